@@ -1,0 +1,282 @@
+//! The valid configuration of one site: every value checked, metres, radians and seconds inside.
+
+use std::path::PathBuf;
+
+use serde::Serialize;
+
+use crate::{frames::MarsDatum, time::PointingBias};
+
+/// Everything that `areograph run` needs to know about a site.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct SiteConfig {
+    /// Identifier: lower-case letters, digits, `_` and `-`; also the folder of its products.
+    pub site: String,
+    /// Free text for the report.
+    pub description: String,
+    /// The file it was read from.
+    pub file: PathBuf,
+    /// Where kernels come from.
+    pub kernels: KernelsConfig,
+    /// Pointing (CK) bias.
+    pub pointing: PointingConfig,
+    /// MOLA clock bias.
+    pub mola_clock: MolaClock,
+    /// PEDR files and filters.
+    pub pedr: PedrConfig,
+    /// Windows on the ground, 1 to 64; bit `i` of `Footprints::windows` is entry `i`.
+    pub windows: Vec<WindowConfig>,
+    /// Images, possibly none.
+    pub images: Vec<ImageConfig>,
+    /// Limits of the range check.
+    pub range_check: RangeCheckConfig,
+    /// Sampling of exterior orientation.
+    pub orientation: OrientationConfig,
+}
+
+/// Where kernels come from, and how coverage is judged.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct KernelsConfig {
+    /// The source of the kernel list.
+    pub source: KernelSource,
+    /// How far from an attitude sample the C-kernel may be asked, seconds; 0 asks only inside its intervals.
+    pub ck_tolerance_s: f64,
+    /// Margin that coverage must have beyond the first and last instant used, seconds.
+    pub padding_s: f64,
+}
+
+/// The three ways to name kernels.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum KernelSource {
+    /// A metakernel; relative paths in it count from its own folder.
+    Metakernel(PathBuf),
+    /// Files in load order (later ones win).
+    Files(Vec<PathBuf>),
+    /// A folder to choose from.
+    Root(KernelSelection),
+}
+
+/// How kernels are chosen from a folder.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct KernelSelection {
+    /// The folder, searched with its subfolders.
+    pub root: PathBuf,
+    /// Orbit solution, for example `nav`, `gsfc` or `ipng`.
+    pub spk_family: String,
+    /// Attitude qualities that may be used, best first: `reconstructed`, `nominal`.
+    pub ck_quality: Vec<CkQuality>,
+    /// Text kernels pinned by file name, such as `pck00010.tpc`; without one the latest version is taken.
+    pub pinned: Vec<String>,
+}
+
+/// Where an attitude kernel comes from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum CkQuality {
+    /// From telemetry.
+    Reconstructed,
+    /// Commanded attitude that fills telemetry gaps (`mgs_ext_roto_all_v*`); loaded first, so that telemetry wins.
+    Nominal,
+}
+
+/// Pointing bias and where its value comes from.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct PointingConfig {
+    /// The bias; it moves attitude look-ups only.
+    pub ck_bias: PointingBias,
+    /// Citation that products repeat.
+    pub source: String,
+}
+
+/// The clock bias of MOLA: how shot tags become shot times.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct MolaClock {
+    /// Size, seconds, not negative.
+    pub bias_s: f64,
+    /// On which side of the true time the tags lie.
+    pub sign: TagSign,
+    /// What the corrected time is used for.
+    pub scope: BiasScope,
+    /// Citation that products repeat.
+    pub source: String,
+}
+
+/// On which side of the true time a tag lies.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum TagSign {
+    /// Tags are late: true time = tag − bias.
+    Late,
+    /// Tags are early: true time = tag + bias.
+    Early,
+}
+
+/// What the corrected shot time is used for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum BiasScope {
+    /// The spacecraft's position in the range check; the default, which is what Shan 2005 did.
+    SpkLookup,
+    /// The rotation into IAU 2000 (the one out of the file's datum stays at the tag).
+    Rotation,
+    /// Both.
+    Both,
+    /// Nothing: tags are taken as they are.
+    None,
+}
+
+impl MolaClock {
+    /// Seconds to add to a tag: `−bias` for late tags, `+bias` for early ones, 0 when switched off.
+    #[must_use]
+    pub fn correction_s(&self) -> f64 {
+        match (self.scope, self.sign) {
+            (BiasScope::None, _) => 0.0,
+            (_, TagSign::Late) => -self.bias_s,
+            (_, TagSign::Early) => self.bias_s,
+        }
+    }
+
+    /// Whether the spacecraft's position is looked up at the corrected time.
+    #[must_use]
+    pub const fn moves_spacecraft(&self) -> bool {
+        matches!(self.scope, BiasScope::SpkLookup | BiasScope::Both)
+    }
+
+    /// Whether Mars turns between leaving the file's datum and entering IAU 2000.
+    #[must_use]
+    pub const fn moves_rotation(&self) -> bool {
+        matches!(self.scope, BiasScope::Rotation | BiasScope::Both)
+    }
+}
+
+/// PEDR files and filters.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct PedrConfig {
+    /// The files, globs resolved, sorted, without repeats.
+    pub files: Vec<PathBuf>,
+    /// Datum of their coordinates.
+    pub datum: DatumChoice,
+    /// Shots to keep.
+    pub filter: ShotFilter,
+}
+
+/// How the datum of a PEDR file is decided.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum DatumChoice {
+    /// By version letter and label: L is IAU 2000, older ones IAU 1991.
+    Auto,
+    /// As stated; a contradiction with letter or label is an error.
+    Stated(MarsDatum),
+}
+
+/// Shots to keep; a shot must pass every test.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ShotFilter {
+    /// Classification codes (1 ground, 0 cloud or noise).
+    pub classes: Vec<i16>,
+    /// Trigger channels, 1 to 4.
+    pub channels: Vec<u8>,
+    /// Attitude flags (0 known, 2 partly, 3 unknown).
+    pub attitude_flags: Vec<u16>,
+    /// Largest off-nadir angle, radians.
+    pub off_nadir_max_rad: f64,
+}
+
+/// A window on the ground.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct WindowConfig {
+    /// Identifier, unique in the site.
+    pub id: String,
+    /// Its outline in IAU 2000 areocentric latitude and east longitude.
+    pub shape: WindowShape,
+}
+
+/// Outline of a window, radians.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum WindowShape {
+    /// From `west_rad` eastwards to `east_rad`, both `0..2π`; `west > east` crosses 0°.
+    /// A box over all longitudes has `west = 0`, `east = 2π`, and holds a pole when it reaches ±π/2.
+    Box {
+        /// Western edge, radians.
+        west_rad: f64,
+        /// Eastern edge, radians.
+        east_rad: f64,
+        /// Southern edge, radians.
+        south_rad: f64,
+        /// Northern edge, radians.
+        north_rad: f64,
+    },
+    /// GeoJSON polygons; each is an outer ring followed by holes, rings of (longitude, latitude) as written.
+    Polygons {
+        /// Polygons, rings, vertices: radians.
+        polygons: Vec<Vec<Vec<[f64; 2]>>>,
+    },
+}
+
+/// An image: a label, keys written in the configuration, or both (keys written here win).
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ImageConfig {
+    /// Identifier, unique in the site; also a folder name.
+    pub id: String,
+    /// PDS3 or ISIS label, attached or detached.
+    pub label: Option<PathBuf>,
+    /// Keys written in the configuration.
+    pub fields: ImageFields,
+}
+
+/// What a label or the configuration says of an image; anything may be missing from either.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+pub struct ImageFields {
+    /// Spacecraft clock at the start of the first line, for example `619971158:28`.
+    pub sclk_start: Option<String>,
+    /// UTC at the start of the first line, used when there is no clock string.
+    pub utc_start: Option<String>,
+    /// Exposure of one detector line, seconds.
+    pub exposure_s: Option<f64>,
+    /// Time between two image lines, seconds.
+    pub line_period_s: Option<f64>,
+    /// Detector lines summed along the track.
+    pub downtrack_summing: Option<u32>,
+    /// Detector pixels summed across the track.
+    pub crosstrack_summing: Option<u32>,
+    /// Lines that were exposed, as the header says; the time model counts these.
+    pub lines_header: Option<u32>,
+    /// Lines in the delivered file, when fewer.
+    pub lines_delivered: Option<u32>,
+    /// Samples per line.
+    pub samples: Option<u32>,
+    /// First detector pixel, counted from 0 (`EDIT_MODE_ID`).
+    pub first_detector: Option<u32>,
+}
+
+/// Limits and options of the range check.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct RangeCheckConfig {
+    /// Largest |mean| of a valid profile, metres.
+    pub mean_max_m: f64,
+    /// A shot farther from the median than this many robust standard deviations is an outlier.
+    pub outlier_sigma: f64,
+    /// Largest share of outliers in a valid profile, 0 to 1.
+    pub outlier_share_max: f64,
+    /// Fewest shots of a valid profile.
+    pub shots_min: u32,
+    /// Largest |range − distance to the file's own spacecraft position| (mean) of a valid profile, metres.
+    pub decoding_max_m: f64,
+    /// Largest clock bias that the scan tries on either side, seconds.
+    pub scan_half_width_s: f64,
+    /// Step of the scan, seconds.
+    pub scan_step_s: f64,
+}
+
+/// Sampling of exterior orientation.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct OrientationConfig {
+    /// Equal intervals over the image; one epoch more than intervals.
+    pub intervals: u32,
+    /// Largest second-order position RMSE (norm of x, y, z) of a valid sensor model, metres.
+    pub position_rmse_max_m: f64,
+    /// Largest second-order pointing RMSE (each angle) of a valid sensor model, radians.
+    pub pointing_rmse_max_rad: f64,
+}

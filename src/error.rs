@@ -1,0 +1,232 @@
+//! What can go wrong, and where: one wrapper adds the place, each room's own enum says the cause.
+//!
+//! A cause is a [`Fault`]: it knows its [`Kind`] (hence the exit code) and what to do about it.
+//! [`Failure`] carries it upwards and collects site, stage, file and record on the way.
+
+use std::{fmt, path::PathBuf};
+
+/// Kinds of failure; each is an exit code of the program.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+#[repr(u8)]
+pub enum Kind {
+    /// A fault of areograph itself.
+    Bug = 1,
+    /// Command line or configuration.
+    Configuration = 2,
+    /// Labels, PEDR files, kernels whose content is not what it should be.
+    Input = 3,
+    /// Kernels do not cover what was asked.
+    Coverage = 4,
+    /// The products exist but are marked invalid.
+    Validation = 5,
+    /// The operating system refused to read or write.
+    Io = 6,
+}
+
+impl Kind {
+    /// The exit code of the process.
+    #[must_use]
+    pub const fn exit_code(self) -> u8 {
+        self as u8
+    }
+}
+
+/// A cause of failure, with its kind and advice.
+pub trait Fault: std::error::Error + Send + Sync + 'static {
+    /// Which kind of failure this is.
+    fn kind(&self) -> Kind;
+    /// What the user can do about it, one sentence.
+    fn advice(&self) -> String;
+}
+
+/// A fault together with the place where it happened.
+#[derive(Debug)]
+pub struct Failure {
+    /// Site, once the flow knows it.
+    pub site: Option<String>,
+    /// Stage of the flow.
+    pub stage: Option<&'static str>,
+    /// File that was read or written.
+    pub file: Option<PathBuf>,
+    /// Record of that file, counted from 1 as a reader of the file counts.
+    pub record: Option<u64>,
+    /// The cause.
+    pub fault: Box<dyn Fault>,
+}
+
+impl Failure {
+    /// A failure whose place is not known yet.
+    pub fn new(fault: impl Fault) -> Self {
+        Self {
+            site: None,
+            stage: None,
+            file: None,
+            record: None,
+            fault: Box::new(fault),
+        }
+    }
+
+    /// The same failure, known to concern `file` (an inner file stays).
+    #[must_use]
+    pub fn in_file(mut self, file: impl Into<PathBuf>) -> Self {
+        self.file.get_or_insert_with(|| file.into());
+        self
+    }
+
+    /// The same failure, known to concern record `record`, counted from 1.
+    #[must_use]
+    pub fn at_record(mut self, record: u64) -> Self {
+        self.record.get_or_insert(record);
+        self
+    }
+
+    /// The same failure, known to come from `stage`.
+    #[must_use]
+    pub fn in_stage(mut self, stage: &'static str) -> Self {
+        self.stage.get_or_insert(stage);
+        self
+    }
+
+    /// The same failure, known to concern `site`.
+    #[must_use]
+    pub fn in_site(mut self, site: &str) -> Self {
+        self.site.get_or_insert_with(|| site.to_owned());
+        self
+    }
+
+    /// The kind of the cause.
+    #[must_use]
+    pub fn kind(&self) -> Kind {
+        self.fault.kind()
+    }
+}
+
+impl<F: Fault> From<F> for Failure {
+    fn from(fault: F) -> Self {
+        Self::new(fault)
+    }
+}
+
+impl fmt::Display for Failure {
+    /// `site/stage: file record n: cause`, then a second line with the advice.
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match (&self.site, self.stage) {
+            (Some(site), Some(stage)) => write!(formatter, "{site}/{stage}: ")?,
+            (Some(site), None) => write!(formatter, "{site}: ")?,
+            (None, Some(stage)) => write!(formatter, "{stage}: ")?,
+            (None, None) => {}
+        }
+        if let Some(file) = &self.file {
+            write!(formatter, "{}", file.display())?;
+            if let Some(record) = self.record {
+                write!(formatter, " record {record}")?;
+            }
+            write!(formatter, ": ")?;
+        }
+        write!(formatter, "{}", self.fault)?;
+        let advice = self.fault.advice();
+        if !advice.is_empty() {
+            write!(formatter, "\n  what to do: {advice}")?;
+        }
+        Ok(())
+    }
+}
+
+/// What fallible functions above the lowest floor return.
+pub type Result<T> = std::result::Result<T, Failure>;
+
+/// Adds the place to a result on its way up.
+pub trait Place<T> {
+    /// See [`Failure::in_file`].
+    ///
+    /// # Errors
+    /// The same failure, with its place.
+    fn in_file(self, file: impl Into<PathBuf>) -> Result<T>;
+    /// See [`Failure::in_stage`].
+    ///
+    /// # Errors
+    /// The same failure, with its place.
+    fn in_stage(self, stage: &'static str) -> Result<T>;
+    /// See [`Failure::in_site`].
+    ///
+    /// # Errors
+    /// The same failure, with its place.
+    fn in_site(self, site: &str) -> Result<T>;
+}
+
+impl<T, E: Into<Failure>> Place<T> for std::result::Result<T, E> {
+    fn in_file(self, file: impl Into<PathBuf>) -> Result<T> {
+        self.map_err(|error| error.into().in_file(file))
+    }
+
+    fn in_stage(self, stage: &'static str) -> Result<T> {
+        self.map_err(|error| error.into().in_stage(stage))
+    }
+
+    fn in_site(self, site: &str) -> Result<T> {
+        self.map_err(|error| error.into().in_site(site))
+    }
+}
+
+/// The operating system refused a file operation.
+#[derive(Debug, thiserror::Error)]
+#[error("cannot {action}: {source}")]
+pub struct IoFault {
+    /// What was tried, for example "read" or "rename into place".
+    pub action: &'static str,
+    /// The system's reason.
+    pub source: std::io::Error,
+}
+
+impl IoFault {
+    /// For `map_err`: `File::open(path).map_err(IoFault::on("open")).in_file(path)?`.
+    pub fn on(action: &'static str) -> impl Fn(std::io::Error) -> Self {
+        move |source| Self { action, source }
+    }
+}
+
+impl Fault for IoFault {
+    fn kind(&self) -> Kind {
+        Kind::Io
+    }
+
+    fn advice(&self) -> String {
+        use std::io::ErrorKind;
+        match self.source.kind() {
+            ErrorKind::NotFound => {
+                "check the path; relative paths in a configuration count from that file's folder"
+            }
+            ErrorKind::PermissionDenied => "check the permissions of the file and its folder",
+            ErrorKind::StorageFull | ErrorKind::QuotaExceeded => {
+                "free some space or choose another --out, then run again: finished stages are kept"
+            }
+            ErrorKind::IsADirectory | ErrorKind::NotADirectory => {
+                "check the path: a file and a folder are mixed up"
+            }
+            _ => "check the file and the disk, then run again",
+        }
+        .to_owned()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_failure_names_its_whole_place_and_its_advice() {
+        let fault = IoFault::on("read")(std::io::ErrorKind::NotFound.into());
+        let failure = Failure::from(fault)
+            .in_file("ap19019k.b")
+            .at_record(41)
+            .in_stage("search_footprints")
+            .in_site("gusev")
+            .in_file("outer.toml");
+        assert_eq!(
+            failure.to_string(),
+            "gusev/search_footprints: ap19019k.b record 41: cannot read: entity not found\n  \
+             what to do: check the path; relative paths in a configuration count from that file's folder"
+        );
+        assert_eq!(failure.kind().exit_code(), 6);
+    }
+}

@@ -1,0 +1,139 @@
+//! Laser footprints as columns, from the PEDR reader to the Parquet writer.
+
+use std::{marker::PhantomData, path::PathBuf};
+
+use serde::{Deserialize, Serialize};
+
+use crate::frames::MarsDatum;
+
+/// State of footprint coordinates as their files have them; each file says its own datum.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub struct AsRead;
+
+/// A PEDR file that footprints came from.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct SourceFile {
+    /// Path as configured or found.
+    pub path: PathBuf,
+    /// Version letter of the file name in upper case, `None` when the name has none.
+    pub version: Option<char>,
+    /// Datum of the file's longitudes and latitudes.
+    pub datum: MarsDatum,
+    /// BLAKE3 of the file's bytes, hexadecimal.
+    pub blake3: String,
+}
+
+macro_rules! columns {
+    ($($(#[$doc:meta])* $column:ident: $kind:ty,)*) => {
+        /// One shot, for building columns and for messages.
+        #[derive(Debug, Clone, Copy, PartialEq)]
+        pub struct Footprint { $($(#[$doc])* pub $column: $kind,)* }
+
+        /// Footprints of a site, one entry per shot in every column, ordered by file, record and shot.
+        ///
+        /// `D` tells whose coordinates they are: [`AsRead`] or a frame such as
+        /// [`MarsIau2000`](crate::frames::MarsIau2000). Only `stages::convert_datum` changes it, so
+        /// converting twice does not compile.
+        #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+        pub struct Footprints<D> {
+            /// The files that `file` counts into.
+            pub files: Vec<SourceFile>,
+            $($(#[$doc])* pub $column: Vec<$kind>,)*
+            datum: PhantomData<D>,
+        }
+
+        impl<D> Footprints<D> {
+            /// No footprints yet, of these files.
+            #[must_use]
+            pub const fn new(files: Vec<SourceFile>) -> Self {
+                Self { files, $($column: Vec::new(),)* datum: PhantomData }
+            }
+
+            /// Appends one shot.
+            pub fn push(&mut self, footprint: &Footprint) {
+                $(self.$column.push(footprint.$column);)*
+            }
+
+            /// Appends all shots of `other`, which must count into the same files.
+            pub fn append(&mut self, mut other: Self) {
+                $(self.$column.append(&mut other.$column);)*
+            }
+
+            /// The shot in row `row`, counted from 0.
+            ///
+            /// # Panics
+            /// When there is no such row.
+            #[must_use]
+            pub fn row(&self, row: usize) -> Footprint {
+                Footprint { $($column: self.$column[row],)* }
+            }
+
+            /// The same columns, their coordinates now said to belong to `E`.
+            ///
+            /// For the stage that converts the coordinates, and for the reader of its product.
+            #[must_use]
+            pub fn declare<E>(self) -> Footprints<E> {
+                Footprints { files: self.files, $($column: self.$column,)* datum: PhantomData }
+            }
+        }
+    };
+}
+
+columns! {
+    /// Time tag of the shot in the file, ET seconds.
+    et_tag_s: f64,
+    /// Time of the shot after the MOLA clock correction, ET seconds.
+    et_s: f64,
+    /// Orbit number of the frame.
+    orbit: u32,
+    /// Index into `files`.
+    file: u16,
+    /// Record of the file, counted from 1 with the label records.
+    record: u32,
+    /// Shot in the frame, 1 to 20.
+    shot: u8,
+    /// East longitude, radians, `0..2π`, parallax corrected.
+    longitude_rad: f64,
+    /// Areocentric latitude, radians, parallax corrected.
+    latitude_rad: f64,
+    /// Planetary radius before the crossover correction, metres.
+    radius_m: f64,
+    /// Planetary radius after the crossover correction, metres.
+    radius_crossover_m: f64,
+    /// Areoid radius, metres.
+    areoid_radius_m: f64,
+    /// One-way range to the spacecraft's centre of mass, metres.
+    range_m: f64,
+    /// East longitude of the spacecraft in the file's own orbit solution, radians.
+    spacecraft_longitude_rad: f64,
+    /// Areocentric latitude of the spacecraft in the file's own orbit solution, radians.
+    spacecraft_latitude_rad: f64,
+    /// Distance of the spacecraft from the centre of Mars in the file's own orbit solution, metres.
+    spacecraft_radius_m: f64,
+    /// Off-nadir angle of the laser, radians.
+    off_nadir_rad: f64,
+    /// Trigger channel, 1 to 4 (other values are kept as found).
+    channel: u8,
+    /// Classification: 1 ground, 0 cloud or noise.
+    class: i16,
+    /// 0 attitude known, 2 known for part of the frame, 3 unknown (footprint assumes nadir).
+    attitude_flag: u16,
+    /// 0 orbit from JPL, 1 or more: MOLA team's gravity model number.
+    orbit_quality: u16,
+    /// Bit `i` set: the shot lies in window `i` of the site.
+    windows: u64,
+}
+
+impl<D> Footprints<D> {
+    /// Number of shots.
+    #[must_use]
+    pub const fn len(&self) -> usize {
+        self.et_tag_s.len()
+    }
+
+    /// Whether there are no shots.
+    #[must_use]
+    pub const fn is_empty(&self) -> bool {
+        self.et_tag_s.is_empty()
+    }
+}

@@ -1,0 +1,168 @@
+//! Reference frames as types: positions and rotations say which frame they belong to.
+//!
+//! Types do not see time, so a [`Rotation`] carries the instant at which it holds, and two rotations
+//! of different instants do not combine.
+
+use std::{fmt, marker::PhantomData, ops::Mul};
+
+use nalgebra::{Matrix3, Vector3};
+use serde::{Deserialize, Serialize};
+
+use crate::{
+    constants::{MARS_IAU1991, MARS_IAU1994, MARS_IAU2000, MarsModel},
+    time::Et,
+};
+
+/// A reference frame with right-handed axes.
+pub trait Frame: Copy + fmt::Debug + Send + Sync + 'static {
+    /// Name as messages and products write it.
+    const NAME: &'static str;
+}
+
+/// A frame fixed to the body of Mars by one IAU report.
+pub trait MarsFixed: Frame {
+    /// Rotation and shape of that report.
+    const MODEL: MarsModel;
+}
+
+macro_rules! frames {
+    ($($(#[$doc:meta])* $frame:ident = $name:literal $(: $model:expr)?;)*) => {$(
+        $(#[$doc])*
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+        pub struct $frame;
+        impl Frame for $frame { const NAME: &'static str = $name; }
+        $(impl MarsFixed for $frame { const MODEL: MarsModel = $model; })?
+    )*};
+}
+
+frames! {
+    /// Inertial, Earth mean equator and equinox of J2000.
+    J2000 = "J2000";
+    /// Mars body-fixed, IAU 1991 report (W₀ = 176.868°).
+    MarsIau1991 = "IAU_MARS (1991)": MARS_IAU1991;
+    /// Mars body-fixed, IAU 1994 report (W₀ = 176.901°).
+    MarsIau1994 = "IAU_MARS (1994)": MARS_IAU1994;
+    /// Mars body-fixed, IAU 2000 report (W₀ = 176.630°); the frame of every product.
+    MarsIau2000 = "IAU_MARS (2000)": MARS_IAU2000;
+    /// Bus of Mars Global Surveyor: +Z towards nadir, flight along −X.
+    MgsBus = "MGS_SPACECRAFT";
+    /// MOC narrow-angle camera: +Z boresight, +Y along the detector.
+    MocNa = "MGS_MOC_NA";
+}
+
+/// Which IAU report a file's Mars-fixed coordinates follow, known only when the file is read.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum MarsDatum {
+    /// W₀ = 176.868°.
+    Iau1991,
+    /// W₀ = 176.901°.
+    Iau1994,
+    /// W₀ = 176.630°.
+    Iau2000,
+}
+
+impl MarsDatum {
+    /// Rotation and shape of the report.
+    #[must_use]
+    pub const fn model(self) -> MarsModel {
+        match self {
+            Self::Iau1991 => MARS_IAU1991,
+            Self::Iau1994 => MARS_IAU1994,
+            Self::Iau2000 => MARS_IAU2000,
+        }
+    }
+}
+
+impl fmt::Display for MarsDatum {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.write_str(self.model().name)
+    }
+}
+
+/// A position in frame `F`, metres from the centre of Mars.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Position<F> {
+    /// Components, metres.
+    pub xyz_m: Vector3<f64>,
+    frame: PhantomData<fn(F)>,
+}
+
+impl<F: Frame> Position<F> {
+    /// The position with components `xyz_m`, metres.
+    #[must_use]
+    pub const fn new(xyz_m: Vector3<f64>) -> Self {
+        Self {
+            xyz_m,
+            frame: PhantomData,
+        }
+    }
+
+    /// Distance to `other`, metres.
+    #[must_use]
+    pub fn distance_m(&self, other: &Self) -> f64 {
+        (self.xyz_m - other.xyz_m).norm()
+    }
+}
+
+/// Takes components in `A` to components in `B`; holds at one instant.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Rotation<A, B> {
+    matrix: Matrix3<f64>,
+    at: Et,
+    frames: PhantomData<fn(A) -> B>,
+}
+
+impl<A: Frame, B: Frame> Rotation<A, B> {
+    /// The rotation whose rows are the axes of `B` in components of `A`, at instant `at`.
+    #[must_use]
+    pub const fn new(matrix: Matrix3<f64>, at: Et) -> Self {
+        Self {
+            matrix,
+            at,
+            frames: PhantomData,
+        }
+    }
+
+    /// The matrix that multiplies components in `A`.
+    #[must_use]
+    pub const fn matrix(&self) -> &Matrix3<f64> {
+        &self.matrix
+    }
+
+    /// The instant at which the rotation holds.
+    #[must_use]
+    pub const fn at(&self) -> Et {
+        self.at
+    }
+
+    /// The rotation from `B` back to `A`.
+    #[must_use]
+    pub fn inverse(&self) -> Rotation<B, A> {
+        Rotation::new(self.matrix.transpose(), self.at)
+    }
+
+    /// A position, its components taken from `A` to `B`.
+    #[must_use]
+    pub fn apply(&self, position: &Position<A>) -> Position<B> {
+        Position::new(self.matrix * position.xyz_m)
+    }
+}
+
+impl<A: Frame, B: Frame, C: Frame> Mul<Rotation<A, B>> for Rotation<B, C> {
+    type Output = Rotation<A, C>;
+
+    /// First `first`, then `self`.
+    ///
+    /// # Panics
+    /// When the two hold at different instants: that is an error of the program, not of its input.
+    fn mul(self, first: Rotation<A, B>) -> Rotation<A, C> {
+        assert!(
+            self.at == first.at,
+            "rotations of two instants, {} and {}",
+            self.at,
+            first.at
+        );
+        Rotation::new(self.matrix * first.matrix, self.at)
+    }
+}

@@ -1,0 +1,9 @@
+//! Pure geometry: no files, no clocks, no SPICE.
+
+pub mod attitude;
+pub mod chebyshev;
+pub mod ellipsoid;
+pub mod mars_rotation;
+pub mod polynomial;
+pub mod statistics;
+pub mod window;

@@ -1,0 +1,13 @@
+//! areograph: Mars Global Surveyor data preparation, from SPICE kernels, MOLA shots and MOC images
+//! to validated, photogrammetry-ready products.
+//!
+//! The way of the data is [`flow::run_site`], read top to bottom; `ARCHITECTURE.md` is the map.
+
+pub mod config;
+pub mod constants;
+pub mod error;
+pub mod footprints;
+pub mod frames;
+pub mod geom;
+pub mod time;
+pub mod units;

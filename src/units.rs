@@ -1,0 +1,51 @@
+//! Conversions at the boundary: kilometres, degrees, microdegrees and centimetres exist only in files.
+//!
+//! Inside areograph lengths are metres, angles radians and times seconds. Parsers multiply by these
+//! constants and writers divide by them; nothing else does.
+
+/// Metres in a kilometre.
+pub const METRES_PER_KM: f64 = 1_000.0;
+/// Metres in a centimetre, the length unit of PEDR integers.
+pub const METRES_PER_CM: f64 = 0.01;
+/// Radians in a degree.
+pub const RADIANS_PER_DEGREE: f64 = std::f64::consts::PI / 180.0;
+/// Radians in a microdegree, the angle unit of PEDR integers.
+pub const RADIANS_PER_MICRODEGREE: f64 = RADIANS_PER_DEGREE * 1e-6;
+/// Radians in an arcsecond.
+pub const RADIANS_PER_ARCSECOND: f64 = RADIANS_PER_DEGREE / 3_600.0;
+/// Seconds in a millisecond.
+pub const SECONDS_PER_MS: f64 = 1e-3;
+/// Seconds in a day of 86 400 s.
+pub const SECONDS_PER_DAY: f64 = 86_400.0;
+
+/// An angle in radians brought into `0 <= angle < 2π`.
+#[must_use]
+pub fn wrap_two_pi(angle_rad: f64) -> f64 {
+    let turn = std::f64::consts::TAU;
+    let wrapped = angle_rad.rem_euclid(turn);
+    // A tiny negative angle rounds up to the full turn itself.
+    if wrapped >= turn { 0.0 } else { wrapped }
+}
+
+/// An angle in radians brought into `-π <= angle < π`.
+#[must_use]
+pub fn wrap_pi(angle_rad: f64) -> f64 {
+    wrap_two_pi(angle_rad + std::f64::consts::PI) - std::f64::consts::PI
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::f64::consts::{PI, TAU};
+
+    #[test]
+    fn wrapping_keeps_the_half_open_ranges() {
+        for turns in -3..=3 {
+            for angle in [-1e-17, 0.0, 1e-17, 1.0, PI, TAU - 1e-9] {
+                let shifted = angle + f64::from(turns) * TAU;
+                assert!((0.0..TAU).contains(&wrap_two_pi(shifted)), "{shifted}");
+                assert!((-PI..PI).contains(&wrap_pi(shifted)), "{shifted}");
+            }
+        }
+    }
+}

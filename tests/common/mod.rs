@@ -1,0 +1,22 @@
+//! Where the real data of the oracle tests lie.
+
+use std::path::{Path, PathBuf};
+
+/// A path below `AREOGRAPH_DATA` or `../shared/data`; without the data one line says what is skipped.
+#[allow(
+    clippy::disallowed_methods,
+    clippy::print_stderr,
+    reason = "tests find their data by an environment variable and say what they skip"
+)]
+pub fn real_data(relative: &str, test: &str) -> Option<PathBuf> {
+    let root = std::env::var("AREOGRAPH_DATA").map_or_else(
+        |_| Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data"),
+        PathBuf::from,
+    );
+    let path = root.join(relative);
+    if path.exists() {
+        return Some(path);
+    }
+    eprintln!("skipped {test}: no {} (set AREOGRAPH_DATA)", path.display());
+    None
+}
