@@ -149,14 +149,16 @@ impl<A: Frame, B: Frame> Rotation<A, B> {
     }
 }
 
-impl<A: Frame, B: Frame, C: Frame> Mul<Rotation<A, B>> for Rotation<B, C> {
-    type Output = Rotation<A, C>;
+impl<Start: Frame, Middle: Frame, End: Frame> Mul<Rotation<Start, Middle>>
+    for Rotation<Middle, End>
+{
+    type Output = Rotation<Start, End>;
 
     /// First `first`, then `self`.
     ///
     /// # Panics
     /// When the two hold at different instants: that is an error of the program, not of its input.
-    fn mul(self, first: Rotation<A, B>) -> Rotation<A, C> {
+    fn mul(self, first: Rotation<Start, Middle>) -> Rotation<Start, End> {
         assert!(
             self.at == first.at,
             "rotations of two instants, {} and {}",
