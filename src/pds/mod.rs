@@ -1,0 +1,3 @@
+//! Bytes to typed records and back: MOLA PEDR files and the labels of MOC images.
+
+pub mod pedr;
