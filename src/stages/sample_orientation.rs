@@ -110,13 +110,7 @@ pub fn sample_orientation(
     pointing: &PointingConfig,
     sampling: &OrientationConfig,
 ) -> Result<Orientation> {
-    let exposures = image.exposures();
-    session.require_position(exposures.padded(kernels.padding_s))?;
-    session.require_attitude(
-        exposures.padded(kernels.padding_s),
-        pointing.ck_bias,
-        kernels.ck_tolerance_s,
-    )?;
+    require_coverage(session, image, kernels, pointing)?;
     let reader = Reader {
         session,
         pointing,
@@ -136,6 +130,23 @@ pub fn sample_orientation(
         samples,
         tables: reader.tables(&table_epochs(image, kernels.padding_s))?,
     })
+}
+
+/// Checks that position and attitude are covered over the image with its padding.
+///
+/// What is asked is what will be read: attitude at the exposures shifted by the pointing bias.
+///
+/// # Errors
+/// A gap, named with its ends and the kernels beside it.
+pub fn require_coverage(
+    session: &Session,
+    image: &ImageTimes,
+    kernels: &KernelsConfig,
+    pointing: &PointingConfig,
+) -> Result<()> {
+    let padded = image.exposures().padded(kernels.padding_s);
+    session.require_position(padded)?;
+    session.require_attitude(padded, pointing.ck_bias, kernels.ck_tolerance_s)
 }
 
 /// Epochs of the camera tables: uniform, both image ends on the grid, beyond them within the padding.
