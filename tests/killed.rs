@@ -15,7 +15,12 @@ const KILLS: u32 = 20;
 
 fn run(site: &Path, out: &Path, threads: &str) -> std::process::Command {
     let mut command = areograph();
-    command.arg("run").arg(site).arg("--out").arg(out).args(["--threads", threads]);
+    command
+        .arg("run")
+        .arg(site)
+        .arg("--out")
+        .arg(out)
+        .args(["--threads", threads]);
     command.stdout(std::process::Stdio::null());
     command
 }
@@ -35,7 +40,8 @@ fn killed_at_twenty_moments() {
         let out = folder.path().join(format!("killed-{moment}"));
         let mut child = run(&site, &out, "2").spawn().unwrap();
         // Moments over the whole run, shifted by a golden-ratio sequence so that they never line up.
-        let share = (f64::from(moment) + (f64::from(moment) * 0.618_034).fract()) / f64::from(KILLS);
+        let share =
+            (f64::from(moment) + (f64::from(moment) * 0.618_034).fract()) / f64::from(KILLS);
         sleep(Duration::from_secs_f64(whole_run.as_secs_f64() * share));
         child.kill().unwrap();
         killed += u32::from(!child.wait().unwrap().success());
@@ -47,9 +53,15 @@ fn killed_at_twenty_moments() {
             );
         }
         succeed(&mut run(&site, &out, "2"));
-        assert!(products(&out) == undisturbed, "products differ after kill {moment}");
+        assert!(
+            products(&out) == undisturbed,
+            "products differ after kill {moment}"
+        );
     }
-    assert!(killed >= KILLS / 2, "only {killed} runs were killed before they ended");
+    assert!(
+        killed >= KILLS / 2,
+        "only {killed} runs were killed before they ended"
+    );
 }
 
 #[test]

@@ -5,7 +5,9 @@ mod common;
 use std::{fs, path::PathBuf};
 
 use areograph::{
-    config::{ImageConfig, ImageFields, KernelSource, KernelsConfig, OrientationConfig, PointingConfig},
+    config::{
+        ImageConfig, ImageFields, KernelSource, KernelsConfig, OrientationConfig, PointingConfig,
+    },
     constants::MGS_POINTING_BIAS,
     geom::attitude::matrix_of_spice_quaternion,
     spice::{KernelSet, Session},
@@ -62,20 +64,29 @@ fn m0402852(test: &str) -> Option<(ImageTimes, Orientation, Value)> {
         ck_bias: MGS_POINTING_BIAS,
         source: String::new(),
     };
-    let orientation =
-        sample_orientation(&session, &times, &kernels, &pointing, &SAMPLING).unwrap();
+    let orientation = sample_orientation(&session, &times, &kernels, &pointing, &SAMPLING).unwrap();
     Some((times, orientation, truth["eo_m0402852"].clone()))
 }
 
 fn numbers(value: &Value) -> Vec<f64> {
-    value.as_array().unwrap().iter().map(|n| n.as_f64().unwrap()).collect()
+    value
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|n| n.as_f64().unwrap())
+        .collect()
 }
 
 #[test]
 fn line_times_come_from_the_clock_and_the_summed_exposure() {
-    let Some((times, _, truth)) = m0402852("real line times") else { return };
+    let Some((times, _, truth)) = m0402852("real line times") else {
+        return;
+    };
     assert_eq!(times.start_from, StartFrom::Sclk);
-    assert_eq!((times.lines_header, times.samples, times.first_detector), (1536, 256, 0));
+    assert_eq!(
+        (times.lines_header, times.samples, times.first_detector),
+        (1536, 256, 0)
+    );
     let start_s = truth["start_et"].as_f64().unwrap();
     assert!((times.start.seconds() - start_s).abs() < 1e-9); // seconds, as the issue demands
     assert!((times.line_period_s - 0.003_856_8).abs() < 1e-12); // 0.4821 ms x 8
@@ -88,13 +99,14 @@ fn line_times_come_from_the_clock_and_the_summed_exposure() {
 
 #[test]
 fn orientation_equals_cspice() {
-    let Some((_, orientation, truth)) = m0402852("real orientation") else { return };
+    let Some((_, orientation, truth)) = m0402852("real orientation") else {
+        return;
+    };
     let samples = truth["samples"].as_array().unwrap();
     assert_eq!(orientation.samples.len(), samples.len());
     for (sample, truth) in orientation.samples.iter().zip(samples) {
         assert!((sample.et.seconds() - truth["et"].as_f64().unwrap()).abs() < 5e-9); // two ulp of ET
-        let position_m =
-            METRES_PER_KM * Vector3::from_vec(numbers(&truth["mgs_iau_mars_pos"]));
+        let position_m = METRES_PER_KM * Vector3::from_vec(numbers(&truth["mgs_iau_mars_pos"]));
         let apart_m = (Vector3::from(sample.position_m) - position_m).norm();
         assert!(apart_m < 1e-3, "{apart_m} m"); // 1e-6 km, as the issue demands
         let matrix = matrix_of_spice_quaternion(sample.camera_to_mars);
@@ -108,7 +120,9 @@ fn orientation_equals_cspice() {
 
 #[test]
 fn position_rmse_equals_cspice() {
-    let Some((_, orientation, truth)) = m0402852("real polynomial fits") else { return };
+    let Some((_, orientation, truth)) = m0402852("real polynomial fits") else {
+        return;
+    };
     let model = fit_sensor_model(&orientation, &SAMPLING).unwrap();
     assert!(model.invalid_because.is_empty());
     for (degree, model, tolerance) in [
@@ -126,11 +140,19 @@ fn position_rmse_equals_cspice() {
 #[test]
 fn m0100115_starts_when_ames_stereo_pipeline_says() {
     let test = "real label of M01/00115";
-    let Some(label) = common::real_data("asp_moc/M0100115.imq", test) else { return };
-    let Some(clock) = common::real_data("mgs_text/MGS_SCLKSCET.00061.tsc", test) else { return };
-    let Some(leap) = common::real_data("mgs_text/naif0012.tls", test) else { return };
+    let Some(label) = common::real_data("asp_moc/M0100115.imq", test) else {
+        return;
+    };
+    let Some(clock) = common::real_data("mgs_text/MGS_SCLKSCET.00061.tsc", test) else {
+        return;
+    };
+    let Some(leap) = common::real_data("mgs_text/naif0012.tls", test) else {
+        return;
+    };
     let session = Session::open(&KernelSet::from_files(&[leap, clock]).unwrap()).unwrap();
-    let times = tag_times(&[image("M01-00115", label)], &session).unwrap().remove(0);
+    let times = tag_times(&[image("M01-00115", label)], &session)
+        .unwrap()
+        .remove(0);
     assert!((times.start.seconds() + 20_723_097.688_171).abs() < 1e-6); // printed to a microsecond
     assert!((times.duration_s() - 7.034_803_2).abs() < 1e-9); // 4864 x 0.4821 ms x 3
 }

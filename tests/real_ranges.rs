@@ -59,7 +59,13 @@ fn shots(path: &Path) -> Vec<Shot> {
 }
 
 fn vectors(value: &Value) -> Vec<Vec<f64>> {
-    let numbers = |row: &Value| row.as_array().unwrap().iter().map(|n| n.as_f64().unwrap()).collect();
+    let numbers = |row: &Value| {
+        row.as_array()
+            .unwrap()
+            .iter()
+            .map(|n| n.as_f64().unwrap())
+            .collect()
+    };
     value.as_array().unwrap().iter().map(numbers).collect()
 }
 
@@ -71,9 +77,13 @@ fn times(table: &Value) -> Vec<f64> {
 /// Cubic Hermite interpolation of the support data's positions and velocities, metres, J2000.
 fn inertial_position(table: &Value, et_s: f64) -> Vector3<f64> {
     let times = times(table);
-    let after = times.partition_point(|time| *time <= et_s).clamp(1, times.len() - 1);
+    let after = times
+        .partition_point(|time| *time <= et_s)
+        .clamp(1, times.len() - 1);
     let (t0, step) = (times[after - 1], times[after] - times[after - 1]);
-    let read = |key: &str, row: usize| METRES_PER_KM * Vector3::from_vec(vectors(&table[key])[row].clone());
+    let read = |key: &str, row: usize| {
+        METRES_PER_KM * Vector3::from_vec(vectors(&table[key])[row].clone())
+    };
     let [p0, p1] = [read("positions", after - 1), read("positions", after)];
     let [v0, v1] = [read("velocities", after - 1), read("velocities", after)];
     let u = (et_s - t0) / step;
@@ -93,16 +103,25 @@ fn moon_matrix(table: &Value, et_s: f64) -> Matrix3<f64> {
         UnitQuaternion::from_matrix(&matrix)
     };
     let u = (et_s - times[0]) / (times[1] - times[0]);
-    let constant: Vec<f64> =
-        table["constant_rotation"].as_array().unwrap().iter().map(|n| n.as_f64().unwrap()).collect();
+    let constant: Vec<f64> = table["constant_rotation"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|n| n.as_f64().unwrap())
+        .collect();
     Matrix3::from_row_slice(&constant)
-        * quaternion(0).slerp(&quaternion(1), u).to_rotation_matrix().into_inner()
+        * quaternion(0)
+            .slerp(&quaternion(1), u)
+            .to_rotation_matrix()
+            .into_inner()
 }
 
 #[test]
 fn the_files_own_spacecraft_gives_the_known_offset() {
     let test = "real ranges";
-    let Some(folder) = common::real_data(FOLDER, test) else { return };
+    let Some(folder) = common::real_data(FOLDER, test) else {
+        return;
+    };
     let residuals: Vec<f64> = shots(&folder.join("lidarPoints.csv"))
         .iter()
         .map(|shot| range_residual_m(shot.range_m, &shot.spacecraft, &shot.footprint))
@@ -111,13 +130,19 @@ fn the_files_own_spacecraft_gives_the_known_offset() {
     assert_eq!(summary.n, 105);
     // Range − distance; the data's description states distance − range: 0.5450 m, 0.0007 m.
     assert!((summary.mean + 0.5450).abs() < 0.0005, "{} m", summary.mean); // half the last digit
-    assert!((summary.standard_deviation - 0.0007).abs() < 0.0001, "{} m", summary.standard_deviation);
+    assert!(
+        (summary.standard_deviation - 0.0007).abs() < 0.0001,
+        "{} m",
+        summary.standard_deviation
+    );
 }
 
 #[test]
 fn an_interpolated_trajectory_gives_the_known_offset() {
     let test = "real ranges along a support-data trajectory";
-    let Some(folder) = common::real_data(FOLDER, test) else { return };
+    let Some(folder) = common::real_data(FOLDER, test) else {
+        return;
+    };
     let text = fs::read_to_string(folder.join("lidarObservationImage1.isd")).unwrap();
     let support: Value = serde_json::from_str(&text).unwrap();
     let (position, rotation) = (&support["instrument_position"], &support["body_rotation"]);
@@ -126,12 +151,17 @@ fn an_interpolated_trajectory_gives_the_known_offset() {
         .iter()
         .filter(|shot| (span[0]..=span[span.len() - 1]).contains(&shot.et_s))
         .map(|shot| {
-            let moon_fixed = moon_matrix(rotation, shot.et_s) * inertial_position(position, shot.et_s);
+            let moon_fixed =
+                moon_matrix(rotation, shot.et_s) * inertial_position(position, shot.et_s);
             range_residual_m(shot.range_m, &Position::new(moon_fixed), &shot.footprint)
         })
         .collect();
     let summary = Summary::of(&residuals);
     assert_eq!(summary.n, 54);
     assert!((summary.mean + 0.450).abs() < 0.001, "{} m", summary.mean); // as the issue demands
-    assert!((summary.standard_deviation - 0.001).abs() < 0.0005, "{} m", summary.standard_deviation);
+    assert!(
+        (summary.standard_deviation - 0.001).abs() < 0.0005,
+        "{} m",
+        summary.standard_deviation
+    );
 }

@@ -300,7 +300,7 @@ fn kernel_entries(session: &Session, results: &Results<'_>) -> Result<Vec<Kernel
         .map(|(index, kernel)| {
             let own = coverage.per_kernel.iter().find(|(of, _)| *of == index);
             KernelEntry {
-                name: kernel.name(),
+                name: kernel.file_name(),
                 role: kernel.role.to_string(),
                 bytes: kernel.bytes,
                 blake3: kernel.blake3.clone(),

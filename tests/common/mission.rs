@@ -24,7 +24,11 @@ pub fn mission() -> PathBuf {
     if !mission.join("truth.json").exists() {
         for entry in fs::read_dir(folder).unwrap() {
             let path = entry.unwrap().path();
-            let old = path.file_name().unwrap().to_string_lossy().starts_with("mission-");
+            let old = path
+                .file_name()
+                .unwrap()
+                .to_string_lossy()
+                .starts_with("mission-");
             if old && path.is_dir() {
                 fs::remove_dir_all(path).unwrap();
             }
@@ -51,7 +55,9 @@ pub fn succeed(command: &mut Command) -> Output {
 /// manifest's time of day is cut out.
 pub fn products(folder: &Path) -> std::collections::BTreeMap<PathBuf, Vec<u8>> {
     fn walk(root: &Path, folder: &Path, found: &mut std::collections::BTreeMap<PathBuf, Vec<u8>>) {
-        let Ok(entries) = fs::read_dir(folder) else { return };
+        let Ok(entries) = fs::read_dir(folder) else {
+            return;
+        };
         for entry in entries {
             let path = entry.unwrap().path();
             if path.file_name().unwrap().to_string_lossy().starts_with('.') {
