@@ -10,5 +10,6 @@ pub mod footprints;
 pub mod frames;
 pub mod geom;
 pub mod pds;
+pub mod stages;
 pub mod time;
 pub mod units;
