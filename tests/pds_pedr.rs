@@ -1,5 +1,7 @@
 //! PEDR files written and read back: shot rules by hand, damaged files, arbitrary bytes.
 
+#![allow(clippy::expect_used, reason = "helpers of tests fail as tests do")]
+
 use std::path::Path;
 
 use areograph::{
@@ -255,9 +257,9 @@ fn a_broken_neighbour_leaves_the_crossover_residual_constant() {
     records[1].clock_frequency_hz.set(0);
     let slopes = slopes_m(&file(file_bytes(&records)));
     assert_eq!(slopes.len(), 2);
-    slopes
-        .into_iter()
-        .for_each(|slope_m| assert_metres(slope_m, 0.0));
+    for slope_m in slopes {
+        assert_metres(slope_m, 0.0);
+    }
 }
 
 #[test]
