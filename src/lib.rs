@@ -11,6 +11,7 @@ pub mod frames;
 pub mod geom;
 pub mod pds;
 pub mod spice;
+pub mod stages;
 pub mod store;
 pub mod time;
 pub mod units;

@@ -4,11 +4,21 @@
 //! # Source
 //! PEDR SIS 2.8 as far as its format files are public, and the MOLA team's reader `pedr2tab`.
 
+mod check;
+mod complaint;
 mod encode;
+mod file;
+mod frame;
+mod label;
 mod record;
 mod writer;
 
+pub use check::{Reason, RecordFault};
+pub use complaint::Complaint;
 pub use encode::{EncodeFault, FrameValues};
+pub use file::File;
+pub use frame::{FieldGuard, Frame};
+pub use label::{FileName, PedrLabel, decide_datum};
 pub use record::{RECORD_BYTES, Record};
 pub use writer::{LabelInfo, PedrWriter};
 
