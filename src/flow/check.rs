@@ -1,8 +1,10 @@
 //! Configuration, files and kernel coverage of a site, without running it.
 
+use std::path::Path;
+
 use super::load_kernels;
 use crate::{
-    config::SiteConfig,
+    config::{DatumChoice, SiteConfig},
     error::{Failure, Place, Result},
     pds::pedr,
     spice::Session,
@@ -32,17 +34,23 @@ impl Checked {
 #[must_use]
 pub fn check_site(config: &SiteConfig) -> Checked {
     let mut checked = Checked::default();
-    for file in &config.pedr.files {
-        let datum = pedr::File::open(file)
-            .and_then(|opened| Ok((opened.frames(), opened.datum(config.pedr.datum)?)))
-            .in_file(file)
-            .map(|(frames, datum)| format!("{}: {frames} frames in {datum}", file.display()));
-        checked.note(datum, config);
+    for path in &config.pedr.files {
+        checked.note(check_pedr(path, config.pedr.datum), config);
     }
     if let Err(failure) = check_kernels(config, &mut checked) {
         checked.failures.push(failure.in_site(&config.site));
     }
     checked
+}
+
+fn check_pedr(path: &Path, choice: DatumChoice) -> Result<String> {
+    let file = pedr::File::open(path)?;
+    let version = file.name().map(|name| name.version);
+    let datum = pedr::decide_datum(choice, version, file.label().datum).in_file(path)?;
+    let complaints: Vec<String> =
+        file.label_complaints().iter().map(|complaint| format!("; {}", complaint.text)).collect();
+    let frames = file.records().len();
+    Ok(format!("{}: {frames} frames in {datum}{}", path.display(), complaints.concat()))
 }
 
 fn check_kernels(config: &SiteConfig, checked: &mut Checked) -> Result<()> {

@@ -7,14 +7,14 @@ use std::{
 };
 
 /// The program under test.
-pub fn areograph() -> Command {
+pub(crate) fn areograph() -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_areograph"));
     command.arg("--quiet");
     command
 }
 
 /// Folder of the default mission. Test programs run side by side: the first one writes it.
-pub fn mission() -> PathBuf {
+pub(crate) fn mission() -> PathBuf {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR"));
     let program = fs::read(env!("CARGO_BIN_EXE_areograph")).unwrap();
     let name = format!("mission-{}", &blake3::hash(&program).to_hex()[..16]);
@@ -39,7 +39,7 @@ pub fn mission() -> PathBuf {
 }
 
 /// Runs a command that must succeed.
-pub fn succeed(command: &mut Command) -> Output {
+pub(crate) fn succeed(command: &mut Command) -> Output {
     let output = command.output().unwrap();
     assert!(
         output.status.success(),
@@ -53,7 +53,7 @@ pub fn succeed(command: &mut Command) -> Output {
 
 /// Every product below `folder` by relative path; `.cache` and `.lock` are not products, and the
 /// manifest's time of day is cut out.
-pub fn products(folder: &Path) -> std::collections::BTreeMap<PathBuf, Vec<u8>> {
+pub(crate) fn products(folder: &Path) -> std::collections::BTreeMap<PathBuf, Vec<u8>> {
     fn walk(root: &Path, folder: &Path, found: &mut std::collections::BTreeMap<PathBuf, Vec<u8>>) {
         let Ok(entries) = fs::read_dir(folder) else {
             return;

@@ -1,7 +1,7 @@
 //! What several tests share: the real data, and the synthetic mission.
 #![allow(dead_code, reason = "each test program uses a part of this module")]
 
-pub mod mission;
+pub(crate) mod mission;
 
 use std::path::{Path, PathBuf};
 
