@@ -122,11 +122,7 @@ impl Review<'_> {
     /// An empty list says nothing, so it is a problem.
     pub(super) fn not_empty<T>(&mut self, key: &str, raw: &Spanned<Vec<T>>) {
         if raw.get_ref().is_empty() {
-            self.refuse(
-                raw.span(),
-                key,
-                "at least one entry (leave the key out for its default)",
-            );
+            self.refuse(raw.span(), key, "at least one entry");
         }
     }
 
