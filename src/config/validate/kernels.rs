@@ -5,7 +5,11 @@ use std::collections::BTreeSet;
 use toml::Spanned;
 
 use super::{
-    super::{problems::Review, raw::RawKernels, site::*},
+    super::{
+        problems::Review,
+        raw::RawKernels,
+        site::{CkQuality, KernelSelection, KernelSource, KernelsConfig},
+    },
     values::{Accept, Target},
 };
 

@@ -13,7 +13,7 @@ use super::{
     super::{
         problems::Review,
         raw::{RawFilter, RawPedr},
-        site::*,
+        site::{DatumChoice, PedrConfig, ShotFilter},
     },
     values::Accept,
 };

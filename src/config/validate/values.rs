@@ -46,6 +46,10 @@ pub(super) enum Target {
     Folder,
 }
 
+#[allow(
+    clippy::ref_option,
+    reason = "entries are passed as the raw structs hold them"
+)]
 impl Review<'_> {
     /// The number of `key`, or nothing when it is absent or refused.
     pub(super) fn optional_number(
