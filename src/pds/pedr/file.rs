@@ -135,12 +135,6 @@ impl File {
         }
     }
 
-    /// The path.
-    #[must_use]
-    pub fn path(&self) -> &Path {
-        &self.path
-    }
-
     /// The parts of the file's name, when it has the archive's form.
     #[must_use]
     pub const fn name(&self) -> Option<FileName> {
