@@ -381,3 +381,13 @@ fn a_file_without_a_datum_stops_the_search() {
             && failure.contains("renamed.dat: the datum is not known")
     );
 }
+
+#[test]
+fn more_files_than_can_be_counted_are_refused() {
+    let failure = search_footprints(&config(vec![PathBuf::from("AP19019L.B"); 65_536]), &[], 0.0);
+    let message = failure.unwrap_err().to_string();
+    assert!(
+        message.contains("65536 PEDR files; expected at most 65535"),
+        "{message}"
+    );
+}

@@ -135,12 +135,6 @@ impl File {
         }
     }
 
-    /// The path.
-    #[must_use]
-    pub fn path(&self) -> &Path {
-        &self.path
-    }
-
     /// The parts of the file's name, when it has the archive's form.
     #[must_use]
     pub const fn name(&self) -> Option<FileName> {
@@ -216,12 +210,8 @@ impl File {
         record: &'a Record,
         guard: FieldGuard,
     ) -> std::result::Result<Frame<'a>, RecordFault> {
-        let records = self.records();
         record.check(self.is_mapping())?;
-        let time_s = |row: Option<usize>| {
-            let time_s = records.get(row?)?.time_s.get();
-            time_s.is_finite().then_some(time_s)
-        };
+        let time_s = |row: Option<usize>| Some(self.sound_record(row?)?.time_s.get());
         let neighbours_s = [
             time_s(row.checked_sub(2)),
             time_s(row.checked_sub(1)),
@@ -242,16 +232,18 @@ impl File {
     ///
     /// Before the first frame stands its next one mirrored, `x₁ − (x₂ − x₁)`, as in `pedr2tab`.
     fn crossover_before_m(&self, row: usize, guard: FieldGuard) -> Option<f64> {
-        let residual_m = |row: usize| {
-            let record = self.records().get(row)?;
-            record.check(self.is_mapping()).ok()?;
-            guard.crossover_m(record)
-        };
+        let residual_m = |row| guard.crossover_m(self.sound_record(row)?);
         if row == 0 {
             let first_m = residual_m(0)?;
             return residual_m(1).map(|next_m| first_m - (next_m - first_m));
         }
         residual_m(row - 1)
+    }
+
+    /// The record in row `row`, when there is one without an impossible value.
+    fn sound_record(&self, row: usize) -> Option<&Record> {
+        let record = self.records().get(row)?;
+        record.check(self.is_mapping()).ok().map(|()| record)
     }
 
     /// Number of the record in row `row` of the data, counted from 1 with the label records.

@@ -4,16 +4,14 @@ use std::f64::consts::{FRAC_PI_2, PI};
 
 use zerocopy::byteorder::big_endian::I32;
 
-use super::{Record, SHOTS};
+use super::{PARALLAX_UNIT_RAD_PER_M, Record, SHOTS};
 use crate::{
     footprints::Footprint,
-    units::{METRES_PER_CM, RADIANS_PER_DEGREE, RADIANS_PER_MICRODEGREE, wrap_two_pi},
+    units::{METRES_PER_CM, RADIANS_PER_MICRODEGREE, wrap_two_pi},
 };
 
 /// Clock cycles between two shots.
 const CYCLES_PER_SHOT: f64 = 1e7;
-/// Radians per metre in the unit of the parallax fields.
-const RADIANS_PER_M_PER_PARALLAX_COUNT: f64 = RADIANS_PER_DEGREE * 1e-9;
 /// Middle of the shots counted from 0: the mid-point of the frame.
 const MIDDLE: f64 = 9.5;
 
@@ -89,7 +87,7 @@ impl<'a> Frame<'a> {
     pub fn new(record: &'a Record, guard: FieldGuard, crossover_before_m: Option<f64>) -> Self {
         let parallax = |field: I32| {
             if guard.parallax_holds(record) {
-                f64::from(field.get()) * RADIANS_PER_M_PER_PARALLAX_COUNT
+                f64::from(field.get()) * PARALLAX_UNIT_RAD_PER_M
             } else {
                 0.0
             }
