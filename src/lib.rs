@@ -9,5 +9,6 @@ pub mod error;
 pub mod footprints;
 pub mod frames;
 pub mod geom;
+pub mod scene;
 pub mod time;
 pub mod units;
