@@ -9,6 +9,7 @@ pub mod error;
 pub mod footprints;
 pub mod frames;
 pub mod geom;
+pub mod pds;
 pub mod scene;
 pub mod time;
 pub mod units;

@@ -1,1 +1,175 @@
-//! placeholder
+//! Plain and robust statistics of residuals.
+
+use serde::{Deserialize, Serialize};
+
+/// Factor that makes the median absolute deviation of a normal distribution its standard deviation.
+const NORMAL_MAD: f64 = 1.4826;
+
+/// A spread below this counts as this when outliers are judged, metres: PEDR ranges and radii come
+/// in whole centimetres, so half of a profile may agree exactly.
+const SPREAD_FLOOR_M: f64 = 0.01;
+
+/// Statistics of a column; all 0 for an empty one.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
+pub struct Summary {
+    /// Number of values.
+    pub n: u32,
+    /// Mean, in the unit of the values.
+    pub mean: f64,
+    /// Standard deviation with divisor n − 1.
+    pub standard_deviation: f64,
+    /// Median.
+    pub median: f64,
+    /// Normalised median absolute deviation, 1.4826 · median |v − median|.
+    pub nmad: f64,
+    /// Smallest value.
+    pub min: f64,
+    /// Largest value.
+    pub max: f64,
+}
+
+impl Summary {
+    /// Statistics of `values`.
+    #[must_use]
+    pub fn of(values: &[f64]) -> Self {
+        if values.is_empty() {
+            return Self::default();
+        }
+        let n = values.len() as f64;
+        let mean = values.iter().sum::<f64>() / n;
+        let squares: f64 = values.iter().map(|value| (value - mean).powi(2)).sum();
+        let (median, nmad) = median_and_nmad(values);
+        Self {
+            n: u32::try_from(values.len()).unwrap_or(u32::MAX),
+            mean,
+            standard_deviation: (squares / (n - 1.0).max(1.0)).sqrt(),
+            median,
+            nmad,
+            min: values.iter().copied().fold(f64::INFINITY, f64::min),
+            max: values.iter().copied().fold(f64::NEG_INFINITY, f64::max),
+        }
+    }
+}
+
+fn median(sorted: &[f64]) -> f64 {
+    let middle = sorted.len() / 2;
+    if sorted.len().is_multiple_of(2) {
+        0.5 * (sorted[middle - 1] + sorted[middle])
+    } else {
+        sorted[middle]
+    }
+}
+
+/// Median and normalised median absolute deviation of at least one value.
+fn median_and_nmad(values: &[f64]) -> (f64, f64) {
+    let mut sorted = values.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    let middle = median(&sorted);
+    for value in &mut sorted {
+        *value = (*value - middle).abs();
+    }
+    sorted.sort_by(f64::total_cmp);
+    (middle, NORMAL_MAD * median(&sorted))
+}
+
+/// Marks residuals in metres farther from the median than `sigma` robust standard deviations.
+///
+/// The robust standard deviation is the NMAD, at least 1 cm.
+#[must_use]
+pub fn outliers(residuals_m: &[f64], sigma: f64) -> Vec<bool> {
+    if residuals_m.is_empty() {
+        return Vec::new();
+    }
+    let (median, nmad) = median_and_nmad(residuals_m);
+    let limit_m = sigma * nmad.max(SPREAD_FLOOR_M);
+    residuals_m
+        .iter()
+        // Written so that NaN counts as an outlier.
+        .map(|value| !((value - median).abs() <= limit_m))
+        .collect()
+}
+
+/// Straight line through values over time.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Trend {
+    /// Slope, unit of the values per second.
+    pub slope: f64,
+    /// Standard uncertainty of the slope from the scatter about the line.
+    pub uncertainty: f64,
+}
+
+impl Trend {
+    /// Least-squares slope of `values` over `seconds`; `None` below three points or without extent in time.
+    #[must_use]
+    pub fn of(seconds: &[f64], values: &[f64]) -> Option<Self> {
+        let n = values.len();
+        if n < 3 || seconds.len() != n {
+            return None;
+        }
+        let mean_s = seconds.iter().sum::<f64>() / n as f64;
+        let mean = values.iter().sum::<f64>() / n as f64;
+        let extent: f64 = seconds.iter().map(|s| (s - mean_s).powi(2)).sum();
+        let product: f64 = seconds
+            .iter()
+            .zip(values)
+            .map(|(s, value)| (s - mean_s) * (value - mean))
+            .sum();
+        let slope = product / extent;
+        let rest: f64 = seconds
+            .iter()
+            .zip(values)
+            .map(|(s, value)| (value - mean - slope * (s - mean_s)).powi(2))
+            .sum();
+        (extent > 0.0).then(|| Self {
+            slope,
+            uncertainty: (rest / ((n - 2) as f64 * extent)).sqrt(),
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn close(value: f64, expected: f64) {
+        assert!((value - expected).abs() < 1e-12, "{value} {expected}"); // rounding of small numbers
+    }
+
+    #[test]
+    fn summary_by_hand() {
+        let summary = Summary::of(&[2.0, 4.0, 4.0, 10.0]);
+        assert_eq!(summary.n, 4);
+        close(summary.mean, 5.0);
+        close(summary.standard_deviation, 12.0_f64.sqrt()); // (9 + 1 + 1 + 25) / 3
+        close(summary.median, 4.0);
+        close(summary.nmad, 1.4826); // deviations 2, 0, 0, 6: median 1
+        close(summary.min, 2.0);
+        close(summary.max, 10.0);
+        assert_eq!(Summary::of(&[]), Summary::default());
+        close(Summary::of(&[7.0]).standard_deviation, 0.0);
+    }
+
+    #[test]
+    fn outliers_are_judged_from_the_median() {
+        let mut residuals = vec![0.50, 0.51, 0.49, 0.50, 0.52, 0.48, 0.50];
+        residuals.extend([0.70, f64::NAN]);
+        let flags = outliers(&residuals, 5.0);
+        assert_eq!(flags.iter().filter(|flag| **flag).count(), 2);
+        assert!(flags[7] && flags[8]);
+        // All equal but one, closer than five times the 1 cm floor: no outlier.
+        assert!(outliers(&[1.0, 1.0, 1.0, 1.04], 5.0).iter().all(|flag| !flag));
+    }
+
+    #[test]
+    fn trend_of_a_line_with_known_scatter() {
+        let seconds = [0.0, 1.0, 2.0, 3.0];
+        let trend = Trend::of(&seconds, &[1.0, 3.0, 5.0, 7.0]).unwrap();
+        close(trend.slope, 2.0);
+        close(trend.uncertainty, 0.0);
+        let trend = Trend::of(&seconds, &[1.0, -1.0, -1.0, 1.0]).unwrap();
+        close(trend.slope, 0.0);
+        close(trend.uncertainty, (4.0_f64 / (2.0 * 5.0)).sqrt());
+        assert!(Trend::of(&seconds[..2], &[1.0, 2.0]).is_none());
+        assert!(Trend::of(&[1.0, 1.0, 1.0], &[1.0, 2.0, 3.0]).is_none());
+    }
+}

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
     clippy::print_stderr,
     reason = "tests find their data by an environment variable and say what they skip"
 )]
-pub fn real_data(relative: &str, test: &str) -> Option<PathBuf> {
+pub(crate) fn real_data(relative: &str, test: &str) -> Option<PathBuf> {
     let root = std::env::var("AREOGRAPH_DATA").map_or_else(
         |_| Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data"),
         PathBuf::from,

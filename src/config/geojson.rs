@@ -1,0 +1,238 @@
+//! Polygons of a GeoJSON file (RFC 7946): areocentric latitude and east longitude of Mars, degrees.
+
+use std::{fs::File, io::Read as _, path::Path};
+
+use serde::Deserialize;
+
+use crate::units::RADIANS_PER_DEGREE;
+
+/// Longest file, bytes.
+const BYTES_MAX: u64 = 16 << 20;
+/// Most vertices of all rings.
+const VERTICES_MAX: usize = 100_000;
+
+/// Polygons, rings, vertices (longitude, latitude): radians.
+pub(super) type Polygons = Vec<Vec<Vec<[f64; 2]>>>;
+
+#[derive(Debug, thiserror::Error)]
+pub(super) enum GeoJsonFault {
+    #[error("cannot read: {0}")]
+    Io(#[from] std::io::Error),
+    #[error("is longer than {} MiB", BYTES_MAX >> 20)]
+    TooLong,
+    #[error("{0}; objects taken are Polygon, MultiPolygon, Feature and FeatureCollection")]
+    Shape(#[from] serde_json::Error),
+    #[error("holds no polygon")]
+    Empty,
+    #[error("has more than {VERTICES_MAX} vertices")]
+    TooManyVertices,
+    #[error("polygon {polygon} ring {ring} {fault}")]
+    Ring {
+        polygon: usize,
+        ring: usize,
+        fault: RingFault,
+    },
+}
+
+#[derive(Debug, thiserror::Error)]
+pub(super) enum RingFault {
+    #[error("has {0} positions; at least 4 make a closed ring")]
+    Short(usize),
+    #[error("is not closed: its last position must repeat its first")]
+    Open,
+    #[error("position {0} has fewer than two numbers")]
+    Position(usize),
+    #[error("position {0}: longitude {1} is not within -180 to 360")]
+    Longitude(usize, f64),
+    #[error("position {0}: latitude {1} is not within -90 to 90")]
+    Latitude(usize, f64),
+    #[error("spans {0} degrees of longitude; a ring spans less than 360")]
+    Wide(f64),
+}
+
+#[derive(Deserialize)]
+#[serde(tag = "type")]
+enum Object {
+    FeatureCollection { features: Vec<Object> },
+    Feature { geometry: Option<Box<Object>> },
+    Polygon { coordinates: Rings },
+    MultiPolygon { coordinates: Vec<Rings> },
+}
+
+type Rings = Vec<Vec<Vec<f64>>>;
+
+/// The polygons of the file, radians.
+pub(super) fn read(path: &Path) -> Result<Polygons, GeoJsonFault> {
+    let mut bytes = Vec::new();
+    File::open(path)?
+        .take(BYTES_MAX + 1)
+        .read_to_end(&mut bytes)?;
+    if bytes.len() as u64 > BYTES_MAX {
+        return Err(GeoJsonFault::TooLong);
+    }
+    parse(&bytes)
+}
+
+/// The polygons of a GeoJSON text, radians.
+fn parse(bytes: &[u8]) -> Result<Polygons, GeoJsonFault> {
+    let mut found = Vec::new();
+    collect(serde_json::from_slice(bytes)?, &mut found);
+    if found.is_empty() {
+        return Err(GeoJsonFault::Empty);
+    }
+    if found.iter().flatten().map(Vec::len).sum::<usize>() > VERTICES_MAX {
+        return Err(GeoJsonFault::TooManyVertices);
+    }
+    let place = |polygon, ring| {
+        move |fault| GeoJsonFault::Ring {
+            polygon,
+            ring,
+            fault,
+        }
+    };
+    (1..)
+        .zip(&found)
+        .map(|(polygon, rings)| {
+            if rings.is_empty() {
+                return Err(place(polygon, 1)(RingFault::Short(0)));
+            }
+            (1..)
+                .zip(rings)
+                .map(|(number, positions)| ring(positions).map_err(place(polygon, number)))
+                .collect()
+        })
+        .collect()
+}
+
+fn collect(object: Object, found: &mut Vec<Rings>) {
+    match object {
+        Object::FeatureCollection { features } => {
+            for feature in features {
+                collect(feature, found);
+            }
+        }
+        Object::Feature { geometry } => {
+            if let Some(geometry) = geometry {
+                collect(*geometry, found);
+            }
+        }
+        Object::Polygon { coordinates } => found.push(coordinates),
+        Object::MultiPolygon { coordinates } => found.extend(coordinates),
+    }
+}
+
+fn ring(positions: &[Vec<f64>]) -> Result<Vec<[f64; 2]>, RingFault> {
+    if positions.len() < 4 {
+        return Err(RingFault::Short(positions.len()));
+    }
+    if positions.first() != positions.last() {
+        return Err(RingFault::Open);
+    }
+    let (mut west, mut east) = (f64::INFINITY, f64::NEG_INFINITY);
+    let mut vertices = Vec::with_capacity(positions.len());
+    for (number, position) in (1..).zip(positions) {
+        let [longitude, latitude, ..] = position[..] else {
+            return Err(RingFault::Position(number));
+        };
+        if !(-180.0..=360.0).contains(&longitude) {
+            return Err(RingFault::Longitude(number, longitude));
+        }
+        if !(-90.0..=90.0).contains(&latitude) {
+            return Err(RingFault::Latitude(number, latitude));
+        }
+        west = west.min(longitude);
+        east = east.max(longitude);
+        vertices.push([
+            longitude * RADIANS_PER_DEGREE,
+            latitude * RADIANS_PER_DEGREE,
+        ]);
+    }
+    if east - west >= 360.0 {
+        return Err(RingFault::Wide(east - west));
+    }
+    Ok(vertices)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn message(text: &str) -> String {
+        parse(text.as_bytes()).unwrap_err().to_string()
+    }
+
+    #[test]
+    fn every_wrapping_of_a_polygon_is_taken() {
+        let polygon = r#"{"type":"Polygon","coordinates":[[[0,0],[90,0,5],[90,45],[0,0]]]}"#;
+        let feature =
+            format!(r#"{{"type":"Feature","properties":{{"n":1}},"geometry":{polygon}}}"#);
+        let collection =
+            format!(r#"{{"type":"FeatureCollection","features":[{feature},{feature}]}}"#);
+        assert_eq!(
+            parse(polygon.as_bytes()).unwrap(),
+            parse(feature.as_bytes()).unwrap()
+        );
+        let both = parse(collection.as_bytes()).unwrap();
+        assert_eq!(both.len(), 2);
+        let quarter = std::f64::consts::FRAC_PI_2;
+        assert_eq!(both[0][0][2], [quarter, quarter / 2.0]);
+    }
+
+    #[test]
+    fn every_fault_names_polygon_ring_and_position() {
+        let polygon = |ring: &str| format!(r#"{{"type":"Polygon","coordinates":[{ring}]}}"#);
+        for (ring, expected) in [
+            (
+                "",
+                "polygon 1 ring 1 has 0 positions; at least 4 make a closed ring",
+            ),
+            (
+                "[[0,0],[1,0],[0,0]]",
+                "polygon 1 ring 1 has 3 positions; at least 4 make a closed ring",
+            ),
+            (
+                "[[0,0],[1,0],[1,1],[0,1]]",
+                "polygon 1 ring 1 is not closed: its last position must repeat its first",
+            ),
+            (
+                "[[0,0],[1],[1,1],[0,0]]",
+                "polygon 1 ring 1 position 2 has fewer than two numbers",
+            ),
+            (
+                "[[0,0],[361,0],[1,1],[0,0]]",
+                "polygon 1 ring 1 position 2: longitude 361 is not within -180 to 360",
+            ),
+            (
+                "[[0,0],[1,0],[1,91],[0,0]]",
+                "polygon 1 ring 1 position 3: latitude 91 is not within -90 to 90",
+            ),
+            (
+                "[[-180,0],[180,0],[1,1],[-180,0]]",
+                "polygon 1 ring 1 spans 360 degrees of longitude; a ring spans less than 360",
+            ),
+        ] {
+            assert_eq!(message(&polygon(ring)), expected);
+        }
+        assert_eq!(
+            message(r#"{"type":"FeatureCollection","features":[]}"#),
+            "holds no polygon"
+        );
+        assert!(
+            message(r#"{"type":"Point","coordinates":[0,0]}"#).contains("unknown variant `Point`")
+        );
+        assert!(message(&"[".repeat(100_000)).contains("recursion limit"));
+        let many = vec!["[0,0]"; VERTICES_MAX + 1].join(",");
+        assert_eq!(
+            message(&polygon(&format!("[{many}]"))),
+            "has more than 100000 vertices"
+        );
+    }
+
+    proptest! {
+        #[test]
+        fn any_bytes_are_survived(bytes in proptest::collection::vec(any::<u8>(), 0..200)) {
+            let _ = parse(&bytes);
+        }
+    }
+}

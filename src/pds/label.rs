@@ -1,0 +1,293 @@
+//! Labels in the Object Description Language of PDS3 and its PVL dialect of ISIS: `KEY = value`,
+//! `OBJECT = …`/`END_OBJECT`, `GROUP = …`/`END_GROUP`, `END`.
+//!
+//! The parser is tolerant: what is no assignment is skipped, so that a label can stand before binary
+//! data and a damaged one still gives what it holds.
+
+use crate::error::{Fault, Kind};
+
+/// Bytes of a file that are looked at; labels are a few kilobytes.
+pub const LABEL_BYTES_MAX: usize = 1 << 20;
+
+/// One `KEY = value` of a label.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Entry {
+    /// Name of the object or group that it stands in, upper case; empty outside of any.
+    pub group: String,
+    /// The keyword in upper case.
+    pub key: String,
+    /// The value without quotes and unit, white space over line ends made one blank.
+    pub value: String,
+    /// The unit that stood in `<>`, lower case.
+    pub unit: Option<String>,
+}
+
+/// A parsed label.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Label {
+    /// The assignments in the order of the file.
+    pub entries: Vec<Entry>,
+}
+
+/// A label is not what it should be.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum LabelFault {
+    /// No assignment at all.
+    #[error("no label found: expected lines KEY = value in the first {LABEL_BYTES_MAX} bytes")]
+    NoLabel,
+    /// A value that is not of its kind.
+    #[error("{key} is {value:?}; expected {expected}")]
+    Value {
+        /// The keyword.
+        key: String,
+        /// Its value.
+        value: String,
+        /// What it should be.
+        expected: &'static str,
+    },
+    /// Another instrument's image.
+    #[error("instrument is {0:?}; expected MOC-NA")]
+    Instrument(String),
+}
+
+impl Fault for LabelFault {
+    fn kind(&self) -> Kind {
+        Kind::Input
+    }
+
+    fn advice(&self) -> String {
+        match self {
+            Self::NoLabel => "give a PDS3 label (.lbl, .imq) or an ISIS label (.lbl, .cub)",
+            Self::Value { .. } => {
+                "correct the label, or write the key in the image's table of the configuration"
+            }
+            Self::Instrument(_) => "only narrow-angle images of the Mars Orbiter Camera are read",
+        }
+        .to_owned()
+    }
+}
+
+/// The label at the start of `bytes`; at most [`LABEL_BYTES_MAX`] of them are looked at.
+///
+/// # Errors
+/// [`LabelFault::NoLabel`] when there is no assignment.
+pub fn parse(bytes: &[u8]) -> Result<Label, LabelFault> {
+    let mut scanner = Scanner {
+        bytes: &bytes[..bytes.len().min(LABEL_BYTES_MAX)],
+        at: 0,
+    };
+    let mut label = Label::default();
+    let mut groups: Vec<String> = Vec::new();
+    while let Some(word) = scanner.word() {
+        let key = word.to_ascii_uppercase();
+        let after_word = scanner.at;
+        if !(key.starts_with(|first: char| first.is_ascii_alphabetic() || first == '^')
+            && scanner.take(b'='))
+        {
+            match key.as_str() {
+                "END" => break,
+                "END_OBJECT" | "END_GROUP" | "ENDOBJECT" | "ENDGROUP" => drop(groups.pop()),
+                _ => {}
+            }
+            // The rest of the line is no assignment either: the mark of an SFDU, or junk.
+            scanner.at = after_word;
+            scanner.skip_line();
+            continue;
+        }
+        let (value, unit) = scanner.value();
+        match key.as_str() {
+            "OBJECT" | "GROUP" | "BEGIN_OBJECT" | "BEGIN_GROUP" => {
+                // Every entry repeats its group's name, so junk must not make it long.
+                groups.push(
+                    value
+                        .chars()
+                        .take(64)
+                        .collect::<String>()
+                        .to_ascii_uppercase(),
+                );
+            }
+            "END_OBJECT" | "END_GROUP" | "ENDOBJECT" | "ENDGROUP" => drop(groups.pop()),
+            _ => label.entries.push(Entry {
+                group: groups.last().cloned().unwrap_or_default(),
+                key,
+                value,
+                unit,
+            }),
+        }
+    }
+    if label.entries.is_empty() {
+        return Err(LabelFault::NoLabel);
+    }
+    Ok(label)
+}
+
+impl Label {
+    /// The first entry with this keyword (upper case), wherever it stands.
+    #[must_use]
+    pub fn find(&self, key: &str) -> Option<&Entry> {
+        self.entries.iter().find(|entry| entry.key == key)
+    }
+
+    /// The first entry with this keyword directly in an object or group of this name (both upper case).
+    #[must_use]
+    pub fn find_in(&self, group: &str, key: &str) -> Option<&Entry> {
+        self.entries
+            .iter()
+            .find(|entry| entry.key == key && entry.group == group)
+    }
+}
+
+/// Walks over the bytes of a label; every step moves forward.
+struct Scanner<'a> {
+    bytes: &'a [u8],
+    at: usize,
+}
+
+impl Scanner<'_> {
+    fn peek(&self) -> Option<u8> {
+        self.bytes.get(self.at).copied()
+    }
+
+    fn take(&mut self, wanted: u8) -> bool {
+        self.skip_space();
+        let found = self.peek() == Some(wanted);
+        self.at += usize::from(found);
+        found
+    }
+
+    fn skip_line(&mut self) {
+        let rest = &self.bytes[self.at.min(self.bytes.len())..];
+        self.at += rest
+            .iter()
+            .position(|byte| matches!(byte, b'\n' | b'\r'))
+            .unwrap_or(rest.len());
+    }
+
+    /// Over white space, `/* … */` and `# …` comments.
+    fn skip_space(&mut self) {
+        while let Some(byte) = self.peek() {
+            if byte.is_ascii_whitespace() || byte == 0 {
+                self.at += 1;
+            } else if byte == b'#' {
+                self.skip_line();
+            } else if self.bytes[self.at..].starts_with(b"/*") {
+                // Comments end with their line, closed or not.
+                let rest = &self.bytes[self.at..];
+                let line = rest.split(|byte| *byte == b'\n').next().unwrap_or(rest);
+                let end = line.windows(2).position(|pair| pair == b"*/");
+                self.at += end.map_or(line.len(), |end| end + 2);
+            } else {
+                break;
+            }
+        }
+    }
+
+    /// The next run of bytes up to white space or `=`; `None` at the end.
+    fn word(&mut self) -> Option<String> {
+        self.skip_space();
+        let rest = self.bytes.get(self.at..).filter(|rest| !rest.is_empty())?;
+        let stops = |byte: &u8| byte.is_ascii_whitespace() || *byte == b'=';
+        // A lone "=" is a word of its own, so that junk cannot stop the walk.
+        let length = rest.iter().position(stops).unwrap_or(rest.len()).max(1);
+        self.at += length;
+        Some(String::from_utf8_lossy(&rest[..length]).into_owned())
+    }
+
+    /// A value and its unit.
+    fn value(&mut self) -> (String, Option<String>) {
+        self.skip_space();
+        let value = match self.peek() {
+            Some(quote @ (b'"' | b'\'')) => self.enclosed(quote),
+            Some(b'(') => self.enclosed(b')'),
+            Some(b'{') => self.enclosed(b'}'),
+            Some(_) => self.bare(),
+            None => String::new(),
+        };
+        while matches!(self.peek(), Some(b' ' | b'\t')) {
+            self.at += 1;
+        }
+        let unit = (self.peek() == Some(b'<')).then(|| self.enclosed(b'>').to_ascii_lowercase());
+        (value, unit)
+    }
+
+    /// What stands between the byte here and the next `close`, which may be lines away.
+    fn enclosed(&mut self, close: u8) -> String {
+        let rest = &self.bytes[self.at + 1..];
+        let length = rest.iter().position(|byte| *byte == close);
+        let inside = &rest[..length.unwrap_or(rest.len())];
+        self.at += 1 + inside.len() + usize::from(length.is_some());
+        let text = String::from_utf8_lossy(inside);
+        text.split_whitespace().collect::<Vec<_>>().join(" ")
+    }
+
+    /// A value without quotes: up to white space or a unit, on this line.
+    fn bare(&mut self) -> String {
+        let rest = &self.bytes[self.at..];
+        let stops = |byte: &u8| byte.is_ascii_whitespace() || *byte == b'<';
+        let length = rest.iter().position(stops).unwrap_or(rest.len());
+        self.at += length;
+        String::from_utf8_lossy(&rest[..length]).into_owned()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn entry(label: &Label, key: &str) -> (String, Option<String>) {
+        let entry = label.find(key).unwrap();
+        (entry.value.clone(), entry.unit.clone())
+    }
+
+    #[test]
+    fn units_quotes_comments_and_nesting_are_understood() {
+        let text = b"CCSD3ZF0000100000001NJPL3IF0PDSX00000001\r\n/* a comment = no */\r\n\
+            A = 1.5 <MILLISECONDS> /* more */\r\nB = \"two\r\n   lines\"\r\n# C = 1\nC=(1, 2)\n\
+            Object = IsisCube\n Group = Dimensions\n  Lines = 12\n End_Group\n D = 4<km>\nEnd_Object\n\
+            E = '5'\nEND\nF = 6\n";
+        let label = parse(text).unwrap();
+        assert_eq!(
+            entry(&label, "A"),
+            ("1.5".into(), Some("milliseconds".into()))
+        );
+        assert_eq!(entry(&label, "B"), ("two lines".into(), None));
+        assert_eq!(entry(&label, "C"), ("1, 2".into(), None));
+        assert_eq!(entry(&label, "D"), ("4".into(), Some("km".into())));
+        assert_eq!(entry(&label, "E"), ("5".into(), None));
+        assert_eq!(label.find("F"), None);
+        let lines = label.find_in("DIMENSIONS", "LINES").unwrap();
+        assert_eq!(lines.value, "12");
+        assert_eq!(label.find_in("ISISCUBE", "LINES"), None);
+    }
+
+    #[test]
+    fn what_is_no_label_is_refused() {
+        for bytes in [&b""[..], b"END", b"\xFF\xD8\xFF\xE0\0\x10JFIF\0", b"= = ="] {
+            assert_eq!(parse(bytes), Err(LabelFault::NoLabel));
+        }
+        assert_eq!(parse(b"no assignment\nat all"), Err(LabelFault::NoLabel));
+    }
+
+    proptest! {
+        #[test]
+        fn any_bytes_are_parsed_or_refused(
+            bytes in proptest::collection::vec(any::<u8>(), 0..600)
+        ) {
+            let _ = parse(&bytes);
+        }
+
+        #[test]
+        fn any_mixture_of_label_pieces_is_parsed_or_refused(
+            pieces in proptest::collection::vec(
+                proptest::sample::select(vec![
+                    "OBJECT", "END_OBJECT", "GROUP", "=", "\"", "'", "(", ")", "<", ">", "/*", "*/",
+                    "#", "\n", "\r\n", " ", "KEY", "1.0", "END", "\0", "{", "}",
+                ]),
+                0..60,
+            )
+        ) {
+            let _ = parse(pieces.concat().as_bytes());
+        }
+    }
+}

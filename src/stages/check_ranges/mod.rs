@@ -1,0 +1,194 @@
+//! Three-way range check: measured range, the file's own orbit and the kernels' orbit against each other.
+//!
+//! | residual | tests |
+//! |---|---|
+//! | range − \|PEDR spacecraft − footprint\| | our decoding of the file |
+//! | PEDR spacecraft − SPK spacecraft | the kernels |
+//! | range − \|SPK spacecraft − footprint\| | Table 3 of Shan et al. 2005 |
+//!
+//! Geometric states only: the range is to the spacecraft's centre of mass, so there is no lever arm,
+//! and ISIS's apparent positions would be 0.14 km off.
+
+mod residuals;
+mod scan;
+
+use serde::{Deserialize, Serialize};
+
+pub use residuals::{ShotResiduals, range_residual_m};
+pub use scan::BiasScan;
+
+use super::group_profiles::Profile;
+use crate::{
+    config::{MolaClock, RangeCheckConfig},
+    error::{Fault, Kind, Result},
+    footprints::Footprints,
+    frames::MarsIau2000,
+    geom::statistics::{Summary, Trend, outliers},
+    spice::Trajectory,
+    time::Et,
+};
+
+/// Residuals of every shot, and what they say about every profile.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct RangeCheck {
+    /// Residuals, ordered by profile, then by time.
+    pub shots: ShotResiduals,
+    /// One entry per profile, in the order of the profiles.
+    pub profiles: Vec<ProfileRanges>,
+    /// Largest error of the tabulated trajectory against the kernels, metres.
+    pub trajectory_error_m: f64,
+}
+
+/// Statistics of one profile.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ProfileRanges {
+    /// Profile identifier.
+    pub profile: String,
+    /// Range − distance (SPK spacecraft, footprint with raw radius), metres.
+    pub range_minus_distance_m: Summary,
+    /// The same with the crossover-corrected radius, metres: crossover moves the footprint, not the range.
+    pub range_minus_distance_crossover_m: Summary,
+    /// Range − distance (PEDR spacecraft, raw footprint), metres.
+    pub decoding_m: Summary,
+    /// PEDR spacecraft − SPK spacecraft along radial, along-track and cross-track axes, metres.
+    pub spacecraft_m: [Summary; 3],
+    /// Linear trend of range − distance over time, metres per second.
+    pub trend_m_s: Option<Trend>,
+    /// Shots farther from the median than the configured number of robust standard deviations.
+    pub outliers: u32,
+    /// Scan over assumed clock biases; `None` when there are too few shots for one.
+    pub scan: Option<BiasScan>,
+    /// Why the profile breaks the limits of the configuration; empty when it is valid.
+    pub invalid_because: Vec<String>,
+}
+
+/// A shot outside the tabulated trajectory.
+#[derive(Debug, thiserror::Error)]
+#[error("profile {profile}: no spacecraft position at {at}, the time of a shot")]
+struct OutsideTrajectory {
+    profile: String,
+    at: Et,
+}
+
+impl Fault for OutsideTrajectory {
+    fn kind(&self) -> Kind {
+        Kind::Coverage
+    }
+
+    fn advice(&self) -> String {
+        "add a spacecraft ephemeris (SPK) that covers the PEDR files".to_owned()
+    }
+}
+
+/// Checks the ranges of every profile against `trajectory`.
+///
+/// # Errors
+/// A shot whose time the trajectory does not cover.
+/// # Source
+/// Shan et al. 2005, Table 3; limits there: |mean| above 10 m, |Δ − mean| above 5 standard deviations.
+pub fn check_ranges(
+    footprints: &Footprints<MarsIau2000>,
+    profiles: &[Profile],
+    trajectory: &Trajectory,
+    clock: &MolaClock,
+    limits: &RangeCheckConfig,
+) -> Result<RangeCheck> {
+    let mut shots = ShotResiduals::default();
+    let mut checked = Vec::with_capacity(profiles.len());
+    for (index, profile) in (0_u32..).zip(profiles) {
+        let first = shots.len();
+        for row in &profile.rows {
+            let shot = footprints.row(*row as usize);
+            let at = residuals::spacecraft_time(&shot, clock);
+            let (Some(position), Some(velocity_m_s)) =
+                (trajectory.position(at), trajectory.velocity_m_s(at))
+            else {
+                return Err(OutsideTrajectory {
+                    profile: profile.id.clone(),
+                    at,
+                }
+                .into());
+            };
+            shots.push(index, *row, &residuals::residuals(&shot, at, &position, &velocity_m_s));
+        }
+        let flags = outliers(
+            &shots.range_minus_distance_m[first..],
+            limits.outlier_sigma,
+        );
+        shots.outlier.extend(flags);
+        let scan = scan::scan(footprints, &shots, first, trajectory, limits);
+        checked.push(judged(profile, &shots, first, scan, footprints, limits));
+    }
+    Ok(RangeCheck {
+        shots,
+        profiles: checked,
+        trajectory_error_m: trajectory.max_error_m(),
+    })
+}
+
+/// Statistics and verdict of the profile whose shots begin at `first`.
+fn judged(
+    profile: &Profile,
+    shots: &ShotResiduals,
+    first: usize,
+    scan: Option<BiasScan>,
+    footprints: &Footprints<MarsIau2000>,
+    limits: &RangeCheckConfig,
+) -> ProfileRanges {
+    let summary = |column: &[f64]| Summary::of(&column[first..]);
+    let seconds: Vec<f64> = profile
+        .rows
+        .iter()
+        .map(|row| Et::from_seconds(footprints.et_s[*row as usize]).since(profile.interval.start))
+        .collect();
+    let outliers = shots.outlier[first..].iter().filter(|flag| **flag).count();
+    let mut ranges = ProfileRanges {
+        profile: profile.id.clone(),
+        range_minus_distance_m: summary(&shots.range_minus_distance_m),
+        range_minus_distance_crossover_m: summary(&shots.range_minus_distance_crossover_m),
+        decoding_m: summary(&shots.decoding_m),
+        spacecraft_m: [
+            summary(&shots.spacecraft_radial_m),
+            summary(&shots.spacecraft_along_m),
+            summary(&shots.spacecraft_cross_m),
+        ],
+        trend_m_s: Trend::of(&seconds, &shots.range_minus_distance_m[first..]),
+        outliers: u32::try_from(outliers).unwrap_or(u32::MAX),
+        scan,
+        invalid_because: Vec::new(),
+    };
+    ranges.invalid_because = broken_limits(&ranges, limits);
+    ranges
+}
+
+fn broken_limits(ranges: &ProfileRanges, limits: &RangeCheckConfig) -> Vec<String> {
+    let mut broken = Vec::new();
+    let n = ranges.range_minus_distance_m.n;
+    if n < limits.shots_min {
+        broken.push(format!("{n} shots; limit at least {}", limits.shots_min));
+    }
+    // Written so that NaN breaks a limit.
+    let mean_m = ranges.range_minus_distance_m.mean;
+    if !(mean_m.abs() <= limits.mean_max_m) {
+        broken.push(format!(
+            "mean of range − distance {mean_m:.3} m; limit ±{} m",
+            limits.mean_max_m
+        ));
+    }
+    let decoding_m = ranges.decoding_m.mean;
+    if !(decoding_m.abs() <= limits.decoding_max_m) {
+        broken.push(format!(
+            "mean of range − distance to the file's own spacecraft {decoding_m:.3} m; limit ±{} m",
+            limits.decoding_max_m
+        ));
+    }
+    let share = f64::from(ranges.outliers) / f64::from(n.max(1));
+    if !(share <= limits.outlier_share_max) {
+        broken.push(format!(
+            "{} outliers of {n} shots; limit {:.1} %",
+            ranges.outliers,
+            100.0 * limits.outlier_share_max
+        ));
+    }
+    broken
+}

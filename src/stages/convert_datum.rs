@@ -1,0 +1,175 @@
+//! Footprints and the file's own spacecraft positions go from the file's datum to IAU 2000.
+
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+
+use crate::{
+    config::MolaClock,
+    footprints::{AsRead, Footprints},
+    frames::{MarsDatum, MarsIau2000},
+    geom::{
+        ellipsoid::{Spherical, spherical_to_xyz_m},
+        mars_rotation::convert_datum as convert_vector,
+    },
+    time::Et,
+};
+
+/// Footprints in IAU 2000, and what was done to each file's coordinates.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Converted {
+    /// The footprints.
+    pub footprints: Footprints<MarsIau2000>,
+    /// One sentence per file, for log, manifest and report.
+    pub notes: Vec<String>,
+}
+
+/// Rotates every shot out of its file's datum and into IAU 2000, through J2000.
+///
+/// Both rotations hold at the shot's tag, unless the clock correction is configured to reach the
+/// rotation (`scope` `rotation` or `both`): then Mars is taken into IAU 2000 at the corrected time,
+/// which moves longitudes by 4.752e-4° for 117 ms. Radii stay as they are. Files that are in IAU 2000
+/// already are left alone, bit for bit, in the first case.
+///
+/// # Source
+/// Shan et al. 2005, p. 99 (conversion through J2000 after T. Duxbury); constants in
+/// [`crate::constants`].
+#[must_use]
+pub fn convert_datum(footprints: Footprints<AsRead>, clock: &MolaClock) -> Converted {
+    let turn_s = if clock.moves_rotation() {
+        clock.correction_s()
+    } else {
+        0.0
+    };
+    let turns = turn_s.abs() > 0.0;
+    let notes = footprints
+        .files
+        .iter()
+        .map(|file| note(&file.path, file.datum, turns.then_some(turn_s)))
+        .collect();
+    let datums: Vec<MarsDatum> = footprints.files.iter().map(|file| file.datum).collect();
+    let mut converted = footprints.declare::<MarsIau2000>();
+    let moved: Vec<Option<[(f64, f64); 2]>> = (0..converted.len())
+        .into_par_iter()
+        .map(|row| {
+            let shot = converted.row(row);
+            let datum = datums[usize::from(shot.file)];
+            if datum == MarsDatum::Iau2000 && !turns {
+                return None;
+            }
+            let out_at = Et::from_seconds(shot.et_tag_s);
+            let move_direction = |longitude_rad, latitude_rad| {
+                let direction = spherical_to_xyz_m(longitude_rad, latitude_rad, 1.0);
+                let there =
+                    convert_vector::<MarsIau2000>(direction, datum, out_at, out_at.plus(turn_s));
+                let there = Spherical::from_xyz_m(&there.xyz_m);
+                (there.longitude_rad, there.latitude.0)
+            };
+            Some([
+                move_direction(shot.longitude_rad, shot.latitude_rad),
+                move_direction(shot.spacecraft_longitude_rad, shot.spacecraft_latitude_rad),
+            ])
+        })
+        .collect();
+    for (row, moved) in moved.into_iter().enumerate() {
+        if let Some([ground, spacecraft]) = moved {
+            (converted.longitude_rad[row], converted.latitude_rad[row]) = ground;
+            (
+                converted.spacecraft_longitude_rad[row],
+                converted.spacecraft_latitude_rad[row],
+            ) = spacecraft;
+        }
+    }
+    Converted {
+        footprints: converted,
+        notes,
+    }
+}
+
+fn note(path: &std::path::Path, datum: MarsDatum, turn_s: Option<f64>) -> String {
+    let name = path.file_name().unwrap_or(path.as_os_str()).display();
+    match (datum, turn_s) {
+        (MarsDatum::Iau2000, None) => format!("{name}: in IAU 2000 already, not converted"),
+        (datum, None) => format!("{name}: {datum} to IAU 2000 at each shot's time tag"),
+        (datum, Some(turn_s)) => format!(
+            "{name}: out of {datum} at the time tag, into IAU 2000 {turn_s:+.3} s later"
+        ),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{
+        config::{BiasScope, TagSign},
+        footprints::{Footprint, SourceFile},
+        units::{RADIANS_PER_DEGREE, wrap_pi},
+    };
+
+    fn footprints(datum: MarsDatum) -> Footprints<AsRead> {
+        let mut footprints = Footprints::new(vec![SourceFile {
+            path: "ap18933k.b".into(),
+            version: Some('K'),
+            datum,
+            blake3: String::new(),
+        }]);
+        footprints.push(&Footprint {
+            et_tag_s: -11_224_002.177_246_002,
+            et_s: -11_224_002.177_246_002,
+            orbit: 8933,
+            file: 0,
+            record: 11,
+            shot: 1,
+            longitude_rad: 318.0 * RADIANS_PER_DEGREE,
+            latitude_rad: -13.4 * RADIANS_PER_DEGREE,
+            radius_m: 3_394_000.0,
+            radius_crossover_m: 3_394_000.0,
+            areoid_radius_m: 3_396_000.0,
+            range_m: 380_000.0,
+            spacecraft_longitude_rad: 318.0 * RADIANS_PER_DEGREE,
+            spacecraft_latitude_rad: -13.4 * RADIANS_PER_DEGREE,
+            spacecraft_radius_m: 3_774_000.0,
+            off_nadir_rad: 0.0,
+            channel: 1,
+            class: 1,
+            attitude_flag: 0,
+            orbit_quality: 3,
+            windows: 1,
+        });
+        footprints
+    }
+
+    fn clock(scope: BiasScope) -> MolaClock {
+        MolaClock {
+            bias_s: 0.117,
+            sign: TagSign::Late,
+            scope,
+            source: String::new(),
+        }
+    }
+
+    #[test]
+    fn eos_chasma_moves_as_cspice_says() {
+        let converted =
+            convert_datum(footprints(MarsDatum::Iau1991), &clock(BiasScope::SpkLookup)).footprints;
+        // CSPICE N0067 with a PCK of the 1991 and one of the 2000 constants; 1e-9 rad is 3 mm.
+        assert!((converted.longitude_rad[0] - 318.237_630_071_608_63 * RADIANS_PER_DEGREE).abs() < 1e-9);
+        assert!((converted.latitude_rad[0] + 13.400_493_296_569_078 * RADIANS_PER_DEGREE).abs() < 1e-9);
+        assert!((converted.spacecraft_longitude_rad[0] - converted.longitude_rad[0]).abs() < 1e-15);
+    }
+
+    #[test]
+    fn iau_2000_is_left_alone_bit_for_bit() {
+        let before = footprints(MarsDatum::Iau2000);
+        let after = convert_datum(before.clone(), &clock(BiasScope::SpkLookup));
+        assert_eq!(after.footprints, before.declare());
+        assert_eq!(after.notes, ["ap18933k.b: in IAU 2000 already, not converted"]);
+    }
+
+    #[test]
+    fn the_rotation_scope_turns_mars_by_the_bias() {
+        let after = convert_datum(footprints(MarsDatum::Iau2000), &clock(BiasScope::Both));
+        let turned_rad = wrap_pi(after.footprints.longitude_rad[0] - 318.0 * RADIANS_PER_DEGREE);
+        // 350.89198 deg/day x 0.117 s = 4.7517e-4 deg; entering at an earlier time, longitudes grow.
+        assert!((turned_rad / RADIANS_PER_DEGREE - 4.7517e-4).abs() < 1e-8, "{turned_rad}");
+    }
+}

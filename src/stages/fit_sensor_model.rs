@@ -1,0 +1,219 @@
+//! Exterior orientation as polynomials in the image line, of first and second order.
+
+use nalgebra::{Matrix3, Vector3};
+use serde::{Deserialize, Serialize};
+
+use super::sample_orientation::Orientation;
+use crate::{
+    config::OrientationConfig,
+    error::{Fault, Kind, Result},
+    geom::{
+        attitude::{OmegaPhiKappa, matrix_of_spice_quaternion, rotation_vector, unwrap_angles},
+        polynomial::{Fit, Polynomial},
+    },
+    units::RADIANS_PER_ARCSECOND,
+};
+
+/// Below this |cos φ| the angles ω and κ lose their meaning and the rotation-vector form should be used.
+const GIMBAL_LOCK_COS_PHI: f64 = 0.1;
+
+/// Polynomial sensor models of one image, abscissa in lines from the middle of the header image.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct SensorModel {
+    /// Image identifier.
+    pub image: String,
+    /// First-order model.
+    pub first_order: EulerModel,
+    /// Second-order model, the one to use.
+    pub second_order: EulerModel,
+    /// Second-order model whose rotation has no gimbal lock.
+    pub rotation_vector: RotationVectorModel,
+    /// Smallest |cos φ| over the samples.
+    pub cos_phi_min: f64,
+    /// Whether ω and κ are badly determined (|cos φ| below 0.1): use `rotation_vector` then.
+    pub near_gimbal_lock: bool,
+    /// Why the model breaks the limits of the configuration; empty when it is valid.
+    pub invalid_because: Vec<String>,
+}
+
+/// Six polynomials: position of the perspective centre and pointing angles.
+///
+/// # Source
+/// Shan et al. 2005, eq. 1 and 2: `X = a0 + a1 x + a2 x²` and so on for Y, Z, ω, φ, κ.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct EulerModel {
+    /// Position X, Y, Z in IAU 2000, metres.
+    pub position_m: [Fit; 3],
+    /// ω, φ, κ, radians, continuous over the image.
+    pub angles_rad: [Fit; 3],
+}
+
+/// Position polynomials stand in [`EulerModel`]; this is the rotation without angles.
+///
+/// `M(x) = exp([r(x)]×) · M_ref`, `M` from Mars-fixed to camera components.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct RotationVectorModel {
+    /// `M_ref` by rows: the rotation of the sample nearest the middle of the image.
+    pub reference: [[f64; 3]; 3],
+    /// Components of `r(x)`, radians, second order.
+    pub vector_rad: [Fit; 3],
+}
+
+impl EulerModel {
+    /// Norm of the three position RMSE, metres.
+    #[must_use]
+    pub fn position_rmse_m(&self) -> f64 {
+        Vector3::from_iterator(self.position_m.iter().map(|fit| fit.rmse)).norm()
+    }
+}
+
+impl RotationVectorModel {
+    /// Rotation from Mars-fixed to camera components at `x` lines from the middle.
+    #[must_use]
+    pub fn mars_to_camera(&self, x: f64) -> Matrix3<f64> {
+        let vector = Vector3::from_iterator(
+            self.vector_rad.iter().map(|fit| fit.polynomial.value(x)),
+        );
+        let reference = Matrix3::from_fn(|row, column| self.reference[row][column]);
+        crate::geom::attitude::matrix_of_rotation_vector(&vector) * reference
+    }
+}
+
+/// Samples that do not determine the polynomials.
+#[derive(Debug, thiserror::Error)]
+#[error("image {image}: {samples} orientation samples do not determine a polynomial of order {order}")]
+struct Undetermined {
+    image: String,
+    samples: usize,
+    order: usize,
+}
+
+impl Fault for Undetermined {
+    fn kind(&self) -> Kind {
+        Kind::Input
+    }
+
+    fn advice(&self) -> String {
+        "raise orientation.intervals, and check that the image has more than a few lines".to_owned()
+    }
+}
+
+/// Fits the models of one image.
+///
+/// # Errors
+/// Fewer samples than coefficients, or samples that are not finite.
+/// # Source
+/// Shan et al. 2005, Table 4 (RMSE over the 31 samples, divided by 31).
+pub fn fit_sensor_model(
+    orientation: &Orientation,
+    limits: &OrientationConfig,
+) -> Result<SensorModel> {
+    let first_order = euler_model(orientation, 1)?;
+    let second_order = euler_model(orientation, 2)?;
+    let rotation_vector = rotation_vector_model(orientation)?;
+    let cos_phi_min = orientation
+        .samples
+        .iter()
+        .map(|sample| sample.angles.phi_rad.cos().abs())
+        .fold(1.0, f64::min);
+    Ok(SensorModel {
+        image: orientation.image.clone(),
+        invalid_because: broken_limits(&second_order, &rotation_vector, limits),
+        first_order,
+        second_order,
+        rotation_vector,
+        cos_phi_min,
+        near_gimbal_lock: cos_phi_min < GIMBAL_LOCK_COS_PHI,
+    })
+}
+
+fn fit(orientation: &Orientation, values: &[f64], order: usize) -> Result<Fit> {
+    let x: Vec<f64> = orientation.samples.iter().map(|s| s.line_offset).collect();
+    Ok(
+        Polynomial::fit(&x, values, order).ok_or_else(|| Undetermined {
+            image: orientation.image.clone(),
+            samples: x.len(),
+            order,
+        })?,
+    )
+}
+
+fn three(mut fit_component: impl FnMut(usize) -> Result<Fit>) -> Result<[Fit; 3]> {
+    Ok([fit_component(0)?, fit_component(1)?, fit_component(2)?])
+}
+
+fn euler_model(orientation: &Orientation, order: usize) -> Result<EulerModel> {
+    let position_m = three(|axis| {
+        let values: Vec<f64> = orientation
+            .samples
+            .iter()
+            .map(|sample| sample.position_m[axis])
+            .collect();
+        fit(orientation, &values, order)
+    })?;
+    let pick: [fn(&OmegaPhiKappa) -> f64; 3] =
+        [|a| a.omega_rad, |a| a.phi_rad, |a| a.kappa_rad];
+    let angles_rad = three(|angle| {
+        let mut values: Vec<f64> = orientation
+            .samples
+            .iter()
+            .map(|sample| pick[angle](&sample.angles))
+            .collect();
+        unwrap_angles(&mut values);
+        fit(orientation, &values, order)
+    })?;
+    Ok(EulerModel {
+        position_m,
+        angles_rad,
+    })
+}
+
+fn rotation_vector_model(orientation: &Orientation) -> Result<RotationVectorModel> {
+    let mars_to_camera: Vec<Matrix3<f64>> = orientation
+        .samples
+        .iter()
+        .map(|sample| matrix_of_spice_quaternion(sample.camera_to_mars).transpose())
+        .collect();
+    let reference = mars_to_camera[mars_to_camera.len() / 2];
+    let vectors: Vec<Vector3<f64>> = mars_to_camera
+        .iter()
+        .map(|matrix| rotation_vector(&(matrix * reference.transpose())))
+        .collect();
+    let vector_rad = three(|axis| {
+        let values: Vec<f64> = vectors.iter().map(|vector| vector[axis]).collect();
+        fit(orientation, &values, 2)
+    })?;
+    Ok(RotationVectorModel {
+        reference: std::array::from_fn(|row| std::array::from_fn(|column| reference[(row, column)])),
+        vector_rad,
+    })
+}
+
+/// The rotation is judged by its vector form, which means the same at every latitude.
+fn broken_limits(
+    model: &EulerModel,
+    rotation: &RotationVectorModel,
+    limits: &OrientationConfig,
+) -> Vec<String> {
+    let mut broken = Vec::new();
+    let position_rmse_m = model.position_rmse_m();
+    if position_rmse_m > limits.position_rmse_max_m {
+        broken.push(format!(
+            "second-order position RMSE {position_rmse_m:.4} m; limit {} m",
+            limits.position_rmse_max_m
+        ));
+    }
+    let pointing_rmse_rad = rotation
+        .vector_rad
+        .iter()
+        .map(|fit| fit.rmse)
+        .fold(0.0, f64::max);
+    if pointing_rmse_rad > limits.pointing_rmse_max_rad {
+        broken.push(format!(
+            "second-order pointing RMSE {:.3} arcsec; limit {:.3} arcsec",
+            pointing_rmse_rad / RADIANS_PER_ARCSECOND,
+            limits.pointing_rmse_max_rad / RADIANS_PER_ARCSECOND
+        ));
+    }
+    broken
+}

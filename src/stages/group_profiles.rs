@@ -1,0 +1,120 @@
+//! Footprints of one orbit inside one window become a profile, marked where an image was taken with it.
+
+use serde::{Deserialize, Serialize};
+
+use super::tag_times::ImageTimes;
+use crate::{
+    config::WindowConfig,
+    footprints::Footprints,
+    frames::MarsIau2000,
+    time::{Et, Interval},
+};
+
+/// A pause longer than this starts another profile of the same orbit, seconds.
+///
+/// An orbit crosses a wide window twice, on its day and its night side; between the two lie tens of
+/// minutes, while clouds and lost packets make pauses of seconds.
+const PAUSE_S: f64 = 300.0;
+
+/// Shots of one orbit inside one window, in order of time.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Profile {
+    /// `<window>/<orbit>`, with `.2`, `.3` … when the orbit crosses the window again.
+    pub id: String,
+    /// Window identifier.
+    pub window: String,
+    /// Orbit number as the PEDR has it.
+    pub orbit: u32,
+    /// Rows of the footprints, counted from 0.
+    pub rows: Vec<u32>,
+    /// First and last corrected shot time.
+    pub interval: Interval,
+    /// Images exposed while the profile was measured.
+    pub simultaneous: Vec<SimultaneousImage>,
+}
+
+/// An image that was exposed during a profile.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct SimultaneousImage {
+    /// Image identifier.
+    pub image: String,
+    /// Shots of the profile fired while the image was exposed.
+    pub shots: u32,
+}
+
+/// Groups footprints by window, orbit and pause.
+///
+/// Profiles come in the order of the windows and, within one, of time.
+#[must_use]
+pub fn group_profiles(
+    footprints: &Footprints<MarsIau2000>,
+    windows: &[WindowConfig],
+    images: &[ImageTimes],
+) -> Vec<Profile> {
+    let mut profiles = Vec::new();
+    for (bit, window) in windows.iter().enumerate() {
+        let mut rows: Vec<u32> = (0_u32..)
+            .zip(&footprints.windows)
+            .filter(|(_, mask)| *mask >> bit & 1 == 1)
+            .map(|(row, _)| row)
+            .collect();
+        // The sort is stable: shots with equal times stay in file order.
+        rows.sort_by(|a, b| {
+            footprints.et_s[*a as usize].total_cmp(&footprints.et_s[*b as usize])
+        });
+        let crossings = rows.chunk_by(|a, b| {
+            let (a, b) = (*a as usize, *b as usize);
+            footprints.orbit[a] == footprints.orbit[b]
+                && footprints.et_s[b] - footprints.et_s[a] <= PAUSE_S
+        });
+        let first_of_window = profiles.len();
+        for rows in crossings {
+            let orbit = footprints.orbit[rows[0] as usize];
+            let earlier = profiles[first_of_window..]
+                .iter()
+                .filter(|profile: &&Profile| profile.orbit == orbit)
+                .count();
+            profiles.push(profile(footprints, &window.id, earlier, rows, images));
+        }
+    }
+    profiles
+}
+
+fn profile(
+    footprints: &Footprints<MarsIau2000>,
+    window: &str,
+    earlier: usize,
+    rows: &[u32],
+    images: &[ImageTimes],
+) -> Profile {
+    let time = |row: &u32| Et::from_seconds(footprints.et_s[*row as usize]);
+    let orbit = footprints.orbit[rows[0] as usize];
+    let suffix = if earlier == 0 {
+        String::new()
+    } else {
+        format!(".{}", earlier + 1)
+    };
+    let simultaneous = images
+        .iter()
+        .filter_map(|image| {
+            let exposures = image.exposures();
+            let shots = rows
+                .iter()
+                .filter(|row| exposures.contains(time(row)))
+                .count();
+            let shots = u32::try_from(shots).unwrap_or(u32::MAX);
+            (shots > 0).then(|| SimultaneousImage {
+                image: image.id.clone(),
+                shots,
+            })
+        })
+        .collect();
+    Profile {
+        id: format!("{window}/{orbit}{suffix}"),
+        window: window.to_owned(),
+        orbit,
+        rows: rows.to_vec(),
+        interval: Interval::new(time(&rows[0]), time(&rows[rows.len() - 1])),
+        simultaneous,
+    }
+}

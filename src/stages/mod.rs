@@ -1,0 +1,11 @@
+//! The stages of the flow: plain functions from typed input to typed output.
+//!
+//! No stage calls another, prints, or knows of another's files. [`crate::flow`] puts them in order.
+
+pub mod check_ranges;
+pub mod convert_datum;
+pub mod fit_sensor_model;
+pub mod group_profiles;
+pub mod sample_orientation;
+pub mod search_footprints;
+pub mod tag_times;

@@ -1,0 +1,254 @@
+//! Exterior orientation of an image: position and rotation of the camera at equally spaced epochs.
+
+use nalgebra::{Matrix3, Vector3};
+use serde::{Deserialize, Serialize};
+
+use super::tag_times::ImageTimes;
+use crate::{
+    config::{KernelsConfig, OrientationConfig, PointingConfig},
+    constants::MARS_IAU2000,
+    error::Result,
+    frames::{J2000, MarsIau2000, MocNa, Position, Rotation},
+    geom::{
+        attitude::{OmegaPhiKappa, make_continuous, spice_quaternion},
+        ellipsoid::{Spherical, ray_meets_ellipsoid},
+        mars_rotation::mars_rotation,
+    },
+    spice::Session,
+    time::Et,
+    units::{RADIANS_PER_DEGREE, SECONDS_PER_DAY},
+};
+
+/// Image lines between two nodes of the camera-model tables; ALE's spacing for long images.
+const TABLE_LINES: u32 = 10;
+/// Fewest nodes over the image; usgscsm resamples tables with fewer than 25.
+const TABLE_NODES_MIN: u32 = 31;
+/// Nodes beyond each end of the image, so that an eighth-order interpolation never runs out.
+const TABLE_NODES_BEYOND: u32 = 8;
+
+/// Orientation of one image.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Orientation {
+    /// Image identifier.
+    pub image: String,
+    /// Samples over the whole header image, both ends included.
+    pub samples: Vec<OrientationSample>,
+    /// Tables for camera models, in J2000.
+    pub tables: CameraTables,
+}
+
+/// Orientation of the camera at one epoch.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct OrientationSample {
+    /// Epoch.
+    pub et: Et,
+    /// Lines from the middle of the header image.
+    pub line_offset: f64,
+    /// Perspective centre in IAU 2000, metres (geometric: no light time, no aberration).
+    pub position_m: [f64; 3],
+    /// Rotation camera → IAU 2000, SPICE quaternion (w, x, y, z), continuous over the image.
+    pub camera_to_mars: [f64; 4],
+    /// The same rotation as ω, φ, κ.
+    pub angles: OmegaPhiKappa,
+    /// Where the boresight meets the IAU 2000 ellipsoid, if it does.
+    pub boresight: Option<BoresightGround>,
+}
+
+/// Ground point of the camera's boresight on the ellipsoid.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct BoresightGround {
+    /// East longitude, radians.
+    pub longitude_rad: f64,
+    /// Areocentric latitude, radians.
+    pub latitude_rad: f64,
+    /// Distance from the camera, metres.
+    pub range_m: f64,
+    /// Angle at the ground between the ellipsoid's normal and the camera, radians.
+    pub emission_rad: f64,
+}
+
+/// Uniform tables from a little before to a little after the image, as camera models want them.
+///
+/// Positions carry light time and stellar aberration (`LT+S`), as the tables of ISIS and ALE do.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct CameraTables {
+    /// Epochs, ET seconds.
+    pub et_s: Vec<f64>,
+    /// Mars to spacecraft, J2000, LT+S, metres.
+    pub position_m: Vec<[f64; 3]>,
+    /// Velocity, metres per second.
+    pub velocity_m_s: Vec<[f64; 3]>,
+    /// Mars to Sun, J2000, LT+S, metres, at the first and the last epoch.
+    pub sun_position_m: [[f64; 3]; 2],
+    /// Velocity of the Sun from Mars, metres per second, at the same epochs.
+    pub sun_velocity_m_s: [[f64; 3]; 2],
+    /// J2000 → bus, read with the pointing bias, (w, x, y, z), continuous.
+    pub inertial_to_bus: Vec<[f64; 4]>,
+    /// Angular velocity of the bus in J2000, radians per second.
+    pub bus_angular_velocity_rad_s: Vec<[f64; 3]>,
+    /// J2000 → IAU 2000, (w, x, y, z), continuous.
+    pub inertial_to_mars: Vec<[f64; 4]>,
+    /// Angular velocity of Mars in J2000, radians per second.
+    pub mars_angular_velocity_rad_s: Vec<[f64; 3]>,
+    /// Bus → camera by rows.
+    pub bus_to_camera: [[f64; 3]; 3],
+}
+
+/// Samples the orientation of `image`.
+///
+/// Position and Mars rotation are those of the exposure; attitude is read where the pointing bias
+/// says. `R(camera → Mars) = R(J2000 → Mars) · R(J2000 → bus)ᵀ · R(bus → camera)ᵀ`.
+///
+/// # Errors
+/// Kernels that do not cover the image with its padding; the gap is named.
+/// # Source
+/// Shan et al. 2005, p. 99 (30 intervals) and eq. 1.
+pub fn sample_orientation(
+    session: &Session,
+    image: &ImageTimes,
+    kernels: &KernelsConfig,
+    pointing: &PointingConfig,
+    sampling: &OrientationConfig,
+) -> Result<Orientation> {
+    let exposures = image.exposures();
+    session.require_position(exposures.padded(kernels.padding_s))?;
+    session.require_attitude(
+        exposures.padded(kernels.padding_s),
+        pointing.ck_bias,
+        kernels.ck_tolerance_s,
+    )?;
+    let reader = Reader {
+        session,
+        pointing,
+        tolerance_s: kernels.ck_tolerance_s,
+    };
+    let step_s = image.duration_s() / f64::from(sampling.intervals);
+    let mut samples = (0..=sampling.intervals)
+        .map(|k| reader.sample(image, image.start.plus(f64::from(k) * step_s)))
+        .collect::<Result<Vec<_>>>()?;
+    let mut quaternions: Vec<[f64; 4]> = samples.iter().map(|s| s.camera_to_mars).collect();
+    make_continuous(&mut quaternions);
+    for (sample, quaternion) in samples.iter_mut().zip(quaternions) {
+        sample.camera_to_mars = quaternion;
+    }
+    Ok(Orientation {
+        image: image.id.clone(),
+        samples,
+        tables: reader.tables(&table_epochs(image, kernels.padding_s))?,
+    })
+}
+
+/// Epochs of the camera tables: uniform, both image ends on the grid, beyond them within the padding.
+fn table_epochs(image: &ImageTimes, padding_s: f64) -> Vec<Et> {
+    let duration_s = image.duration_s();
+    let steps = image.lines_header.div_ceil(TABLE_LINES).max(TABLE_NODES_MIN - 1);
+    let step_s = duration_s / f64::from(steps);
+    let beyond = (1..=TABLE_NODES_BEYOND)
+        .take_while(|nodes| f64::from(*nodes) * step_s <= padding_s)
+        .last()
+        .unwrap_or(0);
+    (0..=steps + 2 * beyond)
+        .map(|k| image.start.plus((f64::from(k) - f64::from(beyond)) * step_s))
+        .collect()
+}
+
+struct Reader<'a> {
+    session: &'a Session,
+    pointing: &'a PointingConfig,
+    tolerance_s: f64,
+}
+
+impl Reader<'_> {
+    fn inertial_to_camera(&self, exposure: Et) -> Result<Rotation<J2000, MocNa>> {
+        let lookup = self.pointing.ck_bias.lookup(exposure);
+        let attitude = self.session.attitude(lookup, exposure, self.tolerance_s)?;
+        Ok(self.session.mounting(exposure)? * attitude.inertial_to_bus)
+    }
+
+    fn sample(&self, image: &ImageTimes, et: Et) -> Result<OrientationSample> {
+        let to_mars = mars_rotation::<MarsIau2000>(et);
+        let position = to_mars.apply(&self.session.state(et)?.position);
+        let camera_to_mars = to_mars * self.inertial_to_camera(et)?.inverse();
+        Ok(OrientationSample {
+            et,
+            line_offset: image.line_offset(et),
+            position_m: position.xyz_m.into(),
+            camera_to_mars: spice_quaternion(camera_to_mars.matrix()),
+            angles: OmegaPhiKappa::from_camera_to_mars(camera_to_mars.matrix()),
+            boresight: boresight_ground(&position, camera_to_mars.matrix()),
+        })
+    }
+
+    /// Tables at two or more epochs.
+    fn tables(&self, epochs: &[Et]) -> Result<CameraTables> {
+        let [first, last] = [epochs[0], epochs[epochs.len() - 1]];
+        let suns = [self.session.sun_state(first)?, self.session.sun_state(last)?];
+        let mut tables = CameraTables {
+            et_s: Vec::new(),
+            position_m: Vec::new(),
+            velocity_m_s: Vec::new(),
+            sun_position_m: suns.map(|sun| sun.position.xyz_m.into()),
+            sun_velocity_m_s: suns.map(|sun| sun.velocity_m_s.into()),
+            inertial_to_bus: Vec::new(),
+            bus_angular_velocity_rad_s: Vec::new(),
+            inertial_to_mars: Vec::new(),
+            mars_angular_velocity_rad_s: Vec::new(),
+            bus_to_camera: rows(self.session.mounting(first)?.matrix()),
+        };
+        for epoch in epochs {
+            let apparent = self.session.apparent_state(*epoch)?;
+            let lookup = self.pointing.ck_bias.lookup(*epoch);
+            let attitude = self.session.attitude(lookup, *epoch, self.tolerance_s)?;
+            let to_mars = mars_rotation::<MarsIau2000>(*epoch);
+            tables.et_s.push(epoch.seconds());
+            tables.position_m.push(apparent.position.xyz_m.into());
+            tables.velocity_m_s.push(apparent.velocity_m_s.into());
+            tables
+                .inertial_to_bus
+                .push(spice_quaternion(attitude.inertial_to_bus.matrix()));
+            tables
+                .bus_angular_velocity_rad_s
+                .push(attitude.angular_velocity_rad_s.into());
+            tables
+                .inertial_to_mars
+                .push(spice_quaternion(to_mars.matrix()));
+            tables
+                .mars_angular_velocity_rad_s
+                .push(mars_angular_velocity(to_mars.matrix()).into());
+        }
+        make_continuous(&mut tables.inertial_to_bus);
+        make_continuous(&mut tables.inertial_to_mars);
+        Ok(tables)
+    }
+}
+
+/// Spin of Mars in J2000: its rate along its pole (the pole's own motion is 1e-14 rad/s).
+fn mars_angular_velocity(inertial_to_mars: &Matrix3<f64>) -> Vector3<f64> {
+    let rate_rad_s = MARS_IAU2000.meridian_deg_per_day * RADIANS_PER_DEGREE / SECONDS_PER_DAY;
+    inertial_to_mars.row(2).transpose() * rate_rad_s
+}
+
+fn rows(matrix: &Matrix3<f64>) -> [[f64; 3]; 3] {
+    std::array::from_fn(|row| std::array::from_fn(|column| matrix[(row, column)]))
+}
+
+fn boresight_ground(
+    position: &Position<MarsIau2000>,
+    camera_to_mars: &Matrix3<f64>,
+) -> Option<BoresightGround> {
+    let boresight = camera_to_mars * Vector3::z();
+    let ground = ray_meets_ellipsoid(position, &boresight)?;
+    let scale = Vector3::new(
+        MARS_IAU2000.equatorial_radius_m.powi(-2),
+        MARS_IAU2000.equatorial_radius_m.powi(-2),
+        MARS_IAU2000.polar_radius_m.powi(-2),
+    );
+    let normal = ground.xyz_m.component_mul(&scale);
+    let coordinates = Spherical::from_xyz_m(&ground.xyz_m);
+    Some(BoresightGround {
+        longitude_rad: coordinates.longitude_rad,
+        latitude_rad: coordinates.latitude.0,
+        range_m: position.distance_m(&ground),
+        emission_rad: normal.angle(&-boresight),
+    })
+}

@@ -1,0 +1,340 @@
+//! Image labels become line times: spacecraft clock or UTC to ET, line period, header and delivered lines.
+
+use serde::{Deserialize, Serialize};
+
+use crate::{
+    config::{ImageConfig, ImageFields},
+    error::{Failure, Fault, Kind, Place, Result},
+    pds::moc,
+    spice::Session,
+    time::{Et, Interval},
+    units::SECONDS_PER_MS,
+};
+
+/// Line periods that differ by more than this share of themselves contradict each other.
+///
+/// Labels give the exposure with four digits (0.4821 ms), so a stated period may differ by 1e-4.
+const PERIOD_TOLERANCE: f64 = 2e-4;
+
+/// A clock string and a UTC string farther apart than this contradict each other, seconds.
+///
+/// UTC in MOC labels is cut to 10 ms and lies up to 5 ms from the clock; a second means another image.
+const START_TOLERANCE_S: f64 = 1.0;
+
+/// When and how the lines of an image were exposed.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ImageTimes {
+    /// Image identifier.
+    pub id: String,
+    /// Start (top edge) of the first line.
+    pub start: Et,
+    /// Whether `start` comes from the spacecraft clock or from UTC.
+    pub start_from: StartFrom,
+    /// Clock string of the start, where the label has one.
+    pub sclk_start: Option<String>,
+    /// UTC of the start, from `start`.
+    pub utc_start: String,
+    /// Time between two image lines, seconds.
+    pub line_period_s: f64,
+    /// Exposure of one detector line, seconds.
+    pub exposure_s: f64,
+    /// Detector lines summed along the track.
+    pub downtrack_summing: u32,
+    /// Detector pixels summed across the track.
+    pub crosstrack_summing: u32,
+    /// Lines exposed; the time model counts these.
+    pub lines_header: u32,
+    /// Lines in the delivered file.
+    pub lines_delivered: u32,
+    /// Samples per line.
+    pub samples: u32,
+    /// First detector pixel, counted from 0.
+    pub first_detector: u32,
+    /// What the reader should know, one sentence each.
+    pub notes: Vec<String>,
+}
+
+/// Source of an image's start time.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum StartFrom {
+    /// Spacecraft clock.
+    Sclk,
+    /// Coordinated universal time.
+    Utc,
+}
+
+impl ImageTimes {
+    /// Exposure of the whole header image, seconds: lines × line period.
+    #[must_use]
+    pub fn duration_s(&self) -> f64 {
+        f64::from(self.lines_header) * self.line_period_s
+    }
+
+    /// From the start of the first line to the end of the last header line.
+    #[must_use]
+    pub fn exposures(&self) -> Interval {
+        Interval::new(self.start, self.start.plus(self.duration_s()))
+    }
+
+    /// Middle of the header image, where the polynomial models have their origin.
+    #[must_use]
+    pub fn middle(&self) -> Et {
+        self.start.plus(0.5 * self.duration_s())
+    }
+
+    /// Centre of the exposure of image line `line`, counted from 0.
+    #[must_use]
+    pub fn line_centre(&self, line: u32) -> Et {
+        self.start
+            .plus((f64::from(line) + 0.5) * self.line_period_s)
+    }
+
+    /// Line coordinate of an instant: lines from the middle of the header image, positive along flight.
+    ///
+    /// # Source
+    /// Shan et al. 2005: `x = (t − t_mid) / τ`; line `i` from 0 has `x = i − (n − 1)/2`.
+    #[must_use]
+    pub fn line_offset(&self, instant: Et) -> f64 {
+        instant.since(self.middle()) / self.line_period_s
+    }
+}
+
+/// An image whose times cannot be told.
+#[derive(Debug, thiserror::Error)]
+enum ImageFault {
+    #[error("image {image}: no {key}, neither in the label nor in the configuration")]
+    Missing { image: String, key: &'static str },
+    #[error(
+        "image {image}: line period {stated_ms} ms is stated, but exposure {exposure_ms} ms × summing \
+         {summing} makes {computed_ms} ms; expected them to agree within 0.02 %"
+    )]
+    Period {
+        image: String,
+        stated_ms: f64,
+        exposure_ms: f64,
+        summing: u32,
+        computed_ms: f64,
+    },
+    #[error(
+        "image {image}: clock {sclk} is {apart_s:.3} s away from UTC {utc}; expected at most {START_TOLERANCE_S} s"
+    )]
+    Start {
+        image: String,
+        sclk: String,
+        utc: String,
+        apart_s: f64,
+    },
+    #[error(
+        "image {image}: {delivered} lines delivered, {header} in the header; expected no more than in the header"
+    )]
+    Lines {
+        image: String,
+        delivered: u32,
+        header: u32,
+    },
+    #[error(
+        "image {image}: {lines} lines of {line_period_s} s; expected at least 3 lines, a positive period and \
+         less than 600 s in all"
+    )]
+    Duration {
+        image: String,
+        lines: u32,
+        line_period_s: f64,
+    },
+}
+
+impl Fault for ImageFault {
+    fn kind(&self) -> Kind {
+        match self {
+            Self::Missing { .. } => Kind::Configuration,
+            _ => Kind::Input,
+        }
+    }
+
+    fn advice(&self) -> String {
+        match self {
+            Self::Missing { key, .. } => format!("add `{key}` to the image's table, or name its label"),
+            Self::Period { .. } => {
+                "give the exposure of one detector line, or the period of summed lines, not a mixture".to_owned()
+            }
+            Self::Start { .. } => {
+                "check which of the two belongs to this image; the clock is what would be used".to_owned()
+            }
+            Self::Lines { .. } => {
+                "lines_header is what the camera exposed, lines_delivered what the file holds".to_owned()
+            }
+            Self::Duration { .. } => "check lines_header, the exposure (milliseconds) and the summing".to_owned(),
+        }
+    }
+}
+
+/// Times of every image, in the order of the configuration.
+///
+/// # Errors
+/// An unreadable label, a missing key, values that contradict each other, a time no kernel can convert.
+pub fn tag_times(images: &[ImageConfig], session: &Session) -> Result<Vec<ImageTimes>> {
+    images.iter().map(|image| tag_image(image, session)).collect()
+}
+
+fn tag_image(image: &ImageConfig, session: &Session) -> Result<ImageTimes> {
+    let mut notes = Vec::new();
+    let label = match &image.label {
+        Some(path) => moc::read_label(path)?.fields,
+        None => ImageFields::default(),
+    };
+    let fields = merged(&image.fields, label, &mut notes);
+    let place = |fault: ImageFault| match &image.label {
+        Some(path) => Failure::from(fault).in_file(path),
+        None => Failure::from(fault),
+    };
+    let missing = |key| {
+        place(ImageFault::Missing {
+            image: image.id.clone(),
+            key,
+        })
+    };
+    let lines_header = fields.lines_header.ok_or_else(|| missing("lines_header"))?;
+    let lines_delivered = fields.lines_delivered.unwrap_or(lines_header);
+    if lines_delivered > lines_header {
+        return Err(place(ImageFault::Lines {
+            image: image.id.clone(),
+            delivered: lines_delivered,
+            header: lines_header,
+        }));
+    }
+    if lines_delivered < lines_header {
+        notes.push(format!(
+            "{} of {lines_header} header lines are not in the delivered file; times count header lines",
+            lines_header - lines_delivered
+        ));
+    }
+    let downtrack_summing = fields
+        .downtrack_summing
+        .ok_or_else(|| missing("downtrack_summing"))?;
+    let (line_period_s, exposure_s) = line_period(image, &fields, downtrack_summing)
+        .map_err(place)?
+        .ok_or_else(|| missing("exposure_ms"))?;
+    let duration_s = f64::from(lines_header) * line_period_s;
+    if lines_header < 3 || !(line_period_s > 0.0 && duration_s < 600.0) {
+        return Err(place(ImageFault::Duration {
+            image: image.id.clone(),
+            lines: lines_header,
+            line_period_s,
+        }));
+    }
+    let (start, start_from) = start_time(image, &fields, session, &mut notes)?
+        .map_err(place)?
+        .ok_or_else(|| missing("sclk_start"))?;
+    Ok(ImageTimes {
+        id: image.id.clone(),
+        start,
+        start_from,
+        utc_start: session.et_to_utc(start)?,
+        sclk_start: fields.sclk_start,
+        line_period_s,
+        exposure_s,
+        downtrack_summing,
+        crosstrack_summing: fields.crosstrack_summing.unwrap_or(downtrack_summing),
+        lines_header,
+        lines_delivered,
+        samples: fields.samples.ok_or_else(|| missing("samples"))?,
+        first_detector: fields.first_detector.unwrap_or(0),
+        notes,
+    })
+}
+
+/// Configuration over label, with a note for every key in which they differ.
+fn merged(written: &ImageFields, label: ImageFields, notes: &mut Vec<String>) -> ImageFields {
+    fn over<T: PartialEq + std::fmt::Debug + Clone>(
+        key: &str,
+        written: Option<&T>,
+        label: Option<T>,
+        notes: &mut Vec<String>,
+    ) -> Option<T> {
+        if let (Some(written), Some(label)) = (written, &label)
+            && written != label
+        {
+            notes.push(format!(
+                "{key} {written:?} of the configuration replaces {label:?} of the label"
+            ));
+        }
+        written.cloned().or(label)
+    }
+    macro_rules! merge {
+        ($($key:ident),*) => {
+            ImageFields { $($key: over(stringify!($key), written.$key.as_ref(), label.$key, notes)),* }
+        };
+    }
+    merge!(
+        sclk_start, utc_start, exposure_s, line_period_s, downtrack_summing, crosstrack_summing,
+        lines_header, lines_delivered, samples, first_detector
+    )
+}
+
+/// Line period and exposure in seconds; `None` when neither is given.
+///
+/// Source: exposure × downtrack summing, ISIS and ALE (`mgs_drivers.py`); the "exposure time" of
+/// Shan et al. 2005, Table 2 is the period already summed.
+fn line_period(
+    image: &ImageConfig,
+    fields: &ImageFields,
+    summing: u32,
+) -> std::result::Result<Option<(f64, f64)>, ImageFault> {
+    let summed = |exposure_s: f64| exposure_s * f64::from(summing);
+    match (fields.line_period_s, fields.exposure_s) {
+        (Some(period_s), Some(exposure_s)) => {
+            let computed_s = summed(exposure_s);
+            if (period_s - computed_s).abs() > PERIOD_TOLERANCE * computed_s.abs() {
+                return Err(ImageFault::Period {
+                    image: image.id.clone(),
+                    stated_ms: period_s / SECONDS_PER_MS,
+                    exposure_ms: exposure_s / SECONDS_PER_MS,
+                    summing,
+                    computed_ms: computed_s / SECONDS_PER_MS,
+                });
+            }
+            Ok(Some((period_s, exposure_s)))
+        }
+        (Some(period_s), None) => Ok(Some((period_s, period_s / f64::from(summing.max(1))))),
+        (None, Some(exposure_s)) => Ok(Some((summed(exposure_s), exposure_s))),
+        (None, None) => Ok(None),
+    }
+}
+
+type Start = std::result::Result<Option<(Et, StartFrom)>, ImageFault>;
+
+/// The clock where there is one, else UTC; both together must agree.
+fn start_time(
+    image: &ImageConfig,
+    fields: &ImageFields,
+    session: &Session,
+    notes: &mut Vec<String>,
+) -> Result<Start> {
+    let convert = |result: Result<Et>| match &image.label {
+        Some(path) => result.in_file(path),
+        None => result,
+    };
+    let from_utc = match &fields.utc_start {
+        Some(utc) => Some((utc, convert(session.utc_to_et(utc))?)),
+        None => None,
+    };
+    let Some(sclk) = &fields.sclk_start else {
+        if from_utc.is_some() {
+            notes.push("start from UTC, which MOC labels cut to 10 ms; no clock string".to_owned());
+        }
+        return Ok(Ok(from_utc.map(|(_, start)| (start, StartFrom::Utc))));
+    };
+    let start = convert(session.sclk_to_et(sclk))?;
+    if let Some((utc, utc_start)) = from_utc
+        && start.since(utc_start).abs() > START_TOLERANCE_S
+    {
+        return Ok(Err(ImageFault::Start {
+            image: image.id.clone(),
+            sclk: sclk.clone(),
+            utc: utc.clone(),
+            apart_s: start.since(utc_start).abs(),
+        }));
+    }
+    Ok(Ok(Some((start, StartFrom::Sclk))))
+}
