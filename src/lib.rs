@@ -11,5 +11,6 @@ pub mod frames;
 pub mod geom;
 pub mod pds;
 pub mod scene;
+pub mod spice;
 pub mod time;
 pub mod units;
