@@ -475,13 +475,18 @@ fn c_text(what: &'static str, text: &str) -> Called<CString> {
         );
         return Err(SpiceFault::Unusable { what, problem });
     }
+    if text.chars().any(char::is_control) {
+        let problem = format!("{text:?} holds control characters");
+        return Err(SpiceFault::Unusable { what, problem });
+    }
     CString::new(text).map_err(|error| SpiceFault::Unusable {
         what,
         problem: error.to_string(),
     })
 }
 
-fn c_path(path: &Path) -> Called<CString> {
+/// The path for CSPICE, refused when it could not be taken whole.
+pub(super) fn c_path(path: &Path) -> Called<CString> {
     let text = path.to_str().ok_or_else(|| SpiceFault::Unusable {
         what: "a path",
         problem: format!("{} is not valid UTF-8", path.display()),

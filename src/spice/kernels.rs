@@ -8,7 +8,7 @@ use std::{
 
 use serde::Serialize;
 
-use super::{daf, error::SpiceFault, text_kernel};
+use super::{daf, error::SpiceFault, ffi, text_kernel};
 use crate::error::{IoFault, Place, Result};
 
 /// Largest text kernel that is read, bytes; the archive's largest is below 2 MB.
@@ -58,6 +58,7 @@ impl Kernel {
     /// # Errors
     /// [`IoFault`]; [`SpiceFault::NotAKernel`]; [`SpiceFault::DamagedKernel`].
     pub(super) fn inspect(path: &Path) -> Result<Self> {
+        ffi::c_path(path)?;
         let role = role_of(path)?;
         let (bytes, blake3) = hash(path)?;
         Ok(Self {

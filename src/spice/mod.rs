@@ -10,15 +10,21 @@
 //!
 //! Kilometres become metres here, and nowhere else.
 
+mod coverage;
 mod daf;
 mod error;
 mod ffi;
 mod kernels;
+mod metakernel;
+mod select;
 mod session;
 mod text_kernel;
+mod trajectory;
 mod write;
 
+pub use coverage::Coverage;
 pub use error::SpiceFault;
 pub use kernels::{Kernel, KernelRole, KernelSet};
 pub use session::{Attitude, Session, State};
+pub use trajectory::Trajectory;
 pub use write::{CkSegment, SpkSegment, write_ck, write_spk};

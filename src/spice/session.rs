@@ -1,8 +1,11 @@
 //! A session with CSPICE: times, states and attitudes from one set of kernels.
 
+use std::cell::OnceCell;
+
 use nalgebra::{Matrix3, Vector3};
 
 use super::{
+    coverage::Coverage,
     error::SpiceFault,
     ffi::{Cspice, Rows, StateKm},
     kernels::KernelSet,
@@ -56,6 +59,7 @@ pub struct Attitude {
 pub struct Session {
     pub(super) cspice: Cspice,
     pub(super) kernels: KernelSet,
+    pub(super) coverage: OnceCell<Coverage>,
 }
 
 impl Session {
@@ -71,6 +75,7 @@ impl Session {
         Ok(Self {
             cspice,
             kernels: kernels.clone(),
+            coverage: OnceCell::new(),
         })
     }
 
