@@ -8,7 +8,16 @@ use std::{
 
 /// Rooms by floor, the lowest first; see ARCHITECTURE.md.
 const FLOORS: [&[&str]; 6] = [
-    &["units", "time", "frames", "constants", "error", "footprints", "files", "config"],
+    &[
+        "units",
+        "time",
+        "frames",
+        "constants",
+        "error",
+        "footprints",
+        "files",
+        "config",
+    ],
     &["geom"],
     &["spice", "pds", "scene"],
     &["stages"],
@@ -31,7 +40,9 @@ fn floor(room: &str) -> usize {
     FLOORS
         .iter()
         .position(|rooms| rooms.contains(&room))
-        .unwrap_or_else(|| panic!("`{room}` is in no floor: add it to ARCHITECTURE.md and to this test"))
+        .unwrap_or_else(|| {
+            panic!("`{room}` is in no floor: add it to ARCHITECTURE.md and to this test")
+        })
 }
 
 fn sources(folder: &Path, found: &mut Vec<PathBuf>) {
@@ -94,7 +105,9 @@ fn arrows_point_down() {
     assert!(files.len() > 30, "the sources were not found");
     let mut wrong = Vec::new();
     for file in files {
-        let Some(room) = room_of(&file, &root) else { continue };
+        let Some(room) = room_of(&file, &root) else {
+            continue;
+        };
         for used in used_rooms(&fs::read_to_string(&file).unwrap()) {
             let down = floor(&used) < floor(&room);
             let ground_floor = floor(&used) == 0 && floor(&room) == 0 && used != "config";
@@ -104,7 +117,11 @@ fn arrows_point_down() {
             }
         }
     }
-    assert!(wrong.is_empty(), "arrows that do not point down:\n{}", wrong.join("\n"));
+    assert!(
+        wrong.is_empty(),
+        "arrows that do not point down:\n{}",
+        wrong.join("\n")
+    );
 }
 
 #[test]
@@ -123,6 +140,10 @@ fn files_stay_short() {
     sources(&root, &mut files);
     for file in files {
         let lines = fs::read_to_string(&file).unwrap().lines().count();
-        assert!(lines <= 450, "{} has {lines} lines: split it", file.display());
+        assert!(
+            lines <= 450,
+            "{} has {lines} lines: split it",
+            file.display()
+        );
     }
 }

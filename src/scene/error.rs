@@ -29,6 +29,12 @@ pub enum SceneError {
         /// True time of the shot.
         et_s: f64,
     },
+    /// A frame asks for an instant that was not tabulated.
+    #[error("no beam was tabulated for ET {et_s:.6}")]
+    NotTabulated {
+        /// True time that was asked for.
+        et_s: f64,
+    },
     /// A day is shorter than its image or longer than a file may be.
     #[error("day_s is {day_s}; expected {least} to {most}")]
     Day {
@@ -53,7 +59,7 @@ impl Fault for SceneError {
     fn kind(&self) -> Kind {
         match self {
             Self::NotAScene { .. } | Self::Day { .. } => Kind::Configuration,
-            Self::NoOrbit { .. } => Kind::Bug,
+            Self::NoOrbit { .. } | Self::NotTabulated { .. } => Kind::Bug,
             Self::BeamMisses { .. } => Kind::Input,
             Self::NothingToFly { .. } => Kind::Coverage,
         }
@@ -62,7 +68,9 @@ impl Fault for SceneError {
     fn advice(&self) -> String {
         match self {
             Self::NotAScene { .. } => "choose an empty or new folder",
-            Self::NoOrbit { .. } => "report this with the seed that was used",
+            Self::NoOrbit { .. } | Self::NotTabulated { .. } => {
+                "report this with the seed and the kernels that were used"
+            }
             Self::BeamMisses { .. } => "the attitude kernels do not point +Z at Mars there; leave them out",
             Self::Day { .. } => "choose a length within these bounds",
             Self::NothingToFly { .. } => {

@@ -12,7 +12,8 @@ use crate::error::{IoFault, Place, Result};
 /// File by which a scene is recognised, written before all others.
 const MARKER: &str = "README.txt";
 /// Its first line.
-const MARKER_LINE: &str = "A synthetic mission, written by `areograph scene`. Nothing in this folder is mission data.";
+const MARKER_LINE: &str =
+    "A synthetic mission, written by `areograph scene`. Nothing in this folder is mission data.";
 
 /// A scene that is being written beside its final place.
 pub(super) struct Draft {
@@ -31,15 +32,22 @@ impl Draft {
         let folder = directory.with_file_name(name);
         refuse_foreign(directory)?;
         remove_scene(&folder)?;
-        fs::create_dir_all(&folder).map_err(IoFault::on("create")).in_file(&folder)?;
+        fs::create_dir_all(&folder)
+            .map_err(IoFault::on("create"))
+            .in_file(&folder)?;
         put(&folder.join(MARKER), &format!("{MARKER_LINE}\n\n{readme}"))?;
-        Ok(Self { final_place: directory.to_owned(), folder })
+        Ok(Self {
+            final_place: directory.to_owned(),
+            folder,
+        })
     }
 
     /// A folder of the draft, created.
     pub(super) fn folder(&self, name: &str) -> Result<PathBuf> {
         let folder = self.folder.join(name);
-        fs::create_dir_all(&folder).map_err(IoFault::on("create")).in_file(&folder)?;
+        fs::create_dir_all(&folder)
+            .map_err(IoFault::on("create"))
+            .in_file(&folder)?;
         Ok(folder)
     }
 
@@ -69,9 +77,11 @@ pub(super) fn put(path: &Path, text: &str) -> Result<()> {
 fn remove_scene(folder: &Path) -> Result<()> {
     refuse_foreign(folder)?;
     match fs::remove_dir_all(folder) {
-        Err(error) if error.kind() != ErrorKind::NotFound => {
-            Err(IoFault { action: "remove the older scene", source: error }).in_file(folder)
-        }
+        Err(error) if error.kind() != ErrorKind::NotFound => Err(IoFault {
+            action: "remove the older scene",
+            source: error,
+        })
+        .in_file(folder),
         _ => Ok(()),
     }
 }
@@ -81,10 +91,17 @@ fn refuse_foreign(folder: &Path) -> Result<()> {
     let mut entries = match fs::read_dir(folder) {
         Ok(entries) => entries,
         Err(error) if error.kind() == ErrorKind::NotFound => return Ok(()),
-        Err(source) => return Err(IoFault { action: "look into", source }).in_file(folder),
+        Err(source) => {
+            return Err(IoFault {
+                action: "look into",
+                source,
+            })
+            .in_file(folder);
+        }
     };
     let empty = entries.next().is_none();
-    let ours = fs::read_to_string(folder.join(MARKER)).is_ok_and(|text| text.starts_with(MARKER_LINE));
+    let ours =
+        fs::read_to_string(folder.join(MARKER)).is_ok_and(|text| text.starts_with(MARKER_LINE));
     if empty || ours {
         return Ok(());
     }
@@ -102,7 +119,11 @@ mod tests {
         for text in ["one", "two"] {
             let draft = Draft::begin(&place, "").unwrap();
             put(&draft.root().join("truth.json"), text).unwrap();
-            assert_eq!(place.exists(), text == "two", "nothing appears before the end");
+            assert_eq!(
+                place.exists(),
+                text == "two",
+                "nothing appears before the end"
+            );
             draft.finish().unwrap();
             assert_eq!(fs::read_to_string(place.join("truth.json")).unwrap(), text);
         }
@@ -110,7 +131,10 @@ mod tests {
         fs::create_dir(&foreign).unwrap();
         put(&foreign.join("holiday.txt"), "sea").unwrap();
         let failure = Draft::begin(&foreign, "").err().unwrap();
-        assert!(failure.to_string().contains("holds no scene of areograph"), "{failure}");
+        assert!(
+            failure.to_string().contains("holds no scene of areograph"),
+            "{failure}"
+        );
         assert!(foreign.join("holiday.txt").exists());
     }
 }

@@ -38,12 +38,27 @@ const SYNTHETIC: &str = "SYNTHETIC: written by areograph scene, not from mission
 
 /// Text kernels by file name, in load order of the first four.
 const TEXT_KERNELS: [(&str, &str); 6] = [
-    ("leapseconds.tls", include_str!("../../kernels.example/leapseconds.tls")),
-    ("mgs_clock.tsc", include_str!("../../kernels.example/mgs_clock.tsc")),
-    ("mars_iau2000.tpc", include_str!("../../kernels.example/mars_iau2000.tpc")),
+    (
+        "leapseconds.tls",
+        include_str!("../../kernels.example/leapseconds.tls"),
+    ),
+    (
+        "mgs_clock.tsc",
+        include_str!("../../kernels.example/mgs_clock.tsc"),
+    ),
+    (
+        "mars_iau2000.tpc",
+        include_str!("../../kernels.example/mars_iau2000.tpc"),
+    ),
     ("moc.ti", include_str!("../../kernels.example/moc.ti")),
-    ("mars_iau1991.tpc", include_str!("../../kernels.example/mars_iau1991.tpc")),
-    ("mars_iau1994.tpc", include_str!("../../kernels.example/mars_iau1994.tpc")),
+    (
+        "mars_iau1991.tpc",
+        include_str!("../../kernels.example/mars_iau1991.tpc"),
+    ),
+    (
+        "mars_iau1994.tpc",
+        include_str!("../../kernels.example/mars_iau1994.tpc"),
+    ),
 ];
 /// How many of them a metakernel loads; the other Mars models would replace the first.
 const LOADED: usize = 4;
@@ -55,14 +70,22 @@ fn spk_name(family: &str) -> String {
 
 /// Writes text kernels and metakernels into `folder`.
 pub(super) fn write_text_kernels(folder: &Path) -> Result<()> {
-    fs::create_dir_all(folder).map_err(IoFault::on("create")).in_file(folder)?;
+    fs::create_dir_all(folder)
+        .map_err(IoFault::on("create"))
+        .in_file(folder)?;
     for (name, text) in TEXT_KERNELS {
         put(&folder.join(name), text)?;
     }
     for family in FAMILIES {
-        let mut names: Vec<String> =
-            TEXT_KERNELS[..LOADED].iter().map(|(name, _)| (*name).to_owned()).collect();
-        names.extend([PLANETS_NAME.to_owned(), spk_name(family), CK_NAME.to_owned()]);
+        let mut names: Vec<String> = TEXT_KERNELS[..LOADED]
+            .iter()
+            .map(|(name, _)| (*name).to_owned())
+            .collect();
+        names.extend([
+            PLANETS_NAME.to_owned(),
+            spk_name(family),
+            CK_NAME.to_owned(),
+        ]);
         let list: Vec<String> = names.iter().map(|name| format!("'{name}'")).collect();
         let text = format!(
             "KPL/MK\n\nKernels of a synthetic mission with the orbit of family {family}; written by\n\
@@ -77,7 +100,10 @@ pub(super) fn write_text_kernels(folder: &Path) -> Result<()> {
 
 /// A session with the clock and the leap seconds of `folder`.
 pub(super) fn clock_session(folder: &Path) -> Result<Session> {
-    let files: Vec<PathBuf> = TEXT_KERNELS[..2].iter().map(|(name, _)| folder.join(name)).collect();
+    let files: Vec<PathBuf> = TEXT_KERNELS[..2]
+        .iter()
+        .map(|(name, _)| folder.join(name))
+        .collect();
     Session::open(&KernelSet::from_files(&files)?)
 }
 
@@ -107,7 +133,10 @@ pub(super) fn write_attitude(folder: &Path, session: &Session, arcs: &[Arc]) -> 
                     .map(|sample| MGS_POINTING_BIAS.lookup(sample.et).kernel_time())
                     .collect(),
                 quaternions,
-                samples.iter().map(|sample| sample.rate_rad_s.into()).collect(),
+                samples
+                    .iter()
+                    .map(|sample| sample.rate_rad_s.into())
+                    .collect(),
             )
         })
         .collect();
@@ -137,7 +166,10 @@ pub(super) fn write_orbits(folder: &Path, arcs: &[Arc], seed: u64) -> Result<()>
             .map(|arc| {
                 let version = &versions(arc, seed)[index];
                 let epochs = epochs(arc.kernel_span(), SPK_STEP_S);
-                let states = epochs.iter().map(|et| kernel_state(&version.state(&arc.orbit, *et))).collect();
+                let states = epochs
+                    .iter()
+                    .map(|et| kernel_state(&version.state(&arc.orbit, *et)))
+                    .collect();
                 (epochs, states)
             })
             .collect();
@@ -153,7 +185,8 @@ pub(super) fn write_orbits(folder: &Path, arcs: &[Arc], seed: u64) -> Result<()>
                 states,
             })
             .collect();
-        let comment = format!("{SYNTHETIC}\nOrbit of family {family}; the truth is that of family gsfc.");
+        let comment =
+            format!("{SYNTHETIC}\nOrbit of family {family}; the truth is that of family gsfc.");
         write_spk(&folder.join(spk_name(family)), &segments, &comment)?;
     }
     write_planets(folder, arcs)
@@ -168,7 +201,9 @@ pub(super) fn versions(arc: &Arc, seed: u64) -> [Version; 3] {
 /// Mars around the Sun; the Sun stands at the barycentre, and Mars at its own, for want of moons.
 fn write_planets(folder: &Path, arcs: &[Arc]) -> Result<()> {
     let days = |days: f64| days * SECONDS_PER_DAY;
-    let (Some(first), Some(last)) = (arcs.first(), arcs.last()) else { return Ok(()) };
+    let (Some(first), Some(last)) = (arcs.first(), arcs.last()) else {
+        return Ok(());
+    };
     let span = Interval::new(first.frames.start, last.frames.stop).padded(days(4.0));
     let epochs = epochs(span, days(1.0));
     let at_rest = State {
@@ -176,7 +211,10 @@ fn write_planets(folder: &Path, arcs: &[Arc]) -> Result<()> {
         velocity_m_s: nalgebra::Vector3::zeros(),
     };
     let resting = vec![at_rest; epochs.len()];
-    let moving: Vec<State> = epochs.iter().map(|et| kernel_state(&mars_state_from_sun(*et))).collect();
+    let moving: Vec<State> = epochs
+        .iter()
+        .map(|et| kernel_state(&mars_state_from_sun(*et)))
+        .collect();
     let segment = |target, centre, name, states| SpkSegment {
         target,
         centre,
@@ -186,9 +224,24 @@ fn write_planets(folder: &Path, arcs: &[Arc]) -> Result<()> {
         states,
     };
     let segments = [
-        segment(NAIF_SUN, NAIF_SOLAR_SYSTEM_BARYCENTRE, "Sun at the barycentre", &resting),
-        segment(NAIF_MARS_BARYCENTRE, NAIF_SOLAR_SYSTEM_BARYCENTRE, "Mars, Standish elements", &moving),
-        segment(NAIF_MARS, NAIF_MARS_BARYCENTRE, "Mars without moons", &resting),
+        segment(
+            NAIF_SUN,
+            NAIF_SOLAR_SYSTEM_BARYCENTRE,
+            "Sun at the barycentre",
+            &resting,
+        ),
+        segment(
+            NAIF_MARS_BARYCENTRE,
+            NAIF_SOLAR_SYSTEM_BARYCENTRE,
+            "Mars, Standish elements",
+            &moving,
+        ),
+        segment(
+            NAIF_MARS,
+            NAIF_MARS_BARYCENTRE,
+            "Mars without moons",
+            &resting,
+        ),
     ];
     let comment = format!(
         "{SYNTHETIC}\nMars by Standish's approximate elements; the Sun rests at the solar system barycentre."
@@ -211,5 +264,7 @@ fn kernel_state(state: &super::orbit::OrbitState) -> State {
 )]
 fn epochs(span: Interval, step_s: f64) -> Vec<Et> {
     let count = (span.duration_s() / step_s).ceil() as usize + 1;
-    (0..count).map(|index| span.start.plus(step_s * index as f64)).collect()
+    (0..count)
+        .map(|index| span.start.plus(step_s * index as f64))
+        .collect()
 }

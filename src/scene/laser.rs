@@ -112,7 +112,10 @@ struct Look {
 
 impl Look {
     fn new(flight: &impl Flight, et: Et, datum: MarsDatum) -> Result<Self> {
-        let Beam { spacecraft_m, direction } = flight.beam(et)?;
+        let Beam {
+            spacecraft_m,
+            direction,
+        } = flight.beam(et)?;
         let mars = mars_matrix(&MARS_IAU2000, et);
         let to_file = match datum {
             MarsDatum::Iau2000 => Matrix3::identity(),
@@ -137,8 +140,12 @@ impl Look {
 
     /// Range to the ground.
     fn range_m(&self, terrain: &Terrain) -> Result<f64> {
-        let fault = SceneError::BeamMisses { et_s: self.et.seconds() };
-        Ok(terrain.range_m(&self.spacecraft_m, &self.direction).ok_or(fault)?)
+        let fault = SceneError::BeamMisses {
+            et_s: self.et.seconds(),
+        };
+        Ok(terrain
+            .range_m(&self.spacecraft_m, &self.direction)
+            .ok_or(fault)?)
     }
 
     fn at_range_m(&self, range_m: f64) -> Vector3<f64> {
@@ -177,7 +184,9 @@ pub(super) fn fly_frame(
         shots.push(fly_shot(&shot_look, index, terrain, request, &mut values)?);
     }
     let mut shots = shots.into_iter();
-    let fault = SceneError::BeamMisses { et_s: middle_et.seconds() };
+    let fault = SceneError::BeamMisses {
+        et_s: middle_et.seconds(),
+    };
     let first_shot = shots.next().ok_or(fault)?;
     let mut all = [first_shot; SHOTS];
     for (slot, shot) in all.iter_mut().skip(1).zip(shots) {
@@ -218,13 +227,17 @@ fn frame_values(
         orbit: request.orbit,
         clock_frequency_hz: CLOCK_HZ,
         spacecraft_longitude_rad: spacecraft.longitude_rad,
-        spacecraft_longitude_change_rad: wrap_pi(craft_last.longitude_rad - craft_first.longitude_rad),
+        spacecraft_longitude_change_rad: wrap_pi(
+            craft_last.longitude_rad - craft_first.longitude_rad,
+        ),
         spacecraft_latitude_rad: spacecraft.latitude_rad,
         spacecraft_latitude_change_rad: craft_last.latitude_rad - craft_first.latitude_rad,
         spacecraft_radius_m: spacecraft.radius_m,
         spacecraft_radius_change_m: craft_last.radius_m - craft_first.radius_m,
         ground_longitude_rad: ground.longitude_rad,
-        ground_longitude_change_rad: wrap_pi(ground_last.longitude_rad - ground_first.longitude_rad),
+        ground_longitude_change_rad: wrap_pi(
+            ground_last.longitude_rad - ground_first.longitude_rad,
+        ),
         ground_latitude_rad: ground.latitude_rad,
         ground_latitude_change_rad: ground_last.latitude_rad - ground_first.latitude_rad,
         parallax_longitude_rad_per_m: wrap_pi(upper.longitude_rad - lower.longitude_rad)
@@ -258,7 +271,9 @@ fn fly_shot(
     values: &mut FrameValues,
 ) -> Result<Shot> {
     let chance = |purpose: u64, number: u64| {
-        unit_of(mix(mix(request.seed ^ purpose) ^ (request.index << 8) ^ number))
+        unit_of(mix(mix(request.seed ^ purpose)
+            ^ (request.index << 8)
+            ^ number))
     };
     let ground_range_m = look.range_m(terrain)?;
     let ground_m = look.at_range_m(ground_range_m);

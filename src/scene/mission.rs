@@ -7,7 +7,9 @@ use super::{
     arc::Arc,
     error::SceneError,
     files::{Draft, put},
-    kernels::{clock_session, image_starts, versions, write_attitude, write_orbits, write_text_kernels},
+    kernels::{
+        clock_session, image_starts, versions, write_attitude, write_orbits, write_text_kernels,
+    },
     pedr::{KeptShot, PedrRequest, frame_tags, write_pedr},
     plan::{IMAGES, SITES},
     sites::{README, image_label, planned_site},
@@ -34,7 +36,12 @@ const DAY_S: [f64; 2] = [600.0, 90_000.0];
 pub fn write_scene(directory: &Path, options: &SceneOptions) -> Result<SceneSummary> {
     let [least, most] = DAY_S;
     if !(least..=most).contains(&options.day_s) {
-        return Err(SceneError::Day { day_s: options.day_s, least, most }.into());
+        return Err(SceneError::Day {
+            day_s: options.day_s,
+            least,
+            most,
+        }
+        .into());
     }
     let draft = Draft::begin(directory, README)?;
     let arcs = write_kernels(&draft, options)?;
@@ -51,8 +58,14 @@ pub fn write_scene(directory: &Path, options: &SceneOptions) -> Result<SceneSumm
     }
     let sites = draft.folder("sites")?;
     for site in SITES {
-        let own: Vec<&Arc> = arcs.iter().filter(|arc| arc.image.site.id == site.id).collect();
-        put(&sites.join(format!("{}.toml", site.id)), &planned_site(site, &own).to_toml())?;
+        let own: Vec<&Arc> = arcs
+            .iter()
+            .filter(|arc| arc.image.site.id == site.id)
+            .collect();
+        put(
+            &sites.join(format!("{}.toml", site.id)),
+            &planned_site(site, &own).to_toml(),
+        )?;
     }
     write_truth(&draft, &truth)?;
     draft.finish()?;
@@ -63,7 +76,10 @@ pub fn write_scene(directory: &Path, options: &SceneOptions) -> Result<SceneSumm
 pub(super) fn write_truth(draft: &Draft, truth: &Truth) -> Result<()> {
     let path = draft.root().join("truth.json");
     let text = serde_json::to_string(truth)
-        .map_err(|error| IoFault { action: "write", source: error.into() })
+        .map_err(|error| IoFault {
+            action: "write",
+            source: error.into(),
+        })
         .in_file(&path)?;
     put(&path, &text)
 }
@@ -81,7 +97,10 @@ fn write_kernels(draft: &Draft, options: &SceneOptions) -> Result<Vec<Arc>> {
         .map(|(image, start)| Arc::new(image, start, image.pedr_duration_s(options.day_s)))
         .collect::<Result<Vec<Arc>>>()?;
     for arc in &arcs {
-        put(&labels.join(format!("{}.lbl", arc.image.id)), &image_label(arc, &session)?)?;
+        put(
+            &labels.join(format!("{}.lbl", arc.image.id)),
+            &image_label(arc, &session)?,
+        )?;
     }
     write_attitude(&kernels, &session, &arcs)?;
     drop(session);
@@ -104,7 +123,9 @@ fn write_day(
         tags: &frame_tags(arc.frames),
         datum: image.datum(),
         // Names of the mapping phase are orbit numbers plus 10 000.
-        orbit: &|et| (image.pedr_number - 10_000).saturating_add_signed(arc.orbit.revolution(et) - first),
+        orbit: &|et| {
+            (image.pedr_number - 10_000).saturating_add_signed(arc.orbit.revolution(et) - first)
+        },
         seed: seed ^ u64::from(image.pedr_number),
     };
     let (file, kept) = write_pedr(folder, arc, terrain, &request, |shot| {
@@ -116,7 +137,8 @@ fn write_day(
     for version in versions(arc, seed) {
         let mean_m = mean(kept.iter().map(|kept| {
             let KeptShot { truth, .. } = kept;
-            let rival_m = mars_matrix(&MARS_IAU2000, truth.et) * version.position_m(&arc.orbit, truth.et);
+            let rival_m =
+                mars_matrix(&MARS_IAU2000, truth.et) * version.position_m(&arc.orbit, truth.et);
             (truth.spacecraft_m - truth.ground_m).norm() - (rival_m - truth.ground_m).norm()
         }));
         let difference = OrbitDifference {

@@ -51,7 +51,10 @@ pub struct SceneOptions {
 impl Default for SceneOptions {
     /// Seed 1, days of 24 h.
     fn default() -> Self {
-        Self { seed: 1, day_s: crate::units::SECONDS_PER_DAY }
+        Self {
+            seed: 1,
+            day_s: crate::units::SECONDS_PER_DAY,
+        }
     }
 }
 

@@ -115,12 +115,17 @@ pub(super) fn write_pedr(
             .collect::<Result<_>>()?;
         for (frame, record) in &frames {
             writer.write_record(record)?;
-            let record = u32::try_from(LABEL_RECORDS as u64 + counts.frames + 1).unwrap_or(u32::MAX);
+            let record =
+                u32::try_from(LABEL_RECORDS as u64 + counts.frames + 1).unwrap_or(u32::MAX);
             counts.frames += 1;
             count(&mut counts, frame);
             kept.extend((1_u8..).zip(&frame.shots).filter_map(|(shot, truth)| {
                 let wanted = truth.echo == Echo::Ground && keep(truth);
-                wanted.then_some(KeptShot { record, shot, truth: *truth })
+                wanted.then_some(KeptShot {
+                    record,
+                    shot,
+                    truth: *truth,
+                })
             }));
         }
     }
@@ -140,8 +145,11 @@ fn count(counts: &mut FileTruth, frame: &Frame) {
         if shot.frame_error_m > FRAME_MODEL_LIMIT_M {
             counts.shots_beyond_frame_model += 1;
             if frame.values.off_nadir_rad < NADIR_MAX_RAD {
-                let latitude_deg = (shot.ground_m.z / shot.ground_m.norm()).asin().abs() / RADIANS_PER_DEGREE;
-                let lowest = counts.beyond_frame_model_from_latitude_deg.get_or_insert(latitude_deg);
+                let latitude_deg =
+                    (shot.ground_m.z / shot.ground_m.norm()).asin().abs() / RADIANS_PER_DEGREE;
+                let lowest = counts
+                    .beyond_frame_model_from_latitude_deg
+                    .get_or_insert(latitude_deg);
                 *lowest = lowest.min(latitude_deg);
             }
         }

@@ -85,8 +85,12 @@ impl SiteFile<'_> {
             );
         }
         for image in &self.images {
-            let _infallible =
-                write!(text, "\n[[images]]\nid = {}\nlabel = {}\n", quoted(&image.id), quoted(&image.label));
+            let _infallible = write!(
+                text,
+                "\n[[images]]\nid = {}\nlabel = {}\n",
+                quoted(&image.id),
+                quoted(&image.label)
+            );
             if let Some(lines) = image.lines_delivered {
                 let _infallible = writeln!(text, "lines_delivered = {lines}");
             }
@@ -105,7 +109,10 @@ pub(super) fn planned_site<'a>(site: &'a Site, arcs: &[&Arc]) -> SiteFile<'a> {
         id: site.id,
         description: format!("{}, synthetic", site.name),
         metakernel: "../kernels/nav.tm".to_owned(),
-        pedr: arcs.iter().map(|arc| format!("../pedr/{}", arc.image.pedr_name())).collect(),
+        pedr: arcs
+            .iter()
+            .map(|arc| format!("../pedr/{}", arc.image.pedr_name()))
+            .collect(),
         windows: vec![Window {
             id: site.id.to_owned(),
             longitude_deg: around(site.longitude_deg, Site::WINDOW_HALF_LONGITUDE_DEG),
@@ -154,7 +161,10 @@ pub(super) fn image_label(arc: &Arc, session: &Session) -> Result<String> {
         format!("STOP_TIME = {stop}"),
         format!("SPACECRAFT_CLOCK_START_COUNT = \"{}\"", image.sclk_start),
         "SPACECRAFT_CLOCK_STOP_COUNT = \"N/A\"".to_owned(),
-        format!("LINE_EXPOSURE_DURATION = {:.6} <MILLISECONDS>", image.exposure_ms),
+        format!(
+            "LINE_EXPOSURE_DURATION = {:.6} <MILLISECONDS>",
+            image.exposure_ms
+        ),
         format!("DOWNTRACK_SUMMING = {}", image.summing),
         format!("CROSSTRACK_SUMMING = {}", image.summing),
         "EDIT_MODE_ID = \"0\"".to_owned(),

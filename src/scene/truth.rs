@@ -144,16 +144,25 @@ impl ImageTruth {
     pub(super) fn of(arc: &Arc) -> Self {
         let image = arc.image;
         let step_s = arc.exposed.duration_s() / f64::from(EPOCHS - 1);
-        let epochs: Vec<_> =
-            (0..EPOCHS).map(|index| arc.exposed.start.plus(step_s * f64::from(index))).collect();
-        let mut quaternions: Vec<[f64; 4]> =
-            epochs.iter().map(|et| spice_quaternion(&arc.camera_to_mars(*et))).collect();
+        let epochs: Vec<_> = (0..EPOCHS)
+            .map(|index| arc.exposed.start.plus(step_s * f64::from(index)))
+            .collect();
+        let mut quaternions: Vec<[f64; 4]> = epochs
+            .iter()
+            .map(|et| spice_quaternion(&arc.camera_to_mars(*et)))
+            .collect();
         make_continuous(&mut quaternions);
         let (look, emission_deg, emission_source) = match image.look {
             Look::Nadir => ("nadir", None, None),
-            Look::Roll { emission_deg, source, .. } => {
-                ("off nadir, held inertially", Some(emission_deg), Some(source))
-            }
+            Look::Roll {
+                emission_deg,
+                source,
+                ..
+            } => (
+                "off nadir, held inertially",
+                Some(emission_deg),
+                Some(source),
+            ),
         };
         Self {
             id: image.id,
@@ -167,7 +176,9 @@ impl ImageTruth {
             emission_source,
             position_iau2000_m: epochs
                 .iter()
-                .map(|et| (mars_matrix(&MARS_IAU2000, *et) * arc.orbit.state(*et).position_m).into())
+                .map(|et| {
+                    (mars_matrix(&MARS_IAU2000, *et) * arc.orbit.state(*et).position_m).into()
+                })
                 .collect(),
             epochs_et_s: epochs.iter().map(|et| et.seconds()).collect(),
             camera_to_mars_quaternion_wxyz: quaternions,
@@ -183,7 +194,10 @@ impl ProfileTruth {
             image: None,
             file: file.to_owned(),
             orbit_differences: BTreeMap::new(),
-            frame_error_max_m: kept.iter().map(|kept| kept.truth.frame_error_m).fold(0.0, f64::max),
+            frame_error_max_m: kept
+                .iter()
+                .map(|kept| kept.truth.frame_error_m)
+                .fold(0.0, f64::max),
             record: kept.iter().map(|kept| kept.record).collect(),
             shot: kept.iter().map(|kept| kept.shot).collect(),
             et_s: kept.iter().map(|kept| kept.truth.et.seconds()).collect(),

@@ -34,13 +34,21 @@ impl Version {
             "ipng" => [3.0, 10.0, 20.0, 40.0],
             _ => [0.0; 4],
         };
-        let side = if random.between(0.0, 1.0) < 0.5 { -1.0 } else { 1.0 };
+        let side = if random.between(0.0, 1.0) < 0.5 {
+            -1.0
+        } else {
+            1.0
+        };
         let offset_m = Vector3::new(
             random.between(-radial_m, radial_m),
             random.between(-along_m, along_m),
             side * random.between(least_m, most_m),
         );
-        Self { family, middle, offset_m }
+        Self {
+            family,
+            middle,
+            offset_m,
+        }
     }
 
     /// Position of this version at `et`, J2000, metres.
