@@ -104,12 +104,12 @@ pub(super) fn publish(
     config: &SiteConfig,
     kernels: &KernelSet,
     outputs: impl IntoIterator<Item = (String, Option<String>)>,
-) -> Result<Parts> {
-    let mut parts = Parts::new().file("configuration", "file", &hash_file(&config.file)?.0);
+) -> Parts {
+    let mut parts = Parts::new().key("configuration", &config.blake3);
     for (stage, output) in outputs {
         parts = parts.output(&stage, output.as_deref());
     }
-    Ok(with_kernels(parts, kernels, |_| true))
+    with_kernels(parts, kernels, |_| true)
 }
 
 fn with_kernels(mut parts: Parts, kernels: &KernelSet, wanted: fn(KernelRole) -> bool) -> Parts {

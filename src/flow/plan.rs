@@ -98,7 +98,7 @@ fn plan_stages(config: &SiteConfig, out: &Path, force: bool) -> Result<Vec<Plann
         let model: Option<Output<SensorModel>> = planner.look(&stage, &parts);
         outputs.push((stage, hash(model.as_ref())));
     }
-    let parts = parts::publish(config, &kernels, outputs).in_stage(Stage::Publish.name())?;
+    let parts = parts::publish(config, &kernels, outputs);
     let because = match publish::standing(&folder, &planner.cache, &parts) {
         Ok(_) => Because::Unchanged,
         Err(because) => because,

@@ -69,7 +69,7 @@ pub(super) fn standing(
 /// A kernel that changed during the run, a product that does not read back, a disk that refuses.
 pub(super) fn publish(folder: &Path, cache: &StageCache, results: &Results<'_>) -> Result<Ending> {
     let name = Stage::Publish.name();
-    let parts = parts::publish(results.config, results.kernels, results.outputs())?;
+    let parts = parts::publish(results.config, results.kernels, results.outputs());
     match standing(folder, cache, &parts) {
         Ok(verdict) => {
             tracing::info!(stage = name, "kept: {}", Because::Unchanged);
@@ -214,7 +214,8 @@ impl Results<'_> {
             reasons.map(move |reason| format!("image {}: {reason}", model.value.image))
         });
         let mut reasons: Vec<String> = profiles.chain(models).collect();
-        if self.converted.value.footprints.is_empty() {
+        let searched = !self.config.pedr.files.is_empty();
+        if searched && self.converted.value.footprints.is_empty() {
             reasons.insert(0, "no footprint in any window".to_owned());
         }
         Verdict {
@@ -257,7 +258,7 @@ impl Results<'_> {
             verdict: self.verdict(),
             configuration: ConfigurationEntry {
                 file_name: file_name.to_string_lossy().into_owned(),
-                blake3: crate::store::atomic::hash_file(&config.file)?.0,
+                blake3: config.blake3.clone(),
             },
             biases: biases(config),
             kernels,
