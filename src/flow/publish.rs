@@ -6,8 +6,8 @@ use super::{Ending, Stage, parts};
 use crate::{
     config::{BiasScope, SiteConfig},
     error::Result,
-    geom::mars_rotation::mars_rotation,
     frames::MarsIau2000,
+    geom::mars_rotation::mars_rotation,
     products::{ImageProducts, KernelLine, SiteProducts, write_products},
     spice::{KernelSet, Session},
     stages::{
@@ -21,7 +21,9 @@ use crate::{
         manifest::{
             BiasEntry, Complaints, ConfigurationEntry, KernelEntry, Manifest, StageEntry, Verdict,
         },
-        publish::{MANIFEST, damaged_product, entries, publish as publish_files, read_manifest, staging},
+        publish::{
+            MANIFEST, damaged_product, entries, publish as publish_files, read_manifest, staging,
+        },
     },
     time::{Et, Interval, Intervals},
 };
@@ -55,10 +57,14 @@ pub(super) fn standing(
 ) -> std::result::Result<Verdict, Because> {
     let output: Output<Verdict> = cache.load(Stage::Publish.name(), parts)?;
     let Some(manifest) = read_manifest(folder) else {
-        return Err(Because::Moved(vec![format!("{MANIFEST} is missing or damaged")]));
+        return Err(Because::Moved(vec![format!(
+            "{MANIFEST} is missing or damaged"
+        )]));
     };
     match damaged_product(folder, &manifest) {
-        Some(path) => Err(Because::Moved(vec![format!("{path} is missing or was changed")])),
+        Some(path) => Err(Because::Moved(vec![format!(
+            "{path} is missing or was changed"
+        )])),
         None => Ok(output.value),
     }
 }
@@ -122,8 +128,13 @@ fn make_products(folder: &Path, results: &Results<'_>, fingerprint: String) -> R
             model: &model.value,
         })
         .collect();
-    let complaints: Vec<String> =
-        results.found.value.complaints.iter().map(ToString::to_string).collect();
+    let complaints: Vec<String> = results
+        .found
+        .value
+        .complaints
+        .iter()
+        .map(ToString::to_string)
+        .collect();
     let rejected = results.rejected();
     let staging = staging(folder)?;
     let mut files: Vec<(std::path::PathBuf, u64)> = write_products(
@@ -188,9 +199,18 @@ impl Results<'_> {
         notes.extend(self.found.value.notes.iter().cloned());
         notes.extend(self.converted.value.notes.iter().cloned());
         for image in &self.images.value {
-            notes.extend(image.notes.iter().map(|note| format!("image {}: {note}", image.id)));
+            notes.extend(
+                image
+                    .notes
+                    .iter()
+                    .map(|note| format!("image {}: {note}", image.id)),
+            );
         }
-        for model in self.models.iter().filter(|model| model.value.near_gimbal_lock) {
+        for model in self
+            .models
+            .iter()
+            .filter(|model| model.value.near_gimbal_lock)
+        {
             notes.push(format!(
                 "image {}: |cos φ| falls to {:.3}, where ω and κ are badly determined; use the rotation-vector form",
                 model.value.image, model.value.cos_phi_min
@@ -201,7 +221,9 @@ impl Results<'_> {
 
     fn rejected(&self) -> BTreeMap<String, u64> {
         let rejected = self.found.value.rejected.iter();
-        rejected.map(|(reason, count)| (reason.to_string(), *count)).collect()
+        rejected
+            .map(|(reason, count)| (reason.to_string(), *count))
+            .collect()
     }
 
     fn verdict(&self) -> Verdict {
@@ -246,7 +268,10 @@ impl Results<'_> {
         let counts = BTreeMap::from([
             ("frames_read".to_owned(), found.frames_read),
             ("shots_read".to_owned(), found.shots_read),
-            ("footprints".to_owned(), self.converted.value.footprints.len() as u64),
+            (
+                "footprints".to_owned(),
+                self.converted.value.footprints.len() as u64,
+            ),
             ("profiles".to_owned(), self.profiles.value.len() as u64),
             ("images".to_owned(), self.images.value.len() as u64),
         ]);
@@ -280,7 +305,9 @@ fn biases(config: &SiteConfig) -> Vec<BiasEntry> {
     let scope = match config.mola_clock.scope {
         BiasScope::SpkLookup => "spacecraft position in the range check",
         BiasScope::Rotation => "rotation of Mars into IAU 2000",
-        BiasScope::Both => "spacecraft position in the range check, and rotation of Mars into IAU 2000",
+        BiasScope::Both => {
+            "spacecraft position in the range check, and rotation of Mars into IAU 2000"
+        }
         BiasScope::None => "nothing",
     };
     vec![
@@ -321,7 +348,9 @@ fn kernel_entries(session: &Session, results: &Results<'_>) -> Result<Vec<Kernel
 
 /// Products use the IAU 2000 formula whatever the PCK says; whoever loads `kernels.tm` should know.
 fn pck_note(session: &Session, wanted: &[Interval]) -> Option<String> {
-    let at = wanted.first().map_or(Et::from_seconds(0.0), |interval| interval.start);
+    let at = wanted
+        .first()
+        .map_or(Et::from_seconds(0.0), |interval| interval.start);
     let ours = *mars_rotation::<MarsIau2000>(at).matrix();
     // Without a PCK there is nothing to compare, and nothing that could mislead.
     let theirs = session.mars_matrix(at).ok()?;
