@@ -54,18 +54,19 @@ pub(super) fn standing(
     folder: &Path,
     cache: &StageCache,
     parts: &Parts,
-) -> std::result::Result<Verdict, Because> {
-    let output: Output<Verdict> = cache.load(Stage::Publish.name(), parts)?;
-    let Some(manifest) = read_manifest(folder) else {
+) -> std::result::Result<Manifest, Because> {
+    let output: Output<Manifest> = cache.load(Stage::Publish.name(), parts)?;
+    let manifest = output.value;
+    if read_manifest(folder).as_ref() != Some(&manifest) {
         return Err(Because::Moved(vec![format!(
-            "{MANIFEST} is missing or damaged"
+            "{MANIFEST} is missing or was changed"
         )]));
-    };
+    }
     match damaged_product(folder, &manifest) {
         Some(path) => Err(Because::Moved(vec![format!(
             "{path} is missing or was changed"
         )])),
-        None => Ok(output.value),
+        None => Ok(manifest),
     }
 }
 
@@ -77,9 +78,9 @@ pub(super) fn publish(folder: &Path, cache: &StageCache, results: &Results<'_>) 
     let name = Stage::Publish.name();
     let parts = parts::publish(results.config, results.kernels, results.outputs());
     match standing(folder, cache, &parts) {
-        Ok(verdict) => {
+        Ok(manifest) => {
             tracing::info!(stage = name, "kept: {}", Because::Unchanged);
-            return Ok(Ending::Unchanged(verdict));
+            return Ok(Ending::Unchanged(manifest));
         }
         Err(because) => {
             tracing::info!(stage = name, "making products: {because}");
@@ -87,11 +88,8 @@ pub(super) fn publish(folder: &Path, cache: &StageCache, results: &Results<'_>) 
         }
     }
     let fingerprint = parts.fingerprint();
-    let verdict = cache.stage(name, parts, || {
-        let manifest = make_products(folder, results, fingerprint)?;
-        Ok(manifest.verdict)
-    })?;
-    Ok(Ending::Published(verdict.value))
+    let manifest = cache.stage(name, parts, || make_products(folder, results, fingerprint))?;
+    Ok(Ending::Published(manifest.value))
 }
 
 fn make_products(folder: &Path, results: &Results<'_>, fingerprint: String) -> Result<Manifest> {
