@@ -6,6 +6,7 @@ use super::{Ending, Stage, parts};
 use crate::{
     config::{BiasScope, SiteConfig},
     error::Result,
+    files::file_name,
     frames::MarsIau2000,
     geom::mars_rotation::mars_rotation,
     products::{ImageProducts, KernelLine, SiteProducts, write_products},
@@ -273,14 +274,13 @@ impl Results<'_> {
             ("profiles".to_owned(), self.profiles.value.len() as u64),
             ("images".to_owned(), self.images.value.len() as u64),
         ]);
-        let file_name = config.file.file_name().unwrap_or(config.file.as_os_str());
         Ok(Manifest {
             tool: "areograph".to_owned(),
             version: env!("CARGO_PKG_VERSION").to_owned(),
             site: config.site.clone(),
             verdict: self.verdict(),
             configuration: ConfigurationEntry {
-                file_name: file_name.to_string_lossy().into_owned(),
+                file_name: file_name(&config.file),
                 blake3: config.blake3.clone(),
             },
             biases: biases(config),
