@@ -161,7 +161,7 @@ impl KernelSet {
     /// [`SpiceFault::KernelChanged`] naming the file that is no longer what was loaded.
     pub fn verify_unchanged(&self) -> Result<()> {
         for kernel in &self.kernels {
-            let (_, is) = hash_file(&kernel.path)?;
+            let (is, _) = hash_file(&kernel.path)?;
             if is != kernel.blake3 {
                 let was = kernel.blake3.clone();
                 return Err(SpiceFault::KernelChanged { was, is }).in_file(&kernel.path);
