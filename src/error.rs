@@ -21,6 +21,8 @@ pub enum Kind {
     Validation = 5,
     /// The operating system refused to read or write.
     Io = 6,
+    /// The user stopped the program (128 + SIGINT, as shells count).
+    Interrupted = 130,
 }
 
 impl Kind {

@@ -1,3 +1,7 @@
 //! The `areograph` program: arguments to library calls, failures to exit codes.
 
-fn main() {}
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    areograph::cli::main()
+}

@@ -157,7 +157,11 @@ mod tests {
         assert_eq!(flags.iter().filter(|flag| **flag).count(), 2);
         assert!(flags[7] && flags[8]);
         // All equal but one, closer than five times the 1 cm floor: no outlier.
-        assert!(outliers(&[1.0, 1.0, 1.0, 1.04], 5.0).iter().all(|flag| !flag));
+        assert!(
+            outliers(&[1.0, 1.0, 1.0, 1.04], 5.0)
+                .iter()
+                .all(|flag| !flag)
+        );
     }
 
     #[test]

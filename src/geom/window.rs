@@ -24,13 +24,13 @@ enum Piece {
     Polygon { outer: Ring, holes: Vec<Ring> },
 }
 
-/// Longitudes from `west_rad` eastwards to `east_rad`, not below it, and latitudes in between.
+/// Longitudes from `west` eastwards to `east`, which is not below it, and latitudes in between; radians.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Bounds {
-    west_rad: f64,
-    east_rad: f64,
-    south_rad: f64,
-    north_rad: f64,
+    west: f64,
+    east: f64,
+    south: f64,
+    north: f64,
 }
 
 /// A closed ring in the plane of longitude and latitude, its longitudes unwrapped.
@@ -55,14 +55,14 @@ impl Region {
                 south_rad,
                 north_rad,
             } => vec![Piece::Box(Bounds {
-                west_rad: *west_rad,
-                east_rad: if west_rad <= east_rad {
+                west: *west_rad,
+                east: if west_rad <= east_rad {
                     *east_rad
                 } else {
                     east_rad + TAU
                 },
-                south_rad: *south_rad,
-                north_rad: *north_rad,
+                south: *south_rad,
+                north: *north_rad,
             })],
             WindowShape::Polygons { polygons } => polygons
                 .iter()
@@ -115,12 +115,12 @@ impl Region {
 
 impl Bounds {
     fn contain(&self, longitude_rad: f64, latitude_rad: f64) -> bool {
-        if !(self.south_rad..=self.north_rad).contains(&latitude_rad) {
+        if !(self.south..=self.north).contains(&latitude_rad) {
             return false;
         }
         // Edges are compared as written, so that points on them are inside to the last bit.
         let longitude_rad = wrap_two_pi(longitude_rad);
-        let between = |longitude_rad| (self.west_rad..=self.east_rad).contains(&longitude_rad);
+        let between = |longitude_rad| (self.west..=self.east).contains(&longitude_rad);
         between(longitude_rad) || between(longitude_rad + TAU)
     }
 
@@ -130,17 +130,16 @@ impl Bounds {
     fn reach(&self, longitude_rad: f64, latitude_rad: f64, margin_rad: f64) -> bool {
         // Rounding of the tests below, a nanoradian, is 3 mm on the ground.
         let margin_rad = margin_rad + 1e-9;
-        if latitude_rad + margin_rad < self.south_rad || latitude_rad - margin_rad > self.north_rad
-        {
+        if latitude_rad + margin_rad < self.south || latitude_rad - margin_rad > self.north {
             return false;
         }
         if latitude_rad.abs() + margin_rad >= FRAC_PI_2 {
             return true;
         }
         let half_width_rad = (margin_rad.sin() / latitude_rad.cos()).min(1.0).asin();
-        let middle_rad = 0.5 * (self.west_rad + self.east_rad);
+        let middle_rad = 0.5 * (self.west + self.east);
         let from_middle_rad = wrap_pi(longitude_rad - middle_rad).abs();
-        from_middle_rad <= 0.5 * (self.east_rad - self.west_rad) + half_width_rad + 1e-9
+        from_middle_rad <= 0.5 * (self.east - self.west) + half_width_rad + 1e-9
     }
 }
 
@@ -164,17 +163,17 @@ impl Ring {
         let polygon = Polygon::new(LineString::new(line), Vec::new());
         let rectangle = polygon.bounding_rect()?;
         let bounds = Bounds {
-            west_rad: rectangle.min().x,
-            east_rad: rectangle.max().x,
-            south_rad: rectangle.min().y,
-            north_rad: rectangle.max().y,
+            west: rectangle.min().x,
+            east: rectangle.max().x,
+            south: rectangle.min().y,
+            north: rectangle.max().y,
         };
         Some(Self { polygon, bounds })
     }
 
     fn contains(&self, longitude_rad: f64, latitude_rad: f64) -> bool {
-        let west_rad = self.bounds.west_rad;
-        if !(self.bounds.south_rad..=self.bounds.north_rad).contains(&latitude_rad) {
+        let west_rad = self.bounds.west;
+        if !(self.bounds.south..=self.bounds.north).contains(&latitude_rad) {
             return false;
         }
         // The copies of the point that can lie within the ring; a point on the seam of a ring round a

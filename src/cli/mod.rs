@@ -1,0 +1,119 @@
+//! The command line: one file per command, no geometry.
+
+mod check;
+mod kernels;
+mod output;
+mod pedr;
+mod plan;
+mod run;
+mod scene;
+
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+use tracing::level_filters::LevelFilter;
+
+use crate::{
+    config::{Loaded, SiteConfig, check_sites, load},
+    error::Failure,
+};
+
+/// Mars Global Surveyor data preparation: SPICE kernels, MOLA shots and MOC images to validated products.
+///
+/// Exit codes: 0 done, 1 fault of areograph, 2 usage or configuration, 3 input data, 4 kernel coverage,
+/// 5 products written but invalid, 6 input/output, 130 interrupted.
+#[derive(Debug, Parser)]
+#[command(name = "areograph", version, arg_required_else_help = true)]
+struct Cli {
+    /// Say less (errors only) or, given as -v, more.
+    #[arg(short, long, global = true, conflicts_with = "verbose")]
+    quiet: bool,
+    /// Say more.
+    #[arg(short, long, global = true)]
+    verbose: bool,
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Run sites from kernels to validated products.
+    Run(run::Arguments),
+    /// Check configuration, files and kernel coverage, gaps included; writes nothing.
+    Check(check::Arguments),
+    /// Say which stages would run, and why; writes nothing.
+    Plan(plan::Arguments),
+    /// Look at kernels: what is loaded, where the gaps are.
+    Kernels(kernels::Arguments),
+    /// Look into PEDR files.
+    Pedr(pedr::Arguments),
+    /// Write a synthetic mission with known truth.
+    Scene(scene::Arguments),
+}
+
+/// Parses the command line, runs the command, reports failures on standard error.
+#[must_use]
+pub fn main() -> ExitCode {
+    let cli = Cli::parse();
+    let level = match (cli.quiet, cli.verbose) {
+        (true, _) => LevelFilter::ERROR,
+        (_, true) => LevelFilter::DEBUG,
+        _ => LevelFilter::INFO,
+    };
+    tracing_subscriber::fmt()
+        .with_writer(std::io::stderr)
+        .with_max_level(level)
+        .with_target(false)
+        .with_ansi(std::io::IsTerminal::is_terminal(&std::io::stderr()))
+        .init();
+    match cli.command {
+        Command::Run(arguments) => run::run(&arguments),
+        Command::Check(arguments) => finish(check::run(&arguments)),
+        Command::Plan(arguments) => finish(plan::run(&arguments)),
+        Command::Kernels(arguments) => finish(kernels::run(&arguments)),
+        Command::Pedr(arguments) => finish(pedr::run(&arguments)),
+        Command::Scene(arguments) => finish(scene::run(&arguments)),
+    }
+}
+
+/// Success, or one failure reported.
+fn finish(result: Result<(), Failure>) -> ExitCode {
+    match result {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(failure) => report(&failure),
+    }
+}
+
+/// Prints a failure and gives its exit code.
+fn report(failure: &Failure) -> ExitCode {
+    output::error(failure);
+    ExitCode::from(failure.kind().exit_code())
+}
+
+/// Loads site files; every problem of every file is reported before the first failure is given back.
+fn load_sites(paths: &[std::path::PathBuf]) -> Result<Vec<SiteConfig>, Failure> {
+    let mut sites = Vec::with_capacity(paths.len());
+    let mut first_failure = None;
+    for path in paths {
+        match load(path) {
+            Ok(Loaded { site, warnings }) => {
+                for warning in warnings {
+                    tracing::warn!("{warning}");
+                }
+                sites.push(site);
+            }
+            Err(failure) => {
+                if let Some(earlier) = first_failure.replace(failure) {
+                    output::error(&earlier);
+                }
+            }
+        }
+    }
+    match first_failure {
+        Some(failure) => Err(failure),
+        None => {
+            check_sites(&sites)?;
+            Ok(sites)
+        }
+    }
+}

@@ -1,0 +1,75 @@
+//! `areograph plan`.
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use serde_json::json;
+
+use super::{load_sites, output};
+use crate::{config::SiteConfig, error::Failure, flow::plan_site};
+
+/// Says which stages would run, and why.
+#[derive(Debug, Args)]
+pub(super) struct Arguments {
+    /// Site files (TOML).
+    #[arg(required = true, value_name = "SITE.toml")]
+    sites: Vec<PathBuf>,
+    /// Folder of the products.
+    #[arg(long, default_value = "out")]
+    out: PathBuf,
+    /// Answer in JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
+    print(
+        &load_sites(&arguments.sites)?,
+        &arguments.out,
+        false,
+        arguments.json,
+    )
+}
+
+/// Prints the plan of every site.
+pub(super) fn print(
+    sites: &[SiteConfig],
+    out: &Path,
+    force: bool,
+    as_json: bool,
+) -> Result<(), Failure> {
+    let mut answers = Vec::new();
+    for site in sites {
+        let stages = plan_site(site, out, force)?;
+        if as_json {
+            let stages: Vec<_> = stages
+                .iter()
+                .map(|planned| {
+                    json!({
+                        "stage": planned.stage,
+                        "runs": planned.because.runs(),
+                        "because": planned.because.to_string(),
+                    })
+                })
+                .collect();
+            answers.push(json!({ "site": site.site, "stages": stages }));
+            continue;
+        }
+        output::line(format_args!("{}:", site.site));
+        for planned in stages {
+            let word = if planned.because.runs() {
+                "run "
+            } else {
+                "keep"
+            };
+            output::line(format_args!(
+                "  {word}  {:32} {}",
+                planned.stage, planned.because
+            ));
+        }
+    }
+    if as_json {
+        output::json(&answers.into());
+    }
+    Ok(())
+}

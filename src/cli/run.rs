@@ -1,0 +1,224 @@
+//! `areograph run`.
+
+use std::{
+    path::PathBuf,
+    process::ExitCode,
+    sync::{
+        Arc,
+        atomic::{AtomicBool, Ordering},
+    },
+};
+
+use clap::Args;
+use serde_json::json;
+use tokio::{sync::Semaphore, task::JoinHandle};
+
+use super::{load_sites, output, plan, report};
+use crate::{
+    config::SiteConfig,
+    error::{Failure, Kind},
+    flow::{Ending, RunOptions, SiteOutcome, Stage, run_site},
+    store::manifest::Verdict,
+};
+
+/// Runs sites from kernels to validated products in `<out>/<site>`.
+///
+/// A stage runs only when something that it depends on has changed; the log says what.
+///
+/// Example: areograph run sites/eos_chasma.toml sites/gusev_crater.toml --out products
+#[derive(Debug, Args)]
+#[command(verbatim_doc_comment)]
+pub(super) struct Arguments {
+    /// Site files (TOML).
+    #[arg(required = true, value_name = "SITE.toml")]
+    sites: Vec<PathBuf>,
+    /// Folder of the products; each site gets a folder of its own in it.
+    #[arg(long, default_value = "out")]
+    out: PathBuf,
+    /// Sites that run at the same time (SPICE itself serves one at a time).
+    #[arg(long, default_value_t = 2, value_parser = clap::value_parser!(u16).range(1..=64))]
+    jobs: u16,
+    /// Worker threads; by default one per core. Products do not depend on it.
+    #[arg(long, value_parser = clap::value_parser!(u16).range(1..=1024))]
+    threads: Option<u16>,
+    /// Stop after this stage.
+    #[arg(
+        long,
+        value_name = "STAGE",
+        default_value = "publish",
+        hide_default_value = true
+    )]
+    until: Stage,
+    /// Run every stage, whatever is stored.
+    #[arg(long)]
+    force: bool,
+    /// Say which stages would run, and why; write nothing.
+    #[arg(long)]
+    dry_run: bool,
+    /// Answer in JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+/// Runs the sites and prints how each ended, in the order given.
+pub(super) fn run(arguments: &Arguments) -> ExitCode {
+    let sites = match load_sites(&arguments.sites) {
+        Ok(sites) => sites,
+        Err(failure) => return report(&failure),
+    };
+    if arguments.dry_run {
+        return super::finish(plan::print(
+            &sites,
+            &arguments.out,
+            arguments.force,
+            arguments.json,
+        ));
+    }
+    if let Some(threads) = arguments.threads {
+        // The only failure is a pool that exists already; then its size stands.
+        let _ = rayon::ThreadPoolBuilder::new()
+            .num_threads(usize::from(threads))
+            .build_global();
+    }
+    let runtime = match tokio::runtime::Runtime::new() {
+        Ok(runtime) => runtime,
+        Err(error) => return report(&crate::error::IoFault::on("start threads")(error).into()),
+    };
+    let outcomes = runtime.block_on(run_all(sites, arguments));
+    print(&outcomes, arguments.json);
+    ExitCode::from(
+        outcomes
+            .iter()
+            .map(exit_code)
+            .find(|code| *code != 0)
+            .unwrap_or(0),
+    )
+}
+
+type Outcome = Result<SiteOutcome, Failure>;
+
+/// Runs at most `jobs` sites at a time; Ctrl-C lets each finish its stage and stop.
+async fn run_all(sites: Vec<SiteConfig>, arguments: &Arguments) -> Vec<Outcome> {
+    let stop = Arc::new(AtomicBool::new(false));
+    let places = Arc::new(Semaphore::new(usize::from(arguments.jobs)));
+    let handles: Vec<JoinHandle<Outcome>> = sites
+        .into_iter()
+        .map(|site| {
+            let (stop, places) = (Arc::clone(&stop), Arc::clone(&places));
+            let (out, until, force) = (arguments.out.clone(), arguments.until, arguments.force);
+            tokio::spawn(async move {
+                let _place = places.acquire_owned().await;
+                let work = move || {
+                    let options = RunOptions {
+                        out,
+                        until,
+                        force,
+                        stop: &stop,
+                    };
+                    run_site(&site, &options)
+                };
+                flatten(tokio::task::spawn_blocking(work).await)
+            })
+        })
+        .collect();
+    let interrupted = tokio::spawn({
+        let stop = Arc::clone(&stop);
+        async move {
+            if tokio::signal::ctrl_c().await.is_ok() {
+                tracing::warn!("stopping after the stages that are running");
+                stop.store(true, Ordering::Relaxed);
+            }
+        }
+    });
+    let mut outcomes = Vec::with_capacity(handles.len());
+    for handle in handles {
+        outcomes.push(flatten(handle.await));
+    }
+    interrupted.abort();
+    outcomes
+}
+
+/// A task that panicked is a fault of areograph, reported like any other failure.
+fn flatten(joined: Result<Outcome, tokio::task::JoinError>) -> Outcome {
+    joined.unwrap_or_else(|error| Err(Panicked(error.to_string()).into()))
+}
+
+#[derive(Debug, thiserror::Error)]
+#[error("areograph itself failed: {0}")]
+struct Panicked(String);
+
+impl crate::error::Fault for Panicked {
+    fn kind(&self) -> Kind {
+        Kind::Bug
+    }
+
+    fn advice(&self) -> String {
+        "please report it with the configuration; products of earlier runs are untouched".to_owned()
+    }
+}
+
+fn exit_code(outcome: &Outcome) -> u8 {
+    match outcome {
+        Err(failure) => failure.kind().exit_code(),
+        Ok(outcome) => match &outcome.ending {
+            Ending::Published(verdict) | Ending::Unchanged(verdict) if !verdict.valid => {
+                Kind::Validation.exit_code()
+            }
+            _ => 0,
+        },
+    }
+}
+
+fn print(outcomes: &[Outcome], as_json: bool) {
+    if as_json {
+        output::json(&outcomes.iter().map(outcome_json).collect());
+    }
+    for outcome in outcomes {
+        match outcome {
+            Err(failure) => output::error(failure),
+            Ok(outcome) if !as_json => print_outcome(outcome),
+            Ok(_) => {}
+        }
+    }
+}
+
+fn print_outcome(outcome: &SiteOutcome) {
+    let (site, folder) = (&outcome.site, outcome.folder.display());
+    let (what, verdict) = match &outcome.ending {
+        Ending::StoppedAfter(stage) => {
+            return output::line(format_args!("{site}: stopped after {stage}, no products"));
+        }
+        Ending::Published(verdict) => ("products", verdict),
+        Ending::Unchanged(verdict) => ("nothing changed; products stand", verdict),
+    };
+    let word = if verdict.valid { "valid" } else { "INVALID" };
+    output::line(format_args!(
+        "{site}: {word}; {what} in {folder}, see report/index.html"
+    ));
+    for reason in &verdict.reasons {
+        output::line(format_args!("  {reason}"));
+    }
+}
+
+fn outcome_json(outcome: &Outcome) -> serde_json::Value {
+    let verdict = |published: bool, verdict: &Verdict| json!({ "published": published, "valid": verdict.valid, "reasons": verdict.reasons });
+    match outcome {
+        Err(failure) => json!({
+            "site": failure.site,
+            "error": failure.to_string(),
+            "exit_code": failure.kind().exit_code(),
+        }),
+        Ok(SiteOutcome {
+            site,
+            folder,
+            ending,
+        }) => {
+            let ending = match ending {
+                Ending::Published(found) => verdict(true, found),
+                Ending::Unchanged(found) => verdict(false, found),
+                Ending::StoppedAfter(stage) => json!({ "stopped_after": stage.name() }),
+            };
+            json!({ "site": site, "folder": folder, "ending": ending })
+        }
+    }
+}

@@ -1,0 +1,82 @@
+//! What can go wrong while a mission is invented.
+
+use crate::error::{Fault, Kind};
+
+/// Faults of the scene writer.
+#[derive(Debug, thiserror::Error)]
+pub enum SceneError {
+    /// The folder holds something that is not an older scene.
+    #[error("the folder is not empty and holds no scene of areograph (no {marker} that says so)")]
+    NotAScene {
+        /// File by which a scene is recognised.
+        marker: &'static str,
+    },
+    /// No orbit shows the site as asked.
+    #[error(
+        "no orbit found that shows {image} as planned: last step {step} rad after {iterations} iterations, expected below 1e-13 rad"
+    )]
+    NoOrbit {
+        /// Image id.
+        image: String,
+        /// Size of the last Newton step.
+        step: f64,
+        /// Steps taken.
+        iterations: u32,
+    },
+    /// The beam leaves Mars.
+    #[error("the laser beam misses Mars at ET {et_s:.3}")]
+    BeamMisses {
+        /// True time of the shot.
+        et_s: f64,
+    },
+    /// A frame asks for an instant that was not tabulated.
+    #[error("no beam was tabulated for ET {et_s:.6}")]
+    NotTabulated {
+        /// True time that was asked for.
+        et_s: f64,
+    },
+    /// A day is shorter than its image or longer than a file may be.
+    #[error("day_s is {day_s}; expected {least} to {most}")]
+    Day {
+        /// What was asked.
+        day_s: f64,
+        /// Fewest seconds.
+        least: f64,
+        /// Most seconds.
+        most: f64,
+    },
+    /// The kernels to fly along do not cover a single stretch of 20 s.
+    #[error(
+        "the kernels have no stretch of {least_s} s or more in which both orbit and attitude are known"
+    )]
+    NothingToFly {
+        /// Shortest stretch that is flown, seconds.
+        least_s: f64,
+    },
+}
+
+impl Fault for SceneError {
+    fn kind(&self) -> Kind {
+        match self {
+            Self::NotAScene { .. } | Self::Day { .. } => Kind::Configuration,
+            Self::NoOrbit { .. } | Self::NotTabulated { .. } => Kind::Bug,
+            Self::BeamMisses { .. } => Kind::Input,
+            Self::NothingToFly { .. } => Kind::Coverage,
+        }
+    }
+
+    fn advice(&self) -> String {
+        match self {
+            Self::NotAScene { .. } => "choose an empty or new folder",
+            Self::NoOrbit { .. } | Self::NotTabulated { .. } => {
+                "report this with the seed and the kernels that were used"
+            }
+            Self::BeamMisses { .. } => "the attitude kernels do not point +Z at Mars there; leave them out",
+            Self::Day { .. } => "choose a length within these bounds",
+            Self::NothingToFly { .. } => {
+                "check that the metakernel loads SPK for -94 and 499 and CK for -94000 of the same time"
+            }
+        }
+        .to_owned()
+    }
+}

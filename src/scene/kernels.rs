@@ -1,0 +1,270 @@
+//! Kernels of the invented mission: text ones as shipped, binary ones by CSPICE's own writers.
+
+use std::{
+    fs,
+    path::{Path, PathBuf},
+};
+
+use super::{
+    arc::Arc,
+    files::put,
+    plan::{IMAGES, PlannedImage},
+    sun::mars_state_from_sun,
+    versions::{FAMILIES, Version},
+};
+use crate::{
+    constants::{MGS_POINTING_BIAS, NAIF_MARS, NAIF_MGS, NAIF_SUN},
+    error::{IoFault, Place, Result},
+    frames::Position,
+    geom::attitude::make_continuous,
+    spice::{CkSegment, KernelSet, Session, SpkSegment, State, write_ck, write_spk},
+    time::{Et, Interval},
+    units::SECONDS_PER_DAY,
+};
+
+/// NAIF id of the barycentre of Mars and its moons, and of the solar system's.
+const NAIF_MARS_BARYCENTRE: i32 = 4;
+const NAIF_SOLAR_SYSTEM_BARYCENTRE: i32 = 0;
+/// Seconds between states of an arc: degree 7 over four states leaves nanometres.
+const SPK_STEP_S: f64 = 60.0;
+/// Degree of Hermite interpolation.
+const SPK_DEGREE: i32 = 7;
+/// Name of the attitude kernel.
+const CK_NAME: &str = "mgs_sc_scene.bc";
+/// Name of the kernel with Mars and the Sun.
+const PLANETS_NAME: &str = "mars_sun_scene.bsp";
+/// The first words of every comment area.
+const SYNTHETIC: &str = "SYNTHETIC: written by areograph scene, not from mission data.";
+
+/// Text kernels by file name, in load order of the first four.
+const TEXT_KERNELS: [(&str, &str); 6] = [
+    (
+        "leapseconds.tls",
+        include_str!("../../kernels.example/leapseconds.tls"),
+    ),
+    (
+        "mgs_clock.tsc",
+        include_str!("../../kernels.example/mgs_clock.tsc"),
+    ),
+    (
+        "mars_iau2000.tpc",
+        include_str!("../../kernels.example/mars_iau2000.tpc"),
+    ),
+    ("moc.ti", include_str!("../../kernels.example/moc.ti")),
+    (
+        "mars_iau1991.tpc",
+        include_str!("../../kernels.example/mars_iau1991.tpc"),
+    ),
+    (
+        "mars_iau1994.tpc",
+        include_str!("../../kernels.example/mars_iau1994.tpc"),
+    ),
+];
+/// How many of them a metakernel loads; the other Mars models would replace the first.
+const LOADED: usize = 4;
+
+/// File name of the orbit of one family.
+fn spk_name(family: &str) -> String {
+    format!("mgs_{family}_scene.bsp")
+}
+
+/// Writes text kernels and metakernels into `folder`.
+pub(super) fn write_text_kernels(folder: &Path) -> Result<()> {
+    fs::create_dir_all(folder)
+        .map_err(IoFault::on("create"))
+        .in_file(folder)?;
+    for (name, text) in TEXT_KERNELS {
+        put(&folder.join(name), text)?;
+    }
+    for family in FAMILIES {
+        let mut names: Vec<String> = TEXT_KERNELS[..LOADED]
+            .iter()
+            .map(|(name, _)| (*name).to_owned())
+            .collect();
+        names.extend([
+            PLANETS_NAME.to_owned(),
+            spk_name(family),
+            CK_NAME.to_owned(),
+        ]);
+        let list: Vec<String> = names.iter().map(|name| format!("'{name}'")).collect();
+        let text = format!(
+            "KPL/MK\n\nKernels of a synthetic mission with the orbit of family {family}; written by\n\
+             `areograph scene`. Paths count from the folder of this file.\n\n\\begindata\n\n\
+             KERNELS_TO_LOAD = ( {} )\n\n\\begintext\n",
+            list.join("\n                    ")
+        );
+        put(&folder.join(format!("{family}.tm")), &text)?;
+    }
+    Ok(())
+}
+
+/// A session with the clock and the leap seconds of `folder`.
+pub(super) fn clock_session(folder: &Path) -> Result<Session> {
+    let files: Vec<PathBuf> = TEXT_KERNELS[..2]
+        .iter()
+        .map(|(name, _)| folder.join(name))
+        .collect();
+    Session::open(&KernelSet::from_files(&files)?)
+}
+
+/// When the first line of each planned image begins, by its clock string.
+pub(super) fn image_starts(session: &Session) -> Result<Vec<Et>> {
+    let start = |image: &PlannedImage| session.sclk_to_et(image.sclk_start);
+    IMAGES.iter().map(start).collect()
+}
+
+/// Writes the attitude of all arcs: the attitude of true time `t` stands at `t − 1.15 s`.
+pub(super) fn write_attitude(folder: &Path, session: &Session, arcs: &[Arc]) -> Result<()> {
+    let columns: Vec<(Vec<Et>, Vec<[f64; 4]>, Vec<[f64; 3]>)> = arcs
+        .iter()
+        .map(|arc| {
+            let samples = arc.attitude.samples();
+            let mut quaternions: Vec<[f64; 4]> = samples
+                .iter()
+                .map(|sample| {
+                    let q = sample.j2000_to_bus;
+                    [q.w, q.i, q.j, q.k]
+                })
+                .collect();
+            make_continuous(&mut quaternions);
+            (
+                samples
+                    .iter()
+                    .map(|sample| MGS_POINTING_BIAS.lookup(sample.et).kernel_time())
+                    .collect(),
+                quaternions,
+                samples
+                    .iter()
+                    .map(|sample| sample.rate_rad_s.into())
+                    .collect(),
+            )
+        })
+        .collect();
+    let segments: Vec<CkSegment> = arcs
+        .iter()
+        .zip(&columns)
+        .map(|(arc, (instants, quaternions, rates))| CkSegment {
+            name: arc.image.id,
+            instants,
+            quaternions,
+            angular_velocities_rad_s: rates,
+            interval_starts: &instants[..1],
+        })
+        .collect();
+    let comment = format!(
+        "{SYNTHETIC}\nTime tags carry the error of the mission's kernels: the attitude of time t \
+         stands at t - 1.15 s."
+    );
+    write_ck(&folder.join(CK_NAME), session, &segments, &comment)
+}
+
+/// Writes one SPK per family and one for Mars and the Sun.
+pub(super) fn write_orbits(folder: &Path, arcs: &[Arc], seed: u64) -> Result<()> {
+    for (index, family) in FAMILIES.iter().enumerate() {
+        let tables: Vec<(Vec<Et>, Vec<State>)> = arcs
+            .iter()
+            .map(|arc| {
+                let version = &versions(arc, seed)[index];
+                let epochs = epochs(arc.kernel_span(), SPK_STEP_S);
+                let states = epochs
+                    .iter()
+                    .map(|et| kernel_state(&version.state(&arc.orbit, *et)))
+                    .collect();
+                (epochs, states)
+            })
+            .collect();
+        let segments: Vec<SpkSegment> = arcs
+            .iter()
+            .zip(&tables)
+            .map(|(arc, (epochs, states))| SpkSegment {
+                target: NAIF_MGS,
+                centre: NAIF_MARS_BARYCENTRE,
+                name: arc.image.id,
+                degree: SPK_DEGREE,
+                epochs,
+                states,
+            })
+            .collect();
+        let comment =
+            format!("{SYNTHETIC}\nOrbit of family {family}; the truth is that of family gsfc.");
+        write_spk(&folder.join(spk_name(family)), &segments, &comment)?;
+    }
+    write_planets(folder, arcs)
+}
+
+/// The three versions of an arc's orbit, in the order of [`FAMILIES`].
+pub(super) fn versions(arc: &Arc, seed: u64) -> [Version; 3] {
+    let middle = arc.exposed.start.plus(arc.exposed.duration_s() / 2.0);
+    FAMILIES.map(|family| Version::new(family, arc.image.id, seed, middle))
+}
+
+/// Mars around the Sun; the Sun stands at the barycentre, and Mars at its own, for want of moons.
+fn write_planets(folder: &Path, arcs: &[Arc]) -> Result<()> {
+    let days = |days: f64| days * SECONDS_PER_DAY;
+    let (Some(first), Some(last)) = (arcs.first(), arcs.last()) else {
+        return Ok(());
+    };
+    let span = Interval::new(first.frames.start, last.frames.stop).padded(days(4.0));
+    let epochs = epochs(span, days(1.0));
+    let at_rest = State {
+        position: Position::new(nalgebra::Vector3::zeros()),
+        velocity_m_s: nalgebra::Vector3::zeros(),
+    };
+    let resting = vec![at_rest; epochs.len()];
+    let moving: Vec<State> = epochs
+        .iter()
+        .map(|et| kernel_state(&mars_state_from_sun(*et)))
+        .collect();
+    let segment = |target, centre, name, states| SpkSegment {
+        target,
+        centre,
+        name,
+        degree: SPK_DEGREE,
+        epochs: &epochs,
+        states,
+    };
+    let segments = [
+        segment(
+            NAIF_SUN,
+            NAIF_SOLAR_SYSTEM_BARYCENTRE,
+            "Sun at the barycentre",
+            &resting,
+        ),
+        segment(
+            NAIF_MARS_BARYCENTRE,
+            NAIF_SOLAR_SYSTEM_BARYCENTRE,
+            "Mars, Standish elements",
+            &moving,
+        ),
+        segment(
+            NAIF_MARS,
+            NAIF_MARS_BARYCENTRE,
+            "Mars without moons",
+            &resting,
+        ),
+    ];
+    let comment = format!(
+        "{SYNTHETIC}\nMars by Standish's approximate elements; the Sun rests at the solar system barycentre."
+    );
+    write_spk(&folder.join(PLANETS_NAME), &segments, &comment)
+}
+
+fn kernel_state(state: &super::orbit::OrbitState) -> State {
+    State {
+        position: Position::new(state.position_m),
+        velocity_m_s: state.velocity_m_s,
+    }
+}
+
+/// Instants `step_s` apart that reach from the start of `span` to its end or just beyond.
+#[allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "a day has some thousand states"
+)]
+fn epochs(span: Interval, step_s: f64) -> Vec<Et> {
+    let count = (span.duration_s() / step_s).ceil() as usize + 1;
+    (0..count)
+        .map(|index| span.start.plus(step_s * index as f64))
+        .collect()
+}

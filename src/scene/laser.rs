@@ -1,0 +1,333 @@
+//! Laser shots over the invented terrain, frame by frame, as a PEDR tells them.
+
+use nalgebra::{Matrix3, Vector3};
+
+use super::{
+    arc::{Beam, Flight},
+    error::SceneError,
+    random::{mix, unit_of},
+    sun::mars_from_sun_m,
+    terrain::Terrain,
+};
+use crate::{
+    constants::{MARS_IAU2000, MOLA_CLOCK_BIAS_S},
+    error::Result,
+    frames::MarsDatum,
+    geom::{
+        ellipsoid::{Spherical, spherical_to_xyz_m},
+        mars_rotation::mars_matrix,
+    },
+    pds::pedr::{FrameValues, SHOTS},
+    time::Et,
+    units::wrap_pi,
+};
+
+/// Seconds of a frame of 20 shots.
+pub(super) const FRAME_S: f64 = 2.0;
+/// Seconds between shots.
+const SHOT_S: f64 = 0.1;
+/// Clock of MOLA, hertz: shots lie exactly 0.1 s apart.
+const CLOCK_HZ: f64 = 1e8;
+/// MOLA's orbit model number; from 3 on readers use parallax and crossover.
+const ORBIT_QUALITY: u16 = 3;
+/// Share of half-frames that see clouds, and of shots that come to nothing.
+const CLOUD_SHARE: f64 = 0.02;
+const MISSING_SHARE: f64 = 0.005;
+/// Amplitude, metres, and period, seconds, of the crossover residual.
+pub(super) const CROSSOVER_AMPLITUDE_M: f64 = 0.8;
+pub(super) const CROSSOVER_PERIOD_S: f64 = 3_000.0;
+
+/// The residual that crossover analysis found at `et`, metres; smooth, to be subtracted from radii.
+pub(super) fn crossover_residual_m(et: Et) -> f64 {
+    let turns = (et.seconds() / CROSSOVER_PERIOD_S).rem_euclid(1.0);
+    CROSSOVER_AMPLITUDE_M * (std::f64::consts::TAU * turns).sin()
+}
+
+/// What a shot met.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Echo {
+    /// The ground.
+    Ground,
+    /// A cloud above it.
+    Cloud,
+    /// Nothing that was heard.
+    Missing,
+}
+
+/// The truth of one shot.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Shot {
+    /// True time.
+    pub et: Et,
+    /// Spacecraft, IAU 2000, metres.
+    pub spacecraft_m: Vector3<f64>,
+    /// Where the beam meets the ground, IAU 2000, metres.
+    pub ground_m: Vector3<f64>,
+    /// What it met.
+    pub echo: Echo,
+    /// How far the linear frame of a PEDR places the footprint from the truth, before rounding, metres.
+    pub frame_error_m: f64,
+}
+
+/// One frame: what the file says and what is true.
+#[derive(Debug, Clone)]
+pub(super) struct Frame {
+    /// Values of the record.
+    pub values: FrameValues,
+    /// Shots 1 to 20.
+    pub shots: [Shot; SHOTS],
+}
+
+/// Which frame to fly.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct FrameRequest {
+    /// Mid-point as the file tags it, a whole number of microseconds.
+    pub tag: Et,
+    /// Number of the frame in its file, from 0.
+    pub index: u64,
+    /// Orbit number.
+    pub orbit: u32,
+    /// Datum of the file's coordinates.
+    pub datum: MarsDatum,
+    /// Seed of clouds and missing returns.
+    pub seed: u64,
+}
+
+/// A place in the file's frame.
+#[derive(Debug, Clone, Copy)]
+struct Place {
+    longitude_rad: f64,
+    latitude_rad: f64,
+    radius_m: f64,
+}
+
+/// The beam at one instant, in IAU 2000 and in the file's frame.
+struct Look {
+    et: Et,
+    spacecraft_m: Vector3<f64>,
+    direction: Vector3<f64>,
+    /// From IAU 2000 to the file's frame.
+    to_file: Matrix3<f64>,
+}
+
+impl Look {
+    fn new(flight: &impl Flight, et: Et, datum: MarsDatum) -> Result<Self> {
+        let Beam {
+            spacecraft_m,
+            direction,
+        } = flight.beam(et)?;
+        let mars = mars_matrix(&MARS_IAU2000, et);
+        let to_file = match datum {
+            MarsDatum::Iau2000 => Matrix3::identity(),
+            older => mars_matrix(&older.model(), et) * mars.transpose(),
+        };
+        Ok(Self {
+            et,
+            spacecraft_m: mars * spacecraft_m,
+            direction: mars * direction,
+            to_file,
+        })
+    }
+
+    fn place(&self, point_m: &Vector3<f64>) -> Place {
+        let spherical = Spherical::from_xyz_m(&(self.to_file * point_m));
+        Place {
+            longitude_rad: spherical.longitude_rad,
+            latitude_rad: spherical.latitude.0,
+            radius_m: spherical.radius_m,
+        }
+    }
+
+    /// Range to the ground.
+    fn range_m(&self, terrain: &Terrain) -> Result<f64> {
+        let fault = SceneError::BeamMisses {
+            et_s: self.et.seconds(),
+        };
+        Ok(terrain
+            .range_m(&self.spacecraft_m, &self.direction)
+            .ok_or(fault)?)
+    }
+
+    fn at_range_m(&self, range_m: f64) -> Vector3<f64> {
+        self.spacecraft_m + range_m * self.direction
+    }
+
+    /// Where the beam passes the sphere of `radius_m`; for a beam that only grazes it, the nearest point.
+    fn at_radius(&self, radius_m: f64) -> Place {
+        let b = self.spacecraft_m.dot(&self.direction);
+        let c = self.spacecraft_m.norm_squared() - radius_m * radius_m;
+        self.place(&self.at_range_m(-b - (b * b - c).max(0.0).sqrt()))
+    }
+}
+
+/// Flies one frame.
+///
+/// The frame's straight track is that of the beam on the sphere of the mid-point's radius; each shot is
+/// displaced along the beam by the parallax times the difference of its radius from the mid-point's.
+///
+/// # Errors
+/// [`SceneError::BeamMisses`], or what `flight` says.
+pub(super) fn fly_frame(
+    flight: &impl Flight,
+    terrain: &Terrain,
+    request: &FrameRequest,
+) -> Result<Frame> {
+    let middle_et = request.tag.plus(-MOLA_CLOCK_BIAS_S);
+    let look = |et: Et| Look::new(flight, et, request.datum);
+    let middle = look(middle_et)?;
+    let first = look(middle_et.plus(-FRAME_S / 2.0))?;
+    let last = look(middle_et.plus(FRAME_S / 2.0))?;
+    let mut values = frame_values(&middle, [&first, &last], terrain, request)?;
+    let mut shots = Vec::with_capacity(SHOTS);
+    for index in 0..SHOTS {
+        let shot_look = look(middle_et.plus((index as f64 - 9.5) * SHOT_S))?;
+        shots.push(fly_shot(&shot_look, index, terrain, request, &mut values)?);
+    }
+    let mut shots = shots.into_iter();
+    let fault = SceneError::BeamMisses {
+        et_s: middle_et.seconds(),
+    };
+    let first_shot = shots.next().ok_or(fault)?;
+    let mut all = [first_shot; SHOTS];
+    for (slot, shot) in all.iter_mut().skip(1).zip(shots) {
+        *slot = shot;
+    }
+    Ok(Frame { values, shots: all })
+}
+
+/// Everything of a frame but its shots.
+fn frame_values(
+    middle: &Look,
+    [first, last]: [&Look; 2],
+    terrain: &Terrain,
+    request: &FrameRequest,
+) -> Result<FrameValues> {
+    /// Half the height over which the parallax is taken, metres.
+    const PARALLAX_STEP_M: f64 = 500.0;
+    let mid_range_m = middle.range_m(terrain)?;
+    let ground_m = middle.at_range_m(mid_range_m);
+    let mid_radius_m = ground_m.norm();
+    let up = ground_m / mid_radius_m;
+
+    let ground = middle.place(&ground_m);
+    let [ground_first, ground_last] = [first, last].map(|look| look.at_radius(mid_radius_m));
+    let spacecraft = middle.place(&middle.spacecraft_m);
+    let [craft_first, craft_last] = [first, last].map(|look| look.place(&look.spacecraft_m));
+    let [lower, upper] =
+        [-PARALLAX_STEP_M, PARALLAX_STEP_M].map(|step_m| middle.at_radius(mid_radius_m + step_m));
+    let [areoid_first, areoid_last] = [first, last].map(|look| {
+        let place = look.at_radius(mid_radius_m);
+        let direction = spherical_to_xyz_m(place.longitude_rad, place.latitude_rad, 1.0);
+        terrain.areoid_radius_m(&look.to_file.tr_mul(&direction))
+    });
+    let sun = mars_matrix(&MARS_IAU2000, middle.et) * -mars_from_sun_m(middle.et);
+    let frame_number = request.index;
+    Ok(FrameValues {
+        time_s: request.tag.seconds(),
+        orbit: request.orbit,
+        clock_frequency_hz: CLOCK_HZ,
+        spacecraft_longitude_rad: spacecraft.longitude_rad,
+        spacecraft_longitude_change_rad: wrap_pi(
+            craft_last.longitude_rad - craft_first.longitude_rad,
+        ),
+        spacecraft_latitude_rad: spacecraft.latitude_rad,
+        spacecraft_latitude_change_rad: craft_last.latitude_rad - craft_first.latitude_rad,
+        spacecraft_radius_m: spacecraft.radius_m,
+        spacecraft_radius_change_m: craft_last.radius_m - craft_first.radius_m,
+        ground_longitude_rad: ground.longitude_rad,
+        ground_longitude_change_rad: wrap_pi(
+            ground_last.longitude_rad - ground_first.longitude_rad,
+        ),
+        ground_latitude_rad: ground.latitude_rad,
+        ground_latitude_change_rad: ground_last.latitude_rad - ground_first.latitude_rad,
+        parallax_longitude_rad_per_m: wrap_pi(upper.longitude_rad - lower.longitude_rad)
+            / (2.0 * PARALLAX_STEP_M),
+        parallax_latitude_rad_per_m: (upper.latitude_rad - lower.latitude_rad)
+            / (2.0 * PARALLAX_STEP_M),
+        areoid_radius_m: terrain.areoid_radius_m(&up),
+        areoid_radius_change_m: areoid_last - areoid_first,
+        crossover_residual_m: crossover_residual_m(middle.et),
+        mid_radius_m,
+        mid_range_m,
+        frame_index: u16::try_from(frame_number % 7 + 1).unwrap_or(1),
+        packet: u16::try_from(frame_number / 7 % 0x4000).unwrap_or(0),
+        orbit_quality: ORBIT_QUALITY,
+        off_nadir_rad: middle.direction.angle(&-middle.spacecraft_m),
+        local_time_rad: wrap_pi(up.y.atan2(up.x) - sun.y.atan2(sun.x)),
+        phase_angle_rad: middle.spacecraft_m.angle(&sun),
+        solar_incidence_rad: up.angle(&sun),
+        emission_angle_rad: up.angle(&-middle.direction),
+        opacity: 0.5,
+        ..FrameValues::default()
+    })
+}
+
+/// Flies one shot (counted from 0) and enters it into the frame's values.
+fn fly_shot(
+    look: &Look,
+    index: usize,
+    terrain: &Terrain,
+    request: &FrameRequest,
+    values: &mut FrameValues,
+) -> Result<Shot> {
+    let chance = |purpose: u64, number: u64| {
+        unit_of(mix(mix(request.seed ^ purpose)
+            ^ (request.index << 8)
+            ^ number))
+    };
+    let ground_range_m = look.range_m(terrain)?;
+    let ground_m = look.at_range_m(ground_range_m);
+    let half = (index / 10) as u64;
+    let echo = if chance(1, index as u64) < MISSING_SHARE {
+        Echo::Missing
+    } else if chance(2, half) < CLOUD_SHARE {
+        Echo::Cloud
+    } else {
+        Echo::Ground
+    };
+    let cloud_height_m = 3_000.0 + 9_000.0 * chance(3, index as u64);
+    let (range_m, radius_m) = match echo {
+        Echo::Ground => (ground_range_m, ground_m.norm()),
+        Echo::Cloud => {
+            let range_m = ground_range_m - cloud_height_m;
+            (range_m, look.at_range_m(range_m).norm())
+        }
+        Echo::Missing => (0.0, 0.0),
+    };
+    values.range_m[index] = range_m;
+    values.shot_radius_m[index] = radius_m;
+    values.class[index] = i16::from(echo == Echo::Ground);
+    values.channel[index] = match chance(4, index as u64) {
+        x if x < 0.80 => 1,
+        x if x < 0.95 => 2,
+        _ => 3,
+    };
+    values.transmit_energy_mj[index] = 40.0 + 4.0 * chance(5, index as u64);
+    values.received_energy_fj[index] = if echo == Echo::Missing {
+        0.0
+    } else {
+        100.0 + 400.0 * chance(6, index as u64)
+    };
+    Ok(Shot {
+        et: look.et,
+        spacecraft_m: look.spacecraft_m,
+        ground_m,
+        echo,
+        frame_error_m: frame_error_m(look, index, &ground_m, values),
+    })
+}
+
+/// Distance from where the linear frame places a ground shot to where it is, metres.
+fn frame_error_m(look: &Look, index: usize, ground_m: &Vector3<f64>, values: &FrameValues) -> f64 {
+    let radius_m = ground_m.norm();
+    let share = (index as f64 - 9.5) / SHOTS as f64;
+    let higher_m = radius_m - values.mid_radius_m;
+    let longitude_rad = values.ground_longitude_rad
+        + share * values.ground_longitude_change_rad
+        + higher_m * values.parallax_longitude_rad_per_m;
+    let latitude_rad = values.ground_latitude_rad
+        + share * values.ground_latitude_change_rad
+        + higher_m * values.parallax_latitude_rad_per_m;
+    let placed_m = spherical_to_xyz_m(longitude_rad, latitude_rad, radius_m);
+    (placed_m - look.to_file * ground_m).norm()
+}

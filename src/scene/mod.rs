@@ -1,0 +1,105 @@
+//! A synthetic mission with known truth: kernels, PEDR files, labels and site configurations.
+//!
+//! | file | what it invents |
+//! |---|---|
+//! | `plan` | six images, three sites, which days are written in full |
+//! | `orbit`, `versions` | the true orbit of a day, and two rivals that are metres off |
+//! | `attitude`, `arc` | pointing, and orbit and attitude solved so that an image shows its site |
+//! | `terrain`, `laser` | the ground, and laser shots on it as a PEDR frame tells them |
+//! | `kernels`, `pedr`, `sites`, `truth` | the files |
+//! | `mission`, `along` | the two entry points |
+//!
+//! Injected errors: attitude stands 1.15 s early in the C-kernel, laser time tags are 0.117 s late,
+//! version K files are in IAU 1991; `truth.json` tells all of it.
+
+mod along;
+mod arc;
+mod attitude;
+mod error;
+mod files;
+mod kernels;
+mod laser;
+mod mission;
+mod orbit;
+mod pedr;
+mod plan;
+mod random;
+mod sites;
+mod sun;
+mod terrain;
+mod truth;
+mod versions;
+
+use std::{
+    fmt,
+    path::{Path, PathBuf},
+};
+
+pub use along::write_scene_along;
+pub use error::SceneError;
+pub use mission::write_scene;
+
+/// How a mission is invented.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SceneOptions {
+    /// Seed of terrain, clouds and orbit differences.
+    pub seed: u64,
+    /// Seconds of frames in the files of whole days, 600 to 90 000; other files hold at most one revolution.
+    pub day_s: f64,
+}
+
+impl Default for SceneOptions {
+    /// Seed 1, days of 24 h.
+    fn default() -> Self {
+        Self {
+            seed: 1,
+            day_s: crate::units::SECONDS_PER_DAY,
+        }
+    }
+}
+
+/// What was written.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct SceneSummary {
+    /// Folder of the mission.
+    pub directory: PathBuf,
+    /// Site configurations.
+    pub sites: usize,
+    /// Images.
+    pub images: usize,
+    /// PEDR files.
+    pub pedr_files: usize,
+    /// Frames in them.
+    pub frames: u64,
+}
+
+impl SceneSummary {
+    fn of(directory: &Path, truth: &truth::Truth, sites: usize) -> Self {
+        Self {
+            directory: directory.to_owned(),
+            sites,
+            images: truth.images.len(),
+            pedr_files: truth.files.len(),
+            frames: truth.files.iter().map(|file| file.frames).sum(),
+        }
+    }
+}
+
+impl fmt::Display for SceneSummary {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let plural = |count: usize| if count == 1 { "" } else { "s" };
+        write!(
+            formatter,
+            "{}: {} site{}, {} image{}, {} frames in {} PEDR file{}; next: areograph run {}/sites/*.toml",
+            self.directory.display(),
+            self.sites,
+            plural(self.sites),
+            self.images,
+            plural(self.images),
+            self.frames,
+            self.pedr_files,
+            plural(self.pedr_files),
+            self.directory.display(),
+        )
+    }
+}

@@ -1,0 +1,157 @@
+//! One PEDR file of the invented mission.
+
+use std::path::Path;
+
+use rayon::prelude::*;
+
+use super::{
+    arc::Flight,
+    laser::{Echo, FRAME_S, Frame, FrameRequest, Shot, fly_frame},
+    terrain::Terrain,
+    truth::FileTruth,
+};
+use crate::{
+    constants::MOLA_CLOCK_BIAS_S,
+    error::{Place, Result},
+    frames::MarsDatum,
+    pds::pedr::{LABEL_RECORDS, LabelInfo, PedrWriter, Record, SHOTS},
+    time::{Et, Interval},
+    units::RADIANS_PER_DEGREE,
+};
+
+/// Frames that are flown side by side before they are written in order.
+const BLOCK: usize = 4_096;
+/// What the linear frame model should hold, metres.
+const FRAME_MODEL_LIMIT_M: f64 = 0.2;
+/// Frames below this off-nadir angle point at nadir, radians.
+const NADIR_MAX_RAD: f64 = 0.05 * RADIANS_PER_DEGREE;
+
+/// What a file holds.
+pub(super) struct PedrRequest<'a> {
+    /// Name of the file, lower case.
+    pub name: &'a str,
+    /// Mid-points of the frames as the file tags them.
+    pub tags: &'a [Et],
+    /// Datum of the coordinates.
+    pub datum: MarsDatum,
+    /// Orbit number at a true time.
+    pub orbit: &'a (dyn Fn(Et) -> u32 + Sync),
+    /// Seed of clouds and missing returns.
+    pub seed: u64,
+}
+
+/// A shot that met the ground, and where its record is.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct KeptShot {
+    /// Record of the file, counted from 1 with the label records.
+    pub record: u32,
+    /// Shot in the frame, 1 to 20.
+    pub shot: u8,
+    /// The truth.
+    pub truth: Shot,
+}
+
+/// Mid-points of the frames that fit into `span`, as late clocks tag them: whole microseconds, so that
+/// both forms of time in a record agree.
+#[allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "a day has 43 200 frames"
+)]
+pub(super) fn frame_tags(span: Interval) -> Vec<Et> {
+    let first_us = ((span.start.seconds() + FRAME_S / 2.0 + MOLA_CLOCK_BIAS_S) * 1e6).ceil();
+    let count = (span.duration_s() / FRAME_S).floor().max(0.0) as u32;
+    (0..count)
+        .map(|index| Et::from_seconds((first_us + f64::from(index) * FRAME_S * 1e6) / 1e6))
+        .collect()
+}
+
+/// Flies and writes one file; returns its counts and the ground shots that `keep` wants.
+///
+/// # Errors
+/// What the flight says, a beam that misses Mars, the system's refusal to write.
+pub(super) fn write_pedr(
+    folder: &Path,
+    flight: &(impl Flight + Sync),
+    terrain: &Terrain,
+    request: &PedrRequest,
+    keep: impl Fn(&Shot) -> bool,
+) -> Result<(FileTruth, Vec<KeptShot>)> {
+    let path = folder.join(request.name);
+    let label = LabelInfo {
+        product_id: request.name.to_uppercase(),
+        software_version: 7.25,
+        datum: request.datum,
+        note: "SYNTHETIC: written by areograph scene, not from mission data".to_owned(),
+    };
+    let mut writer = PedrWriter::create(&path, &label)?;
+    let mut counts = FileTruth {
+        file: request.name.to_owned(),
+        datum: request.datum.model().name,
+        frames: 0,
+        shots_ground: 0,
+        shots_cloud: 0,
+        shots_missing: 0,
+        shots_beyond_frame_model: 0,
+        beyond_frame_model_from_latitude_deg: None,
+    };
+    let mut kept = Vec::new();
+    for (block, tags) in request.tags.chunks(BLOCK).enumerate() {
+        let frames: Vec<(Frame, Record)> = tags
+            .par_iter()
+            .enumerate()
+            .map(|(index, tag)| {
+                let frame_request = FrameRequest {
+                    tag: *tag,
+                    index: (block * BLOCK + index) as u64,
+                    orbit: (request.orbit)(tag.plus(-MOLA_CLOCK_BIAS_S)),
+                    datum: request.datum,
+                    seed: request.seed,
+                };
+                let frame = fly_frame(flight, terrain, &frame_request)?;
+                let record = Record::from_frame(&frame.values).in_file(&path)?;
+                Ok((frame, record))
+            })
+            .collect::<Result<_>>()?;
+        for (frame, record) in &frames {
+            writer.write_record(record)?;
+            let record =
+                u32::try_from(LABEL_RECORDS as u64 + counts.frames + 1).unwrap_or(u32::MAX);
+            counts.frames += 1;
+            count(&mut counts, frame);
+            kept.extend((1_u8..).zip(&frame.shots).filter_map(|(shot, truth)| {
+                let wanted = truth.echo == Echo::Ground && keep(truth);
+                wanted.then_some(KeptShot {
+                    record,
+                    shot,
+                    truth: *truth,
+                })
+            }));
+        }
+    }
+    writer.finish()?;
+    Ok((counts, kept))
+}
+
+/// Adds a frame to the counts of its file.
+fn count(counts: &mut FileTruth, frame: &Frame) {
+    debug_assert_eq!(frame.shots.len(), SHOTS);
+    for shot in &frame.shots {
+        match shot.echo {
+            Echo::Ground => counts.shots_ground += 1,
+            Echo::Cloud => counts.shots_cloud += 1,
+            Echo::Missing => counts.shots_missing += 1,
+        }
+        if shot.frame_error_m > FRAME_MODEL_LIMIT_M {
+            counts.shots_beyond_frame_model += 1;
+            if frame.values.off_nadir_rad < NADIR_MAX_RAD {
+                let latitude_deg =
+                    (shot.ground_m.z / shot.ground_m.norm()).asin().abs() / RADIANS_PER_DEGREE;
+                let lowest = counts
+                    .beyond_frame_model_from_latitude_deg
+                    .get_or_insert(latitude_deg);
+                *lowest = lowest.min(latitude_deg);
+            }
+        }
+    }
+}

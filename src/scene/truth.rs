@@ -1,0 +1,207 @@
+//! What the mission really did, for `truth.json`.
+
+use std::collections::BTreeMap;
+
+use serde::Serialize;
+
+use super::{
+    arc::Arc,
+    laser::{CROSSOVER_AMPLITUDE_M, CROSSOVER_PERIOD_S},
+    pedr::KeptShot,
+    plan::Look,
+};
+use crate::{
+    constants::{MARS_IAU2000, MGS_POINTING_BIAS, MOLA_CLOCK_BIAS_S},
+    geom::{
+        attitude::{make_continuous, spice_quaternion},
+        mars_rotation::mars_matrix,
+    },
+    units::SECONDS_PER_MS,
+};
+
+/// Epochs of an image: the ends of 30 equal intervals.
+const EPOCHS: u32 = 31;
+
+/// The whole truth.
+#[derive(Debug, Serialize)]
+pub(super) struct Truth {
+    pub made_by: &'static str,
+    pub synthetic: &'static str,
+    pub seed: u64,
+    pub biases: Biases,
+    pub crossover: Crossover,
+    pub frame_model: &'static str,
+    pub images: Vec<ImageTruth>,
+    pub files: Vec<FileTruth>,
+    pub profiles: Vec<ProfileTruth>,
+}
+
+/// Injected time errors.
+#[derive(Debug, Serialize)]
+pub(super) struct Biases {
+    ck_bias_s: f64,
+    ck_rule: &'static str,
+    mola_clock_bias_s: f64,
+    mola_clock_sign: &'static str,
+    mola_clock_rule: &'static str,
+}
+
+/// Injected crossover residual.
+#[derive(Debug, Serialize)]
+pub(super) struct Crossover {
+    amplitude_m: f64,
+    period_s: f64,
+    rule: &'static str,
+}
+
+/// Orientation of one image.
+#[derive(Debug, Serialize)]
+pub(super) struct ImageTruth {
+    id: &'static str,
+    site: &'static str,
+    start_et_s: f64,
+    line_period_s: f64,
+    lines_header: u32,
+    lines_delivered: u32,
+    look: &'static str,
+    emission_deg: Option<f64>,
+    emission_source: Option<&'static str>,
+    /// Distance, ET seconds, position of the true orbit (`gsfc`) and attitude, one entry per epoch.
+    epochs_et_s: Vec<f64>,
+    position_iau2000_m: Vec<[f64; 3]>,
+    camera_to_mars_quaternion_wxyz: Vec<[f64; 4]>,
+}
+
+/// One PEDR file.
+#[derive(Debug, Serialize)]
+pub(super) struct FileTruth {
+    pub file: String,
+    pub datum: &'static str,
+    pub frames: u64,
+    pub shots_ground: u64,
+    pub shots_cloud: u64,
+    pub shots_missing: u64,
+    /// Shots that the linear frame model places more than 0.2 m from the truth.
+    pub shots_beyond_frame_model: u64,
+    /// Lowest |latitude| of such shots in nadir-pointing frames, degrees.
+    pub beyond_frame_model_from_latitude_deg: Option<f64>,
+}
+
+/// The shots of one file in one window.
+#[derive(Debug, Serialize)]
+pub(super) struct ProfileTruth {
+    pub window: String,
+    pub image: Option<&'static str>,
+    pub file: String,
+    pub orbit_differences: BTreeMap<&'static str, OrbitDifference>,
+    /// Largest distance between the linear frame model and the truth, metres, before rounding.
+    pub frame_error_max_m: f64,
+    /// Record of the file, counted from 1 with the label, one entry per shot that met the ground.
+    pub record: Vec<u32>,
+    pub shot: Vec<u8>,
+    pub et_s: Vec<f64>,
+    pub ground_iau2000_m: Vec<[f64; 3]>,
+}
+
+/// How one family's orbit differs from the truth over a profile.
+#[derive(Debug, Serialize)]
+pub(super) struct OrbitDifference {
+    /// At the middle of the image, metres.
+    pub radial_along_cross_m: [f64; 3],
+    /// Mean of range minus distance from this family's spacecraft to the footprint, metres.
+    pub expected_range_minus_distance_mean_m: f64,
+}
+
+impl Truth {
+    /// The truth that all missions share; images, files and profiles are still to come.
+    pub(super) fn new(seed: u64) -> Self {
+        Self {
+            made_by: "areograph scene",
+            synthetic: "all of this is invented; only ids, times and geometry of the images follow Shan et al. 2005",
+            seed,
+            biases: Biases {
+                ck_bias_s: MGS_POINTING_BIAS.seconds(),
+                ck_rule: "the attitude of true time t stands in the C-kernel at t + ck_bias_s",
+                mola_clock_bias_s: MOLA_CLOCK_BIAS_S,
+                mola_clock_sign: "late",
+                mola_clock_rule: "true time = tag - mola_clock_bias_s, in all files; coordinates hold at the true time",
+            },
+            crossover: Crossover {
+                amplitude_m: CROSSOVER_AMPLITUDE_M,
+                period_s: CROSSOVER_PERIOD_S,
+                rule: "residual = amplitude_m sin(2 pi et / period_s) at the frame's mid-point; true radii are the raw ones, before its subtraction",
+            },
+            frame_model: "a PEDR frame is linear in latitude and longitude: near the poles, in slews and on steep ground seen off nadir it cannot hold 20 true footprints to 0.2 m; the counts are under files and profiles",
+            images: Vec::new(),
+            files: Vec::new(),
+            profiles: Vec::new(),
+        }
+    }
+}
+
+impl ImageTruth {
+    /// Orientation of the arc's image.
+    pub(super) fn of(arc: &Arc) -> Self {
+        let image = arc.image;
+        let step_s = arc.exposed.duration_s() / f64::from(EPOCHS - 1);
+        let epochs: Vec<_> = (0..EPOCHS)
+            .map(|index| arc.exposed.start.plus(step_s * f64::from(index)))
+            .collect();
+        let mut quaternions: Vec<[f64; 4]> = epochs
+            .iter()
+            .map(|et| spice_quaternion(&arc.camera_to_mars(*et)))
+            .collect();
+        make_continuous(&mut quaternions);
+        let (look, emission_deg, emission_source) = match image.look {
+            Look::Nadir => ("nadir", None, None),
+            Look::Roll {
+                emission_deg,
+                source,
+                ..
+            } => (
+                "off nadir, held inertially",
+                Some(emission_deg),
+                Some(source),
+            ),
+        };
+        Self {
+            id: image.id,
+            site: image.site.id,
+            start_et_s: arc.exposed.start.seconds(),
+            line_period_s: image.exposure_ms * SECONDS_PER_MS * f64::from(image.summing),
+            lines_header: image.lines_header,
+            lines_delivered: image.lines_delivered,
+            look,
+            emission_deg,
+            emission_source,
+            position_iau2000_m: epochs
+                .iter()
+                .map(|et| {
+                    (mars_matrix(&MARS_IAU2000, *et) * arc.orbit.state(*et).position_m).into()
+                })
+                .collect(),
+            epochs_et_s: epochs.iter().map(|et| et.seconds()).collect(),
+            camera_to_mars_quaternion_wxyz: quaternions,
+        }
+    }
+}
+
+impl ProfileTruth {
+    /// The kept shots of one file in one window.
+    pub(super) fn new(window: &str, file: &str, kept: &[KeptShot]) -> Self {
+        Self {
+            window: window.to_owned(),
+            image: None,
+            file: file.to_owned(),
+            orbit_differences: BTreeMap::new(),
+            frame_error_max_m: kept
+                .iter()
+                .map(|kept| kept.truth.frame_error_m)
+                .fold(0.0, f64::max),
+            record: kept.iter().map(|kept| kept.record).collect(),
+            shot: kept.iter().map(|kept| kept.shot).collect(),
+            et_s: kept.iter().map(|kept| kept.truth.et.seconds()).collect(),
+            ground_iau2000_m: kept.iter().map(|kept| kept.truth.ground_m.into()).collect(),
+        }
+    }
+}

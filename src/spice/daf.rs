@@ -1,0 +1,201 @@
+//! Segment lists of binary kernels, checked before CSPICE sees the file.
+//!
+//! Source: NAIF, DAF Required Reading: file record, summary records, addresses of 8-byte words.
+
+use std::{
+    fs::File,
+    io::{Read, Seek, SeekFrom},
+    path::Path,
+};
+
+use super::error::SpiceFault;
+use crate::error::{IoFault, Place, Result};
+
+/// Bytes of a DAF record.
+const RECORD_SIZE: usize = 1_024;
+/// Bytes of a DAF word.
+const WORD_SIZE: usize = 8;
+/// Doubles of a segment summary, in all kernels.
+const SUMMARY_DOUBLES: usize = 2;
+/// Most integers of a segment summary.
+const SUMMARY_INTEGERS_MAX: usize = 6;
+
+/// One segment: SPK integers are target, centre, frame, type and two addresses; CK integers are
+/// object, frame, type, whether there are rates, and two addresses.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Segment {
+    /// First instant: ET seconds in an SPK, encoded clock in a CK.
+    pub(super) start: f64,
+    /// Last instant.
+    pub(super) stop: f64,
+    /// Integers of the summary, zeros behind the last one.
+    pub(super) integers: [i32; SUMMARY_INTEGERS_MAX],
+}
+
+/// The segments of a binary kernel, in file order; later ones win.
+///
+/// # Errors
+/// [`SpiceFault::DamagedKernel`] when the file is shorter than it says or its list is broken.
+pub(super) fn segments(path: &Path) -> Result<Vec<Segment>> {
+    let mut reader = Reader::open(path)?;
+    reader.segments().in_file(path)
+}
+
+struct Reader {
+    file: File,
+    size: u64,
+    big_endian: bool,
+}
+
+impl Reader {
+    fn open(path: &Path) -> Result<Self> {
+        let file = File::open(path)
+            .map_err(IoFault::on("open kernel"))
+            .in_file(path)?;
+        let size = file
+            .metadata()
+            .map_err(IoFault::on("read size of kernel"))
+            .in_file(path)?
+            .len();
+        Ok(Self {
+            file,
+            size,
+            big_endian: false,
+        })
+    }
+
+    /// Record `number`, counted from 1.
+    fn record(&mut self, number: u64) -> Result<[u8; RECORD_SIZE]> {
+        let offset = (number - 1).saturating_mul(RECORD_SIZE as u64);
+        if offset.saturating_add(RECORD_SIZE as u64) > self.size {
+            return Err(damaged(format!(
+                "record {number} lies beyond the end of its {} bytes",
+                self.size
+            )));
+        }
+        let mut record = [0; RECORD_SIZE];
+        self.file
+            .seek(SeekFrom::Start(offset))
+            .and_then(|_| self.file.read_exact(&mut record))
+            .map_err(IoFault::on("read kernel"))?;
+        Ok(record)
+    }
+
+    fn integer(&self, record: &[u8; RECORD_SIZE], offset: usize) -> i32 {
+        let mut bytes = [0; 4];
+        bytes.copy_from_slice(&record[offset..offset + 4]);
+        if self.big_endian {
+            i32::from_be_bytes(bytes)
+        } else {
+            i32::from_le_bytes(bytes)
+        }
+    }
+
+    fn double(&self, record: &[u8; RECORD_SIZE], word: usize) -> f64 {
+        let mut bytes = [0; WORD_SIZE];
+        bytes.copy_from_slice(&record[word * WORD_SIZE..(word + 1) * WORD_SIZE]);
+        if self.big_endian {
+            f64::from_be_bytes(bytes)
+        } else {
+            f64::from_le_bytes(bytes)
+        }
+    }
+
+    fn segments(&mut self) -> Result<Vec<Segment>> {
+        let header = self.record(1)?;
+        self.big_endian = match &header[88..96] {
+            b"LTL-IEEE" => false,
+            b"BIG-IEEE" => true,
+            other => {
+                let format = String::from_utf8_lossy(other).into_owned();
+                return Err(damaged(format!(
+                    "number format \"{format}\"; expected LTL-IEEE or BIG-IEEE"
+                )));
+            }
+        };
+        let doubles = self.integer(&header, 8);
+        let integers = usize::try_from(self.integer(&header, 12)).unwrap_or(0);
+        if doubles != 2 || !(5..=SUMMARY_INTEGERS_MAX).contains(&integers) {
+            return Err(damaged(format!(
+                "segment summaries of {doubles} doubles and {integers} integers; expected 2 and 5 or 6"
+            )));
+        }
+        let first_free_word = i64::from(self.integer(&header, 84));
+        let bytes_needed = (first_free_word - 1) * 8;
+        if !u64::try_from(bytes_needed).is_ok_and(|needed| needed <= self.size) {
+            return Err(damaged(format!(
+                "{} bytes long; its file record says {bytes_needed}",
+                self.size
+            )));
+        }
+        let first_summary_record = self.integer(&header, 76);
+        self.walk(first_summary_record, integers, first_free_word)
+    }
+
+    /// Follows the chain of summary records, each at most once.
+    fn walk(&mut self, first: i32, integers: usize, first_free_word: i64) -> Result<Vec<Segment>> {
+        let words_each = SUMMARY_DOUBLES + integers.div_ceil(2);
+        let summaries_max = (RECORD_SIZE / WORD_SIZE - 3) / words_each;
+        let mut found = Vec::new();
+        let mut next = f64::from(first);
+        let mut records_left = self.size / RECORD_SIZE as u64;
+        while next >= 1.0 {
+            if records_left == 0 {
+                return Err(damaged("its summary records form a circle".to_owned()));
+            }
+            records_left -= 1;
+            #[allow(
+                clippy::cast_possible_truncation,
+                clippy::cast_sign_loss,
+                reason = "at least 1; too large a number saturates and lies beyond the end of the file"
+            )]
+            let record = self.record(next as u64)?;
+            let count = self.double(&record, 2);
+            if !(0.0..=summaries_max as f64).contains(&count) {
+                return Err(damaged(format!(
+                    "a summary record of {count} segments; at most {summaries_max} fit"
+                )));
+            }
+            let summaries = (0..summaries_max).take_while(|index| (*index as f64) < count);
+            for word in summaries.map(|index| 3 + index * words_each) {
+                found.push(self.summary(&record, word, integers, first_free_word)?);
+            }
+            next = self.double(&record, 0);
+        }
+        Ok(found)
+    }
+
+    fn summary(
+        &self,
+        record: &[u8; RECORD_SIZE],
+        word: usize,
+        integers: usize,
+        first_free_word: i64,
+    ) -> Result<Segment> {
+        let mut segment = Segment {
+            start: self.double(record, word),
+            stop: self.double(record, word + 1),
+            integers: [0; SUMMARY_INTEGERS_MAX],
+        };
+        let first_integer = (word + SUMMARY_DOUBLES) * WORD_SIZE;
+        for (index, slot) in segment.integers.iter_mut().take(integers).enumerate() {
+            *slot = self.integer(record, first_integer + 4 * index);
+        }
+        let (begin, end) = (
+            segment.integers[integers - 2],
+            segment.integers[integers - 1],
+        );
+        let addresses_fit = 1 <= begin && begin <= end && i64::from(end) < first_free_word;
+        if !addresses_fit || segment.start.total_cmp(&segment.stop).is_gt() {
+            return Err(damaged(format!(
+                "a segment from {} to {} at words {begin} to {end} of {first_free_word}",
+                segment.start, segment.stop
+            )));
+        }
+        Ok(segment)
+    }
+}
+
+fn damaged(problem: String) -> crate::error::Failure {
+    SpiceFault::DamagedKernel { problem }.into()
+}

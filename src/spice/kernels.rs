@@ -1,0 +1,286 @@
+//! Kernel files: what they are, by their content, and in which order they are loaded.
+
+use std::{
+    fmt,
+    fs::{self, File},
+    io::Read,
+    path::{Path, PathBuf},
+};
+
+use serde::Serialize;
+
+use super::{daf, error::SpiceFault, ffi, text_kernel};
+use crate::error::{IoFault, Place, Result};
+
+/// Largest text kernel that is read, bytes; the archive's largest is below 2 MB.
+const TEXT_SIZE_MAX: u64 = 64 << 20;
+/// What a file should have been, for messages.
+const EXPECTED: &str =
+    "a binary SPK, CK or PCK (DAF/...) or a text kernel with a \\begindata block";
+
+/// What a kernel is for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum KernelRole {
+    /// Leap seconds.
+    Lsk,
+    /// Spacecraft clock.
+    Sclk,
+    /// Planetary constants.
+    Pck,
+    /// Frame definitions.
+    Fk,
+    /// Instrument.
+    Ik,
+    /// Ephemerides.
+    Spk,
+    /// Attitude.
+    Ck,
+    /// A list of kernels.
+    Meta,
+}
+
+impl fmt::Display for KernelRole {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.write_str(match self {
+            Self::Lsk => "LSK",
+            Self::Sclk => "SCLK",
+            Self::Pck => "PCK",
+            Self::Fk => "FK",
+            Self::Ik => "IK",
+            Self::Spk => "SPK",
+            Self::Ck => "CK",
+            Self::Meta => "MK",
+        })
+    }
+}
+
+/// A kernel file as it was when it was chosen.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Kernel {
+    /// Path as given or found.
+    pub path: PathBuf,
+    /// What it is for.
+    pub role: KernelRole,
+    /// Size.
+    pub bytes: u64,
+    /// BLAKE3 of its content, hexadecimal.
+    pub blake3: String,
+}
+
+impl Kernel {
+    /// Looks into a file and hashes it.
+    ///
+    /// # Errors
+    /// [`IoFault`]; [`SpiceFault::NotAKernel`]; [`SpiceFault::DamagedKernel`].
+    pub(super) fn inspect(path: &Path) -> Result<Self> {
+        ffi::c_path(path)?;
+        let role = role_of(path)?;
+        let (bytes, blake3) = hash(path)?;
+        Ok(Self {
+            path: path.to_owned(),
+            role,
+            bytes,
+            blake3,
+        })
+    }
+
+    /// Name of the file without its folder.
+    #[must_use]
+    pub fn file_name(&self) -> String {
+        self.path.file_name().map_or_else(
+            || self.path.display().to_string(),
+            |name| name.to_string_lossy().into_owned(),
+        )
+    }
+}
+
+/// Kernels in load order (later ones win), and why each is there.
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize)]
+pub struct KernelSet {
+    pub(super) kernels: Vec<Kernel>,
+    pub(super) explanation: Vec<String>,
+}
+
+impl KernelSet {
+    /// These files in this order; one with the same content as an earlier one is not loaded again.
+    ///
+    /// # Errors
+    /// [`IoFault`] for a file that cannot be read, [`SpiceFault::NotAKernel`] for a file that is none
+    /// (its role is found by content, never by name), [`SpiceFault::DamagedKernel`] for a truncated one.
+    pub fn from_files(files: &[PathBuf]) -> Result<Self> {
+        let mut set = Self::default();
+        for path in files {
+            set.add(path, "listed")?;
+        }
+        Ok(set)
+    }
+
+    /// Appends a file unless its content is there already.
+    pub(super) fn add(&mut self, path: &Path, reason: &str) -> Result<()> {
+        let kernel = Kernel::inspect(path)?;
+        if kernel.role == KernelRole::Meta {
+            let fault = SpiceFault::NotAKernel {
+                found: "a metakernel".to_owned(),
+                expected: "a kernel; a metakernel stands alone and lists no other",
+            };
+            return Err(fault).in_file(path);
+        }
+        let name = kernel.file_name();
+        if let Some(same) = self
+            .kernels
+            .iter()
+            .find(|held| held.blake3 == kernel.blake3)
+        {
+            self.explanation.push(format!(
+                "{name}: left out, same content as {}",
+                same.file_name()
+            ));
+        } else {
+            self.explanation.push(format!("{name}: {reason}"));
+            self.kernels.push(kernel);
+        }
+        Ok(())
+    }
+
+    /// The kernels in load order.
+    #[must_use]
+    pub fn kernels(&self) -> &[Kernel] {
+        &self.kernels
+    }
+
+    /// Why each kernel was chosen or left out, one line each.
+    #[must_use]
+    pub fn explanation(&self) -> &[String] {
+        &self.explanation
+    }
+
+    /// Hashes every kernel again, after use.
+    ///
+    /// # Errors
+    /// [`SpiceFault::KernelChanged`] naming the file that is no longer what was loaded.
+    pub fn verify_unchanged(&self) -> Result<()> {
+        for kernel in &self.kernels {
+            let (_, is) = hash(&kernel.path)?;
+            if is != kernel.blake3 {
+                let was = kernel.blake3.clone();
+                return Err(SpiceFault::KernelChanged { was, is }).in_file(&kernel.path);
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Size and BLAKE3 of a file.
+fn hash(path: &Path) -> Result<(u64, String)> {
+    let mut hasher = blake3::Hasher::new();
+    File::open(path)
+        .and_then(|file| hasher.update_reader(file).map(|_| ()))
+        .map_err(IoFault::on("read kernel"))
+        .in_file(path)?;
+    Ok((hasher.count(), hasher.finalize().to_hex().to_string()))
+}
+
+/// What a file is, by its content.
+pub(super) fn role_of(path: &Path) -> Result<KernelRole> {
+    let start = first_bytes(path)?;
+    let role = match start.as_slice() {
+        [] => return not_a_kernel(path, "an empty file"),
+        bytes if bytes.starts_with(b"DAF/SPK") => KernelRole::Spk,
+        bytes if bytes.starts_with(b"DAF/CK") => KernelRole::Ck,
+        bytes if bytes.starts_with(b"DAF/PCK") => KernelRole::Pck,
+        bytes if bytes.starts_with(b"DAFETF") || bytes.starts_with(b"DASETF") => {
+            return not_a_kernel(path, "a transfer file (make it binary with NAIF's tobin)");
+        }
+        bytes if bytes.starts_with(b"NAIF/DA") || bytes.starts_with(b"DAS/") => {
+            return not_a_kernel(path, "a binary NAIF file of another kind");
+        }
+        _ => return text_role(path),
+    };
+    daf::segments(path).map(|_| role)
+}
+
+fn not_a_kernel<T>(path: &Path, found: &str) -> Result<T> {
+    Err(SpiceFault::NotAKernel {
+        found: found.to_owned(),
+        expected: EXPECTED,
+    })
+    .in_file(path)
+}
+
+/// At most eight bytes from the start of a regular file.
+fn first_bytes(path: &Path) -> Result<Vec<u8>> {
+    let metadata = fs::metadata(path)
+        .map_err(IoFault::on("open kernel"))
+        .in_file(path)?;
+    if !metadata.is_file() {
+        return not_a_kernel(path, "no regular file");
+    }
+    let mut start = Vec::new();
+    File::open(path)
+        .and_then(|file| file.take(8).read_to_end(&mut start))
+        .map_err(IoFault::on("open kernel"))
+        .in_file(path)?;
+    Ok(start)
+}
+
+/// The text of a text kernel.
+///
+/// # Errors
+/// [`SpiceFault::NotAKernel`] for other files.
+pub(super) fn read_text(path: &Path) -> Result<String> {
+    let mut bytes = Vec::new();
+    File::open(path)
+        .and_then(|file| file.take(TEXT_SIZE_MAX + 1).read_to_end(&mut bytes))
+        .map_err(IoFault::on("read kernel"))
+        .in_file(path)?;
+    if bytes.contains(&0) {
+        return not_a_kernel(path, "a binary file of another kind");
+    }
+    if bytes.len() as u64 > TEXT_SIZE_MAX {
+        return not_a_kernel(path, "too long for a text kernel");
+    }
+    let text = String::from_utf8_lossy(&bytes).into_owned();
+    if text.lines().any(|line| line.trim() == "\\begindata") {
+        return Ok(text);
+    }
+    let found = if text.trim_start().starts_with('<') {
+        "a web page"
+    } else {
+        "a text without a \\begindata block"
+    };
+    not_a_kernel(path, found)
+}
+
+fn text_role(path: &Path) -> Result<KernelRole> {
+    let text = read_text(path)?;
+    let header = text.lines().next().unwrap_or_default().trim();
+    let by_header = match header {
+        "KPL/LSK" => Some(KernelRole::Lsk),
+        "KPL/SCLK" => Some(KernelRole::Sclk),
+        "KPL/PCK" => Some(KernelRole::Pck),
+        "KPL/FK" => Some(KernelRole::Fk),
+        "KPL/IK" => Some(KernelRole::Ik),
+        "KPL/MK" => Some(KernelRole::Meta),
+        _ => None,
+    };
+    if let Some(role) = by_header {
+        return Ok(role);
+    }
+    let assignments = text_kernel::assignments(&text).in_file(path)?;
+    let defines = |part: &str| assignments.iter().any(|found| found.name.starts_with(part));
+    let by_variable = [
+        ("KERNELS_TO_LOAD", KernelRole::Meta),
+        ("DELTET/", KernelRole::Lsk),
+        ("SCLK", KernelRole::Sclk),
+        ("INS-", KernelRole::Ik),
+        ("FRAME_", KernelRole::Fk),
+        ("TKFRAME_", KernelRole::Fk),
+        ("BODY", KernelRole::Pck),
+    ];
+    let role = by_variable.into_iter().find(|(part, _)| defines(part));
+    role.map_or_else(
+        || not_a_kernel(path, "a text kernel of unknown kind"),
+        |(_, role)| Ok(role),
+    )
+}

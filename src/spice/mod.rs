@@ -1,0 +1,30 @@
+//! CSPICE behind one fence: kernels in, times, states, attitudes and tabulated trajectories out.
+//!
+//! | to | use |
+//! |---|---|
+//! | choose and check kernels | [`KernelSet`] |
+//! | ask CSPICE | [`Session`], one at a time in a process |
+//! | know where the gaps are | [`Session::coverage`], [`Session::require_position`], [`Session::require_attitude`] |
+//! | leave CSPICE behind, for parallel work | [`Session::trajectory`] |
+//! | write kernels of an invented mission | [`write_spk`], [`write_ck`] |
+//!
+//! Kilometres become metres here, and nowhere else.
+
+mod coverage;
+mod daf;
+mod error;
+mod ffi;
+mod kernels;
+mod metakernel;
+mod select;
+mod session;
+mod text_kernel;
+mod trajectory;
+mod write;
+
+pub use coverage::Coverage;
+pub use error::SpiceFault;
+pub use kernels::{Kernel, KernelRole, KernelSet};
+pub use session::{Attitude, Session, State};
+pub use trajectory::Trajectory;
+pub use write::{CkSegment, SpkSegment, write_ck, write_spk};

@@ -1,0 +1,323 @@
+//! Choosing kernels from a folder, with a reason for each.
+
+use std::{
+    fs,
+    path::{Path, PathBuf},
+};
+
+use super::{
+    coverage::interval_of,
+    daf::{self, Segment},
+    error::SpiceFault,
+    kernels::{KernelRole, KernelSet, read_text, role_of},
+    session::Session,
+    text_kernel::{self, Assignment, values_of},
+};
+use crate::{
+    config::{CkQuality, KernelSelection},
+    constants::{MARS_IAU2000, NAIF_MGS, NAIF_MGS_BUS},
+    error::{Failure, IoFault, Kind, Place, Result},
+    time::{Interval, Intervals},
+};
+
+/// Deepest folder below the root that is searched.
+const DEPTH_MAX: usize = 16;
+/// Most files that are looked into.
+const FILES_MAX: usize = 100_000;
+/// Variables that time tagging and geometry need from text kernels, and what they are.
+const NEEDS: [(&str, &str); 5] = [
+    ("DELTET/DELTA_AT", "leap seconds"),
+    ("SCLK_DATA_TYPE_94", "the MGS clock"),
+    ("BODY499_PM", "the rotation of Mars"),
+    ("FRAME_-94000_NAME", "the frame of the MGS bus"),
+    (
+        "FRAME_-94031_NAME",
+        "the frame of the MOC narrow-angle camera",
+    ),
+];
+/// Orbit solutions that mark their files by name; a file without a mark is `nav`.
+const MARKED_FAMILIES: [&str; 2] = ["gsfc", "ipng"];
+
+/// Files of a folder by what they hold.
+#[derive(Default)]
+struct Found {
+    texts: Vec<(PathBuf, Vec<Assignment>)>,
+    ephemerides: Vec<(PathBuf, Vec<Segment>)>,
+    attitudes: Vec<PathBuf>,
+    notes: Vec<String>,
+}
+
+impl KernelSet {
+    /// Chooses from a folder: the latest text kernels (pinned ones win), planetary ephemerides, the
+    /// chosen orbit solution, and attitudes from the worst quality to the best, so that the best wins.
+    ///
+    /// * `wanted` – instants that ephemerides and attitudes must touch, ET; without any, only text
+    ///   kernels are chosen, which is enough to tag times
+    ///
+    /// # Errors
+    /// [`SpiceFault::NothingToSelect`] when a needed text kernel or the orbit solution is missing;
+    /// [`IoFault`] when the folder cannot be read.
+    pub fn select(selection: &KernelSelection, wanted: &[Interval]) -> Result<Self> {
+        let found = Found::in_folder(&selection.root)?;
+        let mut set = Self::default();
+        select_texts(selection, &found.texts, &mut set).in_file(&selection.root)?;
+        if !wanted.is_empty() {
+            let wanted = Intervals::union_of(wanted.iter().copied());
+            select_ephemerides(selection, &found.ephemerides, &wanted, &mut set)
+                .in_file(&selection.root)?;
+            select_attitudes(selection, &found.attitudes, &wanted, &mut set)?;
+        }
+        set.explanation.extend(found.notes);
+        Ok(set)
+    }
+}
+
+impl Found {
+    fn in_folder(root: &Path) -> Result<Self> {
+        let mut found = Self::default();
+        for path in files_below(root)? {
+            let role = match role_of(&path) {
+                Ok(role) => role,
+                Err(failure) if failure.kind() == Kind::Io => return Err(failure),
+                Err(failure) => {
+                    found.leave_out(&path, &failure);
+                    continue;
+                }
+            };
+            match role {
+                KernelRole::Spk => {
+                    let segments = daf::segments(&path)?;
+                    found.ephemerides.push((path, segments));
+                }
+                KernelRole::Ck => found.attitudes.push(path),
+                KernelRole::Meta => {}
+                _ => match read_text(&path).and_then(|text| Ok(text_kernel::assignments(&text)?)) {
+                    Ok(assignments) => found.texts.push((path, assignments)),
+                    Err(failure) => found.leave_out(&path, &failure),
+                },
+            }
+        }
+        Ok(found)
+    }
+
+    fn leave_out(&mut self, path: &Path, failure: &Failure) {
+        let note = format!("{}: left out, {}", name_of(path), failure.fault);
+        self.notes.push(note);
+    }
+}
+
+/// All regular files below `root`, sorted; links to folders are not followed.
+fn files_below(root: &Path) -> Result<Vec<PathBuf>> {
+    let mut files = Vec::new();
+    let mut folders = vec![(root.to_owned(), 0)];
+    while let Some((folder, depth)) = folders.pop() {
+        let entries = fs::read_dir(&folder)
+            .map_err(IoFault::on("list folder"))
+            .in_file(&folder)?;
+        for entry in entries {
+            let entry = entry.map_err(IoFault::on("list folder")).in_file(&folder)?;
+            let kind = entry
+                .file_type()
+                .map_err(IoFault::on("list folder"))
+                .in_file(entry.path())?;
+            if kind.is_dir() && depth < DEPTH_MAX {
+                folders.push((entry.path(), depth + 1));
+            } else if entry.path().is_file() {
+                files.push(entry.path());
+            }
+            if files.len() > FILES_MAX {
+                let what = format!("could be found among more than {FILES_MAX} files");
+                return Err(SpiceFault::NothingToSelect { what }).in_file(root);
+            }
+        }
+    }
+    files.sort();
+    Ok(files)
+}
+
+/// For each need the pinned kernel that defines it, or the latest one.
+fn select_texts(
+    selection: &KernelSelection,
+    texts: &[(PathBuf, Vec<Assignment>)],
+    set: &mut KernelSet,
+) -> Result<()> {
+    let pinned = |path: &Path| selection.pinned.iter().any(|name| *name == name_of(path));
+    for name in &selection.pinned {
+        if !texts.iter().any(|(path, _)| name_of(path) == *name) {
+            let what = format!("is the text kernel {name}, which the configuration pins");
+            return Err(SpiceFault::NothingToSelect { what }.into());
+        }
+    }
+    let mut chosen: Vec<&Path> = Vec::new();
+    for (variable, what) in NEEDS {
+        let defines = |assignments: &[Assignment]| !values_of(assignments, variable).is_empty();
+        let mut candidates: Vec<&(PathBuf, Vec<Assignment>)> = texts
+            .iter()
+            .filter(|(path, assignments)| {
+                defines(assignments) && (pinned(path) || mars_fits(variable, assignments))
+            })
+            .collect();
+        candidates.sort_by_key(|(path, _)| (pinned(path), version_of(path)));
+        let Some((best, _)) = candidates.last() else {
+            let what = format!("defines {what} ({variable})");
+            return Err(SpiceFault::NothingToSelect { what }.into());
+        };
+        // One file may serve two needs: the clock kernel of MGS also defines its bus frame.
+        let served = candidates
+            .iter()
+            .any(|(path, _)| chosen.contains(&path.as_path()));
+        if !served {
+            let why = if pinned(best) { "pinned" } else { "latest" };
+            let reason = format!("{why} of {} with {what}", candidates.len());
+            set.add(best, &reason)?;
+            chosen.push(best);
+        }
+    }
+    Ok(())
+}
+
+/// Whether planetary constants have the Mars of IAU 2000, the frame of every product.
+fn mars_fits(variable: &str, assignments: &[Assignment]) -> bool {
+    variable != "BODY499_PM"
+        || values_of(assignments, variable)
+            .first()
+            .and_then(|value| value.number())
+            .is_some_and(|meridian_deg| (meridian_deg - MARS_IAU2000.meridian_deg).abs() < 1e-6)
+}
+
+/// Ephemerides without MGS, then those of MGS in the chosen orbit solution.
+fn select_ephemerides(
+    selection: &KernelSelection,
+    ephemerides: &[(PathBuf, Vec<Segment>)],
+    wanted: &Intervals,
+    set: &mut KernelSet,
+) -> Result<()> {
+    let holds_mgs = |segments: &[Segment]| segments.iter().any(|s| s.integers[0] == NAIF_MGS);
+    let family = selection.spk_family.to_ascii_lowercase();
+    let of_mgs = ephemerides
+        .iter()
+        .filter(|(_, segments)| holds_mgs(segments));
+    if !of_mgs.clone().any(|(path, _)| family_of(path, &family)) {
+        let names: Vec<String> = of_mgs.map(|(path, _)| name_of(path)).collect();
+        let what = format!(
+            "holds the orbit of MGS in the solution {family} (found: {})",
+            names.join(", ")
+        );
+        return Err(SpiceFault::NothingToSelect { what }.into());
+    }
+    // Planets first; in a tie the order of paths.
+    let mut ordered: Vec<&(PathBuf, Vec<Segment>)> = ephemerides.iter().collect();
+    ordered.sort_by_key(|(_, segments)| holds_mgs(segments));
+    for (path, segments) in ordered {
+        let mgs = holds_mgs(segments);
+        let held = segments
+            .iter()
+            .filter(|segment| !mgs || segment.integers[0] == NAIF_MGS)
+            .map(|segment| interval_of([segment.start, segment.stop]));
+        let name = name_of(path);
+        if mgs && !family_of(path, &family) {
+            let line = format!("{name}: left out, not of the orbit solution {family}");
+            set.explanation.push(line);
+        } else if !overlap(held, wanted) {
+            let line = format!("{name}: left out, holds none of the wanted times");
+            set.explanation.push(line);
+        } else if mgs {
+            set.add(path, &format!("orbit of MGS, solution {family}"))?;
+        } else {
+            set.add(path, "ephemeris of planets")?;
+        }
+    }
+    Ok(())
+}
+
+/// Attitudes that touch the wanted times, the worst quality first.
+fn select_attitudes(
+    selection: &KernelSelection,
+    attitudes: &[PathBuf],
+    wanted: &Intervals,
+    set: &mut KernelSet,
+) -> Result<()> {
+    // Times of a C-kernel are clock ticks: the text kernels chosen so far turn them into ET.
+    let session = Session::open(set)?;
+    for quality in selection.ck_quality.iter().rev() {
+        let mut of_quality: Vec<&PathBuf> = attitudes
+            .iter()
+            .filter(|path| quality_of(path) == *quality)
+            .collect();
+        of_quality.sort_by_key(|path| version_of(path));
+        for path in of_quality {
+            let name = name_of(path);
+            let held = session
+                .cspice
+                .ck_coverage(path, NAIF_MGS_BUS)
+                .in_file(path)?;
+            let hull = held.first().zip(held.last());
+            let hull = hull.map(|(first, last)| interval_of([first[0], last[1]]));
+            if overlap(hull.into_iter(), wanted) {
+                set.add(path, &format!("{quality:?} attitude of MGS"))?;
+            } else {
+                let line = format!("{name}: left out, holds no attitude near the wanted times");
+                set.explanation.push(line);
+            }
+        }
+    }
+    for path in attitudes {
+        let quality = quality_of(path);
+        if !selection.ck_quality.contains(&quality) {
+            let line = format!("{}: left out, {quality:?} attitude", name_of(path));
+            set.explanation.push(line);
+        }
+    }
+    Ok(())
+}
+
+fn overlap(held: impl Iterator<Item = Interval>, wanted: &Intervals) -> bool {
+    held.into_iter()
+        .any(|held| wanted.as_slice().iter().any(|wanted| wanted.overlaps(held)))
+}
+
+fn name_of(path: &Path) -> String {
+    path.file_name()
+        .unwrap_or_default()
+        .to_string_lossy()
+        .into_owned()
+}
+
+/// Parts of a name between `_`, `-` and `.`, in lower case.
+fn name_parts(path: &Path) -> Vec<String> {
+    name_of(path)
+        .to_ascii_lowercase()
+        .split(['_', '-', '.'])
+        .map(str::to_owned)
+        .collect()
+}
+
+fn family_of(path: &Path, family: &str) -> bool {
+    let parts = name_parts(path);
+    let unmarked = || {
+        !parts
+            .iter()
+            .any(|part| MARKED_FAMILIES.contains(&part.as_str()))
+    };
+    parts.iter().any(|part| part == family) || (family == "nav" && unmarked())
+}
+
+/// Commanded attitude is told by its name: `mgs_ext_roto_all_v*`.
+fn quality_of(path: &Path) -> CkQuality {
+    let parts = name_parts(path);
+    if parts.iter().any(|part| part == "roto" || part == "nominal") {
+        CkQuality::Nominal
+    } else {
+        CkQuality::Reconstructed
+    }
+}
+
+/// The last number in a name: 61 of `MGS_SCLKSCET.00061.tsc`, 10 of `pck00010.tpc`.
+fn version_of(path: &Path) -> u64 {
+    let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+    let digits = stem.rsplit(|c: char| !c.is_ascii_digit());
+    digits
+        .map(str::parse)
+        .find_map(std::result::Result::ok)
+        .unwrap_or(0)
+}

@@ -1,0 +1,211 @@
+//! A session with CSPICE: times, states and attitudes from one set of kernels.
+
+use std::cell::OnceCell;
+
+use nalgebra::{Matrix3, Vector3};
+
+use super::{
+    coverage::Coverage,
+    error::SpiceFault,
+    ffi::{Cspice, Rows, StateKm},
+    kernels::KernelSet,
+};
+use crate::{
+    constants::{NAIF_MARS, NAIF_MGS, NAIF_MGS_BUS, NAIF_SUN},
+    error::{Place, Result},
+    frames::{J2000, MgsBus, MocNa, Position, Rotation},
+    time::{CkLookup, Et},
+    units::METRES_PER_KM,
+};
+
+/// Digits of a second in UTC strings.
+const UTC_DECIMALS: u8 = 3;
+
+/// Position and velocity relative to the centre of Mars, inertial.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct State {
+    /// Position, metres.
+    pub position: Position<J2000>,
+    /// Velocity in J2000, metres per second.
+    pub velocity_m_s: Vector3<f64>,
+}
+
+impl State {
+    fn from_km(state_km: StateKm) -> Self {
+        let [x, y, z, vx, vy, vz] = state_km.map(|value| value * METRES_PER_KM);
+        Self {
+            position: Position::new(Vector3::new(x, y, z)),
+            velocity_m_s: Vector3::new(vx, vy, vz),
+        }
+    }
+}
+
+/// Attitude of the bus at an exposure.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Attitude {
+    /// From J2000 to the bus; stamped with the exposure's instant, not the kernel's.
+    pub inertial_to_bus: Rotation<J2000, MgsBus>,
+    /// Angular velocity of the bus, J2000 components, radians per second.
+    pub angular_velocity_rad_s: Vector3<f64>,
+    /// How far from the asked instant the kernel's attitude holds, seconds; 0 inside its intervals.
+    pub distance_s: f64,
+}
+
+/// The only way to CSPICE: holds the process-wide lock and one set of loaded kernels.
+///
+/// A second session on another thread waits for this one to end; on the same thread it is refused.
+/// Kernels are unloaded when the session goes.
+#[derive(Debug)]
+pub struct Session {
+    pub(super) cspice: Cspice,
+    pub(super) kernels: KernelSet,
+    pub(super) coverage: OnceCell<Coverage>,
+}
+
+impl Session {
+    /// Waits for the lock and loads `kernels` in their order.
+    ///
+    /// # Errors
+    /// [`SpiceFault::Spice`] with the file whose loading failed; [`SpiceFault::SessionOpen`].
+    pub fn open(kernels: &KernelSet) -> Result<Self> {
+        let cspice = Cspice::lock()?;
+        for kernel in kernels.kernels() {
+            cspice.furnish(&kernel.path).in_file(&kernel.path)?;
+        }
+        Ok(Self {
+            cspice,
+            kernels: kernels.clone(),
+            coverage: OnceCell::new(),
+        })
+    }
+
+    /// The kernels of this session.
+    #[must_use]
+    pub const fn kernels(&self) -> &KernelSet {
+        &self.kernels
+    }
+
+    /// Instant of a UTC string such as `1999-08-24T14:12:13.64`, with or without a closing `Z`.
+    ///
+    /// # Errors
+    /// [`SpiceFault::Spice`] when the string is no date or no leap-second kernel is loaded.
+    pub fn utc_to_et(&self, utc: &str) -> Result<Et> {
+        let utc = utc.trim();
+        let seconds = self
+            .cspice
+            .utc_to_et(utc.strip_suffix('Z').unwrap_or(utc))?;
+        Ok(Et::from_seconds(seconds))
+    }
+
+    /// ISO calendar UTC with three decimals, for example `1999-08-24T14:12:13.635`.
+    ///
+    /// # Errors
+    /// [`SpiceFault::Spice`] when no leap-second kernel is loaded.
+    pub fn et_to_utc(&self, et: Et) -> Result<String> {
+        Ok(self.cspice.et_to_utc(et.seconds(), UTC_DECIMALS)?)
+    }
+
+    /// Instant of a spacecraft clock string of MGS, such as `619971158:28` or `1/0844996544.086`.
+    ///
+    /// # Errors
+    /// [`SpiceFault::Spice`] when the string is no clock reading or the clock kernel is missing.
+    pub fn sclk_to_et(&self, sclk: &str) -> Result<Et> {
+        let seconds = self.cspice.sclk_to_et(NAIF_MGS, sclk.trim())?;
+        Ok(Et::from_seconds(seconds))
+    }
+
+    /// Spacecraft clock string of MGS, with partition, rounded to 1/256 s.
+    ///
+    /// # Errors
+    /// [`SpiceFault::Spice`] outside the clock kernel's range.
+    pub fn et_to_sclk(&self, et: Et) -> Result<String> {
+        Ok(self.cspice.et_to_sclk(NAIF_MGS, et.seconds())?)
+    }
+
+    /// Geometric state of MGS relative to Mars: no light time, no aberration.
+    ///
+    /// # Errors
+    /// [`SpiceFault::Spice`], of kind coverage when the kernels do not reach there.
+    pub fn state(&self, et: Et) -> Result<State> {
+        let state = self
+            .cspice
+            .geometric_state(NAIF_MGS, et.seconds(), NAIF_MARS)?;
+        Ok(State::from_km(state))
+    }
+
+    /// State of MGS as seen from the centre of Mars, corrected for light time and aberration (`LT+S`).
+    ///
+    /// Only for instrument support data, which carry this convention; geometry uses [`Self::state`].
+    ///
+    /// # Errors
+    /// As [`Self::state`].
+    pub fn apparent_state(&self, et: Et) -> Result<State> {
+        let state = self
+            .cspice
+            .apparent_state(NAIF_MGS, et.seconds(), NAIF_MARS)?;
+        Ok(State::from_km(state))
+    }
+
+    /// State of the Sun as seen from the centre of Mars (`LT+S`).
+    ///
+    /// # Errors
+    /// As [`Self::state`].
+    pub fn sun_state(&self, et: Et) -> Result<State> {
+        let state = self
+            .cspice
+            .apparent_state(NAIF_SUN, et.seconds(), NAIF_MARS)?;
+        Ok(State::from_km(state))
+    }
+
+    /// Attitude of the bus at `exposure`, read from the C-kernel at `lookup`.
+    ///
+    /// * `lookup` – made by [`crate::time::PointingBias::lookup`] from the same exposure
+    /// * `tolerance_s` – how far outside its intervals the C-kernel may be asked, seconds
+    ///
+    /// # Errors
+    /// [`SpiceFault::NoAttitude`] when there is no attitude with rates within the tolerance.
+    pub fn attitude(&self, lookup: CkLookup, exposure: Et, tolerance_s: f64) -> Result<Attitude> {
+        let kernel_time = lookup.kernel_time();
+        let ticks = self.cspice.et_to_ticks(NAIF_MGS, kernel_time.seconds())?;
+        let one_second_later = kernel_time.plus(1.0).seconds();
+        let ticks_per_s = self.cspice.et_to_ticks(NAIF_MGS, one_second_later)? - ticks;
+        let pointing = self
+            .cspice
+            .pointing(NAIF_MGS_BUS, ticks, tolerance_s * ticks_per_s)?
+            .ok_or(SpiceFault::NoAttitude {
+                kernel_time,
+                tolerance_s,
+            })?;
+        Ok(Attitude {
+            inertial_to_bus: Rotation::new(matrix(&pointing.matrix), exposure),
+            angular_velocity_rad_s: Vector3::from(pointing.angular_velocity_rad_s),
+            distance_s: (pointing.ticks - ticks).abs() / ticks_per_s,
+        })
+    }
+
+    /// Mounting of the narrow-angle camera as the instrument kernel has it.
+    ///
+    /// # Errors
+    /// [`SpiceFault::Spice`] when no loaded kernel defines the two frames.
+    pub fn mounting(&self, et: Et) -> Result<Rotation<MgsBus, MocNa>> {
+        let rows = self
+            .cspice
+            .frame_matrix(c"MGS_SPACECRAFT", c"MGS_MOC_NA", et.seconds())?;
+        Ok(Rotation::new(matrix(&rows), et))
+    }
+
+    /// Matrix from J2000 to the `IAU_MARS` of the loaded planetary constants, to tell which report they follow.
+    ///
+    /// # Errors
+    /// [`SpiceFault::Spice`] when no planetary constants are loaded.
+    pub fn mars_matrix(&self, et: Et) -> Result<Matrix3<f64>> {
+        let rows = self
+            .cspice
+            .frame_matrix(c"J2000", c"IAU_MARS", et.seconds())?;
+        Ok(matrix(&rows))
+    }
+}
+
+fn matrix(rows: &Rows) -> Matrix3<f64> {
+    Matrix3::from_fn(|row, column| rows[row][column])
+}

@@ -1,0 +1,170 @@
+//! Kernels of an invented mission, written with CSPICE's own writers.
+
+use std::path::Path;
+
+use super::{
+    error::SpiceFault,
+    ffi::{CkColumns, Cspice, StateKm},
+    session::{Session, State},
+};
+use crate::{
+    constants::{NAIF_MGS, NAIF_MGS_BUS},
+    error::{Place, Result},
+    time::Et,
+    units::METRES_PER_KM,
+};
+
+/// Longest segment name that a DAF holds.
+const SEGMENT_NAME_MAX: usize = 40;
+
+/// Hermite-interpolated states (SPK type 13), J2000.
+#[derive(Debug, Clone, Copy)]
+pub struct SpkSegment<'a> {
+    /// NAIF id of the body.
+    pub target: i32,
+    /// NAIF id of the body that states are relative to.
+    pub centre: i32,
+    /// Name of the segment, at most 40 characters.
+    pub name: &'a str,
+    /// Degree of the interpolating polynomial, odd, at most 27.
+    pub degree: i32,
+    /// Instants, increasing.
+    pub epochs: &'a [Et],
+    /// One state per instant.
+    pub states: &'a [State],
+}
+
+/// Linearly interpolated attitudes with rates (CK type 3) of the MGS bus, base frame J2000.
+#[derive(Debug, Clone, Copy)]
+pub struct CkSegment<'a> {
+    /// Name of the segment, at most 40 characters.
+    pub name: &'a str,
+    /// Instants as the kernel counts time, increasing.
+    pub instants: &'a [Et],
+    /// Quaternions of J2000 to bus, scalar first, SPICE's convention, one per instant.
+    pub quaternions: &'a [[f64; 4]],
+    /// Angular velocities, J2000 components, radians per second, one per instant.
+    pub angular_velocities_rad_s: &'a [[f64; 3]],
+    /// Instants at which an interpolation interval begins; the first is the first instant.
+    pub interval_starts: &'a [Et],
+}
+
+/// Writes a new SPK; `comment` goes into its comment area.
+///
+/// # Errors
+/// [`SpiceFault::Segment`] for columns that do not fit, [`SpiceFault::Spice`] from CSPICE (an existing
+/// file is never overwritten), [`SpiceFault::SessionOpen`] when this thread has a session.
+pub fn write_spk(path: &Path, segments: &[SpkSegment], comment: &str) -> Result<()> {
+    for segment in segments {
+        check_lengths(segment.name, segment.epochs, &[segment.states.len()])?;
+    }
+    let cspice = Cspice::lock()?;
+    let lines = comment_lines(comment);
+    let handle = cspice
+        .create_spk(path, comment_size(&lines))
+        .in_file(path)?;
+    let write = || -> Result<()> {
+        cspice.add_comments(handle, &lines)?;
+        for segment in segments {
+            let epochs_s: Vec<f64> = segment.epochs.iter().map(|epoch| epoch.seconds()).collect();
+            let states_km: Vec<StateKm> =
+                segment.states.iter().map(|state| state.to_km()).collect();
+            cspice.write_spk_13(
+                handle,
+                (segment.target, segment.centre),
+                segment.name,
+                segment.degree,
+                &epochs_s,
+                &states_km,
+            )?;
+        }
+        Ok(())
+    };
+    let written = write();
+    let closed = cspice.close(handle);
+    written.and(closed.map_err(Into::into)).in_file(path)
+}
+
+/// Writes a new CK; `session` must have the leap seconds and the clock loaded.
+///
+/// # Errors
+/// As [`write_spk`].
+pub fn write_ck(
+    path: &Path,
+    session: &Session,
+    segments: &[CkSegment],
+    comment: &str,
+) -> Result<()> {
+    for segment in segments {
+        let columns = [
+            segment.quaternions.len(),
+            segment.angular_velocities_rad_s.len(),
+        ];
+        check_lengths(segment.name, segment.instants, &columns)?;
+    }
+    let cspice = &session.cspice;
+    let lines = comment_lines(comment);
+    let handle = cspice.create_ck(path, comment_size(&lines)).in_file(path)?;
+    let ticks = |instants: &[Et]| -> Result<Vec<f64>> {
+        let encode = |instant: &Et| Ok(cspice.et_to_ticks(NAIF_MGS, instant.seconds())?);
+        instants.iter().map(encode).collect()
+    };
+    let write = || -> Result<()> {
+        cspice.add_comments(handle, &lines)?;
+        for segment in segments {
+            let columns = CkColumns {
+                name: segment.name,
+                ticks: &ticks(segment.instants)?,
+                quaternions: segment.quaternions,
+                rates_rad_s: segment.angular_velocities_rad_s,
+                starts: &ticks(segment.interval_starts)?,
+            };
+            cspice.write_ck_3(handle, NAIF_MGS_BUS, &columns)?;
+        }
+        Ok(())
+    };
+    let written = write();
+    let closed = cspice.close(handle);
+    written.and(closed.map_err(Into::into)).in_file(path)
+}
+
+impl State {
+    /// Kilometres and kilometres per second.
+    fn to_km(self) -> StateKm {
+        let (position, velocity) = (self.position.xyz_m, self.velocity_m_s);
+        [
+            position.x, position.y, position.z, velocity.x, velocity.y, velocity.z,
+        ]
+        .map(|value| value / METRES_PER_KM)
+    }
+}
+
+fn check_lengths(name: &str, instants: &[Et], columns: &[usize]) -> Result<()> {
+    let problem = if name.is_empty() || name.len() > SEGMENT_NAME_MAX {
+        format!("its name must have 1 to {SEGMENT_NAME_MAX} characters")
+    } else if instants.is_empty() {
+        "it holds no instants".to_owned()
+    } else if let Some(count) = columns.iter().find(|count| **count != instants.len()) {
+        format!("a column of {count} for {} instants", instants.len())
+    } else {
+        return Ok(());
+    };
+    Err(SpiceFault::Segment {
+        segment: name.to_owned(),
+        problem,
+    }
+    .into())
+}
+
+/// Lines of a comment; an empty one becomes a blank, since CSPICE takes no empty strings.
+fn comment_lines(comment: &str) -> Vec<&str> {
+    let lines = comment
+        .lines()
+        .map(|line| if line.is_empty() { " " } else { line });
+    lines.collect()
+}
+
+/// Characters that the comment area needs, line ends included.
+fn comment_size(lines: &[&str]) -> usize {
+    lines.iter().map(|line| line.len() + 1).sum()
+}

@@ -1,0 +1,50 @@
+//! One process at a time works in a site's folder.
+
+use std::{
+    fs::{self, File, TryLockError},
+    path::{Path, PathBuf},
+};
+
+use crate::error::{Fault, IoFault, Kind, Place, Result};
+
+/// Held while a run works in a site's folder; the system frees it when the process ends, however it ends.
+#[derive(Debug)]
+pub struct SiteLock {
+    _file: File,
+}
+
+/// Another run is at work in the folder.
+#[derive(Debug, thiserror::Error)]
+#[error("another run is at work in this folder")]
+struct Busy;
+
+impl Fault for Busy {
+    fn kind(&self) -> Kind {
+        Kind::Configuration
+    }
+
+    fn advice(&self) -> String {
+        "wait for it, or give this run another --out".to_owned()
+    }
+}
+
+impl SiteLock {
+    /// Takes the lock of `folder`, which is made if need be.
+    ///
+    /// # Errors
+    /// Another process holds it, or the folder cannot be written.
+    pub fn take(folder: &Path) -> Result<Self> {
+        fs::create_dir_all(folder)
+            .map_err(IoFault::on("create the folder"))
+            .in_file(folder)?;
+        let path: PathBuf = folder.join(".lock");
+        let file = File::create(&path)
+            .map_err(IoFault::on("create"))
+            .in_file(&path)?;
+        match file.try_lock() {
+            Ok(()) => Ok(Self { _file: file }),
+            Err(TryLockError::WouldBlock) => Err(Busy).in_file(folder),
+            Err(TryLockError::Error(error)) => Err(IoFault::on("lock")(error)).in_file(&path),
+        }
+    }
+}

@@ -1,0 +1,117 @@
+//! `manifest.json`: what a site's products were made from.
+
+use std::collections::BTreeMap;
+
+use serde::{Deserialize, Serialize};
+
+use crate::time::Interval;
+
+/// The manifest of one site.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Manifest {
+    /// Always `areograph`.
+    pub tool: String,
+    /// Version of the program.
+    pub version: String,
+    /// Site identifier.
+    pub site: String,
+    /// Whether every profile and image keeps the configured limits.
+    pub verdict: Verdict,
+    /// The configuration file.
+    pub configuration: ConfigurationEntry,
+    /// Time corrections as used.
+    pub biases: Vec<BiasEntry>,
+    /// Kernels in load order.
+    pub kernels: Vec<KernelEntry>,
+    /// Stages with the fingerprint of everything that entered them.
+    pub stages: Vec<StageEntry>,
+    /// Product files.
+    pub products: Vec<ProductEntry>,
+    /// Rows and things counted.
+    pub counts: BTreeMap<String, u64>,
+    /// Shots inside a window that were left out, by reason.
+    pub rejected: BTreeMap<String, u64>,
+    /// What was wrong with input records.
+    pub complaints: Complaints,
+    /// What a reader should know, one sentence each.
+    pub notes: Vec<String>,
+    /// When the products were published: the only entry that depends on the clock.
+    pub finished_utc: String,
+}
+
+/// Whether the products keep the limits of the configuration.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Verdict {
+    /// No limit is broken.
+    pub valid: bool,
+    /// Every broken limit, with its profile or image.
+    pub reasons: Vec<String>,
+}
+
+/// The configuration of a run.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct ConfigurationEntry {
+    /// File name, without folders.
+    pub file_name: String,
+    /// BLAKE3 of the file.
+    pub blake3: String,
+}
+
+/// A time correction as used.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct BiasEntry {
+    /// `ck_bias` or `mola_clock`.
+    pub name: String,
+    /// Seconds added to the time of a look-up.
+    pub correction_s: f64,
+    /// What it is applied to.
+    pub scope: String,
+    /// Where the value comes from.
+    pub source: String,
+}
+
+/// A kernel of a run.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct KernelEntry {
+    /// File name, without folders.
+    pub name: String,
+    /// Role by content.
+    pub role: String,
+    /// Size.
+    pub bytes: u64,
+    /// BLAKE3 of the file.
+    pub blake3: String,
+    /// Which of the needed intervals the kernel's own coverage meets, ET seconds.
+    pub coverage_used: Vec<Interval>,
+}
+
+/// A stage of a run.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct StageEntry {
+    /// Name, for a stage of one image followed by `/` and the image.
+    pub name: String,
+    /// BLAKE3 over its parts.
+    pub fingerprint: String,
+}
+
+/// A product file.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct ProductEntry {
+    /// Path below the site's folder, with `/`.
+    pub path: String,
+    /// Size.
+    pub bytes: u64,
+    /// BLAKE3 of the file.
+    pub blake3: String,
+    /// Rows, or 1 for a document.
+    pub rows: u64,
+}
+
+/// Complaints about input records.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Complaints {
+    /// How many there are.
+    pub count: u64,
+    /// The first of them.
+    pub texts: Vec<String>,
+}
