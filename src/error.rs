@@ -46,8 +46,8 @@ pub trait Fault: std::error::Error + Send + Sync + 'static {
 pub struct Failure {
     /// Site, once the flow knows it.
     pub site: Option<String>,
-    /// Stage of the flow.
-    pub stage: Option<&'static str>,
+    /// Stage of the flow, for a stage of one image followed by `/` and the image.
+    pub stage: Option<String>,
     /// File that was read or written.
     pub file: Option<PathBuf>,
     /// Record of that file, counted from 1 as a reader of the file counts.
@@ -84,8 +84,8 @@ impl Failure {
 
     /// The same failure, known to come from `stage`.
     #[must_use]
-    pub fn in_stage(mut self, stage: &'static str) -> Self {
-        self.stage.get_or_insert(stage);
+    pub fn in_stage(mut self, stage: &str) -> Self {
+        self.stage.get_or_insert_with(|| stage.to_owned());
         self
     }
 
@@ -112,7 +112,7 @@ impl<F: Fault> From<F> for Failure {
 impl fmt::Display for Failure {
     /// `site/stage: file record n: cause`, then a second line with the advice.
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match (&self.site, self.stage) {
+        match (&self.site, &self.stage) {
             (Some(site), Some(stage)) => write!(formatter, "{site}/{stage}: ")?,
             (Some(site), None) => write!(formatter, "{site}: ")?,
             (None, Some(stage)) => write!(formatter, "{stage}: ")?,
@@ -148,7 +148,7 @@ pub trait Place<T> {
     ///
     /// # Errors
     /// The same failure, with its place.
-    fn in_stage(self, stage: &'static str) -> Result<T>;
+    fn in_stage(self, stage: &str) -> Result<T>;
     /// See [`Failure::in_site`].
     ///
     /// # Errors
@@ -161,7 +161,7 @@ impl<T, E: Into<Failure>> Place<T> for std::result::Result<T, E> {
         self.map_err(|error| error.into().in_file(file))
     }
 
-    fn in_stage(self, stage: &'static str) -> Result<T> {
+    fn in_stage(self, stage: &str) -> Result<T> {
         self.map_err(|error| error.into().in_stage(stage))
     }
 

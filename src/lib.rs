@@ -7,6 +7,7 @@ pub mod cli;
 pub mod config;
 pub mod constants;
 pub mod error;
+pub mod files;
 pub mod flow;
 pub mod footprints;
 pub mod frames;

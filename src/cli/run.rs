@@ -18,7 +18,7 @@ use crate::{
     config::SiteConfig,
     error::{Failure, Kind},
     flow::{Ending, RunOptions, SiteOutcome, Stage, run_site},
-    store::manifest::Verdict,
+    store::manifest::Manifest,
 };
 
 /// Runs sites from kernels to validated products in `<out>/<site>`.
@@ -161,7 +161,9 @@ fn exit_code(outcome: &Outcome) -> u8 {
     match outcome {
         Err(failure) => failure.kind().exit_code(),
         Ok(outcome) => match &outcome.ending {
-            Ending::Published(verdict) | Ending::Unchanged(verdict) if !verdict.valid => {
+            Ending::Published(manifest) | Ending::Unchanged(manifest)
+                if !manifest.verdict.valid =>
+            {
                 Kind::Validation.exit_code()
             }
             _ => 0,
@@ -184,13 +186,14 @@ fn print(outcomes: &[Outcome], as_json: bool) {
 
 fn print_outcome(outcome: &SiteOutcome) {
     let (site, folder) = (&outcome.site, outcome.folder.display());
-    let (what, verdict) = match &outcome.ending {
+    let (what, manifest) = match &outcome.ending {
         Ending::StoppedAfter(stage) => {
             return output::line(format_args!("{site}: stopped after {stage}, no products"));
         }
-        Ending::Published(verdict) => ("products", verdict),
-        Ending::Unchanged(verdict) => ("nothing changed; products stand", verdict),
+        Ending::Published(manifest) => ("products", manifest),
+        Ending::Unchanged(manifest) => ("nothing changed; products stand", manifest),
     };
+    let (verdict, complaints) = (&manifest.verdict, &manifest.complaints);
     let word = if verdict.valid { "valid" } else { "INVALID" };
     output::line(format_args!(
         "{site}: {word}; {what} in {folder}, see report/index.html"
@@ -198,10 +201,25 @@ fn print_outcome(outcome: &SiteOutcome) {
     for reason in &verdict.reasons {
         output::line(format_args!("  {reason}"));
     }
+    if let Some(first) = complaints.texts.first() {
+        let more = match complaints.count {
+            1 => String::new(),
+            count => format!(" (and {} more, see manifest.json)", count - 1),
+        };
+        output::line(format_args!("  input: {first}{more}"));
+    }
 }
 
 fn outcome_json(outcome: &Outcome) -> serde_json::Value {
-    let verdict = |published: bool, verdict: &Verdict| json!({ "published": published, "valid": verdict.valid, "reasons": verdict.reasons });
+    let products = |published: bool, manifest: &Manifest| {
+        json!({
+            "published": published,
+            "valid": manifest.verdict.valid,
+            "reasons": manifest.verdict.reasons,
+            "counts": manifest.counts,
+            "complaints": manifest.complaints.count,
+        })
+    };
     match outcome {
         Err(failure) => json!({
             "site": failure.site,
@@ -214,8 +232,8 @@ fn outcome_json(outcome: &Outcome) -> serde_json::Value {
             ending,
         }) => {
             let ending = match ending {
-                Ending::Published(found) => verdict(true, found),
-                Ending::Unchanged(found) => verdict(false, found),
+                Ending::Published(manifest) => products(true, manifest),
+                Ending::Unchanged(manifest) => products(false, manifest),
                 Ending::StoppedAfter(stage) => json!({ "stopped_after": stage.name() }),
             };
             json!({ "site": site, "folder": folder, "ending": ending })

@@ -21,7 +21,7 @@ use crate::{
         sample_orientation::sample_orientation, search_footprints::search_footprints,
         tag_times::tag_times,
     },
-    store::{cache::StageCache, lock::SiteLock, manifest::Verdict},
+    store::{cache::StageCache, lock::SiteLock, manifest::Manifest},
     time::{Interval, Intervals},
 };
 
@@ -116,9 +116,9 @@ pub struct SiteOutcome {
 #[derive(Debug)]
 pub enum Ending {
     /// Products were published.
-    Published(Verdict),
+    Published(Manifest),
     /// Nothing had changed; the products of an earlier run stand.
-    Unchanged(Verdict),
+    Unchanged(Manifest),
     /// Stopped after the stage that was asked for.
     StoppedAfter(Stage),
 }
@@ -246,10 +246,10 @@ fn run_stages(config: &SiteConfig, options: &RunOptions<'_>) -> Result<SiteOutco
 
     let mut orientations = Vec::with_capacity(images.value.len());
     for image in &images.value {
-        let stage = Stage::SampleOrientation;
+        let stage = Stage::SampleOrientation.of_image(&image.id);
         let parts = parts::sample_orientation(config, &kernels, image);
-        orientations.push(cache.stage(&stage.of_image(&image.id), parts, || {
-            let session = Session::open(&kernels).in_stage(stage.name())?;
+        orientations.push(cache.stage(&stage, parts, || {
+            let session = Session::open(&kernels).in_stage(&stage)?;
             sample_orientation(
                 &session,
                 image,
@@ -257,18 +257,18 @@ fn run_stages(config: &SiteConfig, options: &RunOptions<'_>) -> Result<SiteOutco
                 &config.pointing,
                 &config.orientation,
             )
-            .in_stage(stage.name())
+            .in_stage(&stage)
         })?);
     }
     until!(Stage::SampleOrientation, Stage::FitSensorModel);
 
     let mut models = Vec::with_capacity(images.value.len());
     for orientation in &orientations {
-        let stage = Stage::FitSensorModel;
         let image = &orientation.value.image;
+        let stage = Stage::FitSensorModel.of_image(image);
         let parts = parts::fit_sensor_model(config, image, Some(&orientation.blake3));
-        models.push(cache.stage(&stage.of_image(image), parts, || {
-            fit_sensor_model(&orientation.value, &config.orientation).in_stage(stage.name())
+        models.push(cache.stage(&stage, parts, || {
+            fit_sensor_model(&orientation.value, &config.orientation).in_stage(&stage)
         })?);
     }
     until!(Stage::FitSensorModel, Stage::Publish);

@@ -3,9 +3,10 @@
 use crate::{
     config::SiteConfig,
     error::Result,
+    files::{file_name, hash_file},
     spice::{KernelRole, KernelSet},
     stages::tag_times::ImageTimes,
-    store::{atomic::hash_file, fingerprint::Parts},
+    store::fingerprint::Parts,
 };
 
 /// Image keys, label files and the kernels that convert times.
@@ -30,11 +31,7 @@ pub(super) fn search_footprints(config: &SiteConfig) -> Result<Parts> {
         .key("mola_clock (correction)", &config.mola_clock.correction_s())
         .key("windows", &config.windows);
     for path in &config.pedr.files {
-        let name = path
-            .file_name()
-            .unwrap_or(path.as_os_str())
-            .to_string_lossy();
-        parts = parts.file("pedr", &name, &hash_file(path)?.0);
+        parts = parts.file("pedr", &file_name(path), &hash_file(path)?.0);
     }
     Ok(parts)
 }

@@ -6,6 +6,7 @@ use super::{Ending, Stage, parts};
 use crate::{
     config::{BiasScope, SiteConfig},
     error::Result,
+    files::file_name,
     frames::MarsIau2000,
     geom::mars_rotation::mars_rotation,
     products::{ImageProducts, KernelLine, SiteProducts, write_products},
@@ -54,18 +55,19 @@ pub(super) fn standing(
     folder: &Path,
     cache: &StageCache,
     parts: &Parts,
-) -> std::result::Result<Verdict, Because> {
-    let output: Output<Verdict> = cache.load(Stage::Publish.name(), parts)?;
-    let Some(manifest) = read_manifest(folder) else {
+) -> std::result::Result<Manifest, Because> {
+    let output: Output<Manifest> = cache.load(Stage::Publish.name(), parts)?;
+    let manifest = output.value;
+    if read_manifest(folder).as_ref() != Some(&manifest) {
         return Err(Because::Moved(vec![format!(
-            "{MANIFEST} is missing or damaged"
+            "{MANIFEST} is missing or was changed"
         )]));
-    };
+    }
     match damaged_product(folder, &manifest) {
         Some(path) => Err(Because::Moved(vec![format!(
             "{path} is missing or was changed"
         )])),
-        None => Ok(output.value),
+        None => Ok(manifest),
     }
 }
 
@@ -77,9 +79,9 @@ pub(super) fn publish(folder: &Path, cache: &StageCache, results: &Results<'_>) 
     let name = Stage::Publish.name();
     let parts = parts::publish(results.config, results.kernels, results.outputs());
     match standing(folder, cache, &parts) {
-        Ok(verdict) => {
+        Ok(manifest) => {
             tracing::info!(stage = name, "kept: {}", Because::Unchanged);
-            return Ok(Ending::Unchanged(verdict));
+            return Ok(Ending::Unchanged(manifest));
         }
         Err(because) => {
             tracing::info!(stage = name, "making products: {because}");
@@ -87,11 +89,8 @@ pub(super) fn publish(folder: &Path, cache: &StageCache, results: &Results<'_>) 
         }
     }
     let fingerprint = parts.fingerprint();
-    let verdict = cache.stage(name, parts, || {
-        let manifest = make_products(folder, results, fingerprint)?;
-        Ok(manifest.verdict)
-    })?;
-    Ok(Ending::Published(verdict.value))
+    let manifest = cache.stage(name, parts, || make_products(folder, results, fingerprint))?;
+    Ok(Ending::Published(manifest.value))
 }
 
 fn make_products(folder: &Path, results: &Results<'_>, fingerprint: String) -> Result<Manifest> {
@@ -275,14 +274,13 @@ impl Results<'_> {
             ("profiles".to_owned(), self.profiles.value.len() as u64),
             ("images".to_owned(), self.images.value.len() as u64),
         ]);
-        let file_name = config.file.file_name().unwrap_or(config.file.as_os_str());
         Ok(Manifest {
             tool: "areograph".to_owned(),
             version: env!("CARGO_PKG_VERSION").to_owned(),
             site: config.site.clone(),
             verdict: self.verdict(),
             configuration: ConfigurationEntry {
-                file_name: file_name.to_string_lossy().into_owned(),
+                file_name: file_name(&config.file),
                 blake3: config.blake3.clone(),
             },
             biases: biases(config),

@@ -10,7 +10,10 @@ use std::{
 use serde::Serialize;
 
 use super::{daf, error::SpiceFault, ffi, text_kernel};
-use crate::error::{IoFault, Place, Result};
+use crate::{
+    error::{IoFault, Place, Result},
+    files::{file_name, hash_file},
+};
 
 /// Largest text kernel that is read, bytes; the archive's largest is below 2 MB.
 const TEXT_SIZE_MAX: u64 = 64 << 20;
@@ -76,7 +79,7 @@ impl Kernel {
     pub(super) fn inspect(path: &Path) -> Result<Self> {
         ffi::c_path(path)?;
         let role = role_of(path)?;
-        let (bytes, blake3) = hash(path)?;
+        let (blake3, bytes) = hash_file(path)?;
         Ok(Self {
             path: path.to_owned(),
             role,
@@ -88,10 +91,7 @@ impl Kernel {
     /// Name of the file without its folder.
     #[must_use]
     pub fn file_name(&self) -> String {
-        self.path.file_name().map_or_else(
-            || self.path.display().to_string(),
-            |name| name.to_string_lossy().into_owned(),
-        )
+        file_name(&self.path)
     }
 }
 
@@ -161,7 +161,7 @@ impl KernelSet {
     /// [`SpiceFault::KernelChanged`] naming the file that is no longer what was loaded.
     pub fn verify_unchanged(&self) -> Result<()> {
         for kernel in &self.kernels {
-            let (_, is) = hash(&kernel.path)?;
+            let (is, _) = hash_file(&kernel.path)?;
             if is != kernel.blake3 {
                 let was = kernel.blake3.clone();
                 return Err(SpiceFault::KernelChanged { was, is }).in_file(&kernel.path);
@@ -169,16 +169,6 @@ impl KernelSet {
         }
         Ok(())
     }
-}
-
-/// Size and BLAKE3 of a file.
-fn hash(path: &Path) -> Result<(u64, String)> {
-    let mut hasher = blake3::Hasher::new();
-    File::open(path)
-        .and_then(|file| hasher.update_reader(file).map(|_| ()))
-        .map_err(IoFault::on("read kernel"))
-        .in_file(path)?;
-    Ok((hasher.count(), hasher.finalize().to_hex().to_string()))
 }
 
 /// What a file is, by its content.

@@ -17,6 +17,7 @@ use crate::{
     config::{CkQuality, KernelSelection},
     constants::{MARS_IAU2000, NAIF_MGS, NAIF_MGS_BUS},
     error::{Failure, IoFault, Kind, Place, Result},
+    files::file_name,
     time::{Interval, Intervals},
 };
 
@@ -101,7 +102,7 @@ impl Found {
     }
 
     fn leave_out(&mut self, path: &Path, failure: &Failure) {
-        let note = format!("{}: left out, {}", name_of(path), failure.fault);
+        let note = format!("{}: left out, {}", file_name(path), failure.fault);
         self.notes.push(note);
     }
 }
@@ -141,9 +142,9 @@ fn select_texts(
     texts: &[(PathBuf, Vec<Assignment>)],
     set: &mut KernelSet,
 ) -> Result<()> {
-    let pinned = |path: &Path| selection.pinned.iter().any(|name| *name == name_of(path));
+    let pinned = |path: &Path| selection.pinned.iter().any(|name| *name == file_name(path));
     for name in &selection.pinned {
-        if !texts.iter().any(|(path, _)| name_of(path) == *name) {
+        if !texts.iter().any(|(path, _)| file_name(path) == *name) {
             let what = format!("is the text kernel {name}, which the configuration pins");
             return Err(SpiceFault::NothingToSelect { what }.into());
         }
@@ -198,7 +199,7 @@ fn select_ephemerides(
         .iter()
         .filter(|(_, segments)| holds_mgs(segments));
     if !of_mgs.clone().any(|(path, _)| family_of(path, &family)) {
-        let names: Vec<String> = of_mgs.map(|(path, _)| name_of(path)).collect();
+        let names: Vec<String> = of_mgs.map(|(path, _)| file_name(path)).collect();
         let what = format!(
             "holds the orbit of MGS in the solution {family} (found: {})",
             names.join(", ")
@@ -214,7 +215,7 @@ fn select_ephemerides(
             .iter()
             .filter(|segment| !mgs || segment.integers[0] == NAIF_MGS)
             .map(|segment| interval_of([segment.start, segment.stop]));
-        let name = name_of(path);
+        let name = file_name(path);
         if mgs && !family_of(path, &family) {
             let line = format!("{name}: left out, not of the orbit solution {family}");
             set.explanation.push(line);
@@ -246,7 +247,7 @@ fn select_attitudes(
             .collect();
         of_quality.sort_by_key(|path| version_of(path));
         for path in of_quality {
-            let name = name_of(path);
+            let name = file_name(path);
             let held = session
                 .cspice
                 .ck_coverage(path, NAIF_MGS_BUS)
@@ -264,7 +265,7 @@ fn select_attitudes(
     for path in attitudes {
         let quality = quality_of(path);
         if !selection.ck_quality.contains(&quality) {
-            let line = format!("{}: left out, {quality:?} attitude", name_of(path));
+            let line = format!("{}: left out, {quality:?} attitude", file_name(path));
             set.explanation.push(line);
         }
     }
@@ -276,16 +277,9 @@ fn overlap(held: impl Iterator<Item = Interval>, wanted: &Intervals) -> bool {
         .any(|held| wanted.as_slice().iter().any(|wanted| wanted.overlaps(held)))
 }
 
-fn name_of(path: &Path) -> String {
-    path.file_name()
-        .unwrap_or_default()
-        .to_string_lossy()
-        .into_owned()
-}
-
 /// Parts of a name between `_`, `-` and `.`, in lower case.
 fn name_parts(path: &Path) -> Vec<String> {
-    name_of(path)
+    file_name(path)
         .to_ascii_lowercase()
         .split(['_', '-', '.'])
         .map(str::to_owned)

@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::{
     config::MolaClock,
+    files::file_name,
     footprints::{AsRead, Footprints},
     frames::{MarsDatum, MarsIau2000},
     geom::{
@@ -86,7 +87,7 @@ pub fn convert_datum(footprints: Footprints<AsRead>, clock: &MolaClock) -> Conve
 }
 
 fn note(path: &std::path::Path, datum: MarsDatum, turn_s: Option<f64>) -> String {
-    let name = path.file_name().unwrap_or(path.as_os_str()).display();
+    let name = file_name(path);
     match (datum, turn_s) {
         (MarsDatum::Iau2000, None) => format!("{name}: in IAU 2000 already, not converted"),
         (datum, None) => format!("{name}: {datum} to IAU 2000 at each shot's time tag"),

@@ -65,18 +65,3 @@ pub fn sync_folder(folder: &Path) {
     // Some file systems refuse to flush folders; the data are safe all the same.
     let _ = File::open(folder).and_then(|folder| folder.sync_all());
 }
-
-/// BLAKE3 of a file, hexadecimal, and its size in bytes.
-///
-/// # Errors
-/// The file cannot be read.
-pub fn hash_file(path: &Path) -> Result<(String, u64)> {
-    let mut hasher = blake3::Hasher::new();
-    let file = File::open(path)
-        .map_err(IoFault::on("open"))
-        .in_file(path)?;
-    let bytes = std::io::copy(&mut &file, &mut hasher)
-        .map_err(IoFault::on("read"))
-        .in_file(path)?;
-    Ok((hasher.finalize().to_hex().to_string(), bytes))
-}

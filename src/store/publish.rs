@@ -9,7 +9,10 @@ use super::{
     atomic,
     manifest::{Manifest, ProductEntry},
 };
-use crate::error::{Fault, IoFault, Kind, Place, Result};
+use crate::{
+    error::{Fault, IoFault, Kind, Place, Result},
+    files::hash_file,
+};
 
 /// Name of the manifest in a site's folder.
 pub const MANIFEST: &str = "manifest.json";
@@ -43,7 +46,7 @@ pub fn entries(staging: &Path, files: &[(PathBuf, u64)]) -> Result<Vec<ProductEn
         .map(|(relative, rows)| {
             let path = staging.join(relative);
             atomic::sync_file(&path)?;
-            let (blake3, bytes) = atomic::hash_file(&path)?;
+            let (blake3, bytes) = hash_file(&path)?;
             Ok(ProductEntry {
                 path: relative.to_string_lossy().replace('\\', "/"),
                 bytes,
@@ -130,7 +133,7 @@ pub fn damaged_product(site_folder: &Path, manifest: &Manifest) -> Option<String
         .products
         .iter()
         .find(|product| {
-            atomic::hash_file(&site_folder.join(&product.path))
+            hash_file(&site_folder.join(&product.path))
                 .map_or(true, |(blake3, _)| blake3 != product.blake3)
         })
         .map(|product| product.path.clone())
