@@ -14,6 +14,7 @@ pub mod frames;
 pub mod geom;
 pub mod pds;
 pub mod products;
+pub mod report;
 pub mod scene;
 pub mod spice;
 pub mod stages;

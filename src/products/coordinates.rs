@@ -1,0 +1,68 @@
+//! Degrees of people's maps.
+
+use crate::units::RADIANS_PER_DEGREE;
+
+/// Degrees of an angle in radians.
+pub(super) fn degrees(angle_rad: f64) -> f64 {
+    angle_rad / RADIANS_PER_DEGREE
+}
+
+/// All of a column in degrees.
+pub(super) fn column_deg(angles_rad: &[f64]) -> Vec<f64> {
+    angles_rad.iter().map(|angle| degrees(*angle)).collect()
+}
+
+/// East longitude in `-180..180` degrees, as GIS expects it, of one in `0..2π` radians.
+pub(super) fn signed_longitude_deg(longitude_rad: f64) -> f64 {
+    let east_deg = degrees(longitude_rad);
+    if east_deg >= 180.0 {
+        east_deg - 360.0
+    } else {
+        east_deg
+    }
+}
+
+/// West, south, east and north of points in degrees; `None` without points.
+///
+/// `west > east` when the shortest box crosses the antimeridian, as RFC 7946 (5.2) and GeoParquet say.
+pub(super) fn bounding_box_deg(points: &[[f64; 2]]) -> Option<[f64; 4]> {
+    let mut longitudes: Vec<f64> = points.iter().map(|point| point[0]).collect();
+    longitudes.sort_by(f64::total_cmp);
+    let (first, last) = (*longitudes.first()?, *longitudes.last()?);
+    // The box leaves out the widest empty stretch of longitudes; the one over the antimeridian unless
+    // another is wider.
+    let mut widest = first + 360.0 - last;
+    let (mut west, mut east) = (first, last);
+    for pair in longitudes.windows(2) {
+        if pair[1] - pair[0] > widest {
+            widest = pair[1] - pair[0];
+            (west, east) = (pair[1], pair[0]);
+        }
+    }
+    let latitudes = || points.iter().map(|point| point[1]);
+    let south = latitudes().fold(f64::INFINITY, f64::min);
+    let north = latitudes().fold(f64::NEG_INFINITY, f64::max);
+    Some([west, south, east, north])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::f64::consts::PI;
+
+    #[test]
+    fn longitudes_fold_at_the_antimeridian() {
+        assert!((signed_longitude_deg(PI) + 180.0).abs() < 1e-12); // rounding of degrees
+        assert!((signed_longitude_deg(1.5 * PI) + 90.0).abs() < 1e-12);
+        assert!((signed_longitude_deg(0.5 * PI) - 90.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn boxes_cross_the_antimeridian_when_that_is_shorter() {
+        let across = [[179.5, 1.0], [-179.0, 3.0], [179.9, 2.0]];
+        assert_eq!(bounding_box_deg(&across), Some([179.5, 1.0, -179.0, 3.0]));
+        let greenwich = [[-1.0, -5.0], [2.0, -6.0]];
+        assert_eq!(bounding_box_deg(&greenwich), Some([-1.0, -6.0, 2.0, -5.0]));
+        assert_eq!(bounding_box_deg(&[]), None);
+    }
+}

@@ -1,0 +1,60 @@
+//! What can go wrong while products are written; all of it is a fault of areograph itself.
+
+use crate::error::{Fault, Kind};
+
+/// A product that would be wrong, or came out wrong.
+#[derive(Debug, thiserror::Error)]
+pub(crate) enum ProductFault {
+    /// A value that no reader of the product could use.
+    #[error("{what} is not a finite number")]
+    NotFinite { what: String },
+    /// Inputs that do not belong together.
+    #[error("{what}: {found}; expected {expected}")]
+    Inconsistent {
+        what: String,
+        found: usize,
+        expected: usize,
+    },
+    /// The file holds something else than what was written.
+    #[error("read back differently: {what}")]
+    ReadBack { what: String },
+    /// A library refused to encode or draw.
+    #[error("cannot {action}: {reason}")]
+    Refused {
+        action: &'static str,
+        reason: String,
+    },
+}
+
+impl ProductFault {
+    /// For `map_err` on errors of encoding libraries.
+    pub(crate) fn refused<E: std::fmt::Display>(action: &'static str) -> impl Fn(E) -> Self {
+        move |error| Self::Refused {
+            action,
+            reason: error.to_string(),
+        }
+    }
+
+    /// For `map_err` on errors of decoding libraries.
+    pub(super) fn unreadable<E: std::fmt::Display>(error: E) -> Self {
+        Self::ReadBack {
+            what: error.to_string(),
+        }
+    }
+}
+
+impl Fault for ProductFault {
+    fn kind(&self) -> Kind {
+        Kind::Bug
+    }
+
+    fn advice(&self) -> String {
+        match self {
+            Self::ReadBack { .. } => {
+                "check the disk and run again; if it happens twice, report it with the site's configuration"
+            }
+            _ => "report this with the site's configuration and the log",
+        }
+        .to_owned()
+    }
+}

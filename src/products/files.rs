@@ -1,0 +1,128 @@
+//! Bytes and JSON to disk and back.
+
+use std::{
+    fs::{self, File},
+    io::{Read as _, Write as _},
+    path::Path,
+};
+
+use serde::Serialize;
+use serde_json::Value;
+
+use super::fault::ProductFault;
+use crate::error::{IoFault, Place, Result};
+
+/// Writes `bytes` to `path`, its folder made where missing, through to the disk.
+pub(super) fn write_bytes(path: &Path, bytes: &[u8]) -> Result<()> {
+    if let Some(folder) = path.parent() {
+        fs::create_dir_all(folder)
+            .map_err(IoFault::on("make the folder"))
+            .in_file(folder)?;
+    }
+    let mut file = File::create(path)
+        .map_err(IoFault::on("create"))
+        .in_file(path)?;
+    file.write_all(bytes)
+        .and_then(|()| file.sync_all())
+        .map_err(IoFault::on("write"))
+        .in_file(path)
+}
+
+/// Opens `path` for reading.
+pub(super) fn open(path: &Path) -> Result<File> {
+    File::open(path).map_err(IoFault::on("open")).in_file(path)
+}
+
+/// Writes `text` and checks that the file holds it.
+pub(super) fn write_text(path: &Path, text: &str) -> Result<()> {
+    write_bytes(path, text.as_bytes())?;
+    if read(path)? == text.as_bytes() {
+        return Ok(());
+    }
+    Err(ProductFault::ReadBack {
+        what: format!("{} bytes of text", text.len()),
+    })
+    .in_file(path)
+}
+
+fn read(path: &Path) -> Result<Vec<u8>> {
+    let mut bytes = Vec::new();
+    open(path)?
+        .read_to_end(&mut bytes)
+        .map_err(IoFault::on("read"))
+        .in_file(path)?;
+    Ok(bytes)
+}
+
+/// Writes `document` as indented JSON and reads it back.
+///
+/// # Errors
+/// Numbers that are not finite, which JSON would turn into null: products have no nulls, what is
+/// unknown is left out.
+pub(super) fn write_json(path: &Path, document: &impl Serialize) -> Result<()> {
+    let text = serde_json::to_string_pretty(document)
+        .map_err(ProductFault::refused("encode JSON"))
+        .in_file(path)?;
+    write_json_text(path, document, &(text + "\n"))
+}
+
+/// Writes `text`, which must be `document` in JSON, and reads it back.
+pub(super) fn write_json_text(path: &Path, document: &impl Serialize, text: &str) -> Result<()> {
+    let written = serde_json::to_value(document)
+        .map_err(ProductFault::refused("encode JSON"))
+        .in_file(path)?;
+    if let Some(what) = find_null(&written, "") {
+        return Err(ProductFault::NotFinite { what }).in_file(path);
+    }
+    write_bytes(path, text.as_bytes())?;
+    let found: Value = serde_json::from_slice(&read(path)?)
+        .map_err(ProductFault::unreadable)
+        .in_file(path)?;
+    if found == written {
+        return Ok(());
+    }
+    Err(ProductFault::ReadBack {
+        what: "the document".to_owned(),
+    })
+    .in_file(path)
+}
+
+/// JSON pointer to the first null.
+fn find_null(value: &Value, path: &str) -> Option<String> {
+    match value {
+        Value::Null => Some(path.to_owned()),
+        Value::Array(items) => items
+            .iter()
+            .enumerate()
+            .find_map(|(index, item)| find_null(item, &format!("{path}/{index}"))),
+        Value::Object(members) => members
+            .iter()
+            .find_map(|(key, member)| find_null(member, &format!("{path}/{key}"))),
+        _ => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::error::Kind;
+
+    #[test]
+    fn numbers_that_json_cannot_hold_are_named_and_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a/b.json");
+        let failure = write_json(&path, &serde_json::json!({"a": [1.0, f64::NAN]})).unwrap_err();
+        assert_eq!(failure.kind(), Kind::Bug);
+        assert_eq!(failure.fault.to_string(), "/a/1 is not a finite number");
+        assert!(!path.exists());
+    }
+
+    #[test]
+    fn every_digit_of_a_number_survives_json() {
+        let folder = tempfile::tempdir().unwrap();
+        let numbers: Vec<f64> = (1..2000)
+            .map(|k| f64::from(k).sqrt().exp() * 1e-9)
+            .collect();
+        write_json(&folder.path().join("numbers.json"), &numbers).unwrap();
+    }
+}

@@ -1,0 +1,308 @@
+//! Footprints as GeoParquet, CSV and GeoJSON.
+
+use serde_json::{Value, json};
+
+use super::{
+    Writer,
+    coordinates::{bounding_box_deg, column_deg, signed_longitude_deg},
+    geojson, parquet,
+    site::SiteProducts,
+    table::{Column, Table, Values},
+    text_table,
+};
+use crate::{error::Result, geom::ellipsoid::spherical_to_xyz_m};
+
+pub(super) fn write(written: &mut Writer, site: &SiteProducts) -> Result<()> {
+    let points = points_deg(site);
+    let mut table = Table::new(columns(site))?;
+    written.add("footprints.csv", |path| text_table::write(path, &table))?;
+    table.columns.push(Column::new(
+        "geometry",
+        "point, longitude (-180..180) and areocentric latitude in degrees, well-known binary",
+        Values::Binary(points.iter().map(well_known_binary).collect()),
+    ));
+    let metadata = vec![("geo", geo_metadata(&points).to_string())];
+    written.add("footprints.parquet", |path| {
+        parquet::write(path, &table, metadata)
+    })?;
+    written.add("footprints.geojson", |path| {
+        geojson::write(path, site, &points)
+    })
+}
+
+/// Longitude (-180..180) and latitude of every footprint, degrees.
+fn points_deg(site: &SiteProducts) -> Vec<[f64; 2]> {
+    let shots = site.footprints;
+    shots
+        .longitude_rad
+        .iter()
+        .zip(column_deg(&shots.latitude_rad))
+        .map(|(longitude_rad, latitude_deg)| [signed_longitude_deg(*longitude_rad), latitude_deg])
+        .collect()
+}
+
+fn columns(site: &SiteProducts) -> Vec<Column> {
+    let mut columns = identity(site);
+    columns.extend(ground(site));
+    columns.extend(spacecraft(site));
+    columns
+}
+
+fn identity(site: &SiteProducts) -> Vec<Column> {
+    let shots = site.footprints;
+    let source = shots
+        .file
+        .iter()
+        .map(|file| file_name(site, *file))
+        .collect();
+    let windows = shots
+        .windows
+        .iter()
+        .map(|mask| window_ids(site, *mask))
+        .collect();
+    vec![
+        Column::new(
+            "et_tag_s",
+            "time tag of the shot in the file, TDB seconds past J2000",
+            Values::F64(shots.et_tag_s.clone()),
+        ),
+        Column::new(
+            "et_s",
+            "time of the shot after the MOLA clock correction, TDB seconds past J2000",
+            Values::F64(shots.et_s.clone()),
+        ),
+        Column::new(
+            "orbit",
+            "orbit number of the frame",
+            Values::U32(shots.orbit.clone()),
+        ),
+        Column::new("source_file", "PEDR file", Values::Text(source)),
+        Column::new(
+            "record",
+            "record of that file, counted from 1 with its label records",
+            Values::U32(shots.record.clone()),
+        ),
+        Column::new(
+            "shot",
+            "shot in the frame, 1 to 20",
+            Values::U32(shots.shot.iter().map(|shot| u32::from(*shot)).collect()),
+        ),
+        Column::new(
+            "channel",
+            "trigger channel",
+            Values::U32(
+                shots
+                    .channel
+                    .iter()
+                    .map(|channel| u32::from(*channel))
+                    .collect(),
+            ),
+        ),
+        Column::new(
+            "class",
+            "classification: 1 ground, 0 cloud or noise",
+            Values::I32(shots.class.iter().map(|class| i32::from(*class)).collect()),
+        ),
+        Column::new(
+            "attitude_flag",
+            "0 attitude known, 2 known for part of the frame, 3 unknown",
+            Values::U32(
+                shots
+                    .attitude_flag
+                    .iter()
+                    .map(|flag| u32::from(*flag))
+                    .collect(),
+            ),
+        ),
+        Column::new(
+            "orbit_quality",
+            "0 orbit from JPL, 1 or more: MOLA team's gravity model number",
+            Values::U32(
+                shots
+                    .orbit_quality
+                    .iter()
+                    .map(|code| u32::from(*code))
+                    .collect(),
+            ),
+        ),
+        Column::new(
+            "windows",
+            "identifiers of the windows that hold the shot, separated by semicolons",
+            Values::Text(windows),
+        ),
+    ]
+}
+
+fn ground(site: &SiteProducts) -> Vec<Column> {
+    let shots = site.footprints;
+    let topography = shots
+        .radius_crossover_m
+        .iter()
+        .zip(&shots.areoid_radius_m)
+        .map(|(radius_m, areoid_m)| radius_m - areoid_m)
+        .collect();
+    let xyz: Vec<[f64; 3]> = (0..shots.len())
+        .map(|row| {
+            let shot = shots.row(row);
+            spherical_to_xyz_m(shot.longitude_rad, shot.latitude_rad, shot.radius_m).into()
+        })
+        .collect();
+    let axis = |axis: usize| Values::F64(xyz.iter().map(|xyz| xyz[axis]).collect());
+    vec![
+        Column::new(
+            "longitude_deg",
+            "east longitude, 0..360 degrees, IAU 2000",
+            Values::F64(column_deg(&shots.longitude_rad)),
+        ),
+        Column::new(
+            "latitude_deg",
+            "areocentric latitude, degrees, IAU 2000",
+            Values::F64(column_deg(&shots.latitude_rad)),
+        ),
+        Column::new(
+            "radius_m",
+            "planetary radius before the crossover correction, metres",
+            Values::F64(shots.radius_m.clone()),
+        ),
+        Column::new(
+            "radius_crossover_m",
+            "planetary radius after the crossover correction, metres",
+            Values::F64(shots.radius_crossover_m.clone()),
+        ),
+        Column::new(
+            "areoid_radius_m",
+            "areoid radius, metres",
+            Values::F64(shots.areoid_radius_m.clone()),
+        ),
+        Column::new(
+            "topography_m",
+            "radius after the crossover correction minus areoid radius, metres",
+            Values::F64(topography),
+        ),
+        Column::new(
+            "x_m",
+            "IAU 2000 body-fixed X of the point with radius_m, metres",
+            axis(0),
+        ),
+        Column::new(
+            "y_m",
+            "IAU 2000 body-fixed Y of the point with radius_m, metres",
+            axis(1),
+        ),
+        Column::new(
+            "z_m",
+            "IAU 2000 body-fixed Z of the point with radius_m, metres",
+            axis(2),
+        ),
+    ]
+}
+
+fn spacecraft(site: &SiteProducts) -> Vec<Column> {
+    let shots = site.footprints;
+    vec![
+        Column::new(
+            "range_m",
+            "one-way range to the spacecraft's centre of mass, metres",
+            Values::F64(shots.range_m.clone()),
+        ),
+        Column::new(
+            "spacecraft_longitude_deg",
+            "east longitude of the spacecraft, the file's orbit, IAU 2000",
+            Values::F64(column_deg(&shots.spacecraft_longitude_rad)),
+        ),
+        Column::new(
+            "spacecraft_latitude_deg",
+            "areocentric latitude of the spacecraft, the file's orbit",
+            Values::F64(column_deg(&shots.spacecraft_latitude_rad)),
+        ),
+        Column::new(
+            "spacecraft_radius_m",
+            "distance of the spacecraft from the centre of Mars, the file's orbit",
+            Values::F64(shots.spacecraft_radius_m.clone()),
+        ),
+        Column::new(
+            "off_nadir_deg",
+            "off-nadir angle of the laser, degrees",
+            Values::F64(column_deg(&shots.off_nadir_rad)),
+        ),
+    ]
+}
+
+/// Name of a source file; its folder belongs to the machine, not to the product.
+pub(super) fn file_name(site: &SiteProducts, file: u16) -> String {
+    let path = site
+        .footprints
+        .files
+        .get(usize::from(file))
+        .map(|source| &source.path);
+    path.and_then(|path| path.file_name())
+        .map_or_else(String::new, |name| name.to_string_lossy().into_owned())
+}
+
+/// Identifiers of the windows in `mask`, separated by semicolons.
+pub(super) fn window_ids(site: &SiteProducts, mask: u64) -> String {
+    let held = site
+        .config
+        .windows
+        .iter()
+        .enumerate()
+        .filter(|(bit, _)| mask >> bit & 1 == 1);
+    let ids: Vec<&str> = held.map(|(_, window)| window.id.as_str()).collect();
+    ids.join(";")
+}
+
+/// Little-endian well-known binary of a point (OGC 06-103r4, 8.2).
+fn well_known_binary(point: &[f64; 2]) -> Vec<u8> {
+    const LITTLE_ENDIAN: u8 = 1;
+    const POINT: u32 = 1;
+    let mut bytes = vec![LITTLE_ENDIAN];
+    bytes.extend(POINT.to_le_bytes());
+    bytes.extend(point[0].to_le_bytes());
+    bytes.extend(point[1].to_le_bytes());
+    bytes
+}
+
+/// The `geo` key of GeoParquet 1.1.0.
+fn geo_metadata(points: &[[f64; 2]]) -> Value {
+    let mut column = json!({
+        "encoding": "WKB",
+        "geometry_types": ["Point"],
+        "crs": mars_sphere(),
+        "edges": "spherical",
+    });
+    if let Some(bounds) = bounding_box_deg(points) {
+        column["bbox"] = json!(bounds);
+    }
+    json!({
+        "version": "1.1.0",
+        "primary_column": "geometry",
+        "columns": { "geometry": column },
+    })
+}
+
+/// PROJJSON of `IAU_2015:49900`; coordinates are (longitude, latitude) all the same, as GeoParquet says.
+///
+/// Source: IAU coordinate systems of the OGC Planetary working group, radius of Archinal et al. 2018.
+fn mars_sphere() -> Value {
+    let axis = |name: &str, abbreviation: &str, direction: &str| json!({ "name": name, "abbreviation": abbreviation, "direction": direction, "unit": "degree" });
+    json!({
+        "$schema": "https://proj.org/schemas/v0.7/projjson.schema.json",
+        "type": "GeographicCRS",
+        "name": "Mars (2015) - Sphere / Ocentric",
+        "datum": {
+            "type": "GeodeticReferenceFrame",
+            "name": "Mars (2015) - Sphere",
+            "anchor": "Viking 1 lander: 47.95137 W",
+            "ellipsoid": { "name": "Mars (2015) - Sphere", "radius": 3_396_190 },
+            "prime_meridian": { "name": "Reference Meridian", "longitude": 0 },
+        },
+        "coordinate_system": {
+            "subtype": "ellipsoidal",
+            "axis": [
+                axis("Geodetic latitude", "Lat", "north"),
+                axis("Geodetic longitude", "Lon", "east"),
+            ],
+        },
+        "id": { "authority": "IAU", "code": 49900, "version": 2015 },
+    })
+}

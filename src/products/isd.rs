@@ -1,0 +1,293 @@
+//! Image support data of a MOC narrow-angle image for the Community Sensor Model, as `usgscsm` reads it.
+//!
+//! Keys and nesting are those of ALE's image support data. Where ALE's file for MOC does not say what
+//! the camera does, the numbers here are those that make `usgscsm` see the right pixel at the right time:
+//!
+//! * `line_scan_rate` holds the period of an *image* line. `usgscsm` computes
+//!   `t = start + rate · (line − 0.5 + 0.5)` with image lines and never multiplies by the summing
+//!   (`UsgsAstroLsSensorModel::getImageTime`); ALE writes the exposure of one detector line.
+//! * `usgscsm` puts the centre of the first sample at 0.5 and computes the detector coordinate
+//!   `sample · summing + starting_detector_sample − detector_center.sample`. With the edge of the detector
+//!   at 0 the centre lies at 2048 / 2 = 1024; ALE's 1023.5 with a start of 1 is off by 1.5 pixels.
+//! * The line of the detector is taken at coordinate 0, so its centre is 0 (`losToEcf`; ISIS sets 0 too).
+//! * Distortion is zero, as the instrument kernel says. ALE repeats the pixel pitch in these places, which
+//!   `usgscsm` takes for radial coefficients per mm² and mm⁴: wrong by hundreds of pixels at the edges.
+
+use std::collections::BTreeMap;
+
+use serde::Serialize;
+use serde_json::{Value, json};
+
+use super::{
+    Writer,
+    files::write_json,
+    site::{ImageProducts, SiteProducts},
+};
+use crate::{
+    constants::{
+        MARS_IAU2000, MOC_NA_DETECTORS, MOC_NA_FOCAL_LENGTH_MM, MOC_NA_PIXEL_PITCH_MM,
+        NAIF_IAU_MARS, NAIF_MARS, NAIF_MGS_BUS, NAIF_MOC_NA,
+    },
+    error::Result,
+    stages::{sample_orientation::CameraTables, tag_times::ImageTimes},
+    units::METRES_PER_KM,
+};
+
+/// J2000 in NAIF's numbering of inertial frames.
+const NAIF_J2000: i32 = 1;
+/// Height that camera models try when they look for the ground, metres above and below the ellipsoid (ALE's).
+const REFERENCE_HEIGHT_M: i32 = 1_000;
+
+#[derive(Serialize)]
+#[allow(clippy::struct_field_names, reason = "the keys that usgscsm reads")]
+struct Isd {
+    isis_camera_version: u32,
+    image_identifier: String,
+    image_lines: u32,
+    image_samples: u32,
+    name_platform: &'static str,
+    name_sensor: &'static str,
+    reference_height: Value,
+    name_model: &'static str,
+    interpolation_method: &'static str,
+    line_scan_rate: [[f64; 3]; 1],
+    starting_ephemeris_time: f64,
+    center_ephemeris_time: f64,
+    radii: Value,
+    body_rotation: Rotation,
+    instrument_pointing: Rotation,
+    naif_keywords: Value,
+    detector_sample_summing: u32,
+    detector_line_summing: u32,
+    focal_length_model: Value,
+    detector_center: Value,
+    focal2pixel_lines: [f64; 3],
+    focal2pixel_samples: [f64; 3],
+    optical_distortion: Value,
+    starting_detector_line: u32,
+    starting_detector_sample: u32,
+    instrument_position: Positions,
+    sun_position: Positions,
+    kernels: BTreeMap<String, Vec<String>>,
+    areograph: Value,
+}
+
+/// Quaternions (w, x, y, z) from J2000.
+#[derive(Serialize)]
+#[allow(clippy::struct_field_names, reason = "the keys that usgscsm reads")]
+struct Rotation {
+    time_dependent_frames: [i32; 2],
+    ck_table_start_time: f64,
+    ck_table_end_time: f64,
+    ck_table_original_size: usize,
+    ephemeris_times: Vec<f64>,
+    quaternions: Vec<[f64; 4]>,
+    angular_velocities: Vec<[f64; 3]>,
+    reference_frame: i32,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    constant_frames: Option<[i32; 2]>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    constant_rotation: Option<Vec<f64>>,
+}
+
+/// Kilometres and kilometres per second from the centre of Mars, J2000.
+#[derive(Serialize)]
+#[allow(clippy::struct_field_names, reason = "the keys that usgscsm reads")]
+struct Positions {
+    spk_table_start_time: f64,
+    spk_table_end_time: f64,
+    spk_table_original_size: usize,
+    ephemeris_times: Vec<f64>,
+    positions: Vec<[f64; 3]>,
+    velocities: Vec<[f64; 3]>,
+    reference_frame: i32,
+}
+
+pub(super) fn write(
+    written: &mut Writer,
+    site: &SiteProducts,
+    image: &ImageProducts,
+) -> Result<()> {
+    written.add(format!("images/{}/isd.json", image.times.id), |path| {
+        write_json(path, &isd(site, image))?;
+        Ok(image.orientation.tables.et_s.len() as u64)
+    })
+}
+
+fn isd(site: &SiteProducts, image: &ImageProducts) -> Isd {
+    let times = image.times;
+    let tables = &image.orientation.tables;
+    let start_s = times.start.seconds();
+    // Of the delivered lines: camera models know no others.
+    let half_s = 0.5 * f64::from(times.lines_delivered) * times.line_period_s;
+    let pixels_per_mm = MOC_NA_PIXEL_PITCH_MM.recip();
+    Isd {
+        isis_camera_version: 1,
+        image_identifier: times.id.clone(),
+        image_lines: times.lines_delivered,
+        image_samples: times.samples,
+        name_platform: "MARS GLOBAL SURVEYOR",
+        name_sensor: "MGS_MOC_NA",
+        reference_height: json!({
+            "maxheight": REFERENCE_HEIGHT_M, "minheight": -REFERENCE_HEIGHT_M, "unit": "m",
+        }),
+        name_model: "USGS_ASTRO_LINE_SCANNER_SENSOR_MODEL",
+        interpolation_method: "lagrange",
+        line_scan_rate: [[0.5, -half_s, times.line_period_s]],
+        starting_ephemeris_time: start_s,
+        center_ephemeris_time: start_s + half_s,
+        radii: json!({
+            "semimajor": MARS_IAU2000.equatorial_radius_m / METRES_PER_KM,
+            "semiminor": MARS_IAU2000.polar_radius_m / METRES_PER_KM,
+            "unit": "km",
+        }),
+        body_rotation: body_rotation(tables),
+        instrument_pointing: instrument_pointing(tables),
+        naif_keywords: naif_keywords(site),
+        detector_sample_summing: times.crosstrack_summing,
+        detector_line_summing: times.downtrack_summing,
+        focal_length_model: json!({ "focal_length": MOC_NA_FOCAL_LENGTH_MM }),
+        detector_center: json!({ "line": 0.0, "sample": f64::from(MOC_NA_DETECTORS) / 2.0 }),
+        focal2pixel_lines: [0.0, pixels_per_mm, 0.0],
+        focal2pixel_samples: [0.0, 0.0, pixels_per_mm],
+        optical_distortion: json!({ "radial": { "coefficients": [0.0, 0.0, 0.0] } }),
+        starting_detector_line: 0,
+        starting_detector_sample: times.first_detector,
+        instrument_position: positions(&tables.et_s, &tables.position_m, &tables.velocity_m_s),
+        sun_position: sun_position(tables),
+        kernels: kernels(site),
+        areograph: provenance(site, times),
+    }
+}
+
+fn rotation(
+    tables: &CameraTables,
+    frame: i32,
+    quaternions: &[[f64; 4]],
+    rates: &[[f64; 3]],
+) -> Rotation {
+    let (start, end) = ends(&tables.et_s);
+    Rotation {
+        time_dependent_frames: [frame, NAIF_J2000],
+        ck_table_start_time: start,
+        ck_table_end_time: end,
+        ck_table_original_size: tables.et_s.len(),
+        ephemeris_times: tables.et_s.clone(),
+        quaternions: quaternions.to_vec(),
+        angular_velocities: rates.to_vec(),
+        reference_frame: NAIF_J2000,
+        constant_frames: None,
+        constant_rotation: None,
+    }
+}
+
+fn body_rotation(tables: &CameraTables) -> Rotation {
+    rotation(
+        tables,
+        NAIF_IAU_MARS,
+        &tables.inertial_to_mars,
+        &tables.mars_angular_velocity_rad_s,
+    )
+}
+
+fn instrument_pointing(tables: &CameraTables) -> Rotation {
+    Rotation {
+        constant_frames: Some([NAIF_MOC_NA, NAIF_MGS_BUS]),
+        constant_rotation: Some(tables.bus_to_camera.concat()),
+        ..rotation(
+            tables,
+            NAIF_MGS_BUS,
+            &tables.inertial_to_bus,
+            &tables.bus_angular_velocity_rad_s,
+        )
+    }
+}
+
+fn positions(et_s: &[f64], position_m: &[[f64; 3]], velocity_m_s: &[[f64; 3]]) -> Positions {
+    let km = |rows: &[[f64; 3]]| {
+        rows.iter()
+            .map(|row| row.map(|value| value / METRES_PER_KM))
+            .collect()
+    };
+    let (start, end) = ends(et_s);
+    Positions {
+        spk_table_start_time: start,
+        spk_table_end_time: end,
+        spk_table_original_size: et_s.len(),
+        ephemeris_times: et_s.to_vec(),
+        positions: km(position_m),
+        velocities: km(velocity_m_s),
+        reference_frame: NAIF_J2000,
+    }
+}
+
+/// The Sun at the first and the last epoch.
+fn sun_position(tables: &CameraTables) -> Positions {
+    let (start, end) = ends(&tables.et_s);
+    positions(
+        &[start, end],
+        &tables.sun_position_m,
+        &tables.sun_velocity_m_s,
+    )
+}
+
+/// First and last epoch; tables are never empty.
+fn ends(et_s: &[f64]) -> (f64, f64) {
+    (
+        et_s.first().copied().unwrap_or_default(),
+        et_s.last().copied().unwrap_or_default(),
+    )
+}
+
+/// The keywords that the numbers above come from, under NAIF's names.
+fn naif_keywords(site: &SiteProducts) -> Value {
+    let mars = MARS_IAU2000;
+    let [a_km, c_km] =
+        [mars.equatorial_radius_m, mars.polar_radius_m].map(|radius_m| radius_m / METRES_PER_KM);
+    json!({
+        "BODY_CODE": NAIF_MARS,
+        "BODY_FRAME_CODE": NAIF_IAU_MARS,
+        "BODY499_RADII": [a_km, a_km, c_km],
+        "BODY499_POLE_RA": [mars.pole_ra_deg, mars.pole_ra_deg_per_century, 0.0],
+        "BODY499_POLE_DEC": [mars.pole_dec_deg, mars.pole_dec_deg_per_century, 0.0],
+        "BODY499_PM": [mars.meridian_deg, mars.meridian_deg_per_day, 0.0],
+        "INS-94031_FOCAL_LENGTH": MOC_NA_FOCAL_LENGTH_MM,
+        "INS-94031_PIXEL_PITCH": MOC_NA_PIXEL_PITCH_MM,
+        "INS-94031_PIXEL_SAMPLES": MOC_NA_DETECTORS,
+        "INS-94031_CK_TIME_BIAS": site.config.pointing.ck_bias.seconds(),
+        "INS-94031_SPK_TIME_BIAS": 0.0,
+    })
+}
+
+/// Kernel names by role, in load order, as ALE lists them.
+fn kernels(site: &SiteProducts) -> BTreeMap<String, Vec<String>> {
+    let mut kernels: BTreeMap<String, Vec<String>> = BTreeMap::new();
+    for kernel in site.kernels {
+        kernels
+            .entry(kernel.role.clone())
+            .or_default()
+            .push(kernel.name.clone());
+    }
+    kernels
+}
+
+/// What the reader of this file should know; camera models ignore it.
+fn provenance(site: &SiteProducts, times: &ImageTimes) -> Value {
+    json!({
+        "version": env!("CARGO_PKG_VERSION"),
+        "site": site.config.site,
+        "line_period_s": times.line_period_s,
+        "detector_line_exposure_s": times.exposure_s,
+        "lines_header": times.lines_header,
+        "utc_start": times.utc_start,
+        "notes": [
+            "line_scan_rate: seconds per image line (summing included), from the top edge of the first line",
+            "detector coordinates count from the detector's edge: centre at sample 1024, starting_detector_sample \
+             from 0, so that the centre of the first sample is 0.5 * summing + starting_detector_sample",
+            "optical_distortion: none, as the instrument kernel says",
+            "instrument_position: light time and stellar aberration corrected (LT+S), as in ISIS and ALE",
+            "instrument_pointing: attitude of each epoch read from the C-kernel at epoch + INS-94031_CK_TIME_BIAS",
+            "image_lines: delivered lines; lines_header were exposed",
+        ],
+    })
+}

@@ -1,0 +1,87 @@
+//! Rows become the files that people's tools read; every file is read back before it counts.
+//!
+//! | file | for |
+//! |---|---|
+//! | `footprints.parquet`, `.csv`, `.geojson` | GIS and scripts: shots in the windows, IAU 2000 |
+//! | `ranges.parquet`, `ranges.json` | range residuals per shot; statistics per profile |
+//! | `images/<id>/orientation.parquet`, `.json` | orientation samples; polynomials with residuals |
+//! | `images/<id>/isd.json` | camera models of the Community Sensor Model (`usgscsm`) |
+//! | `exchange/…` | ISIS and Ames Stereo Pipeline |
+//! | `report/index.html` | people |
+//!
+//! The same site gives the same bytes; nothing here looks at a clock.
+
+mod coordinates;
+mod exchange;
+pub(crate) mod fault;
+mod files;
+mod footprints;
+mod geojson;
+mod isd;
+mod orientation;
+mod parquet;
+mod ranges;
+mod site;
+mod table;
+mod text_table;
+
+use std::path::{Path, PathBuf};
+
+pub use site::{ImageProducts, KernelLine, SiteProducts};
+
+use crate::{error::Result, report};
+
+/// A file that was written.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Product {
+    /// Path below the site's folder, for example `images/m0402852/isd.json`.
+    pub path: PathBuf,
+    /// What the file has of what it is about: shots, samples, profiles, table nodes; 0 for plain text.
+    pub rows: u64,
+}
+
+/// Writes every product of `site` below `directory` and reads each of them back.
+///
+/// # Errors
+/// [`Kind::Io`](crate::error::Kind::Io) for what the disk refuses; [`Kind::Bug`](crate::error::Kind::Bug)
+/// for numbers that are not finite, inputs that do not belong together and files that read back
+/// differently.
+pub fn write_products(directory: &Path, site: &SiteProducts) -> Result<Vec<Product>> {
+    site.check()?;
+    let mut written = Writer {
+        directory,
+        products: Vec::new(),
+    };
+    footprints::write(&mut written, site)?;
+    ranges::write(&mut written, site)?;
+    for image in site.images {
+        orientation::write(&mut written, image)?;
+        isd::write(&mut written, site, image)?;
+    }
+    exchange::write(&mut written, site)?;
+    written.add("report/index.html", |path| {
+        files::write_text(path, &report::page(site)?)?;
+        Ok(0)
+    })?;
+    Ok(written.products)
+}
+
+/// Where products go, and what has been written.
+struct Writer<'a> {
+    directory: &'a Path,
+    products: Vec<Product>,
+}
+
+impl Writer<'_> {
+    /// Writes the product at `path` by a function that returns its rows.
+    fn add(
+        &mut self,
+        path: impl Into<PathBuf>,
+        write: impl FnOnce(&Path) -> Result<u64>,
+    ) -> Result<()> {
+        let path = path.into();
+        let rows = write(&self.directory.join(&path))?;
+        self.products.push(Product { path, rows });
+        Ok(())
+    }
+}
