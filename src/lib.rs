@@ -3,14 +3,19 @@
 //!
 //! The way of the data is [`flow::run_site`], read top to bottom; `ARCHITECTURE.md` is the map.
 
+pub mod cli;
 pub mod config;
 pub mod constants;
 pub mod error;
+pub mod flow;
 pub mod footprints;
 pub mod frames;
 pub mod geom;
 pub mod pds;
+pub mod products;
 pub mod scene;
 pub mod spice;
+pub mod stages;
+pub mod store;
 pub mod time;
 pub mod units;

@@ -1,5 +1,6 @@
 //! The way of the data: kernels → times → footprints → IAU 2000 → ranges → orientation → model → products.
 
+mod check;
 mod parts;
 mod plan;
 mod publish;
@@ -24,6 +25,7 @@ use crate::{
     time::{Interval, Intervals},
 };
 
+pub use check::{Checked, check_site};
 pub use plan::{PlannedStage, plan_site};
 
 /// The tabulated trajectory stays this close to the kernels, metres: a tenth of a PEDR centimetre.

@@ -117,7 +117,7 @@ fn with_kernels(mut parts: Parts, kernels: &KernelSet, wanted: fn(KernelRole) ->
     for kernel in kernels.kernels().iter().filter(|kernel| wanted(kernel.role)) {
         place += 1;
         let value = format!("{place}: {}", kernel.blake3);
-        parts = parts.file("kernel", &kernel.name(), &value);
+        parts = parts.file("kernel", &kernel.file_name(), &value);
     }
     parts
 }

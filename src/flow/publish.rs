@@ -124,6 +124,7 @@ fn make_products(folder: &Path, results: &Results<'_>, fingerprint: String) -> R
         .collect();
     let complaints: Vec<String> =
         results.found.value.complaints.iter().map(ToString::to_string).collect();
+    let rejected = results.rejected();
     let staging = staging(folder)?;
     let mut files: Vec<(std::path::PathBuf, u64)> = write_products(
         &staging,
@@ -135,7 +136,7 @@ fn make_products(folder: &Path, results: &Results<'_>, fingerprint: String) -> R
             utc: &utc,
             profiles: &results.profiles.value,
             ranges: &results.ranges.value,
-            rejected: &results.found.value.rejected,
+            rejected: &rejected,
             complaints: &complaints,
             notes: &notes,
         },
@@ -198,6 +199,11 @@ impl Results<'_> {
         notes
     }
 
+    fn rejected(&self) -> BTreeMap<String, u64> {
+        let rejected = self.found.value.rejected.iter();
+        rejected.map(|(reason, count)| (reason.to_string(), *count)).collect()
+    }
+
     fn verdict(&self) -> Verdict {
         let profiles = self.ranges.value.profiles.iter().flat_map(|profile| {
             let reasons = profile.invalid_because.iter();
@@ -258,7 +264,7 @@ impl Results<'_> {
             stages,
             products,
             counts,
-            rejected: found.rejected.clone(),
+            rejected: self.rejected(),
             complaints: Complaints {
                 count: found.complaint_counts.values().sum(),
                 texts: complaints.iter().take(COMPLAINTS_QUOTED).cloned().collect(),
@@ -300,7 +306,7 @@ fn kernel_entries(session: &Session, results: &Results<'_>) -> Result<Vec<Kernel
         .map(|(index, kernel)| {
             let own = coverage.per_kernel.iter().find(|(of, _)| *of == index);
             KernelEntry {
-                name: kernel.name(),
+                name: kernel.file_name(),
                 role: kernel.role.to_string(),
                 bytes: kernel.bytes,
                 blake3: kernel.blake3.clone(),

@@ -90,9 +90,9 @@ fn note(path: &std::path::Path, datum: MarsDatum, turn_s: Option<f64>) -> String
     match (datum, turn_s) {
         (MarsDatum::Iau2000, None) => format!("{name}: in IAU 2000 already, not converted"),
         (datum, None) => format!("{name}: {datum} to IAU 2000 at each shot's time tag"),
-        (datum, Some(turn_s)) => format!(
-            "{name}: out of {datum} at the time tag, into IAU 2000 {turn_s:+.3} s later"
-        ),
+        (datum, Some(turn_s)) => {
+            format!("{name}: out of {datum} at the time tag, into IAU 2000 {turn_s:+.3} s later")
+        }
     }
 }
 
@@ -152,8 +152,12 @@ mod tests {
         let converted =
             convert_datum(footprints(MarsDatum::Iau1991), &clock(BiasScope::SpkLookup)).footprints;
         // CSPICE N0067 with a PCK of the 1991 and one of the 2000 constants; 1e-9 rad is 3 mm.
-        assert!((converted.longitude_rad[0] - 318.237_630_071_608_63 * RADIANS_PER_DEGREE).abs() < 1e-9);
-        assert!((converted.latitude_rad[0] + 13.400_493_296_569_078 * RADIANS_PER_DEGREE).abs() < 1e-9);
+        assert!(
+            (converted.longitude_rad[0] - 318.237_630_071_608_63 * RADIANS_PER_DEGREE).abs() < 1e-9
+        );
+        assert!(
+            (converted.latitude_rad[0] + 13.400_493_296_569_078 * RADIANS_PER_DEGREE).abs() < 1e-9
+        );
         assert!((converted.spacecraft_longitude_rad[0] - converted.longitude_rad[0]).abs() < 1e-15);
     }
 
@@ -162,7 +166,10 @@ mod tests {
         let before = footprints(MarsDatum::Iau2000);
         let after = convert_datum(before.clone(), &clock(BiasScope::SpkLookup));
         assert_eq!(after.footprints, before.declare());
-        assert_eq!(after.notes, ["ap18933k.b: in IAU 2000 already, not converted"]);
+        assert_eq!(
+            after.notes,
+            ["ap18933k.b: in IAU 2000 already, not converted"]
+        );
     }
 
     #[test]
@@ -170,6 +177,9 @@ mod tests {
         let after = convert_datum(footprints(MarsDatum::Iau2000), &clock(BiasScope::Both));
         let turned_rad = wrap_pi(after.footprints.longitude_rad[0] - 318.0 * RADIANS_PER_DEGREE);
         // 350.89198 deg/day x 0.117 s = 4.7517e-4 deg; entering at an earlier time, longitudes grow.
-        assert!((turned_rad / RADIANS_PER_DEGREE - 4.7517e-4).abs() < 1e-8, "{turned_rad}");
+        assert!(
+            (turned_rad / RADIANS_PER_DEGREE - 4.7517e-4).abs() < 1e-8,
+            "{turned_rad}"
+        );
     }
 }

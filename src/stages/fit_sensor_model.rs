@@ -71,9 +71,8 @@ impl RotationVectorModel {
     /// Rotation from Mars-fixed to camera components at `x` lines from the middle.
     #[must_use]
     pub fn mars_to_camera(&self, x: f64) -> Matrix3<f64> {
-        let vector = Vector3::from_iterator(
-            self.vector_rad.iter().map(|fit| fit.polynomial.value(x)),
-        );
+        let vector =
+            Vector3::from_iterator(self.vector_rad.iter().map(|fit| fit.polynomial.value(x)));
         let reference = Matrix3::from_fn(|row, column| self.reference[row][column]);
         crate::geom::attitude::matrix_of_rotation_vector(&vector) * reference
     }
@@ -81,7 +80,9 @@ impl RotationVectorModel {
 
 /// Samples that do not determine the polynomials.
 #[derive(Debug, thiserror::Error)]
-#[error("image {image}: {samples} orientation samples do not determine a polynomial of order {order}")]
+#[error(
+    "image {image}: {samples} orientation samples do not determine a polynomial of order {order}"
+)]
 struct Undetermined {
     image: String,
     samples: usize,
@@ -151,8 +152,7 @@ fn euler_model(orientation: &Orientation, order: usize) -> Result<EulerModel> {
             .collect();
         fit(orientation, &values, order)
     })?;
-    let pick: [fn(&OmegaPhiKappa) -> f64; 3] =
-        [|a| a.omega_rad, |a| a.phi_rad, |a| a.kappa_rad];
+    let pick: [fn(&OmegaPhiKappa) -> f64; 3] = [|a| a.omega_rad, |a| a.phi_rad, |a| a.kappa_rad];
     let angles_rad = three(|angle| {
         let mut values: Vec<f64> = orientation
             .samples
@@ -184,7 +184,9 @@ fn rotation_vector_model(orientation: &Orientation) -> Result<RotationVectorMode
         fit(orientation, &values, 2)
     })?;
     Ok(RotationVectorModel {
-        reference: std::array::from_fn(|row| std::array::from_fn(|column| reference[(row, column)])),
+        reference: std::array::from_fn(|row| {
+            std::array::from_fn(|column| reference[(row, column)])
+        }),
         vector_rad,
     })
 }

@@ -59,9 +59,7 @@ pub fn group_profiles(
             .map(|(row, _)| row)
             .collect();
         // The sort is stable: shots with equal times stay in file order.
-        rows.sort_by(|a, b| {
-            footprints.et_s[*a as usize].total_cmp(&footprints.et_s[*b as usize])
-        });
+        rows.sort_by(|a, b| footprints.et_s[*a as usize].total_cmp(&footprints.et_s[*b as usize]));
         let crossings = rows.chunk_by(|a, b| {
             let (a, b) = (*a as usize, *b as usize);
             footprints.orbit[a] == footprints.orbit[b]

@@ -110,13 +110,7 @@ pub fn sample_orientation(
     pointing: &PointingConfig,
     sampling: &OrientationConfig,
 ) -> Result<Orientation> {
-    let exposures = image.exposures();
-    session.require_position(exposures.padded(kernels.padding_s))?;
-    session.require_attitude(
-        exposures.padded(kernels.padding_s),
-        pointing.ck_bias,
-        kernels.ck_tolerance_s,
-    )?;
+    require_coverage(session, image, kernels, pointing)?;
     let reader = Reader {
         session,
         pointing,
@@ -138,17 +132,43 @@ pub fn sample_orientation(
     })
 }
 
+/// Checks that position and attitude are covered over the image with its padding.
+///
+/// What is asked is what will be read: attitude at the exposures shifted by the pointing bias.
+///
+/// # Errors
+/// A gap, named with its ends and the kernels beside it.
+pub fn require_coverage(
+    session: &Session,
+    image: &ImageTimes,
+    kernels: &KernelsConfig,
+    pointing: &PointingConfig,
+) -> Result<()> {
+    let exposures = image.exposures();
+    session.require_position(exposures.padded(kernels.padding_s))?;
+    // Within the tolerance a look-up reaches beyond the kernel's intervals.
+    let padding_s = kernels.padding_s - kernels.ck_tolerance_s;
+    session.require_attitude(exposures, pointing.ck_bias, padding_s)
+}
+
 /// Epochs of the camera tables: uniform, both image ends on the grid, beyond them within the padding.
 fn table_epochs(image: &ImageTimes, padding_s: f64) -> Vec<Et> {
     let duration_s = image.duration_s();
-    let steps = image.lines_header.div_ceil(TABLE_LINES).max(TABLE_NODES_MIN - 1);
+    let steps = image
+        .lines_header
+        .div_ceil(TABLE_LINES)
+        .max(TABLE_NODES_MIN - 1);
     let step_s = duration_s / f64::from(steps);
     let beyond = (1..=TABLE_NODES_BEYOND)
         .take_while(|nodes| f64::from(*nodes) * step_s <= padding_s)
         .last()
         .unwrap_or(0);
     (0..=steps + 2 * beyond)
-        .map(|k| image.start.plus((f64::from(k) - f64::from(beyond)) * step_s))
+        .map(|k| {
+            image
+                .start
+                .plus((f64::from(k) - f64::from(beyond)) * step_s)
+        })
         .collect()
 }
 
@@ -182,7 +202,10 @@ impl Reader<'_> {
     /// Tables at two or more epochs.
     fn tables(&self, epochs: &[Et]) -> Result<CameraTables> {
         let [first, last] = [epochs[0], epochs[epochs.len() - 1]];
-        let suns = [self.session.sun_state(first)?, self.session.sun_state(last)?];
+        let suns = [
+            self.session.sun_state(first)?,
+            self.session.sun_state(last)?,
+        ];
         let mut tables = CameraTables {
             et_s: Vec::new(),
             position_m: Vec::new(),

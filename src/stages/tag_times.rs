@@ -174,7 +174,10 @@ impl Fault for ImageFault {
 /// # Errors
 /// An unreadable label, a missing key, values that contradict each other, a time no kernel can convert.
 pub fn tag_times(images: &[ImageConfig], session: &Session) -> Result<Vec<ImageTimes>> {
-    images.iter().map(|image| tag_image(image, session)).collect()
+    images
+        .iter()
+        .map(|image| tag_image(image, session))
+        .collect()
 }
 
 fn tag_image(image: &ImageConfig, session: &Session) -> Result<ImageTimes> {
@@ -267,8 +270,16 @@ fn merged(written: &ImageFields, label: ImageFields, notes: &mut Vec<String>) ->
         };
     }
     merge!(
-        sclk_start, utc_start, exposure_s, line_period_s, downtrack_summing, crosstrack_summing,
-        lines_header, lines_delivered, samples, first_detector
+        sclk_start,
+        utc_start,
+        exposure_s,
+        line_period_s,
+        downtrack_summing,
+        crosstrack_summing,
+        lines_header,
+        lines_delivered,
+        samples,
+        first_detector
     )
 }
 

@@ -26,7 +26,9 @@ pub fn write(path: &Path, bytes: &[u8]) -> Result<()> {
         .write_all(bytes)
         .and_then(|()| temporary.as_file().sync_all());
     written.map_err(IoFault::on("write")).in_file(path)?;
-    make_readable(temporary.as_file()).map_err(IoFault::on("set permissions of")).in_file(path)?;
+    make_readable(temporary.as_file())
+        .map_err(IoFault::on("set permissions of"))
+        .in_file(path)?;
     temporary
         .persist(path)
         .map_err(|error| IoFault::on("rename into place")(error.error))
@@ -70,7 +72,9 @@ pub fn sync_folder(folder: &Path) {
 /// The file cannot be read.
 pub fn hash_file(path: &Path) -> Result<(String, u64)> {
     let mut hasher = blake3::Hasher::new();
-    let file = File::open(path).map_err(IoFault::on("open")).in_file(path)?;
+    let file = File::open(path)
+        .map_err(IoFault::on("open"))
+        .in_file(path)?;
     let bytes = std::io::copy(&mut &file, &mut hasher)
         .map_err(IoFault::on("read"))
         .in_file(path)?;

@@ -44,9 +44,7 @@ impl SiteLock {
         match file.try_lock() {
             Ok(()) => Ok(Self { _file: file }),
             Err(TryLockError::WouldBlock) => Err(Busy).in_file(folder),
-            Err(TryLockError::Error(error)) => {
-                Err(IoFault::on("lock")(error)).in_file(&path)
-            }
+            Err(TryLockError::Error(error)) => Err(IoFault::on("lock")(error)).in_file(&path),
         }
     }
 }

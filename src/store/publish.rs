@@ -76,7 +76,10 @@ pub fn publish(
             .in_file(&target)?;
     }
     for product in earlier.map_or(&[][..], |manifest| &manifest.products) {
-        let still_made = manifest.products.iter().any(|made| made.path == product.path);
+        let still_made = manifest
+            .products
+            .iter()
+            .any(|made| made.path == product.path);
         let path = site_folder.join(&product.path);
         if !still_made && path.exists() {
             fs::remove_file(&path)

@@ -1,4 +1,7 @@
-//! Where the real data of the oracle tests lie.
+//! What several tests share: the real data, and the synthetic mission.
+#![allow(dead_code, reason = "each test program uses a part of this module")]
+
+pub(crate) mod mission;
 
 use std::path::{Path, PathBuf};
 

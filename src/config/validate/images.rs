@@ -83,14 +83,14 @@ fn fields(keys: &RawImage, review: &mut Review<'_>) -> ImageFields {
     ImageFields {
         sclk_start: checked(
             "images.sclk_start",
-            &keys.sclk_start,
+            keys.sclk_start.as_ref(),
             is_clock_string,
             "a spacecraft clock `seconds:ticks` with ticks below 256, such as 619971158:028",
             review,
         ),
         utc_start: checked(
             "images.utc_start",
-            &keys.utc_start,
+            keys.utc_start.as_ref(),
             is_utc_string,
             "UTC such as 1999-08-24T14:12:13.64 or 1999-236T14:12:13.64",
             review,
@@ -139,12 +139,12 @@ fn fields(keys: &RawImage, review: &mut Review<'_>) -> ImageFields {
 /// The text of `key` when `accept` takes it.
 fn checked(
     key: &str,
-    raw: &Entry<String>,
+    raw: Option<&Spanned<String>>,
     accept: fn(&str) -> bool,
     expected: &str,
     review: &mut Review<'_>,
 ) -> Option<String> {
-    let raw = raw.as_ref()?;
+    let raw = raw?;
     if accept(raw.get_ref()) {
         return Some(raw.get_ref().clone());
     }

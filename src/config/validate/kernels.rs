@@ -5,7 +5,11 @@ use std::collections::BTreeSet;
 use toml::Spanned;
 
 use super::{
-    super::{problems::Review, raw::RawKernels, site::*},
+    super::{
+        problems::Review,
+        raw::RawKernels,
+        site::{CkQuality, KernelSelection, KernelSource, KernelsConfig},
+    },
     values::{Accept, Target},
 };
 
@@ -28,11 +32,8 @@ pub(super) fn kernels(raw: Option<Spanned<RawKernels>>, review: &mut Review<'_>)
     ];
     let sources = given.iter().flatten().count();
     if sources == 0 {
-        review.missing(
-            table,
-            "kernels",
-            "exactly one of kernels.metakernel, kernels.files, kernels.root",
-        );
+        let expected = "exactly one of kernels.metakernel, kernels.files, kernels.root";
+        review.problem(table, format!("kernels has no source; expected {expected}"));
     } else if sources > 1 {
         let second = given.iter().flatten().max_by_key(|span| span.start);
         review.problem(

@@ -22,7 +22,10 @@ use crate::{
 use super::{
     problems::Review,
     raw::{RawMolaClock, RawOrientation, RawPointing, RawRangeCheck, RawSite},
-    site::*,
+    site::{
+        BiasScope, MolaClock, OrientationConfig, PointingConfig, RangeCheckConfig, SiteConfig,
+        TagSign,
+    },
 };
 use values::Accept;
 

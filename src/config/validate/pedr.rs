@@ -13,7 +13,7 @@ use super::{
     super::{
         problems::Review,
         raw::{RawFilter, RawPedr},
-        site::*,
+        site::{DatumChoice, PedrConfig, ShotFilter},
     },
     values::Accept,
 };
@@ -93,14 +93,17 @@ fn matches(folder: &Path, glob: &str) -> Result<Vec<PathBuf>, String> {
             "a glob without `**` and with wildcards in at most {WILD_PARTS_MAX} of its parts"
         ));
     }
+    let invalid =
+        |error: glob::PatternError| format!("a glob: {} at character {}", error.msg, error.pos + 1);
+    // Checked alone first, so that the position counts in what was written.
+    glob::Pattern::new(glob).map_err(invalid)?;
     let pattern = if Path::new(glob).is_absolute() {
         glob.to_owned()
     } else {
         let folder = glob::Pattern::escape(&folder.to_string_lossy());
         Path::new(&folder).join(glob).to_string_lossy().into_owned()
     };
-    let found = glob::glob(&pattern)
-        .map_err(|error| format!("a glob: {} at character {}", error.msg, error.pos + 1))?;
+    let found = glob::glob(&pattern).map_err(invalid)?;
     let mut files = Vec::new();
     for entry in found.take(FILES_MAX + 1) {
         let path = entry.map_err(|error| {

@@ -46,6 +46,10 @@ pub(super) enum Target {
     Folder,
 }
 
+#[allow(
+    clippy::ref_option,
+    reason = "entries are passed as the raw structs hold them"
+)]
 impl Review<'_> {
     /// The number of `key`, or nothing when it is absent or refused.
     pub(super) fn optional_number(
@@ -122,11 +126,7 @@ impl Review<'_> {
     /// An empty list says nothing, so it is a problem.
     pub(super) fn not_empty<T>(&mut self, key: &str, raw: &Spanned<Vec<T>>) {
         if raw.get_ref().is_empty() {
-            self.refuse(
-                raw.span(),
-                key,
-                "at least one entry (leave the key out for its default)",
-            );
+            self.refuse(raw.span(), key, "at least one entry");
         }
     }
 

@@ -4,13 +4,26 @@
 //! # Source
 //! PEDR SIS 2.8 as far as its format files are public, and the MOLA team's reader `pedr2tab`.
 
+mod check;
+mod complaint;
 mod encode;
+mod file;
+mod frame;
+mod frame_values;
+mod label;
 mod record;
 mod writer;
 
-pub use encode::{EncodeFault, FrameValues};
+pub use check::{Reason, RecordFault};
+pub use complaint::Complaint;
+pub use file::File;
+pub use frame::{FieldGuard, Frame};
+pub use frame_values::{EncodeFault, FrameValues};
+pub use label::{FileName, PedrLabel, decide_datum};
 pub use record::{RECORD_BYTES, Record};
 pub use writer::{LabelInfo, PedrWriter};
+
+use crate::units::RADIANS_PER_DEGREE;
 
 /// Shots in a frame.
 pub const SHOTS: usize = 20;
@@ -18,3 +31,5 @@ pub const SHOTS: usize = 20;
 pub const LABEL_RECORDS: usize = 10;
 /// Bytes that the attached label takes.
 pub const LABEL_BYTES: usize = LABEL_RECORDS * RECORD_BYTES;
+/// Unit of the parallax fields, radians per metre.
+const PARALLAX_UNIT_RAD_PER_M: f64 = RADIANS_PER_DEGREE * 1e-9;

@@ -109,12 +109,13 @@ pub fn check_ranges(
                 }
                 .into());
             };
-            shots.push(index, *row, &residuals::residuals(&shot, at, &position, &velocity_m_s));
+            shots.push(
+                index,
+                *row,
+                &residuals::residuals(&shot, at, &position, &velocity_m_s),
+            );
         }
-        let flags = outliers(
-            &shots.range_minus_distance_m[first..],
-            limits.outlier_sigma,
-        );
+        let flags = outliers(&shots.range_minus_distance_m[first..], limits.outlier_sigma);
         shots.outlier.extend(flags);
         let scan = scan::scan(footprints, &shots, first, trajectory, limits);
         checked.push(judged(profile, &shots, first, scan, footprints, limits));

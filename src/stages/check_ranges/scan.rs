@@ -20,6 +20,9 @@ use crate::{
 /// Fewest shots that make a scan worth reading.
 const SHOTS_MIN: usize = 10;
 
+/// Most steps on either side of zero.
+const STEPS_MAX: u32 = 10_000;
+
 /// Spread of range − distance against the assumed clock correction.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct BiasScan {
@@ -47,7 +50,11 @@ pub(super) fn scan(
         .filter(|shot| !shots.outlier[*shot])
         .map(|shot| {
             let footprint = footprints.row(shots.row[shot] as usize);
-            (footprint.et_tag_s, footprint.range_m, raw_footprint(&footprint))
+            (
+                footprint.et_tag_s,
+                footprint.range_m,
+                raw_footprint(&footprint),
+            )
         })
         .collect();
     if kept.len() < SHOTS_MIN {
@@ -71,7 +78,8 @@ pub(super) fn scan(
         // Corrections that lead out of the kernels are left out.
         if let Some(residuals) = residuals {
             scan.correction_s.push(correction_s);
-            scan.spread_m.push(Summary::of(&residuals).standard_deviation);
+            scan.spread_m
+                .push(Summary::of(&residuals).standard_deviation);
         }
     }
     refine(&mut scan, kept.len());
@@ -81,8 +89,7 @@ pub(super) fn scan(
 /// Corrections from `-half_width` to `+half_width`, symmetric about zero.
 fn corrections(limits: &RangeCheckConfig) -> impl Iterator<Item = f64> {
     let (half_width_s, step_s) = (limits.scan_half_width_s, limits.scan_step_s);
-    // The configuration limits the number of steps, so the loop is short.
-    let side: Vec<f64> = (1_u32..)
+    let side: Vec<f64> = (1..=STEPS_MAX)
         .map(|k| f64::from(k) * step_s)
         .take_while(|correction| *correction <= half_width_s * (1.0 + 1e-12))
         .collect();
@@ -92,8 +99,8 @@ fn corrections(limits: &RangeCheckConfig) -> impl Iterator<Item = f64> {
 
 /// Parabola through the three least variances: its minimum, and from its curvature the uncertainty.
 fn refine(scan: &mut BiasScan, shots: usize) {
-    let Some(least) = (0..scan.spread_m.len())
-        .min_by(|a, b| scan.spread_m[*a].total_cmp(&scan.spread_m[*b]))
+    let Some(least) =
+        (0..scan.spread_m.len()).min_by(|a, b| scan.spread_m[*a].total_cmp(&scan.spread_m[*b]))
     else {
         return;
     };

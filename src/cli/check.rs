@@ -1,0 +1,34 @@
+//! `areograph check`.
+
+use std::path::PathBuf;
+
+use clap::Args;
+
+use super::{load_sites, output};
+use crate::{error::Failure, flow::check_site};
+
+/// Checks configuration, files and kernel coverage; reports everything that a run would stumble over.
+#[derive(Debug, Args)]
+pub(super) struct Arguments {
+    /// Site files (TOML).
+    #[arg(required = true, value_name = "SITE.toml")]
+    sites: Vec<PathBuf>,
+}
+
+pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
+    let mut last = None;
+    for site in load_sites(&arguments.sites)? {
+        let checked = check_site(&site);
+        let word = if checked.failures.is_empty() { "ready" } else { "NOT READY" };
+        output::line(format_args!("{}: {word}", site.site));
+        for finding in checked.findings {
+            output::line(format_args!("  {finding}"));
+        }
+        for failure in checked.failures {
+            if let Some(earlier) = last.replace(failure) {
+                output::error(earlier);
+            }
+        }
+    }
+    last.map_or(Ok(()), Err)
+}

@@ -1,0 +1,115 @@
+//! `areograph kernels`.
+
+use std::path::PathBuf;
+
+use clap::{Args, Subcommand};
+use serde_json::json;
+
+use super::output;
+use crate::{
+    error::Failure,
+    spice::{KernelSet, Session},
+    time::Intervals,
+};
+
+/// Looks at kernels.
+#[derive(Debug, Args)]
+pub(super) struct Arguments {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Lists kernels in load order: role by content, size, hash, and why each is there.
+    List(Files),
+    /// Shows position and attitude coverage of Mars Global Surveyor, with the gaps inside.
+    Coverage(Files),
+}
+
+#[derive(Debug, Args)]
+struct Files {
+    /// One metakernel (.tm), or kernels in load order.
+    #[arg(required = true, value_name = "KERNEL")]
+    files: Vec<PathBuf>,
+    /// Answer in JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+impl Files {
+    fn load(&self) -> Result<KernelSet, Failure> {
+        match &self.files[..] {
+            [one] if one.extension().is_some_and(|e| e.eq_ignore_ascii_case("tm")) => {
+                KernelSet::from_metakernel(one)
+            }
+            files => KernelSet::from_files(files),
+        }
+    }
+}
+
+pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
+    match &arguments.command {
+        Command::List(files) => list(files),
+        Command::Coverage(files) => coverage(files),
+    }
+}
+
+fn list(files: &Files) -> Result<(), Failure> {
+    let kernels = files.load()?;
+    if files.json {
+        output::json(&json!({
+            "kernels": kernels.kernels(),
+            "explanation": kernels.explanation(),
+        }));
+        return Ok(());
+    }
+    for kernel in kernels.kernels() {
+        output::line(format_args!(
+            "{:5} {:>12} {}  {}",
+            kernel.role.to_string(),
+            kernel.bytes,
+            &kernel.blake3[..16],
+            kernel.path.display()
+        ));
+    }
+    for line in kernels.explanation() {
+        output::line(format_args!("# {line}"));
+    }
+    Ok(())
+}
+
+fn coverage(files: &Files) -> Result<(), Failure> {
+    let session = Session::open(&files.load()?)?;
+    let coverage = session.coverage()?;
+    if files.json {
+        output::json(&json!({ "position": coverage.spk, "attitude": coverage.ck }));
+        return Ok(());
+    }
+    for (what, intervals) in [("position", &coverage.spk), ("attitude", &coverage.ck)] {
+        output::line(format_args!("{what}:"));
+        print_intervals(&session, intervals)?;
+    }
+    Ok(())
+}
+
+fn print_intervals(session: &Session, intervals: &Intervals) -> Result<(), Failure> {
+    if intervals.as_slice().is_empty() {
+        output::line("  none");
+    }
+    let mut earlier: Option<f64> = None;
+    for interval in intervals.as_slice() {
+        if let Some(stop_s) = earlier {
+            let gap_s = interval.start.seconds() - stop_s;
+            output::line(format_args!("  -- gap of {gap_s:.3} s"));
+        }
+        output::line(format_args!(
+            "  {} .. {} UTC  ({:.3} s)",
+            session.et_to_utc(interval.start)?,
+            session.et_to_utc(interval.stop)?,
+            interval.duration_s()
+        ));
+        earlier = Some(interval.stop.seconds());
+    }
+    Ok(())
+}

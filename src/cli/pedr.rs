@@ -1,0 +1,100 @@
+//! `areograph pedr`.
+
+use std::{collections::BTreeMap, path::PathBuf};
+
+use clap::{Args, Subcommand};
+use serde_json::json;
+
+use super::output;
+use crate::{
+    error::Failure,
+    pds::pedr::{Complaint, FieldGuard, File},
+};
+
+/// Looks into PEDR files.
+#[derive(Debug, Args)]
+pub(super) struct Arguments {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Shows label, orbits, time span and everything that is wrong with each file.
+    Info {
+        /// PEDR files (AP#####v.B).
+        #[arg(required = true, value_name = "FILE")]
+        files: Vec<PathBuf>,
+        /// Answer in JSON.
+        #[arg(long)]
+        json: bool,
+    },
+}
+
+/// Complaints printed for a file; all are counted.
+const COMPLAINTS_PRINTED: usize = 20;
+
+pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
+    let Command::Info { files, json } = &arguments.command;
+    let mut answers = Vec::new();
+    for path in files {
+        let answer = info(&File::open(path)?);
+        if *json {
+            answers.push(answer);
+        } else {
+            print(&answer);
+        }
+    }
+    if *json {
+        output::json(&answers.into());
+    }
+    Ok(())
+}
+
+fn info(file: &File) -> serde_json::Value {
+    let guard = FieldGuard::new(file.label().software_version);
+    let mut complaints: Vec<Complaint> = file.label_complaints().to_vec();
+    let mut orbits: BTreeMap<u32, u64> = BTreeMap::new();
+    let mut span_s: Option<[f64; 2]> = None;
+    for (row, frame) in file.frames(0..file.records().len(), guard) {
+        if let Err(fault) = &frame {
+            complaints.push(file.record_complaint(row, fault));
+            continue;
+        }
+        let record = &file.records()[row];
+        *orbits.entry(record.orbit.get()).or_default() += 1;
+        let time_s = record.time_s.get();
+        span_s = Some(span_s.map_or([time_s; 2], |[first, _]| [first, time_s]));
+    }
+    complaints.extend(file.trailing_complaint());
+    let label = file.label();
+    json!({
+        "file": file.path(),
+        "version": file.name().map(|name| name.version),
+        "product_id": label.product_id,
+        "data_set_id": label.data_set_id,
+        "software_version": label.software_version,
+        "datum_in_label": label.datum,
+        "records": file.records().len(),
+        "good_records": orbits.values().sum::<u64>(),
+        "orbits": orbits.keys().collect::<Vec<_>>(),
+        "et_first_s": span_s.map(|[first, _]| first),
+        "et_last_s": span_s.map(|[_, last]| last),
+        "blake3": file.blake3(),
+        "complaints": complaints.iter().map(ToString::to_string).collect::<Vec<_>>(),
+    })
+}
+
+fn print(answer: &serde_json::Value) {
+    for (key, value) in answer.as_object().into_iter().flatten() {
+        match value.as_array() {
+            Some(texts) if key == "complaints" => {
+                output::line(format_args!("{key:18}{}", texts.len()));
+                for text in texts.iter().take(COMPLAINTS_PRINTED) {
+                    output::line(format_args!("  {}", text.as_str().unwrap_or_default()));
+                }
+            }
+            _ => output::line(format_args!("{key:18}{value}")),
+        }
+    }
+}

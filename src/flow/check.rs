@@ -1,0 +1,82 @@
+//! Configuration, files and kernel coverage of a site, without running it.
+
+use std::path::Path;
+
+use super::load_kernels;
+use crate::{
+    config::{DatumChoice, SiteConfig},
+    error::{Failure, Place, Result},
+    pds::pedr,
+    spice::Session,
+    stages::{sample_orientation::require_coverage, tag_times::tag_times},
+    time::Interval,
+};
+
+/// What a check found.
+#[derive(Debug, Default)]
+pub struct Checked {
+    /// What is well, one line each.
+    pub findings: Vec<String>,
+    /// What a run would stumble over; all of it, not only the first.
+    pub failures: Vec<Failure>,
+}
+
+impl Checked {
+    fn note(&mut self, result: Result<String>, config: &SiteConfig) {
+        match result.in_site(&config.site) {
+            Ok(finding) => self.findings.push(finding),
+            Err(failure) => self.failures.push(failure),
+        }
+    }
+}
+
+/// Checks kernels, image labels with their coverage, and PEDR labels of a site.
+#[must_use]
+pub fn check_site(config: &SiteConfig) -> Checked {
+    let mut checked = Checked::default();
+    for path in &config.pedr.files {
+        checked.note(check_pedr(path, config.pedr.datum), config);
+    }
+    if let Err(failure) = check_kernels(config, &mut checked) {
+        checked.failures.push(failure.in_site(&config.site));
+    }
+    checked
+}
+
+fn check_pedr(path: &Path, choice: DatumChoice) -> Result<String> {
+    let file = pedr::File::open(path)?;
+    let version = file.name().map(|name| name.version);
+    let datum = pedr::decide_datum(choice, version, file.label().datum).in_file(path)?;
+    let complaints: Vec<String> =
+        file.label_complaints().iter().map(|complaint| format!("; {}", complaint.text)).collect();
+    let frames = file.records().len();
+    Ok(format!("{}: {frames} frames in {datum}{}", path.display(), complaints.concat()))
+}
+
+fn check_kernels(config: &SiteConfig, checked: &mut Checked) -> Result<()> {
+    let clocks = load_kernels(config, &[])?;
+    let session = Session::open(&clocks)?;
+    let mut images = Vec::new();
+    for image in &config.images {
+        match tag_times(std::slice::from_ref(image), &session) {
+            Ok(mut times) => images.append(&mut times),
+            Err(failure) => checked.failures.push(failure.in_site(&config.site)),
+        }
+    }
+    drop(session);
+    let exposures: Vec<Interval> = images.iter().map(|image| image.exposures()).collect();
+    let kernels = load_kernels(config, &exposures)?;
+    checked.findings.extend(kernels.explanation().iter().cloned());
+    let session = Session::open(&kernels)?;
+    for image in &images {
+        let covered = require_coverage(&session, image, &config.kernels, &config.pointing);
+        let finding = covered.map(|()| {
+            format!(
+                "image {}: {} lines from {} UTC, position and attitude covered",
+                image.id, image.lines_header, image.utc_start
+            )
+        });
+        checked.note(finding, config);
+    }
+    Ok(())
+}

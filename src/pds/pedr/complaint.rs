@@ -1,0 +1,30 @@
+//! What is wrong with a file but does not stop it from being read.
+
+use std::{fmt, path::PathBuf};
+
+use serde::{Deserialize, Serialize};
+
+use super::Reason;
+
+/// One finding in a file; the rest of the file is kept.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Complaint {
+    /// The file.
+    pub file: PathBuf,
+    /// Record, counted from 1 with the label records; `None` when it concerns the whole file.
+    pub record: Option<u32>,
+    /// Reason code, for counts.
+    pub reason: Reason,
+    /// What was found and what was expected.
+    pub text: String,
+}
+
+impl fmt::Display for Complaint {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(formatter, "{}", self.file.display())?;
+        if let Some(record) = self.record {
+            write!(formatter, " record {record}")?;
+        }
+        write!(formatter, ": {}", self.text)
+    }
+}

@@ -1,0 +1,258 @@
+//! A PEDR file: its label, its records, and what is wrong with it.
+
+use std::{
+    fs,
+    ops::{Deref, Range},
+    path::{Path, PathBuf},
+};
+
+use memmap2::Mmap;
+
+use super::{
+    Complaint, FieldGuard, FileName, Frame, LABEL_BYTES, LABEL_RECORDS, PedrLabel, RECORD_BYTES,
+    Reason, Record, RecordFault, check::out_of_order,
+};
+use crate::error::{Fault, IoFault, Kind, Place, Result};
+
+/// A PEDR file, open for reading.
+#[derive(Debug)]
+pub struct File {
+    path: PathBuf,
+    bytes: Bytes,
+    name: Option<FileName>,
+    label: PedrLabel,
+    label_complaints: Vec<Complaint>,
+}
+
+#[derive(Debug)]
+enum Bytes {
+    Mapped(Mmap),
+    Owned(Vec<u8>),
+}
+
+impl Deref for Bytes {
+    type Target = [u8];
+
+    fn deref(&self) -> &[u8] {
+        match self {
+            Self::Mapped(map) => map,
+            Self::Owned(bytes) => bytes,
+        }
+    }
+}
+
+/// The path names something that cannot hold records.
+#[derive(Debug, thiserror::Error)]
+#[error("not a regular file")]
+struct NotAFile;
+
+impl Fault for NotAFile {
+    fn kind(&self) -> Kind {
+        Kind::Input
+    }
+
+    fn advice(&self) -> String {
+        "name PEDR files (AP#####v.B) in pedr.files, not folders or devices".to_owned()
+    }
+}
+
+impl File {
+    /// Opens a file by mapping it into memory, whatever its size.
+    ///
+    /// # Errors
+    /// The system's refusal; not a regular file. What is wrong inside is complained of, not refused.
+    pub fn open(path: &Path) -> Result<Self> {
+        // Asked before opening: opening a pipe would wait for its writer.
+        let metadata = fs::metadata(path)
+            .map_err(IoFault::on("open"))
+            .in_file(path)?;
+        if !metadata.is_file() {
+            return Err(NotAFile).in_file(path);
+        }
+        let file = fs::File::open(path)
+            .map_err(IoFault::on("open"))
+            .in_file(path)?;
+        #[allow(
+            unsafe_code,
+            reason = "an archive is searched where it lies, without a copy"
+        )]
+        // SAFETY: the map is read only and private to this value, every bit pattern is a valid record,
+        // and archive files are not written while they are read. Whoever truncates one nevertheless
+        // ends the process with SIGBUS, the usual price of a mapping; it cannot corrupt the file.
+        let map = unsafe { Mmap::map(&file) };
+        let map = map.map_err(IoFault::on("map")).in_file(path)?;
+        Ok(Self::new(Bytes::Mapped(map), path.to_owned()))
+    }
+
+    /// A file that is already in memory; `name` stands for its path.
+    #[must_use]
+    pub fn from_bytes(bytes: Vec<u8>, name: &Path) -> Self {
+        Self::new(Bytes::Owned(bytes), name.to_owned())
+    }
+
+    fn new(bytes: Bytes, path: PathBuf) -> Self {
+        let mut file = Self {
+            name: FileName::parse(&path),
+            path,
+            bytes,
+            label: PedrLabel::default(),
+            label_complaints: Vec::new(),
+        };
+        file.read_label();
+        file
+    }
+
+    fn read_label(&mut self) {
+        let length = self.bytes.len();
+        if length < LABEL_BYTES {
+            let text = format!(
+                "the file has {length} bytes; expected at least the {LABEL_BYTES} of the label"
+            );
+            self.complain_of_label(Reason::TruncatedLabel, text);
+        }
+        match PedrLabel::parse(&self.bytes) {
+            Ok(label) => self.label = label,
+            Err(fault) => self.complain_of_label(Reason::UnreadableLabel, fault.to_string()),
+        }
+        let records = LABEL_RECORDS as u64 + self.records().len() as u64;
+        if let Some(stated) = self.label.file_records.filter(|stated| *stated != records) {
+            let text = format!("the label states {stated} records; the file holds {records}");
+            self.complain_of_label(Reason::RecordCount, text);
+        }
+    }
+
+    fn complain_of_label(&mut self, reason: Reason, text: String) {
+        let complaint = self.complaint(None, reason, text);
+        self.label_complaints.push(complaint);
+    }
+
+    fn complaint(&self, record: Option<u32>, reason: Reason, text: String) -> Complaint {
+        Complaint {
+            file: self.path.clone(),
+            record,
+            reason,
+            text,
+        }
+    }
+
+    /// The parts of the file's name, when it has the archive's form.
+    #[must_use]
+    pub const fn name(&self) -> Option<FileName> {
+        self.name
+    }
+
+    /// The attached label.
+    #[must_use]
+    pub const fn label(&self) -> &PedrLabel {
+        &self.label
+    }
+
+    /// Complaints of the label: they come before those of records.
+    #[must_use]
+    pub fn label_complaints(&self) -> &[Complaint] {
+        &self.label_complaints
+    }
+
+    /// The complaint of bytes after the last whole record, if there are any.
+    #[must_use]
+    pub fn trailing_complaint(&self) -> Option<Complaint> {
+        let data = self.bytes.get(LABEL_BYTES..)?;
+        let trailing = data.len() % RECORD_BYTES;
+        (trailing > 0).then(|| {
+            let text =
+                format!("{trailing} bytes after the last whole record of {RECORD_BYTES}; left out");
+            self.complaint(
+                Some(Self::record_number(self.records().len())),
+                Reason::TrailingBytes,
+                text,
+            )
+        })
+    }
+
+    /// The complaint of the record in row `row`, counted from 0.
+    #[must_use]
+    pub fn record_complaint(&self, row: usize, fault: &RecordFault) -> Complaint {
+        self.complaint(
+            Some(Self::record_number(row)),
+            fault.reason(),
+            fault.to_string(),
+        )
+    }
+
+    /// The data records, as many as the file's size has room for, whatever the label says.
+    #[must_use]
+    pub fn records(&self) -> &[Record] {
+        Record::slice_of(self.bytes.get(LABEL_BYTES..).unwrap_or_default())
+    }
+
+    /// BLAKE3 of the file's bytes, hexadecimal.
+    #[must_use]
+    pub fn blake3(&self) -> String {
+        blake3::hash(&self.bytes).to_hex().to_string()
+    }
+
+    /// The frames of some rows, counted from 0, each with its row and decoded with its neighbours in
+    /// the file, or with the impossible value that spoils it. Rows that are not there are left out.
+    pub fn frames(
+        &self,
+        rows: Range<usize>,
+        guard: FieldGuard,
+    ) -> impl Iterator<Item = (usize, std::result::Result<Frame<'_>, RecordFault>)> {
+        let end = rows.end.min(self.records().len());
+        (rows.start..end)
+            .zip(self.records().get(rows.start..end).unwrap_or_default())
+            .map(move |(row, record)| (row, self.frame(row, record, guard)))
+    }
+
+    fn frame<'a>(
+        &self,
+        row: usize,
+        record: &'a Record,
+        guard: FieldGuard,
+    ) -> std::result::Result<Frame<'a>, RecordFault> {
+        record.check(self.is_mapping())?;
+        let time_s = |row: Option<usize>| Some(self.sound_record(row?)?.time_s.get());
+        let neighbours_s = [
+            time_s(row.checked_sub(2)),
+            time_s(row.checked_sub(1)),
+            time_s(Some(row)),
+            time_s(row.checked_add(1)),
+        ];
+        if out_of_order(neighbours_s) {
+            return Err(RecordFault::Order(record.time_s.get()));
+        }
+        Ok(Frame::new(
+            record,
+            guard,
+            self.crossover_before_m(row, guard),
+        ))
+    }
+
+    /// Crossover residual of the frame before row `row`, metres.
+    ///
+    /// Before the first frame stands its next one mirrored, `x₁ − (x₂ − x₁)`, as in `pedr2tab`.
+    fn crossover_before_m(&self, row: usize, guard: FieldGuard) -> Option<f64> {
+        let residual_m = |row| guard.crossover_m(self.sound_record(row)?);
+        if row == 0 {
+            let first_m = residual_m(0)?;
+            return residual_m(1).map(|next_m| first_m - (next_m - first_m));
+        }
+        residual_m(row - 1)
+    }
+
+    /// The record in row `row`, when there is one without an impossible value.
+    fn sound_record(&self, row: usize) -> Option<&Record> {
+        let record = self.records().get(row)?;
+        record.check(self.is_mapping()).ok().map(|()| record)
+    }
+
+    /// Number of the record in row `row` of the data, counted from 1 with the label records.
+    #[must_use]
+    pub fn record_number(row: usize) -> u32 {
+        u32::try_from(row + LABEL_RECORDS + 1).unwrap_or(u32::MAX)
+    }
+
+    fn is_mapping(&self) -> bool {
+        self.name.is_some_and(FileName::is_mapping)
+    }
+}

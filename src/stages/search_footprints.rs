@@ -1,0 +1,338 @@
+//! Searches PEDR files for the shots in a site's windows: one pass over every file for all windows.
+
+use std::{collections::BTreeMap, ops::Range, path::Path};
+
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+
+use crate::{
+    config::{PedrConfig, ShotFilter, WindowConfig},
+    error::{Fault, Kind, Place, Result},
+    footprints::{AsRead, Footprint, Footprints, SourceFile},
+    frames::{MarsDatum, MarsIau2000},
+    geom::{
+        ellipsoid::{Spherical, spherical_to_xyz_m},
+        mars_rotation::convert_datum,
+        window::Region,
+    },
+    pds::pedr::{Complaint, FieldGuard, File, FileName, Frame, Reason, SHOTS, decide_datum},
+    time::Et,
+    units::RADIANS_PER_DEGREE,
+};
+
+/// Complaints kept with their text; all are counted.
+const COMPLAINTS_MAX: usize = 1_000;
+/// Records searched by one task.
+const BLOCK_RECORDS: usize = 2_048;
+/// No two of the known datums are turned against each other by more than this, radians: 0.271° and
+/// 0.003° per decade, and pole differences of 0.0006°.
+const DATUM_MARGIN_RAD: f64 = 0.3 * RADIANS_PER_DEGREE;
+
+/// Why a shot inside a window was left out; the first that applies counts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Reject {
+    /// No laser return.
+    NoReturn,
+    /// An impossible radius.
+    Radius,
+    /// Classification not wanted.
+    Class,
+    /// Trigger channel not wanted.
+    Channel,
+    /// Attitude flag not wanted.
+    Attitude,
+    /// Off-nadir angle too large.
+    OffNadir,
+}
+
+/// What the search found.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct SearchResult {
+    /// Shots in the windows, ordered by file, record and shot, in the coordinates of their files.
+    pub footprints: Footprints<AsRead>,
+    /// What is wrong with the files, ordered by file and record; at most 1000 are kept.
+    pub complaints: Vec<Complaint>,
+    /// All complaints by reason.
+    pub complaint_counts: BTreeMap<Reason, u64>,
+    /// Shots inside a window that were left out, by reason.
+    pub rejected: BTreeMap<Reject, u64>,
+    /// Records looked at.
+    pub frames_read: u64,
+    /// Shots whose own position was tested, those of frames near a window.
+    pub shots_read: u64,
+    /// How files were understood, one sentence for each way.
+    pub notes: Vec<String>,
+}
+
+/// More files than footprints can count.
+#[derive(Debug, thiserror::Error)]
+#[error("{0} PEDR files; expected at most {max}", max = u16::MAX)]
+struct TooManyFiles(usize);
+
+impl Fault for TooManyFiles {
+    fn kind(&self) -> Kind {
+        Kind::Configuration
+    }
+
+    fn advice(&self) -> String {
+        "name only the files of the site's orbits in pedr.files".to_owned()
+    }
+}
+
+/// Searches all files of `pedr` for shots in any of `windows`.
+///
+/// Every shot is judged by its own position, in IAU 2000 at its time tag. `correction_s` is added to
+/// tags to give `et_s`. The result does not depend on the number of threads.
+///
+/// # Errors
+/// A file that cannot be opened, or whose datum cannot be told. Anything wrong inside a file is a
+/// complaint; its good records are kept.
+pub fn search_footprints(
+    pedr: &PedrConfig,
+    windows: &[WindowConfig],
+    correction_s: f64,
+) -> Result<SearchResult> {
+    const STAGE: &str = "search_footprints";
+    if pedr.files.len() > usize::from(u16::MAX) {
+        return Err(TooManyFiles(pedr.files.len())).in_stage(STAGE);
+    }
+    let regions: Vec<Region> = windows
+        .iter()
+        .map(|window| Region::new(&window.shape))
+        .collect();
+    let searched: Vec<Result<(SourceFile, Found, String)>> = pedr
+        .files
+        .par_iter()
+        .enumerate()
+        .map(|(index, path)| search_file(pedr, index, path, &regions, correction_s))
+        .collect();
+
+    let mut all = Found::new();
+    let mut files = Vec::with_capacity(searched.len());
+    let mut notes: BTreeMap<String, u32> = BTreeMap::new();
+    // In the order of the files, so that of several failures it is always the same one that is told.
+    for result in searched {
+        let (source, found, note) = result.in_stage(STAGE)?;
+        files.push(source);
+        all.append(found);
+        *notes.entry(note).or_default() += 1;
+    }
+    all.footprints.files = files;
+    Ok(SearchResult {
+        footprints: all.footprints,
+        complaints: all.complaints,
+        complaint_counts: all.complaint_counts,
+        rejected: all.rejected,
+        frames_read: all.frames_read,
+        shots_read: all.shots_read,
+        notes: notes
+            .into_iter()
+            .map(|(note, files)| format!("{files} PEDR file(s): {note}"))
+            .collect(),
+    })
+}
+
+/// What a block, a file or all files gave.
+struct Found {
+    footprints: Footprints<AsRead>,
+    complaints: Vec<Complaint>,
+    complaint_counts: BTreeMap<Reason, u64>,
+    rejected: BTreeMap<Reject, u64>,
+    frames_read: u64,
+    shots_read: u64,
+}
+
+impl Found {
+    const fn new() -> Self {
+        Self {
+            footprints: Footprints::new(Vec::new()),
+            complaints: Vec::new(),
+            complaint_counts: BTreeMap::new(),
+            rejected: BTreeMap::new(),
+            frames_read: 0,
+            shots_read: 0,
+        }
+    }
+
+    fn complain(&mut self, complaint: Complaint) {
+        *self.complaint_counts.entry(complaint.reason).or_default() += 1;
+        if self.complaints.len() < COMPLAINTS_MAX {
+            self.complaints.push(complaint);
+        }
+    }
+
+    fn append(&mut self, other: Self) {
+        self.footprints.append(other.footprints);
+        let room = COMPLAINTS_MAX.saturating_sub(self.complaints.len());
+        self.complaints
+            .extend(other.complaints.into_iter().take(room));
+        for (reason, count) in other.complaint_counts {
+            *self.complaint_counts.entry(reason).or_default() += count;
+        }
+        for (reason, count) in other.rejected {
+            *self.rejected.entry(reason).or_default() += count;
+        }
+        self.frames_read += other.frames_read;
+        self.shots_read += other.shots_read;
+    }
+}
+
+/// One file with all that judging its shots needs.
+struct Search<'a> {
+    file: &'a File,
+    index: u16,
+    datum: MarsDatum,
+    guard: FieldGuard,
+    filter: &'a ShotFilter,
+    regions: &'a [Region],
+    correction_s: f64,
+}
+
+fn search_file(
+    pedr: &PedrConfig,
+    index: usize,
+    path: &Path,
+    regions: &[Region],
+    correction_s: f64,
+) -> Result<(SourceFile, Found, String)> {
+    let file = File::open(path)?;
+    let version = file.name().map(|name: FileName| name.version);
+    let datum = decide_datum(pedr.datum, version, file.label().datum).in_file(path)?;
+    let software_version = file.label().software_version;
+    let search = Search {
+        file: &file,
+        // search_footprints checked the number of files.
+        index: u16::try_from(index).unwrap_or(u16::MAX),
+        datum,
+        guard: FieldGuard::new(software_version),
+        filter: &pedr.filter,
+        regions,
+        correction_s,
+    };
+    let records = file.records().len();
+    let blocks: Vec<Found> = (0..records.div_ceil(BLOCK_RECORDS))
+        .into_par_iter()
+        .map(|block| search.block(block * BLOCK_RECORDS..(block + 1) * BLOCK_RECORDS))
+        .collect();
+    let mut found = Found::new();
+    for complaint in file.label_complaints() {
+        found.complain(complaint.clone());
+    }
+    for block in blocks {
+        found.append(block);
+    }
+    if let Some(complaint) = file.trailing_complaint() {
+        found.complain(complaint);
+    }
+    let source = SourceFile {
+        path: path.to_owned(),
+        version,
+        datum,
+        blake3: file.blake3(),
+    };
+    let software = software_version.map_or_else(
+        || "unknown, taken as new".to_owned(),
+        |version| version.to_string(),
+    );
+    let letter = version.map_or_else(|| "none".to_owned(), |letter| letter.to_string());
+    let note = format!("version letter {letter}, datum {datum}, software version {software}");
+    Ok((source, found, note))
+}
+
+impl Search<'_> {
+    fn block(&self, rows: Range<usize>) -> Found {
+        let mut found = Found::new();
+        for (row, frame) in self.file.frames(rows, self.guard) {
+            found.frames_read += 1;
+            match frame {
+                Ok(frame) => {
+                    if let Err(fault) = frame.record().check_radii() {
+                        found.complain(self.file.record_complaint(row, &fault));
+                    }
+                    self.frame(row, &frame, &mut found);
+                }
+                Err(fault) => found.complain(self.file.record_complaint(row, &fault)),
+            }
+        }
+        found
+    }
+
+    fn frame(&self, row: usize, frame: &Frame<'_>, found: &mut Found) {
+        let (longitude_rad, latitude_rad) = frame.mid_point();
+        let mut margin_rad = frame.reach_rad();
+        if self.datum != MarsDatum::Iau2000 {
+            margin_rad += DATUM_MARGIN_RAD;
+        }
+        let near =
+            |region: &Region| region.may_contain_within(longitude_rad, latitude_rad, margin_rad);
+        if !self.regions.iter().any(near) {
+            return;
+        }
+        for shot in (1..).take(SHOTS).filter_map(|shot| frame.shot(shot)) {
+            found.shots_read += 1;
+            let windows = self.windows_of(&shot);
+            if windows == 0 {
+                continue;
+            }
+            if let Some(reason) = self.reject(&shot, frame) {
+                *found.rejected.entry(reason).or_default() += 1;
+                continue;
+            }
+            found.footprints.push(&Footprint {
+                et_s: shot.et_tag_s + self.correction_s,
+                file: self.index,
+                record: File::record_number(row),
+                windows,
+                ..shot
+            });
+        }
+    }
+
+    /// Bits of the windows that hold the shot, by its position in IAU 2000.
+    fn windows_of(&self, shot: &Footprint) -> u64 {
+        let (longitude_rad, latitude_rad) = self.iau2000(shot);
+        (0..u64::BITS)
+            .zip(self.regions)
+            .filter(|(_, region)| region.contains(longitude_rad, latitude_rad))
+            .fold(0, |bits, (bit, _)| bits | 1 << bit)
+    }
+
+    /// East longitude and areocentric latitude in IAU 2000, radians.
+    fn iau2000(&self, shot: &Footprint) -> (f64, f64) {
+        if self.datum == MarsDatum::Iau2000 {
+            return (shot.longitude_rad, shot.latitude_rad);
+        }
+        let at = Et::from_seconds(shot.et_tag_s);
+        let direction = spherical_to_xyz_m(shot.longitude_rad, shot.latitude_rad, 1.0);
+        let direction = convert_datum::<MarsIau2000>(direction, self.datum, at, at);
+        let spherical = Spherical::from_xyz_m(&direction.xyz_m);
+        (spherical.longitude_rad, spherical.latitude.0)
+    }
+
+    fn reject(&self, shot: &Footprint, frame: &Frame<'_>) -> Option<Reject> {
+        let filter = self.filter;
+        let tests = [
+            (Reject::NoReturn, shot.range_m > 0.0),
+            (
+                Reject::Radius,
+                frame
+                    .record()
+                    .radius_is_possible(usize::from(shot.shot) - 1),
+            ),
+            (Reject::Class, filter.classes.contains(&shot.class)),
+            (Reject::Channel, filter.channels.contains(&shot.channel)),
+            (
+                Reject::Attitude,
+                filter.attitude_flags.contains(&shot.attitude_flag),
+            ),
+            (
+                Reject::OffNadir,
+                shot.off_nadir_rad.abs() <= filter.off_nadir_max_rad,
+            ),
+        ];
+        tests
+            .into_iter()
+            .find_map(|(reason, passed)| (!passed).then_some(reason))
+    }
+}

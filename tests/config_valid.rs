@@ -1,0 +1,286 @@
+//! Shipped configurations are accepted, documented defaults are the defaults, and schema, example
+//! and loader know the same keys.
+
+use std::{
+    collections::BTreeSet,
+    fs,
+    path::{Path, PathBuf},
+};
+
+use areograph::config::{self, Loaded, SiteConfig, WindowShape};
+use serde_json::Value;
+
+const OUTLINE: &str =
+    r#"{"type": "Polygon", "coordinates": [[[0, 0], [10, 0], [10, 10], [0, 10], [0, 0]]]}"#;
+
+fn below_package(path: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join(path)
+}
+
+fn example_text() -> String {
+    fs::read_to_string(below_package("config/sites/example.toml")).unwrap()
+}
+
+/// A temporary `sites` folder beside the files that shipped configurations point to.
+#[allow(
+    clippy::disallowed_methods,
+    reason = "files in a temporary folder need no atomic writer"
+)]
+fn folder() -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    for (path, content) in [
+        ("kernels/scene.tm", "KPL/MK\n"),
+        ("pedr/ap19019k.b", ""),
+        ("labels/e0202855.lbl", "END\n"),
+        ("sites/outline.geojson", OUTLINE),
+    ] {
+        let path = folder.path().join(path);
+        fs::create_dir_all(path.parent().unwrap()).unwrap();
+        fs::write(path, content).unwrap();
+    }
+    folder
+}
+
+fn parse_in(folder: &tempfile::TempDir, text: &str) -> Loaded {
+    config::parse(text, &folder.path().join("sites/site.toml")).unwrap()
+}
+
+fn as_json(text: &str) -> Value {
+    serde_json::to_value(toml::from_str::<toml::Table>(text).unwrap()).unwrap()
+}
+
+fn schema() -> Value {
+    let text = fs::read_to_string(below_package("config/schema/site.schema.json")).unwrap();
+    serde_json::from_str(&text).unwrap()
+}
+
+#[test]
+fn shipped_configurations_are_accepted_without_warnings() {
+    let folder = folder();
+    let mut files = 0;
+    for entry in fs::read_dir(below_package("config/sites")).unwrap() {
+        let path = entry.unwrap().path();
+        let copy = folder.path().join("sites").join(path.file_name().unwrap());
+        fs::copy(&path, &copy).unwrap();
+        if path
+            .extension()
+            .is_some_and(|extension| extension == "toml")
+        {
+            let loaded = config::load(&copy).unwrap();
+            assert_eq!(loaded.warnings, Vec::<String>::new(), "{}", path.display());
+            files += 1;
+        }
+    }
+    assert!(files > 0);
+}
+
+#[test]
+fn the_example_says_the_defaults_and_means_si_units() {
+    let folder = folder();
+    let example = parse_in(&folder, &example_text()).site;
+    let least = r#"
+        site = "eos_chasma"
+        kernels.metakernel = "../kernels/scene.tm"
+        pedr.files = ["../pedr/*.b", "../sites/../pedr/ap19019k.b"]
+        windows = [{ id = "site", longitude_deg = [-42, -41.3], latitude_deg = [-14, -12.9] }]
+    "#;
+    let least = parse_in(&folder, least).site;
+    let with_defaults = SiteConfig {
+        description: example.description.clone(),
+        windows: example.windows.clone(),
+        images: example.images.clone(),
+        ..least.clone()
+    };
+    assert_eq!(example, with_defaults);
+    assert_eq!(
+        example.pedr.files.len(),
+        1,
+        "a file reached twice counts once"
+    );
+
+    let WindowShape::Box {
+        west_rad,
+        east_rad,
+        south_rad,
+        north_rad,
+    } = least.windows[0].shape
+    else {
+        panic!("a box was written");
+    };
+    // One ulp of 2π, nanometres on the ground.
+    for (found, degrees) in [
+        (west_rad, 318.0_f64),
+        (east_rad, 318.7),
+        (south_rad, -14.0),
+        (north_rad, -12.9),
+    ] {
+        assert!((found - degrees.to_radians()).abs() < 1e-15, "{degrees}");
+    }
+    let WindowShape::Polygons { polygons } = &example.windows[1].shape else {
+        panic!("a polygon was written");
+    };
+    assert!((polygons[0][0][2][1] - 10_f64.to_radians()).abs() < 1e-15);
+    let image = &example.images[1].fields;
+    // A picosecond.
+    assert!((image.exposure_s.unwrap() - 0.000_482_1).abs() < 1e-12);
+    assert!((example.orientation.pointing_rmse_max_rad - 4.848_136_8e-5).abs() < 1e-12);
+    assert!((example.mola_clock.correction_s() + 0.117).abs() < 1e-12);
+}
+
+#[test]
+fn the_hash_follows_values_and_nothing_else() {
+    let folder = folder();
+    let hash = |text: &str| parse_in(&folder, text).blake3;
+    let text = "site = 's'\nkernels.metakernel = '../kernels/scene.tm'\nimages = [{ id = 'i', label = '../labels/e0202855.lbl' }]\n";
+    let same = "# a comment\n[kernels]\nmetakernel = \"../kernels/scene.tm\"\n";
+    let same = format!(
+        "images = [{{ label = '../labels/e0202855.lbl', id = 'i' }}]\nsite = \"s\"\n{same}"
+    );
+    assert_eq!(hash(text), hash(&same));
+    assert_ne!(
+        hash(text),
+        hash(&format!("{text}pointing.ck_bias_s = -1.15\n"))
+    );
+}
+
+#[test]
+fn entries_that_are_never_used_are_told() {
+    let folder = folder();
+    let text = "site = 's'\n\
+        kernels = { metakernel = '../kernels/scene.tm', pinned = ['pck00010.tpc'] }\n\
+        mola_clock = { scope = 'none', bias_s = 0.117 }\n\
+        windows = [{ id = 'w', longitude_deg = [0, 1], latitude_deg = [0, 1] }]\n\
+        images = [{ id = 'i', label = '../labels/e0202855.lbl', sclk_start = '1:2', utc_start = '1999-236T14:12:13' }]\n";
+    let prefix = format!("{}/sites/", folder.path().display());
+    let warnings = parse_in(&folder, text)
+        .warnings
+        .join("\n")
+        .replace(&prefix, "");
+    assert_eq!(
+        warnings,
+        "site.toml:2:58: kernels.pinned is never used: it belongs to kernels.root\n\
+         site.toml:3:41: mola_clock.bias_s is never used: mola_clock.scope is \"none\"\n\
+         site.toml:4:11: windows are never used: there is no table pedr\n\
+         site.toml:5:10: images without a table pedr: orientation only, no footprints and no range check\n\
+         site.toml:5:89: images.utc_start is never used: sclk_start comes first"
+    );
+}
+
+#[test]
+fn two_files_of_one_site_are_both_named() {
+    let folder = folder();
+    let one = parse_in(&folder, &example_text()).site;
+    let other = SiteConfig {
+        site: "other".to_owned(),
+        ..one.clone()
+    };
+    let again = SiteConfig {
+        file: PathBuf::from("again.toml"),
+        ..one.clone()
+    };
+    assert!(config::check_sites(&[one.clone(), other.clone()]).is_ok());
+    let fault = config::check_sites(&[one.clone(), other, again]).unwrap_err();
+    assert_eq!(
+        fault.to_string(),
+        format!(
+            "site is \"eos_chasma\" in {} and in again.toml; expected one file per site",
+            one.file.display()
+        )
+    );
+}
+
+#[test]
+fn the_schema_takes_the_example_and_refuses_what_the_loader_refuses() {
+    let schema = jsonschema::validator_for(&schema()).unwrap();
+    let errors: Vec<String> = schema
+        .iter_errors(&as_json(&example_text()))
+        .map(|error| error.to_string())
+        .collect();
+    assert_eq!(errors, Vec::<String>::new());
+    for bad in [
+        "only_site",
+        "unknown_key",
+        "unknown_table",
+        "wrong_type",
+        "site_is_path",
+        "kernels_none",
+        "kernels_two_sources",
+        "kernels_empty_list",
+        "out_of_range",
+        "mola_words",
+        "pedr_words",
+        "pedr_no_files",
+        "no_windows",
+        "windows_65",
+        "window_half",
+        "window_two_shapes",
+        "window_three_numbers",
+        "image_incomplete",
+        "image_numbers",
+    ] {
+        let text =
+            fs::read_to_string(below_package(&format!("tests/config/bad/{bad}.toml"))).unwrap();
+        assert!(!schema.is_valid(&as_json(&text)), "{bad} passes the schema");
+    }
+}
+
+/// The keys of each table, by the path of the table, as the schema has them.
+fn schema_tables(schema: &Value, path: &str, found: &mut Vec<(String, BTreeSet<String>)>) {
+    let table = schema.get("items").unwrap_or(schema);
+    let Some(properties) = table.get("properties").and_then(Value::as_object) else {
+        return;
+    };
+    found.push((path.to_owned(), properties.keys().cloned().collect()));
+    for (key, value) in properties {
+        schema_tables(value, &format!("{path}.{key}"), found);
+    }
+}
+
+#[test]
+fn schema_example_and_loader_know_the_same_keys_and_defaults() {
+    let mut tables = Vec::new();
+    schema_tables(&schema(), "", &mut tables);
+    assert_eq!(tables.len(), 10);
+    let example = example_text();
+    for (path, keys) in tables {
+        // The loader answers an unknown key with all that it knows.
+        let table = path.trim_start_matches('.');
+        let header = match table {
+            "" => String::new(),
+            "windows" | "images" => format!("[[{table}]]\n"),
+            _ => format!("[{table}]\n"),
+        };
+        let answer = config::parse(&format!("{header}zzzzzzzz = 1\n"), Path::new("x.toml"))
+            .unwrap_err()
+            .to_string();
+        let (_, known) = answer.split_once("expected one of ").unwrap();
+        let known: BTreeSet<String> = known.split(", ").map(str::to_owned).collect();
+        assert_eq!(known, keys, "{path}");
+        for key in keys {
+            let written = ["", "# ", "["].iter().any(|before| {
+                example.lines().any(|line| {
+                    line.strip_prefix(before)
+                        .is_some_and(|rest| rest.trim_start_matches('[').starts_with(&key))
+                })
+            });
+            assert!(
+                written || table == "pedr" && key == "filter",
+                "{path}.{key} is not in the example"
+            );
+        }
+    }
+    let schema = schema();
+    let example = as_json(&example);
+    let properties = schema["properties"].as_object().unwrap();
+    for (table, key) in properties.keys().flat_map(|table| {
+        let keys = properties[table]["properties"].as_object();
+        keys.into_iter()
+            .flat_map(move |keys| keys.keys().map(move |key| (table, key)))
+    }) {
+        let default = &properties[table]["properties"][key]["default"];
+        let written = &example[table][key];
+        if !default.is_null() && !written.is_null() {
+            assert_eq!(default, written, "{table}.{key}");
+        }
+    }
+}

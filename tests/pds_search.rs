@@ -1,0 +1,393 @@
+//! The search of PEDR files against brute force over every shot.
+
+#![allow(clippy::expect_used, reason = "helpers of tests fail as tests do")]
+
+use std::path::{Path, PathBuf};
+
+use areograph::{
+    config::{DatumChoice, PedrConfig, ShotFilter, WindowConfig, WindowShape},
+    footprints::Footprint,
+    frames::{MarsDatum, MarsIau2000},
+    geom::{
+        ellipsoid::{Spherical, spherical_to_xyz_m},
+        mars_rotation::convert_datum,
+        window::Region,
+    },
+    pds::pedr::{FieldGuard, File, FrameValues, LabelInfo, PedrWriter, Reason, Record},
+    stages::search_footprints::{Reject, SearchResult, search_footprints},
+    time::Et,
+    units::wrap_pi,
+};
+use proptest::prelude::*;
+
+const DEGREE: f64 = std::f64::consts::PI / 180.0;
+/// A little less than one polar revolution and a half.
+const FRAMES: u32 = 5_000;
+
+/// Ground longitude and latitude, radians, `time_s` after the start: a circular polar orbit over turning Mars.
+fn ground(time_s: f64) -> [f64; 2] {
+    let along_rad = 0.9 + time_s * 8.9e-4;
+    let inclination_rad = 92.9 * DEGREE;
+    let latitude_rad = (inclination_rad.sin() * along_rad.sin()).asin();
+    let node_rad = (inclination_rad.cos() * along_rad.sin()).atan2(along_rad.cos());
+    [node_rad - 7.088e-5 * time_s, latitude_rad]
+}
+
+fn frame(number: u32) -> FrameValues {
+    let time_s = 2.0 * f64::from(number);
+    let [before, mid, after] = [time_s - 1.0, time_s, time_s + 1.0].map(ground);
+    let mut values = FrameValues {
+        time_s: -20_000_000.0 + time_s,
+        orbit: 9_019 + number / 3_530,
+        clock_frequency_hz: 1e8,
+        ground_longitude_rad: mid[0],
+        ground_longitude_change_rad: wrap_pi(after[0] - before[0]),
+        ground_latitude_rad: mid[1],
+        ground_latitude_change_rad: after[1] - before[1],
+        spacecraft_radius_m: 3.78e6,
+        parallax_latitude_rad_per_m: 8e-9,
+        parallax_longitude_rad_per_m: -2e-9,
+        mid_radius_m: 3.39e6,
+        areoid_radius_m: 3.392e6,
+        shot_radius_m: std::array::from_fn(|shot| {
+            3.38e6 + 1e3 * ((number as usize + shot * 7) % 31) as f64
+        }),
+        range_m: [3.9e5; 20],
+        class: [1; 20],
+        channel: [1; 20],
+        frame_index: 1,
+        orbit_quality: 3,
+        off_nadir_rad: if number % 100 < 10 { 0.1 } else { 0.001 },
+        attitude_flag: if number.is_multiple_of(11) { 3 } else { 0 },
+        ..FrameValues::default()
+    };
+    for shot in 0..20 {
+        match (number as usize + shot) % 17 {
+            0 => values.range_m[shot] = 0.0,
+            1 => values.class[shot] = 0,
+            2 => values.channel[shot] = 4,
+            _ => {}
+        }
+    }
+    values
+}
+
+fn write(path: &Path, datum: MarsDatum, first: u32, spoil: impl Fn(u32, &mut Record)) {
+    let product_id = path
+        .file_name()
+        .and_then(|name| name.to_str())
+        .unwrap_or_default();
+    let label = LabelInfo {
+        product_id: product_id.to_owned(),
+        software_version: 7.25,
+        datum,
+        note: "synthetic".to_owned(),
+    };
+    let mut writer = PedrWriter::create(path, &label).expect("a writable folder");
+    for number in first..first + FRAMES / 2 {
+        let mut record = Record::from_frame(&frame(number)).expect("values within their fields");
+        spoil(number, &mut record);
+        writer.write_record(&record).expect("room on the disk");
+    }
+    writer.finish().expect("room on the disk");
+}
+
+/// Two files, the first in IAU 1991, the second in IAU 2000.
+fn archive(folder: &Path) -> PedrConfig {
+    let files = [folder.join("ap19019k.b"), folder.join("AP19020L.B")];
+    write(&files[0], MarsDatum::Iau1991, 0, |_, _| ());
+    write(&files[1], MarsDatum::Iau2000, FRAMES / 2, |_, _| ());
+    config(files.to_vec())
+}
+
+fn config(files: Vec<PathBuf>) -> PedrConfig {
+    PedrConfig {
+        files,
+        datum: DatumChoice::Auto,
+        filter: ShotFilter {
+            classes: vec![1],
+            channels: vec![1, 2, 3],
+            attitude_flags: vec![0],
+            off_nadir_max_rad: 0.02,
+        },
+    }
+}
+
+fn windows(shapes: Vec<WindowShape>) -> Vec<WindowConfig> {
+    shapes
+        .into_iter()
+        .enumerate()
+        .map(|(index, shape)| WindowConfig {
+            id: format!("w{index}"),
+            shape,
+        })
+        .collect()
+}
+
+fn box_deg(west: f64, width: f64, south: f64, north: f64) -> WindowShape {
+    WindowShape::Box {
+        west_rad: west * DEGREE,
+        east_rad: (west + width).rem_euclid(360.0) * DEGREE,
+        south_rad: south * DEGREE,
+        north_rad: north * DEGREE,
+    }
+}
+
+/// Every shot of every file, judged by its own position in IAU 2000, without filters.
+fn brute_force(pedr: &PedrConfig, windows: &[WindowConfig]) -> Vec<(u16, u32, u8, u64)> {
+    let regions: Vec<Region> = windows.iter().map(|w| Region::new(&w.shape)).collect();
+    let mut found = Vec::new();
+    for (index, path) in (0..).zip(&pedr.files) {
+        let file = File::open(path).expect("a readable file");
+        let datum = file.label().datum.expect("a label with its datum");
+        for (row, frame) in file.frames(0..file.records().len(), FieldGuard::new(Some(7.25))) {
+            let frame = frame.expect("a good frame");
+            for shot in (1..=20).filter_map(|shot| frame.shot(shot)) {
+                let at = Et::from_seconds(shot.et_tag_s);
+                let direction = spherical_to_xyz_m(shot.longitude_rad, shot.latitude_rad, 1.0);
+                let direction = convert_datum::<MarsIau2000>(direction, datum, at, at);
+                let there = Spherical::from_xyz_m(&direction.xyz_m);
+                let mut bits = 0;
+                for (bit, region) in regions.iter().enumerate() {
+                    if region.contains(there.longitude_rad, there.latitude.0) {
+                        bits |= 1 << bit;
+                    }
+                }
+                if bits != 0 && keeps(&pedr.filter, &shot) {
+                    found.push((index, File::record_number(row), shot.shot, bits));
+                }
+            }
+        }
+    }
+    found
+}
+
+fn keeps(filter: &ShotFilter, shot: &Footprint) -> bool {
+    shot.range_m > 0.0
+        && filter.classes.contains(&shot.class)
+        && filter.channels.contains(&shot.channel)
+        && filter.attitude_flags.contains(&shot.attitude_flag)
+        && shot.off_nadir_rad <= filter.off_nadir_max_rad
+}
+
+fn found(result: &SearchResult) -> Vec<(u16, u32, u8, u64)> {
+    (0..result.footprints.len())
+        .map(|row| result.footprints.row(row))
+        .map(|shot| (shot.file, shot.record, shot.shot, shot.windows))
+        .collect()
+}
+
+#[test]
+fn random_windows_hold_the_shots_that_brute_force_finds() {
+    let folder = tempfile::tempdir().unwrap();
+    let pedr = archive(folder.path());
+    let shape = (
+        0.0..360.0_f64,
+        1.0..120.0_f64,
+        -90.0..88.0_f64,
+        0.01..1.0_f64,
+        any::<bool>(),
+    );
+    let shape = shape.prop_map(|(west, width, south, share, as_polygon)| {
+        let north = south + share * (90.0 - south);
+        if as_polygon {
+            let corners = [
+                [west, south],
+                [west + width, south],
+                [west + 0.3 * width, north],
+            ];
+            let ring = corners
+                .map(|corner| corner.map(|angle| angle * DEGREE))
+                .to_vec();
+            WindowShape::Polygons {
+                polygons: vec![vec![ring]],
+            }
+        } else {
+            box_deg(west, width, south, north)
+        }
+    });
+    let mut runner = proptest::test_runner::TestRunner::new(ProptestConfig::with_cases(12));
+    let mut shots = 0;
+    let shots_found = std::cell::RefCell::new(&mut shots);
+    runner
+        .run(&proptest::collection::vec(shape, 1..6), |shapes| {
+            let windows = windows(shapes);
+            let result = search_footprints(&pedr, &windows, 0.0).unwrap();
+            let expected = brute_force(&pedr, &windows);
+            **shots_found.borrow_mut() += expected.len();
+            prop_assert_eq!(found(&result), expected);
+            prop_assert_eq!(result.frames_read, u64::from(FRAMES));
+            Ok(())
+        })
+        .unwrap();
+    assert!(
+        shots > 1_000,
+        "only {shots} shots in all windows: the test says little"
+    );
+}
+
+#[test]
+fn a_window_across_zero_and_one_over_the_pole_in_one_pass() {
+    let folder = tempfile::tempdir().unwrap();
+    let pedr = archive(folder.path());
+    let all_round = WindowShape::Box {
+        west_rad: 0.0,
+        east_rad: 2.0 * std::f64::consts::PI,
+        south_rad: -90.0 * DEGREE,
+        north_rad: -86.5 * DEGREE,
+    };
+    let windows = windows(vec![box_deg(200.0, 320.0, -10.0, 10.0), all_round]);
+    let result = search_footprints(&pedr, &windows, -0.117).unwrap();
+    assert_eq!(found(&result), brute_force(&pedr, &windows));
+    let footprints = &result.footprints;
+    for bit in [1, 2] {
+        assert!(footprints.windows.iter().any(|windows| windows & bit != 0));
+    }
+    for (tag_s, et_s) in footprints.et_tag_s.iter().zip(&footprints.et_s) {
+        assert!((et_s - tag_s + 0.117).abs() < 1e-8); // rounding of times of 2e7 s
+    }
+    let datums: Vec<_> = footprints
+        .files
+        .iter()
+        .map(|file| (file.version, file.datum))
+        .collect();
+    assert_eq!(
+        datums,
+        [
+            (Some('K'), MarsDatum::Iau1991),
+            (Some('L'), MarsDatum::Iau2000)
+        ]
+    );
+    let rejects: Vec<_> = result.rejected.keys().copied().collect();
+    let expected = [
+        Reject::NoReturn,
+        Reject::Class,
+        Reject::Channel,
+        Reject::Attitude,
+        Reject::OffNadir,
+    ];
+    assert_eq!(rejects, expected);
+    assert_eq!(
+        result.notes,
+        [
+            "1 PEDR file(s): version letter K, datum iau1991, software version 7.25",
+            "1 PEDR file(s): version letter L, datum iau2000, software version 7.25"
+        ]
+    );
+}
+
+#[test]
+fn the_result_is_the_same_on_one_and_four_threads_and_survives_the_cache() {
+    let folder = tempfile::tempdir().unwrap();
+    let pedr = archive(folder.path());
+    let windows = windows(vec![
+        box_deg(0.0, 170.0, -60.0, 60.0),
+        box_deg(100.0, 100.0, 0.0, 90.0),
+    ]);
+    let bytes = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .build()
+            .unwrap();
+        let result = pool
+            .install(|| search_footprints(&pedr, &windows, 0.0))
+            .unwrap();
+        assert!(!result.footprints.is_empty());
+        let bytes = postcard::to_extend(&result, Vec::new()).unwrap();
+        assert_eq!(
+            postcard::from_bytes::<SearchResult>(&bytes).unwrap(),
+            result
+        );
+        bytes
+    };
+    assert!(bytes(1) == bytes(4));
+}
+
+#[test]
+fn damaged_records_are_complained_of_and_the_others_kept() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("AP19019L.B");
+    write(
+        &path,
+        MarsDatum::Iau2000,
+        0,
+        |number, record| match number {
+            3 => record.clock_frequency_hz.set(7),
+            5 => record.time_s.set(f64::INFINITY),
+            8 => {
+                record.time_s.set(1e7);
+                record.time_whole_s.set(10_000_000);
+                record.time_fraction_us.set(0);
+            }
+            9 => record.shot_radius_cm[4].set(i32::MAX),
+            12 => record.channel = [200; 20],
+            number if number >= 100 && number.is_multiple_of(2) => {
+                record.spacecraft_radius_cm.set(1);
+            }
+            _ => (),
+        },
+    );
+    let mut pedr = config(vec![path.clone()]);
+    pedr.filter.channels = vec![1, 2, 3, 4];
+    pedr.filter.off_nadir_max_rad = 0.2;
+    let globe = windows(vec![WindowShape::Box {
+        west_rad: 0.0,
+        east_rad: 2.0 * std::f64::consts::PI,
+        south_rad: -std::f64::consts::FRAC_PI_2,
+        north_rad: std::f64::consts::FRAC_PI_2,
+    }]);
+    let result = search_footprints(&pedr, &globe, 0.0).unwrap();
+    let said: Vec<String> = result.complaints[..4]
+        .iter()
+        .map(|c| c.text.clone())
+        .collect();
+    assert_eq!(
+        said,
+        [
+            "clock frequency is 7 Hz; expected within 1 % of 1e8",
+            "time is inf; expected seconds past J2000",
+            "time is 10000000 s, out of the order of the neighbouring records",
+            "radius of shot 5 is 2147483647 cm; expected 330000000 to 345000000 for a return",
+        ]
+    );
+    let records: Vec<_> = result.complaints[..4]
+        .iter()
+        .filter_map(|c| c.record)
+        .collect();
+    assert_eq!(records, [14, 16, 19, 20]);
+    assert_eq!(result.complaints.len(), 1_000);
+    assert_eq!(result.complaint_counts[&Reason::SpacecraftRadius], 1_200);
+    assert_eq!(result.complaint_counts[&Reason::TimeOrder], 1);
+    assert_eq!(
+        (
+            result.rejected[&Reject::Radius],
+            result.rejected[&Reject::Channel]
+        ),
+        (1, 18)
+    );
+    assert!(result.footprints.record.contains(&20) && !result.footprints.record.contains(&14));
+}
+
+#[test]
+fn a_file_without_a_datum_stops_the_search() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("renamed.dat");
+    std::fs::File::create(&path).unwrap();
+    let failure = search_footprints(&config(vec![path]), &[], 0.0)
+        .unwrap_err()
+        .to_string();
+    assert!(
+        failure.starts_with("search_footprints: ")
+            && failure.contains("renamed.dat: the datum is not known")
+    );
+}
+
+#[test]
+fn more_files_than_can_be_counted_are_refused() {
+    let failure = search_footprints(&config(vec![PathBuf::from("AP19019L.B"); 65_536]), &[], 0.0);
+    let message = failure.unwrap_err().to_string();
+    assert!(
+        message.contains("65536 PEDR files; expected at most 65535"),
+        "{message}"
+    );
+}
