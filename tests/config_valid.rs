@@ -130,7 +130,7 @@ fn the_example_says_the_defaults_and_means_si_units() {
 #[test]
 fn the_hash_follows_values_and_nothing_else() {
     let folder = folder();
-    let hash = |text: &str| parse_in(&folder, text).blake3;
+    let hash = |text: &str| parse_in(&folder, text).site.blake3;
     let text = "site = 's'\nkernels.metakernel = '../kernels/scene.tm'\nimages = [{ id = 'i', label = '../labels/e0202855.lbl' }]\n";
     let same = "# a comment\n[kernels]\nmetakernel = \"../kernels/scene.tm\"\n";
     let same = format!(

@@ -19,7 +19,11 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let mut last = None;
     for site in load_sites(&arguments.sites)? {
         let checked = check_site(&site);
-        let word = if checked.failures.is_empty() { "ready" } else { "NOT READY" };
+        let word = if checked.failures.is_empty() {
+            "ready"
+        } else {
+            "NOT READY"
+        };
         output::line(format_args!("{}: {word}", site.site));
         for finding in checked.findings {
             output::line(format_args!("  {finding}"));

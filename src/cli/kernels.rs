@@ -40,7 +40,11 @@ struct Files {
 impl Files {
     fn load(&self) -> Result<KernelSet, Failure> {
         match &self.files[..] {
-            [one] if one.extension().is_some_and(|e| e.eq_ignore_ascii_case("tm")) => {
+            [one]
+                if one
+                    .extension()
+                    .is_some_and(|e| e.eq_ignore_ascii_case("tm")) =>
+            {
                 KernelSet::from_metakernel(one)
             }
             files => KernelSet::from_files(files),

@@ -1,6 +1,9 @@
 //! `areograph pedr`.
 
-use std::{collections::BTreeMap, path::PathBuf};
+use std::{
+    collections::BTreeMap,
+    path::{Path, PathBuf},
+};
 
 use clap::{Args, Subcommand};
 use serde_json::json;
@@ -38,7 +41,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let Command::Info { files, json } = &arguments.command;
     let mut answers = Vec::new();
     for path in files {
-        let answer = info(&File::open(path)?);
+        let answer = info(path, &File::open(path)?);
         if *json {
             answers.push(answer);
         } else {
@@ -51,7 +54,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
     Ok(())
 }
 
-fn info(file: &File) -> serde_json::Value {
+fn info(path: &Path, file: &File) -> serde_json::Value {
     let guard = FieldGuard::new(file.label().software_version);
     let mut complaints: Vec<Complaint> = file.label_complaints().to_vec();
     let mut orbits: BTreeMap<u32, u64> = BTreeMap::new();
@@ -69,7 +72,7 @@ fn info(file: &File) -> serde_json::Value {
     complaints.extend(file.trailing_complaint());
     let label = file.label();
     json!({
-        "file": file.path(),
+        "file": path,
         "version": file.name().map(|name| name.version),
         "product_id": label.product_id,
         "data_set_id": label.data_set_id,

@@ -23,7 +23,12 @@ pub(super) struct Arguments {
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
-    print(&load_sites(&arguments.sites)?, &arguments.out, false, arguments.json)
+    print(
+        &load_sites(&arguments.sites)?,
+        &arguments.out,
+        false,
+        arguments.json,
+    )
 }
 
 /// Prints the plan of every site.
@@ -52,8 +57,15 @@ pub(super) fn print(
         }
         output::line(format_args!("{}:", site.site));
         for planned in stages {
-            let word = if planned.because.runs() { "run " } else { "keep" };
-            output::line(format_args!("  {word}  {:32} {}", planned.stage, planned.because));
+            let word = if planned.because.runs() {
+                "run "
+            } else {
+                "keep"
+            };
+            output::line(format_args!(
+                "  {word}  {:32} {}",
+                planned.stage, planned.because
+            ));
         }
     }
     if as_json {

@@ -42,7 +42,12 @@ pub(super) struct Arguments {
     #[arg(long, value_parser = clap::value_parser!(u16).range(1..=1024))]
     threads: Option<u16>,
     /// Stop after this stage.
-    #[arg(long, value_name = "STAGE", default_value = "publish", hide_default_value = true)]
+    #[arg(
+        long,
+        value_name = "STAGE",
+        default_value = "publish",
+        hide_default_value = true
+    )]
     until: Stage,
     /// Run every stage, whatever is stored.
     #[arg(long)]
@@ -81,7 +86,13 @@ pub(super) fn run(arguments: &Arguments) -> ExitCode {
     };
     let outcomes = runtime.block_on(run_all(sites, arguments));
     print(&outcomes, arguments.json);
-    ExitCode::from(outcomes.iter().map(exit_code).find(|code| *code != 0).unwrap_or(0))
+    ExitCode::from(
+        outcomes
+            .iter()
+            .map(exit_code)
+            .find(|code| *code != 0)
+            .unwrap_or(0),
+    )
 }
 
 type Outcome = Result<SiteOutcome, Failure>;
@@ -181,23 +192,27 @@ fn print_outcome(outcome: &SiteOutcome) {
         Ending::Unchanged(verdict) => ("nothing changed; products stand", verdict),
     };
     let word = if verdict.valid { "valid" } else { "INVALID" };
-    output::line(format_args!("{site}: {word}; {what} in {folder}, see report/index.html"));
+    output::line(format_args!(
+        "{site}: {word}; {what} in {folder}, see report/index.html"
+    ));
     for reason in &verdict.reasons {
         output::line(format_args!("  {reason}"));
     }
 }
 
 fn outcome_json(outcome: &Outcome) -> serde_json::Value {
-    let verdict = |published: bool, verdict: &Verdict| {
-        json!({ "published": published, "valid": verdict.valid, "reasons": verdict.reasons })
-    };
+    let verdict = |published: bool, verdict: &Verdict| json!({ "published": published, "valid": verdict.valid, "reasons": verdict.reasons });
     match outcome {
         Err(failure) => json!({
             "site": failure.site,
             "error": failure.to_string(),
             "exit_code": failure.kind().exit_code(),
         }),
-        Ok(SiteOutcome { site, folder, ending }) => {
+        Ok(SiteOutcome {
+            site,
+            folder,
+            ending,
+        }) => {
             let ending = match ending {
                 Ending::Published(found) => verdict(true, found),
                 Ending::Unchanged(found) => verdict(false, found),

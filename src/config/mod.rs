@@ -29,9 +29,6 @@ pub struct Loaded {
     pub site: SiteConfig,
     /// What was accepted but is worth a word, each with its place: entries that are never used.
     pub warnings: Vec<String>,
-    /// BLAKE3, hexadecimal, of the keys and values as written: comments, spacing, order of keys
-    /// and the place of the file do not change it.
-    pub blake3: String,
 }
 
 /// Reads and checks the configuration `path`; relative paths in it count from its own folder.
@@ -78,16 +75,10 @@ fn read(path: &Path) -> Result<String, Failure> {
 /// [`Problems`] with everything that is wrong.
 pub fn parse(text: &str, file: &Path) -> Result<Loaded, Problems> {
     let mut review = Review::new(file, text);
-    let valid = shape::read(text, &mut review).map(|(raw, blake3)| {
-        let site = validate::validate(raw, file, &mut review);
-        (site, blake3)
-    });
-    let ((site, blake3), warnings) = review.finish(valid)?;
-    Ok(Loaded {
-        site,
-        warnings,
-        blake3,
-    })
+    let valid = shape::read(text, &mut review)
+        .map(|(raw, blake3)| validate::validate(raw, file, blake3, &mut review));
+    let (site, warnings) = review.finish(valid)?;
+    Ok(Loaded { site, warnings })
 }
 
 /// Two configurations name the same site, so their products would overwrite each other.

@@ -15,6 +15,9 @@ pub struct SiteConfig {
     pub description: String,
     /// The file it was read from.
     pub file: PathBuf,
+    /// BLAKE3, hexadecimal, of the keys and values as written: comments, spacing, order of keys
+    /// and the place of the file do not change it.
+    pub blake3: String,
     /// Where kernels come from.
     pub kernels: KernelsConfig,
     /// Pointing (CK) bias.

@@ -47,10 +47,17 @@ fn check_pedr(path: &Path, choice: DatumChoice) -> Result<String> {
     let file = pedr::File::open(path)?;
     let version = file.name().map(|name| name.version);
     let datum = pedr::decide_datum(choice, version, file.label().datum).in_file(path)?;
-    let complaints: Vec<String> =
-        file.label_complaints().iter().map(|complaint| format!("; {}", complaint.text)).collect();
+    let complaints: Vec<String> = file
+        .label_complaints()
+        .iter()
+        .map(|complaint| format!("; {}", complaint.text))
+        .collect();
     let frames = file.records().len();
-    Ok(format!("{}: {frames} frames in {datum}{}", path.display(), complaints.concat()))
+    Ok(format!(
+        "{}: {frames} frames in {datum}{}",
+        path.display(),
+        complaints.concat()
+    ))
 }
 
 fn check_kernels(config: &SiteConfig, checked: &mut Checked) -> Result<()> {
@@ -66,7 +73,9 @@ fn check_kernels(config: &SiteConfig, checked: &mut Checked) -> Result<()> {
     drop(session);
     let exposures: Vec<Interval> = images.iter().map(|image| image.exposures()).collect();
     let kernels = load_kernels(config, &exposures)?;
-    checked.findings.extend(kernels.explanation().iter().cloned());
+    checked
+        .findings
+        .extend(kernels.explanation().iter().cloned());
     let session = Session::open(&kernels)?;
     for image in &images {
         let covered = require_coverage(&session, image, &config.kernels, &config.pointing);

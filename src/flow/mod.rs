@@ -189,22 +189,33 @@ fn run_stages(config: &SiteConfig, options: &RunOptions<'_>) -> Result<SiteOutco
     let stage = Stage::SearchFootprints.name();
     let parts = parts::search_footprints(config).in_stage(stage)?;
     let found = cache.stage(stage, parts, || {
-        search_footprints(&config.pedr, &config.windows, config.mola_clock.correction_s())
-            .in_stage(stage)
+        search_footprints(
+            &config.pedr,
+            &config.windows,
+            config.mola_clock.correction_s(),
+        )
+        .in_stage(stage)
     })?;
     until!(Stage::SearchFootprints, Stage::ConvertDatum);
 
     let stage = Stage::ConvertDatum.name();
     let parts = parts::convert_datum(config, Some(&found.blake3));
     let converted = cache.stage(stage, parts, || {
-        Ok(convert_datum(found.value.footprints.clone(), &config.mola_clock))
+        Ok(convert_datum(
+            found.value.footprints.clone(),
+            &config.mola_clock,
+        ))
     })?;
     until!(Stage::ConvertDatum, Stage::GroupProfiles);
 
     let stage = Stage::GroupProfiles.name();
     let parts = parts::group_profiles(config, Some(&converted.blake3), Some(&images.blake3));
     let profiles = cache.stage(stage, parts, || {
-        Ok(group_profiles(&converted.value.footprints, &config.windows, &images.value))
+        Ok(group_profiles(
+            &converted.value.footprints,
+            &config.windows,
+            &images.value,
+        ))
     })?;
     until!(Stage::GroupProfiles, Stage::CheckRanges);
 
@@ -214,7 +225,12 @@ fn run_stages(config: &SiteConfig, options: &RunOptions<'_>) -> Result<SiteOutco
     let kernels = load_kernels(config, &wanted).in_stage(Stage::LoadKernels.name())?;
 
     let stage = Stage::CheckRanges.name();
-    let parts = parts::check_ranges(config, &kernels, Some(&converted.blake3), Some(&profiles.blake3));
+    let parts = parts::check_ranges(
+        config,
+        &kernels,
+        Some(&converted.blake3),
+        Some(&profiles.blake3),
+    );
     let ranges = cache.stage(stage, parts, || {
         let trajectory = trajectory(config, &kernels, &profiles.value).in_stage(stage)?;
         check_ranges(

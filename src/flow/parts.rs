@@ -30,7 +30,10 @@ pub(super) fn search_footprints(config: &SiteConfig) -> Result<Parts> {
         .key("mola_clock (correction)", &config.mola_clock.correction_s())
         .key("windows", &config.windows);
     for path in &config.pedr.files {
-        let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy();
+        let name = path
+            .file_name()
+            .unwrap_or(path.as_os_str())
+            .to_string_lossy();
         parts = parts.file("pedr", &name, &hash_file(path)?.0);
     }
     Ok(parts)
@@ -104,17 +107,21 @@ pub(super) fn publish(
     config: &SiteConfig,
     kernels: &KernelSet,
     outputs: impl IntoIterator<Item = (String, Option<String>)>,
-) -> Result<Parts> {
-    let mut parts = Parts::new().file("configuration", "file", &hash_file(&config.file)?.0);
+) -> Parts {
+    let mut parts = Parts::new().key("configuration", &config.blake3);
     for (stage, output) in outputs {
         parts = parts.output(&stage, output.as_deref());
     }
-    Ok(with_kernels(parts, kernels, |_| true))
+    with_kernels(parts, kernels, |_| true)
 }
 
 fn with_kernels(mut parts: Parts, kernels: &KernelSet, wanted: fn(KernelRole) -> bool) -> Parts {
     let mut place = 0;
-    for kernel in kernels.kernels().iter().filter(|kernel| wanted(kernel.role)) {
+    for kernel in kernels
+        .kernels()
+        .iter()
+        .filter(|kernel| wanted(kernel.role))
+    {
         place += 1;
         let value = format!("{place}: {}", kernel.blake3);
         parts = parts.file("kernel", &kernel.file_name(), &value);

@@ -47,10 +47,8 @@ fn plan_stages(config: &SiteConfig, out: &Path, force: bool) -> Result<Vec<Plann
     let clocks = load_kernels(config, &[]).in_stage(Stage::LoadKernels.name())?;
     let parts = parts::tag_times(config, &clocks).in_stage(Stage::TagTimes.name())?;
     let images: Option<Output<Vec<ImageTimes>>> = planner.look(Stage::TagTimes.name(), &parts);
-    let parts =
-        parts::search_footprints(config).in_stage(Stage::SearchFootprints.name())?;
-    let found: Option<Output<SearchResult>> =
-        planner.look(Stage::SearchFootprints.name(), &parts);
+    let parts = parts::search_footprints(config).in_stage(Stage::SearchFootprints.name())?;
+    let found: Option<Output<SearchResult>> = planner.look(Stage::SearchFootprints.name(), &parts);
     let parts = parts::convert_datum(config, hash(found.as_ref()).as_deref());
     let converted: Option<Output<Converted>> = planner.look(Stage::ConvertDatum.name(), &parts);
     let parts = parts::group_profiles(
@@ -58,11 +56,14 @@ fn plan_stages(config: &SiteConfig, out: &Path, force: bool) -> Result<Vec<Plann
         hash(converted.as_ref()).as_deref(),
         hash(images.as_ref()).as_deref(),
     );
-    let profiles: Option<Output<Vec<Profile>>> =
-        planner.look(Stage::GroupProfiles.name(), &parts);
+    let profiles: Option<Output<Vec<Profile>>> = planner.look(Stage::GroupProfiles.name(), &parts);
 
-    let exposures = images.iter().flat_map(|images| images.value.iter().map(ImageTimes::exposures));
-    let flights = profiles.iter().flat_map(|found| found.value.iter().map(|p| p.interval));
+    let exposures = images
+        .iter()
+        .flat_map(|images| images.value.iter().map(ImageTimes::exposures));
+    let flights = profiles
+        .iter()
+        .flat_map(|found| found.value.iter().map(|p| p.interval));
     let wanted: Vec<Interval> = exposures.chain(flights).collect();
     let kernels = load_kernels(config, &wanted).in_stage(Stage::LoadKernels.name())?;
 
@@ -75,9 +76,18 @@ fn plan_stages(config: &SiteConfig, out: &Path, force: bool) -> Result<Vec<Plann
     let ranges: Option<Output<RangeCheck>> = planner.look(Stage::CheckRanges.name(), &parts);
     let mut outputs = vec![
         (Stage::TagTimes.name().to_owned(), hash(images.as_ref())),
-        (Stage::SearchFootprints.name().to_owned(), hash(found.as_ref())),
-        (Stage::ConvertDatum.name().to_owned(), hash(converted.as_ref())),
-        (Stage::GroupProfiles.name().to_owned(), hash(profiles.as_ref())),
+        (
+            Stage::SearchFootprints.name().to_owned(),
+            hash(found.as_ref()),
+        ),
+        (
+            Stage::ConvertDatum.name().to_owned(),
+            hash(converted.as_ref()),
+        ),
+        (
+            Stage::GroupProfiles.name().to_owned(),
+            hash(profiles.as_ref()),
+        ),
         (Stage::CheckRanges.name().to_owned(), hash(ranges.as_ref())),
     ];
     for image in &config.images {
@@ -98,7 +108,7 @@ fn plan_stages(config: &SiteConfig, out: &Path, force: bool) -> Result<Vec<Plann
         let model: Option<Output<SensorModel>> = planner.look(&stage, &parts);
         outputs.push((stage, hash(model.as_ref())));
     }
-    let parts = parts::publish(config, &kernels, outputs).in_stage(Stage::Publish.name())?;
+    let parts = parts::publish(config, &kernels, outputs);
     let because = match publish::standing(&folder, &planner.cache, &parts) {
         Ok(_) => Because::Unchanged,
         Err(because) => because,

@@ -6,8 +6,8 @@ use super::{Ending, Stage, parts};
 use crate::{
     config::{BiasScope, SiteConfig},
     error::Result,
-    geom::mars_rotation::mars_rotation,
     frames::MarsIau2000,
+    geom::mars_rotation::mars_rotation,
     products::{ImageProducts, KernelLine, SiteProducts, write_products},
     spice::{KernelSet, Session},
     stages::{
@@ -21,7 +21,9 @@ use crate::{
         manifest::{
             BiasEntry, Complaints, ConfigurationEntry, KernelEntry, Manifest, StageEntry, Verdict,
         },
-        publish::{MANIFEST, damaged_product, entries, publish as publish_files, read_manifest, staging},
+        publish::{
+            MANIFEST, damaged_product, entries, publish as publish_files, read_manifest, staging,
+        },
     },
     time::{Et, Interval, Intervals},
 };
@@ -55,10 +57,14 @@ pub(super) fn standing(
 ) -> std::result::Result<Verdict, Because> {
     let output: Output<Verdict> = cache.load(Stage::Publish.name(), parts)?;
     let Some(manifest) = read_manifest(folder) else {
-        return Err(Because::Moved(vec![format!("{MANIFEST} is missing or damaged")]));
+        return Err(Because::Moved(vec![format!(
+            "{MANIFEST} is missing or damaged"
+        )]));
     };
     match damaged_product(folder, &manifest) {
-        Some(path) => Err(Because::Moved(vec![format!("{path} is missing or was changed")])),
+        Some(path) => Err(Because::Moved(vec![format!(
+            "{path} is missing or was changed"
+        )])),
         None => Ok(output.value),
     }
 }
@@ -69,7 +75,7 @@ pub(super) fn standing(
 /// A kernel that changed during the run, a product that does not read back, a disk that refuses.
 pub(super) fn publish(folder: &Path, cache: &StageCache, results: &Results<'_>) -> Result<Ending> {
     let name = Stage::Publish.name();
-    let parts = parts::publish(results.config, results.kernels, results.outputs())?;
+    let parts = parts::publish(results.config, results.kernels, results.outputs());
     match standing(folder, cache, &parts) {
         Ok(verdict) => {
             tracing::info!(stage = name, "kept: {}", Because::Unchanged);
@@ -122,8 +128,13 @@ fn make_products(folder: &Path, results: &Results<'_>, fingerprint: String) -> R
             model: &model.value,
         })
         .collect();
-    let complaints: Vec<String> =
-        results.found.value.complaints.iter().map(ToString::to_string).collect();
+    let complaints: Vec<String> = results
+        .found
+        .value
+        .complaints
+        .iter()
+        .map(ToString::to_string)
+        .collect();
     let rejected = results.rejected();
     let staging = staging(folder)?;
     let mut files: Vec<(std::path::PathBuf, u64)> = write_products(
@@ -188,9 +199,18 @@ impl Results<'_> {
         notes.extend(self.found.value.notes.iter().cloned());
         notes.extend(self.converted.value.notes.iter().cloned());
         for image in &self.images.value {
-            notes.extend(image.notes.iter().map(|note| format!("image {}: {note}", image.id)));
+            notes.extend(
+                image
+                    .notes
+                    .iter()
+                    .map(|note| format!("image {}: {note}", image.id)),
+            );
         }
-        for model in self.models.iter().filter(|model| model.value.near_gimbal_lock) {
+        for model in self
+            .models
+            .iter()
+            .filter(|model| model.value.near_gimbal_lock)
+        {
             notes.push(format!(
                 "image {}: |cos φ| falls to {:.3}, where ω and κ are badly determined; use the rotation-vector form",
                 model.value.image, model.value.cos_phi_min
@@ -201,7 +221,9 @@ impl Results<'_> {
 
     fn rejected(&self) -> BTreeMap<String, u64> {
         let rejected = self.found.value.rejected.iter();
-        rejected.map(|(reason, count)| (reason.to_string(), *count)).collect()
+        rejected
+            .map(|(reason, count)| (reason.to_string(), *count))
+            .collect()
     }
 
     fn verdict(&self) -> Verdict {
@@ -214,7 +236,8 @@ impl Results<'_> {
             reasons.map(move |reason| format!("image {}: {reason}", model.value.image))
         });
         let mut reasons: Vec<String> = profiles.chain(models).collect();
-        if self.converted.value.footprints.is_empty() {
+        let searched = !self.config.pedr.files.is_empty();
+        if searched && self.converted.value.footprints.is_empty() {
             reasons.insert(0, "no footprint in any window".to_owned());
         }
         Verdict {
@@ -245,7 +268,10 @@ impl Results<'_> {
         let counts = BTreeMap::from([
             ("frames_read".to_owned(), found.frames_read),
             ("shots_read".to_owned(), found.shots_read),
-            ("footprints".to_owned(), self.converted.value.footprints.len() as u64),
+            (
+                "footprints".to_owned(),
+                self.converted.value.footprints.len() as u64,
+            ),
             ("profiles".to_owned(), self.profiles.value.len() as u64),
             ("images".to_owned(), self.images.value.len() as u64),
         ]);
@@ -257,7 +283,7 @@ impl Results<'_> {
             verdict: self.verdict(),
             configuration: ConfigurationEntry {
                 file_name: file_name.to_string_lossy().into_owned(),
-                blake3: crate::store::atomic::hash_file(&config.file)?.0,
+                blake3: config.blake3.clone(),
             },
             biases: biases(config),
             kernels,
@@ -279,7 +305,9 @@ fn biases(config: &SiteConfig) -> Vec<BiasEntry> {
     let scope = match config.mola_clock.scope {
         BiasScope::SpkLookup => "spacecraft position in the range check",
         BiasScope::Rotation => "rotation of Mars into IAU 2000",
-        BiasScope::Both => "spacecraft position in the range check, and rotation of Mars into IAU 2000",
+        BiasScope::Both => {
+            "spacecraft position in the range check, and rotation of Mars into IAU 2000"
+        }
         BiasScope::None => "nothing",
     };
     vec![
@@ -320,7 +348,9 @@ fn kernel_entries(session: &Session, results: &Results<'_>) -> Result<Vec<Kernel
 
 /// Products use the IAU 2000 formula whatever the PCK says; whoever loads `kernels.tm` should know.
 fn pck_note(session: &Session, wanted: &[Interval]) -> Option<String> {
-    let at = wanted.first().map_or(Et::from_seconds(0.0), |interval| interval.start);
+    let at = wanted
+        .first()
+        .map_or(Et::from_seconds(0.0), |interval| interval.start);
     let ours = *mars_rotation::<MarsIau2000>(at).matrix();
     // Without a PCK there is nothing to compare, and nothing that could mislead.
     let theirs = session.mars_matrix(at).ok()?;

@@ -1,6 +1,7 @@
 //! Kernel files: what they are, by their content, and in which order they are loaded.
 
 use std::{
+    fmt,
     fs::{self, File},
     io::Read,
     path::{Path, PathBuf},
@@ -37,6 +38,21 @@ pub enum KernelRole {
     Ck,
     /// A list of kernels.
     Meta,
+}
+
+impl fmt::Display for KernelRole {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.write_str(match self {
+            Self::Lsk => "LSK",
+            Self::Sclk => "SCLK",
+            Self::Pck => "PCK",
+            Self::Fk => "FK",
+            Self::Ik => "IK",
+            Self::Spk => "SPK",
+            Self::Ck => "CK",
+            Self::Meta => "MK",
+        })
+    }
 }
 
 /// A kernel file as it was when it was chosen.

@@ -1,6 +1,6 @@
 //! Searches PEDR files for the shots in a site's windows: one pass over every file for all windows.
 
-use std::{collections::BTreeMap, ops::Range, path::Path};
+use std::{collections::BTreeMap, fmt, ops::Range, path::Path};
 
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -44,6 +44,19 @@ pub enum Reject {
     Attitude,
     /// Off-nadir angle too large.
     OffNadir,
+}
+
+impl fmt::Display for Reject {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.write_str(match self {
+            Self::NoReturn => "no return",
+            Self::Radius => "impossible radius",
+            Self::Class => "class",
+            Self::Channel => "channel",
+            Self::Attitude => "attitude flag",
+            Self::OffNadir => "off-nadir angle",
+        })
+    }
 }
 
 /// What the search found.

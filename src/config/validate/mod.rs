@@ -33,7 +33,12 @@ use values::Accept;
 const SCAN_STEPS_MAX: f64 = 10_000.0;
 
 /// The valid form of `raw`; to be used only when `review` has found no problem.
-pub(super) fn validate(raw: RawSite, file: &Path, review: &mut Review<'_>) -> SiteConfig {
+pub(super) fn validate(
+    raw: RawSite,
+    file: &Path,
+    blake3: String,
+    review: &mut Review<'_>,
+) -> SiteConfig {
     let searched = raw.pedr.is_some();
     let imaged = raw
         .images
@@ -56,6 +61,7 @@ pub(super) fn validate(raw: RawSite, file: &Path, review: &mut Review<'_>) -> Si
         site: review.identifier("site", &raw.site, None, false),
         description: raw.description.unwrap_or_default(),
         file: file.to_owned(),
+        blake3,
         kernels: kernels::kernels(raw.kernels, review),
         pointing: pointing(&inner(raw.pointing), review),
         mola_clock: mola_clock(&inner(raw.mola_clock), review),
