@@ -1,6 +1,12 @@
 //! Shipped configurations are accepted, documented defaults are the defaults, and schema, example
 //! and loader know the same keys.
 
+#![allow(
+    clippy::disallowed_methods,
+    clippy::unwrap_used,
+    reason = "helpers of tests may panic, and files in a temporary folder need no atomic writer"
+)]
+
 use std::{
     collections::BTreeSet,
     fs,
@@ -22,10 +28,6 @@ fn example_text() -> String {
 }
 
 /// A temporary `sites` folder beside the files that shipped configurations point to.
-#[allow(
-    clippy::disallowed_methods,
-    reason = "files in a temporary folder need no atomic writer"
-)]
 fn folder() -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     for (path, content) in [
