@@ -117,7 +117,7 @@ impl Cspice {
             text_of(&text)
         };
         let fault = SpiceFault::Spice {
-            call,
+            call: call.to_owned(),
             short: message(c"SHORT", SHORT_MESSAGE_SIZE),
             long: message(c"LONG", LONG_MESSAGE_SIZE),
         };
@@ -134,13 +134,15 @@ impl Cspice {
         self.check("furnsh_c")
     }
 
-    /// `utc2et_c`: UTC to ET.
+    /// `str2et_c`: UTC to ET. (`utc2et_c` would take a thirteenth month for the next January.)
     pub(super) fn utc_to_et(&self, utc: &str) -> Called<f64> {
         let text = c_text("a UTC string", utc)?;
         let mut et = 0.0;
         // SAFETY: the lock is held; `text` is zero-ended, `et` is a live double.
-        unsafe { naif::utc2et_c(text.as_ptr().cast_mut(), &raw mut et) };
-        self.check("utc2et_c").map(|()| et)
+        unsafe { naif::str2et_c(text.as_ptr().cast_mut(), &raw mut et) };
+        self.check("str2et_c")
+            .map(|()| et)
+            .map_err(|fault| fault.of(utc))
     }
 
     /// `et2utc_c`: ET to ISO calendar UTC with `decimals` digits of a second.
@@ -165,7 +167,9 @@ impl Cspice {
         let mut et = 0.0;
         // SAFETY: the lock is held; `text` is zero-ended, `et` is a live double.
         unsafe { naif::scs2e_c(clock, text.as_ptr().cast_mut(), &raw mut et) };
-        self.check("scs2e_c").map(|()| et)
+        self.check("scs2e_c")
+            .map(|()| et)
+            .map_err(|fault| fault.of(sclk))
     }
 
     /// `sce2s_c`: ET to clock string.
