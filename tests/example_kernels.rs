@@ -10,12 +10,15 @@ use areograph::{
 };
 
 fn example(name: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("kernels.example").join(name)
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("kernels.example")
+        .join(name)
 }
 
 #[test]
 fn the_metakernel_loads_clock_leap_seconds_and_camera() {
-    let session = Session::open(&KernelSet::from_metakernel(&example("example.tm")).unwrap()).unwrap();
+    let session =
+        Session::open(&KernelSet::from_metakernel(&example("example.tm")).unwrap()).unwrap();
     // Clock readings and their ET from the mission's own clock kernel; 1 µs is what the digits hold.
     for (clock, et_s) in [
         ("561812335:32", -69_382_819.360_519_02),
@@ -39,7 +42,11 @@ fn the_metakernel_loads_clock_leap_seconds_and_camera() {
     let mounting = session.mounting(Et::from_seconds(0.0)).unwrap();
     // Boresight in the bus as MOC's instrument kernel 2.0 has it; ten printed digits.
     let boresight = mounting.matrix().row(2);
-    for (found, published) in boresight.iter().zip([-0.001_250_004_5, -0.002_000_668_0, 0.999_997_217_4]) {
+    for (found, published) in
+        boresight
+            .iter()
+            .zip([-0.001_250_004_5, -0.002_000_668_0, 0.999_997_217_4])
+    {
         assert!((found - published).abs() < 1e-10, "{boresight}");
     }
 }

@@ -28,7 +28,10 @@ use nalgebra::Vector3;
 use serde_json::Value;
 
 /// Days of half an hour: slews, images and windows are all inside.
-const SHORT: SceneOptions = SceneOptions { seed: 3, day_s: 1_800.0 };
+const SHORT: SceneOptions = SceneOptions {
+    seed: 3,
+    day_s: 1_800.0,
+};
 
 struct Mission {
     folder: tempfile::TempDir,
@@ -58,11 +61,21 @@ fn truth_of(mission: &Path) -> Value {
 }
 
 fn numbers(value: &Value) -> Vec<f64> {
-    value.as_array().unwrap().iter().map(|x| x.as_f64().unwrap()).collect()
+    value
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|x| x.as_f64().unwrap())
+        .collect()
 }
 
 fn vectors(value: &Value) -> Vec<Vector3<f64>> {
-    value.as_array().unwrap().iter().map(|row| Vector3::from_vec(numbers(row))).collect()
+    value
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|row| Vector3::from_vec(numbers(row)))
+        .collect()
 }
 
 /// A shot by the rules of the PEDR, decoded here a second time; angles in radians, lengths in metres.
@@ -78,7 +91,8 @@ fn decode(record: &Record, shot: u8) -> Decoded {
     let k = usize::from(shot - 1);
     let from_middle = f64::from(shot) - 10.5;
     let x = from_middle / 20.0;
-    let micro = |mid: i32, change: i32| (f64::from(mid) + x * f64::from(change)) * RADIANS_PER_MICRODEGREE;
+    let micro =
+        |mid: i32, change: i32| (f64::from(mid) + x * f64::from(change)) * RADIANS_PER_MICRODEGREE;
     let radius_m = f64::from(record.shot_radius_cm[k].get()) / 100.0;
     let higher_m = radius_m - f64::from(record.mid_radius_cm.get()) / 100.0;
     let parallax = |nanodegrees: i32| f64::from(nanodegrees) * 1e-9 * RADIANS_PER_DEGREE * higher_m;
@@ -120,7 +134,11 @@ fn records(path: &Path) -> Vec<Record> {
 }
 
 fn datum(file: &str) -> MarsDatum {
-    if file.ends_with("l.b") { MarsDatum::Iau2000 } else { MarsDatum::Iau1991 }
+    if file.ends_with("l.b") {
+        MarsDatum::Iau2000
+    } else {
+        MarsDatum::Iau1991
+    }
 }
 
 fn shots(profile: &Value) -> Vec<(usize, u8)> {
@@ -144,22 +162,37 @@ fn the_gsfc_orbit_and_the_biased_attitude_are_the_truth() {
             let position = mars * session.state(et).unwrap().position.xyz_m;
             let off_m = (position - positions[index]).norm();
             assert!(off_m < 1e-4, "{} {off_m} m", image["id"]); // 0.1 mm; kernels round to 1e-9 km
-            let attitude = session.attitude(MGS_POINTING_BIAS.lookup(et), et, 0.0).unwrap();
+            let attitude = session
+                .attitude(MGS_POINTING_BIAS.lookup(et), et, 0.0)
+                .unwrap();
             let camera = session.mounting(et).unwrap() * attitude.inertial_to_bus;
             let camera_to_mars = mars * camera.matrix().transpose();
-            let quaternion: [f64; 4] =
-                numbers(&image["camera_to_mars_quaternion_wxyz"][index]).try_into().unwrap();
-            let off_rad = (camera_to_mars - matrix_of_spice_quaternion(quaternion)).abs().max();
+            let quaternion: [f64; 4] = numbers(&image["camera_to_mars_quaternion_wxyz"][index])
+                .try_into()
+                .unwrap();
+            let off_rad = (camera_to_mars - matrix_of_spice_quaternion(quaternion))
+                .abs()
+                .max();
             assert!(off_rad < 1e-10, "{} {off_rad} rad", image["id"]); // clock ticks round to 1e-11 rad
             // Without the bias the camera looks elsewhere: 1.15 s at 0.05 deg/s, unless it is held.
             let unbiased = session.attitude(
-                areograph::time::PointingBias::from_seconds(0.0).lookup(et), et, 0.0,
+                areograph::time::PointingBias::from_seconds(0.0).lookup(et),
+                et,
+                0.0,
             );
             let turned = unbiased.unwrap().inertial_to_bus.matrix()
                 * attitude.inertial_to_bus.matrix().transpose();
             let turned_deg = turned[(0, 2)].abs().asin() / RADIANS_PER_DEGREE;
-            let expected_deg = if image["look"] == "nadir" { 0.0585 } else { 0.0 };
-            assert!((turned_deg - expected_deg).abs() < 0.001, "{} {turned_deg}", image["id"]);
+            let expected_deg = if image["look"] == "nadir" {
+                0.0585
+            } else {
+                0.0
+            };
+            assert!(
+                (turned_deg - expected_deg).abs() < 0.001,
+                "{} {turned_deg}",
+                image["id"]
+            );
         }
     }
 }
@@ -169,8 +202,11 @@ fn image_starts_are_the_published_times_to_the_clock_tick() {
     let session = MISSION.session("nav.tm");
     for image in MISSION.truth["images"].as_array().unwrap() {
         let id = image["id"].as_str().unwrap();
-        let label = areograph::pds::moc::read_label(&MISSION.path(&format!("labels/{id}.lbl"))).unwrap();
-        let clock = session.sclk_to_et(&label.fields.sclk_start.unwrap()).unwrap();
+        let label =
+            areograph::pds::moc::read_label(&MISSION.path(&format!("labels/{id}.lbl"))).unwrap();
+        let clock = session
+            .sclk_to_et(&label.fields.sclk_start.unwrap())
+            .unwrap();
         let utc = session.utc_to_et(&label.fields.utc_start.unwrap()).unwrap();
         assert!((clock.seconds() - image["start_et_s"].as_f64().unwrap()).abs() < 1e-9);
         assert!((0.0..0.004).contains(&utc.since(clock)), "{id}"); // a tick is 1/256 s
@@ -186,7 +222,9 @@ fn footprints_come_back_within_0_2_m_and_times_within_2_us() {
         let times = numbers(&profile["et_s"]);
         let grounds = vectors(&profile["ground_iau2000_m"]);
         assert!(times.len() > 150, "{file}: {} shots", times.len());
-        for (((record, shot), time_s), truth_m) in shots(profile).into_iter().zip(times).zip(grounds) {
+        for (((record, shot), time_s), truth_m) in
+            shots(profile).into_iter().zip(times).zip(grounds)
+        {
             let decoded = decode(&records[record], shot);
             assert_eq!(decoded.class, 1);
             let et = Et::from_seconds(decoded.tag_s - MOLA_CLOCK_BIAS_S);
@@ -213,20 +251,30 @@ fn range_minus_distance_has_the_expected_mean_for_every_orbit() {
                 .map(|(record, shot)| {
                     let decoded = decode(&records[record], shot);
                     let et = Et::from_seconds(decoded.tag_s - MOLA_CLOCK_BIAS_S);
-                    let ground = convert_datum::<MarsIau2000>(decoded.ground_file_m, datum(file), et, et);
+                    let ground =
+                        convert_datum::<MarsIau2000>(decoded.ground_file_m, datum(file), et, et);
                     let spacecraft =
                         mars_matrix(&MARS_IAU2000, et) * session.state(et).unwrap().position.xyz_m;
                     let own_m = (decoded.spacecraft_file_m - decoded.ground_file_m).norm();
                     // The frame's own spacecraft track is linear: a metre would be a field read wrongly.
-                    assert!((decoded.range_m - own_m).abs() < 0.3, "{file} {}", decoded.range_m - own_m);
+                    assert!(
+                        (decoded.range_m - own_m).abs() < 0.3,
+                        "{file} {}",
+                        decoded.range_m - own_m
+                    );
                     decoded.range_m - (spacecraft - ground.xyz_m).norm()
                 })
                 .collect();
             let mean_m = residuals.iter().sum::<f64>() / residuals.len() as f64;
             let difference = &profile["orbit_differences"][family];
-            let expected_m = difference["expected_range_minus_distance_mean_m"].as_f64().unwrap();
+            let expected_m = difference["expected_range_minus_distance_mean_m"]
+                .as_f64()
+                .unwrap();
             println!("{file} {family}: {mean_m:.4} m, expected {expected_m:.4} m");
-            assert!((mean_m - expected_m).abs() < 0.01, "{file} {family} {mean_m} {expected_m}"); // cm steps, averaged
+            assert!(
+                (mean_m - expected_m).abs() < 0.01,
+                "{file} {family} {mean_m} {expected_m}"
+            ); // cm steps, averaged
             assert!(expected_m.abs() < 50.0 && (family != "gsfc" || expected_m.abs() < 1e-9));
         }
     }
@@ -269,27 +317,45 @@ fn the_same_seed_gives_the_same_bytes() {
             let path = entry.unwrap().path();
             if path.is_file() {
                 let other = again.join(part).join(path.file_name().unwrap());
-                assert!(fs::read(&path).unwrap() == fs::read(&other).unwrap(), "{}", path.display());
+                assert!(
+                    fs::read(&path).unwrap() == fs::read(&other).unwrap(),
+                    "{}",
+                    path.display()
+                );
                 compared += 1;
             }
         }
     }
     assert_eq!(compared, 6 + 3 + 5 + 6 + 6 + 3 + 2);
-    assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1, "no draft is left");
+    assert_eq!(
+        fs::read_dir(folder.path()).unwrap().count(),
+        1,
+        "no draft is left"
+    );
 }
 
 #[test]
 fn days_that_miss_their_image_are_refused() {
     let folder = tempfile::tempdir().unwrap();
-    let options = SceneOptions { day_s: f64::NAN, ..SHORT };
+    let options = SceneOptions {
+        day_s: f64::NAN,
+        ..SHORT
+    };
     let failure = write_scene(&folder.path().join("mission"), &options).unwrap_err();
-    assert!(failure.to_string().contains("day_s is NaN; expected 600 to 90000"), "{failure}");
+    assert!(
+        failure
+            .to_string()
+            .contains("day_s is NaN; expected 600 to 90000"),
+        "{failure}"
+    );
 }
 
 #[test]
 fn a_flight_along_real_kernels_gives_shots_that_fit_them() {
     let test = "a_flight_along_real_kernels_gives_shots_that_fit_them";
-    let Some(data) = common::real_data("ale_mgs/m0402852", test) else { return };
+    let Some(data) = common::real_data("ale_mgs/m0402852", test) else {
+        return;
+    };
     let folder = tempfile::tempdir().unwrap();
     let names = [
         "naif0012.tls",
@@ -312,7 +378,13 @@ fn a_flight_along_real_kernels_gives_shots_that_fit_them() {
     );
     fs::write(&metakernel, text).unwrap();
     let mission = folder.path().join("along");
-    let summary = write_scene_along(&mission, &metakernel, &[data.join("m0402852_isis.lbl")], &SHORT).unwrap();
+    let summary = write_scene_along(
+        &mission,
+        &metakernel,
+        &[data.join("m0402852_isis.lbl")],
+        &SHORT,
+    )
+    .unwrap();
     println!("{summary}");
     assert_eq!((summary.images, summary.pedr_files), (1, 1));
     let loaded = config::load(&mission.join("sites/m04-02852.toml")).unwrap();
@@ -328,13 +400,17 @@ fn a_flight_along_real_kernels_gives_shots_that_fit_them() {
         for (record, shot) in shots(profile) {
             let decoded = decode(&records[record], shot);
             let et = Et::from_seconds(decoded.tag_s - MOLA_CLOCK_BIAS_S);
-            let spacecraft = mars_matrix(&MARS_IAU2000, et) * session.state(et).unwrap().position.xyz_m;
+            let spacecraft =
+                mars_matrix(&MARS_IAU2000, et) * session.state(et).unwrap().position.xyz_m;
             let residual_m = decoded.range_m - (spacecraft - decoded.ground_file_m).norm();
             assert!(residual_m.abs() < 0.5, "{residual_m}");
             sum_m += residual_m;
         }
         let mean_m = sum_m / times.len() as f64;
-        println!("{}: mean {mean_m:.4} m, frame error {}", profile["window"], profile["frame_error_max_m"]);
+        println!(
+            "{}: mean {mean_m:.4} m, frame error {}",
+            profile["window"], profile["frame_error_max_m"]
+        );
         assert!(mean_m.abs() < 0.02, "{mean_m}");
     }
 }
