@@ -122,7 +122,14 @@ fn listed_names(assignments: &[Assignment]) -> std::result::Result<Vec<String>, 
             name.replace(&format!("${symbol}"), value)
         })
     };
-    Ok(names.into_iter().map(replace).collect())
+    let names: Vec<String> = names.into_iter().map(replace).collect();
+    match names.iter().find(|name| name.starts_with('$')) {
+        Some(name) => Err(SpiceFault::NotAKernel {
+            found: format!("a metakernel that names {name}"),
+            expected: "that path symbol in PATH_SYMBOLS, with its value in PATH_VALUES",
+        }),
+        None => Ok(names),
+    }
 }
 
 /// The strings of a variable, continued ones joined.
