@@ -1,4 +1,9 @@
 //! A run that is killed leaves nothing half-made, and the next one ends with the same bytes.
+#![allow(
+    clippy::unwrap_used,
+    clippy::panic,
+    reason = "helpers of tests may fail loudly"
+)]
 
 mod common;
 

@@ -1,4 +1,9 @@
 //! A site on real kernels, from the command line: M04/02852, its PEDR flown along the real trajectory.
+#![allow(
+    clippy::unwrap_used,
+    clippy::panic,
+    reason = "helpers of tests may fail loudly"
+)]
 
 mod common;
 
