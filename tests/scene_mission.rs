@@ -1,5 +1,11 @@
 //! The synthetic mission, read back by CSPICE and by a decoding of its own.
 
+#![allow(
+    clippy::disallowed_methods,
+    clippy::unwrap_used,
+    reason = "helpers of tests may panic, and files in a temporary folder need no atomic writer"
+)]
+
 mod common;
 
 use std::{
@@ -142,10 +148,13 @@ fn datum(file: &str) -> MarsDatum {
 }
 
 fn shots(profile: &Value) -> Vec<(usize, u8)> {
-    numbers(&profile["record"])
+    let whole = |value: &Value| usize::try_from(value.as_u64().unwrap()).unwrap();
+    let records = profile["record"].as_array().unwrap();
+    let shots = profile["shot"].as_array().unwrap();
+    records
         .iter()
-        .zip(numbers(&profile["shot"]))
-        .map(|(record, shot)| (*record as usize - LABEL_RECORDS - 1, shot as u8))
+        .zip(shots)
+        .map(|(record, shot)| (whole(record) - LABEL_RECORDS - 1, u8::try_from(whole(shot)).unwrap()))
         .collect()
 }
 
@@ -271,10 +280,11 @@ fn range_minus_distance_has_the_expected_mean_for_every_orbit() {
                 .as_f64()
                 .unwrap();
             println!("{file} {family}: {mean_m:.4} m, expected {expected_m:.4} m");
+            // A footprint is rounded by 0.06 m on the ground, ten frames make a profile, looks lean by up to 18 deg.
             assert!(
-                (mean_m - expected_m).abs() < 0.05,
+                (mean_m - expected_m).abs() < 0.03,
                 "{file} {family} {mean_m} {expected_m}"
-            ); // the frame model and microdegrees, seen off nadir, average to a centimetre
+            );
             assert!(expected_m.abs() < 50.0 && (family != "gsfc" || expected_m.abs() < 1e-9));
         }
     }

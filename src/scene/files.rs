@@ -3,7 +3,7 @@
 use std::{
     fs::{self, File},
     io::{ErrorKind, Write},
-    path::{Path, PathBuf},
+    path::{self, Path, PathBuf},
 };
 
 use super::error::SceneError;
@@ -27,10 +27,13 @@ impl Draft {
     /// # Errors
     /// [`SceneError::NotAScene`] when `directory` or its draft holds something else; the system's refusal.
     pub(super) fn begin(directory: &Path, readme: &str) -> Result<Self> {
+        refuse_foreign(directory)?;
+        let directory = &path::absolute(directory)
+            .map_err(IoFault::on("resolve"))
+            .in_file(directory)?;
         let mut name = directory.file_name().unwrap_or("scene".as_ref()).to_owned();
         name.push(".partial");
         let folder = directory.with_file_name(name);
-        refuse_foreign(directory)?;
         remove_scene(&folder)?;
         fs::create_dir_all(&folder)
             .map_err(IoFault::on("create"))
@@ -56,7 +59,8 @@ impl Draft {
         &self.folder
     }
 
-    /// Moves the draft to its final place, where an older scene makes room.
+    /// Moves the draft to its final place. An older scene there goes first: a folder cannot be replaced in
+    /// one step, so a kill in between leaves the draft alone, whole.
     pub(super) fn finish(self) -> Result<()> {
         remove_scene(&self.final_place)?;
         fs::rename(&self.folder, &self.final_place)

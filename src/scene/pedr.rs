@@ -14,7 +14,7 @@ use crate::{
     constants::MOLA_CLOCK_BIAS_S,
     error::{Place, Result},
     frames::MarsDatum,
-    pds::pedr::{LABEL_RECORDS, LabelInfo, PedrWriter, Record, SHOTS},
+    pds::pedr::{LABEL_RECORDS, LabelInfo, PedrWriter, Record},
     time::{Et, Interval},
     units::RADIANS_PER_DEGREE,
 };
@@ -135,7 +135,6 @@ pub(super) fn write_pedr(
 
 /// Adds a frame to the counts of its file.
 fn count(counts: &mut FileTruth, frame: &Frame) {
-    debug_assert_eq!(frame.shots.len(), SHOTS);
     for shot in &frame.shots {
         match shot.echo {
             Echo::Ground => counts.shots_ground += 1,

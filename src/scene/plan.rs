@@ -20,7 +20,7 @@ pub(super) struct Site {
 }
 
 impl Site {
-    /// Half the window's extent in latitude, degrees: two MOLA seconds more than the longest image.
+    /// Half the window's extent in latitude, degrees: 59 km in all, where the longest image has 54 km.
     pub(super) const WINDOW_HALF_LATITUDE_DEG: f64 = 0.5;
     /// Half the window's extent in longitude, degrees.
     pub(super) const WINDOW_HALF_LONGITUDE_DEG: f64 = 0.25;

@@ -66,7 +66,7 @@ pub(super) struct ImageTruth {
     look: &'static str,
     emission_deg: Option<f64>,
     emission_source: Option<&'static str>,
-    /// Distance, ET seconds, position of the true orbit (`gsfc`) and attitude, one entry per epoch.
+    /// ET, position in the true orbit (`gsfc`) and attitude, one entry per epoch.
     epochs_et_s: Vec<f64>,
     position_iau2000_m: Vec<[f64; 3]>,
     camera_to_mars_quaternion_wxyz: Vec<[f64; 4]>,
