@@ -44,7 +44,7 @@ pub struct SiteProducts<'a> {
 pub struct KernelLine {
     /// File name.
     pub name: String,
-    /// What it holds, in lower case: `lsk`, `sclk`, `pck`, `fk`, `ik`, `spk`, `ck`.
+    /// What it holds: `LSK`, `SCLK`, `PCK`, `FK`, `IK`, `SPK`, `CK`.
     pub role: String,
     /// Size.
     pub bytes: u64,

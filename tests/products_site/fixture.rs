@@ -57,7 +57,7 @@ impl Site {
         Self {
             kernels: vec![KernelLine {
                 name: "naif0012.tls".to_owned(),
-                role: "lsk".to_owned(),
+                role: "LSK".to_owned(),
                 bytes: 5257,
                 blake3: "ab".repeat(32),
             }],
@@ -114,6 +114,7 @@ fn config() -> SiteConfig {
         site: "small".to_owned(),
         description: "One orbit & one image <made by hand>".to_owned(),
         file: "small.toml".into(),
+        blake3: "ef".repeat(32),
         kernels: KernelsConfig {
             source: KernelSource::Files(vec!["naif0012.tls".into()]),
             ck_tolerance_s: 0.0,
