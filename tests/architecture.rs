@@ -1,4 +1,9 @@
 //! Arrows point down: a room uses the floors below it, never one above.
+#![allow(
+    clippy::unwrap_used,
+    clippy::panic,
+    reason = "helpers of tests may fail loudly"
+)]
 
 use std::{
     collections::BTreeSet,

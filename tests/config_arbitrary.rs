@@ -1,5 +1,7 @@
 //! Whatever the text, the loader answers: it never panics, and it answers soon.
 
+#![allow(clippy::unwrap_used, reason = "helpers of tests may panic")]
+
 use std::{fs, path::Path, time::Instant};
 
 use areograph::config;
@@ -82,7 +84,6 @@ proptest! {
 
 #[test]
 fn texts_made_to_be_slow_or_deep_are_answered_soon() {
-    let start = Instant::now();
     let megabyte = 1 << 20;
     for text in [
         "[".repeat(megabyte),
@@ -101,10 +102,10 @@ fn texts_made_to_be_slow_or_deep_are_answered_soon() {
         format!("pedr.files = ['{}']", "[".repeat(megabyte)),
         format!("pedr.files = ['{}']", "*/".repeat(megabyte / 2)),
     ] {
-        let before = start.elapsed();
+        let start = Instant::now();
         let found = answer(&text);
         assert!(!found.is_empty() && found.lines().count() <= 101);
-        let took = start.elapsed() - before;
+        let took = start.elapsed();
         // Milliseconds in practice; the limit only tells a hang from a slow machine.
         assert!(took.as_secs() < 20, "{}… took {took:?}", &text[..30]);
     }

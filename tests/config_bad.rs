@@ -1,5 +1,11 @@
 //! Every configuration in `tests/config/bad` is refused with exactly the message beside it.
 
+#![allow(
+    clippy::disallowed_methods,
+    clippy::unwrap_used,
+    reason = "helpers of tests may panic, and files in a temporary folder need no atomic writer"
+)]
+
 use std::{
     fs,
     path::{Path, PathBuf},
@@ -10,10 +16,6 @@ use areograph::{config, error::Kind};
 const OPEN_RING: &str = r#"{"type": "Polygon", "coordinates": [[[0, 0], [1, 0], [1, 1], [0, 1]]]}"#;
 
 /// The files that the bad configurations point to.
-#[allow(
-    clippy::disallowed_methods,
-    reason = "files in a temporary folder need no atomic writer"
-)]
 fn folder() -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     fs::write(folder.path().join("there.txt"), "some text\n").unwrap();
@@ -64,10 +66,6 @@ fn every_bad_file_has_its_exact_message() {
 }
 
 #[test]
-#[allow(
-    clippy::disallowed_methods,
-    reason = "files in a temporary folder need no atomic writer"
-)]
 fn files_that_are_no_text_are_refused_before_they_are_parsed() {
     let folder = folder();
     let message = |name: &str, bytes: &[u8]| {

@@ -1,6 +1,12 @@
 //! Shipped configurations are accepted, documented defaults are the defaults, and schema, example
 //! and loader know the same keys.
 
+#![allow(
+    clippy::disallowed_methods,
+    clippy::unwrap_used,
+    reason = "helpers of tests may panic, and files in a temporary folder need no atomic writer"
+)]
+
 use std::{
     collections::BTreeSet,
     fs,
@@ -22,10 +28,6 @@ fn example_text() -> String {
 }
 
 /// A temporary `sites` folder beside the files that shipped configurations point to.
-#[allow(
-    clippy::disallowed_methods,
-    reason = "files in a temporary folder need no atomic writer"
-)]
 fn folder() -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     for (path, content) in [
@@ -87,6 +89,7 @@ fn the_example_says_the_defaults_and_means_si_units() {
     let least = parse_in(&folder, least).site;
     let with_defaults = SiteConfig {
         description: example.description.clone(),
+        blake3: example.blake3.clone(),
         windows: example.windows.clone(),
         images: example.images.clone(),
         ..least.clone()

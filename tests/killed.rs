@@ -1,4 +1,9 @@
 //! A run that is killed leaves nothing half-made, and the next one ends with the same bytes.
+#![allow(
+    clippy::unwrap_used,
+    clippy::panic,
+    reason = "helpers of tests may fail loudly"
+)]
 
 mod common;
 
@@ -16,7 +21,7 @@ const KILLS: u32 = 20;
 fn run(site: &Path, out: &Path, threads: &str) -> std::process::Command {
     let mut command = areograph();
     command
-        .arg("run")
+        .args(["--quiet", "run"])
         .arg(site)
         .arg("--out")
         .arg(out)

@@ -1,4 +1,9 @@
 //! The synthetic mission closes: what was injected comes back, and a bias that is switched off shows.
+#![allow(
+    clippy::unwrap_used,
+    clippy::panic,
+    reason = "helpers of tests may fail loudly"
+)]
 
 mod common;
 

@@ -1,4 +1,9 @@
 //! Image M04/02852 on real kernels: orientation and polynomial fits against CSPICE's own numbers.
+#![allow(
+    clippy::unwrap_used,
+    clippy::panic,
+    reason = "helpers of tests may fail loudly"
+)]
 
 mod common;
 

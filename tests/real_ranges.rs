@@ -1,4 +1,9 @@
 //! Table 3 of the paper with real shots: LOLA ranges of a stereo pair (ISIS test data), through our range check.
+#![allow(
+    clippy::unwrap_used,
+    clippy::panic,
+    reason = "helpers of tests may fail loudly"
+)]
 
 mod common;
 

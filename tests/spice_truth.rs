@@ -1,5 +1,10 @@
 //! Times, states and attitudes against numbers of an independent CSPICE run on real kernels.
 
+#![allow(
+    clippy::unwrap_used,
+    reason = "helpers of tests outside a test function"
+)]
+
 mod common;
 
 use std::path::{Path, PathBuf};
@@ -196,12 +201,16 @@ fn closed_rotation_of_mars_equals_the_kernels() {
             continue;
         };
         let session = Session::open(&KernelSet::from_files(&[path]).unwrap()).unwrap();
-        for days in -1_100..=2_600 {
-            let et = Et::from_seconds(f64::from(days) * 86_400.0 + 12_345.678);
-            let kernel = session.mars_matrix(et).unwrap();
-            let difference = worst(&kernel, &mars_matrix(&model, et));
-            // The meridian after 2600 days is 9e5 degrees; its rounding alone is 1e-12 rad.
-            assert!(difference < 3e-12, "{file} day {days}: {difference:.1e}");
+        // CSPICE multiplies the meridian out in degrees, then in radians, before it takes whole turns
+        // off: with 3e5 degrees in MOLA's years its rounding is 1e-12 rad (4 µm on the ground), with
+        // 9e5 degrees at the mission's end three times as much.
+        for (days, tolerance) in [(-900..=600, 1e-12), (601..=2_600, 3e-12)] {
+            let largest = days
+                .map(|day| Et::from_seconds(f64::from(day) * 86_400.0 + 12_345.678))
+                .map(|et| worst(&session.mars_matrix(et).unwrap(), &mars_matrix(&model, et)))
+                .fold(0.0, f64::max);
+            println!("{file}: {largest:.1e}");
+            assert!(largest < tolerance, "{file}: {largest:.1e}");
         }
     }
 }
@@ -346,6 +355,15 @@ fn a_trajectory_keeps_within_a_millimetre_of_the_kernels() {
     println!("trajectory: {worst_m:.2e} m, {worst_m_s:.2e} m/s off at 5001 instants per interval");
     assert!(worst_m < 1e-3);
     assert!(worst_m_s < 1e-3);
+    let start = held.as_slice()[1].start;
+    let clock = std::time::Instant::now();
+    let mut sum_m = 0.0;
+    for step in 0..100_000 {
+        let position = trajectory.position(start.plus(f64::from(step) * 2e-3));
+        sum_m += position.unwrap().xyz_m.x;
+    }
+    let nanoseconds = clock.elapsed().as_secs_f64() * 1e4;
+    println!("trajectory: {nanoseconds:.0} ns a call (checksum {sum_m:.3e})");
     let outside = Intervals::union_of([held.as_slice()[0].padded(1.0)]);
     assert_eq!(
         session.trajectory(&outside, 1e-3).unwrap_err().kind(),

@@ -109,11 +109,9 @@ fn load_sites(paths: &[std::path::PathBuf]) -> Result<Vec<SiteConfig>, Failure> 
             }
         }
     }
-    match first_failure {
-        Some(failure) => Err(failure),
-        None => {
-            check_sites(&sites)?;
-            Ok(sites)
-        }
+    if let Some(failure) = first_failure {
+        return Err(failure);
     }
+    check_sites(&sites)?;
+    Ok(sites)
 }

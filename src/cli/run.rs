@@ -25,7 +25,7 @@ use crate::{
 ///
 /// A stage runs only when something that it depends on has changed; the log says what.
 ///
-/// Example: areograph run sites/eos_chasma.toml sites/gusev_crater.toml --out products
+/// Example: `areograph run sites/*.toml --out products`
 #[derive(Debug, Args)]
 #[command(verbatim_doc_comment)]
 pub(super) struct Arguments {

@@ -12,7 +12,7 @@ use crate::{
 
 /// Writes a synthetic mission: kernels, PEDR files, labels, site files, and the truth behind them.
 ///
-/// Example: areograph scene demo && areograph run demo/sites/*.toml --out demo/out
+/// Example: `areograph scene demo && areograph run demo/sites/*.toml --out demo/out`
 #[derive(Debug, Args)]
 #[command(verbatim_doc_comment)]
 pub(super) struct Arguments {

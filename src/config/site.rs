@@ -24,9 +24,9 @@ pub struct SiteConfig {
     pub pointing: PointingConfig,
     /// MOLA clock bias.
     pub mola_clock: MolaClock,
-    /// PEDR files and filters.
+    /// PEDR files and filters; no files when only images are oriented.
     pub pedr: PedrConfig,
-    /// Windows on the ground, 1 to 64; bit `i` of `Footprints::windows` is entry `i`.
+    /// Windows on the ground, 1 to 64, or none when there are no PEDR files; bit `i` of `Footprints::windows` is entry `i`.
     pub windows: Vec<WindowConfig>,
     /// Images, possibly none.
     pub images: Vec<ImageConfig>,

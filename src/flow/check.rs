@@ -2,14 +2,13 @@
 
 use std::path::Path;
 
-use super::load_kernels;
+use super::steps::{load_kernels, wanted};
 use crate::{
     config::{DatumChoice, SiteConfig},
     error::{Failure, Place, Result},
     pds::pedr,
     spice::Session,
     stages::{sample_orientation::require_coverage, tag_times::tag_times},
-    time::Interval,
 };
 
 /// What a check found.
@@ -71,8 +70,7 @@ fn check_kernels(config: &SiteConfig, checked: &mut Checked) -> Result<()> {
         }
     }
     drop(session);
-    let exposures: Vec<Interval> = images.iter().map(|image| image.exposures()).collect();
-    let kernels = load_kernels(config, &exposures)?;
+    let kernels = load_kernels(config, &wanted(&images, &[]))?;
     checked
         .findings
         .extend(kernels.explanation().iter().cloned());

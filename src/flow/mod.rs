@@ -4,35 +4,21 @@ mod check;
 mod parts;
 mod plan;
 mod publish;
+mod steps;
 
-use std::{
-    fmt,
-    path::PathBuf,
-    sync::atomic::{AtomicBool, Ordering},
-};
+use std::{fmt, path::PathBuf, sync::atomic::AtomicBool};
 
 use crate::{
-    config::{KernelSource, SiteConfig},
-    error::{Fault, Kind, Place, Result},
-    spice::{KernelSet, Session},
-    stages::{
-        check_ranges::check_ranges, convert_datum::convert_datum,
-        fit_sensor_model::fit_sensor_model, group_profiles::group_profiles,
-        sample_orientation::sample_orientation, search_footprints::search_footprints,
-        tag_times::tag_times,
-    },
+    config::SiteConfig,
+    error::{Place, Result},
     store::{cache::StageCache, lock::SiteLock, manifest::Manifest},
-    time::{Interval, Intervals},
 };
 
 pub use check::{Checked, check_site};
 pub use plan::{PlannedStage, plan_site};
 
-/// The tabulated trajectory stays this close to the kernels, metres: a tenth of a PEDR centimetre.
-const TRAJECTORY_TOLERANCE_M: f64 = 0.001;
-
-/// Seconds of trajectory beyond what the scan of the clock bias reaches.
-const TRAJECTORY_MARGIN_S: f64 = 0.5;
+use publish::Results;
+use steps::{Leave, Steps, wanted};
 
 /// The stages, in order.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, clap::ValueEnum)]
@@ -123,158 +109,52 @@ pub enum Ending {
     StoppedAfter(Stage),
 }
 
-/// The user stopped the program.
-#[derive(Debug, thiserror::Error)]
-#[error("stopped before {before}")]
-struct Stopped {
-    before: Stage,
-}
-
-impl Fault for Stopped {
-    fn kind(&self) -> Kind {
-        Kind::Interrupted
-    }
-
-    fn advice(&self) -> String {
-        "run again: finished stages are kept".to_owned()
-    }
-}
-
 /// Runs one site from its configuration to its products.
 ///
-/// A stage whose parts did not move is not run; its stored output is used. Nothing else than this
-/// function decides that, and no stage knows of another.
+/// A stage whose parts did not move is not run; its stored output is used. Nothing else than the flow
+/// decides that, and no stage knows of another.
 ///
 /// # Errors
 /// The first failure, with site, stage, file and record; products of an earlier run stay as they are.
 pub fn run_site(config: &SiteConfig, options: &RunOptions<'_>) -> Result<SiteOutcome> {
     let span = tracing::info_span!("site", id = %config.site);
     let _entered = span.enter();
-    run_stages(config, options).in_site(&config.site)
+    let folder = options.out.join(&config.site);
+    let _lock = SiteLock::take(&folder).in_site(&config.site)?;
+    let steps = Steps {
+        config,
+        options,
+        cache: StageCache::new(&folder.join(".cache"), options.force),
+        folder,
+    };
+    let ending = match run_steps(&steps) {
+        Ok(ending) => ending,
+        Err(Leave::AsAsked) => Ending::StoppedAfter(options.until),
+        Err(Leave::Failed(failure)) => return Err(failure.in_site(&config.site)),
+    };
+    Ok(SiteOutcome {
+        site: config.site.clone(),
+        folder: steps.folder,
+        ending,
+    })
 }
 
-fn run_stages(config: &SiteConfig, options: &RunOptions<'_>) -> Result<SiteOutcome> {
-    let folder = options.out.join(&config.site);
-    let _lock = SiteLock::take(&folder)?;
-    let cache = StageCache::new(&folder.join(".cache"), options.force);
-    let ended = |ending| {
-        Ok(SiteOutcome {
-            site: config.site.clone(),
-            folder: folder.clone(),
-            ending,
-        })
-    };
-    // Leaves the flow after the stage that was asked for, or where the user stopped it.
-    macro_rules! until {
-        ($stage:expr, $next:expr) => {
-            if options.until == $stage {
-                return ended(Ending::StoppedAfter($stage));
-            }
-            if options.stop.load(Ordering::Relaxed) {
-                return Err(Stopped { before: $next }.into());
-            }
-        };
-    }
+/// The way of the data; every step keeps its stored output when nothing that it depends on moved.
+fn run_steps(steps: &Steps<'_>) -> std::result::Result<Ending, Leave> {
+    let clocks = steps.load_kernels(&[])?;
+    let images = steps.tag_times(&clocks)?;
+    let found = steps.search_footprints()?;
+    let converted = steps.convert_datum(&found)?;
+    let profiles = steps.group_profiles(&converted, &images)?;
 
-    let clocks = load_kernels(config, &[]).in_stage(Stage::LoadKernels.name())?;
-    until!(Stage::LoadKernels, Stage::TagTimes);
+    let wanted = wanted(&images.value, &profiles.value);
+    let kernels = steps.load_kernels(&wanted)?;
+    let ranges = steps.check_ranges(&kernels, &converted, &profiles)?;
+    let orientations = steps.sample_orientation(&kernels, &images)?;
+    let models = steps.fit_sensor_model(&orientations)?;
 
-    let stage = Stage::TagTimes.name();
-    let parts = parts::tag_times(config, &clocks).in_stage(stage)?;
-    let images = cache.stage(stage, parts, || {
-        tag_times(&config.images, &Session::open(&clocks)?).in_stage(stage)
-    })?;
-    until!(Stage::TagTimes, Stage::SearchFootprints);
-
-    let stage = Stage::SearchFootprints.name();
-    let parts = parts::search_footprints(config).in_stage(stage)?;
-    let found = cache.stage(stage, parts, || {
-        search_footprints(
-            &config.pedr,
-            &config.windows,
-            config.mola_clock.correction_s(),
-        )
-        .in_stage(stage)
-    })?;
-    until!(Stage::SearchFootprints, Stage::ConvertDatum);
-
-    let stage = Stage::ConvertDatum.name();
-    let parts = parts::convert_datum(config, Some(&found.blake3));
-    let converted = cache.stage(stage, parts, || {
-        Ok(convert_datum(
-            found.value.footprints.clone(),
-            &config.mola_clock,
-        ))
-    })?;
-    until!(Stage::ConvertDatum, Stage::GroupProfiles);
-
-    let stage = Stage::GroupProfiles.name();
-    let parts = parts::group_profiles(config, Some(&converted.blake3), Some(&images.blake3));
-    let profiles = cache.stage(stage, parts, || {
-        Ok(group_profiles(
-            &converted.value.footprints,
-            &config.windows,
-            &images.value,
-        ))
-    })?;
-    until!(Stage::GroupProfiles, Stage::CheckRanges);
-
-    let exposures = images.value.iter().map(|image| image.exposures());
-    let flights = profiles.value.iter().map(|profile| profile.interval);
-    let wanted: Vec<Interval> = exposures.chain(flights).collect();
-    let kernels = load_kernels(config, &wanted).in_stage(Stage::LoadKernels.name())?;
-
-    let stage = Stage::CheckRanges.name();
-    let parts = parts::check_ranges(
-        config,
-        &kernels,
-        Some(&converted.blake3),
-        Some(&profiles.blake3),
-    );
-    let ranges = cache.stage(stage, parts, || {
-        let trajectory = trajectory(config, &kernels, &profiles.value).in_stage(stage)?;
-        check_ranges(
-            &converted.value.footprints,
-            &profiles.value,
-            &trajectory,
-            &config.mola_clock,
-            &config.range_check,
-        )
-        .in_stage(stage)
-    })?;
-    until!(Stage::CheckRanges, Stage::SampleOrientation);
-
-    let mut orientations = Vec::with_capacity(images.value.len());
-    for image in &images.value {
-        let stage = Stage::SampleOrientation.of_image(&image.id);
-        let parts = parts::sample_orientation(config, &kernels, image);
-        orientations.push(cache.stage(&stage, parts, || {
-            let session = Session::open(&kernels).in_stage(&stage)?;
-            sample_orientation(
-                &session,
-                image,
-                &config.kernels,
-                &config.pointing,
-                &config.orientation,
-            )
-            .in_stage(&stage)
-        })?);
-    }
-    until!(Stage::SampleOrientation, Stage::FitSensorModel);
-
-    let mut models = Vec::with_capacity(images.value.len());
-    for orientation in &orientations {
-        let image = &orientation.value.image;
-        let stage = Stage::FitSensorModel.of_image(image);
-        let parts = parts::fit_sensor_model(config, image, Some(&orientation.blake3));
-        models.push(cache.stage(&stage, parts, || {
-            fit_sensor_model(&orientation.value, &config.orientation).in_stage(&stage)
-        })?);
-    }
-    until!(Stage::FitSensorModel, Stage::Publish);
-
-    let results = publish::Results {
-        config,
+    steps.publish(&Results {
+        config: steps.config,
         kernels: &kernels,
         wanted: &wanted,
         images: &images,
@@ -284,32 +164,5 @@ fn run_stages(config: &SiteConfig, options: &RunOptions<'_>) -> Result<SiteOutco
         ranges: &ranges,
         orientations: &orientations,
         models: &models,
-    };
-    ended(publish::publish(&folder, &cache, &results).in_stage(Stage::Publish.name())?)
-}
-
-/// The kernels of the configuration; from a folder, those that cover `wanted` (text kernels always).
-fn load_kernels(config: &SiteConfig, wanted: &[Interval]) -> Result<KernelSet> {
-    match &config.kernels.source {
-        KernelSource::Metakernel(path) => KernelSet::from_metakernel(path),
-        KernelSource::Files(paths) => KernelSet::from_files(paths),
-        KernelSource::Root(selection) => KernelSet::select(selection, wanted),
-    }
-}
-
-/// Tabulates the spacecraft's path over all profiles, as far as the scan reaches and the kernels go.
-fn trajectory(
-    config: &SiteConfig,
-    kernels: &KernelSet,
-    profiles: &[crate::stages::group_profiles::Profile],
-) -> Result<crate::spice::Trajectory> {
-    let session = Session::open(kernels)?;
-    for profile in profiles {
-        session.require_position(profile.interval)?;
-    }
-    let reach_s =
-        config.range_check.scan_half_width_s + config.mola_clock.bias_s + TRAJECTORY_MARGIN_S;
-    let wanted = Intervals::union_of(profiles.iter().map(|p| p.interval.padded(reach_s)));
-    let covered = wanted.intersection(&session.coverage()?.spk);
-    session.trajectory(&covered, TRAJECTORY_TOLERANCE_M)
+    })
 }

@@ -2,7 +2,10 @@
 
 use std::path::Path;
 
-use super::{Stage, load_kernels, parts, publish};
+use super::{
+    Stage, parts, publish,
+    steps::{load_kernels, wanted},
+};
 use crate::{
     config::SiteConfig,
     error::{Place, Result},
@@ -15,7 +18,6 @@ use crate::{
         cache::{Output, StageCache},
         fingerprint::{Because, Parts},
     },
-    time::Interval,
 };
 
 /// A stage with the reason why it would run, or [`Because::Unchanged`].
@@ -58,13 +60,10 @@ fn plan_stages(config: &SiteConfig, out: &Path, force: bool) -> Result<Vec<Plann
     );
     let profiles: Option<Output<Vec<Profile>>> = planner.look(Stage::GroupProfiles.name(), &parts);
 
-    let exposures = images
-        .iter()
-        .flat_map(|images| images.value.iter().map(ImageTimes::exposures));
-    let flights = profiles
-        .iter()
-        .flat_map(|found| found.value.iter().map(|p| p.interval));
-    let wanted: Vec<Interval> = exposures.chain(flights).collect();
+    let wanted = wanted(
+        images.as_ref().map_or(&[], |output| &output.value),
+        profiles.as_ref().map_or(&[], |output| &output.value),
+    );
     let kernels = load_kernels(config, &wanted).in_stage(Stage::LoadKernels.name())?;
 
     let parts = parts::check_ranges(

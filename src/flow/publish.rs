@@ -160,7 +160,7 @@ fn make_products(folder: &Path, results: &Results<'_>, fingerprint: String) -> R
     results.kernels.verify_unchanged()?;
 
     let products = entries(&staging, &files)?;
-    let manifest = results.manifest(kernels, products, notes, &complaints, fingerprint)?;
+    let manifest = results.manifest(kernels, products, notes, &complaints, fingerprint);
     publish_files(folder, &staging, &manifest, read_manifest(folder).as_ref())?;
     Ok(manifest)
 }
@@ -252,7 +252,7 @@ impl Results<'_> {
         notes: Vec<String>,
         complaints: &[String],
         fingerprint: String,
-    ) -> Result<Manifest> {
+    ) -> Manifest {
         let config = self.config;
         let found = &self.found.value;
         let mut stages: Vec<StageEntry> = self
@@ -274,7 +274,7 @@ impl Results<'_> {
             ("profiles".to_owned(), self.profiles.value.len() as u64),
             ("images".to_owned(), self.images.value.len() as u64),
         ]);
-        Ok(Manifest {
+        Manifest {
             tool: "areograph".to_owned(),
             version: env!("CARGO_PKG_VERSION").to_owned(),
             site: config.site.clone(),
@@ -295,7 +295,7 @@ impl Results<'_> {
             },
             notes,
             finished_utc: chrono::Utc::now().format("%Y-%m-%dT%H:%M:%SZ").to_string(),
-        })
+        }
     }
 }
 

@@ -115,7 +115,9 @@ pub(super) fn image_starts(session: &Session) -> Result<Vec<Et>> {
 
 /// Writes the attitude of all arcs: the attitude of true time `t` stands at `t − 1.15 s`.
 pub(super) fn write_attitude(folder: &Path, session: &Session, arcs: &[Arc]) -> Result<()> {
-    let columns: Vec<(Vec<Et>, Vec<[f64; 4]>, Vec<[f64; 3]>)> = arcs
+    /// Instants, quaternions and rates of one arc.
+    type Columns = (Vec<Et>, Vec<[f64; 4]>, Vec<[f64; 3]>);
+    let columns: Vec<Columns> = arcs
         .iter()
         .map(|arc| {
             let samples = arc.attitude.samples();

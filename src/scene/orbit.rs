@@ -117,7 +117,7 @@ mod tests {
     proptest! {
         #[test]
         fn the_arc_obeys_two_body_motion(
-            node_rad in 0.0..6.28_f64, anomaly_rad in -3.1..3.1_f64, later_s in -90_000.0..90_000.0_f64,
+            node_rad in 0.0..std::f64::consts::TAU, anomaly_rad in -3.1..3.1_f64, later_s in -90_000.0..90_000.0_f64,
         ) {
             let orbit = Orbit::new(Et::from_seconds(3.7e7), node_rad, anomaly_rad);
             let at = Et::from_seconds(3.7e7 + later_s);

@@ -220,7 +220,7 @@ mod tests {
         #[test]
         fn a_beam_ends_on_the_ground(
             x in -1.0..1.0_f64, y in -1.0..1.0_f64, z in -1.0..1.0_f64,
-            look_rad in 0.0..0.4_f64, azimuth_rad in 0.0..6.28_f64,
+            look_rad in 0.0..0.4_f64, azimuth_rad in 0.0..std::f64::consts::TAU,
         ) {
             let up = Vector3::new(x, y, z);
             prop_assume!(up.norm() > 0.1);
@@ -238,7 +238,7 @@ mod tests {
         }
 
         #[test]
-        fn neighbours_have_neighbouring_radii(longitude_rad in 0.0..6.28_f64, latitude_rad in -1.57..1.57_f64) {
+        fn neighbours_have_neighbouring_radii(longitude_rad in 0.0..std::f64::consts::TAU, latitude_rad in -1.57..1.57_f64) {
             // Across the meridian, at the poles and over cell edges: 1 m aside the ground rises by less than 1 m.
             let place = |longitude: f64, latitude: f64| {
                 crate::geom::ellipsoid::spherical_to_xyz_m(longitude, latitude, 1.0)

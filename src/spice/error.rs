@@ -11,8 +11,8 @@ pub enum SpiceFault {
     /// CSPICE signalled an error.
     #[error("{call}: {short}: {long}")]
     Spice {
-        /// The routine that was called.
-        call: &'static str,
+        /// The routine that was called, and with what where NAIF's text does not say it.
+        call: String,
         /// NAIF's short message, for example `SPICE(SPKINSUFFDATA)`.
         short: String,
         /// NAIF's long message.
@@ -125,6 +125,16 @@ const COVERAGE_MESSAGES: [&str; 3] = [
     "SPICE(NOFRAMECONNECT)",
     "SPICE(CKINSUFFDATA)",
 ];
+
+impl SpiceFault {
+    /// The same fault of CSPICE, known to come from `value`.
+    pub(super) fn of(mut self, value: &str) -> Self {
+        if let Self::Spice { call, .. } = &mut self {
+            *call = format!("{call}(\"{value}\")");
+        }
+        self
+    }
+}
 
 impl Fault for SpiceFault {
     fn kind(&self) -> Kind {

@@ -20,6 +20,10 @@ use cspice_sys as naif;
 
 use super::error::SpiceFault;
 
+mod write;
+
+pub(super) use write::CkColumns;
+
 /// What a CSPICE call gives back.
 pub(super) type Called<T> = Result<T, SpiceFault>;
 
@@ -63,20 +67,6 @@ pub(super) struct Pointing {
     pub(super) ticks: f64,
 }
 
-/// What a type 3 segment of a C-kernel holds; the columns but the last have equal length.
-pub(super) struct CkColumns<'a> {
-    /// Name of the segment.
-    pub(super) name: &'a str,
-    /// Encoded clock, increasing.
-    pub(super) ticks: &'a [f64],
-    /// Quaternions from J2000, scalar first.
-    pub(super) quaternions: &'a [[f64; 4]],
-    /// Angular velocities in J2000, rad/s.
-    pub(super) rates_rad_s: &'a [[f64; 3]],
-    /// Encoded clock at which an interpolation interval begins.
-    pub(super) starts: &'a [f64],
-}
-
 impl Cspice {
     /// Waits for the lock and makes CSPICE return on errors without printing.
     pub(super) fn lock() -> Called<Self> {
@@ -117,7 +107,7 @@ impl Cspice {
             text_of(&text)
         };
         let fault = SpiceFault::Spice {
-            call,
+            call: call.to_owned(),
             short: message(c"SHORT", SHORT_MESSAGE_SIZE),
             long: message(c"LONG", LONG_MESSAGE_SIZE),
         };
@@ -134,13 +124,15 @@ impl Cspice {
         self.check("furnsh_c")
     }
 
-    /// `utc2et_c`: UTC to ET.
+    /// `str2et_c`: UTC to ET. (`utc2et_c` would take a thirteenth month for the next January.)
     pub(super) fn utc_to_et(&self, utc: &str) -> Called<f64> {
         let text = c_text("a UTC string", utc)?;
         let mut et = 0.0;
         // SAFETY: the lock is held; `text` is zero-ended, `et` is a live double.
-        unsafe { naif::utc2et_c(text.as_ptr().cast_mut(), &raw mut et) };
-        self.check("utc2et_c").map(|()| et)
+        unsafe { naif::str2et_c(text.as_ptr().cast_mut(), &raw mut et) };
+        self.check("str2et_c")
+            .map(|()| et)
+            .map_err(|fault| fault.of(utc))
     }
 
     /// `et2utc_c`: ET to ISO calendar UTC with `decimals` digits of a second.
@@ -165,7 +157,9 @@ impl Cspice {
         let mut et = 0.0;
         // SAFETY: the lock is held; `text` is zero-ended, `et` is a live double.
         unsafe { naif::scs2e_c(clock, text.as_ptr().cast_mut(), &raw mut et) };
-        self.check("scs2e_c").map(|()| et)
+        self.check("scs2e_c")
+            .map(|()| et)
+            .map_err(|fault| fault.of(sclk))
     }
 
     /// `sce2s_c`: ET to clock string.
@@ -312,133 +306,6 @@ impl Cspice {
         let used = usize::try_from(cell.card).unwrap_or(0).min(size);
         let (ends, _) = data[CELL_CONTROL_SIZE..CELL_CONTROL_SIZE + used].as_chunks::<2>();
         Ok(ends.to_vec())
-    }
-
-    /// `spkopn_c`: a new SPK with room for `comment_size` comment characters.
-    pub(super) fn create_spk(&self, path: &Path, comment_size: usize) -> Called<c_int> {
-        let path = c_path(path)?;
-        let mut handle = 0;
-        // SAFETY: the lock is held; names are zero-ended.
-        unsafe {
-            naif::spkopn_c(
-                path.as_ptr().cast_mut(),
-                c"areograph".as_ptr().cast_mut(),
-                length(comment_size),
-                &raw mut handle,
-            );
-        }
-        self.check("spkopn_c").map(|()| handle)
-    }
-
-    /// `ckopn_c`: a new CK with room for `comment_size` comment characters.
-    pub(super) fn create_ck(&self, path: &Path, comment_size: usize) -> Called<c_int> {
-        let path = c_path(path)?;
-        let mut handle = 0;
-        // SAFETY: the lock is held; names are zero-ended.
-        unsafe {
-            naif::ckopn_c(
-                path.as_ptr().cast_mut(),
-                c"areograph".as_ptr().cast_mut(),
-                length(comment_size),
-                &raw mut handle,
-            );
-        }
-        self.check("ckopn_c").map(|()| handle)
-    }
-
-    /// `dafac_c`: appends comment lines.
-    pub(super) fn add_comments(&self, handle: c_int, lines: &[&str]) -> Called<()> {
-        if lines.is_empty() {
-            return Ok(());
-        }
-        let width = lines.iter().map(|line| line.len()).max().unwrap_or(0) + 1;
-        let mut buffer = vec![0_u8; width * lines.len()];
-        for (slot, line) in buffer.chunks_exact_mut(width).zip(lines) {
-            slot[..line.len()].copy_from_slice(line.as_bytes());
-        }
-        // SAFETY: the lock is held; `buffer` holds `lines.len()` zero-ended strings `width` apart.
-        unsafe {
-            naif::dafac_c(
-                handle,
-                length(lines.len()),
-                length(width),
-                buffer.as_ptr().cast(),
-            );
-        }
-        self.check("dafac_c")
-    }
-
-    /// `spkw13_c`: one Hermite segment in J2000, kilometres; `epochs_s` and `states_km` pair up.
-    pub(super) fn write_spk_13(
-        &self,
-        handle: c_int,
-        (target, centre): (i32, i32),
-        name: &str,
-        degree: i32,
-        epochs_s: &[f64],
-        states_km: &[StateKm],
-    ) -> Called<()> {
-        let name = c_text("a segment name", name)?;
-        let (Some(first), Some(last)) = (epochs_s.first(), epochs_s.last()) else {
-            return Ok(());
-        };
-        let count = epochs_s.len().min(states_km.len());
-        // SAFETY: the lock is held; both arrays hold `count` entries and are only read.
-        unsafe {
-            naif::spkw13_c(
-                handle,
-                target,
-                centre,
-                c"J2000".as_ptr().cast_mut(),
-                *first,
-                *last,
-                name.as_ptr().cast_mut(),
-                degree,
-                length(count),
-                states_km.as_ptr().cast_mut(),
-                epochs_s.as_ptr().cast_mut(),
-            );
-        }
-        self.check("spkw13_c")
-    }
-
-    /// `ckw03_c`: one segment of `object` in J2000 with rates.
-    pub(super) fn write_ck_3(&self, handle: c_int, object: i32, columns: &CkColumns) -> Called<()> {
-        let name = c_text("a segment name", columns.name)?;
-        let (Some(first), Some(last)) = (columns.ticks.first(), columns.ticks.last()) else {
-            return Ok(());
-        };
-        let count = columns
-            .ticks
-            .len()
-            .min(columns.quaternions.len())
-            .min(columns.rates_rad_s.len());
-        // SAFETY: the lock is held; the arrays hold `count` and `starts.len()` entries, only read.
-        unsafe {
-            naif::ckw03_c(
-                handle,
-                *first,
-                *last,
-                object,
-                c"J2000".as_ptr().cast_mut(),
-                1,
-                name.as_ptr().cast_mut(),
-                length(count),
-                columns.ticks.as_ptr().cast_mut(),
-                columns.quaternions.as_ptr().cast_mut(),
-                columns.rates_rad_s.as_ptr().cast_mut(),
-                length(columns.starts.len()),
-                columns.starts.as_ptr().cast_mut(),
-            );
-        }
-        self.check("ckw03_c")
-    }
-
-    /// `dafcls_c`: closes a kernel that was written.
-    pub(super) fn close(&self, handle: c_int) -> Called<()> {
-        // SAFETY: the lock is held; an unknown handle is ignored by CSPICE.
-        unsafe { naif::dafcls_c(handle) };
-        self.check("dafcls_c")
     }
 }
 

@@ -230,7 +230,7 @@ mod tests {
 
     #[test]
     fn the_wild_time_is_found_and_not_its_neighbours() {
-        assert_eq!(order(&[1.0, 2.0, 3.0, 4.0]), []);
+        assert!(order(&[1.0, 2.0, 3.0, 4.0]).is_empty());
         assert_eq!(order(&[1.0, 2.0, 99.0, 3.0, 4.0]), [99.0]);
         assert_eq!(order(&[1.0, 2.0, 0.5, 3.0, 4.0]), [0.5]);
         assert_eq!(order(&[99.0, 2.0, 3.0]), [99.0]);

@@ -1,0 +1,233 @@
+//! One step of the flow per stage: its parts, the stored output or a run, and the place of a failure.
+
+use std::{path::PathBuf, sync::atomic::Ordering};
+
+use super::{
+    Ending, RunOptions, Stage, parts,
+    publish::{self, Results},
+};
+use crate::{
+    config::{KernelSource, SiteConfig},
+    error::{Failure, Fault, Kind, Place, Result},
+    spice::{KernelSet, Session, Trajectory},
+    stages::{
+        check_ranges::{RangeCheck, check_ranges},
+        convert_datum::{Converted, convert_datum},
+        fit_sensor_model::{SensorModel, fit_sensor_model},
+        group_profiles::{Profile, group_profiles},
+        sample_orientation::{Orientation, sample_orientation},
+        search_footprints::{SearchResult, search_footprints},
+        tag_times::{ImageTimes, tag_times},
+    },
+    store::cache::{Output, StageCache},
+    time::{Interval, Intervals},
+};
+
+/// The tabulated trajectory stays this close to the kernels, metres: a tenth of a PEDR centimetre.
+const TRAJECTORY_TOLERANCE_M: f64 = 0.001;
+
+/// Seconds of trajectory beyond what the scan of the clock bias reaches.
+const TRAJECTORY_MARGIN_S: f64 = 0.5;
+
+/// A site that is being run.
+pub(super) struct Steps<'a> {
+    pub(super) config: &'a SiteConfig,
+    pub(super) options: &'a RunOptions<'a>,
+    pub(super) cache: StageCache,
+    pub(super) folder: PathBuf,
+}
+
+/// Why the flow ends before its end.
+pub(super) enum Leave {
+    /// The last stage that was asked for is done.
+    AsAsked,
+    /// Something failed.
+    Failed(Failure),
+}
+
+impl From<Failure> for Leave {
+    fn from(failure: Failure) -> Self {
+        Self::Failed(failure)
+    }
+}
+
+type Step<T> = std::result::Result<T, Leave>;
+
+/// The user stopped the program.
+#[derive(Debug, thiserror::Error)]
+#[error("stopped before {before}")]
+struct Stopped {
+    before: Stage,
+}
+
+impl Fault for Stopped {
+    fn kind(&self) -> Kind {
+        Kind::Interrupted
+    }
+
+    fn advice(&self) -> String {
+        "run again: finished stages are kept".to_owned()
+    }
+}
+
+impl Steps<'_> {
+    /// Leaves the flow before `stage` when it is not asked for, or when the user stops the program.
+    fn enter(&self, stage: Stage) -> Step<()> {
+        if self.options.until < stage {
+            return Err(Leave::AsAsked);
+        }
+        if self.options.stop.load(Ordering::Relaxed) {
+            return Err(Failure::from(Stopped { before: stage }).into());
+        }
+        Ok(())
+    }
+
+    pub(super) fn load_kernels(&self, wanted: &[Interval]) -> Step<KernelSet> {
+        self.enter(Stage::LoadKernels)?;
+        Ok(load_kernels(self.config, wanted).in_stage(Stage::LoadKernels.name())?)
+    }
+
+    pub(super) fn tag_times(&self, clocks: &KernelSet) -> Step<Output<Vec<ImageTimes>>> {
+        self.enter(Stage::TagTimes)?;
+        let stage = Stage::TagTimes.name();
+        let parts = parts::tag_times(self.config, clocks).in_stage(stage)?;
+        Ok(self.cache.stage(stage, parts, || {
+            tag_times(&self.config.images, &Session::open(clocks)?).in_stage(stage)
+        })?)
+    }
+
+    pub(super) fn search_footprints(&self) -> Step<Output<SearchResult>> {
+        self.enter(Stage::SearchFootprints)?;
+        let stage = Stage::SearchFootprints.name();
+        let parts = parts::search_footprints(self.config).in_stage(stage)?;
+        let correction_s = self.config.mola_clock.correction_s();
+        Ok(self.cache.stage(stage, parts, || {
+            search_footprints(&self.config.pedr, &self.config.windows, correction_s).in_stage(stage)
+        })?)
+    }
+
+    pub(super) fn convert_datum(&self, found: &Output<SearchResult>) -> Step<Output<Converted>> {
+        self.enter(Stage::ConvertDatum)?;
+        let parts = parts::convert_datum(self.config, Some(&found.blake3));
+        Ok(self.cache.stage(Stage::ConvertDatum.name(), parts, || {
+            let footprints = found.value.footprints.clone();
+            Ok(convert_datum(footprints, &self.config.mola_clock))
+        })?)
+    }
+
+    pub(super) fn group_profiles(
+        &self,
+        converted: &Output<Converted>,
+        images: &Output<Vec<ImageTimes>>,
+    ) -> Step<Output<Vec<Profile>>> {
+        self.enter(Stage::GroupProfiles)?;
+        let parts =
+            parts::group_profiles(self.config, Some(&converted.blake3), Some(&images.blake3));
+        Ok(self.cache.stage(Stage::GroupProfiles.name(), parts, || {
+            let footprints = &converted.value.footprints;
+            Ok(group_profiles(
+                footprints,
+                &self.config.windows,
+                &images.value,
+            ))
+        })?)
+    }
+
+    pub(super) fn check_ranges(
+        &self,
+        kernels: &KernelSet,
+        converted: &Output<Converted>,
+        profiles: &Output<Vec<Profile>>,
+    ) -> Step<Output<RangeCheck>> {
+        self.enter(Stage::CheckRanges)?;
+        let stage = Stage::CheckRanges.name();
+        let outputs = [&converted.blake3, &profiles.blake3].map(|blake3| Some(&**blake3));
+        let parts = parts::check_ranges(self.config, kernels, outputs[0], outputs[1]);
+        Ok(self.cache.stage(stage, parts, || {
+            let trajectory = self.trajectory(kernels, &profiles.value).in_stage(stage)?;
+            check_ranges(
+                &converted.value.footprints,
+                &profiles.value,
+                &trajectory,
+                &self.config.mola_clock,
+                &self.config.range_check,
+            )
+            .in_stage(stage)
+        })?)
+    }
+
+    /// Tabulates the spacecraft's path over all profiles, as far as the scan reaches and the kernels go.
+    fn trajectory(&self, kernels: &KernelSet, profiles: &[Profile]) -> Result<Trajectory> {
+        let session = Session::open(kernels)?;
+        for profile in profiles {
+            session.require_position(profile.interval)?;
+        }
+        let config = self.config;
+        let reach_s =
+            config.range_check.scan_half_width_s + config.mola_clock.bias_s + TRAJECTORY_MARGIN_S;
+        let reach = profiles
+            .iter()
+            .map(|profile| profile.interval.padded(reach_s));
+        let covered = Intervals::union_of(reach).intersection(&session.coverage()?.spk);
+        session.trajectory(&covered, TRAJECTORY_TOLERANCE_M)
+    }
+
+    pub(super) fn sample_orientation(
+        &self,
+        kernels: &KernelSet,
+        images: &Output<Vec<ImageTimes>>,
+    ) -> Step<Vec<Output<Orientation>>> {
+        self.enter(Stage::SampleOrientation)?;
+        let config = self.config;
+        let orientations = images.value.iter().map(|image| {
+            let stage = Stage::SampleOrientation.of_image(&image.id);
+            let parts = parts::sample_orientation(config, kernels, image);
+            self.cache.stage(&stage, parts, || {
+                let session = Session::open(kernels).in_stage(&stage)?;
+                let (bias, sampling) = (&config.pointing, &config.orientation);
+                sample_orientation(&session, image, &config.kernels, bias, sampling)
+                    .in_stage(&stage)
+            })
+        });
+        Ok(orientations.collect::<Result<_>>()?)
+    }
+
+    pub(super) fn fit_sensor_model(
+        &self,
+        orientations: &[Output<Orientation>],
+    ) -> Step<Vec<Output<SensorModel>>> {
+        self.enter(Stage::FitSensorModel)?;
+        let models = orientations.iter().map(|orientation| {
+            let image = &orientation.value.image;
+            let stage = Stage::FitSensorModel.of_image(image);
+            let parts = parts::fit_sensor_model(self.config, image, Some(&orientation.blake3));
+            self.cache.stage(&stage, parts, || {
+                fit_sensor_model(&orientation.value, &self.config.orientation).in_stage(&stage)
+            })
+        });
+        Ok(models.collect::<Result<_>>()?)
+    }
+
+    pub(super) fn publish(&self, results: &Results<'_>) -> Step<Ending> {
+        self.enter(Stage::Publish)?;
+        let ending = publish::publish(&self.folder, &self.cache, results);
+        Ok(ending.in_stage(Stage::Publish.name())?)
+    }
+}
+
+/// The kernels of the configuration; from a folder, those that cover `wanted` (text kernels always).
+pub(super) fn load_kernels(config: &SiteConfig, wanted: &[Interval]) -> Result<KernelSet> {
+    match &config.kernels.source {
+        KernelSource::Metakernel(path) => KernelSet::from_metakernel(path),
+        KernelSource::Files(paths) => KernelSet::from_files(paths),
+        KernelSource::Root(selection) => KernelSet::select(selection, wanted),
+    }
+}
+
+/// Intervals for which the site needs kernels: exposures and flights over the windows.
+pub(super) fn wanted(images: &[ImageTimes], profiles: &[Profile]) -> Vec<Interval> {
+    let exposures = images.iter().map(ImageTimes::exposures);
+    exposures
+        .chain(profiles.iter().map(|profile| profile.interval))
+        .collect()
+}

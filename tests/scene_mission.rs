@@ -1,0 +1,416 @@
+//! The synthetic mission, read back by CSPICE and by a decoding of its own.
+
+mod common;
+
+use std::{
+    collections::BTreeMap,
+    fs,
+    path::{Path, PathBuf},
+    sync::LazyLock,
+};
+
+use areograph::{
+    config,
+    constants::{MARS_IAU2000, MGS_POINTING_BIAS, MOLA_CLOCK_BIAS_S},
+    frames::{MarsDatum, MarsIau2000},
+    geom::{
+        attitude::matrix_of_spice_quaternion,
+        ellipsoid::spherical_to_xyz_m,
+        mars_rotation::{convert_datum, mars_matrix},
+    },
+    pds::pedr::{LABEL_BYTES, LABEL_RECORDS, RECORD_BYTES, Record},
+    scene::{SceneOptions, write_scene, write_scene_along},
+    spice::{KernelSet, Session},
+    time::Et,
+    units::{RADIANS_PER_DEGREE, RADIANS_PER_MICRODEGREE},
+};
+use nalgebra::Vector3;
+use serde_json::Value;
+
+/// Days of half an hour: slews, images and windows are all inside.
+const SHORT: SceneOptions = SceneOptions {
+    seed: 3,
+    day_s: 1_800.0,
+};
+
+struct Mission {
+    folder: tempfile::TempDir,
+    truth: Value,
+}
+
+static MISSION: LazyLock<Mission> = LazyLock::new(|| {
+    let folder = tempfile::tempdir().unwrap();
+    write_scene(&folder.path().join("mission"), &SHORT).unwrap();
+    let truth = truth_of(&folder.path().join("mission"));
+    Mission { folder, truth }
+});
+
+impl Mission {
+    fn path(&self, relative: &str) -> PathBuf {
+        self.folder.path().join("mission").join(relative)
+    }
+
+    fn session(&self, metakernel: &str) -> Session {
+        let path = self.path("kernels").join(metakernel);
+        Session::open(&KernelSet::from_metakernel(&path).unwrap()).unwrap()
+    }
+}
+
+fn truth_of(mission: &Path) -> Value {
+    serde_json::from_str(&fs::read_to_string(mission.join("truth.json")).unwrap()).unwrap()
+}
+
+fn numbers(value: &Value) -> Vec<f64> {
+    value
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|x| x.as_f64().unwrap())
+        .collect()
+}
+
+fn vectors(value: &Value) -> Vec<Vector3<f64>> {
+    value
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|row| Vector3::from_vec(numbers(row)))
+        .collect()
+}
+
+/// A shot by the rules of the PEDR, decoded here a second time; angles in radians, lengths in metres.
+struct Decoded {
+    tag_s: f64,
+    ground_file_m: Vector3<f64>,
+    spacecraft_file_m: Vector3<f64>,
+    range_m: f64,
+    class: i16,
+}
+
+fn decode(record: &Record, shot: u8) -> Decoded {
+    let k = usize::from(shot - 1);
+    let from_middle = f64::from(shot) - 10.5;
+    let x = from_middle / 20.0;
+    let micro =
+        |mid: i32, change: i32| (f64::from(mid) + x * f64::from(change)) * RADIANS_PER_MICRODEGREE;
+    let radius_m = f64::from(record.shot_radius_cm[k].get()) / 100.0;
+    let higher_m = radius_m - f64::from(record.mid_radius_cm.get()) / 100.0;
+    let parallax = |nanodegrees: i32| f64::from(nanodegrees) * 1e-9 * RADIANS_PER_DEGREE * higher_m;
+    let latitude = micro(
+        record.ground_latitude_microdegrees.get(),
+        record.ground_latitude_change_microdegrees.get(),
+    ) + parallax(record.parallax_latitude_nanodegrees_per_m.get());
+    let longitude = micro(
+        record.ground_longitude_microdegrees.get(),
+        record.ground_longitude_change_microdegrees.get(),
+    ) + parallax(record.parallax_longitude_nanodegrees_per_m.get());
+    let craft_radius_m = (f64::from(record.spacecraft_radius_cm.get())
+        + x * f64::from(record.spacecraft_radius_change_cm.get()))
+        / 100.0;
+    let craft_longitude = micro(
+        record.spacecraft_longitude_microdegrees.get(),
+        record.spacecraft_longitude_change_microdegrees.get(),
+    );
+    let craft_latitude = micro(
+        record.spacecraft_latitude_microdegrees.get(),
+        record.spacecraft_latitude_change_microdegrees.get(),
+    );
+    Decoded {
+        tag_s: record.time_s.get() + from_middle * 1e7 / f64::from(record.clock_frequency_hz.get()),
+        ground_file_m: spherical_to_xyz_m(longitude, latitude, radius_m),
+        spacecraft_file_m: spherical_to_xyz_m(craft_longitude, craft_latitude, craft_radius_m),
+        range_m: f64::from(record.range_cm[k].get()) / 100.0,
+        class: record.class[k].get(),
+    }
+}
+
+fn records(path: &Path) -> Vec<Record> {
+    let bytes = fs::read(path).unwrap();
+    assert_eq!(bytes.len() % RECORD_BYTES, 0);
+    bytes[LABEL_BYTES..]
+        .chunks_exact(RECORD_BYTES)
+        .map(|chunk| Record::from_bytes(chunk.try_into().unwrap()))
+        .collect()
+}
+
+fn datum(file: &str) -> MarsDatum {
+    if file.ends_with("l.b") {
+        MarsDatum::Iau2000
+    } else {
+        MarsDatum::Iau1991
+    }
+}
+
+fn shots(profile: &Value) -> Vec<(usize, u8)> {
+    numbers(&profile["record"])
+        .iter()
+        .zip(numbers(&profile["shot"]))
+        .map(|(record, shot)| (*record as usize - LABEL_RECORDS - 1, shot as u8))
+        .collect()
+}
+
+#[test]
+fn the_gsfc_orbit_and_the_biased_attitude_are_the_truth() {
+    let session = MISSION.session("gsfc.tm");
+    for image in MISSION.truth["images"].as_array().unwrap() {
+        let epochs = numbers(&image["epochs_et_s"]);
+        let positions = vectors(&image["position_iau2000_m"]);
+        assert_eq!(epochs.len(), 31);
+        for (index, seconds) in epochs.iter().enumerate() {
+            let et = Et::from_seconds(*seconds);
+            let mars = mars_matrix(&MARS_IAU2000, et);
+            let position = mars * session.state(et).unwrap().position.xyz_m;
+            let off_m = (position - positions[index]).norm();
+            assert!(off_m < 1e-4, "{} {off_m} m", image["id"]); // 0.1 mm; kernels round to 1e-9 km
+            let attitude = session
+                .attitude(MGS_POINTING_BIAS.lookup(et), et, 0.0)
+                .unwrap();
+            let camera = session.mounting(et).unwrap() * attitude.inertial_to_bus;
+            let camera_to_mars = mars * camera.matrix().transpose();
+            let quaternion: [f64; 4] = numbers(&image["camera_to_mars_quaternion_wxyz"][index])
+                .try_into()
+                .unwrap();
+            let off_rad = (camera_to_mars - matrix_of_spice_quaternion(quaternion))
+                .abs()
+                .max();
+            assert!(off_rad < 1e-10, "{} {off_rad} rad", image["id"]); // clock ticks round to 1e-11 rad
+            // Without the bias the camera looks elsewhere: 1.15 s at 0.05 deg/s, unless it is held.
+            let unbiased = session.attitude(
+                areograph::time::PointingBias::from_seconds(0.0).lookup(et),
+                et,
+                0.0,
+            );
+            let turned = unbiased.unwrap().inertial_to_bus.matrix()
+                * attitude.inertial_to_bus.matrix().transpose();
+            let turned_deg = turned[(0, 2)].abs().asin() / RADIANS_PER_DEGREE;
+            let expected_deg = if image["look"] == "nadir" {
+                0.0585
+            } else {
+                0.0
+            };
+            assert!(
+                (turned_deg - expected_deg).abs() < 0.001,
+                "{} {turned_deg}",
+                image["id"]
+            );
+        }
+    }
+}
+
+#[test]
+fn image_starts_are_the_published_times_to_the_clock_tick() {
+    let session = MISSION.session("nav.tm");
+    for image in MISSION.truth["images"].as_array().unwrap() {
+        let id = image["id"].as_str().unwrap();
+        let label =
+            areograph::pds::moc::read_label(&MISSION.path(&format!("labels/{id}.lbl"))).unwrap();
+        let clock = session
+            .sclk_to_et(&label.fields.sclk_start.unwrap())
+            .unwrap();
+        let utc = session.utc_to_et(&label.fields.utc_start.unwrap()).unwrap();
+        assert!((clock.seconds() - image["start_et_s"].as_f64().unwrap()).abs() < 1e-9);
+        assert!((0.0..0.004).contains(&utc.since(clock)), "{id}"); // a tick is 1/256 s
+    }
+}
+
+#[test]
+fn footprints_come_back_within_0_2_m_and_times_within_2_us() {
+    let mut worst: BTreeMap<String, f64> = BTreeMap::new();
+    for profile in MISSION.truth["profiles"].as_array().unwrap() {
+        let file = profile["file"].as_str().unwrap();
+        let records = records(&MISSION.path(&format!("pedr/{file}")));
+        let times = numbers(&profile["et_s"]);
+        let grounds = vectors(&profile["ground_iau2000_m"]);
+        assert!(times.len() > 150, "{file}: {} shots", times.len());
+        for (((record, shot), time_s), truth_m) in
+            shots(profile).into_iter().zip(times).zip(grounds)
+        {
+            let decoded = decode(&records[record], shot);
+            assert_eq!(decoded.class, 1);
+            let et = Et::from_seconds(decoded.tag_s - MOLA_CLOCK_BIAS_S);
+            assert!((et.seconds() - time_s).abs() < 2e-6);
+            let ground = convert_datum::<MarsIau2000>(decoded.ground_file_m, datum(file), et, et);
+            let off_m = (ground.xyz_m - truth_m).norm();
+            let held = worst.entry(file.to_owned()).or_default();
+            *held = held.max(off_m);
+        }
+    }
+    println!("largest distance from the true footprint, m: {worst:.3?}");
+    assert!(worst.values().all(|off_m| *off_m < 0.2), "{worst:?}");
+}
+
+#[test]
+fn range_minus_distance_has_the_expected_mean_for_every_orbit() {
+    for family in ["nav", "gsfc", "ipng"] {
+        let session = MISSION.session(&format!("{family}.tm"));
+        for profile in MISSION.truth["profiles"].as_array().unwrap() {
+            let file = profile["file"].as_str().unwrap();
+            let records = records(&MISSION.path(&format!("pedr/{file}")));
+            let residuals: Vec<f64> = shots(profile)
+                .into_iter()
+                .map(|(record, shot)| {
+                    let decoded = decode(&records[record], shot);
+                    let et = Et::from_seconds(decoded.tag_s - MOLA_CLOCK_BIAS_S);
+                    let ground =
+                        convert_datum::<MarsIau2000>(decoded.ground_file_m, datum(file), et, et);
+                    let spacecraft =
+                        mars_matrix(&MARS_IAU2000, et) * session.state(et).unwrap().position.xyz_m;
+                    let own_m = (decoded.spacecraft_file_m - decoded.ground_file_m).norm();
+                    // The frame's own spacecraft track is linear: a metre would be a field read wrongly.
+                    assert!(
+                        (decoded.range_m - own_m).abs() < 0.3,
+                        "{file} {}",
+                        decoded.range_m - own_m
+                    );
+                    decoded.range_m - (spacecraft - ground.xyz_m).norm()
+                })
+                .collect();
+            let mean_m = residuals.iter().sum::<f64>() / residuals.len() as f64;
+            let difference = &profile["orbit_differences"][family];
+            let expected_m = difference["expected_range_minus_distance_mean_m"]
+                .as_f64()
+                .unwrap();
+            println!("{file} {family}: {mean_m:.4} m, expected {expected_m:.4} m");
+            assert!(
+                (mean_m - expected_m).abs() < 0.05,
+                "{file} {family} {mean_m} {expected_m}"
+            ); // the frame model and microdegrees, seen off nadir, average to a centimetre
+            assert!(expected_m.abs() < 50.0 && (family != "gsfc" || expected_m.abs() < 1e-9));
+        }
+    }
+}
+
+#[test]
+fn site_files_pass_their_own_checks() {
+    for site in ["eos_chasma", "gusev_crater", "isidis"] {
+        let loaded = config::load(&MISSION.path(&format!("sites/{site}.toml"))).unwrap();
+        assert!(loaded.warnings.is_empty(), "{:?}", loaded.warnings);
+        assert_eq!(loaded.site.site, site);
+        assert_eq!(loaded.site.images.len(), 2);
+        assert!((loaded.site.mola_clock.correction_s() + 0.117).abs() < 1e-12);
+    }
+}
+
+#[test]
+fn images_are_taken_by_day_and_the_records_say_so() {
+    for profile in MISSION.truth["profiles"].as_array().unwrap() {
+        let file = profile["file"].as_str().unwrap();
+        let records = records(&MISSION.path(&format!("pedr/{file}")));
+        let record = &records[shots(profile)[0].0];
+        let hour = 12.0 + f64::from(record.local_time.get()) * 1e-4 * 12.0 / std::f64::consts::PI;
+        // The mission's orbit passed the dayside equator at about two in the afternoon.
+        assert!((13.0..15.5).contains(&hour), "{file}: {hour} h");
+        let incidence_deg = f64::from(record.solar_incidence.get()) * 1e-4 / RADIANS_PER_DEGREE;
+        assert!(incidence_deg < 70.0, "{file}: {incidence_deg}");
+    }
+}
+
+#[test]
+fn the_same_seed_gives_the_same_bytes() {
+    let folder = tempfile::tempdir().unwrap();
+    let again = folder.path().join("again");
+    write_scene(&again, &SHORT).unwrap();
+    write_scene(&again, &SHORT).unwrap(); // replaces the first
+    let mut compared = 0;
+    for part in ["kernels", "pedr", "labels", "sites", "."] {
+        for entry in fs::read_dir(MISSION.path(part)).unwrap() {
+            let path = entry.unwrap().path();
+            if path.is_file() {
+                let other = again.join(part).join(path.file_name().unwrap());
+                assert!(
+                    fs::read(&path).unwrap() == fs::read(&other).unwrap(),
+                    "{}",
+                    path.display()
+                );
+                compared += 1;
+            }
+        }
+    }
+    assert_eq!(compared, 6 + 3 + 5 + 6 + 6 + 3 + 2);
+    assert_eq!(
+        fs::read_dir(folder.path()).unwrap().count(),
+        1,
+        "no draft is left"
+    );
+}
+
+#[test]
+fn days_that_miss_their_image_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let options = SceneOptions {
+        day_s: f64::NAN,
+        ..SHORT
+    };
+    let failure = write_scene(&folder.path().join("mission"), &options).unwrap_err();
+    assert!(
+        failure
+            .to_string()
+            .contains("day_s is NaN; expected 600 to 90000"),
+        "{failure}"
+    );
+}
+
+#[test]
+fn a_flight_along_real_kernels_gives_shots_that_fit_them() {
+    let test = "a_flight_along_real_kernels_gives_shots_that_fit_them";
+    let Some(data) = common::real_data("ale_mgs/m0402852", test) else {
+        return;
+    };
+    let folder = tempfile::tempdir().unwrap();
+    let names = [
+        "naif0012.tls",
+        "pck00009.tpc",
+        "MGS_SCLKSCET.00061.tsc",
+        "moc20.ti",
+        "mocAddendum004.ti",
+        "m0402852.ale_0.bsp",
+        "m0402852.ale_1.bsp",
+        "mgs_sc_map2_0_sliced_-94000.bc",
+        "mgs_sc_map2_1_sliced_-94000.bc",
+    ];
+    let data = data.canonicalize().unwrap();
+    let list: Vec<String> = names.iter().map(|name| format!("'$D/{name}'")).collect();
+    let metakernel = folder.path().join("real.tm");
+    let text = format!(
+        "KPL/MK\n\\begindata\nPATH_SYMBOLS = ( 'D' )\nPATH_VALUES = ( '{}' )\nKERNELS_TO_LOAD = ( {} )\n",
+        data.display(),
+        list.join("\n")
+    );
+    fs::write(&metakernel, text).unwrap();
+    let mission = folder.path().join("along");
+    let summary = write_scene_along(
+        &mission,
+        &metakernel,
+        &[data.join("m0402852_isis.lbl")],
+        &SHORT,
+    )
+    .unwrap();
+    println!("{summary}");
+    assert_eq!((summary.images, summary.pedr_files), (1, 1));
+    let loaded = config::load(&mission.join("sites/m04-02852.toml")).unwrap();
+    assert_eq!(loaded.site.windows.len(), 2);
+
+    let truth = truth_of(&mission);
+    let records = records(&mission.join("pedr/ap10001l.b"));
+    let session = Session::open(&KernelSet::from_metakernel(&metakernel).unwrap()).unwrap();
+    for profile in truth["profiles"].as_array().unwrap() {
+        let times = numbers(&profile["et_s"]);
+        assert!(times.len() > 2_000);
+        let mut sum_m = 0.0;
+        for (record, shot) in shots(profile) {
+            let decoded = decode(&records[record], shot);
+            let et = Et::from_seconds(decoded.tag_s - MOLA_CLOCK_BIAS_S);
+            let spacecraft =
+                mars_matrix(&MARS_IAU2000, et) * session.state(et).unwrap().position.xyz_m;
+            let residual_m = decoded.range_m - (spacecraft - decoded.ground_file_m).norm();
+            assert!(residual_m.abs() < 0.5, "{residual_m}");
+            sum_m += residual_m;
+        }
+        let mean_m = sum_m / times.len() as f64;
+        println!(
+            "{}: mean {mean_m:.4} m, frame error {}",
+            profile["window"], profile["frame_error_max_m"]
+        );
+        assert!(mean_m.abs() < 0.02, "{mean_m}");
+    }
+}
