@@ -230,13 +230,8 @@ fn spacecraft(site: &SiteProducts) -> Vec<Column> {
 
 /// Name of a source file; its folder belongs to the machine, not to the product.
 pub(super) fn file_name(site: &SiteProducts, file: u16) -> String {
-    let path = site
-        .footprints
-        .files
-        .get(usize::from(file))
-        .map(|source| &source.path);
-    path.and_then(|path| path.file_name())
-        .map_or_else(String::new, |name| name.to_string_lossy().into_owned())
+    let source = site.footprints.files.get(usize::from(file));
+    source.map_or_else(String::new, |source| crate::files::file_name(&source.path))
 }
 
 /// Identifiers of the windows in `mask`, separated by semicolons.

@@ -264,7 +264,7 @@ fn kernels(site: &SiteProducts) -> BTreeMap<String, Vec<String>> {
     let mut kernels: BTreeMap<String, Vec<String>> = BTreeMap::new();
     for kernel in site.kernels {
         kernels
-            .entry(kernel.role.clone())
+            .entry(kernel.role.to_lowercase())
             .or_default()
             .push(kernel.name.clone());
     }

@@ -44,7 +44,7 @@ pub struct SiteProducts<'a> {
 pub struct KernelLine {
     /// File name.
     pub name: String,
-    /// What it holds, in lower case: `lsk`, `sclk`, `pck`, `fk`, `ik`, `spk`, `ck`.
+    /// What it holds: `LSK`, `SCLK`, `PCK`, `FK`, `IK`, `SPK`, `CK`.
     pub role: String,
     /// Size.
     pub bytes: u64,
@@ -68,10 +68,8 @@ impl SiteProducts<'_> {
     #[must_use]
     pub fn invalid_because(&self) -> Vec<String> {
         let mut reasons = Vec::new();
-        if self.profiles.is_empty() && self.images.is_empty() {
-            reasons.push("nothing was checked: no profile and no image".to_owned());
-        } else if self.profiles.is_empty() && !self.config.pedr.files.is_empty() {
-            reasons.push("no shot of the PEDR files passed windows and filters".to_owned());
+        if !self.config.pedr.files.is_empty() && self.footprints.is_empty() {
+            reasons.push("no footprint in any window".to_owned());
         }
         for profile in &self.ranges.profiles {
             for reason in &profile.invalid_because {

@@ -10,12 +10,12 @@ h1{font-size:1.5rem;margin:.2rem 0}h2{font-size:1.15rem;margin:2rem 0 .5rem;bord
 p,ul{margin:.4rem 0;max-width:52rem}\
 .verdict{padding:.7rem 1rem;border-left:6px solid;margin:1rem 0;max-width:none}\
 .valid{border-color:#2a7d46;background:#eef7f0}.invalid{border-color:#b3261e;background:#fbeeed}\
-.wide{overflow-x:auto}\
+.wide{overflow-x:auto;margin:.6rem 0}\
 table{border-collapse:collapse;font-size:.85rem;font-variant-numeric:tabular-nums}\
 th,td{padding:.25rem .6rem;border-bottom:1px solid #e4e4e4;text-align:left;vertical-align:top}\
 th{background:#f5f5f5;font-weight:600}td.number,th.number{text-align:right;white-space:nowrap}\
 tr.invalid td{background:#fbeeed}\
-figure{margin:1rem 0}svg{max-width:100%;height:auto;border:1px solid #eee}\
+figure{margin:1rem 0}svg{width:100%;max-width:900px;height:auto;border:1px solid #eee}\
 figcaption{font-size:.85rem;color:#444}\
 .key{white-space:nowrap;margin-right:1rem}.key i{display:inline-block;width:.7em;height:.7em;margin-right:.3em}\
 footer{margin-top:3rem;font-size:.8rem;color:#666}";

@@ -4,6 +4,7 @@
 
 mod html;
 mod images;
+mod map;
 mod plots;
 mod ranges;
 mod summary;
@@ -19,7 +20,7 @@ pub fn page(site: &SiteProducts) -> Result<String> {
         summary::verdict(site),
         summary::inputs(site),
         summary::corrections(site),
-        ranges::map(site)?,
+        map::map(site)?,
         ranges::profiles(site),
         ranges::residual_plots(site)?,
         ranges::scan_plots(site)?,

@@ -9,7 +9,7 @@ use super::html::escape;
 use crate::{error::Result, products::fault::ProductFault};
 
 /// Width of a plot in its own units; browsers scale it to the page.
-const WIDTH: u32 = 1_080;
+const WIDTH: u32 = 760;
 /// Colours that stay apart for most colour-blind readers (Okabe and Ito 2008, without yellow).
 const COLOURS: [RGBColor; 7] = [
     RGBColor(0, 114, 178),
@@ -20,6 +20,8 @@ const COLOURS: [RGBColor; 7] = [
     RGBColor(86, 180, 233),
     RGBColor(90, 90, 90),
 ];
+/// Index of the grey among the colours.
+pub(super) const GREY: usize = 6;
 /// Colour of marks and outliers.
 const MARK: RGBColor = RGBColor(179, 38, 30);
 
@@ -81,10 +83,10 @@ impl Extent {
                 high: 1.0,
             };
         }
-        // Values that agree to their rounding still get an axis with room for labels.
+        // Values that agree to a thousandth (of a metre, degree, second) still get an axis with room for labels.
         let margin = (0.05 * (high - low))
             .max(1e-9 * high.abs().max(low.abs()))
-            .max(1e-6);
+            .max(1e-3);
         Self {
             low: low - margin,
             high: high + margin,
@@ -157,7 +159,7 @@ fn draw<'a>(plot: &Plot, area: &Area<'a>) -> Drawn<'a> {
     let mut chart = ChartBuilder::on(area)
         .margin(12)
         .x_label_area_size(46)
-        .y_label_area_size(84)
+        .y_label_area_size(78)
         .build_cartesian_2d(plot.x.range(), plot.y.range())?;
     let (x_decimals, y_decimals) = (plot.x.decimals(), plot.y.decimals());
     let turns = plot.x_turns;
@@ -169,7 +171,7 @@ fn draw<'a>(plot: &Plot, area: &Area<'a>) -> Drawn<'a> {
         .y_labels(7)
         .light_line_style(WHITE)
         .bold_line_style(RGBColor(232, 232, 232))
-        .label_style(("sans-serif", 15))
+        .label_style(("sans-serif", 14))
         .x_label_formatter(&move |x| {
             let x = if turns { x.rem_euclid(360.0) } else { *x };
             format!("{x:.x_decimals$}")

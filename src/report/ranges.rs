@@ -1,137 +1,43 @@
-//! Map of the footprints, table and plots of the range check.
+//! Tables and plots of the range check.
 
 use super::{
     html::{Table, paragraph, section},
     plots::{Extent, Plot, Series, Style, figure, thinned},
 };
-use crate::{
-    error::Result,
-    products::SiteProducts,
-    stages::check_ranges::BiasScan,
-    units::{RADIANS_PER_DEGREE, wrap_two_pi},
-};
+use crate::{error::Result, products::SiteProducts, stages::check_ranges::BiasScan};
 
-/// Points of the map and of all residual plots together; about 90 bytes each.
-const MAP_POINTS: usize = 8_000;
+/// Points of all residual plots together; about 90 bytes each.
 const RESIDUAL_POINTS: usize = 20_000;
 /// Most points of one profile, about one per unit of the plot's width.
 const PROFILE_POINTS: usize = 1_000;
 /// Up to so many profiles have a plot each; more share plots in groups of so many.
-const PROFILES_APART: usize = 12;
-
-/// Where the shots and the boresights of the images lie.
-pub(super) fn map(site: &SiteProducts) -> Result<String> {
-    let shots = site.footprints;
-    if shots.is_empty() && site.images.is_empty() {
-        return Ok(String::new());
-    }
-    let boresights = || {
-        site.images
-            .iter()
-            .flat_map(|image| &image.orientation.samples)
-            .filter_map(|s| s.boresight)
-    };
-    let longitudes: Vec<f64> = shots
-        .longitude_rad
-        .iter()
-        .copied()
-        .chain(boresights().map(|ground| ground.longitude_rad))
-        .collect();
-    let west_rad = western_edge_rad(&longitudes);
-    let place = |longitude_rad: f64, latitude_rad: f64| {
-        let east_rad = west_rad + wrap_two_pi(longitude_rad - west_rad);
-        (
-            east_rad / RADIANS_PER_DEGREE,
-            latitude_rad / RADIANS_PER_DEGREE,
-        )
-    };
-    let share = MAP_POINTS / site.profiles.len().max(1);
-    let mut series: Vec<Series> = Vec::new();
-    for (index, profile) in site.profiles.iter().enumerate() {
-        let points: Vec<(f64, f64)> = profile
-            .rows
-            .iter()
-            .map(|row| {
-                place(
-                    shots.longitude_rad[*row as usize],
-                    shots.latitude_rad[*row as usize],
-                )
-            })
-            .collect();
-        series.push(Series {
-            label: legend(site, &profile.id),
-            style: Style::Dots,
-            colour: index,
-            points: thinned(&points, share.max(2)),
-        });
-    }
-    for image in site.images {
-        let grounds = image
-            .orientation
-            .samples
-            .iter()
-            .filter_map(|sample| sample.boresight);
-        series.push(Series {
-            label: format!("boresight of {}", image.times.id),
-            style: Style::Line,
-            colour: 6,
-            points: grounds
-                .map(|ground| place(ground.longitude_rad, ground.latitude_rad))
-                .collect(),
-        });
-    }
-    let points = || series.iter().flat_map(|series| series.points.iter());
-    let plot = Plot {
-        x_label: "east longitude, degrees",
-        y_label: "areocentric latitude, degrees",
-        x: Extent::of(points().map(|point| point.0)),
-        y: Extent::of(points().map(|point| point.1)),
-        x_turns: true,
-        height: 560,
-        marks: Vec::new(),
-        caption: format!(
-            "IAU 2000; the axes differ in scale.{}",
-            if shots.len() > MAP_POINTS {
-                " Every so many shots are drawn."
-            } else {
-                ""
-            }
-        ),
-        series,
-    };
-    Ok(section("Footprints", &figure(&plot)?))
-}
-
-/// East end of the widest stretch of longitudes without points, radians.
-fn western_edge_rad(longitudes_rad: &[f64]) -> f64 {
-    let mut sorted = longitudes_rad.to_vec();
-    sorted.sort_by(f64::total_cmp);
-    let (Some(first), Some(last)) = (sorted.first(), sorted.last()) else {
-        return 0.0;
-    };
-    let mut widest = (first + std::f64::consts::TAU - last, *first);
-    for pair in sorted.windows(2) {
-        if pair[1] - pair[0] > widest.0 {
-            widest = (pair[1] - pair[0], pair[1]);
-        }
-    }
-    widest.1
-}
-
-/// Legends name profiles as long as there are few.
-fn legend(site: &SiteProducts, id: &str) -> String {
-    if site.profiles.len() > PROFILES_APART {
-        String::new()
-    } else {
-        id.to_owned()
-    }
-}
+pub(super) const PROFILES_APART: usize = 12;
 
 /// Statistics per profile: Table 3 of Shan et al. 2005.
 pub(super) fn profiles(site: &SiteProducts) -> String {
     if site.profiles.is_empty() {
         return section("Range check", &paragraph("No profile."));
     }
+    let mut body = statistics(site);
+    body += &paragraph(
+        "Metres. Range residual: measured range minus distance between the spacecraft in the kernels and the footprint \
+         with its raw radius (Table 3 of Shan et al. 2005).",
+    );
+    body += &comparison(site);
+    body += &paragraph(&format!(
+        "Means in metres. Crossover: range residual with the crossover-corrected radius. Decoding: range residual with \
+         the spacecraft of the PEDR file. Radial, along, cross: the file's spacecraft minus the kernels'. The tabulated \
+         trajectory is within {:.1e} m of the kernels.",
+        site.ranges.trajectory_error_m
+    ));
+    section("Range check", &body)
+}
+
+fn metres(value: f64) -> String {
+    format!("{value:.3}")
+}
+
+fn statistics(site: &SiteProducts) -> String {
     let heads = [
         "profile",
         "n",
@@ -143,27 +49,15 @@ pub(super) fn profiles(site: &SiteProducts) -> String {
         "max",
         "outliers",
         "trend, mm/s",
-        "crossover mean",
-        "decoding mean",
-        "radial",
-        "along",
-        "cross",
-        "images at the same time",
+        "simultaneous images",
         "verdict",
     ];
     let numbers: &'static [bool] = &[
-        false, true, true, true, true, true, true, true, true, true, true, true, true, true, true,
-        false, false,
+        false, true, true, true, true, true, true, true, true, true, false, false,
     ];
     let mut table = Table::new(&heads, numbers);
     for (profile, ranges) in site.profiles.iter().zip(&site.ranges.profiles) {
         let main = &ranges.range_minus_distance_m;
-        let metres = |value: f64| format!("{value:.3}");
-        let images: Vec<String> = profile
-            .simultaneous
-            .iter()
-            .map(|image| format!("{} ({} shots)", image.image, image.shots))
-            .collect();
         let mut cells = vec![profile.id.clone(), main.n.to_string()];
         cells.extend(
             [
@@ -181,14 +75,11 @@ pub(super) fn profiles(site: &SiteProducts) -> String {
             || "–".to_owned(),
             |trend| format!("{:.2} ± {:.2}", 1e3 * trend.slope, 1e3 * trend.uncertainty),
         ));
-        cells.push(metres(ranges.range_minus_distance_crossover_m.mean));
-        cells.push(metres(ranges.decoding_m.mean));
-        cells.extend(
-            ranges
-                .spacecraft_m
-                .iter()
-                .map(|summary| metres(summary.mean)),
-        );
+        let images: Vec<String> = profile
+            .simultaneous
+            .iter()
+            .map(|image| format!("{} ({} shots)", image.image, image.shots))
+            .collect();
         cells.push(if images.is_empty() {
             "–".to_owned()
         } else {
@@ -202,14 +93,35 @@ pub(super) fn profiles(site: &SiteProducts) -> String {
         });
         table.row(valid, &cells);
     }
-    let words = format!(
-        "Metres. Range residual: measured range minus distance between the spacecraft in the kernels and the footprint \
-         with its raw radius (Table 3 of Shan et al. 2005). Crossover: the same with the crossover-corrected radius. \
-         Decoding: with the file's own spacecraft instead. Radial, along, cross: file's spacecraft minus kernels', mean. \
-         The tabulated trajectory is within {:.1e} m of the kernels.",
-        site.ranges.trajectory_error_m
-    );
-    section("Range check", &(table.finish() + &paragraph(&words)))
+    table.finish()
+}
+
+fn comparison(site: &SiteProducts) -> String {
+    let heads = [
+        "profile",
+        "range residual",
+        "crossover",
+        "decoding",
+        "radial",
+        "along",
+        "cross",
+    ];
+    let mut table = Table::new(&heads, &[false, true, true, true, true, true, true]);
+    for ranges in &site.ranges.profiles {
+        let [radial, along, cross] = &ranges.spacecraft_m;
+        let residuals = [
+            &ranges.range_minus_distance_m,
+            &ranges.range_minus_distance_crossover_m,
+            &ranges.decoding_m,
+            radial,
+            along,
+            cross,
+        ];
+        let mut cells = vec![ranges.profile.clone()];
+        cells.extend(residuals.map(|summary| metres(summary.mean)));
+        table.row(true, &cells);
+    }
+    table.finish()
 }
 
 /// Range residuals against time, outliers marked.

@@ -3,6 +3,7 @@
 use super::html::{Table, list, paragraph, section};
 use crate::{
     config::{BiasScope, DatumChoice, TagSign, WindowConfig, WindowShape},
+    files::file_name,
     products::SiteProducts,
     units::RADIANS_PER_DEGREE,
 };
@@ -57,12 +58,11 @@ pub(super) fn inputs(site: &SiteProducts) -> String {
     }
     let mut files = Table::new(&["PEDR file", "version", "datum", "BLAKE3"], &[false; 4]);
     for file in &site.footprints.files {
-        let name = file.path.file_name().unwrap_or_default().to_string_lossy();
         let version = file.version.map_or_else(|| "–".to_owned(), String::from);
         files.row(
             true,
             &[
-                name.into_owned(),
+                file_name(&file.path),
                 version,
                 file.datum.to_string(),
                 short(&file.blake3),

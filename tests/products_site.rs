@@ -1,0 +1,396 @@
+//! Products of a small site: read by outside means, judged by their schemas, made twice.
+
+#[path = "products_site/fixture.rs"]
+mod fixture;
+
+use std::{
+    fs::{self, File},
+    path::{Path, PathBuf},
+};
+
+use areograph::{error::Kind, products::write_products};
+use arrow::array::{AsArray, RecordBatch};
+use arrow::datatypes::Float64Type;
+use fixture::{SHOTS, START_S, Site};
+use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
+use serde_json::Value;
+
+/// Products in a folder below `target`, where a person may look at them.
+fn written(name: &str, site: &Site, image: bool) -> (PathBuf, Vec<(String, u64)>) {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR"))
+        .join("products_site")
+        .join(name);
+    if folder.exists() {
+        fs::remove_dir_all(&folder).unwrap();
+    }
+    let products = site
+        .with(image, |site| write_products(&folder, site))
+        .unwrap();
+    let list = products
+        .iter()
+        .map(|product| (product.path.to_string_lossy().into_owned(), product.rows));
+    (folder, list.collect())
+}
+
+fn json(path: &Path) -> Value {
+    serde_json::from_slice(&fs::read(path).unwrap()).unwrap()
+}
+
+fn check_schema(schema: &str, document: &Value) {
+    let path = format!(
+        "{}/config/schema/{schema}.schema.json",
+        env!("CARGO_MANIFEST_DIR")
+    );
+    let validator = jsonschema::validator_for(&json(Path::new(&path))).unwrap();
+    let errors: Vec<String> = validator
+        .iter_errors(document)
+        .map(|error| format!("{}: {error}", error.instance_path()))
+        .collect();
+    assert!(errors.is_empty(), "{schema}: {errors:?}");
+}
+
+fn table(path: &Path) -> (RecordBatch, Vec<(String, Option<String>)>) {
+    let builder = ParquetRecordBatchReaderBuilder::try_new(File::open(path).unwrap()).unwrap();
+    let keys = builder
+        .metadata()
+        .file_metadata()
+        .key_value_metadata()
+        .cloned()
+        .unwrap_or_default();
+    let batch = builder.build().unwrap().next().unwrap().unwrap();
+    (
+        batch,
+        keys.into_iter()
+            .map(|entry| (entry.key, entry.value))
+            .collect(),
+    )
+}
+
+fn number(batch: &RecordBatch, column: &str, row: usize) -> f64 {
+    batch
+        .column_by_name(column)
+        .unwrap()
+        .as_primitive::<Float64Type>()
+        .value(row)
+}
+
+fn close(value: f64, expected: f64, tolerance: f64) {
+    assert!(
+        (value - expected).abs() <= tolerance,
+        "{value}, expected {expected} within {tolerance}"
+    );
+}
+
+#[test]
+fn every_product_is_there_with_its_rows() {
+    let (folder, products) = written("rows", &Site::small(), true);
+    let shots = u64::from(SHOTS);
+    let expected = [
+        ("footprints.csv", shots),
+        ("footprints.parquet", shots),
+        ("footprints.geojson", shots),
+        ("ranges.parquet", shots),
+        ("ranges.json", 1),
+        ("images/m04-02852/orientation.parquet", 31),
+        ("images/m04-02852/orientation.json", 31),
+        ("images/m04-02852/isd.json", 40),
+        ("exchange/lola_like.csv", shots),
+        ("exchange/ode_pts.csv", shots),
+        ("exchange/formats.json", 0),
+        ("exchange/README.txt", 0),
+        ("report/index.html", 0),
+    ];
+    assert_eq!(
+        products,
+        expected.map(|(path, rows)| (path.to_owned(), rows))
+    );
+    assert!(products.iter().all(|(path, _)| folder.join(path).is_file()));
+}
+
+#[test]
+fn footprints_are_geoparquet_across_the_antimeridian() {
+    let (folder, _) = written("geoparquet", &Site::small(), true);
+    let (batch, keys) = table(&folder.join("footprints.parquet"));
+    let geo = keys
+        .iter()
+        .find(|(key, _)| key == "geo")
+        .unwrap()
+        .1
+        .clone()
+        .unwrap();
+    let geo: Value = serde_json::from_str(&geo).unwrap();
+    assert_eq!(geo["version"], "1.1.0");
+    let column = &geo["columns"]["geometry"];
+    assert_eq!(column["encoding"], "WKB");
+    assert_eq!(column["crs"]["id"]["code"], 49900);
+    let bounds: Vec<f64> = column["bbox"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|v| v.as_f64().unwrap())
+        .collect();
+    assert!(
+        bounds[0] > 179.99 && bounds[2] < -179.99,
+        "west > east across the antimeridian: {bounds:?}"
+    );
+    let points = batch.column_by_name("geometry").unwrap().as_binary::<i32>();
+    for (row, side) in [(0, 180.0), (59, -180.0)] {
+        let bytes = points.value(row);
+        assert_eq!(bytes[..5], [1, 1, 0, 0, 0]);
+        let longitude = f64::from_le_bytes(bytes[5..13].try_into().unwrap());
+        close(longitude, side, 0.003); // the profile spans 1e-4 rad
+        close(
+            f64::from_le_bytes(bytes[13..].try_into().unwrap()),
+            number(&batch, "latitude_deg", row),
+            0.0,
+        );
+    }
+    close(
+        number(&batch, "topography_m", 3),
+        3_394_001.37 - 3_395_500.0,
+        1e-9,
+    ); // rounding at 3e6 m
+    let xyz = ["x_m", "y_m", "z_m"].map(|axis| number(&batch, axis, 7));
+    close(
+        xyz.iter().map(|c| c * c).sum::<f64>().sqrt(),
+        3_394_000.12,
+        1e-8,
+    );
+    assert_eq!(
+        batch
+            .column_by_name("source_file")
+            .unwrap()
+            .as_string::<i32>()
+            .value(0),
+        "ap19019l.b"
+    );
+    assert_eq!(
+        batch
+            .column_by_name("windows")
+            .unwrap()
+            .as_string::<i32>()
+            .value(0),
+        "antimeridian"
+    );
+}
+
+#[test]
+fn documents_keep_their_schemas() {
+    let (folder, _) = written("schemas", &Site::small(), true);
+    let ranges = json(&folder.join("ranges.json"));
+    check_schema("ranges", &ranges);
+    assert_eq!(ranges["valid"], false);
+    assert_eq!(ranges["profiles"][0]["id"], "antimeridian/9019");
+    assert_eq!(ranges["profiles"][0]["simultaneous"][0]["shots"], 60);
+    assert!(
+        ranges["profiles"][0]["bias_scan"]
+            .get("uncertainty_s")
+            .is_none()
+    );
+    check_schema("footprints", &json(&folder.join("footprints.geojson")));
+    let image = folder.join("images/m04-02852");
+    let orientation = json(&image.join("orientation.json"));
+    check_schema("orientation", &orientation);
+    // 10 m of bend: exact in second order, 10 x 0.31752 m (s_31) in first.
+    close(
+        orientation["first_order"]["x_m"]["rmse"].as_f64().unwrap(),
+        3.1752,
+        1e-4,
+    );
+    close(
+        orientation["second_order"]["x_m"]["rmse"].as_f64().unwrap(),
+        0.0,
+        1e-8,
+    );
+    check_schema("isd", &json(&image.join("isd.json")));
+}
+
+#[test]
+fn camera_model_times_and_detectors_are_those_of_a_summed_image() {
+    let (folder, _) = written("isd", &Site::small(), true);
+    let isd = json(&folder.join("images/m04-02852/isd.json"));
+    let value = |pointer: &str| isd.pointer(pointer).and_then(Value::as_f64).unwrap();
+    let period_s = 8.0 * 0.000_482_1;
+    assert_eq!(value("/image_lines") as u32, 1280);
+    close(value("/line_scan_rate/0/2"), period_s, 0.0);
+    // usgscsm: t(line) = centre + start + rate (line - 0.5 + 0.5), the first line's centre at 0.5.
+    let line_s = |line: f64| {
+        value("/center_ephemeris_time")
+            + value("/line_scan_rate/0/1")
+            + value("/line_scan_rate/0/2") * line
+    };
+    close(line_s(0.5), START_S + 0.5 * period_s, 4e-9); // two roundings of ET near 1e7 s
+    close(line_s(1280.0), START_S + 1280.0 * period_s, 4e-9);
+    // usgscsm: detector = sample x summing + start - centre; detector pixels 0 to 7 have their middle at 3.5.
+    let detector = 0.5 * value("/detector_sample_summing") + value("/starting_detector_sample")
+        - value("/detector_center/sample");
+    close(detector, 3.5 - 1023.5, 0.0);
+    close(
+        value("/instrument_position/positions/0/0"),
+        -1745.7033,
+        1e-9,
+    ); // kilometres
+}
+
+/// Members of ALE's image support data that `usgscsm` may look for.
+#[test]
+fn camera_model_has_the_keys_of_the_truth() {
+    let Some(path) = common::real_data(
+        "ale_mgs/isds/mgsmocna_isd.json",
+        "keys of the image support data",
+    ) else {
+        return;
+    };
+    let (folder, _) = written("keys", &Site::small(), true);
+    let ours = json(&folder.join("images/m04-02852/isd.json"));
+    let truth = json(&path);
+    let mut missing = Vec::new();
+    collect_missing(&truth, &ours, "", &mut missing);
+    missing.retain(|key| !key.starts_with("/naif_keywords/"));
+    assert!(missing.is_empty(), "{missing:?}");
+}
+
+mod common;
+
+fn collect_missing(truth: &Value, ours: &Value, at: &str, missing: &mut Vec<String>) {
+    let Some(members) = truth.as_object() else {
+        if truth.is_array() != ours.is_array() || truth.is_number() != ours.is_number() {
+            missing.push(format!("{at} has another kind"));
+        }
+        return;
+    };
+    for (key, member) in members {
+        match ours.get(key) {
+            Some(found) => collect_missing(member, found, &format!("{at}/{key}"), missing),
+            None => missing.push(format!("{at}/{key}")),
+        }
+    }
+}
+
+#[test]
+fn exchange_files_have_the_columns_that_isis_and_asp_read() {
+    let (folder, _) = written("exchange", &Site::small(), true);
+    let lola = fs::read_to_string(folder.join("exchange/lola_like.csv")).unwrap();
+    let fields: Vec<&str> = lola.lines().nth(1).unwrap().split(',').collect();
+    assert_eq!(fields[0], "1999-08-24T14:12:13.000");
+    assert!(fields[1].starts_with("179.997135")); // east longitude, degrees
+    assert_eq!(&fields[3..5], ["3394.001370", "380.000100"]);
+    let ode = fs::read_to_string(folder.join("exchange/ode_pts.csv")).unwrap();
+    assert!(ode.starts_with("LONG_EAST,LAT_NORTH,TOPOGRAPHY,RANGE,PLANET_RAD,"));
+    assert_eq!(
+        ode.lines().nth(1).unwrap().split(',').nth(4),
+        Some("3394001.370")
+    );
+    assert_eq!(lola.lines().count(), 61);
+    assert!(!lola.contains('"') && !ode.contains('"'));
+}
+
+#[test]
+fn the_report_says_the_verdict_and_escapes_what_came_from_files() {
+    let (folder, _) = written("report", &Site::small(), true);
+    let page = fs::read_to_string(folder.join("report/index.html")).unwrap();
+    assert!(page.contains("Invalid, for 1 reason:"));
+    assert!(page.contains("<li>profile antimeridian/9019: mean of range − distance 11.000 m"));
+    assert!(page.contains("One orbit &amp; one image &lt;made by hand&gt;"));
+    assert!(page.contains("record 4: &lt;script&gt;alert(1)&lt;/script&gt; &amp; more"));
+    assert!(page.contains("class 0 &lt;cloud&gt;"));
+    assert!(!page.contains("<script"));
+    // Map, residuals, scan, position and pointing of the image.
+    assert_eq!(page.matches("<svg").count(), 5);
+}
+
+#[test]
+fn many_profiles_share_plots_and_the_page_stays_small() {
+    let mut site = Site::small();
+    let (profile, ranges) = (site.profiles[0].clone(), site.ranges.profiles[0].clone());
+    let shots = site.ranges.shots.clone();
+    for copy in 1..300_u32 {
+        let mut profile = profile.clone();
+        profile.id = format!("antimeridian/{}", 9019 + copy);
+        let mut ranges = ranges.clone();
+        ranges.profile.clone_from(&profile.id);
+        site.profiles.push(profile);
+        site.ranges.profiles.push(ranges);
+        let all = &mut site.ranges.shots;
+        all.profile.extend(shots.profile.iter().map(|_| copy));
+        all.row.extend(&shots.row);
+        all.range_minus_distance_m
+            .extend(&shots.range_minus_distance_m);
+        all.range_minus_distance_crossover_m
+            .extend(&shots.range_minus_distance_crossover_m);
+        all.decoding_m.extend(&shots.decoding_m);
+        all.spacecraft_radial_m.extend(&shots.spacecraft_radial_m);
+        all.spacecraft_along_m.extend(&shots.spacecraft_along_m);
+        all.spacecraft_cross_m.extend(&shots.spacecraft_cross_m);
+        all.outlier.extend(&shots.outlier);
+    }
+    let (folder, _) = written("many", &site, false);
+    let page = fs::read_to_string(folder.join("report/index.html")).unwrap();
+    assert_eq!(page.matches("<svg").count(), 1 + 25 + 25); // map, 300 / 12 residual and scan plots
+    assert!(page.len() < 5_000_000, "{} bytes", page.len());
+}
+
+#[test]
+fn the_same_site_gives_the_same_bytes() {
+    let (first, products) = written("first", &Site::small(), true);
+    let (second, _) = written("second", &Site::small(), true);
+    for (path, _) in products {
+        assert!(
+            fs::read(first.join(&path)).unwrap() == fs::read(second.join(&path)).unwrap(),
+            "{path}"
+        );
+    }
+}
+
+#[test]
+fn an_empty_site_has_empty_products() {
+    let (folder, products) = written("empty", &Site::empty(), false);
+    assert_eq!(products.len(), 10);
+    assert!(products.iter().all(|(_, rows)| *rows == 0));
+    let ranges = json(&folder.join("ranges.json"));
+    check_schema("ranges", &ranges);
+    assert_eq!(ranges["invalid_because"][0], "no footprint in any window");
+    check_schema("footprints", &json(&folder.join("footprints.geojson")));
+    let page = fs::read_to_string(folder.join("report/index.html")).unwrap();
+    assert!(page.contains("Invalid, for 1 reason:") && !page.contains("<svg"));
+}
+
+#[test]
+fn numbers_that_are_not_finite_are_refused_with_their_place() {
+    let mut site = Site::small();
+    site.footprints.range_m[4] = f64::NAN;
+    let folder = tempfile::tempdir().unwrap();
+    let failure = site
+        .with(true, |site| write_products(folder.path(), site))
+        .unwrap_err();
+    assert_eq!(failure.kind(), Kind::Bug);
+    assert_eq!(
+        failure.fault.to_string(),
+        "column range_m, row 5 of 60 is not a finite number"
+    );
+
+    let mut site = Site::small();
+    site.orientation.tables.velocity_m_s[1][2] = f64::INFINITY;
+    let failure = site
+        .with(true, |site| write_products(folder.path(), site))
+        .unwrap_err();
+    assert_eq!(
+        failure.fault.to_string(),
+        "/instrument_position/velocities/1/2 is not a finite number"
+    );
+    assert!(failure.file.unwrap().ends_with("images/m04-02852/isd.json"));
+}
+
+#[test]
+fn parts_that_do_not_belong_together_are_refused() {
+    let mut site = Site::small();
+    site.utc.pop();
+    let folder = tempfile::tempdir().unwrap();
+    let failure = site
+        .with(true, |site| write_products(folder.path(), site))
+        .unwrap_err();
+    assert_eq!(
+        failure.fault.to_string(),
+        "UTC strings of footprints: 59; expected 60"
+    );
+}

@@ -1,0 +1,330 @@
+//! A small site made by hand: one orbit across the antimeridian, one image, one outlier.
+
+use std::collections::BTreeMap;
+
+use areograph::{
+    config::{
+        BiasScope, DatumChoice, KernelSource, KernelsConfig, MolaClock, OrientationConfig,
+        PedrConfig, PointingConfig, RangeCheckConfig, ShotFilter, SiteConfig, TagSign,
+        WindowConfig, WindowShape,
+    },
+    constants::MGS_POINTING_BIAS,
+    footprints::{Footprint, Footprints, SourceFile},
+    frames::{MarsDatum, MarsIau2000},
+    geom::{
+        attitude::{OmegaPhiKappa, spice_quaternion},
+        statistics::{Summary, Trend},
+    },
+    products::{ImageProducts, KernelLine, SiteProducts},
+    stages::{
+        check_ranges::{BiasScan, ProfileRanges, RangeCheck, ShotResiduals},
+        fit_sensor_model::{SensorModel, fit_sensor_model},
+        group_profiles::{Profile, group_profiles},
+        sample_orientation::{BoresightGround, CameraTables, Orientation, OrientationSample},
+        tag_times::{ImageTimes, StartFrom},
+    },
+    time::Et,
+};
+
+/// Shots of the profile; one in ten seconds lies on either side of the antimeridian.
+pub(crate) const SHOTS: u32 = 60;
+/// ET of the first shot and of the image, seconds.
+pub(crate) const START_S: f64 = -11_224_002.182_053_322;
+
+/// Owned parts of a site.
+pub(crate) struct Site {
+    pub(crate) config: SiteConfig,
+    pub(crate) kernels: Vec<KernelLine>,
+    pub(crate) times: ImageTimes,
+    pub(crate) orientation: Orientation,
+    pub(crate) model: SensorModel,
+    pub(crate) footprints: Footprints<MarsIau2000>,
+    pub(crate) utc: Vec<String>,
+    pub(crate) profiles: Vec<Profile>,
+    pub(crate) ranges: RangeCheck,
+    pub(crate) rejected: BTreeMap<String, u64>,
+    pub(crate) complaints: Vec<String>,
+    pub(crate) notes: Vec<String>,
+}
+
+impl Site {
+    pub(crate) fn small() -> Self {
+        let config = config();
+        let times = image_times();
+        let orientation = orientation(&times);
+        let footprints = footprints();
+        let profiles = group_profiles(&footprints, &config.windows, std::slice::from_ref(&times));
+        Self {
+            kernels: vec![KernelLine {
+                name: "naif0012.tls".to_owned(),
+                role: "LSK".to_owned(),
+                bytes: 5257,
+                blake3: "ab".repeat(32),
+            }],
+            model: fit_sensor_model(&orientation, &config.orientation).unwrap(),
+            utc: (0..footprints.len())
+                .map(|row| format!("1999-08-24T14:12:{:06.3}", 13.0 + 0.1 * row as f64))
+                .collect(),
+            ranges: ranges(&profiles),
+            rejected: BTreeMap::from([("class 0 <cloud>".to_owned(), 7)]),
+            complaints: vec!["ap19019l.b record 4: <script>alert(1)</script> & more".to_owned()],
+            notes: vec!["ap19019l.b: in IAU 2000 already, not converted".to_owned()],
+            config,
+            times,
+            orientation,
+            footprints,
+            profiles,
+        }
+    }
+
+    /// The same site without shots and images.
+    pub(crate) fn empty() -> Self {
+        let mut site = Self::small();
+        site.footprints = Footprints::new(site.footprints.files.clone());
+        site.utc.clear();
+        site.profiles.clear();
+        site.ranges = ranges(&[]);
+        site
+    }
+
+    /// Calls `with` on the site as products want it, with or without its image.
+    pub(crate) fn with<T>(&self, image: bool, with: impl FnOnce(&SiteProducts) -> T) -> T {
+        let images = [ImageProducts {
+            times: &self.times,
+            orientation: &self.orientation,
+            model: &self.model,
+        }];
+        with(&SiteProducts {
+            config: &self.config,
+            kernels: &self.kernels,
+            images: if image { &images } else { &[] },
+            footprints: &self.footprints,
+            utc: &self.utc,
+            profiles: &self.profiles,
+            ranges: &self.ranges,
+            rejected: &self.rejected,
+            complaints: &self.complaints,
+            notes: &self.notes,
+        })
+    }
+}
+
+fn config() -> SiteConfig {
+    SiteConfig {
+        site: "small".to_owned(),
+        description: "One orbit & one image <made by hand>".to_owned(),
+        file: "small.toml".into(),
+        blake3: "ef".repeat(32),
+        kernels: KernelsConfig {
+            source: KernelSource::Files(vec!["naif0012.tls".into()]),
+            ck_tolerance_s: 0.0,
+            padding_s: 1.0,
+        },
+        pointing: PointingConfig {
+            ck_bias: MGS_POINTING_BIAS,
+            source: "mocAddendum004.ti".to_owned(),
+        },
+        mola_clock: MolaClock {
+            bias_s: 0.117,
+            sign: TagSign::Late,
+            scope: BiasScope::SpkLookup,
+            source: "Shan et al. 2005, p. 98".to_owned(),
+        },
+        pedr: PedrConfig {
+            files: vec!["data/ap19019l.b".into()],
+            datum: DatumChoice::Auto,
+            filter: ShotFilter {
+                classes: vec![1],
+                channels: vec![1, 2, 3, 4],
+                attitude_flags: vec![0],
+                off_nadir_max_rad: 0.5,
+            },
+        },
+        windows: vec![WindowConfig {
+            id: "antimeridian".to_owned(),
+            shape: WindowShape::Box {
+                west_rad: 3.1,
+                east_rad: 3.2,
+                south_rad: -0.3,
+                north_rad: 0.0,
+            },
+        }],
+        images: Vec::new(),
+        range_check: RangeCheckConfig {
+            mean_max_m: 10.0,
+            outlier_sigma: 5.0,
+            outlier_share_max: 0.05,
+            shots_min: 10,
+            decoding_max_m: 1.0,
+            scan_half_width_s: 0.3,
+            scan_step_s: 0.1,
+        },
+        orientation: OrientationConfig {
+            intervals: 30,
+            position_rmse_max_m: 5.0,
+            pointing_rmse_max_rad: 1e-4,
+        },
+    }
+}
+
+fn image_times() -> ImageTimes {
+    ImageTimes {
+        id: "m04-02852".to_owned(),
+        start: Et::from_seconds(START_S),
+        start_from: StartFrom::Sclk,
+        sclk_start: Some("619971158:28".to_owned()),
+        utc_start: "1999-08-24T14:12:13.635".to_owned(),
+        line_period_s: 8.0 * 0.000_482_1,
+        exposure_s: 0.000_482_1,
+        downtrack_summing: 8,
+        crosstrack_summing: 8,
+        lines_header: 1536,
+        lines_delivered: 1280,
+        samples: 256,
+        first_detector: 0,
+        notes: vec!["256 of 1536 header lines are not in the delivered file".to_owned()],
+    }
+}
+
+/// A camera that moves along a slightly bent line and turns a little.
+fn orientation(times: &ImageTimes) -> Orientation {
+    let samples = (0..=30)
+        .map(|k| {
+            let et = times.start.plus(f64::from(k) / 30.0 * times.duration_s());
+            let u = f64::from(k) / 15.0 - 1.0;
+            let angles = OmegaPhiKappa {
+                omega_rad: 0.2 + 0.01 * u,
+                phi_rad: -1.3 + 0.002 * u + 1e-6 * (5.0 * u).sin(),
+                kappa_rad: -2.2 + 0.01 * u,
+            };
+            OrientationSample {
+                et,
+                line_offset: times.line_offset(et),
+                position_m: [
+                    -3.7e6 + 10.0 * u * u,
+                    1e4 * u,
+                    -0.3e6 + 9e3 * u + 1e-3 * u * u * u,
+                ],
+                camera_to_mars: spice_quaternion(&angles.camera_to_mars()),
+                angles,
+                boresight: (k > 0).then(|| BoresightGround {
+                    longitude_rad: 3.142 + 1e-4 * u,
+                    latitude_rad: -0.1 + 0.005 * u,
+                    range_m: 380_000.0,
+                    emission_rad: 0.003,
+                }),
+            }
+        })
+        .collect();
+    let et_s: Vec<f64> = (0..40).map(|k| START_S + 0.16 * f64::from(k)).collect();
+    let nodes = et_s.len();
+    Orientation {
+        image: times.id.clone(),
+        samples,
+        tables: CameraTables {
+            position_m: vec![[-1_745_703.3, 1_342_962.3, -3_030_553.6]; nodes],
+            velocity_m_s: vec![[-2_248.8, 1_571.6, 1_992.2]; nodes],
+            sun_position_m: [[-3.2e10, 1.9e11, 8.9e10]; 2],
+            sun_velocity_m_s: [[-24_866.9, -5_461.1, -1_832.5]; 2],
+            inertial_to_bus: vec![[0.9, -0.1, -0.3, 0.3]; nodes],
+            bus_angular_velocity_rad_s: vec![[5e-4, 7e-4, 8e-6]; nodes],
+            inertial_to_mars: vec![[0.95, -0.2, -0.2, 0.0]; nodes],
+            mars_angular_velocity_rad_s: vec![[3e-5, -3e-5, 6e-5]; nodes],
+            bus_to_camera: [
+                [1.0, 0.003, 0.001],
+                [-0.003, 1.0, 0.002],
+                [-0.001, -0.002, 1.0],
+            ],
+            et_s,
+        },
+    }
+}
+
+fn footprints() -> Footprints<MarsIau2000> {
+    let mut footprints = Footprints::new(vec![SourceFile {
+        path: "data/ap19019l.b".into(),
+        version: Some('L'),
+        datum: MarsDatum::Iau2000,
+        blake3: "cd".repeat(32),
+    }]);
+    for k in 0..SHOTS {
+        let along = f64::from(k) / f64::from(SHOTS);
+        let et_s = START_S + 0.1 * f64::from(k);
+        footprints.push(&Footprint {
+            et_tag_s: et_s + 0.117,
+            et_s,
+            orbit: 9019,
+            file: 0,
+            record: 11 + k / 20,
+            shot: u8::try_from(k % 20 + 1).unwrap(),
+            longitude_rad: std::f64::consts::PI + 1e-4 * (along - 0.5),
+            latitude_rad: -0.1 + 0.005 * along,
+            radius_m: 3_394_000.12,
+            radius_crossover_m: 3_394_001.37,
+            areoid_radius_m: 3_395_500.0,
+            range_m: 380_000.0 + 0.1,
+            spacecraft_longitude_rad: std::f64::consts::PI,
+            spacecraft_latitude_rad: -0.1 + 0.005 * along,
+            spacecraft_radius_m: 3_774_000.0,
+            off_nadir_rad: 0.003,
+            channel: 1,
+            class: 1,
+            attitude_flag: 0,
+            orbit_quality: 3,
+            windows: 1,
+        });
+    }
+    footprints
+}
+
+/// Residuals of a few centimetres with one outlier of 50 m.
+fn ranges(profiles: &[Profile]) -> RangeCheck {
+    let mut shots = ShotResiduals::default();
+    for profile in profiles {
+        for (k, row) in (0_u32..).zip(&profile.rows) {
+            let residual_m = if k == 17 {
+                50.0
+            } else {
+                -2.0 + 0.02 * f64::from(k).sin()
+            };
+            shots.profile.push(0);
+            shots.row.push(*row);
+            shots.range_minus_distance_m.push(residual_m);
+            shots
+                .range_minus_distance_crossover_m
+                .push(residual_m - 1.25);
+            shots.decoding_m.push(0.001);
+            shots.spacecraft_radial_m.push(1.0);
+            shots.spacecraft_along_m.push(2.0);
+            shots.spacecraft_cross_m.push(3.0);
+            shots.outlier.push(k == 17);
+        }
+    }
+    let summary = Summary::of(&shots.range_minus_distance_m);
+    RangeCheck {
+        profiles: profiles
+            .iter()
+            .map(|profile| ProfileRanges {
+                profile: profile.id.clone(),
+                range_minus_distance_m: summary,
+                range_minus_distance_crossover_m: summary,
+                decoding_m: Summary::of(&shots.decoding_m),
+                spacecraft_m: [summary; 3],
+                trend_m_s: Some(Trend {
+                    slope: 0.01,
+                    uncertainty: 0.002,
+                }),
+                outliers: 1,
+                scan: Some(BiasScan {
+                    correction_s: vec![-0.2, -0.1, 0.0, 0.1, 0.2],
+                    spread_m: vec![0.2, 0.1, 0.3, 0.5, 0.7],
+                    best_s: Some(-0.12),
+                    uncertainty_s: None,
+                }),
+                invalid_because: vec!["mean of range − distance 11.000 m; limit ±10 m".to_owned()],
+            })
+            .collect(),
+        shots,
+        trajectory_error_m: 2e-4,
+    }
+}
