@@ -11,94 +11,9 @@
 
 mod common;
 
-use std::{
-    fs,
-    path::{Path, PathBuf},
-    process::Command,
-};
+use std::{fs, path::Path, process::Command};
 
-use common::mission::{areograph, mission};
-
-/// A small site of its own: kernels, one PEDR file, one label, and a site file over them.
-struct Case {
-    folder: tempfile::TempDir,
-}
-
-const SITE: &str = r#"site = "case"
-[kernels]
-metakernel = "kernels/nav.tm"
-[pedr]
-files = ["pedr/*.b"]
-[[windows]]
-id = "window"
-longitude_deg = [87.5, 88.5]
-latitude_deg = [4.0, 5.0]
-[[images]]
-id = "image"
-label = "image.lbl"
-"#;
-
-impl Case {
-    fn new() -> Self {
-        let case = Self {
-            folder: tempfile::tempdir().unwrap(),
-        };
-        let mission = mission();
-        for folder in ["kernels", "pedr"] {
-            fs::create_dir(case.path(folder)).unwrap();
-        }
-        for entry in fs::read_dir(mission.join("kernels")).unwrap() {
-            let path = entry.unwrap().path();
-            fs::copy(&path, case.path("kernels").join(path.file_name().unwrap())).unwrap();
-        }
-        let pedr = mission.join("pedr/ap19117l.b");
-        fs::copy(pedr, case.path("pedr/ap19117l.b")).unwrap();
-        fs::copy(mission.join("labels/E02-02016.lbl"), case.path("image.lbl")).unwrap();
-        case.write("site.toml", SITE);
-        case
-    }
-
-    fn path(&self, relative: &str) -> PathBuf {
-        self.folder.path().join(relative)
-    }
-
-    fn write(&self, relative: &str, content: impl AsRef<[u8]>) {
-        fs::write(self.path(relative), content).unwrap();
-    }
-
-    fn read(&self, relative: &str) -> Vec<u8> {
-        fs::read(self.path(relative)).unwrap()
-    }
-
-    fn replace(&self, relative: &str, from: &str, to: &str) {
-        let text = String::from_utf8(self.read(relative)).unwrap();
-        assert!(text.contains(from), "{relative} has no {from}");
-        self.write(relative, text.replace(from, to));
-    }
-
-    fn truncate(&self, relative: &str, bytes: usize) {
-        self.write(relative, &self.read(relative)[..bytes]);
-    }
-
-    fn run(&self) -> Command {
-        let mut command = areograph();
-        command.current_dir(self.folder.path());
-        command.args(["run", "site.toml", "--out", "out", "--jobs", "1"]);
-        command
-    }
-
-    /// Exit code and everything printed, the case's folder cut out.
-    fn outcome(&self, mut command: Command) -> String {
-        let output = command.output().unwrap();
-        let printed = [&output.stdout[..], &output.stderr[..]].concat();
-        let folder = self.folder.path().canonicalize().unwrap();
-        let printed = String::from_utf8(printed)
-            .unwrap()
-            .replace(&format!("{}/", folder.display()), "")
-            .replace(&format!("{}/", self.folder.path().display()), "");
-        format!("exit {}\n{printed}", output.status.code().unwrap_or(-1))
-    }
-}
+use common::case::Case;
 
 type Spoil = fn(&Case) -> Command;
 
@@ -262,9 +177,8 @@ const CASES: [(&str, Spoil); 36] = [
         case.run()
     }),
     ("out_cannot_be_made", |case| {
-        let mut command = areograph();
-        command.current_dir(case.folder.path());
-        command.args(["run", "site.toml", "--out", "/proc/areograph"]);
+        let mut command = case.areograph();
+        command.args(["--quiet", "run", "site.toml", "--out", "/proc/areograph"]);
         command
     }),
     ("two_sites_with_one_id", |case| {
@@ -279,17 +193,14 @@ const CASES: [(&str, Spoil); 36] = [
         command
     }),
     ("scene_over_a_foreign_folder", |case| {
-        let mut command = areograph();
-        command
-            .current_dir(case.folder.path())
-            .args(["scene", "kernels"]);
+        let mut command = case.areograph();
+        command.args(["--quiet", "scene", "kernels"]);
         command
     }),
     ("scene_along_kernels_without_attitude", |case| {
         case.replace("kernels/nav.tm", "'mgs_sc_scene.bc'", "");
-        let mut command = areograph();
-        command.current_dir(case.folder.path());
-        command.args(["scene", "flown", "--along", "kernels/nav.tm"]);
+        let mut command = case.areograph();
+        command.args(["--quiet", "scene", "flown", "--along", "kernels/nav.tm"]);
         command
     }),
 ];
@@ -383,7 +294,7 @@ fn a_full_disk_leaves_nothing_half_made() {
     let unshared = |program: &str, arguments: &[&str]| {
         let mut command = Command::new("unshare");
         command
-            .current_dir(case.folder.path())
+            .current_dir(case.path(""))
             .args(["--map-root-user", "--mount"]);
         command.arg(program).args(arguments);
         command

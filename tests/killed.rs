@@ -16,7 +16,7 @@ const KILLS: u32 = 20;
 fn run(site: &Path, out: &Path, threads: &str) -> std::process::Command {
     let mut command = areograph();
     command
-        .arg("run")
+        .args(["--quiet", "run"])
         .arg(site)
         .arg("--out")
         .arg(out)

@@ -74,7 +74,13 @@ fn a_site_on_real_kernels_ends_valid_and_stays() {
     let site = scene.join("sites/m04-02852.toml");
     let out = folder.path().join("out");
     let run = || {
-        let output = succeed(areograph().arg("run").arg(&site).arg("--out").arg(&out));
+        let output = succeed(
+            areograph()
+                .args(["--quiet", "run"])
+                .arg(&site)
+                .arg("--out")
+                .arg(&out),
+        );
         String::from_utf8(output.stdout).unwrap()
     };
     assert!(run().starts_with("m04-02852: valid; products in "));

@@ -31,7 +31,7 @@ impl KernelSet {
         let role = role_of(metakernel)?;
         if role != KernelRole::Meta {
             let fault = SpiceFault::NotAKernel {
-                found: format!("a kernel of role {role:?}"),
+                found: format!("a kernel of role {role}"),
                 expected: "a metakernel (KERNELS_TO_LOAD)",
             };
             return Err(fault).in_file(metakernel);
@@ -63,7 +63,7 @@ impl KernelSet {
     pub fn metakernel_text(&self, relative_to: Option<&Path>) -> String {
         let described = self.kernels.iter().map(|kernel| {
             format!(
-                "   {} {:?}, {} bytes, BLAKE3 {}\n",
+                "   {} {}, {} bytes, BLAKE3 {}\n",
                 kernel.file_name(),
                 kernel.role,
                 kernel.bytes,
@@ -122,7 +122,14 @@ fn listed_names(assignments: &[Assignment]) -> std::result::Result<Vec<String>, 
             name.replace(&format!("${symbol}"), value)
         })
     };
-    Ok(names.into_iter().map(replace).collect())
+    let names: Vec<String> = names.into_iter().map(replace).collect();
+    match names.iter().find(|name| name.starts_with('$')) {
+        Some(name) => Err(SpiceFault::NotAKernel {
+            found: format!("a metakernel that names {name}"),
+            expected: "that path symbol in PATH_SYMBOLS, with its value in PATH_VALUES",
+        }),
+        None => Ok(names),
+    }
 }
 
 /// The strings of a variable, continued ones joined.

@@ -160,6 +160,12 @@ mod tests {
     }
 
     #[test]
+    fn another_version_of_the_program_is_a_reason() {
+        let stored: Parts = serde_json::from_str(r#"{"areograph": "0.0.1"}"#).unwrap();
+        assert_eq!(Parts::new().changed_since(&stored), ["areograph changed"]);
+    }
+
+    #[test]
     fn names_and_values_do_not_run_into_each_other() {
         let one = Parts::new().file("pedr", "a", "bc");
         let other = Parts::new().file("pedr", "ab", "c");

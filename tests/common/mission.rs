@@ -8,9 +8,7 @@ use std::{
 
 /// The program under test.
 pub(crate) fn areograph() -> Command {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_areograph"));
-    command.arg("--quiet");
-    command
+    Command::new(env!("CARGO_BIN_EXE_areograph"))
 }
 
 /// Folder of the default mission. Test programs run side by side: the first one writes it.
@@ -33,7 +31,7 @@ pub(crate) fn mission() -> PathBuf {
                 fs::remove_dir_all(path).unwrap();
             }
         }
-        succeed(areograph().arg("scene").arg(&mission));
+        succeed(areograph().arg("--quiet").arg("scene").arg(&mission));
     }
     mission
 }

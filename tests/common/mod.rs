@@ -1,6 +1,12 @@
 //! What several tests share: the real data, and the synthetic mission.
 #![allow(dead_code, reason = "each test program uses a part of this module")]
+#![allow(
+    clippy::disallowed_methods,
+    clippy::unwrap_used,
+    reason = "helpers of tests work in temporary folders and may fail loudly"
+)]
 
+pub(crate) mod case;
 pub(crate) mod mission;
 
 use std::path::{Path, PathBuf};

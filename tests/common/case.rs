@@ -1,0 +1,92 @@
+//! A small site of a test's own: kernels, one PEDR file, one label, and a site file over them.
+
+use std::{fs, path::PathBuf, process::Command};
+
+use super::mission::{areograph, mission};
+
+const SITE: &str = r#"site = "case"
+[kernels]
+metakernel = "kernels/nav.tm"
+[pedr]
+files = ["pedr/*.b"]
+[[windows]]
+id = "window"
+longitude_deg = [87.5, 88.5]
+latitude_deg = [4.0, 5.0]
+[[images]]
+id = "image"
+label = "image.lbl"
+"#;
+
+/// The site, in a folder that goes with it.
+pub(crate) struct Case {
+    folder: tempfile::TempDir,
+}
+
+impl Case {
+    pub(crate) fn new() -> Self {
+        let case = Self {
+            folder: tempfile::tempdir().unwrap(),
+        };
+        let mission = mission();
+        for folder in ["kernels", "pedr"] {
+            fs::create_dir(case.path(folder)).unwrap();
+        }
+        for entry in fs::read_dir(mission.join("kernels")).unwrap() {
+            let path = entry.unwrap().path();
+            fs::copy(&path, case.path("kernels").join(path.file_name().unwrap())).unwrap();
+        }
+        let pedr = mission.join("pedr/ap19117l.b");
+        fs::copy(pedr, case.path("pedr/ap19117l.b")).unwrap();
+        fs::copy(mission.join("labels/E02-02016.lbl"), case.path("image.lbl")).unwrap();
+        case.write("site.toml", SITE);
+        case
+    }
+
+    pub(crate) fn path(&self, relative: &str) -> PathBuf {
+        self.folder.path().join(relative)
+    }
+
+    pub(crate) fn write(&self, relative: &str, content: impl AsRef<[u8]>) {
+        fs::write(self.path(relative), content).unwrap();
+    }
+
+    pub(crate) fn read(&self, relative: &str) -> Vec<u8> {
+        fs::read(self.path(relative)).unwrap()
+    }
+
+    pub(crate) fn replace(&self, relative: &str, from: &str, to: &str) {
+        let text = String::from_utf8(self.read(relative)).unwrap();
+        assert!(text.contains(from), "{relative} has no {from}");
+        self.write(relative, text.replace(from, to));
+    }
+
+    pub(crate) fn truncate(&self, relative: &str, bytes: usize) {
+        self.write(relative, &self.read(relative)[..bytes]);
+    }
+
+    /// The program, in the folder of the case.
+    pub(crate) fn areograph(&self) -> Command {
+        let mut command = areograph();
+        command.current_dir(self.folder.path());
+        command
+    }
+
+    pub(crate) fn run(&self) -> Command {
+        let mut command = self.areograph();
+        command.args(["--quiet", "run", "site.toml", "--out", "out", "--jobs", "1"]);
+        command
+    }
+
+    /// Exit code and everything printed, the case's folder cut out.
+    pub(crate) fn outcome(&self, mut command: Command) -> String {
+        let output = command.output().unwrap();
+        let printed = [&output.stdout[..], &output.stderr[..]].concat();
+        let folder = self.folder.path().canonicalize().unwrap();
+        let printed = String::from_utf8(printed)
+            .unwrap()
+            .replace(&format!("{}/", folder.display()), "")
+            .replace(&format!("{}/", self.folder.path().display()), "");
+        format!("exit {}\n{printed}", output.status.code().unwrap_or(-1))
+    }
+}

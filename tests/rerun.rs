@@ -1,0 +1,190 @@
+//! A second run does what a change touches, says why, and nothing else.
+#![allow(
+    clippy::unwrap_used,
+    clippy::panic,
+    reason = "helpers of tests may fail loudly"
+)]
+
+mod common;
+
+use std::{collections::BTreeMap, fs::File, time::SystemTime};
+
+use common::case::Case;
+
+/// Stages that would run, with the reason.
+fn plan(case: &Case) -> BTreeMap<String, String> {
+    let mut command = case.areograph();
+    command.args(["--quiet", "plan", "site.toml", "--out", "out", "--json"]);
+    let answer = common::mission::succeed(&mut command).stdout;
+    let answer: serde_json::Value = serde_json::from_slice(&answer).unwrap();
+    let stages = answer[0]["stages"].as_array().unwrap().clone();
+    stages
+        .iter()
+        .filter(|stage| stage["runs"] == true)
+        .map(|stage| {
+            let text = |key: &str| stage[key].as_str().unwrap().to_owned();
+            (text("stage"), text("because"))
+        })
+        .collect()
+}
+
+/// Runs, and gives the stages that the log says ran.
+fn run(case: &Case) -> Vec<String> {
+    let mut command = case.areograph();
+    command.args(["run", "site.toml", "--out", "out"]);
+    let log = String::from_utf8(common::mission::succeed(&mut command).stderr).unwrap();
+    log.lines()
+        .filter(|line| line.contains(": running: "))
+        .map(|line| {
+            line.split("stage=\"")
+                .nth(1)
+                .unwrap()
+                .trim_end_matches('"')
+                .to_owned()
+        })
+        .collect()
+}
+
+fn fresh() -> Case {
+    let case = Case::new();
+    assert_eq!(run(&case).len(), 8);
+    assert_eq!(plan(&case), BTreeMap::new());
+    assert_eq!(run(&case), [""; 0]);
+    case
+}
+
+fn assert_plan(case: &Case, expected: &[(&str, &str)]) {
+    let expected = expected
+        .iter()
+        .map(|(stage, why)| ((*stage).to_owned(), (*why).to_owned()));
+    assert_eq!(plan(case), expected.collect());
+}
+
+#[test]
+fn a_limit_of_the_range_check_touches_the_range_check() {
+    let case = fresh();
+    case.replace(
+        "site.toml",
+        "[[images]]",
+        "[range_check]\nmean_max_m = 9.0\n[[images]]",
+    );
+    let publish = "key configuration changed, output of check_ranges may change";
+    assert_plan(
+        &case,
+        &[
+            ("check_ranges", "key range_check changed"),
+            ("publish", publish),
+        ],
+    );
+    // The statistics come out the same, so only the manifest's configuration hash is new.
+    assert_eq!(run(&case), ["check_ranges", "publish"]);
+}
+
+#[test]
+fn a_comment_touches_nothing() {
+    let case = fresh();
+    case.replace("site.toml", "[pedr]", "# the archive\n[pedr]");
+    let file = File::open(case.path("pedr/ap19117l.b")).unwrap();
+    file.set_modified(SystemTime::now()).unwrap();
+    assert_plan(&case, &[]);
+}
+
+#[test]
+fn a_new_leap_second_kernel_with_the_same_seconds_stops_at_the_times() {
+    let case = fresh();
+    let mut text = case.read("kernels/leapseconds.tls");
+    text.extend(b"\nA remark after the last table.\n");
+    case.write("kernels/leapseconds.tls", text);
+    let planned = plan(&case);
+    assert_eq!(planned["tag_times"], "kernel leapseconds.tls changed");
+    assert_eq!(planned["group_profiles"], "output of tag_times may change");
+    assert!(!planned.contains_key("search_footprints"));
+    // Times come out the same: profiles and ranges stay. Attitude depends on every kernel.
+    assert_eq!(
+        run(&case),
+        ["tag_times", "sample_orientation/image", "publish"]
+    );
+}
+
+#[test]
+fn another_orbit_touches_ranges_and_orientation() {
+    let case = fresh();
+    std::fs::copy(
+        case.path("kernels/mgs_ipng_scene.bsp"),
+        case.path("kernels/mgs_nav_scene.bsp"),
+    )
+    .unwrap();
+    let planned = plan(&case);
+    assert_eq!(planned["check_ranges"], "kernel mgs_nav_scene.bsp changed");
+    assert_eq!(
+        planned["sample_orientation/image"],
+        "kernel mgs_nav_scene.bsp changed"
+    );
+    assert!(!planned.contains_key("tag_times"));
+    let ran = run(&case);
+    assert_eq!(
+        ran,
+        [
+            "check_ranges",
+            "sample_orientation/image",
+            "fit_sensor_model/image",
+            "publish"
+        ]
+    );
+}
+
+#[test]
+fn a_changed_pedr_file_is_searched_again() {
+    let case = fresh();
+    let mut bytes = case.read("pedr/ap19117l.b");
+    bytes[7_760 + 480] ^= 1; // an engineering byte, far from every footprint
+    case.write("pedr/ap19117l.b", bytes);
+    assert_eq!(plan(&case)["search_footprints"], "pedr ap19117l.b changed");
+    // The file's hash is part of the footprints' origin, so what holds it follows; times do not.
+    let ran = run(&case);
+    assert!(
+        ran.contains(&"search_footprints".to_owned()) && !ran.contains(&"tag_times".to_owned())
+    );
+}
+
+#[test]
+fn the_clock_scope_touches_what_it_reaches() {
+    let case = fresh();
+    case.replace(
+        "site.toml",
+        "[pedr]",
+        "[mola_clock]\nscope = \"both\"\n[pedr]",
+    );
+    let planned = plan(&case);
+    assert_eq!(planned["convert_datum"], "key mola_clock.scope changed");
+    assert!(planned["check_ranges"].starts_with("key mola_clock.scope changed"));
+    assert!(!planned.contains_key("search_footprints"));
+    assert!(!planned.contains_key("sample_orientation/image"));
+}
+
+#[test]
+fn until_force_and_dry_run() {
+    let case = Case::new();
+    let mut command = case.run();
+    command.args(["--until", "convert_datum"]);
+    assert_eq!(
+        case.outcome(command),
+        "exit 0\ncase: stopped after convert_datum, no products\n"
+    );
+    assert!(!case.path("out/case/manifest.json").exists());
+    let mut command = case.run();
+    command.arg("--dry-run");
+    let printed = case.outcome(command);
+    assert!(printed.contains("keep  convert_datum"), "{printed}");
+    assert!(
+        printed.contains("run   group_profiles                   no earlier output"),
+        "{printed}"
+    );
+    assert!(!case.path("out/case/manifest.json").exists());
+    run(&case);
+    let before = common::mission::products(&case.path("out"));
+    let mut command = case.run();
+    command.arg("--force");
+    assert!(case.outcome(command).contains("valid; products in"));
+    assert!(common::mission::products(&case.path("out")) == before);
+}

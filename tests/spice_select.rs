@@ -1,0 +1,193 @@
+//! Choosing kernels from a folder.
+
+#![allow(
+    clippy::unwrap_used,
+    reason = "helpers of tests outside a test function"
+)]
+
+mod common;
+
+use std::{fs, path::Path};
+
+use areograph::{
+    config::{CkQuality, KernelSelection},
+    frames::Position,
+    spice::{CkSegment, Kernel, KernelSet, Session, SpkSegment, State, write_ck, write_spk},
+    time::{Interval, PointingBias},
+};
+use common::real_data;
+use nalgebra::Vector3;
+use tempfile::{TempDir, tempdir};
+
+/// Where each file of the folder comes from, and its name as the archive would have it.
+const FILES: [(&str, &str); 11] = [
+    ("mgs_text/pck00010.tpc", "pck00010.tpc"),
+    ("mgs_text/pck00011.tpc", "pck00011.tpc"),
+    ("mgs_text/naif0009.tls", "naif0009.tls"),
+    ("mgs_text/naif0012.tls", "naif0012.tls"),
+    ("mgs_text/MGS_SCLKSCET.00061.tsc", "MGS_SCLKSCET.00061.tsc"),
+    ("ale_mgs/m0402852/moc20.ti", "mgs_moc_v20.ti"),
+    ("ale_mgs/m0402852/mocAddendum004.ti", "mocAddendum004.ti"),
+    ("ale_mgs/m0402852/m0402852.ale_0.bsp", "mgs_map2_first.bsp"),
+    ("ale_mgs/m0402852/m0402852.ale_1.bsp", "mgs_map2.bsp"),
+    (
+        "ale_mgs/m0402852/mgs_sc_map2_0_sliced_-94000.bc",
+        "ck/mgs_sc_map2_first.bc",
+    ),
+    (
+        "ale_mgs/m0402852/mgs_sc_map2_1_sliced_-94000.bc",
+        "ck/mgs_sc_map2.bc",
+    ),
+];
+
+/// A folder of kernels, a rival orbit and commanded attitudes among them, and the time that is wanted.
+fn archive(test: &str) -> Option<(TempDir, Interval)> {
+    let temporary = tempdir().unwrap();
+    let root = temporary.path();
+    fs::create_dir(root.join("ck")).unwrap();
+    for (from, to) in FILES {
+        // Bytes only: the originals may be read-only.
+        let bytes = fs::read(real_data(from, test)?).unwrap();
+        write(root, to, &bytes);
+    }
+    write(root, "README", b"kernels\n");
+    let times = ["naif0012.tls", "MGS_SCLKSCET.00061.tsc"].map(|name| root.join(name));
+    let session = Session::open(&KernelSet::from_files(&times).unwrap()).unwrap();
+    let instants =
+        ["1999-08-24T14:12:10", "1999-08-24T14:12:20"].map(|utc| session.utc_to_et(utc).unwrap());
+    let commanded = CkSegment {
+        name: "commanded",
+        instants: &instants,
+        quaternions: &[[1.0, 0.0, 0.0, 0.0]; 2],
+        angular_velocities_rad_s: &[[0.0; 3]; 2],
+        interval_starts: &instants[..1],
+    };
+    let nominal = root.join("ck/mgs_ext_roto_all_v9.bc");
+    write_ck(&nominal, &session, &[commanded], "").unwrap();
+    drop(session);
+    let state = State {
+        position: Position::new(Vector3::new(3.8e6, 0.0, 0.0)),
+        velocity_m_s: Vector3::new(0.0, 3_400.0, 0.0),
+    };
+    let rival = SpkSegment {
+        target: -94,
+        centre: 499,
+        name: "gsfc",
+        degree: 1,
+        epochs: &instants,
+        states: &[state; 2],
+    };
+    write_spk(&root.join("mgs_map2_gsfc_mgm0827.bsp"), &[rival], "").unwrap();
+    Some((temporary, Interval::new(instants[0], instants[1])))
+}
+
+#[allow(clippy::disallowed_methods, reason = "input of a test, not a product")]
+fn write(folder: &Path, name: &str, content: &[u8]) {
+    fs::write(folder.join(name), content).unwrap();
+}
+
+fn selection(root: &Path) -> KernelSelection {
+    KernelSelection {
+        root: root.to_owned(),
+        spk_family: "nav".to_owned(),
+        ck_quality: vec![CkQuality::Reconstructed, CkQuality::Nominal],
+        pinned: Vec::new(),
+    }
+}
+
+fn names(set: &KernelSet) -> Vec<String> {
+    set.kernels().iter().map(Kernel::file_name).collect()
+}
+
+#[test]
+fn the_latest_texts_and_the_files_of_the_wanted_time_are_chosen() {
+    let Some((temporary, wanted)) = archive("selection") else {
+        return;
+    };
+    let selection = selection(temporary.path());
+    let set = KernelSet::select(&selection, &[wanted]).unwrap();
+    let texts = [
+        "naif0012.tls",
+        "MGS_SCLKSCET.00061.tsc",
+        "pck00010.tpc",
+        "mgs_moc_v20.ti",
+    ];
+    // Commanded attitude comes before telemetry, which therefore wins.
+    let binaries = ["mgs_map2.bsp", "mgs_ext_roto_all_v9.bc", "mgs_sc_map2.bc"];
+    assert_eq!(names(&set), [&texts[..], &binaries[..]].concat());
+    let explanation = set.explanation().join("\n");
+    for line in [
+        "naif0012.tls: latest of 2 with leap seconds",
+        "pck00010.tpc: latest of 1 with the rotation of Mars",
+        "mgs_map2_first.bsp: left out, holds none of the wanted times",
+        "mgs_map2_gsfc_mgm0827.bsp: left out, not of the orbit solution nav",
+        "mgs_sc_map2_first.bc: left out, holds no attitude near the wanted times",
+        "README: left out, is a text without a \\begindata block",
+    ] {
+        assert!(explanation.contains(line), "{line} in {explanation}");
+    }
+    let session = Session::open(&set).unwrap();
+    let bias = PointingBias::from_seconds(-1.15);
+    session.require_attitude(wanted, bias, 1.0).unwrap();
+    drop(session);
+    assert_eq!(names(&KernelSet::select(&selection, &[]).unwrap()), texts);
+}
+
+#[test]
+fn pins_families_and_qualities_are_obeyed() {
+    let Some((temporary, wanted)) = archive("selection by wish") else {
+        return;
+    };
+    let mut selection = selection(temporary.path());
+    selection.pinned = vec!["naif0009.tls".to_owned(), "pck00011.tpc".to_owned()];
+    selection.spk_family = "gsfc".to_owned();
+    selection.ck_quality = vec![CkQuality::Reconstructed];
+    let set = names(&KernelSet::select(&selection, &[wanted]).unwrap());
+    assert_eq!(
+        set,
+        [
+            "naif0009.tls",
+            "MGS_SCLKSCET.00061.tsc",
+            "pck00011.tpc",
+            "mgs_moc_v20.ti",
+            "mgs_map2_gsfc_mgm0827.bsp",
+            "mgs_sc_map2.bc"
+        ]
+    );
+}
+
+#[test]
+fn what_is_missing_in_a_folder_is_named() {
+    let Some((temporary, wanted)) = archive("selection of missing kernels") else {
+        return;
+    };
+    let mut selection = selection(temporary.path());
+    let text = |selection: &KernelSelection| {
+        KernelSet::select(selection, &[wanted])
+            .unwrap_err()
+            .to_string()
+    };
+    selection.spk_family = "ipng".to_owned();
+    let failure = text(&selection);
+    assert!(
+        failure.contains("holds the orbit of MGS in the solution ipng (found: mgs_map2.bsp"),
+        "{failure}"
+    );
+    selection.pinned = vec!["naif0011.tls".to_owned()];
+    let failure = text(&selection);
+    assert!(
+        failure.contains("is the text kernel naif0011.tls"),
+        "{failure}"
+    );
+    selection.pinned.clear();
+    for name in ["mgs_moc_v20.ti", "mocAddendum004.ti"] {
+        fs::remove_file(temporary.path().join(name)).unwrap();
+    }
+    let failure = text(&selection);
+    assert!(
+        failure.contains("no kernel in this folder defines the frame of the MOC"),
+        "{failure}"
+    );
+    selection.root = temporary.path().join("absent");
+    assert!(text(&selection).contains("absent: cannot list folder"));
+}
