@@ -154,7 +154,12 @@ fn shots(profile: &Value) -> Vec<(usize, u8)> {
     records
         .iter()
         .zip(shots)
-        .map(|(record, shot)| (whole(record) - LABEL_RECORDS - 1, u8::try_from(whole(shot)).unwrap()))
+        .map(|(record, shot)| {
+            (
+                whole(record) - LABEL_RECORDS - 1,
+                u8::try_from(whole(shot)).unwrap(),
+            )
+        })
         .collect()
 }
 

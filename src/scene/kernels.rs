@@ -113,8 +113,41 @@ pub(super) fn image_starts(session: &Session) -> Result<Vec<Et>> {
     IMAGES.iter().map(start).collect()
 }
 
+/// Attitude samples of an arc as a C-kernel takes them.
+struct AttitudeColumns {
+    instants: Vec<Et>,
+    quaternions: Vec<[f64; 4]>,
+    rates_rad_s: Vec<[f64; 3]>,
+}
+
+impl AttitudeColumns {
+    fn of(arc: &Arc) -> Self {
+        let samples = arc.attitude.samples();
+        let mut quaternions: Vec<[f64; 4]> = samples
+            .iter()
+            .map(|sample| {
+                let q = sample.j2000_to_bus;
+                [q.w, q.i, q.j, q.k]
+            })
+            .collect();
+        make_continuous(&mut quaternions);
+        Self {
+            instants: samples
+                .iter()
+                .map(|sample| MGS_POINTING_BIAS.lookup(sample.et).kernel_time())
+                .collect(),
+            quaternions,
+            rates_rad_s: samples
+                .iter()
+                .map(|sample| sample.rate_rad_s.into())
+                .collect(),
+        }
+    }
+}
+
 /// Writes the attitude of all arcs: the attitude of true time `t` stands at `t − 1.15 s`.
 pub(super) fn write_attitude(folder: &Path, session: &Session, arcs: &[Arc]) -> Result<()> {
+<<<<<<< HEAD
     /// Instants, quaternions and rates of one arc.
     type Columns = (Vec<Et>, Vec<[f64; 4]>, Vec<[f64; 3]>);
     let columns: Vec<Columns> = arcs
@@ -142,15 +175,18 @@ pub(super) fn write_attitude(folder: &Path, session: &Session, arcs: &[Arc]) -> 
             )
         })
         .collect();
+=======
+    let columns: Vec<AttitudeColumns> = arcs.iter().map(AttitudeColumns::of).collect();
+>>>>>>> scene
     let segments: Vec<CkSegment> = arcs
         .iter()
         .zip(&columns)
-        .map(|(arc, (instants, quaternions, rates))| CkSegment {
+        .map(|(arc, columns)| CkSegment {
             name: arc.image.id,
-            instants,
-            quaternions,
-            angular_velocities_rad_s: rates,
-            interval_starts: &instants[..1],
+            instants: &columns.instants,
+            quaternions: &columns.quaternions,
+            angular_velocities_rad_s: &columns.rates_rad_s,
+            interval_starts: &columns.instants[..1],
         })
         .collect();
     let comment = format!(
