@@ -147,37 +147,7 @@ impl AttitudeColumns {
 
 /// Writes the attitude of all arcs: the attitude of true time `t` stands at `t − 1.15 s`.
 pub(super) fn write_attitude(folder: &Path, session: &Session, arcs: &[Arc]) -> Result<()> {
-<<<<<<< HEAD
-    /// Instants, quaternions and rates of one arc.
-    type Columns = (Vec<Et>, Vec<[f64; 4]>, Vec<[f64; 3]>);
-    let columns: Vec<Columns> = arcs
-        .iter()
-        .map(|arc| {
-            let samples = arc.attitude.samples();
-            let mut quaternions: Vec<[f64; 4]> = samples
-                .iter()
-                .map(|sample| {
-                    let q = sample.j2000_to_bus;
-                    [q.w, q.i, q.j, q.k]
-                })
-                .collect();
-            make_continuous(&mut quaternions);
-            (
-                samples
-                    .iter()
-                    .map(|sample| MGS_POINTING_BIAS.lookup(sample.et).kernel_time())
-                    .collect(),
-                quaternions,
-                samples
-                    .iter()
-                    .map(|sample| sample.rate_rad_s.into())
-                    .collect(),
-            )
-        })
-        .collect();
-=======
     let columns: Vec<AttitudeColumns> = arcs.iter().map(AttitudeColumns::of).collect();
->>>>>>> scene
     let segments: Vec<CkSegment> = arcs
         .iter()
         .zip(&columns)
