@@ -8,7 +8,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use areograph::{error::Kind, products::write_products};
+use areograph::{error::Kind, products::write_products, store::manifest::Manifest};
 use arrow::array::{AsArray, RecordBatch};
 use arrow::datatypes::Float64Type;
 use fixture::{SHOTS, START_S, Site};
@@ -203,6 +203,29 @@ fn documents_keep_their_schemas() {
         1e-8,
     );
     check_schema("isd", &json(&image.join("isd.json")));
+}
+
+#[test]
+fn a_manifest_keeps_its_schema() {
+    let hash = "0f".repeat(32);
+    let mut document = serde_json::json!({
+        "tool": "areograph", "version": "0.1.0", "site": "small",
+        "verdict": { "valid": false, "reasons": ["profile a/1: 3 shots; limit at least 20"] },
+        "configuration": { "file_name": "small.toml", "blake3": hash },
+        "biases": [{ "name": "ck_bias", "correction_s": -1.15, "scope": "attitude", "source": "mocAddendum004.ti" }],
+        "kernels": [{
+            "name": "a.bsp", "role": "SPK", "bytes": 1024, "blake3": hash,
+            "coverage_used": [{ "start": START_S, "stop": START_S + 6.0 }],
+        }],
+        "stages": [{ "name": "tag_times", "fingerprint": hash }],
+        "products": [{ "path": "ranges.json", "bytes": 10, "blake3": hash, "rows": 1 }],
+        "counts": { "footprints": 60 }, "rejected": { "class": 7 },
+        "complaints": { "count": 0, "texts": [] }, "notes": [], "finished_utc": "2026-01-01T00:00:00Z",
+    });
+    // The program's own type and the schema mean the same document.
+    let manifest: Manifest = serde_json::from_value(document.clone()).unwrap();
+    document = serde_json::to_value(manifest).unwrap();
+    check_schema("manifest", &document);
 }
 
 #[test]
