@@ -1,5 +1,8 @@
 //! Products of a small site: read by outside means, judged by their schemas, made twice.
 
+#![allow(clippy::unwrap_used, reason = "helpers of tests may fail loudly")]
+
+mod common;
 #[path = "products_site/fixture.rs"]
 mod fixture;
 
@@ -8,7 +11,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use areograph::{error::Kind, products::write_products};
+use areograph::{error::Kind, products::write_products, store::manifest::Manifest};
 use arrow::array::{AsArray, RecordBatch};
 use arrow::datatypes::Float64Type;
 use fixture::{SHOTS, START_S, Site};
@@ -206,12 +209,35 @@ fn documents_keep_their_schemas() {
 }
 
 #[test]
+fn a_manifest_keeps_its_schema() {
+    let hash = "0f".repeat(32);
+    let mut document = serde_json::json!({
+        "tool": "areograph", "version": "0.1.0", "site": "small",
+        "verdict": { "valid": false, "reasons": ["profile a/1: 3 shots; limit at least 20"] },
+        "configuration": { "file_name": "small.toml", "blake3": hash },
+        "biases": [{ "name": "ck_bias", "correction_s": -1.15, "scope": "attitude", "source": "mocAddendum004.ti" }],
+        "kernels": [{
+            "name": "a.bsp", "role": "SPK", "bytes": 1024, "blake3": hash,
+            "coverage_used": [{ "start": START_S, "stop": START_S + 6.0 }],
+        }],
+        "stages": [{ "name": "tag_times", "fingerprint": hash }],
+        "products": [{ "path": "ranges.json", "bytes": 10, "blake3": hash, "rows": 1 }],
+        "counts": { "footprints": 60 }, "rejected": { "class": 7 },
+        "complaints": { "count": 0, "texts": [] }, "notes": [], "finished_utc": "2026-01-01T00:00:00Z",
+    });
+    // The program's own type and the schema mean the same document.
+    let manifest: Manifest = serde_json::from_value(document.clone()).unwrap();
+    document = serde_json::to_value(manifest).unwrap();
+    check_schema("manifest", &document);
+}
+
+#[test]
 fn camera_model_times_and_detectors_are_those_of_a_summed_image() {
     let (folder, _) = written("isd", &Site::small(), true);
     let isd = json(&folder.join("images/m04-02852/isd.json"));
     let value = |pointer: &str| isd.pointer(pointer).and_then(Value::as_f64).unwrap();
     let period_s = 8.0 * 0.000_482_1;
-    assert_eq!(value("/image_lines") as u32, 1280);
+    assert_eq!(isd["image_lines"], 1280);
     close(value("/line_scan_rate/0/2"), period_s, 0.0);
     // usgscsm: t(line) = centre + start + rate (line - 0.5 + 0.5), the first line's centre at 0.5.
     let line_s = |line: f64| {
@@ -249,8 +275,6 @@ fn camera_model_has_the_keys_of_the_truth() {
     missing.retain(|key| !key.starts_with("/naif_keywords/"));
     assert!(missing.is_empty(), "{missing:?}");
 }
-
-mod common;
 
 fn collect_missing(truth: &Value, ours: &Value, at: &str, missing: &mut Vec<String>) {
     let Some(members) = truth.as_object() else {

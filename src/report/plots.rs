@@ -150,6 +150,15 @@ fn colour(series: &Series) -> RGBColor {
     }
 }
 
+/// A number of an axis; what rounds to zero has no sign.
+fn label(value: f64, decimals: usize) -> String {
+    let text = format!("{value:.decimals$}");
+    match text.strip_prefix('-') {
+        Some(digits) if !digits.contains(|digit| matches!(digit, '1'..='9')) => digits.to_owned(),
+        _ => text,
+    }
+}
+
 type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
 type Drawn<'a> =
     std::result::Result<(), DrawingAreaErrorKind<<SVGBackend<'a> as DrawingBackend>::ErrorType>>;
@@ -174,9 +183,9 @@ fn draw<'a>(plot: &Plot, area: &Area<'a>) -> Drawn<'a> {
         .label_style(("sans-serif", 14))
         .x_label_formatter(&move |x| {
             let x = if turns { x.rem_euclid(360.0) } else { *x };
-            format!("{x:.x_decimals$}")
+            label(x, x_decimals)
         })
-        .y_label_formatter(&move |y| format!("{y:.y_decimals$}"))
+        .y_label_formatter(&move |y| label(*y, y_decimals))
         .draw()?;
     for mark in &plot.marks {
         let (bottom, top) = (plot.y.low, plot.y.high);
@@ -224,6 +233,13 @@ mod tests {
         assert_eq!(thinned(&points, 2000).len(), 1001);
         assert_eq!(thinned(&points, 1), [0]);
         assert!(thinned::<u32>(&[], 10).is_empty());
+    }
+
+    #[test]
+    fn zero_has_no_sign() {
+        assert_eq!(label(-0.004, 2), "0.00");
+        assert_eq!(label(-0.006, 2), "-0.01");
+        assert_eq!(label(-20.0, 0), "-20");
     }
 
     #[test]

@@ -33,7 +33,7 @@ pub(super) fn verdict(site: &SiteProducts) -> String {
         )
     };
     let counts = format!(
-        "{} footprints in {} profiles, {} images.",
+        "Footprints: {}; profiles: {}; images: {}.",
         site.footprints.len(),
         site.profiles.len(),
         site.images.len()

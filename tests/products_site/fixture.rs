@@ -208,7 +208,7 @@ fn orientation(times: &ImageTimes) -> Orientation {
                 camera_to_mars: spice_quaternion(&angles.camera_to_mars()),
                 angles,
                 boresight: (k > 0).then(|| BoresightGround {
-                    longitude_rad: 3.142 + 1e-4 * u,
+                    longitude_rad: 3.145 + 1e-4 * u,
                     latitude_rad: -0.1 + 0.005 * u,
                     range_m: 380_000.0,
                     emission_rad: 0.003,
