@@ -1,6 +1,7 @@
 //! The way of the data: kernels → times → footprints → IAU 2000 → ranges → orientation → model → products.
 
 mod check;
+mod manifest;
 mod parts;
 mod plan;
 mod publish;

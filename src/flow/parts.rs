@@ -1,5 +1,7 @@
 //! What each stage depends on. The lists are the method's dependencies, read beside [`super::run_site`].
 
+use std::path::Path;
+
 use crate::{
     config::SiteConfig,
     error::Result,
@@ -99,13 +101,16 @@ pub(super) fn fit_sensor_model(
         .output(&format!("sample_orientation/{image}"), orientation)
 }
 
-/// The configuration file, all kernels, and every earlier output.
+/// The configuration, all kernels and where they lie from `folder`, and every earlier output.
 pub(super) fn publish(
     config: &SiteConfig,
     kernels: &KernelSet,
+    folder: &Path,
     outputs: impl IntoIterator<Item = (String, Option<String>)>,
 ) -> Parts {
-    let mut parts = Parts::new().key("configuration", &config.blake3);
+    let mut parts = Parts::new()
+        .key("configuration", &config.blake3)
+        .key("places of kernels", &kernels.metakernel_text(Some(folder)));
     for (stage, output) in outputs {
         parts = parts.output(&stage, output.as_deref());
     }

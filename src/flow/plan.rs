@@ -107,7 +107,7 @@ fn plan_stages(config: &SiteConfig, out: &Path, force: bool) -> Result<Vec<Plann
         let model: Option<Output<SensorModel>> = planner.look(&stage, &parts);
         outputs.push((stage, hash(model.as_ref())));
     }
-    let parts = parts::publish(config, &kernels, outputs);
+    let parts = parts::publish(config, &kernels, &folder, outputs);
     let because = match publish::standing(&folder, &planner.cache, &parts) {
         Ok(_) => Because::Unchanged,
         Err(because) => because,

@@ -1,14 +1,15 @@
 //! The last stage: products staged, read back, named, and explained by the manifest.
 
-use std::{collections::BTreeMap, path::Path};
+use std::path::{Path, PathBuf};
 
-use super::{Ending, Stage, parts};
+use super::{
+    Ending, Stage,
+    manifest::{Account, kernel_entries, pck_note},
+    parts,
+};
 use crate::{
-    config::{BiasScope, SiteConfig},
+    config::SiteConfig,
     error::Result,
-    files::file_name,
-    frames::MarsIau2000,
-    geom::mars_rotation::mars_rotation,
     products::{ImageProducts, KernelLine, SiteProducts, write_products},
     spice::{KernelSet, Session},
     stages::{
@@ -17,24 +18,19 @@ use crate::{
         tag_times::ImageTimes,
     },
     store::{
+        atomic,
         cache::{Output, StageCache},
         fingerprint::{Because, Parts},
-        manifest::{
-            BiasEntry, Complaints, ConfigurationEntry, KernelEntry, Manifest, StageEntry, Verdict,
-        },
+        manifest::Manifest,
         publish::{
             MANIFEST, damaged_product, entries, publish as publish_files, read_manifest, staging,
         },
     },
-    time::{Et, Interval, Intervals},
+    time::{Et, Interval},
 };
 
-/// Complaints that the manifest quotes; all are counted.
-const COMPLAINTS_QUOTED: usize = 100;
-
-/// A PCK that turns Mars by more than this against the IAU 2000 formula holds another model, radians
-/// (1e-7 rad is 0.3 m on the ground; the models differ by 4e-3 rad).
-const PCK_TOLERANCE_RAD: f64 = 1e-7;
+/// Metakernel that reproduces the run.
+const METAKERNEL: &str = "kernels.tm";
 
 /// Everything that the earlier stages made.
 pub(super) struct Results<'a> {
@@ -77,7 +73,7 @@ pub(super) fn standing(
 /// A kernel that changed during the run, a product that does not read back, a disk that refuses.
 pub(super) fn publish(folder: &Path, cache: &StageCache, results: &Results<'_>) -> Result<Ending> {
     let name = Stage::Publish.name();
-    let parts = parts::publish(results.config, results.kernels, results.outputs());
+    let parts = parts::publish(results.config, results.kernels, folder, results.outputs());
     match standing(folder, cache, &parts) {
         Ok(manifest) => {
             tracing::info!(stage = name, "kept: {}", Because::Unchanged);
@@ -135,32 +131,37 @@ fn make_products(folder: &Path, results: &Results<'_>, fingerprint: String) -> R
         .map(ToString::to_string)
         .collect();
     let rejected = results.rejected();
+    let site = SiteProducts {
+        config: results.config,
+        kernels: &lines,
+        images: &images,
+        footprints,
+        utc: &utc,
+        profiles: &results.profiles.value,
+        ranges: &results.ranges.value,
+        rejected: &rejected,
+        complaints: &complaints,
+        notes: &notes,
+    };
+    let invalid_because = site.invalid_because();
     let staging = staging(folder)?;
-    let mut files: Vec<(std::path::PathBuf, u64)> = write_products(
-        &staging,
-        &SiteProducts {
-            config: results.config,
-            kernels: &lines,
-            images: &images,
-            footprints,
-            utc: &utc,
-            profiles: &results.profiles.value,
-            ranges: &results.ranges.value,
-            rejected: &rejected,
-            complaints: &complaints,
-            notes: &notes,
-        },
-    )?
-    .into_iter()
-    .map(|product| (product.path, product.rows))
-    .collect();
+    let mut files: Vec<(PathBuf, u64)> = write_products(&staging, &site)?
+        .into_iter()
+        .map(|product| (product.path, product.rows))
+        .collect();
     let metakernel = results.kernels.metakernel_text(Some(folder));
-    crate::store::atomic::write(&staging.join("kernels.tm"), metakernel.as_bytes())?;
-    files.push(("kernels.tm".into(), 1));
+    atomic::write(&staging.join(METAKERNEL), metakernel.as_bytes())?;
+    files.push((METAKERNEL.into(), 1));
     results.kernels.verify_unchanged()?;
 
-    let products = entries(&staging, &files)?;
-    let manifest = results.manifest(kernels, products, notes, &complaints, fingerprint);
+    let account = Account {
+        invalid_because,
+        kernels,
+        products: entries(&staging, &files)?,
+        notes,
+        complaints,
+    };
+    let manifest = results.manifest(account, fingerprint);
     publish_files(folder, &staging, &manifest, read_manifest(folder).as_ref())?;
     Ok(manifest)
 }
@@ -174,7 +175,7 @@ impl Results<'_> {
     }
 
     /// Name, output hash and fingerprint of every stage that ran or was kept.
-    fn stages(&self) -> Vec<(String, String, String)> {
+    pub(super) fn stages(&self) -> Vec<(String, String, String)> {
         fn entry<T>(name: String, output: &Output<T>) -> (String, String, String) {
             (name, output.blake3.clone(), output.fingerprint.clone())
         }
@@ -192,171 +193,4 @@ impl Results<'_> {
         }
         stages
     }
-
-    fn notes(&self) -> Vec<String> {
-        let mut notes = self.kernels.explanation().to_vec();
-        notes.extend(self.found.value.notes.iter().cloned());
-        notes.extend(self.converted.value.notes.iter().cloned());
-        for image in &self.images.value {
-            notes.extend(
-                image
-                    .notes
-                    .iter()
-                    .map(|note| format!("image {}: {note}", image.id)),
-            );
-        }
-        for model in self
-            .models
-            .iter()
-            .filter(|model| model.value.near_gimbal_lock)
-        {
-            notes.push(format!(
-                "image {}: |cos φ| falls to {:.3}, where ω and κ are badly determined; use the rotation-vector form",
-                model.value.image, model.value.cos_phi_min
-            ));
-        }
-        notes
-    }
-
-    fn rejected(&self) -> BTreeMap<String, u64> {
-        let rejected = self.found.value.rejected.iter();
-        rejected
-            .map(|(reason, count)| (reason.to_string(), *count))
-            .collect()
-    }
-
-    fn verdict(&self) -> Verdict {
-        let profiles = self.ranges.value.profiles.iter().flat_map(|profile| {
-            let reasons = profile.invalid_because.iter();
-            reasons.map(move |reason| format!("profile {}: {reason}", profile.profile))
-        });
-        let models = self.models.iter().flat_map(|model| {
-            let reasons = model.value.invalid_because.iter();
-            reasons.map(move |reason| format!("image {}: {reason}", model.value.image))
-        });
-        let mut reasons: Vec<String> = profiles.chain(models).collect();
-        let searched = !self.config.pedr.files.is_empty();
-        if searched && self.converted.value.footprints.is_empty() {
-            reasons.insert(0, "no footprint in any window".to_owned());
-        }
-        Verdict {
-            valid: reasons.is_empty(),
-            reasons,
-        }
-    }
-
-    fn manifest(
-        &self,
-        kernels: Vec<KernelEntry>,
-        products: Vec<crate::store::manifest::ProductEntry>,
-        notes: Vec<String>,
-        complaints: &[String],
-        fingerprint: String,
-    ) -> Manifest {
-        let config = self.config;
-        let found = &self.found.value;
-        let mut stages: Vec<StageEntry> = self
-            .stages()
-            .into_iter()
-            .map(|(name, _, fingerprint)| StageEntry { name, fingerprint })
-            .collect();
-        stages.push(StageEntry {
-            name: Stage::Publish.name().to_owned(),
-            fingerprint,
-        });
-        let counts = BTreeMap::from([
-            ("frames_read".to_owned(), found.frames_read),
-            ("shots_read".to_owned(), found.shots_read),
-            (
-                "footprints".to_owned(),
-                self.converted.value.footprints.len() as u64,
-            ),
-            ("profiles".to_owned(), self.profiles.value.len() as u64),
-            ("images".to_owned(), self.images.value.len() as u64),
-        ]);
-        Manifest {
-            tool: "areograph".to_owned(),
-            version: env!("CARGO_PKG_VERSION").to_owned(),
-            site: config.site.clone(),
-            verdict: self.verdict(),
-            configuration: ConfigurationEntry {
-                file_name: file_name(&config.file),
-                blake3: config.blake3.clone(),
-            },
-            biases: biases(config),
-            kernels,
-            stages,
-            products,
-            counts,
-            rejected: self.rejected(),
-            complaints: Complaints {
-                count: found.complaint_counts.values().sum(),
-                texts: complaints.iter().take(COMPLAINTS_QUOTED).cloned().collect(),
-            },
-            notes,
-            finished_utc: chrono::Utc::now().format("%Y-%m-%dT%H:%M:%SZ").to_string(),
-        }
-    }
-}
-
-fn biases(config: &SiteConfig) -> Vec<BiasEntry> {
-    let scope = match config.mola_clock.scope {
-        BiasScope::SpkLookup => "spacecraft position in the range check",
-        BiasScope::Rotation => "rotation of Mars into IAU 2000",
-        BiasScope::Both => {
-            "spacecraft position in the range check, and rotation of Mars into IAU 2000"
-        }
-        BiasScope::None => "nothing",
-    };
-    vec![
-        BiasEntry {
-            name: "ck_bias".to_owned(),
-            correction_s: config.pointing.ck_bias.seconds(),
-            scope: "attitude look-ups".to_owned(),
-            source: config.pointing.source.clone(),
-        },
-        BiasEntry {
-            name: "mola_clock".to_owned(),
-            correction_s: config.mola_clock.correction_s(),
-            scope: scope.to_owned(),
-            source: config.mola_clock.source.clone(),
-        },
-    ]
-}
-
-fn kernel_entries(session: &Session, results: &Results<'_>) -> Result<Vec<KernelEntry>> {
-    let coverage = session.coverage()?;
-    let wanted = Intervals::union_of(results.wanted.iter().copied());
-    let entries = results.kernels.kernels().iter().enumerate();
-    Ok(entries
-        .map(|(index, kernel)| {
-            let own = coverage.per_kernel.iter().find(|(of, _)| *of == index);
-            KernelEntry {
-                name: kernel.file_name(),
-                role: kernel.role.to_string(),
-                bytes: kernel.bytes,
-                blake3: kernel.blake3.clone(),
-                coverage_used: own.map_or_else(Vec::new, |(_, held)| {
-                    held.intersection(&wanted).as_slice().to_vec()
-                }),
-            }
-        })
-        .collect())
-}
-
-/// Products use the IAU 2000 formula whatever the PCK says; whoever loads `kernels.tm` should know.
-fn pck_note(session: &Session, wanted: &[Interval]) -> Option<String> {
-    let at = wanted
-        .first()
-        .map_or(Et::from_seconds(0.0), |interval| interval.start);
-    let ours = *mars_rotation::<MarsIau2000>(at).matrix();
-    // Without a PCK there is nothing to compare, and nothing that could mislead.
-    let theirs = session.mars_matrix(at).ok()?;
-    let turn_rad = crate::geom::attitude::rotation_vector(&(theirs * ours.transpose())).norm();
-    (turn_rad > PCK_TOLERANCE_RAD).then(|| {
-        format!(
-            "the PCK turns IAU_MARS by {:.5}° against IAU 2000; products use the IAU 2000 constants",
-            turn_rad / crate::units::RADIANS_PER_DEGREE
-        )
-    })
 }

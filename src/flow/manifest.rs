@@ -1,0 +1,191 @@
+//! What the manifest says of a run.
+
+use std::collections::BTreeMap;
+
+use super::{Stage, publish::Results};
+use crate::{
+    config::{BiasScope, SiteConfig},
+    error::Result,
+    files::file_name,
+    frames::MarsIau2000,
+    geom::{attitude::rotation_vector, mars_rotation::mars_rotation},
+    spice::Session,
+    store::manifest::{
+        BiasEntry, Complaints, ConfigurationEntry, KernelEntry, Manifest, ProductEntry, StageEntry,
+        Verdict,
+    },
+    time::{Et, Interval, Intervals},
+    units::RADIANS_PER_DEGREE,
+};
+
+/// Complaints that the manifest quotes; all are counted.
+const COMPLAINTS_QUOTED: usize = 100;
+
+/// A PCK that turns Mars by more than this against the IAU 2000 formula holds another model, radians
+/// (1e-7 rad is 0.3 m on the ground; the models differ by 4e-3 rad).
+const PCK_TOLERANCE_RAD: f64 = 1e-7;
+
+/// What is known of the products once they are made.
+pub(super) struct Account {
+    pub(super) invalid_because: Vec<String>,
+    pub(super) kernels: Vec<KernelEntry>,
+    pub(super) products: Vec<ProductEntry>,
+    pub(super) notes: Vec<String>,
+    pub(super) complaints: Vec<String>,
+}
+
+impl Results<'_> {
+    /// What a reader of the products should know, one sentence each.
+    pub(super) fn notes(&self) -> Vec<String> {
+        let mut notes = self.kernels.explanation().to_vec();
+        notes.extend(self.found.value.notes.iter().cloned());
+        notes.extend(self.converted.value.notes.iter().cloned());
+        for image in &self.images.value {
+            notes.extend(
+                image
+                    .notes
+                    .iter()
+                    .map(|note| format!("image {}: {note}", image.id)),
+            );
+        }
+        for model in self
+            .models
+            .iter()
+            .filter(|model| model.value.near_gimbal_lock)
+        {
+            notes.push(format!(
+                "image {}: |cos φ| falls to {:.3}, where ω and κ are badly determined; use the rotation-vector form",
+                model.value.image, model.value.cos_phi_min
+            ));
+        }
+        notes
+    }
+
+    /// Shots inside a window that were left out, by reason.
+    pub(super) fn rejected(&self) -> BTreeMap<String, u64> {
+        let rejected = self.found.value.rejected.iter();
+        rejected
+            .map(|(reason, count)| (reason.to_string(), *count))
+            .collect()
+    }
+
+    /// The manifest of these results.
+    pub(super) fn manifest(&self, account: Account, fingerprint: String) -> Manifest {
+        let Account {
+            invalid_because,
+            kernels,
+            products,
+            notes,
+            complaints,
+        } = account;
+        let config = self.config;
+        let found = &self.found.value;
+        let mut stages: Vec<StageEntry> = self
+            .stages()
+            .into_iter()
+            .map(|(name, _, fingerprint)| StageEntry { name, fingerprint })
+            .collect();
+        stages.push(StageEntry {
+            name: Stage::Publish.name().to_owned(),
+            fingerprint,
+        });
+        let counts = BTreeMap::from([
+            ("frames_read".to_owned(), found.frames_read),
+            ("shots_read".to_owned(), found.shots_read),
+            (
+                "footprints".to_owned(),
+                self.converted.value.footprints.len() as u64,
+            ),
+            ("profiles".to_owned(), self.profiles.value.len() as u64),
+            ("images".to_owned(), self.images.value.len() as u64),
+        ]);
+        Manifest {
+            tool: "areograph".to_owned(),
+            version: env!("CARGO_PKG_VERSION").to_owned(),
+            site: config.site.clone(),
+            verdict: Verdict {
+                valid: invalid_because.is_empty(),
+                reasons: invalid_because,
+            },
+            configuration: ConfigurationEntry {
+                file_name: file_name(&config.file),
+                blake3: config.blake3.clone(),
+            },
+            biases: biases(config),
+            kernels,
+            stages,
+            products,
+            counts,
+            rejected: self.rejected(),
+            complaints: Complaints {
+                count: found.complaint_counts.values().sum(),
+                texts: complaints.into_iter().take(COMPLAINTS_QUOTED).collect(),
+            },
+            notes,
+            finished_utc: chrono::Utc::now().format("%Y-%m-%dT%H:%M:%SZ").to_string(),
+        }
+    }
+}
+
+fn biases(config: &SiteConfig) -> Vec<BiasEntry> {
+    let scope = match config.mola_clock.scope {
+        BiasScope::SpkLookup => "spacecraft position in the range check",
+        BiasScope::Rotation => "rotation of Mars into IAU 2000",
+        BiasScope::Both => {
+            "spacecraft position in the range check, and rotation of Mars into IAU 2000"
+        }
+        BiasScope::None => "nothing",
+    };
+    vec![
+        BiasEntry {
+            name: "ck_bias".to_owned(),
+            correction_s: config.pointing.ck_bias.seconds(),
+            scope: "attitude look-ups".to_owned(),
+            source: config.pointing.source.clone(),
+        },
+        BiasEntry {
+            name: "mola_clock".to_owned(),
+            correction_s: config.mola_clock.correction_s(),
+            scope: scope.to_owned(),
+            source: config.mola_clock.source.clone(),
+        },
+    ]
+}
+
+/// Kernels with the coverage that the run needed of each.
+pub(super) fn kernel_entries(session: &Session, results: &Results<'_>) -> Result<Vec<KernelEntry>> {
+    let coverage = session.coverage()?;
+    let wanted = Intervals::union_of(results.wanted.iter().copied());
+    let entries = results.kernels.kernels().iter().enumerate();
+    Ok(entries
+        .map(|(index, kernel)| {
+            let own = coverage.per_kernel.iter().find(|(of, _)| *of == index);
+            KernelEntry {
+                name: kernel.file_name(),
+                role: kernel.role.to_string(),
+                bytes: kernel.bytes,
+                blake3: kernel.blake3.clone(),
+                coverage_used: own.map_or_else(Vec::new, |(_, held)| {
+                    held.intersection(&wanted).as_slice().to_vec()
+                }),
+            }
+        })
+        .collect())
+}
+
+/// Products use the IAU 2000 formula whatever the PCK says; whoever loads `kernels.tm` should know.
+pub(super) fn pck_note(session: &Session, wanted: &[Interval]) -> Option<String> {
+    let at = wanted
+        .first()
+        .map_or(Et::from_seconds(0.0), |interval| interval.start);
+    let ours = *mars_rotation::<MarsIau2000>(at).matrix();
+    // Without a PCK there is nothing to compare, and nothing that could mislead.
+    let theirs = session.mars_matrix(at).ok()?;
+    let turn_rad = rotation_vector(&(theirs * ours.transpose())).norm();
+    (turn_rad > PCK_TOLERANCE_RAD).then(|| {
+        format!(
+            "the PCK turns IAU_MARS by {:.5}° against IAU 2000; products use the IAU 2000 constants",
+            turn_rad / RADIANS_PER_DEGREE
+        )
+    })
+}
