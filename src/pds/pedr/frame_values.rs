@@ -26,7 +26,7 @@ impl Fault for EncodeFault {
     }
 }
 
-/// A frame in metres, radians and seconds, for [`Record::from_frame`].
+/// A frame in metres, radians and seconds, for [`super::Record::from_frame`].
 ///
 /// `*_change*` is the change over the whole frame of 20 shots; arrays run over shots 1 to 20.
 /// What is left at its default becomes zero in the record.
