@@ -1,7 +1,7 @@
 //! What can go wrong, and where: one wrapper adds the place, each room's own enum says the cause.
 //!
 //! A cause is a [`Fault`]: it knows its [`Kind`] (hence the exit code) and what to do about it.
-//! [`Failure`] carries it upwards and collects site, stage, file and record on the way.
+//! [`Failure`] carries it upwards and collects site, stage and file on the way.
 
 use std::{fmt, path::PathBuf};
 
@@ -50,8 +50,6 @@ pub struct Failure {
     pub stage: Option<String>,
     /// File that was read or written.
     pub file: Option<PathBuf>,
-    /// Record of that file, counted from 1 as a reader of the file counts.
-    pub record: Option<u64>,
     /// The cause.
     pub fault: Box<dyn Fault>,
 }
@@ -63,7 +61,6 @@ impl Failure {
             site: None,
             stage: None,
             file: None,
-            record: None,
             fault: Box::new(fault),
         }
     }
@@ -72,13 +69,6 @@ impl Failure {
     #[must_use]
     pub fn in_file(mut self, file: impl Into<PathBuf>) -> Self {
         self.file.get_or_insert_with(|| file.into());
-        self
-    }
-
-    /// The same failure, known to concern record `record`, counted from 1.
-    #[must_use]
-    pub fn at_record(mut self, record: u64) -> Self {
-        self.record.get_or_insert(record);
         self
     }
 
@@ -110,7 +100,7 @@ impl<F: Fault> From<F> for Failure {
 }
 
 impl fmt::Display for Failure {
-    /// `site/stage: file record n: cause`, then a second line with the advice.
+    /// `site/stage: file: cause`, then a second line with the advice.
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         match (&self.site, &self.stage) {
             (Some(site), Some(stage)) => write!(formatter, "{site}/{stage}: ")?,
@@ -119,11 +109,7 @@ impl fmt::Display for Failure {
             (None, None) => {}
         }
         if let Some(file) = &self.file {
-            write!(formatter, "{}", file.display())?;
-            if let Some(record) = self.record {
-                write!(formatter, " record {record}")?;
-            }
-            write!(formatter, ": ")?;
+            write!(formatter, "{}: ", file.display())?;
         }
         write!(formatter, "{}", self.fault)?;
         let advice = self.fault.advice();
@@ -220,13 +206,12 @@ mod tests {
         let fault = IoFault::on("read")(std::io::ErrorKind::NotFound.into());
         let failure = Failure::from(fault)
             .in_file("ap19019k.b")
-            .at_record(41)
             .in_stage("search_footprints")
             .in_site("gusev")
             .in_file("outer.toml");
         assert_eq!(
             failure.to_string(),
-            "gusev/search_footprints: ap19019k.b record 41: cannot read: entity not found\n  \
+            "gusev/search_footprints: ap19019k.b: cannot read: entity not found\n  \
              what to do: check the path; relative paths in a configuration count from that file's folder"
         );
         assert_eq!(failure.kind().exit_code(), 6);

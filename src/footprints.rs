@@ -1,6 +1,6 @@
 //! Laser footprints as columns, from the PEDR reader to the Parquet writer.
 
-use std::{marker::PhantomData, path::PathBuf};
+use std::marker::PhantomData;
 
 use serde::{Deserialize, Serialize};
 
@@ -13,8 +13,8 @@ pub struct AsRead;
 /// A PEDR file that footprints came from.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct SourceFile {
-    /// Path as configured or found.
-    pub path: PathBuf,
+    /// File name without folders: where a file lies does not change what is made of it.
+    pub name: String,
     /// Version letter of the file name in upper case, `None` when the name has none.
     pub version: Option<char>,
     /// Datum of the file's longitudes and latitudes.

@@ -233,7 +233,7 @@ fn a_folder_in_use_is_left_alone() {
     let lock = fs::File::create(case.path("out/case/.lock")).unwrap();
     lock.lock().unwrap();
     let found = case.outcome(case.run());
-    assert!(found.starts_with("exit 2\nerror: case: "), "{found}");
+    assert!(found.starts_with("exit 6\nerror: case: "), "{found}");
     assert!(
         found.contains("another run is at work in this folder"),
         "{found}"

@@ -163,6 +163,63 @@ fn the_clock_scope_touches_what_it_reaches() {
 }
 
 #[test]
+fn products_do_not_depend_on_how_the_site_is_named() {
+    let case = fresh();
+    let relative = common::mission::products(&case.path("out"));
+    let mut command = case.areograph();
+    command
+        .arg("--quiet")
+        .arg("run")
+        .arg(case.path("site.toml"));
+    command.arg("--out").arg(case.path("other"));
+    common::mission::succeed(&mut command);
+    assert!(common::mission::products(&case.path("other")) == relative);
+    // The same folder, named otherwise: nothing to do.
+    let mut command = case.areograph();
+    command
+        .arg("--quiet")
+        .arg("run")
+        .arg(case.path("site.toml"))
+        .args(["--out", "out"]);
+    let printed = String::from_utf8(common::mission::succeed(&mut command).stdout).unwrap();
+    assert!(printed.contains("nothing changed"), "{printed}");
+}
+
+#[test]
+fn kernels_that_move_give_another_metakernel_and_nothing_else() {
+    let case = fresh();
+    std::fs::rename(case.path("kernels"), case.path("moved")).unwrap();
+    case.replace("site.toml", "kernels/nav.tm", "moved/nav.tm");
+    assert_eq!(run(&case), ["publish"]);
+    let metakernel = String::from_utf8(case.read("out/case/kernels.tm")).unwrap();
+    assert!(
+        metakernel.contains("moved/mgs_nav_scene.bsp"),
+        "{metakernel}"
+    );
+}
+
+#[test]
+fn pedr_files_of_one_name_are_told_apart() {
+    let case = Case::new();
+    std::fs::create_dir(case.path("second")).unwrap();
+    let mut bytes = case.read("pedr/ap19117l.b");
+    bytes.truncate(7_760 + 50 * 776);
+    case.write("second/ap19117l.b", &bytes);
+    case.replace(
+        "site.toml",
+        "[\"pedr/*.b\"]",
+        "[\"pedr/*.b\", \"second/*.b\"]",
+    );
+    run(&case);
+    case.replace("site.toml", "[pedr]", "# same\n[pedr]");
+    assert_plan(&case, &[]);
+    let mut first = case.read("pedr/ap19117l.b");
+    first[7_760 + 480] ^= 1;
+    case.write("pedr/ap19117l.b", first);
+    assert_eq!(plan(&case)["search_footprints"], "pedr ap19117l.b changed");
+}
+
+#[test]
 fn until_force_and_dry_run() {
     let case = Case::new();
     let mut command = case.run();

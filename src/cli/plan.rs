@@ -6,7 +6,11 @@ use clap::Args;
 use serde_json::json;
 
 use super::{load_sites, output};
-use crate::{config::SiteConfig, error::Failure, flow::plan_site};
+use crate::{
+    config::SiteConfig,
+    error::Failure,
+    flow::{Stage, plan_site},
+};
 
 /// Says which stages would run, and why.
 #[derive(Debug, Args)]
@@ -26,6 +30,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
     print(
         &load_sites(&arguments.sites)?,
         &arguments.out,
+        Stage::Publish,
         false,
         arguments.json,
     )
@@ -35,12 +40,13 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
 pub(super) fn print(
     sites: &[SiteConfig],
     out: &Path,
+    until: Stage,
     force: bool,
     as_json: bool,
 ) -> Result<(), Failure> {
     let mut answers = Vec::new();
     for site in sites {
-        let stages = plan_site(site, out, force)?;
+        let stages = plan_site(site, out, until, force)?;
         if as_json {
             let stages: Vec<_> = stages
                 .iter()

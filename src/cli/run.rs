@@ -70,6 +70,7 @@ pub(super) fn run(arguments: &Arguments) -> ExitCode {
         return super::finish(plan::print(
             &sites,
             &arguments.out,
+            arguments.until,
             arguments.force,
             arguments.json,
         ));
@@ -86,13 +87,16 @@ pub(super) fn run(arguments: &Arguments) -> ExitCode {
     };
     let outcomes = runtime.block_on(run_all(sites, arguments));
     print(&outcomes, arguments.json);
-    ExitCode::from(
-        outcomes
-            .iter()
-            .map(exit_code)
-            .find(|code| *code != 0)
-            .unwrap_or(0),
-    )
+    // A failure says more than an invalid site, and of several the first one counts.
+    let codes: Vec<u8> = outcomes
+        .iter()
+        .map(exit_code)
+        .filter(|code| *code != 0)
+        .collect();
+    let failed = codes
+        .iter()
+        .find(|code| **code != Kind::Validation.exit_code());
+    ExitCode::from(failed.or(codes.first()).copied().unwrap_or(0))
 }
 
 type Outcome = Result<SiteOutcome, Failure>;
@@ -125,8 +129,12 @@ async fn run_all(sites: Vec<SiteConfig>, arguments: &Arguments) -> Vec<Outcome> 
         let stop = Arc::clone(&stop);
         async move {
             if tokio::signal::ctrl_c().await.is_ok() {
-                tracing::warn!("stopping after the stages that are running");
+                tracing::warn!("stopping after the stages that are running; again to stop at once");
                 stop.store(true, Ordering::Relaxed);
+            }
+            if tokio::signal::ctrl_c().await.is_ok() {
+                // Nothing half-made stands under a final name at any moment, so this is safe.
+                std::process::exit(i32::from(Kind::Interrupted.exit_code()));
             }
         }
     });
@@ -153,7 +161,8 @@ impl crate::error::Fault for Panicked {
     }
 
     fn advice(&self) -> String {
-        "please report it with the configuration; products of earlier runs are untouched".to_owned()
+        "please report it with the configuration; running again finds and mends what was left"
+            .to_owned()
     }
 }
 

@@ -116,7 +116,7 @@ pub enum Ending {
 /// decides that, and no stage knows of another.
 ///
 /// # Errors
-/// The first failure, with site, stage, file and record; products of an earlier run stay as they are.
+/// The first failure, with site, stage and file; products of an earlier run stay as they are.
 pub fn run_site(config: &SiteConfig, options: &RunOptions<'_>) -> Result<SiteOutcome> {
     let span = tracing::info_span!("site", id = %config.site);
     let _entered = span.enter();

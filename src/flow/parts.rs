@@ -1,6 +1,8 @@
 //! What each stage depends on. The lists are the method's dependencies, read beside [`super::run_site`].
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
+
+use rayon::prelude::*;
 
 use crate::{
     config::SiteConfig,
@@ -11,9 +13,12 @@ use crate::{
     store::fingerprint::Parts,
 };
 
-/// Image keys, label files and the kernels that convert times.
+/// Raised when a stage computes something else from the same parts, or lays its output out anew.
+const METHOD: u32 = 1;
+
+/// Image keys, label files and all text kernels, among them those that convert times.
 pub(super) fn tag_times(config: &SiteConfig, kernels: &KernelSet) -> Result<Parts> {
-    let mut parts = Parts::new();
+    let mut parts = Parts::new(METHOD);
     for image in &config.images {
         parts = parts.key(&format!("images.{}", image.id), &image.fields);
         if let Some(label) = &image.label {
@@ -21,26 +26,36 @@ pub(super) fn tag_times(config: &SiteConfig, kernels: &KernelSet) -> Result<Part
         }
     }
     Ok(with_kernels(parts, kernels, |role| {
-        matches!(role, KernelRole::Lsk | KernelRole::Sclk)
+        // A file headed as frames may hold a clock as well.
+        !matches!(role, KernelRole::Spk | KernelRole::Ck)
     }))
 }
 
-/// PEDR files and filters, windows, and the clock correction.
-pub(super) fn search_footprints(config: &SiteConfig) -> Result<Parts> {
-    let mut parts = Parts::new()
+/// BLAKE3 of files, in their order.
+pub(super) fn hash_files(paths: &[PathBuf]) -> Result<Vec<String>> {
+    paths
+        .par_iter()
+        .map(|path| Ok(hash_file(path)?.0))
+        .collect()
+}
+
+/// PEDR files (by their hashes) and filters, windows, and the clock correction.
+pub(super) fn search_footprints(config: &SiteConfig, hashes: &[String]) -> Parts {
+    let mut parts = Parts::new(METHOD)
         .key("pedr.datum", &config.pedr.datum)
         .key("pedr.filter", &config.pedr.filter)
         .key("mola_clock (correction)", &config.mola_clock.correction_s())
         .key("windows", &config.windows);
-    for path in &config.pedr.files {
-        parts = parts.file("pedr", &file_name(path), &hash_file(path)?.0);
+    for (place, (path, hash)) in config.pedr.files.iter().zip(hashes).enumerate() {
+        // The order of the files is the order of the footprints.
+        parts = parts.file("pedr", &file_name(path), &format!("{}: {hash}", place + 1));
     }
-    Ok(parts)
+    parts
 }
 
 /// Footprints as read, and whether the clock correction turns Mars.
 pub(super) fn convert_datum(config: &SiteConfig, found: Option<&str>) -> Parts {
-    Parts::new()
+    Parts::new(METHOD)
         .key("mola_clock (correction)", &config.mola_clock.correction_s())
         .key("mola_clock.scope", &config.mola_clock.scope)
         .output("search_footprints", found)
@@ -53,26 +68,29 @@ pub(super) fn group_profiles(
     images: Option<&str>,
 ) -> Parts {
     let windows: Vec<&str> = config.windows.iter().map(|window| &*window.id).collect();
-    Parts::new()
+    Parts::new(METHOD)
         .key("windows (names)", &windows)
         .output("convert_datum", converted)
         .output("tag_times", images)
 }
 
-/// Footprints, profiles, limits, the clock correction and the ephemerides.
+/// Footprints, profiles, limits, the clock correction, the ephemerides and their frames.
 pub(super) fn check_ranges(
     config: &SiteConfig,
     kernels: &KernelSet,
     converted: Option<&str>,
     profiles: Option<&str>,
 ) -> Parts {
-    let parts = Parts::new()
+    let parts = Parts::new(METHOD)
         .key("range_check", &config.range_check)
         .key("mola_clock (correction)", &config.mola_clock.correction_s())
         .key("mola_clock.scope", &config.mola_clock.scope)
         .output("convert_datum", converted)
         .output("group_profiles", profiles);
-    with_kernels(parts, kernels, |role| role == KernelRole::Spk)
+    // Segments may be given in frames that text kernels define.
+    with_kernels(parts, kernels, |role| {
+        matches!(role, KernelRole::Spk | KernelRole::Pck | KernelRole::Fk)
+    })
 }
 
 /// The image's times, pointing bias, sampling, and all kernels: attitude may pass through any frame.
@@ -81,7 +99,7 @@ pub(super) fn sample_orientation(
     kernels: &KernelSet,
     image: &ImageTimes,
 ) -> Parts {
-    let parts = Parts::new()
+    let parts = Parts::new(METHOD)
         .key("image times", image)
         .key("pointing.ck_bias_s", &config.pointing.ck_bias)
         .key("kernels.ck_tolerance_s", &config.kernels.ck_tolerance_s)
@@ -96,7 +114,7 @@ pub(super) fn fit_sensor_model(
     image: &str,
     orientation: Option<&str>,
 ) -> Parts {
-    Parts::new()
+    Parts::new(METHOD)
         .key("orientation", &config.orientation)
         .output(&format!("sample_orientation/{image}"), orientation)
 }
@@ -108,9 +126,11 @@ pub(super) fn publish(
     folder: &Path,
     outputs: impl IntoIterator<Item = (String, Option<String>)>,
 ) -> Parts {
-    let mut parts = Parts::new()
+    let mut parts = Parts::new(METHOD)
         .key("configuration", &config.blake3)
-        .key("places of kernels", &kernels.metakernel_text(Some(folder)));
+        .key("configuration (file name)", &file_name(&config.file))
+        .key("kernels (places)", &kernels.metakernel_text(Some(folder)))
+        .key("kernels (selection)", &kernels.explanation());
     for (stage, output) in outputs {
         parts = parts.output(&stage, output.as_deref());
     }

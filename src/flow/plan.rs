@@ -2,12 +2,14 @@
 
 use std::path::Path;
 
+use serde::de::DeserializeOwned;
+
 use super::{
     Stage, parts, publish,
     steps::{load_kernels, wanted},
 };
 use crate::{
-    config::SiteConfig,
+    config::{KernelSource, SiteConfig},
     error::{Place, Result},
     stages::{
         check_ranges::RangeCheck, convert_datum::Converted, fit_sensor_model::SensorModel,
@@ -23,6 +25,8 @@ use crate::{
 /// A stage with the reason why it would run, or [`Because::Unchanged`].
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct PlannedStage {
+    /// The stage.
+    pub of: Stage,
     /// Name, for a stage of one image followed by `/` and the image.
     pub stage: String,
     /// Why it would run, or that it would not.
@@ -36,120 +40,131 @@ pub struct PlannedStage {
 ///
 /// # Errors
 /// Input files or kernels that cannot be read.
-pub fn plan_site(config: &SiteConfig, out: &Path, force: bool) -> Result<Vec<PlannedStage>> {
-    plan_stages(config, out, force).in_site(&config.site)
+pub fn plan_site(
+    config: &SiteConfig,
+    out: &Path,
+    until: Stage,
+    force: bool,
+) -> Result<Vec<PlannedStage>> {
+    let mut planned = plan_stages(config, out, force).in_site(&config.site)?;
+    planned.retain(|planned| planned.of <= until);
+    Ok(planned)
 }
 
 fn plan_stages(config: &SiteConfig, out: &Path, force: bool) -> Result<Vec<PlannedStage>> {
     let folder = out.join(&config.site);
-    let mut planner = Planner {
+    let mut plan = Planner {
         cache: StageCache::new(&folder.join(".cache"), force),
         planned: Vec::new(),
+        outputs: Vec::new(),
     };
     let clocks = load_kernels(config, &[]).in_stage(Stage::LoadKernels.name())?;
     let parts = parts::tag_times(config, &clocks).in_stage(Stage::TagTimes.name())?;
-    let images: Option<Output<Vec<ImageTimes>>> = planner.look(Stage::TagTimes.name(), &parts);
-    let parts = parts::search_footprints(config).in_stage(Stage::SearchFootprints.name())?;
-    let found: Option<Output<SearchResult>> = planner.look(Stage::SearchFootprints.name(), &parts);
-    let parts = parts::convert_datum(config, hash(found.as_ref()).as_deref());
-    let converted: Option<Output<Converted>> = planner.look(Stage::ConvertDatum.name(), &parts);
-    let parts = parts::group_profiles(
-        config,
-        hash(converted.as_ref()).as_deref(),
-        hash(images.as_ref()).as_deref(),
-    );
-    let profiles: Option<Output<Vec<Profile>>> = planner.look(Stage::GroupProfiles.name(), &parts);
+    let images = plan.look::<Vec<ImageTimes>>(Stage::TagTimes, &parts);
+    let hashes = parts::hash_files(&config.pedr.files).in_stage(Stage::SearchFootprints.name())?;
+    let parts = parts::search_footprints(config, &hashes);
+    let found = plan.look::<SearchResult>(Stage::SearchFootprints, &parts);
+    let parts = parts::convert_datum(config, hash(found.as_ref()));
+    let converted = plan.look::<Converted>(Stage::ConvertDatum, &parts);
+    let parts = parts::group_profiles(config, hash(converted.as_ref()), hash(images.as_ref()));
+    let profiles = plan.look::<Vec<Profile>>(Stage::GroupProfiles, &parts);
 
-    let wanted = wanted(
-        images.as_ref().map_or(&[], |output| &output.value),
-        profiles.as_ref().map_or(&[], |output| &output.value),
-    );
+    let chosen = matches!(config.kernels.source, KernelSource::Root(_));
+    if chosen && (images.is_none() || profiles.is_none()) {
+        // Which kernels will be chosen is not known before the stages above have run.
+        plan.add(Stage::CheckRanges, None, follows());
+        for image in &config.images {
+            plan.add(Stage::SampleOrientation, Some(&image.id), follows());
+            plan.add(Stage::FitSensorModel, Some(&image.id), follows());
+        }
+        plan.add(Stage::Publish, None, follows());
+        return Ok(plan.planned);
+    }
+    let times = images.as_ref().map_or(&[][..], |images| &images.value);
+    let flights = profiles
+        .as_ref()
+        .map_or(&[][..], |profiles| &profiles.value);
+    let wanted = wanted(times, flights);
     let kernels = load_kernels(config, &wanted).in_stage(Stage::LoadKernels.name())?;
-
     let parts = parts::check_ranges(
         config,
         &kernels,
-        hash(converted.as_ref()).as_deref(),
-        hash(profiles.as_ref()).as_deref(),
+        hash(converted.as_ref()),
+        hash(profiles.as_ref()),
     );
-    let ranges: Option<Output<RangeCheck>> = planner.look(Stage::CheckRanges.name(), &parts);
-    let mut outputs = vec![
-        (Stage::TagTimes.name().to_owned(), hash(images.as_ref())),
-        (
-            Stage::SearchFootprints.name().to_owned(),
-            hash(found.as_ref()),
-        ),
-        (
-            Stage::ConvertDatum.name().to_owned(),
-            hash(converted.as_ref()),
-        ),
-        (
-            Stage::GroupProfiles.name().to_owned(),
-            hash(profiles.as_ref()),
-        ),
-        (Stage::CheckRanges.name().to_owned(), hash(ranges.as_ref())),
-    ];
+    plan.look::<RangeCheck>(Stage::CheckRanges, &parts);
     for image in &config.images {
-        let times = images
-            .as_ref()
-            .and_then(|images| images.value.iter().find(|times| times.id == image.id));
-        let stage = Stage::SampleOrientation.of_image(&image.id);
-        let orientation: Option<Output<Orientation>> = match times {
-            Some(times) => {
-                planner.look(&stage, &parts::sample_orientation(config, &kernels, times))
-            }
-            None => planner.follows(&stage, Stage::TagTimes.name()),
-        };
-        let parts =
-            parts::fit_sensor_model(config, &image.id, hash(orientation.as_ref()).as_deref());
-        outputs.push((stage, hash(orientation.as_ref())));
-        let stage = Stage::FitSensorModel.of_image(&image.id);
-        let model: Option<Output<SensorModel>> = planner.look(&stage, &parts);
-        outputs.push((stage, hash(model.as_ref())));
+        let stage = Stage::SampleOrientation;
+        let times = times.iter().find(|times| times.id == image.id);
+        let orientation = times.and_then(|times| {
+            let parts = parts::sample_orientation(config, &kernels, times);
+            plan.look_for::<Orientation>(stage, Some(&image.id), &parts)
+        });
+        if times.is_none() {
+            plan.outputs.push((stage.of_image(&image.id), None));
+            plan.add(stage, Some(&image.id), follows());
+        }
+        let parts = parts::fit_sensor_model(config, &image.id, hash(orientation.as_ref()));
+        plan.look_for::<SensorModel>(Stage::FitSensorModel, Some(&image.id), &parts);
     }
+    let outputs = std::mem::take(&mut plan.outputs);
     let parts = parts::publish(config, &kernels, &folder, outputs);
-    let because = match publish::standing(&folder, &planner.cache, &parts) {
-        Ok(_) => Because::Unchanged,
-        Err(because) => because,
-    };
-    planner.planned.push(PlannedStage {
-        stage: Stage::Publish.name().to_owned(),
-        because,
-    });
-    Ok(planner.planned)
+    let standing = publish::standing(&folder, &plan.cache, &parts);
+    plan.add(
+        Stage::Publish,
+        None,
+        standing.err().unwrap_or(Because::Unchanged),
+    );
+    Ok(plan.planned)
 }
 
-fn hash<T>(output: Option<&Output<T>>) -> Option<String> {
-    output.map(|output| output.blake3.clone())
+fn hash<T>(output: Option<&Output<T>>) -> Option<&str> {
+    output.map(|output| &*output.blake3)
+}
+
+/// The reason of a stage whose parts are not known before earlier stages have run.
+fn follows() -> Because {
+    Because::Moved(vec!["output of earlier stages may change".to_owned()])
 }
 
 struct Planner {
     cache: StageCache,
     planned: Vec<PlannedStage>,
+    /// Stages so far, with the hash of their output where it is known.
+    outputs: Vec<(String, Option<String>)>,
 }
 
 impl Planner {
-    fn look<T: serde::de::DeserializeOwned>(
+    fn look<T: DeserializeOwned>(&mut self, stage: Stage, parts: &Parts) -> Option<Output<T>> {
+        self.look_for(stage, None, parts)
+    }
+
+    fn look_for<T: DeserializeOwned>(
         &mut self,
-        stage: &str,
+        stage: Stage,
+        image: Option<&str>,
         parts: &Parts,
     ) -> Option<Output<T>> {
-        let (because, output) = match self.cache.load(stage, parts) {
+        let loaded = self.cache.load(&name(stage, image), parts);
+        let (because, output) = match loaded {
             Ok(output) => (Because::Unchanged, Some(output)),
             Err(because) => (because, None),
         };
-        self.planned.push(PlannedStage {
-            stage: stage.to_owned(),
-            because,
-        });
+        self.outputs
+            .push((name(stage, image), hash(output.as_ref()).map(str::to_owned)));
+        self.add(stage, image, because);
         output
     }
 
-    fn follows<T>(&mut self, stage: &str, earlier: &str) -> Option<Output<T>> {
+    fn add(&mut self, of: Stage, image: Option<&str>, because: Because) {
         self.planned.push(PlannedStage {
-            stage: stage.to_owned(),
-            because: Because::Moved(vec![format!("output of {earlier} may change")]),
+            of,
+            stage: name(of, image),
+            because,
         });
-        None
     }
+}
+
+fn name(stage: Stage, image: Option<&str>) -> String {
+    image.map_or_else(|| stage.name().to_owned(), |image| stage.of_image(image))
 }

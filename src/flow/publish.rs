@@ -79,14 +79,11 @@ pub(super) fn publish(folder: &Path, cache: &StageCache, results: &Results<'_>) 
             tracing::info!(stage = name, "kept: {}", Because::Unchanged);
             return Ok(Ending::Unchanged(manifest));
         }
-        Err(because) => {
-            tracing::info!(stage = name, "making products: {because}");
-            cache.forget(name);
-        }
+        Err(because) => tracing::info!(stage = name, "running: {because}"),
     }
     let fingerprint = parts.fingerprint();
-    let manifest = cache.stage(name, parts, || make_products(folder, results, fingerprint))?;
-    Ok(Ending::Published(manifest.value))
+    let manifest = make_products(folder, results, fingerprint)?;
+    Ok(Ending::Published(cache.store(name, parts, manifest)?.value))
 }
 
 fn make_products(folder: &Path, results: &Results<'_>, fingerprint: String) -> Result<Manifest> {
@@ -162,7 +159,7 @@ fn make_products(folder: &Path, results: &Results<'_>, fingerprint: String) -> R
         complaints,
     };
     let manifest = results.manifest(account, fingerprint);
-    publish_files(folder, &staging, &manifest, read_manifest(folder).as_ref())?;
+    publish_files(folder, &staging, &manifest)?;
     Ok(manifest)
 }
 

@@ -70,6 +70,21 @@ impl Fault for Stopped {
     }
 }
 
+/// A PEDR file changed between its hash and its search.
+#[derive(Debug, thiserror::Error)]
+#[error("the file changed while it was read")]
+struct ChangedFile;
+
+impl Fault for ChangedFile {
+    fn kind(&self) -> Kind {
+        Kind::Input
+    }
+
+    fn advice(&self) -> String {
+        "run again when the archive is not being written".to_owned()
+    }
+}
+
 impl Steps<'_> {
     /// Leaves the flow before `stage` when it is not asked for, or when the user stops the program.
     fn enter(&self, stage: Stage) -> Step<()> {
@@ -82,6 +97,31 @@ impl Steps<'_> {
         Ok(())
     }
 
+    /// Makes sure that the kernels are still what was hashed, after stages that read them.
+    ///
+    /// Otherwise the fresh outputs would stand under the hashes of other kernels: they are forgotten.
+    fn check_kernels<S: AsRef<str>>(
+        &self,
+        kernels: &KernelSet,
+        stages: impl IntoIterator<Item = (S, bool)>,
+    ) -> Result<()> {
+        let fresh: Vec<S> = stages
+            .into_iter()
+            .filter(|(_, fresh)| *fresh)
+            .map(|(stage, _)| stage)
+            .collect();
+        if fresh.is_empty() {
+            return Ok(());
+        }
+        let unchanged = kernels.verify_unchanged();
+        if unchanged.is_err() {
+            for stage in &fresh {
+                self.cache.forget(stage.as_ref());
+            }
+        }
+        unchanged
+    }
+
     pub(super) fn load_kernels(&self, wanted: &[Interval]) -> Step<KernelSet> {
         self.enter(Stage::LoadKernels)?;
         Ok(load_kernels(self.config, wanted).in_stage(Stage::LoadKernels.name())?)
@@ -91,18 +131,33 @@ impl Steps<'_> {
         self.enter(Stage::TagTimes)?;
         let stage = Stage::TagTimes.name();
         let parts = parts::tag_times(self.config, clocks).in_stage(stage)?;
-        Ok(self.cache.stage(stage, parts, || {
+        let images = self.cache.stage(stage, parts, || {
             tag_times(&self.config.images, &Session::open(clocks)?).in_stage(stage)
-        })?)
+        })?;
+        self.check_kernels(clocks, [(stage, images.fresh)])?;
+        Ok(images)
     }
 
     pub(super) fn search_footprints(&self) -> Step<Output<SearchResult>> {
         self.enter(Stage::SearchFootprints)?;
         let stage = Stage::SearchFootprints.name();
-        let parts = parts::search_footprints(self.config).in_stage(stage)?;
+        let hashes = parts::hash_files(&self.config.pedr.files).in_stage(stage)?;
+        let parts = parts::search_footprints(self.config, &hashes);
         let correction_s = self.config.mola_clock.correction_s();
         Ok(self.cache.stage(stage, parts, || {
-            search_footprints(&self.config.pedr, &self.config.windows, correction_s).in_stage(stage)
+            let found = search_footprints(&self.config.pedr, &self.config.windows, correction_s)?;
+            for ((file, hash), path) in found
+                .footprints
+                .files
+                .iter()
+                .zip(&hashes)
+                .zip(&self.config.pedr.files)
+            {
+                if file.blake3 != *hash {
+                    return Err(Failure::from(ChangedFile).in_file(path).in_stage(stage));
+                }
+            }
+            Ok(found)
         })?)
     }
 
@@ -143,7 +198,7 @@ impl Steps<'_> {
         let stage = Stage::CheckRanges.name();
         let outputs = [&converted.blake3, &profiles.blake3].map(|blake3| Some(&**blake3));
         let parts = parts::check_ranges(self.config, kernels, outputs[0], outputs[1]);
-        Ok(self.cache.stage(stage, parts, || {
+        let ranges = self.cache.stage(stage, parts, || {
             let trajectory = self.trajectory(kernels, &profiles.value).in_stage(stage)?;
             check_ranges(
                 &converted.value.footprints,
@@ -153,7 +208,9 @@ impl Steps<'_> {
                 &self.config.range_check,
             )
             .in_stage(stage)
-        })?)
+        })?;
+        self.check_kernels(kernels, [(stage, ranges.fresh)])?;
+        Ok(ranges)
     }
 
     /// Tabulates the spacecraft's path over all profiles, as far as the scan reaches and the kernels go.
@@ -189,7 +246,13 @@ impl Steps<'_> {
                     .in_stage(&stage)
             })
         });
-        Ok(orientations.collect::<Result<_>>()?)
+        let orientations = orientations.collect::<Result<Vec<_>>>()?;
+        let fresh = orientations.iter().map(|orientation| {
+            let stage = Stage::SampleOrientation.of_image(&orientation.value.image);
+            (stage, orientation.fresh)
+        });
+        self.check_kernels(kernels, fresh)?;
+        Ok(orientations)
     }
 
     pub(super) fn fit_sensor_model(

@@ -231,7 +231,7 @@ fn spacecraft(site: &SiteProducts) -> Vec<Column> {
 /// Name of a source file; its folder belongs to the machine, not to the product.
 pub(super) fn file_name(site: &SiteProducts, file: u16) -> String {
     let source = site.footprints.files.get(usize::from(file));
-    source.map_or_else(String::new, |source| crate::files::file_name(&source.path))
+    source.map_or_else(String::new, |source| source.name.clone())
 }
 
 /// Identifiers of the windows in `mask`, separated by semicolons.

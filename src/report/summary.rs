@@ -3,7 +3,6 @@
 use super::html::{Table, list, paragraph, section};
 use crate::{
     config::{BiasScope, DatumChoice, TagSign, WindowConfig, WindowShape},
-    files::file_name,
     products::SiteProducts,
     units::RADIANS_PER_DEGREE,
 };
@@ -62,7 +61,7 @@ pub(super) fn inputs(site: &SiteProducts) -> String {
         files.row(
             true,
             &[
-                file_name(&file.path),
+                file.name.clone(),
                 version,
                 file.datum.to_string(),
                 short(&file.blake3),

@@ -5,7 +5,6 @@ use serde::{Deserialize, Serialize};
 
 use crate::{
     config::MolaClock,
-    files::file_name,
     footprints::{AsRead, Footprints},
     frames::{MarsDatum, MarsIau2000},
     geom::{
@@ -45,7 +44,7 @@ pub fn convert_datum(footprints: Footprints<AsRead>, clock: &MolaClock) -> Conve
     let notes = footprints
         .files
         .iter()
-        .map(|file| note(&file.path, file.datum, turns.then_some(turn_s)))
+        .map(|file| note(&file.name, file.datum, turns.then_some(turn_s)))
         .collect();
     let datums: Vec<MarsDatum> = footprints.files.iter().map(|file| file.datum).collect();
     let mut converted = footprints.declare::<MarsIau2000>();
@@ -86,8 +85,7 @@ pub fn convert_datum(footprints: Footprints<AsRead>, clock: &MolaClock) -> Conve
     }
 }
 
-fn note(path: &std::path::Path, datum: MarsDatum, turn_s: Option<f64>) -> String {
-    let name = file_name(path);
+fn note(name: &str, datum: MarsDatum, turn_s: Option<f64>) -> String {
     match (datum, turn_s) {
         (MarsDatum::Iau2000, None) => format!("{name}: in IAU 2000 already, not converted"),
         (datum, None) => format!("{name}: {datum} to IAU 2000 at each shot's time tag"),
@@ -108,7 +106,7 @@ mod tests {
 
     fn footprints(datum: MarsDatum) -> Footprints<AsRead> {
         let mut footprints = Footprints::new(vec![SourceFile {
-            path: "ap18933k.b".into(),
+            name: "ap18933k.b".to_owned(),
             version: Some('K'),
             datum,
             blake3: String::new(),

@@ -199,7 +199,8 @@ fn broken_limits(
 ) -> Vec<String> {
     let mut broken = Vec::new();
     let position_rmse_m = model.position_rmse_m();
-    if position_rmse_m > limits.position_rmse_max_m {
+    // Written so that NaN breaks a limit.
+    if !(position_rmse_m <= limits.position_rmse_max_m) {
         broken.push(format!(
             "second-order position RMSE {position_rmse_m:.4} m; limit {} m",
             limits.position_rmse_max_m
@@ -210,7 +211,7 @@ fn broken_limits(
         .iter()
         .map(|fit| fit.rmse)
         .fold(0.0, f64::max);
-    if pointing_rmse_rad > limits.pointing_rmse_max_rad {
+    if !(pointing_rmse_rad <= limits.pointing_rmse_max_rad) {
         broken.push(format!(
             "second-order pointing RMSE {:.3} arcsec; limit {:.3} arcsec",
             pointing_rmse_rad / RADIANS_PER_ARCSECOND,

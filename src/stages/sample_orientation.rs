@@ -138,7 +138,7 @@ pub fn sample_orientation(
 ///
 /// # Errors
 /// A gap, named with its ends and the kernels beside it.
-pub fn require_coverage(
+fn require_coverage(
     session: &Session,
     image: &ImageTimes,
     kernels: &KernelsConfig,

@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 use crate::{
     config::{PedrConfig, ShotFilter, WindowConfig},
     error::{Fault, Kind, Place, Result},
+    files::file_name,
     footprints::{AsRead, Footprint, Footprints, SourceFile},
     frames::{MarsDatum, MarsIau2000},
     geom::{
@@ -239,7 +240,7 @@ fn search_file(
         found.complain(complaint);
     }
     let source = SourceFile {
-        path: path.to_owned(),
+        name: file_name(path),
         version,
         datum,
         blake3: file.blake3(),

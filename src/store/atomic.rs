@@ -8,6 +8,9 @@ use std::{
 
 use crate::error::{IoFault, Place, Result};
 
+/// How names of half-written files begin.
+pub(super) const TEMPORARY: &str = ".partial-";
+
 /// Writes `bytes` beside `path` under a temporary name, flushes them to the disk and renames.
 ///
 /// # Errors
@@ -18,7 +21,7 @@ pub fn write(path: &Path, bytes: &[u8]) -> Result<()> {
         .map_err(IoFault::on("create the folder"))
         .in_file(folder)?;
     let mut temporary = tempfile::Builder::new()
-        .prefix(".partial-")
+        .prefix(TEMPORARY)
         .tempfile_in(folder)
         .map_err(IoFault::on("create a file"))
         .in_file(folder)?;

@@ -37,6 +37,8 @@ pub struct Output<T> {
     pub blake3: String,
     /// Hash over the parts it was made from, for the manifest.
     pub fingerprint: String,
+    /// Whether it was made just now.
+    pub fresh: bool,
 }
 
 /// A stage output that cannot be stored.
@@ -93,6 +95,7 @@ impl StageCache {
             value,
             blake3: stored.blake3,
             fingerprint: parts.fingerprint(),
+            fresh: false,
         })
     }
 
@@ -114,7 +117,14 @@ impl StageCache {
             Err(because) => because,
         };
         tracing::info!(stage, "running: {because}");
-        let value = run()?;
+        self.store(stage, parts, run()?)
+    }
+
+    /// Stores the output of `stage` with the parts it was made from.
+    ///
+    /// # Errors
+    /// The output cannot be written.
+    pub fn store<T: Serialize>(&self, stage: &str, parts: Parts, value: T) -> Result<Output<T>> {
         let unstorable = |source| Unstorable {
             stage: stage.to_owned(),
             source,
@@ -134,6 +144,7 @@ impl StageCache {
             value,
             blake3,
             fingerprint,
+            fresh: true,
         })
     }
 
@@ -156,7 +167,7 @@ mod tests {
     fn an_output_is_kept_until_a_part_moves_or_the_file_is_damaged() {
         let folder = tempfile::tempdir().unwrap();
         let cache = StageCache::new(folder.path(), false);
-        let parts = |value: u32| Parts::new().key("windows", &value);
+        let parts = |value: u32| Parts::new(1).key("windows", &value);
         let run = |value: u32, output: u32| cache.stage("search", parts(value), || Ok(output));
         assert_eq!(run(1, 10).unwrap().value, 10);
         assert_eq!(run(1, 11).unwrap().value, 10);

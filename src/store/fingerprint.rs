@@ -11,7 +11,7 @@ const NOT_KNOWN_YET: &str = "not known yet";
 ///
 /// | part | value |
 /// |---|---|
-/// | `areograph` | version of the program |
+/// | `areograph` | version of the program, and of the stage's method |
 /// | `key …` | a table of the valid configuration |
 /// | `kernel …`, `label …`, `pedr …` | BLAKE3 of a file, kernels with their place in the load order |
 /// | `output of …` | BLAKE3 of an earlier stage's output |
@@ -23,13 +23,11 @@ const NOT_KNOWN_YET: &str = "not known yet";
 pub struct Parts(BTreeMap<String, String>);
 
 impl Parts {
-    /// The parts of a stage of this version of the program.
+    /// The parts of a stage whose method, or the layout of whose output, has this number.
     #[must_use]
-    pub fn new() -> Self {
-        Self(BTreeMap::from([(
-            "areograph".to_owned(),
-            env!("CARGO_PKG_VERSION").to_owned(),
-        )]))
+    pub fn new(method: u32) -> Self {
+        let version = format!("{}, method {method}", env!("CARGO_PKG_VERSION"));
+        Self(BTreeMap::from([("areograph".to_owned(), version)]))
     }
 
     /// Adds a table or value of the valid configuration.
@@ -41,10 +39,16 @@ impl Parts {
         self
     }
 
-    /// Adds a file by its hash.
+    /// Adds a file by its hash; further files of one name count as `name (2)` and so on.
     #[must_use]
     pub fn file(mut self, sort: &str, name: &str, blake3: &str) -> Self {
-        self.0.insert(format!("{sort} {name}"), blake3.to_owned());
+        let mut part = format!("{sort} {name}");
+        let mut place = 1;
+        while self.0.contains_key(&part) {
+            place += 1;
+            part = format!("{sort} {name} ({place})");
+        }
+        self.0.insert(part, blake3.to_owned());
         self
     }
 
@@ -89,12 +93,6 @@ impl Parts {
     }
 }
 
-impl Default for Parts {
-    fn default() -> Self {
-        Self::new()
-    }
-}
-
 /// Why a stage runs, or that it does not.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Because {
@@ -136,14 +134,14 @@ mod tests {
 
     #[test]
     fn the_moved_part_is_named() {
-        let before = Parts::new()
+        let before = Parts::new(1)
             .key("windows", &[1, 2])
             .file("kernel", "naif0012.tls", "aa")
             .output("tag_times", Some("bb"));
         let same = before.clone();
         assert_eq!(before.fingerprint(), same.fingerprint());
         assert!(same.changed_since(&before).is_empty());
-        let after = Parts::new()
+        let after = Parts::new(1)
             .key("windows", &[1, 3])
             .file("kernel", "naif0013.tls", "aa")
             .output("tag_times", None);
@@ -162,13 +160,30 @@ mod tests {
     #[test]
     fn another_version_of_the_program_is_a_reason() {
         let stored: Parts = serde_json::from_str(r#"{"areograph": "0.0.1"}"#).unwrap();
-        assert_eq!(Parts::new().changed_since(&stored), ["areograph changed"]);
+        assert_eq!(Parts::new(1).changed_since(&stored), ["areograph changed"]);
+    }
+
+    #[test]
+    fn files_of_one_name_do_not_hide_each_other() {
+        let parts = |first: &str| {
+            Parts::new(1)
+                .file("pedr", "a.b", first)
+                .file("pedr", "a.b", "cc")
+        };
+        assert_eq!(
+            parts("bb").changed_since(&parts("aa")),
+            ["pedr a.b changed"]
+        );
+        assert_eq!(
+            Parts::new(2).changed_since(&Parts::new(1)),
+            ["areograph changed"]
+        );
     }
 
     #[test]
     fn names_and_values_do_not_run_into_each_other() {
-        let one = Parts::new().file("pedr", "a", "bc");
-        let other = Parts::new().file("pedr", "ab", "c");
+        let one = Parts::new(1).file("pedr", "a", "bc");
+        let other = Parts::new(1).file("pedr", "ab", "c");
         assert_ne!(one.fingerprint(), other.fingerprint());
     }
 }

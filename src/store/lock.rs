@@ -5,6 +5,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
+use super::atomic::TEMPORARY;
 use crate::error::{Fault, IoFault, Kind, Place, Result};
 
 /// Held while a run works in a site's folder; the system frees it when the process ends, however it ends.
@@ -20,7 +21,7 @@ struct Busy;
 
 impl Fault for Busy {
     fn kind(&self) -> Kind {
-        Kind::Configuration
+        Kind::Io
     }
 
     fn advice(&self) -> String {
@@ -42,9 +43,23 @@ impl SiteLock {
             .map_err(IoFault::on("create"))
             .in_file(&path)?;
         match file.try_lock() {
-            Ok(()) => Ok(Self { _file: file }),
+            Ok(()) => {
+                remove_temporaries(folder);
+                remove_temporaries(&folder.join(".cache"));
+                Ok(Self { _file: file })
+            }
             Err(TryLockError::WouldBlock) => Err(Busy).in_file(folder),
             Err(TryLockError::Error(error)) => Err(IoFault::on("lock")(error)).in_file(&path),
+        }
+    }
+}
+
+/// Removes what a killed run left half-written; nobody else works here while the lock is held.
+fn remove_temporaries(folder: &Path) {
+    for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
+        if entry.file_name().to_string_lossy().starts_with(TEMPORARY) {
+            // What cannot be removed does no harm.
+            let _ = fs::remove_file(entry.path());
         }
     }
 }

@@ -1,8 +1,13 @@
 //! Staged products go under their final names, and products that are no longer made go away.
+//!
+//! Renaming many files is not one step for the file system, so a journal says that it has begun and
+//! which files may be concerned. While it lasts there is no manifest: a reader without a manifest has
+//! no products. Whoever finds a journal finishes the work by publishing again.
 
 use std::{
+    collections::BTreeSet,
     fs,
-    path::{Path, PathBuf},
+    path::{Component, Path, PathBuf},
 };
 
 use super::{
@@ -16,6 +21,9 @@ use crate::{
 
 /// Name of the manifest in a site's folder.
 pub const MANIFEST: &str = "manifest.json";
+
+/// Paths below the site's folder that a publication under way may have made or will remove.
+const JOURNAL: &str = ".publishing";
 
 /// A folder for half-made products inside the site's folder, hence on the same file system.
 ///
@@ -57,46 +65,79 @@ pub fn entries(staging: &Path, files: &[(PathBuf, u64)]) -> Result<Vec<ProductEn
         .collect()
 }
 
-/// Renames staged products into place, removes those of `earlier` that are gone, writes the manifest last.
+/// Renames staged products into place, removes earlier ones that are no longer made, writes the manifest last.
 ///
 /// # Errors
-/// A file cannot be renamed or removed; running again mends the folder.
-pub fn publish(
-    site_folder: &Path,
-    staging: &Path,
-    manifest: &Manifest,
-    earlier: Option<&Manifest>,
-) -> Result<()> {
-    for product in &manifest.products {
-        let target = site_folder.join(&product.path);
-        if let Some(folder) = target.parent() {
-            fs::create_dir_all(folder)
-                .map_err(IoFault::on("create the folder"))
-                .in_file(folder)?;
-        }
-        fs::rename(staging.join(&product.path), &target)
+/// A file cannot be renamed or removed; publishing again mends the folder.
+pub fn publish(site_folder: &Path, staging: &Path, manifest: &Manifest) -> Result<()> {
+    let made: BTreeSet<&str> = manifest
+        .products
+        .iter()
+        .map(|product| &*product.path)
+        .collect();
+    let earlier = earlier_products(site_folder);
+    let concerned: Vec<&str> = made
+        .iter()
+        .copied()
+        .chain(earlier.iter().map(|path| &**path))
+        .collect();
+    let journal = site_folder.join(JOURNAL);
+    atomic::write(&journal, concerned.join("\n").as_bytes())?;
+    remove_if_there(&site_folder.join(MANIFEST))?;
+
+    let mut folders = BTreeSet::from([site_folder.to_owned()]);
+    for path in &made {
+        let target = site_folder.join(path);
+        let folder = target.parent().unwrap_or(site_folder).to_owned();
+        fs::create_dir_all(&folder)
+            .map_err(IoFault::on("create the folder"))
+            .in_file(&folder)?;
+        fs::rename(staging.join(path), &target)
             .map_err(IoFault::on("rename into place"))
             .in_file(&target)?;
+        folders.insert(folder);
     }
-    for product in earlier.map_or(&[][..], |manifest| &manifest.products) {
-        let still_made = manifest
-            .products
-            .iter()
-            .any(|made| made.path == product.path);
-        let path = site_folder.join(&product.path);
-        if !still_made && path.exists() {
-            fs::remove_file(&path)
-                .map_err(IoFault::on("remove an outdated product"))
-                .in_file(&path)?;
-            // The folder of an image that is no longer configured goes with its last file.
-            let _ = path.parent().map(fs::remove_dir);
-        }
+    for path in earlier.iter().filter(|path| !made.contains(&***path)) {
+        let path = site_folder.join(path);
+        remove_if_there(&path)?;
+        // The folder of an image that is no longer configured goes with its last file.
+        let _ = path.parent().map(fs::remove_dir);
     }
-    atomic::sync_folder(site_folder);
+    for folder in &folders {
+        atomic::sync_folder(folder);
+    }
     atomic::write(&site_folder.join(MANIFEST), &manifest_bytes(manifest)?)?;
+    remove_if_there(&journal)?;
     fs::remove_dir_all(staging)
         .map_err(IoFault::on("remove the folder"))
         .in_file(staging)
+}
+
+/// Products that earlier runs may have left: those of the manifest and of an unfinished journal.
+///
+/// Paths that lead out of the site's folder, which areograph never writes, are left out.
+fn earlier_products(site_folder: &Path) -> BTreeSet<String> {
+    let journal = fs::read_to_string(site_folder.join(JOURNAL)).unwrap_or_default();
+    let manifest = read_manifest(site_folder).map_or_else(Vec::new, |manifest| manifest.products);
+    let inside = |path: &String| {
+        let mut components = Path::new(path).components();
+        components.all(|component| matches!(component, Component::Normal(_)))
+    };
+    journal
+        .lines()
+        .map(str::to_owned)
+        .chain(manifest.into_iter().map(|product| product.path))
+        .filter(|path| !path.is_empty() && inside(path))
+        .collect()
+}
+
+fn remove_if_there(path: &Path) -> Result<()> {
+    match fs::remove_file(path) {
+        Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
+            Err(IoFault::on("remove")(error)).in_file(path)
+        }
+        _ => Ok(()),
+    }
 }
 
 /// A manifest that cannot be written.

@@ -242,7 +242,7 @@ fn orientation(times: &ImageTimes) -> Orientation {
 
 fn footprints() -> Footprints<MarsIau2000> {
     let mut footprints = Footprints::new(vec![SourceFile {
-        path: "data/ap19019l.b".into(),
+        name: "ap19019l.b".to_owned(),
         version: Some('L'),
         datum: MarsDatum::Iau2000,
         blake3: "cd".repeat(32),

@@ -1,17 +1,16 @@
 //! What is wrong with a file but does not stop it from being read.
 
-use std::{fmt, path::PathBuf};
+use std::fmt;
 
 use serde::{Deserialize, Serialize};
 
 use super::Reason;
-use crate::files::file_name;
 
 /// One finding in a file; the rest of the file is kept.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Complaint {
-    /// The file.
-    pub file: PathBuf,
+    /// Name of the file, without folders.
+    pub file: String,
     /// Record, counted from 1 with the label records; `None` when it concerns the whole file.
     pub record: Option<u32>,
     /// Reason code, for counts.
@@ -22,7 +21,7 @@ pub struct Complaint {
 
 impl fmt::Display for Complaint {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(formatter, "{}", file_name(&self.file))?;
+        formatter.write_str(&self.file)?;
         if let Some(record) = self.record {
             write!(formatter, " record {record}")?;
         }

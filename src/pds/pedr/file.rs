@@ -12,7 +12,10 @@ use super::{
     Complaint, FieldGuard, FileName, Frame, LABEL_BYTES, LABEL_RECORDS, PedrLabel, RECORD_BYTES,
     Reason, Record, RecordFault, check::out_of_order,
 };
-use crate::error::{Fault, IoFault, Kind, Place, Result};
+use crate::{
+    error::{Fault, IoFault, Kind, Place, Result},
+    files::file_name,
+};
 
 /// A PEDR file, open for reading.
 #[derive(Debug)]
@@ -128,7 +131,7 @@ impl File {
 
     fn complaint(&self, record: Option<u32>, reason: Reason, text: String) -> Complaint {
         Complaint {
-            file: self.path.clone(),
+            file: file_name(&self.path),
             record,
             reason,
             text,
