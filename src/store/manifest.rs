@@ -53,7 +53,7 @@ pub struct Verdict {
 pub struct ConfigurationEntry {
     /// File name, without folders.
     pub file_name: String,
-    /// BLAKE3 of the file.
+    /// BLAKE3 of the keys and values as written; comments and layout do not change it.
     pub blake3: String,
 }
 
