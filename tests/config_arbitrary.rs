@@ -1,16 +1,11 @@
 //! Whatever the text, the loader answers: it never panics, and it answers soon.
 
-#![allow(clippy::unwrap_used, reason = "helpers of tests may panic")]
-
-use std::{fs, path::Path, time::Instant};
+use std::{path::Path, time::Instant};
 
 use areograph::config;
-use proptest::prelude::*;
+use proptest::{prelude::*, test_runner::FileFailurePersistence};
 
-fn example() -> String {
-    fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("config/sites/example.toml"))
-        .unwrap()
-}
+const EXAMPLE: &str = include_str!("../config/sites/example.toml");
 
 fn answer(text: &str) -> String {
     match config::parse(text, Path::new("nowhere/site.toml")) {
@@ -47,8 +42,20 @@ const PIECES: [&str; 24] = [
     "# ",
 ];
 
+/// 2000 cases unless `PROPTEST_CASES` says otherwise.
+fn seeds_kept() -> ProptestConfig {
+    ProptestConfig {
+        cases: 2_000,
+        failure_persistence: Some(Box::new(FileFailurePersistence::Direct(concat!(
+            env!("CARGO_MANIFEST_DIR"),
+            "/tests/fuzz_seeds/config.txt"
+        )))),
+        ..ProptestConfig::default()
+    }
+}
+
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(2_000))]
+    #![proptest_config(seeds_kept())]
 
     #[test]
     fn any_text_is_answered(text in any::<String>()) {
@@ -56,10 +63,10 @@ proptest! {
     }
 
     #[test]
-    fn a_changed_example_is_answered(
+    fn any_changed_example_is_answered(
         cuts in proptest::collection::vec((any::<prop::sample::Index>(), 0_usize..40, 0..PIECES.len()), 1..6)
     ) {
-        let mut text = example();
+        let mut text = EXAMPLE.to_owned();
         for (at, length, piece) in cuts {
             let start = text.floor_char_boundary(at.index(text.len()));
             let stop = text.ceil_char_boundary((start + length).min(text.len()));

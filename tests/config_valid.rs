@@ -219,6 +219,7 @@ fn the_schema_takes_the_example_and_refuses_what_the_loader_refuses() {
         "window_two_shapes",
         "window_three_numbers",
         "image_incomplete",
+        "image_without_samples",
         "image_numbers",
     ] {
         let text =

@@ -254,6 +254,18 @@ pub struct ImageFields {
     pub first_detector: Option<u32>,
 }
 
+/// Labels print exposures and periods to 0.0001 ms; half of that is their rounding, seconds.
+const EXPOSURE_ROUNDING_S: f64 = 0.5e-7;
+
+/// Whether a line period is exposure × downtrack summing, within the rounding of printed values.
+///
+/// The rounding of the exposure counts once for every summed line, that of the period once.
+#[must_use]
+pub fn line_period_agrees(line_period_s: f64, exposure_s: f64, downtrack_summing: u32) -> bool {
+    let summing = f64::from(downtrack_summing);
+    (line_period_s - exposure_s * summing).abs() <= EXPOSURE_ROUNDING_S * (summing + 1.0)
+}
+
 /// Limits and options of the range check.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct RangeCheckConfig {
@@ -282,4 +294,33 @@ pub struct OrientationConfig {
     pub position_rmse_max_m: f64,
     /// Largest second-order pointing RMSE (each angle) of a valid sensor model, radians.
     pub pointing_rmse_max_rad: f64,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::line_period_agrees;
+
+    #[test]
+    fn periods_agree_within_the_rounding_of_what_labels_print() {
+        // (period, exposure) in milliseconds, summing: the limits are 0.00045, 0.0002 and 0.0001 ms.
+        for (period_ms, exposure_ms, summing, agrees) in [
+            (3.8568, 0.4821, 8, true),
+            (3.8572, 0.4821, 8, true),
+            (3.8573, 0.4821, 8, false),
+            (3.8564, 0.4821, 8, true),
+            (3.8563, 0.4821, 8, false),
+            (1.4463, 0.482_067, 3, true),
+            (1.4465, 0.482_067, 3, false),
+            (0.482_19, 0.4821, 1, true),
+            (0.482_21, 0.4821, 1, false),
+            (0.4821, 0.4821, 8, false),
+            (f64::NAN, 0.4821, 8, false),
+        ] {
+            assert_eq!(
+                line_period_agrees(period_ms * 1e-3, exposure_ms * 1e-3, summing),
+                agrees,
+                "{period_ms} ms of {summing} × {exposure_ms} ms"
+            );
+        }
+    }
 }

@@ -3,18 +3,13 @@
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    config::{ImageConfig, ImageFields},
+    config::{ImageConfig, ImageFields, line_period_agrees},
     error::{Failure, Fault, Kind, Place, Result},
     pds::moc,
     spice::Session,
     time::{Et, Interval},
     units::SECONDS_PER_MS,
 };
-
-/// Line periods that differ by more than this share of themselves contradict each other.
-///
-/// Labels give the exposure with four digits (0.4821 ms), so a stated period may differ by 1e-4.
-const PERIOD_TOLERANCE: f64 = 2e-4;
 
 /// A clock string and a UTC string farther apart than this contradict each other, seconds.
 ///
@@ -107,7 +102,7 @@ enum ImageFault {
     Missing { image: String, key: &'static str },
     #[error(
         "image {image}: line period {stated_ms} ms is stated, but exposure {exposure_ms} ms × summing \
-         {summing} makes {computed_ms} ms; expected them to agree within 0.02 %"
+         {summing} makes {computed_ms} ms; expected them to agree within the rounding of 0.0001 ms"
     )]
     Period {
         image: String,
@@ -296,7 +291,7 @@ fn line_period(
     match (fields.line_period_s, fields.exposure_s) {
         (Some(period_s), Some(exposure_s)) => {
             let computed_s = summed(exposure_s);
-            if (period_s - computed_s).abs() > PERIOD_TOLERANCE * computed_s.abs() {
+            if !line_period_agrees(period_s, exposure_s, summing) {
                 return Err(ImageFault::Period {
                     image: image.id.clone(),
                     stated_ms: period_s / SECONDS_PER_MS,

@@ -10,7 +10,7 @@ use super::{
     super::{
         problems::Review,
         raw::{Entry, RawImage},
-        site::{ImageConfig, ImageFields},
+        site::{ImageConfig, ImageFields, line_period_agrees},
     },
     no_repeats,
     values::{Accept, Target},
@@ -18,8 +18,6 @@ use super::{
 
 /// Longest exposure or line period, milliseconds: a hundred times those of the camera.
 const MILLISECONDS_MAX: f64 = 1_000.0;
-/// Labels print exposures to 0.0001 ms; half of that is their rounding.
-const EXPOSURE_ROUNDING_MS: f64 = 0.000_05;
 /// Largest summing of the wide-angle cameras; the narrow-angle camera sums up to 8.
 const SUMMING_MAX: u32 = 127;
 /// Beyond every image of the mission, so that line counts cannot make a run endless.
@@ -51,7 +49,7 @@ fn image(raw: &Spanned<RawImage>, review: &mut Review<'_>) -> ImageConfig {
     if label.is_none() {
         complete(raw.span(), keys, review);
     }
-    line_period_agrees(keys, review);
+    line_period(keys, &fields, review);
     if let (Some(header), Some(delivered), Some(written)) = (
         fields.lines_header,
         fields.lines_delivered,
@@ -152,19 +150,20 @@ fn checked(
     None
 }
 
-/// Without a label the keys must give start, line period and line count.
+/// Without a label the keys must give what times and sensor model need: start, line period, summing, size.
 fn complete(table: Range<usize>, keys: &RawImage, review: &mut Review<'_>) {
-    let exposure = keys.exposure_ms.is_some() && keys.downtrack_summing.is_some();
     let needs = [
         (
             keys.sclk_start.is_some() || keys.utc_start.is_some(),
             "sclk_start or utc_start",
         ),
         (
-            keys.line_period_ms.is_some() || exposure,
-            "line_period_ms or exposure_ms with downtrack_summing",
+            keys.line_period_ms.is_some() || keys.exposure_ms.is_some(),
+            "exposure_ms or line_period_ms",
         ),
+        (keys.downtrack_summing.is_some(), "downtrack_summing"),
         (keys.lines_header.is_some(), "lines_header"),
+        (keys.samples.is_some(), "samples"),
     ];
     let lacking: Vec<&str> = needs
         .iter()
@@ -180,21 +179,20 @@ fn complete(table: Range<usize>, keys: &RawImage, review: &mut Review<'_>) {
     }
 }
 
-/// Exposure × downtrack summing must be the line period, within the rounding of printed values.
-fn line_period_agrees(keys: &RawImage, review: &mut Review<'_>) {
-    let (Some(exposure), Some(period), Some(summing)) = (
-        &keys.exposure_ms,
+/// A period, an exposure and a summing that are all written must agree.
+fn line_period(keys: &RawImage, fields: &ImageFields, review: &mut Review<'_>) {
+    let (Some(written), Some(period_s), Some(exposure_s), Some(summing)) = (
         &keys.line_period_ms,
-        &keys.downtrack_summing,
+        fields.line_period_s,
+        fields.exposure_s,
+        fields.downtrack_summing,
     ) else {
         return;
     };
-    let summing = *summing.get_ref() as f64;
-    let expected_ms = exposure.get_ref() * summing;
-    let difference_ms = (period.get_ref() - expected_ms).abs();
-    if difference_ms > EXPOSURE_ROUNDING_MS * (summing + 1.0) {
+    if !line_period_agrees(period_s, exposure_s, summing) {
+        let expected_ms = exposure_s * f64::from(summing) / SECONDS_PER_MS;
         review.refuse(
-            period.span(),
+            written.span(),
             "images.line_period_ms",
             format!("exposure_ms × downtrack_summing = {expected_ms:.4}, or only one of them"),
         );

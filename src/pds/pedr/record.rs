@@ -165,7 +165,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn reading_and_writing_any_bytes_gives_the_same_bytes(
+        fn any_bytes_read_and_written_stay_the_same(
             bytes in proptest::collection::vec(any::<u8>(), RECORD_BYTES)
         ) {
             let bytes: [u8; RECORD_BYTES] = bytes.try_into().unwrap();
