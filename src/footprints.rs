@@ -125,6 +125,16 @@ columns! {
 }
 
 impl<D> Footprints<D> {
+    /// Height of every shot above the areoid, after the crossover correction, metres.
+    #[must_use]
+    pub fn topography_m(&self) -> Vec<f64> {
+        self.radius_crossover_m
+            .iter()
+            .zip(&self.areoid_radius_m)
+            .map(|(radius_m, areoid_m)| radius_m - areoid_m)
+            .collect()
+    }
+
     /// Number of shots.
     #[must_use]
     pub const fn len(&self) -> usize {

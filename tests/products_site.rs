@@ -319,6 +319,10 @@ fn the_report_says_the_verdict_and_escapes_what_came_from_files() {
     assert!(page.contains("record 4: &lt;script&gt;alert(1)&lt;/script&gt; &amp; more"));
     assert!(page.contains("class 0 &lt;cloud&gt;"));
     assert!(!page.contains("<script"));
+    // The table of kernels says what is loaded; the notes do not say it again.
+    assert!(page.contains("<td>naif0012.tls</td>"));
+    assert!(page.contains("<li>ap19019l.b: in IAU 2000 already"));
+    assert!(!page.contains("listed by"));
     // Map, residuals, scan, position and pointing of the image.
     assert_eq!(page.matches("<svg").count(), 5);
 }

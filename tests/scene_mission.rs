@@ -341,7 +341,7 @@ fn the_same_seed_gives_the_same_bytes() {
             }
         }
     }
-    assert_eq!(compared, 6 + 3 + 5 + 6 + 6 + 3 + 2);
+    assert_eq!(compared, 6 + 3 + 5 + 6 + 6 + 3 + 3);
     assert_eq!(
         fs::read_dir(folder.path()).unwrap().count(),
         1,

@@ -12,11 +12,11 @@ use crate::{
 
 /// Writes a synthetic mission: kernels, PEDR files, labels, site files, and the truth behind them.
 ///
-/// Example: `areograph scene demo && areograph run demo/sites/*.toml --out demo/out`
+/// Example: `areograph scene demo && areograph run demo/sites/*.toml --out products`
 #[derive(Debug, Args)]
 #[command(verbatim_doc_comment)]
 pub(super) struct Arguments {
-    /// Folder to write; an earlier scene in it is replaced.
+    /// Folder to write; an earlier scene in it is replaced, if nothing was added or changed.
     directory: PathBuf,
     /// Seed of terrain and noise; the same seed gives the same bytes.
     #[arg(long, default_value_t = 1)]

@@ -82,12 +82,6 @@ fn lola_like(site: &SiteProducts) -> Vec<Column> {
 /// Columns and units of the PEDR point files of the Orbital Data Explorer.
 fn ode_points(site: &SiteProducts) -> Vec<Column> {
     let shots = site.footprints;
-    let topography = shots
-        .radius_crossover_m
-        .iter()
-        .zip(&shots.areoid_radius_m)
-        .map(|(radius_m, areoid_m)| radius_m - areoid_m)
-        .collect();
     vec![
         fixed(
             "LONG_EAST",
@@ -99,7 +93,7 @@ fn ode_points(site: &SiteProducts) -> Vec<Column> {
             column_deg(&shots.latitude_rad),
             DEGREE_DECIMALS,
         ),
-        fixed("TOPOGRAPHY", topography, METRE_DECIMALS),
+        fixed("TOPOGRAPHY", shots.topography_m(), METRE_DECIMALS),
         fixed("RANGE", shots.range_m.clone(), METRE_DECIMALS),
         fixed(
             "PLANET_RAD",

@@ -43,22 +43,20 @@ fn points_deg(site: &SiteProducts) -> Vec<[f64; 2]> {
 
 fn columns(site: &SiteProducts) -> Vec<Column> {
     let mut columns = identity(site);
+    columns.extend(quality(site));
+    columns.push(windows(site));
     columns.extend(ground(site));
     columns.extend(spacecraft(site));
     columns
 }
 
+/// When and where in its file a shot was taken.
 fn identity(site: &SiteProducts) -> Vec<Column> {
     let shots = site.footprints;
     let source = shots
         .file
         .iter()
         .map(|file| file_name(site, *file))
-        .collect();
-    let windows = shots
-        .windows
-        .iter()
-        .map(|mask| window_ids(site, *mask))
         .collect();
     vec![
         Column::new(
@@ -85,62 +83,50 @@ fn identity(site: &SiteProducts) -> Vec<Column> {
         Column::new(
             "shot",
             "shot in the frame, 1 to 20",
-            Values::U32(shots.shot.iter().map(|shot| u32::from(*shot)).collect()),
-        ),
-        Column::new(
-            "channel",
-            "trigger channel",
-            Values::U32(
-                shots
-                    .channel
-                    .iter()
-                    .map(|channel| u32::from(*channel))
-                    .collect(),
-            ),
-        ),
-        Column::new(
-            "class",
-            "classification: 1 ground, 0 cloud or noise",
-            Values::I32(shots.class.iter().map(|class| i32::from(*class)).collect()),
-        ),
-        Column::new(
-            "attitude_flag",
-            "0 attitude known, 2 known for part of the frame, 3 unknown",
-            Values::U32(
-                shots
-                    .attitude_flag
-                    .iter()
-                    .map(|flag| u32::from(*flag))
-                    .collect(),
-            ),
-        ),
-        Column::new(
-            "orbit_quality",
-            "0 orbit from JPL, 1 or more: MOLA team's gravity model number",
-            Values::U32(
-                shots
-                    .orbit_quality
-                    .iter()
-                    .map(|code| u32::from(*code))
-                    .collect(),
-            ),
-        ),
-        Column::new(
-            "windows",
-            "identifiers of the windows that hold the shot, separated by semicolons",
-            Values::Text(windows),
+            Values::U32(shots.shot.iter().copied().map(u32::from).collect()),
         ),
     ]
 }
 
+/// What the file says of how good a shot is.
+fn quality(site: &SiteProducts) -> Vec<Column> {
+    let shots = site.footprints;
+    let wide = |codes: &[u16]| Values::U32(codes.iter().copied().map(u32::from).collect());
+    vec![
+        Column::new(
+            "channel",
+            "trigger channel",
+            Values::U32(shots.channel.iter().copied().map(u32::from).collect()),
+        ),
+        Column::new(
+            "class",
+            "classification: 1 ground, 0 cloud or noise",
+            Values::I32(shots.class.iter().copied().map(i32::from).collect()),
+        ),
+        Column::new(
+            "attitude_flag",
+            "0 attitude known, 2 known for part of the frame, 3 unknown",
+            wide(&shots.attitude_flag),
+        ),
+        Column::new(
+            "orbit_quality",
+            "0 orbit from JPL, 1 or more: MOLA team's gravity model number",
+            wide(&shots.orbit_quality),
+        ),
+    ]
+}
+
+fn windows(site: &SiteProducts) -> Column {
+    let masks = site.footprints.windows.iter();
+    Column::new(
+        "windows",
+        "identifiers of the windows that hold the shot, separated by semicolons",
+        Values::Text(masks.map(|mask| window_ids(site, *mask)).collect()),
+    )
+}
+
 fn ground(site: &SiteProducts) -> Vec<Column> {
     let shots = site.footprints;
-    let topography = shots
-        .radius_crossover_m
-        .iter()
-        .zip(&shots.areoid_radius_m)
-        .map(|(radius_m, areoid_m)| radius_m - areoid_m)
-        .collect();
     let xyz: Vec<[f64; 3]> = (0..shots.len())
         .map(|row| {
             let shot = shots.row(row);
@@ -177,7 +163,7 @@ fn ground(site: &SiteProducts) -> Vec<Column> {
         Column::new(
             "topography_m",
             "radius after the crossover correction minus areoid radius, metres",
-            Values::F64(topography),
+            Values::F64(shots.topography_m()),
         ),
         Column::new(
             "x_m",

@@ -174,10 +174,23 @@ pub(super) fn corrections(site: &SiteProducts) -> String {
     )
 }
 
+/// Whether `note` says no more than that a kernel was asked for by name, which the table of kernels shows.
+fn repeats_kernel_table(site: &SiteProducts, note: &str) -> bool {
+    site.kernels.iter().any(|kernel| {
+        note.strip_prefix(&kernel.name)
+            .is_some_and(|rest| rest == ": listed" || rest.starts_with(": listed by "))
+    })
+}
+
 /// Notes, rejected shots and complaints.
 pub(super) fn remarks(site: &SiteProducts) -> String {
     let mut sections = String::new();
-    let mut notes: Vec<String> = site.notes.to_vec();
+    let mut notes: Vec<String> = site
+        .notes
+        .iter()
+        .filter(|note| !repeats_kernel_table(site, note))
+        .cloned()
+        .collect();
     for image in site.images {
         notes.extend(
             image

@@ -46,7 +46,8 @@ const PEDR_NAME: &str = "ap10001l.b";
 /// [`super::write_scene`]. No session may be open on this thread.
 ///
 /// # Errors
-/// [`SceneError::NothingToFly`], [`SceneError::BeamMisses`], [`SceneError::NotAScene`]; what the kernels
+/// [`SceneError::NothingToFly`], [`SceneError::BeamMisses`]; [`SceneError::NotAScene`],
+/// [`SceneError::Foreign`] and [`SceneError::Changed`] when the folder holds something else; what the kernels
 /// and labels are refused for.
 pub fn write_scene_along(
     directory: &Path,

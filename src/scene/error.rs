@@ -6,10 +6,24 @@ use crate::error::{Fault, Kind};
 #[derive(Debug, thiserror::Error)]
 pub enum SceneError {
     /// The folder holds something that is not an older scene.
-    #[error("the folder is not empty and holds no scene of areograph (no {marker} that says so)")]
+    #[error(
+        "the folder is not empty and holds no scene of areograph (no list {list} of its files)"
+    )]
     NotAScene {
         /// File by which a scene is recognised.
-        marker: &'static str,
+        list: &'static str,
+    },
+    /// The folder holds more than an older scene.
+    #[error("the folder holds {entry}, which `areograph scene` did not write")]
+    Foreign {
+        /// Path below the folder.
+        entry: String,
+    },
+    /// A file of the older scene is not what was written.
+    #[error("{file} was changed since `areograph scene` wrote it")]
+    Changed {
+        /// Path below the folder.
+        file: String,
     },
     /// No orbit shows the site as asked.
     #[error(
@@ -58,7 +72,10 @@ pub enum SceneError {
 impl Fault for SceneError {
     fn kind(&self) -> Kind {
         match self {
-            Self::NotAScene { .. } | Self::Day { .. } => Kind::Configuration,
+            Self::NotAScene { .. }
+            | Self::Foreign { .. }
+            | Self::Changed { .. }
+            | Self::Day { .. } => Kind::Configuration,
             Self::NoOrbit { .. } | Self::NotTabulated { .. } => Kind::Bug,
             Self::BeamMisses { .. } => Kind::Input,
             Self::NothingToFly { .. } => Kind::Coverage,
@@ -68,6 +85,9 @@ impl Fault for SceneError {
     fn advice(&self) -> String {
         match self {
             Self::NotAScene { .. } => "choose an empty or new folder",
+            Self::Foreign { .. } | Self::Changed { .. } => {
+                "a new scene would remove it: move it elsewhere, or choose another folder"
+            }
             Self::NoOrbit { .. } | Self::NotTabulated { .. } => {
                 "report this with the seed and the kernels that were used"
             }

@@ -25,14 +25,14 @@ use crate::{
 /// Fewest and most seconds of frames in a day's file.
 const DAY_S: [f64; 2] = [600.0, 90_000.0];
 
-/// Writes the synthetic mission into `directory`, replacing an older one.
+/// Writes the synthetic mission into `directory`, replacing an older one that nobody added to or changed.
 ///
 /// The same seed gives the same bytes. Everything is written beside `directory` and renamed at the end.
 /// No session may be open on this thread.
 ///
 /// # Errors
-/// [`SceneError::NotAScene`] when the folder holds something else, [`SceneError::Day`], the system's
-/// refusal to write.
+/// [`SceneError::NotAScene`], [`SceneError::Foreign`] and [`SceneError::Changed`] when the folder holds
+/// something else, [`SceneError::Day`], the system's refusal to write.
 pub fn write_scene(directory: &Path, options: &SceneOptions) -> Result<SceneSummary> {
     let [least, most] = DAY_S;
     if !(least..=most).contains(&options.day_s) {
