@@ -153,6 +153,12 @@ fn footprints_are_geoparquet_across_the_antimeridian() {
         3_394_001.37 - 3_395_500.0,
         1e-9,
     ); // rounding at 3e6 m
+    let tangent = |column: &str| number(&batch, column, 3).to_radians().tan();
+    close(
+        tangent("latitude_areographic_deg") / tangent("latitude_deg"),
+        1.011_876_8,
+        5e-8,
+    ); // (a/c)^2 of IAU 2000, seven printed decimals
     let xyz = ["x_m", "y_m", "z_m"].map(|axis| number(&batch, axis, 7));
     close(
         xyz.iter().map(|c| c * c).sum::<f64>().sqrt(),

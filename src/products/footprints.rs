@@ -10,7 +10,11 @@ use super::{
     table::{Column, Table, Values},
     text_table,
 };
-use crate::{error::Result, geom::ellipsoid::spherical_to_xyz_m};
+use crate::{
+    constants::MARS_IAU2000,
+    error::Result,
+    geom::ellipsoid::{AreocentricLatitude, spherical_to_xyz_m},
+};
 
 pub(super) fn write(written: &mut Writer, site: &SiteProducts) -> Result<()> {
     let points = points_deg(site);
@@ -39,6 +43,17 @@ fn points_deg(site: &SiteProducts) -> Vec<[f64; 2]> {
         .zip(column_deg(&shots.latitude_rad))
         .map(|(longitude_rad, latitude_deg)| [signed_longitude_deg(*longitude_rad), latitude_deg])
         .collect()
+}
+
+/// Areographic latitudes, degrees, of areocentric ones in radians.
+fn areographic_deg(latitude_rad: &[f64]) -> Vec<f64> {
+    let areographic = |latitude: &f64| {
+        AreocentricLatitude(*latitude)
+            .to_areographic(&MARS_IAU2000)
+            .0
+    };
+    let latitudes: Vec<f64> = latitude_rad.iter().map(areographic).collect();
+    column_deg(&latitudes)
 }
 
 fn columns(site: &SiteProducts) -> Vec<Column> {
@@ -144,6 +159,11 @@ fn ground(site: &SiteProducts) -> Vec<Column> {
             "latitude_deg",
             "areocentric latitude, degrees, IAU 2000",
             Values::F64(column_deg(&shots.latitude_rad)),
+        ),
+        Column::new(
+            "latitude_areographic_deg",
+            "areographic latitude, degrees, IAU 2000 radii; as older maps count",
+            Values::F64(areographic_deg(&shots.latitude_rad)),
         ),
         Column::new(
             "radius_m",
