@@ -219,6 +219,31 @@ fn what_is_no_kernel_is_refused_with_its_name() {
 }
 
 #[test]
+fn a_chain_of_segments_ends_with_zero_only() {
+    let Some((folder, temporary)) = folders("a broken chain of segments") else {
+        return;
+    };
+    let spk = fs::read(folder.join("m0402852.ale_1.bsp")).unwrap();
+    let summary = usize::try_from(i32::from_le_bytes(spk[76..80].try_into().unwrap())).unwrap();
+    let offset = (summary - 1) * 1_024;
+    for next in [f64::NAN, f64::INFINITY, -1.0, 0.5, 2.5, 1e-300] {
+        let mut bytes = spk.clone();
+        bytes[offset..offset + 8].copy_from_slice(&next.to_le_bytes());
+        let failure = one(&write(temporary.path(), "chain.bsp", &bytes));
+        let text = failure.to_string();
+        assert!(
+            text.contains(&format!("its summary records go on at record {next}")),
+            "{text}"
+        );
+        assert_eq!(failure.kind(), Kind::Input);
+    }
+    let mut bytes = spk;
+    bytes[76..80].copy_from_slice(&(-3_i32).to_le_bytes());
+    let text = one(&write(temporary.path(), "first.bsp", &bytes)).to_string();
+    assert!(text.contains("go on at record -3"), "{text}");
+}
+
+#[test]
 fn damaged_bytes_end_in_a_result() {
     let Some((folder, temporary)) = folders("damaged kernels") else {
         return;
