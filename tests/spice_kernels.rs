@@ -155,7 +155,12 @@ fn what_is_no_kernel_is_refused_with_its_name() {
     let summary = usize::try_from(i32::from_le_bytes(spk[76..80].try_into().unwrap())).unwrap();
     let offset = (summary - 1) * 1_024;
     circle[offset..offset + 8].copy_from_slice(&(summary as f64).to_le_bytes());
-    let cases: [(&str, &[u8], &str); 9] = [
+    let cases: [(&str, &[u8], &str); 10] = [
+        (
+            "frames.tf",
+            b"KPL/FK\n\\begindata\nFRAME_X = 1\nKERNELS_TO_LOAD += 'hidden.tls'\n",
+            "is a metakernel; expected a kernel",
+        ),
         ("empty.bsp", b"", "is an empty file; expected"),
         (
             "page.bsp",

@@ -241,6 +241,12 @@ pub(super) fn read_text(path: &Path) -> Result<String> {
 
 fn text_role(path: &Path) -> Result<KernelRole> {
     let text = read_text(path)?;
+    let assignments = text_kernel::assignments(&text).in_file(path)?;
+    let defines = |part: &str| assignments.iter().any(|found| found.name.starts_with(part));
+    // Whatever the header says: CSPICE loads what such a variable lists, unseen and unhashed.
+    if defines("KERNELS_TO_LOAD") {
+        return Ok(KernelRole::Meta);
+    }
     let header = text.lines().next().unwrap_or_default().trim();
     let by_header = match header {
         "KPL/LSK" => Some(KernelRole::Lsk),
@@ -254,10 +260,7 @@ fn text_role(path: &Path) -> Result<KernelRole> {
     if let Some(role) = by_header {
         return Ok(role);
     }
-    let assignments = text_kernel::assignments(&text).in_file(path)?;
-    let defines = |part: &str| assignments.iter().any(|found| found.name.starts_with(part));
     let by_variable = [
-        ("KERNELS_TO_LOAD", KernelRole::Meta),
         ("DELTET/", KernelRole::Lsk),
         ("SCLK", KernelRole::Sclk),
         ("INS-", KernelRole::Ik),

@@ -91,7 +91,10 @@ impl Found {
                     found.ephemerides.push((path, segments));
                 }
                 KernelRole::Ck => found.attitudes.push(path),
-                KernelRole::Meta => {}
+                KernelRole::Meta => {
+                    let note = format!("{}: left out, a metakernel", file_name(&path));
+                    found.notes.push(note);
+                }
                 _ => match read_text(&path).and_then(|text| Ok(text_kernel::assignments(&text)?)) {
                     Ok(assignments) => found.texts.push((path, assignments)),
                     Err(failure) => found.leave_out(&path, &failure),
