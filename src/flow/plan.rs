@@ -9,6 +9,7 @@ use super::{
 use crate::{
     config::SiteConfig,
     error::{Place, Result},
+    spice::Wanted,
     stages::{
         check_ranges::RangeCheck, convert_datum::Converted, fit_sensor_model::SensorModel,
         group_profiles::Profile, sample_orientation::Orientation, search_footprints::SearchResult,
@@ -46,7 +47,7 @@ fn plan_stages(config: &SiteConfig, out: &Path, force: bool) -> Result<Vec<Plann
         cache: StageCache::new(&folder.join(".cache"), force),
         planned: Vec::new(),
     };
-    let clocks = load_kernels(config, &[]).in_stage(Stage::LoadKernels.name())?;
+    let clocks = load_kernels(config, &Wanted::default()).in_stage(Stage::LoadKernels.name())?;
     let parts = parts::tag_times(config, &clocks).in_stage(Stage::TagTimes.name())?;
     let images: Option<Output<Vec<ImageTimes>>> = planner.look(Stage::TagTimes.name(), &parts);
     let parts = parts::search_footprints(config).in_stage(Stage::SearchFootprints.name())?;
@@ -61,6 +62,7 @@ fn plan_stages(config: &SiteConfig, out: &Path, force: bool) -> Result<Vec<Plann
     let profiles: Option<Output<Vec<Profile>>> = planner.look(Stage::GroupProfiles.name(), &parts);
 
     let wanted = wanted(
+        config,
         images.as_ref().map_or(&[], |output| &output.value),
         profiles.as_ref().map_or(&[], |output| &output.value),
     );
