@@ -155,7 +155,12 @@ fn what_is_no_kernel_is_refused_with_its_name() {
     let summary = usize::try_from(i32::from_le_bytes(spk[76..80].try_into().unwrap())).unwrap();
     let offset = (summary - 1) * 1_024;
     circle[offset..offset + 8].copy_from_slice(&(summary as f64).to_le_bytes());
-    let cases: [(&str, &[u8], &str); 9] = [
+    let cases: [(&str, &[u8], &str); 10] = [
+        (
+            "frames.tf",
+            b"KPL/FK\n\\begindata\nFRAME_X = 1\nKERNELS_TO_LOAD += 'hidden.tls'\n",
+            "is a metakernel; expected a kernel",
+        ),
         ("empty.bsp", b"", "is an empty file; expected"),
         (
             "page.bsp",
@@ -219,6 +224,31 @@ fn what_is_no_kernel_is_refused_with_its_name() {
 }
 
 #[test]
+fn a_chain_of_segments_ends_with_zero_only() {
+    let Some((folder, temporary)) = folders("a broken chain of segments") else {
+        return;
+    };
+    let spk = fs::read(folder.join("m0402852.ale_1.bsp")).unwrap();
+    let summary = usize::try_from(i32::from_le_bytes(spk[76..80].try_into().unwrap())).unwrap();
+    let offset = (summary - 1) * 1_024;
+    for next in [f64::NAN, f64::INFINITY, -1.0, 0.5, 2.5, 1e-300] {
+        let mut bytes = spk.clone();
+        bytes[offset..offset + 8].copy_from_slice(&next.to_le_bytes());
+        let failure = one(&write(temporary.path(), "chain.bsp", &bytes));
+        let text = failure.to_string();
+        assert!(
+            text.contains(&format!("its summary records go on at record {next}")),
+            "{text}"
+        );
+        assert_eq!(failure.kind(), Kind::Input);
+    }
+    let mut bytes = spk;
+    bytes[76..80].copy_from_slice(&(-3_i32).to_le_bytes());
+    let text = one(&write(temporary.path(), "first.bsp", &bytes)).to_string();
+    assert!(text.contains("go on at record -3"), "{text}");
+}
+
+#[test]
 fn damaged_bytes_end_in_a_result() {
     let Some((folder, temporary)) = folders("damaged kernels") else {
         return;
@@ -265,29 +295,33 @@ fn roles_follow_content_and_nothing_is_loaded_twice() {
     assert_eq!(
         roles,
         [
-            KernelRole::Lsk,
             KernelRole::Sclk,
             KernelRole::Pck,
             KernelRole::Ik,
             KernelRole::Spk,
-            KernelRole::Ck
+            KernelRole::Ck,
+            KernelRole::Lsk
         ]
     );
     assert_eq!(
         set.explanation().last().unwrap(),
-        "seven.tls: left out, same content as one.bsp"
+        "one.bsp: left out at its earlier place, same content as seven.tls"
     );
-    assert_eq!(set.kernels()[0].bytes, 5_257);
+    let last = set.kernels().last().unwrap();
+    assert_eq!(
+        (last.file_name().as_str(), last.bytes),
+        ("seven.tls", 5_257)
+    );
     set.verify_unchanged().unwrap();
     let session = Session::open(&set).unwrap();
     assert!(session.utc_to_et("1999-08-24").is_ok());
-    write(at, "one.bsp", "KPL/LSK\n\\begindata\nDELTET/K = 1\n");
+    write(at, "seven.tls", "KPL/LSK\n\\begindata\nDELTET/K = 1\n");
     drop(session);
     let failure = set.verify_unchanged().unwrap_err();
     assert!(
         failure
             .to_string()
-            .contains("one.bsp: kernel changed while it was in use")
+            .contains("seven.tls: kernel changed while it was in use")
     );
 }
 

@@ -12,8 +12,10 @@ use std::{fs, path::Path};
 use areograph::{
     config::{CkQuality, KernelSelection},
     frames::Position,
-    spice::{CkSegment, Kernel, KernelSet, Session, SpkSegment, State, write_ck, write_spk},
-    time::{Interval, PointingBias},
+    spice::{
+        CkSegment, Kernel, KernelSet, Session, SpkSegment, State, Wanted, write_ck, write_spk,
+    },
+    time::{Interval, Intervals, PointingBias},
 };
 use common::real_data;
 use nalgebra::Vector3;
@@ -39,6 +41,8 @@ const FILES: [(&str, &str); 11] = [
         "ck/mgs_sc_map2.bc",
     ),
 ];
+
+const BIAS: PointingBias = PointingBias::from_seconds(-1.15);
 
 /// A folder of kernels, a rival orbit and commanded attitudes among them, and the time that is wanted.
 fn archive(test: &str) -> Option<(TempDir, Interval)> {
@@ -95,6 +99,15 @@ fn selection(root: &Path) -> KernelSelection {
     }
 }
 
+/// Positions at the exposures, attitudes where the pointing bias of MGS moves them, a second more each.
+fn around(exposures: Interval) -> Wanted {
+    let attitudes = exposures.shifted(BIAS.seconds()).padded(1.0);
+    Wanted {
+        positions: Intervals::union_of([exposures.padded(1.0)]),
+        attitudes: Intervals::union_of([attitudes]),
+    }
+}
+
 fn names(set: &KernelSet) -> Vec<String> {
     set.kernels().iter().map(Kernel::file_name).collect()
 }
@@ -105,7 +118,7 @@ fn the_latest_texts_and_the_files_of_the_wanted_time_are_chosen() {
         return;
     };
     let selection = selection(temporary.path());
-    let set = KernelSet::select(&selection, &[wanted]).unwrap();
+    let set = KernelSet::select(&selection, &around(wanted)).unwrap();
     let texts = [
         "naif0012.tls",
         "MGS_SCLKSCET.00061.tsc",
@@ -127,10 +140,12 @@ fn the_latest_texts_and_the_files_of_the_wanted_time_are_chosen() {
         assert!(explanation.contains(line), "{line} in {explanation}");
     }
     let session = Session::open(&set).unwrap();
-    let bias = PointingBias::from_seconds(-1.15);
-    session.require_attitude(wanted, bias, 1.0).unwrap();
+    session.require_attitude(wanted, BIAS, 1.0).unwrap();
     drop(session);
-    assert_eq!(names(&KernelSet::select(&selection, &[]).unwrap()), texts);
+    assert_eq!(
+        names(&KernelSet::select(&selection, &Wanted::default()).unwrap()),
+        texts
+    );
 }
 
 #[test]
@@ -142,7 +157,7 @@ fn pins_families_and_qualities_are_obeyed() {
     selection.pinned = vec!["naif0009.tls".to_owned(), "pck00011.tpc".to_owned()];
     selection.spk_family = "gsfc".to_owned();
     selection.ck_quality = vec![CkQuality::Reconstructed];
-    let set = names(&KernelSet::select(&selection, &[wanted]).unwrap());
+    let set = names(&KernelSet::select(&selection, &around(wanted)).unwrap());
     assert_eq!(
         set,
         [
@@ -163,7 +178,7 @@ fn what_is_missing_in_a_folder_is_named() {
     };
     let mut selection = selection(temporary.path());
     let text = |selection: &KernelSelection| {
-        KernelSet::select(selection, &[wanted])
+        KernelSet::select(selection, &around(wanted))
             .unwrap_err()
             .to_string()
     };

@@ -10,7 +10,7 @@ use crate::{
     config::{DatumChoice, SiteConfig},
     error::{Failure, Place, Result},
     pds::pedr,
-    spice::Session,
+    spice::{Session, Wanted},
     stages::{sample_orientation::sample_orientation, tag_times::tag_times},
 };
 
@@ -63,7 +63,7 @@ fn check_pedr(path: &Path, choice: DatumChoice) -> Result<String> {
 }
 
 fn check_kernels(config: &SiteConfig, checked: &mut Checked) -> Result<()> {
-    let clocks = load_kernels(config, &[])?;
+    let clocks = load_kernels(config, &Wanted::default())?;
     let session = Session::open(&clocks)?;
     let mut images = Vec::new();
     for image in &config.images {
@@ -73,7 +73,7 @@ fn check_kernels(config: &SiteConfig, checked: &mut Checked) -> Result<()> {
         }
     }
     drop(session);
-    let kernels = load_kernels(config, &wanted(&images, &[]))?;
+    let kernels = load_kernels(config, &wanted(config, &images, &[]))?;
     checked
         .findings
         .extend(kernels.explanation().iter().cloned());

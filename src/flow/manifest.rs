@@ -9,12 +9,12 @@ use crate::{
     files::file_name,
     frames::MarsIau2000,
     geom::{attitude::rotation_vector, mars_rotation::mars_rotation},
-    spice::Session,
+    spice::{KernelRole, Session},
     store::manifest::{
         BiasEntry, Complaints, ConfigurationEntry, KernelEntry, Manifest, ProductEntry, StageEntry,
         Verdict,
     },
-    time::{Et, Interval, Intervals},
+    time::{Et, Intervals},
     units::RADIANS_PER_DEGREE,
 };
 
@@ -155,18 +155,22 @@ fn biases(config: &SiteConfig) -> Vec<BiasEntry> {
 /// Kernels with the coverage that the run needed of each.
 pub(super) fn kernel_entries(session: &Session, results: &Results<'_>) -> Result<Vec<KernelEntry>> {
     let coverage = session.coverage()?;
-    let wanted = Intervals::union_of(results.wanted.iter().copied());
+    let wanted = results.wanted;
     let entries = results.kernels.kernels().iter().enumerate();
     Ok(entries
         .map(|(index, kernel)| {
             let own = coverage.per_kernel.iter().find(|(of, _)| *of == index);
+            let used = match kernel.role {
+                KernelRole::Ck => &wanted.attitudes,
+                _ => &wanted.positions,
+            };
             KernelEntry {
                 name: kernel.file_name(),
                 role: kernel.role.to_string(),
                 bytes: kernel.bytes,
                 blake3: kernel.blake3.clone(),
                 coverage_used: own.map_or_else(Vec::new, |(_, held)| {
-                    held.intersection(&wanted).as_slice().to_vec()
+                    held.intersection(used).as_slice().to_vec()
                 }),
             }
         })
@@ -174,8 +178,9 @@ pub(super) fn kernel_entries(session: &Session, results: &Results<'_>) -> Result
 }
 
 /// Products use the IAU 2000 formula whatever the PCK says; whoever loads `kernels.tm` should know.
-pub(super) fn pck_note(session: &Session, wanted: &[Interval]) -> Option<String> {
+pub(super) fn pck_note(session: &Session, wanted: &Intervals) -> Option<String> {
     let at = wanted
+        .as_slice()
         .first()
         .map_or(Et::from_seconds(0.0), |interval| interval.start);
     let ours = *mars_rotation::<MarsIau2000>(at).matrix();

@@ -12,6 +12,7 @@ use std::{fmt, path::PathBuf, sync::atomic::AtomicBool};
 use crate::{
     config::SiteConfig,
     error::{Place, Result},
+    spice::Wanted,
     store::{cache::StageCache, lock::SiteLock, manifest::Manifest},
 };
 
@@ -142,13 +143,13 @@ pub fn run_site(config: &SiteConfig, options: &RunOptions<'_>) -> Result<SiteOut
 
 /// The way of the data; every step keeps its stored output when nothing that it depends on moved.
 fn run_steps(steps: &Steps<'_>) -> std::result::Result<Ending, Leave> {
-    let clocks = steps.load_kernels(&[])?;
+    let clocks = steps.load_kernels(&Wanted::default())?;
     let images = steps.tag_times(&clocks)?;
     let found = steps.search_footprints()?;
     let converted = steps.convert_datum(&found)?;
     let profiles = steps.group_profiles(&converted, &images)?;
 
-    let wanted = wanted(&images.value, &profiles.value);
+    let wanted = wanted(steps.config, &images.value, &profiles.value);
     let kernels = steps.load_kernels(&wanted)?;
     let ranges = steps.check_ranges(&kernels, &converted, &profiles)?;
     let orientations = steps.sample_orientation(&kernels, &images)?;

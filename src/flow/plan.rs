@@ -11,6 +11,7 @@ use super::{
 use crate::{
     config::{KernelSource, SiteConfig},
     error::{Place, Result},
+    spice::Wanted,
     stages::{
         check_ranges::RangeCheck, convert_datum::Converted, fit_sensor_model::SensorModel,
         group_profiles::Profile, sample_orientation::Orientation, search_footprints::SearchResult,
@@ -58,7 +59,7 @@ fn plan_stages(config: &SiteConfig, out: &Path, force: bool) -> Result<Vec<Plann
         planned: Vec::new(),
         outputs: Vec::new(),
     };
-    let clocks = load_kernels(config, &[]).in_stage(Stage::LoadKernels.name())?;
+    let clocks = load_kernels(config, &Wanted::default()).in_stage(Stage::LoadKernels.name())?;
     let parts = parts::tag_times(config, &clocks).in_stage(Stage::TagTimes.name())?;
     let images = plan.look::<Vec<ImageTimes>>(Stage::TagTimes, &parts);
     let hashes = parts::hash_files(&config.pedr.files).in_stage(Stage::SearchFootprints.name())?;
@@ -84,7 +85,7 @@ fn plan_stages(config: &SiteConfig, out: &Path, force: bool) -> Result<Vec<Plann
     let flights = profiles
         .as_ref()
         .map_or(&[][..], |profiles| &profiles.value);
-    let wanted = wanted(times, flights);
+    let wanted = wanted(config, times, flights);
     let kernels = load_kernels(config, &wanted).in_stage(Stage::LoadKernels.name())?;
     let parts = parts::check_ranges(
         config,

@@ -11,7 +11,7 @@ use crate::{
     config::SiteConfig,
     error::Result,
     products::{ImageProducts, KernelLine, SiteProducts, write_products},
-    spice::{KernelSet, Session},
+    spice::{KernelSet, Session, Wanted},
     stages::{
         check_ranges::RangeCheck, convert_datum::Converted, fit_sensor_model::SensorModel,
         group_profiles::Profile, sample_orientation::Orientation, search_footprints::SearchResult,
@@ -26,7 +26,7 @@ use crate::{
             MANIFEST, damaged_product, entries, publish as publish_files, read_manifest, staging,
         },
     },
-    time::{Et, Interval},
+    time::Et,
 };
 
 /// Metakernel that reproduces the run.
@@ -36,7 +36,7 @@ const METAKERNEL: &str = "kernels.tm";
 pub(super) struct Results<'a> {
     pub(super) config: &'a SiteConfig,
     pub(super) kernels: &'a KernelSet,
-    pub(super) wanted: &'a [Interval],
+    pub(super) wanted: &'a Wanted,
     pub(super) images: &'a Output<Vec<ImageTimes>>,
     pub(super) found: &'a Output<SearchResult>,
     pub(super) converted: &'a Output<Converted>,
@@ -95,7 +95,7 @@ fn make_products(folder: &Path, results: &Results<'_>, fingerprint: String) -> R
         .map(|et_s| session.et_to_utc(Et::from_seconds(*et_s)))
         .collect::<Result<Vec<String>>>()?;
     let mut notes = results.notes();
-    notes.extend(pck_note(&session, results.wanted));
+    notes.extend(pck_note(&session, &results.wanted.positions));
     let kernels = kernel_entries(&session, results)?;
     drop(session);
 

@@ -9,7 +9,7 @@ use super::{
 use crate::{
     config::{KernelSource, SiteConfig},
     error::{Failure, Fault, Kind, Place, Result},
-    spice::{KernelSet, Session, Trajectory},
+    spice::{KernelSet, Session, Trajectory, Wanted},
     stages::{
         check_ranges::{RangeCheck, check_ranges},
         convert_datum::{Converted, convert_datum},
@@ -20,7 +20,7 @@ use crate::{
         tag_times::{ImageTimes, tag_times},
     },
     store::cache::{Output, StageCache},
-    time::{Interval, Intervals},
+    time::Intervals,
 };
 
 /// The tabulated trajectory stays this close to the kernels, metres: a tenth of a PEDR centimetre.
@@ -122,7 +122,7 @@ impl Steps<'_> {
         unchanged
     }
 
-    pub(super) fn load_kernels(&self, wanted: &[Interval]) -> Step<KernelSet> {
+    pub(super) fn load_kernels(&self, wanted: &Wanted) -> Step<KernelSet> {
         self.enter(Stage::LoadKernels)?;
         Ok(load_kernels(self.config, wanted).in_stage(Stage::LoadKernels.name())?)
     }
@@ -219,9 +219,7 @@ impl Steps<'_> {
         for profile in profiles {
             session.require_position(profile.interval)?;
         }
-        let config = self.config;
-        let reach_s =
-            config.range_check.scan_half_width_s + config.mola_clock.bias_s + TRAJECTORY_MARGIN_S;
+        let reach_s = trajectory_reach_s(self.config);
         let reach = profiles
             .iter()
             .map(|profile| profile.interval.padded(reach_s));
@@ -279,7 +277,7 @@ impl Steps<'_> {
 }
 
 /// The kernels of the configuration; from a folder, those that cover `wanted` (text kernels always).
-pub(super) fn load_kernels(config: &SiteConfig, wanted: &[Interval]) -> Result<KernelSet> {
+pub(super) fn load_kernels(config: &SiteConfig, wanted: &Wanted) -> Result<KernelSet> {
     match &config.kernels.source {
         KernelSource::Metakernel(path) => KernelSet::from_metakernel(path),
         KernelSource::Files(paths) => KernelSet::from_files(paths),
@@ -287,10 +285,30 @@ pub(super) fn load_kernels(config: &SiteConfig, wanted: &[Interval]) -> Result<K
     }
 }
 
-/// Intervals for which the site needs kernels: exposures and flights over the windows.
-pub(super) fn wanted(images: &[ImageTimes], profiles: &[Profile]) -> Vec<Interval> {
+/// Seconds beyond a profile for which the spacecraft's path is tabulated.
+fn trajectory_reach_s(config: &SiteConfig) -> f64 {
+    config.range_check.scan_half_width_s + config.mola_clock.bias_s + TRAJECTORY_MARGIN_S
+}
+
+/// Times at which the site reads kernels: exposures with their padding, flights over the windows as
+/// far as the scan reaches, and attitudes at the exposures shifted by the pointing bias.
+pub(super) fn wanted(config: &SiteConfig, images: &[ImageTimes], profiles: &[Profile]) -> Wanted {
+    let (kernels, reach_s) = (&config.kernels, trajectory_reach_s(config));
     let exposures = images.iter().map(ImageTimes::exposures);
-    exposures
-        .chain(profiles.iter().map(|profile| profile.interval))
-        .collect()
+    let flights = profiles
+        .iter()
+        .map(|profile| profile.interval.padded(reach_s));
+    let positions = exposures
+        .clone()
+        .map(|exposures| exposures.padded(kernels.padding_s));
+    // Within the tolerance a look-up reaches kernels that end before it or begin after it.
+    let (bias_s, padding_s) = (
+        config.pointing.ck_bias.seconds(),
+        kernels.padding_s + kernels.ck_tolerance_s,
+    );
+    let attitudes = exposures.map(|exposures| exposures.shifted(bias_s).padded(padding_s));
+    Wanted {
+        positions: Intervals::union_of(positions.chain(flights)),
+        attitudes: Intervals::union_of(attitudes),
+    }
 }

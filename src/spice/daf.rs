@@ -139,7 +139,13 @@ impl Reader {
         let mut found = Vec::new();
         let mut next = f64::from(first);
         let mut records_left = self.size / RECORD_SIZE as u64;
-        while next >= 1.0 {
+        // Zero ends the chain; every other number has to be a record's.
+        while next.abs() > 0.0 || next.is_nan() {
+            if !(next >= 1.0 && next.fract().abs() < f64::EPSILON) {
+                return Err(damaged(format!(
+                    "its summary records go on at record {next}; expected a whole number"
+                )));
+            }
             if records_left == 0 {
                 return Err(damaged("its summary records form a circle".to_owned()));
             }
@@ -147,7 +153,7 @@ impl Reader {
             #[allow(
                 clippy::cast_possible_truncation,
                 clippy::cast_sign_loss,
-                reason = "at least 1; too large a number saturates and lies beyond the end of the file"
+                reason = "a whole number from 1; too large a number saturates and lies beyond the end of the file"
             )]
             let record = self.record(next as u64)?;
             let count = self.double(&record, 2);

@@ -103,7 +103,8 @@ pub struct KernelSet {
 }
 
 impl KernelSet {
-    /// These files in this order; one with the same content as an earlier one is not loaded again.
+    /// These files in this order; of files with the same content the last one is loaded, as SPICE lets
+    /// the last one win.
     ///
     /// # Errors
     /// [`IoFault`] for a file that cannot be read, [`SpiceFault::NotAKernel`] for a file that is none
@@ -116,7 +117,7 @@ impl KernelSet {
         Ok(set)
     }
 
-    /// Appends a file unless its content is there already.
+    /// Appends a file; an earlier one of the same content gives up its place, since later files win.
     pub(super) fn add(&mut self, path: &Path, reason: &str) -> Result<()> {
         let kernel = Kernel::inspect(path)?;
         if kernel.role == KernelRole::Meta {
@@ -127,19 +128,15 @@ impl KernelSet {
             return Err(fault).in_file(path);
         }
         let name = kernel.file_name();
-        if let Some(same) = self
-            .kernels
-            .iter()
-            .find(|held| held.blake3 == kernel.blake3)
-        {
+        self.explanation.push(format!("{name}: {reason}"));
+        let same = |held: &Kernel| held.blake3 == kernel.blake3;
+        if let Some(index) = self.kernels.iter().position(same) {
+            let earlier = self.kernels.remove(index).file_name();
             self.explanation.push(format!(
-                "{name}: left out, same content as {}",
-                same.file_name()
+                "{earlier}: left out at its earlier place, same content as {name}"
             ));
-        } else {
-            self.explanation.push(format!("{name}: {reason}"));
-            self.kernels.push(kernel);
         }
+        self.kernels.push(kernel);
         Ok(())
     }
 
@@ -244,6 +241,12 @@ pub(super) fn read_text(path: &Path) -> Result<String> {
 
 fn text_role(path: &Path) -> Result<KernelRole> {
     let text = read_text(path)?;
+    let assignments = text_kernel::assignments(&text).in_file(path)?;
+    let defines = |part: &str| assignments.iter().any(|found| found.name.starts_with(part));
+    // Whatever the header says: CSPICE loads what such a variable lists, unseen and unhashed.
+    if defines("KERNELS_TO_LOAD") {
+        return Ok(KernelRole::Meta);
+    }
     let header = text.lines().next().unwrap_or_default().trim();
     let by_header = match header {
         "KPL/LSK" => Some(KernelRole::Lsk),
@@ -257,10 +260,7 @@ fn text_role(path: &Path) -> Result<KernelRole> {
     if let Some(role) = by_header {
         return Ok(role);
     }
-    let assignments = text_kernel::assignments(&text).in_file(path)?;
-    let defines = |part: &str| assignments.iter().any(|found| found.name.starts_with(part));
     let by_variable = [
-        ("KERNELS_TO_LOAD", KernelRole::Meta),
         ("DELTET/", KernelRole::Lsk),
         ("SCLK", KernelRole::Sclk),
         ("INS-", KernelRole::Ik),

@@ -18,7 +18,7 @@ use crate::{
     constants::{MARS_IAU2000, NAIF_MGS, NAIF_MGS_BUS},
     error::{Failure, IoFault, Kind, Place, Result},
     files::file_name,
-    time::{Interval, Intervals},
+    time::Intervals,
 };
 
 /// Deepest folder below the root that is searched.
@@ -39,6 +39,15 @@ const NEEDS: [(&str, &str); 5] = [
 /// Orbit solutions that mark their files by name; a file without a mark is `nav`.
 const MARKED_FAMILIES: [&str; 2] = ["gsfc", "ipng"];
 
+/// Times for which kernels are chosen from a folder.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Wanted {
+    /// Instants that ephemerides must touch.
+    pub positions: Intervals,
+    /// Instants that attitudes must touch, as the C-kernels count time: exposures with the pointing bias.
+    pub attitudes: Intervals,
+}
+
 /// Files of a folder by what they hold.
 #[derive(Default)]
 struct Found {
@@ -52,21 +61,20 @@ impl KernelSet {
     /// Chooses from a folder: the latest text kernels (pinned ones win), planetary ephemerides, the
     /// chosen orbit solution, and attitudes from the worst quality to the best, so that the best wins.
     ///
-    /// * `wanted` – instants that ephemerides and attitudes must touch, ET; without any, only text
+    /// * `wanted` – instants that ephemerides and attitudes must touch; without any, only text
     ///   kernels are chosen, which is enough to tag times
     ///
     /// # Errors
     /// [`SpiceFault::NothingToSelect`] when a needed text kernel or the orbit solution is missing;
     /// [`IoFault`] when the folder cannot be read.
-    pub fn select(selection: &KernelSelection, wanted: &[Interval]) -> Result<Self> {
+    pub fn select(selection: &KernelSelection, wanted: &Wanted) -> Result<Self> {
         let found = Found::in_folder(&selection.root)?;
         let mut set = Self::default();
         select_texts(selection, &found.texts, &mut set).in_file(&selection.root)?;
-        if !wanted.is_empty() {
-            let wanted = Intervals::union_of(wanted.iter().copied());
-            select_ephemerides(selection, &found.ephemerides, &wanted, &mut set)
+        if *wanted != Wanted::default() {
+            select_ephemerides(selection, &found.ephemerides, &wanted.positions, &mut set)
                 .in_file(&selection.root)?;
-            select_attitudes(selection, &found.attitudes, &wanted, &mut set)?;
+            select_attitudes(selection, &found.attitudes, &wanted.attitudes, &mut set)?;
         }
         set.explanation.extend(found.notes);
         Ok(set)
@@ -91,7 +99,10 @@ impl Found {
                     found.ephemerides.push((path, segments));
                 }
                 KernelRole::Ck => found.attitudes.push(path),
-                KernelRole::Meta => {}
+                KernelRole::Meta => {
+                    let note = format!("{}: left out, a metakernel", file_name(&path));
+                    found.notes.push(note);
+                }
                 _ => match read_text(&path).and_then(|text| Ok(text_kernel::assignments(&text)?)) {
                     Ok(assignments) => found.texts.push((path, assignments)),
                     Err(failure) => found.leave_out(&path, &failure),
@@ -215,11 +226,15 @@ fn select_ephemerides(
             .iter()
             .filter(|segment| !mgs || segment.integers[0] == NAIF_MGS)
             .map(|segment| interval_of([segment.start, segment.stop]));
+        let touches = !Intervals::union_of(held)
+            .intersection(wanted)
+            .as_slice()
+            .is_empty();
         let name = file_name(path);
         if mgs && !family_of(path, &family) {
             let line = format!("{name}: left out, not of the orbit solution {family}");
             set.explanation.push(line);
-        } else if !overlap(held, wanted) {
+        } else if !touches {
             let line = format!("{name}: left out, holds none of the wanted times");
             set.explanation.push(line);
         } else if mgs {
@@ -254,7 +269,8 @@ fn select_attitudes(
                 .in_file(path)?;
             let hull = held.first().zip(held.last());
             let hull = hull.map(|(first, last)| interval_of([first[0], last[1]]));
-            if overlap(hull.into_iter(), wanted) {
+            let hull = Intervals::union_of(hull);
+            if !hull.intersection(wanted).as_slice().is_empty() {
                 set.add(path, &format!("{quality:?} attitude of MGS"))?;
             } else {
                 let line = format!("{name}: left out, holds no attitude near the wanted times");
@@ -270,11 +286,6 @@ fn select_attitudes(
         }
     }
     Ok(())
-}
-
-fn overlap(held: impl Iterator<Item = Interval>, wanted: &Intervals) -> bool {
-    held.into_iter()
-        .any(|held| wanted.as_slice().iter().any(|wanted| wanted.overlaps(held)))
 }
 
 /// Parts of a name between `_`, `-` and `.`, in lower case.
