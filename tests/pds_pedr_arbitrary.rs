@@ -31,7 +31,7 @@ fn file_bytes() -> Vec<u8> {
             orbit: 9_019,
             clock_frequency_hz: 1e8,
             spacecraft_radius_m: 3_780_000.0,
-            ground_longitude_rad: 6.283,
+            ground_longitude_rad: 359.99_f64.to_radians(),
             ground_longitude_change_rad: 7e-4,
             ground_latitude_rad: 0.17,
             ground_latitude_change_rad: 2e-3,
