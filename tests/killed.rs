@@ -1,4 +1,5 @@
-//! A run that is killed leaves nothing half-made, and the next one ends with the same bytes.
+//! A run that is killed leaves nothing half-made, and the next one ends with the same bytes, in an
+//! empty folder as over a published site.
 #![allow(
     clippy::unwrap_used,
     clippy::panic,
@@ -8,16 +9,20 @@
 mod common;
 
 use std::{
-    path::Path,
+    collections::BTreeSet,
+    fs,
+    path::{Path, PathBuf},
     thread::sleep,
     time::{Duration, Instant},
 };
 
-use common::mission::{areograph, mission, products, succeed};
+use common::{
+    case::Case,
+    mission::{areograph, mission, products, succeed},
+};
 
 /// Moments at which a run is killed.
 const KILLS: u32 = 20;
-
 fn run(site: &Path, out: &Path, threads: &str) -> std::process::Command {
     let mut command = areograph();
     command
@@ -67,6 +72,109 @@ fn killed_at_twenty_moments() {
         killed >= KILLS / 2,
         "only {killed} runs were killed before they ended"
     );
+}
+
+/// Adds a second image, the same label under another name, or takes it away.
+fn change(case: &Case, second_image: bool) {
+    let second = "[[images]]\nid = \"second\"\nlabel = \"image.lbl\"\n";
+    if second_image {
+        let text = String::from_utf8(case.read("site.toml")).unwrap();
+        case.write("site.toml", text + second);
+    } else {
+        case.replace("site.toml", second, "");
+    }
+}
+
+/// Starts a run, waits until `begun`, and kills it this long after; whether it was still running.
+fn kill(case: &Case, begun: impl Fn() -> bool, after: Duration) -> bool {
+    let mut child = case.run().spawn().unwrap();
+    while !begun() && child.try_wait().unwrap().is_none() {
+        sleep(Duration::from_micros(20));
+    }
+    sleep(after);
+    child.kill().unwrap();
+    !child.wait().unwrap().success()
+}
+
+/// Paths that the manifest lists, and its own.
+fn listed(case: &Case) -> BTreeSet<PathBuf> {
+    let manifest: serde_json::Value =
+        serde_json::from_slice(&case.read("out/case/manifest.json")).unwrap();
+    manifest["products"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|product| product["path"].as_str().unwrap())
+        .chain(["manifest.json"])
+        .map(PathBuf::from)
+        .collect()
+}
+
+/// Kills runs over a published site at 0 to `last` after something of theirs has begun, each followed by
+/// a run to the end. By turns they add the second image and take it away, and by turns the run to the
+/// end is of the new configuration and of the one before.
+fn kill_republishing(kills: u32, last: Duration, begins: fn(&Case) -> Box<dyn Fn() -> bool>) {
+    let case = Case::new();
+    let undisturbed = [false, true].map(|second_image| {
+        if second_image {
+            change(&case, true);
+        }
+        succeed(&mut case.run());
+        let found = products(&case.path("out/case"));
+        fs::remove_dir_all(case.path("out")).unwrap();
+        found
+    });
+    assert!(undisturbed[1].len() > undisturbed[0].len());
+    succeed(&mut case.run());
+    let (mut second_image, mut killed) = (true, 0);
+    for attempt in 0..kills {
+        second_image = !second_image;
+        change(&case, second_image);
+        let after = last * attempt / (kills - 1);
+        killed += u32::from(kill(&case, begins(&case), after));
+        if attempt % 2 == 1 {
+            second_image = !second_image;
+            change(&case, second_image);
+        }
+        succeed(&mut case.run());
+        let found = products(&case.path("out/case"));
+        let files: BTreeSet<PathBuf> = found.keys().cloned().collect();
+        assert_eq!(files, listed(&case), "kill {attempt}, after {after:?}");
+        assert!(
+            found == undisturbed[usize::from(second_image)],
+            "products differ after kill {attempt}, after {after:?}"
+        );
+    }
+    assert!(killed > 0, "no run was killed before it ended");
+}
+
+#[test]
+fn killed_while_staging_over_a_published_site() {
+    kill_republishing(12, Duration::from_millis(30), |case| {
+        let staging = case.path("out/case/.staging");
+        assert!(!staging.exists(), "the run before left its staging folder");
+        Box::new(move || staging.exists())
+    });
+}
+
+#[test]
+fn killed_while_publishing_over_a_published_site() {
+    // Publishing some twenty files takes a few milliseconds; the first of them is this one.
+    kill_republishing(12, Duration::from_millis(4), |case| {
+        let path = case.path("out/case/exchange/README.txt");
+        let written = move || fs::metadata(&path).and_then(|file| file.modified()).ok();
+        let before = written();
+        Box::new(move || written() != before)
+    });
+}
+
+#[test]
+fn killed_when_an_image_has_just_come_or_gone() {
+    kill_republishing(12, Duration::from_micros(500), |case| {
+        let path = case.path("out/case/images/second/isd.json");
+        let before = path.exists();
+        Box::new(move || path.exists() != before)
+    });
 }
 
 #[test]
