@@ -11,11 +11,6 @@ const BYTES_MAX: u64 = 16 << 20;
 /// Most vertices of all rings.
 const VERTICES_MAX: usize = 100_000;
 
-/// Widest edge, degrees of longitude: half a turn and the rounding of its difference.
-///
-/// A longer one could as well mean the other way round Mars, which is what windows would take it for.
-const EDGE_DEG_MAX: f64 = 180.0 + 1e-11;
-
 /// Polygons, rings, vertices (longitude, latitude): radians.
 pub(super) type Polygons = Vec<Vec<Vec<[f64; 2]>>>;
 
@@ -51,11 +46,6 @@ pub(super) enum RingFault {
     Longitude(usize, f64),
     #[error("position {0}: latitude {1} is not within -90 to 90")]
     Latitude(usize, f64),
-    #[error(
-        "position {position}: edge of {edge_deg} degrees from the position before: split it, longitudes of \
-         neighbouring vertices must differ by at most 180 degrees"
-    )]
-    Edge { position: usize, edge_deg: f64 },
     #[error("spans {0} degrees of longitude; a ring spans less than 360")]
     Wide(f64),
 }
@@ -160,12 +150,6 @@ fn ring(positions: &[Vec<f64>]) -> Result<Vec<[f64; 2]>, RingFault> {
     if east - west >= 360.0 {
         return Err(RingFault::Wide(east - west));
     }
-    for (position, pair) in (2..).zip(positions.windows(2)) {
-        let edge_deg = (pair[1][0] - pair[0][0]).abs();
-        if edge_deg > EDGE_DEG_MAX {
-            return Err(RingFault::Edge { position, edge_deg });
-        }
-    }
     Ok(vertices)
 }
 
@@ -195,19 +179,6 @@ mod tests {
         let [longitude, latitude] = both[0][0][2];
         // One ulp of π/2, nanometres on the ground.
         assert!((longitude - quarter).abs() < 1e-15 && (latitude - quarter / 2.0).abs() < 1e-15);
-    }
-
-    #[test]
-    fn wide_rings_are_taken_when_their_edges_go_one_way_only() {
-        for ring in [
-            "[[-120,0],[0,0],[120,0],[120,10],[0,10],[-120,10],[-120,0]]",
-            "[[0,60],[180,60],[180,90],[0,90],[0,60]]",
-            // This difference is rounded to just above 180.
-            "[[76.1,60],[256.1,60],[256.1,90],[76.1,90],[76.1,60]]",
-        ] {
-            let text = format!(r#"{{"type":"Polygon","coordinates":[{ring}]}}"#);
-            assert!(parse(text.as_bytes()).is_ok(), "{ring}");
-        }
     }
 
     #[test]
@@ -241,16 +212,6 @@ mod tests {
             (
                 "[[-180,0],[180,0],[1,1],[-180,0]]",
                 "polygon 1 ring 1 spans 360 degrees of longitude; a ring spans less than 360",
-            ),
-            (
-                "[[0,0],[1,0],[1,1],[0,0]],[[-120,0],[120,0],[120,10],[-120,10],[-120,0]]",
-                "polygon 1 ring 2 position 2: edge of 240 degrees from the position before: split it, \
-                 longitudes of neighbouring vertices must differ by at most 180 degrees",
-            ),
-            (
-                "[[0,70],[120,70],[240,70],[0,70]]",
-                "polygon 1 ring 1 position 4: edge of 240 degrees from the position before: split it, \
-                 longitudes of neighbouring vertices must differ by at most 180 degrees",
             ),
         ] {
             assert_eq!(message(&polygon(ring)), expected);
