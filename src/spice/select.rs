@@ -270,11 +270,11 @@ fn select_attitudes(
             let hull = held.first().zip(held.last());
             let hull = hull.map(|(first, last)| interval_of([first[0], last[1]]));
             let hull = Intervals::union_of(hull);
-            if !hull.intersection(wanted).as_slice().is_empty() {
-                set.add(path, &format!("{quality:?} attitude of MGS"))?;
-            } else {
+            if hull.intersection(wanted).as_slice().is_empty() {
                 let line = format!("{name}: left out, holds no attitude near the wanted times");
                 set.explanation.push(line);
+            } else {
+                set.add(path, &format!("{quality:?} attitude of MGS"))?;
             }
         }
     }

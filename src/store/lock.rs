@@ -5,7 +5,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use super::atomic::TEMPORARY;
+use super::{atomic::TEMPORARY, publish::STAGING};
 use crate::error::{Fault, IoFault, Kind, Place, Result};
 
 /// Held while a run works in a site's folder; the system frees it when the process ends, however it ends.
@@ -46,6 +46,8 @@ impl SiteLock {
             Ok(()) => {
                 remove_temporaries(folder);
                 remove_temporaries(&folder.join(".cache"));
+                // A killed run's half-made products; what cannot be removed is met when publishing.
+                let _ = fs::remove_dir_all(folder.join(STAGING));
                 Ok(Self { _file: file })
             }
             Err(TryLockError::WouldBlock) => Err(Busy).in_file(folder),

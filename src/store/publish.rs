@@ -22,23 +22,19 @@ use crate::{
 /// Name of the manifest in a site's folder.
 pub const MANIFEST: &str = "manifest.json";
 
+/// Name of the folder of half-made products.
+pub(super) const STAGING: &str = ".staging";
+
 /// Paths below the site's folder that a publication under way may have made or will remove.
 const JOURNAL: &str = ".publishing";
 
-/// A folder for half-made products inside the site's folder, hence on the same file system.
-///
-/// What an interrupted run left in it is removed.
+/// An empty folder for half-made products inside the site's folder, hence on the same file system.
 ///
 /// # Errors
-/// The folder cannot be emptied or made.
+/// The folder cannot be made, or an earlier one could not be removed.
 pub fn staging(site_folder: &Path) -> Result<PathBuf> {
-    let folder = site_folder.join(".staging");
-    if folder.exists() {
-        fs::remove_dir_all(&folder)
-            .map_err(IoFault::on("empty the folder"))
-            .in_file(&folder)?;
-    }
-    fs::create_dir_all(&folder)
+    let folder = site_folder.join(STAGING);
+    fs::create_dir(&folder)
         .map_err(IoFault::on("create the folder"))
         .in_file(&folder)?;
     Ok(folder)
