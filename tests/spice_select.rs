@@ -154,17 +154,23 @@ fn pins_families_and_qualities_are_obeyed() {
         return;
     };
     let mut selection = selection(temporary.path());
-    selection.pinned = vec!["naif0009.tls".to_owned(), "pck00011.tpc".to_owned()];
+    // Nothing needs it, yet a pin is a wish.
+    let extra = b"KPL/PCK\n\\begindata\nBODY9_X = 1\n";
+    write(temporary.path(), "extra.tpc", extra);
+    selection.pinned = ["naif0009.tls", "pck00011.tpc", "extra.tpc"]
+        .map(str::to_owned)
+        .to_vec();
     selection.spk_family = "gsfc".to_owned();
     selection.ck_quality = vec![CkQuality::Reconstructed];
     let set = names(&KernelSet::select(&selection, &around(wanted)).unwrap());
     assert_eq!(
         set,
         [
-            "naif0009.tls",
             "MGS_SCLKSCET.00061.tsc",
-            "pck00011.tpc",
             "mgs_moc_v20.ti",
+            "naif0009.tls",
+            "pck00011.tpc",
+            "extra.tpc",
             "mgs_map2_gsfc_mgm0827.bsp",
             "mgs_sc_map2.bc"
         ]
@@ -205,4 +211,68 @@ fn what_is_missing_in_a_folder_is_named() {
     );
     selection.root = temporary.path().join("absent");
     assert!(text(&selection).contains("absent: cannot list folder"));
+}
+
+#[test]
+fn kernels_that_meet_inside_the_bias_are_chosen_and_versions_count() {
+    let Some((temporary, exposures)) = archive("selection across a seam") else {
+        return;
+    };
+    let root = temporary.path();
+    let mut selection = selection(root);
+    let texts = KernelSet::select(&selection, &Wanted::default()).unwrap();
+    let session = Session::open(&texts).unwrap();
+    fs::remove_file(root.join("ck/mgs_sc_map2.bc")).unwrap();
+    // Telemetry of two files that meet half a second before the exposures, and ends inside them.
+    let seam = exposures.start.plus(-0.5);
+    for (name, start, stop) in [
+        ("mgs_sc_meet_v9.bc", exposures.start.plus(-20.0), seam),
+        ("mgs_sc_meet_v10.bc", seam, exposures.start.plus(4.0)),
+    ] {
+        let instants = [start, stop];
+        let segment = CkSegment {
+            name: "telemetry",
+            instants: &instants,
+            quaternions: &[[1.0, 0.0, 0.0, 0.0]; 2],
+            angular_velocities_rad_s: &[[0.0; 3]; 2],
+            interval_starts: &instants[..1],
+        };
+        write_ck(&root.join("ck").join(name), &session, &[segment], "").unwrap();
+    }
+    drop(session);
+    for name in ["mgs_map2_v9.bsp", "mgs_map2_v10.bsp"] {
+        let mut bytes = fs::read(root.join("mgs_map2.bsp")).unwrap();
+        // A word behind the end makes another content of it.
+        bytes.extend_from_slice(name.as_bytes());
+        write(root, name, &bytes);
+    }
+    let wanted = around(exposures);
+    let set = KernelSet::select(&selection, &wanted).unwrap();
+    let chosen = names(&set);
+    let expected = [
+        "mgs_map2.bsp",
+        "mgs_map2_v9.bsp",
+        "mgs_map2_v10.bsp",
+        "mgs_ext_roto_all_v9.bc",
+        "mgs_sc_meet_v9.bc",
+        "mgs_sc_meet_v10.bc",
+    ];
+    assert_eq!(chosen[chosen.len() - 6..], expected);
+    let explanation = set.explanation().join("\n");
+    for line in [
+        "mgs_ext_roto_all_v9.bc: NOMINAL attitude of MGS: commanded, not measured".to_owned(),
+        // Telemetry ends 4 s into the exposures; look-ups end 1.15 s earlier than they, and 1 s later.
+        format!(
+            "attitude of {} comes from nominal mgs_ext_roto_all_v9.bc",
+            Interval::new(
+                exposures.start.plus(4.0),
+                exposures.stop.plus(BIAS.seconds() + 1.0)
+            )
+        ),
+    ] {
+        assert!(explanation.contains(&line), "{line} in {explanation}");
+    }
+    selection.ck_quality = vec![CkQuality::Reconstructed];
+    let set = KernelSet::select(&selection, &wanted).unwrap();
+    assert!(!set.explanation().join("\n").contains("comes from nominal"));
 }

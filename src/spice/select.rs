@@ -169,7 +169,7 @@ fn select_texts(
                 defines(assignments) && (pinned(path) || mars_fits(variable, assignments))
             })
             .collect();
-        candidates.sort_by_key(|(path, _)| (pinned(path), version_of(path)));
+        candidates.sort_by_key(|(path, _)| version_of(path));
         let Some((best, _)) = candidates.last() else {
             let what = format!("defines {what} ({variable})");
             return Err(SpiceFault::NothingToSelect { what }.into());
@@ -177,12 +177,17 @@ fn select_texts(
         // One file may serve two needs: the clock kernel of MGS also defines its bus frame.
         let served = candidates
             .iter()
-            .any(|(path, _)| chosen.contains(&path.as_path()));
+            .any(|(path, _)| pinned(path) || chosen.contains(&path.as_path()));
         if !served {
-            let why = if pinned(best) { "pinned" } else { "latest" };
-            let reason = format!("{why} of {} with {what}", candidates.len());
+            let reason = format!("latest of {} with {what}", candidates.len());
             set.add(best, &reason)?;
             chosen.push(best);
+        }
+    }
+    // Last, so that a pinned file wins whatever else defines the same variables.
+    for name in &selection.pinned {
+        for (path, _) in texts.iter().filter(|(path, _)| file_name(path) == *name) {
+            set.add(path, "pinned")?;
         }
     }
     Ok(())
@@ -217,9 +222,9 @@ fn select_ephemerides(
         );
         return Err(SpiceFault::NothingToSelect { what }.into());
     }
-    // Planets first; in a tie the order of paths.
+    // Planets first; of several versions the latest last, so that it wins.
     let mut ordered: Vec<&(PathBuf, Vec<Segment>)> = ephemerides.iter().collect();
-    ordered.sort_by_key(|(_, segments)| holds_mgs(segments));
+    ordered.sort_by_key(|(path, segments)| (holds_mgs(segments), natural_order(path)));
     for (path, segments) in ordered {
         let mgs = holds_mgs(segments);
         let held = segments
@@ -246,7 +251,7 @@ fn select_ephemerides(
     Ok(())
 }
 
-/// Attitudes that touch the wanted times, the worst quality first.
+/// Attitudes that touch the wanted times, the worst quality first, and what commanded ones fill in.
 fn select_attitudes(
     selection: &KernelSelection,
     attitudes: &[PathBuf],
@@ -255,12 +260,13 @@ fn select_attitudes(
 ) -> Result<()> {
     // Times of a C-kernel are clock ticks: the text kernels chosen so far turn them into ET.
     let session = Session::open(set)?;
+    let (mut telemetry, mut commanded) = (Vec::new(), Vec::new());
     for quality in selection.ck_quality.iter().rev() {
         let mut of_quality: Vec<&PathBuf> = attitudes
             .iter()
             .filter(|path| quality_of(path) == *quality)
             .collect();
-        of_quality.sort_by_key(|path| version_of(path));
+        of_quality.sort_by_key(|path| natural_order(path));
         for path in of_quality {
             let name = file_name(path);
             let held = session
@@ -273,8 +279,15 @@ fn select_attitudes(
             if hull.intersection(wanted).as_slice().is_empty() {
                 let line = format!("{name}: left out, holds no attitude near the wanted times");
                 set.explanation.push(line);
+                continue;
+            }
+            let held = held.into_iter().map(interval_of);
+            if *quality == CkQuality::Nominal {
+                set.add(path, "NOMINAL attitude of MGS: commanded, not measured")?;
+                commanded.push((name, Intervals::union_of(held)));
             } else {
-                set.add(path, &format!("{quality:?} attitude of MGS"))?;
+                set.add(path, "Reconstructed attitude of MGS")?;
+                telemetry.extend(held);
             }
         }
     }
@@ -285,7 +298,38 @@ fn select_attitudes(
             set.explanation.push(line);
         }
     }
+    if selection.ck_quality.first() == Some(&CkQuality::Nominal) {
+        telemetry.clear();
+    }
+    explain_commanded(wanted, &Intervals::union_of(telemetry), commanded, set);
     Ok(())
+}
+
+/// Says which wanted attitudes come from commanded kernels, because no telemetry that wins holds them.
+fn explain_commanded(
+    wanted: &Intervals,
+    telemetry: &Intervals,
+    commanded: Vec<(String, Intervals)>,
+    set: &mut KernelSet,
+) {
+    let gaps_in = |wanted: &Intervals, held: &Intervals| {
+        let gaps = wanted
+            .as_slice()
+            .iter()
+            .flat_map(|part| held.gaps_in(*part));
+        Intervals::union_of(gaps)
+    };
+    let mut missing = gaps_in(wanted, telemetry);
+    // The last one wins where several hold the same instant.
+    for (name, held) in commanded.into_iter().rev() {
+        for filled in missing.intersection(&held).as_slice() {
+            if filled.duration_s() > 0.0 {
+                let line = format!("attitude of {filled} comes from nominal {name}");
+                set.explanation.push(line);
+            }
+        }
+        missing = gaps_in(&missing, &held);
+    }
 }
 
 /// Parts of a name between `_`, `-` and `.`, in lower case.
@@ -315,6 +359,30 @@ fn quality_of(path: &Path) -> CkQuality {
     } else {
         CkQuality::Reconstructed
     }
+}
+
+/// Sorts names with their numbers as numbers: `v9` before `v10`; in a tie by path.
+fn natural_order(path: &Path) -> (Vec<(usize, String)>, PathBuf) {
+    let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+    let stem = stem.to_ascii_lowercase();
+    let is_digit = |character: char| character.is_ascii_digit();
+    let mut pieces = Vec::new();
+    let mut rest = stem.as_str();
+    while let Some(first) = rest.chars().next() {
+        let end = rest
+            .find(|next| is_digit(next) != is_digit(first))
+            .unwrap_or(rest.len());
+        let (piece, behind) = rest.split_at(end);
+        // Without leading zeros the longer number is the larger one; words have no length.
+        let number = piece.trim_start_matches('0');
+        pieces.push(if is_digit(first) {
+            (number.len(), number.to_owned())
+        } else {
+            (0, piece.to_owned())
+        });
+        rest = behind;
+    }
+    (pieces, path.to_owned())
 }
 
 /// The last number in a name: 61 of `MGS_SCLKSCET.00061.tsc`, 10 of `pck00010.tpc`.
