@@ -12,8 +12,15 @@ use std::{
 };
 
 use areograph::{
-    constants::MARS_IAU2000, error::Kind, footprints::Footprint, products::write_products,
+    constants::MARS_IAU2000,
+    error::Kind,
+    footprints::Footprint,
+    geom::mars_rotation::mars_matrix,
+    products::write_products,
+    spice::{KernelSet, Session},
     store::manifest::Manifest,
+    time::Et,
+    units::{RADIANS_PER_DEGREE, SECONDS_PER_DAY},
 };
 use arrow::array::{AsArray, RecordBatch};
 use arrow::datatypes::{Float64Type, UInt32Type};
@@ -87,6 +94,29 @@ fn says_the_frame(text: &str) {
         text.contains(&meridian) && text.contains("IAU_2015:49900"),
         "{text}"
     );
+}
+
+/// The differences that [`says_the_frame`] finds told, from NAIF's constants of the 2015 report.
+#[test]
+fn the_frame_of_the_crs_code_is_as_far_away_as_products_say() {
+    let test = "the_frame_of_the_crs_code_is_as_far_away_as_products_say";
+    let Some(folder) = common::real_data("mgs_text", test) else {
+        return;
+    };
+    let kernels = ["naif0012.tls", "pck00011.tpc"].map(|name| folder.join(name));
+    let session = Session::open(&KernelSet::from_files(&kernels).unwrap()).unwrap();
+    let (mut least, mut most, mut pole) = (f64::INFINITY, f64::NEG_INFINITY, 0.0_f64);
+    for day in -366..=730 {
+        let et = Et::from_seconds(f64::from(day) * SECONDS_PER_DAY);
+        let turn = session.mars_matrix(et).unwrap() * mars_matrix(&MARS_IAU2000, et).transpose();
+        let smaller_deg = -turn[(1, 0)].atan2(turn[(0, 0)]) / RADIANS_PER_DEGREE;
+        (least, most) = (least.min(smaller_deg), most.max(smaller_deg));
+        pole = pole.max(turn[(2, 0)].hypot(turn[(2, 1)]) / RADIANS_PER_DEGREE);
+    }
+    // Degrees, half a unit of the last digit that is told.
+    close(least, 0.0014, 5e-5);
+    close(most, 0.0018, 5e-5);
+    close(pole, 0.0005, 5e-5);
 }
 
 fn close(value: f64, expected: f64, tolerance: f64) {
