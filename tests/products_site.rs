@@ -11,9 +11,19 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use areograph::{error::Kind, products::write_products, store::manifest::Manifest};
+use areograph::{
+    constants::MARS_IAU2000,
+    error::Kind,
+    footprints::Footprint,
+    geom::mars_rotation::mars_matrix,
+    products::write_products,
+    spice::{KernelSet, Session},
+    store::manifest::Manifest,
+    time::Et,
+    units::{RADIANS_PER_DEGREE, SECONDS_PER_DAY},
+};
 use arrow::array::{AsArray, RecordBatch};
-use arrow::datatypes::Float64Type;
+use arrow::datatypes::{Float64Type, UInt32Type};
 use fixture::{SHOTS, START_S, Site};
 use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 use serde_json::Value;
@@ -77,6 +87,38 @@ fn number(batch: &RecordBatch, column: &str, row: usize) -> f64 {
         .value(row)
 }
 
+/// The CRS code names another frame than the coordinates have; the text must give both.
+fn says_the_frame(text: &str) {
+    let meridian = format!("IAU 2000 (W0 = {:.3} deg)", MARS_IAU2000.meridian_deg);
+    assert!(
+        text.contains(&meridian) && text.contains("IAU_2015:49900"),
+        "{text}"
+    );
+}
+
+/// The differences that [`says_the_frame`] finds told, from NAIF's constants of the 2015 report.
+#[test]
+fn the_frame_of_the_crs_code_is_as_far_away_as_products_say() {
+    let test = "the_frame_of_the_crs_code_is_as_far_away_as_products_say";
+    let Some(folder) = common::real_data("mgs_text", test) else {
+        return;
+    };
+    let kernels = ["naif0012.tls", "pck00011.tpc"].map(|name| folder.join(name));
+    let session = Session::open(&KernelSet::from_files(&kernels).unwrap()).unwrap();
+    let (mut least, mut most, mut pole) = (f64::INFINITY, f64::NEG_INFINITY, 0.0_f64);
+    for day in -366..=730 {
+        let et = Et::from_seconds(f64::from(day) * SECONDS_PER_DAY);
+        let turn = session.mars_matrix(et).unwrap() * mars_matrix(&MARS_IAU2000, et).transpose();
+        let smaller_deg = -turn[(1, 0)].atan2(turn[(0, 0)]) / RADIANS_PER_DEGREE;
+        (least, most) = (least.min(smaller_deg), most.max(smaller_deg));
+        pole = pole.max(turn[(2, 0)].hypot(turn[(2, 1)]) / RADIANS_PER_DEGREE);
+    }
+    // Degrees, half a unit of the last digit that is told.
+    close(least, 0.0014, 5e-5);
+    close(most, 0.0018, 5e-5);
+    close(pole, 0.0005, 5e-5);
+}
+
 fn close(value: f64, expected: f64, tolerance: f64) {
     assert!(
         (value - expected).abs() <= tolerance,
@@ -123,6 +165,8 @@ fn footprints_are_geoparquet_across_the_antimeridian() {
         .unwrap();
     let geo: Value = serde_json::from_str(&geo).unwrap();
     assert_eq!(geo["version"], "1.1.0");
+    let frame = keys.iter().find(|(key, _)| key == "frame").unwrap();
+    says_the_frame(frame.1.as_deref().unwrap());
     let column = &geo["columns"]["geometry"];
     assert_eq!(column["encoding"], "WKB");
     assert_eq!(column["crs"]["id"]["code"], 49900);
@@ -183,6 +227,38 @@ fn footprints_are_geoparquet_across_the_antimeridian() {
     );
 }
 
+/// More rows than stand in memory at once.
+#[test]
+fn a_long_table_comes_back_in_pieces() {
+    const ROWS: u32 = 70_000;
+    let mut site = Site::empty();
+    let shot = Site::small().footprints.row(0);
+    for record in 0..ROWS {
+        site.footprints.push(&Footprint { record, ..shot });
+        site.utc.push(String::new());
+    }
+    let (folder, products) = written("long", &site, false);
+    assert_eq!(
+        products[1],
+        ("footprints.parquet".to_owned(), u64::from(ROWS))
+    );
+    let file = File::open(folder.join("footprints.parquet")).unwrap();
+    let reader = ParquetRecordBatchReaderBuilder::try_new(file)
+        .unwrap()
+        .build();
+    let records: Vec<u32> = reader
+        .unwrap()
+        .flat_map(|batch| {
+            let batch = batch.unwrap();
+            let column = batch.column_by_name("record").unwrap();
+            column.as_primitive::<UInt32Type>().values().to_vec()
+        })
+        .collect();
+    assert!(records.into_iter().eq(0..ROWS));
+    let features = json(&folder.join("footprints.geojson"));
+    assert_eq!(features["features"][69_999]["properties"]["record"], 69_999);
+}
+
 #[test]
 fn documents_keep_their_schemas() {
     let (folder, _) = written("schemas", &Site::small(), true);
@@ -196,7 +272,10 @@ fn documents_keep_their_schemas() {
             .get("uncertainty_s")
             .is_none()
     );
-    check_schema("footprints", &json(&folder.join("footprints.geojson")));
+    let footprints = json(&folder.join("footprints.geojson"));
+    check_schema("footprints", &footprints);
+    assert_eq!(footprints["features"].as_array().unwrap().len(), 60);
+    says_the_frame(footprints["frame"].as_str().unwrap());
     let image = folder.join("images/m04-02852");
     let orientation = json(&image.join("orientation.json"));
     check_schema("orientation", &orientation);
@@ -313,6 +392,7 @@ fn exchange_files_have_the_columns_that_isis_and_asp_read() {
     );
     assert_eq!(lola.lines().count(), 61);
     assert!(!lola.contains('"') && !ode.contains('"'));
+    says_the_frame(&fs::read_to_string(folder.join("exchange/README.txt")).unwrap());
 }
 
 #[test]

@@ -4,7 +4,7 @@ use serde_json::json;
 
 use super::{
     Writer,
-    coordinates::column_deg,
+    coordinates::{FRAME, column_deg},
     files::{write_json, write_text},
     site::SiteProducts,
     table::{Column, Table, Values},
@@ -26,13 +26,11 @@ const LOLA_LIKE_FORMAT: &str = "2:lon 3:lat 4:radius_km";
 const ODE_FORMAT: &str = "1:lon 2:lat 5:radius_m";
 
 pub(super) fn write(written: &mut Writer, site: &SiteProducts) -> Result<()> {
-    let lola_like = Table::new(lola_like(site))?;
     written.add("exchange/lola_like.csv", |path| {
-        text_table::write(path, &lola_like)
+        text_table::write(path, &Table::new(lola_like(site))?)
     })?;
-    let ode_points = Table::new(ode_points(site))?;
     written.add("exchange/ode_pts.csv", |path| {
-        text_table::write(path, &ode_points)
+        text_table::write(path, &Table::new(ode_points(site))?)
     })?;
     written.add("exchange/formats.json", |path| {
         write_json(path, &formats())?;
@@ -128,6 +126,8 @@ fn readme() -> String {
     format!(
         "Footprints for other programs: Mars body-fixed, IAU 2000, areocentric latitude, east longitude 0..360.\n\
          The first line of each CSV file names its columns. Times are corrected shot times.\n\
+         \n\
+         Frame: {FRAME}.\n\
          \n\
          Ames Stereo Pipeline (radii, so that the choice of datum does not matter; D_MARS is a sphere of 3396190 m):\n\
          \x20 pc_align --csv-format '{LOLA_LIKE_FORMAT}' --datum D_MARS ... lola_like.csv\n\

@@ -2,7 +2,7 @@
 
 use std::{
     fs::{self, File},
-    io::{Read as _, Write as _},
+    io::{BufWriter, Read as _, Write as _},
     path::Path,
 };
 
@@ -12,20 +12,34 @@ use serde_json::Value;
 use super::fault::ProductFault;
 use crate::error::{IoFault, Place, Result};
 
-/// Writes `bytes` to `path`, its folder made where missing, through to the disk.
-pub(super) fn write_bytes(path: &Path, bytes: &[u8]) -> Result<()> {
+/// Creates `path`, its folder made where missing, to be written piece by piece and [`finish`]ed.
+pub(super) fn create(path: &Path) -> Result<BufWriter<File>> {
     if let Some(folder) = path.parent() {
         fs::create_dir_all(folder)
             .map_err(IoFault::on("make the folder"))
             .in_file(folder)?;
     }
-    let mut file = File::create(path)
+    let file = File::create(path)
         .map_err(IoFault::on("create"))
         .in_file(path)?;
-    file.write_all(bytes)
-        .and_then(|()| file.sync_all())
+    Ok(BufWriter::new(file))
+}
+
+/// Writes what is left in memory through to the disk.
+pub(super) fn finish(path: &Path, mut file: BufWriter<File>) -> Result<()> {
+    file.flush()
+        .and_then(|()| file.get_ref().sync_all())
         .map_err(IoFault::on("write"))
         .in_file(path)
+}
+
+/// Writes `bytes` to `path`, its folder made where missing, through to the disk.
+fn write_bytes(path: &Path, bytes: &[u8]) -> Result<()> {
+    let mut file = create(path)?;
+    file.write_all(bytes)
+        .map_err(IoFault::on("write"))
+        .in_file(path)?;
+    finish(path, file)
 }
 
 /// Opens `path` for reading.
@@ -57,24 +71,13 @@ fn read(path: &Path) -> Result<Vec<u8>> {
 /// Writes `document` as indented JSON and reads it back.
 ///
 /// # Errors
-/// Numbers that are not finite, which JSON would turn into null: products have no nulls, what is
-/// unknown is left out.
+/// As [`to_value`]; what the disk refuses; a document that comes back different.
 pub(super) fn write_json(path: &Path, document: &impl Serialize) -> Result<()> {
+    let written = to_value(document).in_file(path)?;
     let text = serde_json::to_string_pretty(document)
         .map_err(ProductFault::refused("encode JSON"))
         .in_file(path)?;
-    write_json_text(path, document, &(text + "\n"))
-}
-
-/// Writes `text`, which must be `document` in JSON, and reads it back.
-pub(super) fn write_json_text(path: &Path, document: &impl Serialize, text: &str) -> Result<()> {
-    let written = serde_json::to_value(document)
-        .map_err(ProductFault::refused("encode JSON"))
-        .in_file(path)?;
-    if let Some(what) = find_null(&written, "") {
-        return Err(ProductFault::NotFinite { what }).in_file(path);
-    }
-    write_bytes(path, text.as_bytes())?;
+    write_bytes(path, (text + "\n").as_bytes())?;
     let found: Value = serde_json::from_slice(&read(path)?)
         .map_err(ProductFault::unreadable)
         .in_file(path)?;
@@ -85,6 +88,16 @@ pub(super) fn write_json_text(path: &Path, document: &impl Serialize, text: &str
         what: "the document".to_owned(),
     })
     .in_file(path)
+}
+
+/// What `document` is in JSON.
+///
+/// # Errors
+/// Numbers that are not finite, which JSON would turn into null: products have no nulls, what is
+/// unknown is left out.
+pub(super) fn to_value(document: &impl Serialize) -> std::result::Result<Value, ProductFault> {
+    let value = serde_json::to_value(document).map_err(ProductFault::refused("encode JSON"))?;
+    find_null(&value, "").map_or(Ok(value), |what| Err(ProductFault::NotFinite { what }))
 }
 
 /// JSON pointer to the first null.

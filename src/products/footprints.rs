@@ -4,7 +4,7 @@ use serde_json::{Value, json};
 
 use super::{
     Writer,
-    coordinates::{bounding_box_deg, column_deg, signed_longitude_deg},
+    coordinates::{FRAME, bounding_box_deg, column_deg, signed_longitude_deg},
     geojson, parquet,
     site::SiteProducts,
     table::{Column, Table, Values},
@@ -25,10 +25,14 @@ pub(super) fn write(written: &mut Writer, site: &SiteProducts) -> Result<()> {
         "point, longitude (-180..180) and areocentric latitude in degrees, well-known binary",
         Values::Binary(points.iter().map(well_known_binary).collect()),
     ));
-    let metadata = vec![("geo", geo_metadata(&points).to_string())];
+    let metadata = vec![
+        ("geo", geo_metadata(&points).to_string()),
+        ("frame", FRAME.to_owned()),
+    ];
     written.add("footprints.parquet", |path| {
         parquet::write(path, &table, metadata)
     })?;
+    drop(table);
     written.add("footprints.geojson", |path| {
         geojson::write(path, site, &points)
     })
@@ -281,7 +285,7 @@ fn geo_metadata(points: &[[f64; 2]]) -> Value {
     })
 }
 
-/// PROJJSON of `IAU_2015:49900`; coordinates are (longitude, latitude) all the same, as GeoParquet says.
+/// PROJJSON of `IAU_2015:49900`, which stands for the sphere; [`FRAME`] says whose longitudes these are. Coordinates are (longitude, latitude) all the same, as GeoParquet says.
 ///
 /// Source: IAU coordinate systems of the OGC Planetary working group, radius of Archinal et al. 2018.
 fn mars_sphere() -> Value {

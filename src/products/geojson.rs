@@ -1,27 +1,22 @@
 //! Footprints as GeoJSON (RFC 7946, on Mars), one feature per line.
 
-use std::path::Path;
+use std::{
+    fmt::Write as _,
+    io::{BufRead as _, BufReader, Write as _},
+    path::Path,
+};
 
 use serde::Serialize;
+use serde_json::{Value, json};
 
 use super::{
-    coordinates::bounding_box_deg,
+    coordinates::{FRAME, bounding_box_deg},
     fault::ProductFault,
-    files::write_json_text,
+    files::{create, finish, open, to_value},
     footprints::{file_name, window_ids},
     site::SiteProducts,
 };
-use crate::error::{Place, Result};
-
-#[derive(Debug, Serialize)]
-struct Collection {
-    r#type: &'static str,
-    name: String,
-    crs: NamedCrs,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    bbox: Option<[f64; 4]>,
-    features: Vec<Feature>,
-}
+use crate::error::{IoFault, Place, Result};
 
 /// The `crs` member of GeoJSON 2008, which GIS still reads: RFC 7946 knows the Earth only.
 #[derive(Debug, Serialize)]
@@ -63,29 +58,79 @@ struct Properties {
     windows: String,
 }
 
-/// Writes the footprints, which lie at `points` (degrees).
+/// Writes the footprints, which lie at `points` (degrees), and reads them back, one line at a time: a
+/// document of a million features would take gigabytes.
+///
+/// # Errors
+/// What the disk refuses; lines that come back different.
 pub(super) fn write(path: &Path, site: &SiteProducts, points: &[[f64; 2]]) -> Result<u64> {
-    let collection = Collection {
-        r#type: "FeatureCollection",
-        name: site.config.site.clone(),
-        crs: NamedCrs {
-            r#type: "name",
-            properties: CrsName {
-                name: "urn:ogc:def:crs:IAU:2015:49900",
-            },
-        },
-        bbox: bounding_box_deg(points),
-        features: points
+    let features = || {
+        points
             .iter()
             .enumerate()
             .map(|(row, point)| feature(site, row, *point))
-            .collect(),
     };
-    let text = lines(&collection)
-        .map_err(ProductFault::refused("encode GeoJSON"))
-        .in_file(path)?;
-    write_json_text(path, &collection, &text)?;
+    let head = head(site, points).in_file(path)?;
+    write_lines(path, &head, features())?;
+    read_back(path, &head, features())?;
     Ok(points.len() as u64)
+}
+
+fn write_lines(
+    path: &Path,
+    head: &str,
+    features: impl ExactSizeIterator<Item = Feature>,
+) -> Result<()> {
+    let mut file = create(path)?;
+    let mut put = |text: &str| {
+        file.write_all(text.as_bytes())
+            .map_err(IoFault::on("write"))
+            .in_file(path)
+    };
+    put(head)?;
+    let rows = features.len();
+    for (row, feature) in features.enumerate() {
+        let line = serde_json::to_string(&feature)
+            .map_err(ProductFault::refused("encode GeoJSON"))
+            .in_file(path)?;
+        put(&line)?;
+        put(separator(row, rows))?;
+    }
+    put(TAIL)?;
+    finish(path, file)
+}
+
+/// The lines before the first feature.
+fn head(site: &SiteProducts, points: &[[f64; 2]]) -> std::result::Result<String, ProductFault> {
+    let crs = NamedCrs {
+        r#type: "name",
+        properties: CrsName {
+            name: "urn:ogc:def:crs:IAU:2015:49900",
+        },
+    };
+    let mut members = vec![
+        ("type", json!("FeatureCollection")),
+        ("name", json!(site.config.site)),
+        ("crs", to_value(&crs)?),
+        ("frame", json!(FRAME)),
+    ];
+    if let Some(bounds) = bounding_box_deg(points) {
+        members.push(("bbox", to_value(&bounds)?));
+    }
+    let mut head = "{\n".to_owned();
+    for (name, member) in members {
+        let _infallible = writeln!(head, "\"{name}\": {member},");
+    }
+    head += "\"features\": [\n";
+    Ok(head)
+}
+
+/// The lines after the last feature.
+const TAIL: &str = "]\n}\n";
+
+/// What follows the feature in `row` of `rows`.
+const fn separator(row: usize, rows: usize) -> &'static str {
+    if row + 1 < rows { ",\n" } else { "\n" }
 }
 
 fn feature(site: &SiteProducts, row: usize, point: [f64; 2]) -> Feature {
@@ -112,21 +157,101 @@ fn feature(site: &SiteProducts, row: usize, point: [f64; 2]) -> Feature {
     }
 }
 
-/// The collection with one feature per line, so that a person and `diff` can read it.
-fn lines(collection: &Collection) -> serde_json::Result<String> {
-    let mut members = vec![
-        format!("\"type\": {}", serde_json::to_string(collection.r#type)?),
-        format!("\"name\": {}", serde_json::to_string(&collection.name)?),
-        format!("\"crs\": {}", serde_json::to_string(&collection.crs)?),
-    ];
-    if let Some(bounds) = collection.bbox {
-        members.push(format!("\"bbox\": {}", serde_json::to_string(&bounds)?));
+/// Checks that the file holds `head`, every feature with exact numbers, and nothing else.
+fn read_back(
+    path: &Path,
+    head: &str,
+    features: impl ExactSizeIterator<Item = Feature>,
+) -> Result<()> {
+    let mut file = BufReader::new(open(path)?);
+    let mut line = String::new();
+    let mut next = |line: &mut String| {
+        line.clear();
+        file.read_line(line)
+            .map_err(IoFault::on("read"))
+            .in_file(path)
+    };
+    let differs = |what: String| Err(ProductFault::ReadBack { what }).in_file(path);
+    for expected in head.split_inclusive('\n') {
+        next(&mut line)?;
+        if line != expected {
+            return differs(format!("{line:?} before the features"));
+        }
     }
-    let features = collection
-        .features
-        .iter()
-        .map(serde_json::to_string)
-        .collect::<serde_json::Result<Vec<_>>>()?;
-    members.push(format!("\"features\": [\n{}\n]", features.join(",\n")));
-    Ok(format!("{{\n{}\n}}\n", members.join(",\n")))
+    let rows = features.len();
+    for (row, feature) in features.enumerate() {
+        next(&mut line)?;
+        let expected = to_value(&feature).in_file(path)?;
+        let found = line
+            .strip_suffix(separator(row, rows))
+            .and_then(|text| serde_json::from_str::<Value>(text).ok());
+        if found != Some(expected) {
+            return differs(format!("feature {}", row + 1));
+        }
+    }
+    for expected in TAIL.split_inclusive('\n').chain([""]) {
+        next(&mut line)?;
+        if line != expected {
+            return differs(format!("{line:?} after the features"));
+        }
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::products::files::write_text;
+
+    fn features() -> impl ExactSizeIterator<Item = Feature> {
+        [1.0_f64, 2.0]
+            .map(f64::sqrt)
+            .into_iter()
+            .map(|et_s| Feature {
+                r#type: "Feature",
+                geometry: Point {
+                    r#type: "Point",
+                    coordinates: [0.1 + 0.2, -0.0],
+                },
+                properties: Properties {
+                    et_s,
+                    utc: "1999-08-24T14:12:13.000".to_owned(),
+                    orbit: 9019,
+                    source_file: "a\n\"b\"".to_owned(),
+                    record: 11,
+                    shot: 1,
+                    radius_m: 3_394_000.12,
+                    radius_crossover_m: 3_394_001.37,
+                    topography_m: -1_498.63,
+                    range_m: 380_000.1,
+                    windows: String::new(),
+                },
+            })
+    }
+
+    #[test]
+    fn a_changed_line_is_noticed() {
+        let head = "{\n\"features\": [\n";
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("footprints.geojson");
+        write_lines(&path, head, features()).unwrap();
+        read_back(&path, head, features()).unwrap();
+        let text = std::fs::read_to_string(&path).unwrap();
+        for (from, to, complaint) in [
+            ("{\n", "[\n", "\"[\\n\" before the features"),
+            // The last digit of the square root of 2.
+            ("1.4142135623730951", "1.414213562373095", "feature 2"),
+            ("},\n", "}\n", "feature 1"),
+            ("]\n}\n", "]\n", "\"\" after the features"),
+            ("]\n}\n", "]\n}\n}\n", "\"}\\n\" after the features"),
+        ] {
+            assert!(text.contains(from), "{from}");
+            write_text(&path, &text.replacen(from, to, 1)).unwrap();
+            let failure = read_back(&path, head, features()).unwrap_err();
+            assert_eq!(
+                failure.fault.to_string(),
+                format!("read back differently: {complaint}")
+            );
+        }
+    }
 }

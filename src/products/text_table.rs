@@ -1,13 +1,13 @@
 //! Tables as CSV files: shortest digits that give the same number back, or fixed decimals.
 
-use std::path::Path;
+use std::{io::Write, path::Path};
 
 use super::{
     fault::ProductFault,
-    files::{open, write_bytes},
+    files::{create, finish, open},
     table::{Column, Table, Values},
 };
-use crate::error::{Place, Result};
+use crate::error::{Failure, IoFault, Place, Result};
 
 /// Writes the columns of `table` that are no bytes, and reads them back.
 ///
@@ -19,26 +19,34 @@ pub(super) fn write(path: &Path, table: &Table) -> Result<u64> {
         .iter()
         .filter(|column| !matches!(column.values, Values::Binary(_)))
         .collect();
-    let bytes = encode(&columns, table.rows()).in_file(path)?;
-    write_bytes(path, &bytes)?;
+    let mut file = create(path)?;
+    encode(&mut file, &columns, table.rows()).in_file(path)?;
+    finish(path, file)?;
     read_back(path, &columns, table.rows()).in_file(path)?;
     Ok(table.rows() as u64)
 }
 
-fn encode(columns: &[&Column], rows: usize) -> std::result::Result<Vec<u8>, ProductFault> {
-    let refused = ProductFault::refused("encode CSV");
-    let mut writer = csv::Writer::from_writer(Vec::new());
+fn encode(file: impl Write, columns: &[&Column], rows: usize) -> Result<()> {
+    let mut writer = csv::Writer::from_writer(file);
     writer
         .write_record(columns.iter().map(|column| column.name))
-        .map_err(&refused)?;
+        .map_err(refused)?;
     for row in 0..rows {
         writer
             .write_record(columns.iter().map(|column| cell(&column.values, row)))
-            .map_err(&refused)?;
+            .map_err(refused)?;
     }
-    writer
-        .into_inner()
-        .map_err(ProductFault::refused("encode CSV"))
+    writer.flush().map_err(IoFault::on("write"))?;
+    Ok(())
+}
+
+/// The disk's refusal, or the library's.
+fn refused(error: csv::Error) -> Failure {
+    let reason = error.to_string();
+    match error.into_kind() {
+        csv::ErrorKind::Io(source) => IoFault::on("write")(source).into(),
+        _ => ProductFault::refused("encode CSV")(reason).into(),
+    }
 }
 
 fn cell(values: &Values, row: usize) -> String {
@@ -103,6 +111,7 @@ fn read_back(path: &Path, columns: &[&Column], rows: usize) -> Result<()> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::products::files::write_text;
 
     #[test]
     fn text_with_commas_and_numbers_with_all_digits_come_back() {
@@ -141,7 +150,7 @@ mod tests {
                 "read back differently: column a_m, row 3: 9",
             ),
         ] {
-            write_bytes(&path, text.as_bytes()).unwrap();
+            write_text(&path, text).unwrap();
             let failure = read_back(&path, &[&column], 2).unwrap_err();
             assert_eq!(failure.fault.to_string(), complaint);
         }
