@@ -276,18 +276,18 @@ fn select_attitudes(
             let hull = held.first().zip(held.last());
             let hull = hull.map(|(first, last)| interval_of([first[0], last[1]]));
             let hull = Intervals::union_of(hull);
-            if !hull.intersection(wanted).as_slice().is_empty() {
-                let held = held.into_iter().map(interval_of);
-                if *quality == CkQuality::Nominal {
-                    set.add(path, "NOMINAL attitude of MGS: commanded, not measured")?;
-                    commanded.push((name, Intervals::union_of(held)));
-                } else {
-                    set.add(path, "Reconstructed attitude of MGS")?;
-                    telemetry.extend(held);
-                }
-            } else {
+            if hull.intersection(wanted).as_slice().is_empty() {
                 let line = format!("{name}: left out, holds no attitude near the wanted times");
                 set.explanation.push(line);
+                continue;
+            }
+            let held = held.into_iter().map(interval_of);
+            if *quality == CkQuality::Nominal {
+                set.add(path, "NOMINAL attitude of MGS: commanded, not measured")?;
+                commanded.push((name, Intervals::union_of(held)));
+            } else {
+                set.add(path, "Reconstructed attitude of MGS")?;
+                telemetry.extend(held);
             }
         }
     }
