@@ -26,18 +26,6 @@ use areograph::{
 use nalgebra::{Matrix3, Vector3};
 use serde_json::Value;
 
-const KERNELS: [&str; 9] = [
-    "naif0012.tls",
-    "pck00009.tpc",
-    "MGS_SCLKSCET.00061.tsc",
-    "moc20.ti",
-    "mocAddendum004.ti",
-    "m0402852.ale_0.bsp",
-    "m0402852.ale_1.bsp",
-    "mgs_sc_map2_0_sliced_-94000.bc",
-    "mgs_sc_map2_1_sliced_-94000.bc",
-];
-
 fn image(id: &str, label: PathBuf) -> ImageConfig {
     ImageConfig {
         id: id.to_owned(),
@@ -56,7 +44,10 @@ fn m0402852(test: &str) -> Option<(ImageTimes, Orientation, Value)> {
     let folder = common::real_data("ale_mgs/m0402852", test)?;
     let truth = common::real_data("derived/cspice_truth.json", test)?;
     let truth: Value = serde_json::from_str(&fs::read_to_string(truth).unwrap()).unwrap();
-    let files: Vec<PathBuf> = KERNELS.iter().map(|name| folder.join(name)).collect();
+    let files: Vec<PathBuf> = common::M0402852_KERNELS
+        .iter()
+        .map(|name| folder.join(name))
+        .collect();
     let session = Session::open(&KernelSet::from_files(&files).unwrap()).unwrap();
     let image = image("M04-02852", folder.join("m0402852_isis.lbl"));
     let times = tag_times(&[image], &session).unwrap().remove(0);

@@ -15,18 +15,6 @@ use std::{
 use common::mission::{areograph, products, succeed};
 use serde_json::Value;
 
-const KERNELS: [&str; 9] = [
-    "naif0012.tls",
-    "pck00009.tpc",
-    "MGS_SCLKSCET.00061.tsc",
-    "moc20.ti",
-    "mocAddendum004.ti",
-    "m0402852.ale_0.bsp",
-    "m0402852.ale_1.bsp",
-    "mgs_sc_map2_0_sliced_-94000.bc",
-    "mgs_sc_map2_1_sliced_-94000.bc",
-];
-
 /// A metakernel over the real kernels, its strings cut to the 80 characters that NAIF allows.
 #[allow(
     clippy::disallowed_methods,
@@ -47,7 +35,7 @@ fn metakernel(folder: &Path, data: &Path) -> PathBuf {
         lines.push(last.clone());
         lines.join("\n  ")
     };
-    let list: Vec<String> = KERNELS
+    let list: Vec<String> = common::M0402852_KERNELS
         .iter()
         .map(|name| quoted(&data.join(name).to_string_lossy()))
         .collect();
@@ -94,7 +82,10 @@ fn a_site_on_real_kernels_ends_valid_and_stays() {
     assert_eq!(manifest["verdict"]["valid"], true);
     assert_eq!(manifest["counts"]["images"], 1);
     assert!(manifest["counts"]["footprints"].as_u64().unwrap() > 1000);
-    assert_eq!(manifest["kernels"].as_array().unwrap().len(), KERNELS.len());
+    assert_eq!(
+        manifest["kernels"].as_array().unwrap().len(),
+        common::M0402852_KERNELS.len()
+    );
     assert_eq!(manifest["complaints"]["count"], 0);
     for product in manifest["products"].as_array().unwrap() {
         let path = out

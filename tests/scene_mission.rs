@@ -372,19 +372,11 @@ fn a_flight_along_real_kernels_gives_shots_that_fit_them() {
         return;
     };
     let folder = tempfile::tempdir().unwrap();
-    let names = [
-        "naif0012.tls",
-        "pck00009.tpc",
-        "MGS_SCLKSCET.00061.tsc",
-        "moc20.ti",
-        "mocAddendum004.ti",
-        "m0402852.ale_0.bsp",
-        "m0402852.ale_1.bsp",
-        "mgs_sc_map2_0_sliced_-94000.bc",
-        "mgs_sc_map2_1_sliced_-94000.bc",
-    ];
     let data = data.canonicalize().unwrap();
-    let list: Vec<String> = names.iter().map(|name| format!("'$D/{name}'")).collect();
+    let list: Vec<String> = common::M0402852_KERNELS
+        .iter()
+        .map(|name| format!("'$D/{name}'"))
+        .collect();
     let metakernel = folder.path().join("real.tm");
     let text = format!(
         "KPL/MK\n\\begindata\nPATH_SYMBOLS = ( 'D' )\nPATH_VALUES = ( '{}' )\nKERNELS_TO_LOAD = ( {} )\n",

@@ -29,3 +29,16 @@ pub(crate) fn real_data(relative: &str, test: &str) -> Option<PathBuf> {
     eprintln!("skipped {test}: no {} (set AREOGRAPH_DATA)", path.display());
     None
 }
+
+/// Kernels of image M04/02852 in `ale_mgs/m0402852`, in load order.
+pub(crate) const M0402852_KERNELS: [&str; 9] = [
+    "naif0012.tls",
+    "pck00009.tpc",
+    "MGS_SCLKSCET.00061.tsc",
+    "moc20.ti",
+    "mocAddendum004.ti",
+    "m0402852.ale_0.bsp",
+    "m0402852.ale_1.bsp",
+    "mgs_sc_map2_0_sliced_-94000.bc",
+    "mgs_sc_map2_1_sliced_-94000.bc",
+];
