@@ -31,13 +31,13 @@ const FLOORS: [&[&str]; 6] = [
 ];
 
 /// Arrows inside a floor that are meant: the scene is written with the fence and the PEDR writer,
-/// the flow publishes, and the report is a product.
+/// the flow publishes, and the report tells of the products.
 const SAME_FLOOR: [(&str, &str); 6] = [
     ("scene", "spice"),
     ("scene", "pds"),
     ("flow", "products"),
     ("flow", "store"),
-    ("products", "report"),
+    ("flow", "report"),
     ("report", "products"),
 ];
 

@@ -17,6 +17,7 @@ use areograph::{
     footprints::Footprint,
     geom::mars_rotation::mars_matrix,
     products::write_products,
+    report,
     spice::{KernelSet, Session},
     store::manifest::Manifest,
     time::Et,
@@ -37,7 +38,9 @@ fn written(name: &str, site: &Site, image: bool) -> (PathBuf, Vec<(String, u64)>
         fs::remove_dir_all(&folder).unwrap();
     }
     let products = site
-        .with(image, |site| write_products(&folder, site))
+        .with(image, |site| {
+            write_products(&folder, site, &report::page(site)?)
+        })
         .unwrap();
     let list = products
         .iter()
@@ -475,7 +478,9 @@ fn numbers_that_are_not_finite_are_refused_with_their_place() {
     site.footprints.range_m[4] = f64::NAN;
     let folder = tempfile::tempdir().unwrap();
     let failure = site
-        .with(true, |site| write_products(folder.path(), site))
+        .with(true, |site| {
+            write_products(folder.path(), site, &report::page(site)?)
+        })
         .unwrap_err();
     assert_eq!(failure.kind(), Kind::Bug);
     assert_eq!(
@@ -486,7 +491,9 @@ fn numbers_that_are_not_finite_are_refused_with_their_place() {
     let mut site = Site::small();
     site.orientation.tables.velocity_m_s[1][2] = f64::INFINITY;
     let failure = site
-        .with(true, |site| write_products(folder.path(), site))
+        .with(true, |site| {
+            write_products(folder.path(), site, &report::page(site)?)
+        })
         .unwrap_err();
     assert_eq!(
         failure.fault.to_string(),
@@ -501,7 +508,9 @@ fn parts_that_do_not_belong_together_are_refused() {
     site.utc.pop();
     let folder = tempfile::tempdir().unwrap();
     let failure = site
-        .with(true, |site| write_products(folder.path(), site))
+        .with(true, |site| {
+            write_products(folder.path(), site, &report::page(site)?)
+        })
         .unwrap_err();
     assert_eq!(
         failure.fault.to_string(),

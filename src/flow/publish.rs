@@ -11,6 +11,7 @@ use crate::{
     config::SiteConfig,
     error::Result,
     products::{ImageProducts, KernelLine, SiteProducts, write_products},
+    report,
     spice::{KernelSet, Session, Wanted},
     stages::{
         check_ranges::RangeCheck, convert_datum::Converted, fit_sensor_model::SensorModel,
@@ -142,7 +143,7 @@ fn make_products(folder: &Path, results: &Results<'_>, fingerprint: String) -> R
     };
     let invalid_because = site.invalid_because();
     let staging = staging(folder)?;
-    let mut files: Vec<(PathBuf, u64)> = write_products(&staging, &site)?
+    let mut files: Vec<(PathBuf, u64)> = write_products(&staging, &site, &report::page(&site)?)?
         .into_iter()
         .map(|product| (product.path, product.rows))
         .collect();

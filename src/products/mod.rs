@@ -29,7 +29,7 @@ use std::path::{Path, PathBuf};
 
 pub use site::{ImageProducts, KernelLine, SiteProducts};
 
-use crate::{error::Result, report};
+use crate::error::Result;
 
 /// A file that was written.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -40,13 +40,13 @@ pub struct Product {
     pub rows: u64,
 }
 
-/// Writes every product of `site` below `directory` and reads each of them back.
+/// Writes every product of `site` below `directory`, with `page` as its report, and reads each of them back.
 ///
 /// # Errors
 /// [`Kind::Io`](crate::error::Kind::Io) for what the disk refuses; [`Kind::Bug`](crate::error::Kind::Bug)
 /// for numbers that are not finite, inputs that do not belong together and files that read back
 /// differently.
-pub fn write_products(directory: &Path, site: &SiteProducts) -> Result<Vec<Product>> {
+pub fn write_products(directory: &Path, site: &SiteProducts, page: &str) -> Result<Vec<Product>> {
     site.check()?;
     let mut written = Writer {
         directory,
@@ -60,7 +60,7 @@ pub fn write_products(directory: &Path, site: &SiteProducts) -> Result<Vec<Produ
     }
     exchange::write(&mut written, site)?;
     written.add("report/index.html", |path| {
-        files::write_text(path, &report::page(site)?)?;
+        files::write_text(path, page)?;
         Ok(0)
     })?;
     Ok(written.products)
