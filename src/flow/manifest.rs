@@ -9,7 +9,8 @@ use crate::{
     files::file_name,
     frames::MarsIau2000,
     geom::{attitude::rotation_vector, mars_rotation::mars_rotation},
-    spice::{KernelRole, Session},
+    products::KernelLine,
+    spice::{KernelRole, KernelSet, Session},
     store::manifest::{
         BiasEntry, Complaints, ConfigurationEntry, KernelEntry, Manifest, ProductEntry, StageEntry,
         Verdict,
@@ -173,6 +174,25 @@ pub(super) fn kernel_entries(session: &Session, results: &Results<'_>) -> Result
                     held.intersection(used).as_slice().to_vec()
                 }),
             }
+        })
+        .collect())
+}
+
+/// Kernels with all that they hold of MGS, as reports show them.
+pub(super) fn kernel_lines(session: &Session, kernels: &KernelSet) -> Result<Vec<KernelLine>> {
+    let coverage = session.coverage()?;
+    let lines = kernels.kernels().iter().enumerate();
+    Ok(lines
+        .map(|(index, kernel)| KernelLine {
+            name: kernel.file_name(),
+            role: kernel.role.to_string(),
+            bytes: kernel.bytes,
+            blake3: kernel.blake3.clone(),
+            held: coverage
+                .per_kernel
+                .iter()
+                .find(|(of, _)| *of == index)
+                .map(|(_, held)| held.clone()),
         })
         .collect())
 }

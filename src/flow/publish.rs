@@ -4,13 +4,13 @@ use std::path::{Path, PathBuf};
 
 use super::{
     Ending, Stage,
-    manifest::{Account, kernel_entries, pck_note},
+    manifest::{Account, kernel_entries, kernel_lines, pck_note},
     parts,
 };
 use crate::{
     config::SiteConfig,
     error::Result,
-    products::{ImageProducts, KernelLine, SiteProducts, write_products},
+    products::{ImageProducts, SiteProducts, write_products},
     report,
     spice::{KernelSet, Session, Wanted},
     stages::{
@@ -98,17 +98,9 @@ fn make_products(folder: &Path, results: &Results<'_>, fingerprint: String) -> R
     let mut notes = results.notes();
     notes.extend(pck_note(&session, &results.wanted.positions));
     let kernels = kernel_entries(&session, results)?;
+    let lines = kernel_lines(&session, results.kernels)?;
     drop(session);
 
-    let lines: Vec<KernelLine> = kernels
-        .iter()
-        .map(|kernel| KernelLine {
-            name: kernel.name.clone(),
-            role: kernel.role.clone(),
-            bytes: kernel.bytes,
-            blake3: kernel.blake3.clone(),
-        })
-        .collect();
     let images: Vec<ImageProducts<'_>> = results
         .images
         .value
@@ -132,6 +124,7 @@ fn make_products(folder: &Path, results: &Results<'_>, fingerprint: String) -> R
     let site = SiteProducts {
         config: results.config,
         kernels: &lines,
+        wanted: results.wanted,
         images: &images,
         footprints,
         utc: &utc,

@@ -8,10 +8,12 @@ use crate::{
     error::Result,
     footprints::Footprints,
     frames::MarsIau2000,
+    spice::Wanted,
     stages::{
         check_ranges::RangeCheck, fit_sensor_model::SensorModel, group_profiles::Profile,
         sample_orientation::Orientation, tag_times::ImageTimes,
     },
+    time::Intervals,
 };
 
 /// One site, borrowed from the flow.
@@ -21,6 +23,8 @@ pub struct SiteProducts<'a> {
     pub config: &'a SiteConfig,
     /// Kernels in load order.
     pub kernels: &'a [KernelLine],
+    /// The instants that the site asks of the kernels.
+    pub wanted: &'a Wanted,
     /// Images in the order of the configuration.
     pub images: &'a [ImageProducts<'a>],
     /// Footprints in IAU 2000.
@@ -40,7 +44,7 @@ pub struct SiteProducts<'a> {
 }
 
 /// A kernel as reports show it.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct KernelLine {
     /// File name.
     pub name: String,
@@ -50,6 +54,8 @@ pub struct KernelLine {
     pub bytes: u64,
     /// BLAKE3 of its bytes, hexadecimal.
     pub blake3: String,
+    /// When it holds MGS itself, its position in an SPK, its attitude in a CK; `None` for other kernels.
+    pub held: Option<Intervals>,
 }
 
 /// One image.

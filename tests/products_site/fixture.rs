@@ -16,6 +16,7 @@ use areograph::{
         statistics::{Summary, Trend},
     },
     products::{ImageProducts, KernelLine, SiteProducts},
+    spice::Wanted,
     stages::{
         check_ranges::{BiasScan, ProfileRanges, RangeCheck, ShotResiduals},
         fit_sensor_model::{SensorModel, fit_sensor_model},
@@ -35,6 +36,7 @@ pub(crate) const START_S: f64 = -11_224_002.182_053_322;
 pub(crate) struct Site {
     pub(crate) config: SiteConfig,
     pub(crate) kernels: Vec<KernelLine>,
+    pub(crate) wanted: Wanted,
     pub(crate) times: ImageTimes,
     pub(crate) orientation: Orientation,
     pub(crate) model: SensorModel,
@@ -60,7 +62,9 @@ impl Site {
                 role: "LSK".to_owned(),
                 bytes: 5257,
                 blake3: "ab".repeat(32),
+                held: None,
             }],
+            wanted: Wanted::default(),
             model: fit_sensor_model(&orientation, &config.orientation).unwrap(),
             utc: (0..footprints.len())
                 .map(|row| format!("1999-08-24T14:12:{:06.3}", 13.0 + 0.1 * row as f64))
@@ -100,6 +104,7 @@ impl Site {
         with(&SiteProducts {
             config: &self.config,
             kernels: &self.kernels,
+            wanted: &self.wanted,
             images: if image { &images } else { &[] },
             footprints: &self.footprints,
             utc: &self.utc,
