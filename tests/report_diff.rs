@@ -1,0 +1,305 @@
+//! What `areograph report diff` says of two runs, and that it says it of what was really injected.
+#![allow(
+    clippy::disallowed_methods,
+    clippy::unwrap_used,
+    clippy::panic,
+    reason = "helpers of tests work in temporary folders and may fail loudly"
+)]
+
+mod common;
+
+use std::{
+    fs,
+    path::{Path, PathBuf},
+};
+
+use areograph::{
+    frames::{J2000, MgsBus, Rotation},
+    geom::{
+        attitude::{make_continuous, spice_quaternion},
+        mars_rotation::frame_rotation_1,
+    },
+    spice::{CkSegment, KernelSet, Session, write_ck},
+    time::{Et, PointingBias},
+    units::RADIANS_PER_ARCSECOND,
+};
+use common::case::Case;
+use serde_json::Value;
+
+/// The image of the case.
+const IMAGE: &str = "E02-02016";
+const TURN_ARCSEC: f64 = 20.0;
+
+/// A case that has run once, its products kept in `before/case`.
+fn after_a_first_run() -> Case {
+    let case = Case::new();
+    case.stages_run();
+    copy_products(&case.path("out/case"), &case.path("before/case"));
+    case
+}
+
+/// Copies what was published; the cache stays behind.
+fn copy_products(from: &Path, to: &Path) {
+    for (relative, _) in common::mission::products(from) {
+        let target = to.join(&relative);
+        fs::create_dir_all(target.parent().unwrap()).unwrap();
+        fs::copy(from.join(&relative), target).unwrap();
+    }
+}
+
+/// Exit code and everything printed by the command with these further arguments.
+fn diff(case: &Case, arguments: &[&str]) -> String {
+    let mut command = case.areograph();
+    command.args(["--quiet", "report", "diff"]).args(arguments);
+    case.outcome(command)
+}
+
+/// The one site's difference between `before` and `out`.
+fn difference(case: &Case) -> Value {
+    let mut command = case.areograph();
+    command.args(["report", "diff", "before", "out", "--json"]);
+    let answer = common::mission::succeed(&mut command).stdout;
+    let mut answer: Value = serde_json::from_slice(&answer).unwrap();
+    assert_eq!(answer["sites"].as_array().unwrap().len(), 1);
+    answer["sites"][0].take()
+}
+
+fn number(value: &Value) -> f64 {
+    value
+        .as_f64()
+        .unwrap_or_else(|| panic!("no number: {value}"))
+}
+
+fn names(items: &Value) -> Vec<&str> {
+    let items = items.as_array().unwrap().iter();
+    items.map(|item| item["name"].as_str().unwrap()).collect()
+}
+
+fn assert_near(found: &Value, expected: f64, tolerance: f64) {
+    let found = number(found);
+    assert!(
+        (found - expected).abs() <= tolerance,
+        "{found}, expected {expected} ± {tolerance}"
+    );
+}
+
+/// Replaces the case's C-kernel by a copy with every attitude turned about the camera's x axis.
+fn turn_attitudes(case: &Case) {
+    let path = case.path("kernels/mgs_sc_scene.bc");
+    let turned = case.path("kernels/turned.bc");
+    let kernels = KernelSet::from_metakernel(&case.path("kernels/nav.tm")).unwrap();
+    let session = Session::open(&kernels).unwrap();
+    let columns: Vec<_> = session
+        .coverage()
+        .unwrap()
+        .ck
+        .as_slice()
+        .iter()
+        .map(|interval| {
+            // The scene's samples, 4 s apart: between them both kernels turn evenly.
+            let count = (interval.duration_s() / 4.0).round() as u32;
+            turned_attitudes(&session, interval.start, count)
+        })
+        .collect();
+    let segments: Vec<CkSegment> = columns
+        .iter()
+        .map(|(instants, quaternions, rates)| CkSegment {
+            name: "turned",
+            instants,
+            quaternions,
+            angular_velocities_rad_s: rates,
+            interval_starts: &instants[..1],
+        })
+        .collect();
+    write_ck(&turned, &session, &segments, "every attitude turned").unwrap();
+    drop(session);
+    fs::rename(turned, path).unwrap();
+}
+
+type Attitudes = (Vec<Et>, Vec<[f64; 4]>, Vec<[f64; 3]>);
+
+/// Attitudes from `start` on as the kernel counts time, turned; rates in J2000 stay as they are.
+fn turned_attitudes(session: &Session, start: Et, count: u32) -> Attitudes {
+    let turn = frame_rotation_1(TURN_ARCSEC * RADIANS_PER_ARCSECOND);
+    let unbiased = PointingBias::from_seconds(0.0);
+    let (mut instants, mut quaternions, mut rates) = (Vec::new(), Vec::new(), Vec::new());
+    for index in 0..=count {
+        let at = start.plus(4.0 * f64::from(index));
+        // The last instant may be a rounding of the clock beyond the interval.
+        let attitude = session.attitude(unbiased.lookup(at), at, 0.01).unwrap();
+        let mounting = *session.mounting(at).unwrap().matrix();
+        let turned = mounting.transpose() * turn * mounting * attitude.inertial_to_bus.matrix();
+        let turned: Rotation<J2000, MgsBus> = Rotation::new(turned, at);
+        instants.push(at);
+        quaternions.push(spice_quaternion(turned.matrix()));
+        rates.push(attitude.angular_velocity_rad_s.into());
+    }
+    make_continuous(&mut quaternions);
+    (instants, quaternions, rates)
+}
+
+#[test]
+fn a_turned_ck_is_found_and_nothing_else() {
+    let case = after_a_first_run();
+    turn_attitudes(&case);
+    let ran = [
+        "sample_orientation/image",
+        "fit_sensor_model/image",
+        "publish",
+    ];
+    assert_eq!(case.stages_run(), ran);
+
+    let found = difference(&case);
+    assert_eq!(found["outcome"], "moved");
+    assert_eq!(names(&found["kernels"]["changed"]), ["mgs_sc_scene.bc"]);
+    assert_eq!(found["kernels"]["changed"][0]["role"], "CK");
+    assert_eq!(names(&found["stages"]["changed"]), ran);
+    assert_eq!(found["stages"]["unchanged"], 5);
+    assert_eq!(found["configuration_changed"], false);
+    assert_eq!(found["footprints"]["only_in_a"], 0);
+    assert_eq!(found["footprints"]["only_in_b"], 0);
+    let footprints = &found["footprints"]["movement"];
+    assert_eq!(footprints["moved"], 0);
+    assert_near(&footprints["distance_m"]["max"], 0.0, 0.0);
+    assert!(
+        found["profiles"]
+            .as_array()
+            .unwrap()
+            .iter()
+            .all(|profile| profile["changed"] == false)
+    );
+
+    let movement = &found["images"][0]["movement"];
+    assert_eq!(movement["samples"].as_array().unwrap().len(), 31);
+    assert_near(&movement["distance_m"]["max"], 0.0, 0.0);
+    // 1 % is what the command is meant to be good for; clock ticks of 1/256 s leave 1e-4 arcsec.
+    assert_near(
+        &movement["turn_arcsec"]["mean"],
+        TURN_ARCSEC,
+        0.01 * TURN_ARCSEC,
+    );
+    assert_near(
+        &movement["about_x_arcsec"]["mean"],
+        TURN_ARCSEC,
+        0.01 * TURN_ARCSEC,
+    );
+    assert_near(&movement["about_y_arcsec"]["max_abs"], 0.0, 0.01);
+    assert_near(&movement["about_z_arcsec"]["max_abs"], 0.0, 0.01);
+    // The image looks at nadir from this height, by the range of its boresight.
+    let expected_m = TURN_ARCSEC * RADIANS_PER_ARCSECOND * boresight_range_m(&case);
+    assert_near(
+        &movement["pointing_ground_m"]["mean"],
+        expected_m,
+        0.01 * expected_m,
+    );
+    assert_near(
+        &movement["boresight_ground_m"]["mean"],
+        expected_m,
+        0.01 * expected_m,
+    );
+}
+
+/// Range of the middle of the image, from the exchange-independent product.
+fn boresight_range_m(case: &Case) -> f64 {
+    let path = case.path("before/case/images/image/orientation.parquet");
+    let rows = areograph::products::read::read_samples(&path).unwrap();
+    rows[15].boresight_range_m.unwrap()
+}
+
+#[test]
+fn limits_on_the_movement_give_exit_code_5() {
+    let case = after_a_first_run();
+    turn_attitudes(&case);
+    case.stages_run();
+    let printed = diff(&case, &["before", "out", "--limit-arcsec", "19"]);
+    assert!(
+        printed.starts_with(
+            "exit 5\ncase: BEYOND THE LIMIT: image image: the camera turned by up to 20."
+        ),
+        "{printed}"
+    );
+    let printed = diff(&case, &["before", "out", "--limit-m", "30"]);
+    assert!(printed.starts_with("exit 5\ncase: BEYOND THE LIMIT: image image: the boresight's ground point moved by up to 3"), "{printed}");
+    let printed = diff(
+        &case,
+        &["before", "out", "--limit-m", "40", "--limit-arcsec", "21"],
+    );
+    assert!(
+        printed.starts_with("exit 0\ncase: moved: pointing by up to 20."),
+        "{printed}"
+    );
+    let printed = diff(&case, &["before", "out", "--limit-m", "-1"]);
+    assert!(printed.starts_with("exit 2\n"), "{printed}");
+}
+
+#[test]
+fn another_orbit_moves_the_camera_by_the_injected_difference() {
+    let case = Case::new();
+    case.replace("site.toml", "nav.tm", "gsfc.tm");
+    case.stages_run();
+    copy_products(&case.path("out/case"), &case.path("before/case"));
+    case.replace("site.toml", "gsfc.tm", "nav.tm");
+    let ran = [
+        "check_ranges",
+        "sample_orientation/image",
+        "fit_sensor_model/image",
+        "publish",
+    ];
+    assert_eq!(case.stages_run(), ran);
+
+    let found = difference(&case);
+    assert_eq!(found["outcome"], "moved");
+    assert_eq!(names(&found["kernels"]["added"]), ["mgs_nav_scene.bsp"]);
+    assert_eq!(names(&found["kernels"]["removed"]), ["mgs_gsfc_scene.bsp"]);
+    assert_eq!(found["configuration_changed"], true);
+    assert_eq!(found["footprints"]["movement"]["moved"], 0);
+
+    let truth = fs::read(common::mission::mission().join("truth.json")).unwrap();
+    let truth: Value = serde_json::from_slice(&truth).unwrap();
+    let mut profiles = truth["profiles"].as_array().unwrap().iter();
+    let truth =
+        &profiles.find(|profile| profile["image"] == IMAGE).unwrap()["orbit_differences"]["nav"];
+    let movement = &found["images"][0]["movement"];
+    for (index, axis) in ["radial_m", "along_m", "cross_m"].iter().enumerate() {
+        let expected_m = number(&truth["radial_along_cross_m"][index]);
+        // The truth holds in the middle; Hermite interpolation over 60 s leaves less than 1 mm. Over the
+        // image's 12 s the difference swings by 0.1 sin(0.9e-3 · 6 s), 0.05 % of at most 18 m.
+        assert_near(&movement["samples"][15][axis], expected_m, 1e-3);
+        assert_near(&movement[axis]["mean"], expected_m, 1e-3);
+        assert_near(&movement[axis]["max_abs"], expected_m.abs(), 0.01);
+    }
+    assert_near(&movement["turn_arcsec"]["max"], 0.0, 1e-6); // rounding of quaternions
+    // With the other orbit the profile's residuals are those of the truth: half a decimetre for the ranges.
+    let profile = found["profiles"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .find(|profile| profile["changed"] == true)
+        .unwrap();
+    let mean_m = |run: &str| number(&profile[run]["range_minus_distance_m"]["mean"]);
+    let expected_m = number(&truth["expected_range_minus_distance_mean_m"]);
+    assert!((mean_m("b") - mean_m("a") - expected_m).abs() < 0.05);
+}
+
+#[test]
+fn equal_runs_say_so() {
+    let case = after_a_first_run();
+    let mut command = case.run();
+    command.arg("--force");
+    assert!(case.outcome(command).starts_with("exit 0"));
+    let printed = diff(
+        &case,
+        &["before", "out", "--limit-m", "0", "--limit-arcsec", "0"],
+    );
+    assert!(
+        printed.starts_with("exit 0\ncase: nothing changed\n"),
+        "{printed}"
+    );
+    assert_eq!(printed.lines().count(), 4, "{printed}");
+    assert_eq!(difference(&case)["outcome"], "nothing_changed");
+    // The folder of the site, instead of the one that holds it.
+    assert_eq!(
+        diff(&case, &["before/case", "out/case"]),
+        printed.replace("exit 0", "exit 0")
+    );
+}
