@@ -8,10 +8,7 @@
 
 mod common;
 
-use std::{
-    fs,
-    path::{Path, PathBuf},
-};
+use std::{fs, path::Path};
 
 use areograph::{
     frames::{J2000, MgsBus, Rotation},
@@ -199,7 +196,7 @@ fn a_turned_ck_is_found_and_nothing_else() {
     );
 }
 
-/// Range of the middle of the image, from the exchange-independent product.
+/// Range of the middle of the image, from the product.
 fn boresight_range_m(case: &Case) -> f64 {
     let path = case.path("before/case/images/image/orientation.parquet");
     let rows = areograph::products::read::read_samples(&path).unwrap();
@@ -298,8 +295,196 @@ fn equal_runs_say_so() {
     assert_eq!(printed.lines().count(), 4, "{printed}");
     assert_eq!(difference(&case)["outcome"], "nothing_changed");
     // The folder of the site, instead of the one that holds it.
-    assert_eq!(
-        diff(&case, &["before/case", "out/case"]),
-        printed.replace("exit 0", "exit 0")
+    assert_eq!(diff(&case, &["before/case", "out/case"]), printed);
+}
+
+#[test]
+fn a_clock_correction_that_turns_mars_moves_footprints_and_names_its_key() {
+    let case = after_a_first_run();
+    case.replace(
+        "site.toml",
+        "[pedr]",
+        "[mola_clock]\nscope = \"both\"\n[pedr]",
+    );
+    case.stages_run();
+    let found = difference(&case);
+    let keys = serde_json::json!([{"what": "mola_clock.scope", "a": "spk_lookup", "b": "both"}]);
+    assert_eq!(found["configuration"], keys);
+    assert_eq!(found["biases"][0]["what"], "mola_clock.scope");
+    let movement = &found["footprints"]["movement"];
+    assert_eq!(movement["moved"], found["footprints"]["matched"]);
+    // 117 ms of Mars' rotation at 4° to 5° north, 3394 to 3396 km from the centre: 28.09 m ± 0.04 m.
+    assert_near(&movement["distance_m"]["mean"], 28.09, 0.05);
+    assert_near(&movement["topography_m"]["max_abs"], 0.0, 0.0);
+    assert_eq!(found["images"][0]["movement"]["distance_m"]["max"], 0.0);
+    let printed = diff(&case, &["before", "out", "--limit-m", "28"]);
+    assert!(
+        printed.starts_with("exit 5\ncase: BEYOND THE LIMIT: footprints moved by up to 28."),
+        "{printed}"
     );
 }
+
+#[test]
+fn what_is_in_one_run_only_is_counted_and_keeps_no_limit() {
+    let case = after_a_first_run();
+    case.replace("site.toml", "[4.0, 5.0]", "[4.5, 5.5]");
+    case.replace("site.toml", "id = \"image\"", "id = \"renamed\"");
+    case.stages_run();
+    let found = difference(&case);
+    assert_eq!(found["outcome"], "moved");
+    let footprints = &found["footprints"];
+    let count = |key: &str| footprints[key].as_u64().unwrap();
+    // The windows are equally high and share a half.
+    assert!(
+        count("matched") > 50 && count("only_in_a") > 50 && count("only_in_b") > 50,
+        "{footprints}"
+    );
+    assert_eq!(footprints["movement"]["moved"], 0);
+    assert_eq!(names(&found["stages"]["added"]).len(), 2);
+    assert_eq!(found["images"][0]["valid_in_a"], true);
+    assert_eq!(found["images"][1]["samples_only_in_b"], 31);
+    assert!(found["images"][0]["valid_in_b"].is_null());
+    let printed = diff(&case, &["before", "out", "--limit-arcsec", "1"]);
+    let expected = "exit 5\ncase: BEYOND THE LIMIT: image image: no sample of A is in B: limits cannot be applied\n";
+    assert!(printed.starts_with(expected), "{printed}");
+    assert!(
+        printed.contains("\n  image renamed: only in B\n"),
+        "{printed}"
+    );
+}
+
+#[test]
+fn every_site_of_two_outputs_is_compared() {
+    let case = after_a_first_run();
+    for (folder, site) in [("before", "gone"), ("out", "new")] {
+        copy_products(&case.path("before/case"), &case.path(folder).join(site));
+    }
+    let printed = diff(&case, &["before", "out"]);
+    assert!(
+        printed.starts_with("exit 0\ncase: nothing changed\n"),
+        "{printed}"
+    );
+    assert!(
+        printed.ends_with("gone: only in A, not compared\nnew: only in B, not compared\n"),
+        "{printed}"
+    );
+    assert!(diff(&case, &["before", "out", "--limit-m", "1"]).starts_with("exit 5\n"));
+    // A site that cannot be read does not hide the others.
+    copy_products(&case.path("before/case"), &case.path("out/gone"));
+    case.write("out/gone/kernels.tm", "mine");
+    let printed = diff(&case, &["before", "out"]);
+    assert!(
+        printed.starts_with("exit 3\ncase: nothing changed\n"),
+        "{printed}"
+    );
+    assert!(
+        printed.contains("error: out/gone/kernels.tm: has 4 bytes"),
+        "{printed}"
+    );
+}
+
+#[test]
+fn outputs_that_cannot_be_compared_are_refused() {
+    let case = after_a_first_run();
+    let refusals: [(&str, fn(&Case), &str); 8] = [
+        (
+            "no folder",
+            |case| fs::remove_dir_all(case.path("out")).unwrap(),
+            NO_FOLDER,
+        ),
+        (
+            "empty folder",
+            |case| {
+                fs::remove_dir_all(case.path("out")).unwrap();
+                fs::create_dir(case.path("out")).unwrap();
+            },
+            EMPTY,
+        ),
+        (
+            "no manifest",
+            |case| fs::remove_file(case.path("out/case/manifest.json")).unwrap(),
+            EMPTY,
+        ),
+        (
+            "stopped early",
+            |case| {
+                fs::remove_file(case.path("out/case/manifest.json")).unwrap();
+                fs::create_dir(case.path("out/case/.cache")).unwrap();
+            },
+            STOPPED_EARLY,
+        ),
+        (
+            "half-made",
+            |case| case.write("out/case/.publishing", "kernels.tm"),
+            HALF_MADE,
+        ),
+        (
+            "no JSON",
+            |case| case.write("out/case/manifest.json", "{"),
+            NO_JSON,
+        ),
+        (
+            "another site",
+            |case| {
+                case.replace(
+                    "out/case/manifest.json",
+                    "\"site\": \"case\"",
+                    "\"site\": \"other\"",
+                )
+            },
+            ANOTHER_SITE,
+        ),
+        (
+            "no common site",
+            |case| fs::rename(case.path("out/case"), case.path("out/other")).unwrap(),
+            NO_COMMON_SITE,
+        ),
+    ];
+    for (what, spoil, expected) in refusals {
+        let _ = fs::remove_dir_all(case.path("out"));
+        copy_products(&case.path("before/case"), &case.path("out/case"));
+        spoil(&case);
+        assert_eq!(diff(&case, &["before", "out"]), expected, "{what}");
+    }
+    assert_eq!(diff(&case, &["before", "before/../before"]), ONE_FOLDER);
+    let _ = fs::remove_dir_all(case.path("out"));
+    copy_products(&case.path("before/case"), &case.path("out/case"));
+    assert_eq!(diff(&case, &["before/case", "out"]), ONE_AND_SEVERAL);
+}
+
+#[test]
+fn products_that_contradict_the_manifest_are_refused() {
+    let case = after_a_first_run();
+    copy_products(&case.path("before/case"), &case.path("aside/case"));
+    let manifest: Value = serde_json::from_slice(&case.read("out/case/manifest.json")).unwrap();
+    let message = |path: &str, found: &str| {
+        let mut products = manifest["products"].as_array().unwrap().iter();
+        let product = products.find(|product| product["path"] == path).unwrap();
+        let hash = &product["blake3"].as_str().unwrap()[..12];
+        let bytes = &product["bytes"];
+        format!(
+            "exit 3\nerror: aside/case/{path}: {found}; expected {bytes} bytes with the BLAKE3 hash {hash} of \
+             manifest.json\n  what to do: run the site again, which makes damaged products anew\n"
+        )
+    };
+    case.write("aside/case/footprints.csv", "mine");
+    let hash = &blake3::hash(b"mine").to_hex()[..12];
+    let expected = message(
+        "footprints.csv",
+        &format!("has 4 bytes with the hash {hash}"),
+    );
+    assert_eq!(diff(&case, &["aside", "out"]), expected);
+    fs::remove_file(case.path("aside/case/footprints.csv")).unwrap();
+    let expected = message("footprints.csv", "is missing");
+    assert_eq!(diff(&case, &["out", "aside"]), expected);
+}
+
+const NO_FOLDER: &str = "exit 6\nerror: out: cannot read the folder: No such file or directory (os error 2)\n  what to do: check the path; relative paths in a configuration count from that file's folder\n";
+const EMPTY: &str = "exit 3\nerror: out: there is no manifest.json in it or in a folder below; expected products of `areograph run`\n  what to do: name the folder given to --out, or a site's folder in it\n";
+const STOPPED_EARLY: &str = "exit 3\nerror: out/case: there is no manifest.json, so there are no products\n  what to do: name a site's folder of products, and run the site to the end\n";
+const HALF_MADE: &str = "exit 3\nerror: out/case: the publication of products into this folder was not finished\n  what to do: wait for the run that is at work, or run the site again to mend it\n";
+const NO_JSON: &str = "exit 3\nerror: out/case/manifest.json: this is no manifest of areograph 0.1.0: EOF while parsing an object at line 1 column 1\n  what to do: run the site again, which makes damaged products anew\n";
+const ANOTHER_SITE: &str = "exit 2\nerror: out/case: these are products of site \"other\", the others of site \"case\"; expected one site\n  what to do: compare runs of the same site\n";
+const NO_COMMON_SITE: &str = "exit 2\nerror: no site is in both: A has case; B has other\n  what to do: compare runs of the same site\n";
+const ONE_FOLDER: &str = "exit 2\nerror: before/../before: A and B are one folder; expected the products of two runs\n  what to do: copy the first products aside before running again, or run into another --out\n";
+const ONE_AND_SEVERAL: &str = "exit 2\nerror: before/case: it holds the products of one site, the other folder those of several\n  what to do: name two folders of one site, or two output folders with sites\n";

@@ -36,8 +36,9 @@ pub struct FootprintsMovement {
     pub topography_m: Component,
     /// Change of the corrected shot time.
     pub time_s: Component,
-    /// The shot that moved farthest.
-    pub farthest: ShotName,
+    /// The shot that moved farthest, if one moved.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub farthest: Option<ShotName>,
 }
 
 /// Which shot.
@@ -95,12 +96,13 @@ fn movement(a: &FootprintRows, b: &FootprintRows, pairs: &[Pair]) -> Option<Foot
         Component::of(pairs.iter().map(|(first, second)| b[*second] - a[*first]))
     };
     // Of several that moved as far, the first.
-    let (mut farthest, mut farthest_m) = (pairs.first()?.0, 0.0);
+    let (mut farthest, mut farthest_m) = (None, ROUNDING);
     for pair in pairs {
         if distance_m(pair) > farthest_m {
-            (farthest, farthest_m) = (pair.0, distance_m(pair));
+            (farthest, farthest_m) = (Some(pair.0), distance_m(pair));
         }
     }
+    pairs.first()?;
     Some(FootprintsMovement {
         moved: pairs
             .iter()
@@ -109,13 +111,17 @@ fn movement(a: &FootprintRows, b: &FootprintRows, pairs: &[Pair]) -> Option<Foot
         distance_m: Size::of(pairs.iter().map(distance_m)),
         topography_m: change(&a.topography_m, &b.topography_m),
         time_s: change(&a.et_s, &b.et_s),
-        farthest: ShotName {
-            source_file: a.files[a.file[farthest] as usize].clone(),
-            orbit: a.orbit[farthest],
-            record: a.record[farthest],
-            shot: a.shot[farthest],
-        },
+        farthest: farthest.map(|row| shot_name(a, row)),
     })
+}
+
+fn shot_name(rows: &FootprintRows, row: usize) -> ShotName {
+    ShotName {
+        source_file: rows.files[rows.file[row] as usize].clone(),
+        orbit: rows.orbit[row],
+        record: rows.record[row],
+        shot: rows.shot[row],
+    }
 }
 
 /// Place of the file's name among all names, orbit, record, shot.
@@ -201,8 +207,8 @@ mod tests {
         assert!((movement.distance_m.max - 0.5).abs() < 1e-12); // metres, exact in binary
         assert!((movement.distance_m.mean - 0.5 / 3.0).abs() < 1e-12);
         assert!((movement.topography_m.mean - 0.25 / 3.0).abs() < 1e-12);
-        assert_eq!(movement.farthest.source_file, "l.b");
-        assert_eq!(movement.farthest.record, 12);
+        let farthest = movement.farthest.unwrap();
+        assert_eq!((&*farthest.source_file, farthest.record), ("l.b", 12));
     }
 
     #[test]

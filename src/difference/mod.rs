@@ -69,7 +69,7 @@ pub struct RunDifference {
     pub rejected: Vec<Change>,
     /// Complaints about input of one run alone; manifests quote the first ones.
     pub complaints: Texts,
-    /// Notes of one run alone.
+    /// Notes of one run alone; that a list names a kernel is told by the kernels.
     pub notes: Texts,
     /// Stages by their fingerprints: what entered them, not what came out.
     pub stages: Items,
@@ -185,7 +185,7 @@ fn of_manifests(a: &Manifest, b: &Manifest, limits: &Limits) -> RunDifference {
         counts: changes::between(&a.counts, &b.counts),
         rejected: changes::between(&a.rejected, &b.rejected),
         complaints: Texts::between(&a.complaints.texts, &b.complaints.texts),
-        notes: Texts::between(&a.notes, &b.notes),
+        notes: Texts::between(&items::notes(a), &items::notes(b)),
         stages: Items::between(&items::stages(a), &items::stages(b)),
         products: Items::between(&items::products(a), &items::products(b)),
         profiles: Vec::new(),

@@ -8,6 +8,9 @@ use super::{
     movement::{Component, Size},
 };
 
+/// Texts of one kind that a sentence quotes; the JSON answer has all.
+const FEW: usize = 3;
+
 /// A number with three decimals, or two digits when it is too small for them.
 #[must_use]
 pub fn quantity(value: f64) -> String {
@@ -25,7 +28,7 @@ impl RunDifference {
             Outcome::NothingChanged => "nothing changed".to_owned(),
             Outcome::NothingMoved => "nothing moved".to_owned(),
             Outcome::Moved => format!("moved: {}", self.farthest().join("; ")),
-            Outcome::BeyondLimit => format!("BEYOND THE LIMIT: {}", self.beyond_limits.join("; ")),
+            Outcome::BeyondLimit => format!("BEYOND THE LIMIT: {}", few(&self.beyond_limits)),
         }
     }
 
@@ -132,11 +135,11 @@ impl RunDifference {
         let footprints = &self.footprints;
         let mut told = vec![format!("{} in both", footprints.matched)];
         if let Some(movement) = &footprints.movement {
-            let farthest = &movement.farthest;
-            told.push(match movement.moved {
-                0 => "none moved".to_owned(),
-                moved => format!(
-                    "{moved} moved, by {} m in the mean and up to {} m ({} record {} shot {})",
+            told.push(match &movement.farthest {
+                None => "none moved".to_owned(),
+                Some(farthest) => format!(
+                    "{} moved, by {} m in the mean and up to {} m ({} record {} shot {})",
+                    movement.moved,
                     quantity(movement.distance_m.mean),
                     quantity(movement.distance_m.max),
                     farthest.source_file,
@@ -211,8 +214,21 @@ fn values(what: &str, changes: &[Change]) -> Option<String> {
 }
 
 fn texts(what: &str, texts: &Texts) -> Option<String> {
-    let (a, b) = (texts.only_in_a.len(), texts.only_in_b.len());
-    (!texts.is_empty()).then(|| format!("{what}: {a} only in A, {b} only in B"))
+    let runs = [(&texts.only_in_a, "A"), (&texts.only_in_b, "B")].into_iter();
+    let told: Vec<String> = runs
+        .filter(|(texts, _)| !texts.is_empty())
+        .map(|(texts, whose)| format!("only in {whose}: {}", few(texts)))
+        .collect();
+    (!texts.is_empty()).then(|| format!("{what} {}", told.join("; ")))
+}
+
+/// The first texts; the others are counted.
+fn few(texts: &[String]) -> String {
+    let told = texts[..texts.len().min(FEW)].join("; ");
+    match texts.len().saturating_sub(FEW) {
+        0 => told,
+        more => format!("{told}; and {more} more"),
+    }
 }
 
 fn items(what: &str, items: &Items) -> Option<String> {
