@@ -17,7 +17,7 @@ use areograph::{
         mars_rotation::frame_rotation_1,
     },
     spice::{CkSegment, KernelSet, Session, write_ck},
-    time::{Et, PointingBias},
+    time::{Et, Interval, PointingBias},
     units::RADIANS_PER_ARCSECOND,
 };
 use common::case::Case;
@@ -94,8 +94,7 @@ fn turn_attitudes(case: &Case) {
         .iter()
         .map(|interval| {
             // The scene's samples, 4 s apart: between them both kernels turn evenly.
-            let count = (interval.duration_s() / 4.0).round() as u32;
-            turned_attitudes(&session, interval.start, count)
+            turned_attitudes(&session, *interval)
         })
         .collect();
     let segments: Vec<CkSegment> = columns
@@ -115,14 +114,14 @@ fn turn_attitudes(case: &Case) {
 
 type Attitudes = (Vec<Et>, Vec<[f64; 4]>, Vec<[f64; 3]>);
 
-/// Attitudes from `start` on as the kernel counts time, turned; rates in J2000 stay as they are.
-fn turned_attitudes(session: &Session, start: Et, count: u32) -> Attitudes {
+/// Attitudes of an interval as the kernel counts time, turned; rates in J2000 stay as they are.
+fn turned_attitudes(session: &Session, interval: Interval) -> Attitudes {
     let turn = frame_rotation_1(TURN_ARCSEC * RADIANS_PER_ARCSECOND);
     let unbiased = PointingBias::from_seconds(0.0);
     let (mut instants, mut quaternions, mut rates) = (Vec::new(), Vec::new(), Vec::new());
-    for index in 0..=count {
-        let at = start.plus(4.0 * f64::from(index));
-        // The last instant may be a rounding of the clock beyond the interval.
+    // The last sample may be a rounding of the clock beyond the interval's end.
+    let samples = (0..).map(|index| interval.start.plus(4.0 * f64::from(index)));
+    for at in samples.take_while(|at| at.since(interval.stop) < 0.01) {
         let attitude = session.attitude(unbiased.lookup(at), at, 0.01).unwrap();
         let mounting = *session.mounting(at).unwrap().matrix();
         let turned = mounting.transpose() * turn * mounting * attitude.inertial_to_bus.matrix();
@@ -383,10 +382,12 @@ fn every_site_of_two_outputs_is_compared() {
     );
 }
 
+type Spoil = fn(&Case);
+
 #[test]
 fn outputs_that_cannot_be_compared_are_refused() {
     let case = after_a_first_run();
-    let refusals: [(&str, fn(&Case), &str); 8] = [
+    let refusals: [(&str, Spoil, &str); 8] = [
         (
             "no folder",
             |case| fs::remove_dir_all(case.path("out")).unwrap(),
@@ -430,7 +431,7 @@ fn outputs_that_cannot_be_compared_are_refused() {
                     "out/case/manifest.json",
                     "\"site\": \"case\"",
                     "\"site\": \"other\"",
-                )
+                );
             },
             ANOTHER_SITE,
         ),
