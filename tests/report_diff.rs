@@ -353,6 +353,32 @@ fn what_is_in_one_run_only_is_counted_and_keeps_no_limit() {
 }
 
 #[test]
+fn the_page_opens_with_the_outcome_and_needs_nothing_from_outside() {
+    let case = after_a_first_run();
+    turn_attitudes(&case);
+    case.stages_run();
+    let arguments = [
+        "before",
+        "out",
+        "--limit-arcsec",
+        "19",
+        "--page",
+        "pages/diff.html",
+    ];
+    assert!(diff(&case, &arguments).starts_with("exit 5\n"));
+    let page = String::from_utf8(case.read("pages/diff.html")).unwrap();
+    let outcome =
+        page.find("case: BEYOND THE LIMIT: image image: the camera turned by up to 20.000 arcsec");
+    assert!(outcome.unwrap() < page.find("<table").unwrap());
+    assert!(page.contains("mgs_sc_scene.bc (CK) changed; 6 unchanged"));
+    assert_eq!(page.matches("<svg").count(), 1); // the camera turned and did not move
+    assert!(page.contains("Image image: turn of the camera"));
+    for outside in ["<script", "src=", "@import", "url("] {
+        assert!(!page.contains(outside), "{outside}");
+    }
+}
+
+#[test]
 fn every_site_of_two_outputs_is_compared() {
     let case = after_a_first_run();
     for (folder, site) in [("before", "gone"), ("out", "new")] {

@@ -9,6 +9,8 @@ use super::output;
 use crate::{
     difference::{Limits, Outcome, Pairs, RunDifference, compare, pairs},
     error::{Failure, Kind},
+    report::difference_page,
+    store::atomic,
 };
 
 /// Reports on products.
@@ -86,17 +88,38 @@ fn diff(arguments: &DiffArguments) -> Result<u8, Failure> {
     if arguments.json {
         output::json(&answer(&sites, &pairs));
     } else {
-        print(&sites, &pairs);
+        print(&sites, &lonely(&pairs));
     }
-    for (_, compared) in &sites {
-        if let Err(failure) = compared {
-            output::error(failure);
-        }
+    let failures = || {
+        sites
+            .iter()
+            .filter_map(|(_, compared)| compared.as_ref().err())
+    };
+    failures().for_each(output::error);
+    if let Some(file) = &arguments.page {
+        let compared = sites
+            .iter()
+            .filter_map(|(_, compared)| compared.as_ref().ok());
+        let mut not_compared = lonely(&pairs);
+        not_compared.extend(failures().map(ToString::to_string));
+        let page = difference_page(&compared.collect::<Vec<_>>(), &not_compared)?;
+        atomic::write(file, page.as_bytes())?;
     }
     Ok(exit_code(&sites, &pairs, &limits))
 }
 
-fn print(sites: &[Compared], pairs: &Pairs) {
+/// Sites that only one output has, one sentence each.
+fn lonely(pairs: &Pairs) -> Vec<String> {
+    let runs = [(&pairs.only_in_a, "A"), (&pairs.only_in_b, "B")].into_iter();
+    runs.flat_map(|(names, whose)| {
+        names
+            .iter()
+            .map(move |name| format!("{name}: only in {whose}, not compared"))
+    })
+    .collect()
+}
+
+fn print(sites: &[Compared], lonely: &[String]) {
     for (_, compared) in sites {
         let Ok(difference) = compared else { continue };
         output::line(format_args!(
@@ -110,11 +133,7 @@ fn print(sites: &[Compared], pairs: &Pairs) {
             output::line(format_args!("  {sentence}"));
         }
     }
-    for (names, whose) in [(&pairs.only_in_a, "A"), (&pairs.only_in_b, "B")] {
-        for name in names {
-            output::line(format_args!("{name}: only in {whose}, not compared"));
-        }
-    }
+    lonely.iter().for_each(output::line);
 }
 
 fn answer(sites: &[Compared], pairs: &Pairs) -> Value {

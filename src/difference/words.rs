@@ -4,7 +4,7 @@ use super::{
     Outcome, RunDifference,
     changes::{Change, Texts, text},
     images::{ImageDifference, ImageMovement},
-    items::Items,
+    items::{Item, Items},
     movement::{Component, Size},
 };
 
@@ -232,25 +232,22 @@ fn few(texts: &[String]) -> String {
 }
 
 fn items(what: &str, items: &Items) -> Option<String> {
-    let mut told: Vec<String> = Vec::new();
-    told.extend(
+    let named = |name: &str, role: Option<&String>, happened: &str| match role {
+        Some(role) => format!("{name} ({role}) {happened}"),
+        None => format!("{name} {happened}"),
+    };
+    let lonely = |items: &[Item], happened: &str| -> Vec<String> {
+        let items = items.iter();
         items
-            .added
-            .iter()
-            .map(|item| format!("{} added", item.name)),
-    );
-    told.extend(
-        items
-            .removed
-            .iter()
-            .map(|item| format!("{} removed", item.name)),
-    );
-    told.extend(
-        items
-            .changed
-            .iter()
-            .map(|item| format!("{} changed", item.name)),
-    );
+            .map(|item| named(&item.name, item.role.as_ref(), happened))
+            .collect()
+    };
+    let changed = items.changed.iter();
+    let mut told: Vec<String> = changed
+        .map(|item| named(&item.name, item.role.as_ref(), "changed"))
+        .collect();
+    told.extend(lonely(&items.removed, "removed"));
+    told.extend(lonely(&items.added, "added"));
     if items.reordered {
         told.push("another load order".to_owned());
     }

@@ -2,12 +2,15 @@
 //!
 //! One HTML file without scripts or outside parts; everything that came from files is escaped.
 
+mod diff;
 mod html;
 mod images;
 mod map;
 mod plots;
 mod ranges;
 mod summary;
+
+pub use diff::difference_page;
 
 use crate::{error::Result, products::SiteProducts};
 

@@ -85,7 +85,8 @@ pub(super) fn inputs(site: &SiteProducts) -> String {
     section("Windows, files and kernels", &body)
 }
 
-fn short(hash: &str) -> String {
+/// Enough of a hash to tell files apart on one page.
+pub(super) fn short(hash: &str) -> String {
     hash.chars().take(HASH_DIGITS).collect()
 }
 
