@@ -65,6 +65,8 @@ pub struct RunDifference {
     pub biases: Vec<Change>,
     /// Counts that differ.
     pub counts: Vec<Change>,
+    /// Largest figures of the site that differ.
+    pub figures: Vec<Change>,
     /// Shots left out, by reason, that differ.
     pub rejected: Vec<Change>,
     /// Complaints about input of one run alone; manifests quote the first ones.
@@ -183,6 +185,7 @@ fn of_manifests(a: &Manifest, b: &Manifest, limits: &Limits) -> RunDifference {
         configuration: Vec::new(),
         biases: changes::between(&changes::biases(a), &changes::biases(b)),
         counts: changes::between(&a.counts, &b.counts),
+        figures: changes::between(&a.figures, &b.figures),
         rejected: changes::between(&a.rejected, &b.rejected),
         complaints: Texts::between(&a.complaints.texts, &b.complaints.texts),
         notes: Texts::between(&items::notes(a), &items::notes(b)),

@@ -7,6 +7,7 @@ use super::{
     items::{Item, Items},
     movement::{Component, Size},
 };
+use crate::store::manifest::Verdict;
 
 /// Texts of one kind that a sentence quotes; the JSON answer has all.
 const FEW: usize = 3;
@@ -174,19 +175,21 @@ impl RunDifference {
     }
 
     fn verdict_sentence(&self) -> String {
-        let word = |valid: bool| if valid { "valid" } else { "INVALID" };
+        let word = |verdict: &Verdict| match (verdict.valid, verdict.remarks.is_empty()) {
+            (false, _) => "INVALID",
+            (true, true) => "valid",
+            (true, false) => "valid with remarks",
+        };
         let (a, b) = (&self.a.verdict, &self.b.verdict);
         if a == b {
-            return format!("verdict: {} in both", word(a.valid));
+            return format!("verdict: {} in both", word(a));
         }
-        let reasons = Texts::between(&a.reasons, &b.reasons);
-        let mut told = vec![format!("verdict: {} → {}", word(a.valid), word(b.valid))];
-        for (reasons, tense) in [
-            (&reasons.only_in_a, "no longer"),
-            (&reasons.only_in_b, "now"),
-        ] {
-            if !reasons.is_empty() {
-                told.push(format!("{tense}: {}", reasons.join("; ")));
+        let all = |verdict: &Verdict| [&verdict.reasons[..], &verdict.remarks].concat();
+        let differ = Texts::between(&all(a), &all(b));
+        let mut told = vec![format!("verdict: {} → {}", word(a), word(b))];
+        for (texts, tense) in [(&differ.only_in_a, "no longer"), (&differ.only_in_b, "now")] {
+            if !texts.is_empty() {
+                told.push(format!("{tense}: {}", texts.join("; ")));
             }
         }
         told.join("; ")

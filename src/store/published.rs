@@ -4,11 +4,11 @@ use std::{fs, io::ErrorKind, path::Path};
 
 use super::{
     manifest::Manifest,
-    publish::{JOURNAL, MANIFEST, read_manifest},
+    publish::{JOURNAL, MANIFEST, has_work, read_manifest},
 };
 use crate::{
     error::{Fault, IoFault, Kind, Place, Result},
-    files::hash_file,
+    files::{hash_file, short_hash},
 };
 
 /// Why products in a folder are not to be used.
@@ -69,9 +69,7 @@ impl Fault for PublishedFault {
 /// Whether the folder is, or was meant to be, that of a site's products.
 #[must_use]
 pub fn is_site_folder(folder: &Path) -> bool {
-    [MANIFEST, JOURNAL, ".cache"]
-        .iter()
-        .any(|name| folder.join(name).exists())
+    folder.join(MANIFEST).exists() || has_work(folder)
 }
 
 /// The manifest of a site's folder, every product checked against it.
@@ -98,14 +96,16 @@ pub fn read_published(folder: &Path) -> Result<Manifest> {
         let path = folder.join(&product.path);
         let found = match hash_file(&path) {
             Ok((blake3, _)) if blake3 == product.blake3 => continue,
-            Ok((blake3, bytes)) => format!("has {bytes} bytes with the hash {}", short(&blake3)),
+            Ok((blake3, bytes)) => {
+                format!("has {bytes} bytes with the hash {}", short_hash(&blake3))
+            }
             Err(_) if !path.exists() => "is missing".to_owned(),
             Err(failure) => return Err(failure),
         };
         return Err(PublishedFault::Contradicts {
             found,
             expected_bytes: product.bytes,
-            expected: short(&product.blake3),
+            expected: short_hash(&product.blake3),
         })
         .in_file(path);
     }
@@ -121,9 +121,4 @@ pub fn still_published(folder: &Path, manifest: &Manifest) -> Result<()> {
         return Ok(());
     }
     Err(PublishedFault::Replaced).in_file(folder)
-}
-
-/// Enough of a hash to tell files apart.
-fn short(blake3: &str) -> String {
-    blake3.chars().take(12).collect()
 }

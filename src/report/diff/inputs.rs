@@ -2,11 +2,9 @@
 
 use crate::{
     difference::{Change, Item, Items, RunDifference, Texts, text},
+    files::short_hash,
     products::read::ProfileDocument,
-    report::{
-        html::{Table, list, paragraph},
-        summary::short,
-    },
+    report::html::{Cell, Column, Table, list, paragraph},
 };
 
 /// Range residuals per profile in both runs.
@@ -14,23 +12,22 @@ pub(super) fn profiles(site: &RunDifference) -> String {
     if site.profiles.is_empty() {
         return String::new();
     }
-    let heads = [
-        "profile",
-        "shots A",
-        "B",
-        "mean A, m",
-        "B",
-        "B − A",
-        "st. dev. A, m",
-        "B",
-        "outliers A",
-        "B",
-        "verdict",
-    ];
-    let numbers: &'static [bool] = &[
-        false, true, true, true, true, true, true, true, true, true, false,
-    ];
-    let mut table = Table::new(&heads, numbers);
+    let mut table = Table::new(
+        "Range − distance to the spacecraft in the kernels",
+        &[
+            Column::Text("profile"),
+            Column::Number("shots A"),
+            Column::Number("B"),
+            Column::Number("mean A, m"),
+            Column::Number("B"),
+            Column::Number("B − A"),
+            Column::Number("st. dev. A, m"),
+            Column::Number("B"),
+            Column::Number("outliers A"),
+            Column::Number("B"),
+            Column::Text("verdict"),
+        ],
+    );
     for profile in &site.profiles {
         let [a, b] = [profile.a.as_ref(), profile.b.as_ref()];
         let cell = |profile: Option<&ProfileDocument>, value: fn(&ProfileDocument) -> String| {
@@ -60,25 +57,34 @@ pub(super) fn profiles(site: &RunDifference) -> String {
         } else {
             format!("{} → {}", word(valid[0]), word(valid[1]))
         });
-        table.row(valid[1] != Some(false), &cells);
+        table.row(valid[1] != Some(false), cells.into_iter().map(Cell::from));
     }
     table.finish()
 }
 
 /// Keys, corrections, counts, times and model statistics that differ.
 pub(super) fn values(site: &RunDifference) -> String {
-    let mut table = Table::new(&["of", "value", "A", "B"], &[false; 4]);
+    let mut table = Table::new(
+        "Values that differ",
+        &[
+            Column::Text("of"),
+            Column::Text("value"),
+            Column::Text("A"),
+            Column::Text("B"),
+        ],
+    );
     let mut rows = 0;
     let mut add = |of: &str, changes: &[Change]| {
         rows += changes.len();
         for change in changes {
             let [a, b] = [&change.a, &change.b].map(|value| text(value.as_ref()));
-            table.row(true, &[of.to_owned(), change.what.clone(), a, b]);
+            table.row(true, [of.into(), (&change.what).into(), a.into(), b.into()]);
         }
     };
     add("configuration", &site.configuration);
     add("corrections", &site.biases);
     add("counts", &site.counts);
+    add("figures", &site.figures);
     add("rejected shots", &site.rejected);
     for image in &site.images {
         add(&format!("times of image {}", image.image), &image.times);
@@ -87,7 +93,10 @@ pub(super) fn values(site: &RunDifference) -> String {
     if site.a.version != site.b.version {
         rows += 1;
         let [a, b] = [&site.a, &site.b].map(|run| run.version.clone());
-        table.row(true, &["program".to_owned(), "version".to_owned(), a, b]);
+        table.row(
+            true,
+            ["program".into(), "version".into(), a.into(), b.into()],
+        );
     }
     let hidden = if site.configuration_changed {
         paragraph(
@@ -107,9 +116,9 @@ pub(super) fn values(site: &RunDifference) -> String {
 pub(super) fn items(site: &RunDifference) -> String {
     let mut body = String::new();
     for (what, items) in [
-        ("kernel", &site.kernels),
-        ("stage, by what entered it", &site.stages),
-        ("product", &site.products),
+        ("Kernels", &site.kernels),
+        ("Stages, by what entered them", &site.stages),
+        ("Products", &site.products),
     ] {
         if !items.is_empty() {
             body += &item_table(what, items);
@@ -119,29 +128,37 @@ pub(super) fn items(site: &RunDifference) -> String {
 }
 
 fn item_table(what: &str, items: &Items) -> String {
-    let mut table = Table::new(&[what, "role", "what happened", "A", "B"], &[false; 5]);
-    let role = |role: &Option<String>| role.clone().unwrap_or_default();
-    for item in &items.changed {
+    let mut table = Table::new(
+        what,
+        &[
+            Column::Text("name"),
+            Column::Text("role"),
+            Column::Text("what happened"),
+            Column::Text("A"),
+            Column::Text("B"),
+        ],
+    );
+    let mut row = |name: &str, role: &Option<String>, happened: &str, [a, b]: [Option<&str>; 2]| {
+        let hash = |hash: Option<&str>| Cell::from(hash.map(short_hash).unwrap_or_default());
+        let role = role.clone().unwrap_or_default();
         table.row(
             true,
-            &[
-                item.name.clone(),
-                role(&item.role),
-                "changed".to_owned(),
-                short(&item.a),
-                short(&item.b),
-            ],
+            [name.into(), role.into(), happened.into(), hash(a), hash(b)],
+        );
+    };
+    for item in &items.changed {
+        row(
+            &item.name,
+            &item.role,
+            "changed",
+            [Some(&item.a), Some(&item.b)],
         );
     }
-    let mut lonely = |item: &Item, happened: &str, [a, b]: [String; 2]| {
-        let happened = happened.to_owned();
-        table.row(true, &[item.name.clone(), role(&item.role), happened, a, b]);
-    };
-    for item in &items.removed {
-        lonely(item, "removed", [short(&item.hash), String::new()]);
+    for Item { name, role, hash } in &items.removed {
+        row(name, role, "removed", [Some(hash), None]);
     }
-    for item in &items.added {
-        lonely(item, "added", [String::new(), short(&item.hash)]);
+    for Item { name, role, hash } in &items.added {
+        row(name, role, "added", [None, Some(hash)]);
     }
     let order = if items.reordered {
         ", in another order"

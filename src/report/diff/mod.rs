@@ -3,7 +3,7 @@
 mod inputs;
 mod movement;
 
-use super::html::{self, escape, list, paragraph, section};
+use super::html::{self, Section, Tone, heading, list, paragraph};
 use crate::{
     difference::{Outcome, RunDifference},
     error::Result,
@@ -19,9 +19,7 @@ pub fn difference_page(sites: &[&RunDifference], not_compared: &[String]) -> Res
         _ => "Difference of two runs".to_owned(),
     };
     let lead: String = sites.iter().map(|site| verdict(site)).collect();
-    let body = [
-        lead,
-        list(not_compared),
+    let sections = [
         of_each("Movement", sites, |site| Ok(movement::tables(site)))?,
         of_each("Movement along the images", sites, movement::plots)?,
         of_each("Range residuals", sites, |site| Ok(inputs::profiles(site)))?,
@@ -33,48 +31,39 @@ pub fn difference_page(sites: &[&RunDifference], not_compared: &[String]) -> Res
             Ok(inputs::texts(site))
         })?,
     ];
-    Ok(html::page(&title, &body.concat()))
+    Ok(html::page(&title, &(lead + &list(not_compared)), &sections))
 }
 
 /// A section with the part of every site that has one, under the site's name when there are several.
 fn of_each(
-    heading: &'static str,
+    name: &'static str,
     sites: &[&RunDifference],
     part: impl Fn(&RunDifference) -> Result<String>,
-) -> Result<String> {
+) -> Result<Section> {
     let mut body = String::new();
     for site in sites {
         let part = part(site)?;
         if !part.is_empty() && sites.len() > 1 {
-            body.push_str("<h3>");
-            body.push_str(&escape(&site.site));
-            body.push_str("</h3>\n");
+            body += &heading(&site.site);
         }
         body += &part;
     }
-    if body.is_empty() {
-        return Ok(body);
-    }
-    Ok(section(heading, &body))
+    Ok(Section::new(name, body))
 }
 
 fn verdict(site: &RunDifference) -> String {
-    let class = match site.outcome {
-        Outcome::BeyondLimit => "invalid",
-        _ => "valid",
+    let tone = match site.outcome {
+        Outcome::NothingChanged | Outcome::NothingMoved => Tone::Good,
+        Outcome::Moved => Tone::Remarks,
+        Outcome::BeyondLimit => Tone::Bad,
     };
     let headline = format!("{}: {}.", site.site, site.headline());
     let runs = format!(
         "A was published at {}, B at {}; a movement is B − A.",
         site.a.finished_utc, site.b.finished_utc
     );
-    format!(
-        "<div class=\"verdict {class}\">\n{}{}{}{}</div>\n",
-        paragraph(&headline),
-        list(&site.sentences()),
-        paragraph(&limits(site)),
-        paragraph(&runs),
-    )
+    let body = list(&site.sentences()) + &paragraph(&limits(site)) + &paragraph(&runs);
+    html::verdict(tone, &headline, &body)
 }
 
 fn limits(site: &RunDifference) -> String {
