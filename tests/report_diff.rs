@@ -56,7 +56,9 @@ fn difference(case: &Case) -> Value {
     let mut command = case.areograph();
     command.args(["report", "diff", "before", "out", "--json"]);
     let answer = common::mission::succeed(&mut command).stdout;
-    let mut answer: Value = serde_json::from_slice(&answer).unwrap();
+    let text = String::from_utf8(answer).unwrap();
+    assert!(!text.contains("null"), "what is unknown is left out");
+    let mut answer: Value = serde_json::from_str(&text).unwrap();
     assert_eq!(answer["sites"].as_array().unwrap().len(), 1);
     answer["sites"][0].take()
 }
@@ -372,7 +374,7 @@ fn the_page_opens_with_the_outcome_and_needs_nothing_from_outside() {
     assert!(outcome.unwrap() < page.find("<table").unwrap());
     assert!(page.contains("mgs_sc_scene.bc (CK) changed; 6 unchanged"));
     assert_eq!(page.matches("<svg").count(), 1); // the camera turned and did not move
-    assert!(page.contains("Image image: turn of the camera"));
+    assert!(page.contains("camera%20turned,%20arcsec") && !page.contains("camera%20moved"));
     for outside in ["<script", "src=", "@import", "url("] {
         assert!(!page.contains(outside), "{outside}");
     }

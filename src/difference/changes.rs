@@ -29,6 +29,15 @@ pub struct Texts {
     pub only_in_b: Vec<String>,
 }
 
+impl Change {
+    /// `B − A` of numbers.
+    #[must_use]
+    pub fn difference(&self) -> Option<f64> {
+        let number = |value: &Option<Value>| value.as_ref().and_then(Value::as_f64);
+        Some(number(&self.b)? - number(&self.a)?)
+    }
+}
+
 impl Texts {
     pub(super) fn between(a: &[String], b: &[String]) -> Self {
         let without = |texts: &[String], others: &[String]| {
@@ -93,14 +102,26 @@ pub(super) fn biases(manifest: &Manifest) -> BTreeMap<&str, Value> {
     biases.map(|bias| (&*bias.name, entry(bias))).collect()
 }
 
-/// A value as people read it; a dash for none.
+/// A value as people read it, fractions to six decimals or seven digits; a dash for none.
 #[must_use]
 pub fn text(value: Option<&Value>) -> String {
     match value {
         None => "–".to_owned(),
         Some(Value::String(text)) => text.clone(),
+        Some(Value::Number(number)) if number.is_f64() => {
+            fraction(number.as_f64().unwrap_or(f64::NAN))
+        }
         Some(value) => value.to_string(),
     }
+}
+
+fn fraction(value: f64) -> String {
+    if value.abs() > 0.0 && value.abs() < 1e-3 {
+        return format!("{value:.6e}");
+    }
+    let digits = format!("{value:.6}");
+    let short = digits.trim_end_matches('0').trim_end_matches('.');
+    short.to_owned()
 }
 
 #[cfg(test)]
@@ -125,10 +146,16 @@ mod tests {
             [
                 "classes: [1] → [0,1]",
                 "gone: x → –",
-                "limits.mean_max_m: 5.0 → 9.0",
+                "limits.mean_max_m: 5 → 9",
                 "new: – → true",
             ]
         );
         assert!(between(&a, &a).is_empty());
+        let fractions =
+            [-1.15, 37_000_000.25, 0.104_943_9, 7.4e-9, 0.0].map(|value| text(Some(&json!(value))));
+        assert_eq!(
+            fractions,
+            ["-1.15", "37000000.25", "0.104944", "7.400000e-9", "0"]
+        );
     }
 }

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::{Outcome, RunDifference, images::ImageDifference, words::quantity};
+use super::{Outcome, RunDifference, images::ImageDifference, movement::ROUNDING, words::quantity};
 
 /// How far things may move; without a limit everything may.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
@@ -88,8 +88,8 @@ impl Limits {
 /// The sentence for a movement beyond its limit, if there is one and it is.
 fn beyond(what: impl Fn() -> String, found: f64, limit: Option<f64>, unit: &str) -> Option<String> {
     let limit = limit?;
-    // Written so that NaN is beyond.
-    (!(found <= limit)).then(|| {
+    // Rounding is no movement, whatever the limit. Written so that NaN is beyond.
+    (!(found <= limit.max(ROUNDING))).then(|| {
         format!(
             "{} by up to {} {unit}, beyond the limit of {limit} {unit}",
             what(),

@@ -5,20 +5,23 @@ use super::{
     changes::{Change, Texts, text},
     images::{ImageDifference, ImageMovement},
     items::{Item, Items},
-    movement::{Component, Size},
+    movement::{Component, ROUNDING, Size},
 };
 use crate::store::manifest::Verdict;
 
 /// Texts of one kind that a sentence quotes; the JSON answer has all.
 const FEW: usize = 3;
 
-/// A number with three decimals, or two digits when it is too small for them.
+/// A number with three decimals, or two digits when it is too small for them; what is rounding is 0.
 #[must_use]
 pub fn quantity(value: f64) -> String {
-    if value.abs() > 0.0 && value.abs() < 0.01 {
-        return format!("{value:.1e}");
+    if value.abs() <= ROUNDING {
+        "0".to_owned()
+    } else if value.abs() < 0.01 {
+        format!("{value:.1e}")
+    } else {
+        format!("{value:.3}")
     }
-    format!("{value:.3}")
 }
 
 impl RunDifference {
@@ -171,7 +174,7 @@ impl RunDifference {
                 _ => format!("{} only in B", profile.profile),
             })
             .collect();
-        (!told.is_empty()).then(|| format!("range residuals of profiles: {}", told.join("; ")))
+        (!told.is_empty()).then(|| format!("range residuals of profiles: {}", few(&told)))
     }
 
     fn verdict_sentence(&self) -> String {

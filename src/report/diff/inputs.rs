@@ -1,7 +1,7 @@
 //! Statistics, values, kernels, stages and products that differ.
 
 use crate::{
-    difference::{Change, Item, Items, RunDifference, Texts, text},
+    difference::{Change, Item, Items, RunDifference, Texts, quantity, text},
     files::short_hash,
     products::read::ProfileDocument,
     report::html::{Cell, Column, Table, list, paragraph},
@@ -38,8 +38,8 @@ pub(super) fn profiles(site: &RunDifference) -> String {
             cells.extend([cell(a, value), cell(b, value)]);
         };
         pair(|p| p.range_minus_distance_m.n.to_string());
-        pair(|p| format!("{:.3}", p.range_minus_distance_m.mean));
-        pair(|p| format!("{:.3}", p.range_minus_distance_m.standard_deviation));
+        pair(|p| quantity(p.range_minus_distance_m.mean));
+        pair(|p| quantity(p.range_minus_distance_m.standard_deviation));
         pair(|p| p.outliers.to_string());
         let change_m = a.zip(b).map(|(a, b)| {
             let mean_m = |profile: &ProfileDocument| profile.range_minus_distance_m.mean;
@@ -69,8 +69,9 @@ pub(super) fn values(site: &RunDifference) -> String {
         &[
             Column::Text("of"),
             Column::Text("value"),
-            Column::Text("A"),
-            Column::Text("B"),
+            Column::Number("A"),
+            Column::Number("B"),
+            Column::Number("B − A"),
         ],
     );
     let mut rows = 0;
@@ -78,7 +79,15 @@ pub(super) fn values(site: &RunDifference) -> String {
         rows += changes.len();
         for change in changes {
             let [a, b] = [&change.a, &change.b].map(|value| text(value.as_ref()));
-            table.row(true, [of.into(), (&change.what).into(), a.into(), b.into()]);
+            let difference = change
+                .difference()
+                .map(|change| format!("{change:+.2e}"))
+                .unwrap_or_default();
+            let what = (&change.what).into();
+            table.row(
+                true,
+                [of.into(), what, a.into(), b.into(), difference.into()],
+            );
         }
     };
     add("configuration", &site.configuration);
@@ -95,7 +104,13 @@ pub(super) fn values(site: &RunDifference) -> String {
         let [a, b] = [&site.a, &site.b].map(|run| run.version.clone());
         table.row(
             true,
-            ["program".into(), "version".into(), a.into(), b.into()],
+            [
+                "program".into(),
+                "version".into(),
+                a.into(),
+                b.into(),
+                "".into(),
+            ],
         );
     }
     let hidden = if site.configuration_changed {

@@ -37,8 +37,10 @@ fn unknown() -> Cell {
 fn limited(value: f64, limit: Option<f64>) -> Cell {
     match limit {
         None => quantity(value).into(),
-        // Without this a movement of 0 under a limit of 0 would have no share.
-        Some(limit) if value <= limit && limit <= 0.0 => Cell::Limited(quantity(value), 0.0),
+        // Of a limit of 0, what is no more than rounding uses nothing.
+        Some(limit) if quantity(value) == "0" && limit <= 0.0 => {
+            Cell::Limited(quantity(value), 0.0)
+        }
         Some(limit) => Cell::Limited(quantity(value), value / limit),
     }
 }
