@@ -506,6 +506,16 @@ fn products_that_contradict_the_manifest_are_refused() {
     fs::remove_file(case.path("aside/case/footprints.csv")).unwrap();
     let expected = message("footprints.csv", "is missing");
     assert_eq!(diff(&case, &["out", "aside"]), expected);
+    // What the manifest vouches for may still be of another version.
+    copy_products(&case.path("before/case"), &case.path("aside/case"));
+    let product = fs::read(case.path("aside/case/ranges.json")).unwrap();
+    let hash = |bytes: &[u8]| blake3::hash(bytes).to_hex().to_string();
+    case.write("aside/case/ranges.json", "{}");
+    case.replace("aside/case/manifest.json", &hash(&product), &hash(b"{}"));
+    let expected = "exit 3\nerror: case: aside/case/ranges.json: cannot be read as range statistics: missing field \
+                    `mola_clock` at line 1 column 2\n  what to do: products of another version of areograph have \
+                    to be made again by this one\n";
+    assert_eq!(diff(&case, &["before", "aside"]), expected);
 }
 
 const NO_FOLDER: &str = "exit 6\nerror: out: cannot read the folder: No such file or directory (os error 2)\n  what to do: check the path; relative paths in a configuration count from that file's folder\n";

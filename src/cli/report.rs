@@ -22,12 +22,12 @@ pub(super) struct Arguments {
 
 #[derive(Debug, Subcommand)]
 enum Command {
-    /// Say what differs between two runs: inputs, verdicts, statistics, and how far everything moved.
     Diff(DiffArguments),
 }
 
-/// Says what differs between two runs, from their products alone.
+/// Says what differs between two runs: inputs, verdicts, statistics, and how far everything moved.
 ///
+/// Products alone are read, and checked against their manifests.
 /// A and B are folders of one site, or output folders of which every common site is compared.
 /// A movement is B − A. Exit code 5 when something moved beyond a limit.
 ///
