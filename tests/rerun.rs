@@ -30,19 +30,7 @@ fn plan(case: &Case) -> BTreeMap<String, String> {
 
 /// Runs, and gives the stages that the log says ran.
 fn run(case: &Case) -> Vec<String> {
-    let mut command = case.areograph();
-    command.args(["run", "site.toml", "--out", "out"]);
-    let log = String::from_utf8(common::mission::succeed(&mut command).stderr).unwrap();
-    log.lines()
-        .filter(|line| line.contains(": running: "))
-        .map(|line| {
-            line.split("stage=\"")
-                .nth(1)
-                .unwrap()
-                .trim_end_matches('"')
-                .to_owned()
-        })
-        .collect()
+    case.stages_run()
 }
 
 fn fresh() -> Case {

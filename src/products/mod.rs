@@ -21,6 +21,7 @@ mod isd;
 mod orientation;
 mod parquet;
 mod ranges;
+pub mod read;
 mod site;
 mod table;
 mod text_table;

@@ -15,6 +15,7 @@
     reason = "pixels, bars and grid lines are small numbers, and casts of floats saturate"
 )]
 
+mod diff;
 mod graticule;
 mod html;
 mod images;
@@ -28,6 +29,7 @@ mod timeline;
 
 use crate::{error::Result, products::SiteProducts};
 
+pub use diff::difference_page;
 pub use sites::{SiteLine, SiteSummary, sites_page};
 
 use html::Section;
