@@ -197,6 +197,21 @@ impl Fault for IoFault {
     }
 }
 
+/// The user stopped the program, and the stage at work gave up.
+#[derive(Debug, thiserror::Error)]
+#[error("stopped before its end")]
+pub struct Stopped;
+
+impl Fault for Stopped {
+    fn kind(&self) -> Kind {
+        Kind::Interrupted
+    }
+
+    fn advice(&self) -> String {
+        "run again: finished stages are kept".to_owned()
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

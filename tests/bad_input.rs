@@ -18,7 +18,7 @@ use common::case::Case;
 type Spoil = fn(&Case) -> Command;
 
 /// Spoils one thing of a good case and says what to run.
-const CASES: [(&str, Spoil); 36] = [
+const CASES: [(&str, Spoil); 41] = [
     ("good", Case::run),
     ("site_file_missing", |case| {
         fs::remove_file(case.path("site.toml")).unwrap();
@@ -159,6 +159,36 @@ const CASES: [(&str, Spoil); 36] = [
             "datum = \"iau1991\"\n[[windows]]",
         );
         case.run()
+    }),
+    ("pedr_in_two_versions", |case| {
+        let mut bytes = case.read("pedr/ap19117l.b");
+        let label = String::from_utf8_lossy(&bytes[..7_760]).replace("2000", "1991");
+        bytes[..7_760].copy_from_slice(label.as_bytes());
+        case.write("pedr/ap19117k.b", bytes);
+        case.run()
+    }),
+    ("check_pedr_is_empty", |case| {
+        case.truncate("pedr/ap19117l.b", 0);
+        case.check()
+    }),
+    ("check_pedr_in_two_versions", |case| {
+        let mut bytes = case.read("pedr/ap19117l.b");
+        let label = String::from_utf8_lossy(&bytes[..7_760]).replace("2000", "1991");
+        bytes[..7_760].copy_from_slice(label.as_bytes());
+        case.write("pedr/ap19117k.b", bytes);
+        case.check()
+    }),
+    ("check_no_position_at_the_shots", |case| {
+        let site = String::from_utf8(case.read("site.toml")).unwrap();
+        case.write("site.toml", &site[..site.find("[[images]]").unwrap()]);
+        case.replace("kernels/nav.tm", "'mgs_nav_scene.bsp'", "");
+        case.check()
+    }),
+    ("info_of_a_file_of_zeros", |case| {
+        case.write("pedr/ap19117l.b", [0; 20_000]);
+        let mut command = case.areograph();
+        command.args(["--quiet", "pedr", "info", "pedr/ap19117l.b"]);
+        command
     }),
     ("no_shot_in_the_window", |case| {
         case.replace("site.toml", "[87.5, 88.5]", "[10.0, 10.1]");

@@ -39,9 +39,11 @@ const COMPLAINTS_PRINTED: usize = 20;
 
 pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let Command::Info { files, json } = &arguments.command;
-    let mut answers = Vec::new();
+    let (mut answers, mut useless) = (Vec::new(), Vec::new());
     for path in files {
-        let answer = info(path, &File::open(path)?);
+        let file = File::open(path)?;
+        let answer = info(path, &file);
+        useless.extend(file.require_records().err());
         if *json {
             answers.push(answer);
         } else {
@@ -51,7 +53,10 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
     if *json {
         output::json(&answers.into());
     }
-    Ok(())
+    // Every file is shown first; the last of the useless ones is told by whoever called.
+    let last = useless.pop();
+    useless.iter().for_each(output::error);
+    last.map_or(Ok(()), Err)
 }
 
 fn info(path: &Path, file: &File) -> serde_json::Value {

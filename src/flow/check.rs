@@ -1,6 +1,6 @@
-//! Configuration, files and kernel coverage of a site, without running it.
+//! Configuration, files and kernel coverage of a site, without writing anything.
 
-use std::path::Path;
+use std::{path::Path, sync::atomic::AtomicBool};
 
 use super::{
     Stage,
@@ -11,7 +11,13 @@ use crate::{
     error::{Failure, Place, Result},
     pds::pedr,
     spice::{Session, Wanted},
-    stages::{sample_orientation::sample_orientation, tag_times::tag_times},
+    stages::{
+        convert_datum::convert_datum,
+        group_profiles::{Profile, group_profiles},
+        sample_orientation::sample_orientation,
+        search_footprints::search_footprints,
+        tag_times::{ImageTimes, tag_times},
+    },
 };
 
 /// What a check found.
@@ -32,7 +38,9 @@ impl Checked {
     }
 }
 
-/// Checks kernels, image labels with their coverage, and PEDR labels of a site.
+/// Checks a site's kernels, labels and PEDR files, and coverage at its images and at its shots.
+///
+/// The PEDR files are searched as a run does it: only shots in the windows tell which times are needed.
 #[must_use]
 pub fn check_site(config: &SiteConfig) -> Checked {
     let mut checked = Checked::default();
@@ -47,6 +55,7 @@ pub fn check_site(config: &SiteConfig) -> Checked {
 
 fn check_pedr(path: &Path, choice: DatumChoice) -> Result<String> {
     let file = pedr::File::open(path)?;
+    file.require_records()?;
     let version = file.name().map(|name| name.version);
     let datum = pedr::decide_datum(choice, version, file.label().datum).in_file(path)?;
     let complaints: Vec<String> = file
@@ -62,7 +71,26 @@ fn check_pedr(path: &Path, choice: DatumChoice) -> Result<String> {
     ))
 }
 
+/// Profiles of the site's shots, as [`super::run_site`] finds them.
+fn profiles(config: &SiteConfig, images: &[ImageTimes]) -> Result<Vec<Profile>> {
+    let correction_s = config.mola_clock.correction_s();
+    let never = AtomicBool::new(false);
+    let found = search_footprints(&config.pedr, &config.windows, correction_s, &never)?;
+    let footprints = convert_datum(found.footprints, &config.mola_clock).footprints;
+    Ok(group_profiles(&footprints, &config.windows, images))
+}
+
+fn check_profile(profile: &Profile, session: &Session) -> Result<String> {
+    session
+        .require_position(profile.interval)
+        .in_stage(Stage::CheckRanges.name())?;
+    let (id, shots) = (&profile.id, profile.rows.len());
+    Ok(format!("profile {id}: {shots} shots, position covered"))
+}
+
+/// Coverage at images, and at shots unless a PEDR file cannot be used: that was told before.
 fn check_kernels(config: &SiteConfig, checked: &mut Checked) -> Result<()> {
+    let searchable = !config.pedr.files.is_empty() && checked.failures.is_empty();
     let clocks = load_kernels(config, &Wanted::default())?;
     let session = Session::open(&clocks)?;
     let mut images = Vec::new();
@@ -73,7 +101,17 @@ fn check_kernels(config: &SiteConfig, checked: &mut Checked) -> Result<()> {
         }
     }
     drop(session);
-    let kernels = load_kernels(config, &wanted(config, &images, &[]))?;
+    let found = searchable.then(|| profiles(config, &images)).transpose();
+    let profiles = found.unwrap_or_else(|failure| {
+        checked.failures.push(failure.in_site(&config.site));
+        None
+    });
+    if profiles.as_ref().is_some_and(Vec::is_empty) {
+        let finding = "no shot in any window: products would be invalid".to_owned();
+        checked.findings.push(finding);
+    }
+    let profiles = profiles.unwrap_or_default();
+    let kernels = load_kernels(config, &wanted(config, &images, &profiles))?;
     checked
         .findings
         .extend(kernels.explanation().iter().cloned());
@@ -98,6 +136,9 @@ fn check_kernels(config: &SiteConfig, checked: &mut Checked) -> Result<()> {
             )
         });
         checked.note(finding, config);
+    }
+    for profile in &profiles {
+        checked.note(check_profile(profile, &session), config);
     }
     Ok(())
 }

@@ -8,7 +8,7 @@ use super::{
 };
 use crate::{
     config::{KernelSource, SiteConfig},
-    error::{Failure, Fault, Kind, Place, Result},
+    error::{Failure, Fault, Kind, Place, Result, Stopped},
     spice::{KernelSet, Session, Trajectory, Wanted},
     stages::{
         check_ranges::{RangeCheck, check_ranges},
@@ -53,23 +53,6 @@ impl From<Failure> for Leave {
 
 type Step<T> = std::result::Result<T, Leave>;
 
-/// The user stopped the program.
-#[derive(Debug, thiserror::Error)]
-#[error("stopped before {before}")]
-struct Stopped {
-    before: Stage,
-}
-
-impl Fault for Stopped {
-    fn kind(&self) -> Kind {
-        Kind::Interrupted
-    }
-
-    fn advice(&self) -> String {
-        "run again: finished stages are kept".to_owned()
-    }
-}
-
 /// A PEDR file changed between its hash and its search.
 #[derive(Debug, thiserror::Error)]
 #[error("the file changed while it was read")]
@@ -92,7 +75,7 @@ impl Steps<'_> {
             return Err(Leave::AsAsked);
         }
         if self.options.stop.load(Ordering::Relaxed) {
-            return Err(Failure::from(Stopped { before: stage }).into());
+            return Err(Failure::from(Stopped).in_stage(stage.name()).into());
         }
         Ok(())
     }
@@ -141,17 +124,14 @@ impl Steps<'_> {
     pub(super) fn search_footprints(&self) -> Step<Output<SearchResult>> {
         self.enter(Stage::SearchFootprints)?;
         let stage = Stage::SearchFootprints.name();
-        let hashes = parts::hash_files(&self.config.pedr.files).in_stage(stage)?;
+        let hashes =
+            parts::hash_files(&self.config.pedr.files, self.options.stop).in_stage(stage)?;
         let parts = parts::search_footprints(self.config, &hashes);
         let correction_s = self.config.mola_clock.correction_s();
         Ok(self.cache.stage(stage, parts, || {
-            let found = search_footprints(&self.config.pedr, &self.config.windows, correction_s)?;
-            for ((file, hash), path) in found
-                .footprints
-                .files
-                .iter()
-                .zip(&hashes)
-                .zip(&self.config.pedr.files)
+            let (pedr, windows) = (&self.config.pedr, &self.config.windows);
+            let found = search_footprints(pedr, windows, correction_s, self.options.stop)?;
+            for ((file, hash), path) in found.footprints.files.iter().zip(&hashes).zip(&pedr.files)
             {
                 if file.blake3 != *hash {
                     return Err(Failure::from(ChangedFile).in_file(path).in_stage(stage));
