@@ -313,31 +313,58 @@ fn damaged_stores_and_products_are_made_again() {
     assert!(common::mission::products(&case.path("out")) == before);
 }
 
-/// A full disk is a small tmpfs, which only root (or a user who may make namespaces) can mount.
-#[test]
+/// Runs a shell script in the case's folder, with a tmpfs of `size` mounted at `small` in it and the
+/// program as `$0`; `None` for a user who cannot mount (only root, or who may make namespaces, can).
 #[allow(clippy::print_stderr, reason = "says what is skipped")]
-fn a_full_disk_leaves_nothing_half_made() {
-    let case = Case::new();
-    let script = "mount -t tmpfs -o size=300k tmpfs small && \"$0\" --quiet run site.toml --out small; code=$?; \
-                  find small -type f ! -path '*/.*'; exit $code";
-    fs::create_dir(case.path("small")).unwrap();
-    let unshared = |program: &str, arguments: &[&str]| {
+fn on_a_small_disk(case: &Case, size: &str, script: &str) -> Option<String> {
+    fs::create_dir_all(case.path("small")).unwrap();
+    let unshared = |script: String| {
         let mut command = Command::new("unshare");
         command
             .current_dir(case.path(""))
-            .args(["--map-root-user", "--mount"]);
-        command.arg(program).args(arguments);
+            .args(["--map-root-user", "--mount", "sh", "-c", &script])
+            .arg(env!("CARGO_BIN_EXE_areograph"));
         command
     };
-    let possible = unshared("sh", &["-c", "mount -t tmpfs tmpfs small"]).output();
+    let mount = format!("mount -t tmpfs -o size={size} tmpfs small");
+    let possible = unshared(mount.clone()).output();
     if !possible.is_ok_and(|output| output.status.success()) {
         eprintln!("skipped full disk: this user cannot mount a tmpfs");
-        return;
+        return None;
     }
-    let program = env!("CARGO_BIN_EXE_areograph");
-    let found = case.outcome(unshared("sh", &["-c", script, program]));
+    Some(case.outcome(unshared(format!("{mount} && {script}"))))
+}
+
+#[test]
+fn a_full_disk_leaves_nothing_half_made() {
+    let script = "\"$0\" --quiet run site.toml --out small; code=$?; \
+                  find small -type f ! -path '*/.*'; exit $code";
+    let Some(found) = on_a_small_disk(&Case::new(), "300k", script) else {
+        return;
+    };
     assert!(found.starts_with("exit 6\n"), "{found}");
     assert!(found.contains("No space left on device"), "{found}");
     assert!(found.contains("free some space"), "{found}");
     assert!(!found.contains("small/case/manifest.json\n"), "{found}");
+}
+
+#[test]
+fn a_scene_on_a_full_disk_names_the_file_that_did_not_fit() {
+    let script = "\"$0\" --quiet scene small/scene; code=$?; ls -A small; exit $code";
+    // Full at a text kernel, at the start and in the middle of the C-kernel, and at a PEDR file.
+    let sizes = [
+        ("30k", "kernels/gsfc.tm"),
+        ("100k", "kernels/mgs_sc_scene.bc"),
+        ("2500k", "kernels/mgs_sc_scene.bc"),
+        ("20000k", "pedr/"),
+    ];
+    for (size, file) in sizes {
+        let Some(found) = on_a_small_disk(&Case::new(), size, script) else {
+            return;
+        };
+        assert!(found.starts_with("exit 6\nerror: "), "{size}: {found}");
+        assert!(found.contains("No space left on device"), "{size}: {found}");
+        assert!(found.contains(file), "{size}: {found}");
+        assert!(!found.contains("\n.partial"), "{size}: {found}");
+    }
 }
