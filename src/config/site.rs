@@ -254,6 +254,13 @@ pub struct ImageFields {
     pub first_detector: Option<u32>,
 }
 
+/// Fewest lines of an image: orientation is fitted over its length.
+pub const IMAGE_LINES_MIN: u32 = 3;
+
+/// No image is exposed this long, seconds: the longest of the mission take about a minute, and minutes
+/// later the orientation is no polynomial of second order any more.
+pub const IMAGE_DURATION_END_S: f64 = 600.0;
+
 /// Labels print exposures and periods to 0.0001 ms; half of that is their rounding, seconds.
 const EXPOSURE_ROUNDING_S: f64 = 0.5e-7;
 
