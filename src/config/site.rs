@@ -273,6 +273,9 @@ pub fn line_period_agrees(line_period_s: f64, exposure_s: f64, downtrack_summing
     (line_period_s - exposure_s * summing).abs() <= EXPOSURE_ROUNDING_S * (summing + 1.0)
 }
 
+/// Most steps of the bias scan, so that a slip in its step cannot make a run endless.
+pub const SCAN_STEPS_MAX: u32 = 10_000;
+
 /// Limits and options of the range check.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct RangeCheckConfig {
