@@ -313,6 +313,44 @@ fn damaged_stores_and_products_are_made_again() {
     assert!(common::mission::products(&case.path("out")) == before);
 }
 
+/// A manifest and a journal that someone else wrote must not make the next run remove foreign files.
+#[test]
+fn products_named_outside_the_folder_are_left_alone() {
+    let case = Case::new();
+    assert!(case.outcome(case.run()).starts_with("exit 0"));
+    let foreign = [case.path("foreign.txt"), case.path("out/foreign.txt")];
+    for path in &foreign {
+        fs::write(path, "not ours").unwrap();
+    }
+    let inside = case.path("out/case/once_made.txt");
+    fs::write(&inside, "ours").unwrap();
+    let listed = |path: &str| {
+        format!("{{ \"path\": {path:?}, \"bytes\": 8, \"blake3\": \"00\", \"rows\": 1 }}, ")
+    };
+    let absolute = foreign[0].display().to_string();
+    let paths = [
+        "../foreign.txt",
+        "images/../../../foreign.txt",
+        &absolute,
+        "once_made.txt",
+    ];
+    let entries: String = paths.iter().map(|path| listed(path)).collect();
+    let manifest = "out/case/manifest.json";
+    case.replace(
+        manifest,
+        "\"products\": [",
+        &format!("\"products\": [{entries}"),
+    );
+    case.write("out/case/.publishing", paths[..3].join("\n"));
+    let found = case.outcome(case.run());
+    assert!(found.starts_with("exit 0"), "{found}");
+    for path in &foreign {
+        assert_eq!(fs::read_to_string(path).unwrap(), "not ours");
+    }
+    // What the manifest names inside the folder is ours to remove: the list was believed.
+    assert!(!inside.exists());
+}
+
 /// Runs a shell script in the case's folder, with a tmpfs of `size` mounted at `small` in it and the
 /// program as `$0`; `None` for a user who cannot mount (only root, or who may make namespaces, can).
 #[allow(clippy::print_stderr, reason = "says what is skipped")]

@@ -99,6 +99,7 @@ fn checked(version: &str, config: &SiteConfig, found: &Found) -> RangeCheck {
         &trajectory(version, found),
         &config.mola_clock,
         &config.range_check,
+        &RUN_ON,
     )
     .unwrap()
 }

@@ -101,7 +101,7 @@ pub(super) fn run(arguments: &Arguments) -> ExitCode {
 
 type Outcome = Result<SiteOutcome, Failure>;
 
-/// Runs at most `jobs` sites at a time; Ctrl-C lets each finish its stage, or leave the search, and stop.
+/// Runs at most `jobs` sites at a time; Ctrl-C lets each finish its stage, or leave a long one, and stop.
 async fn run_all(sites: Vec<SiteConfig>, arguments: &Arguments) -> Vec<Outcome> {
     let stop = Arc::new(AtomicBool::new(false));
     let places = Arc::new(Semaphore::new(usize::from(arguments.jobs)));

@@ -186,6 +186,7 @@ impl Steps<'_> {
                 &trajectory,
                 &self.config.mola_clock,
                 &self.config.range_check,
+                self.options.stop,
             )
             .in_stage(stage)
         })?;
