@@ -196,7 +196,7 @@ fn an_interrupt_leaves_the_search_and_keeps_finished_stages() {
         .unwrap();
     let begun = Instant::now();
     while !case.path("out/case/.cache/tag_times").exists() {
-        assert!(begun.elapsed() < Duration::from_secs(60), "never begun");
+        assert!(begun.elapsed() < Duration::from_mins(1), "never begun");
         sleep(Duration::from_millis(1));
     }
     succeed(std::process::Command::new("kill").args(["-INT", &child.id().to_string()]));

@@ -2,7 +2,7 @@
 
 use std::{
     path::{Path, PathBuf},
-    sync::atomic::{AtomicBool, Ordering},
+    sync::atomic::AtomicBool,
 };
 
 use rayon::prelude::*;
@@ -36,9 +36,9 @@ pub(super) fn tag_times(config: &SiteConfig, kernels: &KernelSet) -> Result<Part
 
 /// BLAKE3 of files, in their order; `stop` is looked at before each.
 pub(super) fn hash_files(paths: &[PathBuf], stop: &AtomicBool) -> Result<Vec<String>> {
-    let hash = |path: &PathBuf| match stop.load(Ordering::Relaxed) {
-        true => Err(Stopped.into()),
-        false => Ok(hash_file(path)?.0),
+    let hash = |path: &PathBuf| {
+        Stopped::check(stop)?;
+        Ok(hash_file(path)?.0)
     };
     paths.par_iter().map(hash).collect()
 }

@@ -1,6 +1,6 @@
 //! One step of the flow per stage: its parts, the stored output or a run, and the place of a failure.
 
-use std::{path::PathBuf, sync::atomic::Ordering};
+use std::path::PathBuf;
 
 use super::{
     Ending, RunOptions, Stage, parts,
@@ -74,10 +74,7 @@ impl Steps<'_> {
         if self.options.until < stage {
             return Err(Leave::AsAsked);
         }
-        if self.options.stop.load(Ordering::Relaxed) {
-            return Err(Failure::from(Stopped).in_stage(stage.name()).into());
-        }
-        Ok(())
+        Ok(Stopped::check(self.options.stop).in_stage(stage.name())?)
     }
 
     /// Makes sure that the kernels are still what was hashed, after stages that read them.

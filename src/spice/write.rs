@@ -159,7 +159,7 @@ fn fill(
 fn refusal(path: &Path) -> Option<IoFault> {
     let probe = || -> io::Result<()> {
         let mut file = OpenOptions::new().append(true).create(true).open(path)?;
-        file.write_all(&[0; PROBE_BYTES])?;
+        file.write_all(&vec![0; PROBE_BYTES])?;
         file.sync_all()
     };
     probe().err().map(IoFault::on("write"))

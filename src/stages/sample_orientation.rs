@@ -144,7 +144,7 @@ pub fn sample_orientation(
         image: image.id.clone(),
         samples,
         tables: reader.tables(&nodes)?,
-        invalid_because: far.map(|held| held.reason()).into_iter().collect(),
+        invalid_because: far.map(HeldAttitudes::reason).into_iter().collect(),
         notes: held.iter().map(ToString::to_string).collect(),
     })
 }

@@ -2,13 +2,7 @@
 
 mod repeats;
 
-use std::{
-    collections::BTreeMap,
-    fmt,
-    ops::Range,
-    path::Path,
-    sync::atomic::{AtomicBool, Ordering},
-};
+use std::{collections::BTreeMap, fmt, ops::Range, path::Path, sync::atomic::AtomicBool};
 
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -286,9 +280,7 @@ fn search_file(
 
 impl Search<'_> {
     fn block(&self, rows: Range<usize>) -> Result<Found> {
-        if self.stop.load(Ordering::Relaxed) {
-            return Err(Stopped.into());
-        }
+        Stopped::check(self.stop)?;
         let mut found = Found::new();
         for (row, frame) in self.file.frames(rows, self.guard) {
             found.frames_read += 1;

@@ -12,7 +12,7 @@
 mod residuals;
 mod scan;
 
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::AtomicBool;
 
 use serde::{Deserialize, Serialize};
 
@@ -101,9 +101,7 @@ pub fn check_ranges(
     let mut shots = ShotResiduals::default();
     let mut checked = Vec::with_capacity(profiles.len());
     for (index, profile) in (0_u32..).zip(profiles) {
-        if stop.load(Ordering::Relaxed) {
-            return Err(Stopped.into());
-        }
+        Stopped::check(stop)?;
         let first = shots.len();
         for row in &profile.rows {
             let shot = footprints.row(*row as usize);
