@@ -18,7 +18,7 @@ use common::case::Case;
 type Spoil = fn(&Case) -> Command;
 
 /// Spoils one thing of a good case and says what to run.
-const CASES: [(&str, Spoil); 41] = [
+const CASES: [(&str, Spoil); 42] = [
     ("good", Case::run),
     ("site_file_missing", |case| {
         fs::remove_file(case.path("site.toml")).unwrap();
@@ -190,6 +190,12 @@ const CASES: [(&str, Spoil); 41] = [
         command.args(["--quiet", "pedr", "info", "pedr/ap19117l.b"]);
         command
     }),
+    ("info_with_something_else_for_leap_seconds", |case| {
+        let mut command = case.areograph();
+        command.args(["--quiet", "pedr", "info", "pedr/ap19117l.b"]);
+        command.args(["--leap-seconds", "kernels/moc.ti"]);
+        command
+    }),
     ("no_shot_in_the_window", |case| {
         case.replace("site.toml", "[87.5, 88.5]", "[10.0, 10.1]");
         case.run()
@@ -253,6 +259,25 @@ fn every_case_has_its_exit_code_and_exact_message() {
         differing.len(),
         CASES.len(),
         differing.join("\n")
+    );
+}
+
+#[test]
+fn pedr_info_tells_utc_when_it_is_given_leap_seconds() {
+    let case = Case::new();
+    let mut command = case.areograph();
+    command.args(["--quiet", "pedr", "info", "pedr/ap19117l.b"]);
+    command.args(["--leap-seconds", "kernels/leapseconds.tls"]);
+    let found = case.outcome(command);
+    assert!(found.starts_with("exit 0\n"), "{found}");
+    // The revolution of the image of 04:17:44 UTC.
+    assert!(
+        found.contains("utc_first         \"2001-03-23T03:19:"),
+        "{found}"
+    );
+    assert!(
+        found.contains("utc_last          \"2001-03-23T05:16:"),
+        "{found}"
     );
 }
 
