@@ -80,12 +80,27 @@ fn profiles(config: &SiteConfig, images: &[ImageTimes]) -> Result<Vec<Profile>> 
     Ok(group_profiles(&footprints, &config.windows, images))
 }
 
-fn check_profile(profile: &Profile, session: &Session) -> Result<String> {
-    session
-        .require_position(profile.interval)
-        .in_stage(Stage::CheckRanges.name())?;
-    let (id, shots) = (&profile.id, profile.rows.len());
-    Ok(format!("profile {id}: {shots} shots, position covered"))
+/// Position at the shots of every profile; one finding for all that have it.
+fn check_profiles(
+    profiles: &[Profile],
+    session: &Session,
+    config: &SiteConfig,
+    checked: &mut Checked,
+) {
+    let (mut covered, mut shots) = (0, 0);
+    for profile in profiles {
+        let position = session.require_position(profile.interval);
+        match position.in_stage(Stage::CheckRanges.name()) {
+            Ok(()) => {
+                covered += 1;
+                shots += profile.rows.len();
+            }
+            Err(failure) => checked.failures.push(failure.in_site(&config.site)),
+        }
+    }
+    let of = profiles.len();
+    let finding = format!("{covered} of {of} profiles ({shots} shots): position covered");
+    checked.findings.push(finding);
 }
 
 /// Coverage at images, and at shots unless a PEDR file cannot be used: that was told before.
@@ -106,12 +121,8 @@ fn check_kernels(config: &SiteConfig, checked: &mut Checked) -> Result<()> {
         checked.failures.push(failure.in_site(&config.site));
         None
     });
-    if profiles.as_ref().is_some_and(Vec::is_empty) {
-        let finding = "no shot in any window: products would be invalid".to_owned();
-        checked.findings.push(finding);
-    }
-    let profiles = profiles.unwrap_or_default();
-    let kernels = load_kernels(config, &wanted(config, &images, &profiles))?;
+    let flights = profiles.as_deref().unwrap_or_default();
+    let kernels = load_kernels(config, &wanted(config, &images, flights))?;
     checked
         .findings
         .extend(kernels.explanation().iter().cloned());
@@ -126,19 +137,27 @@ fn check_kernels(config: &SiteConfig, checked: &mut Checked) -> Result<()> {
             pointing,
             &config.orientation,
         );
-        let finding = sampled.in_stage(&Stage::SampleOrientation.of_image(&image.id)).map(|_| {
+        let finding = sampled.in_stage(&Stage::SampleOrientation.of_image(&image.id)).map(|orientation| {
+            let invalid = orientation.invalid_because.iter();
+            let invalid = invalid.map(|reason| format!("; products would be invalid: {reason}"));
             format!(
-                "image {}: {} lines from {} UTC, first line centre {}, position and attitude covered",
+                "image {}: {} lines from {} UTC, first line centre {}, position and attitude covered{}",
                 image.id,
                 image.lines_header,
                 image.utc_start,
-                image.line_centre(0)
+                image.line_centre(0),
+                invalid.collect::<String>()
             )
         });
         checked.note(finding, config);
     }
-    for profile in &profiles {
-        checked.note(check_profile(profile, &session), config);
+    match profiles.as_deref() {
+        Some([]) => {
+            let finding = "no shot in any window: products would be invalid";
+            checked.findings.push(finding.to_owned());
+        }
+        Some(profiles) => check_profiles(profiles, &session, config, checked),
+        None => {}
     }
     Ok(())
 }
