@@ -42,6 +42,14 @@ fn coverage_is_asked_at_the_shifted_instants_with_their_padding() {
     // Exposures to 05:17:37.0: with padding beyond the C-kernel, shifted by -1.15 s inside it.
     let good = outcome(&case, "05:17:30.0", 700, "", "ck_bias_s = -1.15");
     assert!(good.starts_with("exit 0"), "{good}");
+    // 05:17:30 UTC is ET 38596714.186; the flow wanted the exposures of 7 s, shifted, with 1 s around.
+    let kernels = manifest(&case)["kernels"].clone();
+    let mut kernels = kernels.as_array().unwrap().iter();
+    let used = &kernels.find(|kernel| kernel["role"] == "CK").unwrap()["coverage_used"][0];
+    for (end, expected_s) in [("start", 38_596_712.036), ("stop", 38_596_721.036)] {
+        let end_s = used[end].as_f64().unwrap();
+        assert!((end_s - expected_s).abs() < 0.001, "{end}: {end_s} s"); // ET above has milliseconds
+    }
     // The same image, covered as it stands, but not at the instants that this bias asks for.
     for (start, bias) in [("05:17:30.0", "1.15"), ("03:18:04.0", "-5.0")] {
         let refused = outcome(&case, start, 700, "", &format!("ck_bias_s = {bias}"));
