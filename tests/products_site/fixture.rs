@@ -16,14 +16,18 @@ use areograph::{
         statistics::{Summary, Trend},
     },
     products::{ImageProducts, KernelLine, SiteProducts},
+    spice::Wanted,
     stages::{
         check_ranges::{BiasScan, ProfileRanges, RangeCheck, ShotResiduals},
+        convert_datum::FileConversion,
         fit_sensor_model::{SensorModel, fit_sensor_model},
         group_profiles::{Profile, group_profiles},
-        sample_orientation::{BoresightGround, CameraTables, Orientation, OrientationSample},
+        sample_orientation::{
+            BoresightGround, CameraTables, GroundPoint, Orientation, OrientationSample,
+        },
         tag_times::{ImageTimes, StartFrom},
     },
-    time::Et,
+    time::{Et, Interval, Intervals},
 };
 
 /// Shots of the profile; one in ten seconds lies on either side of the antimeridian.
@@ -35,6 +39,7 @@ pub(crate) const START_S: f64 = -11_224_002.182_053_322;
 pub(crate) struct Site {
     pub(crate) config: SiteConfig,
     pub(crate) kernels: Vec<KernelLine>,
+    pub(crate) wanted: Wanted,
     pub(crate) times: ImageTimes,
     pub(crate) orientation: Orientation,
     pub(crate) model: SensorModel,
@@ -45,6 +50,8 @@ pub(crate) struct Site {
     pub(crate) rejected: BTreeMap<String, u64>,
     pub(crate) complaints: Vec<String>,
     pub(crate) notes: Vec<String>,
+    pub(crate) warnings: Vec<String>,
+    pub(crate) conversions: Vec<FileConversion>,
 }
 
 impl Site {
@@ -55,12 +62,22 @@ impl Site {
         let footprints = footprints();
         let profiles = group_profiles(&footprints, &config.windows, std::slice::from_ref(&times));
         Self {
-            kernels: vec![KernelLine {
-                name: "naif0012.tls".to_owned(),
-                role: "LSK".to_owned(),
-                bytes: 5257,
-                blake3: "ab".repeat(32),
-            }],
+            kernels: vec![
+                kernel("naif0012.tls", "LSK", None),
+                kernel("nav.bsp", "SPK", Some(vec![seconds(-4e4, 4e4)])),
+                // A gap of two seconds in what the image asks.
+                kernel(
+                    "sc.bc",
+                    "CK",
+                    Some(vec![seconds(-900.0, 1.0), seconds(3.0, 900.0)]),
+                ),
+            ],
+            wanted: Wanted {
+                positions: Intervals::union_of([seconds(-1.0, 8.0)]),
+                attitudes: Intervals::union_of([seconds(-2.15, 6.0)]),
+            },
+            warnings: Vec::new(),
+            conversions: vec![FileConversion::default()],
             model: fit_sensor_model(&orientation, &config.orientation).unwrap(),
             utc: (0..footprints.len())
                 .map(|row| format!("1999-08-24T14:12:{:06.3}", 13.0 + 0.1 * row as f64))
@@ -78,6 +95,34 @@ impl Site {
             footprints,
             profiles,
         }
+    }
+
+    /// The same site with its window, shots and image around the north pole, longitudes all round.
+    #[allow(dead_code, reason = "not every test that shares this needs it")]
+    pub(crate) fn polar() -> Self {
+        let mut site = Self::small();
+        site.config.windows[0].shape = WindowShape::Box {
+            west_rad: 0.0,
+            east_rad: std::f64::consts::TAU,
+            south_rad: 1.45,
+            north_rad: std::f64::consts::FRAC_PI_2,
+        };
+        // Up to the pole along one meridian and down along the opposite one.
+        for k in 0..SHOTS {
+            let row = k as usize;
+            let from_pole_rad = 0.002 * (f64::from(k) - 29.5);
+            site.footprints.latitude_rad[row] = std::f64::consts::FRAC_PI_2 - from_pole_rad.abs();
+            site.footprints.longitude_rad[row] = if from_pole_rad < 0.0 { 1.0 } else { 4.2 };
+        }
+        site.orientation.outline = Some(
+            [0.3, 1.9, 3.4, 5.0]
+                .map(|longitude_rad| GroundPoint {
+                    longitude_rad,
+                    latitude_rad: 1.55,
+                })
+                .to_vec(),
+        );
+        site
     }
 
     /// The same site without shots and images.
@@ -100,6 +145,7 @@ impl Site {
         with(&SiteProducts {
             config: &self.config,
             kernels: &self.kernels,
+            wanted: &self.wanted,
             images: if image { &images } else { &[] },
             footprints: &self.footprints,
             utc: &self.utc,
@@ -108,7 +154,27 @@ impl Site {
             rejected: &self.rejected,
             complaints: &self.complaints,
             notes: &self.notes,
+            warnings: &self.warnings,
+            conversions: &self.conversions,
         })
+    }
+}
+
+/// An interval in seconds from the first shot.
+fn seconds(start_s: f64, stop_s: f64) -> Interval {
+    Interval::new(
+        Et::from_seconds(START_S + start_s),
+        Et::from_seconds(START_S + stop_s),
+    )
+}
+
+fn kernel(name: &str, role: &str, held: Option<Vec<Interval>>) -> KernelLine {
+    KernelLine {
+        name: name.to_owned(),
+        role: role.to_owned(),
+        bytes: 5257,
+        blake3: "ab".repeat(32),
+        held: held.map(Intervals::union_of),
     }
 }
 
@@ -224,6 +290,14 @@ fn orientation(times: &ImageTimes) -> Orientation {
     Orientation {
         image: times.id.clone(),
         samples,
+        outline: Some(
+            [(-0.05, -0.1), (-0.05, 0.05), (0.0, 0.05), (0.0, -0.1)]
+                .map(|(longitude_rad, latitude_rad)| GroundPoint {
+                    longitude_rad: std::f64::consts::PI + longitude_rad,
+                    latitude_rad,
+                })
+                .to_vec(),
+        ),
         tables: CameraTables {
             position_m: vec![[-1_745_703.3, 1_342_962.3, -3_030_553.6]; nodes],
             velocity_m_s: vec![[-2_248.8, 1_571.6, 1_992.2]; nodes],
