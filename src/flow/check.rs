@@ -1,6 +1,6 @@
-//! Configuration, files and kernel coverage of a site, without running it.
+//! Configuration, files and kernel coverage of a site, without writing anything.
 
-use std::path::Path;
+use std::{path::Path, sync::atomic::AtomicBool};
 
 use super::{
     Stage,
@@ -11,7 +11,13 @@ use crate::{
     error::{Failure, Place, Result},
     pds::pedr,
     spice::{Session, Wanted},
-    stages::{sample_orientation::sample_orientation, tag_times::tag_times},
+    stages::{
+        convert_datum::convert_datum,
+        group_profiles::{Profile, group_profiles},
+        sample_orientation::sample_orientation,
+        search_footprints::search_footprints,
+        tag_times::{ImageTimes, tag_times},
+    },
 };
 
 /// What a check found.
@@ -32,7 +38,9 @@ impl Checked {
     }
 }
 
-/// Checks kernels, image labels with their coverage, and PEDR labels of a site.
+/// Checks a site's kernels, labels and PEDR files, and coverage at its images and at its shots.
+///
+/// The PEDR files are searched as a run does it: only shots in the windows tell which times are needed.
 #[must_use]
 pub fn check_site(config: &SiteConfig) -> Checked {
     let mut checked = Checked::default();
@@ -47,6 +55,7 @@ pub fn check_site(config: &SiteConfig) -> Checked {
 
 fn check_pedr(path: &Path, choice: DatumChoice) -> Result<String> {
     let file = pedr::File::open(path)?;
+    file.require_records()?;
     let version = file.name().map(|name| name.version);
     let datum = pedr::decide_datum(choice, version, file.label().datum).in_file(path)?;
     let complaints: Vec<String> = file
@@ -62,7 +71,41 @@ fn check_pedr(path: &Path, choice: DatumChoice) -> Result<String> {
     ))
 }
 
+/// Profiles of the site's shots, as [`super::run_site`] finds them.
+fn profiles(config: &SiteConfig, images: &[ImageTimes]) -> Result<Vec<Profile>> {
+    let correction_s = config.mola_clock.correction_s();
+    let never = AtomicBool::new(false);
+    let found = search_footprints(&config.pedr, &config.windows, correction_s, &never)?;
+    let footprints = convert_datum(found.footprints, &config.mola_clock).footprints;
+    Ok(group_profiles(&footprints, &config.windows, images))
+}
+
+/// Position at the shots of every profile; one finding for all that have it.
+fn check_profiles(
+    profiles: &[Profile],
+    session: &Session,
+    config: &SiteConfig,
+    checked: &mut Checked,
+) {
+    let (mut covered, mut shots) = (0, 0);
+    for profile in profiles {
+        let position = session.require_position(profile.interval);
+        match position.in_stage(Stage::CheckRanges.name()) {
+            Ok(()) => {
+                covered += 1;
+                shots += profile.rows.len();
+            }
+            Err(failure) => checked.failures.push(failure.in_site(&config.site)),
+        }
+    }
+    let of = profiles.len();
+    let finding = format!("{covered} of {of} profiles ({shots} shots): position covered");
+    checked.findings.push(finding);
+}
+
+/// Coverage at images, and at shots unless a PEDR file cannot be used: that was told before.
 fn check_kernels(config: &SiteConfig, checked: &mut Checked) -> Result<()> {
+    let searchable = !config.pedr.files.is_empty() && checked.failures.is_empty();
     let clocks = load_kernels(config, &Wanted::default())?;
     let session = Session::open(&clocks)?;
     let mut images = Vec::new();
@@ -73,7 +116,13 @@ fn check_kernels(config: &SiteConfig, checked: &mut Checked) -> Result<()> {
         }
     }
     drop(session);
-    let kernels = load_kernels(config, &wanted(config, &images, &[]))?;
+    let found = searchable.then(|| profiles(config, &images)).transpose();
+    let profiles = found.unwrap_or_else(|failure| {
+        checked.failures.push(failure.in_site(&config.site));
+        None
+    });
+    let flights = profiles.as_deref().unwrap_or_default();
+    let kernels = load_kernels(config, &wanted(config, &images, flights))?;
     checked
         .findings
         .extend(kernels.explanation().iter().cloned());
@@ -88,16 +137,27 @@ fn check_kernels(config: &SiteConfig, checked: &mut Checked) -> Result<()> {
             pointing,
             &config.orientation,
         );
-        let finding = sampled.in_stage(&Stage::SampleOrientation.of_image(&image.id)).map(|_| {
+        let finding = sampled.in_stage(&Stage::SampleOrientation.of_image(&image.id)).map(|orientation| {
+            let invalid = orientation.invalid_because.iter();
+            let invalid = invalid.map(|reason| format!("; products would be invalid: {reason}"));
             format!(
-                "image {}: {} lines from {} UTC, first line centre {}, position and attitude covered",
+                "image {}: {} lines from {} UTC, first line centre {}, position and attitude covered{}",
                 image.id,
                 image.lines_header,
                 image.utc_start,
-                image.line_centre(0)
+                image.line_centre(0),
+                invalid.collect::<String>()
             )
         });
         checked.note(finding, config);
+    }
+    match profiles.as_deref() {
+        Some([]) => {
+            let finding = "no shot in any window: products would be invalid";
+            checked.findings.push(finding.to_owned());
+        }
+        Some(profiles) => check_profiles(profiles, &session, config, checked),
+        None => {}
     }
     Ok(())
 }

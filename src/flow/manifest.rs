@@ -50,6 +50,10 @@ impl Results<'_> {
                     .map(|note| format!("image {}: {note}", image.id)),
             );
         }
+        for orientation in self.orientations {
+            let (image, held) = (&orientation.value.image, &orientation.value.notes);
+            notes.extend(held.iter().map(|note| format!("image {image}: {note}")));
+        }
         notes
     }
 

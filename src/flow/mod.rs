@@ -87,7 +87,7 @@ pub struct RunOptions<'a> {
     pub until: Stage,
     /// Use no stored output.
     pub force: bool,
-    /// Set from outside to stop between two stages.
+    /// Set from outside to stop between two stages, or inside the search and the range check.
     pub stop: &'a AtomicBool,
 }
 

@@ -1,12 +1,15 @@
 //! What each stage depends on. The lists are the method's dependencies, read beside [`super::run_site`].
 
-use std::path::{Path, PathBuf};
+use std::{
+    path::{Path, PathBuf},
+    sync::atomic::AtomicBool,
+};
 
 use rayon::prelude::*;
 
 use crate::{
     config::SiteConfig,
-    error::Result,
+    error::{Result, Stopped},
     files::{file_name, hash_file},
     spice::{KernelRole, KernelSet},
     stages::tag_times::ImageTimes,
@@ -14,7 +17,7 @@ use crate::{
 };
 
 /// Raised when a stage computes something else from the same parts, or lays its output out anew.
-const METHOD: u32 = 2;
+const METHOD: u32 = 3;
 
 /// Image keys, label files and all text kernels, among them those that convert times.
 pub(super) fn tag_times(config: &SiteConfig, kernels: &KernelSet) -> Result<Parts> {
@@ -31,12 +34,13 @@ pub(super) fn tag_times(config: &SiteConfig, kernels: &KernelSet) -> Result<Part
     }))
 }
 
-/// BLAKE3 of files, in their order.
-pub(super) fn hash_files(paths: &[PathBuf]) -> Result<Vec<String>> {
-    paths
-        .par_iter()
-        .map(|path| Ok(hash_file(path)?.0))
-        .collect()
+/// BLAKE3 of files, in their order; `stop` is looked at before each.
+pub(super) fn hash_files(paths: &[PathBuf], stop: &AtomicBool) -> Result<Vec<String>> {
+    let hash = |path: &PathBuf| {
+        Stopped::check(stop)?;
+        Ok(hash_file(path)?.0)
+    };
+    paths.par_iter().map(hash).collect()
 }
 
 /// PEDR files (by their hashes) and filters, windows, and the clock correction.

@@ -1,6 +1,6 @@
 //! Which stages would run, and why; nothing is written.
 
-use std::path::Path;
+use std::{path::Path, sync::atomic::AtomicBool};
 
 use serde::de::DeserializeOwned;
 
@@ -63,7 +63,8 @@ fn plan_stages(config: &SiteConfig, out: &Path, force: bool) -> Result<Vec<Plann
     let clocks = load_kernels(config, &Wanted::default()).in_stage(Stage::LoadKernels.name())?;
     let parts = parts::tag_times(config, &clocks).in_stage(Stage::TagTimes.name())?;
     let images = plan.look::<Vec<ImageTimes>>(Stage::TagTimes, &parts);
-    let hashes = parts::hash_files(&config.pedr.files).in_stage(Stage::SearchFootprints.name())?;
+    let hashes = parts::hash_files(&config.pedr.files, &AtomicBool::new(false))
+        .in_stage(Stage::SearchFootprints.name())?;
     let parts = parts::search_footprints(config, &hashes);
     let found = plan.look::<SearchResult>(Stage::SearchFootprints, &parts);
     let parts = parts::convert_datum(config, hash(found.as_ref()));

@@ -84,7 +84,10 @@ pub(super) fn publish(folder: &Path, cache: &StageCache, results: &Results<'_>) 
     }
     let fingerprint = parts.fingerprint();
     let manifest = make_products(folder, results, fingerprint)?;
-    Ok(Ending::Published(cache.store(name, parts, manifest)?.value))
+    let published = cache.store(name, parts, manifest)?.value;
+    let stages = published.stages.iter().map(|stage| &*stage.name);
+    cache.keep_only(stages);
+    Ok(Ending::Published(published))
 }
 
 fn make_products(folder: &Path, results: &Results<'_>, fingerprint: String) -> Result<Manifest> {

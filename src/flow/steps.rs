@@ -1,6 +1,6 @@
 //! One step of the flow per stage: its parts, the stored output or a run, and the place of a failure.
 
-use std::{path::PathBuf, sync::atomic::Ordering};
+use std::path::PathBuf;
 
 use super::{
     Ending, RunOptions, Stage, parts,
@@ -8,7 +8,7 @@ use super::{
 };
 use crate::{
     config::{KernelSource, SiteConfig},
-    error::{Failure, Fault, Kind, Place, Result},
+    error::{Failure, Fault, Kind, Place, Result, Stopped},
     spice::{KernelSet, Session, Trajectory, Wanted},
     stages::{
         check_ranges::{RangeCheck, check_ranges},
@@ -53,23 +53,6 @@ impl From<Failure> for Leave {
 
 type Step<T> = std::result::Result<T, Leave>;
 
-/// The user stopped the program.
-#[derive(Debug, thiserror::Error)]
-#[error("stopped before {before}")]
-struct Stopped {
-    before: Stage,
-}
-
-impl Fault for Stopped {
-    fn kind(&self) -> Kind {
-        Kind::Interrupted
-    }
-
-    fn advice(&self) -> String {
-        "run again: finished stages are kept".to_owned()
-    }
-}
-
 /// A PEDR file changed between its hash and its search.
 #[derive(Debug, thiserror::Error)]
 #[error("the file changed while it was read")]
@@ -91,10 +74,7 @@ impl Steps<'_> {
         if self.options.until < stage {
             return Err(Leave::AsAsked);
         }
-        if self.options.stop.load(Ordering::Relaxed) {
-            return Err(Failure::from(Stopped { before: stage }).into());
-        }
-        Ok(())
+        Ok(Stopped::check(self.options.stop).in_stage(stage.name())?)
     }
 
     /// Makes sure that the kernels are still what was hashed, after stages that read them.
@@ -141,17 +121,14 @@ impl Steps<'_> {
     pub(super) fn search_footprints(&self) -> Step<Output<SearchResult>> {
         self.enter(Stage::SearchFootprints)?;
         let stage = Stage::SearchFootprints.name();
-        let hashes = parts::hash_files(&self.config.pedr.files).in_stage(stage)?;
+        let hashes =
+            parts::hash_files(&self.config.pedr.files, self.options.stop).in_stage(stage)?;
         let parts = parts::search_footprints(self.config, &hashes);
         let correction_s = self.config.mola_clock.correction_s();
         Ok(self.cache.stage(stage, parts, || {
-            let found = search_footprints(&self.config.pedr, &self.config.windows, correction_s)?;
-            for ((file, hash), path) in found
-                .footprints
-                .files
-                .iter()
-                .zip(&hashes)
-                .zip(&self.config.pedr.files)
+            let (pedr, windows) = (&self.config.pedr, &self.config.windows);
+            let found = search_footprints(pedr, windows, correction_s, self.options.stop)?;
+            for ((file, hash), path) in found.footprints.files.iter().zip(&hashes).zip(&pedr.files)
             {
                 if file.blake3 != *hash {
                     return Err(Failure::from(ChangedFile).in_file(path).in_stage(stage));
@@ -206,6 +183,7 @@ impl Steps<'_> {
                 &trajectory,
                 &self.config.mola_clock,
                 &self.config.range_check,
+                self.options.stop,
             )
             .in_stage(stage)
         })?;

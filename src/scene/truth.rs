@@ -27,6 +27,7 @@ const EPOCHS: u32 = 31;
 pub(super) struct Truth {
     pub made_by: &'static str,
     pub synthetic: &'static str,
+    pub orbit: &'static str,
     pub seed: u64,
     pub biases: Biases,
     pub crossover: Crossover,
@@ -118,6 +119,7 @@ impl Truth {
         Self {
             made_by: "areograph scene",
             synthetic: "all of this is invented; only ids, times and geometry of the images follow Shan et al. 2005",
+            orbit: "all positions below, of images and behind the shots, belong to the true orbit, which is gsfc (kernels/gsfc.tm); nav and ipng, and the site files use nav, differ from it by orbit_differences",
             seed,
             biases: Biases {
                 ck_bias_s: MGS_POINTING_BIAS.seconds(),

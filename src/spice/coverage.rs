@@ -102,7 +102,8 @@ impl Session {
     /// Makes sure that the attitude is known for every exposure in `exposures`.
     ///
     /// What is looked for are the instants as the C-kernels count them, with `padding_s` seconds more
-    /// at both ends.
+    /// at both ends; an instant within `tolerance_s` of a C-kernel's interval is known, as it is to
+    /// [`Session::attitude`].
     ///
     /// # Errors
     /// [`SpiceFault::CoverageGap`] with the first gap and the kernels beside it.
@@ -111,10 +112,12 @@ impl Session {
         exposures: Interval,
         bias: PointingBias,
         padding_s: f64,
+        tolerance_s: f64,
     ) -> Result<()> {
         let wanted = exposures.shifted(bias.seconds()).padded(padding_s);
-        let held = &self.coverage()?.ck;
-        self.require(wanted, held, "attitude", KernelRole::Ck)
+        let intervals = self.coverage()?.ck.as_slice().iter();
+        let held = Intervals::union_of(intervals.map(|interval| interval.padded(tolerance_s)));
+        self.require(wanted, &held, "attitude", KernelRole::Ck)
     }
 
     fn require(

@@ -95,6 +95,12 @@ impl Case {
             .collect()
     }
 
+    pub(crate) fn check(&self) -> Command {
+        let mut command = self.areograph();
+        command.args(["--quiet", "check", "site.toml"]);
+        command
+    }
+
     /// Exit code and everything printed, the case's folder cut out.
     pub(crate) fn outcome(&self, mut command: Command) -> String {
         let output = command.output().unwrap();

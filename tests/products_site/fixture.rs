@@ -314,6 +314,8 @@ fn orientation(times: &ImageTimes) -> Orientation {
             ],
             et_s,
         },
+        notes: Vec::new(),
+        invalid_because: Vec::new(),
     }
 }
 
