@@ -7,7 +7,7 @@ use super::{
     steps::{load_kernels, wanted},
 };
 use crate::{
-    config::{DatumChoice, SiteConfig},
+    config::{DatumChoice, KernelSource, SiteConfig},
     error::{Failure, Place, Result},
     pds::pedr,
     spice::{Session, Wanted},
@@ -62,8 +62,22 @@ fn check_pedr(path: &Path, choice: DatumChoice) -> Result<String> {
     ))
 }
 
+/// Checks the kernels; of rival sets every one, since any of them may be chosen.
 fn check_kernels(config: &SiteConfig, checked: &mut Checked) -> Result<()> {
-    let clocks = load_kernels(config, &Wanted::default())?;
+    let KernelSource::Sets(sets) = &config.kernels.source else {
+        return check_set(config, 0, "", checked);
+    };
+    for (index, set) in sets.iter().enumerate() {
+        let prefix = format!("kernel set {}: ", set.id);
+        if let Err(failure) = check_set(config, index, &prefix, checked) {
+            checked.failures.push(failure.in_site(&config.site));
+        }
+    }
+    Ok(())
+}
+
+fn check_set(config: &SiteConfig, index: usize, prefix: &str, checked: &mut Checked) -> Result<()> {
+    let clocks = load_kernels(config, &Wanted::default(), index)?;
     let session = Session::open(&clocks)?;
     let mut images = Vec::new();
     for image in &config.images {
@@ -73,10 +87,11 @@ fn check_kernels(config: &SiteConfig, checked: &mut Checked) -> Result<()> {
         }
     }
     drop(session);
-    let kernels = load_kernels(config, &wanted(config, &images, &[]))?;
+    let kernels = load_kernels(config, &wanted(config, &images, &[]), index)?;
+    let explanation = kernels.explanation().iter();
     checked
         .findings
-        .extend(kernels.explanation().iter().cloned());
+        .extend(explanation.map(|line| format!("{prefix}{line}")));
     let session = Session::open(&kernels)?;
     for image in &images {
         // One pass of the stage itself meets whatever a run would: ephemerides, frames, gaps.
@@ -90,7 +105,7 @@ fn check_kernels(config: &SiteConfig, checked: &mut Checked) -> Result<()> {
         );
         let finding = sampled.in_stage(&Stage::SampleOrientation.of_image(&image.id)).map(|_| {
             format!(
-                "image {}: {} lines from {} UTC, first line centre {}, position and attitude covered",
+                "{prefix}image {}: {} lines from {} UTC, first line centre {}, position and attitude covered",
                 image.id,
                 image.lines_header,
                 image.utc_start,

@@ -4,6 +4,7 @@ pub mod attitude;
 pub mod chebyshev;
 pub mod ellipsoid;
 pub mod mars_rotation;
+pub mod orbit_axes;
 pub mod polynomial;
 pub mod statistics;
 pub mod window;
