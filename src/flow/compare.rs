@@ -3,7 +3,7 @@
 use std::fmt;
 
 use crate::{
-    error::{Fault, Kind, Result},
+    error::{Fault, Kind, Place, Result},
     spice::{Coverage, KernelRole, KernelSet, Session, Wanted},
     stages::compare_kernels::{
         AttitudeComparison, AttitudeSample, Comparison, compare_attitudes, compare_orbits,
@@ -70,17 +70,18 @@ pub struct LeftOut {
     pub utc: [String; 2],
 }
 
+impl RivalSet {
+    /// Where a failure of one set happened.
+    fn stage(&self) -> String {
+        format!("compare_kernels/{}", self.id)
+    }
+}
+
 /// Sets that cannot be compared.
 #[derive(Debug, thiserror::Error)]
 enum CompareFault {
-    #[error(
-        "the kernel sets {} have no time in common at which all hold the position of MGS{wanted}",
-        sets.join(", ")
-    )]
-    NothingInCommon {
-        sets: Vec<String>,
-        wanted: &'static str,
-    },
+    #[error("no time at which all kernel sets hold the position of MGS; {held}")]
+    NothingInCommon { held: String },
     #[error(
         "the clocks of the kernel sets {first} and {other} differ: {reading} is {apart_s} s later in {other}"
     )]
@@ -120,10 +121,7 @@ impl Fault for CompareFault {
 /// # Errors
 /// Sets without common time, sets whose clocks differ, and what a session says of its kernels.
 pub fn compare_kernels(sets: &[RivalSet], request: &Request<'_>) -> Result<Compared> {
-    let held = sets.iter().map(|set| {
-        let session = Session::open(&set.kernels)?;
-        Ok(session.coverage()?.clone())
-    });
+    let held = sets.iter().map(|set| coverage(set).in_stage(&set.stage()));
     let held: Vec<Coverage> = held.collect::<Result<_>>()?;
     let mut notes = Vec::new();
 
@@ -132,13 +130,16 @@ pub fn compare_kernels(sets: &[RivalSet], request: &Request<'_>) -> Result<Compa
     let (common, mut gaps) = shared(wanted, &positions, "position");
     let epochs = equally_spaced(&common);
     if epochs.is_empty() {
-        return Err(CompareFault::NothingInCommon {
-            sets: sets.iter().map(|set| set.id.clone()).collect(),
-            wanted: wanted.map_or("", |_| ", of the time that is asked for"),
-        }
-        .into());
+        let held = sets.iter().zip(&positions).map(|(set, held)| {
+            let held = wanted.map_or_else(|| held.clone(), |wanted| wanted.intersection(held));
+            format!("{} holds {:.3} s", set.id, held.duration_s())
+        });
+        let of = wanted.map_or_else(String::new, |wanted| {
+            format!(" of {:.3} s asked for", wanted.duration_s())
+        });
+        let held = held.collect::<Vec<_>>().join(", ") + &of;
+        return Err(CompareFault::NothingInCommon { held }.into());
     }
-
     let (turn_epochs, more) = turn_epochs(sets, &held, request, &mut notes);
     gaps.extend(more);
 
@@ -159,14 +160,20 @@ pub fn compare_kernels(sets: &[RivalSet], request: &Request<'_>) -> Result<Compa
 
     let (mut orbits, mut attitudes) = (Vec::new(), Vec::new());
     for set in sets {
-        let session = Session::open(&set.kernels)?;
-        check_clocks(&session, &readings, [&sets[0].id, &set.id])?;
-        let states = epochs.iter().map(|et| session.state(*et));
-        orbits.push((set.id.clone(), states.collect::<Result<_>>()?));
-        let samples = turn_epochs
-            .iter()
-            .map(|et| attitude_sample(&session, request.bias, *et));
-        attitudes.push((set.id.clone(), samples.collect::<Result<_>>()?));
+        let ask = || -> Result<_> {
+            let session = Session::open(&set.kernels)?;
+            check_clocks(&session, &readings, [&sets[0].id, &set.id])?;
+            let states = epochs.iter().map(|et| session.state(*et));
+            let sample = |et: &Et| attitude_sample(&session, request.bias, *et);
+            let samples = turn_epochs.iter().map(sample);
+            Ok((
+                states.collect::<Result<_>>()?,
+                samples.collect::<Result<_>>()?,
+            ))
+        };
+        let (states, samples) = ask().in_stage(&set.stage())?;
+        orbits.push((set.id.clone(), states));
+        attitudes.push((set.id.clone(), samples));
     }
     let attitude = (!turn_epochs.is_empty()).then(|| compare_attitudes(&turn_epochs, &attitudes));
     Ok(Compared {
@@ -176,6 +183,11 @@ pub fn compare_kernels(sets: &[RivalSet], request: &Request<'_>) -> Result<Compa
         left_out,
         notes,
     })
+}
+
+fn coverage(set: &RivalSet) -> Result<Coverage> {
+    let session = Session::open(&set.kernels)?;
+    Ok(session.coverage()?.clone())
 }
 
 /// Epochs at which attitudes are compared, none when the notes say why not, and what sets lack.

@@ -48,7 +48,7 @@ pub(super) struct Arguments {
 /// A command line that asks for no comparison.
 #[derive(Debug, thiserror::Error)]
 enum Usage {
-    #[error("{count} kernel set is no choice; expected two or more")]
+    #[error("kernel sets to compare: {count}; expected two or more")]
     TooFew { count: usize },
     #[error("--time is \"{written}\"; expected FROM..TO in UTC, the first earlier than the second")]
     Time { written: String },
