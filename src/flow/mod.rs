@@ -7,6 +7,7 @@ mod manifest;
 mod parts;
 mod plan;
 mod publish;
+mod sites;
 mod steps;
 
 use std::{fmt, path::PathBuf, sync::atomic::AtomicBool};
@@ -15,13 +16,14 @@ use crate::{
     config::SiteConfig,
     error::{Place, Result},
     spice::Wanted,
-    store::{cache::StageCache, lock::SiteLock, manifest::Manifest},
+    store::{cache::StageCache, lock::SiteLock, manifest::Manifest, publish::CACHE},
 };
 
 pub use check::{Checked, check_site};
 pub use choice::{rival_sets, wanted_by_site};
 pub use compare::{Compared, EPOCHS_MAX, LeftOut, Request, RivalSet, compare_kernels};
 pub use plan::{PlannedStage, plan_site};
+pub use sites::publish_sites;
 
 use publish::Results;
 use steps::{Leave, Steps, wanted};
@@ -133,7 +135,7 @@ pub fn run_site(config: &SiteConfig, options: &RunOptions<'_>) -> Result<SiteOut
     let steps = Steps {
         config,
         options,
-        cache: StageCache::new(&folder.join(".cache"), options.force),
+        cache: StageCache::new(&folder.join(CACHE), options.force),
         folder,
     };
     let ending = match run_steps(&steps) {

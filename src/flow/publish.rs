@@ -5,13 +5,13 @@ use std::path::{Path, PathBuf};
 use super::{
     Ending, Stage,
     choice::KernelChoice,
-    manifest::{Account, kernel_entries, pck_note},
+    manifest::{Account, kernel_entries, kernel_lines, pck_note},
     parts,
 };
 use crate::{
     config::SiteConfig,
     error::Result,
-    products::{ImageProducts, KernelLine, SiteProducts, write_products},
+    products::{ImageProducts, SiteProducts, write_products},
     report,
     spice::{KernelSet, Session, Wanted},
     stages::{
@@ -97,23 +97,17 @@ fn make_products(folder: &Path, results: &Results<'_>, fingerprint: String) -> R
         .iter()
         .map(|et_s| session.et_to_utc(Et::from_seconds(*et_s)))
         .collect::<Result<Vec<String>>>()?;
-    let mut notes = results.notes();
-    if let Some(note) = pck_note(&session, &results.wanted.positions) {
-        tracing::warn!("{note}");
-        notes.push(note);
+    let notes = results.notes();
+    let warnings: Vec<String> = pck_note(&session, &results.wanted.positions)
+        .into_iter()
+        .collect();
+    for warning in &warnings {
+        tracing::warn!("{warning}");
     }
     let kernels = kernel_entries(&session, results)?;
+    let lines = kernel_lines(&session, results.kernels)?;
     drop(session);
 
-    let lines: Vec<KernelLine> = kernels
-        .iter()
-        .map(|kernel| KernelLine {
-            name: kernel.name.clone(),
-            role: kernel.role.clone(),
-            bytes: kernel.bytes,
-            blake3: kernel.blake3.clone(),
-        })
-        .collect();
     let images: Vec<ImageProducts<'_>> = results
         .images
         .value
@@ -137,7 +131,9 @@ fn make_products(folder: &Path, results: &Results<'_>, fingerprint: String) -> R
     let site = SiteProducts {
         config: results.config,
         kernels: &lines,
+        wanted: results.wanted,
         images: &images,
+        conversions: &results.converted.value.files,
         footprints,
         utc: &utc,
         profiles: &results.profiles.value,
@@ -145,8 +141,9 @@ fn make_products(folder: &Path, results: &Results<'_>, fingerprint: String) -> R
         rejected: &rejected,
         complaints: &complaints,
         notes: &notes,
+        warnings: &warnings,
     };
-    let invalid_because = site.invalid_because();
+    let (invalid_because, remarks) = (site.invalid_because(), site.remarks());
     let staging = staging(folder)?;
     let mut files: Vec<(PathBuf, u64)> = write_products(&staging, &site, &report::page(&site)?)?
         .into_iter()
@@ -162,6 +159,7 @@ fn make_products(folder: &Path, results: &Results<'_>, fingerprint: String) -> R
         kernels,
         products: entries(&staging, &files)?,
         notes,
+        remarks,
         complaints,
     };
     let manifest = results.manifest(account, fingerprint);
