@@ -128,14 +128,10 @@ fn notes(compared: &Compared) -> Vec<String> {
         distances.join(", ")
     )];
     if !orbit.tied.is_empty() {
-        let tied = orbit
-            .tied
-            .iter()
-            .map(|index| &*orbit.deviations[*index].set);
         notes.push(format!(
             "kernel set {} is the first of several that are equally close; as close: {}",
             orbit.closest().set,
-            tied.collect::<Vec<_>>().join(", ")
+            orbit.tied_sets().collect::<Vec<_>>().join(", ")
         ));
     }
     notes.extend(compared.left_out.iter().map(|left_out| {

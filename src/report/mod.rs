@@ -3,6 +3,7 @@
 //! One HTML file without scripts or outside parts, for light and dark screens, phones and paper.
 //! Every plot is told in words and carries its numbers; everything that came from files is escaped.
 
+mod compare;
 mod graticule;
 mod html;
 mod images;
@@ -16,6 +17,7 @@ mod timeline;
 
 use crate::{error::Result, products::SiteProducts};
 
+pub use compare::{KernelComparison, comparison_page};
 pub use sites::{SiteLine, SiteSummary, sites_page};
 
 use html::Section;

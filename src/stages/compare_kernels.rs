@@ -111,6 +111,18 @@ impl Comparison {
         &self.deviations[self.closest]
     }
 
+    /// Each two sets once, by index, the earlier first.
+    pub fn pairs(&self) -> impl Iterator<Item = (usize, usize)> + use<> {
+        let count = self.deviations.len();
+        (0..count).flat_map(move |first| (first + 1..count).map(move |second| (first, second)))
+    }
+
+    /// Sets that are as close to the mean as the closest.
+    pub fn tied_sets(&self) -> impl Iterator<Item = &str> {
+        let tied = self.tied.iter();
+        tied.map(|index| &*self.deviations[*index].set)
+    }
+
     /// Set `second` minus set `first`, both by index; of turns to first order in the angles.
     #[must_use]
     pub fn difference(&self, first: usize, second: usize) -> Size {

@@ -11,8 +11,10 @@ use crate::{
     error::{Failure, Fault, Kind},
     flow::{Compared, LeftOut, Request, RivalSet, compare_kernels, rival_sets, wanted_by_site},
     geom::{polynomial::root_mean_square, statistics::Summary},
+    report::{KernelComparison, comparison_page},
     spice::{KernelSet, Session, Wanted},
     stages::compare_kernels::{AttitudeComparison, Comparison, Size},
+    store::atomic,
     time::{Et, Interval, Intervals, PointingBias},
     units::RADIANS_PER_ARCSECOND,
 };
@@ -43,6 +45,9 @@ pub(super) struct Arguments {
     /// Answer in JSON, deviations at every epoch included.
     #[arg(long)]
     json: bool,
+    /// Write a page with tables and plots to this file.
+    #[arg(long, value_name = "FILE.html")]
+    page: Option<PathBuf>,
 }
 
 /// A command line that asks for no comparison.
@@ -97,12 +102,29 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
         clocks: site.is_some_and(|site| !site.images.is_empty()),
     };
     let compared = compare_kernels(&sets, &request)?;
+    if let Some(path) = &arguments.page {
+        atomic::write(path, page(&compared)?.as_bytes())?;
+    }
     if arguments.json {
         output::json(&answer(&compared));
     } else {
         print(&compared);
+        if let Some(path) = &arguments.page {
+            output::line(format_args!("page: {}", path.display()));
+        }
     }
     Ok(())
+}
+
+fn page(compared: &Compared) -> Result<String, Failure> {
+    let mut remarks = compared.notes.clone();
+    remarks.extend(left_out_lines(&compared.left_out));
+    comparison_page(&KernelComparison {
+        orbit: &compared.orbit,
+        attitude: compared.attitude.as_ref(),
+        utc: &compared.utc,
+        remarks: &remarks,
+    })
 }
 
 /// The sets by the names of their metakernels, by their paths where two have one name.
@@ -170,7 +192,9 @@ fn print(compared: &Compared) {
         ));
         print_table(&attitude.turns, RADIANS_PER_ARCSECOND, Some(attitude));
     }
-    print_left_out(&compared.left_out);
+    for line in left_out_lines(&compared.left_out) {
+        output::line(line);
+    }
     for note in &compared.notes {
         output::line(format_args!("note: {note}"));
     }
@@ -204,12 +228,12 @@ fn print_table(comparison: &Comparison, unit: f64, attitude: Option<&AttitudeCom
             ground.map_or_else(String::new, |[rms, max]| format!("{rms:>12.3}{max:>12.3}"));
         row(&deviation.set, &deviation.size, &ground);
     }
-    for (first, second) in pairs(comparison) {
+    for (first, second) in comparison.pairs() {
         let sets = [second, first].map(|index| &*comparison.deviations[index].set);
         row(&sets.join(" - "), &comparison.difference(first, second), "");
     }
     let closest = &comparison.closest().set;
-    let tied: Vec<&str> = tied(comparison).collect();
+    let tied: Vec<&str> = comparison.tied_sets().collect();
     if tied.is_empty() {
         output::line(format_args!("  closest to the mean of all: {closest}"));
     } else {
@@ -220,40 +244,29 @@ fn print_table(comparison: &Comparison, unit: f64, attitude: Option<&AttitudeCom
     }
 }
 
-fn print_left_out(left_out: &[LeftOut]) {
-    let mut rest = left_out;
-    while let Some(first) = rest.first() {
-        let same = |other: &LeftOut| other.set == first.set && other.what == first.what;
-        let (spans, others) = rest.split_at(rest.iter().take_while(|one| same(one)).count());
-        rest = others;
+/// For each set what it lacks: how much, and the first spans.
+fn left_out_lines(left_out: &[LeftOut]) -> Vec<String> {
+    let same = |a: &LeftOut, b: &LeftOut| a.set == b.set && a.what == b.what;
+    let of_one_set = left_out.chunk_by(same);
+    let lines = of_one_set.map(|spans| {
+        let (set, what) = (&spans[0].set, spans[0].what);
         let total_s: f64 = spans.iter().map(|one| one.interval.duration_s()).sum();
-        output::line(format_args!(
-            "left out: {} has no {} for {} spans, {total_s:.3} s in all",
-            first.set,
-            first.what,
-            spans.len()
-        ));
-        for span in spans.iter().take(SPANS_PRINTED) {
-            let seconds = span.interval.duration_s();
-            let [start, stop] = &span.utc;
-            output::line(format_args!("  {start} .. {stop} UTC  ({seconds:.3} s)"));
-        }
+        let mut told: Vec<String> = spans
+            .iter()
+            .take(SPANS_PRINTED)
+            .map(|span| {
+                let seconds = span.interval.duration_s();
+                format!("{} .. {} UTC ({seconds:.3} s)", span.utc[0], span.utc[1])
+            })
+            .collect();
         if spans.len() > SPANS_PRINTED {
             let more = spans.len() - SPANS_PRINTED;
-            output::line(format_args!("  and {more} more, see --json"));
+            told.push(format!("and {more} more, see --json"));
         }
-    }
-}
-
-/// Each two sets once, by index.
-fn pairs(comparison: &Comparison) -> impl Iterator<Item = (usize, usize)> + use<> {
-    let count = comparison.deviations.len();
-    (0..count).flat_map(move |first| (first + 1..count).map(move |second| (first, second)))
-}
-
-fn tied(comparison: &Comparison) -> impl Iterator<Item = &str> {
-    let tied = comparison.tied.iter();
-    tied.map(|index| &*comparison.deviations[*index].set)
+        let told = told.join(", ");
+        format!("left out: {set} has no {what} for {total_s:.3} s: {told}")
+    });
+    lines.collect()
 }
 
 /// Root mean square and largest distance on the ground, metres; nothing when no boresight meets Mars.
@@ -320,7 +333,7 @@ fn comparison_json(comparison: &Comparison, unit: f64, name: &str) -> Value {
         entry[keyed("radial_along_cross")] = series.collect::<Vec<_>>().into_iter().collect();
         entry
     });
-    let differences = pairs(comparison).map(|(first, second)| {
+    let differences = comparison.pairs().map(|(first, second)| {
         let mut entry = size(&comparison.difference(first, second));
         entry["set"] = comparison.deviations[second].set.clone().into();
         entry["minus"] = comparison.deviations[first].set.clone().into();
@@ -328,7 +341,7 @@ fn comparison_json(comparison: &Comparison, unit: f64, name: &str) -> Value {
     });
     json!({
         "closest": comparison.closest().set,
-        "equally_close": tied(comparison).collect::<Vec<_>>(),
+        "equally_close": comparison.tied_sets().collect::<Vec<_>>(),
         "epochs_et_s": comparison.epochs.iter().map(|et| et.seconds()).collect::<Vec<_>>(),
         "sets": sets.collect::<Vec<_>>(),
         "differences": differences.collect::<Vec<_>>(),
