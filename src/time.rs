@@ -220,7 +220,10 @@ impl Intervals {
     /// How much time it is in all, seconds.
     #[must_use]
     pub fn duration_s(&self) -> f64 {
-        self.0.iter().map(|interval| interval.duration_s()).sum()
+        // An empty sum of floats would be −0.
+        self.0
+            .iter()
+            .fold(0.0, |sum, interval| sum + interval.duration_s())
     }
 
     /// The instants that both sets hold.
