@@ -8,7 +8,7 @@
 
 mod common;
 
-use std::{fs, process::Command};
+use std::{fs, path::Path, process::Command};
 
 use areograph::{
     constants::MGS_POINTING_BIAS,
@@ -178,6 +178,13 @@ fn rival_case(families: [&str; 3]) -> Case {
     case
 }
 
+/// What the manifest's schema says of the choice.
+fn schema_of_choice() -> jsonschema::Validator {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("config/schema/manifest.schema.json");
+    let schema: Value = serde_json::from_slice(&fs::read(path).unwrap()).unwrap();
+    jsonschema::validator_for(&schema["properties"]["kernel_choice"]).unwrap()
+}
+
 fn manifest(case: &Case) -> Value {
     serde_json::from_slice(&case.read("out/case/manifest.json")).unwrap()
 }
@@ -209,6 +216,7 @@ fn a_site_with_three_sets_takes_the_closest_to_their_mean() {
             // The site needs half a minute round the image; a tenth of a difference swings in 2 hours.
             assert!((share - 1.0).abs() < 0.01, "{share}");
         }
+        assert!(schema_of_choice().is_valid(&manifest["kernel_choice"]));
         let notes = manifest["notes"].to_string();
         let chosen = FAMILIES[closest];
         assert!(

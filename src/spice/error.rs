@@ -58,7 +58,7 @@ pub enum SpiceFault {
         what: String,
     },
     /// A set of kernels lacks a text kernel that a call needs.
-    #[error("no {kernel} in the set: none of {} defines {variable}", listed(set))]
+    #[error("no {kernel} in the set{}", without(set, variable))]
     MissingText {
         /// The kernel that usually holds it.
         kernel: &'static str,
@@ -134,17 +134,15 @@ pub enum SpiceFault {
 /// Names of a set that a message repeats.
 const NAMES_MAX: usize = 12;
 
-/// The names of a set of kernels, of many the first.
-fn listed(names: &[String]) -> String {
-    match names.len() {
-        0 => "no kernels".to_owned(),
-        count if count <= NAMES_MAX => names.join(", "),
-        count => format!(
-            "{} and {} more",
-            names[..NAMES_MAX].join(", "),
-            count - NAMES_MAX
-        ),
-    }
+/// That none of a set of kernels defines `variable`, as the end of a sentence.
+fn without(names: &[String], variable: &str) -> String {
+    let more = match names.len() {
+        0 => return ", which is empty".to_owned(),
+        count if count <= NAMES_MAX => String::new(),
+        count => format!(" and {} more", count - NAMES_MAX),
+    };
+    let first = names[..names.len().min(NAMES_MAX)].join(", ");
+    format!(": none of {first}{more} defines {variable}")
 }
 
 /// CSPICE's short messages that mean "the kernels do not reach there".
