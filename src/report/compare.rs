@@ -7,12 +7,17 @@ use super::{
 use crate::{
     error::Result,
     stages::compare_kernels::{AttitudeComparison, Comparison, Size},
-    time::Et,
+    time::{Et, Interval},
     units::RADIANS_PER_ARCSECOND,
 };
 
-/// Points of a series that are drawn.
-const POINTS_MAX: usize = 1_500;
+/// Points of a set that are drawn, over all stretches.
+const POINTS_MAX: usize = 2_000;
+/// Epochs farther apart than this, seconds, and than so many steps, are of two stretches.
+const GAP_S: f64 = 3_600.0;
+const GAP_STEPS: f64 = 2.5;
+/// Most stretches that are drawn.
+const PICTURES: usize = 8;
 /// Seconds up to which time is told in seconds; beyond in hours.
 const SECONDS_MAX: f64 = 7_200.0;
 const SECONDS_PER_HOUR: f64 = 3_600.0;
@@ -95,11 +100,7 @@ fn orbit(orbit: &Comparison) -> Result<String> {
     ];
     let labels = ["radial, m", "along track, m", "cross track, m"];
     let title = "Orbits minus their mean";
-    Ok([
-        tables(orbit, columns, 1.0),
-        figure(&plot(title, orbit, labels, 1.0, Vec::new()))?,
-    ]
-    .concat())
+    Ok(tables(orbit, columns, 1.0) + &figures(title, orbit, labels, 1.0, None)?)
 }
 
 fn attitude(attitude: &AttitudeComparison) -> Result<String> {
@@ -117,29 +118,15 @@ fn attitude(attitude: &AttitudeComparison) -> Result<String> {
         "about cross track, ″",
     ];
     let turns = &attitude.turns;
-    let ground = turns.deviations.iter().zip(&attitude.ground_m);
-    let ground = ground.map(|(deviation, ground_m)| (&*deviation.set, ground_m.iter().copied()));
-    let origin = turns.epochs.first().copied();
-    let ground = series(&attitude.on_ground, origin, last(turns), ground);
     let words = paragraph(
         "Turns from the mean attitude to that of each set, read with the pointing bias. On the ground: the angle \
          between its boresight and that of the mean attitude, times the distance along it to the ellipsoid.",
     );
-    let ground = Panel {
-        height: PANEL_HEIGHT,
-        ..Panel::of("on the ground, m", ground)
-    };
     let title = "Attitudes against their mean";
     Ok([
         words,
         tables(turns, columns, RADIANS_PER_ARCSECOND),
-        figure(&plot(
-            title,
-            turns,
-            labels,
-            RADIANS_PER_ARCSECOND,
-            vec![ground],
-        ))?,
+        figures(title, turns, labels, RADIANS_PER_ARCSECOND, Some(attitude))?,
     ]
     .concat())
 }
@@ -171,84 +158,127 @@ fn cells(name: &str, size: &Size, unit: f64) -> Vec<Cell> {
     cells
 }
 
-/// Components of every set over time, then `more` panels.
-fn plot(
+/// Stretches of time that are compared without long gaps between their epochs.
+fn stretches(epochs: &[Et]) -> Vec<Interval> {
+    let steps_s = epochs.windows(2).map(|two| two[1].since(two[0]));
+    let gap_s = GAP_S.max(GAP_STEPS * steps_s.fold(f64::INFINITY, f64::min));
+    let mut found: Vec<Interval> = Vec::new();
+    for et in epochs {
+        match found.last_mut() {
+            Some(last) if et.since(last.stop) <= gap_s => last.stop = *et,
+            _ => found.push(Interval::new(*et, *et)),
+        }
+    }
+    found
+}
+
+/// A figure for every stretch: the components of every set and, of attitudes, metres on the ground.
+fn figures(
     title: &str,
     comparison: &Comparison,
     labels: [&'static str; 3],
     unit: f64,
-    more: Vec<Panel>,
-) -> Plot {
-    let origin = comparison.epochs.first().copied();
-    let panels = labels.into_iter().enumerate().map(|(axis, label)| {
-        let sets = comparison.deviations.iter().map(|deviation| {
-            let vectors = deviation.radial_along_cross.iter();
-            (&*deviation.set, vectors.map(move |v| v[axis] / unit))
-        });
-        Panel {
-            height: PANEL_HEIGHT,
-            ..Panel::of(
-                label,
-                series(&comparison.epochs, origin, last(comparison), sets),
-            )
-        }
-    });
-    let x_label = if scale_s(origin, last(comparison)) > 1.0 {
-        "hours after the first epoch"
-    } else {
-        "seconds after the first epoch"
-    };
-    let thinned = match comparison.epochs.len().div_ceil(POINTS_MAX) {
-        0 | 1 => String::new(),
-        step => format!(
-            " Drawn, and in the data below, is one of {step} epochs; `areograph kernels compare --json` gives all."
-        ),
-    };
-    let caption = format!("Each set minus the mean of all.{thinned}");
-    Plot::of(
-        title.to_owned(),
-        caption,
-        x_label,
-        panels.chain(more).collect(),
-    )
-}
-
-fn last(comparison: &Comparison) -> Option<Et> {
-    comparison.epochs.last().copied()
-}
-
-/// Seconds of a unit of the time axis.
-fn scale_s(first: Option<Et>, last: Option<Et>) -> f64 {
-    let span = first
-        .zip(last)
-        .map_or(0.0, |(first, last)| last.since(first));
-    if span > SECONDS_MAX {
-        SECONDS_PER_HOUR
-    } else {
-        1.0
+    ground: Option<&AttitudeComparison>,
+) -> Result<String> {
+    let stretches = stretches(&comparison.epochs);
+    let drawn = stretches.len().min(PICTURES);
+    let mut html = String::new();
+    for (index, stretch) in stretches.iter().take(PICTURES).enumerate() {
+        let over = Over::new(*stretch, POINTS_MAX / drawn);
+        let mut panels: Vec<Panel> = labels
+            .into_iter()
+            .enumerate()
+            .map(|(axis, label)| {
+                let sets = comparison.deviations.iter().map(|deviation| {
+                    let vectors = deviation.radial_along_cross.iter();
+                    (&*deviation.set, vectors.map(move |v| v[axis] / unit))
+                });
+                over.panel(label, &comparison.epochs, sets)
+            })
+            .collect();
+        panels.extend(ground.map(|attitude| {
+            let ground_m = attitude
+                .ground_m
+                .iter()
+                .map(|ground_m| ground_m.iter().copied());
+            let names = comparison
+                .deviations
+                .iter()
+                .map(|deviation| &*deviation.set);
+            over.panel("on the ground, m", &attitude.on_ground, names.zip(ground_m))
+        }));
+        let title = match stretches.len() {
+            1 => title.to_owned(),
+            count => format!("{title}, stretch {} of {count}", index + 1),
+        };
+        let begins_h = stretch.start.since(stretches[0].start) / SECONDS_PER_HOUR;
+        let caption = format!(
+            "Each set minus the mean of all; the stretch begins {begins_h:.3} h after the first epoch. Of many \
+             epochs every so many is drawn; `areograph kernels compare --json` gives all."
+        );
+        html += &figure(&Plot::of(title, caption, over.x_label(), panels))?;
     }
+    let html = format!("<div class=\"plots\">\n{html}</div>\n");
+    if stretches.len() > drawn {
+        let words = format!(
+            "The first {drawn} of {} stretches are drawn.",
+            stretches.len()
+        );
+        return Ok(html + &paragraph(&words));
+    }
+    Ok(html)
 }
 
-/// Dots of every set over time after `origin`: time may have gaps, which a line would hide.
-fn series<'a, V: Iterator<Item = f64>>(
-    epochs: &[Et],
-    origin: Option<Et>,
-    last: Option<Et>,
-    sets: impl Iterator<Item = (&'a str, V)>,
-) -> Vec<Series> {
-    let scale_s = scale_s(origin, last);
-    let after = |et: &Et| origin.map_or(0.0, |origin| et.since(origin) / scale_s);
-    sets.enumerate()
-        .map(|(colour, (set, values))| {
-            let points: Vec<(f64, f64)> = epochs.iter().map(after).zip(values).collect();
+/// How one stretch is drawn.
+struct Over {
+    stretch: Interval,
+    points_max: usize,
+    /// Seconds of a unit of the time axis.
+    scale_s: f64,
+}
+
+impl Over {
+    fn new(stretch: Interval, points_max: usize) -> Self {
+        let long = stretch.duration_s() > SECONDS_MAX;
+        Self {
+            stretch,
+            points_max,
+            scale_s: if long { SECONDS_PER_HOUR } else { 1.0 },
+        }
+    }
+
+    fn x_label(&self) -> &'static str {
+        if self.scale_s > 1.0 {
+            "hours after the start of the stretch"
+        } else {
+            "seconds after the start of the stretch"
+        }
+    }
+
+    /// Dots of every set: time may have gaps, which a line would hide.
+    fn panel<'a, V: Iterator<Item = f64>>(
+        &self,
+        label: &'static str,
+        epochs: &[Et],
+        sets: impl Iterator<Item = (&'a str, V)>,
+    ) -> Panel {
+        let series = sets.enumerate().map(|(colour, (set, values))| {
+            let inside = epochs.iter().zip(values);
+            let inside = inside.filter(|(et, _)| self.stretch.contains(**et));
+            let after = |et: &Et| et.since(self.stretch.start) / self.scale_s;
+            let points: Vec<(f64, f64)> = inside.map(|(et, value)| (after(et), value)).collect();
             Series {
                 label: set.to_owned(),
                 style: Style::Dots,
                 colour,
-                points: thinned(&points, POINTS_MAX),
+                points: thinned(&points, self.points_max),
             }
-        })
-        .collect()
+        });
+        Panel {
+            height: PANEL_HEIGHT,
+            ..Panel::of(label, series.collect())
+        }
+    }
 }
 
 #[cfg(test)]
@@ -288,10 +318,28 @@ mod tests {
         let page = page_of(&found, &["<i>left out</i>".to_owned()]);
         assert!(page.contains("Of 3 kernel sets &lt;nav&gt; is closest to the mean orbit"));
         assert!(page.contains("2.000 m")); // 1 − (1 + 0 + 8) / 3
-        assert!(page.contains("one of 2 epochs"));
+        assert!(page.contains("id=\"orbits-minus-their-mean\""));
         assert!(!page.contains("<nav>") && !page.contains("<i>left"));
         assert!(!page.contains("id=\"attitude\""));
         assert!(page.contains("gsfc − &lt;nav&gt;") && page.contains("ipng − gsfc"));
+    }
+
+    #[test]
+    fn long_gaps_part_stretches_and_wide_steps_do_not() {
+        let ends = |seconds: &[f64]| -> Vec<[f64; 2]> {
+            let epochs: Vec<Et> = seconds.iter().copied().map(Et::from_seconds).collect();
+            let stretches = stretches(&epochs);
+            let ends = stretches
+                .iter()
+                .map(|one| [one.start.seconds(), one.stop.seconds()]);
+            ends.collect()
+        };
+        assert_eq!(
+            ends(&[0.0, 1.0, 2.0, 5e3, 5_001.0]),
+            [[0.0, 2.0], [5e3, 5_001.0]]
+        );
+        assert_eq!(ends(&[0.0, 1e4, 2e4, 4e4]), [[0.0, 4e4]]);
+        assert_eq!(ends(&[7.0]), [[7.0, 7.0]]);
     }
 
     #[test]
