@@ -17,8 +17,23 @@ use common::case::Case;
 
 type Spoil = fn(&Case) -> Command;
 
+/// The case with two rival sets of kernels.
+fn rivals(case: &Case) {
+    let sets = "sets = [{ id = \"nav\", metakernel = \"kernels/nav.tm\" }, \
+                { id = \"ipng\", metakernel = \"kernels/ipng.tm\" }]";
+    case.replace("site.toml", "metakernel = \"kernels/nav.tm\"", sets);
+}
+
+fn compare(case: &Case, arguments: &[&str]) -> Command {
+    let mut command = case.areograph();
+    command
+        .args(["--quiet", "kernels", "compare"])
+        .args(arguments);
+    command
+}
+
 /// Spoils one thing of a good case and says what to run.
-const CASES: [(&str, Spoil); 42] = [
+const CASES: [(&str, Spoil); 49] = [
     ("good", Case::run),
     ("site_file_missing", |case| {
         fs::remove_file(case.path("site.toml")).unwrap();
@@ -228,6 +243,50 @@ const CASES: [(&str, Spoil); 42] = [
         command.args(["--until", "adjust"]);
         command
     }),
+    ("rival_sets_without_common_time", |case| {
+        rivals(case);
+        case.replace("kernels/ipng.tm", "'mgs_ipng_scene.bsp'", "");
+        case.run()
+    }),
+    ("rival_clocks_differ", |case| {
+        rivals(case);
+        // The clock of another set reads the same a second later.
+        fs::copy(
+            case.path("kernels/mgs_clock.tsc"),
+            case.path("kernels/other.tsc"),
+        )
+        .unwrap();
+        case.replace(
+            "kernels/other.tsc",
+            "2.210370652298117E+07",
+            "2.210370752298117E+07",
+        );
+        case.replace("kernels/ipng.tm", "mgs_clock.tsc", "other.tsc");
+        case.run()
+    }),
+    ("rival_set_without_leap_seconds", |case| {
+        rivals(case);
+        case.replace("kernels/ipng.tm", "'leapseconds.tls'", "");
+        case.run()
+    }),
+    ("compare_one_set", |case| compare(case, &["kernels/nav.tm"])),
+    ("compare_a_site_without_sets", |case| {
+        compare(case, &["--site", "site.toml"])
+    }),
+    ("compare_time_reversed", |case| {
+        compare(
+            case,
+            &[
+                "kernels/nav.tm",
+                "kernels/ipng.tm",
+                "--time",
+                "2001-03-23T05:00..2001-03-23T04:00",
+            ],
+        )
+    }),
+    ("compare_something_else", |case| {
+        compare(case, &["kernels/nav.tm", "site.toml"])
+    }),
     ("scene_over_a_foreign_folder", |case| {
         let mut command = case.areograph();
         command.args(["--quiet", "scene", "kernels"]);
@@ -338,6 +397,21 @@ fn damaged_stores_and_products_are_made_again() {
     fs::remove_file(case.path("out/case/ranges.json")).unwrap();
     assert!(case.outcome(case.run()).contains("remarks; products in"));
     assert!(common::mission::products(&case.path("out")) == before);
+}
+
+#[test]
+fn a_contradicting_pck_is_said_on_the_terminal() {
+    let case = Case::new();
+    case.replace("kernels/nav.tm", "mars_iau2000.tpc", "mars_iau1991.tpc");
+    let mut command = case.areograph();
+    command.args(["run", "site.toml", "--out", "out"]);
+    let found = case.outcome(command);
+    assert!(found.starts_with("exit 0"), "{found}");
+    let warning = found.lines().find(|line| line.contains("WARN")).unwrap();
+    assert!(
+        warning.contains("the PCK turns IAU_MARS by 0.2"),
+        "{warning}"
+    );
 }
 
 /// A manifest and a journal that someone else wrote must not make the next run remove foreign files.

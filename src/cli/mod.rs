@@ -44,7 +44,7 @@ enum Command {
     Check(check::Arguments),
     /// Say which stages would run, and why; writes nothing.
     Plan(plan::Arguments),
-    /// Look at kernels: what is loaded, where the gaps are.
+    /// Look at kernels: what is loaded, where the gaps are, how rival sets differ.
     Kernels(kernels::Arguments),
     /// Look into PEDR files.
     Pedr(pedr::Arguments),

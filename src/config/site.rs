@@ -47,16 +47,35 @@ pub struct KernelsConfig {
     pub padding_s: f64,
 }
 
-/// The three ways to name kernels.
+/// The ways to name kernels.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum KernelSource {
+    /// One list.
+    Listed(KernelList),
+    /// A folder to choose from.
+    Root(KernelSelection),
+    /// Rival sets, at least two: the one whose trajectory is closest to the mean of all is used.
+    Sets(Vec<RivalKernels>),
+}
+
+/// Kernels named one by one.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum KernelList {
     /// A metakernel; relative paths in it count from its own folder.
     Metakernel(PathBuf),
     /// Files in load order (later ones win).
     Files(Vec<PathBuf>),
-    /// A folder to choose from.
-    Root(KernelSelection),
+}
+
+/// One of several complete sets of kernels.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct RivalKernels {
+    /// Identifier, unique in the site, for example `nav`.
+    pub id: String,
+    /// Its kernels.
+    pub list: KernelList,
 }
 
 /// How kernels are chosen from a folder.

@@ -7,7 +7,7 @@ use super::{
     steps::{load_kernels, wanted},
 };
 use crate::{
-    config::{DatumChoice, SiteConfig},
+    config::{DatumChoice, KernelSource, SiteConfig},
     error::{Failure, Place, Result},
     pds::pedr,
     spice::{Session, Wanted},
@@ -71,8 +71,8 @@ fn check_pedr(path: &Path, choice: DatumChoice) -> Result<String> {
     ))
 }
 
-/// Profiles of the site's shots, as [`super::run_site`] finds them.
-fn profiles(config: &SiteConfig, images: &[ImageTimes]) -> Result<Vec<Profile>> {
+/// Profiles of the site's shots, as [`super::run_site`] finds them; nothing is stored.
+pub(super) fn find_profiles(config: &SiteConfig, images: &[ImageTimes]) -> Result<Vec<Profile>> {
     let correction_s = config.mola_clock.correction_s();
     let never = AtomicBool::new(false);
     let found = search_footprints(&config.pedr, &config.windows, correction_s, &never)?;
@@ -82,13 +82,14 @@ fn profiles(config: &SiteConfig, images: &[ImageTimes]) -> Result<Vec<Profile>> 
 
 /// Position at the shots of every profile; one finding for all that have it.
 fn check_profiles(
-    profiles: &[Profile],
+    needs: &Needs,
     session: &Session,
     config: &SiteConfig,
+    prefix: &str,
     checked: &mut Checked,
 ) {
     let (mut covered, mut shots) = (0, 0);
-    for profile in profiles {
+    for profile in &needs.profiles {
         let position = session.require_position(profile.interval);
         match position.in_stage(Stage::CheckRanges.name()) {
             Ok(()) => {
@@ -98,15 +99,40 @@ fn check_profiles(
             Err(failure) => checked.failures.push(failure.in_site(&config.site)),
         }
     }
-    let of = profiles.len();
-    let finding = format!("{covered} of {of} profiles ({shots} shots): position covered");
-    checked.findings.push(finding);
+    let of = needs.profiles.len();
+    if of > 0 {
+        let finding =
+            format!("{prefix}{covered} of {of} profiles ({shots} shots): position covered");
+        checked.findings.push(finding);
+    }
 }
 
-/// Coverage at images, and at shots unless a PEDR file cannot be used: that was told before.
+/// What the site asks of its kernels.
+struct Needs {
+    images: Vec<ImageTimes>,
+    /// Empty when a PEDR file cannot be used: that was told before.
+    profiles: Vec<Profile>,
+}
+
+/// Coverage at images and shots; of rival sets of kernels every one, since any of them may be chosen.
 fn check_kernels(config: &SiteConfig, checked: &mut Checked) -> Result<()> {
+    let needs = needs(config, checked)?;
+    let KernelSource::Sets(sets) = &config.kernels.source else {
+        return check_set(config, 0, "", &needs, checked);
+    };
+    for (index, set) in sets.iter().enumerate() {
+        let prefix = format!("kernel set {}: ", set.id);
+        if let Err(failure) = check_set(config, index, &prefix, &needs, checked) {
+            checked.failures.push(failure.in_site(&config.site));
+        }
+    }
+    Ok(())
+}
+
+/// Times of the images by the clocks of the first set, and the shots in the windows.
+fn needs(config: &SiteConfig, checked: &mut Checked) -> Result<Needs> {
     let searchable = !config.pedr.files.is_empty() && checked.failures.is_empty();
-    let clocks = load_kernels(config, &Wanted::default())?;
+    let clocks = load_kernels(config, &Wanted::default(), 0)?;
     let session = Session::open(&clocks)?;
     let mut images = Vec::new();
     for image in &config.images {
@@ -116,18 +142,38 @@ fn check_kernels(config: &SiteConfig, checked: &mut Checked) -> Result<()> {
         }
     }
     drop(session);
-    let found = searchable.then(|| profiles(config, &images)).transpose();
-    let profiles = found.unwrap_or_else(|failure| {
-        checked.failures.push(failure.in_site(&config.site));
-        None
-    });
-    let flights = profiles.as_deref().unwrap_or_default();
-    let kernels = load_kernels(config, &wanted(config, &images, flights))?;
+    let mut found = Vec::new();
+    if searchable {
+        match find_profiles(config, &images) {
+            Ok(profiles) => found = profiles,
+            Err(failure) => checked.failures.push(failure.in_site(&config.site)),
+        }
+        if found.is_empty() && checked.failures.is_empty() {
+            let finding = "no shot in any window: products would be invalid";
+            checked.findings.push(finding.to_owned());
+        }
+    }
+    Ok(Needs {
+        images,
+        profiles: found,
+    })
+}
+
+fn check_set(
+    config: &SiteConfig,
+    index: usize,
+    prefix: &str,
+    needs: &Needs,
+    checked: &mut Checked,
+) -> Result<()> {
+    let wanted = wanted(config, &needs.images, &needs.profiles);
+    let kernels = load_kernels(config, &wanted, index)?;
+    let explanation = kernels.explanation().iter();
     checked
         .findings
-        .extend(kernels.explanation().iter().cloned());
+        .extend(explanation.map(|line| format!("{prefix}{line}")));
     let session = Session::open(&kernels)?;
-    for image in &images {
+    for image in &needs.images {
         // One pass of the stage itself meets whatever a run would: ephemerides, frames, gaps.
         let pointing = &config.pointing;
         let sampled = sample_orientation(
@@ -141,7 +187,7 @@ fn check_kernels(config: &SiteConfig, checked: &mut Checked) -> Result<()> {
             let invalid = orientation.invalid_because.iter();
             let invalid = invalid.map(|reason| format!("; products would be invalid: {reason}"));
             format!(
-                "image {}: {} lines from {} UTC, first line centre {}, position and attitude covered{}",
+                "{prefix}image {}: {} lines from {} UTC, first line centre {}, position and attitude covered{}",
                 image.id,
                 image.lines_header,
                 image.utc_start,
@@ -151,13 +197,6 @@ fn check_kernels(config: &SiteConfig, checked: &mut Checked) -> Result<()> {
         });
         checked.note(finding, config);
     }
-    match profiles.as_deref() {
-        Some([]) => {
-            let finding = "no shot in any window: products would be invalid";
-            checked.findings.push(finding.to_owned());
-        }
-        Some(profiles) => check_profiles(profiles, &session, config, checked),
-        None => {}
-    }
+    check_profiles(needs, &session, config, prefix, checked);
     Ok(())
 }

@@ -7,11 +7,12 @@ use std::{
 
 use rayon::prelude::*;
 
+use super::RivalSet;
 use crate::{
     config::SiteConfig,
     error::{Result, Stopped},
     files::{file_name, hash_file},
-    spice::{KernelRole, KernelSet},
+    spice::{KernelRole, KernelSet, Wanted},
     stages::tag_times::ImageTimes,
     store::fingerprint::Parts,
 };
@@ -76,6 +77,27 @@ pub(super) fn group_profiles(
         .key("windows (names)", &windows)
         .output("convert_datum", converted)
         .output("tag_times", images)
+}
+
+/// The positions that are needed, and of every set, by its name, what its trajectory and its clocks
+/// come from.
+pub(super) fn choose_kernels(config: &SiteConfig, wanted: &Wanted, rivals: &[RivalSet]) -> Parts {
+    let names: Vec<&str> = rivals.iter().map(|rival| &*rival.id).collect();
+    let mut parts = Parts::new(METHOD)
+        .key("kernels.sets (names)", &names)
+        .key("images (any)", &!config.images.is_empty())
+        .key("positions", &wanted.positions);
+    for rival in rivals {
+        let kernels = rival.kernels.kernels().iter();
+        let of_trajectory =
+            kernels.filter(|kernel| !matches!(kernel.role, KernelRole::Ck | KernelRole::Ik));
+        for (place, kernel) in of_trajectory.enumerate() {
+            let value = format!("{}: {}", place + 1, kernel.blake3);
+            let sort = format!("kernel of set {}", rival.id);
+            parts = parts.file(&sort, &kernel.file_name(), &value);
+        }
+    }
+    parts
 }
 
 /// Footprints, profiles, limits, the clock correction, the ephemerides and their frames.

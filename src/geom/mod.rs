@@ -5,6 +5,7 @@ pub mod chebyshev;
 pub mod ellipsoid;
 pub mod map_projection;
 pub mod mars_rotation;
+pub mod orbit_axes;
 pub mod polynomial;
 pub mod statistics;
 pub mod window;

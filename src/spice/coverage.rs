@@ -4,7 +4,13 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
-use super::{daf, error::SpiceFault, kernels::KernelRole, session::Session};
+use super::{
+    daf,
+    error::SpiceFault,
+    kernels::KernelRole,
+    select::Wanted,
+    session::{CLOCKS, Session},
+};
 use crate::{
     constants::{NAIF_MARS, NAIF_MGS, NAIF_MGS_BUS},
     error::{Place, Result},
@@ -38,7 +44,7 @@ impl Session {
     /// Coverage of all loaded kernels, at the level of intervals.
     ///
     /// # Errors
-    /// [`SpiceFault::Spice`] when a C-kernel cannot be read, or the clock kernel is missing.
+    /// [`SpiceFault::Spice`] when a C-kernel cannot be read; [`SpiceFault::MissingText`] without clock.
     pub fn coverage(&self) -> Result<&Coverage> {
         if let Some(coverage) = self.coverage.get() {
             return Ok(coverage);
@@ -71,8 +77,12 @@ impl Session {
                     }
                 }
                 KernelRole::Ck => {
-                    let windows = self.cspice.ck_coverage(&kernel.path, NAIF_MGS_BUS);
-                    held.extend(windows.in_file(&kernel.path)?.into_iter().map(interval_of));
+                    let windows = self
+                        .cspice
+                        .ck_coverage(&kernel.path, NAIF_MGS_BUS)
+                        .map_err(|fault| self.explain(fault, &CLOCKS))
+                        .in_file(&kernel.path)?;
+                    held.extend(windows.into_iter().map(interval_of));
                     attitude.extend_from_slice(&held);
                 }
                 _ => {}
@@ -88,6 +98,33 @@ impl Session {
             .seams
             .sort_by(|a, b| a.seconds().total_cmp(&b.seconds()));
         Ok(coverage)
+    }
+
+    /// For each kernel that holds MGS: its index in the set, and the wanted instants for which CSPICE reads
+    /// it, because no later kernel of its role holds them.
+    ///
+    /// * `tolerance_s` – how far outside its intervals a C-kernel may be asked, seconds
+    ///
+    /// # Errors
+    /// As [`Self::coverage`].
+    pub fn coverage_in_use(
+        &self,
+        wanted: &Wanted,
+        tolerance_s: f64,
+    ) -> Result<Vec<(usize, Intervals)>> {
+        let (mut positions, mut attitudes) = (wanted.positions.clone(), wanted.attitudes.clone());
+        let mut in_use = Vec::new();
+        for (index, held) in self.coverage()?.per_kernel.iter().rev() {
+            let (open, reach_s) = match self.kernels.kernels()[*index].role {
+                KernelRole::Ck => (&mut attitudes, tolerance_s),
+                _ => (&mut positions, 0.0),
+            };
+            in_use.push((*index, held.intersection(open)));
+            let reached = held.as_slice().iter().map(|part| part.padded(reach_s));
+            *open = open.without(&Intervals::union_of(reached));
+        }
+        in_use.reverse();
+        Ok(in_use)
     }
 
     /// Makes sure that the position of MGS is known throughout `wanted`.
