@@ -1,22 +1,19 @@
 //! Map of windows, footprints coloured by height, and image outlines.
 
-use std::{
-    f64::consts::{FRAC_PI_2, TAU},
-    fmt::Write as _,
-};
+use std::{f64::consts::FRAC_PI_2, fmt::Write as _};
 
 use plotters::{prelude::*, style::text_anchor::HPos};
 
 use super::{
     graticule::{GridLine, View, graticule},
     html::paragraph,
+    outlines::{Outline, images, windows},
     plots::{
         COLOURS, Canvas, Drawn, GRID, INK, Key, WIDTH, draw_text, drawn, figure_html, quoted,
         thinned,
     },
 };
 use crate::{
-    config::WindowShape,
     error::Result,
     geom::map_projection::MapProjection,
     products::SiteProducts,
@@ -37,8 +34,6 @@ const HEIGHTS: [RGBColor; 7] = [
     RGBColor(0xcf, 0x6c, 0x3c),
     RGBColor(0xb0, 0x3f, 0x43),
 ];
-/// Points along the edge of a box window.
-const EDGE_POINTS: u32 = 72;
 /// Least and greatest height of the picture against its width.
 const RATIO: (f64, f64) = (0.5, 1.15);
 
@@ -77,12 +72,6 @@ pub(super) fn section(site: &SiteProducts) -> Result<String> {
         missing.join(", ")
     );
     Ok(figure + &paragraph(&words))
-}
-
-/// A named ring of (longitude, latitude), radians.
-struct Outline {
-    name: String,
-    ring: Vec<(f64, f64)>,
 }
 
 struct Shot {
@@ -295,7 +284,9 @@ impl Sheet {
 
     fn words(&self, site: &SiteProducts) -> String {
         let names = |outlines: &[Outline]| -> String {
-            let names: Vec<&str> = outlines.iter().map(|outline| &*outline.name).collect();
+            let mut names: Vec<&str> = outlines.iter().map(|outline| &*outline.name).collect();
+            // Holes and islands are rings of the same window.
+            names.dedup();
             names.join(", ")
         };
         let mut words = String::new();
@@ -359,70 +350,6 @@ fn round_length_m(length_m: f64) -> f64 {
     lead * power
 }
 
-fn images(site: &SiteProducts) -> Vec<Outline> {
-    let outline = |image: &crate::products::ImageProducts| {
-        let points = image.orientation.outline.as_ref()?.iter();
-        Some(Outline {
-            name: image.times.id.clone(),
-            ring: points
-                .map(|point| (point.longitude_rad, point.latitude_rad))
-                .collect(),
-        })
-    };
-    site.images.iter().filter_map(outline).collect()
-}
-
-fn windows(site: &SiteProducts) -> Vec<Outline> {
-    let rings = site.config.windows.iter().flat_map(|window| {
-        let rings: Vec<Vec<(f64, f64)>> = match &window.shape {
-            WindowShape::Box {
-                west_rad,
-                east_rad,
-                south_rad,
-                north_rad,
-            } => box_rings(*west_rad, *east_rad, *south_rad, *north_rad),
-            WindowShape::Polygons { polygons } => polygons
-                .iter()
-                .flatten()
-                .map(|ring| {
-                    ring.iter()
-                        .map(|[longitude, latitude]| (*longitude, *latitude))
-                        .collect()
-                })
-                .collect(),
-        };
-        rings.into_iter().map(|ring| Outline {
-            name: window.id.clone(),
-            ring,
-        })
-    });
-    rings.collect()
-}
-
-/// The edges of a box, bent as the parallels are; around the whole globe they are two circles.
-fn box_rings(west: f64, east: f64, south: f64, north: f64) -> Vec<Vec<(f64, f64)>> {
-    let width = if east < west {
-        east + TAU - west
-    } else {
-        east - west
-    };
-    let shares = (0..=EDGE_POINTS).map(|k| f64::from(k) / f64::from(EDGE_POINTS));
-    let parallel = |latitude: f64| -> Vec<(f64, f64)> {
-        let shares = shares.clone();
-        shares
-            .map(|share| (west + share * width, latitude))
-            .collect()
-    };
-    if width > TAU - 1e-9 {
-        let circles = [south, north].into_iter();
-        // A pole is no circle.
-        let circles = circles.filter(|latitude| latitude.abs() < FRAC_PI_2 - 1e-9);
-        return circles.map(parallel).collect();
-    }
-    let northern = parallel(north).into_iter().rev();
-    vec![parallel(south).into_iter().chain(northern).collect()]
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -432,18 +359,5 @@ mod tests {
         for (room, length) in [(13_000.0, 10_000.0), (2_400.0, 2_000.0), (999.0, 500.0)] {
             assert!((round_length_m(room) - length).abs() < 1e-6, "{room}"); // rounding
         }
-    }
-
-    #[test]
-    fn a_box_across_the_prime_meridian_stays_narrow() {
-        let rings = box_rings(6.2, 0.1, -0.1, 0.1);
-        let (first, last) = (rings[0][0].0, rings[0][EDGE_POINTS as usize].0);
-        assert!(last > first && last - first < 0.2);
-    }
-
-    #[test]
-    fn a_cap_around_a_pole_has_one_edge() {
-        assert_eq!(box_rings(0.0, TAU, 1.4, FRAC_PI_2).len(), 1);
-        assert_eq!(box_rings(0.0, TAU, -0.2, 0.2).len(), 2);
     }
 }
