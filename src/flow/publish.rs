@@ -87,6 +87,11 @@ pub(super) fn publish(folder: &Path, cache: &StageCache, results: &Results<'_>) 
     let fingerprint = parts.fingerprint();
     let manifest = make_products(folder, results, fingerprint)?;
     let published = cache.store(name, parts, manifest)?.value;
+    tracing::info!(
+        stage = name,
+        products = published.products.len(),
+        "published"
+    );
     let stages = published.stages.iter().map(|stage| &*stage.name);
     cache.keep_only(stages);
     Ok(Ending::Published(published))
