@@ -29,7 +29,7 @@ async function look(browser, file, view) {
   await page.goto('file://' + path.resolve(file));
   const wide = await page.evaluate(() => document.documentElement.scrollWidth);
   if (wide > view.width) problems.push(`scrolls sideways: ${wide} of ${view.width} pixels`);
-  const name = path.resolve(file).split(path.sep).slice(-3).join('-').replace(/\.html$/, '');
+  const name = path.resolve(file).split(path.sep).slice(-3).filter(Boolean).join('-').replace(/\.html$/, '');
   await page.screenshot({ path: path.join(pictures, `${name}-${view.name}.png`), fullPage: true });
   await page.addScriptTag({ content: axe });
   const { violations } = await page.evaluate(() => axe.run());
