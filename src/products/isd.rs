@@ -29,7 +29,7 @@ use crate::{
         NAIF_IAU_MARS, NAIF_MARS, NAIF_MGS_BUS, NAIF_MOC_NA,
     },
     error::Result,
-    stages::{sample_orientation::CameraTables, tag_times::ImageTimes},
+    stages::sample_orientation::{CameraTables, InterpolationCheck},
     units::METRES_PER_KM,
 };
 
@@ -156,7 +156,7 @@ fn isd(site: &SiteProducts, image: &ImageProducts) -> Isd {
         instrument_position: positions(&tables.et_s, &tables.position_m, &tables.velocity_m_s),
         sun_position: sun_position(tables),
         kernels: kernels(site),
-        areograph: provenance(site, times),
+        areograph: provenance(site, image),
     }
 }
 
@@ -272,14 +272,32 @@ fn kernels(site: &SiteProducts) -> BTreeMap<String, Vec<String>> {
 }
 
 /// What the reader of this file should know; camera models ignore it.
-fn provenance(site: &SiteProducts, times: &ImageTimes) -> Value {
+fn provenance(site: &SiteProducts, image: &ImageProducts) -> Value {
+    let times = image.times;
+    let interpolation = &image.orientation.tables.interpolation;
+    let hashes: BTreeMap<&str, &str> = site
+        .kernels
+        .iter()
+        .map(|kernel| (&*kernel.name, &*kernel.blake3))
+        .collect();
     json!({
         "version": env!("CARGO_PKG_VERSION"),
         "site": site.config.site,
+        "configuration_blake3": site.config.blake3,
+        "kernels_blake3": hashes,
         "line_period_s": times.line_period_s,
         "detector_line_exposure_s": times.exposure_s,
         "lines_header": times.lines_header,
         "utc_start": times.utc_start,
+        "start_from": times.start_from,
+        "interpolation": {
+            "method": "Lagrange over uniform nodes, eighth order inside, lower towards the ends, of the positions \
+                       and the camera's quaternions turned to Mars, as usgscsm does",
+            "error_max_px": interpolation.error_max_px,
+            "limit_px": InterpolationCheck::LIMIT_PX,
+            "within_limit": interpolation.keeps_limit(),
+            "epochs_compared_with_kernels": interpolation.epochs,
+        },
         "notes": [
             "line_scan_rate: seconds per image line (summing included), from the top edge of the first line",
             "detector coordinates count from the detector's edge: centre at sample 1024, starting_detector_sample \

@@ -21,7 +21,7 @@ use areograph::{
         check_ranges::{BiasScan, ProfileRanges, RangeCheck, ShotResiduals},
         fit_sensor_model::{SensorModel, fit_sensor_model},
         group_profiles::{Profile, group_profiles},
-        sample_orientation::{BoresightGround, CameraTables, Orientation, OrientationSample},
+        sample_orientation::{BoresightGround, CameraTables, InterpolationCheck, Orientation, OrientationSample},
         tag_times::{ImageTimes, StartFrom},
     },
     time::Et,
@@ -243,6 +243,10 @@ fn orientation(times: &ImageTimes) -> Orientation {
                 [-0.003, 1.0, 0.002],
                 [-0.001, -0.002, 1.0],
             ],
+            interpolation: InterpolationCheck {
+                error_max_px: 0.002,
+                epochs: 117,
+            },
             et_s,
         },
     }
