@@ -20,6 +20,7 @@ use serde_json::{Value, json};
 
 use super::{
     Writer,
+    exchange::kernel_report::{names_by_type, qualities},
     files::write_json,
     site::{ImageProducts, SiteProducts},
 };
@@ -68,7 +69,7 @@ struct Isd {
     starting_detector_sample: u32,
     instrument_position: Positions,
     sun_position: Positions,
-    kernels: BTreeMap<String, Vec<String>>,
+    kernels: Value,
     areograph: Value,
 }
 
@@ -259,14 +260,11 @@ fn naif_keywords(site: &SiteProducts) -> Value {
     })
 }
 
-/// Kernel names by role, in load order, as ALE lists them.
-fn kernels(site: &SiteProducts) -> BTreeMap<String, Vec<String>> {
-    let mut kernels: BTreeMap<String, Vec<String>> = BTreeMap::new();
-    for kernel in site.kernels {
-        kernels
-            .entry(kernel.role.to_lowercase())
-            .or_default()
-            .push(kernel.name.clone());
+/// Kernel names by type, in load order, and qualities, as ALE lists them.
+fn kernels(site: &SiteProducts) -> Value {
+    let mut kernels = json!(names_by_type(site));
+    for (key, quality) in qualities(site) {
+        kernels[key] = json!(quality);
     }
     kernels
 }
