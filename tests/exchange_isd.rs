@@ -84,22 +84,70 @@ fn real(test: &str) -> Option<Real> {
 
 /// ALE's members that ours differ from on purpose, and why.
 const DIFFERENT: [(&str, &str); 16] = [
-    ("/line_scan_rate/0/2", "seconds per image line, 8 detector lines summed: usgscsm multiplies by no summing"),
-    ("/detector_sample_summing", "8, as the label says; ALE's file says 1"),
-    ("/detector_line_summing", "8, as the label says; ALE's file says 1"),
-    ("/detector_center/line", "usgscsm takes the detector's line at 0"),
-    ("/detector_center/sample", "counted from the detector's edge, as usgscsm counts samples"),
-    ("/starting_detector_sample", "counted from 0, as usgscsm counts samples"),
-    ("/optical_distortion/radial/coefficients/1", "no distortion: ALE repeats the pixel pitch here"),
-    ("/optical_distortion/radial/coefficients/2", "no distortion: ALE repeats the pixel pitch here"),
-    ("/body_rotation", "more epochs, beyond both ends; compared as functions of time"),
-    ("/instrument_pointing/ephemeris_times", "from before the first line on: ALE's begin 1.15 s late"),
-    ("/instrument_pointing/quaternions", "compared as functions of time"),
-    ("/instrument_pointing/angular_velocities", "compared as functions of time"),
-    ("/instrument_pointing/ck_table", "names the epochs of this file"),
-    ("/instrument_position", "more epochs, beyond both ends; compared as functions of time"),
-    ("/sun_position", "the epochs of the other tables; compared as functions of time"),
-    ("/naif_keywords/", "only the keywords that the file's numbers come from"),
+    (
+        "/line_scan_rate/0/2",
+        "seconds per image line, 8 detector lines summed: usgscsm multiplies by no summing",
+    ),
+    (
+        "/detector_sample_summing",
+        "8, as the label says; ALE's file says 1",
+    ),
+    (
+        "/detector_line_summing",
+        "8, as the label says; ALE's file says 1",
+    ),
+    (
+        "/detector_center/line",
+        "usgscsm takes the detector's line at 0",
+    ),
+    (
+        "/detector_center/sample",
+        "counted from the detector's edge, as usgscsm counts samples",
+    ),
+    (
+        "/starting_detector_sample",
+        "counted from 0, as usgscsm counts samples",
+    ),
+    (
+        "/optical_distortion/radial/coefficients/1",
+        "no distortion: ALE repeats the pixel pitch here",
+    ),
+    (
+        "/optical_distortion/radial/coefficients/2",
+        "no distortion: ALE repeats the pixel pitch here",
+    ),
+    (
+        "/body_rotation",
+        "more epochs, beyond both ends; compared as functions of time",
+    ),
+    (
+        "/instrument_pointing/ephemeris_times",
+        "from before the first line on: ALE's begin 1.15 s late",
+    ),
+    (
+        "/instrument_pointing/quaternions",
+        "compared as functions of time",
+    ),
+    (
+        "/instrument_pointing/angular_velocities",
+        "compared as functions of time",
+    ),
+    (
+        "/instrument_pointing/ck_table",
+        "names the epochs of this file",
+    ),
+    (
+        "/instrument_position",
+        "more epochs, beyond both ends; compared as functions of time",
+    ),
+    (
+        "/sun_position",
+        "the epochs of the other tables; compared as functions of time",
+    ),
+    (
+        "/naif_keywords/",
+        "only the keywords that the file's numbers come from",
+    ),
 ];
 
 /// Members of `truth` at which `ours` has something else, numbers within rounding.
@@ -121,7 +169,9 @@ fn differing(truth: &Value, ours: Option<&Value>, at: &str, found: &mut Vec<Stri
                 // ISIS rounds the camera's mounting to 1e-7 rad.
                 at if at.contains("constant_rotation") => 1e-7,
                 // Seconds, two units in the last place of ET: ALE subtracts epochs.
-                "/line_scan_rate/0/1" | "/starting_ephemeris_time" | "/center_ephemeris_time" => 4e-9,
+                "/line_scan_rate/0/1" | "/starting_ephemeris_time" | "/center_ephemeris_time" => {
+                    4e-9
+                }
                 _ => 0.0,
             };
             // Relative: 15 digits.

@@ -47,8 +47,8 @@ const POINT_Z_HEIGHT: &str = "z: radius after the crossover correction minus 339
 pub(super) fn write(written: &mut Writer, site: &SiteProducts) -> Result<()> {
     let points = points_deg(site);
     if !points.is_empty() {
-        write_csv(written, LOLA_LIKE, lola_like(site))?;
-        write_csv(written, ODE, ode_points(site))?;
+        write_csv(written, &LOLA_LIKE, lola_like(site))?;
+        write_csv(written, &ODE, ode_points(site))?;
         written.add("exchange/footprints.gpkg", |path| {
             geopackage::write(path, site, &points)
         })?;
@@ -98,9 +98,9 @@ const ODE: CsvFile = CsvFile {
 };
 
 /// Writes a table, and beside it what its readers must be told.
-fn write_csv(written: &mut Writer, file: CsvFile, columns: Vec<Column>) -> Result<()> {
+fn write_csv(written: &mut Writer, file: &CsvFile, columns: Vec<Column>) -> Result<()> {
     let table = Table::new(columns)?;
-    let sidecar = sidecar(&file, &table);
+    let sidecar = sidecar(file, &table);
     written.add(format!("exchange/{}", file.name), |path| {
         text_table::write(path, &table)
     })?;
@@ -125,12 +125,7 @@ fn sidecar(file: &CsvFile, table: &Table) -> Value {
     })
 }
 
-fn fixed(
-    name: &'static str,
-    meaning: &'static str,
-    values: Vec<f64>,
-    decimals: usize,
-) -> Column {
+fn fixed(name: &'static str, meaning: &'static str, values: Vec<f64>, decimals: usize) -> Column {
     Column::new(name, meaning, Values::Fixed(values, decimals))
 }
 
@@ -142,7 +137,11 @@ fn km(values_m: &[f64]) -> Vec<f64> {
 fn lola_like(site: &SiteProducts) -> Vec<Column> {
     let shots = site.footprints;
     vec![
-        Column::new("utc", "corrected time of the shot, UTC", Values::Text(site.utc.to_vec())),
+        Column::new(
+            "utc",
+            "corrected time of the shot, UTC",
+            Values::Text(site.utc.to_vec()),
+        ),
         fixed(
             "longitude_deg",
             "east longitude, degrees",
@@ -161,10 +160,29 @@ fn lola_like(site: &SiteProducts) -> Vec<Column> {
             km(&shots.radius_crossover_m),
             KM_DECIMALS,
         ),
-        fixed("range_km", "one-way range, kilometres", km(&shots.range_m), KM_DECIMALS),
-        fixed("radius_km", "radius before the crossover correction, kilometres", km(&shots.radius_m), KM_DECIMALS),
-        fixed("et_s", "corrected time of the shot, TDB seconds past J2000", shots.et_s.clone(), SECOND_DECIMALS),
-        Column::new("orbit", "orbit number of the frame", Values::U32(shots.orbit.clone())),
+        fixed(
+            "range_km",
+            "one-way range, kilometres",
+            km(&shots.range_m),
+            KM_DECIMALS,
+        ),
+        fixed(
+            "radius_km",
+            "radius before the crossover correction, kilometres",
+            km(&shots.radius_m),
+            KM_DECIMALS,
+        ),
+        fixed(
+            "et_s",
+            "corrected time of the shot, TDB seconds past J2000",
+            shots.et_s.clone(),
+            SECOND_DECIMALS,
+        ),
+        Column::new(
+            "orbit",
+            "orbit number of the frame",
+            Values::U32(shots.orbit.clone()),
+        ),
     ]
 }
 
@@ -184,15 +202,34 @@ fn ode_points(site: &SiteProducts) -> Vec<Column> {
             column_deg(&shots.latitude_rad),
             DEGREE_DECIMALS,
         ),
-        fixed("TOPOGRAPHY", "radius after the crossover correction minus areoid radius, metres", shots.topography_m(), METRE_DECIMALS),
-        fixed("RANGE", "one-way range, metres", shots.range_m.clone(), METRE_DECIMALS),
+        fixed(
+            "TOPOGRAPHY",
+            "radius after the crossover correction minus areoid radius, metres",
+            shots.topography_m(),
+            METRE_DECIMALS,
+        ),
+        fixed(
+            "RANGE",
+            "one-way range, metres",
+            shots.range_m.clone(),
+            METRE_DECIMALS,
+        ),
         fixed(
             "PLANET_RAD",
             "radius after the crossover correction, metres",
             shots.radius_crossover_m.clone(),
             METRE_DECIMALS,
         ),
-        fixed("EPHEMERIS_TIME", "corrected time of the shot, TDB seconds past J2000", shots.et_s.clone(), SECOND_DECIMALS),
-        Column::new("ORBIT", "orbit number of the frame", Values::U32(shots.orbit.clone())),
+        fixed(
+            "EPHEMERIS_TIME",
+            "corrected time of the shot, TDB seconds past J2000",
+            shots.et_s.clone(),
+            SECOND_DECIMALS,
+        ),
+        Column::new(
+            "ORBIT",
+            "orbit number of the frame",
+            Values::U32(shots.orbit.clone()),
+        ),
     ]
 }

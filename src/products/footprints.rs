@@ -279,7 +279,6 @@ fn geo_metadata(points: &[[f64; 2]]) -> Value {
         "encoding": "WKB",
         "geometry_types": ["Point"],
         "crs": mars_sphere(),
-        "edges": "spherical",
     });
     if let Some(bounds) = bounding_box_deg(points) {
         column["bbox"] = json!(bounds);

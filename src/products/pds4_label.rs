@@ -64,10 +64,13 @@ fn describe(path: &Path) -> Result<Described> {
         name: crate::files::file_name(path),
         bytes,
         header_bytes: header.len() as u64,
-        md5: hasher.finalize().iter().fold(String::new(), |mut text, byte| {
-            let _infallible = write!(text, "{byte:02x}");
-            text
-        }),
+        md5: hasher
+            .finalize()
+            .iter()
+            .fold(String::new(), |mut text, byte| {
+                let _infallible = write!(text, "{byte:02x}");
+                text
+            }),
     })
 }
 

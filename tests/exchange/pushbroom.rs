@@ -43,7 +43,11 @@ impl Nodes {
             (self.et_s[0]..=self.et_s[last]).contains(&et_s),
             "{et_s} would be extrapolated"
         );
-        let before = self.et_s.partition_point(|node| *node <= et_s).clamp(1, last) - 1;
+        let before = self
+            .et_s
+            .partition_point(|node| *node <= et_s)
+            .clamp(1, last)
+            - 1;
         let half = (before + 1).min(last - before).min(4);
         let nodes = before + 1 - half..before + 1 + half;
         (0..self.values[0].len())
@@ -84,7 +88,11 @@ impl Pushbroom {
             let flip = camera_to_mars.last().is_some_and(|previous| {
                 previous.iter().zip(&q).map(|(a, b)| a * b).sum::<f64>() < 0.0
             });
-            camera_to_mars.push(if flip { q.iter().map(|c| -c).collect() } else { q });
+            camera_to_mars.push(if flip {
+                q.iter().map(|c| -c).collect()
+            } else {
+                q
+            });
         }
         let position_km = Nodes {
             values: position
@@ -141,7 +149,8 @@ impl Pushbroom {
         let detector = sample * self.value("/detector_sample_summing")
             + self.value("/starting_detector_sample")
             - self.value("/detector_center/sample");
-        detector / self.value("/focal2pixel_samples/2")
+        detector
+            / self.value("/focal2pixel_samples/2")
             / self.value("/focal_length_model/focal_length")
     }
 
@@ -149,7 +158,10 @@ impl Pushbroom {
     pub(crate) fn ground(&self, line: f64, sample: f64) -> Vector3<f64> {
         let (position, to_mars) = self.camera(self.time(line));
         let look = to_mars * Vector3::new(0.0, self.across(sample), 1.0);
-        let (a, c) = (self.value("/radii/semimajor"), self.value("/radii/semiminor"));
+        let (a, c) = (
+            self.value("/radii/semimajor"),
+            self.value("/radii/semiminor"),
+        );
         let scale = Vector3::new(1.0 / a, 1.0 / a, 1.0 / c);
         let (p, d) = (position.component_mul(&scale), look.component_mul(&scale));
         let (pd, dd) = (p.dot(&d), d.norm_squared());

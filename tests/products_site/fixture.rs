@@ -21,7 +21,9 @@ use areograph::{
         check_ranges::{BiasScan, ProfileRanges, RangeCheck, ShotResiduals},
         fit_sensor_model::{SensorModel, fit_sensor_model},
         group_profiles::{Profile, group_profiles},
-        sample_orientation::{BoresightGround, CameraTables, InterpolationCheck, Orientation, OrientationSample},
+        sample_orientation::{
+            BoresightGround, CameraTables, InterpolationCheck, Orientation, OrientationSample,
+        },
         tag_times::{ImageTimes, StartFrom},
     },
     time::Et,

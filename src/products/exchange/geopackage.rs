@@ -173,9 +173,10 @@ fn describe(
 
 /// Least and greatest.
 fn ends(values: impl Iterator<Item = f64>) -> [f64; 2] {
-    values.fold([f64::INFINITY, f64::NEG_INFINITY], |[least, greatest], value| {
-        [least.min(value), greatest.max(value)]
-    })
+    values.fold(
+        [f64::INFINITY, f64::NEG_INFINITY],
+        |[least, greatest], value| [least.min(value), greatest.max(value)],
+    )
 }
 
 fn shot(site: &SiteProducts, row: usize, point: &[f64; 2]) -> Shot {

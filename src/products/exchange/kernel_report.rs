@@ -24,7 +24,10 @@ pub(crate) fn names_by_type<'a>(site: &SiteProducts<'a>) -> BTreeMap<String, Vec
 
 fn type_of(kernel: &KernelLine) -> String {
     let name = kernel.name.to_lowercase();
-    let holds_mgs = kernel.held.as_ref().is_some_and(|held| !held.as_slice().is_empty());
+    let holds_mgs = kernel
+        .held
+        .as_ref()
+        .is_some_and(|held| !held.as_slice().is_empty());
     match kernel.role.as_str() {
         "SPK" if !holds_mgs => "tspk".to_owned(),
         "IK" if name.contains("addendum") => "iak".to_owned(),

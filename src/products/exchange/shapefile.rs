@@ -209,8 +209,7 @@ fn read_points(path: &Path, site: &SiteProducts, points: &[[f64; 2]]) -> Result<
 fn read_attributes(path: &Path, site: &SiteProducts, points: &[[f64; 2]]) -> Result<()> {
     let unreadable = |error: dbase::Error| Failure::from(ProductFault::unreadable(error));
     let source = BufReader::new(open(path)?);
-    let mut reader =
-        dbase::Reader::new(source).map_err(unreadable)?;
+    let mut reader = dbase::Reader::new(source).map_err(unreadable)?;
     let mut rows = 0;
     for (row, record) in reader.iter_records().enumerate() {
         let record = record.map_err(unreadable)?;
@@ -230,11 +229,14 @@ fn holds(record: &dbase::Record, expected: &Attributes) -> bool {
     let numbers = NUMBERS.iter().zip(&expected.numbers);
     let texts = TEXTS.iter().zip(&expected.texts);
     numbers.clone().all(|((name, _, decimals), expected)| {
-        let tolerance = 0.5 * 10_f64.powi(-i32::from(*decimals)) + 4.0 * f64::EPSILON * expected.abs();
+        let tolerance =
+            0.5 * 10_f64.powi(-i32::from(*decimals)) + 4.0 * f64::EPSILON * expected.abs();
         matches!(record.get(name), Some(FieldValue::Numeric(Some(found)))
             if (found - expected).abs() <= tolerance)
-    }) && texts.clone().all(|(name, expected)| match record.get(name) {
-        Some(FieldValue::Character(found)) => found.as_deref().unwrap_or_default() == expected,
-        _ => false,
-    })
+    }) && texts
+        .clone()
+        .all(|(name, expected)| match record.get(name) {
+            Some(FieldValue::Character(found)) => found.as_deref().unwrap_or_default() == expected,
+            _ => false,
+        })
 }

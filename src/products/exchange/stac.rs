@@ -1,6 +1,6 @@
 //! The site as a STAC Item (1.1.0): where, when, and every product with its size and hash.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use chrono::{NaiveDateTime, TimeDelta};
 use serde_json::{Map, Value, json};
@@ -53,7 +53,8 @@ pub(super) fn item(
         "geometry": outline(bounds),
         "properties": {
             "title": site.config.site,
-            "description": format!("{} Coordinates: {FRAME}.", site.config.description).trim_start(),
+            "description": description(site),
+            "areograph:frame": FRAME,
             "datetime": start,
             "start_datetime": start,
             "end_datetime": end,
@@ -67,6 +68,13 @@ pub(super) fn item(
         "links": [],
         "assets": assets(directory, products)?,
     })))
+}
+
+fn description(site: &SiteProducts) -> String {
+    match site.config.description.as_str() {
+        "" => format!("MOLA footprints and MOC images of {}", site.config.site),
+        text => text.to_owned(),
+    }
 }
 
 fn instruments(site: &SiteProducts) -> Vec<&'static str> {
@@ -119,7 +127,13 @@ fn outline([west, south, east, north]: [f64; 4]) -> Value {
 /// First and last UTC of shots and images; `None` without any.
 fn period(site: &SiteProducts) -> Result<Option<[String; 2]>> {
     let mut instants = Vec::new();
-    for utc in site.utc.iter().min().into_iter().chain(site.utc.iter().max()) {
+    for utc in site
+        .utc
+        .iter()
+        .min()
+        .into_iter()
+        .chain(site.utc.iter().max())
+    {
         instants.push(instant(utc)?);
     }
     for image in site.images {
@@ -162,18 +176,17 @@ fn assets(directory: &Path, products: &[Product]) -> Result<Value> {
     Ok(Value::Object(assets))
 }
 
-fn slashes(path: &PathBuf) -> String {
+fn slashes(path: &Path) -> String {
     let parts: Vec<_> = path.iter().map(|part| part.to_string_lossy()).collect();
     parts.join("/")
 }
 
 fn role(path: &str) -> &'static str {
-    if path.starts_with("report/") {
-        "overview"
-    } else if path.ends_with(".csv.json") || path.ends_with(".txt") || path.ends_with(".xml") {
-        "metadata"
-    } else {
-        "data"
+    match path {
+        "report/index.html" => "overview",
+        "footprints.xml" | "exchange/README.txt" => "metadata",
+        sidecar if sidecar.ends_with(".csv.json") => "metadata",
+        _ => "data",
     }
 }
 
@@ -203,9 +216,8 @@ mod tests {
         let bounds = bounding_box_deg(&[[179.5, 1.0], [-179.0, 3.0]]).map(with_margin);
         let cut = outline(bounds.unwrap());
         assert_eq!(cut["type"], "MultiPolygon");
-        let corner = |part: usize, index: usize| {
-            cut["coordinates"][part][0][index][0].as_f64().unwrap()
-        };
+        let corner =
+            |part: usize, index: usize| cut["coordinates"][part][0][index][0].as_f64().unwrap();
         assert!(corner(0, 0) < 179.5 && (corner(0, 1) - 180.0).abs() < 1e-12); // degrees, rounding
         assert!((corner(1, 0) + 180.0).abs() < 1e-12 && corner(1, 1) > -179.0);
     }

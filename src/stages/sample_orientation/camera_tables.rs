@@ -4,9 +4,7 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::{CameraTables, InterpolationCheck, Reader};
 use crate::{
-    constants::{
-        MARS_IAU2000, MOC_NA_DETECTORS, MOC_NA_FOCAL_LENGTH_MM, MOC_NA_PIXEL_PITCH_MM,
-    },
+    constants::{MARS_IAU2000, MOC_NA_DETECTORS, MOC_NA_FOCAL_LENGTH_MM, MOC_NA_PIXEL_PITCH_MM},
     error::Result,
     frames::MarsIau2000,
     geom::{
@@ -205,7 +203,8 @@ fn error_px(image: &ImageTimes, kernels: &Camera, interpolated: &Camera) -> f64 
     [first, first + 0.5 * width, first + width]
         .map(|detector| {
             let across = (detector - centre) * detector_rad;
-            let ground_m = position_m + camera_to_mars * Vector3::new(0.0, across, 1.0) * distance_m;
+            let ground_m =
+                position_m + camera_to_mars * Vector3::new(0.0, across, 1.0) * distance_m;
             let seen = interpolated.1.transpose() * (ground_m - interpolated.0);
             let lines = seen.x / seen.z / f64::from(image.downtrack_summing);
             let samples = (seen.y / seen.z - across) / f64::from(image.crosstrack_summing);
