@@ -44,6 +44,11 @@ struct Real {
 }
 
 fn real(test: &str) -> Option<Real> {
+    real_with_summing(test, 8)
+}
+
+/// The image with another number of summed detectors, and so with other pixels, in the same time.
+fn real_with_summing(test: &str, summing: u32) -> Option<Real> {
     let folder = common::real_data("ale_mgs/m0402852", test)?;
     let files: Vec<PathBuf> = common::M0402852_KERNELS
         .iter()
@@ -66,6 +71,8 @@ fn real(test: &str) -> Option<Real> {
     };
     let mut site = fixture::Site::small();
     site.times = tag_times(&[image], &session).unwrap().remove(0);
+    site.times.downtrack_summing = summing;
+    site.times.crosstrack_summing = summing;
     site.orientation =
         sample_orientation(&session, &site.times, &kernels, &pointing, &SAMPLING).unwrap();
     site.model = fit_sensor_model(&site.orientation, &SAMPLING).unwrap();
@@ -319,4 +326,44 @@ fn the_line_scanner_agrees_with_spice() {
     assert_eq!(times.len(), 1);
     let nodes = numbers(&real.isd["instrument_pointing"]["ephemeris_times"]);
     assert!(nodes[0] < camera.time(0.0) && camera.time(camera.lines()) < nodes[nodes.len() - 1]);
+}
+
+/// Pixels eight times finer want the same attitude eight times better.
+#[test]
+fn tables_get_the_nodes_that_the_limit_needs() {
+    let measured = |summing| {
+        let real = real_with_summing("nodes of tables", summing)?;
+        let epochs = numbers(&real.isd["instrument_pointing"]["ephemeris_times"]);
+        Some((epochs.len(), real.site.orientation.tables.interpolation))
+    };
+    let (Some((coarse, _)), Some((fine, interpolation))) = (measured(8), measured(1)) else {
+        return;
+    };
+    // Ten lines from node to node, and eight nodes beyond either end.
+    assert_eq!(coarse, 1 + 1536_usize.div_ceil(10) + 2 * 8);
+    assert_eq!(fine, 1 + 2 * 154 + 2 * 8);
+    assert!(interpolation.keeps_limit());
+}
+
+#[test]
+fn tables_that_cannot_keep_the_limit_make_the_image_invalid() {
+    let mut site = fixture::Site::small();
+    site.orientation.tables.interpolation.error_max_px = 0.25;
+    let model = fit_sensor_model(&site.orientation, &site.config.orientation).unwrap();
+    let told = "camera tables interpolate with errors up to 0.2500 pixels even with a node per line; \
+                limit 0.01 pixels";
+    assert!(
+        model.invalid_because.contains(&told.to_owned()),
+        "{:?}",
+        model.invalid_because
+    );
+    site.model = model;
+    let folder = tempfile::tempdir().unwrap();
+    site.with(true, |site| write_products(folder.path(), site, ""))
+        .unwrap();
+    let isd = fs::read(folder.path().join("images/m04-02852/isd.json")).unwrap();
+    let isd: Value = serde_json::from_slice(&isd).unwrap();
+    let stated = &isd["areograph"]["interpolation"];
+    assert_eq!(stated["error_max_px"], 0.25);
+    assert_eq!(stated["within_limit"], false);
 }
