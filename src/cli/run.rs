@@ -17,7 +17,7 @@ use super::{load_sites, output, plan, report};
 use crate::{
     config::SiteConfig,
     error::{Failure, Kind},
-    flow::{Ending, RunOptions, SiteOutcome, Stage, run_site},
+    flow::{Ending, RunOptions, SiteOutcome, Stage, publish_sites, run_site},
     store::manifest::Manifest,
 };
 
@@ -87,10 +87,26 @@ pub(super) fn run(arguments: &Arguments) -> ExitCode {
     };
     let outcomes = runtime.block_on(run_all(sites, arguments));
     print(&outcomes, arguments.json);
+    // A run that could not even make the folder has said so already.
+    let page = arguments
+        .out
+        .exists()
+        .then(|| publish_sites(&arguments.out));
+    match &page {
+        Some(Ok(page)) if !arguments.json && outcomes.len() > 1 => {
+            output::line(format_args!("all sites: {}", page.display()));
+        }
+        Some(Err(failure)) => output::error(failure),
+        _ => {}
+    }
     // A failure says more than an invalid site, and of several the first one counts.
     let codes: Vec<u8> = outcomes
         .iter()
         .map(exit_code)
+        .chain(
+            page.and_then(Result::err)
+                .map(|failure| failure.kind().exit_code()),
+        )
         .filter(|code| *code != 0)
         .collect();
     let failed = codes
@@ -202,20 +218,17 @@ fn print_outcome(outcome: &SiteOutcome) {
         Ending::Published(manifest) => ("products", manifest),
         Ending::Unchanged(manifest) => ("nothing changed; products stand", manifest),
     };
-    let (verdict, complaints) = (&manifest.verdict, &manifest.complaints);
-    let word = if verdict.valid { "valid" } else { "INVALID" };
+    let verdict = &manifest.verdict;
+    let word = match (verdict.valid, verdict.remarks.as_slice()) {
+        (false, _) => "INVALID",
+        (true, []) => "valid",
+        (true, _) => "valid with remarks",
+    };
     output::line(format_args!(
         "{site}: {word}; {what} in {folder}, see report/index.html"
     ));
-    for reason in &verdict.reasons {
+    for reason in verdict.reasons.iter().chain(&verdict.remarks) {
         output::line(format_args!("  {reason}"));
-    }
-    if let Some(first) = complaints.texts.first() {
-        let more = match complaints.count {
-            1 => String::new(),
-            count => format!(" (and {} more, see manifest.json)", count - 1),
-        };
-        output::line(format_args!("  input: {first}{more}"));
     }
 }
 
@@ -225,6 +238,7 @@ fn outcome_json(outcome: &Outcome) -> serde_json::Value {
             "published": published,
             "valid": manifest.verdict.valid,
             "reasons": manifest.verdict.reasons,
+            "remarks": manifest.verdict.remarks,
             "counts": manifest.counts,
             "complaints": manifest.complaints.count,
         })

@@ -13,7 +13,7 @@ use crate::{
     spice::{KernelRole, KernelSet, Session},
     store::manifest::{
         BiasEntry, Complaints, ConfigurationEntry, KernelEntry, Manifest, ProductEntry, StageEntry,
-        Verdict,
+        Verdict, figures,
     },
     time::{Et, Intervals},
     units::RADIANS_PER_DEGREE,
@@ -32,6 +32,7 @@ pub(super) struct Account {
     pub(super) kernels: Vec<KernelEntry>,
     pub(super) products: Vec<ProductEntry>,
     pub(super) notes: Vec<String>,
+    pub(super) remarks: Vec<String>,
     pub(super) complaints: Vec<String>,
 }
 
@@ -49,16 +50,6 @@ impl Results<'_> {
                     .map(|note| format!("image {}: {note}", image.id)),
             );
         }
-        for model in self
-            .models
-            .iter()
-            .filter(|model| model.value.near_gimbal_lock)
-        {
-            notes.push(format!(
-                "image {}: |cos φ| falls to {:.3}, where ω and κ are badly determined; use the rotation-vector form",
-                model.value.image, model.value.cos_phi_min
-            ));
-        }
         notes
     }
 
@@ -70,6 +61,23 @@ impl Results<'_> {
             .collect()
     }
 
+    /// The largest figures of the site.
+    fn figures(&self) -> BTreeMap<String, f64> {
+        let profiles = self.ranges.value.profiles.iter();
+        let means = profiles.map(|ranges| ranges.range_minus_distance_m.mean.abs());
+        let models = || self.models.iter().map(|model| &model.value);
+        let positions = models().map(|model| model.second_order.position_rmse_m());
+        let pointings = models().map(|model| model.rotation_vector.rmse_rad());
+        [
+            (figures::RANGE_MEAN_M, means.max_by(f64::total_cmp)),
+            (figures::POSITION_RMSE_M, positions.max_by(f64::total_cmp)),
+            (figures::POINTING_RMSE_RAD, pointings.max_by(f64::total_cmp)),
+        ]
+        .into_iter()
+        .filter_map(|(name, figure)| Some((name.to_owned(), figure?)))
+        .collect()
+    }
+
     /// The manifest of these results.
     pub(super) fn manifest(&self, account: Account, fingerprint: String) -> Manifest {
         let Account {
@@ -77,6 +85,7 @@ impl Results<'_> {
             kernels,
             products,
             notes,
+            remarks,
             complaints,
         } = account;
         let config = self.config;
@@ -107,6 +116,7 @@ impl Results<'_> {
             verdict: Verdict {
                 valid: invalid_because.is_empty(),
                 reasons: invalid_because,
+                remarks,
             },
             configuration: ConfigurationEntry {
                 file_name: file_name(&config.file),
@@ -117,6 +127,7 @@ impl Results<'_> {
             stages,
             products,
             counts,
+            figures: self.figures(),
             rejected: self.rejected(),
             complaints: Complaints {
                 count: found.complaint_counts.values().sum(),

@@ -5,6 +5,7 @@ mod manifest;
 mod parts;
 mod plan;
 mod publish;
+mod sites;
 mod steps;
 
 use std::{fmt, path::PathBuf, sync::atomic::AtomicBool};
@@ -13,11 +14,12 @@ use crate::{
     config::SiteConfig,
     error::{Place, Result},
     spice::Wanted,
-    store::{cache::StageCache, lock::SiteLock, manifest::Manifest},
+    store::{cache::StageCache, lock::SiteLock, manifest::Manifest, publish::CACHE},
 };
 
 pub use check::{Checked, check_site};
 pub use plan::{PlannedStage, plan_site};
+pub use sites::publish_sites;
 
 use publish::Results;
 use steps::{Leave, Steps, wanted};
@@ -126,7 +128,7 @@ pub fn run_site(config: &SiteConfig, options: &RunOptions<'_>) -> Result<SiteOut
     let steps = Steps {
         config,
         options,
-        cache: StageCache::new(&folder.join(".cache"), options.force),
+        cache: StageCache::new(&folder.join(CACHE), options.force),
         folder,
     };
     let ending = match run_steps(&steps) {

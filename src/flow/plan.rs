@@ -20,6 +20,7 @@ use crate::{
     store::{
         cache::{Output, StageCache},
         fingerprint::{Because, Parts},
+        publish::CACHE,
     },
 };
 
@@ -55,7 +56,7 @@ pub fn plan_site(
 fn plan_stages(config: &SiteConfig, out: &Path, force: bool) -> Result<Vec<PlannedStage>> {
     let folder = out.join(&config.site);
     let mut plan = Planner {
-        cache: StageCache::new(&folder.join(".cache"), force),
+        cache: StageCache::new(&folder.join(CACHE), force),
         planned: Vec::new(),
         outputs: Vec::new(),
     };

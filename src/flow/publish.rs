@@ -95,8 +95,10 @@ fn make_products(folder: &Path, results: &Results<'_>, fingerprint: String) -> R
         .iter()
         .map(|et_s| session.et_to_utc(Et::from_seconds(*et_s)))
         .collect::<Result<Vec<String>>>()?;
-    let mut notes = results.notes();
-    notes.extend(pck_note(&session, &results.wanted.positions));
+    let notes = results.notes();
+    let warnings: Vec<String> = pck_note(&session, &results.wanted.positions)
+        .into_iter()
+        .collect();
     let kernels = kernel_entries(&session, results)?;
     let lines = kernel_lines(&session, results.kernels)?;
     drop(session);
@@ -126,6 +128,7 @@ fn make_products(folder: &Path, results: &Results<'_>, fingerprint: String) -> R
         kernels: &lines,
         wanted: results.wanted,
         images: &images,
+        conversions: &results.converted.value.files,
         footprints,
         utc: &utc,
         profiles: &results.profiles.value,
@@ -133,8 +136,9 @@ fn make_products(folder: &Path, results: &Results<'_>, fingerprint: String) -> R
         rejected: &rejected,
         complaints: &complaints,
         notes: &notes,
+        warnings: &warnings,
     };
-    let invalid_because = site.invalid_because();
+    let (invalid_because, remarks) = (site.invalid_because(), site.remarks());
     let staging = staging(folder)?;
     let mut files: Vec<(PathBuf, u64)> = write_products(&staging, &site, &report::page(&site)?)?
         .into_iter()
@@ -150,6 +154,7 @@ fn make_products(folder: &Path, results: &Results<'_>, fingerprint: String) -> R
         kernels,
         products: entries(&staging, &files)?,
         notes,
+        remarks,
         complaints,
     };
     let manifest = results.manifest(account, fingerprint);

@@ -15,7 +15,7 @@ use crate::{
     geom::polynomial::Fit,
     stages::{
         fit_sensor_model::{EulerModel, RotationVectorModel, SensorModel},
-        sample_orientation::{BoresightGround, OrientationSample},
+        sample_orientation::{BoresightGround, GroundPoint, Orientation, OrientationSample},
         tag_times::{ImageTimes, StartFrom},
     },
     units::RADIANS_PER_ARCSECOND,
@@ -42,6 +42,9 @@ struct Document<'a> {
     times: Times<'a>,
     conventions: [&'static str; 6],
     samples: usize,
+    /// East longitude and areocentric latitude, degrees: along the first edge and back along the last.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    outline_deg: Option<Vec<[f64; 2]>>,
     first_order: Euler<'a>,
     second_order: Euler<'a>,
     rotation_vector: RotationVector<'a>,
@@ -72,6 +75,9 @@ struct Times<'a> {
 #[derive(Serialize)]
 struct Euler<'a> {
     position_rmse_m: f64,
+    /// Root mean square on the ellipsoid of what the residuals of the angles do there.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pointing_ground_rmse_m: Option<f64>,
     x_m: Polynomial<'a>,
     y_m: Polynomial<'a>,
     z_m: Polynomial<'a>,
@@ -188,12 +194,19 @@ fn document<'a>(image: &ImageProducts<'a>) -> Document<'a> {
         times: times(image.times),
         conventions: CONVENTIONS,
         samples: image.orientation.samples.len(),
+        outline_deg: outline_deg(image.orientation),
         first_order: euler(&model.first_order),
         second_order: euler(&model.second_order),
         rotation_vector: rotation_vector(&model.rotation_vector),
         cos_phi_min: model.cos_phi_min,
         near_gimbal_lock: model.near_gimbal_lock,
     }
+}
+
+fn outline_deg(orientation: &Orientation) -> Option<Vec<[f64; 2]>> {
+    let outline = orientation.outline.as_deref()?;
+    let corner = |point: &GroundPoint| [point.longitude_rad, point.latitude_rad].map(degrees);
+    Some(outline.iter().map(corner).collect())
 }
 
 fn times(times: &ImageTimes) -> Times<'_> {
@@ -238,6 +251,7 @@ fn euler(model: &EulerModel) -> Euler<'_> {
     let [omega, phi, kappa] = &model.angles_rad;
     Euler {
         position_rmse_m: model.position_rmse_m(),
+        pointing_ground_rmse_m: model.pointing_ground_rmse_m(),
         x_m: length(x),
         y_m: length(y),
         z_m: length(z),

@@ -10,8 +10,12 @@ use crate::{
     frames::MarsIau2000,
     spice::Wanted,
     stages::{
-        check_ranges::RangeCheck, fit_sensor_model::SensorModel, group_profiles::Profile,
-        sample_orientation::Orientation, tag_times::ImageTimes,
+        check_ranges::{BiasScan, RangeCheck},
+        convert_datum::FileConversion,
+        fit_sensor_model::SensorModel,
+        group_profiles::Profile,
+        sample_orientation::Orientation,
+        tag_times::ImageTimes,
     },
     time::Intervals,
 };
@@ -27,6 +31,8 @@ pub struct SiteProducts<'a> {
     pub wanted: &'a Wanted,
     /// Images in the order of the configuration.
     pub images: &'a [ImageProducts<'a>],
+    /// What the conversion of the datum did, in the order of the footprints' files.
+    pub conversions: &'a [FileConversion],
     /// Footprints in IAU 2000.
     pub footprints: &'a Footprints<MarsIau2000>,
     /// UTC of every footprint's corrected time, ISO 8601, without a zone letter.
@@ -41,6 +47,8 @@ pub struct SiteProducts<'a> {
     pub complaints: &'a [String],
     /// What the reader should know, one sentence each.
     pub notes: &'a [String],
+    /// What the reader must weigh before trusting the site, one sentence each.
+    pub warnings: &'a [String],
 }
 
 /// A kernel as reports show it.
@@ -90,10 +98,48 @@ impl SiteProducts<'_> {
         reasons
     }
 
+    /// What a reader must weigh although no limit is broken, one sentence each.
+    #[must_use]
+    pub fn remarks(&self) -> Vec<String> {
+        let mut remarks = self.warnings.to_vec();
+        match self.complaints {
+            [] => {}
+            [only] => remarks.push(format!("input that was read around: {only}")),
+            [first, rest @ ..] => remarks.push(format!(
+                "input that was read around: {first}; and {} more complaints",
+                rest.len()
+            )),
+        }
+        let images = self
+            .images
+            .iter()
+            .filter(|image| image.model.near_gimbal_lock);
+        remarks.extend(images.map(|image| {
+            format!(
+                "image {}: |cos φ| falls to {:.3}, where ω and κ are badly determined; use the rotation-vector form",
+                image.times.id, image.model.cos_phi_min
+            )
+        }));
+        let configured_s = self.config.mola_clock.correction_s();
+        for ranges in &self.ranges.profiles {
+            let doubt = ranges
+                .scan
+                .as_ref()
+                .and_then(|scan| doubt(scan, configured_s));
+            remarks.extend(doubt.map(|doubt| format!("profile {}: {doubt}", ranges.profile)));
+        }
+        remarks
+    }
+
     /// Lengths that must agree.
     pub(super) fn check(&self) -> Result<()> {
         let shots = self.profiles.iter().map(|profile| profile.rows.len()).sum();
         let lengths = [
+            (
+                "datum decisions of PEDR files",
+                self.conversions.len(),
+                self.footprints.files.len(),
+            ),
             (
                 "UTC strings of footprints",
                 self.utc.len(),
@@ -127,4 +173,22 @@ impl SiteProducts<'_> {
         }
         Ok(())
     }
+}
+
+/// Differences from the configured clock correction below this are not remarked on, seconds: rival orbits
+/// differ by tens of metres along the track, which the spacecraft flies in this time.
+const CLOCK_DOUBT_S: f64 = 0.02;
+/// Nor are those below so many standard uncertainties.
+const CLOCK_DOUBT_SIGMA: f64 = 5.0;
+
+/// What a scan says against the configured correction.
+fn doubt(scan: &BiasScan, configured_s: f64) -> Option<String> {
+    let (best_s, uncertainty_s) = (scan.best_s?, scan.uncertainty_s?);
+    let apart_s = (best_s - configured_s).abs();
+    (apart_s > CLOCK_DOUBT_S && apart_s > CLOCK_DOUBT_SIGMA * uncertainty_s).then(|| {
+        format!(
+            "its ranges want a clock correction of {best_s:+.4} ± {uncertainty_s:.4} s, not the configured \
+             {configured_s:+.3} s"
+        )
+    })
 }

@@ -2,23 +2,8 @@
 
 use std::fmt::Write as _;
 
-/// Colours, sizes and nothing else: the page has no scripts.
-const STYLE: &str = "\
-:root{color-scheme:light}\
-body{margin:0 auto;max-width:1120px;padding:1rem;font:15px/1.5 system-ui,sans-serif;color:#222;background:#fff}\
-h1{font-size:1.5rem;margin:.2rem 0}h2{font-size:1.15rem;margin:2rem 0 .5rem;border-bottom:1px solid #ddd}\
-p,ul{margin:.4rem 0;max-width:52rem}\
-.verdict{padding:.7rem 1rem;border-left:6px solid;margin:1rem 0;max-width:none}\
-.valid{border-color:#2a7d46;background:#eef7f0}.invalid{border-color:#b3261e;background:#fbeeed}\
-.wide{overflow-x:auto;margin:.6rem 0}\
-table{border-collapse:collapse;font-size:.85rem;font-variant-numeric:tabular-nums}\
-th,td{padding:.25rem .6rem;border-bottom:1px solid #e4e4e4;text-align:left;vertical-align:top}\
-th{background:#f5f5f5;font-weight:600}td.number,th.number{text-align:right;white-space:nowrap}\
-tr.invalid td{background:#fbeeed}\
-figure{margin:1rem 0}svg{width:100%;max-width:900px;height:auto;border:1px solid #eee}\
-figcaption{font-size:.85rem;color:#444}\
-.key{white-space:nowrap;margin-right:1rem}.key i{display:inline-block;width:.7em;height:.7em;margin-right:.3em}\
-footer{margin-top:3rem;font-size:.8rem;color:#666}";
+/// The page has no scripts; plots take their colours from here, so that they follow light and dark.
+const STYLE: &str = include_str!("style.css");
 
 /// `text` with the five characters that HTML reads as markup replaced.
 pub(super) fn escape(text: &str) -> String {
@@ -36,31 +21,105 @@ pub(super) fn escape(text: &str) -> String {
     escaped
 }
 
-/// The whole page; `body` is HTML.
-pub(super) fn page(title: &str, body: &str) -> String {
+/// How good something is, for colours; words say the same.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Tone {
+    Good,
+    Remarks,
+    Bad,
+}
+
+impl Tone {
+    const fn class(self) -> &'static str {
+        match self {
+            Self::Good => "valid",
+            Self::Remarks => "remarks",
+            Self::Bad => "invalid",
+        }
+    }
+}
+
+/// A section of a page, and what the list of contents calls it.
+pub(super) struct Section {
+    heading: &'static str,
+    body: String,
+}
+
+impl Section {
+    /// A section with `body` as HTML.
+    pub(super) const fn new(heading: &'static str, body: String) -> Self {
+        Self { heading, body }
+    }
+
+    fn id(&self) -> String {
+        slug(self.heading)
+    }
+}
+
+/// The whole page: title, what a reader must see first (HTML), then the sections that are not empty.
+pub(super) fn page(title: &str, lead: &str, sections: &[Section]) -> String {
     let title = escape(title);
     let version = env!("CARGO_PKG_VERSION");
+    let shown = || sections.iter().filter(|section| !section.body.is_empty());
+    let contents: String = shown()
+        .map(|section| {
+            format!(
+                "<li><a href=\"#{}\">{}</a></li>\n",
+                section.id(),
+                escape(section.heading)
+            )
+        })
+        .collect();
+    let body: String = shown()
+        .map(|section| {
+            format!(
+                "<section id=\"{}\">\n<h2>{}</h2>\n{}</section>\n",
+                section.id(),
+                escape(section.heading),
+                section.body
+            )
+        })
+        .collect();
+    let nav = if contents.is_empty() {
+        String::new()
+    } else {
+        format!("<nav aria-label=\"Contents\"><ul>\n{contents}</ul></nav>\n")
+    };
     format!(
         "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
          <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
-         <title>{title} – areograph</title>\n<style>{STYLE}</style>\n</head>\n<body>\n\
-         <h1>{title}</h1>\n{body}\
-         <footer>areograph {version}; what was read and written, with hashes and time, is in \
-         manifest.json beside this folder.</footer>\n</body>\n</html>\n"
+         <link rel=\"icon\" href=\"data:,\">\n\
+         <title>{title} – areograph</title>\n<style>\n{STYLE}</style>\n</head>\n<body>\n\
+         <header>\n<h1>{title}</h1>\n</header>\n<main>\n{lead}{nav}{body}</main>\n\
+         <footer>Made by areograph {version}.</footer>\n</body>\n</html>\n"
     )
 }
 
-/// A section with a heading; `body` is HTML.
-pub(super) fn section(heading: &str, body: &str) -> String {
+/// The box that is read first: a headline, then paragraphs and lists as HTML.
+pub(super) fn verdict(tone: Tone, headline: &str, body: &str) -> String {
     format!(
-        "<section>\n<h2>{}</h2>\n{body}</section>\n",
-        escape(heading)
+        "<div class=\"verdict {}\">\n<p><strong>{}</strong></p>\n{body}</div>\n",
+        tone.class(),
+        escape(headline)
     )
+}
+
+/// A heading inside a section.
+pub(super) fn heading(text: &str) -> String {
+    format!("<h3>{}</h3>\n", escape(text))
 }
 
 /// A paragraph of text.
 pub(super) fn paragraph(text: &str) -> String {
+    if text.is_empty() {
+        return String::new();
+    }
     format!("<p>{}</p>\n", escape(text))
+}
+
+/// A link to `place` named `text`, as HTML.
+pub(super) fn link(place: &str, text: &str) -> String {
+    format!("<a href=\"{}\">{}</a>", escape(place), escape(text))
 }
 
 /// A list of texts; nothing for none.
@@ -75,46 +134,128 @@ pub(super) fn list<T: AsRef<str>>(items: &[T]) -> String {
     format!("<ul>\n{}</ul>\n", items.concat())
 }
 
-/// A table being filled row by row; cells are text.
+/// Letters and digits of `text` in lower case, the rest as hyphens: a name inside a page or file.
+pub(super) fn slug(text: &str) -> String {
+    let words = text.split(|character: char| !character.is_alphanumeric());
+    let words: Vec<String> = words
+        .filter(|word| !word.is_empty())
+        .map(str::to_lowercase)
+        .collect();
+    words.join("-")
+}
+
+/// A column of a table.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum Column {
+    /// Words, flush left.
+    Text(&'static str),
+    /// Numbers, flush right.
+    Number(&'static str),
+}
+
+/// What a cell holds.
+#[derive(Debug, Clone)]
+pub(super) enum Cell {
+    /// Words or a number.
+    Plain(String),
+    /// A figure with a limit: the share of it that is used, above 1 (or NaN) beyond it.
+    Limited(String, f64),
+    /// HTML.
+    Html(String),
+}
+
+impl From<&str> for Cell {
+    fn from(text: &str) -> Self {
+        Self::Plain(text.to_owned())
+    }
+}
+
+impl From<&String> for Cell {
+    fn from(text: &String) -> Self {
+        Self::Plain(text.clone())
+    }
+}
+
+impl From<String> for Cell {
+    fn from(text: String) -> Self {
+        Self::Plain(text)
+    }
+}
+
+/// A table being filled row by row; the first cell of a row is its head.
 pub(super) struct Table {
     html: String,
-    numbers: &'static [bool],
+    columns: &'static [Column],
 }
 
 impl Table {
-    /// A table with these column heads; `true` in `numbers` sets a column flush right.
-    pub(super) fn new(heads: &[&str], numbers: &'static [bool]) -> Self {
-        let mut table = Self {
-            html: "<div class=\"wide\"><table>\n".to_owned(),
-            numbers,
-        };
-        table.line("th", "", heads);
-        table
-    }
-
-    fn line<T: AsRef<str>>(&mut self, tag: &str, class: &str, cells: &[T]) {
-        let cells: Vec<String> = cells
+    /// A table with a caption and column heads.
+    pub(super) fn new(caption: &str, columns: &'static [Column]) -> Self {
+        let heads: String = columns
             .iter()
-            .enumerate()
-            .map(|(column, cell)| {
-                let number = self.numbers.get(column).copied().unwrap_or_default();
-                let class = if number { " class=\"number\"" } else { "" };
-                format!("<{tag}{class}>{}</{tag}>", escape(cell.as_ref()))
+            .map(|column| match column {
+                Column::Text(head) => format!("<th scope=\"col\">{}</th>", escape(head)),
+                Column::Number(head) => {
+                    format!("<th scope=\"col\" class=\"number\">{}</th>", escape(head))
+                }
             })
             .collect();
-        // Writing to a string cannot fail.
-        let _ = writeln!(self.html, "<tr{class}>{}</tr>", cells.concat());
+        let caption = escape(caption);
+        // What scrolls must be reachable by keyboard, and then it needs a name.
+        let html = format!(
+            "<div class=\"wide\" tabindex=\"0\" role=\"region\" aria-label=\"{caption}\"><table>\n\
+             <caption>{caption}</caption>\n<thead><tr>{heads}</tr></thead>\n<tbody>\n"
+        );
+        Self { html, columns }
     }
 
     /// Adds a row, tinted when it is not `valid`.
-    pub(super) fn row<T: AsRef<str>>(&mut self, valid: bool, cells: &[T]) {
+    pub(super) fn row(&mut self, valid: bool, cells: impl IntoIterator<Item = Cell>) {
         let class = if valid { "" } else { " class=\"invalid\"" };
-        self.line("td", class, cells);
+        let cells: String = cells
+            .into_iter()
+            .enumerate()
+            .map(|(place, cell)| self.cell(place, cell))
+            .collect();
+        // Writing to a string cannot fail.
+        let _ = writeln!(self.html, "<tr{class}>{cells}</tr>");
+    }
+
+    fn cell(&self, place: usize, cell: Cell) -> String {
+        let class = match self.columns.get(place) {
+            Some(Column::Number(_)) => "number",
+            _ => "",
+        };
+        let (tag, scope) = if place == 0 {
+            ("th", " scope=\"row\"")
+        } else {
+            ("td", "")
+        };
+        match cell {
+            Cell::Limited(text, share) => limited(class, &text, share),
+            Cell::Html(html) => format!("<{tag}{scope} class=\"{class}\">{html}</{tag}>"),
+            Cell::Plain(text) => {
+                format!("<{tag}{scope} class=\"{class}\">{}</{tag}>", escape(&text))
+            }
+        }
     }
 
     /// The finished table.
     pub(super) fn finish(self) -> String {
-        self.html + "</table></div>\n"
+        self.html + "</tbody>\n</table></div>\n"
+    }
+}
+
+fn limited(class: &str, text: &str, share: f64) -> String {
+    let text = escape(text);
+    // Written so that NaN is beyond.
+    if share <= 1.0 {
+        let per_cent = (100.0 * share.max(0.0)).round();
+        format!("<td class=\"{class} limited\" style=\"--share:{per_cent}%\">{text}</td>")
+    } else {
+        format!(
+            "<td class=\"{class} beyond\"><span class=\"hidden\">beyond the limit: </span>✗ {text}</td>"
+        )
     }
 }
 
@@ -124,13 +265,34 @@ mod tests {
 
     #[test]
     fn text_stays_text() {
-        let mut table = Table::new(&["<b>"], &[true]);
-        table.row(false, &["<script>alert('&\"')</script>"]);
-        assert_eq!(
-            table.finish(),
-            "<div class=\"wide\"><table>\n<tr><th class=\"number\">&lt;b&gt;</th></tr>\n\
-             <tr class=\"invalid\"><td class=\"number\">&lt;script&gt;alert(&#39;&amp;&quot;&#39;)\
-             &lt;/script&gt;</td></tr>\n</table></div>\n"
-        );
+        let mut table = Table::new("<i>", &[Column::Number("<b>")]);
+        table.row(false, ["<script>alert('&\"')</script>".into()]);
+        let html = table.finish();
+        assert!(!html.contains("<script") && !html.contains("<b>") && !html.contains("<i>"));
+        assert!(html.contains("&lt;script&gt;alert(&#39;&amp;&quot;&#39;)&lt;/script&gt;"));
+        assert!(html.contains("<tr class=\"invalid\">"));
+    }
+
+    #[test]
+    fn a_figure_beyond_its_limit_is_marked_and_said() {
+        let columns = &[Column::Text("profile"), Column::Number("mean, m")];
+        let mut table = Table::new("ranges", columns);
+        let cells = |share| ["a".into(), Cell::Limited("12.3".to_owned(), share)];
+        table.row(true, cells(0.5));
+        table.row(false, cells(1.01));
+        table.row(false, cells(f64::NAN));
+        let html = table.finish();
+        assert_eq!(html.matches("beyond the limit").count(), 2);
+        assert_eq!(html.matches("--share:50%").count(), 1);
+    }
+
+    #[test]
+    fn empty_sections_are_not_listed() {
+        let sections = [
+            Section::new("One", "<p>1</p>".to_owned()),
+            Section::new("Two words", String::new()),
+        ];
+        let page = page("T", "", &sections);
+        assert!(page.contains("href=\"#one\"") && !page.contains("two-words"));
     }
 }

@@ -1,159 +1,237 @@
-//! Table and plots of the sensor models.
+//! Exterior orientation: Table 4 and figure 3 of Shan et al. 2005.
 
 use super::{
-    html::{Table, paragraph, section},
-    plots::{Extent, Plot, Series, Style, figure},
+    html::{Cell, Column, Table, paragraph},
+    plots::{GREY, Panel, Plot, Series, figure},
 };
 use crate::{
     error::Result,
     geom::polynomial::Fit,
     products::{ImageProducts, SiteProducts},
-    stages::fit_sensor_model::EulerModel,
-    units::RADIANS_PER_ARCSECOND,
+    stages::{fit_sensor_model::EulerModel, sample_orientation::BoresightGround},
+    units::{METRES_PER_KM, RADIANS_PER_ARCSECOND, RADIANS_PER_DEGREE},
 };
 
-/// RMSE per image: Table 4 of Shan et al. 2005.
-pub(super) fn models(site: &SiteProducts) -> String {
+/// Table and plots.
+///
+/// # Errors
+/// A plot that cannot be drawn.
+pub(super) fn section(site: &SiteProducts) -> Result<String> {
     if site.images.is_empty() {
-        return String::new();
+        return Ok(String::new());
     }
-    let heads = [
-        "image",
-        "start (UTC)",
-        "lines",
-        "line period, ms",
-        "order",
-        "X, m",
-        "Y, m",
-        "Z, m",
-        "ω, ″",
-        "φ, ″",
-        "κ, ″",
-        "verdict",
-    ];
-    let numbers: &'static [bool] = &[
-        false, false, true, true, true, true, true, true, true, true, true, false,
-    ];
-    let mut table = Table::new(&heads, numbers);
-    for image in site.images {
-        let model = image.model;
-        let valid = model.invalid_because.is_empty();
-        let mut verdict = if valid {
-            "valid".to_owned()
-        } else {
-            model.invalid_because.join("; ")
-        };
-        if model.near_gimbal_lock {
-            verdict += "; near gimbal lock, use the rotation-vector form";
-        }
-        let times = image.times;
-        let first = [
-            times.id.clone(),
-            times.utc_start.clone(),
-            times.lines_header.to_string(),
-            format!("{:.4}", 1e3 * times.line_period_s),
-            "1".to_owned(),
-        ];
-        table.row(
-            valid,
-            &[&first[..], &rmse(&model.first_order), &[String::new()]].concat(),
-        );
-        let second = [
-            String::new(),
-            String::new(),
-            String::new(),
-            String::new(),
-            "2".to_owned(),
-        ];
-        table.row(
-            valid,
-            &[&second[..], &rmse(&model.second_order), &[verdict]].concat(),
-        );
-    }
-    let words = paragraph(
-        "RMSE of the polynomials over all samples (Table 4 of Shan et al. 2005): position in metres, pointing angles in \
-         arcseconds.",
+    let figures = site
+        .images
+        .iter()
+        .map(|image| figure(&residual_plot(image)))
+        .collect::<Result<String>>()?;
+    Ok(taken(site) + &models(site) + &format!("<div class=\"plots\">\n{figures}</div>\n"))
+}
+
+/// When and how the images were taken: Table 2.
+fn taken(site: &SiteProducts) -> String {
+    let mut table = Table::new(
+        "Images (Table 2 of Shan et al. 2005)",
+        &[
+            Column::Text("image"),
+            Column::Text("start (UTC)"),
+            Column::Number("lines exposed"),
+            Column::Number("delivered"),
+            Column::Number("samples"),
+            Column::Number("summing, along × across"),
+            Column::Number("line period, ms"),
+            Column::Number("duration, s"),
+            Column::Number("range at the middle, km"),
+            Column::Number("emission, degrees"),
+        ],
     );
-    section("Exterior orientation", &(table.finish() + &words))
-}
-
-fn rmse(model: &EulerModel) -> Vec<String> {
-    let position = model
-        .position_m
-        .iter()
-        .map(|fit| format!("{:.4}", fit.rmse));
-    let angles = model
-        .angles_rad
-        .iter()
-        .map(|fit| format!("{:.3}", fit.rmse / RADIANS_PER_ARCSECOND));
-    position.chain(angles).collect()
-}
-
-/// Residuals of the second-order models along the images.
-pub(super) fn residual_plots(site: &SiteProducts) -> Result<String> {
-    let mut figures = String::new();
     for image in site.images {
-        let model = &image.model.second_order;
-        figures += &figure(&residual_plot(
-            image,
-            "position, mm",
-            &model.position_m,
-            ["X", "Y", "Z"],
-            1e3,
-        ))?;
-        let arcseconds = RADIANS_PER_ARCSECOND.recip();
-        figures += &figure(&residual_plot(
-            image,
-            "pointing, arcsec",
-            &model.angles_rad,
-            ["ω", "φ", "κ"],
-            arcseconds,
-        ))?;
+        let times = image.times;
+        let samples = &image.orientation.samples;
+        let middle = samples
+            .get(samples.len() / 2)
+            .and_then(|sample| sample.boresight);
+        let seen = |number: fn(&BoresightGround) -> String| -> Cell {
+            middle
+                .as_ref()
+                .map_or_else(|| "–".to_owned(), number)
+                .into()
+        };
+        table.row(
+            true,
+            [
+                (&times.id).into(),
+                (&times.utc_start).into(),
+                times.lines_header.to_string().into(),
+                times.lines_delivered.to_string().into(),
+                times.samples.to_string().into(),
+                format!("{} × {}", times.downtrack_summing, times.crosstrack_summing).into(),
+                format!("{:.4}", 1e3 * times.line_period_s).into(),
+                format!("{:.2}", times.duration_s()).into(),
+                seen(|ground| format!("{:.1}", ground.range_m / METRES_PER_KM)),
+                seen(|ground| format!("{:.2}", ground.emission_rad / RADIANS_PER_DEGREE)),
+            ],
+        );
     }
-    if figures.is_empty() {
-        return Ok(figures);
-    }
-    Ok(section("Residuals of the second-order models", &figures))
+    table.finish()
 }
 
-fn residual_plot(
-    image: &ImageProducts,
-    y_label: &'static str,
-    fits: &[Fit; 3],
-    names: [&str; 3],
-    scale: f64,
-) -> Plot {
+/// RMSE per image: Table 4.
+fn models(site: &SiteProducts) -> String {
+    let limits = &site.config.orientation;
+    let mut table = Table::new(
+        "RMSE of the polynomials over all samples (Table 4 of Shan et al. 2005)",
+        &[
+            Column::Text("image"),
+            Column::Number("order"),
+            Column::Number("X, m"),
+            Column::Number("Y, m"),
+            Column::Number("Z, m"),
+            Column::Number("position, m"),
+            Column::Number("ω, ″"),
+            Column::Number("φ, ″"),
+            Column::Number("κ, ″"),
+            Column::Number("pointing, ″"),
+            Column::Number("pointing on the ground, m"),
+            Column::Text("verdict"),
+        ],
+    );
+    for image in site.images {
+        let (model, id) = (image.model, &image.times.id);
+        let valid = model.invalid_because.is_empty();
+        let judged = [
+            Cell::Plain(format!("{:.4}", model.first_order.position_rmse_m())),
+            "–".into(),
+            "".into(),
+        ];
+        table.row(valid, row(id, "1", &model.first_order, judged));
+        let rmse_rad = model.rotation_vector.rmse_rad();
+        let position_m = model.second_order.position_rmse_m();
+        let judged = [
+            Cell::Limited(
+                format!("{position_m:.4}"),
+                position_m / limits.position_rmse_max_m,
+            ),
+            Cell::Limited(
+                format!("{:.3}", rmse_rad / RADIANS_PER_ARCSECOND),
+                rmse_rad / limits.pointing_rmse_max_rad,
+            ),
+            if valid { "valid" } else { "invalid" }.into(),
+        ];
+        table.row(valid, row(id, "2", &model.second_order, judged));
+    }
+    let words = format!(
+        "Judged: the second order, position within {} m and pointing within {:.1}″ (largest component of the rotation \
+         vector, which means the same at every latitude). On the ground: how far the residuals of the angles move the \
+         boresight on the ellipsoid, root mean square.",
+        limits.position_rmse_max_m,
+        limits.pointing_rmse_max_rad / RADIANS_PER_ARCSECOND
+    );
+    table.finish() + &paragraph(&words)
+}
+
+/// A row: image, order, six RMSE with the judged ones among them.
+fn row(
+    image: &str,
+    order: &str,
+    model: &EulerModel,
+    [position, pointing, verdict]: [Cell; 3],
+) -> Vec<Cell> {
+    let mut cells: Vec<Cell> = vec![image.into(), order.into()];
+    cells.extend(
+        model
+            .position_m
+            .iter()
+            .map(|fit| format!("{:.4}", fit.rmse).into()),
+    );
+    cells.push(position);
+    cells.extend(
+        model
+            .angles_rad
+            .iter()
+            .map(|fit| format!("{:.3}", fit.rmse / RADIANS_PER_ARCSECOND).into()),
+    );
+    cells.push(pointing);
+    let ground = model.pointing_ground_rmse_m();
+    cells.push(
+        ground
+            .map_or_else(|| "–".to_owned(), |metres| format!("{metres:.3}"))
+            .into(),
+    );
+    cells.push(verdict);
+    cells
+}
+
+/// Figure 3: residuals of the second-order model at every sample, and what they do on the ground.
+fn residual_plot(image: &ImageProducts) -> Plot {
+    let model = &image.model.second_order;
     let lines: Vec<f64> = image
         .orientation
         .samples
         .iter()
         .map(|sample| sample.line_offset)
         .collect();
-    let series: Vec<Series> = fits
-        .iter()
-        .zip(names)
-        .enumerate()
-        .map(|(colour, (fit, name))| Series {
-            label: name.to_owned(),
-            style: Style::Line,
-            colour,
-            points: lines
-                .iter()
-                .copied()
-                .zip(fit.residuals.iter().map(|residual| residual * scale))
-                .collect(),
-        })
-        .collect();
-    let points = || series.iter().flat_map(|series| series.points.iter());
-    Plot {
-        x_label: "lines from the middle of the header image",
-        y_label,
-        x: Extent::of(points().map(|point| point.0)),
-        y: Extent::of(points().map(|point| point.1)),
-        x_turns: false,
-        height: 240,
-        marks: Vec::new(),
-        caption: format!("Image {}.", image.times.id),
-        series,
+    let over_lines = |values: &[f64], scale: f64| {
+        let values = values.iter().map(|value| value * scale);
+        lines.iter().copied().zip(values).collect::<Vec<_>>()
+    };
+    let three = |fits: &[Fit; 3], names: [&str; 3], scale: f64| {
+        let series = fits.iter().zip(names).enumerate();
+        series
+            .map(|(axis, (fit, name))| Series::line(name, axis, over_lines(&fit.residuals, scale)))
+            .collect::<Vec<_>>()
+    };
+    let mut panels = vec![
+        Panel::of(
+            "position, mm",
+            three(&model.position_m, ["X, ω", "Y, φ", "Z, κ"], 1e3),
+        ),
+        Panel::of(
+            "pointing, arcsec",
+            three(
+                &model.angles_rad,
+                ["X, ω", "Y, φ", "Z, κ"],
+                RADIANS_PER_ARCSECOND.recip(),
+            ),
+        ),
+    ];
+    if let Some(ground_m) = &model.pointing_ground_m {
+        let series = Series::line("on the ground", GREY, over_lines(ground_m, 1.0));
+        panels.push(Panel::of("pointing, m", vec![series]));
     }
+    for panel in &mut panels {
+        panel.height = 250;
+    }
+    Plot::of(
+        format!("Residuals of {}", image.times.id),
+        words(image),
+        "lines from the middle of the header image",
+        panels,
+    )
+}
+
+fn words(image: &ImageProducts) -> String {
+    let model = &image.model.second_order;
+    let largest = |fits: &[Fit; 3]| {
+        let residuals = fits.iter().flat_map(|fit| &fit.residuals);
+        residuals.fold(0.0, |most: f64, value| most.max(value.abs()))
+    };
+    let ground = model
+        .pointing_ground_m
+        .iter()
+        .flatten()
+        .copied()
+        .fold(0.0, f64::max);
+    let mut text = format!(
+        "{} epochs; largest residual {:.2} mm in position, {:.3}″ in pointing",
+        image.orientation.samples.len(),
+        1e3 * largest(&model.position_m),
+        largest(&model.angles_rad) / RADIANS_PER_ARCSECOND
+    );
+    text += &if model.pointing_ground_m.is_some() {
+        format!(", which is {ground:.3} m on the ground.")
+    } else {
+        "; the boresight leaves the ground.".to_owned()
+    };
+    text
 }

@@ -1,133 +1,397 @@
-//! Map of the footprints and of the images' boresights.
+//! Map of windows, footprints coloured by height, and image outlines.
+
+use std::fmt::Write as _;
+
+use plotters::{prelude::*, style::text_anchor::HPos};
 
 use super::{
-    html::section,
-    plots::{Extent, GREY, Plot, Series, Style, figure, thinned},
-    ranges::PROFILES_APART,
+    graticule::{View, graticule},
+    html::paragraph,
+    plots::{
+        COLOURS, Canvas, Drawn, GRID, INK, Key, WIDTH, draw_text, drawn, figure_html, quoted,
+        thinned,
+    },
 };
 use crate::{
+    config::WindowShape,
     error::Result,
+    geom::map_projection::MapProjection,
     products::SiteProducts,
-    stages::group_profiles::Profile,
-    units::{RADIANS_PER_DEGREE, wrap_two_pi},
+    units::{METRES_PER_KM, RADIANS_PER_DEGREE},
 };
 
-/// Points of the map; about 90 bytes each.
-const MAP_POINTS: usize = 8_000;
+/// Shots of the map, drawn and listed; about 140 bytes each.
+const MAP_SHOTS: usize = 5_000;
+/// Radius of the sphere of the map, the equatorial one, metres.
+const SPHERE_M: f64 = 3_396_190.0;
+/// Colours of heights, the lowest first; clear on light and dark pages.
+const HEIGHTS: [RGBColor; 7] = [
+    RGBColor(0x3f, 0x68, 0xb5),
+    RGBColor(0x4f, 0x94, 0xc4),
+    RGBColor(0x6d, 0xb3, 0xae),
+    RGBColor(0xa9, 0xb0, 0x6a),
+    RGBColor(0xd3, 0x9a, 0x45),
+    RGBColor(0xcf, 0x6c, 0x3c),
+    RGBColor(0xb0, 0x3f, 0x43),
+];
+/// Points along the edge of a box window.
+const EDGE_POINTS: u32 = 40;
+/// Least and greatest height of the picture against its width.
+const RATIO: (f64, f64) = (0.5, 1.35);
 
-/// Where the shots and the boresights of the images lie.
-pub(super) fn map(site: &SiteProducts) -> Result<String> {
-    let shots = site.footprints;
-    if shots.is_empty() && site.images.is_empty() {
+/// The map; empty when there is nothing to show.
+///
+/// # Errors
+/// A plot that cannot be drawn.
+pub(super) fn section(site: &SiteProducts) -> Result<String> {
+    let sheet = Sheet::of(site);
+    if sheet.outlines().next().is_none() && sheet.shots.is_empty() {
         return Ok(String::new());
     }
-    let view = View::of(site);
-    let mut series = profile_tracks(site, &view);
-    series.extend(boresight_tracks(site, &view));
-    let points = || series.iter().flat_map(|series| series.points.iter());
-    let thinned_out = if shots.len() > MAP_POINTS {
-        " Every so many shots are drawn."
-    } else {
-        ""
-    };
-    let plot = Plot {
-        x_label: "east longitude, degrees",
-        y_label: "areocentric latitude, degrees",
-        x: Extent::of(points().map(|point| point.0)),
-        y: Extent::of(points().map(|point| point.1)),
-        x_turns: true,
-        height: 460,
-        marks: Vec::new(),
-        caption: format!("IAU 2000; the axes differ in scale.{thinned_out}"),
-        series,
-    };
-    Ok(section("Footprints", &figure(&plot)?))
+    let svg = drawn(sheet.height() as u32, |area| sheet.draw(area))?;
+    let mut words = sheet.words(site);
+    if site.footprints.len() > sheet.shots.len() {
+        words += " Every so many shots are drawn.";
+    }
+    let figure = figure_html(
+        "Windows, footprints and images",
+        &svg,
+        &sheet.keys(),
+        &words,
+        &sheet.csv(),
+    );
+    let missing: Vec<&str> = site
+        .images
+        .iter()
+        .filter(|image| image.orientation.outline.is_none())
+        .map(|image| &*image.times.id)
+        .collect();
+    if missing.is_empty() {
+        return Ok(figure);
+    }
+    let words = format!(
+        "Not drawn, because a corner sees no ground: {}.",
+        missing.join(", ")
+    );
+    Ok(figure + &paragraph(&words))
 }
 
-/// Longitudes counted onwards from the western edge, so that no site is cut by 0° or 180°.
-struct View {
-    west_rad: f64,
+/// A named ring of (longitude, latitude), radians.
+struct Outline {
+    name: String,
+    ring: Vec<(f64, f64)>,
 }
 
-impl View {
+struct Shot {
+    place_rad: (f64, f64),
+    height_m: f64,
+}
+
+/// Everything on the map.
+struct Sheet {
+    map: MapProjection,
+    view: View,
+    windows: Vec<Outline>,
+    images: Vec<Outline>,
+    shots: Vec<Shot>,
+    /// Lowest and highest shot.
+    heights_m: (f64, f64),
+}
+
+impl Sheet {
     fn of(site: &SiteProducts) -> Self {
-        let samples = site
+        let windows = windows(site);
+        let images = images(site);
+        let rows: Vec<usize> = (0..site.footprints.len()).collect();
+        let topography_m = site.footprints.topography_m();
+        let shots: Vec<Shot> = thinned(&rows, MAP_SHOTS)
+            .into_iter()
+            .map(|row| Shot {
+                place_rad: (
+                    site.footprints.longitude_rad[row],
+                    site.footprints.latitude_rad[row],
+                ),
+                height_m: topography_m[row],
+            })
+            .collect();
+        let rings = windows.iter().chain(&images);
+        let points: Vec<(f64, f64)> = rings
+            .flat_map(|outline| outline.ring.iter().copied())
+            .chain(shots.iter().map(|shot| shot.place_rad))
+            .collect();
+        let map = MapProjection::of_points(points.iter().copied(), SPHERE_M);
+        let places = points
+            .iter()
+            .filter_map(|point| map.project(point.0, point.1));
+        let view = View::of(places);
+        let ratio = (view.height_m() / view.width_m()).clamp(RATIO.0, RATIO.1);
+        let heights = shots.iter().map(|shot| shot.height_m);
+        let heights_m = heights.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), height| {
+            (low.min(height), high.max(height))
+        });
+        Self {
+            map,
+            view: view.with_ratio(ratio),
+            windows,
+            images,
+            shots,
+            heights_m,
+        }
+    }
+
+    fn outlines(&self) -> impl Iterator<Item = &Outline> {
+        self.windows.iter().chain(&self.images)
+    }
+
+    fn height(&self) -> f64 {
+        (f64::from(WIDTH) * self.view.height_m() / self.view.width_m()).round()
+    }
+
+    fn pixel(&self, (x, y): (f64, f64)) -> (i32, i32) {
+        let scale = f64::from(WIDTH) / self.view.width_m();
+        let right = (x - self.view.west_m) * scale;
+        let down = (self.view.north_m - y) * scale;
+        (right.round() as i32, down.round() as i32)
+    }
+
+    /// Colour of a height: the range in equal steps.
+    fn colour(&self, height_m: f64) -> RGBColor {
+        let (low, high) = self.heights_m;
+        let share = (height_m - low) / (high - low).max(f64::MIN_POSITIVE);
+        let step = (share * HEIGHTS.len() as f64) as usize;
+        HEIGHTS[step.min(HEIGHTS.len() - 1)]
+    }
+
+    fn draw<'a>(&self, area: &Canvas<'a>) -> Drawn<'a> {
+        self.draw_graticule(area)?;
+        for shot in &self.shots {
+            let (longitude, latitude) = shot.place_rad;
+            if let Some(place) = self.map.project(longitude, latitude) {
+                let style = self.colour(shot.height_m).filled();
+                area.draw(&Circle::new(self.pixel(place), 4, style))?;
+            }
+        }
+        for window in &self.windows {
+            self.draw_ring(&window.ring, INK.stroke_width(3), area)?;
+        }
+        for (place, image) in self.images.iter().enumerate() {
+            let colour = COLOURS[place % COLOURS.len()];
+            self.draw_ring(&image.ring, colour.stroke_width(5), area)?;
+        }
+        self.draw_scale(area)
+    }
+
+    fn draw_ring<'a>(
+        &self,
+        ring: &[(f64, f64)],
+        style: ShapeStyle,
+        area: &Canvas<'a>,
+    ) -> Drawn<'a> {
+        let closed = ring.iter().chain(ring.first());
+        let places: Vec<Option<(f64, f64)>> = closed
+            .map(|(longitude, latitude)| self.map.project(*longitude, *latitude))
+            .collect();
+        for run in places.split(Option::is_none) {
+            let pixels: Vec<(i32, i32)> = run
+                .iter()
+                .flatten()
+                .map(|place| self.pixel(*place))
+                .collect();
+            if pixels.len() > 1 {
+                area.draw(&PathElement::new(pixels, style))?;
+            }
+        }
+        Ok(())
+    }
+
+    fn draw_graticule<'a>(&self, area: &Canvas<'a>) -> Drawn<'a> {
+        let lines = graticule(&self.map, &self.view);
+        for line in &lines {
+            for segment in &line.segments {
+                let ends = segment.map(|place| self.pixel(place)).to_vec();
+                area.draw(&PathElement::new(ends, GRID.stroke_width(2)))?;
+            }
+        }
+        let frame = [(0, 0), (WIDTH as i32 - 1, self.height() as i32 - 1)];
+        area.draw(&Rectangle::new(frame, INK.stroke_width(2)))?;
+        // Parallels are named where they are farthest left, meridians where they are lowest.
+        for line in &lines {
+            let ends = line
+                .segments
+                .iter()
+                .flatten()
+                .map(|place| self.pixel(*place));
+            if line.is_parallel {
+                if let Some((_, y)) = ends.min_by_key(|(x, _)| *x) {
+                    let y = y.clamp(20, self.height() as i32 - 70);
+                    draw_text(area, &line.name, (10, y - 16), HPos::Left)?;
+                }
+            } else if let Some((x, _)) = ends.max_by_key(|(_, y)| *y) {
+                let x = x.clamp(60, WIDTH as i32 - 70);
+                let y = self.height() as i32 - 20;
+                draw_text(area, &line.name, (x + 6, y), HPos::Left)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// A bar of a round length at the upper right.
+    fn draw_scale<'a>(&self, area: &Canvas<'a>) -> Drawn<'a> {
+        let length_m = round_length_m(0.22 * self.view.width_m());
+        let pixels = (length_m / self.view.width_m() * f64::from(WIDTH)).round() as i32;
+        let (right, y) = (WIDTH as i32 - 24, 30);
+        let bar = vec![
+            (right - pixels, y - 10),
+            (right - pixels, y),
+            (right, y),
+            (right, y - 10),
+        ];
+        area.draw(&PathElement::new(bar, INK.stroke_width(4)))?;
+        let text = if length_m < METRES_PER_KM {
+            format!("{length_m} m")
+        } else {
+            format!("{} km", length_m / METRES_PER_KM)
+        };
+        draw_text(area, &text, (right, y + 22), HPos::Right)
+    }
+
+    fn keys(&self) -> Vec<Key> {
+        let mut keys: Vec<Key> = self
             .images
             .iter()
-            .flat_map(|image| &image.orientation.samples);
-        let boresights = samples.filter_map(|sample| Some(sample.boresight?.longitude_rad));
-        let shots = site.footprints.longitude_rad.iter().copied();
-        let longitudes: Vec<f64> = shots.chain(boresights).collect();
-        Self {
-            west_rad: western_edge_rad(longitudes),
+            .enumerate()
+            .map(|(place, image)| Key::colour(&format!("image {}", image.name), place))
+            .collect();
+        if !self.shots.is_empty() {
+            let (low, high) = self.heights_m;
+            let step = (high - low) / HEIGHTS.len() as f64;
+            keys.extend(HEIGHTS.iter().enumerate().map(|(place, colour)| {
+                let [from, to] = [place, place + 1].map(|edge| low + edge as f64 * step);
+                Key::fixed(&format!("{from:.0} to {to:.0} m"), *colour)
+            }));
         }
+        keys
     }
 
-    /// Degrees of longitude, onwards from the western edge, and of latitude.
-    fn place(&self, longitude_rad: f64, latitude_rad: f64) -> (f64, f64) {
-        let east_rad = self.west_rad + wrap_two_pi(longitude_rad - self.west_rad);
-        (
-            east_rad / RADIANS_PER_DEGREE,
-            latitude_rad / RADIANS_PER_DEGREE,
-        )
-    }
-}
-
-fn profile_tracks(site: &SiteProducts, view: &View) -> Vec<Series> {
-    let shots = site.footprints;
-    let share = (MAP_POINTS / site.profiles.len().max(1)).max(2);
-    let track = |(colour, profile): (usize, &Profile)| {
-        let place = |row: &u32| {
-            let row = *row as usize;
-            view.place(shots.longitude_rad[row], shots.latitude_rad[row])
+    fn words(&self, site: &SiteProducts) -> String {
+        let names = |outlines: &[Outline]| -> String {
+            let names: Vec<&str> = outlines.iter().map(|outline| &*outline.name).collect();
+            names.join(", ")
         };
-        // Legends name profiles as long as there are few.
-        let named = site.profiles.len() <= PROFILES_APART;
-        Series {
-            label: if named {
-                profile.id.clone()
-            } else {
-                String::new()
-            },
-            style: Style::Dots,
-            colour,
-            points: thinned(&profile.rows, share).iter().map(place).collect(),
+        let mut words = String::new();
+        if !self.windows.is_empty() {
+            words += &format!("Windows (black or white lines): {}. ", names(&self.windows));
         }
-    };
-    site.profiles.iter().enumerate().map(track).collect()
-}
-
-fn boresight_tracks(site: &SiteProducts, view: &View) -> impl Iterator<Item = Series> {
-    site.images.iter().map(|image| {
-        let grounds = image
-            .orientation
-            .samples
-            .iter()
-            .filter_map(|sample| sample.boresight);
-        Series {
-            label: format!("boresight of {}", image.times.id),
-            style: Style::Line,
-            colour: GREY,
-            points: grounds
-                .map(|ground| view.place(ground.longitude_rad, ground.latitude_rad))
-                .collect(),
+        if !self.images.is_empty() {
+            words += &format!("Outlines of images: {}. ", names(&self.images));
         }
-    })
-}
-
-/// East end of the widest stretch of longitudes without points, radians; 0 without points.
-fn western_edge_rad(mut longitudes_rad: Vec<f64>) -> f64 {
-    longitudes_rad.sort_by(f64::total_cmp);
-    let (Some(first), Some(last)) = (longitudes_rad.first(), longitudes_rad.last()) else {
-        return 0.0;
-    };
-    let mut widest = (first + std::f64::consts::TAU - last, *first);
-    for pair in longitudes_rad.windows(2) {
-        if pair[1] - pair[0] > widest.0 {
-            widest = (pair[1] - pair[0], pair[1]);
+        if !self.shots.is_empty() {
+            words += &format!(
+                "{} footprints, {:.0} to {:.0} m above the areoid. ",
+                site.footprints.len(),
+                self.heights_m.0,
+                self.heights_m.1
+            );
         }
+        words
+            + &format!(
+                "IAU 2000, areocentric; equal-area map about {:.2}° E {:.2}° N, north up at the centre, where the \
+                 scale is true.",
+                self.map.longitude_rad() / RADIANS_PER_DEGREE,
+                self.map.latitude_rad() / RADIANS_PER_DEGREE
+            )
     }
-    widest.1
+
+    fn csv(&self) -> String {
+        let mut csv = "what,name,longitude_deg,latitude_deg,height_m\n".to_owned();
+        for (what, outlines) in [("window", &self.windows), ("image", &self.images)] {
+            for outline in outlines {
+                let name = quoted(&outline.name);
+                for (longitude, latitude) in &outline.ring {
+                    let [longitude, latitude] =
+                        [longitude, latitude].map(|angle| angle / RADIANS_PER_DEGREE);
+                    // Writing to a string cannot fail.
+                    let _ = writeln!(csv, "{what},{name},{longitude:.6},{latitude:.6},");
+                }
+            }
+        }
+        for shot in &self.shots {
+            let (longitude, latitude) = shot.place_rad;
+            let [longitude, latitude] =
+                [longitude, latitude].map(|angle| angle / RADIANS_PER_DEGREE);
+            let _ = writeln!(
+                csv,
+                "shot,,{longitude:.6},{latitude:.6},{:.2}",
+                shot.height_m
+            );
+        }
+        csv
+    }
+}
+
+/// 1, 2 or 5 times a power of ten, at most `length_m`.
+fn round_length_m(length_m: f64) -> f64 {
+    let power = 10_f64.powf(length_m.log10().floor());
+    let lead = [5.0, 2.0]
+        .into_iter()
+        .find(|lead| lead * power <= length_m)
+        .unwrap_or(1.0);
+    lead * power
+}
+
+fn images(site: &SiteProducts) -> Vec<Outline> {
+    let outline = |image: &crate::products::ImageProducts| {
+        let points = image.orientation.outline.as_ref()?.iter();
+        Some(Outline {
+            name: image.times.id.clone(),
+            ring: points
+                .map(|point| (point.longitude_rad, point.latitude_rad))
+                .collect(),
+        })
+    };
+    site.images.iter().filter_map(outline).collect()
+}
+
+fn windows(site: &SiteProducts) -> Vec<Outline> {
+    let rings = site.config.windows.iter().flat_map(|window| {
+        let rings: Vec<Vec<(f64, f64)>> = match &window.shape {
+            WindowShape::Box {
+                west_rad,
+                east_rad,
+                south_rad,
+                north_rad,
+            } => vec![box_ring(*west_rad, *east_rad, *south_rad, *north_rad)],
+            WindowShape::Polygons { polygons } => polygons
+                .iter()
+                .flatten()
+                .map(|ring| {
+                    ring.iter()
+                        .map(|[longitude, latitude]| (*longitude, *latitude))
+                        .collect()
+                })
+                .collect(),
+        };
+        rings.into_iter().map(|ring| Outline {
+            name: window.id.clone(),
+            ring,
+        })
+    });
+    rings.collect()
+}
+
+/// The edges of a box, bent as the parallels are.
+fn box_ring(west: f64, east: f64, south: f64, north: f64) -> Vec<(f64, f64)> {
+    let east = if east < west {
+        east + std::f64::consts::TAU
+    } else {
+        east
+    };
+    let shares = (0..=EDGE_POINTS).map(|k| f64::from(k) / f64::from(EDGE_POINTS));
+    let eastwards = shares
+        .clone()
+        .map(|share| (west + share * (east - west), south));
+    let westwards = shares.map(|share| (east - share * (east - west), north));
+    eastwards.chain(westwards).collect()
 }
 
 #[cfg(test)]
@@ -135,13 +399,16 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_view_is_not_cut_by_the_prime_meridian() {
-        let view = View {
-            west_rad: western_edge_rad(vec![0.02, 6.27, 0.01]),
-        };
-        let [west, east] = [6.27, 0.02].map(|longitude| view.place(longitude, 0.0).0);
-        assert!(west < east && east - west < 2.0, "{west} {east}");
-        assert!(western_edge_rad(vec![1.0, 2.0]) < 1.5);
-        assert!(western_edge_rad(Vec::new()).abs() < f64::MIN_POSITIVE);
+    fn scales_have_round_lengths() {
+        for (room, length) in [(13_000.0, 10_000.0), (2_400.0, 2_000.0), (999.0, 500.0)] {
+            assert!((round_length_m(room) - length).abs() < 1e-6, "{room}"); // rounding
+        }
+    }
+
+    #[test]
+    fn a_box_across_the_prime_meridian_stays_narrow() {
+        let ring = box_ring(6.2, 0.1, -0.1, 0.1);
+        let (first, last) = (ring[0].0, ring[EDGE_POINTS as usize].0);
+        assert!(last > first && last - first < 0.2);
     }
 }

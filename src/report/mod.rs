@@ -1,15 +1,24 @@
-//! The page that a person looks at first: verdict, what was used, residuals and plots of one site.
+//! The page that a person looks at first: verdict, residuals, orientation, map and kernels of one site.
 //!
-//! One HTML file without scripts or outside parts; everything that came from files is escaped.
+//! One HTML file without scripts or outside parts, for light and dark screens, phones and paper.
+//! Every plot is told in words and carries its numbers; everything that came from files is escaped.
 
+mod graticule;
 mod html;
 mod images;
 mod map;
 mod plots;
 mod ranges;
+mod scan;
+mod sites;
 mod summary;
+mod timeline;
 
 use crate::{error::Result, products::SiteProducts};
+
+pub use sites::{SiteLine, SiteSummary, sites_page};
+
+use html::Section;
 
 /// The report of `site` as one HTML page.
 ///
@@ -17,16 +26,19 @@ use crate::{error::Result, products::SiteProducts};
 /// A plot that cannot be drawn, which is a fault of areograph.
 pub fn page(site: &SiteProducts) -> Result<String> {
     let sections = [
-        summary::verdict(site),
-        summary::inputs(site),
-        summary::corrections(site),
-        map::map(site)?,
-        ranges::profiles(site),
-        ranges::residual_plots(site)?,
-        ranges::scan_plots(site)?,
-        images::models(site),
-        images::residual_plots(site)?,
-        summary::remarks(site),
+        Section::new("Range check", ranges::section(site)?),
+        Section::new("Clock bias scan", scan::section(site)?),
+        Section::new("Exterior orientation", images::section(site)?),
+        Section::new("Map", map::section(site)?),
+        Section::new("Selection of shots", summary::selection(site)),
+        Section::new("Clock corrections and datum", summary::corrections(site)),
+        Section::new("Kernel coverage", timeline::section(site)?),
+        Section::new("Notes", summary::notes(site)),
+        Section::new("Provenance", summary::provenance(site)),
     ];
-    Ok(html::page(&site.config.site, &sections.concat()))
+    Ok(html::page(
+        &site.config.site,
+        &summary::lead(site),
+        &sections,
+    ))
 }

@@ -1,144 +1,182 @@
-//! Tables and plots of the range check.
+//! The range check: Table 3 and figure 2 of Shan et al. 2005, and the residuals beside them.
 
 use super::{
-    html::{Table, paragraph, section},
-    plots::{Extent, Plot, Series, Style, figure, thinned},
+    html::{Cell, Column, Table, heading, list, paragraph},
+    plots::{Extent, Panel, Plot, Series, Style, figure, thinned},
 };
-use crate::{error::Result, products::SiteProducts, stages::check_ranges::BiasScan};
+use crate::{
+    error::Result, products::SiteProducts, stages::check_ranges::ProfileRanges,
+    units::RADIANS_PER_DEGREE,
+};
 
-/// Points of all residual plots together; about 90 bytes each.
-const RESIDUAL_POINTS: usize = 20_000;
-/// Most points of one profile, about one per unit of the plot's width.
-const PROFILE_POINTS: usize = 1_000;
+/// Points of all residual plots together; each is drawn twice and listed once, about 300 bytes.
+const RESIDUAL_POINTS: usize = 5_000;
+/// Most points of one profile, about one per pixel of the plot's width.
+const PROFILE_POINTS: usize = 500;
 /// Up to so many profiles have a plot each; more share plots in groups of so many.
 pub(super) const PROFILES_APART: usize = 12;
 
-/// Statistics per profile: Table 3 of Shan et al. 2005.
-pub(super) fn profiles(site: &SiteProducts) -> String {
-    if site.profiles.is_empty() {
-        return section("Range check", &paragraph("No profile."));
+/// Tables and plots.
+///
+/// # Errors
+/// A plot that cannot be drawn.
+pub(super) fn section(site: &SiteProducts) -> Result<String> {
+    if site.config.pedr.files.is_empty() {
+        return Ok(String::new());
     }
-    let mut body = statistics(site);
-    body += &paragraph(
-        "Metres. Range residual: measured range minus distance between the spacecraft in the kernels and the footprint \
-         with its raw radius (Table 3 of Shan et al. 2005).",
-    );
-    body += &comparison(site);
-    body += &paragraph(&format!(
-        "Means in metres. Crossover: range residual with the crossover-corrected radius. Decoding: range residual with \
-         the spacecraft of the PEDR file. Radial, along, cross: the file's spacecraft minus the kernels'. The tabulated \
-         trajectory is within {:.1e} m of the kernels.",
-        site.ranges.trajectory_error_m
-    ));
-    section("Range check", &body)
+    if site.profiles.is_empty() {
+        return Ok(paragraph("No profile."));
+    }
+    let figures = figures(site)?;
+    Ok([
+        statistics(site),
+        three_ways(site),
+        heading("Along the profiles"),
+        format!("<div class=\"plots\">\n{figures}</div>\n"),
+    ]
+    .concat())
 }
 
-fn metres(value: f64) -> String {
+pub(super) fn metres(value: f64) -> String {
     format!("{value:.3}")
 }
 
 fn statistics(site: &SiteProducts) -> String {
-    let heads = [
-        "profile",
-        "n",
-        "mean",
-        "std",
-        "median",
-        "NMAD",
-        "min",
-        "max",
-        "outliers",
-        "trend, mm/s",
-        "simultaneous images",
-        "verdict",
-    ];
-    let numbers: &'static [bool] = &[
-        false, true, true, true, true, true, true, true, true, true, false, false,
-    ];
-    let mut table = Table::new(&heads, numbers);
+    let limits = &site.config.range_check;
+    let mut table = Table::new(
+        "Range − distance per profile (Table 3 of Shan et al. 2005), metres",
+        &[
+            Column::Text("profile"),
+            Column::Number("n"),
+            Column::Number("mean"),
+            Column::Number("std"),
+            Column::Number("median"),
+            Column::Number("NMAD"),
+            Column::Number("min"),
+            Column::Number("max"),
+            Column::Number("outliers"),
+            Column::Number("trend, mm/s"),
+            Column::Text("simultaneous images"),
+            Column::Text("verdict"),
+        ],
+    );
     for (profile, ranges) in site.profiles.iter().zip(&site.ranges.profiles) {
         let main = &ranges.range_minus_distance_m;
-        let mut cells = vec![profile.id.clone(), main.n.to_string()];
-        cells.extend(
-            [
-                main.mean,
-                main.standard_deviation,
-                main.median,
-                main.nmad,
-                main.min,
-                main.max,
-            ]
-            .map(metres),
-        );
-        cells.push(ranges.outliers.to_string());
-        cells.push(ranges.trend_m_s.map_or_else(
-            || "–".to_owned(),
-            |trend| format!("{:.2} ± {:.2}", 1e3 * trend.slope, 1e3 * trend.uncertainty),
-        ));
+        let shots_share = f64::from(limits.shots_min) / f64::from(main.n.max(1));
+        let outlier_share = f64::from(ranges.outliers) / f64::from(main.n.max(1));
         let images: Vec<String> = profile
             .simultaneous
             .iter()
             .map(|image| format!("{} ({} shots)", image.image, image.shots))
             .collect();
-        cells.push(if images.is_empty() {
-            "–".to_owned()
-        } else {
-            images.join(", ")
-        });
         let valid = ranges.invalid_because.is_empty();
-        cells.push(if valid {
-            "valid".to_owned()
-        } else {
-            ranges.invalid_because.join("; ")
-        });
-        table.row(valid, &cells);
+        table.row(
+            valid,
+            [
+                (&profile.id).into(),
+                Cell::Limited(main.n.to_string(), shots_share),
+                Cell::Limited(metres(main.mean), main.mean.abs() / limits.mean_max_m),
+                metres(main.standard_deviation).into(),
+                metres(main.median).into(),
+                metres(main.nmad).into(),
+                metres(main.min).into(),
+                metres(main.max).into(),
+                Cell::Limited(
+                    ranges.outliers.to_string(),
+                    used_share(outlier_share, limits.outlier_share_max),
+                ),
+                trend(ranges).into(),
+                dash_for_none(images.join(", ")).into(),
+                if valid { "valid" } else { "invalid" }.into(),
+            ],
+        );
     }
-    table.finish()
+    let words = format!(
+        "Valid: at least {} shots, mean within ±{} m, at most {} % outliers (beyond {} robust standard deviations of \
+         the median). The bar below a figure shows how much of its limit it uses.",
+        limits.shots_min,
+        limits.mean_max_m,
+        100.0 * limits.outlier_share_max,
+        limits.outlier_sigma
+    );
+    table.finish() + &paragraph(&words)
 }
 
-fn comparison(site: &SiteProducts) -> String {
-    let heads = [
-        "profile",
-        "range residual",
-        "crossover",
-        "decoding",
-        "radial",
-        "along",
-        "cross",
-    ];
-    let mut table = Table::new(&heads, &[false, true, true, true, true, true, true]);
+/// Share of a limit that may be 0: then nothing of it is used by 0, and all is beyond otherwise.
+fn used_share(value: f64, limit: f64) -> f64 {
+    if value <= 0.0 { 0.0 } else { value / limit }
+}
+
+fn dash_for_none(text: String) -> String {
+    if text.is_empty() {
+        "–".to_owned()
+    } else {
+        text
+    }
+}
+
+fn trend(ranges: &ProfileRanges) -> String {
+    ranges.trend_m_s.map_or_else(
+        || "–".to_owned(),
+        |trend| format!("{:.2} ± {:.2}", 1e3 * trend.slope, 1e3 * trend.uncertainty),
+    )
+}
+
+fn three_ways(site: &SiteProducts) -> String {
+    let limits = &site.config.range_check;
+    let mut table = Table::new(
+        "The three ways to check a range, means in metres",
+        &[
+            Column::Text("profile"),
+            Column::Number("range − distance, kernels"),
+            Column::Number("with crossover radius"),
+            Column::Number("range − distance, PEDR's own orbit"),
+            Column::Number("PEDR − kernels, radial"),
+            Column::Number("along"),
+            Column::Number("cross"),
+        ],
+    );
     for ranges in &site.ranges.profiles {
-        let [radial, along, cross] = &ranges.spacecraft_m;
-        let residuals = [
-            &ranges.range_minus_distance_m,
-            &ranges.range_minus_distance_crossover_m,
-            &ranges.decoding_m,
-            radial,
-            along,
-            cross,
-        ];
-        let mut cells = vec![ranges.profile.clone()];
-        cells.extend(residuals.map(|summary| metres(summary.mean)));
-        table.row(true, &cells);
+        let mean_m = ranges.range_minus_distance_m.mean;
+        let decoding_m = ranges.decoding_m.mean;
+        let [radial, along, cross] =
+            [0, 1, 2].map(|axis| metres(ranges.spacecraft_m[axis].mean).into());
+        table.row(
+            true,
+            [
+                (&ranges.profile).into(),
+                Cell::Limited(metres(mean_m), mean_m.abs() / limits.mean_max_m),
+                metres(ranges.range_minus_distance_crossover_m.mean).into(),
+                Cell::Limited(metres(decoding_m), decoding_m.abs() / limits.decoding_max_m),
+                radial,
+                along,
+                cross,
+            ],
+        );
     }
-    table.finish()
-}
-
-/// Range residuals against time, outliers marked.
-pub(super) fn residual_plots(site: &SiteProducts) -> Result<String> {
-    if site.profiles.is_empty() {
-        return Ok(String::new());
-    }
-    let limit = (RESIDUAL_POINTS / site.profiles.len()).clamp(20, PROFILE_POINTS);
-    let mut figures = String::new();
-    for group in groups(site) {
-        figures += &figure(&residual_plot(site, group, limit))?;
-    }
-    Ok(section("Range residuals", &figures))
+    let words = [
+        "Range − distance with the kernels' spacecraft: what remains between laser, footprint and trajectory; the \
+         paper's figure."
+            .to_owned(),
+        "With the crossover radius: the same after the MOLA team's crossover adjustment, which moves the footprint and \
+         not the range."
+            .to_owned(),
+        format!(
+            "Range − distance with the spacecraft of the PEDR file: no kernel is involved, so anything beyond ±{} m \
+             means that the file was read wrongly.",
+            limits.decoding_max_m
+        ),
+        format!(
+            "PEDR − kernels: the file's spacecraft minus the kernels', radial, along the flight and across it: what \
+             the choice of orbit changes. The tabulated trajectory is within {:.1e} m of the kernels.",
+            site.ranges.trajectory_error_m
+        ),
+    ];
+    table.finish() + &list(&words)
 }
 
 /// Profiles by index, one per plot or, when there are many, several.
-fn groups(site: &SiteProducts) -> Vec<std::ops::Range<usize>> {
+pub(super) fn groups(site: &SiteProducts) -> Vec<std::ops::Range<usize>> {
     let count = site.profiles.len();
     let size = if count > PROFILES_APART {
         PROFILES_APART
@@ -151,126 +189,163 @@ fn groups(site: &SiteProducts) -> Vec<std::ops::Range<usize>> {
         .collect()
 }
 
-fn residual_plot(site: &SiteProducts, group: std::ops::Range<usize>, limit: usize) -> Plot {
-    let shots = &site.ranges.shots;
-    let mut series = Vec::new();
+/// How a plot of these profiles is called.
+pub(super) fn group_title(site: &SiteProducts, group: &std::ops::Range<usize>) -> String {
+    let first = &site.profiles[group.start].id;
+    if group.len() == 1 {
+        return first.clone();
+    }
+    format!("{first} to {}", site.profiles[group.end - 1].id)
+}
+
+fn figures(site: &SiteProducts) -> Result<String> {
+    let limit = (RESIDUAL_POINTS / site.profiles.len()).clamp(20, PROFILE_POINTS);
+    let plots = groups(site)
+        .into_iter()
+        .map(|group| figure(&profile_plot(site, group, limit)));
+    plots.collect()
+}
+
+/// Figure 2 of the paper: residuals along the profile, the off-nadir angle below.
+fn profile_plot(site: &SiteProducts, group: std::ops::Range<usize>, limit: usize) -> Plot {
+    let title = format!("Range − distance along {}", group_title(site, &group));
     let mut first: usize = site.profiles[..group.start]
         .iter()
         .map(|profile| profile.rows.len())
         .sum();
+    let (mut residuals, mut angles, mut outliers, mut trends) =
+        (Vec::new(), Vec::new(), Vec::new(), Vec::new());
     let mut thinned_out = false;
-    let mut outliers: Vec<(f64, f64)> = Vec::new();
-    for (index, profile) in site.profiles[group.clone()].iter().enumerate() {
-        let start_s = profile.interval.start.seconds();
-        let rows = first..first + profile.rows.len();
-        first = rows.end;
-        let point = |shot: usize| {
-            let et_s = site.footprints.et_s[shots.row[shot] as usize];
-            (et_s - start_s, shots.range_minus_distance_m[shot])
-        };
-        let kept: Vec<(f64, f64)> = rows
-            .clone()
-            .filter(|shot| !shots.outlier[*shot])
-            .map(point)
-            .collect();
-        outliers.extend(rows.filter(|shot| shots.outlier[*shot]).map(point));
-        thinned_out |= kept.len() > limit;
-        series.push(Series {
-            label: profile.id.clone(),
-            style: Style::Dots,
-            colour: index,
-            points: thinned(&kept, limit),
-        });
+    let apart = group.len() == 1;
+    for (colour, index) in group.clone().enumerate() {
+        let shots = Shots::of(site, index, first);
+        first += site.profiles[index].rows.len();
+        thinned_out |= shots.kept.len() > limit;
+        let label = if apart { "shots" } else { &*shots.id };
+        residuals.push(dots(label, colour, thinned(&shots.kept, limit)));
+        angles.push(dots(label, colour, thinned(&shots.off_nadir_deg, limit)));
+        outliers.extend(shots.outliers);
+        trends.extend(shots.trend);
     }
-    let inliers = || {
-        series
-            .iter()
-            .flat_map(|series: &Series| series.points.iter())
-    };
-    let y = Extent::of(inliers().map(|point| point.1));
-    let x = Extent::of(inliers().chain(&outliers).map(|point| point.0));
+    let mut panel = Panel::of("range − distance, m", residuals);
+    panel.histogram = true;
+    let mean_max_m = site.config.range_check.mean_max_m;
+    panel.limits = vec![-mean_max_m, mean_max_m];
+    if apart && !trends.is_empty() {
+        panel.series.push(Series::line("trend", 1, trends));
+    }
     if !outliers.is_empty() {
-        series.push(Series {
+        panel.series.push(Series {
             label: "outliers, at the edge when beyond it".to_owned(),
             style: Style::Crosses,
             colour: 0,
             points: thinned(&outliers, limit),
         });
     }
-    Plot {
-        x_label: "seconds from the start of the profile",
-        y_label: "range − distance, m",
-        x,
-        y,
-        x_turns: false,
-        height: 300,
-        series,
-        marks: Vec::new(),
-        caption: if thinned_out {
-            "Every so many shots are drawn.".to_owned()
-        } else {
-            String::new()
-        },
-    }
-}
-
-/// Spread of the residuals against the assumed clock correction.
-pub(super) fn scan_plots(site: &SiteProducts) -> Result<String> {
-    let configured_s = site.config.mola_clock.correction_s();
-    let mut figures = String::new();
-    for group in groups(site) {
-        let scans: Vec<(&str, &BiasScan)> = site.ranges.profiles[group]
-            .iter()
-            .filter_map(|profile| Some((profile.profile.as_str(), profile.scan.as_ref()?)))
-            .collect();
-        if !scans.is_empty() {
-            figures += &figure(&scan_plot(&scans, configured_s))?;
-        }
-    }
-    if figures.is_empty() {
-        return Ok(String::new());
-    }
-    let words = paragraph(
-        "The correction added to the time tags at which the residuals of a profile spread least. Profiles at nadir \
-         hardly tell: look at the uncertainty. The upright line is the configured correction.",
-    );
-    Ok(section("Clock bias scan", &(words + &figures)))
-}
-
-fn scan_plot(scans: &[(&str, &BiasScan)], configured_s: f64) -> Plot {
-    let series: Vec<Series> = scans
+    let limits_seen = panel
+        .limits
         .iter()
-        .enumerate()
-        .map(|(colour, (id, scan))| Series {
-            label: format!("{id}: {}", best(scan)),
-            style: Style::Line,
-            colour,
-            points: scan
-                .correction_s
-                .iter()
-                .copied()
-                .zip(scan.spread_m.iter().copied())
-                .collect(),
-        })
-        .collect();
-    let points = || series.iter().flat_map(|series| series.points.iter());
-    Plot {
-        x_label: "assumed correction of the tags, s",
-        y_label: "standard deviation, m",
-        x: Extent::of(points().map(|point| point.0).chain([configured_s])),
-        y: Extent::of(points().map(|point| point.1)),
-        x_turns: false,
-        height: 280,
-        marks: vec![configured_s],
-        caption: format!("Configured {configured_s:+.3} s."),
-        series,
+        .any(|limit| panel.y.low < *limit && *limit < panel.y.high);
+    let mut angle_panel = Panel::of("off nadir, deg", angles);
+    angle_panel.height = 170;
+    angle_panel.y = Extent {
+        low: angle_panel.y.low.max(0.0),
+        ..angle_panel.y
+    };
+    let mut caption = if apart {
+        words(&site.ranges.profiles[group.start])
+    } else {
+        format!("{} profiles in one plot.", group.len())
+    };
+    caption += " Bars: how many shots lie at each height.";
+    caption += &if limits_seen {
+        format!(" Dashed: the limit of the mean, ±{mean_max_m} m.")
+    } else {
+        format!(" The limit of the mean, ±{mean_max_m} m, is outside the plot.")
+    };
+    if thinned_out {
+        caption += " Every so many shots are drawn.";
+    }
+    let x = "seconds from the start of the profile";
+    Plot::of(title, caption, x, vec![panel, angle_panel])
+}
+
+fn dots(label: &str, colour: usize, points: Vec<(f64, f64)>) -> Series {
+    Series {
+        label: label.to_owned(),
+        style: Style::Dots,
+        colour,
+        points,
     }
 }
 
-fn best(scan: &BiasScan) -> String {
-    match (scan.best_s, scan.uncertainty_s) {
-        (Some(best_s), Some(uncertainty_s)) => format!("best {best_s:+.4} ± {uncertainty_s:.4} s"),
-        (Some(best_s), None) => format!("best {best_s:+.4} s"),
-        _ => "no minimum inside the scan".to_owned(),
+/// What the plot of one profile shows.
+fn words(ranges: &ProfileRanges) -> String {
+    let main = &ranges.range_minus_distance_m;
+    let trend = ranges.trend_m_s.map_or_else(String::new, |trend| {
+        format!(
+            ", trend {:.2} ± {:.2} mm/s",
+            1e3 * trend.slope,
+            1e3 * trend.uncertainty
+        )
+    });
+    format!(
+        "{} shots: mean {} m, standard deviation {} m{trend}; {} outliers.",
+        main.n,
+        metres(main.mean),
+        metres(main.standard_deviation),
+        ranges.outliers
+    )
+}
+
+/// Points of one profile over seconds from its start.
+struct Shots {
+    id: String,
+    kept: Vec<(f64, f64)>,
+    outliers: Vec<(f64, f64)>,
+    off_nadir_deg: Vec<(f64, f64)>,
+    /// Ends of the trend line.
+    trend: Vec<(f64, f64)>,
+}
+
+impl Shots {
+    /// Of profile `index`, whose shots begin at `first`.
+    fn of(site: &SiteProducts, index: usize, first: usize) -> Self {
+        let (profile, all) = (&site.profiles[index], &site.ranges.shots);
+        let start_s = profile.interval.start.seconds();
+        let mut shots = Self {
+            id: profile.id.clone(),
+            kept: Vec::new(),
+            outliers: Vec::new(),
+            off_nadir_deg: Vec::new(),
+            trend: Vec::new(),
+        };
+        for shot in first..first + profile.rows.len() {
+            let row = all.row[shot] as usize;
+            let seconds = site.footprints.et_s[row] - start_s;
+            let residual = (seconds, all.range_minus_distance_m[shot]);
+            if all.outlier[shot] {
+                shots.outliers.push(residual);
+            } else {
+                shots.kept.push(residual);
+            }
+            let angle_deg = site.footprints.off_nadir_rad[row] / RADIANS_PER_DEGREE;
+            shots.off_nadir_deg.push((seconds, angle_deg));
+        }
+        let ranges = &site.ranges.profiles[index];
+        if let (Some(trend), Some(first), Some(last)) = (
+            ranges.trend_m_s,
+            shots.off_nadir_deg.first(),
+            shots.off_nadir_deg.last(),
+        ) {
+            let mean_s = shots.off_nadir_deg.iter().map(|shot| shot.0).sum::<f64>()
+                / shots.off_nadir_deg.len() as f64;
+            let at = |seconds: f64| {
+                let mean_m = ranges.range_minus_distance_m.mean;
+                (seconds, mean_m + trend.slope * (seconds - mean_s))
+            };
+            shots.trend = vec![at(first.0), at(last.0)];
+        }
+        shots
     }
 }

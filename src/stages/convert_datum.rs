@@ -10,8 +10,10 @@ use crate::{
     geom::{
         ellipsoid::{Spherical, spherical_to_xyz_m},
         mars_rotation::convert_datum as convert_vector,
+        statistics::Summary,
     },
     time::Et,
+    units::{RADIANS_PER_DEGREE, wrap_pi},
 };
 
 /// Footprints in IAU 2000, and what was done to each file's coordinates.
@@ -19,8 +21,21 @@ use crate::{
 pub struct Converted {
     /// The footprints.
     pub footprints: Footprints<MarsIau2000>,
+    /// What was done to each file, in the order of [`Footprints::files`].
+    pub files: Vec<FileConversion>,
     /// One sentence per file, for log, manifest and report.
     pub notes: Vec<String>,
+}
+
+/// What the conversion did to the shots of one file.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct FileConversion {
+    /// Shots of the file in the windows.
+    pub shots: u32,
+    /// How far they moved on the ground, metres; all 0 for a file that was left alone.
+    pub shift_m: Summary,
+    /// Change of east longitude, degrees.
+    pub longitude_shift_deg: Summary,
 }
 
 /// Rotates every shot out of its file's datum and into IAU 2000, through J2000.
@@ -48,6 +63,7 @@ pub fn convert_datum(footprints: Footprints<AsRead>, clock: &MolaClock) -> Conve
         .collect();
     let datums: Vec<MarsDatum> = footprints.files.iter().map(|file| file.datum).collect();
     let mut converted = footprints.declare::<MarsIau2000>();
+    let before = [&converted.longitude_rad, &converted.latitude_rad].map(Clone::clone);
     let moved: Vec<Option<[(f64, f64); 2]>> = (0..converted.len())
         .into_par_iter()
         .map(|row| {
@@ -80,9 +96,31 @@ pub fn convert_datum(footprints: Footprints<AsRead>, clock: &MolaClock) -> Conve
         }
     }
     Converted {
+        files: shifts(&converted, &before),
         footprints: converted,
         notes,
     }
+}
+
+/// How far the shots of each file moved from longitudes and latitudes `before`.
+fn shifts(after: &Footprints<MarsIau2000>, before: &[Vec<f64>; 2]) -> Vec<FileConversion> {
+    let mut moved = vec![(Vec::new(), Vec::new()); after.files.len()];
+    let [longitude_rad, latitude_rad] = before;
+    for row in 0..after.len() {
+        let shot = after.row(row);
+        let there = spherical_to_xyz_m(shot.longitude_rad, shot.latitude_rad, shot.radius_m);
+        let here = spherical_to_xyz_m(longitude_rad[row], latitude_rad[row], shot.radius_m);
+        let turn_rad = wrap_pi(shot.longitude_rad - longitude_rad[row]);
+        let (shift_m, turn_deg) = &mut moved[usize::from(shot.file)];
+        shift_m.push((there - here).norm());
+        turn_deg.push(turn_rad / RADIANS_PER_DEGREE);
+    }
+    let summaries = moved.iter().map(|(shift_m, turn_deg)| FileConversion {
+        shots: u32::try_from(shift_m.len()).unwrap_or(u32::MAX),
+        shift_m: Summary::of(shift_m),
+        longitude_shift_deg: Summary::of(turn_deg),
+    });
+    summaries.collect()
 }
 
 fn note(name: &str, datum: MarsDatum, turn_s: Option<f64>) -> String {
@@ -101,7 +139,6 @@ mod tests {
     use crate::{
         config::{BiasScope, TagSign},
         footprints::{Footprint, SourceFile},
-        units::{RADIANS_PER_DEGREE, wrap_pi},
     };
 
     fn footprints(datum: MarsDatum) -> Footprints<AsRead> {

@@ -3,13 +3,15 @@
 use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 
-use super::sample_orientation::{InterpolationCheck, Orientation};
+use super::sample_orientation::{InterpolationCheck, Orientation, OrientationSample};
 use crate::{
     config::OrientationConfig,
     error::{Fault, Kind, Result},
+    frames::{MarsIau2000, Position},
     geom::{
         attitude::{OmegaPhiKappa, matrix_of_spice_quaternion, rotation_vector, unwrap_angles},
-        polynomial::{Fit, Polynomial},
+        ellipsoid::ray_meets_ellipsoid,
+        polynomial::{Fit, Polynomial, root_mean_square},
     },
     units::RADIANS_PER_ARCSECOND,
 };
@@ -46,6 +48,9 @@ pub struct EulerModel {
     pub position_m: [Fit; 3],
     /// ω, φ, κ, radians, continuous over the image.
     pub angles_rad: [Fit; 3],
+    /// How far the angles alone move the boresight on the ellipsoid at each sample, metres; `None` when
+    /// a boresight meets no ground.
+    pub pointing_ground_m: Option<Vec<f64>>,
 }
 
 /// Position polynomials stand in [`EulerModel`]; this is the rotation without angles.
@@ -65,9 +70,24 @@ impl EulerModel {
     pub fn position_rmse_m(&self) -> f64 {
         Vector3::from_iterator(self.position_m.iter().map(|fit| fit.rmse)).norm()
     }
+
+    /// Root mean square over the samples of what the residuals of the angles do on the ground, metres.
+    #[must_use]
+    pub fn pointing_ground_rmse_m(&self) -> Option<f64> {
+        self.pointing_ground_m.as_deref().map(root_mean_square)
+    }
 }
 
 impl RotationVectorModel {
+    /// Largest RMSE of the three components, radians.
+    #[must_use]
+    pub fn rmse_rad(&self) -> f64 {
+        self.vector_rad
+            .iter()
+            .map(|fit| fit.rmse)
+            .fold(0.0, f64::max)
+    }
+
     /// Rotation from Mars-fixed to camera components at `x` lines from the middle.
     #[must_use]
     pub fn mars_to_camera(&self, x: f64) -> Matrix3<f64> {
@@ -164,8 +184,29 @@ fn euler_model(orientation: &Orientation, order: usize) -> Result<EulerModel> {
     })?;
     Ok(EulerModel {
         position_m,
+        pointing_ground_m: pointing_ground_m(orientation, &angles_rad),
         angles_rad,
     })
+}
+
+/// Distance on the ellipsoid between where each sample looks and where the polynomials look from there.
+fn pointing_ground_m(orientation: &Orientation, angles_rad: &[Fit; 3]) -> Option<Vec<f64>> {
+    let distance_m = |sample: &OrientationSample| {
+        let position = Position::<MarsIau2000>::new(sample.position_m.into());
+        let [omega_rad, phi_rad, kappa_rad] =
+            [0, 1, 2].map(|angle| angles_rad[angle].polynomial.value(sample.line_offset));
+        let model = OmegaPhiKappa {
+            omega_rad,
+            phi_rad,
+            kappa_rad,
+        };
+        let ground = |camera_to_mars: Matrix3<f64>| {
+            ray_meets_ellipsoid(&position, &(camera_to_mars * Vector3::z()))
+        };
+        let sampled = ground(matrix_of_spice_quaternion(sample.camera_to_mars))?;
+        Some(ground(model.camera_to_mars())?.distance_m(&sampled))
+    };
+    orientation.samples.iter().map(distance_m).collect()
 }
 
 fn rotation_vector_model(orientation: &Orientation) -> Result<RotationVectorModel> {
@@ -207,11 +248,7 @@ fn broken_limits(
             limits.position_rmse_max_m
         ));
     }
-    let pointing_rmse_rad = rotation
-        .vector_rad
-        .iter()
-        .map(|fit| fit.rmse)
-        .fold(0.0, f64::max);
+    let pointing_rmse_rad = rotation.rmse_rad();
     if !(pointing_rmse_rad <= limits.pointing_rmse_max_rad) {
         broken.push(format!(
             "second-order pointing RMSE {:.3} arcsec; limit {:.3} arcsec",

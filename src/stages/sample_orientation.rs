@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use super::tag_times::ImageTimes;
 use crate::{
     config::{KernelsConfig, OrientationConfig, PointingConfig},
-    constants::MARS_IAU2000,
+    constants::{MARS_IAU2000, MOC_NA_DETECTORS, MOC_NA_FOCAL_LENGTH_MM, MOC_NA_PIXEL_PITCH_MM},
     error::Result,
     frames::{J2000, MarsIau2000, MocNa, Position, Rotation},
     geom::{
@@ -20,6 +20,9 @@ use crate::{
     time::Et,
 };
 
+/// Intervals of the outline along the image: between two of them the track bends by centimetres.
+const OUTLINE_INTERVALS: u32 = 10;
+
 /// Orientation of one image.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Orientation {
@@ -27,6 +30,9 @@ pub struct Orientation {
     pub image: String,
     /// Samples over the whole header image, both ends included.
     pub samples: Vec<OrientationSample>,
+    /// Outline of the delivered image on the IAU 2000 ellipsoid: along the first pixel's outer edge,
+    /// back along the last one's, not closed. `None` when a corner sees no ground.
+    pub outline: Option<Vec<GroundPoint>>,
     /// Tables for camera models, in J2000.
     pub tables: CameraTables,
 }
@@ -46,6 +52,15 @@ pub struct OrientationSample {
     pub angles: OmegaPhiKappa,
     /// Where the boresight meets the IAU 2000 ellipsoid, if it does.
     pub boresight: Option<BoresightGround>,
+}
+
+/// A point on the ellipsoid.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct GroundPoint {
+    /// East longitude, radians.
+    pub longitude_rad: f64,
+    /// Areocentric latitude, radians.
+    pub latitude_rad: f64,
 }
 
 /// Ground point of the camera's boresight on the ellipsoid.
@@ -144,6 +159,7 @@ pub fn sample_orientation(
     Ok(Orientation {
         image: image.id.clone(),
         samples,
+        outline: reader.outline(image)?,
         tables: camera_tables::camera_tables(&reader, image, kernels.padding_s)?,
     })
 }
@@ -193,6 +209,59 @@ impl Reader<'_> {
             boresight: boresight_ground(&position, camera_to_mars.matrix()),
         })
     }
+
+    /// Outline of the delivered lines and samples.
+    fn outline(&self, image: &ImageTimes) -> Result<Option<Vec<GroundPoint>>> {
+        let duration_s = f64::from(image.lines_delivered) * image.line_period_s;
+        let step_s = duration_s / f64::from(OUTLINE_INTERVALS);
+        let (mut first_edge, mut last_edge) = (Vec::new(), Vec::new());
+        for k in 0..=OUTLINE_INTERVALS {
+            let et = image.start.plus(f64::from(k) * step_s);
+            let to_mars = mars_rotation::<MarsIau2000>(et);
+            let position = to_mars.apply(&self.session.state(et)?.position);
+            let camera_to_mars = to_mars * self.inertial_to_camera(et)?.inverse();
+            let [first, last] = swath_directions(image).map(|direction| {
+                let ground = ray_meets_ellipsoid(&position, &(camera_to_mars.matrix() * direction));
+                ground.map(|ground| GroundPoint::of(&ground))
+            });
+            let (Some(first), Some(last)) = (first, last) else {
+                return Ok(None);
+            };
+            first_edge.push(first);
+            last_edge.push(last);
+        }
+        Ok(Some(
+            first_edge
+                .into_iter()
+                .chain(last_edge.into_iter().rev())
+                .collect(),
+        ))
+    }
+}
+
+impl GroundPoint {
+    fn of(ground: &Position<MarsIau2000>) -> Self {
+        let coordinates = Spherical::from_xyz_m(&ground.xyz_m);
+        Self {
+            longitude_rad: coordinates.longitude_rad,
+            latitude_rad: coordinates.latitude.0,
+        }
+    }
+}
+
+/// Where the outer edges of the first and the last sample look, camera frame, millimetres.
+///
+/// Samples follow +Y of the camera, detector 1024 of 2048 lies on the boresight (instrument kernel).
+fn swath_directions(image: &ImageTimes) -> [Vector3<f64>; 2] {
+    let last_detector = image.first_detector + image.samples * image.crosstrack_summing;
+    [image.first_detector, last_detector].map(|detector| {
+        let from_centre = f64::from(detector) - 0.5 * f64::from(MOC_NA_DETECTORS);
+        Vector3::new(
+            0.0,
+            from_centre * MOC_NA_PIXEL_PITCH_MM,
+            MOC_NA_FOCAL_LENGTH_MM,
+        )
+    })
 }
 
 fn boresight_ground(
@@ -207,10 +276,10 @@ fn boresight_ground(
         MARS_IAU2000.polar_radius_m.powi(-2),
     );
     let normal = ground.xyz_m.component_mul(&scale);
-    let coordinates = Spherical::from_xyz_m(&ground.xyz_m);
+    let point = GroundPoint::of(&ground);
     Some(BoresightGround {
-        longitude_rad: coordinates.longitude_rad,
-        latitude_rad: coordinates.latitude.0,
+        longitude_rad: point.longitude_rad,
+        latitude_rad: point.latitude_rad,
         range_m: position.distance_m(&ground),
         emission_rad: normal.angle(&-boresight),
     })

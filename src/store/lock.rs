@@ -5,7 +5,10 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use super::{atomic::TEMPORARY, publish::STAGING};
+use super::{
+    atomic::TEMPORARY,
+    publish::{CACHE, STAGING},
+};
 use crate::error::{Fault, IoFault, Kind, Place, Result};
 
 /// Held while a run works in a site's folder; the system frees it when the process ends, however it ends.
@@ -45,7 +48,7 @@ impl SiteLock {
         match file.try_lock() {
             Ok(()) => {
                 remove_temporaries(folder);
-                remove_temporaries(&folder.join(".cache"));
+                remove_temporaries(&folder.join(CACHE));
                 // A killed run's half-made products; what cannot be removed is met when publishing.
                 let _ = fs::remove_dir_all(folder.join(STAGING));
                 Ok(Self { _file: file })

@@ -29,6 +29,8 @@ pub struct Manifest {
     pub products: Vec<ProductEntry>,
     /// Rows and things counted.
     pub counts: BTreeMap<String, u64>,
+    /// The largest figures of the site under the names in [`figures`]; absent when there is none.
+    pub figures: BTreeMap<String, f64>,
     /// Shots inside a window that were left out, by reason.
     pub rejected: BTreeMap<String, u64>,
     /// What was wrong with input records.
@@ -39,6 +41,16 @@ pub struct Manifest {
     pub finished_utc: String,
 }
 
+/// Names of [`Manifest::figures`].
+pub mod figures {
+    /// Largest |mean| of range − distance of a profile, metres.
+    pub const RANGE_MEAN_M: &str = "range_mean_m";
+    /// Largest second-order position RMSE of an image, metres.
+    pub const POSITION_RMSE_M: &str = "position_rmse_m";
+    /// Largest second-order pointing RMSE of an image, radians.
+    pub const POINTING_RMSE_RAD: &str = "pointing_rmse_rad";
+}
+
 /// Whether the products keep the limits of the configuration.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Verdict {
@@ -46,6 +58,8 @@ pub struct Verdict {
     pub valid: bool,
     /// Every broken limit, with its profile or image.
     pub reasons: Vec<String>,
+    /// What a reader must weigh although no limit is broken.
+    pub remarks: Vec<String>,
 }
 
 /// The configuration of a run.

@@ -22,6 +22,9 @@ use crate::{
 /// Name of the manifest in a site's folder.
 pub const MANIFEST: &str = "manifest.json";
 
+/// Name of the folder of stored stages.
+pub const CACHE: &str = ".cache";
+
 /// Name of the folder of half-made products.
 pub(super) const STAGING: &str = ".staging";
 
@@ -38,6 +41,14 @@ pub fn staging(site_folder: &Path) -> Result<PathBuf> {
         .map_err(IoFault::on("create the folder"))
         .in_file(&folder)?;
     Ok(folder)
+}
+
+/// Whether a run ever worked in the folder: it holds stored stages or a publication under way.
+#[must_use]
+pub fn has_work(site_folder: &Path) -> bool {
+    [CACHE, STAGING, JOURNAL]
+        .iter()
+        .any(|name| site_folder.join(name).exists())
 }
 
 /// Hashes and flushes staged files, given as paths below `staging` with their rows.

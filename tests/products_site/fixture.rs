@@ -19,10 +19,12 @@ use areograph::{
     spice::Wanted,
     stages::{
         check_ranges::{BiasScan, ProfileRanges, RangeCheck, ShotResiduals},
+        convert_datum::FileConversion,
         fit_sensor_model::{SensorModel, fit_sensor_model},
         group_profiles::{Profile, group_profiles},
         sample_orientation::{
-            BoresightGround, CameraTables, InterpolationCheck, Orientation, OrientationSample,
+            BoresightGround, CameraTables, GroundPoint, InterpolationCheck, Orientation,
+            OrientationSample,
         },
         tag_times::{ImageTimes, StartFrom},
     },
@@ -49,6 +51,8 @@ pub(crate) struct Site {
     pub(crate) rejected: BTreeMap<String, u64>,
     pub(crate) complaints: Vec<String>,
     pub(crate) notes: Vec<String>,
+    pub(crate) warnings: Vec<String>,
+    pub(crate) conversions: Vec<FileConversion>,
 }
 
 impl Site {
@@ -67,6 +71,8 @@ impl Site {
                 held: None,
             }],
             wanted: Wanted::default(),
+            warnings: Vec::new(),
+            conversions: vec![FileConversion::default()],
             model: fit_sensor_model(&orientation, &config.orientation).unwrap(),
             utc: (0..footprints.len())
                 .map(|row| format!("1999-08-24T14:12:{:06.3}", 13.0 + 0.1 * row as f64))
@@ -115,6 +121,8 @@ impl Site {
             rejected: &self.rejected,
             complaints: &self.complaints,
             notes: &self.notes,
+            warnings: &self.warnings,
+            conversions: &self.conversions,
         })
     }
 }
@@ -231,6 +239,14 @@ fn orientation(times: &ImageTimes) -> Orientation {
     Orientation {
         image: times.id.clone(),
         samples,
+        outline: Some(
+            [(-0.05, -0.1), (-0.05, 0.05), (0.0, 0.05), (0.0, -0.1)]
+                .map(|(longitude_rad, latitude_rad)| GroundPoint {
+                    longitude_rad: std::f64::consts::PI + longitude_rad,
+                    latitude_rad,
+                })
+                .to_vec(),
+        ),
         tables: CameraTables {
             position_m: vec![[-1_745_703.3, 1_342_962.3, -3_030_553.6]; nodes],
             velocity_m_s: vec![[-2_248.8, 1_571.6, 1_992.2]; nodes],

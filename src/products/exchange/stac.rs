@@ -37,7 +37,7 @@ pub(super) fn item(
     shots_deg: &[[f64; 2]],
 ) -> Result<Option<Value>> {
     let mut points = shots_deg.to_vec();
-    points.extend(boresights_deg(site));
+    points.extend(outlines_deg(site));
     let Some(bounds) = bounding_box_deg(&points).map(with_margin) else {
         return Ok(None);
     };
@@ -83,15 +83,15 @@ fn instruments(site: &SiteProducts) -> Vec<&'static str> {
     mola.into_iter().chain(moc).collect()
 }
 
-/// Where the boresights of the images meet the ground.
-fn boresights_deg(site: &SiteProducts) -> Vec<[f64; 2]> {
+/// Outlines of the images on the ground.
+fn outlines_deg(site: &SiteProducts) -> Vec<[f64; 2]> {
     site.images
         .iter()
-        .flat_map(|image| &image.orientation.samples)
-        .filter_map(|sample| sample.boresight.as_ref())
-        .map(|ground| {
-            let longitude_deg = signed_longitude_deg(ground.longitude_rad);
-            [longitude_deg, degrees(ground.latitude_rad)]
+        .filter_map(|image| image.orientation.outline.as_ref())
+        .flatten()
+        .map(|point| {
+            let longitude_deg = signed_longitude_deg(point.longitude_rad);
+            [longitude_deg, degrees(point.latitude_rad)]
         })
         .collect()
 }

@@ -1,0 +1,63 @@
+//! The page over all sites of an output folder, made again after every run.
+
+use std::{
+    collections::BTreeMap,
+    fs,
+    path::{Path, PathBuf},
+};
+
+use crate::{
+    error::{IoFault, Place, Result},
+    report::{SiteLine, SiteSummary, sites_page},
+    store::{
+        atomic,
+        manifest::{Manifest, figures},
+        publish::{has_work, read_manifest},
+    },
+};
+
+/// File of the page in the output folder.
+const PAGE: &str = "index.html";
+
+/// Writes the page over the sites whose folders lie in `out`; returns its path.
+///
+/// # Errors
+/// The folder cannot be read, the page cannot be written.
+pub fn publish_sites(out: &Path) -> Result<PathBuf> {
+    let mut lines = BTreeMap::new();
+    let entries = fs::read_dir(out)
+        .map_err(IoFault::on("list"))
+        .in_file(out)?;
+    for entry in entries {
+        let folder = entry.map_err(IoFault::on("list")).in_file(out)?.path();
+        let name = folder.file_name().unwrap_or_default().to_string_lossy();
+        let manifest = read_manifest(&folder);
+        // Folders that no run ever worked in are none of our business.
+        if manifest.is_some() || has_work(&folder) {
+            let products = manifest.as_ref().map(summary);
+            lines.insert(name.into_owned(), products);
+        }
+    }
+    let lines: Vec<SiteLine> = lines
+        .into_iter()
+        .map(|(folder, products)| SiteLine { folder, products })
+        .collect();
+    let page = out.join(PAGE);
+    atomic::write(&page, sites_page(&lines).as_bytes())?;
+    Ok(page)
+}
+
+fn summary(manifest: &Manifest) -> SiteSummary {
+    let count = |name: &str| manifest.counts.get(name).copied().unwrap_or(0);
+    let figure = |name: &str| manifest.figures.get(name).copied();
+    SiteSummary {
+        reasons: manifest.verdict.reasons.clone(),
+        remarks: manifest.verdict.remarks.clone(),
+        counts: ["footprints", "profiles", "images"].map(count),
+        range_mean_m: figure(figures::RANGE_MEAN_M),
+        position_rmse_m: figure(figures::POSITION_RMSE_M),
+        pointing_rmse_rad: figure(figures::POINTING_RMSE_RAD),
+        finished_utc: manifest.finished_utc.clone(),
+        version: manifest.version.clone(),
+    }
+}

@@ -1,0 +1,247 @@
+//! Plots on paper: what the drawing library is told.
+
+use plotters::{
+    coord::{Shift, types::RangedCoordf64},
+    prelude::*,
+    style::text_anchor::{HPos, Pos, VPos},
+};
+
+use super::{Extent, GRID, INK, LETTERS, MARK, Panel, Plot, Series, Style, WIDTH};
+use crate::{error::Result, products::fault::ProductFault};
+
+/// Height of the axis below the lowest panel, with its labels.
+pub(super) const FOOT: u32 = 84;
+/// Room between panels, for the labels at their corners.
+const GUTTER: u32 = 16;
+/// Width of the axes at the left side.
+const SIDE: u32 = 138;
+/// Width of the bars at the right side.
+const BARS: u32 = 170;
+/// Number of bars over the range of a panel.
+const BAR_COUNT: usize = 24;
+
+/// A drawing in progress.
+pub(in crate::report) type Canvas<'a> = DrawingArea<SVGBackend<'a>, Shift>;
+/// Whether a piece could be drawn.
+pub(in crate::report) type Drawn<'a> =
+    std::result::Result<(), DrawingAreaErrorKind<<SVGBackend<'a> as DrawingBackend>::ErrorType>>;
+type Chart<'a, 'b> = ChartContext<'b, SVGBackend<'a>, Cartesian2d<RangedCoordf64, RangedCoordf64>>;
+
+/// SVG of the given height, filled by `with`.
+///
+/// # Errors
+/// A drawing that the library refuses, which is a fault of areograph.
+pub(in crate::report) fn drawn(
+    height: u32,
+    with: impl for<'a> FnOnce(&Canvas<'a>) -> Drawn<'a>,
+) -> Result<String> {
+    let mut svg = String::new();
+    {
+        let area = SVGBackend::with_string(&mut svg, (WIDTH, height)).into_drawing_area();
+        with(&area)
+            .and_then(|()| area.present())
+            .map_err(ProductFault::refused("draw a plot"))?;
+    }
+    Ok(svg)
+}
+
+/// Words on a drawing, in the colour of ink.
+pub(in crate::report) fn draw_text<'a>(
+    area: &Canvas<'a>,
+    text: &str,
+    at: (i32, i32),
+    anchor: HPos,
+) -> Drawn<'a> {
+    let style = TextStyle::from(("sans-serif", LETTERS).into_font())
+        .color(&INK)
+        .pos(Pos::new(anchor, VPos::Center));
+    area.draw_text(text, &style, at)
+}
+
+/// A number of an axis; what rounds to zero has no sign.
+pub(in crate::report) fn label(value: f64, decimals: usize) -> String {
+    let text = format!("{value:.decimals$}");
+    match text.strip_prefix('-') {
+        Some(digits) if !digits.contains(|digit| matches!(digit, '1'..='9')) => digits.to_owned(),
+        _ => text.replace('-', "\u{2212}"),
+    }
+}
+
+pub(super) fn plot<'a>(plot: &Plot, area: &Canvas<'a>) -> Drawn<'a> {
+    let last = plot.panels.len().saturating_sub(1);
+    let mut rest = area.clone();
+    for (place, panel) in plot.panels.iter().enumerate() {
+        let lowest = place == last;
+        let height = panel.height + if lowest { FOOT } else { 0 };
+        let (own, below) = rest.split_vertically(height);
+        draw_panel(plot, panel, lowest, &own)?;
+        rest = below;
+    }
+    Ok(())
+}
+
+fn draw_panel<'a>(plot: &Plot, panel: &Panel, lowest: bool, area: &Canvas<'a>) -> Drawn<'a> {
+    let foot = if lowest { FOOT } else { 0 };
+    let histograms = plot.panels.iter().any(|panel| panel.histogram);
+    let width = if histograms { WIDTH - BARS } else { WIDTH };
+    let (left, right) = area.split_horizontally(width);
+    let mut chart = ChartBuilder::on(&left)
+        .margin_top(14)
+        .margin_right(14)
+        .margin_bottom(if lowest { 0 } else { GUTTER })
+        .x_label_area_size(foot)
+        .y_label_area_size(SIDE)
+        .build_cartesian_2d(plot.x.range(), panel.y.range())?;
+    let (x_decimals, y_decimals) = (plot.x.decimals(), panel.y.decimals());
+    chart
+        .configure_mesh()
+        .x_desc(if lowest { plot.x_label } else { "" })
+        .y_desc(panel.y_label)
+        .x_labels(7)
+        .y_labels(if panel.height < 300 { 4 } else { 7 })
+        .max_light_lines(0)
+        .bold_line_style(GRID.stroke_width(2))
+        .axis_style(INK.stroke_width(2))
+        .label_style(("sans-serif", LETTERS).into_font().color(&INK))
+        .axis_desc_style(("sans-serif", LETTERS).into_font().color(&INK))
+        .x_label_formatter(&move |x| label(*x, x_decimals))
+        .y_label_formatter(&move |y| label(*y, y_decimals))
+        .draw()?;
+    draw_marks(plot, panel, &mut chart)?;
+    for series in &panel.series {
+        draw_series(plot.x, panel.y, series, &mut chart)?;
+    }
+    if panel.histogram {
+        draw_histogram(panel, foot, &right)?;
+    }
+    Ok(())
+}
+
+/// Upright marks with their bands, and level limits.
+fn draw_marks<'a>(plot: &Plot, panel: &Panel, chart: &mut Chart<'a, '_>) -> Drawn<'a> {
+    for mark in panel.marks.iter().filter(|mark| plot.x.contains(mark.x)) {
+        let sides = [mark.x - mark.half_width, mark.x + mark.half_width].map(|x| plot.x.clamp(x));
+        chart.draw_series([Rectangle::new(
+            [(sides[0], panel.y.low), (sides[1], panel.y.high)],
+            mark.colour.mix(0.15).filled(),
+        )])?;
+        let line = [(mark.x, panel.y.low), (mark.x, panel.y.high)];
+        chart.draw_series(LineSeries::new(line, mark.colour.stroke_width(3)))?;
+    }
+    for limit in panel
+        .limits
+        .iter()
+        .filter(|limit| panel.y.contains(**limit))
+    {
+        let line = [(plot.x.low, *limit), (plot.x.high, *limit)];
+        chart.draw_series(DashedLineSeries::new(line, 14, 10, MARK.stroke_width(3)))?;
+    }
+    Ok(())
+}
+
+fn draw_series<'a>(x: Extent, y: Extent, series: &Series, chart: &mut Chart<'a, '_>) -> Drawn<'a> {
+    let colour = series.rgb();
+    let points = series
+        .points
+        .iter()
+        .map(|point| (x.clamp(point.0), y.clamp(point.1)));
+    match series.style {
+        Style::Dots => {
+            chart.draw_series(points.map(|point| Circle::new(point, 4, colour.filled())))?;
+        }
+        Style::Line => {
+            chart.draw_series(LineSeries::new(points, colour.stroke_width(3)))?;
+        }
+        Style::Crosses => {
+            chart.draw_series(points.map(|point| Cross::new(point, 8, colour.stroke_width(4))))?;
+        }
+    }
+    Ok(())
+}
+
+/// How many dots lie at each height, as bars to the right.
+fn draw_histogram<'a>(panel: &Panel, foot: u32, area: &Canvas<'a>) -> Drawn<'a> {
+    let counts = histogram(panel);
+    let most = counts.iter().copied().max().unwrap_or(0).max(1);
+    let mut chart = ChartBuilder::on(area)
+        .margin_top(14)
+        .margin_right(8)
+        .margin_bottom(if foot > 0 { 0 } else { GUTTER })
+        .x_label_area_size(foot)
+        .build_cartesian_2d(0.0..f64::from(most), panel.y.range())?;
+    chart
+        .configure_mesh()
+        .disable_mesh()
+        .x_labels(2)
+        .y_labels(0)
+        .x_desc("shots")
+        .axis_style(INK.stroke_width(2))
+        .label_style(("sans-serif", LETTERS).into_font().color(&INK))
+        .x_label_formatter(&|count| label(*count, 0))
+        .draw()?;
+    let step = (panel.y.high - panel.y.low) / BAR_COUNT as f64;
+    let bars = counts.iter().enumerate().filter(|(_, count)| **count > 0);
+    chart.draw_series(bars.map(|(bar, count)| {
+        let low = panel.y.low + bar as f64 * step;
+        Rectangle::new(
+            [
+                (0.0, low + 0.1 * step),
+                (f64::from(*count), low + 0.9 * step),
+            ],
+            super::COLOURS[super::GREY].filled(),
+        )
+    }))?;
+    Ok(())
+}
+
+/// Dots of a panel in equal steps of its range, points beyond it left out.
+fn histogram(panel: &Panel) -> Vec<u32> {
+    let mut counts = vec![0_u32; BAR_COUNT];
+    let dots = panel
+        .series
+        .iter()
+        .filter(|series| series.style == Style::Dots);
+    for (_, value) in dots.flat_map(|series| &series.points) {
+        let share = (value - panel.y.low) / (panel.y.high - panel.y.low);
+        if (0.0..1.0).contains(&share) {
+            counts[(share * BAR_COUNT as f64) as usize] += 1;
+        }
+    }
+    counts
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn zero_has_no_sign() {
+        assert_eq!(label(-0.004, 2), "0.00");
+        assert_eq!(label(-0.006, 2), "−0.01");
+        assert_eq!(label(-20.0, 0), "−20");
+    }
+
+    #[test]
+    fn every_dot_inside_the_range_is_counted() {
+        let points = (0..100).map(|k| (0.0, f64::from(k))).collect();
+        let dots = Series {
+            label: String::new(),
+            style: Style::Dots,
+            colour: 0,
+            points,
+        };
+        let outlier = Series {
+            label: String::new(),
+            style: Style::Crosses,
+            colour: 0,
+            points: vec![(0.0, 50.0)],
+        };
+        let mut panel = Panel::of("m", vec![dots, outlier]);
+        assert_eq!(histogram(&panel).iter().sum::<u32>(), 100);
+        panel.y = Extent {
+            low: 0.0,
+            high: 50.0,
+        };
+        assert_eq!(histogram(&panel).iter().sum::<u32>(), 50);
+    }
+}

@@ -1,0 +1,130 @@
+//! A figure of a page: heading, picture, legend, caption, and its numbers to take away.
+
+use super::super::html::{escape, slug};
+
+/// An entry of a legend.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(in crate::report) struct Key {
+    label: String,
+    /// The swatch: a class of the page's style, or a colour written out.
+    swatch: Swatch,
+}
+
+#[derive(Debug, Clone, PartialEq, Eq)]
+enum Swatch {
+    Class(String),
+    Colour(String),
+}
+
+impl Key {
+    /// An entry in colour `index` of the palette.
+    pub(in crate::report) fn colour(label: &str, index: usize) -> Self {
+        Self {
+            label: label.to_owned(),
+            swatch: Swatch::Class(format!("k{}", index % super::COLOURS.len())),
+        }
+    }
+
+    /// An entry in the colour of marks.
+    pub(in crate::report) fn mark(label: &str) -> Self {
+        Self {
+            label: label.to_owned(),
+            swatch: Swatch::Class("km".to_owned()),
+        }
+    }
+
+    /// An entry in a colour that is the same on light and dark pages.
+    pub(in crate::report) fn fixed(label: &str, colour: plotters::style::RGBColor) -> Self {
+        let plotters::style::RGBColor(red, green, blue) = colour;
+        Self {
+            label: label.to_owned(),
+            swatch: Swatch::Colour(format!("#{red:02x}{green:02x}{blue:02x}")),
+        }
+    }
+
+    fn html(&self) -> String {
+        let label = escape(&self.label);
+        match &self.swatch {
+            Swatch::Class(class) => format!("<li><i class=\"{class}\"></i>{label}</li>"),
+            Swatch::Colour(colour) => {
+                format!("<li><i style=\"background:{colour}\"></i>{label}</li>")
+            }
+        }
+    }
+}
+
+/// The figure; `title` is unique on its page, `csv` holds the numbers that are drawn.
+pub(in crate::report) fn figure_html(
+    title: &str,
+    svg: &str,
+    keys: &[Key],
+    caption: &str,
+    csv: &str,
+) -> String {
+    let id = slug(title);
+    let keys: String = keys.iter().map(Key::html).collect();
+    let keys = if keys.is_empty() {
+        keys
+    } else {
+        format!("<ul class=\"keys\">{keys}</ul>\n")
+    };
+    // The drawing library says its size in pixels; the page decides that.
+    let svg = svg.find("viewBox").map_or_else(
+        || svg.to_owned(),
+        |at| {
+            format!(
+                "<svg role=\"img\" aria-labelledby=\"{id}-title {id}-words\" {}",
+                &svg[at..]
+            )
+        },
+    );
+    format!(
+        "<figure id=\"{id}\">\n<h3 id=\"{id}-title\">{}</h3>\n{svg}{keys}\
+         <figcaption><span id=\"{id}-words\">{}</span> {}</figcaption>\n</figure>\n",
+        escape(title),
+        escape(caption),
+        data_link(&id, csv)
+    )
+}
+
+/// A link that hands out `csv` as `<name>.csv` from inside the page.
+pub(in crate::report) fn data_link(name: &str, csv: &str) -> String {
+    let mut encoded = String::with_capacity(csv.len() + csv.len() / 8);
+    for byte in csv.bytes() {
+        match byte {
+            b'0'..=b'9' | b'a'..=b'z' | b'A'..=b'Z' | b'.' | b',' | b'-' | b'_' | b':' | b'/' => {
+                encoded.push(char::from(byte));
+            }
+            _ => encoded.push_str(&format!("%{byte:02X}")),
+        }
+    }
+    format!(
+        "<a class=\"data\" download=\"{name}.csv\" href=\"data:text/csv;charset=utf-8,{encoded}\">Data (CSV)</a>"
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn data_can_be_decoded_again() {
+        let csv = "a,\"µ% #\"\n1,-2.5e-3\n";
+        let link = data_link("x", csv);
+        let start = link.find("utf-8,").unwrap() + "utf-8,".len();
+        let encoded = &link[start..link[start..].find('"').unwrap() + start];
+        let mut bytes = Vec::new();
+        let mut rest = encoded.as_bytes();
+        while let [first, tail @ ..] = rest {
+            rest = tail;
+            if *first == b'%' {
+                let digits = std::str::from_utf8(&rest[..2]).unwrap();
+                bytes.push(u8::from_str_radix(digits, 16).unwrap());
+                rest = &rest[2..];
+            } else {
+                bytes.push(*first);
+            }
+        }
+        assert_eq!(String::from_utf8(bytes).unwrap(), csv);
+    }
+}

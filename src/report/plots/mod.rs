@@ -1,0 +1,310 @@
+//! Plots: panels over one axis, drawn as inline SVG, told in words and given as CSV.
+
+mod draw;
+mod figure;
+
+pub(super) use draw::{Canvas, Drawn, draw_text, drawn};
+pub(super) use figure::{Key, figure_html};
+
+use std::fmt::Write as _;
+
+use plotters::style::RGBColor;
+
+use crate::error::Result;
+
+/// Width of a plot in its own units; pages show about half as many pixels, so that lines stay fine.
+pub(super) const WIDTH: u32 = 1040;
+/// Size of letters in the same units.
+pub(super) const LETTERS: u32 = 25;
+
+/// Colours that stay apart for most colour-blind readers, after Okabe and Ito 2008, dark enough for
+/// white paper; the page's style maps them, and the three below, for dark screens.
+pub(super) const COLOURS: [RGBColor; 7] = [
+    RGBColor(0x00, 0x72, 0xb2),
+    RGBColor(0xc2, 0x50, 0x00),
+    RGBColor(0x00, 0x80, 0x5d),
+    RGBColor(0xb0, 0x51, 0x8a),
+    RGBColor(0xa8, 0x6f, 0x00),
+    RGBColor(0x3b, 0x8f, 0xc0),
+    RGBColor(0x5a, 0x5a, 0x5a),
+];
+/// Index of the grey among the colours.
+pub(super) const GREY: usize = 6;
+/// Marks, limits and outliers.
+pub(super) const MARK: RGBColor = RGBColor(0xb3, 0x26, 0x1e);
+/// Letters and axes.
+pub(super) const INK: RGBColor = RGBColor(0x22, 0x22, 0x22);
+/// Grid lines.
+pub(super) const GRID: RGBColor = RGBColor(0xe2, 0xe2, 0xe2);
+
+/// How a series is drawn.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Style {
+    Dots,
+    Line,
+    /// Crosses in the colour of marks, for outliers.
+    Crosses,
+}
+
+/// Points of one kind.
+#[derive(Debug)]
+pub(super) struct Series {
+    /// Entry of the legend, and name in the CSV.
+    pub(super) label: String,
+    pub(super) style: Style,
+    /// Index into the colours, taken round.
+    pub(super) colour: usize,
+    pub(super) points: Vec<(f64, f64)>,
+}
+
+impl Series {
+    pub(super) fn line(label: impl Into<String>, colour: usize, points: Vec<(f64, f64)>) -> Self {
+        Self {
+            label: label.into(),
+            style: Style::Line,
+            colour,
+            points,
+        }
+    }
+
+    fn rgb(&self) -> RGBColor {
+        match self.style {
+            Style::Crosses => MARK,
+            _ => COLOURS[self.colour % COLOURS.len()],
+        }
+    }
+}
+
+/// An upright line at `x`, with a band of `half_width` to either side.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Mark {
+    pub(super) x: f64,
+    pub(super) half_width: f64,
+    pub(super) colour: RGBColor,
+}
+
+/// One panel; points outside its range are drawn at the edge.
+#[derive(Debug)]
+pub(super) struct Panel {
+    pub(super) y_label: &'static str,
+    pub(super) y: Extent,
+    pub(super) height: u32,
+    pub(super) series: Vec<Series>,
+    pub(super) marks: Vec<Mark>,
+    /// Level lines that values should not cross; drawn where they are inside the range.
+    pub(super) limits: Vec<f64>,
+    /// Whether the dots are counted in bars at the right side.
+    pub(super) histogram: bool,
+}
+
+impl Panel {
+    /// A panel of `series` as high as usual, whose range holds all their points.
+    pub(super) fn of(y_label: &'static str, series: Vec<Series>) -> Self {
+        let values = series.iter().flat_map(|series| &series.points);
+        Self {
+            y_label,
+            y: Extent::of(values.map(|point| point.1)),
+            height: 420,
+            series,
+            marks: Vec::new(),
+            limits: Vec::new(),
+            histogram: false,
+        }
+    }
+}
+
+/// Panels over one axis.
+#[derive(Debug)]
+pub(super) struct Plot {
+    /// Heading, unique on its page.
+    pub(super) title: String,
+    /// What it shows, for those who see it and those who do not.
+    pub(super) caption: String,
+    pub(super) x_label: &'static str,
+    pub(super) x: Extent,
+    pub(super) panels: Vec<Panel>,
+}
+
+impl Plot {
+    /// One panel of `series`, whose axis holds all their points.
+    pub(super) fn of(
+        title: String,
+        caption: String,
+        x_label: &'static str,
+        panels: Vec<Panel>,
+    ) -> Self {
+        let series = panels.iter().flat_map(|panel| &panel.series);
+        let x = Extent::of(
+            series
+                .flat_map(|series| &series.points)
+                .map(|point| point.0),
+        );
+        Self {
+            title,
+            caption,
+            x_label,
+            x,
+            panels,
+        }
+    }
+
+    /// The points of every panel, one line each.
+    fn csv(&self) -> String {
+        let mut csv = format!("quantity,series,{},value\n", quoted(self.x_label));
+        for panel in &self.panels {
+            for series in &panel.series {
+                let name = format!("{},{}", quoted(panel.y_label), quoted(&series.label));
+                for (x, y) in &series.points {
+                    // Writing to a string cannot fail.
+                    let _ = writeln!(csv, "{name},{x},{y}");
+                }
+            }
+        }
+        csv
+    }
+
+    /// Entries of the legend: every label once.
+    fn keys(&self) -> Vec<Key> {
+        let mut keys: Vec<Key> = Vec::new();
+        for series in self.panels.iter().flat_map(|panel| &panel.series) {
+            let key = match series.style {
+                Style::Crosses => Key::mark(&series.label),
+                _ => Key::colour(&series.label, series.colour),
+            };
+            if !series.label.is_empty() && !keys.contains(&key) {
+                keys.push(key);
+            }
+        }
+        keys
+    }
+}
+
+/// A field of a CSV file.
+pub(super) fn quoted(text: &str) -> String {
+    if text.contains([',', '"', '\n']) {
+        format!("\"{}\"", text.replace('"', "\"\""))
+    } else {
+        text.to_owned()
+    }
+}
+
+/// The plot as a figure.
+///
+/// # Errors
+/// A plot that the library refuses, which is a fault of areograph.
+pub(super) fn figure(plot: &Plot) -> Result<String> {
+    let height = plot.panels.iter().map(|panel| panel.height).sum::<u32>() + draw::FOOT;
+    let svg = drawn(height, |area| draw::plot(plot, area))?;
+    Ok(figure_html(
+        &plot.title,
+        &svg,
+        &plot.keys(),
+        &plot.caption,
+        &plot.csv(),
+    ))
+}
+
+/// Smallest and largest value of an axis.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Extent {
+    pub(super) low: f64,
+    pub(super) high: f64,
+}
+
+impl Extent {
+    /// All of `values` with a margin, never empty.
+    pub(super) fn of(values: impl Iterator<Item = f64>) -> Self {
+        let (low, high) = values
+            .filter(|value| value.is_finite())
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| {
+                (low.min(value), high.max(value))
+            });
+        if low > high {
+            return Self {
+                low: 0.0,
+                high: 1.0,
+            };
+        }
+        // Values that agree to a thousandth (of a metre, degree, second) still get an axis with room for labels.
+        let margin = (0.05 * (high - low))
+            .max(1e-9 * high.abs().max(low.abs()))
+            .max(1e-3);
+        Self {
+            low: low - margin,
+            high: high + margin,
+        }
+    }
+
+    fn clamp(self, value: f64) -> f64 {
+        value.clamp(self.low, self.high)
+    }
+
+    fn contains(self, value: f64) -> bool {
+        self.low <= value && value <= self.high
+    }
+
+    fn range(self) -> std::ops::Range<f64> {
+        self.low..self.high
+    }
+
+    /// Decimals that tell the labels of about eight steps apart.
+    pub(super) fn decimals(self) -> usize {
+        let step = (self.high - self.low) / 8.0;
+        (0..9_u8)
+            .find(|decimals| 10_f64.powi(-i32::from(*decimals)) <= step)
+            .map_or(9, usize::from)
+    }
+}
+
+/// Every so many points, so that at most `limit` remain; the first always does.
+pub(super) fn thinned<T: Copy>(points: &[T], limit: usize) -> Vec<T> {
+    let step = points.len().div_ceil(limit.max(1)).max(1);
+    points.iter().step_by(step).copied().collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn thinning_keeps_the_limit_and_the_first() {
+        let points: Vec<u32> = (0..1001).collect();
+        assert_eq!(thinned(&points, 500).len(), 334); // every third
+        assert_eq!(thinned(&points, 2000).len(), 1001);
+        assert_eq!(thinned(&points, 1), [0]);
+        assert!(thinned::<u32>(&[], 10).is_empty());
+    }
+
+    #[test]
+    fn axes_have_room_whatever_the_values() {
+        for values in [
+            vec![],
+            vec![0.0],
+            vec![3.4e6],
+            vec![-1.0, 2.0],
+            vec![f64::NAN, 1.0],
+        ] {
+            let extent = Extent::of(values.iter().copied());
+            assert!(extent.high > extent.low, "{values:?}");
+            assert!(
+                values
+                    .iter()
+                    .all(|v| v.is_nan() || (extent.low < *v && *v < extent.high))
+            );
+        }
+    }
+
+    #[test]
+    fn every_point_is_in_the_data_once() {
+        let series = Series::line("a, \"b\"", 0, vec![(1.0, 0.25), (2.0, -0.5)]);
+        let panel = Panel::of("range − distance, m", vec![series]);
+        let plot = Plot::of("T".to_owned(), String::new(), "seconds", vec![panel]);
+        assert_eq!(
+            plot.csv(),
+            "quantity,series,seconds,value\n\
+             \"range − distance, m\",\"a, \"\"b\"\"\",1,0.25\n\
+             \"range − distance, m\",\"a, \"\"b\"\"\",2,-0.5\n"
+        );
+        assert_eq!(plot.keys().len(), 1);
+    }
+}

@@ -1,0 +1,286 @@
+//! What every kernel holds against what the site asks: coverage and gaps over time.
+
+use chrono::{DateTime, TimeDelta};
+use plotters::{prelude::*, style::text_anchor::HPos};
+
+use super::{
+    html::{Column, Table, heading, paragraph},
+    plots::{COLOURS, Canvas, Drawn, INK, Key, MARK, WIDTH, draw_text, drawn, figure_html, quoted},
+};
+use crate::{
+    error::Result,
+    products::{KernelLine, SiteProducts},
+    time::{Et, Interval, Intervals},
+};
+
+/// Instants that are asked for closer together than this share a picture, seconds.
+const APART_S: f64 = 600.0;
+/// Most pictures; the data beside them holds all.
+const PICTURES: usize = 8;
+/// Height of a row: a name over a bar.
+const ROW: u32 = 62;
+const BAR_TOP: i32 = 34;
+const BAR_BOTTOM: i32 = 54;
+/// Colour of what is held.
+const HELD: usize = 2;
+/// Colour of what is asked.
+const ASKED: usize = 0;
+
+/// Pictures per stretch of time, and the list of what is held.
+///
+/// # Errors
+/// A plot that cannot be drawn.
+pub(super) fn section(site: &SiteProducts) -> Result<String> {
+    let stretches = stretches(site);
+    if stretches.is_empty() {
+        return Ok(String::new());
+    }
+    let figures = stretches
+        .iter()
+        .take(PICTURES)
+        .map(|stretch| picture(site, *stretch))
+        .collect::<Result<String>>()?;
+    let mut body = format!("<div class=\"plots\">\n{figures}</div>\n");
+    if stretches.len() > PICTURES {
+        let words = format!(
+            "The first {PICTURES} of {} stretches are drawn.",
+            stretches.len()
+        );
+        body += &paragraph(&words);
+    }
+    Ok(body + &heading("What the kernels hold") + &table(site))
+}
+
+/// What is asked, merged where it lies close together, with room at both sides.
+fn stretches(site: &SiteProducts) -> Vec<Interval> {
+    let asked = [&site.wanted.positions, &site.wanted.attitudes];
+    let wide = asked
+        .into_iter()
+        .flat_map(|intervals| intervals.as_slice())
+        .map(|interval| interval.padded(0.5 * APART_S));
+    let merged = Intervals::union_of(wide);
+    let stretches = merged.as_slice().iter().map(|interval| {
+        let exact = interval.padded(-0.5 * APART_S);
+        exact.padded((0.25 * exact.duration_s()).max(5.0))
+    });
+    stretches.collect()
+}
+
+/// A row of a picture.
+struct Row {
+    name: String,
+    held: Intervals,
+    asked: Intervals,
+    /// Whether gaps in what is asked matter: they do in the sum of a kind of kernels only.
+    sum: bool,
+}
+
+/// Rows of one stretch: position and attitude as a whole, then every kernel that holds some of it.
+fn rows(site: &SiteProducts, stretch: Interval) -> Vec<Row> {
+    let mut rows = Vec::new();
+    for (role, name, asked) in [
+        ("SPK", "position, all kernels", &site.wanted.positions),
+        ("CK", "attitude, all kernels", &site.wanted.attitudes),
+    ] {
+        let within = Intervals::union_of([stretch]);
+        let asked = asked.intersection(&within);
+        if asked.as_slice().is_empty() {
+            continue;
+        }
+        let of_role = || {
+            site.kernels
+                .iter()
+                .filter(move |kernel| kernel.role == role)
+        };
+        let all = Intervals::union_of(of_role().flat_map(held).copied());
+        rows.push(Row {
+            name: name.to_owned(),
+            held: all.intersection(&within),
+            asked: asked.clone(),
+            sum: true,
+        });
+        for kernel in of_role() {
+            let held = Intervals::union_of(held(kernel).iter().copied()).intersection(&within);
+            if !held.as_slice().is_empty() {
+                rows.push(Row {
+                    name: kernel.name.clone(),
+                    held,
+                    asked: asked.clone(),
+                    sum: false,
+                });
+            }
+        }
+    }
+    rows
+}
+
+fn held(kernel: &KernelLine) -> &[Interval] {
+    kernel.held.as_ref().map_or(&[], Intervals::as_slice)
+}
+
+fn picture(site: &SiteProducts, stretch: Interval) -> Result<String> {
+    let rows = rows(site, stretch);
+    let height = u32::try_from(rows.len()).unwrap_or(u32::MAX) * ROW + 50;
+    let svg = drawn(height, |area| draw(&rows, stretch, area))?;
+    let gaps: Vec<Interval> = rows.iter().filter(|row| row.sum).flat_map(gaps).collect();
+    let mut words = format!(
+        "{:.1} s from {} (ephemeris time {:.3} s).",
+        stretch.duration_s(),
+        calendar(stretch.start),
+        stretch.start.seconds()
+    );
+    words += &match gaps.as_slice() {
+        [] => " Everything that is asked is held.".to_owned(),
+        [first, ..] => format!(
+            " {} gaps in what is asked, the first {:.3} s long at {first}.",
+            gaps.len(),
+            first.duration_s()
+        ),
+    };
+    let keys = [
+        Key::colour("held", HELD),
+        Key::colour("asked by the site, with its margin", ASKED),
+        Key::mark("asked and not held"),
+    ];
+    let title = format!("Kernels at {}", calendar(stretch.start));
+    Ok(figure_html(&title, &svg, &keys, &words, &csv(&rows)))
+}
+
+fn gaps(row: &Row) -> Vec<Interval> {
+    let asked = row.asked.as_slice().iter();
+    asked.flat_map(|asked| row.held.gaps_in(*asked)).collect()
+}
+
+fn draw<'a>(rows: &[Row], stretch: Interval, area: &Canvas<'a>) -> Drawn<'a> {
+    let width = f64::from(WIDTH);
+    let at = |instant: Et| {
+        let share = instant.since(stretch.start) / stretch.duration_s();
+        (share * width).round().clamp(0.0, width) as i32
+    };
+    let mut top = 0;
+    for row in rows {
+        let bar = |interval: &Interval, from: i32, to: i32, colour: RGBColor| {
+            // What is asked may be shorter than a pixel and must still be seen.
+            let (left, right) = (at(interval.start), at(interval.stop));
+            let right = right.max(left + 3);
+            Rectangle::new([(left, top + from), (right, top + to)], colour.filled())
+        };
+        draw_text(area, &row.name, (4, top + 14), HPos::Left)?;
+        for interval in row.held.as_slice() {
+            area.draw(&bar(interval, BAR_TOP, BAR_BOTTOM, COLOURS[HELD]))?;
+        }
+        for interval in row.asked.as_slice() {
+            area.draw(&bar(
+                interval,
+                BAR_BOTTOM - 8,
+                BAR_BOTTOM + 4,
+                COLOURS[ASKED],
+            ))?;
+        }
+        for interval in gaps(row).iter().filter(|_| row.sum) {
+            area.draw(&bar(interval, BAR_TOP - 4, BAR_BOTTOM + 4, MARK))?;
+        }
+        top += i32::try_from(ROW).unwrap_or(i32::MAX);
+    }
+    let right = i32::try_from(WIDTH).unwrap_or(i32::MAX) - 4;
+    area.draw(&PathElement::new(
+        vec![(0, top + 4), (right, top + 4)],
+        INK.stroke_width(2),
+    ))?;
+    draw_text(area, "0 s", (4, top + 28), HPos::Left)?;
+    let end = format!("{:.1} s", stretch.duration_s());
+    draw_text(area, &end, (right, top + 28), HPos::Right)
+}
+
+fn csv(rows: &[Row]) -> String {
+    let mut csv = "kernel,what,start_et_s,stop_et_s\n".to_owned();
+    for row in rows {
+        for (what, intervals) in [("held", &row.held), ("asked", &row.asked)] {
+            for interval in intervals.as_slice() {
+                let (start, stop) = (interval.start.seconds(), interval.stop.seconds());
+                csv += &format!("{},{what},{start},{stop}\n", quoted(&row.name));
+            }
+        }
+    }
+    csv
+}
+
+fn table(site: &SiteProducts) -> String {
+    let mut table = Table::new(
+        "Kernels that hold MGS",
+        &[
+            Column::Text("kernel"),
+            Column::Text("role"),
+            Column::Text("from (TDB)"),
+            Column::Text("to (TDB)"),
+            Column::Number("intervals"),
+            Column::Number("held of the span, %"),
+            Column::Number("asked of it, s"),
+        ],
+    );
+    for kernel in site
+        .kernels
+        .iter()
+        .filter(|kernel| !held(kernel).is_empty())
+    {
+        let intervals = held(kernel);
+        let span = Interval::new(intervals[0].start, intervals[intervals.len() - 1].stop);
+        let held_s: f64 = intervals.iter().map(|interval| interval.duration_s()).sum();
+        let asked = match &*kernel.role {
+            "CK" => &site.wanted.attitudes,
+            _ => &site.wanted.positions,
+        };
+        let used = Intervals::union_of(intervals.iter().copied()).intersection(asked);
+        let used_s: f64 = used.as_slice().iter().map(|used| used.duration_s()).sum();
+        table.row(
+            true,
+            [
+                (&kernel.name).into(),
+                (&kernel.role).into(),
+                calendar(span.start).into(),
+                calendar(span.stop).into(),
+                intervals.len().to_string().into(),
+                format!("{:.2}", 100.0 * held_s / span.duration_s()).into(),
+                format!("{used_s:.1}").into(),
+            ],
+        );
+    }
+    table.finish()
+}
+
+/// Calendar form of ephemeris time (TDB, about a minute ahead of UTC in these years).
+pub(super) fn calendar(et: Et) -> String {
+    let j2000 = DateTime::from_timestamp(946_728_000, 0).unwrap_or_default();
+    let since = TimeDelta::try_milliseconds((et.seconds() * 1e3).round() as i64);
+    since
+        .and_then(|since| j2000.checked_add_signed(since))
+        .map_or_else(
+            || et.to_string(),
+            |date| date.format("%Y-%m-%d %H:%M:%S TDB").to_string(),
+        )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ephemeris_time_has_a_calendar() {
+        assert_eq!(calendar(Et::from_seconds(0.0)), "2000-01-01 12:00:00 TDB");
+        let early = Et::from_seconds(-86_400.0 * 365.0);
+        assert_eq!(calendar(early), "1999-01-01 12:00:00 TDB");
+    }
+
+    #[test]
+    fn gaps_in_the_sum_are_found() {
+        let interval =
+            |start: f64, stop: f64| Interval::new(Et::from_seconds(start), Et::from_seconds(stop));
+        let row = Row {
+            name: String::new(),
+            held: Intervals::union_of([interval(0.0, 4.0), interval(6.0, 9.0)]),
+            asked: Intervals::union_of([interval(3.0, 7.0)]),
+            sum: true,
+        };
+        assert_eq!(gaps(&row), [interval(4.0, 6.0)]);
+    }
+}
