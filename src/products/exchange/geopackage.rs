@@ -70,19 +70,42 @@ struct Shot {
     windows: String,
 }
 
+/// What the file says of its table.
+struct Contents {
+    site: String,
+    /// That of the newest shot, as a clock would give other bytes each time.
+    last_change: String,
+    longitude_deg: [f64; 2],
+    latitude_deg: [f64; 2],
+}
+
+impl Contents {
+    fn of(site: &SiteProducts, points: &[[f64; 2]]) -> Self {
+        let newest = site.utc.iter().max().map_or("", String::as_str);
+        Self {
+            site: site.config.site.clone(),
+            last_change: format!("{newest}Z"),
+            longitude_deg: ends(points.iter().map(|point| point[0])),
+            latitude_deg: ends(points.iter().map(|point| point[1])),
+        }
+    }
+}
+
 /// Writes the footprints, which lie at `points` (degrees), and reads them back.
 ///
 /// # Errors
 /// What the disk or SQLite refuses; rows that come back different.
 pub(super) fn write(path: &Path, site: &SiteProducts, points: &[[f64; 2]]) -> Result<u64> {
+    let shots = || (points.iter().enumerate()).map(|(row, point)| shot(site, row, point));
     // Makes the folder and an empty file, which SQLite takes for a new database.
     finish(path, create(path)?)?;
-    fill(path, site, points).in_file(path)?;
+    let contents = Contents::of(site, points);
+    fill(path, &contents, shots()).in_file(path)?;
     open(path)?
         .sync_all()
         .map_err(IoFault::on("write"))
         .in_file(path)?;
-    read_back(path, site, points).in_file(path)?;
+    read_back(path, shots()).in_file(path)?;
     Ok(points.len() as u64)
 }
 
@@ -97,18 +120,17 @@ fn refused(error: rusqlite::Error) -> Failure {
     }
 }
 
-fn fill(path: &Path, site: &SiteProducts, points: &[[f64; 2]]) -> Result<()> {
+fn fill(path: &Path, contents: &Contents, shots: impl Iterator<Item = Shot>) -> Result<()> {
     let database = Connection::open(path).map_err(refused)?;
     database.execute_batch(LAYOUT).map_err(refused)?;
-    describe(&database, site, points).map_err(refused)?;
+    describe(&database, contents).map_err(refused)?;
     let mut insert = database
         .prepare(
             "INSERT INTO footprints (geom, et_s, utc, orbit, source_file, record, shot, radius_m, \
              radius_crossover_m, topography_m, range_m, windows) VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
         )
         .map_err(refused)?;
-    for (row, point) in points.iter().enumerate() {
-        let shot = shot(site, row, point);
+    for shot in shots {
         insert
             .execute(params![
                 shot.geometry,
@@ -131,13 +153,8 @@ fn fill(path: &Path, site: &SiteProducts, points: &[[f64; 2]]) -> Result<()> {
     database.close().map_err(|(_, error)| refused(error))
 }
 
-/// Fills the tables of contents. The time of the last change is that of the newest shot, as a clock would
-/// give other bytes each time.
-fn describe(
-    database: &Connection,
-    site: &SiteProducts,
-    points: &[[f64; 2]],
-) -> rusqlite::Result<()> {
+/// Fills the tables of contents.
+fn describe(database: &Connection, contents: &Contents) -> rusqlite::Result<()> {
     let systems = "INSERT INTO gpkg_spatial_ref_sys VALUES (?, ?, ?, ?, ?, ?)";
     for (name, id, organization, definition, description) in [
         ("Undefined Cartesian SRS", -1, "NONE", "undefined", ""),
@@ -148,15 +165,13 @@ fn describe(
         let row = params![name, id, organization, id, definition, description];
         database.execute(systems, row)?;
     }
-    let newest = site.utc.iter().max().map_or("", String::as_str);
-    let [west, east] = ends(points.iter().map(|point| point[0]));
-    let [south, north] = ends(points.iter().map(|point| point[1]));
+    let ([west, east], [south, north]) = (contents.longitude_deg, contents.latitude_deg);
     database.execute(
         "INSERT INTO gpkg_contents VALUES ('footprints', 'features', ?, ?, ?, ?, ?, ?, ?, ?)",
         params![
-            site.config.site,
+            contents.site,
             POINT_Z_HEIGHT,
-            format!("{newest}Z"),
+            contents.last_change,
             west,
             south,
             east,
@@ -212,7 +227,7 @@ fn geometry([longitude_deg, latitude_deg]: &[f64; 2], height_m: f64) -> Vec<u8> 
     bytes
 }
 
-fn read_back(path: &Path, site: &SiteProducts, points: &[[f64; 2]]) -> Result<()> {
+fn read_back(path: &Path, shots: impl Iterator<Item = Shot>) -> Result<()> {
     let unreadable = |error: rusqlite::Error| Failure::from(ProductFault::unreadable(error));
     let database =
         Connection::open_with_flags(path, OpenFlags::SQLITE_OPEN_READ_ONLY).map_err(unreadable)?;
@@ -223,20 +238,16 @@ fn read_back(path: &Path, site: &SiteProducts, points: &[[f64; 2]]) -> Result<()
         )
         .map_err(unreadable)?;
     let mut found = select.query_map([], from_row).map_err(unreadable)?;
-    for (row, point) in points.iter().enumerate() {
-        let expected = shot(site, row, point);
+    let differs = |what: String| Err(ProductFault::ReadBack { what }.into());
+    let mut rows = 0;
+    for expected in shots {
+        rows += 1;
         if found.next().transpose().map_err(unreadable)? != Some(expected) {
-            return Err(ProductFault::ReadBack {
-                what: format!("footprint {}", row + 1),
-            }
-            .into());
+            return differs(format!("footprint {rows}"));
         }
     }
     if found.next().is_some() {
-        return Err(ProductFault::ReadBack {
-            what: format!("more than {} footprints", points.len()),
-        }
-        .into());
+        return differs(format!("more than {rows} footprints"));
     }
     Ok(())
 }
@@ -256,4 +267,67 @@ fn from_row(row: &Row) -> rusqlite::Result<Shot> {
         range_m: row.get(10)?,
         windows: row.get(11)?,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn shots() -> impl Iterator<Item = Shot> {
+        [1_u8, 2].into_iter().map(|shot| Shot {
+            geometry: geometry(&[175.3, -14.6], -1_950.25),
+            et_s: 2.0_f64.sqrt(),
+            utc: "1999-08-24T14:12:13.000".to_owned(),
+            orbit: 9019,
+            source_file: "a 'b'.b".to_owned(),
+            record: 11,
+            shot,
+            radius_m: 3_394_000.12,
+            radius_crossover_m: 3_394_001.37,
+            topography_m: -1_498.63,
+            range_m: 380_000.1,
+            windows: String::new(),
+        })
+    }
+
+    #[test]
+    fn a_changed_row_is_noticed() {
+        let folder = tempfile::tempdir().unwrap();
+        let contents = Contents {
+            site: "a".to_owned(),
+            last_change: "1999-08-24T14:12:13.000Z".to_owned(),
+            longitude_deg: [175.3; 2],
+            latitude_deg: [-14.6; 2],
+        };
+        for (number, (change, complaint)) in [
+            (
+                "UPDATE footprints SET et_s = 1.414213562373095 WHERE fid = 2",
+                "footprint 2",
+            ),
+            ("DELETE FROM footprints WHERE fid = 1", "footprint 1"),
+            ("DELETE FROM footprints WHERE fid = 2", "footprint 2"),
+            (
+                "UPDATE footprints SET geom = substr(geom, 1, 30) WHERE fid = 1",
+                "footprint 1",
+            ),
+        ]
+        .into_iter()
+        .enumerate()
+        {
+            let path = folder.path().join(format!("{number}.gpkg"));
+            fill(&path, &contents, shots()).unwrap();
+            read_back(&path, shots()).unwrap();
+            let longer = read_back(&path, shots().take(1)).unwrap_err();
+            assert!(longer.fault.to_string().ends_with("more than 1 footprints"));
+            Connection::open(&path)
+                .unwrap()
+                .execute(change, [])
+                .unwrap();
+            let failure = read_back(&path, shots()).unwrap_err();
+            assert_eq!(
+                failure.fault.to_string(),
+                format!("read back differently: {complaint}")
+            );
+        }
+    }
 }

@@ -1,8 +1,7 @@
 //! Footprints as a shapefile of three-dimensional points, as made from `pedr2tab` tables.
 
 use std::{
-    fs::File,
-    io::{BufReader, BufWriter, Seek as _, SeekFrom, Write},
+    io::{BufReader, Seek as _, SeekFrom, Write},
     path::Path,
 };
 
@@ -70,13 +69,15 @@ impl WritableRecord for Attributes {
 /// # Errors
 /// What the disk or the encoder refuses; records that come back different.
 pub(super) fn write(path: &Path, site: &SiteProducts, points: &[[f64; 2]]) -> Result<u64> {
-    write_points(path, site, points)?;
+    let shapes = || (points.iter().enumerate()).map(|(row, at)| point(site, row, at));
+    let records = || (0..points.len()).map(|row| attributes(site, row));
+    write_points(path, shapes())?;
     let table = path.with_extension("dbf");
-    write_attributes(&table, site, points)?;
+    write_attributes(&table, text_widths(site), newest_day(site), records())?;
     write_text(&path.with_extension("prj"), CRS_WKT)?;
     write_text(&path.with_extension("cpg"), "UTF-8")?;
-    read_points(path, site, points).in_file(path)?;
-    read_attributes(&table, site, points).in_file(&table)?;
+    read_points(path, shapes()).in_file(path)?;
+    read_attributes(&table, records()).in_file(&table)?;
     Ok(points.len() as u64)
 }
 
@@ -115,15 +116,12 @@ fn refused(error: shapefile::Error) -> Failure {
     }
 }
 
-fn write_points(path: &Path, site: &SiteProducts, points: &[[f64; 2]]) -> Result<()> {
+fn write_points(path: &Path, points: impl Iterator<Item = PointZ>) -> Result<()> {
     let index = path.with_extension("shx");
     let (mut shp, mut shx) = (create(path)?, create(&index)?);
     let mut writer = ShapeWriter::with_shx(&mut shp, &mut shx);
-    for (row, at) in points.iter().enumerate() {
-        writer
-            .write_shape(&point(site, row, at))
-            .map_err(refused)
-            .in_file(path)?;
+    for point in points {
+        writer.write_shape(&point).map_err(refused).in_file(path)?;
     }
     writer.finalize().map_err(refused).in_file(path)?;
     drop(writer);
@@ -131,26 +129,35 @@ fn write_points(path: &Path, site: &SiteProducts, points: &[[f64; 2]]) -> Result
     finish(&index, shx)
 }
 
-fn write_attributes(path: &Path, site: &SiteProducts, points: &[[f64; 2]]) -> Result<()> {
+/// * `widths` – bytes of each field of text
+/// * `day` – what the header holds as the date of the last change: years since 1900, month, day
+fn write_attributes(
+    path: &Path,
+    widths: [u8; TEXTS.len()],
+    day: [u8; 3],
+    records: impl Iterator<Item = Attributes>,
+) -> Result<()> {
     let mut file = create(path)?;
     let refused = |error: dbase::Error| ProductFault::refused("encode dBASE")(error);
     let mut fields = TableWriterBuilder::with_encoding(dbase::encoding::Unicode);
     for (name, width, decimals) in NUMBERS {
         fields = fields.add_numeric_field(field_name(name).in_file(path)?, width, decimals);
     }
-    for (name, width) in TEXTS.into_iter().zip(text_widths(site)) {
+    for (name, width) in TEXTS.into_iter().zip(widths) {
         fields = fields.add_character_field(field_name(name).in_file(path)?, width);
     }
     let mut writer = fields.build_with_dest(&mut file);
-    for row in 0..points.len() {
+    for record in records {
         writer
-            .write_record(&attributes(site, row))
+            .write_record(&record)
             .map_err(refused)
             .in_file(path)?;
     }
     writer.finalize().map_err(refused).in_file(path)?;
     drop(writer);
-    date_by_newest_shot(&mut file, site)
+    // The library has written today's date there.
+    file.seek(SeekFrom::Start(1))
+        .and_then(|_| file.write_all(&day))
         .map_err(IoFault::on("write"))
         .in_file(path)?;
     finish(path, file)
@@ -175,51 +182,56 @@ fn text_widths(site: &SiteProducts) -> [u8; TEXTS.len()] {
     ]
 }
 
-/// The table's header holds a date: that of the newest shot instead of today's, for the same bytes each day.
-fn date_by_newest_shot(file: &mut BufWriter<File>, site: &SiteProducts) -> std::io::Result<()> {
+/// Day of the newest shot, for the same bytes each day: years since 1900, month, day.
+fn newest_day(site: &SiteProducts) -> [u8; 3] {
     let newest = site.utc.iter().max().map_or("", String::as_str);
-    let digits = |range| newest.get(range).and_then(|text: &str| text.parse().ok());
-    let year: u16 = digits(0..4).unwrap_or(1900);
-    let [month, day] = [5..7, 8..10].map(|range| digits(range).and_then(|n| u8::try_from(n).ok()));
-    let since_1900 = u8::try_from(year.saturating_sub(1900)).unwrap_or(0);
-    file.seek(SeekFrom::Start(1))?;
-    file.write_all(&[since_1900, month.unwrap_or(1), day.unwrap_or(1)])
+    let number = |range| -> u16 {
+        let digits: Option<&str> = newest.get(range);
+        digits.and_then(|text| text.parse().ok()).unwrap_or(0)
+    };
+    [
+        number(0..4).saturating_sub(1900),
+        number(5..7),
+        number(8..10),
+    ]
+    .map(|value| u8::try_from(value).unwrap_or(u8::MAX))
 }
 
 fn differs(what: String) -> Failure {
     ProductFault::ReadBack { what }.into()
 }
 
-fn read_points(path: &Path, site: &SiteProducts, points: &[[f64; 2]]) -> Result<()> {
+fn read_points(path: &Path, points: impl Iterator<Item = PointZ>) -> Result<()> {
     let unreadable = |error: shapefile::Error| Failure::from(ProductFault::unreadable(error));
     let mut reader = ShapeReader::new(BufReader::new(open(path)?)).map_err(unreadable)?;
     let mut found = reader.iter_shapes_as::<PointZ>();
-    for (row, at) in points.iter().enumerate() {
-        let next = found.next().transpose().map_err(unreadable)?;
-        if next != Some(point(site, row, at)) {
-            return Err(differs(format!("point {}", row + 1)));
+    let mut rows = 0;
+    for expected in points {
+        rows += 1;
+        if found.next().transpose().map_err(unreadable)? != Some(expected) {
+            return Err(differs(format!("point {rows}")));
         }
     }
     if found.next().is_some() {
-        return Err(differs(format!("more than {} points", points.len())));
+        return Err(differs(format!("more than {rows} points")));
     }
     Ok(())
 }
 
-fn read_attributes(path: &Path, site: &SiteProducts, points: &[[f64; 2]]) -> Result<()> {
+fn read_attributes(path: &Path, records: impl Iterator<Item = Attributes>) -> Result<()> {
     let unreadable = |error: dbase::Error| Failure::from(ProductFault::unreadable(error));
-    let source = BufReader::new(open(path)?);
-    let mut reader = dbase::Reader::new(source).map_err(unreadable)?;
+    let mut reader = dbase::Reader::new(BufReader::new(open(path)?)).map_err(unreadable)?;
+    let mut found = reader.iter_records();
     let mut rows = 0;
-    for (row, record) in reader.iter_records().enumerate() {
-        let record = record.map_err(unreadable)?;
-        if row >= points.len() || !holds(&record, &attributes(site, row)) {
-            return Err(differs(format!("attributes of point {}", row + 1)));
+    for expected in records {
+        rows += 1;
+        let record = found.next().transpose().map_err(unreadable)?;
+        if !record.is_some_and(|record| holds(&record, &expected)) {
+            return Err(differs(format!("attributes of point {rows}")));
         }
-        rows = row + 1;
     }
-    if rows != points.len() {
-        return Err(differs(format!("{rows} attributes of {}", points.len())));
+    if found.next().is_some() {
+        return Err(differs(format!("attributes of more than {rows} points")));
     }
     Ok(())
 }
@@ -239,4 +251,75 @@ fn holds(record: &dbase::Record, expected: &Attributes) -> bool {
             Some(FieldValue::Character(found)) => found.as_deref().unwrap_or_default() == expected,
             _ => false,
         })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::fs;
+
+    fn records() -> impl Iterator<Item = Attributes> {
+        [1.0, 2.0].into_iter().map(|shot| Attributes {
+            numbers: [
+                -11_224_002.182_053_322,
+                9019.0,
+                11.0,
+                shot,
+                175.312_345_678_9,
+                -14.6,
+                3_394_000.12,
+                3_394_001.37,
+                -1_498.63,
+                380_000.1,
+            ],
+            texts: ["1999-08-24T14:12:13.000".to_owned(), "å.b".to_owned()],
+        })
+    }
+
+    #[test]
+    fn a_changed_attribute_is_noticed() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.dbf");
+        write_attributes(&path, [23, 5], [99, 8, 24], records()).unwrap();
+        read_attributes(&path, records()).unwrap();
+        let bytes = fs::read(&path).unwrap();
+        assert_eq!(bytes[1..4], [99, 8, 24]);
+        let longer = read_attributes(&path, records().take(1)).unwrap_err();
+        assert!(longer.fault.to_string().ends_with("more than 1 points"));
+        // The last digit that stands there of a longitude.
+        let digits = b"175.312345679";
+        let at = bytes
+            .windows(digits.len())
+            .rposition(|window| window == digits);
+        let mut changed = bytes;
+        changed[at.unwrap() + digits.len() - 1] = b'8';
+        fs::File::create(&path)
+            .unwrap()
+            .write_all(&changed)
+            .unwrap();
+        let failure = read_attributes(&path, records()).unwrap_err();
+        assert_eq!(
+            failure.fault.to_string(),
+            "read back differently: attributes of point 2"
+        );
+    }
+
+    #[test]
+    fn a_changed_point_is_noticed() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.shp");
+        let points = |z_m: f64| [0.1 + 0.2, 2.0].map(|x| PointZ::new(x, -0.0, z_m, NO_DATA));
+        write_points(&path, points(-1950.25).into_iter()).unwrap();
+        read_points(&path, points(-1950.25).into_iter()).unwrap();
+        for (expected, complaint) in [
+            (&points(-1950.0)[..], "point 1"),
+            (&points(-1950.25)[..1], "more than 1 points"),
+        ] {
+            let failure = read_points(&path, expected.iter().copied()).unwrap_err();
+            assert_eq!(
+                failure.fault.to_string(),
+                format!("read back differently: {complaint}")
+            );
+        }
+    }
 }
