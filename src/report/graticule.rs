@@ -72,7 +72,7 @@ impl View {
         }
     }
 
-    fn contains(&self, (x, y): (f64, f64)) -> bool {
+    pub(super) fn contains(&self, (x, y): (f64, f64)) -> bool {
         (self.west_m..=self.east_m).contains(&x) && (self.south_m..=self.north_m).contains(&y)
     }
 

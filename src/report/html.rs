@@ -5,6 +5,9 @@ use std::fmt::Write as _;
 /// The page has no scripts; plots take their colours from here, so that they follow light and dark.
 const STYLE: &str = include_str!("style.css");
 
+/// Letters up to which a cell stays on one line.
+const SHORT: usize = 28;
+
 /// `text` with the five characters that HTML reads as markup replaced.
 pub(super) fn escape(text: &str) -> String {
     let mut escaped = String::with_capacity(text.len());
@@ -235,7 +238,16 @@ impl Table {
             Cell::Limited(text, share) => limited(class, &text, share),
             Cell::Html(html) => format!("<{tag}{scope} class=\"{class}\">{html}</{tag}>"),
             Cell::Plain(text) => {
-                format!("<{tag}{scope} class=\"{class}\">{}</{tag}>", escape(&text))
+                // Times and names read badly when they break; sentences must.
+                let short = if text.chars().count() <= SHORT {
+                    " short"
+                } else {
+                    ""
+                };
+                format!(
+                    "<{tag}{scope} class=\"{class}{short}\">{}</{tag}>",
+                    escape(&text)
+                )
             }
         }
     }

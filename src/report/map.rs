@@ -1,11 +1,14 @@
 //! Map of windows, footprints coloured by height, and image outlines.
 
-use std::fmt::Write as _;
+use std::{
+    f64::consts::{FRAC_PI_2, TAU},
+    fmt::Write as _,
+};
 
 use plotters::{prelude::*, style::text_anchor::HPos};
 
 use super::{
-    graticule::{View, graticule},
+    graticule::{GridLine, View, graticule},
     html::paragraph,
     plots::{
         COLOURS, Canvas, Drawn, GRID, INK, Key, WIDTH, draw_text, drawn, figure_html, quoted,
@@ -35,9 +38,9 @@ const HEIGHTS: [RGBColor; 7] = [
     RGBColor(0xb0, 0x3f, 0x43),
 ];
 /// Points along the edge of a box window.
-const EDGE_POINTS: u32 = 40;
+const EDGE_POINTS: u32 = 72;
 /// Least and greatest height of the picture against its width.
-const RATIO: (f64, f64) = (0.5, 1.35);
+const RATIO: (f64, f64) = (0.5, 1.15);
 
 /// The map; empty when there is nothing to show.
 ///
@@ -265,6 +268,10 @@ impl Sheet {
         if !self.shots.is_empty() {
             let (low, high) = self.heights_m;
             let step = (high - low) / HEIGHTS.len() as f64;
+            if step < 0.5 {
+                keys.push(Key::fixed(&format!("{low:.1} to {high:.1} m"), HEIGHTS[0]));
+                return keys;
+            }
             keys.extend(HEIGHTS.iter().enumerate().map(|(place, colour)| {
                 let [from, to] = [place, place + 1].map(|edge| low + edge as f64 * step);
                 Key::fixed(&format!("{from:.0} to {to:.0} m"), *colour)
@@ -360,7 +367,7 @@ fn windows(site: &SiteProducts) -> Vec<Outline> {
                 east_rad,
                 south_rad,
                 north_rad,
-            } => vec![box_ring(*west_rad, *east_rad, *south_rad, *north_rad)],
+            } => box_rings(*west_rad, *east_rad, *south_rad, *north_rad),
             WindowShape::Polygons { polygons } => polygons
                 .iter()
                 .flatten()
@@ -379,19 +386,28 @@ fn windows(site: &SiteProducts) -> Vec<Outline> {
     rings.collect()
 }
 
-/// The edges of a box, bent as the parallels are.
-fn box_ring(west: f64, east: f64, south: f64, north: f64) -> Vec<(f64, f64)> {
-    let east = if east < west {
-        east + std::f64::consts::TAU
+/// The edges of a box, bent as the parallels are; around the whole globe they are two circles.
+fn box_rings(west: f64, east: f64, south: f64, north: f64) -> Vec<Vec<(f64, f64)>> {
+    let width = if east < west {
+        east + TAU - west
     } else {
-        east
+        east - west
     };
     let shares = (0..=EDGE_POINTS).map(|k| f64::from(k) / f64::from(EDGE_POINTS));
-    let eastwards = shares
-        .clone()
-        .map(|share| (west + share * (east - west), south));
-    let westwards = shares.map(|share| (east - share * (east - west), north));
-    eastwards.chain(westwards).collect()
+    let parallel = |latitude: f64| -> Vec<(f64, f64)> {
+        let shares = shares.clone();
+        shares
+            .map(|share| (west + share * width, latitude))
+            .collect()
+    };
+    if width > TAU - 1e-9 {
+        let circles = [south, north].into_iter();
+        // A pole is no circle.
+        let circles = circles.filter(|latitude| latitude.abs() < FRAC_PI_2 - 1e-9);
+        return circles.map(parallel).collect();
+    }
+    let northern = parallel(north).into_iter().rev();
+    vec![parallel(south).into_iter().chain(northern).collect()]
 }
 
 #[cfg(test)]
@@ -407,8 +423,14 @@ mod tests {
 
     #[test]
     fn a_box_across_the_prime_meridian_stays_narrow() {
-        let ring = box_ring(6.2, 0.1, -0.1, 0.1);
-        let (first, last) = (ring[0].0, ring[EDGE_POINTS as usize].0);
+        let rings = box_rings(6.2, 0.1, -0.1, 0.1);
+        let (first, last) = (rings[0][0].0, rings[0][EDGE_POINTS as usize].0);
         assert!(last > first && last - first < 0.2);
+    }
+
+    #[test]
+    fn a_cap_around_a_pole_has_one_edge() {
+        assert_eq!(box_rings(0.0, TAU, 1.4, FRAC_PI_2).len(), 1);
+        assert_eq!(box_rings(0.0, TAU, -0.2, 0.2).len(), 2);
     }
 }

@@ -247,7 +247,7 @@ fn profile_plot(site: &SiteProducts, group: std::ops::Range<usize>, limit: usize
         .iter()
         .any(|limit| panel.y.low < *limit && *limit < panel.y.high);
     let mut angle_panel = Panel::of("off nadir, deg", angles);
-    angle_panel.height = 170;
+    angle_panel.height = 190;
     angle_panel.y = Extent {
         low: angle_panel.y.low.max(0.0),
         ..angle_panel.y

@@ -28,7 +28,7 @@ use areograph::{
         },
         tag_times::{ImageTimes, StartFrom},
     },
-    time::Et,
+    time::{Et, Interval, Intervals},
 };
 
 /// Shots of the profile; one in ten seconds lies on either side of the antimeridian.
@@ -63,14 +63,20 @@ impl Site {
         let footprints = footprints();
         let profiles = group_profiles(&footprints, &config.windows, std::slice::from_ref(&times));
         Self {
-            kernels: vec![KernelLine {
-                name: "naif0012.tls".to_owned(),
-                role: "LSK".to_owned(),
-                bytes: 5257,
-                blake3: "ab".repeat(32),
-                held: None,
-            }],
-            wanted: Wanted::default(),
+            kernels: vec![
+                kernel("naif0012.tls", "LSK", None),
+                kernel("nav.bsp", "SPK", Some(vec![seconds(-4e4, 4e4)])),
+                // A gap of two seconds in what the image asks.
+                kernel(
+                    "sc.bc",
+                    "CK",
+                    Some(vec![seconds(-900.0, 1.0), seconds(3.0, 900.0)]),
+                ),
+            ],
+            wanted: Wanted {
+                positions: Intervals::union_of([seconds(-1.0, 8.0)]),
+                attitudes: Intervals::union_of([seconds(-2.15, 6.0)]),
+            },
             warnings: Vec::new(),
             conversions: vec![FileConversion::default()],
             model: fit_sensor_model(&orientation, &config.orientation).unwrap(),
@@ -90,6 +96,34 @@ impl Site {
             footprints,
             profiles,
         }
+    }
+
+    /// The same site with its window, shots and image around the north pole, longitudes all round.
+    #[allow(dead_code, reason = "not every test that shares this needs it")]
+    pub(crate) fn polar() -> Self {
+        let mut site = Self::small();
+        site.config.windows[0].shape = WindowShape::Box {
+            west_rad: 0.0,
+            east_rad: std::f64::consts::TAU,
+            south_rad: 1.45,
+            north_rad: std::f64::consts::FRAC_PI_2,
+        };
+        // Up to the pole along one meridian and down along the opposite one.
+        for k in 0..SHOTS {
+            let row = k as usize;
+            let from_pole_rad = 0.002 * (f64::from(k) - 29.5);
+            site.footprints.latitude_rad[row] = std::f64::consts::FRAC_PI_2 - from_pole_rad.abs();
+            site.footprints.longitude_rad[row] = if from_pole_rad < 0.0 { 1.0 } else { 4.2 };
+        }
+        site.orientation.outline = Some(
+            [0.3, 1.9, 3.4, 5.0]
+                .map(|longitude_rad| GroundPoint {
+                    longitude_rad,
+                    latitude_rad: 1.55,
+                })
+                .to_vec(),
+        );
+        site
     }
 
     /// The same site without shots and images.
@@ -124,6 +158,24 @@ impl Site {
             warnings: &self.warnings,
             conversions: &self.conversions,
         })
+    }
+}
+
+/// An interval in seconds from the first shot.
+fn seconds(start_s: f64, stop_s: f64) -> Interval {
+    Interval::new(
+        Et::from_seconds(START_S + start_s),
+        Et::from_seconds(START_S + stop_s),
+    )
+}
+
+fn kernel(name: &str, role: &str, held: Option<Vec<Interval>>) -> KernelLine {
+    KernelLine {
+        name: name.to_owned(),
+        role: role.to_owned(),
+        bytes: 5257,
+        blake3: "ab".repeat(32),
+        held: held.map(Intervals::union_of),
     }
 }
 

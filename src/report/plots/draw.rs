@@ -10,13 +10,13 @@ use super::{Extent, GRID, INK, LETTERS, MARK, Panel, Plot, Series, Style, WIDTH}
 use crate::{error::Result, products::fault::ProductFault};
 
 /// Height of the axis below the lowest panel, with its labels.
-pub(super) const FOOT: u32 = 84;
+pub(super) const FOOT: u32 = 110;
 /// Room between panels, for the labels at their corners.
 const GUTTER: u32 = 16;
 /// Width of the axes at the left side.
-const SIDE: u32 = 138;
+const SIDE: u32 = 176;
 /// Width of the bars at the right side.
-const BARS: u32 = 170;
+const BARS: u32 = 150;
 /// Number of bars over the range of a panel.
 const BAR_COUNT: usize = 24;
 
@@ -97,8 +97,8 @@ fn draw_panel<'a>(plot: &Plot, panel: &Panel, lowest: bool, area: &Canvas<'a>) -
         .configure_mesh()
         .x_desc(if lowest { plot.x_label } else { "" })
         .y_desc(panel.y_label)
-        .x_labels(7)
-        .y_labels(if panel.height < 300 { 4 } else { 7 })
+        .x_labels(6)
+        .y_labels(if panel.height < 300 { 5 } else { 8 })
         .max_light_lines(0)
         .bold_line_style(GRID.stroke_width(2))
         .axis_style(INK.stroke_width(2))

@@ -72,10 +72,11 @@ pub(in crate::report) fn figure_html(
     let svg = svg.find("viewBox").map_or_else(
         || svg.to_owned(),
         |at| {
-            format!(
-                "<svg role=\"img\" aria-labelledby=\"{id}-title {id}-words\" {}",
-                &svg[at..]
-            )
+            // What every element says of itself although it is the rule.
+            let drawing = svg[at..]
+                .replace(" opacity=\"1\"", "")
+                .replace(" stroke=\"none\" stroke-width=\"1\"", "");
+            format!("<svg role=\"img\" aria-labelledby=\"{id}-title {id}-words\" {drawing}")
         },
     );
     format!(

@@ -15,7 +15,7 @@ use crate::error::Result;
 /// Width of a plot in its own units; pages show about half as many pixels, so that lines stay fine.
 pub(super) const WIDTH: u32 = 1040;
 /// Size of letters in the same units.
-pub(super) const LETTERS: u32 = 25;
+pub(super) const LETTERS: u32 = 34;
 
 /// Colours that stay apart for most colour-blind readers, after Okabe and Ito 2008, dark enough for
 /// white paper; the page's style maps them, and the three below, for dark screens.
@@ -156,7 +156,7 @@ impl Plot {
                 let name = format!("{},{}", quoted(panel.y_label), quoted(&series.label));
                 for (x, y) in &series.points {
                     // Writing to a string cannot fail.
-                    let _ = writeln!(csv, "{name},{x},{y}");
+                    let _ = writeln!(csv, "{name},{},{}", rounded(*x), rounded(*y));
                 }
             }
         }
@@ -177,6 +177,11 @@ impl Plot {
         }
         keys
     }
+}
+
+/// `value` to eight digits, more than a plot can show.
+fn rounded(value: f64) -> f64 {
+    format!("{value:.7e}").parse().unwrap_or(value)
 }
 
 /// A field of a CSV file.

@@ -1,0 +1,64 @@
+// Opens pages in headless Chromium; see scripts/look.
+const fs = require('fs');
+const path = require('path');
+const { chromium } = require('playwright-core');
+
+const [pictures, ...pages] = process.argv.slice(2);
+const axe = fs.readFileSync(require.resolve('axe-core/axe.min.js'), 'utf8');
+const views = [
+  { name: 'phone', width: 360, scheme: 'light' },
+  { name: 'tablet', width: 800, scheme: 'dark' },
+  { name: 'desktop', width: 1440, scheme: 'light' },
+];
+
+async function look(browser, file, view) {
+  const context = await browser.newContext({
+    viewport: { width: view.width, height: 900 },
+    colorScheme: view.scheme,
+    bypassCSP: true,
+  });
+  const page = await context.newPage();
+  const problems = [];
+  page.on('console', (message) => {
+    if (message.type() === 'error') problems.push(`console: ${message.text()}`);
+  });
+  page.on('pageerror', (error) => problems.push(`error: ${error.message}`));
+  page.on('request', (request) => {
+    if (!/^(file|data):/.test(request.url())) problems.push(`asks for ${request.url()}`);
+  });
+  await page.goto('file://' + path.resolve(file));
+  const wide = await page.evaluate(() => document.documentElement.scrollWidth);
+  if (wide > view.width) problems.push(`scrolls sideways: ${wide} of ${view.width} pixels`);
+  const name = path.resolve(file).split(path.sep).slice(-3).join('-').replace(/\.html$/, '');
+  await page.screenshot({ path: path.join(pictures, `${name}-${view.name}.png`), fullPage: true });
+  await page.addScriptTag({ content: axe });
+  const { violations } = await page.evaluate(() => axe.run());
+  for (const { impact, id, help, nodes } of violations) {
+    const text = `axe ${impact}: ${id}, ${help} (${nodes.length} times, first ${nodes[0].html.slice(0, 120)})`;
+    if (impact === 'serious' || impact === 'critical') problems.push(text);
+    else console.log(`look: note: ${file}: ${text}`);
+  }
+  await context.close();
+  return problems;
+}
+
+(async () => {
+  fs.mkdirSync(pictures, { recursive: true });
+  const browser = await chromium.launch({
+    executablePath: '/usr/bin/chromium',
+    args: ['--no-sandbox', '--disable-gpu', '--disable-quic', '--no-first-run',
+      '--disable-background-networking', '--disable-component-update', '--disable-sync'],
+  });
+  let failed = false;
+  for (const file of pages) {
+    for (const view of views) {
+      for (const problem of await look(browser, file, view)) {
+        failed = true;
+        console.error(`look: ${file} (${view.name}): ${problem}`);
+      }
+    }
+  }
+  await browser.close();
+  console.log(`look: ${pages.length} pages at ${views.length} widths, pictures in ${pictures}`);
+  process.exit(failed ? 1 : 0);
+})();

@@ -1,0 +1,168 @@
+//! The report page of a small site: what its first lines say, and that nothing in it is lost or leaks.
+
+#![allow(clippy::unwrap_used, reason = "helpers of tests may fail loudly")]
+
+#[path = "products_site/fixture.rs"]
+mod fixture;
+
+use std::{collections::BTreeSet, fs, path::Path};
+
+use areograph::report;
+use fixture::{SHOTS, Site};
+
+/// The page, also left below `target`, where a person may look at it.
+fn page(name: &str, site: &Site, image: bool) -> String {
+    let page = site.with(image, report::page).unwrap();
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("report_page");
+    fs::create_dir_all(&folder).unwrap();
+    fs::write(folder.join(format!("{name}.html")), &page).unwrap();
+    page
+}
+
+/// What stands between `start` and the next `end` after each `start`.
+fn between<'a>(text: &'a str, start: &'a str, end: char) -> impl Iterator<Item = &'a str> {
+    text.split(start)
+        .skip(1)
+        .map(move |rest| rest.split(end).next().unwrap())
+}
+
+#[test]
+fn a_failed_range_check_is_said_in_the_first_lines() {
+    let mut site = Site::small();
+    site.ranges.profiles[0].range_minus_distance_m.mean = 11.0;
+    let page = page("small", &site, true);
+    let lead = page.split("<nav").next().unwrap();
+    assert!(lead.contains("class=\"verdict invalid\""));
+    assert!(lead.contains("<strong>Invalid, for one reason:</strong>"));
+    assert!(lead.contains("<li>profile antimeridian/9019: mean of range − distance 11.000 m"));
+    assert!(lead.contains("input that was read around: ap19019l.b record 4"));
+    assert!(page.contains("beyond the limit"));
+}
+
+#[test]
+fn what_came_from_files_stays_text() {
+    let page = page("escaped", &Site::small(), true);
+    assert!(page.contains("One orbit &amp; one image &lt;made by hand&gt;"));
+    assert!(page.contains("record 4: &lt;script&gt;alert(1)&lt;/script&gt; &amp; more"));
+    assert!(page.contains("class 0 &lt;cloud&gt;"));
+    assert!(!page.contains("<script"));
+    // The table of files says what is loaded; the notes do not say it again.
+    assert!(page.contains(">naif0012.tls</th>") && !page.contains("listed by"));
+    assert!(page.contains("<li>ap19019l.b: in IAU 2000 already"));
+}
+
+#[test]
+fn nothing_is_fetched_and_every_plot_is_told_in_words_and_numbers() {
+    let page = page("alone", &Site::small(), true);
+    for outside in [
+        "src=",
+        "url(",
+        "@import",
+        "<iframe",
+        "<link rel=\"stylesheet\"",
+    ] {
+        assert!(!page.contains(outside), "{outside}");
+    }
+    for target in between(&page, "href=\"", '"') {
+        let inside = target.starts_with('#') || target.starts_with("data:");
+        assert!(inside, "{target:.60}");
+    }
+    let ids: Vec<&str> = between(&page, " id=\"", '"').collect();
+    let unique: BTreeSet<&str> = ids.iter().copied().collect();
+    assert_eq!(ids.len(), unique.len(), "names inside the page are unique");
+    for named in between(&page, "aria-labelledby=\"", '"') {
+        for id in named.split(' ') {
+            assert!(unique.contains(id), "{id}");
+        }
+    }
+    for anchor in between(&page, "href=\"#", '"') {
+        assert!(unique.contains(anchor), "{anchor}");
+    }
+    // Residuals, scan, image, map and the kernels of one stretch of time.
+    assert_eq!(page.matches("<svg").count(), 5);
+    assert_eq!(page.matches("<svg role=\"img\"").count(), 5);
+    assert_eq!(page.matches("href=\"data:text/csv").count(), 5);
+    // Every shot is in the data of the residuals, once as residual and once as angle.
+    let name = "download=\"range-distance-along-antimeridian-9019.csv\" href=\"";
+    let residuals = between(&page, name, '"').next().unwrap();
+    let lines = residuals.matches("%0A").count();
+    let trend_ends = 2;
+    assert_eq!(lines, 1 + 2 * SHOTS as usize + trend_ends);
+}
+
+#[test]
+fn a_gap_in_attitude_is_seen_and_measured() {
+    let page = page("gap", &Site::small(), true);
+    let picture = page.split("<figure id=\"kernels-at-").nth(1).unwrap();
+    let caption = between(picture, "<figcaption>", '\n').next().unwrap();
+    assert!(
+        caption.contains("1 gaps in what is asked, the first 2.000 s long"),
+        "{caption:.300}"
+    );
+    // One red bar for the gap; the swatch of its key is not part of the picture.
+    let svg = picture.split("</svg>").next().unwrap();
+    assert_eq!(svg.matches("fill=\"#B3261E\"").count(), 1);
+}
+
+#[test]
+fn many_profiles_share_plots_and_the_page_stays_small() {
+    let mut site = Site::small();
+    let (profile, ranges) = (site.profiles[0].clone(), site.ranges.profiles[0].clone());
+    let shots = site.ranges.shots.clone();
+    for copy in 1..300_u32 {
+        let mut profile = profile.clone();
+        profile.id = format!("antimeridian/{}", 9019 + copy);
+        let mut ranges = ranges.clone();
+        ranges.profile.clone_from(&profile.id);
+        site.profiles.push(profile);
+        site.ranges.profiles.push(ranges);
+        let all = &mut site.ranges.shots;
+        all.profile.extend(shots.profile.iter().map(|_| copy));
+        all.row.extend(&shots.row);
+        all.range_minus_distance_m
+            .extend(&shots.range_minus_distance_m);
+        all.range_minus_distance_crossover_m
+            .extend(&shots.range_minus_distance_crossover_m);
+        all.decoding_m.extend(&shots.decoding_m);
+        all.spacecraft_radial_m.extend(&shots.spacecraft_radial_m);
+        all.spacecraft_along_m.extend(&shots.spacecraft_along_m);
+        all.spacecraft_cross_m.extend(&shots.spacecraft_cross_m);
+        all.outlier.extend(&shots.outlier);
+    }
+    let page = page("many", &site, false);
+    // 300 / 12 plots of residuals and of scans, one map, one stretch of kernels.
+    assert_eq!(page.matches("<svg").count(), 25 + 25 + 1 + 1);
+    assert!(page.len() < 3_000_000, "{} bytes", page.len());
+}
+
+#[test]
+fn maps_work_at_the_pole_and_across_the_antimeridian() {
+    for (name, site, longitude) in [
+        ("antimeridian", Site::small(), "180° E"),
+        ("polar", Site::polar(), "270° E"),
+    ] {
+        let page = page(name, &site, true);
+        let map = page
+            .split("<figure id=\"windows-footprints-and-images\"")
+            .nth(1)
+            .unwrap();
+        let svg = map.split("</svg>").next().unwrap();
+        assert!(svg.contains(longitude), "{name}");
+        // All shots are on the sheet: dots whose centre lies inside the picture.
+        let width = between(svg, "viewBox=\"0 0 ", ' ').next().unwrap();
+        let width: f64 = width.parse().unwrap();
+        let centres: Vec<f64> = between(svg, "<circle cx=\"", '"')
+            .map(|x| x.parse().unwrap())
+            .collect();
+        assert_eq!(centres.len(), SHOTS as usize, "{name}");
+        assert!(centres.iter().all(|x| (0.0..=width).contains(x)), "{name}");
+    }
+}
+
+#[test]
+fn a_site_without_shots_and_images_has_a_page_too() {
+    let page = page("empty", &Site::empty(), false);
+    assert!(page.contains("Invalid, for one reason:"));
+    assert!(page.contains("no footprint in any window"));
+    assert_eq!(page.matches("<svg").count(), 2); // the window and the kernels
+}
