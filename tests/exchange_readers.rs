@@ -370,12 +370,13 @@ fn the_kernel_report_keeps_its_schema_with_qualities_and_gaps() {
     let schema = jsonschema::validator_for(&json(Path::new(&path))).unwrap();
     let mut site = Site::small();
     let held = [[START_S - 100.0, START_S], [START_S + 1.0, START_S + 100.0]];
-    site.kernels.extend([
+    site.kernels = vec![
+        kernel("naif0012.tls", "LSK", None),
         kernel("mocAddendum004.ti", "IK", None),
         kernel("de421.bsp", "SPK", Some(&[])),
         kernel("mgs_map2.bsp", "SPK", Some(&held[..1])),
         kernel("mgs_sc_map2.bc", "CK", Some(&held)),
-    ]);
+    ];
     let report = |site: &Site| json(&written(site, true).path().join("exchange/kernels.json"));
     let found = report(&site);
     assert!(schema.is_valid(&found), "{found}");

@@ -154,7 +154,7 @@ fn every_product_is_there_with_its_rows() {
         ("exchange/footprints.dbf", 0),
         ("exchange/footprints.prj", 0),
         ("exchange/footprints.cpg", 0),
-        ("exchange/kernels.json", 1),
+        ("exchange/kernels.json", 3),
         ("exchange/README.txt", 0),
         ("exchange/stac_item.json", 0),
     ];
@@ -437,7 +437,7 @@ fn an_empty_site_has_empty_products() {
             ("ranges.parquet", 0),
             ("ranges.json", 0),
             ("report/index.html", 0),
-            ("exchange/kernels.json", 1),
+            ("exchange/kernels.json", 3),
             ("exchange/README.txt", 0),
         ]
     );
