@@ -238,8 +238,10 @@ fn a_folder_in_use_is_left_alone() {
         found.contains("another run is at work in this folder"),
         "{found}"
     );
-    drop(lock);
-    assert!(case.outcome(case.run()).starts_with("exit 0"));
+    // Closing would not do: a process that another test is starting may hold a copy of the file.
+    lock.unlock().unwrap();
+    let found = case.outcome(case.run());
+    assert!(found.starts_with("exit 0"), "{found}");
 }
 
 #[test]
@@ -279,7 +281,7 @@ fn damaged_stores_and_products_are_made_again() {
     case.write("out/case/.cache/convert_datum", b"damaged");
     case.write("out/case/footprints.csv", b"edited");
     fs::remove_file(case.path("out/case/ranges.json")).unwrap();
-    assert!(case.outcome(case.run()).contains("valid; products in"));
+    assert!(case.outcome(case.run()).contains("remarks; products in"));
     assert!(common::mission::products(&case.path("out")) == before);
 }
 

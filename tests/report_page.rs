@@ -1,6 +1,10 @@
 //! The report page of a small site: what its first lines say, and that nothing in it is lost or leaks.
 
-#![allow(clippy::unwrap_used, reason = "helpers of tests may fail loudly")]
+#![allow(
+    clippy::unwrap_used,
+    clippy::disallowed_methods,
+    reason = "helpers of tests may fail loudly and write as they like"
+)]
 
 #[path = "products_site/fixture.rs"]
 mod fixture;

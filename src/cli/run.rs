@@ -90,7 +90,7 @@ pub(super) fn run(arguments: &Arguments) -> ExitCode {
     // A run that could not even make the folder has said so already.
     let page = arguments
         .out
-        .exists()
+        .is_dir()
         .then(|| publish_sites(&arguments.out));
     match &page {
         Some(Ok(page)) if !arguments.json && outcomes.len() > 1 => {

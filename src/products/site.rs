@@ -106,7 +106,7 @@ impl SiteProducts<'_> {
             [] => {}
             [only] => remarks.push(format!("input that was read around: {only}")),
             [first, rest @ ..] => remarks.push(format!(
-                "input that was read around: {first}; and {} more complaints",
+                "input that was read around: {first} (and {} more)",
                 rest.len()
             )),
         }

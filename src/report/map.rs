@@ -217,25 +217,38 @@ impl Sheet {
         }
         let frame = [(0, 0), (WIDTH as i32 - 1, self.height() as i32 - 1)];
         area.draw(&Rectangle::new(frame, INK.stroke_width(2)))?;
-        // Parallels are named where they are farthest left, meridians where they are lowest.
-        for line in &lines {
-            let ends = line
-                .segments
-                .iter()
-                .flatten()
-                .map(|place| self.pixel(*place));
-            if line.is_parallel {
-                if let Some((_, y)) = ends.min_by_key(|(x, _)| *x) {
-                    let y = y.clamp(20, self.height() as i32 - 70);
-                    draw_text(area, &line.name, (10, y - 16), HPos::Left)?;
-                }
-            } else if let Some((x, _)) = ends.max_by_key(|(_, y)| *y) {
-                let x = x.clamp(60, WIDTH as i32 - 70);
-                let y = self.height() as i32 - 20;
-                draw_text(area, &line.name, (x + 6, y), HPos::Left)?;
-            }
-        }
-        Ok(())
+        lines.iter().try_for_each(|line| self.draw_name(line, area))
+    }
+
+    /// Names a parallel where it is farthest left, a meridian where it is lowest or, when meridians run
+    /// together in a pole, where it leaves the sheet.
+    fn draw_name<'a>(&self, line: &GridLine, area: &Canvas<'a>) -> Drawn<'a> {
+        let (width, height) = (WIDTH as i32, self.height() as i32);
+        let ends = || {
+            let places = line.segments.iter().flatten();
+            places.map(|place| self.pixel(*place))
+        };
+        let at = if line.is_parallel {
+            ends().min_by_key(|(x, _)| *x).map(|(_, y)| (10, y - 18))
+        } else if self.pole() {
+            ends().max_by_key(|(x, y)| (x - width / 2).pow(2) + (y - height / 2).pow(2))
+        } else {
+            ends()
+                .max_by_key(|(_, y)| *y)
+                .map(|(x, _)| (x + 6, height - 22))
+        };
+        at.map_or(Ok(()), |(x, y)| {
+            let at = (x.clamp(10, width - 120), y.clamp(22, height - 22));
+            draw_text(area, &line.name, at, HPos::Left)
+        })
+    }
+
+    /// Whether a pole lies on the sheet.
+    fn pole(&self) -> bool {
+        [FRAC_PI_2, -FRAC_PI_2].into_iter().any(|pole| {
+            let place = self.map.project(0.0, pole);
+            place.is_some_and(|place| self.view.contains(place))
+        })
     }
 
     /// A bar of a round length at the upper right.

@@ -3,6 +3,18 @@
 //! One HTML file without scripts or outside parts, for light and dark screens, phones and paper.
 //! Every plot is told in words and carries its numbers; everything that came from files is escaped.
 
+#![allow(
+    clippy::format_push_string,
+    clippy::format_collect,
+    reason = "pages are put together once from small pieces"
+)]
+#![allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_possible_wrap,
+    clippy::cast_sign_loss,
+    reason = "pixels, bars and grid lines are small numbers, and casts of floats saturate"
+)]
+
 mod graticule;
 mod html;
 mod images;

@@ -56,7 +56,7 @@ fn stretches(site: &SiteProducts) -> Vec<Interval> {
     let asked = [&site.wanted.positions, &site.wanted.attitudes];
     let wide = asked
         .into_iter()
-        .flat_map(|intervals| intervals.as_slice())
+        .flat_map(Intervals::as_slice)
         .map(|interval| interval.padded(0.5 * APART_S));
     let merged = Intervals::union_of(wide);
     let stretches = merged.as_slice().iter().map(|interval| {
@@ -225,7 +225,7 @@ fn table(site: &SiteProducts) -> String {
     {
         let intervals = held(kernel);
         let span = Interval::new(intervals[0].start, intervals[intervals.len() - 1].stop);
-        let held_s: f64 = intervals.iter().map(|interval| interval.duration_s()).sum();
+        let held_s: f64 = intervals.iter().copied().map(Interval::duration_s).sum();
         let asked = match &*kernel.role {
             "CK" => &site.wanted.attitudes,
             _ => &site.wanted.positions,

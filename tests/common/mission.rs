@@ -76,5 +76,7 @@ pub(crate) fn products(folder: &Path) -> std::collections::BTreeMap<PathBuf, Vec
     }
     let mut found = std::collections::BTreeMap::new();
     walk(folder, folder, &mut found);
+    // The page over all sites shows the manifests' times of day.
+    found.remove(Path::new("index.html"));
     found
 }
