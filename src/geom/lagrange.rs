@@ -54,7 +54,7 @@ mod tests {
     fn polynomials_come_back_to_the_degree_that_the_nodes_hold() {
         for (at, degree) in [
             (5.3, 7),
-            (3.0, 7),
+            (3.4, 7),
             (2.5, 5),
             (8.7, 5),
             (1.5, 3),
