@@ -3,7 +3,11 @@
 //! A cause is a [`Fault`]: it knows its [`Kind`] (hence the exit code) and what to do about it.
 //! [`Failure`] carries it upwards and collects site, stage and file on the way.
 
-use std::{fmt, path::PathBuf};
+use std::{
+    fmt,
+    path::PathBuf,
+    sync::atomic::{AtomicBool, Ordering},
+};
 
 /// Kinds of failure; each is an exit code of the program.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -194,6 +198,35 @@ impl Fault for IoFault {
             _ => "check the file and the disk, then run again",
         }
         .to_owned()
+    }
+}
+
+/// The user stopped the program, and the stage at work gave up.
+#[derive(Debug, thiserror::Error)]
+#[error("stopped before its end")]
+pub struct Stopped;
+
+impl Stopped {
+    /// For long loops, before each part of their work.
+    ///
+    /// # Errors
+    /// This fault, once `stop` is set.
+    pub fn check(stop: &AtomicBool) -> std::result::Result<(), Self> {
+        if stop.load(Ordering::Relaxed) {
+            Err(Self)
+        } else {
+            Ok(())
+        }
+    }
+}
+
+impl Fault for Stopped {
+    fn kind(&self) -> Kind {
+        Kind::Interrupted
+    }
+
+    fn advice(&self) -> String {
+        "run again: finished stages are kept".to_owned()
     }
 }
 

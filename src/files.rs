@@ -25,3 +25,9 @@ pub fn file_name(path: &Path) -> String {
     let name = path.file_name().unwrap_or(path.as_os_str());
     name.to_string_lossy().into_owned()
 }
+
+/// The first digits of a hash: enough for people to tell files apart.
+#[must_use]
+pub fn short_hash(blake3: &str) -> String {
+    blake3.chars().take(12).collect()
+}

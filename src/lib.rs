@@ -6,6 +6,7 @@
 pub mod cli;
 pub mod config;
 pub mod constants;
+pub mod difference;
 pub mod error;
 pub mod files;
 pub mod flow;

@@ -205,6 +205,27 @@ impl Intervals {
         gaps
     }
 
+    /// The instants that this set holds and `other` does not.
+    #[must_use]
+    pub fn without(&self, other: &Self) -> Self {
+        Self::union_of(self.0.iter().flat_map(|own| other.gaps_in(*own)))
+    }
+
+    /// The same instants, `seconds` later.
+    #[must_use]
+    pub fn shifted(&self, seconds: f64) -> Self {
+        Self(self.0.iter().map(|one| one.shifted(seconds)).collect())
+    }
+
+    /// How much time it is in all, seconds.
+    #[must_use]
+    pub fn duration_s(&self) -> f64 {
+        // An empty sum of floats would be −0.
+        self.0
+            .iter()
+            .fold(0.0, |sum, interval| sum + interval.duration_s())
+    }
+
     /// The instants that both sets hold.
     #[must_use]
     pub fn intersection(&self, other: &Self) -> Self {
@@ -245,6 +266,18 @@ mod tests {
         );
         assert!(held.cover(interval(4.0, 7.0)) && !held.cover(interval(1.5, 4.5)));
         assert!(held.gaps_in(interval(4.5, 6.5)).is_empty());
+    }
+
+    #[test]
+    fn without_keeps_what_the_other_does_not_hold() {
+        let own = Intervals::union_of([interval(0.0, 10.0), interval(20.0, 30.0)]);
+        let other = Intervals::union_of([interval(2.0, 3.0), interval(8.0, 25.0)]);
+        let left = own.without(&other);
+        let expected = [interval(0.0, 2.0), interval(3.0, 8.0), interval(25.0, 30.0)];
+        assert_eq!(left.as_slice(), expected);
+        assert!((left.duration_s() - 12.0).abs() < 1e-12); // rounding of small numbers
+        assert_eq!(own.without(&Intervals::default()), own);
+        assert_eq!(own.shifted(1.0).as_slice()[0], interval(1.0, 11.0));
     }
 
     #[test]

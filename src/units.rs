@@ -33,6 +33,23 @@ pub fn wrap_pi(angle_rad: f64) -> f64 {
     wrap_two_pi(angle_rad + std::f64::consts::PI) - std::f64::consts::PI
 }
 
+/// Steps in longitude this close to half or a whole turn, radians, count as such (3 µm on the ground).
+const TURN_TOLERANCE_RAD: f64 = 1e-12;
+
+/// A step in longitude as written, radians, or the shorter way when it is longer than half a turn.
+///
+/// A whole turn stays: polar caps are written with an edge from −180° to 180°.
+#[must_use]
+pub fn longitude_step_rad(written_rad: f64) -> f64 {
+    let (half, whole) = (std::f64::consts::PI, std::f64::consts::TAU);
+    let length = written_rad.abs();
+    if length <= half + TURN_TOLERANCE_RAD || (length - whole).abs() <= TURN_TOLERANCE_RAD {
+        written_rad
+    } else {
+        wrap_pi(written_rad)
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

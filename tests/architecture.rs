@@ -26,19 +26,22 @@ const FLOORS: [&[&str]; 6] = [
     &["geom"],
     &["spice", "pds", "scene"],
     &["stages"],
-    &["flow", "report", "products", "store"],
+    &["flow", "report", "difference", "products", "store"],
     &["cli"],
 ];
 
 /// Arrows inside a floor that are meant: the scene is written with the fence and the PEDR writer,
-/// the flow publishes, and the report tells of the products.
-const SAME_FLOOR: [(&str, &str); 6] = [
+/// the flow publishes, the difference reads what was published, and the report tells of both.
+const SAME_FLOOR: [(&str, &str); 9] = [
     ("scene", "spice"),
     ("scene", "pds"),
     ("flow", "products"),
     ("flow", "store"),
     ("flow", "report"),
+    ("difference", "products"),
+    ("difference", "store"),
     ("report", "products"),
+    ("report", "difference"),
 ];
 
 fn floor(room: &str) -> usize {

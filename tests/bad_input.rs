@@ -17,8 +17,23 @@ use common::case::Case;
 
 type Spoil = fn(&Case) -> Command;
 
+/// The case with two rival sets of kernels.
+fn rivals(case: &Case) {
+    let sets = "sets = [{ id = \"nav\", metakernel = \"kernels/nav.tm\" }, \
+                { id = \"ipng\", metakernel = \"kernels/ipng.tm\" }]";
+    case.replace("site.toml", "metakernel = \"kernels/nav.tm\"", sets);
+}
+
+fn compare(case: &Case, arguments: &[&str]) -> Command {
+    let mut command = case.areograph();
+    command
+        .args(["--quiet", "kernels", "compare"])
+        .args(arguments);
+    command
+}
+
 /// Spoils one thing of a good case and says what to run.
-const CASES: [(&str, Spoil); 36] = [
+const CASES: [(&str, Spoil); 49] = [
     ("good", Case::run),
     ("site_file_missing", |case| {
         fs::remove_file(case.path("site.toml")).unwrap();
@@ -160,6 +175,42 @@ const CASES: [(&str, Spoil); 36] = [
         );
         case.run()
     }),
+    ("pedr_in_two_versions", |case| {
+        let mut bytes = case.read("pedr/ap19117l.b");
+        let label = String::from_utf8_lossy(&bytes[..7_760]).replace("2000", "1991");
+        bytes[..7_760].copy_from_slice(label.as_bytes());
+        case.write("pedr/ap19117k.b", bytes);
+        case.run()
+    }),
+    ("check_pedr_is_empty", |case| {
+        case.truncate("pedr/ap19117l.b", 0);
+        case.check()
+    }),
+    ("check_pedr_in_two_versions", |case| {
+        let mut bytes = case.read("pedr/ap19117l.b");
+        let label = String::from_utf8_lossy(&bytes[..7_760]).replace("2000", "1991");
+        bytes[..7_760].copy_from_slice(label.as_bytes());
+        case.write("pedr/ap19117k.b", bytes);
+        case.check()
+    }),
+    ("check_no_position_at_the_shots", |case| {
+        let site = String::from_utf8(case.read("site.toml")).unwrap();
+        case.write("site.toml", &site[..site.find("[[images]]").unwrap()]);
+        case.replace("kernels/nav.tm", "'mgs_nav_scene.bsp'", "");
+        case.check()
+    }),
+    ("info_of_a_file_of_zeros", |case| {
+        case.write("pedr/ap19117l.b", [0; 20_000]);
+        let mut command = case.areograph();
+        command.args(["--quiet", "pedr", "info", "pedr/ap19117l.b"]);
+        command
+    }),
+    ("info_with_something_else_for_leap_seconds", |case| {
+        let mut command = case.areograph();
+        command.args(["--quiet", "pedr", "info", "pedr/ap19117l.b"]);
+        command.args(["--leap-seconds", "kernels/moc.ti"]);
+        command
+    }),
     ("no_shot_in_the_window", |case| {
         case.replace("site.toml", "[87.5, 88.5]", "[10.0, 10.1]");
         case.run()
@@ -192,6 +243,50 @@ const CASES: [(&str, Spoil); 36] = [
         command.args(["--until", "adjust"]);
         command
     }),
+    ("rival_sets_without_common_time", |case| {
+        rivals(case);
+        case.replace("kernels/ipng.tm", "'mgs_ipng_scene.bsp'", "");
+        case.run()
+    }),
+    ("rival_clocks_differ", |case| {
+        rivals(case);
+        // The clock of another set reads the same a second later.
+        fs::copy(
+            case.path("kernels/mgs_clock.tsc"),
+            case.path("kernels/other.tsc"),
+        )
+        .unwrap();
+        case.replace(
+            "kernels/other.tsc",
+            "2.210370652298117E+07",
+            "2.210370752298117E+07",
+        );
+        case.replace("kernels/ipng.tm", "mgs_clock.tsc", "other.tsc");
+        case.run()
+    }),
+    ("rival_set_without_leap_seconds", |case| {
+        rivals(case);
+        case.replace("kernels/ipng.tm", "'leapseconds.tls'", "");
+        case.run()
+    }),
+    ("compare_one_set", |case| compare(case, &["kernels/nav.tm"])),
+    ("compare_a_site_without_sets", |case| {
+        compare(case, &["--site", "site.toml"])
+    }),
+    ("compare_time_reversed", |case| {
+        compare(
+            case,
+            &[
+                "kernels/nav.tm",
+                "kernels/ipng.tm",
+                "--time",
+                "2001-03-23T05:00..2001-03-23T04:00",
+            ],
+        )
+    }),
+    ("compare_something_else", |case| {
+        compare(case, &["kernels/nav.tm", "site.toml"])
+    }),
     ("scene_over_a_foreign_folder", |case| {
         let mut command = case.areograph();
         command.args(["--quiet", "scene", "kernels"]);
@@ -223,6 +318,25 @@ fn every_case_has_its_exit_code_and_exact_message() {
         differing.len(),
         CASES.len(),
         differing.join("\n")
+    );
+}
+
+#[test]
+fn pedr_info_tells_utc_when_it_is_given_leap_seconds() {
+    let case = Case::new();
+    let mut command = case.areograph();
+    command.args(["--quiet", "pedr", "info", "pedr/ap19117l.b"]);
+    command.args(["--leap-seconds", "kernels/leapseconds.tls"]);
+    let found = case.outcome(command);
+    assert!(found.starts_with("exit 0\n"), "{found}");
+    // The revolution of the image of 04:17:44 UTC.
+    assert!(
+        found.contains("utc_first         \"2001-03-23T03:19:"),
+        "{found}"
+    );
+    assert!(
+        found.contains("utc_last          \"2001-03-23T05:16:"),
+        "{found}"
     );
 }
 
@@ -285,31 +399,111 @@ fn damaged_stores_and_products_are_made_again() {
     assert!(common::mission::products(&case.path("out")) == before);
 }
 
-/// A full disk is a small tmpfs, which only root (or a user who may make namespaces) can mount.
 #[test]
-#[allow(clippy::print_stderr, reason = "says what is skipped")]
-fn a_full_disk_leaves_nothing_half_made() {
+fn a_contradicting_pck_is_said_on_the_terminal() {
     let case = Case::new();
-    let script = "mount -t tmpfs -o size=300k tmpfs small && \"$0\" --quiet run site.toml --out small; code=$?; \
-                  find small -type f ! -path '*/.*'; exit $code";
-    fs::create_dir(case.path("small")).unwrap();
-    let unshared = |program: &str, arguments: &[&str]| {
+    case.replace("kernels/nav.tm", "mars_iau2000.tpc", "mars_iau1991.tpc");
+    let mut command = case.areograph();
+    command.args(["run", "site.toml", "--out", "out"]);
+    let found = case.outcome(command);
+    assert!(found.starts_with("exit 0"), "{found}");
+    let warning = found.lines().find(|line| line.contains("WARN")).unwrap();
+    assert!(
+        warning.contains("the PCK turns IAU_MARS by 0.2"),
+        "{warning}"
+    );
+}
+
+/// A manifest and a journal that someone else wrote must not make the next run remove foreign files.
+#[test]
+fn products_named_outside_the_folder_are_left_alone() {
+    let case = Case::new();
+    assert!(case.outcome(case.run()).starts_with("exit 0"));
+    let foreign = [case.path("foreign.txt"), case.path("out/foreign.txt")];
+    for path in &foreign {
+        fs::write(path, "not ours").unwrap();
+    }
+    let inside = case.path("out/case/once_made.txt");
+    fs::write(&inside, "ours").unwrap();
+    let listed = |path: &str| {
+        format!("{{ \"path\": {path:?}, \"bytes\": 8, \"blake3\": \"00\", \"rows\": 1 }}, ")
+    };
+    let absolute = foreign[0].display().to_string();
+    let paths = [
+        "../foreign.txt",
+        "images/../../../foreign.txt",
+        &absolute,
+        "once_made.txt",
+    ];
+    let entries: String = paths.iter().map(|path| listed(path)).collect();
+    let manifest = "out/case/manifest.json";
+    case.replace(
+        manifest,
+        "\"products\": [",
+        &format!("\"products\": [{entries}"),
+    );
+    case.write("out/case/.publishing", paths[..3].join("\n"));
+    let found = case.outcome(case.run());
+    assert!(found.starts_with("exit 0"), "{found}");
+    for path in &foreign {
+        assert_eq!(fs::read_to_string(path).unwrap(), "not ours");
+    }
+    // What the manifest names inside the folder is ours to remove: the list was believed.
+    assert!(!inside.exists());
+}
+
+/// Runs a shell script in the case's folder, with a tmpfs of `size` mounted at `small` in it and the
+/// program as `$0`; `None` for a user who cannot mount (only root, or who may make namespaces, can).
+#[allow(clippy::print_stderr, reason = "says what is skipped")]
+fn on_a_small_disk(case: &Case, size: &str, script: &str) -> Option<String> {
+    fs::create_dir_all(case.path("small")).unwrap();
+    let unshared = |script: String| {
         let mut command = Command::new("unshare");
         command
             .current_dir(case.path(""))
-            .args(["--map-root-user", "--mount"]);
-        command.arg(program).args(arguments);
+            .args(["--map-root-user", "--mount", "sh", "-c", &script])
+            .arg(env!("CARGO_BIN_EXE_areograph"));
         command
     };
-    let possible = unshared("sh", &["-c", "mount -t tmpfs tmpfs small"]).output();
+    let mount = format!("mount -t tmpfs -o size={size} tmpfs small");
+    let possible = unshared(mount.clone()).output();
     if !possible.is_ok_and(|output| output.status.success()) {
         eprintln!("skipped full disk: this user cannot mount a tmpfs");
-        return;
+        return None;
     }
-    let program = env!("CARGO_BIN_EXE_areograph");
-    let found = case.outcome(unshared("sh", &["-c", script, program]));
+    Some(case.outcome(unshared(format!("{mount} && {script}"))))
+}
+
+#[test]
+fn a_full_disk_leaves_nothing_half_made() {
+    let script = "\"$0\" --quiet run site.toml --out small; code=$?; \
+                  find small -type f ! -path '*/.*'; exit $code";
+    let Some(found) = on_a_small_disk(&Case::new(), "300k", script) else {
+        return;
+    };
     assert!(found.starts_with("exit 6\n"), "{found}");
     assert!(found.contains("No space left on device"), "{found}");
     assert!(found.contains("free some space"), "{found}");
     assert!(!found.contains("small/case/manifest.json\n"), "{found}");
+}
+
+#[test]
+fn a_scene_on_a_full_disk_names_the_file_that_did_not_fit() {
+    let script = "\"$0\" --quiet scene small/scene; code=$?; ls -A small; exit $code";
+    // Full at a text kernel, at the start and in the middle of the C-kernel, and at a PEDR file.
+    let sizes = [
+        ("30k", "kernels/gsfc.tm"),
+        ("100k", "kernels/mgs_sc_scene.bc"),
+        ("2500k", "kernels/mgs_sc_scene.bc"),
+        ("20000k", "pedr/"),
+    ];
+    for (size, file) in sizes {
+        let Some(found) = on_a_small_disk(&Case::new(), size, script) else {
+            return;
+        };
+        assert!(found.starts_with("exit 6\nerror: "), "{size}: {found}");
+        assert!(found.contains("No space left on device"), "{size}: {found}");
+        assert!(found.contains(file), "{size}: {found}");
+        assert!(!found.contains("\n.partial"), "{size}: {found}");
+    }
 }

@@ -209,6 +209,8 @@ fn the_schema_takes_the_example_and_refuses_what_the_loader_refuses() {
         "kernels_none",
         "kernels_two_sources",
         "kernels_empty_list",
+        "kernel_set_alone",
+        "kernel_sets",
         "out_of_range",
         "mola_words",
         "pedr_words",
@@ -244,14 +246,14 @@ fn schema_tables(schema: &Value, path: &str, found: &mut Vec<(String, BTreeSet<S
 fn schema_example_and_loader_know_the_same_keys_and_defaults() {
     let mut tables = Vec::new();
     schema_tables(&schema(), "", &mut tables);
-    assert_eq!(tables.len(), 10);
+    assert_eq!(tables.len(), 11);
     let example = example_text();
     for (path, keys) in tables {
         // The loader answers an unknown key with all that it knows.
         let table = path.trim_start_matches('.');
         let header = match table {
             "" => String::new(),
-            "windows" | "images" => format!("[[{table}]]\n"),
+            "windows" | "images" | "kernels.sets" => format!("[[{table}]]\n"),
             _ => format!("[{table}]\n"),
         };
         let answer = config::parse(&format!("{header}zzzzzzzz = 1\n"), Path::new("x.toml"))

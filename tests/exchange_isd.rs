@@ -12,7 +12,8 @@ use std::{fs, path::PathBuf};
 
 use areograph::{
     config::{
-        ImageConfig, ImageFields, KernelSource, KernelsConfig, OrientationConfig, PointingConfig,
+        ImageConfig, ImageFields, KernelList, KernelSource, KernelsConfig, OrientationConfig,
+        PointingConfig,
     },
     constants::MGS_POINTING_BIAS,
     geom::attitude::matrix_of_spice_quaternion,
@@ -61,7 +62,7 @@ fn real_with_summing(test: &str, summing: u32) -> Option<Real> {
         fields: ImageFields::default(),
     };
     let kernels = KernelsConfig {
-        source: KernelSource::Files(files),
+        source: KernelSource::Listed(KernelList::Files(files)),
         ck_tolerance_s: 0.0,
         padding_s: 1.0,
     };

@@ -177,6 +177,40 @@ fn killed_when_an_image_has_just_come_or_gone() {
     });
 }
 
+/// Ctrl-C while forty large PEDR files are hashed and searched: the run ends soon, says where, and the
+/// next run begins where it was.
+#[test]
+#[cfg(unix)]
+fn an_interrupt_leaves_the_search_and_keeps_finished_stages() {
+    let case = Case::new();
+    let large = mission().join("pedr/ap18933l.b");
+    for number in 0..40 {
+        let link = case.path(&format!("pedr/link{number:02}.b"));
+        std::os::unix::fs::symlink(&large, link).unwrap();
+    }
+    let mut command = case.run();
+    let child = command
+        .stdout(std::process::Stdio::piped())
+        .stderr(std::process::Stdio::piped())
+        .spawn()
+        .unwrap();
+    let begun = Instant::now();
+    while !case.path("out/case/.cache/tag_times").exists() {
+        assert!(begun.elapsed() < Duration::from_mins(1), "never begun");
+        sleep(Duration::from_millis(1));
+    }
+    succeed(std::process::Command::new("kill").args(["-INT", &child.id().to_string()]));
+    let output = child.wait_with_output().unwrap();
+    let said = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(130), "{said}");
+    assert!(
+        said.contains("case/search_footprints: stopped before its end"),
+        "{said}"
+    );
+    assert!(case.path("out/case/.cache/tag_times").exists());
+    assert!(!case.path("out/case/.cache/search_footprints").exists());
+}
+
 #[test]
 fn one_and_eight_threads_give_the_same_bytes() {
     let site = mission().join("sites/gusev_crater.toml");

@@ -2,7 +2,10 @@
 
 #![allow(clippy::expect_used, reason = "helpers of tests fail as tests do")]
 
-use std::path::{Path, PathBuf};
+use std::{
+    path::{Path, PathBuf},
+    sync::atomic::AtomicBool,
+};
 
 use areograph::{
     config::{DatumChoice, PedrConfig, ShotFilter, WindowConfig, WindowShape},
@@ -19,6 +22,9 @@ use areograph::{
     units::wrap_pi,
 };
 use proptest::prelude::*;
+
+/// Nobody stops these searches.
+static RUN_ON: AtomicBool = AtomicBool::new(false);
 
 const DEGREE: f64 = std::f64::consts::PI / 180.0;
 /// A little less than one polar revolution and a half.
@@ -98,6 +104,11 @@ fn archive(folder: &Path) -> PedrConfig {
     write(&files[0], MarsDatum::Iau1991, 0, |_, _| ());
     write(&files[1], MarsDatum::Iau2000, FRAMES / 2, |_, _| ());
     config(files.to_vec())
+}
+
+fn overwrite(path: &Path, bytes: &[u8]) {
+    let mut file = std::fs::File::create(path).expect("a writable folder");
+    std::io::Write::write_all(&mut file, bytes).expect("room on the disk");
 }
 
 fn config(files: Vec<PathBuf>) -> PedrConfig {
@@ -212,7 +223,7 @@ fn random_windows_hold_the_shots_that_brute_force_finds() {
     runner
         .run(&proptest::collection::vec(shape, 1..6), |shapes| {
             let windows = windows(shapes);
-            let result = search_footprints(&pedr, &windows, 0.0).unwrap();
+            let result = search_footprints(&pedr, &windows, 0.0, &RUN_ON).unwrap();
             let expected = brute_force(&pedr, &windows);
             **shots_found.borrow_mut() += expected.len();
             prop_assert_eq!(found(&result), expected);
@@ -237,7 +248,7 @@ fn a_window_across_zero_and_one_over_the_pole_in_one_pass() {
         north_rad: -86.5 * DEGREE,
     };
     let windows = windows(vec![box_deg(200.0, 320.0, -10.0, 10.0), all_round]);
-    let result = search_footprints(&pedr, &windows, -0.117).unwrap();
+    let result = search_footprints(&pedr, &windows, -0.117, &RUN_ON).unwrap();
     assert_eq!(found(&result), brute_force(&pedr, &windows));
     let footprints = &result.footprints;
     for bit in [1, 2] {
@@ -290,7 +301,7 @@ fn the_result_is_the_same_on_one_and_four_threads_and_survives_the_cache() {
             .build()
             .unwrap();
         let result = pool
-            .install(|| search_footprints(&pedr, &windows, 0.0))
+            .install(|| search_footprints(&pedr, &windows, 0.0, &RUN_ON))
             .unwrap();
         assert!(!result.footprints.is_empty());
         let bytes = postcard::to_extend(&result, Vec::new()).unwrap();
@@ -336,7 +347,7 @@ fn damaged_records_are_complained_of_and_the_others_kept() {
         south_rad: -std::f64::consts::FRAC_PI_2,
         north_rad: std::f64::consts::FRAC_PI_2,
     }]);
-    let result = search_footprints(&pedr, &globe, 0.0).unwrap();
+    let result = search_footprints(&pedr, &globe, 0.0, &RUN_ON).unwrap();
     let said: Vec<String> = result.complaints[..4]
         .iter()
         .map(|c| c.text.clone())
@@ -372,19 +383,123 @@ fn damaged_records_are_complained_of_and_the_others_kept() {
 fn a_file_without_a_datum_stops_the_search() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("renamed.dat");
-    std::fs::File::create(&path).unwrap();
-    let failure = search_footprints(&config(vec![path]), &[], 0.0)
+    write(&path, MarsDatum::Iau2000, 0, |_, _| ());
+    let mut bytes = std::fs::read(&path).unwrap();
+    let label = String::from_utf8_lossy(&bytes[..7_760]).replace("2000", "XXXX");
+    bytes[..7_760].copy_from_slice(label.as_bytes());
+    overwrite(&path, &bytes);
+    let failure = search_footprints(&config(vec![path]), &[], 0.0, &RUN_ON)
         .unwrap_err()
         .to_string();
     assert!(
         failure.starts_with("search_footprints: ")
-            && failure.contains("renamed.dat: the datum is not known")
+            && failure.contains("renamed.dat: the datum is not known"),
+        "{failure}"
+    );
+}
+
+#[test]
+fn a_file_without_a_good_record_stops_the_search_before_its_datum_is_asked_for() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("renamed.dat");
+    let random: Vec<u8> = (0..50_000_u32)
+        .flat_map(|n| n.wrapping_mul(2_654_435_761).to_le_bytes())
+        .collect();
+    let good = {
+        write(&path, MarsDatum::Iau2000, 0, |_, _| ());
+        std::fs::read(&path).unwrap()
+    };
+    for (bytes, why) in [
+        (&[][..], "the file has 0 bytes; expected at least the 7760"),
+        (&random, "no good record: "),
+        (
+            &good[..7_760 + 700],
+            "nothing of 776 bytes follows the label",
+        ),
+    ] {
+        overwrite(&path, bytes);
+        let failure = search_footprints(&config(vec![path.clone()]), &[], 0.0, &RUN_ON);
+        let failure = failure.unwrap_err();
+        assert_eq!(failure.kind().exit_code(), 3);
+        let message = failure.to_string();
+        assert!(
+            message.contains("renamed.dat: no good record") && message.contains(why),
+            "{message}"
+        );
+    }
+}
+
+#[test]
+fn a_copy_is_read_once_and_a_note_names_both_files() {
+    let folder = tempfile::tempdir().unwrap();
+    let single = archive(folder.path());
+    let windows = windows(vec![box_deg(0.0, 170.0, -60.0, 60.0)]);
+    let expected = search_footprints(&single, &windows, 0.0, &RUN_ON).unwrap();
+    let copy = folder.path().join("copy.b");
+    std::fs::copy(&single.files[0], &copy).unwrap();
+    let mut files = single.files.clone();
+    files.push(copy);
+    let result = search_footprints(&config(files), &windows, 0.0, &RUN_ON).unwrap();
+    assert!(!result.footprints.is_empty());
+    assert_eq!(found(&result), found(&expected));
+    assert_eq!(result.frames_read, expected.frames_read);
+    assert_eq!(
+        result.notes.last().map(String::as_str),
+        Some("PEDR file 3 (copy.b) holds the same bytes as file 1 (ap19019k.b): read once")
+    );
+}
+
+#[test]
+fn two_versions_of_one_orbit_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let files = [
+        folder.path().join("ap19019k.b"),
+        folder.path().join("ap19019l.b"),
+    ];
+    write(&files[0], MarsDatum::Iau1991, 0, |_, _| ());
+    // The later version moves its time tags by 20 ms.
+    write(&files[1], MarsDatum::Iau2000, 0, |_, record| {
+        record.time_s.set(record.time_s.get() + 0.02);
+        record.time_fraction_us.set(20_000);
+    });
+    let windows = windows(vec![box_deg(0.0, 170.0, -60.0, 60.0)]);
+    for order in [[0, 1], [1, 0]] {
+        let pedr = config(order.map(|index: usize| files[index].clone()).to_vec());
+        let failure = search_footprints(&pedr, &windows, 0.0, &RUN_ON).unwrap_err();
+        assert_eq!(failure.kind().exit_code(), 3);
+        let message = failure.to_string();
+        for part in [
+            "ap19019k.b",
+            "ap19019l.b",
+            "orbit 9019",
+            "only one of the two",
+        ] {
+            assert!(message.contains(part), "{part}: {message}");
+        }
+    }
+}
+
+#[test]
+fn a_search_that_is_stopped_ends_as_interrupted() {
+    let folder = tempfile::tempdir().unwrap();
+    let pedr = archive(folder.path());
+    let windows = windows(vec![box_deg(0.0, 170.0, -60.0, 60.0)]);
+    let failure = search_footprints(&pedr, &windows, 0.0, &AtomicBool::new(true)).unwrap_err();
+    assert_eq!(failure.kind().exit_code(), 130);
+    assert!(
+        failure.to_string().starts_with("search_footprints: "),
+        "{failure}"
     );
 }
 
 #[test]
 fn more_files_than_can_be_counted_are_refused() {
-    let failure = search_footprints(&config(vec![PathBuf::from("AP19019L.B"); 65_536]), &[], 0.0);
+    let failure = search_footprints(
+        &config(vec![PathBuf::from("AP19019L.B"); 65_536]),
+        &[],
+        0.0,
+        &RUN_ON,
+    );
     let message = failure.unwrap_err().to_string();
     assert!(
         message.contains("65536 PEDR files; expected at most 65535"),

@@ -318,6 +318,11 @@ fn a_manifest_keeps_its_schema() {
             "name": "a.bsp", "role": "SPK", "bytes": 1024, "blake3": hash,
             "coverage_used": [{ "start": START_S, "stop": START_S + 6.0 }],
         }],
+        "kernel_choice": [{
+            "set": "nav", "chosen": true, "epochs": 60, "distance_rms_m": 1.5, "distance_max_m": 2.0,
+            "radial_mean_m": 0.1, "along_track_mean_m": -1.0, "cross_track_mean_m": 1.0,
+            "ephemerides": [{ "name": "a.bsp", "blake3": hash }],
+        }],
         "stages": [{ "name": "tag_times", "fingerprint": hash }],
         "products": [{ "path": "ranges.json", "bytes": 10, "blake3": hash, "rows": 1 }],
         "counts": { "footprints": 60 }, "figures": { "range_mean_m": 1.5 }, "rejected": { "class": 7 },

@@ -11,7 +11,8 @@ use std::{fs, path::PathBuf};
 
 use areograph::{
     config::{
-        ImageConfig, ImageFields, KernelSource, KernelsConfig, OrientationConfig, PointingConfig,
+        ImageConfig, ImageFields, KernelList, KernelSource, KernelsConfig, OrientationConfig,
+        PointingConfig,
     },
     constants::MGS_POINTING_BIAS,
     geom::attitude::matrix_of_spice_quaternion,
@@ -52,7 +53,7 @@ fn m0402852(test: &str) -> Option<(ImageTimes, Orientation, Value)> {
     let image = image("M04-02852", folder.join("m0402852_isis.lbl"));
     let times = tag_times(&[image], &session).unwrap().remove(0);
     let kernels = KernelsConfig {
-        source: KernelSource::Files(files),
+        source: KernelSource::Listed(KernelList::Files(files)),
         ck_tolerance_s: 0.0,
         padding_s: 1.0,
     };

@@ -30,19 +30,7 @@ fn plan(case: &Case) -> BTreeMap<String, String> {
 
 /// Runs, and gives the stages that the log says ran.
 fn run(case: &Case) -> Vec<String> {
-    let mut command = case.areograph();
-    command.args(["run", "site.toml", "--out", "out"]);
-    let log = String::from_utf8(common::mission::succeed(&mut command).stderr).unwrap();
-    log.lines()
-        .filter(|line| line.contains(": running: "))
-        .map(|line| {
-            line.split("stage=\"")
-                .nth(1)
-                .unwrap()
-                .trim_end_matches('"')
-                .to_owned()
-        })
-        .collect()
+    case.stages_run()
 }
 
 fn fresh() -> Case {
@@ -244,4 +232,27 @@ fn until_force_and_dry_run() {
     command.arg("--force");
     assert!(case.outcome(command).contains("valid; products in"));
     assert!(common::mission::products(&case.path("out")) == before);
+}
+
+#[test]
+fn outputs_of_an_image_that_was_taken_out_are_forgotten() {
+    let case = fresh();
+    let stored = |case: &Case| {
+        let names = std::fs::read_dir(case.path("out/case/.cache")).unwrap();
+        let mut names: Vec<String> = names
+            .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+            .collect();
+        names.sort();
+        names
+    };
+    let before = stored(&case);
+    let second = "[[images]]\nid = \"second\"\nlabel = \"image.lbl\"\n";
+    let text = String::from_utf8(case.read("site.toml")).unwrap();
+    case.write("site.toml", format!("{text}{second}"));
+    run(&case);
+    assert!(stored(&case).contains(&"sample_orientation+second".to_owned()));
+    case.write("site.toml", text);
+    run(&case);
+    assert_eq!(stored(&case), before);
+    assert_eq!(run(&case), [""; 0]);
 }

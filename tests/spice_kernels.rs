@@ -138,9 +138,10 @@ fn faults_of_cspice_carry_both_messages_of_naif() {
     drop(session);
     let empty = Session::open(&KernelSet::default()).unwrap();
     let failure = empty.utc_to_et("1999-08-24").unwrap_err();
-    assert!(
-        failure.to_string().contains("SPICE(NOLEAPSECONDS)"),
-        "{failure}"
+    assert_eq!(failure.kind(), Kind::Coverage);
+    assert_eq!(
+        failure.fault.to_string(),
+        "no leap-second kernel (.tls) in the set, which is empty"
     );
 }
 
@@ -410,5 +411,24 @@ fn metakernels_are_read_and_written() {
     assert!(
         failure.to_string().contains("expected a metakernel"),
         "{failure}"
+    );
+}
+
+#[test]
+fn a_path_that_is_too_long_for_cspice_is_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let deep = folder
+        .path()
+        .join("long".repeat(50))
+        .join("folders".repeat(20));
+    fs::create_dir_all(&deep).unwrap();
+    let path = write(&deep, "naif0012.tls", "KPL/LSK\n\\begindata\nA = 1\n");
+    let failure = KernelSet::from_files(std::slice::from_ref(&path)).unwrap_err();
+    assert_eq!(failure.kind(), Kind::Input);
+    assert_eq!(failure.file.as_deref(), Some(&*path));
+    let text = failure.to_string();
+    assert!(
+        text.contains("bytes long, at most 255 are possible"),
+        "{text}"
     );
 }

@@ -140,7 +140,7 @@ fn the_latest_texts_and_the_files_of_the_wanted_time_are_chosen() {
         assert!(explanation.contains(line), "{line} in {explanation}");
     }
     let session = Session::open(&set).unwrap();
-    session.require_attitude(wanted, BIAS, 1.0).unwrap();
+    session.require_attitude(wanted, BIAS, 1.0, 0.0).unwrap();
     drop(session);
     assert_eq!(
         names(&KernelSet::select(&selection, &Wanted::default()).unwrap()),

@@ -287,7 +287,7 @@ fn a_gap_between_attitude_files_is_named_with_its_kernels() {
     let at = |utc: &str| session.utc_to_et(utc).unwrap();
     let gap = Interval::new(at("1999-08-24T14:00:00"), at("1999-08-24T14:11:00"));
     let failure = session
-        .require_attitude(gap, MGS_POINTING_BIAS, 1.0)
+        .require_attitude(gap, MGS_POINTING_BIAS, 1.0, 0.0)
         .unwrap_err();
     assert_eq!(failure.kind(), Kind::Coverage);
     let text = failure.to_string();
@@ -308,12 +308,12 @@ fn a_gap_between_attitude_files_is_named_with_its_kernels() {
     let exposures = Interval::new(edge.plus(1.0), edge.plus(10.0));
     assert!(
         session
-            .require_attitude(exposures, PointingBias::from_seconds(0.0), 0.5)
+            .require_attitude(exposures, PointingBias::from_seconds(0.0), 0.5, 0.0)
             .is_ok()
     );
     assert!(
         session
-            .require_attitude(exposures, MGS_POINTING_BIAS, 0.0)
+            .require_attitude(exposures, MGS_POINTING_BIAS, 0.0, 0.0)
             .is_err()
     );
     let inside = MGS_POINTING_BIAS.lookup(at("1999-08-24T14:05:00"));

@@ -1,5 +1,7 @@
 //! `areograph kernels`.
 
+mod compare;
+
 use std::path::PathBuf;
 
 use clap::{Args, Subcommand};
@@ -25,6 +27,7 @@ enum Command {
     List(Files),
     /// Shows position and attitude coverage of Mars Global Surveyor, with the gaps inside.
     Coverage(Files),
+    Compare(compare::Arguments),
 }
 
 #[derive(Debug, Args)]
@@ -56,6 +59,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
     match &arguments.command {
         Command::List(files) => list(files),
         Command::Coverage(files) => coverage(files),
+        Command::Compare(arguments) => compare::run(arguments),
     }
 }
 

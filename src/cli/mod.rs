@@ -5,6 +5,7 @@ mod kernels;
 mod output;
 mod pedr;
 mod plan;
+mod report;
 mod run;
 mod scene;
 
@@ -21,7 +22,7 @@ use crate::{
 /// Mars Global Surveyor data preparation: SPICE kernels, MOLA shots and MOC images to validated products.
 ///
 /// Exit codes: 0 done, 1 fault of areograph, 2 usage or configuration, 3 input data, 4 kernel coverage,
-/// 5 products written but invalid, 6 input/output, 130 interrupted.
+/// 5 products written but invalid, or moved beyond a limit, 6 input/output, 130 interrupted.
 #[derive(Debug, Parser)]
 #[command(name = "areograph", version, arg_required_else_help = true)]
 struct Cli {
@@ -43,10 +44,12 @@ enum Command {
     Check(check::Arguments),
     /// Say which stages would run, and why; writes nothing.
     Plan(plan::Arguments),
-    /// Look at kernels: what is loaded, where the gaps are.
+    /// Look at kernels: what is loaded, where the gaps are, how rival sets differ.
     Kernels(kernels::Arguments),
     /// Look into PEDR files.
     Pedr(pedr::Arguments),
+    /// Say what differs between two runs.
+    Report(report::Arguments),
     /// Write a synthetic mission with known truth.
     Scene(scene::Arguments),
 }
@@ -72,6 +75,7 @@ pub fn main() -> ExitCode {
         Command::Plan(arguments) => finish(plan::run(&arguments)),
         Command::Kernels(arguments) => finish(kernels::run(&arguments)),
         Command::Pedr(arguments) => finish(pedr::run(&arguments)),
+        Command::Report(arguments) => report::run(&arguments),
         Command::Scene(arguments) => finish(scene::run(&arguments)),
     }
 }

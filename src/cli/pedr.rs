@@ -10,8 +10,10 @@ use serde_json::json;
 
 use super::output;
 use crate::{
-    error::Failure,
+    error::{Failure, Place as _},
     pds::pedr::{Complaint, FieldGuard, File},
+    spice::{KernelSet, Session},
+    time::Et,
 };
 
 /// Looks into PEDR files.
@@ -28,6 +30,9 @@ enum Command {
         /// PEDR files (AP#####v.B).
         #[arg(required = true, value_name = "FILE")]
         files: Vec<PathBuf>,
+        /// Leap seconds (LSK, such as naif0012.tls): shows the time span in UTC as well.
+        #[arg(long, value_name = "FILE")]
+        leap_seconds: Option<PathBuf>,
         /// Answer in JSON.
         #[arg(long)]
         json: bool,
@@ -38,10 +43,22 @@ enum Command {
 const COMPLAINTS_PRINTED: usize = 20;
 
 pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
-    let Command::Info { files, json } = &arguments.command;
-    let mut answers = Vec::new();
+    let Command::Info {
+        files,
+        leap_seconds,
+        json,
+    } = &arguments.command;
+    let clock = match leap_seconds {
+        Some(kernel) => Some(Session::open(&KernelSet::from_files(
+            std::slice::from_ref(kernel),
+        )?)?),
+        None => None,
+    };
+    let (mut answers, mut useless) = (Vec::new(), Vec::new());
     for path in files {
-        let answer = info(path, &File::open(path)?);
+        let file = File::open(path)?;
+        let answer = info(path, &file, clock.as_ref())?;
+        useless.extend(file.require_records().err());
         if *json {
             answers.push(answer);
         } else {
@@ -51,10 +68,13 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
     if *json {
         output::json(&answers.into());
     }
-    Ok(())
+    // Every file is shown first; the last of the useless ones is told by whoever called.
+    let last = useless.pop();
+    useless.iter().for_each(output::error);
+    last.map_or(Ok(()), Err)
 }
 
-fn info(path: &Path, file: &File) -> serde_json::Value {
+fn info(path: &Path, file: &File, clock: Option<&Session>) -> Result<serde_json::Value, Failure> {
     let guard = FieldGuard::new(file.label().software_version);
     let mut complaints: Vec<Complaint> = file.label_complaints().to_vec();
     let mut orbits: BTreeMap<u32, u64> = BTreeMap::new();
@@ -71,7 +91,7 @@ fn info(path: &Path, file: &File) -> serde_json::Value {
     }
     complaints.extend(file.trailing_complaint());
     let label = file.label();
-    json!({
+    let mut answer = json!({
         "file": path,
         "version": file.name().map(|name| name.version),
         "product_id": label.product_id,
@@ -85,7 +105,14 @@ fn info(path: &Path, file: &File) -> serde_json::Value {
         "et_last_s": span_s.map(|[_, last]| last),
         "blake3": file.blake3(),
         "complaints": complaints.iter().map(ToString::to_string).collect::<Vec<_>>(),
-    })
+    });
+    if let (Some(clock), Some([first_s, last_s])) = (clock, span_s) {
+        let kernel = &clock.kernels().kernels()[0].path;
+        let utc = |et_s| clock.et_to_utc(Et::from_seconds(et_s)).in_file(kernel);
+        answer["utc_first"] = utc(first_s)?.into();
+        answer["utc_last"] = utc(last_s)?.into();
+    }
+    Ok(answer)
 }
 
 fn print(answer: &serde_json::Value) {

@@ -117,7 +117,7 @@ pub(super) fn run(arguments: &Arguments) -> ExitCode {
 
 type Outcome = Result<SiteOutcome, Failure>;
 
-/// Runs at most `jobs` sites at a time; Ctrl-C lets each finish its stage and stop.
+/// Runs at most `jobs` sites at a time; Ctrl-C lets each finish its stage, or leave a long one, and stop.
 async fn run_all(sites: Vec<SiteConfig>, arguments: &Arguments) -> Vec<Outcome> {
     let stop = Arc::new(AtomicBool::new(false));
     let places = Arc::new(Semaphore::new(usize::from(arguments.jobs)));
@@ -145,7 +145,7 @@ async fn run_all(sites: Vec<SiteConfig>, arguments: &Arguments) -> Vec<Outcome> 
         let stop = Arc::clone(&stop);
         async move {
             if tokio::signal::ctrl_c().await.is_ok() {
-                tracing::warn!("stopping after the stages that are running; again to stop at once");
+                tracing::warn!("stopping as soon as the stages at work can; again to stop at once");
                 stop.store(true, Ordering::Relaxed);
             }
             if tokio::signal::ctrl_c().await.is_ok() {

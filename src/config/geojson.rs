@@ -4,7 +4,7 @@ use std::{fs::File, io::Read as _, path::Path};
 
 use serde::Deserialize;
 
-use crate::units::RADIANS_PER_DEGREE;
+use crate::units::{RADIANS_PER_DEGREE, longitude_step_rad};
 
 /// Longest file, bytes.
 const BYTES_MAX: u64 = 16 << 20;
@@ -46,6 +46,8 @@ pub(super) enum RingFault {
     Longitude(usize, f64),
     #[error("position {0}: latitude {1} is not within -90 to 90")]
     Latitude(usize, f64),
+    #[error("crosses itself: the edge after position {0} and the edge after position {1} meet")]
+    Crossed(usize, usize),
     #[error("spans {0} degrees of longitude; a ring spans less than 360")]
     Wide(f64),
 }
@@ -73,8 +75,9 @@ pub(super) fn read(path: &Path) -> Result<Polygons, GeoJsonFault> {
     parse(&bytes)
 }
 
-/// The polygons of a GeoJSON text, radians.
+/// The polygons of a GeoJSON text, radians; some writers put a byte order mark before it.
 fn parse(bytes: &[u8]) -> Result<Polygons, GeoJsonFault> {
+    let bytes = bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(bytes);
     let mut found = Vec::new();
     collect(serde_json::from_slice(bytes)?, &mut found);
     if found.is_empty() {
@@ -150,7 +153,48 @@ fn ring(positions: &[Vec<f64>]) -> Result<Vec<[f64; 2]>, RingFault> {
     if east - west >= 360.0 {
         return Err(RingFault::Wide(east - west));
     }
-    Ok(vertices)
+    match crossing(&vertices) {
+        Some((one, other)) => Err(RingFault::Crossed(one, other)),
+        None => Ok(vertices),
+    }
+}
+
+/// Positions, counted from 1, at which two edges of a closed ring begin that cross each other.
+///
+/// Edges that only touch or lie along each other enclose what they enclose without them.
+fn crossing(vertices: &[[f64; 2]]) -> Option<(usize, usize)> {
+    let mut longitude = vertices[0][0];
+    let mut path = vec![vertices[0]];
+    for pair in vertices.windows(2) {
+        longitude += longitude_step_rad(pair[1][0] - pair[0][0]);
+        path.push([longitude, pair[1][1]]);
+    }
+    let ends = |edge: usize| (path[edge], path[edge + 1]);
+    let west = |edge: usize| path[edge][0].min(path[edge + 1][0]);
+    let east = |edge: usize| path[edge][0].max(path[edge + 1][0]);
+    let mut edges: Vec<usize> = (0..path.len() - 1).collect();
+    edges.sort_by(|a, b| west(*a).total_cmp(&west(*b)));
+    // From west to east, only edges whose longitudes overlap are compared.
+    for (place, one) in edges.iter().enumerate() {
+        let rivals = edges[place + 1..].iter();
+        for other in rivals.take_while(|other| west(**other) <= east(*one)) {
+            if cross(ends(*one), ends(*other)) {
+                return Some((one.min(other) + 1, one.max(other) + 1));
+            }
+        }
+    }
+    None
+}
+
+type Edge = ([f64; 2], [f64; 2]);
+
+/// Whether each edge has its ends on either side of the other.
+fn cross(one: Edge, other: Edge) -> bool {
+    let side = |(from, to): Edge, point: [f64; 2]| {
+        (to[0] - from[0]) * (point[1] - from[1]) - (to[1] - from[1]) * (point[0] - from[0])
+    };
+    let parted = |edge: Edge, (a, b): Edge| side(edge, a) * side(edge, b) < 0.0;
+    parted(one, other) && parted(other, one)
 }
 
 #[cfg(test)]
@@ -210,6 +254,14 @@ mod tests {
                 "polygon 1 ring 1 position 3: latitude 91 is not within -90 to 90",
             ),
             (
+                "[[0,0],[10,10],[10,0],[0,10],[0,0]]",
+                "polygon 1 ring 1 crosses itself: the edge after position 1 and the edge after position 3 meet",
+            ),
+            (
+                "[[175,0],[-175,10],[-175,0],[175,10],[175,0]]",
+                "polygon 1 ring 1 crosses itself: the edge after position 1 and the edge after position 3 meet",
+            ),
+            (
                 "[[-180,0],[180,0],[1,1],[-180,0]]",
                 "polygon 1 ring 1 spans 360 degrees of longitude; a ring spans less than 360",
             ),
@@ -232,6 +284,24 @@ mod tests {
             message(&polygon(&format!("[{many}]"))),
             "has more than 100000 vertices"
         );
+    }
+
+    #[test]
+    fn a_byte_order_mark_and_rings_that_only_touch_themselves_are_taken() {
+        let polygon = |ring: &str| format!(r#"{{"type":"Polygon","coordinates":[{ring}]}}"#);
+        let square = polygon("[[0,0],[1,0],[1,1],[0,1],[0,0]]");
+        assert_eq!(
+            parse(format!("\u{feff}{square}").as_bytes()).unwrap(),
+            parse(square.as_bytes()).unwrap()
+        );
+        for ring in [
+            // Two triangles that share a corner; a spike; a cap with edges along a meridian and the pole.
+            "[[0,0],[1,1],[2,0],[2,2],[1,1],[0,2],[0,0]]",
+            "[[0,0],[1,0],[1,5],[1,0],[1,1],[0,1],[0,0]]",
+            "[[-170,-60],[0,-65],[170,-60],[170,-90],[-170,-90],[-170,-60]]",
+        ] {
+            assert!(parse(polygon(ring).as_bytes()).is_ok(), "{ring}");
+        }
     }
 
     proptest! {

@@ -30,11 +30,20 @@ pub(super) struct RawKernels {
     pub(super) metakernel: Entry<String>,
     pub(super) files: Entry<Vec<Spanned<String>>>,
     pub(super) root: Entry<String>,
+    pub(super) sets: Entry<Vec<Spanned<RawKernelSet>>>,
     pub(super) spk_family: Entry<String>,
     pub(super) ck_quality: Entry<Vec<Spanned<String>>>,
     pub(super) pinned: Entry<Vec<Spanned<String>>>,
     pub(super) ck_tolerance_s: Entry<f64>,
     pub(super) padding_s: Entry<f64>,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct RawKernelSet {
+    pub(super) id: Entry<String>,
+    pub(super) metakernel: Entry<String>,
+    pub(super) files: Entry<Vec<Spanned<String>>>,
 }
 
 #[derive(Debug, Default, Deserialize)]

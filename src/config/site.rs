@@ -47,16 +47,35 @@ pub struct KernelsConfig {
     pub padding_s: f64,
 }
 
-/// The three ways to name kernels.
+/// The ways to name kernels.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum KernelSource {
+    /// One list.
+    Listed(KernelList),
+    /// A folder to choose from.
+    Root(KernelSelection),
+    /// Rival sets, at least two: the one whose trajectory is closest to the mean of all is used.
+    Sets(Vec<RivalKernels>),
+}
+
+/// Kernels named one by one.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum KernelList {
     /// A metakernel; relative paths in it count from its own folder.
     Metakernel(PathBuf),
     /// Files in load order (later ones win).
     Files(Vec<PathBuf>),
-    /// A folder to choose from.
-    Root(KernelSelection),
+}
+
+/// One of several complete sets of kernels.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct RivalKernels {
+    /// Identifier, unique in the site, for example `nav`.
+    pub id: String,
+    /// Its kernels.
+    pub list: KernelList,
 }
 
 /// How kernels are chosen from a folder.
@@ -254,6 +273,13 @@ pub struct ImageFields {
     pub first_detector: Option<u32>,
 }
 
+/// Fewest lines of an image: orientation is fitted over its length.
+pub const IMAGE_LINES_MIN: u32 = 3;
+
+/// No image is exposed this long, seconds: the longest of the mission take about a minute, and minutes
+/// later the orientation is no polynomial of second order any more.
+pub const IMAGE_DURATION_END_S: f64 = 600.0;
+
 /// Labels print exposures and periods to 0.0001 ms; half of that is their rounding, seconds.
 const EXPOSURE_ROUNDING_S: f64 = 0.5e-7;
 
@@ -265,6 +291,9 @@ pub fn line_period_agrees(line_period_s: f64, exposure_s: f64, downtrack_summing
     let summing = f64::from(downtrack_summing);
     (line_period_s - exposure_s * summing).abs() <= EXPOSURE_ROUNDING_S * (summing + 1.0)
 }
+
+/// Most steps of the bias scan, so that a slip in its step cannot make a run endless.
+pub const SCAN_STEPS_MAX: u32 = 10_000;
 
 /// Limits and options of the range check.
 #[derive(Debug, Clone, PartialEq, Serialize)]

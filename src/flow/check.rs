@@ -1,17 +1,23 @@
-//! Configuration, files and kernel coverage of a site, without running it.
+//! Configuration, files and kernel coverage of a site, without writing anything.
 
-use std::path::Path;
+use std::{path::Path, sync::atomic::AtomicBool};
 
 use super::{
     Stage,
     steps::{load_kernels, wanted},
 };
 use crate::{
-    config::{DatumChoice, SiteConfig},
+    config::{DatumChoice, KernelSource, SiteConfig},
     error::{Failure, Place, Result},
     pds::pedr,
     spice::{Session, Wanted},
-    stages::{sample_orientation::sample_orientation, tag_times::tag_times},
+    stages::{
+        convert_datum::convert_datum,
+        group_profiles::{Profile, group_profiles},
+        sample_orientation::sample_orientation,
+        search_footprints::search_footprints,
+        tag_times::{ImageTimes, tag_times},
+    },
 };
 
 /// What a check found.
@@ -32,7 +38,9 @@ impl Checked {
     }
 }
 
-/// Checks kernels, image labels with their coverage, and PEDR labels of a site.
+/// Checks a site's kernels, labels and PEDR files, and coverage at its images and at its shots.
+///
+/// The PEDR files are searched as a run does it: only shots in the windows tell which times are needed.
 #[must_use]
 pub fn check_site(config: &SiteConfig) -> Checked {
     let mut checked = Checked::default();
@@ -47,6 +55,7 @@ pub fn check_site(config: &SiteConfig) -> Checked {
 
 fn check_pedr(path: &Path, choice: DatumChoice) -> Result<String> {
     let file = pedr::File::open(path)?;
+    file.require_records()?;
     let version = file.name().map(|name| name.version);
     let datum = pedr::decide_datum(choice, version, file.label().datum).in_file(path)?;
     let complaints: Vec<String> = file
@@ -62,8 +71,68 @@ fn check_pedr(path: &Path, choice: DatumChoice) -> Result<String> {
     ))
 }
 
+/// Profiles of the site's shots, as [`super::run_site`] finds them; nothing is stored.
+pub(super) fn find_profiles(config: &SiteConfig, images: &[ImageTimes]) -> Result<Vec<Profile>> {
+    let correction_s = config.mola_clock.correction_s();
+    let never = AtomicBool::new(false);
+    let found = search_footprints(&config.pedr, &config.windows, correction_s, &never)?;
+    let footprints = convert_datum(found.footprints, &config.mola_clock).footprints;
+    Ok(group_profiles(&footprints, &config.windows, images))
+}
+
+/// Position at the shots of every profile; one finding for all that have it.
+fn check_profiles(
+    needs: &Needs,
+    session: &Session,
+    config: &SiteConfig,
+    prefix: &str,
+    checked: &mut Checked,
+) {
+    let (mut covered, mut shots) = (0, 0);
+    for profile in &needs.profiles {
+        let position = session.require_position(profile.interval);
+        match position.in_stage(Stage::CheckRanges.name()) {
+            Ok(()) => {
+                covered += 1;
+                shots += profile.rows.len();
+            }
+            Err(failure) => checked.failures.push(failure.in_site(&config.site)),
+        }
+    }
+    let of = needs.profiles.len();
+    if of > 0 {
+        let finding =
+            format!("{prefix}{covered} of {of} profiles ({shots} shots): position covered");
+        checked.findings.push(finding);
+    }
+}
+
+/// What the site asks of its kernels.
+struct Needs {
+    images: Vec<ImageTimes>,
+    /// Empty when a PEDR file cannot be used: that was told before.
+    profiles: Vec<Profile>,
+}
+
+/// Coverage at images and shots; of rival sets of kernels every one, since any of them may be chosen.
 fn check_kernels(config: &SiteConfig, checked: &mut Checked) -> Result<()> {
-    let clocks = load_kernels(config, &Wanted::default())?;
+    let needs = needs(config, checked)?;
+    let KernelSource::Sets(sets) = &config.kernels.source else {
+        return check_set(config, 0, "", &needs, checked);
+    };
+    for (index, set) in sets.iter().enumerate() {
+        let prefix = format!("kernel set {}: ", set.id);
+        if let Err(failure) = check_set(config, index, &prefix, &needs, checked) {
+            checked.failures.push(failure.in_site(&config.site));
+        }
+    }
+    Ok(())
+}
+
+/// Times of the images by the clocks of the first set, and the shots in the windows.
+fn needs(config: &SiteConfig, checked: &mut Checked) -> Result<Needs> {
+    let searchable = !config.pedr.files.is_empty() && checked.failures.is_empty();
+    let clocks = load_kernels(config, &Wanted::default(), 0)?;
     let session = Session::open(&clocks)?;
     let mut images = Vec::new();
     for image in &config.images {
@@ -73,12 +142,38 @@ fn check_kernels(config: &SiteConfig, checked: &mut Checked) -> Result<()> {
         }
     }
     drop(session);
-    let kernels = load_kernels(config, &wanted(config, &images, &[]))?;
+    let mut found = Vec::new();
+    if searchable {
+        match find_profiles(config, &images) {
+            Ok(profiles) => found = profiles,
+            Err(failure) => checked.failures.push(failure.in_site(&config.site)),
+        }
+        if found.is_empty() && checked.failures.is_empty() {
+            let finding = "no shot in any window: products would be invalid";
+            checked.findings.push(finding.to_owned());
+        }
+    }
+    Ok(Needs {
+        images,
+        profiles: found,
+    })
+}
+
+fn check_set(
+    config: &SiteConfig,
+    index: usize,
+    prefix: &str,
+    needs: &Needs,
+    checked: &mut Checked,
+) -> Result<()> {
+    let wanted = wanted(config, &needs.images, &needs.profiles);
+    let kernels = load_kernels(config, &wanted, index)?;
+    let explanation = kernels.explanation().iter();
     checked
         .findings
-        .extend(kernels.explanation().iter().cloned());
+        .extend(explanation.map(|line| format!("{prefix}{line}")));
     let session = Session::open(&kernels)?;
-    for image in &images {
+    for image in &needs.images {
         // One pass of the stage itself meets whatever a run would: ephemerides, frames, gaps.
         let pointing = &config.pointing;
         let sampled = sample_orientation(
@@ -88,16 +183,20 @@ fn check_kernels(config: &SiteConfig, checked: &mut Checked) -> Result<()> {
             pointing,
             &config.orientation,
         );
-        let finding = sampled.in_stage(&Stage::SampleOrientation.of_image(&image.id)).map(|_| {
+        let finding = sampled.in_stage(&Stage::SampleOrientation.of_image(&image.id)).map(|orientation| {
+            let invalid = orientation.invalid_because.iter();
+            let invalid = invalid.map(|reason| format!("; products would be invalid: {reason}"));
             format!(
-                "image {}: {} lines from {} UTC, first line centre {}, position and attitude covered",
+                "{prefix}image {}: {} lines from {} UTC, first line centre {}, position and attitude covered{}",
                 image.id,
                 image.lines_header,
                 image.utc_start,
-                image.line_centre(0)
+                image.line_centre(0),
+                invalid.collect::<String>()
             )
         });
         checked.note(finding, config);
     }
+    check_profiles(needs, &session, config, prefix, checked);
     Ok(())
 }

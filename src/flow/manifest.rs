@@ -10,7 +10,7 @@ use crate::{
     frames::MarsIau2000,
     geom::{attitude::rotation_vector, mars_rotation::mars_rotation},
     products::KernelLine,
-    spice::{KernelRole, KernelSet, Session},
+    spice::{KernelSet, Session},
     store::manifest::{
         BiasEntry, Complaints, ConfigurationEntry, KernelEntry, Manifest, ProductEntry, StageEntry,
         Verdict, figures,
@@ -39,7 +39,8 @@ pub(super) struct Account {
 impl Results<'_> {
     /// What a reader of the products should know, one sentence each.
     pub(super) fn notes(&self) -> Vec<String> {
-        let mut notes = self.kernels.explanation().to_vec();
+        let choice = self.choice.iter().flat_map(|choice| &choice.value.notes);
+        let mut notes: Vec<String> = choice.chain(self.kernels.explanation()).cloned().collect();
         notes.extend(self.found.value.notes.iter().cloned());
         notes.extend(self.converted.value.notes.iter().cloned());
         for image in &self.images.value {
@@ -49,6 +50,10 @@ impl Results<'_> {
                     .iter()
                     .map(|note| format!("image {}: {note}", image.id)),
             );
+        }
+        for orientation in self.orientations {
+            let (image, held) = (&orientation.value.image, &orientation.value.notes);
+            notes.extend(held.iter().map(|note| format!("image {image}: {note}")));
         }
         notes
     }
@@ -124,6 +129,9 @@ impl Results<'_> {
             },
             biases: biases(config),
             kernels,
+            kernel_choice: self
+                .choice
+                .map_or_else(Vec::new, |choice| choice.value.entries.clone()),
             stages,
             products,
             counts,
@@ -164,26 +172,20 @@ fn biases(config: &SiteConfig) -> Vec<BiasEntry> {
     ]
 }
 
-/// Kernels with the coverage that the run needed of each.
+/// Kernels with what the run read of each: where several hold the same instant, the last one is read.
 pub(super) fn kernel_entries(session: &Session, results: &Results<'_>) -> Result<Vec<KernelEntry>> {
-    let coverage = session.coverage()?;
-    let wanted = results.wanted;
+    let tolerance_s = results.config.kernels.ck_tolerance_s;
+    let in_use = session.coverage_in_use(results.wanted, tolerance_s)?;
     let entries = results.kernels.kernels().iter().enumerate();
     Ok(entries
         .map(|(index, kernel)| {
-            let own = coverage.per_kernel.iter().find(|(of, _)| *of == index);
-            let used = match kernel.role {
-                KernelRole::Ck => &wanted.attitudes,
-                _ => &wanted.positions,
-            };
+            let own = in_use.iter().find(|(of, _)| *of == index);
             KernelEntry {
                 name: kernel.file_name(),
                 role: kernel.role.to_string(),
                 bytes: kernel.bytes,
                 blake3: kernel.blake3.clone(),
-                coverage_used: own.map_or_else(Vec::new, |(_, held)| {
-                    held.intersection(used).as_slice().to_vec()
-                }),
+                coverage_used: own.map_or_else(Vec::new, |(_, used)| used.as_slice().to_vec()),
             }
         })
         .collect())

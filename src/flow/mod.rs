@@ -1,6 +1,8 @@
 //! The way of the data: kernels → times → footprints → IAU 2000 → ranges → orientation → model → products.
 
 mod check;
+mod choice;
+mod compare;
 mod manifest;
 mod parts;
 mod plan;
@@ -18,6 +20,8 @@ use crate::{
 };
 
 pub use check::{Checked, check_site};
+pub use choice::{rival_sets, wanted_by_site};
+pub use compare::{Compared, EPOCHS_MAX, LeftOut, Request, RivalSet, compare_kernels};
 pub use plan::{PlannedStage, plan_site};
 pub use sites::publish_sites;
 
@@ -38,6 +42,8 @@ pub enum Stage {
     ConvertDatum,
     /// Shots of one orbit in one window.
     GroupProfiles,
+    /// Of rival kernel sets the one closest to the mean of all; nothing when there is one source.
+    ChooseKernels,
     /// Three-way range check.
     CheckRanges,
     /// Exterior orientation at 31 epochs.
@@ -58,6 +64,7 @@ impl Stage {
             Self::SearchFootprints => "search_footprints",
             Self::ConvertDatum => "convert_datum",
             Self::GroupProfiles => "group_profiles",
+            Self::ChooseKernels => "choose_kernels",
             Self::CheckRanges => "check_ranges",
             Self::SampleOrientation => "sample_orientation",
             Self::FitSensorModel => "fit_sensor_model",
@@ -87,7 +94,7 @@ pub struct RunOptions<'a> {
     pub until: Stage,
     /// Use no stored output.
     pub force: bool,
-    /// Set from outside to stop between two stages.
+    /// Set from outside to stop between two stages, or inside the search and the range check.
     pub stop: &'a AtomicBool,
 }
 
@@ -145,14 +152,15 @@ pub fn run_site(config: &SiteConfig, options: &RunOptions<'_>) -> Result<SiteOut
 
 /// The way of the data; every step keeps its stored output when nothing that it depends on moved.
 fn run_steps(steps: &Steps<'_>) -> std::result::Result<Ending, Leave> {
-    let clocks = steps.load_kernels(&Wanted::default())?;
+    let clocks = steps.load_kernels(&Wanted::default(), None)?;
     let images = steps.tag_times(&clocks)?;
     let found = steps.search_footprints()?;
     let converted = steps.convert_datum(&found)?;
     let profiles = steps.group_profiles(&converted, &images)?;
 
     let wanted = wanted(steps.config, &images.value, &profiles.value);
-    let kernels = steps.load_kernels(&wanted)?;
+    let choice = steps.choose_kernels(&wanted)?;
+    let kernels = steps.load_kernels(&wanted, choice.as_ref())?;
     let ranges = steps.check_ranges(&kernels, &converted, &profiles)?;
     let orientations = steps.sample_orientation(&kernels, &images)?;
     let models = steps.fit_sensor_model(&orientations)?;
@@ -161,6 +169,7 @@ fn run_steps(steps: &Steps<'_>) -> std::result::Result<Ending, Leave> {
         config: steps.config,
         kernels: &kernels,
         wanted: &wanted,
+        choice: choice.as_ref(),
         images: &images,
         found: &found,
         converted: &converted,

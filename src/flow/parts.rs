@@ -1,20 +1,24 @@
 //! What each stage depends on. The lists are the method's dependencies, read beside [`super::run_site`].
 
-use std::path::{Path, PathBuf};
+use std::{
+    path::{Path, PathBuf},
+    sync::atomic::AtomicBool,
+};
 
 use rayon::prelude::*;
 
+use super::RivalSet;
 use crate::{
     config::SiteConfig,
-    error::Result,
+    error::{Result, Stopped},
     files::{file_name, hash_file},
-    spice::{KernelRole, KernelSet},
+    spice::{KernelRole, KernelSet, Wanted},
     stages::tag_times::ImageTimes,
     store::fingerprint::Parts,
 };
 
 /// Raised when a stage computes something else from the same parts, or lays its output out anew.
-const METHOD: u32 = 3;
+const METHOD: u32 = 4;
 
 /// Image keys, label files and all text kernels, among them those that convert times.
 pub(super) fn tag_times(config: &SiteConfig, kernels: &KernelSet) -> Result<Parts> {
@@ -31,12 +35,13 @@ pub(super) fn tag_times(config: &SiteConfig, kernels: &KernelSet) -> Result<Part
     }))
 }
 
-/// BLAKE3 of files, in their order.
-pub(super) fn hash_files(paths: &[PathBuf]) -> Result<Vec<String>> {
-    paths
-        .par_iter()
-        .map(|path| Ok(hash_file(path)?.0))
-        .collect()
+/// BLAKE3 of files, in their order; `stop` is looked at before each.
+pub(super) fn hash_files(paths: &[PathBuf], stop: &AtomicBool) -> Result<Vec<String>> {
+    let hash = |path: &PathBuf| {
+        Stopped::check(stop)?;
+        Ok(hash_file(path)?.0)
+    };
+    paths.par_iter().map(hash).collect()
 }
 
 /// PEDR files (by their hashes) and filters, windows, and the clock correction.
@@ -72,6 +77,27 @@ pub(super) fn group_profiles(
         .key("windows (names)", &windows)
         .output("convert_datum", converted)
         .output("tag_times", images)
+}
+
+/// The positions that are needed, and of every set, by its name, what its trajectory and its clocks
+/// come from.
+pub(super) fn choose_kernels(config: &SiteConfig, wanted: &Wanted, rivals: &[RivalSet]) -> Parts {
+    let names: Vec<&str> = rivals.iter().map(|rival| &*rival.id).collect();
+    let mut parts = Parts::new(METHOD)
+        .key("kernels.sets (names)", &names)
+        .key("images (any)", &!config.images.is_empty())
+        .key("positions", &wanted.positions);
+    for rival in rivals {
+        let kernels = rival.kernels.kernels().iter();
+        let of_trajectory =
+            kernels.filter(|kernel| !matches!(kernel.role, KernelRole::Ck | KernelRole::Ik));
+        for (place, kernel) in of_trajectory.enumerate() {
+            let value = format!("{}: {}", place + 1, kernel.blake3);
+            let sort = format!("kernel of set {}", rival.id);
+            parts = parts.file(&sort, &kernel.file_name(), &value);
+        }
+    }
+    parts
 }
 
 /// Footprints, profiles, limits, the clock correction, the ephemerides and their frames.

@@ -1,12 +1,14 @@
 //! Which stages would run, and why; nothing is written.
 
-use std::path::Path;
+use std::{path::Path, sync::atomic::AtomicBool};
 
 use serde::de::DeserializeOwned;
 
 use super::{
-    Stage, parts, publish,
-    steps::{load_kernels, wanted},
+    Stage,
+    choice::KernelChoice,
+    parts, publish,
+    steps::{load_kernels, load_rivals, wanted},
 };
 use crate::{
     config::{KernelSource, SiteConfig},
@@ -60,10 +62,11 @@ fn plan_stages(config: &SiteConfig, out: &Path, force: bool) -> Result<Vec<Plann
         planned: Vec::new(),
         outputs: Vec::new(),
     };
-    let clocks = load_kernels(config, &Wanted::default()).in_stage(Stage::LoadKernels.name())?;
+    let clocks = load_kernels(config, &Wanted::default(), 0).in_stage(Stage::LoadKernels.name())?;
     let parts = parts::tag_times(config, &clocks).in_stage(Stage::TagTimes.name())?;
     let images = plan.look::<Vec<ImageTimes>>(Stage::TagTimes, &parts);
-    let hashes = parts::hash_files(&config.pedr.files).in_stage(Stage::SearchFootprints.name())?;
+    let hashes = parts::hash_files(&config.pedr.files, &AtomicBool::new(false))
+        .in_stage(Stage::SearchFootprints.name())?;
     let parts = parts::search_footprints(config, &hashes);
     let found = plan.look::<SearchResult>(Stage::SearchFootprints, &parts);
     let parts = parts::convert_datum(config, hash(found.as_ref()));
@@ -71,23 +74,29 @@ fn plan_stages(config: &SiteConfig, out: &Path, force: bool) -> Result<Vec<Plann
     let parts = parts::group_profiles(config, hash(converted.as_ref()), hash(images.as_ref()));
     let profiles = plan.look::<Vec<Profile>>(Stage::GroupProfiles, &parts);
 
-    let chosen = matches!(config.kernels.source, KernelSource::Root(_));
-    if chosen && (images.is_none() || profiles.is_none()) {
+    let rivals = load_rivals(config).in_stage(Stage::ChooseKernels.name())?;
+    let depends = !matches!(config.kernels.source, KernelSource::Listed(_));
+    if depends && (images.is_none() || profiles.is_none()) {
         // Which kernels will be chosen is not known before the stages above have run.
-        plan.add(Stage::CheckRanges, None, follows());
-        for image in &config.images {
-            plan.add(Stage::SampleOrientation, Some(&image.id), follows());
-            plan.add(Stage::FitSensorModel, Some(&image.id), follows());
+        if !rivals.is_empty() {
+            plan.add(Stage::ChooseKernels, None, follows());
         }
-        plan.add(Stage::Publish, None, follows());
-        return Ok(plan.planned);
+        return Ok(plan.all_follow(config));
     }
     let times = images.as_ref().map_or(&[][..], |images| &images.value);
     let flights = profiles
         .as_ref()
         .map_or(&[][..], |profiles| &profiles.value);
     let wanted = wanted(config, times, flights);
-    let kernels = load_kernels(config, &wanted).in_stage(Stage::LoadKernels.name())?;
+    let mut chosen = 0;
+    if !rivals.is_empty() {
+        let parts = parts::choose_kernels(config, &wanted, &rivals);
+        match plan.look::<KernelChoice>(Stage::ChooseKernels, &parts) {
+            Some(choice) => chosen = choice.value.chosen,
+            None => return Ok(plan.all_follow(config)),
+        }
+    }
+    let kernels = load_kernels(config, &wanted, chosen).in_stage(Stage::LoadKernels.name())?;
     let parts = parts::check_ranges(
         config,
         &kernels,
@@ -156,6 +165,17 @@ impl Planner {
             .push((name(stage, image), hash(output.as_ref()).map(str::to_owned)));
         self.add(stage, image, because);
         output
+    }
+
+    /// The plan when the kernels are not known before earlier stages have run.
+    fn all_follow(mut self, config: &SiteConfig) -> Vec<PlannedStage> {
+        self.add(Stage::CheckRanges, None, follows());
+        for image in &config.images {
+            self.add(Stage::SampleOrientation, Some(&image.id), follows());
+            self.add(Stage::FitSensorModel, Some(&image.id), follows());
+        }
+        self.add(Stage::Publish, None, follows());
+        self.planned
     }
 
     fn add(&mut self, of: Stage, image: Option<&str>, because: Because) {

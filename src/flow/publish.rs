@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use super::{
     Ending, Stage,
+    choice::KernelChoice,
     manifest::{Account, kernel_entries, kernel_lines, pck_note},
     parts,
 };
@@ -38,6 +39,7 @@ pub(super) struct Results<'a> {
     pub(super) config: &'a SiteConfig,
     pub(super) kernels: &'a KernelSet,
     pub(super) wanted: &'a Wanted,
+    pub(super) choice: Option<&'a Output<KernelChoice>>,
     pub(super) images: &'a Output<Vec<ImageTimes>>,
     pub(super) found: &'a Output<SearchResult>,
     pub(super) converted: &'a Output<Converted>,
@@ -84,7 +86,10 @@ pub(super) fn publish(folder: &Path, cache: &StageCache, results: &Results<'_>) 
     }
     let fingerprint = parts.fingerprint();
     let manifest = make_products(folder, results, fingerprint)?;
-    Ok(Ending::Published(cache.store(name, parts, manifest)?.value))
+    let published = cache.store(name, parts, manifest)?.value;
+    let stages = published.stages.iter().map(|stage| &*stage.name);
+    cache.keep_only(stages);
+    Ok(Ending::Published(published))
 }
 
 fn make_products(folder: &Path, results: &Results<'_>, fingerprint: String) -> Result<Manifest> {
@@ -99,6 +104,9 @@ fn make_products(folder: &Path, results: &Results<'_>, fingerprint: String) -> R
     let warnings: Vec<String> = pck_note(&session, &results.wanted.positions)
         .into_iter()
         .collect();
+    for warning in &warnings {
+        tracing::warn!("{warning}");
+    }
     let kernels = kernel_entries(&session, results)?;
     let lines = kernel_lines(&session, results.kernels)?;
     drop(session);
@@ -180,8 +188,10 @@ impl Results<'_> {
             entry(Stage::SearchFootprints.name().to_owned(), self.found),
             entry(Stage::ConvertDatum.name().to_owned(), self.converted),
             entry(Stage::GroupProfiles.name().to_owned(), self.profiles),
-            entry(Stage::CheckRanges.name().to_owned(), self.ranges),
         ];
+        let choice = self.choice.into_iter();
+        stages.extend(choice.map(|choice| entry(Stage::ChooseKernels.name().to_owned(), choice)));
+        stages.push(entry(Stage::CheckRanges.name().to_owned(), self.ranges));
         for (orientation, model) in self.orientations.iter().zip(self.models) {
             let image = &orientation.value.image;
             stages.push(entry(Stage::SampleOrientation.of_image(image), orientation));

@@ -1,14 +1,16 @@
 //! One step of the flow per stage: its parts, the stored output or a run, and the place of a failure.
 
-use std::{path::PathBuf, sync::atomic::Ordering};
+use std::path::PathBuf;
 
 use super::{
-    Ending, RunOptions, Stage, parts,
+    Ending, RivalSet, RunOptions, Stage,
+    choice::{KernelChoice, choose_kernels},
+    parts,
     publish::{self, Results},
 };
 use crate::{
-    config::{KernelSource, SiteConfig},
-    error::{Failure, Fault, Kind, Place, Result},
+    config::{KernelList, KernelSource, SiteConfig},
+    error::{Failure, Fault, Kind, Place, Result, Stopped},
     spice::{KernelSet, Session, Trajectory, Wanted},
     stages::{
         check_ranges::{RangeCheck, check_ranges},
@@ -53,23 +55,6 @@ impl From<Failure> for Leave {
 
 type Step<T> = std::result::Result<T, Leave>;
 
-/// The user stopped the program.
-#[derive(Debug, thiserror::Error)]
-#[error("stopped before {before}")]
-struct Stopped {
-    before: Stage,
-}
-
-impl Fault for Stopped {
-    fn kind(&self) -> Kind {
-        Kind::Interrupted
-    }
-
-    fn advice(&self) -> String {
-        "run again: finished stages are kept".to_owned()
-    }
-}
-
 /// A PEDR file changed between its hash and its search.
 #[derive(Debug, thiserror::Error)]
 #[error("the file changed while it was read")]
@@ -91,10 +76,7 @@ impl Steps<'_> {
         if self.options.until < stage {
             return Err(Leave::AsAsked);
         }
-        if self.options.stop.load(Ordering::Relaxed) {
-            return Err(Failure::from(Stopped { before: stage }).into());
-        }
-        Ok(())
+        Ok(Stopped::check(self.options.stop).in_stage(stage.name())?)
     }
 
     /// Makes sure that the kernels are still what was hashed, after stages that read them.
@@ -122,9 +104,34 @@ impl Steps<'_> {
         unchanged
     }
 
-    pub(super) fn load_kernels(&self, wanted: &Wanted) -> Step<KernelSet> {
+    pub(super) fn load_kernels(
+        &self,
+        wanted: &Wanted,
+        choice: Option<&Output<KernelChoice>>,
+    ) -> Step<KernelSet> {
         self.enter(Stage::LoadKernels)?;
-        Ok(load_kernels(self.config, wanted).in_stage(Stage::LoadKernels.name())?)
+        let chosen = choice.map_or(0, |choice| choice.value.chosen);
+        Ok(load_kernels(self.config, wanted, chosen).in_stage(Stage::LoadKernels.name())?)
+    }
+
+    pub(super) fn choose_kernels(&self, wanted: &Wanted) -> Step<Option<Output<KernelChoice>>> {
+        self.enter(Stage::ChooseKernels)?;
+        let stage = Stage::ChooseKernels.name();
+        let rivals = load_rivals(self.config).in_stage(stage)?;
+        if rivals.is_empty() {
+            return Ok(None);
+        }
+        let parts = parts::choose_kernels(self.config, wanted, &rivals);
+        let choice = self.cache.stage(stage, parts, || {
+            choose_kernels(self.config, wanted, &rivals).in_stage(stage)
+        })?;
+        for rival in &rivals {
+            self.check_kernels(&rival.kernels, [(stage, choice.fresh)])?;
+        }
+        for note in &choice.value.notes {
+            tracing::info!(stage, "{note}");
+        }
+        Ok(Some(choice))
     }
 
     pub(super) fn tag_times(&self, clocks: &KernelSet) -> Step<Output<Vec<ImageTimes>>> {
@@ -141,17 +148,14 @@ impl Steps<'_> {
     pub(super) fn search_footprints(&self) -> Step<Output<SearchResult>> {
         self.enter(Stage::SearchFootprints)?;
         let stage = Stage::SearchFootprints.name();
-        let hashes = parts::hash_files(&self.config.pedr.files).in_stage(stage)?;
+        let hashes =
+            parts::hash_files(&self.config.pedr.files, self.options.stop).in_stage(stage)?;
         let parts = parts::search_footprints(self.config, &hashes);
         let correction_s = self.config.mola_clock.correction_s();
         Ok(self.cache.stage(stage, parts, || {
-            let found = search_footprints(&self.config.pedr, &self.config.windows, correction_s)?;
-            for ((file, hash), path) in found
-                .footprints
-                .files
-                .iter()
-                .zip(&hashes)
-                .zip(&self.config.pedr.files)
+            let (pedr, windows) = (&self.config.pedr, &self.config.windows);
+            let found = search_footprints(pedr, windows, correction_s, self.options.stop)?;
+            for ((file, hash), path) in found.footprints.files.iter().zip(&hashes).zip(&pedr.files)
             {
                 if file.blake3 != *hash {
                     return Err(Failure::from(ChangedFile).in_file(path).in_stage(stage));
@@ -206,6 +210,7 @@ impl Steps<'_> {
                 &trajectory,
                 &self.config.mola_clock,
                 &self.config.range_check,
+                self.options.stop,
             )
             .in_stage(stage)
         })?;
@@ -276,13 +281,41 @@ impl Steps<'_> {
     }
 }
 
-/// The kernels of the configuration; from a folder, those that cover `wanted` (text kernels always).
-pub(super) fn load_kernels(config: &SiteConfig, wanted: &Wanted) -> Result<KernelSet> {
+/// The kernels of the configuration; from a folder, those that cover `wanted` (text kernels always);
+/// of rival sets the `chosen` one, which is the first as long as only clocks are needed.
+pub(super) fn load_kernels(
+    config: &SiteConfig,
+    wanted: &Wanted,
+    chosen: usize,
+) -> Result<KernelSet> {
     match &config.kernels.source {
-        KernelSource::Metakernel(path) => KernelSet::from_metakernel(path),
-        KernelSource::Files(paths) => KernelSet::from_files(paths),
+        KernelSource::Listed(list) => load_list(list),
         KernelSource::Root(selection) => KernelSet::select(selection, wanted),
+        KernelSource::Sets(sets) => sets
+            .get(chosen)
+            .map_or_else(|| Ok(KernelSet::default()), |set| load_list(&set.list)),
     }
+}
+
+fn load_list(list: &KernelList) -> Result<KernelSet> {
+    match list {
+        KernelList::Metakernel(path) => KernelSet::from_metakernel(path),
+        KernelList::Files(paths) => KernelSet::from_files(paths),
+    }
+}
+
+/// The rival sets of the configuration; none when it names one source.
+pub(super) fn load_rivals(config: &SiteConfig) -> Result<Vec<RivalSet>> {
+    let KernelSource::Sets(sets) = &config.kernels.source else {
+        return Ok(Vec::new());
+    };
+    let rivals = sets.iter().map(|set| {
+        Ok(RivalSet {
+            id: set.id.clone(),
+            kernels: load_list(&set.list)?,
+        })
+    });
+    rivals.collect()
 }
 
 /// Seconds beyond a profile for which the spacecraft's path is tabulated.

@@ -106,6 +106,34 @@ pub fn matrix_of_rotation_vector(vector_rad: &Vector3<f64>) -> Matrix3<f64> {
     Rotation3::new(*vector_rad).into_inner()
 }
 
+/// Steps towards the mean rotation that are tried; each leaves the cube of what was left.
+const MEAN_STEPS_MAX: u32 = 20;
+/// Size of the last step, radians.
+const MEAN_STEP_RAD: f64 = 1e-14;
+
+/// The rotation from which the rotation vectors to all of `matrices` add up to zero.
+///
+/// For rotations less than a right angle apart there is one such; the identity for none.
+#[must_use]
+pub fn mean_rotation(matrices: &[Matrix3<f64>]) -> Matrix3<f64> {
+    let Some(first) = matrices.first() else {
+        return Matrix3::identity();
+    };
+    let share = 1.0 / matrices.len() as f64;
+    let mut mean = *first;
+    for _ in 0..MEAN_STEPS_MAX {
+        let step_rad: Vector3<f64> = matrices
+            .iter()
+            .map(|matrix| share * rotation_vector(&(matrix * mean.transpose())))
+            .sum();
+        mean = matrix_of_rotation_vector(&step_rad) * mean;
+        if step_rad.norm() < MEAN_STEP_RAD {
+            break;
+        }
+    }
+    mean
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -140,6 +168,23 @@ mod tests {
         let nadir = -Vector3::new(2743.679, -2435.358, -895.114).normalize();
         let off_nadir_deg = boresight.angle(&nadir) / RADIANS_PER_DEGREE;
         assert!((off_nadir_deg - 0.125).abs() < 0.001, "{off_nadir_deg} deg"); // angles have 1e-4 deg
+    }
+
+    #[test]
+    fn the_mean_rotation_lies_in_the_middle() {
+        let about_z = |angle_rad: f64| {
+            matrix_of_rotation_vector(&Vector3::new(0.0, 0.0, angle_rad)) * frame_rotation_1(0.3)
+        };
+        let mean = mean_rotation(&[about_z(0.1), about_z(0.2), about_z(0.6)]);
+        assert!((mean - about_z(0.3)).norm() < 1e-14); // rounding
+        let (tilted, other) = (frame_rotation_1(1e-3), frame_rotation_2(-2e-3));
+        let mean = mean_rotation(&[tilted, other, about_z(0.0)]);
+        let rest: Vector3<f64> = [tilted, other, about_z(0.0)]
+            .iter()
+            .map(|matrix| rotation_vector(&(matrix * mean.transpose())))
+            .sum();
+        assert!(rest.norm() < 1e-13); // the definition, to the size of the last step
+        assert_eq!(mean_rotation(&[]), Matrix3::identity());
     }
 
     #[test]

@@ -6,6 +6,7 @@ pub mod ellipsoid;
 pub mod lagrange;
 pub mod map_projection;
 pub mod mars_rotation;
+pub mod orbit_axes;
 pub mod polynomial;
 pub mod statistics;
 pub mod window;

@@ -6,11 +6,8 @@ use geo::{BoundingRect, Coord, Intersects, LineString, Polygon};
 
 use crate::{
     config::WindowShape,
-    units::{wrap_pi, wrap_two_pi},
+    units::{longitude_step_rad, wrap_pi, wrap_two_pi},
 };
-
-/// Steps in longitude this close to half or a whole turn, radians, count as such (3 µm on the ground).
-const TURN_TOLERANCE_RAD: f64 = 1e-12;
 
 /// A window made ready for many tests.
 #[derive(Debug, Clone, PartialEq)]
@@ -152,7 +149,7 @@ impl Ring {
         let mut line: Vec<Coord<f64>> = Vec::with_capacity(vertices.len() + 3);
         let (mut x, mut written) = (vertices[0][0], vertices[0][0]);
         for &[longitude, latitude] in vertices.iter().chain(vertices.first()) {
-            x += step_rad(longitude - written);
+            x += longitude_step_rad(longitude - written);
             written = longitude;
             line.push(Coord { x, y: latitude });
         }
@@ -183,18 +180,6 @@ impl Ring {
             let point = Coord { x, y: latitude_rad };
             self.polygon.intersects(&point)
         })
-    }
-}
-
-/// A step in longitude as written, radians, or the shorter way when it is longer than half a turn.
-///
-/// A whole turn stays: polar caps are written with an edge from −180° to 180°.
-fn step_rad(written_rad: f64) -> f64 {
-    let length = written_rad.abs();
-    if length <= PI + TURN_TOLERANCE_RAD || (length - TAU).abs() <= TURN_TOLERANCE_RAD {
-        written_rad
-    } else {
-        wrap_pi(written_rad)
     }
 }
 

@@ -59,7 +59,8 @@ pub(super) fn write_text(path: &Path, text: &str) -> Result<()> {
     .in_file(path)
 }
 
-fn read(path: &Path) -> Result<Vec<u8>> {
+/// All bytes of `path`.
+pub(super) fn read(path: &Path) -> Result<Vec<u8>> {
     let mut bytes = Vec::new();
     open(path)?
         .read_to_end(&mut bytes)

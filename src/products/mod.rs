@@ -23,6 +23,7 @@ mod orientation;
 mod parquet;
 mod pds4_label;
 mod ranges;
+pub mod read;
 mod site;
 mod table;
 mod text_table;

@@ -20,7 +20,7 @@ use crate::{
 };
 
 /// What each residual is, for readers of the files.
-const DEFINITIONS: [(&str, &str); 5] = [
+const DEFINITIONS: [(&str, &str); 6] = [
     (
         "range_minus_distance",
         "measured range minus |spacecraft in the kernels - footprint with the raw radius|, \
@@ -42,7 +42,14 @@ const DEFINITIONS: [(&str, &str); 5] = [
     ),
     (
         "trend",
-        "slope of range_minus_distance over time, with its standard uncertainty",
+        "slope of range_minus_distance over time, with its standard uncertainty from the scatter about \
+        the line, correlated neighbours counted",
+    ),
+    (
+        "bias_scan",
+        "spread of range_minus_distance against an assumed correction of the time tags; best_s is known \
+        as well as its scatter and the orbit allow: uncertainty_s takes the mean difference of the two \
+        orbits for what either may be off, a metre along the flight being 0.3 ms",
     ),
 ];
 

@@ -91,7 +91,8 @@ impl SiteProducts<'_> {
             }
         }
         for image in self.images {
-            for reason in &image.model.invalid_because {
+            let orientation = &image.orientation.invalid_because;
+            for reason in orientation.iter().chain(&image.model.invalid_because) {
                 reasons.push(format!("image {}: {reason}", image.times.id));
             }
         }

@@ -15,6 +15,8 @@
     reason = "pixels, bars and grid lines are small numbers, and casts of floats saturate"
 )]
 
+mod compare;
+mod diff;
 mod graticule;
 mod html;
 mod images;
@@ -28,6 +30,8 @@ mod timeline;
 
 use crate::{error::Result, products::SiteProducts};
 
+pub use compare::{KernelComparison, comparison_page};
+pub use diff::difference_page;
 pub use sites::{SiteLine, SiteSummary, sites_page};
 
 use html::Section;

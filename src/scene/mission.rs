@@ -51,7 +51,9 @@ pub fn write_scene(directory: &Path, options: &SceneOptions) -> Result<SceneSumm
     let mut truth = Truth::new(options.seed);
     let pedr = draft.folder("pedr")?;
     for arc in &arcs {
-        truth.images.push(ImageTruth::of(arc));
+        truth
+            .images
+            .push(ImageTruth::of(arc, &versions(arc, options.seed)));
         let (file, profile) = write_day(&pedr, arc, &terrain, options.seed)?;
         truth.files.push(file);
         truth.profiles.push(profile);

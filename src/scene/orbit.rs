@@ -102,13 +102,6 @@ pub(super) fn eccentric_anomaly(mean_anomaly_rad: f64, eccentricity: f64) -> f64
     eccentric_rad
 }
 
-/// The three axes of an orbit: radial, along the track and across it (along the orbit's normal).
-pub(super) fn radial_along_cross(state: &OrbitState) -> Matrix3<f64> {
-    let radial = state.position_m.normalize();
-    let cross = state.position_m.cross(&state.velocity_m_s).normalize();
-    Matrix3::from_columns(&[radial, cross.cross(&radial), cross])
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -9,6 +9,7 @@ use super::{
     laser::{CROSSOVER_AMPLITUDE_M, CROSSOVER_PERIOD_S},
     pedr::KeptShot,
     plan::Look,
+    versions::Version,
 };
 use crate::{
     constants::{MARS_IAU2000, MGS_POINTING_BIAS, MOLA_CLOCK_BIAS_S},
@@ -27,6 +28,7 @@ const EPOCHS: u32 = 31;
 pub(super) struct Truth {
     pub made_by: &'static str,
     pub synthetic: &'static str,
+    pub orbit: &'static str,
     pub seed: u64,
     pub biases: Biases,
     pub crossover: Crossover,
@@ -70,6 +72,9 @@ pub(super) struct ImageTruth {
     epochs_et_s: Vec<f64>,
     position_iau2000_m: Vec<[f64; 3]>,
     camera_to_mars_quaternion_wxyz: Vec<[f64; 4]>,
+    /// Each family's orbit minus the true one along the radial, along-track and cross-track axes of the
+    /// true orbit, metres, one entry per epoch.
+    orbit_radial_along_cross_m: BTreeMap<&'static str, Vec<[f64; 3]>>,
 }
 
 /// One PEDR file.
@@ -118,6 +123,7 @@ impl Truth {
         Self {
             made_by: "areograph scene",
             synthetic: "all of this is invented; only ids, times and geometry of the images follow Shan et al. 2005",
+            orbit: "all positions below, of images and behind the shots, belong to the true orbit, which is gsfc (kernels/gsfc.tm); nav and ipng, and the site files use nav, differ from it by orbit_differences",
             seed,
             biases: Biases {
                 ck_bias_s: MGS_POINTING_BIAS.seconds(),
@@ -140,8 +146,8 @@ impl Truth {
 }
 
 impl ImageTruth {
-    /// Orientation of the arc's image.
-    pub(super) fn of(arc: &Arc) -> Self {
+    /// Orientation of the arc's image, and how far the rival orbits are off.
+    pub(super) fn of(arc: &Arc, versions: &[Version]) -> Self {
         let image = arc.image;
         let step_s = arc.exposed.duration_s() / f64::from(EPOCHS - 1);
         let epochs: Vec<_> = (0..EPOCHS)
@@ -178,6 +184,15 @@ impl ImageTruth {
                 .iter()
                 .map(|et| {
                     (mars_matrix(&MARS_IAU2000, *et) * arc.orbit.state(*et).position_m).into()
+                })
+                .collect(),
+            orbit_radial_along_cross_m: versions
+                .iter()
+                .map(|version| {
+                    let off = epochs
+                        .iter()
+                        .map(|et| version.radial_along_cross_m(*et).into());
+                    (version.family, off.collect())
                 })
                 .collect(),
             epochs_et_s: epochs.iter().map(|et| et.seconds()).collect(),

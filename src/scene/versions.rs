@@ -3,10 +3,10 @@
 use nalgebra::Vector3;
 
 use super::{
-    orbit::{Orbit, OrbitState, radial_along_cross},
+    orbit::{Orbit, OrbitState},
     random::Random,
 };
-use crate::time::Et;
+use crate::{geom::orbit_axes::radial_along_cross, time::Et};
 
 /// Families of orbit solutions, as the archive names them.
 pub(super) const FAMILIES: [&str; 3] = ["nav", "gsfc", "ipng"];
@@ -57,9 +57,15 @@ impl Version {
         if self.offset_m.norm_squared() <= 0.0 {
             return state.position_m;
         }
+        let axes = radial_along_cross(&state.position_m, &state.velocity_m_s);
+        state.position_m + axes * self.radial_along_cross_m(et)
+    }
+
+    /// This version minus the truth at `et` along the axes of the true orbit, metres.
+    pub(super) fn radial_along_cross_m(&self, et: Et) -> Vector3<f64> {
         // A tenth of the difference swings with the revolution.
         let slow = 1.0 + 0.1 * (Orbit::mean_motion_rad_s() * et.since(self.middle)).sin();
-        state.position_m + radial_along_cross(&state) * (slow * self.offset_m)
+        slow * self.offset_m
     }
 
     /// State of this version at `et`; what is added to the true velocity is a central difference, good to

@@ -4,7 +4,13 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
-use super::{daf, error::SpiceFault, kernels::KernelRole, session::Session};
+use super::{
+    daf,
+    error::SpiceFault,
+    kernels::KernelRole,
+    select::Wanted,
+    session::{CLOCKS, Session},
+};
 use crate::{
     constants::{NAIF_MARS, NAIF_MGS, NAIF_MGS_BUS},
     error::{Place, Result},
@@ -38,7 +44,7 @@ impl Session {
     /// Coverage of all loaded kernels, at the level of intervals.
     ///
     /// # Errors
-    /// [`SpiceFault::Spice`] when a C-kernel cannot be read, or the clock kernel is missing.
+    /// [`SpiceFault::Spice`] when a C-kernel cannot be read; [`SpiceFault::MissingText`] without clock.
     pub fn coverage(&self) -> Result<&Coverage> {
         if let Some(coverage) = self.coverage.get() {
             return Ok(coverage);
@@ -71,8 +77,12 @@ impl Session {
                     }
                 }
                 KernelRole::Ck => {
-                    let windows = self.cspice.ck_coverage(&kernel.path, NAIF_MGS_BUS);
-                    held.extend(windows.in_file(&kernel.path)?.into_iter().map(interval_of));
+                    let windows = self
+                        .cspice
+                        .ck_coverage(&kernel.path, NAIF_MGS_BUS)
+                        .map_err(|fault| self.explain(fault, &CLOCKS))
+                        .in_file(&kernel.path)?;
+                    held.extend(windows.into_iter().map(interval_of));
                     attitude.extend_from_slice(&held);
                 }
                 _ => {}
@@ -90,6 +100,33 @@ impl Session {
         Ok(coverage)
     }
 
+    /// For each kernel that holds MGS: its index in the set, and the wanted instants for which CSPICE reads
+    /// it, because no later kernel of its role holds them.
+    ///
+    /// * `tolerance_s` – how far outside its intervals a C-kernel may be asked, seconds
+    ///
+    /// # Errors
+    /// As [`Self::coverage`].
+    pub fn coverage_in_use(
+        &self,
+        wanted: &Wanted,
+        tolerance_s: f64,
+    ) -> Result<Vec<(usize, Intervals)>> {
+        let (mut positions, mut attitudes) = (wanted.positions.clone(), wanted.attitudes.clone());
+        let mut in_use = Vec::new();
+        for (index, held) in self.coverage()?.per_kernel.iter().rev() {
+            let (open, reach_s) = match self.kernels.kernels()[*index].role {
+                KernelRole::Ck => (&mut attitudes, tolerance_s),
+                _ => (&mut positions, 0.0),
+            };
+            in_use.push((*index, held.intersection(open)));
+            let reached = held.as_slice().iter().map(|part| part.padded(reach_s));
+            *open = open.without(&Intervals::union_of(reached));
+        }
+        in_use.reverse();
+        Ok(in_use)
+    }
+
     /// Makes sure that the position of MGS is known throughout `wanted`.
     ///
     /// # Errors
@@ -102,7 +139,8 @@ impl Session {
     /// Makes sure that the attitude is known for every exposure in `exposures`.
     ///
     /// What is looked for are the instants as the C-kernels count them, with `padding_s` seconds more
-    /// at both ends.
+    /// at both ends; an instant within `tolerance_s` of a C-kernel's interval is known, as it is to
+    /// [`Session::attitude`].
     ///
     /// # Errors
     /// [`SpiceFault::CoverageGap`] with the first gap and the kernels beside it.
@@ -111,10 +149,12 @@ impl Session {
         exposures: Interval,
         bias: PointingBias,
         padding_s: f64,
+        tolerance_s: f64,
     ) -> Result<()> {
         let wanted = exposures.shifted(bias.seconds()).padded(padding_s);
-        let held = &self.coverage()?.ck;
-        self.require(wanted, held, "attitude", KernelRole::Ck)
+        let intervals = self.coverage()?.ck.as_slice().iter();
+        let held = Intervals::union_of(intervals.map(|interval| interval.padded(tolerance_s)));
+        self.require(wanted, &held, "attitude", KernelRole::Ck)
     }
 
     fn require(

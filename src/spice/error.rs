@@ -57,6 +57,18 @@ pub enum SpiceFault {
         /// What is missing, for example `defines the MGS clock (SCLK_DATA_TYPE_94)`.
         what: String,
     },
+    /// A set of kernels lacks a text kernel that a call needs.
+    #[error("no {kernel} in the set{}", without(set, variable))]
+    MissingText {
+        /// The kernel that usually holds it.
+        kernel: &'static str,
+        /// The variable that is not defined.
+        variable: &'static str,
+        /// A file of the archive that holds it.
+        example: &'static str,
+        /// Names of the kernels of the set.
+        set: Vec<String>,
+    },
     /// A kernel is not what it was when it was chosen.
     #[error("kernel changed while it was in use: BLAKE3 was {was}, is {is}")]
     KernelChanged {
@@ -119,6 +131,20 @@ pub enum SpiceFault {
     },
 }
 
+/// Names of a set that a message repeats.
+const NAMES_MAX: usize = 12;
+
+/// That none of a set of kernels defines `variable`, as the end of a sentence.
+fn without(names: &[String], variable: &str) -> String {
+    let more = match names.len() {
+        0 => return ", which is empty".to_owned(),
+        count if count <= NAMES_MAX => String::new(),
+        count => format!(" and {} more", count - NAMES_MAX),
+    };
+    let first = names[..names.len().min(NAMES_MAX)].join(", ");
+    format!(": none of {first}{more} defines {variable}")
+}
+
 /// CSPICE's short messages that mean "the kernels do not reach there".
 const COVERAGE_MESSAGES: [&str; 3] = [
     "SPICE(SPKINSUFFDATA)",
@@ -142,9 +168,10 @@ impl Fault for SpiceFault {
             Self::Spice { short, .. } if COVERAGE_MESSAGES.contains(&short.as_str()) => {
                 Kind::Coverage
             }
-            Self::CoverageGap { .. } | Self::NoAttitude { .. } | Self::NoConvergence { .. } => {
-                Kind::Coverage
-            }
+            Self::MissingText { .. }
+            | Self::CoverageGap { .. }
+            | Self::NoAttitude { .. }
+            | Self::NoConvergence { .. } => Kind::Coverage,
             Self::SessionOpen | Self::Segment { .. } => Kind::Bug,
             _ => Kind::Input,
         }
@@ -156,6 +183,9 @@ impl Fault for SpiceFault {
                 "add kernels that cover this time; `areograph kernels coverage` shows what is held"
             }
             Self::Spice { .. } => "check the value and the kernels that NAIF's message names",
+            Self::MissingText { example, .. } => {
+                return format!("add such a kernel to the set, for example {example}");
+            }
             Self::SessionOpen => "report this: a stage opened a second session",
             Self::NotAKernel { .. } => {
                 "fetch the kernel again from NAIF, or correct the list of kernels"

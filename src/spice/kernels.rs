@@ -77,7 +77,7 @@ impl Kernel {
     /// # Errors
     /// [`IoFault`]; [`SpiceFault::NotAKernel`]; [`SpiceFault::DamagedKernel`].
     pub(super) fn inspect(path: &Path) -> Result<Self> {
-        ffi::c_path(path)?;
+        ffi::c_path(path).in_file(path)?;
         let role = role_of(path)?;
         let (blake3, bytes) = hash_file(path)?;
         Ok(Self {

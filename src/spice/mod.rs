@@ -16,6 +16,7 @@ mod error;
 mod ffi;
 mod kernels;
 mod metakernel;
+mod needs;
 mod select;
 mod session;
 mod text_kernel;

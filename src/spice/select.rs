@@ -10,6 +10,7 @@ use super::{
     daf::{self, Segment},
     error::SpiceFault,
     kernels::{KernelRole, KernelSet, read_text, role_of},
+    needs::{BUS_FRAME, CAMERA_FRAME, CLOCK, LEAP_SECONDS, MARS, Need},
     session::Session,
     text_kernel::{self, Assignment, values_of},
 };
@@ -25,17 +26,8 @@ use crate::{
 const DEPTH_MAX: usize = 16;
 /// Most files that are looked into.
 const FILES_MAX: usize = 100_000;
-/// Variables that time tagging and geometry need from text kernels, and what they are.
-const NEEDS: [(&str, &str); 5] = [
-    ("DELTET/DELTA_AT", "leap seconds"),
-    ("SCLK_DATA_TYPE_94", "the MGS clock"),
-    ("BODY499_PM", "the rotation of Mars"),
-    ("FRAME_-94000_NAME", "the frame of the MGS bus"),
-    (
-        "FRAME_-94031_NAME",
-        "the frame of the MOC narrow-angle camera",
-    ),
-];
+/// What time tagging and geometry need from text kernels.
+const NEEDS: [Need; 5] = [LEAP_SECONDS, CLOCK, MARS, BUS_FRAME, CAMERA_FRAME];
 /// Orbit solutions that mark their files by name; a file without a mark is `nav`.
 const MARKED_FAMILIES: [&str; 2] = ["gsfc", "ipng"];
 
@@ -161,7 +153,7 @@ fn select_texts(
         }
     }
     let mut chosen: Vec<&Path> = Vec::new();
-    for (variable, what) in NEEDS {
+    for Need { variable, what, .. } in NEEDS {
         let defines = |assignments: &[Assignment]| !values_of(assignments, variable).is_empty();
         let mut candidates: Vec<&(PathBuf, Vec<Assignment>)> = texts
             .iter()
@@ -195,7 +187,7 @@ fn select_texts(
 
 /// Whether planetary constants have the Mars of IAU 2000, the frame of every product.
 fn mars_fits(variable: &str, assignments: &[Assignment]) -> bool {
-    variable != "BODY499_PM"
+    variable != MARS.variable
         || values_of(assignments, variable)
             .first()
             .and_then(|value| value.number())
@@ -312,14 +304,7 @@ fn explain_commanded(
     commanded: Vec<(String, Intervals)>,
     set: &mut KernelSet,
 ) {
-    let gaps_in = |wanted: &Intervals, held: &Intervals| {
-        let gaps = wanted
-            .as_slice()
-            .iter()
-            .flat_map(|part| held.gaps_in(*part));
-        Intervals::union_of(gaps)
-    };
-    let mut missing = gaps_in(wanted, telemetry);
+    let mut missing = wanted.without(telemetry);
     // The last one wins where several hold the same instant.
     for (name, held) in commanded.into_iter().rev() {
         for filled in missing.intersection(&held).as_slice() {
@@ -328,7 +313,7 @@ fn explain_commanded(
                 set.explanation.push(line);
             }
         }
-        missing = gaps_in(&missing, &held);
+        missing = missing.without(&held);
     }
 }
 

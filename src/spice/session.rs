@@ -9,6 +9,7 @@ use super::{
     error::SpiceFault,
     ffi::{Cspice, Rows, StateKm},
     kernels::KernelSet,
+    needs::{BUS_FRAME, CAMERA_FRAME, CLOCK, LEAP_SECONDS, Need},
 };
 use crate::{
     constants::{NAIF_MARS, NAIF_MGS, NAIF_MGS_BUS, NAIF_SUN},
@@ -17,6 +18,9 @@ use crate::{
     time::{CkLookup, Et},
     units::METRES_PER_KM,
 };
+
+/// What clock strings and attitude need.
+pub(super) const CLOCKS: [Need; 2] = [LEAP_SECONDS, CLOCK];
 
 /// Digits of a second in UTC strings.
 const UTC_DECIMALS: u8 = 3;
@@ -88,38 +92,42 @@ impl Session {
     /// Instant of a UTC string such as `1999-08-24T14:12:13.64`, with or without a closing `Z`.
     ///
     /// # Errors
-    /// [`SpiceFault::Spice`] when the string is no date or no leap-second kernel is loaded.
+    /// [`SpiceFault::Spice`] when the string is no date; [`SpiceFault::MissingText`].
     pub fn utc_to_et(&self, utc: &str) -> Result<Et> {
         let utc = utc.trim();
         let seconds = self
             .cspice
-            .utc_to_et(utc.strip_suffix('Z').unwrap_or(utc))?;
+            .utc_to_et(utc.strip_suffix('Z').unwrap_or(utc))
+            .map_err(|fault| self.explain(fault, &[LEAP_SECONDS]))?;
         Ok(Et::from_seconds(seconds))
     }
 
     /// ISO calendar UTC with three decimals, for example `1999-08-24T14:12:13.635`.
     ///
     /// # Errors
-    /// [`SpiceFault::Spice`] when no leap-second kernel is loaded.
+    /// [`SpiceFault::MissingText`] without a leap-second kernel.
     pub fn et_to_utc(&self, et: Et) -> Result<String> {
-        Ok(self.cspice.et_to_utc(et.seconds(), UTC_DECIMALS)?)
+        let utc = self.cspice.et_to_utc(et.seconds(), UTC_DECIMALS);
+        Ok(utc.map_err(|fault| self.explain(fault, &[LEAP_SECONDS]))?)
     }
 
     /// Instant of a spacecraft clock string of MGS, such as `619971158:28` or `1/0844996544.086`.
     ///
     /// # Errors
-    /// [`SpiceFault::Spice`] when the string is no clock reading or the clock kernel is missing.
+    /// [`SpiceFault::Spice`] when the string is no clock reading; [`SpiceFault::MissingText`].
     pub fn sclk_to_et(&self, sclk: &str) -> Result<Et> {
-        let seconds = self.cspice.sclk_to_et(NAIF_MGS, sclk.trim())?;
+        let seconds = self.cspice.sclk_to_et(NAIF_MGS, sclk.trim());
+        let seconds = seconds.map_err(|fault| self.explain(fault, &CLOCKS))?;
         Ok(Et::from_seconds(seconds))
     }
 
     /// Spacecraft clock string of MGS, with partition, rounded to 1/256 s.
     ///
     /// # Errors
-    /// [`SpiceFault::Spice`] outside the clock kernel's range.
+    /// [`SpiceFault::Spice`] outside the clock kernel's range; [`SpiceFault::MissingText`].
     pub fn et_to_sclk(&self, et: Et) -> Result<String> {
-        Ok(self.cspice.et_to_sclk(NAIF_MGS, et.seconds())?)
+        let sclk = self.cspice.et_to_sclk(NAIF_MGS, et.seconds());
+        Ok(sclk.map_err(|fault| self.explain(fault, &CLOCKS))?)
     }
 
     /// Geometric state of MGS relative to Mars: no light time, no aberration.
@@ -163,12 +171,12 @@ impl Session {
     /// * `tolerance_s` – how far outside its intervals the C-kernel may be asked, seconds
     ///
     /// # Errors
-    /// [`SpiceFault::NoAttitude`] when there is no attitude with rates within the tolerance.
+    /// [`SpiceFault::NoAttitude`] when there is no attitude with rates within the tolerance;
+    /// [`SpiceFault::MissingText`] without clock or leap seconds.
     pub fn attitude(&self, lookup: CkLookup, exposure: Et, tolerance_s: f64) -> Result<Attitude> {
         let kernel_time = lookup.kernel_time();
-        let ticks = self.cspice.et_to_ticks(NAIF_MGS, kernel_time.seconds())?;
-        let one_second_later = kernel_time.plus(1.0).seconds();
-        let ticks_per_s = self.cspice.et_to_ticks(NAIF_MGS, one_second_later)? - ticks;
+        let ticks = self.ticks(kernel_time)?;
+        let ticks_per_s = self.ticks(kernel_time.plus(1.0))? - ticks;
         let pointing = self
             .cspice
             .pointing(NAIF_MGS_BUS, ticks, tolerance_s * ticks_per_s)?
@@ -183,14 +191,21 @@ impl Session {
         })
     }
 
+    /// Encoded clock of MGS.
+    fn ticks(&self, et: Et) -> Result<f64> {
+        let ticks = self.cspice.et_to_ticks(NAIF_MGS, et.seconds());
+        Ok(ticks.map_err(|fault| self.explain(fault, &CLOCKS))?)
+    }
+
     /// Mounting of the narrow-angle camera as the instrument kernel has it.
     ///
     /// # Errors
-    /// [`SpiceFault::Spice`] when no loaded kernel defines the two frames.
+    /// [`SpiceFault::MissingText`] when no loaded kernel defines the two frames.
     pub fn mounting(&self, et: Et) -> Result<Rotation<MgsBus, MocNa>> {
         let rows = self
             .cspice
-            .frame_matrix(c"MGS_SPACECRAFT", c"MGS_MOC_NA", et.seconds())?;
+            .frame_matrix(c"MGS_SPACECRAFT", c"MGS_MOC_NA", et.seconds())
+            .map_err(|fault| self.explain(fault, &[CAMERA_FRAME, BUS_FRAME]))?;
         Ok(Rotation::new(matrix(&rows), et))
     }
 

@@ -1,21 +1,30 @@
 //! Kernels of an invented mission, written with CSPICE's own writers.
 
-use std::path::Path;
+use std::{
+    ffi::c_int,
+    fs::{self, OpenOptions},
+    io::{self, Write as _},
+    path::Path,
+};
 
 use super::{
+    daf,
     error::SpiceFault,
     ffi::{CkColumns, Cspice, StateKm},
     session::{Session, State},
 };
 use crate::{
     constants::{NAIF_MGS, NAIF_MGS_BUS},
-    error::{Place, Result},
+    error::{IoFault, Place, Result},
     time::Et,
     units::METRES_PER_KM,
 };
 
 /// Longest segment name that a DAF holds.
 const SEGMENT_NAME_MAX: usize = 40;
+
+/// More than what CSPICE's last buffer may have left free on a full disk.
+const PROBE_BYTES: usize = 1 << 16;
 
 /// Hermite-interpolated states (SPK type 13), J2000.
 #[derive(Debug, Clone, Copy)]
@@ -53,17 +62,16 @@ pub struct CkSegment<'a> {
 ///
 /// # Errors
 /// [`SpiceFault::Segment`] for columns that do not fit, [`SpiceFault::Spice`] from CSPICE (an existing
-/// file is never overwritten), [`SpiceFault::SessionOpen`] when this thread has a session.
+/// file is never overwritten), [`SpiceFault::SessionOpen`] when this thread has a session, [`IoFault`]
+/// when the system refuses to write. A kernel that is not whole is removed.
 pub fn write_spk(path: &Path, segments: &[SpkSegment], comment: &str) -> Result<()> {
     for segment in segments {
         check_lengths(segment.name, segment.epochs, &[segment.states.len()])?;
     }
     let cspice = Cspice::lock()?;
     let lines = comment_lines(comment);
-    let handle = cspice
-        .create_spk(path, comment_size(&lines))
-        .in_file(path)?;
-    let write = || -> Result<()> {
+    let create = || Ok(cspice.create_spk(path, comment_size(&lines))?);
+    fill(&cspice, path, create, |handle| {
         cspice.add_comments(handle, &lines)?;
         for segment in segments {
             let epochs_s: Vec<f64> = segment.epochs.iter().map(|epoch| epoch.seconds()).collect();
@@ -79,10 +87,7 @@ pub fn write_spk(path: &Path, segments: &[SpkSegment], comment: &str) -> Result<
             )?;
         }
         Ok(())
-    };
-    let written = write();
-    let closed = cspice.close(handle);
-    written.and(closed.map_err(Into::into)).in_file(path)
+    })
 }
 
 /// Writes a new CK; `session` must have the leap seconds and the clock loaded.
@@ -104,12 +109,12 @@ pub fn write_ck(
     }
     let cspice = &session.cspice;
     let lines = comment_lines(comment);
-    let handle = cspice.create_ck(path, comment_size(&lines)).in_file(path)?;
     let ticks = |instants: &[Et]| -> Result<Vec<f64>> {
         let encode = |instant: &Et| Ok(cspice.et_to_ticks(NAIF_MGS, instant.seconds())?);
         instants.iter().map(encode).collect()
     };
-    let write = || -> Result<()> {
+    let create = || Ok(cspice.create_ck(path, comment_size(&lines))?);
+    fill(cspice, path, create, |handle| {
         cspice.add_comments(handle, &lines)?;
         for segment in segments {
             let columns = CkColumns {
@@ -122,10 +127,42 @@ pub fn write_ck(
             cspice.write_ck_3(handle, NAIF_MGS_BUS, &columns)?;
         }
         Ok(())
+    })
+}
+
+/// Creates the kernel at `path`, writes into it, closes it, and makes sure that it is whole.
+fn fill(
+    cspice: &Cspice,
+    path: &Path,
+    create: impl FnOnce() -> Result<c_int>,
+    write: impl FnOnce(c_int) -> Result<()>,
+) -> Result<()> {
+    let existed = path.exists();
+    let written = create().and_then(|handle| {
+        let written = write(handle);
+        let closed = cspice.close(handle);
+        written.and(closed.map_err(Into::into))
+    });
+    let whole = written.and_then(|()| daf::segments(path)).map(|_| ());
+    if existed || whole.is_ok() {
+        return whole.in_file(path);
+    }
+    let refused = refusal(path);
+    // What is left is no kernel; when it cannot even be removed, the first fault is the one to tell.
+    let _ = fs::remove_file(path);
+    refused
+        .map_or(whole, |refused| Err(refused.into()))
+        .in_file(path)
+}
+
+/// Why the system refuses to write at `path`, if it does: CSPICE's messages do not tell.
+fn refusal(path: &Path) -> Option<IoFault> {
+    let probe = || -> io::Result<()> {
+        let mut file = OpenOptions::new().append(true).create(true).open(path)?;
+        file.write_all(&vec![0; PROBE_BYTES])?;
+        file.sync_all()
     };
-    let written = write();
-    let closed = cspice.close(handle);
-    written.and(closed.map_err(Into::into)).in_file(path)
+    probe().err().map(IoFault::on("write"))
 }
 
 impl State {

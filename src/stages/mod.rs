@@ -3,6 +3,7 @@
 //! No stage calls another, prints, or knows of another's files. [`crate::flow`] puts them in order.
 
 pub mod check_ranges;
+pub mod compare_kernels;
 pub mod convert_datum;
 pub mod fit_sensor_model;
 pub mod group_profiles;

@@ -2,6 +2,8 @@
 
 mod camera_tables;
 
+use std::fmt;
+
 use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 
@@ -16,10 +18,13 @@ use crate::{
         ellipsoid::{Spherical, ray_meets_ellipsoid},
         mars_rotation::mars_rotation,
     },
-    spice::Session,
+    spice::{Attitude, Session},
     time::Et,
 };
 
+/// Time between the attitude samples of the mission's C-kernels, seconds: an attitude that is held for
+/// longer is not explained by their spacing, and the bus turns by 0.2° meanwhile.
+const ATTITUDE_SPACING_S: f64 = 4.0;
 /// Intervals of the outline along the image: between two of them the track bends by centimetres.
 const OUTLINE_INTERVALS: u32 = 10;
 
@@ -35,6 +40,10 @@ pub struct Orientation {
     pub outline: Option<Vec<GroundPoint>>,
     /// Tables for camera models, in J2000.
     pub tables: CameraTables,
+    /// What the reader should know, one sentence each.
+    pub notes: Vec<String>,
+    /// Why the orientation is not to be trusted; empty when it is valid.
+    pub invalid_because: Vec<String>,
 }
 
 /// Orientation of the camera at one epoch.
@@ -148,20 +157,62 @@ pub fn sample_orientation(
         tolerance_s: kernels.ck_tolerance_s,
     };
     let step_s = image.duration_s() / f64::from(sampling.intervals);
-    let mut samples = (0..=sampling.intervals)
-        .map(|k| reader.sample(image, image.start.plus(f64::from(k) * step_s)))
+    let epochs = (0..=sampling.intervals).map(|k| image.start.plus(f64::from(k) * step_s));
+    let epochs: Vec<Et> = epochs.collect();
+    let mut samples = epochs
+        .iter()
+        .map(|epoch| reader.sample(image, *epoch))
         .collect::<Result<Vec<_>>>()?;
     let mut quaternions: Vec<[f64; 4]> = samples.iter().map(|s| s.camera_to_mars).collect();
     make_continuous(&mut quaternions);
     for (sample, quaternion) in samples.iter_mut().zip(quaternions) {
         sample.camera_to_mars = quaternion;
     }
+    let tables = camera_tables::camera_tables(&reader, image, kernels.padding_s)?;
+    let nodes: Vec<Et> = tables.et_s.iter().copied().map(Et::from_seconds).collect();
+    let held = reader.held_attitudes(epochs.iter().chain(&nodes))?;
+    let far = held.as_ref().filter(|held| held.is_unexplained());
     Ok(Orientation {
         image: image.id.clone(),
         samples,
         outline: reader.outline(image)?,
-        tables: camera_tables::camera_tables(&reader, image, kernels.padding_s)?,
+        tables,
+        invalid_because: far.map(HeldAttitudes::reason).into_iter().collect(),
+        notes: held.iter().map(ToString::to_string).collect(),
     })
+}
+
+/// Attitudes that were read outside the C-kernels' intervals, where their last or next one is held.
+struct HeldAttitudes {
+    lookups: usize,
+    of: usize,
+    distance_max_s: f64,
+}
+
+impl HeldAttitudes {
+    fn is_unexplained(&self) -> bool {
+        // Written so that NaN counts.
+        !(self.distance_max_s <= ATTITUDE_SPACING_S)
+    }
+
+    fn reason(&self) -> String {
+        format!(
+            "attitude held for up to {:.3} s beyond the C-kernels; limit {ATTITUDE_SPACING_S} s, the time between \
+             their samples",
+            self.distance_max_s
+        )
+    }
+}
+
+impl fmt::Display for HeldAttitudes {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(
+            formatter,
+            "{} of {} attitudes lie outside the C-kernels' intervals, up to {:.3} s; within \
+             kernels.ck_tolerance_s the nearest one is held, though the bus turns",
+            self.lookups, self.of, self.distance_max_s
+        )
+    }
 }
 
 /// Checks that position and attitude are covered over the image with its padding.
@@ -178,9 +229,8 @@ fn require_coverage(
 ) -> Result<()> {
     let exposures = image.exposures();
     session.require_position(exposures.padded(kernels.padding_s))?;
-    // Within the tolerance a look-up reaches beyond the kernel's intervals.
-    let padding_s = kernels.padding_s - kernels.ck_tolerance_s;
-    session.require_attitude(exposures, pointing.ck_bias, padding_s)
+    let (padding_s, tolerance_s) = (kernels.padding_s, kernels.ck_tolerance_s);
+    session.require_attitude(exposures, pointing.ck_bias, padding_s, tolerance_s)
 }
 
 struct Reader<'a> {
@@ -190,9 +240,29 @@ struct Reader<'a> {
 }
 
 impl Reader<'_> {
-    fn inertial_to_camera(&self, exposure: Et) -> Result<Rotation<J2000, MocNa>> {
+    fn attitude(&self, exposure: Et) -> Result<Attitude> {
         let lookup = self.pointing.ck_bias.lookup(exposure);
-        let attitude = self.session.attitude(lookup, exposure, self.tolerance_s)?;
+        self.session.attitude(lookup, exposure, self.tolerance_s)
+    }
+
+    /// How many of the attitudes at `exposures` lie outside the C-kernels' intervals, if any do.
+    fn held_attitudes<'e>(
+        &self,
+        exposures: impl Iterator<Item = &'e Et>,
+    ) -> Result<Option<HeldAttitudes>> {
+        let distances_s = exposures
+            .map(|exposure| Ok(self.attitude(*exposure)?.distance_s))
+            .collect::<Result<Vec<f64>>>()?;
+        let lookups = distances_s.iter().filter(|s| !(**s <= 0.0)).count();
+        Ok((lookups > 0).then(|| HeldAttitudes {
+            lookups,
+            of: distances_s.len(),
+            distance_max_s: distances_s.iter().copied().fold(0.0, f64::max),
+        }))
+    }
+
+    fn inertial_to_camera(&self, exposure: Et) -> Result<Rotation<J2000, MocNa>> {
+        let attitude = self.attitude(exposure)?;
         Ok(self.session.mounting(exposure)? * attitude.inertial_to_bus)
     }
 

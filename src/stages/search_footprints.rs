@@ -1,13 +1,16 @@
 //! Searches PEDR files for the shots in a site's windows: one pass over every file for all windows.
 
-use std::{collections::BTreeMap, fmt, ops::Range, path::Path};
+mod repeats;
+
+use std::{collections::BTreeMap, fmt, ops::Range, path::Path, sync::atomic::AtomicBool};
 
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
+use self::repeats::{Copies, require_distinct};
 use crate::{
     config::{PedrConfig, ShotFilter, WindowConfig},
-    error::{Fault, Kind, Place, Result},
+    error::{Fault, Kind, Place, Result, Stopped},
     files::file_name,
     footprints::{AsRead, Footprint, Footprints, SourceFile},
     frames::{MarsDatum, MarsIau2000},
@@ -75,7 +78,7 @@ pub struct SearchResult {
     pub frames_read: u64,
     /// Shots whose own position was tested, those of frames near a window.
     pub shots_read: u64,
-    /// How files were understood, one sentence for each way.
+    /// How files were understood, one sentence for each way, and which were copies of others.
     pub notes: Vec<String>,
 }
 
@@ -97,15 +100,18 @@ impl Fault for TooManyFiles {
 /// Searches all files of `pedr` for shots in any of `windows`.
 ///
 /// Every shot is judged by its own position, in IAU 2000 at its time tag. `correction_s` is added to
-/// tags to give `et_s`. The result does not depend on the number of threads.
+/// tags to give `et_s`. The result does not depend on the number of threads. A file with the bytes of
+/// an earlier one is not read again; a note says so. `stop` is looked at before every block of records.
 ///
 /// # Errors
-/// A file that cannot be opened, or whose datum cannot be told. Anything wrong inside a file is a
-/// complaint; its good records are kept.
+/// A file that cannot be opened, holds no good record, or whose datum cannot be told; two files that
+/// hold the same shot in a window; [`Stopped`]. Anything else wrong inside a file is a complaint; its
+/// good records are kept.
 pub fn search_footprints(
     pedr: &PedrConfig,
     windows: &[WindowConfig],
     correction_s: f64,
+    stop: &AtomicBool,
 ) -> Result<SearchResult> {
     const STAGE: &str = "search_footprints";
     if pedr.files.len() > usize::from(u16::MAX) {
@@ -119,20 +125,37 @@ pub fn search_footprints(
         .files
         .par_iter()
         .enumerate()
-        .map(|(index, path)| search_file(pedr, index, path, &regions, correction_s))
+        .map(|(index, path)| search_file(pedr, index, path, &regions, correction_s, stop))
         .collect();
 
     let mut all = Found::new();
-    let mut files = Vec::with_capacity(searched.len());
-    let mut notes: BTreeMap<String, u32> = BTreeMap::new();
+    let mut files: Vec<SourceFile> = Vec::with_capacity(searched.len());
+    let mut understood: BTreeMap<String, u32> = BTreeMap::new();
+    let (mut copies, mut copy_notes) = (Copies::default(), Vec::new());
     // In the order of the files, so that of several failures it is always the same one that is told.
-    for result in searched {
+    for (index, result) in searched.into_iter().enumerate() {
         let (source, found, note) = result.in_stage(STAGE)?;
+        if let Some(original) = copies.original_of(index, &source, &files) {
+            copy_notes.push(format!(
+                "PEDR file {} ({}) holds the same bytes as file {} ({}): read once",
+                index + 1,
+                source.name,
+                original + 1,
+                files[original].name
+            ));
+        } else {
+            all.append(found);
+            *understood.entry(note).or_default() += 1;
+        }
         files.push(source);
-        all.append(found);
-        *notes.entry(note).or_default() += 1;
     }
+    require_distinct(&all.footprints, &pedr.files).in_stage(STAGE)?;
     all.footprints.files = files;
+    let mut notes: Vec<String> = understood
+        .into_iter()
+        .map(|(note, files)| format!("{files} PEDR file(s): {note}"))
+        .collect();
+    notes.extend(copy_notes);
     Ok(SearchResult {
         footprints: all.footprints,
         complaints: all.complaints,
@@ -140,10 +163,7 @@ pub fn search_footprints(
         rejected: all.rejected,
         frames_read: all.frames_read,
         shots_read: all.shots_read,
-        notes: notes
-            .into_iter()
-            .map(|(note, files)| format!("{files} PEDR file(s): {note}"))
-            .collect(),
+        notes,
     })
 }
 
@@ -201,6 +221,7 @@ struct Search<'a> {
     filter: &'a ShotFilter,
     regions: &'a [Region],
     correction_s: f64,
+    stop: &'a AtomicBool,
 }
 
 fn search_file(
@@ -209,8 +230,10 @@ fn search_file(
     path: &Path,
     regions: &[Region],
     correction_s: f64,
+    stop: &AtomicBool,
 ) -> Result<(SourceFile, Found, String)> {
     let file = File::open(path)?;
+    file.require_records()?;
     let version = file.name().map(|name: FileName| name.version);
     let datum = decide_datum(pedr.datum, version, file.label().datum).in_file(path)?;
     let software_version = file.label().software_version;
@@ -223,12 +246,13 @@ fn search_file(
         filter: &pedr.filter,
         regions,
         correction_s,
+        stop,
     };
     let records = file.records().len();
-    let blocks: Vec<Found> = (0..records.div_ceil(BLOCK_RECORDS))
+    let blocks = (0..records.div_ceil(BLOCK_RECORDS))
         .into_par_iter()
         .map(|block| search.block(block * BLOCK_RECORDS..(block + 1) * BLOCK_RECORDS))
-        .collect();
+        .collect::<Result<Vec<Found>>>()?;
     let mut found = Found::new();
     for complaint in file.label_complaints() {
         found.complain(complaint.clone());
@@ -255,7 +279,8 @@ fn search_file(
 }
 
 impl Search<'_> {
-    fn block(&self, rows: Range<usize>) -> Found {
+    fn block(&self, rows: Range<usize>) -> Result<Found> {
+        Stopped::check(self.stop)?;
         let mut found = Found::new();
         for (row, frame) in self.file.frames(rows, self.guard) {
             found.frames_read += 1;
@@ -269,7 +294,7 @@ impl Search<'_> {
                 Err(fault) => found.complain(self.file.record_complaint(row, &fault)),
             }
         }
-        found
+        Ok(found)
     }
 
     fn frame(&self, row: usize, frame: &Frame<'_>, found: &mut Found) {

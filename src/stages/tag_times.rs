@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    config::{ImageConfig, ImageFields, line_period_agrees},
+    config::{IMAGE_DURATION_END_S, IMAGE_LINES_MIN, ImageConfig, ImageFields, line_period_agrees},
     error::{Failure, Fault, Kind, Place, Result},
     pds::moc,
     spice::Session,
@@ -129,8 +129,8 @@ enum ImageFault {
         header: u32,
     },
     #[error(
-        "image {image}: {lines} lines of {line_period_s} s; expected at least 3 lines, a positive period and \
-         less than 600 s in all"
+        "image {image}: {lines} lines of {line_period_s} s; expected at least {IMAGE_LINES_MIN} lines, a \
+         positive period and less than {IMAGE_DURATION_END_S} s in all"
     )]
     Duration {
         image: String,
@@ -214,7 +214,8 @@ fn tag_image(image: &ImageConfig, session: &Session) -> Result<ImageTimes> {
         .map_err(place)?
         .ok_or_else(|| missing("exposure_ms"))?;
     let duration_s = f64::from(lines_header) * line_period_s;
-    if lines_header < 3 || !(line_period_s > 0.0 && duration_s < 600.0) {
+    if lines_header < IMAGE_LINES_MIN || !(line_period_s > 0.0 && duration_s < IMAGE_DURATION_END_S)
+    {
         return Err(place(ImageFault::Duration {
             image: image.id.clone(),
             lines: lines_header,

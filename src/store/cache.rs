@@ -1,6 +1,7 @@
 //! Stage outputs on disk, each with the parts it was made from.
 
 use std::{
+    collections::BTreeSet,
     fs,
     path::{Path, PathBuf},
 };
@@ -152,6 +153,18 @@ impl StageCache {
     pub fn forget(&self, stage: &str) {
         // Nothing to forget is as good as forgotten.
         let _ = fs::remove_file(self.path(stage));
+    }
+
+    /// Forgets all stages but these, such as those of an image that is no longer configured.
+    pub fn keep_only<'s>(&self, stages: impl IntoIterator<Item = &'s str>) {
+        let kept: BTreeSet<PathBuf> = stages.into_iter().map(|stage| self.path(stage)).collect();
+        let entries = fs::read_dir(&self.folder).into_iter().flatten().flatten();
+        for path in entries.map(|entry| entry.path()) {
+            if !kept.contains(&path) {
+                // What cannot be removed costs room and nothing else: nobody asks for it.
+                let _ = fs::remove_file(path);
+            }
+        }
     }
 
     fn path(&self, stage: &str) -> PathBuf {

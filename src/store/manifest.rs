@@ -23,6 +23,8 @@ pub struct Manifest {
     pub biases: Vec<BiasEntry>,
     /// Kernels in load order.
     pub kernels: Vec<KernelEntry>,
+    /// Rival kernel sets, and which was used; empty when the configuration names one source of kernels.
+    pub kernel_choice: Vec<KernelChoiceEntry>,
     /// Stages with the fingerprint of everything that entered them.
     pub stages: Vec<StageEntry>,
     /// Product files.
@@ -95,8 +97,40 @@ pub struct KernelEntry {
     pub bytes: u64,
     /// BLAKE3 of the file.
     pub blake3: String,
-    /// Which of the needed intervals the kernel's own coverage meets, ET seconds.
+    /// Which of the needed intervals were read from this kernel, ET seconds: later kernels come first.
     pub coverage_used: Vec<Interval>,
+}
+
+/// One of several kernel sets, compared over the positions that the site needs.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct KernelChoiceEntry {
+    /// Identifier in the configuration.
+    pub set: String,
+    /// Whether it was used: its trajectory is closest to the mean of all, by root mean square distance.
+    pub chosen: bool,
+    /// Instants at which all sets were compared.
+    pub epochs: u64,
+    /// Root mean square distance from the mean of all, metres.
+    pub distance_rms_m: f64,
+    /// Largest distance from the mean of all, metres.
+    pub distance_max_m: f64,
+    /// Mean radial deviation from the mean of all, metres.
+    pub radial_mean_m: f64,
+    /// Mean deviation along the track, metres.
+    pub along_track_mean_m: f64,
+    /// Mean deviation across the track, along the orbit's normal, metres.
+    pub cross_track_mean_m: f64,
+    /// Its ephemerides in load order.
+    pub ephemerides: Vec<FileEntry>,
+}
+
+/// A file by name and content.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct FileEntry {
+    /// File name, without folders.
+    pub name: String,
+    /// BLAKE3 of the file.
+    pub blake3: String,
 }
 
 /// A stage of a run.

@@ -7,3 +7,4 @@ pub mod fingerprint;
 pub mod lock;
 pub mod manifest;
 pub mod publish;
+pub mod published;

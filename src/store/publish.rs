@@ -29,7 +29,7 @@ pub const CACHE: &str = ".cache";
 pub(super) const STAGING: &str = ".staging";
 
 /// Paths below the site's folder that a publication under way may have made or will remove.
-const JOURNAL: &str = ".publishing";
+pub(super) const JOURNAL: &str = ".publishing";
 
 /// An empty folder for half-made products inside the site's folder, hence on the same file system.
 ///

@@ -2,7 +2,7 @@
 
 use std::{fs, path::PathBuf, process::Command};
 
-use super::mission::{areograph, mission};
+use super::mission::{areograph, mission, succeed};
 
 const SITE: &str = r#"site = "case"
 [kernels]
@@ -75,6 +75,29 @@ impl Case {
     pub(crate) fn run(&self) -> Command {
         let mut command = self.areograph();
         command.args(["--quiet", "run", "site.toml", "--out", "out", "--jobs", "1"]);
+        command
+    }
+
+    /// Runs into `out`, and gives the stages that the log says ran.
+    pub(crate) fn stages_run(&self) -> Vec<String> {
+        let mut command = self.areograph();
+        command.args(["run", "site.toml", "--out", "out"]);
+        let log = String::from_utf8(succeed(&mut command).stderr).unwrap();
+        log.lines()
+            .filter(|line| line.contains(": running: "))
+            .map(|line| {
+                line.split("stage=\"")
+                    .nth(1)
+                    .unwrap()
+                    .trim_end_matches('"')
+                    .to_owned()
+            })
+            .collect()
+    }
+
+    pub(crate) fn check(&self) -> Command {
+        let mut command = self.areograph();
+        command.args(["--quiet", "check", "site.toml"]);
         command
     }
 

@@ -4,9 +4,9 @@ use std::collections::BTreeMap;
 
 use areograph::{
     config::{
-        BiasScope, DatumChoice, KernelSource, KernelsConfig, MolaClock, OrientationConfig,
-        PedrConfig, PointingConfig, RangeCheckConfig, ShotFilter, SiteConfig, TagSign,
-        WindowConfig, WindowShape,
+        BiasScope, DatumChoice, KernelList, KernelSource, KernelsConfig, MolaClock,
+        OrientationConfig, PedrConfig, PointingConfig, RangeCheckConfig, ShotFilter, SiteConfig,
+        TagSign, WindowConfig, WindowShape,
     },
     constants::MGS_POINTING_BIAS,
     footprints::{Footprint, Footprints, SourceFile},
@@ -186,7 +186,7 @@ fn config() -> SiteConfig {
         file: "small.toml".into(),
         blake3: "ef".repeat(32),
         kernels: KernelsConfig {
-            source: KernelSource::Files(vec!["naif0012.tls".into()]),
+            source: KernelSource::Listed(KernelList::Files(vec!["naif0012.tls".into()])),
             ck_tolerance_s: 0.0,
             padding_s: 1.0,
         },
@@ -319,6 +319,8 @@ fn orientation(times: &ImageTimes) -> Orientation {
             },
             et_s,
         },
+        notes: Vec::new(),
+        invalid_because: Vec::new(),
     }
 }
 

@@ -10,7 +10,9 @@ use super::{
     super::{
         problems::Review,
         raw::{Entry, RawImage},
-        site::{ImageConfig, ImageFields, line_period_agrees},
+        site::{
+            IMAGE_DURATION_END_S, IMAGE_LINES_MIN, ImageConfig, ImageFields, line_period_agrees,
+        },
     },
     no_repeats,
     values::{Accept, Target},
@@ -50,6 +52,7 @@ fn image(raw: &Spanned<RawImage>, review: &mut Review<'_>) -> ImageConfig {
         complete(raw.span(), keys, review);
     }
     line_period(keys, &fields, review);
+    duration(keys, &fields, review);
     if let (Some(header), Some(delivered), Some(written)) = (
         fields.lines_header,
         fields.lines_delivered,
@@ -113,7 +116,7 @@ fn fields(keys: &RawImage, review: &mut Review<'_>) -> ImageFields {
             review,
             "images.lines_header",
             &keys.lines_header,
-            1,
+            IMAGE_LINES_MIN,
             LINES_MAX,
         ),
         lines_delivered: whole(
@@ -196,6 +199,26 @@ fn line_period(keys: &RawImage, fields: &ImageFields, review: &mut Review<'_>) {
             "images.line_period_ms",
             format!("exposure_ms × downtrack_summing = {expected_ms:.4}, or only one of them"),
         );
+    }
+}
+
+/// Lines and line period that are both written must not make an endless image.
+fn duration(keys: &RawImage, fields: &ImageFields, review: &mut Review<'_>) {
+    let summed_s = || Some(fields.exposure_s? * f64::from(fields.downtrack_summing?));
+    let (Some(written), Some(lines), Some(period_s)) = (
+        &keys.lines_header,
+        fields.lines_header,
+        fields.line_period_s.or_else(summed_s),
+    ) else {
+        return;
+    };
+    let duration_s = f64::from(lines) * period_s;
+    if !(duration_s < IMAGE_DURATION_END_S) {
+        let expected = format!(
+            "less than {IMAGE_DURATION_END_S} s in all; {lines} lines of {:.4} ms take {duration_s:.1} s",
+            period_s / SECONDS_PER_MS
+        );
+        review.refuse(written.span(), "images.lines_header", expected);
     }
 }
 

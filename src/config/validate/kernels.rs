@@ -7,15 +7,23 @@ use toml::Spanned;
 use super::{
     super::{
         problems::Review,
-        raw::RawKernels,
-        site::{CkQuality, KernelSelection, KernelSource, KernelsConfig},
+        raw::{RawKernelSet, RawKernels},
+        site::{CkQuality, KernelList, KernelSelection, KernelSource, KernelsConfig, RivalKernels},
     },
+    no_repeats,
     values::{Accept, Target},
 };
 
 /// Beyond the rounding of label times (10 ms) and clock ticks (4 ms), well below the 4 s between
 /// attitude samples, so that no image is refused which the kernels can orient.
 const PADDING_S: f64 = 1.0;
+
+/// What a table of kernels must say.
+const SOURCES: &str =
+    "exactly one of kernels.metakernel, kernels.files, kernels.root, kernels.sets";
+
+/// Sets are loaded one after the other and compared; more than this is a slip.
+const SETS_MAX: usize = 16;
 
 const QUALITIES: [(&str, CkQuality); 2] = [
     ("reconstructed", CkQuality::Reconstructed),
@@ -29,16 +37,16 @@ pub(super) fn kernels(raw: Option<Spanned<RawKernels>>, review: &mut Review<'_>)
         raw.metakernel.as_ref().map(Spanned::span),
         raw.files.as_ref().map(Spanned::span),
         raw.root.as_ref().map(Spanned::span),
+        raw.sets.as_ref().map(Spanned::span),
     ];
     let sources = given.iter().flatten().count();
     if sources == 0 {
-        let expected = "exactly one of kernels.metakernel, kernels.files, kernels.root";
-        review.problem(table, format!("kernels has no source; expected {expected}"));
+        review.problem(table, format!("kernels has no source; expected {SOURCES}"));
     } else if sources > 1 {
         let second = given.iter().flatten().max_by_key(|span| span.start);
         review.problem(
             second.cloned(),
-            format!("kernels has {sources} sources; expected exactly one of kernels.metakernel, kernels.files, kernels.root"),
+            format!("kernels has {sources} sources; expected {SOURCES}"),
         );
     }
     KernelsConfig {
@@ -75,29 +83,81 @@ fn source(raw: &RawKernels, review: &mut Review<'_>) -> KernelSource {
             );
         }
     }
-    let metakernel = raw
-        .metakernel
-        .as_ref()
-        .map(|path| review.existing("kernels.metakernel", path, Target::File));
-    let files = raw.files.as_ref().map(|files| kernel_files(files, review));
+    if let Some(sets) = &raw.sets {
+        return KernelSource::Sets(rival_sets(sets, review));
+    }
+    let list = kernel_list(
+        "kernels",
+        raw.metakernel.as_ref(),
+        raw.files.as_ref(),
+        review,
+    );
+    KernelSource::Listed(list)
+}
+
+/// The list of the table `table`; of several the metakernel, of none an empty one.
+fn kernel_list(
+    table: &str,
+    metakernel: Option<&Spanned<String>>,
+    files: Option<&Spanned<Vec<Spanned<String>>>>,
+    review: &mut Review<'_>,
+) -> KernelList {
+    let metakernel =
+        metakernel.map(|path| review.existing(&format!("{table}.metakernel"), path, Target::File));
+    let files = files.map(|files| kernel_files(&format!("{table}.files"), files, review));
     match (metakernel, files) {
-        (Some(metakernel), _) => KernelSource::Metakernel(metakernel),
-        (None, files) => KernelSource::Files(files.unwrap_or_default()),
+        (Some(metakernel), _) => KernelList::Metakernel(metakernel),
+        (None, files) => KernelList::Files(files.unwrap_or_default()),
     }
 }
 
+fn rival_sets(
+    raw: &Spanned<Vec<Spanned<RawKernelSet>>>,
+    review: &mut Review<'_>,
+) -> Vec<RivalKernels> {
+    let sets = raw.get_ref();
+    if !(2..=SETS_MAX).contains(&sets.len()) {
+        review.problem(
+            Some(raw.span()),
+            format!(
+                "kernels.sets has {} entries; expected 2 to {SETS_MAX} sets to choose from",
+                sets.len()
+            ),
+        );
+    }
+    no_repeats(
+        "kernels.sets.id",
+        sets.iter().map(|set| set.get_ref().id.as_ref()),
+        review,
+    );
+    let rivals = sets.iter().map(|set| {
+        let fields = set.get_ref();
+        if fields.metakernel.is_some() == fields.files.is_some() {
+            let text = "kernels.sets has no clear source; expected either metakernel or files";
+            review.problem(Some(set.span()), text.to_owned());
+        }
+        let (metakernel, files) = (fields.metakernel.as_ref(), fields.files.as_ref());
+        RivalKernels {
+            id: review.identifier("kernels.sets.id", &fields.id, Some(set.span()), false),
+            list: kernel_list("kernels.sets", metakernel, files, review),
+        }
+    });
+    rivals.collect()
+}
+
 fn kernel_files(
+    key: &str,
     raw: &Spanned<Vec<Spanned<String>>>,
     review: &mut Review<'_>,
 ) -> Vec<std::path::PathBuf> {
-    review.not_empty("kernels.files", raw);
+    review.not_empty(key, raw);
     let mut seen = BTreeSet::new();
     raw.get_ref()
         .iter()
         .map(|written| {
-            let path = review.existing("kernels.files", written, Target::File);
+            let path = review.existing(key, written, Target::File);
             if !seen.insert(path.clone()) {
-                review.refuse(written.span(), "kernels.files", "each kernel once");
+                review.refuse(written.span(), key, "each kernel once");
             }
             path
         })

@@ -23,14 +23,11 @@ use super::{
     problems::Review,
     raw::{RawMolaClock, RawOrientation, RawPointing, RawRangeCheck, RawSite},
     site::{
-        BiasScope, MolaClock, OrientationConfig, PointingConfig, RangeCheckConfig, SiteConfig,
-        TagSign,
+        BiasScope, MolaClock, OrientationConfig, PointingConfig, RangeCheckConfig, SCAN_STEPS_MAX,
+        SiteConfig, TagSign,
     },
 };
 use values::Accept;
-
-/// Epochs of the bias scan are bounded, so that a slip in its step cannot make a run endless.
-const SCAN_STEPS_MAX: f64 = 10_000.0;
 
 /// The valid form of `raw`; to be used only when `review` has found no problem.
 pub(super) fn validate(
@@ -176,7 +173,7 @@ fn range_check(raw: &RawRangeCheck, review: &mut Review<'_>) -> RangeCheckConfig
         scan_step_s: review.number("range_check.scan_step_s", &raw.scan_step_s, seconds, 0.01),
     };
     let (step, half_width) = (checked.scan_step_s, checked.scan_half_width_s);
-    let (shortest, longest) = (2.0 * half_width / SCAN_STEPS_MAX, half_width);
+    let (shortest, longest) = (2.0 * half_width / f64::from(SCAN_STEPS_MAX), half_width);
     if !(shortest <= step && step <= longest) {
         // Whichever of the two was written is the one to mend.
         for (key, written) in [

@@ -54,7 +54,7 @@ pub enum RecordFault {
     #[error("time is {0}; expected seconds past J2000")]
     NoTime(f64),
     /// The double and the two integers disagree.
-    #[error("the times of the record are {time_s} s and {integers_s} s; expected equal to 1e-6 s")]
+    #[error("the times of the record are {} s and {integers_s} s; expected equal to 1e-6 s", legible(*.time_s))]
     TwoTimes {
         /// From the double, ET seconds.
         time_s: f64,
@@ -188,6 +188,15 @@ impl Record {
             });
         }
         Ok(())
+    }
+}
+
+/// The number, in powers of ten where no clock of ours counts so far: a spoiled double has 300 digits.
+fn legible(seconds: f64) -> String {
+    if seconds.abs() < 1e12 {
+        seconds.to_string()
+    } else {
+        format!("{seconds:e}")
     }
 }
 
@@ -325,5 +334,21 @@ mod tests {
         let mut record = good();
         record.spacecraft_radius_cm.set(2_000_000_000);
         assert!(record.check(true).is_err() && record.check(false).is_ok());
+    }
+
+    #[test]
+    fn impossible_times_are_told_in_few_digits() {
+        let told = |time_s| {
+            RecordFault::TwoTimes {
+                time_s,
+                integers_s: 4.5,
+            }
+            .to_string()
+        };
+        assert_eq!(
+            told(-1.25e300),
+            "the times of the record are -1.25e300 s and 4.5 s; expected equal to 1e-6 s"
+        );
+        assert!(told(38_593_125.159_874).contains("are 38593125.159874 s"));
     }
 }

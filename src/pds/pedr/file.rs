@@ -59,6 +59,23 @@ impl Fault for NotAFile {
     }
 }
 
+/// A file without a single good record.
+#[derive(Debug, thiserror::Error)]
+#[error("no good record: {why}")]
+struct NoGoodRecord {
+    why: String,
+}
+
+impl Fault for NoGoodRecord {
+    fn kind(&self) -> Kind {
+        Kind::Input
+    }
+
+    fn advice(&self) -> String {
+        "fetch the file again if it is a PEDR file (AP#####v.B), else leave it out".to_owned()
+    }
+}
+
 impl File {
     /// Opens a file by mapping it into memory, whatever its size.
     ///
@@ -186,6 +203,28 @@ impl File {
     #[must_use]
     pub fn records(&self) -> &[Record] {
         Record::slice_of(self.bytes.get(LABEL_BYTES..).unwrap_or_default())
+    }
+
+    /// Makes sure that the file holds at least one good record; a file of another kind holds none.
+    ///
+    /// # Errors
+    /// What is wrong with the label, else with the first record.
+    pub fn require_records(&self) -> Result<()> {
+        let guard = FieldGuard::new(self.label.software_version);
+        let mut frames = self.frames(0..self.records().len(), guard);
+        let first = frames.next();
+        if matches!(first, Some((_, Ok(_)))) || frames.any(|(_, frame)| frame.is_ok()) {
+            return Ok(());
+        }
+        let label = self.label_complaints.first();
+        let why = match (label, first) {
+            (Some(complaint), _) => complaint.text.clone(),
+            (None, Some((row, Err(fault)))) => {
+                format!("record {}: {fault}", Self::record_number(row))
+            }
+            _ => format!("nothing of {RECORD_BYTES} bytes follows the label"),
+        };
+        Err(NoGoodRecord { why }).in_file(&self.path)
     }
 
     /// BLAKE3 of the file's bytes, hexadecimal.

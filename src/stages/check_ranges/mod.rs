@@ -12,6 +12,8 @@
 mod residuals;
 mod scan;
 
+use std::sync::atomic::AtomicBool;
+
 use serde::{Deserialize, Serialize};
 
 pub use residuals::{ShotResiduals, range_residual_m};
@@ -20,7 +22,7 @@ pub use scan::BiasScan;
 use super::group_profiles::Profile;
 use crate::{
     config::{MolaClock, RangeCheckConfig},
-    error::{Fault, Kind, Result},
+    error::{Fault, Kind, Result, Stopped},
     footprints::Footprints,
     frames::MarsIau2000,
     geom::statistics::{Summary, Trend, outliers},
@@ -82,8 +84,10 @@ impl Fault for OutsideTrajectory {
 
 /// Checks the ranges of every profile against `trajectory`.
 ///
+/// `stop` is looked at before every profile.
+///
 /// # Errors
-/// A shot whose time the trajectory does not cover.
+/// A shot whose time the trajectory does not cover; [`Stopped`].
 /// # Source
 /// Shan et al. 2005, Table 3; limits there: |mean| above 10 m, |Δ − mean| above 5 standard deviations.
 pub fn check_ranges(
@@ -92,10 +96,12 @@ pub fn check_ranges(
     trajectory: &Trajectory,
     clock: &MolaClock,
     limits: &RangeCheckConfig,
+    stop: &AtomicBool,
 ) -> Result<RangeCheck> {
     let mut shots = ShotResiduals::default();
     let mut checked = Vec::with_capacity(profiles.len());
     for (index, profile) in (0_u32..).zip(profiles) {
+        Stopped::check(stop)?;
         let first = shots.len();
         for row in &profile.rows {
             let shot = footprints.row(*row as usize);

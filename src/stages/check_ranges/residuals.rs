@@ -1,6 +1,6 @@
 //! Range residuals of single shots.
 
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 
 use crate::{
@@ -99,6 +99,22 @@ pub(super) fn raw_footprint(shot: &Footprint) -> Position<MarsIau2000> {
     ))
 }
 
+/// The spacecraft where the PEDR file has it.
+pub(super) fn own_spacecraft(shot: &Footprint) -> Position<MarsIau2000> {
+    Position::new(spherical_to_xyz_m(
+        shot.spacecraft_longitude_rad,
+        shot.spacecraft_latitude_rad,
+        shot.spacecraft_radius_m,
+    ))
+}
+
+/// Axes of the orbit in J2000 as columns: away from Mars, along the flight, along the angular momentum.
+pub(super) fn orbit_axes(position: &Position<J2000>, velocity_m_s: &Vector3<f64>) -> Matrix3<f64> {
+    let radial = position.xyz_m.normalize();
+    let cross = position.xyz_m.cross(velocity_m_s).normalize();
+    Matrix3::from_columns(&[radial, cross.cross(&radial), cross])
+}
+
 /// Residuals of one shot, the spacecraft at `position` and `velocity_m_s` (J2000) at `at`.
 pub(super) fn residuals(
     shot: &Footprint,
@@ -114,23 +130,12 @@ pub(super) fn residuals(
         shot.latitude_rad,
         shot.radius_crossover_m,
     ));
-    let own = Position::new(spherical_to_xyz_m(
-        shot.spacecraft_longitude_rad,
-        shot.spacecraft_latitude_rad,
-        shot.spacecraft_radius_m,
-    ));
+    let own = own_spacecraft(shot);
     let difference = to_mars.matrix().tr_mul(&(own.xyz_m - spacecraft.xyz_m));
-    let radial = position.xyz_m.normalize();
-    let cross = position.xyz_m.cross(velocity_m_s).normalize();
-    let along = cross.cross(&radial);
     Residuals {
         range_minus_distance_m: range_residual_m(shot.range_m, &spacecraft, &raw),
         range_minus_distance_crossover_m: range_residual_m(shot.range_m, &spacecraft, &crossover),
         decoding_m: range_residual_m(shot.range_m, &own, &raw),
-        spacecraft_m: Vector3::new(
-            difference.dot(&radial),
-            difference.dot(&along),
-            difference.dot(&cross),
-        ),
+        spacecraft_m: orbit_axes(position, velocity_m_s).tr_mul(&difference),
     }
 }

@@ -5,14 +5,20 @@
 //! when that rate varies along it: strongly when the spacecraft holds still in inertial space while
 //! it looks off nadir (about 3 m/s²), hardly at nadir (below 0.03 m/s²). The uncertainty says which.
 
+use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
-use super::residuals::{ShotResiduals, raw_footprint};
+use super::residuals::{
+    ShotResiduals, orbit_axes, own_spacecraft, range_residual_m, raw_footprint,
+};
 use crate::{
-    config::RangeCheckConfig,
-    footprints::Footprints,
-    frames::{MarsIau2000, Position},
-    geom::{mars_rotation::mars_rotation, statistics::Summary},
+    config::{RangeCheckConfig, SCAN_STEPS_MAX},
+    footprints::{Footprint, Footprints},
+    frames::MarsIau2000,
+    geom::{
+        mars_rotation::mars_rotation,
+        statistics::{Summary, Trend},
+    },
     spice::Trajectory,
     time::Et,
 };
@@ -20,8 +26,8 @@ use crate::{
 /// Fewest shots that make a scan worth reading.
 const SHOTS_MIN: usize = 10;
 
-/// Most steps on either side of zero.
-const STEPS_MAX: u32 = 10_000;
+/// Half the time over which the rate of a line of sight is measured, seconds.
+const RATE_STEP_S: f64 = 0.01;
 
 /// Spread of range − distance against the assumed clock correction.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -34,7 +40,8 @@ pub struct BiasScan {
     ///
     /// `None` when the least spread lies at an end of the scan.
     pub best_s: Option<f64>,
-    /// Standard uncertainty of `best_s`, seconds, were the remaining residuals white noise.
+    /// Standard uncertainty of `best_s`, seconds: from the remaining residuals with the correlation of
+    /// neighbours, and from how well the orbit is known.
     pub uncertainty_s: Option<f64>,
 }
 
@@ -46,16 +53,9 @@ pub(super) fn scan(
     trajectory: &Trajectory,
     limits: &RangeCheckConfig,
 ) -> Option<BiasScan> {
-    let kept: Vec<(f64, f64, Position<MarsIau2000>)> = (first..shots.len())
+    let kept: Vec<Footprint> = (first..shots.len())
         .filter(|shot| !shots.outlier[*shot])
-        .map(|shot| {
-            let footprint = footprints.row(shots.row[shot] as usize);
-            (
-                footprint.et_tag_s,
-                footprint.range_m,
-                raw_footprint(&footprint),
-            )
-        })
+        .map(|shot| footprints.row(shots.row[shot] as usize))
         .collect();
     if kept.len() < SHOTS_MIN {
         return None;
@@ -69,11 +69,7 @@ pub(super) fn scan(
     for correction_s in corrections(limits) {
         let residuals: Option<Vec<f64>> = kept
             .iter()
-            .map(|(tag_s, range_m, footprint)| {
-                let at = Et::from_seconds(tag_s + correction_s);
-                let spacecraft = mars_rotation::<MarsIau2000>(at).apply(&trajectory.position(at)?);
-                Some(range_m - spacecraft.distance_m(footprint))
-            })
+            .map(|shot| residual_m(shot, trajectory, correction_s))
             .collect();
         // Corrections that lead out of the kernels are left out.
         if let Some(residuals) = residuals {
@@ -82,14 +78,28 @@ pub(super) fn scan(
                 .push(Summary::of(&residuals).standard_deviation);
         }
     }
-    refine(&mut scan, kept.len());
+    scan.best_s = best_s(&scan);
+    scan.uncertainty_s = scan
+        .best_s
+        .and_then(|best_s| uncertainty_s(&kept, trajectory, best_s));
     Some(scan)
+}
+
+/// Range − distance of a shot whose tag is corrected by `correction_s`.
+fn residual_m(shot: &Footprint, trajectory: &Trajectory, correction_s: f64) -> Option<f64> {
+    let at = Et::from_seconds(shot.et_tag_s + correction_s);
+    let spacecraft = mars_rotation::<MarsIau2000>(at).apply(&trajectory.position(at)?);
+    Some(range_residual_m(
+        shot.range_m,
+        &spacecraft,
+        &raw_footprint(shot),
+    ))
 }
 
 /// Corrections from `-half_width` to `+half_width`, symmetric about zero.
 fn corrections(limits: &RangeCheckConfig) -> impl Iterator<Item = f64> {
     let (half_width_s, step_s) = (limits.scan_half_width_s, limits.scan_step_s);
-    let side: Vec<f64> = (1..=STEPS_MAX)
+    let side: Vec<f64> = (1..=SCAN_STEPS_MAX)
         .map(|k| f64::from(k) * step_s)
         .take_while(|correction| *correction <= half_width_s * (1.0 + 1e-12))
         .collect();
@@ -97,26 +107,57 @@ fn corrections(limits: &RangeCheckConfig) -> impl Iterator<Item = f64> {
     negative.into_iter().chain([0.0]).chain(side)
 }
 
-/// Parabola through the three least variances: its minimum, and from its curvature the uncertainty.
-fn refine(scan: &mut BiasScan, shots: usize) {
-    let Some(least) =
-        (0..scan.spread_m.len()).min_by(|a, b| scan.spread_m[*a].total_cmp(&scan.spread_m[*b]))
-    else {
-        return;
-    };
+/// Minimum of the parabola through the three least variances.
+fn best_s(scan: &BiasScan) -> Option<f64> {
+    let least =
+        (0..scan.spread_m.len()).min_by(|a, b| scan.spread_m[*a].total_cmp(&scan.spread_m[*b]))?;
     if least == 0 || least + 1 >= scan.spread_m.len() {
-        return;
+        return None;
     }
     let variance = |index: usize| scan.spread_m[index].powi(2);
     let step_s = scan.correction_s[least + 1] - scan.correction_s[least];
     let (before, at, after) = (variance(least - 1), variance(least), variance(least + 1));
     let curvature = (before - 2.0 * at + after) / (2.0 * step_s * step_s);
     let slope = (after - before) / (2.0 * step_s);
-    if !(curvature > 0.0) {
-        return;
+    (curvature > 0.0).then(|| scan.correction_s[least] - slope / (2.0 * curvature))
+}
+
+/// Standard uncertainty of the best correction.
+///
+/// The best correction is the slope of the residuals over the rates of their lines of sight. It is
+/// uncertain by the scatter about that line, and by the orbit: moved by a constant vector it changes
+/// the residuals by the vector's part along each line of sight, and a metre along the track cannot be
+/// told from 0.3 ms. How well the orbit is known is taken from its mean difference to the orbit of the
+/// PEDR file, as likely in any direction.
+fn uncertainty_s(shots: &[Footprint], trajectory: &Trajectory, best_s: f64) -> Option<f64> {
+    let mut residuals_m = Vec::with_capacity(shots.len());
+    let mut rates_m_s = Vec::with_capacity(shots.len());
+    let mut directions: [Vec<f64>; 3] = std::array::from_fn(|_| Vec::with_capacity(shots.len()));
+    let mut orbit_difference_m = Vector3::zeros();
+    for shot in shots {
+        let residual = |correction_s| residual_m(shot, trajectory, correction_s);
+        let change_m = residual(best_s + RATE_STEP_S)? - residual(best_s - RATE_STEP_S)?;
+        residuals_m.push(residual(best_s)?);
+        rates_m_s.push(change_m / (2.0 * RATE_STEP_S));
+        let at = Et::from_seconds(shot.et_tag_s + best_s);
+        let position = trajectory.position(at)?;
+        let to_mars = mars_rotation::<MarsIau2000>(at);
+        let to_orbit = orbit_axes(&position, &trajectory.velocity_m_s(at)?).transpose()
+            * to_mars.matrix().transpose();
+        let spacecraft = to_mars.apply(&position);
+        let sight_m = spacecraft.xyz_m - raw_footprint(shot).xyz_m;
+        let direction = to_orbit * sight_m.normalize();
+        for (axis, component) in directions.iter_mut().zip(&direction) {
+            axis.push(*component);
+        }
+        orbit_difference_m += to_orbit * (own_spacecraft(shot).xyz_m - spacecraft.xyz_m);
     }
-    let offset_s = -slope / (2.0 * curvature);
-    let remaining = (at - curvature * offset_s * offset_s).max(0.0);
-    scan.best_s = Some(scan.correction_s[least] + offset_s);
-    scan.uncertainty_s = Some((remaining / (curvature * shots as f64)).sqrt());
+    let noise_s = Trend::of(&rates_m_s, &residuals_m)?.uncertainty;
+    let mut seconds_per_metre = Vector3::zeros();
+    for (sensitivity, axis) in seconds_per_metre.iter_mut().zip(&directions) {
+        *sensitivity = Trend::of(&rates_m_s, axis)?.slope;
+    }
+    let difference_m = orbit_difference_m.norm() / shots.len() as f64;
+    let orbit_s = seconds_per_metre.norm() * difference_m / f64::sqrt(3.0);
+    Some(noise_s.hypot(orbit_s))
 }

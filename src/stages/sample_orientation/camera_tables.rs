@@ -82,8 +82,7 @@ fn tables(reader: &Reader, epochs: &[Et]) -> Result<CameraTables> {
     };
     for epoch in epochs {
         let apparent = session.apparent_state(*epoch)?;
-        let lookup = reader.pointing.ck_bias.lookup(*epoch);
-        let attitude = session.attitude(lookup, *epoch, reader.tolerance_s)?;
+        let attitude = reader.attitude(*epoch)?;
         let to_mars = mars_rotation::<MarsIau2000>(*epoch);
         tables.et_s.push(epoch.seconds());
         tables.position_m.push(apparent.position.xyz_m.into());

@@ -1,0 +1,358 @@
+//! `areograph kernels compare`.
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use serde_json::{Value, json};
+
+use super::super::{load_sites, output};
+use crate::{
+    constants::MGS_POINTING_BIAS,
+    error::{Failure, Fault, Kind},
+    flow::{Compared, LeftOut, Request, RivalSet, compare_kernels, rival_sets, wanted_by_site},
+    geom::{polynomial::root_mean_square, statistics::Summary},
+    report::{KernelComparison, comparison_page},
+    spice::{KernelSet, Session, Wanted},
+    stages::compare_kernels::{AttitudeComparison, Comparison, Size},
+    store::atomic,
+    time::{Et, Interval, Intervals, PointingBias},
+    units::RADIANS_PER_ARCSECOND,
+};
+
+/// Spans without coverage that are printed for a set; JSON has all.
+const SPANS_PRINTED: usize = 5;
+
+/// Compares rival kernel sets: how far the orbit and the attitude of each are from the mean of all.
+///
+/// Orbits are positions of MGS from Mars (geometric, J2000) along the radial, along-track and cross-track
+/// axes of the mean orbit. The set with the least root mean square distance from the mean is closest: the
+/// rule by which Shan et al. 2005 chose. Instants are equally spaced over the time that all sets hold,
+/// 1 s apart or, beyond 10000 of them, as far as keeps that number; what a set does not hold is listed.
+///
+/// Example: `areograph kernels compare nav.tm gsfc.tm ipng.tm --site gusev_crater.toml`
+#[derive(Debug, Args)]
+#[command(verbatim_doc_comment)]
+pub(super) struct Arguments {
+    /// Metakernels (.tm), two or more; without any, the rival sets of --site.
+    #[arg(required_unless_present = "site", value_name = "SET.tm")]
+    sets: Vec<PathBuf>,
+    /// Compare within this time, UTC, for example 1999-08-24T14:00..1999-08-24T15:00.
+    #[arg(long, value_name = "FROM..TO", conflicts_with = "site")]
+    time: Option<String>,
+    /// Compare over the times for which this site needs kernels, with its pointing bias.
+    #[arg(long, value_name = "SITE.toml")]
+    site: Option<PathBuf>,
+    /// Answer in JSON, deviations at every epoch included.
+    #[arg(long)]
+    json: bool,
+    /// Write a page with tables and plots to this file.
+    #[arg(long, value_name = "FILE.html")]
+    page: Option<PathBuf>,
+}
+
+/// A command line that asks for no comparison.
+#[derive(Debug, thiserror::Error)]
+enum Usage {
+    #[error("kernel sets to compare: {count}; expected two or more")]
+    TooFew { count: usize },
+    #[error("--time is \"{written}\"; expected FROM..TO in UTC, the first earlier than the second")]
+    Time { written: String },
+}
+
+impl Fault for Usage {
+    fn kind(&self) -> Kind {
+        Kind::Configuration
+    }
+
+    fn advice(&self) -> String {
+        match self {
+            Self::TooFew { .. } => {
+                "name the metakernels of rival sets, or a site with [[kernels.sets]]"
+            }
+            Self::Time { .. } => "write for example --time 1999-08-24T14:00..1999-08-24T15:00",
+        }
+        .to_owned()
+    }
+}
+
+pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
+    let site = match &arguments.site {
+        Some(path) => load_sites(std::slice::from_ref(path))?.pop(),
+        None => None,
+    };
+    let sets = match &site {
+        Some(site) if arguments.sets.is_empty() => rival_sets(site)?,
+        _ => named(&arguments.sets)?,
+    };
+    if sets.len() < 2 {
+        return Err(Usage::TooFew { count: sets.len() }.into());
+    }
+    let bias = site
+        .as_ref()
+        .map_or(MGS_POINTING_BIAS, |site| site.pointing.ck_bias);
+    let wanted = match (&arguments.time, &site) {
+        (Some(time), _) => Some(wanted_by_time(time, bias, &sets[0].kernels)?),
+        (None, Some(site)) => Some(wanted_by_site(site)?),
+        (None, None) => None,
+    };
+    let request = Request {
+        wanted: wanted.as_ref(),
+        bias,
+        attitudes: true,
+        clocks: site.is_some_and(|site| !site.images.is_empty()),
+    };
+    let compared = compare_kernels(&sets, &request)?;
+    if let Some(path) = &arguments.page {
+        atomic::write(path, page(&compared)?.as_bytes())?;
+    }
+    if arguments.json {
+        output::json(&answer(&compared));
+    } else {
+        print(&compared);
+        if let Some(path) = &arguments.page {
+            output::line(format_args!("page: {}", path.display()));
+        }
+    }
+    Ok(())
+}
+
+fn page(compared: &Compared) -> Result<String, Failure> {
+    let mut remarks = compared.notes.clone();
+    remarks.extend(left_out_lines(&compared.left_out));
+    comparison_page(&KernelComparison {
+        orbit: &compared.orbit,
+        attitude: compared.attitude.as_ref(),
+        utc: &compared.utc,
+        remarks: &remarks,
+    })
+}
+
+/// The sets by the names of their metakernels, by their paths where two have one name.
+fn named(paths: &[PathBuf]) -> Result<Vec<RivalSet>, Failure> {
+    let stem = |path: &Path| path.file_stem().map(ToOwned::to_owned);
+    let sets = paths.iter().map(|path| {
+        let alone = paths
+            .iter()
+            .filter(|other| stem(other) == stem(path))
+            .count()
+            == 1;
+        let id = match stem(path) {
+            Some(stem) if alone => stem.to_string_lossy().into_owned(),
+            _ => path.display().to_string(),
+        };
+        let kernels = KernelSet::from_metakernel(path)?;
+        Ok(RivalSet { id, kernels })
+    });
+    sets.collect()
+}
+
+/// The same stretch of positions and attitudes; `kernels` convert its ends.
+fn wanted_by_time(
+    written: &str,
+    bias: PointingBias,
+    kernels: &KernelSet,
+) -> Result<Wanted, Failure> {
+    let unclear = || Usage::Time {
+        written: written.to_owned(),
+    };
+    let (from, to) = written.split_once("..").ok_or_else(unclear)?;
+    let session = Session::open(kernels)?;
+    let instant = |utc: &str| -> Result<Et, Failure> {
+        session
+            .utc_to_et(utc)
+            .map_err(|failure| match failure.kind() {
+                Kind::Input => unclear().into(),
+                _ => failure,
+            })
+    };
+    let span = Interval::new(instant(from)?, instant(to)?);
+    if span.start >= span.stop {
+        return Err(unclear().into());
+    }
+    let span = Intervals::union_of([span]);
+    Ok(Wanted {
+        attitudes: span.shifted(bias.seconds()),
+        positions: span,
+    })
+}
+
+fn print(compared: &Compared) {
+    let orbit = &compared.orbit;
+    output::line(format_args!(
+        "orbit: {} epochs from {} to {} UTC; metres, set minus mean of all",
+        orbit.epochs.len(),
+        compared.utc[0],
+        compared.utc[1],
+    ));
+    print_table(orbit, 1.0, None);
+    if let Some(attitude) = &compared.attitude {
+        output::line(format_args!(
+            "attitude: {} epochs; arcseconds about the same axes, ground in metres along the boresight",
+            attitude.turns.epochs.len(),
+        ));
+        print_table(&attitude.turns, RADIANS_PER_ARCSECOND, Some(attitude));
+    }
+    for line in left_out_lines(&compared.left_out) {
+        output::line(line);
+    }
+    for note in &compared.notes {
+        output::line(format_args!("note: {note}"));
+    }
+}
+
+/// Deviations and differences of each two sets, in units of `unit`.
+fn print_table(comparison: &Comparison, unit: f64, attitude: Option<&AttitudeComparison>) {
+    let heads = ["radial", "along track", "cross track"].map(|head| format!("{head:^23}"));
+    let ground = attitude.map_or("", |_| "  ground rms  ground max");
+    output::line(format_args!(
+        "  {:24}{}{:>12}{:>12}{ground}",
+        "mean ± st. deviation",
+        heads.concat(),
+        "rms",
+        "max"
+    ));
+    let row = |name: &str, size: &Size, ground: &str| {
+        let components = size.components.map(|one| {
+            let (mean, spread) = (one.mean / unit, one.standard_deviation / unit);
+            format!("{mean:>11.3} ± {spread:<9.3}")
+        });
+        let (rms, max) = (size.rms / unit, size.max / unit);
+        let components = components.concat();
+        output::line(format_args!(
+            "  {name:24}{components}{rms:>12.3}{max:>12.3}{ground}"
+        ));
+    };
+    for (index, deviation) in comparison.deviations.iter().enumerate() {
+        let ground = attitude.and_then(|attitude| ground_size(attitude, index));
+        let ground =
+            ground.map_or_else(String::new, |[rms, max]| format!("{rms:>12.3}{max:>12.3}"));
+        row(&deviation.set, &deviation.size, &ground);
+    }
+    for (first, second) in comparison.pairs() {
+        let sets = [second, first].map(|index| &*comparison.deviations[index].set);
+        row(&sets.join(" - "), &comparison.difference(first, second), "");
+    }
+    let closest = &comparison.closest().set;
+    let tied: Vec<&str> = comparison.tied_sets().collect();
+    if tied.is_empty() {
+        output::line(format_args!("  closest to the mean of all: {closest}"));
+    } else {
+        output::line(format_args!(
+            "  equally close to the mean of all: {closest}, {}",
+            tied.join(", ")
+        ));
+    }
+}
+
+/// For each set what it lacks: how much, and the first spans.
+fn left_out_lines(left_out: &[LeftOut]) -> Vec<String> {
+    let same = |a: &LeftOut, b: &LeftOut| a.set == b.set && a.what == b.what;
+    let of_one_set = left_out.chunk_by(same);
+    let lines = of_one_set.map(|spans| {
+        let (set, what) = (&spans[0].set, spans[0].what);
+        let total_s: f64 = spans.iter().map(|one| one.interval.duration_s()).sum();
+        let mut told: Vec<String> = spans
+            .iter()
+            .take(SPANS_PRINTED)
+            .map(|span| {
+                let seconds = span.interval.duration_s();
+                format!("{} .. {} UTC ({seconds:.3} s)", span.utc[0], span.utc[1])
+            })
+            .collect();
+        if spans.len() > SPANS_PRINTED {
+            let more = spans.len() - SPANS_PRINTED;
+            told.push(format!("and {more} more, see --json"));
+        }
+        let told = told.join(", ");
+        format!("left out: {set} has no {what} for {total_s:.3} s: {told}")
+    });
+    lines.collect()
+}
+
+/// Root mean square and largest distance on the ground, metres; nothing when no boresight meets Mars.
+fn ground_size(attitude: &AttitudeComparison, set: usize) -> Option<[f64; 2]> {
+    let ground_m = &attitude.ground_m[set];
+    let max_m = ground_m.iter().copied().reduce(f64::max)?;
+    Some([root_mean_square(ground_m), max_m])
+}
+
+fn answer(compared: &Compared) -> Value {
+    let left_out = compared.left_out.iter().map(|one| {
+        json!({
+            "set": one.set,
+            "what": one.what,
+            "start_et_s": one.interval.start.seconds(),
+            "stop_et_s": one.interval.stop.seconds(),
+            "start_utc": one.utc[0],
+            "stop_utc": one.utc[1],
+        })
+    });
+    let mut answer = json!({
+        "rule": "least root mean square distance from the mean of all sets",
+        "orbit": comparison_json(&compared.orbit, 1.0, "m"),
+        "start_utc": compared.utc[0],
+        "stop_utc": compared.utc[1],
+        "left_out": left_out.collect::<Vec<_>>(),
+        "notes": compared.notes,
+    });
+    if let Some(attitude) = &compared.attitude {
+        let mut turns = comparison_json(&attitude.turns, RADIANS_PER_ARCSECOND, "arcsec");
+        let on_ground = attitude.on_ground.iter().map(|et| et.seconds());
+        turns["ground_epochs_et_s"] = on_ground.collect::<Vec<_>>().into();
+        for (set, ground_m) in attitude.ground_m.iter().enumerate() {
+            let entry = &mut turns["sets"][set];
+            entry["ground_m"] = json!(ground_m);
+            if let Some([rms_m, max_m]) = ground_size(attitude, set) {
+                entry["ground_rms_m"] = rms_m.into();
+                entry["ground_max_m"] = max_m.into();
+            }
+        }
+        answer["attitude"] = turns;
+    }
+    answer
+}
+
+/// A comparison in units of `unit`, whose name ends the keys.
+fn comparison_json(comparison: &Comparison, unit: f64, name: &str) -> Value {
+    let keyed = |key: &str| format!("{key}_{name}");
+    let size = |size: &Size| {
+        let [radial, along, cross] = size.components.map(|summary| summary_json(&summary, unit));
+        json!({
+            keyed("rms"): size.rms / unit,
+            keyed("max"): size.max / unit,
+            keyed("radial"): radial,
+            keyed("along_track"): along,
+            keyed("cross_track"): cross,
+        })
+    };
+    let sets = comparison.deviations.iter().map(|deviation| {
+        let mut entry = size(&deviation.size);
+        let in_unit = |vector: &[f64; 3]| vector.map(|component| component / unit);
+        let series = deviation.radial_along_cross.iter().map(in_unit);
+        entry["set"] = deviation.set.clone().into();
+        entry[keyed("radial_along_cross")] = series.collect::<Vec<_>>().into_iter().collect();
+        entry
+    });
+    let differences = comparison.pairs().map(|(first, second)| {
+        let mut entry = size(&comparison.difference(first, second));
+        entry["set"] = comparison.deviations[second].set.clone().into();
+        entry["minus"] = comparison.deviations[first].set.clone().into();
+        entry
+    });
+    json!({
+        "closest": comparison.closest().set,
+        "equally_close": comparison.tied_sets().collect::<Vec<_>>(),
+        "epochs_et_s": comparison.epochs.iter().map(|et| et.seconds()).collect::<Vec<_>>(),
+        "sets": sets.collect::<Vec<_>>(),
+        "differences": differences.collect::<Vec<_>>(),
+    })
+}
+
+fn summary_json(summary: &Summary, unit: f64) -> Value {
+    json!({
+        "mean": summary.mean / unit,
+        "standard_deviation": summary.standard_deviation / unit,
+        "min": summary.min / unit,
+        "max": summary.max / unit,
+    })
+}

@@ -1,0 +1,176 @@
+//! `areograph report`.
+
+use std::{path::PathBuf, process::ExitCode};
+
+use clap::{Args, Subcommand};
+use serde_json::{Value, json};
+
+use super::output;
+use crate::{
+    difference::{Limits, Outcome, Pairs, RunDifference, compare, pairs},
+    error::{Failure, Kind},
+    report::difference_page,
+    store::atomic,
+};
+
+/// Reports on products.
+#[derive(Debug, Args)]
+pub(super) struct Arguments {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    Diff(DiffArguments),
+}
+
+/// Says what differs between two runs: inputs, verdicts, statistics, and how far everything moved.
+///
+/// Products alone are read, and checked against their manifests.
+/// A and B are folders of one site, or output folders of which every common site is compared.
+/// A movement is B − A. Exit code 5 when something moved beyond a limit.
+///
+/// Example: `areograph report diff out.yesterday out --limit-m 5 --page diff.html`
+#[derive(Debug, Args)]
+#[command(verbatim_doc_comment)]
+struct DiffArguments {
+    /// Products of the first run.
+    #[arg(value_name = "OUT_A")]
+    a: PathBuf,
+    /// Products of the second run.
+    #[arg(value_name = "OUT_B")]
+    b: PathBuf,
+    /// Answer in JSON.
+    #[arg(long)]
+    json: bool,
+    /// Write a page as well.
+    #[arg(long, value_name = "FILE.html")]
+    page: Option<PathBuf>,
+    /// How far a footprint, a camera or a boresight on the ground may move, metres.
+    #[arg(long, value_name = "METRES", value_parser = limit)]
+    limit_m: Option<f64>,
+    /// How far a camera may turn, arcseconds.
+    #[arg(long, value_name = "ARCSECONDS", value_parser = limit)]
+    limit_arcsec: Option<f64>,
+}
+
+/// A limit as typed.
+fn limit(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(limit) if limit.is_finite() && limit >= 0.0 => Ok(limit),
+        _ => Err("expected a number, 0 or more".to_owned()),
+    }
+}
+
+pub(super) fn run(arguments: &Arguments) -> ExitCode {
+    let Command::Diff(arguments) = &arguments.command;
+    match diff(arguments) {
+        Ok(code) => ExitCode::from(code),
+        Err(failure) => super::report(&failure),
+    }
+}
+
+/// A site and what came of its comparison.
+type Compared = (String, Result<RunDifference, Failure>);
+
+fn diff(arguments: &DiffArguments) -> Result<u8, Failure> {
+    let limits = Limits {
+        movement_m: arguments.limit_m,
+        pointing_arcsec: arguments.limit_arcsec,
+    };
+    let pairs = pairs(&arguments.a, &arguments.b)?;
+    let sites: Vec<Compared> = pairs
+        .both
+        .iter()
+        .map(|(a, b)| (crate::files::file_name(b), compare(a, b, &limits)))
+        .collect();
+    if arguments.json {
+        output::json(&answer(&sites, &pairs));
+    } else {
+        print(&sites, &lonely(&pairs));
+    }
+    let failures = || {
+        sites
+            .iter()
+            .filter_map(|(_, compared)| compared.as_ref().err())
+    };
+    failures().for_each(output::error);
+    if let Some(file) = &arguments.page {
+        let compared = sites
+            .iter()
+            .filter_map(|(_, compared)| compared.as_ref().ok());
+        let mut not_compared = lonely(&pairs);
+        not_compared.extend(failures().map(ToString::to_string));
+        let page = difference_page(&compared.collect::<Vec<_>>(), &not_compared)?;
+        atomic::write(file, page.as_bytes())?;
+    }
+    Ok(exit_code(&sites, &pairs, &limits))
+}
+
+/// Sites that only one output has, one sentence each.
+fn lonely(pairs: &Pairs) -> Vec<String> {
+    let runs = [(&pairs.only_in_a, "A"), (&pairs.only_in_b, "B")].into_iter();
+    runs.flat_map(|(names, whose)| {
+        names
+            .iter()
+            .map(move |name| format!("{name}: only in {whose}, not compared"))
+    })
+    .collect()
+}
+
+fn print(sites: &[Compared], lonely: &[String]) {
+    for (_, compared) in sites {
+        let Ok(difference) = compared else { continue };
+        output::line(format_args!(
+            "{}: {}",
+            difference.site,
+            difference.headline()
+        ));
+        let (a, b) = (&difference.a.finished_utc, &difference.b.finished_utc);
+        output::line(format_args!("  A of {a}, B of {b}"));
+        for sentence in difference.sentences() {
+            output::line(format_args!("  {sentence}"));
+        }
+    }
+    lonely.iter().for_each(output::line);
+}
+
+fn answer(sites: &[Compared], pairs: &Pairs) -> Value {
+    let sites: Vec<Value> = sites
+        .iter()
+        .map(|(site, compared)| match compared {
+            Ok(difference) => json!(difference),
+            Err(failure) => json!({
+                "site": site,
+                "error": failure.to_string(),
+                "exit_code": failure.kind().exit_code(),
+            }),
+        })
+        .collect();
+    json!({
+        "sites": sites,
+        "only_in_a": pairs.only_in_a,
+        "only_in_b": pairs.only_in_b,
+    })
+}
+
+/// A failure says more than a limit; a site that is gone keeps no limit.
+fn exit_code(sites: &[Compared], pairs: &Pairs, limits: &Limits) -> u8 {
+    let failed = sites
+        .iter()
+        .find_map(|(_, compared)| compared.as_ref().err());
+    if let Some(failure) = failed {
+        return failure.kind().exit_code();
+    }
+    let beyond = |(_, compared): &Compared| {
+        compared
+            .as_ref()
+            .is_ok_and(|difference| difference.outcome == Outcome::BeyondLimit)
+    };
+    let gone = *limits != Limits::default() && !pairs.only_in_a.is_empty();
+    if gone || sites.iter().any(beyond) {
+        return Kind::Validation.exit_code();
+    }
+    0
+}

@@ -1,0 +1,161 @@
+//! Values that differ, key by key.
+
+use std::collections::BTreeMap;
+
+use serde::Serialize;
+use serde_json::{Value, json};
+
+use crate::store::manifest::Manifest;
+
+/// A value that differs; missing where a run does not have it.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Change {
+    /// Key, with dots between tables.
+    pub what: String,
+    /// In the first run.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub a: Option<Value>,
+    /// In the second run.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub b: Option<Value>,
+}
+
+/// Texts of one run alone.
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize)]
+pub struct Texts {
+    /// Only in the first run.
+    pub only_in_a: Vec<String>,
+    /// Only in the second run.
+    pub only_in_b: Vec<String>,
+}
+
+impl Change {
+    /// `B − A` of numbers.
+    #[must_use]
+    pub fn difference(&self) -> Option<f64> {
+        let number = |value: &Option<Value>| value.as_ref().and_then(Value::as_f64);
+        Some(number(&self.b)? - number(&self.a)?)
+    }
+}
+
+impl Texts {
+    pub(super) fn between(a: &[String], b: &[String]) -> Self {
+        let without = |texts: &[String], others: &[String]| {
+            let lonely = texts.iter().filter(|text| !others.contains(text));
+            lonely.cloned().collect()
+        };
+        Self {
+            only_in_a: without(a, b),
+            only_in_b: without(b, a),
+        }
+    }
+
+    /// Whether both runs have the same texts.
+    #[must_use]
+    pub const fn is_empty(&self) -> bool {
+        self.only_in_a.is_empty() && self.only_in_b.is_empty()
+    }
+}
+
+/// Values of `a` and `b` that differ, in the order of their keys; lists are compared as wholes.
+pub(super) fn between(a: &impl Serialize, b: &impl Serialize) -> Vec<Change> {
+    let (mut a, mut b) = (flat(a), flat(b));
+    let mut keys: Vec<String> = a.keys().chain(b.keys()).cloned().collect();
+    keys.sort();
+    keys.dedup();
+    keys.into_iter()
+        .map(|what| Change {
+            a: a.remove(&what),
+            b: b.remove(&what),
+            what,
+        })
+        .filter(|change| change.a != change.b)
+        .collect()
+}
+
+fn flat(values: &impl Serialize) -> BTreeMap<String, Value> {
+    let mut flat = BTreeMap::new();
+    // Values that were read from JSON can be written as JSON.
+    let value = serde_json::to_value(values).unwrap_or_default();
+    flatten("", value, &mut flat);
+    flat
+}
+
+fn flatten(path: &str, value: Value, flat: &mut BTreeMap<String, Value>) {
+    match value {
+        Value::Object(members) => {
+            for (key, member) in members {
+                let dot = if path.is_empty() { "" } else { "." };
+                flatten(&format!("{path}{dot}{key}"), member, flat);
+            }
+        }
+        value => {
+            flat.insert(path.to_owned(), value);
+        }
+    }
+}
+
+/// Time corrections by name.
+pub(super) fn biases(manifest: &Manifest) -> BTreeMap<&str, Value> {
+    let entry = |bias: &crate::store::manifest::BiasEntry| json!({"correction_s": bias.correction_s, "scope": bias.scope, "source": bias.source});
+    let biases = manifest.biases.iter();
+    biases.map(|bias| (&*bias.name, entry(bias))).collect()
+}
+
+/// A value as people read it, fractions to six decimals or seven digits; a dash for none.
+#[must_use]
+pub fn text(value: Option<&Value>) -> String {
+    match value {
+        None => "–".to_owned(),
+        Some(Value::String(text)) => text.clone(),
+        Some(Value::Number(number)) if number.is_f64() => {
+            fraction(number.as_f64().unwrap_or(f64::NAN))
+        }
+        Some(value) => value.to_string(),
+    }
+}
+
+fn fraction(value: f64) -> String {
+    if value.abs() > 0.0 && value.abs() < 1e-3 {
+        return format!("{value:.6e}");
+    }
+    let digits = format!("{value:.6}");
+    let short = digits.trim_end_matches('0').trim_end_matches('.');
+    short.to_owned()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn changes_are_told_by_key() {
+        let a =
+            json!({"limits": {"mean_max_m": 5.0, "shots_min": 10}, "classes": [1], "gone": "x"});
+        let b =
+            json!({"limits": {"mean_max_m": 9.0, "shots_min": 10}, "classes": [0, 1], "new": true});
+        let told: Vec<String> = between(&a, &b)
+            .iter()
+            .map(|change| {
+                let [a, b] = [&change.a, &change.b].map(|value| text(value.as_ref()));
+                format!("{}: {a} → {b}", change.what)
+            })
+            .collect();
+        assert_eq!(
+            told,
+            [
+                "classes: [1] → [0,1]",
+                "gone: x → –",
+                "limits.mean_max_m: 5 → 9",
+                "new: – → true",
+            ]
+        );
+        assert!(between(&a, &a).is_empty());
+        let fractions =
+            [-1.15, 37_000_000.25, 0.104_943_9, 7.4e-9, 0.0].map(|value| text(Some(&json!(value))));
+        assert_eq!(
+            fractions,
+            ["-1.15", "37000000.25", "0.104944", "7.400000e-9", "0"]
+        );
+    }
+}

@@ -1,0 +1,99 @@
+//! Movements judged by limits.
+
+use serde::Serialize;
+
+use super::{Outcome, RunDifference, images::ImageDifference, movement::ROUNDING, words::quantity};
+
+/// How far things may move; without a limit everything may.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
+pub struct Limits {
+    /// For footprints, perspective centres and the boresight's ground points, metres.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub movement_m: Option<f64>,
+    /// For the camera's turn, arcseconds.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub pointing_arcsec: Option<f64>,
+}
+
+impl Limits {
+    /// The difference with its outcome, and what is beyond these limits.
+    ///
+    /// Footprints and samples of one run alone have no movement: at a window's edge they come and go. Where
+    /// nothing is left to compare, a limit cannot be said to be kept, and that is told as well.
+    pub(super) fn judged(&self, mut difference: RunDifference) -> RunDifference {
+        let mut beyond = self.footprints(&difference);
+        for image in &difference.images {
+            beyond.extend(self.image(image));
+        }
+        if !beyond.is_empty() {
+            difference.outcome = Outcome::BeyondLimit;
+        } else if difference.moved() {
+            difference.outcome = Outcome::Moved;
+        }
+        difference.beyond_limits = beyond;
+        difference
+    }
+
+    fn footprints(&self, difference: &RunDifference) -> Vec<String> {
+        let footprints = &difference.footprints;
+        match (&footprints.movement, self.movement_m) {
+            (Some(movement), limit) => {
+                let what = || "footprints moved".to_owned();
+                beyond(what, movement.distance_m.max, limit, "m")
+                    .into_iter()
+                    .collect()
+            }
+            (None, Some(_)) if footprints.only_in_a > 0 => {
+                vec!["no footprint of A is in B: the limit cannot be applied".to_owned()]
+            }
+            _ => Vec::new(),
+        }
+    }
+
+    fn image(&self, difference: &ImageDifference) -> Vec<String> {
+        let image = &difference.image;
+        let Some(movement) = &difference.movement else {
+            let asked = self.movement_m.or(self.pointing_arcsec).is_some();
+            let told = format!("image {image}: no sample of A is in B: limits cannot be applied");
+            return Vec::from_iter((asked && difference.samples_only_in_a > 0).then_some(told));
+        };
+        let ground_m = movement.boresight_ground_m.map_or(0.0, |ground| ground.max);
+        let (metres, arcseconds) = (self.movement_m, self.pointing_arcsec);
+        [
+            beyond(
+                || format!("image {image}: the camera moved"),
+                movement.distance_m.max,
+                metres,
+                "m",
+            ),
+            beyond(
+                || format!("image {image}: the boresight's ground point moved"),
+                ground_m,
+                metres,
+                "m",
+            ),
+            beyond(
+                || format!("image {image}: the camera turned"),
+                movement.turn_arcsec.max,
+                arcseconds,
+                "arcsec",
+            ),
+        ]
+        .into_iter()
+        .flatten()
+        .collect()
+    }
+}
+
+/// The sentence for a movement beyond its limit, if there is one and it is.
+fn beyond(what: impl Fn() -> String, found: f64, limit: Option<f64>, unit: &str) -> Option<String> {
+    let limit = limit?;
+    // Rounding is no movement, whatever the limit. Written so that NaN is beyond.
+    (!(found <= limit.max(ROUNDING))).then(|| {
+        format!(
+            "{} by up to {} {unit}, beyond the limit of {limit} {unit}",
+            what(),
+            quantity(found)
+        )
+    })
+}

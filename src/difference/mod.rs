@@ -1,0 +1,266 @@
+//! What differs between two runs of a site, read from their published products alone.
+//!
+//! `A` is the earlier run and `B` the later one, by the order in which they are named; a movement is
+//! `B − A`. What is in both is compared by identity: shots by file, orbit, record and shot number,
+//! samples of an image by their line, profiles, images, kernels, stages and products by name.
+
+mod changes;
+mod fault;
+mod footprints;
+mod images;
+mod items;
+mod limits;
+mod movement;
+mod outputs;
+mod words;
+
+use std::path::Path;
+
+use serde::Serialize;
+
+use crate::{
+    error::{Place, Result},
+    products::read::{ImageDocument, ProfileDocument, RangesDocument, read_image, read_ranges},
+    store::{
+        manifest::{Manifest, Verdict},
+        published::{read_published, still_published},
+    },
+};
+
+pub use changes::{Change, Texts, text};
+pub use footprints::{FootprintsDifference, FootprintsMovement, ShotName};
+pub use images::{ImageDifference, ImageMovement, SampleMovement};
+pub use items::{ChangedItem, Item, Items};
+pub use limits::Limits;
+pub use movement::{Component, Size};
+pub use outputs::{Pairs, pairs};
+pub use words::quantity;
+
+use fault::DifferenceFault;
+
+/// Everything that differs between two runs of one site.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct RunDifference {
+    /// Always `areograph difference 1`.
+    pub format: &'static str,
+    /// Site identifier.
+    pub site: String,
+    /// What came of it, in one word.
+    pub outcome: Outcome,
+    /// Limits that movements were judged by.
+    pub limits: Limits,
+    /// Movements beyond the limits, and what the limits could not be applied to, one sentence each.
+    pub beyond_limits: Vec<String>,
+    /// The first run.
+    pub a: RunEntry,
+    /// The second run.
+    pub b: RunEntry,
+    /// Kernels by name.
+    pub kernels: Items,
+    /// Whether configuration keys or values differ, by the hashes of both.
+    pub configuration_changed: bool,
+    /// Configuration keys that products repeat and that differ; others may differ as well.
+    pub configuration: Vec<Change>,
+    /// Time corrections that differ.
+    pub biases: Vec<Change>,
+    /// Counts that differ.
+    pub counts: Vec<Change>,
+    /// Largest figures of the site that differ.
+    pub figures: Vec<Change>,
+    /// Shots left out, by reason, that differ.
+    pub rejected: Vec<Change>,
+    /// Complaints about input of one run alone; manifests quote the first ones.
+    pub complaints: Texts,
+    /// Notes of one run alone; that a list names a kernel is told by the kernels.
+    pub notes: Texts,
+    /// Stages by their fingerprints: what entered them, not what came out.
+    pub stages: Items,
+    /// Product files by content.
+    pub products: Items,
+    /// Range statistics of every profile.
+    pub profiles: Vec<ProfileDifference>,
+    /// Where shots hit the ground.
+    pub footprints: FootprintsDifference,
+    /// Orientation of every image.
+    pub images: Vec<ImageDifference>,
+}
+
+/// What came of a comparison.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Outcome {
+    /// Manifests are equal but for the time of publication.
+    NothingChanged,
+    /// Something changed, no footprint, position or pointing among it.
+    NothingMoved,
+    /// Footprints, positions or pointing moved, or are there in one run only.
+    Moved,
+    /// Something moved farther than a limit allows, or a limit could not be applied.
+    BeyondLimit,
+}
+
+/// A run, as its manifest introduces it.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct RunEntry {
+    /// Version of the program.
+    pub version: String,
+    /// When the products were published.
+    pub finished_utc: String,
+    /// Configuration file, without folders.
+    pub configuration: String,
+    /// BLAKE3 of its keys and values.
+    pub configuration_blake3: String,
+    /// Whether the products keep the limits of the configuration, and which are broken.
+    pub verdict: Verdict,
+}
+
+impl RunEntry {
+    fn of(manifest: &Manifest) -> Self {
+        Self {
+            version: manifest.version.clone(),
+            finished_utc: manifest.finished_utc.clone(),
+            configuration: manifest.configuration.file_name.clone(),
+            configuration_blake3: manifest.configuration.blake3.clone(),
+            verdict: manifest.verdict.clone(),
+        }
+    }
+}
+
+/// A profile in both runs or in one.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ProfileDifference {
+    /// Window, orbit and crossing.
+    pub profile: String,
+    /// Whether anything in it differs.
+    pub changed: bool,
+    /// In the first run.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub a: Option<ProfileDocument>,
+    /// In the second run.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub b: Option<ProfileDocument>,
+}
+
+/// Compares the products in two folders of one site; movements beyond `limits` are told.
+///
+/// # Errors
+/// A folder without products, with half-made ones or with others than its manifest says; products of
+/// two sites; products that this version cannot read.
+pub fn compare(a: &Path, b: &Path, limits: &Limits) -> Result<RunDifference> {
+    let (first, second) = (read_published(a)?, read_published(b)?);
+    if first.site != second.site {
+        let fault = DifferenceFault::DifferentSites {
+            a: first.site,
+            b: second.site,
+        };
+        return Err(fault).in_file(b);
+    }
+    let site = first.site.clone();
+    let difference = of_manifests(&first, &second, limits);
+    let read = read_movements(difference, [(a, &first), (b, &second)]).in_site(&site)?;
+    for (folder, manifest) in [(a, &first), (b, &second)] {
+        still_published(folder, manifest).in_site(&site)?;
+    }
+    Ok(limits.judged(read))
+}
+
+/// What manifests alone can tell.
+fn of_manifests(a: &Manifest, b: &Manifest, limits: &Limits) -> RunDifference {
+    let mut b_when_a_was_made = b.clone();
+    b_when_a_was_made.finished_utc.clone_from(&a.finished_utc);
+    RunDifference {
+        format: "areograph difference 1",
+        site: a.site.clone(),
+        outcome: if b_when_a_was_made == *a {
+            Outcome::NothingChanged
+        } else {
+            Outcome::NothingMoved
+        },
+        limits: *limits,
+        beyond_limits: Vec::new(),
+        a: RunEntry::of(a),
+        b: RunEntry::of(b),
+        kernels: Items::between(&items::kernels(a), &items::kernels(b)),
+        configuration_changed: a.configuration.blake3 != b.configuration.blake3,
+        configuration: Vec::new(),
+        biases: changes::between(&changes::biases(a), &changes::biases(b)),
+        counts: changes::between(&a.counts, &b.counts),
+        figures: changes::between(&a.figures, &b.figures),
+        rejected: changes::between(&a.rejected, &b.rejected),
+        complaints: Texts::between(&a.complaints.texts, &b.complaints.texts),
+        notes: Texts::between(&items::notes(a), &items::notes(b)),
+        stages: Items::between(&items::stages(a), &items::stages(b)),
+        products: Items::between(&items::products(a), &items::products(b)),
+        profiles: Vec::new(),
+        footprints: FootprintsDifference::default(),
+        images: Vec::new(),
+    }
+}
+
+/// Adds what the products themselves tell.
+fn read_movements(
+    mut difference: RunDifference,
+    runs: [(&Path, &Manifest); 2],
+) -> Result<RunDifference> {
+    let [a, b] = runs.map(|(folder, _)| folder);
+    let ranges = [
+        read_ranges(&a.join("ranges.json"))?,
+        read_ranges(&b.join("ranges.json"))?,
+    ];
+    difference.configuration = configuration(&ranges);
+    let [first, second] = ranges.map(|document| document.profiles);
+    difference.profiles = profiles(first, second);
+    difference.footprints = footprints::between(a, b)?;
+    let images = |manifest: &Manifest| items::images(manifest);
+    for name in items::united(&images(runs[0].1), &images(runs[1].1)) {
+        let document = |(folder, manifest): (&Path, &Manifest)| -> Result<Option<ImageDocument>> {
+            let file = folder.join(format!("images/{name}/orientation.json"));
+            let there = images(manifest).contains(&name);
+            there.then(|| read_image(&file)).transpose()
+        };
+        let documents = [document(runs[0])?, document(runs[1])?];
+        let image = images::between(&name, [a, b], &documents)?;
+        difference.images.push(image);
+    }
+    Ok(difference)
+}
+
+/// Keys of the configuration that `ranges.json` repeats; the correction follows from the others.
+fn configuration(ranges: &[RangesDocument; 2]) -> Vec<Change> {
+    let [a, b] = ranges
+        .each_ref()
+        .map(|document| serde_json::json!({"mola_clock": document.mola_clock, "range_check": document.limits}));
+    let mut keys = changes::between(&a, &b);
+    keys.retain(|key| key.what != "mola_clock.correction_s");
+    keys
+}
+
+/// Profiles of both runs, in the order of the first, then those of the second alone.
+fn profiles(a: Vec<ProfileDocument>, mut b: Vec<ProfileDocument>) -> Vec<ProfileDifference> {
+    let mut profiles = Vec::with_capacity(a.len());
+    for first in a {
+        let place = b.iter().position(|second| second.id == first.id);
+        let second = place.map(|place| b.remove(place));
+        profiles.push(ProfileDifference {
+            profile: first.id.clone(),
+            changed: second.as_ref() != Some(&first),
+            a: Some(first),
+            b: second,
+        });
+    }
+    profiles.extend(b.into_iter().map(|second| ProfileDifference {
+        profile: second.id.clone(),
+        changed: true,
+        a: None,
+        b: Some(second),
+    }));
+    profiles
+}
+
+impl RunDifference {
+    /// Whether a footprint, a position or the pointing moved, or is there in one run only.
+    #[must_use]
+    pub fn moved(&self) -> bool {
+        self.footprints.moved() || self.images.iter().any(ImageDifference::moved)
+    }
+}

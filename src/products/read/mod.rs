@@ -1,0 +1,55 @@
+//! Published products read back into typed values, without the configuration or the run that made them.
+//!
+//! Only what comparing needs is read. Lengths are metres, times ET seconds, as in the files.
+
+mod columns;
+mod documents;
+mod footprints;
+mod orientation;
+
+pub use documents::{
+    AngleModel, ImageDocument, LengthModel, OrientationModel, ProfileDocument, RangesDocument,
+    read_image, read_ranges,
+};
+pub use footprints::{FootprintRows, read_footprints};
+pub use orientation::{SampleRow, read_samples};
+
+use crate::error::{Fault, Kind};
+
+/// A product that is whole, but not what this program writes.
+#[derive(Debug, thiserror::Error)]
+pub(super) enum ReadFault {
+    /// Not Parquet, or not the document.
+    #[error("cannot be read as {what}: {reason}")]
+    Unreadable { what: &'static str, reason: String },
+    /// A path of the camera needs two ends.
+    #[error("has {found} samples; expected 2 or more")]
+    TooFew { found: usize },
+    /// A column is missing or of another type.
+    #[error("column {name} is {found}; expected {expected}")]
+    Column {
+        name: &'static str,
+        found: String,
+        expected: &'static str,
+    },
+}
+
+impl ReadFault {
+    /// For `map_err` on errors of decoding libraries.
+    fn unreadable<E: std::fmt::Display>(what: &'static str) -> impl Fn(E) -> Self {
+        move |error| Self::Unreadable {
+            what,
+            reason: error.to_string(),
+        }
+    }
+}
+
+impl Fault for ReadFault {
+    fn kind(&self) -> Kind {
+        Kind::Input
+    }
+
+    fn advice(&self) -> String {
+        "products of another version of areograph have to be made again by this one".to_owned()
+    }
+}

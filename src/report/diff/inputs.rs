@@ -1,0 +1,195 @@
+//! Statistics, values, kernels, stages and products that differ.
+
+use crate::{
+    difference::{Change, Item, Items, RunDifference, Texts, quantity, text},
+    files::short_hash,
+    products::read::ProfileDocument,
+    report::html::{Cell, Column, Table, list, paragraph},
+};
+
+/// Range residuals per profile in both runs.
+pub(super) fn profiles(site: &RunDifference) -> String {
+    if site.profiles.is_empty() {
+        return String::new();
+    }
+    let mut table = Table::new(
+        "Range − distance to the spacecraft in the kernels",
+        &[
+            Column::Text("profile"),
+            Column::Number("shots A"),
+            Column::Number("B"),
+            Column::Number("mean A, m"),
+            Column::Number("B"),
+            Column::Number("B − A"),
+            Column::Number("st. dev. A, m"),
+            Column::Number("B"),
+            Column::Number("outliers A"),
+            Column::Number("B"),
+            Column::Text("verdict"),
+        ],
+    );
+    for profile in &site.profiles {
+        let [a, b] = [profile.a.as_ref(), profile.b.as_ref()];
+        let cell = |profile: Option<&ProfileDocument>, value: fn(&ProfileDocument) -> String| {
+            profile.map_or_else(|| "–".to_owned(), value)
+        };
+        let mut cells = vec![profile.profile.clone()];
+        let mut pair = |value: fn(&ProfileDocument) -> String| {
+            cells.extend([cell(a, value), cell(b, value)]);
+        };
+        pair(|p| p.range_minus_distance_m.n.to_string());
+        pair(|p| quantity(p.range_minus_distance_m.mean));
+        pair(|p| quantity(p.range_minus_distance_m.standard_deviation));
+        pair(|p| p.outliers.to_string());
+        let change_m = a.zip(b).map(|(a, b)| {
+            let mean_m = |profile: &ProfileDocument| profile.range_minus_distance_m.mean;
+            format!("{:+.3}", mean_m(b) - mean_m(a))
+        });
+        cells.insert(5, change_m.unwrap_or_else(|| "–".to_owned()));
+        let word = |valid: Option<bool>| match valid {
+            Some(true) => "valid",
+            Some(false) => "INVALID",
+            None => "not there",
+        };
+        let valid = [a, b].map(|profile| profile.map(|profile| profile.valid));
+        cells.push(if valid[0] == valid[1] {
+            word(valid[0]).to_owned()
+        } else {
+            format!("{} → {}", word(valid[0]), word(valid[1]))
+        });
+        table.row(valid[1] != Some(false), cells.into_iter().map(Cell::from));
+    }
+    table.finish()
+}
+
+/// Keys, corrections, counts, times and model statistics that differ.
+pub(super) fn values(site: &RunDifference) -> String {
+    let mut table = Table::new(
+        "Values that differ",
+        &[
+            Column::Text("of"),
+            Column::Text("value"),
+            Column::Number("A"),
+            Column::Number("B"),
+            Column::Number("B − A"),
+        ],
+    );
+    let mut rows = 0;
+    let mut add = |of: &str, changes: &[Change]| {
+        rows += changes.len();
+        for change in changes {
+            let [a, b] = [&change.a, &change.b].map(|value| text(value.as_ref()));
+            let difference = change
+                .difference()
+                .map(|change| format!("{change:+.2e}"))
+                .unwrap_or_default();
+            let what = (&change.what).into();
+            table.row(
+                true,
+                [of.into(), what, a.into(), b.into(), difference.into()],
+            );
+        }
+    };
+    add("configuration", &site.configuration);
+    add("corrections", &site.biases);
+    add("counts", &site.counts);
+    add("figures", &site.figures);
+    add("rejected shots", &site.rejected);
+    for image in &site.images {
+        add(&format!("times of image {}", image.image), &image.times);
+        add(&format!("models of image {}", image.image), &image.models);
+    }
+    if site.a.version != site.b.version {
+        rows += 1;
+        let [a, b] = [&site.a, &site.b].map(|run| run.version.clone());
+        table.row(
+            true,
+            [
+                "program".into(),
+                "version".into(),
+                a.into(),
+                b.into(),
+                "".into(),
+            ],
+        );
+    }
+    let hidden = if site.configuration_changed {
+        paragraph(
+            "The configurations differ. Keys are compared where products repeat them (mola_clock, range_check); \
+             others may differ as well.",
+        )
+    } else {
+        String::new()
+    };
+    if rows == 0 {
+        return hidden;
+    }
+    table.finish() + &hidden
+}
+
+/// Kernels, stages and products that differ.
+pub(super) fn items(site: &RunDifference) -> String {
+    let mut body = String::new();
+    for (what, items) in [
+        ("Kernels", &site.kernels),
+        ("Stages, by what entered them", &site.stages),
+        ("Products", &site.products),
+    ] {
+        if !items.is_empty() {
+            body += &item_table(what, items);
+        }
+    }
+    body
+}
+
+fn item_table(what: &str, items: &Items) -> String {
+    let mut table = Table::new(
+        what,
+        &[
+            Column::Text("name"),
+            Column::Text("role"),
+            Column::Text("what happened"),
+            Column::Text("A"),
+            Column::Text("B"),
+        ],
+    );
+    let mut row = |name: &str, role: &Option<String>, happened: &str, [a, b]: [Option<&str>; 2]| {
+        let hash = |hash: Option<&str>| Cell::from(hash.map(short_hash).unwrap_or_default());
+        let role = role.clone().unwrap_or_default();
+        table.row(
+            true,
+            [name.into(), role.into(), happened.into(), hash(a), hash(b)],
+        );
+    };
+    for item in &items.changed {
+        row(
+            &item.name,
+            &item.role,
+            "changed",
+            [Some(&item.a), Some(&item.b)],
+        );
+    }
+    for Item { name, role, hash } in &items.removed {
+        row(name, role, "removed", [Some(hash), None]);
+    }
+    for Item { name, role, hash } in &items.added {
+        row(name, role, "added", [None, Some(hash)]);
+    }
+    let order = if items.reordered {
+        ", in another order"
+    } else {
+        ""
+    };
+    table.finish() + &paragraph(&format!("The same in both: {}{order}.", items.unchanged))
+}
+
+/// Notes and complaints of one run alone.
+pub(super) fn texts(site: &RunDifference) -> String {
+    let told = |texts: &Texts, what: &str| {
+        let runs = [(&texts.only_in_a, "A"), (&texts.only_in_b, "B")].into_iter();
+        runs.filter(|(texts, _)| !texts.is_empty())
+            .map(|(texts, whose)| paragraph(&format!("{what} only in {whose}:")) + &list(texts))
+            .collect::<String>()
+    };
+    told(&site.notes, "Notes") + &told(&site.complaints, "Complaints")
+}

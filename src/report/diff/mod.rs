@@ -1,0 +1,78 @@
+//! The page of a comparison: what moved and how far, first; then what it may come from.
+
+mod inputs;
+mod movement;
+
+use super::html::{self, Section, Tone, heading, list, paragraph};
+use crate::{
+    difference::{Outcome, RunDifference},
+    error::Result,
+};
+
+/// The differences of one or several sites as one HTML page; `not_compared` tells why others are not here.
+///
+/// # Errors
+/// A plot that cannot be drawn, which is a fault of areograph.
+pub fn difference_page(sites: &[&RunDifference], not_compared: &[String]) -> Result<String> {
+    let title = match sites {
+        [one] => format!("{}: difference of two runs", one.site),
+        _ => "Difference of two runs".to_owned(),
+    };
+    let lead: String = sites.iter().map(|site| verdict(site)).collect();
+    let sections = [
+        of_each("Movement", sites, |site| Ok(movement::tables(site)))?,
+        of_each("Movement along the images", sites, movement::plots)?,
+        of_each("Range residuals", sites, |site| Ok(inputs::profiles(site)))?,
+        of_each("Values", sites, |site| Ok(inputs::values(site)))?,
+        of_each("Kernels, stages and products", sites, |site| {
+            Ok(inputs::items(site))
+        })?,
+        of_each("Notes and complaints", sites, |site| {
+            Ok(inputs::texts(site))
+        })?,
+    ];
+    Ok(html::page(&title, &(lead + &list(not_compared)), &sections))
+}
+
+/// A section with the part of every site that has one, under the site's name when there are several.
+fn of_each(
+    name: &'static str,
+    sites: &[&RunDifference],
+    part: impl Fn(&RunDifference) -> Result<String>,
+) -> Result<Section> {
+    let mut body = String::new();
+    for site in sites {
+        let part = part(site)?;
+        if !part.is_empty() && sites.len() > 1 {
+            body += &heading(&site.site);
+        }
+        body += &part;
+    }
+    Ok(Section::new(name, body))
+}
+
+fn verdict(site: &RunDifference) -> String {
+    let tone = match site.outcome {
+        Outcome::NothingChanged | Outcome::NothingMoved => Tone::Good,
+        Outcome::Moved => Tone::Remarks,
+        Outcome::BeyondLimit => Tone::Bad,
+    };
+    let headline = format!("{}: {}.", site.site, site.headline());
+    let runs = format!(
+        "A was published at {}, B at {}; a movement is B − A.",
+        site.a.finished_utc, site.b.finished_utc
+    );
+    let body = list(&site.sentences()) + &paragraph(&limits(site)) + &paragraph(&runs);
+    html::verdict(tone, &headline, &body)
+}
+
+fn limits(site: &RunDifference) -> String {
+    let metres = site.limits.movement_m.map(|limit| format!("{limit} m"));
+    let arcseconds = site.limits.pointing_arcsec;
+    let arcseconds = arcseconds.map(|limit| format!("{limit} arcsec"));
+    let limits: Vec<String> = metres.into_iter().chain(arcseconds).collect();
+    if limits.is_empty() {
+        return "No limits were set.".to_owned();
+    }
+    format!("Limits: {}.", limits.join(", "))
+}

@@ -1,0 +1,124 @@
+//! Products as a reader finds them: whole and as the manifest says, or not to be used.
+
+use std::{fs, io::ErrorKind, path::Path};
+
+use super::{
+    manifest::Manifest,
+    publish::{JOURNAL, MANIFEST, has_work, read_manifest},
+};
+use crate::{
+    error::{Fault, IoFault, Kind, Place, Result},
+    files::{hash_file, short_hash},
+};
+
+/// Why products in a folder are not to be used.
+#[derive(Debug, thiserror::Error)]
+pub enum PublishedFault {
+    /// Nothing was published.
+    #[error("there is no {MANIFEST}, so there are no products")]
+    NoManifest,
+    /// A run was killed, or is at work, while files got their final names.
+    #[error("the publication of products into this folder was not finished")]
+    Unfinished,
+    /// The manifest is damaged, or of a version with other entries.
+    #[error("this is no manifest of areograph {}: {reason}", env!("CARGO_PKG_VERSION"))]
+    Unreadable {
+        /// The parser's reason, with line and column.
+        reason: String,
+    },
+    /// A product is not the one that was published.
+    #[error(
+        "{found}; expected {expected_bytes} bytes with the BLAKE3 hash {expected} of {MANIFEST}"
+    )]
+    Contradicts {
+        /// What is there instead.
+        found: String,
+        /// Size in the manifest.
+        expected_bytes: u64,
+        /// Hash in the manifest, shortened.
+        expected: String,
+    },
+    /// Another run published meanwhile.
+    #[error("products were published anew while they were read")]
+    Replaced,
+}
+
+impl Fault for PublishedFault {
+    fn kind(&self) -> Kind {
+        match self {
+            Self::Replaced => Kind::Io,
+            _ => Kind::Input,
+        }
+    }
+
+    fn advice(&self) -> String {
+        match self {
+            Self::NoManifest => "name a site's folder of products, and run the site to the end",
+            Self::Unfinished => {
+                "wait for the run that is at work, or run the site again to mend it"
+            }
+            Self::Unreadable { .. } | Self::Contradicts { .. } => {
+                "run the site again, which makes damaged products anew"
+            }
+            Self::Replaced => "ask again when the run is over",
+        }
+        .to_owned()
+    }
+}
+
+/// Whether the folder is, or was meant to be, that of a site's products.
+#[must_use]
+pub fn is_site_folder(folder: &Path) -> bool {
+    folder.join(MANIFEST).exists() || has_work(folder)
+}
+
+/// The manifest of a site's folder, every product checked against it.
+///
+/// # Errors
+/// [`PublishedFault`], of kind input; the disk's refusal.
+pub fn read_published(folder: &Path) -> Result<Manifest> {
+    if folder.join(JOURNAL).exists() {
+        return Err(PublishedFault::Unfinished).in_file(folder);
+    }
+    let path = folder.join(MANIFEST);
+    let bytes = match fs::read(&path) {
+        Err(error) if error.kind() == ErrorKind::NotFound && folder.is_dir() => {
+            return Err(PublishedFault::NoManifest).in_file(folder);
+        }
+        read => read.map_err(IoFault::on("read")).in_file(&path)?,
+    };
+    let manifest: Manifest = serde_json::from_slice(&bytes)
+        .map_err(|error| PublishedFault::Unreadable {
+            reason: error.to_string(),
+        })
+        .in_file(&path)?;
+    for product in &manifest.products {
+        let path = folder.join(&product.path);
+        let found = match hash_file(&path) {
+            Ok((blake3, _)) if blake3 == product.blake3 => continue,
+            Ok((blake3, bytes)) => {
+                format!("has {bytes} bytes with the hash {}", short_hash(&blake3))
+            }
+            Err(_) if !path.exists() => "is missing".to_owned(),
+            Err(failure) => return Err(failure),
+        };
+        return Err(PublishedFault::Contradicts {
+            found,
+            expected_bytes: product.bytes,
+            expected: short_hash(&product.blake3),
+        })
+        .in_file(path);
+    }
+    Ok(manifest)
+}
+
+/// Checks that `manifest` still stands when its products have been read.
+///
+/// # Errors
+/// [`PublishedFault::Replaced`].
+pub fn still_published(folder: &Path, manifest: &Manifest) -> Result<()> {
+    if read_manifest(folder).as_ref() == Some(manifest) {
+        return Ok(());
+    }
+    Err(PublishedFault::Replaced).in_file(folder)
+}
