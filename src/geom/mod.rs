@@ -3,6 +3,7 @@
 pub mod attitude;
 pub mod chebyshev;
 pub mod ellipsoid;
+pub mod lagrange;
 pub mod map_projection;
 pub mod mars_rotation;
 pub mod orbit_axes;

@@ -5,7 +5,7 @@ use serde_json::{Value, json};
 use super::{
     Writer,
     coordinates::{FRAME, bounding_box_deg, column_deg, signed_longitude_deg},
-    geojson, parquet,
+    geojson, parquet, pds4_label,
     site::SiteProducts,
     table::{Column, Table, Values},
     text_table,
@@ -19,7 +19,13 @@ use crate::{
 pub(super) fn write(written: &mut Writer, site: &SiteProducts) -> Result<()> {
     let points = points_deg(site);
     let mut table = Table::new(columns(site))?;
+    let csv = written.directory.join("footprints.csv");
     written.add("footprints.csv", |path| text_table::write(path, &table))?;
+    if table.rows() > 0 {
+        written.add("footprints.xml", |path| {
+            pds4_label::write(path, &csv, &table, site)
+        })?;
+    }
     table.columns.push(Column::new(
         "geometry",
         "point, longitude (-180..180) and areocentric latitude in degrees, well-known binary",
@@ -39,7 +45,7 @@ pub(super) fn write(written: &mut Writer, site: &SiteProducts) -> Result<()> {
 }
 
 /// Longitude (-180..180) and latitude of every footprint, degrees.
-fn points_deg(site: &SiteProducts) -> Vec<[f64; 2]> {
+pub(super) fn points_deg(site: &SiteProducts) -> Vec<[f64; 2]> {
     let shots = site.footprints;
     shots
         .longitude_rad
@@ -273,7 +279,6 @@ fn geo_metadata(points: &[[f64; 2]]) -> Value {
         "encoding": "WKB",
         "geometry_types": ["Point"],
         "crs": mars_sphere(),
-        "edges": "spherical",
     });
     if let Some(bounds) = bounding_box_deg(points) {
         column["bbox"] = json!(bounds);

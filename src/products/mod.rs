@@ -6,7 +6,8 @@
 //! | `ranges.parquet`, `ranges.json` | range residuals per shot; statistics per profile |
 //! | `images/<id>/orientation.parquet`, `.json` | orientation samples; polynomials with residuals |
 //! | `images/<id>/isd.json` | camera models of the Community Sensor Model (`usgscsm`) |
-//! | `exchange/…` | ISIS and Ames Stereo Pipeline |
+//! | `footprints.xml` | a PDS4-style label of `footprints.csv` |
+//! | `exchange/…` | ISIS, Ames Stereo Pipeline, GIS, STAC catalogues; see its `README.txt` |
 //! | `report/index.html` | people |
 //!
 //! The same site gives the same bytes; nothing here looks at a clock.
@@ -20,6 +21,7 @@ mod geojson;
 mod isd;
 mod orientation;
 mod parquet;
+mod pds4_label;
 mod ranges;
 pub mod read;
 mod site;
@@ -59,11 +61,12 @@ pub fn write_products(directory: &Path, site: &SiteProducts, page: &str) -> Resu
         orientation::write(&mut written, image)?;
         isd::write(&mut written, site, image)?;
     }
-    exchange::write(&mut written, site)?;
     written.add("report/index.html", |path| {
         files::write_text(path, page)?;
         Ok(0)
     })?;
+    // Last, as its catalogue lists the others.
+    exchange::write(&mut written, site)?;
     Ok(written.products)
 }
 

@@ -23,7 +23,8 @@ use areograph::{
         fit_sensor_model::{SensorModel, fit_sensor_model},
         group_profiles::{Profile, group_profiles},
         sample_orientation::{
-            BoresightGround, CameraTables, GroundPoint, Orientation, OrientationSample,
+            BoresightGround, CameraTables, GroundPoint, InterpolationCheck, Orientation,
+            OrientationSample,
         },
         tag_times::{ImageTimes, StartFrom},
     },
@@ -312,6 +313,10 @@ fn orientation(times: &ImageTimes) -> Orientation {
                 [-0.003, 1.0, 0.002],
                 [-0.001, -0.002, 1.0],
             ],
+            interpolation: InterpolationCheck {
+                error_max_px: 0.002,
+                epochs: 117,
+            },
             et_s,
         },
         notes: Vec::new(),
