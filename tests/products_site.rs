@@ -312,7 +312,7 @@ fn a_manifest_keeps_its_schema() {
     let mut document = serde_json::json!({
         "tool": "areograph", "version": "0.1.0", "site": "small",
         "verdict": { "valid": false, "reasons": ["profile a/1: 3 shots; limit at least 20"], "remarks": ["b"] },
-        "configuration": { "file_name": "small.toml", "blake3": hash },
+        "configuration": { "file_name": "small.toml", "blake3": hash, "keys": { "site": "small" } },
         "biases": [{ "name": "ck_bias", "correction_s": -1.15, "scope": "attitude", "source": "mocAddendum004.ti" }],
         "kernels": [{
             "name": "a.bsp", "role": "SPK", "bytes": 1024, "blake3": hash,

@@ -126,6 +126,7 @@ impl Results<'_> {
             configuration: ConfigurationEntry {
                 file_name: file_name(&config.file),
                 blake3: config.blake3.clone(),
+                keys: config.keys.clone(),
             },
             biases: biases(config),
             kernels,

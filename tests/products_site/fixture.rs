@@ -185,6 +185,7 @@ fn config() -> SiteConfig {
         description: "One orbit & one image <made by hand>".to_owned(),
         file: "small.toml".into(),
         blake3: "ef".repeat(32),
+        keys: BTreeMap::new(),
         kernels: KernelsConfig {
             source: KernelSource::Listed(KernelList::Files(vec!["naif0012.tls".into()])),
             ck_tolerance_s: 0.0,
