@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::{Stage, publish::Results};
+use super::{Stage, results::Results};
 use crate::{
     config::{BiasScope, SiteConfig},
     error::Result,

@@ -4,21 +4,15 @@ use std::path::{Path, PathBuf};
 
 use super::{
     Ending, Stage,
-    choice::KernelChoice,
     manifest::{Account, kernel_entries, kernel_lines, pck_note},
     parts,
+    results::Results,
 };
 use crate::{
-    config::SiteConfig,
     error::Result,
     products::{ImageProducts, SiteProducts, write_products},
     report,
-    spice::{KernelSet, Session, Wanted},
-    stages::{
-        check_ranges::RangeCheck, convert_datum::Converted, fit_sensor_model::SensorModel,
-        group_profiles::Profile, sample_orientation::Orientation, search_footprints::SearchResult,
-        tag_times::ImageTimes,
-    },
+    spice::Session,
     store::{
         atomic,
         cache::{Output, StageCache},
@@ -33,21 +27,6 @@ use crate::{
 
 /// Metakernel that reproduces the run.
 const METAKERNEL: &str = "kernels.tm";
-
-/// Everything that the earlier stages made.
-pub(super) struct Results<'a> {
-    pub(super) config: &'a SiteConfig,
-    pub(super) kernels: &'a KernelSet,
-    pub(super) wanted: &'a Wanted,
-    pub(super) choice: Option<&'a Output<KernelChoice>>,
-    pub(super) images: &'a Output<Vec<ImageTimes>>,
-    pub(super) found: &'a Output<SearchResult>,
-    pub(super) converted: &'a Output<Converted>,
-    pub(super) profiles: &'a Output<Vec<Profile>>,
-    pub(super) ranges: &'a Output<RangeCheck>,
-    pub(super) orientations: &'a [Output<Orientation>],
-    pub(super) models: &'a [Output<SensorModel>],
-}
 
 /// The products that stand for these parts, or why they have to be made.
 pub(super) fn standing(
@@ -173,35 +152,4 @@ fn make_products(folder: &Path, results: &Results<'_>, fingerprint: String) -> R
     let manifest = results.manifest(account, fingerprint);
     publish_files(folder, &staging, &manifest)?;
     Ok(manifest)
-}
-
-impl Results<'_> {
-    fn outputs(&self) -> Vec<(String, Option<String>)> {
-        self.stages()
-            .into_iter()
-            .map(|(stage, output, _)| (stage, Some(output)))
-            .collect()
-    }
-
-    /// Name, output hash and fingerprint of every stage that ran or was kept.
-    pub(super) fn stages(&self) -> Vec<(String, String, String)> {
-        fn entry<T>(name: String, output: &Output<T>) -> (String, String, String) {
-            (name, output.blake3.clone(), output.fingerprint.clone())
-        }
-        let mut stages = vec![
-            entry(Stage::TagTimes.name().to_owned(), self.images),
-            entry(Stage::SearchFootprints.name().to_owned(), self.found),
-            entry(Stage::ConvertDatum.name().to_owned(), self.converted),
-            entry(Stage::GroupProfiles.name().to_owned(), self.profiles),
-        ];
-        let choice = self.choice.into_iter();
-        stages.extend(choice.map(|choice| entry(Stage::ChooseKernels.name().to_owned(), choice)));
-        stages.push(entry(Stage::CheckRanges.name().to_owned(), self.ranges));
-        for (orientation, model) in self.orientations.iter().zip(self.models) {
-            let image = &orientation.value.image;
-            stages.push(entry(Stage::SampleOrientation.of_image(image), orientation));
-            stages.push(entry(Stage::FitSensorModel.of_image(image), model));
-        }
-        stages
-    }
 }
