@@ -81,7 +81,7 @@ fn identity(site: &SiteProducts) -> Vec<Column> {
     let source = shots
         .file
         .iter()
-        .map(|file| file_name(site, *file))
+        .map(|file| site.file_name(*file))
         .collect();
     vec![
         Column::new(
@@ -146,7 +146,7 @@ fn windows(site: &SiteProducts) -> Column {
     Column::new(
         "windows",
         "identifiers of the windows that hold the shot, separated by semicolons",
-        Values::Text(masks.map(|mask| window_ids(site, *mask)).collect()),
+        Values::Text(masks.map(|mask| site.window_ids(*mask)).collect()),
     )
 }
 
@@ -242,24 +242,6 @@ fn spacecraft(site: &SiteProducts) -> Vec<Column> {
             Values::F64(column_deg(&shots.off_nadir_rad)),
         ),
     ]
-}
-
-/// Name of a source file; its folder belongs to the machine, not to the product.
-pub(super) fn file_name(site: &SiteProducts, file: u16) -> String {
-    let source = site.footprints.files.get(usize::from(file));
-    source.map_or_else(String::new, |source| source.name.clone())
-}
-
-/// Identifiers of the windows in `mask`, separated by semicolons.
-pub(super) fn window_ids(site: &SiteProducts, mask: u64) -> String {
-    let held = site
-        .config
-        .windows
-        .iter()
-        .enumerate()
-        .filter(|(bit, _)| mask >> bit & 1 == 1);
-    let ids: Vec<&str> = held.map(|(_, window)| window.id.as_str()).collect();
-    ids.join(";")
 }
 
 /// Little-endian well-known binary of a point (OGC 06-103r4, 8.2).

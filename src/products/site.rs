@@ -132,6 +132,24 @@ impl SiteProducts<'_> {
         remarks
     }
 
+    /// Name of a source file; its folder belongs to the machine, not to the product.
+    pub(super) fn file_name(&self, file: u16) -> String {
+        let source = self.footprints.files.get(usize::from(file));
+        source.map_or_else(String::new, |source| source.name.clone())
+    }
+
+    /// Identifiers of the windows in `mask`, separated by semicolons.
+    pub(super) fn window_ids(&self, mask: u64) -> String {
+        let held = self
+            .config
+            .windows
+            .iter()
+            .enumerate()
+            .filter(|(bit, _)| mask >> bit & 1 == 1);
+        let ids: Vec<&str> = held.map(|(_, window)| window.id.as_str()).collect();
+        ids.join(";")
+    }
+
     /// Lengths that must agree.
     pub(super) fn check(&self) -> Result<()> {
         let shots = self.profiles.iter().map(|profile| profile.rows.len()).sum();

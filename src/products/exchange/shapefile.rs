@@ -19,7 +19,6 @@ use crate::{
         coordinates::degrees,
         fault::ProductFault,
         files::{create, finish, open, write_text},
-        footprints::file_name,
         site::SiteProducts,
     },
 };
@@ -104,7 +103,7 @@ fn attributes(site: &SiteProducts, row: usize) -> Attributes {
             shot.radius_crossover_m - shot.areoid_radius_m,
             shot.range_m,
         ],
-        texts: [site.utc[row].clone(), file_name(site, shot.file)],
+        texts: [site.utc[row].clone(), site.file_name(shot.file)],
     }
 }
 
