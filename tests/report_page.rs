@@ -100,7 +100,7 @@ fn a_gap_in_attitude_is_seen_and_measured() {
     let picture = page.split("<figure id=\"kernels-at-").nth(1).unwrap();
     let caption = between(picture, "<figcaption>", '\n').next().unwrap();
     assert!(
-        caption.contains("1 gaps in what is asked, the first 2.000 s long"),
+        caption.contains("of the margins around them 2.000 s are not held, the first 2.000 s at"),
         "{caption:.300}"
     );
     // One red bar for the gap; the swatch of its key is not part of the picture.

@@ -33,11 +33,11 @@ pub(super) fn lead(site: &SiteProducts) -> String {
 }
 
 fn counts(site: &SiteProducts) -> String {
-    let images = site.images.len();
     let mut text = format!(
-        "{} footprints in {} profiles; {images} images.",
-        site.footprints.len(),
-        site.profiles.len()
+        "{} in {}; {}.",
+        counted(site.footprints.len(), "footprint"),
+        counted(site.profiles.len(), "profile"),
+        counted(site.images.len(), "image")
     );
     if let Some((share, what)) = nearest_limit(site) {
         text += &format!(
@@ -46,6 +46,11 @@ fn counts(site: &SiteProducts) -> String {
         );
     }
     text
+}
+
+fn counted(count: usize, what: &str) -> String {
+    let plural = if count == 1 { "" } else { "s" };
+    format!("{count} {what}{plural}")
 }
 
 /// The valid figure that uses most of its limit.
