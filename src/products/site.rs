@@ -27,6 +27,8 @@ pub struct SiteProducts<'a> {
     pub config: &'a SiteConfig,
     /// Kernels in load order.
     pub kernels: &'a [KernelLine],
+    /// Text of the metakernel that loads them again, its paths relative to the folder of the products.
+    pub metakernel: &'a str,
     /// The instants that the site asks of the kernels.
     pub wanted: &'a Wanted,
     /// Images in the order of the configuration.

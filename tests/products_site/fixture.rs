@@ -143,6 +143,7 @@ impl Site {
         with(&SiteProducts {
             config: &self.config,
             kernels: &self.kernels,
+            metakernel: "KPL/MK\n",
             wanted: &self.wanted,
             images: if image { &images } else { &[] },
             footprints: &self.footprints,
