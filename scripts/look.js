@@ -52,7 +52,9 @@ async function look(browser, file, view) {
   let failed = false;
   for (const file of pages) {
     for (const view of views) {
-      for (const problem of await look(browser, file, view)) {
+      // A page that brings the browser down is a problem of that page.
+      const problems = await look(browser, file, view).catch((error) => [error.message]);
+      for (const problem of problems) {
         failed = true;
         console.error(`look: ${file} (${view.name}): ${problem}`);
       }

@@ -251,6 +251,37 @@ fn the_scan_finds_the_injected_clock_bias_on_off_nadir_profiles() {
     assert!(off_nadir >= 2);
 }
 
+#[test]
+fn scans_of_profiles_from_pole_to_pole_keep_within_their_uncertainty() {
+    let truth = truth();
+    let bias_s = number(&truth["biases"]["mola_clock_bias_s"]);
+    let mut config = site("eos_chasma");
+    config.windows[0].shape = areograph::config::WindowShape::Box {
+        west_rad: 350.0_f64.to_radians(),
+        east_rad: 10.0_f64.to_radians(),
+        south_rad: -std::f64::consts::FRAC_PI_2,
+        north_rad: std::f64::consts::FRAC_PI_2,
+    };
+    let found = found(&config);
+    let mut told = 0;
+    for version in ["nav", "gsfc"] {
+        for ranges in checked(version, &config, &found).profiles {
+            let scan = ranges.scan.unwrap();
+            let (Some(best_s), Some(uncertainty_s)) = (scan.best_s, scan.uncertainty_s) else {
+                continue;
+            };
+            told += 1;
+            let apart = (best_s + bias_s).abs() / uncertainty_s;
+            assert!(
+                apart < 3.0,
+                "{} {version}: {apart} uncertainties",
+                ranges.profile
+            );
+        }
+    }
+    assert!(told > 10, "{told} scans");
+}
+
 fn orientations(name: &str, bias: PointingBias) -> Vec<Orientation> {
     let mut config = site(name);
     config.pointing.ck_bias = bias;

@@ -18,7 +18,12 @@ use crate::{
     config::SiteConfig,
     error::{Place, Result},
     spice::Wanted,
-    store::{cache::StageCache, lock::SiteLock, manifest::Manifest, publish::CACHE},
+    store::{
+        cache::StageCache,
+        lock::SiteLock,
+        manifest::Manifest,
+        publish::{CACHE, note_failure},
+    },
 };
 
 pub use check::{Checked, check_site};
@@ -144,8 +149,12 @@ pub fn run_site(config: &SiteConfig, options: &RunOptions<'_>) -> Result<SiteOut
     let ending = match run_steps(&steps) {
         Ok(ending) => ending,
         Err(Leave::AsAsked) => Ending::StoppedAfter(options.until),
-        Err(Leave::Failed(failure)) => return Err(failure.in_site(&config.site)),
+        Err(Leave::Failed(failure)) => {
+            note_failure(&steps.folder, Some(&failure.to_string()));
+            return Err(failure.in_site(&config.site));
+        }
     };
+    note_failure(&steps.folder, None);
     Ok(SiteOutcome {
         site: config.site.clone(),
         folder: steps.folder,

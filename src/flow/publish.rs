@@ -129,7 +129,12 @@ fn make_products(folder: &Path, results: &Results<'_>, fingerprint: String) -> R
     Ok(manifest)
 }
 
+/// Digits of a second in the UTC of shots: programs take the time from it, and MGS flies 3 m in a millisecond.
+const SHOT_UTC_DECIMALS: u8 = 6;
+
 fn utc(session: &Session, et_s: &[f64]) -> Result<Vec<String>> {
     let instants = et_s.iter().copied().map(Et::from_seconds);
-    instants.map(|et| session.et_to_utc(et)).collect()
+    instants
+        .map(|et| session.et_to_utc_with(et, SHOT_UTC_DECIMALS))
+        .collect()
 }

@@ -12,7 +12,7 @@ use crate::{
     store::{
         atomic,
         manifest::{Manifest, figures},
-        publish::{has_work, read_manifest},
+        publish::{has_work, last_failure, read_manifest},
     },
 };
 
@@ -32,15 +32,20 @@ pub fn publish_sites(out: &Path) -> Result<PathBuf> {
         let folder = entry.map_err(IoFault::on("list")).in_file(out)?.path();
         let name = folder.file_name().unwrap_or_default().to_string_lossy();
         let manifest = read_manifest(&folder);
+        let failure = last_failure(&folder);
         // Folders that no run ever worked in are none of our business.
         if manifest.is_some() || has_work(&folder) {
             let products = manifest.as_ref().map(summary);
-            lines.insert(name.into_owned(), products);
+            lines.insert(name.into_owned(), (products, failure));
         }
     }
     let lines: Vec<SiteLine> = lines
         .into_iter()
-        .map(|(folder, products)| SiteLine { folder, products })
+        .map(|(folder, (products, failure))| SiteLine {
+            folder,
+            products,
+            failure,
+        })
         .collect();
     let page = out.join(PAGE);
     atomic::write(&page, sites_page(&lines).as_bytes())?;

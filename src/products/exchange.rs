@@ -87,7 +87,8 @@ struct CsvFile {
 const LOLA_LIKE: CsvFile = CsvFile {
     name: "lola_like.csv",
     csv_format: LOLA_LIKE_FORMAT,
-    radius: "column 4 is the distance from the centre of Mars after the crossover correction, kilometres; \
+    radius: "column 4 is the distance from the centre of Mars after the crossover correction, kilometres: for heights; \
+             the range of column 5 belongs to the radius before it, column 6: for range constraints; \
              column 6 the same before it; no column is a height",
 };
 const ODE: CsvFile = CsvFile {

@@ -1,5 +1,7 @@
 //! The range check: residuals per shot as Parquet, statistics and verdicts as JSON.
 
+use std::collections::HashSet;
+
 use serde::Serialize;
 
 use super::{
@@ -20,7 +22,7 @@ use crate::{
 };
 
 /// What each residual is, for readers of the files.
-const DEFINITIONS: [(&str, &str); 6] = [
+const DEFINITIONS: [(&str, &str); 7] = [
     (
         "range_minus_distance",
         "measured range minus |spacecraft in the kernels - footprint with the raw radius|, \
@@ -51,7 +53,22 @@ const DEFINITIONS: [(&str, &str); 6] = [
         as well as its scatter and the orbit allow: uncertainty_s takes the mean difference of the two \
         orbits for what either may be off, a metre along the flight being 0.3 ms",
     ),
+    (
+        "summary",
+        "all shots of the site, each once, also when it lies in several windows; its standard deviation holds what \
+        profiles differ by, which those of the profiles do not",
+    ),
 ];
+
+/// Places at which rows of footprints come for the first time.
+fn each_once(rows: &[u32]) -> Vec<usize> {
+    let mut seen = HashSet::with_capacity(rows.len());
+    let places = rows.iter().enumerate();
+    places
+        .filter(|(_, row)| seen.insert(**row))
+        .map(|(place, _)| place)
+        .collect()
+}
 
 #[derive(Serialize)]
 struct Document<'a> {
@@ -201,6 +218,11 @@ fn columns(site: &SiteProducts) -> Vec<Column> {
 }
 
 fn document<'a>(site: &SiteProducts<'a>) -> Document<'a> {
+    let once = each_once(&site.ranges.shots.row);
+    let residuals = once
+        .iter()
+        .map(|shot| site.ranges.shots.range_minus_distance_m[*shot]);
+    let residuals_m: Vec<f64> = residuals.collect();
     let invalid_because = site.invalid_because();
     let ranges = site.ranges;
     let valid = |profile: &&ProfileRanges| profile.invalid_because.is_empty();
@@ -223,13 +245,12 @@ fn document<'a>(site: &SiteProducts<'a>) -> Document<'a> {
         summary: SiteSummary {
             profiles: site.profiles.len(),
             profiles_valid: ranges.profiles.iter().filter(valid).count(),
-            shots: ranges.shots.len(),
-            outliers: ranges
-                .profiles
+            shots: once.len(),
+            outliers: once
                 .iter()
-                .map(|profile| u64::from(profile.outliers))
-                .sum(),
-            range_minus_distance_m: Summary::of(&ranges.shots.range_minus_distance_m),
+                .filter(|shot| ranges.shots.outlier[**shot])
+                .count() as u64,
+            range_minus_distance_m: Summary::of(&residuals_m),
         },
         profiles: site
             .profiles

@@ -48,7 +48,7 @@ pub(super) fn section(site: &SiteProducts) -> Result<String> {
     let svg = drawn(sheet.height() as u32, |area| sheet.draw(area))?;
     let mut words = sheet.words(site);
     if site.footprints.len() > sheet.shots.len() {
-        words += " Every so many shots are drawn.";
+        words += " Some are left out of the drawing, equally spaced.";
     }
     let figure = figure_html(
         "Windows, footprints and images",
@@ -164,7 +164,7 @@ impl Sheet {
             self.draw_ring(&window.ring, INK.stroke_width(3), area)?;
         }
         for (place, image) in self.images.iter().enumerate() {
-            let colour = COLOURS[place % COLOURS.len()];
+            let colour = COLOURS[image_colour(place)];
             self.draw_ring(&image.ring, colour.stroke_width(5), area)?;
         }
         self.draw_scale(area)
@@ -262,7 +262,9 @@ impl Sheet {
             .images
             .iter()
             .enumerate()
-            .map(|(place, image)| Key::colour(&format!("image {}", image.name), place))
+            .map(|(place, image)| {
+                Key::colour(&format!("image {}", image.name), image_colour(place))
+            })
             .collect();
         if !self.shots.is_empty() {
             let (low, high) = self.heights_m;
@@ -303,10 +305,15 @@ impl Sheet {
         }
         words
             + &format!(
-                "IAU 2000, areocentric; equal-area map about {:.2}° E {:.2}° N, north up at the centre, where the \
+                "IAU 2000, areocentric; equal-area map about {:.2}° E {:.2}° {}, north up at the centre, where the \
                  scale is true.",
                 self.map.longitude_rad() / RADIANS_PER_DEGREE,
-                self.map.latitude_rad() / RADIANS_PER_DEGREE
+                self.map.latitude_rad().abs() / RADIANS_PER_DEGREE,
+                if self.map.latitude_rad() < 0.0 {
+                    "S"
+                } else {
+                    "N"
+                }
             )
     }
 
@@ -335,6 +342,12 @@ impl Sheet {
         }
         csv
     }
+}
+
+/// Colours of image outlines that no height has.
+const fn image_colour(place: usize) -> usize {
+    const APART: [usize; 3] = [3, 2, super::plots::GREY];
+    APART[place % APART.len()]
 }
 
 /// Lowest and highest of `values`.

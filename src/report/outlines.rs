@@ -78,8 +78,19 @@ fn box_rings(west: f64, east: f64, south: f64, north: f64) -> Vec<Vec<(f64, f64)
         let circles = circles.filter(|latitude| latitude.abs() < FRAC_PI_2 - 1e-9);
         return circles.map(parallel).collect();
     }
-    let northern = parallel(north).into_iter().rev();
-    vec![parallel(south).into_iter().chain(northern).collect()]
+    let meridian = |longitude: f64| -> Vec<(f64, f64)> {
+        let shares = shares.clone();
+        shares
+            .map(|share| (longitude, south + share * (north - south)))
+            .collect()
+    };
+    let (northern, western) = (
+        parallel(north).into_iter().rev(),
+        meridian(west).into_iter().rev(),
+    );
+    let eastern = meridian(west + width).into_iter();
+    let ring = parallel(south).into_iter().chain(eastern);
+    vec![ring.chain(northern).chain(western).collect()]
 }
 
 #[cfg(test)]

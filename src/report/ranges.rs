@@ -256,7 +256,7 @@ fn profile_plot(site: &SiteProducts, group: std::ops::Range<usize>, limit: usize
     let mut caption = if apart {
         words(&site.ranges.profiles[group.start])
     } else {
-        format!("{} profiles in one plot.", group.len())
+        together(&site.ranges.profiles[group])
     };
     caption += " Bars: how many shots lie at each height.";
     caption += &if limits_seen {
@@ -265,7 +265,7 @@ fn profile_plot(site: &SiteProducts, group: std::ops::Range<usize>, limit: usize
         format!(" The limit of the mean, ±{mean_max_m} m, is outside the plot.")
     };
     if thinned_out {
-        caption += " Every so many shots are drawn.";
+        caption += &format!(" At most {limit} shots of a profile are drawn, equally spaced.");
     }
     let x = "seconds from the start of the profile";
     Plot::of(title, caption, x, vec![panel, angle_panel])
@@ -296,6 +296,28 @@ fn words(ranges: &ProfileRanges) -> String {
         metres(main.mean),
         metres(main.standard_deviation),
         ranges.outliers
+    )
+}
+
+/// What a plot of several profiles shows.
+fn together(profiles: &[ProfileRanges]) -> String {
+    let summaries = || profiles.iter().map(|ranges| &ranges.range_minus_distance_m);
+    let lowest = summaries()
+        .map(|main| main.mean)
+        .fold(f64::INFINITY, f64::min);
+    let highest = summaries()
+        .map(|main| main.mean)
+        .fold(f64::NEG_INFINITY, f64::max);
+    let spread = summaries()
+        .map(|main| main.standard_deviation)
+        .fold(0.0, f64::max);
+    let outliers: u32 = profiles.iter().map(|ranges| ranges.outliers).sum();
+    format!(
+        "{} profiles: means from {} to {} m, standard deviations up to {} m; {outliers} outliers.",
+        profiles.len(),
+        metres(lowest),
+        metres(highest),
+        metres(spread)
     )
 }
 

@@ -10,6 +10,8 @@ pub struct SiteLine {
     pub folder: String,
     /// Its products; `None` when it has none, because a run did not come to its end.
     pub products: Option<SiteSummary>,
+    /// Why the last run failed, if it did; the products are then of an earlier run.
+    pub failure: Option<String>,
 }
 
 /// Products of one site in one line.
@@ -41,7 +43,7 @@ pub fn sites_page(sites: &[SiteLine]) -> String {
     let (valid, remarks) = (with(Tone::Good), with(Tone::Remarks));
     let invalid = with(Tone::Bad) - unfinished;
     let headline = format!(
-        "{} sites: {invalid} invalid, {unfinished} without products, {remarks} valid with remarks, {valid} valid.",
+        "{} sites: {invalid} invalid or failed, {unfinished} without products, {remarks} valid with remarks, {valid} valid.",
         sites.len()
     );
     let overall = if invalid + unfinished > 0 {
@@ -65,6 +67,7 @@ pub fn sites_page(sites: &[SiteLine]) -> String {
 fn tone(site: &SiteLine) -> Tone {
     match &site.products {
         None => Tone::Bad,
+        Some(_) if site.failure.is_some() => Tone::Bad,
         Some(summary) if !summary.reasons.is_empty() => Tone::Bad,
         Some(summary) if !summary.remarks.is_empty() => Tone::Remarks,
         Some(_) => Tone::Good,
@@ -96,10 +99,14 @@ fn table(sites: &[SiteLine]) -> String {
 
 fn cells(site: &SiteLine) -> Vec<Cell> {
     let Some(summary) = &site.products else {
-        let because = "no manifest: the last run did not come to its end; see its log";
+        let because = site.failure.as_deref().map_or(
+            "the last run did not come to its end; see its log",
+            first_line,
+        );
         return vec![(&site.folder).into(), "no products".into(), because.into()];
     };
     let word = match tone(site) {
+        Tone::Bad if site.failure.is_some() => "last run failed, products of an earlier one",
         Tone::Good => "valid",
         Tone::Remarks => "valid with remarks",
         Tone::Bad => "invalid",
@@ -115,7 +122,13 @@ fn cells(site: &SiteLine) -> Vec<Cell> {
             &site.folder,
         )),
         word.into(),
-        because(summary).into(),
+        site.failure
+            .as_deref()
+            .map_or_else(
+                || because(summary),
+                |failure| first_line(failure).to_owned(),
+            )
+            .into(),
     ];
     cells.extend(summary.counts.map(|count| count.to_string().into()));
     cells.push(figure(summary.range_mean_m, 1.0));
@@ -127,6 +140,10 @@ fn cells(site: &SiteLine) -> Vec<Cell> {
     cells.push((&summary.finished_utc).into());
     cells.push((&summary.version).into());
     cells
+}
+
+fn first_line(text: &str) -> &str {
+    text.lines().next().unwrap_or_default()
 }
 
 /// The first reason or remark, and how many more there are.
@@ -160,17 +177,23 @@ mod tests {
         let line = |folder: &str, products| SiteLine {
             folder: folder.to_owned(),
             products,
+            failure: None,
         };
         let page = sites_page(&[
             line("good", Some(summary(&[]))),
             line("bad", Some(summary(&["mean of <x>", "more"]))),
             line("half", None),
+            SiteLine {
+                failure: Some("a <kernel> is gone\n  what to do: look".to_owned()),
+                ..line("stale", Some(summary(&[])))
+            },
         ]);
-        assert!(
-            page.contains("3 sites: 1 invalid, 1 without products, 0 valid with remarks, 1 valid.")
-        );
+        assert!(page.contains(
+            "4 sites: 2 invalid or failed, 1 without products, 0 valid with remarks, 1 valid."
+        ));
         assert!(page.contains("mean of &lt;x&gt;; and 1 more"));
         assert!(page.contains("href=\"good/report/index.html\""));
-        assert_eq!(page.matches("<tr class=\"invalid\">").count(), 2);
+        assert!(page.contains("a &lt;kernel&gt; is gone</td>"));
+        assert_eq!(page.matches("<tr class=\"invalid\">").count(), 3);
     }
 }

@@ -39,7 +39,9 @@ fn counts(site: &SiteProducts) -> String {
         counted(site.profiles.len(), "profile"),
         counted(site.images.len(), "image")
     );
-    if let Some((share, what)) = nearest_limit(site) {
+    // Of an invalid site the reasons say what is beyond its limit, and by how much.
+    let nearest = nearest_limit(site).filter(|_| site.invalid_because().is_empty());
+    if let Some((share, what)) = nearest {
         text += &format!(
             " Nearest to its limit: {what}, at {:.0} % of it.",
             100.0 * share

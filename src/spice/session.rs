@@ -22,7 +22,7 @@ use crate::{
 /// What clock strings and attitude need.
 pub(super) const CLOCKS: [Need; 2] = [LEAP_SECONDS, CLOCK];
 
-/// Digits of a second in UTC strings.
+/// Digits of a second in UTC strings for people.
 const UTC_DECIMALS: u8 = 3;
 
 /// Position and velocity relative to the centre of Mars, inertial.
@@ -107,7 +107,15 @@ impl Session {
     /// # Errors
     /// [`SpiceFault::MissingText`] without a leap-second kernel.
     pub fn et_to_utc(&self, et: Et) -> Result<String> {
-        let utc = self.cspice.et_to_utc(et.seconds(), UTC_DECIMALS);
+        self.et_to_utc_with(et, UTC_DECIMALS)
+    }
+
+    /// UTC of an instant with so many digits of a second, ISO 8601 without a zone letter.
+    ///
+    /// # Errors
+    /// [`SpiceFault::MissingText`] without a leap-second kernel.
+    pub fn et_to_utc_with(&self, et: Et, decimals: u8) -> Result<String> {
+        let utc = self.cspice.et_to_utc(et.seconds(), decimals);
         Ok(utc.map_err(|fault| self.explain(fault, &[LEAP_SECONDS]))?)
     }
 

@@ -232,6 +232,11 @@ fn rotation_vector_model(orientation: &Orientation) -> Result<RotationVectorMode
     })
 }
 
+/// A limit as it was written, without the rounding of its conversion; limits of any size keep their digits.
+fn four_digits(value: f64) -> f64 {
+    format!("{value:.3e}").parse().unwrap_or(value)
+}
+
 /// The rotation is judged by its vector form, which means the same at every latitude.
 fn broken_limits(
     orientation: &Orientation,
@@ -251,9 +256,9 @@ fn broken_limits(
     let pointing_rmse_rad = rotation.rmse_rad();
     if !(pointing_rmse_rad <= limits.pointing_rmse_max_rad) {
         broken.push(format!(
-            "second-order pointing RMSE {:.3} arcsec; limit {:.3} arcsec",
+            "second-order pointing RMSE {:.3} arcsec; limit {} arcsec",
             pointing_rmse_rad / RADIANS_PER_ARCSECOND,
-            limits.pointing_rmse_max_rad / RADIANS_PER_ARCSECOND
+            four_digits(limits.pointing_rmse_max_rad / RADIANS_PER_ARCSECOND)
         ));
     }
     let interpolation = &orientation.tables.interpolation;

@@ -153,7 +153,7 @@ pub fn search_footprints(
     all.footprints.files = files;
     let mut notes: Vec<String> = understood
         .into_iter()
-        .map(|(note, files)| format!("{files} PEDR file(s): {note}"))
+        .map(|(note, files)| format!("PEDR files {files}: {note}"))
         .collect();
     notes.extend(copy_notes);
     Ok(SearchResult {

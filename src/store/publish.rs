@@ -31,6 +31,26 @@ pub(super) const STAGING: &str = ".staging";
 /// Paths below the site's folder that a publication under way may have made or will remove.
 pub(super) const JOURNAL: &str = ".publishing";
 
+/// Why the last run of the site failed; there is none after a run that did not.
+const FAILED: &str = ".failed";
+
+/// Keeps why a run of the site failed, for the page over all sites; `None` when it did not.
+///
+/// What the disk refuses is no matter here: the failure itself is told by whoever calls.
+pub fn note_failure(site_folder: &Path, failure: Option<&str>) {
+    let path = site_folder.join(FAILED);
+    let _ = match failure {
+        Some(text) => atomic::write(&path, text.as_bytes()).is_ok(),
+        None => fs::remove_file(path).is_ok(),
+    };
+}
+
+/// Why the last run of the site failed.
+#[must_use]
+pub fn last_failure(site_folder: &Path) -> Option<String> {
+    fs::read_to_string(site_folder.join(FAILED)).ok()
+}
+
 /// An empty folder for half-made products inside the site's folder, hence on the same file system.
 ///
 /// # Errors
@@ -46,7 +66,7 @@ pub fn staging(site_folder: &Path) -> Result<PathBuf> {
 /// Whether a run ever worked in the folder: it holds stored stages or a publication under way.
 #[must_use]
 pub fn has_work(site_folder: &Path) -> bool {
-    [CACHE, STAGING, JOURNAL]
+    [CACHE, STAGING, JOURNAL, FAILED]
         .iter()
         .any(|name| site_folder.join(name).exists())
 }
