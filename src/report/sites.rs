@@ -15,6 +15,8 @@ pub struct SiteLine {
 /// Products of one site in one line.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SiteSummary {
+    /// The verdict in words, as the program has it everywhere.
+    pub verdict: &'static str,
     /// Why the site is invalid; empty when it is valid.
     pub reasons: Vec<String>,
     /// What a reader must weigh.
@@ -99,11 +101,6 @@ fn cells(site: &SiteLine) -> Vec<Cell> {
         let because = "no manifest: the last run did not come to its end; see its log";
         return vec![(&site.folder).into(), "no products".into(), because.into()];
     };
-    let word = match tone(site) {
-        Tone::Good => "valid",
-        Tone::Remarks => "valid with remarks",
-        Tone::Bad => "invalid",
-    };
     let figure = |value: Option<f64>, scale: f64| -> Cell {
         value
             .map_or_else(|| "–".to_owned(), |value| format!("{:.3}", value * scale))
@@ -114,7 +111,7 @@ fn cells(site: &SiteLine) -> Vec<Cell> {
             &format!("{}/report/index.html", site.folder),
             &site.folder,
         )),
-        word.into(),
+        summary.verdict.into(),
         because(summary).into(),
     ];
     cells.extend(summary.counts.map(|count| count.to_string().into()));
@@ -147,7 +144,8 @@ mod tests {
 
     #[test]
     fn the_worst_is_said_first() {
-        let summary = |reasons: &[&str]| SiteSummary {
+        let summary = |verdict, reasons: &[&str]| SiteSummary {
+            verdict,
             reasons: reasons.iter().map(ToString::to_string).collect(),
             remarks: Vec::new(),
             counts: [10, 1, 0],
@@ -162,8 +160,8 @@ mod tests {
             products,
         };
         let page = sites_page(&[
-            line("good", Some(summary(&[]))),
-            line("bad", Some(summary(&["mean of <x>", "more"]))),
+            line("good", Some(summary("valid", &[]))),
+            line("bad", Some(summary("INVALID", &["mean of <x>", "more"]))),
             line("half", None),
         ]);
         assert!(
