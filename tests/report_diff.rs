@@ -28,6 +28,7 @@ fn difference(case: &Case) -> Value {
     let text = String::from_utf8(answer).unwrap();
     assert!(!text.contains("null"), "what is unknown is left out");
     let mut answer: Value = serde_json::from_str(&text).unwrap();
+    common::assert_keeps_schema(&answer, "difference");
     assert_eq!(answer["sites"].as_array().unwrap().len(), 1);
     answer["sites"][0].take()
 }

@@ -44,6 +44,12 @@ fn every_site_of_two_outputs_is_compared() {
         printed.contains("error: out/gone/kernels.tm: has 4 bytes"),
         "{printed}"
     );
+    let mut command = case.areograph();
+    command.args(["report", "diff", "before", "out", "--json"]);
+    let answer: Value = serde_json::from_slice(&command.output().unwrap().stdout).unwrap();
+    assert_eq!(answer["sites"][1]["exit_code"], 3);
+    assert_eq!(answer["only_in_b"], serde_json::json!(["new"]));
+    common::assert_keeps_schema(&answer, "difference");
 }
 
 type Spoil = fn(&Case);
