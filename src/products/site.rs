@@ -27,6 +27,8 @@ pub struct SiteProducts<'a> {
     pub config: &'a SiteConfig,
     /// Kernels in load order.
     pub kernels: &'a [KernelLine],
+    /// Text of the metakernel that loads them again, its paths relative to the folder of the products.
+    pub metakernel: &'a str,
     /// The instants that the site asks of the kernels.
     pub wanted: &'a Wanted,
     /// Images in the order of the configuration.
@@ -77,6 +79,16 @@ pub struct ImageProducts<'a> {
     pub model: &'a SensorModel,
 }
 
+impl<'a> ImageProducts<'a> {
+    /// Why the image is invalid: first its orientation, then its models; empty when it is valid.
+    #[must_use]
+    pub fn invalid_because(&self) -> Vec<&'a str> {
+        let orientation = self.orientation.invalid_because.iter();
+        let reasons = orientation.chain(&self.model.invalid_because);
+        reasons.map(String::as_str).collect()
+    }
+}
+
 impl SiteProducts<'_> {
     /// Why the site is invalid, one sentence per reason; empty when it is valid.
     #[must_use]
@@ -91,8 +103,7 @@ impl SiteProducts<'_> {
             }
         }
         for image in self.images {
-            let orientation = &image.orientation.invalid_because;
-            for reason in orientation.iter().chain(&image.model.invalid_because) {
+            for reason in image.invalid_because() {
                 reasons.push(format!("image {}: {reason}", image.times.id));
             }
         }
@@ -110,6 +121,10 @@ impl SiteProducts<'_> {
                 "input that was read around: {first} (and {} more)",
                 rest.len()
             )),
+        }
+        for image in self.images {
+            let notes = image.orientation.notes.iter();
+            remarks.extend(notes.map(|note| format!("image {}: {note}", image.times.id)));
         }
         let images = self
             .images

@@ -14,6 +14,7 @@ use super::{
     },
 };
 use crate::{
+    constants::MARS_IAU2000,
     error::Result,
     geom::map_projection::MapProjection,
     products::SiteProducts,
@@ -22,8 +23,6 @@ use crate::{
 
 /// Shots of the map, drawn and listed; about 140 bytes each.
 const MAP_SHOTS: usize = 5_000;
-/// Radius of the sphere of the map, the equatorial one, metres.
-const SPHERE_M: f64 = 3_396_190.0;
 /// Colours of heights, the lowest first; clear on light and dark pages.
 const HEIGHTS: [RGBColor; 7] = [
     RGBColor(0x3f, 0x68, 0xb5),
@@ -86,7 +85,7 @@ struct Sheet {
     windows: Vec<Outline>,
     images: Vec<Outline>,
     shots: Vec<Shot>,
-    /// Lowest and highest shot.
+    /// Lowest and highest shot, those that are not drawn included.
     heights_m: (f64, f64),
 }
 
@@ -111,16 +110,14 @@ impl Sheet {
             .flat_map(|outline| outline.ring.iter().copied())
             .chain(shots.iter().map(|shot| shot.place_rad))
             .collect();
-        let map = MapProjection::of_points(points.iter().copied(), SPHERE_M);
+        let map =
+            MapProjection::of_points(points.iter().copied(), MARS_IAU2000.equatorial_radius_m);
         let places = points
             .iter()
             .filter_map(|point| map.project(point.0, point.1));
         let view = View::of(places);
         let ratio = (view.height_m() / view.width_m()).clamp(RATIO.0, RATIO.1);
-        let heights = shots.iter().map(|shot| shot.height_m);
-        let heights_m = heights.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), height| {
-            (low.min(height), high.max(height))
-        });
+        let heights_m = range(&topography_m);
         Self {
             map,
             view: view.with_ratio(ratio),
@@ -338,6 +335,14 @@ impl Sheet {
         }
         csv
     }
+}
+
+/// Lowest and highest of `values`.
+fn range(values: &[f64]) -> (f64, f64) {
+    let start = (f64::INFINITY, f64::NEG_INFINITY);
+    values.iter().fold(start, |(low, high), value| {
+        (low.min(*value), high.max(*value))
+    })
 }
 
 /// 1, 2 or 5 times a power of ten, at most `length_m`.

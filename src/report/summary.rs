@@ -334,22 +334,9 @@ fn hash(blake3: &str) -> Cell {
     ))
 }
 
-/// Whether `note` says no more than that a kernel was asked for by name, which the table of files shows.
-fn repeats_kernel_table(site: &SiteProducts, note: &str) -> bool {
-    site.kernels.iter().any(|kernel| {
-        note.strip_prefix(&kernel.name)
-            .is_some_and(|rest| rest == ": listed" || rest.starts_with(": listed by "))
-    })
-}
-
 /// Notes and complaints.
 pub(super) fn notes(site: &SiteProducts) -> String {
-    let notes: Vec<&String> = site
-        .notes
-        .iter()
-        .filter(|note| !repeats_kernel_table(site, note))
-        .collect();
-    let mut body = list(&notes);
+    let mut body = list(site.notes);
     if !site.complaints.is_empty() {
         let shown = &site.complaints[..site.complaints.len().min(COMPLAINTS_SHOWN)];
         body += &heading("Complaints about input");

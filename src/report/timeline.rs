@@ -248,12 +248,21 @@ fn table(site: &SiteProducts) -> String {
                 calendar(span.start).into(),
                 calendar(span.stop).into(),
                 intervals.len().to_string().into(),
-                format!("{:.2}", 100.0 * held_s / span.duration_s()).into(),
+                held_share(held_s, span).into(),
                 format!("{used_s:.1}").into(),
             ],
         );
     }
     table.finish()
+}
+
+/// Share of a kernel's span that it holds, per cent; a kernel of one instant has no span.
+fn held_share(held_s: f64, span: Interval) -> String {
+    if span.duration_s() > 0.0 {
+        format!("{:.2}", 100.0 * held_s / span.duration_s())
+    } else {
+        "–".to_owned()
+    }
 }
 
 /// Calendar form of ephemeris time (TDB, about a minute ahead of UTC in these years).

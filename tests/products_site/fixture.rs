@@ -86,10 +86,7 @@ impl Site {
             ranges: ranges(&profiles),
             rejected: BTreeMap::from([("class 0 <cloud>".to_owned(), 7)]),
             complaints: vec!["ap19019l.b record 4: <script>alert(1)</script> & more".to_owned()],
-            notes: vec![
-                "naif0012.tls: listed by nav.tm".to_owned(),
-                "ap19019l.b: in IAU 2000 already, not converted".to_owned(),
-            ],
+            notes: vec!["ap19019l.b: in IAU 2000 already, not converted".to_owned()],
             config,
             times,
             orientation,
@@ -146,6 +143,7 @@ impl Site {
         with(&SiteProducts {
             config: &self.config,
             kernels: &self.kernels,
+            metakernel: "KPL/MK\n",
             wanted: &self.wanted,
             images: if image { &images } else { &[] },
             footprints: &self.footprints,

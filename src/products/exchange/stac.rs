@@ -184,7 +184,7 @@ fn slashes(path: &Path) -> String {
 fn role(path: &str) -> &'static str {
     match path {
         "report/index.html" => "overview",
-        "footprints.xml" | "exchange/README.txt" => "metadata",
+        "footprints.xml" | "exchange/README.txt" | "kernels.tm" => "metadata",
         sidecar if sidecar.ends_with(".csv.json") => "metadata",
         _ => "data",
     }
@@ -202,7 +202,7 @@ fn media_type(path: &Path) -> Option<&'static str> {
         "dbf" => "application/vnd.dbf",
         "html" => "text/html",
         "xml" => "application/xml",
-        "txt" | "prj" | "cpg" => "text/plain",
+        "txt" | "prj" | "cpg" | "tm" => "text/plain",
         _ => return None,
     })
 }

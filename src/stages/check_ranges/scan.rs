@@ -5,12 +5,10 @@
 //! when that rate varies along it: strongly when the spacecraft holds still in inertial space while
 //! it looks off nadir (about 3 m/s²), hardly at nadir (below 0.03 m/s²). The uncertainty says which.
 
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 
-use super::residuals::{
-    ShotResiduals, orbit_axes, own_spacecraft, range_residual_m, raw_footprint,
-};
+use super::residuals::{ShotResiduals, own_spacecraft, range_residual_m, raw_footprint};
 use crate::{
     config::{RangeCheckConfig, SCAN_STEPS_MAX},
     footprints::{Footprint, Footprints},
@@ -122,13 +120,23 @@ fn best_s(scan: &BiasScan) -> Option<f64> {
     (curvature > 0.0).then(|| scan.correction_s[least] - slope / (2.0 * curvature))
 }
 
+/// Unit vectors as columns: along the velocity, across the orbit, and at right angles to both.
+///
+/// The first is the flight itself and not, as elsewhere, at right angles to the radius: an orbit that
+/// is late by a constant time is moved along it, and must show as what it is.
+fn track_axes(position: &Vector3<f64>, velocity: &Vector3<f64>) -> Matrix3<f64> {
+    let along = velocity.normalize();
+    let cross = position.cross(velocity).normalize();
+    Matrix3::from_columns(&[along, cross, along.cross(&cross)])
+}
+
 /// Standard uncertainty of the best correction.
 ///
 /// The best correction is the slope of the residuals over the rates of their lines of sight. It is
 /// uncertain by the scatter about that line, and by the orbit: moved by a constant vector it changes
 /// the residuals by the vector's part along each line of sight, and a metre along the track cannot be
-/// told from 0.3 ms. How well the orbit is known is taken from its mean difference to the orbit of the
-/// PEDR file, as likely in any direction.
+/// told from 0.3 ms. How well the orbit is known is taken from its difference to the orbit of the PEDR
+/// file, as likely in any direction.
 fn uncertainty_s(shots: &[Footprint], trajectory: &Trajectory, best_s: f64) -> Option<f64> {
     let mut residuals_m = Vec::with_capacity(shots.len());
     let mut rates_m_s = Vec::with_capacity(shots.len());
@@ -142,15 +150,17 @@ fn uncertainty_s(shots: &[Footprint], trajectory: &Trajectory, best_s: f64) -> O
         let at = Et::from_seconds(shot.et_tag_s + best_s);
         let position = trajectory.position(at)?;
         let to_mars = mars_rotation::<MarsIau2000>(at);
-        let to_orbit = orbit_axes(&position, &trajectory.velocity_m_s(at)?).transpose()
+        let to_track = track_axes(&position.xyz_m, &trajectory.velocity_m_s(at)?).transpose()
             * to_mars.matrix().transpose();
         let spacecraft = to_mars.apply(&position);
         let sight_m = spacecraft.xyz_m - raw_footprint(shot).xyz_m;
-        let direction = to_orbit * sight_m.normalize();
+        let sight = sight_m.normalize();
+        let direction = to_track * sight;
         for (axis, component) in directions.iter_mut().zip(&direction) {
             axis.push(*component);
         }
-        orbit_difference_m += to_orbit * (own_spacecraft(shot).xyz_m - spacecraft.xyz_m);
+        let difference_m = own_spacecraft(shot).xyz_m - spacecraft.xyz_m;
+        orbit_difference_m += to_track * difference_m;
     }
     let noise_s = Trend::of(&rates_m_s, &residuals_m)?.uncertainty;
     let mut seconds_per_metre = Vector3::zeros();
