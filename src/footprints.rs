@@ -124,14 +124,20 @@ columns! {
     windows: u64,
 }
 
+impl Footprint {
+    /// Height above the areoid, after the crossover correction, metres.
+    #[must_use]
+    pub const fn topography_m(&self) -> f64 {
+        self.radius_crossover_m - self.areoid_radius_m
+    }
+}
+
 impl<D> Footprints<D> {
     /// Height of every shot above the areoid, after the crossover correction, metres.
     #[must_use]
     pub fn topography_m(&self) -> Vec<f64> {
-        self.radius_crossover_m
-            .iter()
-            .zip(&self.areoid_radius_m)
-            .map(|(radius_m, areoid_m)| radius_m - areoid_m)
+        (0..self.len())
+            .map(|row| self.row(row).topography_m())
             .collect()
     }
 

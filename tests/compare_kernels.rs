@@ -63,7 +63,9 @@ fn session(family: &str) -> Session {
 }
 
 fn answer(command: &mut Command) -> Value {
-    serde_json::from_slice(&succeed(command).stdout).unwrap()
+    let answer = serde_json::from_slice(&succeed(command).stdout).unwrap();
+    common::assert_keeps_schema(&answer, "kernel_comparison");
+    answer
 }
 
 /// The command over the scene's three families, with further arguments.

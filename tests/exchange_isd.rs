@@ -196,6 +196,26 @@ fn differing(truth: &Value, ours: Option<&Value>, at: &str, found: &mut Vec<Stri
 }
 
 #[test]
+fn two_kernels_of_one_name_keep_their_hashes() {
+    let mut site = fixture::Site::small();
+    let mut rival = site.kernels[1].clone();
+    rival.blake3 = "5".repeat(64);
+    site.kernels.push(rival);
+    let folder = tempfile::tempdir().unwrap();
+    site.with(true, |site| write_products(folder.path(), site, ""))
+        .unwrap();
+    let text = fs::read(folder.path().join("images/m04-02852/isd.json")).unwrap();
+    let isd: Value = serde_json::from_slice(&text).unwrap();
+    common::assert_keeps_schema(&isd, "isd");
+    let expected: Vec<Value> = site
+        .kernels
+        .iter()
+        .map(|kernel| serde_json::json!({"name": kernel.name, "blake3": kernel.blake3}))
+        .collect();
+    assert_eq!(isd["areograph"]["kernels"], Value::Array(expected));
+}
+
+#[test]
 fn camera_keys_are_those_of_ale_but_for_a_list() {
     let test = "image support data beside ALE's";
     let (Some(real), Some(path)) = (

@@ -7,49 +7,18 @@
 )]
 
 mod common;
+#[path = "report_diff/fixture.rs"]
+mod fixture;
 
-use std::{fs, path::Path};
+use std::fs;
 
-use areograph::{
-    frames::{J2000, MgsBus, Rotation},
-    geom::{
-        attitude::{make_continuous, spice_quaternion},
-        mars_rotation::frame_rotation_1,
-    },
-    spice::{CkSegment, KernelSet, Session, write_ck},
-    time::{Et, Interval, PointingBias},
-    units::RADIANS_PER_ARCSECOND,
-};
+use areograph::units::RADIANS_PER_ARCSECOND;
 use common::case::Case;
+use fixture::{TURN_ARCSEC, after_a_first_run, copy_products, diff, turn_attitudes};
 use serde_json::Value;
 
 /// The image of the case.
 const IMAGE: &str = "E02-02016";
-const TURN_ARCSEC: f64 = 20.0;
-
-/// A case that has run once, its products kept in `before/case`.
-fn after_a_first_run() -> Case {
-    let case = Case::new();
-    case.stages_run();
-    copy_products(&case.path("out/case"), &case.path("before/case"));
-    case
-}
-
-/// Copies what was published; the cache stays behind.
-fn copy_products(from: &Path, to: &Path) {
-    for (relative, _) in common::mission::products(from) {
-        let target = to.join(&relative);
-        fs::create_dir_all(target.parent().unwrap()).unwrap();
-        fs::copy(from.join(&relative), target).unwrap();
-    }
-}
-
-/// Exit code and everything printed by the command with these further arguments.
-fn diff(case: &Case, arguments: &[&str]) -> String {
-    let mut command = case.areograph();
-    command.args(["--quiet", "report", "diff"]).args(arguments);
-    case.outcome(command)
-}
 
 /// The one site's difference between `before` and `out`.
 fn difference(case: &Case) -> Value {
@@ -59,6 +28,7 @@ fn difference(case: &Case) -> Value {
     let text = String::from_utf8(answer).unwrap();
     assert!(!text.contains("null"), "what is unknown is left out");
     let mut answer: Value = serde_json::from_str(&text).unwrap();
+    common::assert_keeps_schema(&answer, "difference");
     assert_eq!(answer["sites"].as_array().unwrap().len(), 1);
     answer["sites"][0].take()
 }
@@ -80,60 +50,6 @@ fn assert_near(found: &Value, expected: f64, tolerance: f64) {
         (found - expected).abs() <= tolerance,
         "{found}, expected {expected} ± {tolerance}"
     );
-}
-
-/// Replaces the case's C-kernel by a copy with every attitude turned about the camera's x axis.
-fn turn_attitudes(case: &Case) {
-    let path = case.path("kernels/mgs_sc_scene.bc");
-    let turned = case.path("kernels/turned.bc");
-    let kernels = KernelSet::from_metakernel(&case.path("kernels/nav.tm")).unwrap();
-    let session = Session::open(&kernels).unwrap();
-    let columns: Vec<_> = session
-        .coverage()
-        .unwrap()
-        .ck
-        .as_slice()
-        .iter()
-        .map(|interval| {
-            // The scene's samples, 4 s apart: between them both kernels turn evenly.
-            turned_attitudes(&session, *interval)
-        })
-        .collect();
-    let segments: Vec<CkSegment> = columns
-        .iter()
-        .map(|(instants, quaternions, rates)| CkSegment {
-            name: "turned",
-            instants,
-            quaternions,
-            angular_velocities_rad_s: rates,
-            interval_starts: &instants[..1],
-        })
-        .collect();
-    write_ck(&turned, &session, &segments, "every attitude turned").unwrap();
-    drop(session);
-    fs::rename(turned, path).unwrap();
-}
-
-type Attitudes = (Vec<Et>, Vec<[f64; 4]>, Vec<[f64; 3]>);
-
-/// Attitudes of an interval as the kernel counts time, turned; rates in J2000 stay as they are.
-fn turned_attitudes(session: &Session, interval: Interval) -> Attitudes {
-    let turn = frame_rotation_1(TURN_ARCSEC * RADIANS_PER_ARCSECOND);
-    let unbiased = PointingBias::from_seconds(0.0);
-    let (mut instants, mut quaternions, mut rates) = (Vec::new(), Vec::new(), Vec::new());
-    // The last sample may be a rounding of the clock beyond the interval's end.
-    let samples = (0..).map(|index| interval.start.plus(4.0 * f64::from(index)));
-    for at in samples.take_while(|at| at.since(interval.stop) < 0.01) {
-        let attitude = session.attitude(unbiased.lookup(at), at, 0.01).unwrap();
-        let mounting = *session.mounting(at).unwrap().matrix();
-        let turned = mounting.transpose() * turn * mounting * attitude.inertial_to_bus.matrix();
-        let turned: Rotation<J2000, MgsBus> = Rotation::new(turned, at);
-        instants.push(at);
-        quaternions.push(spice_quaternion(turned.matrix()));
-        rates.push(attitude.angular_velocity_rad_s.into());
-    }
-    make_continuous(&mut quaternions);
-    (instants, quaternions, rates)
 }
 
 #[test]
@@ -202,6 +118,53 @@ fn boresight_range_m(case: &Case) -> f64 {
     let path = case.path("before/case/images/image/orientation.parquet");
     let rows = areograph::products::read::read_samples(&path).unwrap();
     rows[15].boresight_range_m.unwrap()
+}
+
+#[test]
+fn denser_sampling_moves_nothing_and_is_told() {
+    let case = after_a_first_run();
+    case.replace(
+        "site.toml",
+        "[pedr]",
+        "[orientation]\nintervals = 60\n[pedr]",
+    );
+    case.stages_run();
+    let found = difference(&case);
+    assert_eq!(found["outcome"], "nothing_moved");
+    assert_eq!(found["images"][0]["samples_only_in_b"], 30);
+    let limits = ["before", "out", "--limit-m", "0", "--limit-arcsec", "0"];
+    let printed = diff(&case, &limits);
+    assert!(
+        printed.starts_with("exit 0\ncase: nothing moved\n"),
+        "{printed}"
+    );
+    for told in [
+        "\n  image image: not moved; not turned; 30 samples only in B\n",
+        "\n  configuration: orientation.intervals – → 60\n",
+        // The residuals of more samples have another root mean square.
+        "\n  figures: pointing_rmse_rad ",
+    ] {
+        assert!(printed.contains(told), "{printed}");
+    }
+}
+
+#[test]
+fn another_order_of_images_is_told_by_the_configuration() {
+    const FIRST: &str = "[[images]]\nid = \"image\"\nlabel = \"image.lbl\"\n";
+    const SECOND: &str = "[[images]]\nid = \"second\"\nlabel = \"image.lbl\"\n";
+    let case = Case::new();
+    case.replace("site.toml", FIRST, &[FIRST, SECOND].concat());
+    case.stages_run();
+    copy_products(&case.path("out/case"), &case.path("before/case"));
+    case.replace(
+        "site.toml",
+        &[FIRST, SECOND].concat(),
+        &[SECOND, FIRST].concat(),
+    );
+    case.stages_run();
+    let printed = diff(&case, &["before", "out"]);
+    let told = "\n  configuration: images [\"image\", \"second\"] → [\"second\", \"image\"]\n";
+    assert!(printed.contains(told), "{printed}");
 }
 
 #[test]
@@ -309,7 +272,7 @@ fn a_clock_correction_that_turns_mars_moves_footprints_and_names_its_key() {
     );
     case.stages_run();
     let found = difference(&case);
-    let keys = serde_json::json!([{"what": "mola_clock.scope", "b": "both"}]);
+    let keys = serde_json::json!([{"what": "mola_clock.scope", "b": "\"both\""}]);
     assert_eq!(found["configuration"], keys);
     assert_eq!(found["biases"][0]["what"], "mola_clock.scope");
     let movement = &found["footprints"]["movement"];
@@ -379,151 +342,3 @@ fn the_page_opens_with_the_outcome_and_needs_nothing_from_outside() {
         assert!(!page.contains(outside), "{outside}");
     }
 }
-
-#[test]
-fn every_site_of_two_outputs_is_compared() {
-    let case = after_a_first_run();
-    for (folder, site) in [("before", "gone"), ("out", "new")] {
-        copy_products(&case.path("before/case"), &case.path(folder).join(site));
-    }
-    let printed = diff(&case, &["before", "out"]);
-    assert!(
-        printed.starts_with("exit 0\ncase: nothing changed\n"),
-        "{printed}"
-    );
-    assert!(
-        printed.ends_with("gone: only in A, not compared\nnew: only in B, not compared\n"),
-        "{printed}"
-    );
-    assert!(diff(&case, &["before", "out", "--limit-m", "1"]).starts_with("exit 5\n"));
-    // A site that cannot be read does not hide the others.
-    copy_products(&case.path("before/case"), &case.path("out/gone"));
-    case.write("out/gone/kernels.tm", "mine");
-    let printed = diff(&case, &["before", "out"]);
-    assert!(
-        printed.starts_with("exit 3\ncase: nothing changed\n"),
-        "{printed}"
-    );
-    assert!(
-        printed.contains("error: out/gone/kernels.tm: has 4 bytes"),
-        "{printed}"
-    );
-}
-
-type Spoil = fn(&Case);
-
-#[test]
-fn outputs_that_cannot_be_compared_are_refused() {
-    let case = after_a_first_run();
-    let refusals: [(&str, Spoil, &str); 8] = [
-        (
-            "no folder",
-            |case| fs::remove_dir_all(case.path("out")).unwrap(),
-            NO_FOLDER,
-        ),
-        (
-            "empty folder",
-            |case| {
-                fs::remove_dir_all(case.path("out")).unwrap();
-                fs::create_dir(case.path("out")).unwrap();
-            },
-            EMPTY,
-        ),
-        (
-            "no manifest",
-            |case| fs::remove_file(case.path("out/case/manifest.json")).unwrap(),
-            EMPTY,
-        ),
-        (
-            "stopped early",
-            |case| {
-                fs::remove_file(case.path("out/case/manifest.json")).unwrap();
-                fs::create_dir(case.path("out/case/.cache")).unwrap();
-            },
-            STOPPED_EARLY,
-        ),
-        (
-            "half-made",
-            |case| case.write("out/case/.publishing", "kernels.tm"),
-            HALF_MADE,
-        ),
-        (
-            "no JSON",
-            |case| case.write("out/case/manifest.json", "{"),
-            NO_JSON,
-        ),
-        (
-            "another site",
-            |case| {
-                case.replace(
-                    "out/case/manifest.json",
-                    "\"site\": \"case\"",
-                    "\"site\": \"other\"",
-                );
-            },
-            ANOTHER_SITE,
-        ),
-        (
-            "no common site",
-            |case| fs::rename(case.path("out/case"), case.path("out/other")).unwrap(),
-            NO_COMMON_SITE,
-        ),
-    ];
-    for (what, spoil, expected) in refusals {
-        let _ = fs::remove_dir_all(case.path("out"));
-        copy_products(&case.path("before/case"), &case.path("out/case"));
-        spoil(&case);
-        assert_eq!(diff(&case, &["before", "out"]), expected, "{what}");
-    }
-    assert_eq!(diff(&case, &["before", "before/../before"]), ONE_FOLDER);
-    let _ = fs::remove_dir_all(case.path("out"));
-    copy_products(&case.path("before/case"), &case.path("out/case"));
-    assert_eq!(diff(&case, &["before/case", "out"]), ONE_AND_SEVERAL);
-}
-
-#[test]
-fn products_that_contradict_the_manifest_are_refused() {
-    let case = after_a_first_run();
-    copy_products(&case.path("before/case"), &case.path("aside/case"));
-    let manifest: Value = serde_json::from_slice(&case.read("out/case/manifest.json")).unwrap();
-    let message = |path: &str, found: &str| {
-        let mut products = manifest["products"].as_array().unwrap().iter();
-        let product = products.find(|product| product["path"] == path).unwrap();
-        let hash = &product["blake3"].as_str().unwrap()[..12];
-        let bytes = &product["bytes"];
-        format!(
-            "exit 3\nerror: aside/case/{path}: {found}; expected {bytes} bytes with the BLAKE3 hash {hash} of \
-             manifest.json\n  what to do: run the site again, which makes damaged products anew\n"
-        )
-    };
-    case.write("aside/case/footprints.csv", "mine");
-    let hash = &blake3::hash(b"mine").to_hex()[..12];
-    let expected = message(
-        "footprints.csv",
-        &format!("has 4 bytes with the hash {hash}"),
-    );
-    assert_eq!(diff(&case, &["aside", "out"]), expected);
-    fs::remove_file(case.path("aside/case/footprints.csv")).unwrap();
-    let expected = message("footprints.csv", "is missing");
-    assert_eq!(diff(&case, &["out", "aside"]), expected);
-    // What the manifest vouches for may still be of another version.
-    copy_products(&case.path("before/case"), &case.path("aside/case"));
-    let product = fs::read(case.path("aside/case/ranges.json")).unwrap();
-    let hash = |bytes: &[u8]| blake3::hash(bytes).to_hex().to_string();
-    case.write("aside/case/ranges.json", "{}");
-    case.replace("aside/case/manifest.json", &hash(&product), &hash(b"{}"));
-    let expected = "exit 3\nerror: case: aside/case/ranges.json: cannot be read as range statistics: missing field \
-                    `profiles` at line 1 column 2\n  what to do: products of another version of areograph have \
-                    to be made again by this one\n";
-    assert_eq!(diff(&case, &["before", "aside"]), expected);
-}
-
-const NO_FOLDER: &str = "exit 6\nerror: out: cannot read the folder: No such file or directory (os error 2)\n  what to do: check the path; relative paths in a configuration count from that file's folder\n";
-const EMPTY: &str = "exit 3\nerror: out: there is no manifest.json in it or in a folder below; expected products of `areograph run`\n  what to do: name the folder given to --out, or a site's folder in it\n";
-const STOPPED_EARLY: &str = "exit 3\nerror: out/case: there is no manifest.json, so there are no products\n  what to do: name a site's folder of products, and run the site to the end\n";
-const HALF_MADE: &str = "exit 3\nerror: out/case: the publication of products into this folder was not finished\n  what to do: wait for the run that is at work, or run the site again to mend it\n";
-const NO_JSON: &str = "exit 3\nerror: out/case/manifest.json: this is no manifest of areograph 0.1.0: EOF while parsing an object at line 1 column 1\n  what to do: run the site again, which makes damaged products anew\n";
-const ANOTHER_SITE: &str = "exit 2\nerror: out/case: these are products of site \"other\", the others of site \"case\"; expected one site\n  what to do: compare runs of the same site\n";
-const NO_COMMON_SITE: &str = "exit 2\nerror: no site is in both: A has case; B has other\n  what to do: compare runs of the same site\n";
-const ONE_FOLDER: &str = "exit 2\nerror: before/../before: A and B are one folder; expected the products of two runs\n  what to do: copy the first products aside before running again, or run into another --out\n";
-const ONE_AND_SEVERAL: &str = "exit 2\nerror: before/case: it holds the products of one site, the other folder those of several\n  what to do: name two folders of one site, or two output folders with sites\n";

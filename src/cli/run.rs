@@ -219,13 +219,9 @@ fn print_outcome(outcome: &SiteOutcome) {
         Ending::Unchanged(manifest) => ("nothing changed; products stand", manifest),
     };
     let verdict = &manifest.verdict;
-    let word = match (verdict.valid, verdict.remarks.as_slice()) {
-        (false, _) => "INVALID",
-        (true, []) => "valid",
-        (true, _) => "valid with remarks",
-    };
     output::line(format_args!(
-        "{site}: {word}; {what} in {folder}, see report/index.html"
+        "{site}: {}; {what} in {folder}, see report/index.html",
+        verdict.word()
     ));
     for reason in verdict.reasons.iter().chain(&verdict.remarks) {
         output::line(format_args!("  {reason}"));

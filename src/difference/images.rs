@@ -15,6 +15,7 @@ use crate::{
     geom::{
         attitude::{matrix_of_spice_quaternion, rotation_vector},
         mars_rotation::mars_rotation,
+        orbit_axes::radial_along_cross,
     },
     products::read::{ImageDocument, SampleRow, read_samples},
     units::RADIANS_PER_ARCSECOND,
@@ -115,14 +116,27 @@ pub struct SampleMovement {
 }
 
 impl ImageDifference {
-    /// Whether the camera moved or turned, or samples are there in one run only.
+    /// Whether the camera moved or turned, or cannot be compared: in one run only, or without a common line.
+    ///
+    /// Samples of one run alone are no movement where others can be compared: the path was sampled at
+    /// other lines.
     #[must_use]
     pub fn moved(&self) -> bool {
-        let moved = |movement: &ImageMovement| {
-            movement.time_s.moved() || movement.distance_m.moved() || movement.turn_arcsec.moved()
-        };
-        self.samples_only_in_a + self.samples_only_in_b > 0
-            || self.movement.as_ref().is_some_and(moved)
+        self.movement.as_ref().is_none_or(ImageMovement::moved)
+    }
+
+    /// Whether the image is there in one run only.
+    #[must_use]
+    pub const fn only_in_one(&self) -> bool {
+        self.valid_in_a.is_some() != self.valid_in_b.is_some()
+    }
+}
+
+impl ImageMovement {
+    /// Whether the camera moved or turned, or saw its lines at other times.
+    #[must_use]
+    pub fn moved(&self) -> bool {
+        self.time_s.moved() || self.distance_m.moved() || self.turn_arcsec.moved()
     }
 }
 
@@ -188,7 +202,7 @@ fn movement(a: &[SampleRow], b: &[SampleRow], pairs: &[(usize, usize)]) -> Optio
     }
     let samples: Vec<SampleMovement> = pairs
         .iter()
-        .map(|(first, second)| of_sample(&a[*first], &b[*second], &radial_along_cross(a, *first)))
+        .map(|(first, second)| of_sample(&a[*first], &b[*second], &orbit_axes(a, *first)))
         .collect();
     let all = |value: fn(&SampleMovement) -> f64| samples.iter().map(value);
     Some(ImageMovement {
@@ -247,7 +261,7 @@ fn boresight(from_camera: &Matrix3<f64>) -> Vector3<f64> {
 /// The three axes of the orbit at row `index`, as columns in Mars-fixed components; there are two rows at least.
 ///
 /// The flight is seen in inertial space: in Mars' own frame it would lean by up to 4 degrees.
-fn radial_along_cross(rows: &[SampleRow], index: usize) -> Matrix3<f64> {
+fn orbit_axes(rows: &[SampleRow], index: usize) -> Matrix3<f64> {
     let inertial = |index: usize| {
         let row = &rows[index];
         mars_rotation::<MarsIau2000>(row.et)
@@ -256,10 +270,8 @@ fn radial_along_cross(rows: &[SampleRow], index: usize) -> Matrix3<f64> {
             .xyz_m
     };
     let flight = inertial((index + 1).min(rows.len() - 1)) - inertial(index.saturating_sub(1));
-    let radial = inertial(index).normalize();
-    let cross = radial.cross(&flight).normalize();
-    let axes = Matrix3::from_columns(&[radial, cross.cross(&radial), cross]);
-    mars_rotation::<MarsIau2000>(rows[index].et).matrix() * axes
+    mars_rotation::<MarsIau2000>(rows[index].et).matrix()
+        * radial_along_cross(&inertial(index), &flight)
 }
 
 #[cfg(test)]

@@ -34,6 +34,16 @@ impl Limits {
         difference
     }
 
+    /// The share of a limit that a movement uses, above 1 (or NaN) beyond it; rounding uses nothing of any limit.
+    #[must_use]
+    pub fn share(found: f64, limit: f64) -> f64 {
+        if found <= ROUNDING {
+            0.0
+        } else {
+            found / limit
+        }
+    }
+
     fn footprints(&self, difference: &RunDifference) -> Vec<String> {
         let footprints = &difference.footprints;
         match (&footprints.movement, self.movement_m) {
@@ -88,12 +98,34 @@ impl Limits {
 /// The sentence for a movement beyond its limit, if there is one and it is.
 fn beyond(what: impl Fn() -> String, found: f64, limit: Option<f64>, unit: &str) -> Option<String> {
     let limit = limit?;
-    // Rounding is no movement, whatever the limit. Written so that NaN is beyond.
-    (!(found <= limit.max(ROUNDING))).then(|| {
+    // Written so that NaN is beyond.
+    (!(Limits::share(found, limit) <= 1.0)).then(|| {
         format!(
             "{} by up to {} {unit}, beyond the limit of {limit} {unit}",
             what(),
             quantity(found)
         )
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rounding_keeps_every_limit_and_what_is_no_number_none() {
+        let verdict =
+            |found: f64, limit: f64| beyond(|| "it moved".to_owned(), found, Some(limit), "m");
+        for limit in [0.0, 1e-9, 1e-3] {
+            assert_eq!(verdict(0.5e-6, limit), None, "{limit} m");
+            assert!(Limits::share(0.5e-6, limit) <= 1.0, "{limit} m");
+            let told = verdict(2e-3, limit);
+            assert!(
+                told.is_some_and(|told| told.starts_with("it moved by up to 2.0e-3 m, beyond"))
+            );
+            assert!(Limits::share(2e-3, limit) > 1.0, "{limit} m");
+            assert!(verdict(f64::NAN, limit).is_some());
+        }
+        assert_eq!(verdict(2e-3, 2e-3), None);
+    }
 }

@@ -59,7 +59,7 @@ pub struct RunDifference {
     pub kernels: Items,
     /// Whether configuration keys or values differ, by the hashes of both.
     pub configuration_changed: bool,
-    /// Configuration keys that products repeat and that differ; others may differ as well.
+    /// Configuration keys whose values differ, as they are written.
     pub configuration: Vec<Change>,
     /// Time corrections that differ.
     pub biases: Vec<Change>,
@@ -91,9 +91,9 @@ pub struct RunDifference {
 pub enum Outcome {
     /// Manifests are equal but for the time of publication.
     NothingChanged,
-    /// Something changed, no footprint, position or pointing among it.
+    /// Something changed, no footprint, position or pointing among it; images may be sampled at other lines.
     NothingMoved,
-    /// Footprints, positions or pointing moved, or are there in one run only.
+    /// Footprints, positions or pointing moved; or footprints or images are there in one run only.
     Moved,
     /// Something moved farther than a limit allows, or a limit could not be applied.
     BeyondLimit,
@@ -247,7 +247,8 @@ fn profiles(a: Vec<ProfileDocument>, mut b: Vec<ProfileDocument>) -> Vec<Profile
 }
 
 impl RunDifference {
-    /// Whether a footprint, a position or the pointing moved, or is there in one run only.
+    /// Whether a footprint, a position or the pointing moved, or a footprint or an image is there in one run
+    /// only.
     #[must_use]
     pub fn moved(&self) -> bool {
         self.footprints.moved() || self.images.iter().any(ImageDifference::moved)

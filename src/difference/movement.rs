@@ -2,6 +2,8 @@
 
 use serde::Serialize;
 
+use crate::geom::statistics::largest;
+
 /// Movements below this are rounding of `f64`, not movements: metres, arcseconds or seconds of time.
 ///
 /// A Mars-fixed coordinate is good to 1e-9 m, a quaternion to 1e-10 arcsec, an ET of these years to
@@ -28,51 +30,64 @@ pub struct Component {
 
 impl Size {
     /// Of at least one value; zero of none.
-    pub(super) fn of(values: impl Iterator<Item = f64>) -> Self {
-        let (mut sum, mut max, mut count) = (0.0, 0.0_f64, 0.0_f64);
-        for value in values {
-            sum += value;
-            max = max.max(value);
-            count += 1.0;
-        }
+    pub(super) fn of(values: impl Iterator<Item = f64> + Clone) -> Self {
         Self {
-            mean: sum / count.max(1.0),
-            max,
+            mean: mean(values.clone()),
+            max: largest(values).unwrap_or(0.0),
         }
     }
 
     /// Of the values that are known, if one is.
-    pub(super) fn of_known(values: impl Iterator<Item = Option<f64>>) -> Option<Self> {
-        let mut known = values.flatten().peekable();
-        known.peek()?;
+    pub(super) fn of_known(values: impl Iterator<Item = Option<f64>> + Clone) -> Option<Self> {
+        let known = values.flatten();
+        known.clone().next()?;
         Some(Self::of(known))
     }
 
-    /// Whether this is more than rounding.
+    /// Whether this is more than rounding; what is not known is.
     #[must_use]
     pub fn moved(&self) -> bool {
-        self.max > ROUNDING
+        !(self.max <= ROUNDING)
     }
 }
 
 impl Component {
     /// Of at least one value; zero of none.
-    pub(super) fn of(values: impl Iterator<Item = f64>) -> Self {
-        let (mut sum, mut max_abs, mut count) = (0.0, 0.0_f64, 0.0_f64);
-        for value in values {
-            sum += value;
-            max_abs = max_abs.max(value.abs());
-            count += 1.0;
-        }
+    pub(super) fn of(values: impl Iterator<Item = f64> + Clone) -> Self {
         Self {
-            mean: sum / count.max(1.0),
-            max_abs,
+            mean: mean(values.clone()),
+            max_abs: largest(values.map(f64::abs)).unwrap_or(0.0),
         }
     }
 
-    /// Whether this is more than rounding.
+    /// Whether this is more than rounding; what is not known is.
     #[must_use]
     pub fn moved(&self) -> bool {
-        self.max_abs > ROUNDING
+        !(self.max_abs <= ROUNDING)
+    }
+}
+
+/// Zero of none.
+fn mean(values: impl Iterator<Item = f64>) -> f64 {
+    let (sum, count) = values.fold((0.0, 0.0_f64), |(sum, count), value| {
+        (sum + value, count + 1.0)
+    });
+    sum / count.max(1.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_not_a_number_is_not_lost_among_numbers() {
+        let values = || [1.0, f64::NAN, -2.0].into_iter();
+        let (size, component) = (Size::of(values()), Component::of(values()));
+        assert!(size.max.is_nan() && component.max_abs.is_nan());
+        assert!(size.moved() && component.moved());
+        let known = Size::of_known([None, Some(3.0)].into_iter());
+        assert!(known.is_some_and(|size| size.moved()));
+        assert_eq!(Size::of_known([None].into_iter()), None);
+        assert!(!Size::of(std::iter::empty()).moved());
     }
 }

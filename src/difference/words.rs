@@ -7,7 +7,7 @@ use super::{
     items::{Item, Items},
     movement::{Component, ROUNDING, Size},
 };
-use crate::store::manifest::Verdict;
+use crate::{geom::statistics::largest, store::manifest::Verdict};
 
 /// Texts of one kind that a sentence quotes; the JSON answer has all.
 const FEW: usize = 3;
@@ -47,10 +47,11 @@ impl RunDifference {
                 .iter()
                 .filter_map(|image| image.movement.as_ref())
         };
-        let largest = |value: fn(&ImageMovement) -> f64| images().map(value).fold(0.0, f64::max);
-        let distance_m = largest(|movement| movement.distance_m.max);
-        let turn_arcsec = largest(|movement| movement.turn_arcsec.max);
-        let ground_m = largest(|movement| movement.boresight_ground_m.map_or(0.0, |size| size.max));
+        let up_to = |value: fn(&ImageMovement) -> f64| largest(images().map(value)).unwrap_or(0.0);
+        let time_s = up_to(|movement| movement.time_s.max_abs);
+        let distance_m = up_to(|movement| movement.distance_m.max);
+        let turn_arcsec = up_to(|movement| movement.turn_arcsec.max);
+        let ground_m = up_to(|movement| movement.boresight_ground_m.map_or(0.0, |size| size.max));
         if images().any(|movement| movement.distance_m.moved()) {
             told.push(format!("cameras by up to {} m", quantity(distance_m)));
         }
@@ -66,13 +67,22 @@ impl RunDifference {
                 quantity(ground_m)
             ));
         }
-        let lonely = self
-            .images
-            .iter()
-            .filter(|image| image.movement.is_none())
-            .count();
-        if lonely > 0 {
-            told.push(format!("{lonely} image(s) without a counterpart"));
+        if images().any(|movement| movement.time_s.moved()) {
+            told.push(format!("lines in time by up to {} s", quantity(time_s)));
+        }
+        let not_compared = |only_in_one: bool| {
+            let images = self.images.iter().filter(|image| image.movement.is_none());
+            images
+                .filter(|image| image.only_in_one() == only_in_one)
+                .count()
+        };
+        for (count, why) in [
+            (not_compared(true), "in one run only"),
+            (not_compared(false), "without a line in common"),
+        ] {
+            if count > 0 {
+                told.push(format!("{count} image(s) {why}"));
+            }
         }
         told
     }
@@ -93,6 +103,7 @@ impl RunDifference {
         }
         told.extend(values("biases", &self.biases));
         told.extend(values("counts", &self.counts));
+        told.extend(values("figures", &self.figures));
         told.extend(values("rejected shots", &self.rejected));
         told.extend(texts("complaints", &self.complaints));
         told.extend(texts("notes", &self.notes));
@@ -175,18 +186,13 @@ impl RunDifference {
     }
 
     fn verdict_sentence(&self) -> String {
-        let word = |verdict: &Verdict| match (verdict.valid, verdict.remarks.is_empty()) {
-            (false, _) => "INVALID",
-            (true, true) => "valid",
-            (true, false) => "valid with remarks",
-        };
         let (a, b) = (&self.a.verdict, &self.b.verdict);
         if a == b {
-            return format!("verdict: {} in both", word(a));
+            return format!("verdict: {} in both", a.word());
         }
         let all = |verdict: &Verdict| [&verdict.reasons[..], &verdict.remarks].concat();
         let differ = Texts::between(&all(a), &all(b));
-        let mut told = vec![format!("verdict: {} → {}", word(a), word(b))];
+        let mut told = vec![format!("verdict: {} → {}", a.word(), b.word())];
         for (texts, tense) in [(&differ.only_in_a, "no longer"), (&differ.only_in_b, "now")] {
             if !texts.is_empty() {
                 told.push(format!("{tense}: {}", texts.join("; ")));

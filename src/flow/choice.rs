@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::{
+    Stage,
     check::find_profiles,
     compare::{Compared, Request, RivalSet, compare_kernels},
     kernels::{load_kernels, load_rivals, wanted},
@@ -46,6 +47,7 @@ pub(super) fn choose_kernels(
         });
     }
     let request = Request {
+        stage: Stage::ChooseKernels.name(),
         wanted: Some(wanted),
         bias: config.pointing.ck_bias,
         attitudes: false,
@@ -128,15 +130,6 @@ fn notes(compared: &Compared) -> Vec<String> {
             orbit.tied_sets().collect::<Vec<_>>().join(", ")
         ));
     }
-    notes.extend(compared.left_out.iter().map(|left_out| {
-        format!(
-            "kernel set {}: no {} for UTC {} .. {} ({:.3} s), left out of the comparison of sets",
-            left_out.set,
-            left_out.what,
-            left_out.utc[0],
-            left_out.utc[1],
-            left_out.interval.duration_s()
-        )
-    }));
+    notes.extend(compared.left_out_lines());
     notes
 }

@@ -56,6 +56,7 @@ fn summary(manifest: &Manifest) -> SiteSummary {
     let count = |name: &str| manifest.counts.get(name).copied().unwrap_or(0);
     let figure = |name: &str| manifest.figures.get(name).copied();
     SiteSummary {
+        verdict: manifest.verdict.word(),
         reasons: manifest.verdict.reasons.clone(),
         remarks: manifest.verdict.remarks.clone(),
         counts: ["footprints", "profiles", "images"].map(count),

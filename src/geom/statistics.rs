@@ -54,6 +54,20 @@ impl Summary {
     }
 }
 
+/// The largest of `values`, `None` of none; NaN if one of them is NaN, so that no limit is kept by chance.
+#[must_use]
+pub fn largest(values: impl IntoIterator<Item = f64>) -> Option<f64> {
+    // No comparison with NaN holds: one that is held already stays.
+    let larger = |held: f64, next: f64| {
+        if next.is_nan() || next > held {
+            next
+        } else {
+            held
+        }
+    };
+    values.into_iter().reduce(larger)
+}
+
 fn median(sorted: &[f64]) -> f64 {
     let middle = sorted.len() / 2;
     if sorted.len().is_multiple_of(2) {
@@ -195,6 +209,17 @@ mod tests {
 
     fn close(value: f64, expected: f64) {
         assert!((value - expected).abs() < 1e-12, "{value} {expected}"); // rounding of small numbers
+    }
+
+    #[test]
+    fn the_largest_of_some_is_none_of_those_that_are_no_number() {
+        close(largest([-3.0, -1.0, -2.0]).unwrap(), -1.0);
+        assert_eq!(largest([]), None);
+        for place in 0..3 {
+            let mut values = [1.0, 3.0, 2.0];
+            values[place] = f64::NAN;
+            assert!(largest(values).is_some_and(f64::is_nan), "NaN at {place}");
+        }
     }
 
     #[test]

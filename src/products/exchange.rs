@@ -1,7 +1,6 @@
 //! Products in the forms of other programs: ISIS, Ames Stereo Pipeline, GIS, catalogues.
 
 mod geopackage;
-pub(super) mod kernel_report;
 mod readme;
 mod shapefile;
 mod stac;
@@ -13,6 +12,7 @@ use super::{
     coordinates::{FRAME, column_deg},
     files::{write_json, write_text},
     footprints::points_deg,
+    kernel_report,
     site::SiteProducts,
     table::{Column, Table, Values},
     text_table,

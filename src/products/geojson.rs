@@ -13,6 +13,7 @@ use super::{
     coordinates::{FRAME, bounding_box_deg},
     fault::ProductFault,
     files::{create, finish, open, to_value},
+    shot::Shot,
     site::SiteProducts,
 };
 use crate::error::{IoFault, Place, Result};
@@ -33,28 +34,13 @@ struct CrsName {
 struct Feature {
     r#type: &'static str,
     geometry: Point,
-    properties: Properties,
+    properties: Shot,
 }
 
 #[derive(Debug, Serialize)]
 struct Point {
     r#type: &'static str,
     coordinates: [f64; 2],
-}
-
-#[derive(Debug, Serialize)]
-struct Properties {
-    et_s: f64,
-    utc: String,
-    orbit: u32,
-    source_file: String,
-    record: u32,
-    shot: u8,
-    radius_m: f64,
-    radius_crossover_m: f64,
-    topography_m: f64,
-    range_m: f64,
-    windows: String,
 }
 
 /// Writes the footprints, which lie at `points` (degrees), and reads them back, one line at a time: a
@@ -133,26 +119,13 @@ const fn separator(row: usize, rows: usize) -> &'static str {
 }
 
 fn feature(site: &SiteProducts, row: usize, point: [f64; 2]) -> Feature {
-    let shot = site.footprints.row(row);
     Feature {
         r#type: "Feature",
         geometry: Point {
             r#type: "Point",
             coordinates: point,
         },
-        properties: Properties {
-            et_s: shot.et_s,
-            utc: site.utc[row].clone(),
-            orbit: shot.orbit,
-            source_file: site.file_name(shot.file),
-            record: shot.record,
-            shot: shot.shot,
-            radius_m: shot.radius_m,
-            radius_crossover_m: shot.radius_crossover_m,
-            topography_m: shot.radius_crossover_m - shot.areoid_radius_m,
-            range_m: shot.range_m,
-            windows: site.window_ids(shot.windows),
-        },
+        properties: Shot::of(site, row),
     }
 }
 
@@ -200,7 +173,7 @@ fn read_back(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::products::files::write_text;
+    use crate::products::{files::write_text, shot::example};
 
     fn features() -> impl ExactSizeIterator<Item = Feature> {
         [1.0_f64, 2.0]
@@ -212,19 +185,7 @@ mod tests {
                     r#type: "Point",
                     coordinates: [0.1 + 0.2, -0.0],
                 },
-                properties: Properties {
-                    et_s,
-                    utc: "1999-08-24T14:12:13.000".to_owned(),
-                    orbit: 9019,
-                    source_file: "a\n\"b\"".to_owned(),
-                    record: 11,
-                    shot: 1,
-                    radius_m: 3_394_000.12,
-                    radius_crossover_m: 3_394_001.37,
-                    topography_m: -1_498.63,
-                    range_m: 380_000.1,
-                    windows: String::new(),
-                },
+                properties: example(1, et_s),
             })
     }
 

@@ -15,15 +15,13 @@
 //! * Distortion is zero, as the instrument kernel says. ALE repeats the pixel pitch in these places, which
 //!   `usgscsm` takes for radial coefficients per mm² and mm⁴: wrong by hundreds of pixels at the edges.
 
-use std::collections::BTreeMap;
-
 use serde::Serialize;
 use serde_json::{Value, json};
 
 use super::{
     Writer,
-    exchange::kernel_report::{names_by_type, qualities},
     files::write_json,
+    kernel_report::{names_by_type, qualities},
     site::{ImageProducts, SiteProducts},
 };
 use crate::{
@@ -275,16 +273,14 @@ fn kernels(site: &SiteProducts) -> Value {
 fn provenance(site: &SiteProducts, image: &ImageProducts) -> Value {
     let times = image.times;
     let interpolation = &image.orientation.tables.interpolation;
-    let hashes: BTreeMap<&str, &str> = site
-        .kernels
-        .iter()
-        .map(|kernel| (&*kernel.name, &*kernel.blake3))
-        .collect();
+    // A list, as two kernels may have one name.
+    let kernels = site.kernels.iter();
+    let kernels = kernels.map(|kernel| json!({"name": kernel.name, "blake3": kernel.blake3}));
     json!({
         "version": env!("CARGO_PKG_VERSION"),
         "site": site.config.site,
         "configuration_blake3": site.config.blake3,
-        "kernels_blake3": hashes,
+        "kernels": kernels.collect::<Vec<_>>(),
         "line_period_s": times.line_period_s,
         "detector_line_exposure_s": times.exposure_s,
         "lines_header": times.lines_header,

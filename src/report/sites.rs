@@ -17,6 +17,8 @@ pub struct SiteLine {
 /// Products of one site in one line.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SiteSummary {
+    /// The verdict in words, as the program has it everywhere.
+    pub verdict: &'static str,
     /// Why the site is invalid; empty when it is valid.
     pub reasons: Vec<String>,
     /// What a reader must weigh.
@@ -105,11 +107,12 @@ fn cells(site: &SiteLine) -> Vec<Cell> {
         );
         return vec![(&site.folder).into(), "no products".into(), because.into()];
     };
-    let word = match tone(site) {
-        Tone::Bad if site.failure.is_some() => "last run failed, products of an earlier one",
-        Tone::Good => "valid",
-        Tone::Remarks => "valid with remarks",
-        Tone::Bad => "invalid",
+    let (word, why) = match &site.failure {
+        Some(failure) => (
+            "last run failed, products of an earlier one",
+            first_line(failure).to_owned(),
+        ),
+        None => (summary.verdict, because(summary)),
     };
     let figure = |value: Option<f64>, scale: f64| -> Cell {
         value
@@ -122,13 +125,7 @@ fn cells(site: &SiteLine) -> Vec<Cell> {
             &site.folder,
         )),
         word.into(),
-        site.failure
-            .as_deref()
-            .map_or_else(
-                || because(summary),
-                |failure| first_line(failure).to_owned(),
-            )
-            .into(),
+        why.into(),
     ];
     cells.extend(summary.counts.map(|count| count.to_string().into()));
     cells.push(figure(summary.range_mean_m, 1.0));
@@ -164,7 +161,8 @@ mod tests {
 
     #[test]
     fn the_worst_is_said_first() {
-        let summary = |reasons: &[&str]| SiteSummary {
+        let summary = |verdict, reasons: &[&str]| SiteSummary {
+            verdict,
             reasons: reasons.iter().map(ToString::to_string).collect(),
             remarks: Vec::new(),
             counts: [10, 1, 0],
@@ -180,12 +178,12 @@ mod tests {
             failure: None,
         };
         let page = sites_page(&[
-            line("good", Some(summary(&[]))),
-            line("bad", Some(summary(&["mean of <x>", "more"]))),
+            line("good", Some(summary("valid", &[]))),
+            line("bad", Some(summary("INVALID", &["mean of <x>", "more"]))),
             line("half", None),
             SiteLine {
                 failure: Some("a <kernel> is gone\n  what to do: look".to_owned()),
-                ..line("stale", Some(summary(&[])))
+                ..line("stale", Some(summary("valid", &[])))
             },
         ]);
         assert!(page.contains(

@@ -64,6 +64,18 @@ pub struct Verdict {
     pub remarks: Vec<String>,
 }
 
+impl Verdict {
+    /// The verdict in one word or three, as every message and page has it.
+    #[must_use]
+    pub const fn word(&self) -> &'static str {
+        match (self.valid, self.remarks.as_slice()) {
+            (false, _) => "INVALID",
+            (true, []) => "valid",
+            (true, _) => "valid with remarks",
+        }
+    }
+}
+
 /// The configuration of a run.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct ConfigurationEntry {

@@ -16,7 +16,7 @@ use super::{
 };
 use crate::{
     error::{Fault, IoFault, Kind, Place, Result},
-    files::hash_file,
+    files::{hash_file, short_hash},
 };
 
 /// Name of the manifest in a site's folder.
@@ -194,15 +194,29 @@ pub fn read_manifest(site_folder: &Path) -> Option<Manifest> {
     serde_json::from_slice(&fs::read(site_folder.join(MANIFEST)).ok()?).ok()
 }
 
+/// Products that are not what the manifest says, with what is there instead, or why it cannot be read.
+pub(super) fn damaged<'a>(
+    site_folder: &Path,
+    manifest: &'a Manifest,
+) -> impl Iterator<Item = (&'a ProductEntry, Result<String>)> {
+    manifest.products.iter().filter_map(move |product| {
+        let path = site_folder.join(&product.path);
+        let found = match hash_file(&path) {
+            Ok((blake3, _)) if blake3 == product.blake3 => return None,
+            Ok((blake3, bytes)) => Ok(format!(
+                "has {bytes} bytes with the hash {}",
+                short_hash(&blake3)
+            )),
+            Err(_) if !path.exists() => Ok("is missing".to_owned()),
+            Err(failure) => Err(failure),
+        };
+        Some((product, found))
+    })
+}
+
 /// The first product that is missing or not what the manifest says.
 #[must_use]
 pub fn damaged_product(site_folder: &Path, manifest: &Manifest) -> Option<String> {
-    manifest
-        .products
-        .iter()
-        .find(|product| {
-            hash_file(&site_folder.join(&product.path))
-                .map_or(true, |(blake3, _)| blake3 != product.blake3)
-        })
-        .map(|product| product.path.clone())
+    let (product, _) = damaged(site_folder, manifest).next()?;
+    Some(product.path.clone())
 }

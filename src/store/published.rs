@@ -4,11 +4,11 @@ use std::{fs, io::ErrorKind, path::Path};
 
 use super::{
     manifest::Manifest,
-    publish::{JOURNAL, MANIFEST, has_work, read_manifest},
+    publish::{JOURNAL, MANIFEST, damaged, has_work, read_manifest},
 };
 use crate::{
     error::{Fault, IoFault, Kind, Place, Result},
-    files::{hash_file, short_hash},
+    files::short_hash,
 };
 
 /// Why products in a folder are not to be used.
@@ -92,22 +92,13 @@ pub fn read_published(folder: &Path) -> Result<Manifest> {
             reason: error.to_string(),
         })
         .in_file(&path)?;
-    for product in &manifest.products {
-        let path = folder.join(&product.path);
-        let found = match hash_file(&path) {
-            Ok((blake3, _)) if blake3 == product.blake3 => continue,
-            Ok((blake3, bytes)) => {
-                format!("has {bytes} bytes with the hash {}", short_hash(&blake3))
-            }
-            Err(_) if !path.exists() => "is missing".to_owned(),
-            Err(failure) => return Err(failure),
-        };
+    if let Some((product, found)) = damaged(folder, &manifest).next() {
         return Err(PublishedFault::Contradicts {
-            found,
+            found: found?,
             expected_bytes: product.bytes,
             expected: short_hash(&product.blake3),
         })
-        .in_file(path);
+        .in_file(folder.join(&product.path));
     }
     Ok(manifest)
 }

@@ -11,6 +11,20 @@ pub(crate) mod mission;
 
 use std::path::{Path, PathBuf};
 
+/// Makes sure that `answer` keeps the shipped schema `config/schema/<name>.schema.json`.
+pub(crate) fn assert_keeps_schema(answer: &serde_json::Value, name: &str) {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("config/schema")
+        .join(format!("{name}.schema.json"));
+    let schema: serde_json::Value = serde_json::from_slice(&std::fs::read(path).unwrap()).unwrap();
+    let validator = jsonschema::validator_for(&schema).unwrap();
+    let errors: Vec<String> = validator
+        .iter_errors(answer)
+        .map(|error| format!("{}: {error}", error.instance_path()))
+        .collect();
+    assert!(errors.is_empty(), "{name}: {errors:#?}");
+}
+
 /// A path below `AREOGRAPH_DATA` or `../shared/data`; without the data one line says what is skipped.
 #[allow(
     clippy::disallowed_methods,

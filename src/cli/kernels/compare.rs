@@ -9,7 +9,7 @@ use super::super::{load_sites, output};
 use crate::{
     constants::MGS_POINTING_BIAS,
     error::{Failure, Fault, Kind},
-    flow::{Compared, LeftOut, Request, RivalSet, compare_kernels, rival_sets, wanted_by_site},
+    flow::{Compared, Request, RivalSet, compare_kernels, rival_sets, wanted_by_site},
     geom::{polynomial::root_mean_square, statistics::Summary},
     report::{KernelComparison, comparison_page},
     spice::{KernelSet, Session, Wanted},
@@ -18,9 +18,6 @@ use crate::{
     time::{Et, Interval, Intervals, PointingBias},
     units::RADIANS_PER_ARCSECOND,
 };
-
-/// Spans without coverage that are printed for a set; JSON has all.
-const SPANS_PRINTED: usize = 5;
 
 /// Compares rival kernel sets: how far the orbit and the attitude of each are from the mean of all.
 ///
@@ -96,6 +93,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
         (None, None) => None,
     };
     let request = Request {
+        stage: "compare_kernels",
         wanted: wanted.as_ref(),
         bias,
         attitudes: true,
@@ -118,7 +116,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
 
 fn page(compared: &Compared) -> Result<String, Failure> {
     let mut remarks = compared.notes.clone();
-    remarks.extend(left_out_lines(&compared.left_out));
+    remarks.extend(compared.left_out_lines());
     comparison_page(&KernelComparison {
         orbit: &compared.orbit,
         attitude: compared.attitude.as_ref(),
@@ -192,7 +190,7 @@ fn print(compared: &Compared) {
         ));
         print_table(&attitude.turns, RADIANS_PER_ARCSECOND, Some(attitude));
     }
-    for line in left_out_lines(&compared.left_out) {
+    for line in compared.left_out_lines() {
         output::line(line);
     }
     for note in &compared.notes {
@@ -244,31 +242,6 @@ fn print_table(comparison: &Comparison, unit: f64, attitude: Option<&AttitudeCom
     }
 }
 
-/// For each set what it lacks: how much, and the first spans.
-fn left_out_lines(left_out: &[LeftOut]) -> Vec<String> {
-    let same = |a: &LeftOut, b: &LeftOut| a.set == b.set && a.what == b.what;
-    let of_one_set = left_out.chunk_by(same);
-    let lines = of_one_set.map(|spans| {
-        let (set, what) = (&spans[0].set, spans[0].what);
-        let total_s: f64 = spans.iter().map(|one| one.interval.duration_s()).sum();
-        let mut told: Vec<String> = spans
-            .iter()
-            .take(SPANS_PRINTED)
-            .map(|span| {
-                let seconds = span.interval.duration_s();
-                format!("{} .. {} UTC ({seconds:.3} s)", span.utc[0], span.utc[1])
-            })
-            .collect();
-        if spans.len() > SPANS_PRINTED {
-            let more = spans.len() - SPANS_PRINTED;
-            told.push(format!("and {more} more, see --json"));
-        }
-        let told = told.join(", ");
-        format!("left out: {set} has no {what} for {total_s:.3} s: {told}")
-    });
-    lines.collect()
-}
-
 /// Root mean square and largest distance on the ground, metres; nothing when no boresight meets Mars.
 fn ground_size(attitude: &AttitudeComparison, set: usize) -> Option<[f64; 2]> {
     let ground_m = &attitude.ground_m[set];
@@ -288,6 +261,7 @@ fn answer(compared: &Compared) -> Value {
         })
     });
     let mut answer = json!({
+        "format": "areograph kernel comparison 1",
         "rule": "least root mean square distance from the mean of all sets",
         "orbit": comparison_json(&compared.orbit, 1.0, "m"),
         "start_utc": compared.utc[0],

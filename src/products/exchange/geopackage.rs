@@ -13,6 +13,7 @@ use crate::{
         coordinates::FRAME,
         fault::ProductFault,
         files::{create, finish, open},
+        shot::Shot,
         site::SiteProducts,
     },
 };
@@ -54,19 +55,9 @@ const WGS84_WKT: &str = "GEOGCS[\"WGS 84\",DATUM[\"WGS_1984\",SPHEROID[\"WGS 84\
 
 /// A row of the table `footprints` but for its number.
 #[derive(Debug, PartialEq)]
-struct Shot {
+struct Feature {
     geometry: Vec<u8>,
-    et_s: f64,
-    utc: String,
-    orbit: u32,
-    source_file: String,
-    record: u32,
-    shot: u8,
-    radius_m: f64,
-    radius_crossover_m: f64,
-    topography_m: f64,
-    range_m: f64,
-    windows: String,
+    shot: Shot,
 }
 
 /// What the file says of its table.
@@ -95,16 +86,16 @@ impl Contents {
 /// # Errors
 /// What the disk or SQLite refuses; rows that come back different.
 pub(super) fn write(path: &Path, site: &SiteProducts, points: &[[f64; 2]]) -> Result<u64> {
-    let shots = || (points.iter().enumerate()).map(|(row, point)| shot(site, row, point));
+    let features = || (points.iter().enumerate()).map(|(row, point)| feature(site, row, point));
     // Makes the folder and an empty file, which SQLite takes for a new database.
     finish(path, create(path)?)?;
     let contents = Contents::of(site, points);
-    fill(path, &contents, shots()).in_file(path)?;
+    fill(path, &contents, features()).in_file(path)?;
     open(path)?
         .sync_all()
         .map_err(IoFault::on("write"))
         .in_file(path)?;
-    read_back(path, shots()).in_file(path)?;
+    read_back(path, features()).in_file(path)?;
     Ok(points.len() as u64)
 }
 
@@ -119,7 +110,7 @@ fn refused(error: rusqlite::Error) -> Failure {
     }
 }
 
-fn fill(path: &Path, contents: &Contents, shots: impl Iterator<Item = Shot>) -> Result<()> {
+fn fill(path: &Path, contents: &Contents, features: impl Iterator<Item = Feature>) -> Result<()> {
     let database = Connection::open(path).map_err(refused)?;
     database.execute_batch(LAYOUT).map_err(refused)?;
     describe(&database, contents).map_err(refused)?;
@@ -129,10 +120,10 @@ fn fill(path: &Path, contents: &Contents, shots: impl Iterator<Item = Shot>) -> 
              radius_crossover_m, topography_m, range_m, windows) VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
         )
         .map_err(refused)?;
-    for shot in shots {
+    for Feature { geometry, shot } in features {
         insert
             .execute(params![
-                shot.geometry,
+                geometry,
                 shot.et_s,
                 shot.utc,
                 shot.orbit,
@@ -193,21 +184,11 @@ fn ends(values: impl Iterator<Item = f64>) -> [f64; 2] {
     )
 }
 
-fn shot(site: &SiteProducts, row: usize, point: &[f64; 2]) -> Shot {
-    let shot = site.footprints.row(row);
-    Shot {
+fn feature(site: &SiteProducts, row: usize, point: &[f64; 2]) -> Feature {
+    let shot = Shot::of(site, row);
+    Feature {
         geometry: geometry(point, shot.radius_crossover_m - SPHERE_RADIUS_M),
-        et_s: shot.et_s,
-        utc: site.utc[row].clone(),
-        orbit: shot.orbit,
-        source_file: site.file_name(shot.file),
-        record: shot.record,
-        shot: shot.shot,
-        radius_m: shot.radius_m,
-        radius_crossover_m: shot.radius_crossover_m,
-        topography_m: shot.radius_crossover_m - shot.areoid_radius_m,
-        range_m: shot.range_m,
-        windows: site.window_ids(shot.windows),
+        shot,
     }
 }
 
@@ -226,7 +207,7 @@ fn geometry([longitude_deg, latitude_deg]: &[f64; 2], height_m: f64) -> Vec<u8> 
     bytes
 }
 
-fn read_back(path: &Path, shots: impl Iterator<Item = Shot>) -> Result<()> {
+fn read_back(path: &Path, features: impl Iterator<Item = Feature>) -> Result<()> {
     let unreadable = |error: rusqlite::Error| Failure::from(ProductFault::unreadable(error));
     let database =
         Connection::open_with_flags(path, OpenFlags::SQLITE_OPEN_READ_ONLY).map_err(unreadable)?;
@@ -239,7 +220,7 @@ fn read_back(path: &Path, shots: impl Iterator<Item = Shot>) -> Result<()> {
     let mut found = select.query_map([], from_row).map_err(unreadable)?;
     let differs = |what: String| Err(ProductFault::ReadBack { what }.into());
     let mut rows = 0;
-    for expected in shots {
+    for expected in features {
         rows += 1;
         if found.next().transpose().map_err(unreadable)? != Some(expected) {
             return differs(format!("footprint {rows}"));
@@ -251,41 +232,34 @@ fn read_back(path: &Path, shots: impl Iterator<Item = Shot>) -> Result<()> {
     Ok(())
 }
 
-fn from_row(row: &Row) -> rusqlite::Result<Shot> {
-    Ok(Shot {
+fn from_row(row: &Row) -> rusqlite::Result<Feature> {
+    Ok(Feature {
         geometry: row.get(0)?,
-        et_s: row.get(1)?,
-        utc: row.get(2)?,
-        orbit: row.get(3)?,
-        source_file: row.get(4)?,
-        record: row.get(5)?,
-        shot: row.get(6)?,
-        radius_m: row.get(7)?,
-        radius_crossover_m: row.get(8)?,
-        topography_m: row.get(9)?,
-        range_m: row.get(10)?,
-        windows: row.get(11)?,
+        shot: Shot {
+            et_s: row.get(1)?,
+            utc: row.get(2)?,
+            orbit: row.get(3)?,
+            source_file: row.get(4)?,
+            record: row.get(5)?,
+            shot: row.get(6)?,
+            radius_m: row.get(7)?,
+            radius_crossover_m: row.get(8)?,
+            topography_m: row.get(9)?,
+            range_m: row.get(10)?,
+            windows: row.get(11)?,
+        },
     })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::products::shot::example;
 
-    fn shots() -> impl Iterator<Item = Shot> {
-        [1_u8, 2].into_iter().map(|shot| Shot {
+    fn features() -> impl Iterator<Item = Feature> {
+        [1, 2].into_iter().map(|shot| Feature {
             geometry: geometry(&[175.3, -14.6], -1_950.25),
-            et_s: 2.0_f64.sqrt(),
-            utc: "1999-08-24T14:12:13.000".to_owned(),
-            orbit: 9019,
-            source_file: "a 'b'.b".to_owned(),
-            record: 11,
-            shot,
-            radius_m: 3_394_000.12,
-            radius_crossover_m: 3_394_001.37,
-            topography_m: -1_498.63,
-            range_m: 380_000.1,
-            windows: String::new(),
+            shot: example(shot, 2.0_f64.sqrt()),
         })
     }
 
@@ -314,15 +288,15 @@ mod tests {
         .enumerate()
         {
             let path = folder.path().join(format!("{number}.gpkg"));
-            fill(&path, &contents, shots()).unwrap();
-            read_back(&path, shots()).unwrap();
-            let longer = read_back(&path, shots().take(1)).unwrap_err();
+            fill(&path, &contents, features()).unwrap();
+            read_back(&path, features()).unwrap();
+            let longer = read_back(&path, features().take(1)).unwrap_err();
             assert!(longer.fault.to_string().ends_with("more than 1 footprints"));
             Connection::open(&path)
                 .unwrap()
                 .execute(change, [])
                 .unwrap();
-            let failure = read_back(&path, shots()).unwrap_err();
+            let failure = read_back(&path, features()).unwrap_err();
             assert_eq!(
                 failure.fault.to_string(),
                 format!("read back differently: {complaint}")

@@ -19,6 +19,7 @@ use crate::{
         coordinates::degrees,
         fault::ProductFault,
         files::{create, finish, open, write_text},
+        shot::Shot,
         site::SiteProducts,
     },
 };
@@ -89,21 +90,21 @@ fn point(site: &SiteProducts, row: usize, [longitude_deg, latitude_deg]: &[f64; 
 }
 
 fn attributes(site: &SiteProducts, row: usize) -> Attributes {
-    let shot = site.footprints.row(row);
+    let shot = Shot::of(site, row);
     Attributes {
         numbers: [
             shot.et_s,
             f64::from(shot.orbit),
             f64::from(shot.record),
             f64::from(shot.shot),
-            degrees(shot.longitude_rad),
-            degrees(shot.latitude_rad),
+            degrees(site.footprints.longitude_rad[row]),
+            degrees(site.footprints.latitude_rad[row]),
             shot.radius_m,
             shot.radius_crossover_m,
-            shot.radius_crossover_m - shot.areoid_radius_m,
+            shot.topography_m,
             shot.range_m,
         ],
-        texts: [site.utc[row].clone(), site.file_name(shot.file)],
+        texts: [shot.utc, shot.source_file],
     }
 }
 

@@ -32,21 +32,31 @@ pub(super) fn read(
         .build()
         .map_err(ReadFault::unreadable(PARQUET))
         .in_file(path)?;
+    let mut rows_before = 0;
     for batch in batches {
-        let batch = batch
+        let columns = batch
             .map_err(ReadFault::unreadable(PARQUET))
             .in_file(path)?;
-        take(&Batch(batch)).in_file(path)?;
+        let batch = Batch {
+            columns,
+            rows_before,
+        };
+        take(&batch).in_file(path)?;
+        rows_before += batch.rows();
     }
     Ok(())
 }
 
 /// Some rows of the columns asked for.
-pub(super) struct Batch(RecordBatch);
+pub(super) struct Batch {
+    columns: RecordBatch,
+    /// Rows of the file before these.
+    rows_before: usize,
+}
 
 impl Batch {
     pub(super) fn rows(&self) -> usize {
-        self.0.num_rows()
+        self.columns.num_rows()
     }
 
     fn column<T: 'static>(
@@ -61,7 +71,7 @@ impl Batch {
             expected,
         };
         let column = self
-            .0
+            .columns
             .column_by_name(name)
             .ok_or_else(|| wrong("missing".to_owned()))?;
         if !may_be_null && column.null_count() > 0 {
@@ -73,20 +83,37 @@ impl Batch {
             .ok_or_else(|| wrong(format!("of type {}", column.data_type())))
     }
 
-    /// A column of numbers, none missing.
+    /// A column of finite numbers, none missing.
     pub(super) fn numbers(
         &self,
         name: &'static str,
     ) -> std::result::Result<&Float64Array, ReadFault> {
-        self.column(name, "64-bit floating point", false)
+        self.finite(name, false)
     }
 
-    /// A column of numbers, some perhaps missing.
+    /// A column of finite numbers, some perhaps missing.
     pub(super) fn optional_numbers(
         &self,
         name: &'static str,
     ) -> std::result::Result<&Float64Array, ReadFault> {
-        self.column(name, "64-bit floating point", true)
+        self.finite(name, true)
+    }
+
+    fn finite(
+        &self,
+        name: &'static str,
+        may_be_null: bool,
+    ) -> std::result::Result<&Float64Array, ReadFault> {
+        let numbers: &Float64Array = self.column(name, "64-bit floating point", may_be_null)?;
+        let mut rows = numbers.iter().zip(self.rows_before + 1..);
+        match rows.find_map(|(number, row)| Some((number.filter(|n| !n.is_finite())?, row))) {
+            None => Ok(numbers),
+            Some((number, row)) => Err(ReadFault::Column {
+                name,
+                found: format!("{number} in row {row}"),
+                expected: "finite numbers",
+            }),
+        }
     }
 
     /// A column of counts.
@@ -100,5 +127,38 @@ impl Batch {
     /// A column of texts.
     pub(super) fn texts(&self, name: &'static str) -> std::result::Result<&StringArray, ReadFault> {
         self.column(name, "text", false)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use arrow::array::ArrayRef;
+
+    use super::*;
+
+    #[test]
+    fn numbers_that_are_none_are_refused_with_their_row() {
+        let batch = |numbers: [Option<f64>; 3]| Batch {
+            columns: RecordBatch::try_from_iter([(
+                "x_m",
+                Arc::new(Float64Array::from_iter(numbers)) as ArrayRef,
+            )])
+            .unwrap(),
+            rows_before: 100,
+        };
+        let refused = |fault: std::result::Result<&Float64Array, ReadFault>| {
+            fault.map(drop).unwrap_err().to_string()
+        };
+        let expected = "column x_m is NaN in row 103; expected finite numbers";
+        let spoilt = batch([Some(1.0), Some(2.0), Some(f64::NAN)]);
+        assert_eq!(refused(spoilt.numbers("x_m")), expected);
+        assert_eq!(refused(spoilt.optional_numbers("x_m")), expected);
+        let expected = "column x_m is -inf in row 102; expected finite numbers";
+        let spoilt = batch([None, Some(f64::NEG_INFINITY), Some(0.0)]);
+        assert_eq!(refused(spoilt.optional_numbers("x_m")), expected);
+        let whole = batch([None, Some(1.0), Some(2.0)]);
+        assert_eq!(whole.optional_numbers("x_m").unwrap().null_count(), 1);
     }
 }

@@ -119,18 +119,10 @@ pub(super) fn values(site: &RunDifference) -> String {
             ],
         );
     }
-    let hidden = if site.configuration_changed {
-        paragraph(
-            "The configurations differ. Keys are compared where products repeat them (mola_clock, range_check); \
-             others may differ as well.",
-        )
-    } else {
-        String::new()
-    };
     if rows == 0 {
-        return hidden;
+        return String::new();
     }
-    table.finish() + &hidden
+    table.finish()
 }
 
 /// Kernels, stages and products that differ.

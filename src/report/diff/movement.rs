@@ -37,11 +37,7 @@ fn unknown() -> Cell {
 fn limited(value: f64, limit: Option<f64>) -> Cell {
     match limit {
         None => quantity(value).into(),
-        // Of a limit of 0, what is no more than rounding uses nothing.
-        Some(limit) if quantity(value) == "0" && limit <= 0.0 => {
-            Cell::Limited(quantity(value), 0.0)
-        }
-        Some(limit) => Cell::Limited(quantity(value), value / limit),
+        Some(limit) => Cell::Limited(quantity(value), Limits::share(value, limit)),
     }
 }
 

@@ -5,16 +5,12 @@ use std::{collections::BTreeMap, path::Path};
 use serde::Serialize;
 use serde_json::{Map, Value, json};
 
-use crate::{
-    config::CkQuality,
-    products::site::{KernelLine, SiteProducts},
-    spice::quality_of,
-    time::Intervals,
-};
+use super::site::{KernelLine, SiteProducts};
+use crate::{config::CkQuality, spice::quality_of, time::Intervals};
 
 /// Kernel names by SpiceQL's types, in load order: `ck`, `spk`, `tspk` (ephemerides of other bodies), `pck`,
 /// `fk`, `ik`, `iak` (ISIS addenda), `lsk`, `sclk`.
-pub(crate) fn names_by_type<'a>(site: &SiteProducts<'a>) -> BTreeMap<String, Vec<&'a str>> {
+pub(super) fn names_by_type<'a>(site: &SiteProducts<'a>) -> BTreeMap<String, Vec<&'a str>> {
     let mut names: BTreeMap<String, Vec<&str>> = BTreeMap::new();
     for kernel in site.kernels {
         names.entry(type_of(kernel)).or_default().push(&kernel.name);
@@ -37,7 +33,7 @@ fn type_of(kernel: &KernelLine) -> String {
 
 /// The least of the qualities of the spacecraft's kernels of one type, in SpiceQL's words: commanded attitude
 /// is `predicted`, archived kernels are `reconstructed`, names that tell nothing give `noquality`.
-pub(crate) fn qualities(site: &SiteProducts) -> BTreeMap<&'static str, &'static str> {
+pub(super) fn qualities(site: &SiteProducts) -> BTreeMap<&'static str, &'static str> {
     let quality = |kernel: &&KernelLine| {
         let name = kernel.name.to_lowercase();
         if quality_of(Path::new(&name)) == CkQuality::Nominal {
