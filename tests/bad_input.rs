@@ -33,7 +33,7 @@ fn compare(case: &Case, arguments: &[&str]) -> Command {
 }
 
 /// Spoils one thing of a good case and says what to run.
-const CASES: [(&str, Spoil); 49] = [
+const CASES: [(&str, Spoil); 50] = [
     ("good", Case::run),
     ("site_file_missing", |case| {
         fs::remove_file(case.path("site.toml")).unwrap();
@@ -270,6 +270,9 @@ const CASES: [(&str, Spoil); 49] = [
         case.run()
     }),
     ("compare_one_set", |case| compare(case, &["kernels/nav.tm"])),
+    ("compare_a_set_with_itself", |case| {
+        compare(case, &["kernels/nav.tm", "kernels/../kernels/nav.tm"])
+    }),
     ("compare_a_site_without_sets", |case| {
         compare(case, &["--site", "site.toml"])
     }),

@@ -281,8 +281,8 @@ fn a_window_across_zero_and_one_over_the_pole_in_one_pass() {
     assert_eq!(
         result.notes,
         [
-            "1 PEDR file(s): version letter K, datum iau1991, software version 7.25",
-            "1 PEDR file(s): version letter L, datum iau2000, software version 7.25"
+            "1 PEDR file: version letter K, datum iau1991, software version 7.25",
+            "1 PEDR file: version letter L, datum iau2000, software version 7.25"
         ]
     );
 }

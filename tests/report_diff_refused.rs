@@ -31,7 +31,12 @@ fn every_site_of_two_outputs_is_compared() {
         printed.ends_with("gone: only in A, not compared\nnew: only in B, not compared\n"),
         "{printed}"
     );
-    assert!(diff(&case, &["before", "out", "--limit-m", "1"]).starts_with("exit 5\n"));
+    let limited = diff(&case, &["before", "out", "--limit-m", "1"]);
+    assert!(limited.starts_with("exit 5\n"), "{limited}");
+    assert!(
+        limited.contains("gone: BEYOND THE LIMIT: only in A, so limits cannot be applied"),
+        "{limited}"
+    );
     // A site that cannot be read does not hide the others.
     copy_products(&case.path("before/case"), &case.path("out/gone"));
     case.write("out/gone/kernels.tm", "mine");

@@ -88,7 +88,7 @@ fn diff(arguments: &DiffArguments) -> Result<u8, Failure> {
     if arguments.json {
         output::json(&answer(&sites, &pairs));
     } else {
-        print(&sites, &lonely(&pairs));
+        print(&sites, &lonely(&pairs, &limits));
     }
     let failures = || {
         sites
@@ -100,7 +100,7 @@ fn diff(arguments: &DiffArguments) -> Result<u8, Failure> {
         let compared = sites
             .iter()
             .filter_map(|(_, compared)| compared.as_ref().ok());
-        let mut not_compared = lonely(&pairs);
+        let mut not_compared = lonely(&pairs, &limits);
         not_compared.extend(failures().map(ToString::to_string));
         let page = difference_page(&compared.collect::<Vec<_>>(), &not_compared)?;
         atomic::write(file, page.as_bytes())?;
@@ -109,14 +109,20 @@ fn diff(arguments: &DiffArguments) -> Result<u8, Failure> {
 }
 
 /// Sites that only one output has, one sentence each.
-fn lonely(pairs: &Pairs) -> Vec<String> {
-    let runs = [(&pairs.only_in_a, "A"), (&pairs.only_in_b, "B")].into_iter();
-    runs.flat_map(|(names, whose)| {
-        names
-            .iter()
-            .map(move |name| format!("{name}: only in {whose}, not compared"))
-    })
-    .collect()
+fn lonely(pairs: &Pairs, limits: &Limits) -> Vec<String> {
+    let gone = if *limits == Limits::default() {
+        "only in A, not compared"
+    } else {
+        "BEYOND THE LIMIT: only in A, so limits cannot be applied"
+    };
+    let runs = [
+        (&pairs.only_in_a, gone),
+        (&pairs.only_in_b, "only in B, not compared"),
+    ];
+    let sentences = runs
+        .into_iter()
+        .flat_map(|(names, what)| names.iter().map(move |name| format!("{name}: {what}")));
+    sentences.collect()
 }
 
 fn print(sites: &[Compared], lonely: &[String]) {

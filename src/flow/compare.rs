@@ -76,6 +76,8 @@ impl Compared {
 /// Sets that cannot be compared.
 #[derive(Debug, thiserror::Error)]
 enum CompareFault {
+    #[error("kernel set {other} holds the same kernels as {first}")]
+    Same { first: String, other: String },
     #[error("no time at which all kernel sets hold the position of MGS; {held}")]
     NothingInCommon { held: String },
     #[error(
@@ -92,6 +94,7 @@ enum CompareFault {
 impl Fault for CompareFault {
     fn kind(&self) -> Kind {
         match self {
+            Self::Same { .. } => Kind::Configuration,
             Self::NothingInCommon { .. } => Kind::Coverage,
             Self::Clocks { .. } => Kind::Input,
         }
@@ -99,6 +102,7 @@ impl Fault for CompareFault {
 
     fn advice(&self) -> String {
         match self {
+            Self::Same { .. } => "name each set once",
             Self::NothingInCommon { .. } => {
                 "see `areograph kernels coverage` for each set, and leave out the set that does not reach there"
             }
@@ -193,6 +197,25 @@ fn left_out(sets: &[RivalSet], (set, what, interval): Gap, session: &Session) ->
         interval,
         utc: utc_of(session, interval)?,
     })
+}
+
+/// Makes sure that no set is named twice: what is compared with itself looks like agreement.
+///
+/// # Errors
+/// Two sets with the same files in the same order.
+pub fn require_different(sets: &[RivalSet]) -> Result<()> {
+    let hashes = |set: &RivalSet| -> Vec<String> {
+        let kernels = set.kernels.kernels().iter();
+        kernels.map(|kernel| kernel.blake3.clone()).collect()
+    };
+    let all: Vec<Vec<String>> = sets.iter().map(hashes).collect();
+    for (other, set) in sets.iter().enumerate() {
+        if let Some(first) = all[..other].iter().position(|hashes| *hashes == all[other]) {
+            let (first, other) = (sets[first].id.clone(), set.id.clone());
+            return Err(CompareFault::Same { first, other }.into());
+        }
+    }
+    Ok(())
 }
 
 fn coverage(set: &RivalSet) -> Result<Coverage> {

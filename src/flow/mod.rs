@@ -28,7 +28,9 @@ use crate::{
 
 pub use check::{Checked, check_site};
 pub use choice::{rival_sets, wanted_by_site};
-pub use compare::{Compared, EPOCHS_MAX, LeftOut, Request, RivalSet, compare_kernels};
+pub use compare::{
+    Compared, EPOCHS_MAX, LeftOut, Request, RivalSet, compare_kernels, require_different,
+};
 pub use plan::{PlannedStage, plan_site};
 pub use sites::publish_sites;
 

@@ -153,7 +153,12 @@ pub fn search_footprints(
     all.footprints.files = files;
     let mut notes: Vec<String> = understood
         .into_iter()
-        .map(|(note, files)| format!("PEDR files {files}: {note}"))
+        .map(|(note, files)| {
+            format!(
+                "{files} PEDR file{}: {note}",
+                if files == 1 { "" } else { "s" }
+            )
+        })
         .collect();
     notes.extend(copy_notes);
     Ok(SearchResult {

@@ -9,7 +9,9 @@ use super::super::{load_sites, output};
 use crate::{
     constants::MGS_POINTING_BIAS,
     error::{Failure, Fault, Kind},
-    flow::{Compared, Request, RivalSet, compare_kernels, rival_sets, wanted_by_site},
+    flow::{
+        Compared, Request, RivalSet, compare_kernels, require_different, rival_sets, wanted_by_site,
+    },
     geom::{polynomial::root_mean_square, statistics::Summary},
     report::{KernelComparison, comparison_page},
     spice::{KernelSet, Session, Wanted},
@@ -99,6 +101,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
         attitudes: true,
         clocks: site.is_some_and(|site| !site.images.is_empty()),
     };
+    require_different(&sets)?;
     let compared = compare_kernels(&sets, &request)?;
     if let Some(path) = &arguments.page {
         atomic::write(path, page(&compared)?.as_bytes())?;
