@@ -2,6 +2,7 @@
 
 pub mod attitude;
 pub mod chebyshev;
+pub mod collinearity;
 pub mod ellipsoid;
 pub mod map_projection;
 pub mod mars_rotation;
