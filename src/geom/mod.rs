@@ -8,5 +8,6 @@ pub mod map_projection;
 pub mod mars_rotation;
 pub mod orbit_axes;
 pub mod polynomial;
+pub mod pushbroom;
 pub mod statistics;
 pub mod window;
