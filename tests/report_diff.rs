@@ -143,6 +143,7 @@ fn a_turned_ck_is_found_and_nothing_else() {
     let ran = [
         "sample_orientation/image",
         "fit_sensor_model/image",
+        "register/image",
         "publish",
     ];
     assert_eq!(case.stages_run(), ran);
@@ -241,6 +242,7 @@ fn another_orbit_moves_the_camera_by_the_injected_difference() {
         "check_ranges",
         "sample_orientation/image",
         "fit_sensor_model/image",
+        "register/image",
         "publish",
     ];
     assert_eq!(case.stages_run(), ran);
