@@ -6,6 +6,7 @@ pub mod collinearity;
 pub mod ellipsoid;
 pub mod map_projection;
 pub mod mars_rotation;
+pub mod misregistration;
 pub mod orbit_axes;
 pub mod polynomial;
 pub mod pushbroom;

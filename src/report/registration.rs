@@ -2,7 +2,7 @@
 
 use super::{
     html::{Column, Table, heading, paragraph},
-    plots::{COLOURS, Extent, GREY, INK, Mark, Panel, Plot, Series, Style, figure, thinned},
+    plots::{COLOURS, Extent, GREY, INK, Mark, Panel, Plot, Series, Style, figure, label, thinned},
 };
 use crate::{
     config::CameraModel,
@@ -225,8 +225,8 @@ fn methods(site: &SiteProducts, images: &[&ImageProducts]) -> String {
                     run.evaluations.n.to_string().into(),
                     format!("{:.2}", run.evaluations.mean).into(),
                     format!("{:.0}", run.evaluations.max).into(),
-                    format!("{:.4}", difference.mean).into(),
-                    format!("{:.4}", difference.standard_deviation).into(),
+                    label(difference.mean, 4).into(),
+                    label(difference.standard_deviation, 4).into(),
                 ],
             );
         }
@@ -248,8 +248,10 @@ fn converges(image: &ImageProducts) -> bool {
 
 /// Figure 4: the mean step of every iteration.
 fn convergence_plot(image: &ImageProducts) -> Plot {
-    let runs = image.registration.methods.iter().enumerate();
-    let series = runs.map(|(colour, run)| {
+    // The curves of first order lie on those of second.
+    let runs = image.registration.methods.iter();
+    let second_order = runs.filter(|run| run.model == CameraModel::SecondOrder);
+    let series = second_order.enumerate().map(|(colour, run)| {
         let steps = (1_u32..).zip(&run.mean_step_lines);
         let logarithms = steps
             .filter(|(_, step)| **step > 0.0)
@@ -296,8 +298,8 @@ fn models(images: &[&ImageProducts]) -> String {
                 word(other.model).into(),
             ];
             for summary in [&other.lines, &other.samples] {
-                cells.push(format!("{:.4}", summary.mean).into());
-                cells.push(format!("{:.4}", summary.standard_deviation).into());
+                cells.push(label(summary.mean, 4).into());
+                cells.push(label(summary.standard_deviation, 4).into());
             }
             table.row(true, cells);
         }

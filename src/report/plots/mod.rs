@@ -3,7 +3,7 @@
 mod draw;
 mod figure;
 
-pub(super) use draw::{Canvas, Drawn, draw_text, drawn};
+pub(super) use draw::{Canvas, Drawn, draw_text, drawn, label};
 pub(super) use figure::{Key, figure_html};
 
 use std::fmt::Write as _;
