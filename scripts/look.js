@@ -3,7 +3,7 @@ const fs = require('fs');
 const path = require('path');
 const { chromium } = require('playwright-core');
 
-const [pictures, ...pages] = process.argv.slice(2);
+const [chromiumPath, pictures, ...pages] = process.argv.slice(2);
 const axe = fs.readFileSync(require.resolve('axe-core/axe.min.js'), 'utf8');
 const views = [
   { name: 'phone', width: 360, scheme: 'light' },
@@ -29,7 +29,7 @@ async function look(browser, file, view) {
   await page.goto('file://' + path.resolve(file));
   const wide = await page.evaluate(() => document.documentElement.scrollWidth);
   if (wide > view.width) problems.push(`scrolls sideways: ${wide} of ${view.width} pixels`);
-  const name = path.resolve(file).split(path.sep).slice(-3).join('-').replace(/\.html$/, '');
+  const name = path.resolve(file).split(path.sep).slice(-3).filter(Boolean).join('-').replace(/\.html$/, '');
   await page.screenshot({ path: path.join(pictures, `${name}-${view.name}.png`), fullPage: true });
   await page.addScriptTag({ content: axe });
   const { violations } = await page.evaluate(() => axe.run());
@@ -45,7 +45,7 @@ async function look(browser, file, view) {
 (async () => {
   fs.mkdirSync(pictures, { recursive: true });
   const browser = await chromium.launch({
-    executablePath: '/usr/bin/chromium',
+    executablePath: chromiumPath,
     args: ['--no-sandbox', '--disable-gpu', '--disable-quic', '--no-first-run',
       '--disable-background-networking', '--disable-component-update', '--disable-sync'],
   });

@@ -70,11 +70,11 @@ fn held_attitudes_are_noted_and_beyond_their_spacing_invalid() {
     assert!(refused.starts_with("exit 4"), "{refused}");
     let noted = outcome(&case, "05:17:31.0", 700, "ck_tolerance_s = 1.0", "");
     assert!(noted.starts_with("exit 0"), "{noted}");
-    let notes = manifest(&case)["notes"].to_string();
-    assert!(notes.contains("image edge: "), "{notes}");
+    let remarks = manifest(&case)["verdict"]["remarks"].to_string();
+    assert!(remarks.contains("image edge: "), "{remarks}");
     assert!(
-        notes.contains("lie outside the C-kernels' intervals"),
-        "{notes}"
+        remarks.contains("lie outside the C-kernels' intervals"),
+        "{remarks}"
     );
     // Exposures to 05:17:47: nine seconds without attitude are no matter of spacing.
     let invalid = outcome(&case, "05:17:35.0", 1_200, "ck_tolerance_s = 60.0", "");
@@ -83,11 +83,19 @@ fn held_attitudes_are_noted_and_beyond_their_spacing_invalid() {
         invalid.contains("image edge: attitude held for up to "),
         "{invalid}"
     );
+    // A short image wholly beyond the end has constant attitude, which polynomials fit perfectly.
+    let held = outcome(&case, "05:17:41.0", 200, "ck_tolerance_s = 60.0", "");
+    assert!(held.starts_with("exit 5"), "{held}");
+    let orientation = case.read("out/case/images/edge/orientation.json");
+    let orientation: serde_json::Value = serde_json::from_slice(&orientation).unwrap();
+    assert_eq!(orientation["valid"], false);
+    let reasons = orientation["invalid_because"].to_string();
+    assert!(reasons.contains("attitude held for up to "), "{reasons}");
     // Inside the intervals a tolerance changes nothing and says nothing.
     let inside = outcome(&case, "05:17:20.0", 700, "ck_tolerance_s = 60.0", "");
     assert!(inside.starts_with("exit 0"), "{inside}");
     assert!(
-        !manifest(&case)["notes"]
+        !manifest(&case)["verdict"]["remarks"]
             .to_string()
             .contains("outside the C-kernels")
     );

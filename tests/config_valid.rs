@@ -90,6 +90,7 @@ fn the_example_says_the_defaults_and_means_si_units() {
     let with_defaults = SiteConfig {
         description: example.description.clone(),
         blake3: example.blake3.clone(),
+        keys: example.keys.clone(),
         windows: example.windows.clone(),
         images: example.images.clone(),
         ..least.clone()

@@ -135,6 +135,7 @@ fn every_product_is_there_with_its_rows() {
     let shots = u64::from(SHOTS);
     let expected = [
         ("footprints.csv", shots),
+        ("footprints.xml", shots),
         ("footprints.parquet", shots),
         ("footprints.geojson", shots),
         ("ranges.parquet", shots),
@@ -144,11 +145,21 @@ fn every_product_is_there_with_its_rows() {
         ("images/m04-02852/orientation.parquet", 31),
         ("images/m04-02852/orientation.json", 31),
         ("images/m04-02852/isd.json", 40),
-        ("exchange/lola_like.csv", shots),
-        ("exchange/ode_pts.csv", shots),
-        ("exchange/formats.json", 0),
-        ("exchange/README.txt", 0),
         ("report/index.html", 0),
+        ("kernels.tm", 0),
+        ("exchange/lola_like.csv", shots),
+        ("exchange/lola_like.csv.json", 0),
+        ("exchange/ode_pts.csv", shots),
+        ("exchange/ode_pts.csv.json", 0),
+        ("exchange/footprints.gpkg", shots),
+        ("exchange/footprints.shp", shots),
+        ("exchange/footprints.shx", 0),
+        ("exchange/footprints.dbf", 0),
+        ("exchange/footprints.prj", 0),
+        ("exchange/footprints.cpg", 0),
+        ("exchange/kernels.json", 3),
+        ("exchange/README.txt", 0),
+        ("exchange/stac_item.json", 0),
     ];
     assert_eq!(
         products,
@@ -240,11 +251,11 @@ fn a_long_table_comes_back_in_pieces() {
     let shot = Site::small().footprints.row(0);
     for record in 0..ROWS {
         site.footprints.push(&Footprint { record, ..shot });
-        site.utc.push(String::new());
+        site.utc.push("1999-08-24T14:12:13.000".to_owned());
     }
     let (folder, products) = written("long", &site, false);
     assert_eq!(
-        products[1],
+        products[2],
         ("footprints.parquet".to_owned(), u64::from(ROWS))
     );
     let file = File::open(folder.join("footprints.parquet")).unwrap();
@@ -306,7 +317,7 @@ fn a_manifest_keeps_its_schema() {
     let mut document = serde_json::json!({
         "tool": "areograph", "version": "0.1.0", "site": "small",
         "verdict": { "valid": false, "reasons": ["profile a/1: 3 shots; limit at least 20"], "remarks": ["b"] },
-        "configuration": { "file_name": "small.toml", "blake3": hash },
+        "configuration": { "file_name": "small.toml", "blake3": hash, "keys": { "site": "small" } },
         "biases": [{ "name": "ck_bias", "correction_s": -1.15, "scope": "attitude", "source": "mocAddendum004.ti" }],
         "kernels": [{
             "name": "a.bsp", "role": "SPK", "bytes": 1024, "blake3": hash,
@@ -422,8 +433,27 @@ fn the_same_site_gives_the_same_bytes() {
 #[test]
 fn an_empty_site_has_empty_products() {
     let (folder, products) = written("empty", &Site::empty(), false);
-    assert_eq!(products.len(), 12);
-    assert!(products.iter().all(|(_, rows)| *rows == 0));
+    let rows: Vec<(&str, u64)> = products
+        .iter()
+        .map(|(path, rows)| (path.as_str(), *rows))
+        .collect();
+    // No exchange file of footprints, and nothing says where the site is.
+    assert_eq!(
+        rows,
+        [
+            ("footprints.csv", 0),
+            ("footprints.parquet", 0),
+            ("footprints.geojson", 0),
+            ("ranges.parquet", 0),
+            ("ranges.json", 0),
+            ("registration.parquet", 0),
+            ("registration.json", 0),
+            ("report/index.html", 0),
+            ("kernels.tm", 0),
+            ("exchange/kernels.json", 3),
+            ("exchange/README.txt", 0),
+        ]
+    );
     let ranges = json(&folder.join("ranges.json"));
     check_schema("ranges", &ranges);
     assert_eq!(ranges["invalid_because"][0], "no footprint in any window");

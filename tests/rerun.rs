@@ -245,7 +245,10 @@ fn until_force_and_dry_run() {
     let before = common::mission::products(&case.path("out"));
     let mut command = case.run();
     command.arg("--force");
-    assert!(case.outcome(command).contains("valid; products in"));
+    assert!(
+        case.outcome(command)
+            .contains("valid with remarks; products in")
+    );
     assert!(common::mission::products(&case.path("out")) == before);
 }
 

@@ -76,7 +76,7 @@ fn read(path: &Path) -> Result<String, Failure> {
 pub fn parse(text: &str, file: &Path) -> Result<Loaded, Problems> {
     let mut review = Review::new(file, text);
     let valid = shape::read(text, &mut review)
-        .map(|(raw, blake3)| validate::validate(raw, file, blake3, &mut review));
+        .map(|(raw, written)| validate::validate(raw, file, written, &mut review));
     let (site, warnings) = review.finish(valid)?;
     Ok(Loaded { site, warnings })
 }

@@ -1,12 +1,21 @@
 //! From text to raw values: syntax and shape errors in the same form as all other problems.
 
+use std::collections::BTreeMap;
+
 use toml::de::{DeTable, DeValue};
 
 use super::{problems::Review, raw::RawSite};
 
-/// The raw values and the BLAKE3 of keys and values in canonical order and spacing; `None` after
-/// reporting what keeps them from being read.
-pub(super) fn read(text: &str, review: &mut Review<'_>) -> Option<(RawSite, String)> {
+/// The keys and values of a file as written.
+pub(super) struct Written {
+    /// BLAKE3 of them in canonical order and spacing.
+    pub(super) blake3: String,
+    /// Values by their keys, with dots between tables; elements of lists by their `id`, else their place.
+    pub(super) keys: BTreeMap<String, String>,
+}
+
+/// The raw values and the keys as written; `None` after reporting what keeps them from being read.
+pub(super) fn read(text: &str, review: &mut Review<'_>) -> Option<(RawSite, Written)> {
     let (document, syntax_errors) = DeTable::parse_recoverable(text);
     if !syntax_errors.is_empty() {
         for error in syntax_errors {
@@ -22,11 +31,41 @@ pub(super) fn read(text: &str, review: &mut Review<'_>) -> Option<(RawSite, Stri
     match read {
         Ok((raw, table)) => {
             let hash = blake3::hash(table.to_string().as_bytes());
-            Some((raw, hash.to_hex().to_string()))
+            let mut keys = BTreeMap::new();
+            flatten("", &toml::Value::Table(table), &mut keys);
+            let written = Written {
+                blake3: hash.to_hex().to_string(),
+                keys,
+            };
+            Some((raw, written))
         }
         Err(error) => {
             report_shape(document.get_ref(), &error, review);
             None
+        }
+    }
+}
+
+fn flatten(path: &str, value: &toml::Value, keys: &mut BTreeMap<String, String>) {
+    match value {
+        toml::Value::Table(table) => {
+            for (key, value) in table {
+                let dot = if path.is_empty() { "" } else { "." };
+                flatten(&format!("{path}{dot}{key}"), value, keys);
+            }
+        }
+        toml::Value::Array(tables) if tables.iter().any(toml::Value::is_table) => {
+            for (place, table) in tables.iter().enumerate() {
+                let id = table.get("id").and_then(toml::Value::as_str);
+                let name = id.map_or_else(|| (place + 1).to_string(), str::to_owned);
+                flatten(&format!("{path}.{name}"), table, keys);
+            }
+        }
+        toml::Value::String(text) => {
+            keys.insert(path.to_owned(), text.clone());
+        }
+        value => {
+            keys.insert(path.to_owned(), value.to_string());
         }
     }
 }
@@ -118,5 +157,24 @@ mod tests {
             "metakernel (one of metakernel, files, root)"
         );
         assert_eq!(suggestion("zzz", &known), "one of metakernel, files, root");
+    }
+
+    #[test]
+    fn every_value_is_found_under_its_key() {
+        let text = "site = \"a\"\n[pedr]\nfiles = [\"x\", \"y\"]\n[pedr.filter]\nclasses = [1]\n\
+                    [[images]]\nid = \"one\"\nlines_header = 8\n[[images]]\nid = \"two\"\n";
+        let table: toml::Table = toml::from_str(text).unwrap();
+        let mut keys = BTreeMap::new();
+        flatten("", &toml::Value::Table(table), &mut keys);
+        let found: Vec<(&str, &str)> = keys.iter().map(|(key, value)| (&**key, &**value)).collect();
+        let expected = [
+            ("images.one.id", "one"),
+            ("images.one.lines_header", "8"),
+            ("images.two.id", "two"),
+            ("pedr.files", "[\"x\", \"y\"]"),
+            ("pedr.filter.classes", "[1]"),
+            ("site", "a"),
+        ];
+        assert_eq!(found, expected);
     }
 }

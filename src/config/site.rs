@@ -1,6 +1,6 @@
 //! The valid configuration of one site: every value checked, metres, radians and seconds inside.
 
-use std::path::PathBuf;
+use std::{collections::BTreeMap, path::PathBuf};
 
 use serde::{Deserialize, Serialize};
 
@@ -18,6 +18,9 @@ pub struct SiteConfig {
     /// BLAKE3, hexadecimal, of the keys and values as written: comments, spacing, order of keys
     /// and the place of the file do not change it.
     pub blake3: String,
+    /// The same keys and values one by one: dots between tables, elements of lists by their `id`, else
+    /// their place from 1.
+    pub keys: BTreeMap<String, String>,
     /// Where kernels come from.
     pub kernels: KernelsConfig,
     /// Pointing (CK) bias.

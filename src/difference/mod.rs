@@ -20,7 +20,7 @@ use serde::Serialize;
 
 use crate::{
     error::{Place, Result},
-    products::read::{ImageDocument, ProfileDocument, RangesDocument, read_image, read_ranges},
+    products::read::{ImageDocument, ProfileDocument, read_image, read_ranges},
     store::{
         manifest::{Manifest, Verdict},
         published::{read_published, still_published},
@@ -182,7 +182,7 @@ fn of_manifests(a: &Manifest, b: &Manifest, limits: &Limits) -> RunDifference {
         b: RunEntry::of(b),
         kernels: Items::between(&items::kernels(a), &items::kernels(b)),
         configuration_changed: a.configuration.blake3 != b.configuration.blake3,
-        configuration: Vec::new(),
+        configuration: changes::between(&a.configuration.keys, &b.configuration.keys),
         biases: changes::between(&changes::biases(a), &changes::biases(b)),
         counts: changes::between(&a.counts, &b.counts),
         figures: changes::between(&a.figures, &b.figures),
@@ -207,7 +207,6 @@ fn read_movements(
         read_ranges(&a.join("ranges.json"))?,
         read_ranges(&b.join("ranges.json"))?,
     ];
-    difference.configuration = configuration(&ranges);
     let [first, second] = ranges.map(|document| document.profiles);
     difference.profiles = profiles(first, second);
     difference.footprints = footprints::between(a, b)?;
@@ -223,16 +222,6 @@ fn read_movements(
         difference.images.push(image);
     }
     Ok(difference)
-}
-
-/// Keys of the configuration that `ranges.json` repeats; the correction follows from the others.
-fn configuration(ranges: &[RangesDocument; 2]) -> Vec<Change> {
-    let [a, b] = ranges
-        .each_ref()
-        .map(|document| serde_json::json!({"mola_clock": document.mola_clock, "range_check": document.limits}));
-    let mut keys = changes::between(&a, &b);
-    keys.retain(|key| key.what != "mola_clock.correction_s");
-    keys
 }
 
 /// Profiles of both runs, in the order of the first, then those of the second alone.

@@ -107,11 +107,8 @@ impl RunDifference {
     }
 
     fn configuration_sentence(&self) -> String {
-        if self.configuration.is_empty() {
-            return "configuration: differs in keys that products do not repeat".to_owned();
-        }
         let keys: Vec<String> = self.configuration.iter().map(change).collect();
-        format!("configuration: {}; other keys may differ", keys.join("; "))
+        format!("configuration: {}", keys.join("; "))
     }
 
     fn stages_sentence(&self) -> String {

@@ -4,7 +4,7 @@ use std::{path::Path, sync::atomic::AtomicBool};
 
 use super::{
     Stage,
-    steps::{load_kernels, wanted},
+    kernels::{load_kernels, wanted},
 };
 use crate::{
     config::{DatumChoice, KernelSource, SiteConfig},

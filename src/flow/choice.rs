@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use super::{
     check::find_profiles,
     compare::{Compared, Request, RivalSet, compare_kernels},
-    steps::{load_kernels, load_rivals, wanted},
+    kernels::{load_kernels, load_rivals, wanted},
 };
 use crate::{
     config::SiteConfig,

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::{Stage, publish::Results};
+use super::{Stage, results::Results};
 use crate::{
     config::{BiasScope, SiteConfig},
     error::Result,
@@ -40,7 +40,7 @@ impl Results<'_> {
     /// What a reader of the products should know, one sentence each.
     pub(super) fn notes(&self) -> Vec<String> {
         let choice = self.choice.iter().flat_map(|choice| &choice.value.notes);
-        let mut notes: Vec<String> = choice.chain(self.kernels.explanation()).cloned().collect();
+        let mut notes: Vec<String> = choice.chain(self.kernels.notes()).cloned().collect();
         notes.extend(self.found.value.notes.iter().cloned());
         notes.extend(self.converted.value.notes.iter().cloned());
         for image in &self.images.value {
@@ -50,10 +50,6 @@ impl Results<'_> {
                     .iter()
                     .map(|note| format!("image {}: {note}", image.id)),
             );
-        }
-        for orientation in self.orientations {
-            let (image, held) = (&orientation.value.image, &orientation.value.notes);
-            notes.extend(held.iter().map(|note| format!("image {image}: {note}")));
         }
         notes
     }
@@ -141,6 +137,7 @@ impl Results<'_> {
             configuration: ConfigurationEntry {
                 file_name: file_name(&config.file),
                 blake3: config.blake3.clone(),
+                keys: config.keys.clone(),
             },
             biases: biases(config),
             kernels,

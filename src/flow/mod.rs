@@ -3,10 +3,12 @@
 mod check;
 mod choice;
 mod compare;
+mod kernels;
 mod manifest;
 mod parts;
 mod plan;
 mod publish;
+mod results;
 mod sites;
 mod steps;
 
@@ -25,8 +27,9 @@ pub use compare::{Compared, EPOCHS_MAX, LeftOut, Request, RivalSet, compare_kern
 pub use plan::{PlannedStage, plan_site};
 pub use sites::publish_sites;
 
-use publish::Results;
-use steps::{Leave, Steps, wanted};
+use kernels::wanted;
+use results::Results;
+use steps::{Leave, Steps};
 
 /// The stages, in order.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, clap::ValueEnum)]

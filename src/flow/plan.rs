@@ -7,8 +7,8 @@ use serde::de::DeserializeOwned;
 use super::{
     Stage,
     choice::KernelChoice,
+    kernels::{load_kernels, load_rivals, wanted},
     parts, publish,
-    steps::{load_kernels, load_rivals, wanted},
 };
 use crate::{
     config::{KernelSource, SiteConfig},

@@ -3,13 +3,14 @@
 use std::path::PathBuf;
 
 use super::{
-    Ending, RivalSet, RunOptions, Stage,
+    Ending, RunOptions, Stage,
     choice::{KernelChoice, choose_kernels},
-    parts,
-    publish::{self, Results},
+    kernels::{load_kernels, load_rivals, trajectory_reach_s},
+    parts, publish,
+    results::Results,
 };
 use crate::{
-    config::{KernelList, KernelSource, SiteConfig},
+    config::SiteConfig,
     error::{Failure, Fault, Kind, Place, Result, Stopped},
     spice::{KernelSet, Session, Trajectory, Wanted},
     stages::{
@@ -28,9 +29,6 @@ use crate::{
 
 /// The tabulated trajectory stays this close to the kernels, metres: a tenth of a PEDR centimetre.
 const TRAJECTORY_TOLERANCE_M: f64 = 0.001;
-
-/// Seconds of trajectory beyond what the scan of the clock bias reaches.
-const TRAJECTORY_MARGIN_S: f64 = 0.5;
 
 /// A site that is being run.
 pub(super) struct Steps<'a> {
@@ -320,70 +318,5 @@ impl Steps<'_> {
         self.enter(Stage::Publish)?;
         let ending = publish::publish(&self.folder, &self.cache, results);
         Ok(ending.in_stage(Stage::Publish.name())?)
-    }
-}
-
-/// The kernels of the configuration; from a folder, those that cover `wanted` (text kernels always);
-/// of rival sets the `chosen` one, which is the first as long as only clocks are needed.
-pub(super) fn load_kernels(
-    config: &SiteConfig,
-    wanted: &Wanted,
-    chosen: usize,
-) -> Result<KernelSet> {
-    match &config.kernels.source {
-        KernelSource::Listed(list) => load_list(list),
-        KernelSource::Root(selection) => KernelSet::select(selection, wanted),
-        KernelSource::Sets(sets) => sets
-            .get(chosen)
-            .map_or_else(|| Ok(KernelSet::default()), |set| load_list(&set.list)),
-    }
-}
-
-fn load_list(list: &KernelList) -> Result<KernelSet> {
-    match list {
-        KernelList::Metakernel(path) => KernelSet::from_metakernel(path),
-        KernelList::Files(paths) => KernelSet::from_files(paths),
-    }
-}
-
-/// The rival sets of the configuration; none when it names one source.
-pub(super) fn load_rivals(config: &SiteConfig) -> Result<Vec<RivalSet>> {
-    let KernelSource::Sets(sets) = &config.kernels.source else {
-        return Ok(Vec::new());
-    };
-    let rivals = sets.iter().map(|set| {
-        Ok(RivalSet {
-            id: set.id.clone(),
-            kernels: load_list(&set.list)?,
-        })
-    });
-    rivals.collect()
-}
-
-/// Seconds beyond a profile for which the spacecraft's path is tabulated.
-fn trajectory_reach_s(config: &SiteConfig) -> f64 {
-    config.range_check.scan_half_width_s + config.mola_clock.bias_s + TRAJECTORY_MARGIN_S
-}
-
-/// Times at which the site reads kernels: exposures with their padding, flights over the windows as
-/// far as the scan reaches, and attitudes at the exposures shifted by the pointing bias.
-pub(super) fn wanted(config: &SiteConfig, images: &[ImageTimes], profiles: &[Profile]) -> Wanted {
-    let (kernels, reach_s) = (&config.kernels, trajectory_reach_s(config));
-    let exposures = images.iter().map(ImageTimes::exposures);
-    let flights = profiles
-        .iter()
-        .map(|profile| profile.interval.padded(reach_s));
-    let positions = exposures
-        .clone()
-        .map(|exposures| exposures.padded(kernels.padding_s));
-    // Within the tolerance a look-up reaches kernels that end before it or begin after it.
-    let (bias_s, padding_s) = (
-        config.pointing.ck_bias.seconds(),
-        kernels.padding_s + kernels.ck_tolerance_s,
-    );
-    let attitudes = exposures.map(|exposures| exposures.shifted(bias_s).padded(padding_s));
-    Wanted {
-        positions: Intervals::union_of(positions.chain(flights)),
-        attitudes: Intervals::union_of(attitudes),
     }
 }

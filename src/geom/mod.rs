@@ -4,6 +4,7 @@ pub mod attitude;
 pub mod chebyshev;
 pub mod collinearity;
 pub mod ellipsoid;
+pub mod lagrange;
 pub mod map_projection;
 pub mod mars_rotation;
 pub mod misregistration;

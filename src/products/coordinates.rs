@@ -32,9 +32,14 @@ pub(super) fn signed_longitude_deg(longitude_rad: f64) -> f64 {
     }
 }
 
+/// Points of all longitudes surround a pole when all lie poleward of this latitude, degrees; farther from it
+/// they are a belt round Mars.
+const POLAR_DEG: f64 = 60.0;
+
 /// West, south, east and north of points in degrees; `None` without points.
 ///
-/// `west > east` when the shortest box crosses the antimeridian, as RFC 7946 (5.2) and GeoParquet say.
+/// `west > east` when the shortest box crosses the antimeridian, as RFC 7946 (5.2) and GeoParquet say. Points
+/// that surround a pole have all longitudes and reach to the pole (5.3).
 pub(super) fn bounding_box_deg(points: &[[f64; 2]]) -> Option<[f64; 4]> {
     let mut longitudes: Vec<f64> = points.iter().map(|point| point[0]).collect();
     longitudes.sort_by(f64::total_cmp);
@@ -52,7 +57,14 @@ pub(super) fn bounding_box_deg(points: &[[f64; 2]]) -> Option<[f64; 4]> {
     let latitudes = || points.iter().map(|point| point[1]);
     let south = latitudes().fold(f64::INFINITY, f64::min);
     let north = latitudes().fold(f64::NEG_INFINITY, f64::max);
-    Some([west, south, east, north])
+    let surrounded = widest < 180.0;
+    Some(if surrounded && south > POLAR_DEG {
+        [-180.0, south, 180.0, 90.0]
+    } else if surrounded && north < -POLAR_DEG {
+        [-180.0, -90.0, 180.0, north]
+    } else {
+        [west, south, east, north]
+    })
 }
 
 #[cfg(test)]
@@ -74,5 +86,19 @@ mod tests {
         let greenwich = [[-1.0, -5.0], [2.0, -6.0]];
         assert_eq!(bounding_box_deg(&greenwich), Some([-1.0, -6.0, 2.0, -5.0]));
         assert_eq!(bounding_box_deg(&[]), None);
+    }
+
+    #[test]
+    fn boxes_round_a_pole_reach_it() {
+        let round = |latitude: f64| [-170.0, -50.0, 60.0, 160.0].map(|east| [east, latitude]);
+        let north = Some([-180.0, 86.0, 180.0, 90.0]);
+        assert_eq!(bounding_box_deg(&round(86.0)), north);
+        let south = Some([-180.0, -90.0, 180.0, -86.0]);
+        assert_eq!(bounding_box_deg(&round(-86.0)), south);
+        // A track that passes beside the pole, and a belt.
+        let track = [[10.0, 88.0], [100.0, 89.0], [180.0, 87.0]];
+        assert_eq!(bounding_box_deg(&track), Some([10.0, 87.0, 180.0, 89.0]));
+        let belt = Some([-50.0, 5.0, -170.0, 5.0]);
+        assert_eq!(bounding_box_deg(&round(5.0)), belt);
     }
 }

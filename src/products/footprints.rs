@@ -5,7 +5,7 @@ use serde_json::{Value, json};
 use super::{
     Writer,
     coordinates::{FRAME, bounding_box_deg, column_deg, signed_longitude_deg},
-    geojson, parquet,
+    geojson, parquet, pds4_label,
     site::SiteProducts,
     table::{Column, Table, Values},
     text_table,
@@ -19,7 +19,13 @@ use crate::{
 pub(super) fn write(written: &mut Writer, site: &SiteProducts) -> Result<()> {
     let points = points_deg(site);
     let mut table = Table::new(columns(site))?;
+    let csv = written.directory.join("footprints.csv");
     written.add("footprints.csv", |path| text_table::write(path, &table))?;
+    if table.rows() > 0 {
+        written.add("footprints.xml", |path| {
+            pds4_label::write(path, &csv, &table, site)
+        })?;
+    }
     table.columns.push(Column::new(
         "geometry",
         "point, longitude (-180..180) and areocentric latitude in degrees, well-known binary",
@@ -39,7 +45,7 @@ pub(super) fn write(written: &mut Writer, site: &SiteProducts) -> Result<()> {
 }
 
 /// Longitude (-180..180) and latitude of every footprint, degrees.
-fn points_deg(site: &SiteProducts) -> Vec<[f64; 2]> {
+pub(super) fn points_deg(site: &SiteProducts) -> Vec<[f64; 2]> {
     let shots = site.footprints;
     shots
         .longitude_rad
@@ -75,7 +81,7 @@ fn identity(site: &SiteProducts) -> Vec<Column> {
     let source = shots
         .file
         .iter()
-        .map(|file| file_name(site, *file))
+        .map(|file| site.file_name(*file))
         .collect();
     vec![
         Column::new(
@@ -140,7 +146,7 @@ fn windows(site: &SiteProducts) -> Column {
     Column::new(
         "windows",
         "identifiers of the windows that hold the shot, separated by semicolons",
-        Values::Text(masks.map(|mask| window_ids(site, *mask)).collect()),
+        Values::Text(masks.map(|mask| site.window_ids(*mask)).collect()),
     )
 }
 
@@ -238,24 +244,6 @@ fn spacecraft(site: &SiteProducts) -> Vec<Column> {
     ]
 }
 
-/// Name of a source file; its folder belongs to the machine, not to the product.
-pub(super) fn file_name(site: &SiteProducts, file: u16) -> String {
-    let source = site.footprints.files.get(usize::from(file));
-    source.map_or_else(String::new, |source| source.name.clone())
-}
-
-/// Identifiers of the windows in `mask`, separated by semicolons.
-pub(super) fn window_ids(site: &SiteProducts, mask: u64) -> String {
-    let held = site
-        .config
-        .windows
-        .iter()
-        .enumerate()
-        .filter(|(bit, _)| mask >> bit & 1 == 1);
-    let ids: Vec<&str> = held.map(|(_, window)| window.id.as_str()).collect();
-    ids.join(";")
-}
-
 /// Little-endian well-known binary of a point (OGC 06-103r4, 8.2).
 fn well_known_binary(point: &[f64; 2]) -> Vec<u8> {
     const LITTLE_ENDIAN: u8 = 1;
@@ -273,7 +261,6 @@ fn geo_metadata(points: &[[f64; 2]]) -> Value {
         "encoding": "WKB",
         "geometry_types": ["Point"],
         "crs": mars_sphere(),
-        "edges": "spherical",
     });
     if let Some(bounds) = bounding_box_deg(points) {
         column["bbox"] = json!(bounds);
@@ -298,7 +285,7 @@ fn mars_sphere() -> Value {
             "type": "GeodeticReferenceFrame",
             "name": "Mars (2015) - Sphere",
             "anchor": "Viking 1 lander: 47.95137 W",
-            "ellipsoid": { "name": "Mars (2015) - Sphere", "radius": 3_396_190 },
+            "ellipsoid": { "name": "Mars (2015) - Sphere", "radius": MARS_IAU2000.equatorial_radius_m },
             "prime_meridian": { "name": "Reference Meridian", "longitude": 0 },
         },
         "coordinate_system": {

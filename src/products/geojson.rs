@@ -13,7 +13,6 @@ use super::{
     coordinates::{FRAME, bounding_box_deg},
     fault::ProductFault,
     files::{create, finish, open, to_value},
-    footprints::{file_name, window_ids},
     site::SiteProducts,
 };
 use crate::error::{IoFault, Place, Result};
@@ -145,14 +144,14 @@ fn feature(site: &SiteProducts, row: usize, point: [f64; 2]) -> Feature {
             et_s: shot.et_s,
             utc: site.utc[row].clone(),
             orbit: shot.orbit,
-            source_file: file_name(site, shot.file),
+            source_file: site.file_name(shot.file),
             record: shot.record,
             shot: shot.shot,
             radius_m: shot.radius_m,
             radius_crossover_m: shot.radius_crossover_m,
             topography_m: shot.radius_crossover_m - shot.areoid_radius_m,
             range_m: shot.range_m,
-            windows: window_ids(site, shot.windows),
+            windows: site.window_ids(shot.windows),
         },
     }
 }

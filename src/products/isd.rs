@@ -10,6 +10,8 @@
 //!   `sample · summing + starting_detector_sample − detector_center.sample`. With the edge of the detector
 //!   at 0 the centre lies at 2048 / 2 = 1024; ALE's 1023.5 with a start of 1 is off by 1.5 pixels.
 //! * The line of the detector is taken at coordinate 0, so its centre is 0 (`losToEcf`; ISIS sets 0 too).
+//! * Pointing is sampled from before the first line to after the last; ALE's table starts 1.15 s late. Nodes are
+//!   as dense as an interpolation error below 0.01 pixels wants, which is measured and stated.
 //! * Distortion is zero, as the instrument kernel says. ALE repeats the pixel pitch in these places, which
 //!   `usgscsm` takes for radial coefficients per mm² and mm⁴: wrong by hundreds of pixels at the edges.
 
@@ -20,6 +22,7 @@ use serde_json::{Value, json};
 
 use super::{
     Writer,
+    exchange::kernel_report::{names_by_type, qualities},
     files::write_json,
     site::{ImageProducts, SiteProducts},
 };
@@ -29,7 +32,7 @@ use crate::{
         NAIF_IAU_MARS, NAIF_MARS, NAIF_MGS_BUS, NAIF_MOC_NA,
     },
     error::Result,
-    stages::{sample_orientation::CameraTables, tag_times::ImageTimes},
+    stages::sample_orientation::{CameraTables, InterpolationCheck},
     units::METRES_PER_KM,
 };
 
@@ -68,7 +71,7 @@ struct Isd {
     starting_detector_sample: u32,
     instrument_position: Positions,
     sun_position: Positions,
-    kernels: BTreeMap<String, Vec<String>>,
+    kernels: Value,
     areograph: Value,
 }
 
@@ -156,7 +159,7 @@ fn isd(site: &SiteProducts, image: &ImageProducts) -> Isd {
         instrument_position: positions(&tables.et_s, &tables.position_m, &tables.velocity_m_s),
         sun_position: sun_position(tables),
         kernels: kernels(site),
-        areograph: provenance(site, times),
+        areograph: provenance(site, image),
     }
 }
 
@@ -259,27 +262,42 @@ fn naif_keywords(site: &SiteProducts) -> Value {
     })
 }
 
-/// Kernel names by role, in load order, as ALE lists them.
-fn kernels(site: &SiteProducts) -> BTreeMap<String, Vec<String>> {
-    let mut kernels: BTreeMap<String, Vec<String>> = BTreeMap::new();
-    for kernel in site.kernels {
-        kernels
-            .entry(kernel.role.to_lowercase())
-            .or_default()
-            .push(kernel.name.clone());
+/// Kernel names by type, in load order, and qualities, as ALE lists them.
+fn kernels(site: &SiteProducts) -> Value {
+    let mut kernels = json!(names_by_type(site));
+    for (key, quality) in qualities(site) {
+        kernels[key] = json!(quality);
     }
     kernels
 }
 
 /// What the reader of this file should know; camera models ignore it.
-fn provenance(site: &SiteProducts, times: &ImageTimes) -> Value {
+fn provenance(site: &SiteProducts, image: &ImageProducts) -> Value {
+    let times = image.times;
+    let interpolation = &image.orientation.tables.interpolation;
+    let hashes: BTreeMap<&str, &str> = site
+        .kernels
+        .iter()
+        .map(|kernel| (&*kernel.name, &*kernel.blake3))
+        .collect();
     json!({
         "version": env!("CARGO_PKG_VERSION"),
         "site": site.config.site,
+        "configuration_blake3": site.config.blake3,
+        "kernels_blake3": hashes,
         "line_period_s": times.line_period_s,
         "detector_line_exposure_s": times.exposure_s,
         "lines_header": times.lines_header,
         "utc_start": times.utc_start,
+        "start_from": times.start_from,
+        "interpolation": {
+            "method": "Lagrange over uniform nodes, eighth order inside, lower towards the ends, of the positions \
+                       and the camera's quaternions turned to Mars, as usgscsm does",
+            "error_max_px": interpolation.error_max_px,
+            "limit_px": InterpolationCheck::LIMIT_PX,
+            "within_limit": interpolation.keeps_limit(),
+            "epochs_compared_with_kernels": interpolation.epochs,
+        },
         "notes": [
             "line_scan_rate: seconds per image line (summing included), from the top edge of the first line",
             "detector coordinates count from the detector's edge: centre at sample 1024, starting_detector_sample \

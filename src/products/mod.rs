@@ -7,7 +7,9 @@
 //! | `registration.parquet`, `registration.json` | line and sample of every footprint in every image; how the iterations converge |
 //! | `images/<id>/orientation.parquet`, `.json` | orientation samples; polynomials with residuals |
 //! | `images/<id>/isd.json` | camera models of the Community Sensor Model (`usgscsm`) |
-//! | `exchange/…` | ISIS and Ames Stereo Pipeline |
+//! | `footprints.xml` | a PDS4-style label of `footprints.csv` |
+//! | `exchange/…` | ISIS, Ames Stereo Pipeline, GIS, STAC catalogues; see its `README.txt` |
+//! | `kernels.tm` | SPICE: the same kernels in the same order |
 //! | `report/index.html` | people |
 //!
 //! The same site gives the same bytes; nothing here looks at a clock.
@@ -21,6 +23,7 @@ mod geojson;
 mod isd;
 mod orientation;
 mod parquet;
+mod pds4_label;
 mod ranges;
 pub mod read;
 mod registration;
@@ -62,11 +65,16 @@ pub fn write_products(directory: &Path, site: &SiteProducts, page: &str) -> Resu
         orientation::write(&mut written, image)?;
         isd::write(&mut written, site, image)?;
     }
-    exchange::write(&mut written, site)?;
     written.add("report/index.html", |path| {
         files::write_text(path, page)?;
         Ok(0)
     })?;
+    written.add("kernels.tm", |path| {
+        files::write_text(path, site.metakernel)?;
+        Ok(0)
+    })?;
+    // Last, as its catalogue lists the others.
+    exchange::write(&mut written, site)?;
     Ok(written.products)
 }
 

@@ -28,6 +28,8 @@ pub struct SiteProducts<'a> {
     pub config: &'a SiteConfig,
     /// Kernels in load order.
     pub kernels: &'a [KernelLine],
+    /// Text of the metakernel that loads them again, its paths relative to the folder of the products.
+    pub metakernel: &'a str,
     /// The instants that the site asks of the kernels.
     pub wanted: &'a Wanted,
     /// Images in the order of the configuration.
@@ -80,6 +82,16 @@ pub struct ImageProducts<'a> {
     pub registration: &'a ImageRegistration,
 }
 
+impl<'a> ImageProducts<'a> {
+    /// Why the image is invalid: first its orientation, then its models; empty when it is valid.
+    #[must_use]
+    pub fn invalid_because(&self) -> Vec<&'a str> {
+        let orientation = self.orientation.invalid_because.iter();
+        let reasons = orientation.chain(&self.model.invalid_because);
+        reasons.map(String::as_str).collect()
+    }
+}
+
 impl SiteProducts<'_> {
     /// Why the site is invalid, one sentence per reason; empty when it is valid.
     #[must_use]
@@ -94,8 +106,7 @@ impl SiteProducts<'_> {
             }
         }
         for image in self.images {
-            let orientation = &image.orientation.invalid_because;
-            for reason in orientation.iter().chain(&image.model.invalid_because) {
+            for reason in image.invalid_because() {
                 reasons.push(format!("image {}: {reason}", image.times.id));
             }
         }
@@ -113,6 +124,10 @@ impl SiteProducts<'_> {
                 "input that was read around: {first} (and {} more)",
                 rest.len()
             )),
+        }
+        for image in self.images {
+            let notes = image.orientation.notes.iter();
+            remarks.extend(notes.map(|note| format!("image {}: {note}", image.times.id)));
         }
         let images = self
             .images
@@ -133,6 +148,24 @@ impl SiteProducts<'_> {
             remarks.extend(doubt.map(|doubt| format!("profile {}: {doubt}", ranges.profile)));
         }
         remarks
+    }
+
+    /// Name of a source file; its folder belongs to the machine, not to the product.
+    pub(super) fn file_name(&self, file: u16) -> String {
+        let source = self.footprints.files.get(usize::from(file));
+        source.map_or_else(String::new, |source| source.name.clone())
+    }
+
+    /// Identifiers of the windows in `mask`, separated by semicolons.
+    pub(super) fn window_ids(&self, mask: u64) -> String {
+        let held = self
+            .config
+            .windows
+            .iter()
+            .enumerate()
+            .filter(|(bit, _)| mask >> bit & 1 == 1);
+        let ids: Vec<&str> = held.map(|(_, window)| window.id.as_str()).collect();
+        ids.join(";")
     }
 
     /// Lengths that must agree.

@@ -109,14 +109,15 @@ pub(super) struct GridLine {
 /// The lines that a view shows.
 pub(super) fn graticule(map: &MapProjection, view: &View) -> Vec<GridLine> {
     let shown = Shown::of(map, view);
-    let radius_m = view.height_m() / shown.height_rad(map, view);
-    let step_rad = step(view.height_m() / radius_m / LINES);
+    let height_rad = shown.height_rad(map, view);
+    let step_rad = step(height_rad / LINES);
     let meridian_step_rad = if shown.pole {
         30.0 * RADIANS_PER_DEGREE
     } else {
-        step(view.width_m() / radius_m / LINES / map.latitude_rad().cos())
+        let width_rad = height_rad * view.width_m() / view.height_m();
+        step(width_rad / LINES / map.latitude_rad().cos())
     };
-    let turns = (shown.turn_rad.0, shown.turn_rad.1);
+    let turns = shown.turn_rad;
     let latitudes = shown.latitude_rad;
     let parallels = multiples(latitudes, step_rad)
         .filter(|latitude| latitude.abs() < FRAC_PI_2 - 1e-9)

@@ -98,7 +98,7 @@ fn models(site: &SiteProducts) -> String {
     );
     for image in site.images {
         let (model, id) = (image.model, &image.times.id);
-        let valid = model.invalid_because.is_empty();
+        let valid = image.invalid_because().is_empty();
         let judged = [
             Cell::Plain(format!("{:.4}", model.first_order.position_rmse_m())),
             "–".into(),

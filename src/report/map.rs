@@ -1,22 +1,20 @@
 //! Map of windows, footprints coloured by height, and image outlines.
 
-use std::{
-    f64::consts::{FRAC_PI_2, TAU},
-    fmt::Write as _,
-};
+use std::{f64::consts::FRAC_PI_2, fmt::Write as _};
 
 use plotters::{prelude::*, style::text_anchor::HPos};
 
 use super::{
     graticule::{GridLine, View, graticule},
     html::paragraph,
+    outlines::{Outline, images, windows},
     plots::{
         COLOURS, Canvas, Drawn, GRID, INK, Key, WIDTH, draw_text, drawn, figure_html, quoted,
         thinned,
     },
 };
 use crate::{
-    config::WindowShape,
+    constants::MARS_IAU2000,
     error::Result,
     geom::map_projection::MapProjection,
     products::SiteProducts,
@@ -25,8 +23,6 @@ use crate::{
 
 /// Shots of the map, drawn and listed; about 140 bytes each.
 const MAP_SHOTS: usize = 5_000;
-/// Radius of the sphere of the map, the equatorial one, metres.
-const SPHERE_M: f64 = 3_396_190.0;
 /// Colours of heights, the lowest first; clear on light and dark pages.
 const HEIGHTS: [RGBColor; 7] = [
     RGBColor(0x3f, 0x68, 0xb5),
@@ -37,8 +33,6 @@ const HEIGHTS: [RGBColor; 7] = [
     RGBColor(0xcf, 0x6c, 0x3c),
     RGBColor(0xb0, 0x3f, 0x43),
 ];
-/// Points along the edge of a box window.
-const EDGE_POINTS: u32 = 72;
 /// Least and greatest height of the picture against its width.
 const RATIO: (f64, f64) = (0.5, 1.15);
 
@@ -79,12 +73,6 @@ pub(super) fn section(site: &SiteProducts) -> Result<String> {
     Ok(figure + &paragraph(&words))
 }
 
-/// A named ring of (longitude, latitude), radians.
-struct Outline {
-    name: String,
-    ring: Vec<(f64, f64)>,
-}
-
 struct Shot {
     place_rad: (f64, f64),
     height_m: f64,
@@ -97,7 +85,7 @@ struct Sheet {
     windows: Vec<Outline>,
     images: Vec<Outline>,
     shots: Vec<Shot>,
-    /// Lowest and highest shot.
+    /// Lowest and highest shot, those that are not drawn included.
     heights_m: (f64, f64),
 }
 
@@ -122,16 +110,14 @@ impl Sheet {
             .flat_map(|outline| outline.ring.iter().copied())
             .chain(shots.iter().map(|shot| shot.place_rad))
             .collect();
-        let map = MapProjection::of_points(points.iter().copied(), SPHERE_M);
+        let map =
+            MapProjection::of_points(points.iter().copied(), MARS_IAU2000.equatorial_radius_m);
         let places = points
             .iter()
             .filter_map(|point| map.project(point.0, point.1));
         let view = View::of(places);
         let ratio = (view.height_m() / view.width_m()).clamp(RATIO.0, RATIO.1);
-        let heights = shots.iter().map(|shot| shot.height_m);
-        let heights_m = heights.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), height| {
-            (low.min(height), high.max(height))
-        });
+        let heights_m = range(&topography_m);
         Self {
             map,
             view: view.with_ratio(ratio),
@@ -295,7 +281,9 @@ impl Sheet {
 
     fn words(&self, site: &SiteProducts) -> String {
         let names = |outlines: &[Outline]| -> String {
-            let names: Vec<&str> = outlines.iter().map(|outline| &*outline.name).collect();
+            let mut names: Vec<&str> = outlines.iter().map(|outline| &*outline.name).collect();
+            // Holes and islands are rings of the same window.
+            names.dedup();
             names.join(", ")
         };
         let mut words = String::new();
@@ -349,6 +337,14 @@ impl Sheet {
     }
 }
 
+/// Lowest and highest of `values`.
+fn range(values: &[f64]) -> (f64, f64) {
+    let start = (f64::INFINITY, f64::NEG_INFINITY);
+    values.iter().fold(start, |(low, high), value| {
+        (low.min(*value), high.max(*value))
+    })
+}
+
 /// 1, 2 or 5 times a power of ten, at most `length_m`.
 fn round_length_m(length_m: f64) -> f64 {
     let power = 10_f64.powf(length_m.log10().floor());
@@ -357,70 +353,6 @@ fn round_length_m(length_m: f64) -> f64 {
         .find(|lead| lead * power <= length_m)
         .unwrap_or(1.0);
     lead * power
-}
-
-fn images(site: &SiteProducts) -> Vec<Outline> {
-    let outline = |image: &crate::products::ImageProducts| {
-        let points = image.orientation.outline.as_ref()?.iter();
-        Some(Outline {
-            name: image.times.id.clone(),
-            ring: points
-                .map(|point| (point.longitude_rad, point.latitude_rad))
-                .collect(),
-        })
-    };
-    site.images.iter().filter_map(outline).collect()
-}
-
-fn windows(site: &SiteProducts) -> Vec<Outline> {
-    let rings = site.config.windows.iter().flat_map(|window| {
-        let rings: Vec<Vec<(f64, f64)>> = match &window.shape {
-            WindowShape::Box {
-                west_rad,
-                east_rad,
-                south_rad,
-                north_rad,
-            } => box_rings(*west_rad, *east_rad, *south_rad, *north_rad),
-            WindowShape::Polygons { polygons } => polygons
-                .iter()
-                .flatten()
-                .map(|ring| {
-                    ring.iter()
-                        .map(|[longitude, latitude]| (*longitude, *latitude))
-                        .collect()
-                })
-                .collect(),
-        };
-        rings.into_iter().map(|ring| Outline {
-            name: window.id.clone(),
-            ring,
-        })
-    });
-    rings.collect()
-}
-
-/// The edges of a box, bent as the parallels are; around the whole globe they are two circles.
-fn box_rings(west: f64, east: f64, south: f64, north: f64) -> Vec<Vec<(f64, f64)>> {
-    let width = if east < west {
-        east + TAU - west
-    } else {
-        east - west
-    };
-    let shares = (0..=EDGE_POINTS).map(|k| f64::from(k) / f64::from(EDGE_POINTS));
-    let parallel = |latitude: f64| -> Vec<(f64, f64)> {
-        let shares = shares.clone();
-        shares
-            .map(|share| (west + share * width, latitude))
-            .collect()
-    };
-    if width > TAU - 1e-9 {
-        let circles = [south, north].into_iter();
-        // A pole is no circle.
-        let circles = circles.filter(|latitude| latitude.abs() < FRAC_PI_2 - 1e-9);
-        return circles.map(parallel).collect();
-    }
-    let northern = parallel(north).into_iter().rev();
-    vec![parallel(south).into_iter().chain(northern).collect()]
 }
 
 #[cfg(test)]
@@ -432,18 +364,5 @@ mod tests {
         for (room, length) in [(13_000.0, 10_000.0), (2_400.0, 2_000.0), (999.0, 500.0)] {
             assert!((round_length_m(room) - length).abs() < 1e-6, "{room}"); // rounding
         }
-    }
-
-    #[test]
-    fn a_box_across_the_prime_meridian_stays_narrow() {
-        let rings = box_rings(6.2, 0.1, -0.1, 0.1);
-        let (first, last) = (rings[0][0].0, rings[0][EDGE_POINTS as usize].0);
-        assert!(last > first && last - first < 0.2);
-    }
-
-    #[test]
-    fn a_cap_around_a_pole_has_one_edge() {
-        assert_eq!(box_rings(0.0, TAU, 1.4, FRAC_PI_2).len(), 1);
-        assert_eq!(box_rings(0.0, TAU, -0.2, 0.2).len(), 2);
     }
 }

@@ -21,6 +21,7 @@ mod graticule;
 mod html;
 mod images;
 mod map;
+mod outlines;
 mod plots;
 mod ranges;
 mod registration;

@@ -2,7 +2,7 @@
 
 use super::{
     html::{Cell, Column, Table, heading, list, paragraph},
-    plots::{Extent, Panel, Plot, Series, Style, figure, thinned},
+    plots::{Extent, Panel, Plot, Series, Style, figure, label, thinned},
 };
 use crate::{
     error::Result, products::SiteProducts, stages::check_ranges::ProfileRanges,
@@ -37,8 +37,9 @@ pub(super) fn section(site: &SiteProducts) -> Result<String> {
     .concat())
 }
 
+/// Millimetres are enough for ranges that come in centimetres.
 pub(super) fn metres(value: f64) -> String {
-    format!("{value:.3}")
+    label(value, 3)
 }
 
 fn statistics(site: &SiteProducts) -> String {

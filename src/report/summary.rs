@@ -33,11 +33,11 @@ pub(super) fn lead(site: &SiteProducts) -> String {
 }
 
 fn counts(site: &SiteProducts) -> String {
-    let images = site.images.len();
     let mut text = format!(
-        "{} footprints in {} profiles; {images} images.",
-        site.footprints.len(),
-        site.profiles.len()
+        "{} in {}; {}.",
+        counted(site.footprints.len(), "footprint"),
+        counted(site.profiles.len(), "profile"),
+        counted(site.images.len(), "image")
     );
     if let Some((share, what)) = nearest_limit(site) {
         text += &format!(
@@ -46,6 +46,11 @@ fn counts(site: &SiteProducts) -> String {
         );
     }
     text
+}
+
+fn counted(count: usize, what: &str) -> String {
+    let plural = if count == 1 { "" } else { "s" };
+    format!("{count} {what}{plural}")
 }
 
 /// The valid figure that uses most of its limit.
@@ -329,22 +334,9 @@ fn hash(blake3: &str) -> Cell {
     ))
 }
 
-/// Whether `note` says no more than that a kernel was asked for by name, which the table of files shows.
-fn repeats_kernel_table(site: &SiteProducts, note: &str) -> bool {
-    site.kernels.iter().any(|kernel| {
-        note.strip_prefix(&kernel.name)
-            .is_some_and(|rest| rest == ": listed" || rest.starts_with(": listed by "))
-    })
-}
-
 /// Notes and complaints.
 pub(super) fn notes(site: &SiteProducts) -> String {
-    let notes: Vec<&String> = site
-        .notes
-        .iter()
-        .filter(|note| !repeats_kernel_table(site, note))
-        .collect();
-    let mut body = list(&notes);
+    let mut body = list(site.notes);
     if !site.complaints.is_empty() {
         let shown = &site.complaints[..site.complaints.len().min(COMPLAINTS_SHOWN)];
         body += &heading("Complaints about input");

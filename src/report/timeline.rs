@@ -132,8 +132,9 @@ fn picture(site: &SiteProducts, stretch: Interval) -> Result<String> {
     words += &match gaps.as_slice() {
         [] => " Everything that is asked is held.".to_owned(),
         [first, ..] => format!(
-            " {} gaps in what is asked, the first {:.3} s long at {first}.",
-            gaps.len(),
+            " Shots and lines are covered; of the margins around them {:.3} s are not held, the first {:.3} s at \
+             {first}.",
+            total_s(&gaps),
             first.duration_s()
         ),
     };
@@ -144,6 +145,13 @@ fn picture(site: &SiteProducts, stretch: Interval) -> Result<String> {
     ];
     let title = format!("Kernels at {}", calendar(stretch.start));
     Ok(figure_html(&title, &svg, &keys, &words, &csv(&rows)))
+}
+
+/// Length of all intervals, seconds.
+fn total_s(intervals: &[Interval]) -> f64 {
+    intervals
+        .iter()
+        .fold(0.0, |sum, interval| sum + interval.duration_s())
 }
 
 fn gaps(row: &Row) -> Vec<Interval> {
@@ -225,13 +233,13 @@ fn table(site: &SiteProducts) -> String {
     {
         let intervals = held(kernel);
         let span = Interval::new(intervals[0].start, intervals[intervals.len() - 1].stop);
-        let held_s: f64 = intervals.iter().copied().map(Interval::duration_s).sum();
+        let held_s = total_s(intervals);
         let asked = match &*kernel.role {
             "CK" => &site.wanted.attitudes,
             _ => &site.wanted.positions,
         };
         let used = Intervals::union_of(intervals.iter().copied()).intersection(asked);
-        let used_s: f64 = used.as_slice().iter().map(|used| used.duration_s()).sum();
+        let used_s = total_s(used.as_slice());
         table.row(
             true,
             [
@@ -240,12 +248,21 @@ fn table(site: &SiteProducts) -> String {
                 calendar(span.start).into(),
                 calendar(span.stop).into(),
                 intervals.len().to_string().into(),
-                format!("{:.2}", 100.0 * held_s / span.duration_s()).into(),
+                held_share(held_s, span).into(),
                 format!("{used_s:.1}").into(),
             ],
         );
     }
     table.finish()
+}
+
+/// Share of a kernel's span that it holds, per cent; a kernel of one instant has no span.
+fn held_share(held_s: f64, span: Interval) -> String {
+    if span.duration_s() > 0.0 {
+        format!("{:.2}", 100.0 * held_s / span.duration_s())
+    } else {
+        "–".to_owned()
+    }
 }
 
 /// Calendar form of ephemeris time (TDB, about a minute ahead of UTC in these years).

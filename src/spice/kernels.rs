@@ -152,6 +152,18 @@ impl KernelSet {
         &self.explanation
     }
 
+    /// What of the explanation the list of kernels does not say itself: all but that one was listed.
+    pub fn notes(&self) -> impl Iterator<Item = &String> {
+        let plain = |line: &str| {
+            let mut kernels = self.kernels.iter();
+            kernels.any(|kernel| {
+                let reason = line.strip_prefix(&kernel.file_name());
+                reason.is_some_and(|reason| reason.starts_with(": listed"))
+            })
+        };
+        self.explanation.iter().filter(move |line| !plain(line))
+    }
+
     /// Hashes every kernel again, after use.
     ///
     /// # Errors

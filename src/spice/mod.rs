@@ -26,7 +26,7 @@ mod write;
 pub use coverage::Coverage;
 pub use error::SpiceFault;
 pub use kernels::{Kernel, KernelRole, KernelSet};
-pub use select::Wanted;
+pub use select::{Wanted, quality_of};
 pub use session::{Attitude, Session, State};
 pub use trajectory::Trajectory;
 pub use write::{CkSegment, SpkSegment, write_ck, write_spk};

@@ -337,7 +337,8 @@ fn family_of(path: &Path, family: &str) -> bool {
 }
 
 /// Commanded attitude is told by its name: `mgs_ext_roto_all_v*`.
-fn quality_of(path: &Path) -> CkQuality {
+#[must_use]
+pub fn quality_of(path: &Path) -> CkQuality {
     let parts = name_parts(path);
     if parts.iter().any(|part| part == "roto" || part == "nominal") {
         CkQuality::Nominal

@@ -3,7 +3,7 @@
 use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 
-use super::sample_orientation::{Orientation, OrientationSample};
+use super::sample_orientation::{InterpolationCheck, Orientation, OrientationSample};
 use crate::{
     config::OrientationConfig,
     error::{Fault, Kind, Result},
@@ -166,7 +166,7 @@ pub fn fit_sensor_model(
         .fold(1.0, f64::min);
     Ok(SensorModel {
         image: orientation.image.clone(),
-        invalid_because: broken_limits(&second_order, &rotation_vector, limits),
+        invalid_because: broken_limits(orientation, &second_order, &rotation_vector, limits),
         first_order,
         second_order,
         rotation_vector,
@@ -261,6 +261,7 @@ fn rotation_vector_model(orientation: &Orientation) -> Result<RotationVectorMode
 
 /// The rotation is judged by its vector form, which means the same at every latitude.
 fn broken_limits(
+    orientation: &Orientation,
     model: &EulerModel,
     rotation: &RotationVectorModel,
     limits: &OrientationConfig,
@@ -280,6 +281,14 @@ fn broken_limits(
             "second-order pointing RMSE {:.3} arcsec; limit {:.3} arcsec",
             pointing_rmse_rad / RADIANS_PER_ARCSECOND,
             limits.pointing_rmse_max_rad / RADIANS_PER_ARCSECOND
+        ));
+    }
+    let interpolation = &orientation.tables.interpolation;
+    if !interpolation.keeps_limit() {
+        broken.push(format!(
+            "camera tables interpolate with errors up to {:.4} pixels even with a node per line; limit {} pixels",
+            interpolation.error_max_px,
+            InterpolationCheck::LIMIT_PX
         ));
     }
     broken

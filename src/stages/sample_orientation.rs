@@ -1,5 +1,7 @@
 //! Exterior orientation of an image: position and rotation of the camera at equally spaced epochs.
 
+mod camera_tables;
+
 use std::fmt;
 
 use nalgebra::{Matrix3, Vector3};
@@ -18,20 +20,13 @@ use crate::{
     },
     spice::{Attitude, Session},
     time::Et,
-    units::{RADIANS_PER_DEGREE, SECONDS_PER_DAY},
 };
 
-/// Image lines between two nodes of the camera-model tables; ALE's spacing for long images.
-const TABLE_LINES: u32 = 10;
-/// Fewest nodes over the image; usgscsm resamples tables with fewer than 25.
-const TABLE_NODES_MIN: u32 = 31;
 /// Time between the attitude samples of the mission's C-kernels, seconds: an attitude that is held for
 /// longer is not explained by their spacing, and the bus turns by 0.2° meanwhile.
 const ATTITUDE_SPACING_S: f64 = 4.0;
 /// Intervals of the outline along the image: between two of them the track bends by centimetres.
 const OUTLINE_INTERVALS: u32 = 10;
-/// Nodes beyond each end of the image, so that an eighth-order interpolation never runs out.
-const TABLE_NODES_BEYOND: u32 = 8;
 
 /// Orientation of one image.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -115,6 +110,28 @@ pub struct CameraTables {
     pub mars_angular_velocity_rad_s: Vec<[f64; 3]>,
     /// Bus → camera by rows.
     pub bus_to_camera: [[f64; 3]; 3],
+    /// How well the tables are interpolated over the image.
+    pub interpolation: InterpolationCheck,
+}
+
+/// Interpolation between the nodes of [`CameraTables`], as camera models do it, against the kernels.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
+pub struct InterpolationCheck {
+    /// Largest distance between what both see of the same ground, image pixels.
+    pub error_max_px: f64,
+    /// Epochs that were compared.
+    pub epochs: usize,
+}
+
+impl InterpolationCheck {
+    /// Largest error that tables should have, image pixels: tables with more get more nodes.
+    pub const LIMIT_PX: f64 = 0.01;
+
+    /// Whether the error is below the limit.
+    #[must_use]
+    pub fn keeps_limit(&self) -> bool {
+        self.error_max_px < Self::LIMIT_PX
+    }
 }
 
 /// Samples the orientation of `image`.
@@ -151,14 +168,15 @@ pub fn sample_orientation(
     for (sample, quaternion) in samples.iter_mut().zip(quaternions) {
         sample.camera_to_mars = quaternion;
     }
-    let nodes = table_epochs(image, kernels.padding_s);
+    let tables = camera_tables::camera_tables(&reader, image, kernels.padding_s)?;
+    let nodes: Vec<Et> = tables.et_s.iter().copied().map(Et::from_seconds).collect();
     let held = reader.held_attitudes(epochs.iter().chain(&nodes))?;
     let far = held.as_ref().filter(|held| held.is_unexplained());
     Ok(Orientation {
         image: image.id.clone(),
         samples,
         outline: reader.outline(image)?,
-        tables: reader.tables(&nodes)?,
+        tables,
         invalid_because: far.map(HeldAttitudes::reason).into_iter().collect(),
         notes: held.iter().map(ToString::to_string).collect(),
     })
@@ -213,27 +231,6 @@ fn require_coverage(
     session.require_position(exposures.padded(kernels.padding_s))?;
     let (padding_s, tolerance_s) = (kernels.padding_s, kernels.ck_tolerance_s);
     session.require_attitude(exposures, pointing.ck_bias, padding_s, tolerance_s)
-}
-
-/// Epochs of the camera tables: uniform, both image ends on the grid, beyond them within the padding.
-fn table_epochs(image: &ImageTimes, padding_s: f64) -> Vec<Et> {
-    let duration_s = image.duration_s();
-    let steps = image
-        .lines_header
-        .div_ceil(TABLE_LINES)
-        .max(TABLE_NODES_MIN - 1);
-    let step_s = duration_s / f64::from(steps);
-    let beyond = (1..=TABLE_NODES_BEYOND)
-        .take_while(|nodes| f64::from(*nodes) * step_s <= padding_s)
-        .last()
-        .unwrap_or(0);
-    (0..=steps + 2 * beyond)
-        .map(|k| {
-            image
-                .start
-                .plus((f64::from(k) - f64::from(beyond)) * step_s)
-        })
-        .collect()
 }
 
 struct Reader<'a> {
@@ -310,60 +307,6 @@ impl Reader<'_> {
                 .collect(),
         ))
     }
-
-    /// Tables at two or more epochs.
-    fn tables(&self, epochs: &[Et]) -> Result<CameraTables> {
-        let [first, last] = [epochs[0], epochs[epochs.len() - 1]];
-        let suns = [
-            self.session.sun_state(first)?,
-            self.session.sun_state(last)?,
-        ];
-        let mut tables = CameraTables {
-            et_s: Vec::new(),
-            position_m: Vec::new(),
-            velocity_m_s: Vec::new(),
-            sun_position_m: suns.map(|sun| sun.position.xyz_m.into()),
-            sun_velocity_m_s: suns.map(|sun| sun.velocity_m_s.into()),
-            inertial_to_bus: Vec::new(),
-            bus_angular_velocity_rad_s: Vec::new(),
-            inertial_to_mars: Vec::new(),
-            mars_angular_velocity_rad_s: Vec::new(),
-            bus_to_camera: rows(self.session.mounting(first)?.matrix()),
-        };
-        for epoch in epochs {
-            let apparent = self.session.apparent_state(*epoch)?;
-            let attitude = self.attitude(*epoch)?;
-            let to_mars = mars_rotation::<MarsIau2000>(*epoch);
-            tables.et_s.push(epoch.seconds());
-            tables.position_m.push(apparent.position.xyz_m.into());
-            tables.velocity_m_s.push(apparent.velocity_m_s.into());
-            tables
-                .inertial_to_bus
-                .push(spice_quaternion(attitude.inertial_to_bus.matrix()));
-            tables
-                .bus_angular_velocity_rad_s
-                .push(attitude.angular_velocity_rad_s.into());
-            tables
-                .inertial_to_mars
-                .push(spice_quaternion(to_mars.matrix()));
-            tables
-                .mars_angular_velocity_rad_s
-                .push(mars_angular_velocity(to_mars.matrix()).into());
-        }
-        make_continuous(&mut tables.inertial_to_bus);
-        make_continuous(&mut tables.inertial_to_mars);
-        Ok(tables)
-    }
-}
-
-/// Spin of Mars in J2000: its rate along its pole (the pole's own motion is 1e-14 rad/s).
-fn mars_angular_velocity(inertial_to_mars: &Matrix3<f64>) -> Vector3<f64> {
-    let rate_rad_s = MARS_IAU2000.meridian_deg_per_day * RADIANS_PER_DEGREE / SECONDS_PER_DAY;
-    inertial_to_mars.row(2).transpose() * rate_rad_s
-}
-
-fn rows(matrix: &Matrix3<f64>) -> [[f64; 3]; 3] {
-    std::array::from_fn(|row| std::array::from_fn(|column| matrix[(row, column)]))
 }
 
 impl GroundPoint {

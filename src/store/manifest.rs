@@ -71,6 +71,8 @@ pub struct ConfigurationEntry {
     pub file_name: String,
     /// BLAKE3 of the keys and values as written; comments and layout do not change it.
     pub blake3: String,
+    /// These keys and values, with dots between tables.
+    pub keys: BTreeMap<String, String>,
 }
 
 /// A time correction as used.

@@ -26,7 +26,8 @@ use areograph::{
         group_profiles::{Profile, group_profiles},
         register::{ImageRegistration, register},
         sample_orientation::{
-            BoresightGround, CameraTables, GroundPoint, Orientation, OrientationSample,
+            BoresightGround, CameraTables, GroundPoint, InterpolationCheck, Orientation,
+            OrientationSample,
         },
         tag_times::{ImageTimes, StartFrom},
     },
@@ -104,10 +105,7 @@ impl Site {
             ranges: ranges(&profiles),
             rejected: BTreeMap::from([("class 0 <cloud>".to_owned(), 7)]),
             complaints: vec!["ap19019l.b record 4: <script>alert(1)</script> & more".to_owned()],
-            notes: vec![
-                "naif0012.tls: listed by nav.tm".to_owned(),
-                "ap19019l.b: in IAU 2000 already, not converted".to_owned(),
-            ],
+            notes: vec!["ap19019l.b: in IAU 2000 already, not converted".to_owned()],
             config,
             times,
             orientation,
@@ -165,6 +163,7 @@ impl Site {
         with(&SiteProducts {
             config: &self.config,
             kernels: &self.kernels,
+            metakernel: "KPL/MK\n",
             wanted: &self.wanted,
             images: if image { &images } else { &[] },
             footprints: &self.footprints,
@@ -204,6 +203,7 @@ fn config() -> SiteConfig {
         description: "One orbit & one image <made by hand>".to_owned(),
         file: "small.toml".into(),
         blake3: "ef".repeat(32),
+        keys: BTreeMap::new(),
         kernels: KernelsConfig {
             source: KernelSource::Listed(KernelList::Files(vec!["naif0012.tls".into()])),
             ck_tolerance_s: 0.0,
@@ -355,6 +355,10 @@ fn orientation(times: &ImageTimes) -> Orientation {
                 [-0.003, 1.0, 0.002],
                 [-0.001, -0.002, 1.0],
             ],
+            interpolation: InterpolationCheck {
+                error_max_px: 0.002,
+                epochs: 117,
+            },
             et_s,
         },
         notes: Vec::new(),

@@ -22,6 +22,7 @@ use crate::{
 use super::{
     problems::Review,
     raw::{RawMolaClock, RawOrientation, RawPointing, RawRangeCheck, RawRegistration, RawSite},
+    shape::Written,
     site::{
         BiasScope, CameraModel, MolaClock, OrientationConfig, PointingConfig, RangeCheckConfig,
         RegistrationConfig, SCAN_STEPS_MAX, SiteConfig, TagSign,
@@ -33,7 +34,7 @@ use values::Accept;
 pub(super) fn validate(
     raw: RawSite,
     file: &Path,
-    blake3: String,
+    written: Written,
     review: &mut Review<'_>,
 ) -> SiteConfig {
     let searched = raw.pedr.is_some();
@@ -58,7 +59,8 @@ pub(super) fn validate(
         site: review.identifier("site", &raw.site, None, false),
         description: raw.description.unwrap_or_default(),
         file: file.to_owned(),
-        blake3,
+        blake3: written.blake3,
+        keys: written.keys,
         kernels: kernels::kernels(raw.kernels, review),
         pointing: pointing(&inner(raw.pointing), review),
         mola_clock: mola_clock(&inner(raw.mola_clock), review),

@@ -12,13 +12,9 @@ use crate::{
     products::files::read,
 };
 
-/// `ranges.json`: configuration of the range check and its result per profile.
+/// `ranges.json`: the result of the range check per profile.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 pub struct RangesDocument {
-    /// The MOLA clock correction as configured, by key.
-    pub mola_clock: Value,
-    /// Limits of the range check, by key.
-    pub limits: Value,
     /// Profiles in order.
     pub profiles: Vec<ProfileDocument>,
 }

@@ -62,6 +62,15 @@ pub(super) fn profiles(site: &RunDifference) -> String {
     table.finish()
 }
 
+/// A difference in as few digits as tell it.
+fn signed(difference: f64) -> String {
+    if difference.abs() < 1e-3 {
+        format!("{difference:+.1e}")
+    } else {
+        format!("{difference:+.3}")
+    }
+}
+
 /// Keys, corrections, counts, times and model statistics that differ.
 pub(super) fn values(site: &RunDifference) -> String {
     let mut table = Table::new(
@@ -79,10 +88,7 @@ pub(super) fn values(site: &RunDifference) -> String {
         rows += changes.len();
         for change in changes {
             let [a, b] = [&change.a, &change.b].map(|value| text(value.as_ref()));
-            let difference = change
-                .difference()
-                .map(|change| format!("{change:+.2e}"))
-                .unwrap_or_default();
+            let difference = change.difference().map(signed).unwrap_or_default();
             let what = (&change.what).into();
             table.row(
                 true,

@@ -1,13 +1,15 @@
 //! Range residuals of single shots.
 
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
 use crate::{
     config::MolaClock,
     footprints::Footprint,
     frames::{Frame, J2000, MarsIau2000, Position},
-    geom::{ellipsoid::spherical_to_xyz_m, mars_rotation::mars_rotation},
+    geom::{
+        ellipsoid::spherical_to_xyz_m, mars_rotation::mars_rotation, orbit_axes::radial_along_cross,
+    },
     time::Et,
 };
 
@@ -108,13 +110,6 @@ pub(super) fn own_spacecraft(shot: &Footprint) -> Position<MarsIau2000> {
     ))
 }
 
-/// Axes of the orbit in J2000 as columns: away from Mars, along the flight, along the angular momentum.
-pub(super) fn orbit_axes(position: &Position<J2000>, velocity_m_s: &Vector3<f64>) -> Matrix3<f64> {
-    let radial = position.xyz_m.normalize();
-    let cross = position.xyz_m.cross(velocity_m_s).normalize();
-    Matrix3::from_columns(&[radial, cross.cross(&radial), cross])
-}
-
 /// Residuals of one shot, the spacecraft at `position` and `velocity_m_s` (J2000) at `at`.
 pub(super) fn residuals(
     shot: &Footprint,
@@ -136,6 +131,6 @@ pub(super) fn residuals(
         range_minus_distance_m: range_residual_m(shot.range_m, &spacecraft, &raw),
         range_minus_distance_crossover_m: range_residual_m(shot.range_m, &spacecraft, &crossover),
         decoding_m: range_residual_m(shot.range_m, &own, &raw),
-        spacecraft_m: orbit_axes(position, velocity_m_s).tr_mul(&difference),
+        spacecraft_m: radial_along_cross(&position.xyz_m, velocity_m_s).tr_mul(&difference),
     }
 }

@@ -8,15 +8,14 @@
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
-use super::residuals::{
-    ShotResiduals, orbit_axes, own_spacecraft, range_residual_m, raw_footprint,
-};
+use super::residuals::{ShotResiduals, own_spacecraft, range_residual_m, raw_footprint};
 use crate::{
     config::{RangeCheckConfig, SCAN_STEPS_MAX},
     footprints::{Footprint, Footprints},
     frames::MarsIau2000,
     geom::{
         mars_rotation::mars_rotation,
+        orbit_axes::radial_along_cross,
         statistics::{Summary, Trend},
     },
     spice::Trajectory,
@@ -142,7 +141,8 @@ fn uncertainty_s(shots: &[Footprint], trajectory: &Trajectory, best_s: f64) -> O
         let at = Et::from_seconds(shot.et_tag_s + best_s);
         let position = trajectory.position(at)?;
         let to_mars = mars_rotation::<MarsIau2000>(at);
-        let to_orbit = orbit_axes(&position, &trajectory.velocity_m_s(at)?).transpose()
+        let to_orbit = radial_along_cross(&position.xyz_m, &trajectory.velocity_m_s(at)?)
+            .transpose()
             * to_mars.matrix().transpose();
         let spacecraft = to_mars.apply(&position);
         let sight_m = spacecraft.xyz_m - raw_footprint(shot).xyz_m;

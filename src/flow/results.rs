@@ -1,0 +1,92 @@
+//! Everything that the stages before the last one made.
+
+use super::{Stage, choice::KernelChoice};
+use crate::{
+    config::SiteConfig,
+    products::ImageProducts,
+    spice::{KernelSet, Wanted},
+    stages::{
+        check_ranges::RangeCheck, convert_datum::Converted, fit_sensor_model::SensorModel,
+        group_profiles::Profile, register::ImageRegistration, sample_orientation::Orientation,
+        search_footprints::SearchResult, tag_times::ImageTimes,
+    },
+    store::cache::Output,
+};
+
+/// Outputs of the earlier stages, and what they were made with.
+pub(super) struct Results<'a> {
+    pub(super) config: &'a SiteConfig,
+    pub(super) kernels: &'a KernelSet,
+    pub(super) wanted: &'a Wanted,
+    pub(super) choice: Option<&'a Output<KernelChoice>>,
+    pub(super) images: &'a Output<Vec<ImageTimes>>,
+    pub(super) found: &'a Output<SearchResult>,
+    pub(super) converted: &'a Output<Converted>,
+    pub(super) profiles: &'a Output<Vec<Profile>>,
+    pub(super) ranges: &'a Output<RangeCheck>,
+    pub(super) orientations: &'a [Output<Orientation>],
+    pub(super) models: &'a [Output<SensorModel>],
+    pub(super) registrations: &'a [Output<ImageRegistration>],
+}
+
+impl Results<'_> {
+    /// The images as products want them.
+    pub(super) fn image_products(&self) -> Vec<ImageProducts<'_>> {
+        let images = self
+            .images
+            .value
+            .iter()
+            .zip(self.orientations)
+            .zip(self.models)
+            .zip(self.registrations);
+        images
+            .map(
+                |(((times, orientation), model), registration)| ImageProducts {
+                    times,
+                    orientation: &orientation.value,
+                    model: &model.value,
+                    registration: &registration.value,
+                },
+            )
+            .collect()
+    }
+
+    /// What was wrong with input records, one sentence each.
+    pub(super) fn complaints(&self) -> Vec<String> {
+        let complaints = self.found.value.complaints.iter();
+        complaints.map(ToString::to_string).collect()
+    }
+
+    pub(super) fn outputs(&self) -> Vec<(String, Option<String>)> {
+        self.stages()
+            .into_iter()
+            .map(|(stage, output, _)| (stage, Some(output)))
+            .collect()
+    }
+
+    /// Name, output hash and fingerprint of every stage that ran or was kept.
+    pub(super) fn stages(&self) -> Vec<(String, String, String)> {
+        fn entry<T>(name: String, output: &Output<T>) -> (String, String, String) {
+            (name, output.blake3.clone(), output.fingerprint.clone())
+        }
+        let mut stages = vec![
+            entry(Stage::TagTimes.name().to_owned(), self.images),
+            entry(Stage::SearchFootprints.name().to_owned(), self.found),
+            entry(Stage::ConvertDatum.name().to_owned(), self.converted),
+            entry(Stage::GroupProfiles.name().to_owned(), self.profiles),
+        ];
+        let choice = self.choice.into_iter();
+        stages.extend(choice.map(|choice| entry(Stage::ChooseKernels.name().to_owned(), choice)));
+        stages.push(entry(Stage::CheckRanges.name().to_owned(), self.ranges));
+        for (orientation, model) in self.orientations.iter().zip(self.models) {
+            let image = &orientation.value.image;
+            stages.push(entry(Stage::SampleOrientation.of_image(image), orientation));
+            stages.push(entry(Stage::FitSensorModel.of_image(image), model));
+        }
+        for registration in self.registrations {
+            let stage = Stage::Register.of_image(&registration.value.image);
+            stages.push(entry(stage, registration));
+        }
+        stages
+    }
+}

@@ -1,0 +1,231 @@
+//! The site as a STAC Item (1.1.0): where, when, and every product with its size and hash.
+
+use std::path::Path;
+
+use chrono::{NaiveDateTime, TimeDelta};
+use serde_json::{Map, Value, json};
+
+use crate::{
+    error::{Place, Result},
+    files::hash_file,
+    products::{
+        Product,
+        coordinates::{FRAME, bounding_box_deg, degrees, signed_longitude_deg},
+        fault::ProductFault,
+        site::SiteProducts,
+    },
+};
+
+const EXTENSIONS: [&str; 3] = [
+    "https://stac-extensions.github.io/file/v2.1.0/schema.json",
+    "https://stac-extensions.github.io/projection/v2.0.0/schema.json",
+    "https://stac-extensions.github.io/ssys/v1.1.0/schema.json",
+];
+/// Code of BLAKE3 with 32 bytes in the multihash table, before the hash itself.
+const BLAKE3_MULTIHASH: &str = "1e20";
+/// Degrees (6 cm) by which the box reaches beyond its outermost points, so that one point has an area too.
+const MARGIN_DEG: f64 = 1e-6;
+
+/// The item, for a file in the folder `exchange` of `directory`; `None` when nothing says where the site is.
+///
+/// # Errors
+/// A product that cannot be read; a time that is no ISO 8601.
+pub(super) fn item(
+    directory: &Path,
+    products: &[Product],
+    site: &SiteProducts,
+    shots_deg: &[[f64; 2]],
+) -> Result<Option<Value>> {
+    let mut points = shots_deg.to_vec();
+    points.extend(outlines_deg(site));
+    let Some(bounds) = bounding_box_deg(&points).map(with_margin) else {
+        return Ok(None);
+    };
+    let Some([start, end]) = period(site)? else {
+        return Ok(None);
+    };
+    Ok(Some(json!({
+        "type": "Feature",
+        "stac_version": "1.1.0",
+        "stac_extensions": EXTENSIONS,
+        "id": site.config.site,
+        "bbox": bounds,
+        "geometry": outline(bounds),
+        "properties": {
+            "title": site.config.site,
+            "description": description(site),
+            "areograph:frame": FRAME,
+            "datetime": start,
+            "start_datetime": start,
+            "end_datetime": end,
+            "mission": "Mars Global Surveyor",
+            "platform": "mars-global-surveyor",
+            "instruments": instruments(site),
+            "proj:code": "IAU_2015:49900",
+            "ssys:targets": ["Mars"],
+            "ssys:target_class": "planet",
+        },
+        "links": [],
+        "assets": assets(directory, products)?,
+    })))
+}
+
+fn description(site: &SiteProducts) -> String {
+    match site.config.description.as_str() {
+        "" => format!("MOLA footprints and MOC images of {}", site.config.site),
+        text => text.to_owned(),
+    }
+}
+
+fn instruments(site: &SiteProducts) -> Vec<&'static str> {
+    let mola = (!site.footprints.is_empty()).then_some("mola");
+    let moc = (!site.images.is_empty()).then_some("moc-na");
+    mola.into_iter().chain(moc).collect()
+}
+
+/// Outlines of the images on the ground.
+fn outlines_deg(site: &SiteProducts) -> Vec<[f64; 2]> {
+    site.images
+        .iter()
+        .filter_map(|image| image.orientation.outline.as_ref())
+        .flatten()
+        .map(|point| {
+            let longitude_deg = signed_longitude_deg(point.longitude_rad);
+            [longitude_deg, degrees(point.latitude_rad)]
+        })
+        .collect()
+}
+
+/// A little more on every side, but not across the antimeridian or a pole.
+fn with_margin([west, south, east, north]: [f64; 4]) -> [f64; 4] {
+    [
+        (west - MARGIN_DEG).max(-180.0),
+        (south - MARGIN_DEG).max(-90.0),
+        (east + MARGIN_DEG).min(180.0),
+        (north + MARGIN_DEG).min(90.0),
+    ]
+}
+
+/// The box as a polygon; two, cut at the antimeridian, when it crosses there (RFC 7946, 3.1.9).
+fn outline([west, south, east, north]: [f64; 4]) -> Value {
+    let ring = |west: f64, east: f64| {
+        json!([[
+            [west, south],
+            [east, south],
+            [east, north],
+            [west, north],
+            [west, south]
+        ]])
+    };
+    if west <= east {
+        json!({ "type": "Polygon", "coordinates": ring(west, east) })
+    } else {
+        json!({ "type": "MultiPolygon", "coordinates": [ring(west, 180.0), ring(-180.0, east)] })
+    }
+}
+
+/// First and last UTC of shots and images; `None` without any.
+fn period(site: &SiteProducts) -> Result<Option<[String; 2]>> {
+    let mut instants = Vec::new();
+    for utc in site
+        .utc
+        .iter()
+        .min()
+        .into_iter()
+        .chain(site.utc.iter().max())
+    {
+        instants.push(instant(utc)?);
+    }
+    for image in site.images {
+        let start = instant(&image.times.utc_start)?;
+        #[allow(
+            clippy::cast_possible_truncation,
+            reason = "images last less than 600 s"
+        )]
+        let duration = TimeDelta::milliseconds((1e3 * image.times.duration_s()).ceil() as i64);
+        instants.extend([start, start + duration]);
+    }
+    let text = |instant: &NaiveDateTime| instant.format("%Y-%m-%dT%H:%M:%S%.3fZ").to_string();
+    let ends = instants.iter().min().zip(instants.iter().max());
+    Ok(ends.map(|(first, last)| [text(first), text(last)]))
+}
+
+fn instant(utc: &str) -> Result<NaiveDateTime> {
+    Ok(NaiveDateTime::parse_from_str(utc, "%Y-%m-%dT%H:%M:%S%.f")
+        .map_err(ProductFault::refused("read a UTC string"))?)
+}
+
+/// The products by their paths, with what a reader needs to fetch and check them.
+fn assets(directory: &Path, products: &[Product]) -> Result<Value> {
+    let mut assets = Map::new();
+    for product in products {
+        let path = directory.join(&product.path);
+        let (blake3, bytes) = hash_file(&path).in_file(&path)?;
+        let relative = slashes(&product.path);
+        let mut asset = json!({
+            "href": format!("../{relative}"),
+            "roles": [role(&relative)],
+            "file:size": bytes,
+            "file:checksum": format!("{BLAKE3_MULTIHASH}{blake3}"),
+        });
+        if let Some(media) = media_type(&product.path) {
+            asset["type"] = json!(media);
+        }
+        assets.insert(relative, asset);
+    }
+    Ok(Value::Object(assets))
+}
+
+fn slashes(path: &Path) -> String {
+    let parts: Vec<_> = path.iter().map(|part| part.to_string_lossy()).collect();
+    parts.join("/")
+}
+
+fn role(path: &str) -> &'static str {
+    match path {
+        "report/index.html" => "overview",
+        "footprints.xml" | "exchange/README.txt" | "kernels.tm" => "metadata",
+        sidecar if sidecar.ends_with(".csv.json") => "metadata",
+        _ => "data",
+    }
+}
+
+fn media_type(path: &Path) -> Option<&'static str> {
+    Some(match path.extension()?.to_str()? {
+        "parquet" => "application/vnd.apache.parquet",
+        "geojson" => "application/geo+json",
+        "json" => "application/json",
+        "csv" => "text/csv",
+        "gpkg" => "application/geopackage+sqlite3",
+        "shp" => "application/vnd.shp",
+        "shx" => "application/vnd.shx",
+        "dbf" => "application/vnd.dbf",
+        "html" => "text/html",
+        "xml" => "application/xml",
+        "txt" | "prj" | "cpg" | "tm" => "text/plain",
+        _ => return None,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn boxes_across_the_antimeridian_are_cut_there() {
+        let bounds = bounding_box_deg(&[[179.5, 1.0], [-179.0, 3.0]]).map(with_margin);
+        let cut = outline(bounds.unwrap());
+        assert_eq!(cut["type"], "MultiPolygon");
+        let corner =
+            |part: usize, index: usize| cut["coordinates"][part][0][index][0].as_f64().unwrap();
+        assert!(corner(0, 0) < 179.5 && (corner(0, 1) - 180.0).abs() < 1e-12); // degrees, rounding
+        assert!((corner(1, 0) + 180.0).abs() < 1e-12 && corner(1, 1) > -179.0);
+    }
+
+    #[test]
+    fn one_point_at_a_pole_on_the_antimeridian_has_an_area_within_the_sphere() {
+        let [west, south, east, north] = with_margin([-180.0, 90.0, -180.0, 90.0]);
+        assert!(west < east && south < north && north <= 90.0 && west >= -180.0);
+        assert_eq!(outline([west, south, east, north])["type"], "Polygon");
+    }
+}

@@ -1,0 +1,65 @@
+//! Programs of other people that read the products.
+
+use std::{
+    path::{Path, PathBuf},
+    process::Command,
+};
+
+/// Where `scripts/readers` put the Python packages, and whether every reader must be there: `scripts/test`
+/// names the folder in `AREOGRAPH_READERS` once it has provided them.
+#[allow(
+    clippy::disallowed_methods,
+    reason = "tests find their readers by an environment variable"
+)]
+fn folder() -> (PathBuf, bool) {
+    let named = std::env::var("AREOGRAPH_READERS");
+    let usual = Path::new(env!("CARGO_MANIFEST_DIR")).join("target/readers");
+    named.map_or((usual, false), |folder| (PathBuf::from(folder), true))
+}
+
+#[allow(
+    clippy::print_stderr,
+    clippy::panic,
+    reason = "tests say what they skip, and fail on what must be there"
+)]
+fn absent(reader: &str, test: &str, required: bool) {
+    assert!(
+        !required,
+        "{test}: {reader} must be there; run scripts/readers"
+    );
+    eprintln!("skipped {test}: no {reader} (run scripts/readers)");
+}
+
+/// A program, if it can be run; without it one line says what is skipped.
+pub(crate) fn program(name: &str, test: &str) -> Option<Command> {
+    if Command::new(name).arg("--version").output().is_ok() {
+        return Some(Command::new(name));
+    }
+    absent(name, test, folder().1);
+    None
+}
+
+/// A Python script of this folder, if its packages are there.
+pub(crate) fn python(script: &str, test: &str) -> Option<Command> {
+    let (folder, required) = folder();
+    if !folder.join("requirements.txt").is_file() {
+        absent("Python packages", test, required);
+        return None;
+    }
+    let mut command = Command::new("python3");
+    let path = format!("{}/tests/exchange/{script}", env!("CARGO_MANIFEST_DIR"));
+    command.env("PYTHONPATH", folder).arg("-B").arg(path);
+    Some(command)
+}
+
+/// What the program prints; it must succeed.
+pub(crate) fn output(command: &mut Command) -> String {
+    let output = command.output().unwrap();
+    assert!(
+        output.status.success(),
+        "{command:?}: {}{}",
+        String::from_utf8_lossy(&output.stderr),
+        String::from_utf8_lossy(&output.stdout)
+    );
+    String::from_utf8(output.stdout).unwrap()
+}
