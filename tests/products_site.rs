@@ -140,6 +140,8 @@ fn every_product_is_there_with_its_rows() {
         ("footprints.geojson", shots),
         ("ranges.parquet", shots),
         ("ranges.json", 1),
+        ("registration.parquet", shots),
+        ("registration.json", 1),
         ("images/m04-02852/orientation.parquet", 31),
         ("images/m04-02852/orientation.json", 31),
         ("images/m04-02852/isd.json", 40),
@@ -288,6 +290,8 @@ fn documents_keep_their_schemas() {
     );
     let footprints = json(&folder.join("footprints.geojson"));
     check_schema("footprints", &footprints);
+    let registration = json(&folder.join("registration.json"));
+    check_schema("registration", &registration);
     assert_eq!(footprints["features"].as_array().unwrap().len(), 60);
     says_the_frame(footprints["frame"].as_str().unwrap());
     let image = folder.join("images/m04-02852");
@@ -442,6 +446,8 @@ fn an_empty_site_has_empty_products() {
             ("footprints.geojson", 0),
             ("ranges.parquet", 0),
             ("ranges.json", 0),
+            ("registration.parquet", 0),
+            ("registration.json", 0),
             ("report/index.html", 0),
             ("kernels.tm", 0),
             ("exchange/kernels.json", 3),
@@ -452,6 +458,7 @@ fn an_empty_site_has_empty_products() {
     check_schema("ranges", &ranges);
     assert_eq!(ranges["invalid_because"][0], "no footprint in any window");
     check_schema("footprints", &json(&folder.join("footprints.geojson")));
+    check_schema("registration", &json(&folder.join("registration.json")));
     let page = fs::read_to_string(folder.join("report/index.html")).unwrap();
     assert!(page.contains("Invalid, for one reason:"));
 }

@@ -18,7 +18,7 @@ use crate::{
 };
 
 /// Raised when a stage computes something else from the same parts, or lays its output out anew.
-const METHOD: u32 = 6;
+const METHOD: u32 = 7;
 
 /// Image keys, label files and all text kernels, among them those that convert times.
 pub(super) fn tag_times(config: &SiteConfig, kernels: &KernelSet) -> Result<Parts> {
@@ -143,6 +143,22 @@ pub(super) fn fit_sensor_model(
     Parts::new(METHOD)
         .key("orientation", &config.orientation)
         .output(&format!("sample_orientation/{image}"), orientation)
+}
+
+/// The image, its orientation and model, footprints and profiles.
+pub(super) fn register(
+    config: &SiteConfig,
+    image: &ImageTimes,
+    [orientation, model, converted, profiles]: [Option<&str>; 4],
+) -> Parts {
+    let id = &image.id;
+    Parts::new(METHOD)
+        .key("image times", image)
+        .key("registration", &config.registration)
+        .output(&format!("sample_orientation/{id}"), orientation)
+        .output(&format!("fit_sensor_model/{id}"), model)
+        .output("convert_datum", converted)
+        .output("group_profiles", profiles)
 }
 
 /// The configuration, all kernels and where they lie from `folder`, and every earlier output.

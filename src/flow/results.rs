@@ -7,8 +7,8 @@ use crate::{
     spice::{KernelSet, Wanted},
     stages::{
         check_ranges::RangeCheck, convert_datum::Converted, fit_sensor_model::SensorModel,
-        group_profiles::Profile, sample_orientation::Orientation, search_footprints::SearchResult,
-        tag_times::ImageTimes,
+        group_profiles::Profile, register::ImageRegistration, sample_orientation::Orientation,
+        search_footprints::SearchResult, tag_times::ImageTimes,
     },
     store::cache::Output,
 };
@@ -26,6 +26,7 @@ pub(super) struct Results<'a> {
     pub(super) ranges: &'a Output<RangeCheck>,
     pub(super) orientations: &'a [Output<Orientation>],
     pub(super) models: &'a [Output<SensorModel>],
+    pub(super) registrations: &'a [Output<ImageRegistration>],
 }
 
 impl Results<'_> {
@@ -36,13 +37,17 @@ impl Results<'_> {
             .value
             .iter()
             .zip(self.orientations)
-            .zip(self.models);
+            .zip(self.models)
+            .zip(self.registrations);
         images
-            .map(|((times, orientation), model)| ImageProducts {
-                times,
-                orientation: &orientation.value,
-                model: &model.value,
-            })
+            .map(
+                |(((times, orientation), model), registration)| ImageProducts {
+                    times,
+                    orientation: &orientation.value,
+                    model: &model.value,
+                    registration: &registration.value,
+                },
+            )
             .collect()
     }
 
@@ -77,6 +82,10 @@ impl Results<'_> {
             let image = &orientation.value.image;
             stages.push(entry(Stage::SampleOrientation.of_image(image), orientation));
             stages.push(entry(Stage::FitSensorModel.of_image(image), model));
+        }
+        for registration in self.registrations {
+            let stage = Stage::Register.of_image(&registration.value.image);
+            stages.push(entry(stage, registration));
         }
         stages
     }

@@ -2,11 +2,14 @@
 
 pub mod attitude;
 pub mod chebyshev;
+pub mod collinearity;
 pub mod ellipsoid;
 pub mod lagrange;
 pub mod map_projection;
 pub mod mars_rotation;
+pub mod misregistration;
 pub mod orbit_axes;
 pub mod polynomial;
+pub mod pushbroom;
 pub mod statistics;
 pub mod window;

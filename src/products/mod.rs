@@ -4,6 +4,7 @@
 //! |---|---|
 //! | `footprints.parquet`, `.csv`, `.geojson` | GIS and scripts: shots in the windows, IAU 2000 |
 //! | `ranges.parquet`, `ranges.json` | range residuals per shot; statistics per profile |
+//! | `registration.parquet`, `registration.json` | line and sample of every footprint in every image; how the iterations converge |
 //! | `images/<id>/orientation.parquet`, `.json` | orientation samples; polynomials with residuals |
 //! | `images/<id>/isd.json` | camera models of the Community Sensor Model (`usgscsm`) |
 //! | `footprints.xml` | a PDS4-style label of `footprints.csv` |
@@ -26,6 +27,7 @@ mod parquet;
 mod pds4_label;
 mod ranges;
 pub mod read;
+mod registration;
 mod shot;
 mod site;
 mod table;
@@ -60,6 +62,7 @@ pub fn write_products(directory: &Path, site: &SiteProducts, page: &str) -> Resu
     };
     footprints::write(&mut written, site)?;
     ranges::write(&mut written, site)?;
+    registration::write(&mut written, site)?;
     for image in site.images {
         orientation::write(&mut written, image)?;
         isd::write(&mut written, site, image)?;

@@ -7,6 +7,7 @@ pub mod compare_kernels;
 pub mod convert_datum;
 pub mod fit_sensor_model;
 pub mod group_profiles;
+pub mod register;
 pub mod sample_orientation;
 pub mod search_footprints;
 pub mod tag_times;

@@ -244,7 +244,7 @@ impl Extent {
         value.clamp(self.low, self.high)
     }
 
-    fn contains(self, value: f64) -> bool {
+    pub(super) fn contains(self, value: f64) -> bool {
         self.low <= value && value <= self.high
     }
 
