@@ -7,7 +7,6 @@ pub mod ellipsoid;
 pub mod lagrange;
 pub mod map_projection;
 pub mod mars_rotation;
-pub mod misregistration;
 pub mod orbit_axes;
 pub mod polynomial;
 pub mod pushbroom;
