@@ -117,18 +117,6 @@ pub(super) fn kernels(manifest: &Manifest) -> Vec<Item> {
     items(kernels.map(|kernel| (&*kernel.name, Some(&*kernel.role), &*kernel.blake3)))
 }
 
-/// Notes that say more than that a kernel was listed.
-pub(super) fn notes(manifest: &Manifest) -> Vec<String> {
-    let listed = |note: &str| {
-        manifest.kernels.iter().any(|kernel| {
-            let rest = note.strip_prefix(&*kernel.name);
-            rest.is_some_and(|rest| rest.starts_with(": listed"))
-        })
-    };
-    let notes = manifest.notes.iter();
-    notes.filter(|note| !listed(note)).cloned().collect()
-}
-
 /// Stages in the order of the flow.
 pub(super) fn stages(manifest: &Manifest) -> Vec<Item> {
     let stages = manifest.stages.iter();

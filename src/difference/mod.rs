@@ -188,7 +188,7 @@ fn of_manifests(a: &Manifest, b: &Manifest, limits: &Limits) -> RunDifference {
         figures: changes::between(&a.figures, &b.figures),
         rejected: changes::between(&a.rejected, &b.rejected),
         complaints: Texts::between(&a.complaints.texts, &b.complaints.texts),
-        notes: Texts::between(&items::notes(a), &items::notes(b)),
+        notes: Texts::between(&a.notes, &b.notes),
         stages: Items::between(&items::stages(a), &items::stages(b)),
         products: Items::between(&items::products(a), &items::products(b)),
         profiles: Vec::new(),

@@ -13,6 +13,7 @@ use crate::{
         ellipsoid::ray_meets_ellipsoid,
         polynomial::{Fit, Polynomial, root_mean_square},
         pushbroom::{EulerPolynomial, RotationVectorPolynomial, VectorPolynomial},
+        statistics::largest,
     },
     units::RADIANS_PER_ARCSECOND,
 };
@@ -109,10 +110,7 @@ impl RotationVectorModel {
     /// Largest RMSE of the three components, radians.
     #[must_use]
     pub fn rmse_rad(&self) -> f64 {
-        self.vector_rad
-            .iter()
-            .map(|fit| fit.rmse)
-            .fold(0.0, f64::max)
+        largest(self.vector_rad.iter().map(|fit| fit.rmse)).unwrap_or_default()
     }
 
     /// Rotation from Mars-fixed to camera components at `x` lines from the middle.

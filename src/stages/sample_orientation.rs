@@ -17,6 +17,7 @@ use crate::{
         attitude::{OmegaPhiKappa, make_continuous, spice_quaternion},
         ellipsoid::{Spherical, ray_meets_ellipsoid},
         mars_rotation::mars_rotation,
+        statistics::largest,
     },
     spice::{Attitude, Session},
     time::Et,
@@ -257,7 +258,7 @@ impl Reader<'_> {
         Ok((lookups > 0).then(|| HeldAttitudes {
             lookups,
             of: distances_s.len(),
-            distance_max_s: distances_s.iter().copied().fold(0.0, f64::max),
+            distance_max_s: largest(distances_s.iter().copied()).unwrap_or_default(),
         }))
     }
 

@@ -39,10 +39,11 @@ const FAILED: &str = ".failed";
 /// What the disk refuses is no matter here: the failure itself is told by whoever calls.
 pub fn note_failure(site_folder: &Path, failure: Option<&str>) {
     let path = site_folder.join(FAILED);
-    let _ = match failure {
-        Some(text) => atomic::write(&path, text.as_bytes()).is_ok(),
-        None => fs::remove_file(path).is_ok(),
-    };
+    if let Some(text) = failure {
+        let _ = atomic::write(&path, text.as_bytes());
+    } else {
+        let _ = fs::remove_file(path);
+    }
 }
 
 /// Why the last run of the site failed.

@@ -11,6 +11,7 @@ use crate::{
         attitude::{make_continuous, matrix_of_spice_quaternion, spice_quaternion},
         lagrange::lagrange,
         mars_rotation::mars_rotation,
+        statistics::largest,
     },
     stages::tag_times::ImageTimes,
     time::Et,
@@ -183,7 +184,7 @@ fn check_interpolation(
             let camera_to_mars = to_mars * reader.inertial_to_camera(et)?.inverse();
             let kernels = (position.xyz_m, *camera_to_mars.matrix());
             let error_px = error_px(image, &kernels, &nodes.camera(et));
-            check.error_max_px = check.error_max_px.max(error_px);
+            check.error_max_px = largest([check.error_max_px, error_px]).unwrap_or_default();
             check.epochs += 1;
         }
     }
@@ -199,16 +200,13 @@ fn error_px(image: &ImageTimes, kernels: &Camera, interpolated: &Camera) -> f64 
     let first = f64::from(image.first_detector);
     let width = f64::from(image.samples * image.crosstrack_summing);
     let centre = f64::from(MOC_NA_DETECTORS) / 2.0;
-    [first, first + 0.5 * width, first + width]
-        .map(|detector| {
-            let across = (detector - centre) * detector_rad;
-            let ground_m =
-                position_m + camera_to_mars * Vector3::new(0.0, across, 1.0) * distance_m;
-            let seen = interpolated.1.transpose() * (ground_m - interpolated.0);
-            let lines = seen.x / seen.z / f64::from(image.downtrack_summing);
-            let samples = (seen.y / seen.z - across) / f64::from(image.crosstrack_summing);
-            lines.hypot(samples) / detector_rad
-        })
-        .into_iter()
-        .fold(0.0, f64::max)
+    let errors_px = [first, first + 0.5 * width, first + width].map(|detector| {
+        let across = (detector - centre) * detector_rad;
+        let ground_m = position_m + camera_to_mars * Vector3::new(0.0, across, 1.0) * distance_m;
+        let seen = interpolated.1.transpose() * (ground_m - interpolated.0);
+        let lines = seen.x / seen.z / f64::from(image.downtrack_summing);
+        let samples = (seen.y / seen.z - across) / f64::from(image.crosstrack_summing);
+        lines.hypot(samples) / detector_rad
+    });
+    largest(errors_px).unwrap_or_default()
 }
