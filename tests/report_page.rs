@@ -99,7 +99,9 @@ fn a_gap_in_attitude_is_seen_and_measured() {
     let picture = page.split("<figure id=\"kernels-at-").nth(1).unwrap();
     let caption = between(picture, "<figcaption>", '\n').next().unwrap();
     assert!(
-        caption.contains("of the margins around them 2.000 s are not held, the first 2.000 s at"),
+        caption.contains(
+            "Of what is asked, margins included, 2.000 s are not held, the first 2.000 s at"
+        ),
         "{caption:.300}"
     );
     // One red bar for the gap; the swatch of its key is not part of the picture.
@@ -135,6 +137,9 @@ fn many_profiles_share_plots_and_the_page_stays_small() {
     let page = page("many", &site, false);
     // 300 / 12 plots of residuals and of scans, one map, one stretch of kernels.
     assert_eq!(page.matches("<svg").count(), 25 + 25 + 1 + 1);
+    // The verdict stays on one screen, however many profiles break their limit.
+    assert!(page.contains("Invalid, for 300 reasons:"));
+    assert!(page.contains("And 288 more, all of them in ../manifest.json."));
     assert!(page.len() < 3_000_000, "{} bytes", page.len());
 }
 

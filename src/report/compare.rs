@@ -112,11 +112,7 @@ fn attitude(attitude: &AttitudeComparison) -> Result<String> {
         Column::Number("rms angle, ″"),
         Column::Number("largest, ″"),
     ];
-    let labels = [
-        "about radial, ″",
-        "about along track, ″",
-        "about cross track, ″",
-    ];
+    let labels = ["radial, ″", "along, ″", "cross, ″"];
     let turns = &attitude.turns;
     let words = paragraph(
         "Turns from the mean attitude to that of each set, read with the pointing bias. On the ground: the angle \

@@ -7,6 +7,8 @@ use crate::{
     units::RADIANS_PER_DEGREE,
 };
 
+/// Reasons, and remarks, in the verdict; the rest is counted.
+const REASONS_SHOWN: usize = 12;
 /// Complaints shown; the rest is counted.
 const COMPLAINTS_SHOWN: usize = 50;
 
@@ -23,11 +25,11 @@ pub(super) fn lead(site: &SiteProducts) -> String {
         (1, _) => (Tone::Bad, "Invalid, for one reason:".to_owned()),
         (count, _) => (Tone::Bad, format!("Invalid, for {count} reasons:")),
     };
-    let mut body = list(&reasons);
+    let mut body = first_of(&reasons);
     if !reasons.is_empty() && !remarks.is_empty() {
         body += &paragraph("Also:");
     }
-    body += &list(&remarks);
+    body += &first_of(&remarks);
     body += &paragraph(&counts(site));
     paragraph(&site.config.description) + &verdict(tone, &headline, &body)
 }
@@ -48,6 +50,19 @@ fn counts(site: &SiteProducts) -> String {
         );
     }
     text
+}
+
+/// As many sentences as leave the verdict on one screen; the manifest has all.
+fn first_of(sentences: &[String]) -> String {
+    let shown = &sentences[..sentences.len().min(REASONS_SHOWN)];
+    let mut html = list(shown);
+    if shown.len() < sentences.len() {
+        let more = sentences.len() - shown.len();
+        html += &paragraph(&format!(
+            "And {more} more, all of them in ../manifest.json."
+        ));
+    }
+    html
 }
 
 fn counted(count: usize, what: &str) -> String {

@@ -132,7 +132,7 @@ fn picture(site: &SiteProducts, stretch: Interval) -> Result<String> {
     words += &match gaps.as_slice() {
         [] => " Everything that is asked is held.".to_owned(),
         [first, ..] => format!(
-            " Shots and lines are covered; of the margins around them {:.3} s are not held, the first {:.3} s at \
+            " Of what is asked, margins included, {:.3} s are not held, the first {:.3} s at \
              {first}.",
             total_s(&gaps),
             first.duration_s()
