@@ -10,6 +10,7 @@ pub mod mars_rotation;
 pub mod normal_equations;
 pub mod orbit_axes;
 pub mod polynomial;
+pub mod pushbroom;
 pub mod robust;
 pub mod statistics;
 pub mod window;

@@ -1,0 +1,107 @@
+//! A pushbroom camera: where it is and looks as a function of the image line, and which line sees a point.
+//!
+//! The image line is `x`, in lines from the middle of the header image. `M` takes Mars-fixed components
+//! to camera components; the camera looks along +Z. A ground point `P` has the camera vector
+//! `q = M (P − C)`, and is seen by the line where `q1 = 0`.
+
+mod detector;
+mod models;
+mod newton;
+mod published;
+mod sampled;
+
+use nalgebra::{Matrix3, Vector3};
+
+pub use detector::Detector;
+pub use models::{EulerPolynomial, RotationVectorPolynomial, VectorPolynomial};
+pub use newton::Projector;
+pub use published::{FixedPoint, FrameFirst, Limits, Solution};
+pub use sampled::{SampledOrientation, SamplesFault};
+
+/// Where the camera is and looks while one line is exposed.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Pose {
+    /// Perspective centre, Mars-fixed, metres.
+    pub position_m: Vector3<f64>,
+    /// Rotation `M` from Mars-fixed to camera components.
+    pub mars_to_camera: Matrix3<f64>,
+}
+
+/// How a [`Pose`] changes from line to line.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Motion {
+    /// `dC/dx`, Mars-fixed, metres per line.
+    pub advance_m: Vector3<f64>,
+    /// `Ω` with `dM/dx = [Ω]× M`, camera components, radians per line.
+    pub turn_rad: Vector3<f64>,
+}
+
+/// Exterior orientation of an image as a function of its line.
+pub trait ExteriorOrientation: Sync {
+    /// Pose at `x` lines from the middle; outside the image an extrapolation.
+    fn pose(&self, x: f64) -> Pose;
+
+    /// The pose with its change per line.
+    fn moving(&self, x: f64) -> (Pose, Motion);
+}
+
+/// An orientation whose positions are a polynomial of at most second order, as eq. 4 of Shan et al. 2005 needs.
+pub trait PolynomialPath: ExteriorOrientation {
+    /// The positions, metres.
+    fn path_m(&self) -> &VectorPolynomial;
+}
+
+/// Why an image has no line for a point.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, thiserror::Error)]
+pub enum Unseen {
+    /// The point lies behind the camera.
+    #[error("behind the camera")]
+    BehindCamera,
+    /// The camera's x axis lies within 0.6° of across the flight: lines do not follow each other on the ground.
+    #[error("the camera flies across its lines")]
+    AcrossFlight,
+    /// The steps grew three times running.
+    #[error("the iteration diverges")]
+    Diverged,
+    /// The steps stayed above the tolerance.
+    #[error("the iteration does not converge")]
+    NotConverged,
+    /// A coordinate or a coefficient is not a finite number.
+    #[error("not a finite number")]
+    NotFinite,
+}
+
+impl Pose {
+    /// Camera vector `q = M (P − C)` of a Mars-fixed point, metres.
+    #[must_use]
+    pub fn camera_vector_m(&self, point_m: &Vector3<f64>) -> Vector3<f64> {
+        self.mars_to_camera * (point_m - self.position_m)
+    }
+}
+
+impl Motion {
+    /// `dq/dx` of the camera vector `camera_m` of a fixed point, metres per line.
+    #[must_use]
+    pub fn camera_vector_rate_m(&self, pose: &Pose, camera_m: &Vector3<f64>) -> Vector3<f64> {
+        self.turn_rad.cross(camera_m) - pose.mars_to_camera * self.advance_m
+    }
+}
+
+/// Smallest share of the advance per line that must lie along the camera's x axis.
+const ALONG_SHARE_MIN: f64 = 0.01;
+
+/// Sense in which the camera's x axis points along the flight: +1 or −1 (MOC flies along −X).
+///
+/// # Errors
+/// [`Unseen::AcrossFlight`], [`Unseen::NotFinite`].
+fn flight_sense(model: &impl ExteriorOrientation) -> Result<f64, Unseen> {
+    let (pose, motion) = model.moving(0.0);
+    let along_m = (pose.mars_to_camera * motion.advance_m).x;
+    if !along_m.is_finite() {
+        return Err(Unseen::NotFinite);
+    }
+    if along_m.abs() <= ALONG_SHARE_MIN * motion.advance_m.norm() {
+        return Err(Unseen::AcrossFlight);
+    }
+    Ok(along_m.signum())
+}

@@ -1,0 +1,119 @@
+//! From the ground to the image by Newton's method on `q1(x) = M1(x)·(P − C(x))`.
+
+use nalgebra::Vector3;
+
+use super::{ExteriorOrientation, Solution, Unseen, flight_sense};
+
+/// Lines of the table that start the iteration, equally spaced over the image.
+const NODES: u32 = 65;
+/// A step below this many lines is the last: `q1` bends so little that what it leaves is below 1e-8 lines.
+const LAST_STEP_LINES: f64 = 1e-2;
+/// Evaluations after which the iteration is given up.
+const EVALUATIONS_MAX: u32 = 20;
+
+/// Finds the line that sees a point, for many points of one image.
+///
+/// `q1` and its slope are tabulated at a few lines, so that a point in the image needs one or two
+/// evaluations of the orientation.
+#[derive(Debug, Clone)]
+pub struct Projector<'a, M> {
+    model: &'a M,
+    half_lines: f64,
+    nodes_per_line: f64,
+    nodes: Vec<Node>,
+}
+
+/// `q1` of any point and its slope, at one line.
+#[derive(Debug, Clone, Copy)]
+struct Node {
+    x: f64,
+    position_m: Vector3<f64>,
+    axis: Vector3<f64>,
+    axis_rate: Vector3<f64>,
+    advance_m: f64,
+}
+
+impl Node {
+    fn of(model: &impl ExteriorOrientation, x: f64) -> Self {
+        let (pose, motion) = model.moving(x);
+        let m = &pose.mars_to_camera;
+        let turn = &motion.turn_rad;
+        let axis = m.row(0).transpose();
+        Self {
+            x,
+            position_m: pose.position_m,
+            axis,
+            // The first row of [Ω]× M.
+            axis_rate: m.row(2).transpose() * turn.y - m.row(1).transpose() * turn.z,
+            advance_m: axis.dot(&motion.advance_m),
+        }
+    }
+
+    fn newton(&self, point_m: &Vector3<f64>) -> f64 {
+        let away_m = point_m - self.position_m;
+        self.x - self.axis.dot(&away_m) / (self.axis_rate.dot(&away_m) - self.advance_m)
+    }
+}
+
+impl<'a, M: ExteriorOrientation> Projector<'a, M> {
+    /// Prepares an image of `lines` lines.
+    ///
+    /// # Errors
+    /// [`Unseen::AcrossFlight`] and [`Unseen::NotFinite`] for orientations that see nothing.
+    pub fn new(model: &'a M, lines: f64) -> Result<Self, Unseen> {
+        flight_sense(model)?;
+        if !(lines > 0.0 && lines.is_finite()) {
+            return Err(Unseen::NotFinite);
+        }
+        let half_lines = 0.5 * lines;
+        let spacing = lines / f64::from(NODES - 1);
+        let nodes = (0..NODES)
+            .map(|node| Node::of(model, f64::from(node) * spacing - half_lines))
+            .collect();
+        Ok(Self {
+            model,
+            half_lines,
+            nodes_per_line: spacing.recip(),
+            nodes,
+        })
+    }
+
+    #[allow(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "the number is clamped to the table before, NaN becomes 0"
+    )]
+    fn nearest(&self, x: f64) -> &Node {
+        let place = (x + self.half_lines) * self.nodes_per_line + 0.5;
+        &self.nodes[place.clamp(0.0, f64::from(NODES - 1)) as usize]
+    }
+
+    /// The line that sees `point_m` (Mars-fixed), also outside the image.
+    ///
+    /// # Errors
+    /// [`Unseen::BehindCamera`], [`Unseen::NotConverged`], [`Unseen::NotFinite`].
+    pub fn project(&self, point_m: &Vector3<f64>) -> Result<Solution, Unseen> {
+        let start = self.nearest(0.0).newton(point_m);
+        let mut x = self.nearest(start).newton(point_m);
+        for evaluations in 1..=EVALUATIONS_MAX {
+            let (pose, motion) = self.model.moving(x);
+            let camera_m = pose.camera_vector_m(point_m);
+            let rate_m = motion.camera_vector_rate_m(&pose, &camera_m);
+            let step_lines = -camera_m.x / rate_m.x;
+            x += step_lines;
+            if !x.is_finite() {
+                return Err(Unseen::NotFinite);
+            }
+            if step_lines.abs() <= LAST_STEP_LINES {
+                let solution = Solution {
+                    x,
+                    camera_m: camera_m + rate_m * step_lines,
+                    evaluations,
+                    step_lines,
+                };
+                return solution.in_front();
+            }
+        }
+        Err(Unseen::NotConverged)
+    }
+}
