@@ -1,6 +1,7 @@
 //! Pure geometry: no files, no clocks, no SPICE.
 
 pub mod attitude;
+pub mod bundle;
 pub mod chebyshev;
 pub mod collinearity;
 pub mod ellipsoid;

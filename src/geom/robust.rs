@@ -33,6 +33,16 @@ impl RobustWeight {
             Self::Cauchy { limit } => 1.0 / (1.0 + (z / limit).powi(2)),
         }
     }
+
+    /// The function whose sum these weights make small, `z²/2` near zero.
+    #[must_use]
+    pub fn cost(self, z: f64) -> f64 {
+        match self {
+            Self::Huber { limit } if z.abs() <= limit => 0.5 * z * z,
+            Self::Huber { limit } => limit * (z.abs() - 0.5 * limit),
+            Self::Cauchy { limit } => 0.5 * limit * limit * (z / limit).powi(2).ln_1p(),
+        }
+    }
 }
 
 #[cfg(test)]
@@ -52,6 +62,11 @@ mod tests {
             assert!((function.factor(0.0) - 1.0).abs() < 1e-15);
             assert!((function.factor(-1.345) - at_limit).abs() < 1e-15);
             assert!((function.factor(10.0) - at_ten).abs() < 1e-5); // five printed digits
+            for z in [0.5, 1.3, 1.4, 10.0] {
+                // The weight is the slope of the cost over z.
+                let slope = (function.cost(z + 1e-5) - function.cost(z - 1e-5)) / 2e-5;
+                assert!((slope / z - function.factor(z)).abs() < 1e-9, "{z}");
+            }
         }
     }
 }
