@@ -80,7 +80,7 @@ impl IntersectionLimits {
 
 /// Why a point was not intersected; counted, never a number in a product.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, thiserror::Error)]
-#[serde(rename_all = "snake_case", tag = "reason")]
+#[serde(rename_all = "snake_case")]
 pub enum Unintersected {
     /// Fewer than two rays.
     #[error("{rays} ray, expected at least two")]

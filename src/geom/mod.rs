@@ -14,4 +14,5 @@ pub mod polynomial;
 pub mod pushbroom;
 pub mod robust;
 pub mod statistics;
+pub mod stereo;
 pub mod window;

@@ -7,6 +7,8 @@ pub mod compare_kernels;
 pub mod convert_datum;
 pub mod fit_sensor_model;
 pub mod group_profiles;
+pub mod intersect;
 pub mod sample_orientation;
 pub mod search_footprints;
 pub mod tag_times;
+pub mod uncertainty;

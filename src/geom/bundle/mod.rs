@@ -116,7 +116,7 @@ impl Default for BundleOptions {
     fn default() -> Self {
         Self {
             robust: None,
-            steps_max: 50,
+            steps_max: 100,
         }
     }
 }

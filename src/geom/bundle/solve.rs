@@ -15,6 +15,9 @@ use crate::{geom::normal_equations::ScaledCholesky, units::METRES_PER_KM};
 const STEP: f64 = 1e-8;
 /// So does a relative change of the weighted sum of squares below this.
 const CHANGE: f64 = 1e-8;
+/// The same with robust weights: how a blunder is shared between the two rays of a tie hardly changes the
+/// sum, so that the point creeps long after everything else is at rest.
+const CHANGE_ROBUST: f64 = 1e-6;
 /// Damping after a step that made matters worse, as a share of each unknown's own information.
 const DAMPING: f64 = 1e-6;
 
@@ -110,6 +113,11 @@ fn settle(
         state: start,
         reduced,
     };
+    let least_change = if layout.robust.is_some() {
+        CHANGE_ROBUST
+    } else {
+        CHANGE
+    };
     let mut damping = 0.0;
     for _ in 0..steps_max {
         let factor = factorise(layout, &now.reduced, damping)?;
@@ -125,7 +133,7 @@ fn settle(
                     state: next,
                     reduced,
                 };
-                if step < STEP || change <= CHANGE * before {
+                if step < STEP || change <= least_change * before {
                     return Ok(now);
                 }
                 damping = 0.0;
