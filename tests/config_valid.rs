@@ -246,7 +246,7 @@ fn schema_tables(schema: &Value, path: &str, found: &mut Vec<(String, BTreeSet<S
 fn schema_example_and_loader_know_the_same_keys_and_defaults() {
     let mut tables = Vec::new();
     schema_tables(&schema(), "", &mut tables);
-    assert_eq!(tables.len(), 11);
+    assert_eq!(tables.len(), 12);
     let example = example_text();
     for (path, keys) in tables {
         // The loader answers an unknown key with all that it knows.

@@ -139,6 +139,8 @@ fn every_product_is_there_with_its_rows() {
         ("footprints.geojson", shots),
         ("ranges.parquet", shots),
         ("ranges.json", 1),
+        ("registration.parquet", shots),
+        ("registration.json", 1),
         ("images/m04-02852/orientation.parquet", 31),
         ("images/m04-02852/orientation.json", 31),
         ("images/m04-02852/isd.json", 40),
@@ -277,6 +279,8 @@ fn documents_keep_their_schemas() {
     );
     let footprints = json(&folder.join("footprints.geojson"));
     check_schema("footprints", &footprints);
+    let registration = json(&folder.join("registration.json"));
+    check_schema("registration", &registration);
     assert_eq!(footprints["features"].as_array().unwrap().len(), 60);
     says_the_frame(footprints["frame"].as_str().unwrap());
     let image = folder.join("images/m04-02852");
@@ -418,12 +422,13 @@ fn the_same_site_gives_the_same_bytes() {
 #[test]
 fn an_empty_site_has_empty_products() {
     let (folder, products) = written("empty", &Site::empty(), false);
-    assert_eq!(products.len(), 10);
+    assert_eq!(products.len(), 12);
     assert!(products.iter().all(|(_, rows)| *rows == 0));
     let ranges = json(&folder.join("ranges.json"));
     check_schema("ranges", &ranges);
     assert_eq!(ranges["invalid_because"][0], "no footprint in any window");
     check_schema("footprints", &json(&folder.join("footprints.geojson")));
+    check_schema("registration", &json(&folder.join("registration.json")));
     let page = fs::read_to_string(folder.join("report/index.html")).unwrap();
     assert!(page.contains("Invalid, for one reason:"));
 }

@@ -143,6 +143,7 @@ fn a_turned_ck_is_found_and_nothing_else() {
     let ran = [
         "sample_orientation/image",
         "fit_sensor_model/image",
+        "register/image",
         "publish",
     ];
     assert_eq!(case.stages_run(), ran);
@@ -241,6 +242,7 @@ fn another_orbit_moves_the_camera_by_the_injected_difference() {
         "check_ranges",
         "sample_orientation/image",
         "fit_sensor_model/image",
+        "register/image",
         "publish",
     ];
     assert_eq!(case.stages_run(), ran);
@@ -341,7 +343,7 @@ fn what_is_in_one_run_only_is_counted_and_keeps_no_limit() {
         "{footprints}"
     );
     assert_eq!(footprints["movement"]["moved"], 0);
-    assert_eq!(names(&found["stages"]["added"]).len(), 2);
+    assert_eq!(names(&found["stages"]["added"]).len(), 3);
     assert_eq!(found["images"][0]["valid_in_a"], true);
     assert_eq!(found["images"][1]["samples_only_in_b"], 31);
     assert!(found["images"][0]["valid_in_b"].is_null());

@@ -82,10 +82,10 @@ fn nothing_is_fetched_and_every_plot_is_told_in_words_and_numbers() {
     for anchor in between(&page, "href=\"#", '"') {
         assert!(unique.contains(anchor), "{anchor}");
     }
-    // Residuals, scan, image, map and the kernels of one stretch of time.
-    assert_eq!(page.matches("<svg").count(), 5);
-    assert_eq!(page.matches("<svg role=\"img\"").count(), 5);
-    assert_eq!(page.matches("href=\"data:text/csv").count(), 5);
+    // Residuals, scan, image, image plane, convergence, map and the kernels of one stretch of time.
+    assert_eq!(page.matches("<svg").count(), 7);
+    assert_eq!(page.matches("<svg role=\"img\"").count(), 7);
+    assert_eq!(page.matches("href=\"data:text/csv").count(), 7);
     // Every shot is in the data of the residuals, once as residual and once as angle.
     let name = "download=\"range-distance-along-antimeridian-9019.csv\" href=\"";
     let residuals = between(&page, name, '"').next().unwrap();

@@ -35,7 +35,7 @@ fn run(case: &Case) -> Vec<String> {
 
 fn fresh() -> Case {
     let case = Case::new();
-    assert_eq!(run(&case).len(), 8);
+    assert_eq!(run(&case).len(), 9);
     assert_eq!(plan(&case), BTreeMap::new());
     assert_eq!(run(&case), [""; 0]);
     case
@@ -116,9 +116,24 @@ fn another_orbit_touches_ranges_and_orientation() {
             "check_ranges",
             "sample_orientation/image",
             "fit_sensor_model/image",
+            "register/image",
             "publish"
         ]
     );
+}
+
+#[test]
+fn another_camera_model_touches_registration_alone() {
+    let case = fresh();
+    case.replace(
+        "site.toml",
+        "[pedr]",
+        "[registration]\nmodel = \"samples\"\n[pedr]",
+    );
+    let planned = plan(&case);
+    assert_eq!(planned["register/image"], "key registration changed");
+    assert!(!planned.contains_key("fit_sensor_model/image"));
+    assert_eq!(run(&case), ["register/image", "publish"]);
 }
 
 #[test]

@@ -22,6 +22,7 @@ pub(super) struct RawSite {
     pub(super) images: Entry<Vec<Spanned<RawImage>>>,
     pub(super) range_check: Entry<RawRangeCheck>,
     pub(super) orientation: Entry<RawOrientation>,
+    pub(super) registration: Entry<RawRegistration>,
 }
 
 #[derive(Debug, Default, Deserialize)]
@@ -123,4 +124,12 @@ pub(super) struct RawOrientation {
     pub(super) intervals: Entry<i64>,
     pub(super) position_rmse_max_m: Entry<f64>,
     pub(super) pointing_rmse_max_arcsec: Entry<f64>,
+}
+
+#[derive(Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct RawRegistration {
+    pub(super) model: Entry<String>,
+    pub(super) tolerance_lines: Entry<f64>,
+    pub(super) steps_max: Entry<i64>,
 }

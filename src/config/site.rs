@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use crate::{frames::MarsDatum, time::PointingBias};
 
@@ -34,6 +34,8 @@ pub struct SiteConfig {
     pub range_check: RangeCheckConfig,
     /// Sampling of exterior orientation.
     pub orientation: OrientationConfig,
+    /// Projection of footprints into the images.
+    pub registration: RegistrationConfig,
 }
 
 /// Where kernels come from, and how coverage is judged.
@@ -323,6 +325,41 @@ pub struct OrientationConfig {
     pub position_rmse_max_m: f64,
     /// Largest second-order pointing RMSE (each angle) of a valid sensor model, radians.
     pub pointing_rmse_max_rad: f64,
+}
+
+/// Projection of footprints into the images.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct RegistrationConfig {
+    /// The orientation that points are projected with.
+    pub model: CameraModel,
+    /// A step of the published iterations below this is the last, lines.
+    pub tolerance_lines: f64,
+    /// Steps after which the published iterations are given up.
+    pub steps_max: u32,
+}
+
+/// The forms of an image's orientation.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum CameraModel {
+    /// Positions and angles as polynomials of first order.
+    FirstOrder,
+    /// Positions and angles as polynomials of second order.
+    SecondOrder,
+    /// Positions and a rotation vector as polynomials of second order.
+    RotationVector,
+    /// Interpolation between the samples, no polynomial over the whole image.
+    Samples,
+}
+
+impl CameraModel {
+    /// Every model, with its word in configuration and products.
+    pub const WORDS: [(&'static str, Self); 4] = [
+        ("first_order", Self::FirstOrder),
+        ("second_order", Self::SecondOrder),
+        ("rotation_vector", Self::RotationVector),
+        ("samples", Self::Samples),
+    ];
 }
 
 #[cfg(test)]

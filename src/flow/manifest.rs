@@ -104,6 +104,7 @@ impl Results<'_> {
             name: Stage::Publish.name().to_owned(),
             fingerprint,
         });
+        let registered = || self.registrations.iter().map(|image| &image.value);
         let counts = BTreeMap::from([
             ("frames_read".to_owned(), found.frames_read),
             ("shots_read".to_owned(), found.shots_read),
@@ -113,6 +114,20 @@ impl Results<'_> {
             ),
             ("profiles".to_owned(), self.profiles.value.len() as u64),
             ("images".to_owned(), self.images.value.len() as u64),
+            (
+                "registered".to_owned(),
+                registered().map(|image| image.points.len() as u64).sum(),
+            ),
+            (
+                "registered_inside".to_owned(),
+                registered()
+                    .map(|image| image.points.inside_count() as u64)
+                    .sum(),
+            ),
+            (
+                "registration_rejected".to_owned(),
+                registered().flat_map(|image| image.rejected.values()).sum(),
+            ),
         ]);
         Manifest {
             tool: "areograph".to_owned(),

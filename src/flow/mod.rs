@@ -1,4 +1,4 @@
-//! The way of the data: kernels → times → footprints → IAU 2000 → ranges → orientation → model → products.
+//! The way of the data: kernels → times → footprints → IAU 2000 → ranges → orientation → model → registration → products.
 
 mod check;
 mod choice;
@@ -50,6 +50,8 @@ pub enum Stage {
     SampleOrientation,
     /// Polynomials of first and second order.
     FitSensorModel,
+    /// Lines and samples of the footprints in every image.
+    Register,
     /// Products under their final names.
     Publish,
 }
@@ -68,6 +70,7 @@ impl Stage {
             Self::CheckRanges => "check_ranges",
             Self::SampleOrientation => "sample_orientation",
             Self::FitSensorModel => "fit_sensor_model",
+            Self::Register => "register",
             Self::Publish => "publish",
         }
     }
@@ -164,6 +167,7 @@ fn run_steps(steps: &Steps<'_>) -> std::result::Result<Ending, Leave> {
     let ranges = steps.check_ranges(&kernels, &converted, &profiles)?;
     let orientations = steps.sample_orientation(&kernels, &images)?;
     let models = steps.fit_sensor_model(&orientations)?;
+    let registrations = steps.register(&images, &orientations, &models, &converted, &profiles)?;
 
     steps.publish(&Results {
         config: steps.config,
@@ -177,5 +181,6 @@ fn run_steps(steps: &Steps<'_>) -> std::result::Result<Ending, Leave> {
         ranges: &ranges,
         orientations: &orientations,
         models: &models,
+        registrations: &registrations,
     })
 }

@@ -145,6 +145,22 @@ pub(super) fn fit_sensor_model(
         .output(&format!("sample_orientation/{image}"), orientation)
 }
 
+/// The image, its orientation and model, footprints and profiles.
+pub(super) fn register(
+    config: &SiteConfig,
+    image: &ImageTimes,
+    [orientation, model, converted, profiles]: [Option<&str>; 4],
+) -> Parts {
+    let id = &image.id;
+    Parts::new(METHOD)
+        .key("image times", image)
+        .key("registration", &config.registration)
+        .output(&format!("sample_orientation/{id}"), orientation)
+        .output(&format!("fit_sensor_model/{id}"), model)
+        .output("convert_datum", converted)
+        .output("group_profiles", profiles)
+}
+
 /// The configuration, all kernels and where they lie from `folder`, and every earlier output.
 pub(super) fn publish(
     config: &SiteConfig,

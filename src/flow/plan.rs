@@ -16,8 +16,8 @@ use crate::{
     spice::Wanted,
     stages::{
         check_ranges::RangeCheck, convert_datum::Converted, fit_sensor_model::SensorModel,
-        group_profiles::Profile, sample_orientation::Orientation, search_footprints::SearchResult,
-        tag_times::ImageTimes,
+        group_profiles::Profile, register::ImageRegistration, sample_orientation::Orientation,
+        search_footprints::SearchResult, tag_times::ImageTimes,
     },
     store::{
         cache::{Output, StageCache},
@@ -104,6 +104,7 @@ fn plan_stages(config: &SiteConfig, out: &Path, force: bool) -> Result<Vec<Plann
         hash(profiles.as_ref()),
     );
     plan.look::<RangeCheck>(Stage::CheckRanges, &parts);
+    let mut oriented = Vec::new();
     for image in &config.images {
         let stage = Stage::SampleOrientation;
         let times = times.iter().find(|times| times.id == image.id);
@@ -116,7 +117,27 @@ fn plan_stages(config: &SiteConfig, out: &Path, force: bool) -> Result<Vec<Plann
             plan.add(stage, Some(&image.id), follows());
         }
         let parts = parts::fit_sensor_model(config, &image.id, hash(orientation.as_ref()));
-        plan.look_for::<SensorModel>(Stage::FitSensorModel, Some(&image.id), &parts);
+        let model = plan.look_for::<SensorModel>(Stage::FitSensorModel, Some(&image.id), &parts);
+        oriented.push((
+            orientation.map(|orientation| orientation.blake3),
+            model.map(|model| model.blake3),
+        ));
+    }
+    for (image, (orientation, model)) in config.images.iter().zip(&oriented) {
+        let Some(times) = times.iter().find(|times| times.id == image.id) else {
+            plan.outputs
+                .push((Stage::Register.of_image(&image.id), None));
+            plan.add(Stage::Register, Some(&image.id), follows());
+            continue;
+        };
+        let outputs = [
+            orientation.as_deref(),
+            model.as_deref(),
+            hash(converted.as_ref()),
+            hash(profiles.as_ref()),
+        ];
+        let parts = parts::register(config, times, outputs);
+        plan.look_for::<ImageRegistration>(Stage::Register, Some(&image.id), &parts);
     }
     let outputs = std::mem::take(&mut plan.outputs);
     let parts = parts::publish(config, &kernels, &folder, outputs);
@@ -173,6 +194,9 @@ impl Planner {
         for image in &config.images {
             self.add(Stage::SampleOrientation, Some(&image.id), follows());
             self.add(Stage::FitSensorModel, Some(&image.id), follows());
+        }
+        for image in &config.images {
+            self.add(Stage::Register, Some(&image.id), follows());
         }
         self.add(Stage::Publish, None, follows());
         self.planned

@@ -16,8 +16,8 @@ use crate::{
     spice::{KernelSet, Session, Wanted},
     stages::{
         check_ranges::RangeCheck, convert_datum::Converted, fit_sensor_model::SensorModel,
-        group_profiles::Profile, sample_orientation::Orientation, search_footprints::SearchResult,
-        tag_times::ImageTimes,
+        group_profiles::Profile, register::ImageRegistration, sample_orientation::Orientation,
+        search_footprints::SearchResult, tag_times::ImageTimes,
     },
     store::{
         atomic,
@@ -47,6 +47,7 @@ pub(super) struct Results<'a> {
     pub(super) ranges: &'a Output<RangeCheck>,
     pub(super) orientations: &'a [Output<Orientation>],
     pub(super) models: &'a [Output<SensorModel>],
+    pub(super) registrations: &'a [Output<ImageRegistration>],
 }
 
 /// The products that stand for these parts, or why they have to be made.
@@ -117,11 +118,15 @@ fn make_products(folder: &Path, results: &Results<'_>, fingerprint: String) -> R
         .iter()
         .zip(results.orientations)
         .zip(results.models)
-        .map(|((times, orientation), model)| ImageProducts {
-            times,
-            orientation: &orientation.value,
-            model: &model.value,
-        })
+        .zip(results.registrations)
+        .map(
+            |(((times, orientation), model), registration)| ImageProducts {
+                times,
+                orientation: &orientation.value,
+                model: &model.value,
+                registration: &registration.value,
+            },
+        )
         .collect();
     let complaints: Vec<String> = results
         .found
@@ -196,6 +201,10 @@ impl Results<'_> {
             let image = &orientation.value.image;
             stages.push(entry(Stage::SampleOrientation.of_image(image), orientation));
             stages.push(entry(Stage::FitSensorModel.of_image(image), model));
+        }
+        for registration in self.registrations {
+            let stage = Stage::Register.of_image(&registration.value.image);
+            stages.push(entry(stage, registration));
         }
         stages
     }

@@ -17,6 +17,7 @@ use crate::{
         convert_datum::{Converted, convert_datum},
         fit_sensor_model::{SensorModel, fit_sensor_model},
         group_profiles::{Profile, group_profiles},
+        register::{ImageRegistration, register},
         sample_orientation::{Orientation, sample_orientation},
         search_footprints::{SearchResult, search_footprints},
         tag_times::{ImageTimes, tag_times},
@@ -272,6 +273,47 @@ impl Steps<'_> {
             })
         });
         Ok(models.collect::<Result<_>>()?)
+    }
+
+    pub(super) fn register(
+        &self,
+        images: &Output<Vec<ImageTimes>>,
+        orientations: &[Output<Orientation>],
+        models: &[Output<SensorModel>],
+        converted: &Output<Converted>,
+        profiles: &Output<Vec<Profile>>,
+    ) -> Step<Vec<Output<ImageRegistration>>> {
+        self.enter(Stage::Register)?;
+        let oriented = orientations.iter().zip(models);
+        let registrations =
+            images
+                .value
+                .iter()
+                .zip(oriented)
+                .map(|(image, (orientation, model))| {
+                    let stage = Stage::Register.of_image(&image.id);
+                    let outputs = [
+                        &orientation.blake3,
+                        &model.blake3,
+                        &converted.blake3,
+                        &profiles.blake3,
+                    ];
+                    let parts =
+                        parts::register(self.config, image, outputs.map(|hash| Some(&**hash)));
+                    self.cache.stage(&stage, parts, || {
+                        register(
+                            image,
+                            &orientation.value,
+                            &model.value,
+                            &converted.value.footprints,
+                            &profiles.value,
+                            &self.config.registration,
+                            self.options.stop,
+                        )
+                        .in_stage(&stage)
+                    })
+                });
+        Ok(registrations.collect::<Result<_>>()?)
     }
 
     pub(super) fn publish(&self, results: &Results<'_>) -> Step<Ending> {

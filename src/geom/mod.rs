@@ -8,6 +8,7 @@ pub mod ellipsoid;
 pub mod intersection;
 pub mod map_projection;
 pub mod mars_rotation;
+pub mod misregistration;
 pub mod normal_equations;
 pub mod orbit_axes;
 pub mod polynomial;

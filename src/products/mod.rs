@@ -4,6 +4,7 @@
 //! |---|---|
 //! | `footprints.parquet`, `.csv`, `.geojson` | GIS and scripts: shots in the windows, IAU 2000 |
 //! | `ranges.parquet`, `ranges.json` | range residuals per shot; statistics per profile |
+//! | `registration.parquet`, `registration.json` | line and sample of every footprint in every image; how the iterations converge |
 //! | `images/<id>/orientation.parquet`, `.json` | orientation samples; polynomials with residuals |
 //! | `images/<id>/isd.json` | camera models of the Community Sensor Model (`usgscsm`) |
 //! | `exchange/…` | ISIS and Ames Stereo Pipeline |
@@ -22,6 +23,7 @@ mod orientation;
 mod parquet;
 mod ranges;
 pub mod read;
+mod registration;
 mod site;
 mod table;
 mod text_table;
@@ -55,6 +57,7 @@ pub fn write_products(directory: &Path, site: &SiteProducts, page: &str) -> Resu
     };
     footprints::write(&mut written, site)?;
     ranges::write(&mut written, site)?;
+    registration::write(&mut written, site)?;
     for image in site.images {
         orientation::write(&mut written, image)?;
         isd::write(&mut written, site, image)?;

@@ -14,6 +14,7 @@ use crate::{
         convert_datum::FileConversion,
         fit_sensor_model::SensorModel,
         group_profiles::Profile,
+        register::ImageRegistration,
         sample_orientation::Orientation,
         tag_times::ImageTimes,
     },
@@ -75,6 +76,8 @@ pub struct ImageProducts<'a> {
     pub orientation: &'a Orientation,
     /// Polynomial models.
     pub model: &'a SensorModel,
+    /// The footprints in the image.
+    pub registration: &'a ImageRegistration,
 }
 
 impl SiteProducts<'_> {

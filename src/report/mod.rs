@@ -23,6 +23,7 @@ mod images;
 mod map;
 mod plots;
 mod ranges;
+mod registration;
 mod scan;
 mod sites;
 mod summary;
@@ -45,6 +46,7 @@ pub fn page(site: &SiteProducts) -> Result<String> {
         Section::new("Range check", ranges::section(site)?),
         Section::new("Clock bias scan", scan::section(site)?),
         Section::new("Exterior orientation", images::section(site)?),
+        Section::new("Registration", registration::section(site)?),
         Section::new("Map", map::section(site)?),
         Section::new("Selection of shots", summary::selection(site)),
         Section::new("Clock corrections and datum", summary::corrections(site)),

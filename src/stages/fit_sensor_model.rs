@@ -12,6 +12,7 @@ use crate::{
         attitude::{OmegaPhiKappa, matrix_of_spice_quaternion, rotation_vector, unwrap_angles},
         ellipsoid::ray_meets_ellipsoid,
         polynomial::{Fit, Polynomial, root_mean_square},
+        pushbroom::{EulerPolynomial, RotationVectorPolynomial, VectorPolynomial},
     },
     units::RADIANS_PER_ARCSECOND,
 };
@@ -64,7 +65,33 @@ pub struct RotationVectorModel {
     pub vector_rad: [Fit; 3],
 }
 
+impl SensorModel {
+    /// The second-order model without gimbal lock, as a function of the line.
+    #[must_use]
+    pub fn rotation_vector_orientation(&self) -> RotationVectorPolynomial {
+        let reference = &self.rotation_vector.reference;
+        RotationVectorPolynomial {
+            path_m: of_fits(&self.second_order.position_m),
+            vector_rad: of_fits(&self.rotation_vector.vector_rad),
+            reference: Matrix3::from_fn(|row, column| reference[row][column]),
+        }
+    }
+}
+
+fn of_fits([x, y, z]: &[Fit; 3]) -> VectorPolynomial {
+    VectorPolynomial::of([&x.polynomial, &y.polynomial, &z.polynomial])
+}
+
 impl EulerModel {
+    /// The model as a function of the line.
+    #[must_use]
+    pub fn orientation(&self) -> EulerPolynomial {
+        EulerPolynomial {
+            path_m: of_fits(&self.position_m),
+            angles_rad: of_fits(&self.angles_rad),
+        }
+    }
+
     /// Norm of the three position RMSE, metres.
     #[must_use]
     pub fn position_rmse_m(&self) -> f64 {

@@ -9,6 +9,7 @@ pub mod convert_datum;
 pub mod fit_sensor_model;
 pub mod group_profiles;
 pub mod intersect;
+pub mod register;
 pub mod sample_orientation;
 pub mod search_footprints;
 pub mod tag_times;

@@ -1,18 +1,20 @@
 //! A small site made by hand: one orbit across the antimeridian, one image, one outlier.
 
-use std::collections::BTreeMap;
+use std::{collections::BTreeMap, sync::atomic::AtomicBool};
 
 use areograph::{
     config::{
-        BiasScope, DatumChoice, KernelList, KernelSource, KernelsConfig, MolaClock,
-        OrientationConfig, PedrConfig, PointingConfig, RangeCheckConfig, ShotFilter, SiteConfig,
-        TagSign, WindowConfig, WindowShape,
+        BiasScope, CameraModel, DatumChoice, KernelList, KernelSource, KernelsConfig, MolaClock,
+        OrientationConfig, PedrConfig, PointingConfig, RangeCheckConfig, RegistrationConfig,
+        ShotFilter, SiteConfig, TagSign, WindowConfig, WindowShape,
     },
     constants::MGS_POINTING_BIAS,
     footprints::{Footprint, Footprints, SourceFile},
     frames::{MarsDatum, MarsIau2000},
     geom::{
         attitude::{OmegaPhiKappa, spice_quaternion},
+        ellipsoid::Spherical,
+        pushbroom::ExteriorOrientation,
         statistics::{Summary, Trend},
     },
     products::{ImageProducts, KernelLine, SiteProducts},
@@ -22,6 +24,7 @@ use areograph::{
         convert_datum::FileConversion,
         fit_sensor_model::{SensorModel, fit_sensor_model},
         group_profiles::{Profile, group_profiles},
+        register::{ImageRegistration, register},
         sample_orientation::{
             BoresightGround, CameraTables, GroundPoint, Orientation, OrientationSample,
         },
@@ -47,6 +50,7 @@ pub(crate) struct Site {
     pub(crate) utc: Vec<String>,
     pub(crate) profiles: Vec<Profile>,
     pub(crate) ranges: RangeCheck,
+    pub(crate) registration: ImageRegistration,
     pub(crate) rejected: BTreeMap<String, u64>,
     pub(crate) complaints: Vec<String>,
     pub(crate) notes: Vec<String>,
@@ -61,6 +65,20 @@ impl Site {
         let orientation = orientation(&times);
         let footprints = footprints();
         let profiles = group_profiles(&footprints, &config.windows, std::slice::from_ref(&times));
+        let model = fit_sensor_model(&orientation, &config.orientation).unwrap();
+        // Shots and camera of this site have nothing to do with each other: without a move none would be seen.
+        let mut seen = footprints.clone();
+        move_under_the_camera(&mut seen, &model);
+        let registration = register(
+            &times,
+            &orientation,
+            &model,
+            &seen,
+            &profiles,
+            &config.registration,
+            &AtomicBool::new(false),
+        )
+        .unwrap();
         Self {
             kernels: vec![
                 kernel("naif0012.tls", "LSK", None),
@@ -78,7 +96,8 @@ impl Site {
             },
             warnings: Vec::new(),
             conversions: vec![FileConversion::default()],
-            model: fit_sensor_model(&orientation, &config.orientation).unwrap(),
+            model,
+            registration,
             utc: (0..footprints.len())
                 .map(|row| format!("1999-08-24T14:12:{:06.3}", 13.0 + 0.1 * row as f64))
                 .collect(),
@@ -141,6 +160,7 @@ impl Site {
             times: &self.times,
             orientation: &self.orientation,
             model: &self.model,
+            registration: &self.registration,
         }];
         with(&SiteProducts {
             config: &self.config,
@@ -233,7 +253,30 @@ fn config() -> SiteConfig {
             position_rmse_max_m: 5.0,
             pointing_rmse_max_rad: 1e-4,
         },
+        registration: RegistrationConfig {
+            model: CameraModel::RotationVector,
+            tolerance_lines: 0.1,
+            steps_max: 100,
+        },
     }
+}
+
+/// Moves every footprint to where the camera looks, 40 lines apart; the last third lies beyond the image.
+pub(crate) fn move_under_the_camera(footprints: &mut Footprints<MarsIau2000>, model: &SensorModel) {
+    let camera = model.rotation_vector_orientation();
+    for row in 0..footprints.len() {
+        let pose = camera.pose(line_offset(row));
+        let boresight = pose.mars_to_camera.row(2).transpose();
+        let ground = Spherical::from_xyz_m(&(pose.position_m + boresight * 380_000.0));
+        footprints.radius_m[row] = ground.radius_m;
+        footprints.latitude_rad[row] = ground.latitude.0;
+        footprints.longitude_rad[row] = ground.longitude_rad;
+    }
+}
+
+/// Line from the middle under which [`move_under_the_camera`] puts the footprint in `row`.
+pub(crate) fn line_offset(row: usize) -> f64 {
+    40.0 * (row as f64 - 20.0)
 }
 
 fn image_times() -> ImageTimes {
@@ -255,16 +298,16 @@ fn image_times() -> ImageTimes {
     }
 }
 
-/// A camera that moves along a slightly bent line and turns a little.
+/// A camera that moves along a slightly bent line, looks at Mars, flies along its −X and turns a little.
 fn orientation(times: &ImageTimes) -> Orientation {
     let samples = (0..=30)
         .map(|k| {
             let et = times.start.plus(f64::from(k) / 30.0 * times.duration_s());
             let u = f64::from(k) / 15.0 - 1.0;
             let angles = OmegaPhiKappa {
-                omega_rad: 0.2 + 0.01 * u,
-                phi_rad: -1.3 + 0.002 * u + 1e-6 * (5.0 * u).sin(),
-                kappa_rad: -2.2 + 0.01 * u,
+                omega_rad: 1.57 + 0.01 * u,
+                phi_rad: -0.733 + 0.002 * u + 1e-6 * (5.0 * u).sin(),
+                kappa_rad: 1.57 + 0.01 * u,
             };
             OrientationSample {
                 et,

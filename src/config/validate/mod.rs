@@ -21,10 +21,10 @@ use crate::{
 
 use super::{
     problems::Review,
-    raw::{RawMolaClock, RawOrientation, RawPointing, RawRangeCheck, RawSite},
+    raw::{RawMolaClock, RawOrientation, RawPointing, RawRangeCheck, RawRegistration, RawSite},
     site::{
-        BiasScope, MolaClock, OrientationConfig, PointingConfig, RangeCheckConfig, SCAN_STEPS_MAX,
-        SiteConfig, TagSign,
+        BiasScope, CameraModel, MolaClock, OrientationConfig, PointingConfig, RangeCheckConfig,
+        RegistrationConfig, SCAN_STEPS_MAX, SiteConfig, TagSign,
     },
 };
 use values::Accept;
@@ -67,6 +67,7 @@ pub(super) fn validate(
         images: images::images(raw.images, review),
         range_check: range_check(&inner(raw.range_check), review),
         orientation: orientation(&inner(raw.orientation), review),
+        registration: registration(&inner(raw.registration), review),
     }
 }
 
@@ -211,6 +212,28 @@ fn orientation(raw: &RawOrientation, review: &mut Review<'_>) -> OrientationConf
                 Accept::AboveTo(0.0, 3600.0),
                 10.0,
             ),
+    }
+}
+
+fn registration(raw: &RawRegistration, review: &mut Review<'_>) -> RegistrationConfig {
+    RegistrationConfig {
+        model: review
+            .word(
+                "registration.model",
+                raw.model.as_ref(),
+                &CameraModel::WORDS,
+            )
+            .unwrap_or(CameraModel::RotationVector),
+        tolerance_lines: review.number(
+            "registration.tolerance_lines",
+            &raw.tolerance_lines,
+            // Below, steps drown in the rounding of coordinates: 1e-9 m of 4e6 m, lines of metres.
+            Accept::FromTo(1e-6, 100.0),
+            0.1,
+        ),
+        steps_max: review
+            .whole("registration.steps_max", raw.steps_max.as_ref(), 1, 10_000)
+            .unwrap_or(100),
     }
 }
 

@@ -94,7 +94,7 @@ const ALONG_SHARE_MIN: f64 = 0.01;
 ///
 /// # Errors
 /// [`Unseen::AcrossFlight`], [`Unseen::NotFinite`].
-fn flight_sense(model: &impl ExteriorOrientation) -> Result<f64, Unseen> {
+fn flight_sense(model: &(impl ExteriorOrientation + ?Sized)) -> Result<f64, Unseen> {
     let (pose, motion) = model.moving(0.0);
     let along_m = (pose.mars_to_camera * motion.advance_m).x;
     if !along_m.is_finite() {

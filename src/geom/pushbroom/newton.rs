@@ -16,7 +16,7 @@ const EVALUATIONS_MAX: u32 = 20;
 /// `q1` and its slope are tabulated at a few lines, so that a point in the image needs one or two
 /// evaluations of the orientation.
 #[derive(Debug, Clone)]
-pub struct Projector<'a, M> {
+pub struct Projector<'a, M: ?Sized> {
     model: &'a M,
     half_lines: f64,
     nodes_per_line: f64,
@@ -34,7 +34,7 @@ struct Node {
 }
 
 impl Node {
-    fn of(model: &impl ExteriorOrientation, x: f64) -> Self {
+    fn of(model: &(impl ExteriorOrientation + ?Sized), x: f64) -> Self {
         let (pose, motion) = model.moving(x);
         let m = &pose.mars_to_camera;
         let turn = &motion.turn_rad;
@@ -55,7 +55,7 @@ impl Node {
     }
 }
 
-impl<'a, M: ExteriorOrientation> Projector<'a, M> {
+impl<'a, M: ExteriorOrientation + ?Sized> Projector<'a, M> {
     /// Prepares an image of `lines` lines.
     ///
     /// # Errors
@@ -76,6 +76,12 @@ impl<'a, M: ExteriorOrientation> Projector<'a, M> {
             nodes_per_line: spacing.recip(),
             nodes,
         })
+    }
+
+    /// The orientation.
+    #[must_use]
+    pub const fn model(&self) -> &'a M {
+        self.model
     }
 
     #[allow(

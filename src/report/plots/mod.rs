@@ -3,7 +3,7 @@
 mod draw;
 mod figure;
 
-pub(super) use draw::{Canvas, Drawn, draw_text, drawn};
+pub(super) use draw::{Canvas, Drawn, draw_text, drawn, label};
 pub(super) use figure::{Key, figure_html};
 
 use std::fmt::Write as _;
@@ -244,7 +244,7 @@ impl Extent {
         value.clamp(self.low, self.high)
     }
 
-    fn contains(self, value: f64) -> bool {
+    pub(super) fn contains(self, value: f64) -> bool {
         self.low <= value && value <= self.high
     }
 

@@ -1,0 +1,308 @@
+//! Registration: profiles on the image plane, and figure 4 of Shan et al. 2005 for this site.
+
+use super::{
+    html::{Column, Table, heading, paragraph},
+    plots::{COLOURS, Extent, GREY, INK, Mark, Panel, Plot, Series, Style, figure, label, thinned},
+};
+use crate::{
+    config::CameraModel,
+    error::Result,
+    products::{ImageProducts, SiteProducts},
+    stages::{
+        group_profiles::Profile,
+        register::{Method, MethodRun},
+    },
+};
+
+/// Profiles that have a colour of their own; the others share the last, grey one.
+const COLOURED: usize = COLOURS.len() - 1;
+/// Dots of one series.
+const DOTS_MAX: usize = 600;
+/// Widths of the image that are shown on either side of it.
+const WIDTHS_BESIDE: f64 = 1.0;
+
+/// Tables and plots.
+///
+/// # Errors
+/// A plot that cannot be drawn.
+pub(super) fn section(site: &SiteProducts) -> Result<String> {
+    let registered = |image: &&ImageProducts| !image.registration.points.is_empty();
+    let images: Vec<&ImageProducts> = site.images.iter().filter(registered).collect();
+    if images.is_empty() {
+        return Ok(String::new());
+    }
+    let mut planes = String::new();
+    for image in &images {
+        planes += &figure(&plane(site.profiles, image))?;
+    }
+    let mut convergence = String::new();
+    for image in images.iter().filter(|image| converges(image)) {
+        convergence += &figure(&convergence_plot(image))?;
+    }
+    let mut html = profiles(site, &images) + &format!("<div class=\"plots\">\n{planes}</div>\n");
+    html += &heading("From the ground to the image");
+    html += &methods(site, &images);
+    if !convergence.is_empty() {
+        html += &format!("<div class=\"plots\">\n{convergence}</div>\n");
+    }
+    Ok(html + &models(&images))
+}
+
+/// Which profile the images show, and where.
+fn profiles(site: &SiteProducts, images: &[&ImageProducts]) -> String {
+    let mut table = Table::new(
+        "Profiles in the images",
+        &[
+            Column::Text("image"),
+            Column::Text("profile"),
+            Column::Text("exposed with it"),
+            Column::Number("footprints in the image"),
+            Column::Number("lines"),
+            Column::Number("samples"),
+            Column::Number("shot spacing, lines"),
+        ],
+    );
+    let mut elsewhere = 0;
+    for image in images {
+        let points = &image.registration.points;
+        let each = site.profiles.iter().zip(&image.registration.profiles);
+        for (index, (profile, on_image)) in (0_u32..).zip(each) {
+            if on_image.inside == 0 {
+                elsewhere += 1;
+                continue;
+            }
+            let inside = |values: &[f64]| {
+                let of = points.profile.iter().zip(&points.inside).zip(values);
+                let own = of.filter(|((profile, inside), _)| **profile == index && **inside);
+                let (low, high) = own.fold((f64::INFINITY, f64::NEG_INFINITY), |ends, (_, at)| {
+                    (ends.0.min(*at), ends.1.max(*at))
+                });
+                format!("{low:.0} to {high:.0}")
+            };
+            let with = |simultaneous: &str| simultaneous == image.times.id;
+            let together = profile.simultaneous.iter().any(|of| with(&of.image));
+            let spacing = on_image.shot_spacing_lines;
+            table.row(
+                true,
+                [
+                    (&image.times.id).into(),
+                    (&profile.id).into(),
+                    if together { "yes" } else { "no" }.into(),
+                    on_image.inside.to_string().into(),
+                    inside(&points.line).into(),
+                    inside(&points.sample).into(),
+                    spacing
+                        .map_or_else(|| "–".to_owned(), |lines| format!("{lines:.1}"))
+                        .into(),
+                ],
+            );
+        }
+    }
+    let rejected: u64 = images
+        .iter()
+        .flat_map(|image| image.registration.rejected.values())
+        .sum();
+    let words = format!(
+        "Every profile is projected into every image. {elsewhere} pairs of profile and image without a footprint in the \
+         image are left out here; {rejected} footprints have no place in an image at all (behind the camera, beyond \
+         the horizon)."
+    );
+    table.finish() + &paragraph(&words)
+}
+
+/// Footprints near the image, over its lines.
+fn plane(profiles: &[Profile], image: &ImageProducts) -> Plot {
+    let points = &image.registration.points;
+    let (lines, samples) = (
+        f64::from(image.times.lines_header),
+        f64::from(image.times.samples),
+    );
+    let beside = WIDTHS_BESIDE * samples;
+    let near = Extent {
+        low: -beside,
+        high: samples + beside,
+    };
+    let mut dots: Vec<Vec<(f64, f64)>> = vec![Vec::new(); profiles.len()];
+    for index in 0..points.len() {
+        let (line, sample) = (points.line[index], points.sample[index]);
+        if !points.extrapolated[index] && near.contains(sample) {
+            dots[points.profile[index] as usize].push((line, sample));
+        }
+    }
+    let mut series: Vec<Series> = Vec::new();
+    let mut others = Vec::new();
+    for (profile, dots) in profiles.iter().zip(dots) {
+        if dots.is_empty() {
+            continue;
+        }
+        if series.len() < COLOURED {
+            series.push(Series {
+                label: profile.id.clone(),
+                style: Style::Dots,
+                colour: series.len(),
+                points: thinned(&dots, DOTS_MAX),
+            });
+        } else {
+            others.extend(dots);
+        }
+    }
+    if !others.is_empty() {
+        series.push(Series {
+            label: "other profiles".to_owned(),
+            style: Style::Dots,
+            colour: GREY,
+            points: thinned(&others, DOTS_MAX),
+        });
+    }
+    let shown = series.len();
+    let ends = [0.0, f64::from(image.times.lines_delivered)].map(|x| Mark {
+        x,
+        half_width: 0.0,
+        colour: INK,
+    });
+    let panel = Panel {
+        y: near,
+        limits: vec![0.0, samples],
+        marks: ends.to_vec(),
+        ..Panel::of("sample", series)
+    };
+    let words = format!(
+        "Footprints on the image plane, flight to the right; level and upright lines are the edges of the delivered \
+         image. {} of {} footprints lie in the image, {shown} series are near it.",
+        points.inside_count(),
+        points.len()
+    );
+    Plot {
+        x: Extent::of([0.0, lines].into_iter()),
+        ..Plot::of(
+            format!("Profiles on {}", image.times.id),
+            words,
+            "line",
+            vec![panel],
+        )
+    }
+}
+
+fn name(run: &MethodRun) -> String {
+    let method = match run.method {
+        Method::FrameFirst => "frame first",
+        Method::FixedPoint => "fixed point, eq. 4",
+    };
+    format!("{method}, order {}", order(run.model))
+}
+
+const fn order(model: CameraModel) -> &'static str {
+    match model {
+        CameraModel::FirstOrder => "1",
+        _ => "2",
+    }
+}
+
+/// What the published iterations cost on this site's footprints.
+fn methods(site: &SiteProducts, images: &[&ImageProducts]) -> String {
+    let mut table = Table::new(
+        "Iterations per footprint within the image's lines",
+        &[
+            Column::Text("image"),
+            Column::Text("method"),
+            Column::Number("footprints"),
+            Column::Number("converged"),
+            Column::Number("iterations, mean"),
+            Column::Number("most"),
+            Column::Number("line − Newton's, mean"),
+            Column::Number("standard deviation"),
+        ],
+    );
+    for image in images {
+        for run in &image.registration.methods {
+            let difference = &run.difference_lines;
+            table.row(
+                u64::from(run.evaluations.n) == run.points,
+                [
+                    (&image.times.id).into(),
+                    name(run).into(),
+                    run.points.to_string().into(),
+                    run.evaluations.n.to_string().into(),
+                    format!("{:.2}", run.evaluations.mean).into(),
+                    format!("{:.0}", run.evaluations.max).into(),
+                    label(difference.mean, 4).into(),
+                    label(difference.standard_deviation, 4).into(),
+                ],
+            );
+        }
+    }
+    let words = format!(
+        "Tolerance {} lines, at most {} steps. Shan et al. 2005 print 13.6 (frame first) and 2.9 (eq. 4) for Eos, 17.1 \
+         and 5.6 for Gusev. Frame first converges by the aspect ratio of the pixels and diverges where a line is \
+         more than twice as long as a pixel; eq. 4 by what the camera turns from line to line.",
+        site.config.registration.tolerance_lines, site.config.registration.steps_max
+    );
+    table.finish() + &paragraph(&words)
+}
+
+/// Whether an iteration has steps to be drawn.
+fn converges(image: &ImageProducts) -> bool {
+    let mut runs = image.registration.methods.iter();
+    runs.any(|run| !run.mean_step_lines.is_empty())
+}
+
+/// Figure 4: the mean step of every iteration.
+fn convergence_plot(image: &ImageProducts) -> Plot {
+    // The curves of first order lie on those of second.
+    let runs = image.registration.methods.iter();
+    let second_order = runs.filter(|run| run.model == CameraModel::SecondOrder);
+    let series = second_order.enumerate().map(|(colour, run)| {
+        let steps = (1_u32..).zip(&run.mean_step_lines);
+        let logarithms = steps
+            .filter(|(_, step)| **step > 0.0)
+            .map(|(iteration, step)| (f64::from(iteration), step.log10()));
+        Series::line(name(run), colour, logarithms.collect())
+    });
+    let words = "Mean size of each step over the footprints within the image's lines, as a power of ten in lines; a \
+         footprint that has ended counts as no step."
+        .to_owned();
+    Plot::of(
+        format!("Convergence on {}", image.times.id),
+        words,
+        "iteration",
+        vec![Panel::of("log10 of mean |step|", series.collect())],
+    )
+}
+
+/// What the choice of the model moves.
+fn models(images: &[&ImageProducts]) -> String {
+    let mut table = Table::new(
+        "Other models against the one used, footprints within the image's lines",
+        &[
+            Column::Text("image"),
+            Column::Text("used"),
+            Column::Text("other"),
+            Column::Number("lines, mean"),
+            Column::Number("standard deviation"),
+            Column::Number("samples, mean"),
+            Column::Number("standard deviation"),
+        ],
+    );
+    let word = |wanted: CameraModel| {
+        let words = CameraModel::WORDS.into_iter();
+        words
+            .filter(|(_, model)| *model == wanted)
+            .map(|(word, _)| word.replace('_', " "))
+            .collect::<String>()
+    };
+    for image in images {
+        for other in &image.registration.models {
+            let mut cells = vec![
+                (&image.times.id).into(),
+                word(image.registration.model).into(),
+                word(other.model).into(),
+            ];
+            for summary in [&other.lines, &other.samples] {
+                cells.push(label(summary.mean, 4).into());
+                cells.push(label(summary.standard_deviation, 4).into());
+            }
+            table.row(true, cells);
+        }
+    }
+    table.finish()
+}

@@ -1,0 +1,294 @@
+//! Registration: which line and sample of an image sees each footprint.
+//!
+//! Every profile goes into every image, not only into the one exposed with it. Production is Newton's
+//! method; the published iterations run beside it on the same points, so that what they cost and how they
+//! converge is known for this site.
+
+mod methods;
+mod points;
+
+use std::{collections::BTreeMap, sync::atomic::AtomicBool};
+
+use nalgebra::Vector3;
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+
+pub use methods::{Method, MethodRun};
+pub use points::{PointOnImage, ProfileOnImage, RegisteredPoints};
+
+use super::{
+    fit_sensor_model::SensorModel,
+    group_profiles::Profile,
+    sample_orientation::{Orientation, OrientationSample},
+    tag_times::ImageTimes,
+};
+use crate::{
+    config::{CameraModel, RegistrationConfig},
+    error::{Fault, Kind, Result, Stopped},
+    footprints::Footprints,
+    frames::MarsIau2000,
+    geom::{
+        attitude::matrix_of_spice_quaternion,
+        ellipsoid::spherical_to_xyz_m,
+        pushbroom::{
+            Detector, EulerPolynomial, ExteriorOrientation, Pose, Projector,
+            RotationVectorPolynomial, SampledOrientation, SamplesFault, Unseen,
+        },
+        statistics::Summary,
+    },
+};
+
+/// Points between two looks at whether the user stops the program.
+const POINTS_AT_ONCE: usize = 65_536;
+
+/// The footprints of a site in one image.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ImageRegistration {
+    /// Image identifier.
+    pub image: String,
+    /// The orientation that points were projected with.
+    pub model: CameraModel,
+    /// Points that have a line, ordered by profile, then by shot.
+    pub points: RegisteredPoints,
+    /// Points that have none, by reason.
+    pub rejected: BTreeMap<String, u64>,
+    /// One entry per profile, in the order of the profiles.
+    pub profiles: Vec<ProfileOnImage>,
+    /// The published iterations on the points within the image's lines.
+    pub methods: Vec<MethodRun>,
+    /// The other models against `model`, on the points within the image's lines.
+    pub models: Vec<ModelDifference>,
+}
+
+/// What another model of the same image makes of the same points.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ModelDifference {
+    /// The other model.
+    pub model: CameraModel,
+    /// Its line minus the one of the production model.
+    pub lines: Summary,
+    /// Its sample minus the one of the production model.
+    pub samples: Summary,
+}
+
+/// Samples that are no orientation.
+#[derive(Debug, thiserror::Error)]
+#[error("image {image}: {fault}")]
+struct NoOrientation {
+    image: String,
+    fault: SamplesFault,
+}
+
+impl Fault for NoOrientation {
+    fn kind(&self) -> Kind {
+        Kind::Input
+    }
+
+    fn advice(&self) -> String {
+        "raise orientation.intervals, and check the kernels of the image's time".to_owned()
+    }
+}
+
+/// Why a footprint has no place in an image.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+enum Reject {
+    #[error(transparent)]
+    Unseen(#[from] Unseen),
+    /// Mars itself stands between camera and point.
+    #[error("beyond the horizon")]
+    BeyondHorizon,
+}
+
+/// The image with its orientation in every form.
+pub(super) struct Camera<'a> {
+    pub(super) image: &'a ImageTimes,
+    pub(super) detector: Detector,
+    pub(super) first_order: EulerPolynomial,
+    pub(super) second_order: EulerPolynomial,
+    rotation_vector: RotationVectorPolynomial,
+    samples: SampledOrientation,
+}
+
+/// Projects all profiles into `image`.
+///
+/// Footprints are taken with the radius before the crossover correction, as in the products' x, y and z.
+/// `stop` is looked at between blocks of points. With an orientation that sees nothing all points are rejected.
+///
+/// # Errors
+/// Samples that are no orientation; [`Stopped`].
+/// # Source
+/// Shan et al. 2005, eq. 3 and 4; Shan, Lee & Yoon 2002.
+pub fn register(
+    image: &ImageTimes,
+    orientation: &Orientation,
+    model: &SensorModel,
+    footprints: &Footprints<MarsIau2000>,
+    profiles: &[Profile],
+    config: &RegistrationConfig,
+    stop: &AtomicBool,
+) -> Result<ImageRegistration> {
+    let camera = Camera::of(image, orientation, model)?;
+    let shots: Vec<(u32, u32)> = (0_u32..)
+        .zip(profiles)
+        .flat_map(|(profile, of)| of.rows.iter().map(move |row| (profile, *row)))
+        .collect();
+    let projector = camera.projector(config.model);
+    let mut points = RegisteredPoints::default();
+    let mut rejected = BTreeMap::new();
+    for block in shots.chunks(POINTS_AT_ONCE) {
+        Stopped::check(stop)?;
+        let placed: Vec<_> = block
+            .par_iter()
+            .map(|(_, row)| {
+                let projector = projector.as_ref().map_err(|unseen| *unseen)?;
+                camera.place(projector, &ground_m(footprints, *row))
+            })
+            .collect();
+        for ((profile, row), placed) in block.iter().zip(placed) {
+            match placed {
+                Ok(point) => points.push(*profile, *row, &point),
+                Err(reject) => *rejected.entry(reject.to_string()).or_insert(0) += 1,
+            }
+        }
+    }
+    let on_lines = points.on_lines();
+    let ground: Vec<Vector3<f64>> = on_lines
+        .iter()
+        .map(|index| ground_m(footprints, points.row[*index]))
+        .collect();
+    let methods = methods::run(&camera, &ground, config, stop)?;
+    points.count(Method::FrameFirst, &on_lines, &methods);
+    points.count(Method::FixedPoint, &on_lines, &methods);
+    Ok(ImageRegistration {
+        image: image.id.clone(),
+        model: config.model,
+        profiles: points::on_image(&points, profiles.len()),
+        models: camera.differences(config.model, &points, &on_lines, &ground),
+        methods: methods.into_iter().map(|(run, _)| run).collect(),
+        points,
+        rejected,
+    })
+}
+
+/// Position of a footprint, metres.
+fn ground_m(footprints: &Footprints<MarsIau2000>, row: u32) -> Vector3<f64> {
+    let row = row as usize;
+    spherical_to_xyz_m(
+        footprints.longitude_rad[row],
+        footprints.latitude_rad[row],
+        footprints.radius_m[row],
+    )
+}
+
+/// Every sample as a line with its pose.
+fn poses(samples: &[OrientationSample]) -> Vec<(f64, Pose)> {
+    let pose = |sample: &OrientationSample| Pose {
+        position_m: sample.position_m.into(),
+        mars_to_camera: matrix_of_spice_quaternion(sample.camera_to_mars).transpose(),
+    };
+    samples
+        .iter()
+        .map(|sample| (sample.line_offset, pose(sample)))
+        .collect()
+}
+
+impl<'a> Camera<'a> {
+    fn of(image: &'a ImageTimes, orientation: &Orientation, model: &SensorModel) -> Result<Self> {
+        let sampled = SampledOrientation::new(&poses(&orientation.samples)).map_err(|fault| {
+            let image = image.id.clone();
+            NoOrientation { image, fault }
+        })?;
+        let (summing, first) = (image.crosstrack_summing, image.first_detector);
+        Ok(Self {
+            image,
+            detector: Detector::moc_na(summing, first, image.samples),
+            first_order: model.first_order.orientation(),
+            second_order: model.second_order.orientation(),
+            rotation_vector: model.rotation_vector_orientation(),
+            samples: sampled,
+        })
+    }
+
+    fn lines(&self) -> f64 {
+        f64::from(self.image.lines_header)
+    }
+
+    pub(super) fn projector(
+        &self,
+        wanted: CameraModel,
+    ) -> std::result::Result<Projector<'_, dyn ExteriorOrientation>, Unseen> {
+        let model: &dyn ExteriorOrientation = match wanted {
+            CameraModel::FirstOrder => &self.first_order,
+            CameraModel::SecondOrder => &self.second_order,
+            CameraModel::RotationVector => &self.rotation_vector,
+            CameraModel::Samples => &self.samples,
+        };
+        Projector::new(model, self.lines())
+    }
+
+    /// Line and sample of a point.
+    fn place(
+        &self,
+        projector: &Projector<'_, dyn ExteriorOrientation>,
+        point_m: &Vector3<f64>,
+    ) -> std::result::Result<PointOnImage, Reject> {
+        let solution = projector.project(point_m)?;
+        let pose = projector.model().pose(solution.x);
+        // Seen from the point, the camera must stand above the horizon of a sphere through it.
+        if !(point_m.dot(&(pose.position_m - point_m)) > 0.0) {
+            return Err(Reject::BeyondHorizon);
+        }
+        let focal_px = self.detector.focal_px(&pose.camera_vector_m(point_m));
+        let focal_px = focal_px.map_err(|_| Unseen::BehindCamera)?;
+        let line = solution.x + 0.5 * self.lines();
+        let sample = self.detector.sample(focal_px.y);
+        let delivered = 0.0..=f64::from(self.image.lines_delivered);
+        Ok(PointOnImage {
+            line,
+            sample,
+            line_offset: solution.x,
+            y_px: focal_px.y,
+            range_m: solution.camera_m.norm(),
+            residual_px: focal_px.x,
+            step_lines: solution.step_lines,
+            evaluations: solution.evaluations,
+            inside: delivered.contains(&line) && (0.0..=self.detector.samples).contains(&sample),
+            extrapolated: solution.x.abs() > 0.5 * self.lines(),
+        })
+    }
+
+    /// The models other than `production` on the points `on_lines`, which lie at `ground`.
+    fn differences(
+        &self,
+        production: CameraModel,
+        points: &RegisteredPoints,
+        on_lines: &[usize],
+        ground: &[Vector3<f64>],
+    ) -> Vec<ModelDifference> {
+        let others = CameraModel::WORDS.map(|(_, model)| model).into_iter();
+        let difference = |model| {
+            let projector = self.projector(model).ok()?;
+            let apart: Vec<Option<(f64, f64)>> = ground
+                .par_iter()
+                .zip(on_lines)
+                .map(|(point_m, index)| {
+                    let other = self.place(&projector, point_m).ok()?;
+                    Some((
+                        other.line - points.line[*index],
+                        other.sample - points.sample[*index],
+                    ))
+                })
+                .collect();
+            let (lines, samples): (Vec<f64>, Vec<f64>) = apart.into_iter().flatten().unzip();
+            Some(ModelDifference {
+                model,
+                lines: Summary::of(&lines),
+                samples: Summary::of(&samples),
+            })
+        };
+        others
+            .filter(|model| *model != production)
+            .filter_map(difference)
+            .collect()
+    }
+}
