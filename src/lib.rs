@@ -20,5 +20,6 @@ pub mod scene;
 pub mod spice;
 pub mod stages;
 pub mod store;
+pub mod ties;
 pub mod time;
 pub mod units;

@@ -20,6 +20,7 @@ const FLOORS: [&[&str]; 6] = [
         "constants",
         "error",
         "footprints",
+        "ties",
         "files",
         "config",
     ],

@@ -1,14 +1,19 @@
 //! Pure geometry: no files, no clocks, no SPICE.
 
 pub mod attitude;
+pub mod bundle;
 pub mod chebyshev;
 pub mod collinearity;
 pub mod ellipsoid;
+pub mod intersection;
 pub mod lagrange;
 pub mod map_projection;
 pub mod mars_rotation;
+pub mod normal_equations;
 pub mod orbit_axes;
 pub mod polynomial;
 pub mod pushbroom;
+pub mod robust;
 pub mod statistics;
+pub mod stereo;
 pub mod window;

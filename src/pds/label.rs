@@ -14,6 +14,8 @@ pub const LABEL_BYTES_MAX: usize = 1 << 20;
 pub struct Entry {
     /// Name of the object or group that it stands in, upper case; empty outside of any.
     pub group: String,
+    /// Number of that object or group, counted from 1 in the order of their openings; 0 outside of any.
+    pub block: usize,
     /// The keyword in upper case.
     pub key: String,
     /// The value without quotes and unit, white space over line ends made one blank.
@@ -72,12 +74,18 @@ impl Fault for LabelFault {
 /// # Errors
 /// [`LabelFault::NoLabel`] when there is no assignment.
 pub fn parse(bytes: &[u8]) -> Result<Label, LabelFault> {
-    let mut scanner = Scanner {
-        bytes: &bytes[..bytes.len().min(LABEL_BYTES_MAX)],
-        at: 0,
-    };
+    parse_whole(&bytes[..bytes.len().min(LABEL_BYTES_MAX)])
+}
+
+/// The same for text of any length, as that of control networks.
+///
+/// # Errors
+/// [`LabelFault::NoLabel`] when there is no assignment.
+pub fn parse_whole(bytes: &[u8]) -> Result<Label, LabelFault> {
+    let mut scanner = Scanner { bytes, at: 0 };
     let mut label = Label::default();
-    let mut groups: Vec<String> = Vec::new();
+    let mut groups: Vec<(String, usize)> = Vec::new();
+    let mut blocks = 0;
     while let Some(word) = scanner.word() {
         let key = word.to_ascii_uppercase();
         let after_word = scanner.at;
@@ -98,21 +106,21 @@ pub fn parse(bytes: &[u8]) -> Result<Label, LabelFault> {
         match key.as_str() {
             "OBJECT" | "GROUP" | "BEGIN_OBJECT" | "BEGIN_GROUP" => {
                 // Every entry repeats its group's name, so junk must not make it long.
-                groups.push(
-                    value
-                        .chars()
-                        .take(64)
-                        .collect::<String>()
-                        .to_ascii_uppercase(),
-                );
+                let name: String = value.chars().take(64).collect();
+                blocks += 1;
+                groups.push((name.to_ascii_uppercase(), blocks));
             }
             "END_OBJECT" | "END_GROUP" | "ENDOBJECT" | "ENDGROUP" => drop(groups.pop()),
-            _ => label.entries.push(Entry {
-                group: groups.last().cloned().unwrap_or_default(),
-                key,
-                value,
-                unit,
-            }),
+            _ => {
+                let (group, block) = groups.last().cloned().unwrap_or_default();
+                label.entries.push(Entry {
+                    group,
+                    block,
+                    key,
+                    value,
+                    unit,
+                });
+            }
         }
     }
     if label.entries.is_empty() {
@@ -259,6 +267,8 @@ mod tests {
         let lines = label.find_in("DIMENSIONS", "LINES").unwrap();
         assert_eq!(lines.value, "12");
         assert_eq!(label.find_in("ISISCUBE", "LINES"), None);
+        let blocks = ["A", "LINES", "D", "E"].map(|key| label.find(key).unwrap().block);
+        assert_eq!(blocks, [0, 2, 1, 0]);
     }
 
     #[test]

@@ -2,12 +2,15 @@
 //!
 //! No stage calls another, prints, or knows of another's files. [`crate::flow`] puts them in order.
 
+pub mod adjust;
 pub mod check_ranges;
 pub mod compare_kernels;
 pub mod convert_datum;
 pub mod fit_sensor_model;
 pub mod group_profiles;
+pub mod intersect;
 pub mod register;
 pub mod sample_orientation;
 pub mod search_footprints;
 pub mod tag_times;
+pub mod uncertainty;

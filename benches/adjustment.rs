@@ -1,0 +1,76 @@
+//! Times of the combined adjustment: the recipe, and many tie points in twenty images.
+#![allow(
+    clippy::unwrap_used,
+    clippy::print_stdout,
+    reason = "a benchmark prints its times and may fail loudly"
+)]
+
+#[path = "../tests/network/recipe.rs"]
+mod recipe;
+#[path = "../tests/pushbroom/scene.rs"]
+mod scene;
+
+use std::time::Instant;
+
+use areograph::geom::bundle::{BundleOptions, Network, View, solve};
+use recipe::{Normals, Recipe};
+
+const IMAGES: usize = 20;
+
+/// Ties in three of twenty images each, so that the images hang together in a ring.
+fn ring(ties: usize) -> Network {
+    let simulated = Recipe {
+        ties,
+        ..Recipe::GUSEV
+    }
+    .simulate();
+    let mut network = simulated.network;
+    let pair = [network.images[0].clone(), network.images[1].clone()];
+    network.images = (0..IMAGES).map(|image| pair[image % 2].clone()).collect();
+    let mut normals = Normals::new(1);
+    let mut third = Vec::new();
+    for view in network
+        .views
+        .iter_mut()
+        .filter(|view| view.point >= simulated.shots)
+    {
+        let first = 2 * (view.point % (IMAGES / 2));
+        if view.image == 0 {
+            third.push(View {
+                image: (first + 2) % IMAGES,
+                x_lines: view.x_lines + normals.next(),
+                y_px: view.y_px + normals.next(),
+                ..*view
+            });
+        }
+        view.image += first;
+    }
+    network.views.extend(third);
+    network
+}
+
+/// Median of `runs` adjustments, seconds, with steps and σ0.
+fn time(what: &str, network: &Network, runs: usize) {
+    let mut seconds: Vec<f64> = Vec::new();
+    let mut result = None;
+    for _ in 0..runs {
+        let start = Instant::now();
+        let adjustment = solve(network, &BundleOptions::default()).unwrap();
+        seconds.push(start.elapsed().as_secs_f64());
+        result = Some((adjustment.steps(), adjustment.sigma0()));
+    }
+    seconds.sort_by(f64::total_cmp);
+    let (steps, sigma0) = result.unwrap();
+    println!(
+        "adjustment, {what}: {:.4} s ({steps} steps, {} views, sigma0 {sigma0:.6})",
+        seconds[runs / 2],
+        network.views.len()
+    );
+}
+
+fn main() {
+    time("recipe", &Recipe::GUSEV.simulate().network, 11);
+    for ties in [25_000, 50_000, 100_000] {
+        time(&format!("{ties} ties in 20 images"), &ring(ties), 3);
+    }
+}

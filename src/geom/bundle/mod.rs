@@ -1,0 +1,288 @@
+//! Combined bundle adjustment of pushbroom images, ground points and laser ranges.
+//!
+//! Unknown are the 18 coefficients of each image's orientation, the ground points, and where asked for a
+//! time bias of each image and a range bias of each profile. Orientation unknowns belong to powers of
+//! `t = x/L`, `L` half the number of lines: all positions are metres, all angles radians, of like size.
+//! Observed are focal coordinates, ranges, and the initial values themselves with their standard
+//! deviations. Residuals are observed minus computed.
+//!
+//! # Source
+//! Yoon & Shan 2004. They state one standard deviation a image for 18 unknowns, in metres; here each
+//! unknown has its own.
+
+mod eliminate;
+mod quality;
+mod rows;
+mod solve;
+mod unknowns;
+
+#[cfg(test)]
+mod tests;
+
+use nalgebra::{DMatrix, Matrix3, Vector2, Vector3};
+
+pub use solve::solve;
+pub use unknowns::Unknown;
+
+use super::{pushbroom::EulerPolynomial, robust::RobustWeight};
+
+/// Orientation unknowns of an image: X, Y, Z, ω, φ, κ, each with powers 0, 1 and 2 of `t`.
+pub const ORIENTATION_UNKNOWNS: usize = 18;
+
+/// An image with its initial orientation.
+#[derive(Debug, Clone, PartialEq)]
+pub struct BundleImage {
+    /// Initial orientation, abscissa in lines from the middle.
+    pub orientation: EulerPolynomial,
+    /// Half the number of lines of the orientation, `L`.
+    pub half_lines: f64,
+    /// Time from line to line, seconds.
+    pub line_period_s: f64,
+    /// Focal length, pixels of the image.
+    pub focal_length_px: f64,
+    /// Standard deviation of each initial unknown at `[3·quantity + power]`, metres and radians;
+    /// infinite leaves it free, 0 holds it fixed.
+    pub sigmas: [f64; ORIENTATION_UNKNOWNS],
+    /// Standard deviation of a bias of all line times of the image, seconds; 0 for no such unknown.
+    pub time_bias_sigma_s: f64,
+}
+
+/// A ground point with its initial coordinates.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct BundlePoint {
+    /// Initial coordinates, Mars-fixed, metres.
+    pub ground_m: Vector3<f64>,
+    /// Standard deviation of each initial coordinate when they are observations, metres.
+    pub sigma_m: Option<Vector3<f64>>,
+}
+
+/// A point measured in an image.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct View {
+    /// Index of the point.
+    pub point: usize,
+    /// Index of the image.
+    pub image: usize,
+    /// Measured line, from the middle of the image.
+    pub x_lines: f64,
+    /// Measured place in the line, pixels from the principal point.
+    pub y_px: f64,
+    /// Standard deviations along and across the track, focal pixels.
+    pub sigma_px: Vector2<f64>,
+}
+
+/// A laser range to a point, from the orbit of an image.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Range {
+    /// Index of the point.
+    pub point: usize,
+    /// Index of the image that was exposed meanwhile.
+    pub image: usize,
+    /// The instant of the shot as a line, `(t_shot − t_mid)/τ`: not the line that the point falls in.
+    pub x_lines: f64,
+    /// Measured distance, metres.
+    pub range_m: f64,
+    /// Its standard deviation, metres.
+    pub sigma_m: f64,
+    /// Index of its profile's bias.
+    pub profile: usize,
+}
+
+/// All that enters an adjustment.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Network {
+    /// Images.
+    pub images: Vec<BundleImage>,
+    /// Points.
+    pub points: Vec<BundlePoint>,
+    /// Image coordinates.
+    pub views: Vec<View>,
+    /// Ranges.
+    pub ranges: Vec<Range>,
+    /// Standard deviation of each profile's range bias, metres; 0 for no such unknown.
+    pub range_bias_sigmas_m: Vec<f64>,
+}
+
+/// How to adjust.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct BundleOptions {
+    /// Weights of image coordinates once the quadratic adjustment has settled.
+    pub robust: Option<RobustWeight>,
+    /// Steps that are taken in each of the two.
+    pub steps_max: u32,
+}
+
+impl Default for BundleOptions {
+    fn default() -> Self {
+        Self {
+            robust: None,
+            steps_max: 100,
+        }
+    }
+}
+
+/// Why a point takes no part.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, thiserror::Error)]
+pub enum Dropped {
+    /// It is observed in no two images and has no coordinates of its own.
+    #[error("too few rays to determine the point")]
+    Undetermined,
+    /// It lies behind a camera that has measured it.
+    #[error("behind a camera that measured it")]
+    BehindCamera,
+}
+
+/// One scalar observation after the adjustment.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Residual {
+    /// Observed minus computed, in the unit of the observation.
+    pub value: f64,
+    /// Its a priori standard deviation.
+    pub sigma: f64,
+    /// Redundancy number, `0..=1`: how much of an error of the observation shows in its residual.
+    pub redundancy: f64,
+    /// Factor of its weight from robust estimation, 1 without.
+    pub weight_factor: f64,
+}
+
+/// Below this redundancy number a residual says nothing about its observation.
+const REDUNDANCY_MIN: f64 = 1e-6;
+
+impl Residual {
+    /// Residual over its own standard deviation when the a priori ones are true; `None` when the
+    /// observation is not controlled by others.
+    #[must_use]
+    pub fn standardised(&self) -> Option<f64> {
+        (self.redundancy > REDUNDANCY_MIN)
+            .then(|| self.value / (self.sigma * self.redundancy.sqrt()))
+    }
+
+    /// Its part of the weighted sum of squares.
+    #[must_use]
+    pub fn weighted_square(&self) -> f64 {
+        self.weight_factor * (self.value / self.sigma).powi(2)
+    }
+}
+
+/// An adjusted image.
+#[derive(Debug, Clone, PartialEq)]
+pub struct AdjustedImage {
+    /// Adjusted orientation.
+    pub orientation: EulerPolynomial,
+    /// Adjusted minus initial unknowns, metres and radians, ordered like [`BundleImage::sigmas`].
+    pub corrections: [f64; ORIENTATION_UNKNOWNS],
+    /// Cofactors of the unknowns in the same order, rows of fixed ones zero; times σ0² the covariance.
+    pub cofactors: DMatrix<f64>,
+    /// Residuals of the initial values, `None` where free or fixed.
+    pub priors: [Option<Residual>; ORIENTATION_UNKNOWNS],
+    /// Time bias, seconds, with the square root of its cofactor, when it is unknown.
+    pub time_bias_s: Option<(f64, f64)>,
+}
+
+/// An adjusted point.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct AdjustedPoint {
+    /// Coordinates, Mars-fixed, metres.
+    pub ground_m: Vector3<f64>,
+    /// Cofactors, m²; times σ0² the covariance.
+    pub cofactor_m2: Matrix3<f64>,
+    /// Residuals of the initial coordinates when they were observed.
+    pub priors: Option<[Residual; 3]>,
+}
+
+/// The adjusted network.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Adjustment {
+    /// Images, in the order of the network.
+    pub images: Vec<AdjustedImage>,
+    /// Points, in the order of the network.
+    pub points: Vec<Result<AdjustedPoint, Dropped>>,
+    /// Residuals along and across the track of each view, focal pixels; `None` for dropped points.
+    pub views: Vec<Option<[Residual; 2]>>,
+    /// Residuals of the ranges, metres; `None` for dropped points.
+    pub ranges: Vec<Option<Residual>>,
+    /// Range bias of each profile with the square root of its cofactor, metres, when it is unknown.
+    pub range_biases_m: Vec<Option<(f64, f64)>>,
+    /// Scalar observations, initial values with a standard deviation included.
+    pub observations: usize,
+    /// Unknowns.
+    pub unknowns: usize,
+    /// Weighted sum of squared residuals.
+    pub weighted_squares: f64,
+    /// The weighted sum before each step and after the last.
+    pub history: Vec<f64>,
+    /// Pairs of unknowns that are correlated by more than 0.95, with the coefficient.
+    pub correlated: Vec<(Unknown, Unknown, f64)>,
+}
+
+impl Adjustment {
+    /// Degrees of freedom: observations minus unknowns.
+    #[must_use]
+    pub fn degrees_of_freedom(&self) -> usize {
+        self.observations - self.unknowns
+    }
+
+    /// A posteriori standard deviation of unit weight, pixels; 1 where nothing is redundant.
+    #[must_use]
+    pub fn sigma0(&self) -> f64 {
+        match self.degrees_of_freedom() {
+            0 => 1.0,
+            free => (self.weighted_squares / free as f64).sqrt(),
+        }
+    }
+
+    /// Steps that were taken.
+    #[must_use]
+    pub fn steps(&self) -> usize {
+        self.history.len() - 1
+    }
+}
+
+/// A network that cannot be adjusted.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum BundleFault {
+    /// A standard deviation, coordinate or number that is none.
+    #[error("{what} {index} has {value}, expected {expected}")]
+    Value {
+        /// What it belongs to.
+        what: &'static str,
+        /// Index in the network.
+        index: usize,
+        /// The value.
+        value: f64,
+        /// What it should be.
+        expected: &'static str,
+    },
+    /// An index of a point, image or profile that the network does not have.
+    #[error("{what} {index} names {named}, which the network does not have")]
+    Unmatched {
+        /// View or range.
+        what: &'static str,
+        /// Its index.
+        index: usize,
+        /// The kind and index that is missing.
+        named: String,
+    },
+    /// Unknowns that nothing tells apart.
+    #[error("the network is singular: nothing tells apart {}", unknowns::names(.unknowns))]
+    Singular {
+        /// The weakest combination.
+        unknowns: Vec<Unknown>,
+    },
+    /// Fewer observations than unknowns.
+    #[error("{observations} observations for {unknowns} unknowns")]
+    Underdetermined {
+        /// Observations.
+        observations: usize,
+        /// Unknowns.
+        unknowns: usize,
+    },
+    /// The steps do not come to rest.
+    #[error("no rest after {steps} steps; weighted sum of squares {weighted_squares:.6e}")]
+    Unsettled {
+        /// Steps taken.
+        steps: usize,
+        /// The sum where it was given up.
+        weighted_squares: f64,
+    },
+}

@@ -1,0 +1,301 @@
+//! What the public interface does not show: derivatives, and the elimination against dense equations.
+
+use nalgebra::{DMatrix, DVector, Vector2, Vector3};
+
+use super::{
+    BundleImage, BundleOptions, BundlePoint, Network, ORIENTATION_UNKNOWNS, Range, View,
+    eliminate::{ByPoint, Layout, reduce},
+    rows, solve,
+    unknowns::{Columns, State},
+};
+use crate::geom::{
+    collinearity::project,
+    pushbroom::{EulerPolynomial, ExteriorOrientation, VectorPolynomial},
+};
+
+const FOCAL_LENGTH_PX: f64 = 3_500.0 / 0.026;
+
+/// A camera that flies north over the equator at longitude zero, `roll_rad` to the side.
+fn image(east_m: f64, roll_rad: f64) -> BundleImage {
+    let path_m = VectorPolynomial {
+        coefficients: [
+            Vector3::new(3_776e3, east_m, -300.0),
+            Vector3::new(0.0, 0.0, 4.4),
+            Vector3::new(-1e-6, 2e-7, 0.0),
+        ],
+    };
+    // Camera axes: X south, Z down; hence M = Ry(−90°) and a turn about X.
+    let angles_rad = VectorPolynomial {
+        coefficients: [
+            Vector3::new(roll_rad, -1.4, 1e-3),
+            Vector3::new(1e-8, 1e-6, -2e-8),
+            Vector3::new(1e-13, -3e-12, 2e-13),
+        ],
+    };
+    BundleImage {
+        orientation: EulerPolynomial { path_m, angles_rad },
+        half_lines: 5_000.0,
+        line_period_s: 1.4e-3,
+        focal_length_px: FOCAL_LENGTH_PX,
+        sigmas: std::array::from_fn(|index| if index < 9 { 100.0 } else { 2.6e-4 }),
+        time_bias_sigma_s: 0.05,
+    }
+}
+
+/// Three images, nine points; the first four carry coordinates and ranges, the last is seen by three.
+fn network() -> Network {
+    let images = vec![image(0.0, 0.02), image(-150e3, 0.39), image(90e3, -0.22)];
+    let mut network = Network {
+        range_bias_sigmas_m: vec![30.0],
+        ..Network::default()
+    };
+    for index in 0..9_u32 {
+        let spread = f64::from(index) - 4.0;
+        let x_lines = 900.0 * spread;
+        let pose = images[0].orientation.pose(x_lines);
+        let camera = Vector3::new(0.0, 1e-3 * spread, 1.0);
+        let ground_m = pose.position_m
+            + pose.mars_to_camera.tr_mul(&camera) * (380e3 + 60.0 * spread * spread);
+        let point = network.points.len();
+        let mola = index < 4;
+        network.points.push(BundlePoint {
+            ground_m,
+            sigma_m: mola.then(|| Vector3::new(10.0, 12.0, 14.0)),
+        });
+        for (number, image) in images.iter().enumerate() {
+            if number == 2 && index != 8 {
+                continue;
+            }
+            // Any line will do: the equations need not be met where they are only compared.
+            let seen = image.orientation.pose(x_lines).camera_vector_m(&ground_m);
+            let focal = project(&seen, image.focal_length_px).unwrap();
+            network.views.push(View {
+                point,
+                image: number,
+                x_lines,
+                y_px: focal.y + 0.3 * spread,
+                sigma_px: Vector2::new(1.0, 0.8),
+            });
+        }
+        if mola {
+            network.ranges.push(Range {
+                point,
+                image: usize::from(index % 2 == 1),
+                x_lines: x_lines + 20.0,
+                range_m: 380e3,
+                sigma_m: 10.0,
+                profile: 0,
+            });
+        }
+    }
+    network.images = images;
+    network
+}
+
+fn layout(network: &Network) -> (Layout<'_>, State, Vec<usize>) {
+    let layout = Layout {
+        network,
+        columns: Columns::of(network),
+        by_point: ByPoint::of(network),
+        robust: None,
+    };
+    let corrections = DVector::zeros(layout.columns.len());
+    let points_m = network.points.iter().map(|point| point.ground_m).collect();
+    let state = State::new(network, &layout.columns, corrections, points_m);
+    (layout, state, (0..network.points.len()).collect())
+}
+
+#[test]
+fn derivatives_equal_central_differences() {
+    let network = network();
+    let (layout, state, _) = layout(&network);
+    let at = |column: Option<usize>, step: f64, move_m: Vector3<f64>, point: usize| {
+        let mut corrections = state.corrections.clone();
+        if let Some(column) = column {
+            corrections[column] += step;
+        }
+        let mut points_m = state.points_m.clone();
+        points_m[point] += move_m;
+        State::new(&network, &layout.columns, corrections, points_m)
+    };
+    // Computed values: misclosures with the sign turned.
+    let view = |state: &State, index: usize| {
+        rows::of_view(&network, state, &network.views[index])
+            .unwrap()
+            .map(|row| -row.misclosure)
+    };
+    let close = |numeric: f64, analytic: f64, scale: f64| {
+        assert!(
+            (numeric - analytic).abs() < 1e-6 * scale,
+            "{numeric} {analytic}"
+        );
+    };
+    for index in [0, 1, 9, 18] {
+        let entry = &network.views[index];
+        let analytic = rows::of_view(&network, &state, entry).unwrap();
+        for unknown in 0..=ORIENTATION_UNKNOWNS {
+            let column = layout.columns.of_image[entry.image][unknown];
+            // Steps whose truncation and rounding are both far below 1e-6 of the derivative.
+            let step = match unknown {
+                0..9 => 20.0,
+                9..18 => 5e-5,
+                _ => 1e-2,
+            };
+            let ahead = view(&at(column, step, Vector3::zeros(), entry.point), index);
+            let behind = view(&at(column, -step, Vector3::zeros(), entry.point), index);
+            for axis in 0..2 {
+                let scale = analytic[axis]
+                    .by_image
+                    .rows(unknown / 3 * 3, if unknown < 18 { 3 } else { 1 })
+                    .norm();
+                let numeric = (ahead[axis] - behind[axis]) / (2.0 * step);
+                close(numeric, analytic[axis].by_image[unknown], scale.max(1e-2));
+            }
+        }
+        for axis in 0..3 {
+            let mut step_m = Vector3::zeros();
+            step_m[axis] = 20.0;
+            let ahead = view(&at(None, 0.0, step_m, entry.point), index);
+            let behind = view(&at(None, 0.0, -step_m, entry.point), index);
+            for row in 0..2 {
+                let numeric = (ahead[row] - behind[row]) / 40.0;
+                close(
+                    numeric,
+                    analytic[row].by_point[axis],
+                    analytic[row].by_point.norm(),
+                );
+            }
+        }
+    }
+    let range = &network.ranges[1];
+    let analytic = rows::of_range(&network, &state, range);
+    for unknown in 0..=ORIENTATION_UNKNOWNS {
+        let column = layout.columns.of_image[range.image][unknown];
+        let step = if unknown < 9 { 20.0 } else { 1e-4 };
+        let distance = |step: f64| {
+            let moved = at(column, step, Vector3::zeros(), range.point);
+            -rows::of_range(&network, &moved, range).misclosure
+        };
+        let numeric = (distance(step) - distance(-step)) / (2.0 * step);
+        close(numeric, analytic.by_image[unknown], 1.0);
+    }
+}
+
+#[test]
+fn elimination_equals_the_dense_equations() {
+    let network = network();
+    let (layout, state, active) = layout(&network);
+    let shared = layout.columns.len();
+    let unknowns = shared + 3 * active.len();
+    let mut normal = DMatrix::zeros(unknowns, unknowns);
+    let mut right = DVector::zeros(unknowns);
+    for point in &active {
+        let rows = layout.rows(&state, *point).unwrap();
+        let mut dense = DMatrix::zeros(rows.weights.len(), unknowns);
+        for (local, column) in rows.columns.iter().enumerate() {
+            dense.set_column(*column, &rows.by_shared.column(local));
+        }
+        dense
+            .columns_mut(shared + 3 * point, 3)
+            .copy_from(&rows.by_point);
+        normal += dense.tr_mul(&dense);
+        right += dense.tr_mul(&rows.misclosures);
+    }
+    for (column, sigma) in layout.columns.sigmas.iter().enumerate() {
+        normal[(column, column)] += sigma.powi(-2);
+    }
+    // Scaled by hand, for the plain inverse to be exact enough.
+    let scale = normal.diagonal().map(|value| 1.0 / value.sqrt());
+    let scaled = DMatrix::from_fn(unknowns, unknowns, |row, column| {
+        normal[(row, column)] * scale[row] * scale[column]
+    });
+    let factor = scaled.cholesky().unwrap();
+    let dense_step = factor
+        .solve(&right.component_mul(&scale))
+        .component_mul(&scale);
+    let dense_cofactors = factor.inverse();
+
+    let reduced = reduce(&layout, &state, &active).unwrap();
+    let cholesky = crate::geom::normal_equations::ScaledCholesky::new(reduced.matrix).unwrap();
+    let step = cholesky.solve(&reduced.right);
+    for (column, sigma) in layout.columns.sigmas.iter().enumerate() {
+        // As shares of the standard deviations; steps are of their order.
+        assert!(
+            (step[column] - dense_step[column]).abs() < 1e-9 * sigma,
+            "{column}"
+        );
+    }
+    let inverse = cholesky.inverse();
+    for column in 0..shared {
+        let dense = dense_cofactors[(column, column)] * scale[column].powi(2);
+        assert!((inverse[(column, column)] / dense - 1.0).abs() < 1e-9);
+    }
+    for point in active {
+        let (eliminated, _) = layout.eliminate(&state, point).unwrap();
+        let step_m = eliminated.point_step_m(&step).unwrap();
+        for axis in 0..3 {
+            let dense_m = dense_step[shared + 3 * point + axis];
+            assert!((step_m[axis] - dense_m).abs() < 1e-9 * dense_step.rows(shared, 3 * 9).amax());
+        }
+    }
+}
+
+#[test]
+fn cofactors_of_points_equal_those_of_the_dense_equations() {
+    let network = network();
+    let adjustment = solve(&network, &BundleOptions::default()).unwrap();
+    let (layout, start, active) = layout(&network);
+    let mut corrections = start.corrections.clone();
+    for (image, adjusted) in adjustment.images.iter().enumerate() {
+        for (coefficient, value) in adjusted.corrections.iter().enumerate() {
+            corrections[layout.columns.of_image[image][coefficient].unwrap()] = *value;
+        }
+        corrections[layout.columns.of_image[image][ORIENTATION_UNKNOWNS].unwrap()] =
+            adjusted.time_bias_s.unwrap().0;
+    }
+    corrections[layout.columns.of_profile[0].unwrap()] = adjustment.range_biases_m[0].unwrap().0;
+    let points_m = adjustment
+        .points
+        .iter()
+        .map(|point| point.unwrap().ground_m)
+        .collect();
+    let state = State::new(&network, &layout.columns, corrections, points_m);
+    let shared = layout.columns.len();
+    let unknowns = shared + 3 * active.len();
+    let mut design = DMatrix::zeros(0, unknowns);
+    for point in &active {
+        let rows = layout.rows(&state, *point).unwrap();
+        let before = design.nrows();
+        design = design.insert_rows(before, rows.weights.len(), 0.0);
+        for (local, column) in rows.columns.iter().enumerate() {
+            design
+                .view_mut((before, *column), (rows.weights.len(), 1))
+                .copy_from(&rows.by_shared.column(local));
+        }
+        design
+            .view_mut((before, shared + 3 * point), (rows.weights.len(), 3))
+            .copy_from(&rows.by_point);
+    }
+    let mut normal = design.tr_mul(&design);
+    for (column, sigma) in layout.columns.sigmas.iter().enumerate() {
+        normal[(column, column)] += sigma.powi(-2);
+    }
+    let scale = normal.diagonal().map(|value| 1.0 / value.sqrt());
+    for row in 0..unknowns {
+        for column in 0..unknowns {
+            normal[(row, column)] *= scale[row] * scale[column];
+        }
+    }
+    let inverse = normal.cholesky().unwrap().inverse();
+    for point in active {
+        let cofactor_m2 = adjustment.points[point].unwrap().cofactor_m2;
+        for row in 0..3 {
+            for column in 0..3 {
+                let (r, c) = (shared + 3 * point + row, shared + 3 * point + column);
+                let dense = inverse[(r, c)] * scale[r] * scale[c];
+                // The point moved by rounding since the last step.
+                assert!((cofactor_m2[(row, column)] - dense).abs() < 1e-6 * cofactor_m2.trace());
+            }
+        }
+    }
+}

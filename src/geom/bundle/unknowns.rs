@@ -1,0 +1,172 @@
+//! Which unknown of images and profiles stands in which column of the reduced equations.
+
+use std::fmt;
+
+use nalgebra::{DVector, Vector3};
+
+use super::{Network, ORIENTATION_UNKNOWNS};
+use crate::{geom::pushbroom::EulerPolynomial, units::METRES_PER_KM};
+
+/// An unknown that is shared by many observations.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Unknown {
+    /// Coefficient of an image's orientation at `3·quantity + power`, quantities X, Y, Z, ω, φ, κ.
+    Orientation {
+        /// Index of the image.
+        image: usize,
+        /// `3·quantity + power`.
+        coefficient: usize,
+    },
+    /// Bias of the line times of an image.
+    TimeBias {
+        /// Index of the image.
+        image: usize,
+    },
+    /// Bias of the ranges of a profile.
+    RangeBias {
+        /// Index of the profile.
+        profile: usize,
+    },
+}
+
+impl fmt::Display for Unknown {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Orientation { image, coefficient } => {
+                let quantity = ["X", "Y", "Z", "ω", "φ", "κ"][coefficient / 3 % 6];
+                write!(
+                    formatter,
+                    "{quantity} t^{} of image {image}",
+                    coefficient % 3
+                )
+            }
+            Self::TimeBias { image } => write!(formatter, "time bias of image {image}"),
+            Self::RangeBias { profile } => write!(formatter, "range bias of profile {profile}"),
+        }
+    }
+}
+
+pub(super) fn names(unknowns: &[Unknown]) -> String {
+    let names: Vec<String> = unknowns.iter().map(Unknown::to_string).collect();
+    names.join(", ")
+}
+
+impl Unknown {
+    /// Size of a change that matters as much as a kilometre, a radian or a second.
+    pub(super) fn step_unit(self) -> f64 {
+        match self {
+            Self::Orientation { coefficient, .. } if coefficient < 9 => METRES_PER_KM,
+            Self::RangeBias { .. } => METRES_PER_KM,
+            Self::Orientation { .. } | Self::TimeBias { .. } => 1.0,
+        }
+    }
+}
+
+/// The unknowns that are solved for, in column order, and their standard deviations.
+pub(super) struct Columns {
+    pub(super) unknowns: Vec<Unknown>,
+    pub(super) sigmas: Vec<f64>,
+    /// Column of each image's 18 coefficients and its time bias.
+    pub(super) of_image: Vec<[Option<usize>; ORIENTATION_UNKNOWNS + 1]>,
+    /// Column of each profile's bias.
+    pub(super) of_profile: Vec<Option<usize>>,
+}
+
+impl Columns {
+    pub(super) fn of(network: &Network) -> Self {
+        let mut columns = Self {
+            unknowns: Vec::new(),
+            sigmas: Vec::new(),
+            of_image: Vec::new(),
+            of_profile: Vec::new(),
+        };
+        for (image, entry) in network.images.iter().enumerate() {
+            let mut of_image = [None; ORIENTATION_UNKNOWNS + 1];
+            for (coefficient, sigma) in entry.sigmas.iter().enumerate() {
+                of_image[coefficient] =
+                    columns.add(Unknown::Orientation { image, coefficient }, *sigma);
+            }
+            of_image[ORIENTATION_UNKNOWNS] =
+                columns.add(Unknown::TimeBias { image }, entry.time_bias_sigma_s);
+            columns.of_image.push(of_image);
+        }
+        for (profile, sigma_m) in network.range_bias_sigmas_m.iter().enumerate() {
+            let column = columns.add(Unknown::RangeBias { profile }, *sigma_m);
+            columns.of_profile.push(column);
+        }
+        columns
+    }
+
+    fn add(&mut self, unknown: Unknown, sigma: f64) -> Option<usize> {
+        // A standard deviation of 0 holds the unknown fixed: it has no column at all.
+        (sigma > 0.0).then(|| {
+            self.unknowns.push(unknown);
+            self.sigmas.push(sigma);
+            self.unknowns.len() - 1
+        })
+    }
+
+    pub(super) fn len(&self) -> usize {
+        self.unknowns.len()
+    }
+}
+
+/// Values of all unknowns.
+#[derive(Clone)]
+pub(super) struct State {
+    /// Shared unknowns minus their initial values, by column.
+    pub(super) corrections: DVector<f64>,
+    pub(super) orientations: Vec<EulerPolynomial>,
+    pub(super) time_biases_s: Vec<f64>,
+    pub(super) range_biases_m: Vec<f64>,
+    pub(super) points_m: Vec<Vector3<f64>>,
+}
+
+impl State {
+    /// The state with these corrections of shared unknowns and these points.
+    pub(super) fn new(
+        network: &Network,
+        columns: &Columns,
+        corrections: DVector<f64>,
+        points_m: Vec<Vector3<f64>>,
+    ) -> Self {
+        let value = |column: Option<usize>| column.map_or(0.0, |column| corrections[column]);
+        let orientations = network
+            .images
+            .iter()
+            .zip(&columns.of_image)
+            .map(|(image, of_image)| {
+                let mut orientation = image.orientation;
+                for quantity in 0..6 {
+                    let polynomial = if quantity < 3 {
+                        &mut orientation.path_m
+                    } else {
+                        &mut orientation.angles_rad
+                    };
+                    let mut lines = 1.0;
+                    for power in 0..3 {
+                        polynomial.coefficients[power][quantity % 3] +=
+                            value(of_image[3 * quantity + power]) / lines;
+                        lines *= image.half_lines;
+                    }
+                }
+                orientation
+            })
+            .collect();
+        Self {
+            orientations,
+            time_biases_s: columns
+                .of_image
+                .iter()
+                .map(|of_image| value(of_image[ORIENTATION_UNKNOWNS]))
+                .collect(),
+            range_biases_m: columns
+                .of_profile
+                .iter()
+                .map(|column| value(*column))
+                .collect(),
+            corrections,
+            points_m,
+        }
+    }
+}

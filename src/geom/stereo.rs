@@ -1,0 +1,41 @@
+//! An image as intersection and adjustment use it: orientation and detector together.
+
+use nalgebra::Vector3;
+
+use super::pushbroom::{Detector, ExteriorOrientation};
+
+/// An image that takes part in intersection or adjustment.
+#[derive(Debug, Clone, PartialEq)]
+pub struct StereoImage<M> {
+    /// Identifier that measurements name.
+    pub id: String,
+    /// Exterior orientation as a function of the line from the middle.
+    pub orientation: M,
+    /// Detector line.
+    pub detector: Detector,
+    /// Lines of the whole image.
+    pub lines: f64,
+}
+
+impl<M: ExteriorOrientation> StereoImage<M> {
+    /// Line from the middle, and focal coordinate across the track in pixels, of a place in the image.
+    ///
+    /// Lines and samples are 0 at the outer edge of the first one.
+    #[must_use]
+    pub fn focal_place(&self, line: f64, sample: f64) -> (f64, f64) {
+        (
+            line - 0.5 * self.lines,
+            self.detector.y_of_sample_px(sample),
+        )
+    }
+
+    /// How far a ground point moves along the focal plane from line `x_lines` to the next, pixels.
+    #[must_use]
+    pub fn focal_px_per_line(&self, x_lines: f64, ground_m: &Vector3<f64>) -> f64 {
+        let (pose, motion) = self.orientation.moving(x_lines);
+        let camera_m = pose.camera_vector_m(ground_m);
+        let rate_m = motion.camera_vector_rate_m(&pose, &camera_m);
+        // The point lies in the plane of its line, so that the change of its depth does not count.
+        self.detector.focal_length_px * rate_m.x.abs() / camera_m.z
+    }
+}

@@ -1,0 +1,327 @@
+//! Tie points from a table, and from ISIS control networks as text (PVL).
+//!
+//! Both count lines and samples as ISIS does: the middle of the first pixel is 1. Ground coordinates of
+//! a network are not read: here they come from intersection.
+
+use std::{collections::BTreeMap, fs, path::Path};
+
+use serde::Deserialize;
+
+use super::label::{Entry, LabelFault, parse_whole};
+use crate::{
+    error::{Fault, IoFault, Kind, Place, Result},
+    ties::{TieMeasure, TiePoint},
+};
+
+/// Where ISIS has the middle of the first pixel, we have its outer edge at 0.
+const ISIS_TO_EDGE: f64 = -0.5;
+
+/// Tie points of a file, and what was not taken.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct TieFile {
+    /// Points in the order of their first measurement, also those measured once.
+    pub ties: Vec<TiePoint>,
+    /// Measurements and points that the network itself says to ignore.
+    pub ignored: usize,
+    /// Records that are not what they should be.
+    pub complaints: Vec<TieComplaint>,
+}
+
+/// A record that was left out.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct TieComplaint {
+    /// Line of a table, or number of the object or group in a network, both from 1.
+    pub record: u64,
+    /// What was found, and what was expected.
+    pub text: String,
+}
+
+/// A file that holds no tie points.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+enum TieFault {
+    #[error("this is a binary control network; expected its text form (PVL)")]
+    Binary,
+    #[error("no ControlNetwork object found")]
+    NoNetwork,
+    #[error("column {0} is missing; expected point_id, serial_number, sample and line")]
+    Column(&'static str),
+    #[error("the table cannot be read: {0}")]
+    Table(String),
+    #[error(transparent)]
+    Label(#[from] LabelFault),
+}
+
+impl Fault for TieFault {
+    fn kind(&self) -> Kind {
+        Kind::Input
+    }
+
+    fn advice(&self) -> String {
+        match self {
+            Self::Binary => "convert it with ISIS: cnetbin2pvl from=control.net to=control.pvl",
+            Self::NoNetwork | Self::Label(_) => "give an ISIS control network in PVL, or a CSV table",
+            Self::Column(_) | Self::Table(_) => {
+                "give a comma-separated table with a header line; lines and samples count from 1 at the middle of the first pixel"
+            }
+        }
+        .to_owned()
+    }
+}
+
+/// Reads tie points; a file whose name ends in `.csv` is a table, any other a control network.
+///
+/// # Errors
+/// The system's refusal to read; a binary network; no network; columns that are missing.
+pub fn read_ties(path: &Path) -> Result<TieFile> {
+    let bytes = fs::read(path).map_err(IoFault::on("read")).in_file(path)?;
+    let table = path
+        .extension()
+        .is_some_and(|extension| extension.eq_ignore_ascii_case("csv"));
+    let ties = if table {
+        parse_table(&bytes)
+    } else {
+        parse_network(&bytes)
+    };
+    ties.in_file(path)
+}
+
+/// One row of a table; other columns are left alone.
+#[derive(Deserialize)]
+struct Row {
+    point_id: String,
+    serial_number: String,
+    sample: f64,
+    line: f64,
+}
+
+/// Gathers measurements into points by their identifiers.
+#[derive(Default)]
+struct Gathered {
+    file: TieFile,
+    index: BTreeMap<String, usize>,
+}
+
+impl Gathered {
+    fn add(&mut self, id: String, image: String, line: f64, sample: f64) {
+        let ties = &mut self.file.ties;
+        let at = *self.index.entry(id).or_insert_with_key(|id| {
+            ties.push(TiePoint {
+                id: id.clone(),
+                measures: Vec::new(),
+            });
+            ties.len() - 1
+        });
+        ties[at].measures.push(TieMeasure {
+            image,
+            line: line + ISIS_TO_EDGE,
+            sample: sample + ISIS_TO_EDGE,
+        });
+    }
+
+    fn complain(&mut self, record: u64, text: String) {
+        self.file.complaints.push(TieComplaint { record, text });
+    }
+}
+
+fn parse_table(bytes: &[u8]) -> std::result::Result<TieFile, TieFault> {
+    let mut reader = csv::ReaderBuilder::new()
+        .trim(csv::Trim::All)
+        .from_reader(bytes);
+    let unreadable = |error: csv::Error| TieFault::Table(error.to_string());
+    let header = reader.headers().map_err(unreadable)?.clone();
+    for column in ["point_id", "serial_number", "sample", "line"] {
+        if !header.iter().any(|name| name == column) {
+            return Err(TieFault::Column(column));
+        }
+    }
+    let mut gathered = Gathered::default();
+    for record in reader.into_records() {
+        let record = match record {
+            Ok(record) => record,
+            Err(error) => {
+                let line = error.position().map_or(0, csv::Position::line);
+                gathered.complain(line, error.to_string());
+                continue;
+            }
+        };
+        let line = record.position().map_or(0, csv::Position::line);
+        match record.deserialize::<Row>(Some(&header)) {
+            Ok(row) if row.line.is_finite() && row.sample.is_finite() => {
+                gathered.add(row.point_id, row.serial_number, row.line, row.sample);
+            }
+            Ok(row) => gathered.complain(
+                line,
+                format!(
+                    "line {}, sample {}: expected finite numbers",
+                    row.line, row.sample
+                ),
+            ),
+            Err(error) => gathered.complain(line, error.to_string()),
+        }
+    }
+    Ok(gathered.file)
+}
+
+fn parse_network(bytes: &[u8]) -> std::result::Result<TieFile, TieFault> {
+    let label = parse_whole(bytes)?;
+    let is_in = |name: &str| label.entries.iter().any(|entry| entry.group == name);
+    if !is_in("CONTROLNETWORK") {
+        // The label of the binary form describes where its bytes start.
+        return Err(if is_in("PROTOBUFFER") || is_in("CORE") {
+            TieFault::Binary
+        } else {
+            TieFault::NoNetwork
+        });
+    }
+    let mut gathered = Gathered::default();
+    let mut point = BlockEntries::default();
+    for block in label.entries.chunk_by(|a, b| a.block == b.block) {
+        let block = BlockEntries(block);
+        match block.0[0].group.as_str() {
+            "CONTROLPOINT" => {
+                point = block;
+                gathered.file.ignored += usize::from(block.ignored());
+                if point.value("POINTID").is_none() {
+                    gathered.complain(block.number(), "a point without PointId".to_owned());
+                }
+            }
+            "CONTROLMEASURE" => add_measure(&mut gathered, &point, &block),
+            _ => {}
+        }
+    }
+    Ok(gathered.file)
+}
+
+/// The entries of one object or group.
+#[derive(Clone, Copy, Default)]
+struct BlockEntries<'a>(&'a [Entry]);
+
+impl<'a> BlockEntries<'a> {
+    fn value(&self, key: &str) -> Option<&'a str> {
+        let entry = self.0.iter().find(|entry| entry.key == key);
+        entry.map(|entry| entry.value.as_str())
+    }
+
+    fn ignored(&self) -> bool {
+        self.value("IGNORE")
+            .is_some_and(|value| value.eq_ignore_ascii_case("true"))
+    }
+
+    fn number(&self) -> u64 {
+        self.0.first().map_or(0, |entry| entry.block as u64)
+    }
+
+    fn finite(&self, key: &str) -> Option<f64> {
+        let number: f64 = self.value(key)?.parse().ok()?;
+        number.is_finite().then_some(number)
+    }
+}
+
+fn add_measure(gathered: &mut Gathered, point: &BlockEntries<'_>, measure: &BlockEntries<'_>) {
+    if point.ignored() || measure.ignored() {
+        gathered.file.ignored += usize::from(measure.ignored());
+        return;
+    }
+    let Some(id) = point.value("POINTID") else {
+        return;
+    };
+    let place = (
+        measure.value("SERIALNUMBER"),
+        measure.finite("LINE"),
+        measure.finite("SAMPLE"),
+    );
+    if let (Some(image), Some(line), Some(sample)) = place {
+        gathered.add(id.to_owned(), image.to_owned(), line, sample);
+    } else {
+        let found = |key| measure.value(key).unwrap_or("missing");
+        let text = format!(
+            "point {id}: SerialNumber {}, Line {}, Sample {}: expected a name and two numbers",
+            found("SERIALNUMBER"),
+            found("LINE"),
+            found("SAMPLE")
+        );
+        gathered.complain(measure.number(), text);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    const NETWORK: &str = "Object = ControlNetwork\n NetworkId = n\n \
+        Object = ControlPoint\n PointId = p1\n \
+        Group = ControlMeasure\n SerialNumber = A\n Line = 1.0\n Sample = 2.5\n End_Group\n \
+        Group = ControlMeasure\n Sample = 7.0\n Line = 8.0\n SerialNumber = B\n End_Group\n End_Object\n \
+        Object = ControlPoint\n PointId = p2\n \
+        Group = ControlMeasure\n SerialNumber = A\n Line = x\n Sample = 1\n End_Group\n \
+        Group = ControlMeasure\n SerialNumber = B\n Line = 3\n Sample = 1\n Ignore = True\n End_Group\n \
+        Group = ControlMeasure\n SerialNumber = C\n Line = 4\n Sample = 5\n End_Group\n End_Object\n \
+        Object = ControlPoint\n PointId = p3\n Ignore = True\n \
+        Group = ControlMeasure\n SerialNumber = A\n Line = 1\n Sample = 1\n End_Group\n End_Object\n\
+        End_Object\nEnd\n";
+
+    fn measure(image: &str, line: f64, sample: f64) -> TieMeasure {
+        TieMeasure {
+            image: image.to_owned(),
+            line,
+            sample,
+        }
+    }
+
+    #[test]
+    fn a_network_is_read_and_what_is_left_out_is_told() {
+        let file = parse_network(NETWORK.as_bytes()).unwrap();
+        assert_eq!(file.ties.len(), 2);
+        assert_eq!(file.ties[0].id, "p1");
+        assert_eq!(
+            file.ties[0].measures,
+            [measure("A", 0.5, 2.0), measure("B", 7.5, 6.5)]
+        );
+        assert_eq!(file.ties[1].measures, [measure("C", 3.5, 4.5)]);
+        assert_eq!(file.ignored, 2);
+        assert_eq!(file.complaints.len(), 1);
+        assert!(
+            file.complaints[0]
+                .text
+                .contains("point p2: SerialNumber A, Line x")
+        );
+    }
+
+    #[test]
+    fn a_table_is_read_and_bad_rows_are_told() {
+        let table = "point_id,serial_number,type,sample,line\n1,A,0,2.5,1\n2,A,0,x,1\n1, B,3,7,8\n3,A\n4,A,0,NaN,1\n";
+        let file = parse_table(table.as_bytes()).unwrap();
+        assert_eq!(file.ties.len(), 1);
+        assert_eq!(
+            file.ties[0].measures,
+            [measure("A", 0.5, 2.0), measure("B", 7.5, 6.5)]
+        );
+        let rows: Vec<u64> = file
+            .complaints
+            .iter()
+            .map(|complaint| complaint.record)
+            .collect();
+        assert_eq!(rows, [3, 5, 6]);
+        assert_eq!(
+            parse_table(b"point_id,line\n"),
+            Err(TieFault::Column("serial_number"))
+        );
+    }
+
+    #[test]
+    fn what_is_no_network_is_refused() {
+        let binary = b"Object = ProtoBuffer\n Object = Core\n HeaderStartByte = 65536\n End_Object\nEnd_Object\nEnd\n\0\x01";
+        assert_eq!(parse_network(binary), Err(TieFault::Binary));
+        assert_eq!(parse_network(b"A = 1\n"), Err(TieFault::NoNetwork));
+        assert!(matches!(parse_network(b"\x00"), Err(TieFault::Label(_))));
+    }
+
+    proptest! {
+        #[test]
+        fn any_bytes_are_read_or_refused(bytes in proptest::collection::vec(any::<u8>(), 0..400)) {
+            let _ = parse_network(&bytes);
+            let _ = parse_table(&bytes);
+        }
+    }
+}

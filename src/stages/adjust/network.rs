@@ -1,0 +1,209 @@
+//! The network of a site: identifiers become indices, places become focal coordinates.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use nalgebra::Vector3;
+
+use super::{
+    AdjustFault, AdjustImage, AdjustOptions, LaserShot, LeftOut, LeftOutReason, MolaImage,
+    image_index, pair,
+};
+use crate::{
+    error::Result,
+    geom::{
+        bundle::{BundleImage, BundlePoint, Network, Range, View},
+        pushbroom::{EulerPolynomial, Projector},
+    },
+    stages::intersect::IntersectedTies,
+    ties::{TiePoint, image_indices},
+};
+
+/// A network with the names of its parts.
+pub(super) struct Assembled {
+    pub(super) network: Network,
+    /// Identifiers of the points: shots, then tie points.
+    pub(super) points: Vec<String>,
+    pub(super) shots: usize,
+    pub(super) profiles: Vec<String>,
+    pub(super) rejected: Vec<LeftOut>,
+    /// Where the initial orientations put the footprints.
+    pub(super) mola: Vec<View>,
+}
+
+pub(super) fn assemble(
+    images: &[AdjustImage],
+    shots: &[LaserShot],
+    ties: &[TiePoint],
+    starts: &IntersectedTies,
+    options: &AdjustOptions,
+) -> Result<Assembled> {
+    let mut assembled = Assembled {
+        network: Network {
+            images: images.iter().map(bundle_image).collect(),
+            ..Network::default()
+        },
+        points: Vec::with_capacity(shots.len() + ties.len()),
+        shots: shots.len(),
+        profiles: Vec::new(),
+        rejected: Vec::new(),
+        mola: Vec::new(),
+    };
+    assembled.add_shots(images, shots, options)?;
+    assembled.mola = footprints_in_images(images, shots, options)?;
+    if options.mola_image == MolaImage::Weighted {
+        assembled.network.views.extend(&assembled.mola);
+    }
+    assembled.add_ties(images, ties, starts, options)?;
+    Ok(assembled)
+}
+
+fn bundle_image(image: &AdjustImage) -> BundleImage {
+    BundleImage {
+        orientation: image.stereo.orientation,
+        half_lines: 0.5 * image.stereo.lines,
+        line_period_s: image.line_period_s,
+        focal_length_px: image.stereo.detector.focal_length_px,
+        sigmas: image.sigmas,
+        time_bias_sigma_s: image.time_bias_sigma_s,
+    }
+}
+
+/// Finds lines for points in the whole of an image.
+pub(super) fn projector<'a>(
+    image: &AdjustImage,
+    orientation: &'a EulerPolynomial,
+) -> std::result::Result<Projector<'a, EulerPolynomial>, AdjustFault> {
+    Projector::new(orientation, image.stereo.lines).map_err(|unseen| AdjustFault::Blind {
+        image: image.stereo.id.clone(),
+        unseen,
+    })
+}
+
+/// Where the initial orientations put the footprints, in and around each image.
+fn footprints_in_images(
+    images: &[AdjustImage],
+    shots: &[LaserShot],
+    options: &AdjustOptions,
+) -> std::result::Result<Vec<View>, AdjustFault> {
+    let mut views = Vec::new();
+    for (index, image) in images.iter().enumerate() {
+        let projector = projector(image, &image.stereo.orientation)?;
+        let detector = &image.stereo.detector;
+        let samples = -options.mola_margin_px..=detector.samples + options.mola_margin_px;
+        for (point, shot) in shots.iter().enumerate() {
+            // What a camera does not see is not in its image.
+            let Ok(seen) = projector.project(&Vector3::from(shot.ground_m)) else {
+                continue;
+            };
+            let Ok(focal) = detector.focal_px(&seen.camera_m) else {
+                continue;
+            };
+            let inside = seen.x.abs() <= 0.5 * image.stereo.lines
+                && samples.contains(&detector.sample(focal.y));
+            if inside {
+                views.push(View {
+                    point,
+                    image: index,
+                    x_lines: seen.x,
+                    y_px: focal.y,
+                    sigma_px: pair(options.mola_sigma_px),
+                });
+            }
+        }
+    }
+    Ok(views)
+}
+
+impl Assembled {
+    fn add_shots(
+        &mut self,
+        images: &[AdjustImage],
+        shots: &[LaserShot],
+        options: &AdjustOptions,
+    ) -> std::result::Result<(), AdjustFault> {
+        let image_index = image_index(images);
+        let mut used = BTreeSet::new();
+        let mut profiles = BTreeMap::new();
+        for (point, shot) in shots.iter().enumerate() {
+            if !used.insert(shot.id.as_str()) {
+                return Err(AdjustFault::DuplicateShot(shot.id.clone()));
+            }
+            self.points.push(shot.id.clone());
+            self.network.points.push(BundlePoint {
+                ground_m: shot.ground_m.into(),
+                sigma_m: Some(Vector3::repeat(options.ground_sigma_m)),
+            });
+            let Some(range) = &shot.range else { continue };
+            let Some(image) = image_index.get(range.image.as_str()) else {
+                return Err(AdjustFault::UnknownImage {
+                    shot: shot.id.clone(),
+                    image: range.image.clone(),
+                    known: image_index.keys().copied().collect::<Vec<_>>().join(", "),
+                });
+            };
+            let profile = *profiles.entry(range.profile.as_str()).or_insert_with(|| {
+                self.profiles.push(range.profile.clone());
+                self.network
+                    .range_bias_sigmas_m
+                    .push(options.range_bias_sigma_m);
+                self.profiles.len() - 1
+            });
+            self.network.ranges.push(Range {
+                point,
+                image: *image,
+                x_lines: range.x_lines,
+                range_m: range.range_m,
+                sigma_m: options.range_sigma_m,
+                profile,
+            });
+        }
+        Ok(())
+    }
+
+    fn add_ties(
+        &mut self,
+        images: &[AdjustImage],
+        ties: &[TiePoint],
+        starts: &IntersectedTies,
+        options: &AdjustOptions,
+    ) -> Result<()> {
+        let ids: Vec<&str> = images
+            .iter()
+            .map(|image| image.stereo.id.as_str())
+            .collect();
+        let indices = image_indices(&ids, ties)?;
+        // Of tie points with the same identifier the first was intersected.
+        let mut starts: BTreeMap<&str, &[f64; 3]> = starts
+            .points
+            .iter()
+            .map(|point| (point.id.as_str(), &point.ground_m))
+            .collect();
+        for (tie, indices) in ties.iter().zip(indices) {
+            let Some(ground_m) = starts.remove(tie.id.as_str()) else {
+                self.rejected.push(LeftOut {
+                    id: tie.id.clone(),
+                    reason: LeftOutReason::NotIntersected,
+                });
+                continue;
+            };
+            let point = self.points.len();
+            self.points.push(tie.id.clone());
+            self.network.points.push(BundlePoint {
+                ground_m: Vector3::from(*ground_m),
+                sigma_m: None,
+            });
+            for (measure, image) in tie.measures.iter().zip(indices) {
+                let stereo = &images[image].stereo;
+                let (x_lines, y_px) = stereo.focal_place(measure.line, measure.sample);
+                self.network.views.push(View {
+                    point,
+                    image,
+                    x_lines,
+                    y_px,
+                    sigma_px: pair(options.tie_sigma_px),
+                });
+            }
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,255 @@
+//! Statistics of an adjustment, as its report and its tables need them.
+
+use nalgebra::Vector3;
+use serde::{Deserialize, Serialize};
+
+use super::{
+    AdjustFault, AdjustImage, BAARDA_LIMIT, MolaImage,
+    network::{Assembled, projector},
+    unknown_in_words,
+};
+use crate::geom::{
+    bundle::{Adjustment, Residual},
+    statistics::Summary,
+};
+
+/// The kinds of observation.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ObservationType {
+    /// Image coordinates of tie points.
+    TieImage,
+    /// Image coordinates of footprints.
+    MolaImage,
+    /// Ranges.
+    MolaRange,
+    /// Initial orientation unknowns.
+    Orientation,
+    /// Initial coordinates of footprints.
+    MolaGround,
+}
+
+/// What the residuals of one kind of observation say.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct TypeSummary {
+    /// The kind.
+    pub kind: ObservationType,
+    /// Scalar observations.
+    pub observations: usize,
+    /// Sum of their redundancy numbers.
+    pub redundancy: f64,
+    /// Their part of the weighted sum of squares.
+    pub weighted_squares: f64,
+    /// `sqrt(weighted squares / redundancy)`: near 1 when their standard deviations are right; 0 without
+    /// redundancy.
+    pub variance_component: f64,
+    /// Observations whose standardised residual exceeds 3.29.
+    pub beyond_limit: usize,
+}
+
+/// Coordinates of one kind of point.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct GroundSummary {
+    /// Adjusted minus initial X, Y and Z, metres.
+    pub corrections_m: [Summary; 3],
+    /// A posteriori standard deviations of X, Y and Z, metres.
+    pub sigmas_m: [Summary; 3],
+}
+
+/// What one image shows.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ImageSummary {
+    /// Identifier.
+    pub image: String,
+    /// Residuals of tie points, along and across the track, focal pixels.
+    pub tie_residuals_px: [Summary; 2],
+    /// Adjusted minus initial image coordinates of footprints, lines and pixels; empty when these are off.
+    pub mola_corrections: [Summary; 2],
+}
+
+/// Statistics of an adjustment.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct AdjustmentSummary {
+    /// Steps of the iteration.
+    pub steps: usize,
+    /// Degrees of freedom.
+    pub degrees_of_freedom: usize,
+    /// A posteriori standard deviation of unit weight.
+    pub sigma0: f64,
+    /// One entry for each kind of observation that occurs.
+    pub types: Vec<TypeSummary>,
+    /// Footprints.
+    pub shots: GroundSummary,
+    /// Tie points.
+    pub ties: GroundSummary,
+    /// One entry for each image, in their order.
+    pub images: Vec<ImageSummary>,
+    /// Range bias of each profile with its standard deviation, metres, where they are unknown.
+    pub range_biases_m: Vec<(String, f64, f64)>,
+    /// Unknowns with a correlation above 0.95: single values of them must not be interpreted.
+    pub correlated: Vec<(String, String, f64)>,
+}
+
+pub(super) fn summarise(
+    images: &[AdjustImage],
+    assembled: &Assembled,
+    adjustment: &Adjustment,
+    mola_image: MolaImage,
+) -> Result<AdjustmentSummary, AdjustFault> {
+    let (shots, ties) = (0..assembled.shots, assembled.shots..assembled.points.len());
+    let in_words = |unknown| unknown_in_words(unknown, images, &assembled.profiles);
+    let biases = assembled.profiles.iter().zip(&adjustment.range_biases_m);
+    Ok(AdjustmentSummary {
+        steps: adjustment.steps(),
+        degrees_of_freedom: adjustment.degrees_of_freedom(),
+        sigma0: adjustment.sigma0(),
+        types: types(assembled, adjustment),
+        shots: ground(assembled, adjustment, shots),
+        ties: ground(assembled, adjustment, ties),
+        images: images
+            .iter()
+            .enumerate()
+            .map(|(index, image)| {
+                Ok(ImageSummary {
+                    image: image.stereo.id.clone(),
+                    tie_residuals_px: tie_residuals(assembled, adjustment, index),
+                    mola_corrections: if mola_image == MolaImage::Off {
+                        [Summary::default(); 2]
+                    } else {
+                        mola_corrections(image, assembled, adjustment, index)?
+                    },
+                })
+            })
+            .collect::<Result<_, AdjustFault>>()?,
+        range_biases_m: biases
+            .filter_map(|(profile, bias)| {
+                let (value_m, root_m) = (*bias)?;
+                Some((profile.clone(), value_m, root_m * adjustment.sigma0()))
+            })
+            .collect(),
+        correlated: adjustment
+            .correlated
+            .iter()
+            .map(|(first, second, coefficient)| (in_words(*first), in_words(*second), *coefficient))
+            .collect(),
+    })
+}
+
+fn types(assembled: &Assembled, adjustment: &Adjustment) -> Vec<TypeSummary> {
+    let views = assembled.network.views.iter().zip(&adjustment.views);
+    let of_views = |shots: bool| -> Vec<Residual> {
+        let wanted = views
+            .clone()
+            .filter(|(view, _)| (view.point < assembled.shots) == shots);
+        wanted
+            .filter_map(|(_, residuals)| *residuals)
+            .flatten()
+            .collect()
+    };
+    let orientations = adjustment.images.iter().flat_map(|image| image.priors);
+    let grounds = adjustment
+        .points
+        .iter()
+        .flatten()
+        .filter_map(|point| point.priors);
+    let all = [
+        (ObservationType::TieImage, of_views(false)),
+        (ObservationType::MolaImage, of_views(true)),
+        (
+            ObservationType::MolaRange,
+            adjustment.ranges.iter().flatten().copied().collect(),
+        ),
+        (
+            ObservationType::Orientation,
+            orientations.flatten().collect(),
+        ),
+        (ObservationType::MolaGround, grounds.flatten().collect()),
+    ];
+    all.into_iter()
+        .filter(|(_, residuals)| !residuals.is_empty())
+        .map(|(kind, residuals)| of_type(kind, &residuals))
+        .collect()
+}
+
+fn of_type(kind: ObservationType, residuals: &[Residual]) -> TypeSummary {
+    let redundancy: f64 = residuals.iter().map(|residual| residual.redundancy).sum();
+    let weighted_squares: f64 = residuals.iter().map(Residual::weighted_square).sum();
+    let beyond = |residual: &&Residual| {
+        let standardised = residual.standardised();
+        standardised.is_some_and(|value| value.abs() > BAARDA_LIMIT)
+    };
+    TypeSummary {
+        kind,
+        observations: residuals.len(),
+        redundancy,
+        weighted_squares,
+        variance_component: if redundancy > 0.0 {
+            (weighted_squares / redundancy).sqrt()
+        } else {
+            0.0
+        },
+        beyond_limit: residuals.iter().filter(beyond).count(),
+    }
+}
+
+fn ground(
+    assembled: &Assembled,
+    adjustment: &Adjustment,
+    points: std::ops::Range<usize>,
+) -> GroundSummary {
+    let found: Vec<(Vector3<f64>, Vector3<f64>)> = points
+        .filter_map(|point| {
+            let adjusted = adjustment.points[point].as_ref().ok()?;
+            let correction_m = adjusted.ground_m - assembled.network.points[point].ground_m;
+            let sigma_m = adjusted.cofactor_m2.diagonal().map(f64::sqrt) * adjustment.sigma0();
+            Some((correction_m, sigma_m))
+        })
+        .collect();
+    let summary = |values: Vec<f64>| Summary::of(&values);
+    GroundSummary {
+        corrections_m: [0, 1, 2].map(|axis| summary(found.iter().map(|(m, _)| m[axis]).collect())),
+        sigmas_m: [0, 1, 2].map(|axis| summary(found.iter().map(|(_, m)| m[axis]).collect())),
+    }
+}
+
+fn tie_residuals(assembled: &Assembled, adjustment: &Adjustment, image: usize) -> [Summary; 2] {
+    let views = assembled.network.views.iter().zip(&adjustment.views);
+    let residuals: Vec<[f64; 2]> = views
+        .filter(|(view, _)| view.image == image && view.point >= assembled.shots)
+        .filter_map(|(_, residuals)| Some((*residuals)?.map(|residual| residual.value)))
+        .collect();
+    by_axis(&residuals)
+}
+
+/// Adjusted footprints seen with the adjusted orientation, minus where the initial ones put them.
+fn mola_corrections(
+    image: &AdjustImage,
+    assembled: &Assembled,
+    adjustment: &Adjustment,
+    index: usize,
+) -> Result<[Summary; 2], AdjustFault> {
+    let adjusted = &adjustment.images[index];
+    let projector = projector(image, &adjusted.orientation)?;
+    let late_lines = adjusted
+        .time_bias_s
+        .map_or(0.0, |(bias_s, _)| bias_s / image.line_period_s);
+    let corrections: Vec<[f64; 2]> = assembled
+        .mola
+        .iter()
+        .filter(|view| view.image == index)
+        .filter_map(|view| {
+            let point = adjustment.points[view.point].as_ref().ok()?;
+            let seen = projector.project(&point.ground_m).ok()?;
+            let focal = image.stereo.detector.focal_px(&seen.camera_m).ok()?;
+            Some([seen.x - late_lines - view.x_lines, focal.y - view.y_px])
+        })
+        .collect();
+    Ok(by_axis(&corrections))
+}
+
+fn by_axis(pairs: &[[f64; 2]]) -> [Summary; 2] {
+    [0, 1].map(|axis| {
+        let values: Vec<f64> = pairs.iter().map(|pair| pair[axis]).collect();
+        Summary::of(&values)
+    })
+}

@@ -1,0 +1,337 @@
+//! Ground points of tie points, from images whose orientation is held fixed.
+//!
+//! Two kinds of residual are told apart. The *focal* residual is what is left in an image's focal plane,
+//! in pixels. The *reprojection* residual is the measured place minus the one where the image sees the
+//! intersected point, in lines and pixels; it is the one that Shan et al. 2005 print in their Table 5.
+
+mod statistics;
+
+use std::collections::BTreeSet;
+
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+
+pub use statistics::{ImageResiduals, Residuals2};
+
+use crate::{
+    error::{Fault, Kind, Result},
+    geom::{
+        intersection::{Intersection, IntersectionLimits, Sight, Unintersected, intersect},
+        pushbroom::{ExteriorOrientation, Projector, Unseen},
+        stereo::StereoImage,
+    },
+    ties::{TiePoint, image_indices},
+};
+
+/// What a measuring error is the same for in all images.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Weighting {
+    /// Standard deviation of both focal coordinates.
+    Focal {
+        /// Pixels.
+        sigma_px: f64,
+    },
+    /// Standard deviations along the track in lines and across it in pixels.
+    Line {
+        /// Lines.
+        along_lines: f64,
+        /// Pixels.
+        across_px: f64,
+    },
+}
+
+/// How to intersect.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct IntersectOptions {
+    /// Weights of the measurements.
+    pub weighting: Weighting,
+    /// Which intersections are refused.
+    pub limits: IntersectionLimits,
+}
+
+impl Default for IntersectOptions {
+    fn default() -> Self {
+        Self {
+            weighting: Weighting::Focal { sigma_px: 1.0 },
+            limits: IntersectionLimits::default(),
+        }
+    }
+}
+
+/// All points, with what they say about the images.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct IntersectedTies {
+    /// Points, in the order of the tie points.
+    pub points: Vec<IntersectedPoint>,
+    /// Tie points without a ground point, in their order.
+    pub rejected: Vec<RejectedTie>,
+    /// Standard deviation of unit weight over all points; 1 where nothing is redundant.
+    pub sigma0: f64,
+    /// Statistics of each image, in the order of the images.
+    pub images: Vec<ImageResiduals>,
+}
+
+/// A ground point.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct IntersectedPoint {
+    /// Identifier of the tie point.
+    pub id: String,
+    /// Mars-fixed coordinates, metres.
+    pub ground_m: [f64; 3],
+    /// Their covariance with the common standard deviation of unit weight, m².
+    pub covariance_m2: [[f64; 3]; 3],
+    /// Angle between the two rays that differ most, radians.
+    pub convergence_rad: f64,
+    /// Residuals of its measurements.
+    pub measures: Vec<MeasureResidual>,
+    /// Whether a reprojection residual is farther out than three robust standard deviations of its
+    /// image. With two images nothing says which of the two measurements is wrong.
+    pub outlier: bool,
+}
+
+/// Residuals of one measurement.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct MeasureResidual {
+    /// Index of the image.
+    pub image: usize,
+    /// Along the track, focal pixels.
+    pub focal_along_px: f64,
+    /// Across the track, focal pixels.
+    pub focal_across_px: f64,
+    /// Measured minus projected line.
+    pub reprojection_lines: f64,
+    /// Measured minus projected focal coordinate across the track, pixels.
+    pub reprojection_px: f64,
+    /// Whether the line lies outside the image, where the orientation is extrapolated.
+    pub extrapolated: bool,
+}
+
+/// A tie point without a ground point.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct RejectedTie {
+    /// Identifier of the tie point.
+    pub id: String,
+    /// Why.
+    pub reason: TieReject,
+}
+
+/// Why a tie point is left out.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, thiserror::Error)]
+#[serde(rename_all = "snake_case")]
+pub enum TieReject {
+    /// Its rays give no point.
+    #[error("{0}")]
+    Rays(Unintersected),
+    /// An image cannot see the intersected point.
+    #[error("an image does not see the intersected point")]
+    Unseen,
+    /// Another tie point before it has the same identifier.
+    #[error("its identifier was used before")]
+    Duplicate,
+    /// Two of its measurements are in one image.
+    #[error("it is measured twice in one image")]
+    TwiceInImage,
+    /// A measurement is not a finite number.
+    #[error("a measurement is not a finite number")]
+    NotFinite,
+}
+
+/// An orientation that sees nothing.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[error("image {image}: its orientation sees no ground: {unseen}")]
+struct BlindImage {
+    image: String,
+    unseen: Unseen,
+}
+
+impl Fault for BlindImage {
+    fn kind(&self) -> Kind {
+        Kind::Input
+    }
+
+    fn advice(&self) -> String {
+        "check the orientation samples of the image".to_owned()
+    }
+}
+
+/// A measurement in focal coordinates.
+#[derive(Debug, Clone, Copy)]
+struct Place {
+    image: usize,
+    x_lines: f64,
+    y_px: f64,
+}
+
+/// Intersects all tie points.
+///
+/// # Errors
+/// Measurements in images that are not there; orientations that see nothing. Single points that cannot
+/// be intersected are listed instead.
+pub fn intersect_ties<M: ExteriorOrientation>(
+    images: &[StereoImage<M>],
+    ties: &[TiePoint],
+    options: &IntersectOptions,
+) -> Result<IntersectedTies> {
+    let places = places(images, ties)?;
+    let projectors: Vec<Projector<'_, M>> = images
+        .iter()
+        .map(|image| {
+            Projector::new(&image.orientation, image.lines).map_err(|unseen| BlindImage {
+                image: image.id.clone(),
+                unseen,
+            })
+        })
+        .collect::<std::result::Result<_, _>>()?;
+    let found: Vec<std::result::Result<(IntersectedPoint, Intersection), TieReject>> = ties
+        .par_iter()
+        .zip(&places)
+        .map(|(tie, places)| {
+            let places = places.as_ref().map_err(|reject| *reject)?;
+            intersect_one(images, &projectors, tie, places, options)
+        })
+        .collect();
+    Ok(summarise(images, ties, found))
+}
+
+/// Measurements of each tie point, or why it is left out.
+fn places<M: ExteriorOrientation>(
+    images: &[StereoImage<M>],
+    ties: &[TiePoint],
+) -> Result<Vec<std::result::Result<Vec<Place>, TieReject>>> {
+    let ids: Vec<&str> = images.iter().map(|image| image.id.as_str()).collect();
+    let indices = image_indices(&ids, ties)?;
+    let mut used = BTreeSet::new();
+    let places = ties.iter().zip(indices).map(|(tie, indices)| {
+        let seen_in: BTreeSet<usize> = indices.iter().copied().collect();
+        if !used.insert(tie.id.as_str()) {
+            return Err(TieReject::Duplicate);
+        }
+        if seen_in.len() < indices.len() {
+            return Err(TieReject::TwiceInImage);
+        }
+        let measures = tie.measures.iter().zip(indices);
+        measures
+            .map(|(measure, image)| {
+                let (x_lines, y_px) = images[image].focal_place(measure.line, measure.sample);
+                let finite = x_lines.is_finite() && y_px.is_finite();
+                finite
+                    .then_some(Place {
+                        image,
+                        x_lines,
+                        y_px,
+                    })
+                    .ok_or(TieReject::NotFinite)
+            })
+            .collect()
+    });
+    Ok(places.collect())
+}
+
+fn intersect_one<M: ExteriorOrientation>(
+    images: &[StereoImage<M>],
+    projectors: &[Projector<'_, M>],
+    tie: &TiePoint,
+    places: &[Place],
+    options: &IntersectOptions,
+) -> std::result::Result<(IntersectedPoint, Intersection), TieReject> {
+    let (along_sigma_px, across_sigma_px) = match options.weighting {
+        Weighting::Focal { sigma_px } => (sigma_px, sigma_px),
+        Weighting::Line { across_px, .. } => (1.0, across_px),
+    };
+    let mut sights: Vec<Sight> = places
+        .iter()
+        .map(|place| {
+            let pose = images[place.image].orientation.pose(place.x_lines);
+            Sight {
+                position_m: pose.position_m,
+                mars_to_camera: pose.mars_to_camera,
+                focal_length_px: images[place.image].detector.focal_length_px,
+                across_px: place.y_px,
+                along_sigma_px,
+                across_sigma_px,
+            }
+        })
+        .collect();
+    let mut point = intersect(&sights, &options.limits).map_err(TieReject::Rays)?;
+    if let Weighting::Line { along_lines, .. } = options.weighting {
+        // A line is so many focal pixels at the range of this point.
+        for (sight, place) in sights.iter_mut().zip(places) {
+            let image = &images[place.image];
+            let rate_px = image.focal_px_per_line(place.x_lines, &point.ground_m);
+            sight.along_sigma_px = along_lines * rate_px;
+        }
+        point = intersect(&sights, &options.limits).map_err(TieReject::Rays)?;
+    }
+    let measures = places
+        .iter()
+        .zip(&point.residuals_px)
+        .map(|(place, focal)| {
+            let image = &images[place.image];
+            let seen = projectors[place.image].project(&point.ground_m).ok()?;
+            let y_px = image.detector.focal_px(&seen.camera_m).ok()?.y;
+            Some(MeasureResidual {
+                image: place.image,
+                focal_along_px: focal.x,
+                focal_across_px: focal.y,
+                reprojection_lines: place.x_lines - seen.x,
+                reprojection_px: place.y_px - y_px,
+                extrapolated: place.x_lines.abs() > 0.5 * image.lines,
+            })
+        })
+        .collect::<Option<Vec<_>>>()
+        .ok_or(TieReject::Unseen)?;
+    let found = IntersectedPoint {
+        id: tie.id.clone(),
+        ground_m: point.ground_m.into(),
+        covariance_m2: point.cofactor_m2.into(),
+        convergence_rad: point.convergence_rad,
+        measures,
+        outlier: false,
+    };
+    Ok((found, point))
+}
+
+fn summarise<M>(
+    images: &[StereoImage<M>],
+    ties: &[TiePoint],
+    found: Vec<std::result::Result<(IntersectedPoint, Intersection), TieReject>>,
+) -> IntersectedTies {
+    let (mut points, mut rejected) = (Vec::new(), Vec::new());
+    let (mut squares, mut redundancy) = (0.0, 0_usize);
+    for (tie, outcome) in ties.iter().zip(found) {
+        match outcome {
+            Ok((point, intersection)) => {
+                squares += intersection.weighted_squares;
+                redundancy += intersection.redundancy();
+                points.push(point);
+            }
+            Err(reason) => rejected.push(RejectedTie {
+                id: tie.id.clone(),
+                reason,
+            }),
+        }
+    }
+    let sigma0 = if redundancy > 0 {
+        (squares / redundancy as f64).sqrt()
+    } else {
+        1.0
+    };
+    for point in &mut points {
+        for entry in point.covariance_m2.as_flattened_mut() {
+            *entry *= sigma0 * sigma0;
+        }
+    }
+    statistics::mark_outliers(&mut points, images.len());
+    let images = images
+        .iter()
+        .enumerate()
+        .map(|(index, image)| ImageResiduals::of(&image.id, index, &points))
+        .collect();
+    IntersectedTies {
+        points,
+        rejected,
+        sigma0,
+        images,
+    }
+}

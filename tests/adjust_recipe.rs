@@ -1,0 +1,399 @@
+//! The verified synthetic recipe: a Gusev-like pair, its misregistration, and its cure.
+#![allow(
+    clippy::unwrap_used,
+    clippy::panic,
+    reason = "helpers of tests may fail loudly"
+)]
+
+#[path = "network/recipe.rs"]
+mod recipe;
+#[path = "pushbroom/scene.rs"]
+mod scene;
+
+use areograph::geom::{
+    bundle::{Adjustment, BundleOptions, Dropped, Network, Residual, View, solve},
+    pushbroom::{EulerPolynomial, Projector},
+    statistics::Summary,
+};
+use nalgebra::Vector3;
+use recipe::{Recipe, Simulated, project};
+
+fn adjust(network: &Network) -> Adjustment {
+    solve(network, &BundleOptions::default()).unwrap()
+}
+
+/// Measured minus projected: lines and pixels of each view of the ties of an image.
+fn reprojection(
+    simulated: &Simulated,
+    image: usize,
+    orientation: &EulerPolynomial,
+    ground_m: impl Fn(usize) -> Vector3<f64>,
+) -> [Vec<f64>; 2] {
+    let entry = &simulated.network.images[image];
+    let projector = Projector::new(orientation, 2.0 * entry.half_lines).unwrap();
+    let ties = |view: &&View| view.image == image && view.point >= simulated.shots;
+    let differences: Vec<(f64, f64)> = simulated
+        .network
+        .views
+        .iter()
+        .filter(ties)
+        .map(|view| {
+            let (x, y) = project(&projector, entry.focal_length_px, &ground_m(view.point));
+            (view.x_lines - x, view.y_px - y)
+        })
+        .collect();
+    let (lines, pixels) = differences.into_iter().unzip();
+    [lines, pixels]
+}
+
+/// Ground length of a line of an image at its middle, metres.
+fn line_spacing_m(simulated: &Simulated, image: usize) -> f64 {
+    let ground = |shift: f64| recipe::pair()[image].boresight_ground_m(shift);
+    let period_s = simulated.network.images[image].line_period_s;
+    (ground(period_s) - ground(0.0)).norm()
+}
+
+/// Mean shift of the shots' image coordinates from the initial to the adjusted orientation, lines.
+fn mola_shift_lines(simulated: &Simulated, adjustment: &Adjustment, image: usize) -> Summary {
+    let entry = &simulated.network.images[image];
+    let projector = Projector::new(
+        &adjustment.images[image].orientation,
+        2.0 * entry.half_lines,
+    )
+    .unwrap();
+    let shots = |view: &&View| view.image == image && view.point < simulated.shots;
+    let shifts: Vec<f64> = simulated
+        .network
+        .views
+        .iter()
+        .filter(shots)
+        .map(|view| {
+            let ground_m = adjustment.points[view.point].unwrap().ground_m;
+            project(&projector, entry.focal_length_px, &ground_m).0 - view.x_lines
+        })
+        .collect();
+    Summary::of(&shifts)
+}
+
+fn residuals(adjustment: &Adjustment) -> Vec<Residual> {
+    let views = adjustment.views.iter().flatten().flatten().copied();
+    let ranges = adjustment.ranges.iter().flatten().copied();
+    let orientations = adjustment
+        .images
+        .iter()
+        .flat_map(|image| image.priors.into_iter().flatten());
+    let points = adjustment.points.iter().flatten();
+    let grounds = points.flat_map(|point| point.priors.into_iter().flatten());
+    views
+        .chain(ranges)
+        .chain(orientations)
+        .chain(grounds)
+        .collect()
+}
+
+#[test]
+fn the_recipe_comes_out_as_verified() {
+    let simulated = Recipe::GUSEV.simulate();
+    let network = &simulated.network;
+    let adjustment = adjust(network);
+    assert!(
+        (2..=3).contains(&adjustment.steps()),
+        "{}",
+        adjustment.steps()
+    );
+    // 2·430 + 266 + 154.
+    assert_eq!(adjustment.degrees_of_freedom(), 1_280);
+    // A prototype found 0.80; another draw of 154 ties moves it by 4 %.
+    assert!(
+        (0.74..0.86).contains(&adjustment.sigma0()),
+        "σ0 {}",
+        adjustment.sigma0()
+    );
+    let along_m = [0, 1].map(|image| {
+        let initial = &network.images[image].orientation;
+        let before = reprojection(&simulated, image, initial, |point| {
+            network.points[point].ground_m
+        });
+        let after = reprojection(
+            &simulated,
+            image,
+            &adjustment.images[image].orientation,
+            |point| adjustment.points[point].unwrap().ground_m,
+        );
+        let [before, along, across] = [&before[0], &after[0], &after[1]].map(|v| Summary::of(v));
+        println!("image {image}: {before:.3?}\n {along:.3?}\n {across:.3?}");
+        assert!((15.0..45.0).contains(&before.mean.abs()), "{before:?}");
+        // The mean of 154 lines with noise 0.7 is known to 0.06.
+        assert!(along.mean.abs() < 0.15, "{along:?}");
+        assert!((0.6..0.85).contains(&along.standard_deviation), "{along:?}");
+        // Height absorbs what lies across the track.
+        assert!(
+            (0.06..0.095).contains(&across.standard_deviation),
+            "{across:?}"
+        );
+        let shift = mola_shift_lines(&simulated, &adjustment, image);
+        println!("MOLA {shift:.3?}");
+        let spacing_m = line_spacing_m(&simulated, image);
+        [before.mean, shift.mean].map(|lines| lines * spacing_m)
+    });
+    // Opposite signs, as Yoon & Shan 2004 print them (Table 3).
+    assert!(along_m[0][1] * along_m[1][1] < 0.0, "{along_m:?}");
+    // Cross-test: corrections of MOLA's image coordinates tell the same as the residuals of intersection.
+    let [from_ties, from_mola] = [0, 1].map(|kind| along_m[0][kind] - along_m[1][kind]);
+    println!("disagreement {from_ties} m, {from_mola} m");
+    assert!(
+        (from_mola.abs() / from_ties.abs() - 1.0).abs() < 0.02,
+        "{from_ties} {from_mola}"
+    );
+}
+
+#[test]
+fn relative_position_is_healed_absolute_is_not() {
+    let simulated = Recipe::GUSEV.simulate();
+    let adjustment = adjust(&simulated.network);
+    let (mut error, mut formal) = (Vec::new(), Vec::new());
+    for tie in simulated.shots..simulated.points_m.len() {
+        let point = adjustment.points[tie].unwrap();
+        error.push((point.ground_m - simulated.points_m[tie]).norm());
+        formal.push(adjustment.sigma0() * point.cofactor_m2.trace().sqrt());
+    }
+    let [error, formal] = [error, formal].map(|values| Summary::of(&values));
+    println!("error {} m, formal {} m", error.mean, formal.mean);
+    // Image coordinates of shots that come from the orientation itself make the covariance optimistic.
+    assert!(error.mean > 1.5 * formal.mean);
+}
+
+#[test]
+fn redundancy_numbers_add_up_to_the_degrees_of_freedom() {
+    let simulated = Recipe::GUSEV.simulate();
+    for (robust, name) in [
+        (None, "quadratic"),
+        (Some(areograph::geom::robust::RobustWeight::HUBER), "Huber"),
+    ] {
+        let options = BundleOptions {
+            robust,
+            ..BundleOptions::default()
+        };
+        let adjustment = solve(&simulated.network, &options).unwrap();
+        let all = residuals(&adjustment);
+        assert_eq!(all.len(), adjustment.observations, "{name}");
+        let sum: f64 = all.iter().map(|residual| residual.redundancy).sum();
+        // The trace of a matrix with 2190 rows: rounding.
+        assert!(
+            (sum - adjustment.degrees_of_freedom() as f64).abs() < 1e-6,
+            "{name} {sum}"
+        );
+        let squares: f64 = all.iter().map(Residual::weighted_square).sum();
+        assert!(
+            (squares / adjustment.weighted_squares - 1.0).abs() < 1e-12,
+            "{name}"
+        );
+    }
+}
+
+#[test]
+fn no_observation_makes_an_unknown_worse() {
+    let simulated = Recipe::GUSEV.simulate();
+    let adjustment = adjust(&simulated.network);
+    // σ0 stands on both sides of σ_post ≤ σ0·σ_prior.
+    for (image, adjusted) in simulated.network.images.iter().zip(&adjustment.images) {
+        for (coefficient, sigma) in image.sigmas.iter().enumerate() {
+            let cofactor = adjusted.cofactors[(coefficient, coefficient)];
+            assert!(cofactor.sqrt() <= sigma * (1.0 + 1e-9));
+            assert!(cofactor > 0.0);
+        }
+    }
+    for shot in &adjustment.points[..simulated.shots] {
+        let cofactor_m2 = shot.unwrap().cofactor_m2;
+        assert!(
+            cofactor_m2
+                .diagonal()
+                .iter()
+                .all(|value| *value <= 100.0 * (1.0 + 1e-9))
+        );
+    }
+}
+
+#[test]
+fn exact_data_are_left_alone() {
+    let simulated = Recipe::EXACT.simulate();
+    let adjustment = adjust(&simulated.network);
+    for image in &adjustment.images {
+        assert!(image.corrections.iter().all(|value| value.abs() < 1e-6)); // metres and radians
+    }
+    for (index, point) in adjustment.points.iter().enumerate() {
+        let moved_m = point.unwrap().ground_m - simulated.network.points[index].ground_m;
+        assert!(moved_m.norm() < 1e-6, "{index}: {moved_m}"); // metres
+    }
+    assert!(adjustment.sigma0() < 1e-6);
+}
+
+#[test]
+fn the_order_of_points_does_not_matter() {
+    let simulated = Recipe::GUSEV.simulate();
+    let straight = adjust(&simulated.network);
+    let mut turned = simulated.network.clone();
+    let last = turned.points.len() - 1;
+    turned.points.reverse();
+    turned.views.reverse();
+    for view in &mut turned.views {
+        view.point = last - view.point;
+    }
+    for range in &mut turned.ranges {
+        range.point = last - range.point;
+    }
+    let reversed = adjust(&turned);
+    for (a, b) in straight.images.iter().zip(&reversed.images) {
+        for (index, sigma) in simulated.network.images[0].sigmas.iter().enumerate() {
+            // Sums in another order, solved at a condition number of some 1e6.
+            assert!((a.corrections[index] - b.corrections[index]).abs() < 1e-8 * sigma);
+        }
+    }
+    assert!((straight.sigma0() / reversed.sigma0() - 1.0).abs() < 1e-9);
+}
+
+#[test]
+fn ranges_hold_the_height_of_the_orbit() {
+    let simulated = Recipe::GUSEV.simulate();
+    let with = adjust(&simulated.network);
+    let without = adjust(&Network {
+        ranges: Vec::new(),
+        ..simulated.network.clone()
+    });
+    let radial = simulated.orientations[0].path_m.coefficients[0].normalize();
+    let spread = |adjustment: &Adjustment| {
+        // The constants of X, Y and Z stand at 0, 3 and 6.
+        let cofactors = &adjustment.images[0].cofactors;
+        let position = nalgebra::Matrix3::from_fn(|row, column| cofactors[(3 * row, 3 * column)]);
+        let across = Vector3::z().cross(&radial).normalize();
+        [radial, across, radial.cross(&across)].map(|axis| (position * axis).dot(&axis).sqrt())
+    };
+    let growth: Vec<f64> = spread(&without)
+        .iter()
+        .zip(spread(&with))
+        .map(|(a, b)| a / b)
+        .collect();
+    println!("{growth:?}");
+    assert!(
+        growth[0] > 5.0 && growth[0] > growth[1] && growth[0] > growth[2],
+        "{growth:?}"
+    );
+}
+
+#[test]
+fn two_time_biases_explain_the_disagreement() {
+    // Orientations fixed, ties alone: one parameter an image instead of 18.
+    let simulated = Recipe {
+        position_bias_m: 0.0,
+        ..Recipe::GUSEV
+    }
+    .simulate();
+    let mut network = simulated.network.clone();
+    for image in &mut network.images {
+        image.sigmas = [0.0; 18];
+        image.time_bias_sigma_s = 0.1;
+    }
+    network.views.retain(|view| view.point >= simulated.shots);
+    network.ranges.clear();
+    network.points[..simulated.shots]
+        .iter_mut()
+        .for_each(|point| point.sigma_m = None);
+    let adjustment = adjust(&network);
+    assert_eq!(adjustment.points[0], Err(Dropped::Undetermined));
+    let biases: Vec<(f64, f64)> = adjustment
+        .images
+        .iter()
+        .map(|image| image.time_bias_s.unwrap())
+        .collect();
+    let along_m: Vec<f64> = (0..2)
+        .map(|image| {
+            biases[image].0 / network.images[image].line_period_s
+                * line_spacing_m(&simulated, image)
+        })
+        .collect();
+    let found_m = along_m[0] - along_m[1];
+    // The tags are late by 26 and −23.5 lines.
+    let expected_m = -26.0 * line_spacing_m(&simulated, 0) - 23.5 * line_spacing_m(&simulated, 1);
+    println!("{found_m} {expected_m} {biases:?}");
+    assert!(
+        (found_m / expected_m - 1.0).abs() < 0.01,
+        "{found_m} {expected_m}"
+    );
+    // Only the difference is measured; the split is the prior's.
+    assert!(
+        biases
+            .iter()
+            .all(|(_, sigma_s)| (0.06..0.08).contains(sigma_s)),
+        "{biases:?}"
+    );
+}
+
+#[test]
+fn range_biases_are_found() {
+    let mut simulated = Recipe {
+        shift_lines: [0.0; 2],
+        position_bias_m: 0.0,
+        ..Recipe::GUSEV
+    }
+    .simulate();
+    simulated.network.range_bias_sigmas_m[1] = 30.0;
+    for image in &mut simulated.network.images {
+        image.sigmas = recipe::sigmas(2.0);
+    }
+    for range in simulated
+        .network
+        .ranges
+        .iter_mut()
+        .filter(|range| range.profile == 1)
+    {
+        range.range_m += 25.0;
+    }
+    let adjustment = adjust(&simulated.network);
+    assert_eq!(adjustment.range_biases_m[0], None);
+    let (bias_m, sigma_m) = adjustment.range_biases_m[1].unwrap();
+    println!("{bias_m} {sigma_m}");
+    assert!(
+        (bias_m - 25.0).abs() < 4.0 * sigma_m && sigma_m < 5.0,
+        "{bias_m} {sigma_m}"
+    );
+}
+
+#[test]
+fn points_that_cannot_take_part_are_told() {
+    let mut simulated = Recipe::GUSEV.simulate();
+    let network = &mut simulated.network;
+    let tie = simulated.shots;
+    // The first tie loses a ray, the second lies behind the camera.
+    let lost = network
+        .views
+        .iter()
+        .rposition(|view| view.point == tie)
+        .unwrap();
+    network.views.remove(lost);
+    network.points[tie + 1].ground_m *= 1.2;
+    let adjustment = adjust(network);
+    assert_eq!(adjustment.points[tie], Err(Dropped::Undetermined));
+    assert_eq!(adjustment.points[tie + 1], Err(Dropped::BehindCamera));
+    assert_eq!(adjustment.degrees_of_freedom(), 1_278);
+    assert_eq!(
+        adjustment
+            .views
+            .iter()
+            .filter(|view| view.is_none())
+            .count(),
+        3
+    );
+}
+
+#[test]
+fn a_view_twice_with_half_the_weight_is_the_view_once() {
+    let simulated = Recipe::GUSEV.simulate();
+    let once = adjust(&simulated.network);
+    let mut network = simulated.network.clone();
+    for view in &mut network.views {
+        view.sigma_px *= 2.0_f64.sqrt();
+    }
+    network.views.extend(network.views.clone());
+    let twice = adjust(&network);
+    assert!((twice.weighted_squares / once.weighted_squares - 1.0).abs() < 1e-8);
+}

@@ -1,0 +1,347 @@
+//! A stereo pair like Gusev's with MOLA shots and tie points, its truth known.
+#![allow(
+    clippy::unwrap_used,
+    dead_code,
+    reason = "helpers of tests and benchmarks may fail loudly; each program uses a part"
+)]
+
+use areograph::geom::{
+    bundle::{BundleImage, BundlePoint, Network, Range, View},
+    intersection::{IntersectionLimits, Sight, intersect},
+    pushbroom::{EulerPolynomial, ExteriorOrientation, Projector},
+};
+use nalgebra::{Vector2, Vector3};
+
+use super::scene::{GUSEV, Held, Scene};
+
+/// Half the width of an image, pixels.
+pub(crate) const HALF_SWATH_PX: f64 = 512.0;
+/// Shots so far outside a swath still count as measured in it, pixels.
+const OUTSIDE_PX: f64 = 200.0;
+/// From perspective centre to ground, roughly: turns a standard deviation of positions into one of angles.
+const RANGE_M: f64 = 380e3;
+/// Interval of MOLA's shots, seconds.
+const SHOT_INTERVAL_S: f64 = 0.1;
+
+/// Normal numbers by Box and Muller from a linear congruential generator, the same in every run.
+pub(crate) struct Normals(u64);
+
+impl Normals {
+    pub(crate) fn new(seed: u64) -> Self {
+        let mut normals = Self(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1);
+        normals.uniform();
+        normals
+    }
+
+    /// Evenly spread over `0..1`.
+    pub(crate) fn uniform(&mut self) -> f64 {
+        self.0 = self
+            .0
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
+        ((self.0 >> 11) as f64 + 0.5) / (1_u64 << 53) as f64
+    }
+
+    pub(crate) fn next(&mut self) -> f64 {
+        (-2.0 * self.uniform().ln()).sqrt() * (std::f64::consts::TAU * self.uniform()).cos()
+    }
+
+    pub(crate) fn vector(&mut self) -> Vector3<f64> {
+        Vector3::new(self.next(), self.next(), self.next())
+    }
+}
+
+/// What is simulated.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Recipe {
+    pub(crate) seed: u64,
+    pub(crate) ties: usize,
+    /// Shots along the track of each image.
+    pub(crate) shots: [usize; 2],
+    /// Lines by which the tags of each image are late.
+    pub(crate) shift_lines: [f64; 2],
+    /// Standard deviation of a constant error of each image's position, metres.
+    pub(crate) position_bias_m: f64,
+    pub(crate) ground_noise_m: f64,
+    pub(crate) range_noise_m: f64,
+    /// Noise of ties, lines and pixels.
+    pub(crate) tie_noise: f64,
+    /// Image coordinates of shots that are kept: all of the own image, of the other those nearest its middle.
+    pub(crate) mola_views: usize,
+}
+
+impl Recipe {
+    /// The verified synthetic recipe of the adjustment.
+    pub(crate) const GUSEV: Self = Self {
+        seed: 7,
+        ties: 154,
+        shots: [142, 124],
+        shift_lines: [26.0, -23.5],
+        position_bias_m: 20.0,
+        ground_noise_m: 10.0,
+        range_noise_m: 7.0,
+        tie_noise: 1.0,
+        mola_views: 430,
+    };
+
+    /// The same without any error.
+    pub(crate) const EXACT: Self = Self {
+        shift_lines: [0.0, 0.0],
+        position_bias_m: 0.0,
+        ground_noise_m: 0.0,
+        range_noise_m: 0.0,
+        tie_noise: 0.0,
+        ..Self::GUSEV
+    };
+}
+
+/// A network and what it should be.
+#[derive(Debug, Clone)]
+pub(crate) struct Simulated {
+    pub(crate) network: Network,
+    /// True orientation of each image.
+    pub(crate) orientations: [EulerPolynomial; 2],
+    /// True points: shots of the first track, of the second, then ties.
+    pub(crate) points_m: Vec<Vector3<f64>>,
+    /// Number of shots.
+    pub(crate) shots: usize,
+}
+
+/// The pair: nadir image, and one from an orbit 2.45° west that looks at the same ground.
+pub(crate) fn pair() -> [Scene; 2] {
+    let target_m = GUSEV.boresight_ground_m(0.0);
+    let mut oblique = Scene {
+        longitude_deg: GUSEV.longitude_deg - 2.45,
+        lines: 8_960,
+        duration_s: 12.958,
+        held: Held::Inertial { roll_deg: 0.0 },
+        ..GUSEV
+    };
+    for _ in 0..4 {
+        let unrolled = Scene {
+            held: Held::Inertial { roll_deg: 0.0 },
+            ..oblique
+        };
+        let camera_m = unrolled.pose(0.0).camera_vector_m(&target_m);
+        let roll_deg = camera_m.y.atan2(camera_m.z).to_degrees();
+        // The camera flies along its −X: what lies ahead has a negative x.
+        oblique.latitude_deg -= (camera_m.x / target_m.norm()).to_degrees();
+        oblique.held = Held::Inertial { roll_deg };
+    }
+    [GUSEV, oblique]
+}
+
+/// The same images with their tags late and their positions off.
+fn biased(truth: &EulerPolynomial, shift_lines: f64, bias_m: &Vector3<f64>) -> EulerPolynomial {
+    let shift = |polynomial: &areograph::geom::pushbroom::VectorPolynomial| {
+        let [_, linear, square] = polynomial.coefficients;
+        let mut shifted = *polynomial;
+        shifted.coefficients[0] += linear * shift_lines + square * shift_lines.powi(2);
+        shifted.coefficients[1] += square * (2.0 * shift_lines);
+        shifted
+    };
+    let mut path_m = shift(&truth.path_m);
+    path_m.coefficients[0] += bias_m;
+    EulerPolynomial {
+        path_m,
+        angles_rad: shift(&truth.angles_rad),
+    }
+}
+
+/// Standard deviations of the paper: `sigma_m` for positions, the same on the ground for angles.
+pub(crate) fn sigmas(sigma_m: f64) -> [f64; 18] {
+    std::array::from_fn(|index| {
+        if index < 9 {
+            sigma_m
+        } else {
+            sigma_m / RANGE_M
+        }
+    })
+}
+
+/// Measures of a point: line and place in the line.
+pub(crate) fn project(
+    projector: &Projector<'_, EulerPolynomial>,
+    focal_length_px: f64,
+    point_m: &Vector3<f64>,
+) -> (f64, f64) {
+    let seen = projector.project(point_m).unwrap();
+    let y_px = -focal_length_px * seen.camera_m.y / seen.camera_m.z;
+    (seen.x, y_px)
+}
+
+/// A measurement for intersection, one focal pixel in both axes.
+pub(crate) fn sight(image: &BundleImage, x_lines: f64, y_px: f64) -> Sight {
+    let pose = image.orientation.pose(x_lines);
+    Sight {
+        position_m: pose.position_m,
+        mars_to_camera: pose.mars_to_camera,
+        focal_length_px: image.focal_length_px,
+        across_px: y_px,
+        along_sigma_px: 1.0,
+        across_sigma_px: 1.0,
+    }
+}
+
+impl Recipe {
+    pub(crate) fn simulate(&self) -> Simulated {
+        let scenes = pair();
+        let mut normals = Normals::new(self.seed);
+        let orientations = [scenes[0].euler(2), scenes[1].euler(2)];
+        let focal_length_px = scenes[0].focal_length_px();
+        let mut network = Network {
+            images: (0..2)
+                .map(|image| BundleImage {
+                    orientation: biased(
+                        &orientations[image],
+                        self.shift_lines[image],
+                        &(normals.vector() * self.position_bias_m),
+                    ),
+                    half_lines: 0.5 * f64::from(scenes[image].lines),
+                    line_period_s: scenes[image].line_period_s(),
+                    focal_length_px,
+                    sigmas: sigmas([100.0, 200.0][image]),
+                    time_bias_sigma_s: 0.0,
+                })
+                .collect(),
+            range_bias_sigmas_m: vec![0.0; 2],
+            ..Network::default()
+        };
+        let mut points_m = Vec::new();
+        self.shoot(
+            &scenes,
+            &orientations,
+            &mut normals,
+            &mut network,
+            &mut points_m,
+        );
+        let shots = points_m.len();
+        self.tie(
+            &scenes,
+            &orientations,
+            &mut normals,
+            &mut network,
+            &mut points_m,
+        );
+        Simulated {
+            network,
+            orientations,
+            points_m,
+            shots,
+        }
+    }
+
+    fn shoot(
+        &self,
+        scenes: &[Scene; 2],
+        orientations: &[EulerPolynomial; 2],
+        normals: &mut Normals,
+        network: &mut Network,
+        points_m: &mut Vec<Vector3<f64>>,
+    ) {
+        for (image, scene) in scenes.iter().enumerate() {
+            for shot in 0..self.shots[image] {
+                let at_s = (shot as f64 - 0.5 * (self.shots[image] as f64 - 1.0)) * SHOT_INTERVAL_S;
+                let ground_m = scene.boresight_ground_m(at_s);
+                let point_m = ground_m + ground_m.normalize() * (50.0 * normals.next());
+                let x_lines = at_s / scene.line_period_s();
+                let distance_m = (orientations[image].pose(x_lines).position_m - point_m).norm();
+                network.ranges.push(Range {
+                    point: points_m.len(),
+                    image,
+                    x_lines,
+                    range_m: distance_m + self.range_noise_m * normals.next(),
+                    sigma_m: 10.0,
+                    profile: image,
+                });
+                network.points.push(BundlePoint {
+                    ground_m: point_m + normals.vector() * self.ground_noise_m,
+                    sigma_m: Some(Vector3::repeat(10.0)),
+                });
+                points_m.push(point_m);
+            }
+        }
+        // MOLA's image coordinates are where the initial orientation puts its footprints.
+        let mut views = Vec::new();
+        for (image, entry) in network.images.iter().enumerate() {
+            let projector = Projector::new(&entry.orientation, 2.0 * entry.half_lines).unwrap();
+            for (index, point) in network.points.iter().enumerate() {
+                let (x_lines, y_px) = project(&projector, entry.focal_length_px, &point.ground_m);
+                if x_lines.abs() <= entry.half_lines && y_px.abs() <= HALF_SWATH_PX + OUTSIDE_PX {
+                    views.push(View {
+                        point: index,
+                        image,
+                        x_lines,
+                        y_px,
+                        sigma_px: Vector2::new(74.0, 4.0),
+                    });
+                }
+            }
+        }
+        let far = |view: &View| {
+            let own = network.ranges[view.point].image == view.image;
+            if own { 0.0 } else { view.x_lines.abs() }
+        };
+        views.sort_by(|a, b| far(a).total_cmp(&far(b)));
+        views.truncate(self.mola_views);
+        network.views.extend(views);
+    }
+
+    fn tie(
+        &self,
+        scenes: &[Scene; 2],
+        orientations: &[EulerPolynomial; 2],
+        normals: &mut Normals,
+        network: &mut Network,
+        points_m: &mut Vec<Vector3<f64>>,
+    ) {
+        let projectors = [0, 1].map(|image| {
+            Projector::new(&orientations[image], f64::from(scenes[image].lines)).unwrap()
+        });
+        let focal_length_px = scenes[0].focal_length_px();
+        let mut left = self.ties;
+        while left > 0 {
+            let at_s = (normals.uniform() - 0.5) * scenes[0].duration_s;
+            let pose = scenes[0].pose(at_s);
+            let below_m = scenes[0].boresight_ground_m(at_s);
+            let across = (2.0 * normals.uniform() - 1.0) * HALF_SWATH_PX / focal_length_px;
+            let aside_m = below_m
+                + pose.mars_to_camera.row(1).transpose()
+                    * (across * (pose.position_m - below_m).norm());
+            let point_m = aside_m.normalize() * (below_m.norm() + 150.0 * normals.next());
+            let seen = projectors
+                .each_ref()
+                .map(|projector| project(projector, focal_length_px, &point_m));
+            let inside = seen.iter().zip(scenes).all(|((x_lines, y_px), scene)| {
+                x_lines.abs() < 0.5 * f64::from(scene.lines) && y_px.abs() < HALF_SWATH_PX
+            });
+            if !inside {
+                continue;
+            }
+            left -= 1;
+            let measured = seen.map(|(x_lines, y_px)| {
+                (
+                    x_lines + self.tie_noise * normals.next(),
+                    y_px + self.tie_noise * normals.next(),
+                )
+            });
+            let sights = [0, 1]
+                .map(|image| sight(&network.images[image], measured[image].0, measured[image].1));
+            let start = intersect(&sights, &IntersectionLimits::default()).unwrap();
+            for (image, (x_lines, y_px)) in measured.into_iter().enumerate() {
+                network.views.push(View {
+                    point: points_m.len(),
+                    image,
+                    x_lines,
+                    y_px,
+                    sigma_px: Vector2::new(1.0, 1.0),
+                });
+            }
+            network.points.push(BundlePoint {
+                ground_m: start.ground_m,
+                sigma_m: None,
+            });
+            points_m.push(point_m);
+        }
+    }
+}
