@@ -59,6 +59,7 @@ fn real_with_summing(test: &str, summing: u32) -> Option<Real> {
     let image = ImageConfig {
         id: "m04-02852".to_owned(),
         label: Some(folder.join("m0402852_isis.lbl")),
+        serial_number: None,
         fields: ImageFields::default(),
     };
     let kernels = KernelsConfig {

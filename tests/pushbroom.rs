@@ -7,6 +7,8 @@
 
 #[path = "pushbroom/edges.rs"]
 mod edges;
+#[path = "pushbroom/misregistration.rs"]
+mod misregistration;
 #[path = "pushbroom/published.rs"]
 mod published;
 #[path = "pushbroom/scene.rs"]

@@ -31,6 +31,7 @@ fn image(id: &str, label: PathBuf) -> ImageConfig {
     ImageConfig {
         id: id.to_owned(),
         label: Some(label),
+        serial_number: None,
         fields: ImageFields::default(),
     }
 }

@@ -11,12 +11,13 @@ mod recipe;
 mod scene;
 
 use areograph::{
+    config::Weighting,
     geom::{
         intersection::Unintersected,
         pushbroom::{Detector, EulerPolynomial},
         stereo::StereoImage,
     },
-    stages::intersect::{IntersectOptions, IntersectedTies, TieReject, Weighting, intersect_ties},
+    stages::intersect::{IntersectOptions, IntersectedTies, TieReject, intersect_ties},
     ties::{TieMeasure, TiePoint},
 };
 use nalgebra::{Matrix3, Vector3};

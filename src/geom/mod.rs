@@ -9,6 +9,7 @@ pub mod intersection;
 pub mod lagrange;
 pub mod map_projection;
 pub mod mars_rotation;
+pub mod misregistration;
 pub mod normal_equations;
 pub mod orbit_axes;
 pub mod polynomial;

@@ -38,4 +38,11 @@ impl<M: ExteriorOrientation> StereoImage<M> {
         // The point lies in the plane of its line, so that the change of its depth does not count.
         self.detector.focal_length_px * rate_m.x.abs() / camera_m.z
     }
+
+    /// How far apart line `x_lines` and the next lie on the ground at a point of it, metres, across the ray.
+    #[must_use]
+    pub fn line_spacing_m(&self, x_lines: f64, ground_m: &Vector3<f64>) -> f64 {
+        let depth_m = self.orientation.pose(x_lines).camera_vector_m(ground_m).z;
+        self.focal_px_per_line(x_lines, ground_m) * depth_m / self.detector.focal_length_px
+    }
 }

@@ -5,10 +5,13 @@
 pub mod adjust;
 pub mod check_ranges;
 pub mod compare_kernels;
+pub mod compare_pairs;
 pub mod convert_datum;
 pub mod fit_sensor_model;
 pub mod group_profiles;
 pub mod intersect;
+pub mod oriented;
+pub mod read_ties;
 pub mod register;
 pub mod sample_orientation;
 pub mod search_footprints;

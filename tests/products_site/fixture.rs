@@ -4,9 +4,10 @@ use std::{collections::BTreeMap, sync::atomic::AtomicBool};
 
 use areograph::{
     config::{
-        BiasScope, CameraModel, DatumChoice, KernelList, KernelSource, KernelsConfig, MolaClock,
-        OrientationConfig, PedrConfig, PointingConfig, RangeCheckConfig, RegistrationConfig,
-        ShotFilter, SiteConfig, TagSign, WindowConfig, WindowShape,
+        AdjustmentConfig, BiasScope, CameraModel, DatumChoice, IntersectionConfig, KernelList,
+        KernelSource, KernelsConfig, MolaClock, OrientationConfig, PedrConfig, PointingConfig,
+        RangeCheckConfig, RegistrationConfig, ShotFilter, SiteConfig, TagSign, TiesConfig,
+        WindowConfig, WindowShape,
     },
     constants::MGS_POINTING_BIAS,
     footprints::{Footprint, Footprints, SourceFile},
@@ -258,6 +259,9 @@ fn config() -> SiteConfig {
             tolerance_lines: 0.1,
             steps_max: 100,
         },
+        ties: TiesConfig::default(),
+        intersection: IntersectionConfig::default(),
+        adjustment: AdjustmentConfig::default(),
     }
 }
 

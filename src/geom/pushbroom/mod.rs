@@ -45,6 +45,16 @@ pub trait ExteriorOrientation: Sync {
     fn moving(&self, x: f64) -> (Pose, Motion);
 }
 
+impl<M: ExteriorOrientation + ?Sized> ExteriorOrientation for &M {
+    fn pose(&self, x: f64) -> Pose {
+        (**self).pose(x)
+    }
+
+    fn moving(&self, x: f64) -> (Pose, Motion) {
+        (**self).moving(x)
+    }
+}
+
 /// An orientation whose positions are a polynomial of at most second order, as eq. 4 of Shan et al. 2005 needs.
 pub trait PolynomialPath: ExteriorOrientation {
     /// The positions, metres.

@@ -14,6 +14,7 @@ use serde::{Deserialize, Serialize};
 pub use statistics::{ImageResiduals, Residuals2};
 
 use crate::{
+    config::{IntersectionConfig, Weighting},
     error::{Fault, Kind, Result},
     geom::{
         intersection::{Intersection, IntersectionLimits, Sight, Unintersected, intersect},
@@ -22,24 +23,6 @@ use crate::{
     },
     ties::{TiePoint, image_indices},
 };
-
-/// What a measuring error is the same for in all images.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Weighting {
-    /// Standard deviation of both focal coordinates.
-    Focal {
-        /// Pixels.
-        sigma_px: f64,
-    },
-    /// Standard deviations along the track in lines and across it in pixels.
-    Line {
-        /// Lines.
-        along_lines: f64,
-        /// Pixels.
-        across_px: f64,
-    },
-}
 
 /// How to intersect.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -50,12 +33,21 @@ pub struct IntersectOptions {
     pub limits: IntersectionLimits,
 }
 
+impl From<&IntersectionConfig> for IntersectOptions {
+    fn from(config: &IntersectionConfig) -> Self {
+        Self {
+            weighting: config.weighting,
+            limits: IntersectionLimits {
+                convergence_min_rad: config.convergence_min_rad,
+                ..IntersectionLimits::default()
+            },
+        }
+    }
+}
+
 impl Default for IntersectOptions {
     fn default() -> Self {
-        Self {
-            weighting: Weighting::Focal { sigma_px: 1.0 },
-            limits: IntersectionLimits::default(),
-        }
+        Self::from(&IntersectionConfig::default())
     }
 }
 
@@ -95,6 +87,10 @@ pub struct IntersectedPoint {
 pub struct MeasureResidual {
     /// Index of the image.
     pub image: usize,
+    /// Measured line from the middle of the image.
+    pub x_lines: f64,
+    /// Measured focal coordinate across the track, pixels.
+    pub y_px: f64,
     /// Along the track, focal pixels.
     pub focal_along_px: f64,
     /// Across the track, focal pixels.
@@ -272,6 +268,8 @@ fn intersect_one<M: ExteriorOrientation>(
             let y_px = image.detector.focal_px(&seen.camera_m).ok()?.y;
             Some(MeasureResidual {
                 image: place.image,
+                x_lines: place.x_lines,
+                y_px: place.y_px,
                 focal_along_px: focal.x,
                 focal_across_px: focal.y,
                 reprojection_lines: place.x_lines - seen.x,

@@ -6,7 +6,7 @@ use nalgebra::Vector3;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use super::Camera;
+use super::super::oriented::OrientedImage;
 use crate::{
     config::{CameraModel, RegistrationConfig},
     error::{Result, Stopped},
@@ -50,7 +50,7 @@ type Way = (Vec<f64>, std::result::Result<Solution, Unseen>);
 
 /// All iterations, each with the evaluations of every point (0 without a result).
 pub(super) fn run(
-    camera: &Camera<'_>,
+    camera: &OrientedImage<'_>,
     ground: &[Vector3<f64>],
     config: &RegistrationConfig,
     stop: &AtomicBool,
@@ -94,7 +94,7 @@ fn all_ways(
 }
 
 fn summed(
-    camera: &Camera<'_>,
+    camera: &OrientedImage<'_>,
     (method, model): (Method, CameraModel),
     ground: &[Vector3<f64>],
     ways: &[Way],

@@ -17,23 +17,17 @@ pub use methods::{Method, MethodRun};
 pub use points::{PointOnImage, ProfileOnImage, RegisteredPoints};
 
 use super::{
-    fit_sensor_model::SensorModel,
-    group_profiles::Profile,
-    sample_orientation::{Orientation, OrientationSample},
-    tag_times::ImageTimes,
+    fit_sensor_model::SensorModel, group_profiles::Profile, oriented::OrientedImage,
+    sample_orientation::Orientation, tag_times::ImageTimes,
 };
 use crate::{
     config::{CameraModel, RegistrationConfig},
-    error::{Fault, Kind, Result, Stopped},
+    error::{Result, Stopped},
     footprints::Footprints,
     frames::MarsIau2000,
     geom::{
-        attitude::matrix_of_spice_quaternion,
         ellipsoid::spherical_to_xyz_m,
-        pushbroom::{
-            Detector, EulerPolynomial, ExteriorOrientation, Pose, Projector,
-            RotationVectorPolynomial, SampledOrientation, SamplesFault, Unseen,
-        },
+        pushbroom::{ExteriorOrientation, Projector, Unseen},
         statistics::Summary,
     },
 };
@@ -71,24 +65,6 @@ pub struct ModelDifference {
     pub samples: Summary,
 }
 
-/// Samples that are no orientation.
-#[derive(Debug, thiserror::Error)]
-#[error("image {image}: {fault}")]
-struct NoOrientation {
-    image: String,
-    fault: SamplesFault,
-}
-
-impl Fault for NoOrientation {
-    fn kind(&self) -> Kind {
-        Kind::Input
-    }
-
-    fn advice(&self) -> String {
-        "raise orientation.intervals, and check the kernels of the image's time".to_owned()
-    }
-}
-
 /// Why a footprint has no place in an image.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 enum Reject {
@@ -97,16 +73,6 @@ enum Reject {
     /// Mars itself stands between camera and point.
     #[error("beyond the horizon")]
     BeyondHorizon,
-}
-
-/// The image with its orientation in every form.
-pub(super) struct Camera<'a> {
-    pub(super) image: &'a ImageTimes,
-    pub(super) detector: Detector,
-    pub(super) first_order: EulerPolynomial,
-    pub(super) second_order: EulerPolynomial,
-    rotation_vector: RotationVectorPolynomial,
-    samples: SampledOrientation,
 }
 
 /// Projects all profiles into `image`.
@@ -127,7 +93,7 @@ pub fn register(
     config: &RegistrationConfig,
     stop: &AtomicBool,
 ) -> Result<ImageRegistration> {
-    let camera = Camera::of(image, orientation, model)?;
+    let camera = OrientedImage::of(image, orientation, model)?;
     let shots: Vec<(u32, u32)> = (0_u32..)
         .zip(profiles)
         .flat_map(|(profile, of)| of.rows.iter().map(move |row| (profile, *row)))
@@ -180,52 +146,7 @@ fn ground_m(footprints: &Footprints<MarsIau2000>, row: u32) -> Vector3<f64> {
     )
 }
 
-/// Every sample as a line with its pose.
-fn poses(samples: &[OrientationSample]) -> Vec<(f64, Pose)> {
-    let pose = |sample: &OrientationSample| Pose {
-        position_m: sample.position_m.into(),
-        mars_to_camera: matrix_of_spice_quaternion(sample.camera_to_mars).transpose(),
-    };
-    samples
-        .iter()
-        .map(|sample| (sample.line_offset, pose(sample)))
-        .collect()
-}
-
-impl<'a> Camera<'a> {
-    fn of(image: &'a ImageTimes, orientation: &Orientation, model: &SensorModel) -> Result<Self> {
-        let sampled = SampledOrientation::new(&poses(&orientation.samples)).map_err(|fault| {
-            let image = image.id.clone();
-            NoOrientation { image, fault }
-        })?;
-        let (summing, first) = (image.crosstrack_summing, image.first_detector);
-        Ok(Self {
-            image,
-            detector: Detector::moc_na(summing, first, image.samples),
-            first_order: model.first_order.orientation(),
-            second_order: model.second_order.orientation(),
-            rotation_vector: model.rotation_vector_orientation(),
-            samples: sampled,
-        })
-    }
-
-    fn lines(&self) -> f64 {
-        f64::from(self.image.lines_header)
-    }
-
-    pub(super) fn projector(
-        &self,
-        wanted: CameraModel,
-    ) -> std::result::Result<Projector<'_, dyn ExteriorOrientation>, Unseen> {
-        let model: &dyn ExteriorOrientation = match wanted {
-            CameraModel::FirstOrder => &self.first_order,
-            CameraModel::SecondOrder => &self.second_order,
-            CameraModel::RotationVector => &self.rotation_vector,
-            CameraModel::Samples => &self.samples,
-        };
-        Projector::new(model, self.lines())
-    }
-
+impl OrientedImage<'_> {
     /// Line and sample of a point.
     fn place(
         &self,

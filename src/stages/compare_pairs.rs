@@ -1,0 +1,322 @@
+//! What every pair of images says of itself: how it sees, how far footprints and tie points disagree in it, and
+//! how uncertain that makes ground points.
+
+use std::collections::BTreeMap;
+
+use nalgebra::Vector3;
+use serde::{Deserialize, Serialize};
+
+use super::{
+    group_profiles::Profile,
+    intersect::{IntersectedPoint, IntersectedTies, MeasureResidual},
+    register::ImageRegistration,
+    uncertainty::{BudgetInput, ResidualMoments, UncertaintyBudget, uncertainty_budget},
+};
+use crate::{
+    footprints::Footprints,
+    frames::MarsIau2000,
+    geom::{
+        ellipsoid::spherical_to_xyz_m,
+        misregistration::{ImageToImage, Pair},
+        pushbroom::ExteriorOrientation,
+        statistics::Summary,
+        stereo::StereoImage,
+    },
+    ties::TiePoint,
+};
+
+/// A pair of images with tie points in both.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct PairComparison {
+    /// Identifiers, in the order of the site.
+    pub images: [String; 2],
+    /// Intersected tie points that both images see.
+    pub ties: u32,
+    /// Median angle between the rays of a tie point, radians.
+    pub convergence_rad: f64,
+    /// Height of the cameras over their distance from each other, median.
+    pub height_over_base: f64,
+    /// How far apart lines lie on the ground, metres, median over the tie points.
+    pub line_spacing_m: [f64; 2],
+    /// How wide a pixel is at the range of the ground, metres, median over the tie points.
+    pub pixel_size_m: [f64; 2],
+    /// Reprojection residuals of the tie points in each image.
+    pub residuals: [ResidualMoments; 2],
+    /// How far apart along the flight the images place a tie point, metres, mean: what their reprojection
+    /// residuals add up to.
+    pub disagreement_m: f64,
+    /// Footprints against tie points; `None` where tie points determine no transformation.
+    pub footprints: Option<FootprintsByTies>,
+    /// Median distance of successive footprints, metres; `None` without any.
+    pub mola_spacing_m: Option<f64>,
+    /// The budget of Shan et al. 2005, or why there is none.
+    pub budget: Result<UncertaintyBudget, String>,
+}
+
+/// Footprints of both images under the transformation that tie points determine.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct FootprintsByTies {
+    /// Order of the transformation from the first image to the second.
+    pub order: u8,
+    /// Tie points that it rests on.
+    pub ties: u32,
+    /// Tie points that were left out as outliers.
+    pub ties_rejected: u32,
+    /// What it leaves of the tie points' lines.
+    pub tie_lines: Summary,
+    /// What it leaves of the tie points' samples.
+    pub tie_samples: Summary,
+    /// Profiles with footprints within the lines of both images.
+    pub profiles: Vec<ProfileByTies>,
+}
+
+/// One profile of a pair.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ProfileByTies {
+    /// Identifier of the profile.
+    pub profile: String,
+    /// Transformed minus projected line in the second image.
+    pub lines: Summary,
+    /// Transformed minus projected sample in the second image.
+    pub samples: Summary,
+    /// The mean in lines on the ground, metres.
+    pub along_m: f64,
+    /// The same in distances of successive footprints of the profile; `None` for a single one.
+    pub along_spacings: Option<f64>,
+    /// Footprints beyond the tie points.
+    pub beyond_ties: u32,
+}
+
+/// Pairs with fewer tie points are not compared.
+const TIES_MIN: usize = 2;
+
+/// Compares all pairs of `images` that share tie points.
+///
+/// `registrations` go with `images`. Blunders among the tie points do not count.
+///
+/// # Source
+/// Shan et al. 2005, p. 104 and eq. 5 to 9; their eye is replaced by a transformation through tie points.
+#[must_use]
+pub fn compare_pairs<M: ExteriorOrientation>(
+    images: &[StereoImage<M>],
+    registrations: &[&ImageRegistration],
+    ties: &[TiePoint],
+    intersected: &IntersectedTies,
+    footprints: &Footprints<MarsIau2000>,
+    profiles: &[Profile],
+) -> Vec<PairComparison> {
+    let spacings: Vec<Option<f64>> = profiles
+        .iter()
+        .map(|profile| shot_spacing_m(footprints, profile))
+        .collect();
+    let mut pairs = Vec::new();
+    for first in 0..images.len() {
+        for second in first + 1..images.len() {
+            let pair = [first, second];
+            let shared = Shared::of(pair, intersected);
+            if shared.points.len() < TIES_MIN {
+                continue;
+            }
+            let line_spacing_m = shared.line_spacing_m(images);
+            let by_ties = footprints_by_ties(
+                pair.map(|index| registrations[index]),
+                pair.map(|index| images[index].id.as_str()),
+                ties,
+                (profiles, &spacings),
+                line_spacing_m[1],
+            );
+            let mola_spacing_m = median(spacings.iter().flatten().copied());
+            pairs.push(shared.compare(images, line_spacing_m, by_ties, mola_spacing_m));
+        }
+    }
+    pairs
+}
+
+/// The points of a pair, each with its measurements in the two images.
+struct Shared<'a> {
+    pair: [usize; 2],
+    points: Vec<(&'a IntersectedPoint, [MeasureResidual; 2])>,
+}
+
+impl<'a> Shared<'a> {
+    fn of(pair: [usize; 2], intersected: &'a IntersectedTies) -> Self {
+        let good = intersected.points.iter().filter(|point| !point.outlier);
+        let points = good.filter_map(|point| {
+            let measure = |image| point.measures.iter().find(|m| m.image == image).copied();
+            Some((point, [measure(pair[0])?, measure(pair[1])?]))
+        });
+        Self {
+            pair,
+            points: points.collect(),
+        }
+    }
+
+    /// Median over the points.
+    fn each(&self, of: impl Fn(&IntersectedPoint, &[MeasureResidual; 2]) -> f64) -> f64 {
+        let values = self
+            .points
+            .iter()
+            .map(|(point, measures)| of(point, measures));
+        median(values).unwrap_or_default()
+    }
+
+    fn line_spacing_m<M: ExteriorOrientation>(&self, images: &[StereoImage<M>]) -> [f64; 2] {
+        [0, 1].map(|at| {
+            let image = &images[self.pair[at]];
+            self.each(|point, measures| {
+                image.line_spacing_m(measures[at].x_lines, &point.ground_m.into())
+            })
+        })
+    }
+
+    fn compare<M: ExteriorOrientation>(
+        &self,
+        images: &[StereoImage<M>],
+        line_spacing_m: [f64; 2],
+        footprints: Option<FootprintsByTies>,
+        mola_spacing_m: Option<f64>,
+    ) -> PairComparison {
+        let pair = self.pair.map(|index| &images[index]);
+        let position_m = |measures: &[MeasureResidual; 2], at: usize| {
+            pair[at].orientation.pose(measures[at].x_lines).position_m
+        };
+        let residuals = [0, 1].map(|at| self.moments(at));
+        let height_over_base = self.each(|point, measures| {
+            let [a_m, b_m] = [0, 1].map(|at| position_m(measures, at));
+            let height_m = 0.5 * (a_m.norm() + b_m.norm()) - Vector3::from(point.ground_m).norm();
+            height_m / (b_m - a_m).norm()
+        });
+        let budget = uncertainty_budget(&BudgetInput {
+            sites: vec![residuals],
+            mola_spacing_m: mola_spacing_m.unwrap_or_default(),
+            // A pixel is what both images see on average along the flight.
+            pixel_size_m: 0.5 * (line_spacing_m[0] + line_spacing_m[1]),
+            height_over_base,
+        });
+        PairComparison {
+            images: pair.map(|image| image.id.clone()),
+            ties: u32::try_from(self.points.len()).unwrap_or(u32::MAX),
+            convergence_rad: self.each(|point, _| point.convergence_rad),
+            height_over_base,
+            line_spacing_m,
+            pixel_size_m: [0, 1].map(|at| {
+                let focal_length_px = pair[at].detector.focal_length_px;
+                self.each(|point, measures| {
+                    let away_m = position_m(measures, at) - Vector3::from(point.ground_m);
+                    away_m.norm() / focal_length_px
+                })
+            }),
+            residuals,
+            disagreement_m: (residuals[0].mean_x * line_spacing_m[0]
+                - residuals[1].mean_x * line_spacing_m[1])
+                .abs(),
+            footprints,
+            mola_spacing_m,
+            budget: budget.map_err(|fault| fault.to_string()),
+        }
+    }
+
+    fn moments(&self, at: usize) -> ResidualMoments {
+        let of = |pick: fn(&MeasureResidual) -> f64| {
+            let values: Vec<f64> = self.points.iter().map(|(_, m)| pick(&m[at])).collect();
+            Summary::of(&values)
+        };
+        let (along, across) = (of(|m| m.reprojection_lines), of(|m| m.reprojection_px));
+        ResidualMoments {
+            mean_x: along.mean,
+            deviation_x: along.standard_deviation,
+            mean_y: across.mean,
+            deviation_y: across.standard_deviation,
+        }
+    }
+}
+
+fn footprints_by_ties(
+    registrations: [&ImageRegistration; 2],
+    ids: [&str; 2],
+    ties: &[TiePoint],
+    (profiles, spacings): (&[Profile], &[Option<f64>]),
+    line_spacing_m: f64,
+) -> Option<FootprintsByTies> {
+    let pairs: Vec<Pair> = ties.iter().filter_map(|tie| tie_pair(tie, ids)).collect();
+    let fit = ImageToImage::through(&pairs)?;
+    let places = registrations.map(places);
+    let mut compared = Vec::new();
+    for ((index, profile), spacing_m) in (0_u32..).zip(profiles).zip(spacings) {
+        let seen: Vec<Pair> = profile
+            .rows
+            .iter()
+            .filter_map(|row| {
+                Some(Pair {
+                    first: *places[0].get(&(index, *row))?,
+                    second: *places[1].get(&(index, *row))?,
+                })
+            })
+            .collect();
+        let found = fit.disagreement(&seen);
+        if found.lines.n == 0 {
+            continue;
+        }
+        let along_m = found.lines.mean * line_spacing_m;
+        compared.push(ProfileByTies {
+            profile: profile.id.clone(),
+            lines: found.lines,
+            samples: found.samples,
+            along_m,
+            along_spacings: spacing_m.map(|spacing_m| along_m / spacing_m),
+            beyond_ties: u32::try_from(found.beyond_ties).unwrap_or(u32::MAX),
+        });
+    }
+    let count = |count: usize| u32::try_from(count).unwrap_or(u32::MAX);
+    Some(FootprintsByTies {
+        order: fit.order(),
+        ties: count(fit.ties),
+        ties_rejected: count(fit.ties_rejected),
+        tie_lines: fit.tie_lines,
+        tie_samples: fit.tie_samples,
+        profiles: compared,
+    })
+}
+
+/// Line and sample of a tie point in both images.
+fn tie_pair(tie: &TiePoint, ids: [&str; 2]) -> Option<Pair> {
+    let place = |id: &str| {
+        let measure = tie.measures.iter().find(|measure| measure.image == id)?;
+        Some([measure.line, measure.sample])
+    };
+    Some(Pair {
+        first: place(ids[0])?,
+        second: place(ids[1])?,
+    })
+}
+
+/// Line and sample of footprints within the image's lines, by profile and row.
+fn places(registration: &ImageRegistration) -> BTreeMap<(u32, u32), [f64; 2]> {
+    let points = &registration.points;
+    (0..points.len())
+        .filter(|index| !points.extrapolated[*index])
+        .map(|index| {
+            let shot = (points.profile[index], points.row[index]);
+            (shot, [points.line[index], points.sample[index]])
+        })
+        .collect()
+}
+
+/// Median distance of successive footprints of a profile, metres.
+fn shot_spacing_m(footprints: &Footprints<MarsIau2000>, profile: &Profile) -> Option<f64> {
+    let ground_m = |row: &u32| {
+        let row = *row as usize;
+        spherical_to_xyz_m(
+            footprints.longitude_rad[row],
+            footprints.latitude_rad[row],
+            footprints.radius_m[row],
+        )
+    };
+    let successive = profile.rows.windows(2);
+    median(successive.map(|pair| (ground_m(&pair[1]) - ground_m(&pair[0])).norm()))
+}
+
+fn median(values: impl Iterator<Item = f64>) -> Option<f64> {
+    let values: Vec<f64> = values.collect();
+    (!values.is_empty()).then(|| Summary::of(&values).median)
+}

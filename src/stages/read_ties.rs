@@ -1,0 +1,193 @@
+//! Reads tie points and gives their images the site's identifiers.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use serde::{Deserialize, Serialize};
+
+use crate::{
+    config::{ImageConfig, TiesConfig},
+    error::{Fault, Kind, Result},
+    files::file_name,
+    pds,
+    ties::{TieMeasure, TiePoint},
+};
+
+/// Complaints kept with their text; all are counted.
+const COMPLAINTS_MAX: usize = 1_000;
+/// Names of foreign images that a message quotes.
+const NAMES_QUOTED: usize = 5;
+
+/// Tie points of a site.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct Ties {
+    /// Points with a measurement in one of the site's images, in the order of the files; their
+    /// measurements name images by the site's identifiers.
+    pub points: Vec<TiePoint>,
+    /// Measurements in images that the site does not have, by the name in the file.
+    pub elsewhere: BTreeMap<String, u64>,
+    /// Measurements and points that their network itself says to ignore.
+    pub ignored: u64,
+    /// Records that are not what they should be; at most 1000 are kept.
+    pub complaints: Vec<String>,
+    /// All of them.
+    pub complaint_count: u64,
+}
+
+/// Tie points that belong to other images.
+#[derive(Debug, thiserror::Error)]
+enum TiesFault {
+    #[error("no tie point file holds a measurement")]
+    Empty,
+    #[error("tie points are measured in {found}; expected images of the site: {expected}")]
+    NoImage { found: String, expected: String },
+}
+
+impl Fault for TiesFault {
+    fn kind(&self) -> Kind {
+        Kind::Input
+    }
+
+    fn advice(&self) -> String {
+        match self {
+            Self::Empty => "give files with measurements in ties.files",
+            Self::NoImage { .. } => {
+                "give each image the name that the file has for it as images.serial_number"
+            }
+        }
+        .to_owned()
+    }
+}
+
+/// Reads all files of `ties`. Points that two files know by the same identifier stay two points: an
+/// intersection takes the first.
+///
+/// # Errors
+/// A file that is no table and no network; no measurement at all; none in an image of the site.
+pub fn read_ties(ties: &TiesConfig, images: &[ImageConfig]) -> Result<Ties> {
+    let names: BTreeMap<&str, &str> = images
+        .iter()
+        .map(|image| (image.name_in_ties(), image.id.as_str()))
+        .collect();
+    let mut read = Ties::default();
+    for path in &ties.files {
+        let file = pds::ties::read_ties(path)?;
+        read.ignored += file.ignored as u64;
+        for complaint in file.complaints {
+            read.complaint_count += 1;
+            if read.complaints.len() < COMPLAINTS_MAX {
+                let name = file_name(path);
+                let (record, text) = (complaint.record, complaint.text);
+                read.complaints
+                    .push(format!("{name}: record {record}: {text}"));
+            }
+        }
+        for tie in file.ties {
+            read.take(tie, &names);
+        }
+    }
+    if read.points.is_empty() {
+        return Err(nothing_found(&read, &names).into());
+    }
+    Ok(read)
+}
+
+impl Ties {
+    fn take(&mut self, tie: TiePoint, names: &BTreeMap<&str, &str>) {
+        let mut measures = Vec::with_capacity(tie.measures.len());
+        for measure in tie.measures {
+            match names.get(measure.image.as_str()) {
+                Some(id) => measures.push(TieMeasure {
+                    image: (*id).to_owned(),
+                    ..measure
+                }),
+                None => *self.elsewhere.entry(measure.image).or_insert(0) += 1,
+            }
+        }
+        if !measures.is_empty() {
+            self.points.push(TiePoint {
+                id: tie.id,
+                measures,
+            });
+        }
+    }
+
+    /// Tie points measured in at least two images.
+    #[must_use]
+    pub fn joining(&self) -> usize {
+        let images = |tie: &&TiePoint| {
+            let images: BTreeSet<&str> = tie.measures.iter().map(|m| m.image.as_str()).collect();
+            images.len() > 1
+        };
+        self.points.iter().filter(images).count()
+    }
+}
+
+fn nothing_found(read: &Ties, names: &BTreeMap<&str, &str>) -> TiesFault {
+    if read.elsewhere.is_empty() {
+        return TiesFault::Empty;
+    }
+    let mut found: Vec<&str> = read.elsewhere.keys().map(String::as_str).collect();
+    let more = found.len().saturating_sub(NAMES_QUOTED);
+    found.truncate(NAMES_QUOTED);
+    let more = match more {
+        0 => String::new(),
+        more => format!(" and {more} more"),
+    };
+    TiesFault::NoImage {
+        found: found.join(", ") + &more,
+        expected: names.keys().copied().collect::<Vec<_>>().join(", "),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::config::ImageFields;
+
+    fn image(id: &str, serial_number: Option<&str>) -> ImageConfig {
+        ImageConfig {
+            id: id.to_owned(),
+            label: None,
+            serial_number: serial_number.map(str::to_owned),
+            fields: ImageFields::default(),
+        }
+    }
+
+    fn read(text: &str, images: &[ImageConfig]) -> Result<Ties> {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("ties.csv");
+        std::fs::write(&path, text).unwrap();
+        read_ties(&TiesConfig { files: vec![path] }, images)
+    }
+
+    const TABLE: &str = "point_id,serial_number,sample,line\n\
+        1,A,1,1\n1,B,2,2\n1,C,3,3\n2,C,1,1\n3,B,4,4\n4,A,x,1\n";
+
+    #[test]
+    fn images_get_the_names_of_the_site() {
+        let ties = read(TABLE, &[image("one", Some("A")), image("B", None)]).unwrap();
+        let ids: Vec<&str> = ties.points.iter().map(|tie| &*tie.id).collect();
+        assert_eq!(ids, ["1", "3"]);
+        let images: Vec<&str> = ties.points[0].measures.iter().map(|m| &*m.image).collect();
+        assert_eq!(images, ["one", "B"]);
+        assert_eq!(ties.joining(), 1);
+        assert_eq!(ties.elsewhere, BTreeMap::from([("C".to_owned(), 2)]));
+        assert_eq!(ties.complaint_count, 1);
+        assert!(ties.complaints[0].starts_with("ties.csv: record 7: "));
+    }
+
+    #[test]
+    fn names_that_do_not_match_are_told() {
+        let failure = read(TABLE, &[image("x", None), image("y", None)]).unwrap_err();
+        assert_eq!(failure.kind(), Kind::Input);
+        assert_eq!(
+            failure.fault.to_string(),
+            "tie points are measured in A, B, C; expected images of the site: x, y"
+        );
+        let empty = read("point_id,serial_number,sample,line\n", &[image("x", None)]);
+        assert_eq!(
+            empty.unwrap_err().fault.to_string(),
+            "no tie point file holds a measurement"
+        );
+    }
+}
