@@ -12,19 +12,33 @@ mod scene;
 
 use std::time::Instant;
 
-use areograph::geom::bundle::{BundleOptions, Network, View, solve};
-use recipe::{Normals, Recipe};
+use areograph::geom::{
+    bundle::{BundleOptions, Network, View, solve},
+    pushbroom::{EulerPolynomial, ExteriorOrientation, Pose, SampledOrientation},
+};
+use recipe::{Normals, Recipe, Simulated};
 
 const IMAGES: usize = 20;
 
+/// The simulated network with its initial orientations through 31 samples, as the flow has them.
+fn sampled(simulated: &Simulated<EulerPolynomial>) -> Network<SampledOrientation> {
+    simulated.based_on(|image| {
+        let samples: Vec<(f64, Pose)> = (-15..=15)
+            .map(|k| f64::from(k) / 15.0 * image.half_lines)
+            .map(|x| (x, image.base.pose(x)))
+            .collect();
+        SampledOrientation::new(&samples).unwrap()
+    })
+}
+
 /// Ties in three of twenty images each, so that the images hang together in a ring.
-fn ring(ties: usize) -> Network {
+fn ring(ties: usize) -> Network<SampledOrientation> {
     let simulated = Recipe {
         ties,
         ..Recipe::GUSEV
     }
     .simulate();
-    let mut network = simulated.network;
+    let mut network = sampled(&simulated);
     let pair = [network.images[0].clone(), network.images[1].clone()];
     network.images = (0..IMAGES).map(|image| pair[image % 2].clone()).collect();
     let mut normals = Normals::new(1);
@@ -50,7 +64,7 @@ fn ring(ties: usize) -> Network {
 }
 
 /// Median of `runs` adjustments, seconds, with steps and σ0.
-fn time(what: &str, network: &Network, runs: usize) {
+fn time(what: &str, network: &Network<SampledOrientation>, runs: usize) {
     let mut seconds: Vec<f64> = Vec::new();
     let mut result = None;
     for _ in 0..runs {
@@ -69,7 +83,7 @@ fn time(what: &str, network: &Network, runs: usize) {
 }
 
 fn main() {
-    time("recipe", &Recipe::GUSEV.simulate().network, 11);
+    time("recipe", &sampled(&Recipe::GUSEV.simulate()), 11);
     for ties in [25_000, 50_000, 100_000] {
         time(&format!("{ties} ties in 20 images"), &ring(ties), 3);
     }

@@ -14,14 +14,17 @@ mod scene;
 use areograph::{
     geom::{
         bundle::{BundleOptions, Network, View, solve},
-        pushbroom::{Detector, EulerPolynomial, ExteriorOrientation, Projector},
+        pushbroom::{
+            CorrectedOrientation, Detector, EulerPolynomial, ExteriorOrientation,
+            OrientationCorrection, Projector,
+        },
         robust::RobustWeight,
         stereo::StereoImage,
     },
     stages::{
         adjust::{
-            AdjustImage, AdjustOptions, AdjustedSite, BAARDA_LIMIT, LaserShot, LeftOutReason,
-            MolaImage, ObservationType, ShotRange, adjust,
+            AdjustImage, AdjustOptions, Adjusted, BAARDA_LIMIT, LaserShot, LeftOutReason,
+            MolaImage, ObservationType, PointKind, ShotRange, adjust,
         },
         intersect::{IntersectOptions, IntersectedTies, intersect_ties},
     },
@@ -32,18 +35,21 @@ use recipe::{HALF_SWATH_PX, Normals, Recipe, Simulated, project};
 
 const NAMES: [&str; 2] = ["E02-00665", "E02-01453"];
 
+/// What the recipe starts from.
+type Initial = CorrectedOrientation<EulerPolynomial>;
+
 struct Site {
-    simulated: Simulated,
-    images: Vec<AdjustImage>,
+    simulated: Simulated<EulerPolynomial>,
+    images: Vec<AdjustImage<Initial>>,
     shots: Vec<LaserShot>,
     ties: Vec<TiePoint>,
 }
 
-fn stereo(
-    simulated: &Simulated,
+fn stereo<M>(
+    simulated: &Simulated<EulerPolynomial>,
     image: usize,
-    orientation: EulerPolynomial,
-) -> StereoImage<EulerPolynomial> {
+    orientation: M,
+) -> StereoImage<M> {
     let entry = &simulated.network.images[image];
     StereoImage {
         id: NAMES[image].to_owned(),
@@ -62,12 +68,12 @@ impl Site {
     fn of(recipe: Recipe) -> Self {
         let simulated = recipe.simulate();
         let network = &simulated.network;
-        let images: Vec<AdjustImage> = network
+        let images: Vec<AdjustImage<Initial>> = network
             .images
             .iter()
             .enumerate()
             .map(|(index, image)| AdjustImage {
-                stereo: stereo(&simulated, index, image.orientation),
+                stereo: stereo(&simulated, index, image.base),
                 line_period_s: image.line_period_s,
                 sigmas: image.sigmas,
                 time_bias_sigma_s: 0.0,
@@ -77,10 +83,10 @@ impl Site {
             .ranges
             .iter()
             .map(|range| LaserShot {
-                id: format!("shot {}", range.point),
+                id: format!("{}/{}", range.profile, range.point),
                 ground_m: network.points[range.point].ground_m.into(),
                 range: Some(ShotRange {
-                    profile: format!("profile {}", range.profile),
+                    profile: format!("{}", 10_496 + range.profile),
                     image: NAMES[range.image].to_owned(),
                     x_lines: range.x_lines,
                     range_m: range.range_m,
@@ -89,7 +95,7 @@ impl Site {
             .collect();
         let ties = (simulated.shots..network.points.len())
             .map(|point| TiePoint {
-                id: format!("tie {point}"),
+                id: format!("T{point}"),
                 measures: network
                     .views
                     .iter()
@@ -119,7 +125,7 @@ impl Site {
         intersect_ties(&images, &self.ties, &IntersectOptions::default()).unwrap()
     }
 
-    fn adjust(&self, options: &AdjustOptions) -> areograph::error::Result<AdjustedSite> {
+    fn adjust(&self, options: &AdjustOptions) -> areograph::error::Result<Adjusted> {
         adjust(
             &self.images,
             &self.shots,
@@ -138,7 +144,7 @@ fn matched(site: &Site) -> AdjustOptions {
     }
 }
 
-fn focal_px_per_line(simulated: &Simulated, image: usize) -> f64 {
+fn focal_px_per_line(simulated: &Simulated<EulerPolynomial>, image: usize) -> f64 {
     let truth = stereo(simulated, image, simulated.orientations[image]);
     truth.focal_px_per_line(0.0, &simulated.points_m[simulated.shots])
 }
@@ -156,7 +162,7 @@ fn the_stage_gives_what_the_geometry_gives() {
         direct.degrees_of_freedom()
     );
     assert!((adjusted.summary.sigma0 / direct.sigma0() - 1.0).abs() < 1e-9); // sums in another order
-    assert!(adjusted.rejected.is_empty());
+    assert!(adjusted.left_out.is_empty());
     let redundancy: f64 = adjusted
         .summary
         .types
@@ -196,7 +202,7 @@ fn footprints_in_images_weigh_as_the_mode_says() {
     };
     let [weighted, off, reproject] =
         [MolaImage::Weighted, MolaImage::Off, MolaImage::Reproject].map(with);
-    let views = weighted.network.views.len() - off.network.views.len();
+    let views = weighted.views.len() - off.views.len();
     assert_eq!(
         weighted.summary.degrees_of_freedom,
         2 * views + off.summary.degrees_of_freedom
@@ -207,7 +213,7 @@ fn footprints_in_images_weigh_as_the_mode_says() {
         reproject.summary.degrees_of_freedom,
         off.summary.degrees_of_freedom
     );
-    assert_eq!(reproject.adjustment.images, off.adjustment.images);
+    assert_eq!(reproject.images, off.images);
     assert_eq!(off.summary.images[0].mola_corrections[0].n, 0);
     let shifts = [0, 1].map(|image| reproject.summary.images[image].mola_corrections[0]);
     println!("{shifts:.3?}");
@@ -246,12 +252,12 @@ fn blunders_are_found_and_good_ties_kept() {
             entry.sample += 50.0 * (normals.uniform() - 0.5);
         }
         let tested = site.adjust(&options).unwrap();
-        for left_out in &tested.rejected {
+        for left_out in &tested.left_out {
             assert!(
                 matches!(left_out.reason, LeftOutReason::Blunder { .. }),
                 "{left_out:?}"
             );
-            let number: usize = left_out.id.trim_start_matches("tie ").parse().unwrap();
+            let number: usize = left_out.id.trim_start_matches('T').parse().unwrap();
             if wrong.contains(&(number - site.simulated.shots)) {
                 found += 1;
             } else {
@@ -259,13 +265,13 @@ fn blunders_are_found_and_good_ties_kept() {
             }
         }
         clean += site.ties.len() - BLUNDERS;
-        let rms_m = |adjusted: &AdjustedSite| {
-            let errors = (site.simulated.shots..site.simulated.points_m.len())
-                .filter(|point| !wrong.contains(&(point - site.simulated.shots)))
-                .filter_map(|point| {
-                    let found = adjusted.adjustment.points[point].ok()?;
-                    Some((found.ground_m - site.simulated.points_m[point]).norm_squared())
-                });
+        let rms_m = |adjusted: &Adjusted| {
+            let errors = adjusted.points.iter().filter_map(|point| {
+                let number: usize = point.id.strip_prefix('T')?.parse().unwrap();
+                let good = !wrong.contains(&(number - site.simulated.shots));
+                let truth_m = site.simulated.points_m[number];
+                good.then(|| (Vector3::from(point.ground_m) - truth_m).norm_squared())
+            });
             let errors: Vec<f64> = errors.collect();
             (errors.iter().sum::<f64>() / errors.len() as f64).sqrt()
         };
@@ -290,20 +296,17 @@ fn blunders_are_found_and_good_ties_kept() {
 fn across_the_track_a_pair_does_not_control_itself() {
     let site = Site::of(Recipe::GUSEV);
     let adjusted = site.adjust(&AdjustOptions::default()).unwrap();
-    for (view, residuals) in adjusted
-        .network
+    for view in adjusted
         .views
         .iter()
-        .zip(&adjusted.adjustment.views)
+        .filter(|view| view.kind == PointKind::Tie)
     {
-        if view.point >= adjusted.shots {
-            let [along, across] = residuals.unwrap().map(|residual| residual.redundancy);
-            // Height takes up nearly all of an error across the track.
-            assert!(
-                across < 0.02 && (0.2..0.8).contains(&along),
-                "{along} {across}"
-            );
-        }
+        let [along, across] = [view.along_px, view.across_px].map(|axis| axis.redundancy);
+        // Height takes up nearly all of an error across the track.
+        assert!(
+            across < 0.02 && (0.2..0.8).contains(&along),
+            "{along} {across}"
+        );
     }
 }
 
@@ -311,7 +314,7 @@ fn across_the_track_a_pair_does_not_control_itself() {
 fn what_does_not_fit_together_is_refused() {
     let site = Site::of(Recipe::GUSEV);
     let starts = site.starts();
-    let run = |images: &[AdjustImage],
+    let run = |images: &[AdjustImage<Initial>],
                shots: &[LaserShot],
                ties: &[TiePoint],
                options: &AdjustOptions| {
@@ -326,12 +329,12 @@ fn what_does_not_fit_together_is_refused() {
     shots[3].range.as_mut().unwrap().image = "E02-00000".to_owned();
     let message = run(&site.images, &shots, &site.ties, &plain);
     assert!(
-        message.contains("shot 3") && message.contains("E02-00000"),
+        message.contains("shot 0/3 was") && message.contains("E02-00000"),
         "{message}"
     );
     shots.clone_from(&site.shots);
-    shots[4].id = "shot 5".to_owned();
-    assert!(run(&site.images, &shots, &site.ties, &plain).contains("shot 5"));
+    shots[4].id = "0/5".to_owned();
+    assert!(run(&site.images, &shots, &site.ties, &plain).contains("0/5"));
     let mut ties = site.ties.clone();
     ties[0].measures[0].image = "E02-00000".to_owned();
     assert!(run(&site.images, &site.shots, &ties, &plain).contains("E02-00000"));
@@ -352,14 +355,39 @@ fn what_does_not_fit_together_is_refused() {
     shots[60].ground_m[0] += 5_000.0;
     let message = run(&site.images, &shots, &site.ties, &plain);
     assert!(message.contains("contradicts"), "{message}");
+    assert!(message.contains("the footprint of shot 0/60"), "{message}");
+
+    // Values that are none are told with what they belong to.
     let mut negative = site.images.clone();
     negative[1].sigmas[4] = -1.0;
-    assert!(run(&negative, &site.shots, &site.ties, &plain).contains("standard deviation"));
+    let message = run(&negative, &site.shots, &site.ties, &plain);
+    assert!(
+        message
+            .contains("the standard deviation of an orientation unknown of image E02-01453 is -1"),
+        "{message}"
+    );
+    shots.clone_from(&site.shots);
+    shots[7].range.as_mut().unwrap().range_m = f64::NAN;
+    let message = run(&site.images, &shots, &site.ties, &plain);
+    assert!(
+        message.contains("the range of shot 0/7 is NaN"),
+        "{message}"
+    );
     let nowhere = AdjustOptions {
-        range_sigma_m: f64::NAN,
+        tie_sigma_px: [1.0, 0.0],
         ..plain
     };
-    assert!(run(&site.images, &site.shots, &site.ties, &nowhere).contains("NaN"));
+    let message = run(&site.images, &site.shots, &site.ties, &nowhere);
+    assert!(
+        message.contains("of tie point T266 in image E02-00665 is 0"),
+        "{message}"
+    );
+    let unknown = AdjustOptions {
+        range_bias_sigma_m: f64::NAN,
+        ..plain
+    };
+    let message = run(&site.images, &site.shots, &site.ties, &unknown);
+    assert!(message.contains("of profile 10496 is NaN"), "{message}");
     assert!(!run(&[], &[], &[], &plain).is_empty());
 }
 
@@ -368,26 +396,24 @@ fn ties_without_a_ground_point_are_listed() {
     let mut site = Site::of(Recipe::GUSEV);
     site.ties[0].measures.truncate(1);
     let adjusted = site.adjust(&AdjustOptions::default()).unwrap();
-    assert_eq!(adjusted.rejected.len(), 1);
-    assert_eq!(adjusted.rejected[0].id, site.ties[0].id);
-    assert_eq!(adjusted.rejected[0].reason, LeftOutReason::NotIntersected);
+    assert_eq!(adjusted.left_out.len(), 1);
+    assert_eq!(adjusted.left_out[0].id, site.ties[0].id);
+    assert_eq!(adjusted.left_out[0].reason, LeftOutReason::NotIntersected);
 }
 
 /// One draw of every observation from its own standard deviation about the truth.
-fn draw(simulated: &Simulated, views: &[View], normals: &mut Normals) -> Network {
+fn draw(
+    simulated: &Simulated<EulerPolynomial>,
+    views: &[View],
+    normals: &mut Normals,
+) -> Network<Initial> {
     let mut network = simulated.network.clone();
     for (image, truth) in network.images.iter_mut().zip(&simulated.orientations) {
-        image.orientation = *truth;
-        for (index, sigma) in image.sigmas.iter().enumerate() {
-            let (quantity, power) = (index / 3, index % 3);
-            let polynomial = if quantity < 3 {
-                &mut image.orientation.path_m
-            } else {
-                &mut image.orientation.angles_rad
-            };
-            let lines = image.half_lines.powi(i32::try_from(power).unwrap());
-            polynomial.coefficients[power][quantity % 3] += sigma * normals.next() / lines;
-        }
+        let errors = image.sigmas.map(|sigma| sigma * normals.next());
+        image.base = CorrectedOrientation {
+            base: *truth,
+            correction: OrientationCorrection::of(&errors, image.half_lines, 0.0),
+        };
     }
     for range in &mut network.ranges {
         let orientation = &simulated.orientations[range.image];
@@ -445,21 +471,11 @@ fn the_formal_covariance_is_the_scatter_where_the_model_is_exact() {
         let adjustment = solve(&network, &BundleOptions::default()).unwrap();
         sigma0 += adjustment.sigma0().powi(2) / f64::from(RUNS);
         for (image, adjusted) in adjustment.images.iter().enumerate() {
+            let wrong = network.images[image].base.correction.coefficients();
+            let found = adjusted.correction.coefficients();
             for (index, sum) in orientation[image].iter_mut().enumerate() {
-                let coefficient = |orientation: &EulerPolynomial| {
-                    let polynomial = if index < 9 {
-                        &orientation.path_m
-                    } else {
-                        &orientation.angles_rad
-                    };
-                    polynomial.coefficients[index % 3][index / 3 % 3]
-                };
-                let lines = network.images[image]
-                    .half_lines
-                    .powi(i32::try_from(index % 3).unwrap());
-                let error = (coefficient(&adjusted.orientation)
-                    - coefficient(&simulated.orientations[image]))
-                    * lines;
+                // What is added should undo what was wrong; rotations of 1e-3 rad as good as commute.
+                let error = found[index] + wrong[index];
                 *sum += error * error / adjusted.cofactors[(index, index)] / f64::from(RUNS);
             }
         }
@@ -478,4 +494,40 @@ fn the_formal_covariance_is_the_scatter_where_the_model_is_exact() {
     ties.into_iter().for_each(close);
     orientation.into_iter().flatten().for_each(close);
     close(sigma0);
+}
+
+#[test]
+fn the_result_is_kept_and_read_back() {
+    let mut site = Site::of(Recipe::GUSEV);
+    for image in &mut site.images {
+        image.time_bias_sigma_s = 0.05;
+    }
+    let adjusted = site.adjust(&AdjustOptions::default()).unwrap();
+    let bytes = postcard::to_stdvec(&adjusted).unwrap();
+    assert_eq!(postcard::from_bytes::<Adjusted>(&bytes).unwrap(), adjusted);
+    // The corrected orientation puts the adjusted ties where they were measured, up to their residuals.
+    for (index, image) in site.images.iter().enumerate() {
+        let orientation = CorrectedOrientation {
+            base: image.stereo.orientation,
+            correction: adjusted.correction(index),
+        };
+        let ties = adjusted
+            .views
+            .iter()
+            .filter(|view| view.image == index && view.kind == PointKind::Tie);
+        for view in ties {
+            let ground_m = Vector3::from(adjusted.points[view.point].ground_m);
+            let camera_m = orientation.pose(view.x_lines).camera_vector_m(&ground_m);
+            let focal = image.stereo.detector.focal_px(&camera_m).unwrap();
+            // Half a million pixels of focal length times rounding of positions of 4e6 m.
+            assert!((focal.x + view.along_px.value).abs() < 1e-6);
+            assert!((focal.y + view.across_px.value - view.y_px).abs() < 1e-6);
+        }
+        let entry = &adjusted.images[index];
+        assert!(entry.sigmas.iter().all(|sigma| *sigma > 0.0));
+        assert!(entry.time_bias_s.unwrap().1 < 0.05);
+    }
+    let tie = adjusted.points.last().unwrap();
+    let sigma_m = (0..3).map(|axis| tie.covariance_m2[axis][axis].sqrt());
+    assert!(sigma_m.fold(0.0, f64::max) < 100.0);
 }

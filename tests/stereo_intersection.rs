@@ -24,7 +24,7 @@ use nalgebra::{Matrix3, Vector3};
 use recipe::{Normals, Recipe};
 
 fn images() -> Vec<StereoImage<EulerPolynomial>> {
-    let scenes = recipe::pair();
+    let scenes = recipe::pair(recipe::Recipe::GUSEV.place_deg);
     let names = ["nadir", "oblique"];
     scenes
         .iter()
@@ -111,7 +111,7 @@ fn exact_measurements_give_the_truth() {
 
 /// Ground size of a pixel over that of a line: what shares a disagreement between the images.
 fn ground_per_px_and_line(point: &[f64; 3], image: usize) -> (f64, f64) {
-    let scenes = recipe::pair();
+    let scenes = recipe::pair(recipe::Recipe::GUSEV.place_deg);
     let range_m = (scenes[image].pose(0.0).position_m - Vector3::from(*point)).norm();
     let spacing_m = (scenes[image].boresight_ground_m(scenes[image].line_period_s())
         - scenes[image].boresight_ground_m(0.0))

@@ -106,6 +106,31 @@ pub fn matrix_of_rotation_vector(vector_rad: &Vector3<f64>) -> Matrix3<f64> {
     Rotation3::new(*vector_rad).into_inner()
 }
 
+/// Below this angle, radians, the two factors of [`turn_of_rotation_vector`] are taken from their series,
+/// whose next terms are below 1e-11 of them there.
+const SERIES_BELOW_RAD: f64 = 1e-2;
+
+/// `Ω`, radians, with `d exp([r]×) = [Ω]× exp([r]×)` while `r` changes by `rate`: the left Jacobian of the
+/// rotation times `rate`. Its transpose is the same with `−r`.
+#[must_use]
+pub fn turn_of_rotation_vector(vector_rad: &Vector3<f64>, rate_rad: &Vector3<f64>) -> Vector3<f64> {
+    let square = vector_rad.norm_squared();
+    let angle = square.sqrt();
+    let (first, second) = if angle < SERIES_BELOW_RAD {
+        (
+            0.5 - square / 24.0 + square * square / 720.0,
+            1.0 / 6.0 - square / 120.0 + square * square / 5_040.0,
+        )
+    } else {
+        (
+            (1.0 - angle.cos()) / square,
+            (angle - angle.sin()) / (square * angle),
+        )
+    };
+    let across = vector_rad.cross(rate_rad);
+    rate_rad + across * first + vector_rad.cross(&across) * second
+}
+
 /// Steps towards the mean rotation that are tried; each leaves the cube of what was left.
 const MEAN_STEPS_MAX: u32 = 20;
 /// Size of the last step, radians.

@@ -8,7 +8,10 @@
 use areograph::geom::{
     bundle::{BundleImage, BundlePoint, Network, Range, View},
     intersection::{IntersectionLimits, Sight, intersect},
-    pushbroom::{EulerPolynomial, ExteriorOrientation, Projector},
+    pushbroom::{
+        CorrectedOrientation, EulerPolynomial, ExteriorOrientation, OrientationCorrection,
+        Projector,
+    },
 };
 use nalgebra::{Vector2, Vector3};
 
@@ -54,6 +57,8 @@ impl Normals {
 /// What is simulated.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Recipe {
+    /// Latitude and longitude of the nadir image, degrees.
+    pub(crate) place_deg: [f64; 2],
     pub(crate) seed: u64,
     pub(crate) ties: usize,
     /// Shots along the track of each image.
@@ -73,6 +78,7 @@ pub(crate) struct Recipe {
 impl Recipe {
     /// The verified synthetic recipe of the adjustment.
     pub(crate) const GUSEV: Self = Self {
+        place_deg: [GUSEV.latitude_deg, GUSEV.longitude_deg],
         seed: 7,
         ties: 154,
         shots: [142, 124],
@@ -97,25 +103,55 @@ impl Recipe {
 
 /// A network and what it should be.
 #[derive(Debug, Clone)]
-pub(crate) struct Simulated {
-    pub(crate) network: Network,
+pub(crate) struct Simulated<M> {
+    /// Initial orientations are the true ones, late and off their place.
+    pub(crate) network: Network<CorrectedOrientation<M>>,
     /// True orientation of each image.
-    pub(crate) orientations: [EulerPolynomial; 2],
+    pub(crate) orientations: [M; 2],
     /// True points: shots of the first track, of the second, then ties.
     pub(crate) points_m: Vec<Vector3<f64>>,
     /// Number of shots.
     pub(crate) shots: usize,
 }
 
+impl<M: ExteriorOrientation> Simulated<M> {
+    /// The same observations with other initial orientations, made from the former ones.
+    pub(crate) fn based_on<N>(
+        &self,
+        base: impl Fn(&BundleImage<CorrectedOrientation<M>>) -> N,
+    ) -> Network<N> {
+        let images = self.network.images.iter().map(|image| BundleImage {
+            base: base(image),
+            half_lines: image.half_lines,
+            line_period_s: image.line_period_s,
+            focal_length_px: image.focal_length_px,
+            sigmas: image.sigmas,
+            time_bias_sigma_s: image.time_bias_sigma_s,
+        });
+        Network {
+            images: images.collect(),
+            points: self.network.points.clone(),
+            views: self.network.views.clone(),
+            ranges: self.network.ranges.clone(),
+            range_bias_sigmas_m: self.network.range_bias_sigmas_m.clone(),
+        }
+    }
+}
+
 /// The pair: nadir image, and one from an orbit 2.45° west that looks at the same ground.
-pub(crate) fn pair() -> [Scene; 2] {
-    let target_m = GUSEV.boresight_ground_m(0.0);
+pub(crate) fn pair([latitude_deg, longitude_deg]: [f64; 2]) -> [Scene; 2] {
+    let nadir = Scene {
+        latitude_deg,
+        longitude_deg,
+        ..GUSEV
+    };
+    let target_m = nadir.boresight_ground_m(0.0);
     let mut oblique = Scene {
-        longitude_deg: GUSEV.longitude_deg - 2.45,
+        longitude_deg: longitude_deg - 2.45,
         lines: 8_960,
         duration_s: 12.958,
         held: Held::Inertial { roll_deg: 0.0 },
-        ..GUSEV
+        ..nadir
     };
     for _ in 0..4 {
         let unrolled = Scene {
@@ -128,24 +164,7 @@ pub(crate) fn pair() -> [Scene; 2] {
         oblique.latitude_deg -= (camera_m.x / target_m.norm()).to_degrees();
         oblique.held = Held::Inertial { roll_deg };
     }
-    [GUSEV, oblique]
-}
-
-/// The same images with their tags late and their positions off.
-fn biased(truth: &EulerPolynomial, shift_lines: f64, bias_m: &Vector3<f64>) -> EulerPolynomial {
-    let shift = |polynomial: &areograph::geom::pushbroom::VectorPolynomial| {
-        let [_, linear, square] = polynomial.coefficients;
-        let mut shifted = *polynomial;
-        shifted.coefficients[0] += linear * shift_lines + square * shift_lines.powi(2);
-        shifted.coefficients[1] += square * (2.0 * shift_lines);
-        shifted
-    };
-    let mut path_m = shift(&truth.path_m);
-    path_m.coefficients[0] += bias_m;
-    EulerPolynomial {
-        path_m,
-        angles_rad: shift(&truth.angles_rad),
-    }
+    [nadir, oblique]
 }
 
 /// Standard deviations of the paper: `sigma_m` for positions, the same on the ground for angles.
@@ -161,7 +180,7 @@ pub(crate) fn sigmas(sigma_m: f64) -> [f64; 18] {
 
 /// Measures of a point: line and place in the line.
 pub(crate) fn project(
-    projector: &Projector<'_, EulerPolynomial>,
+    projector: &Projector<'_, impl ExteriorOrientation>,
     focal_length_px: f64,
     point_m: &Vector3<f64>,
 ) -> (f64, f64) {
@@ -171,8 +190,12 @@ pub(crate) fn project(
 }
 
 /// A measurement for intersection, one focal pixel in both axes.
-pub(crate) fn sight(image: &BundleImage, x_lines: f64, y_px: f64) -> Sight {
-    let pose = image.orientation.pose(x_lines);
+pub(crate) fn sight(
+    image: &BundleImage<impl ExteriorOrientation>,
+    x_lines: f64,
+    y_px: f64,
+) -> Sight {
+    let pose = image.base.pose(x_lines);
     Sight {
         position_m: pose.position_m,
         mars_to_camera: pose.mars_to_camera,
@@ -184,24 +207,38 @@ pub(crate) fn sight(image: &BundleImage, x_lines: f64, y_px: f64) -> Sight {
 }
 
 impl Recipe {
-    pub(crate) fn simulate(&self) -> Simulated {
-        let scenes = pair();
+    /// With the sensor model of the papers as the truth.
+    pub(crate) fn simulate(&self) -> Simulated<EulerPolynomial> {
+        self.simulate_with(|scene| scene.euler(2))
+    }
+
+    /// With any sensor model of the scenes as the truth.
+    pub(crate) fn simulate_with<M: ExteriorOrientation + Clone>(
+        &self,
+        model: impl Fn(&Scene) -> M,
+    ) -> Simulated<M> {
+        let scenes = pair(self.place_deg);
         let mut normals = Normals::new(self.seed);
-        let orientations = [scenes[0].euler(2), scenes[1].euler(2)];
+        let orientations = scenes.each_ref().map(model);
         let focal_length_px = scenes[0].focal_length_px();
         let mut network = Network {
             images: (0..2)
-                .map(|image| BundleImage {
-                    orientation: biased(
-                        &orientations[image],
-                        self.shift_lines[image],
-                        &(normals.vector() * self.position_bias_m),
-                    ),
-                    half_lines: 0.5 * f64::from(scenes[image].lines),
-                    line_period_s: scenes[image].line_period_s(),
-                    focal_length_px,
-                    sigmas: sigmas([100.0, 200.0][image]),
-                    time_bias_sigma_s: 0.0,
+                .map(|image| {
+                    let half_lines = 0.5 * f64::from(scenes[image].lines);
+                    let mut bias =
+                        OrientationCorrection::of(&[0.0; 18], half_lines, self.shift_lines[image]);
+                    bias.position_m[0] = normals.vector() * self.position_bias_m;
+                    BundleImage {
+                        base: CorrectedOrientation {
+                            base: orientations[image].clone(),
+                            correction: bias,
+                        },
+                        half_lines,
+                        line_period_s: scenes[image].line_period_s(),
+                        focal_length_px,
+                        sigmas: sigmas([100.0, 200.0][image]),
+                        time_bias_sigma_s: 0.0,
+                    }
                 })
                 .collect(),
             range_bias_sigmas_m: vec![0.0; 2],
@@ -231,12 +268,12 @@ impl Recipe {
         }
     }
 
-    fn shoot(
+    fn shoot<M: ExteriorOrientation>(
         &self,
         scenes: &[Scene; 2],
-        orientations: &[EulerPolynomial; 2],
+        orientations: &[M; 2],
         normals: &mut Normals,
-        network: &mut Network,
+        network: &mut Network<CorrectedOrientation<M>>,
         points_m: &mut Vec<Vector3<f64>>,
     ) {
         for (image, scene) in scenes.iter().enumerate() {
@@ -264,7 +301,7 @@ impl Recipe {
         // MOLA's image coordinates are where the initial orientation puts its footprints.
         let mut views = Vec::new();
         for (image, entry) in network.images.iter().enumerate() {
-            let projector = Projector::new(&entry.orientation, 2.0 * entry.half_lines).unwrap();
+            let projector = Projector::new(&entry.base, 2.0 * entry.half_lines).unwrap();
             for (index, point) in network.points.iter().enumerate() {
                 let (x_lines, y_px) = project(&projector, entry.focal_length_px, &point.ground_m);
                 if x_lines.abs() <= entry.half_lines && y_px.abs() <= HALF_SWATH_PX + OUTSIDE_PX {
@@ -287,12 +324,12 @@ impl Recipe {
         network.views.extend(views);
     }
 
-    fn tie(
+    fn tie<M: ExteriorOrientation>(
         &self,
         scenes: &[Scene; 2],
-        orientations: &[EulerPolynomial; 2],
+        orientations: &[M; 2],
         normals: &mut Normals,
-        network: &mut Network,
+        network: &mut Network<CorrectedOrientation<M>>,
         points_m: &mut Vec<Vector3<f64>>,
     ) {
         let projectors = [0, 1].map(|image| {

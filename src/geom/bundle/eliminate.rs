@@ -12,7 +12,9 @@ use super::{
     rows::{self, Row},
     unknowns::{Columns, State},
 };
-use crate::geom::{collinearity::BehindCamera, robust::RobustWeight};
+use crate::geom::{
+    collinearity::BehindCamera, pushbroom::ExteriorOrientation, robust::RobustWeight,
+};
 
 /// Parts in which points are summed: fixed, so that the sums do not depend on the number of threads.
 const PARTS: usize = 16;
@@ -26,7 +28,7 @@ pub(super) struct ByPoint {
 }
 
 impl ByPoint {
-    pub(super) fn of(network: &Network) -> Self {
+    pub(super) fn of<M>(network: &Network<M>) -> Self {
         let mut by_point = Self {
             views: vec![Vec::new(); network.points.len()],
             ranges: vec![Vec::new(); network.points.len()],
@@ -42,8 +44,8 @@ impl ByPoint {
 }
 
 /// A network laid out for its adjustment.
-pub(super) struct Layout<'a> {
-    pub(super) network: &'a Network,
+pub(super) struct Layout<'a, M> {
+    pub(super) network: &'a Network<M>,
     pub(super) columns: Columns,
     pub(super) by_point: ByPoint,
     pub(super) robust: Option<RobustWeight>,
@@ -72,7 +74,7 @@ pub(super) struct Eliminated {
     pub(super) misclosures: DVector<f64>,
 }
 
-impl Layout<'_> {
+impl<M: ExteriorOrientation> Layout<'_, M> {
     fn columns_of(&self, point: usize) -> Vec<usize> {
         let views = self.by_point.views[point]
             .iter()
@@ -262,8 +264,8 @@ impl Reduced {
 }
 
 /// Sums up the points of `active` and the initial values of the shared unknowns.
-pub(super) fn reduce(
-    layout: &Layout<'_>,
+pub(super) fn reduce<M: ExteriorOrientation>(
+    layout: &Layout<'_, M>,
     state: &State,
     active: &[usize],
 ) -> Result<Reduced, BehindCamera> {

@@ -1,15 +1,18 @@
 //! Combined bundle adjustment of pushbroom images, ground points and laser ranges.
 //!
-//! Unknown are the 18 coefficients of each image's orientation, the ground points, and where asked for a
-//! time bias of each image and a range bias of each profile. Orientation unknowns belong to powers of
-//! `t = x/L`, `L` half the number of lines: all positions are metres, all angles radians, of like size.
+//! Unknown are 18 coefficients of a correction to each image's orientation, the ground points, and where
+//! asked for a time bias of each image and a range bias of each profile. The orientation itself may be of
+//! any form. Coefficients belong to powers of `t = x/L`, `L` half the number of lines: all positions are
+//! metres, all rotations radians, of like size.
 //! Observed are focal coordinates, ranges, and the initial values themselves with their standard
 //! deviations. Residuals are observed minus computed.
 //!
 //! # Source
-//! Yoon & Shan 2004. They state one standard deviation a image for 18 unknowns, in metres; here each
-//! unknown has its own.
+//! Yoon & Shan 2004. They adjust the coefficients of ω, φ and κ, which near the equator cannot be told
+//! apart; here a rotation about the camera's own axes is added to them. They state one standard deviation
+//! an image for 18 unknowns, in metres; here each unknown has its own.
 
+mod check;
 mod eliminate;
 mod quality;
 mod rows;
@@ -24,23 +27,24 @@ use nalgebra::{DMatrix, Matrix3, Vector2, Vector3};
 pub use solve::solve;
 pub use unknowns::Unknown;
 
-use super::{pushbroom::EulerPolynomial, robust::RobustWeight};
+use super::{pushbroom::OrientationCorrection, robust::RobustWeight};
 
-/// Orientation unknowns of an image: X, Y, Z, ω, φ, κ, each with powers 0, 1 and 2 of `t`.
+/// Orientation unknowns of an image: X, Y, Z and the rotations about the camera's x, y and z axis, each with
+/// powers 0, 1 and 2 of `t`.
 pub const ORIENTATION_UNKNOWNS: usize = 18;
 
 /// An image with its initial orientation.
 #[derive(Debug, Clone, PartialEq)]
-pub struct BundleImage {
+pub struct BundleImage<M> {
     /// Initial orientation, abscissa in lines from the middle.
-    pub orientation: EulerPolynomial,
+    pub base: M,
     /// Half the number of lines of the orientation, `L`.
     pub half_lines: f64,
     /// Time from line to line, seconds.
     pub line_period_s: f64,
     /// Focal length, pixels of the image.
     pub focal_length_px: f64,
-    /// Standard deviation of each initial unknown at `[3·quantity + power]`, metres and radians;
+    /// Standard deviation of each unknown, initially zero, at `[3·quantity + power]`, metres and radians;
     /// infinite leaves it free, 0 holds it fixed.
     pub sigmas: [f64; ORIENTATION_UNKNOWNS],
     /// Standard deviation of a bias of all line times of the image, seconds; 0 for no such unknown.
@@ -89,10 +93,10 @@ pub struct Range {
 }
 
 /// All that enters an adjustment.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub struct Network {
+#[derive(Debug, Clone, PartialEq)]
+pub struct Network<M> {
     /// Images.
-    pub images: Vec<BundleImage>,
+    pub images: Vec<BundleImage<M>>,
     /// Points.
     pub points: Vec<BundlePoint>,
     /// Image coordinates.
@@ -101,6 +105,18 @@ pub struct Network {
     pub ranges: Vec<Range>,
     /// Standard deviation of each profile's range bias, metres; 0 for no such unknown.
     pub range_bias_sigmas_m: Vec<f64>,
+}
+
+impl<M> Default for Network<M> {
+    fn default() -> Self {
+        Self {
+            images: Vec::new(),
+            points: Vec::new(),
+            views: Vec::new(),
+            ranges: Vec::new(),
+            range_bias_sigmas_m: Vec::new(),
+        }
+    }
 }
 
 /// How to adjust.
@@ -167,10 +183,8 @@ impl Residual {
 /// An adjusted image.
 #[derive(Debug, Clone, PartialEq)]
 pub struct AdjustedImage {
-    /// Adjusted orientation.
-    pub orientation: EulerPolynomial,
-    /// Adjusted minus initial unknowns, metres and radians, ordered like [`BundleImage::sigmas`].
-    pub corrections: [f64; ORIENTATION_UNKNOWNS],
+    /// What is added to the initial orientation; its coefficients are the unknowns.
+    pub correction: OrientationCorrection,
     /// Cofactors of the unknowns in the same order, rows of fixed ones zero; times σ0² the covariance.
     pub cofactors: DMatrix<f64>,
     /// Residuals of the initial values, `None` where free or fixed.
@@ -238,30 +252,48 @@ impl Adjustment {
     }
 }
 
+/// A part of a network, by its index.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub enum Part {
+    /// An image.
+    #[error("image {0}")]
+    Image(usize),
+    /// A ground point.
+    #[error("point {0}")]
+    Point(usize),
+    /// Image coordinates of a point.
+    #[error("view {0}")]
+    View(usize),
+    /// A range.
+    #[error("range {0}")]
+    Range(usize),
+    /// A profile of ranges.
+    #[error("profile {0}")]
+    Profile(usize),
+}
+
 /// A network that cannot be adjusted.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum BundleFault {
     /// A standard deviation, coordinate or number that is none.
-    #[error("{what} {index} has {value}, expected {expected}")]
+    #[error("{what} of {part} is {value}, expected {expected}")]
     Value {
         /// What it belongs to.
+        part: Part,
+        /// What it is.
         what: &'static str,
-        /// Index in the network.
-        index: usize,
         /// The value.
         value: f64,
         /// What it should be.
         expected: &'static str,
     },
     /// An index of a point, image or profile that the network does not have.
-    #[error("{what} {index} names {named}, which the network does not have")]
+    #[error("{part} belongs to {missing}, which the network does not have")]
     Unmatched {
         /// View or range.
-        what: &'static str,
-        /// Its index.
-        index: usize,
-        /// The kind and index that is missing.
-        named: String,
+        part: Part,
+        /// What is missing.
+        missing: Part,
     },
     /// Unknowns that nothing tells apart.
     #[error("the network is singular: nothing tells apart {}", unknowns::names(.unknowns))]

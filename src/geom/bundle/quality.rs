@@ -8,6 +8,7 @@ use super::{
     eliminate::{Layout, PointRows},
     unknowns::{State, Unknown},
 };
+use crate::geom::pushbroom::ExteriorOrientation;
 
 /// Correlations above this are reported.
 const CORRELATION_REPORTED: f64 = 0.95;
@@ -19,8 +20,8 @@ struct Judged {
 }
 
 /// The adjustment at `state`; observations, unknowns and history are left to the caller.
-pub(super) fn judge(
-    layout: &Layout<'_>,
+pub(super) fn judge<M: ExteriorOrientation>(
+    layout: &Layout<'_, M>,
     state: &State,
     fitness: &[Result<(), Dropped>],
     cofactors: &DMatrix<f64>,
@@ -72,8 +73,8 @@ pub(super) fn judge(
     adjustment
 }
 
-fn judge_point(
-    layout: &Layout<'_>,
+fn judge_point<M: ExteriorOrientation>(
+    layout: &Layout<'_, M>,
     state: &State,
     point: usize,
     cofactors: &DMatrix<f64>,
@@ -131,8 +132,8 @@ fn estimate(state: &State, cofactors: &DMatrix<f64>, column: usize) -> (f64, f64
     )
 }
 
-fn judge_image(
-    layout: &Layout<'_>,
+fn judge_image<M>(
+    layout: &Layout<'_, M>,
     state: &State,
     image: usize,
     cofactors: &DMatrix<f64>,
@@ -152,17 +153,14 @@ fn judge_image(
         })
     };
     AdjustedImage {
-        orientation: state.orientations[image],
-        corrections: std::array::from_fn(|coefficient| {
-            columns[coefficient].map_or(0.0, |column| state.corrections[column])
-        }),
+        correction: state.orientations[image],
         cofactors: DMatrix::from_fn(ORIENTATION_UNKNOWNS, ORIENTATION_UNKNOWNS, between),
         priors: std::array::from_fn(|coefficient| columns[coefficient].and_then(prior)),
         time_bias_s: columns[ORIENTATION_UNKNOWNS].map(|column| estimate(state, cofactors, column)),
     }
 }
 
-fn correlated(layout: &Layout<'_>, cofactors: &DMatrix<f64>) -> Vec<(Unknown, Unknown, f64)> {
+fn correlated<M>(layout: &Layout<'_, M>, cofactors: &DMatrix<f64>) -> Vec<(Unknown, Unknown, f64)> {
     let deviations: DVector<f64> = cofactors.diagonal().map(f64::sqrt);
     let mut pairs = Vec::new();
     for first in 0..deviations.len() {

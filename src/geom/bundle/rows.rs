@@ -4,11 +4,12 @@ use nalgebra::{RowVector3, SVector, Vector2, Vector3};
 
 use super::{Network, ORIENTATION_UNKNOWNS, Range, View, unknowns::State};
 use crate::geom::{
-    attitude::OmegaPhiKappa,
-    collinearity::{BehindCamera, LineOrientation, observe},
+    attitude::{matrix_of_rotation_vector, turn_of_rotation_vector},
+    collinearity::{BehindCamera, by_camera_point, project},
+    pushbroom::{ExteriorOrientation, Pose},
 };
 
-/// Partial derivatives with respect to an image's 18 coefficients and its time bias.
+/// Partial derivatives with respect to the 18 coefficients of an image's correction and its time bias.
 pub(super) type ImagePartials = SVector<f64, { ORIENTATION_UNKNOWNS + 1 }>;
 
 /// One linearised observation, not yet divided by its standard deviation.
@@ -23,7 +24,7 @@ pub(super) struct Row {
 
 fn chain(
     by_position: &RowVector3<f64>,
-    by_angles: &RowVector3<f64>,
+    by_rotation: &Vector3<f64>,
     t: f64,
     by_time: f64,
 ) -> ImagePartials {
@@ -32,7 +33,7 @@ fn chain(
         let mut power_of_t = 1.0;
         for power in 0..3 {
             partials[3 * axis + power] = power_of_t * by_position[axis];
-            partials[9 + 3 * axis + power] = power_of_t * by_angles[axis];
+            partials[9 + 3 * axis + power] = power_of_t * by_rotation[axis];
             power_of_t *= t;
         }
     }
@@ -42,37 +43,43 @@ fn chain(
 
 /// The rows of a view, along the track and across it.
 ///
-/// The line is exposed a time bias later than its tag says, so the orientation is taken there.
-pub(super) fn of_view(
-    network: &Network,
+/// The line is exposed a time bias later than its tag says, so the initial orientation is taken there.
+pub(super) fn of_view<M: ExteriorOrientation>(
+    network: &Network<M>,
     state: &State,
     view: &View,
 ) -> Result<[Row; 2], BehindCamera> {
     let image = &network.images[view.image];
-    let orientation = &state.orientations[view.image];
-    let x_lines = view.x_lines + state.time_biases_s[view.image] / image.line_period_s;
-    let angles_rad = orientation.angles_rad.value(x_lines);
-    let line = LineOrientation {
-        position_m: orientation.path_m.value(x_lines),
-        angles: OmegaPhiKappa {
-            omega_rad: angles_rad.x,
-            phi_rad: angles_rad.y,
-            kappa_rad: angles_rad.z,
-        },
+    let correction = &state.orientations[view.image];
+    let (base, motion) = image
+        .base
+        .moving(view.x_lines + correction.time_shift_lines);
+    let vector_rad = correction.turn_rad(view.x_lines);
+    let rotation = matrix_of_rotation_vector(&vector_rad);
+    let pose = Pose {
+        position_m: base.position_m + correction.shift_m(view.x_lines),
+        mars_to_camera: rotation * base.mars_to_camera,
     };
-    let seen = observe(&state.points_m[view.point], &line, image.focal_length_px)?;
-    let misclosure = Vector2::new(0.0, view.y_px) - seen.focal;
-    let by_line = seen.by_angles * orientation.angles_rad.rate(x_lines)
-        - seen.by_ground * orientation.path_m.rate(x_lines);
-    let by_time = by_line / image.line_period_s;
-    let t = x_lines / image.half_lines;
+    let camera_m = pose.camera_vector_m(&state.points_m[view.point]);
+    let focal = project(&camera_m, image.focal_length_px)?;
+    let by_camera_point = by_camera_point(&camera_m, image.focal_length_px);
+    let by_ground = by_camera_point * pose.mars_to_camera;
+    let misclosure = Vector2::new(0.0, view.y_px) - focal;
+    // The initial orientation turns and advances under its correction.
+    let camera_rate_m =
+        (rotation * motion.turn_rad).cross(&camera_m) - pose.mars_to_camera * motion.advance_m;
+    let by_time = by_camera_point * camera_rate_m / image.line_period_s;
+    let t = view.x_lines / image.half_lines;
     Ok([0, 1].map(|axis| {
-        let by_point: RowVector3<f64> = seen.by_ground.row(axis).into_owned();
-        let by_angles: RowVector3<f64> = seen.by_angles.row(axis).into_owned();
+        let by_point: RowVector3<f64> = by_ground.row(axis).into_owned();
+        // A rotation ε moves the camera vector q by ε × q, and a change of the rotation vector turns by
+        // the left Jacobian times it.
+        let across = camera_m.cross(&by_camera_point.row(axis).transpose());
+        let by_rotation = turn_of_rotation_vector(&-vector_rad, &across);
         Row {
             misclosure: misclosure[axis],
             sigma: view.sigma_px[axis],
-            by_image: chain(&-by_point, &by_angles, t, by_time[axis]),
+            by_image: chain(&-by_point, &by_rotation, t, by_time[axis]),
             by_point,
         }
     }))
@@ -81,8 +88,16 @@ pub(super) fn of_view(
 /// The row of a range; its derivative by the bias of its profile is 1.
 ///
 /// The instant of a shot does not come from the image, so a time bias of the image does not move it.
-pub(super) fn of_range(network: &Network, state: &State, range: &Range) -> Row {
-    let position_m = state.orientations[range.image].path_m.value(range.x_lines);
+pub(super) fn of_range<M: ExteriorOrientation>(
+    network: &Network<M>,
+    state: &State,
+    range: &Range,
+) -> Row {
+    let base_m = network.images[range.image]
+        .base
+        .pose(range.x_lines)
+        .position_m;
+    let position_m = base_m + state.orientations[range.image].shift_m(range.x_lines);
     let away_m: Vector3<f64> = position_m - state.points_m[range.point];
     let distance_m = away_m.norm();
     let towards = away_m.transpose() / distance_m;
@@ -90,7 +105,7 @@ pub(super) fn of_range(network: &Network, state: &State, range: &Range) -> Row {
     Row {
         misclosure: range.range_m - distance_m - state.range_biases_m[range.profile],
         sigma: range.sigma_m,
-        by_image: chain(&towards, &RowVector3::zeros(), t, 0.0),
+        by_image: chain(&towards, &Vector3::zeros(), t, 0.0),
         by_point: -towards,
     }
 }

@@ -5,11 +5,15 @@ use rayon::prelude::*;
 
 use super::{
     Adjustment, BundleFault, BundleOptions, Dropped, Network,
+    check::check,
     eliminate::{ByPoint, Layout, Reduced, reduce},
     quality,
     unknowns::{Columns, State},
 };
-use crate::{geom::normal_equations::ScaledCholesky, units::METRES_PER_KM};
+use crate::{
+    geom::{normal_equations::ScaledCholesky, pushbroom::ExteriorOrientation},
+    units::METRES_PER_KM,
+};
 
 /// A step below this ends the iteration, kilometres and radians.
 const STEP: f64 = 1e-8;
@@ -18,6 +22,8 @@ const CHANGE: f64 = 1e-8;
 /// The same with robust weights: how a blunder is shared between the two rays of a tie hardly changes the
 /// sum, so that the point creeps long after everything else is at rest.
 const CHANGE_ROBUST: f64 = 1e-6;
+/// A relative rise of the sum below this is rounding, of positions of 4e6 m in the main.
+const ROUNDING: f64 = 1e-10;
 /// Damping after a step that made matters worse, as a share of each unknown's own information.
 const DAMPING: f64 = 1e-6;
 
@@ -26,7 +32,10 @@ const DAMPING: f64 = 1e-6;
 /// # Errors
 /// Values that are none, indices without a target, too few observations, a singular network, an
 /// iteration that does not settle.
-pub fn solve(network: &Network, options: &BundleOptions) -> Result<Adjustment, BundleFault> {
+pub fn solve<M: ExteriorOrientation>(
+    network: &Network<M>,
+    options: &BundleOptions,
+) -> Result<Adjustment, BundleFault> {
     check(network)?;
     let mut layout = Layout {
         network,
@@ -72,7 +81,7 @@ pub fn solve(network: &Network, options: &BundleOptions) -> Result<Adjustment, B
 }
 
 /// Observations, weighted initial values included, and unknowns.
-fn count(layout: &Layout<'_>, active: &[usize]) -> (usize, usize) {
+fn count<M>(layout: &Layout<'_, M>, active: &[usize]) -> (usize, usize) {
     let of_points: usize = active
         .iter()
         .map(|point| {
@@ -97,8 +106,8 @@ struct Settled {
     reduced: Reduced,
 }
 
-fn settle(
-    layout: &Layout<'_>,
+fn settle<M: ExteriorOrientation>(
+    layout: &Layout<'_, M>,
     start: State,
     active: &[usize],
     steps_max: u32,
@@ -126,7 +135,7 @@ fn settle(
             advance(layout, &now.state, active, &shared).ok_or_else(|| unsettled(history))?;
         let before = now.reduced.cost;
         match reduce(layout, &next, active) {
-            Ok(reduced) if reduced.cost <= before || step < STEP => {
+            Ok(reduced) if reduced.cost <= before * (1.0 + ROUNDING) || step < STEP => {
                 let change = (before - reduced.cost).abs();
                 history.push(reduced.cost);
                 now = Settled {
@@ -151,8 +160,8 @@ fn unsettled(history: &[f64]) -> BundleFault {
     }
 }
 
-fn factorise(
-    layout: &Layout<'_>,
+fn factorise<M>(
+    layout: &Layout<'_, M>,
     reduced: &Reduced,
     damping: f64,
 ) -> Result<ScaledCholesky, BundleFault> {
@@ -170,8 +179,8 @@ fn factorise(
 }
 
 /// The state after a step of the shared unknowns, and the length of the whole step.
-fn advance(
-    layout: &Layout<'_>,
+fn advance<M: ExteriorOrientation>(
+    layout: &Layout<'_, M>,
     state: &State,
     active: &[usize],
     shared: &DVector<f64>,
@@ -194,101 +203,4 @@ fn advance(
         let next = State::new(layout.network, &layout.columns, corrections, points_m);
         (next, longest)
     })
-}
-
-fn check(network: &Network) -> Result<(), BundleFault> {
-    let value = |what, index, value: f64, valid: bool, expected| {
-        if valid {
-            Ok(())
-        } else {
-            Err(BundleFault::Value {
-                what,
-                index,
-                value,
-                expected,
-            })
-        }
-    };
-    let positive = |what, index, number: f64| {
-        let valid = number > 0.0 && number.is_finite();
-        value(what, index, number, valid, "a positive number")
-    };
-    let finite = |what, index, number: f64| {
-        value(what, index, number, number.is_finite(), "a finite number")
-    };
-    let deviation = |what, index, sigma: f64| {
-        value(
-            what,
-            index,
-            sigma,
-            sigma >= 0.0,
-            "a standard deviation of 0 or more",
-        )
-    };
-    for (index, image) in network.images.iter().enumerate() {
-        positive("half the lines of image", index, image.half_lines)?;
-        positive("line period of image", index, image.line_period_s)?;
-        positive("focal length of image", index, image.focal_length_px)?;
-        deviation("time bias of image", index, image.time_bias_sigma_s)?;
-        for sigma in image.sigmas {
-            deviation("orientation of image", index, sigma)?;
-        }
-        for polynomial in [&image.orientation.path_m, &image.orientation.angles_rad] {
-            for coefficient in polynomial.coefficients.iter().flatten() {
-                finite("orientation of image", index, *coefficient)?;
-            }
-        }
-    }
-    for (index, sigma_m) in network.range_bias_sigmas_m.iter().enumerate() {
-        deviation("range bias of profile", index, *sigma_m)?;
-    }
-    for (index, point) in network.points.iter().enumerate() {
-        for axis in 0..3 {
-            finite("point", index, point.ground_m[axis])?;
-            if let Some(sigma_m) = point.sigma_m {
-                positive("standard deviation of point", index, sigma_m[axis])?;
-            }
-        }
-    }
-    for (index, view) in network.views.iter().enumerate() {
-        matched(network, "view", index, view.point, view.image)?;
-        finite("line of view", index, view.x_lines)?;
-        finite("sample of view", index, view.y_px)?;
-        positive("standard deviation of view", index, view.sigma_px.x)?;
-        positive("standard deviation of view", index, view.sigma_px.y)?;
-    }
-    for (index, range) in network.ranges.iter().enumerate() {
-        matched(network, "range", index, range.point, range.image)?;
-        if range.profile >= network.range_bias_sigmas_m.len() {
-            return Err(unmatched("range", index, "profile", range.profile));
-        }
-        finite("line of range", index, range.x_lines)?;
-        positive("range", index, range.range_m)?;
-        positive("standard deviation of range", index, range.sigma_m)?;
-    }
-    Ok(())
-}
-
-fn matched(
-    network: &Network,
-    what: &'static str,
-    index: usize,
-    point: usize,
-    image: usize,
-) -> Result<(), BundleFault> {
-    if point >= network.points.len() {
-        return Err(unmatched(what, index, "point", point));
-    }
-    if image >= network.images.len() {
-        return Err(unmatched(what, index, "image", image));
-    }
-    Ok(())
-}
-
-fn unmatched(what: &'static str, index: usize, kind: &str, named: usize) -> BundleFault {
-    BundleFault::Unmatched {
-        what,
-        index,
-        named: format!("{kind} {named}"),
-    }
 }

@@ -6,7 +6,7 @@ use super::{
     BundleImage, BundleOptions, BundlePoint, Network, ORIENTATION_UNKNOWNS, Range, View,
     eliminate::{ByPoint, Layout, reduce},
     rows, solve,
-    unknowns::{Columns, State},
+    unknowns::{Columns, State, Unknown},
 };
 use crate::geom::{
     collinearity::project,
@@ -16,7 +16,7 @@ use crate::geom::{
 const FOCAL_LENGTH_PX: f64 = 3_500.0 / 0.026;
 
 /// A camera that flies north over the equator at longitude zero, `roll_rad` to the side.
-fn image(east_m: f64, roll_rad: f64) -> BundleImage {
+fn image(east_m: f64, roll_rad: f64) -> BundleImage<EulerPolynomial> {
     let path_m = VectorPolynomial {
         coefficients: [
             Vector3::new(3_776e3, east_m, -300.0),
@@ -33,7 +33,7 @@ fn image(east_m: f64, roll_rad: f64) -> BundleImage {
         ],
     };
     BundleImage {
-        orientation: EulerPolynomial { path_m, angles_rad },
+        base: EulerPolynomial { path_m, angles_rad },
         half_lines: 5_000.0,
         line_period_s: 1.4e-3,
         focal_length_px: FOCAL_LENGTH_PX,
@@ -43,7 +43,7 @@ fn image(east_m: f64, roll_rad: f64) -> BundleImage {
 }
 
 /// Three images, nine points; the first four carry coordinates and ranges, the last is seen by three.
-fn network() -> Network {
+fn network() -> Network<EulerPolynomial> {
     let images = vec![image(0.0, 0.02), image(-150e3, 0.39), image(90e3, -0.22)];
     let mut network = Network {
         range_bias_sigmas_m: vec![30.0],
@@ -52,7 +52,7 @@ fn network() -> Network {
     for index in 0..9_u32 {
         let spread = f64::from(index) - 4.0;
         let x_lines = 900.0 * spread;
-        let pose = images[0].orientation.pose(x_lines);
+        let pose = images[0].base.pose(x_lines);
         let camera = Vector3::new(0.0, 1e-3 * spread, 1.0);
         let ground_m = pose.position_m
             + pose.mars_to_camera.tr_mul(&camera) * (380e3 + 60.0 * spread * spread);
@@ -67,7 +67,7 @@ fn network() -> Network {
                 continue;
             }
             // Any line will do: the equations need not be met where they are only compared.
-            let seen = image.orientation.pose(x_lines).camera_vector_m(&ground_m);
+            let seen = image.base.pose(x_lines).camera_vector_m(&ground_m);
             let focal = project(&seen, image.focal_length_px).unwrap();
             network.views.push(View {
                 point,
@@ -92,7 +92,7 @@ fn network() -> Network {
     network
 }
 
-fn layout(network: &Network) -> (Layout<'_>, State, Vec<usize>) {
+fn layout(network: &Network<EulerPolynomial>) -> (Layout<'_, EulerPolynomial>, State, Vec<usize>) {
     let layout = Layout {
         network,
         columns: Columns::of(network),
@@ -108,7 +108,34 @@ fn layout(network: &Network) -> (Layout<'_>, State, Vec<usize>) {
 #[test]
 fn derivatives_equal_central_differences() {
     let network = network();
-    let (layout, state, _) = layout(&network);
+    let (layout, start, _) = layout(&network);
+    // Also away from the initial values: rotations of 1e-3 to 1e-2 rad.
+    let corrections = DVector::from_fn(layout.columns.len(), |column, _| {
+        let sign = if column % 2 == 0 { 1.0 } else { -1.0 };
+        let size = match layout.columns.unknowns[column] {
+            Unknown::Orientation { coefficient, .. } if coefficient < 9 => 150.0,
+            Unknown::Orientation { coefficient, .. } => 5e-4 * coefficient as f64,
+            Unknown::TimeBias { .. } => 0.03,
+            Unknown::RangeBias { .. } => 25.0,
+        };
+        sign * size
+    });
+    let corrected = State::new(
+        &network,
+        &layout.columns,
+        corrections,
+        start.points_m.clone(),
+    );
+    for state in [start, corrected] {
+        derivatives_at(&network, &layout, &state);
+    }
+}
+
+fn derivatives_at(
+    network: &Network<EulerPolynomial>,
+    layout: &Layout<'_, EulerPolynomial>,
+    state: &State,
+) {
     let at = |column: Option<usize>, step: f64, move_m: Vector3<f64>, point: usize| {
         let mut corrections = state.corrections.clone();
         if let Some(column) = column {
@@ -116,11 +143,11 @@ fn derivatives_equal_central_differences() {
         }
         let mut points_m = state.points_m.clone();
         points_m[point] += move_m;
-        State::new(&network, &layout.columns, corrections, points_m)
+        State::new(network, &layout.columns, corrections, points_m)
     };
     // Computed values: misclosures with the sign turned.
     let view = |state: &State, index: usize| {
-        rows::of_view(&network, state, &network.views[index])
+        rows::of_view(network, state, &network.views[index])
             .unwrap()
             .map(|row| -row.misclosure)
     };
@@ -132,7 +159,7 @@ fn derivatives_equal_central_differences() {
     };
     for index in [0, 1, 9, 18] {
         let entry = &network.views[index];
-        let analytic = rows::of_view(&network, &state, entry).unwrap();
+        let analytic = rows::of_view(network, state, entry).unwrap();
         for unknown in 0..=ORIENTATION_UNKNOWNS {
             let column = layout.columns.of_image[entry.image][unknown];
             // Steps whose truncation and rounding are both far below 1e-6 of the derivative.
@@ -168,13 +195,13 @@ fn derivatives_equal_central_differences() {
         }
     }
     let range = &network.ranges[1];
-    let analytic = rows::of_range(&network, &state, range);
+    let analytic = rows::of_range(network, state, range);
     for unknown in 0..=ORIENTATION_UNKNOWNS {
         let column = layout.columns.of_image[range.image][unknown];
         let step = if unknown < 9 { 20.0 } else { 1e-4 };
         let distance = |step: f64| {
             let moved = at(column, step, Vector3::zeros(), range.point);
-            -rows::of_range(&network, &moved, range).misclosure
+            -rows::of_range(network, &moved, range).misclosure
         };
         let numeric = (distance(step) - distance(-step)) / (2.0 * step);
         close(numeric, analytic.by_image[unknown], 1.0);
@@ -247,7 +274,7 @@ fn cofactors_of_points_equal_those_of_the_dense_equations() {
     let (layout, start, active) = layout(&network);
     let mut corrections = start.corrections.clone();
     for (image, adjusted) in adjustment.images.iter().enumerate() {
-        for (coefficient, value) in adjusted.corrections.iter().enumerate() {
+        for (coefficient, value) in adjusted.correction.coefficients().iter().enumerate() {
             corrections[layout.columns.of_image[image][coefficient].unwrap()] = *value;
         }
         corrections[layout.columns.of_image[image][ORIENTATION_UNKNOWNS].unwrap()] =

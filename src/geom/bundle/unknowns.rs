@@ -4,13 +4,14 @@ use std::fmt;
 
 use nalgebra::{DVector, Vector3};
 
-use super::{Network, ORIENTATION_UNKNOWNS};
-use crate::{geom::pushbroom::EulerPolynomial, units::METRES_PER_KM};
+use super::{Network, ORIENTATION_UNKNOWNS, Part};
+use crate::{geom::pushbroom::OrientationCorrection, units::METRES_PER_KM};
 
 /// An unknown that is shared by many observations.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Unknown {
-    /// Coefficient of an image's orientation at `3·quantity + power`, quantities X, Y, Z, ω, φ, κ.
+    /// Coefficient of the correction to an image's orientation at `3·quantity + power`, quantities X, Y, Z and
+    /// the rotations about the camera's x, y and z axis.
     Orientation {
         /// Index of the image.
         image: usize,
@@ -29,20 +30,45 @@ pub enum Unknown {
     },
 }
 
+/// Names of the quantities that an orientation is corrected by.
+const QUANTITIES: [&str; 6] = [
+    "X position",
+    "Y position",
+    "Z position",
+    "rotation about the camera's x axis",
+    "rotation about the camera's y axis",
+    "rotation about the camera's z axis",
+];
+/// Names of the powers of `t`.
+const POWERS: [&str; 3] = ["constant", "linear", "quadratic"];
+
+impl Unknown {
+    /// What the unknown is of its image or profile.
+    #[must_use]
+    pub fn quantity(self) -> String {
+        match self {
+            Self::Orientation { coefficient, .. } => {
+                let quantity = QUANTITIES[coefficient / 3 % QUANTITIES.len()];
+                format!("{} {quantity}", POWERS[coefficient % 3])
+            }
+            Self::TimeBias { .. } => "time bias".to_owned(),
+            Self::RangeBias { .. } => "range bias".to_owned(),
+        }
+    }
+
+    /// The image or profile that it belongs to.
+    #[must_use]
+    pub const fn part(self) -> Part {
+        match self {
+            Self::Orientation { image, .. } | Self::TimeBias { image } => Part::Image(image),
+            Self::RangeBias { profile } => Part::Profile(profile),
+        }
+    }
+}
+
 impl fmt::Display for Unknown {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Orientation { image, coefficient } => {
-                let quantity = ["X", "Y", "Z", "ω", "φ", "κ"][coefficient / 3 % 6];
-                write!(
-                    formatter,
-                    "{quantity} t^{} of image {image}",
-                    coefficient % 3
-                )
-            }
-            Self::TimeBias { image } => write!(formatter, "time bias of image {image}"),
-            Self::RangeBias { profile } => write!(formatter, "range bias of profile {profile}"),
-        }
+        write!(formatter, "{} of {}", self.quantity(), self.part())
     }
 }
 
@@ -73,7 +99,7 @@ pub(super) struct Columns {
 }
 
 impl Columns {
-    pub(super) fn of(network: &Network) -> Self {
+    pub(super) fn of<M>(network: &Network<M>) -> Self {
         let mut columns = Self {
             unknowns: Vec::new(),
             sigmas: Vec::new(),
@@ -116,50 +142,32 @@ impl Columns {
 pub(super) struct State {
     /// Shared unknowns minus their initial values, by column.
     pub(super) corrections: DVector<f64>,
-    pub(super) orientations: Vec<EulerPolynomial>,
-    pub(super) time_biases_s: Vec<f64>,
+    pub(super) orientations: Vec<OrientationCorrection>,
     pub(super) range_biases_m: Vec<f64>,
     pub(super) points_m: Vec<Vector3<f64>>,
 }
 
 impl State {
     /// The state with these corrections of shared unknowns and these points.
-    pub(super) fn new(
-        network: &Network,
+    pub(super) fn new<M>(
+        network: &Network<M>,
         columns: &Columns,
         corrections: DVector<f64>,
         points_m: Vec<Vector3<f64>>,
     ) -> Self {
         let value = |column: Option<usize>| column.map_or(0.0, |column| corrections[column]);
-        let orientations = network
-            .images
-            .iter()
-            .zip(&columns.of_image)
-            .map(|(image, of_image)| {
-                let mut orientation = image.orientation;
-                for quantity in 0..6 {
-                    let polynomial = if quantity < 3 {
-                        &mut orientation.path_m
-                    } else {
-                        &mut orientation.angles_rad
-                    };
-                    let mut lines = 1.0;
-                    for power in 0..3 {
-                        polynomial.coefficients[power][quantity % 3] +=
-                            value(of_image[3 * quantity + power]) / lines;
-                        lines *= image.half_lines;
-                    }
-                }
-                orientation
-            })
-            .collect();
+        let images = network.images.iter().zip(&columns.of_image);
+        let orientations = images.map(|(image, of_image)| {
+            let coefficients = std::array::from_fn(|coefficient| value(of_image[coefficient]));
+            let time_bias_s = value(of_image[ORIENTATION_UNKNOWNS]);
+            OrientationCorrection::of(
+                &coefficients,
+                image.half_lines,
+                time_bias_s / image.line_period_s,
+            )
+        });
         Self {
-            orientations,
-            time_biases_s: columns
-                .of_image
-                .iter()
-                .map(|of_image| value(of_image[ORIENTATION_UNKNOWNS]))
-                .collect(),
+            orientations: orientations.collect(),
             range_biases_m: columns
                 .of_profile
                 .iter()

@@ -4,6 +4,7 @@
 //! to camera components; the camera looks along +Z. A ground point `P` has the camera vector
 //! `q = M (P − C)`, and is seen by the line where `q1 = 0`.
 
+mod corrected;
 mod detector;
 mod models;
 mod newton;
@@ -12,6 +13,7 @@ mod sampled;
 
 use nalgebra::{Matrix3, Vector3};
 
+pub use corrected::{CorrectedOrientation, OrientationCorrection};
 pub use detector::Detector;
 pub use models::{EulerPolynomial, RotationVectorPolynomial, VectorPolynomial};
 pub use newton::Projector;

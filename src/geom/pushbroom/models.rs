@@ -3,7 +3,10 @@
 use nalgebra::{Matrix3, Vector3};
 
 use super::{ExteriorOrientation, Motion, PolynomialPath, Pose};
-use crate::geom::{attitude::matrix_of_rotation_vector, polynomial::Polynomial};
+use crate::geom::{
+    attitude::{matrix_of_rotation_vector, turn_of_rotation_vector},
+    polynomial::Polynomial,
+};
 
 /// Three polynomials of at most second order in the image line.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -149,7 +152,7 @@ impl ExteriorOrientation for RotationVectorPolynomial {
     fn moving(&self, x: f64) -> (Pose, Motion) {
         let motion = Motion {
             advance_m: self.path_m.rate(x),
-            turn_rad: turn_of_vector_rad(&self.vector_rad.value(x), &self.vector_rad.rate(x)),
+            turn_rad: turn_of_rotation_vector(&self.vector_rad.value(x), &self.vector_rad.rate(x)),
         };
         (self.pose(x), motion)
     }
@@ -159,30 +162,4 @@ impl PolynomialPath for RotationVectorPolynomial {
     fn path_m(&self) -> &VectorPolynomial {
         &self.path_m
     }
-}
-
-/// Below this angle, radians, the two factors of [`turn_of_vector_rad`] are taken from their series,
-/// whose next terms are below 1e-11 of them there.
-const SERIES_BELOW_RAD: f64 = 1e-2;
-
-/// `Ω` of `exp([r]×)` while `r` changes by `rate`: the left Jacobian of the rotation times `rate`.
-pub(super) fn turn_of_vector_rad(
-    vector_rad: &Vector3<f64>,
-    rate_rad: &Vector3<f64>,
-) -> Vector3<f64> {
-    let square = vector_rad.norm_squared();
-    let angle = square.sqrt();
-    let (first, second) = if angle < SERIES_BELOW_RAD {
-        (
-            0.5 - square / 24.0 + square * square / 720.0,
-            1.0 / 6.0 - square / 120.0 + square * square / 5_040.0,
-        )
-    } else {
-        (
-            (1.0 - angle.cos()) / square,
-            (angle - angle.sin()) / (square * angle),
-        )
-    };
-    let across = vector_rad.cross(rate_rad);
-    rate_rad + across * first + vector_rad.cross(&across) * second
 }

@@ -2,8 +2,8 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::{ExteriorOrientation, Motion, Pose, models::turn_of_vector_rad};
-use crate::geom::attitude::{matrix_of_rotation_vector, rotation_vector};
+use super::{ExteriorOrientation, Motion, Pose};
+use crate::geom::attitude::{matrix_of_rotation_vector, rotation_vector, turn_of_rotation_vector};
 
 /// Orientation that agrees with every one of its samples.
 ///
@@ -168,7 +168,7 @@ impl ExteriorOrientation for SampledOrientation {
         };
         let motion = Motion {
             advance_m: position_m.slope,
-            turn_rad: turn_of_vector_rad(&vector_rad.value, &vector_rad.slope),
+            turn_rad: turn_of_rotation_vector(&vector_rad.value, &vector_rad.slope),
         };
         (pose, motion)
     }

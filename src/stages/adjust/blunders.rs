@@ -1,7 +1,10 @@
 //! Tie points that are no ties: found by their standardised residuals, left out, and adjusted again.
 
-use super::{AdjustOptions, LeftOut, LeftOutReason, network::Assembled};
-use crate::geom::bundle::{Adjustment, BundleFault, BundleOptions, Network, Residual, solve};
+use super::{AdjustOptions, LeftOut, LeftOutReason, PointKind, network::Assembled};
+use crate::geom::{
+    bundle::{Adjustment, BundleFault, BundleOptions, Network, Residual, solve},
+    pushbroom::ExteriorOrientation,
+};
 
 /// Rounds after which no more tie points are left out.
 const ROUNDS_MAX: u32 = 20;
@@ -10,8 +13,8 @@ const ROUNDS_MAX: u32 = 20;
 const SHARE_OF_LARGEST: f64 = 0.5;
 
 /// Adjusts, leaves out the worst tie points and repeats until none fails the test.
-pub(super) fn solve_without_blunders(
-    assembled: &mut Assembled,
+pub(super) fn solve_without_blunders<M: ExteriorOrientation>(
+    assembled: &mut Assembled<M>,
     bundle_options: &BundleOptions,
     options: &AdjustOptions,
 ) -> Result<Adjustment, BundleFault> {
@@ -32,7 +35,8 @@ pub(super) fn solve_without_blunders(
             .enumerate()
             .filter(|(point, _)| left_out[*point])
         {
-            assembled.rejected.push(LeftOut {
+            assembled.left_out.push(LeftOut {
+                kind: PointKind::Tie,
                 id: assembled.points[point].clone(),
                 reason: LeftOutReason::Blunder {
                     standardised: *standardised,
@@ -46,7 +50,7 @@ pub(super) fn solve_without_blunders(
 }
 
 /// The largest standardised residual of each tie point, without sign; 0 for shots and dropped points.
-fn worst_standardised(network: &Network, adjustment: &Adjustment, shots: usize) -> Vec<f64> {
+fn worst_standardised<M>(network: &Network<M>, adjustment: &Adjustment, shots: usize) -> Vec<f64> {
     let mut worst = vec![0.0_f64; network.points.len()];
     for (view, residuals) in network.views.iter().zip(&adjustment.views) {
         if view.point < shots {

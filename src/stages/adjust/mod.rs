@@ -4,25 +4,30 @@
 //! Yoon & Shan 2004. Image coordinates of footprints are computed from the orientation that is being
 //! adjusted; with small standard deviations they would hold the misregistration in place.
 
+mod adjusted;
 mod blunders;
+mod fault;
 mod network;
 mod summary;
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::Vector2;
 use serde::{Deserialize, Serialize};
 
+pub use adjusted::{
+    Adjusted, CorrectedImage, CorrectedPoint, ImageResidual, PointKind, RangeResidual,
+    ScalarResidual,
+};
+pub use fault::AdjustFault;
 pub use summary::{AdjustmentSummary, GroundSummary, ImageSummary, ObservationType, TypeSummary};
 
 use super::intersect::IntersectedTies;
 use crate::{
-    error::{Fault, Kind, Result},
+    error::Result,
     geom::{
-        bundle::{
-            Adjustment, BundleFault, BundleOptions, Dropped, Network, ORIENTATION_UNKNOWNS, Unknown,
-        },
-        pushbroom::{EulerPolynomial, Unseen},
+        bundle::{Adjustment, BundleOptions, ORIENTATION_UNKNOWNS, Residual, Unknown},
+        pushbroom::ExteriorOrientation,
         robust::RobustWeight,
         stereo::StereoImage,
     },
@@ -31,18 +36,19 @@ use crate::{
 
 /// An image with what is known of its orientation beforehand.
 #[derive(Debug, Clone, PartialEq)]
-pub struct AdjustImage {
+pub struct AdjustImage<M> {
     /// Initial orientation and detector.
-    pub stereo: StereoImage<EulerPolynomial>,
+    pub stereo: StereoImage<M>,
     /// Time from line to line, seconds.
     pub line_period_s: f64,
-    /// Standard deviation of each unknown, see [`orientation_sigmas`].
+    /// Standard deviation of each orientation unknown, see [`orientation_sigmas`]; infinite leaves it free,
+    /// 0 holds it fixed.
     pub sigmas: [f64; ORIENTATION_UNKNOWNS],
     /// Standard deviation of a bias of the line times, seconds; 0 for no such unknown.
     pub time_bias_sigma_s: f64,
 }
 
-/// Standard deviations of an image's unknowns from one for positions and one for angles.
+/// Standard deviations of an image's unknowns from one for positions and one for rotations.
 ///
 /// All powers of `t`, half the image being its unit, get the same.
 #[must_use]
@@ -53,7 +59,7 @@ pub fn orientation_sigmas(position_m: f64, angle_rad: f64) -> [f64; ORIENTATION_
 /// A laser shot.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LaserShot {
-    /// Identifier, unique among the shots.
+    /// Identifier, unique among the shots; messages put the word `shot` before it.
     pub id: String,
     /// Footprint, Mars-fixed, metres.
     pub ground_m: [f64; 3],
@@ -133,26 +139,11 @@ impl Default for AdjustOptions {
 /// Baarda 1968, A testing procedure for use in geodetic networks.
 pub const BAARDA_LIMIT: f64 = 3.29;
 
-/// The adjusted site.
-#[derive(Debug, Clone, PartialEq)]
-pub struct AdjustedSite {
-    /// What was adjusted: shots first, then tie points.
-    pub network: Network,
-    /// The result.
-    pub adjustment: Adjustment,
-    /// Identifiers of the points, in the order of the network.
-    pub points: Vec<String>,
-    /// Number of shots among them.
-    pub shots: usize,
-    /// Tie points that were left out.
-    pub rejected: Vec<LeftOut>,
-    /// Statistics.
-    pub summary: AdjustmentSummary,
-}
-
 /// A point that was left out.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct LeftOut {
+    /// Shot or tie point.
+    pub kind: PointKind,
     /// Identifier.
     pub id: String,
     /// Why.
@@ -177,68 +168,8 @@ pub enum LeftOutReason {
     },
 }
 
-/// Why a site cannot be adjusted.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum AdjustFault {
-    /// The network itself.
-    #[error("{0}")]
-    Network(BundleFault),
-    /// Nothing tells unknowns apart.
-    #[error("the network is singular: nothing tells apart {0}")]
-    Singular(String),
-    /// A range names an image that is not there.
-    #[error("shot {shot} was fired during image {image}, which is none of the images {known}")]
-    UnknownImage {
-        /// Identifier of the shot.
-        shot: String,
-        /// The name.
-        image: String,
-        /// The names that are known.
-        known: String,
-    },
-    /// Two shots have the same identifier.
-    #[error("two shots have the identifier {0}")]
-    DuplicateShot(String),
-    /// An orientation that sees nothing.
-    #[error("image {image}: its orientation sees no ground: {unseen}")]
-    Blind {
-        /// Identifier of the image.
-        image: String,
-        /// Why.
-        unseen: Unseen,
-    },
-    /// Initial values that the observations refute.
-    #[error(
-        "{what} contradicts the rest of the network: standardised residual {standardised:.1}, expected at most {CONTRADICTION}"
-    )]
-    Contradiction {
-        /// The initial value.
-        what: String,
-        /// Its standardised residual, without sign.
-        standardised: f64,
-    },
-}
-
 /// An initial value so far from its adjusted one is a contradiction, in its standard deviations.
 const CONTRADICTION: f64 = 10.0;
-
-impl Fault for AdjustFault {
-    fn kind(&self) -> Kind {
-        Kind::Input
-    }
-
-    fn advice(&self) -> String {
-        match self {
-            Self::Network(_) => "check the input of the adjustment, and give orientations and footprints finite standard deviations",
-            Self::Singular(_) => "give these unknowns finite standard deviations, or hold them fixed with 0",
-            Self::UnknownImage { .. } => "give shots the identifiers of the images",
-            Self::DuplicateShot(_) => "leave out the second file, or number the shots anew",
-            Self::Blind { .. } => "check the orientation samples of the image",
-            Self::Contradiction { .. } => "check the datum, the clock and the units of this value, or raise its standard deviation",
-        }
-        .to_owned()
-    }
-}
 
 /// Adjusts images, shots and tie points together.
 ///
@@ -246,81 +177,48 @@ impl Fault for AdjustFault {
 ///
 /// # Errors
 /// Identifiers that do not match, a singular network, initial values that the rest refutes.
-pub fn adjust(
-    images: &[AdjustImage],
+pub fn adjust<M: ExteriorOrientation>(
+    images: &[AdjustImage<M>],
     shots: &[LaserShot],
     ties: &[TiePoint],
     starts: &IntersectedTies,
     options: &AdjustOptions,
-) -> Result<AdjustedSite> {
+) -> Result<Adjusted> {
     let mut assembled = network::assemble(images, shots, ties, starts, options)?;
     let bundle_options = BundleOptions {
         robust: options.robust,
         ..BundleOptions::default()
     };
     let adjustment = blunders::solve_without_blunders(&mut assembled, &bundle_options, options)
-        .map_err(|fault| in_words(fault, images, &assembled.profiles))?;
-    for (point, outcome) in assembled.points.iter().zip(&adjustment.points) {
-        if let Err(Dropped::Undetermined | Dropped::BehindCamera) = outcome {
-            // Blunders have lost their measurements and are listed already.
-            if !assembled
-                .rejected
-                .iter()
-                .any(|left_out| left_out.id == *point)
-            {
-                assembled.rejected.push(LeftOut {
-                    id: point.clone(),
-                    reason: LeftOutReason::Undetermined,
-                });
-            }
-        }
-    }
+        .map_err(|fault| fault::in_words(fault, images, &assembled))?;
+    // Blunders have lost their measurements and are listed already.
+    let listed: BTreeSet<&str> = assembled
+        .left_out
+        .iter()
+        .map(|tie| tie.id.as_str())
+        .collect();
+    let dropped = adjustment
+        .points
+        .iter()
+        .enumerate()
+        .filter_map(|(point, outcome)| {
+            let id = &assembled.points[point];
+            let known = point >= assembled.shots && listed.contains(id.as_str());
+            (outcome.is_err() && !known).then(|| LeftOut {
+                kind: assembled.kind(point),
+                id: id.clone(),
+                reason: LeftOutReason::Undetermined,
+            })
+        });
+    let dropped: Vec<LeftOut> = dropped.collect();
+    assembled.left_out.extend(dropped);
     contradictions(images, &assembled.points, &adjustment)?;
     let summary = summary::summarise(images, &assembled, &adjustment, options.mola_image)?;
-    Ok(AdjustedSite {
-        network: assembled.network,
-        adjustment,
-        points: assembled.points,
-        shots: shots.len(),
-        rejected: assembled.rejected,
-        summary,
-    })
+    Ok(adjusted::collect(images, assembled, adjustment, summary))
 }
 
-/// The fault with identifiers in place of indices.
-fn in_words(fault: BundleFault, images: &[AdjustImage], profiles: &[String]) -> AdjustFault {
-    let BundleFault::Singular { unknowns } = fault else {
-        return AdjustFault::Network(fault);
-    };
-    let words: Vec<String> = unknowns
-        .iter()
-        .map(|unknown| unknown_in_words(*unknown, images, profiles))
-        .collect();
-    AdjustFault::Singular(words.join(", "))
-}
-
-/// An unknown as a surveyor names it.
-fn unknown_in_words(unknown: Unknown, images: &[AdjustImage], profiles: &[String]) -> String {
-    match unknown {
-        Unknown::Orientation { image, coefficient } => {
-            let quantity = ["X", "Y", "Z", "ω", "φ", "κ"][coefficient / 3 % 6];
-            let power = ["constant", "linear term", "quadratic term"][coefficient % 3];
-            format!(
-                "the {power} of {quantity} of image {}",
-                images[image].stereo.id
-            )
-        }
-        Unknown::TimeBias { image } => {
-            format!("the time bias of image {}", images[image].stereo.id)
-        }
-        Unknown::RangeBias { profile } => {
-            format!("the range bias of profile {}", profiles[profile])
-        }
-    }
-}
-
-fn contradictions(
-    images: &[AdjustImage],
+fn contradictions<M>(
+    images: &[AdjustImage<M>],
     points: &[String],
     adjustment: &Adjustment,
 ) -> std::result::Result<(), AdjustFault> {
@@ -331,12 +229,12 @@ fn contradictions(
             Ok(())
         }
     };
-    let size = |residual: &crate::geom::bundle::Residual| (residual.value / residual.sigma).abs();
+    let size = |residual: &Residual| (residual.value / residual.sigma).abs();
     for (image, adjusted) in adjustment.images.iter().enumerate() {
         for (coefficient, prior) in adjusted.priors.iter().enumerate() {
             if let Some(prior) = prior {
                 let unknown = Unknown::Orientation { image, coefficient };
-                refuse(unknown_in_words(unknown, images, &[]), size(prior))?;
+                refuse(fault::unknown_in_words(unknown, images, &[]), size(prior))?;
             }
         }
     }
@@ -349,7 +247,7 @@ fn contradictions(
 }
 
 /// Index of each image by its identifier.
-fn image_index(images: &[AdjustImage]) -> BTreeMap<&str, usize> {
+fn image_index<M>(images: &[AdjustImage<M>]) -> BTreeMap<&str, usize> {
     let ids = images.iter().map(|image| image.stereo.id.as_str());
     ids.zip(0..).collect()
 }

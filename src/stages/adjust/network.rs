@@ -6,37 +6,37 @@ use nalgebra::Vector3;
 
 use super::{
     AdjustFault, AdjustImage, AdjustOptions, LaserShot, LeftOut, LeftOutReason, MolaImage,
-    image_index, pair,
+    PointKind, image_index, pair,
 };
 use crate::{
     error::Result,
     geom::{
         bundle::{BundleImage, BundlePoint, Network, Range, View},
-        pushbroom::{EulerPolynomial, Projector},
+        pushbroom::{ExteriorOrientation, Projector},
     },
     stages::intersect::IntersectedTies,
     ties::{TiePoint, image_indices},
 };
 
 /// A network with the names of its parts.
-pub(super) struct Assembled {
-    pub(super) network: Network,
+pub(super) struct Assembled<M> {
+    pub(super) network: Network<M>,
     /// Identifiers of the points: shots, then tie points.
     pub(super) points: Vec<String>,
     pub(super) shots: usize,
     pub(super) profiles: Vec<String>,
-    pub(super) rejected: Vec<LeftOut>,
+    pub(super) left_out: Vec<LeftOut>,
     /// Where the initial orientations put the footprints.
     pub(super) mola: Vec<View>,
 }
 
-pub(super) fn assemble(
-    images: &[AdjustImage],
+pub(super) fn assemble<'a, M: ExteriorOrientation>(
+    images: &'a [AdjustImage<M>],
     shots: &[LaserShot],
     ties: &[TiePoint],
     starts: &IntersectedTies,
     options: &AdjustOptions,
-) -> Result<Assembled> {
+) -> Result<Assembled<&'a M>> {
     let mut assembled = Assembled {
         network: Network {
             images: images.iter().map(bundle_image).collect(),
@@ -45,7 +45,7 @@ pub(super) fn assemble(
         points: Vec::with_capacity(shots.len() + ties.len()),
         shots: shots.len(),
         profiles: Vec::new(),
-        rejected: Vec::new(),
+        left_out: Vec::new(),
         mola: Vec::new(),
     };
     assembled.add_shots(images, shots, options)?;
@@ -57,9 +57,9 @@ pub(super) fn assemble(
     Ok(assembled)
 }
 
-fn bundle_image(image: &AdjustImage) -> BundleImage {
+fn bundle_image<M>(image: &AdjustImage<M>) -> BundleImage<&M> {
     BundleImage {
-        orientation: image.stereo.orientation,
+        base: &image.stereo.orientation,
         half_lines: 0.5 * image.stereo.lines,
         line_period_s: image.line_period_s,
         focal_length_px: image.stereo.detector.focal_length_px,
@@ -69,10 +69,10 @@ fn bundle_image(image: &AdjustImage) -> BundleImage {
 }
 
 /// Finds lines for points in the whole of an image.
-pub(super) fn projector<'a>(
-    image: &AdjustImage,
-    orientation: &'a EulerPolynomial,
-) -> std::result::Result<Projector<'a, EulerPolynomial>, AdjustFault> {
+pub(super) fn projector<'a, M, O: ExteriorOrientation>(
+    image: &AdjustImage<M>,
+    orientation: &'a O,
+) -> std::result::Result<Projector<'a, O>, AdjustFault> {
     Projector::new(orientation, image.stereo.lines).map_err(|unseen| AdjustFault::Blind {
         image: image.stereo.id.clone(),
         unseen,
@@ -80,8 +80,8 @@ pub(super) fn projector<'a>(
 }
 
 /// Where the initial orientations put the footprints, in and around each image.
-fn footprints_in_images(
-    images: &[AdjustImage],
+fn footprints_in_images<M: ExteriorOrientation>(
+    images: &[AdjustImage<M>],
     shots: &[LaserShot],
     options: &AdjustOptions,
 ) -> std::result::Result<Vec<View>, AdjustFault> {
@@ -114,10 +114,21 @@ fn footprints_in_images(
     Ok(views)
 }
 
-impl Assembled {
+impl<M> Assembled<M> {
+    /// Whether the point at this index is a shot or a tie point.
+    pub(super) fn kind(&self, point: usize) -> PointKind {
+        if point < self.shots {
+            PointKind::Shot
+        } else {
+            PointKind::Tie
+        }
+    }
+}
+
+impl<'a, M: ExteriorOrientation> Assembled<&'a M> {
     fn add_shots(
         &mut self,
-        images: &[AdjustImage],
+        images: &'a [AdjustImage<M>],
         shots: &[LaserShot],
         options: &AdjustOptions,
     ) -> std::result::Result<(), AdjustFault> {
@@ -162,7 +173,7 @@ impl Assembled {
 
     fn add_ties(
         &mut self,
-        images: &[AdjustImage],
+        images: &'a [AdjustImage<M>],
         ties: &[TiePoint],
         starts: &IntersectedTies,
         options: &AdjustOptions,
@@ -180,7 +191,8 @@ impl Assembled {
             .collect();
         for (tie, indices) in ties.iter().zip(indices) {
             let Some(ground_m) = starts.remove(tie.id.as_str()) else {
-                self.rejected.push(LeftOut {
+                self.left_out.push(LeftOut {
+                    kind: PointKind::Tie,
                     id: tie.id.clone(),
                     reason: LeftOutReason::NotIntersected,
                 });

@@ -4,12 +4,13 @@ use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
 use super::{
-    AdjustFault, AdjustImage, BAARDA_LIMIT, MolaImage,
+    AdjustFault, AdjustImage, BAARDA_LIMIT, MolaImage, PointKind,
+    fault::unknown_in_words,
     network::{Assembled, projector},
-    unknown_in_words,
 };
 use crate::geom::{
     bundle::{Adjustment, Residual},
+    pushbroom::{CorrectedOrientation, ExteriorOrientation},
     statistics::Summary,
 };
 
@@ -90,9 +91,9 @@ pub struct AdjustmentSummary {
     pub correlated: Vec<(String, String, f64)>,
 }
 
-pub(super) fn summarise(
-    images: &[AdjustImage],
-    assembled: &Assembled,
+pub(super) fn summarise<M: ExteriorOrientation>(
+    images: &[AdjustImage<M>],
+    assembled: &Assembled<&M>,
     adjustment: &Adjustment,
     mola_image: MolaImage,
 ) -> Result<AdjustmentSummary, AdjustFault> {
@@ -135,12 +136,12 @@ pub(super) fn summarise(
     })
 }
 
-fn types(assembled: &Assembled, adjustment: &Adjustment) -> Vec<TypeSummary> {
+fn types<M>(assembled: &Assembled<M>, adjustment: &Adjustment) -> Vec<TypeSummary> {
     let views = assembled.network.views.iter().zip(&adjustment.views);
-    let of_views = |shots: bool| -> Vec<Residual> {
+    let of_views = |kind: PointKind| -> Vec<Residual> {
         let wanted = views
             .clone()
-            .filter(|(view, _)| (view.point < assembled.shots) == shots);
+            .filter(|(view, _)| assembled.kind(view.point) == kind);
         wanted
             .filter_map(|(_, residuals)| *residuals)
             .flatten()
@@ -153,8 +154,8 @@ fn types(assembled: &Assembled, adjustment: &Adjustment) -> Vec<TypeSummary> {
         .flatten()
         .filter_map(|point| point.priors);
     let all = [
-        (ObservationType::TieImage, of_views(false)),
-        (ObservationType::MolaImage, of_views(true)),
+        (ObservationType::TieImage, of_views(PointKind::Tie)),
+        (ObservationType::MolaImage, of_views(PointKind::Shot)),
         (
             ObservationType::MolaRange,
             adjustment.ranges.iter().flatten().copied().collect(),
@@ -192,8 +193,8 @@ fn of_type(kind: ObservationType, residuals: &[Residual]) -> TypeSummary {
     }
 }
 
-fn ground(
-    assembled: &Assembled,
+fn ground<M>(
+    assembled: &Assembled<M>,
     adjustment: &Adjustment,
     points: std::ops::Range<usize>,
 ) -> GroundSummary {
@@ -212,27 +213,31 @@ fn ground(
     }
 }
 
-fn tie_residuals(assembled: &Assembled, adjustment: &Adjustment, image: usize) -> [Summary; 2] {
+fn tie_residuals<M>(
+    assembled: &Assembled<M>,
+    adjustment: &Adjustment,
+    image: usize,
+) -> [Summary; 2] {
     let views = assembled.network.views.iter().zip(&adjustment.views);
     let residuals: Vec<[f64; 2]> = views
-        .filter(|(view, _)| view.image == image && view.point >= assembled.shots)
+        .filter(|(view, _)| view.image == image && assembled.kind(view.point) == PointKind::Tie)
         .filter_map(|(_, residuals)| Some((*residuals)?.map(|residual| residual.value)))
         .collect();
     by_axis(&residuals)
 }
 
 /// Adjusted footprints seen with the adjusted orientation, minus where the initial ones put them.
-fn mola_corrections(
-    image: &AdjustImage,
-    assembled: &Assembled,
+fn mola_corrections<M: ExteriorOrientation>(
+    image: &AdjustImage<M>,
+    assembled: &Assembled<&M>,
     adjustment: &Adjustment,
     index: usize,
 ) -> Result<[Summary; 2], AdjustFault> {
-    let adjusted = &adjustment.images[index];
-    let projector = projector(image, &adjusted.orientation)?;
-    let late_lines = adjusted
-        .time_bias_s
-        .map_or(0.0, |(bias_s, _)| bias_s / image.line_period_s);
+    let orientation = CorrectedOrientation {
+        base: &image.stereo.orientation,
+        correction: adjustment.images[index].correction,
+    };
+    let projector = projector(image, &orientation)?;
     let corrections: Vec<[f64; 2]> = assembled
         .mola
         .iter()
@@ -241,7 +246,7 @@ fn mola_corrections(
             let point = adjustment.points[view.point].as_ref().ok()?;
             let seen = projector.project(&point.ground_m).ok()?;
             let focal = image.stereo.detector.focal_px(&seen.camera_m).ok()?;
-            Some([seen.x - late_lines - view.x_lines, focal.y - view.y_px])
+            Some([seen.x - view.x_lines, focal.y - view.y_px])
         })
         .collect();
     Ok(by_axis(&corrections))

@@ -1,0 +1,111 @@
+//! Values and indices that a network must have before anything is computed.
+
+use super::{BundleFault, Network, Part};
+use crate::geom::pushbroom::ExteriorOrientation;
+
+/// # Errors
+/// The first value that is none, the first index without a target.
+pub(super) fn check<M: ExteriorOrientation>(network: &Network<M>) -> Result<(), BundleFault> {
+    for (index, image) in network.images.iter().enumerate() {
+        let part = Part::Image(index);
+        positive(part, "half the number of lines", image.half_lines)?;
+        positive(part, "line period", image.line_period_s)?;
+        positive(part, "focal length", image.focal_length_px)?;
+        deviation(
+            part,
+            "standard deviation of the time bias",
+            image.time_bias_sigma_s,
+        )?;
+        for sigma in image.sigmas {
+            deviation(part, "standard deviation of an orientation unknown", sigma)?;
+        }
+        let (pose, motion) = image.base.moving(0.0);
+        for vector in [pose.position_m, motion.advance_m, motion.turn_rad] {
+            for component in &vector {
+                finite(part, "initial orientation", *component)?;
+            }
+        }
+    }
+    for (index, sigma_m) in network.range_bias_sigmas_m.iter().enumerate() {
+        let part = Part::Profile(index);
+        deviation(part, "standard deviation of the range bias", *sigma_m)?;
+    }
+    for (index, point) in network.points.iter().enumerate() {
+        let part = Part::Point(index);
+        for axis in 0..3 {
+            finite(part, "initial coordinate", point.ground_m[axis])?;
+            if let Some(sigma_m) = point.sigma_m {
+                positive(part, "standard deviation", sigma_m[axis])?;
+            }
+        }
+    }
+    for (index, view) in network.views.iter().enumerate() {
+        let part = Part::View(index);
+        matched(network, part, view.point, view.image)?;
+        finite(part, "line", view.x_lines)?;
+        finite(part, "place in the line", view.y_px)?;
+        positive(part, "standard deviation", view.sigma_px.x)?;
+        positive(part, "standard deviation", view.sigma_px.y)?;
+    }
+    for (index, range) in network.ranges.iter().enumerate() {
+        let part = Part::Range(index);
+        matched(network, part, range.point, range.image)?;
+        if range.profile >= network.range_bias_sigmas_m.len() {
+            let missing = Part::Profile(range.profile);
+            return Err(BundleFault::Unmatched { part, missing });
+        }
+        finite(part, "line", range.x_lines)?;
+        positive(part, "distance", range.range_m)?;
+        positive(part, "standard deviation", range.sigma_m)?;
+    }
+    Ok(())
+}
+
+fn value(
+    part: Part,
+    what: &'static str,
+    value: f64,
+    valid: bool,
+    expected: &'static str,
+) -> Result<(), BundleFault> {
+    if valid {
+        Ok(())
+    } else {
+        Err(BundleFault::Value {
+            part,
+            what,
+            value,
+            expected,
+        })
+    }
+}
+
+fn positive(part: Part, what: &'static str, number: f64) -> Result<(), BundleFault> {
+    let valid = number > 0.0 && number.is_finite();
+    value(part, what, number, valid, "a positive number")
+}
+
+fn finite(part: Part, what: &'static str, number: f64) -> Result<(), BundleFault> {
+    value(part, what, number, number.is_finite(), "a finite number")
+}
+
+fn deviation(part: Part, what: &'static str, sigma: f64) -> Result<(), BundleFault> {
+    value(part, what, sigma, sigma >= 0.0, "0 or more")
+}
+
+fn matched<M>(
+    network: &Network<M>,
+    part: Part,
+    point: usize,
+    image: usize,
+) -> Result<(), BundleFault> {
+    if point >= network.points.len() {
+        let missing = Part::Point(point);
+        return Err(BundleFault::Unmatched { part, missing });
+    }
+    if image >= network.images.len() {
+        let missing = Part::Image(image);
+        return Err(BundleFault::Unmatched { part, missing });
+    }
+    Ok(())
+}

@@ -1,0 +1,216 @@
+//! The result of an adjustment as plain numbers, for reports, tables and storage.
+
+use serde::{Deserialize, Serialize};
+
+use super::{AdjustImage, AdjustmentSummary, LeftOut, network::Assembled};
+use crate::geom::{
+    bundle::{Adjustment, ORIENTATION_UNKNOWNS, Residual},
+    pushbroom::OrientationCorrection,
+};
+
+/// The adjusted site.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Adjusted {
+    /// Statistics.
+    pub summary: AdjustmentSummary,
+    /// One entry for each image, in their order.
+    pub images: Vec<CorrectedImage>,
+    /// Points with adjusted coordinates: shots, then tie points, each in their order.
+    pub points: Vec<CorrectedPoint>,
+    /// Image coordinates of these points.
+    pub views: Vec<ImageResidual>,
+    /// Ranges of these points.
+    pub ranges: Vec<RangeResidual>,
+    /// Points that were left out.
+    pub left_out: Vec<LeftOut>,
+    /// Weighted sum of squared residuals before each step and after the last.
+    pub weighted_squares: Vec<f64>,
+}
+
+/// An image and what the adjustment adds to its orientation.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct CorrectedImage {
+    /// Identifier.
+    pub id: String,
+    /// Coefficients of the correction at `[3·quantity + power]`, metres and radians: X, Y and Z position,
+    /// rotations about the camera's x, y and z axis, each with powers 0, 1 and 2 of `t = x/half_lines`.
+    pub correction: [f64; ORIENTATION_UNKNOWNS],
+    /// Their standard deviations; 0 where held fixed.
+    pub sigmas: [f64; ORIENTATION_UNKNOWNS],
+    /// Bias of the line times with its standard deviation, seconds, where it is unknown.
+    pub time_bias_s: Option<(f64, f64)>,
+    /// Time from line to line, seconds.
+    pub line_period_s: f64,
+    /// Half the number of lines.
+    pub half_lines: f64,
+}
+
+/// The kinds of point.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum PointKind {
+    /// A footprint of the laser altimeter.
+    Shot,
+    /// A tie point.
+    Tie,
+}
+
+/// An adjusted ground point.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct CorrectedPoint {
+    /// Shot or tie point.
+    pub kind: PointKind,
+    /// Identifier.
+    pub id: String,
+    /// Initial coordinates, Mars-fixed, metres.
+    pub initial_m: [f64; 3],
+    /// Adjusted coordinates, Mars-fixed, metres.
+    pub ground_m: [f64; 3],
+    /// Their covariance, m², with the a posteriori standard deviation of unit weight.
+    pub covariance_m2: [[f64; 3]; 3],
+}
+
+/// One scalar observation after the adjustment.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct ScalarResidual {
+    /// Observed minus computed.
+    pub value: f64,
+    /// Redundancy number, `0..=1`.
+    pub redundancy: f64,
+    /// Residual over its own a priori standard deviation; none where no other observation controls it.
+    pub standardised: Option<f64>,
+}
+
+/// A point in an image.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ImageResidual {
+    /// Index of the point.
+    pub point: usize,
+    /// Index of the image.
+    pub image: usize,
+    /// Shot or tie point.
+    pub kind: PointKind,
+    /// Measured line, from the middle of the image.
+    pub x_lines: f64,
+    /// Measured place in the line, pixels from the principal point.
+    pub y_px: f64,
+    /// Along the track, focal pixels.
+    pub along_px: ScalarResidual,
+    /// Across the track, focal pixels.
+    pub across_px: ScalarResidual,
+}
+
+/// A range.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct RangeResidual {
+    /// Index of the point.
+    pub point: usize,
+    /// Index of the image.
+    pub image: usize,
+    /// Profile.
+    pub profile: String,
+    /// Measured distance, metres.
+    pub range_m: f64,
+    /// Its residual, metres.
+    pub residual_m: ScalarResidual,
+}
+
+impl Adjusted {
+    /// What is to be added to the orientation of the image at index `image`.
+    #[must_use]
+    pub fn correction(&self, image: usize) -> OrientationCorrection {
+        let entry = &self.images[image];
+        let time_bias_s = entry.time_bias_s.map_or(0.0, |(bias_s, _)| bias_s);
+        OrientationCorrection::of(
+            &entry.correction,
+            entry.half_lines,
+            time_bias_s / entry.line_period_s,
+        )
+    }
+}
+
+impl From<Residual> for ScalarResidual {
+    fn from(residual: Residual) -> Self {
+        Self {
+            value: residual.value,
+            redundancy: residual.redundancy,
+            standardised: residual.standardised(),
+        }
+    }
+}
+
+/// Puts the result together; points without adjusted coordinates are left to `left_out`.
+pub(super) fn collect<M>(
+    images: &[AdjustImage<M>],
+    assembled: Assembled<&M>,
+    adjustment: Adjustment,
+    summary: AdjustmentSummary,
+) -> Adjusted {
+    let mut index_of = vec![None; assembled.points.len()];
+    let mut points = Vec::with_capacity(assembled.points.len());
+    let variance = adjustment.sigma0().powi(2);
+    for (point, outcome) in adjustment.points.iter().enumerate() {
+        let Ok(found) = outcome else { continue };
+        index_of[point] = Some(points.len());
+        points.push(CorrectedPoint {
+            kind: assembled.kind(point),
+            id: assembled.points[point].clone(),
+            initial_m: assembled.network.points[point].ground_m.into(),
+            ground_m: found.ground_m.into(),
+            covariance_m2: (found.cofactor_m2 * variance).into(),
+        });
+    }
+    let views = assembled.network.views.iter().zip(&adjustment.views);
+    let ranges = assembled.network.ranges.iter().zip(&adjustment.ranges);
+    Adjusted {
+        summary,
+        images: corrected_images(images, &adjustment),
+        views: views
+            .filter_map(|(view, residuals)| {
+                let [along, across] = (*residuals)?;
+                Some(ImageResidual {
+                    point: index_of[view.point]?,
+                    image: view.image,
+                    kind: assembled.kind(view.point),
+                    x_lines: view.x_lines,
+                    y_px: view.y_px,
+                    along_px: along.into(),
+                    across_px: across.into(),
+                })
+            })
+            .collect(),
+        ranges: ranges
+            .filter_map(|(range, residual)| {
+                Some(RangeResidual {
+                    point: index_of[range.point]?,
+                    image: range.image,
+                    profile: assembled.profiles[range.profile].clone(),
+                    range_m: range.range_m,
+                    residual_m: (*residual)?.into(),
+                })
+            })
+            .collect(),
+        points,
+        left_out: assembled.left_out,
+        weighted_squares: adjustment.history,
+    }
+}
+
+fn corrected_images<M>(images: &[AdjustImage<M>], adjustment: &Adjustment) -> Vec<CorrectedImage> {
+    let sigma0 = adjustment.sigma0();
+    let found = images.iter().zip(&adjustment.images);
+    found
+        .map(|(image, adjusted)| CorrectedImage {
+            id: image.stereo.id.clone(),
+            correction: adjusted.correction.coefficients(),
+            sigmas: std::array::from_fn(|unknown| {
+                sigma0 * adjusted.cofactors[(unknown, unknown)].sqrt()
+            }),
+            time_bias_s: adjusted
+                .time_bias_s
+                .map(|(bias_s, root_s)| (bias_s, sigma0 * root_s)),
+            line_period_s: image.line_period_s,
+            half_lines: adjusted.correction.half_lines,
+        })
+        .collect()
+}
