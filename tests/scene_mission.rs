@@ -327,7 +327,7 @@ fn the_same_seed_gives_the_same_bytes() {
     write_scene(&again, &SHORT).unwrap();
     write_scene(&again, &SHORT).unwrap(); // replaces the first
     let mut compared = 0;
-    for part in ["kernels", "pedr", "labels", "sites", "."] {
+    for part in ["kernels", "pedr", "labels", "sites", "ties", "."] {
         for entry in fs::read_dir(MISSION.path(part)).unwrap() {
             let path = entry.unwrap().path();
             if path.is_file() {
@@ -341,7 +341,7 @@ fn the_same_seed_gives_the_same_bytes() {
             }
         }
     }
-    assert_eq!(compared, 6 + 3 + 5 + 6 + 6 + 3 + 3);
+    assert_eq!(compared, 6 + 3 + 5 + 6 + 6 + 3 + 3 + 3);
     assert_eq!(
         fs::read_dir(folder.path()).unwrap().count(),
         1,
