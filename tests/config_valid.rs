@@ -34,6 +34,7 @@ fn folder() -> tempfile::TempDir {
         ("kernels/scene.tm", "KPL/MK\n"),
         ("pedr/ap19019k.b", ""),
         ("labels/e0202855.lbl", "END\n"),
+        ("ties/site.csv", ""),
         ("sites/outline.geojson", OUTLINE),
     ] {
         let path = folder.path().join(path);
@@ -93,6 +94,7 @@ fn the_example_says_the_defaults_and_means_si_units() {
         keys: example.keys.clone(),
         windows: example.windows.clone(),
         images: example.images.clone(),
+        ties: example.ties.clone(),
         ..least.clone()
     };
     assert_eq!(example, with_defaults);
@@ -247,14 +249,14 @@ fn schema_tables(schema: &Value, path: &str, found: &mut Vec<(String, BTreeSet<S
 fn schema_example_and_loader_know_the_same_keys_and_defaults() {
     let mut tables = Vec::new();
     schema_tables(&schema(), "", &mut tables);
-    assert_eq!(tables.len(), 12);
+    assert_eq!(tables.len(), 16);
     let example = example_text();
     for (path, keys) in tables {
         // The loader answers an unknown key with all that it knows.
         let table = path.trim_start_matches('.');
         let header = match table {
             "" => String::new(),
-            "windows" | "images" | "kernels.sets" => format!("[[{table}]]\n"),
+            "windows" | "images" | "kernels.sets" | "adjustment.images" => format!("[[{table}]]\n"),
             _ => format!("[{table}]\n"),
         };
         let answer = config::parse(&format!("{header}zzzzzzzz = 1\n"), Path::new("x.toml"))

@@ -4,6 +4,7 @@
 //! problems of a file are reported together, each as `file:line:column: key is value; expected …`.
 //! `config/sites/example.toml` documents every key, `config/schema/site.schema.json` is its schema.
 
+mod adjustment;
 mod geojson;
 mod problems;
 mod raw;
@@ -13,6 +14,7 @@ mod validate;
 
 use std::{collections::BTreeMap, fs::File, io::Read as _, path::Path};
 
+pub use adjustment::*;
 pub use problems::Problems;
 pub use site::*;
 

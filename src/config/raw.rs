@@ -23,6 +23,9 @@ pub(super) struct RawSite {
     pub(super) range_check: Entry<RawRangeCheck>,
     pub(super) orientation: Entry<RawOrientation>,
     pub(super) registration: Entry<RawRegistration>,
+    pub(super) ties: Entry<RawTies>,
+    pub(super) intersection: Entry<RawIntersection>,
+    pub(super) adjustment: Entry<RawAdjustment>,
 }
 
 #[derive(Debug, Default, Deserialize)]
@@ -94,6 +97,7 @@ pub(super) struct RawWindow {
 pub(super) struct RawImage {
     pub(super) id: Entry<String>,
     pub(super) label: Entry<String>,
+    pub(super) serial_number: Entry<String>,
     pub(super) sclk_start: Entry<String>,
     pub(super) utc_start: Entry<String>,
     pub(super) exposure_ms: Entry<f64>,
@@ -132,4 +136,46 @@ pub(super) struct RawRegistration {
     pub(super) model: Entry<String>,
     pub(super) tolerance_lines: Entry<f64>,
     pub(super) steps_max: Entry<i64>,
+}
+
+#[derive(Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct RawTies {
+    pub(super) files: Entry<Vec<Spanned<String>>>,
+}
+
+#[derive(Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct RawIntersection {
+    pub(super) weighting: Entry<String>,
+    pub(super) sigma_px: Entry<f64>,
+    pub(super) sigma_lines: Entry<f64>,
+    pub(super) convergence_min_deg: Entry<f64>,
+}
+
+#[derive(Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct RawAdjustment {
+    pub(super) tie_sigma_px: Entry<Vec<Spanned<f64>>>,
+    pub(super) mola_image: Entry<String>,
+    pub(super) mola_sigma_px: Entry<Vec<Spanned<f64>>>,
+    pub(super) mola_margin_px: Entry<f64>,
+    pub(super) ground_sigma_m: Entry<f64>,
+    pub(super) range_sigma_m: Entry<f64>,
+    pub(super) range_bias_sigma_m: Entry<f64>,
+    pub(super) time_bias_sigma_ms: Entry<f64>,
+    pub(super) nadir_sigma_m: Entry<f64>,
+    pub(super) off_nadir_sigma_m: Entry<f64>,
+    pub(super) robust: Entry<String>,
+    pub(super) robust_limit: Entry<f64>,
+    pub(super) blunder_limit: Entry<f64>,
+    pub(super) images: Entry<Vec<Spanned<RawOrientationPrior>>>,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct RawOrientationPrior {
+    pub(super) id: Entry<String>,
+    pub(super) position_m: Entry<Vec<Spanned<f64>>>,
+    pub(super) rotation_arcsec: Entry<Vec<Spanned<f64>>>,
 }

@@ -4,6 +4,7 @@ use std::{collections::BTreeMap, path::PathBuf};
 
 use serde::{Deserialize, Serialize};
 
+use super::adjustment::{AdjustmentConfig, IntersectionConfig, TiesConfig};
 use crate::{frames::MarsDatum, time::PointingBias};
 
 /// Everything that `areograph run` needs to know about a site.
@@ -39,6 +40,12 @@ pub struct SiteConfig {
     pub orientation: OrientationConfig,
     /// Projection of footprints into the images.
     pub registration: RegistrationConfig,
+    /// Tie points between the images.
+    pub ties: TiesConfig,
+    /// Intersection of tie points.
+    pub intersection: IntersectionConfig,
+    /// Combined adjustment.
+    pub adjustment: AdjustmentConfig,
 }
 
 /// Where kernels come from, and how coverage is judged.
@@ -249,8 +256,18 @@ pub struct ImageConfig {
     pub id: String,
     /// PDS3 or ISIS label, attached or detached.
     pub label: Option<PathBuf>,
+    /// Its name in tie point files and in what is written for ISIS, when that is not the identifier.
+    pub serial_number: Option<String>,
     /// Keys written in the configuration.
     pub fields: ImageFields,
+}
+
+impl ImageConfig {
+    /// The name that tie points give the image.
+    #[must_use]
+    pub fn name_in_ties(&self) -> &str {
+        self.serial_number.as_deref().unwrap_or(&self.id)
+    }
 }
 
 /// What a label or the configuration says of an image; anything may be missing from either.

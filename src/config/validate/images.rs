@@ -37,6 +37,16 @@ pub(super) fn images(
         raw.iter().map(|image| image.get_ref().id.as_ref()),
         review,
     );
+    if raw
+        .iter()
+        .any(|image| image.get_ref().serial_number.is_some())
+    {
+        let names = raw.iter().map(|image| {
+            let keys = image.get_ref();
+            keys.serial_number.as_ref().or(keys.id.as_ref())
+        });
+        no_repeats("images.serial_number", names, review);
+    }
     raw.iter().map(|raw| image(raw, review)).collect()
 }
 
@@ -68,7 +78,16 @@ fn image(raw: &Spanned<RawImage>, review: &mut Review<'_>) -> ImageConfig {
             "images.utc_start is never used: sclk_start comes first".to_owned(),
         );
     }
-    ImageConfig { id, label, fields }
+    let serial_number = keys
+        .serial_number
+        .is_some()
+        .then(|| review.text("images.serial_number", &keys.serial_number, ""));
+    ImageConfig {
+        id,
+        label,
+        serial_number,
+        fields,
+    }
 }
 
 fn fields(keys: &RawImage, review: &mut Review<'_>) -> ImageFields {

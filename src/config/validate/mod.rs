@@ -3,6 +3,8 @@
 //! Each function returns a value even after a problem, so that all problems are found in one pass;
 //! the values are used only when there was none.
 
+mod adjustment;
+mod globs;
 mod images;
 mod kernels;
 mod pedr;
@@ -55,6 +57,7 @@ pub(super) fn validate(
         ),
         _ => {}
     }
+    let images = images::images(raw.images, review);
     SiteConfig {
         site: review.identifier("site", &raw.site, None, false),
         description: raw.description.unwrap_or_default(),
@@ -66,10 +69,13 @@ pub(super) fn validate(
         mola_clock: mola_clock(&inner(raw.mola_clock), review),
         pedr: pedr::pedr(raw.pedr, review),
         windows: windows::windows(raw.windows, searched, review),
-        images: images::images(raw.images, review),
         range_check: range_check(&inner(raw.range_check), review),
         orientation: orientation(&inner(raw.orientation), review),
         registration: registration(&inner(raw.registration), review),
+        ties: adjustment::ties(raw.ties, &images, review),
+        intersection: adjustment::intersection(&inner(raw.intersection), review),
+        adjustment: adjustment::adjustment(&inner(raw.adjustment), &images, review),
+        images,
     }
 }
 

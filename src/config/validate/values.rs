@@ -33,6 +33,9 @@ impl Accept {
 impl fmt::Display for Accept {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
+            Self::FromTo(low, f64::INFINITY) => {
+                write!(formatter, "a number not below {low}; inf is one")
+            }
             Self::FromTo(low, high) => write!(formatter, "a number from {low} to {high}"),
             Self::AboveTo(low, high) => write!(formatter, "a number above {low}, at most {high}"),
         }
