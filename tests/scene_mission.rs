@@ -302,6 +302,7 @@ fn site_files_pass_their_own_checks() {
         assert!(loaded.warnings.is_empty(), "{:?}", loaded.warnings);
         assert_eq!(loaded.site.site, site);
         assert_eq!(loaded.site.images.len(), 2);
+        assert!(loaded.site.ties.files[0].ends_with(format!("ties/{site}.csv")));
         assert!((loaded.site.mola_clock.correction_s() + 0.117).abs() < 1e-12);
     }
 }

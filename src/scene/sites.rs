@@ -5,6 +5,7 @@ use std::fmt::Write as _;
 use super::{
     arc::Arc,
     plan::{Look, Site},
+    ties::ties_name,
 };
 use crate::{
     constants::{MGS_POINTING_BIAS, MOLA_CLOCK_BIAS_S},
@@ -45,6 +46,8 @@ pub(super) struct SiteFile<'a> {
     pub metakernel: String,
     /// Paths of the PEDR files.
     pub pedr: Vec<String>,
+    /// Path of the tie points, where there are any.
+    pub ties: Option<String>,
     /// Windows.
     pub windows: Vec<Window>,
     /// Images.
@@ -75,6 +78,9 @@ impl SiteFile<'_> {
             quoted(INJECTED),
             files.join(", "),
         );
+        if let Some(ties) = &self.ties {
+            let _infallible = write!(text, "\n[ties]\nfiles = [{}]\n", quoted(ties));
+        }
         for window in &self.windows {
             let [west, east] = window.longitude_deg;
             let [south, north] = window.latitude_deg;
@@ -113,6 +119,7 @@ pub(super) fn planned_site<'a>(site: &'a Site, arcs: &[&Arc]) -> SiteFile<'a> {
             .iter()
             .map(|arc| format!("../pedr/{}", arc.image.pedr_name()))
             .collect(),
+        ties: Some(format!("../ties/{}", ties_name(site.id))),
         windows: vec![Window {
             id: site.id.to_owned(),
             longitude_deg: around(site.longitude_deg, Site::WINDOW_HALF_LONGITUDE_DEG),
