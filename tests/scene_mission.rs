@@ -302,6 +302,7 @@ fn site_files_pass_their_own_checks() {
         assert!(loaded.warnings.is_empty(), "{:?}", loaded.warnings);
         assert_eq!(loaded.site.site, site);
         assert_eq!(loaded.site.images.len(), 2);
+        assert!(loaded.site.ties.files[0].ends_with(format!("ties/{site}.csv")));
         assert!((loaded.site.mola_clock.correction_s() + 0.117).abs() < 1e-12);
     }
 }
@@ -327,7 +328,7 @@ fn the_same_seed_gives_the_same_bytes() {
     write_scene(&again, &SHORT).unwrap();
     write_scene(&again, &SHORT).unwrap(); // replaces the first
     let mut compared = 0;
-    for part in ["kernels", "pedr", "labels", "sites", "."] {
+    for part in ["kernels", "pedr", "labels", "sites", "ties", "."] {
         for entry in fs::read_dir(MISSION.path(part)).unwrap() {
             let path = entry.unwrap().path();
             if path.is_file() {
@@ -341,7 +342,7 @@ fn the_same_seed_gives_the_same_bytes() {
             }
         }
     }
-    assert_eq!(compared, 6 + 3 + 5 + 6 + 6 + 3 + 3);
+    assert_eq!(compared, 6 + 3 + 5 + 6 + 6 + 3 + 3 + 3);
     assert_eq!(
         fs::read_dir(folder.path()).unwrap().count(),
         1,

@@ -109,6 +109,7 @@ pub fn write_scene_along(
         description: "Given kernels over invented terrain, synthetic PEDR".to_owned(),
         metakernel: metakernel.display().to_string(),
         pedr: vec![format!("../pedr/{PEDR_NAME}")],
+        ties: None,
         windows,
         images,
     };

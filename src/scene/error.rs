@@ -37,6 +37,14 @@ pub enum SceneError {
         /// Steps taken.
         iterations: u32,
     },
+    /// The true orientation of an image is none.
+    #[error("image {image}: no camera sees its tie points: {fault}")]
+    NoCamera {
+        /// Image id.
+        image: String,
+        /// What is wrong with it.
+        fault: String,
+    },
     /// The beam leaves Mars.
     #[error("the laser beam misses Mars at ET {et_s:.3}")]
     BeamMisses {
@@ -76,7 +84,7 @@ impl Fault for SceneError {
             | Self::Foreign { .. }
             | Self::Changed { .. }
             | Self::Day { .. } => Kind::Configuration,
-            Self::NoOrbit { .. } | Self::NotTabulated { .. } => Kind::Bug,
+            Self::NoOrbit { .. } | Self::NoCamera { .. } | Self::NotTabulated { .. } => Kind::Bug,
             Self::BeamMisses { .. } => Kind::Input,
             Self::NothingToFly { .. } => Kind::Coverage,
         }
@@ -88,7 +96,7 @@ impl Fault for SceneError {
             Self::Foreign { .. } | Self::Changed { .. } => {
                 "a new scene would remove it: move it elsewhere, or choose another folder"
             }
-            Self::NoOrbit { .. } | Self::NotTabulated { .. } => {
+            Self::NoOrbit { .. } | Self::NoCamera { .. } | Self::NotTabulated { .. } => {
                 "report this with the seed and the kernels that were used"
             }
             Self::BeamMisses { .. } => "the attitude kernels do not point +Z at Mars there; leave them out",

@@ -14,6 +14,7 @@ use super::{
     plan::{IMAGES, SITES},
     sites::{README, image_label, planned_site},
     terrain::Terrain,
+    ties::write_ties,
     truth::{ImageTruth, OrbitDifference, ProfileTruth, Truth},
 };
 use crate::{
@@ -59,6 +60,7 @@ pub fn write_scene(directory: &Path, options: &SceneOptions) -> Result<SceneSumm
         truth.profiles.push(profile);
     }
     let sites = draft.folder("sites")?;
+    let ties = draft.folder("ties")?;
     for site in SITES {
         let own: Vec<&Arc> = arcs
             .iter()
@@ -68,6 +70,10 @@ pub fn write_scene(directory: &Path, options: &SceneOptions) -> Result<SceneSumm
             &sites.join(format!("{}.toml", site.id)),
             &planned_site(site, &own).to_toml(),
         )?;
+        if let [first, second] = own[..] {
+            let pair = write_ties(&ties, [first, second], &terrain, options.seed)?;
+            truth.ties.push(pair);
+        }
     }
     write_truth(&draft, &truth)?;
     draft.finish()?;

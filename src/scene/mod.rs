@@ -6,11 +6,13 @@
 //! | `orbit`, `versions` | the true orbit of a day, and two rivals that are metres off |
 //! | `attitude`, `arc` | pointing, and orbit and attitude solved so that an image shows its site |
 //! | `terrain`, `laser` | the ground, and laser shots on it as a PEDR frame tells them |
+//! | `ties` | places that two images show, in images that were truly taken elsewhere and at other times |
 //! | `kernels`, `pedr`, `sites`, `truth` | the files |
 //! | `mission`, `along` | the two entry points |
 //!
 //! Injected errors: attitude stands 1.15 s early in the C-kernel, laser time tags are 0.117 s late,
-//! version K files are in IAU 1991; `truth.json` tells all of it.
+//! version K files are in IAU 1991; tie points see images that were exposed some lines off their labels,
+//! and a few of them are blunders. `truth.json` tells all of it.
 
 mod along;
 mod arc;
@@ -27,6 +29,7 @@ mod random;
 mod sites;
 mod sun;
 mod terrain;
+mod ties;
 mod truth;
 mod versions;
 

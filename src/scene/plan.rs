@@ -1,6 +1,7 @@
 //! What the invented mission does: the six images of Shan et al. 2005 and the days around them.
 
 use crate::{
+    constants::MOC_NA_DETECTORS,
     frames::MarsDatum,
     time::{Et, Interval},
     units::{RADIANS_PER_DEGREE, SECONDS_PER_MS},
@@ -80,6 +81,8 @@ pub(super) struct PlannedImage {
     pub lines_header: u32,
     /// Lines delivered.
     pub lines_delivered: u32,
+    /// Lines by which all lines were truly exposed later than the label says; tie points show it.
+    pub time_bias_lines: f64,
     /// Where it looks.
     pub look: Look,
     /// Number in the name of the day's PEDR file.
@@ -94,6 +97,11 @@ impl PlannedImage {
     /// Time between two image lines, seconds.
     pub(super) fn line_period_s(&self) -> f64 {
         self.exposure_ms * SECONDS_PER_MS * f64::from(self.summing)
+    }
+
+    /// Samples per line: a multiple of 16.
+    pub(super) fn samples(&self) -> u32 {
+        MOC_NA_DETECTORS / self.summing / 16 * 16
     }
 
     /// Time of exposure when the first line begins at `start`.
@@ -161,7 +169,8 @@ const INVENTED: &str =
 /// Ids, dates, lines and line periods are those of Shan et al. 2005, Table 2 (header line counts as
 /// their Table 4 demands). Line spacing over line period is 3.04 km/s for the three nadir images and
 /// 3.39 to 3.42 km/s for the three that are held inertially. The paper tells the emission of the two
-/// Eos images only. Exposures are line periods divided by the summing.
+/// Eos images only. Exposures are line periods divided by the summing. Time biases are the mean residuals of
+/// their Table 5 along the track, to half a line and with the other sign.
 pub(super) static IMAGES: [PlannedImage; 6] = [
     PlannedImage {
         id: "E02-00665",
@@ -172,6 +181,7 @@ pub(super) static IMAGES: [PlannedImage; 6] = [
         summing: 2,
         lines_header: 10_496,
         lines_delivered: 10_112,
+        time_bias_lines: 26.0,
         look: Look::Nadir,
         pedr_number: 18_933,
         pedr_version: 'L',
@@ -186,6 +196,7 @@ pub(super) static IMAGES: [PlannedImage; 6] = [
         summing: 2,
         lines_header: 8_064,
         lines_delivered: 7_680,
+        time_bias_lines: -34.5,
         look: Look::Roll {
             emission_deg: 15.0,
             east: false,
@@ -204,6 +215,7 @@ pub(super) static IMAGES: [PlannedImage; 6] = [
         summing: 2,
         lines_header: 8_960,
         lines_delivered: 8_960,
+        time_bias_lines: -23.5,
         look: Look::Roll {
             emission_deg: 20.0,
             east: false,
@@ -222,6 +234,7 @@ pub(super) static IMAGES: [PlannedImage; 6] = [
         summing: 3,
         lines_header: 8_064,
         lines_delivered: 7_680,
+        time_bias_lines: 25.5,
         look: Look::Nadir,
         pedr_number: 19_117,
         pedr_version: 'L',
@@ -236,6 +249,7 @@ pub(super) static IMAGES: [PlannedImage; 6] = [
         summing: 3,
         lines_header: 9_856,
         lines_delivered: 9_856,
+        time_bias_lines: 34.0,
         look: Look::Nadir,
         pedr_number: 19_215,
         pedr_version: 'K',
@@ -250,6 +264,7 @@ pub(super) static IMAGES: [PlannedImage; 6] = [
         summing: 2,
         lines_header: 8_064,
         lines_delivered: 7_424,
+        time_bias_lines: -20.5,
         look: Look::Roll {
             emission_deg: 17.97,
             east: true,

@@ -41,6 +41,13 @@ impl Random {
         self.between(low.ln(), high.ln()).exp()
     }
 
+    /// The next normal number, of mean 0 and standard deviation 1, by Box and Muller.
+    pub(super) fn normal(&mut self) -> f64 {
+        // 1 − x, so that the logarithm is finite.
+        let radius = (-2.0 * (1.0 - self.between(0.0, 1.0)).ln()).sqrt();
+        radius * self.between(0.0, std::f64::consts::TAU).cos()
+    }
+
     /// The next direction, evenly spread over the sphere.
     pub(super) fn direction(&mut self) -> nalgebra::Vector3<f64> {
         let z = self.between(-1.0, 1.0);

@@ -5,6 +5,7 @@ use std::fmt::Write as _;
 use super::{
     arc::Arc,
     plan::{Look, Site},
+    ties::ties_name,
 };
 use crate::{
     constants::{MGS_POINTING_BIAS, MOLA_CLOCK_BIAS_S},
@@ -45,6 +46,8 @@ pub(super) struct SiteFile<'a> {
     pub metakernel: String,
     /// Paths of the PEDR files.
     pub pedr: Vec<String>,
+    /// Path of the tie points, where there are any.
+    pub ties: Option<String>,
     /// Windows.
     pub windows: Vec<Window>,
     /// Images.
@@ -75,6 +78,9 @@ impl SiteFile<'_> {
             quoted(INJECTED),
             files.join(", "),
         );
+        if let Some(ties) = &self.ties {
+            let _infallible = write!(text, "\n[ties]\nfiles = [{}]\n", quoted(ties));
+        }
         for window in &self.windows {
             let [west, east] = window.longitude_deg;
             let [south, north] = window.latitude_deg;
@@ -113,6 +119,7 @@ pub(super) fn planned_site<'a>(site: &'a Site, arcs: &[&Arc]) -> SiteFile<'a> {
             .iter()
             .map(|arc| format!("../pedr/{}", arc.image.pedr_name()))
             .collect(),
+        ties: Some(format!("../ties/{}", ties_name(site.id))),
         windows: vec![Window {
             id: site.id.to_owned(),
             longitude_deg: around(site.longitude_deg, Site::WINDOW_HALF_LONGITUDE_DEG),
@@ -144,7 +151,6 @@ pub(super) fn image_label(arc: &Arc, session: &Session) -> Result<String> {
         Look::Nadir => format!("SYNTHETIC {}, nadir", image.site.name),
         Look::Roll { .. } => format!("SYNTHETIC {}, off nadir", image.site.name),
     };
-    let samples = 2048 / image.summing / 16 * 16;
     let lines = [
         "PDS_VERSION_ID = PDS3".to_owned(),
         "NOTE = \"SYNTHETIC: written by areograph scene, there is no such image file\"".to_owned(),
@@ -172,7 +178,7 @@ pub(super) fn image_label(arc: &Arc, session: &Session) -> Result<String> {
         "DATA_QUALITY_DESC = \"OK\"".to_owned(),
         "OBJECT = IMAGE".to_owned(),
         format!("LINES = {}", image.lines_header),
-        format!("LINE_SAMPLES = {samples}"),
+        format!("LINE_SAMPLES = {}", image.samples()),
         "SAMPLE_TYPE = UNSIGNED_INTEGER".to_owned(),
         "SAMPLE_BITS = 8".to_owned(),
         "END_OBJECT = IMAGE".to_owned(),
@@ -187,9 +193,11 @@ kernels/     text kernels; orbit (three rival versions), attitude, Mars and Sun 
              nav.tm, gsfc.tm, ipng.tm load them with one version of the orbit each
 pedr/        MOLA PEDR files: two whole days, four single revolutions; version K is in IAU 1991, L in IAU 2000
 labels/      labels of six images
+ties/        places that both images of a site show, as measured in them; some are blunders
 sites/       configurations for `areograph run`
 truth.json   what really happened: biases, orientation of the images, footprints in the sites' windows,
-             and how far the rival orbits are off; the orbit `gsfc` is the true one
+             how far the rival orbits are off (the orbit `gsfc` is the true one), and for the tie points when and
+             from where the images were truly taken
 
 Image ids, times, line counts and line periods are those of Shan et al. 2005, Table 2. Terrain, orbits and
 attitudes are invented. Emission angles of E02-01301 and E02-01453 are invented too; the paper does not tell them.

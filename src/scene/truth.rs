@@ -36,6 +36,8 @@ pub(super) struct Truth {
     pub images: Vec<ImageTruth>,
     pub files: Vec<FileTruth>,
     pub profiles: Vec<ProfileTruth>,
+    pub tie_rule: &'static str,
+    pub ties: Vec<TiesTruth>,
 }
 
 /// Injected time errors.
@@ -117,6 +119,40 @@ pub(super) struct OrbitDifference {
     pub expected_range_minus_distance_mean_m: f64,
 }
 
+/// The tie points of one site.
+#[derive(Debug, Serialize)]
+pub(super) struct TiesTruth {
+    pub site: &'static str,
+    /// The two images, in the order of time.
+    pub cameras: [TieCameraTruth; 2],
+    /// In the order of the file.
+    pub ties: Vec<TieTruth>,
+}
+
+/// How an image was truly taken.
+#[derive(Debug, Serialize)]
+pub(super) struct TieCameraTruth {
+    pub image: &'static str,
+    pub time_bias_lines: f64,
+    pub position_bias_m: [f64; 3],
+}
+
+/// One tie point.
+#[derive(Debug, Serialize)]
+pub(super) struct TieTruth {
+    pub id: String,
+    pub ground_iau2000_m: [f64; 3],
+    pub blunder: Option<BlunderTruth>,
+}
+
+/// A measurement that was moved far away.
+#[derive(Debug, Serialize)]
+pub(super) struct BlunderTruth {
+    pub image: String,
+    pub line_error: f64,
+    pub sample_error: f64,
+}
+
 impl Truth {
     /// The truth that all missions share; images, files and profiles are still to come.
     pub(super) fn new(seed: u64) -> Self {
@@ -141,6 +177,8 @@ impl Truth {
             images: Vec::new(),
             files: Vec::new(),
             profiles: Vec::new(),
+            tie_rule: "line n of an image was truly exposed when its label has line n + time_bias_lines, from the place of the true orbit (gsfc) at that time plus position_bias_m (IAU 2000), with the true attitude of that time; tie points, and nothing else, are measured in images taken like that; the position bias against nav is position_bias_m less the orbit difference of nav; time_bias_lines are the residuals of Shan et al. 2005, Table 5, to half a line and with the other sign, position_bias_m has a standard deviation of 20 m an axis; measurements have noise of 1 line and 1 sample, blunders come on top of it",
+            ties: Vec::new(),
         }
     }
 }
