@@ -12,6 +12,7 @@ mod recipe;
 mod scene;
 
 use areograph::{
+    config::MolaImage,
     geom::{
         bundle::{BundleOptions, Network, View, solve},
         pushbroom::{
@@ -24,7 +25,7 @@ use areograph::{
     stages::{
         adjust::{
             AdjustImage, AdjustOptions, Adjusted, BAARDA_LIMIT, LaserShot, LeftOutReason,
-            MolaImage, ObservationType, PointKind, ShotRange, adjust,
+            ObservationType, PointKind, ShotRange, adjust,
         },
         intersect::{IntersectOptions, IntersectedTies, intersect_ties},
     },

@@ -11,6 +11,7 @@ pub mod fit_sensor_model;
 pub mod group_profiles;
 pub mod intersect;
 pub mod oriented;
+pub mod prepare_adjustment;
 pub mod read_ties;
 pub mod register;
 pub mod sample_orientation;

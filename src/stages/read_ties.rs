@@ -140,6 +140,10 @@ fn nothing_found(read: &Ties, names: &BTreeMap<&str, &str>) -> TiesFault {
 }
 
 #[cfg(test)]
+#[allow(
+    clippy::disallowed_methods,
+    reason = "files in a temporary folder need no atomic writer"
+)]
 mod tests {
     use super::*;
     use crate::config::ImageFields;

@@ -24,6 +24,7 @@ pub use summary::{AdjustmentSummary, GroundSummary, ImageSummary, ObservationTyp
 
 use super::intersect::IntersectedTies;
 use crate::{
+    config::{AdjustmentConfig, MolaImage, RobustFunction},
     error::Result,
     geom::{
         bundle::{Adjustment, BundleOptions, ORIENTATION_UNKNOWNS, Residual, Unknown},
@@ -80,19 +81,6 @@ pub struct ShotRange {
     pub range_m: f64,
 }
 
-/// What image coordinates of footprints are.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum MolaImage {
-    /// Observations with their own standard deviations, as in the paper.
-    Weighted,
-    /// Nothing.
-    Off,
-    /// No observations, but projected with the adjusted orientation afterwards: a coordinate that
-    /// follows the orientation has no residual and carries no weight, no freedom and no covariance.
-    Reproject,
-}
-
 /// Standard deviations and options.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct AdjustOptions {
@@ -117,18 +105,34 @@ pub struct AdjustOptions {
 }
 
 impl Default for AdjustOptions {
-    /// The standard deviations of the paper, one MOLA spacing for footprints in images, and no test.
+    /// The defaults of the configuration, but every tie point stays.
     fn default() -> Self {
         Self {
-            tie_sigma_px: [1.0, 1.0],
-            mola_image: MolaImage::Weighted,
-            mola_sigma_px: [74.0, 4.0],
-            mola_margin_px: 200.0,
-            ground_sigma_m: 10.0,
-            range_sigma_m: 10.0,
-            range_bias_sigma_m: 0.0,
-            robust: None,
             blunder_limit: None,
+            ..Self::from(&AdjustmentConfig::default())
+        }
+    }
+}
+
+impl From<&AdjustmentConfig> for AdjustOptions {
+    fn from(config: &AdjustmentConfig) -> Self {
+        Self {
+            tie_sigma_px: config.tie_sigma_px,
+            mola_image: config.mola_image,
+            mola_sigma_px: config.mola_sigma_px,
+            mola_margin_px: config.mola_margin_px,
+            ground_sigma_m: config.ground_sigma_m,
+            range_sigma_m: config.range_sigma_m,
+            range_bias_sigma_m: config.range_bias_sigma_m,
+            robust: config.robust.map(|robust| match robust.function {
+                RobustFunction::Huber => RobustWeight::Huber {
+                    limit: robust.limit,
+                },
+                RobustFunction::Cauchy => RobustWeight::Cauchy {
+                    limit: robust.limit,
+                },
+            }),
+            blunder_limit: config.blunder_limit,
         }
     }
 }

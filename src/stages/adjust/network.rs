@@ -5,10 +5,11 @@ use std::collections::{BTreeMap, BTreeSet};
 use nalgebra::Vector3;
 
 use super::{
-    AdjustFault, AdjustImage, AdjustOptions, LaserShot, LeftOut, LeftOutReason, MolaImage,
-    PointKind, image_index, pair,
+    AdjustFault, AdjustImage, AdjustOptions, LaserShot, LeftOut, LeftOutReason, PointKind,
+    image_index, pair,
 };
 use crate::{
+    config::MolaImage,
     error::Result,
     geom::{
         bundle::{BundleImage, BundlePoint, Network, Range, View},

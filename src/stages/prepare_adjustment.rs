@@ -1,0 +1,152 @@
+//! What enters the combined adjustment: images with what is known of them beforehand, and shots.
+
+use std::collections::BTreeSet;
+
+use super::{
+    adjust::{AdjustImage, LaserShot, ShotRange, orientation_sigmas},
+    group_profiles::Profile,
+    register::ImageRegistration,
+    sample_orientation::Orientation,
+    tag_times::ImageTimes,
+};
+use crate::{
+    config::AdjustmentConfig,
+    footprints::Footprints,
+    frames::MarsIau2000,
+    geom::{ellipsoid::spherical_to_xyz_m, pushbroom::ExteriorOrientation, stereo::StereoImage},
+    time::Et,
+    units::RADIANS_PER_DEGREE,
+};
+
+/// Images that look within this of nadir are nadir images, radians: MOC looks straight down to about a
+/// degree, and off nadir by ten and more.
+const NADIR_RAD: f64 = 5.0 * RADIANS_PER_DEGREE;
+
+/// An image before the adjustment.
+#[derive(Debug, Clone)]
+pub struct Candidate<'a, M> {
+    /// Line times.
+    pub times: &'a ImageTimes,
+    /// Orientation samples.
+    pub orientation: &'a Orientation,
+    /// The form of the orientation that is adjusted.
+    pub stereo: StereoImage<M>,
+    /// Where the image has the footprints.
+    pub registration: &'a ImageRegistration,
+}
+
+impl<M: ExteriorOrientation> Candidate<'_, M> {
+    /// The image with its standard deviations.
+    ///
+    /// An image that `config` names keeps those written there. Otherwise all position unknowns get the one
+    /// of nadir or of other images, and rotations what moves the ground as far: `σ/range`.
+    fn weighed(self, config: &AdjustmentConfig) -> AdjustImage<M> {
+        let pose = self.stereo.orientation.pose(0.0);
+        let look = pose.mars_to_camera.row(2).transpose();
+        let position_sigma_m = if look.angle(&-pose.position_m) < NADIR_RAD {
+            config.nadir_sigma_m
+        } else {
+            config.off_nadir_sigma_m
+        };
+        let mut sigmas = orientation_sigmas(position_sigma_m, position_sigma_m / self.range_m());
+        if let Some(own) = config.images.iter().find(|own| own.id == self.times.id) {
+            if let Some(position_m) = own.position_m {
+                sigmas[..9].copy_from_slice(&position_m);
+            }
+            if let Some(rotation_rad) = own.rotation_rad {
+                sigmas[9..].copy_from_slice(&rotation_rad);
+            }
+        }
+        AdjustImage {
+            stereo: self.stereo,
+            line_period_s: self.times.line_period_s,
+            sigmas,
+            time_bias_sigma_s: config.time_bias_sigma_s,
+        }
+    }
+
+    /// Distance of the ground in the middle of the image, metres; that of the centre of Mars where the image
+    /// sees no ground.
+    fn range_m(&self) -> f64 {
+        let middle = self
+            .orientation
+            .samples
+            .get(self.orientation.samples.len() / 2);
+        let ground = middle.and_then(|sample| sample.boresight);
+        ground.map_or_else(
+            || self.stereo.orientation.pose(0.0).position_m.norm(),
+            |ground| ground.range_m,
+        )
+    }
+}
+
+/// Images and shots as the adjustment takes them.
+///
+/// Of the shots those take part that fall within an image's lines and not farther beside it than `config`
+/// says, and those that were fired while an image was exposed: these with their range. A shot in two windows
+/// counts once. Its name is its profile's and its row in the table of footprints.
+///
+/// # Source
+/// Yoon & Shan 2004: ranges only in the simultaneous image.
+#[must_use]
+pub fn prepare_adjustment<M: ExteriorOrientation>(
+    candidates: Vec<Candidate<'_, M>>,
+    footprints: &Footprints<MarsIau2000>,
+    profiles: &[Profile],
+    config: &AdjustmentConfig,
+) -> (Vec<AdjustImage<M>>, Vec<LaserShot>) {
+    let mut near = BTreeSet::new();
+    for candidate in &candidates {
+        let points = &candidate.registration.points;
+        let samples =
+            -config.mola_margin_px..=f64::from(candidate.times.samples) + config.mola_margin_px;
+        let seen = (0..points.len()).filter(|index| {
+            !points.extrapolated[*index] && samples.contains(&points.sample[*index])
+        });
+        near.extend(seen.map(|index| points.row[index]));
+    }
+    let times: Vec<&ImageTimes> = candidates.iter().map(|candidate| candidate.times).collect();
+    let mut taken = BTreeSet::new();
+    let mut shots = Vec::new();
+    for profile in profiles {
+        for row in &profile.rows {
+            let range = range_of(footprints, profile, *row, &times);
+            if (range.is_some() || near.contains(row)) && taken.insert(*row) {
+                let at = *row as usize;
+                shots.push(LaserShot {
+                    id: format!("{}:{row}", profile.id),
+                    ground_m: spherical_to_xyz_m(
+                        footprints.longitude_rad[at],
+                        footprints.latitude_rad[at],
+                        footprints.radius_m[at],
+                    )
+                    .into(),
+                    range,
+                });
+            }
+        }
+    }
+    let weighed = candidates
+        .into_iter()
+        .map(|candidate| candidate.weighed(config));
+    (weighed.collect(), shots)
+}
+
+/// The range of a shot, when an image was exposed meanwhile.
+fn range_of(
+    footprints: &Footprints<MarsIau2000>,
+    profile: &Profile,
+    row: u32,
+    images: &[&ImageTimes],
+) -> Option<ShotRange> {
+    let instant = Et::from_seconds(footprints.et_s[row as usize]);
+    let image = images
+        .iter()
+        .find(|image| image.exposures().contains(instant))?;
+    Some(ShotRange {
+        profile: profile.id.clone(),
+        image: image.id.clone(),
+        x_lines: image.line_offset(instant),
+        range_m: footprints.range_m[row as usize],
+    })
+}
