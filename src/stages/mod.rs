@@ -10,6 +10,7 @@ pub mod fit_sensor_model;
 pub mod group_profiles;
 pub mod intersect;
 pub mod register;
+pub mod reorient;
 pub mod sample_orientation;
 pub mod search_footprints;
 pub mod tag_times;
