@@ -91,7 +91,8 @@ impl Fault for ReorientFault {
 /// The line with the tag `x` gets the camera of `x + s`: `C(x) = C₀(x + s) + Δ(x + s)` and
 /// `M(x) = exp([θ(x + s)]×) M₀(x + s)`, all relative to Mars. Samples keep their epochs. Tables keep their
 /// nodes but those that the shift takes beyond what is known; their positions keep the light time and
-/// aberration that the original ones carry (a correction of 100 m changes those by 1 cm).
+/// aberration that the original ones carry (a correction of 100 m would change those by 1 cm, one that grows
+/// by 10 m/s by 0.1 m).
 ///
 /// # Errors
 /// [`Kind::Input`] for a shift beyond the camera tables; [`Kind::Bug`] for a correction that is not finite.
