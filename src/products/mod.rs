@@ -14,6 +14,7 @@
 //!
 //! The same site gives the same bytes; nothing here looks at a clock.
 
+mod adjusted_kernels;
 mod coordinates;
 mod exchange;
 pub(crate) mod fault;
@@ -35,6 +36,7 @@ mod text_table;
 
 use std::path::{Path, PathBuf};
 
+pub use adjusted_kernels::{AdjustedImage, AdjustedKernels, write_adjusted_kernels};
 pub use site::{ImageProducts, KernelLine, SiteProducts};
 
 use crate::error::Result;

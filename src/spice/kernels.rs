@@ -117,6 +117,18 @@ impl KernelSet {
         Ok(set)
     }
 
+    /// The same kernels and behind them `files`, which therefore win.
+    ///
+    /// # Errors
+    /// As [`Self::from_files`].
+    pub fn followed_by(&self, files: &[PathBuf]) -> Result<Self> {
+        let mut set = self.clone();
+        for path in files {
+            set.add(path, "follows the listed ones")?;
+        }
+        Ok(set)
+    }
+
     /// Appends a file; an earlier one of the same content gives up its place, since later files win.
     pub(super) fn add(&mut self, path: &Path, reason: &str) -> Result<()> {
         let kernel = Kernel::inspect(path)?;

@@ -10,7 +10,7 @@ use std::{
 
 use super::{
     error::SpiceFault,
-    kernels::{KernelRole, KernelSet, read_text, role_of},
+    kernels::{Kernel, KernelRole, KernelSet, read_text, role_of},
     text_kernel::{self, Assignment, Value, values_of},
 };
 use crate::error::{Place, Result};
@@ -61,7 +61,16 @@ impl KernelSet {
     /// * `relative_to` – the folder it will lie in; paths are written relative to it where possible
     #[must_use]
     pub fn metakernel_text(&self, relative_to: Option<&Path>) -> String {
-        let described = self.kernels.iter().map(|kernel| {
+        self.metakernel_text_before(relative_to, &[])
+    }
+
+    /// A metakernel that loads the same kernels in the same order, and then those of `later`.
+    ///
+    /// * `relative_to` – as for [`Self::metakernel_text`]
+    /// * `later` – their paths are written as they are, relative to the metakernel's folder
+    #[must_use]
+    pub fn metakernel_text_before(&self, relative_to: Option<&Path>, later: &[Kernel]) -> String {
+        let described = self.kernels.iter().chain(later).map(|kernel| {
             format!(
                 "   {} {}, {} bytes, BLAKE3 {}\n",
                 kernel.file_name(),
@@ -70,8 +79,10 @@ impl KernelSet {
                 kernel.blake3
             )
         });
-        let listed = self.kernels.iter().flat_map(|kernel| {
-            let path = relative_path(&kernel.path, relative_to);
+        let earlier = self.kernels.iter();
+        let paths = earlier.map(|kernel| relative_path(&kernel.path, relative_to));
+        let paths = paths.chain(later.iter().map(|kernel| kernel.path.clone()));
+        let listed = paths.flat_map(|path| {
             let mut parts = split_string(&path.to_string_lossy());
             let last = parts.pop();
             let parts = parts.into_iter().map(|part| part + "+").chain(last);

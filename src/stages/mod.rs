@@ -14,6 +14,7 @@ pub mod oriented;
 pub mod prepare_adjustment;
 pub mod read_ties;
 pub mod register;
+pub mod reorient;
 pub mod sample_orientation;
 pub mod search_footprints;
 pub mod tag_times;

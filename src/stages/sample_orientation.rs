@@ -22,6 +22,7 @@ use crate::{
     spice::{Attitude, Session},
     time::Et,
 };
+pub(super) use camera_tables::{Camera, Nodes, check_interpolation};
 
 /// Time between the attitude samples of the mission's C-kernels, seconds: an attitude that is held for
 /// longer is not explained by their spacing, and the bus turns by 0.2° meanwhile.
@@ -160,15 +161,7 @@ pub fn sample_orientation(
     let step_s = image.duration_s() / f64::from(sampling.intervals);
     let epochs = (0..=sampling.intervals).map(|k| image.start.plus(f64::from(k) * step_s));
     let epochs: Vec<Et> = epochs.collect();
-    let mut samples = epochs
-        .iter()
-        .map(|epoch| reader.sample(image, *epoch))
-        .collect::<Result<Vec<_>>>()?;
-    let mut quaternions: Vec<[f64; 4]> = samples.iter().map(|s| s.camera_to_mars).collect();
-    make_continuous(&mut quaternions);
-    for (sample, quaternion) in samples.iter_mut().zip(quaternions) {
-        sample.camera_to_mars = quaternion;
-    }
+    let samples = samples_at(image, &epochs, |et| reader.camera(et))?;
     let tables = camera_tables::camera_tables(&reader, image, kernels.padding_s)?;
     let nodes: Vec<Et> = tables.et_s.iter().copied().map(Et::from_seconds).collect();
     let held = reader.held_attitudes(epochs.iter().chain(&nodes))?;
@@ -176,7 +169,7 @@ pub fn sample_orientation(
     Ok(Orientation {
         image: image.id.clone(),
         samples,
-        outline: reader.outline(image)?,
+        outline: outline(image, |et| reader.camera(et))?,
         tables,
         invalid_because: far.map(HeldAttitudes::reason).into_iter().collect(),
         notes: held.iter().map(ToString::to_string).collect(),
@@ -267,47 +260,69 @@ impl Reader<'_> {
         Ok(self.session.mounting(exposure)? * attitude.inertial_to_bus)
     }
 
-    fn sample(&self, image: &ImageTimes, et: Et) -> Result<OrientationSample> {
+    /// Geometric position in IAU 2000 and the rotation from the camera to it.
+    fn camera(&self, et: Et) -> Result<Camera> {
         let to_mars = mars_rotation::<MarsIau2000>(et);
         let position = to_mars.apply(&self.session.state(et)?.position);
         let camera_to_mars = to_mars * self.inertial_to_camera(et)?.inverse();
-        Ok(OrientationSample {
+        Ok((position.xyz_m, *camera_to_mars.matrix()))
+    }
+}
+
+impl OrientationSample {
+    pub(super) fn new(image: &ImageTimes, et: Et, (position_m, camera_to_mars): &Camera) -> Self {
+        Self {
             et,
             line_offset: image.line_offset(et),
-            position_m: position.xyz_m.into(),
-            camera_to_mars: spice_quaternion(camera_to_mars.matrix()),
-            angles: OmegaPhiKappa::from_camera_to_mars(camera_to_mars.matrix()),
-            boresight: boresight_ground(&position, camera_to_mars.matrix()),
-        })
-    }
-
-    /// Outline of the delivered lines and samples.
-    fn outline(&self, image: &ImageTimes) -> Result<Option<Vec<GroundPoint>>> {
-        let duration_s = f64::from(image.lines_delivered) * image.line_period_s;
-        let step_s = duration_s / f64::from(OUTLINE_INTERVALS);
-        let (mut first_edge, mut last_edge) = (Vec::new(), Vec::new());
-        for k in 0..=OUTLINE_INTERVALS {
-            let et = image.start.plus(f64::from(k) * step_s);
-            let to_mars = mars_rotation::<MarsIau2000>(et);
-            let position = to_mars.apply(&self.session.state(et)?.position);
-            let camera_to_mars = to_mars * self.inertial_to_camera(et)?.inverse();
-            let [first, last] = swath_directions(image).map(|direction| {
-                let ground = ray_meets_ellipsoid(&position, &(camera_to_mars.matrix() * direction));
-                ground.map(|ground| GroundPoint::of(&ground))
-            });
-            let (Some(first), Some(last)) = (first, last) else {
-                return Ok(None);
-            };
-            first_edge.push(first);
-            last_edge.push(last);
+            position_m: (*position_m).into(),
+            camera_to_mars: spice_quaternion(camera_to_mars),
+            angles: OmegaPhiKappa::from_camera_to_mars(camera_to_mars),
+            boresight: boresight_ground(&Position::new(*position_m), camera_to_mars),
         }
-        Ok(Some(
-            first_edge
-                .into_iter()
-                .chain(last_edge.into_iter().rev())
-                .collect(),
-        ))
     }
+}
+
+/// Samples with the camera that `camera` gives for their epochs; quaternions are continuous.
+pub(super) fn samples_at(
+    image: &ImageTimes,
+    epochs: &[Et],
+    camera: impl Fn(Et) -> Result<Camera>,
+) -> Result<Vec<OrientationSample>> {
+    let mut samples = epochs
+        .iter()
+        .map(|epoch| Ok(OrientationSample::new(image, *epoch, &camera(*epoch)?)))
+        .collect::<Result<Vec<_>>>()?;
+    let mut quaternions: Vec<[f64; 4]> = samples.iter().map(|s| s.camera_to_mars).collect();
+    make_continuous(&mut quaternions);
+    for (sample, quaternion) in samples.iter_mut().zip(quaternions) {
+        sample.camera_to_mars = quaternion;
+    }
+    Ok(samples)
+}
+
+/// Outline of the delivered lines and samples, seen by the camera that `camera` gives for an instant.
+pub(super) fn outline(
+    image: &ImageTimes,
+    camera: impl Fn(Et) -> Result<Camera>,
+) -> Result<Option<Vec<GroundPoint>>> {
+    let duration_s = f64::from(image.lines_delivered) * image.line_period_s;
+    let step_s = duration_s / f64::from(OUTLINE_INTERVALS);
+    let (mut first_edge, mut last_edge) = (Vec::new(), Vec::new());
+    for k in 0..=OUTLINE_INTERVALS {
+        let (position_m, camera_to_mars) = camera(image.start.plus(f64::from(k) * step_s))?;
+        let position = Position::new(position_m);
+        let [first, last] = swath_directions(image).map(|direction| {
+            let ground = ray_meets_ellipsoid(&position, &(camera_to_mars * direction));
+            ground.map(|ground| GroundPoint::of(&ground))
+        });
+        let (Some(first), Some(last)) = (first, last) else {
+            return Ok(None);
+        };
+        first_edge.push(first);
+        last_edge.push(last);
+    }
+    let back = last_edge.into_iter().rev();
+    Ok(Some(first_edge.into_iter().chain(back).collect()))
 }
 
 impl GroundPoint {

@@ -39,7 +39,8 @@ pub(super) fn camera_tables(
         .max(TABLE_NODES_MIN - 1);
     loop {
         let mut tables = tables(reader, &table_epochs(image, steps, padding_s))?;
-        tables.interpolation = check_interpolation(reader, image, &tables)?;
+        tables.interpolation =
+            check_interpolation(image, &tables, |et| apparent_camera(reader, et))?;
         if tables.interpolation.keeps_limit() || steps >= image.lines_header {
             return Ok(tables);
         }
@@ -117,10 +118,10 @@ fn rows(matrix: &Matrix3<f64>) -> [[f64; 3]; 3] {
 }
 
 /// Camera position in IAU 2000, metres, and the rotation from the camera to it.
-type Camera = (Vector3<f64>, Matrix3<f64>);
+pub(in crate::stages) type Camera = (Vector3<f64>, Matrix3<f64>);
 
 /// What a camera model makes of the nodes: rotated to Mars first, then interpolated.
-struct Nodes {
+pub(in crate::stages) struct Nodes {
     start_s: f64,
     step_s: f64,
     position_m: Vec<[f64; 3]>,
@@ -128,7 +129,8 @@ struct Nodes {
 }
 
 impl Nodes {
-    fn new(tables: &CameraTables) -> Self {
+    /// Nodes of `tables`, which hold two or more.
+    pub(in crate::stages) fn new(tables: &CameraTables) -> Self {
         let bus_to_camera = Matrix3::from_fn(|row, column| tables.bus_to_camera[row][column]);
         let matrices: Vec<(Matrix3<f64>, Matrix3<f64>)> = tables
             .inertial_to_mars
@@ -157,7 +159,8 @@ impl Nodes {
         }
     }
 
-    fn camera(&self, et: Et) -> Camera {
+    /// The camera between the nodes.
+    pub(in crate::stages) fn camera(&self, et: Et) -> Camera {
         let at = (et.seconds() - self.start_s) / self.step_s;
         let position_m = lagrange(&self.position_m, at).into();
         let camera_to_mars = matrix_of_spice_quaternion(lagrange(&self.camera_to_mars, at));
@@ -165,11 +168,11 @@ impl Nodes {
     }
 }
 
-/// Compares the interpolated camera with the kernels between all nodes over the image.
-fn check_interpolation(
-    reader: &Reader,
+/// Compares the interpolated camera with `camera` between all nodes over the image.
+pub(in crate::stages) fn check_interpolation(
     image: &ImageTimes,
     tables: &CameraTables,
+    camera: impl Fn(Et) -> Result<Camera>,
 ) -> Result<InterpolationCheck> {
     let nodes = Nodes::new(tables);
     let mut check = InterpolationCheck::default();
@@ -179,16 +182,20 @@ fn check_interpolation(
             if !image.exposures().contains(et) {
                 continue;
             }
-            let to_mars = mars_rotation::<MarsIau2000>(et);
-            let position = to_mars.apply(&reader.session.apparent_state(et)?.position);
-            let camera_to_mars = to_mars * reader.inertial_to_camera(et)?.inverse();
-            let kernels = (position.xyz_m, *camera_to_mars.matrix());
-            let error_px = error_px(image, &kernels, &nodes.camera(et));
+            let error_px = error_px(image, &camera(et)?, &nodes.camera(et));
             check.error_max_px = largest([check.error_max_px, error_px]).unwrap_or_default();
             check.epochs += 1;
         }
     }
     Ok(check)
+}
+
+/// What the kernels say of the camera, its position with light time and aberration as the tables have it.
+fn apparent_camera(reader: &Reader, et: Et) -> Result<Camera> {
+    let to_mars = mars_rotation::<MarsIau2000>(et);
+    let position = to_mars.apply(&reader.session.apparent_state(et)?.position);
+    let camera_to_mars = to_mars * reader.inertial_to_camera(et)?.inverse();
+    Ok((position.xyz_m, *camera_to_mars.matrix()))
 }
 
 /// How far apart two cameras see the same ground, in image pixels, at most over the middle and both ends

@@ -1,0 +1,268 @@
+//! States and attitudes of an adjusted image, as kernels take them.
+
+use std::path::Path;
+
+use nalgebra::{Matrix3, Vector3};
+
+use super::{AdjustedImage, AdjustedKernels, earlier, later};
+use crate::{
+    constants::{NAIF_MARS, NAIF_MGS},
+    error::Result,
+    frames::{MarsIau2000, Position},
+    geom::{
+        attitude::{make_continuous, matrix_of_spice_quaternion, spice_quaternion},
+        lagrange::lagrange,
+        mars_rotation::mars_rotation,
+        pushbroom::{ExteriorOrientation, Pose, SampledOrientation},
+    },
+    products::fault::ProductFault,
+    spice::{Attitude, CkSegment, Session, SpkSegment, State, write_ck, write_spk},
+    stages::sample_orientation::{Orientation, OrientationSample},
+    time::{Et, Interval},
+};
+
+/// Longest time between two states around the image, seconds: degree 3 leaves nanometres of the orbit.
+const STATE_STEP_S: f64 = 0.5;
+/// Degree of Hermite interpolation: with a state at every sample a cubic holds what lies between two of them.
+const STATE_DEGREE: i32 = 3;
+/// Positions reach this far beyond attitudes, seconds: light from MGS to the centre of Mars takes 0.013 s.
+const LIGHT_TIME_S: f64 = 0.1;
+/// Longest time between two attitudes beyond the camera tables, seconds.
+const ATTITUDE_STEP_S: f64 = 0.5;
+/// Attitudes nearer than this to one of a sample are left out, seconds.
+const SAME_INSTANT_S: f64 = 1e-4;
+/// Half the time over which the rotation of Mars is differentiated, seconds.
+const HALF_DIFFERENCE_S: f64 = 0.5;
+/// Longest name of a segment.
+const SEGMENT_NAME_MAX: usize = 40;
+
+/// One image, and the original kernels.
+pub(super) struct Source<'a> {
+    pub(super) session: &'a Session,
+    pub(super) to: &'a AdjustedKernels<'a>,
+    pub(super) image: &'a AdjustedImage<'a>,
+    pub(super) span: Interval,
+}
+
+/// States of one image.
+pub(super) struct States {
+    name: String,
+    epochs: Vec<Et>,
+    states: Vec<State>,
+}
+
+impl States {
+    pub(super) fn write(&self, path: &Path, comment: &str) -> Result<u64> {
+        let segment = SpkSegment {
+            target: NAIF_MGS,
+            centre: NAIF_MARS,
+            name: &self.name,
+            degree: STATE_DEGREE,
+            epochs: &self.epochs,
+            states: &self.states,
+        };
+        write_spk(path, &[segment], comment)?;
+        Ok(self.epochs.len() as u64)
+    }
+}
+
+/// Attitudes of one image by the instants of their exposures.
+pub(super) struct Attitudes {
+    name: String,
+    instants: Vec<Et>,
+    quaternions: Vec<[f64; 4]>,
+    rates_rad_s: Vec<[f64; 3]>,
+}
+
+impl Attitudes {
+    pub(super) fn write(&self, path: &Path, session: &Session, comment: &str) -> Result<u64> {
+        let segment = CkSegment {
+            name: &self.name,
+            instants: &self.instants,
+            quaternions: &self.quaternions,
+            angular_velocities_rad_s: &self.rates_rad_s,
+            interval_starts: self.instants.get(..1).unwrap_or_default(),
+        };
+        write_ck(path, session, &[segment], comment)?;
+        Ok(self.instants.len() as u64)
+    }
+}
+
+/// Attitude of the bus at an exposure: from J2000, and its angular velocity in J2000.
+#[derive(Clone, Copy)]
+struct Node {
+    exposure: Et,
+    to_bus: Matrix3<f64>,
+    rate_rad_s: Vector3<f64>,
+}
+
+impl Source<'_> {
+    fn name(&self) -> String {
+        let id = self.image.times.id.chars();
+        id.take(SEGMENT_NAME_MAX).collect()
+    }
+
+    /// What the adjustment adds to positions in IAU 2000, metres, over ET.
+    fn difference(&self) -> Result<SampledOrientation> {
+        let mut samples = Vec::new();
+        for sample in &self.image.orientation.samples {
+            let to_mars = mars_rotation::<MarsIau2000>(sample.et);
+            let original = to_mars.apply(&self.session.state(sample.et)?.position);
+            let pose = Pose {
+                position_m: Vector3::from(sample.position_m) - original.xyz_m,
+                mars_to_camera: Matrix3::identity(),
+            };
+            samples.push((sample.et.seconds(), pose));
+        }
+        let difference = SampledOrientation::new(&samples);
+        Ok(difference.map_err(ProductFault::refused("continue an adjusted orbit"))?)
+    }
+
+    pub(super) fn states(&self) -> Result<States> {
+        let difference = self.difference()?;
+        let mut states = Vec::new();
+        let epochs = self.epochs_of_states()?;
+        for et in &epochs {
+            let original = self.session.state(*et)?;
+            let (pose, motion) = difference.moving(et.seconds());
+            let from_mars = |et: Et| mars_rotation::<MarsIau2000>(et).matrix().transpose();
+            let [before, after] =
+                [-HALF_DIFFERENCE_S, HALF_DIFFERENCE_S].map(|s| from_mars(et.plus(s)));
+            let turning_per_s = (after - before) / (2.0 * HALF_DIFFERENCE_S);
+            states.push(State {
+                position: Position::new(original.position.xyz_m + from_mars(*et) * pose.position_m),
+                velocity_m_s: original.velocity_m_s
+                    + from_mars(*et) * motion.advance_m
+                    + turning_per_s * pose.position_m,
+            });
+        }
+        Ok(States {
+            name: self.name(),
+            epochs,
+            states,
+        })
+    }
+
+    /// The epochs of the samples, between which the difference is one cubic, and steps around them.
+    fn epochs_of_states(&self) -> Result<Vec<Et>> {
+        let known = self.known_orbit()?;
+        let samples = self.image.orientation.samples.iter();
+        let mut epochs: Vec<Et> = samples.map(|sample| sample.et).collect();
+        if let (Some(first), Some(last)) = (epochs.first().copied(), epochs.last().copied()) {
+            epochs.extend(steps_beyond(first, known.start, STATE_STEP_S));
+            epochs.extend(steps_beyond(last, known.stop, STATE_STEP_S));
+        }
+        epochs.sort_by(|a, b| a.seconds().total_cmp(&b.seconds()));
+        Ok(epochs)
+    }
+
+    /// As much of the span, and the light time around it, as the original kernels hold.
+    fn known_orbit(&self) -> Result<Interval> {
+        let exposed = self.image.times.exposures();
+        self.session.require_position(exposed)?;
+        let mut known = self.span.padded(LIGHT_TIME_S);
+        let held = self.session.coverage()?.spk.as_slice().iter();
+        for held in held.filter(|held| held.contains(exposed.start)) {
+            known.start = later(known.start, held.start);
+            known.stop = earlier(known.stop, held.stop);
+        }
+        Ok(known)
+    }
+
+    fn original(&self, exposure: Et) -> Result<Attitude> {
+        let lookup = self.to.pointing.ck_bias.lookup(exposure);
+        let tolerance_s = self.to.kernels.ck_tolerance_s;
+        self.session.attitude(lookup, exposure, tolerance_s)
+    }
+
+    pub(super) fn attitudes(&self) -> Result<Attitudes> {
+        let mut nodes = self.known_attitudes();
+        if let (Some(first), Some(last)) = (nodes.first().copied(), nodes.last().copied()) {
+            nodes.extend(self.continued(&first, self.span.start)?);
+            nodes.extend(self.continued(&last, self.span.stop)?);
+        }
+        nodes.sort_by(|a, b| a.exposure.seconds().total_cmp(&b.exposure.seconds()));
+        let bias = self.to.pointing.ck_bias;
+        let lookup = |node: &Node| bias.lookup(node.exposure).kernel_time();
+        let quaternions = nodes.iter().map(|node| spice_quaternion(&node.to_bus));
+        let mut quaternions: Vec<[f64; 4]> = quaternions.collect();
+        make_continuous(&mut quaternions);
+        Ok(Attitudes {
+            name: self.name(),
+            instants: nodes.iter().map(lookup).collect(),
+            quaternions,
+            rates_rad_s: nodes.iter().map(|node| node.rate_rad_s.into()).collect(),
+        })
+    }
+
+    /// Attitudes at the samples, and at the nodes of the camera tables between them.
+    fn known_attitudes(&self) -> Vec<Node> {
+        let Orientation {
+            samples, tables, ..
+        } = self.image.orientation;
+        let last = tables.et_s.len().saturating_sub(1);
+        let bus_to_camera = Matrix3::from_fn(|row, column| tables.bus_to_camera[row][column]);
+        let start_s = tables.et_s.first().copied().unwrap_or_default();
+        let step_s =
+            (tables.et_s.last().copied().unwrap_or_default() - start_s) / last.max(1) as f64;
+        let of_sample = |sample: &OrientationSample| {
+            let to_mars = *mars_rotation::<MarsIau2000>(sample.et).matrix();
+            let mars_to_camera = matrix_of_spice_quaternion(sample.camera_to_mars).transpose();
+            let at = (sample.et.seconds() - start_s) / step_s;
+            Node {
+                exposure: sample.et,
+                to_bus: bus_to_camera.transpose() * mars_to_camera * to_mars,
+                rate_rad_s: lagrange(&tables.bus_angular_velocity_rad_s, at).into(),
+            }
+        };
+        let of_table = |row: usize| Node {
+            exposure: Et::from_seconds(tables.et_s[row]),
+            to_bus: matrix_of_spice_quaternion(tables.inertial_to_bus[row]),
+            rate_rad_s: tables.bus_angular_velocity_rad_s[row].into(),
+        };
+        let is_sample = |et_s: f64| {
+            let mut samples = samples.iter();
+            samples.any(|sample| (sample.et.seconds() - et_s).abs() < SAME_INSTANT_S)
+        };
+        let rows = (0..tables.et_s.len()).filter(|row| !is_sample(tables.et_s[*row]));
+        let mut nodes: Vec<Node> = rows
+            .map(of_table)
+            .chain(samples.iter().map(of_sample))
+            .collect();
+        nodes.retain(|node| self.span.contains(node.exposure));
+        nodes.sort_by(|a, b| a.exposure.seconds().total_cmp(&b.exposure.seconds()));
+        nodes
+    }
+
+    /// The original motion from `end` on, turned by what the adjustment turned it there; without `end` itself.
+    fn continued(&self, end: &Node, limit: Et) -> Result<Vec<Node>> {
+        let original = self.original(end.exposure)?.inertial_to_bus;
+        let turned = end.to_bus * original.matrix().transpose();
+        steps_beyond(end.exposure, limit, ATTITUDE_STEP_S)
+            .map(|exposure| {
+                let original = self.original(exposure)?;
+                Ok(Node {
+                    exposure,
+                    to_bus: turned * original.inertial_to_bus.matrix(),
+                    rate_rad_s: original.angular_velocity_rad_s,
+                })
+            })
+            .collect()
+    }
+}
+
+/// Instants from `end`, without itself, to `limit`, at most `step_s` apart; none where they are the same.
+#[allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "paddings have some dozens of steps"
+)]
+fn steps_beyond(end: Et, limit: Et, step_s: f64) -> impl Iterator<Item = Et> {
+    let length_s = limit.since(end);
+    let count = if length_s.abs() < SAME_INSTANT_S {
+        0
+    } else {
+        (length_s.abs() / step_s).ceil() as usize
+    };
+    (1..=count).map(move |index| end.plus(length_s * (index as f64 / count as f64)))
+}

@@ -1,0 +1,351 @@
+//! An orientation after a correction: samples and camera tables moved together, and the lines' times with them.
+
+use nalgebra::{Matrix3, Vector3};
+
+use super::{
+    sample_orientation::{
+        Camera, CameraTables, InterpolationCheck, Nodes, Orientation, OrientationSample,
+        check_interpolation, outline, samples_at,
+    },
+    tag_times::ImageTimes,
+};
+use crate::{
+    error::{Fault, Kind, Result},
+    frames::MarsIau2000,
+    geom::{
+        attitude::{
+            make_continuous, matrix_of_rotation_vector, matrix_of_spice_quaternion,
+            spice_quaternion,
+        },
+        lagrange::lagrange,
+        mars_rotation::mars_rotation,
+        pushbroom::{ExteriorOrientation, Pose, SampledOrientation, SamplesFault},
+    },
+    time::{Et, Interval},
+};
+
+/// Nodes by which a table may be overstepped: the rounding of epochs.
+const NODE_TOLERANCE: f64 = 1e-6;
+
+/// What an adjustment adds to the orientation of a line.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LineCorrection {
+    /// Added to the perspective centre, IAU 2000, metres.
+    pub position_m: Vector3<f64>,
+    /// Rotation vector `θ` in camera components, radians: `M = exp([θ]×) M₀` with `M` from Mars to the camera.
+    pub rotation_rad: Vector3<f64>,
+}
+
+/// An orientation that cannot be corrected.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+enum ReorientFault {
+    #[error(
+        "image {image}: lines shifted by {shift_lines:.3} lines want the orientation over {wanted}; expected within \
+         the camera tables, {known}"
+    )]
+    Shift {
+        image: String,
+        shift_lines: f64,
+        wanted: Interval,
+        known: Interval,
+    },
+    #[error(
+        "image {image}: correction {value} at line {line_offset:.1} from the middle; expected a finite number"
+    )]
+    NotFinite {
+        image: String,
+        line_offset: f64,
+        value: f64,
+    },
+    #[error("image {image}: camera tables with {nodes} nodes; expected at least 2")]
+    NoTables { image: String, nodes: usize },
+    #[error("image {image}: {source}")]
+    Samples { image: String, source: SamplesFault },
+}
+
+impl Fault for ReorientFault {
+    fn kind(&self) -> Kind {
+        match self {
+            Self::Shift { .. } => Kind::Input,
+            _ => Kind::Bug,
+        }
+    }
+
+    fn advice(&self) -> String {
+        match self {
+            Self::Shift { .. } => {
+                "check the image's start time, or give its time bias a smaller standard deviation"
+            }
+            _ => "report this with the site's configuration and the log",
+        }
+        .to_owned()
+    }
+}
+
+/// The orientation of `image` after a correction.
+///
+/// * `orientation` – as sampled from the kernels
+/// * `time_shift_lines` – `s`, by how many lines later than its tag says a line was exposed
+/// * `correction` – what is added at a line offset `x`, lines from the middle of the header image
+///
+/// The line with the tag `x` gets the camera of `x + s`: `C(x) = C₀(x + s) + Δ(x + s)` and
+/// `M(x) = exp([θ(x + s)]×) M₀(x + s)`, all relative to Mars. Samples keep their epochs. Tables keep their
+/// nodes but those that the shift takes beyond what is known; their positions keep the light time and
+/// aberration that the original ones carry (a correction of 100 m would change those by 1 cm, one that grows
+/// by 10 m/s by 0.1 m).
+///
+/// # Errors
+/// [`Kind::Input`] for a shift beyond the camera tables; [`Kind::Bug`] for a correction that is not finite.
+/// # Accuracy
+/// Without a shift the samples are those of the kernels to rounding. With one they are read from the
+/// tables; [`CameraTables::interpolation`] then bounds the error of both steps together.
+/// # Source
+/// Shan et al. 2005 for the orientation; the time shift is our own, see `geom::bundle`.
+pub fn reorient(
+    orientation: &Orientation,
+    image: &ImageTimes,
+    time_shift_lines: f64,
+    correction: impl Fn(f64) -> LineCorrection,
+) -> Result<Orientation> {
+    let tables = &orientation.tables;
+    let corrected = Corrected {
+        image,
+        nodes: nodes(orientation)?,
+        residual: residual(orientation)?,
+        shift_lines: time_shift_lines,
+        correction,
+    };
+    corrected.require_known(tables)?;
+    let epochs: Vec<Et> = orientation.samples.iter().map(|s| s.et).collect();
+    let geometric = |et| corrected.camera(et, Convention::Geometric);
+    Ok(Orientation {
+        image: orientation.image.clone(),
+        samples: samples_at(image, &epochs, geometric)?,
+        outline: outline(image, geometric)?,
+        tables: corrected.tables(tables)?,
+        notes: orientation.notes.clone(),
+        invalid_because: orientation.invalid_because.clone(),
+    })
+}
+
+/// The tables of `orientation` with geometric positions, those of its samples: no light time, no aberration.
+///
+/// The positions of [`CameraTables`] lie some 140 m from them, as those of ISIS and ALE do. A camera model
+/// that is to see adjusted ground at the measured pixels needs the positions that were adjusted.
+///
+/// # Errors
+/// [`Kind::Bug`] for tables of fewer than two nodes and fewer than three samples.
+pub fn geometric_tables(orientation: &Orientation) -> Result<CameraTables> {
+    let (nodes, residual) = (nodes(orientation)?, residual(orientation)?);
+    let mut tables = orientation.tables.clone();
+    let offset_m = |et: Et| residual.pose(et.seconds()).position_m;
+    for row in 0..tables.et_s.len() {
+        let et = Et::from_seconds(tables.et_s[row]);
+        let from_mars = mars_rotation::<MarsIau2000>(et).matrix().transpose();
+        let offset_rate_m_s = residual.moving(et.seconds()).1.advance_m;
+        let spin = Vector3::from(tables.mars_angular_velocity_rad_s[row]);
+        let in_j2000_m = from_mars * offset_m(et);
+        let position_m = from_mars * (nodes.camera(et).0 + offset_m(et));
+        let velocity_m_s = Vector3::from(tables.velocity_m_s[row])
+            + from_mars * offset_rate_m_s
+            + spin.cross(&in_j2000_m);
+        tables.position_m[row] = position_m.into();
+        tables.velocity_m_s[row] = velocity_m_s.into();
+    }
+    Ok(tables)
+}
+
+fn nodes(orientation: &Orientation) -> Result<Nodes> {
+    let nodes = orientation.tables.et_s.len();
+    if nodes < 2 {
+        let image = orientation.image.clone();
+        return Err(ReorientFault::NoTables { image, nodes }.into());
+    }
+    Ok(Nodes::new(&orientation.tables))
+}
+
+/// Samples relative to the interpolated tables, over ET: light time and aberration taken out of positions,
+/// and what interpolation misses of rotations.
+fn residual(orientation: &Orientation) -> Result<SampledOrientation> {
+    let nodes = nodes(orientation)?;
+    let relative = |sample: &OrientationSample| {
+        let (position_m, camera_to_mars) = nodes.camera(sample.et);
+        let mars_to_camera = matrix_of_spice_quaternion(sample.camera_to_mars).transpose();
+        let pose = Pose {
+            position_m: Vector3::from(sample.position_m) - position_m,
+            mars_to_camera: mars_to_camera * camera_to_mars,
+        };
+        (sample.et.seconds(), pose)
+    };
+    let samples: Vec<(f64, Pose)> = orientation.samples.iter().map(relative).collect();
+    let image = orientation.image.clone();
+    SampledOrientation::new(&samples)
+        .map_err(|source| ReorientFault::Samples { image, source }.into())
+}
+
+/// Which positions are asked for.
+#[derive(Clone, Copy, PartialEq)]
+enum Convention {
+    /// As the samples have them.
+    Geometric,
+    /// With light time and aberration, as the tables have them.
+    Apparent,
+}
+
+/// The camera after the correction, by the tags of its lines.
+struct Corrected<'a, F> {
+    image: &'a ImageTimes,
+    nodes: Nodes,
+    residual: SampledOrientation,
+    shift_lines: f64,
+    correction: F,
+}
+
+impl<F: Fn(f64) -> LineCorrection> Corrected<'_, F> {
+    fn shift_s(&self) -> f64 {
+        self.shift_lines * self.image.line_period_s
+    }
+
+    /// Whether the tables reach as far as the shifted image.
+    fn require_known(&self, tables: &CameraTables) -> Result<()> {
+        let ends = [tables.et_s[0], tables.et_s[tables.et_s.len() - 1]].map(Et::from_seconds);
+        let known = Interval::new(ends[0], ends[1]);
+        let wanted = self.image.exposures().shifted(self.shift_s());
+        let rounding_s = NODE_TOLERANCE * known.duration_s() / tables.et_s.len() as f64;
+        let held = known.padded(rounding_s);
+        // Written so that NaN is refused too.
+        if held.contains(wanted.start) && held.contains(wanted.stop) {
+            return Ok(());
+        }
+        Err(ReorientFault::Shift {
+            image: self.image.id.clone(),
+            shift_lines: self.shift_lines,
+            wanted,
+            known,
+        }
+        .into())
+    }
+
+    fn correction(&self, line_offset: f64) -> Result<LineCorrection> {
+        let correction = (self.correction)(line_offset);
+        let values = correction.position_m.iter();
+        let mut values = values.chain(correction.rotation_rad.iter());
+        match values.find(|value| !value.is_finite()) {
+            None => Ok(correction),
+            Some(value) => Err(ReorientFault::NotFinite {
+                image: self.image.id.clone(),
+                line_offset,
+                value: *value,
+            }
+            .into()),
+        }
+    }
+
+    /// Position in IAU 2000 and the rotation from the camera to it, for the line with the tag `tag`.
+    fn camera(&self, tag: Et, convention: Convention) -> Result<Camera> {
+        let et = tag.plus(self.shift_s());
+        let (mut position_m, mut camera_to_mars) = self.nodes.camera(et);
+        if convention == Convention::Geometric {
+            let residual = self.residual.pose(et.seconds());
+            position_m += residual.position_m;
+            camera_to_mars *= residual.mars_to_camera.transpose();
+        }
+        let correction = self.correction(self.image.line_offset(et))?;
+        let turned = matrix_of_rotation_vector(&correction.rotation_rad);
+        Ok((
+            position_m + correction.position_m,
+            camera_to_mars * turned.transpose(),
+        ))
+    }
+
+    fn tables(&self, original: &CameraTables) -> Result<CameraTables> {
+        let last = original.et_s.len() - 1;
+        let start_s = original.et_s[0];
+        let step_s = (original.et_s[last] - start_s) / last as f64;
+        let place = |et_s: f64| (et_s - start_s) / step_s;
+        let known = -NODE_TOLERANCE..=last as f64 + NODE_TOLERANCE;
+        let rows: Vec<usize> = (0..=last)
+            .filter(|row| known.contains(&place(original.et_s[*row] + self.shift_s())))
+            .collect();
+        let kept = |values: &[[f64; 4]]| rows.iter().map(|row| values[*row]).collect();
+        let mut tables = CameraTables {
+            et_s: rows.iter().map(|row| original.et_s[*row]).collect(),
+            position_m: Vec::new(),
+            velocity_m_s: Vec::new(),
+            inertial_to_bus: Vec::new(),
+            bus_angular_velocity_rad_s: Vec::new(),
+            inertial_to_mars: kept(&original.inertial_to_mars),
+            mars_angular_velocity_rad_s: rows
+                .iter()
+                .map(|row| original.mars_angular_velocity_rad_s[*row])
+                .collect(),
+            ..original.clone()
+        };
+        for row in &rows {
+            let at = place(original.et_s[*row] + self.shift_s());
+            self.push_node(&mut tables, original, *row, at)?;
+        }
+        make_continuous(&mut tables.inertial_to_bus);
+        let sun_at =
+            [rows.first(), rows.last()].map(|row| row.map_or(0.0, |row| *row as f64 / last as f64));
+        tables.sun_position_m = sun_at.map(|at| lagrange(&original.sun_position_m, at));
+        tables.sun_velocity_m_s = sun_at.map(|at| lagrange(&original.sun_velocity_m_s, at));
+        let own = check_interpolation(self.image, &tables, |et| {
+            self.camera(et, Convention::Apparent)
+        })?;
+        tables.interpolation = InterpolationCheck {
+            error_max_px: original.interpolation.error_max_px + own.error_max_px,
+            epochs: own.epochs,
+        };
+        Ok(tables)
+    }
+
+    /// Appends the node of `row`, whose camera the original tables have at the place `at`.
+    fn push_node(
+        &self,
+        tables: &mut CameraTables,
+        original: &CameraTables,
+        row: usize,
+        at: f64,
+    ) -> Result<()> {
+        let tag = Et::from_seconds(original.et_s[row]);
+        let et = tag.plus(self.shift_s());
+        let (position_m, camera_to_mars) = self.camera(tag, Convention::Apparent)?;
+        let [to_mars, to_mars_then] =
+            [tag, et].map(|et| *mars_rotation::<MarsIau2000>(et).matrix());
+        let bus_to_camera = Matrix3::from_fn(|row, column| tables.bus_to_camera[row][column]);
+        let to_camera = camera_to_mars.transpose() * to_mars;
+        let to_bus = bus_to_camera.transpose() * to_camera;
+        let (drift_m_s, turn_rad_s) = self.rates(self.image.line_offset(et))?;
+        let spin = Vector3::from(original.mars_angular_velocity_rad_s[row]);
+        let old_position_m = Vector3::from(lagrange(&original.position_m, at));
+        let old_velocity_m_s = Vector3::from(lagrange(&original.velocity_m_s, at));
+        let old_turn_rad_s = Vector3::from(lagrange(&original.bus_angular_velocity_rad_s, at));
+        // Velocities relative to Mars are the same at the tag and at the kernels' instant.
+        let over_ground_m_s = to_mars_then * (old_velocity_m_s - spin.cross(&old_position_m));
+        let position_m = to_mars.transpose() * position_m;
+        let velocity_m_s =
+            to_mars.transpose() * (over_ground_m_s + drift_m_s) + spin.cross(&position_m);
+        // To first order in θ, which leaves 1e-3 of a rate that is small itself.
+        let bus_rad_s = to_mars.transpose() * (to_mars_then * old_turn_rad_s)
+            - to_camera.transpose() * turn_rad_s;
+        tables.position_m.push(position_m.into());
+        tables.velocity_m_s.push(velocity_m_s.into());
+        tables.inertial_to_bus.push(spice_quaternion(&to_bus));
+        tables.bus_angular_velocity_rad_s.push(bus_rad_s.into());
+        Ok(())
+    }
+
+    /// How fast the correction changes, metres and radians per second, from a line before to a line behind.
+    fn rates(&self, line_offset: f64) -> Result<(Vector3<f64>, Vector3<f64>)> {
+        let (before, behind) = (
+            self.correction(line_offset - 1.0)?,
+            self.correction(line_offset + 1.0)?,
+        );
+        let between_s = 2.0 * self.image.line_period_s;
+        Ok((
+            (behind.position_m - before.position_m) / between_s,
+            (behind.rotation_rad - before.rotation_rad) / between_s,
+        ))
+    }
+}

@@ -1,0 +1,151 @@
+//! Images of the synthetic mission and the real one, sampled from their kernels.
+
+use std::{path::PathBuf, sync::LazyLock};
+
+use areograph::{
+    config::{
+        ImageConfig, ImageFields, KernelList, KernelSource, KernelsConfig, OrientationConfig,
+        PointingConfig,
+    },
+    constants::{MARS_IAU2000, MGS_POINTING_BIAS},
+    geom::{attitude::matrix_of_spice_quaternion, mars_rotation::mars_matrix},
+    scene::{SceneOptions, write_scene},
+    spice::{KernelSet, Session},
+    stages::{
+        sample_orientation::{Orientation, sample_orientation},
+        tag_times::{ImageTimes, tag_times},
+    },
+    time::Et,
+};
+use nalgebra::{Matrix3, Vector3};
+
+use super::common;
+
+const SAMPLING: OrientationConfig = OrientationConfig {
+    intervals: 30,
+    position_rmse_max_m: 1.0,
+    pointing_rmse_max_rad: 1e-3,
+};
+
+/// Days of half an hour: images and windows are all inside.
+static MISSION: LazyLock<tempfile::TempDir> = LazyLock::new(|| {
+    let folder = tempfile::tempdir().unwrap();
+    let options = SceneOptions {
+        seed: 5,
+        day_s: 1_800.0,
+    };
+    write_scene(&folder.path().join("mission"), &options).unwrap();
+    folder
+});
+
+pub(crate) struct Image {
+    pub(crate) set: KernelSet,
+    pub(crate) kernels: KernelsConfig,
+    pub(crate) pointing: PointingConfig,
+    pub(crate) times: ImageTimes,
+    pub(crate) orientation: Orientation,
+}
+
+impl Image {
+    fn new(set: KernelSet, id: &str, label: PathBuf) -> Self {
+        let kernels = KernelsConfig {
+            source: KernelSource::Listed(KernelList::Files(Vec::new())),
+            ck_tolerance_s: 0.0,
+            padding_s: 1.0,
+        };
+        let pointing = PointingConfig {
+            ck_bias: MGS_POINTING_BIAS,
+            source: String::new(),
+        };
+        let session = Session::open(&set).unwrap();
+        let config = ImageConfig {
+            id: id.to_owned(),
+            label: Some(label),
+            fields: ImageFields::default(),
+        };
+        let times = tag_times(&[config], &session).unwrap().remove(0);
+        let orientation =
+            sample_orientation(&session, &times, &kernels, &pointing, &SAMPLING).unwrap();
+        Self {
+            set,
+            kernels,
+            pointing,
+            times,
+            orientation,
+        }
+    }
+
+    /// An image of the synthetic mission.
+    pub(crate) fn of_scene(id: &str) -> Self {
+        let mission = MISSION.path().join("mission");
+        let set = KernelSet::from_metakernel(&mission.join("kernels/nav.tm")).unwrap();
+        Self::new(set, id, mission.join(format!("labels/{id}.lbl")))
+    }
+
+    /// Image M04/02852 on real kernels.
+    pub(crate) fn real(test: &str) -> Option<Self> {
+        let folder = common::real_data("ale_mgs/m0402852", test)?;
+        let files: Vec<PathBuf> = common::M0402852_KERNELS
+            .iter()
+            .map(|name| folder.join(name))
+            .collect();
+        let set = KernelSet::from_files(&files).unwrap();
+        Some(Self::new(
+            set,
+            "m04-02852",
+            folder.join("m0402852_isis.lbl"),
+        ))
+    }
+
+    /// The same image as other kernels have it.
+    pub(crate) fn sampled_with(&self, set: &KernelSet) -> Orientation {
+        let session = Session::open(set).unwrap();
+        let Self {
+            times,
+            kernels,
+            pointing,
+            ..
+        } = self;
+        sample_orientation(&session, times, kernels, pointing, &SAMPLING).unwrap()
+    }
+}
+
+/// Position, metres, and rotation from the camera, both IAU 2000, as the kernels of `session` have them.
+pub(crate) fn kernel_camera(
+    session: &Session,
+    image: &Image,
+    et: Et,
+) -> (Vector3<f64>, Matrix3<f64>) {
+    let to_mars = mars_matrix(&MARS_IAU2000, et);
+    let lookup = image.pointing.ck_bias.lookup(et);
+    let attitude = session.attitude(lookup, et, 0.0).unwrap();
+    let to_camera = session.mounting(et).unwrap() * attitude.inertial_to_bus;
+    (
+        to_mars * session.state(et).unwrap().position.xyz_m,
+        to_mars * to_camera.matrix().transpose(),
+    )
+}
+
+/// Largest distance of positions, metres, and largest angle between rotations, radians, over all samples.
+pub(crate) fn apart(a: &Orientation, b: &Orientation) -> (f64, f64) {
+    assert_eq!(a.samples.len(), b.samples.len());
+    let mut worst = (0.0_f64, 0.0_f64);
+    for (a, b) in a.samples.iter().zip(&b.samples) {
+        assert_eq!(a.et, b.et);
+        let distance_m = (Vector3::from(a.position_m) - Vector3::from(b.position_m)).norm();
+        let [a, b] = [a, b].map(|sample| matrix_of_spice_quaternion(sample.camera_to_mars));
+        worst = (worst.0.max(distance_m), worst.1.max(angle_rad(&a, &b)));
+    }
+    worst
+}
+
+/// Angle between two rotations, radians.
+pub(crate) fn angle_rad(a: &Matrix3<f64>, b: &Matrix3<f64>) -> f64 {
+    let skew = a * b.transpose();
+    0.5 * Vector3::new(
+        skew[(2, 1)] - skew[(1, 2)],
+        skew[(0, 2)] - skew[(2, 0)],
+        skew[(1, 0)] - skew[(0, 1)],
+    )
+    .norm()
+}
