@@ -7,7 +7,7 @@ mod common;
 use std::{collections::BTreeMap, fs};
 
 use areograph::{
-    config::{SiteConfig, load},
+    config::{SiteConfig, Weighting, load},
     geom::{
         attitude::matrix_of_spice_quaternion,
         ellipsoid::spherical_to_xyz_m,
@@ -17,9 +17,7 @@ use areograph::{
     pds::ties::read_ties,
     spice::{KernelSet, Session},
     stages::{
-        intersect::{
-            IntersectOptions, IntersectedPoint, IntersectedTies, Weighting, intersect_ties,
-        },
+        intersect::{IntersectOptions, IntersectedPoint, IntersectedTies, intersect_ties},
         sample_orientation::{Orientation, sample_orientation},
         tag_times::{ImageTimes, tag_times},
     },
