@@ -1,8 +1,9 @@
-//! The way of the data: kernels → times → footprints → IAU 2000 → ranges → orientation → model → registration → products.
+//! The way of the data: kernels → times → footprints → IAU 2000 → ranges → orientation → model → registration → adjustment → products.
 
 mod check;
 mod choice;
 mod compare;
+mod geometric;
 mod kernels;
 mod manifest;
 mod parts;
@@ -34,6 +35,7 @@ pub use compare::{
 pub use plan::{PlannedStage, plan_site};
 pub use sites::publish_sites;
 
+use geometric::Prepared;
 use kernels::wanted;
 use results::Results;
 use steps::{Leave, Steps};
@@ -62,6 +64,14 @@ pub enum Stage {
     FitSensorModel,
     /// Lines and samples of the footprints in every image.
     Register,
+    /// Tie points with the site's names of images.
+    ReadTies,
+    /// Ground points of the tie points; every pair of images compared.
+    Intersect,
+    /// Combined adjustment of images, footprints, ranges and tie points.
+    Adjust,
+    /// Orientation, models, footprints and tie points once more, as adjusted.
+    ApplyAdjustment,
     /// Products under their final names.
     Publish,
 }
@@ -81,6 +91,10 @@ impl Stage {
             Self::SampleOrientation => "sample_orientation",
             Self::FitSensorModel => "fit_sensor_model",
             Self::Register => "register",
+            Self::ReadTies => "read_ties",
+            Self::Intersect => "intersect",
+            Self::Adjust => "adjust",
+            Self::ApplyAdjustment => "apply_adjustment",
             Self::Publish => "publish",
         }
     }
@@ -182,6 +196,14 @@ fn run_steps(steps: &Steps<'_>) -> std::result::Result<Ending, Leave> {
     let orientations = steps.sample_orientation(&kernels, &images)?;
     let models = steps.fit_sensor_model(&orientations)?;
     let registrations = steps.register(&images, &orientations, &models, &converted, &profiles)?;
+    let geometric = steps.geometric(&Prepared {
+        images: &images,
+        converted: &converted,
+        profiles: &profiles,
+        orientations: &orientations,
+        models: &models,
+        registrations: &registrations,
+    })?;
 
     steps.publish(&Results {
         config: steps.config,
@@ -196,5 +218,6 @@ fn run_steps(steps: &Steps<'_>) -> std::result::Result<Ending, Leave> {
         orientations: &orientations,
         models: &models,
         registrations: &registrations,
+        geometric: geometric.as_ref(),
     })
 }

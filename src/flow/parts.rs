@@ -18,7 +18,7 @@ use crate::{
 };
 
 /// Raised when a stage computes something else from the same parts, or lays its output out anew.
-const METHOD: u32 = 7;
+const METHOD: u32 = 8;
 
 /// Image keys, label files and all text kernels, among them those that convert times.
 pub(super) fn tag_times(config: &SiteConfig, kernels: &KernelSet) -> Result<Parts> {
@@ -159,6 +159,89 @@ pub(super) fn register(
         .output(&format!("fit_sensor_model/{id}"), model)
         .output("convert_datum", converted)
         .output("group_profiles", profiles)
+}
+
+/// Tie point files (by their hashes), and the names that they have for the images.
+pub(super) fn read_ties(config: &SiteConfig, hashes: &[String]) -> Parts {
+    let names: Vec<[&str; 2]> = config
+        .images
+        .iter()
+        .map(|image| [image.name_in_ties(), image.id.as_str()])
+        .collect();
+    let mut parts = Parts::new(METHOD).key("images (names in tie points)", &names);
+    for (place, (path, hash)) in config.ties.files.iter().zip(hashes).enumerate() {
+        // The order of the files is the order of the points.
+        parts = parts.file("ties", &file_name(path), &format!("{}: {hash}", place + 1));
+    }
+    parts
+}
+
+/// Hashes of the prepared data; what is not known yet has none.
+#[derive(Default)]
+pub(super) struct Hashes<'a> {
+    pub(super) images: Option<&'a str>,
+    pub(super) converted: Option<&'a str>,
+    pub(super) profiles: Option<&'a str>,
+    /// One entry for each image here and below.
+    pub(super) orientations: Vec<Option<&'a str>>,
+    pub(super) models: Vec<Option<&'a str>>,
+    pub(super) registrations: Vec<Option<&'a str>>,
+}
+
+impl Hashes<'_> {
+    fn parts(&self, config: &SiteConfig) -> Parts {
+        let mut parts = Parts::new(METHOD)
+            .key("registration.model", &config.registration.model)
+            .output("tag_times", self.images)
+            .output("convert_datum", self.converted)
+            .output("group_profiles", self.profiles);
+        for (stage, outputs) in [
+            ("sample_orientation", &self.orientations),
+            ("fit_sensor_model", &self.models),
+            ("register", &self.registrations),
+        ] {
+            for (image, output) in config.images.iter().zip(outputs) {
+                parts = parts.output(&format!("{stage}/{}", image.id), *output);
+            }
+        }
+        parts
+    }
+}
+
+/// The prepared data and the tie points.
+pub(super) fn intersect(config: &SiteConfig, prepared: &Hashes<'_>, ties: Option<&str>) -> Parts {
+    let parts = prepared.parts(config);
+    parts
+        .key("intersection", &config.intersection)
+        .output("read_ties", ties)
+}
+
+/// The prepared data, the tie points and their ground points.
+pub(super) fn adjust(
+    config: &SiteConfig,
+    prepared: &Hashes<'_>,
+    [ties, intersected]: [Option<&str>; 2],
+) -> Parts {
+    let parts = prepared.parts(config);
+    parts
+        .key("adjustment", &config.adjustment)
+        .output("read_ties", ties)
+        .output("intersect", intersected)
+}
+
+/// The prepared data, the tie points and what the adjustment adds to the orientations.
+pub(super) fn apply_adjustment(
+    config: &SiteConfig,
+    prepared: &Hashes<'_>,
+    [ties, adjusted]: [Option<&str>; 2],
+) -> Parts {
+    let parts = prepared.parts(config);
+    parts
+        .key("orientation", &config.orientation)
+        .key("registration", &config.registration)
+        .key("intersection", &config.intersection)
+        .output("read_ties", ties)
+        .output("adjust", adjusted)
 }
 
 /// The configuration, all kernels and where they lie from `folder`, and every earlier output.

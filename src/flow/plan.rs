@@ -7,6 +7,7 @@ use serde::de::DeserializeOwned;
 use super::{
     Stage,
     choice::KernelChoice,
+    geometric::{Intersected, Readjusted},
     kernels::{load_kernels, load_rivals, wanted},
     parts, publish,
 };
@@ -15,8 +16,9 @@ use crate::{
     error::{Place, Result},
     spice::Wanted,
     stages::{
-        check_ranges::RangeCheck, convert_datum::Converted, fit_sensor_model::SensorModel,
-        group_profiles::Profile, register::ImageRegistration, sample_orientation::Orientation,
+        adjust::Adjusted, check_ranges::RangeCheck, convert_datum::Converted,
+        fit_sensor_model::SensorModel, group_profiles::Profile, read_ties::Ties,
+        register::ImageRegistration, sample_orientation::Orientation,
         search_footprints::SearchResult, tag_times::ImageTimes,
     },
     store::{
@@ -123,11 +125,13 @@ fn plan_stages(config: &SiteConfig, out: &Path, force: bool) -> Result<Vec<Plann
             model.map(|model| model.blake3),
         ));
     }
+    let mut registered = Vec::new();
     for (image, (orientation, model)) in config.images.iter().zip(&oriented) {
         let Some(times) = times.iter().find(|times| times.id == image.id) else {
             plan.outputs
                 .push((Stage::Register.of_image(&image.id), None));
             plan.add(Stage::Register, Some(&image.id), follows());
+            registered.push(None);
             continue;
         };
         let outputs = [
@@ -137,8 +141,18 @@ fn plan_stages(config: &SiteConfig, out: &Path, force: bool) -> Result<Vec<Plann
             hash(profiles.as_ref()),
         ];
         let parts = parts::register(config, times, outputs);
-        plan.look_for::<ImageRegistration>(Stage::Register, Some(&image.id), &parts);
+        let found = plan.look_for::<ImageRegistration>(Stage::Register, Some(&image.id), &parts);
+        registered.push(found.map(|registration| registration.blake3));
     }
+    let prepared = parts::Hashes {
+        images: hash(images.as_ref()),
+        converted: hash(converted.as_ref()),
+        profiles: hash(profiles.as_ref()),
+        orientations: oriented.iter().map(|(of, _)| of.as_deref()).collect(),
+        models: oriented.iter().map(|(_, of)| of.as_deref()).collect(),
+        registrations: registered.iter().map(Option::as_deref).collect(),
+    };
+    plan.geometric(config, &prepared)?;
     let outputs = std::mem::take(&mut plan.outputs);
     let parts = parts::publish(config, &kernels, &folder, outputs);
     let standing = publish::standing(&folder, &plan.cache, &parts);
@@ -188,6 +202,27 @@ impl Planner {
         output
     }
 
+    /// The steps of a site with tie points.
+    fn geometric(&mut self, config: &SiteConfig, prepared: &parts::Hashes<'_>) -> Result<()> {
+        if config.ties.files.is_empty() {
+            return Ok(());
+        }
+        let hashes = parts::hash_files(&config.ties.files, &AtomicBool::new(false))
+            .in_stage(Stage::ReadTies.name())?;
+        let parts = parts::read_ties(config, &hashes);
+        let ties = self.look::<Ties>(Stage::ReadTies, &parts);
+        let ties = hash(ties.as_ref());
+        let parts = parts::intersect(config, prepared, ties);
+        let intersected = self.look::<Intersected>(Stage::Intersect, &parts);
+        let outputs = [ties, hash(intersected.as_ref())];
+        let parts = parts::adjust(config, prepared, outputs);
+        let adjusted = self.look::<Adjusted>(Stage::Adjust, &parts);
+        let outputs = [ties, hash(adjusted.as_ref())];
+        let parts = parts::apply_adjustment(config, prepared, outputs);
+        self.look::<Readjusted>(Stage::ApplyAdjustment, &parts);
+        Ok(())
+    }
+
     /// The plan when the kernels are not known before earlier stages have run.
     fn all_follow(mut self, config: &SiteConfig) -> Vec<PlannedStage> {
         self.add(Stage::CheckRanges, None, follows());
@@ -197,6 +232,16 @@ impl Planner {
         }
         for image in &config.images {
             self.add(Stage::Register, Some(&image.id), follows());
+        }
+        if !config.ties.files.is_empty() {
+            for stage in [
+                Stage::ReadTies,
+                Stage::Intersect,
+                Stage::Adjust,
+                Stage::ApplyAdjustment,
+            ] {
+                self.add(stage, None, follows());
+            }
         }
         self.add(Stage::Publish, None, follows());
         self.planned

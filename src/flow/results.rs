@@ -1,6 +1,6 @@
 //! Everything that the stages before the last one made.
 
-use super::{Stage, choice::KernelChoice};
+use super::{Stage, choice::KernelChoice, geometric::Geometric};
 use crate::{
     config::SiteConfig,
     products::ImageProducts,
@@ -27,6 +27,8 @@ pub(super) struct Results<'a> {
     pub(super) orientations: &'a [Output<Orientation>],
     pub(super) models: &'a [Output<SensorModel>],
     pub(super) registrations: &'a [Output<ImageRegistration>],
+    /// Nothing for a site without tie points.
+    pub(super) geometric: Option<&'a Geometric>,
 }
 
 impl Results<'_> {
@@ -86,6 +88,13 @@ impl Results<'_> {
         for registration in self.registrations {
             let stage = Stage::Register.of_image(&registration.value.image);
             stages.push(entry(stage, registration));
+        }
+        for (stage, output, fingerprint) in self.geometric.iter().flat_map(|of| of.stages()) {
+            stages.push((
+                stage.name().to_owned(),
+                output.to_owned(),
+                fingerprint.to_owned(),
+            ));
         }
         stages
     }

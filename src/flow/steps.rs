@@ -52,7 +52,7 @@ impl From<Failure> for Leave {
     }
 }
 
-type Step<T> = std::result::Result<T, Leave>;
+pub(super) type Step<T> = std::result::Result<T, Leave>;
 
 /// A PEDR file changed between its hash and its search.
 #[derive(Debug, thiserror::Error)]
@@ -71,7 +71,7 @@ impl Fault for ChangedFile {
 
 impl Steps<'_> {
     /// Leaves the flow before `stage` when it is not asked for, or when the user stops the program.
-    fn enter(&self, stage: Stage) -> Step<()> {
+    pub(super) fn enter(&self, stage: Stage) -> Step<()> {
         if self.options.until < stage {
             return Err(Leave::AsAsked);
         }

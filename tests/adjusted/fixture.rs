@@ -61,6 +61,7 @@ impl Image {
         let config = ImageConfig {
             id: id.to_owned(),
             label: Some(label),
+            serial_number: None,
             fields: ImageFields::default(),
         };
         let times = tag_times(&[config], &session).unwrap().remove(0);
