@@ -92,6 +92,7 @@ fn make_products(folder: &Path, results: &Results<'_>, fingerprint: String) -> R
         results.complaints(),
         results.rejected(),
     );
+    let adjusted_images = results.adjusted_image_products();
     let site = SiteProducts {
         config: results.config,
         kernels: &lines,
@@ -107,6 +108,7 @@ fn make_products(folder: &Path, results: &Results<'_>, fingerprint: String) -> R
         complaints: &complaints,
         notes: &notes,
         warnings: &warnings,
+        geometric: results.geometric_products(&adjusted_images),
     };
     let (invalid_because, remarks) = (site.invalid_because(), site.remarks());
     let staging = staging(folder)?;

@@ -3,7 +3,7 @@
 use super::{Stage, choice::KernelChoice, geometric::Geometric};
 use crate::{
     config::SiteConfig,
-    products::ImageProducts,
+    products::{GeometricProducts, ImageProducts},
     spice::{KernelSet, Wanted},
     stages::{
         check_ranges::RangeCheck, convert_datum::Converted, fit_sensor_model::SensorModel,
@@ -53,10 +53,48 @@ impl Results<'_> {
             .collect()
     }
 
+    /// The images with their adjusted orientation; none for a site without tie points.
+    pub(super) fn adjusted_image_products(&self) -> Vec<ImageProducts<'_>> {
+        let adjusted = self.geometric.iter();
+        let adjusted = adjusted.flat_map(|geometric| &geometric.readjusted.value.images);
+        let images = self.images.value.iter().zip(adjusted);
+        images
+            .map(|(times, adjusted)| ImageProducts {
+                times,
+                orientation: &adjusted.orientation,
+                model: &adjusted.model,
+                registration: &adjusted.registration,
+            })
+            .collect()
+    }
+
+    /// What tie points make of the site; `adjusted_images` are [`Self::adjusted_image_products`].
+    pub(super) fn geometric_products<'a>(
+        &'a self,
+        adjusted_images: &'a [ImageProducts<'a>],
+    ) -> Option<GeometricProducts<'a>> {
+        let geometric = self.geometric?;
+        let after = &geometric.readjusted.value.intersected;
+        Some(GeometricProducts {
+            ties: &geometric.ties.value,
+            intersected: &geometric.intersected.value.ties,
+            pairs: &geometric.intersected.value.pairs,
+            adjusted: &geometric.adjusted.value,
+            adjusted_images,
+            adjusted_intersected: &after.ties,
+            adjusted_pairs: &after.pairs,
+        })
+    }
+
     /// What was wrong with input records, one sentence each.
     pub(super) fn complaints(&self) -> Vec<String> {
         let complaints = self.found.value.complaints.iter();
-        complaints.map(ToString::to_string).collect()
+        let of_ties = self.geometric.iter();
+        let of_ties = of_ties.flat_map(|geometric| &geometric.ties.value.complaints);
+        complaints
+            .map(ToString::to_string)
+            .chain(of_ties.cloned())
+            .collect()
     }
 
     pub(super) fn outputs(&self) -> Vec<(String, Option<String>)> {

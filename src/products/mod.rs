@@ -37,7 +37,7 @@ mod text_table;
 use std::path::{Path, PathBuf};
 
 pub use adjusted_kernels::{AdjustedImage, AdjustedKernels, write_adjusted_kernels};
-pub use site::{ImageProducts, KernelLine, SiteProducts};
+pub use site::{GeometricProducts, ImageProducts, KernelLine, SiteProducts};
 
 use crate::error::Result;
 

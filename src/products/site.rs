@@ -10,10 +10,14 @@ use crate::{
     frames::MarsIau2000,
     spice::Wanted,
     stages::{
+        adjust::Adjusted,
         check_ranges::{BiasScan, RangeCheck},
+        compare_pairs::PairComparison,
         convert_datum::FileConversion,
         fit_sensor_model::SensorModel,
         group_profiles::Profile,
+        intersect::IntersectedTies,
+        read_ties::Ties,
         register::ImageRegistration,
         sample_orientation::Orientation,
         tag_times::ImageTimes,
@@ -52,6 +56,27 @@ pub struct SiteProducts<'a> {
     pub notes: &'a [String],
     /// What the reader must weigh before trusting the site, one sentence each.
     pub warnings: &'a [String],
+    /// Intersection and adjustment; nothing for a site without tie points.
+    pub geometric: Option<GeometricProducts<'a>>,
+}
+
+/// What tie points make of a site, before and after the adjustment.
+#[derive(Debug, Clone, Copy)]
+pub struct GeometricProducts<'a> {
+    /// The tie points.
+    pub ties: &'a Ties,
+    /// Their ground points with the orientation of the kernels.
+    pub intersected: &'a IntersectedTies,
+    /// Every pair of images with tie points in both, likewise.
+    pub pairs: &'a [PairComparison],
+    /// The adjustment.
+    pub adjusted: &'a Adjusted,
+    /// The images with their adjusted orientation, in the order of the site's.
+    pub adjusted_images: &'a [ImageProducts<'a>],
+    /// Ground points of the tie points with the adjusted orientation.
+    pub adjusted_intersected: &'a IntersectedTies,
+    /// Every pair with the adjusted orientation.
+    pub adjusted_pairs: &'a [PairComparison],
 }
 
 /// A kernel as reports show it.

@@ -175,6 +175,7 @@ impl Site {
             complaints: &self.complaints,
             notes: &self.notes,
             warnings: &self.warnings,
+            geometric: None,
             conversions: &self.conversions,
         })
     }
