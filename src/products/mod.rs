@@ -37,6 +37,10 @@ mod text_table;
 use std::path::{Path, PathBuf};
 
 pub use adjusted_kernels::{AdjustedImage, AdjustedKernels, write_adjusted_kernels};
+pub use exchange::{
+    ControlMeasure, ControlPoint, GroundEstimate, ImageMeasure, LidarPoint, moc_serial_number,
+    write_gcp, write_lidar_data,
+};
 pub use site::{ImageProducts, KernelLine, SiteProducts};
 
 use crate::error::Result;
