@@ -223,6 +223,29 @@ fn two_images_share_a_metakernel() {
 }
 
 #[test]
+fn images_shortly_after_one_another_do_not_reach_into_each_other() {
+    let first = Image::of_scene("E02-02016");
+    let mut second = Image::of_scene("E02-02016");
+    // Nearer than the padding of 1 s, and than what positions reach beyond it.
+    second.times.start = first.times.exposures().stop.plus(0.06);
+    second.times.id = "E02-02016b".to_owned();
+    second.orientation = second.sampled_with(&second.set);
+    let images = [first, second];
+    let adjusted = [0, 1].map(|index| adjusted(&images[index], 5.0));
+    let folder = tempfile::tempdir().unwrap();
+    let both = [0, 1].map(|index| AdjustedImage {
+        times: &images[index].times,
+        orientation: &adjusted[index],
+    });
+    write_adjusted_kernels(&kernels_of(&images[0], folder.path()), &both).unwrap();
+    let set = KernelSet::from_metakernel(&folder.path().join("adjusted.tm")).unwrap();
+    for (image, adjusted) in images.iter().zip(&adjusted) {
+        let (distance_m, turn_rad) = apart(&image.sampled_with(&set), adjusted);
+        assert!(distance_m < 1e-3 && turn_rad < 1e-9); // as above
+    }
+}
+
+#[test]
 fn orientations_that_are_none_and_kernels_that_end_are_refused() {
     let image = Image::of_scene("E02-02016");
     let folder = tempfile::tempdir().unwrap();

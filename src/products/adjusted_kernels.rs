@@ -15,8 +15,9 @@
 //! instant at which it was exposed. Therefore each pair belongs to its image alone, and to nothing else that
 //! happened meanwhile, laser shots among them.
 //!
-//! Between two images the kernels end half way. Of two that were exposed at once, the later one wins in
-//! `adjusted.tm`; with its own pair alone each is right.
+//! Between two images the kernels end half way. Of two that were exposed at once, or nearer to each other than
+//! the tolerance with which attitude is asked (CSPICE takes the last file that has any within it), the later
+//! one wins in `adjusted.tm`; with its own pair alone each is right.
 
 mod columns;
 
@@ -50,6 +51,8 @@ const POSITION_TOLERANCE_M: f64 = 1e-3;
 /// The same for rotations, radians: 100 times what the bus turns in the 1.5e-8 s to which ticks are rounded.
 const ROTATION_TOLERANCE_RAD: f64 = 1e-9;
 
+/// Positions reach this far beyond attitudes, seconds: light from MGS to the centre of Mars takes 0.013 s.
+const LIGHT_TIME_S: f64 = 0.1;
 /// A bias this near to the usual one is the usual one, seconds.
 const BIAS_TOLERANCE_S: f64 = 1e-9;
 
@@ -110,7 +113,8 @@ pub fn write_adjusted_kernels(
             session: &session,
             to,
             image,
-            span: span(images, index, to.kernels.padding_s),
+            attitude_span: span(images, index, to.kernels.padding_s),
+            orbit_span: span(images, index, to.kernels.padding_s + LIGHT_TIME_S),
         };
         let segment = source.attitudes()?;
         written.add(attitude_name(image), |path| {

@@ -1,10 +1,16 @@
 //! Products in the forms of other programs: ISIS, Ames Stereo Pipeline, GIS, catalogues.
 
+mod gcp;
 mod geopackage;
+mod lidar_data;
+mod points;
 mod readme;
 mod shapefile;
 mod stac;
 
+pub use gcp::{ControlMeasure, ControlPoint, write_gcp};
+pub use lidar_data::{LidarPoint, moc_serial_number, write_lidar_data};
+pub use points::{GroundEstimate, ImageMeasure};
 use serde_json::{Value, json};
 
 use super::{
