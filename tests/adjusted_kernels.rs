@@ -183,6 +183,30 @@ fn the_metakernel_lists_the_adjusted_kernels_last_and_the_comments_say_the_rule(
 }
 
 #[test]
+fn the_metakernel_counts_paths_from_where_the_files_go_in_the_end() {
+    let image = Image::of_scene("E02-02016");
+    let folder = tempfile::tempdir().unwrap();
+    let staging = folder.path().join(".staging/deep");
+    let to = AdjustedKernels {
+        directory: &staging,
+        ..kernels_of(&image, folder.path())
+    };
+    let of_image = AdjustedImage {
+        times: &image.times,
+        orientation: &image.orientation,
+    };
+    write_adjusted_kernels(&to, &[of_image]).unwrap();
+    for name in ["adjusted", "adjusted.tm"] {
+        fs::rename(staging.join(name), folder.path().join(name)).unwrap();
+    }
+    let set = KernelSet::from_metakernel(&folder.path().join("adjusted.tm")).unwrap();
+    let own = set.kernels()[set.kernels().len() - 1].path.clone();
+    assert_eq!(own, folder.path().join("adjusted/E02-02016.bc"));
+    let (distance_m, turn_rad) = apart(&image.sampled_with(&set), &image.orientation);
+    assert!(distance_m < 1e-3 && turn_rad < 1e-9); // as above
+}
+
+#[test]
 fn another_bias_is_kept_and_the_comment_warns_of_isis() {
     let mut image = Image::of_scene("E02-02016");
     image.pointing = PointingConfig {
