@@ -28,7 +28,9 @@ use std::{
 
 use nalgebra::Vector3;
 
-use super::{Product, Writer, fault::ProductFault, files::write_text};
+use super::{
+    GeometricProducts, Product, SiteProducts, Writer, fault::ProductFault, files::write_text,
+};
 use crate::{
     config::{KernelsConfig, PointingConfig},
     constants::MGS_POINTING_BIAS,
@@ -78,6 +80,30 @@ pub struct AdjustedKernels<'a> {
     pub kernels: &'a KernelsConfig,
     /// The pointing bias that readers of the kernels will apply.
     pub pointing: &'a PointingConfig,
+}
+
+/// Writes the adjusted kernels of a site with tie points.
+pub(super) fn write(
+    written: &mut Writer,
+    site: &SiteProducts,
+    geometric: &GeometricProducts,
+) -> Result<()> {
+    let to = AdjustedKernels {
+        directory: written.directory,
+        site_folder: geometric.folder,
+        originals: geometric.kernels,
+        kernels: &site.config.kernels,
+        pointing: &site.config.pointing,
+    };
+    let images = geometric.adjusted_images.iter().map(|image| AdjustedImage {
+        times: image.times,
+        orientation: image.orientation,
+    });
+    let images: Vec<AdjustedImage> = images.collect();
+    written
+        .products
+        .extend(write_adjusted_kernels(&to, &images)?);
+    Ok(())
 }
 
 /// Writes an SPK and a CK of every image, and the metakernel; reads every sample back through them.

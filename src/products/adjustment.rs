@@ -6,12 +6,16 @@ use serde::Serialize;
 
 use super::{GeometricProducts, SiteProducts, Writer, files::write_json};
 use crate::{
-    config::{AdjustmentConfig, CameraModel, IntersectionConfig},
+    config::{
+        AdjustmentConfig, CameraModel, IntersectionConfig, MolaImage, OrientationPrior, Robust,
+    },
     error::Result,
+    geom::{bundle::ORIENTATION_UNKNOWNS, statistics::Summary},
     stages::{
         adjust::{AdjustmentSummary, CorrectedImage, PointKind},
-        compare_pairs::PairComparison,
+        compare_pairs::{PairComparison, ProfileByTies},
         intersect::{ImageResiduals, IntersectedTies},
+        uncertainty::{ResidualMoments, UncertaintyBudget},
     },
 };
 
@@ -56,7 +60,7 @@ const DEFINITIONS: [(&str, &str); 9] = [
     ),
     (
         "configured",
-        "a standard deviation that is null leaves the unknown free",
+        "a standard deviation above 1e300 leaves the unknown free; without blunder_limit all tie points stay",
     ),
 ];
 
@@ -82,7 +86,63 @@ struct Definition {
 struct Configured<'a> {
     model: CameraModel,
     intersection: &'a IntersectionConfig,
-    adjustment: &'a AdjustmentConfig,
+    adjustment: AdjustmentKeys<'a>,
+}
+
+/// [`AdjustmentConfig`] without what is not set.
+#[derive(Serialize)]
+struct AdjustmentKeys<'a> {
+    tie_sigma_px: [f64; 2],
+    mola_image: MolaImage,
+    mola_sigma_px: [f64; 2],
+    mola_margin_px: f64,
+    ground_sigma_m: f64,
+    range_sigma_m: f64,
+    range_bias_sigma_m: f64,
+    time_bias_sigma_s: f64,
+    nadir_sigma_m: f64,
+    off_nadir_sigma_m: f64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    robust: Option<&'a Robust>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    blunder_limit: Option<f64>,
+    images: Vec<PriorKeys<'a>>,
+}
+
+#[derive(Serialize)]
+struct PriorKeys<'a> {
+    id: &'a str,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    position_m: Option<[f64; 9]>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    rotation_rad: Option<[f64; 9]>,
+}
+
+impl<'a> AdjustmentKeys<'a> {
+    fn of(config: &'a AdjustmentConfig) -> Self {
+        // JSON has no infinity.
+        let number = |sigma: f64| sigma.min(f64::MAX);
+        let prior = |prior: &'a OrientationPrior| PriorKeys {
+            id: &prior.id,
+            position_m: prior.position_m.map(|sigmas| sigmas.map(number)),
+            rotation_rad: prior.rotation_rad.map(|sigmas| sigmas.map(number)),
+        };
+        Self {
+            tie_sigma_px: config.tie_sigma_px,
+            mola_image: config.mola_image,
+            mola_sigma_px: config.mola_sigma_px,
+            mola_margin_px: config.mola_margin_px,
+            ground_sigma_m: config.ground_sigma_m,
+            range_sigma_m: config.range_sigma_m,
+            range_bias_sigma_m: config.range_bias_sigma_m,
+            time_bias_sigma_s: config.time_bias_sigma_s,
+            nadir_sigma_m: number(config.nadir_sigma_m),
+            off_nadir_sigma_m: number(config.off_nadir_sigma_m),
+            robust: config.robust.as_ref(),
+            blunder_limit: config.blunder_limit,
+            images: config.images.iter().map(prior).collect(),
+        }
+    }
 }
 
 #[derive(Serialize)]
@@ -101,7 +161,48 @@ struct StateDocument<'a> {
     sigma0: f64,
     rejected: Vec<LeftOutDocument<'a>>,
     images: &'a [ImageResiduals],
-    pairs: &'a [PairComparison],
+    pairs: Vec<PairDocument<'a>>,
+}
+
+#[derive(Serialize)]
+struct PairDocument<'a> {
+    images: &'a [String; 2],
+    ties: u32,
+    convergence_rad: f64,
+    height_over_base: f64,
+    line_spacing_m: [f64; 2],
+    pixel_size_m: [f64; 2],
+    residuals: &'a [ResidualMoments; 2],
+    disagreement_m: f64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    mola_spacing_m: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    footprints: Option<FootprintsDocument<'a>>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    budget: Option<&'a UncertaintyBudget>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    no_budget_because: Option<&'a str>,
+}
+
+#[derive(Serialize)]
+struct FootprintsDocument<'a> {
+    order: u8,
+    ties: u32,
+    ties_rejected: u32,
+    tie_lines: &'a Summary,
+    tie_samples: &'a Summary,
+    profiles: Vec<ProfileDocument<'a>>,
+}
+
+#[derive(Serialize)]
+struct ProfileDocument<'a> {
+    profile: &'a str,
+    lines: &'a Summary,
+    samples: &'a Summary,
+    along_m: f64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    along_spacings: Option<f64>,
+    beyond_ties: u32,
 }
 
 #[derive(Serialize)]
@@ -116,8 +217,20 @@ struct AdjustmentDocument<'a> {
     summary: &'a AdjustmentSummary,
     /// Weighted sum of squared residuals before each step and after the last.
     weighted_squares: &'a [f64],
-    images: &'a [CorrectedImage],
+    images: Vec<ImageDocument<'a>>,
     left_out: Vec<LeftOutDocument<'a>>,
+}
+
+#[derive(Serialize)]
+struct ImageDocument<'a> {
+    image: &'a str,
+    half_lines: f64,
+    line_period_s: f64,
+    correction: &'a [f64; ORIENTATION_UNKNOWNS],
+    sigmas: &'a [f64; ORIENTATION_UNKNOWNS],
+    /// With its standard deviation.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    time_bias_s: Option<(f64, f64)>,
 }
 
 /// Writes `adjustment.json` of a site with tie points.
@@ -150,7 +263,7 @@ fn document<'a>(site: &SiteProducts<'a>, geometric: &GeometricProducts<'a>) -> D
         configured: Configured {
             model: site.config.registration.model,
             intersection: &site.config.intersection,
-            adjustment: &site.config.adjustment,
+            adjustment: AdjustmentKeys::of(&site.config.adjustment),
         },
         ties: TiesDocument {
             points: ties.points.len(),
@@ -164,7 +277,7 @@ fn document<'a>(site: &SiteProducts<'a>, geometric: &GeometricProducts<'a>) -> D
         adjustment: AdjustmentDocument {
             summary: &adjusted.summary,
             weighted_squares: &adjusted.weighted_squares,
-            images: &adjusted.images,
+            images: adjusted.images.iter().map(image).collect(),
             left_out: left_out.collect(),
         },
     }
@@ -182,6 +295,51 @@ fn state<'a>(ties: &'a IntersectedTies, pairs: &'a [PairComparison]) -> StateDoc
         sigma0: ties.sigma0,
         rejected: rejected.collect(),
         images: &ties.images,
-        pairs,
+        pairs: pairs.iter().map(pair).collect(),
+    }
+}
+
+fn image(image: &CorrectedImage) -> ImageDocument<'_> {
+    ImageDocument {
+        image: &image.id,
+        half_lines: image.half_lines,
+        line_period_s: image.line_period_s,
+        correction: &image.correction,
+        sigmas: &image.sigmas,
+        time_bias_s: image.time_bias_s,
+    }
+}
+
+fn pair(pair: &PairComparison) -> PairDocument<'_> {
+    fn profile(profile: &ProfileByTies) -> ProfileDocument<'_> {
+        ProfileDocument {
+            profile: &profile.profile,
+            lines: &profile.lines,
+            samples: &profile.samples,
+            along_m: profile.along_m,
+            along_spacings: profile.along_spacings,
+            beyond_ties: profile.beyond_ties,
+        }
+    }
+    PairDocument {
+        images: &pair.images,
+        ties: pair.ties,
+        convergence_rad: pair.convergence_rad,
+        height_over_base: pair.height_over_base,
+        line_spacing_m: pair.line_spacing_m,
+        pixel_size_m: pair.pixel_size_m,
+        residuals: &pair.residuals,
+        disagreement_m: pair.disagreement_m,
+        mola_spacing_m: pair.mola_spacing_m,
+        footprints: pair.footprints.as_ref().map(|by_ties| FootprintsDocument {
+            order: by_ties.order,
+            ties: by_ties.ties,
+            ties_rejected: by_ties.ties_rejected,
+            tie_lines: &by_ties.tie_lines,
+            tie_samples: &by_ties.tie_samples,
+            profiles: by_ties.profiles.iter().map(profile).collect(),
+        }),
+        budget: pair.budget.as_ref().ok(),
+        no_budget_because: pair.budget.as_ref().err().map(String::as_str),
     }
 }

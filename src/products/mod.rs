@@ -86,6 +86,7 @@ pub fn write_products(directory: &Path, site: &SiteProducts, page: &str) -> Resu
             orientation::write(&mut written, image, "adjusted_")?;
             isd::write_adjusted(&mut written, site, image)?;
         }
+        adjusted_kernels::write(&mut written, site, geometric)?;
     }
     written.add("report/index.html", |path| {
         files::write_text(path, page)?;

@@ -127,7 +127,11 @@ fn tie_columns(rows: &[Measurement]) -> Vec<Column> {
         Column::new(name, description, Values::Text(values))
     };
     let number = |name, description, of: fn(&Measurement) -> f64| {
-        Column::new(name, description, Values::F64(rows.iter().map(of).collect()))
+        Column::new(
+            name,
+            description,
+            Values::F64(rows.iter().map(of).collect()),
+        )
     };
     let known = |name, description, of: fn(&Measurement) -> Option<f64>| {
         let values = rows.iter().map(of).collect();
@@ -181,11 +185,9 @@ fn tie_columns(rows: &[Measurement]) -> Vec<Column> {
             "measured minus projected focal coordinate across the track, image pixels",
             |row| Some(row.before?.1.reprojection_px),
         ),
-        known(
-            "adjusted_x_m",
-            "adjusted point, IAU 2000, metres",
-            |row| Some(row.adjusted?.0.ground_m[0]),
-        ),
+        known("adjusted_x_m", "adjusted point, IAU 2000, metres", |row| {
+            Some(row.adjusted?.0.ground_m[0])
+        }),
         known("adjusted_y_m", "likewise", |row| {
             Some(row.adjusted?.0.ground_m[1])
         }),
@@ -303,11 +305,9 @@ fn shot_columns(rows: &[Shot]) -> Vec<Column> {
     .into_iter()
     .enumerate()
     {
-        columns.push(number(
-            initial,
-            "footprint, IAU 2000, metres",
-            &|point| point.initial_m[axis],
-        ));
+        columns.push(number(initial, "footprint, IAU 2000, metres", &|point| {
+            point.initial_m[axis]
+        }));
         columns.push(number(
             adjusted,
             "adjusted footprint, IAU 2000, metres",
