@@ -162,19 +162,27 @@ impl Site {
     /// Distance of each adjusted footprint from the adjusted camera at the instant of the shot, minus its range,
     /// metres.
     fn misclosures_m(&self, adjusted: &Adjusted) -> Vec<f64> {
-        let image = &self.images[0];
         let orientation = CorrectedOrientation {
-            base: &image.orientation,
+            base: &self.images[0].orientation,
             correction: adjusted.correction(0),
         };
-        let misclosure_m = |point: &LidarPoint| {
+        let adjusted_m = |point: &LidarPoint| {
             let mut shots = adjusted.points.iter();
             let shot = shots.find(|shot| shot.kind == PointKind::Shot && shot.id == point.id);
-            let ground_m = Vector3::from(shot.unwrap().ground_m);
-            let camera_m = orientation.pose(image.x_lines(point.et_s)).position_m;
-            (camera_m - ground_m).norm() - point.range_m
+            Vector3::from(shot.unwrap().ground_m)
         };
+        let misclosure_m = |point| self.misclosure_m(&orientation, point, &adjusted_m(point));
         self.points.iter().map(misclosure_m).collect()
+    }
+
+    fn misclosure_m(
+        &self,
+        orientation: &impl ExteriorOrientation,
+        point: &LidarPoint,
+        ground_m: &Vector3<f64>,
+    ) -> f64 {
+        let x_lines = self.images[0].x_lines(point.et_s);
+        (orientation.pose(x_lines).position_m - ground_m).norm() - point.range_m
     }
 }
 
@@ -399,6 +407,13 @@ fn every_distance_comes_closer_to_its_range_with_the_priors_of_isis() {
             assert!((sigma_m - 10.0).abs() < 0.05, "{sigma_m}"); // metres: radii of 1735 or 1737 km
         }
     }
+    let orientation = &site.images[0].orientation;
+    let points = site.points.iter();
+    let initial_m =
+        summary(points.map(|point| site.misclosure_m(orientation, point, &point.ground_m)));
+    row("initial distance - range, m", &initial_m);
+    // Metres: the numbers of `real_ranges.rs`, which interpolates the trajectory itself.
+    assert!((initial_m.mean - 0.450).abs() < 0.002 && initial_m.standard_deviation < 0.0015);
     let (priors, options) = (priors_of_isis(), options(MolaImage::Weighted));
     let [without, with] = [false, true].map(|ranges| site.adjust(&priors, &options, ranges));
     report("ISIS's priors without ranges", &site, &without);
