@@ -122,6 +122,24 @@ fn reasons<'a>(geometric: &GeometricProducts<'a>) -> BTreeMap<&'a str, String> {
 }
 
 fn tie_columns(rows: &[Measurement]) -> Vec<Column> {
+    let mut columns = measured_columns(rows);
+    columns.extend(intersected_columns(rows));
+    columns.extend(adjusted_columns(rows));
+    columns
+}
+
+/// A column of what is not known of every measurement.
+fn known(
+    rows: &[Measurement],
+    name: &'static str,
+    description: &'static str,
+    of: fn(&Measurement) -> Option<f64>,
+) -> Column {
+    let values = rows.iter().map(of).collect();
+    Column::new(name, description, Values::OptionalF64(values))
+}
+
+fn measured_columns(rows: &[Measurement]) -> Vec<Column> {
     let text = |name, description, of: for<'a> fn(&Measurement<'a>) -> &'a str| {
         let values = rows.iter().map(|row| of(row).to_owned()).collect();
         Column::new(name, description, Values::Text(values))
@@ -132,10 +150,6 @@ fn tie_columns(rows: &[Measurement]) -> Vec<Column> {
             description,
             Values::F64(rows.iter().map(of).collect()),
         )
-    };
-    let known = |name, description, of: fn(&Measurement) -> Option<f64>| {
-        let values = rows.iter().map(of).collect();
-        Column::new(name, description, Values::OptionalF64(values))
     };
     vec![
         text("tie", "identifier of the tie point", |row| row.id),
@@ -155,6 +169,12 @@ fn tie_columns(rows: &[Measurement]) -> Vec<Column> {
             "why the tie point took no part in the adjustment; empty when it did",
             Values::Text(rows.iter().map(|row| row.left_out.clone()).collect()),
         ),
+    ]
+}
+
+fn intersected_columns(rows: &[Measurement]) -> Vec<Column> {
+    let known = |name, description, of| known(rows, name, description, of);
+    vec![
         known(
             "x_m",
             "intersected point with the orientation of the kernels, IAU 2000, metres",
@@ -185,6 +205,12 @@ fn tie_columns(rows: &[Measurement]) -> Vec<Column> {
             "measured minus projected focal coordinate across the track, image pixels",
             |row| Some(row.before?.1.reprojection_px),
         ),
+    ]
+}
+
+fn adjusted_columns(rows: &[Measurement]) -> Vec<Column> {
+    let known = |name, description, of| known(rows, name, description, of);
+    vec![
         known("adjusted_x_m", "adjusted point, IAU 2000, metres", |row| {
             Some(row.adjusted?.0.ground_m[0])
         }),
