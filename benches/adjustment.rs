@@ -1,8 +1,11 @@
 //! Times of the combined adjustment: the recipe, and many tie points in twenty images.
+//!
+//! Where `AREOGRAPH_NETWORK` names a file, the recipe goes there for `scripts/ceres.py`.
 #![allow(
     clippy::unwrap_used,
     clippy::print_stdout,
-    reason = "a benchmark prints its times and may fail loudly"
+    clippy::disallowed_methods,
+    reason = "a benchmark prints its times, writes no product and may fail loudly"
 )]
 
 #[path = "../tests/network/recipe.rs"]
@@ -13,10 +16,11 @@ mod scene;
 use std::time::Instant;
 
 use areograph::geom::{
-    bundle::{BundleOptions, Network, View, solve},
+    bundle::{Adjustment, BundleOptions, Network, View, solve},
     pushbroom::{EulerPolynomial, ExteriorOrientation, Pose, SampledOrientation},
 };
 use recipe::{Normals, Recipe, Simulated, place_px};
+use serde_json::json;
 
 const IMAGES: usize = 20;
 
@@ -76,27 +80,90 @@ fn ring(ties: usize) -> Network<SampledOrientation> {
     network
 }
 
-/// Median of `runs` adjustments, seconds, with steps and σ0.
-fn time(what: &str, network: &Network<SampledOrientation>, runs: usize) {
+/// Median of `runs` adjustments, seconds, with the last of them.
+fn time(what: &str, network: &Network<SampledOrientation>, runs: usize) -> (f64, Adjustment) {
     let mut seconds: Vec<f64> = Vec::new();
     let mut result = None;
     for _ in 0..runs {
         let start = Instant::now();
         let adjustment = solve(network, &BundleOptions::default()).unwrap();
         seconds.push(start.elapsed().as_secs_f64());
-        result = Some((adjustment.steps(), adjustment.sigma0()));
+        result = Some(adjustment);
     }
     seconds.sort_by(f64::total_cmp);
-    let (steps, sigma0) = result.unwrap();
+    let (seconds, adjustment) = (seconds[runs / 2], result.unwrap());
     println!(
-        "adjustment, {what}: {:.4} s ({steps} steps, {} views, sigma0 {sigma0:.6})",
-        seconds[runs / 2],
-        network.views.len()
+        "adjustment, {what}: {seconds:.4} s ({} steps, {} views, sigma0 {:.6})",
+        adjustment.steps(),
+        network.views.len(),
+        adjustment.sigma0()
     );
+    (seconds, adjustment)
+}
+
+/// The network as another program can adjust it, with our result.
+fn document(
+    network: &Network<SampledOrientation>,
+    seconds: f64,
+    adjustment: &Adjustment,
+) -> serde_json::Value {
+    let images = network.images.iter().map(|image| {
+        json!({
+            "half_lines": image.half_lines,
+            "focal_length_px": image.focal_length_px,
+            "sigmas": image.sigmas,
+        })
+    });
+    let points = network.points.iter().map(|point| {
+        json!({
+            "ground_m": point.ground_m.as_slice(),
+            "sigma_m": point.sigma_m.map(|sigma_m| [sigma_m.x, sigma_m.y, sigma_m.z]),
+        })
+    });
+    let views = network.views.iter().map(|view| {
+        let base = network.images[view.image].base.pose(view.x_lines);
+        let rows: [[f64; 3]; 3] = base.mars_to_camera.transpose().into();
+        json!({
+            "point": view.point,
+            "image": view.image,
+            "x_lines": view.x_lines,
+            "y_px": view.y_px,
+            "sigma_px": view.sigma_px.as_slice(),
+            "position_m": base.position_m.as_slice(),
+            "mars_to_camera": rows,
+        })
+    });
+    let ranges = network.ranges.iter().map(|range| {
+        let base = network.images[range.image].base.pose(range.x_lines);
+        json!({
+            "point": range.point,
+            "image": range.image,
+            "x_lines": range.x_lines,
+            "range_m": range.range_m,
+            "sigma_m": range.sigma_m,
+            "position_m": base.position_m.as_slice(),
+        })
+    });
+    json!({
+        "images": images.collect::<Vec<_>>(),
+        "points": points.collect::<Vec<_>>(),
+        "views": views.collect::<Vec<_>>(),
+        "ranges": ranges.collect::<Vec<_>>(),
+        "areograph": {
+            "seconds": seconds,
+            "sigma0": adjustment.sigma0(),
+            "degrees_of_freedom": adjustment.degrees_of_freedom(),
+        },
+    })
 }
 
 fn main() {
-    time("recipe", &sampled(&Recipe::GUSEV.simulate()), 11);
+    let recipe = sampled(&Recipe::GUSEV.simulate());
+    let (seconds, adjustment) = time("recipe", &recipe, 11);
+    if let Some(path) = std::env::var_os("AREOGRAPH_NETWORK") {
+        let document = document(&recipe, seconds, &adjustment);
+        std::fs::write(path, serde_json::to_vec(&document).unwrap()).unwrap();
+    }
     for ties in [25_000, 50_000, 100_000] {
         time(&format!("{ties} ties in 20 images"), &ring(ties), 3);
     }
