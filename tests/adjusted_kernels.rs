@@ -69,7 +69,7 @@ fn between_samples(image: &Image, set: &KernelSet, shift_lines: f64) {
     let found = cameras(set, 0.0);
     let original = cameras(&image.set, shift_lines * image.times.line_period_s);
     for ((et, found), (position_m, camera_to_mars)) in instants.iter().zip(&found).zip(original) {
-        let correction = curved(image.times.line_offset(*et) + shift_lines);
+        let correction = curved(image.times.line_offset(*et));
         let distance_m = (found.0 - position_m - correction.position_m).norm();
         let mars_to_camera =
             matrix_of_rotation_vector(&correction.rotation_rad) * camera_to_mars.transpose();

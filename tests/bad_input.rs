@@ -240,7 +240,7 @@ const CASES: [(&str, Spoil); 50] = [
     }),
     ("stage_unknown", |case| {
         let mut command = case.run();
-        command.args(["--until", "adjust"]);
+        command.args(["--until", "triangulate"]);
         command
     }),
     ("rival_sets_without_common_time", |case| {
@@ -303,12 +303,69 @@ const CASES: [(&str, Spoil); 50] = [
     }),
 ];
 
+/// The same for a pair of images with tie points.
+const PAIR_CASES: &[(&str, Spoil)] = &[
+    ("ties_of_other_images", |case| {
+        case.replace("ties/isidis.csv", "E02-", "M02-");
+        case.run()
+    }),
+    ("ties_of_one_image", |case| {
+        case.replace("ties/isidis.csv", "E02-01301", "E02-02016");
+        case.run()
+    }),
+    ("ties_without_a_column", |case| {
+        case.replace("ties/isidis.csv", "serial_number", "serial");
+        case.run()
+    }),
+    ("ties_are_empty", |case| {
+        case.write("ties/isidis.csv", "");
+        case.run()
+    }),
+    ("ties_are_a_binary_network", |case| {
+        let label = "Object = ProtoBuffer\n Object = Core\n HeaderStartByte = 65536\n End_Object\nEnd_Object\nEnd\n";
+        case.write(
+            "ties/isidis.net",
+            [label.as_bytes(), &[0, 1, 2, 255]].concat(),
+        );
+        case.replace("site.toml", "isidis.csv", "isidis.net");
+        case.run()
+    }),
+    ("ties_of_parallel_rays", |case| {
+        // Both images are the same one.
+        case.write("labels/E02-01301.lbl", case.read("labels/E02-02016.lbl"));
+        case.run()
+    }),
+    ("adjustment_without_a_hold", |case| {
+        case.replace(
+            "site.toml",
+            "tie_sigma_px",
+            "nadir_sigma_m = inf\noff_nadir_sigma_m = inf\nmola_image = \"off\"\ntie_sigma_px",
+        );
+        case.run()
+    }),
+    ("adjustment_held_against_its_ties", |case| {
+        case.replace(
+            "site.toml",
+            "tie_sigma_px",
+            "nadir_sigma_m = 0.01\noff_nadir_sigma_m = 0.01\nblunder_limit = 0\ntie_sigma_px",
+        );
+        case.run()
+    }),
+    ("check_ties_of_other_images", |case| {
+        case.replace("ties/isidis.csv", "E02-", "M02-");
+        case.check()
+    }),
+];
+
 #[test]
 fn every_case_has_its_exit_code_and_exact_message() {
     let expected = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/bad_input");
     let mut differing = Vec::new();
-    for (name, spoil) in CASES {
-        let case = Case::new();
+    let cases = CASES.iter().map(|(name, spoil)| (name, Case::new(), spoil));
+    let pairs = PAIR_CASES
+        .iter()
+        .map(|(name, spoil)| (name, Case::pair(), spoil));
+    for (name, case, spoil) in cases.chain(pairs) {
         let found = case.outcome(spoil(&case));
         let wanted = fs::read_to_string(expected.join(format!("{name}.txt"))).unwrap_or_default();
         if found.trim_end() != wanted.trim_end() {
@@ -319,7 +376,7 @@ fn every_case_has_its_exit_code_and_exact_message() {
         differing.is_empty(),
         "{} of {} messages differ from tests/bad_input; found:\n{}",
         differing.len(),
-        CASES.len(),
+        CASES.len() + PAIR_CASES.len(),
         differing.join("\n")
     );
 }

@@ -14,6 +14,7 @@ use crate::{
     stages::{
         convert_datum::convert_datum,
         group_profiles::{Profile, group_profiles},
+        read_ties::read_ties,
         sample_orientation::sample_orientation,
         search_footprints::search_footprints,
         tag_times::{ImageTimes, tag_times},
@@ -38,7 +39,7 @@ impl Checked {
     }
 }
 
-/// Checks a site's kernels, labels and PEDR files, and coverage at its images and at its shots.
+/// Checks a site's kernels, labels, PEDR and tie point files, and coverage at its images and at its shots.
 ///
 /// The PEDR files are searched as a run does it: only shots in the windows tell which times are needed.
 #[must_use]
@@ -46,6 +47,9 @@ pub fn check_site(config: &SiteConfig) -> Checked {
     let mut checked = Checked::default();
     for path in &config.pedr.files {
         checked.note(check_pedr(path, config.pedr.datum), config);
+    }
+    if !config.ties.files.is_empty() {
+        checked.note(check_ties(config), config);
     }
     if let Err(failure) = check_kernels(config, &mut checked) {
         checked.failures.push(failure.in_site(&config.site));
@@ -68,6 +72,18 @@ fn check_pedr(path: &Path, choice: DatumChoice) -> Result<String> {
         "{}: {frames} frames in {datum}{}",
         path.display(),
         complaints.concat()
+    ))
+}
+
+fn check_ties(config: &SiteConfig) -> Result<String> {
+    let ties = read_ties(&config.ties, &config.images).in_stage(Stage::ReadTies.name())?;
+    let (points, joining) = (ties.points.len(), ties.joining());
+    let bad = match ties.complaint_count {
+        0 => String::new(),
+        count => format!("; {count} records that cannot be read"),
+    };
+    Ok(format!(
+        "{points} tie points, {joining} of them in two or more images{bad}"
     ))
 }
 

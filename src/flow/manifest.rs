@@ -11,6 +11,7 @@ use crate::{
     geom::{attitude::rotation_vector, mars_rotation::mars_rotation},
     products::KernelLine,
     spice::{KernelSet, Session},
+    stages::compare_pairs::PairComparison,
     store::manifest::{
         BiasEntry, Complaints, ConfigurationEntry, KernelEntry, Manifest, ProductEntry, StageEntry,
         Verdict, figures,
@@ -36,6 +37,11 @@ pub(super) struct Account {
     pub(super) complaints: Vec<String>,
 }
 
+fn largest_disagreement_m(pairs: &[PairComparison]) -> Option<f64> {
+    let pairs = pairs.iter().map(|pair| pair.disagreement_m);
+    pairs.max_by(f64::total_cmp)
+}
+
 impl Results<'_> {
     /// What a reader of the products should know, one sentence each.
     pub(super) fn notes(&self) -> Vec<String> {
@@ -51,6 +57,7 @@ impl Results<'_> {
                     .map(|note| format!("image {}: {note}", image.id)),
             );
         }
+        notes.extend(self.geometric.iter().flat_map(|of| of.ties.value.notes()));
         notes
     }
 
@@ -73,6 +80,20 @@ impl Results<'_> {
             (figures::RANGE_MEAN_M, means.max_by(f64::total_cmp)),
             (figures::POSITION_RMSE_M, positions.max_by(f64::total_cmp)),
             (figures::POINTING_RMSE_RAD, pointings.max_by(f64::total_cmp)),
+            (
+                figures::DISAGREEMENT_M,
+                self.geometric
+                    .and_then(|of| largest_disagreement_m(&of.intersected.value.pairs)),
+            ),
+            (
+                figures::ADJUSTED_DISAGREEMENT_M,
+                self.geometric
+                    .and_then(|of| largest_disagreement_m(&of.readjusted.value.intersected.pairs)),
+            ),
+            (
+                figures::ADJUSTMENT_SIGMA0,
+                self.geometric.map(|of| of.adjusted.value.summary.sigma0),
+            ),
         ]
         .into_iter()
         .filter_map(|(name, figure)| Some((name.to_owned(), figure?)))

@@ -10,7 +10,7 @@ use crate::{
     frames::MarsIau2000,
     spice::{KernelSet, Wanted},
     stages::{
-        adjust::Adjusted,
+        adjust::{Adjusted, PointKind},
         check_ranges::{BiasScan, RangeCheck},
         compare_pairs::PairComparison,
         convert_datum::FileConversion,
@@ -111,6 +111,49 @@ pub struct ImageProducts<'a> {
     pub registration: &'a ImageRegistration,
 }
 
+/// More tie points than this share are not left out of a sound adjustment.
+const LEFT_OUT_SHARE: f64 = 0.1;
+/// An a posteriori standard deviation of unit weight above this contradicts the configured ones.
+const SIGMA0_MAX: f64 = 2.0;
+
+impl GeometricProducts<'_> {
+    /// Why the adjusted orientation is invalid, one sentence per reason.
+    fn invalid_because(&self) -> Vec<String> {
+        let reasons = |image: &ImageProducts| -> Vec<String> {
+            let id = &image.times.id;
+            // What is wrong with the orientation of the kernels is told with it.
+            let of_model = image.model.invalid_because.iter();
+            of_model
+                .map(|reason| format!("adjusted image {id}: {reason}"))
+                .collect()
+        };
+        self.adjusted_images.iter().flat_map(reasons).collect()
+    }
+
+    /// What a reader must weigh, one sentence each.
+    fn remarks(&self) -> Vec<String> {
+        let mut remarks = Vec::new();
+        let ties = self.ties.points.len();
+        let left_out = self.adjusted.left_out.iter();
+        let left_out = left_out
+            .filter(|point| point.kind == PointKind::Tie)
+            .count();
+        if left_out as f64 > LEFT_OUT_SHARE * ties as f64 {
+            remarks.push(format!(
+                "{left_out} of {ties} tie points were left out of the adjustment; ties.parquet says why"
+            ));
+        }
+        let sigma0 = self.adjusted.summary.sigma0;
+        if sigma0 > SIGMA0_MAX {
+            remarks.push(format!(
+                "the adjustment's standard deviation of unit weight is {sigma0:.2}: measurements are worse than \
+                 configured, or a model does not hold"
+            ));
+        }
+        remarks
+    }
+}
+
 impl<'a> ImageProducts<'a> {
     /// Why the image is invalid: first its orientation, then its models; empty when it is valid.
     #[must_use]
@@ -139,6 +182,11 @@ impl SiteProducts<'_> {
                 reasons.push(format!("image {}: {reason}", image.times.id));
             }
         }
+        reasons.extend(
+            self.geometric
+                .iter()
+                .flat_map(GeometricProducts::invalid_because),
+        );
         reasons
     }
 
@@ -176,6 +224,7 @@ impl SiteProducts<'_> {
                 .and_then(|scan| doubt(scan, configured_s));
             remarks.extend(doubt.map(|doubt| format!("profile {}: {doubt}", ranges.profile)));
         }
+        remarks.extend(self.geometric.iter().flat_map(GeometricProducts::remarks));
         remarks
     }
 

@@ -38,6 +38,8 @@ pub struct Ties {
 enum TiesFault {
     #[error("no tie point file holds a measurement")]
     Empty,
+    #[error("{points} tie points, none of them measured in two images of the site")]
+    NoneJoins { points: usize },
     #[error("tie points are measured in {found}; expected images of the site: {expected}")]
     NoImage { found: String, expected: String },
 }
@@ -50,6 +52,9 @@ impl Fault for TiesFault {
     fn advice(&self) -> String {
         match self {
             Self::Empty => "give files with measurements in ties.files",
+            Self::NoneJoins { .. } => {
+                "measure tie points in at least two images, or leave out the table ties"
+            }
             Self::NoImage { .. } => {
                 "give each image the name that the file has for it as images.serial_number"
             }
@@ -62,7 +67,8 @@ impl Fault for TiesFault {
 /// intersection takes the first.
 ///
 /// # Errors
-/// A file that is no table and no network; no measurement at all; none in an image of the site.
+/// A file that is no table and no network; no measurement at all; none in an image of the site; none
+/// that joins two of them.
 pub fn read_ties(ties: &TiesConfig, images: &[ImageConfig]) -> Result<Ties> {
     let names: BTreeMap<&str, &str> = images
         .iter()
@@ -88,6 +94,10 @@ pub fn read_ties(ties: &TiesConfig, images: &[ImageConfig]) -> Result<Ties> {
     if read.points.is_empty() {
         return Err(nothing_found(&read, &names).into());
     }
+    if read.joining() == 0 {
+        let points = read.points.len();
+        return Err(TiesFault::NoneJoins { points }.into());
+    }
     Ok(read)
 }
 
@@ -109,6 +119,26 @@ impl Ties {
                 measures,
             });
         }
+    }
+
+    /// What was read around, one sentence each.
+    #[must_use]
+    pub fn notes(&self) -> Vec<String> {
+        let elsewhere: u64 = self.elsewhere.values().sum();
+        let mut notes = Vec::new();
+        if elsewhere > 0 {
+            notes.push(format!(
+                "tie points: {elsewhere} measurements in {} images that the site does not have",
+                self.elsewhere.len()
+            ));
+        }
+        if self.ignored > 0 {
+            notes.push(format!(
+                "tie points: {} points and measurements that their network says to ignore",
+                self.ignored
+            ));
+        }
+        notes
     }
 
     /// Tie points measured in at least two images.
@@ -187,6 +217,14 @@ mod tests {
         assert_eq!(
             failure.fault.to_string(),
             "tie points are measured in A, B, C; expected images of the site: x, y"
+        );
+        let single = read(
+            "point_id,serial_number,sample,line\n1,x,1,1\n2,y,1,1\n",
+            &[image("x", None), image("y", None)],
+        );
+        assert_eq!(
+            single.unwrap_err().fault.to_string(),
+            "2 tie points, none of them measured in two images of the site"
         );
         let empty = read("point_id,serial_number,sample,line\n", &[image("x", None)]);
         assert_eq!(

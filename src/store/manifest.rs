@@ -51,6 +51,12 @@ pub mod figures {
     pub const POSITION_RMSE_M: &str = "position_rmse_m";
     /// Largest second-order pointing RMSE of an image, radians.
     pub const POINTING_RMSE_RAD: &str = "pointing_rmse_rad";
+    /// Largest disagreement of two images along the flight at their tie points, metres.
+    pub const DISAGREEMENT_M: &str = "disagreement_m";
+    /// The same with the adjusted orientation, metres.
+    pub const ADJUSTED_DISAGREEMENT_M: &str = "adjusted_disagreement_m";
+    /// A posteriori standard deviation of unit weight of the adjustment.
+    pub const ADJUSTMENT_SIGMA0: &str = "adjustment_sigma0";
 }
 
 /// Whether the products keep the limits of the configuration.

@@ -24,7 +24,8 @@ pub(crate) struct Case {
 }
 
 impl Case {
-    pub(crate) fn new() -> Self {
+    /// A folder with the kernels of the mission, and an empty one for PEDR files.
+    fn with_kernels() -> Self {
         let case = Self {
             folder: tempfile::tempdir().unwrap(),
         };
@@ -36,6 +37,31 @@ impl Case {
             let path = entry.unwrap().path();
             fs::copy(&path, case.path("kernels").join(path.file_name().unwrap())).unwrap();
         }
+        case
+    }
+
+    /// The mission's pair of images over Isidis with its tie points, as `isidis`.
+    pub(crate) fn pair() -> Self {
+        let (case, mission) = (Self::with_kernels(), mission());
+        for folder in ["labels", "ties"] {
+            fs::create_dir(case.path(folder)).unwrap();
+        }
+        for file in [
+            "pedr/ap19019k.b",
+            "pedr/ap19117l.b",
+            "labels/E02-01301.lbl",
+            "labels/E02-02016.lbl",
+            "ties/isidis.csv",
+        ] {
+            fs::copy(mission.join(file), case.path(file)).unwrap();
+        }
+        let site = fs::read_to_string(mission.join("sites/isidis.toml")).unwrap();
+        case.write("site.toml", site.replace("../", ""));
+        case
+    }
+
+    pub(crate) fn new() -> Self {
+        let (case, mission) = (Self::with_kernels(), mission());
         let pedr = mission.join("pedr/ap19117l.b");
         fs::copy(pedr, case.path("pedr/ap19117l.b")).unwrap();
         fs::copy(mission.join("labels/E02-02016.lbl"), case.path("image.lbl")).unwrap();

@@ -12,6 +12,14 @@ use crate::{
 /// Why a site cannot be adjusted.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum AdjustFault {
+    /// No tie point could be intersected.
+    #[error("none of {ties} tie points has a ground point; {first}")]
+    NoTies {
+        /// Tie points.
+        ties: usize,
+        /// The first of them, and why it has none.
+        first: String,
+    },
     /// The network as a whole.
     #[error("{0}")]
     Network(BundleFault),
@@ -68,6 +76,7 @@ impl Fault for AdjustFault {
 
     fn advice(&self) -> String {
         match self {
+            Self::NoTies { .. } => "check that the images overlap and that the tie points are theirs",
             Self::Network(_) => "check the input of the adjustment, and give orientations and footprints finite standard deviations",
             Self::Value { .. } => "correct this value, or leave out what it belongs to",
             Self::Singular(_) => "give these unknowns finite standard deviations, or hold them fixed with 0",

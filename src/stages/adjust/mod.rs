@@ -180,7 +180,7 @@ const CONTRADICTION: f64 = 10.0;
 /// Tie points start from their intersection; those without one are left out and listed.
 ///
 /// # Errors
-/// Identifiers that do not match, a singular network, initial values that the rest refutes.
+/// No tie point with a ground point, identifiers that do not match, a singular network, initial values that the rest refutes.
 pub fn adjust<M: ExteriorOrientation>(
     images: &[AdjustImage<M>],
     shots: &[LaserShot],
@@ -188,6 +188,17 @@ pub fn adjust<M: ExteriorOrientation>(
     starts: &IntersectedTies,
     options: &AdjustOptions,
 ) -> Result<Adjusted> {
+    if starts.points.is_empty() {
+        let first = starts.rejected.first();
+        return Err(AdjustFault::NoTies {
+            ties: ties.len(),
+            first: first.map_or_else(
+                || "there are none".to_owned(),
+                |tie| format!("{}: {}", tie.id, tie.reason),
+            ),
+        }
+        .into());
+    }
     let mut assembled = network::assemble(images, shots, ties, starts, options)?;
     let bundle_options = BundleOptions {
         robust: options.robust,

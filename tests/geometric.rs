@@ -1,0 +1,268 @@
+//! A pair of images through the whole flow: misregistration of one spacing of footprints, its cure, the products,
+//! and what a change touches.
+#![allow(
+    clippy::unwrap_used,
+    clippy::panic,
+    reason = "helpers of tests may fail loudly"
+)]
+
+mod common;
+
+use std::{collections::BTreeSet, fs, fs::File, path::Path};
+
+use arrow::{
+    array::{AsArray, RecordBatch},
+    datatypes::Float64Type,
+};
+use common::{
+    case::Case,
+    mission::{mission, products},
+};
+use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
+use serde_json::Value;
+
+fn json(path: &Path) -> Value {
+    serde_json::from_slice(&fs::read(path).unwrap()).unwrap()
+}
+
+fn table(path: &Path) -> RecordBatch {
+    let builder = ParquetRecordBatchReaderBuilder::try_new(File::open(path).unwrap()).unwrap();
+    builder.build().unwrap().next().unwrap().unwrap()
+}
+
+fn number(value: &Value, pointer: &str) -> f64 {
+    let found = value.pointer(pointer);
+    found
+        .unwrap_or_else(|| panic!("no {pointer}"))
+        .as_f64()
+        .unwrap()
+}
+
+fn blunders() -> BTreeSet<String> {
+    let truth = json(&mission().join("truth.json"));
+    let sites = truth["ties"].as_array().unwrap();
+    let site = sites.iter().find(|site| site["site"] == "isidis").unwrap();
+    let ties = site["ties"].as_array().unwrap().iter();
+    ties.filter(|tie| !tie["blunder"].is_null())
+        .map(|tie| tie["id"].as_str().unwrap().to_owned())
+        .collect()
+}
+
+#[test]
+fn the_adjustment_cures_the_misregistration() {
+    let case = Case::pair();
+    case.stages_run();
+    let site = case.path("out/isidis");
+    let found = json(&site.join("adjustment.json"));
+    let schema = concat!(
+        env!("CARGO_MANIFEST_DIR"),
+        "/config/schema/adjustment.schema.json"
+    );
+    let schema = jsonschema::validator_for(&json(Path::new(schema))).unwrap();
+    let errors: Vec<String> = schema.iter_errors(&found).map(|e| e.to_string()).collect();
+    assert_eq!(errors, [""; 0]);
+
+    // 34.5 and 25.5 lines of 3.26 and 4.40 m and position biases of tens of metres, along the flight.
+    let before_m = number(&found, "/before/pairs/0/disagreement_m");
+    assert!((190.0..330.0).contains(&before_m), "{before_m} m");
+    let spacings: Vec<f64> = found["before"]["pairs"][0]["footprints"]["profiles"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|profile| number(profile, "/along_spacings").abs())
+        .collect();
+    assert_eq!(spacings.len(), 2);
+    assert!(
+        spacings
+            .iter()
+            .all(|spacings| (0.5..1.2).contains(spacings)),
+        "{spacings:?}"
+    );
+    // 146 ties of a line's noise tell the mean to 0.1 lines of 4 m; the image-to-image transformation adds what
+    // relief does to it.
+    let after_m = number(&found, "/after/pairs/0/disagreement_m");
+    assert!(after_m < 1.0, "{after_m} m");
+    for profile in found["after"]["pairs"][0]["footprints"]["profiles"]
+        .as_array()
+        .unwrap()
+    {
+        assert!(number(profile, "/along_spacings").abs() < 0.05, "{profile}");
+    }
+
+    // Who is left out is a blunder; two of eight lie across the track, where a pair controls nothing.
+    let left_out: BTreeSet<String> = found["adjustment"]["left_out"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|point| point["id"].as_str().unwrap().to_owned())
+        .collect();
+    assert!(
+        left_out.is_subset(&blunders()) && left_out.len() >= 6,
+        "{left_out:?}"
+    );
+    let manifest = json(&site.join("manifest.json"));
+    assert!((number(&manifest, "/figures/disagreement_m") - before_m).abs() < 1e-9); // the same number
+    assert!((number(&manifest, "/figures/adjusted_disagreement_m") - after_m).abs() < 1e-9);
+    assert_eq!(
+        manifest["figures"]["adjustment_sigma0"],
+        found["adjustment"]["summary"]["sigma0"]
+    );
+}
+
+#[test]
+fn the_products_of_the_adjustment_agree_with_each_other() {
+    let case = Case::pair();
+    case.stages_run();
+    let site = case.path("out/isidis");
+    let found = json(&site.join("adjustment.json"));
+    let ties = table(&site.join("ties.parquet"));
+    assert_eq!(ties.num_rows(), 2 * 154);
+    let column = |name: &str| {
+        ties.column_by_name(name)
+            .unwrap()
+            .as_primitive::<Float64Type>()
+            .clone()
+    };
+    let left_out = ties
+        .column_by_name("left_out")
+        .unwrap()
+        .as_string::<i32>()
+        .clone();
+    let out = left_out.iter().filter(|reason| *reason != Some("")).count();
+    let named = found["adjustment"]["left_out"].as_array().unwrap().len();
+    assert_eq!(out, 2 * named);
+    assert_eq!(
+        column("adjusted_x_m").iter().flatten().count(),
+        2 * (154 - named)
+    );
+    // What the table and the statistics say of the residuals is one thing.
+    let images = ties
+        .column_by_name("image")
+        .unwrap()
+        .as_string::<i32>()
+        .clone();
+    let residuals: Vec<f64> = column("residual_along_px")
+        .iter()
+        .zip(images.iter())
+        .filter(|(_, image)| *image == Some("E02-01301"))
+        .filter_map(|(residual, _)| residual)
+        .collect();
+    let mean = residuals.iter().sum::<f64>() / residuals.len() as f64;
+    let told = number(
+        &found,
+        "/adjustment/summary/images/0/tie_residuals_px/0/mean",
+    );
+    assert!((mean - told).abs() < 1e-9, "{mean} {told}"); // rounding of a sum
+
+    let control = fs::read_to_string(site.join("exchange/adjusted.gcp")).unwrap();
+    let points = control
+        .lines()
+        .filter(|line| !line.starts_with('#'))
+        .count();
+    assert_eq!(points, 154 - named);
+    let lidar = json(&site.join("exchange/lidar.json"));
+    let shots = table(&site.join("adjusted_footprints.parquet"));
+    let ranges = shots.column_by_name("range_m").unwrap();
+    let with_range = ranges.len() - ranges.null_count();
+    assert_eq!(lidar["points"].as_array().unwrap().len(), with_range);
+    assert!(
+        lidar["points"][0]["simultaneousImages"][0]
+            .as_str()
+            .unwrap()
+            .starts_with("MGS/")
+    );
+    // The images start where this run ended when the adjusted kernels are loaded; shots are none of these.
+    let site = String::from_utf8(case.read("site.toml")).unwrap();
+    let cut = |site: String, from: &str, to: &str| {
+        let (from, to) = (site.find(from).unwrap(), site.find(to).unwrap());
+        format!("{}{}", &site[..from], &site[to..])
+    };
+    let images = cut(cut(site, "[pedr]", "[ties]"), "[[windows]]", "[[images]]");
+    case.write("site.toml", images);
+    case.replace("site.toml", "kernels/nav.tm", "out/isidis/adjusted.tm");
+    case.replace("site.toml", "site = \"isidis\"", "site = \"again\"");
+    case.stages_run();
+    let again = json(&case.path("out/again/adjustment.json"));
+    let starts_m = number(&again, "/before/pairs/0/disagreement_m");
+    assert!(starts_m < 1.0, "{starts_m} m"); // as the_adjustment_cures_the_misregistration
+    let orientation = |path: &str| table(&case.path(path));
+    for id in ["E02-01301", "E02-02016"] {
+        let adjusted = orientation(&format!(
+            "out/isidis/images/{id}/adjusted_orientation.parquet"
+        ));
+        let sampled = orientation(&format!("out/again/images/{id}/orientation.parquet"));
+        for axis in ["x_m", "y_m", "z_m"] {
+            let values = |of: &RecordBatch| {
+                of.column_by_name(axis)
+                    .unwrap()
+                    .as_primitive::<Float64Type>()
+                    .values()
+                    .to_vec()
+            };
+            for (adjusted, sampled) in values(&adjusted).iter().zip(values(&sampled)) {
+                // Metres: ET is rounded to 7e-9 s, in which MGS flies 3e-5 m.
+                assert!((adjusted - sampled).abs() < 1e-3, "{id} {axis}");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_tie_point_file_touches_what_comes_after_it() {
+    let case = Case::pair();
+    assert!(case.stages_run().contains(&"apply_adjustment".to_owned()));
+    assert_eq!(case.stages_run(), [""; 0]);
+    let text = String::from_utf8(case.read("ties/isidis.csv")).unwrap();
+    let without_last: Vec<&str> = text.lines().collect();
+    case.write(
+        "ties/isidis.csv",
+        without_last[..without_last.len() - 2].join("\n"),
+    );
+    let stages = [
+        "read_ties",
+        "intersect",
+        "adjust",
+        "apply_adjustment",
+        "publish",
+    ];
+    assert_eq!(case.stages_run(), stages);
+    case.replace(
+        "site.toml",
+        "tie_sigma_px = [1.6, 1.0]",
+        "tie_sigma_px = [1.7, 1.0]",
+    );
+    assert_eq!(case.stages_run(), stages[2..]);
+    // A site whose tie points are gone has no product of them left.
+    let site = String::from_utf8(case.read("site.toml")).unwrap();
+    let (before, after) = (
+        site.find("[ties]").unwrap(),
+        site.find("[adjustment]").unwrap(),
+    );
+    case.write(
+        "site.toml",
+        format!("{}{}", &site[..before], &site[after..]),
+    );
+    assert_eq!(case.stages_run(), ["publish"]);
+    let left: Vec<_> = products(&case.path("out/isidis")).into_keys().collect();
+    let of_ties = |path: &&std::path::PathBuf| {
+        let path = path.to_string_lossy();
+        path.contains("adjust") || path.contains("ties") || path.contains("lidar")
+    };
+    assert_eq!(left.iter().find(of_ties), None);
+}
+
+#[test]
+fn threads_change_no_byte() {
+    let case = Case::pair();
+    let with = |threads: &str| {
+        let mut command = case.run();
+        command.args(["--threads", threads, "--force"]);
+        common::mission::succeed(&mut command);
+        products(&case.path("out"))
+    };
+    let (one, eight) = (with("1"), with("8"));
+    assert!(one.keys().eq(eight.keys()));
+    for (path, bytes) in one {
+        assert!(eight[&path] == bytes, "{}", path.display());
+    }
+}
