@@ -20,6 +20,9 @@ use crate::{
     units::RADIANS_PER_DEGREE,
 };
 
+/// Pairs that have a sentence of their own; tables have all.
+const PAIRS_TOLD: usize = 6;
+
 /// Tables and plots; nothing for a site without tie points.
 ///
 /// # Errors
@@ -29,10 +32,8 @@ pub(super) fn section(site: &SiteProducts) -> Result<String> {
         return Ok(String::new());
     };
     let pairs = BeforeAfter::all(geometric);
-    let mut html: String = pairs
-        .iter()
-        .map(|pair| paragraph(&pair.sentence()))
-        .collect();
+    let told = pairs.iter().take(PAIRS_TOLD);
+    let mut html: String = told.map(|pair| paragraph(&pair.sentence())).collect();
     if pairs.is_empty() {
         html += &paragraph("No two images share tie points that could be intersected.");
     }
@@ -61,6 +62,12 @@ impl<'a> BeforeAfter<'a> {
             after: adjusted.iter().find(|pair| pair.images == before.images),
         };
         pairs.iter().map(of).collect()
+    }
+
+    /// The pair whose images disagree most before the adjustment.
+    pub(super) fn worst(pairs: &[Self]) -> Option<&Self> {
+        let size = |pair: &&Self| apart(pair.before).metres;
+        pairs.iter().max_by(|a, b| size(a).total_cmp(&size(b)))
     }
 
     /// Both images by name.
@@ -95,9 +102,9 @@ impl<'a> BeforeAfter<'a> {
 }
 
 /// How far apart along the flight two images place the same thing.
-pub(super) struct Apart {
+struct Apart {
     /// Metres on the ground, without sign.
-    pub(super) metres: f64,
+    metres: f64,
     /// The same in distances of successive footprints.
     spacings: Option<f64>,
     /// Whether footprints tell it; otherwise tie points do.
@@ -118,7 +125,7 @@ impl Apart {
 }
 
 /// The mean over all footprints that both images of `pair` show; the tie points' where there are none.
-pub(super) fn apart(pair: &PairComparison) -> Apart {
+fn apart(pair: &PairComparison) -> Apart {
     let profiles = pair.footprints.iter().flat_map(|found| &found.profiles);
     let (mut shots, mut metres) = (0.0, 0.0);
     for profile in profiles {
@@ -198,13 +205,13 @@ fn left_out(geometric: &GeometricProducts) -> String {
         return paragraph("No tie point was left out.");
     }
     let columns = &[
-        Column::Text("reason"),
         Column::Text("left out of"),
         Column::Number("tie points"),
+        Column::Text("reason"),
     ];
     let mut table = Table::new("Tie points that were left out", columns);
     for ((of, reason), count) in reasons {
-        table.row(true, [reason.into(), of.into(), count.to_string().into()]);
+        table.row(true, [of.into(), count.to_string().into(), reason.into()]);
     }
     table.finish()
 }

@@ -15,7 +15,9 @@ use crate::{
 
 /// Dots of one series.
 const DOTS_MAX: usize = 300;
-/// Vectors of one panel.
+/// Vectors of all images together; each is drawn once and listed once, about 400 bytes.
+const ARROWS_ALL: usize = 4_000;
+/// Most vectors of one panel.
 const ARROWS_MAX: usize = 250;
 /// Widths of the image on either side of it within which footprints are compared.
 const WIDTHS_BESIDE: f64 = 0.5;
@@ -34,12 +36,14 @@ const AFTER: usize = 0;
 /// A plot that cannot be drawn.
 pub(super) fn figures(site: &SiteProducts, geometric: &GeometricProducts) -> Result<String> {
     let mut html = String::new();
+    let panels = 2 * site.images.len().max(1);
+    let limit = (ARROWS_ALL / panels).clamp(20, ARROWS_MAX);
     let images = site.images.iter().zip(geometric.adjusted_images);
     for (index, (before, after)) in images.enumerate() {
         if let Some(plot) = footprints(before, after) {
             html += &figure(&plot)?;
         }
-        html += &figure(&vectors(before, index, geometric))?;
+        html += &figure(&vectors(before, index, geometric, limit))?;
     }
     Ok(format!("<div class=\"plots\">\n{html}</div>\n"))
 }
@@ -95,7 +99,7 @@ fn footprints(before: &ImageProducts, after: &ImageProducts) -> Option<Plot> {
     });
     let words = format!(
         "Footprints around the middle one, with the orientation of the kernels and with the adjusted one, flight to the \
-         right. Of {} that both see, {} lines and {} samples are the medians of what they move by.",
+         right. Of {} that are seen with both, {} lines and {} samples are the medians of what they move by.",
         all.len(),
         label(lines, 2),
         label(across, 2)
@@ -131,7 +135,12 @@ fn moves(before: &RegisteredPoints, after: &RegisteredPoints) -> Vec<Arrow> {
 }
 
 /// Figure 6: reprojection residuals where the tie points were measured.
-fn vectors(image: &ImageProducts, index: usize, geometric: &GeometricProducts) -> Plot {
+fn vectors(
+    image: &ImageProducts,
+    index: usize,
+    geometric: &GeometricProducts,
+    limit: usize,
+) -> Plot {
     let samples = f64::from(image.times.samples);
     let lines = f64::from(image.times.lines_header);
     let ends = [0.0, f64::from(image.times.lines_delivered)].map(|x| Mark {
@@ -152,15 +161,23 @@ fn vectors(image: &ImageProducts, index: usize, geometric: &GeometricProducts) -
         ("after", "After", AFTER, geometric.adjusted_intersected),
     ] {
         let (all, outliers) = residuals(image, index, ties);
-        let each = thinned(&all, ARROWS_MAX);
+        let each = thinned(&all, limit);
         let room = (LONGEST * lines, LONGEST * samples);
-        let magnification = magnification(&each, room);
-        let times = label(magnification, if magnification < 1.0 { 2 } else { 0 });
+        let arrows = Arrows {
+            label: state.to_owned(),
+            colour,
+            magnification: magnification(&each, room),
+            each,
+        };
         words += &format!(
-            " {title}: {} vectors, drawn {times} times as long as on the axes, {} on average.",
+            " {title}: {} vectors, drawn {} times as long as on the axes, {} on average.",
             all.len(),
+            arrows.times(),
             mean_in_words(&all),
         );
+        if all.len() > limit {
+            words += &format!(" At most {limit} are drawn.");
+        }
         if outliers > 0 {
             words += &format!(" {outliers} outliers are not drawn.");
         }
@@ -169,12 +186,7 @@ fn vectors(image: &ImageProducts, index: usize, geometric: &GeometricProducts) -
             height: 330,
             limits: vec![0.0, samples],
             marks: ends.to_vec(),
-            arrows: vec![Arrows {
-                label: format!("{state}, × {times}"),
-                colour,
-                magnification,
-                each,
-            }],
+            arrows: vec![arrows],
             ..Panel::of("sample", Vec::new())
         });
     }

@@ -3,7 +3,7 @@
 
 use super::{
     html::{Cell, Column, Table, paragraph},
-    misregistration::{BeforeAfter, apart},
+    misregistration::BeforeAfter,
     plots::label,
     summary::counted,
 };
@@ -31,26 +31,8 @@ const BLUNDERS_SHOWN: usize = 20;
 /// Relative registration is healed, absolute position is not: with numbers.
 pub(super) fn absolute(site: &SiteProducts, geometric: &GeometricProducts) -> String {
     let pairs = BeforeAfter::all(geometric);
-    let healed: Vec<String> = pairs
-        .iter()
-        .filter_map(|pair| {
-            let (before, after) = (apart(pair.before), apart(pair.after?));
-            Some(format!(
-                "{}: from {} to {} m",
-                pair.name(),
-                label(before.metres, 1),
-                label(after.metres, 1)
-            ))
-        })
-        .collect();
-    let relative = if healed.is_empty() {
-        String::new()
-    } else {
-        format!(
-            "The adjustment brings the images together ({}). ",
-            healed.join("; ")
-        )
-    };
+    let relative = BeforeAfter::worst(&pairs);
+    let relative = relative.map_or_else(String::new, |pair| pair.sentence() + " ");
     let witness = match site.config.adjustment.mola_image {
         MolaImage::Weighted => {
             "the image coordinates of footprints were computed from the very orientation that is adjusted and are no \
@@ -66,7 +48,7 @@ pub(super) fn absolute(site: &SiteProducts, geometric: &GeometricProducts) -> St
         means.join(", ")
     };
     format!(
-        "{relative}Where they lie on Mars it cannot tell: {witness}, and only the standard deviations that the orientation \
+        "{relative}Where the images lie on Mars the adjustment cannot tell: {witness}, and only the standard deviations that the orientation \
          was given beforehand decide how much each image moves. The tie points moved by {} m in X, Y, Z on average; their \
          formal standard deviations of {} m are optimistic. Relative registration is healed, absolute position is not.",
         of(&ties.corrections_m),
@@ -223,13 +205,13 @@ pub(super) fn correlations(summary: &AdjustmentSummary) -> String {
         label(*largest, 4)
     ));
     let columns = &[
+        Column::Number("correlation"),
         Column::Text("unknown"),
         Column::Text("and"),
-        Column::Number("correlation"),
     ];
     let mut table = Table::new("Largest correlations", columns);
     for (first, second, coefficient) in all.iter().take(CORRELATED_SHOWN) {
-        let cells: [Cell; 3] = [first.into(), second.into(), label(*coefficient, 4).into()];
+        let cells: [Cell; 3] = [label(*coefficient, 4).into(), first.into(), second.into()];
         table.row(true, cells);
     }
     html += &table.finish();

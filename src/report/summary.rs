@@ -2,7 +2,7 @@
 
 use super::{
     html::{Cell, Column, Table, Tone, heading, list, paragraph, verdict},
-    misregistration::{BeforeAfter, apart},
+    misregistration::BeforeAfter,
     plots::label,
 };
 use crate::{
@@ -63,9 +63,7 @@ fn together(site: &SiteProducts) -> String {
         return String::new();
     };
     let pairs = BeforeAfter::all(geometric);
-    let size = |pair: &&BeforeAfter| apart(pair.before).metres;
-    let worst = pairs.iter().max_by(|a, b| size(a).total_cmp(&size(b)));
-    let words = worst.map_or_else(String::new, |pair| {
+    let words = BeforeAfter::worst(&pairs).map_or_else(String::new, |pair| {
         let others = match pairs.len() {
             1 => String::new(),
             count => format!(" It is the worst of {}.", counted(count, "pair")),

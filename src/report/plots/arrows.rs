@@ -8,7 +8,7 @@ use plotters::{
 };
 
 use super::{
-    COLOURS, Panel, Plot,
+    COLOURS, Key, Panel, Plot,
     draw::{Chart, Drawn},
     quoted, rounded,
 };
@@ -19,7 +19,7 @@ const BARB: f64 = 9.0;
 /// Vectors of one kind.
 #[derive(Debug)]
 pub(in crate::report) struct Arrows {
-    /// Entry of the legend, and name in the CSV.
+    /// Name in the CSV, and in the legend, which adds the magnification.
     pub(in crate::report) label: String,
     /// Index into the colours, taken round.
     pub(in crate::report) colour: usize,
@@ -36,6 +36,20 @@ pub(in crate::report) struct Arrow {
 }
 
 impl Arrows {
+    /// Entry of the legend: the label with the magnification.
+    pub(super) fn key(&self) -> Key {
+        let times = self.times();
+        if times == "1" {
+            return Key::colour(&self.label, self.colour);
+        }
+        Key::colour(&format!("{}, × {times}", self.label), self.colour)
+    }
+
+    /// The magnification in digits.
+    pub(in crate::report) fn times(&self) -> String {
+        self.magnification.to_string()
+    }
+
     fn tip(&self, arrow: &Arrow) -> (f64, f64) {
         (
             arrow.from.0 + self.magnification * arrow.by.0,
@@ -52,7 +66,7 @@ pub(in crate::report) fn magnification(arrows: &[Arrow], room: (f64, f64)) -> f6
     if longest <= 0.0 || !longest.is_finite() {
         return 1.0;
     }
-    let power = 10_f64.powf((-longest.log10()).floor());
+    let power = 10_f64.powi((-longest.log10()).floor() as i32);
     let steps = [5.0, 2.0, 1.0].map(|step| step * power);
     let fits = steps.into_iter().find(|step| step * longest <= 1.0);
     fits.unwrap_or(power)

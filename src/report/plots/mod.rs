@@ -185,8 +185,7 @@ impl Plot {
                 Style::Crosses => Key::mark(&series.label),
                 _ => Key::colour(&series.label, series.colour),
             });
-            let of_arrows = panel.arrows.iter();
-            let of_arrows = of_arrows.map(|arrows| Key::colour(&arrows.label, arrows.colour));
+            let of_arrows = panel.arrows.iter().map(Arrows::key);
             for key in of_series.chain(of_arrows) {
                 if !keys.contains(&key) {
                     keys.push(key);
