@@ -183,6 +183,30 @@ fn the_metakernel_lists_the_adjusted_kernels_last_and_the_comments_say_the_rule(
 }
 
 #[test]
+fn the_metakernel_counts_paths_from_where_the_files_go_in_the_end() {
+    let image = Image::of_scene("E02-02016");
+    let folder = tempfile::tempdir().unwrap();
+    let staging = folder.path().join(".staging/deep");
+    let to = AdjustedKernels {
+        directory: &staging,
+        ..kernels_of(&image, folder.path())
+    };
+    let of_image = AdjustedImage {
+        times: &image.times,
+        orientation: &image.orientation,
+    };
+    write_adjusted_kernels(&to, &[of_image]).unwrap();
+    for name in ["adjusted", "adjusted.tm"] {
+        fs::rename(staging.join(name), folder.path().join(name)).unwrap();
+    }
+    let set = KernelSet::from_metakernel(&folder.path().join("adjusted.tm")).unwrap();
+    let own = set.kernels()[set.kernels().len() - 1].path.clone();
+    assert_eq!(own, folder.path().join("adjusted/E02-02016.bc"));
+    let (distance_m, turn_rad) = apart(&image.sampled_with(&set), &image.orientation);
+    assert!(distance_m < 1e-3 && turn_rad < 1e-9); // as above
+}
+
+#[test]
 fn another_bias_is_kept_and_the_comment_warns_of_isis() {
     let mut image = Image::of_scene("E02-02016");
     image.pointing = PointingConfig {
@@ -215,6 +239,29 @@ fn two_images_share_a_metakernel() {
     });
     let products = write_adjusted_kernels(&kernels_of(&images[0], folder.path()), &both).unwrap();
     assert_eq!(products.len(), 5);
+    let set = KernelSet::from_metakernel(&folder.path().join("adjusted.tm")).unwrap();
+    for (image, adjusted) in images.iter().zip(&adjusted) {
+        let (distance_m, turn_rad) = apart(&image.sampled_with(&set), adjusted);
+        assert!(distance_m < 1e-3 && turn_rad < 1e-9); // as above
+    }
+}
+
+#[test]
+fn images_shortly_after_one_another_do_not_reach_into_each_other() {
+    let first = Image::of_scene("E02-02016");
+    let mut second = Image::of_scene("E02-02016");
+    // Nearer than the padding of 1 s, and than what positions reach beyond it.
+    second.times.start = first.times.exposures().stop.plus(0.06);
+    second.times.id = "E02-02016b".to_owned();
+    second.orientation = second.sampled_with(&second.set);
+    let images = [first, second];
+    let adjusted = [0, 1].map(|index| adjusted(&images[index], 5.0));
+    let folder = tempfile::tempdir().unwrap();
+    let both = [0, 1].map(|index| AdjustedImage {
+        times: &images[index].times,
+        orientation: &adjusted[index],
+    });
+    write_adjusted_kernels(&kernels_of(&images[0], folder.path()), &both).unwrap();
     let set = KernelSet::from_metakernel(&folder.path().join("adjusted.tm")).unwrap();
     for (image, adjusted) in images.iter().zip(&adjusted) {
         let (distance_m, turn_rad) = apart(&image.sampled_with(&set), adjusted);

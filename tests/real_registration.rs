@@ -14,116 +14,20 @@ mod common;
 #[path = "common/lunar_pair.rs"]
 mod lunar_pair;
 
-use std::{
-    fs,
-    path::{Path, PathBuf},
-};
+use std::path::{Path, PathBuf};
 
-use areograph::{
-    geom::{
-        ellipsoid::spherical_to_xyz_m,
-        pushbroom::{Detector, Pose, Projector, SampledOrientation},
-        statistics::Summary,
-    },
-    units::{METRES_PER_KM, RADIANS_PER_DEGREE},
-};
-use lunar_pair::{FOLDER, attitude, inertial_position, moon_matrix, shots, times};
-use nalgebra::Vector3;
-use serde_json::Value;
-
-const SERIALS: [&str; 2] = ["LRO/1/286265995:36824/NACL", "LRO/1/286272781:34203/NACL"];
-
-/// One image of the pair with what its support data say.
-struct Image {
-    orientation: SampledOrientation,
-    detector: Detector,
-    lines: f64,
-    distortion_per_mm2: f64,
-    pixels_per_mm: f64,
-}
-
-impl Image {
-    fn read(path: &Path) -> Self {
-        let support: Value = serde_json::from_str(&fs::read_to_string(path).unwrap()).unwrap();
-        let number = |pointer: &str| support.pointer(pointer).unwrap().as_f64().unwrap();
-        let (start_s, period_s) = (
-            number("/starting_ephemeris_time"),
-            number("/line_scan_rate/0/2"),
-        );
-        let lines = number("/image_lines");
-        let pointing = &support["instrument_pointing"];
-        let samples: Vec<(f64, Pose)> = times(pointing)
-            .iter()
-            .map(|et_s| {
-                let to_moon = moon_matrix(&support["body_rotation"], *et_s);
-                let pose = Pose {
-                    position_m: to_moon * inertial_position(&support["instrument_position"], *et_s),
-                    mars_to_camera: attitude(pointing, *et_s) * to_moon.transpose(),
-                };
-                ((et_s - start_s) / period_s - 0.5 * lines, pose)
-            })
-            .collect();
-        let pixels_per_mm = number("/focal2pixel_samples/2");
-        Self {
-            orientation: SampledOrientation::new(&samples).unwrap(),
-            detector: Detector {
-                focal_length_px: number("/focal_length_model/focal_length") * pixels_per_mm,
-                // The centre of the first pixel is 0.5 there, as here.
-                boresight_sample: number("/detector_center/sample"),
-                sample_sense: -1.0,
-                samples: number("/image_samples"),
-            },
-            lines,
-            distortion_per_mm2: number("/optical_distortion/lrolrocnac/coefficients/0"),
-            pixels_per_mm,
-        }
-    }
-
-    /// Line and sample as ISIS counts them: 1 at the centre of the first pixel.
-    fn place(&self, point_m: &Vector3<f64>) -> [f64; 2] {
-        let projector = Projector::new(&self.orientation, self.lines).unwrap();
-        let solution = projector.project(point_m).unwrap();
-        let y_px = self.detector.focal_px(&solution.camera_m).unwrap().y;
-        // The camera's own distortion: undistorted = distorted / (1 + k · distorted²), in millimetres.
-        let ideal_mm = y_px / self.pixels_per_mm;
-        let distorted_mm = (0..20).fold(ideal_mm, |seen: f64, _| {
-            ideal_mm * (1.0 + self.distortion_per_mm2 * seen * seen)
-        });
-        let sample = self.detector.sample(distorted_mm * self.pixels_per_mm);
-        [solution.x + 0.5 * self.lines + 0.5, sample + 0.5]
-    }
-
-    fn shows(&self, [line, sample]: [f64; 2]) -> bool {
-        (0.5..=self.lines + 0.5).contains(&line)
-            && (0.5..=self.detector.samples + 0.5).contains(&sample)
-    }
-}
-
-fn images(folder: &Path) -> [Image; 2] {
-    ["lidarObservationImage1.isd", "lidarObservationImage2.isd"]
-        .map(|name| Image::read(&folder.join(FOLDER).join(name)))
-}
+use areograph::geom::statistics::Summary;
+use lunar_pair::{FOLDER, images, lidar_points, shots};
 
 /// Measured minus projected line and sample of every measure of `file`, by image, and the number of points.
 fn differences(folder: &Path, file: &str) -> ([Vec<[f64; 2]>; 2], usize) {
     let images = images(folder);
-    let document: Value =
-        serde_json::from_str(&fs::read_to_string(folder.join(file)).unwrap()).unwrap();
-    let points = document["points"].as_array().unwrap();
+    let points = lidar_points(&folder.join(file));
     let mut found = [Vec::new(), Vec::new()];
-    for point in points {
-        let number = |key: &str| point[key].as_f64().unwrap();
-        let point_m = spherical_to_xyz_m(
-            number("longitude") * RADIANS_PER_DEGREE,
-            number("latitude") * RADIANS_PER_DEGREE,
-            number("radius") * METRES_PER_KM,
-        );
-        for measure in point["measures"].as_array().unwrap() {
-            let serial = measure["serialNumber"].as_str().unwrap();
-            let image = SERIALS.iter().position(|known| *known == serial).unwrap();
-            let [line, sample] = images[image].place(&point_m);
-            let read = |key: &str| measure[key].as_f64().unwrap();
-            found[image].push([read("line") - line, read("sample") - sample]);
+    for point in &points {
+        for (image, measured) in &point.measures {
+            let [line, sample] = images[*image].place(&point.ground_m);
+            found[*image].push([measured[0] - line, measured[1] - sample]);
         }
     }
     (found, points.len())

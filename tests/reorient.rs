@@ -136,7 +136,7 @@ fn a_shift_of_lines_and_a_curved_correction_are_those_of_the_kernels() {
         for sample in &adjusted.samples {
             let et = sample.et.plus(shift_lines * image.times.line_period_s);
             let (position_m, camera_to_mars) = kernel_camera(&session, &image, et);
-            let correction = curved(sample.line_offset + shift_lines);
+            let correction = curved(sample.line_offset);
             let expected_m = position_m + correction.position_m;
             let distance_m = (Vector3::from(sample.position_m) - expected_m).norm();
             // Tags, shifted instants and nodes are rounded to 7e-9 s, 3e-5 m each at this speed.

@@ -125,25 +125,8 @@ fn plan_stages(config: &SiteConfig, out: &Path, force: bool) -> Result<Vec<Plann
             model.map(|model| model.blake3),
         ));
     }
-    let mut registered = Vec::new();
-    for (image, (orientation, model)) in config.images.iter().zip(&oriented) {
-        let Some(times) = times.iter().find(|times| times.id == image.id) else {
-            plan.outputs
-                .push((Stage::Register.of_image(&image.id), None));
-            plan.add(Stage::Register, Some(&image.id), follows());
-            registered.push(None);
-            continue;
-        };
-        let outputs = [
-            orientation.as_deref(),
-            model.as_deref(),
-            hash(converted.as_ref()),
-            hash(profiles.as_ref()),
-        ];
-        let parts = parts::register(config, times, outputs);
-        let found = plan.look_for::<ImageRegistration>(Stage::Register, Some(&image.id), &parts);
-        registered.push(found.map(|registration| registration.blake3));
-    }
+    let shots = [hash(converted.as_ref()), hash(profiles.as_ref())];
+    let registered = plan.register(config, times, &oriented, shots);
     let prepared = parts::Hashes {
         images: hash(images.as_ref()),
         converted: hash(converted.as_ref()),
@@ -200,6 +183,35 @@ impl Planner {
             .push((name(stage, image), hash(output.as_ref()).map(str::to_owned)));
         self.add(stage, image, because);
         output
+    }
+
+    /// Registration of every image, with the hash of its output where it is known.
+    fn register(
+        &mut self,
+        config: &SiteConfig,
+        times: &[ImageTimes],
+        oriented: &[(Option<String>, Option<String>)],
+        [converted, profiles]: [Option<&str>; 2],
+    ) -> Vec<Option<String>> {
+        let stage = Stage::Register;
+        let images = config.images.iter().zip(oriented);
+        let registered = images.map(|(image, (orientation, model))| {
+            let Some(times) = times.iter().find(|times| times.id == image.id) else {
+                self.outputs.push((stage.of_image(&image.id), None));
+                self.add(stage, Some(&image.id), follows());
+                return None;
+            };
+            let outputs = [
+                orientation.as_deref(),
+                model.as_deref(),
+                converted,
+                profiles,
+            ];
+            let parts = parts::register(config, times, outputs);
+            let found = self.look_for::<ImageRegistration>(stage, Some(&image.id), &parts);
+            found.map(|registration| registration.blake3)
+        });
+        registered.collect()
     }
 
     /// The steps of a site with tie points.

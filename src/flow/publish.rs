@@ -108,7 +108,7 @@ fn make_products(folder: &Path, results: &Results<'_>, fingerprint: String) -> R
         complaints: &complaints,
         notes: &notes,
         warnings: &warnings,
-        geometric: results.geometric_products(&adjusted_images),
+        geometric: results.geometric_products(folder, &adjusted_images),
     };
     let (invalid_because, remarks) = (site.invalid_because(), site.remarks());
     let staging = staging(folder)?;

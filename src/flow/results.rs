@@ -1,5 +1,7 @@
 //! Everything that the stages before the last one made.
 
+use std::path::Path;
+
 use super::{Stage, choice::KernelChoice, geometric::Geometric};
 use crate::{
     config::SiteConfig,
@@ -68,14 +70,17 @@ impl Results<'_> {
             .collect()
     }
 
-    /// What tie points make of the site; `adjusted_images` are [`Self::adjusted_image_products`].
+    /// What tie points make of the site in `folder`; `adjusted_images` are [`Self::adjusted_image_products`].
     pub(super) fn geometric_products<'a>(
         &'a self,
+        folder: &'a Path,
         adjusted_images: &'a [ImageProducts<'a>],
     ) -> Option<GeometricProducts<'a>> {
         let geometric = self.geometric?;
         let after = &geometric.readjusted.value.intersected;
         Some(GeometricProducts {
+            kernels: self.kernels,
+            folder,
             ties: &geometric.ties.value,
             intersected: &geometric.intersected.value.ties,
             pairs: &geometric.intersected.value.pairs,

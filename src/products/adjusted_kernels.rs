@@ -15,8 +15,9 @@
 //! instant at which it was exposed. Therefore each pair belongs to its image alone, and to nothing else that
 //! happened meanwhile, laser shots among them.
 //!
-//! Between two images the kernels end half way. Of two that were exposed at once, the later one wins in
-//! `adjusted.tm`; with its own pair alone each is right.
+//! Between two images the kernels end half way. Of two that were exposed at once, or nearer to each other than
+//! the tolerance with which attitude is asked (CSPICE takes the last file that has any within it), the later
+//! one wins in `adjusted.tm`; with its own pair alone each is right.
 
 mod columns;
 
@@ -27,7 +28,9 @@ use std::{
 
 use nalgebra::Vector3;
 
-use super::{Product, Writer, fault::ProductFault, files::write_text};
+use super::{
+    GeometricProducts, Product, SiteProducts, Writer, fault::ProductFault, files::write_text,
+};
 use crate::{
     config::{KernelsConfig, PointingConfig},
     constants::MGS_POINTING_BIAS,
@@ -50,6 +53,8 @@ const POSITION_TOLERANCE_M: f64 = 1e-3;
 /// The same for rotations, radians: 100 times what the bus turns in the 1.5e-8 s to which ticks are rounded.
 const ROTATION_TOLERANCE_RAD: f64 = 1e-9;
 
+/// Positions reach this far beyond attitudes, seconds: light from MGS to the centre of Mars takes 0.013 s.
+const LIGHT_TIME_S: f64 = 0.1;
 /// A bias this near to the usual one is the usual one, seconds.
 const BIAS_TOLERANCE_S: f64 = 1e-9;
 
@@ -75,6 +80,30 @@ pub struct AdjustedKernels<'a> {
     pub kernels: &'a KernelsConfig,
     /// The pointing bias that readers of the kernels will apply.
     pub pointing: &'a PointingConfig,
+}
+
+/// Writes the adjusted kernels of a site with tie points.
+pub(super) fn write(
+    written: &mut Writer,
+    site: &SiteProducts,
+    geometric: &GeometricProducts,
+) -> Result<()> {
+    let to = AdjustedKernels {
+        directory: written.directory,
+        site_folder: geometric.folder,
+        originals: geometric.kernels,
+        kernels: &site.config.kernels,
+        pointing: &site.config.pointing,
+    };
+    let images = geometric.adjusted_images.iter().map(|image| AdjustedImage {
+        times: image.times,
+        orientation: image.orientation,
+    });
+    let images: Vec<AdjustedImage> = images.collect();
+    written
+        .products
+        .extend(write_adjusted_kernels(&to, &images)?);
+    Ok(())
 }
 
 /// Writes an SPK and a CK of every image, and the metakernel; reads every sample back through them.
@@ -110,7 +139,8 @@ pub fn write_adjusted_kernels(
             session: &session,
             to,
             image,
-            span: span(images, index, to.kernels.padding_s),
+            attitude_span: span(images, index, to.kernels.padding_s),
+            orbit_span: span(images, index, to.kernels.padding_s + LIGHT_TIME_S),
         };
         let segment = source.attitudes()?;
         written.add(attitude_name(image), |path| {

@@ -1,10 +1,17 @@
 //! Products in the forms of other programs: ISIS, Ames Stereo Pipeline, GIS, catalogues.
 
+mod adjusted;
+mod gcp;
 mod geopackage;
+mod lidar_data;
+mod points;
 mod readme;
 mod shapefile;
 mod stac;
 
+pub use gcp::{ControlMeasure, ControlPoint, write_gcp};
+pub use lidar_data::{LidarPoint, moc_serial_number, write_lidar_data};
+pub use points::{GroundEstimate, ImageMeasure};
 use serde_json::{Value, json};
 
 use super::{
@@ -59,6 +66,9 @@ pub(super) fn write(written: &mut Writer, site: &SiteProducts) -> Result<()> {
             // Written with the points.
             written.add(format!("exchange/footprints.{extension}"), |_| Ok(0))?;
         }
+    }
+    if let Some(geometric) = &site.geometric {
+        adjusted::write(written, site, geometric)?;
     }
     written.add("exchange/kernels.json", |path| {
         write_json(path, &kernel_report::report(site))?;

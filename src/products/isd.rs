@@ -30,7 +30,10 @@ use crate::{
         NAIF_IAU_MARS, NAIF_MARS, NAIF_MGS_BUS, NAIF_MOC_NA,
     },
     error::Result,
-    stages::sample_orientation::{CameraTables, InterpolationCheck},
+    stages::{
+        reorient::geometric_tables,
+        sample_orientation::{CameraTables, InterpolationCheck, Orientation},
+    },
     units::METRES_PER_KM,
 };
 
@@ -109,7 +112,36 @@ pub(super) fn write(
     site: &SiteProducts,
     image: &ImageProducts,
 ) -> Result<()> {
-    written.add(format!("images/{}/isd.json", image.times.id), |path| {
+    write_as(written, site, image, "isd.json")
+}
+
+/// Writes the adjusted camera model of an image.
+///
+/// Its positions are geometric: what was adjusted is where the camera was, not where light of it seemed to come
+/// from, and adjusted ground must be seen at the measured pixels.
+pub(super) fn write_adjusted(
+    written: &mut Writer,
+    site: &SiteProducts,
+    image: &ImageProducts,
+) -> Result<()> {
+    let orientation = Orientation {
+        tables: geometric_tables(image.orientation)?,
+        ..image.orientation.clone()
+    };
+    let image = ImageProducts {
+        orientation: &orientation,
+        ..*image
+    };
+    write_as(written, site, &image, "adjusted_isd.json")
+}
+
+fn write_as(
+    written: &mut Writer,
+    site: &SiteProducts,
+    image: &ImageProducts,
+    name: &str,
+) -> Result<()> {
+    written.add(format!("images/{}/{name}", image.times.id), |path| {
         write_json(path, &isd(site, image))?;
         Ok(image.orientation.tables.et_s.len() as u64)
     })

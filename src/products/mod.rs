@@ -5,6 +5,9 @@
 //! | `footprints.parquet`, `.csv`, `.geojson` | GIS and scripts: shots in the windows, IAU 2000 |
 //! | `ranges.parquet`, `ranges.json` | range residuals per shot; statistics per profile |
 //! | `registration.parquet`, `registration.json` | line and sample of every footprint in every image; how the iterations converge |
+//! | `ties.parquet`, `adjusted_footprints.parquet`, `adjustment.json` | tie points and footprints in the adjustment; what it says of the site |
+//! | `registration_adjusted.parquet` | line and sample of every footprint with the adjusted orientation |
+//! | `images/<id>/adjusted_*`, `adjusted/…`, `adjusted.tm` | the adjusted orientation: samples, camera model, SPICE kernels |
 //! | `images/<id>/orientation.parquet`, `.json` | orientation samples; polynomials with residuals |
 //! | `images/<id>/isd.json` | camera models of the Community Sensor Model (`usgscsm`) |
 //! | `footprints.xml` | a PDS4-style label of `footprints.csv` |
@@ -15,6 +18,7 @@
 //! The same site gives the same bytes; nothing here looks at a clock.
 
 mod adjusted_kernels;
+mod adjustment;
 mod coordinates;
 mod exchange;
 pub(crate) mod fault;
@@ -33,10 +37,15 @@ mod shot;
 mod site;
 mod table;
 mod text_table;
+mod ties;
 
 use std::path::{Path, PathBuf};
 
 pub use adjusted_kernels::{AdjustedImage, AdjustedKernels, write_adjusted_kernels};
+pub use exchange::{
+    ControlMeasure, ControlPoint, GroundEstimate, ImageMeasure, LidarPoint, moc_serial_number,
+    write_gcp, write_lidar_data,
+};
 pub use site::{GeometricProducts, ImageProducts, KernelLine, SiteProducts};
 
 use crate::error::Result;
@@ -66,8 +75,18 @@ pub fn write_products(directory: &Path, site: &SiteProducts, page: &str) -> Resu
     ranges::write(&mut written, site)?;
     registration::write(&mut written, site)?;
     for image in site.images {
-        orientation::write(&mut written, image)?;
+        orientation::write(&mut written, image, "")?;
         isd::write(&mut written, site, image)?;
+    }
+    if let Some(geometric) = &site.geometric {
+        ties::write(&mut written, site, geometric)?;
+        adjustment::write(&mut written, site, geometric)?;
+        registration::write_adjusted(&mut written, site, geometric)?;
+        for image in geometric.adjusted_images {
+            orientation::write(&mut written, image, "adjusted_")?;
+            isd::write_adjusted(&mut written, site, image)?;
+        }
+        adjusted_kernels::write(&mut written, site, geometric)?;
     }
     written.add("report/index.html", |path| {
         files::write_text(path, page)?;

@@ -104,13 +104,14 @@ struct Polynomial<'a> {
     residuals: &'a [f64],
 }
 
-pub(super) fn write(written: &mut Writer, image: &ImageProducts) -> Result<()> {
+/// Writes samples and models of an image; the names of the files begin with `prefix`.
+pub(super) fn write(written: &mut Writer, image: &ImageProducts, prefix: &str) -> Result<()> {
     let folder = format!("images/{}", image.times.id);
     let table = Table::new(columns(&image.orientation.samples))?;
-    written.add(format!("{folder}/orientation.parquet"), |path| {
+    written.add(format!("{folder}/{prefix}orientation.parquet"), |path| {
         parquet::write(path, &table, Vec::new())
     })?;
-    written.add(format!("{folder}/orientation.json"), |path| {
+    written.add(format!("{folder}/{prefix}orientation.json"), |path| {
         write_json(path, &document(image))?;
         Ok(table.rows() as u64)
     })

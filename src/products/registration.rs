@@ -8,7 +8,7 @@ use super::{
     Writer,
     files::write_json,
     parquet,
-    site::{ImageProducts, SiteProducts},
+    site::{GeometricProducts, ImageProducts, SiteProducts},
     table::{Column, Table, Values},
 };
 use crate::{
@@ -94,7 +94,7 @@ struct ProfileDocument<'a> {
 }
 
 pub(super) fn write(written: &mut Writer, site: &SiteProducts) -> Result<()> {
-    let table = Table::new(columns(site))?;
+    let table = Table::new(columns(site, site.images))?;
     written.add("registration.parquet", |path| {
         parquet::write(path, &table, Vec::new())
     })?;
@@ -104,34 +104,46 @@ pub(super) fn write(written: &mut Writer, site: &SiteProducts) -> Result<()> {
     })
 }
 
+/// Writes where the adjusted images have the footprints.
+pub(super) fn write_adjusted(
+    written: &mut Writer,
+    site: &SiteProducts,
+    geometric: &GeometricProducts,
+) -> Result<()> {
+    let table = Table::new(columns(site, geometric.adjusted_images))?;
+    written.add("registration_adjusted.parquet", |path| {
+        parquet::write(path, &table, Vec::new())
+    })
+}
+
 /// One column over all images.
 fn all<T>(
-    site: &SiteProducts,
+    images: &[ImageProducts],
     of: impl Fn(&ImageProducts<'_>, &RegisteredPoints) -> Vec<T>,
 ) -> Vec<T> {
-    let images = site.images.iter();
+    let images = images.iter();
     images
         .flat_map(|image| of(image, &image.registration.points))
         .collect()
 }
 
-fn columns(site: &SiteProducts) -> Vec<Column> {
+fn columns(site: &SiteProducts, images: &[ImageProducts]) -> Vec<Column> {
     let number = |name, description, of: fn(&RegisteredPoints) -> &Vec<f64>| {
-        let values = all(site, |_, points| of(points).clone());
+        let values = all(images, |_, points| of(points).clone());
         Column::new(name, description, Values::F64(values))
     };
     let count = |name, description, of: fn(&RegisteredPoints) -> &Vec<u32>| {
-        let values = all(site, |_, points| of(points).clone());
+        let values = all(images, |_, points| of(points).clone());
         Column::new(name, description, Values::U32(values))
     };
     let flag = |name, description, of: fn(&RegisteredPoints) -> &Vec<bool>| {
-        let values = all(site, |_, points| of(points).clone());
+        let values = all(images, |_, points| of(points).clone());
         Column::new(name, description, Values::Bool(values))
     };
-    let images = all(site, |image, points| {
+    let ids = all(images, |image, points| {
         vec![image.times.id.clone(); points.len()]
     });
-    let profiles = all(site, |_, points| {
+    let profiles = all(images, |_, points| {
         let id = |index: &u32| {
             let profile = site.profiles.get(*index as usize);
             profile.map_or_else(String::new, |profile| profile.id.clone())
@@ -139,7 +151,7 @@ fn columns(site: &SiteProducts) -> Vec<Column> {
         points.profile.iter().map(id).collect()
     });
     vec![
-        Column::new("image", "image identifier", Values::Text(images)),
+        Column::new("image", "image identifier", Values::Text(ids)),
         Column::new(
             "profile",
             "profile: window, orbit and crossing",

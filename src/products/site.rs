@@ -1,6 +1,6 @@
 //! Everything of one site that products are made of.
 
-use std::collections::BTreeMap;
+use std::{collections::BTreeMap, path::Path};
 
 use super::fault::ProductFault;
 use crate::{
@@ -8,7 +8,7 @@ use crate::{
     error::Result,
     footprints::Footprints,
     frames::MarsIau2000,
-    spice::Wanted,
+    spice::{KernelSet, Wanted},
     stages::{
         adjust::Adjusted,
         check_ranges::{BiasScan, RangeCheck},
@@ -63,6 +63,10 @@ pub struct SiteProducts<'a> {
 /// What tie points make of a site, before and after the adjustment.
 #[derive(Debug, Clone, Copy)]
 pub struct GeometricProducts<'a> {
+    /// The kernels that the adjusted ones follow.
+    pub kernels: &'a KernelSet,
+    /// Folder of the site's products, where `adjusted.tm` will lie.
+    pub folder: &'a Path,
     /// The tie points.
     pub ties: &'a Ties,
     /// Their ground points with the orientation of the kernels.

@@ -6,7 +6,7 @@
 //! | ask CSPICE | [`Session`], one at a time in a process |
 //! | know where the gaps are | [`Session::coverage`], [`Session::require_position`], [`Session::require_attitude`] |
 //! | leave CSPICE behind, for parallel work | [`Session::trajectory`] |
-//! | write kernels of an invented mission | [`write_spk`], [`write_ck`] |
+//! | write kernels: of an invented mission, of adjusted orientations | [`write_spk`], [`write_ck`] |
 //!
 //! Kilometres become metres here, and nowhere else.
 

@@ -1,4 +1,4 @@
-//! Kernels of an invented mission, written with CSPICE's own writers.
+//! Kernels of an invented mission and of adjusted orientations, written with CSPICE's own writers.
 
 use std::{
     ffi::c_int,

@@ -84,7 +84,7 @@ impl<M: ExteriorOrientation> Candidate<'_, M> {
 ///
 /// Of the shots those take part that fall within an image's lines and not farther beside it than `config`
 /// says, and those that were fired while an image was exposed: these with their range. A shot in two windows
-/// counts once. Its name is its profile's and its row in the table of footprints.
+/// counts once. It is named by [`shot_id`].
 ///
 /// # Source
 /// Yoon & Shan 2004: ranges only in the simultaneous image.
@@ -114,7 +114,7 @@ pub fn prepare_adjustment<M: ExteriorOrientation>(
             if (range.is_some() || near.contains(row)) && taken.insert(*row) {
                 let at = *row as usize;
                 shots.push(LaserShot {
-                    id: format!("{}:{row}", profile.id),
+                    id: shot_id(profile, *row),
                     ground_m: spherical_to_xyz_m(
                         footprints.longitude_rad[at],
                         footprints.latitude_rad[at],
@@ -130,6 +130,12 @@ pub fn prepare_adjustment<M: ExteriorOrientation>(
         .into_iter()
         .map(|candidate| candidate.weighed(config));
     (weighed.collect(), shots)
+}
+
+/// Name of the shot in row `row` of the footprints, a shot of `profile`.
+#[must_use]
+pub fn shot_id(profile: &Profile, row: u32) -> String {
+    format!("{}:{row}", profile.id)
 }
 
 /// The range of a shot, when an image was exposed meanwhile.

@@ -88,8 +88,9 @@ impl Fault for ReorientFault {
 /// * `time_shift_lines` – `s`, by how many lines later than its tag says a line was exposed
 /// * `correction` – what is added at a line offset `x`, lines from the middle of the header image
 ///
-/// The line with the tag `x` gets the camera of `x + s`: `C(x) = C₀(x + s) + Δ(x + s)` and
-/// `M(x) = exp([θ(x + s)]×) M₀(x + s)`, all relative to Mars. Samples keep their epochs. Tables keep their
+/// The line with the tag `x` gets the camera of `x + s`: `C(x) = C₀(x + s) + Δ(x)` and
+/// `M(x) = exp([θ(x)]×) M₀(x + s)`, all relative to Mars, as
+/// [`CorrectedOrientation`](crate::geom::pushbroom::CorrectedOrientation) has it. Samples keep their epochs. Tables keep their
 /// nodes but those that the shift takes beyond what is known; their positions keep the light time and
 /// aberration that the original ones carry (a correction of 100 m would change those by 1 cm, one that grows
 /// by 10 m/s by 0.1 m).
@@ -250,7 +251,7 @@ impl<F: Fn(f64) -> LineCorrection> Corrected<'_, F> {
             position_m += residual.position_m;
             camera_to_mars *= residual.mars_to_camera.transpose();
         }
-        let correction = self.correction(self.image.line_offset(et))?;
+        let correction = self.correction(self.image.line_offset(tag))?;
         let turned = matrix_of_rotation_vector(&correction.rotation_rad);
         Ok((
             position_m + correction.position_m,
@@ -316,7 +317,7 @@ impl<F: Fn(f64) -> LineCorrection> Corrected<'_, F> {
         let bus_to_camera = Matrix3::from_fn(|row, column| tables.bus_to_camera[row][column]);
         let to_camera = camera_to_mars.transpose() * to_mars;
         let to_bus = bus_to_camera.transpose() * to_camera;
-        let (drift_m_s, turn_rad_s) = self.rates(self.image.line_offset(et))?;
+        let (drift_m_s, turn_rad_s) = self.rates(self.image.line_offset(tag))?;
         let spin = Vector3::from(original.mars_angular_velocity_rad_s[row]);
         let old_position_m = Vector3::from(lagrange(&original.position_m, at));
         let old_velocity_m_s = Vector3::from(lagrange(&original.velocity_m_s, at));

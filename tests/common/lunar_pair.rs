@@ -1,17 +1,28 @@
 //! A stereo pair of the Moon with the laser shots of its spacecraft (ISIS test data).
 #![allow(dead_code, reason = "each test program uses a part of this module")]
 
-use std::path::Path;
+use std::{fs, path::Path};
 
 use areograph::{
     frames::{Frame, Position},
-    geom::{attitude::matrix_of_spice_quaternion, ellipsoid::spherical_to_xyz_m},
+    geom::{
+        attitude::matrix_of_spice_quaternion,
+        ellipsoid::spherical_to_xyz_m,
+        pushbroom::{Detector, Pose, Projector, SampledOrientation},
+    },
     units::{METRES_PER_KM, RADIANS_PER_DEGREE},
 };
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 use serde_json::Value;
 
 pub(crate) const FOLDER: &str = "isis_lidar/lidarObservationPair";
+
+/// The images of the pair, as the files name them.
+pub(crate) const SERIALS: [&str; 2] = ["LRO/1/286265995:36824/NACL", "LRO/1/286272781:34203/NACL"];
+
+pub(crate) fn read_json(path: &Path) -> Value {
+    serde_json::from_str(&fs::read_to_string(path).unwrap()).unwrap()
+}
 
 /// Moon mean-Earth frame of the LOLA file.
 #[derive(Debug, Clone, Copy)]
@@ -128,4 +139,149 @@ pub(crate) fn attitude(table: &Value, et_s: f64) -> Matrix3<f64> {
         .slerp(&quaternion(after), u)
         .to_rotation_matrix()
         .into_inner()
+}
+
+/// One image of the pair with what its support data say.
+pub(crate) struct Image {
+    pub(crate) orientation: SampledOrientation,
+    pub(crate) detector: Detector,
+    pub(crate) lines: f64,
+    pub(crate) start_s: f64,
+    pub(crate) period_s: f64,
+    distortion_per_mm2: f64,
+    pixels_per_mm: f64,
+}
+
+impl Image {
+    pub(crate) fn read(path: &Path) -> Self {
+        let support = read_json(path);
+        let number = |pointer: &str| support.pointer(pointer).unwrap().as_f64().unwrap();
+        let (start_s, period_s) = (
+            number("/starting_ephemeris_time"),
+            number("/line_scan_rate/0/2"),
+        );
+        let lines = number("/image_lines");
+        let pointing = &support["instrument_pointing"];
+        let samples: Vec<(f64, Pose)> = times(pointing)
+            .iter()
+            .map(|et_s| {
+                let to_moon = moon_matrix(&support["body_rotation"], *et_s);
+                let pose = Pose {
+                    position_m: to_moon * inertial_position(&support["instrument_position"], *et_s),
+                    mars_to_camera: attitude(pointing, *et_s) * to_moon.transpose(),
+                };
+                ((et_s - start_s) / period_s - 0.5 * lines, pose)
+            })
+            .collect();
+        let pixels_per_mm = number("/focal2pixel_samples/2");
+        Self {
+            orientation: SampledOrientation::new(&samples).unwrap(),
+            detector: Detector {
+                focal_length_px: number("/focal_length_model/focal_length") * pixels_per_mm,
+                // The centre of the first pixel is 0.5 there, as here.
+                boresight_sample: number("/detector_center/sample"),
+                sample_sense: -1.0,
+                samples: number("/image_samples"),
+            },
+            lines,
+            start_s,
+            period_s,
+            distortion_per_mm2: number("/optical_distortion/lrolrocnac/coefficients/0"),
+            pixels_per_mm,
+        }
+    }
+
+    /// Line and sample as ISIS counts them: 1 at the centre of the first pixel.
+    pub(crate) fn place(&self, point_m: &Vector3<f64>) -> [f64; 2] {
+        let projector = Projector::new(&self.orientation, self.lines).unwrap();
+        let solution = projector.project(point_m).unwrap();
+        let y_px = self.detector.focal_px(&solution.camera_m).unwrap().y;
+        // The camera's own distortion: undistorted = distorted / (1 + k · distorted²), in millimetres.
+        let ideal_mm = y_px / self.pixels_per_mm;
+        let distorted_mm = (0..20).fold(ideal_mm, |seen: f64, _| {
+            ideal_mm * (1.0 + self.distortion_per_mm2 * seen * seen)
+        });
+        let sample = self.detector.sample(distorted_mm * self.pixels_per_mm);
+        [solution.x + 0.5 * self.lines + 0.5, sample + 0.5]
+    }
+
+    /// Where a camera without distortion has what this one has at `sample`; both 0 at the outer edge.
+    pub(crate) fn ideal_sample(&self, sample: f64) -> f64 {
+        let distorted_mm = self.detector.y_of_sample_px(sample) / self.pixels_per_mm;
+        let ideal_mm = distorted_mm / (1.0 + self.distortion_per_mm2 * distorted_mm * distorted_mm);
+        self.detector.sample(ideal_mm * self.pixels_per_mm)
+    }
+
+    /// Lines from the middle of the image at an instant.
+    pub(crate) fn x_lines(&self, et_s: f64) -> f64 {
+        (et_s - self.start_s) / self.period_s - 0.5 * self.lines
+    }
+
+    pub(crate) fn shows(&self, [line, sample]: [f64; 2]) -> bool {
+        (0.5..=self.lines + 0.5).contains(&line)
+            && (0.5..=self.detector.samples + 0.5).contains(&sample)
+    }
+}
+
+/// Both images, from the folder of all real data.
+pub(crate) fn images(root: &Path) -> [Image; 2] {
+    ["lidarObservationImage1.isd", "lidarObservationImage2.isd"]
+        .map(|name| Image::read(&root.join(FOLDER).join(name)))
+}
+
+/// A shot as ISIS's lidar data describe it.
+pub(crate) struct LidarPoint {
+    pub(crate) id: String,
+    pub(crate) et_s: f64,
+    pub(crate) range_m: f64,
+    pub(crate) range_sigma_m: f64,
+    /// Moon-fixed.
+    pub(crate) ground_m: Vector3<f64>,
+    /// To the north, to the east, upwards.
+    pub(crate) ground_sigma_m: [f64; 3],
+    /// Images that were exposed meanwhile.
+    pub(crate) simultaneous: Vec<String>,
+    /// Image with line and sample as ISIS counts them.
+    pub(crate) measures: Vec<(usize, [f64; 2])>,
+}
+
+pub(crate) fn lidar_points(path: &Path) -> Vec<LidarPoint> {
+    let document = read_json(path);
+    let points = document["points"].as_array().unwrap();
+    points.iter().map(lidar_point).collect()
+}
+
+fn lidar_point(point: &Value) -> LidarPoint {
+    let number = |key: &str| point[key].as_f64().unwrap();
+    let (longitude_rad, latitude_rad, radius_m) = (
+        number("longitude") * RADIANS_PER_DEGREE,
+        number("latitude") * RADIANS_PER_DEGREE,
+        number("radius") * METRES_PER_KM,
+    );
+    // The upper triangle by rows: latitude and longitude in radians, radius in metres.
+    let root = |at: usize| point["aprioriMatrix"][at].as_f64().unwrap().sqrt();
+    let measure = |measure: &Value| {
+        let serial = measure["serialNumber"].as_str().unwrap();
+        let image = SERIALS.iter().position(|known| *known == serial).unwrap();
+        let read = |key: &str| measure[key].as_f64().unwrap();
+        (image, [read("line"), read("sample")])
+    };
+    let array = |key: &str| point[key].as_array().unwrap();
+    LidarPoint {
+        id: point["id"].as_str().unwrap().to_owned(),
+        et_s: number("time"),
+        range_m: number("range") * METRES_PER_KM,
+        range_sigma_m: number("sigmaRange"),
+        ground_m: spherical_to_xyz_m(longitude_rad, latitude_rad, radius_m),
+        ground_sigma_m: [
+            root(0) * radius_m,
+            root(3) * radius_m * latitude_rad.cos(),
+            root(5),
+        ],
+        simultaneous: array("simultaneousImages")
+            .iter()
+            .map(|serial| serial.as_str().unwrap().to_owned())
+            .collect(),
+        measures: array("measures").iter().map(measure).collect(),
+    }
 }

@@ -4,226 +4,97 @@
 //! them. The squares of the other rows sum up to the Schur complement `U − W V⁻¹ Wᵀ`; nothing is
 //! subtracted, so nothing is lost to cancellation.
 
-use nalgebra::{DMatrix, DVector, Dyn, Matrix3, OMatrix, U3, Vector3};
+use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 use rayon::prelude::*;
 
 use super::{
-    Dropped, Network,
-    rows::{self, Row},
-    unknowns::{Columns, State},
+    layout::{Layout, PointRows},
+    unknowns::State,
 };
-use crate::geom::{
-    collinearity::BehindCamera, pushbroom::ExteriorOrientation, robust::RobustWeight,
-};
+use crate::geom::{collinearity::BehindCamera, pushbroom::ExteriorOrientation};
 
 /// Parts in which points are summed: fixed, so that the sums do not depend on the number of threads.
 const PARTS: usize = 16;
-/// A point whose rows determine one direction this much worse than another counts as undetermined.
-const DIRECTION_RATIO_MIN: f64 = 1e-6;
 
-/// Which observations belong to each point.
-pub(super) struct ByPoint {
-    pub(super) views: Vec<Vec<usize>>,
-    pub(super) ranges: Vec<Vec<usize>>,
+/// Transforms at least three rows so that the point is left in the first three, and gives its triangle `R`.
+///
+/// `by_point` is used up; all else is transformed in place.
+///
+/// # Source
+/// Householder 1958, Unitary triangularization of a nonsymmetric matrix.
+pub(super) fn triangulate(rows: &mut PointRows) -> Matrix3<f64> {
+    let PointRows {
+        by_point,
+        beside,
+        width,
+        sums,
+        ..
+    } = rows;
+    let mut triangle = Matrix3::zeros();
+    for axis in 0..3 {
+        let (above, below) = by_point.split_at_mut(axis);
+        let length = below
+            .iter()
+            .map(|row| row[axis].powi(2))
+            .sum::<f64>()
+            .sqrt();
+        for (row, entry) in above.iter().enumerate() {
+            triangle[(row, axis)] = entry[axis];
+        }
+        if length == 0.0 {
+            continue;
+        }
+        // The mirror's normal takes the place of the column; its first entry is made large, not small.
+        let pivot = below[0][axis];
+        let image = -length.copysign(pivot);
+        below[0][axis] = pivot - image;
+        triangle[(axis, axis)] = image;
+        let share = 1.0 / (length * (length + pivot.abs()));
+        for later in axis + 1..3 {
+            let along: f64 = below.iter().map(|row| row[axis] * row[later]).sum();
+            for row in &mut *below {
+                row[later] -= share * along * row[axis];
+            }
+        }
+        sums.clear();
+        sums.resize(*width, 0.0);
+        let beside = &mut beside[axis * *width..];
+        for (normal, row) in below.iter().zip(beside.chunks_exact(*width)) {
+            add_multiple(sums, normal[axis], row);
+        }
+        for (normal, row) in below.iter().zip(beside.chunks_exact_mut(*width)) {
+            add_multiple(row, -share * normal[axis], sums);
+        }
+    }
+    triangle
 }
 
-impl ByPoint {
-    pub(super) fn of<M>(network: &Network<M>) -> Self {
-        let mut by_point = Self {
-            views: vec![Vec::new(); network.points.len()],
-            ranges: vec![Vec::new(); network.points.len()],
-        };
-        for (index, view) in network.views.iter().enumerate() {
-            by_point.views[view.point].push(index);
-        }
-        for (index, range) in network.ranges.iter().enumerate() {
-            by_point.ranges[range.point].push(index);
-        }
-        by_point
+/// Adds `factor · from` to `to`.
+fn add_multiple(to: &mut [f64], factor: f64, from: &[f64]) {
+    for (to, from) in to.iter_mut().zip(from) {
+        *to += factor * from;
     }
 }
 
-/// A network laid out for its adjustment.
-pub(super) struct Layout<'a, M> {
-    pub(super) network: &'a Network<M>,
-    pub(super) columns: Columns,
-    pub(super) by_point: ByPoint,
-    pub(super) robust: Option<RobustWeight>,
-}
-
-/// The weighted rows of one point: views by twos, then ranges, then its own coordinates if observed.
-pub(super) struct PointRows {
-    /// Shared unknowns that the rows contain, ascending.
-    pub(super) columns: Vec<usize>,
-    pub(super) by_shared: DMatrix<f64>,
-    pub(super) by_point: OMatrix<f64, Dyn, U3>,
-    pub(super) misclosures: DVector<f64>,
-    /// Standard deviation and weight factor of each row.
-    pub(super) weights: Vec<(f64, f64)>,
-    /// Their part of the sum that is made small.
-    pub(super) cost: f64,
-}
-
-/// A point's rows after the transformation.
-pub(super) struct Eliminated {
-    pub(super) columns: Vec<usize>,
-    /// `R` of the coordinates' columns.
-    pub(super) triangle: Matrix3<f64>,
-    /// Transformed rows of the shared unknowns; the first three go with `triangle`.
-    pub(super) by_shared: DMatrix<f64>,
-    pub(super) misclosures: DVector<f64>,
-}
-
-impl<M: ExteriorOrientation> Layout<'_, M> {
-    fn columns_of(&self, point: usize) -> Vec<usize> {
-        let views = self.by_point.views[point]
+/// Step of the point that goes with a step of the shared unknowns.
+pub(super) fn point_step_m(rows: &mut PointRows, shared: &DVector<f64>) -> Option<Vector3<f64>> {
+    // What the shared unknowns leave of the misclosures; from here on a row is nothing but that.
+    for row in 0..rows.weights.len() {
+        let at = row * rows.width;
+        let known: f64 = rows
+            .runs
             .iter()
-            .map(|view| self.network.views[*view].image);
-        let ranges = self.by_point.ranges[point]
-            .iter()
-            .map(|range| &self.network.ranges[*range]);
-        let images = views.chain(ranges.clone().map(|range| range.image));
-        let mut columns: Vec<usize> = images
-            .flat_map(|image| self.columns.of_image[image])
-            .chain(ranges.map(|range| self.columns.of_profile[range.profile]))
-            .flatten()
-            .collect();
-        columns.sort_unstable();
-        columns.dedup();
-        columns
-    }
-
-    /// The rows of `point` at `state`.
-    pub(super) fn rows(&self, state: &State, point: usize) -> Result<PointRows, BehindCamera> {
-        let (views, ranges) = (&self.by_point.views[point], &self.by_point.ranges[point]);
-        let priors = self.network.points[point].sigma_m;
-        let count = 2 * views.len() + ranges.len() + 3 * usize::from(priors.is_some());
-        let columns = self.columns_of(point);
-        let mut rows = PointRows {
-            by_shared: DMatrix::zeros(count, columns.len()),
-            columns,
-            by_point: OMatrix::<f64, Dyn, U3>::zeros(count),
-            misclosures: DVector::zeros(count),
-            weights: Vec::with_capacity(count),
-            cost: 0.0,
-        };
-        for view in views {
-            let view = &self.network.views[*view];
-            let pair = rows::of_view(self.network, state, view)?;
-            let of_image = &self.columns.of_image[view.image];
-            let (factor, cost) = self.robust_factor(&pair);
-            rows.cost += cost;
-            for row in &pair {
-                rows.push(row, of_image, factor);
-            }
-        }
-        for range in ranges {
-            let range = &self.network.ranges[*range];
-            let row = rows::of_range(self.network, state, range);
-            rows.cost += (row.misclosure / row.sigma).powi(2);
-            let at = rows.push(&row, &self.columns.of_image[range.image], 1.0);
-            if let Some(column) = self.columns.of_profile[range.profile] {
-                rows.add(at, column, 1.0 / row.sigma);
-            }
-        }
-        if let Some(sigma_m) = priors {
-            let initial_m = self.network.points[point].ground_m;
-            for axis in 0..3 {
-                let at = rows.weights.len();
-                rows.by_point[(at, axis)] = 1.0 / sigma_m[axis];
-                rows.misclosures[at] =
-                    (initial_m[axis] - state.points_m[point][axis]) / sigma_m[axis];
-                rows.cost += rows.misclosures[at].powi(2);
-                rows.weights.push((sigma_m[axis], 1.0));
-            }
-        }
-        Ok(rows)
-    }
-
-    /// Factor of a view's weights, and its part of the sum that is made small.
-    fn robust_factor(&self, pair: &[Row; 2]) -> (f64, f64) {
-        let squares: f64 = pair
-            .iter()
-            .map(|row| (row.misclosure / row.sigma).powi(2))
+            .map(|run| {
+                let partials = &rows.beside[at + run.first..][..run.columns.len()];
+                let steps = &shared.as_slice()[run.columns.clone()];
+                partials.iter().zip(steps).map(|(a, b)| a * b).sum::<f64>()
+            })
             .sum();
-        match self.robust {
-            None => (1.0, squares),
-            Some(weight) => {
-                let z = (0.5 * squares).sqrt();
-                (weight.factor(z), 4.0 * weight.cost(z))
-            }
-        }
+        rows.beside[row] = rows.beside[at + rows.width - 1] - known;
     }
-
-    /// The rows of `point` with its coordinates eliminated, and its part of the sum.
-    pub(super) fn eliminate(
-        &self,
-        state: &State,
-        point: usize,
-    ) -> Result<(Eliminated, f64), BehindCamera> {
-        let mut rows = self.rows(state, point)?;
-        let decomposition = rows.by_point.qr();
-        decomposition.q_tr_mul(&mut rows.by_shared);
-        decomposition.q_tr_mul(&mut rows.misclosures);
-        let eliminated = Eliminated {
-            columns: rows.columns,
-            triangle: Matrix3::from(decomposition.unpack_r().fixed_view::<3, 3>(0, 0)),
-            by_shared: rows.by_shared,
-            misclosures: rows.misclosures,
-        };
-        Ok((eliminated, rows.cost))
-    }
-
-    /// Why `point` cannot take part, from its rows at the start.
-    pub(super) fn fitness(&self, state: &State, point: usize) -> Result<(), Dropped> {
-        let rows = self.rows(state, point).map_err(|_| Dropped::BehindCamera)?;
-        if rows.weights.len() < 3 {
-            return Err(Dropped::Undetermined);
-        }
-        let singular_values = rows.by_point.singular_values();
-        // Written so that NaN is refused.
-        if singular_values.min() > DIRECTION_RATIO_MIN * singular_values.max() {
-            Ok(())
-        } else {
-            Err(Dropped::Undetermined)
-        }
-    }
-}
-
-impl PointRows {
-    /// Appends a row of an image divided by its standard deviation, and says where.
-    fn push(&mut self, row: &Row, of_image: &[Option<usize>], factor: f64) -> usize {
-        let at = self.weights.len();
-        let root_weight = factor.sqrt() / row.sigma;
-        for (column, partial) in of_image.iter().zip(&row.by_image) {
-            if let Some(column) = column {
-                self.add(at, *column, root_weight * partial);
-            }
-        }
-        self.by_point
-            .row_mut(at)
-            .copy_from(&(root_weight * row.by_point));
-        self.misclosures[at] = root_weight * row.misclosure;
-        self.weights.push((row.sigma, factor));
-        at
-    }
-
-    fn add(&mut self, row: usize, column: usize, value: f64) {
-        if let Ok(local) = self.columns.binary_search(&column) {
-            self.by_shared[(row, local)] += value;
-        }
-    }
-}
-
-impl Eliminated {
-    /// Step of the point that goes with a step of the shared unknowns.
-    pub(super) fn point_step_m(&self, shared: &DVector<f64>) -> Option<Vector3<f64>> {
-        let mut right = Vector3::from(self.misclosures.fixed_rows::<3>(0));
-        for (local, column) in self.columns.iter().enumerate() {
-            right -= self.by_shared.fixed_view::<3, 1>(0, local) * shared[*column];
-        }
-        self.triangle.solve_upper_triangular(&right)
-    }
+    rows.width = 1;
+    let triangle = triangulate(rows);
+    triangle.solve_upper_triangular(&Vector3::from_column_slice(&rows.beside[..3]))
 }
 
 /// Reduced normal equations at a state.
@@ -245,19 +116,25 @@ impl Reduced {
         }
     }
 
-    fn add(&mut self, point: &Eliminated, cost: f64) {
-        self.cost += cost;
-        let rows = point.by_shared.nrows() - 3;
-        if rows == 0 {
-            return;
-        }
-        let misclosures = point.misclosures.rows(3, rows);
-        for (first, first_column) in point.columns.iter().enumerate() {
-            let partials = point.by_shared.view((3, first), (rows, 1));
-            self.right[*first_column] += partials.dot(&misclosures);
-            for (second, second_column) in point.columns.iter().enumerate().skip(first) {
-                self.matrix[(*second_column, *first_column)] +=
-                    partials.dot(&point.by_shared.view((3, second), (rows, 1)));
+    /// Adds the rows of a point after [`triangulate`].
+    fn add(&mut self, rows: &PointRows) {
+        self.cost += rows.cost;
+        let columns = self.right.len();
+        let matrix = self.matrix.as_mut_slice();
+        for row in rows.beside.chunks_exact(rows.width).skip(3) {
+            let misclosure = row[rows.width - 1];
+            for (index, run) in rows.runs.iter().enumerate() {
+                for (place, column) in (run.first..).zip(run.columns.clone()) {
+                    let partial = row[place];
+                    self.right[column] += partial * misclosure;
+                    let sums = &mut matrix[column * columns..(column + 1) * columns];
+                    let below = run.first + run.columns.len();
+                    add_multiple(&mut sums[column..], partial, &row[place..below]);
+                    for other in &rows.runs[index + 1..] {
+                        let partials = &row[other.first..][..other.columns.len()];
+                        add_multiple(&mut sums[other.columns.clone()], partial, partials);
+                    }
+                }
             }
         }
     }
@@ -275,9 +152,11 @@ pub(super) fn reduce<M: ExteriorOrientation>(
         .par_chunks(part_len)
         .map(|points| {
             let mut part = Reduced::zeros(columns);
+            let mut rows = PointRows::default();
             for point in points {
-                let (eliminated, cost) = layout.eliminate(state, *point)?;
-                part.add(&eliminated, cost);
+                layout.fill(&mut rows, state, *point)?;
+                triangulate(&mut rows);
+                part.add(&rows);
             }
             Ok(part)
         })

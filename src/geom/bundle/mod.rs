@@ -14,6 +14,7 @@
 
 mod check;
 mod eliminate;
+mod layout;
 mod quality;
 mod rows;
 mod solve;

@@ -1,11 +1,12 @@
 //! Covariances, residuals, redundancy numbers and correlations of the settled adjustment.
 
-use nalgebra::{DMatrix, DVector, Matrix3};
+use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 use rayon::prelude::*;
 
 use super::{
     AdjustedImage, AdjustedPoint, Adjustment, Dropped, ORIENTATION_UNKNOWNS, Residual,
-    eliminate::{Layout, PointRows},
+    eliminate::triangulate,
+    layout::{Layout, PointRows},
     unknowns::{State, Unknown},
 };
 use crate::geom::pushbroom::ExteriorOrientation;
@@ -28,9 +29,9 @@ pub(super) fn judge<M: ExteriorOrientation>(
 ) -> Adjustment {
     let judged: Vec<Result<Judged, Dropped>> = (0..fitness.len())
         .into_par_iter()
-        .map(|point| {
+        .map_init(Default::default, |room, point| {
             fitness[point]?;
-            judge_point(layout, state, point, cofactors).ok_or(Dropped::Undetermined)
+            judge_point(layout, state, point, cofactors, room).ok_or(Dropped::Undetermined)
         })
         .collect();
     let mut adjustment = Adjustment {
@@ -57,11 +58,11 @@ pub(super) fn judge<M: ExteriorOrientation>(
             let squares = judged.residuals.iter().map(Residual::weighted_square);
             adjustment.weighted_squares += squares.sum::<f64>();
             let mut residuals = judged.residuals.into_iter();
-            for view in &layout.by_point.views[index] {
+            for view in layout.views.of_key(index) {
                 adjustment.views[*view] =
                     residuals.next().zip(residuals.next()).map(<[_; 2]>::from);
             }
-            for range in &layout.by_point.ranges[index] {
+            for range in layout.ranges.of_key(index) {
                 adjustment.ranges[*range] = residuals.next();
             }
             judged.point
@@ -73,31 +74,64 @@ pub(super) fn judge<M: ExteriorOrientation>(
     adjustment
 }
 
+/// Room for one point, used again for the next.
+#[derive(Default)]
+struct Room {
+    rows: PointRows,
+    transformed: PointRows,
+    /// Cofactors between the point, transformed by its triangle, and the shared unknowns of its rows.
+    between: Vec<Vector3<f64>>,
+}
+
 fn judge_point<M: ExteriorOrientation>(
     layout: &Layout<'_, M>,
     state: &State,
     point: usize,
     cofactors: &DMatrix<f64>,
+    room: &mut Room,
 ) -> Option<Judged> {
-    let rows = layout.rows(state, point).ok()?;
-    let (eliminated, _) = layout.eliminate(state, point).ok()?;
-    let inverse = eliminated.triangle.try_inverse()?;
-    let local = DMatrix::from_fn(rows.columns.len(), rows.columns.len(), |row, column| {
-        cofactors[(rows.columns[row], rows.columns[column])]
-    });
-    let coupling = eliminated.by_shared.rows(0, 3);
-    let through_shared =
-        Matrix3::from((coupling * &local * coupling.transpose()).fixed_view::<3, 3>(0, 0));
-    let cofactor_m2 = inverse * (Matrix3::identity() + through_shared) * inverse.transpose();
-    // Each row without its point: what the shared unknowns alone do to it.
-    let points_part = &rows.by_point * inverse;
-    let shared_part = &rows.by_shared - &points_part * coupling;
-    let spread = &shared_part * local;
+    let Room {
+        rows,
+        transformed,
+        between,
+    } = room;
+    layout.fill(rows, state, point).ok()?;
+    layout.fill(transformed, state, point).ok()?;
+    let inverse = triangulate(transformed).try_inverse()?;
+    let coupling = [0, 1, 2].map(|row| transformed.row(row));
+    between.clear();
+    between.extend(rows.columns().map(|column| {
+        let cofactors = column_of(cofactors, column);
+        Vector3::from(coupling.map(|coupling| {
+            let runs = rows.runs.iter();
+            runs.map(|run| dot(&cofactors[run.columns.clone()], &coupling[run.first..]))
+                .sum()
+        }))
+    }));
+    let mut through_shared = Matrix3::zeros();
+    for (place, between) in between.iter().enumerate() {
+        through_shared += between * Vector3::from(coupling.map(|row| row[place])).transpose();
+    }
     let residuals: Vec<Residual> = (0..rows.weights.len())
         .map(|row| {
-            let leverage =
-                points_part.row(row).norm_squared() + spread.row(row).dot(&shared_part.row(row));
-            residual_of(&rows, row, leverage)
+            // What the point does to the row, what the shared unknowns do, and what both do together.
+            let own = inverse.tr_mul(&rows.by_point[row]);
+            let mut leverage = own.norm_squared() + own.dot(&(through_shared * own));
+            let partials = rows.row(row);
+            let of_row = || {
+                let places = rows.columns().zip(partials).zip(&*between);
+                places.filter(|((_, partial), _)| **partial != 0.0)
+            };
+            for (index, ((column, partial), between)) in of_row().enumerate() {
+                let cofactors = column_of(cofactors, column);
+                let before: f64 = of_row()
+                    .take(index)
+                    .map(|((column, partial), _)| cofactors[column] * partial)
+                    .sum();
+                leverage += partial
+                    * (2.0 * before + cofactors[column] * partial - 2.0 * between.dot(&own));
+            }
+            residual_of(rows, row, leverage)
         })
         .collect();
     let priors = layout.network.points[point]
@@ -106,17 +140,28 @@ fn judge_point<M: ExteriorOrientation>(
     Some(Judged {
         point: AdjustedPoint {
             ground_m: state.points_m[point],
-            cofactor_m2,
+            cofactor_m2: inverse * (Matrix3::identity() + through_shared) * inverse.transpose(),
             priors,
         },
         residuals,
     })
 }
 
+/// A column of a square matrix.
+fn column_of(matrix: &DMatrix<f64>, column: usize) -> &[f64] {
+    &matrix.as_slice()[column * matrix.nrows()..(column + 1) * matrix.nrows()]
+}
+
+/// Sum of products, as far as the first reaches.
+fn dot(first: &[f64], second: &[f64]) -> f64 {
+    first.iter().zip(second).map(|(a, b)| a * b).sum()
+}
+
 fn residual_of(rows: &PointRows, row: usize, leverage: f64) -> Residual {
     let (sigma, weight_factor) = rows.weights[row];
+    let misclosure = rows.row(row)[rows.width - 1];
     Residual {
-        value: rows.misclosures[row] * sigma / weight_factor.sqrt(),
+        value: misclosure * sigma / weight_factor.sqrt(),
         sigma,
         // Rounding may leave it a little outside.
         redundancy: (1.0 - leverage).clamp(0.0, 1.0),
@@ -132,7 +177,7 @@ fn estimate(state: &State, cofactors: &DMatrix<f64>, column: usize) -> (f64, f64
     )
 }
 
-fn judge_image<M>(
+fn judge_image<M: ExteriorOrientation>(
     layout: &Layout<'_, M>,
     state: &State,
     image: usize,
@@ -160,7 +205,10 @@ fn judge_image<M>(
     }
 }
 
-fn correlated<M>(layout: &Layout<'_, M>, cofactors: &DMatrix<f64>) -> Vec<(Unknown, Unknown, f64)> {
+fn correlated<M: ExteriorOrientation>(
+    layout: &Layout<'_, M>,
+    cofactors: &DMatrix<f64>,
+) -> Vec<(Unknown, Unknown, f64)> {
     let deviations: DVector<f64> = cofactors.diagonal().map(f64::sqrt);
     let mut pairs = Vec::new();
     for first in 0..deviations.len() {

@@ -6,9 +6,10 @@ use rayon::prelude::*;
 use super::{
     Adjustment, BundleFault, BundleOptions, Dropped, Network,
     check::check,
-    eliminate::{ByPoint, Layout, Reduced, reduce},
+    eliminate::{Reduced, point_step_m, reduce},
+    layout::{Layout, PointRows},
     quality,
-    unknowns::{Columns, State},
+    unknowns::State,
 };
 use crate::{
     geom::{normal_equations::ScaledCholesky, pushbroom::ExteriorOrientation},
@@ -37,18 +38,15 @@ pub fn solve<M: ExteriorOrientation>(
     options: &BundleOptions,
 ) -> Result<Adjustment, BundleFault> {
     check(network)?;
-    let mut layout = Layout {
-        network,
-        columns: Columns::of(network),
-        by_point: ByPoint::of(network),
-        robust: None,
-    };
+    let mut layout = Layout::of(network);
     let initial_m = network.points.iter().map(|point| point.ground_m).collect();
     let corrections = DVector::zeros(layout.columns.len());
     let start = State::new(network, &layout.columns, corrections, initial_m);
     let fitness: Vec<Result<(), Dropped>> = (0..network.points.len())
         .into_par_iter()
-        .map(|point| layout.fitness(&start, point))
+        .map_init(PointRows::default, |rows, point| {
+            layout.fitness(rows, &start, point)
+        })
         .collect();
     let active: Vec<usize> = (0..fitness.len())
         .filter(|point| fitness[*point].is_ok())
@@ -81,12 +79,12 @@ pub fn solve<M: ExteriorOrientation>(
 }
 
 /// Observations, weighted initial values included, and unknowns.
-fn count<M>(layout: &Layout<'_, M>, active: &[usize]) -> (usize, usize) {
+fn count<M: ExteriorOrientation>(layout: &Layout<'_, M>, active: &[usize]) -> (usize, usize) {
     let of_points: usize = active
         .iter()
         .map(|point| {
-            2 * layout.by_point.views[*point].len()
-                + layout.by_point.ranges[*point].len()
+            2 * layout.views.of_key(*point).len()
+                + layout.ranges.of_key(*point).len()
                 + 3 * usize::from(layout.network.points[*point].sigma_m.is_some())
         })
         .sum();
@@ -145,7 +143,12 @@ fn settle<M: ExteriorOrientation>(
                 if step < STEP || change <= least_change * before {
                     return Ok(now);
                 }
-                damping = 0.0;
+                // What helped once helps again, until it is needed no more.
+                damping = if damping > DAMPING {
+                    0.1 * damping
+                } else {
+                    0.0
+                };
             }
             _ => damping = DAMPING.max(10.0 * damping),
         }
@@ -187,7 +190,10 @@ fn advance<M: ExteriorOrientation>(
 ) -> Option<(State, f64)> {
     let steps_m: Vec<Vector3<f64>> = active
         .par_iter()
-        .map(|point| layout.eliminate(state, *point).ok()?.0.point_step_m(shared))
+        .map_init(PointRows::default, |rows, point| {
+            layout.fill(rows, state, *point).ok()?;
+            point_step_m(rows, shared)
+        })
         .collect::<Option<_>>()?;
     let mut points_m = state.points_m.clone();
     let mut longest = 0.0_f64;

@@ -4,9 +4,10 @@ use nalgebra::{DMatrix, DVector, Vector2, Vector3};
 
 use super::{
     BundleImage, BundleOptions, BundlePoint, Network, ORIENTATION_UNKNOWNS, Range, View,
-    eliminate::{ByPoint, Layout, reduce},
-    rows, solve,
-    unknowns::{Columns, State, Unknown},
+    eliminate::{point_step_m, reduce},
+    layout::{Layout, PointRows},
+    solve,
+    unknowns::{State, Unknown},
 };
 use crate::geom::{
     collinearity::project,
@@ -93,12 +94,7 @@ fn network() -> Network<EulerPolynomial> {
 }
 
 fn layout(network: &Network<EulerPolynomial>) -> (Layout<'_, EulerPolynomial>, State, Vec<usize>) {
-    let layout = Layout {
-        network,
-        columns: Columns::of(network),
-        by_point: ByPoint::of(network),
-        robust: None,
-    };
+    let layout = Layout::of(network);
     let corrections = DVector::zeros(layout.columns.len());
     let points_m = network.points.iter().map(|point| point.ground_m).collect();
     let state = State::new(network, &layout.columns, corrections, points_m);
@@ -147,9 +143,8 @@ fn derivatives_at(
     };
     // Computed values: misclosures with the sign turned.
     let view = |state: &State, index: usize| {
-        rows::of_view(network, state, &network.views[index])
-            .unwrap()
-            .map(|row| -row.misclosure)
+        let rows = layout.view_rows(state, index).unwrap();
+        rows.map(|row| -row.misclosure)
     };
     let close = |numeric: f64, analytic: f64, scale: f64| {
         assert!(
@@ -159,7 +154,7 @@ fn derivatives_at(
     };
     for index in [0, 1, 9, 18] {
         let entry = &network.views[index];
-        let analytic = rows::of_view(network, state, entry).unwrap();
+        let analytic = layout.view_rows(state, index).unwrap();
         for unknown in 0..=ORIENTATION_UNKNOWNS {
             let column = layout.columns.of_image[entry.image][unknown];
             // Steps whose truncation and rounding are both far below 1e-6 of the derivative.
@@ -171,12 +166,11 @@ fn derivatives_at(
             let ahead = view(&at(column, step, Vector3::zeros(), entry.point), index);
             let behind = view(&at(column, -step, Vector3::zeros(), entry.point), index);
             for axis in 0..2 {
-                let scale = analytic[axis]
-                    .by_image
-                    .rows(unknown / 3 * 3, if unknown < 18 { 3 } else { 1 })
-                    .norm();
+                let partials = analytic[axis].by_image();
+                let group = unknown / 3 * 3..(unknown / 3 * 3 + 3).min(partials.len());
+                let scale = DVector::from_column_slice(&partials[group]).norm();
                 let numeric = (ahead[axis] - behind[axis]) / (2.0 * step);
-                close(numeric, analytic[axis].by_image[unknown], scale.max(1e-2));
+                close(numeric, partials[unknown], scale.max(1e-2));
             }
         }
         for axis in 0..3 {
@@ -195,17 +189,41 @@ fn derivatives_at(
         }
     }
     let range = &network.ranges[1];
-    let analytic = rows::of_range(network, state, range);
-    for unknown in 0..=ORIENTATION_UNKNOWNS {
+    let analytic = layout.range_row(state, 1).by_image();
+    for (unknown, partial) in analytic.iter().enumerate() {
         let column = layout.columns.of_image[range.image][unknown];
         let step = if unknown < 9 { 20.0 } else { 1e-4 };
         let distance = |step: f64| {
             let moved = at(column, step, Vector3::zeros(), range.point);
-            -rows::of_range(network, &moved, range).misclosure
+            -layout.range_row(&moved, 1).misclosure
         };
         let numeric = (distance(step) - distance(-step)) / (2.0 * step);
-        close(numeric, analytic.by_image[unknown], 1.0);
+        close(numeric, *partial, 1.0);
     }
+}
+
+/// Rows of a point in all shared unknowns and all coordinates, and their misclosures.
+fn dense_rows(
+    layout: &Layout<'_, EulerPolynomial>,
+    state: &State,
+    point: usize,
+) -> (DMatrix<f64>, DVector<f64>) {
+    let shared = layout.columns.len();
+    let mut rows = PointRows::default();
+    layout.fill(&mut rows, state, point).unwrap();
+    let count = rows.weights.len();
+    let mut dense = DMatrix::zeros(count, shared + 3 * layout.network.points.len());
+    let mut misclosures = DVector::zeros(count);
+    for row in 0..count {
+        for (column, partial) in rows.columns().zip(rows.row(row)) {
+            dense[(row, column)] = *partial;
+        }
+        misclosures[row] = *rows.row(row).last().unwrap();
+        for axis in 0..3 {
+            dense[(row, shared + 3 * point + axis)] = rows.by_point[row][axis];
+        }
+    }
+    (dense, misclosures)
 }
 
 #[test]
@@ -217,16 +235,9 @@ fn elimination_equals_the_dense_equations() {
     let mut normal = DMatrix::zeros(unknowns, unknowns);
     let mut right = DVector::zeros(unknowns);
     for point in &active {
-        let rows = layout.rows(&state, *point).unwrap();
-        let mut dense = DMatrix::zeros(rows.weights.len(), unknowns);
-        for (local, column) in rows.columns.iter().enumerate() {
-            dense.set_column(*column, &rows.by_shared.column(local));
-        }
-        dense
-            .columns_mut(shared + 3 * point, 3)
-            .copy_from(&rows.by_point);
+        let (dense, misclosures) = dense_rows(&layout, &state, *point);
         normal += dense.tr_mul(&dense);
-        right += dense.tr_mul(&rows.misclosures);
+        right += dense.tr_mul(&misclosures);
     }
     for (column, sigma) in layout.columns.sigmas.iter().enumerate() {
         normal[(column, column)] += sigma.powi(-2);
@@ -258,8 +269,9 @@ fn elimination_equals_the_dense_equations() {
         assert!((inverse[(column, column)] / dense - 1.0).abs() < 1e-9);
     }
     for point in active {
-        let (eliminated, _) = layout.eliminate(&state, point).unwrap();
-        let step_m = eliminated.point_step_m(&step).unwrap();
+        let mut rows = PointRows::default();
+        layout.fill(&mut rows, &state, point).unwrap();
+        let step_m = point_step_m(&mut rows, &step).unwrap();
         for axis in 0..3 {
             let dense_m = dense_step[shared + 3 * point + axis];
             assert!((step_m[axis] - dense_m).abs() < 1e-9 * dense_step.rows(shared, 3 * 9).amax());
@@ -289,21 +301,11 @@ fn cofactors_of_points_equal_those_of_the_dense_equations() {
     let state = State::new(&network, &layout.columns, corrections, points_m);
     let shared = layout.columns.len();
     let unknowns = shared + 3 * active.len();
-    let mut design = DMatrix::zeros(0, unknowns);
+    let mut normal = DMatrix::zeros(unknowns, unknowns);
     for point in &active {
-        let rows = layout.rows(&state, *point).unwrap();
-        let before = design.nrows();
-        design = design.insert_rows(before, rows.weights.len(), 0.0);
-        for (local, column) in rows.columns.iter().enumerate() {
-            design
-                .view_mut((before, *column), (rows.weights.len(), 1))
-                .copy_from(&rows.by_shared.column(local));
-        }
-        design
-            .view_mut((before, shared + 3 * point), (rows.weights.len(), 3))
-            .copy_from(&rows.by_point);
+        let (dense, _) = dense_rows(&layout, &state, *point);
+        normal += dense.tr_mul(&dense);
     }
-    let mut normal = design.tr_mul(&design);
     for (column, sigma) in layout.columns.sigmas.iter().enumerate() {
         normal[(column, column)] += sigma.powi(-2);
     }
@@ -325,4 +327,22 @@ fn cofactors_of_points_equal_those_of_the_dense_equations() {
             }
         }
     }
+}
+
+#[test]
+fn what_the_network_does_not_have_is_told() {
+    let mut lost = network();
+    lost.views[3].point = 99;
+    let fault = solve(&lost, &BundleOptions::default()).unwrap_err();
+    assert_eq!(
+        fault.to_string(),
+        "view 3 belongs to point 99, which the network does not have"
+    );
+    let mut lost = network();
+    lost.ranges[1].profile = 7;
+    let fault = solve(&lost, &BundleOptions::default()).unwrap_err();
+    assert_eq!(
+        fault.to_string(),
+        "range 1 belongs to profile 7, which the network does not have"
+    );
 }

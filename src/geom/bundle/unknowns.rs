@@ -1,6 +1,6 @@
 //! Which unknown of images and profiles stands in which column of the reduced equations.
 
-use std::fmt;
+use std::{fmt, ops::Range};
 
 use nalgebra::{DVector, Vector3};
 
@@ -94,6 +94,8 @@ pub(super) struct Columns {
     pub(super) sigmas: Vec<f64>,
     /// Column of each image's 18 coefficients and its time bias.
     pub(super) of_image: Vec<[Option<usize>; ORIENTATION_UNKNOWNS + 1]>,
+    /// All columns of each image: they stand side by side.
+    pub(super) images: Vec<Range<usize>>,
     /// Column of each profile's bias.
     pub(super) of_profile: Vec<Option<usize>>,
 }
@@ -104,9 +106,11 @@ impl Columns {
             unknowns: Vec::new(),
             sigmas: Vec::new(),
             of_image: Vec::new(),
+            images: Vec::new(),
             of_profile: Vec::new(),
         };
         for (image, entry) in network.images.iter().enumerate() {
+            let first = columns.len();
             let mut of_image = [None; ORIENTATION_UNKNOWNS + 1];
             for (coefficient, sigma) in entry.sigmas.iter().enumerate() {
                 of_image[coefficient] =
@@ -115,6 +119,7 @@ impl Columns {
             of_image[ORIENTATION_UNKNOWNS] =
                 columns.add(Unknown::TimeBias { image }, entry.time_bias_sigma_s);
             columns.of_image.push(of_image);
+            columns.images.push(first..columns.len());
         }
         for (profile, sigma_m) in network.range_bias_sigmas_m.iter().enumerate() {
             let column = columns.add(Unknown::RangeBias { profile }, *sigma_m);

@@ -25,8 +25,6 @@ use crate::{
 const STATE_STEP_S: f64 = 0.5;
 /// Degree of Hermite interpolation: with a state at every sample a cubic holds what lies between two of them.
 const STATE_DEGREE: i32 = 3;
-/// Positions reach this far beyond attitudes, seconds: light from MGS to the centre of Mars takes 0.013 s.
-const LIGHT_TIME_S: f64 = 0.1;
 /// Longest time between two attitudes beyond the camera tables, seconds.
 const ATTITUDE_STEP_S: f64 = 0.5;
 /// Attitudes nearer than this to one of a sample are left out, seconds.
@@ -41,7 +39,10 @@ pub(super) struct Source<'a> {
     pub(super) session: &'a Session,
     pub(super) to: &'a AdjustedKernels<'a>,
     pub(super) image: &'a AdjustedImage<'a>,
-    pub(super) span: Interval,
+    /// When the CK holds attitudes.
+    pub(super) attitude_span: Interval,
+    /// When the SPK holds positions.
+    pub(super) orbit_span: Interval,
 }
 
 /// States of one image.
@@ -156,11 +157,11 @@ impl Source<'_> {
         Ok(epochs)
     }
 
-    /// As much of the span, and the light time around it, as the original kernels hold.
+    /// As much of the span as the original kernels hold.
     fn known_orbit(&self) -> Result<Interval> {
         let exposed = self.image.times.exposures();
         self.session.require_position(exposed)?;
-        let mut known = self.span.padded(LIGHT_TIME_S);
+        let mut known = self.orbit_span;
         let held = self.session.coverage()?.spk.as_slice().iter();
         for held in held.filter(|held| held.contains(exposed.start)) {
             known.start = later(known.start, held.start);
@@ -178,8 +179,8 @@ impl Source<'_> {
     pub(super) fn attitudes(&self) -> Result<Attitudes> {
         let mut nodes = self.known_attitudes();
         if let (Some(first), Some(last)) = (nodes.first().copied(), nodes.last().copied()) {
-            nodes.extend(self.continued(&first, self.span.start)?);
-            nodes.extend(self.continued(&last, self.span.stop)?);
+            nodes.extend(self.continued(&first, self.attitude_span.start)?);
+            nodes.extend(self.continued(&last, self.attitude_span.stop)?);
         }
         nodes.sort_by(|a, b| a.exposure.seconds().total_cmp(&b.exposure.seconds()));
         let bias = self.to.pointing.ck_bias;
@@ -229,7 +230,7 @@ impl Source<'_> {
             .map(of_table)
             .chain(samples.iter().map(of_sample))
             .collect();
-        nodes.retain(|node| self.span.contains(node.exposure));
+        nodes.retain(|node| self.attitude_span.contains(node.exposure));
         nodes.sort_by(|a, b| a.exposure.seconds().total_cmp(&b.exposure.seconds()));
         nodes
     }

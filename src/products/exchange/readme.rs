@@ -27,6 +27,16 @@ pub(super) fn text(site: &SiteProducts) -> String {
         }
         text += ISD;
     }
+    if let Some(geometric) = &site.geometric {
+        text += ADJUSTED;
+        for image in geometric.adjusted_images {
+            let id = &image.times.id;
+            let _infallible = writeln!(
+                text,
+                "  spiceinit from={id}.cub spk=../adjusted/{id}.bsp ck=../adjusted/{id}.bc"
+            );
+        }
+    }
     text += CATALOGUE;
     text
 }
@@ -66,6 +76,17 @@ const ISD: &str = "\
 They differ from the files of ALE where those do not say what the camera does: the time of a line includes the\n\
 summing, samples and the detector's centre count from the detector's edge, there is no distortion, and the\n\
 pointing covers the whole image. The member areograph.interpolation holds the measured interpolation error.\n";
+
+const ADJUSTED: &str = "\n\
+The adjusted site (../adjustment.json says what was adjusted and how well)\n\
+\x20 lidar.json       shots with ranges for ISIS: a priori and adjusted points, where the adjusted images see them\n\
+\x20   jigsaw fromlist=cubes.lis cnet=ties.net onet=out.net lidardata=lidar.json olidarfile=out spsolve=position\n\
+\x20 adjusted.gcp     adjusted tie points for Ames Stereo Pipeline; standard deviations along x, y, z, so not with\n\
+\x20                  --use-lon-lat-height-gcp-error; the images are called <id>.cub\n\
+\x20   bundle_adjust --datum D_MARS IMAGES CAMERAS adjusted.gcp -o run/out\n\
+../images/<id>/adjusted_isd.json is the adjusted camera. Its positions are geometric, those of ../images/<id>/isd.json\n\
+have light time and aberration as ISIS and ALE have them. Kernels to be loaded after the original ones, each pair for\n\
+its image alone:\n";
 
 const CATALOGUE: &str = "\n\
 kernels.json       kernels by type with the keys of SpiceQL, and under areograph hashes and coverage\n\

@@ -77,8 +77,8 @@ pub struct IntersectedPoint {
     pub convergence_rad: f64,
     /// Residuals of its measurements.
     pub measures: Vec<MeasureResidual>,
-    /// Whether a reprojection residual is farther out than three robust standard deviations of its
-    /// image. With two images nothing says which of the two measurements is wrong.
+    /// Whether a reprojection residual is out of line with those of other points in its image. With two
+    /// images nothing says which of the two measurements is wrong.
     pub outlier: bool,
 }
 

@@ -5,8 +5,9 @@ use serde::{Deserialize, Serialize};
 use super::{IntersectedPoint, MeasureResidual};
 use crate::geom::statistics::Summary;
 
-/// Robust standard deviations from the median at which a point is marked.
-const OUTLIER_SIGMA: f64 = 3.0;
+/// Robust standard deviations beyond the median distance at which a point is marked: residuals lie nearly on
+/// a line, and of normal ones there this is 3.6 standard deviations, one point in three thousand.
+const OUTLIER_SIGMA: f64 = 5.0;
 
 /// Statistics along and across the track.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -54,30 +55,50 @@ impl ImageResiduals {
     }
 }
 
-fn length(measure: &MeasureResidual) -> f64 {
-    measure.reprojection_lines.hypot(measure.reprojection_px)
-}
-
-/// Marks points with a reprojection residual longer than its image's median by three robust standard
-/// deviations. With identical residuals nothing is marked.
+/// Marks points with a reprojection residual farther from the median one of its image than other points' are,
+/// by five robust standard deviations. With identical residuals nothing is marked.
+///
+/// The distance from the median counts, not the length: all residuals of an image lean the same way when its
+/// clock is wrong, and a blunder across that way makes them hardly longer.
 pub(super) fn mark_outliers(points: &mut [IntersectedPoint], images: usize) {
-    let limits: Vec<f64> = (0..images)
-        .map(|image| {
-            let lengths: Vec<f64> = points
-                .iter()
-                .flat_map(|point| &point.measures)
-                .filter(|measure| measure.image == image)
-                .map(length)
-                .collect();
-            let summary = Summary::of(&lengths);
-            // Rounding of exact measurements is no spread.
-            summary.median + OUTLIER_SIGMA * summary.nmad.max(1e-6)
-        })
-        .collect();
+    let limits: Vec<Limit> = (0..images).map(|image| Limit::of(points, image)).collect();
     for point in points {
         point.outlier = point
             .measures
             .iter()
-            .any(|measure| length(measure) > limits[measure.image]);
+            .any(|measure| limits[measure.image].is_beyond(measure));
     }
+}
+
+/// Where the residuals of an image lie, and how far from there is too far.
+struct Limit {
+    median: [f64; 2],
+    distance: f64,
+}
+
+impl Limit {
+    fn of(points: &[IntersectedPoint], image: usize) -> Self {
+        let own = || {
+            let measures = points.iter().flat_map(|point| &point.measures);
+            measures.filter(|measure| measure.image == image)
+        };
+        let along: Vec<f64> = own().map(|measure| measure.reprojection_lines).collect();
+        let across: Vec<f64> = own().map(|measure| measure.reprojection_px).collect();
+        let median = [Summary::of(&along).median, Summary::of(&across).median];
+        let distances: Vec<f64> = own().map(|measure| distance(measure, median)).collect();
+        let summary = Summary::of(&distances);
+        Self {
+            median,
+            // Rounding of exact measurements is no spread.
+            distance: summary.median + OUTLIER_SIGMA * summary.nmad.max(1e-6),
+        }
+    }
+
+    fn is_beyond(&self, measure: &MeasureResidual) -> bool {
+        distance(measure, self.median) > self.distance
+    }
+}
+
+fn distance(measure: &MeasureResidual, [along, across]: [f64; 2]) -> f64 {
+    (measure.reprojection_lines - along).hypot(measure.reprojection_px - across)
 }

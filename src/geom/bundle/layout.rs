@@ -1,0 +1,301 @@
+//! A network laid out for its adjustment: which observations belong to a point, and their weighted rows.
+
+use std::ops::Range;
+
+use nalgebra::Vector3;
+use rayon::prelude::*;
+
+use super::{
+    Dropped, Network,
+    eliminate::triangulate,
+    rows::{self, ImagePartials, Row},
+    unknowns::{Columns, State},
+};
+use crate::geom::{
+    collinearity::BehindCamera,
+    pushbroom::{ExteriorOrientation, Pose},
+    robust::RobustWeight,
+};
+
+/// A point whose rows determine one direction this much worse than another counts as undetermined.
+const DIRECTION_RATIO_MIN: f64 = 1e-6;
+
+/// A network laid out for its adjustment.
+pub(super) struct Layout<'a, M> {
+    pub(super) network: &'a Network<M>,
+    pub(super) columns: Columns,
+    /// Views and ranges of each point.
+    pub(super) views: Lists,
+    pub(super) ranges: Lists,
+    pub(super) robust: Option<RobustWeight>,
+    /// Initial pose at the line of each view: it stays as it is without time biases.
+    view_bases: Vec<Pose>,
+    /// Initial position at the instant of each range.
+    range_bases_m: Vec<Vector3<f64>>,
+}
+
+/// A list of indices for each key, one after the other in the same memory.
+pub(super) struct Lists {
+    starts: Vec<usize>,
+    indices: Vec<usize>,
+}
+
+impl Lists {
+    /// Lists of the positions at which each of `count` keys occurs, ascending.
+    fn of(count: usize, keys: impl Iterator<Item = usize> + Clone) -> Self {
+        let mut starts = vec![0; count + 1];
+        for key in keys.clone() {
+            starts[key + 1] += 1;
+        }
+        for key in 0..count {
+            starts[key + 1] += starts[key];
+        }
+        let mut next = starts.clone();
+        let mut indices = vec![0; starts[count]];
+        for (index, key) in keys.enumerate() {
+            indices[next[key]] = index;
+            next[key] += 1;
+        }
+        Self { starts, indices }
+    }
+
+    pub(super) fn of_key(&self, key: usize) -> &[usize] {
+        &self.indices[self.starts[key]..self.starts[key + 1]]
+    }
+}
+
+/// Shared unknowns that stand side by side, in the equations and in a point's rows.
+#[derive(Debug, Clone)]
+pub(super) struct Run {
+    /// Columns in the equations.
+    pub(super) columns: Range<usize>,
+    /// The first one's place in the rows.
+    pub(super) first: usize,
+}
+
+/// The weighted rows of one point: views by twos, then ranges, then its own coordinates if observed.
+///
+/// It is used for one point after another, so that its memory is asked for only once.
+#[derive(Debug, Default)]
+pub(super) struct PointRows {
+    /// Which shared unknowns the rows contain.
+    pub(super) runs: Vec<Run>,
+    /// Numbers in a row of `beside`: partial derivatives by these unknowns, then the misclosure.
+    pub(super) width: usize,
+    /// Rows, one after the other.
+    pub(super) beside: Vec<f64>,
+    /// Partial derivatives by the point.
+    pub(super) by_point: Vec<Vector3<f64>>,
+    /// Standard deviation and weight factor of each row.
+    pub(super) weights: Vec<(f64, f64)>,
+    /// Their part of the sum that is made small.
+    pub(super) cost: f64,
+    /// Room for [`triangulate`].
+    pub(super) sums: Vec<f64>,
+}
+
+impl PointRows {
+    /// Empties the rows and lays out the unknowns of `ranges_of_columns`.
+    fn begin(&mut self, columns: impl Iterator<Item = Range<usize>>) {
+        self.beside.clear();
+        self.by_point.clear();
+        self.weights.clear();
+        self.cost = 0.0;
+        self.runs.clear();
+        let columns = columns.filter(|columns| !columns.is_empty());
+        self.runs
+            .extend(columns.map(|columns| Run { columns, first: 0 }));
+        self.runs.sort_unstable_by_key(|run| run.columns.start);
+        self.runs.dedup_by_key(|run| run.columns.start);
+        let mut first = 0;
+        for run in &mut self.runs {
+            run.first = first;
+            first += run.columns.len();
+        }
+        self.width = first + 1;
+    }
+
+    /// Appends an empty row.
+    fn push(&mut self, by_point: Vector3<f64>, misclosure: f64, weight: (f64, f64)) {
+        self.beside.resize(self.beside.len() + self.width - 1, 0.0);
+        self.beside.push(misclosure);
+        self.by_point.push(by_point);
+        self.weights.push(weight);
+    }
+
+    /// Appends a row of an image, divided by its standard deviation.
+    fn push_observed(&mut self, row: &Row, of_image: &[Option<usize>], factor: f64) {
+        let root_weight = factor.sqrt() / row.sigma;
+        self.push(
+            row.by_point * root_weight,
+            row.misclosure * root_weight,
+            (row.sigma, factor),
+        );
+        let partials: ImagePartials = row.by_image();
+        for (column, partial) in of_image.iter().zip(&partials) {
+            if let Some(column) = column {
+                self.set_last(*column, partial * root_weight);
+            }
+        }
+    }
+
+    /// Sets the derivative by the unknown in `column` in the last row.
+    fn set_last(&mut self, column: usize, value: f64) {
+        let last = self.beside.len() - self.width;
+        let run = self.runs.iter().find(|run| run.columns.contains(&column));
+        if let Some(run) = run {
+            self.beside[last + run.first + column - run.columns.start] = value;
+        }
+    }
+
+    /// Derivatives by the shared unknowns in a row, and its misclosure last.
+    pub(super) fn row(&self, row: usize) -> &[f64] {
+        &self.beside[row * self.width..(row + 1) * self.width]
+    }
+
+    /// Column of each shared unknown in the rows.
+    pub(super) fn columns(&self) -> impl Iterator<Item = usize> + '_ {
+        self.runs.iter().flat_map(|run| run.columns.clone())
+    }
+}
+
+impl<'a, M: ExteriorOrientation> Layout<'a, M> {
+    pub(super) fn of(network: &'a Network<M>) -> Self {
+        let points = network.points.len();
+        let views = network.views.par_iter();
+        let ranges = network.ranges.iter();
+        Self {
+            columns: Columns::of(network),
+            views: Lists::of(points, network.views.iter().map(|view| view.point)),
+            ranges: Lists::of(points, network.ranges.iter().map(|range| range.point)),
+            robust: None,
+            view_bases: views
+                .map(|view| network.images[view.image].base.pose(view.x_lines))
+                .collect(),
+            range_bases_m: ranges
+                .map(|range| {
+                    network.images[range.image]
+                        .base
+                        .pose(range.x_lines)
+                        .position_m
+                })
+                .collect(),
+            network,
+        }
+    }
+
+    /// The rows of the view at `index`.
+    pub(super) fn view_rows(&self, state: &State, index: usize) -> Result<[Row; 2], BehindCamera> {
+        let view = &self.network.views[index];
+        let image = &self.network.images[view.image];
+        let correction = &state.orientations[view.image];
+        let ground_m = &state.points_m[view.point];
+        if image.time_bias_sigma_s > 0.0 {
+            let exposed = view.x_lines + correction.time_shift_lines;
+            let (base, motion) = image.base.moving(exposed);
+            rows::of_view(image, correction, &base, Some(&motion), view, ground_m)
+        } else {
+            let base = &self.view_bases[index];
+            rows::of_view(image, correction, base, None, view, ground_m)
+        }
+    }
+
+    /// The row of the range at `index`.
+    pub(super) fn range_row(&self, state: &State, index: usize) -> Row {
+        let range = &self.network.ranges[index];
+        rows::of_range(
+            &self.network.images[range.image],
+            &state.orientations[range.image],
+            &self.range_bases_m[index],
+            range,
+            state.range_biases_m[range.profile],
+            &state.points_m[range.point],
+        )
+    }
+
+    /// Fills `rows` with the rows of `point` at `state`.
+    pub(super) fn fill(
+        &self,
+        rows: &mut PointRows,
+        state: &State,
+        point: usize,
+    ) -> Result<(), BehindCamera> {
+        let (views, ranges) = (self.views.of_key(point), self.ranges.of_key(point));
+        let columns = &self.columns;
+        let of_views = views
+            .iter()
+            .map(|view| columns.images[self.network.views[*view].image].clone());
+        let of_ranges = ranges.iter().flat_map(|range| {
+            let range = &self.network.ranges[*range];
+            let bias = columns.of_profile[range.profile].map_or(0..0, |column| column..column + 1);
+            [columns.images[range.image].clone(), bias]
+        });
+        rows.begin(of_views.chain(of_ranges));
+        for view in views {
+            let pair = self.view_rows(state, *view)?;
+            let (factor, cost) = self.robust_factor(&pair);
+            rows.cost += cost;
+            let of_image = &columns.of_image[self.network.views[*view].image];
+            for row in &pair {
+                rows.push_observed(row, of_image, factor);
+            }
+        }
+        for index in ranges {
+            let range = &self.network.ranges[*index];
+            let row = self.range_row(state, *index);
+            rows.cost += (row.misclosure / row.sigma).powi(2);
+            rows.push_observed(&row, &columns.of_image[range.image], 1.0);
+            if let Some(column) = columns.of_profile[range.profile] {
+                rows.set_last(column, 1.0 / row.sigma);
+            }
+        }
+        if let Some(sigma_m) = self.network.points[point].sigma_m {
+            let from_initial_m = self.network.points[point].ground_m - state.points_m[point];
+            for axis in 0..3 {
+                let misclosure = from_initial_m[axis] / sigma_m[axis];
+                let mut by_point = Vector3::zeros();
+                by_point[axis] = 1.0 / sigma_m[axis];
+                rows.cost += misclosure * misclosure;
+                rows.push(by_point, misclosure, (sigma_m[axis], 1.0));
+            }
+        }
+        Ok(())
+    }
+
+    /// Factor of a view's weights, and its part of the sum that is made small.
+    fn robust_factor(&self, pair: &[Row; 2]) -> (f64, f64) {
+        let squares: f64 = pair
+            .iter()
+            .map(|row| (row.misclosure / row.sigma).powi(2))
+            .sum();
+        match self.robust {
+            None => (1.0, squares),
+            Some(weight) => {
+                let z = (0.5 * squares).sqrt();
+                (weight.factor(z), 4.0 * weight.cost(z))
+            }
+        }
+    }
+
+    /// Why `point` cannot take part, from its rows at the start.
+    pub(super) fn fitness(
+        &self,
+        rows: &mut PointRows,
+        state: &State,
+        point: usize,
+    ) -> Result<(), Dropped> {
+        self.fill(rows, state, point)
+            .map_err(|_| Dropped::BehindCamera)?;
+        if rows.weights.len() < 3 {
+            return Err(Dropped::Undetermined);
+        }
+        // The triangle has the singular values of the rows.
+        let singular_values = triangulate(rows).singular_values();
+        // Written so that NaN is refused.
+        if singular_values.min() > DIRECTION_RATIO_MIN * singular_values.max() {
+            Ok(())
+        } else {
+            Err(Dropped::Undetermined)
+        }
+    }
+}

@@ -1,0 +1,345 @@
+//! What tie points, intersection and adjustment say of a site, as JSON.
+
+use std::collections::BTreeMap;
+
+use serde::Serialize;
+
+use super::{GeometricProducts, SiteProducts, Writer, files::write_json};
+use crate::{
+    config::{
+        AdjustmentConfig, CameraModel, IntersectionConfig, MolaImage, OrientationPrior, Robust,
+    },
+    error::Result,
+    geom::{bundle::ORIENTATION_UNKNOWNS, statistics::Summary},
+    stages::{
+        adjust::{AdjustmentSummary, CorrectedImage, PointKind},
+        compare_pairs::{PairComparison, ProfileByTies},
+        intersect::{ImageResiduals, IntersectedTies},
+        uncertainty::{ResidualMoments, UncertaintyBudget},
+    },
+};
+
+/// What the numbers are, for readers of the file.
+const DEFINITIONS: [(&str, &str); 9] = [
+    (
+        "before, after",
+        "with the orientation of the kernels, and with the adjusted one; ground points are intersected anew",
+    ),
+    (
+        "focal",
+        "what an intersection leaves in the focal plane, along and across the track, pixels of the image",
+    ),
+    (
+        "reprojection",
+        "measured minus projected place of the intersected point: lines along the track, pixels of the image \
+         across it; residuals of the pairs too (Table 5 of Shan et al. 2005)",
+    ),
+    (
+        "disagreement_m",
+        "how far apart along the flight the two images place a tie point, mean, metres",
+    ),
+    (
+        "footprints",
+        "where tie points say that a footprint of the first image lies in the second, minus where it is projected: \
+         lines and samples of the second image, metres on the ground, and distances of successive footprints",
+    ),
+    (
+        "budget",
+        "eq. 5 to 9 of Shan et al. 2005; pixels are the mean line spacing of the pair. paper_average takes the average of \
+         the images' across-track residuals as the paper computes, equation_7 their sum of squares as its eq. 7 says",
+    ),
+    (
+        "correction, sigmas",
+        "X, Y and Z position in IAU 2000, metres, then rotations about the camera's x, y and z axis, radians; of each \
+         the coefficients of 1, t and t², t = 0 in the middle of the image and 1 at its end. M = exp([rotation]x) M before",
+    ),
+    (
+        "sigmas",
+        "a posteriori. They take footprints in images as measured independently, which they are not: they hold for \
+         positions of points to each other, not for absolute ones",
+    ),
+    (
+        "configured",
+        "a standard deviation above 1e300 leaves the unknown free; without blunder_limit all tie points stay",
+    ),
+];
+
+#[derive(Serialize)]
+struct Document<'a> {
+    format: &'static str,
+    site: &'a str,
+    definitions: Vec<Definition>,
+    configured: Configured<'a>,
+    ties: TiesDocument<'a>,
+    before: StateDocument<'a>,
+    after: StateDocument<'a>,
+    adjustment: AdjustmentDocument<'a>,
+}
+
+#[derive(Serialize)]
+struct Definition {
+    of: &'static str,
+    is: &'static str,
+}
+
+#[derive(Serialize)]
+struct Configured<'a> {
+    model: CameraModel,
+    intersection: &'a IntersectionConfig,
+    adjustment: AdjustmentKeys<'a>,
+}
+
+/// [`AdjustmentConfig`] without what is not set.
+#[derive(Serialize)]
+struct AdjustmentKeys<'a> {
+    tie_sigma_px: [f64; 2],
+    mola_image: MolaImage,
+    mola_sigma_px: [f64; 2],
+    mola_margin_px: f64,
+    ground_sigma_m: f64,
+    range_sigma_m: f64,
+    range_bias_sigma_m: f64,
+    time_bias_sigma_s: f64,
+    nadir_sigma_m: f64,
+    off_nadir_sigma_m: f64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    robust: Option<&'a Robust>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    blunder_limit: Option<f64>,
+    images: Vec<PriorKeys<'a>>,
+}
+
+#[derive(Serialize)]
+struct PriorKeys<'a> {
+    id: &'a str,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    position_m: Option<[f64; 9]>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    rotation_rad: Option<[f64; 9]>,
+}
+
+impl<'a> AdjustmentKeys<'a> {
+    fn of(config: &'a AdjustmentConfig) -> Self {
+        // JSON has no infinity.
+        let number = |sigma: f64| sigma.min(f64::MAX);
+        let prior = |prior: &'a OrientationPrior| PriorKeys {
+            id: &prior.id,
+            position_m: prior.position_m.map(|sigmas| sigmas.map(number)),
+            rotation_rad: prior.rotation_rad.map(|sigmas| sigmas.map(number)),
+        };
+        Self {
+            tie_sigma_px: config.tie_sigma_px,
+            mola_image: config.mola_image,
+            mola_sigma_px: config.mola_sigma_px,
+            mola_margin_px: config.mola_margin_px,
+            ground_sigma_m: config.ground_sigma_m,
+            range_sigma_m: config.range_sigma_m,
+            range_bias_sigma_m: config.range_bias_sigma_m,
+            time_bias_sigma_s: config.time_bias_sigma_s,
+            nadir_sigma_m: number(config.nadir_sigma_m),
+            off_nadir_sigma_m: number(config.off_nadir_sigma_m),
+            robust: config.robust.as_ref(),
+            blunder_limit: config.blunder_limit,
+            images: config.images.iter().map(prior).collect(),
+        }
+    }
+}
+
+#[derive(Serialize)]
+struct TiesDocument<'a> {
+    points: usize,
+    joining_images: usize,
+    measured_elsewhere: &'a BTreeMap<String, u64>,
+    ignored: u64,
+    complaints: u64,
+}
+
+#[derive(Serialize)]
+struct StateDocument<'a> {
+    intersected: usize,
+    outliers: usize,
+    sigma0: f64,
+    rejected: Vec<LeftOutDocument<'a>>,
+    images: &'a [ImageResiduals],
+    pairs: Vec<PairDocument<'a>>,
+}
+
+#[derive(Serialize)]
+struct PairDocument<'a> {
+    images: &'a [String; 2],
+    ties: u32,
+    convergence_rad: f64,
+    height_over_base: f64,
+    line_spacing_m: [f64; 2],
+    pixel_size_m: [f64; 2],
+    residuals: &'a [ResidualMoments; 2],
+    disagreement_m: f64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    mola_spacing_m: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    footprints: Option<FootprintsDocument<'a>>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    budget: Option<&'a UncertaintyBudget>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    no_budget_because: Option<&'a str>,
+}
+
+#[derive(Serialize)]
+struct FootprintsDocument<'a> {
+    order: u8,
+    ties: u32,
+    ties_rejected: u32,
+    tie_lines: &'a Summary,
+    tie_samples: &'a Summary,
+    profiles: Vec<ProfileDocument<'a>>,
+}
+
+#[derive(Serialize)]
+struct ProfileDocument<'a> {
+    profile: &'a str,
+    lines: &'a Summary,
+    samples: &'a Summary,
+    along_m: f64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    along_spacings: Option<f64>,
+    beyond_ties: u32,
+}
+
+#[derive(Serialize)]
+struct LeftOutDocument<'a> {
+    kind: PointKind,
+    id: &'a str,
+    reason: String,
+}
+
+#[derive(Serialize)]
+struct AdjustmentDocument<'a> {
+    summary: &'a AdjustmentSummary,
+    /// Weighted sum of squared residuals before each step and after the last.
+    weighted_squares: &'a [f64],
+    images: Vec<ImageDocument<'a>>,
+    left_out: Vec<LeftOutDocument<'a>>,
+}
+
+#[derive(Serialize)]
+struct ImageDocument<'a> {
+    image: &'a str,
+    half_lines: f64,
+    line_period_s: f64,
+    correction: &'a [f64; ORIENTATION_UNKNOWNS],
+    sigmas: &'a [f64; ORIENTATION_UNKNOWNS],
+    /// With its standard deviation.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    time_bias_s: Option<(f64, f64)>,
+}
+
+/// Writes `adjustment.json` of a site with tie points.
+pub(super) fn write(
+    written: &mut Writer,
+    site: &SiteProducts,
+    geometric: &GeometricProducts,
+) -> Result<()> {
+    written.add("adjustment.json", |path| {
+        write_json(path, &document(site, geometric))?;
+        Ok(geometric.adjusted.points.len() as u64)
+    })
+}
+
+fn document<'a>(site: &SiteProducts<'a>, geometric: &GeometricProducts<'a>) -> Document<'a> {
+    let ties = geometric.ties;
+    let adjusted = geometric.adjusted;
+    let left_out = adjusted.left_out.iter().map(|point| LeftOutDocument {
+        kind: point.kind,
+        id: &point.id,
+        reason: point.reason.to_string(),
+    });
+    Document {
+        format: "areograph adjustment 1",
+        site: &site.config.site,
+        definitions: DEFINITIONS
+            .iter()
+            .map(|(of, is)| Definition { of, is })
+            .collect(),
+        configured: Configured {
+            model: site.config.registration.model,
+            intersection: &site.config.intersection,
+            adjustment: AdjustmentKeys::of(&site.config.adjustment),
+        },
+        ties: TiesDocument {
+            points: ties.points.len(),
+            joining_images: ties.joining(),
+            measured_elsewhere: &ties.elsewhere,
+            ignored: ties.ignored,
+            complaints: ties.complaint_count,
+        },
+        before: state(geometric.intersected, geometric.pairs),
+        after: state(geometric.adjusted_intersected, geometric.adjusted_pairs),
+        adjustment: AdjustmentDocument {
+            summary: &adjusted.summary,
+            weighted_squares: &adjusted.weighted_squares,
+            images: adjusted.images.iter().map(image).collect(),
+            left_out: left_out.collect(),
+        },
+    }
+}
+
+fn state<'a>(ties: &'a IntersectedTies, pairs: &'a [PairComparison]) -> StateDocument<'a> {
+    let rejected = ties.rejected.iter().map(|tie| LeftOutDocument {
+        kind: PointKind::Tie,
+        id: &tie.id,
+        reason: tie.reason.to_string(),
+    });
+    StateDocument {
+        intersected: ties.points.len(),
+        outliers: ties.points.iter().filter(|point| point.outlier).count(),
+        sigma0: ties.sigma0,
+        rejected: rejected.collect(),
+        images: &ties.images,
+        pairs: pairs.iter().map(pair).collect(),
+    }
+}
+
+fn image(image: &CorrectedImage) -> ImageDocument<'_> {
+    ImageDocument {
+        image: &image.id,
+        half_lines: image.half_lines,
+        line_period_s: image.line_period_s,
+        correction: &image.correction,
+        sigmas: &image.sigmas,
+        time_bias_s: image.time_bias_s,
+    }
+}
+
+fn pair(pair: &PairComparison) -> PairDocument<'_> {
+    fn profile(profile: &ProfileByTies) -> ProfileDocument<'_> {
+        ProfileDocument {
+            profile: &profile.profile,
+            lines: &profile.lines,
+            samples: &profile.samples,
+            along_m: profile.along_m,
+            along_spacings: profile.along_spacings,
+            beyond_ties: profile.beyond_ties,
+        }
+    }
+    PairDocument {
+        images: &pair.images,
+        ties: pair.ties,
+        convergence_rad: pair.convergence_rad,
+        height_over_base: pair.height_over_base,
+        line_spacing_m: pair.line_spacing_m,
+        pixel_size_m: pair.pixel_size_m,
+        residuals: &pair.residuals,
+        disagreement_m: pair.disagreement_m,
+        mola_spacing_m: pair.mola_spacing_m,
+        footprints: pair.footprints.as_ref().map(|by_ties| FootprintsDocument {
+            order: by_ties.order,
+            ties: by_ties.ties,
+            ties_rejected: by_ties.ties_rejected,
+            tie_lines: &by_ties.tie_lines,
+            tie_samples: &by_ties.tie_samples,
+            profiles: by_ties.profiles.iter().map(profile).collect(),
+        }),
+        budget: pair.budget.as_ref().ok(),
+        no_budget_because: pair.budget.as_ref().err().map(String::as_str),
+    }
+}

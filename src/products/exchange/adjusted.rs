@@ -1,0 +1,185 @@
+//! Adjusted shots and tie points in the forms of ISIS and Ames Stereo Pipeline.
+
+use std::collections::BTreeMap;
+
+use nalgebra::Matrix3;
+
+use super::{
+    gcp::{ControlMeasure, ControlPoint, write_gcp},
+    lidar_data::{LidarPoint, moc_serial_number, write_lidar_data},
+    points::{GroundEstimate, ImageMeasure},
+};
+use crate::{
+    error::Result,
+    frames::Position,
+    products::{GeometricProducts, ImageProducts, SiteProducts, Writer},
+    stages::{
+        adjust::{CorrectedPoint, PointKind},
+        prepare_adjustment::shot_id,
+    },
+    ties::{TieMeasure, TiePoint},
+    time::Et,
+};
+
+/// Writes `lidar.json` and `adjusted.gcp` of a site with tie points.
+pub(super) fn write(
+    written: &mut Writer,
+    site: &SiteProducts,
+    geometric: &GeometricProducts,
+) -> Result<()> {
+    let names: Vec<String> = site
+        .images
+        .iter()
+        .map(|image| isis_name(site, image))
+        .collect();
+    let shots = lidar_points(site, geometric, &names);
+    if !shots.is_empty() {
+        written.add("exchange/lidar.json", |path| write_lidar_data(path, &shots))?;
+    }
+    let files: Vec<String> = site
+        .images
+        .iter()
+        .map(|image| format!("{}.cub", image.times.id))
+        .collect();
+    let points = control_points(site, geometric, &files);
+    if !points.is_empty() {
+        written.add("exchange/adjusted.gcp", |path| write_gcp(path, &points))?;
+    }
+    Ok(())
+}
+
+/// The serial number that ISIS has for an image: as configured, else as ISIS composes it.
+fn isis_name(site: &SiteProducts, image: &ImageProducts) -> String {
+    let id = &image.times.id;
+    let configured = site.config.images.iter().find(|image| image.id == *id);
+    let configured = configured.and_then(|image| image.serial_number.clone());
+    configured
+        .or_else(|| moc_serial_number(image.times))
+        .unwrap_or_else(|| id.clone())
+}
+
+fn estimate(ground_m: [f64; 3], covariance_m2: Matrix3<f64>) -> GroundEstimate {
+    GroundEstimate {
+        position: Position::new(ground_m.into()),
+        covariance_m2,
+    }
+}
+
+fn adjusted(point: &CorrectedPoint) -> GroundEstimate {
+    estimate(point.ground_m, point.covariance_m2.into())
+}
+
+/// Shots with a range: the adjusted images see them where they project.
+fn lidar_points<'a>(
+    site: &SiteProducts<'a>,
+    geometric: &GeometricProducts<'a>,
+    names: &'a [String],
+) -> Vec<LidarPoint<'a>> {
+    let config = &site.config.adjustment;
+    let result = geometric.adjusted;
+    let rows: BTreeMap<String, u32> = site
+        .profiles
+        .iter()
+        .flat_map(|profile| {
+            profile
+                .rows
+                .iter()
+                .map(|row| (shot_id(profile, *row), *row))
+        })
+        .collect();
+    let places: Vec<BTreeMap<u32, [f64; 2]>> =
+        geometric.adjusted_images.iter().map(places).collect();
+    let shots = result.ranges.iter().filter_map(|range| {
+        let point = &result.points[range.point];
+        let row = *rows.get(&point.id)?;
+        let image = &result.images[range.image];
+        let time_bias_s = image.time_bias_s.map_or(0.0, |(bias_s, _)| bias_s);
+        let measures = names.iter().zip(&places).filter_map(|(image, places)| {
+            let [line, sample] = *places.get(&row)?;
+            Some(ImageMeasure {
+                image,
+                line,
+                sample,
+            })
+        });
+        Some(LidarPoint {
+            id: &point.id,
+            // A time bias of the image is folded into its adjusted kernels.
+            et: Et::from_seconds(site.footprints.et_s[row as usize] - time_bias_s),
+            range_m: range.range_m,
+            range_sigma_m: config.range_sigma_m,
+            apriori: estimate(
+                point.initial_m,
+                Matrix3::from_diagonal_element(config.ground_sigma_m.powi(2)),
+            ),
+            adjusted: Some(adjusted(point)),
+            simultaneous_images: vec![&names[range.image]],
+            measures: measures.collect(),
+        })
+    });
+    shots.collect()
+}
+
+/// Line and sample of the footprints that the delivered image shows, by their rows.
+fn places(image: &ImageProducts) -> BTreeMap<u32, [f64; 2]> {
+    let points = &image.registration.points;
+    (0..points.len())
+        .filter(|index| points.inside[*index])
+        .map(|index| {
+            (
+                points.row[index],
+                [points.line[index], points.sample[index]],
+            )
+        })
+        .collect()
+}
+
+/// Adjusted tie points where they were measured.
+fn control_points<'a>(
+    site: &SiteProducts<'a>,
+    geometric: &GeometricProducts<'a>,
+    files: &'a [String],
+) -> Vec<ControlPoint<'a>> {
+    let [along_px, across_px] = site.config.adjustment.tie_sigma_px;
+    let file_of = |measure: &TieMeasure| {
+        let mut images = site.images.iter().zip(files).enumerate();
+        images.find(|(_, (image, _))| image.times.id == measure.image)
+    };
+    let mut measured: BTreeMap<&str, &TiePoint> = BTreeMap::new();
+    for tie in &geometric.ties.points {
+        // Of points with the same identifier the first took part.
+        measured.entry(&tie.id).or_insert(tie);
+    }
+    let points = geometric.adjusted.points.iter();
+    let ties = points.filter(|point| point.kind == PointKind::Tie);
+    ties.filter_map(|point| {
+        let tie = measured.get(point.id.as_str())?;
+        let measures = tie.measures.iter().filter_map(|measure| {
+            let (index, (_, file)) = file_of(measure)?;
+            Some(ControlMeasure {
+                measure: ImageMeasure {
+                    image: file,
+                    line: measure.line,
+                    sample: measure.sample,
+                },
+                sigma_px: [across_px, along_px / focal_px_per_line(geometric, index)],
+            })
+        });
+        Some(ControlPoint {
+            id: &point.id,
+            ground: adjusted(point),
+            measures: measures.collect(),
+        })
+    })
+    .collect()
+}
+
+/// How many focal pixels a line is, from the pairs of the image.
+fn focal_px_per_line(geometric: &GeometricProducts, image: usize) -> f64 {
+    let id = &geometric.adjusted_images[image].times.id;
+    let mut pairs = geometric.adjusted_pairs.iter().filter_map(|pair| {
+        let at = pair.images.iter().position(|of| of == id)?;
+        Some(pair.line_spacing_m[at] / pair.pixel_size_m[at])
+    });
+    pairs.next().unwrap_or(1.0)
+}

@@ -1,0 +1,119 @@
+//! Adjusted points as ground control of Ames Stereo Pipeline, for `bundle_adjust --datum D_MARS`.
+//!
+//! A line per point: number, latitude, longitude, height, three standard deviations, and for each image its
+//! file, column, row and two standard deviations. The datum is a sphere, so latitudes are areocentric and
+//! heights radii minus 3396190 m. The standard deviations belong to Mars-fixed x, y, z (not to latitude,
+//! longitude and height, as `--use-lon-lat-height-gcp-error` would have them). Columns and rows have the
+//! middle of the first pixel at 0. Numbers count from 1; the comment line before a point says whose it is.
+//!
+//! Source: manual of `bundle_adjust`, section on ground control points; lines beginning with `#` are skipped
+//! by its reader (`ControlNetworkLoader.cc` of Vision Workbench).
+
+use std::{fmt::Write as _, path::Path};
+
+use super::{
+    DEGREE_DECIMALS, METRE_DECIMALS, SPHERE_RADIUS_M,
+    points::{GroundEstimate, ImageMeasure, above_zero},
+};
+use crate::{
+    error::{Place, Result},
+    products::{fault::ProductFault, files::write_text},
+    units::RADIANS_PER_DEGREE,
+};
+
+/// Where we have the outer edge of the first pixel at 0, its middle is 0 for Ames Stereo Pipeline.
+const EDGE_TO_MIDDLE: f64 = -0.5;
+/// Decimals of pixels.
+const PIXEL_DECIMALS: usize = 4;
+
+/// A point with its measurements.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ControlPoint<'a> {
+    /// Identifier; goes into a comment, since the format wants numbers.
+    pub id: &'a str,
+    /// Where it lies.
+    pub ground: GroundEstimate,
+    /// Where images, by their files as `bundle_adjust` is given them, see it.
+    pub measures: Vec<ControlMeasure<'a>>,
+}
+
+/// A measurement with its standard deviations.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ControlMeasure<'a> {
+    /// The measurement.
+    pub measure: ImageMeasure<'a>,
+    /// Standard deviations of sample and line, image pixels.
+    pub sigma_px: [f64; 2],
+}
+
+/// Writes the points that were measured in any image to `path`, which must end in `.gcp`; gives their number.
+///
+/// # Errors
+/// [`Kind::Bug`](crate::error::Kind::Bug) for what the reader would refuse or read as something else:
+/// standard deviations that are not above 0, numbers that are not finite, names of files with spaces or
+/// commas; [`Kind::Io`](crate::error::Kind::Io).
+pub fn write_gcp(path: &Path, points: &[ControlPoint]) -> Result<u64> {
+    let mut text = format!(
+        "# bundle_adjust --datum D_MARS (sphere of {SPHERE_RADIUS_M} m, Mars IAU 2000); pixels from 0\n\
+         # number latitude longitude height_m sigma_x_m sigma_y_m sigma_z_m, and for each image: \
+         file column row sigma_column sigma_row\n"
+    );
+    let measured = points.iter().filter(|point| !point.measures.is_empty());
+    let mut number = 0;
+    for point in measured {
+        number += 1;
+        let line = line(number, point).in_file(path)?;
+        let _infallible = writeln!(text, "# {number} is {}\n{line}", comment(point.id));
+    }
+    write_text(path, &text)?;
+    Ok(number)
+}
+
+/// An identifier that cannot begin another line.
+fn comment(id: &str) -> String {
+    id.replace(char::is_control, " ")
+}
+
+fn line(number: u64, point: &ControlPoint) -> std::result::Result<String, ProductFault> {
+    let id = point.id;
+    let spherical = point.ground.spherical();
+    let sigmas_m = point.ground.covariance_m2.diagonal().map(f64::sqrt);
+    let mut line = format!(
+        "{number} {:.DEGREE_DECIMALS$} {:.DEGREE_DECIMALS$} {:.METRE_DECIMALS$}",
+        spherical.latitude.0 / RADIANS_PER_DEGREE,
+        spherical.longitude_rad / RADIANS_PER_DEGREE,
+        spherical.radius_m - SPHERE_RADIUS_M,
+    );
+    above_zero(&format!("radius of {id}, metres,"), spherical.radius_m)?;
+    for sigma_m in sigmas_m.iter() {
+        above_zero(&format!("standard deviation of {id}, metres,"), *sigma_m)?;
+        let _infallible = write!(line, " {sigma_m}");
+    }
+    for ControlMeasure { measure, sigma_px } in &point.measures {
+        let file = measure.image;
+        let splits = |character: char| character.is_whitespace() || character == ',';
+        let place = [measure.sample, measure.line].map(|at| at + EDGE_TO_MIDDLE);
+        if file.is_empty() || file.contains(splits) || !place.iter().all(|at| at.is_finite()) {
+            let reason = format!(
+                "{id} is measured in {file:?} at line {} and sample {}; expected a file without spaces and commas, \
+                 and finite numbers",
+                measure.line, measure.sample
+            );
+            let action = "write a point";
+            return Err(ProductFault::Refused { action, reason });
+        }
+        let [column, row] = place;
+        let _infallible = write!(
+            line,
+            " {file} {column:.PIXEL_DECIMALS$} {row:.PIXEL_DECIMALS$}"
+        );
+        for sigma in sigma_px {
+            above_zero(
+                &format!("standard deviation of {id} in {file}, pixels,"),
+                *sigma,
+            )?;
+            let _infallible = write!(line, " {sigma}");
+        }
+    }
+    Ok(line)
+}
