@@ -15,20 +15,26 @@
     reason = "pixels, bars and grid lines are small numbers, and casts of floats saturate"
 )]
 
+mod adjustment;
 mod compare;
+mod corrections;
 mod diff;
 mod graticule;
 mod html;
 mod images;
 mod map;
+mod misregistration;
+mod moved;
 mod outlines;
 mod plots;
 mod ranges;
 mod registration;
+mod reliability;
 mod scan;
 mod sites;
 mod summary;
 mod timeline;
+mod uncertainty;
 
 use crate::{error::Result, products::SiteProducts};
 
@@ -48,6 +54,12 @@ pub fn page(site: &SiteProducts) -> Result<String> {
         Section::new("Clock bias scan", scan::section(site)?),
         Section::new("Exterior orientation", images::section(site)?),
         Section::new("Registration", registration::section(site)?),
+        Section::new(
+            "Tie points and misregistration",
+            misregistration::section(site)?,
+        ),
+        Section::new("Combined adjustment", adjustment::section(site)?),
+        Section::new("Uncertainty of ground points", uncertainty::section(site)),
         Section::new("Map", map::section(site)?),
         Section::new("Selection of shots", summary::selection(site)),
         Section::new("Clock corrections and datum", summary::corrections(site)),

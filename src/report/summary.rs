@@ -1,6 +1,10 @@
 //! Sections in words and tables: verdict, selection, corrections, provenance, notes.
 
-use super::html::{Cell, Column, Table, Tone, heading, list, paragraph, verdict};
+use super::{
+    html::{Cell, Column, Table, Tone, heading, list, paragraph, verdict},
+    misregistration::BeforeAfter,
+    plots::label,
+};
 use crate::{
     config::{BiasScope, DatumChoice, TagSign, WindowConfig, WindowShape},
     products::SiteProducts,
@@ -31,6 +35,7 @@ pub(super) fn lead(site: &SiteProducts) -> String {
     }
     body += &first_of(&remarks);
     body += &paragraph(&counts(site));
+    body += &paragraph(&together(site));
     paragraph(&site.config.description) + &verdict(tone, &headline, &body)
 }
 
@@ -52,6 +57,25 @@ fn counts(site: &SiteProducts) -> String {
     text
 }
 
+/// How far apart the images see the same ground, before and after the adjustment; nothing without tie points.
+fn together(site: &SiteProducts) -> String {
+    let Some(geometric) = &site.geometric else {
+        return String::new();
+    };
+    let pairs = BeforeAfter::all(geometric);
+    let words = BeforeAfter::worst(&pairs).map_or_else(String::new, |pair| {
+        let others = match pairs.len() {
+            1 => String::new(),
+            count => format!(" It is the worst of {}.", counted(count, "pair")),
+        };
+        pair.sentence() + &others
+    });
+    let sigma0 = label(geometric.adjusted.summary.sigma0, 2);
+    format!("{words} σ0 of the adjustment: {sigma0}.")
+        .trim_start()
+        .to_owned()
+}
+
 /// As many sentences as leave the verdict on one screen; the manifest has all.
 fn first_of(sentences: &[String]) -> String {
     let shown = &sentences[..sentences.len().min(REASONS_SHOWN)];
@@ -65,7 +89,8 @@ fn first_of(sentences: &[String]) -> String {
     html
 }
 
-fn counted(count: usize, what: &str) -> String {
+/// A number of things, in the plural where there are several.
+pub(super) fn counted(count: usize, what: &str) -> String {
     let plural = if count == 1 { "" } else { "s" };
     format!("{count} {what}{plural}")
 }

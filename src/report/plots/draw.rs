@@ -6,7 +6,9 @@ use plotters::{
     style::text_anchor::{HPos, Pos, VPos},
 };
 
-use super::{Extent, GRID, INK, LETTERS, MARK, Panel, Plot, Series, Style, WIDTH};
+use super::{
+    Extent, GRID, INK, LETTERS, MARK, Panel, Plot, Series, Style, WIDTH, arrows::draw_arrows,
+};
 use crate::{error::Result, products::fault::ProductFault};
 
 /// Height of the axis below the lowest panel, with its labels.
@@ -25,7 +27,8 @@ pub(in crate::report) type Canvas<'a> = DrawingArea<SVGBackend<'a>, Shift>;
 /// Whether a piece could be drawn.
 pub(in crate::report) type Drawn<'a> =
     std::result::Result<(), DrawingAreaErrorKind<<SVGBackend<'a> as DrawingBackend>::ErrorType>>;
-type Chart<'a, 'b> = ChartContext<'b, SVGBackend<'a>, Cartesian2d<RangedCoordf64, RangedCoordf64>>;
+pub(super) type Chart<'a, 'b> =
+    ChartContext<'b, SVGBackend<'a>, Cartesian2d<RangedCoordf64, RangedCoordf64>>;
 
 /// SVG of the given height, filled by `with`.
 ///
@@ -110,6 +113,9 @@ fn draw_panel<'a>(plot: &Plot, panel: &Panel, lowest: bool, area: &Canvas<'a>) -
     draw_marks(plot, panel, &mut chart)?;
     for series in &panel.series {
         draw_series(plot.x, panel.y, series, &mut chart)?;
+    }
+    for arrows in &panel.arrows {
+        draw_arrows(plot, panel, arrows, &mut chart)?;
     }
     if panel.histogram {
         draw_histogram(panel, foot, &right)?;

@@ -1,8 +1,10 @@
 //! Plots: panels over one axis, drawn as inline SVG, told in words and given as CSV.
 
+mod arrows;
 mod draw;
 mod figure;
 
+pub(super) use arrows::{Arrow, Arrows, magnification};
 pub(super) use draw::{Canvas, Drawn, draw_text, drawn, label};
 pub(super) use figure::{Key, figure_html};
 
@@ -90,6 +92,8 @@ pub(super) struct Panel {
     pub(super) y: Extent,
     pub(super) height: u32,
     pub(super) series: Vec<Series>,
+    /// Vectors, over the series.
+    pub(super) arrows: Vec<Arrows>,
     pub(super) marks: Vec<Mark>,
     /// Level lines that values should not cross; drawn where they are inside the range.
     pub(super) limits: Vec<f64>,
@@ -106,6 +110,7 @@ impl Panel {
             y: Extent::of(values.map(|point| point.1)),
             height: 420,
             series,
+            arrows: Vec::new(),
             marks: Vec::new(),
             limits: Vec::new(),
             histogram: false,
@@ -148,9 +153,13 @@ impl Plot {
         }
     }
 
-    /// The points of every panel, one line each.
+    /// The points of every panel, one line each; vectors have two columns more.
     fn csv(&self) -> String {
-        let mut csv = format!("quantity,series,{},value\n", quoted(self.x_label));
+        let mut csv = format!("quantity,series,{},value", quoted(self.x_label));
+        if self.panels.iter().any(|panel| !panel.arrows.is_empty()) {
+            csv += &format!(",by {},by value", self.x_label);
+        }
+        csv.push('\n');
         for panel in &self.panels {
             for series in &panel.series {
                 let name = format!("{},{}", quoted(panel.y_label), quoted(&series.label));
@@ -159,6 +168,7 @@ impl Plot {
                     let _ = writeln!(csv, "{name},{},{}", rounded(*x), rounded(*y));
                 }
             }
+            arrows::append_csv(panel, &mut csv);
         }
         csv
     }
@@ -166,13 +176,20 @@ impl Plot {
     /// Entries of the legend: every label once.
     fn keys(&self) -> Vec<Key> {
         let mut keys: Vec<Key> = Vec::new();
-        for series in self.panels.iter().flat_map(|panel| &panel.series) {
-            let key = match series.style {
+        for panel in &self.panels {
+            let series = panel
+                .series
+                .iter()
+                .filter(|series| !series.label.is_empty());
+            let of_series = series.map(|series| match series.style {
                 Style::Crosses => Key::mark(&series.label),
                 _ => Key::colour(&series.label, series.colour),
-            };
-            if !series.label.is_empty() && !keys.contains(&key) {
-                keys.push(key);
+            });
+            let of_arrows = panel.arrows.iter().map(Arrows::key);
+            for key in of_series.chain(of_arrows) {
+                if !keys.contains(&key) {
+                    keys.push(key);
+                }
             }
         }
         keys

@@ -1,0 +1,250 @@
+//! The combined adjustment: tables 2, 3 and 4 of Yoon & Shan 2004 for this site, and what the observations say.
+
+use super::{
+    corrections,
+    html::{Cell, Column, Table, heading, paragraph},
+    plots::{Extent, Panel, Plot, Series, figure, label},
+    reliability,
+    summary::counted,
+};
+use crate::{
+    error::Result,
+    geom::statistics::Summary,
+    products::SiteProducts,
+    stages::adjust::{Adjusted, AdjustmentSummary, BAARDA_LIMIT, GroundSummary, ObservationType},
+};
+
+/// Steps that the axis of the convergence has room for at least, so that its labels are whole numbers.
+const STEPS_SHOWN_MIN: f64 = 8.0;
+
+/// Tables and plots; nothing for a site without tie points.
+///
+/// # Errors
+/// A plot that cannot be drawn.
+pub(super) fn section(site: &SiteProducts) -> Result<String> {
+    let Some(geometric) = &site.geometric else {
+        return Ok(String::new());
+    };
+    let adjusted = geometric.adjusted;
+    let summary = &adjusted.summary;
+    let mut html = paragraph(&overview(adjusted));
+    html += &paragraph(&reliability::absolute(site, geometric));
+    html += &format!(
+        "<div class=\"plots\">\n{}</div>\n",
+        figure(&convergence(adjusted))?
+    );
+    html += &ground_corrections(summary);
+    html += &image_coordinates(summary);
+    html += &ground_sigmas(summary);
+    html += &observations(summary);
+    html += &heading("What was added to the orientation");
+    html += &corrections::tables(site, adjusted);
+    html += &heading("What can be trusted");
+    html += &reliability::redundancy(site, adjusted);
+    html += &reliability::correlations(summary);
+    html += &reliability::left_out(adjusted);
+    Ok(html)
+}
+
+fn overview(adjusted: &Adjusted) -> String {
+    let summary = &adjusted.summary;
+    let verdict = if summary.degrees_of_freedom == 0 {
+        "nothing is redundant, so that nothing can be said of it".to_owned()
+    } else if summary.sigma0 < 1.0 {
+        "the observations agree better than their standard deviations promise".to_owned()
+    } else {
+        "the observations agree worse than their standard deviations promise, or as well".to_owned()
+    };
+    format!(
+        "{}, {} and {} were adjusted together in {}; {} degrees of freedom. The a posteriori standard deviation of unit \
+         weight σ0 is {} (1 was put in): {verdict}.",
+        counted(adjusted.images.len(), "image"),
+        counted(summary.shots.corrections_m[0].n as usize, "footprint"),
+        counted(summary.ties.corrections_m[0].n as usize, "tie point"),
+        counted(summary.steps, "step"),
+        summary.degrees_of_freedom,
+        label(summary.sigma0, 3)
+    )
+}
+
+/// The weighted sum of squares from step to step.
+fn convergence(adjusted: &Adjusted) -> Plot {
+    let squares = (0_u32..).zip(&adjusted.weighted_squares);
+    let logarithms = squares
+        .filter(|(_, squares)| **squares > 0.0)
+        .map(|(step, squares)| (f64::from(step), squares.log10()));
+    let series = Series::line("weighted sum of squares", 0, logarithms.collect());
+    let ends = (
+        adjusted.weighted_squares.first(),
+        adjusted.weighted_squares.last(),
+    );
+    let words = match ends {
+        (Some(first), Some(last)) => format!(
+            "Weighted sum of squared residuals before each step and after the last, as a power of ten: from {first:.4e} \
+             to {last:.4e}."
+        ),
+        _ => "No step was taken.".to_owned(),
+    };
+    let panel = Panel {
+        height: 260,
+        ..Panel::of("log10 of vᵀPv", vec![series])
+    };
+    Plot {
+        x: Extent {
+            low: 0.0,
+            high: (adjusted.weighted_squares.len() as f64).max(STEPS_SHOWN_MIN),
+        },
+        ..Plot::of(
+            "Convergence of the adjustment".to_owned(),
+            words,
+            "step",
+            vec![panel],
+        )
+    }
+}
+
+/// Mean and standard deviation, or a dash each where there is nothing.
+fn moments(of: &Summary, decimals: usize) -> [Cell; 2] {
+    if of.n == 0 {
+        return ["–".into(), "–".into()];
+    }
+    [of.mean, of.standard_deviation].map(|value| label(value, decimals).into())
+}
+
+const fn kinds(summary: &AdjustmentSummary) -> [(&'static str, &GroundSummary); 2] {
+    [("MOLA", &summary.shots), ("tie points", &summary.ties)]
+}
+
+fn ground_corrections(summary: &AdjustmentSummary) -> String {
+    let mut table = Table::new(
+        "Corrections of ground points (Table 2 of Yoon & Shan 2004), metres",
+        &[
+            Column::Text("points"),
+            Column::Number("n"),
+            Column::Number("X, mean"),
+            Column::Number("std"),
+            Column::Number("Y, mean"),
+            Column::Number("std"),
+            Column::Number("Z, mean"),
+            Column::Number("std"),
+        ],
+    );
+    for (name, of) in kinds(summary) {
+        let mut cells: Vec<Cell> = vec![name.into(), of.corrections_m[0].n.to_string().into()];
+        cells.extend(of.corrections_m.iter().flat_map(|axis| moments(axis, 3)));
+        table.row(true, cells);
+    }
+    table.finish()
+        + &paragraph(
+            "Adjusted minus initial, Mars-fixed axes. The initial tie points are intersections with the orientation of \
+             the kernels. The paper's “RMS” is the standard deviation about the mean, as here.",
+        )
+}
+
+fn image_coordinates(summary: &AdjustmentSummary) -> String {
+    let mut table = Table::new(
+        "Image coordinates (Table 3 of Yoon & Shan 2004): corrections of MOLA, residuals of tie points",
+        &[
+            Column::Text("image"),
+            Column::Text("points"),
+            Column::Number("n"),
+            Column::Number("along, mean"),
+            Column::Number("std"),
+            Column::Number("across, mean"),
+            Column::Number("std"),
+        ],
+    );
+    for image in &summary.images {
+        for (name, of) in [
+            ("MOLA, lines and px", &image.mola_corrections),
+            ("tie points, focal px", &image.tie_residuals_px),
+        ] {
+            let mut cells: Vec<Cell> = vec![
+                (&image.image).into(),
+                name.into(),
+                of[0].n.to_string().into(),
+            ];
+            cells.extend(of.iter().flat_map(|axis| moments(axis, 3)));
+            table.row(true, cells);
+        }
+    }
+    table.finish()
+}
+
+fn ground_sigmas(summary: &AdjustmentSummary) -> String {
+    let mut table = Table::new(
+        "A posteriori standard deviations of ground points (Table 4 of Yoon & Shan 2004), metres, means",
+        &[
+            Column::Text("points"),
+            Column::Number("σ X"),
+            Column::Number("σ Y"),
+            Column::Number("σ Z"),
+            Column::Number("largest σ"),
+            Column::Number("σ0"),
+        ],
+    );
+    for (name, of) in kinds(summary) {
+        let largest = of.sigmas_m.iter().map(|axis| axis.max).fold(0.0, f64::max);
+        let mut cells: Vec<Cell> = vec![name.into()];
+        for axis in &of.sigmas_m {
+            let [mean, _] = moments(axis, 3);
+            cells.push(mean);
+        }
+        cells.push(label(largest, 3).into());
+        cells.push(label(summary.sigma0, 3).into());
+        table.row(true, cells);
+    }
+    table.finish()
+}
+
+/// A kind of observation in words.
+const fn kind(of: ObservationType) -> &'static str {
+    match of {
+        ObservationType::TieImage => "image coordinates of tie points",
+        ObservationType::MolaImage => "image coordinates of MOLA",
+        ObservationType::MolaRange => "MOLA ranges",
+        ObservationType::Orientation => "initial orientation",
+        ObservationType::MolaGround => "ground coordinates of MOLA",
+    }
+}
+
+fn observations(summary: &AdjustmentSummary) -> String {
+    let mut table = Table::new(
+        "Observations by kind",
+        &[
+            Column::Text("kind"),
+            Column::Number("number"),
+            Column::Number("redundancy"),
+            Column::Number("per observation"),
+            Column::Number("vᵀPv"),
+            Column::Number("variance component"),
+            Column::Number("beyond 3.29"),
+        ],
+    );
+    for of in &summary.types {
+        let each = 100.0 * of.redundancy / of.observations.max(1) as f64;
+        let component = if of.redundancy > 0.0 {
+            label(of.variance_component, 3)
+        } else {
+            "–".to_owned()
+        };
+        table.row(
+            true,
+            [
+                kind(of.kind).into(),
+                of.observations.to_string().into(),
+                label(of.redundancy, 1).into(),
+                format!("{} %", label(each, 1)).into(),
+                label(of.weighted_squares, 2).into(),
+                component.into(),
+                of.beyond_limit.to_string().into(),
+            ],
+        );
+    }
+    let words = format!(
+        "The variance component is the standard deviation of unit weight of one kind, √(vᵀPv / redundancy): near 1 where \
+         the standard deviations put in are right, below 1 where they are too large. Beyond {BAARDA_LIMIT}: \
+         observations that fail Baarda's test; one good one in a thousand does."
+    );
+    table.finish() + &paragraph(&words)
+}

@@ -1,0 +1,177 @@
+//! What the adjustment adds to each image's orientation, and what it makes of ranges and biases.
+
+use std::collections::BTreeMap;
+
+use nalgebra::Vector3;
+
+use super::{
+    html::{Cell, Column, Table, paragraph},
+    plots::label,
+};
+use crate::{
+    geom::{orbit_axes::radial_along_cross, statistics::Summary},
+    products::{ImageProducts, SiteProducts},
+    stages::adjust::{Adjusted, CorrectedImage},
+    units::{RADIANS_PER_ARCSECOND, SECONDS_PER_MS},
+};
+
+/// Corrections at the middle of each image, ranges, biases.
+pub(super) fn tables(site: &SiteProducts, adjusted: &Adjusted) -> String {
+    [
+        positions(site, adjusted),
+        rotations(adjusted),
+        ranges(site, adjusted),
+        biases(adjusted),
+    ]
+    .concat()
+}
+
+/// Coefficients of power 0 from quantity `first` on, with their standard deviations.
+fn constants(image: &CorrectedImage, first: usize) -> [(f64, f64); 3] {
+    [0, 1, 2].map(|axis| {
+        let index = 3 * (first + axis);
+        (image.correction[index], image.sigmas[index])
+    })
+}
+
+fn with_sigma((value, sigma): (f64, f64), decimals: usize) -> Cell {
+    format!("{} ± {}", label(value, decimals), label(sigma, decimals)).into()
+}
+
+fn positions(site: &SiteProducts, adjusted: &Adjusted) -> String {
+    let mut table = Table::new(
+        "Shift of the camera at the middle of the image, metres",
+        &[
+            Column::Text("image"),
+            Column::Number("X"),
+            Column::Number("Y"),
+            Column::Number("Z"),
+            Column::Number("along the flight"),
+            Column::Number("across it"),
+            Column::Number("radial"),
+        ],
+    );
+    for (image, corrected) in site.images.iter().zip(&adjusted.images) {
+        let position_m = constants(corrected, 0);
+        let in_orbit = orbit_axes(image, Vector3::from(position_m.map(|(value, _)| value)));
+        let mut cells: Vec<Cell> = vec![(&corrected.id).into()];
+        cells.extend(position_m.map(|axis| with_sigma(axis, 1)));
+        cells.extend([1, 2, 0].map(|axis| {
+            let component = in_orbit.map(|shift_m| label(shift_m[axis], 1));
+            Cell::from(component.unwrap_or_else(|| "–".to_owned()))
+        }));
+        table.row(true, cells);
+    }
+    table.finish()
+}
+
+/// Radial, along the flight over the turning planet, and across it.
+fn orbit_axes(image: &ImageProducts, shift_m: Vector3<f64>) -> Option<Vector3<f64>> {
+    let samples = &image.orientation.samples;
+    let middle = samples.len() / 2;
+    let position_m = |index: usize| Some(Vector3::from(samples.get(index)?.position_m));
+    let (before, after) = (position_m(middle.checked_sub(1)?)?, position_m(middle)?);
+    let advance_m = after - before;
+    let axes = radial_along_cross(&after, &advance_m);
+    (advance_m.norm() > 0.0).then(|| axes.transpose() * shift_m)
+}
+
+fn rotations(adjusted: &Adjusted) -> String {
+    let mut table = Table::new(
+        "Rotation of the camera at the middle of the image, arcseconds",
+        &[
+            Column::Text("image"),
+            Column::Number("about camera x"),
+            Column::Number("about camera y"),
+            Column::Number("about camera z"),
+            Column::Number("time bias, ms"),
+        ],
+    );
+    for image in &adjusted.images {
+        let arcseconds = |(value, sigma): (f64, f64)| {
+            (value / RADIANS_PER_ARCSECOND, sigma / RADIANS_PER_ARCSECOND)
+        };
+        let mut cells: Vec<Cell> = vec![(&image.id).into()];
+        let rotation = constants(image, 3);
+        cells.extend(rotation.map(|axis| with_sigma(arcseconds(axis), 1)));
+        cells.push(image.time_bias_s.map_or_else(
+            || "no unknown".into(),
+            |(bias_s, sigma_s)| with_sigma((bias_s / SECONDS_PER_MS, sigma_s / SECONDS_PER_MS), 2),
+        ));
+        table.row(true, cells);
+    }
+    table.finish()
+        + &paragraph(
+            "± is the a posteriori standard deviation. Position and rotation are nearly the same to a narrow camera: see \
+             the correlations below before reading any of these alone.",
+        )
+}
+
+/// Range residuals of the same shots with the orbit of the kernels and after the adjustment.
+fn ranges(site: &SiteProducts, adjusted: &Adjusted) -> String {
+    if adjusted.ranges.is_empty() {
+        return paragraph("No shot was fired while an image was exposed: no range takes part.");
+    }
+    let before_m = checked_ranges(site);
+    let mut groups: BTreeMap<(&str, usize), [Vec<f64>; 2]> = BTreeMap::new();
+    for range in &adjusted.ranges {
+        let [before, after] = groups.entry((&range.profile, range.image)).or_default();
+        let shot = &adjusted.points[range.point].id;
+        before.extend(before_m.get(shot));
+        after.push(range.residual_m.value);
+    }
+    let mut table = Table::new(
+        "Ranges of shots that were fired while an image was exposed, residuals in metres",
+        &[
+            Column::Text("profile"),
+            Column::Text("image"),
+            Column::Number("ranges"),
+            Column::Number("before, mean"),
+            Column::Number("std"),
+            Column::Number("after, mean"),
+            Column::Number("std"),
+        ],
+    );
+    for ((profile, image), [before, after]) in groups {
+        let mut cells: Vec<Cell> = vec![
+            profile.into(),
+            (&adjusted.images[image].id).into(),
+            after.len().to_string().into(),
+        ];
+        for values in [before, after] {
+            let found = Summary::of(&values);
+            let numbers = [found.mean, found.standard_deviation].map(|value| label(value, 3));
+            cells.extend(numbers.map(|text| {
+                let text = if found.n == 0 { "–".to_owned() } else { text };
+                Cell::from(text)
+            }));
+        }
+        table.row(true, cells);
+    }
+    table.finish()
+        + &paragraph("Before: range − distance of the same shots, as in the range check.")
+}
+
+/// Range − distance by the name that the adjustment gives a shot: its profile and its row.
+fn checked_ranges(site: &SiteProducts) -> BTreeMap<String, f64> {
+    let shots = &site.ranges.shots;
+    let name = |index: usize| {
+        let profile = site.profiles.get(shots.profile[index] as usize)?;
+        let name = format!("{}:{}", profile.id, shots.row[index]);
+        Some((name, shots.range_minus_distance_m[index]))
+    };
+    (0..shots.len()).filter_map(name).collect()
+}
+
+fn biases(adjusted: &Adjusted) -> String {
+    let biases = &adjusted.summary.range_biases_m;
+    if biases.is_empty() {
+        return String::new();
+    }
+    let columns = &[Column::Text("profile"), Column::Number("range bias, m")];
+    let mut table = Table::new("Range biases", columns);
+    for (profile, value_m, sigma_m) in biases {
+        table.row(true, [profile.into(), with_sigma((*value_m, *sigma_m), 3)]);
+    }
+    table.finish()
+}

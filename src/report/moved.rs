@@ -1,0 +1,237 @@
+//! What the adjustment moves on the image planes: footprints, and figure 6 of Shan et al. 2005 for tie points.
+
+use std::collections::BTreeMap;
+
+use super::plots::{
+    Arrow, Arrows, Extent, GREY, INK, Mark, Panel, Plot, Series, Style, figure, label,
+    magnification, thinned,
+};
+use crate::{
+    error::Result,
+    geom::{pushbroom::Detector, statistics::Summary},
+    products::{GeometricProducts, ImageProducts, SiteProducts},
+    stages::{intersect::IntersectedTies, register::RegisteredPoints},
+};
+
+/// Dots of one series.
+const DOTS_MAX: usize = 300;
+/// Vectors of all images together; each is drawn once and listed once, about 400 bytes.
+const ARROWS_ALL: usize = 4_000;
+/// Most vectors of one panel.
+const ARROWS_MAX: usize = 250;
+/// Widths of the image on either side of it within which footprints are compared.
+const WIDTHS_BESIDE: f64 = 0.5;
+/// Lines that are shown to either side, in lengths of what footprints move by, and at least.
+const MOVES_BESIDE: f64 = 12.0;
+const LINES_BESIDE_MIN: f64 = 200.0;
+/// Share of the image's lines, and of its samples, that the longest vector takes.
+const LONGEST: f64 = 0.1;
+/// Colours of what was before and after.
+const BEFORE: usize = 1;
+const AFTER: usize = 0;
+
+/// Footprints and residual vectors of every image.
+///
+/// # Errors
+/// A plot that cannot be drawn.
+pub(super) fn figures(site: &SiteProducts, geometric: &GeometricProducts) -> Result<String> {
+    let mut html = String::new();
+    let panels = 2 * site.images.len().max(1);
+    let limit = (ARROWS_ALL / panels).clamp(20, ARROWS_MAX);
+    let images = site.images.iter().zip(geometric.adjusted_images);
+    for (index, (before, after)) in images.enumerate() {
+        if let Some(plot) = footprints(before, after) {
+            html += &figure(&plot)?;
+        }
+        html += &figure(&vectors(before, index, geometric, limit))?;
+    }
+    Ok(format!("<div class=\"plots\">\n{html}</div>\n"))
+}
+
+/// Footprints around the middle one with the orientation of the kernels and with the adjusted one, so near that
+/// the difference can be seen.
+fn footprints(before: &ImageProducts, after: &ImageProducts) -> Option<Plot> {
+    let samples = f64::from(before.times.samples);
+    let near = -WIDTHS_BESIDE * samples..=(1.0 + WIDTHS_BESIDE) * samples;
+    let all = moves(&before.registration.points, &after.registration.points);
+    let all: Vec<Arrow> = all
+        .into_iter()
+        .filter(|moved| near.contains(&moved.from.1))
+        .collect();
+    let median = |of: fn(&Arrow) -> f64| {
+        let values: Vec<f64> = all.iter().map(of).collect();
+        Summary::of(&values).median
+    };
+    let (lines, across) = (median(|moved| moved.by.0), median(|moved| moved.by.1));
+    let half = (MOVES_BESIDE * lines.abs()).max(LINES_BESIDE_MIN);
+    let middle = median(|moved| moved.from.0);
+    let x = Extent {
+        low: middle - half,
+        high: middle + half,
+    };
+    let shown: Vec<Arrow> = all
+        .iter()
+        .copied()
+        .filter(|moved| x.contains(moved.from.0))
+        .collect();
+    let shown = thinned(&shown, DOTS_MAX);
+    if shown.is_empty() {
+        return None;
+    }
+    let dots = |label: &str, colour: usize, at: fn(&Arrow) -> (f64, f64)| Series {
+        label: label.to_owned(),
+        style: Style::Dots,
+        colour,
+        points: shown.iter().map(at).collect(),
+    };
+    let series = vec![
+        dots("before", BEFORE, |moved| moved.from),
+        dots("after", AFTER, |moved| {
+            (moved.from.0 + moved.by.0, moved.from.1 + moved.by.1)
+        }),
+    ];
+    let mut panel = Panel::of("sample", series);
+    panel.arrows.push(Arrows {
+        label: "moved".to_owned(),
+        colour: GREY,
+        magnification: 1.0,
+        each: shown,
+    });
+    let words = format!(
+        "Footprints around the middle one, with the orientation of the kernels and with the adjusted one, flight to the \
+         right. Of {} that are seen with both, {} lines and {} samples are the medians of what they move by.",
+        all.len(),
+        label(lines, 2),
+        label(across, 2)
+    );
+    Some(Plot {
+        x,
+        ..Plot::of(
+            format!("Footprints on {} before and after", before.times.id),
+            words,
+            "line",
+            vec![panel],
+        )
+    })
+}
+
+/// What moves each footprint that is within an image's lines before and after.
+fn moves(before: &RegisteredPoints, after: &RegisteredPoints) -> Vec<Arrow> {
+    let places = |points: &RegisteredPoints| -> BTreeMap<(u32, u32), (f64, f64)> {
+        let own = (0..points.len()).filter(|index| !points.extrapolated[*index]);
+        own.map(|index| {
+            let shot = (points.profile[index], points.row[index]);
+            (shot, (points.line[index], points.sample[index]))
+        })
+        .collect()
+    };
+    let after = places(after);
+    let moved = places(before).into_iter().filter_map(|(shot, from)| {
+        let to = after.get(&shot)?;
+        let by = (to.0 - from.0, to.1 - from.1);
+        Some(Arrow { from, by })
+    });
+    moved.collect()
+}
+
+/// Figure 6: reprojection residuals where the tie points were measured.
+fn vectors(
+    image: &ImageProducts,
+    index: usize,
+    geometric: &GeometricProducts,
+    limit: usize,
+) -> Plot {
+    let samples = f64::from(image.times.samples);
+    let lines = f64::from(image.times.lines_header);
+    let ends = [0.0, f64::from(image.times.lines_delivered)].map(|x| Mark {
+        x,
+        half_width: 0.0,
+        colour: INK,
+    });
+    let y = Extent {
+        low: -LONGEST * samples,
+        high: samples + LONGEST * samples,
+    };
+    let mut panels = Vec::new();
+    let mut words = "Reprojection residuals of tie points, measured minus projected, from where they were measured; \
+                     flight to the right."
+        .to_owned();
+    for (state, title, colour, ties) in [
+        ("before", "Before", BEFORE, geometric.intersected),
+        ("after", "After", AFTER, geometric.adjusted_intersected),
+    ] {
+        let (all, outliers) = residuals(image, index, ties);
+        let each = thinned(&all, limit);
+        let room = (LONGEST * lines, LONGEST * samples);
+        let arrows = Arrows {
+            label: state.to_owned(),
+            colour,
+            magnification: magnification(&each, room),
+            each,
+        };
+        words += &format!(
+            " {title}: {} vectors, drawn {} times as long as on the axes, {} on average.",
+            all.len(),
+            arrows.times(),
+            mean_in_words(&all),
+        );
+        if all.len() > limit {
+            words += &format!(" At most {limit} are drawn.");
+        }
+        if outliers > 0 {
+            words += &format!(" {outliers} outliers are not drawn.");
+        }
+        panels.push(Panel {
+            y,
+            height: 330,
+            limits: vec![0.0, samples],
+            marks: ends.to_vec(),
+            arrows: vec![arrows],
+            ..Panel::of("sample", Vec::new())
+        });
+    }
+    Plot {
+        x: Extent::of([0.0, lines].into_iter()),
+        ..Plot::of(
+            format!("Residual vectors on {}", image.times.id),
+            words,
+            "line",
+            panels,
+        )
+    }
+}
+
+/// Residual vectors of good points in lines and samples, and the number of outliers.
+fn residuals(image: &ImageProducts, index: usize, ties: &IntersectedTies) -> (Vec<Arrow>, usize) {
+    let times = image.times;
+    let detector = Detector::moc_na(
+        times.crosstrack_summing,
+        times.first_detector,
+        times.samples,
+    );
+    let middle = 0.5 * f64::from(times.lines_header);
+    let mut outliers = 0;
+    let mut arrows = Vec::new();
+    for point in &ties.points {
+        for measure in point.measures.iter().filter(|own| own.image == index) {
+            if point.outlier {
+                outliers += 1;
+                continue;
+            }
+            let sample = detector.sample(measure.y_px);
+            let projected = detector.sample(measure.y_px - measure.reprojection_px);
+            arrows.push(Arrow {
+                from: (measure.x_lines + middle, sample),
+                by: (measure.reprojection_lines, sample - projected),
+            });
+        }
+    }
+    (arrows, outliers)
+}
+
+fn mean_in_words(arrows: &[Arrow]) -> String {
+    let count = arrows.len().max(1) as f64;
+    let mean = |of: fn(&Arrow) -> f64| label(arrows.iter().map(of).sum::<f64>() / count, 2);
+    let (lines, samples) = (mean(|arrow| arrow.by.0), mean(|arrow| arrow.by.1));
+    format!("{lines} lines and {samples} samples")
+}

@@ -1,0 +1,262 @@
+//! What of the adjustment can be trusted, in the words of surveyors: absolute position, gross errors that no
+//! residual shows, unknowns that cannot be told apart, and points that were left out.
+
+use super::{
+    html::{Cell, Column, Table, paragraph},
+    misregistration::BeforeAfter,
+    plots::label,
+    summary::counted,
+};
+use crate::{
+    config::MolaImage,
+    geom::statistics::Summary,
+    products::{GeometricProducts, SiteProducts},
+    stages::adjust::{Adjusted, AdjustmentSummary, LeftOutReason, PointKind, ScalarResidual},
+};
+
+/// Error in standard deviations over the root of the redundancy number that Baarda's test at 3.29 finds in
+/// eight cases of ten.
+///
+/// # Source
+/// Baarda 1968, A testing procedure for use in geodetic networks.
+const NON_CENTRALITY: f64 = 4.13;
+/// Below this redundancy number a residual hides the error behind it.
+const HIDDEN: f64 = 0.1;
+/// Above this one it shows the error well.
+const SHOWN: f64 = 0.3;
+/// Pairs of unknowns, and blunders, that are listed; the rest is counted.
+const CORRELATED_SHOWN: usize = 12;
+const BLUNDERS_SHOWN: usize = 20;
+
+/// Relative registration is healed, absolute position is not: with numbers.
+pub(super) fn absolute(site: &SiteProducts, geometric: &GeometricProducts) -> String {
+    let pairs = BeforeAfter::all(geometric);
+    let relative = BeforeAfter::worst(&pairs);
+    let relative = relative.map_or_else(String::new, |pair| pair.sentence() + " ");
+    let witness = match site.config.adjustment.mola_image {
+        MolaImage::Weighted => {
+            "the image coordinates of footprints were computed from the very orientation that is adjusted and are no \
+             measurements of their own"
+        }
+        MolaImage::Off | MolaImage::Reproject => {
+            "nothing was measured in the images that has known coordinates"
+        }
+    };
+    let ties = &geometric.adjusted.summary.ties;
+    let of = |axes: &[Summary; 3]| {
+        let means = axes.each_ref().map(|axis| label(axis.mean, 1));
+        means.join(", ")
+    };
+    format!(
+        "{relative}Where the images lie on Mars the adjustment cannot tell: {witness}, and only the standard deviations that the orientation \
+         was given beforehand decide how much each image moves. The tie points moved by {} m in X, Y, Z on average; their \
+         formal standard deviations of {} m are optimistic. Relative registration is healed, absolute position is not.",
+        of(&ties.corrections_m),
+        of(&ties.sigmas_m)
+    )
+}
+
+/// Observations of one kind along one axis.
+struct Controlled {
+    name: &'static str,
+    unit: &'static str,
+    sigma: f64,
+    redundancies: Vec<f64>,
+}
+
+impl Controlled {
+    fn all(site: &SiteProducts, adjusted: &Adjusted) -> Vec<Self> {
+        let options = &site.config.adjustment;
+        let views = |kind: PointKind, of: fn(&[ScalarResidual; 2]) -> f64| -> Vec<f64> {
+            let views = adjusted.views.iter().filter(|view| view.kind == kind);
+            views
+                .map(|view| of(&[view.along_px, view.across_px]))
+                .collect()
+        };
+        let along = |of: &[ScalarResidual; 2]| of[0].redundancy;
+        let across = |of: &[ScalarResidual; 2]| of[1].redundancy;
+        let ranges = adjusted.ranges.iter();
+        let all = [
+            (
+                "tie point along the track",
+                "px",
+                options.tie_sigma_px[0],
+                views(PointKind::Tie, along),
+            ),
+            (
+                "tie point across the track",
+                "px",
+                options.tie_sigma_px[1],
+                views(PointKind::Tie, across),
+            ),
+            (
+                "MOLA image point along the track",
+                "px",
+                options.mola_sigma_px[0],
+                views(PointKind::Shot, along),
+            ),
+            (
+                "MOLA image point across the track",
+                "px",
+                options.mola_sigma_px[1],
+                views(PointKind::Shot, across),
+            ),
+            (
+                "MOLA range",
+                "m",
+                options.range_sigma_m,
+                ranges.map(|range| range.residual_m.redundancy).collect(),
+            ),
+        ];
+        let named = all.map(|(name, unit, sigma, redundancies)| Self {
+            name,
+            unit,
+            sigma,
+            redundancies,
+        });
+        let held = named.into_iter();
+        held.filter(|of| !of.redundancies.is_empty()).collect()
+    }
+
+    fn mean(&self) -> f64 {
+        Summary::of(&self.redundancies).mean
+    }
+
+    /// The smallest error that the test finds, with its unit.
+    fn smallest(&self) -> String {
+        let error = NON_CENTRALITY * self.sigma / self.mean().sqrt();
+        if error.is_finite() {
+            format!("{} {}", label(error, 1), self.unit)
+        } else {
+            "–".to_owned()
+        }
+    }
+}
+
+/// How much of a gross error its own residual shows.
+pub(super) fn redundancy(site: &SiteProducts, adjusted: &Adjusted) -> String {
+    let all = Controlled::all(site, adjusted);
+    let mut table = Table::new(
+        "How much of a gross error its own residual shows",
+        &[
+            Column::Text("observation"),
+            Column::Number("number"),
+            Column::Number("shown, mean"),
+            Column::Number("least"),
+            Column::Number("most"),
+            Column::Number("smallest error that is found"),
+        ],
+    );
+    let mut sentences = String::new();
+    for of in &all {
+        let found = Summary::of(&of.redundancies);
+        let [mean, least, most] = [found.mean, found.min, found.max].map(per_cent);
+        let hidden = found.mean < HIDDEN;
+        let consequence = if hidden {
+            "such errors cannot be found"
+        } else {
+            "only large ones are found"
+        };
+        if found.mean < SHOWN {
+            sentences += &paragraph(&format!(
+                "A gross error in a {} shows only {mean} in its residual: {consequence}.",
+                of.name
+            ));
+        }
+        table.row(
+            !hidden,
+            [
+                of.name.into(),
+                found.n.to_string().into(),
+                mean.into(),
+                least.into(),
+                most.into(),
+                of.smallest().into(),
+            ],
+        );
+    }
+    let words = "The redundancy number of an observation is the share of an error in it that its residual shows; the rest \
+                 moves the unknowns. The smallest error that Baarda's test finds (at 3.29, in eight cases of ten) is \
+                 4.13 σ/√r for the mean redundancy number r.";
+    sentences + &table.finish() + &paragraph(words)
+}
+
+/// A share; one that rounds to nothing is still there.
+fn per_cent(share: f64) -> String {
+    if 0.0 < share && share < 5e-4 {
+        "< 0.1 %".to_owned()
+    } else {
+        format!("{} %", label(100.0 * share, 1))
+    }
+}
+
+/// Unknowns that cannot be told apart.
+pub(super) fn correlations(summary: &AdjustmentSummary) -> String {
+    let mut all: Vec<_> = summary.correlated.iter().collect();
+    all.sort_by(|a, b| b.2.abs().total_cmp(&a.2.abs()));
+    let Some((first, second, largest)) = all.first() else {
+        return paragraph("No two unknowns of the orientation correlate by more than 0.95.");
+    };
+    let sum = if *largest < 0.0 { "sum" } else { "difference" };
+    let mut html = paragraph(&format!(
+        "{} correlate by more than 0.95, most of all {first} and {second}, by {}: only their {sum}, each over its standard deviation, \
+         is determined. Do not interpret single values of such unknowns.",
+        counted(all.len(), "pair") + " of unknowns",
+        label(*largest, 4)
+    ));
+    let columns = &[
+        Column::Number("correlation"),
+        Column::Text("unknown"),
+        Column::Text("and"),
+    ];
+    let mut table = Table::new("Largest correlations", columns);
+    for (first, second, coefficient) in all.iter().take(CORRELATED_SHOWN) {
+        let cells: [Cell; 3] = [label(*coefficient, 4).into(), first.into(), second.into()];
+        table.row(true, cells);
+    }
+    html += &table.finish();
+    html + &rest(all.len(), CORRELATED_SHOWN)
+}
+
+fn rest(all: usize, shown: usize) -> String {
+    if all <= shown {
+        return String::new();
+    }
+    paragraph(&format!("And {} more.", all - shown))
+}
+
+/// Points that the adjustment left out.
+pub(super) fn left_out(adjusted: &Adjusted) -> String {
+    let mut blunders = Vec::new();
+    let mut undetermined = [0_usize; 2];
+    for point in &adjusted.left_out {
+        match point.reason {
+            LeftOutReason::Blunder { standardised } => blunders.push((&point.id, standardised)),
+            LeftOutReason::Undetermined => {
+                undetermined[usize::from(point.kind == PointKind::Tie)] += 1;
+            }
+            LeftOutReason::NotIntersected => {}
+        }
+    }
+    let mut html = String::new();
+    for (count, what) in undetermined.into_iter().zip(["footprint", "tie point"]) {
+        if count > 0 {
+            html += &paragraph(&format!(
+                "{} left out as not determined.",
+                counted(count, what)
+            ));
+        }
+    }
+    if blunders.is_empty() {
+        return html + &paragraph("No tie point was left out as a blunder.");
+    }
+    let columns = &[
+        Column::Text("tie point"),
+        Column::Number("largest standardised residual"),
+    ];
+    let mut table = Table::new("Blunders, in the order that they were found", columns);
+    for (id, standardised) in blunders.iter().take(BLUNDERS_SHOWN) {
+        table.row(true, [(*id).into(), label(*standardised, 1).into()]);
+    }
+    html + &table.finish() + &rest(blunders.len(), BLUNDERS_SHOWN)
+}

@@ -1,0 +1,407 @@
+//! The report page of a site with tie points: its sections are there, and say what the stages found.
+
+#![allow(
+    clippy::unwrap_used,
+    clippy::disallowed_methods,
+    reason = "helpers of tests may fail loudly and write as they like"
+)]
+
+mod common;
+#[path = "report_geometric/page.rs"]
+mod page;
+#[path = "report_geometric/site.rs"]
+mod site;
+
+use areograph::{
+    report,
+    stages::{
+        adjust::{LeftOut, LeftOutReason, PointKind},
+        compare_pairs::PairComparison,
+        uncertainty::GroundPart,
+    },
+    units::RADIANS_PER_ARCSECOND,
+};
+use page::{csv, lead, number, section, table};
+use site::Site;
+
+const SECTIONS: [&str; 3] = [
+    "tie-points-and-misregistration",
+    "combined-adjustment",
+    "uncertainty-of-ground-points",
+];
+
+/// Numbers of a page have so many decimals.
+fn agree(text: &str, value: f64, decimals: i32) {
+    // Half of the last digit, and rounding.
+    let tolerance = 0.5 * 10_f64.powi(-decimals) + 1e-9;
+    let found = number(text);
+    assert!((found - value).abs() <= tolerance, "{text} {value}");
+}
+
+/// Mean size of what footprints of a pair disagree by along the flight, metres.
+fn apart_m(pair: &PairComparison) -> f64 {
+    let profiles = &pair.footprints.as_ref().unwrap().profiles;
+    let shots: f64 = profiles.iter().map(|of| f64::from(of.lines.n)).sum();
+    let each = profiles
+        .iter()
+        .map(|of| f64::from(of.lines.n) * of.along_m.abs());
+    each.sum::<f64>() / shots
+}
+
+#[test]
+fn the_first_lines_tell_how_far_images_disagree_before_and_after() {
+    let site = Site::gusev();
+    let page = site.page();
+    let spacing_m = site.pairs[0].mola_spacing_m.unwrap();
+    let (before_m, after_m) = (apart_m(&site.pairs[0]), apart_m(&site.adjusted_pairs[0]));
+    // The mission is made so: most of a spacing before, metres after.
+    assert!(before_m > 0.5 * spacing_m && after_m < 0.05 * spacing_m);
+    let words = format!(
+        "before the adjustment a footprint falls {:.2} MOLA spacings ({before_m:.0} m) apart in the two images along \
+         the flight; after it {:.3} MOLA spacings ({after_m:.1} m). σ0 of the adjustment: {:.2}.",
+        before_m / spacing_m,
+        after_m / spacing_m,
+        site.adjusted.summary.sigma0
+    );
+    assert!(lead(&page).contains(&words), "{words}\n{}", lead(&page));
+}
+
+#[test]
+fn the_published_page_has_all_sections_and_stays_small() {
+    let site = Site::gusev();
+    let page = &site.published;
+    for id in SECTIONS {
+        assert!(page.contains(&format!("<section id=\"{id}\">")), "{id}");
+        assert!(page.contains(&format!("<a href=\"#{id}\">")), "{id}");
+        assert_eq!(
+            section(page, id),
+            section(&site.page(), id),
+            "{id}: the page of the run shows what its stages stored"
+        );
+    }
+    assert!(page.len() < 3_000_000, "{} bytes", page.len());
+    for word in page.split(|letter: char| !letter.is_alphanumeric()) {
+        assert!(!["NaN", "inf", "Infinity"].contains(&word), "{word}");
+    }
+    page::assert_complete(page);
+}
+
+#[test]
+fn pairs_tell_their_residuals_and_footprints_before_and_after() {
+    let site = Site::gusev();
+    let page = site.page();
+    let pairs = [&site.pairs[0], &site.adjusted_pairs[0]];
+    let seen = table(&page, "Pairs of images");
+    let residuals = table(&page, "Reprojection residuals of tie points");
+    assert_eq!((seen.len(), residuals.len()), (2, 2));
+    for (row, pair) in pairs.iter().enumerate() {
+        assert_eq!(seen[row][2], pair.ties.to_string());
+        agree(&seen[row][3], pair.convergence_rad.to_degrees(), 2);
+        agree(&seen[row][4], pair.height_over_base, 2);
+        agree(&seen[row][5], pair.line_spacing_m[0], 3);
+        agree(&seen[row][7], pair.disagreement_m, 2);
+        for (image, of) in pair.residuals.iter().enumerate() {
+            let moments = [of.mean_x, of.deviation_x, of.mean_y, of.deviation_y];
+            for (column, value) in moments.into_iter().enumerate() {
+                agree(&residuals[row][3 + 4 * image + column], value, 2);
+            }
+        }
+    }
+    let profiles = pairs.map(|pair| &pair.footprints.as_ref().unwrap().profiles);
+    let rows = table(&page, "Footprints between the images");
+    assert_eq!(rows.len(), profiles[0].len());
+    for (index, row) in rows.iter().enumerate() {
+        let of = profiles.map(|profiles| &profiles[index]);
+        assert_eq!(row[0], of[0].profile);
+        for (state, of) in of.into_iter().enumerate() {
+            agree(&row[3 + state], of.lines.mean, 2);
+            agree(&row[5 + state], of.along_m, 1);
+            agree(&row[7 + state], of.along_spacings.unwrap(), 3);
+        }
+    }
+}
+
+#[test]
+fn residual_vectors_are_those_of_the_intersection() {
+    let site = Site::gusev();
+    let page = site.page();
+    for (index, times) in site.times.iter().enumerate() {
+        let name = format!("residual-vectors-on-{}", times.id.to_lowercase());
+        let rows = csv(&page, &name);
+        let header = "quantity,series,line,value,by line,by value";
+        assert_eq!(rows[0].join(","), header);
+        for (state, ties, pair) in [
+            ("before", &site.intersected, &site.pairs[0]),
+            ("after", &site.adjusted_intersected, &site.adjusted_pairs[0]),
+        ] {
+            let own: Vec<&Vec<String>> = rows.iter().filter(|row| row[1] == state).collect();
+            let good = ties.points.iter().filter(|point| !point.outlier).count();
+            assert_eq!(own.len(), good, "{name} {state}");
+            let mean = |column: usize| {
+                let values = own.iter().map(|row| number(&row[column]));
+                values.sum::<f64>() / own.len() as f64
+            };
+            // Samples run against y. The data have eight digits.
+            let moments = &pair.residuals[index];
+            assert!((mean(4) - moments.mean_x).abs() < 1e-5, "{name} {state}");
+            assert!((mean(5) + moments.mean_y).abs() < 1e-5, "{name} {state}");
+            // The vectors start where the tie points were measured.
+            for (row, point) in own.iter().zip(ties.points.iter().filter(|p| !p.outlier)) {
+                let mut ties = site.ties.points.iter();
+                let tie = ties.find(|tie| tie.id == point.id).unwrap();
+                let mut measures = tie.measures.iter();
+                let measure = measures.find(|of| of.image == times.id).unwrap();
+                // Eight digits of line numbers up to 10496.
+                assert!((number(&row[2]) - measure.line).abs() < 1e-3, "{}", tie.id);
+                assert!(
+                    (number(&row[3]) - measure.sample).abs() < 1e-3,
+                    "{}",
+                    tie.id
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn moved_footprints_go_where_the_adjusted_image_has_them() {
+    let site = Site::gusev();
+    let page = site.page();
+    for ((times, before), (_, _, after)) in site
+        .times
+        .iter()
+        .zip(&site.registrations)
+        .zip(&site.adjusted_images)
+    {
+        let name = format!("footprints-on-{}-before-and-after", times.id.to_lowercase());
+        let rows = csv(&page, &name);
+        let moved: Vec<_> = rows.iter().filter(|row| row[1] == "moved").collect();
+        assert!(moved.len() > 5, "{name}: {} footprints", moved.len());
+        for row in moved {
+            let [x, y, by_x, by_y] = [2, 3, 4, 5].map(|column| number(&row[column]));
+            // Eight digits of line numbers up to 10496.
+            let near = |a: f64, b: f64| (a - b).abs() < 1e-3;
+            let (old, new) = (&before.points, &after.points);
+            let found = (0..old.len())
+                .find(|index| near(old.line[*index], x) && near(old.sample[*index], y))
+                .unwrap();
+            let shot = |points: &areograph::stages::register::RegisteredPoints, index: usize| {
+                (points.profile[index], points.row[index])
+            };
+            let same = (0..new.len())
+                .find(|index| shot(new, *index) == shot(old, found))
+                .unwrap();
+            assert!(near(new.line[same], x + by_x) && near(new.sample[same], y + by_y));
+        }
+    }
+}
+
+#[test]
+fn the_tables_of_the_adjustment_are_its_summary() {
+    let site = Site::gusev();
+    let page = site.page();
+    let summary = &site.adjusted.summary;
+    let corrections = table(&page, "Corrections of ground points");
+    let sigmas = table(&page, "A posteriori standard deviations of ground points");
+    for (row, of) in [&summary.shots, &summary.ties].into_iter().enumerate() {
+        for axis in 0..3 {
+            agree(
+                &corrections[row][2 + 2 * axis],
+                of.corrections_m[axis].mean,
+                3,
+            );
+            agree(
+                &corrections[row][3 + 2 * axis],
+                of.corrections_m[axis].standard_deviation,
+                3,
+            );
+            agree(&sigmas[row][1 + axis], of.sigmas_m[axis].mean, 3);
+        }
+        agree(&sigmas[row][5], summary.sigma0, 3);
+    }
+    let coordinates = table(&page, "Image coordinates (Table 3");
+    let expected = summary
+        .images
+        .iter()
+        .flat_map(|image| [&image.mola_corrections, &image.tie_residuals_px]);
+    assert_eq!(coordinates.len(), 2 * summary.images.len());
+    for (row, of) in coordinates.iter().zip(expected) {
+        assert_eq!(row[2], of[0].n.to_string());
+        agree(&row[3], of[0].mean, 3);
+        agree(&row[6], of[1].standard_deviation, 3);
+    }
+    let observations = table(&page, "Observations by kind");
+    assert_eq!(observations.len(), summary.types.len());
+    for (row, of) in observations.iter().zip(&summary.types) {
+        assert_eq!(row[1], of.observations.to_string());
+        agree(&row[2], of.redundancy, 1);
+        assert_eq!(row[6], of.beyond_limit.to_string());
+    }
+    let steps = csv(&page, "convergence-of-the-adjustment");
+    assert_eq!(steps.len(), 1 + site.adjusted.weighted_squares.len());
+    for (row, squares) in steps[1..].iter().zip(&site.adjusted.weighted_squares) {
+        agree(&row[3], squares.log10(), 6);
+    }
+}
+
+#[test]
+fn corrections_of_images_and_their_ranges_are_told() {
+    let site = Site::gusev();
+    let page = site.page();
+    let shifts = table(&page, "Shift of the camera at the middle");
+    let turns = table(&page, "Rotation of the camera at the middle");
+    assert_eq!((shifts.len(), turns.len()), (2, 2));
+    for ((shift, turn), image) in shifts.iter().zip(&turns).zip(&site.adjusted.images) {
+        let at = |cell: &str, part: usize| cell.split(" ± ").nth(part).unwrap().to_owned();
+        let mut square_m2 = [0.0; 2];
+        for axis in 0..3 {
+            agree(&at(&shift[1 + axis], 0), image.correction[3 * axis], 1);
+            agree(&at(&shift[1 + axis], 1), image.sigmas[3 * axis], 1);
+            let angle = image.correction[9 + 3 * axis] / RADIANS_PER_ARCSECOND;
+            agree(&at(&turn[1 + axis], 0), angle, 1);
+            square_m2[0] += image.correction[3 * axis].powi(2);
+            square_m2[1] += number(&shift[4 + axis]).powi(2);
+        }
+        // Axes of the orbit turn the shift and keep its length, to the tenth of a metre of each number.
+        assert!((square_m2[0].sqrt() - square_m2[1].sqrt()).abs() < 0.1);
+        // The mission's misregistration is along the flight.
+        assert!(number(&shift[4]).abs() > 5.0 * number(&shift[5]).abs());
+    }
+    let ranges = table(&page, "Ranges of shots");
+    let taken: usize = ranges
+        .iter()
+        .map(|row| row[2].parse::<usize>().unwrap())
+        .sum();
+    assert_eq!(taken, site.adjusted.ranges.len());
+    for row in &ranges {
+        let residuals = site
+            .adjusted
+            .ranges
+            .iter()
+            .filter(|of| of.profile == row[0]);
+        let values: Vec<f64> = residuals.map(|of| of.residual_m.value).collect();
+        agree(&row[5], values.iter().sum::<f64>() / values.len() as f64, 3);
+        // All shots of these profiles were fired near or in an image; the check's mean is close to theirs.
+        let mut checked = site.ranges.profiles.iter();
+        let checked = checked.find(|of| of.profile == row[0]).unwrap();
+        let off_m = number(&row[3]) - checked.range_minus_distance_m.mean;
+        assert!(off_m.abs() < 0.1, "{off_m} m");
+    }
+}
+
+#[test]
+fn what_cannot_be_trusted_is_said() {
+    let site = Site::gusev();
+    let page = site.page();
+    let text = section(&page, SECTIONS[1]);
+    assert!(text.contains("Relative registration is healed, absolute position is not."));
+    assert!(text.contains(
+        "A gross error in a tie point across the track shows only &lt; 0.1 % in its residual: such errors cannot be found."
+    ));
+    let correlated = &site.adjusted.summary.correlated;
+    let most = correlated.iter().map(|of| of.2.abs()).fold(0.0, f64::max);
+    let rows = table(&page, "Largest correlations");
+    assert_eq!(rows.len(), correlated.len().min(12));
+    agree(&number(&rows[0][0]).abs().to_string(), most, 4);
+    let blunders = table(&page, "Blunders");
+    let found = |of: &&LeftOut| matches!(of.reason, LeftOutReason::Blunder { .. });
+    let expected: Vec<&LeftOut> = site.adjusted.left_out.iter().filter(found).collect();
+    assert_eq!(blunders.len(), expected.len());
+    assert!(
+        blunders
+            .iter()
+            .zip(expected)
+            .all(|(row, of)| row[0] == of.id)
+    );
+}
+
+#[test]
+fn budgets_are_told_by_both_readings() {
+    let site = Site::gusev();
+    let page = site.page();
+    let rows = table(&page, "Ground points (eq. 8 and 9)");
+    let budgets = [&site.pairs[0], &site.adjusted_pairs[0]].map(|pair| pair.budget.clone());
+    let points = budgets.iter().flatten();
+    let points: Vec<_> = points
+        .flat_map(|budget| [budget.paper_average, budget.equation_7])
+        .collect();
+    assert_eq!((rows.len(), points.len()), (4, 4));
+    for (row, of) in rows.iter().zip(points) {
+        agree(&row[3], of.across_px, 2);
+        agree(&row[5], of.planimetric_m, 2);
+        agree(&row[7], of.height_m, 2);
+    }
+    let along = table(&page, "Along the track before the adjustment");
+    let GroundPart::Resolved { along_px } = budgets[0].as_ref().unwrap().ground else {
+        unreachable!("misregistration of less than a spacing");
+    };
+    agree(&along[0][4], along_px, 2);
+}
+
+#[test]
+fn budgets_that_cannot_be_are_told_in_words() {
+    let mut site = Site::gusev();
+    site.pairs[0].budget.as_mut().unwrap().ground = GroundPart::NotResolvable;
+    let fault = "the spacing of footprints, metres, is 0, expected a positive number";
+    site.adjusted_pairs[0].budget = Err(fault.to_owned());
+    let page = site.page();
+    let text = section(&page, SECTIONS[2]);
+    assert!(text.contains("orientation alone explains more than one MOLA spacing"));
+    assert!(text.contains(&format!(
+        "after the adjustment: there is no budget, for {fault}."
+    )));
+    assert_eq!(
+        table(&page, "Along the track before")[0][4],
+        "not resolvable"
+    );
+    assert_eq!(table(&page, "Ground points (eq. 8 and 9)").len(), 2);
+}
+
+#[test]
+fn many_blunders_are_counted_and_their_names_stay_text() {
+    let mut site = Site::gusev();
+    site.adjusted.left_out = (0..33)
+        .map(|index| LeftOut {
+            kind: PointKind::Tie,
+            id: format!("<i>{index}"),
+            reason: LeftOutReason::Blunder { standardised: 5.0 },
+        })
+        .collect();
+    site.adjusted.summary.range_biases_m = vec![("gusev & co".to_owned(), -7.25, 0.125)];
+    site.adjusted.images[0].time_bias_s = Some((-0.0425, 0.001));
+    site.adjusted.summary.correlated.clear();
+    let page = site.page();
+    let text = section(&page, SECTIONS[1]);
+    assert_eq!(table(&page, "Blunders").len(), 20);
+    assert!(text.contains("And 13 more.") && text.contains("&lt;i&gt;19") && !text.contains("<i>"));
+    assert!(text.contains("−7.250 ± 0.125") && text.contains("gusev &amp; co"));
+    assert!(text.contains("−42.50 ± 1.00"));
+    assert!(text.contains("No two unknowns of the orientation correlate"));
+}
+
+#[test]
+fn images_without_a_common_tie_point_are_said_to_be_so() {
+    let mut site = Site::gusev();
+    site.pairs.clear();
+    site.adjusted_pairs.clear();
+    let page = site.page();
+    assert!(section(&page, SECTIONS[0]).contains("No two images share tie points"));
+    assert!(!page.contains(&format!("id=\"{}\"", SECTIONS[2])));
+    assert!(lead(&page).contains("<p>σ0 of the adjustment"));
+}
+
+#[test]
+fn a_site_without_tie_points_has_none_of_it() {
+    let site = Site::gusev();
+    let page = site
+        .with(|products| {
+            let mut products = *products;
+            products.geometric = None;
+            report::page(&products)
+        })
+        .unwrap();
+    for id in SECTIONS {
+        assert!(!page.contains(id), "{id}");
+    }
+    assert!(!lead(&page).contains("σ0"));
+}
