@@ -38,6 +38,17 @@ fn number(value: &Value, pointer: &str) -> f64 {
         .unwrap()
 }
 
+fn keeps_schema(document: &Value, name: &str) {
+    let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/config/schema");
+    let path = Path::new(folder).join(format!("{name}.schema.json"));
+    let schema = jsonschema::validator_for(&json(&path)).unwrap();
+    let errors: Vec<String> = schema
+        .iter_errors(document)
+        .map(|e| e.to_string())
+        .collect();
+    assert_eq!(errors, [""; 0], "{name}");
+}
+
 fn blunders() -> BTreeSet<String> {
     let truth = json(&mission().join("truth.json"));
     let sites = truth["ties"].as_array().unwrap();
@@ -54,13 +65,8 @@ fn the_adjustment_cures_the_misregistration() {
     case.stages_run();
     let site = case.path("out/isidis");
     let found = json(&site.join("adjustment.json"));
-    let schema = concat!(
-        env!("CARGO_MANIFEST_DIR"),
-        "/config/schema/adjustment.schema.json"
-    );
-    let schema = jsonschema::validator_for(&json(Path::new(schema))).unwrap();
-    let errors: Vec<String> = schema.iter_errors(&found).map(|e| e.to_string()).collect();
-    assert_eq!(errors, [""; 0]);
+    keeps_schema(&found, "adjustment");
+    keeps_schema(&json(&site.join("manifest.json")), "manifest");
 
     // 34.5 and 25.5 lines of 3.26 and 4.40 m and position biases of tens of metres, along the flight.
     let before_m = number(&found, "/before/pairs/0/disagreement_m");
