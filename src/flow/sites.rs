@@ -63,6 +63,8 @@ fn summary(manifest: &Manifest) -> SiteSummary {
         range_mean_m: figure(figures::RANGE_MEAN_M),
         position_rmse_m: figure(figures::POSITION_RMSE_M),
         pointing_rmse_rad: figure(figures::POINTING_RMSE_RAD),
+        disagreement_m: figure(figures::DISAGREEMENT_M),
+        adjusted_disagreement_m: figure(figures::ADJUSTED_DISAGREEMENT_M),
         finished_utc: manifest.finished_utc.clone(),
         version: manifest.version.clone(),
     }

@@ -31,6 +31,10 @@ pub struct SiteSummary {
     pub position_rmse_m: Option<f64>,
     /// Largest second-order pointing RMSE of an image, radians.
     pub pointing_rmse_rad: Option<f64>,
+    /// Largest disagreement of two images along the flight at their tie points, metres.
+    pub disagreement_m: Option<f64>,
+    /// The same with the adjusted orientation, metres.
+    pub adjusted_disagreement_m: Option<f64>,
     /// When the products were published.
     pub finished_utc: String,
     /// Version of the program that made them.
@@ -89,6 +93,8 @@ fn table(sites: &[SiteLine]) -> String {
             Column::Number("range, m"),
             Column::Number("position, m"),
             Column::Number("pointing, ″"),
+            Column::Number("images apart, m"),
+            Column::Number("adjusted, m"),
             Column::Text("published (UTC)"),
             Column::Text("version"),
         ],
@@ -134,6 +140,8 @@ fn cells(site: &SiteLine) -> Vec<Cell> {
         summary.pointing_rmse_rad,
         RADIANS_PER_ARCSECOND.recip(),
     ));
+    cells.push(figure(summary.disagreement_m, 1.0));
+    cells.push(figure(summary.adjusted_disagreement_m, 1.0));
     cells.push((&summary.finished_utc).into());
     cells.push((&summary.version).into());
     cells
@@ -169,6 +177,8 @@ mod tests {
             range_mean_m: Some(1.25),
             position_rmse_m: None,
             pointing_rmse_rad: None,
+            disagreement_m: None,
+            adjusted_disagreement_m: None,
             finished_utc: "2026-01-01T00:00:00Z".to_owned(),
             version: "1".to_owned(),
         };
