@@ -89,8 +89,8 @@ fn points(pairs: &[BeforeAfter]) -> String {
 
 fn point_cells(budget: &UncertaintyBudget) -> [[Cell; 6]; 2] {
     [
-        ("average, as the paper computes", &budget.paper_average),
-        ("sum of squares, as eq. 7 says", &budget.equation_7),
+        ("average (paper)", &budget.paper_average),
+        ("sum of squares (eq. 7)", &budget.equation_7),
     ]
     .map(|(reading, point)| {
         let [across, planimetric, planimetric_m, height, height_m] = [

@@ -6,7 +6,7 @@ use areograph::{
     config::{SiteConfig, load},
     products::{GeometricProducts, ImageProducts, SiteProducts},
     report,
-    spice::Wanted,
+    spice::{KernelSet, Wanted},
     stages::{
         adjust::Adjusted, check_ranges::RangeCheck, compare_pairs::PairComparison,
         convert_datum::Converted, fit_sensor_model::SensorModel, group_profiles::Profile,
@@ -22,6 +22,7 @@ use super::common::mission::{areograph, mission, succeed};
 pub(crate) struct Site {
     pub(crate) published: String,
     config: SiteConfig,
+    kernels: KernelSet,
     pub(crate) times: Vec<ImageTimes>,
     converted: Converted,
     profiles: Vec<Profile>,
@@ -68,6 +69,7 @@ impl Site {
         Self {
             published: fs::read_to_string(folder.join("report/index.html")).unwrap(),
             config: load(&site).unwrap().site,
+            kernels: KernelSet::from_metakernel(&mission().join("kernels/nav.tm")).unwrap(),
             converted: stored(&folder, "convert_datum"),
             profiles: stored(&folder, "group_profiles"),
             ranges: stored(&folder, "check_ranges"),
@@ -122,6 +124,8 @@ impl Site {
             notes: &[],
             warnings: &[],
             geometric: Some(GeometricProducts {
+                kernels: &self.kernels,
+                folder: Path::new(""),
                 ties: &self.ties,
                 intersected: &self.intersected,
                 pairs: &self.pairs,
