@@ -170,13 +170,14 @@ fn the_products_of_the_adjustment_agree_with_each_other() {
     let shots = table(&site.join("adjusted_footprints.parquet"));
     let ranges = shots.column_by_name("range_m").unwrap();
     let with_range = ranges.len() - ranges.null_count();
-    assert_eq!(lidar["points"].as_array().unwrap().len(), with_range);
-    assert!(
-        lidar["points"][0]["simultaneousImages"][0]
-            .as_str()
-            .unwrap()
-            .starts_with("MGS/")
-    );
+    let points = lidar["points"].as_array().unwrap();
+    // Of the shots fired during the 13 s of an image some lie before its first line: the camera looks ahead.
+    assert!((with_range * 8 / 10..=with_range).contains(&points.len()));
+    for point in points {
+        assert!(!point["measures"].as_array().unwrap().is_empty());
+        let serial_number = point["simultaneousImages"][0].as_str().unwrap();
+        assert!(serial_number.starts_with("MGS/"), "{serial_number}");
+    }
     // The images start where this run ended when the adjusted kernels are loaded; shots are none of these.
     let site = String::from_utf8(case.read("site.toml")).unwrap();
     let cut = |site: String, from: &str, to: &str| {

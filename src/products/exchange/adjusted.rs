@@ -69,7 +69,8 @@ fn adjusted(point: &CorrectedPoint) -> GroundEstimate {
     estimate(point.ground_m, point.covariance_m2.into())
 }
 
-/// Shots with a range: the adjusted images see them where they project.
+/// Shots with a range that an adjusted image sees, where it sees them: others have no observation equation of
+/// their own in ISIS.
 fn lidar_points<'a>(
     site: &SiteProducts<'a>,
     geometric: &GeometricProducts<'a>,
@@ -102,6 +103,10 @@ fn lidar_points<'a>(
                 sample,
             })
         });
+        let measures: Vec<ImageMeasure> = measures.collect();
+        if measures.is_empty() {
+            return None;
+        }
         Some(LidarPoint {
             id: &point.id,
             // A time bias of the image is folded into its adjusted kernels.
@@ -114,7 +119,7 @@ fn lidar_points<'a>(
             ),
             adjusted: Some(adjusted(point)),
             simultaneous_images: vec![&names[range.image]],
-            measures: measures.collect(),
+            measures,
         })
     });
     shots.collect()

@@ -55,8 +55,8 @@ Ames Stereo Pipeline (D_MARS is a sphere of 3396190 m)\n\
 \n\
 ISIS (cubes need spiceinit first)\n\
 \x20 lrolola2isis from=lola_like.csv cubes=cubes.lis pointid=MOLA???? to=lidar.json\n\
-There is no ready lidar file for ISIS: its points need the line and sample at which each image sees the shot,\n\
-which lrolola2isis computes. It reads column 4, the radius after the crossover correction; the measured range of\n\
+Lidar points of ISIS need the line and sample at which each image sees the shot, which lrolola2isis computes (a\n\
+site with tie points has them ready in lidar.json). It reads column 4, the radius after the crossover correction; the measured range of\n\
 column 5 belongs to the radius before it, column 6. For range constraints exchange the two first:\n\
 \x20 awk -F, -v OFS=, '{{ t = $4; $4 = $6; $6 = t; print }}' lola_like.csv > lola_raw.csv\n\
 \n\
