@@ -1,10 +1,9 @@
 //! The steps behind the prepared data: tie points, their intersection, the combined adjustment, and what the
 //! adjusted orientation makes of footprints and tie points.
 
-use serde::{Deserialize, Serialize};
-
 use super::{
     Stage, parts,
+    results::{Geometric, Intersected, Readjusted, ReadjustedImage},
     steps::{Step, Steps},
 };
 use crate::{
@@ -12,11 +11,11 @@ use crate::{
     geom::{pushbroom::ExteriorOrientation, stereo::StereoImage},
     stages::{
         adjust::{Adjusted, adjust},
-        compare_pairs::{PairComparison, compare_pairs},
+        compare_pairs::compare_pairs,
         convert_datum::Converted,
         fit_sensor_model::{SensorModel, fit_sensor_model},
         group_profiles::Profile,
-        intersect::{IntersectedTies, intersect_ties},
+        intersect::intersect_ties,
         oriented::OrientedImage,
         prepare_adjustment::{Candidate, prepare_adjustment},
         read_ties::{Ties, read_ties},
@@ -36,51 +35,6 @@ pub(super) struct Prepared<'a> {
     pub(super) orientations: &'a [Output<Orientation>],
     pub(super) models: &'a [Output<SensorModel>],
     pub(super) registrations: &'a [Output<ImageRegistration>],
-}
-
-/// Ground points of the tie points, and what every pair of images says of itself.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub(super) struct Intersected {
-    pub(super) ties: IntersectedTies,
-    pub(super) pairs: Vec<PairComparison>,
-}
-
-/// Images, footprints and tie points with the adjusted orientation.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub(super) struct Readjusted {
-    pub(super) images: Vec<ReadjustedImage>,
-    pub(super) intersected: Intersected,
-}
-
-/// One image with its adjusted orientation.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub(super) struct ReadjustedImage {
-    pub(super) orientation: Orientation,
-    pub(super) model: SensorModel,
-    pub(super) registration: ImageRegistration,
-}
-
-/// What the geometric steps make of a site with tie points.
-pub(super) struct Geometric {
-    pub(super) ties: Output<Ties>,
-    pub(super) intersected: Output<Intersected>,
-    pub(super) adjusted: Output<Adjusted>,
-    pub(super) readjusted: Output<Readjusted>,
-}
-
-impl Geometric {
-    /// Name, output hash and fingerprint of every step.
-    pub(super) fn stages(&self) -> [(Stage, &str, &str); 4] {
-        fn entry<T>(stage: Stage, output: &Output<T>) -> (Stage, &str, &str) {
-            (stage, &output.blake3, &output.fingerprint)
-        }
-        [
-            entry(Stage::ReadTies, &self.ties),
-            entry(Stage::Intersect, &self.intersected),
-            entry(Stage::Adjust, &self.adjusted),
-            entry(Stage::ApplyAdjustment, &self.readjusted),
-        ]
-    }
 }
 
 impl Prepared<'_> {

@@ -7,9 +7,9 @@ use serde::de::DeserializeOwned;
 use super::{
     Stage,
     choice::KernelChoice,
-    geometric::{Intersected, Readjusted},
     kernels::{load_kernels, load_rivals, wanted},
     parts, publish,
+    results::{Intersected, Readjusted},
 };
 use crate::{
     config::{KernelSource, SiteConfig},

@@ -2,15 +2,18 @@
 
 use std::path::Path;
 
-use super::{Stage, choice::KernelChoice, geometric::Geometric};
+use serde::{Deserialize, Serialize};
+
+use super::{Stage, choice::KernelChoice};
 use crate::{
     config::SiteConfig,
     products::{GeometricProducts, ImageProducts},
     spice::{KernelSet, Wanted},
     stages::{
-        check_ranges::RangeCheck, convert_datum::Converted, fit_sensor_model::SensorModel,
-        group_profiles::Profile, register::ImageRegistration, sample_orientation::Orientation,
-        search_footprints::SearchResult, tag_times::ImageTimes,
+        adjust::Adjusted, check_ranges::RangeCheck, compare_pairs::PairComparison,
+        convert_datum::Converted, fit_sensor_model::SensorModel, group_profiles::Profile,
+        intersect::IntersectedTies, read_ties::Ties, register::ImageRegistration,
+        sample_orientation::Orientation, search_footprints::SearchResult, tag_times::ImageTimes,
     },
     store::cache::Output,
 };
@@ -31,6 +34,51 @@ pub(super) struct Results<'a> {
     pub(super) registrations: &'a [Output<ImageRegistration>],
     /// Nothing for a site without tie points.
     pub(super) geometric: Option<&'a Geometric>,
+}
+
+/// Ground points of the tie points, and what every pair of images says of itself.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(super) struct Intersected {
+    pub(super) ties: IntersectedTies,
+    pub(super) pairs: Vec<PairComparison>,
+}
+
+/// Images, footprints and tie points with the adjusted orientation.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(super) struct Readjusted {
+    pub(super) images: Vec<ReadjustedImage>,
+    pub(super) intersected: Intersected,
+}
+
+/// One image with its adjusted orientation.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(super) struct ReadjustedImage {
+    pub(super) orientation: Orientation,
+    pub(super) model: SensorModel,
+    pub(super) registration: ImageRegistration,
+}
+
+/// What the geometric steps make of a site with tie points.
+pub(super) struct Geometric {
+    pub(super) ties: Output<Ties>,
+    pub(super) intersected: Output<Intersected>,
+    pub(super) adjusted: Output<Adjusted>,
+    pub(super) readjusted: Output<Readjusted>,
+}
+
+impl Geometric {
+    /// Name, output hash and fingerprint of every step.
+    pub(super) fn stages(&self) -> [(Stage, &str, &str); 4] {
+        fn entry<T>(stage: Stage, output: &Output<T>) -> (Stage, &str, &str) {
+            (stage, &output.blake3, &output.fingerprint)
+        }
+        [
+            entry(Stage::ReadTies, &self.ties),
+            entry(Stage::Intersect, &self.intersected),
+            entry(Stage::Adjust, &self.adjusted),
+            entry(Stage::ApplyAdjustment, &self.readjusted),
+        ]
+    }
 }
 
 impl Results<'_> {

@@ -2,10 +2,9 @@
 
 use super::{
     corrections,
-    html::{Cell, Column, Table, heading, paragraph},
+    html::{Cell, Column, Table, counted, heading, paragraph},
     plots::{Extent, Panel, Plot, Series, figure, label},
     reliability,
-    summary::counted,
 };
 use crate::{
     error::Result,

@@ -271,6 +271,12 @@ fn limited(class: &str, text: &str, share: f64) -> String {
     }
 }
 
+/// A number of things, in the plural where there are several.
+pub(super) fn counted(count: usize, what: &str) -> String {
+    let plural = if count == 1 { "" } else { "s" };
+    format!("{count} {what}{plural}")
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

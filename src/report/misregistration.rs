@@ -3,10 +3,9 @@
 use std::collections::BTreeMap;
 
 use super::{
-    html::{Cell, Column, Table, heading, paragraph},
+    html::{Cell, Column, Table, counted, heading, paragraph},
     moved,
     plots::label,
-    summary::counted,
 };
 use crate::{
     error::Result,

@@ -2,10 +2,9 @@
 //! residual shows, unknowns that cannot be told apart, and points that were left out.
 
 use super::{
-    html::{Cell, Column, Table, paragraph},
+    html::{Cell, Column, Table, counted, paragraph},
     misregistration::BeforeAfter,
     plots::label,
-    summary::counted,
 };
 use crate::{
     config::MolaImage,

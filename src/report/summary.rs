@@ -1,7 +1,7 @@
 //! Sections in words and tables: verdict, selection, corrections, provenance, notes.
 
 use super::{
-    html::{Cell, Column, Table, Tone, heading, list, paragraph, verdict},
+    html::{Cell, Column, Table, Tone, counted, heading, list, paragraph, verdict},
     misregistration::BeforeAfter,
     plots::label,
 };
@@ -87,12 +87,6 @@ fn first_of(sentences: &[String]) -> String {
         ));
     }
     html
-}
-
-/// A number of things, in the plural where there are several.
-pub(super) fn counted(count: usize, what: &str) -> String {
-    let plural = if count == 1 { "" } else { "s" };
-    format!("{count} {what}{plural}")
 }
 
 /// The valid figure that uses most of its limit.
