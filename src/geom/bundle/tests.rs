@@ -169,7 +169,12 @@ fn derivatives_at(
             for axis in 0..2 {
                 let partials = analytic[axis].by_image();
                 let group = unknown / 3 * 3..(unknown / 3 * 3 + 3).min(partials.len());
-                let scale = DVector::from_column_slice(&partials[group]).norm();
+                let norm = |row: usize| {
+                    let partials = analytic[row].by_image();
+                    DVector::from_column_slice(&partials[group.clone()]).norm()
+                };
+                // A row takes up a part of the other's derivatives with the line.
+                let scale = norm(axis).max(0.1 * norm(1 - axis));
                 let numeric = (ahead[axis] - behind[axis]) / (2.0 * step);
                 close(numeric, partials[unknown], scale.max(1e-2));
             }
