@@ -17,9 +17,13 @@ use std::time::Instant;
 
 use areograph::geom::{
     bundle::{Adjustment, BundleOptions, Network, View, solve},
-    pushbroom::{EulerPolynomial, ExteriorOrientation, Pose, SampledOrientation},
+    collinearity::by_camera_point,
+    pushbroom::{
+        CorrectedOrientation, EulerPolynomial, ExteriorOrientation, Pose, SampledOrientation,
+        Sighting,
+    },
 };
-use recipe::{Normals, Recipe, Simulated, place_px};
+use recipe::{Normals, Recipe, Simulated};
 use serde_json::json;
 
 const IMAGES: usize = 20;
@@ -35,11 +39,9 @@ fn sampled(simulated: &Simulated<EulerPolynomial>) -> Network<SampledOrientation
     })
 }
 
-/// Noise of the ties in the ring, lines and pixels: what matching attains.
-///
-/// With noise of a whole line in so many ties, corrections of images without footprints drift to ten and more
-/// of their prior standard deviations, and the iteration takes dozens of steps: see ARCHITECTURE.md.
-const NOISE: f64 = 0.1;
+/// Noise of the ties in the ring, lines and pixels: ten times what matching attains, the standard deviation that
+/// the published adjustment takes.
+const NOISE: f64 = 1.0;
 
 /// Ties in three of twenty images each, so that the images hang together in a ring.
 fn ring(ties: usize) -> Network<SampledOrientation> {
@@ -60,15 +62,10 @@ fn ring(ties: usize) -> Network<SampledOrientation> {
     for view in exact {
         let first = 2 * (view.point % (IMAGES / 2));
         let mut measure = |image: usize| {
-            let (truth, entry) = (&simulated.orientations[view.image], &pair[view.image]);
-            let x_lines = view.x_lines + NOISE * normals.next();
-            let point_m = &simulated.points_m[view.point];
-            let y_px =
-                place_px(truth, entry.focal_length_px, x_lines, point_m) + NOISE * normals.next();
             network.views.push(View {
                 image: image % IMAGES,
-                x_lines,
-                y_px,
+                x_lines: view.x_lines + NOISE * normals.next(),
+                y_px: view.y_px + NOISE * normals.next(),
                 ..view
             });
         };
@@ -121,16 +118,35 @@ fn document(
         })
     });
     let views = network.views.iter().map(|view| {
-        let base = network.images[view.image].base.pose(view.x_lines);
-        let rows: [[f64; 3]; 3] = base.mars_to_camera.transpose().into();
+        let base = &network.images[view.image].base;
+        let correction = adjustment.images[view.image].correction;
+        let ground_m = adjustment.points[view.point].unwrap().ground_m;
+        let adjusted = CorrectedOrientation { base, correction };
+        let x_lines = Sighting::near(&adjusted, view.x_lines, &ground_m, 1e-3)
+            .unwrap()
+            .solution
+            .x;
+        let (pose, motion) = base.moving(x_lines);
+        let rows: [[f64; 3]; 3] = pose.mars_to_camera.transpose().into();
+        let (initial, advance) = base.moving(view.x_lines);
+        let camera_m = initial.camera_vector_m(&network.points[view.point].ground_m);
+        let rate_m = advance.camera_vector_rate_m(&initial, &camera_m);
+        let focal_length_px = network.images[view.image].focal_length_px;
+        let rate_px = by_camera_point(&camera_m, focal_length_px) * rate_m;
         json!({
             "point": view.point,
             "image": view.image,
             "x_lines": view.x_lines,
             "y_px": view.y_px,
             "sigma_px": view.sigma_px.as_slice(),
-            "position_m": base.position_m.as_slice(),
-            "mars_to_camera": rows,
+            "px_per_line": rate_px.x,
+            "near": {
+                "x_lines": x_lines,
+                "position_m": pose.position_m.as_slice(),
+                "mars_to_camera": rows,
+                "advance_m": motion.advance_m.as_slice(),
+                "turn_rad": motion.turn_rad.as_slice(),
+            },
         })
     });
     let ranges = network.ranges.iter().map(|range| {

@@ -1,5 +1,8 @@
 """Adjusts the network that the benchmark wrote with Ceres Solver and compares; see `scripts/bench geometry`.
 
+Residuals are ours: measured line and place minus those of the line that sees the point. The initial orientation of a
+view goes on evenly from the line that sees its point in the end, where both agree to second order.
+
 The cost functions are Python with analytic Jacobians: Ceres calls back into the interpreter for every view, so
 that its time is mostly theirs. It bounds nothing but what one gets from pyceres without writing C++.
 """
@@ -41,30 +44,54 @@ class View(pyceres.CostFunction):
         super().__init__()
         self.set_num_residuals(2)
         self.set_parameter_block_sizes([18, 3])
-        t = view["x_lines"] / image["half_lines"]
-        self.powers = np.array([1.0, t, t * t])
-        self.position = np.array(view["position_m"])
-        self.base = np.array(view["mars_to_camera"])
+        near = view["near"]
+        self.near = near["x_lines"]
+        self.position = np.array(near["position_m"])
+        self.base = np.array(near["mars_to_camera"])
+        self.advance = np.array(near["advance_m"])
+        self.turn = np.array(near["turn_rad"])
+        self.half_lines = image["half_lines"]
         self.focal_length = image["focal_length_px"]
+        self.line = view["x_lines"]
+        self.px_per_line = view["px_per_line"]
         self.y = view["y_px"]
         self.sigma = np.array(view["sigma_px"])
 
+    def see(self, coefficients, point):
+        """The line that sees the point, its camera vector there, the vector's change per line, and the pose."""
+        line = self.near
+        for _ in range(20):
+            t = line / self.half_lines
+            powers = np.array([1.0, t, t * t])
+            values = coefficients @ powers
+            slopes = coefficients @ (np.array([0.0, 1.0, 2.0 * t]) / self.half_lines)
+            rotation, left = rotation_and_jacobian(values[3:])
+            along = line - self.near
+            matrix = rotation @ rotation_and_jacobian(along * self.turn)[0] @ self.base
+            q = matrix @ (point - self.position - along * self.advance - values[:3])
+            turn = left @ slopes[3:] + rotation @ self.turn
+            rate = np.cross(turn, q) - matrix @ (self.advance + slopes[:3])
+            step = -q[0] / rate[0]
+            line += step
+            if abs(step) < 1e-2:
+                return line, q + rate * step, rate, matrix, left, powers
+        raise ArithmeticError("no line sees the point")
+
     def Evaluate(self, parameters, residuals, jacobians):
-        coefficients = parameters[0].reshape(6, 3) @ self.powers
-        rotation, left = rotation_and_jacobian(coefficients[3:])
-        matrix = rotation @ self.base
-        q = matrix @ (parameters[1] - self.position - coefficients[:3])
+        line, q, rate, matrix, left, powers = self.see(parameters[0].reshape(6, 3), parameters[1])
         scale = -self.focal_length / q[2]
-        residuals[0] = scale * q[0] / self.sigma[0]
+        residuals[0] = self.px_per_line * (self.line - line) / self.sigma[0]
         residuals[1] = (scale * q[1] - self.y) / self.sigma[1]
         if jacobians is None:
             return True
-        by_q = scale * np.array([[1.0, 0.0, -q[0] / q[2]], [0.0, 1.0, -q[1] / q[2]]])
+        along, across = scale * np.array([[1.0, 0.0, -q[0] / q[2]], [0.0, 1.0, -q[1] / q[2]]])
+        along /= along @ rate
+        by_q = np.array([self.px_per_line * along, across - (across @ rate) * along])
         by_q /= self.sigma[:, None]
         by_point = by_q @ matrix
         by_rotation = -by_q @ cross(q) @ left
         if jacobians[0] is not None:
-            by_image = np.hstack([-by_point, by_rotation])[:, :, None] * self.powers
+            by_image = np.hstack([-by_point, by_rotation])[:, :, None] * powers
             jacobians[0][:] = by_image.ravel()
         if jacobians[1] is not None:
             jacobians[1][:] = by_point.ravel()

@@ -145,11 +145,12 @@ fn the_recipe_comes_out_as_verified() {
         // The mean of 154 lines with noise 0.7 is known to 0.06.
         assert!(along.mean.abs() < 0.15, "{along:?}");
         assert!((0.6..0.85).contains(&along.standard_deviation), "{along:?}");
-        // Height absorbs what lies across the track.
-        assert!(
-            (0.06..0.095).contains(&across.standard_deviation),
-            "{across:?}"
-        );
+        // Height absorbs what lies across the track. The published equation takes the place across the
+        // track in the measured line: the detector is 5° to 8° off the normal of the flight, which leaves a tenth
+        // of the residual along the track, 0.07 in the prototype. The line that sees the point has no such part;
+        // what stays is that the two images do not lie exactly beside each other.
+        assert!(across.mean.abs() < 0.01, "{across:?}");
+        assert!(across.standard_deviation < 0.04, "{across:?}");
         let shift = mola_shift_lines(&simulated, &adjustment, image);
         println!("MOLA {shift:.3?}");
         let spacing_m = line_spacing_m(&simulated, image);
@@ -168,7 +169,14 @@ fn the_recipe_comes_out_as_verified() {
 
 #[test]
 fn relative_position_is_healed_absolute_is_not() {
-    let simulated = Recipe::GUSEV.simulate();
+    // Tags of both images that are late by the same way on the ground: ties cannot tell.
+    let late = Recipe::GUSEV.shift_lines[0];
+    let spacing_m = [0, 1].map(|image| line_spacing_m(&Recipe::GUSEV.simulate(), image));
+    let simulated = Recipe {
+        shift_lines: [late, late * spacing_m[0] / spacing_m[1]],
+        ..Recipe::GUSEV
+    }
+    .simulate();
     let adjustment = adjust(&simulated.network);
     let (mut error, mut formal) = (Vec::new(), Vec::new());
     for tie in simulated.shots..simulated.points_m.len() {
@@ -180,6 +188,41 @@ fn relative_position_is_healed_absolute_is_not() {
     println!("error {} m, formal {} m", error.mean, formal.mean);
     // Image coordinates of shots that come from the orientation itself make the covariance optimistic.
     assert!(error.mean > 1.5 * formal.mean);
+}
+
+#[test]
+fn many_noisy_ties_do_not_bend_the_orientation() {
+    // Everything is exact but the ties, which have noise of a whole line and pixel.
+    let simulated = Recipe {
+        ties: 20_000,
+        tie_noise: 1.0,
+        ..Recipe::EXACT
+    }
+    .simulate();
+    let adjustment = adjust(&simulated.network);
+    let sigma0 = adjustment.sigma0();
+    let mut worst = [0.0_f64; 2];
+    for (image, adjusted) in simulated.network.images.iter().zip(&adjustment.images) {
+        let corrections = adjusted.correction.coefficients();
+        for (coefficient, correction) in corrections.iter().enumerate() {
+            let cofactor = adjusted.cofactors[(coefficient, coefficient)];
+            let priors = correction.abs() / image.sigmas[coefficient];
+            let formal = correction.abs() / (sigma0 * cofactor.sqrt());
+            worst = [worst[0].max(priors), worst[1].max(formal)];
+        }
+    }
+    println!(
+        "{} steps, σ0 {sigma0}, largest correction {:.2} prior and {:.2} formal standard deviations",
+        adjustment.steps(),
+        worst[0],
+        worst[1]
+    );
+    assert!(adjustment.steps() <= 5, "{}", adjustment.steps());
+    // The truth is no correction at all, and the noise of ties is but a part of the formal variance:
+    // 4 standard deviations are passed once in 16 000 unknowns. Noise of a line is 1.5 of the assumed
+    // pixels, so that corrections may pass a prior standard deviation. Residuals in the focal plane of
+    // the measured line bend the orientation by many more.
+    assert!(worst[0] < 2.0 && worst[1] < 4.0, "{worst:?}");
 }
 
 #[test]

@@ -422,8 +422,9 @@ fn every_distance_comes_closer_to_its_range_with_the_priors_of_isis() {
     // 311 ties of redundancy 1, 208 coordinates of footprints; 52 ranges.
     let freedom = [&without, &with].map(|adjusted| adjusted.summary.degrees_of_freedom);
     assert_eq!(freedom, [519, 571]);
-    // Metres: without ranges, 1000 m and 2° leave the height of the camera to what the ties push.
-    assert!(site.misclosures_m(&without).iter().all(|m| *m > 20.0));
+    // Metres: without ranges, 1000 m and 2° leave the height of the camera to what the ties push. In the focal
+    // plane of the measured line they pushed it by more than 20 m: from afar, a line is fewer pixels.
+    assert!(site.misclosures_m(&without).iter().all(|m| *m > 5.0));
     assert!(site.misclosures_m(&with).iter().all(|m| m.abs() < 0.05));
     for adjusted in [&without, &with] {
         assert!(adjusted.left_out.is_empty());
@@ -472,7 +473,8 @@ fn only_weighted_footprints_hold_the_ties_to_the_ground() {
         assert_eq!((shown(off), shown(reproject)), (0, 104));
     }
     // Metres. Ranges alone do not reach the ties: they hold the first camera's distance to the footprints, and no tie
-    // sees a footprint. The ties sink by a hundred metres, within their standard deviations.
+    // sees a footprint. The ties lie anywhere within their standard deviations of more than a hundred metres. (In the
+    // focal plane of the measured line they sank, to where a line is fewer pixels.)
     for (adjusted, held) in [(&weighted, true), (&off, false)] {
         for adjusted in adjusted {
             let above_m = adjusted_heights_m(&site, adjusted).median;
@@ -480,7 +482,10 @@ fn only_weighted_footprints_hold_the_ties_to_the_ground() {
             if held {
                 assert!(above_m.abs() < 5.0 && sigma_m < 5.0, "{above_m} {sigma_m}");
             } else {
-                assert!(above_m < -50.0 && sigma_m > 100.0, "{above_m} {sigma_m}");
+                assert!(
+                    above_m.abs() < sigma_m && sigma_m > 100.0,
+                    "{above_m} {sigma_m}"
+                );
             }
         }
     }

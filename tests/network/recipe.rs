@@ -189,20 +189,6 @@ pub(crate) fn project(
     (seen.x, y_px)
 }
 
-/// Measures a point of which `x_lines` is known: the place in the line that this line sees it at.
-///
-/// The detector is not quite at right angles to the flight: an error of the line moves the place too.
-/// The observation equation takes both errors for independent, so noise is to be added to this.
-pub(crate) fn place_px(
-    truth: &impl ExteriorOrientation,
-    focal_length_px: f64,
-    x_lines: f64,
-    point_m: &Vector3<f64>,
-) -> f64 {
-    let camera_m = truth.pose(x_lines).camera_vector_m(point_m);
-    -focal_length_px * camera_m.y / camera_m.z
-}
-
 /// A measurement for intersection, one focal pixel in both axes.
 pub(crate) fn sight(
     image: &BundleImage<impl ExteriorOrientation>,

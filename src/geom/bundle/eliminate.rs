@@ -11,7 +11,7 @@ use super::{
     layout::{Layout, PointRows},
     unknowns::State,
 };
-use crate::geom::{collinearity::BehindCamera, pushbroom::ExteriorOrientation};
+use crate::geom::pushbroom::{ExteriorOrientation, Unseen};
 
 /// Parts in which points are summed: fixed, so that the sums do not depend on the number of threads.
 const PARTS: usize = 16;
@@ -145,7 +145,7 @@ pub(super) fn reduce<M: ExteriorOrientation>(
     layout: &Layout<'_, M>,
     state: &State,
     active: &[usize],
-) -> Result<Reduced, BehindCamera> {
+) -> Result<Reduced, Unseen> {
     let columns = layout.columns.len();
     let part_len = active.len().div_ceil(PARTS).max(1);
     let parts: Vec<Reduced> = active
@@ -160,7 +160,7 @@ pub(super) fn reduce<M: ExteriorOrientation>(
             }
             Ok(part)
         })
-        .collect::<Result<_, BehindCamera>>()?;
+        .collect::<Result<_, Unseen>>()?;
     let mut sum = Reduced::zeros(columns);
     for part in parts {
         sum.matrix += part.matrix;

@@ -12,8 +12,7 @@ use super::{
     unknowns::{Columns, State},
 };
 use crate::geom::{
-    collinearity::BehindCamera,
-    pushbroom::{ExteriorOrientation, Pose},
+    pushbroom::{ExteriorOrientation, Unseen},
     robust::RobustWeight,
 };
 
@@ -28,8 +27,8 @@ pub(super) struct Layout<'a, M> {
     pub(super) views: Lists,
     pub(super) ranges: Lists,
     pub(super) robust: Option<RobustWeight>,
-    /// Initial pose at the line of each view: it stays as it is without time biases.
-    view_bases: Vec<Pose>,
+    /// Focal pixels per line of each view, initially: the unit of its residual along the track.
+    px_per_line: Vec<f64>,
     /// Initial position at the instant of each range.
     range_bases_m: Vec<Vector3<f64>>,
 }
@@ -169,8 +168,11 @@ impl<'a, M: ExteriorOrientation> Layout<'a, M> {
             views: Lists::of(points, network.views.iter().map(|view| view.point)),
             ranges: Lists::of(points, network.ranges.iter().map(|range| range.point)),
             robust: None,
-            view_bases: views
-                .map(|view| network.images[view.image].base.pose(view.x_lines))
+            px_per_line: views
+                .map(|view| {
+                    let ground_m = &network.points[view.point].ground_m;
+                    rows::initial_px_per_line(&network.images[view.image], view, ground_m)
+                })
                 .collect(),
             range_bases_m: ranges
                 .map(|range| {
@@ -185,19 +187,15 @@ impl<'a, M: ExteriorOrientation> Layout<'a, M> {
     }
 
     /// The rows of the view at `index`.
-    pub(super) fn view_rows(&self, state: &State, index: usize) -> Result<[Row; 2], BehindCamera> {
+    pub(super) fn view_rows(&self, state: &State, index: usize) -> Result<[Row; 2], Unseen> {
         let view = &self.network.views[index];
-        let image = &self.network.images[view.image];
-        let correction = &state.orientations[view.image];
-        let ground_m = &state.points_m[view.point];
-        if image.time_bias_sigma_s > 0.0 {
-            let exposed = view.x_lines + correction.time_shift_lines;
-            let (base, motion) = image.base.moving(exposed);
-            rows::of_view(image, correction, &base, Some(&motion), view, ground_m)
-        } else {
-            let base = &self.view_bases[index];
-            rows::of_view(image, correction, base, None, view, ground_m)
-        }
+        rows::of_view(
+            &self.network.images[view.image],
+            &state.orientations[view.image],
+            self.px_per_line[index],
+            view,
+            &state.points_m[view.point],
+        )
     }
 
     /// The row of the range at `index`.
@@ -219,7 +217,7 @@ impl<'a, M: ExteriorOrientation> Layout<'a, M> {
         rows: &mut PointRows,
         state: &State,
         point: usize,
-    ) -> Result<(), BehindCamera> {
+    ) -> Result<(), Unseen> {
         let (views, ranges) = (self.views.of_key(point), self.ranges.of_key(point));
         let columns = &self.columns;
         let of_views = views
@@ -285,7 +283,10 @@ impl<'a, M: ExteriorOrientation> Layout<'a, M> {
         point: usize,
     ) -> Result<(), Dropped> {
         self.fill(rows, state, point)
-            .map_err(|_| Dropped::BehindCamera)?;
+            .map_err(|unseen| match unseen {
+                Unseen::BehindCamera => Dropped::BehindCamera,
+                _ => Dropped::Unseen,
+            })?;
         if rows.weights.len() < 3 {
             return Err(Dropped::Undetermined);
         }

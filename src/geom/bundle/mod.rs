@@ -7,10 +7,16 @@
 //! Observed are focal coordinates, ranges, and the initial values themselves with their standard
 //! deviations. Residuals are observed minus computed.
 //!
+//! A view is compared with where the unknowns project its point: the line that sees it, and the place in
+//! that line. Lines count as focal pixels, as many as they are initially.
+//!
 //! # Source
 //! Yoon & Shan 2004. They adjust the coefficients of ω, φ and κ, which near the equator cannot be told
 //! apart; here a rotation about the camera's own axes is added to them. They state one standard deviation
 //! an image for 18 unknowns, in metres; here each unknown has its own.
+//! Their residual along the track is the point's place in the focal plane of the measured line. An error of
+//! the line then counts as the more pixels the faster the image flies over the ground, and the adjustment
+//! learns from many noisy lines to fly slowly: a bias of errors in variables.
 
 mod check;
 mod eliminate;
@@ -147,6 +153,9 @@ pub enum Dropped {
     /// It lies behind a camera that has measured it.
     #[error("behind a camera that measured it")]
     BehindCamera,
+    /// No line of a camera that has measured it sees it.
+    #[error("in the plane of no line of a camera that measured it")]
+    Unseen,
 }
 
 /// One scalar observation after the adjustment.

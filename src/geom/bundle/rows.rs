@@ -1,12 +1,14 @@
 //! Observation equations of single views and ranges.
 
-use nalgebra::{Vector2, Vector3};
+use nalgebra::Vector3;
 
 use super::{BundleImage, ORIENTATION_UNKNOWNS, Range, View};
 use crate::geom::{
     attitude::{matrix_of_rotation_vector, turn_of_rotation_vector},
-    collinearity::{BehindCamera, by_camera_point, project},
-    pushbroom::{Motion, OrientationCorrection, Pose},
+    collinearity::by_camera_point,
+    pushbroom::{
+        CorrectedOrientation, ExteriorOrientation, OrientationCorrection, Sighting, Unseen,
+    },
 };
 
 /// Partial derivatives with respect to the 18 coefficients of an image's correction and its time bias.
@@ -45,46 +47,77 @@ impl Row {
     }
 }
 
-/// The rows of a view of `ground_m`, along the track and across it.
+/// A step below this many lines finds the line of a view: rates that turn by 1e-4 of themselves per line are
+/// exact to 1e-7.
+const LAST_STEP_LINES: f64 = 1e-3;
+
+/// How far a point at its initial coordinates moves along the focal plane from the measured line to the next,
+/// with the initial orientation, focal pixels.
 ///
-/// `base` is the initial orientation where the line was exposed: a time bias later than its tag says.
-/// Its `motion` is wanted where the time bias is unknown.
-pub(super) fn of_view<M>(
+/// The unit of the residuals along the track must not depend on the unknowns: a model that flies slower
+/// would make them smaller.
+pub(super) fn initial_px_per_line<M: ExteriorOrientation>(
     image: &BundleImage<M>,
-    correction: &OrientationCorrection,
-    base: &Pose,
-    motion: Option<&Motion>,
     view: &View,
     ground_m: &Vector3<f64>,
-) -> Result<[Row; 2], BehindCamera> {
-    let vector_rad = correction.turn_rad(view.x_lines);
-    let rotation = matrix_of_rotation_vector(&vector_rad);
-    let pose = Pose {
-        position_m: base.position_m + correction.shift_m(view.x_lines),
-        mars_to_camera: rotation * base.mars_to_camera,
-    };
+) -> f64 {
+    let (pose, motion) = image.base.moving(view.x_lines);
     let camera_m = pose.camera_vector_m(ground_m);
-    let focal = project(&camera_m, image.focal_length_px)?;
-    let misclosure = Vector2::new(0.0, view.y_px) - focal;
+    let rate_m = motion.camera_vector_rate_m(&pose, &camera_m);
+    (by_camera_point(&camera_m, image.focal_length_px) * rate_m).x
+}
+
+/// The rows of a view of `ground_m`, along the track and across it: what was measured minus where the
+/// line that sees the point lies, `px_per_line` focal pixels each, and where in that line the point does.
+pub(super) fn of_view<M: ExteriorOrientation>(
+    image: &BundleImage<M>,
+    correction: &OrientationCorrection,
+    px_per_line: f64,
+    view: &View,
+    ground_m: &Vector3<f64>,
+) -> Result<[Row; 2], Unseen> {
+    let orientation = CorrectedOrientation {
+        base: &image.base,
+        correction: *correction,
+    };
+    let seen = Sighting::near(&orientation, view.x_lines, ground_m, LAST_STEP_LINES)?;
+    let (x_lines, camera_m) = (seen.solution.x, seen.solution.camera_m);
+    let focal_y_px = -image.focal_length_px * camera_m.y / camera_m.z;
+    // The sense is that of the point's place in the focal plane of the measured line.
+    let misclosures = [
+        px_per_line * (x_lines - view.x_lines),
+        view.y_px - focal_y_px,
+    ];
+    // What moves the point along the focal plane by one pixel is made up for by `1/rate_px.x` lines less,
+    // and these move it across.
     let by_camera_point = by_camera_point(&camera_m, image.focal_length_px);
-    // The initial orientation turns and advances under its correction.
-    let by_time = motion.map_or_else(Vector2::zeros, |motion| {
-        let rate_m =
-            (rotation * motion.turn_rad).cross(&camera_m) - pose.mars_to_camera * motion.advance_m;
-        by_camera_point * rate_m / image.line_period_s
-    });
+    let rate_px = by_camera_point * seen.rate_m;
+    let [along, across] = [0, 1].map(|axis| by_camera_point.row(axis).transpose());
+    let by_camera_point = [
+        along * (px_per_line / rate_px.x),
+        across - along * (rate_px.y / rate_px.x),
+    ];
+    let vector_rad = correction.turn_rad(x_lines);
+    let by_time_m = if image.time_bias_sigma_s > 0.0 {
+        // The initial orientation turns and advances under its correction.
+        let (_, motion) = image.base.moving(x_lines + correction.time_shift_lines);
+        let turn_rad = matrix_of_rotation_vector(&vector_rad) * motion.turn_rad;
+        let rate_m = turn_rad.cross(&camera_m) - seen.pose.mars_to_camera * motion.advance_m;
+        rate_m / image.line_period_s
+    } else {
+        Vector3::zeros()
+    };
     Ok([0, 1].map(|axis| {
-        let by_camera_point = by_camera_point.row(axis).transpose();
         // A rotation ε moves the camera vector q by ε × q, and a change of the rotation vector turns by
         // the left Jacobian times it.
-        let by_turn = camera_m.cross(&by_camera_point);
+        let by_turn = camera_m.cross(&by_camera_point[axis]);
         Row {
-            misclosure: misclosure[axis],
+            misclosure: misclosures[axis],
             sigma: view.sigma_px[axis],
-            by_point: pose.mars_to_camera.tr_mul(&by_camera_point),
+            by_point: seen.pose.mars_to_camera.tr_mul(&by_camera_point[axis]),
             by_rotation: turn_of_rotation_vector(&-vector_rad, &by_turn),
-            by_time: by_time[axis],
-            t: view.x_lines / image.half_lines,
+            by_time: by_camera_point[axis].dot(&by_time_m),
+            t: x_lines / image.half_lines,
         }
     }))
 }

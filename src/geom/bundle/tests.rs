@@ -157,29 +157,35 @@ fn derivatives_at(
         let analytic = layout.view_rows(state, index).unwrap();
         for unknown in 0..=ORIENTATION_UNKNOWNS {
             let column = layout.columns.of_image[entry.image][unknown];
-            // Steps whose truncation and rounding are both far below 1e-6 of the derivative.
+            // Steps whose truncation and rounding are both far below 1e-6 of the derivative: the line moves
+            // with the unknown, and a quadratic term by a share of `step/1e4 m` with the line.
             let step = match unknown {
-                0..9 => 20.0,
-                9..18 => 5e-5,
-                _ => 1e-2,
+                0..9 => 4.0,
+                9..18 => 1e-5,
+                _ => 2e-3,
             };
             let ahead = view(&at(column, step, Vector3::zeros(), entry.point), index);
             let behind = view(&at(column, -step, Vector3::zeros(), entry.point), index);
             for axis in 0..2 {
                 let partials = analytic[axis].by_image();
                 let group = unknown / 3 * 3..(unknown / 3 * 3 + 3).min(partials.len());
-                let scale = DVector::from_column_slice(&partials[group]).norm();
+                let norm = |row: usize| {
+                    let partials = analytic[row].by_image();
+                    DVector::from_column_slice(&partials[group.clone()]).norm()
+                };
+                // A row takes up a part of the other's derivatives with the line.
+                let scale = norm(axis).max(0.1 * norm(1 - axis));
                 let numeric = (ahead[axis] - behind[axis]) / (2.0 * step);
                 close(numeric, partials[unknown], scale.max(1e-2));
             }
         }
         for axis in 0..3 {
             let mut step_m = Vector3::zeros();
-            step_m[axis] = 20.0;
+            step_m[axis] = 4.0;
             let ahead = view(&at(None, 0.0, step_m, entry.point), index);
             let behind = view(&at(None, 0.0, -step_m, entry.point), index);
             for row in 0..2 {
-                let numeric = (ahead[row] - behind[row]) / 40.0;
+                let numeric = (ahead[row] - behind[row]) / 8.0;
                 close(
                     numeric,
                     analytic[row].by_point[axis],

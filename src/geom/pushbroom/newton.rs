@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 
-use super::{ExteriorOrientation, Solution, Unseen, flight_sense};
+use super::{ExteriorOrientation, Pose, Solution, Unseen, flight_sense};
 
 /// Lines of the table that start the iteration, equally spaced over the image.
 const NODES: u32 = 65;
@@ -10,6 +10,61 @@ const NODES: u32 = 65;
 const LAST_STEP_LINES: f64 = 1e-2;
 /// Evaluations after which the iteration is given up.
 const EVALUATIONS_MAX: u32 = 20;
+
+/// A point as the line that sees it does.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Sighting {
+    /// The line, and the camera vector there.
+    pub solution: Solution,
+    /// Pose of the line.
+    pub pose: Pose,
+    /// Change of the camera vector per line, metres.
+    pub rate_m: Vector3<f64>,
+}
+
+impl Sighting {
+    /// Finds the line of `model` that sees `point_m` (Mars-fixed) by steps from line `x`; one of at most
+    /// `last_step_lines` is the last. The change per line is that before it.
+    ///
+    /// # Errors
+    /// [`Unseen::BehindCamera`], [`Unseen::NotConverged`], [`Unseen::NotFinite`].
+    pub fn near(
+        model: &(impl ExteriorOrientation + ?Sized),
+        mut x: f64,
+        point_m: &Vector3<f64>,
+        last_step_lines: f64,
+    ) -> Result<Self, Unseen> {
+        for evaluations in 1..=EVALUATIONS_MAX {
+            let (pose, motion) = model.moving(x);
+            let camera_m = pose.camera_vector_m(point_m);
+            let rate_m = motion.camera_vector_rate_m(&pose, &camera_m);
+            let step_lines = -camera_m.x / rate_m.x;
+            x += step_lines;
+            if !x.is_finite() {
+                return Err(Unseen::NotFinite);
+            }
+            if step_lines.abs() <= last_step_lines {
+                let solution = Solution {
+                    x,
+                    camera_m: camera_m + rate_m * step_lines,
+                    evaluations,
+                    step_lines,
+                };
+                let turn_rad = motion.turn_rad * step_lines;
+                return Ok(Self {
+                    solution: solution.in_front()?,
+                    pose: Pose {
+                        position_m: pose.position_m + motion.advance_m * step_lines,
+                        mars_to_camera: pose.mars_to_camera
+                            + turn_rad.cross_matrix() * pose.mars_to_camera,
+                    },
+                    rate_m,
+                });
+            }
+        }
+        Err(Unseen::NotConverged)
+    }
+}
 
 /// Finds the line that sees a point, for many points of one image.
 ///
@@ -100,26 +155,7 @@ impl<'a, M: ExteriorOrientation + ?Sized> Projector<'a, M> {
     /// [`Unseen::BehindCamera`], [`Unseen::NotConverged`], [`Unseen::NotFinite`].
     pub fn project(&self, point_m: &Vector3<f64>) -> Result<Solution, Unseen> {
         let start = self.nearest(0.0).newton(point_m);
-        let mut x = self.nearest(start).newton(point_m);
-        for evaluations in 1..=EVALUATIONS_MAX {
-            let (pose, motion) = self.model.moving(x);
-            let camera_m = pose.camera_vector_m(point_m);
-            let rate_m = motion.camera_vector_rate_m(&pose, &camera_m);
-            let step_lines = -camera_m.x / rate_m.x;
-            x += step_lines;
-            if !x.is_finite() {
-                return Err(Unseen::NotFinite);
-            }
-            if step_lines.abs() <= LAST_STEP_LINES {
-                let solution = Solution {
-                    x,
-                    camera_m: camera_m + rate_m * step_lines,
-                    evaluations,
-                    step_lines,
-                };
-                return solution.in_front();
-            }
-        }
-        Err(Unseen::NotConverged)
+        let x = self.nearest(start).newton(point_m);
+        Ok(Sighting::near(self.model, x, point_m, LAST_STEP_LINES)?.solution)
     }
 }
