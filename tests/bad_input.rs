@@ -332,15 +332,7 @@ const PAIR_CASES: &[(&str, Spoil)] = &[
     }),
     ("ties_of_parallel_rays", |case| {
         // Both images are the same one.
-        case.write("labels/E02-01301.lbl", case.read("labels/E02-02016.lbl"));
-        case.run()
-    }),
-    ("adjustment_without_a_hold", |case| {
-        case.replace(
-            "site.toml",
-            "tie_sigma_px",
-            "nadir_sigma_m = inf\noff_nadir_sigma_m = inf\nmola_image = \"off\"\ntie_sigma_px",
-        );
+        case.write("labels/E02-02016.lbl", case.read("labels/E02-01301.lbl"));
         case.run()
     }),
     ("adjustment_held_against_its_ties", |case| {

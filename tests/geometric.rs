@@ -273,3 +273,57 @@ fn threads_change_no_byte() {
         assert!(eight[&path] == bytes, "{}", path.display());
     }
 }
+
+/// The ties with three of five of them measured wrongly by 150 lines to either side.
+fn spoiled(table: &str) -> String {
+    let mut lines = table.lines();
+    let mut spoiled = lines.next().unwrap().to_owned();
+    for (index, row) in lines.enumerate() {
+        let (before, line) = row.rsplit_once(',').unwrap();
+        let line: f64 = line.parse().unwrap();
+        let tie = index / 2;
+        let wrong = match (row.contains("E02-02016"), tie % 5) {
+            (true, 0) => 150.0,
+            (true, 1) => -150.0,
+            (true, 2) => {
+                if tie % 2 == 0 {
+                    100.0
+                } else {
+                    -100.0
+                }
+            }
+            _ => 0.0,
+        };
+        spoiled += &format!("\n{before},{}", line + wrong);
+    }
+    spoiled
+}
+
+#[test]
+fn ties_that_are_none_make_the_site_invalid() {
+    let case = Case::pair();
+    let table = String::from_utf8(case.read("ties/isidis.csv")).unwrap();
+    case.write("ties/isidis.csv", spoiled(&table));
+    let outcome = case.outcome(case.run());
+    assert!(outcome.starts_with("exit 5\nisidis: INVALID"), "{outcome}");
+    assert!(
+        outcome.contains("of 154 tie points were left out"),
+        "{outcome}"
+    );
+    let page = fs::read_to_string(case.path("out/isidis/report/index.html")).unwrap();
+    assert!(!page.contains("Relative registration is healed"));
+}
+
+#[test]
+fn what_nothing_tells_apart_is_named() {
+    let case = Case::pair();
+    let free = "nadir_sigma_m = inf\noff_nadir_sigma_m = inf\nmola_image = \"off\"\ntie_sigma_px";
+    case.replace("site.toml", "tie_sigma_px", free);
+    let outcome = case.outcome(case.run());
+    let singular = "error: isidis/adjust: the network is singular: nothing tells apart the ";
+    assert!(
+        outcome.starts_with(&format!("exit 3\n{singular}")),
+        "{outcome}"
+    );
+    assert!(outcome.contains("finite standard deviations"), "{outcome}");
+}

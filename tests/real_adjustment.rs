@@ -391,7 +391,8 @@ fn the_places_of_the_shots_contradict_the_ties() {
         measure.sample += if second { 2.533 } else { 2.796 };
     }
     let found = site.intersect(&shifted);
-    assert_eq!(found.points.len(), 311);
+    // The shift takes one of 311 out of its image.
+    assert_eq!(found.points.len(), 310);
     assert!((found.sigma0 - 3.08).abs() < 0.01, "{}", found.sigma0); // pixels: half the last digit, and arcs
 }
 

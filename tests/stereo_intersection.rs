@@ -103,7 +103,6 @@ fn exact_measurements_give_the_truth() {
             assert!(measure.focal_along_px.abs() < 1e-6 && measure.focal_across_px.abs() < 1e-6);
             assert!(measure.reprojection_lines.abs() < 1e-6);
             assert!(measure.reprojection_px.abs() < 1e-6);
-            assert!(!measure.extrapolated);
         }
         assert!(!point.outlier);
     }
@@ -168,15 +167,19 @@ fn noise_comes_out_as_simulated_and_as_the_covariance_says() {
     // Noise and weights agree: one standard deviation of unit weight.
     near(line.sigma0, 1.0);
     let mut squares = 0.0;
-    for (point, truth) in line.points.iter().zip(&truth) {
-        let error = Vector3::from(point.ground_m) - truth;
+    // Noise takes a few of the outermost out of their image.
+    assert!(line.rejected.len() < TIES / 200);
+    let truth: std::collections::BTreeMap<&str, &Vector3<f64>> =
+        ties.iter().map(|tie| tie.id.as_str()).zip(&truth).collect();
+    for point in &line.points {
+        let error = Vector3::from(point.ground_m) - truth[point.id.as_str()];
         let covariance = Matrix3::from(point.covariance_m2);
         squares += error.dot(&(covariance.try_inverse().unwrap() * error)) / 3.0;
     }
-    near((squares / TIES as f64).sqrt(), 1.0);
-    // Three standard deviations of 3000 residual lengths: a few per thousand, and a long tail of lengths.
+    near((squares / line.points.len() as f64).sqrt(), 1.0);
+    // Five robust standard deviations: one in three thousand on a line, a few more beside it.
     let outliers = line.points.iter().filter(|point| point.outlier).count();
-    assert!(outliers < TIES / 20, "{outliers}");
+    assert!(outliers < TIES / 100, "{outliers}");
 }
 
 #[test]
@@ -238,14 +241,19 @@ fn an_image_with_itself_gives_no_height() {
 }
 
 #[test]
-fn lines_outside_the_image_are_flagged() {
-    let (mut ties, _) = ties(1, |_| (0.0, 0.0));
+fn places_outside_the_image_are_no_measurements() {
+    let (ties, _) = ties(1, |_| (0.0, 0.0));
     let images = images();
-    let shift = images[0].lines - ties[0].measures[0].line + 10.0;
-    // Both cameras move on by the same way on the ground.
-    let per_line = [0, 1].map(|image| ground_per_px_and_line(&[3.39e6, 0.0, 0.0], image).1);
-    ties[0].measures[0].line += shift;
-    ties[0].measures[1].line += shift * per_line[0] / per_line[1];
-    let result = intersect_ties(&images, &ties, &IntersectOptions::default()).unwrap();
-    assert!(result.points[0].measures[0].extrapolated);
+    let samples = images[0].detector.samples;
+    for (line, sample) in [
+        (images[0].lines + 1.0, 10.0),
+        (-1.0, 10.0),
+        (10.0, samples + 1.0),
+        (10.0, -1.0),
+    ] {
+        let mut ties = ties.clone();
+        (ties[0].measures[0].line, ties[0].measures[0].sample) = (line, sample);
+        let result = intersect_ties(&images, &ties, &IntersectOptions::default()).unwrap();
+        assert_eq!(result.rejected[0].reason, TieReject::OutsideImage);
+    }
 }

@@ -171,7 +171,7 @@ impl Results<'_> {
             figures: self.figures(),
             rejected: self.rejected(),
             complaints: Complaints {
-                count: found.complaint_counts.values().sum(),
+                count: found.complaint_counts.values().sum::<u64>() + self.tie_complaints(),
                 texts: complaints.into_iter().take(COMPLAINTS_QUOTED).collect(),
             },
             notes,

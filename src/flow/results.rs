@@ -139,6 +139,12 @@ impl Results<'_> {
         })
     }
 
+    /// Records of tie point files that were read around.
+    pub(super) fn tie_complaints(&self) -> u64 {
+        self.geometric
+            .map_or(0, |geometric| geometric.ties.value.complaint_count)
+    }
+
     /// What was wrong with input records, one sentence each.
     pub(super) fn complaints(&self) -> Vec<String> {
         let complaints = self.found.value.complaints.iter();

@@ -29,6 +29,12 @@ impl<M: ExteriorOrientation> StereoImage<M> {
         )
     }
 
+    /// Whether a place lies in the image, its edges included.
+    #[must_use]
+    pub fn shows(&self, line: f64, sample: f64) -> bool {
+        (0.0..=self.lines).contains(&line) && (0.0..=self.detector.samples).contains(&sample)
+    }
+
     /// How far a ground point moves along the focal plane from line `x_lines` to the next, pixels.
     #[must_use]
     pub fn focal_px_per_line(&self, x_lines: f64, ground_m: &Vector3<f64>) -> f64 {

@@ -278,7 +278,17 @@ fn metakernel(to: &AdjustedKernels, images: &[AdjustedImage]) -> Result<String> 
             ..kernel.clone()
         })
         .collect();
-    Ok(to
+    let text = to
         .originals
-        .metakernel_text_before(Some(to.site_folder), &own))
+        .metakernel_text_before(Some(to.site_folder), &own);
+    // Text before the first data block is comment.
+    Ok(text.replacen(
+        "\n\n",
+        &format!(
+            "\n\nThe last ones are adjusted: each pair for its image alone, not for laser shots nor other images, and with\n\
+             the pointing bias of {} s.\n\n",
+            to.pointing.ck_bias.seconds()
+        ),
+        1,
+    ))
 }

@@ -115,6 +115,16 @@ pub struct ImageProducts<'a> {
 const LEFT_OUT_SHARE: f64 = 0.1;
 /// An a posteriori standard deviation of unit weight above this contradicts the configured ones.
 const SIGMA0_MAX: f64 = 2.0;
+/// Fewer tie points than this do not outweigh the image coordinates of hundreds of footprints.
+const TIES_FEW: usize = 10;
+/// Images whose adjusted tie points lie farther apart than this along the flight, metres, were not brought together:
+/// six lines of MOC's usual 4 m, and a thirteenth of a spacing of footprints.
+const APART_MAX_M: f64 = 25.0;
+
+fn is_together(pair: &PairComparison) -> bool {
+    // Written so that NaN counts as apart.
+    pair.disagreement_m <= APART_MAX_M
+}
 
 impl GeometricProducts<'_> {
     /// Why the adjusted orientation is invalid, one sentence per reason.
@@ -127,20 +137,56 @@ impl GeometricProducts<'_> {
                 .map(|reason| format!("adjusted image {id}: {reason}"))
                 .collect()
         };
-        self.adjusted_images.iter().flat_map(reasons).collect()
+        let mut invalid: Vec<String> = self.adjusted_images.iter().flat_map(reasons).collect();
+        let (left_out, ties) = (self.left_out(), self.ties.joining());
+        if 2 * left_out > ties {
+            invalid.push(format!(
+                "adjustment: {left_out} of {ties} tie points were left out; ties.parquet says why"
+            ));
+        }
+        for pair in self.adjusted_pairs.iter().filter(|pair| !is_together(pair)) {
+            invalid.push(format!(
+                "adjustment: tie points of {} and {} still lie {:.1} m apart along the flight, expected at most {} m",
+                pair.images[0], pair.images[1], pair.disagreement_m, APART_MAX_M
+            ));
+        }
+        invalid
+    }
+
+    /// Tie points that took part in the adjustment.
+    fn taken(&self) -> usize {
+        let points = self.adjusted.points.iter();
+        points.filter(|point| point.kind == PointKind::Tie).count()
+    }
+
+    /// Tie points that join images and yet took no part.
+    fn left_out(&self) -> usize {
+        self.ties.joining().saturating_sub(self.taken())
+    }
+
+    /// Whether the images of every pair place tie points together after the adjustment, and most of these took
+    /// part in it.
+    #[must_use]
+    pub fn is_healed(&self) -> bool {
+        2 * self.left_out() <= self.ties.joining()
+            && !self.adjusted_pairs.is_empty()
+            && self.adjusted_pairs.iter().all(is_together)
     }
 
     /// What a reader must weigh, one sentence each.
     fn remarks(&self) -> Vec<String> {
         let mut remarks = Vec::new();
-        let ties = self.ties.points.len();
-        let left_out = self.adjusted.left_out.iter();
-        let left_out = left_out
-            .filter(|point| point.kind == PointKind::Tie)
-            .count();
-        if left_out as f64 > LEFT_OUT_SHARE * ties as f64 {
+        let (left_out, ties) = (self.left_out(), self.ties.joining());
+        if left_out as f64 > LEFT_OUT_SHARE * ties as f64 && 2 * left_out <= ties {
             remarks.push(format!(
                 "{left_out} of {ties} tie points were left out of the adjustment; ties.parquet says why"
+            ));
+        }
+        let taken = self.taken();
+        if taken < TIES_FEW {
+            remarks.push(format!(
+                "only {taken} tie points took part in the adjustment: weighted image coordinates of footprints \
+                 (adjustment.mola_image) hold the images against so few"
             ));
         }
         let sigma0 = self.adjusted.summary.sigma0;

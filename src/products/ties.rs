@@ -112,11 +112,13 @@ fn measurements<'a>(
 fn reasons<'a>(geometric: &GeometricProducts<'a>) -> BTreeMap<&'a str, String> {
     let adjusted = geometric.adjusted.left_out.iter();
     let ties = adjusted.filter(|point| point.kind == PointKind::Tie);
-    let mut reasons: BTreeMap<&str, String> = ties
-        .map(|point| (point.id.as_str(), point.reason.to_string()))
-        .collect();
-    for tie in &geometric.intersected.rejected {
-        reasons.insert(&tie.id, tie.reason.to_string());
+    let rejected = geometric.intersected.rejected.iter();
+    let rejected = rejected.map(|tie| (tie.id.as_str(), tie.reason.to_string()));
+    let ties = ties.map(|point| (point.id.as_str(), point.reason.to_string()));
+    let mut reasons = BTreeMap::new();
+    for (id, reason) in rejected.chain(ties) {
+        // Of points with the same identifier the first is meant.
+        reasons.entry(id).or_insert(reason);
     }
     reasons
 }

@@ -49,10 +49,12 @@ fn overview(adjusted: &Adjusted) -> String {
     let summary = &adjusted.summary;
     let verdict = if summary.degrees_of_freedom == 0 {
         "nothing is redundant, so that nothing can be said of it".to_owned()
-    } else if summary.sigma0 < 1.0 {
+    } else if summary.sigma0 < 0.9 {
         "the observations agree better than their standard deviations promise".to_owned()
+    } else if summary.sigma0 <= 1.1 {
+        "the observations agree as their standard deviations promise".to_owned()
     } else {
-        "the observations agree worse than their standard deviations promise, or as well".to_owned()
+        "the observations agree worse than their standard deviations promise".to_owned()
     };
     format!(
         "{}, {} and {} were adjusted together in {}; {} degrees of freedom. The a posteriori standard deviation of unit \
@@ -204,6 +206,7 @@ const fn kind(of: ObservationType) -> &'static str {
         ObservationType::MolaRange => "MOLA ranges",
         ObservationType::Orientation => "initial orientation",
         ObservationType::MolaGround => "ground coordinates of MOLA",
+        ObservationType::Bias => "time and range biases",
     }
 }
 

@@ -229,6 +229,7 @@ const fn rejection(reason: TieReject) -> &'static str {
         TieReject::Unseen => "an image does not see the intersected point",
         TieReject::Duplicate => "identifier used before",
         TieReject::TwiceInImage => "measured twice in one image",
+        TieReject::OutsideImage => "measured outside its image",
         TieReject::NotFinite => "measurement not a finite number",
     }
 }

@@ -32,24 +32,34 @@ pub(super) fn absolute(site: &SiteProducts, geometric: &GeometricProducts) -> St
     let pairs = BeforeAfter::all(geometric);
     let relative = BeforeAfter::worst(&pairs);
     let relative = relative.map_or_else(String::new, |pair| pair.sentence() + " ");
+    let summary = &geometric.adjusted.summary;
     let witness = match site.config.adjustment.mola_image {
-        MolaImage::Weighted => {
+        MolaImage::Weighted if summary.shots.corrections_m[0].n > 0 => {
             "the image coordinates of footprints were computed from the very orientation that is adjusted and are no \
-             measurements of their own"
+             measurements of their own; these, by their weight, and the standard deviations that the orientation was \
+             given beforehand decide how much each image moves"
         }
-        MolaImage::Off | MolaImage::Reproject => {
-            "nothing was measured in the images that has known coordinates"
+        _ => {
+            "nothing was measured in the images that has known coordinates; the standard deviations that the \
+             orientation was given beforehand decide how much each image moves"
         }
     };
-    let ties = &geometric.adjusted.summary.ties;
+    let ties = &summary.ties;
+    if ties.corrections_m[0].n == 0 {
+        return format!("{relative}No tie point took part: nothing was adjusted to anything.");
+    }
+    let healed = if geometric.is_healed() {
+        "Relative registration is healed, absolute position is not."
+    } else {
+        "Relative registration is not healed, nor is absolute position."
+    };
     let of = |axes: &[Summary; 3]| {
         let means = axes.each_ref().map(|axis| label(axis.mean, 1));
         means.join(", ")
     };
     format!(
-        "{relative}Where the images lie on Mars the adjustment cannot tell: {witness}, and only the standard deviations that the orientation \
-         was given beforehand decide how much each image moves. The tie points moved by {} m in X, Y, Z on average; their \
-         formal standard deviations of {} m are optimistic. Relative registration is healed, absolute position is not.",
+        "{relative}Where the images lie on Mars the adjustment cannot tell: {witness}. The tie points moved by {} m in X, Y, Z \
+         on average; their formal standard deviations of {} m are optimistic. {healed}",
         of(&ties.corrections_m),
         of(&ties.sigmas_m)
     )

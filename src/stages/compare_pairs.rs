@@ -186,12 +186,15 @@ impl<'a> Shared<'a> {
             let height_m = 0.5 * (a_m.norm() + b_m.norm()) - Vector3::from(point.ground_m).norm();
             height_m / (b_m - a_m).norm()
         });
-        let budget = uncertainty_budget(&BudgetInput {
-            sites: vec![residuals],
-            mola_spacing_m: mola_spacing_m.unwrap_or_default(),
-            // A pixel is what both images see on average along the flight.
-            pixel_size_m: 0.5 * (line_spacing_m[0] + line_spacing_m[1]),
-            height_over_base,
+        let budget = mola_spacing_m.map(|mola_spacing_m| {
+            uncertainty_budget(&BudgetInput {
+                sites: vec![residuals],
+                mola_spacing_m,
+                // A pixel is what both images see on average along the flight.
+                pixel_size_m: 0.5 * (line_spacing_m[0] + line_spacing_m[1]),
+                height_over_base,
+            })
+            .map_err(|fault| fault.to_string())
         });
         PairComparison {
             images: pair.map(|image| image.id.clone()),
@@ -212,7 +215,7 @@ impl<'a> Shared<'a> {
                 .abs(),
             footprints,
             mola_spacing_m,
-            budget: budget.map_err(|fault| fault.to_string()),
+            budget: budget.unwrap_or_else(|| Err("there are no footprints".to_owned())),
         }
     }
 

@@ -63,8 +63,8 @@ impl Fault for TiesFault {
     }
 }
 
-/// Reads all files of `ties`. Points that two files know by the same identifier stay two points: an
-/// intersection takes the first.
+/// Reads all files of `ties`. A point that two files know by the same identifier is one when they measured it
+/// in different images; otherwise it stays two, of which an intersection takes the first.
 ///
 /// # Errors
 /// A file that is no table and no network; no measurement at all; none in an image of the site; none
@@ -75,6 +75,7 @@ pub fn read_ties(ties: &TiesConfig, images: &[ImageConfig]) -> Result<Ties> {
         .map(|image| (image.name_in_ties(), image.id.as_str()))
         .collect();
     let mut read = Ties::default();
+    let mut first = BTreeMap::new();
     for path in &ties.files {
         let file = pds::ties::read_ties(path)?;
         read.ignored += file.ignored as u64;
@@ -88,7 +89,7 @@ pub fn read_ties(ties: &TiesConfig, images: &[ImageConfig]) -> Result<Ties> {
             }
         }
         for tie in file.ties {
-            read.take(tie, &names);
+            read.take(tie, &names, &mut first);
         }
     }
     if read.points.is_empty() {
@@ -102,7 +103,13 @@ pub fn read_ties(ties: &TiesConfig, images: &[ImageConfig]) -> Result<Ties> {
 }
 
 impl Ties {
-    fn take(&mut self, tie: TiePoint, names: &BTreeMap<&str, &str>) {
+    /// Takes a point over; `first` knows where the first point of each identifier stands.
+    fn take(
+        &mut self,
+        tie: TiePoint,
+        names: &BTreeMap<&str, &str>,
+        first: &mut BTreeMap<String, usize>,
+    ) {
         let mut measures = Vec::with_capacity(tie.measures.len());
         for measure in tie.measures {
             match names.get(measure.image.as_str()) {
@@ -113,7 +120,20 @@ impl Ties {
                 None => *self.elsewhere.entry(measure.image).or_insert(0) += 1,
             }
         }
-        if !measures.is_empty() {
+        if measures.is_empty() {
+            return;
+        }
+        let known = first.get(&tie.id).map(|at| &mut self.points[*at]);
+        let joins = |known: &&mut TiePoint| {
+            let images = || known.measures.iter().map(|measure| &measure.image);
+            measures
+                .iter()
+                .all(|new| !images().any(|image| *image == new.image))
+        };
+        if let Some(known) = known.filter(joins) {
+            known.measures.extend(measures);
+        } else {
+            first.entry(tie.id.clone()).or_insert(self.points.len());
             self.points.push(TiePoint {
                 id: tie.id,
                 measures,
@@ -208,6 +228,27 @@ mod tests {
         assert_eq!(ties.elsewhere, BTreeMap::from([("C".to_owned(), 2)]));
         assert_eq!(ties.complaint_count, 1);
         assert!(ties.complaints[0].starts_with("ties.csv: record 7: "));
+    }
+
+    #[test]
+    fn a_point_in_two_files_is_one_when_its_images_differ() {
+        let folder = tempfile::tempdir().unwrap();
+        let files = ["1,A,1,1\n2,A,1,1\n", "1,B,2,2\n2,A,5,5\n"].map(|rows| {
+            let path = folder.path().join(format!("{}.csv", &rows[2..3]));
+            let text = format!("point_id,serial_number,sample,line\n{rows}");
+            std::fs::write(&path, text).unwrap();
+            path
+        });
+        let images = [image("A", None), image("B", None)];
+        let ties = read_ties(
+            &TiesConfig {
+                files: files.to_vec(),
+            },
+            &images,
+        )
+        .unwrap();
+        let measures: Vec<usize> = ties.points.iter().map(|tie| tie.measures.len()).collect();
+        assert_eq!(measures, [2, 1, 1]);
     }
 
     #[test]

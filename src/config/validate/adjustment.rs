@@ -19,12 +19,13 @@ use super::{
     values::Accept,
 };
 
-/// Standard deviations of observations: above zero, and not beyond any that could matter.
-const SIGMA: Accept = Accept::AboveTo(0.0, 1e6);
+/// Standard deviations of observations: none is better than a micrometre or a millionth of a pixel, and smaller
+/// ones would drown all others in rounding.
+const SIGMA: Accept = Accept::FromTo(1e-6, 1e6);
 /// Standard deviations of unknowns that 0 takes out.
-const SIGMA_OR_NONE: Accept = Accept::FromTo(0.0, 1e6);
+const SIGMA_OR_NONE: Accept = Accept::ZeroOr(1e-6, 1e6);
 /// Standard deviations of orientation unknowns: 0 holds fixed, infinity leaves free.
-const SIGMA_OR_FREE: Accept = Accept::FromTo(0.0, f64::INFINITY);
+const SIGMA_OR_FREE: Accept = Accept::ZeroOr(1e-6, f64::INFINITY);
 
 pub(super) fn ties(
     raw: Option<Spanned<RawTies>>,

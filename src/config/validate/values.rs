@@ -19,6 +19,8 @@ pub(super) enum Accept {
     FromTo(f64, f64),
     /// Above the first, at most the second.
     AboveTo(f64, f64),
+    /// 0 and both ends belong to it.
+    ZeroOr(f64, f64),
 }
 
 impl Accept {
@@ -26,6 +28,7 @@ impl Accept {
         match self {
             Self::FromTo(low, high) => low <= value && value <= high,
             Self::AboveTo(low, high) => low < value && value <= high,
+            Self::ZeroOr(low, high) => value.abs() <= 0.0 || low <= value && value <= high,
         }
     }
 }
@@ -33,8 +36,11 @@ impl Accept {
 impl fmt::Display for Accept {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::FromTo(low, f64::INFINITY) => {
-                write!(formatter, "a number not below {low}; inf is one")
+            Self::ZeroOr(low, f64::INFINITY) => {
+                write!(formatter, "0, or a number not below {low}; inf is one")
+            }
+            Self::ZeroOr(low, high) => {
+                write!(formatter, "0, or a number from {low} to {high}")
             }
             Self::FromTo(low, high) => write!(formatter, "a number from {low} to {high}"),
             Self::AboveTo(low, high) => write!(formatter, "a number above {low}, at most {high}"),

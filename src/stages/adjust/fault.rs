@@ -77,6 +77,7 @@ impl Fault for AdjustFault {
     fn advice(&self) -> String {
         match self {
             Self::NoTies { .. } => "check that the images overlap and that the tie points are theirs",
+            Self::Network(BundleFault::Unsettled { .. }) => "check the tie points and the images' times and kernels: so far apart the observations have no common solution",
             Self::Network(_) => "check the input of the adjustment, and give orientations and footprints finite standard deviations",
             Self::Value { .. } => "correct this value, or leave out what it belongs to",
             Self::Singular(_) => "give these unknowns finite standard deviations, or hold them fixed with 0",

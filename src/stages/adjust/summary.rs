@@ -29,6 +29,8 @@ pub enum ObservationType {
     Orientation,
     /// Initial coordinates of footprints.
     MolaGround,
+    /// Time and range biases, initially 0.
+    Bias,
 }
 
 /// What the residuals of one kind of observation say.
@@ -166,10 +168,31 @@ fn types<M>(assembled: &Assembled<M>, adjustment: &Adjustment) -> Vec<TypeSummar
             orientations.flatten().collect(),
         ),
         (ObservationType::MolaGround, grounds.flatten().collect()),
+        (ObservationType::Bias, biases(assembled, adjustment)),
     ];
     all.into_iter()
         .filter(|(_, residuals)| !residuals.is_empty())
         .map(|(kind, residuals)| of_type(kind, &residuals))
+        .collect()
+}
+
+/// Residuals of time and range biases, whose initial value is 0.
+fn biases<M>(assembled: &Assembled<M>, adjustment: &Adjustment) -> Vec<Residual> {
+    let images = assembled.network.images.iter().zip(&adjustment.images);
+    let times = images.map(|(image, adjusted)| (image.time_bias_sigma_s, adjusted.time_bias_s));
+    let ranges = assembled.network.range_bias_sigmas_m.iter().copied();
+    let ranges = ranges.zip(adjustment.range_biases_m.iter().copied());
+    let weighted = times.chain(ranges).filter(|(sigma, _)| sigma.is_finite());
+    weighted
+        .filter_map(|(sigma, estimate)| {
+            let (bias, root_cofactor) = estimate?;
+            Some(Residual {
+                value: -bias,
+                sigma,
+                redundancy: (1.0 - (root_cofactor / sigma).powi(2)).clamp(0.0, 1.0),
+                weight_factor: 1.0,
+            })
+        })
         .collect()
 }
 

@@ -99,8 +99,6 @@ pub struct MeasureResidual {
     pub reprojection_lines: f64,
     /// Measured minus projected focal coordinate across the track, pixels.
     pub reprojection_px: f64,
-    /// Whether the line lies outside the image, where the orientation is extrapolated.
-    pub extrapolated: bool,
 }
 
 /// A tie point without a ground point.
@@ -128,6 +126,9 @@ pub enum TieReject {
     /// Two of its measurements are in one image.
     #[error("it is measured twice in one image")]
     TwiceInImage,
+    /// A measurement lies outside its image.
+    #[error("a measurement lies outside its image")]
+    OutsideImage,
     /// A measurement is not a finite number.
     #[error("a measurement is not a finite number")]
     NotFinite,
@@ -210,14 +211,17 @@ fn places<M: ExteriorOrientation>(
         measures
             .map(|(measure, image)| {
                 let (x_lines, y_px) = images[image].focal_place(measure.line, measure.sample);
-                let finite = x_lines.is_finite() && y_px.is_finite();
-                finite
-                    .then_some(Place {
-                        image,
-                        x_lines,
-                        y_px,
-                    })
-                    .ok_or(TieReject::NotFinite)
+                if !(x_lines.is_finite() && y_px.is_finite()) {
+                    return Err(TieReject::NotFinite);
+                }
+                if !images[image].shows(measure.line, measure.sample) {
+                    return Err(TieReject::OutsideImage);
+                }
+                Ok(Place {
+                    image,
+                    x_lines,
+                    y_px,
+                })
             })
             .collect()
     });
@@ -274,7 +278,6 @@ fn intersect_one<M: ExteriorOrientation>(
                 focal_across_px: focal.y,
                 reprojection_lines: place.x_lines - seen.x,
                 reprojection_px: place.y_px - y_px,
-                extrapolated: place.x_lines.abs() > 0.5 * image.lines,
             })
         })
         .collect::<Option<Vec<_>>>()
