@@ -8,7 +8,7 @@
 
 mod common;
 
-use std::{collections::BTreeSet, fs, fs::File, path::Path};
+use std::{collections::BTreeSet, fmt::Write as _, fs, fs::File, path::Path};
 
 use arrow::{
     array::{AsArray, RecordBatch},
@@ -294,7 +294,7 @@ fn spoiled(table: &str) -> String {
             }
             _ => 0.0,
         };
-        spoiled += &format!("\n{before},{}", line + wrong);
+        write!(spoiled, "\n{before},{}", line + wrong).unwrap();
     }
     spoiled
 }
