@@ -230,7 +230,10 @@ fn redundancy_numbers_add_up_to_the_degrees_of_freedom() {
     let simulated = Recipe::GUSEV.simulate();
     for (robust, name) in [
         (None, "quadratic"),
-        (Some(areograph::geom::robust::RobustWeight::HUBER), "Huber"),
+        (
+            Some(areograph::geom::robust::RobustWeight::Huber { limit: 1.345 }),
+            "Huber",
+        ),
     ] {
         let options = BundleOptions {
             robust,

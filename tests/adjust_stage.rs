@@ -12,20 +12,19 @@ mod recipe;
 mod scene;
 
 use areograph::{
-    config::MolaImage,
+    config::{AdjustmentConfig, BAARDA_LIMIT, MolaImage, Robust, RobustFunction},
     geom::{
         bundle::{BundleOptions, Network, View, solve},
         pushbroom::{
             CorrectedOrientation, Detector, EulerPolynomial, OrientationCorrection, Projector,
             Sighting,
         },
-        robust::RobustWeight,
         stereo::StereoImage,
     },
     stages::{
         adjust::{
-            AdjustImage, AdjustOptions, Adjusted, BAARDA_LIMIT, LaserShot, LeftOutReason,
-            ObservationType, PointKind, ShotRange, adjust,
+            AdjustImage, Adjusted, LaserShot, LeftOutReason, ObservationType, PointKind, ShotRange,
+            adjust,
         },
         intersect::{IntersectOptions, IntersectedTies, intersect_ties},
     },
@@ -126,7 +125,7 @@ impl Site {
         intersect_ties(&images, &self.ties, &IntersectOptions::default()).unwrap()
     }
 
-    fn adjust(&self, options: &AdjustOptions) -> areograph::error::Result<Adjusted> {
+    fn adjust(&self, options: &AdjustmentConfig) -> areograph::error::Result<Adjusted> {
         adjust(
             &self.images,
             &self.shots,
@@ -137,11 +136,24 @@ impl Site {
     }
 }
 
+const HUBER: Robust = Robust {
+    function: RobustFunction::Huber,
+    limit: RobustFunction::Huber.usual_limit(),
+};
+
+/// The defaults, but no tie point is left out.
+fn every_tie() -> AdjustmentConfig {
+    AdjustmentConfig {
+        blunder_limit: None,
+        ..AdjustmentConfig::default()
+    }
+}
+
 /// Standard deviations that agree with noise of one line and one pixel.
-fn matched(site: &Site) -> AdjustOptions {
-    AdjustOptions {
+fn matched(site: &Site) -> AdjustmentConfig {
+    AdjustmentConfig {
         tie_sigma_px: [focal_px_per_line(&site.simulated, 0), 1.0],
-        ..AdjustOptions::default()
+        ..every_tie()
     }
 }
 
@@ -157,7 +169,7 @@ fn the_stage_gives_what_the_geometry_gives() {
         ..Recipe::GUSEV
     });
     let direct = solve(&site.simulated.network, &BundleOptions::default()).unwrap();
-    let adjusted = site.adjust(&AdjustOptions::default()).unwrap();
+    let adjusted = site.adjust(&every_tie()).unwrap();
     assert_eq!(
         adjusted.summary.degrees_of_freedom,
         direct.degrees_of_freedom()
@@ -195,9 +207,9 @@ fn the_stage_gives_what_the_geometry_gives() {
 fn footprints_in_images_weigh_as_the_mode_says() {
     let site = Site::of(Recipe::GUSEV);
     let with = |mola_image| {
-        site.adjust(&AdjustOptions {
+        site.adjust(&AdjustmentConfig {
             mola_image,
-            ..AdjustOptions::default()
+            ..every_tie()
         })
         .unwrap()
     };
@@ -232,15 +244,15 @@ fn blunders_are_found_and_good_ties_kept() {
             seed: 100 + run,
             ..Recipe::GUSEV
         });
-        let options = AdjustOptions {
+        let options = AdjustmentConfig {
             blunder_limit: Some(BAARDA_LIMIT),
-            robust: Some(RobustWeight::HUBER),
+            robust: Some(HUBER),
             ..matched(&site)
         };
-        let good = site.adjust(&AdjustOptions {
+        let good = site.adjust(&AdjustmentConfig {
             blunder_limit: None,
             robust: None,
-            ..options
+            ..options.clone()
         });
         let mut normals = Normals::new(500 + run);
         let wrong: Vec<usize> = (0..BLUNDERS).map(|k| 19 * k + 3).collect();
@@ -296,7 +308,7 @@ fn blunders_are_found_and_good_ties_kept() {
 #[test]
 fn across_the_track_a_pair_does_not_control_itself() {
     let site = Site::of(Recipe::GUSEV);
-    let adjusted = site.adjust(&AdjustOptions::default()).unwrap();
+    let adjusted = site.adjust(&every_tie()).unwrap();
     for view in adjusted
         .views
         .iter()
@@ -318,13 +330,13 @@ fn what_does_not_fit_together_is_refused() {
     let run = |images: &[AdjustImage<Initial>],
                shots: &[LaserShot],
                ties: &[TiePoint],
-               options: &AdjustOptions| {
+               options: &AdjustmentConfig| {
         let failure = adjust(images, shots, ties, &starts, options).unwrap_err();
         assert_eq!(failure.kind().exit_code(), 3);
         println!("{failure}");
         failure.to_string()
     };
-    let plain = AdjustOptions::default();
+    let plain = every_tie();
 
     let mut shots = site.shots.clone();
     shots[3].range.as_mut().unwrap().image = "E02-00000".to_owned();
@@ -374,18 +386,18 @@ fn what_does_not_fit_together_is_refused() {
         message.contains("the range of shot 0/7 is NaN"),
         "{message}"
     );
-    let nowhere = AdjustOptions {
+    let nowhere = AdjustmentConfig {
         tie_sigma_px: [1.0, 0.0],
-        ..plain
+        ..plain.clone()
     };
     let message = run(&site.images, &site.shots, &site.ties, &nowhere);
     assert!(
         message.contains("of tie point T266 in image E02-00665 is 0"),
         "{message}"
     );
-    let unknown = AdjustOptions {
+    let unknown = AdjustmentConfig {
         range_bias_sigma_m: f64::NAN,
-        ..plain
+        ..plain.clone()
     };
     let message = run(&site.images, &site.shots, &site.ties, &unknown);
     assert!(message.contains("of profile 10496 is NaN"), "{message}");
@@ -396,7 +408,7 @@ fn what_does_not_fit_together_is_refused() {
 fn ties_without_a_ground_point_are_listed() {
     let mut site = Site::of(Recipe::GUSEV);
     site.ties[0].measures.truncate(1);
-    let adjusted = site.adjust(&AdjustOptions::default()).unwrap();
+    let adjusted = site.adjust(&every_tie()).unwrap();
     assert_eq!(adjusted.left_out.len(), 1);
     assert_eq!(adjusted.left_out[0].id, site.ties[0].id);
     assert_eq!(adjusted.left_out[0].reason, LeftOutReason::NotIntersected);
@@ -498,7 +510,7 @@ fn the_result_is_kept_and_read_back() {
     for image in &mut site.images {
         image.time_bias_sigma_s = 0.05;
     }
-    let adjusted = site.adjust(&AdjustOptions::default()).unwrap();
+    let adjusted = site.adjust(&every_tie()).unwrap();
     let bytes = postcard::to_stdvec(&adjusted).unwrap();
     assert_eq!(postcard::from_bytes::<Adjusted>(&bytes).unwrap(), adjusted);
     // The corrected orientation puts the adjusted ties where they were measured, up to their residuals.
@@ -542,9 +554,9 @@ fn threads_do_not_change_a_bit() {
         ties: 400,
         ..Recipe::GUSEV
     });
-    let options = AdjustOptions {
-        robust: Some(RobustWeight::HUBER),
-        ..AdjustOptions::default()
+    let options = AdjustmentConfig {
+        robust: Some(HUBER),
+        ..every_tie()
     };
     let starts = site.starts();
     let bytes = [1, 8].map(|threads| {

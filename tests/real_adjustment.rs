@@ -23,7 +23,7 @@ use std::{
 };
 
 use areograph::{
-    config::MolaImage,
+    config::{AdjustmentConfig, MolaImage},
     geom::{
         intersection::{IntersectionLimits, Unintersected},
         pushbroom::{CorrectedOrientation, ExteriorOrientation, SampledOrientation},
@@ -33,8 +33,7 @@ use areograph::{
     pds::ties::read_ties,
     stages::{
         adjust::{
-            AdjustImage, AdjustOptions, Adjusted, LaserShot, PointKind, ShotRange, adjust,
-            orientation_sigmas,
+            AdjustImage, Adjusted, LaserShot, PointKind, ShotRange, adjust, orientation_sigmas,
         },
         intersect::{IntersectOptions, IntersectedTies, TieReject, intersect_ties},
     },
@@ -81,14 +80,15 @@ fn priors_of_the_paper() -> Priors {
 
 /// As in ISIS: 1.4 px for ties, 30 px for the places of footprints, and the 10 m of `lidarData.json` for ranges and
 /// coordinates.
-fn options(mola_image: MolaImage) -> AdjustOptions {
-    AdjustOptions {
+fn options(mola_image: MolaImage) -> AdjustmentConfig {
+    AdjustmentConfig {
         tie_sigma_px: [1.4; 2],
         mola_image,
         mola_sigma_px: [30.0; 2],
         ground_sigma_m: 10.0,
         range_sigma_m: 10.0,
-        ..AdjustOptions::default()
+        blunder_limit: None,
+        ..AdjustmentConfig::default()
     }
 }
 
@@ -144,7 +144,7 @@ impl Site {
         self.points.iter().map(shot).collect()
     }
 
-    fn adjust(&self, priors: &Priors, options: &AdjustOptions, with_ranges: bool) -> Adjusted {
+    fn adjust(&self, priors: &Priors, options: &AdjustmentConfig, with_ranges: bool) -> Adjusted {
         let images = self.stereo().into_iter().zip(&self.images).zip(priors);
         let images: Vec<_> = images
             .map(|((stereo, image), sigmas)| AdjustImage {

@@ -47,6 +47,12 @@ pub enum Weighting {
     },
 }
 
+/// Critical value of the test of standardised residuals: one good observation in a thousand fails it.
+///
+/// # Source
+/// Baarda 1968, A testing procedure for use in geodetic networks.
+pub const BAARDA_LIMIT: f64 = 3.29;
+
 /// Standard deviations and options of the combined adjustment.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct AdjustmentConfig {
@@ -94,7 +100,7 @@ impl Default for AdjustmentConfig {
             nadir_sigma_m: 100.0,
             off_nadir_sigma_m: 200.0,
             robust: None,
-            blunder_limit: Some(3.29),
+            blunder_limit: Some(BAARDA_LIMIT),
             images: Vec::new(),
         }
     }

@@ -175,7 +175,7 @@ impl Steps<'_> {
                 config,
             );
             let starts = &intersected.value.ties;
-            adjust(&images, &shots, &ties.value.points, starts, &config.into()).in_stage(stage)
+            adjust(&images, &shots, &ties.value.points, starts, config).in_stage(stage)
         })?)
     }
 

@@ -19,11 +19,6 @@ pub enum RobustWeight {
 }
 
 impl RobustWeight {
-    /// Huber's function with 95 % efficiency for normal errors.
-    pub const HUBER: Self = Self::Huber { limit: 1.345 };
-    /// Cauchy's function with 95 % efficiency for normal errors.
-    pub const CAUCHY: Self = Self::Cauchy { limit: 2.385 };
-
     /// Factor of the weight, `0..=1`, at the normalised residual `z`.
     #[must_use]
     pub fn factor(self, z: f64) -> f64 {
@@ -52,9 +47,9 @@ mod tests {
     #[test]
     fn weights_fall_with_the_residual() {
         for (function, at_limit, at_ten) in [
-            (RobustWeight::HUBER, 1.0, 0.1345),
+            (RobustWeight::Huber { limit: 1.345 }, 1.0, 0.1345),
             (
-                RobustWeight::CAUCHY,
+                RobustWeight::Cauchy { limit: 2.385 },
                 1.0 / (1.0 + (1.345_f64 / 2.385).powi(2)),
                 0.05382,
             ),

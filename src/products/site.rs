@@ -185,8 +185,8 @@ impl GeometricProducts<'_> {
         let taken = self.taken();
         if taken < TIES_FEW {
             remarks.push(format!(
-                "only {taken} tie points took part in the adjustment: weighted image coordinates of footprints \
-                 (adjustment.mola_image) hold the images against so few"
+                "only {taken} tie points took part in the adjustment: image coordinates of footprints, where weighted \
+                 (adjustment.mola_image), hold the images against so few"
             ));
         }
         let sigma0 = self.adjusted.summary.sigma0;

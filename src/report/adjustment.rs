@@ -7,10 +7,11 @@ use super::{
     reliability,
 };
 use crate::{
+    config::BAARDA_LIMIT,
     error::Result,
     geom::statistics::Summary,
     products::SiteProducts,
-    stages::adjust::{Adjusted, AdjustmentSummary, BAARDA_LIMIT, GroundSummary, ObservationType},
+    stages::adjust::{Adjusted, AdjustmentSummary, GroundSummary, ObservationType},
 };
 
 /// Steps that the axis of the convergence has room for at least, so that its labels are whole numbers.

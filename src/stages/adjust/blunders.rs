@@ -1,6 +1,6 @@
 //! Tie points that are no ties: found by their standardised residuals, left out, and adjusted again.
 
-use super::{AdjustOptions, LeftOut, LeftOutReason, PointKind, network::Assembled};
+use super::{LeftOut, LeftOutReason, PointKind, network::Assembled};
 use crate::geom::{
     bundle::{Adjustment, BundleFault, BundleOptions, Network, Residual, solve},
     pushbroom::ExteriorOrientation,
@@ -12,14 +12,15 @@ const ROUNDS_MAX: u32 = 20;
 /// pulls at its neighbours, and they come right when it is gone.
 const SHARE_OF_LARGEST: f64 = 0.5;
 
-/// Adjusts, leaves out the worst tie points and repeats until none fails the test.
+/// Adjusts, leaves out the worst tie points and repeats until no standardised residual exceeds `limit`; without one
+/// all stay.
 pub(super) fn solve_without_blunders<M: ExteriorOrientation>(
     assembled: &mut Assembled<M>,
     bundle_options: &BundleOptions,
-    options: &AdjustOptions,
+    limit: Option<f64>,
 ) -> Result<Adjustment, BundleFault> {
     let mut adjustment = solve(&assembled.network, bundle_options)?;
-    let Some(limit) = options.blunder_limit else {
+    let Some(limit) = limit else {
         return Ok(adjustment);
     };
     for _ in 0..ROUNDS_MAX {

@@ -24,7 +24,7 @@ pub use summary::{AdjustmentSummary, GroundSummary, ImageSummary, ObservationTyp
 
 use super::intersect::IntersectedTies;
 use crate::{
-    config::{AdjustmentConfig, MolaImage, RobustFunction},
+    config::{AdjustmentConfig, Robust, RobustFunction},
     error::Result,
     geom::{
         bundle::{Adjustment, BundleOptions, ORIENTATION_UNKNOWNS, Residual, Unknown},
@@ -81,68 +81,6 @@ pub struct ShotRange {
     pub range_m: f64,
 }
 
-/// Standard deviations and options.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct AdjustOptions {
-    /// Tie points, along and across the track, focal pixels.
-    pub tie_sigma_px: [f64; 2],
-    /// What image coordinates of footprints are.
-    pub mola_image: MolaImage,
-    /// Their standard deviations, along and across the track, focal pixels.
-    pub mola_sigma_px: [f64; 2],
-    /// How far outside an image a footprint still counts as seen by it, pixels.
-    pub mola_margin_px: f64,
-    /// Footprint coordinates, metres.
-    pub ground_sigma_m: f64,
-    /// Ranges, metres.
-    pub range_sigma_m: f64,
-    /// Range bias of each profile, metres; 0 for no such unknown.
-    pub range_bias_sigma_m: f64,
-    /// Robust weights of image coordinates.
-    pub robust: Option<RobustWeight>,
-    /// Standardised residual above which a tie point is a blunder and left out; `None` keeps all.
-    pub blunder_limit: Option<f64>,
-}
-
-impl Default for AdjustOptions {
-    /// The defaults of the configuration, but every tie point stays.
-    fn default() -> Self {
-        Self {
-            blunder_limit: None,
-            ..Self::from(&AdjustmentConfig::default())
-        }
-    }
-}
-
-impl From<&AdjustmentConfig> for AdjustOptions {
-    fn from(config: &AdjustmentConfig) -> Self {
-        Self {
-            tie_sigma_px: config.tie_sigma_px,
-            mola_image: config.mola_image,
-            mola_sigma_px: config.mola_sigma_px,
-            mola_margin_px: config.mola_margin_px,
-            ground_sigma_m: config.ground_sigma_m,
-            range_sigma_m: config.range_sigma_m,
-            range_bias_sigma_m: config.range_bias_sigma_m,
-            robust: config.robust.map(|robust| match robust.function {
-                RobustFunction::Huber => RobustWeight::Huber {
-                    limit: robust.limit,
-                },
-                RobustFunction::Cauchy => RobustWeight::Cauchy {
-                    limit: robust.limit,
-                },
-            }),
-            blunder_limit: config.blunder_limit,
-        }
-    }
-}
-
-/// Critical value of the test of standardised residuals: one good observation in a thousand fails it.
-///
-/// # Source
-/// Baarda 1968, A testing procedure for use in geodetic networks.
-pub const BAARDA_LIMIT: f64 = 3.29;
-
 /// A point that was left out.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct LeftOut {
@@ -186,7 +124,7 @@ pub fn adjust<M: ExteriorOrientation>(
     shots: &[LaserShot],
     ties: &[TiePoint],
     starts: &IntersectedTies,
-    options: &AdjustOptions,
+    config: &AdjustmentConfig,
 ) -> Result<Adjusted> {
     if starts.points.is_empty() {
         let first = starts.rejected.first();
@@ -199,13 +137,14 @@ pub fn adjust<M: ExteriorOrientation>(
         }
         .into());
     }
-    let mut assembled = network::assemble(images, shots, ties, starts, options)?;
+    let mut assembled = network::assemble(images, shots, ties, starts, config)?;
     let bundle_options = BundleOptions {
-        robust: options.robust,
+        robust: config.robust.map(robust_weight),
         ..BundleOptions::default()
     };
-    let adjustment = blunders::solve_without_blunders(&mut assembled, &bundle_options, options)
-        .map_err(|fault| fault::in_words(fault, images, &assembled))?;
+    let adjustment =
+        blunders::solve_without_blunders(&mut assembled, &bundle_options, config.blunder_limit)
+            .map_err(|fault| fault::in_words(fault, images, &assembled))?;
     // Blunders have lost their measurements and are listed already.
     let listed: BTreeSet<&str> = assembled
         .left_out
@@ -228,8 +167,16 @@ pub fn adjust<M: ExteriorOrientation>(
     let dropped: Vec<LeftOut> = dropped.collect();
     assembled.left_out.extend(dropped);
     contradictions(images, &assembled.points, &adjustment)?;
-    let summary = summary::summarise(images, &assembled, &adjustment, options.mola_image)?;
+    let summary = summary::summarise(images, &assembled, &adjustment, config.mola_image)?;
     Ok(adjusted::collect(images, assembled, adjustment, summary))
+}
+
+const fn robust_weight(robust: Robust) -> RobustWeight {
+    let limit = robust.limit;
+    match robust.function {
+        RobustFunction::Huber => RobustWeight::Huber { limit },
+        RobustFunction::Cauchy => RobustWeight::Cauchy { limit },
+    }
 }
 
 fn contradictions<M>(

@@ -5,11 +5,10 @@ use std::collections::{BTreeMap, BTreeSet};
 use nalgebra::Vector3;
 
 use super::{
-    AdjustFault, AdjustImage, AdjustOptions, LaserShot, LeftOut, LeftOutReason, PointKind,
-    image_index, pair,
+    AdjustFault, AdjustImage, LaserShot, LeftOut, LeftOutReason, PointKind, image_index, pair,
 };
 use crate::{
-    config::MolaImage,
+    config::{AdjustmentConfig, MolaImage},
     error::Result,
     geom::{
         bundle::{BundleImage, BundlePoint, Network, Range, View},
@@ -36,7 +35,7 @@ pub(super) fn assemble<'a, M: ExteriorOrientation>(
     shots: &[LaserShot],
     ties: &[TiePoint],
     starts: &IntersectedTies,
-    options: &AdjustOptions,
+    config: &AdjustmentConfig,
 ) -> Result<Assembled<&'a M>> {
     let mut assembled = Assembled {
         network: Network {
@@ -49,12 +48,12 @@ pub(super) fn assemble<'a, M: ExteriorOrientation>(
         left_out: Vec::new(),
         mola: Vec::new(),
     };
-    assembled.add_shots(images, shots, options)?;
-    assembled.mola = footprints_in_images(images, shots, options)?;
-    if options.mola_image == MolaImage::Weighted {
+    assembled.add_shots(images, shots, config)?;
+    assembled.mola = footprints_in_images(images, shots, config)?;
+    if config.mola_image == MolaImage::Weighted {
         assembled.network.views.extend(&assembled.mola);
     }
-    assembled.add_ties(images, ties, starts, options)?;
+    assembled.add_ties(images, ties, starts, config)?;
     Ok(assembled)
 }
 
@@ -84,13 +83,13 @@ pub(super) fn projector<'a, M, O: ExteriorOrientation>(
 fn footprints_in_images<M: ExteriorOrientation>(
     images: &[AdjustImage<M>],
     shots: &[LaserShot],
-    options: &AdjustOptions,
+    config: &AdjustmentConfig,
 ) -> std::result::Result<Vec<View>, AdjustFault> {
     let mut views = Vec::new();
     for (index, image) in images.iter().enumerate() {
         let projector = projector(image, &image.stereo.orientation)?;
         let detector = &image.stereo.detector;
-        let samples = -options.mola_margin_px..=detector.samples + options.mola_margin_px;
+        let samples = -config.mola_margin_px..=detector.samples + config.mola_margin_px;
         for (point, shot) in shots.iter().enumerate() {
             // What a camera does not see is not in its image.
             let Ok(seen) = projector.project(&Vector3::from(shot.ground_m)) else {
@@ -107,7 +106,7 @@ fn footprints_in_images<M: ExteriorOrientation>(
                     image: index,
                     x_lines: seen.x,
                     y_px: focal.y,
-                    sigma_px: pair(options.mola_sigma_px),
+                    sigma_px: pair(config.mola_sigma_px),
                 });
             }
         }
@@ -131,7 +130,7 @@ impl<'a, M: ExteriorOrientation> Assembled<&'a M> {
         &mut self,
         images: &'a [AdjustImage<M>],
         shots: &[LaserShot],
-        options: &AdjustOptions,
+        config: &AdjustmentConfig,
     ) -> std::result::Result<(), AdjustFault> {
         let image_index = image_index(images);
         let mut used = BTreeSet::new();
@@ -143,7 +142,7 @@ impl<'a, M: ExteriorOrientation> Assembled<&'a M> {
             self.points.push(shot.id.clone());
             self.network.points.push(BundlePoint {
                 ground_m: shot.ground_m.into(),
-                sigma_m: Some(Vector3::repeat(options.ground_sigma_m)),
+                sigma_m: Some(Vector3::repeat(config.ground_sigma_m)),
             });
             let Some(range) = &shot.range else { continue };
             let Some(image) = image_index.get(range.image.as_str()) else {
@@ -157,7 +156,7 @@ impl<'a, M: ExteriorOrientation> Assembled<&'a M> {
                 self.profiles.push(range.profile.clone());
                 self.network
                     .range_bias_sigmas_m
-                    .push(options.range_bias_sigma_m);
+                    .push(config.range_bias_sigma_m);
                 self.profiles.len() - 1
             });
             self.network.ranges.push(Range {
@@ -165,7 +164,7 @@ impl<'a, M: ExteriorOrientation> Assembled<&'a M> {
                 image: *image,
                 x_lines: range.x_lines,
                 range_m: range.range_m,
-                sigma_m: options.range_sigma_m,
+                sigma_m: config.range_sigma_m,
                 profile,
             });
         }
@@ -177,7 +176,7 @@ impl<'a, M: ExteriorOrientation> Assembled<&'a M> {
         images: &'a [AdjustImage<M>],
         ties: &[TiePoint],
         starts: &IntersectedTies,
-        options: &AdjustOptions,
+        config: &AdjustmentConfig,
     ) -> Result<()> {
         let ids: Vec<&str> = images
             .iter()
@@ -213,7 +212,7 @@ impl<'a, M: ExteriorOrientation> Assembled<&'a M> {
                     image,
                     x_lines,
                     y_px,
-                    sigma_px: pair(options.tie_sigma_px),
+                    sigma_px: pair(config.tie_sigma_px),
                 });
             }
         }

@@ -4,11 +4,11 @@ use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
 use super::{
-    AdjustFault, AdjustImage, BAARDA_LIMIT, PointKind,
+    AdjustFault, AdjustImage, PointKind,
     fault::unknown_in_words,
     network::{Assembled, projector},
 };
-use crate::config::MolaImage;
+use crate::config::{BAARDA_LIMIT, MolaImage};
 use crate::geom::{
     bundle::{Adjustment, Residual},
     pushbroom::{CorrectedOrientation, ExteriorOrientation},
