@@ -18,6 +18,7 @@ pub mod products;
 pub mod report;
 pub mod scene;
 pub mod spice;
+pub mod stage;
 pub mod stages;
 pub mod store;
 pub mod ties;

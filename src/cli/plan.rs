@@ -9,7 +9,7 @@ use super::{load_sites, output};
 use crate::{
     config::SiteConfig,
     error::Failure,
-    flow::{Stage, plan_site},
+    flow::{PUBLISH, plan_site},
 };
 
 /// Says which stages would run, and why.
@@ -30,7 +30,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
     print(
         &load_sites(&arguments.sites)?,
         &arguments.out,
-        Stage::Publish,
+        PUBLISH,
         false,
         arguments.json,
     )
@@ -40,7 +40,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
 pub(super) fn print(
     sites: &[SiteConfig],
     out: &Path,
-    until: Stage,
+    until: &str,
     force: bool,
     as_json: bool,
 ) -> Result<(), Failure> {
@@ -53,8 +53,8 @@ pub(super) fn print(
                 .map(|planned| {
                     json!({
                         "stage": planned.stage,
-                        "runs": planned.because.runs(),
-                        "because": planned.because.to_string(),
+                        "runs": planned.reason.runs(),
+                        "because": planned.reason.to_string(),
                     })
                 })
                 .collect();
@@ -63,14 +63,14 @@ pub(super) fn print(
         }
         output::line(format_args!("{}:", site.site));
         for planned in stages {
-            let word = if planned.because.runs() {
+            let word = if planned.reason.runs() {
                 "run "
             } else {
                 "keep"
             };
             output::line(format_args!(
                 "  {word}  {:32} {}",
-                planned.stage, planned.because
+                planned.stage, planned.reason
             ));
         }
     }

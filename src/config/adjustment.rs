@@ -7,7 +7,9 @@ use serde::{Deserialize, Serialize};
 /// Tie points between the images.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct TiesConfig {
-    /// The files, globs resolved, sorted, without repeats; none when there are no tie points.
+    /// The files, globs resolved, sorted, without repeats; none when there are no tie points. They enter
+    /// fingerprints by content.
+    #[serde(skip)]
     pub files: Vec<PathBuf>,
 }
 

@@ -51,7 +51,8 @@ pub struct SiteConfig {
 /// Where kernels come from, and how coverage is judged.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct KernelsConfig {
-    /// The source of the kernel list.
+    /// The source of the kernel list; kernels enter fingerprints by content.
+    #[serde(skip)]
     pub source: KernelSource,
     /// How far from an attitude sample the C-kernel may be asked, seconds; 0 asks only inside its intervals.
     pub ck_tolerance_s: f64,
@@ -186,7 +187,8 @@ impl MolaClock {
 /// PEDR files and filters.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct PedrConfig {
-    /// The files, globs resolved, sorted, without repeats.
+    /// The files, globs resolved, sorted, without repeats; they enter fingerprints by content.
+    #[serde(skip)]
     pub files: Vec<PathBuf>,
     /// Datum of their coordinates.
     pub datum: DatumChoice,
@@ -254,7 +256,8 @@ pub enum WindowShape {
 pub struct ImageConfig {
     /// Identifier, unique in the site; also a folder name.
     pub id: String,
-    /// PDS3 or ISIS label, attached or detached.
+    /// PDS3 or ISIS label, attached or detached; it enters fingerprints by content.
+    #[serde(skip)]
     pub label: Option<PathBuf>,
     /// Its name in tie point files and in what is written for ISIS, when that is not the identifier.
     pub serial_number: Option<String>,

@@ -5,7 +5,8 @@ use std::{collections::BTreeMap, path::Path};
 use serde::Serialize;
 use serde_json::{Map, Value, json};
 
-use super::site::{KernelLine, SiteProducts};
+use super::site::SiteProducts;
+use crate::stages::describe_kernels::KernelLine;
 use crate::{config::CkQuality, spice::quality_of, time::Intervals};
 
 /// Kernel names by SpiceQL's types, in load order: `ck`, `spk`, `tspk` (ephemerides of other bodies), `pck`,

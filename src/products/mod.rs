@@ -46,7 +46,7 @@ pub use exchange::{
     ControlMeasure, ControlPoint, GroundEstimate, ImageMeasure, LidarPoint, moc_serial_number,
     write_gcp, write_lidar_data,
 };
-pub use site::{GeometricProducts, ImageProducts, KernelLine, SiteProducts};
+pub use site::{GeometricProducts, ImageProducts, SiteProducts};
 
 use crate::error::Result;
 

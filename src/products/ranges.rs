@@ -75,7 +75,7 @@ struct Document<'a> {
     format: &'static str,
     site: &'a str,
     valid: bool,
-    invalid_because: Vec<String>,
+    invalid_because: &'a [String],
     units: &'static str,
     definitions: Vec<Definition>,
     mola_clock: Clock<'a>,
@@ -223,14 +223,13 @@ fn document<'a>(site: &SiteProducts<'a>) -> Document<'a> {
         .iter()
         .map(|shot| site.ranges.shots.range_minus_distance_m[*shot]);
     let residuals_m: Vec<f64> = residuals.collect();
-    let invalid_because = site.invalid_because();
     let ranges = site.ranges;
     let valid = |profile: &&ProfileRanges| profile.invalid_because.is_empty();
     Document {
         format: "areograph ranges 1",
         site: &site.config.site,
-        valid: invalid_because.is_empty(),
-        invalid_because,
+        valid: site.verdict.valid,
+        invalid_because: &site.verdict.reasons,
         units: "metres, seconds, metres per second; angles in limits in radians",
         definitions: DEFINITIONS
             .iter()

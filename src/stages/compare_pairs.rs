@@ -7,10 +7,21 @@ use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
 use super::{
+    convert_datum::Converted,
+    read_ties::Ties,
+    site_image::{SiteImage, oriented_images},
+};
+use super::{
     group_profiles::Profile,
     intersect::{IntersectedPoint, IntersectedTies, MeasureResidual},
     register::ImageRegistration,
     uncertainty::{BudgetInput, ResidualMoments, UncertaintyBudget, uncertainty_budget},
+};
+use crate::{
+    config::CameraModel,
+    error::Result,
+    stage::{InOrder, Output, Round, Stage},
+    stage_inputs,
 };
 use crate::{
     footprints::Footprints,
@@ -24,6 +35,7 @@ use crate::{
     },
     ties::TiePoint,
 };
+use std::sync::atomic::AtomicBool;
 
 /// A pair of images with tie points in both.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -50,7 +62,7 @@ pub struct PairComparison {
     /// Median distance of successive footprints, metres; `None` without any.
     pub mola_spacing_m: Option<f64>,
     /// The budget of Shan et al. 2005, or why there is none.
-    pub budget: Result<UncertaintyBudget, String>,
+    pub budget: std::result::Result<UncertaintyBudget, String>,
 }
 
 /// Footprints of both images under the transformation that tie points determine.
@@ -89,6 +101,53 @@ pub struct ProfileByTies {
 
 /// Pairs with fewer tie points are not compared.
 const TIES_MIN: usize = 2;
+
+stage_inputs! {
+    /// The images with one orientation, tie points and their ground points, and the footprints.
+    pub struct ComparePairs<'a> {
+        /// Which orientation.
+        pub round: Round,
+        /// The images.
+        pub images: InOrder<'a, SiteImage>,
+        /// The form of the orientation.
+        pub model: &'a CameraModel,
+        /// Tie points.
+        pub ties: &'a Output<Ties>,
+        /// Their ground points.
+        pub intersected: &'a Output<IntersectedTies>,
+        /// Footprints in IAU 2000.
+        pub converted: &'a Output<Converted>,
+        /// Profiles.
+        pub profiles: &'a Output<Vec<Profile>>,
+    }
+}
+
+impl Stage for ComparePairs<'_> {
+    const NAME: &'static str = "compare_pairs";
+    type Output = Vec<PairComparison>;
+    stage_inputs!(fingerprint);
+
+    fn part(&self) -> Option<String> {
+        self.round.part()
+    }
+
+    fn run(&self, _stop: &AtomicBool) -> Result<Vec<PairComparison>> {
+        let oriented = oriented_images(self.images.0)?;
+        let images: Vec<_> = oriented
+            .iter()
+            .map(|image| image.stereo(*self.model))
+            .collect();
+        let registrations = self.images.0.iter().map(|image| image.registration.value());
+        Ok(compare_pairs(
+            &images,
+            &registrations.collect::<Result<Vec<_>>>()?,
+            &self.ties.value()?.points,
+            self.intersected.value()?,
+            &self.converted.value()?.footprints,
+            self.profiles.value()?,
+        ))
+    }
+}
 
 /// Compares all pairs of `images` that share tie points.
 ///

@@ -3,6 +3,7 @@
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
+use super::search_footprints::SearchResult;
 use crate::{
     config::MolaClock,
     footprints::{AsRead, Footprints},
@@ -15,6 +16,12 @@ use crate::{
     time::Et,
     units::{RADIANS_PER_DEGREE, wrap_pi},
 };
+use crate::{
+    error::Result,
+    stage::{Output, Stage},
+    stage_inputs,
+};
+use std::sync::atomic::AtomicBool;
 
 /// Footprints in IAU 2000, and what was done to each file's coordinates.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -36,6 +43,28 @@ pub struct FileConversion {
     pub shift_m: Summary,
     /// Change of east longitude, degrees.
     pub longitude_shift_deg: Summary,
+}
+
+stage_inputs! {
+    /// Footprints as read, and whether the clock correction turns Mars.
+    pub struct ConvertDatum<'a> {
+        /// What the search found.
+        pub found: &'a Output<SearchResult>,
+        /// The clock of MOLA.
+        pub mola_clock: &'a MolaClock,
+    }
+}
+
+impl Stage for ConvertDatum<'_> {
+    const NAME: &'static str = "convert_datum";
+    const CHECKED: bool = true;
+    type Output = Converted;
+    stage_inputs!(fingerprint);
+
+    fn run(&self, _stop: &AtomicBool) -> Result<Converted> {
+        let footprints = self.found.value()?.footprints.clone();
+        Ok(convert_datum(footprints, self.mola_clock))
+    }
 }
 
 /// Rotates every shot out of its file's datum and into IAU 2000, through J2000.

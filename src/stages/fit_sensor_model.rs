@@ -17,6 +17,11 @@ use crate::{
     },
     units::RADIANS_PER_ARCSECOND,
 };
+use crate::{
+    stage::{Output, Round, Stage},
+    stage_inputs,
+};
+use std::sync::atomic::AtomicBool;
 
 /// Below this |cos φ| the angles ω and κ lose their meaning and the rotation-vector form should be used.
 const GIMBAL_LOCK_COS_PHI: f64 = 0.1;
@@ -141,6 +146,34 @@ impl Fault for Undetermined {
 
     fn advice(&self) -> String {
         "raise orientation.intervals, and check that the image has more than a few lines".to_owned()
+    }
+}
+
+stage_inputs! {
+    /// The samples of one image, and the limits.
+    pub struct FitSensorModel<'a> {
+        /// Identifier of the image.
+        pub image: &'a str,
+        /// Which orientation.
+        pub round: Round,
+        /// Its samples.
+        pub samples: &'a Output<Orientation>,
+        /// Limits.
+        pub orientation: &'a OrientationConfig,
+    }
+}
+
+impl Stage for FitSensorModel<'_> {
+    const NAME: &'static str = "fit_sensor_model";
+    type Output = SensorModel;
+    stage_inputs!(fingerprint);
+
+    fn part(&self) -> Option<String> {
+        self.round.part_of(self.image)
+    }
+
+    fn run(&self, _stop: &AtomicBool) -> Result<SensorModel> {
+        fit_sensor_model(self.samples.value()?, self.orientation)
     }
 }
 

@@ -10,6 +10,8 @@ use crate::{
     time::{Et, Interval},
     units::SECONDS_PER_MS,
 };
+use crate::{files::HashedFile, spice::KernelView, stage::Stage, stage_inputs};
+use std::sync::atomic::AtomicBool;
 
 /// A clock string and a UTC string farther apart than this contradict each other, seconds.
 ///
@@ -161,6 +163,33 @@ impl Fault for ImageFault {
             }
             Self::Duration { .. } => "check lines_header, the exposure (milliseconds) and the summing".to_owned(),
         }
+    }
+}
+
+stage_inputs! {
+    /// Label and keys of one image, and the clocks.
+    pub struct TagTimes<'a> {
+        /// Identifier and keys written in the configuration.
+        pub image: &'a ImageConfig,
+        /// The label that the configuration names.
+        pub label: Option<HashedFile>,
+        /// Text kernels.
+        pub kernels: &'a KernelView,
+    }
+}
+
+impl Stage for TagTimes<'_> {
+    const NAME: &'static str = "tag_times";
+    const CHECKED: bool = true;
+    type Output = ImageTimes;
+    stage_inputs!(fingerprint);
+
+    fn part(&self) -> Option<String> {
+        Some(self.image.id.clone())
+    }
+
+    fn run(&self, _stop: &AtomicBool) -> Result<ImageTimes> {
+        tag_image(self.image, self.kernels.session()?)
     }
 }
 

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
+pub use crate::stages::judge::Verdict;
 use crate::time::Interval;
 
 /// The manifest of one site.
@@ -57,29 +58,6 @@ pub mod figures {
     pub const ADJUSTED_DISAGREEMENT_M: &str = "adjusted_disagreement_m";
     /// A posteriori standard deviation of unit weight of the adjustment.
     pub const ADJUSTMENT_SIGMA0: &str = "adjustment_sigma0";
-}
-
-/// Whether the products keep the limits of the configuration.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Verdict {
-    /// No limit is broken.
-    pub valid: bool,
-    /// Every broken limit, with its profile or image.
-    pub reasons: Vec<String>,
-    /// What a reader must weigh although no limit is broken.
-    pub remarks: Vec<String>,
-}
-
-impl Verdict {
-    /// The verdict in one word or three, as every message and page has it.
-    #[must_use]
-    pub const fn word(&self) -> &'static str {
-        match (self.valid, self.remarks.as_slice()) {
-            (false, _) => "INVALID",
-            (true, []) => "valid",
-            (true, _) => "valid with remarks",
-        }
-    }
 }
 
 /// The configuration of a run.

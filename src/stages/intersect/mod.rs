@@ -13,6 +13,15 @@ use serde::{Deserialize, Serialize};
 
 pub use statistics::{ImageResiduals, Residuals2};
 
+use super::{
+    read_ties::Ties,
+    site_image::{SiteImage, oriented_images},
+};
+use crate::{
+    config::CameraModel,
+    stage::{InOrder, Output, Round, Stage},
+    stage_inputs,
+};
 use crate::{
     config::{IntersectionConfig, Weighting},
     error::{Fault, Kind, Result},
@@ -23,6 +32,7 @@ use crate::{
     },
     ties::{TiePoint, image_indices},
 };
+use std::sync::atomic::AtomicBool;
 
 /// How to intersect.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -158,6 +168,45 @@ struct Place {
     image: usize,
     x_lines: f64,
     y_px: f64,
+}
+
+stage_inputs! {
+    /// The images with one orientation, and the tie points.
+    pub struct Intersect<'a> {
+        /// Which orientation.
+        pub round: Round,
+        /// The images.
+        pub images: InOrder<'a, SiteImage>,
+        /// The form of the orientation.
+        pub model: &'a CameraModel,
+        /// Tie points.
+        pub ties: &'a Output<Ties>,
+        /// Weights and limits.
+        pub intersection: &'a IntersectionConfig,
+    }
+}
+
+impl Stage for Intersect<'_> {
+    const NAME: &'static str = "intersect";
+    type Output = IntersectedTies;
+    stage_inputs!(fingerprint);
+
+    fn part(&self) -> Option<String> {
+        self.round.part()
+    }
+
+    fn run(&self, _stop: &AtomicBool) -> Result<IntersectedTies> {
+        let oriented = oriented_images(self.images.0)?;
+        let images: Vec<_> = oriented
+            .iter()
+            .map(|image| image.stereo(*self.model))
+            .collect();
+        intersect_ties(
+            &images,
+            &self.ties.value()?.points,
+            &self.intersection.into(),
+        )
+    }
 }
 
 /// Intersects all tie points.

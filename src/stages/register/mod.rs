@@ -16,6 +16,7 @@ use serde::{Deserialize, Serialize};
 pub use methods::{Method, MethodRun};
 pub use points::{PointOnImage, ProfileOnImage, RegisteredPoints};
 
+use super::convert_datum::Converted;
 use super::{
     fit_sensor_model::SensorModel, group_profiles::Profile, oriented::OrientedImage,
     sample_orientation::Orientation, tag_times::ImageTimes,
@@ -30,6 +31,10 @@ use crate::{
         pushbroom::{ExteriorOrientation, Projector, Unseen},
         statistics::Summary,
     },
+};
+use crate::{
+    stage::{Output, Round, Stage},
+    stage_inputs,
 };
 
 /// Points between two looks at whether the user stops the program.
@@ -73,6 +78,50 @@ enum Reject {
     /// Mars itself stands between camera and point.
     #[error("beyond the horizon")]
     BeyondHorizon,
+}
+
+stage_inputs! {
+    /// One image with its orientation, and the footprints.
+    pub struct Register<'a> {
+        /// Identifier of the image.
+        pub image: &'a str,
+        /// Which orientation.
+        pub round: Round,
+        /// Its line times.
+        pub times: &'a Output<ImageTimes>,
+        /// Its orientation.
+        pub orientation: &'a Output<Orientation>,
+        /// Its sensor models.
+        pub model: &'a Output<SensorModel>,
+        /// Footprints in IAU 2000.
+        pub converted: &'a Output<Converted>,
+        /// Profiles.
+        pub profiles: &'a Output<Vec<Profile>>,
+        /// Model to project with, and the published iterations.
+        pub registration: &'a RegistrationConfig,
+    }
+}
+
+impl Stage for Register<'_> {
+    const NAME: &'static str = "register";
+    type Output = ImageRegistration;
+    stage_inputs!(fingerprint);
+
+    fn part(&self) -> Option<String> {
+        self.round.part_of(self.image)
+    }
+
+    fn run(&self, stop: &AtomicBool) -> Result<ImageRegistration> {
+        register(
+            self.times.value()?,
+            self.orientation.value()?,
+            self.model.value()?,
+            &self.converted.value()?.footprints,
+            self.profiles.value()?,
+            self.registration,
+            stop,
+        )
+    }
 }
 
 /// Projects all profiles into `image`.
