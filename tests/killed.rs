@@ -195,7 +195,7 @@ fn an_interrupt_leaves_the_search_and_keeps_finished_stages() {
         .spawn()
         .unwrap();
     let begun = Instant::now();
-    while !case.path("out/case/.cache/tag_times").exists() {
+    while !case.path("out/case/.cache/tag_times+image").exists() {
         assert!(begun.elapsed() < Duration::from_mins(1), "never begun");
         sleep(Duration::from_millis(1));
     }
@@ -207,7 +207,7 @@ fn an_interrupt_leaves_the_search_and_keeps_finished_stages() {
         said.contains("case/search_footprints: stopped before its end"),
         "{said}"
     );
-    assert!(case.path("out/case/.cache/tag_times").exists());
+    assert!(case.path("out/case/.cache/tag_times+image").exists());
     assert!(!case.path("out/case/.cache/search_footprints").exists());
 }
 
