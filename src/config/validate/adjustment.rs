@@ -183,16 +183,20 @@ pub(super) fn adjustment(
 }
 
 fn robust(raw: &RawAdjustment, review: &mut Review<'_>) -> Option<RobustWeight> {
-    let huber = |limit: Option<f64>| RobustWeight::Huber {
-        limit: limit.unwrap_or(RobustWeight::HUBER_LIMIT),
-    };
-    let cauchy = |limit: Option<f64>| RobustWeight::Cauchy {
-        limit: limit.unwrap_or(RobustWeight::CAUCHY_LIMIT),
-    };
-    let words: [(&str, Option<fn(Option<f64>) -> RobustWeight>); 3] = [
+    let words = [
         ("none", None),
-        ("huber", Some(huber)),
-        ("cauchy", Some(cauchy)),
+        (
+            "huber",
+            Some(RobustWeight::Huber {
+                limit: RobustWeight::HUBER_LIMIT,
+            }),
+        ),
+        (
+            "cauchy",
+            Some(RobustWeight::Cauchy {
+                limit: RobustWeight::CAUCHY_LIMIT,
+            }),
+        ),
     ];
     let function = review
         .word("adjustment.robust", raw.robust.as_ref(), &words)
@@ -208,7 +212,11 @@ fn robust(raw: &RawAdjustment, review: &mut Review<'_>) -> Option<RobustWeight> 
             "adjustment.robust_limit is never used: adjustment.robust is \"none\"".to_owned(),
         );
     }
-    function.map(|weight| weight(limit))
+    function.map(|weight| match (weight, limit) {
+        (usual, None) => usual,
+        (RobustWeight::Huber { .. }, Some(limit)) => RobustWeight::Huber { limit },
+        (RobustWeight::Cauchy { .. }, Some(limit)) => RobustWeight::Cauchy { limit },
+    })
 }
 
 /// The limit of the test; 0 switches it off.
