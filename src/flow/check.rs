@@ -8,9 +8,10 @@ use super::{
     site::{Prepared, Site, kernels, orient, prepare, ties},
 };
 use crate::{
-    config::{KernelSource, SiteConfig},
+    config::SiteConfig,
     error::{Failure, Place, Result},
     files::{HashedFile, InputFiles},
+    kernel_source::KernelSource,
     spice::Wanted,
     stage::{Output, Provenance, Stage},
     stages::{group_profiles::Profile, tag_times::ImageTimes},

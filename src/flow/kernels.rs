@@ -2,9 +2,10 @@
 
 use super::RivalSet;
 use crate::{
-    config::{KernelList, KernelSource, SiteConfig},
+    config::SiteConfig,
     error::Result,
     files::InputFiles,
+    kernel_source::{KernelList, KernelSource},
     spice::{KernelSet, Wanted},
     stages::{check_ranges::trajectory_reach_s, group_profiles::Profile, tag_times::ImageTimes},
     time::Intervals,

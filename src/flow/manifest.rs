@@ -8,7 +8,8 @@ use super::{
     site::{Adjustment, Site},
 };
 use crate::{
-    config::{BiasScope, SiteConfig},
+    altimetry::BiasScope,
+    config::SiteConfig,
     error::Result,
     files::file_name,
     stage::Inputs,

@@ -7,8 +7,9 @@ use super::{
     kernels::load_kernels,
 };
 use crate::{
-    config::{ImageConfig, KernelSource, SiteConfig},
+    config::{ImageConfig, SiteConfig},
     error::{Failure, Kind},
+    kernel_source::KernelSource,
     spice::{KernelSet, KernelView, Wanted},
     stage::{InOrder, Output, Round, Stage},
     stages::{

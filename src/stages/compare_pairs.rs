@@ -1,41 +1,35 @@
 //! What every pair of images says of itself: how it sees, how far footprints and tie points disagree in it, and
 //! how uncertain that makes ground points.
 
-use std::collections::BTreeMap;
+use std::{collections::BTreeMap, sync::atomic::AtomicBool};
 
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
 use super::{
     convert_datum::Converted,
-    read_ties::Ties,
-    site_image::{SiteImage, oriented_images},
-};
-use super::{
     group_profiles::Profile,
     intersect::{IntersectedPoint, IntersectedTies, MeasureResidual},
+    read_ties::Ties,
     register::ImageRegistration,
+    site_image::{SiteImage, oriented_images},
     uncertainty::{BudgetInput, ResidualMoments, UncertaintyBudget, uncertainty_budget},
 };
 use crate::{
-    config::CameraModel,
     error::Result,
-    stage::{InOrder, Output, Round, Stage},
-    stage_inputs,
-};
-use crate::{
     footprints::Footprints,
     frames::MarsIau2000,
     geom::{
         ellipsoid::spherical_to_xyz_m,
         misregistration::{ImageToImage, Pair},
-        pushbroom::ExteriorOrientation,
+        pushbroom::{CameraModel, ExteriorOrientation},
         statistics::Summary,
         stereo::StereoImage,
     },
+    stage::{InOrder, Output, Round, Stage},
+    stage_inputs,
     ties::TiePoint,
 };
-use std::sync::atomic::AtomicBool;
 
 /// A pair of images with tie points in both.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

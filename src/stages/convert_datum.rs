@@ -1,11 +1,14 @@
 //! Footprints and the file's own spacecraft positions go from the file's datum to IAU 2000.
 
+use std::sync::atomic::AtomicBool;
+
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::search_footprints::SearchResult;
 use crate::{
-    config::MolaClock,
+    altimetry::MolaClock,
+    error::Result,
     footprints::{AsRead, Footprints},
     frames::{MarsDatum, MarsIau2000},
     geom::{
@@ -13,15 +16,11 @@ use crate::{
         mars_rotation::convert_datum as convert_vector,
         statistics::Summary,
     },
+    stage::{Output, Stage},
+    stage_inputs,
     time::Et,
     units::{RADIANS_PER_DEGREE, wrap_pi},
 };
-use crate::{
-    error::Result,
-    stage::{Output, Stage},
-    stage_inputs,
-};
-use std::sync::atomic::AtomicBool;
 
 /// Footprints in IAU 2000, and what was done to each file's coordinates.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -166,7 +165,7 @@ fn note(name: &str, datum: MarsDatum, turn_s: Option<f64>) -> String {
 mod tests {
     use super::*;
     use crate::{
-        config::{BiasScope, TagSign},
+        altimetry::{BiasScope, TagSign},
         footprints::{Footprint, SourceFile},
     };
 

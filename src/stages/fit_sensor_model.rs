@@ -1,5 +1,7 @@
 //! Exterior orientation as polynomials in the image line, of first and second order.
 
+use std::sync::atomic::AtomicBool;
+
 use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 
@@ -15,13 +17,10 @@ use crate::{
         pushbroom::{EulerPolynomial, RotationVectorPolynomial, VectorPolynomial},
         statistics::largest,
     },
-    units::RADIANS_PER_ARCSECOND,
-};
-use crate::{
     stage::{Output, Round, Stage},
     stage_inputs,
+    units::RADIANS_PER_ARCSECOND,
 };
-use std::sync::atomic::AtomicBool;
 
 /// Below this |cos φ| the angles ω and κ lose their meaning and the rotation-vector form should be used.
 const GIMBAL_LOCK_COS_PHI: f64 = 0.1;

@@ -1,21 +1,19 @@
 //! Footprints of one orbit inside one window become a profile, marked where an image was taken with it.
 
+use std::sync::atomic::AtomicBool;
+
 use serde::{Deserialize, Serialize};
 
-use super::convert_datum::Converted;
-use super::tag_times::ImageTimes;
+use super::{convert_datum::Converted, tag_times::ImageTimes};
 use crate::{
     config::WindowConfig,
+    error::Result,
     footprints::Footprints,
     frames::MarsIau2000,
-    time::{Et, Interval},
-};
-use crate::{
-    error::Result,
     stage::{InOrder, Output, Stage},
     stage_inputs,
+    time::{Et, Interval},
 };
-use std::sync::atomic::AtomicBool;
 
 /// A pause longer than this starts another profile of the same orbit, seconds.
 ///

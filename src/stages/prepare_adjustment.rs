@@ -1,36 +1,33 @@
 //! What enters the combined adjustment: images with what is known of them beforehand, and shots.
 
-use std::collections::BTreeSet;
+use std::{collections::BTreeSet, sync::atomic::AtomicBool};
 
 use super::{
-    adjust::{AdjustImage, LaserShot, ShotRange, orientation_sigmas},
-    group_profiles::Profile,
-    register::ImageRegistration,
-    sample_orientation::Orientation,
-    tag_times::ImageTimes,
-};
-use super::{
-    adjust::{Adjusted, adjust},
+    adjust::{AdjustImage, Adjusted, LaserShot, ShotRange, adjust, orientation_sigmas},
     convert_datum::Converted,
+    group_profiles::Profile,
     intersect::IntersectedTies,
     read_ties::Ties,
+    register::ImageRegistration,
+    sample_orientation::Orientation,
     site_image::{SiteImage, oriented_images},
+    tag_times::ImageTimes,
 };
 use crate::{
     config::AdjustmentConfig,
+    error::Result,
     footprints::Footprints,
     frames::MarsIau2000,
-    geom::{ellipsoid::spherical_to_xyz_m, pushbroom::ExteriorOrientation, stereo::StereoImage},
+    geom::{
+        ellipsoid::spherical_to_xyz_m,
+        pushbroom::{CameraModel, ExteriorOrientation},
+        stereo::StereoImage,
+    },
+    stage::{InOrder, Output, Stage},
+    stage_inputs,
     time::Et,
     units::RADIANS_PER_DEGREE,
 };
-use crate::{
-    config::CameraModel,
-    error::Result,
-    stage::{InOrder, Output, Stage},
-    stage_inputs,
-};
-use std::sync::atomic::AtomicBool;
 
 stage_inputs! {
     /// Images, footprints, tie points with their ground points, and the standard deviations.

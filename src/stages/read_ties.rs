@@ -1,22 +1,21 @@
 //! Reads tie points and gives their images the site's identifiers.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    sync::atomic::AtomicBool,
+};
 
 use serde::{Deserialize, Serialize};
 
 use crate::{
     config::{ImageConfig, TiesConfig},
     error::{Fault, Kind, Result},
-    files::file_name,
+    files::{HashedFile, file_name},
     pds,
-    ties::{TieMeasure, TiePoint},
-};
-use crate::{
-    files::HashedFile,
     stage::{InOrder, Input, Inputs, Stage},
     stage_inputs,
+    ties::{TieMeasure, TiePoint},
 };
-use std::sync::atomic::AtomicBool;
 
 /// Complaints kept with their text; all are counted.
 const COMPLAINTS_MAX: usize = 1_000;
@@ -260,7 +259,7 @@ fn nothing_found(read: &Ties, names: &BTreeMap<&str, &str>) -> TiesFault {
 )]
 mod tests {
     use super::*;
-    use crate::config::ImageFields;
+    use crate::image::ImageFields;
 
     fn image(id: &str, serial_number: Option<&str>) -> ImageConfig {
         ImageConfig {

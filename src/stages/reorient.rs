@@ -1,9 +1,11 @@
 //! An orientation after a correction: samples and camera tables moved together, and the lines' times with them.
 
+use std::sync::atomic::AtomicBool;
+
 use nalgebra::{Matrix3, Vector3};
 
-use super::adjust::Adjusted;
 use super::{
+    adjust::Adjusted,
     sample_orientation::{
         Camera, CameraTables, InterpolationCheck, Nodes, Orientation, OrientationSample,
         check_interpolation, outline, samples_at,
@@ -22,13 +24,10 @@ use crate::{
         mars_rotation::mars_rotation,
         pushbroom::{ExteriorOrientation, Pose, SampledOrientation, SamplesFault},
     },
-    time::{Et, Interval},
-};
-use crate::{
     stage::{Output, Stage},
     stage_inputs,
+    time::{Et, Interval},
 };
-use std::sync::atomic::AtomicBool;
 
 /// Nodes by which a table may be overstepped: the rounding of epochs.
 const NODE_TOLERANCE: f64 = 1e-6;

@@ -2,7 +2,7 @@
 
 mod camera_tables;
 
-use std::fmt;
+use std::{fmt, sync::atomic::AtomicBool};
 
 use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
@@ -19,17 +19,13 @@ use crate::{
         mars_rotation::mars_rotation,
         statistics::largest,
     },
-    spice::{Attitude, Session},
-    time::Et,
-};
-use crate::{
-    spice::KernelView,
+    spice::{Attitude, KernelView, Session},
     stage::{Output, Stage},
     stage_inputs,
+    time::Et,
 };
-pub(super) use camera_tables::{Camera, Nodes, check_interpolation};
-use std::sync::atomic::AtomicBool;
 
+pub(super) use camera_tables::{Camera, Nodes, check_interpolation};
 /// Time between the attitude samples of the mission's C-kernels, seconds: an attitude that is held for
 /// longer is not explained by their spacing, and the bus turns by 0.2° meanwhile.
 const ATTITUDE_SPACING_S: f64 = 4.0;

@@ -9,15 +9,10 @@ use serde::{Deserialize, Serialize};
 
 use self::repeats::{Copies, require_distinct};
 use crate::{
-    config::DatumChoice,
-    files::HashedFile,
-    stage::{InOrder, Input, Inputs, Stage},
-    stage_inputs,
-};
-use crate::{
-    config::{PedrConfig, ShotFilter, WindowConfig},
+    altimetry::{DatumChoice, ShotFilter},
+    config::{PedrConfig, WindowConfig},
     error::{Fault, Kind, Place, Result, Stopped},
-    files::file_name,
+    files::{HashedFile, file_name},
     footprints::{AsRead, Footprint, Footprints, SourceFile},
     frames::{MarsDatum, MarsIau2000},
     geom::{
@@ -26,6 +21,8 @@ use crate::{
         window::Region,
     },
     pds::pedr::{Complaint, FieldGuard, File, FileName, Frame, Reason, SHOTS, decide_datum},
+    stage::{InOrder, Input, Inputs, Stage},
+    stage_inputs,
     time::Et,
     units::RADIANS_PER_DEGREE,
 };

@@ -1,17 +1,21 @@
 //! Image labels become line times: spacecraft clock or UTC to ET, line period, header and delivered lines.
 
+use std::sync::atomic::AtomicBool;
+
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    config::{IMAGE_DURATION_END_S, IMAGE_LINES_MIN, ImageConfig, ImageFields, line_period_agrees},
+    config::ImageConfig,
     error::{Failure, Fault, Kind, Place, Result},
+    files::HashedFile,
+    image::{IMAGE_DURATION_END_S, IMAGE_LINES_MIN, ImageFields, line_period_agrees},
     pds::moc,
-    spice::Session,
+    spice::{KernelView, Session},
+    stage::Stage,
+    stage_inputs,
     time::{Et, Interval},
     units::SECONDS_PER_MS,
 };
-use crate::{files::HashedFile, spice::KernelView, stage::Stage, stage_inputs};
-use std::sync::atomic::AtomicBool;
 
 /// A clock string and a UTC string farther apart than this contradict each other, seconds.
 ///

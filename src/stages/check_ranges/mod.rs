@@ -16,26 +16,22 @@ use std::sync::atomic::AtomicBool;
 
 use serde::{Deserialize, Serialize};
 
-pub use residuals::{ShotResiduals, range_residual_m};
-pub use scan::BiasScan;
-
-use super::convert_datum::Converted;
-use super::group_profiles::Profile;
+use super::{convert_datum::Converted, group_profiles::Profile};
 use crate::{
-    config::{MolaClock, RangeCheckConfig},
+    altimetry::MolaClock,
+    config::RangeCheckConfig,
     error::{Fault, Kind, Result, Stopped},
     footprints::Footprints,
     frames::MarsIau2000,
     geom::statistics::{Summary, Trend, outliers},
-    spice::Trajectory,
-    time::Et,
-};
-use crate::{
-    spice::{KernelView, Session},
+    spice::{KernelView, Session, Trajectory},
     stage::{Output, Stage},
     stage_inputs,
-    time::Intervals,
+    time::{Et, Intervals},
 };
+
+pub use residuals::{ShotResiduals, range_residual_m};
+pub use scan::BiasScan;
 
 /// Residuals of every shot, and what they say about every profile.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

@@ -6,33 +6,31 @@
 
 mod statistics;
 
-use std::collections::BTreeSet;
+use std::{collections::BTreeSet, sync::atomic::AtomicBool};
 
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
-
-pub use statistics::{ImageResiduals, Residuals2};
 
 use super::{
     read_ties::Ties,
     site_image::{SiteImage, oriented_images},
 };
 use crate::{
-    config::CameraModel,
-    stage::{InOrder, Output, Round, Stage},
-    stage_inputs,
-};
-use crate::{
-    config::{IntersectionConfig, Weighting},
+    config::IntersectionConfig,
     error::{Fault, Kind, Result},
     geom::{
-        intersection::{Intersection, IntersectionLimits, Sight, Unintersected, intersect},
-        pushbroom::{ExteriorOrientation, Projector, Unseen},
+        intersection::{
+            Intersection, IntersectionLimits, Sight, Unintersected, Weighting, intersect,
+        },
+        pushbroom::{CameraModel, ExteriorOrientation, Projector, Unseen},
         stereo::StereoImage,
     },
+    stage::{InOrder, Output, Round, Stage},
+    stage_inputs,
     ties::{TiePoint, image_indices},
 };
-use std::sync::atomic::AtomicBool;
+
+pub use statistics::{ImageResiduals, Residuals2};
 
 /// How to intersect.
 #[derive(Debug, Clone, Copy, PartialEq)]

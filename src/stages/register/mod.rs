@@ -13,29 +13,26 @@ use nalgebra::Vector3;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-pub use methods::{Method, MethodRun};
-pub use points::{PointOnImage, ProfileOnImage, RegisteredPoints};
-
-use super::convert_datum::Converted;
 use super::{
-    fit_sensor_model::SensorModel, group_profiles::Profile, oriented::OrientedImage,
-    sample_orientation::Orientation, tag_times::ImageTimes,
+    convert_datum::Converted, fit_sensor_model::SensorModel, group_profiles::Profile,
+    oriented::OrientedImage, sample_orientation::Orientation, tag_times::ImageTimes,
 };
 use crate::{
-    config::{CameraModel, RegistrationConfig},
+    config::RegistrationConfig,
     error::{Result, Stopped},
     footprints::Footprints,
     frames::MarsIau2000,
     geom::{
         ellipsoid::spherical_to_xyz_m,
-        pushbroom::{ExteriorOrientation, Projector, Unseen},
+        pushbroom::{CameraModel, ExteriorOrientation, Projector, Unseen},
         statistics::Summary,
     },
-};
-use crate::{
     stage::{Output, Round, Stage},
     stage_inputs,
 };
+
+pub use methods::{Method, MethodRun};
+pub use points::{PointOnImage, ProfileOnImage, RegisteredPoints};
 
 /// Points between two looks at whether the user stops the program.
 const POINTS_AT_ONCE: usize = 65_536;
