@@ -9,7 +9,7 @@ use super::{load_sites, output};
 use crate::{
     config::SiteConfig,
     error::Failure,
-    flow::{PUBLISH, plan_site},
+    flow::{PUBLISH, StageReason, plan_site},
 };
 
 /// Says which stages would run, and why.
@@ -48,16 +48,7 @@ pub(super) fn print(
     for site in sites {
         let stages = plan_site(site, out, until, force)?;
         if as_json {
-            let stages: Vec<_> = stages
-                .iter()
-                .map(|planned| {
-                    json!({
-                        "stage": planned.stage,
-                        "runs": planned.reason.runs(),
-                        "because": planned.reason.to_string(),
-                    })
-                })
-                .collect();
+            let stages: Vec<_> = stages.iter().map(stage_json).collect();
             answers.push(json!({ "site": site.site, "stages": stages }));
             continue;
         }
@@ -78,4 +69,13 @@ pub(super) fn print(
         output::json(&answers.into());
     }
     Ok(())
+}
+
+/// A stage with its reason, as plans and runs answer.
+pub(super) fn stage_json(stage: &StageReason) -> serde_json::Value {
+    json!({
+        "stage": stage.stage,
+        "runs": stage.reason.runs(),
+        "because": stage.reason.to_string(),
+    })
 }

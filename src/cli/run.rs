@@ -253,6 +253,7 @@ fn outcome_json(outcome: &Outcome) -> serde_json::Value {
         Ok(SiteOutcome {
             site,
             folder,
+            stages,
             ending,
         }) => {
             let ending = match ending {
@@ -260,7 +261,8 @@ fn outcome_json(outcome: &Outcome) -> serde_json::Value {
                 Ending::Unchanged(manifest) => products(false, manifest),
                 Ending::StoppedAfter(stage) => json!({ "stopped_after": stage }),
             };
-            json!({ "site": site, "folder": folder, "ending": ending })
+            let stages: Vec<_> = stages.iter().map(plan::stage_json).collect();
+            json!({ "site": site, "folder": folder, "stages": stages, "ending": ending })
         }
     }
 }

@@ -8,7 +8,7 @@ use crate::{
     error::{Failure, Place, Result, Stopped},
     files::{HashedFile, InputFiles},
     spice::Wanted,
-    stage::{Output, Provenance, Stage},
+    stage::{Output, Provenance, Reason, Stage},
     stages::{group_profiles::Profile, tag_times::ImageTimes},
 };
 
@@ -29,6 +29,15 @@ impl From<Failure> for Leave {
 
 /// What a step of the flow gives, unless the flow ends there.
 pub(super) type Flow<T> = std::result::Result<T, Leave>;
+
+/// A stage with the reason why it runs, or [`Reason::Unchanged`].
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct StageReason {
+    /// Label of the stage, for example `register/E02-00665`.
+    pub stage: String,
+    /// Why it runs, or that it does not.
+    pub reason: Reason,
+}
 
 /// Stages that the flow has passed, with the origin of their outputs where these are known.
 pub(super) type Ledger = Vec<(String, Option<Provenance>)>;

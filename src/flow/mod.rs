@@ -22,7 +22,8 @@ pub use choice::{ChooseKernels, KernelChoice, RivalKernelSets, rival_sets, wante
 pub use compare::{
     Compared, EPOCHS_MAX, LeftOut, Request, RivalSet, compare_kernels, require_different,
 };
-pub use plan::{PlannedStage, plan_site};
+pub use driver::StageReason;
+pub use plan::plan_site;
 pub use run::{Ending, RunOptions, SiteOutcome, run_site};
 pub use sites::publish_sites;
 

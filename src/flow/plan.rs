@@ -7,7 +7,7 @@ use std::{
 
 use super::{
     PUBLISH,
-    driver::{Bounds, Driver, Flow, Leave, Ledger},
+    driver::{Bounds, Driver, Flow, Leave, Ledger, StageReason},
     publish::{inputs, standing},
     site::{Site, site},
 };
@@ -18,15 +18,6 @@ use crate::{
     stage::{Output, Reason, Stage},
     store::{cache::StageCache, publish::CACHE},
 };
-
-/// A stage with the reason why it would run, or [`Reason::Unchanged`].
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct PlannedStage {
-    /// Label of the stage, for example `register/E02-00665`.
-    pub stage: String,
-    /// Why it would run, or that it would not.
-    pub reason: Reason,
-}
 
 /// Says what [`run_site`](super::run_site) would do.
 ///
@@ -40,7 +31,7 @@ pub fn plan_site(
     out: &Path,
     until: &str,
     force: bool,
-) -> Result<Vec<PlannedStage>> {
+) -> Result<Vec<StageReason>> {
     let folder = out.join(&config.site);
     let mut plan = Plan {
         cache: StageCache::new(&folder.join(CACHE), force),
@@ -63,7 +54,7 @@ struct Plan<'a> {
     cache: StageCache,
     folder: PathBuf,
     bounds: Bounds<'a>,
-    planned: Vec<PlannedStage>,
+    planned: Vec<StageReason>,
     ledger: Ledger,
 }
 
@@ -89,7 +80,7 @@ impl Driver for Plan<'_> {
         };
         let provenance = output.provenance().cloned();
         self.ledger.push((label.clone(), provenance));
-        self.planned.push(PlannedStage {
+        self.planned.push(StageReason {
             stage: label,
             reason,
         });
@@ -100,7 +91,7 @@ impl Driver for Plan<'_> {
         self.enter(PUBLISH)?;
         let inputs = inputs(config, site, &self.folder, &self.ledger);
         let standing = standing(&self.folder, &self.cache, &inputs);
-        self.planned.push(PlannedStage {
+        self.planned.push(StageReason {
             stage: PUBLISH.to_owned(),
             reason: standing.err().unwrap_or(Reason::Unchanged),
         });

@@ -4,7 +4,7 @@ use std::{path::PathBuf, sync::atomic::AtomicBool};
 
 use super::{
     PUBLISH,
-    driver::{Bounds, Driver, Flow, Leave, Ledger},
+    driver::{Bounds, Driver, Flow, Leave, Ledger, StageReason},
     publish::{inputs, publish, standing},
     site::{Site, site},
 };
@@ -41,6 +41,8 @@ pub struct SiteOutcome {
     pub site: String,
     /// Folder of the products.
     pub folder: PathBuf,
+    /// Every stage that the run passed, with the reason why it ran, or that it was kept.
+    pub stages: Vec<StageReason>,
     /// How the run ended.
     pub ending: Ending,
 }
@@ -76,7 +78,7 @@ pub fn run_site(config: &SiteConfig, options: &RunOptions<'_>) -> Result<SiteOut
             files: InputFiles::default(),
         },
         ledger: Ledger::new(),
-        fresh: Vec::new(),
+        passed: Vec::new(),
         ending: Ending::StoppedAfter(options.until.to_owned()),
     };
     let driven = match site(&mut run, config) {
@@ -96,6 +98,7 @@ pub fn run_site(config: &SiteConfig, options: &RunOptions<'_>) -> Result<SiteOut
     Ok(SiteOutcome {
         site: config.site.clone(),
         folder: run.folder,
+        stages: run.passed,
         ending: run.ending,
     })
 }
@@ -105,19 +108,29 @@ struct Run<'a> {
     folder: PathBuf,
     bounds: Bounds<'a>,
     ledger: Ledger,
-    /// Labels of the stages that ran.
-    fresh: Vec<String>,
+    /// Every stage so far.
+    passed: Vec<StageReason>,
     ending: Ending,
 }
 
 impl Run<'_> {
+    /// Notes and tells why a stage runs, or that it is kept.
+    fn pass(&mut self, label: &str, reason: Reason) {
+        let word = if reason.runs() { "running" } else { "kept" };
+        tracing::info!(stage = label, "{word}: {reason}");
+        self.passed.push(StageReason {
+            stage: label.to_owned(),
+            reason,
+        });
+    }
+
     /// Makes sure that all stages have read the same files. Otherwise their outputs would stand under the hashes
     /// of other ones: those that were made just now are forgotten.
     fn verify_inputs(&self) -> Result<()> {
         let unchanged = self.bounds.files.verify_all();
         if unchanged.is_err() {
-            for label in &self.fresh {
-                self.cache.forget(label);
+            for fresh in self.passed.iter().filter(|of| of.reason.runs()) {
+                self.cache.forget(&fresh.stage);
             }
         }
         unchanged
@@ -142,16 +155,15 @@ impl Driver for Run<'_> {
         let (label, inputs) = (stage.label(), stage.inputs());
         let output = match self.cache.load(&label, &inputs) {
             Ok(output) => {
-                tracing::info!(stage = label, "kept: {}", Reason::Unchanged);
+                self.pass(&label, Reason::Unchanged);
                 output
             }
             Err(reason) => {
-                tracing::info!(stage = label, "running: {reason}");
+                self.pass(&label, reason);
                 let value = stage.run(self.bounds.stop).in_stage(&label)?;
                 for path in inputs.file_paths() {
                     self.bounds.files.verify(path).in_stage(&label)?;
                 }
-                self.fresh.push(label.clone());
                 self.cache.store(&label, inputs, value).in_stage(&label)?
             }
         };
@@ -165,11 +177,11 @@ impl Driver for Run<'_> {
         let inputs = inputs(config, site, &self.folder, &self.ledger);
         self.ending = match standing(&self.folder, &self.cache, &inputs) {
             Ok(manifest) => {
-                tracing::info!(stage = PUBLISH, "kept: {}", Reason::Unchanged);
+                self.pass(PUBLISH, Reason::Unchanged);
                 Ending::Unchanged(manifest)
             }
             Err(reason) => {
-                tracing::info!(stage = PUBLISH, "running: {reason}");
+                self.pass(PUBLISH, reason);
                 self.verify_inputs().in_stage(PUBLISH)?;
                 let manifest = publish(config, site, &self.folder, &self.ledger, &inputs);
                 let manifest = manifest.in_stage(PUBLISH)?;
