@@ -72,7 +72,7 @@ pub fn check_out(out: &Path, sites: &[SiteConfig]) -> Result<()> {
     if text.contains(char::is_control) {
         return Err(unspeakable("holds control characters").into());
     }
-    for part in out.iter() {
+    for part in out {
         if part.len() > PART_LENGTH_MAX {
             let part = part.to_string_lossy().into_owned();
             let bytes = part.len();

@@ -8,9 +8,8 @@ use super::{
     section::Section,
 };
 use crate::{
-    config::BAARDA_LIMIT,
     error::Result,
-    geom::statistics::Summary,
+    geom::statistics::{BAARDA_LIMIT, Summary},
     products::{GeometricProducts, SiteProducts},
     stages::adjust::{Adjusted, AdjustmentSummary, GroundSummary, ObservationType},
 };

@@ -5,7 +5,7 @@ use super::{
     section::Section,
 };
 use crate::{
-    config::{BiasScope, DatumChoice, TagSign},
+    altimetry::{BiasScope, DatumChoice, TagSign},
     products::SiteProducts,
 };
 

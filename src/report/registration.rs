@@ -6,8 +6,8 @@ use super::{
     section::Section,
 };
 use crate::{
-    config::CameraModel,
     error::Result,
+    geom::pushbroom::CameraModel,
     products::{ImageProducts, SiteProducts},
     stages::{
         group_profiles::Profile,

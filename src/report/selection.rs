@@ -5,8 +5,7 @@ use super::{
     section::Section,
 };
 use crate::{
-    config::{WindowConfig, WindowShape},
-    products::SiteProducts,
+    config::WindowConfig, geom::window::WindowShape, products::SiteProducts,
     units::RADIANS_PER_DEGREE,
 };
 

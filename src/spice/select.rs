@@ -15,10 +15,10 @@ use super::{
     text_kernel::{self, Assignment, values_of},
 };
 use crate::{
-    config::{CkQuality, KernelSelection},
     constants::{MARS_IAU2000, NAIF_MGS, NAIF_MGS_BUS},
     error::{Failure, IoFault, Kind, Place, Result},
     files::file_name,
+    kernel_source::{CkQuality, KernelSelection},
     time::Intervals,
 };
 
