@@ -56,7 +56,8 @@ impl Walk {
 
     /// Runs into a folder; the stages with their reasons.
     fn run(&self, out: &str, until: &str) -> Result<(Vec<StageReason>, Ending), String> {
-        let config = config::load(&self.case.path("site.toml")).map_err(|failure| failure.to_string())?;
+        let config =
+            config::load(&self.case.path("site.toml")).map_err(|failure| failure.to_string())?;
         let options = RunOptions {
             out: self.case.path(out),
             until,
@@ -84,7 +85,9 @@ impl Walk {
             (Ok((ran, ending)), Ok(_)) => {
                 agree(what, &planned.unwrap(), ran);
                 match ending {
-                    Ending::StoppedAfter(_) => assert_same(what, &before, &products(&self.case.path("out"))),
+                    Ending::StoppedAfter(_) => {
+                        assert_same(what, &before, &products(&self.case.path("out")))
+                    }
                     _ => assert_same(
                         what,
                         &products(&self.case.path("out")),
@@ -108,13 +111,17 @@ impl Walk {
 /// A stage that a plan keeps is kept, one that it runs for a reason of its own runs for that reason, and one
 /// whose inputs may change does either.
 fn agree(what: &str, planned: &[StageReason], ran: &[StageReason]) {
-    let names = |of: &[StageReason]| -> Vec<String> { of.iter().map(|one| one.stage.clone()).collect() };
+    let names =
+        |of: &[StageReason]| -> Vec<String> { of.iter().map(|one| one.stage.clone()).collect() };
     assert_eq!(names(planned), names(ran), "{what}");
     for (planned, ran) in planned.iter().zip(ran) {
         let may_change = |reason: &Reason| reason.to_string().contains("may change");
         let open = may_change(&planned.reason);
         assert!(!may_change(&ran.reason), "{what}: {ran:?}");
-        assert!(open || planned.reason == ran.reason, "{what}: {planned:?}, {ran:?}");
+        assert!(
+            open || planned.reason == ran.reason,
+            "{what}: {planned:?}, {ran:?}"
+        );
     }
 }
 
@@ -131,8 +138,16 @@ fn products(out: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
 }
 
 fn assert_same(what: &str, one: &BTreeMap<PathBuf, Vec<u8>>, other: &BTreeMap<PathBuf, Vec<u8>>) {
-    assert!(one.keys().eq(other.keys()), "{what}: {:?}, {:?}", one.keys(), other.keys());
-    let differing: Vec<_> = one.keys().filter(|path| one[*path] != other[*path]).collect();
+    assert!(
+        one.keys().eq(other.keys()),
+        "{what}: {:?}, {:?}",
+        one.keys(),
+        other.keys()
+    );
+    let differing: Vec<_> = one
+        .keys()
+        .filter(|path| one[*path] != other[*path])
+        .collect();
     assert!(differing.is_empty(), "{what}: {differing:?}");
 }
 
@@ -142,7 +157,9 @@ fn table_of<'a>(site: &'a mut Table, path: &str) -> Option<(&'a mut Table, Strin
     let key = names.pop()?.to_owned();
     let mut table = site;
     for name in names {
-        let entry = table.entry(name).or_insert_with(|| Value::Table(Table::new()));
+        let entry = table
+            .entry(name)
+            .or_insert_with(|| Value::Table(Table::new()));
         table = match entry {
             Value::Array(entries) => entries.first_mut()?.as_table_mut()?,
             entry => entry.as_table_mut()?,
@@ -155,7 +172,8 @@ fn table_of<'a>(site: &'a mut Table, path: &str) -> Option<(&'a mut Table, Strin
 fn others(kind: &ValueKind, now: Option<&Value>) -> Vec<Value> {
     let candidates: Vec<Value> = match kind {
         ValueKind::Number(accept) => {
-            let number = |value: &Value| value.as_float().or(value.as_integer().map(|of| of as f64));
+            let number =
+                |value: &Value| value.as_float().or(value.as_integer().map(|of| of as f64));
             let now = now.and_then(number).unwrap_or(1.0);
             [0.9 * now, 1.1 * now, now + 0.001, 0.5, 1.0]
                 .into_iter()
@@ -187,7 +205,10 @@ fn others(kind: &ValueKind, now: Option<&Value>) -> Vec<Value> {
         }
         _ => Vec::new(),
     };
-    candidates.into_iter().filter(|value| Some(value) != now).collect()
+    candidates
+        .into_iter()
+        .filter(|value| Some(value) != now)
+        .collect()
 }
 
 /// The site with another value of `key`, in every way that its declaration allows.
@@ -196,7 +217,10 @@ fn changed(site: &Table, key: &DeclaredKey) -> Vec<Table> {
     let Some((table, name)) = table_of(&mut with_table, &key.path) else {
         return Vec::new();
     };
-    let default = key.default.as_ref().map(|value| Value::try_from(value).unwrap());
+    let default = key
+        .default
+        .as_ref()
+        .map(|value| Value::try_from(value).unwrap());
     let now = table.get(&name).cloned().or(default);
     let set = |value: Value| {
         let mut site = site.clone();
@@ -204,7 +228,10 @@ fn changed(site: &Table, key: &DeclaredKey) -> Vec<Table> {
         table.insert(name, value);
         site
     };
-    others(&key.kind, now.as_ref()).into_iter().map(set).collect()
+    others(&key.kind, now.as_ref())
+        .into_iter()
+        .map(set)
+        .collect()
 }
 
 #[test]
@@ -237,7 +264,10 @@ struct Dice(u64);
 
 impl Dice {
     fn below(&mut self, end: usize) -> usize {
-        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        self.0 = self
+            .0
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
         ((self.0 >> 33) as usize) % end
     }
 }
@@ -253,7 +283,11 @@ fn change_file(case: &Case, dice: &mut Dice) -> &'static str {
         }
         1 => {
             let ties = String::from_utf8(case.read("ties/isidis.csv")).unwrap();
-            let ties = if ties.contains("\r\n") { ties.replace("\r\n", "\n") } else { ties.replace('\n', "\r\n") };
+            let ties = if ties.contains("\r\n") {
+                ties.replace("\r\n", "\n")
+            } else {
+                ties.replace('\n', "\r\n")
+            };
             case.write("ties/isidis.csv", ties);
             "line ends of the tie points"
         }
@@ -336,9 +370,16 @@ fn over_a_random_walk_of_changes_a_run_gives_what_a_clean_run_gives() {
             4..=7 => change_file(&walk.case, &mut dice).to_owned(),
             _ => change_order(&mut site, &walk.site, &mut dice).to_owned(),
         };
-        let until = if dice.below(8) == 0 { STAGES[dice.below(STAGES.len())] } else { PUBLISH };
+        let until = if dice.below(8) == 0 {
+            STAGES[dice.below(STAGES.len())]
+        } else {
+            PUBLISH
+        };
         walk.write(&site);
-        if walk.compare(&format!("step {step}: {what}, until {until}"), until).is_some() {
+        if walk
+            .compare(&format!("step {step}: {what}, until {until}"), until)
+            .is_some()
+        {
             failures += 1;
             site = earlier;
         }

@@ -9,7 +9,7 @@ use super::{load_sites, output};
 use crate::{
     config::SiteConfig,
     error::Failure,
-    flow::{PUBLISH, StageReason, plan_site},
+    flow::{PUBLISH, StageReason, check_out, plan_site},
 };
 
 /// Says which stages would run, and why.
@@ -27,13 +27,9 @@ pub(super) struct Arguments {
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
-    print(
-        &load_sites(&arguments.sites)?,
-        &arguments.out,
-        PUBLISH,
-        false,
-        arguments.json,
-    )
+    let sites = load_sites(&arguments.sites)?;
+    check_out(&arguments.out, &sites)?;
+    print(&sites, &arguments.out, PUBLISH, false, arguments.json)
 }
 
 /// Prints the plan of every site.

@@ -17,8 +17,8 @@ use super::{load_sites, output, plan, report};
 use crate::{
     config::SiteConfig,
     error::{Failure, Kind},
-    flow::{Ending, PUBLISH, RunOptions, STAGES, SiteOutcome, publish_sites, run_site},
-    store::manifest::Manifest,
+    flow::{Ending, PUBLISH, RunOptions, STAGES, SiteOutcome, check_out, publish_sites, run_site},
+    store::{manifest::Manifest, publish::read_manifest},
 };
 
 /// Runs sites from kernels to validated products in `<out>/<site>`.
@@ -67,6 +67,9 @@ pub(super) fn run(arguments: &Arguments) -> ExitCode {
         Ok(sites) => sites,
         Err(failure) => return report(&failure),
     };
+    if let Err(failure) = check_out(&arguments.out, &sites) {
+        return report(&failure);
+    }
     if arguments.dry_run {
         return super::finish(plan::print(
             &sites,
@@ -218,7 +221,14 @@ fn print_outcome(outcome: &SiteOutcome) {
     let (site, folder) = (&outcome.site, outcome.folder.display());
     let (what, manifest) = match &outcome.ending {
         Ending::StoppedAfter(stage) => {
-            return output::line(format_args!("{site}: stopped after {stage}, no products"));
+            let products = read_manifest(&outcome.folder).map_or_else(
+                || ", no products".to_owned(),
+                |earlier| {
+                    let utc = earlier.finished_utc;
+                    format!("; the products of {utc} in {folder} stay as they are")
+                },
+            );
+            return output::line(format_args!("{site}: stopped after {stage}{products}"));
         }
         Ending::Published(manifest) => ("products", manifest),
         Ending::Unchanged(manifest) => ("nothing changed; products stand", manifest),
@@ -259,7 +269,10 @@ fn outcome_json(outcome: &Outcome) -> serde_json::Value {
             let ending = match ending {
                 Ending::Published(manifest) => products(true, manifest),
                 Ending::Unchanged(manifest) => products(false, manifest),
-                Ending::StoppedAfter(stage) => json!({ "stopped_after": stage }),
+                Ending::StoppedAfter(stage) => json!({
+                    "stopped_after": stage,
+                    "earlier_products_utc": read_manifest(folder).map(|earlier| earlier.finished_utc),
+                }),
             };
             let stages: Vec<_> = stages.iter().map(plan::stage_json).collect();
             json!({ "site": site, "folder": folder, "stages": stages, "ending": ending })

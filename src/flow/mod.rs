@@ -11,6 +11,7 @@ mod driver;
 mod evidence;
 mod kernels;
 mod manifest;
+mod out;
 mod plan;
 mod publish;
 mod run;
@@ -23,6 +24,7 @@ pub use compare::{
     Compared, EPOCHS_MAX, LeftOut, Request, RivalSet, compare_kernels, require_different,
 };
 pub use driver::StageReason;
+pub use out::{OutFault, check_out};
 pub use plan::plan_site;
 pub use run::{Ending, RunOptions, SiteOutcome, run_site};
 pub use sites::publish_sites;

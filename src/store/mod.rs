@@ -5,5 +5,6 @@ pub mod atomic;
 pub mod cache;
 pub mod lock;
 pub mod manifest;
+pub mod page;
 pub mod publish;
 pub mod published;
