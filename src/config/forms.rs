@@ -315,7 +315,7 @@ where
         };
         let mut values: Vec<F::Value> = Vec::with_capacity(entries.len());
         let mut seen = BTreeSet::new();
-        for entry in entries.iter() {
+        for entry in entries {
             let entry = Found {
                 key: found.key.clone(),
                 value: entry,

@@ -107,7 +107,7 @@ impl Form for Globs {
             return None;
         };
         let mut by_identity: BTreeMap<PathBuf, PathBuf> = BTreeMap::new();
-        for written in globs.iter() {
+        for written in globs {
             let matched = match written.get_ref().as_str() {
                 Some(glob) => matches(&review.resolve(""), glob),
                 None => Err(ValueKind::Glob.to_string()),

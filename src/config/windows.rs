@@ -1,6 +1,6 @@
 //! `[[windows]]`: boxes and GeoJSON outlines on the ground.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 use serde_json::json;
@@ -87,7 +87,7 @@ fn shape(written: ShapeKeys, keys: &mut Keys<'_, '_>) -> WindowShape {
         return nowhere();
     }
     let bounds = bounds(written.longitude_deg, written.latitude_deg, keys);
-    let outline = written.polygon.and_then(|path| outline(path, keys));
+    let outline = written.polygon.and_then(|path| outline(&path, keys));
     bounds.or(outline).unwrap_or_else(nowhere)
 }
 
@@ -98,11 +98,11 @@ const fn nowhere() -> WindowShape {
     }
 }
 
-fn outline(path: PathBuf, keys: &mut Keys<'_, '_>) -> Option<WindowShape> {
+fn outline(path: &Path, keys: &mut Keys<'_, '_>) -> Option<WindowShape> {
     if !path.is_file() {
         return None;
     }
-    match geojson::read(&path) {
+    match geojson::read(path) {
         Ok(polygons) => Some(WindowShape::Polygons { polygons }),
         Err(fault) => {
             let expected = format!("GeoJSON polygons; {}: {fault}", path.display());
