@@ -83,9 +83,11 @@
 //! ```
 
 mod check;
-mod eliminate;
+
 mod layout;
+mod point_rows;
 mod quality;
+mod reduce;
 mod rows;
 mod solve;
 mod unknowns;
