@@ -284,7 +284,7 @@ fn declarations_are_complete() {
     let keys = config::keys();
     let paths: BTreeSet<&str> = keys.iter().map(|key| &*key.path).collect();
     assert_eq!(paths.len(), keys.len(), "a key is declared twice");
-    assert!(keys.len() > 80, "{} keys", keys.len());
+    assert!(keys.len() > 70, "{} keys", keys.len());
     // Shares, ratios and normalised residuals.
     let without_unit = [
         "range_check.outlier_sigma",

@@ -72,14 +72,6 @@ declare_table! {
     }
 }
 
-impl Default for AdjustmentConfig {
-    /// The standard deviations of Yoon & Shan 2004, one MOLA spacing for footprints in images, and Baarda's
-    /// test with one good observation in a thousand beyond it.
-    fn default() -> Self {
-        Keys::default_of()
-    }
-}
-
 declare_table! {
     /// Robust estimation.
     struct RobustKeys {

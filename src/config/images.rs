@@ -12,7 +12,7 @@ use crate::{
 use super::{
     declare::{Declare, Keys, Many, declare_table, group, key},
     forms::{Whole, above_to, identifier, matching, text, whole_from_to},
-    paths::File,
+    paths::FILE,
 };
 
 /// Longest exposure or line period, milliseconds: a hundred times those of the camera.
@@ -42,7 +42,7 @@ declare_table! {
             .example(r#""E02-02855""#)
             .example_in(1, r#""M04-02852""#),
         /// PDS3 or ISIS label, attached or detached.
-        label: Option<PathBuf> = key(File).example(r#""../labels/e0202855.lbl""#),
+        label: Option<PathBuf> = key(FILE).example(r#""../labels/e0202855.lbl""#),
         /// Its name in tie point files and in what is written for ISIS, when that is not the identifier: for a
         /// control network the ISIS serial number. Without it, the identifier.
         serial_number: Option<String> =

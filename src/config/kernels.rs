@@ -9,7 +9,7 @@ use crate::kernel_source::{CkQuality, KernelList, KernelSelection, KernelSource,
 use super::{
     declare::{Declare as _, Keys, Many, declare_table, group, key, tables},
     forms::{from_to, list, list_or_none, lower_case_identifier, matching, words},
-    paths::{File, Folder},
+    paths::{FILE, FOLDER},
 };
 
 /// The ways to name kernels; exactly one of them.
@@ -45,12 +45,12 @@ declare_table! {
     /// The source of the kernel list.
     struct SourceKeys {
         /// A SPICE metakernel; relative paths in it count from its own folder.
-        metakernel: Option<PathBuf> = key(File).example(r#""../kernels/scene.tm""#),
+        metakernel: Option<PathBuf> = key(FILE).example(r#""../kernels/scene.tm""#),
         /// Or kernels in load order, plain paths without wildcards; later ones win.
-        files: Option<Vec<PathBuf>> = key(list(File).each_once("each kernel once"))
+        files: Option<Vec<PathBuf>> = key(list(FILE).each_once("each kernel once"))
             .unused(r#"["../kernels/naif0012.tls", "../kernels/mgs_ext1.bsp"]"#),
         /// Or a folder, searched with its subfolders; then also the three keys that follow.
-        root: Option<PathBuf> = key(Folder).unused(r#""../kernels""#),
+        root: Option<PathBuf> = key(FOLDER).unused(r#""../kernels""#),
         /// Or rival sets, each complete with the same clocks.
         sets: Option<Vec<RivalKernels>> = tables(SETS).then(|sets, keys: &mut Keys<'_, '_>| {
             keys.span_of("sets").is_some().then_some(sets)
@@ -141,9 +141,9 @@ declare_table! {
     /// Kernels of a set.
     struct ListKeys {
         /// A SPICE metakernel, as above.
-        metakernel: Option<PathBuf> = key(File).unused(r#""../kernels/nav.tm""#),
+        metakernel: Option<PathBuf> = key(FILE).unused(r#""../kernels/nav.tm""#),
         /// Or kernels in load order, as above.
-        files: Option<Vec<PathBuf>> = key(list(File).each_once("each kernel once"))
+        files: Option<Vec<PathBuf>> = key(list(FILE).each_once("each kernel once"))
             .unused_in(1, r#"["../kernels/naif0012.tls", "../kernels/mgs_ipng.bsp"]"#),
     }
     check one_list

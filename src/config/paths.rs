@@ -17,60 +17,47 @@ const FILES_MAX: usize = 65_535;
 /// Folders and file name of a glob that may hold wildcards: an archive is `volume/folder/file`.
 const WILD_PARTS_MAX: usize = 3;
 
-/// The path of a file that is there, counted from the configuration's folder.
-pub(super) struct File;
-/// The path of a folder that is there, counted from the configuration's folder.
-pub(super) struct Folder;
-
-impl Form for File {
-    type Value = PathBuf;
-
-    fn kind(&self) -> ValueKind {
-        ValueKind::File
-    }
-
-    fn read(&self, found: &Found<'_>, review: &mut Review<'_>) -> Option<PathBuf> {
-        existing(found, &self.kind(), Path::is_file, review)
-    }
-
-    fn written(&self, value: &PathBuf) -> Value {
-        Value::from(value.to_string_lossy().into_owned())
-    }
-}
-
-impl Form for Folder {
-    type Value = PathBuf;
-
-    fn kind(&self) -> ValueKind {
-        ValueKind::Folder
-    }
-
-    fn read(&self, found: &Found<'_>, review: &mut Review<'_>) -> Option<PathBuf> {
-        existing(found, &self.kind(), Path::is_dir, review)
-    }
-
-    fn written(&self, value: &PathBuf) -> Value {
-        Value::from(value.to_string_lossy().into_owned())
-    }
-}
-
-fn existing(
-    found: &Found<'_>,
-    kind: &ValueKind,
+/// A path that leads somewhere, counted from the configuration's folder.
+pub(super) struct Existing {
+    kind: ValueKind,
     is_there: fn(&Path) -> bool,
-    review: &mut Review<'_>,
-) -> Option<PathBuf> {
-    let Some(written) = found.value.get_ref().as_str() else {
-        found.refuse(review, kind);
-        return None;
-    };
-    let path = review.resolve(written);
-    if written.is_empty() || !is_there(&path) {
-        let expected = format!("{kind}; {} is {}", path.display(), what_is_at(&path));
-        found.refuse(review, expected);
+}
+
+/// The path of a file that is there.
+pub(super) const FILE: Existing = Existing {
+    kind: ValueKind::File,
+    is_there: Path::is_file,
+};
+/// The path of a folder that is there.
+pub(super) const FOLDER: Existing = Existing {
+    kind: ValueKind::Folder,
+    is_there: Path::is_dir,
+};
+
+impl Form for Existing {
+    type Value = PathBuf;
+
+    fn kind(&self) -> ValueKind {
+        self.kind.clone()
     }
-    // Also a path that is not there: a second one like it is told as well.
-    Some(path)
+
+    fn read(&self, found: &Found<'_>, review: &mut Review<'_>) -> Option<PathBuf> {
+        let Some(written) = found.value.get_ref().as_str() else {
+            found.refuse(review, &self.kind);
+            return None;
+        };
+        let path = review.resolve(written);
+        if written.is_empty() || !(self.is_there)(&path) {
+            let (kind, shown) = (&self.kind, path.display());
+            found.refuse(review, format!("{kind}; {shown} is {}", what_is_at(&path)));
+        }
+        // Also a path that leads nowhere: a second one like it is told as well.
+        Some(path)
+    }
+
+    fn written(&self, value: &PathBuf) -> Value {
+        Value::from(value.to_string_lossy().into_owned())
+    }
 }
 
 /// What a path leads to, for messages.
@@ -138,7 +125,7 @@ impl Form for Globs {
     }
 
     fn written(&self, value: &Vec<PathBuf>) -> Value {
-        let paths = value.iter().map(|path| File.written(path));
+        let paths = value.iter().map(|path| FILE.written(path));
         Value::Array(paths.collect())
     }
 }

@@ -13,7 +13,7 @@ use super::{
 
 declare_table! {
     /// Tie points between the images. Without this table nothing is intersected or adjusted.
-    pub struct TiesConfig: Default {
+    pub struct TiesConfig {
         /// Paths or globs as in `[pedr]`: tables (.csv) with the columns `point_id`, `serial_number`, `sample`,
         /// `line`, one row a measurement, or ISIS control networks in PVL (a binary one: cnetbin2pvl). Lines and
         /// samples count as in ISIS, the middle of the first pixel is 1. `serial_number` is an image's
@@ -32,12 +32,6 @@ declare_table! {
         /// Smallest angle between the two rays of a point that differ most.
         convergence_min_rad as "convergence_min_deg": f64 =
             key(above_to(0.0, 90.0)).or(0.5).map(|degrees| degrees * RADIANS_PER_DEGREE),
-    }
-}
-
-impl Default for IntersectionConfig {
-    fn default() -> Self {
-        Keys::default_of()
     }
 }
 

@@ -11,7 +11,7 @@ use super::{
     declare::{Declare as _, Keys, Many, declare_table, group, key},
     forms::{from_to, identifier, several},
     geojson,
-    paths::File,
+    paths::FILE,
 };
 
 /// Bits of the column `Footprints::windows`.
@@ -62,7 +62,7 @@ declare_table! {
         latitude_deg: Option<[f64; 2]> =
             key(several(from_to(-90.0, 90.0), "two numbers [south, north]")).example("[-14.0, -12.9]"),
         /// GeoJSON file.
-        polygon: Option<PathBuf> = key(File).example_in(1, r#""outline.geojson""#),
+        polygon: Option<PathBuf> = key(FILE).example_in(1, r#""outline.geojson""#),
     }
 }
 

@@ -1,5 +1,15 @@
 //! A key is declared once, where its table is: documentation, form, unit, range, default and example.
 //!
+//! ```text
+//! declare_table! {
+//!     /// Limits that make a profile valid or invalid.
+//!     pub struct RangeCheckConfig {
+//!         /// Fewest shots. The default is one PEDR frame.
+//!         shots_min: u32 = key(whole_from_to(2, 1_000_000)).or(20),
+//!     }
+//! }
+//! ```
+//!
 //! From the declaration follow the field of the valid configuration, the reading of a file with its
 //! messages, `config/sites/example.toml`, `config/schema/site.schema.json` and [`keys`](super::keys).
 //! Reading and describing are the same text: [`Table::read`] declares key after key to [`Keys`], which
@@ -132,6 +142,13 @@ macro_rules! declare_table {
         $(#[doc = $about])+
         #[derive(Debug, Clone, PartialEq, serde::Serialize $(, $($derive),+)?)]
         $vis struct $name { $($(#[doc = $doc])+ $vis $field: $type,)+ }
+
+        impl Default for $name {
+            /// Every key as where the file leaves it out; what has no default is empty.
+            fn default() -> Self {
+                $crate::config::declare::Keys::default_of()
+            }
+        }
 
         $crate::config::declare::declare_table! {
             $(#[doc = $about])+

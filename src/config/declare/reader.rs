@@ -53,13 +53,8 @@ impl<'a, 'r> Keys<'a, 'r> {
     /// The keys of a file.
     pub(in crate::config) fn of_file(table: &'a DeTable<'a>, review: &'a mut Review<'r>) -> Self {
         Self {
-            path: String::new(),
             table: Some(table),
-            span: None,
-            declared: Vec::new(),
-            former: Vec::new(),
-            description: None,
-            review,
+            ..Self::absent(review)
         }
     }
 
