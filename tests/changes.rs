@@ -31,9 +31,6 @@ struct Walk {
     begun: u32,
 }
 
-/// What a run left, or why it failed.
-type Left = Result<BTreeMap<PathBuf, Vec<u8>>, String>;
-
 impl Walk {
     fn new() -> Self {
         let case = Case::pair();
