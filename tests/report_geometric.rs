@@ -13,11 +13,11 @@ mod page;
 mod site;
 
 use areograph::{
+    geom::uncertainty::GroundPart,
     report,
     stages::{
         adjust::{LeftOut, LeftOutReason, PointKind},
         compare_pairs::PairComparison,
-        uncertainty::GroundPart,
     },
     units::RADIANS_PER_ARCSECOND,
 };

@@ -10,12 +10,15 @@ use crate::{
         AdjustmentConfig, CameraModel, IntersectionConfig, MolaImage, OrientationPrior, Robust,
     },
     error::Result,
-    geom::{bundle::ORIENTATION_UNKNOWNS, statistics::Summary},
+    geom::{
+        bundle::ORIENTATION_UNKNOWNS,
+        statistics::Summary,
+        uncertainty::{ResidualMoments, UncertaintyBudget},
+    },
     stages::{
         adjust::{AdjustmentSummary, CorrectedImage, PointKind},
         compare_pairs::{PairComparison, ProfileByTies},
         intersect::{ImageResiduals, IntersectedTies},
-        uncertainty::{ResidualMoments, UncertaintyBudget},
     },
 };
 

@@ -6,8 +6,8 @@ use super::{
     plots::label,
 };
 use crate::{
+    geom::uncertainty::{GroundPart, UncertaintyBudget},
     products::SiteProducts,
-    stages::uncertainty::{GroundPart, UncertaintyBudget},
 };
 
 /// One budget per pair, before and after the adjustment; nothing for a site without pairs.

@@ -10,7 +10,6 @@ use super::{
     group_profiles::Profile,
     intersect::{IntersectedPoint, IntersectedTies, MeasureResidual},
     register::ImageRegistration,
-    uncertainty::{BudgetInput, ResidualMoments, UncertaintyBudget, uncertainty_budget},
 };
 use crate::{
     footprints::Footprints,
@@ -21,6 +20,7 @@ use crate::{
         pushbroom::ExteriorOrientation,
         statistics::Summary,
         stereo::StereoImage,
+        uncertainty::{BudgetInput, ResidualMoments, UncertaintyBudget, uncertainty_budget},
     },
     ties::TiePoint,
 };

@@ -3,7 +3,7 @@
 use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 
-use super::sample_orientation::{InterpolationCheck, Orientation, OrientationSample};
+use super::orientation::{InterpolationCheck, Orientation, OrientationSample};
 use crate::{
     config::OrientationConfig,
     error::{Fault, Kind, Result},

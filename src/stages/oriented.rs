@@ -2,7 +2,7 @@
 
 use super::{
     fit_sensor_model::SensorModel,
-    sample_orientation::{Orientation, OrientationSample},
+    orientation::{Orientation, OrientationSample},
     tag_times::ImageTimes,
 };
 use crate::{

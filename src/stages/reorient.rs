@@ -3,7 +3,7 @@
 use nalgebra::{Matrix3, Vector3};
 
 use super::{
-    sample_orientation::{
+    orientation::{
         Camera, CameraTables, InterpolationCheck, Nodes, Orientation, OrientationSample,
         check_interpolation, outline, samples_at,
     },

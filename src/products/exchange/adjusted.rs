@@ -13,10 +13,7 @@ use crate::{
     error::Result,
     frames::Position,
     products::{GeometricProducts, ImageProducts, SiteProducts, Writer},
-    stages::{
-        adjust::{CorrectedPoint, PointKind},
-        prepare_adjustment::shot_id,
-    },
+    stages::adjust::{CorrectedPoint, PointKind, shot_id},
     ties::{TieMeasure, TiePoint},
     time::Et,
 };

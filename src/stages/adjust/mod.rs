@@ -8,6 +8,7 @@ mod adjusted;
 mod blunders;
 mod fault;
 mod network;
+mod prepare;
 mod summary;
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -20,6 +21,7 @@ pub use adjusted::{
     ScalarResidual,
 };
 pub use fault::AdjustFault;
+pub use prepare::{Candidate, prepare_adjustment, shot_id};
 pub use summary::{AdjustmentSummary, GroundSummary, ImageSummary, ObservationType, TypeSummary};
 
 use super::intersect::IntersectedTies;

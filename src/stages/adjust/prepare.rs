@@ -2,18 +2,16 @@
 
 use std::collections::BTreeSet;
 
-use super::{
-    adjust::{AdjustImage, LaserShot, ShotRange, orientation_sigmas},
-    group_profiles::Profile,
-    register::ImageRegistration,
-    sample_orientation::Orientation,
-    tag_times::ImageTimes,
-};
+use super::{AdjustImage, LaserShot, ShotRange, orientation_sigmas};
 use crate::{
     config::AdjustmentConfig,
     footprints::Footprints,
     frames::MarsIau2000,
     geom::{ellipsoid::spherical_to_xyz_m, pushbroom::ExteriorOrientation, stereo::StereoImage},
+    stages::{
+        group_profiles::Profile, orientation::Orientation, register::ImageRegistration,
+        tag_times::ImageTimes,
+    },
     time::Et,
     units::RADIANS_PER_DEGREE,
 };
