@@ -6,12 +6,13 @@ use serde::Serialize;
 
 use super::{GeometricProducts, SiteProducts, Writer, files::write_json};
 use crate::{
-    config::{
-        AdjustmentConfig, CameraModel, IntersectionConfig, MolaImage, OrientationPrior, Robust,
-    },
+    config::{AdjustmentConfig, IntersectionConfig, OrientationPrior},
     error::Result,
+    footprints::FootprintImageCoordinates,
     geom::{
         bundle::ORIENTATION_UNKNOWNS,
+        pushbroom::CameraModel,
+        robust::RobustWeight,
         statistics::Summary,
         uncertainty::{ResidualMoments, UncertaintyBudget},
     },
@@ -96,7 +97,7 @@ struct Configured<'a> {
 #[derive(Serialize)]
 struct AdjustmentKeys<'a> {
     tie_sigma_px: [f64; 2],
-    mola_image: MolaImage,
+    mola_image: FootprintImageCoordinates,
     mola_sigma_px: [f64; 2],
     mola_margin_px: f64,
     ground_sigma_m: f64,
@@ -106,7 +107,7 @@ struct AdjustmentKeys<'a> {
     nadir_sigma_m: f64,
     off_nadir_sigma_m: f64,
     #[serde(skip_serializing_if = "Option::is_none")]
-    robust: Option<&'a Robust>,
+    robust: Option<&'a RobustWeight>,
     #[serde(skip_serializing_if = "Option::is_none")]
     blunder_limit: Option<f64>,
     images: Vec<PriorKeys<'a>>,

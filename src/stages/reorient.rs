@@ -4,8 +4,8 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::{
     orientation::{
-        Camera, CameraTables, InterpolationCheck, Nodes, Orientation, OrientationSample,
-        check_interpolation, outline, samples_at,
+        Camera, CameraTables, GroundPoint, InterpolationCheck, Nodes, Orientation,
+        OrientationSample,
     },
     tag_times::ImageTimes,
 };
@@ -121,8 +121,8 @@ pub fn reorient(
     let geometric = |et| corrected.camera(et, Convention::Geometric);
     Ok(Orientation {
         image: orientation.image.clone(),
-        samples: samples_at(image, &epochs, geometric)?,
-        outline: outline(image, geometric)?,
+        samples: OrientationSample::at_epochs(image, &epochs, geometric)?,
+        outline: GroundPoint::outline(image, geometric)?,
         tables: corrected.tables(tables)?,
         notes: orientation.notes.clone(),
         invalid_because: orientation.invalid_because.clone(),
@@ -291,7 +291,7 @@ impl<F: Fn(f64) -> LineCorrection> Corrected<'_, F> {
             [rows.first(), rows.last()].map(|row| row.map_or(0.0, |row| *row as f64 / last as f64));
         tables.sun_position_m = sun_at.map(|at| lagrange(&original.sun_position_m, at));
         tables.sun_velocity_m_s = sun_at.map(|at| lagrange(&original.sun_velocity_m_s, at));
-        let own = check_interpolation(self.image, &tables, |et| {
+        let own = InterpolationCheck::of(self.image, &tables, |et| {
             self.camera(et, Convention::Apparent)
         })?;
         tables.interpolation = InterpolationCheck {

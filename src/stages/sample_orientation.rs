@@ -8,10 +8,7 @@ pub use super::orientation::{
     BoresightGround, CameraTables, GroundPoint, InterpolationCheck, Orientation, OrientationSample,
 };
 
-use super::{
-    orientation::{Camera, outline, samples_at},
-    tag_times::ImageTimes,
-};
+use super::{orientation::Camera, tag_times::ImageTimes};
 use crate::{
     config::{KernelsConfig, OrientationConfig, PointingConfig},
     error::Result,
@@ -50,7 +47,7 @@ pub fn sample_orientation(
     let step_s = image.duration_s() / f64::from(sampling.intervals);
     let epochs = (0..=sampling.intervals).map(|k| image.start.plus(f64::from(k) * step_s));
     let epochs: Vec<Et> = epochs.collect();
-    let samples = samples_at(image, &epochs, |et| reader.camera(et))?;
+    let samples = OrientationSample::at_epochs(image, &epochs, |et| reader.camera(et))?;
     let tables = camera_tables::camera_tables(&reader, image, kernels.padding_s)?;
     let nodes: Vec<Et> = tables.et_s.iter().copied().map(Et::from_seconds).collect();
     let held = reader.held_attitudes(epochs.iter().chain(&nodes))?;
@@ -58,7 +55,7 @@ pub fn sample_orientation(
     Ok(Orientation {
         image: image.id.clone(),
         samples,
-        outline: outline(image, |et| reader.camera(et))?,
+        outline: GroundPoint::outline(image, |et| reader.camera(et))?,
         tables,
         invalid_because: far.map(HeldAttitudes::reason).into_iter().collect(),
         notes: held.iter().map(ToString::to_string).collect(),

@@ -5,7 +5,7 @@ mod tables;
 use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 
-pub(super) use tables::{Camera, Nodes, check_interpolation};
+pub(super) use tables::{Camera, Nodes};
 pub use tables::{CameraTables, InterpolationCheck};
 
 use super::tag_times::ImageTimes;
@@ -91,49 +91,24 @@ impl OrientationSample {
             boresight: boresight_ground(&Position::new(*position_m), camera_to_mars),
         }
     }
-}
 
-/// Samples with the camera that `camera` gives for their epochs; quaternions are continuous.
-pub(super) fn samples_at(
-    image: &ImageTimes,
-    epochs: &[Et],
-    camera: impl Fn(Et) -> Result<Camera>,
-) -> Result<Vec<OrientationSample>> {
-    let mut samples = epochs
-        .iter()
-        .map(|epoch| Ok(OrientationSample::new(image, *epoch, &camera(*epoch)?)))
-        .collect::<Result<Vec<_>>>()?;
-    let mut quaternions: Vec<[f64; 4]> = samples.iter().map(|s| s.camera_to_mars).collect();
-    make_continuous(&mut quaternions);
-    for (sample, quaternion) in samples.iter_mut().zip(quaternions) {
-        sample.camera_to_mars = quaternion;
+    /// Samples with the camera that `camera` gives for their epochs; quaternions are continuous.
+    pub(super) fn at_epochs(
+        image: &ImageTimes,
+        epochs: &[Et],
+        camera: impl Fn(Et) -> Result<Camera>,
+    ) -> Result<Vec<Self>> {
+        let mut samples = epochs
+            .iter()
+            .map(|epoch| Ok(Self::new(image, *epoch, &camera(*epoch)?)))
+            .collect::<Result<Vec<_>>>()?;
+        let mut quaternions: Vec<[f64; 4]> = samples.iter().map(|s| s.camera_to_mars).collect();
+        make_continuous(&mut quaternions);
+        for (sample, quaternion) in samples.iter_mut().zip(quaternions) {
+            sample.camera_to_mars = quaternion;
+        }
+        Ok(samples)
     }
-    Ok(samples)
-}
-
-/// Outline of the delivered lines and samples, seen by the camera that `camera` gives for an instant.
-pub(super) fn outline(
-    image: &ImageTimes,
-    camera: impl Fn(Et) -> Result<Camera>,
-) -> Result<Option<Vec<GroundPoint>>> {
-    let duration_s = f64::from(image.lines_delivered) * image.line_period_s;
-    let step_s = duration_s / f64::from(OUTLINE_INTERVALS);
-    let (mut first_edge, mut last_edge) = (Vec::new(), Vec::new());
-    for k in 0..=OUTLINE_INTERVALS {
-        let (position_m, camera_to_mars) = camera(image.start.plus(f64::from(k) * step_s))?;
-        let position = Position::new(position_m);
-        let [first, last] = swath_directions(image).map(|direction| {
-            let ground = ray_meets_ellipsoid(&position, &(camera_to_mars * direction));
-            ground.map(|ground| GroundPoint::of(&ground))
-        });
-        let (Some(first), Some(last)) = (first, last) else {
-            return Ok(None);
-        };
-        first_edge.push(first);
-        last_edge.push(last);
-    }
-    let back = last_edge.into_iter().rev();
-    Ok(Some(first_edge.into_iter().chain(back).collect()))
 }
 
 impl GroundPoint {
@@ -143,6 +118,31 @@ impl GroundPoint {
             longitude_rad: coordinates.longitude_rad,
             latitude_rad: coordinates.latitude.0,
         }
+    }
+
+    /// Outline of the delivered lines and samples, seen by the camera that `camera` gives for an instant.
+    pub(super) fn outline(
+        image: &ImageTimes,
+        camera: impl Fn(Et) -> Result<Camera>,
+    ) -> Result<Option<Vec<Self>>> {
+        let duration_s = f64::from(image.lines_delivered) * image.line_period_s;
+        let step_s = duration_s / f64::from(OUTLINE_INTERVALS);
+        let (mut first_edge, mut last_edge) = (Vec::new(), Vec::new());
+        for k in 0..=OUTLINE_INTERVALS {
+            let (position_m, camera_to_mars) = camera(image.start.plus(f64::from(k) * step_s))?;
+            let position = Position::new(position_m);
+            let [first, last] = swath_directions(image).map(|direction| {
+                let ground = ray_meets_ellipsoid(&position, &(camera_to_mars * direction));
+                ground.map(|ground| Self::of(&ground))
+            });
+            let (Some(first), Some(last)) = (first, last) else {
+                return Ok(None);
+            };
+            first_edge.push(first);
+            last_edge.push(last);
+        }
+        let back = last_edge.into_iter().rev();
+        Ok(Some(first_edge.into_iter().chain(back).collect()))
     }
 }
 

@@ -65,6 +65,28 @@ impl InterpolationCheck {
     pub fn keeps_limit(&self) -> bool {
         self.error_max_px < Self::LIMIT_PX
     }
+
+    /// Compares the interpolated camera with `camera` between all nodes over the image.
+    pub(in crate::stages) fn of(
+        image: &ImageTimes,
+        tables: &CameraTables,
+        camera: impl Fn(Et) -> Result<Camera>,
+    ) -> Result<Self> {
+        let nodes = Nodes::new(tables);
+        let mut check = Self::default();
+        for pair in tables.et_s.windows(2) {
+            for share in CHECKED_AT {
+                let et = Et::from_seconds(pair[0] + share * (pair[1] - pair[0]));
+                if !image.exposures().contains(et) {
+                    continue;
+                }
+                let error_px = error_px(image, &camera(et)?, &nodes.camera(et));
+                check.error_max_px = largest([check.error_max_px, error_px]).unwrap_or_default();
+                check.epochs += 1;
+            }
+        }
+        Ok(check)
+    }
 }
 
 /// Camera position in IAU 2000, metres, and the rotation from the camera to it.
@@ -116,28 +138,6 @@ impl Nodes {
         let camera_to_mars = matrix_of_spice_quaternion(lagrange(&self.camera_to_mars, at));
         (position_m, camera_to_mars)
     }
-}
-
-/// Compares the interpolated camera with `camera` between all nodes over the image.
-pub(in crate::stages) fn check_interpolation(
-    image: &ImageTimes,
-    tables: &CameraTables,
-    camera: impl Fn(Et) -> Result<Camera>,
-) -> Result<InterpolationCheck> {
-    let nodes = Nodes::new(tables);
-    let mut check = InterpolationCheck::default();
-    for pair in tables.et_s.windows(2) {
-        for share in CHECKED_AT {
-            let et = Et::from_seconds(pair[0] + share * (pair[1] - pair[0]));
-            if !image.exposures().contains(et) {
-                continue;
-            }
-            let error_px = error_px(image, &camera(et)?, &nodes.camera(et));
-            check.error_max_px = largest([check.error_max_px, error_px]).unwrap_or_default();
-            check.epochs += 1;
-        }
-    }
-    Ok(check)
 }
 
 /// How far apart two cameras see the same ground, in image pixels, at most over the middle and both ends

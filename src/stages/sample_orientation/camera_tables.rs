@@ -12,7 +12,7 @@ use crate::{
         mars_rotation::mars_rotation,
     },
     stages::{
-        orientation::{Camera, CameraTables, InterpolationCheck, check_interpolation},
+        orientation::{Camera, CameraTables, InterpolationCheck},
         tag_times::ImageTimes,
     },
     time::Et,
@@ -38,7 +38,7 @@ pub(super) fn camera_tables(
     loop {
         let mut tables = tables(reader, &table_epochs(image, steps, padding_s))?;
         tables.interpolation =
-            check_interpolation(image, &tables, |et| apparent_camera(reader, et))?;
+            InterpolationCheck::of(image, &tables, |et| apparent_camera(reader, et))?;
         if tables.interpolation.keeps_limit() || steps >= image.lines_header {
             return Ok(tables);
         }
