@@ -9,7 +9,6 @@ use std::{collections::BTreeMap, fs};
 use areograph::{
     config::{SiteConfig, load},
     geom::{
-        attitude::matrix_of_spice_quaternion,
         ellipsoid::spherical_to_xyz_m,
         intersection::Weighting,
         pushbroom::{Detector, Pose, Projector, SampledOrientation},
@@ -104,10 +103,8 @@ impl Pair {
             .samples
             .iter()
             .map(|sample| {
-                let pose = Pose {
-                    position_m: Vector3::from(sample.position_m) + aside_m,
-                    mars_to_camera: matrix_of_spice_quaternion(sample.camera_to_mars).transpose(),
-                };
+                let mut pose = sample.pose();
+                pose.position_m += aside_m;
                 (sample.line_offset, pose)
             })
             .collect();

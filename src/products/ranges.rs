@@ -18,7 +18,7 @@ use crate::{
     geom::statistics::{Summary, Trend},
     stages::{
         check_ranges::{BiasScan, ProfileRanges},
-        group_profiles::{Profile, SimultaneousImage},
+        group_profiles::Profile,
     },
 };
 

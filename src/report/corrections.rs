@@ -69,7 +69,7 @@ fn positions(site: &SiteProducts, adjusted: &Adjusted) -> String {
 fn orbit_axes(image: &ImageProducts, shift_m: Vector3<f64>) -> Option<Vector3<f64>> {
     let samples = &image.orientation.samples;
     let middle = samples.len() / 2;
-    let position_m = |index: usize| Some(Vector3::from(samples.get(index)?.position_m));
+    let position_m = |index: usize| Some(samples.get(index)?.position.xyz_m);
     let (before, after) = (position_m(middle.checked_sub(1)?)?, position_m(middle)?);
     let advance_m = after - before;
     let axes = radial_along_cross(&after, &advance_m);

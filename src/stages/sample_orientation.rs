@@ -150,7 +150,9 @@ impl Reader<'_> {
     fn camera(&self, et: Et) -> Result<Camera> {
         let to_mars = mars_rotation::<MarsIau2000>(et);
         let position = to_mars.apply(&self.session.state(et)?.position);
-        let camera_to_mars = to_mars * self.inertial_to_camera(et)?.inverse();
-        Ok((position.xyz_m, *camera_to_mars.matrix()))
+        Ok(Camera {
+            position,
+            to_mars: to_mars * self.inertial_to_camera(et)?.inverse(),
+        })
     }
 }

@@ -2,7 +2,7 @@
 
 mod tables;
 
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
 pub(super) use tables::{Camera, Nodes};
@@ -12,10 +12,11 @@ use super::tag_times::ImageTimes;
 use crate::{
     constants::{MARS_IAU2000, MOC_NA_DETECTORS, MOC_NA_FOCAL_LENGTH_MM, MOC_NA_PIXEL_PITCH_MM},
     error::Result,
-    frames::{MarsIau2000, Position},
+    frames::{MarsIau2000, MocNa, Position, Rotation},
     geom::{
-        attitude::{OmegaPhiKappa, make_continuous, spice_quaternion},
+        attitude::OmegaPhiKappa,
         ellipsoid::{Spherical, ray_meets_ellipsoid},
+        pushbroom::Pose,
     },
     time::Et,
 };
@@ -48,10 +49,10 @@ pub struct OrientationSample {
     pub et: Et,
     /// Lines from the middle of the header image.
     pub line_offset: f64,
-    /// Perspective centre in IAU 2000, metres (geometric: no light time, no aberration).
-    pub position_m: [f64; 3],
-    /// Rotation camera → IAU 2000, SPICE quaternion (w, x, y, z), continuous over the image.
-    pub camera_to_mars: [f64; 4],
+    /// Perspective centre (geometric: no light time, no aberration).
+    pub position: Position<MarsIau2000>,
+    /// How the camera looks.
+    pub camera_to_mars: Rotation<MocNa, MarsIau2000>,
     /// The same rotation as ω, φ, κ.
     pub angles: OmegaPhiKappa,
     /// Where the boresight meets the IAU 2000 ellipsoid, if it does.
@@ -81,33 +82,34 @@ pub struct BoresightGround {
 }
 
 impl OrientationSample {
-    fn new(image: &ImageTimes, et: Et, (position_m, camera_to_mars): &Camera) -> Self {
+    fn new(image: &ImageTimes, et: Et, camera: &Camera) -> Self {
         Self {
             et,
             line_offset: image.line_offset(et),
-            position_m: (*position_m).into(),
-            camera_to_mars: spice_quaternion(camera_to_mars),
-            angles: OmegaPhiKappa::from_camera_to_mars(camera_to_mars),
-            boresight: boresight_ground(&Position::new(*position_m), camera_to_mars),
+            position: camera.position,
+            camera_to_mars: camera.to_mars,
+            angles: OmegaPhiKappa::from_camera_to_mars(camera.to_mars.matrix()),
+            boresight: boresight_ground(camera),
         }
     }
 
-    /// Samples with the camera that `camera` gives for their epochs; quaternions are continuous.
+    /// Its pose.
+    #[must_use]
+    pub fn pose(&self) -> Pose {
+        Pose {
+            position_m: self.position.xyz_m,
+            mars_to_camera: self.camera_to_mars.matrix().transpose(),
+        }
+    }
+
+    /// Samples with the camera that `camera` gives for their epochs.
     pub(super) fn at_epochs(
         image: &ImageTimes,
         epochs: &[Et],
         camera: impl Fn(Et) -> Result<Camera>,
     ) -> Result<Vec<Self>> {
-        let mut samples = epochs
-            .iter()
-            .map(|epoch| Ok(Self::new(image, *epoch, &camera(*epoch)?)))
-            .collect::<Result<Vec<_>>>()?;
-        let mut quaternions: Vec<[f64; 4]> = samples.iter().map(|s| s.camera_to_mars).collect();
-        make_continuous(&mut quaternions);
-        for (sample, quaternion) in samples.iter_mut().zip(quaternions) {
-            sample.camera_to_mars = quaternion;
-        }
-        Ok(samples)
+        let sample = |epoch: &Et| Ok(Self::new(image, *epoch, &camera(*epoch)?));
+        epochs.iter().map(sample).collect()
     }
 }
 
@@ -129,10 +131,9 @@ impl GroundPoint {
         let step_s = duration_s / f64::from(OUTLINE_INTERVALS);
         let (mut first_edge, mut last_edge) = (Vec::new(), Vec::new());
         for k in 0..=OUTLINE_INTERVALS {
-            let (position_m, camera_to_mars) = camera(image.start.plus(f64::from(k) * step_s))?;
-            let position = Position::new(position_m);
+            let Camera { position, to_mars } = camera(image.start.plus(f64::from(k) * step_s))?;
             let [first, last] = swath_directions(image).map(|direction| {
-                let ground = ray_meets_ellipsoid(&position, &(camera_to_mars * direction));
+                let ground = ray_meets_ellipsoid(&position, &(to_mars.matrix() * direction));
                 ground.map(|ground| Self::of(&ground))
             });
             let (Some(first), Some(last)) = (first, last) else {
@@ -161,12 +162,9 @@ fn swath_directions(image: &ImageTimes) -> [Vector3<f64>; 2] {
     })
 }
 
-fn boresight_ground(
-    position: &Position<MarsIau2000>,
-    camera_to_mars: &Matrix3<f64>,
-) -> Option<BoresightGround> {
-    let boresight = camera_to_mars * Vector3::z();
-    let ground = ray_meets_ellipsoid(position, &boresight)?;
+fn boresight_ground(camera: &Camera) -> Option<BoresightGround> {
+    let boresight = camera.to_mars.matrix() * Vector3::z();
+    let ground = ray_meets_ellipsoid(&camera.position, &boresight)?;
     let scale = Vector3::new(
         MARS_IAU2000.equatorial_radius_m.powi(-2),
         MARS_IAU2000.equatorial_radius_m.powi(-2),
@@ -177,7 +175,7 @@ fn boresight_ground(
     Some(BoresightGround {
         longitude_rad: point.longitude_rad,
         latitude_rad: point.latitude_rad,
-        range_m: position.distance_m(&ground),
+        range_m: camera.position.distance_m(&ground),
         emission_rad: normal.angle(&-boresight),
     })
 }

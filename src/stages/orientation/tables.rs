@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 use crate::{
     constants::{MARS_IAU2000, MOC_NA_DETECTORS, MOC_NA_FOCAL_LENGTH_MM, MOC_NA_PIXEL_PITCH_MM},
     error::Result,
+    frames::{MarsIau2000, MocNa, Position, Rotation},
     geom::{
         attitude::{make_continuous, matrix_of_spice_quaternion, spice_quaternion},
         lagrange::lagrange,
@@ -89,8 +90,14 @@ impl InterpolationCheck {
     }
 }
 
-/// Camera position in IAU 2000, metres, and the rotation from the camera to it.
-pub(in crate::stages) type Camera = (Vector3<f64>, Matrix3<f64>);
+/// Where the camera is and how it looks at one instant.
+#[derive(Debug, Clone, Copy)]
+pub(in crate::stages) struct Camera {
+    /// Perspective centre.
+    pub(in crate::stages) position: Position<MarsIau2000>,
+    /// Rotation to the axes of Mars.
+    pub(in crate::stages) to_mars: Rotation<MocNa, MarsIau2000>,
+}
 
 /// What a camera model makes of the nodes: rotated to Mars first, then interpolated.
 pub(in crate::stages) struct Nodes {
@@ -134,16 +141,18 @@ impl Nodes {
     /// The camera between the nodes.
     pub(in crate::stages) fn camera(&self, et: Et) -> Camera {
         let at = (et.seconds() - self.start_s) / self.step_s;
-        let position_m = lagrange(&self.position_m, at).into();
         let camera_to_mars = matrix_of_spice_quaternion(lagrange(&self.camera_to_mars, at));
-        (position_m, camera_to_mars)
+        Camera {
+            position: Position::new(lagrange(&self.position_m, at).into()),
+            to_mars: Rotation::new(camera_to_mars, et),
+        }
     }
 }
 
 /// How far apart two cameras see the same ground, in image pixels, at most over the middle and both ends
 /// of a line; the ground is taken as near as it can be, straight below.
 fn error_px(image: &ImageTimes, kernels: &Camera, interpolated: &Camera) -> f64 {
-    let (position_m, camera_to_mars) = kernels;
+    let position_m = kernels.position.xyz_m;
     let distance_m = position_m.norm() - MARS_IAU2000.equatorial_radius_m;
     let detector_rad = MOC_NA_PIXEL_PITCH_MM / MOC_NA_FOCAL_LENGTH_MM;
     let first = f64::from(image.first_detector);
@@ -151,8 +160,10 @@ fn error_px(image: &ImageTimes, kernels: &Camera, interpolated: &Camera) -> f64 
     let centre = f64::from(MOC_NA_DETECTORS) / 2.0;
     let errors_px = [first, first + 0.5 * width, first + width].map(|detector| {
         let across = (detector - centre) * detector_rad;
-        let ground_m = position_m + camera_to_mars * Vector3::new(0.0, across, 1.0) * distance_m;
-        let seen = interpolated.1.transpose() * (ground_m - interpolated.0);
+        let ground_m =
+            position_m + kernels.to_mars.matrix() * Vector3::new(0.0, across, 1.0) * distance_m;
+        let seen =
+            interpolated.to_mars.matrix().transpose() * (ground_m - interpolated.position.xyz_m);
         let lines = seen.x / seen.z / f64::from(image.downtrack_summing);
         let samples = (seen.y / seen.z - across) / f64::from(image.crosstrack_summing);
         lines.hypot(samples) / detector_rad

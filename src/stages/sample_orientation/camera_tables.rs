@@ -119,6 +119,8 @@ fn rows(matrix: &Matrix3<f64>) -> [[f64; 3]; 3] {
 fn apparent_camera(reader: &Reader, et: Et) -> Result<Camera> {
     let to_mars = mars_rotation::<MarsIau2000>(et);
     let position = to_mars.apply(&reader.session.apparent_state(et)?.position);
-    let camera_to_mars = to_mars * reader.inertial_to_camera(et)?.inverse();
-    Ok((position.xyz_m, *camera_to_mars.matrix()))
+    Ok(Camera {
+        position,
+        to_mars: to_mars * reader.inertial_to_camera(et)?.inverse(),
+    })
 }
