@@ -1,6 +1,10 @@
 //! Tie points of the synthetic mission: the cameras that measured them meet on the true ground, and the
 //! cameras that labels and kernels tell miss each other by about one spacing of MOLA's footprints.
-#![allow(clippy::unwrap_used, reason = "helpers of tests may fail loudly")]
+#![allow(
+    clippy::unwrap_used,
+    clippy::panic,
+    reason = "helpers of tests may fail loudly"
+)]
 
 mod common;
 

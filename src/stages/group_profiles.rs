@@ -102,7 +102,7 @@ fn profile(
                 .filter(|row| exposures.contains(time(row)))
                 .count();
             let shots = u32::try_from(shots).unwrap_or(u32::MAX);
-            (shots > 0).then(|| SimultaneousImage {
+            (shots > 0).then_some(SimultaneousImage {
                 image: index,
                 shots,
             })
