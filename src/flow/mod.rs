@@ -32,9 +32,9 @@ pub use sites::publish_sites;
 use crate::{
     stage::Stage,
     stages::{
-        check_ranges::CheckRanges, compare_pairs::ComparePairs, convert_datum::ConvertDatum,
-        describe_kernels::DescribeKernels, fit_sensor_model::FitSensorModel,
-        group_profiles::GroupProfiles, intersect::Intersect, prepare_adjustment::Adjust,
+        adjust::Adjust, check_ranges::CheckRanges, compare_pairs::ComparePairs,
+        convert_datum::ConvertDatum, describe_kernels::DescribeKernels,
+        fit_sensor_model::FitSensorModel, group_profiles::GroupProfiles, intersect::Intersect,
         read_ties::ReadTies, register::Register, reorient::Reorient,
         sample_orientation::SampleOrientation, search_footprints::SearchFootprints,
         tag_times::TagTimes, tag_utc::TagUtc,

@@ -7,8 +7,8 @@ use super::{
     check_ranges::{BiasScan, RangeCheck},
     compare_pairs::PairComparison,
     fit_sensor_model::SensorModel,
+    orientation::Orientation,
     read_ties::Ties,
-    sample_orientation::Orientation,
 };
 
 /// Whether the products keep the limits of the configuration.

@@ -1,8 +1,8 @@
 //! An image of the site with the outputs of its stages: what the stages behind the registration see.
 
 use super::{
-    fit_sensor_model::SensorModel, oriented::OrientedImage, register::ImageRegistration,
-    sample_orientation::Orientation, tag_times::ImageTimes,
+    fit_sensor_model::SensorModel, orientation::Orientation, oriented::OrientedImage,
+    register::ImageRegistration, tag_times::ImageTimes,
 };
 use crate::{
     error::Result,

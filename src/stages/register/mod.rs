@@ -15,7 +15,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{
     convert_datum::Converted, fit_sensor_model::SensorModel, group_profiles::Profile,
-    oriented::OrientedImage, sample_orientation::Orientation, tag_times::ImageTimes,
+    orientation::Orientation, oriented::OrientedImage, tag_times::ImageTimes,
 };
 use crate::{
     config::RegistrationConfig,

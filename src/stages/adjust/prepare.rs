@@ -1,80 +1,20 @@
 //! What enters the combined adjustment: images with what is known of them beforehand, and shots.
 
-use std::{collections::BTreeSet, sync::atomic::AtomicBool};
+use std::collections::BTreeSet;
 
-use super::{
-    adjust::{AdjustImage, Adjusted, LaserShot, ShotRange, adjust, orientation_sigmas},
-    convert_datum::Converted,
-    group_profiles::Profile,
-    intersect::IntersectedTies,
-    read_ties::Ties,
-    register::ImageRegistration,
-    sample_orientation::Orientation,
-    site_image::{SiteImage, oriented_images},
-    tag_times::ImageTimes,
-};
+use super::input::{AdjustImage, LaserShot, LaserShots, ShotRange, orientation_sigmas};
 use crate::{
     config::AdjustmentConfig,
-    error::Result,
     footprints::Footprints,
-    frames::MarsIau2000,
-    geom::{
-        ellipsoid::spherical_to_xyz_m,
-        pushbroom::{CameraModel, ExteriorOrientation},
-        stereo::StereoImage,
+    frames::{MarsIau2000, Position},
+    geom::{ellipsoid::spherical_to_xyz_m, pushbroom::ExteriorOrientation, stereo::StereoImage},
+    stages::{
+        group_profiles::Profile, orientation::Orientation, register::ImageRegistration,
+        tag_times::ImageTimes,
     },
-    stage::{InOrder, Output, Stage},
-    stage_inputs,
     time::Et,
     units::RADIANS_PER_DEGREE,
 };
-
-stage_inputs! {
-    /// Images, footprints, tie points with their ground points, and the standard deviations.
-    pub struct Adjust<'a> {
-        /// The images with the orientation of the kernels.
-        pub images: InOrder<'a, SiteImage>,
-        /// The form of the orientation.
-        pub model: &'a CameraModel,
-        /// Footprints in IAU 2000.
-        pub converted: &'a Output<Converted>,
-        /// Profiles.
-        pub profiles: &'a Output<Vec<Profile>>,
-        /// Tie points.
-        pub ties: &'a Output<Ties>,
-        /// Their ground points.
-        pub intersected: &'a Output<IntersectedTies>,
-        /// Standard deviations and options.
-        pub adjustment: &'a AdjustmentConfig,
-    }
-}
-
-impl Stage for Adjust<'_> {
-    const NAME: &'static str = "adjust";
-    type Output = Adjusted;
-    stage_inputs!(fingerprint);
-
-    fn run(&self, _stop: &AtomicBool) -> Result<Adjusted> {
-        let oriented = oriented_images(self.images.0)?;
-        let candidates = self.images.0.iter().zip(&oriented);
-        let candidates = candidates.map(|(image, oriented)| {
-            Ok(Candidate {
-                times: image.times.value()?,
-                orientation: image.orientation.value()?,
-                stereo: oriented.stereo(*self.model),
-                registration: image.registration.value()?,
-            })
-        });
-        let (images, shots) = prepare_adjustment(
-            candidates.collect::<Result<Vec<_>>>()?,
-            &self.converted.value()?.footprints,
-            self.profiles.value()?,
-            self.adjustment,
-        );
-        let (ties, starts) = (&self.ties.value()?.points, self.intersected.value()?);
-        adjust(&images, &shots, ties, starts, self.adjustment)
-    }
-}
 
 /// Images that look within this of nadir are nadir images, radians: MOC looks straight down to about a
 /// degree, and off nadir by ten and more.
@@ -142,7 +82,7 @@ impl<M: ExteriorOrientation> Candidate<'_, M> {
 ///
 /// Of the shots those take part that fall within an image's lines and not farther beside it than `config`
 /// says, and those that were fired while an image was exposed: these with their range. A shot in two windows
-/// counts once. It is named by [`shot_id`].
+/// counts once.
 ///
 /// # Source
 /// Yoon & Shan 2004: ranges only in the simultaneous image.
@@ -152,7 +92,7 @@ pub fn prepare_adjustment<M: ExteriorOrientation>(
     footprints: &Footprints<MarsIau2000>,
     profiles: &[Profile],
     config: &AdjustmentConfig,
-) -> (Vec<AdjustImage<M>>, Vec<LaserShot>) {
+) -> (Vec<AdjustImage<M>>, LaserShots) {
     let mut near = BTreeSet::new();
     for candidate in &candidates {
         let points = &candidate.registration.points;
@@ -166,19 +106,19 @@ pub fn prepare_adjustment<M: ExteriorOrientation>(
     let times: Vec<&ImageTimes> = candidates.iter().map(|candidate| candidate.times).collect();
     let mut taken = BTreeSet::new();
     let mut shots = Vec::new();
-    for profile in profiles {
+    for (index, profile) in profiles.iter().enumerate() {
         for row in &profile.rows {
-            let range = range_of(footprints, profile, *row, &times);
+            let range = range_of(footprints, *row, &times);
             if (range.is_some() || near.contains(row)) && taken.insert(*row) {
                 let at = *row as usize;
                 shots.push(LaserShot {
-                    id: shot_id(profile, *row),
-                    ground_m: spherical_to_xyz_m(
+                    profile: index,
+                    row: *row,
+                    ground: Position::new(spherical_to_xyz_m(
                         footprints.longitude_rad[at],
                         footprints.latitude_rad[at],
                         footprints.radius_m[at],
-                    )
-                    .into(),
+                    )),
                     range,
                 });
             }
@@ -187,30 +127,23 @@ pub fn prepare_adjustment<M: ExteriorOrientation>(
     let weighed = candidates
         .into_iter()
         .map(|candidate| candidate.weighed(config));
-    (weighed.collect(), shots)
-}
-
-/// Name of the shot in row `row` of the footprints, a shot of `profile`.
-#[must_use]
-pub fn shot_id(profile: &Profile, row: u32) -> String {
-    format!("{}:{row}", profile.id)
+    let profiles = profiles.iter().map(|profile| profile.id.clone()).collect();
+    (weighed.collect(), LaserShots { profiles, shots })
 }
 
 /// The range of a shot, when an image was exposed meanwhile.
 fn range_of(
     footprints: &Footprints<MarsIau2000>,
-    profile: &Profile,
     row: u32,
     images: &[&ImageTimes],
 ) -> Option<ShotRange> {
     let instant = Et::from_seconds(footprints.et_s[row as usize]);
     let image = images
         .iter()
-        .find(|image| image.exposures().contains(instant))?;
+        .position(|image| image.exposures().contains(instant))?;
     Some(ShotRange {
-        profile: profile.id.clone(),
-        image: image.id.clone(),
-        x_lines: image.line_offset(instant),
+        image,
+        x_lines: images[image].line_offset(instant),
         range_m: footprints.range_m[row as usize],
     })
 }
