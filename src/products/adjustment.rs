@@ -4,12 +4,15 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
-use super::{GeometricProducts, SiteProducts, Writer, files::write_json};
+use super::{
+    GeometricProducts, SiteProducts,
+    files::write_json,
+    product::{Content, Declaration, Role, Write},
+};
 use crate::{
     config::{
         AdjustmentConfig, CameraModel, IntersectionConfig, MolaImage, OrientationPrior, Robust,
     },
-    error::Result,
     geom::{bundle::ORIENTATION_UNKNOWNS, statistics::Summary},
     stages::{
         adjust::{AdjustmentSummary, CorrectedImage, PointKind},
@@ -233,17 +236,19 @@ struct ImageDocument<'a> {
     time_bias_s: Option<(f64, f64)>,
 }
 
-/// Writes `adjustment.json` of a site with tie points.
-pub(super) fn write(
-    written: &mut Writer,
-    site: &SiteProducts,
-    geometric: &GeometricProducts,
-) -> Result<()> {
-    written.add("adjustment.json", |path| {
-        write_json(path, &document(site, geometric))?;
-        Ok(geometric.adjusted.points.len() as u64)
-    })
-}
+pub(super) static DOCUMENT: Declaration = Declaration {
+    path: "adjustment.json",
+    what: "tie points intersected before and after the adjustment, every pair of images compared, the adjustment itself",
+    readers: "scripts",
+    rows: "adjusted points",
+    role: Role::Data,
+    content: Content::Document("adjustment"),
+    write: Write::Ties(|path, of, geometric| {
+        write_json(path, &document(of.site, geometric))?;
+        Ok(Some(geometric.adjusted.points.len() as u64))
+    }),
+    uses: &[],
+};
 
 fn document<'a>(site: &SiteProducts<'a>, geometric: &GeometricProducts<'a>) -> Document<'a> {
     let ties = geometric.ties;

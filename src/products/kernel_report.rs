@@ -5,8 +5,26 @@ use std::{collections::BTreeMap, path::Path};
 use serde::Serialize;
 use serde_json::{Map, Value, json};
 
-use super::site::{KernelLine, SiteProducts};
+use super::{
+    files::write_json,
+    product::{Content, Declaration, Role, Write},
+    site::{KernelLine, SiteProducts},
+};
 use crate::{config::CkQuality, spice::quality_of, time::Intervals};
+
+pub(super) static KERNELS: Declaration = Declaration {
+    path: "exchange/kernels.json",
+    what: "kernels by type with the keys of SpiceQL, and under areograph hashes and coverage",
+    readers: "SpiceQL, scripts",
+    rows: "kernels",
+    role: Role::Data,
+    content: Content::Document("kernels"),
+    write: Write::Site(|path, of| {
+        write_json(path, &report(of.site))?;
+        Ok(Some(of.site.kernels.len() as u64))
+    }),
+    uses: &[],
+};
 
 /// Kernel names by SpiceQL's types, in load order: `ck`, `spk`, `tspk` (ephemerides of other bodies), `pck`,
 /// `fk`, `ik`, `iak` (ISIS addenda), `lsk`, `sclk`.
@@ -67,7 +85,7 @@ struct Entry<'a> {
 }
 
 /// The report: SpiceQL's members, and `areograph` with a kernel per entry.
-pub(super) fn report(site: &SiteProducts) -> Value {
+fn report(site: &SiteProducts) -> Value {
     let mut report = Map::new();
     for (kind, names) in names_by_type(site) {
         report.insert(kind, json!(names));

@@ -1,14 +1,16 @@
 //! Orientation of an image: samples as Parquet, times and polynomials as JSON.
 
+use std::path::Path;
+
 use serde::Serialize;
 
 use super::{
-    Writer,
     coordinates::degrees,
     files::write_json,
     parquet,
+    product::{Content, Context, Declaration, Role, Write},
     site::ImageProducts,
-    table::{Column, Table, Values},
+    table::{Column, Table, Unit, column, meanings},
 };
 use crate::{
     error::Result,
@@ -104,81 +106,157 @@ struct Polynomial<'a> {
     residuals: &'a [f64],
 }
 
-/// Writes samples and models of an image; the names of the files begin with `prefix`.
-pub(super) fn write(written: &mut Writer, image: &ImageProducts, prefix: &str) -> Result<()> {
-    let folder = format!("images/{}", image.times.id);
-    let table = Table::new(columns(&image.orientation.samples))?;
-    written.add(format!("{folder}/{prefix}orientation.parquet"), |path| {
-        parquet::write(path, &table, Vec::new())
-    })?;
-    written.add(format!("{folder}/{prefix}orientation.json"), |path| {
-        write_json(path, &document(image))?;
-        Ok(table.rows() as u64)
-    })
+macro_rules! declared {
+    ($path:literal, $what:literal, $content:expr, $write:expr) => {
+        Declaration {
+            path: $path,
+            what: $what,
+            readers: "scripts",
+            rows: "samples",
+            role: Role::Data,
+            content: $content,
+            write: $write,
+            uses: &[],
+        }
+    };
 }
 
-fn columns(samples: &[OrientationSample]) -> Vec<Column> {
-    let number = |name, description, value: fn(&OrientationSample) -> f64| {
-        Column::new(
-            name,
-            description,
-            Values::F64(samples.iter().map(value).collect()),
-        )
-    };
-    let boresight = |name, description, value: fn(&BoresightGround) -> f64| {
-        let values = samples
-            .iter()
-            .map(|sample| sample.boresight.as_ref().map(value));
-        Column::new(name, description, Values::OptionalF64(values.collect()))
-    };
+pub(super) static TABLE: Declaration = declared!(
+    "images/<image>/orientation.parquet",
+    "positions and rotations of the camera, sampled along the image",
+    Content::Table(|| meanings(&columns())),
+    Write::Image(write_table)
+);
+
+pub(super) static DOCUMENT: Declaration = declared!(
+    "images/<image>/orientation.json",
+    "times and sensor models: polynomials of first and second order with residuals, rotation-vector form",
+    Content::Document("orientation"),
+    Write::Image(write_document)
+);
+
+pub(super) static ADJUSTED_TABLE: Declaration = declared!(
+    "images/<image>/adjusted_orientation.parquet",
+    "adjusted positions and rotations of the camera",
+    Content::Table(|| meanings(&columns())),
+    Write::AdjustedImage(write_table)
+);
+
+pub(super) static ADJUSTED_DOCUMENT: Declaration = declared!(
+    "images/<image>/adjusted_orientation.json",
+    "the sensor models fitted to them",
+    Content::Document("orientation"),
+    Write::AdjustedImage(write_document)
+);
+
+fn write_table(path: &Path, _: &Context, image: &ImageProducts) -> Result<u64> {
+    let samples = image.orientation.samples.iter().collect();
+    parquet::write(path, Table::new(columns(), samples), Vec::new())
+}
+
+fn write_document(path: &Path, _: &Context, image: &ImageProducts) -> Result<u64> {
+    write_json(path, &document(image))?;
+    Ok(image.orientation.samples.len() as u64)
+}
+
+type Sample<'a> = &'a OrientationSample;
+
+fn columns<'a>() -> Vec<Column<Sample<'a>>> {
+    fn boresight<'a>(
+        name: &'static str,
+        unit: Unit,
+        description: &'static str,
+        of: fn(&BoresightGround) -> f64,
+    ) -> Column<Sample<'a>> {
+        column(name, unit, description, move |s: &Sample| {
+            s.boresight.as_ref().map(of)
+        })
+    }
     vec![
-        number("et_s", "epoch, TDB seconds past J2000", |s| s.et.seconds()),
-        number(
-            "line_offset",
-            "lines from the middle of the header image",
-            |s| s.line_offset,
+        column(
+            "et_s",
+            Unit::Second,
+            "epoch, TDB seconds past J2000",
+            |s: &Sample| s.et.seconds(),
         ),
-        number("x_m", "perspective centre, IAU 2000 X, metres", |s| {
-            s.position_m[0]
+        column(
+            "line_offset",
+            Unit::Line,
+            "lines from the middle of the header image",
+            |s: &Sample| s.line_offset,
+        ),
+        column(
+            "x_m",
+            Unit::Metre,
+            "perspective centre, IAU 2000 X, metres",
+            |s: &Sample| s.position_m[0],
+        ),
+        column(
+            "y_m",
+            Unit::Metre,
+            "perspective centre, IAU 2000 Y, metres",
+            |s: &Sample| s.position_m[1],
+        ),
+        column(
+            "z_m",
+            Unit::Metre,
+            "perspective centre, IAU 2000 Z, metres",
+            |s: &Sample| s.position_m[2],
+        ),
+        column("omega_rad", Unit::Radian, "omega, radians", |s: &Sample| {
+            s.angles.omega_rad
         }),
-        number("y_m", "perspective centre, IAU 2000 Y, metres", |s| {
-            s.position_m[1]
+        column("phi_rad", Unit::Radian, "phi, radians", |s: &Sample| {
+            s.angles.phi_rad
         }),
-        number("z_m", "perspective centre, IAU 2000 Z, metres", |s| {
-            s.position_m[2]
+        column("kappa_rad", Unit::Radian, "kappa, radians", |s: &Sample| {
+            s.angles.kappa_rad
         }),
-        number("omega_rad", "omega, radians", |s| s.angles.omega_rad),
-        number("phi_rad", "phi, radians", |s| s.angles.phi_rad),
-        number("kappa_rad", "kappa, radians", |s| s.angles.kappa_rad),
-        number("quaternion_w", "camera to Mars, SPICE convention, w", |s| {
-            s.camera_to_mars[0]
-        }),
-        number("quaternion_x", "camera to Mars, SPICE convention, x", |s| {
-            s.camera_to_mars[1]
-        }),
-        number("quaternion_y", "camera to Mars, SPICE convention, y", |s| {
-            s.camera_to_mars[2]
-        }),
-        number("quaternion_z", "camera to Mars, SPICE convention, z", |s| {
-            s.camera_to_mars[3]
-        }),
+        column(
+            "quaternion_w",
+            Unit::None,
+            "camera to Mars, SPICE convention, w",
+            |s: &Sample| s.camera_to_mars[0],
+        ),
+        column(
+            "quaternion_x",
+            Unit::None,
+            "camera to Mars, SPICE convention, x",
+            |s: &Sample| s.camera_to_mars[1],
+        ),
+        column(
+            "quaternion_y",
+            Unit::None,
+            "camera to Mars, SPICE convention, y",
+            |s: &Sample| s.camera_to_mars[2],
+        ),
+        column(
+            "quaternion_z",
+            Unit::None,
+            "camera to Mars, SPICE convention, z",
+            |s: &Sample| s.camera_to_mars[3],
+        ),
         boresight(
             "boresight_longitude_deg",
+            Unit::Degree,
             "east longitude where the boresight meets the ellipsoid",
             |ground| degrees(ground.longitude_rad),
         ),
         boresight(
             "boresight_latitude_deg",
+            Unit::Degree,
             "areocentric latitude where the boresight meets the ellipsoid",
             |ground| degrees(ground.latitude_rad),
         ),
         boresight(
             "boresight_range_m",
+            Unit::Metre,
             "distance of that point, metres",
             |ground| ground.range_m,
         ),
         boresight(
             "boresight_emission_deg",
+            Unit::Degree,
             "angle between normal and camera there, degrees",
             |ground| degrees(ground.emission_rad),
         ),
