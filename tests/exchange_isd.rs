@@ -11,12 +11,11 @@ mod pushbroom;
 use std::{fs, path::PathBuf};
 
 use areograph::{
-    config::{
-        ImageConfig, ImageFields, KernelList, KernelSource, KernelsConfig, OrientationConfig,
-        PointingConfig,
-    },
+    config::{ImageConfig, KernelsConfig, OrientationConfig, PointingConfig},
     constants::MGS_POINTING_BIAS,
     geom::attitude::matrix_of_spice_quaternion,
+    image::ImageFields,
+    kernel_source::{KernelList, KernelSource},
     products::write_products,
     spice::{KernelSet, Session},
     stages::{

@@ -10,12 +10,11 @@ mod common;
 use std::{fs, path::PathBuf};
 
 use areograph::{
-    config::{
-        ImageConfig, ImageFields, KernelList, KernelSource, KernelsConfig, OrientationConfig,
-        PointingConfig,
-    },
+    config::{ImageConfig, KernelsConfig, OrientationConfig, PointingConfig},
     constants::MGS_POINTING_BIAS,
     geom::attitude::matrix_of_spice_quaternion,
+    image::ImageFields,
+    kernel_source::{KernelList, KernelSource},
     spice::{KernelSet, Session},
     stages::{
         fit_sensor_model::fit_sensor_model,

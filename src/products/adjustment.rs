@@ -10,10 +10,12 @@ use super::{
     product::{Content, Declaration, Role, Write},
 };
 use crate::{
-    config::{
-        AdjustmentConfig, CameraModel, IntersectionConfig, MolaImage, OrientationPrior, Robust,
+    config::{AdjustmentConfig, IntersectionConfig, OrientationPrior},
+    footprints::FootprintImageCoordinates,
+    geom::{
+        bundle::ORIENTATION_UNKNOWNS, pushbroom::CameraModel, robust::RobustWeight,
+        statistics::Summary,
     },
-    geom::{bundle::ORIENTATION_UNKNOWNS, statistics::Summary},
     stages::{
         adjust::{AdjustmentSummary, CorrectedImage, PointKind},
         compare_pairs::{PairComparison, ProfileByTies},
@@ -96,7 +98,7 @@ struct Configured<'a> {
 #[derive(Serialize)]
 struct AdjustmentKeys<'a> {
     tie_sigma_px: [f64; 2],
-    mola_image: MolaImage,
+    mola_image: FootprintImageCoordinates,
     mola_sigma_px: [f64; 2],
     mola_margin_px: f64,
     ground_sigma_m: f64,
@@ -106,7 +108,7 @@ struct AdjustmentKeys<'a> {
     nadir_sigma_m: f64,
     off_nadir_sigma_m: f64,
     #[serde(skip_serializing_if = "Option::is_none")]
-    robust: Option<&'a Robust>,
+    robust: Option<&'a RobustWeight>,
     #[serde(skip_serializing_if = "Option::is_none")]
     blunder_limit: Option<f64>,
     images: Vec<PriorKeys<'a>>,

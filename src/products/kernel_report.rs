@@ -10,7 +10,7 @@ use super::{
     product::{Content, Declaration, Role, Write},
     site::{KernelLine, SiteProducts},
 };
-use crate::{config::CkQuality, spice::quality_of, time::Intervals};
+use crate::{kernel_source::CkQuality, spice::quality_of, time::Intervals};
 
 pub(super) static KERNELS: Declaration = Declaration {
     path: "exchange/kernels.json",

@@ -12,7 +12,8 @@ use super::{
     table::{Column, Table, Unit, column, meanings},
 };
 use crate::{
-    config::{MolaClock, RangeCheckConfig},
+    altimetry::MolaClock,
+    config::RangeCheckConfig,
     footprints::Footprint,
     geom::statistics::{Summary, Trend},
     stages::{

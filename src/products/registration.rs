@@ -12,8 +12,8 @@ use super::{
     table::{Column, Table, Unit, column, meanings},
 };
 use crate::{
-    config::{CameraModel, RegistrationConfig},
-    geom::statistics::Summary,
+    config::RegistrationConfig,
+    geom::{pushbroom::CameraModel, statistics::Summary},
     stages::{
         group_profiles::Profile,
         register::{MethodRun, ModelDifference, ProfileOnImage, RegisteredPoints},

@@ -3,8 +3,9 @@
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    config::{IMAGE_DURATION_END_S, IMAGE_LINES_MIN, ImageConfig, ImageFields, line_period_agrees},
+    config::ImageConfig,
     error::{Failure, Fault, Kind, Place, Result},
+    image::{IMAGE_DURATION_END_S, IMAGE_LINES_MIN, ImageFields, line_period_agrees},
     pds::moc,
     spice::Session,
     time::{Et, Interval},

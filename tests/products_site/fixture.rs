@@ -3,11 +3,10 @@
 use std::{collections::BTreeMap, sync::atomic::AtomicBool};
 
 use areograph::{
+    altimetry::{BiasScope, DatumChoice, MolaClock, ShotFilter, TagSign},
     config::{
-        AdjustmentConfig, BiasScope, CameraModel, DatumChoice, IntersectionConfig, KernelList,
-        KernelSource, KernelsConfig, MolaClock, OrientationConfig, PedrConfig, PointingConfig,
-        RangeCheckConfig, RegistrationConfig, ShotFilter, SiteConfig, TagSign, TiesConfig,
-        WindowConfig, WindowShape,
+        AdjustmentConfig, IntersectionConfig, KernelsConfig, OrientationConfig, PedrConfig,
+        PointingConfig, RangeCheckConfig, RegistrationConfig, SiteConfig, TiesConfig, WindowConfig,
     },
     constants::MGS_POINTING_BIAS,
     footprints::{Footprint, Footprints, SourceFile},
@@ -15,9 +14,11 @@ use areograph::{
     geom::{
         attitude::{OmegaPhiKappa, spice_quaternion},
         ellipsoid::Spherical,
-        pushbroom::ExteriorOrientation,
+        pushbroom::{CameraModel, ExteriorOrientation},
         statistics::{Summary, Trend},
+        window::WindowShape,
     },
+    kernel_source::{KernelList, KernelSource},
     products::{ImageProducts, KernelLine, SiteProducts},
     spice::Wanted,
     stages::{

@@ -16,7 +16,9 @@ use std::{collections::BTreeSet, path::Path};
 use toml::Spanned;
 
 use crate::{
+    altimetry::{BiasScope, MolaClock, TagSign},
     constants::{MGS_POINTING_BIAS, MOLA_CLOCK_BIAS_S},
+    geom::pushbroom::CameraModel,
     time::PointingBias,
     units::RADIANS_PER_ARCSECOND,
 };
@@ -26,8 +28,8 @@ use super::{
     raw::{RawMolaClock, RawOrientation, RawPointing, RawRangeCheck, RawRegistration, RawSite},
     shape::Written,
     site::{
-        BiasScope, CameraModel, MolaClock, OrientationConfig, PointingConfig, RangeCheckConfig,
-        RegistrationConfig, SCAN_STEPS_MAX, SiteConfig, TagSign,
+        OrientationConfig, PointingConfig, RangeCheckConfig, RegistrationConfig, SCAN_STEPS_MAX,
+        SiteConfig,
     },
 };
 use values::Accept;

@@ -1,14 +1,12 @@
 //! A network laid out for its adjustment: which observations belong to a point, and their weighted rows.
 
-use std::ops::Range;
-
 use nalgebra::Vector3;
 use rayon::prelude::*;
 
 use super::{
     Dropped, Network,
-    eliminate::triangulate,
-    rows::{self, ImagePartials, Row},
+    point_rows::PointRows,
+    rows::{self, Row},
     unknowns::{Columns, State},
 };
 use crate::geom::{
@@ -60,101 +58,6 @@ impl Lists {
 
     pub(super) fn of_key(&self, key: usize) -> &[usize] {
         &self.indices[self.starts[key]..self.starts[key + 1]]
-    }
-}
-
-/// Shared unknowns that stand side by side, in the equations and in a point's rows.
-#[derive(Debug, Clone)]
-pub(super) struct Run {
-    /// Columns in the equations.
-    pub(super) columns: Range<usize>,
-    /// The first one's place in the rows.
-    pub(super) first: usize,
-}
-
-/// The weighted rows of one point: views by twos, then ranges, then its own coordinates if observed.
-///
-/// It is used for one point after another, so that its memory is asked for only once.
-#[derive(Debug, Default)]
-pub(super) struct PointRows {
-    /// Which shared unknowns the rows contain.
-    pub(super) runs: Vec<Run>,
-    /// Numbers in a row of `beside`: partial derivatives by these unknowns, then the misclosure.
-    pub(super) width: usize,
-    /// Rows, one after the other.
-    pub(super) beside: Vec<f64>,
-    /// Partial derivatives by the point.
-    pub(super) by_point: Vec<Vector3<f64>>,
-    /// Standard deviation and weight factor of each row.
-    pub(super) weights: Vec<(f64, f64)>,
-    /// Their part of the sum that is made small.
-    pub(super) cost: f64,
-    /// Room for [`triangulate`].
-    pub(super) sums: Vec<f64>,
-}
-
-impl PointRows {
-    /// Empties the rows and lays out the unknowns of `ranges_of_columns`.
-    fn begin(&mut self, columns: impl Iterator<Item = Range<usize>>) {
-        self.beside.clear();
-        self.by_point.clear();
-        self.weights.clear();
-        self.cost = 0.0;
-        self.runs.clear();
-        let columns = columns.filter(|columns| !columns.is_empty());
-        self.runs
-            .extend(columns.map(|columns| Run { columns, first: 0 }));
-        self.runs.sort_unstable_by_key(|run| run.columns.start);
-        self.runs.dedup_by_key(|run| run.columns.start);
-        let mut first = 0;
-        for run in &mut self.runs {
-            run.first = first;
-            first += run.columns.len();
-        }
-        self.width = first + 1;
-    }
-
-    /// Appends an empty row.
-    fn push(&mut self, by_point: Vector3<f64>, misclosure: f64, weight: (f64, f64)) {
-        self.beside.resize(self.beside.len() + self.width - 1, 0.0);
-        self.beside.push(misclosure);
-        self.by_point.push(by_point);
-        self.weights.push(weight);
-    }
-
-    /// Appends a row of an image, divided by its standard deviation.
-    fn push_observed(&mut self, row: &Row, of_image: &[Option<usize>], factor: f64) {
-        let root_weight = factor.sqrt() / row.sigma;
-        self.push(
-            row.by_point * root_weight,
-            row.misclosure * root_weight,
-            (row.sigma, factor),
-        );
-        let partials: ImagePartials = row.by_image();
-        for (column, partial) in of_image.iter().zip(&partials) {
-            if let Some(column) = column {
-                self.set_last(*column, partial * root_weight);
-            }
-        }
-    }
-
-    /// Sets the derivative by the unknown in `column` in the last row.
-    fn set_last(&mut self, column: usize, value: f64) {
-        let last = self.beside.len() - self.width;
-        let run = self.runs.iter().find(|run| run.columns.contains(&column));
-        if let Some(run) = run {
-            self.beside[last + run.first + column - run.columns.start] = value;
-        }
-    }
-
-    /// Derivatives by the shared unknowns in a row, and its misclosure last.
-    pub(super) fn row(&self, row: usize) -> &[f64] {
-        &self.beside[row * self.width..(row + 1) * self.width]
-    }
-
-    /// Column of each shared unknown in the rows.
-    pub(super) fn columns(&self) -> impl Iterator<Item = usize> + '_ {
-        self.runs.iter().flat_map(|run| run.columns.clone())
     }
 }
 
@@ -291,7 +194,7 @@ impl<'a, M: ExteriorOrientation> Layout<'a, M> {
             return Err(Dropped::Undetermined);
         }
         // The triangle has the singular values of the rows.
-        let singular_values = triangulate(rows).singular_values();
+        let singular_values = rows.eliminate().singular_values();
         // Written so that NaN is refused.
         if singular_values.min() > DIRECTION_RATIO_MIN * singular_values.max() {
             Ok(())

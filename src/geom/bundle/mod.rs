@@ -19,9 +19,11 @@
 //! learns from many noisy lines to fly slowly: a bias of errors in variables.
 
 mod check;
-mod eliminate;
+
 mod layout;
+mod point_rows;
 mod quality;
+mod reduce;
 mod rows;
 mod solve;
 mod unknowns;

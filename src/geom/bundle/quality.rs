@@ -5,8 +5,8 @@ use rayon::prelude::*;
 
 use super::{
     AdjustedImage, AdjustedPoint, Adjustment, Dropped, ORIENTATION_UNKNOWNS, Residual,
-    eliminate::triangulate,
-    layout::{Layout, PointRows},
+    layout::Layout,
+    point_rows::PointRows,
     unknowns::{State, Unknown},
 };
 use crate::geom::pushbroom::ExteriorOrientation;
@@ -97,7 +97,7 @@ fn judge_point<M: ExteriorOrientation>(
     } = room;
     layout.fill(rows, state, point).ok()?;
     layout.fill(transformed, state, point).ok()?;
-    let inverse = triangulate(transformed).try_inverse()?;
+    let inverse = transformed.eliminate().try_inverse()?;
     let coupling = [0, 1, 2].map(|row| transformed.row(row));
     between.clear();
     between.extend(rows.columns().map(|column| {

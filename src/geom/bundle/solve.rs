@@ -6,9 +6,10 @@ use rayon::prelude::*;
 use super::{
     Adjustment, BundleFault, BundleOptions, Dropped, Network,
     check::check,
-    eliminate::{Reduced, point_step_m, reduce},
-    layout::{Layout, PointRows},
+    layout::Layout,
+    point_rows::PointRows,
     quality,
+    reduce::{Reduced, reduce},
     unknowns::State,
 };
 use crate::{
@@ -192,7 +193,7 @@ fn advance<M: ExteriorOrientation>(
         .par_iter()
         .map_init(PointRows::default, |rows, point| {
             layout.fill(rows, state, *point).ok()?;
-            point_step_m(rows, shared)
+            rows.point_step_m(shared)
         })
         .collect::<Option<_>>()?;
     let mut points_m = state.points_m.clone();

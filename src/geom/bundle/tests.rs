@@ -4,8 +4,9 @@ use nalgebra::{DMatrix, DVector, Vector2, Vector3};
 
 use super::{
     BundleImage, BundleOptions, BundlePoint, Network, ORIENTATION_UNKNOWNS, Range, View,
-    eliminate::{point_step_m, reduce},
-    layout::{Layout, PointRows},
+    layout::Layout,
+    point_rows::PointRows,
+    reduce::reduce,
     solve,
     unknowns::{State, Unknown},
 };
@@ -277,7 +278,7 @@ fn elimination_equals_the_dense_equations() {
     for point in active {
         let mut rows = PointRows::default();
         layout.fill(&mut rows, &state, point).unwrap();
-        let step_m = point_step_m(&mut rows, &step).unwrap();
+        let step_m = rows.point_step_m(&step).unwrap();
         for axis in 0..3 {
             let dense_m = dense_step[shared + 3 * point + axis];
             assert!((step_m[axis] - dense_m).abs() < 1e-9 * dense_step.rows(shared, 3 * 9).amax());

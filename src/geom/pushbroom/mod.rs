@@ -15,7 +15,7 @@ use nalgebra::{Matrix3, Vector3};
 
 pub use corrected::{CorrectedOrientation, OrientationCorrection};
 pub use detector::Detector;
-pub use models::{EulerPolynomial, RotationVectorPolynomial, VectorPolynomial};
+pub use models::{CameraModel, EulerPolynomial, RotationVectorPolynomial, VectorPolynomial};
 pub use newton::{Projector, Sighting};
 pub use published::{FixedPoint, FrameFirst, Limits, Solution};
 pub use sampled::{SampledOrientation, SamplesFault};

@@ -1,101 +1,21 @@
-//! Elimination of each point's coordinates, which leaves equations in the shared unknowns only.
+//! Reduced normal equations: each point's coordinates are eliminated, the shared unknowns are left.
 //!
 //! An orthogonal transformation of a point's rows leaves its three coordinates in the first three of
 //! them. The squares of the other rows sum up to the Schur complement `U − W V⁻¹ Wᵀ`; nothing is
 //! subtracted, so nothing is lost to cancellation.
 
-use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
+use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use super::{
-    layout::{Layout, PointRows},
+    layout::Layout,
+    point_rows::{PointRows, add_multiple},
     unknowns::State,
 };
 use crate::geom::pushbroom::{ExteriorOrientation, Unseen};
 
 /// Parts in which points are summed: fixed, so that the sums do not depend on the number of threads.
 const PARTS: usize = 16;
-
-/// Transforms at least three rows so that the point is left in the first three, and gives its triangle `R`.
-///
-/// `by_point` is used up; all else is transformed in place.
-///
-/// # Source
-/// Householder 1958, Unitary triangularization of a nonsymmetric matrix.
-pub(super) fn triangulate(rows: &mut PointRows) -> Matrix3<f64> {
-    let PointRows {
-        by_point,
-        beside,
-        width,
-        sums,
-        ..
-    } = rows;
-    let mut triangle = Matrix3::zeros();
-    for axis in 0..3 {
-        let (above, below) = by_point.split_at_mut(axis);
-        let length = below
-            .iter()
-            .map(|row| row[axis].powi(2))
-            .sum::<f64>()
-            .sqrt();
-        for (row, entry) in above.iter().enumerate() {
-            triangle[(row, axis)] = entry[axis];
-        }
-        if length == 0.0 {
-            continue;
-        }
-        // The mirror's normal takes the place of the column; its first entry is made large, not small.
-        let pivot = below[0][axis];
-        let image = -length.copysign(pivot);
-        below[0][axis] = pivot - image;
-        triangle[(axis, axis)] = image;
-        let share = 1.0 / (length * (length + pivot.abs()));
-        for later in axis + 1..3 {
-            let along: f64 = below.iter().map(|row| row[axis] * row[later]).sum();
-            for row in &mut *below {
-                row[later] -= share * along * row[axis];
-            }
-        }
-        sums.clear();
-        sums.resize(*width, 0.0);
-        let beside = &mut beside[axis * *width..];
-        for (normal, row) in below.iter().zip(beside.chunks_exact(*width)) {
-            add_multiple(sums, normal[axis], row);
-        }
-        for (normal, row) in below.iter().zip(beside.chunks_exact_mut(*width)) {
-            add_multiple(row, -share * normal[axis], sums);
-        }
-    }
-    triangle
-}
-
-/// Adds `factor · from` to `to`.
-fn add_multiple(to: &mut [f64], factor: f64, from: &[f64]) {
-    for (to, from) in to.iter_mut().zip(from) {
-        *to += factor * from;
-    }
-}
-
-/// Step of the point that goes with a step of the shared unknowns.
-pub(super) fn point_step_m(rows: &mut PointRows, shared: &DVector<f64>) -> Option<Vector3<f64>> {
-    // What the shared unknowns leave of the misclosures; from here on a row is nothing but that.
-    for row in 0..rows.weights.len() {
-        let at = row * rows.width;
-        let known: f64 = rows
-            .runs
-            .iter()
-            .map(|run| {
-                let partials = &rows.beside[at + run.first..][..run.columns.len()];
-                let steps = &shared.as_slice()[run.columns.clone()];
-                partials.iter().zip(steps).map(|(a, b)| a * b).sum::<f64>()
-            })
-            .sum();
-        rows.beside[row] = rows.beside[at + rows.width - 1] - known;
-    }
-    rows.width = 1;
-    let triangle = triangulate(rows);
-    triangle.solve_upper_triangular(&Vector3::from_column_slice(&rows.beside[..3]))
-}
 
 /// Reduced normal equations at a state.
 #[derive(Clone)]
@@ -116,7 +36,7 @@ impl Reduced {
         }
     }
 
-    /// Adds the rows of a point after [`triangulate`].
+    /// Adds the rows of a point after [`PointRows::eliminate`].
     fn add(&mut self, rows: &PointRows) {
         self.cost += rows.cost;
         let columns = self.right.len();
@@ -155,7 +75,7 @@ pub(super) fn reduce<M: ExteriorOrientation>(
             let mut rows = PointRows::default();
             for point in points {
                 layout.fill(&mut rows, state, *point)?;
-                triangulate(&mut rows);
+                rows.eliminate();
                 part.add(&rows);
             }
             Ok(part)
