@@ -15,7 +15,10 @@ fn is_up_to_date(relative: &str, expected: &str) {
         return;
     }
     let found = fs::read_to_string(path).unwrap_or_default();
-    let differs = found.lines().zip(expected.lines()).position(|(a, b)| a != b);
+    let differs = found
+        .lines()
+        .zip(expected.lines())
+        .position(|(a, b)| a != b);
     let line = differs.unwrap_or_else(|| found.lines().count().min(expected.lines().count()));
     assert!(
         found == expected,
@@ -30,4 +33,12 @@ fn is_up_to_date(relative: &str, expected: &str) {
 #[test]
 fn the_list_of_products_is_up_to_date() {
     is_up_to_date("docs/products.md", &areograph::products::documentation());
+}
+
+#[test]
+fn schemas_are_up_to_date() {
+    for (name, schema) in areograph::products::schemas() {
+        let text = serde_json::to_string_pretty(&schema).unwrap() + "\n";
+        is_up_to_date(&format!("config/schema/{name}.schema.json"), &text);
+    }
 }

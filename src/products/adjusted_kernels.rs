@@ -86,7 +86,7 @@ pub(super) static ATTITUDE: Declaration = Declaration {
     rows: "epochs",
     role: Role::Data,
     content: Content::Foreign,
-    write: Write::With(METAKERNEL.path),
+    write: Write::WithAnother,
     uses: &[Use {
         program: Program::AdjustedKernels,
         lines: "spiceinit from=<image>.cub spk=../adjusted/<image>.bsp ck=../adjusted/<image>.bc",
@@ -100,7 +100,7 @@ pub(super) static POSITION: Declaration = Declaration {
     rows: "epochs",
     role: Role::Data,
     content: Content::Foreign,
-    write: Write::With(METAKERNEL.path),
+    write: Write::WithAnother,
     uses: &[],
 };
 

@@ -152,13 +152,15 @@ fn text_columns() -> Vec<Meaning> {
         .collect()
 }
 
-/// The attributes of GeoJSON.
-pub(super) fn gis_columns() -> Vec<Meaning> {
-    Table::new(columns(), Vec::new())
-        .for_gis()
-        .columns()
-        .copied()
-        .collect()
+/// JSON Schema of the GeoJSON file.
+pub(super) fn schema() -> Value {
+    let table = Table::new(columns(), Vec::new()).for_gis();
+    geojson::schema(
+        "Footprints as GeoJSON",
+        "footprints.geojson of areograph: laser shots inside the windows, Mars sphere, areocentric; west > east in \
+         bbox when it crosses the antimeridian.",
+        &table.columns().copied().collect::<Vec<_>>(),
+    )
 }
 
 /// Longitude (-180..180) and latitude of every footprint, degrees.

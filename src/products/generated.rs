@@ -2,11 +2,20 @@
 
 use std::fmt::Write as _;
 
+use serde_json::Value;
+
 use super::{
+    footprints,
     product::{Content, Declaration},
     registry::PRODUCTS,
     table::{Kind, Meaning},
 };
+
+/// JSON Schemas that follow from declarations, by their names in `config/schema`.
+#[must_use]
+pub fn schemas() -> Vec<(&'static str, Value)> {
+    vec![("footprints", footprints::schema())]
+}
 
 /// `docs/products.md`: every product, and the columns of every table.
 #[must_use]

@@ -7,14 +7,14 @@ use std::{
 };
 
 use serde::{Serialize, Serializer, ser::SerializeMap as _};
-use serde_json::{Value, json};
+use serde_json::{Map, Value, json};
 
 use super::{
     coordinates::{FRAME, bounding_box_deg},
     fault::ProductFault,
     files::{create, finish, open, to_value},
     gis::Features,
-    table::{Meaning, Values},
+    table::{Kind, Meaning, Values},
 };
 use crate::error::{IoFault, Place, Result};
 
@@ -61,6 +61,86 @@ impl Serialize for Properties<'_> {
         }
         map.end()
     }
+}
+
+/// JSON Schema of points with these attributes.
+pub(super) fn schema(title: &str, description: &str, attributes: &[Meaning]) -> Value {
+    let closed = |properties: Value, optional: &[&str]| {
+        let names = properties.as_object().into_iter().flatten();
+        let names = names.map(|(name, _)| name.as_str());
+        let required: Vec<&str> = names.filter(|name| !optional.contains(name)).collect();
+        json!({
+            "type": "object",
+            "additionalProperties": false,
+            "required": required,
+            "properties": properties,
+        })
+    };
+    let longitude = json!({ "type": "number", "minimum": -180, "maximum": 180 });
+    let latitude = json!({ "type": "number", "minimum": -90, "maximum": 90 });
+    let numbers = |of: &[&Value]| json!({ "type": "array", "prefixItems": of, "minItems": of.len(), "maxItems": of.len() });
+    let optional: Vec<&str> = attributes
+        .iter()
+        .filter(|column| column.optional)
+        .map(|column| column.name)
+        .collect();
+    let properties: Map<String, Value> = attributes
+        .iter()
+        .map(|column| (column.name.to_owned(), attribute(column)))
+        .collect();
+    let geometry = closed(
+        json!({
+            "type": { "const": "Point" },
+            "coordinates": numbers(&[&longitude, &latitude]),
+        }),
+        &[],
+    );
+    let feature = closed(
+        json!({
+            "type": { "const": "Feature" },
+            "geometry": geometry,
+            "properties": closed(properties.into(), &optional),
+        }),
+        &[],
+    );
+    let crs_name = closed(json!({ "name": { "const": CRS_URN } }), &[]);
+    let crs = json!({ "type": { "const": "name" }, "properties": crs_name });
+    let mut schema = closed(
+        json!({
+            "type": { "const": "FeatureCollection" },
+            "name": { "type": "string" },
+            "crs": closed(crs, &[]),
+            "frame": {
+                "description": "The frame of the coordinates, and how far that of the CRS code is from it.",
+                "type": "string",
+                "minLength": 1,
+            },
+            "features": { "type": "array", "items": feature },
+            "bbox": numbers(&[&longitude, &latitude, &longitude, &latitude]),
+        }),
+        &["bbox"],
+    );
+    schema["$schema"] = json!("https://json-schema.org/draft/2020-12/schema");
+    schema["title"] = json!(title);
+    schema["description"] = json!(description);
+    schema
+}
+
+/// JSON Schema of an attribute.
+fn attribute(column: &Meaning) -> Value {
+    let mut schema = match column.kind {
+        Kind::Real => json!({ "type": "number" }),
+        Kind::Natural => json!({ "type": "integer", "minimum": 0 }),
+        Kind::Integer => json!({ "type": "integer" }),
+        Kind::Flag => json!({ "type": "boolean" }),
+        Kind::Text | Kind::Bytes => json!({ "type": "string" }),
+    };
+    schema["description"] = json!(column.description);
+    if let Some([least, greatest]) = column.limits {
+        schema["minimum"] = json!(least);
+        schema["maximum"] = json!(greatest);
+    }
+    schema
 }
 
 /// Writes the points and reads them back, one line at a time: a document of a million features would take

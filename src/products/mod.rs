@@ -38,7 +38,7 @@ pub use exchange::{
     ControlMeasure, ControlPoint, GroundEstimate, ImageMeasure, LidarPoint, moc_serial_number,
     write_gcp, write_lidar_data,
 };
-pub use generated::documentation;
+pub use generated::{documentation, schemas};
 pub use product::Product;
 pub use site::{GeometricProducts, ImageProducts, KernelLine, SiteProducts};
 

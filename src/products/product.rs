@@ -80,8 +80,8 @@ pub(super) enum Write {
     Ties(fn(&Path, &Context, &GeometricProducts) -> Result<Option<u64>>),
     /// For every image of a site with tie points.
     AdjustedImage(fn(&Path, &Context, &ImageProducts) -> Result<u64>),
-    /// For every image of a site with tie points, by the product of this path, which writes several.
-    With(&'static str),
+    /// For every image of a site with tie points, by the product that writes several.
+    WithAnother,
     /// For a site with tie points, others with it.
     Several(fn(&Context, &GeometricProducts) -> Result<Vec<Written>>),
 }
@@ -143,7 +143,7 @@ impl Declaration {
             Write::Footprints(_) => "a site with footprints",
             Write::Image(_) => "every image",
             Write::Ties(_) | Write::Several(_) => "a site with tie points",
-            Write::AdjustedImage(_) | Write::With(_) => "every image of a site with tie points",
+            Write::AdjustedImage(_) | Write::WithAnother => "every image of a site with tie points",
         }
     }
 
