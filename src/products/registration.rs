@@ -140,7 +140,7 @@ struct Registered<'a> {
     at: usize,
 }
 
-impl<'a> Registered<'a> {
+impl Registered<'_> {
     /// The column that `of` picks, in the footprint's row.
     fn get<T: Copy>(&self, of: fn(&RegisteredPoints) -> &Vec<T>) -> T {
         of(&self.image.registration.points)[self.at]

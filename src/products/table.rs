@@ -94,10 +94,13 @@ pub(super) struct Meaning {
     gis: Gis,
 }
 
+/// Gives the values of rows.
+type Gather<R> = dyn Fn(&[R]) -> Values;
+
 /// A column of a table whose rows are `R`.
 pub(super) struct Column<R> {
     meaning: Meaning,
-    values: Box<dyn Fn(&[R]) -> Values>,
+    values: Box<Gather<R>>,
 }
 
 /// The column `name`, whose value in a row is what `of` gives.
@@ -341,7 +344,7 @@ pub(super) mod tests {
     #[test]
     fn formats_get_their_columns_in_their_order() {
         let table = || {
-            let none = |name| column(name, Unit::None, "", |_: &()| String::new());
+            let none = |name| column(name, Unit::None, "", |(): &()| String::new());
             let columns = vec![
                 none("text").in_dbase("text", 0, 0).last_in_gis(),
                 column("bytes", Unit::None, "", |(): &()| vec![1_u8]),

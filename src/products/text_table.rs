@@ -127,11 +127,12 @@ mod tests {
         table::{Unit, column, tests::numbers},
     };
 
+    type Row = (f64, &'static str, f64, Option<f64>);
+
     #[test]
     fn text_with_commas_and_numbers_with_all_digits_come_back() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("table.csv");
-        type Row = (f64, &'static str, f64, Option<f64>);
         let columns = vec![
             column("a_m", Unit::Metre, "", |row: &Row| row.0),
             column("b", Unit::None, "", |row: &Row| row.1.to_owned()),

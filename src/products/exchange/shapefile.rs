@@ -79,7 +79,7 @@ pub(in crate::products) static ATTRIBUTES: Declaration = part!(
     "attributes of footprints.shp",
     |path, of| {
         let features = features(of.site);
-        write_attributes(path, features.newest_utc, features.attributes.for_dbase())
+        write_attributes(path, features.newest_utc, &features.attributes.for_dbase())
     }
 );
 
@@ -198,11 +198,11 @@ fn cell(values: &Values, row: usize) -> Cell<'_> {
 ///
 /// # Errors
 /// Numbers that are not finite; what the disk or the encoder refuses; records that come back different.
-fn write_attributes(path: &Path, newest_utc: &str, table: Table) -> Result<()> {
-    let bytes = encode_attributes(newest_utc, &table).in_file(path)?;
+fn write_attributes(path: &Path, newest_utc: &str, table: &Table) -> Result<()> {
+    let bytes = encode_attributes(newest_utc, table).in_file(path)?;
     write_bytes(path, &bytes)?;
     drop(bytes);
-    read_attributes(path, &table).in_file(path)
+    read_attributes(path, table).in_file(path)
 }
 
 fn encode_attributes(newest_utc: &str, table: &Table) -> Result<Vec<u8>> {
@@ -329,7 +329,7 @@ mod tests {
     fn a_changed_attribute_is_noticed() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.dbf");
-        write_attributes(&path, example().newest_utc, table()).unwrap();
+        write_attributes(&path, example().newest_utc, &table()).unwrap();
         let bytes = fs::read(&path).unwrap();
         assert_eq!(bytes[1..4], [99, 8, 24]);
         // The last digit that stands there of a longitude.
@@ -351,7 +351,7 @@ mod tests {
     #[test]
     fn a_full_disk_is_told_as_such() {
         let full = Path::new("/dev/full");
-        let failure = write_attributes(full, example().newest_utc, table()).unwrap_err();
+        let failure = write_attributes(full, example().newest_utc, &table()).unwrap_err();
         assert_eq!(failure.kind(), FailureKind::Io);
         assert_eq!(failure.file.as_deref(), Some(full));
         assert!(failure.to_string().contains("free some space"), "{failure}");
