@@ -182,12 +182,12 @@ fn written(to: &AdjustedKernels, images: &[AdjustedImage]) -> Result<Vec<Written
     // CSPICE has one user at a time.
     drop(session);
     for (image, states) in images.iter().zip(&states) {
-        let name = position_name(image);
+        let name = position_kernel(&image.times.id);
         let rows = states.write(&to.directory.join(&name), &comment(image, to))?;
         add(name, rows, &POSITION);
     }
     for image in images {
-        read_back(to, image).in_file(position_name(image))?;
+        read_back(to, image).in_file(position_kernel(&image.times.id))?;
     }
     let path = to.directory.join(METAKERNEL.path);
     write_text(&path, &metakernel(to, images)?)?;
@@ -195,8 +195,10 @@ fn written(to: &AdjustedKernels, images: &[AdjustedImage]) -> Result<Vec<Written
     Ok(written)
 }
 
-fn position_name(image: &AdjustedImage) -> String {
-    POSITION.path_of(&image.times.id)
+/// Path of the SPK of an image below the folder of the products, the longest that CSPICE writes there.
+#[must_use]
+pub fn position_kernel(image: &str) -> String {
+    POSITION.path_of(image)
 }
 
 fn attitude_name(image: &AdjustedImage) -> String {
@@ -265,7 +267,8 @@ fn comment(image: &AdjustedImage, to: &AdjustedKernels) -> String {
 
 /// Reads every sample of `image` through the original kernels and its own pair.
 fn read_back(to: &AdjustedKernels, image: &AdjustedImage) -> Result<()> {
-    let own = [position_name(image), attitude_name(image)].map(|name| to.directory.join(name));
+    let own = [position_kernel(&image.times.id), attitude_name(image)]
+        .map(|name| to.directory.join(name));
     let session = Session::open(&to.originals.followed_by(&own)?)?;
     let (mut distances_m, mut turns_rad) = (Vec::new(), Vec::new());
     for sample in &image.orientation.samples {
@@ -297,7 +300,7 @@ fn read_back(to: &AdjustedKernels, image: &AdjustedImage) -> Result<()> {
 fn metakernel(to: &AdjustedKernels, images: &[AdjustedImage]) -> Result<String> {
     let names = images
         .iter()
-        .flat_map(|image| [position_name(image), attitude_name(image)]);
+        .flat_map(|image| [position_kernel(&image.times.id), attitude_name(image)]);
     let names: Vec<PathBuf> = names.map(PathBuf::from).collect();
     let files: Vec<PathBuf> = names.iter().map(|name| to.directory.join(name)).collect();
     let own = KernelSet::from_files(&files)?;
