@@ -28,6 +28,7 @@ const FLOORS: [&[&str]; 6] = [
         "footprints",
         "ties",
         "files",
+        "schema",
         "altimetry",
         "image",
         "kernel_source",

@@ -8,6 +8,8 @@
 
 use std::{env, fs, path::Path};
 
+use areograph::schema::DocumentSchema;
+
 fn is_up_to_date(relative: &str, expected: &str) {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(relative);
     if env::var("SNAPSHOTS").is_ok_and(|mode| mode == "overwrite") {
@@ -37,7 +39,10 @@ fn the_list_of_products_is_up_to_date() {
 
 #[test]
 fn schemas_are_up_to_date() {
-    for (name, schema) in areograph::products::schemas() {
+    let mut schemas = areograph::products::schemas();
+    schemas.push(areograph::store::manifest::schema());
+    schemas.push(areograph::difference::schema());
+    for DocumentSchema { name, schema } in schemas {
         let text = serde_json::to_string_pretty(&schema).unwrap() + "\n";
         is_up_to_date(&format!("config/schema/{name}.schema.json"), &text);
     }

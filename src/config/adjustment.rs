@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::{
@@ -17,11 +18,12 @@ pub struct TiesConfig {
 }
 
 /// How tie points are intersected.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
 pub struct IntersectionConfig {
     /// Weights of the measurements.
     pub weighting: Weighting,
     /// Smallest angle between the two rays of a point that differ most, radians.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub convergence_min_rad: f64,
 }
 

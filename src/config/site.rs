@@ -2,6 +2,7 @@
 
 use std::{collections::BTreeMap, path::PathBuf};
 
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::adjustment::{AdjustmentConfig, IntersectionConfig, TiesConfig};
@@ -119,7 +120,7 @@ impl ImageConfig {
 pub const SCAN_STEPS_MAX: u32 = 10_000;
 
 /// Limits and options of the range check.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct RangeCheckConfig {
     /// Largest |mean| of a valid profile, metres.
     pub mean_max_m: f64,
@@ -149,12 +150,14 @@ pub struct OrientationConfig {
 }
 
 /// Projection of footprints into the images.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct RegistrationConfig {
     /// The orientation that points are projected with.
     pub model: CameraModel,
     /// A step of the published iterations below this is the last, lines.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub tolerance_lines: f64,
     /// Steps after which the published iterations are given up.
+    #[schemars(range(min = 1))]
     pub steps_max: u32,
 }

@@ -17,6 +17,7 @@ use crate::{
     footprints::Footprints,
     frames::MarsIau2000,
     geom::ellipsoid::{AreocentricLatitude, spherical_to_xyz_m},
+    schema::DocumentSchema,
 };
 
 pub(super) static CSV: Declaration = Declaration {
@@ -69,7 +70,7 @@ pub(super) static GEOJSON: Declaration = Declaration {
     readers: "GIS, web maps",
     rows: "shots",
     role: Role::Data,
-    content: Content::Document("footprints"),
+    content: Content::Document(schema),
     write: Write::Site(|path, of| geojson::write(path, features(of.site)).map(Some)),
     uses: &[Use {
         program: Program::Gis,
@@ -152,15 +153,19 @@ fn text_columns() -> Vec<Meaning> {
         .collect()
 }
 
-/// JSON Schema of the GeoJSON file.
-pub(super) fn schema() -> Value {
+/// Schema of the GeoJSON file.
+pub(super) fn schema() -> DocumentSchema {
     let table = Table::new(columns(), Vec::new()).for_gis();
-    geojson::schema(
+    let schema = geojson::schema(
         "Footprints as GeoJSON",
         "footprints.geojson of areograph: laser shots inside the windows, Mars sphere, areocentric; west > east in \
          bbox when it crosses the antimeridian.",
         &table.columns().copied().collect::<Vec<_>>(),
-    )
+    );
+    DocumentSchema {
+        name: "footprints",
+        schema,
+    }
 }
 
 /// Longitude (-180..180) and latitude of every footprint, degrees.

@@ -2,19 +2,26 @@
 
 use std::fmt::Write as _;
 
-use serde_json::Value;
-
 use super::{
-    footprints,
     product::{Content, Declaration},
     registry::PRODUCTS,
     table::{Kind, Meaning},
 };
+use crate::schema::DocumentSchema;
 
-/// JSON Schemas that follow from declarations, by their names in `config/schema`.
+/// JSON Schemas of the documents, each once.
 #[must_use]
-pub fn schemas() -> Vec<(&'static str, Value)> {
-    vec![("footprints", footprints::schema())]
+pub fn schemas() -> Vec<DocumentSchema> {
+    let mut schemas: Vec<DocumentSchema> = Vec::new();
+    for product in PRODUCTS {
+        if let Content::Document(schema) = product.content {
+            let schema = schema();
+            if !schemas.contains(&schema) {
+                schemas.push(schema);
+            }
+        }
+    }
+    schemas
 }
 
 /// `docs/products.md`: every product, and the columns of every table.
@@ -56,12 +63,12 @@ pub fn documentation() -> String {
 }
 
 fn schema_link(product: &Declaration) -> String {
-    match product.content {
-        Content::Document(name) => {
-            format!("[{name}](../config/schema/{name}.schema.json)")
-        }
-        Content::Table(_) | Content::Foreign => String::new(),
-    }
+    let name = match product.content {
+        Content::Document(schema) => schema().name,
+        Content::Described(name) => name,
+        Content::Table(_) | Content::Foreign => return String::new(),
+    };
+    format!("[{name}](../config/schema/{name}.schema.json)")
 }
 
 fn row(column: &Meaning) -> String {

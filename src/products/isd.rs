@@ -115,7 +115,7 @@ pub(super) static ISD: Declaration = Declaration {
     readers: "usgscsm, Ames Stereo Pipeline, ISIS",
     rows: "table nodes",
     role: Role::Data,
-    content: Content::Document("isd"),
+    content: Content::Described("isd"),
     write: Write::Image(write),
     uses: &[Use {
         program: Program::CameraModel,
@@ -131,7 +131,7 @@ pub(super) static ADJUSTED: Declaration = Declaration {
     readers: "usgscsm, Ames Stereo Pipeline, ISIS",
     rows: "table nodes",
     role: Role::Data,
-    content: Content::Document("isd"),
+    content: Content::Described("isd"),
     write: Write::AdjustedImage(|path, of, image| {
         let orientation = Orientation {
             tables: geometric_tables(image.orientation)?,

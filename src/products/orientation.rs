@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::{
@@ -15,6 +16,7 @@ use super::{
 use crate::{
     error::Result,
     geom::polynomial::Fit,
+    schema::DocumentSchema,
     stages::{
         fit_sensor_model::{EulerModel, RotationVectorModel, SensorModel},
         sample_orientation::{BoresightGround, GroundPoint, Orientation, OrientationSample},
@@ -35,26 +37,34 @@ const CONVENTIONS: [&str; 6] = [
      order; to be used near gimbal lock, where |cos phi| < 0.1 leaves omega and kappa badly determined",
 ];
 
-#[derive(Serialize)]
+#[derive(Serialize, JsonSchema)]
+#[schemars(
+    title = "Exterior orientation of an image",
+    description = "images/<id>/orientation.json of areograph: times, polynomial sensor models of first and second order with residuals (the paper's Table 4), and the rotation-vector form."
+)]
 struct Document<'a> {
+    #[schemars(extend("const" = "areograph orientation 1"))]
     format: &'static str,
     image: &'a str,
     valid: bool,
     invalid_because: Vec<&'a str>,
     times: Times<'a>,
     conventions: [&'static str; 6],
+    #[schemars(range(min = 3))]
     samples: usize,
     /// East longitude and areocentric latitude, degrees: along the first edge and back along the last.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(length(min = 3))]
     outline_deg: Option<Vec<[f64; 2]>>,
     first_order: Euler<'a>,
     second_order: Euler<'a>,
     rotation_vector: RotationVector<'a>,
+    #[schemars(range(min = 0.0, max = 1.0))]
     cos_phi_min: f64,
     near_gimbal_lock: bool,
 }
 
-#[derive(Serialize)]
+#[derive(Serialize, JsonSchema)]
 struct Times<'a> {
     start_et_s: f64,
     start_from: StartFrom,
@@ -63,6 +73,7 @@ struct Times<'a> {
     utc_start: &'a str,
     middle_et_s: f64,
     stop_et_s: f64,
+    #[schemars(extend("exclusiveMinimum" = 0))]
     line_period_s: f64,
     exposure_s: f64,
     downtrack_summing: u32,
@@ -74,35 +85,49 @@ struct Times<'a> {
     notes: &'a [String],
 }
 
-#[derive(Serialize)]
+#[derive(Serialize, JsonSchema)]
 struct Euler<'a> {
+    #[schemars(range(min = 0.0))]
     position_rmse_m: f64,
     /// Root mean square on the ellipsoid of what the residuals of the angles do there.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(range(min = 0.0))]
     pointing_ground_rmse_m: Option<f64>,
-    x_m: Polynomial<'a>,
-    y_m: Polynomial<'a>,
-    z_m: Polynomial<'a>,
-    omega_rad: Polynomial<'a>,
-    phi_rad: Polynomial<'a>,
-    kappa_rad: Polynomial<'a>,
+    x_m: Length<'a>,
+    y_m: Length<'a>,
+    z_m: Length<'a>,
+    omega_rad: Angle<'a>,
+    phi_rad: Angle<'a>,
+    kappa_rad: Angle<'a>,
 }
 
-#[derive(Serialize)]
+#[derive(Serialize, JsonSchema)]
 struct RotationVector<'a> {
     reference: [[f64; 3]; 3],
-    x_rad: Polynomial<'a>,
-    y_rad: Polynomial<'a>,
-    z_rad: Polynomial<'a>,
+    x_rad: Angle<'a>,
+    y_rad: Angle<'a>,
+    z_rad: Angle<'a>,
 }
 
-/// A fit; RMSE and residuals in the unit of the samples.
-#[derive(Serialize)]
-struct Polynomial<'a> {
+/// Coefficients from the constant upwards in metres per power of a line; residual = sample - polynomial.
+#[derive(Serialize, JsonSchema)]
+struct Length<'a> {
+    #[schemars(length(min = 2, max = 3))]
     coefficients: &'a [f64],
+    #[schemars(range(min = 0.0))]
     rmse: f64,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    rmse_arcsec: Option<f64>,
+    residuals: &'a [f64],
+}
+
+/// Coefficients from the constant upwards in radians per power of a line; RMSE in arcseconds as well.
+#[derive(Serialize, JsonSchema)]
+struct Angle<'a> {
+    #[schemars(length(min = 2, max = 3))]
+    coefficients: &'a [f64],
+    #[schemars(range(min = 0.0))]
+    rmse: f64,
+    #[schemars(range(min = 0.0))]
+    rmse_arcsec: f64,
     residuals: &'a [f64],
 }
 
@@ -131,7 +156,7 @@ pub(super) static TABLE: Declaration = declared!(
 pub(super) static DOCUMENT: Declaration = declared!(
     "images/<image>/orientation.json",
     "times and sensor models: polynomials of first and second order with residuals, rotation-vector form",
-    Content::Document("orientation"),
+    Content::Document(schema),
     Write::Image(write_document)
 );
 
@@ -145,7 +170,7 @@ pub(super) static ADJUSTED_TABLE: Declaration = declared!(
 pub(super) static ADJUSTED_DOCUMENT: Declaration = declared!(
     "images/<image>/adjusted_orientation.json",
     "the sensor models fitted to them",
-    Content::Document("orientation"),
+    Content::Document(schema),
     Write::AdjustedImage(write_document)
 );
 
@@ -160,6 +185,11 @@ fn write_document(path: &Path, _: &Context, image: &ImageProducts) -> Result<u64
 }
 
 type Sample<'a> = &'a OrientationSample;
+
+/// Schema of the document.
+pub(super) fn schema() -> DocumentSchema {
+    DocumentSchema::of::<Document>("orientation")
+}
 
 fn columns<'a>() -> Vec<Column<Sample<'a>>> {
     fn boresight<'a>(
@@ -309,19 +339,20 @@ fn times(times: &ImageTimes) -> Times<'_> {
     }
 }
 
-fn length(fit: &Fit) -> Polynomial<'_> {
-    Polynomial {
+fn length(fit: &Fit) -> Length<'_> {
+    Length {
         coefficients: fit.polynomial.coefficients(),
         rmse: fit.rmse,
-        rmse_arcsec: None,
         residuals: &fit.residuals,
     }
 }
 
-fn angle(fit: &Fit) -> Polynomial<'_> {
-    Polynomial {
-        rmse_arcsec: Some(fit.rmse / RADIANS_PER_ARCSECOND),
-        ..length(fit)
+fn angle(fit: &Fit) -> Angle<'_> {
+    Angle {
+        coefficients: fit.polynomial.coefficients(),
+        rmse: fit.rmse,
+        rmse_arcsec: fit.rmse / RADIANS_PER_ARCSECOND,
+        residuals: &fit.residuals,
     }
 }
 

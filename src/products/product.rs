@@ -6,7 +6,7 @@ use super::{
     site::{GeometricProducts, ImageProducts, SiteProducts},
     table::Meaning,
 };
-use crate::error::Result;
+use crate::{error::Result, schema::DocumentSchema};
 
 /// A file that was written.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -62,8 +62,10 @@ impl Role {
 pub(super) enum Content {
     /// A table with these columns.
     Table(fn() -> Vec<Meaning>),
-    /// A document of this schema in `config/schema`.
-    Document(&'static str),
+    /// A document of this schema.
+    Document(fn() -> DocumentSchema),
+    /// A document of others' making, with this schema of ours in `config/schema`.
+    Described(&'static str),
     /// A format of others.
     Foreign,
 }

@@ -2,6 +2,7 @@
 
 use std::collections::HashSet;
 
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::{
@@ -16,6 +17,7 @@ use crate::{
     config::RangeCheckConfig,
     footprints::Footprint,
     geom::statistics::{Summary, Trend},
+    schema::DocumentSchema,
     stages::{
         check_ranges::{BiasScan, ProfileRanges, ShotResiduals},
         group_profiles::{Profile, SimultaneousImage},
@@ -71,35 +73,42 @@ fn each_once(rows: &[u32]) -> Vec<usize> {
         .collect()
 }
 
-#[derive(Serialize)]
+#[derive(Serialize, JsonSchema)]
+#[schemars(
+    title = "Range check of a site",
+    description = "ranges.json of areograph: residuals of measured ranges per profile (the paper's Table 3), their limits and verdicts. Metres and seconds; what is unknown is left out."
+)]
 struct Document<'a> {
+    #[schemars(extend("const" = "areograph ranges 1"))]
     format: &'static str,
     site: &'a str,
     valid: bool,
     invalid_because: Vec<String>,
     units: &'static str,
+    #[schemars(length(min = 1))]
     definitions: Vec<Definition>,
     mola_clock: Clock<'a>,
     limits: &'a RangeCheckConfig,
+    #[schemars(range(min = 0.0))]
     trajectory_error_m: f64,
     summary: SiteSummary,
     profiles: Vec<ProfileDocument<'a>>,
 }
 
-#[derive(Serialize)]
+#[derive(Serialize, JsonSchema)]
 struct Definition {
     residual: &'static str,
     is: &'static str,
 }
 
-#[derive(Serialize)]
+#[derive(Serialize, JsonSchema)]
 struct Clock<'a> {
     #[serde(flatten)]
     configured: &'a MolaClock,
     correction_s: f64,
 }
 
-#[derive(Serialize)]
+#[derive(Serialize, JsonSchema)]
 struct SiteSummary {
     profiles: usize,
     profiles_valid: usize,
@@ -108,7 +117,7 @@ struct SiteSummary {
     range_minus_distance_m: Summary,
 }
 
-#[derive(Serialize)]
+#[derive(Serialize, JsonSchema)]
 struct ProfileDocument<'a> {
     id: &'a str,
     window: &'a str,
@@ -132,7 +141,7 @@ struct ProfileDocument<'a> {
 }
 
 /// A scan without the members that are not known.
-#[derive(Serialize)]
+#[derive(Serialize, JsonSchema)]
 struct Scan<'a> {
     correction_s: &'a [f64],
     spread_m: &'a [f64],
@@ -164,7 +173,7 @@ pub(super) static DOCUMENT: Declaration = Declaration {
     readers: "scripts",
     rows: "profiles",
     role: Role::Data,
-    content: Content::Document("ranges"),
+    content: Content::Document(schema),
     write: Write::Site(|path, of| {
         write_json(path, &document(of.site))?;
         Ok(Some(of.site.profiles.len() as u64))
@@ -250,6 +259,11 @@ fn columns<'a>() -> Vec<Column<RangedShot<'a>>> {
             |shot: &RangedShot| shot.site.ranges.shots.outlier[shot.at],
         ),
     ]
+}
+
+/// Schema of the document.
+pub(super) fn schema() -> DocumentSchema {
+    DocumentSchema::of::<Document>("ranges")
 }
 
 fn document<'a>(site: &SiteProducts<'a>) -> Document<'a> {

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::{
@@ -14,6 +15,7 @@ use super::{
 use crate::{
     config::RegistrationConfig,
     geom::{pushbroom::CameraModel, statistics::Summary},
+    schema::DocumentSchema,
     stages::{
         group_profiles::Profile,
         register::{MethodRun, ModelDifference, ProfileOnImage, RegisteredPoints},
@@ -53,22 +55,28 @@ const DEFINITIONS: [(&str, &str); 6] = [
     ),
 ];
 
-#[derive(Serialize)]
+#[derive(Serialize, JsonSchema)]
+#[schemars(
+    title = "Registration of a site",
+    description = "registration.json of areograph: footprints in every image, what the published iterations cost on them, and what the choice of the camera model moves. Lines, samples and image pixels; what is unknown is left out."
+)]
 struct Document<'a> {
+    #[schemars(extend("const" = "areograph registration 1"))]
     format: &'static str,
     site: &'a str,
+    #[schemars(length(min = 1))]
     definitions: Vec<Definition>,
     configured: &'a RegistrationConfig,
     images: Vec<ImageDocument<'a>>,
 }
 
-#[derive(Serialize)]
+#[derive(Serialize, JsonSchema)]
 struct Definition {
     of: &'static str,
     is: &'static str,
 }
 
-#[derive(Serialize)]
+#[derive(Serialize, JsonSchema)]
 struct ImageDocument<'a> {
     image: &'a str,
     model: CameraModel,
@@ -83,12 +91,13 @@ struct ImageDocument<'a> {
     models: &'a [ModelDifference],
 }
 
-#[derive(Serialize)]
+#[derive(Serialize, JsonSchema)]
 struct ProfileDocument<'a> {
     id: &'a str,
     points: u32,
     inside: u32,
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(range(min = 0.0))]
     shot_spacing_lines: Option<f64>,
 }
 
@@ -111,7 +120,7 @@ pub(super) static DOCUMENT: Declaration = Declaration {
     readers: "scripts",
     rows: "images",
     role: Role::Data,
-    content: Content::Document("registration"),
+    content: Content::Document(schema),
     write: Write::Site(|path, of| {
         write_json(path, &document(of.site))?;
         Ok(Some(of.site.images.len() as u64))
@@ -257,6 +266,11 @@ fn columns<'a>() -> Vec<Column<Registered<'a>>> {
             |point: &Registered| point.get(|of| &of.extrapolated),
         ),
     ]
+}
+
+/// Schema of the document.
+pub(super) fn schema() -> DocumentSchema {
+    DocumentSchema::of::<Document>("registration")
 }
 
 fn document<'a>(site: &SiteProducts<'a>) -> Document<'a> {

@@ -1,5 +1,6 @@
 //! Footprints of one orbit inside one window become a profile, marked where an image was taken with it.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::tag_times::ImageTimes;
@@ -34,7 +35,7 @@ pub struct Profile {
 }
 
 /// An image that was exposed during a profile.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub struct SimultaneousImage {
     /// Image identifier.
     pub image: String,

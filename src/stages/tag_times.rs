@@ -1,5 +1,6 @@
 //! Image labels become line times: spacecraft clock or UTC to ET, line period, header and delivered lines.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::{
@@ -51,7 +52,7 @@ pub struct ImageTimes {
 }
 
 /// Source of an image's start time.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum StartFrom {
     /// Spacecraft clock.

@@ -15,6 +15,7 @@ use crate::{
         table::{Column, Table, Unit, column, meanings},
         text_table,
     },
+    schema::DocumentSchema,
     units::METRES_PER_KM,
 };
 
@@ -50,7 +51,7 @@ pub(in crate::products) static LOLA_LIKE_SIDECAR: Declaration = Declaration {
     readers: "scripts",
     rows: "",
     role: Role::Metadata,
-    content: Content::Document("csv_columns"),
+    content: Content::Document(schema),
     write: Write::Footprints(|path, _| {
         let sidecar = Sidecar::new(
             "lola_like.csv",
@@ -84,7 +85,7 @@ pub(in crate::products) static ODE_SIDECAR: Declaration = Declaration {
     readers: "scripts",
     rows: "",
     role: Role::Metadata,
-    content: Content::Document("csv_columns"),
+    content: Content::Document(schema),
     write: Write::Footprints(|path, _| {
         let sidecar = Sidecar::new(
             "ode_pts.csv",
@@ -106,7 +107,7 @@ const ODE_RADIUS: &str = "column 5 is the distance from the centre of Mars after
 /// What the readers of a CSV file must be told.
 #[derive(Serialize, JsonSchema)]
 #[schemars(title = "Columns of a CSV file")]
-pub(in crate::products) struct Sidecar {
+struct Sidecar {
     /// The file that is described.
     file: &'static str,
     /// What `pc_align` of Ames Stereo Pipeline must be told.
@@ -160,6 +161,11 @@ impl Sidecar {
             columns: columns.collect(),
         }
     }
+}
+
+/// Schema of the documents beside the files.
+pub(in crate::products) fn schema() -> DocumentSchema {
+    DocumentSchema::of::<Sidecar>("csv_columns")
 }
 
 fn table<'a>(site: &'a SiteProducts<'a>, columns: Vec<Column<Shot<'a>>>) -> Table<'a> {

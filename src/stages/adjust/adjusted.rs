@@ -1,5 +1,6 @@
 //! The result of an adjustment as plain numbers, for reports, tables and storage.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::{AdjustImage, AdjustmentSummary, LeftOut, network::Assembled};
@@ -46,7 +47,9 @@ pub struct CorrectedImage {
 }
 
 /// The kinds of point.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[derive(
+    Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema,
+)]
 #[serde(rename_all = "snake_case")]
 pub enum PointKind {
     /// A footprint of the laser altimeter.
