@@ -31,6 +31,15 @@ impl DocumentSchema {
             schema: schema.to_value(),
         }
     }
+
+    /// Sets `keyword` of the schema at a JSON pointer, where the type itself does not say it.
+    #[must_use]
+    pub fn with(mut self, pointer: &str, keyword: &str, value: impl Into<Value>) -> Self {
+        if let Some(part) = self.schema.pointer_mut(pointer) {
+            part[keyword] = value.into();
+        }
+        self
+    }
 }
 
 /// Sets `keyword` at the JSON pointer `pointer` of a member's schema; for what attributes of single numbers cannot

@@ -154,15 +154,15 @@ impl<'a> AdjustmentKeys<'a> {
         };
         Self {
             tie_sigma_px: config.tie_sigma_px,
-            mola_image: config.mola_image,
-            mola_sigma_px: config.mola_sigma_px,
-            mola_margin_px: config.mola_margin_px,
+            mola_image: config.footprint_image_coordinates,
+            mola_sigma_px: config.footprint_sigma_px,
+            mola_margin_px: config.footprint_margin_px,
             ground_sigma_m: config.ground_sigma_m,
             range_sigma_m: config.range_sigma_m,
             range_bias_sigma_m: config.range_bias_sigma_m,
             time_bias_sigma_s: config.time_bias_sigma_s,
-            nadir_sigma_m: number(config.nadir_sigma_m),
-            off_nadir_sigma_m: number(config.off_nadir_sigma_m),
+            nadir_sigma_m: number(config.position_sigma_nadir_m),
+            off_nadir_sigma_m: number(config.position_sigma_off_nadir_m),
             robust: config.robust.as_ref(),
             blunder_limit: config.blunder_limit,
             images: config.images.iter().map(prior).collect(),
@@ -287,7 +287,12 @@ pub(super) static DOCUMENT: Declaration = Declaration {
 
 /// Schema of the document.
 pub(super) fn schema() -> DocumentSchema {
-    DocumentSchema::of::<Document>("adjustment")
+    let keys = "/$defs/IntersectionConfig/properties";
+    DocumentSchema::of::<Document>("adjustment").with(
+        &format!("{keys}/convergence_min_rad"),
+        "exclusiveMinimum",
+        0,
+    )
 }
 
 fn document<'a>(site: &SiteProducts<'a>, geometric: &GeometricProducts<'a>) -> Document<'a> {

@@ -270,7 +270,10 @@ fn columns<'a>() -> Vec<Column<Registered<'a>>> {
 
 /// Schema of the document.
 pub(super) fn schema() -> DocumentSchema {
+    let keys = "/$defs/RegistrationConfig/properties";
     DocumentSchema::of::<Document>("registration")
+        .with(&format!("{keys}/tolerance_lines"), "exclusiveMinimum", 0)
+        .with(&format!("{keys}/steps_max"), "minimum", 1)
 }
 
 fn document<'a>(site: &SiteProducts<'a>) -> Document<'a> {
