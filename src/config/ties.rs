@@ -1,8 +1,8 @@
 //! `[ties]` and `[intersection]`.
 
-use schemars::JsonSchema;
-
 use std::path::PathBuf;
+
+use schemars::JsonSchema;
 
 use crate::{geom::intersection::Weighting, units::RADIANS_PER_DEGREE};
 
