@@ -20,6 +20,7 @@ pub mod pds;
 pub mod products;
 pub mod report;
 pub mod scene;
+pub mod schema;
 pub mod spice;
 pub mod stage;
 pub mod stages;

@@ -29,6 +29,7 @@ const FLOORS: [&[&str]; 6] = [
         "ties",
         "files",
         "stage",
+        "schema",
         "altimetry",
         "image",
         "kernel_source",

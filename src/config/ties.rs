@@ -2,6 +2,8 @@
 
 use std::path::PathBuf;
 
+use schemars::JsonSchema;
+
 use crate::{geom::intersection::Weighting, units::RADIANS_PER_DEGREE};
 
 use super::{
@@ -27,7 +29,7 @@ declare_table! {
 
 declare_table! {
     /// Ground points of the tie points, with the orientation held fixed.
-    pub struct IntersectionConfig: Copy {
+    pub struct IntersectionConfig: Copy, JsonSchema {
         /// Weights of the measurements.
         weighting: Weighting = group::<WeightingKeys>().map(WeightingKeys::weighting),
         /// Smallest angle between the two rays of a point that differ most.

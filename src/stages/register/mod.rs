@@ -11,6 +11,7 @@ use std::{collections::BTreeMap, sync::atomic::AtomicBool};
 
 use nalgebra::Vector3;
 use rayon::prelude::*;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::{
@@ -57,7 +58,7 @@ pub struct ImageRegistration {
 }
 
 /// What another model of the same image makes of the same points.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct ModelDifference {
     /// The other model.
     pub model: CameraModel,
