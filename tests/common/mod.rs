@@ -9,6 +9,7 @@
 pub(crate) mod case;
 pub(crate) mod golden;
 pub(crate) mod mission;
+pub(crate) mod outside;
 
 use std::path::{Path, PathBuf};
 
@@ -26,11 +27,11 @@ pub(crate) fn assert_keeps_schema(answer: &serde_json::Value, name: &str) {
     assert!(errors.is_empty(), "{name}: {errors:#?}");
 }
 
-/// A path below `AREOGRAPH_DATA` or `../shared/data`; without the data one line says what is skipped.
+/// A path below `AREOGRAPH_DATA` or `../shared/data`; without the data the test is counted as skipped, and under `CI`
+/// it fails.
 #[allow(
     clippy::disallowed_methods,
-    clippy::print_stderr,
-    reason = "tests find their data by an environment variable and say what they skip"
+    reason = "tests find their data by an environment variable"
 )]
 pub(crate) fn real_data(relative: &str, test: &str) -> Option<PathBuf> {
     let root = std::env::var("AREOGRAPH_DATA").map_or_else(
@@ -39,9 +40,12 @@ pub(crate) fn real_data(relative: &str, test: &str) -> Option<PathBuf> {
     );
     let path = root.join(relative);
     if path.exists() {
+        outside::found(test);
         return Some(path);
     }
-    eprintln!("skipped {test}: no {} (set AREOGRAPH_DATA)", path.display());
+    let lack = format!("no {} (set AREOGRAPH_DATA)", path.display());
+    assert!(std::env::var_os("CI").is_none(), "{test}: {lack}");
+    outside::skipped(test, &lack);
     None
 }
 
