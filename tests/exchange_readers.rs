@@ -5,6 +5,7 @@
     reason = "helpers of tests may fail loudly"
 )]
 
+mod common;
 #[path = "products_site/fixture.rs"]
 #[allow(dead_code, reason = "the fixture serves several tests")]
 mod fixture;

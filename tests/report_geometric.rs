@@ -278,7 +278,7 @@ fn corrections_of_images_and_their_ranges_are_told() {
             .adjusted
             .ranges
             .iter()
-            .filter(|of| of.profile == row[0]);
+            .filter(|of| site.profiles[of.profile].id == row[0]);
         let values: Vec<f64> = residuals.map(|of| of.residual_m.value).collect();
         agree(&row[5], values.iter().sum::<f64>() / values.len() as f64, 3);
         // All shots of these profiles were fired near or in an image; the check's mean is close to theirs.
