@@ -83,7 +83,7 @@ impl Walk {
                 agree(what, &planned.unwrap(), ran);
                 match ending {
                     Ending::StoppedAfter(_) => {
-                        assert_same(what, &before, &products(&self.case.path("out")))
+                        assert_same(what, &before, &products(&self.case.path("out")));
                     }
                     _ => assert_same(
                         what,
