@@ -14,15 +14,17 @@ use crate::{
     config::{AdjustmentConfig, IntersectionConfig, OrientationPrior},
     footprints::FootprintImageCoordinates,
     geom::{
-        bundle::ORIENTATION_UNKNOWNS, pushbroom::CameraModel, robust::RobustWeight,
+        bundle::ORIENTATION_UNKNOWNS,
+        pushbroom::CameraModel,
+        robust::RobustWeight,
         statistics::Summary,
+        uncertainty::{ResidualMoments, UncertaintyBudget},
     },
     schema::{DocumentSchema, all_positive, at, none_negative},
     stages::{
         adjust::{AdjustmentSummary, CorrectedImage, PointKind},
         compare_pairs::{PairComparison, ProfileByTies},
         intersect::{ImageResiduals, IntersectedTies},
-        uncertainty::{ResidualMoments, UncertaintyBudget},
     },
 };
 

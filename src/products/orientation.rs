@@ -15,7 +15,7 @@ use super::{
 };
 use crate::{
     error::Result,
-    geom::polynomial::Fit,
+    geom::{attitude::continuous_quaternions, polynomial::Fit},
     schema::DocumentSchema,
     stages::{
         fit_sensor_model::{EulerModel, RotationVectorModel, SensorModel},
@@ -175,8 +175,11 @@ pub(super) static ADJUSTED_DOCUMENT: Declaration = declared!(
 );
 
 fn write_table(path: &Path, _: &Context, image: &ImageProducts) -> Result<u64> {
-    let samples = image.orientation.samples.iter().collect();
-    parquet::write(path, Table::new(columns(), samples), Vec::new())
+    let samples = &image.orientation.samples;
+    let rotations = samples.iter().map(|sample| sample.camera_to_mars.matrix());
+    let quaternions = continuous_quaternions(rotations);
+    let rows = samples.iter().zip(quaternions);
+    parquet::write(path, Table::new(columns(), rows.collect()), Vec::new())
 }
 
 fn write_document(path: &Path, _: &Context, image: &ImageProducts) -> Result<u64> {
@@ -184,7 +187,8 @@ fn write_document(path: &Path, _: &Context, image: &ImageProducts) -> Result<u64
     Ok(image.orientation.samples.len() as u64)
 }
 
-type Sample<'a> = &'a OrientationSample;
+/// A sample and its quaternion, camera to Mars, continuous over the image.
+type Sample<'a> = (&'a OrientationSample, [f64; 4]);
 
 /// Schema of the document.
 pub(super) fn schema() -> DocumentSchema {
@@ -199,7 +203,7 @@ fn columns<'a>() -> Vec<Column<Sample<'a>>> {
         of: fn(&BoresightGround) -> f64,
     ) -> Column<Sample<'a>> {
         column(name, unit, description, move |s: &Sample| {
-            s.boresight.as_ref().map(of)
+            s.0.boresight.as_ref().map(of)
         })
     }
     vec![
@@ -207,64 +211,64 @@ fn columns<'a>() -> Vec<Column<Sample<'a>>> {
             "et_s",
             Unit::Second,
             "epoch, TDB seconds past J2000",
-            |s: &Sample| s.et.seconds(),
+            |s: &Sample| s.0.et.seconds(),
         ),
         column(
             "line_offset",
             Unit::Line,
             "lines from the middle of the header image",
-            |s: &Sample| s.line_offset,
+            |s: &Sample| s.0.line_offset,
         ),
         column(
             "x_m",
             Unit::Metre,
             "perspective centre, IAU 2000 X, metres",
-            |s: &Sample| s.position_m[0],
+            |s: &Sample| s.0.position.xyz_m.x,
         ),
         column(
             "y_m",
             Unit::Metre,
             "perspective centre, IAU 2000 Y, metres",
-            |s: &Sample| s.position_m[1],
+            |s: &Sample| s.0.position.xyz_m.y,
         ),
         column(
             "z_m",
             Unit::Metre,
             "perspective centre, IAU 2000 Z, metres",
-            |s: &Sample| s.position_m[2],
+            |s: &Sample| s.0.position.xyz_m.z,
         ),
         column("omega_rad", Unit::Radian, "omega, radians", |s: &Sample| {
-            s.angles.omega_rad
+            s.0.angles.omega_rad
         }),
         column("phi_rad", Unit::Radian, "phi, radians", |s: &Sample| {
-            s.angles.phi_rad
+            s.0.angles.phi_rad
         }),
         column("kappa_rad", Unit::Radian, "kappa, radians", |s: &Sample| {
-            s.angles.kappa_rad
+            s.0.angles.kappa_rad
         }),
         column(
             "quaternion_w",
             Unit::None,
             "camera to Mars, SPICE convention, w",
-            |s: &Sample| s.camera_to_mars[0],
+            |s: &Sample| s.1[0],
         ),
         column(
             "quaternion_x",
             Unit::None,
             "camera to Mars, SPICE convention, x",
-            |s: &Sample| s.camera_to_mars[1],
+            |s: &Sample| s.1[1],
         ),
         column(
             "quaternion_y",
             Unit::None,
             "camera to Mars, SPICE convention, y",
-            |s: &Sample| s.camera_to_mars[2],
+            |s: &Sample| s.1[2],
         ),
         column(
             "quaternion_z",
             Unit::None,
             "camera to Mars, SPICE convention, z",
-            |s: &Sample| s.camera_to_mars[3],
+            |s: &Sample| s.1[3],
         ),
         boresight(
             "boresight_longitude_deg",
@@ -374,7 +378,7 @@ fn euler(model: &EulerModel) -> Euler<'_> {
 fn rotation_vector(model: &RotationVectorModel) -> RotationVector<'_> {
     let [x, y, z] = &model.vector_rad;
     RotationVector {
-        reference: model.reference,
+        reference: model.reference.transpose().into(),
         x_rad: angle(x),
         y_rad: angle(y),
         z_rad: angle(z),
