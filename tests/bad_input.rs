@@ -538,7 +538,7 @@ fn a_full_disk_leaves_nothing_half_made() {
     assert!(found.contains("No space left on device"), "{found}");
     assert!(found.contains("free some space"), "{found}");
     assert!(!found.contains("small/case/manifest.json\n"), "{found}");
-    assert!(!found.contains(".staging"), "{found}");
+    assert!(!found.contains("/.staging\n"), "{found}");
 }
 
 #[test]
