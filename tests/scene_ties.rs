@@ -24,7 +24,7 @@ use areograph::{
     },
     ties::TiePoint,
 };
-use common::mission::mission;
+use common::{mission::mission, number};
 use nalgebra::{Matrix3, Vector3};
 use serde_json::Value;
 
@@ -39,10 +39,6 @@ const RADIUS_M: f64 = 3.39e6;
 
 fn truth() -> Value {
     serde_json::from_slice(&fs::read(mission().join("truth.json")).unwrap()).unwrap()
-}
-
-fn number(value: &Value) -> f64 {
-    value.as_f64().unwrap()
 }
 
 fn vector(value: &Value) -> Vector3<f64> {
