@@ -16,6 +16,7 @@ use areograph::{
     config::PointingConfig,
     constants::{MOC_NA_FOCAL_LENGTH_MM, MOC_NA_PIXEL_PITCH_MM},
     error::Kind,
+    frames::Rotation,
     geom::attitude::matrix_of_rotation_vector,
     products::{AdjustedImage, AdjustedKernels, write_adjusted_kernels},
     spice::{KernelRole, KernelSet, Session},
@@ -26,7 +27,7 @@ use areograph::{
     time::{Et, PointingBias},
 };
 use fixture::{Image, angle_rad, apart, kernel_camera};
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Vector3};
 
 /// Tens of metres and of arcseconds, with slopes and bends.
 fn curved(x: f64) -> LineCorrection {
@@ -288,7 +289,8 @@ fn orientations_that_are_none_and_kernels_that_end_are_refused() {
         write_adjusted_kernels(&to, &[image]).unwrap_err()
     };
     let mut broken = image.orientation.clone();
-    broken.samples[7].camera_to_mars[1] = f64::NAN;
+    let sample = &mut broken.samples[7];
+    sample.camera_to_mars = Rotation::new(Matrix3::repeat(f64::NAN), sample.et);
     let failure = refused(&broken).to_string();
     assert!(
         failure.starts_with("adjusted/E02-02016.bsp: ckgpav_c"),

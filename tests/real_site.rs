@@ -16,7 +16,6 @@ use common::{
     json,
     mission::{areograph, products, succeed},
 };
-use serde_json::Value;
 
 /// A metakernel over the real kernels, its strings cut to the 80 characters that NAIF allows.
 #[allow(

@@ -7,7 +7,7 @@
 
 mod common;
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use areograph::{
     constants::{MARS_IAU1991, MARS_IAU1994, MARS_IAU2000, MGS_POINTING_BIAS, MarsModel},

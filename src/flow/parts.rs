@@ -18,7 +18,7 @@ use crate::{
 };
 
 /// Raised when a stage computes something else from the same parts, or lays its output out anew.
-const METHOD: u32 = 9;
+const METHOD: u32 = 10;
 
 /// Image keys, label files and all text kernels, among them those that convert times.
 pub(super) fn tag_times(config: &SiteConfig, kernels: &KernelSet) -> Result<Parts> {
