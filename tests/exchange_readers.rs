@@ -25,6 +25,7 @@ use areograph::{
     stages::{describe_kernels::KernelLine, group_profiles::group_profiles},
     time::{Et, Interval, Intervals},
 };
+use common::json;
 use fixture::{SHOTS, START_S, Site};
 use nalgebra::Vector3;
 use readers::{output, program, python};
@@ -38,10 +39,6 @@ fn written(site: &Site, image: bool) -> tempfile::TempDir {
     })
     .unwrap();
     folder
-}
-
-fn json(path: &Path) -> Value {
-    serde_json::from_slice(&fs::read(path).unwrap()).unwrap()
 }
 
 fn close(value: f64, expected: f64, tolerance: f64) {

@@ -178,10 +178,8 @@ fn write_table(path: &Path, _: &Context, image: &ImageProducts) -> Result<u64> {
     let samples = &image.orientation.samples;
     let rotations = samples.iter().map(|sample| sample.camera_to_mars.matrix());
     let quaternions = continuous_quaternions(rotations);
-    let samples = samples.iter().zip(quaternions);
-    let samples = samples.map(|(at, quaternion)| Sample { at, quaternion });
-    let samples = samples.collect();
-    parquet::write(path, Table::new(columns(), samples), Vec::new())
+    let rows = samples.iter().zip(quaternions);
+    parquet::write(path, Table::new(columns(), rows.collect()), Vec::new())
 }
 
 fn write_document(path: &Path, _: &Context, image: &ImageProducts) -> Result<u64> {
@@ -189,11 +187,8 @@ fn write_document(path: &Path, _: &Context, image: &ImageProducts) -> Result<u64
     Ok(image.orientation.samples.len() as u64)
 }
 
-/// A sample, and its rotation as a quaternion that does not jump from row to row.
-struct Sample<'a> {
-    at: &'a OrientationSample,
-    quaternion: [f64; 4],
-}
+/// A sample and its quaternion, camera to Mars, continuous over the image.
+type Sample<'a> = (&'a OrientationSample, [f64; 4]);
 
 /// Schema of the document.
 pub(super) fn schema() -> DocumentSchema {
@@ -208,7 +203,7 @@ fn columns<'a>() -> Vec<Column<Sample<'a>>> {
         of: fn(&BoresightGround) -> f64,
     ) -> Column<Sample<'a>> {
         column(name, unit, description, move |s: &Sample| {
-            s.at.boresight.as_ref().map(of)
+            s.0.boresight.as_ref().map(of)
         })
     }
     vec![
@@ -216,64 +211,64 @@ fn columns<'a>() -> Vec<Column<Sample<'a>>> {
             "et_s",
             Unit::Second,
             "epoch, TDB seconds past J2000",
-            |s: &Sample| s.at.et.seconds(),
+            |s: &Sample| s.0.et.seconds(),
         ),
         column(
             "line_offset",
             Unit::Line,
             "lines from the middle of the header image",
-            |s: &Sample| s.at.line_offset,
+            |s: &Sample| s.0.line_offset,
         ),
         column(
             "x_m",
             Unit::Metre,
             "perspective centre, IAU 2000 X, metres",
-            |s: &Sample| s.at.position.xyz_m.x,
+            |s: &Sample| s.0.position.xyz_m.x,
         ),
         column(
             "y_m",
             Unit::Metre,
             "perspective centre, IAU 2000 Y, metres",
-            |s: &Sample| s.at.position.xyz_m.y,
+            |s: &Sample| s.0.position.xyz_m.y,
         ),
         column(
             "z_m",
             Unit::Metre,
             "perspective centre, IAU 2000 Z, metres",
-            |s: &Sample| s.at.position.xyz_m.z,
+            |s: &Sample| s.0.position.xyz_m.z,
         ),
         column("omega_rad", Unit::Radian, "omega, radians", |s: &Sample| {
-            s.at.angles.omega_rad
+            s.0.angles.omega_rad
         }),
         column("phi_rad", Unit::Radian, "phi, radians", |s: &Sample| {
-            s.at.angles.phi_rad
+            s.0.angles.phi_rad
         }),
         column("kappa_rad", Unit::Radian, "kappa, radians", |s: &Sample| {
-            s.at.angles.kappa_rad
+            s.0.angles.kappa_rad
         }),
         column(
             "quaternion_w",
             Unit::None,
             "camera to Mars, SPICE convention, w",
-            |s: &Sample| s.quaternion[0],
+            |s: &Sample| s.1[0],
         ),
         column(
             "quaternion_x",
             Unit::None,
             "camera to Mars, SPICE convention, x",
-            |s: &Sample| s.quaternion[1],
+            |s: &Sample| s.1[1],
         ),
         column(
             "quaternion_y",
             Unit::None,
             "camera to Mars, SPICE convention, y",
-            |s: &Sample| s.quaternion[2],
+            |s: &Sample| s.1[2],
         ),
         column(
             "quaternion_z",
             Unit::None,
             "camera to Mars, SPICE convention, z",
-            |s: &Sample| s.quaternion[3],
+            |s: &Sample| s.1[3],
         ),
         boresight(
             "boresight_longitude_deg",

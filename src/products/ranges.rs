@@ -119,9 +119,10 @@ struct SiteSummary {
 
 /// An image that was exposed during a profile.
 #[derive(Serialize, JsonSchema)]
-struct Simultaneous<'a> {
+struct SimultaneousImage<'a> {
+    /// Image identifier.
     image: &'a str,
-    #[schemars(range(min = 1))]
+    /// Shots of the profile fired while the image was exposed.
     shots: u32,
 }
 
@@ -132,7 +133,7 @@ struct ProfileDocument<'a> {
     orbit: u32,
     et_start_s: f64,
     et_stop_s: f64,
-    simultaneous: Vec<Simultaneous<'a>>,
+    simultaneous: Vec<SimultaneousImage<'a>>,
     valid: bool,
     invalid_because: &'a [String],
     range_minus_distance_m: Summary,
@@ -332,7 +333,7 @@ fn profile_document<'a>(
         simultaneous: profile
             .simultaneous
             .iter()
-            .map(|of| Simultaneous {
+            .map(|of| SimultaneousImage {
                 image: &site.images[of.image].times.id,
                 shots: of.shots,
             })

@@ -3,6 +3,7 @@
 #![allow(
     clippy::disallowed_methods,
     clippy::unwrap_used,
+    clippy::panic,
     reason = "helpers of tests work in temporary folders and may fail loudly"
 )]
 
@@ -18,8 +19,7 @@ pub(crate) fn assert_keeps_schema(answer: &serde_json::Value, name: &str) {
     let path = Path::new(env!("CARGO_MANIFEST_DIR"))
         .join("config/schema")
         .join(format!("{name}.schema.json"));
-    let schema: serde_json::Value = serde_json::from_slice(&std::fs::read(path).unwrap()).unwrap();
-    let validator = jsonschema::validator_for(&schema).unwrap();
+    let validator = jsonschema::validator_for(&json(&path)).unwrap();
     let errors: Vec<String> = validator
         .iter_errors(answer)
         .map(|error| format!("{}: {error}", error.instance_path()))
@@ -47,6 +47,23 @@ pub(crate) fn real_data(relative: &str, test: &str) -> Option<PathBuf> {
     assert!(std::env::var_os("CI").is_none(), "{test}: {lack}");
     outside::skipped(test, &lack);
     None
+}
+
+/// A JSON file.
+pub(crate) fn json(path: &Path) -> serde_json::Value {
+    serde_json::from_slice(&std::fs::read(path).unwrap()).unwrap()
+}
+
+/// A number of a JSON document.
+pub(crate) fn number(value: &serde_json::Value) -> f64 {
+    value
+        .as_f64()
+        .unwrap_or_else(|| panic!("no number: {value}"))
+}
+
+/// Files of [`M0402852_KERNELS`] in their folder.
+pub(crate) fn m0402852_files(folder: &Path) -> Vec<PathBuf> {
+    M0402852_KERNELS.map(|name| folder.join(name)).to_vec()
 }
 
 /// Kernels of image M04/02852 in `ale_mgs/m0402852`, in load order.

@@ -14,11 +14,18 @@ fn notes() -> PathBuf {
         .join(call.to_string())
 }
 
-/// Writes what a test says of itself under a name that is its own.
+/// Writes what a test says of itself under a name that is its own: its program's and its function's, after which
+/// the harness names its thread; run in one thread, it is known by its words.
 fn note(folder: &str, test: &str, text: &str) {
     let folder = notes().join(folder);
     fs::create_dir_all(&folder).unwrap();
-    let name = test.replace('/', "-");
+    let thread = std::thread::current();
+    let function = thread.name().filter(|name| *name != "main");
+    let program = std::env::current_exe().unwrap();
+    let program = program.file_stem().unwrap().to_string_lossy();
+    // Cargo adds a hash.
+    let (program, _) = program.rsplit_once('-').unwrap();
+    let name = format!("{program} {}", function.unwrap_or(test)).replace(['/', ':'], "-");
     fs::write(folder.join(name), text).unwrap();
 }
 

@@ -149,6 +149,7 @@ fn checked(outcome: libc::c_long) -> io::Result<()> {
 }
 
 /// Starts the command in a shell that stops before it becomes the program.
+#[allow(clippy::zombie_processes, reason = "`traced` waits for it")]
 fn stopped(command: &Command, errors: &File) -> pid_t {
     let mut shell = Command::new("sh");
     shell
