@@ -323,15 +323,23 @@ fn ties_that_are_none_make_the_site_invalid() {
 }
 
 #[test]
-fn what_nothing_tells_apart_is_named() {
+fn a_failed_adjustment_keeps_no_other_product_from_its_readers() {
     let case = Case::pair();
     let free = "position_sigma_nadir_m = inf\nposition_sigma_off_nadir_m = inf\nfootprint_image_coordinates = \"off\"\ntie_sigma_px";
     case.replace("site.toml", "tie_sigma_px", free);
     let outcome = case.outcome(case.run());
-    let singular = "error: isidis/adjust: the network is singular: nothing tells apart the ";
-    assert!(
-        outcome.starts_with(&format!("exit 3\n{singular}")),
-        "{outcome}"
-    );
+    let invalid = "exit 5\nisidis: INVALID; products in out/isidis, see report/index.html\n  \
+                   no adjustment: the network is singular: nothing tells apart the ";
+    assert!(outcome.starts_with(invalid), "{outcome}");
     assert!(outcome.contains("finite standard deviations"), "{outcome}");
+    let made: Vec<_> = products(&case.path("out/isidis")).into_keys().collect();
+    let named = |name: &str| made.iter().any(|path| path.ends_with(name));
+    assert!(named("footprints.parquet") && named("registration.parquet"));
+    assert!(!named("adjustment.json") && !named("registration_adjusted.parquet"));
+    // The adjustment is tried again, and what stands is kept.
+    let again = case.outcome(case.run());
+    assert!(
+        again.starts_with("exit 5\nisidis: INVALID; nothing changed"),
+        "{again}"
+    );
 }

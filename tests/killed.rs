@@ -252,6 +252,38 @@ fn an_interrupt_leaves_the_search_and_keeps_finished_stages() {
     assert!(!case.path("out/case/.cache/search_footprints").exists());
 }
 
+/// The clock kernel is replaced when the images have their times and the PEDR file is about to be read: the run ends
+/// with the name of the kernel, and what it made is forgotten.
+#[test]
+#[cfg(unix)]
+fn a_kernel_that_is_replaced_during_a_run_ends_it() {
+    let case = Case::new();
+    let (tagged, clock) = (
+        case.path("out/case/.cache/tag_times+image"),
+        "kernels/mgs_clock.tsc",
+    );
+    let before = case.read(clock);
+    let mut replaced = false;
+    let ended = traced(&case.run(), |call| {
+        if !replaced && call.path.ends_with("pedr/ap19117l.b") && tagged.exists() {
+            replaced = true;
+            case.write(
+                clock,
+                [&before[..], b"\nA remark after the last table.\n"].concat(),
+            );
+        }
+        Then::GoOn
+    });
+    assert!(replaced, "the search was not seen");
+    assert_eq!(ended.code, Some(3), "{}", ended.stderr);
+    let said = "mgs_clock.tsc: the file changed while it was in use";
+    assert!(ended.stderr.contains(said), "{}", ended.stderr);
+    assert!(!tagged.exists(), "times of the earlier clock are kept");
+    assert!(!case.path("out/case/manifest.json").exists());
+    case.write(clock, before);
+    succeed(&mut case.run());
+}
+
 #[test]
 fn one_and_eight_threads_give_the_same_bytes() {
     let site = mission().join("sites/gusev_crater.toml");

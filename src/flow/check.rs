@@ -3,9 +3,11 @@
 use std::{path::PathBuf, sync::atomic::AtomicBool};
 
 use super::{
+    RivalSet,
     driver::{Driver, Flow, Leave},
-    kernels::wanted,
-    site::{Prepared, Site, kernels, orient, prepare, ties},
+    kernels::{load_rivals, wanted},
+    outputs::{Prepared, Site},
+    site::{kernels, orient, prepare, ties},
 };
 use crate::{
     config::SiteConfig,
@@ -43,7 +45,7 @@ pub fn check_site(config: &SiteConfig) -> Checked {
 ///
 /// # Errors
 /// What those stages say of labels, clocks and PEDR files.
-pub(super) fn required(config: &SiteConfig) -> Result<Wanted> {
+pub fn wanted_by_site(config: &SiteConfig) -> Result<Wanted> {
     let mut check = Check::of(config);
     let prepared = prepare(&mut check, config);
     if let Some(failure) = check.checked.failures.into_iter().next() {
@@ -54,6 +56,14 @@ pub(super) fn required(config: &SiteConfig) -> Result<Wanted> {
         Err(Leave::StageReached) => Ok(Wanted::default()),
         Err(Leave::Failed(failure)) => Err(failure.in_site(&config.site)),
     }
+}
+
+/// The rival sets of the configuration; none when it names one source of kernels.
+///
+/// # Errors
+/// Kernels that cannot be read.
+pub fn rival_sets(config: &SiteConfig) -> Result<Vec<RivalSet>> {
+    load_rivals(config, &InputFiles::default()).in_site(&config.site)
 }
 
 struct Check<'a> {

@@ -5,13 +5,12 @@ use std::sync::atomic::AtomicBool;
 use serde::{Deserialize, Serialize};
 
 use super::{
-    check,
     compare::{Compared, Request, RivalSet, compare_kernels},
     kernels::load_rivals,
 };
 use crate::{
     config::SiteConfig,
-    error::{Place, Result},
+    error::Result,
     files::InputFiles,
     spice::{KernelRole, Wanted, position_kernels},
     stage::{Input, Inputs, Stage},
@@ -122,22 +121,6 @@ pub(super) fn rival_positions(config: &SiteConfig, files: &InputFiles) -> Result
         })
     });
     rivals.collect()
-}
-
-/// The rival sets of the configuration; none when it names one source of kernels.
-///
-/// # Errors
-/// Kernels that cannot be read.
-pub fn rival_sets(config: &SiteConfig) -> Result<Vec<RivalSet>> {
-    load_rivals(config, &InputFiles::default()).in_site(&config.site)
-}
-
-/// The times at which a site reads kernels, found by the stages that need no orbit; nothing is stored.
-///
-/// # Errors
-/// What those stages say of labels, clocks and PEDR files.
-pub fn wanted_by_site(config: &SiteConfig) -> Result<Wanted> {
-    check::required(config)
 }
 
 fn entries(rivals: &[RivalSet], compared: &Compared) -> Vec<KernelChoiceEntry> {

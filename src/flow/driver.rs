@@ -2,7 +2,7 @@
 
 use std::{path::PathBuf, sync::atomic::AtomicBool};
 
-use super::{STAGES, site::Site};
+use super::{STAGES, outputs::Site};
 use crate::{
     config::SiteConfig,
     error::{Failure, Place, Result, Stopped},

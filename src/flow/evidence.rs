@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::site::Site;
+use super::outputs::Site;
 use crate::{
     config::SiteConfig,
     error::Result,
@@ -35,7 +35,7 @@ pub(super) fn judged(
     let failure = site
         .adjustment_failure
         .as_ref()
-        .map(|failure| failure.fault.to_string());
+        .map(|failure| format!("{}; {}", failure.fault, failure.fault.advice()));
     let searched = !config.pedr.files.is_empty();
     let verdict = judge(&Evidence {
         footprints: searched.then_some(site.converted.value()?.footprints.len()),

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use super::{
     PUBLISH,
     driver::Ledger,
-    site::{Adjustment, Site},
+    outputs::{Adjustment, Site},
 };
 use crate::{
     altimetry::BiasScope,

@@ -12,14 +12,15 @@ mod evidence;
 mod kernels;
 mod manifest;
 mod out;
+mod outputs;
 mod plan;
 mod publish;
 mod run;
 mod site;
 mod sites;
 
-pub use check::{Checked, check_site};
-pub use choice::{ChooseKernels, KernelChoice, RivalKernelSets, rival_sets, wanted_by_site};
+pub use check::{Checked, check_site, rival_sets, wanted_by_site};
+pub use choice::{ChooseKernels, KernelChoice, RivalKernelSets};
 pub use compare::{
     Compared, EPOCHS_MAX, LeftOut, Request, RivalSet, compare_kernels, require_different,
 };

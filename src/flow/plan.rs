@@ -8,8 +8,9 @@ use std::{
 use super::{
     PUBLISH,
     driver::{Bounds, Driver, Flow, Leave, Ledger, StageReason},
+    outputs::Site,
     publish::{inputs, standing},
-    site::{Site, site},
+    site::site,
 };
 use crate::{
     config::SiteConfig,

@@ -7,7 +7,7 @@ use super::{
     driver::Ledger,
     evidence::{complaints, judged, notes, rejected},
     manifest::{Account, manifest},
-    site::{Adjustment, Site},
+    outputs::{Adjustment, Site},
 };
 use crate::{
     config::SiteConfig,

@@ -5,8 +5,9 @@ use std::{path::PathBuf, sync::atomic::AtomicBool};
 use super::{
     PUBLISH,
     driver::{Bounds, Driver, Flow, Leave, Ledger, StageReason},
+    outputs::Site,
     publish::{inputs, publish, standing},
-    site::{Site, site},
+    site::site,
 };
 use crate::{
     config::SiteConfig,

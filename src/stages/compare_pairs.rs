@@ -11,7 +11,7 @@ use super::{
     intersect::{IntersectedPoint, IntersectedTies, MeasureResidual},
     read_ties::Ties,
     register::ImageRegistration,
-    site_image::{SiteImage, oriented_images},
+    site_image::SiteImage,
 };
 use crate::{
     error::Result,
@@ -125,7 +125,7 @@ impl Stage for ComparePairs<'_> {
     }
 
     fn run(&self, _stop: &AtomicBool) -> Result<Vec<PairComparison>> {
-        let oriented = oriented_images(self.images.0)?;
+        let oriented = SiteImage::oriented(self.images.0)?;
         let images: Vec<_> = oriented
             .iter()
             .map(|image| image.stereo(*self.model))

@@ -35,14 +35,16 @@ impl Input for InOrder<'_, SiteImage> {
     }
 }
 
-/// The images with their orientation in every form.
-///
-/// # Errors
-/// Samples that are no orientation.
-pub fn oriented_images(images: &[SiteImage]) -> Result<Vec<OrientedImage<'_>>> {
-    let oriented = images.iter().map(|image| {
-        let (times, orientation) = (image.times.value()?, image.orientation.value()?);
-        OrientedImage::of(times, orientation, image.model.value()?)
-    });
-    oriented.collect()
+impl SiteImage {
+    /// The images with their orientation in every form.
+    ///
+    /// # Errors
+    /// Samples that are no orientation.
+    pub fn oriented(images: &[Self]) -> Result<Vec<OrientedImage<'_>>> {
+        let oriented = images.iter().map(|image| {
+            let (times, orientation) = (image.times.value()?, image.orientation.value()?);
+            OrientedImage::of(times, orientation, image.model.value()?)
+        });
+        oriented.collect()
+    }
 }

@@ -149,7 +149,7 @@ mod tests {
         };
         let why = |cache: &StageCache, value| cache.load::<u32>("search", &inputs(value)).err();
         assert_eq!(why(&cache, 1), Some(Reason::First));
-        let stored = cache.store("search", inputs(1), 10).unwrap();
+        let stored = cache.store("search", inputs(1), 10_u32).unwrap();
         let loaded = cache.load::<u32>("search", &inputs(1)).unwrap();
         assert_eq!(loaded.value().unwrap(), &10);
         assert_eq!(loaded.provenance(), stored.provenance());

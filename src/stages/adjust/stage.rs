@@ -10,11 +10,8 @@ use crate::{
     stage::{InOrder, Output, Stage},
     stage_inputs,
     stages::{
-        convert_datum::Converted,
-        group_profiles::Profile,
-        intersect::IntersectedTies,
-        read_ties::Ties,
-        site_image::{SiteImage, oriented_images},
+        convert_datum::Converted, group_profiles::Profile, intersect::IntersectedTies,
+        read_ties::Ties, site_image::SiteImage,
     },
 };
 
@@ -44,7 +41,7 @@ impl Stage for Adjust<'_> {
     stage_inputs!(fingerprint);
 
     fn run(&self, _stop: &AtomicBool) -> Result<Adjusted> {
-        let oriented = oriented_images(self.images.0)?;
+        let oriented = SiteImage::oriented(self.images.0)?;
         let candidates = self.images.0.iter().zip(&oriented);
         let candidates = candidates.map(|(image, oriented)| {
             Ok(Candidate {

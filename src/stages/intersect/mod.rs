@@ -12,10 +12,7 @@ use nalgebra::Matrix3;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use super::{
-    read_ties::Ties,
-    site_image::{SiteImage, oriented_images},
-};
+use super::{read_ties::Ties, site_image::SiteImage};
 use crate::{
     config::IntersectionConfig,
     error::{Fault, Kind, Result},
@@ -200,7 +197,7 @@ impl Stage for Intersect<'_> {
     }
 
     fn run(&self, _stop: &AtomicBool) -> Result<IntersectedTies> {
-        let oriented = oriented_images(self.images.0)?;
+        let oriented = SiteImage::oriented(self.images.0)?;
         let images: Vec<_> = oriented
             .iter()
             .map(|image| image.stereo(*self.model))
