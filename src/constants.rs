@@ -1,34 +1,11 @@
 //! Constants of the mission, each with its source and sign.
 
-use crate::time::PointingBias;
-
-/// Attitude kernel bias of Mars Global Surveyor: the attitude of an exposure at `t` is read at `t − 1.15 s`.
-///
-/// Source: `INS-94031_CK_TIME_BIAS` in the ISIS addendum `mocAddendum004.ti`; Shan et al. 2005, p. 98.
-pub const MGS_POINTING_BIAS: PointingBias = PointingBias::from_seconds(-1.15);
-
-/// Clock bias of MOLA in seconds, applied by Shan et al. 2005 (p. 98, citing NAIF 2001).
-///
-/// Neither its sign nor whether PEDR tags already include it is published; see `MolaClock`.
-pub const MOLA_CLOCK_BIAS_S: f64 = 0.117;
-
 /// NAIF id of the Mars Global Surveyor spacecraft and of its clock.
 pub const NAIF_MGS: i32 = -94;
 /// NAIF id of the spacecraft bus frame `MGS_SPACECRAFT` and of its attitude kernels.
 pub const NAIF_MGS_BUS: i32 = -94_000;
-/// NAIF id of the MOC narrow-angle camera.
-pub const NAIF_MOC_NA: i32 = -94_031;
 /// NAIF id of the frame `IAU_MARS`.
 pub const NAIF_IAU_MARS: i32 = 10_014;
-/// Focal length of the MOC narrow-angle camera, millimetres; nominal (instrument kernel `moc20.ti`).
-pub const MOC_NA_FOCAL_LENGTH_MM: f64 = 3_500.0;
-/// Pixel pitch that goes with the nominal focal length, millimetres.
-///
-/// Source: `INS-94031_PIXEL_PITCH` of the ISIS addendum `mocAddendum004.ti`; the detector's own pitch is
-/// 0.013 mm, the difference stands for the true focal length.
-pub const MOC_NA_PIXEL_PITCH_MM: f64 = 0.013_124_057_852_294_9;
-/// Pixels of the narrow-angle detector (`moc20.ti`).
-pub const MOC_NA_DETECTORS: u32 = 2_048;
 /// NAIF id of the centre of Mars.
 pub const NAIF_MARS: i32 = 499;
 /// NAIF id of the Sun.

@@ -46,8 +46,8 @@ frames! {
     MarsIau2000 = "IAU_MARS (2000)": MARS_IAU2000;
     /// Bus of Mars Global Surveyor: +Z towards nadir, flight along −X.
     MgsBus = "MGS_SPACECRAFT";
-    /// MOC narrow-angle camera: +Z boresight, +Y along the detector.
-    MocNa = "MGS_MOC_NA";
+    /// A camera: +Z boresight, +Y along the detector.
+    CameraFrame = "camera";
 }
 
 /// Which IAU report a file's Mars-fixed coordinates follow, known only when the file is read.

@@ -13,6 +13,7 @@ pub mod flow;
 pub mod footprints;
 pub mod frames;
 pub mod geom;
+pub mod instruments;
 pub mod pds;
 pub mod products;
 pub mod report;

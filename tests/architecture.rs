@@ -22,6 +22,7 @@ const FLOORS: [&[&str]; 6] = [
         "footprints",
         "ties",
         "files",
+        "instruments",
         "config",
     ],
     &["geom"],

@@ -13,9 +13,8 @@ use std::{fs, path::PathBuf};
 use areograph::{
     config::{
         ImageConfig, ImageFields, KernelList, KernelSource, KernelsConfig, OrientationConfig,
-        PointingConfig,
+        PointingConfig, usual_instrument,
     },
-    constants::MGS_POINTING_BIAS,
     geom::attitude::matrix_of_spice_quaternion,
     products::write_products,
     spice::{KernelSet, Session},
@@ -59,6 +58,7 @@ fn real_with_summing(test: &str, summing: u32) -> Option<Real> {
     let image = ImageConfig {
         id: "m04-02852".to_owned(),
         label: Some(folder.join("m0402852_isis.lbl")),
+        instrument: None,
         serial_number: None,
         fields: ImageFields::default(),
     };
@@ -68,7 +68,7 @@ fn real_with_summing(test: &str, summing: u32) -> Option<Real> {
         padding_s: 1.0,
     };
     let pointing = PointingConfig {
-        ck_bias: MGS_POINTING_BIAS,
+        ck_bias: usual_instrument().pointing_bias(),
         source: String::new(),
     };
     let mut site = fixture::Site::small();
@@ -285,7 +285,7 @@ fn positions_and_rotations_are_those_of_ale() {
         let rates = Nodes::new(&isd["instrument_pointing"], "angular_velocities");
         for (index, et_s) in nodes.et_s.iter().enumerate() {
             let exposure = Et::from_seconds(*et_s);
-            let lookup = MGS_POINTING_BIAS.lookup(exposure);
+            let lookup = usual_instrument().pointing_bias().lookup(exposure);
             let kernels = real.session.attitude(lookup, exposure, 0.0).unwrap();
             let apart = matrix(&nodes.values[index]) - kernels.inertial_to_bus.matrix();
             assert!(apart.abs().max() < 1e-9, "{et_s}: {apart}"); // matrix elements

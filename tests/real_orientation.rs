@@ -12,9 +12,8 @@ use std::{fs, path::PathBuf};
 use areograph::{
     config::{
         ImageConfig, ImageFields, KernelList, KernelSource, KernelsConfig, OrientationConfig,
-        PointingConfig,
+        PointingConfig, usual_instrument,
     },
-    constants::MGS_POINTING_BIAS,
     geom::attitude::matrix_of_spice_quaternion,
     spice::{KernelSet, Session},
     stages::{
@@ -31,6 +30,7 @@ fn image(id: &str, label: PathBuf) -> ImageConfig {
     ImageConfig {
         id: id.to_owned(),
         label: Some(label),
+        instrument: None,
         serial_number: None,
         fields: ImageFields::default(),
     }
@@ -59,7 +59,7 @@ fn m0402852(test: &str) -> Option<(ImageTimes, Orientation, Value)> {
         padding_s: 1.0,
     };
     let pointing = PointingConfig {
-        ck_bias: MGS_POINTING_BIAS,
+        ck_bias: usual_instrument().pointing_bias(),
         source: String::new(),
     };
     let orientation = sample_orientation(&session, &times, &kernels, &pointing, &SAMPLING).unwrap();

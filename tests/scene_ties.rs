@@ -7,7 +7,7 @@ mod common;
 use std::{collections::BTreeMap, fs};
 
 use areograph::{
-    config::{SiteConfig, Weighting, load},
+    config::{SiteConfig, Weighting, load, usual_instrument},
     geom::{
         attitude::matrix_of_spice_quaternion,
         ellipsoid::spherical_to_xyz_m,
@@ -109,7 +109,8 @@ impl Pair {
         StereoImage {
             id: times.id.clone(),
             orientation: SampledOrientation::new(&poses).unwrap(),
-            detector: Detector::moc_na(
+            detector: Detector::new(
+                usual_instrument(),
                 times.crosstrack_summing,
                 times.first_detector,
                 times.samples,

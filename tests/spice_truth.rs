@@ -10,7 +10,8 @@ mod common;
 use std::path::{Path, PathBuf};
 
 use areograph::{
-    constants::{MARS_IAU1991, MARS_IAU1994, MARS_IAU2000, MGS_POINTING_BIAS, MarsModel},
+    config::usual_instrument,
+    constants::{MARS_IAU1991, MARS_IAU1994, MARS_IAU2000, MarsModel},
     error::Kind,
     frames::{MarsDatum, MarsIau2000},
     geom::{
@@ -135,10 +136,11 @@ fn orientation_samples_of_a_real_image_are_met() {
             worst_km = worst_km.max(worst(&(ours / 1_000.0), &vector(&sample[key])));
         }
         let attitude = session
-            .attitude(MGS_POINTING_BIAS.lookup(et), et, 0.0)
+            .attitude(usual_instrument().pointing_bias().lookup(et), et, 0.0)
             .unwrap();
         assert!(attitude.distance_s < 1e-9 && attitude.inertial_to_bus.at() == et);
-        let to_camera = session.mounting(et).unwrap() * attitude.inertial_to_bus;
+        let to_camera =
+            session.mounting(usual_instrument(), et).unwrap() * attitude.inertial_to_bus;
         let camera_to_mars = to_mars * to_camera.inverse();
         for (ours, key) in [
             (to_mars.matrix(), "r_j2000_to_iau_mars"),
@@ -287,7 +289,7 @@ fn a_gap_between_attitude_files_is_named_with_its_kernels() {
     let at = |utc: &str| session.utc_to_et(utc).unwrap();
     let gap = Interval::new(at("1999-08-24T14:00:00"), at("1999-08-24T14:11:00"));
     let failure = session
-        .require_attitude(gap, MGS_POINTING_BIAS, 1.0, 0.0)
+        .require_attitude(gap, usual_instrument().pointing_bias(), 1.0, 0.0)
         .unwrap_err();
     assert_eq!(failure.kind(), Kind::Coverage);
     let text = failure.to_string();
@@ -313,10 +315,12 @@ fn a_gap_between_attitude_files_is_named_with_its_kernels() {
     );
     assert!(
         session
-            .require_attitude(exposures, MGS_POINTING_BIAS, 0.0, 0.0)
+            .require_attitude(exposures, usual_instrument().pointing_bias(), 0.0, 0.0)
             .is_err()
     );
-    let inside = MGS_POINTING_BIAS.lookup(at("1999-08-24T14:05:00"));
+    let inside = usual_instrument()
+        .pointing_bias()
+        .lookup(at("1999-08-24T14:05:00"));
     let failure = session
         .attitude(inside, at("1999-08-24T14:05:00"), 1.0)
         .unwrap_err();

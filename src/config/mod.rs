@@ -5,7 +5,9 @@
 //! `config/sites/example.toml` documents every key, `config/schema/site.schema.json` is its schema.
 
 mod adjustment;
+mod data_file;
 mod geojson;
+mod instruments;
 mod problems;
 mod raw;
 mod shape;
@@ -15,6 +17,9 @@ mod validate;
 use std::{collections::BTreeMap, fs::File, io::Read as _, path::Path};
 
 pub use adjustment::*;
+pub use instruments::{
+    altimeter, built_in_altimeter, built_in_instruments, instrument, usual_instrument,
+};
 pub use problems::Problems;
 pub use site::*;
 

@@ -97,6 +97,7 @@ pub(super) struct RawWindow {
 pub(super) struct RawImage {
     pub(super) id: Entry<String>,
     pub(super) label: Entry<String>,
+    pub(super) instrument: Entry<String>,
     pub(super) serial_number: Entry<String>,
     pub(super) sclk_start: Entry<String>,
     pub(super) utc_start: Entry<String>,

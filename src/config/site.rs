@@ -5,7 +5,7 @@ use std::{collections::BTreeMap, path::PathBuf};
 use serde::{Deserialize, Serialize};
 
 use super::adjustment::{AdjustmentConfig, IntersectionConfig, TiesConfig};
-use crate::{frames::MarsDatum, time::PointingBias};
+use crate::{frames::MarsDatum, instruments::Instrument, time::PointingBias};
 
 /// Everything that `areograph run` needs to know about a site.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -256,6 +256,8 @@ pub struct ImageConfig {
     pub id: String,
     /// PDS3 or ISIS label, attached or detached.
     pub label: Option<PathBuf>,
+    /// The camera, where the configuration names it: else the label does.
+    pub instrument: Option<Instrument>,
     /// Its name in tie point files and in what is written for ISIS, when that is not the identifier.
     pub serial_number: Option<String>,
     /// Keys written in the configuration.

@@ -4,12 +4,12 @@ use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 
 use super::orbit::{Orbit, OrbitState};
 use crate::{
+    config::usual_instrument,
     geom::{
         attitude::{matrix_of_rotation_vector, rotation_vector},
         mars_rotation::{frame_rotation_1, frame_rotation_2, frame_rotation_3},
     },
     time::{Et, Interval},
-    units::RADIANS_PER_DEGREE,
 };
 
 /// Seconds between attitude samples, as in the mission's C-kernels.
@@ -19,14 +19,12 @@ const HOLD_MARGIN_S: f64 = 40.0;
 /// Seconds of the slew from nadir to the held attitude, and back.
 const SLEW_S: f64 = 240.0;
 
-/// Matrix from bus to camera: the in-flight mounting.
-///
-/// # Source
-/// Kirk et al., LPSC 2001, Table 2, as in the MOC instrument kernel 2.0 and `kernels.example/moc.ti`.
+/// Matrix from bus to camera: the in-flight mounting, as in `kernels.example/moc.ti`.
 pub(super) fn bus_to_camera() -> Matrix3<f64> {
-    frame_rotation_3(0.180_00 * RADIANS_PER_DEGREE)
-        * frame_rotation_2(-0.071_62 * RADIANS_PER_DEGREE)
-        * frame_rotation_1(0.114_63 * RADIANS_PER_DEGREE)
+    let mounting = &usual_instrument().mounting;
+    frame_rotation_3(mounting.yaw_rad)
+        * frame_rotation_2(mounting.pitch_rad)
+        * frame_rotation_1(mounting.roll_rad)
 }
 
 /// Matrix from J2000 to the bus that looks at the centre of Mars: +Z down, flight along −X.
@@ -144,6 +142,7 @@ fn quaternion(matrix: &Matrix3<f64>) -> UnitQuaternion<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::units::RADIANS_PER_DEGREE;
 
     fn orbit() -> Orbit {
         Orbit::new(Et::from_seconds(3.7e7), 1.0, 1.3)

@@ -13,7 +13,8 @@ use super::{
     versions::{FAMILIES, Version},
 };
 use crate::{
-    constants::{MGS_POINTING_BIAS, NAIF_MARS, NAIF_MGS, NAIF_SUN},
+    config::usual_instrument,
+    constants::{NAIF_MARS, NAIF_MGS, NAIF_SUN},
     error::{IoFault, Place, Result},
     frames::Position,
     geom::attitude::make_continuous,
@@ -134,7 +135,12 @@ impl AttitudeColumns {
         Self {
             instants: samples
                 .iter()
-                .map(|sample| MGS_POINTING_BIAS.lookup(sample.et).kernel_time())
+                .map(|sample| {
+                    usual_instrument()
+                        .pointing_bias()
+                        .lookup(sample.et)
+                        .kernel_time()
+                })
                 .collect(),
             quaternions,
             rates_rad_s: samples

@@ -1,7 +1,7 @@
 //! What the invented mission does: the six images of Shan et al. 2005 and the days around them.
 
 use crate::{
-    constants::MOC_NA_DETECTORS,
+    config::usual_instrument,
     frames::MarsDatum,
     time::{Et, Interval},
     units::{RADIANS_PER_DEGREE, SECONDS_PER_MS},
@@ -101,7 +101,7 @@ impl PlannedImage {
 
     /// Samples per line: a multiple of 16.
     pub(super) fn samples(&self) -> u32 {
-        MOC_NA_DETECTORS / self.summing / 16 * 16
+        usual_instrument().detector.pixels / self.summing / 16 * 16
     }
 
     /// Time of exposure when the first line begins at `start`.

@@ -8,7 +8,7 @@ use super::{
     ties::ties_name,
 };
 use crate::{
-    constants::{MGS_POINTING_BIAS, MOLA_CLOCK_BIAS_S},
+    config::{built_in_altimeter, usual_instrument},
     error::Result,
     spice::Session,
 };
@@ -72,9 +72,9 @@ impl SiteFile<'_> {
             quoted(self.id),
             quoted(&self.description),
             quoted(&self.metakernel),
-            MGS_POINTING_BIAS.seconds(),
+            usual_instrument().pointing.ck_bias_s,
             quoted(INJECTED),
-            MOLA_CLOCK_BIAS_S,
+            built_in_altimeter().clock_bias_s,
             quoted(INJECTED),
             files.join(", "),
         );

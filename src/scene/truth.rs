@@ -12,7 +12,8 @@ use super::{
     versions::Version,
 };
 use crate::{
-    constants::{MARS_IAU2000, MGS_POINTING_BIAS, MOLA_CLOCK_BIAS_S},
+    config::{built_in_altimeter, usual_instrument},
+    constants::MARS_IAU2000,
     geom::{
         attitude::{make_continuous, spice_quaternion},
         mars_rotation::mars_matrix,
@@ -162,9 +163,9 @@ impl Truth {
             orbit: "all positions below, of images and behind the shots, belong to the true orbit, which is gsfc (kernels/gsfc.tm); nav and ipng, and the site files use nav, differ from it by orbit_differences",
             seed,
             biases: Biases {
-                ck_bias_s: MGS_POINTING_BIAS.seconds(),
+                ck_bias_s: usual_instrument().pointing.ck_bias_s,
                 ck_rule: "the attitude of true time t stands in the C-kernel at t + ck_bias_s",
-                mola_clock_bias_s: MOLA_CLOCK_BIAS_S,
+                mola_clock_bias_s: built_in_altimeter().clock_bias_s,
                 mola_clock_sign: "late",
                 mola_clock_rule: "true time = tag - mola_clock_bias_s, in all files; coordinates hold at the true time",
             },

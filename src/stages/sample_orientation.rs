@@ -10,15 +10,16 @@ use serde::{Deserialize, Serialize};
 use super::tag_times::ImageTimes;
 use crate::{
     config::{KernelsConfig, OrientationConfig, PointingConfig},
-    constants::{MARS_IAU2000, MOC_NA_DETECTORS, MOC_NA_FOCAL_LENGTH_MM, MOC_NA_PIXEL_PITCH_MM},
+    constants::MARS_IAU2000,
     error::Result,
-    frames::{J2000, MarsIau2000, MocNa, Position, Rotation},
+    frames::{CameraFrame, J2000, MarsIau2000, Position, Rotation},
     geom::{
         attitude::{OmegaPhiKappa, make_continuous, spice_quaternion},
         ellipsoid::{Spherical, ray_meets_ellipsoid},
         mars_rotation::mars_rotation,
         statistics::largest,
     },
+    instruments::Instrument,
     spice::{Attitude, Session},
     time::Et,
 };
@@ -155,6 +156,7 @@ pub fn sample_orientation(
     require_coverage(session, image, kernels, pointing)?;
     let reader = Reader {
         session,
+        instrument: &image.instrument,
         pointing,
         tolerance_s: kernels.ck_tolerance_s,
     };
@@ -229,6 +231,7 @@ fn require_coverage(
 
 struct Reader<'a> {
     session: &'a Session,
+    instrument: &'a Instrument,
     pointing: &'a PointingConfig,
     tolerance_s: f64,
 }
@@ -255,9 +258,10 @@ impl Reader<'_> {
         }))
     }
 
-    fn inertial_to_camera(&self, exposure: Et) -> Result<Rotation<J2000, MocNa>> {
+    fn inertial_to_camera(&self, exposure: Et) -> Result<Rotation<J2000, CameraFrame>> {
         let attitude = self.attitude(exposure)?;
-        Ok(self.session.mounting(exposure)? * attitude.inertial_to_bus)
+        let mounting = self.session.mounting(self.instrument, exposure)?;
+        Ok(mounting * attitude.inertial_to_bus)
     }
 
     /// Geometric position in IAU 2000 and the rotation from the camera to it.
@@ -335,19 +339,10 @@ impl GroundPoint {
     }
 }
 
-/// Where the outer edges of the first and the last sample look, camera frame, millimetres.
-///
-/// Samples follow +Y of the camera, detector 1024 of 2048 lies on the boresight (instrument kernel).
+/// Where the outer edges of the first and the last sample look, camera frame.
 fn swath_directions(image: &ImageTimes) -> [Vector3<f64>; 2] {
-    let last_detector = image.first_detector + image.samples * image.crosstrack_summing;
-    [image.first_detector, last_detector].map(|detector| {
-        let from_centre = f64::from(detector) - 0.5 * f64::from(MOC_NA_DETECTORS);
-        Vector3::new(
-            0.0,
-            from_centre * MOC_NA_PIXEL_PITCH_MM,
-            MOC_NA_FOCAL_LENGTH_MM,
-        )
-    })
+    let detector = image.detector();
+    [0.0, detector.samples].map(|sample| detector.look(sample))
 }
 
 fn boresight_ground(

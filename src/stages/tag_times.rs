@@ -3,8 +3,13 @@
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    config::{IMAGE_DURATION_END_S, IMAGE_LINES_MIN, ImageConfig, ImageFields, line_period_agrees},
+    config::{
+        IMAGE_DURATION_END_S, IMAGE_LINES_MIN, ImageConfig, ImageFields, built_in_instruments,
+        line_period_agrees, usual_instrument,
+    },
     error::{Failure, Fault, Kind, Place, Result},
+    geom::pushbroom::{Detector, Distortion, FoldedLine},
+    instruments::Instrument,
     pds::moc,
     spice::Session,
     time::{Et, Interval},
@@ -21,6 +26,8 @@ const START_TOLERANCE_S: f64 = 1.0;
 pub struct ImageTimes {
     /// Image identifier.
     pub id: String,
+    /// The camera.
+    pub instrument: Instrument,
     /// Start (top edge) of the first line.
     pub start: Et,
     /// Whether `start` comes from the spacecraft clock or from UTC.
@@ -60,6 +67,17 @@ pub enum StartFrom {
 }
 
 impl ImageTimes {
+    /// Where the samples of a line look.
+    #[must_use]
+    pub fn detector(&self) -> Detector {
+        Detector::new(
+            &self.instrument,
+            self.crosstrack_summing,
+            self.first_detector,
+            self.samples,
+        )
+    }
+
     /// Exposure of the whole header image, seconds: lines × line period.
     #[must_use]
     pub fn duration_s(&self) -> f64 {
@@ -128,6 +146,42 @@ enum ImageFault {
         delivered: u32,
         header: u32,
     },
+    #[error("image {image}: {key} is {summing}; expected 1 to {max}, as {instrument} sums")]
+    Summing {
+        image: String,
+        key: &'static str,
+        summing: u32,
+        instrument: String,
+        max: u32,
+    },
+    #[error(
+        "image {image}: crosstrack_summing {code} of {instrument} stands for summing that varies over the line; \
+         expected one summing for all samples"
+    )]
+    VariableSumming {
+        image: String,
+        code: u32,
+        instrument: String,
+    },
+    #[error(
+        "image {image}: {samples} samples of {crosstrack} pixels from pixel {first} end at {end}; expected at most \
+         {pixels}, the pixels of {instrument}"
+    )]
+    Detector {
+        image: String,
+        samples: u32,
+        crosstrack: u32,
+        first: u32,
+        end: u64,
+        instrument: String,
+        pixels: u32,
+    },
+    #[error("image {image}: distortion of {instrument}: {folded}")]
+    Distortion {
+        image: String,
+        instrument: String,
+        folded: FoldedLine,
+    },
     #[error(
         "image {image}: {lines} lines of {line_period_s} s; expected at least {IMAGE_LINES_MIN} lines, a \
          positive period and less than {IMAGE_DURATION_END_S} s in all"
@@ -142,7 +196,7 @@ enum ImageFault {
 impl Fault for ImageFault {
     fn kind(&self) -> Kind {
         match self {
-            Self::Missing { .. } => Kind::Configuration,
+            Self::Missing { .. } | Self::Distortion { .. } => Kind::Configuration,
             _ => Kind::Input,
         }
     }
@@ -152,6 +206,15 @@ impl Fault for ImageFault {
             Self::Missing { key, .. } => format!("add `{key}` to the image's table, or name its label"),
             Self::Period { .. } => {
                 "give the exposure of one detector line, or the period of summed lines, not a mixture".to_owned()
+            }
+            Self::Summing { .. } | Self::Detector { .. } => {
+                "check summing, samples and first detector, and that the image is of this camera".to_owned()
+            }
+            Self::VariableSumming { .. } => {
+                "leave the image out: its samples differ in width, which areograph does not model".to_owned()
+            }
+            Self::Distortion { .. } => {
+                "check coefficients, scale and boresight in the instrument file".to_owned()
             }
             Self::Start { .. } => {
                 "check which of the two belongs to this image; the clock is what would be used".to_owned()
@@ -177,10 +240,7 @@ pub fn tag_times(images: &[ImageConfig], session: &Session) -> Result<Vec<ImageT
 
 fn tag_image(image: &ImageConfig, session: &Session) -> Result<ImageTimes> {
     let mut notes = Vec::new();
-    let label = match &image.label {
-        Some(path) => moc::read_label(path)?.fields,
-        None => ImageFields::default(),
-    };
+    let (instrument, label) = labelled(image)?;
     let fields = merged(&image.fields, label, &mut notes);
     let place = |fault: ImageFault| match &image.label {
         Some(path) => Failure::from(fault).in_file(path),
@@ -210,6 +270,16 @@ fn tag_image(image: &ImageConfig, session: &Session) -> Result<ImageTimes> {
     let downtrack_summing = fields
         .downtrack_summing
         .ok_or_else(|| missing("downtrack_summing"))?;
+    let crosstrack_summing = fields.crosstrack_summing.unwrap_or(downtrack_summing);
+    let samples = fields.samples.ok_or_else(|| missing("samples"))?;
+    let first_detector = fields.first_detector.unwrap_or(0);
+    fits_detector(
+        image,
+        &instrument,
+        [downtrack_summing, crosstrack_summing],
+        [first_detector, samples],
+    )
+    .map_err(place)?;
     let (line_period_s, exposure_s) = line_period(image, &fields, downtrack_summing)
         .map_err(place)?
         .ok_or_else(|| missing("exposure_ms"))?;
@@ -227,6 +297,7 @@ fn tag_image(image: &ImageConfig, session: &Session) -> Result<ImageTimes> {
         .ok_or_else(|| missing("sclk_start"))?;
     Ok(ImageTimes {
         id: image.id.clone(),
+        instrument,
         start,
         start_from,
         utc_start: session.et_to_utc(start)?,
@@ -234,13 +305,84 @@ fn tag_image(image: &ImageConfig, session: &Session) -> Result<ImageTimes> {
         line_period_s,
         exposure_s,
         downtrack_summing,
-        crosstrack_summing: fields.crosstrack_summing.unwrap_or(downtrack_summing),
+        crosstrack_summing,
         lines_header,
         lines_delivered,
-        samples: fields.samples.ok_or_else(|| missing("samples"))?,
-        first_detector: fields.first_detector.unwrap_or(0),
+        samples,
+        first_detector,
         notes,
     })
+}
+
+/// The camera that the configuration names, else that of the label, else the first one that is known; and what
+/// the label says.
+fn labelled(image: &ImageConfig) -> Result<(Instrument, ImageFields)> {
+    let cameras = match &image.instrument {
+        Some(named) => std::slice::from_ref(named),
+        None => built_in_instruments(),
+    };
+    let (instrument, fields) = match &image.label {
+        Some(path) => {
+            let label = moc::read_label(path, cameras)?;
+            (label.instrument, label.fields)
+        }
+        None => {
+            let named = image.instrument.as_ref();
+            let camera = named.unwrap_or_else(|| usual_instrument());
+            (camera.clone(), ImageFields::default())
+        }
+    };
+    Distortion::check(&instrument).map_err(|folded| ImageFault::Distortion {
+        image: image.id.clone(),
+        instrument: instrument.name.clone(),
+        folded,
+    })?;
+    Ok((instrument, fields))
+}
+
+/// Makes sure that the camera can sum like that and has the pixels.
+fn fits_detector(
+    image: &ImageConfig,
+    instrument: &Instrument,
+    [downtrack, crosstrack]: [u32; 2],
+    [first, samples]: [u32; 2],
+) -> std::result::Result<(), ImageFault> {
+    let limits = &instrument.summing;
+    for (key, summing) in [
+        ("downtrack_summing", downtrack),
+        ("crosstrack_summing", crosstrack),
+    ] {
+        if summing == 0 || summing > limits.max {
+            return Err(ImageFault::Summing {
+                image: image.id.clone(),
+                key,
+                summing,
+                instrument: instrument.name.clone(),
+                max: limits.max,
+            });
+        }
+    }
+    if limits.variable_codes.contains(&crosstrack) {
+        return Err(ImageFault::VariableSumming {
+            image: image.id.clone(),
+            code: crosstrack,
+            instrument: instrument.name.clone(),
+        });
+    }
+    let pixels = instrument.detector.pixels;
+    let end = u64::from(first) + u64::from(samples) * u64::from(crosstrack);
+    if samples == 0 || end > u64::from(pixels) {
+        return Err(ImageFault::Detector {
+            image: image.id.clone(),
+            samples,
+            crosstrack,
+            first,
+            end,
+            instrument: instrument.name.clone(),
+            pixels,
+        });
+    }
+    Ok(())
 }
 
 /// Configuration over label, with a note for every key in which they differ.

@@ -7,9 +7,8 @@ use areograph::{
         AdjustmentConfig, BiasScope, CameraModel, DatumChoice, IntersectionConfig, KernelList,
         KernelSource, KernelsConfig, MolaClock, OrientationConfig, PedrConfig, PointingConfig,
         RangeCheckConfig, RegistrationConfig, ShotFilter, SiteConfig, TagSign, TiesConfig,
-        WindowConfig, WindowShape,
+        WindowConfig, WindowShape, usual_instrument,
     },
-    constants::MGS_POINTING_BIAS,
     footprints::{Footprint, Footprints, SourceFile},
     frames::{MarsDatum, MarsIau2000},
     geom::{
@@ -212,7 +211,7 @@ fn config() -> SiteConfig {
             padding_s: 1.0,
         },
         pointing: PointingConfig {
-            ck_bias: MGS_POINTING_BIAS,
+            ck_bias: usual_instrument().pointing_bias(),
             source: "mocAddendum004.ti".to_owned(),
         },
         mola_clock: MolaClock {
@@ -287,6 +286,7 @@ pub(crate) fn line_offset(row: usize) -> f64 {
 fn image_times() -> ImageTimes {
     ImageTimes {
         id: "m04-02852".to_owned(),
+        instrument: usual_instrument().clone(),
         start: Et::from_seconds(START_S),
         start_from: StartFrom::Sclk,
         sclk_start: Some("619971158:28".to_owned()),

@@ -57,6 +57,10 @@ fn image(raw: &Spanned<RawImage>, review: &mut Review<'_>) -> ImageConfig {
         .label
         .as_ref()
         .map(|path| review.existing("images.label", path, Target::File));
+    let instrument = keys
+        .instrument
+        .as_ref()
+        .and_then(|written| review.instrument(written));
     let fields = fields(keys, review);
     if label.is_none() {
         complete(raw.span(), keys, review);
@@ -85,6 +89,7 @@ fn image(raw: &Spanned<RawImage>, review: &mut Review<'_>) -> ImageConfig {
     ImageConfig {
         id,
         label,
+        instrument,
         serial_number,
         fields,
     }

@@ -15,19 +15,16 @@ use std::{collections::BTreeSet, path::Path};
 
 use toml::Spanned;
 
-use crate::{
-    constants::{MGS_POINTING_BIAS, MOLA_CLOCK_BIAS_S},
-    time::PointingBias,
-    units::RADIANS_PER_ARCSECOND,
-};
+use crate::{instruments::PointingTime, time::PointingBias, units::RADIANS_PER_ARCSECOND};
 
 use super::{
+    instruments::{built_in_altimeter, usual_instrument},
     problems::Review,
     raw::{RawMolaClock, RawOrientation, RawPointing, RawRangeCheck, RawRegistration, RawSite},
     shape::Written,
     site::{
-        BiasScope, CameraModel, MolaClock, OrientationConfig, PointingConfig, RangeCheckConfig,
-        RegistrationConfig, SCAN_STEPS_MAX, SiteConfig, TagSign,
+        BiasScope, CameraModel, ImageConfig, MolaClock, OrientationConfig, PointingConfig,
+        RangeCheckConfig, RegistrationConfig, SCAN_STEPS_MAX, SiteConfig, TagSign,
     },
 };
 use values::Accept;
@@ -65,7 +62,7 @@ pub(super) fn validate(
         blake3: written.blake3,
         keys: written.keys,
         kernels: kernels::kernels(raw.kernels, review),
-        pointing: pointing(&inner(raw.pointing), review),
+        pointing: pointing(&inner(raw.pointing), &images, review),
         mola_clock: mola_clock(&inner(raw.mola_clock), review),
         pedr: pedr::pedr(raw.pedr, review),
         windows: windows::windows(raw.windows, searched, review),
@@ -84,20 +81,27 @@ fn inner<T: Default>(raw: Option<Spanned<T>>) -> T {
     raw.map(Spanned::into_inner).unwrap_or_default()
 }
 
-fn pointing(raw: &RawPointing, review: &mut Review<'_>) -> PointingConfig {
+fn pointing(raw: &RawPointing, images: &[ImageConfig], review: &mut Review<'_>) -> PointingConfig {
+    let named: Vec<&PointingTime> = images
+        .iter()
+        .filter_map(|image| Some(&image.instrument.as_ref()?.pointing))
+        .collect();
+    let usual = named.first().copied();
+    let usual = usual.unwrap_or(&usual_instrument().pointing);
+    let differs = |own: &&PointingTime| own.ck_bias_s.total_cmp(&usual.ck_bias_s).is_ne();
+    if raw.ck_bias_s.is_none() && named.iter().any(differs) {
+        let expected = "one bias for all images, as their instruments have different ones";
+        review.missing(None, "pointing.ck_bias_s", expected);
+    }
     let ck_bias_s = review.number(
         "pointing.ck_bias_s",
         &raw.ck_bias_s,
         Accept::FromTo(-10.0, 10.0),
-        MGS_POINTING_BIAS.seconds(),
+        usual.ck_bias_s,
     );
     PointingConfig {
         ck_bias: PointingBias::from_seconds(ck_bias_s),
-        source: review.text(
-            "pointing.source",
-            &raw.source,
-            "INS-94031_CK_TIME_BIAS in mocAddendum004.ti; Shan et al. 2005, p. 98",
-        ),
+        source: review.text("pointing.source", &raw.source, &usual.source),
     }
 }
 
@@ -123,22 +127,19 @@ fn mola_clock(raw: &RawMolaClock, review: &mut Review<'_>) -> MolaClock {
             }
         }
     }
+    let altimeter = built_in_altimeter();
     MolaClock {
         bias_s: review.number(
             "mola_clock.bias_s",
             &raw.bias_s,
             Accept::FromTo(0.0, 10.0),
-            MOLA_CLOCK_BIAS_S,
+            altimeter.clock_bias_s,
         ),
         sign: review
             .word("mola_clock.sign", raw.sign.as_ref(), &signs)
             .unwrap_or(TagSign::Late),
         scope: scope.unwrap_or(BiasScope::SpkLookup),
-        source: review.text(
-            "mola_clock.source",
-            &raw.source,
-            "Shan et al. 2005, p. 98, citing NAIF 2001; sign and scope not published",
-        ),
+        source: review.text("mola_clock.source", &raw.source, &altimeter.clock_source),
     }
 }
 

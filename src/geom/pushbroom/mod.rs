@@ -2,10 +2,12 @@
 //!
 //! The image line is `x`, in lines from the middle of the header image. `M` takes Mars-fixed components
 //! to camera components; the camera looks along +Z. A ground point `P` has the camera vector
-//! `q = M (P − C)`, and is seen by the line where `q1 = 0`.
+//! `q = M (P − C)`, and is seen by the line where `q1 = 0`, or where
+//! `q1/q3` is that of the distorted detector at `q2/q3`.
 
 mod corrected;
 mod detector;
+mod distortion;
 mod models;
 mod newton;
 mod published;
@@ -14,8 +16,10 @@ mod sampled;
 use nalgebra::{Matrix3, Vector3};
 
 pub use corrected::{CorrectedOrientation, OrientationCorrection};
-pub use detector::Detector;
+pub use detector::{Detector, RadialFit};
+pub use distortion::{Distortion, FoldedLine};
 pub use models::{EulerPolynomial, RotationVectorPolynomial, VectorPolynomial};
+pub(super) use newton::missed_m;
 pub use newton::{Projector, Sighting};
 pub use published::{FixedPoint, FrameFirst, Limits, Solution};
 pub use sampled::{SampledOrientation, SamplesFault};

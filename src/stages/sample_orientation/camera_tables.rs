@@ -4,7 +4,7 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::{CameraTables, InterpolationCheck, Reader};
 use crate::{
-    constants::{MARS_IAU2000, MOC_NA_DETECTORS, MOC_NA_FOCAL_LENGTH_MM, MOC_NA_PIXEL_PITCH_MM},
+    constants::MARS_IAU2000,
     error::Result,
     frames::MarsIau2000,
     geom::{
@@ -79,7 +79,7 @@ fn tables(reader: &Reader, epochs: &[Et]) -> Result<CameraTables> {
         bus_angular_velocity_rad_s: Vec::new(),
         inertial_to_mars: Vec::new(),
         mars_angular_velocity_rad_s: Vec::new(),
-        bus_to_camera: rows(session.mounting(first)?.matrix()),
+        bus_to_camera: rows(session.mounting(reader.instrument, first)?.matrix()),
         interpolation: InterpolationCheck::default(),
     };
     for epoch in epochs {
@@ -203,17 +203,17 @@ fn apparent_camera(reader: &Reader, et: Et) -> Result<Camera> {
 fn error_px(image: &ImageTimes, kernels: &Camera, interpolated: &Camera) -> f64 {
     let (position_m, camera_to_mars) = kernels;
     let distance_m = position_m.norm() - MARS_IAU2000.equatorial_radius_m;
-    let detector_rad = MOC_NA_PIXEL_PITCH_MM / MOC_NA_FOCAL_LENGTH_MM;
-    let first = f64::from(image.first_detector);
-    let width = f64::from(image.samples * image.crosstrack_summing);
-    let centre = f64::from(MOC_NA_DETECTORS) / 2.0;
-    let errors_px = [first, first + 0.5 * width, first + width].map(|detector| {
-        let across = (detector - centre) * detector_rad;
-        let ground_m = position_m + camera_to_mars * Vector3::new(0.0, across, 1.0) * distance_m;
+    let detector = image.detector();
+    let pixel_rad =
+        image.instrument.optics.pixel_pitch_mm / image.instrument.optics.focal_length_mm;
+    let errors_px = [0.0, 0.5, 1.0].map(|share| {
+        let look = detector.look(share * detector.samples);
+        let ground_m = position_m + camera_to_mars * look * distance_m;
         let seen = interpolated.1.transpose() * (ground_m - interpolated.0);
-        let lines = seen.x / seen.z / f64::from(image.downtrack_summing);
-        let samples = (seen.y / seen.z - across) / f64::from(image.crosstrack_summing);
-        lines.hypot(samples) / detector_rad
+        let missed = seen.xy() / seen.z - look.xy();
+        let lines = missed.x / f64::from(image.downtrack_summing);
+        let samples = missed.y / f64::from(image.crosstrack_summing);
+        lines.hypot(samples) / pixel_rad
     });
     largest(errors_px).unwrap_or_default()
 }
