@@ -23,6 +23,28 @@ pub struct SourceFile {
     pub blake3: String,
 }
 
+/// What image coordinates of footprints are to an adjustment.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum FootprintImageCoordinates {
+    /// Observations with their own standard deviations, as in the paper.
+    Weighted,
+    /// Nothing.
+    Off,
+    /// No observations, but projected with the adjusted orientation afterwards: a coordinate that
+    /// follows the orientation has no residual and carries no weight, no freedom and no covariance.
+    Reproject,
+}
+
+impl FootprintImageCoordinates {
+    /// Every mode, with its word in the configuration.
+    pub const WORDS: [(&'static str, Self); 3] = [
+        ("weighted", Self::Weighted),
+        ("off", Self::Off),
+        ("reproject", Self::Reproject),
+    ];
+}
+
 macro_rules! columns {
     ($($(#[$doc:meta])* $column:ident: $kind:ty,)*) => {
         /// One shot, for building columns and for messages.

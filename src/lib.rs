@@ -3,6 +3,7 @@
 //!
 //! The way of the data is [`flow::run_site`], read top to bottom; `ARCHITECTURE.md` is the map.
 
+pub mod altimetry;
 pub mod cli;
 pub mod config;
 pub mod constants;
@@ -13,7 +14,9 @@ pub mod flow;
 pub mod footprints;
 pub mod frames;
 pub mod geom;
+pub mod image;
 pub mod instruments;
+pub mod kernel_source;
 pub mod pds;
 pub mod products;
 pub mod report;

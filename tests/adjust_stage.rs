@@ -12,13 +12,16 @@ mod recipe;
 mod scene;
 
 use areograph::{
-    config::{AdjustmentConfig, BAARDA_LIMIT, MolaImage, Robust, RobustFunction},
+    config::AdjustmentConfig,
+    footprints::FootprintImageCoordinates,
     geom::{
         bundle::{BundleOptions, Network, View, solve},
         pushbroom::{
             CorrectedOrientation, Detector, Distortion, EulerPolynomial, OrientationCorrection,
             Projector, Sighting,
         },
+        robust::RobustWeight,
+        statistics::BAARDA_LIMIT,
         stereo::StereoImage,
     },
     stages::{
@@ -137,9 +140,8 @@ impl Site {
     }
 }
 
-const HUBER: Robust = Robust {
-    function: RobustFunction::Huber,
-    limit: RobustFunction::Huber.usual_limit(),
+const HUBER: RobustWeight = RobustWeight::Huber {
+    limit: RobustWeight::HUBER_LIMIT,
 };
 
 /// The defaults, but no tie point is left out.
@@ -214,8 +216,12 @@ fn footprints_in_images_weigh_as_the_mode_says() {
         })
         .unwrap()
     };
-    let [weighted, off, reproject] =
-        [MolaImage::Weighted, MolaImage::Off, MolaImage::Reproject].map(with);
+    let [weighted, off, reproject] = [
+        FootprintImageCoordinates::Weighted,
+        FootprintImageCoordinates::Off,
+        FootprintImageCoordinates::Reproject,
+    ]
+    .map(with);
     let views = weighted.views.len() - off.views.len();
     assert_eq!(
         weighted.summary.degrees_of_freedom,

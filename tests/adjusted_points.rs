@@ -10,10 +10,11 @@ mod common;
 use std::{fs, path::PathBuf};
 
 use areograph::{
-    config::{ImageConfig, ImageFields},
+    config::ImageConfig,
     error::Kind,
     frames::Position,
     geom::ellipsoid::{Spherical, spherical_to_xyz_m},
+    image::ImageFields,
     products::{
         ControlMeasure, ControlPoint, GroundEstimate, ImageMeasure, LidarPoint, moc_serial_number,
         write_gcp, write_lidar_data,

@@ -1,15 +1,21 @@
-//! Arrows point down: a room uses the floors below it, never one above.
+//! Arrows point down: a room uses the floors below it, never one above; files use each other one way;
+//! no stage calls another.
 #![allow(
     clippy::unwrap_used,
     clippy::panic,
     reason = "helpers of tests may fail loudly"
 )]
 
+#[path = "architecture/uses.rs"]
+mod uses;
+
 use std::{
-    collections::BTreeSet,
+    collections::{BTreeMap, BTreeSet},
     fs,
-    path::{Path, PathBuf},
+    path::Path,
 };
+
+use uses::{Module, Sources, files_below};
 
 /// Rooms by floor, the lowest first; see ARCHITECTURE.md.
 const FLOORS: [&[&str]; 6] = [
@@ -22,19 +28,22 @@ const FLOORS: [&[&str]; 6] = [
         "footprints",
         "ties",
         "files",
+        "altimetry",
+        "image",
         "instruments",
-        "config",
+        "kernel_source",
     ],
-    &["geom"],
+    &["geom", "config"],
     &["spice", "pds", "scene"],
     &["stages"],
     &["flow", "report", "difference", "products", "store"],
     &["cli"],
 ];
 
-/// Arrows inside a floor that are meant: the scene is written with the fence and the PEDR writer,
-/// the flow publishes, the difference reads what was published, and the report tells of both.
-const SAME_FLOOR: [(&str, &str); 9] = [
+/// Arrows inside a floor that are meant: the configuration speaks of windows and camera models, the scene is
+/// written with the fence and the PEDR writer, the flow publishes, the difference reads what was published, and the report tells of both.
+const SAME_FLOOR: [(&str, &str); 10] = [
+    ("config", "geom"),
     ("scene", "spice"),
     ("scene", "pds"),
     ("flow", "products"),
@@ -55,83 +64,21 @@ fn floor(room: &str) -> usize {
         })
 }
 
-fn sources(folder: &Path, found: &mut Vec<PathBuf>) {
-    for entry in fs::read_dir(folder).unwrap() {
-        let path = entry.unwrap().path();
-        if path.is_dir() {
-            sources(&path, found);
-        } else if path.extension().is_some_and(|extension| extension == "rs") {
-            found.push(path);
-        }
-    }
-}
-
-/// The room a source file belongs to, `None` for `lib.rs` and `main.rs`.
-fn room_of(source: &Path, root: &Path) -> Option<String> {
-    let relative = source.strip_prefix(root).unwrap();
-    let first = relative.iter().next()?.to_str()?;
-    let room = first.strip_suffix(".rs").unwrap_or(first);
-    (!matches!(room, "lib" | "main")).then(|| room.to_owned())
-}
-
-/// Rooms named after `crate::`, also inside `use crate::{a::…, b::…}`; comments, and tests at the end of
-/// a file, do not count.
-fn used_rooms(text: &str) -> BTreeSet<String> {
-    let code: String = text
-        .split("#[cfg(test)]")
-        .next()
-        .unwrap_or_default()
-        .lines()
-        .filter(|line| !line.trim_start().starts_with("//"))
-        .collect::<Vec<_>>()
-        .join("\n");
-    let name = |text: &str| -> String {
-        text.chars()
-            .take_while(|c| c.is_ascii_alphanumeric() || *c == '_')
-            .collect()
-    };
-    let mut rooms = BTreeSet::new();
-    for after in code.split("crate::").skip(1) {
-        let Some(group) = after.strip_prefix('{') else {
-            rooms.insert(name(after));
-            continue;
-        };
-        let mut depth = 0;
-        let mut item_starts = true;
-        for (position, character) in group.char_indices() {
-            match character {
-                '{' => depth += 1,
-                '}' if depth == 0 => break,
-                '}' => depth -= 1,
-                ',' if depth == 0 => item_starts = true,
-                c if depth == 0 && item_starts && c.is_ascii_alphabetic() => {
-                    rooms.insert(name(&group[position..]));
-                    item_starts = false;
-                }
-                _ => {}
-            }
-        }
-    }
-    rooms
-}
-
 #[test]
 fn arrows_point_down() {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
-    let mut files = Vec::new();
-    sources(&root, &mut files);
-    assert!(files.len() > 30, "the sources were not found");
+    let sources = Sources::of_this_crate();
     let mut wrong = Vec::new();
-    for file in files {
-        let Some(room) = room_of(&file, &root) else {
-            continue;
-        };
-        for used in used_rooms(&fs::read_to_string(&file).unwrap()) {
-            let down = floor(&used) < floor(&room);
-            let ground_floor = floor(&used) == 0 && floor(&room) == 0 && used != "config";
-            let meant = SAME_FLOOR.contains(&(&*room, &*used));
+    for module in sources.modules() {
+        let room = &module[0];
+        for used in sources.uses(module) {
+            let Some(used) = used.file.first() else {
+                continue;
+            };
+            let down = floor(used) < floor(room);
+            let ground_floor = floor(used) == 0 && floor(room) == 0;
+            let meant = SAME_FLOOR.contains(&(&**room, &**used));
             if used != room && !down && !ground_floor && !meant {
-                wrong.push(format!("{}: {room} -> {used}", file.display()));
+                wrong.push(format!("{}: {room} -> {used}", module.join("/")));
             }
         }
     }
@@ -142,20 +89,140 @@ fn arrows_point_down() {
     );
 }
 
+/// To go: files that still use each other in a circle, and functions of one stage that another still calls.
+const CIRCLES_TO_GO: &str = "stages/adjust/";
+const CALLS_TO_GO: [&str; 5] = [
+    "stages/compare_pairs: uncertainty_budget",
+    "stages/prepare_adjustment: orientation_sigmas",
+    "stages/reorient: check_interpolation",
+    "stages/reorient: outline",
+    "stages/reorient: samples_at",
+];
+
+/// Arrows from file to file that lie on a circle.
+fn circles(sources: &Sources) -> Vec<String> {
+    let files_used = |module: &Module| -> BTreeSet<Module> {
+        let uses = sources.uses(module).into_iter();
+        uses.map(|used| used.file).collect()
+    };
+    let arrows: BTreeMap<&Module, BTreeSet<Module>> = sources
+        .modules()
+        .map(|module| (module, files_used(module)))
+        .collect();
+    let leads_back = |from: &Module, to: &Module| {
+        let (mut seen, mut ahead) = (BTreeSet::new(), vec![from]);
+        while let Some(module) = ahead.pop() {
+            let next = arrows.get(module).into_iter().flatten();
+            ahead.extend(next.filter(|next| seen.insert(*next)));
+        }
+        seen.contains(to)
+    };
+    let all = arrows
+        .iter()
+        .flat_map(|(from, to)| to.iter().map(move |to| (*from, to)));
+    all.filter(|(from, to)| leads_back(to, from))
+        .map(|(from, to)| format!("{} -> {}", from.join("/"), to.join("/")))
+        .collect()
+}
+
 #[test]
-fn grouped_uses_are_read() {
-    let text = "use crate::{a::{b, c}, d,\n  e::f};\n/// [`crate::y`]\nfn x() { crate::g::h() }\n#[cfg(test)]\nuse crate::z;";
+fn files_use_each_other_one_way() {
+    let mut circles = circles(&Sources::of_this_crate());
+    circles.retain(|arrow| !arrow.starts_with(CIRCLES_TO_GO));
+    assert!(
+        circles.is_empty(),
+        "files that use each other in a circle:\n{}",
+        circles.join("\n")
+    );
+}
+
+/// Stages share types; what one of them does is for the flow alone to ask.
+#[test]
+fn no_stage_calls_another() {
+    let sources = Sources::of_this_crate();
+    let mut calls = Vec::new();
+    for module in sources.modules().filter(|module| module[0] == "stages") {
+        for used in sources.uses(module) {
+            let other =
+                used.file.len() > 1 && used.file[0] == "stages" && used.file[1] != module[1];
+            let name = used.item.unwrap_or_default();
+            let function = name.starts_with(|first: char| first.is_ascii_lowercase());
+            if other && function {
+                calls.push(format!("{}: {name}", module.join("/")));
+            }
+        }
+    }
+    calls.retain(|call| !CALLS_TO_GO.contains(&&**call));
+    assert!(
+        calls.is_empty(),
+        "functions of other stages:\n{}",
+        calls.join("\n")
+    );
+}
+
+fn texts(files: &[(&str, &str)]) -> Sources {
+    let module = |path: &str| path.split_terminator('/').map(str::to_owned).collect();
+    Sources::of_texts(
+        files
+            .iter()
+            .map(|(path, text)| (module(path), (*text).to_owned())),
+    )
+}
+
+#[test]
+fn uses_are_read_whatever_their_form() {
+    let text = "use crate::{a::{self, b as bee, c}, d,\n  e::f};\n/// [`crate::y`]\nuse super::h::T;\n\
+                fn x() { crate::g::h::<u8>(); println!(\"crate::z {}\", crate::p::Q::new()); inner::i(); }\n\
+                #[cfg(test)]\nmod tests { use crate::z; }\nmod inner;";
+    let mut files = vec![("room/one", text), ("room", "pub use two::T as h;\n")];
+    files.push(("room/one/inner", ""));
+    files.push(("room/h", ""));
+    files.extend(["a", "d", "e", "g", "y", "z", "p"].map(|name| (name, "")));
+    let uses = texts(&files).uses(&vec!["room".to_owned(), "one".to_owned()]);
+    let told: Vec<String> = uses
+        .into_iter()
+        .map(|used| format!("{} {}", used.file.join("/"), used.item.unwrap_or_default()))
+        .collect();
     assert_eq!(
-        used_rooms(text).into_iter().collect::<Vec<_>>(),
-        ["a", "d", "e", "g"]
+        told,
+        [
+            "a ",
+            "a b",
+            "a c",
+            "d ",
+            "e f",
+            "g h",
+            "p Q",
+            "room/h T",
+            "room/one/inner i"
+        ]
+    );
+}
+
+#[test]
+fn a_circle_is_found_through_what_a_folder_passes_on() {
+    let sources = texts(&[
+        (
+            "room",
+            "mod one; mod two; pub use one::Thing; fn all() { two::run(); one::run() }",
+        ),
+        ("room/one", "use super::two::run; pub struct Thing;"),
+        ("room/two", "use super::Thing;"),
+        ("other", "use crate::room::Thing;"),
+    ]);
+    assert_eq!(
+        circles(&sources),
+        ["room/one -> room/two", "room/two -> room/one"]
     );
 }
 
 #[test]
 fn files_stay_short() {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
     let mut files = Vec::new();
-    sources(&root, &mut files);
+    files_below(
+        &Path::new(env!("CARGO_MANIFEST_DIR")).join("src"),
+        &mut files,
+    );
     for file in files {
         let lines = fs::read_to_string(&file).unwrap().lines().count();
         assert!(

@@ -1,7 +1,8 @@
 //! Bad input through the command line: exit code and exact message of every case.
 //!
 //! Expected messages stand in `tests/bad_input/<case>.txt`: exit code, then what the program printed,
-//! with the case's folder cut out. Cases of the configuration alone are in `tests/config/bad`.
+//! with the case's folder cut out (`SNAPSHOTS=overwrite` writes them anew). Cases of the configuration
+//! alone are in `tests/config/bad`.
 #![allow(
     clippy::disallowed_methods,
     clippy::unwrap_used,
@@ -11,9 +12,9 @@
 
 mod common;
 
-use std::{fs, path::Path, process::Command};
+use std::{fs, process::Command};
 
-use common::case::Case;
+use common::{case::Case, golden::Golden};
 
 type Spoil = fn(&Case) -> Command;
 
@@ -33,7 +34,7 @@ fn compare(case: &Case, arguments: &[&str]) -> Command {
 }
 
 /// Spoils one thing of a good case and says what to run.
-const CASES: [(&str, Spoil); 50] = [
+const CASES: &[(&str, Spoil)] = &[
     ("good", Case::run),
     ("site_file_missing", |case| {
         fs::remove_file(case.path("site.toml")).unwrap();
@@ -351,26 +352,15 @@ const PAIR_CASES: &[(&str, Spoil)] = &[
 
 #[test]
 fn every_case_has_its_exit_code_and_exact_message() {
-    let expected = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/bad_input");
-    let mut differing = Vec::new();
+    let mut golden = Golden::folder("bad_input");
     let cases = CASES.iter().map(|(name, spoil)| (name, Case::new(), spoil));
     let pairs = PAIR_CASES
         .iter()
         .map(|(name, spoil)| (name, Case::pair(), spoil));
     for (name, case, spoil) in cases.chain(pairs) {
-        let found = case.outcome(spoil(&case));
-        let wanted = fs::read_to_string(expected.join(format!("{name}.txt"))).unwrap_or_default();
-        if found.trim_end() != wanted.trim_end() {
-            differing.push(format!("=== {name}\n{found}"));
-        }
+        golden.compare(name, &case.outcome(spoil(&case)));
     }
-    assert!(
-        differing.is_empty(),
-        "{} of {} messages differ from tests/bad_input; found:\n{}",
-        differing.len(),
-        CASES.len() + PAIR_CASES.len(),
-        differing.join("\n")
-    );
+    golden.finish();
 }
 
 #[test]

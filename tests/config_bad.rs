@@ -6,12 +6,15 @@
     reason = "helpers of tests may panic, and files in a temporary folder need no atomic writer"
 )]
 
+mod common;
+
 use std::{
     fs,
     path::{Path, PathBuf},
 };
 
 use areograph::{config, error::Kind};
+use common::golden::{Golden, assert_messages};
 
 const OPEN_RING: &str = r#"{"type": "Polygon", "coordinates": [[[0, 0], [1, 0], [1, 1], [0, 1]]]}"#;
 
@@ -44,7 +47,7 @@ fn every_bad_file_has_its_exact_message() {
     let prefix = format!("{}/", folder.path().display());
     let files = bad_files();
     assert!(files.len() >= 40, "only {} cases", files.len());
-    let mut differing = Vec::new();
+    let mut golden = Golden::folder("config/bad");
     for path in files {
         let text = fs::read_to_string(&path).unwrap();
         let copy = folder.path().join(path.file_name().unwrap());
@@ -52,45 +55,35 @@ fn every_bad_file_has_its_exact_message() {
             Ok(_) => "accepted".to_owned(),
             Err(problems) => problems.to_string().replace(&prefix, ""),
         };
-        let expected = fs::read_to_string(path.with_extension("txt")).unwrap_or_default();
-        if found.trim_end() != expected.trim_end() {
-            differing.push(format!("--- {}\n{found}", path.display()));
-        }
+        golden.compare(path.file_stem().unwrap().to_str().unwrap(), &found);
     }
-    assert!(
-        differing.is_empty(),
-        "{} messages differ from their .txt; found:\n{}",
-        differing.len(),
-        differing.join("\n")
-    );
+    golden.finish();
 }
 
 #[test]
 fn files_that_are_no_text_are_refused_before_they_are_parsed() {
     let folder = folder();
-    let message = |name: &str, bytes: &[u8]| {
+    let prefix = format!("{}/", folder.path().display());
+    let load = |name: &str, bytes: Option<&[u8]>| {
         let path = folder.path().join(name);
-        fs::write(&path, bytes).unwrap();
+        if let Some(bytes) = bytes {
+            fs::write(&path, bytes).unwrap();
+        }
         let failure = config::load(&path).unwrap_err();
-        assert_eq!(failure.kind(), Kind::Configuration);
-        failure
-            .to_string()
-            .replace(&format!("{}/", folder.path().display()), "")
+        let message = failure.to_string().replace(&prefix, "");
+        (failure.kind(), (name.to_owned(), message))
     };
-    let advice = "\n  what to do: mend these entries; config/sites/example.toml documents every key \
-                  with its unit and default";
-    assert_eq!(
-        message("long.toml", &vec![b'#'; (1 << 20) + 1]),
-        format!(
-            "long.toml: is longer than 1048576 bytes; expected the TOML file of one site{advice}"
-        )
-    );
-    assert_eq!(
-        message("binary.toml", b"DAF/SPK \xff\x00"),
-        format!("binary.toml: is not UTF-8 from byte 9; expected text{advice}")
-    );
-    let no_file = config::load(folder.path()).unwrap_err();
-    assert!(no_file.to_string().contains("is no regular file"));
-    let absent = config::load(&folder.path().join("absent.toml")).unwrap_err();
-    assert_eq!(absent.kind(), Kind::Io);
+    let long = vec![b'#'; (1 << 20) + 1];
+    fs::create_dir(folder.path().join("folder.toml")).unwrap();
+    let (kinds, told): (Vec<Kind>, Vec<_>) = [
+        load("long.toml", Some(&long)),
+        load("binary.toml", Some(b"DAF/SPK \xff\x00")),
+        load("folder.toml", None),
+        load("absent.toml", None),
+    ]
+    .into_iter()
+    .unzip();
+    assert_eq!(kinds[..2], [Kind::Configuration; 2]);
+    assert_eq!(kinds[3], Kind::Io);
+    assert_messages("config_no_text", &told);
 }

@@ -13,7 +13,10 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use areograph::config::{self, Loaded, SiteConfig, WindowShape};
+use areograph::{
+    config::{self, Loaded, SiteConfig},
+    geom::window::WindowShape,
+};
 use serde_json::Value;
 
 const OUTLINE: &str =

@@ -11,11 +11,10 @@ mod pushbroom;
 use std::{fs, path::PathBuf};
 
 use areograph::{
-    config::{
-        ImageConfig, ImageFields, KernelList, KernelSource, KernelsConfig, OrientationConfig,
-        PointingConfig, usual_instrument,
-    },
+    config::{ImageConfig, KernelsConfig, OrientationConfig, PointingConfig, usual_instrument},
     geom::attitude::matrix_of_spice_quaternion,
+    image::ImageFields,
+    kernel_source::{KernelList, KernelSource},
     products::write_products,
     spice::{KernelSet, Session},
     stages::{

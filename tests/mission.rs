@@ -10,7 +10,8 @@ mod common;
 use std::{fs, path::PathBuf, sync::atomic::AtomicBool};
 
 use areograph::{
-    config::{BiasScope, SiteConfig, load, usual_instrument},
+    altimetry::BiasScope,
+    config::{SiteConfig, load, usual_instrument},
     footprints::Footprints,
     frames::{MarsIau2000, Position},
     geom::{
@@ -256,7 +257,7 @@ fn scans_of_profiles_from_pole_to_pole_keep_within_their_uncertainty() {
     let truth = truth();
     let bias_s = number(&truth["biases"]["mola_clock_bias_s"]);
     let mut config = site("eos_chasma");
-    config.windows[0].shape = areograph::config::WindowShape::Box {
+    config.windows[0].shape = areograph::geom::window::WindowShape::Box {
         west_rad: 350.0_f64.to_radians(),
         east_rad: 10.0_f64.to_radians(),
         south_rad: -std::f64::consts::FRAC_PI_2,
@@ -386,7 +387,7 @@ fn a_stated_datum_against_the_version_letter_is_refused() {
     let mut config = site("eos_chasma");
     config.pedr.files = vec![mission().join("pedr/ap19802l.b") as PathBuf];
     config.pedr.datum =
-        areograph::config::DatumChoice::Stated(areograph::frames::MarsDatum::Iau1991);
+        areograph::altimetry::DatumChoice::Stated(areograph::frames::MarsDatum::Iau1991);
     let failure = search_footprints(&config.pedr, &config.windows, 0.0, &RUN_ON).unwrap_err();
     assert!(failure.to_string().contains("iau1991"), "{failure}");
     assert_eq!(failure.kind(), areograph::error::Kind::Input);

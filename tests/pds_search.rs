@@ -8,13 +8,14 @@ use std::{
 };
 
 use areograph::{
-    config::{DatumChoice, PedrConfig, ShotFilter, WindowConfig, WindowShape},
+    altimetry::{DatumChoice, ShotFilter},
+    config::{PedrConfig, WindowConfig},
     footprints::Footprint,
     frames::{MarsDatum, MarsIau2000},
     geom::{
         ellipsoid::{Spherical, spherical_to_xyz_m},
         mars_rotation::convert_datum,
-        window::Region,
+        window::{Region, WindowShape},
     },
     pds::pedr::{FieldGuard, File, FrameValues, LabelInfo, PedrWriter, Reason, Record},
     stages::search_footprints::{Reject, SearchResult, search_footprints},

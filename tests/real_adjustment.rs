@@ -23,7 +23,8 @@ use std::{
 };
 
 use areograph::{
-    config::{AdjustmentConfig, MolaImage},
+    config::AdjustmentConfig,
+    footprints::FootprintImageCoordinates,
     geom::{
         intersection::{IntersectionLimits, Unintersected},
         pushbroom::{CorrectedOrientation, ExteriorOrientation, SampledOrientation},
@@ -80,7 +81,7 @@ fn priors_of_the_paper() -> Priors {
 
 /// As in ISIS: 1.4 px for ties, 30 px for the places of footprints, and the 10 m of `lidarData.json` for ranges and
 /// coordinates.
-fn options(mola_image: MolaImage) -> AdjustmentConfig {
+fn options(mola_image: FootprintImageCoordinates) -> AdjustmentConfig {
     AdjustmentConfig {
         tie_sigma_px: [1.4; 2],
         mola_image,
@@ -415,7 +416,10 @@ fn every_distance_comes_closer_to_its_range_with_the_priors_of_isis() {
     row("initial distance - range, m", &initial_m);
     // Metres: the numbers of `real_ranges.rs`, which interpolates the trajectory itself.
     assert!((initial_m.mean - 0.450).abs() < 0.002 && initial_m.standard_deviation < 0.0015);
-    let (priors, options) = (priors_of_isis(), options(MolaImage::Weighted));
+    let (priors, options) = (
+        priors_of_isis(),
+        options(FootprintImageCoordinates::Weighted),
+    );
     let [without, with] = [false, true].map(|ranges| site.adjust(&priors, &options, ranges));
     report("ISIS's priors without ranges", &site, &without);
     report("ISIS's priors with ranges", &site, &with);
@@ -451,7 +455,7 @@ fn only_weighted_footprints_hold_the_ties_to_the_ground() {
         return;
     };
     let priors = priors_of_the_paper();
-    let [weighted, off, reproject] = MolaImage::WORDS.map(|(word, mode)| {
+    let [weighted, off, reproject] = FootprintImageCoordinates::WORDS.map(|(word, mode)| {
         let adjusted = [false, true].map(|ranges| site.adjust(&priors, &options(mode), ranges));
         report(&format!("{word} without ranges"), &site, &adjusted[0]);
         report(&format!("{word} with ranges"), &site, &adjusted[1]);

@@ -10,11 +10,10 @@ mod common;
 use std::{fs, path::PathBuf};
 
 use areograph::{
-    config::{
-        ImageConfig, ImageFields, KernelList, KernelSource, KernelsConfig, OrientationConfig,
-        PointingConfig, usual_instrument,
-    },
+    config::{ImageConfig, KernelsConfig, OrientationConfig, PointingConfig, usual_instrument},
     geom::attitude::matrix_of_spice_quaternion,
+    image::ImageFields,
+    kernel_source::{KernelList, KernelSource},
     spice::{KernelSet, Session},
     stages::{
         fit_sensor_model::fit_sensor_model,

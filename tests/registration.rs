@@ -13,8 +13,10 @@ mod fixture;
 use std::{fs::File, path::Path, sync::atomic::AtomicBool};
 
 use areograph::{
-    config::CameraModel,
-    geom::{pushbroom::ExteriorOrientation, statistics::Summary},
+    geom::{
+        pushbroom::{CameraModel, ExteriorOrientation},
+        statistics::Summary,
+    },
     stages::register::{ImageRegistration, Method, register},
 };
 use arrow::{

@@ -7,10 +7,11 @@ mod common;
 use std::{collections::BTreeMap, fs};
 
 use areograph::{
-    config::{SiteConfig, Weighting, load, usual_instrument},
+    config::{SiteConfig, load, usual_instrument},
     geom::{
         attitude::matrix_of_spice_quaternion,
         ellipsoid::spherical_to_xyz_m,
+        intersection::Weighting,
         pushbroom::{Detector, Pose, Projector, SampledOrientation},
         stereo::StereoImage,
     },

@@ -10,8 +10,8 @@ mod common;
 use std::{fs, path::Path};
 
 use areograph::{
-    config::{CkQuality, KernelSelection},
     frames::Position,
+    kernel_source::{CkQuality, KernelSelection},
     spice::{
         CkSegment, Kernel, KernelSet, Session, SpkSegment, State, Wanted, write_ck, write_spk,
     },

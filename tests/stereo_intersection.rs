@@ -11,9 +11,8 @@ mod recipe;
 mod scene;
 
 use areograph::{
-    config::Weighting,
     geom::{
-        intersection::Unintersected,
+        intersection::{Unintersected, Weighting},
         pushbroom::{Detector, Distortion, EulerPolynomial},
         stereo::StereoImage,
     },

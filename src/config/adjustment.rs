@@ -2,7 +2,12 @@
 
 use std::path::PathBuf;
 
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
+
+use crate::{
+    footprints::FootprintImageCoordinates,
+    geom::{intersection::Weighting, robust::RobustWeight, statistics::BAARDA_LIMIT},
+};
 
 /// Tie points between the images.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
@@ -29,37 +34,13 @@ impl Default for IntersectionConfig {
     }
 }
 
-/// What a measuring error is the same for in all images.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Weighting {
-    /// Standard deviation of both focal coordinates.
-    Focal {
-        /// Pixels.
-        sigma_px: f64,
-    },
-    /// Standard deviations along the track in lines and across it in pixels.
-    Line {
-        /// Lines.
-        along_lines: f64,
-        /// Pixels.
-        across_px: f64,
-    },
-}
-
-/// Critical value of the test of standardised residuals: one good observation in a thousand fails it.
-///
-/// # Source
-/// Baarda 1968, A testing procedure for use in geodetic networks.
-pub const BAARDA_LIMIT: f64 = 3.29;
-
 /// Standard deviations and options of the combined adjustment.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct AdjustmentConfig {
     /// Tie points, along and across the track, focal pixels.
     pub tie_sigma_px: [f64; 2],
     /// What image coordinates of footprints are.
-    pub mola_image: MolaImage,
+    pub mola_image: FootprintImageCoordinates,
     /// Their standard deviations, along and across the track, focal pixels.
     pub mola_sigma_px: [f64; 2],
     /// How far outside an image a footprint still counts as seen by it, pixels.
@@ -77,7 +58,7 @@ pub struct AdjustmentConfig {
     /// Position unknowns of images that look elsewhere, metres; angles get the same at the ground.
     pub off_nadir_sigma_m: f64,
     /// Weights of image coordinates that fall with their residual.
-    pub robust: Option<Robust>,
+    pub robust: Option<RobustWeight>,
     /// Standardised residual above which a tie point is a blunder and left out; `None` keeps all.
     pub blunder_limit: Option<f64>,
     /// Images whose unknowns have their own standard deviations.
@@ -90,7 +71,7 @@ impl Default for AdjustmentConfig {
     fn default() -> Self {
         Self {
             tie_sigma_px: [1.0, 1.0],
-            mola_image: MolaImage::Weighted,
+            mola_image: FootprintImageCoordinates::Weighted,
             mola_sigma_px: [74.0, 4.0],
             mola_margin_px: 200.0,
             ground_sigma_m: 10.0,
@@ -115,56 +96,4 @@ pub struct OrientationPrior {
     pub position_m: Option<[f64; 9]>,
     /// Rotations about the camera's axes, likewise, radians.
     pub rotation_rad: Option<[f64; 9]>,
-}
-
-/// What image coordinates of footprints are.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum MolaImage {
-    /// Observations with their own standard deviations, as in the paper.
-    Weighted,
-    /// Nothing.
-    Off,
-    /// No observations, but projected with the adjusted orientation afterwards: a coordinate that
-    /// follows the orientation has no residual and carries no weight, no freedom and no covariance.
-    Reproject,
-}
-
-impl MolaImage {
-    /// Every mode, with its word in the configuration.
-    pub const WORDS: [(&'static str, Self); 3] = [
-        ("weighted", Self::Weighted),
-        ("off", Self::Off),
-        ("reproject", Self::Reproject),
-    ];
-}
-
-/// Weights that fall with the normalised residual.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Robust {
-    /// The function.
-    pub function: RobustFunction,
-    /// Normalised residual from which the weight falls (Huber) or at which it is half (Cauchy).
-    pub limit: f64,
-}
-
-/// Weight functions.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum RobustFunction {
-    /// `1` up to the limit, then `limit/|z|`.
-    Huber,
-    /// `1 / (1 + (z/limit)²)`.
-    Cauchy,
-}
-
-impl RobustFunction {
-    /// The limit that keeps 95 % efficiency for normal errors.
-    #[must_use]
-    pub const fn usual_limit(self) -> f64 {
-        match self {
-            Self::Huber => 1.345,
-            Self::Cauchy => 2.385,
-        }
-    }
 }

@@ -9,6 +9,7 @@ use super::{
     problems::{Problems, Review},
 };
 use crate::{
+    geom::pushbroom::Distortion,
     instruments::{
         Altimeter, COEFFICIENTS_MAX, DetectorLine, DistortionModel, Instrument, LabelNames,
         Mounting, NaifNames, Optics, PointingTime, Sense, SummingLimits,
@@ -105,7 +106,22 @@ impl Review<'_> {
 /// # Errors
 /// Everything that is wrong with it, each with its place.
 pub fn instrument(text: &str, file: &Path) -> Result<Instrument, Problems> {
-    data_file::read(text, file, |top, review| Instrument {
+    data_file::read(text, file, |top, review| {
+        let instrument = camera(top, review);
+        // Without these numbers, whose absence is told, every line is folded.
+        let optics = &instrument.optics;
+        let told = [optics.focal_length_mm, optics.pixel_pitch_mm].map(|value| value > 0.0);
+        if told == [true; 2]
+            && let Err(folded) = Distortion::check(&instrument)
+        {
+            review.problem(None, format!("distortion: {folded}"));
+        }
+        instrument
+    })
+}
+
+fn camera(top: &mut DataTable<'_>, review: &mut Review<'_>) -> Instrument {
+    Instrument {
         id: top.text(review, "id"),
         name: top.text(review, "name"),
         label: top.table(review, "label", |table, _, review| LabelNames {
@@ -135,7 +151,7 @@ pub fn instrument(text: &str, file: &Path) -> Result<Instrument, Problems> {
             ck_bias_s: table.number(review, "ck_bias_s", [-10.0, 10.0]),
             source,
         }),
-    })
+    }
 }
 
 fn mounting(table: &mut DataTable<'_>, _source: String, review: &mut Review<'_>) -> Mounting {

@@ -7,8 +7,10 @@ use super::{
     kernels::{load_kernels, wanted},
 };
 use crate::{
-    config::{DatumChoice, KernelSource, SiteConfig},
+    altimetry::DatumChoice,
+    config::SiteConfig,
     error::{Failure, Place, Result},
+    kernel_source::KernelSource,
     pds::pedr,
     spice::{Session, Wanted},
     stages::{

@@ -2,8 +2,9 @@
 
 use super::RivalSet;
 use crate::{
-    config::{KernelList, KernelSource, SiteConfig},
+    config::SiteConfig,
     error::Result,
+    kernel_source::{KernelList, KernelSource},
     spice::{KernelSet, Wanted},
     stages::{group_profiles::Profile, tag_times::ImageTimes},
     time::Intervals,

@@ -4,7 +4,8 @@ use std::collections::BTreeMap;
 
 use super::{Stage, results::Results};
 use crate::{
-    config::{BiasScope, SiteConfig},
+    altimetry::BiasScope,
+    config::SiteConfig,
     error::Result,
     files::file_name,
     frames::MarsIau2000,

@@ -12,8 +12,9 @@ use super::{
     results::{Intersected, Readjusted},
 };
 use crate::{
-    config::{KernelSource, SiteConfig},
+    config::SiteConfig,
     error::{Place, Result},
+    kernel_source::KernelSource,
     spice::Wanted,
     stages::{
         adjust::Adjusted, check_ranges::RangeCheck, convert_datum::Converted,

@@ -13,6 +13,24 @@ const STEP_M: f64 = 1e-4;
 /// Largest condition number of the normal matrix with unit diagonal.
 const CONDITION_MAX: f64 = 1e12;
 
+/// What a measuring error is the same for in all images.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Weighting {
+    /// Standard deviation of both focal coordinates.
+    Focal {
+        /// Pixels.
+        sigma_px: f64,
+    },
+    /// Standard deviations along the track in lines and across it in pixels.
+    Line {
+        /// Lines.
+        along_lines: f64,
+        /// Pixels.
+        across_px: f64,
+    },
+}
+
 /// One measurement: the orientation of the measured line and the place in that line.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Sight {

@@ -1,24 +1,29 @@
 //! Weight functions of robust estimation.
 
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 
 /// How the weight of an observation falls with its normalised residual `z = v/σ`.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[serde(tag = "function", rename_all = "snake_case")]
 pub enum RobustWeight {
     /// `1` up to the limit, then `limit/|z|`.
     Huber {
-        /// Normalised residual from which the weight falls; 1.345 keeps 95 % efficiency.
+        /// Normalised residual from which the weight falls.
         limit: f64,
     },
     /// `1 / (1 + (z/limit)²)`.
     Cauchy {
-        /// Normalised residual with half the weight; 2.385 keeps 95 % efficiency.
+        /// Normalised residual with half the weight.
         limit: f64,
     },
 }
 
 impl RobustWeight {
+    /// Limit of Huber's function that keeps 95 % efficiency for normal errors.
+    pub const HUBER_LIMIT: f64 = 1.345;
+    /// Limit of Cauchy's function that keeps 95 % efficiency for normal errors.
+    pub const CAUCHY_LIMIT: f64 = 2.385;
+
     /// Factor of the weight, `0..=1`, at the normalised residual `z`.
     #[must_use]
     pub fn factor(self, z: f64) -> f64 {

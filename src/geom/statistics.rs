@@ -12,6 +12,12 @@ const SPREAD_FLOOR_M: f64 = 0.01;
 /// Fewer residuals than this tell nothing of the correlation of neighbours.
 const CORRELATED_MIN: usize = 10;
 
+/// Critical value of the test of standardised residuals: one good observation in a thousand fails it.
+///
+/// # Source
+/// Baarda 1968, A testing procedure for use in geodetic networks.
+pub const BAARDA_LIMIT: f64 = 3.29;
+
 /// Statistics of a column; all 0 for an empty one.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 pub struct Summary {

@@ -3,11 +3,32 @@
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use geo::{BoundingRect, Coord, Intersects, LineString, Polygon};
+use serde::Serialize;
 
-use crate::{
-    config::WindowShape,
-    units::{longitude_step_rad, wrap_pi, wrap_two_pi},
-};
+use crate::units::{longitude_step_rad, wrap_pi, wrap_two_pi};
+
+/// Outline of a window, radians.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum WindowShape {
+    /// From `west_rad` eastwards to `east_rad`, both `0..2π`; `west > east` crosses 0°.
+    /// A box over all longitudes has `west = 0`, `east = 2π`, and holds a pole when it reaches ±π/2.
+    Box {
+        /// Western edge, radians.
+        west_rad: f64,
+        /// Eastern edge, radians.
+        east_rad: f64,
+        /// Southern edge, radians.
+        south_rad: f64,
+        /// Northern edge, radians.
+        north_rad: f64,
+    },
+    /// GeoJSON polygons; each is an outer ring followed by holes, rings of (longitude, latitude) as written.
+    Polygons {
+        /// Polygons, rings, vertices: radians.
+        polygons: Vec<Vec<Vec<[f64; 2]>>>,
+    },
+}
 
 /// A window made ready for many tests.
 #[derive(Debug, Clone, PartialEq)]

@@ -4,8 +4,8 @@ use std::{fs::File, io::Read, path::Path};
 
 use super::label::{Entry, LABEL_BYTES_MAX, Label, LabelFault, parse};
 use crate::{
-    config::ImageFields,
     error::{IoFault, Place, Result},
+    image::ImageFields,
     instruments::{Instrument, LabelNames},
     units::SECONDS_PER_MS,
 };

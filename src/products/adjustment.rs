@@ -6,11 +6,13 @@ use serde::Serialize;
 
 use super::{GeometricProducts, SiteProducts, Writer, files::write_json};
 use crate::{
-    config::{
-        AdjustmentConfig, CameraModel, IntersectionConfig, MolaImage, OrientationPrior, Robust,
-    },
+    config::{AdjustmentConfig, IntersectionConfig, OrientationPrior},
     error::Result,
-    geom::{bundle::ORIENTATION_UNKNOWNS, statistics::Summary},
+    footprints::FootprintImageCoordinates,
+    geom::{
+        bundle::ORIENTATION_UNKNOWNS, pushbroom::CameraModel, robust::RobustWeight,
+        statistics::Summary,
+    },
     stages::{
         adjust::{AdjustmentSummary, CorrectedImage, PointKind},
         compare_pairs::{PairComparison, ProfileByTies},
@@ -93,7 +95,7 @@ struct Configured<'a> {
 #[derive(Serialize)]
 struct AdjustmentKeys<'a> {
     tie_sigma_px: [f64; 2],
-    mola_image: MolaImage,
+    mola_image: FootprintImageCoordinates,
     mola_sigma_px: [f64; 2],
     mola_margin_px: f64,
     ground_sigma_m: f64,
@@ -103,7 +105,7 @@ struct AdjustmentKeys<'a> {
     nadir_sigma_m: f64,
     off_nadir_sigma_m: f64,
     #[serde(skip_serializing_if = "Option::is_none")]
-    robust: Option<&'a Robust>,
+    robust: Option<&'a RobustWeight>,
     #[serde(skip_serializing_if = "Option::is_none")]
     blunder_limit: Option<f64>,
     images: Vec<PriorKeys<'a>>,

@@ -6,7 +6,7 @@ use serde::Serialize;
 use serde_json::{Map, Value, json};
 
 use super::site::{KernelLine, SiteProducts};
-use crate::{config::CkQuality, spice::quality_of, time::Intervals};
+use crate::{kernel_source::CkQuality, spice::quality_of, time::Intervals};
 
 /// Kernel names by SpiceQL's types, in load order: `ck`, `spk`, `tspk` (ephemerides of other bodies), `pck`,
 /// `fk`, `ik`, `iak` (ISIS addenda), `lsk`, `sclk`.

@@ -12,7 +12,8 @@ use super::{
     table::{Column, Table, Values},
 };
 use crate::{
-    config::{MolaClock, RangeCheckConfig},
+    altimetry::MolaClock,
+    config::RangeCheckConfig,
     error::Result,
     geom::statistics::{Summary, Trend},
     stages::{

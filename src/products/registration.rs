@@ -12,9 +12,9 @@ use super::{
     table::{Column, Table, Values},
 };
 use crate::{
-    config::{CameraModel, RegistrationConfig},
+    config::RegistrationConfig,
     error::Result,
-    geom::statistics::Summary,
+    geom::{pushbroom::CameraModel, statistics::Summary},
     stages::{
         group_profiles::Profile,
         register::{MethodRun, ModelDifference, ProfileOnImage, RegisteredPoints},

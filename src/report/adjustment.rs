@@ -7,9 +7,8 @@ use super::{
     reliability,
 };
 use crate::{
-    config::BAARDA_LIMIT,
     error::Result,
-    geom::statistics::Summary,
+    geom::statistics::{BAARDA_LIMIT, Summary},
     products::SiteProducts,
     stages::adjust::{Adjusted, AdjustmentSummary, GroundSummary, ObservationType},
 };

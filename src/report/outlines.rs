@@ -3,7 +3,7 @@
 use std::f64::consts::{FRAC_PI_2, TAU};
 
 use crate::{
-    config::WindowShape,
+    geom::window::WindowShape,
     products::{ImageProducts, SiteProducts},
 };
 

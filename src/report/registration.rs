@@ -5,8 +5,8 @@ use super::{
     plots::{COLOURS, Extent, GREY, INK, Mark, Panel, Plot, Series, Style, figure, label, thinned},
 };
 use crate::{
-    config::CameraModel,
     error::Result,
+    geom::pushbroom::CameraModel,
     products::{ImageProducts, SiteProducts},
     stages::{
         group_profiles::Profile,

@@ -7,7 +7,7 @@ use super::{
     plots::label,
 };
 use crate::{
-    config::MolaImage,
+    footprints::FootprintImageCoordinates,
     geom::statistics::Summary,
     products::{GeometricProducts, SiteProducts},
     stages::adjust::{Adjusted, AdjustmentSummary, LeftOutReason, PointKind, ScalarResidual},
@@ -34,7 +34,7 @@ pub(super) fn absolute(site: &SiteProducts, geometric: &GeometricProducts) -> St
     let relative = relative.map_or_else(String::new, |pair| pair.sentence() + " ");
     let summary = &geometric.adjusted.summary;
     let witness = match site.config.adjustment.mola_image {
-        MolaImage::Weighted if summary.shots.corrections_m[0].n > 0 => {
+        FootprintImageCoordinates::Weighted if summary.shots.corrections_m[0].n > 0 => {
             "the image coordinates of footprints were computed from the very orientation that is adjusted and are no \
              measurements of their own; these, by their weight, and the standard deviations that the orientation was \
              given beforehand decide how much each image moves"

@@ -6,7 +6,9 @@ use super::{
     plots::label,
 };
 use crate::{
-    config::{BiasScope, DatumChoice, TagSign, WindowConfig, WindowShape},
+    altimetry::{BiasScope, DatumChoice, TagSign},
+    config::WindowConfig,
+    geom::window::WindowShape,
     products::SiteProducts,
     units::RADIANS_PER_DEGREE,
 };

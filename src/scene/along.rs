@@ -12,10 +12,10 @@ use super::{
     files::{Draft, put},
     laser::FRAME_S,
     mission::write_truth,
-    pedr::{KeptShot, PedrRequest, frame_tags, write_pedr},
+    pedr::{PedrRequest, frame_tags, write_pedr},
     sites::{README_ALONG, SiteFile, SiteImage, Window},
     terrain::Terrain,
-    truth::{ProfileTruth, Truth},
+    truth::{KeptShot, ProfileTruth, Truth},
 };
 use crate::{
     config::{built_in_altimeter, built_in_instruments, usual_instrument},

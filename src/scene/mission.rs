@@ -10,12 +10,12 @@ use super::{
     kernels::{
         clock_session, image_starts, versions, write_attitude, write_orbits, write_text_kernels,
     },
-    pedr::{KeptShot, PedrRequest, frame_tags, write_pedr},
+    pedr::{PedrRequest, frame_tags, write_pedr},
     plan::{IMAGES, SITES},
     sites::{README, image_label, planned_site},
     terrain::Terrain,
     ties::write_ties,
-    truth::{ImageTruth, OrbitDifference, ProfileTruth, Truth},
+    truth::{FileTruth, ImageTruth, KeptShot, OrbitDifference, ProfileTruth, Truth},
 };
 use crate::{
     constants::MARS_IAU2000,
@@ -122,7 +122,7 @@ fn write_day(
     arc: &Arc,
     terrain: &Terrain,
     seed: u64,
-) -> Result<(super::truth::FileTruth, ProfileTruth)> {
+) -> Result<(FileTruth, ProfileTruth)> {
     let image = arc.image;
     let first = arc.orbit.revolution(arc.frames.start);
     let name = image.pedr_name();

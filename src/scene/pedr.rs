@@ -8,7 +8,7 @@ use super::{
     arc::Flight,
     laser::{Echo, FRAME_S, Frame, FrameRequest, Shot, fly_frame},
     terrain::Terrain,
-    truth::FileTruth,
+    truth::{FileTruth, KeptShot},
 };
 use crate::{
     config::built_in_altimeter,
@@ -38,17 +38,6 @@ pub(super) struct PedrRequest<'a> {
     pub orbit: &'a (dyn Fn(Et) -> u32 + Sync),
     /// Seed of clouds and missing returns.
     pub seed: u64,
-}
-
-/// A shot that met the ground, and where its record is.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct KeptShot {
-    /// Record of the file, counted from 1 with the label records.
-    pub record: u32,
-    /// Shot in the frame, 1 to 20.
-    pub shot: u8,
-    /// The truth.
-    pub truth: Shot,
 }
 
 /// Mid-points of the frames that fit into `span`, as late clocks tag them: whole microseconds, so that

@@ -6,8 +6,7 @@ use serde::Serialize;
 
 use super::{
     arc::Arc,
-    laser::{CROSSOVER_AMPLITUDE_M, CROSSOVER_PERIOD_S},
-    pedr::KeptShot,
+    laser::{CROSSOVER_AMPLITUDE_M, CROSSOVER_PERIOD_S, Shot},
     plan::Look,
     versions::Version,
 };
@@ -93,6 +92,17 @@ pub(super) struct FileTruth {
     pub shots_beyond_frame_model: u64,
     /// Lowest |latitude| of such shots in nadir-pointing frames, degrees.
     pub beyond_frame_model_from_latitude_deg: Option<f64>,
+}
+
+/// A shot that met the ground, and where its record is.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct KeptShot {
+    /// Record of the file, counted from 1 with the label records.
+    pub record: u32,
+    /// Shot in the frame, 1 to 20.
+    pub shot: u8,
+    /// The truth.
+    pub truth: Shot,
 }
 
 /// The shots of one file in one window.

@@ -4,8 +4,7 @@ use std::borrow::Cow;
 
 use super::{
     error::SpiceFault,
-    kernels::{KernelRole, read_text},
-    session::Session,
+    kernels::{Kernel, KernelRole, KernelSet, read_text},
     text_kernel::{self, values_of},
 };
 use crate::instruments::Instrument;
@@ -57,37 +56,33 @@ pub(super) fn camera_frame(instrument: &Instrument) -> Need {
     }
 }
 
-impl Session {
-    /// A fault of CSPICE, or the kernel whose absence explains it: the first of `needs` that no text
-    /// kernel of the set defines.
-    pub(super) fn explain(&self, fault: SpiceFault, needs: &[Need]) -> SpiceFault {
-        let texts = self.kernels.kernels().iter().filter(|kernel| {
-            !matches!(
-                kernel.role,
-                KernelRole::Spk | KernelRole::Ck | KernelRole::Meta
-            )
-        });
-        // Binary planetary constants are no text, and define none of these.
-        let defined: Vec<_> = texts
-            .filter_map(|kernel| text_kernel::assignments(&read_text(&kernel.path).ok()?).ok())
-            .collect();
-        let missing = needs.iter().find(|need| {
-            let defines = |text| !values_of(text, &need.variable).is_empty();
-            !defined.iter().any(|text| defines(text))
-        });
-        match missing {
-            None => fault,
-            Some(need) => SpiceFault::MissingText {
-                kernel: need.kernel.clone().into_owned(),
-                variable: need.variable.clone().into_owned(),
-                example: need.example.clone().into_owned(),
-                set: self
-                    .kernels
-                    .kernels()
-                    .iter()
-                    .map(super::kernels::Kernel::file_name)
-                    .collect(),
-            },
-        }
+/// What clock strings and attitude need.
+pub(super) const CLOCKS: [Need; 2] = [LEAP_SECONDS, CLOCK];
+
+/// A fault of CSPICE, or the kernel whose absence explains it: the first of `needs` that no text
+/// kernel of `set` defines.
+pub(super) fn explain(set: &KernelSet, fault: SpiceFault, needs: &[Need]) -> SpiceFault {
+    let texts = set.kernels().iter().filter(|kernel| {
+        !matches!(
+            kernel.role,
+            KernelRole::Spk | KernelRole::Ck | KernelRole::Meta
+        )
+    });
+    // Binary planetary constants are no text, and define none of these.
+    let defined: Vec<_> = texts
+        .filter_map(|kernel| text_kernel::assignments(&read_text(&kernel.path).ok()?).ok())
+        .collect();
+    let missing = needs.iter().find(|need| {
+        let defines = |text| !values_of(text, &need.variable).is_empty();
+        !defined.iter().any(|text| defines(text))
+    });
+    match missing {
+        None => fault,
+        Some(need) => SpiceFault::MissingText {
+            kernel: need.kernel.clone().into_owned(),
+            variable: need.variable.clone().into_owned(),
+            example: need.example.clone().into_owned(),
+            set: set.kernels().iter().map(Kernel::file_name).collect(),
+        },
     }
 }

@@ -6,7 +6,7 @@ use std::{
 };
 
 use super::{
-    coverage::interval_of,
+    coverage::{Wanted, interval_of},
     daf::{self, Segment},
     error::SpiceFault,
     kernels::{KernelRole, KernelSet, read_text, role_of},
@@ -15,10 +15,11 @@ use super::{
     text_kernel::{self, Assignment, values_of},
 };
 use crate::{
-    config::{CkQuality, KernelSelection, built_in_instruments},
+    config::built_in_instruments,
     constants::{MARS_IAU2000, NAIF_MGS, NAIF_MGS_BUS},
     error::{Failure, IoFault, Kind, Place, Result},
     files::file_name,
+    kernel_source::{CkQuality, KernelSelection},
     time::Intervals,
 };
 
@@ -30,15 +31,6 @@ const FILES_MAX: usize = 100_000;
 const NEEDS: [Need; 4] = [LEAP_SECONDS, CLOCK, MARS, BUS_FRAME];
 /// Orbit solutions that mark their files by name; a file without a mark is `nav`.
 const MARKED_FAMILIES: [&str; 2] = ["gsfc", "ipng"];
-
-/// Times for which kernels are chosen from a folder.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub struct Wanted {
-    /// Instants that ephemerides must touch.
-    pub positions: Intervals,
-    /// Instants that attitudes must touch, as the C-kernels count time: exposures with the pointing bias.
-    pub attitudes: Intervals,
-}
 
 /// Files of a folder by what they hold.
 #[derive(Default)]

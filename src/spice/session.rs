@@ -9,7 +9,7 @@ use super::{
     error::SpiceFault,
     ffi::{Cspice, Rows, StateKm},
     kernels::KernelSet,
-    needs::{BUS_FRAME, CLOCK, LEAP_SECONDS, Need, camera_frame},
+    needs::{BUS_FRAME, CLOCKS, LEAP_SECONDS, Need, camera_frame, explain},
 };
 use crate::{
     constants::{NAIF_MARS, NAIF_MGS, NAIF_MGS_BUS, NAIF_SUN},
@@ -19,9 +19,6 @@ use crate::{
     time::{CkLookup, Et},
     units::METRES_PER_KM,
 };
-
-/// What clock strings and attitude need.
-pub(super) const CLOCKS: [Need; 2] = [LEAP_SECONDS, CLOCK];
 
 /// Digits of a second in UTC strings for people.
 const UTC_DECIMALS: u8 = 3;
@@ -63,8 +60,8 @@ pub struct Attitude {
 #[derive(Debug)]
 pub struct Session {
     pub(super) cspice: Cspice,
-    pub(super) kernels: KernelSet,
-    pub(super) coverage: OnceCell<Coverage>,
+    kernels: KernelSet,
+    coverage: OnceCell<Coverage>,
 }
 
 impl Session {
@@ -88,6 +85,23 @@ impl Session {
     #[must_use]
     pub const fn kernels(&self) -> &KernelSet {
         &self.kernels
+    }
+
+    /// Coverage of all loaded kernels, at the level of intervals.
+    ///
+    /// # Errors
+    /// [`SpiceFault::Spice`] when a C-kernel cannot be read; [`SpiceFault::MissingText`] without clock.
+    pub fn coverage(&self) -> Result<&Coverage> {
+        if let Some(coverage) = self.coverage.get() {
+            return Ok(coverage);
+        }
+        let coverage = Coverage::of(&self.kernels, &self.cspice)?;
+        Ok(self.coverage.get_or_init(|| coverage))
+    }
+
+    /// A fault of CSPICE, or the absence of a kernel that explains it.
+    fn explain(&self, fault: SpiceFault, needs: &[Need]) -> SpiceFault {
+        explain(&self.kernels, fault, needs)
     }
 
     /// Instant of a UTC string such as `1999-08-24T14:12:13.64`, with or without a closing `Z`.

@@ -4,7 +4,7 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    config::MolaClock,
+    altimetry::MolaClock,
     footprints::{AsRead, Footprints},
     frames::{MarsDatum, MarsIau2000},
     geom::{
@@ -137,7 +137,7 @@ fn note(name: &str, datum: MarsDatum, turn_s: Option<f64>) -> String {
 mod tests {
     use super::*;
     use crate::{
-        config::{BiasScope, TagSign},
+        altimetry::{BiasScope, TagSign},
         footprints::{Footprint, SourceFile},
     };
 

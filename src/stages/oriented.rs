@@ -6,12 +6,11 @@ use super::{
     tag_times::ImageTimes,
 };
 use crate::{
-    config::CameraModel,
     error::{Fault, Kind, Result},
     geom::{
         attitude::matrix_of_spice_quaternion,
         pushbroom::{
-            Detector, EulerPolynomial, ExteriorOrientation, Pose, Projector,
+            CameraModel, Detector, EulerPolynomial, ExteriorOrientation, Pose, Projector,
             RotationVectorPolynomial, SampledOrientation, SamplesFault, Unseen,
         },
         stereo::StereoImage,

@@ -196,7 +196,7 @@ fn nothing_found(read: &Ties, names: &BTreeMap<&str, &str>) -> TiesFault {
 )]
 mod tests {
     use super::*;
-    use crate::config::ImageFields;
+    use crate::image::ImageFields;
 
     fn image(id: &str, serial_number: Option<&str>) -> ImageConfig {
         ImageConfig {

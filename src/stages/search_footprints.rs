@@ -9,7 +9,8 @@ use serde::{Deserialize, Serialize};
 
 use self::repeats::{Copies, require_distinct};
 use crate::{
-    config::{PedrConfig, ShotFilter, WindowConfig},
+    altimetry::ShotFilter,
+    config::{PedrConfig, WindowConfig},
     error::{Fault, Kind, Place, Result, Stopped},
     files::file_name,
     footprints::{AsRead, Footprint, Footprints, SourceFile},

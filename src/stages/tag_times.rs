@@ -3,12 +3,10 @@
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    config::{
-        IMAGE_DURATION_END_S, IMAGE_LINES_MIN, ImageConfig, ImageFields, built_in_instruments,
-        line_period_agrees, usual_instrument,
-    },
+    config::{ImageConfig, built_in_instruments, usual_instrument},
     error::{Failure, Fault, Kind, Place, Result},
-    geom::pushbroom::{Detector, Distortion, FoldedLine},
+    geom::pushbroom::Detector,
+    image::{IMAGE_DURATION_END_S, IMAGE_LINES_MIN, ImageFields, line_period_agrees},
     instruments::Instrument,
     pds::moc,
     spice::Session,
@@ -176,12 +174,6 @@ enum ImageFault {
         instrument: String,
         pixels: u32,
     },
-    #[error("image {image}: distortion of {instrument}: {folded}")]
-    Distortion {
-        image: String,
-        instrument: String,
-        folded: FoldedLine,
-    },
     #[error(
         "image {image}: {lines} lines of {line_period_s} s; expected at least {IMAGE_LINES_MIN} lines, a \
          positive period and less than {IMAGE_DURATION_END_S} s in all"
@@ -196,7 +188,7 @@ enum ImageFault {
 impl Fault for ImageFault {
     fn kind(&self) -> Kind {
         match self {
-            Self::Missing { .. } | Self::Distortion { .. } => Kind::Configuration,
+            Self::Missing { .. } => Kind::Configuration,
             _ => Kind::Input,
         }
     }
@@ -212,9 +204,6 @@ impl Fault for ImageFault {
             }
             Self::VariableSumming { .. } => {
                 "leave the image out: its samples differ in width, which areograph does not model".to_owned()
-            }
-            Self::Distortion { .. } => {
-                "check coefficients, scale and boresight in the instrument file".to_owned()
             }
             Self::Start { .. } => {
                 "check which of the two belongs to this image; the clock is what would be used".to_owned()
@@ -332,11 +321,6 @@ fn labelled(image: &ImageConfig) -> Result<(Instrument, ImageFields)> {
             (camera.clone(), ImageFields::default())
         }
     };
-    Distortion::check(&instrument).map_err(|folded| ImageFault::Distortion {
-        image: image.id.clone(),
-        instrument: instrument.name.clone(),
-        folded,
-    })?;
     Ok((instrument, fields))
 }
 

@@ -3,12 +3,11 @@
 use std::{path::PathBuf, sync::LazyLock};
 
 use areograph::{
-    config::{
-        ImageConfig, ImageFields, KernelList, KernelSource, KernelsConfig, OrientationConfig,
-        PointingConfig, usual_instrument,
-    },
+    config::{ImageConfig, KernelsConfig, OrientationConfig, PointingConfig, usual_instrument},
     constants::MARS_IAU2000,
     geom::{attitude::matrix_of_spice_quaternion, mars_rotation::mars_matrix},
+    image::ImageFields,
+    kernel_source::{KernelList, KernelSource},
     scene::{SceneOptions, write_scene},
     spice::{KernelSet, Session},
     stages::{

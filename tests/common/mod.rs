@@ -7,6 +7,7 @@
 )]
 
 pub(crate) mod case;
+pub(crate) mod golden;
 pub(crate) mod mission;
 
 use std::path::{Path, PathBuf};

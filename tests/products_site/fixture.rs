@@ -3,20 +3,22 @@
 use std::{collections::BTreeMap, sync::atomic::AtomicBool};
 
 use areograph::{
+    altimetry::{BiasScope, DatumChoice, MolaClock, ShotFilter, TagSign},
     config::{
-        AdjustmentConfig, BiasScope, CameraModel, DatumChoice, IntersectionConfig, KernelList,
-        KernelSource, KernelsConfig, MolaClock, OrientationConfig, PedrConfig, PointingConfig,
-        RangeCheckConfig, RegistrationConfig, ShotFilter, SiteConfig, TagSign, TiesConfig,
-        WindowConfig, WindowShape, usual_instrument,
+        AdjustmentConfig, IntersectionConfig, KernelsConfig, OrientationConfig, PedrConfig,
+        PointingConfig, RangeCheckConfig, RegistrationConfig, SiteConfig, TiesConfig, WindowConfig,
+        usual_instrument,
     },
     footprints::{Footprint, Footprints, SourceFile},
     frames::{MarsDatum, MarsIau2000},
     geom::{
         attitude::{OmegaPhiKappa, spice_quaternion},
         ellipsoid::Spherical,
-        pushbroom::ExteriorOrientation,
+        pushbroom::{CameraModel, ExteriorOrientation},
         statistics::{Summary, Trend},
+        window::WindowShape,
     },
+    kernel_source::{KernelList, KernelSource},
     products::{ImageProducts, KernelLine, SiteProducts},
     spice::Wanted,
     stages::{

@@ -14,7 +14,11 @@ use super::scene::{EOS_OBLIQUE, GUSEV};
 
 fn camera(id: &str) -> Instrument {
     let cameras = built_in_instruments().iter();
-    cameras.into_iter().find(|camera| camera.id == id).unwrap().clone()
+    cameras
+        .into_iter()
+        .find(|camera| camera.id == id)
+        .unwrap()
+        .clone()
 }
 
 /// The whole detector with `summing` pixels in a sample.
@@ -30,22 +34,62 @@ fn look_directions_are_those_of_the_instrument_kernel() {
         (
             "moc_wa_red",
             [
-                [0.004_011_243_500_160_5, 0.922_362_806_078_673_3, 0.386_303_978_607_855],
-                [0.003_912_545_671_105_8, -0.957_561_754_650_581_6, 0.288_201_627_366_798_3],
-                [0.003_460_137_968_268_4, 0.922_363_607_643_934_8, 0.386_307_394_103_848_2],
-                [0.003_375_000_533_211_1, -0.957_562_666_215_756_6, 0.288_205_394_885_615_3],
+                [
+                    0.004_011_243_500_160_5,
+                    0.922_362_806_078_673_3,
+                    0.386_303_978_607_855,
+                ],
+                [
+                    0.003_912_545_671_105_8,
+                    -0.957_561_754_650_581_6,
+                    0.288_201_627_366_798_3,
+                ],
+                [
+                    0.003_460_137_968_268_4,
+                    0.922_363_607_643_934_8,
+                    0.386_307_394_103_848_2,
+                ],
+                [
+                    0.003_375_000_533_211_1,
+                    -0.957_562_666_215_756_6,
+                    0.288_205_394_885_615_3,
+                ],
             ],
-            [0.004_234_210_899_862_3, -0.033_637_568_334_821_4, 0.999_425_127_488_085_4],
+            [
+                0.004_234_210_899_862_3,
+                -0.033_637_568_334_821_4,
+                0.999_425_127_488_085_4,
+            ],
         ),
         (
             "moc_wa_blue",
             [
-                [-0.000_194_439_709_793_3, -0.941_712_224_247_275_7, 0.336_419_453_802_017_7],
-                [-0.000_190_385_605_123_1, 0.965_701_148_267_654, 0.259_656_033_990_847_2],
-                [-0.000_752_212_740_069_1, -0.941_712_109_340_111_5, 0.336_418_985_093_503_7],
-                [-0.000_736_528_947_749_3, 0.965_701_013_302_503_7, 0.259_655_561_141_345],
+                [
+                    -0.000_194_439_709_793_3,
+                    -0.941_712_224_247_275_7,
+                    0.336_419_453_802_017_7,
+                ],
+                [
+                    -0.000_190_385_605_123_1,
+                    0.965_701_148_267_654,
+                    0.259_656_033_990_847_2,
+                ],
+                [
+                    -0.000_752_212_740_069_1,
+                    -0.941_712_109_340_111_5,
+                    0.336_418_985_093_503_7,
+                ],
+                [
+                    -0.000_736_528_947_749_3,
+                    0.965_701_013_302_503_7,
+                    0.259_655_561_141_345,
+                ],
             ],
-            [-0.000_528_944_586_935_9, 0.024_893_957_225_993, 0.999_689_957_492_449_2],
+            [
+                -0.000_528_944_586_935_9,
+                0.024_893_957_225_993,
+                0.999_689_957_492_449_2,
+            ],
         ),
     ];
     for (id, corners, middle) in kernel {
@@ -73,7 +117,9 @@ fn look_directions_are_those_of_the_instrument_kernel() {
 /// An image of the ground at a depth of `depth_m` comes back to every sample and line.
 fn comes_back(camera: &Instrument, summing: u32, model: &impl ExteriorOrientation, lines: f64) {
     let detector = detector(camera, summing);
-    let projector = Projector::new(model, lines).unwrap().through(detector.distortion);
+    let projector = Projector::new(model, lines)
+        .unwrap()
+        .through(detector.distortion);
     let steps = 173;
     for line in [-0.5, -0.31, 0.0, 0.27, 0.5].map(|share| share * lines) {
         let pose = model.pose(line);
@@ -129,11 +175,18 @@ fn the_published_iterations_find_the_line_of_a_distorted_camera() {
         let (x, look) = (0.2 * lines, detector.look(sample));
         let pose = model.pose(x);
         let ground_m = pose.position_m + pose.mars_to_camera.tr_mul(&look) * 380e3;
-        let by_frame = frame_first.through(detector.distortion).solve(&ground_m, &limits, drop);
-        let by_line = fixed_point.through(detector.distortion).solve(&ground_m, &limits, drop);
+        let by_frame = frame_first
+            .through(detector.distortion)
+            .solve(&ground_m, &limits, drop);
+        let by_line = fixed_point
+            .through(detector.distortion)
+            .solve(&ground_m, &limits, drop);
         for solution in [by_frame, by_line] {
             let off_lines = solution.unwrap().x - x;
-            assert!(off_lines.abs() < 1e-6, "{off_lines} lines at sample {sample}");
+            assert!(
+                off_lines.abs() < 1e-6,
+                "{off_lines} lines at sample {sample}"
+            );
         }
     }
 }
@@ -141,7 +194,12 @@ fn the_published_iterations_find_the_line_of_a_distorted_camera() {
 #[test]
 fn beyond_the_detector_the_line_goes_straight_on() {
     let detector = detector(&camera("moc_wa_blue"), 1);
-    for sample in [-300.0, -1.0, detector.samples + 1.0, detector.samples + 300.0] {
+    for sample in [
+        -300.0,
+        -1.0,
+        detector.samples + 1.0,
+        detector.samples + 300.0,
+    ] {
         let place_px = detector.place_px(sample);
         assert!((detector.sample(place_px.y) - sample).abs() < 1e-6);
     }
@@ -162,7 +220,10 @@ fn radial_coefficients_are_found_again() {
     };
     let fit = detector(&radial, 2).radial_fit(&radial);
     for (found, expected) in fit.coefficients.iter().zip(coefficients) {
-        assert!((found / expected - 1.0).abs() < 1e-6, "{found} for {expected}"); // rounding over 1024 pixels
+        assert!(
+            (found / expected - 1.0).abs() < 1e-6,
+            "{found} for {expected}"
+        ); // rounding over 1024 pixels
     }
     assert!(fit.error_max_px < 1e-6, "{} px", fit.error_max_px);
     // Without distortion all is zero, exactly.

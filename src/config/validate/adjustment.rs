@@ -2,14 +2,15 @@
 
 use toml::Spanned;
 
-use crate::units::{RADIANS_PER_ARCSECOND, RADIANS_PER_DEGREE, SECONDS_PER_MS};
+use crate::{
+    footprints::FootprintImageCoordinates,
+    geom::{intersection::Weighting, robust::RobustWeight},
+    units::{RADIANS_PER_ARCSECOND, RADIANS_PER_DEGREE, SECONDS_PER_MS},
+};
 
 use super::{
     super::{
-        adjustment::{
-            AdjustmentConfig, IntersectionConfig, MolaImage, OrientationPrior, Robust,
-            RobustFunction, TiesConfig, Weighting,
-        },
+        adjustment::{AdjustmentConfig, IntersectionConfig, OrientationPrior, TiesConfig},
         problems::Review,
         raw::{Entry, RawAdjustment, RawIntersection, RawOrientationPrior, RawTies},
         site::ImageConfig,
@@ -115,7 +116,7 @@ pub(super) fn adjustment(
             .word(
                 "adjustment.mola_image",
                 raw.mola_image.as_ref(),
-                &MolaImage::WORDS,
+                &FootprintImageCoordinates::WORDS,
             )
             .unwrap_or(default.mola_image),
         mola_sigma_px: sigmas(
@@ -181,11 +182,21 @@ pub(super) fn adjustment(
     }
 }
 
-fn robust(raw: &RawAdjustment, review: &mut Review<'_>) -> Option<Robust> {
+fn robust(raw: &RawAdjustment, review: &mut Review<'_>) -> Option<RobustWeight> {
     let words = [
         ("none", None),
-        ("huber", Some(RobustFunction::Huber)),
-        ("cauchy", Some(RobustFunction::Cauchy)),
+        (
+            "huber",
+            Some(RobustWeight::Huber {
+                limit: RobustWeight::HUBER_LIMIT,
+            }),
+        ),
+        (
+            "cauchy",
+            Some(RobustWeight::Cauchy {
+                limit: RobustWeight::CAUCHY_LIMIT,
+            }),
+        ),
     ];
     let function = review
         .word("adjustment.robust", raw.robust.as_ref(), &words)
@@ -201,10 +212,10 @@ fn robust(raw: &RawAdjustment, review: &mut Review<'_>) -> Option<Robust> {
             "adjustment.robust_limit is never used: adjustment.robust is \"none\"".to_owned(),
         );
     }
-    let function = function?;
-    Some(Robust {
-        function,
-        limit: limit.unwrap_or(function.usual_limit()),
+    function.map(|weight| match (weight, limit) {
+        (usual, None) => usual,
+        (RobustWeight::Huber { .. }, Some(limit)) => RobustWeight::Huber { limit },
+        (RobustWeight::Cauchy { .. }, Some(limit)) => RobustWeight::Cauchy { limit },
     })
 }
 

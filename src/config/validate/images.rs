@@ -4,15 +4,16 @@ use std::ops::Range;
 
 use toml::Spanned;
 
-use crate::units::SECONDS_PER_MS;
+use crate::{
+    image::{IMAGE_DURATION_END_S, IMAGE_LINES_MIN, ImageFields, line_period_agrees},
+    units::SECONDS_PER_MS,
+};
 
 use super::{
     super::{
         problems::Review,
         raw::{Entry, RawImage},
-        site::{
-            IMAGE_DURATION_END_S, IMAGE_LINES_MIN, ImageConfig, ImageFields, line_period_agrees,
-        },
+        site::ImageConfig,
     },
     no_repeats,
     values::{Accept, Target},

@@ -4,11 +4,13 @@ use std::collections::BTreeSet;
 
 use toml::Spanned;
 
+use crate::kernel_source::{CkQuality, KernelList, KernelSelection, KernelSource, RivalKernels};
+
 use super::{
     super::{
         problems::Review,
         raw::{RawKernelSet, RawKernels},
-        site::{CkQuality, KernelList, KernelSelection, KernelSource, KernelsConfig, RivalKernels},
+        site::KernelsConfig,
     },
     no_repeats,
     values::{Accept, Target},

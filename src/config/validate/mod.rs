@@ -15,7 +15,13 @@ use std::{collections::BTreeSet, path::Path};
 
 use toml::Spanned;
 
-use crate::{instruments::PointingTime, time::PointingBias, units::RADIANS_PER_ARCSECOND};
+use crate::{
+    altimetry::{BiasScope, MolaClock, TagSign},
+    geom::pushbroom::CameraModel,
+    instruments::PointingTime,
+    time::PointingBias,
+    units::RADIANS_PER_ARCSECOND,
+};
 
 use super::{
     instruments::{built_in_altimeter, usual_instrument},
@@ -23,8 +29,8 @@ use super::{
     raw::{RawMolaClock, RawOrientation, RawPointing, RawRangeCheck, RawRegistration, RawSite},
     shape::Written,
     site::{
-        BiasScope, CameraModel, ImageConfig, MolaClock, OrientationConfig, PointingConfig,
-        RangeCheckConfig, RegistrationConfig, SCAN_STEPS_MAX, SiteConfig, TagSign,
+        ImageConfig, OrientationConfig, PointingConfig, RangeCheckConfig, RegistrationConfig,
+        SCAN_STEPS_MAX, SiteConfig,
     },
 };
 use values::Accept;

@@ -2,13 +2,17 @@
 
 use toml::Spanned;
 
-use crate::{frames::MarsDatum, units::RADIANS_PER_DEGREE};
+use crate::{
+    altimetry::{DatumChoice, ShotFilter},
+    frames::MarsDatum,
+    units::RADIANS_PER_DEGREE,
+};
 
 use super::{
     super::{
         problems::Review,
         raw::{RawFilter, RawPedr},
-        site::{DatumChoice, PedrConfig, ShotFilter},
+        site::PedrConfig,
     },
     globs::found_files,
     values::Accept,

@@ -2,14 +2,14 @@
 
 use toml::Spanned;
 
-use crate::units::RADIANS_PER_DEGREE;
+use crate::{geom::window::WindowShape, units::RADIANS_PER_DEGREE};
 
 use super::{
     super::{
         geojson,
         problems::Review,
         raw::{Entry, RawWindow},
-        site::{WindowConfig, WindowShape},
+        site::WindowConfig,
     },
     no_repeats,
     values::{Accept, Target},

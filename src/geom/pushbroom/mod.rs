@@ -18,7 +18,7 @@ use nalgebra::{Matrix3, Vector3};
 pub use corrected::{CorrectedOrientation, OrientationCorrection};
 pub use detector::{Detector, RadialFit};
 pub use distortion::{Distortion, FoldedLine};
-pub use models::{EulerPolynomial, RotationVectorPolynomial, VectorPolynomial};
+pub use models::{CameraModel, EulerPolynomial, RotationVectorPolynomial, VectorPolynomial};
 pub(super) use newton::missed_m;
 pub use newton::{Projector, Sighting};
 pub use published::{FixedPoint, FrameFirst, Limits, Solution};

@@ -1,12 +1,37 @@
 //! Orientation as polynomials: with pointing angles, and with a rotation vector.
 
 use nalgebra::{Matrix3, Vector3};
+use serde::{Deserialize, Serialize};
 
 use super::{ExteriorOrientation, Motion, PolynomialPath, Pose};
 use crate::geom::{
     attitude::{matrix_of_rotation_vector, turn_of_rotation_vector},
     polynomial::Polynomial,
 };
+
+/// The forms of an image's orientation.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum CameraModel {
+    /// Positions and angles as polynomials of first order.
+    FirstOrder,
+    /// Positions and angles as polynomials of second order.
+    SecondOrder,
+    /// Positions and a rotation vector as polynomials of second order.
+    RotationVector,
+    /// Interpolation between the samples, no polynomial over the whole image.
+    Samples,
+}
+
+impl CameraModel {
+    /// Every model, with its word in configuration and products.
+    pub const WORDS: [(&'static str, Self); 4] = [
+        ("first_order", Self::FirstOrder),
+        ("second_order", Self::SecondOrder),
+        ("rotation_vector", Self::RotationVector),
+        ("samples", Self::Samples),
+    ];
+}
 
 /// Three polynomials of at most second order in the image line.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use super::{LABEL_BYTES, RECORD_BYTES};
 use crate::{
-    config::DatumChoice,
+    altimetry::DatumChoice,
     error::{Fault, Kind},
     frames::MarsDatum,
     pds::label::{Label, LabelFault, parse},

@@ -9,7 +9,7 @@ use plotters::{
 
 use super::{
     COLOURS, Key, Panel, Plot,
-    draw::{Chart, Drawn},
+    canvas::{Chart, Drawn},
     quoted, rounded,
 };
 

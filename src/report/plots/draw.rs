@@ -1,15 +1,12 @@
-//! Plots on paper: what the drawing library is told.
+//! Plots on paper: panels with their axes, marks, series, arrows and bars.
 
-use plotters::{
-    coord::{Shift, types::RangedCoordf64},
-    prelude::*,
-    style::text_anchor::{HPos, Pos, VPos},
-};
+use plotters::prelude::*;
 
 use super::{
-    Extent, GRID, INK, LETTERS, MARK, Panel, Plot, Series, Style, WIDTH, arrows::draw_arrows,
+    Extent, GRID, INK, LETTERS, MARK, Panel, Plot, Series, Style, WIDTH,
+    arrows::draw_arrows,
+    canvas::{Canvas, Chart, Drawn, label},
 };
-use crate::{error::Result, products::fault::ProductFault};
 
 /// Height of the axis below the lowest panel, with its labels.
 pub(super) const FOOT: u32 = 110;
@@ -21,54 +18,6 @@ const SIDE: u32 = 176;
 const BARS: u32 = 150;
 /// Number of bars over the range of a panel.
 const BAR_COUNT: usize = 24;
-
-/// A drawing in progress.
-pub(in crate::report) type Canvas<'a> = DrawingArea<SVGBackend<'a>, Shift>;
-/// Whether a piece could be drawn.
-pub(in crate::report) type Drawn<'a> =
-    std::result::Result<(), DrawingAreaErrorKind<<SVGBackend<'a> as DrawingBackend>::ErrorType>>;
-pub(super) type Chart<'a, 'b> =
-    ChartContext<'b, SVGBackend<'a>, Cartesian2d<RangedCoordf64, RangedCoordf64>>;
-
-/// SVG of the given height, filled by `with`.
-///
-/// # Errors
-/// A drawing that the library refuses, which is a fault of areograph.
-pub(in crate::report) fn drawn(
-    height: u32,
-    with: impl for<'a> FnOnce(&Canvas<'a>) -> Drawn<'a>,
-) -> Result<String> {
-    let mut svg = String::new();
-    {
-        let area = SVGBackend::with_string(&mut svg, (WIDTH, height)).into_drawing_area();
-        with(&area)
-            .and_then(|()| area.present())
-            .map_err(ProductFault::refused("draw a plot"))?;
-    }
-    Ok(svg)
-}
-
-/// Words on a drawing, in the colour of ink.
-pub(in crate::report) fn draw_text<'a>(
-    area: &Canvas<'a>,
-    text: &str,
-    at: (i32, i32),
-    anchor: HPos,
-) -> Drawn<'a> {
-    let style = TextStyle::from(("sans-serif", LETTERS).into_font())
-        .color(&INK)
-        .pos(Pos::new(anchor, VPos::Center));
-    area.draw_text(text, &style, at)
-}
-
-/// A number of an axis; what rounds to zero has no sign.
-pub(in crate::report) fn label(value: f64, decimals: usize) -> String {
-    let text = format!("{value:.decimals$}");
-    match text.strip_prefix('-') {
-        Some(digits) if !digits.contains(|digit| matches!(digit, '1'..='9')) => digits.to_owned(),
-        _ => text.replace('-', "\u{2212}"),
-    }
-}
 
 pub(super) fn plot<'a>(plot: &Plot, area: &Canvas<'a>) -> Drawn<'a> {
     let last = plot.panels.len().saturating_sub(1);
@@ -219,13 +168,6 @@ fn histogram(panel: &Panel) -> Vec<u32> {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn zero_has_no_sign() {
-        assert_eq!(label(-0.004, 2), "0.00");
-        assert_eq!(label(-0.006, 2), "−0.01");
-        assert_eq!(label(-20.0, 0), "−20");
-    }
 
     #[test]
     fn every_dot_inside_the_range_is_counted() {

@@ -1,11 +1,12 @@
 //! Plots: panels over one axis, drawn as inline SVG, told in words and given as CSV.
 
 mod arrows;
+mod canvas;
 mod draw;
 mod figure;
 
 pub(super) use arrows::{Arrow, Arrows, magnification};
-pub(super) use draw::{Canvas, Drawn, draw_text, drawn, label};
+pub(super) use canvas::{Canvas, Drawn, draw_text, drawn, label};
 pub(super) use figure::{Key, figure_html};
 
 use std::fmt::Write as _;

@@ -24,12 +24,11 @@ pub use summary::{AdjustmentSummary, GroundSummary, ImageSummary, ObservationTyp
 
 use super::intersect::IntersectedTies;
 use crate::{
-    config::{AdjustmentConfig, Robust, RobustFunction},
+    config::AdjustmentConfig,
     error::Result,
     geom::{
         bundle::{Adjustment, BundleOptions, ORIENTATION_UNKNOWNS, Residual, Unknown},
         pushbroom::ExteriorOrientation,
-        robust::RobustWeight,
         stereo::StereoImage,
     },
     ties::TiePoint,
@@ -139,7 +138,7 @@ pub fn adjust<M: ExteriorOrientation>(
     }
     let mut assembled = network::assemble(images, shots, ties, starts, config)?;
     let bundle_options = BundleOptions {
-        robust: config.robust.map(robust_weight),
+        robust: config.robust,
         ..BundleOptions::default()
     };
     let adjustment =
@@ -169,14 +168,6 @@ pub fn adjust<M: ExteriorOrientation>(
     contradictions(images, &assembled.points, &adjustment)?;
     let summary = summary::summarise(images, &assembled, &adjustment, config.mola_image)?;
     Ok(adjusted::collect(images, assembled, adjustment, summary))
-}
-
-const fn robust_weight(robust: Robust) -> RobustWeight {
-    let limit = robust.limit;
-    match robust.function {
-        RobustFunction::Huber => RobustWeight::Huber { limit },
-        RobustFunction::Cauchy => RobustWeight::Cauchy { limit },
-    }
 }
 
 fn contradictions<M>(

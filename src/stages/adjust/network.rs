@@ -8,8 +8,9 @@ use super::{
     AdjustFault, AdjustImage, LaserShot, LeftOut, LeftOutReason, PointKind, image_index, pair,
 };
 use crate::{
-    config::{AdjustmentConfig, MolaImage},
+    config::AdjustmentConfig,
     error::Result,
+    footprints::FootprintImageCoordinates,
     geom::{
         bundle::{BundleImage, BundlePoint, Network, Range, View},
         pushbroom::{ExteriorOrientation, Projector},
@@ -50,7 +51,7 @@ pub(super) fn assemble<'a, M: ExteriorOrientation>(
     };
     assembled.add_shots(images, shots, config)?;
     assembled.mola = footprints_in_images(images, shots, config)?;
-    if config.mola_image == MolaImage::Weighted {
+    if config.mola_image == FootprintImageCoordinates::Weighted {
         assembled.network.views.extend(&assembled.mola);
     }
     assembled.add_ties(images, ties, starts, config)?;

@@ -8,12 +8,12 @@ use super::{
     fault::unknown_in_words,
     network::{Assembled, projector},
 };
-use crate::config::{BAARDA_LIMIT, MolaImage};
 use crate::geom::{
     bundle::{Adjustment, Residual},
     pushbroom::{CorrectedOrientation, ExteriorOrientation},
     statistics::Summary,
 };
+use crate::{footprints::FootprintImageCoordinates, geom::statistics::BAARDA_LIMIT};
 
 /// The kinds of observation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
@@ -98,7 +98,7 @@ pub(super) fn summarise<M: ExteriorOrientation>(
     images: &[AdjustImage<M>],
     assembled: &Assembled<&M>,
     adjustment: &Adjustment,
-    mola_image: MolaImage,
+    mola_image: FootprintImageCoordinates,
 ) -> Result<AdjustmentSummary, AdjustFault> {
     let (shots, ties) = (0..assembled.shots, assembled.shots..assembled.points.len());
     let in_words = |unknown| unknown_in_words(unknown, images, &assembled.profiles);
@@ -117,7 +117,7 @@ pub(super) fn summarise<M: ExteriorOrientation>(
                 Ok(ImageSummary {
                     image: image.stereo.id.clone(),
                     tie_residuals_px: tie_residuals(assembled, adjustment, index),
-                    mola_corrections: if mola_image == MolaImage::Off {
+                    mola_corrections: if mola_image == FootprintImageCoordinates::Off {
                         [Summary::default(); 2]
                     } else {
                         mola_corrections(image, assembled, adjustment, index)?

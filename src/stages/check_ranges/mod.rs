@@ -21,7 +21,8 @@ pub use scan::BiasScan;
 
 use super::group_profiles::Profile;
 use crate::{
-    config::{MolaClock, RangeCheckConfig},
+    altimetry::MolaClock,
+    config::RangeCheckConfig,
     error::{Fault, Kind, Result, Stopped},
     footprints::Footprints,
     frames::MarsIau2000,

@@ -4,7 +4,7 @@ use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    config::MolaClock,
+    altimetry::MolaClock,
     footprints::Footprint,
     frames::{Frame, J2000, MarsIau2000, Position},
     geom::{

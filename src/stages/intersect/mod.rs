@@ -15,10 +15,12 @@ use serde::{Deserialize, Serialize};
 pub use statistics::{ImageResiduals, Residuals2};
 
 use crate::{
-    config::{IntersectionConfig, Weighting},
+    config::IntersectionConfig,
     error::{Fault, Kind, Result},
     geom::{
-        intersection::{Intersection, IntersectionLimits, Sight, Unintersected, intersect},
+        intersection::{
+            Intersection, IntersectionLimits, Sight, Unintersected, Weighting, intersect,
+        },
         pushbroom::{ExteriorOrientation, Projector, Unseen},
         stereo::StereoImage,
     },

@@ -8,10 +8,10 @@ use serde::{Deserialize, Serialize};
 
 use super::super::oriented::OrientedImage;
 use crate::{
-    config::{CameraModel, RegistrationConfig},
+    config::RegistrationConfig,
     error::{Result, Stopped},
     geom::{
-        pushbroom::{FixedPoint, FrameFirst, Limits, Solution, Unseen},
+        pushbroom::{CameraModel, FixedPoint, FrameFirst, Limits, Solution, Unseen},
         statistics::Summary,
     },
 };

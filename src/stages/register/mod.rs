@@ -21,13 +21,13 @@ use super::{
     sample_orientation::Orientation, tag_times::ImageTimes,
 };
 use crate::{
-    config::{CameraModel, RegistrationConfig},
+    config::RegistrationConfig,
     error::{Result, Stopped},
     footprints::Footprints,
     frames::MarsIau2000,
     geom::{
         ellipsoid::spherical_to_xyz_m,
-        pushbroom::{ExteriorOrientation, Projector, Unseen},
+        pushbroom::{CameraModel, ExteriorOrientation, Projector, Unseen},
         statistics::Summary,
     },
 };

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::methods::{Method, MethodRun};
-use crate::config::CameraModel;
+use crate::geom::pushbroom::CameraModel;
 
 macro_rules! columns {
     ($($(#[$doc:meta])* $column:ident: $kind:ty,)*) => {

@@ -1,0 +1,89 @@
+//! Vocabulary of the altimeter: its clock bias, the datum of its files, the shots that are kept.
+
+use serde::Serialize;
+
+use crate::frames::MarsDatum;
+
+/// The clock bias of MOLA: how shot tags become shot times.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct MolaClock {
+    /// Size, seconds, not negative.
+    pub bias_s: f64,
+    /// On which side of the true time the tags lie.
+    pub sign: TagSign,
+    /// What the corrected time is used for.
+    pub scope: BiasScope,
+    /// Citation that products repeat.
+    pub source: String,
+}
+
+/// On which side of the true time a tag lies.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum TagSign {
+    /// Tags are late: true time = tag − bias.
+    Late,
+    /// Tags are early: true time = tag + bias.
+    Early,
+}
+
+/// What the corrected shot time is used for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum BiasScope {
+    /// The spacecraft's position in the range check; the default, which is what Shan 2005 did.
+    SpkLookup,
+    /// The rotation into IAU 2000 (the one out of the file's datum stays at the tag).
+    Rotation,
+    /// Both.
+    Both,
+    /// Nothing: tags are taken as they are.
+    None,
+}
+
+impl MolaClock {
+    /// Seconds to add to a tag: `−bias` for late tags, `+bias` for early ones, 0 when switched off.
+    #[must_use]
+    pub fn correction_s(&self) -> f64 {
+        match (self.scope, self.sign) {
+            (BiasScope::None, _) => 0.0,
+            (_, TagSign::Late) => -self.bias_s,
+            (_, TagSign::Early) => self.bias_s,
+        }
+    }
+
+    /// Whether the spacecraft's position is looked up at the corrected time.
+    #[must_use]
+    pub const fn moves_spacecraft(&self) -> bool {
+        matches!(self.scope, BiasScope::SpkLookup | BiasScope::Both)
+    }
+
+    /// Whether Mars turns between leaving the file's datum and entering IAU 2000.
+    #[must_use]
+    pub const fn moves_rotation(&self) -> bool {
+        matches!(self.scope, BiasScope::Rotation | BiasScope::Both)
+    }
+}
+
+/// How the datum of a PEDR file is decided.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum DatumChoice {
+    /// By version letter and label: L is IAU 2000, older ones IAU 1991.
+    Auto,
+    /// As stated; a contradiction with letter or label is an error.
+    Stated(MarsDatum),
+}
+
+/// Shots to keep; a shot must pass every test.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ShotFilter {
+    /// Classification codes (1 ground, 0 cloud or noise).
+    pub classes: Vec<i16>,
+    /// Trigger channels, 1 to 4.
+    pub channels: Vec<u8>,
+    /// Attitude flags (0 known, 2 partly, 3 unknown).
+    pub attitude_flags: Vec<u16>,
+    /// Largest off-nadir angle, radians.
+    pub off_nadir_max_rad: f64,
+}

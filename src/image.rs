@@ -1,0 +1,76 @@
+//! What labels and configuration say of an image, and the limits of what an image can be.
+
+use serde::Serialize;
+
+/// What a label or the configuration says of an image; anything may be missing from either.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+pub struct ImageFields {
+    /// Spacecraft clock at the start of the first line, for example `619971158:28`.
+    pub sclk_start: Option<String>,
+    /// UTC at the start of the first line, used when there is no clock string.
+    pub utc_start: Option<String>,
+    /// Exposure of one detector line, seconds.
+    pub exposure_s: Option<f64>,
+    /// Time between two image lines, seconds.
+    pub line_period_s: Option<f64>,
+    /// Detector lines summed along the track.
+    pub downtrack_summing: Option<u32>,
+    /// Detector pixels summed across the track.
+    pub crosstrack_summing: Option<u32>,
+    /// Lines that were exposed, as the header says; the time model counts these.
+    pub lines_header: Option<u32>,
+    /// Lines in the delivered file, when fewer.
+    pub lines_delivered: Option<u32>,
+    /// Samples per line.
+    pub samples: Option<u32>,
+    /// First detector pixel, counted from 0 (`EDIT_MODE_ID`).
+    pub first_detector: Option<u32>,
+}
+
+/// Fewest lines of an image: orientation is fitted over its length.
+pub const IMAGE_LINES_MIN: u32 = 3;
+
+/// No image is exposed this long, seconds: the longest of the mission take about a minute, and minutes
+/// later the orientation is no polynomial of second order any more.
+pub const IMAGE_DURATION_END_S: f64 = 600.0;
+
+/// Labels print exposures and periods to 0.0001 ms; half of that is their rounding, seconds.
+const EXPOSURE_ROUNDING_S: f64 = 0.5e-7;
+
+/// Whether a line period is exposure × downtrack summing, within the rounding of printed values.
+///
+/// The rounding of the exposure counts once for every summed line, that of the period once.
+#[must_use]
+pub fn line_period_agrees(line_period_s: f64, exposure_s: f64, downtrack_summing: u32) -> bool {
+    let summing = f64::from(downtrack_summing);
+    (line_period_s - exposure_s * summing).abs() <= EXPOSURE_ROUNDING_S * (summing + 1.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::line_period_agrees;
+
+    #[test]
+    fn periods_agree_within_the_rounding_of_what_labels_print() {
+        // (period, exposure) in milliseconds, summing: the limits are 0.00045, 0.0002 and 0.0001 ms.
+        for (period_ms, exposure_ms, summing, agrees) in [
+            (3.8568, 0.4821, 8, true),
+            (3.8572, 0.4821, 8, true),
+            (3.8573, 0.4821, 8, false),
+            (3.8564, 0.4821, 8, true),
+            (3.8563, 0.4821, 8, false),
+            (1.4463, 0.482_067, 3, true),
+            (1.4465, 0.482_067, 3, false),
+            (0.482_19, 0.4821, 1, true),
+            (0.482_21, 0.4821, 1, false),
+            (0.4821, 0.4821, 8, false),
+            (f64::NAN, 0.4821, 8, false),
+        ] {
+            assert_eq!(
+                line_period_agrees(period_ms * 1e-3, exposure_ms * 1e-3, summing),
+                agrees,
+                "{period_ms} ms of {summing} × {exposure_ms} ms"
+            );
+        }
+    }
+}
