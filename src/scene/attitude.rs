@@ -4,11 +4,11 @@ use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 
 use super::orbit::{Orbit, OrbitState};
 use crate::{
-    config::usual_instrument,
     geom::{
         attitude::{matrix_of_rotation_vector, rotation_vector},
         mars_rotation::{frame_rotation_1, frame_rotation_2, frame_rotation_3},
     },
+    instruments::Instrument,
     time::{Et, Interval},
 };
 
@@ -20,8 +20,8 @@ const HOLD_MARGIN_S: f64 = 40.0;
 const SLEW_S: f64 = 240.0;
 
 /// Matrix from bus to camera: the in-flight mounting, as in `kernels.example/moc.ti`.
-pub(super) fn bus_to_camera() -> Matrix3<f64> {
-    let mounting = &usual_instrument().mounting;
+pub(super) fn bus_to_camera(camera: &Instrument) -> Matrix3<f64> {
+    let mounting = &camera.mounting;
     frame_rotation_3(mounting.yaw_rad)
         * frame_rotation_2(mounting.pitch_rad)
         * frame_rotation_1(mounting.roll_rad)
@@ -142,7 +142,7 @@ fn quaternion(matrix: &Matrix3<f64>) -> UnitQuaternion<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::units::RADIANS_PER_DEGREE;
+    use crate::{config::usual_instrument, units::RADIANS_PER_DEGREE};
 
     fn orbit() -> Orbit {
         Orbit::new(Et::from_seconds(3.7e7), 1.0, 1.3)
@@ -168,7 +168,7 @@ mod tests {
             -0.002_000_668_0,
             0.999_997_217_4,
         );
-        assert!((bus_to_camera() - published).abs().max() < 1e-10); // ten printed digits
+        assert!((bus_to_camera(usual_instrument()) - published).abs().max() < 1e-10); // ten printed digits
     }
 
     #[test]

@@ -37,12 +37,20 @@ impl Site {
 
     /// Whether a point in radians lies in the site's window.
     pub(super) fn contains(&self, longitude_rad: f64, latitude_rad: f64) -> bool {
+        let half_deg = [
+            Self::WINDOW_HALF_LONGITUDE_DEG,
+            Self::WINDOW_HALF_LATITUDE_DEG,
+        ];
+        self.holds(longitude_rad, latitude_rad, half_deg)
+    }
+
+    /// Whether a point in radians lies in a window of this half width and height around the site, degrees.
+    pub(super) fn holds(&self, longitude_rad: f64, latitude_rad: f64, half_deg: [f64; 2]) -> bool {
         let east_deg =
             crate::units::wrap_pi(longitude_rad - self.longitude_deg * RADIANS_PER_DEGREE)
                 / RADIANS_PER_DEGREE;
         let north_deg = latitude_rad / RADIANS_PER_DEGREE - self.latitude_deg;
-        east_deg.abs() <= Self::WINDOW_HALF_LONGITUDE_DEG
-            && north_deg.abs() <= Self::WINDOW_HALF_LATITUDE_DEG
+        east_deg.abs() <= half_deg[0] && north_deg.abs() <= half_deg[1]
     }
 }
 

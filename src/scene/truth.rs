@@ -6,6 +6,7 @@ use serde::Serialize;
 
 use super::{
     arc::Arc,
+    context::ContextTruth,
     laser::{CROSSOVER_AMPLITUDE_M, CROSSOVER_PERIOD_S, Shot},
     plan::Look,
     versions::Version,
@@ -38,6 +39,8 @@ pub(super) struct Truth {
     pub profiles: Vec<ProfileTruth>,
     pub tie_rule: &'static str,
     pub ties: Vec<TiesTruth>,
+    pub wide_angle_rule: &'static str,
+    pub wide_angle: Vec<ContextTruth>,
 }
 
 /// Injected time errors.
@@ -190,6 +193,8 @@ impl Truth {
             profiles: Vec::new(),
             tie_rule: "line n of an image was truly exposed when its label has line n + time_bias_lines, from the place of the true orbit (gsfc) at that time plus position_bias_m (IAU 2000), with the true attitude of that time; tie points, and nothing else, are measured in images taken like that; the position bias against nav is position_bias_m less the orbit difference of nav; time_bias_lines are the residuals of Shan et al. 2005, Table 5, to half a line and with the other sign, position_bias_m has a standard deviation of 20 m an axis; measurements have noise of 1 line and 1 sample, blunders come on top of it",
             ties: Vec::new(),
+            wide_angle_rule: "wide-angle images are taken when their labels say, from the true orbit (gsfc) with the true attitude; lines and samples of shots follow the formula of the instrument kernel moc20.ti",
+            wide_angle: Vec::new(),
         }
     }
 }
