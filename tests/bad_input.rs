@@ -33,6 +33,12 @@ fn compare(case: &Case, arguments: &[&str]) -> Command {
     command
 }
 
+fn run_into(case: &Case, out: &str) -> Command {
+    let mut command = case.areograph();
+    command.args(["--quiet", "run", "site.toml", "--out", out]);
+    command
+}
+
 /// Spoils one thing of a good case and says what to run.
 const CASES: &[(&str, Spoil)] = &[
     ("good", Case::run),
@@ -229,9 +235,11 @@ const CASES: &[(&str, Spoil)] = &[
         case.run()
     }),
     ("out_cannot_be_made", |case| {
-        let mut command = case.areograph();
-        command.args(["--quiet", "run", "site.toml", "--out", "/proc/areograph"]);
-        command
+        run_into(case, "/proc/areograph")
+    }),
+    ("out_holds_a_newline", |case| run_into(case, "new\nline")),
+    ("out_has_a_long_part", |case| {
+        run_into(case, &"a".repeat(256))
     }),
     ("two_sites_with_one_id", |case| {
         fs::copy(case.path("site.toml"), case.path("other.toml")).unwrap();
@@ -343,6 +351,9 @@ const PAIR_CASES: &[(&str, Spoil)] = &[
             "nadir_sigma_m = 0.01\noff_nadir_sigma_m = 0.01\nblunder_limit = 0\ntie_sigma_px",
         );
         case.run()
+    }),
+    ("out_is_too_long_for_kernels", |case| {
+        run_into(case, &["b".repeat(200), "c".repeat(40)].join("/"))
     }),
     ("check_ties_of_other_images", |case| {
         case.replace("ties/isidis.csv", "E02-", "M02-");

@@ -416,9 +416,9 @@ fn a_c_kernel_turned_by_a_known_angle_is_told_in_arcseconds_and_metres() {
         "kernels/turned.tm",
         "--json",
     ]);
-    command.args(["--page", "page/index.html"]);
+    command.args(["--page", "index.html"]);
     let found = answer(&mut command);
-    let page = String::from_utf8(case.read("page/index.html")).unwrap();
+    let page = String::from_utf8(case.read("index.html")).unwrap();
     assert!(page.contains("nav and turned are equally close to the mean orbit"));
     assert!(page.contains("Attitudes against their mean") && page.contains("on the ground, m"));
     let attitude = &found["attitude"];

@@ -330,10 +330,10 @@ fn the_page_opens_with_the_outcome_and_needs_nothing_from_outside() {
         "--limit-arcsec",
         "19",
         "--page",
-        "pages/diff.html",
+        "diff.html",
     ];
     assert!(diff(&case, &arguments).starts_with("exit 5\n"));
-    let page = String::from_utf8(case.read("pages/diff.html")).unwrap();
+    let page = String::from_utf8(case.read("diff.html")).unwrap();
     let outcome =
         page.find("case: BEYOND THE LIMIT: image image: the camera turned by up to 20.000 arcsec");
     assert!(outcome.unwrap() < page.find("<table").unwrap());

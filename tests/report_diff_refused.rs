@@ -12,7 +12,7 @@ mod fixture;
 
 use std::fs;
 
-use common::case::Case;
+use common::{case::Case, golden::assert_messages, mission};
 use fixture::{after_a_first_run, copy_products, diff};
 use serde_json::Value;
 
@@ -62,70 +62,90 @@ type Spoil = fn(&Case);
 #[test]
 fn outputs_that_cannot_be_compared_are_refused() {
     let case = after_a_first_run();
-    let refusals: [(&str, Spoil, &str); 8] = [
-        (
-            "no folder",
-            |case| fs::remove_dir_all(case.path("out")).unwrap(),
-            NO_FOLDER,
-        ),
-        (
-            "empty folder",
-            |case| {
-                fs::remove_dir_all(case.path("out")).unwrap();
-                fs::create_dir(case.path("out")).unwrap();
-            },
-            EMPTY,
-        ),
-        (
-            "no manifest",
-            |case| fs::remove_file(case.path("out/case/manifest.json")).unwrap(),
-            EMPTY,
-        ),
-        (
-            "stopped early",
-            |case| {
-                fs::remove_file(case.path("out/case/manifest.json")).unwrap();
-                fs::create_dir(case.path("out/case/.cache")).unwrap();
-            },
-            STOPPED_EARLY,
-        ),
-        (
-            "half-made",
-            |case| case.write("out/case/.publishing", "kernels.tm"),
-            HALF_MADE,
-        ),
-        (
-            "no JSON",
-            |case| case.write("out/case/manifest.json", "{"),
-            NO_JSON,
-        ),
-        (
-            "another site",
-            |case| {
-                case.replace(
-                    "out/case/manifest.json",
-                    "\"site\": \"case\"",
-                    "\"site\": \"other\"",
-                );
-            },
-            ANOTHER_SITE,
-        ),
-        (
-            "no common site",
-            |case| fs::rename(case.path("out/case"), case.path("out/other")).unwrap(),
-            NO_COMMON_SITE,
-        ),
-    ];
-    for (what, spoil, expected) in refusals {
+    let renew = || {
         let _ = fs::remove_dir_all(case.path("out"));
         copy_products(&case.path("before/case"), &case.path("out/case"));
+    };
+    let spoiled: [(&str, Spoil); 8] = [
+        ("no folder", |case| {
+            fs::remove_dir_all(case.path("out")).unwrap();
+        }),
+        ("empty folder", |case| {
+            fs::remove_dir_all(case.path("out")).unwrap();
+            fs::create_dir(case.path("out")).unwrap();
+        }),
+        ("no manifest", |case| {
+            fs::remove_file(case.path("out/case/manifest.json")).unwrap();
+        }),
+        ("stopped early", |case| {
+            fs::remove_file(case.path("out/case/manifest.json")).unwrap();
+            fs::create_dir(case.path("out/case/.cache")).unwrap();
+        }),
+        ("half-made", |case| {
+            case.write("out/case/.publishing", "kernels.tm");
+        }),
+        ("no JSON", |case| case.write("out/case/manifest.json", "{")),
+        ("another site", |case| {
+            let manifest = "out/case/manifest.json";
+            case.replace(manifest, "\"site\": \"case\"", "\"site\": \"other\"");
+        }),
+        ("no common site", |case| {
+            fs::rename(case.path("out/case"), case.path("out/other")).unwrap();
+        }),
+    ];
+    let mut told = Vec::new();
+    for (what, spoil) in spoiled {
+        renew();
         spoil(&case);
-        assert_eq!(diff(&case, &["before", "out"]), expected, "{what}");
+        told.push((what, diff(&case, &["before", "out"])));
     }
-    assert_eq!(diff(&case, &["before", "before/../before"]), ONE_FOLDER);
-    let _ = fs::remove_dir_all(case.path("out"));
-    copy_products(&case.path("before/case"), &case.path("out/case"));
-    assert_eq!(diff(&case, &["before/case", "out"]), ONE_AND_SEVERAL);
+    renew();
+    let one_folder = diff(&case, &["before", "before/../before"]);
+    told.push(("one folder", one_folder));
+    let one_and_several = diff(&case, &["before/case", "out"]);
+    told.push(("one and several", one_and_several));
+    assert_messages("report_diff_refused", &told);
+}
+
+/// A page replaces a regular file or nothing, and makes no folders.
+#[test]
+#[cfg(unix)]
+fn pages_are_written_over_files_that_are_no_products() {
+    use std::os::unix::fs::symlink;
+    let case = after_a_first_run();
+    case.write("notes.html", "old");
+    symlink("notes.html", case.path("link.html")).unwrap();
+    symlink("out/case", case.path("elsewhere")).unwrap();
+    fs::create_dir(case.path("folder")).unwrap();
+    mission::succeed(std::process::Command::new("mkfifo").arg(case.path("pipe")));
+    let before = mission::products(&case.path("out"));
+    let page = |place: &str| diff(&case, &["before", "out", "--page", place]);
+    let places = [
+        "folder",
+        "link.html",
+        "pipe",
+        "/dev/null",
+        "none/page.html",
+        "notes.html/page.html",
+        "out/case/report/index.html",
+        "out/case/new.html",
+        "elsewhere/new.html",
+        "out/index.html",
+    ];
+    let mut told: Vec<(&str, String)> = places.iter().map(|place| (*place, page(place))).collect();
+    let mut compare = case.areograph();
+    compare.args(["--quiet", "kernels", "compare", "kernels/nav.tm"]);
+    compare.args(["kernels/ipng.tm", "--page", "/dev/full"]);
+    told.push(("kernels compare /dev/full", case.outcome(compare)));
+    assert_messages("page_refused", &told);
+    assert!(mission::products(&case.path("out")) == before);
+    assert!(case.path("link.html").is_symlink() && !case.path("none").exists());
+    assert_eq!(case.read("notes.html"), b"old");
+    for place in ["notes.html", "out/difference.html"] {
+        let outcome = page(place);
+        assert!(outcome.starts_with("exit 0\n"), "{outcome}");
+        assert!(case.read(place).starts_with(b"<!DOCTYPE html>"), "{place}");
+    }
 }
 
 #[test]
@@ -164,13 +184,3 @@ fn products_that_contradict_the_manifest_are_refused() {
                     to be made again by this one\n";
     assert_eq!(diff(&case, &["before", "aside"]), expected);
 }
-
-const NO_FOLDER: &str = "exit 6\nerror: out: cannot read the folder: No such file or directory (os error 2)\n  what to do: check the path; relative paths in a configuration count from that file's folder\n";
-const EMPTY: &str = "exit 3\nerror: out: there is no manifest.json in it or in a folder below; expected products of `areograph run`\n  what to do: name the folder given to --out, or a site's folder in it\n";
-const STOPPED_EARLY: &str = "exit 3\nerror: out/case: there is no manifest.json, so there are no products\n  what to do: name a site's folder of products, and run the site to the end\n";
-const HALF_MADE: &str = "exit 3\nerror: out/case: the publication of products into this folder was not finished\n  what to do: wait for the run that is at work, or run the site again to mend it\n";
-const NO_JSON: &str = "exit 3\nerror: out/case/manifest.json: this is no manifest of areograph 0.1.0: EOF while parsing an object at line 1 column 1\n  what to do: run the site again, which makes damaged products anew\n";
-const ANOTHER_SITE: &str = "exit 2\nerror: out/case: these are products of site \"other\", the others of site \"case\"; expected one site\n  what to do: compare runs of the same site\n";
-const NO_COMMON_SITE: &str = "exit 2\nerror: no site is in both: A has case; B has other\n  what to do: compare runs of the same site\n";
-const ONE_FOLDER: &str = "exit 2\nerror: before/../before: A and B are one folder; expected the products of two runs\n  what to do: copy the first products aside before running again, or run into another --out\n";
-const ONE_AND_SEVERAL: &str = "exit 2\nerror: before/case: it holds the products of one site, the other folder those of several\n  what to do: name two folders of one site, or two output folders with sites\n";

@@ -243,6 +243,15 @@ fn until_force_and_dry_run() {
     assert!(!case.path("out/case/manifest.json").exists());
     run(&case);
     let before = common::mission::products(&case.path("out"));
+    let manifest: serde_json::Value =
+        serde_json::from_slice(&case.read("out/case/manifest.json")).unwrap();
+    let mut command = case.run();
+    command.args(["--until", "convert_datum"]);
+    let expected = format!(
+        "exit 0\ncase: stopped after convert_datum; the products of {} in out/case stay as they are\n",
+        manifest["finished_utc"].as_str().unwrap()
+    );
+    assert_eq!(case.outcome(command), expected);
     let mut command = case.run();
     command.arg("--force");
     assert!(

@@ -9,7 +9,7 @@ use super::{load_sites, output};
 use crate::{
     config::SiteConfig,
     error::Failure,
-    flow::{Stage, plan_site},
+    flow::{Stage, check_out, plan_site},
 };
 
 /// Says which stages would run, and why.
@@ -27,8 +27,10 @@ pub(super) struct Arguments {
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
+    let sites = load_sites(&arguments.sites)?;
+    check_out(&arguments.out, &sites)?;
     print(
-        &load_sites(&arguments.sites)?,
+        &sites,
         &arguments.out,
         Stage::Publish,
         false,

@@ -10,7 +10,7 @@ use crate::{
     difference::{Limits, Outcome, Pairs, RunDifference, compare, pairs},
     error::{Failure, Kind},
     report::difference_page,
-    store::atomic,
+    store::page::PagePath,
 };
 
 /// Reports on products.
@@ -44,7 +44,7 @@ struct DiffArguments {
     /// Answer in JSON.
     #[arg(long)]
     json: bool,
-    /// Write a page as well.
+    /// Write a page to this file as well; its folder must exist, and products are not overwritten.
     #[arg(long, value_name = "FILE.html")]
     page: Option<PathBuf>,
     /// How far a footprint, a camera or a boresight on the ground may move, metres.
@@ -79,6 +79,7 @@ fn diff(arguments: &DiffArguments) -> Result<u8, Failure> {
         movement_m: arguments.limit_m,
         pointing_arcsec: arguments.limit_arcsec,
     };
+    let page_path = arguments.page.as_deref().map(PagePath::new).transpose()?;
     let pairs = pairs(&arguments.a, &arguments.b)?;
     let sites: Vec<Compared> = pairs
         .both
@@ -96,14 +97,14 @@ fn diff(arguments: &DiffArguments) -> Result<u8, Failure> {
             .filter_map(|(_, compared)| compared.as_ref().err())
     };
     failures().for_each(output::error);
-    if let Some(file) = &arguments.page {
+    if let Some(path) = &page_path {
         let compared = sites
             .iter()
             .filter_map(|(_, compared)| compared.as_ref().ok());
         let mut not_compared = lonely(&pairs, &limits);
         not_compared.extend(failures().map(ToString::to_string));
         let page = difference_page(&compared.collect::<Vec<_>>(), &not_compared)?;
-        atomic::write(file, page.as_bytes())?;
+        path.write(&page)?;
     }
     Ok(exit_code(&sites, &pairs, &limits))
 }

@@ -17,8 +17,8 @@ use super::{load_sites, output, plan, report};
 use crate::{
     config::SiteConfig,
     error::{Failure, Kind},
-    flow::{Ending, RunOptions, SiteOutcome, Stage, publish_sites, run_site},
-    store::manifest::Manifest,
+    flow::{Ending, RunOptions, SiteOutcome, Stage, check_out, publish_sites, run_site},
+    store::{manifest::Manifest, publish::read_manifest},
 };
 
 /// Runs sites from kernels to validated products in `<out>/<site>`.
@@ -66,6 +66,9 @@ pub(super) fn run(arguments: &Arguments) -> ExitCode {
         Ok(sites) => sites,
         Err(failure) => return report(&failure),
     };
+    if let Err(failure) = check_out(&arguments.out, &sites) {
+        return report(&failure);
+    }
     if arguments.dry_run {
         return super::finish(plan::print(
             &sites,
@@ -213,7 +216,14 @@ fn print_outcome(outcome: &SiteOutcome) {
     let (site, folder) = (&outcome.site, outcome.folder.display());
     let (what, manifest) = match &outcome.ending {
         Ending::StoppedAfter(stage) => {
-            return output::line(format_args!("{site}: stopped after {stage}, no products"));
+            let products = read_manifest(&outcome.folder).map_or_else(
+                || ", no products".to_owned(),
+                |earlier| {
+                    let utc = earlier.finished_utc;
+                    format!("; the products of {utc} in {folder} stay as they are")
+                },
+            );
+            return output::line(format_args!("{site}: stopped after {stage}{products}"));
         }
         Ending::Published(manifest) => ("products", manifest),
         Ending::Unchanged(manifest) => ("nothing changed; products stand", manifest),
@@ -253,7 +263,10 @@ fn outcome_json(outcome: &Outcome) -> serde_json::Value {
             let ending = match ending {
                 Ending::Published(manifest) => products(true, manifest),
                 Ending::Unchanged(manifest) => products(false, manifest),
-                Ending::StoppedAfter(stage) => json!({ "stopped_after": stage.name() }),
+                Ending::StoppedAfter(stage) => json!({
+                    "stopped_after": stage.name(),
+                    "earlier_products_utc": read_manifest(folder).map(|earlier| earlier.finished_utc),
+                }),
             };
             json!({ "site": site, "folder": folder, "ending": ending })
         }

@@ -6,6 +6,7 @@ mod compare;
 mod geometric;
 mod kernels;
 mod manifest;
+mod out;
 mod parts;
 mod plan;
 mod publish;
@@ -32,6 +33,7 @@ pub use choice::{rival_sets, wanted_by_site};
 pub use compare::{
     Compared, EPOCHS_MAX, LeftOut, Request, RivalSet, compare_kernels, require_different,
 };
+pub use out::{OutFault, check_out};
 pub use plan::{PlannedStage, plan_site};
 pub use sites::publish_sites;
 

@@ -12,12 +12,10 @@ use crate::{
     store::{
         atomic,
         manifest::{Manifest, figures},
+        page::SITES_PAGE,
         publish::{has_work, last_failure, read_manifest},
     },
 };
-
-/// File of the page in the output folder.
-const PAGE: &str = "index.html";
 
 /// Writes the page over the sites whose folders lie in `out`; returns its path.
 ///
@@ -47,7 +45,7 @@ pub fn publish_sites(out: &Path) -> Result<PathBuf> {
             failure,
         })
         .collect();
-    let page = out.join(PAGE);
+    let page = out.join(SITES_PAGE);
     atomic::write(&page, sites_page(&lines).as_bytes())?;
     Ok(page)
 }

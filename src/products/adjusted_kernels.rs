@@ -150,12 +150,12 @@ pub fn write_adjusted_kernels(
     // CSPICE has one user at a time.
     drop(session);
     for (image, states) in images.iter().zip(&states) {
-        written.add(position_name(image), |path| {
+        written.add(position_kernel(&image.times.id), |path| {
             states.write(path, &comment(image, to))
         })?;
     }
     for image in images {
-        read_back(to, image).in_file(position_name(image))?;
+        read_back(to, image).in_file(position_kernel(&image.times.id))?;
     }
     written.add("adjusted.tm", |path| {
         write_text(path, &metakernel(to, images)?)?;
@@ -164,8 +164,10 @@ pub fn write_adjusted_kernels(
     Ok(written.products)
 }
 
-fn position_name(image: &AdjustedImage) -> String {
-    format!("adjusted/{}.bsp", image.times.id)
+/// Path of the SPK of an image below the folder of the products, the longest that CSPICE writes there.
+#[must_use]
+pub fn position_kernel(image: &str) -> String {
+    format!("adjusted/{image}.bsp")
 }
 
 fn attitude_name(image: &AdjustedImage) -> String {
@@ -234,7 +236,8 @@ fn comment(image: &AdjustedImage, to: &AdjustedKernels) -> String {
 
 /// Reads every sample of `image` through the original kernels and its own pair.
 fn read_back(to: &AdjustedKernels, image: &AdjustedImage) -> Result<()> {
-    let own = [position_name(image), attitude_name(image)].map(|name| to.directory.join(name));
+    let own = [position_kernel(&image.times.id), attitude_name(image)]
+        .map(|name| to.directory.join(name));
     let session = Session::open(&to.originals.followed_by(&own)?)?;
     let (mut distances_m, mut turns_rad) = (Vec::new(), Vec::new());
     for sample in &image.orientation.samples {
@@ -267,7 +270,7 @@ fn read_back(to: &AdjustedKernels, image: &AdjustedImage) -> Result<()> {
 fn metakernel(to: &AdjustedKernels, images: &[AdjustedImage]) -> Result<String> {
     let names = images
         .iter()
-        .flat_map(|image| [position_name(image), attitude_name(image)]);
+        .flat_map(|image| [position_kernel(&image.times.id), attitude_name(image)]);
     let names: Vec<PathBuf> = names.map(PathBuf::from).collect();
     let files: Vec<PathBuf> = names.iter().map(|name| to.directory.join(name)).collect();
     let own = KernelSet::from_files(&files)?;

@@ -41,7 +41,9 @@ mod ties;
 
 use std::path::{Path, PathBuf};
 
-pub use adjusted_kernels::{AdjustedImage, AdjustedKernels, write_adjusted_kernels};
+pub use adjusted_kernels::{
+    AdjustedImage, AdjustedKernels, position_kernel, write_adjusted_kernels,
+};
 pub use exchange::{
     ControlMeasure, ControlPoint, GroundEstimate, ImageMeasure, LidarPoint, moc_serial_number,
     write_gcp, write_lidar_data,

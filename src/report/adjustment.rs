@@ -5,25 +5,29 @@ use super::{
     html::{Cell, Column, Table, counted, heading, paragraph},
     plots::{Extent, Panel, Plot, Series, figure, label},
     reliability,
+    section::Section,
 };
 use crate::{
     error::Result,
     geom::statistics::{BAARDA_LIMIT, Summary},
-    products::SiteProducts,
+    products::{GeometricProducts, SiteProducts},
     stages::adjust::{Adjusted, AdjustmentSummary, GroundSummary, ObservationType},
 };
 
 /// Steps that the axis of the convergence has room for at least, so that its labels are whole numbers.
 const STEPS_SHOWN_MIN: f64 = 8.0;
 
-/// Tables and plots; nothing for a site without tie points.
-///
-/// # Errors
-/// A plot that cannot be drawn.
-pub(super) fn section(site: &SiteProducts) -> Result<String> {
-    let Some(geometric) = &site.geometric else {
-        return Ok(String::new());
-    };
+pub(super) const SECTION: Section = Section {
+    title: "Combined adjustment",
+    anchor: "combined-adjustment",
+    appears: |site| site.geometric.is_some(),
+    write: |site| {
+        let geometric = site.geometric.iter();
+        geometric.map(|geometric| write(site, geometric)).collect()
+    },
+};
+
+fn write(site: &SiteProducts, geometric: &GeometricProducts) -> Result<String> {
     let adjusted = geometric.adjusted;
     let summary = &adjusted.summary;
     let mut html = paragraph(&overview(adjusted));

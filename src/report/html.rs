@@ -44,18 +44,25 @@ impl Tone {
 
 /// A section of a page, and what the list of contents calls it.
 pub(super) struct Section {
+    /// Name in links.
+    anchor: String,
     heading: &'static str,
     body: String,
 }
 
 impl Section {
-    /// A section with `body` as HTML.
-    pub(super) const fn new(heading: &'static str, body: String) -> Self {
-        Self { heading, body }
+    /// A section with `body` as HTML, named after its heading in links.
+    pub(super) fn new(heading: &'static str, body: String) -> Self {
+        Self::named(&slug(heading), heading, body)
     }
 
-    fn id(&self) -> String {
-        slug(self.heading)
+    /// A section with a name of its own in links.
+    pub(super) fn named(anchor: &str, heading: &'static str, body: String) -> Self {
+        Self {
+            anchor: anchor.to_owned(),
+            heading,
+            body,
+        }
     }
 }
 
@@ -68,7 +75,7 @@ pub(super) fn page(title: &str, lead: &str, sections: &[Section]) -> String {
         .map(|section| {
             format!(
                 "<li><a href=\"#{}\">{}</a></li>\n",
-                section.id(),
+                section.anchor,
                 escape(section.heading)
             )
         })
@@ -77,7 +84,7 @@ pub(super) fn page(title: &str, lead: &str, sections: &[Section]) -> String {
         .map(|section| {
             format!(
                 "<section id=\"{}\">\n<h2>{}</h2>\n{}</section>\n",
-                section.id(),
+                section.anchor,
                 escape(section.heading),
                 section.body
             )

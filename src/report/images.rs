@@ -3,6 +3,7 @@
 use super::{
     html::{Cell, Column, Table, paragraph},
     plots::{GREY, Panel, Plot, Series, figure},
+    section::Section,
 };
 use crate::{
     error::Result,
@@ -12,14 +13,14 @@ use crate::{
     units::{METRES_PER_KM, RADIANS_PER_ARCSECOND, RADIANS_PER_DEGREE},
 };
 
-/// Table and plots.
-///
-/// # Errors
-/// A plot that cannot be drawn.
-pub(super) fn section(site: &SiteProducts) -> Result<String> {
-    if site.images.is_empty() {
-        return Ok(String::new());
-    }
+pub(super) const SECTION: Section = Section {
+    title: "Exterior orientation",
+    anchor: "exterior-orientation",
+    appears: |site| !site.images.is_empty(),
+    write,
+};
+
+fn write(site: &SiteProducts) -> Result<String> {
     let figures = site
         .images
         .iter()

@@ -12,6 +12,7 @@ use super::{
         COLOURS, Canvas, Drawn, GRID, INK, Key, WIDTH, draw_text, drawn, figure_html, quoted,
         thinned,
     },
+    section::Section,
 };
 use crate::{
     constants::MARS_IAU2000,
@@ -36,15 +37,18 @@ const HEIGHTS: [RGBColor; 7] = [
 /// Least and greatest height of the picture against its width.
 const RATIO: (f64, f64) = (0.5, 1.15);
 
-/// The map; empty when there is nothing to show.
-///
-/// # Errors
-/// A plot that cannot be drawn.
-pub(super) fn section(site: &SiteProducts) -> Result<String> {
+pub(super) const SECTION: Section = Section {
+    title: "Map",
+    anchor: "map",
+    appears: |site| {
+        let outlined = !windows(site).is_empty() || !images(site).is_empty();
+        outlined || !site.footprints.is_empty()
+    },
+    write,
+};
+
+fn write(site: &SiteProducts) -> Result<String> {
     let sheet = Sheet::of(site);
-    if sheet.outlines().next().is_none() && sheet.shots.is_empty() {
-        return Ok(String::new());
-    }
     let svg = drawn(sheet.height() as u32, |area| sheet.draw(area))?;
     let mut words = sheet.words(site);
     if site.footprints.len() > sheet.shots.len() {
@@ -126,10 +130,6 @@ impl Sheet {
             shots,
             heights_m,
         }
-    }
-
-    fn outlines(&self) -> impl Iterator<Item = &Outline> {
-        self.windows.iter().chain(&self.images)
     }
 
     fn height(&self) -> f64 {

@@ -6,6 +6,7 @@ use super::{
     html::{Cell, Column, Table, counted, heading, paragraph},
     moved,
     plots::label,
+    section::Section,
 };
 use crate::{
     error::Result,
@@ -22,14 +23,17 @@ use crate::{
 /// Pairs that have a sentence of their own; tables have all.
 const PAIRS_TOLD: usize = 6;
 
-/// Tables and plots; nothing for a site without tie points.
-///
-/// # Errors
-/// A plot that cannot be drawn.
-pub(super) fn section(site: &SiteProducts) -> Result<String> {
-    let Some(geometric) = &site.geometric else {
-        return Ok(String::new());
-    };
+pub(super) const SECTION: Section = Section {
+    title: "Tie points and misregistration",
+    anchor: "tie-points-and-misregistration",
+    appears: |site| site.geometric.is_some(),
+    write: |site| {
+        let geometric = site.geometric.iter();
+        geometric.map(|geometric| write(site, geometric)).collect()
+    },
+};
+
+fn write(site: &SiteProducts, geometric: &GeometricProducts) -> Result<String> {
     let pairs = BeforeAfter::all(geometric);
     let told = pairs.iter().take(PAIRS_TOLD);
     let mut html: String = told.map(|pair| paragraph(&pair.sentence())).collect();

@@ -16,6 +16,7 @@
 )]
 
 mod adjustment;
+mod clocks_and_datum;
 mod compare;
 mod corrections;
 mod diff;
@@ -25,12 +26,16 @@ mod images;
 mod map;
 mod misregistration;
 mod moved;
+mod notes;
 mod outlines;
 mod plots;
+mod provenance;
 mod ranges;
 mod registration;
 mod reliability;
 mod scan;
+mod section;
+mod selection;
 mod sites;
 mod summary;
 mod timeline;
@@ -42,34 +47,51 @@ pub use compare::{KernelComparison, comparison_page};
 pub use diff::difference_page;
 pub use sites::{SiteLine, SiteSummary, sites_page};
 
-use html::Section;
+use section::Section;
+
+/// Every section of a site's page, in its order.
+const SECTIONS: &[Section] = &[
+    ranges::SECTION,
+    scan::SECTION,
+    images::SECTION,
+    registration::SECTION,
+    misregistration::SECTION,
+    adjustment::SECTION,
+    uncertainty::SECTION,
+    map::SECTION,
+    selection::SECTION,
+    clocks_and_datum::SECTION,
+    timeline::SECTION,
+    notes::SECTION,
+    provenance::SECTION,
+];
 
 /// The report of `site` as one HTML page.
 ///
 /// # Errors
 /// A plot that cannot be drawn, which is a fault of areograph.
 pub fn page(site: &SiteProducts) -> Result<String> {
-    let sections = [
-        Section::new("Range check", ranges::section(site)?),
-        Section::new("Clock bias scan", scan::section(site)?),
-        Section::new("Exterior orientation", images::section(site)?),
-        Section::new("Registration", registration::section(site)?),
-        Section::new(
-            "Tie points and misregistration",
-            misregistration::section(site)?,
-        ),
-        Section::new("Combined adjustment", adjustment::section(site)?),
-        Section::new("Uncertainty of ground points", uncertainty::section(site)),
-        Section::new("Map", map::section(site)?),
-        Section::new("Selection of shots", summary::selection(site)),
-        Section::new("Clock corrections and datum", summary::corrections(site)),
-        Section::new("Kernel coverage", timeline::section(site)?),
-        Section::new("Notes", summary::notes(site)),
-        Section::new("Provenance", summary::provenance(site)),
-    ];
+    let sections = SECTIONS.iter().map(|section| section.of(site));
+    let sections: Vec<html::Section> = sections
+        .filter_map(Result::transpose)
+        .collect::<Result<_>>()?;
     Ok(html::page(
         &site.config.site,
         &summary::lead(site),
         &sections,
     ))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn anchors_are_unique_and_need_no_escape() {
+        let mut anchors: Vec<&str> = SECTIONS.iter().map(|section| section.anchor).collect();
+        assert!(anchors.iter().all(|anchor| html::slug(anchor) == *anchor));
+        anchors.sort_unstable();
+        anchors.dedup();
+        assert_eq!(anchors.len(), SECTIONS.len());
+    }
 }

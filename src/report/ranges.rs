@@ -3,6 +3,7 @@
 use super::{
     html::{Cell, Column, Table, heading, list, paragraph},
     plots::{Extent, Panel, Plot, Series, Style, figure, label, thinned},
+    section::Section,
 };
 use crate::{
     error::Result, products::SiteProducts, stages::check_ranges::ProfileRanges,
@@ -16,14 +17,14 @@ const PROFILE_POINTS: usize = 500;
 /// Up to so many profiles have a plot each; more share plots in groups of so many.
 pub(super) const PROFILES_APART: usize = 12;
 
-/// Tables and plots.
-///
-/// # Errors
-/// A plot that cannot be drawn.
-pub(super) fn section(site: &SiteProducts) -> Result<String> {
-    if site.config.pedr.files.is_empty() {
-        return Ok(String::new());
-    }
+pub(super) const SECTION: Section = Section {
+    title: "Range check",
+    anchor: "range-check",
+    appears: |site| !site.config.pedr.files.is_empty(),
+    write,
+};
+
+fn write(site: &SiteProducts) -> Result<String> {
     if site.profiles.is_empty() {
         return Ok(paragraph("No profile."));
     }

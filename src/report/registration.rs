@@ -3,6 +3,7 @@
 use super::{
     html::{Column, Table, heading, paragraph},
     plots::{COLOURS, Extent, GREY, INK, Mark, Panel, Plot, Series, Style, figure, label, thinned},
+    section::Section,
 };
 use crate::{
     error::Result,
@@ -21,16 +22,20 @@ const DOTS_MAX: usize = 600;
 /// Widths of the image that are shown on either side of it.
 const WIDTHS_BESIDE: f64 = 1.0;
 
-/// Tables and plots.
-///
-/// # Errors
-/// A plot that cannot be drawn.
-pub(super) fn section(site: &SiteProducts) -> Result<String> {
-    let registered = |image: &&ImageProducts| !image.registration.points.is_empty();
-    let images: Vec<&ImageProducts> = site.images.iter().filter(registered).collect();
-    if images.is_empty() {
-        return Ok(String::new());
-    }
+pub(super) const SECTION: Section = Section {
+    title: "Registration",
+    anchor: "registration",
+    appears: |site| site.images.iter().any(registered),
+    write,
+};
+
+fn registered(image: &ImageProducts) -> bool {
+    !image.registration.points.is_empty()
+}
+
+fn write(site: &SiteProducts) -> Result<String> {
+    let images = site.images.iter().filter(|image| registered(image));
+    let images: Vec<&ImageProducts> = images.collect();
     let mut planes = String::new();
     for image in &images {
         planes += &figure(&plane(site.profiles, image))?;

@@ -4,22 +4,21 @@ use super::{
     html::{Column, Table, paragraph},
     plots::{COLOURS, MARK, Mark, Panel, Plot, Series, figure},
     ranges::{group_title, groups},
+    section::Section,
 };
 use crate::{error::Result, products::SiteProducts, stages::check_ranges::BiasScan};
 
-/// Table and plots; empty when no profile has a scan.
-///
-/// # Errors
-/// A plot that cannot be drawn.
-pub(super) fn section(site: &SiteProducts) -> Result<String> {
-    if !site
-        .ranges
-        .profiles
-        .iter()
-        .any(|ranges| ranges.scan.is_some())
-    {
-        return Ok(String::new());
-    }
+pub(super) const SECTION: Section = Section {
+    title: "Clock bias scan",
+    anchor: "clock-bias-scan",
+    appears: |site| {
+        let mut profiles = site.ranges.profiles.iter();
+        profiles.any(|ranges| ranges.scan.is_some())
+    },
+    write,
+};
+
+fn write(site: &SiteProducts) -> Result<String> {
     let mut figures = String::new();
     for group in groups(site) {
         if let Some(plot) = scan_plot(site, group) {

@@ -6,6 +6,7 @@ use plotters::{prelude::*, style::text_anchor::HPos};
 use super::{
     html::{Column, Table, heading, paragraph},
     plots::{COLOURS, Canvas, Drawn, INK, Key, MARK, WIDTH, draw_text, drawn, figure_html, quoted},
+    section::Section,
 };
 use crate::{
     error::Result,
@@ -26,15 +27,15 @@ const HELD: usize = 2;
 /// Colour of what is asked.
 const ASKED: usize = 0;
 
-/// Pictures per stretch of time, and the list of what is held.
-///
-/// # Errors
-/// A plot that cannot be drawn.
-pub(super) fn section(site: &SiteProducts) -> Result<String> {
+pub(super) const SECTION: Section = Section {
+    title: "Kernel coverage",
+    anchor: "kernel-coverage",
+    appears: |site| !stretches(site).is_empty(),
+    write,
+};
+
+fn write(site: &SiteProducts) -> Result<String> {
     let stretches = stretches(site);
-    if stretches.is_empty() {
-        return Ok(String::new());
-    }
     let figures = stretches
         .iter()
         .take(PICTURES)

@@ -4,19 +4,25 @@ use super::{
     html::{Cell, Column, Table, paragraph},
     misregistration::BeforeAfter,
     plots::label,
+    section::Section,
 };
 use crate::{
-    products::SiteProducts,
+    products::GeometricProducts,
     stages::uncertainty::{GroundPart, UncertaintyBudget},
 };
 
-/// One budget per pair, before and after the adjustment; nothing for a site without pairs.
-pub(super) fn section(site: &SiteProducts) -> String {
-    let pairs = site.geometric.as_ref().map(BeforeAfter::all);
-    let pairs = pairs.unwrap_or_default();
-    if pairs.is_empty() {
-        return String::new();
-    }
+pub(super) const SECTION: Section = Section {
+    title: "Uncertainty of ground points",
+    anchor: "uncertainty-of-ground-points",
+    appears: |site| {
+        let pairs = site.geometric.as_ref().map(|geometric| geometric.pairs);
+        pairs.is_some_and(|pairs| !pairs.is_empty())
+    },
+    write: |site| Ok(site.geometric.iter().map(write).collect()),
+};
+
+fn write(geometric: &GeometricProducts) -> String {
+    let pairs = BeforeAfter::all(geometric);
     let words: String = pairs.iter().map(in_words).collect();
     let explained = "Every tie point's reprojection residuals give D = √(M² + σ²) per image; along the track the squares \
                      of both images add up to what the orientation explains. One MOLA spacing is taken for the whole \

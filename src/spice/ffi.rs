@@ -28,7 +28,7 @@ pub(super) use write::CkColumns;
 pub(super) type Called<T> = Result<T, SpiceFault>;
 
 /// Longest file name that CSPICE takes (`FILSIZ` in its kernel loader).
-pub(super) const PATH_LENGTH_MAX: usize = 255;
+pub const PATH_LENGTH_MAX: usize = 255;
 /// Lengths of CSPICE's short and long error messages, with the closing zero.
 const SHORT_MESSAGE_SIZE: usize = 26;
 const LONG_MESSAGE_SIZE: usize = 1_841;

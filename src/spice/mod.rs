@@ -26,6 +26,7 @@ mod write;
 
 pub use coverage::{Coverage, Wanted};
 pub use error::SpiceFault;
+pub use ffi::PATH_LENGTH_MAX;
 pub use kernels::{Kernel, KernelRole, KernelSet};
 pub use select::quality_of;
 pub use session::{Attitude, Session, State};

@@ -6,5 +6,6 @@ pub mod cache;
 pub mod fingerprint;
 pub mod lock;
 pub mod manifest;
+pub mod page;
 pub mod publish;
 pub mod published;

@@ -52,12 +52,18 @@ pub fn last_failure(site_folder: &Path) -> Option<String> {
     fs::read_to_string(site_folder.join(FAILED)).ok()
 }
 
+/// Where products of a site are made.
+#[must_use]
+pub fn staging_path(site_folder: &Path) -> PathBuf {
+    site_folder.join(STAGING)
+}
+
 /// An empty folder for half-made products inside the site's folder, hence on the same file system.
 ///
 /// # Errors
 /// The folder cannot be made, or an earlier one could not be removed.
 pub fn staging(site_folder: &Path) -> Result<PathBuf> {
-    let folder = site_folder.join(STAGING);
+    let folder = staging_path(site_folder);
     fs::create_dir(&folder)
         .map_err(IoFault::on("create the folder"))
         .in_file(&folder)?;

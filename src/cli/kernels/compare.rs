@@ -16,7 +16,7 @@ use crate::{
     report::{KernelComparison, comparison_page},
     spice::{KernelSet, Session, Wanted},
     stages::compare_kernels::{AttitudeComparison, Comparison, Size},
-    store::atomic,
+    store::page::PagePath,
     time::{Et, Interval, Intervals, PointingBias},
     units::RADIANS_PER_ARCSECOND,
 };
@@ -44,7 +44,7 @@ pub(super) struct Arguments {
     /// Answer in JSON, deviations at every epoch included.
     #[arg(long)]
     json: bool,
-    /// Write a page with tables and plots to this file.
+    /// Write a page with tables and plots to this file; its folder must exist, and products are not overwritten.
     #[arg(long, value_name = "FILE.html")]
     page: Option<PathBuf>,
 }
@@ -75,6 +75,7 @@ impl Fault for Usage {
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
+    let page_path = arguments.page.as_deref().map(PagePath::new).transpose()?;
     let site = match &arguments.site {
         Some(path) => load_sites(std::slice::from_ref(path))?.pop(),
         None => None,
@@ -105,8 +106,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
     };
     require_different(&sets)?;
     let compared = compare_kernels(&sets, &request)?;
-    if let Some(path) = &arguments.page {
-        atomic::write(path, page(&compared)?.as_bytes())?;
+    if let Some(path) = &page_path {
+        path.write(&page(&compared)?)?;
     }
     if arguments.json {
         output::json(&answer(&compared));

@@ -1,0 +1,92 @@
+//! Whether products can be written into a folder, asked before any stage runs.
+
+use std::path::{Path, PathBuf};
+
+use crate::{
+    config::SiteConfig,
+    error::{Fault, Kind, Place, Result},
+    products::position_kernel,
+    spice::PATH_LENGTH_MAX,
+    store::publish::staging_path,
+};
+
+/// Longest part of a path that the usual file systems hold, bytes.
+const PART_LENGTH_MAX: usize = 255;
+
+/// Why no products can be written into a folder.
+#[derive(Debug, thiserror::Error)]
+pub enum OutFault {
+    /// Metakernels and CSPICE cannot name files in it.
+    #[error("--out is {out:?}: it {holds}; expected UTF-8 without control characters")]
+    Unspeakable {
+        /// The folder.
+        out: PathBuf,
+        /// What stands in the way.
+        holds: &'static str,
+    },
+    /// No file system holds it.
+    #[error("--out has a part of {bytes} bytes, {part:.20}…; expected at most {PART_LENGTH_MAX}")]
+    LongPart {
+        /// The part.
+        part: String,
+        /// Its length.
+        bytes: usize,
+    },
+    /// A kernel of an adjusted image has a path that CSPICE does not take.
+    #[error(
+        "--out makes the path of a product, {}, {} bytes long while it is made; CSPICE takes at most {PATH_LENGTH_MAX}",
+        .product.display(), .product.as_os_str().len()
+    )]
+    LongPath {
+        /// The product.
+        product: PathBuf,
+    },
+}
+
+impl Fault for OutFault {
+    fn kind(&self) -> Kind {
+        Kind::Configuration
+    }
+
+    fn advice(&self) -> String {
+        match self {
+            Self::Unspeakable { .. } => "name a folder without such characters for --out",
+            Self::LongPart { .. } | Self::LongPath { .. } => {
+                "name a folder with a shorter path for --out; a relative path counts as it is written"
+            }
+        }
+        .to_owned()
+    }
+}
+
+/// Makes sure that the paths of all products of `sites` in `out` can be written.
+///
+/// # Errors
+/// [`OutFault`], of kind configuration.
+pub fn check_out(out: &Path, sites: &[SiteConfig]) -> Result<()> {
+    let unspeakable = |holds| OutFault::Unspeakable {
+        out: out.to_owned(),
+        holds,
+    };
+    let text = out.to_str().ok_or_else(|| unspeakable("is not UTF-8"))?;
+    if text.contains(char::is_control) {
+        return Err(unspeakable("holds control characters").into());
+    }
+    for part in out {
+        if part.len() > PART_LENGTH_MAX {
+            let part = part.to_string_lossy().into_owned();
+            let bytes = part.len();
+            return Err(OutFault::LongPart { part, bytes }.into());
+        }
+    }
+    for site in sites.iter().filter(|site| !site.ties.files.is_empty()) {
+        let staging = staging_path(&out.join(&site.site));
+        let ids = site.images.iter().map(|image| &*image.id);
+        let products = ids.map(|id| staging.join(position_kernel(id)));
+        let longest = products.max_by_key(|product| product.as_os_str().len());
+        if let Some(product) = longest.filter(|path| path.as_os_str().len() > PATH_LENGTH_MAX) {
+            return Err(OutFault::LongPath { product }).in_site(&site.site);
+        }
+    }
+    Ok(())
+}

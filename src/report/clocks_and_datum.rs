@@ -1,0 +1,111 @@
+//! The clock corrections and the datum as used, with their sources.
+
+use super::{
+    html::{Column, Table, paragraph},
+    section::Section,
+};
+use crate::{
+    altimetry::{BiasScope, DatumChoice, TagSign},
+    products::SiteProducts,
+};
+
+pub(super) const SECTION: Section = Section {
+    title: "Clock corrections and datum",
+    anchor: "clock-corrections-and-datum",
+    appears: |_| true,
+    write: |site| Ok(biases(site) + &datum(site)),
+};
+
+fn biases(site: &SiteProducts) -> String {
+    let (clock, pointing) = (&site.config.mola_clock, &site.config.pointing);
+    let sign = match clock.sign {
+        TagSign::Late => "tags are late",
+        TagSign::Early => "tags are early",
+    };
+    let scope = match clock.scope {
+        BiasScope::SpkLookup => "the spacecraft's position in the range check",
+        BiasScope::Rotation => "the rotation of Mars into IAU 2000",
+        BiasScope::Both => "the spacecraft's position in the range check and the rotation of Mars",
+        BiasScope::None => "nothing (switched off)",
+    };
+    let mut table = Table::new(
+        "Clock corrections",
+        &[
+            Column::Text("bias"),
+            Column::Number("correction, s"),
+            Column::Text("of what"),
+            Column::Text("source"),
+        ],
+    );
+    table.row(
+        true,
+        [
+            "attitude (CK)".into(),
+            format!("{:+.3}", pointing.ck_bias.seconds()).into(),
+            "the time at which attitude is read; position and Mars stay at the exposure".into(),
+            (&pointing.source).into(),
+        ],
+    );
+    table.row(
+        true,
+        [
+            "MOLA clock".into(),
+            format!("{:+.3}", clock.correction_s()).into(),
+            format!("{scope}; {:.3} s, {sign}", clock.bias_s).into(),
+            (&clock.source).into(),
+        ],
+    );
+    table.finish()
+}
+
+fn datum(site: &SiteProducts) -> String {
+    if site.footprints.files.is_empty() {
+        return String::new();
+    }
+    let decided = match site.config.pedr.datum {
+        DatumChoice::Auto => "by version letter and label".to_owned(),
+        DatumChoice::Stated(datum) => format!("stated in the configuration: {datum}"),
+    };
+    let mut table = Table::new(
+        "Datum of the PEDR coordinates",
+        &[
+            Column::Text("PEDR file"),
+            Column::Text("version"),
+            Column::Text("datum of the file"),
+            Column::Number("W0, degrees"),
+            Column::Text("done"),
+            Column::Number("shots"),
+            Column::Number("mean shift, m"),
+            Column::Number("mean change of longitude, degrees"),
+        ],
+    );
+    for (file, conversion) in site.footprints.files.iter().zip(site.conversions) {
+        let moved = conversion.shift_m.max > 0.0;
+        let number = |text: String| if moved { text } else { "–".to_owned() };
+        table.row(
+            true,
+            [
+                (&file.name).into(),
+                file.version
+                    .map_or_else(|| "–".to_owned(), String::from)
+                    .into(),
+                file.datum.to_string().into(),
+                format!("{:.3}", file.datum.model().meridian_deg).into(),
+                if moved {
+                    "through J2000 to IAU 2000"
+                } else {
+                    "left alone"
+                }
+                .into(),
+                conversion.shots.to_string().into(),
+                number(format!("{:.1}", conversion.shift_m.mean)).into(),
+                number(format!("{:+.5}", conversion.longitude_shift_deg.mean)).into(),
+            ],
+        );
+    }
+    let words = format!(
+        "Decided {decided}. Products are in IAU 2000, W0 = {:.3}°.",
+        crate::constants::MARS_IAU2000.meridian_deg
+    );
+    table.finish() + &paragraph(&words)
+}

@@ -1,0 +1,31 @@
+//! What a section of a site's page declares.
+
+use super::html;
+use crate::{error::Result, products::SiteProducts};
+
+/// A section of the page of one site. Its file declares it as `SECTION`; [`super::SECTIONS`] lists it once, and order
+/// and contents of the page follow.
+pub(super) struct Section {
+    /// Its heading, and what the list of contents calls it.
+    pub(super) title: &'static str,
+    /// Its name in links, unique on the page.
+    pub(super) anchor: &'static str,
+    /// Whether the page of this site has it.
+    pub(super) appears: fn(&SiteProducts) -> bool,
+    /// Its body as HTML; fails with a plot that cannot be drawn.
+    pub(super) write: fn(&SiteProducts) -> Result<String>,
+}
+
+impl Section {
+    /// The section of this site, if it has one.
+    ///
+    /// # Errors
+    /// A plot that cannot be drawn, which is a fault of areograph.
+    pub(super) fn of(&self, site: &SiteProducts) -> Result<Option<html::Section>> {
+        if !(self.appears)(site) {
+            return Ok(None);
+        }
+        let body = (self.write)(site)?;
+        Ok(Some(html::Section::named(self.anchor, self.title, body)))
+    }
+}

@@ -1,0 +1,107 @@
+//! Windows and filters, and what they left out.
+
+use super::{
+    html::{Column, Table, paragraph},
+    section::Section,
+};
+use crate::{
+    config::WindowConfig, geom::window::WindowShape, products::SiteProducts,
+    units::RADIANS_PER_DEGREE,
+};
+
+pub(super) const SECTION: Section = Section {
+    title: "Selection of shots",
+    anchor: "selection-of-shots",
+    appears: |site| !site.config.pedr.files.is_empty(),
+    write: |site| Ok(write(site)),
+};
+
+fn write(site: &SiteProducts) -> String {
+    let mut windows = Table::new(
+        "Windows",
+        &[
+            Column::Text("window"),
+            Column::Text("outline (IAU 2000, areocentric, east)"),
+            Column::Number("shots"),
+        ],
+    );
+    for (bit, window) in site.config.windows.iter().enumerate() {
+        let masks = site.footprints.windows.iter();
+        let shots = masks.filter(|mask| **mask >> bit & 1 == 1).count();
+        windows.row(
+            true,
+            [
+                (&window.id).into(),
+                outline(window).into(),
+                shots.to_string().into(),
+            ],
+        );
+    }
+    windows.finish() + &paragraph(&filter(site)) + &rejects(site)
+}
+
+fn filter(site: &SiteProducts) -> String {
+    let filter = &site.config.pedr.filter;
+    let join = |values: Vec<String>| values.join(", ");
+    format!(
+        "A shot is kept when its class is one of {}, its trigger channel one of {}, its attitude flag one of {} and \
+         its off-nadir angle at most {:.1}°.",
+        join(filter.classes.iter().map(ToString::to_string).collect()),
+        join(filter.channels.iter().map(ToString::to_string).collect()),
+        join(
+            filter
+                .attitude_flags
+                .iter()
+                .map(ToString::to_string)
+                .collect()
+        ),
+        filter.off_nadir_max_rad / RADIANS_PER_DEGREE
+    )
+}
+
+fn rejects(site: &SiteProducts) -> String {
+    if site.rejected.is_empty() {
+        return paragraph("No shot inside a window was left out.");
+    }
+    let left_out: u64 = site.rejected.values().sum();
+    let all = left_out + site.footprints.len() as u64;
+    let mut table = Table::new(
+        "Shots inside a window that were left out",
+        &[
+            Column::Text("reason"),
+            Column::Number("shots"),
+            Column::Number("share of the shots in windows"),
+        ],
+    );
+    for (reason, shots) in site.rejected {
+        let share = 100.0 * *shots as f64 / all as f64;
+        table.row(
+            true,
+            [
+                reason.into(),
+                shots.to_string().into(),
+                format!("{share:.1} %").into(),
+            ],
+        );
+    }
+    table.finish()
+}
+
+fn outline(window: &WindowConfig) -> String {
+    match &window.shape {
+        WindowShape::Box {
+            west_rad,
+            east_rad,
+            south_rad,
+            north_rad,
+        } => {
+            let [west, east, south, north] =
+                [west_rad, east_rad, south_rad, north_rad].map(|angle| angle / RADIANS_PER_DEGREE);
+            format!("longitude {west:.4}° to {east:.4}°, latitude {south:.4}° to {north:.4}°")
+        }
+        WindowShape::Polygons { polygons } => {
+            let vertices: usize = polygons.iter().flatten().map(Vec::len).sum();
+            format!("{} polygons with {vertices} vertices", polygons.len())
+        }
+    }
+}
