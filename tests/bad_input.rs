@@ -154,6 +154,27 @@ const CASES: &[(&str, Spoil)] = &[
         case.replace("site.toml", "label", "lines_delivered = 99999\nlabel");
         case.run()
     }),
+    ("summing_beyond_the_camera", |case| {
+        case.replace("site.toml", "label", "crosstrack_summing = 9\nlabel");
+        case.run()
+    }),
+    ("samples_beyond_the_detector", |case| {
+        case.replace("site.toml", "label", "first_detector = 100\nlabel");
+        case.run()
+    }),
+    ("instrument_file_is_bad", |case| {
+        let file = include_str!("../config/instruments/moc_na.toml")
+            .replace("pixels = 2048", "pixel = 2048")
+            .replace("samples_along = \"+y\"", "samples_along = \"y\"")
+            .replace("focal_length_mm = 3500.0", "focal_length_mm = 0.0");
+        case.write("camera.toml", file);
+        case.replace("site.toml", "label", "instrument = \"camera.toml\"\nlabel");
+        case.run()
+    }),
+    ("instrument_is_unknown", |case| {
+        case.replace("site.toml", "label", "instrument = \"moc_wa\"\nlabel");
+        case.run()
+    }),
     ("pedr_shorter_than_its_label", |case| {
         case.truncate("pedr/ap19117l.b", 5_000);
         case.run()

@@ -12,7 +12,7 @@ use super::{
     error::SceneError,
     plan::Site,
     random::Random,
-    sites::{Label, SiteFile, SiteImage, image_label, window},
+    sites::{Label, SiteFile, SiteImage, SiteTies, image_label, window},
     terrain::Terrain,
     ties::ties_name,
     truth::KeptShot,
@@ -49,9 +49,10 @@ const TIES: [usize; 2] = [60, 2_000];
 const NOISE_PX: f64 = 0.2;
 /// No tie point is nearer to the edge of an image, pixels.
 const EDGE_PX: f64 = 5.0;
-/// Steps of the search for a place, the last of them in lines and samples, and the steps of its slopes.
+/// Steps of the search for a place, and the last of them in lines and samples: ET is rounded at 1e-7 of a line.
 const STEPS_MAX: u32 = 30;
-const LAST_STEP_PX: f64 = 1e-9;
+const LAST_STEP_PX: f64 = 1e-6;
+/// Half the interval of its slopes.
 const SLOPE_STEP_PX: f64 = 0.5;
 
 /// An image that is exposed around the middle of a narrow-angle one.
@@ -386,7 +387,11 @@ pub(super) fn context_site(images: &[ContextImage<'_>], metakernel: &str) -> Sit
         description: format!("{}, synthetic", CONTEXT_SITE.name),
         metakernel: format!("../kernels/{metakernel}"),
         pedr,
-        ties: Some(format!("../ties/{}", ties_name(CONTEXT_SITE.id))),
+        ties: Some(SiteTies {
+            file: format!("../ties/{}", ties_name(CONTEXT_SITE.id)),
+            note: "The noise of these tie points is a fifth of a pixel.",
+            sigma_px: [NOISE_PX; 2],
+        }),
         windows: vec![window(&CONTEXT_SITE, WINDOW_HALF_DEG)],
         images: images
             .iter()

@@ -168,12 +168,7 @@ struct Day {
 }
 
 /// Writes the PEDR file of one day.
-fn write_day(
-    folder: &Path,
-    arc: &Arc,
-    terrain: &Terrain,
-    seed: u64,
-) -> Result<Day> {
+fn write_day(folder: &Path, arc: &Arc, terrain: &Terrain, seed: u64) -> Result<Day> {
     let image = arc.image;
     let first = arc.orbit.revolution(arc.frames.start);
     let name = image.pedr_name();

@@ -83,7 +83,7 @@ impl SceneSummary {
         Self {
             directory: directory.to_owned(),
             sites,
-            images: truth.images.len(),
+            images: truth.images.len() + truth.wide_angle.len(),
             pedr_files: truth.files.len(),
             frames: truth.files.iter().map(|file| file.frames).sum(),
         }

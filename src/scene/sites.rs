@@ -36,6 +36,16 @@ pub(super) struct SiteImage {
     pub lines_delivered: Option<u32>,
 }
 
+/// Tie points of a site file.
+pub(super) struct SiteTies {
+    /// Path of the file.
+    pub file: String,
+    /// What the site file says of their noise.
+    pub note: &'static str,
+    /// Standard deviations along and across the track, focal pixels.
+    pub sigma_px: [f64; 2],
+}
+
 /// What a site file says.
 pub(super) struct SiteFile<'a> {
     /// Identifier.
@@ -46,8 +56,8 @@ pub(super) struct SiteFile<'a> {
     pub metakernel: String,
     /// Paths of the PEDR files.
     pub pedr: Vec<String>,
-    /// Path of the tie points, where there are any.
-    pub ties: Option<String>,
+    /// Tie points, where there are any.
+    pub ties: Option<SiteTies>,
     /// Windows.
     pub windows: Vec<Window>,
     /// Images.
@@ -81,10 +91,10 @@ impl SiteFile<'_> {
         if let Some(ties) = &self.ties {
             let _infallible = write!(
                 text,
-                "\n[ties]\nfiles = [{}]\n\n\
-                 [adjustment]\n# A line, the noise of these tie points, is 1.3 to 1.6 focal pixels.\n\
-                 tie_sigma_px = [1.6, 1.0]\n",
-                quoted(ties)
+                "\n[ties]\nfiles = [{}]\n\n[adjustment]\n# {}\ntie_sigma_px = {:?}\n",
+                quoted(&ties.file),
+                ties.note,
+                ties.sigma_px,
             );
         }
         for window in &self.windows {
@@ -134,7 +144,11 @@ pub(super) fn planned_site<'a>(site: &'a Site, arcs: &[&Arc]) -> SiteFile<'a> {
             .iter()
             .map(|arc| format!("../pedr/{}", arc.image.pedr_name()))
             .collect(),
-        ties: Some(format!("../ties/{}", ties_name(site.id))),
+        ties: Some(SiteTies {
+            file: format!("../ties/{}", ties_name(site.id)),
+            note: "A line, the noise of these tie points, is 1.3 to 1.6 focal pixels.",
+            sigma_px: [1.6, 1.0],
+        }),
         windows: vec![window(
             site,
             [
