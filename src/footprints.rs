@@ -1,4 +1,27 @@
 //! Laser footprints as columns, from the PEDR reader to the Parquet writer.
+//!
+//! ```
+//! use areograph::footprints::{AsRead, Footprints};
+//!
+//! let footprints = Footprints::<AsRead>::new(Vec::new());
+//! assert!(footprints.is_empty());
+//! assert!(footprints.topography_m().is_empty());
+//! ```
+//!
+//! Footprints as their files have them are not taken for footprints in IAU 2000:
+//!
+//! ```compile_fail,E0308
+//! use areograph::{
+//!     footprints::{AsRead, Footprints},
+//!     frames::MarsIau2000,
+//! };
+//!
+//! fn mean_radius_m(footprints: &Footprints<MarsIau2000>) -> f64 {
+//!     footprints.radius_m.iter().sum::<f64>() / footprints.len() as f64
+//! }
+//!
+//! mean_radius_m(&Footprints::<AsRead>::new(Vec::new()));
+//! ```
 
 use std::marker::PhantomData;
 

@@ -2,6 +2,50 @@
 //!
 //! Types do not see time, so a [`Rotation`] carries the instant at which it holds, and two rotations
 //! of different instants do not combine.
+//!
+//! ```
+//! use areograph::{
+//!     frames::{MarsIau1991, MarsIau2000, Position, Rotation},
+//!     geom::mars_rotation::mars_rotation,
+//!     time::Et,
+//! };
+//! use nalgebra::Vector3;
+//!
+//! // The same point of the ground in the frames of two IAU reports, through J2000.
+//! let et = Et::from_seconds(-20_723_097.688);
+//! let old_to_new: Rotation<MarsIau1991, MarsIau2000> =
+//!     mars_rotation::<MarsIau2000>(et) * mars_rotation::<MarsIau1991>(et).inverse();
+//! let old: Position<MarsIau1991> = Position::new(Vector3::new(3_396_190.0, 0.0, 0.0));
+//! let new: Position<MarsIau2000> = old_to_new.apply(&old);
+//!
+//! // The reports' meridians are 0.238° apart, which is 14 km on the equator.
+//! let longitude_deg = new.xyz_m.y.atan2(new.xyz_m.x).to_degrees();
+//! assert!((longitude_deg - 0.238).abs() < 1e-3); // the poles differ too
+//! ```
+//!
+//! Two frames do not mix, neither in a distance
+//!
+//! ```compile_fail,E0308
+//! use areograph::frames::{MarsIau1991, MarsIau2000, Position};
+//! use nalgebra::Vector3;
+//!
+//! let old: Position<MarsIau1991> = Position::new(Vector3::zeros());
+//! let new: Position<MarsIau2000> = Position::new(Vector3::zeros());
+//! old.distance_m(&new);
+//! ```
+//!
+//! nor in a product of rotations:
+//!
+//! ```compile_fail,E0277
+//! use areograph::{
+//!     frames::{MarsIau1991, MarsIau2000},
+//!     geom::mars_rotation::mars_rotation,
+//!     time::Et,
+//! };
+//!
+//! let et = Et::from_seconds(0.0);
+//! let old_to_new = mars_rotation::<MarsIau2000>(et) * mars_rotation::<MarsIau1991>(et);
+//! ```
 
 use std::{fmt, marker::PhantomData, ops::Mul};
 
@@ -22,7 +66,7 @@ pub trait Frame: Copy + fmt::Debug + Send + Sync + 'static {
 /// A frame fixed to the body of Mars by one IAU report.
 pub trait MarsFixed: Frame {
     /// Rotation and shape of that report.
-    const MODEL: MarsModel;
+    fn model() -> &'static MarsModel;
 }
 
 macro_rules! frames {
@@ -31,7 +75,7 @@ macro_rules! frames {
         #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
         pub struct $frame;
         impl Frame for $frame { const NAME: &'static str = $name; }
-        $(impl MarsFixed for $frame { const MODEL: MarsModel = $model; })?
+        $(impl MarsFixed for $frame { fn model() -> &'static MarsModel { &$model } })?
     )*};
 }
 
@@ -65,11 +109,11 @@ pub enum MarsDatum {
 impl MarsDatum {
     /// Rotation and shape of the report.
     #[must_use]
-    pub const fn model(self) -> MarsModel {
+    pub fn model(self) -> &'static MarsModel {
         match self {
-            Self::Iau1991 => MARS_IAU1991,
-            Self::Iau1994 => MARS_IAU1994,
-            Self::Iau2000 => MARS_IAU2000,
+            Self::Iau1991 => &MARS_IAU1991,
+            Self::Iau1994 => &MARS_IAU1994,
+            Self::Iau2000 => &MARS_IAU2000,
         }
     }
 }

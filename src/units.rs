@@ -2,6 +2,17 @@
 //!
 //! Inside areograph lengths are metres, angles radians and times seconds. Parsers multiply by these
 //! constants and writers divide by them; nothing else does.
+//!
+//! ```
+//! use areograph::units::{METRES_PER_KM, RADIANS_PER_DEGREE, wrap_two_pi};
+//!
+//! // A label says 178.2° W; inside, longitudes are radians east.
+//! let longitude_rad = wrap_two_pi(-178.2 * RADIANS_PER_DEGREE);
+//! assert!((longitude_rad / RADIANS_PER_DEGREE - 181.8).abs() < 1e-12); // rounding, degrees
+//!
+//! let altitude_m = 378.5 * METRES_PER_KM;
+//! assert!((altitude_m - 378_500.0).abs() < 1e-9); // rounding, metres
+//! ```
 
 /// Metres in a kilometre.
 pub const METRES_PER_KM: f64 = 1_000.0;

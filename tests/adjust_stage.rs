@@ -209,9 +209,9 @@ fn the_stage_gives_what_the_geometry_gives() {
 #[test]
 fn footprints_in_images_weigh_as_the_mode_says() {
     let site = Site::of(Recipe::GUSEV);
-    let with = |mola_image| {
+    let with = |footprint_image_coordinates| {
         site.adjust(&AdjustmentConfig {
-            mola_image,
+            footprint_image_coordinates,
             ..every_tie()
         })
         .unwrap()

@@ -1,5 +1,5 @@
-//! Shipped configurations are accepted, documented defaults are the defaults, and schema, example
-//! and loader know the same keys.
+//! Shipped configurations are accepted, documented defaults are the defaults, and schema and example are
+//! those of the declared keys.
 
 #![allow(
     clippy::disallowed_methods,
@@ -14,10 +14,11 @@ use std::{
 };
 
 use areograph::{
-    config::{self, Loaded, SiteConfig},
+    config::{self, Loaded, SiteConfig, ValueKind},
     geom::window::WindowShape,
 };
 use serde_json::Value;
+use snapbox::{Assert, Data, IntoData, assert::DEFAULT_ACTION_ENV};
 
 const OUTLINE: &str =
     r#"{"type": "Polygon", "coordinates": [[[0, 0], [10, 0], [10, 10], [0, 10], [0, 0]]]}"#;
@@ -236,63 +237,118 @@ fn the_schema_takes_the_example_and_refuses_what_the_loader_refuses() {
     }
 }
 
-/// The keys of each table, by the path of the table, as the schema has them.
-fn schema_tables(schema: &Value, path: &str, found: &mut Vec<(String, BTreeSet<String>)>) {
-    let table = schema.get("items").unwrap_or(schema);
-    let Some(properties) = table.get("properties").and_then(Value::as_object) else {
-        return;
-    };
-    found.push((path.to_owned(), properties.keys().cloned().collect()));
-    for (key, value) in properties {
-        schema_tables(value, &format!("{path}.{key}"), found);
+/// What is made from the declarations of the keys; `SNAPSHOTS=overwrite cargo test --test config_valid` writes
+/// both files anew.
+#[test]
+fn example_and_schema_are_made_from_the_declarations() {
+    let schema = serde_json::to_string_pretty(&config::schema()).unwrap() + "\n";
+    for (path, made) in [
+        ("config/sites/example.toml", config::example()),
+        ("config/schema/site.schema.json", schema),
+    ] {
+        let committed = Data::read_from(&below_package(path), None).raw();
+        Assert::new()
+            .action_env(DEFAULT_ACTION_ENV)
+            .eq(made.into_data(), committed);
+    }
+}
+
+/// Whether a default is a value that its key takes.
+fn takes(kind: &ValueKind, value: &toml::Value) -> bool {
+    match (kind, value) {
+        (ValueKind::Text { empty }, toml::Value::String(text)) => *empty || !text.is_empty(),
+        (ValueKind::Form { .. }, toml::Value::String(_)) => true,
+        (ValueKind::Number(accept), toml::Value::Float(number)) => accept.takes(*number),
+        (ValueKind::Whole { low, high }, toml::Value::Integer(number)) => {
+            (low..=high).contains(&number)
+        }
+        (ValueKind::Word(words), toml::Value::String(text)) => {
+            words.iter().any(|word| word.word == text)
+        }
+        (
+            ValueKind::List {
+                of, count, empty, ..
+            },
+            toml::Value::Array(entries),
+        ) => {
+            count.is_none_or(|count| count == entries.len())
+                && (*empty || !entries.is_empty())
+                && entries.iter().all(|entry| takes(of, entry))
+        }
+        _ => false,
     }
 }
 
 #[test]
-fn schema_example_and_loader_know_the_same_keys_and_defaults() {
-    let mut tables = Vec::new();
-    schema_tables(&schema(), "", &mut tables);
-    assert_eq!(tables.len(), 16);
-    let example = example_text();
-    for (path, keys) in tables {
-        // The loader answers an unknown key with all that it knows.
-        let table = path.trim_start_matches('.');
-        let header = match table {
-            "" => String::new(),
-            "windows" | "images" | "kernels.sets" | "adjustment.images" => format!("[[{table}]]\n"),
-            _ => format!("[{table}]\n"),
-        };
-        let answer = config::parse(&format!("{header}zzzzzzzz = 1\n"), Path::new("x.toml"))
-            .unwrap_err()
-            .to_string();
-        let (_, known) = answer.split_once("expected one of ").unwrap();
-        let known: BTreeSet<String> = known.split(", ").map(str::to_owned).collect();
-        assert_eq!(known, keys, "{path}");
-        for key in keys {
-            let written = ["", "# ", "["].iter().any(|before| {
-                example.lines().any(|line| {
-                    line.strip_prefix(before)
-                        .is_some_and(|rest| rest.trim_start_matches('[').starts_with(&key))
-                })
-            });
-            assert!(
-                written || table == "pedr" && key == "filter",
-                "{path}.{key} is not in the example"
-            );
+fn declarations_are_complete() {
+    let keys = config::keys();
+    let paths: BTreeSet<&str> = keys.iter().map(|key| &*key.path).collect();
+    assert_eq!(paths.len(), keys.len(), "a key is declared twice");
+    assert!(keys.len() > 70, "{} keys", keys.len());
+    // Shares, ratios and normalised residuals.
+    let without_unit = [
+        "range_check.outlier_sigma",
+        "range_check.outlier_share_max",
+        "adjustment.robust_limit",
+        "adjustment.blunder_limit",
+    ];
+    for key in &keys {
+        let path = &*key.path;
+        assert!(!key.about.is_empty(), "{path} has no documentation");
+        assert!(
+            key.default.is_some() || !key.examples.is_empty(),
+            "{path} is not in the example"
+        );
+        if let Some(default) = &key.default {
+            assert!(takes(&key.kind, default), "{path}: {default}");
+        }
+        if matches!(key.kind, ValueKind::Number(_)) {
+            let has_unit = key.unit.is_some();
+            assert_ne!(has_unit, without_unit.contains(&path), "{path}");
+        }
+        if let Some(was) = key.was {
+            let table = path.rsplit_once('.').map_or("", |(table, _)| table);
+            assert!(!paths.contains(&*format!("{table}.{was}")), "{path}");
         }
     }
-    let schema = schema();
-    let example = as_json(&example);
-    let properties = schema["properties"].as_object().unwrap();
-    for (table, key) in properties.keys().flat_map(|table| {
-        let keys = properties[table]["properties"].as_object();
-        keys.into_iter()
-            .flat_map(move |keys| keys.keys().map(move |key| (table, key)))
-    }) {
-        let default = &properties[table]["properties"][key]["default"];
-        let written = &example[table][key];
-        if !default.is_null() && !written.is_null() {
-            assert_eq!(default, written, "{table}.{key}");
-        }
-    }
+}
+
+#[test]
+fn former_names_are_understood() {
+    let folder = folder();
+    let text = |lines: &str| {
+        format!(
+            "site = 's'\nkernels.metakernel = '../kernels/scene.tm'\n\
+             images = [{{ id = 'i', label = '../labels/e0202855.lbl' }}]\n\
+             pedr.files = ['../pedr/*.b']\n\
+             windows = [{{ id = 'w', longitude_deg = [0, 1], latitude_deg = [0, 1] }}]\n\
+             [adjustment]\n{lines}"
+        )
+    };
+    let now = parse_in(
+        &folder,
+        &text(
+            "footprint_image_coordinates = 'off'\nfootprint_sigma_px = [70, 5]\nfootprint_margin_px = 100\n\
+             position_sigma_nadir_m = 50\nposition_sigma_off_nadir_m = inf\n",
+        ),
+    );
+    assert_eq!(now.warnings, Vec::<String>::new());
+    let before = parse_in(
+        &folder,
+        &text(
+            "mola_image = 'off'\nmola_sigma_px = [70, 5]\nmola_margin_px = 100\n\
+             nadir_sigma_m = 50\noff_nadir_sigma_m = inf\n",
+        ),
+    );
+    // Also what the manifest keeps: nothing is computed anew because of a name.
+    assert_eq!(before.site, now.site);
+    let prefix = format!("{}/sites/", folder.path().display());
+    assert_eq!(
+        before.warnings.join("\n").replace(&prefix, ""),
+        "site.toml:7:1: adjustment.mola_image is now called adjustment.footprint_image_coordinates\n\
+         site.toml:8:1: adjustment.mola_sigma_px is now called adjustment.footprint_sigma_px\n\
+         site.toml:9:1: adjustment.mola_margin_px is now called adjustment.footprint_margin_px\n\
+         site.toml:10:1: adjustment.nadir_sigma_m is now called adjustment.position_sigma_nadir_m\n\
+         site.toml:11:1: adjustment.off_nadir_sigma_m is now called adjustment.position_sigma_off_nadir_m"
+    );
 }

@@ -64,7 +64,7 @@ fn each_mars_model_is_the_one_its_name_says() {
         let session = Session::open(&KernelSet::from_files(&[example(name)]).unwrap()).unwrap();
         for seconds in [-7.0e7, 0.0, 3.9e7] {
             let et = Et::from_seconds(seconds);
-            let off = session.mars_matrix(et).unwrap() - mars_matrix(&datum.model(), et);
+            let off = session.mars_matrix(et).unwrap() - mars_matrix(datum.model(), et);
             assert!(off.abs().max() < 1e-12, "{name}"); // rounding of the meridian angle
         }
     }

@@ -63,8 +63,7 @@ fn real_with_summing(test: &str, summing: u32) -> Option<Real> {
     };
     let kernels = KernelsConfig {
         source: KernelSource::Listed(KernelList::Files(files)),
-        ck_tolerance_s: 0.0,
-        padding_s: 1.0,
+        ..KernelsConfig::default()
     };
     let pointing = PointingConfig {
         ck_bias: usual_instrument().pointing_bias(),

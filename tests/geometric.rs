@@ -317,7 +317,7 @@ fn ties_that_are_none_make_the_site_invalid() {
 #[test]
 fn what_nothing_tells_apart_is_named() {
     let case = Case::pair();
-    let free = "nadir_sigma_m = inf\noff_nadir_sigma_m = inf\nmola_image = \"off\"\ntie_sigma_px";
+    let free = "position_sigma_nadir_m = inf\nposition_sigma_off_nadir_m = inf\nfootprint_image_coordinates = \"off\"\ntie_sigma_px";
     case.replace("site.toml", "tie_sigma_px", free);
     let outcome = case.outcome(case.run());
     let singular = "error: isidis/adjust: the network is singular: nothing tells apart the ";

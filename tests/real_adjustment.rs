@@ -81,11 +81,11 @@ fn priors_of_the_paper() -> Priors {
 
 /// As in ISIS: 1.4 px for ties, 30 px for the places of footprints, and the 10 m of `lidarData.json` for ranges and
 /// coordinates.
-fn options(mola_image: FootprintImageCoordinates) -> AdjustmentConfig {
+fn options(footprint_image_coordinates: FootprintImageCoordinates) -> AdjustmentConfig {
     AdjustmentConfig {
         tie_sigma_px: [1.4; 2],
-        mola_image,
-        mola_sigma_px: [30.0; 2],
+        footprint_image_coordinates,
+        footprint_sigma_px: [30.0; 2],
         ground_sigma_m: 10.0,
         range_sigma_m: 10.0,
         blunder_limit: None,

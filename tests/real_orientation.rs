@@ -54,8 +54,7 @@ fn m0402852(test: &str) -> Option<(ImageTimes, Orientation, Value)> {
     let times = tag_times(&[image], &session).unwrap().remove(0);
     let kernels = KernelsConfig {
         source: KernelSource::Listed(KernelList::Files(files)),
-        ck_tolerance_s: 0.0,
-        padding_s: 1.0,
+        ..KernelsConfig::default()
     };
     let pointing = PointingConfig {
         ck_bias: usual_instrument().pointing_bias(),

@@ -190,13 +190,13 @@ fn apparent_positions_and_the_sun_are_those_of_the_support_data() {
 #[test]
 fn closed_rotation_of_mars_equals_the_kernels() {
     let cases: [(&str, MarsModel); 7] = [
-        ("derived/mars_iau1991_w176868.tpc", MARS_IAU1991),
-        ("derived/mars_iau1994_pck00006.tpc", MARS_IAU1994),
-        ("mgs_text/mars_iau2000_v0.tpc", MARS_IAU2000),
-        ("mgs_text/pck00008.tpc", MARS_IAU2000),
-        ("mgs_text/pck00009.tpc", MARS_IAU2000),
-        ("mgs_text/pck00010.tpc", MARS_IAU2000),
-        ("ale_mgs/m0402852/pck00009.tpc", MARS_IAU2000),
+        ("derived/mars_iau1991_w176868.tpc", *MARS_IAU1991),
+        ("derived/mars_iau1994_pck00006.tpc", *MARS_IAU1994),
+        ("mgs_text/mars_iau2000_v0.tpc", *MARS_IAU2000),
+        ("mgs_text/pck00008.tpc", *MARS_IAU2000),
+        ("mgs_text/pck00009.tpc", *MARS_IAU2000),
+        ("mgs_text/pck00010.tpc", *MARS_IAU2000),
+        ("ale_mgs/m0402852/pck00009.tpc", *MARS_IAU2000),
     ];
     for (file, model) in cases {
         let Some(path) = real_data(file, "rotation of Mars") else {
@@ -254,8 +254,8 @@ fn areographic_latitudes_are_met() {
     };
     for case in rows(&json(&path)["areographic_to_areocentric"]) {
         let model = match case["ellipsoid"].as_str().unwrap() {
-            "iau1991" => MARS_IAU1991,
-            _ => MARS_IAU2000,
+            "iau1991" => *MARS_IAU1991,
+            _ => *MARS_IAU2000,
         };
         let graphic = AreographicLatitude(number(&case["lat_graphic"]) * RADIANS_PER_DEGREE);
         let expected_rad = number(&case["lat_centric"]) * RADIANS_PER_DEGREE;

@@ -1,7 +1,9 @@
 //! The command line: one file per command, no geometry.
 
 mod check;
+mod completions;
 mod kernels;
+mod manual;
 mod output;
 mod pedr;
 mod plan;
@@ -52,6 +54,11 @@ enum Command {
     Report(report::Arguments),
     /// Write a synthetic mission with known truth.
     Scene(scene::Arguments),
+    /// Print shell completions.
+    Completions(completions::Arguments),
+    /// Write the manual pages.
+    #[command(hide = true)]
+    Manual(manual::Arguments),
 }
 
 /// Parses the command line, runs the command, reports failures on standard error.
@@ -77,6 +84,11 @@ pub fn main() -> ExitCode {
         Command::Pedr(arguments) => finish(pedr::run(&arguments)),
         Command::Report(arguments) => report::run(&arguments),
         Command::Scene(arguments) => finish(scene::run(&arguments)),
+        Command::Completions(arguments) => {
+            completions::run(&arguments);
+            ExitCode::SUCCESS
+        }
+        Command::Manual(arguments) => finish(manual::run(&arguments)),
     }
 }
 

@@ -7,6 +7,11 @@ pub(super) fn line(text: impl Display) {
     let _ = writeln!(std::io::stdout().lock(), "{text}");
 }
 
+/// Prints text as it is.
+pub(super) fn text(text: &[u8]) {
+    let _ = std::io::stdout().lock().write_all(text);
+}
+
 /// Prints a failure.
 pub(super) fn error(failure: impl Display) {
     let _ = writeln!(std::io::stderr().lock(), "error: {failure}");

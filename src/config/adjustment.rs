@@ -1,99 +1,122 @@
-//! Tie points, their intersection and the combined adjustment.
-
-use std::path::PathBuf;
-
-use serde::Serialize;
+//! `[adjustment]`.
 
 use crate::{
     footprints::FootprintImageCoordinates,
-    geom::{intersection::Weighting, robust::RobustWeight, statistics::BAARDA_LIMIT},
+    geom::{robust::RobustWeight, statistics::BAARDA_LIMIT},
+    units::{RADIANS_PER_ARCSECOND, SECONDS_PER_MS},
 };
 
-/// Tie points between the images.
-#[derive(Debug, Clone, Default, PartialEq, Serialize)]
-pub struct TiesConfig {
-    /// The files, globs resolved, sorted, without repeats; none when there are no tie points.
-    pub files: Vec<PathBuf>,
+use super::{
+    declare::{Declare as _, Keys, Many, declare_table, group, key, tables},
+    forms::{Number, Several, above_to, from_to, identifier, several, words, words_of, zero_or},
+};
+
+/// Standard deviations of observations: none is better than a micrometre or a millionth of a pixel, and smaller
+/// ones would drown all others in rounding.
+pub(super) const SIGMA: Number = from_to(1e-6, 1e6);
+/// Standard deviations of unknowns that 0 takes out.
+const SIGMA_OR_NONE: Number = zero_or(1e-6, 1e6);
+/// Standard deviations of orientation unknowns: 0 holds fixed, infinity leaves free.
+const SIGMA_OR_FREE: Number = zero_or(1e-6, f64::INFINITY);
+/// Standard deviations along and across the track.
+const SIGMAS: Several<Number, 2> = several(SIGMA, "2 numbers");
+/// Standard deviations of three quantities, each with three powers of time.
+const SIGMAS_OF_POWERS: Several<Number, 9> = several(SIGMA_OR_FREE, "9 numbers");
+
+declare_table! {
+    /// Combined adjustment of images, footprints, ranges and tie points (Yoon & Shan 2004). Standard deviations
+    /// are those of the paper where it gives one.
+    pub struct AdjustmentConfig {
+        /// Standard deviations of tie points, along and across the track, in the focal plane (the paper).
+        tie_sigma_px: [f64; 2] = key(SIGMAS).or([1.0, 1.0]),
+        /// What image coordinates of footprints are. They come from the orientation that is being adjusted and
+        /// are no measurements of their own; the paper has them all the same. Weighted, hundreds of them hold
+        /// the images where they were against a handful of tie points: with fewer than about ten, choose "off".
+        footprint_image_coordinates: FootprintImageCoordinates = key(words_of(
+            FootprintImageCoordinates::WORDS,
+            [
+                "observations",
+                "nothing",
+                "projections with the adjusted orientation, without weight, freedom or covariance",
+            ],
+        )).or(FootprintImageCoordinates::Weighted).was("mola_image"),
+        /// Their standard deviations, along and across the track, in the focal plane: one MOLA spacing (325 m
+        /// at 4.4 m a pixel), and 4; the paper gives none.
+        footprint_sigma_px: [f64; 2] = key(SIGMAS).or([74.0, 4.0]).was("mola_sigma_px"),
+        /// How far outside an image a footprint still counts as seen by it.
+        footprint_margin_px: f64 = key(from_to(0.0, 1e4)).or(200.0).was("mola_margin_px"),
+        /// Standard deviation of footprint coordinates (the paper).
+        ground_sigma_m: f64 = key(SIGMA).or(10.0),
+        /// Standard deviation of ranges (the paper; the instrument: 7 m at 400 km).
+        range_sigma_m: f64 = key(SIGMA).or(10.0),
+        /// Range bias of each profile as an unknown with this standard deviation; 0 for no such unknown. Biases
+        /// up to 25 m occur off nadir (Table 3 of Shan et al. 2005): 30 lets them go.
+        range_bias_sigma_m: f64 = key(SIGMA_OR_NONE).or(0.0),
+        /// Time bias of each image as an unknown with this standard deviation; 0 for no such unknown.
+        time_bias_sigma_s as "time_bias_sigma_ms": f64 =
+            key(SIGMA_OR_NONE).or(0.0).map(|milliseconds| milliseconds * SECONDS_PER_MS),
+        /// Standard deviation of the position unknowns of images that look to nadir (within 5 degrees); inf
+        /// leaves free, 0 holds fixed. Rotations get what moves the ground as far (the paper).
+        position_sigma_nadir_m: f64 = key(SIGMA_OR_FREE).or(100.0).was("nadir_sigma_m"),
+        /// The same for all other images (the paper).
+        position_sigma_off_nadir_m: f64 = key(SIGMA_OR_FREE).or(200.0).was("off_nadir_sigma_m"),
+        /// Weights of image coordinates that fall with their residual.
+        robust: Option<RobustWeight> = group::<RobustKeys>().map(RobustKeys::weight),
+        /// Standardised residual above which a tie point is a blunder and left out; 0 keeps all. Beyond the
+        /// default is one good observation in a thousand.
+        blunder_limit: Option<f64> = key(from_to(0.0, 1000.0))
+            .or(BAARDA_LIMIT)
+            .map(|limit| (limit > 0.0).then_some(limit)),
+        /// Images whose unknowns have their own standard deviations.
+        images: Vec<OrientationPrior> = tables(Many::ANY),
+    }
 }
 
-/// How tie points are intersected.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct IntersectionConfig {
-    /// Weights of the measurements.
-    pub weighting: Weighting,
-    /// Smallest angle between the two rays of a point that differ most, radians.
-    pub convergence_min_rad: f64,
+declare_table! {
+    /// Robust estimation.
+    struct RobustKeys {
+        /// Weights of image coordinates that fall with their residual.
+        robust: Option<RobustWeight> = key(words([
+            ("none", None, ""),
+            ("huber", Some(RobustWeight::Huber { limit: RobustWeight::HUBER_LIMIT }), ""),
+            ("cauchy", Some(RobustWeight::Cauchy { limit: RobustWeight::CAUCHY_LIMIT }), ""),
+        ])).or(None),
+        /// Normalised residual from which (huber, default 1.345) or at which half (cauchy, default 2.385) the
+        /// weight falls.
+        robust_limit: Option<f64> = key(above_to(0.0, 1000.0)).unused("1.345"),
+    }
+    check limit_is_used
 }
 
-impl Default for IntersectionConfig {
-    fn default() -> Self {
-        Self {
-            weighting: Weighting::Focal { sigma_px: 1.0 },
-            convergence_min_rad: 0.5_f64.to_radians(),
+fn limit_is_used(written: &RobustKeys, keys: &mut Keys<'_, '_>) {
+    if written.robust.is_none() {
+        keys.unused("robust_limit", "adjustment.robust is \"none\"");
+    }
+}
+
+impl RobustKeys {
+    fn weight(self) -> Option<RobustWeight> {
+        match (self.robust?, self.robust_limit) {
+            (usual, None) => Some(usual),
+            (RobustWeight::Huber { .. }, Some(limit)) => Some(RobustWeight::Huber { limit }),
+            (RobustWeight::Cauchy { .. }, Some(limit)) => Some(RobustWeight::Cauchy { limit }),
         }
     }
 }
 
-/// Standard deviations and options of the combined adjustment.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct AdjustmentConfig {
-    /// Tie points, along and across the track, focal pixels.
-    pub tie_sigma_px: [f64; 2],
-    /// What image coordinates of footprints are.
-    pub mola_image: FootprintImageCoordinates,
-    /// Their standard deviations, along and across the track, focal pixels.
-    pub mola_sigma_px: [f64; 2],
-    /// How far outside an image a footprint still counts as seen by it, pixels.
-    pub mola_margin_px: f64,
-    /// Footprint coordinates, metres.
-    pub ground_sigma_m: f64,
-    /// Ranges, metres.
-    pub range_sigma_m: f64,
-    /// Range bias of each profile, metres; 0 for no such unknown.
-    pub range_bias_sigma_m: f64,
-    /// Time bias of each image, seconds; 0 for no such unknown.
-    pub time_bias_sigma_s: f64,
-    /// Position unknowns of images that look to nadir, metres; angles get the same at the ground.
-    pub nadir_sigma_m: f64,
-    /// Position unknowns of images that look elsewhere, metres; angles get the same at the ground.
-    pub off_nadir_sigma_m: f64,
-    /// Weights of image coordinates that fall with their residual.
-    pub robust: Option<RobustWeight>,
-    /// Standardised residual above which a tie point is a blunder and left out; `None` keeps all.
-    pub blunder_limit: Option<f64>,
-    /// Images whose unknowns have their own standard deviations.
-    pub images: Vec<OrientationPrior>,
-}
-
-impl Default for AdjustmentConfig {
-    /// The standard deviations of Yoon & Shan 2004, one MOLA spacing for footprints in images, and Baarda's
-    /// test with one good observation in a thousand beyond it.
-    fn default() -> Self {
-        Self {
-            tie_sigma_px: [1.0, 1.0],
-            mola_image: FootprintImageCoordinates::Weighted,
-            mola_sigma_px: [74.0, 4.0],
-            mola_margin_px: 200.0,
-            ground_sigma_m: 10.0,
-            range_sigma_m: 10.0,
-            range_bias_sigma_m: 0.0,
-            time_bias_sigma_s: 0.0,
-            nadir_sigma_m: 100.0,
-            off_nadir_sigma_m: 200.0,
-            robust: None,
-            blunder_limit: Some(BAARDA_LIMIT),
-            images: Vec::new(),
-        }
+declare_table! {
+    /// Images whose unknowns have their own standard deviations; of each image X, Y, Z, or rotations about the
+    /// camera's x, y, z, each with the powers 0, 1, 2 of t, which is 0 in the middle of the image and 1 at its
+    /// end.
+    pub struct OrientationPrior {
+        /// Identifier of the image.
+        id: String = key(identifier()).required().unused(r#""E02-02855""#),
+        /// X, Y, Z; inf leaves free, 0 holds fixed.
+        position_m: Option<[f64; 9]> = key(SIGMAS_OF_POWERS)
+            .unused("[100.0, 100.0, 100.0, 100.0, 100.0, 100.0, 100.0, 100.0, 100.0]"),
+        /// Rotations, likewise.
+        rotation_rad as "rotation_arcsec": Option<[f64; 9]> = key(SIGMAS_OF_POWERS)
+            .unused("[54.0, 54.0, 54.0, 54.0, 54.0, 54.0, 54.0, 54.0, 54.0]")
+            .map(|sigmas| sigmas.map(|sigmas| sigmas.map(|sigma| sigma * RADIANS_PER_ARCSECOND))),
     }
-}
-
-/// Standard deviations of one image's orientation unknowns.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct OrientationPrior {
-    /// Identifier of the image.
-    pub id: String,
-    /// X, Y, Z, each with the powers 0, 1, 2 of `t`, metres; infinite leaves free, 0 holds fixed.
-    pub position_m: Option<[f64; 9]>,
-    /// Rotations about the camera's axes, likewise, radians.
-    pub rotation_rad: Option<[f64; 9]>,
 }

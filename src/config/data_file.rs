@@ -8,8 +8,8 @@ use toml::{
 };
 
 use super::{
+    declare::suggestion,
     problems::{Problems, Review},
-    shape::suggestion,
 };
 
 /// One table of a file; keys that nobody takes are problems when it is closed.

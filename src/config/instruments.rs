@@ -2,10 +2,11 @@
 
 use std::{path::Path, sync::LazyLock};
 
-use toml::Spanned;
+use toml::Value;
 
 use super::{
     data_file::{self, DataTable},
+    declare::{Form, Found, ValueKind},
     problems::{Problems, Review},
 };
 use crate::{
@@ -76,28 +77,43 @@ pub fn built_in_altimeter() -> &'static Altimeter {
     &ALTIMETER
 }
 
-impl Review<'_> {
-    /// The camera that `images.instrument` names: one of the program's, or an instrument file.
-    pub(super) fn instrument(&mut self, written: &Spanned<String>) -> Option<Instrument> {
-        const KEY: &str = "images.instrument";
+/// The camera of an image: one of the program's, or an instrument file.
+pub(super) struct Camera;
+
+impl Form for Camera {
+    type Value = Instrument;
+
+    fn kind(&self) -> ValueKind {
+        ValueKind::Text { empty: false }
+    }
+
+    fn read(&self, found: &Found<'_>, review: &mut Review<'_>) -> Option<Instrument> {
         let known = built_in_instruments();
-        if let Some(found) = known.iter().find(|known| known.id == *written.get_ref()) {
-            return Some(found.clone());
+        let Some(written) = found.value.get_ref().as_str() else {
+            found.refuse(review, self.kind());
+            return None;
+        };
+        if let Some(camera) = known.iter().find(|camera| camera.id == written) {
+            return Some(camera.clone());
         }
-        let path = self.resolve(written.get_ref());
+        let path = review.resolve(written);
         if !path.is_file() {
-            let ids: Vec<&str> = known.iter().map(|known| known.id.as_str()).collect();
+            let ids: Vec<&str> = known.iter().map(|camera| camera.id.as_str()).collect();
             let expected = format!("{}, or the path of an instrument file", ids.join(", "));
-            self.refuse(written.span(), KEY, expected);
+            found.refuse(review, expected);
             return None;
         }
         let read = super::read(&path).map_err(|failure| failure.fault.to_string());
         let read = read.and_then(|text| instrument(&text, &path).map_err(|all| all.to_string()));
         read.map_err(|problems| {
-            let text = format!("{KEY} names a file with problems:\n{problems}");
-            self.problem(Some(written.span()), text);
+            let text = format!("{} names a file with problems:\n{problems}", found.key);
+            review.problem(Some(found.value.span()), text);
         })
         .ok()
+    }
+
+    fn written(&self, value: &Instrument) -> Value {
+        Value::from(value.id.clone())
     }
 }
 
@@ -108,10 +124,7 @@ impl Review<'_> {
 pub fn instrument(text: &str, file: &Path) -> Result<Instrument, Problems> {
     data_file::read(text, file, |top, review| {
         let instrument = camera(top, review);
-        // Without these numbers, whose absence is told, every line is folded.
-        let optics = &instrument.optics;
-        let told = [optics.focal_length_mm, optics.pixel_pitch_mm].map(|value| value > 0.0);
-        if told == [true; 2]
+        if !review.has_problems()
             && let Err(folded) = Distortion::check(&instrument)
         {
             review.problem(None, format!("distortion: {folded}"));
@@ -178,7 +191,7 @@ fn detector(table: &mut DataTable<'_>, _source: String, review: &mut Review<'_>)
 
 /// The forms of distortion.
 #[derive(Clone, Copy)]
-enum Form {
+enum Model {
     None,
     Radial,
     Angle,
@@ -189,17 +202,17 @@ fn distortion(
     _source: String,
     review: &mut Review<'_>,
 ) -> DistortionModel {
-    let forms = [
-        ("none", Form::None),
-        ("radial_polynomial", Form::Radial),
-        ("angle_polynomial", Form::Angle),
+    let models = [
+        ("none", Model::None),
+        ("radial_polynomial", Model::Radial),
+        ("angle_polynomial", Model::Angle),
     ];
-    match table.word(review, "model", &forms) {
-        None | Some(Form::None) => DistortionModel::None,
-        Some(Form::Radial) => DistortionModel::RadialPolynomial {
+    match table.word(review, "model", &models) {
+        None | Some(Model::None) => DistortionModel::None,
+        Some(Model::Radial) => DistortionModel::RadialPolynomial {
             coefficients: table.numbers(review, "coefficients", COEFFICIENTS_MAX),
         },
-        Some(Form::Angle) => DistortionModel::AnglePolynomial {
+        Some(Model::Angle) => DistortionModel::AnglePolynomial {
             coefficients_rad: table
                 .numbers(review, "coefficients_deg", COEFFICIENTS_MAX)
                 .into_iter()

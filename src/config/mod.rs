@@ -1,30 +1,54 @@
-//! Site configuration: a TOML file, read raw, checked whole, turned into [`SiteConfig`].
+//! Site configuration: a TOML file, checked whole, turned into [`SiteConfig`].
 //!
 //! The file speaks of degrees and milliseconds, the valid form of radians and seconds. All
 //! problems of a file are reported together, each as `file:line:column: key is value; expected …`.
-//! `config/sites/example.toml` documents every key, `config/schema/site.schema.json` is its schema.
+//! Each table has a file here, in which its keys are declared; `config/sites/example.toml`, which
+//! documents every key, and `config/schema/site.schema.json` are made from the declarations.
 
 mod adjustment;
 mod data_file;
+mod declare;
+mod forms;
 mod geojson;
+mod images;
 mod instruments;
+mod kernels;
+mod orientation;
+mod paths;
+mod pedr;
+mod pointing;
 mod problems;
-mod raw;
-mod shape;
+mod range_check;
 mod site;
-mod validate;
+mod ties;
+mod windows;
+mod written;
 
 use std::{collections::BTreeMap, fs::File, io::Read as _, path::Path};
 
-pub use adjustment::*;
+use serde::Serialize;
+use toml::de::DeTable;
+
+pub use adjustment::{AdjustmentConfig, OrientationPrior};
+pub use declare::{Accept, DeclaredKey, ValueKind, Word};
+pub use images::ImageConfig;
 pub use instruments::{
     altimeter, built_in_altimeter, built_in_instruments, instrument, usual_instrument,
 };
+pub use kernels::KernelsConfig;
+pub use orientation::{OrientationConfig, RegistrationConfig};
+pub use pedr::PedrConfig;
+pub use pointing::PointingConfig;
 pub use problems::Problems;
-pub use site::*;
+pub use range_check::{RangeCheckConfig, SCAN_STEPS_MAX};
+pub use site::SiteConfig;
+pub use ties::{IntersectionConfig, TiesConfig};
+pub use windows::WindowConfig;
 
 use crate::error::{Failure, Fault, IoFault, Kind, Place as _};
+use declare::{Keys, Table as _, described};
 use problems::Review;
+use written::Written;
 
 /// Longest configuration file, bytes.
 const BYTES_MAX: u64 = 1 << 20;
@@ -82,10 +106,62 @@ fn read(path: &Path) -> Result<String, Failure> {
 /// [`Problems`] with everything that is wrong.
 pub fn parse(text: &str, file: &Path) -> Result<Loaded, Problems> {
     let mut review = Review::new(file, text);
-    let valid = shape::read(text, &mut review)
-        .map(|(raw, written)| validate::validate(raw, file, written, &mut review));
-    let (site, warnings) = review.finish(valid)?;
+    let site = read_site(text, file, &mut review);
+    let (site, warnings) = review.finish(site)?;
     Ok(Loaded { site, warnings })
+}
+
+/// The site of `text`, to be used only when `review` has found no problem.
+fn read_site(text: &str, file: &Path, review: &mut Review<'_>) -> Option<SiteConfig> {
+    let (document, syntax_errors) = DeTable::parse_recoverable(text);
+    if !syntax_errors.is_empty() {
+        for error in syntax_errors {
+            let text = format!("this is not TOML: {}", error.message());
+            review.problem(error.span(), text);
+        }
+        return None;
+    }
+    let mut keys = Keys::of_file(document.get_ref(), review);
+    let site = SiteConfig::read(&mut keys);
+    keys.finish();
+    match toml::from_str(text) {
+        Ok(table) => {
+            let Written { blake3, keys } = Written::of(table, review.renames());
+            Some(SiteConfig {
+                file: file.to_owned(),
+                blake3,
+                keys,
+                ..site
+            })
+        }
+        // A value that TOML cannot hold, which its key has refused already.
+        Err(error) => {
+            if !review.has_problems() {
+                review.problem(error.span(), error.message().to_owned());
+            }
+            None
+        }
+    }
+}
+
+/// Every key that a site file can have, in the order of the example file.
+#[must_use]
+pub fn keys() -> Vec<DeclaredKey> {
+    let mut keys = Vec::new();
+    described::<SiteConfig>().walk(&mut keys);
+    keys
+}
+
+/// The example file, `config/sites/example.toml`.
+#[must_use]
+pub fn example() -> String {
+    declare::example(&described::<SiteConfig>())
+}
+
+/// The JSON Schema of a site file, `config/schema/site.schema.json`.
+#[must_use]
+pub fn schema() -> impl Serialize {
+    declare::schema(&described::<SiteConfig>())
 }
 
 /// Two configurations name the same site, so their products would overwrite each other.

@@ -1,6 +1,7 @@
 //! All problems of one configuration file, each with its place.
 
 use std::{
+    collections::BTreeSet,
     fmt,
     ops::Range,
     path::{Path, PathBuf},
@@ -49,13 +50,24 @@ impl Fault for Problems {
     }
 
     fn advice(&self) -> String {
-        "mend these entries; config/sites/example.toml documents every key with its unit and default"
+        "correct these entries; config/sites/example.toml documents every key with its unit and default"
             .to_owned()
     }
 }
 
 /// Where something stands: a byte range of the text, or the file as a whole.
 type Place = Option<Range<usize>>;
+
+/// A key that stands in the file under its former name.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) struct Rename {
+    /// Its tables, with dots between them.
+    pub(super) table: String,
+    /// Its former name.
+    pub(super) was: &'static str,
+    /// Its name.
+    pub(super) name: &'static str,
+}
 
 /// The text under review, and what has been found in it so far.
 pub(super) struct Review<'a> {
@@ -64,6 +76,7 @@ pub(super) struct Review<'a> {
     problems: Vec<(Place, String)>,
     unlisted: usize,
     warnings: Vec<(Place, String)>,
+    renames: BTreeSet<Rename>,
 }
 
 impl<'a> Review<'a> {
@@ -74,6 +87,7 @@ impl<'a> Review<'a> {
             problems: Vec::new(),
             unlisted: 0,
             warnings: Vec::new(),
+            renames: BTreeSet::new(),
         }
     }
 
@@ -109,6 +123,26 @@ impl<'a> Review<'a> {
         if self.warnings.len() < LISTED_MAX {
             self.warnings.push((Some(span), text));
         }
+    }
+
+    /// The key at `span` stands under its former name.
+    pub(super) fn renamed(&mut self, span: Range<usize>, rename: Rename) {
+        let Rename { table, was, name } = &rename;
+        let dot = if table.is_empty() { "" } else { "." };
+        self.warn(
+            span,
+            format!("{table}{dot}{was} is now called {table}{dot}{name}"),
+        );
+        self.renames.insert(rename);
+    }
+
+    pub(super) const fn has_problems(&self) -> bool {
+        !self.problems.is_empty()
+    }
+
+    /// Keys that stand under former names.
+    pub(super) const fn renames(&self) -> &BTreeSet<Rename> {
+        &self.renames
     }
 
     /// The value and the warnings, or the problems when there are any.

@@ -1,163 +1,163 @@
-//! The valid configuration of one site: every value checked, metres, radians and seconds inside.
+//! The configuration of one site: its tables, and what must hold between them.
 
-use std::{collections::BTreeMap, path::PathBuf};
-
-use serde::Serialize;
-
-use super::adjustment::{AdjustmentConfig, IntersectionConfig, TiesConfig};
-use crate::{
-    altimetry::{DatumChoice, MolaClock, ShotFilter},
-    geom::{pushbroom::CameraModel, window::WindowShape},
-    image::ImageFields,
-    instruments::Instrument,
-    kernel_source::KernelSource,
-    time::PointingBias,
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    path::PathBuf,
 };
 
-/// Everything that `areograph run` needs to know about a site.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct SiteConfig {
-    /// Identifier: lower-case letters, digits, `_` and `-`; also the folder of its products.
-    pub site: String,
-    /// Free text for the report.
-    pub description: String,
-    /// The file it was read from.
-    pub file: PathBuf,
-    /// BLAKE3, hexadecimal, of the keys and values as written: comments, spacing, order of keys
-    /// and the place of the file do not change it.
-    pub blake3: String,
-    /// The same keys and values one by one: dots between tables, elements of lists by their `id`, else
-    /// their place from 1.
-    pub keys: BTreeMap<String, String>,
-    /// Where kernels come from.
-    pub kernels: KernelsConfig,
-    /// Pointing (CK) bias.
-    pub pointing: PointingConfig,
-    /// MOLA clock bias.
-    pub mola_clock: MolaClock,
-    /// PEDR files and filters; no files when only images are oriented.
-    pub pedr: PedrConfig,
-    /// Windows on the ground, 1 to 64, or none when there are no PEDR files; bit `i` of `Footprints::windows` is entry `i`.
-    pub windows: Vec<WindowConfig>,
-    /// Images, possibly none.
-    pub images: Vec<ImageConfig>,
-    /// Limits of the range check.
-    pub range_check: RangeCheckConfig,
-    /// Sampling of exterior orientation.
-    pub orientation: OrientationConfig,
-    /// Projection of footprints into the images.
-    pub registration: RegistrationConfig,
-    /// Tie points between the images.
-    pub ties: TiesConfig,
-    /// Intersection of tie points.
-    pub intersection: IntersectionConfig,
-    /// Combined adjustment.
-    pub adjustment: AdjustmentConfig,
+use serde_json::json;
+
+use crate::altimetry::MolaClock;
+
+use super::{
+    adjustment::AdjustmentConfig,
+    declare::{Keys, declare_table, key, no_repeats, of_the_file, table, tables},
+    forms::{any_text, lower_case_identifier},
+    images::{IMAGES, ImageConfig},
+    kernels::KernelsConfig,
+    orientation::{OrientationConfig, RegistrationConfig},
+    pedr::PedrConfig,
+    pointing::PointingConfig,
+    range_check::RangeCheckConfig,
+    ties::{IntersectionConfig, TiesConfig},
+    windows::{WINDOWS, WINDOWS_MAX, WindowConfig},
+};
+
+declare_table! {
+    /// Everything that `areograph run` needs to know about a site: every value checked, metres, radians and
+    /// seconds inside.
+    pub struct SiteConfig {
+        /// Identifier, and the name of the folder of its products.
+        site: String = key(lower_case_identifier()).required().example(r#""eos_chasma""#),
+        /// Free text for the report.
+        description: String = key(any_text())
+            .or(String::new())
+            .example(r#""Eos Chasma, one of the three study sites of Shan et al. 2005""#),
+        /// The file it was read from.
+        file: PathBuf = of_the_file(),
+        /// BLAKE3, hexadecimal, of the keys and values as written: comments, spacing, order of keys and the
+        /// place of the file do not change it.
+        blake3: String = of_the_file(),
+        /// The same keys and values one by one: dots between tables, elements of lists by their `id`, else
+        /// their place from 1.
+        keys: BTreeMap<String, String> = of_the_file(),
+        /// Where kernels come from.
+        kernels: KernelsConfig = table(),
+        /// Pointing (CK) bias.
+        pointing: PointingConfig = table(),
+        /// MOLA clock bias.
+        mola_clock: MolaClock = table(),
+        /// PEDR files and filters; no files when only images are oriented.
+        pedr: PedrConfig = table(),
+        /// Windows on the ground, 1 to 64, or none when there are no PEDR files; bit `i` of
+        /// `Footprints::windows` is entry `i`.
+        windows: Vec<WindowConfig> = tables(WINDOWS),
+        /// Images, possibly none.
+        images: Vec<ImageConfig> = tables(IMAGES),
+        /// Limits of the range check.
+        range_check: RangeCheckConfig = table(),
+        /// Sampling of exterior orientation.
+        orientation: OrientationConfig = table(),
+        /// Projection of footprints into the images.
+        registration: RegistrationConfig = table(),
+        /// Tie points between the images.
+        ties: TiesConfig = table(),
+        /// Intersection of tie points.
+        intersection: IntersectionConfig = table(),
+        /// Combined adjustment.
+        adjustment: AdjustmentConfig = table(),
+    }
+    check across_tables
 }
 
-/// Where kernels come from, and how coverage is judged.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct KernelsConfig {
-    /// The source of the kernel list.
-    pub source: KernelSource,
-    /// How far from an attitude sample the C-kernel may be asked, seconds; 0 asks only inside its intervals.
-    pub ck_tolerance_s: f64,
-    /// Margin that coverage must have beyond the first and last instant used, seconds.
-    pub padding_s: f64,
+fn across_tables(site: &SiteConfig, keys: &mut Keys<'_, '_>) {
+    keys.rule(|| json!({"required": ["kernels"]}));
+    keys.rule(|| {
+        json!({"anyOf": [
+            {"required": ["pedr", "windows"]},
+            {"required": ["images"], "not": {"required": ["pedr"]}},
+        ]})
+    });
+    something_to_do(site, keys);
+    serial_numbers(keys);
+    pointing_of_instruments(site, keys);
+    if site.images.len() < 2 {
+        keys.refuse("ties", "at least two images that tie points can join");
+    }
+    priors_of_images(site, keys);
 }
 
-/// Pointing bias and where its value comes from.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct PointingConfig {
-    /// The bias; it moves attitude look-ups only.
-    pub ck_bias: PointingBias,
-    /// Citation that products repeat.
-    pub source: String,
-}
-
-/// PEDR files and filters.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct PedrConfig {
-    /// The files, globs resolved, sorted, without repeats.
-    pub files: Vec<PathBuf>,
-    /// Datum of their coordinates.
-    pub datum: DatumChoice,
-    /// Shots to keep.
-    pub filter: ShotFilter,
-}
-
-/// A window on the ground.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct WindowConfig {
-    /// Identifier, unique in the site.
-    pub id: String,
-    /// Its outline in IAU 2000 areocentric latitude and east longitude.
-    pub shape: WindowShape,
-}
-
-/// An image: a label, keys written in the configuration, or both (keys written here win).
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct ImageConfig {
-    /// Identifier, unique in the site; also a folder name.
-    pub id: String,
-    /// PDS3 or ISIS label, attached or detached.
-    pub label: Option<PathBuf>,
-    /// The camera, where the configuration names it: else the label does.
-    pub instrument: Option<Instrument>,
-    /// Its name in tie point files and in what is written for ISIS, when that is not the identifier.
-    pub serial_number: Option<String>,
-    /// Keys written in the configuration.
-    pub fields: ImageFields,
-}
-
-impl ImageConfig {
-    /// The name that tie points give the image.
-    #[must_use]
-    pub fn name_in_ties(&self) -> &str {
-        self.serial_number.as_deref().unwrap_or(&self.id)
+/// Footprints need windows; a site needs footprints or images.
+fn something_to_do(site: &SiteConfig, keys: &mut Keys<'_, '_>) {
+    let windows = keys.span_of("windows");
+    if keys.span_of("pedr").is_some() {
+        if windows.is_none() {
+            keys.missing("windows", &format!("1 to {WINDOWS_MAX} tables [[windows]]"));
+        }
+        return;
+    }
+    if let Some(windows) = windows {
+        let text = "windows are never used: there is no table pedr";
+        keys.review().warn(windows, text.to_owned());
+    }
+    match keys.span_of("images") {
+        Some(images) if !site.images.is_empty() => keys.review().warn(
+            images,
+            "images without a table pedr: orientation only, no footprints and no range check"
+                .to_owned(),
+        ),
+        _ => keys.missing(
+            "pedr",
+            "a table pedr, tables [[images]], or both: a site without either has nothing to do",
+        ),
     }
 }
 
-/// Most steps of the bias scan, so that a slip in its step cannot make a run endless.
-pub const SCAN_STEPS_MAX: u32 = 10_000;
-
-/// Limits and options of the range check.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct RangeCheckConfig {
-    /// Largest |mean| of a valid profile, metres.
-    pub mean_max_m: f64,
-    /// A shot farther from the median than this many robust standard deviations is an outlier.
-    pub outlier_sigma: f64,
-    /// Largest share of outliers in a valid profile, 0 to 1.
-    pub outlier_share_max: f64,
-    /// Fewest shots of a valid profile.
-    pub shots_min: u32,
-    /// Largest |range − distance to the file's own spacecraft position| (mean) of a valid profile, metres.
-    pub decoding_max_m: f64,
-    /// Largest clock bias that the scan tries on either side, seconds.
-    pub scan_half_width_s: f64,
-    /// Step of the scan, seconds.
-    pub scan_step_s: f64,
+/// One pointing bias holds for all images; that of an instrument file may be another.
+fn pointing_of_instruments(site: &SiteConfig, keys: &mut Keys<'_, '_>) {
+    let used_s = site.pointing.ck_bias.seconds();
+    let named = site
+        .images
+        .iter()
+        .filter_map(|image| image.instrument.as_ref());
+    for camera in named {
+        let own_s = camera.pointing.ck_bias_s;
+        if own_s.total_cmp(&used_s).is_ne()
+            && let Some(images) = keys.span_of("images")
+        {
+            let text = format!(
+                "the {own_s} s of {} are never used: pointing.ck_bias_s is {used_s}",
+                camera.name
+            );
+            keys.review().warn(images, text);
+        }
+    }
 }
 
-/// Sampling of exterior orientation.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct OrientationConfig {
-    /// Equal intervals over the image; one epoch more than intervals.
-    pub intervals: u32,
-    /// Largest second-order position RMSE (norm of x, y, z) of a valid sensor model, metres.
-    pub position_rmse_max_m: f64,
-    /// Largest second-order pointing RMSE (each angle) of a valid sensor model, radians.
-    pub pointing_rmse_max_rad: f64,
+/// Names in tie point files are as unique as identifiers; an image without one has its identifier.
+fn serial_numbers(keys: &mut Keys<'_, '_>) {
+    let images = keys.entries(&["images"]);
+    if images
+        .iter()
+        .any(|image| image.contains_key("serial_number"))
+    {
+        let names = images
+            .iter()
+            .filter_map(|image| image.get("serial_number").or_else(|| image.get("id")));
+        no_repeats("images.serial_number", names, keys.review());
+    }
 }
 
-/// Projection of footprints into the images.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct RegistrationConfig {
-    /// The orientation that points are projected with.
-    pub model: CameraModel,
-    /// A step of the published iterations below this is the last, lines.
-    pub tolerance_lines: f64,
-    /// Steps after which the published iterations are given up.
-    pub steps_max: u32,
+/// Standard deviations of their own are for images of the site.
+fn priors_of_images(site: &SiteConfig, keys: &mut Keys<'_, '_>) {
+    let known: BTreeSet<&str> = site.images.iter().map(|image| &*image.id).collect();
+    for prior in keys.entries(&["adjustment", "images"]) {
+        let Some(id) = prior.get("id") else { continue };
+        if id.get_ref().as_str().is_some_and(|id| !known.contains(id)) {
+            let images: Vec<&str> = site.images.iter().map(|image| &*image.id).collect();
+            let expected = format!("one of the site's images: {}", images.join(", "));
+            keys.review()
+                .refuse(id.span(), "adjustment.images.id", expected);
+        }
+    }
 }

@@ -24,7 +24,7 @@ use super::{
     table::{Column, Table, Values},
     text_table,
 };
-use crate::{constants::MARS_IAU2000, error::Result, units::METRES_PER_KM};
+use crate::{error::Result, units::METRES_PER_KM};
 
 /// Decimals of degrees: 1e-9° are 0.06 mm on the ground.
 const DEGREE_DECIMALS: usize = 9;
@@ -40,7 +40,7 @@ const LOLA_LIKE_FORMAT: &str = "2:lon 3:lat 4:radius_km";
 const ODE_FORMAT: &str = "1:lon 2:lat 5:radius_m";
 
 /// The sphere of the CRS, and of `D_MARS` in Ames Stereo Pipeline, metres.
-const SPHERE_RADIUS_M: f64 = MARS_IAU2000.equatorial_radius_m;
+const SPHERE_RADIUS_M: f64 = 3_396_190.0;
 /// `IAU_2015:49900` as text for GIS; [`FRAME`] says whose longitudes the coordinates are.
 const CRS_NAME: &str = "Mars (2015) - Sphere / Ocentric";
 const CRS_WKT: &str = "GEOGCS[\"Mars (2015) - Sphere / Ocentric\",DATUM[\"Mars (2015) - Sphere\",\

@@ -286,7 +286,7 @@ fn ends(et_s: &[f64]) -> (f64, f64) {
 
 /// The keywords that the numbers above come from, under NAIF's names.
 fn naif_keywords(site: &SiteProducts, instrument: &Instrument) -> Value {
-    let mars = MARS_IAU2000;
+    let mars = &MARS_IAU2000;
     let [a_km, c_km] =
         [mars.equatorial_radius_m, mars.polar_radius_m].map(|radius_m| radius_m / METRES_PER_KM);
     let mut keywords = json!({

@@ -186,7 +186,7 @@ impl GeometricProducts<'_> {
         if taken < TIES_FEW {
             remarks.push(format!(
                 "only {taken} tie points took part in the adjustment: image coordinates of footprints, where weighted \
-                 (adjustment.mola_image), hold the images against so few"
+                 (adjustment.footprint_image_coordinates), hold the images against so few"
             ));
         }
         let sigma0 = self.adjusted.summary.sigma0;

@@ -33,7 +33,7 @@ pub(super) fn absolute(site: &SiteProducts, geometric: &GeometricProducts) -> St
     let relative = BeforeAfter::worst(&pairs);
     let relative = relative.map_or_else(String::new, |pair| pair.sentence() + " ");
     let summary = &geometric.adjusted.summary;
-    let witness = match site.config.adjustment.mola_image {
+    let witness = match site.config.adjustment.footprint_image_coordinates {
         FootprintImageCoordinates::Weighted if summary.shots.corrections_m[0].n > 0 => {
             "the image coordinates of footprints were computed from the very orientation that is adjusted and are no \
              measurements of their own; these, by their weight, and the standard deviations that the orientation was \
@@ -101,13 +101,13 @@ impl Controlled {
             (
                 "MOLA image point along the track",
                 "px",
-                options.mola_sigma_px[0],
+                options.footprint_sigma_px[0],
                 views(PointKind::Shot, along),
             ),
             (
                 "MOLA image point across the track",
                 "px",
-                options.mola_sigma_px[1],
+                options.footprint_sigma_px[1],
                 views(PointKind::Shot, across),
             ),
             (

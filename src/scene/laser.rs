@@ -120,7 +120,7 @@ impl Look {
         let mars = mars_matrix(&MARS_IAU2000, et);
         let to_file = match datum {
             MarsDatum::Iau2000 => Matrix3::identity(),
-            older => mars_matrix(&older.model(), et) * mars.transpose(),
+            older => mars_matrix(older.model(), et) * mars.transpose(),
         };
         Ok(Self {
             et,

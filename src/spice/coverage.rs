@@ -36,7 +36,7 @@ impl Coverage {
     /// What `set` holds, which `cspice` has loaded.
     ///
     /// # Errors
-    /// [`SpiceFault::Spice`] when a C-kernel cannot be read; [`SpiceFault::MissingText`] without clock.
+    /// [`super::SpiceFault::Spice`] when a C-kernel cannot be read; [`super::SpiceFault::MissingText`] without clock.
     pub(super) fn of(set: &KernelSet, cspice: &Cspice) -> Result<Self> {
         let mut coverage = Self::default();
         let (mut of_mgs, mut of_mars) = (ByCentre::new(), ByCentre::new());

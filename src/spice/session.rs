@@ -57,6 +57,20 @@ pub struct Attitude {
 ///
 /// A second session on another thread waits for this one to end; on the same thread it is refused.
 /// Kernels are unloaded when the session goes.
+///
+/// ```
+/// use std::path::Path;
+///
+/// use areograph::spice::{KernelSet, Session};
+///
+/// # fn main() -> areograph::error::Result<()> {
+/// let kernels = KernelSet::from_metakernel(Path::new("kernels.example/example.tm"))?;
+/// let session = Session::open(&kernels)?;
+/// let start = session.sclk_to_et("619971158:28")?;
+/// assert_eq!(session.et_to_utc(start)?, "1999-08-24T14:12:13.635");
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Debug)]
 pub struct Session {
     pub(super) cspice: Cspice,

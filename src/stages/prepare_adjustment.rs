@@ -44,9 +44,9 @@ impl<M: ExteriorOrientation> Candidate<'_, M> {
         let pose = self.stereo.orientation.pose(0.0);
         let look = pose.mars_to_camera.row(2).transpose();
         let position_sigma_m = if look.angle(&-pose.position_m) < NADIR_RAD {
-            config.nadir_sigma_m
+            config.position_sigma_nadir_m
         } else {
-            config.off_nadir_sigma_m
+            config.position_sigma_off_nadir_m
         };
         let mut sigmas = orientation_sigmas(position_sigma_m, position_sigma_m / self.range_m());
         if let Some(own) = config.images.iter().find(|own| own.id == self.times.id) {
@@ -98,8 +98,8 @@ pub fn prepare_adjustment<M: ExteriorOrientation>(
     let mut near = BTreeSet::new();
     for candidate in &candidates {
         let points = &candidate.registration.points;
-        let samples =
-            -config.mola_margin_px..=f64::from(candidate.times.samples) + config.mola_margin_px;
+        let samples = -config.footprint_margin_px
+            ..=f64::from(candidate.times.samples) + config.footprint_margin_px;
         let seen = (0..points.len()).filter(|index| {
             !points.extrapolated[*index] && samples.contains(&points.sample[*index])
         });

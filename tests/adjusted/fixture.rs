@@ -49,8 +49,7 @@ impl Image {
     fn new(set: KernelSet, id: &str, label: PathBuf) -> Self {
         let kernels = KernelsConfig {
             source: KernelSource::Listed(KernelList::Files(Vec::new())),
-            ck_tolerance_s: 0.0,
-            padding_s: 1.0,
+            ..KernelsConfig::default()
         };
         let pointing = PointingConfig {
             ck_bias: usual_instrument().pointing_bias(),

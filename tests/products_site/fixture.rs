@@ -5,16 +5,15 @@ use std::{collections::BTreeMap, sync::atomic::AtomicBool};
 use areograph::{
     altimetry::{BiasScope, DatumChoice, MolaClock, ShotFilter, TagSign},
     config::{
-        AdjustmentConfig, IntersectionConfig, KernelsConfig, OrientationConfig, PedrConfig,
-        PointingConfig, RangeCheckConfig, RegistrationConfig, SiteConfig, TiesConfig, WindowConfig,
-        usual_instrument,
+        KernelsConfig, OrientationConfig, PedrConfig, PointingConfig, RangeCheckConfig, SiteConfig,
+        WindowConfig, usual_instrument,
     },
     footprints::{Footprint, Footprints, SourceFile},
     frames::{MarsDatum, MarsIau2000},
     geom::{
         attitude::{OmegaPhiKappa, spice_quaternion},
         ellipsoid::Spherical,
-        pushbroom::{CameraModel, ExteriorOrientation},
+        pushbroom::ExteriorOrientation,
         statistics::{Summary, Trend},
         window::WindowShape,
     },
@@ -206,11 +205,9 @@ fn config() -> SiteConfig {
         description: "One orbit & one image <made by hand>".to_owned(),
         file: "small.toml".into(),
         blake3: "ef".repeat(32),
-        keys: BTreeMap::new(),
         kernels: KernelsConfig {
             source: KernelSource::Listed(KernelList::Files(vec!["naif0012.tls".into()])),
-            ck_tolerance_s: 0.0,
-            padding_s: 1.0,
+            ..KernelsConfig::default()
         },
         pointing: PointingConfig {
             ck_bias: usual_instrument().pointing_bias(),
@@ -241,29 +238,18 @@ fn config() -> SiteConfig {
                 north_rad: 0.0,
             },
         }],
-        images: Vec::new(),
         range_check: RangeCheckConfig {
-            mean_max_m: 10.0,
-            outlier_sigma: 5.0,
-            outlier_share_max: 0.05,
             shots_min: 10,
             decoding_max_m: 1.0,
             scan_half_width_s: 0.3,
             scan_step_s: 0.1,
+            ..RangeCheckConfig::default()
         },
         orientation: OrientationConfig {
-            intervals: 30,
-            position_rmse_max_m: 5.0,
             pointing_rmse_max_rad: 1e-4,
+            ..OrientationConfig::default()
         },
-        registration: RegistrationConfig {
-            model: CameraModel::RotationVector,
-            tolerance_lines: 0.1,
-            steps_max: 100,
-        },
-        ties: TiesConfig::default(),
-        intersection: IntersectionConfig::default(),
-        adjustment: AdjustmentConfig::default(),
+        ..SiteConfig::default()
     }
 }
 

@@ -17,6 +17,70 @@
 //! Their residual along the track is the point's place in the focal plane of the measured line. An error of
 //! the line then counts as the more pixels the faster the image flies over the ground, and the adjustment
 //! learns from many noisy lines to fly slowly: a bias of errors in variables.
+//!
+//! ```
+//! use areograph::geom::{
+//!     bundle::{BundleImage, BundleOptions, BundlePoint, Network, View, solve},
+//!     collinearity::project,
+//!     pushbroom::{EulerPolynomial, Sighting, VectorPolynomial},
+//! };
+//! use nalgebra::{Vector2, Vector3};
+//!
+//! // Two cameras fly north over the equator side by side; the second looks to the first one's ground.
+//! let camera = |east_m, north_m, roll_rad| EulerPolynomial {
+//!     path_m: VectorPolynomial {
+//!         coefficients: [Vector3::new(3_776e3, east_m, north_m), Vector3::new(0.0, 0.0, 4.4), Vector3::zeros()],
+//!     },
+//!     angles_rad: VectorPolynomial {
+//!         coefficients: [
+//!             Vector3::new(roll_rad, std::f64::consts::FRAC_PI_2, 0.0),
+//!             Vector3::zeros(),
+//!             Vector3::zeros(),
+//!         ],
+//!     },
+//! };
+//! // In truth the second flew 20 m further north than its orbit says.
+//! let truth = [camera(0.0, 0.0, 0.0), camera(-150e3, 20.0, 0.39)];
+//! let orbit = [truth[0], camera(-150e3, 0.0, 0.39)];
+//!
+//! let focal_length_px = 3_500.0 / 0.026;
+//! let mut network = Network::default();
+//! for (number, base) in orbit.into_iter().enumerate() {
+//!     // The first image is held fixed; of the second, Z of the position is free.
+//!     let mut sigmas = [0.0; 18];
+//!     if number == 1 {
+//!         sigmas[6] = f64::INFINITY;
+//!     }
+//!     network.images.push(BundleImage {
+//!         base,
+//!         half_lines: 2_000.0,
+//!         line_period_s: 1.4e-3,
+//!         focal_length_px,
+//!         sigmas,
+//!         time_bias_sigma_s: 0.0,
+//!     });
+//! }
+//! for point in 0..5_u32 {
+//!     let ground_m = Vector3::new(3_396e3, 300.0 * f64::from(point), 1_500.0 * (f64::from(point) - 2.0));
+//!     network.points.push(BundlePoint { ground_m, sigma_m: None });
+//!     for (image, camera) in truth.iter().enumerate() {
+//!         let seen = Sighting::near(camera, 0.0, &ground_m, 1e-3)?.solution;
+//!         network.views.push(View {
+//!             point: point as usize,
+//!             image,
+//!             x_lines: seen.x,
+//!             y_px: project(&seen.camera_m, focal_length_px)?.y,
+//!             sigma_px: Vector2::new(1.0, 1.0),
+//!         });
+//!     }
+//! }
+//!
+//! let adjustment = solve(&network, &BundleOptions::default())?;
+//! assert_eq!(adjustment.degrees_of_freedom(), 20 - 16);
+//! let north_m = adjustment.images[1].correction.position_m[0].z;
+//! assert!((north_m - 20.0).abs() < 1e-3); // metres; the observations are free of errors
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 mod check;
 

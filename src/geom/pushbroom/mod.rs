@@ -2,8 +2,28 @@
 //!
 //! The image line is `x`, in lines from the middle of the header image. `M` takes Mars-fixed components
 //! to camera components; the camera looks along +Z. A ground point `P` has the camera vector
-//! `q = M (P − C)`, and is seen by the line where `q1 = 0`, or where
-//! `q1/q3` is that of the distorted detector at `q2/q3`.
+//! `q = M (P − C)`, and is seen by the line where `q1 = 0`, or where `q1/q3` is that of the distorted
+//! detector at `q2/q3`.
+//!
+//! ```
+//! use areograph::geom::pushbroom::{Distortion, EulerPolynomial, ExteriorOrientation, Sighting, VectorPolynomial};
+//! use nalgebra::Vector3;
+//!
+//! // A camera that flies north over the equator, 4.4 m per line, and looks straight down.
+//! let camera = EulerPolynomial {
+//!     path_m: VectorPolynomial {
+//!         coefficients: [Vector3::new(3_776e3, 0.0, 0.0), Vector3::new(0.0, 0.0, 4.4), Vector3::zeros()],
+//!     },
+//!     angles_rad: VectorPolynomial {
+//!         coefficients: [Vector3::new(0.0, std::f64::consts::FRAC_PI_2, 0.0), Vector3::zeros(), Vector3::zeros()],
+//!     },
+//! };
+//! // The point below line 250 is seen by line 250.
+//! let below_m = camera.pose(250.0).position_m - Vector3::new(380e3, 0.0, 0.0);
+//! let seen = Sighting::near(&camera, &Distortion::NONE, 0.0, &below_m, 1e-2)?;
+//! assert!((seen.solution.x - 250.0).abs() < 1e-6); // lines; the last step is below 1e-2
+//! # Ok::<(), areograph::geom::pushbroom::Unseen>(())
+//! ```
 
 mod corrected;
 mod detector;

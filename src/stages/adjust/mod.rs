@@ -166,7 +166,12 @@ pub fn adjust<M: ExteriorOrientation>(
     let dropped: Vec<LeftOut> = dropped.collect();
     assembled.left_out.extend(dropped);
     contradictions(images, &assembled.points, &adjustment)?;
-    let summary = summary::summarise(images, &assembled, &adjustment, config.mola_image)?;
+    let summary = summary::summarise(
+        images,
+        &assembled,
+        &adjustment,
+        config.footprint_image_coordinates,
+    )?;
     Ok(adjusted::collect(images, assembled, adjustment, summary))
 }
 

@@ -51,7 +51,7 @@ pub(super) fn assemble<'a, M: ExteriorOrientation>(
     };
     assembled.add_shots(images, shots, config)?;
     assembled.mola = footprints_in_images(images, shots, config)?;
-    if config.mola_image == FootprintImageCoordinates::Weighted {
+    if config.footprint_image_coordinates == FootprintImageCoordinates::Weighted {
         assembled.network.views.extend(&assembled.mola);
     }
     assembled.add_ties(images, ties, starts, config)?;
@@ -93,7 +93,7 @@ fn footprints_in_images<M: ExteriorOrientation>(
     for (index, image) in images.iter().enumerate() {
         let projector = projector(image, &image.stereo.orientation)?;
         let detector = &image.stereo.detector;
-        let samples = -config.mola_margin_px..=detector.samples + config.mola_margin_px;
+        let samples = -config.footprint_margin_px..=detector.samples + config.footprint_margin_px;
         for (point, shot) in shots.iter().enumerate() {
             // What a camera does not see is not in its image.
             let Ok(seen) = projector.project(&Vector3::from(shot.ground_m)) else {
@@ -110,7 +110,7 @@ fn footprints_in_images<M: ExteriorOrientation>(
                     image: index,
                     x_lines: seen.x,
                     y_px: focal.y,
-                    sigma_px: pair(config.mola_sigma_px),
+                    sigma_px: pair(config.footprint_sigma_px),
                 });
             }
         }

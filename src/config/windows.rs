@@ -1,139 +1,136 @@
 //! `[[windows]]`: boxes and GeoJSON outlines on the ground.
 
-use toml::Spanned;
+use std::path::{Path, PathBuf};
+
+use serde::Serialize;
+use serde_json::json;
 
 use crate::{geom::window::WindowShape, units::RADIANS_PER_DEGREE};
 
 use super::{
-    super::{
-        geojson,
-        problems::Review,
-        raw::{Entry, RawWindow},
-        site::WindowConfig,
-    },
-    no_repeats,
-    values::{Accept, Target},
+    declare::{Declare as _, Keys, Many, declare_table, group, key},
+    forms::{from_to, identifier, several},
+    geojson,
+    paths::FILE,
 };
 
 /// Bits of the column `Footprints::windows`.
-const WINDOWS_MAX: usize = 64;
+pub(super) const WINDOWS_MAX: usize = 64;
 
-/// The windows; none are needed when no PEDR files are searched.
-pub(super) fn windows(
-    raw: Entry<Vec<Spanned<RawWindow>>>,
-    searched: bool,
-    review: &mut Review<'_>,
-) -> Vec<WindowConfig> {
-    let Some(raw) = raw else {
-        if searched {
-            review.missing(
-                None,
-                "windows",
-                format!("1 to {WINDOWS_MAX} tables [[windows]]"),
-            );
-        }
-        return Vec::new();
-    };
-    let count = raw.get_ref().len();
-    if !(1..=WINDOWS_MAX).contains(&count) {
-        review.problem(
-            Some(raw.span()),
-            format!("windows has {count} entries; expected 1 to {WINDOWS_MAX}"),
-        );
-        return Vec::new();
-    }
-    if !searched {
-        review.warn(
-            raw.span(),
-            "windows are never used: there is no table pedr".to_owned(),
-        );
-    }
-    let raw = raw.into_inner();
-    no_repeats(
-        "windows.id",
-        raw.iter().map(|window| window.get_ref().id.as_ref()),
-        review,
-    );
-    raw.iter()
-        .map(|window| self::window(window, review))
-        .collect()
+/// Keys that give the outline.
+const SHAPES: [&str; 3] = ["longitude_deg", "latitude_deg", "polygon"];
+
+/// Windows of a site.
+pub(super) const WINDOWS: Many = Many {
+    count: Some((1, WINDOWS_MAX)),
+    purpose: "",
+    further: &[&[
+        " Instead of a box: polygons of a GeoJSON file (Polygon, MultiPolygon, Feature, FeatureCollection),",
+        " coordinates [longitude, latitude] as above, rings closed and less than 360 degrees wide, at most",
+        " 100000 vertices and 16 MiB. Cut polygons that cross 180 degrees in two, or let longitudes run on to 360.",
+    ]],
+};
+
+/// A window on the ground.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct WindowConfig {
+    /// Identifier, unique in the site.
+    pub id: String,
+    /// Its outline in IAU 2000 areocentric latitude and east longitude.
+    pub shape: WindowShape,
 }
 
-fn window(raw: &Spanned<RawWindow>, review: &mut Review<'_>) -> WindowConfig {
-    let fields = raw.get_ref();
-    let id = review.identifier("windows.id", &fields.id, Some(raw.span()), true);
-    let shape = match (&fields.longitude_deg, &fields.latitude_deg, &fields.polygon) {
-        (Some(longitude), Some(latitude), None) => bounds(longitude, latitude, review),
-        (None, None, Some(polygon)) => outline(polygon, review),
-        _ => {
-            review.problem(
-                Some(raw.span()),
-                "windows has no clear shape; expected either longitude_deg and latitude_deg, or polygon".to_owned(),
-            );
-            None
-        }
-    };
-    WindowConfig {
-        id,
-        shape: shape.unwrap_or(WindowShape::Polygons {
-            polygons: Vec::new(),
-        }),
+declare_table! {
+    /// 1 to 64 windows; a footprint belongs to every window that its own position lies in.
+    fill WindowConfig {
+        /// Identifier, unique in the site.
+        id = key(identifier()).required().example(r#""site""#).example_in(1, r#""outline""#),
+        /// Outline.
+        shape = group::<ShapeKeys>().then(shape),
     }
 }
 
-fn outline(raw: &Spanned<String>, review: &mut Review<'_>) -> Option<WindowShape> {
-    let path = review.existing("windows.polygon", raw, Target::File);
+declare_table! {
+    /// Outline of a window.
+    struct ShapeKeys {
+        /// West and east edge. West above east crosses 0 (or 180) degrees: `[350, 10]` is 20 degrees wide.
+        /// `[0, 360]` or `[-180, 180]` is all longitudes; then a window that reaches 90 or -90 degrees of
+        /// latitude holds the pole.
+        longitude_deg: Option<[f64; 2]> =
+            key(several(from_to(-180.0, 360.0), "two numbers [west, east]")).example("[318.0, 318.7]"),
+        /// South and north edge, areocentric.
+        latitude_deg: Option<[f64; 2]> =
+            key(several(from_to(-90.0, 90.0), "two numbers [south, north]")).example("[-14.0, -12.9]"),
+        /// GeoJSON file.
+        polygon: Option<PathBuf> = key(FILE).example_in(1, r#""outline.geojson""#),
+    }
+}
+
+fn shape(written: ShapeKeys, keys: &mut Keys<'_, '_>) -> WindowShape {
+    keys.rule(|| {
+        json!({"oneOf": [
+            {"required": ["longitude_deg", "latitude_deg"], "not": {"required": ["polygon"]}},
+            {"required": ["polygon"], "not": {"anyOf": [
+                {"required": ["longitude_deg"]},
+                {"required": ["latitude_deg"]},
+            ]}},
+        ]})
+    });
+    let there = SHAPES.map(|key| keys.span_of(key).is_some());
+    if !matches!(there, [true, true, false] | [false, false, true]) {
+        if !keys.is_no_table() && !keys.misspelt(&SHAPES) {
+            keys.problem(
+                "windows has no clear shape; expected either longitude_deg and latitude_deg, or polygon"
+                    .to_owned(),
+            );
+        }
+        return nowhere();
+    }
+    let bounds = bounds(written.longitude_deg, written.latitude_deg, keys);
+    let outline = written.polygon.and_then(|path| outline(&path, keys));
+    bounds.or(outline).unwrap_or_else(nowhere)
+}
+
+/// A shape that stands for one that is refused.
+const fn nowhere() -> WindowShape {
+    WindowShape::Polygons {
+        polygons: Vec::new(),
+    }
+}
+
+fn outline(path: &Path, keys: &mut Keys<'_, '_>) -> Option<WindowShape> {
     if !path.is_file() {
         return None;
     }
-    match geojson::read(&path) {
+    match geojson::read(path) {
         Ok(polygons) => Some(WindowShape::Polygons { polygons }),
         Err(fault) => {
             let expected = format!("GeoJSON polygons; {}: {fault}", path.display());
-            review.refuse(raw.span(), "windows.polygon", expected);
+            keys.refuse("polygon", expected);
             None
         }
     }
 }
 
 fn bounds(
-    longitude: &Spanned<Vec<Spanned<f64>>>,
-    latitude: &Spanned<Vec<Spanned<f64>>>,
-    review: &mut Review<'_>,
+    longitude: Option<[f64; 2]>,
+    latitude: Option<[f64; 2]>,
+    keys: &mut Keys<'_, '_>,
 ) -> Option<WindowShape> {
-    let longitudes = pair(
-        "windows.longitude_deg",
-        "[west, east]",
-        longitude,
-        Accept::FromTo(-180.0, 360.0),
-        review,
-    );
-    let latitudes = pair(
-        "windows.latitude_deg",
-        "[south, north]",
-        latitude,
-        Accept::FromTo(-90.0, 90.0),
-        review,
-    );
-    let longitudes = longitudes.and_then(|pair| {
+    let longitudes = longitude.and_then(|pair| {
         let wrapped = wrapped_longitudes(pair);
         if wrapped.is_none() {
-            review.refuse(
-                longitude.span(),
-                "windows.longitude_deg",
+            keys.refuse(
+                "longitude_deg",
                 "[west, east], above 0 and at most 360 degrees wide going east",
             );
         }
         wrapped
     });
-    let latitudes = latitudes.filter(|[south, north]| {
+    let latitudes = latitude.filter(|[south, north]| {
         let ordered = south < north;
         if !ordered {
-            review.refuse(
-                latitude.span(),
-                "windows.latitude_deg",
-                "[south, north] with south below north",
-            );
+            keys.refuse("latitude_deg", "[south, north] with south below north");
         }
         ordered
     });
@@ -144,23 +141,6 @@ fn bounds(
         south_rad: south * RADIANS_PER_DEGREE,
         north_rad: north * RADIANS_PER_DEGREE,
     })
-}
-
-/// Two numbers in range.
-fn pair(
-    key: &str,
-    meaning: &str,
-    raw: &Spanned<Vec<Spanned<f64>>>,
-    accept: Accept,
-    review: &mut Review<'_>,
-) -> Option<[f64; 2]> {
-    let [first, second] = raw.get_ref().as_slice() else {
-        review.refuse(raw.span(), key, format!("two numbers {meaning}"));
-        return None;
-    };
-    let first = review.optional_number(key, Some(first), accept);
-    let second = review.optional_number(key, Some(second), accept);
-    Some([first?, second?])
 }
 
 /// Longitudes in `0..360`, or `[0, 360]` for all of them; `None` when the width is none or over 360°.

@@ -1,0 +1,24 @@
+//! `areograph manual`.
+
+use std::path::PathBuf;
+
+use clap::{Args, CommandFactory};
+
+use super::Cli;
+use crate::error::{IoFault, Place, Result};
+
+/// Writes the manual pages, one for each command, as `man` reads them.
+///
+/// Example: `areograph manual ~/.local/share/man/man1`
+#[derive(Debug, Args)]
+#[command(verbatim_doc_comment)]
+pub(super) struct Arguments {
+    /// Folder of the pages; it must exist.
+    directory: PathBuf,
+}
+
+pub(super) fn run(arguments: &Arguments) -> Result<()> {
+    clap_mangen::generate_to(Cli::command(), &arguments.directory)
+        .map_err(IoFault::on("write the manual pages"))
+        .in_file(&arguments.directory)
+}

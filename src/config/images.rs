@@ -1,0 +1,295 @@
+//! `[[images]]`: labels, or the keys that stand in for them.
+
+use std::path::PathBuf;
+
+use serde_json::json;
+
+use crate::{
+    image::{IMAGE_DURATION_END_S, IMAGE_LINES_MIN, ImageFields, line_period_agrees},
+    instruments::Instrument,
+    units::SECONDS_PER_MS,
+};
+
+use super::{
+    declare::{Declare, Keys, Many, declare_table, group, key},
+    forms::{Whole, above_to, identifier, matching, text, whole_from_to},
+    instruments::Camera,
+    paths::FILE,
+};
+
+/// Longest exposure or line period, milliseconds: a hundred times those of the camera.
+const MILLISECONDS_MAX: f64 = 1_000.0;
+/// Largest summing of the wide-angle cameras; the narrow-angle camera sums up to 8.
+const SUMMING: Whole<u32> = whole_from_to(1, 127);
+/// Beyond every image of the mission, so that line counts cannot make a run endless.
+const LINES_MAX: u32 = 1_000_000;
+/// Beyond the detectors of all three cameras.
+const DETECTORS_MAX: u32 = 4_096;
+
+/// Images of a site.
+pub(super) const IMAGES: Many = Many {
+    further: &[&[
+        " Without a label these are required: `sclk_start` or `utc_start`, `exposure_ms` or `line_period_ms`,",
+        " `downtrack_summing`, `lines_header`, `samples`.",
+    ]],
+    ..Many::ANY
+};
+
+declare_table! {
+    /// Images, none to many: a label, the keys below, or both; keys written here win over the label.
+    pub struct ImageConfig {
+        /// Identifier, unique in the site; also the name of a folder.
+        id: String = key(identifier())
+            .required()
+            .example(r#""E02-02855""#)
+            .example_in(1, r#""M04-02852""#),
+        /// PDS3 or ISIS label, attached or detached.
+        label: Option<PathBuf> = key(FILE).example(r#""../labels/e0202855.lbl""#),
+        /// The camera: `moc_na`, `moc_wa_red`, `moc_wa_blue`, or the path of an instrument file like those in
+        /// `config/instruments`. Without it, the camera that the label names, and without a label `moc_na`.
+        instrument: Option<Instrument> = key(Camera).example(r#""moc_na""#),
+        /// Its name in tie point files and in what is written for ISIS, when that is not the identifier: for a
+        /// control network the ISIS serial number. Without it, the identifier.
+        serial_number: Option<String> =
+            key(text()).example(r#""MGS/651158134:116/MOC-NA""#),
+        /// Keys written in the configuration.
+        fields: ImageFields = group(),
+    }
+    check is_complete
+}
+
+impl ImageConfig {
+    /// The name that tie points give the image.
+    #[must_use]
+    pub fn name_in_ties(&self) -> &str {
+        self.serial_number.as_deref().unwrap_or(&self.id)
+    }
+}
+
+declare_table! {
+    /// What the configuration says of an image.
+    fill ImageFields {
+        /// Spacecraft clock at the start of the first line, seconds:ticks with 256 ticks a second (":28" and
+        /// ":028" are both 28/256 s). Preferred: label UTC is rounded, 1.0 to 4.8 ms off in five labels.
+        sclk_start = key(matching(
+            "a spacecraft clock `seconds:ticks` with ticks below 256, such as 619971158:028",
+            "^(1/)?[0-9]+([:.][0-9]+)?$",
+            is_clock_string,
+        )).example_in(1, r#""619971158:028""#),
+        /// UTC at the start of the first line, used when there is no clock string.
+        utc_start = key(matching(
+            "UTC such as 1999-08-24T14:12:13.64 or 1999-236T14:12:13.64",
+            "^[0-9]{4}-([0-9]{2}-[0-9]{2}|[0-9]{3})T[0-9]{2}:[0-9]{2}:[0-9]{2}([.][0-9]{1,9})?Z?$",
+            is_utc_string,
+        )).unused_in(1, r#""1999-08-24T14:12:13.64""#),
+        /// Exposure of one detector line (`LINE_EXPOSURE_DURATION`).
+        exposure_s as "exposure_ms" = milliseconds("0.4821"),
+        /// Time between two image lines: `exposure_ms` × `downtrack_summing`. One of the two is enough; both,
+        /// or one here and one in the label, must agree within the rounding of 0.0001 ms. The "Exposure Time"
+        /// of Shan et al. 2005, Table 2, is this.
+        line_period_s as "line_period_ms" = milliseconds("3.8568"),
+        /// Detector lines summed along the track (narrow angle: to 8).
+        downtrack_summing = key(SUMMING).example_in(1, "8"),
+        /// Detector pixels summed across the track.
+        crosstrack_summing = key(SUMMING).example_in(1, "8"),
+        /// Lines that were exposed, as the image header says; the time model counts these, less than 600 s in
+        /// all.
+        lines_header = key(whole_from_to(IMAGE_LINES_MIN, LINES_MAX)).example_in(1, "1536"),
+        /// Lines in the delivered file, when fewer.
+        lines_delivered = key(whole_from_to(1, LINES_MAX)).example_in(1, "1536"),
+        /// Samples per line.
+        samples = key(whole_from_to(1, DETECTORS_MAX)).example_in(1, "256"),
+        /// First detector pixel, counted from 0 (`EDIT_MODE_ID`).
+        first_detector = key(whole_from_to(0, DETECTORS_MAX - 1)).example_in(1, "0"),
+    }
+    check agree
+}
+
+fn milliseconds(example: &'static str) -> impl Declare<Value = Option<f64>> {
+    key(above_to(0.0, MILLISECONDS_MAX))
+        .example_in(1, example)
+        .map(|value_ms| value_ms.map(|value_ms| value_ms * SECONDS_PER_MS))
+}
+
+/// Without a label the keys must give what times and sensor model need: start, line period, summing, size.
+fn is_complete(_: &ImageConfig, keys: &mut Keys<'_, '_>) {
+    const NEEDS: [&[&str]; 5] = [
+        &["sclk_start", "utc_start"],
+        &["exposure_ms", "line_period_ms"],
+        &["downtrack_summing"],
+        &["lines_header"],
+        &["samples"],
+    ];
+    keys.rule(|| {
+        let needs = NEEDS.map(|ways| {
+            let ways: Vec<_> = ways.iter().map(|way| json!({"required": [way]})).collect();
+            json!({"anyOf": ways})
+        });
+        json!({"anyOf": [{"required": ["label"]}, {"allOf": needs}]})
+    });
+    let lacking: Vec<String> = NEEDS
+        .into_iter()
+        .filter(|ways| !ways.iter().any(|way| keys.span_of(way).is_some()))
+        .map(|ways| ways.join(" or "))
+        .collect();
+    if keys.span_of("label").is_none() && !lacking.is_empty() {
+        keys.missing("label", &format!("a label, or also {}", lacking.join(", ")));
+    }
+}
+
+/// Keys that are all written must agree.
+fn agree(fields: &ImageFields, keys: &mut Keys<'_, '_>) {
+    line_period(fields, keys);
+    duration(fields, keys);
+    if let (Some(header), Some(delivered)) = (fields.lines_header, fields.lines_delivered)
+        && delivered > header
+    {
+        keys.refuse(
+            "lines_delivered",
+            format!("at most lines_header = {header}"),
+        );
+    }
+    if keys.span_of("sclk_start").is_some() {
+        keys.unused("utc_start", "sclk_start comes first");
+    }
+}
+
+/// A period, an exposure and a summing that are all written must agree.
+fn line_period(fields: &ImageFields, keys: &mut Keys<'_, '_>) {
+    let (Some(period_s), Some(exposure_s), Some(summing)) = (
+        fields.line_period_s,
+        fields.exposure_s,
+        fields.downtrack_summing,
+    ) else {
+        return;
+    };
+    if !line_period_agrees(period_s, exposure_s, summing) {
+        let expected_ms = exposure_s * f64::from(summing) / SECONDS_PER_MS;
+        keys.refuse(
+            "line_period_ms",
+            format!("exposure_ms × downtrack_summing = {expected_ms:.4}, or only one of them"),
+        );
+    }
+}
+
+/// Lines and line period that are both written must not make an endless image.
+fn duration(fields: &ImageFields, keys: &mut Keys<'_, '_>) {
+    let summed_s = || Some(fields.exposure_s? * f64::from(fields.downtrack_summing?));
+    let period_s = fields.line_period_s.or_else(summed_s);
+    let (Some(lines), Some(period_s)) = (fields.lines_header, period_s) else {
+        return;
+    };
+    let duration_s = f64::from(lines) * period_s;
+    if !(duration_s < IMAGE_DURATION_END_S) {
+        let expected = format!(
+            "less than {IMAGE_DURATION_END_S} s in all; {lines} lines of {:.4} ms take {duration_s:.1} s",
+            period_s / SECONDS_PER_MS
+        );
+        keys.refuse("lines_header", expected);
+    }
+}
+
+/// `[partition/]seconds[:ticks]`, the two fields of the MGS clock (32 bits and 1/256 s).
+fn is_clock_string(text: &str) -> bool {
+    let digits = |part: &str| !part.is_empty() && part.bytes().all(|byte| byte.is_ascii_digit());
+    let (partition, count) = text.split_once('/').unwrap_or(("1", text));
+    let (seconds, ticks) = count.split_once([':', '.']).unwrap_or((count, "0"));
+    let below = |part: &str, limit: u64| {
+        digits(part) && part.parse::<u64>().is_ok_and(|value| value < limit)
+    };
+    partition == "1" && below(seconds, 1 << 32) && below(ticks, 256)
+}
+
+/// `YYYY-MM-DDThh:mm:ss[.fff][Z]`, or with the day of the year `YYYY-DDD`.
+///
+/// Only the form; leap seconds and month lengths are for the leap-second kernel.
+fn is_utc_string(text: &str) -> bool {
+    let text = text.strip_suffix('Z').unwrap_or(text);
+    let Some((date, time)) = text.split_once('T') else {
+        return false;
+    };
+    let date: Vec<&str> = date.split('-').collect();
+    let time: Vec<&str> = time.split(':').collect();
+    let date_fits = match date[..] {
+        [year, month, day] => {
+            whole(year, 4, 1990..=2050) && whole(month, 2, 1..=12) && whole(day, 2, 1..=31)
+        }
+        [year, day] => whole(year, 4, 1990..=2050) && whole(day, 3, 1..=366),
+        _ => false,
+    };
+    let time_fits = match time[..] {
+        [hour, minute, second] => {
+            let (second, fraction) = second.split_once('.').unwrap_or((second, "0"));
+            whole(hour, 2, 0..=23)
+                && whole(minute, 2, 0..=59)
+                && whole(second, 2, 0..=60)
+                && (1..=9).contains(&fraction.len())
+                && fraction.bytes().all(|byte| byte.is_ascii_digit())
+        }
+        _ => false,
+    };
+    date_fits && time_fits
+}
+
+/// Whether `text` is a number of `width` digits within `range`.
+fn whole(text: &str, width: usize, range: std::ops::RangeInclusive<u32>) -> bool {
+    text.len() == width
+        && text.bytes().all(|byte| byte.is_ascii_digit())
+        && text.parse().is_ok_and(|value| range.contains(&value))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn clock_strings_have_seconds_and_256ths() {
+        for good in [
+            "619971158:28",
+            "619971158.028",
+            "1/0844996544.086",
+            "619971158",
+        ] {
+            assert!(is_clock_string(good), "{good}");
+        }
+        for bad in [
+            "",
+            "4294967296:0",
+            "1:256",
+            "2/1:1",
+            "1:",
+            "a:1",
+            "1:1:1",
+            "-1:1",
+            "1:+1",
+        ] {
+            assert!(!is_clock_string(bad), "{bad}");
+        }
+    }
+
+    #[test]
+    fn utc_strings_have_the_forms_of_labels() {
+        for good in [
+            "1999-08-24T14:12:13.64",
+            "1999-236T14:12:13",
+            "1998-12-31T23:59:60.5Z",
+        ] {
+            assert!(is_utc_string(good), "{good}");
+        }
+        for bad in [
+            "",
+            "1999-08-24",
+            "1999-13-24T14:12:13",
+            "1999-08-24T24:12:13",
+            "1999-08-24T14:12:61",
+            "1999-8-24T14:12:13",
+            "1999-08-24T14:12:13.",
+            "1999-000T14:12:13",
+            "99-08-24T14:12:13",
+            "1999-08-24 14:12:13",
+            "1999-08-24T1é:12:13",
+        ] {
+            assert!(!is_utc_string(bad), "{bad}");
+        }
+    }
+}

@@ -1,0 +1,175 @@
+//! Paths: files and folders that are there, and globs resolved to files.
+
+use std::{
+    collections::BTreeMap,
+    path::{Path, PathBuf},
+};
+
+use toml::Value;
+
+use super::{
+    declare::{Form, Found, ValueKind},
+    problems::Review,
+};
+
+/// Footprint columns count files in 16 bits.
+const FILES_MAX: usize = 65_535;
+/// Folders and file name of a glob that may hold wildcards: an archive is `volume/folder/file`.
+const WILD_PARTS_MAX: usize = 3;
+
+/// A path that leads somewhere, counted from the configuration's folder.
+pub(super) struct Existing {
+    kind: ValueKind,
+    is_there: fn(&Path) -> bool,
+}
+
+/// The path of a file that is there.
+pub(super) const FILE: Existing = Existing {
+    kind: ValueKind::File,
+    is_there: Path::is_file,
+};
+/// The path of a folder that is there.
+pub(super) const FOLDER: Existing = Existing {
+    kind: ValueKind::Folder,
+    is_there: Path::is_dir,
+};
+
+impl Form for Existing {
+    type Value = PathBuf;
+
+    fn kind(&self) -> ValueKind {
+        self.kind.clone()
+    }
+
+    fn read(&self, found: &Found<'_>, review: &mut Review<'_>) -> Option<PathBuf> {
+        let Some(written) = found.value.get_ref().as_str() else {
+            found.refuse(review, &self.kind);
+            return None;
+        };
+        let path = review.resolve(written);
+        if written.is_empty() || !(self.is_there)(&path) {
+            let (kind, shown) = (&self.kind, path.display());
+            found.refuse(review, format!("{kind}; {shown} is {}", what_is_at(&path)));
+        }
+        // Also a path that leads nowhere: a second one like it is told as well.
+        Some(path)
+    }
+
+    fn written(&self, value: &PathBuf) -> Value {
+        Value::from(value.to_string_lossy().into_owned())
+    }
+}
+
+/// What a path leads to, for messages.
+fn what_is_at(path: &Path) -> &'static str {
+    match path.metadata() {
+        Ok(found) if found.is_dir() => "a folder",
+        Ok(found) if found.is_file() => "a file",
+        Ok(_) => "neither file nor folder",
+        Err(error) if error.kind() == std::io::ErrorKind::PermissionDenied => "not to be read",
+        Err(_) => "not there",
+    }
+}
+
+/// All files that the globs match, sorted by path; a file reached twice is taken once.
+pub(super) struct Globs;
+
+impl Form for Globs {
+    type Value = Vec<PathBuf>;
+
+    fn kind(&self) -> ValueKind {
+        ValueKind::List {
+            expected: "at least one entry".to_owned(),
+            of: Box::new(ValueKind::Glob),
+            count: None,
+            empty: false,
+            distinct: false,
+        }
+    }
+
+    fn read(&self, found: &Found<'_>, review: &mut Review<'_>) -> Option<Vec<PathBuf>> {
+        let globs = found.value.get_ref().as_array();
+        let Some(globs) = globs.filter(|globs| !globs.is_empty()) else {
+            found.refuse(review, self.kind());
+            return None;
+        };
+        let mut by_identity: BTreeMap<PathBuf, PathBuf> = BTreeMap::new();
+        for written in globs {
+            let matched = match written.get_ref().as_str() {
+                Some(glob) => matches(&review.resolve(""), glob),
+                None => Err(ValueKind::Glob.to_string()),
+            };
+            match matched {
+                Err(expected) => review.refuse(written.span(), &found.key, expected),
+                Ok(paths) => {
+                    for path in paths {
+                        let identity = path.canonicalize().unwrap_or_else(|_| path.clone());
+                        by_identity.entry(identity).or_insert(path);
+                    }
+                }
+            }
+        }
+        if by_identity.len() > FILES_MAX {
+            review.problem(
+                Some(found.value.span()),
+                format!(
+                    "{} match {} files; expected at most {FILES_MAX} for one site",
+                    found.key,
+                    by_identity.len()
+                ),
+            );
+        }
+        let mut files: Vec<PathBuf> = by_identity.into_values().collect();
+        files.sort();
+        Some(files)
+    }
+
+    fn written(&self, value: &Vec<PathBuf>) -> Value {
+        let paths = value.iter().map(|path| FILE.written(path));
+        Value::Array(paths.collect())
+    }
+}
+
+/// Files that one glob matches below `folder`, or what was expected of it.
+fn matches(folder: &Path, glob: &str) -> Result<Vec<PathBuf>, String> {
+    // `**` and long rows of wildcards could walk a whole disk.
+    let wild_parts = glob
+        .split('/')
+        .filter(|part| part.contains(['*', '?', '[']))
+        .count();
+    if glob.contains("**") || wild_parts > WILD_PARTS_MAX {
+        return Err(format!(
+            "a glob without `**` and with wildcards in at most {WILD_PARTS_MAX} of its parts"
+        ));
+    }
+    let invalid =
+        |error: glob::PatternError| format!("a glob: {} at character {}", error.msg, error.pos + 1);
+    // Checked alone first, so that the position counts in what was written.
+    glob::Pattern::new(glob).map_err(invalid)?;
+    let pattern = if Path::new(glob).is_absolute() {
+        glob.to_owned()
+    } else {
+        let folder = glob::Pattern::escape(&folder.to_string_lossy());
+        Path::new(&folder).join(glob).to_string_lossy().into_owned()
+    };
+    let found = glob::glob(&pattern).map_err(invalid)?;
+    let mut files = Vec::new();
+    for entry in found.take(FILES_MAX + 1) {
+        let path = entry.map_err(|error| {
+            format!(
+                "folders that can be read: {}: {}",
+                error.path().display(),
+                error.error()
+            )
+        })?;
+        if path.is_file() {
+            files.push(path);
+        }
+    }
+    if files.is_empty() {
+        return Err(format!(
+            "a glob that matches a file; {pattern} matches none"
+        ));
+    }
+    Ok(files)
+}

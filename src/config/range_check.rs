@@ -1,0 +1,47 @@
+//! `[range_check]`.
+
+use super::{
+    declare::{Keys, declare_table, key},
+    forms::{above_to, from_to, whole_from_to},
+};
+
+/// Most steps of the bias scan, so that a slip in its step cannot make a run endless.
+pub const SCAN_STEPS_MAX: u32 = 10_000;
+
+declare_table! {
+    /// Limits that make a profile valid or invalid.
+    pub struct RangeCheckConfig {
+        /// Largest |mean| of range minus distance. The default is the limit of Shan et al. 2005.
+        mean_max_m: f64 = key(above_to(0.0, 1e6)).or(10.0),
+        /// A shot farther from the median than this many robust standard deviations is an outlier.
+        /// Shan et al. 2005 take 5 standard deviations from the mean.
+        outlier_sigma: f64 = key(above_to(0.0, 1000.0)).or(5.0),
+        /// Largest share of outliers. The default is our choice.
+        outlier_share_max: f64 = key(from_to(0.0, 1.0)).or(0.05),
+        /// Fewest shots. The default is one PEDR frame; the paper's profiles have 71 to 174.
+        shots_min: u32 = key(whole_from_to(2, 1_000_000)).or(20),
+        /// Largest |mean| of range minus distance to the file's own spacecraft position: a test of
+        /// decoding, which needs no kernels. Both come from one orbit solution and agree to about a metre.
+        decoding_max_m: f64 = key(above_to(0.0, 1e6)).or(2.0),
+        /// The clock bias scan tries biases to both sides of 0 up to this one. The default is four times
+        /// 0.117 either way.
+        scan_half_width_s: f64 = key(above_to(0.0, 10.0)).or(0.5),
+        /// Step of the scan: at most the half width, at least a 10000th of the whole.
+        scan_step_s: f64 = key(above_to(0.0, 10.0)).or(0.01),
+    }
+    check step_fits
+}
+
+fn step_fits(checked: &RangeCheckConfig, keys: &mut Keys<'_, '_>) {
+    let (step, half_width) = (checked.scan_step_s, checked.scan_half_width_s);
+    let (shortest, longest) = (2.0 * half_width / f64::from(SCAN_STEPS_MAX), half_width);
+    if !(shortest <= step && step <= longest) {
+        // Whichever of the two was written is the one to change.
+        let written = ["scan_step_s", "scan_half_width_s"]
+            .into_iter()
+            .find(|key| keys.span_of(key).is_some());
+        let expected =
+            format!("a step from {shortest} to {longest} s within a half width of {half_width} s");
+        keys.refuse(written.unwrap_or("scan_step_s"), expected);
+    }
+}
