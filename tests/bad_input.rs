@@ -566,7 +566,7 @@ fn a_scene_on_a_full_disk_names_the_file_that_did_not_fit() {
     let script = "\"$0\" --quiet scene small/scene; code=$?; ls -A small; exit $code";
     // Full at a text kernel, at the start and in the middle of the C-kernel, and at a PEDR file.
     let sizes = [
-        ("30k", "kernels/gsfc.tm"),
+        ("30k", "kernels/nav.tm"),
         ("100k", "kernels/mgs_sc_scene.bc"),
         ("2500k", "kernels/mgs_sc_scene.bc"),
         ("20000k", "pedr/"),

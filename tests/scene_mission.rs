@@ -346,7 +346,7 @@ fn the_same_seed_gives_the_same_bytes() {
             }
         }
     }
-    assert_eq!(compared, 6 + 3 + 5 + 6 + 6 + 3 + 3 + 3);
+    assert_eq!(compared, 7 + 6 + 5 + 6 + 9 + 4 + 4 + 3);
     assert_eq!(
         fs::read_dir(folder.path()).unwrap().count(),
         1,

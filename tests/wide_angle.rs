@@ -89,6 +89,31 @@ fn orientation_comes_back() {
     }
 }
 
+/// Samples of an ISD look where ours do, by the formulas of usgscsm (`computeDistortedFocalPlaneCoordinates`,
+/// `removeDistortion`, `createCameraLookVector`).
+fn camera_model_looks_there(isd: &Value, image: &ImageTimes) {
+    let value = |pointer: &str| isd.pointer(pointer).and_then(Value::as_f64).unwrap();
+    let detector = image.detector();
+    for share in [0.0, 0.25, 0.5, 0.75, 1.0] {
+        let sample = share * value("/image_samples");
+        let pixel = sample * value("/detector_sample_summing") + value("/starting_detector_sample");
+        let x_mm = (0.0 - value("/detector_center/line")) / value("/focal2pixel_lines/1");
+        let y_mm = (pixel - value("/detector_center/sample")) / value("/focal2pixel_samples/2");
+        let square = x_mm * x_mm + y_mm * y_mm;
+        let [k0, k1, k2] =
+            [0, 1, 2].map(|k| value(&format!("/optical_distortion/radial/coefficients/{k}")));
+        let kept = 1.0 - (k0 + square * (k1 + square * k2));
+        let focal_length_mm = value("/focal_length_model/focal_length");
+        let look = Vector3::new(x_mm * kept, y_mm * kept, focal_length_mm) / focal_length_mm;
+        let off_px = (look - detector.look(sample)).norm() * detector.focal_length_px;
+        assert!(
+            off_px < 0.01,
+            "{}: {off_px} px at sample {sample}",
+            image.id
+        ); // what three coefficients leave
+    }
+}
+
 /// Ground points of the shots of `file`, by record and shot.
 fn ground_m(products: &Path, file: &str) -> BTreeMap<(u64, u64), Vector3<f64>> {
     let table = fs::read_to_string(products.join("gusev_context/footprints.csv")).unwrap();
@@ -161,5 +186,12 @@ fn shots_lie_where_the_instrument_kernel_sees_them() {
             compared += 1;
         }
         assert!(compared > 100, "{}: {compared} shots", image.id);
+        let isd = out
+            .path()
+            .join(format!("gusev_context/images/{}/isd.json", image.id));
+        camera_model_looks_there(
+            &serde_json::from_slice(&fs::read(isd).unwrap()).unwrap(),
+            &image,
+        );
     }
 }

@@ -18,13 +18,18 @@ use crate::{
 };
 
 /// Raised when a stage computes something else from the same parts, or lays its output out anew.
-const METHOD: u32 = 9;
+const METHOD: u32 = 10;
 
 /// Image keys, label files and all text kernels, among them those that convert times.
 pub(super) fn tag_times(config: &SiteConfig, kernels: &KernelSet) -> Result<Parts> {
     let mut parts = Parts::new(METHOD);
     for image in &config.images {
-        parts = parts.key(&format!("images.{}", image.id), &image.fields);
+        parts = parts
+            .key(&format!("images.{}", image.id), &image.fields)
+            .key(
+                &format!("images.{}.instrument", image.id),
+                &image.instrument,
+            );
         if let Some(label) = &image.label {
             parts = parts.file("label", &image.id, &hash_file(label)?.0);
         }

@@ -4,7 +4,6 @@
 //! in an image is searched for with it: nothing here goes through the camera models of the program.
 
 use nalgebra::{Matrix2, Matrix3, Vector2, Vector3};
-use serde::Serialize;
 
 use super::{
     arc::Arc,
@@ -15,7 +14,7 @@ use super::{
     sites::{Label, SiteFile, SiteImage, SiteTies, image_label, window},
     terrain::Terrain,
     ties::ties_name,
-    truth::KeptShot,
+    truth::{ContextShot, ContextTruth, KeptShot},
 };
 use crate::{
     config::built_in_instruments,
@@ -304,30 +303,6 @@ impl<'a> ContextImage<'a> {
 
 fn line_period_s(plan: &PlannedContext) -> f64 {
     plan.exposure_ms * SECONDS_PER_MS * f64::from(plan.summing)
-}
-
-/// A wide-angle image in `truth.json`.
-#[derive(Debug, Serialize)]
-pub(super) struct ContextTruth {
-    id: &'static str,
-    camera: &'static str,
-    start_et_s: f64,
-    line_period_s: f64,
-    lines: u32,
-    epochs_et_s: Vec<f64>,
-    position_iau2000_m: Vec<[f64; 3]>,
-    camera_to_mars_quaternion_wxyz: Vec<[f64; 4]>,
-    /// Shots of the PEDR file of the image's day that the image shows.
-    shots: Vec<ContextShot>,
-}
-
-/// Where an image shows a shot; lines and samples are 0 at the outer edge of the first one.
-#[derive(Debug, Serialize)]
-pub(super) struct ContextShot {
-    record: u32,
-    shot: u8,
-    line: f64,
-    sample: f64,
 }
 
 /// Whether a point in radians lies in the site's window.

@@ -5,7 +5,7 @@ use std::path::Path;
 use super::{
     SceneOptions, SceneSummary,
     arc::Arc,
-    context::{CONTEXT_SITE, ContextImage, ContextTruth, context_site, context_ties, in_window},
+    context::{CONTEXT_SITE, ContextImage, context_site, context_ties, in_window},
     error::SceneError,
     files::{Draft, put},
     kernels::{
@@ -18,7 +18,7 @@ use super::{
     sites::{README, planned_label, planned_site},
     terrain::Terrain,
     ties::{ties_name, write_ties},
-    truth::{FileTruth, ImageTruth, KeptShot, OrbitDifference, ProfileTruth, Truth},
+    truth::{ContextTruth, FileTruth, ImageTruth, KeptShot, OrbitDifference, ProfileTruth, Truth},
 };
 use crate::{
     constants::MARS_IAU2000,

@@ -6,7 +6,6 @@ use serde::Serialize;
 
 use super::{
     arc::Arc,
-    context::ContextTruth,
     laser::{CROSSOVER_AMPLITUDE_M, CROSSOVER_PERIOD_S, Shot},
     plan::Look,
     versions::Version,
@@ -106,6 +105,30 @@ pub(super) struct KeptShot {
     pub shot: u8,
     /// The truth.
     pub truth: Shot,
+}
+
+/// A wide-angle image in `truth.json`.
+#[derive(Debug, Serialize)]
+pub(super) struct ContextTruth {
+    pub id: &'static str,
+    pub camera: &'static str,
+    pub start_et_s: f64,
+    pub line_period_s: f64,
+    pub lines: u32,
+    pub epochs_et_s: Vec<f64>,
+    pub position_iau2000_m: Vec<[f64; 3]>,
+    pub camera_to_mars_quaternion_wxyz: Vec<[f64; 4]>,
+    /// Shots of the PEDR file of the image's day that the image shows.
+    pub shots: Vec<ContextShot>,
+}
+
+/// Where an image shows a shot; lines and samples are 0 at the outer edge of the first one.
+#[derive(Debug, Serialize)]
+pub(super) struct ContextShot {
+    pub record: u32,
+    pub shot: u8,
+    pub line: f64,
+    pub sample: f64,
 }
 
 /// The shots of one file in one window.

@@ -1,6 +1,10 @@
 //! Image labels become line times: spacecraft clock or UTC to ET, line period, header and delivered lines.
 
+mod detector;
+
 use serde::{Deserialize, Serialize};
+
+use detector::fits_detector;
 
 use crate::{
     config::{ImageConfig, built_in_instruments, usual_instrument},
@@ -144,36 +148,6 @@ enum ImageFault {
         delivered: u32,
         header: u32,
     },
-    #[error("image {image}: {key} is {summing}; expected 1 to {max}, as {instrument} sums")]
-    Summing {
-        image: String,
-        key: &'static str,
-        summing: u32,
-        instrument: String,
-        max: u32,
-    },
-    #[error(
-        "image {image}: crosstrack_summing {code} of {instrument} stands for summing that varies over the line; \
-         expected one summing for all samples"
-    )]
-    VariableSumming {
-        image: String,
-        code: u32,
-        instrument: String,
-    },
-    #[error(
-        "image {image}: {samples} samples of {crosstrack} pixels from pixel {first} end at {end}; expected at most \
-         {pixels}, the pixels of {instrument}"
-    )]
-    Detector {
-        image: String,
-        samples: u32,
-        crosstrack: u32,
-        first: u32,
-        end: u64,
-        instrument: String,
-        pixels: u32,
-    },
     #[error(
         "image {image}: {lines} lines of {line_period_s} s; expected at least {IMAGE_LINES_MIN} lines, a \
          positive period and less than {IMAGE_DURATION_END_S} s in all"
@@ -198,12 +172,6 @@ impl Fault for ImageFault {
             Self::Missing { key, .. } => format!("add `{key}` to the image's table, or name its label"),
             Self::Period { .. } => {
                 "give the exposure of one detector line, or the period of summed lines, not a mixture".to_owned()
-            }
-            Self::Summing { .. } | Self::Detector { .. } => {
-                "check summing, samples and first detector, and that the image is of this camera".to_owned()
-            }
-            Self::VariableSumming { .. } => {
-                "leave the image out: its samples differ in width, which areograph does not model".to_owned()
             }
             Self::Start { .. } => {
                 "check which of the two belongs to this image; the clock is what would be used".to_owned()
@@ -262,13 +230,16 @@ fn tag_image(image: &ImageConfig, session: &Session) -> Result<ImageTimes> {
     let crosstrack_summing = fields.crosstrack_summing.unwrap_or(downtrack_summing);
     let samples = fields.samples.ok_or_else(|| missing("samples"))?;
     let first_detector = fields.first_detector.unwrap_or(0);
-    fits_detector(
-        image,
+    let fits = fits_detector(
+        &image.id,
         &instrument,
         [downtrack_summing, crosstrack_summing],
         [first_detector, samples],
-    )
-    .map_err(place)?;
+    );
+    match &image.label {
+        Some(path) => fits.in_file(path)?,
+        None => fits?,
+    }
     let (line_period_s, exposure_s) = line_period(image, &fields, downtrack_summing)
         .map_err(place)?
         .ok_or_else(|| missing("exposure_ms"))?;
@@ -322,51 +293,6 @@ fn labelled(image: &ImageConfig) -> Result<(Instrument, ImageFields)> {
         }
     };
     Ok((instrument, fields))
-}
-
-/// Makes sure that the camera can sum like that and has the pixels.
-fn fits_detector(
-    image: &ImageConfig,
-    instrument: &Instrument,
-    [downtrack, crosstrack]: [u32; 2],
-    [first, samples]: [u32; 2],
-) -> std::result::Result<(), ImageFault> {
-    let limits = &instrument.summing;
-    for (key, summing) in [
-        ("downtrack_summing", downtrack),
-        ("crosstrack_summing", crosstrack),
-    ] {
-        if summing == 0 || summing > limits.max {
-            return Err(ImageFault::Summing {
-                image: image.id.clone(),
-                key,
-                summing,
-                instrument: instrument.name.clone(),
-                max: limits.max,
-            });
-        }
-    }
-    if limits.variable_codes.contains(&crosstrack) {
-        return Err(ImageFault::VariableSumming {
-            image: image.id.clone(),
-            code: crosstrack,
-            instrument: instrument.name.clone(),
-        });
-    }
-    let pixels = instrument.detector.pixels;
-    let end = u64::from(first) + u64::from(samples) * u64::from(crosstrack);
-    if samples == 0 || end > u64::from(pixels) {
-        return Err(ImageFault::Detector {
-            image: image.id.clone(),
-            samples,
-            crosstrack,
-            first,
-            end,
-            instrument: instrument.name.clone(),
-            pixels,
-        });
-    }
-    Ok(())
 }
 
 /// Configuration over label, with a note for every key in which they differ.

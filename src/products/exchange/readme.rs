@@ -17,7 +17,7 @@ pub(super) fn text(site: &SiteProducts) -> String {
         text += &footprints();
     }
     if !site.images.is_empty() {
-        text += "\nCommunity Sensor Model (usgscsm): image support data of the MOC narrow-angle camera\n";
+        text += "\nCommunity Sensor Model (usgscsm): image support data\n";
         for image in site.images {
             let _infallible = writeln!(
                 text,
