@@ -125,7 +125,8 @@ impl fmt::Display for MarsDatum {
 }
 
 /// A position in frame `F`, metres from the centre of Mars.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(transparent, bound = "")]
 pub struct Position<F> {
     /// Components, metres.
     pub xyz_m: Vector3<f64>,
@@ -150,7 +151,8 @@ impl<F: Frame> Position<F> {
 }
 
 /// Takes components in `A` to components in `B`; holds at one instant.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(bound = "")]
 pub struct Rotation<A, B> {
     matrix: Matrix3<f64>,
     at: Et,

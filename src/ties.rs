@@ -1,76 +1,104 @@
 //! Tie points: places on the ground that were measured in several images.
 
-use std::collections::BTreeMap;
-
 use serde::{Deserialize, Serialize};
 
 use crate::error::{Fault, Kind};
 
 /// A point measured in images; its ground coordinates are not known.
+///
+/// Its measurements name their images by `I`: the text of a file, or the index among a site's images.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct TiePoint {
+pub struct TiePoint<I = usize> {
     /// Identifier in its file.
     pub id: String,
     /// Its measurements.
-    pub measures: Vec<TieMeasure>,
+    pub measures: Vec<TieMeasure<I>>,
 }
 
 /// One measurement.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct TieMeasure {
-    /// The image as the file names it: an identifier, or an ISIS serial number.
-    pub image: String,
+pub struct TieMeasure<I = usize> {
+    /// The image as the file names it (an identifier, or an ISIS serial number), or its index.
+    pub image: I,
     /// Line in the whole image, 0 at the outer edge of the first line and 0.5 at its middle.
     pub line: f64,
     /// Sample, 0 at the outer edge of the first pixel and 0.5 at its middle.
     pub sample: f64,
 }
 
-/// A measurement names an image that is not there.
+impl TiePoint<String> {
+    /// The point with the indices that `index_of` knows for the names of its images; names that it does not know
+    /// go to `unknown`, and their measurements are left out.
+    pub fn in_images(
+        self,
+        index_of: impl Fn(&str) -> Option<usize>,
+        mut unknown: impl FnMut(String),
+    ) -> TiePoint {
+        let mut measures = Vec::with_capacity(self.measures.len());
+        for TieMeasure {
+            image,
+            line,
+            sample,
+        } in self.measures
+        {
+            match index_of(&image) {
+                Some(image) => measures.push(TieMeasure {
+                    image,
+                    line,
+                    sample,
+                }),
+                None => unknown(image),
+            }
+        }
+        TiePoint {
+            id: self.id,
+            measures,
+        }
+    }
+}
+
+/// A measurement belongs to an image that is not there.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("tie point {tie} is measured in {image}, which is none of the images {known}")]
+#[error(
+    "tie point {tie} is measured in image {image}, counted from 0; expected one of {images} images"
+)]
 pub struct UnknownImage {
     /// Identifier of the tie point.
     pub tie: String,
-    /// The name.
-    pub image: String,
-    /// The names that are known.
-    pub known: String,
+    /// Index of the image.
+    pub image: usize,
+    /// How many images there are.
+    pub images: usize,
 }
 
 impl Fault for UnknownImage {
     fn kind(&self) -> Kind {
-        Kind::Input
+        Kind::Bug
     }
 
     fn advice(&self) -> String {
-        "give the images the names of the tie point file (serial numbers in an ISIS network), or leave those measurements out"
-            .to_owned()
+        "report this with the site's configuration and the log".to_owned()
     }
 }
 
-/// Index of the image of each measurement of each tie point.
+/// Makes sure that every measurement belongs to one of `images` images.
 ///
 /// # Errors
-/// The first measurement in an image that is not among `images`.
-pub fn image_indices(images: &[&str], ties: &[TiePoint]) -> Result<Vec<Vec<usize>>, UnknownImage> {
-    let index: BTreeMap<&str, usize> = images.iter().copied().zip(0..).collect();
-    let of_measure = |tie: &TiePoint, measure: &TieMeasure| {
-        let found = index.get(measure.image.as_str()).copied();
-        found.ok_or_else(|| UnknownImage {
-            tie: tie.id.clone(),
-            image: measure.image.clone(),
-            known: images.join(", "),
-        })
-    };
-    ties.iter()
-        .map(|tie| {
-            tie.measures
-                .iter()
-                .map(|measure| of_measure(tie, measure))
-                .collect()
-        })
-        .collect()
+/// The first measurement that does not.
+pub fn require_images(ties: &[TiePoint], images: usize) -> Result<(), UnknownImage> {
+    let measures = ties
+        .iter()
+        .flat_map(|tie| tie.measures.iter().map(move |measure| (tie, measure.image)));
+    for (tie, image) in measures {
+        if image >= images {
+            return Err(UnknownImage {
+                tie: tie.id.clone(),
+                image,
+                images,
+            });
+        }
+    }
+    Ok(())
 }
 
 #[cfg(test)]
@@ -78,7 +106,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_measurement_in_an_unknown_image_is_named() {
+    fn names_become_indices_and_an_index_without_an_image_is_told() {
         let measure = |image: &str| TieMeasure {
             image: image.to_owned(),
             line: 1.0,
@@ -86,14 +114,21 @@ mod tests {
         };
         let tie = TiePoint {
             id: "t1".to_owned(),
-            measures: vec![measure("B"), measure("A")],
+            measures: vec![measure("B"), measure("elsewhere"), measure("A")],
         };
-        let ties = [tie];
-        assert_eq!(image_indices(&["A", "B"], &ties), Ok(vec![vec![1, 0]]));
-        let unknown = image_indices(&["B", "C"], &ties).unwrap_err();
+        let mut unknown = Vec::new();
+        let index_of = |name: &str| ["A", "B"].iter().position(|known| *known == name);
+        let tie = tie.in_images(index_of, |name| unknown.push(name));
+        let images: Vec<usize> = tie.measures.iter().map(|measure| measure.image).collect();
         assert_eq!(
-            unknown.to_string(),
-            "tie point t1 is measured in A, which is none of the images B, C"
+            (images, unknown),
+            (vec![1, 0], vec!["elsewhere".to_owned()])
+        );
+        let ties = [tie];
+        assert_eq!(require_images(&ties, 2), Ok(()));
+        assert_eq!(
+            require_images(&ties, 1).unwrap_err().to_string(),
+            "tie point t1 is measured in image 1, counted from 0; expected one of 1 images"
         );
     }
 }

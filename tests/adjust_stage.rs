@@ -13,7 +13,9 @@ mod scene;
 
 use areograph::{
     config::AdjustmentConfig,
+    error::Kind,
     footprints::FootprintImageCoordinates,
+    frames::Position,
     geom::{
         bundle::{BundleOptions, Network, View, solve},
         pushbroom::{
@@ -26,8 +28,8 @@ use areograph::{
     },
     stages::{
         adjust::{
-            AdjustImage, Adjusted, LaserShot, LeftOutReason, ObservationType, PointKind, ShotRange,
-            adjust,
+            AdjustImage, Adjusted, LaserShot, LaserShots, LeftOutReason, ObservationType,
+            PointKind, ShotRange, adjust,
         },
         intersect::{IntersectOptions, IntersectedTies, intersect_ties},
     },
@@ -44,7 +46,7 @@ type Initial = CorrectedOrientation<EulerPolynomial>;
 struct Site {
     simulated: Simulated<EulerPolynomial>,
     images: Vec<AdjustImage<Initial>>,
-    shots: Vec<LaserShot>,
+    shots: LaserShots,
     ties: Vec<TiePoint>,
 }
 
@@ -83,20 +85,26 @@ impl Site {
                 time_bias_sigma_s: 0.0,
             })
             .collect();
-        let shots = network
-            .ranges
-            .iter()
-            .map(|range| LaserShot {
-                id: format!("{}/{}", range.profile, range.point),
-                ground_m: network.points[range.point].ground_m.into(),
-                range: Some(ShotRange {
-                    profile: format!("{}", 10_496 + range.profile),
-                    image: NAMES[range.image].to_owned(),
-                    x_lines: range.x_lines,
-                    range_m: range.range_m,
-                }),
-            })
-            .collect();
+        let shots = LaserShots {
+            profiles: (10_496..)
+                .take(network.range_bias_sigmas_m.len())
+                .map(|orbit: u32| orbit.to_string())
+                .collect(),
+            shots: network
+                .ranges
+                .iter()
+                .map(|range| LaserShot {
+                    profile: range.profile,
+                    row: u32::try_from(range.point).unwrap(),
+                    ground: Position::new(network.points[range.point].ground_m),
+                    range: Some(ShotRange {
+                        image: range.image,
+                        x_lines: range.x_lines,
+                        range_m: range.range_m,
+                    }),
+                })
+                .collect(),
+        };
         let ties = (simulated.shots..network.points.len())
             .map(|point| TiePoint {
                 id: format!("T{point}"),
@@ -105,7 +113,7 @@ impl Site {
                     .iter()
                     .filter(|view| view.point == point)
                     .map(|view| TieMeasure {
-                        image: NAMES[view.image].to_owned(),
+                        image: view.image,
                         line: view.x_lines + network.images[view.image].half_lines,
                         sample: images[view.image].stereo.detector.sample(view.y_px),
                     })
@@ -290,7 +298,7 @@ fn blunders_are_found_and_good_ties_kept() {
                 let number: usize = point.id.strip_prefix('T')?.parse().unwrap();
                 let good = !wrong.contains(&(number - site.simulated.shots));
                 let truth_m = site.simulated.points_m[number];
-                good.then(|| (Vector3::from(point.ground_m) - truth_m).norm_squared())
+                good.then(|| (point.ground.xyz_m - truth_m).norm_squared())
             });
             let errors: Vec<f64> = errors.collect();
             (errors.iter().sum::<f64>() / errors.len() as f64).sqrt()
@@ -335,7 +343,7 @@ fn what_does_not_fit_together_is_refused() {
     let site = Site::of(Recipe::GUSEV);
     let starts = site.starts();
     let run = |images: &[AdjustImage<Initial>],
-               shots: &[LaserShot],
+               shots: &LaserShots,
                ties: &[TiePoint],
                options: &AdjustmentConfig| {
         let failure = adjust(images, shots, ties, &starts, options).unwrap_err();
@@ -346,25 +354,30 @@ fn what_does_not_fit_together_is_refused() {
     let plain = every_tie();
 
     let mut shots = site.shots.clone();
-    shots[3].range.as_mut().unwrap().image = "E02-00000".to_owned();
+    shots.shots[3].range.as_mut().unwrap().image = 7;
     let message = run(&site.images, &shots, &site.ties, &plain);
     assert!(
-        message.contains("shot 0/3 was") && message.contains("E02-00000"),
+        message.contains("range 3 belongs to image 7, which the network does not have"),
         "{message}"
     );
     shots.clone_from(&site.shots);
-    shots[4].id = "0/5".to_owned();
-    assert!(run(&site.images, &shots, &site.ties, &plain).contains("0/5"));
+    shots.shots[4].row = 5;
+    assert!(run(&site.images, &shots, &site.ties, &plain).contains("10496:5"));
     let mut ties = site.ties.clone();
-    ties[0].measures[0].image = "E02-00000".to_owned();
-    assert!(run(&site.images, &site.shots, &ties, &plain).contains("E02-00000"));
+    ties[0].measures[0].image = 7;
+    let failure = adjust(&site.images, &site.shots, &ties, &starts, &plain).unwrap_err();
+    assert_eq!(failure.kind(), Kind::Bug);
+    assert!(
+        failure.to_string().contains("measured in image 7"),
+        "{failure}"
+    );
 
     // Free orientations and nothing but ties: neither place nor scale.
     let mut free = site.images.clone();
     for image in &mut free {
         image.sigmas = [f64::INFINITY; 18];
     }
-    let message = run(&free, &[], &site.ties, &plain);
+    let message = run(&free, &LaserShots::default(), &site.ties, &plain);
     assert!(
         message.contains("singular") && message.contains("of image E02-0"),
         "{message}"
@@ -372,10 +385,13 @@ fn what_does_not_fit_together_is_refused() {
 
     // A footprint 5 km off, between good ones, with 10 m to its name.
     shots.clone_from(&site.shots);
-    shots[60].ground_m[0] += 5_000.0;
+    shots.shots[60].ground.xyz_m.x += 5_000.0;
     let message = run(&site.images, &shots, &site.ties, &plain);
     assert!(message.contains("contradicts"), "{message}");
-    assert!(message.contains("the footprint of shot 0/60"), "{message}");
+    assert!(
+        message.contains("the footprint of shot 10496:60"),
+        "{message}"
+    );
 
     // Values that are none are told with what they belong to.
     let mut negative = site.images.clone();
@@ -387,10 +403,10 @@ fn what_does_not_fit_together_is_refused() {
         "{message}"
     );
     shots.clone_from(&site.shots);
-    shots[7].range.as_mut().unwrap().range_m = f64::NAN;
+    shots.shots[7].range.as_mut().unwrap().range_m = f64::NAN;
     let message = run(&site.images, &shots, &site.ties, &plain);
     assert!(
-        message.contains("the range of shot 0/7 is NaN"),
+        message.contains("the range of shot 10496:7 is NaN"),
         "{message}"
     );
     let nowhere = AdjustmentConfig {
@@ -408,7 +424,7 @@ fn what_does_not_fit_together_is_refused() {
     };
     let message = run(&site.images, &site.shots, &site.ties, &unknown);
     assert!(message.contains("of profile 10496 is NaN"), "{message}");
-    assert!(!run(&[], &[], &[], &plain).is_empty());
+    assert!(!run(&[], &LaserShots::default(), &[], &plain).is_empty());
 }
 
 #[test]
@@ -531,7 +547,7 @@ fn the_result_is_kept_and_read_back() {
             .iter()
             .filter(|view| view.image == index && view.kind == PointKind::Tie);
         for view in ties {
-            let ground_m = Vector3::from(adjusted.points[view.point].ground_m);
+            let ground_m = adjusted.points[view.point].ground.xyz_m;
             let seen = Sighting::near(
                 &orientation,
                 &Distortion::NONE,
@@ -558,7 +574,7 @@ fn the_result_is_kept_and_read_back() {
         assert!(entry.time_bias_s.unwrap().1 < 0.05);
     }
     let tie = adjusted.points.last().unwrap();
-    let sigma_m = (0..3).map(|axis| tie.covariance_m2[axis][axis].sqrt());
+    let sigma_m = (0..3).map(|axis| tie.covariance_m2[(axis, axis)].sqrt());
     assert!(sigma_m.fold(0.0, f64::max) < 100.0);
 }
 

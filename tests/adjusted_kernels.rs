@@ -15,6 +15,7 @@ use std::{fs, path::Path};
 use areograph::{
     config::PointingConfig,
     error::Kind,
+    frames::Rotation,
     geom::attitude::matrix_of_rotation_vector,
     products::{AdjustedImage, AdjustedKernels, write_adjusted_kernels},
     spice::{KernelRole, KernelSet, Session},
@@ -25,7 +26,7 @@ use areograph::{
     time::{Et, PointingBias},
 };
 use fixture::{Image, angle_rad, apart, kernel_camera};
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Vector3};
 
 /// A pixel of the narrow angle, radians.
 const PIXEL_RAD: f64 = 0.013_124_057_852_294_9 / 3_500.0;
@@ -289,7 +290,8 @@ fn orientations_that_are_none_and_kernels_that_end_are_refused() {
         write_adjusted_kernels(&to, &[image]).unwrap_err()
     };
     let mut broken = image.orientation.clone();
-    broken.samples[7].camera_to_mars[1] = f64::NAN;
+    let sample = &mut broken.samples[7];
+    sample.camera_to_mars = Rotation::new(Matrix3::repeat(f64::NAN), sample.et);
     let failure = refused(&broken).to_string();
     assert!(
         failure.starts_with("adjusted/E02-02016.bsp: ckgpav_c"),

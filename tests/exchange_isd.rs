@@ -12,7 +12,6 @@ use std::{fs, path::PathBuf};
 
 use areograph::{
     config::{ImageConfig, KernelsConfig, OrientationConfig, PointingConfig, usual_instrument},
-    geom::attitude::matrix_of_spice_quaternion,
     image::ImageFields,
     kernel_source::{KernelList, KernelSource},
     products::write_products,
@@ -325,7 +324,7 @@ fn the_line_scanner_agrees_with_spice() {
     let (mut rotation, mut position_m) = (0.0_f64, 0.0_f64);
     for sample in &real.site.orientation.samples {
         let (position_km, camera_to_mars) = camera.camera(sample.et.seconds());
-        let spice = matrix_of_spice_quaternion(sample.camera_to_mars);
+        let spice = sample.camera_to_mars.matrix();
         rotation = rotation.max((camera_to_mars - spice).abs().max());
         // The samples are geometric; camera models want the apparent position.
         let body = Nodes::new(&real.isd["body_rotation"], "quaternions");

@@ -13,7 +13,7 @@ use areograph::{
     altimetry::BiasScope,
     config::{SiteConfig, load, usual_instrument},
     footprints::Footprints,
-    frames::{MarsIau2000, Position},
+    frames::MarsIau2000,
     geom::{
         attitude::{matrix_of_spice_quaternion, rotation_vector},
         ellipsoid::{ray_meets_ellipsoid, spherical_to_xyz_m},
@@ -25,7 +25,7 @@ use areograph::{
         group_profiles::{Profile, group_profiles},
         sample_orientation::{Orientation, sample_orientation},
         search_footprints::search_footprints,
-        tag_times::tag_times,
+        tag_times::{ImageTimes, tag_times},
     },
     time::{Intervals, PointingBias},
 };
@@ -66,6 +66,7 @@ fn list(value: &Value) -> &[Value] {
 }
 
 struct Found {
+    images: Vec<ImageTimes>,
     footprints: Footprints<MarsIau2000>,
     profiles: Vec<Profile>,
 }
@@ -78,6 +79,7 @@ fn found(config: &SiteConfig) -> Found {
     let footprints = convert_datum(searched.footprints, &config.mola_clock).footprints;
     let profiles = group_profiles(&footprints, &config.windows, &images);
     Found {
+        images,
         footprints,
         profiles,
     }
@@ -108,7 +110,8 @@ fn checked(version: &str, config: &SiteConfig, found: &Found) -> RangeCheck {
 /// The profile of `found` that `truth` tells of.
 fn of_truth<'a>(found: &'a Found, truth: &Value) -> Option<(usize, &'a Profile)> {
     let image = truth["image"].as_str().unwrap();
-    let same = |profile: &Profile| profile.simultaneous.iter().any(|one| one.image == image);
+    let is_named = |at: usize| found.images[at].id == image;
+    let same = |profile: &Profile| profile.simultaneous.iter().any(|one| is_named(one.image));
     found
         .profiles
         .iter()
@@ -318,12 +321,12 @@ fn orientation_comes_back() {
                 // The label's clock count of 1/256 s is exact in the scene.
                 assert!((sample.et.seconds() - number(&truth["epochs_et_s"][k])).abs() < 1e-6);
                 let position_m = vector(&truth["position_iau2000_m"][k]);
-                let apart_m = (Vector3::from(sample.position_m) - position_m).norm();
+                let apart_m = (sample.position.xyz_m - position_m).norm();
                 assert!(apart_m < 1e-3, "{} {k}: {apart_m} m", orientation.image);
                 let quaternion = &truth["camera_to_mars_quaternion_wxyz"][k];
                 let true_matrix =
                     matrix_of_spice_quaternion(std::array::from_fn(|i| number(&quaternion[i])));
-                let matrix = matrix_of_spice_quaternion(sample.camera_to_mars);
+                let matrix = sample.camera_to_mars.matrix();
                 let apart_rad = rotation_vector(&(matrix * true_matrix.transpose())).norm();
                 assert!(
                     apart_rad < 1e-8,
@@ -355,9 +358,8 @@ fn without_the_pointing_bias_a_nadir_image_moves_380_m() {
         seen += 1;
         let ground = |orientation: &Orientation| {
             let sample = &orientation.samples[15];
-            let position = Position::<MarsIau2000>::new(sample.position_m.into());
-            let boresight = matrix_of_spice_quaternion(sample.camera_to_mars) * Vector3::z();
-            ray_meets_ellipsoid(&position, &boresight).unwrap()
+            let boresight = sample.camera_to_mars.matrix() * Vector3::z();
+            ray_meets_ellipsoid(&sample.position, &boresight).unwrap()
         };
         let moved_m = ground(with).distance_m(&ground(without));
         // 1.15 s of 0.050 deg/s seen from 375 to 380 km.

@@ -25,6 +25,7 @@ use std::{
 use areograph::{
     config::AdjustmentConfig,
     footprints::FootprintImageCoordinates,
+    frames::Position,
     geom::{
         intersection::{IntersectionLimits, Unintersected},
         pushbroom::{CorrectedOrientation, ExteriorOrientation, SampledOrientation},
@@ -34,7 +35,8 @@ use areograph::{
     pds::ties::read_ties,
     stages::{
         adjust::{
-            AdjustImage, Adjusted, LaserShot, PointKind, ShotRange, adjust, orientation_sigmas,
+            AdjustImage, Adjusted, LaserShot, LaserShots, PointKind, ShotRange, adjust,
+            orientation_sigmas,
         },
         intersect::{IntersectOptions, IntersectedTies, TieReject, intersect_ties},
     },
@@ -131,18 +133,21 @@ impl Site {
         intersect_ties(&self.stereo(), ties, &options).unwrap()
     }
 
-    fn shots(&self, with_ranges: bool) -> Vec<LaserShot> {
-        let shot = |point: &LidarPoint| LaserShot {
-            id: point.id.clone(),
-            ground_m: point.ground_m.into(),
+    fn shots(&self, with_ranges: bool) -> LaserShots {
+        let shot = |(row, point): (u32, &LidarPoint)| LaserShot {
+            profile: 0,
+            row,
+            ground: Position::new(point.ground_m),
             range: with_ranges.then(|| ShotRange {
-                profile: "LOLA".to_owned(),
-                image: SERIALS[0].to_owned(),
+                image: 0,
                 x_lines: self.images[0].x_lines(point.et_s),
                 range_m: point.range_m,
             }),
         };
-        self.points.iter().map(shot).collect()
+        LaserShots {
+            profiles: vec!["LOLA".to_owned()],
+            shots: (0..).zip(&self.points).map(shot).collect(),
+        }
     }
 
     fn adjust(&self, priors: &Priors, options: &AdjustmentConfig, with_ranges: bool) -> Adjusted {
@@ -167,13 +172,15 @@ impl Site {
             base: &self.images[0].orientation,
             correction: adjusted.correction(0),
         };
-        let adjusted_m = |point: &LidarPoint| {
+        let adjusted_m = |row: usize| {
             let mut shots = adjusted.points.iter();
-            let shot = shots.find(|shot| shot.kind == PointKind::Shot && shot.id == point.id);
-            Vector3::from(shot.unwrap().ground_m)
+            let shot = shots.find(|shot| shot.kind == PointKind::Shot && shot.index == row);
+            shot.unwrap().ground.xyz_m
         };
-        let misclosure_m = |point| self.misclosure_m(&orientation, point, &adjusted_m(point));
-        self.points.iter().map(misclosure_m).collect()
+        let points = self.points.iter().enumerate();
+        points
+            .map(|(row, point)| self.misclosure_m(&orientation, point, &adjusted_m(row)))
+            .collect()
     }
 
     fn misclosure_m(
@@ -189,10 +196,13 @@ impl Site {
 
 /// The ties of a network as a camera without distortion has them.
 fn ties(path: &Path, images: &[Image; 2]) -> Vec<TiePoint> {
-    let mut ties = read_ties(path).unwrap().ties;
+    let index_of = |name: &str| SERIALS.iter().position(|known| *known == name);
+    let ties = read_ties(path).unwrap().ties.into_iter();
+    let mut ties: Vec<TiePoint> = ties
+        .map(|tie| tie.in_images(index_of, |name| panic!("{name}")))
+        .collect();
     for measure in ties.iter_mut().flat_map(|tie| &mut tie.measures) {
-        let image = SERIALS.iter().position(|known| *known == measure.image);
-        measure.sample = images[image.unwrap()].ideal_sample(measure.sample);
+        measure.sample = images[measure.image].ideal_sample(measure.sample);
     }
     ties
 }
@@ -201,21 +211,21 @@ fn summary(values: impl IntoIterator<Item = f64>) -> Summary {
     Summary::of(&values.into_iter().collect::<Vec<_>>())
 }
 
-fn height_m(ground_m: [f64; 3]) -> f64 {
-    Vector3::from(ground_m).norm() - MOON_RADIUS_M
+fn height_m(ground_m: &Vector3<f64>) -> f64 {
+    ground_m.norm() - MOON_RADIUS_M
 }
 
 /// Heights of the tie points minus that of the nearest footprint, where one lies within 200 m.
-fn heights_above_shots_m(site: &Site, ties: impl Iterator<Item = [f64; 3]>) -> Summary {
+fn heights_above_shots_m(site: &Site, ties: impl Iterator<Item = Vector3<f64>>) -> Summary {
     let above = ties.filter_map(|tie_m| {
-        let direction = Vector3::from(tie_m).normalize();
+        let direction = tie_m.normalize();
         let apart_m =
             |point: &LidarPoint| MOON_RADIUS_M * direction.angle(&point.ground_m.normalize());
         let nearest = site
             .points
             .iter()
             .min_by(|a, b| apart_m(a).total_cmp(&apart_m(b)))?;
-        (apart_m(nearest) < 200.0).then(|| height_m(tie_m) - height_m(nearest.ground_m.into()))
+        (apart_m(nearest) < 200.0).then(|| height_m(&tie_m) - height_m(&nearest.ground_m))
     });
     summary(above)
 }
@@ -224,7 +234,7 @@ fn heights_above_shots_m(site: &Site, ties: impl Iterator<Item = [f64; 3]>) -> S
 fn adjusted_heights_m(site: &Site, adjusted: &Adjusted) -> Summary {
     let ties = adjusted.points.iter();
     let ties = ties.filter(|point| point.kind == PointKind::Tie);
-    heights_above_shots_m(site, ties.map(|point| point.ground_m))
+    heights_above_shots_m(site, ties.map(|point| point.ground.xyz_m))
 }
 
 fn row(name: &str, values: &Summary) {
@@ -329,10 +339,10 @@ fn the_ties_of_the_network_meet_within_a_line() {
             .iter()
             .map(|point| point.convergence_rad.to_degrees()),
     );
-    let heights_m = summary(points.iter().map(|point| height_m(point.ground_m)));
+    let heights_m = summary(points.iter().map(|point| height_m(&point.ground.xyz_m)));
     let shots = site.points.iter();
-    let shots_m = summary(shots.map(|point| height_m(point.ground_m.into())));
-    let above_m = heights_above_shots_m(&site, points.iter().map(|point| point.ground_m));
+    let shots_m = summary(shots.map(|point| height_m(&point.ground_m)));
+    let above_m = heights_above_shots_m(&site, points.iter().map(|point| point.ground.xyz_m));
     let outliers = points.iter().filter(|point| point.outlier).count();
     eprintln!("sigma0 {:.4} px, {outliers} outliers", found.sigma0);
     row("convergence, degrees", &angles_deg);
@@ -387,7 +397,7 @@ fn the_places_of_the_shots_contradict_the_ties() {
     // orientation, ties would meet better with them, not worse.
     let mut shifted = site.ties.clone();
     for measure in shifted.iter_mut().flat_map(|tie| &mut tie.measures) {
-        let second = measure.image == SERIALS[1];
+        let second = measure.image == 1;
         measure.line += if second { 18.615 } else { 13.223 };
         measure.sample += if second { 2.533 } else { 2.796 };
     }

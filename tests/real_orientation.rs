@@ -11,7 +11,6 @@ use std::{fs, path::PathBuf};
 
 use areograph::{
     config::{ImageConfig, KernelsConfig, OrientationConfig, PointingConfig, usual_instrument},
-    geom::attitude::matrix_of_spice_quaternion,
     image::ImageFields,
     kernel_source::{KernelList, KernelSource},
     spice::{KernelSet, Session},
@@ -103,9 +102,9 @@ fn orientation_equals_cspice() {
     for (sample, truth) in orientation.samples.iter().zip(samples) {
         assert!((sample.et.seconds() - truth["et"].as_f64().unwrap()).abs() < 5e-9); // two ulp of ET
         let position_m = METRES_PER_KM * Vector3::from_vec(numbers(&truth["mgs_iau_mars_pos"]));
-        let apart_m = (Vector3::from(sample.position_m) - position_m).norm();
+        let apart_m = (sample.position.xyz_m - position_m).norm();
         assert!(apart_m < 1e-3, "{apart_m} m"); // 1e-6 km, as the issue demands
-        let matrix = matrix_of_spice_quaternion(sample.camera_to_mars);
+        let matrix = sample.camera_to_mars.matrix();
         let truth = Matrix3::from_row_slice(&numbers(&truth["r_camera_to_iau_mars"]));
         let apart = (matrix - truth).abs().max();
         assert!(apart < 1e-11, "{apart}"); // matrix elements, as the issue demands

@@ -163,12 +163,11 @@ fn repeated_shots_and_empty_profiles_are_nothing_special() {
 fn every_profile_is_tried_in_an_image_that_sees_nothing() {
     let mut site = under_the_camera();
     for sample in &mut site.orientation.samples {
-        sample.position_m = site
+        sample.position.xyz_m = site
             .model
             .rotation_vector_orientation()
             .pose(0.0)
-            .position_m
-            .into();
+            .position_m;
     }
     // A camera that stands still has no lines.
     site.model = areograph::stages::fit_sensor_model::fit_sensor_model(

@@ -137,12 +137,12 @@ fn a_shift_of_lines_and_a_curved_correction_are_those_of_the_kernels() {
             let (position_m, camera_to_mars) = kernel_camera(&session, &image, et);
             let correction = curved(sample.line_offset);
             let expected_m = position_m + correction.position_m;
-            let distance_m = (Vector3::from(sample.position_m) - expected_m).norm();
+            let distance_m = (sample.position.xyz_m - expected_m).norm();
             // Tags, shifted instants and nodes are rounded to 7e-9 s, 3e-5 m each at this speed.
             assert!(distance_m < 5e-4, "{distance_m:.1e} m");
             let mars_to_camera =
                 matrix_of_rotation_vector(&correction.rotation_rad) * camera_to_mars.transpose();
-            let found = matrix_of_spice_quaternion(sample.camera_to_mars);
+            let found = *sample.camera_to_mars.matrix();
             let turn_rad = angle_rad(&found, &mars_to_camera.transpose());
             // What the tables say of themselves, and rounding.
             assert!(
@@ -181,9 +181,9 @@ fn tables_against_samples_px(orientation: &Orientation, tables: &CameraTables) -
         let position_m = Vector3::from(lagrange(&positions, at));
         let camera_to_mars =
             matrix_of_rotation_vector(&Vector3::from(lagrange(&vectors, at))) * reference;
-        let expected = matrix_of_spice_quaternion(sample.camera_to_mars);
+        let expected = *sample.camera_to_mars.matrix();
         let range_m = sample.boresight.unwrap().range_m;
-        let ground_m = Vector3::from(sample.position_m) + expected * Vector3::z() * range_m;
+        let ground_m = sample.position.xyz_m + expected * Vector3::z() * range_m;
         let seen = camera_to_mars.transpose() * (ground_m - position_m);
         worst_px = worst_px.max((seen.x / seen.z).hypot(seen.y / seen.z) / PIXEL_RAD);
     }

@@ -13,11 +13,11 @@ mod page;
 mod site;
 
 use areograph::{
+    geom::uncertainty::GroundPart,
     report,
     stages::{
         adjust::{LeftOut, LeftOutReason, PointKind},
         compare_pairs::PairComparison,
-        uncertainty::GroundPart,
     },
     units::RADIANS_PER_ARCSECOND,
 };
@@ -148,9 +148,9 @@ fn residual_vectors_are_those_of_the_intersection() {
             // The vectors start where the tie points were measured.
             for (row, point) in own.iter().zip(ties.points.iter().filter(|p| !p.outlier)) {
                 let mut ties = site.ties.points.iter();
-                let tie = ties.find(|tie| tie.id == point.id).unwrap();
+                let tie = ties.nth(point.tie).unwrap();
                 let mut measures = tie.measures.iter();
-                let measure = measures.find(|of| of.image == times.id).unwrap();
+                let measure = measures.find(|of| of.image == index).unwrap();
                 // Eight digits of line numbers up to 10496.
                 assert!((number(&row[2]) - measure.line).abs() < 1e-3, "{}", tie.id);
                 assert!(
@@ -278,7 +278,7 @@ fn corrections_of_images_and_their_ranges_are_told() {
             .adjusted
             .ranges
             .iter()
-            .filter(|of| of.profile == row[0]);
+            .filter(|of| site.profiles[of.profile].id == row[0]);
         let values: Vec<f64> = residuals.map(|of| of.residual_m.value).collect();
         agree(&row[5], values.iter().sum::<f64>() / values.len() as f64, 3);
         // All shots of these profiles were fired near or in an image; the check's mean is close to theirs.
@@ -363,6 +363,7 @@ fn many_blunders_are_counted_and_their_names_stay_text() {
     site.adjusted.left_out = (0..33)
         .map(|index| LeftOut {
             kind: PointKind::Tie,
+            index,
             id: format!("<i>{index}"),
             reason: LeftOutReason::Blunder { standardised: 5.0 },
         })

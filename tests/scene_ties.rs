@@ -1,6 +1,10 @@
 //! Tie points of the synthetic mission: the cameras that measured them meet on the true ground, and the
 //! cameras that labels and kernels tell miss each other by about one spacing of MOLA's footprints.
-#![allow(clippy::unwrap_used, reason = "helpers of tests may fail loudly")]
+#![allow(
+    clippy::unwrap_used,
+    clippy::panic,
+    reason = "helpers of tests may fail loudly"
+)]
 
 mod common;
 
@@ -9,7 +13,6 @@ use std::{collections::BTreeMap, fs};
 use areograph::{
     config::{SiteConfig, load, usual_instrument},
     geom::{
-        attitude::matrix_of_spice_quaternion,
         ellipsoid::spherical_to_xyz_m,
         intersection::Weighting,
         pushbroom::{Detector, Pose, Projector, SampledOrientation},
@@ -25,7 +28,7 @@ use areograph::{
     ties::TiePoint,
 };
 use common::mission::mission;
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::Vector3;
 use serde_json::Value;
 
 const SITES: [&str; 3] = ["eos_chasma", "gusev_crater", "isidis"];
@@ -70,12 +73,16 @@ impl Pair {
         assert_eq!((file.ignored, file.complaints.len()), (0, 0));
         let all = truth();
         let mut own = all["ties"].as_array().unwrap().iter();
+        let index_of = |name: &str| times.iter().position(|image| image.id == name);
+        let ties = file.ties.into_iter();
+        let ties = ties.map(|tie| tie.in_images(index_of, |name| panic!("{name}")));
+        let ties = ties.collect();
         Self {
             config,
             times,
             session,
             truth: own.find(|ties| ties["site"] == site).unwrap().clone(),
-            ties: file.ties,
+            ties,
         }
     }
 
@@ -100,10 +107,8 @@ impl Pair {
             .samples
             .iter()
             .map(|sample| {
-                let pose = Pose {
-                    position_m: Vector3::from(sample.position_m) + aside_m,
-                    mars_to_camera: matrix_of_spice_quaternion(sample.camera_to_mars).transpose(),
-                };
+                let mut pose = sample.pose();
+                pose.position_m += aside_m;
                 (sample.line_offset, pose)
             })
             .collect();
@@ -191,8 +196,8 @@ fn intersected(
 fn squares_off(found: &IntersectedTies, truth: &BTreeMap<String, Value>) -> Vec<f64> {
     let square = |point: &IntersectedPoint| {
         let ground_m = vector(&truth[&point.id]["ground_iau2000_m"]);
-        let off_m = Vector3::from(point.ground_m) - ground_m;
-        let covariance_m2 = Matrix3::from(point.covariance_m2) / found.sigma0.powi(2);
+        let off_m = point.ground.xyz_m - ground_m;
+        let covariance_m2 = point.covariance_m2 / found.sigma0.powi(2);
         off_m.dot(&(covariance_m2.try_inverse().unwrap() * off_m))
     };
     found.points.iter().map(square).collect()
@@ -205,11 +210,7 @@ fn each_pair_has_154_ties_and_8_blunders() {
         assert_eq!(pair.ties.len(), 154, "{site}");
         assert_eq!(pair.good().len(), 154 - 8, "{site}");
         for measure in pair.ties.iter().flat_map(|tie| &tie.measures) {
-            let times = pair
-                .times
-                .iter()
-                .find(|times| times.id == measure.image)
-                .unwrap();
+            let times = &pair.times[measure.image];
             assert!((0.0..f64::from(times.lines_delivered)).contains(&measure.line));
             assert!((0.0..f64::from(times.samples)).contains(&measure.sample));
         }
@@ -270,7 +271,7 @@ fn blunders_are_where_the_truth_says() {
             assert!((20.0..100.0).contains(&length_px), "{blunder}");
             let mut mended = tie.clone();
             for measure in &mut mended.measures {
-                if blunder["image"] == measure.image.as_str() {
+                if blunder["image"] == pair.times[measure.image].id.as_str() {
                     measure.line -= line;
                     measure.sample -= sample;
                 }
@@ -289,10 +290,7 @@ fn shifts_lines(pair: &Pair, images: &[StereoImage<SampledOrientation>]) -> [f64
         let projector = Projector::new(&image.orientation, image.lines).unwrap();
         let shifts = good.iter().map(|tie| {
             let ground_m = vector(&truth[&tie.id]["ground_iau2000_m"]);
-            let measure = tie
-                .measures
-                .iter()
-                .find(|measure| measure.image == image.id);
+            let measure = tie.measures.iter().find(|measure| measure.image == index);
             let (x_lines, _) = image.focal_place(measure.unwrap().line, 0.0);
             x_lines - projector.project(&ground_m).unwrap().x
         });

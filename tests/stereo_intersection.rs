@@ -11,6 +11,7 @@ mod recipe;
 mod scene;
 
 use areograph::{
+    error::Kind,
     geom::{
         intersection::{Unintersected, Weighting},
         pushbroom::{Detector, Distortion, EulerPolynomial},
@@ -19,7 +20,7 @@ use areograph::{
     stages::intersect::{IntersectOptions, IntersectedTies, TieReject, intersect_ties},
     ties::{TieMeasure, TiePoint},
 };
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::Vector3;
 use recipe::{Normals, Recipe};
 
 fn images() -> Vec<StereoImage<EulerPolynomial>> {
@@ -67,7 +68,7 @@ fn ties(
                     let (lines, pixels) = error(view.image);
                     let image = &images[view.image];
                     TieMeasure {
-                        image: image.id.clone(),
+                        image: view.image,
                         line: view.x_lines + 0.5 * image.lines + lines,
                         sample: image.detector.sample(view.y_px) + pixels,
                     }
@@ -98,7 +99,7 @@ fn exact_measurements_give_the_truth() {
     let result = intersected(&ties, FOCAL);
     assert_eq!((result.points.len(), result.rejected.len()), (154, 0));
     for (point, truth) in result.points.iter().zip(&truth) {
-        assert!((Vector3::from(point.ground_m) - truth).norm() < 1e-3); // metres
+        assert!((point.ground.xyz_m - truth).norm() < 1e-3); // metres
         for measure in &point.measures {
             assert!(measure.focal_along_px.abs() < 1e-6 && measure.focal_across_px.abs() < 1e-6);
             assert!(measure.reprojection_lines.abs() < 1e-6);
@@ -109,9 +110,9 @@ fn exact_measurements_give_the_truth() {
 }
 
 /// Ground size of a pixel over that of a line: what shares a disagreement between the images.
-fn ground_per_px_and_line(point: &[f64; 3], image: usize) -> (f64, f64) {
+fn ground_per_px_and_line(point_m: &Vector3<f64>, image: usize) -> (f64, f64) {
     let scenes = recipe::pair(recipe::Recipe::GUSEV.place_deg);
-    let range_m = (scenes[image].pose(0.0).position_m - Vector3::from(*point)).norm();
+    let range_m = (scenes[image].pose(0.0).position_m - point_m).norm();
     let spacing_m = (scenes[image].boresight_ground_m(scenes[image].line_period_s())
         - scenes[image].boresight_ground_m(0.0))
     .norm();
@@ -126,7 +127,7 @@ fn a_line_bias_is_shared_as_the_weights_say() {
         let [first, second] = [0, 1].map(|image| result.images[image].reprojection);
         println!("{first:.4?}\n{second:.4?}\n{:.4?}", result.images[0].focal);
         assert!(first.along.mean > 0.0 && second.along.mean < 0.0);
-        let middle = &result.points[77].ground_m;
+        let middle = &result.points[77].ground.xyz_m;
         let [(g1, s1), (g2, s2)] = [0, 1].map(|image| ground_per_px_and_line(middle, image));
         let law = if focal {
             (g1 / g2).powi(2) * s2 / s1
@@ -172,8 +173,8 @@ fn noise_comes_out_as_simulated_and_as_the_covariance_says() {
     let truth: std::collections::BTreeMap<&str, &Vector3<f64>> =
         ties.iter().map(|tie| tie.id.as_str()).zip(&truth).collect();
     for point in &line.points {
-        let error = Vector3::from(point.ground_m) - truth[point.id.as_str()];
-        let covariance = Matrix3::from(point.covariance_m2);
+        let error = point.ground.xyz_m - truth[point.id.as_str()];
+        let covariance = point.covariance_m2;
         squares += error.dot(&(covariance.try_inverse().unwrap() * error)) / 3.0;
     }
     near((squares / line.points.len() as f64).sqrt(), 1.0);
@@ -205,13 +206,13 @@ fn what_cannot_be_intersected_is_counted() {
     assert_eq!(result.points.len(), 1);
 
     let mut unknown = ties;
-    unknown[3].measures[0].image = "another".to_owned();
+    unknown[3].measures[0].image = 2;
     let failure = intersect_ties(&images(), &unknown, &IntersectOptions::default()).unwrap_err();
-    assert_eq!(failure.kind().exit_code(), 3);
+    assert_eq!(failure.kind(), Kind::Bug);
     assert!(
         failure
             .to_string()
-            .contains("none of the images nadir, oblique")
+            .contains("image 2, counted from 0; expected one of 2 images")
     );
 }
 
@@ -225,7 +226,7 @@ fn an_image_with_itself_gives_no_height() {
     };
     for tie in &mut ties {
         tie.measures[1] = TieMeasure {
-            image: "oblique".to_owned(),
+            image: 1,
             ..tie.measures[0].clone()
         };
     }

@@ -73,12 +73,12 @@ fn orientation_comes_back() {
             let apart_s = sample.et.seconds() - truth["epochs_et_s"][k].as_f64().unwrap();
             assert!(apart_s.abs() < 1e-6, "{apart_s} s"); // the clock count of 1/256 s is exact
             let true_m = vector(&truth["position_iau2000_m"][k]);
-            let apart_m = (Vector3::from(sample.position_m) - true_m).norm();
+            let apart_m = (sample.position.xyz_m - true_m).norm();
             assert!(apart_m < 1e-3, "{} {k}: {apart_m} m", orientation.image);
             let quaternion = &truth["camera_to_mars_quaternion_wxyz"][k];
             let components = std::array::from_fn(|i| quaternion[i].as_f64().unwrap());
-            let turned = matrix_of_spice_quaternion(sample.camera_to_mars)
-                * matrix_of_spice_quaternion(components).transpose();
+            let turned =
+                sample.camera_to_mars.matrix() * matrix_of_spice_quaternion(components).transpose();
             let apart_rad = rotation_vector(&turned).norm();
             assert!(
                 apart_rad < 1e-8,

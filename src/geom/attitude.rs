@@ -79,6 +79,16 @@ pub fn matrix_of_spice_quaternion([w, x, y, z]: [f64; 4]) -> Matrix3<f64> {
         .into_inner()
 }
 
+/// Quaternions of matrices as [`spice_quaternion`] has them, each with the sign that lies nearest to the one before.
+#[must_use]
+pub fn continuous_quaternions<'a>(
+    matrices: impl IntoIterator<Item = &'a Matrix3<f64>>,
+) -> Vec<[f64; 4]> {
+    let mut quaternions: Vec<[f64; 4]> = matrices.into_iter().map(spice_quaternion).collect();
+    make_continuous(&mut quaternions);
+    quaternions
+}
+
 /// Chooses signs so that each quaternion lies nearest to the one before it.
 pub fn make_continuous(quaternions: &mut [[f64; 4]]) {
     for index in 1..quaternions.len() {

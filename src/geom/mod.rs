@@ -17,4 +17,5 @@ pub mod pushbroom;
 pub mod robust;
 pub mod statistics;
 pub mod stereo;
+pub mod uncertainty;
 pub mod window;

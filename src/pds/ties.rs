@@ -20,7 +20,7 @@ const ISIS_TO_EDGE: f64 = -0.5;
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct TieFile {
     /// Points in the order of their first measurement, also those measured once.
-    pub ties: Vec<TiePoint>,
+    pub ties: Vec<TiePoint<String>>,
     /// Measurements and points that the network itself says to ignore.
     pub ignored: usize,
     /// Records that are not what they should be.
@@ -87,7 +87,7 @@ pub fn read_ties(path: &Path) -> Result<TieFile> {
 
 /// The table of some tie points, as [`read_ties`] reads it; places to a ten-thousandth of a pixel.
 #[must_use]
-pub fn ties_table(ties: &[TiePoint]) -> String {
+pub fn ties_table(ties: &[TiePoint<String>]) -> String {
     let mut table = csv::Writer::from_writer(Vec::new());
     // Writing into memory cannot fail.
     let _infallible = table.write_record(["point_id", "serial_number", "sample", "line"]);
@@ -278,7 +278,7 @@ mod tests {
         Group = ControlMeasure\n SerialNumber = A\n Line = 1\n Sample = 1\n End_Group\n End_Object\n\
         End_Object\nEnd\n";
 
-    fn measure(image: &str, line: f64, sample: f64) -> TieMeasure {
+    fn measure(image: &str, line: f64, sample: f64) -> TieMeasure<String> {
         TieMeasure {
             image: image.to_owned(),
             line,

@@ -26,8 +26,6 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use nalgebra::Vector3;
-
 use super::{
     GeometricProducts, Product, SiteProducts, Writer, fault::ProductFault, files::write_text,
 };
@@ -35,11 +33,7 @@ use crate::{
     config::{KernelsConfig, PointingConfig},
     error::{IoFault, Place, Result},
     frames::MarsIau2000,
-    geom::{
-        attitude::{matrix_of_spice_quaternion, rotation_vector},
-        mars_rotation::mars_rotation,
-        statistics::largest,
-    },
+    geom::{attitude::rotation_vector, mars_rotation::mars_rotation, statistics::largest},
     spice::{Kernel, KernelSet, Session},
     stages::{sample_orientation::Orientation, tag_times::ImageTimes},
     time::{Et, Interval},
@@ -248,9 +242,9 @@ fn read_back(to: &AdjustedKernels, image: &AdjustedImage) -> Result<()> {
         let to_camera =
             session.mounting(&image.times.instrument, sample.et)? * attitude.inertial_to_bus;
         let camera_to_mars = to_mars * to_camera.inverse();
-        let expected = matrix_of_spice_quaternion(sample.camera_to_mars);
-        distances_m.push((position.xyz_m - Vector3::from(sample.position_m)).norm());
-        turns_rad.push(rotation_vector(&(camera_to_mars.matrix() * expected.transpose())).norm());
+        let expected = sample.pose().mars_to_camera;
+        distances_m.push(position.distance_m(&sample.position));
+        turns_rad.push(rotation_vector(&(camera_to_mars.matrix() * expected)).norm());
     }
     let distance_m = largest(distances_m).unwrap_or_default();
     let turn_rad = largest(turns_rad).unwrap_or_default();

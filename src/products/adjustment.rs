@@ -10,14 +10,16 @@ use crate::{
     error::Result,
     footprints::FootprintImageCoordinates,
     geom::{
-        bundle::ORIENTATION_UNKNOWNS, pushbroom::CameraModel, robust::RobustWeight,
+        bundle::ORIENTATION_UNKNOWNS,
+        pushbroom::CameraModel,
+        robust::RobustWeight,
         statistics::Summary,
+        uncertainty::{ResidualMoments, UncertaintyBudget},
     },
     stages::{
         adjust::{AdjustmentSummary, CorrectedImage, PointKind},
         compare_pairs::{PairComparison, ProfileByTies},
         intersect::{ImageResiduals, IntersectedTies},
-        uncertainty::{ResidualMoments, UncertaintyBudget},
     },
 };
 

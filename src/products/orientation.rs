@@ -12,7 +12,7 @@ use super::{
 };
 use crate::{
     error::Result,
-    geom::polynomial::Fit,
+    geom::{attitude::continuous_quaternions, polynomial::Fit},
     stages::{
         fit_sensor_model::{EulerModel, RotationVectorModel, SensorModel},
         sample_orientation::{BoresightGround, GroundPoint, Orientation, OrientationSample},
@@ -125,6 +125,12 @@ fn columns(samples: &[OrientationSample]) -> Vec<Column> {
             Values::F64(samples.iter().map(value).collect()),
         )
     };
+    let rotations = samples.iter().map(|sample| sample.camera_to_mars.matrix());
+    let quaternions = continuous_quaternions(rotations);
+    let quaternion = |name, description, component: usize| {
+        let values = quaternions.iter().map(|quaternion| quaternion[component]);
+        Column::new(name, description, Values::F64(values.collect()))
+    };
     let boresight = |name, description, value: fn(&BoresightGround) -> f64| {
         let values = samples
             .iter()
@@ -139,29 +145,21 @@ fn columns(samples: &[OrientationSample]) -> Vec<Column> {
             |s| s.line_offset,
         ),
         number("x_m", "perspective centre, IAU 2000 X, metres", |s| {
-            s.position_m[0]
+            s.position.xyz_m.x
         }),
         number("y_m", "perspective centre, IAU 2000 Y, metres", |s| {
-            s.position_m[1]
+            s.position.xyz_m.y
         }),
         number("z_m", "perspective centre, IAU 2000 Z, metres", |s| {
-            s.position_m[2]
+            s.position.xyz_m.z
         }),
         number("omega_rad", "omega, radians", |s| s.angles.omega_rad),
         number("phi_rad", "phi, radians", |s| s.angles.phi_rad),
         number("kappa_rad", "kappa, radians", |s| s.angles.kappa_rad),
-        number("quaternion_w", "camera to Mars, SPICE convention, w", |s| {
-            s.camera_to_mars[0]
-        }),
-        number("quaternion_x", "camera to Mars, SPICE convention, x", |s| {
-            s.camera_to_mars[1]
-        }),
-        number("quaternion_y", "camera to Mars, SPICE convention, y", |s| {
-            s.camera_to_mars[2]
-        }),
-        number("quaternion_z", "camera to Mars, SPICE convention, z", |s| {
-            s.camera_to_mars[3]
-        }),
+        quaternion("quaternion_w", "camera to Mars, SPICE convention, w", 0),
+        quaternion("quaternion_x", "camera to Mars, SPICE convention, x", 1),
+        quaternion("quaternion_y", "camera to Mars, SPICE convention, y", 2),
+        quaternion("quaternion_z", "camera to Mars, SPICE convention, z", 3),
         boresight(
             "boresight_longitude_deg",
             "east longitude where the boresight meets the ellipsoid",
@@ -265,7 +263,7 @@ fn euler(model: &EulerModel) -> Euler<'_> {
 fn rotation_vector(model: &RotationVectorModel) -> RotationVector<'_> {
     let [x, y, z] = &model.vector_rad;
     RotationVector {
-        reference: model.reference,
+        reference: model.reference.transpose().into(),
         x_rad: angle(x),
         y_rad: angle(y),
         z_rad: angle(z),

@@ -18,7 +18,7 @@ use crate::{
     geom::statistics::{Summary, Trend},
     stages::{
         check_ranges::{BiasScan, ProfileRanges},
-        group_profiles::{Profile, SimultaneousImage},
+        group_profiles::Profile,
     },
 };
 
@@ -108,6 +108,13 @@ struct SiteSummary {
     range_minus_distance_m: Summary,
 }
 
+/// An image that was exposed during a profile.
+#[derive(Serialize)]
+struct Simultaneous<'a> {
+    image: &'a str,
+    shots: u32,
+}
+
 #[derive(Serialize)]
 struct ProfileDocument<'a> {
     id: &'a str,
@@ -115,7 +122,7 @@ struct ProfileDocument<'a> {
     orbit: u32,
     et_start_s: f64,
     et_stop_s: f64,
-    simultaneous: &'a [SimultaneousImage],
+    simultaneous: Vec<Simultaneous<'a>>,
     valid: bool,
     invalid_because: &'a [String],
     range_minus_distance_m: Summary,
@@ -257,12 +264,16 @@ fn document<'a>(site: &SiteProducts<'a>) -> Document<'a> {
             .profiles
             .iter()
             .zip(&ranges.profiles)
-            .map(|(profile, ranges)| profile_document(profile, ranges))
+            .map(|(profile, ranges)| profile_document(site, profile, ranges))
             .collect(),
     }
 }
 
-fn profile_document<'a>(profile: &'a Profile, ranges: &'a ProfileRanges) -> ProfileDocument<'a> {
+fn profile_document<'a>(
+    site: &SiteProducts<'a>,
+    profile: &'a Profile,
+    ranges: &'a ProfileRanges,
+) -> ProfileDocument<'a> {
     let [radial, along, cross] = ranges.spacecraft_m;
     ProfileDocument {
         id: &profile.id,
@@ -270,7 +281,14 @@ fn profile_document<'a>(profile: &'a Profile, ranges: &'a ProfileRanges) -> Prof
         orbit: profile.orbit,
         et_start_s: profile.interval.start.seconds(),
         et_stop_s: profile.interval.stop.seconds(),
-        simultaneous: &profile.simultaneous,
+        simultaneous: profile
+            .simultaneous
+            .iter()
+            .map(|of| Simultaneous {
+                image: &site.images[of.image].times.id,
+                shots: of.shots,
+            })
+            .collect(),
         valid: ranges.invalid_because.is_empty(),
         invalid_because: &ranges.invalid_because,
         range_minus_distance_m: ranges.range_minus_distance_m,

@@ -47,55 +47,51 @@ struct Measurement<'a> {
     adjusted: Option<(&'a CorrectedPoint, &'a ImageResidual)>,
 }
 
-/// Intersected points by their identifiers; of points with the same one the first was intersected.
-fn by_id(ties: &IntersectedTies) -> BTreeMap<&str, &IntersectedPoint> {
-    let points = ties.points.iter();
-    points.map(|point| (point.id.as_str(), point)).collect()
+/// Intersected points by the indices of their tie points.
+fn by_tie(ties: &IntersectedTies) -> BTreeMap<usize, &IntersectedPoint> {
+    ties.points.iter().map(|point| (point.tie, point)).collect()
 }
 
 fn measurements<'a>(
     site: &SiteProducts<'a>,
     geometric: &GeometricProducts<'a>,
 ) -> Vec<Measurement<'a>> {
-    let ids: Vec<&str> = site.images.iter().map(|image| &*image.times.id).collect();
     let adjusted = geometric.adjusted;
     let ties = (0_usize..).zip(&adjusted.points);
     let ties = ties.filter(|(_, point)| point.kind == PointKind::Tie);
-    let mut points: BTreeMap<&str, (usize, &CorrectedPoint)> = ties
-        .map(|(index, point)| (point.id.as_str(), (index, point)))
+    let points: BTreeMap<usize, (usize, &CorrectedPoint)> = ties
+        .map(|(index, point)| (point.index, (index, point)))
         .collect();
     let views: BTreeMap<(usize, usize), &ImageResidual> = adjusted
         .views
         .iter()
         .map(|view| ((view.point, view.image), view))
         .collect();
-    let mut before = by_id(geometric.intersected);
-    let mut after = by_id(geometric.adjusted_intersected);
+    let before = by_tie(geometric.intersected);
+    let after = by_tie(geometric.adjusted_intersected);
     let reasons = reasons(geometric);
     let mut found = Vec::new();
-    for tie in &geometric.ties.points {
-        let id = tie.id.as_str();
-        let (before, after, point) = (before.remove(id), after.remove(id), points.remove(id));
+    for (index, tie) in geometric.ties.points.iter().enumerate() {
+        let (before, after) = (before.get(&index), after.get(&index));
+        let point = points.get(&index);
         for measure in &tie.measures {
-            let image = ids.iter().position(|id| *id == measure.image);
-            let seen = |point: Option<&'a IntersectedPoint>| {
-                let own = |residual: &&MeasureResidual| Some(residual.image) == image;
-                let point = point?;
+            let seen = |point: Option<&&'a IntersectedPoint>| {
+                let own = |residual: &&MeasureResidual| residual.image == measure.image;
+                let point = *point?;
                 Some((point, point.measures.iter().find(own)?))
             };
             let view = point.and_then(|(index, point)| {
-                let view = views.get(&(index, image?)).copied()?;
-                Some((point, view))
+                let view = views.get(&(*index, measure.image)).copied()?;
+                Some((*point, view))
             });
             let left_out = if view.is_some() {
                 String::new()
             } else {
-                let reason = reasons.get(id).cloned();
-                reason.unwrap_or_else(|| "its identifier was used before".to_owned())
+                reasons.get(&index).cloned().unwrap_or_default()
             };
             found.push(Measurement {
-                id,
-                image: &measure.image,
+                id: &tie.id,
+                image: &site.images[measure.image].times.id,
                 line: measure.line,
                 sample: measure.sample,
                 left_out,
@@ -109,16 +105,15 @@ fn measurements<'a>(
 }
 
 /// Why tie points were left out; what the intersection says of a point comes first.
-fn reasons<'a>(geometric: &GeometricProducts<'a>) -> BTreeMap<&'a str, String> {
+fn reasons(geometric: &GeometricProducts) -> BTreeMap<usize, String> {
     let adjusted = geometric.adjusted.left_out.iter();
     let ties = adjusted.filter(|point| point.kind == PointKind::Tie);
     let rejected = geometric.intersected.rejected.iter();
-    let rejected = rejected.map(|tie| (tie.id.as_str(), tie.reason.to_string()));
-    let ties = ties.map(|point| (point.id.as_str(), point.reason.to_string()));
+    let rejected = rejected.map(|tie| (tie.tie, tie.reason.to_string()));
+    let ties = ties.map(|point| (point.index, point.reason.to_string()));
     let mut reasons = BTreeMap::new();
-    for (id, reason) in rejected.chain(ties) {
-        // Of points with the same identifier the first is meant.
-        reasons.entry(id).or_insert(reason);
+    for (tie, reason) in rejected.chain(ties) {
+        reasons.entry(tie).or_insert(reason);
     }
     reasons
 }
@@ -180,10 +175,10 @@ fn intersected_columns(rows: &[Measurement]) -> Vec<Column> {
         known(
             "x_m",
             "intersected point with the orientation of the kernels, IAU 2000, metres",
-            |row| Some(row.before?.0.ground_m[0]),
+            |row| Some(row.before?.0.ground.xyz_m[0]),
         ),
-        known("y_m", "likewise", |row| Some(row.before?.0.ground_m[1])),
-        known("z_m", "likewise", |row| Some(row.before?.0.ground_m[2])),
+        known("y_m", "likewise", |row| Some(row.before?.0.ground.xyz_m[1])),
+        known("z_m", "likewise", |row| Some(row.before?.0.ground.xyz_m[2])),
         known(
             "convergence_deg",
             "angle between the two rays that differ most, degrees",
@@ -214,13 +209,13 @@ fn adjusted_columns(rows: &[Measurement]) -> Vec<Column> {
     let known = |name, description, of| known(rows, name, description, of);
     vec![
         known("adjusted_x_m", "adjusted point, IAU 2000, metres", |row| {
-            Some(row.adjusted?.0.ground_m[0])
+            Some(row.adjusted?.0.ground.xyz_m[0])
         }),
         known("adjusted_y_m", "likewise", |row| {
-            Some(row.adjusted?.0.ground_m[1])
+            Some(row.adjusted?.0.ground.xyz_m[1])
         }),
         known("adjusted_z_m", "likewise", |row| {
-            Some(row.adjusted?.0.ground_m[2])
+            Some(row.adjusted?.0.ground.xyz_m[2])
         }),
         known(
             "adjusted_longitude_deg",
@@ -286,11 +281,11 @@ fn adjusted_columns(rows: &[Measurement]) -> Vec<Column> {
 }
 
 fn spherical(point: &CorrectedPoint) -> Spherical {
-    Spherical::from_xyz_m(&point.ground_m.into())
+    Spherical::from_xyz_m(&point.ground.xyz_m)
 }
 
 fn sigma_m(point: &CorrectedPoint, axis: usize) -> f64 {
-    point.covariance_m2[axis][axis].sqrt()
+    point.covariance_m2[(axis, axis)].sqrt()
 }
 
 /// A footprint that took part, with its range.
@@ -334,12 +329,12 @@ fn shot_columns(rows: &[Shot]) -> Vec<Column> {
     .enumerate()
     {
         columns.push(number(initial, "footprint, IAU 2000, metres", &|point| {
-            point.initial_m[axis]
+            point.initial.xyz_m[axis]
         }));
         columns.push(number(
             adjusted,
             "adjusted footprint, IAU 2000, metres",
-            &|point| point.ground_m[axis],
+            &|point| point.ground.xyz_m[axis],
         ));
         columns.push(number(
             sigma,

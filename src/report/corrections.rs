@@ -69,7 +69,7 @@ fn positions(site: &SiteProducts, adjusted: &Adjusted) -> String {
 fn orbit_axes(image: &ImageProducts, shift_m: Vector3<f64>) -> Option<Vector3<f64>> {
     let samples = &image.orientation.samples;
     let middle = samples.len() / 2;
-    let position_m = |index: usize| Some(Vector3::from(samples.get(index)?.position_m));
+    let position_m = |index: usize| Some(samples.get(index)?.position.xyz_m);
     let (before, after) = (position_m(middle.checked_sub(1)?)?, position_m(middle)?);
     let advance_m = after - before;
     let axes = radial_along_cross(&after, &advance_m);
@@ -115,9 +115,10 @@ fn ranges(site: &SiteProducts, adjusted: &Adjusted) -> String {
     let before_m = checked_ranges(site);
     let mut groups: BTreeMap<(&str, usize), [Vec<f64>; 2]> = BTreeMap::new();
     for range in &adjusted.ranges {
-        let [before, after] = groups.entry((&range.profile, range.image)).or_default();
-        let shot = &adjusted.points[range.point].id;
-        before.extend(before_m.get(shot));
+        let profile = &*site.profiles[range.profile].id;
+        let [before, after] = groups.entry((profile, range.image)).or_default();
+        let shot = (range.profile, adjusted.points[range.point].index);
+        before.extend(before_m.get(&shot));
         after.push(range.residual_m.value);
     }
     let mut table = Table::new(
@@ -152,15 +153,14 @@ fn ranges(site: &SiteProducts, adjusted: &Adjusted) -> String {
         + &paragraph("Before: range − distance of the same shots, as in the range check.")
 }
 
-/// Range − distance by the name that the adjustment gives a shot: its profile and its row.
-fn checked_ranges(site: &SiteProducts) -> BTreeMap<String, f64> {
+/// Range − distance of the shots by profile and row.
+fn checked_ranges(site: &SiteProducts) -> BTreeMap<(usize, usize), f64> {
     let shots = &site.ranges.shots;
-    let name = |index: usize| {
-        let profile = site.profiles.get(shots.profile[index] as usize)?;
-        let name = format!("{}:{}", profile.id, shots.row[index]);
-        Some((name, shots.range_minus_distance_m[index]))
+    let of_shot = |index: usize| {
+        let shot = (shots.profile[index] as usize, shots.row[index] as usize);
+        (shot, shots.range_minus_distance_m[index])
     };
-    (0..shots.len()).filter_map(name).collect()
+    (0..shots.len()).map(of_shot).collect()
 }
 
 fn biases(adjusted: &Adjusted) -> String {

@@ -69,7 +69,7 @@ fn statistics(site: &SiteProducts) -> String {
         let images: Vec<String> = profile
             .simultaneous
             .iter()
-            .map(|image| format!("{} ({} shots)", image.image, image.shots))
+            .map(|of| format!("{} ({} shots)", site.images[of.image].times.id, of.shots))
             .collect();
         let valid = ranges.invalid_because.is_empty();
         table.row(

@@ -84,8 +84,8 @@ fn profiles(site: &SiteProducts, images: &[&ImageProducts]) -> String {
                 });
                 format!("{low:.0} to {high:.0}")
             };
-            let with = |simultaneous: &str| simultaneous == image.times.id;
-            let together = profile.simultaneous.iter().any(|of| with(&of.image));
+            let with = |at: usize| site.images[at].times.id == image.times.id;
+            let together = profile.simultaneous.iter().any(|of| with(of.image));
             let spacing = on_image.shot_spacing_lines;
             table.row(
                 true,

@@ -7,8 +7,8 @@ use super::{
     section::Section,
 };
 use crate::{
+    geom::uncertainty::{GroundPart, UncertaintyBudget},
     products::GeometricProducts,
-    stages::uncertainty::{GroundPart, UncertaintyBudget},
 };
 
 pub(super) const SECTION: Section = Section {

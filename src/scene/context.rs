@@ -315,13 +315,13 @@ pub(super) fn context_ties(
     images: &[ContextImage<'_>],
     terrain: &Terrain,
     seed: u64,
-) -> Vec<TiePoint> {
+) -> Vec<TiePoint<String>> {
     let (Some(first), Some(second)) = (images.first(), images.last()) else {
         return Vec::new();
     };
     let mut random = Random::new(seed, "ties of wide-angle images");
     let [count, tried] = TIES;
-    let mut ties: Vec<TiePoint> = Vec::with_capacity(count);
+    let mut ties: Vec<TiePoint<String>> = Vec::with_capacity(count);
     for _ in 0..tried {
         let line = random.between(EDGE_PX, f64::from(first.plan.lines) - EDGE_PX);
         let sample = random.between(EDGE_PX, f64::from(first.plan.samples) - EDGE_PX);

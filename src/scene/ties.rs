@@ -54,7 +54,7 @@ struct TrueImage<'a> {
 /// A point on the ground and where both images see it.
 struct Tie {
     ground_m: Vector3<f64>,
-    measures: [TieMeasure; 2],
+    measures: [TieMeasure<String>; 2],
 }
 
 impl<'a> TrueImage<'a> {
@@ -111,7 +111,7 @@ impl<'a> TrueImage<'a> {
         &self,
         projector: &Projector<'_, SampledOrientation>,
         ground_m: &Vector3<f64>,
-    ) -> Option<TieMeasure> {
+    ) -> Option<TieMeasure<String>> {
         let seen = projector.project(ground_m).ok()?;
         let y_px = self.stereo.detector.focal_px(&seen.camera_m).ok()?.y;
         let measure = TieMeasure {
@@ -209,7 +209,7 @@ fn exact_ties(
 }
 
 /// Adds noise to all measurements, and blunders to a few.
-fn spoil(ties: Vec<Tie>, random: &mut Random) -> (Vec<TiePoint>, Vec<TieTruth>) {
+fn spoil(ties: Vec<Tie>, random: &mut Random) -> (Vec<TiePoint<String>>, Vec<TieTruth>) {
     let spoilt = ties.into_iter().enumerate().map(|(index, tie)| {
         let id = format!("tie-{:03}", index + 1);
         let mut measures = tie.measures.to_vec();
@@ -230,7 +230,7 @@ fn spoil(ties: Vec<Tie>, random: &mut Random) -> (Vec<TiePoint>, Vec<TieTruth>) 
 }
 
 /// Moves one of the measurements far away.
-fn blunder(measures: &mut [TieMeasure], random: &mut Random) -> BlunderTruth {
+fn blunder(measures: &mut [TieMeasure<String>], random: &mut Random) -> BlunderTruth {
     let image = usize::from(random.between(0.0, 1.0) < 0.5);
     let [least_px, most_px] = BLUNDER_PX;
     let length_px = random.between(least_px, most_px);
@@ -266,7 +266,7 @@ mod tests {
         Terrain::new(seed, &SITES.map(Site::direction))
     }
 
-    fn sight(image: &TrueImage<'_>, measure: &TieMeasure) -> Sight {
+    fn sight(image: &TrueImage<'_>, measure: &TieMeasure<String>) -> Sight {
         let (x_lines, focal_px) = image.stereo.focal_place(measure.line, measure.sample);
         let pose = image.stereo.orientation.pose(x_lines);
         Sight {
@@ -328,7 +328,8 @@ mod tests {
         let arcs = arcs("isidis");
         let pair = [0, 1].map(|image| TrueImage::new(&arcs[image], 1).unwrap());
         let exact = exact_ties(&pair, &terrain(1), &mut Random::new(1, "test")).unwrap();
-        let wanted: Vec<[TieMeasure; 2]> = exact.iter().map(|tie| tie.measures.clone()).collect();
+        let wanted: Vec<[TieMeasure<String>; 2]> =
+            exact.iter().map(|tie| tie.measures.clone()).collect();
         let (measured, truth) = spoil(exact, &mut Random::new(1, "noise"));
         let (mut squares, mut count) = (0.0, 0.0);
         for ((tie, truth), wanted) in measured.iter().zip(&truth).zip(&wanted) {

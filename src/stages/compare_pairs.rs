@@ -3,14 +3,12 @@
 
 use std::collections::BTreeMap;
 
-use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
 use super::{
     group_profiles::Profile,
     intersect::{IntersectedPoint, IntersectedTies, MeasureResidual},
     register::ImageRegistration,
-    uncertainty::{BudgetInput, ResidualMoments, UncertaintyBudget, uncertainty_budget},
 };
 use crate::{
     footprints::Footprints,
@@ -21,6 +19,7 @@ use crate::{
         pushbroom::ExteriorOrientation,
         statistics::Summary,
         stereo::StereoImage,
+        uncertainty::{BudgetInput, ResidualMoments, UncertaintyBudget, uncertainty_budget},
     },
     ties::TiePoint,
 };
@@ -120,7 +119,7 @@ pub fn compare_pairs<M: ExteriorOrientation>(
             let line_spacing_m = shared.line_spacing_m(images);
             let by_ties = footprints_by_ties(
                 pair.map(|index| registrations[index]),
-                pair.map(|index| images[index].id.as_str()),
+                pair,
                 ties,
                 (profiles, &spacings),
                 line_spacing_m[1],
@@ -164,7 +163,7 @@ impl<'a> Shared<'a> {
         [0, 1].map(|at| {
             let image = &images[self.pair[at]];
             self.each(|point, measures| {
-                image.line_spacing_m(measures[at].x_lines, &point.ground_m.into())
+                image.line_spacing_m(measures[at].x_lines, &point.ground.xyz_m)
             })
         })
     }
@@ -183,7 +182,7 @@ impl<'a> Shared<'a> {
         let residuals = [0, 1].map(|at| self.moments(at));
         let height_over_base = self.each(|point, measures| {
             let [a_m, b_m] = [0, 1].map(|at| position_m(measures, at));
-            let height_m = 0.5 * (a_m.norm() + b_m.norm()) - Vector3::from(point.ground_m).norm();
+            let height_m = 0.5 * (a_m.norm() + b_m.norm()) - point.ground.xyz_m.norm();
             height_m / (b_m - a_m).norm()
         });
         let budget = mola_spacing_m.map(|mola_spacing_m| {
@@ -205,7 +204,7 @@ impl<'a> Shared<'a> {
             pixel_size_m: [0, 1].map(|at| {
                 let focal_length_px = pair[at].detector.focal_length_px;
                 self.each(|point, measures| {
-                    let away_m = position_m(measures, at) - Vector3::from(point.ground_m);
+                    let away_m = position_m(measures, at) - point.ground.xyz_m;
                     away_m.norm() / focal_length_px
                 })
             }),
@@ -236,12 +235,12 @@ impl<'a> Shared<'a> {
 
 fn footprints_by_ties(
     registrations: [&ImageRegistration; 2],
-    ids: [&str; 2],
+    pair: [usize; 2],
     ties: &[TiePoint],
     (profiles, spacings): (&[Profile], &[Option<f64>]),
     line_spacing_m: f64,
 ) -> Option<FootprintsByTies> {
-    let pairs: Vec<Pair> = ties.iter().filter_map(|tie| tie_pair(tie, ids)).collect();
+    let pairs: Vec<Pair> = ties.iter().filter_map(|tie| tie_pair(tie, pair)).collect();
     let fit = ImageToImage::through(&pairs)?;
     let places = registrations.map(places);
     let mut compared = Vec::new();
@@ -282,14 +281,14 @@ fn footprints_by_ties(
 }
 
 /// Line and sample of a tie point in both images.
-fn tie_pair(tie: &TiePoint, ids: [&str; 2]) -> Option<Pair> {
-    let place = |id: &str| {
-        let measure = tie.measures.iter().find(|measure| measure.image == id)?;
+fn tie_pair(tie: &TiePoint, pair: [usize; 2]) -> Option<Pair> {
+    let place = |image: usize| {
+        let measure = tie.measures.iter().find(|measure| measure.image == image)?;
         Some([measure.line, measure.sample])
     };
     Some(Pair {
-        first: place(ids[0])?,
-        second: place(ids[1])?,
+        first: place(pair[0])?,
+        second: place(pair[1])?,
     })
 }
 

@@ -3,13 +3,12 @@
 use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 
-use super::sample_orientation::{InterpolationCheck, Orientation, OrientationSample};
+use super::orientation::{InterpolationCheck, Orientation, OrientationSample};
 use crate::{
     config::OrientationConfig,
     error::{Fault, Kind, Result},
-    frames::{MarsIau2000, Position},
     geom::{
-        attitude::{OmegaPhiKappa, matrix_of_spice_quaternion, rotation_vector, unwrap_angles},
+        attitude::{OmegaPhiKappa, matrix_of_rotation_vector, rotation_vector, unwrap_angles},
         ellipsoid::ray_meets_ellipsoid,
         polynomial::{Fit, Polynomial, root_mean_square},
         pushbroom::{EulerPolynomial, RotationVectorPolynomial, VectorPolynomial},
@@ -60,8 +59,8 @@ pub struct EulerModel {
 /// `M(x) = exp([r(x)]×) · M_ref`, `M` from Mars-fixed to camera components.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct RotationVectorModel {
-    /// `M_ref` by rows: the rotation of the sample nearest the middle of the image.
-    pub reference: [[f64; 3]; 3],
+    /// `M_ref`: the rotation of the sample nearest the middle of the image.
+    pub reference: Matrix3<f64>,
     /// Components of `r(x)`, radians, second order.
     pub vector_rad: [Fit; 3],
 }
@@ -70,11 +69,10 @@ impl SensorModel {
     /// The second-order model without gimbal lock, as a function of the line.
     #[must_use]
     pub fn rotation_vector_orientation(&self) -> RotationVectorPolynomial {
-        let reference = &self.rotation_vector.reference;
         RotationVectorPolynomial {
             path_m: of_fits(&self.second_order.position_m),
             vector_rad: of_fits(&self.rotation_vector.vector_rad),
-            reference: Matrix3::from_fn(|row, column| reference[row][column]),
+            reference: self.rotation_vector.reference,
         }
     }
 }
@@ -118,8 +116,7 @@ impl RotationVectorModel {
     pub fn mars_to_camera(&self, x: f64) -> Matrix3<f64> {
         let vector =
             Vector3::from_iterator(self.vector_rad.iter().map(|fit| fit.polynomial.value(x)));
-        let reference = Matrix3::from_fn(|row, column| self.reference[row][column]);
-        crate::geom::attitude::matrix_of_rotation_vector(&vector) * reference
+        matrix_of_rotation_vector(&vector) * self.reference
     }
 }
 
@@ -193,7 +190,7 @@ fn euler_model(orientation: &Orientation, order: usize) -> Result<EulerModel> {
         let values: Vec<f64> = orientation
             .samples
             .iter()
-            .map(|sample| sample.position_m[axis])
+            .map(|sample| sample.position.xyz_m[axis])
             .collect();
         fit(orientation, &values, order)
     })?;
@@ -217,7 +214,6 @@ fn euler_model(orientation: &Orientation, order: usize) -> Result<EulerModel> {
 /// Distance on the ellipsoid between where each sample looks and where the polynomials look from there.
 fn pointing_ground_m(orientation: &Orientation, angles_rad: &[Fit; 3]) -> Option<Vec<f64>> {
     let distance_m = |sample: &OrientationSample| {
-        let position = Position::<MarsIau2000>::new(sample.position_m.into());
         let [omega_rad, phi_rad, kappa_rad] =
             [0, 1, 2].map(|angle| angles_rad[angle].polynomial.value(sample.line_offset));
         let model = OmegaPhiKappa {
@@ -225,11 +221,11 @@ fn pointing_ground_m(orientation: &Orientation, angles_rad: &[Fit; 3]) -> Option
             phi_rad,
             kappa_rad,
         };
-        let ground = |camera_to_mars: Matrix3<f64>| {
-            ray_meets_ellipsoid(&position, &(camera_to_mars * Vector3::z()))
+        let ground = |camera_to_mars: &Matrix3<f64>| {
+            ray_meets_ellipsoid(&sample.position, &(camera_to_mars * Vector3::z()))
         };
-        let sampled = ground(matrix_of_spice_quaternion(sample.camera_to_mars))?;
-        Some(ground(model.camera_to_mars())?.distance_m(&sampled))
+        let sampled = ground(sample.camera_to_mars.matrix())?;
+        Some(ground(&model.camera_to_mars())?.distance_m(&sampled))
     };
     orientation.samples.iter().map(distance_m).collect()
 }
@@ -238,7 +234,7 @@ fn rotation_vector_model(orientation: &Orientation) -> Result<RotationVectorMode
     let mars_to_camera: Vec<Matrix3<f64>> = orientation
         .samples
         .iter()
-        .map(|sample| matrix_of_spice_quaternion(sample.camera_to_mars).transpose())
+        .map(|sample| sample.pose().mars_to_camera)
         .collect();
     let reference = mars_to_camera[mars_to_camera.len() / 2];
     let vectors: Vec<Vector3<f64>> = mars_to_camera
@@ -250,9 +246,7 @@ fn rotation_vector_model(orientation: &Orientation) -> Result<RotationVectorMode
         fit(orientation, &values, 2)
     })?;
     Ok(RotationVectorModel {
-        reference: std::array::from_fn(|row| {
-            std::array::from_fn(|column| reference[(row, column)])
-        }),
+        reference,
         vector_rad,
     })
 }

@@ -36,8 +36,8 @@ pub struct Profile {
 /// An image that was exposed during a profile.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct SimultaneousImage {
-    /// Image identifier.
-    pub image: String,
+    /// Index of the image.
+    pub image: usize,
     /// Shots of the profile fired while the image was exposed.
     pub shots: u32,
 }
@@ -94,15 +94,16 @@ fn profile(
     };
     let simultaneous = images
         .iter()
-        .filter_map(|image| {
+        .enumerate()
+        .filter_map(|(index, image)| {
             let exposures = image.exposures();
             let shots = rows
                 .iter()
                 .filter(|row| exposures.contains(time(row)))
                 .count();
             let shots = u32::try_from(shots).unwrap_or(u32::MAX);
-            (shots > 0).then(|| SimultaneousImage {
-                image: image.id.clone(),
+            (shots > 0).then_some(SimultaneousImage {
+                image: index,
                 shots,
             })
         })

@@ -1,16 +1,11 @@
 //! An image with its orientation in every form: what the geometric stages see through.
 
-use super::{
-    fit_sensor_model::SensorModel,
-    sample_orientation::{Orientation, OrientationSample},
-    tag_times::ImageTimes,
-};
+use super::{fit_sensor_model::SensorModel, orientation::Orientation, tag_times::ImageTimes};
 use crate::{
     error::{Fault, Kind, Result},
     geom::{
-        attitude::matrix_of_spice_quaternion,
         pushbroom::{
-            CameraModel, Detector, EulerPolynomial, ExteriorOrientation, Pose, Projector,
+            CameraModel, Detector, EulerPolynomial, ExteriorOrientation, Projector,
             RotationVectorPolynomial, SampledOrientation, SamplesFault, Unseen,
         },
         stereo::StereoImage,
@@ -60,7 +55,11 @@ impl<'a> OrientedImage<'a> {
         orientation: &Orientation,
         model: &SensorModel,
     ) -> Result<Self> {
-        let sampled = SampledOrientation::new(&poses(&orientation.samples)).map_err(|fault| {
+        let samples = orientation.samples.iter();
+        let poses: Vec<_> = samples
+            .map(|sample| (sample.line_offset, sample.pose()))
+            .collect();
+        let sampled = SampledOrientation::new(&poses).map_err(|fault| {
             let image = image.id.clone();
             NoOrientation { image, fault }
         })?;
@@ -113,16 +112,4 @@ impl<'a> OrientedImage<'a> {
             lines: self.lines(),
         }
     }
-}
-
-/// Every sample as a line with its pose.
-fn poses(samples: &[OrientationSample]) -> Vec<(f64, Pose)> {
-    let pose = |sample: &OrientationSample| Pose {
-        position_m: sample.position_m.into(),
-        mars_to_camera: matrix_of_spice_quaternion(sample.camera_to_mars).transpose(),
-    };
-    samples
-        .iter()
-        .map(|sample| (sample.line_offset, pose(sample)))
-        .collect()
 }

@@ -1,4 +1,4 @@
-//! Reads tie points and gives their images the site's identifiers.
+//! Reads tie points and finds their images among the site's.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -9,7 +9,7 @@ use crate::{
     error::{Fault, Kind, Result},
     files::file_name,
     pds,
-    ties::{TieMeasure, TiePoint},
+    ties::TiePoint,
 };
 
 /// Complaints kept with their text; all are counted.
@@ -20,8 +20,7 @@ const NAMES_QUOTED: usize = 5;
 /// Tie points of a site.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Ties {
-    /// Points with a measurement in one of the site's images, in the order of the files; their
-    /// measurements name images by the site's identifiers.
+    /// Points with a measurement in one of the site's images, in the order of the files.
     pub points: Vec<TiePoint>,
     /// Measurements in images that the site does not have, by the name in the file.
     pub elsewhere: BTreeMap<String, u64>,
@@ -70,9 +69,10 @@ impl Fault for TiesFault {
 /// A file that is no table and no network; no measurement at all; none in an image of the site; none
 /// that joins two of them.
 pub fn read_ties(ties: &TiesConfig, images: &[ImageConfig]) -> Result<Ties> {
-    let names: BTreeMap<&str, &str> = images
+    let names: BTreeMap<&str, usize> = images
         .iter()
-        .map(|image| (image.name_in_ties(), image.id.as_str()))
+        .map(ImageConfig::name_in_ties)
+        .zip(0..)
         .collect();
     let mut read = Ties::default();
     let mut first = BTreeMap::new();
@@ -106,38 +106,29 @@ impl Ties {
     /// Takes a point over; `first` knows where the first point of each identifier stands.
     fn take(
         &mut self,
-        tie: TiePoint,
-        names: &BTreeMap<&str, &str>,
+        tie: TiePoint<String>,
+        names: &BTreeMap<&str, usize>,
         first: &mut BTreeMap<String, usize>,
     ) {
-        let mut measures = Vec::with_capacity(tie.measures.len());
-        for measure in tie.measures {
-            match names.get(measure.image.as_str()) {
-                Some(id) => measures.push(TieMeasure {
-                    image: (*id).to_owned(),
-                    ..measure
-                }),
-                None => *self.elsewhere.entry(measure.image).or_insert(0) += 1,
-            }
-        }
-        if measures.is_empty() {
+        let tie = tie.in_images(
+            |name| names.get(name).copied(),
+            |name| *self.elsewhere.entry(name).or_insert(0) += 1,
+        );
+        if tie.measures.is_empty() {
             return;
         }
         let known = first.get(&tie.id).map(|at| &mut self.points[*at]);
         let joins = |known: &&mut TiePoint| {
             let images = || known.measures.iter().map(|measure| &measure.image);
-            measures
+            tie.measures
                 .iter()
                 .all(|new| !images().any(|image| *image == new.image))
         };
         if let Some(known) = known.filter(joins) {
-            known.measures.extend(measures);
+            known.measures.extend(tie.measures);
         } else {
             first.entry(tie.id.clone()).or_insert(self.points.len());
-            self.points.push(TiePoint {
-                id: tie.id,
-                measures,
-            });
+            self.points.push(tie);
         }
     }
 
@@ -165,14 +156,14 @@ impl Ties {
     #[must_use]
     pub fn joining(&self) -> usize {
         let images = |tie: &&TiePoint| {
-            let images: BTreeSet<&str> = tie.measures.iter().map(|m| m.image.as_str()).collect();
+            let images: BTreeSet<usize> = tie.measures.iter().map(|m| m.image).collect();
             images.len() > 1
         };
         self.points.iter().filter(images).count()
     }
 }
 
-fn nothing_found(read: &Ties, names: &BTreeMap<&str, &str>) -> TiesFault {
+fn nothing_found(read: &Ties, names: &BTreeMap<&str, usize>) -> TiesFault {
     if read.elsewhere.is_empty() {
         return TiesFault::Empty;
     }
@@ -219,12 +210,12 @@ mod tests {
         1,A,1,1\n1,B,2,2\n1,C,3,3\n2,C,1,1\n3,B,4,4\n4,A,x,1\n";
 
     #[test]
-    fn images_get_the_names_of_the_site() {
+    fn measurements_get_the_indices_of_the_sites_images() {
         let ties = read(TABLE, &[image("one", Some("A")), image("B", None)]).unwrap();
         let ids: Vec<&str> = ties.points.iter().map(|tie| &*tie.id).collect();
         assert_eq!(ids, ["1", "3"]);
-        let images: Vec<&str> = ties.points[0].measures.iter().map(|m| &*m.image).collect();
-        assert_eq!(images, ["one", "B"]);
+        let images: Vec<usize> = ties.points[0].measures.iter().map(|m| m.image).collect();
+        assert_eq!(images, [0, 1]);
         assert_eq!(ties.joining(), 1);
         assert_eq!(ties.elsewhere, BTreeMap::from([("C".to_owned(), 2)]));
         assert_eq!(ties.complaint_count, 1);

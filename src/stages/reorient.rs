@@ -3,20 +3,17 @@
 use nalgebra::{Matrix3, Vector3};
 
 use super::{
-    sample_orientation::{
-        Camera, CameraTables, InterpolationCheck, Nodes, Orientation, OrientationSample,
-        check_interpolation, outline, samples_at,
+    orientation::{
+        Camera, CameraTables, GroundPoint, InterpolationCheck, Nodes, Orientation,
+        OrientationSample,
     },
     tag_times::ImageTimes,
 };
 use crate::{
     error::{Fault, Kind, Result},
-    frames::MarsIau2000,
+    frames::{MarsIau2000, Position, Rotation},
     geom::{
-        attitude::{
-            make_continuous, matrix_of_rotation_vector, matrix_of_spice_quaternion,
-            spice_quaternion,
-        },
+        attitude::{make_continuous, matrix_of_rotation_vector, spice_quaternion},
         lagrange::lagrange,
         mars_rotation::mars_rotation,
         pushbroom::{ExteriorOrientation, Pose, SampledOrientation, SamplesFault},
@@ -121,8 +118,8 @@ pub fn reorient(
     let geometric = |et| corrected.camera(et, Convention::Geometric);
     Ok(Orientation {
         image: orientation.image.clone(),
-        samples: samples_at(image, &epochs, geometric)?,
-        outline: outline(image, geometric)?,
+        samples: OrientationSample::at_epochs(image, &epochs, geometric)?,
+        outline: GroundPoint::outline(image, geometric)?,
         tables: corrected.tables(tables)?,
         notes: orientation.notes.clone(),
         invalid_because: orientation.invalid_because.clone(),
@@ -146,7 +143,7 @@ pub fn geometric_tables(orientation: &Orientation) -> Result<CameraTables> {
         let offset_rate_m_s = residual.moving(et.seconds()).1.advance_m;
         let spin = Vector3::from(tables.mars_angular_velocity_rad_s[row]);
         let in_j2000_m = from_mars * offset_m(et);
-        let position_m = from_mars * (nodes.camera(et).0 + offset_m(et));
+        let position_m = from_mars * (nodes.camera(et).position.xyz_m + offset_m(et));
         let velocity_m_s = Vector3::from(tables.velocity_m_s[row])
             + from_mars * offset_rate_m_s
             + spin.cross(&in_j2000_m);
@@ -170,11 +167,14 @@ fn nodes(orientation: &Orientation) -> Result<Nodes> {
 fn residual(orientation: &Orientation) -> Result<SampledOrientation> {
     let nodes = nodes(orientation)?;
     let relative = |sample: &OrientationSample| {
-        let (position_m, camera_to_mars) = nodes.camera(sample.et);
-        let mars_to_camera = matrix_of_spice_quaternion(sample.camera_to_mars).transpose();
+        let camera = nodes.camera(sample.et);
+        let Pose {
+            position_m,
+            mars_to_camera,
+        } = sample.pose();
         let pose = Pose {
-            position_m: Vector3::from(sample.position_m) - position_m,
-            mars_to_camera: mars_to_camera * camera_to_mars,
+            position_m: position_m - camera.position.xyz_m,
+            mars_to_camera: mars_to_camera * camera.to_mars.matrix(),
         };
         (sample.et.seconds(), pose)
     };
@@ -245,7 +245,9 @@ impl<F: Fn(f64) -> LineCorrection> Corrected<'_, F> {
     /// Position in IAU 2000 and the rotation from the camera to it, for the line with the tag `tag`.
     fn camera(&self, tag: Et, convention: Convention) -> Result<Camera> {
         let et = tag.plus(self.shift_s());
-        let (mut position_m, mut camera_to_mars) = self.nodes.camera(et);
+        let camera = self.nodes.camera(et);
+        let mut position_m = camera.position.xyz_m;
+        let mut camera_to_mars = *camera.to_mars.matrix();
         if convention == Convention::Geometric {
             let residual = self.residual.pose(et.seconds());
             position_m += residual.position_m;
@@ -253,10 +255,10 @@ impl<F: Fn(f64) -> LineCorrection> Corrected<'_, F> {
         }
         let correction = self.correction(self.image.line_offset(tag))?;
         let turned = matrix_of_rotation_vector(&correction.rotation_rad);
-        Ok((
-            position_m + correction.position_m,
-            camera_to_mars * turned.transpose(),
-        ))
+        Ok(Camera {
+            position: Position::new(position_m + correction.position_m),
+            to_mars: Rotation::new(camera_to_mars * turned.transpose(), tag),
+        })
     }
 
     fn tables(&self, original: &CameraTables) -> Result<CameraTables> {
@@ -291,7 +293,7 @@ impl<F: Fn(f64) -> LineCorrection> Corrected<'_, F> {
             [rows.first(), rows.last()].map(|row| row.map_or(0.0, |row| *row as f64 / last as f64));
         tables.sun_position_m = sun_at.map(|at| lagrange(&original.sun_position_m, at));
         tables.sun_velocity_m_s = sun_at.map(|at| lagrange(&original.sun_velocity_m_s, at));
-        let own = check_interpolation(self.image, &tables, |et| {
+        let own = InterpolationCheck::of(self.image, &tables, |et| {
             self.camera(et, Convention::Apparent)
         })?;
         tables.interpolation = InterpolationCheck {
@@ -311,11 +313,11 @@ impl<F: Fn(f64) -> LineCorrection> Corrected<'_, F> {
     ) -> Result<()> {
         let tag = Et::from_seconds(original.et_s[row]);
         let et = tag.plus(self.shift_s());
-        let (position_m, camera_to_mars) = self.camera(tag, Convention::Apparent)?;
+        let camera = self.camera(tag, Convention::Apparent)?;
         let [to_mars, to_mars_then] =
             [tag, et].map(|et| *mars_rotation::<MarsIau2000>(et).matrix());
         let bus_to_camera = Matrix3::from_fn(|row, column| tables.bus_to_camera[row][column]);
-        let to_camera = camera_to_mars.transpose() * to_mars;
+        let to_camera = camera.to_mars.matrix().transpose() * to_mars;
         let to_bus = bus_to_camera.transpose() * to_camera;
         let (drift_m_s, turn_rad_s) = self.rates(self.image.line_offset(tag))?;
         let spin = Vector3::from(original.mars_angular_velocity_rad_s[row]);
@@ -324,7 +326,7 @@ impl<F: Fn(f64) -> LineCorrection> Corrected<'_, F> {
         let old_turn_rad_s = Vector3::from(lagrange(&original.bus_angular_velocity_rad_s, at));
         // Velocities relative to Mars are the same at the tag and at the kernels' instant.
         let over_ground_m_s = to_mars_then * (old_velocity_m_s - spin.cross(&old_position_m));
-        let position_m = to_mars.transpose() * position_m;
+        let position_m = to_mars.transpose() * camera.position.xyz_m;
         let velocity_m_s =
             to_mars.transpose() * (over_ground_m_s + drift_m_s) + spin.cross(&position_m);
         // To first order in θ, which leaves 1e-3 of a rate that is small itself.

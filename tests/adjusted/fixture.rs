@@ -5,7 +5,7 @@ use std::{path::PathBuf, sync::LazyLock};
 use areograph::{
     config::{ImageConfig, KernelsConfig, OrientationConfig, PointingConfig, usual_instrument},
     constants::MARS_IAU2000,
-    geom::{attitude::matrix_of_spice_quaternion, mars_rotation::mars_matrix},
+    geom::mars_rotation::mars_matrix,
     image::ImageFields,
     kernel_source::{KernelList, KernelSource},
     scene::{SceneOptions, write_scene},
@@ -132,9 +132,9 @@ pub(crate) fn apart(a: &Orientation, b: &Orientation) -> (f64, f64) {
     let mut worst = (0.0_f64, 0.0_f64);
     for (a, b) in a.samples.iter().zip(&b.samples) {
         assert_eq!(a.et, b.et);
-        let distance_m = (Vector3::from(a.position_m) - Vector3::from(b.position_m)).norm();
-        let [a, b] = [a, b].map(|sample| matrix_of_spice_quaternion(sample.camera_to_mars));
-        worst = (worst.0.max(distance_m), worst.1.max(angle_rad(&a, &b)));
+        let distance_m = a.position.distance_m(&b.position);
+        let [a, b] = [a, b].map(|sample| sample.camera_to_mars.matrix());
+        worst = (worst.0.max(distance_m), worst.1.max(angle_rad(a, b)));
     }
     worst
 }

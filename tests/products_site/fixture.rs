@@ -9,9 +9,9 @@ use areograph::{
         WindowConfig, usual_instrument,
     },
     footprints::{Footprint, Footprints, SourceFile},
-    frames::{MarsDatum, MarsIau2000},
+    frames::{MarsDatum, MarsIau2000, Position, Rotation},
     geom::{
-        attitude::{OmegaPhiKappa, spice_quaternion},
+        attitude::OmegaPhiKappa,
         ellipsoid::Spherical,
         pushbroom::ExteriorOrientation,
         statistics::{Summary, Trend},
@@ -34,6 +34,7 @@ use areograph::{
     },
     time::{Et, Interval, Intervals},
 };
+use nalgebra::Vector3;
 
 /// Shots of the profile; one in ten seconds lies on either side of the antimeridian.
 pub(crate) const SHOTS: u32 = 60;
@@ -305,12 +306,12 @@ fn orientation(times: &ImageTimes) -> Orientation {
             OrientationSample {
                 et,
                 line_offset: times.line_offset(et),
-                position_m: [
+                position: Position::new(Vector3::new(
                     -3.7e6 + 10.0 * u * u,
                     1e4 * u,
                     -0.3e6 + 9e3 * u + 1e-3 * u * u * u,
-                ],
-                camera_to_mars: spice_quaternion(&angles.camera_to_mars()),
+                )),
+                camera_to_mars: Rotation::new(angles.camera_to_mars(), et),
                 angles,
                 boresight: (k > 0).then(|| BoresightGround {
                     longitude_rad: 3.145 + 1e-4 * u,

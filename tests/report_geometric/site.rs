@@ -25,7 +25,7 @@ pub(crate) struct Site {
     kernels: KernelSet,
     pub(crate) times: Vec<ImageTimes>,
     converted: Converted,
-    profiles: Vec<Profile>,
+    pub(crate) profiles: Vec<Profile>,
     pub(crate) ranges: RangeCheck,
     orientations: Vec<Orientation>,
     models: Vec<SensorModel>,

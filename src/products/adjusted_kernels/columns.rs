@@ -10,7 +10,7 @@ use crate::{
     error::Result,
     frames::{MarsIau2000, Position},
     geom::{
-        attitude::{make_continuous, matrix_of_spice_quaternion, spice_quaternion},
+        attitude::{continuous_quaternions, matrix_of_spice_quaternion},
         lagrange::lagrange,
         mars_rotation::mars_rotation,
         pushbroom::{ExteriorOrientation, Pose, SampledOrientation},
@@ -110,7 +110,7 @@ impl Source<'_> {
             let to_mars = mars_rotation::<MarsIau2000>(sample.et);
             let original = to_mars.apply(&self.session.state(sample.et)?.position);
             let pose = Pose {
-                position_m: Vector3::from(sample.position_m) - original.xyz_m,
+                position_m: sample.position.xyz_m - original.xyz_m,
                 mars_to_camera: Matrix3::identity(),
             };
             samples.push((sample.et.seconds(), pose));
@@ -185,13 +185,10 @@ impl Source<'_> {
         nodes.sort_by(|a, b| a.exposure.seconds().total_cmp(&b.exposure.seconds()));
         let bias = self.to.pointing.ck_bias;
         let lookup = |node: &Node| bias.lookup(node.exposure).kernel_time();
-        let quaternions = nodes.iter().map(|node| spice_quaternion(&node.to_bus));
-        let mut quaternions: Vec<[f64; 4]> = quaternions.collect();
-        make_continuous(&mut quaternions);
         Ok(Attitudes {
             name: self.name(),
             instants: nodes.iter().map(lookup).collect(),
-            quaternions,
+            quaternions: continuous_quaternions(nodes.iter().map(|node| &node.to_bus)),
             rates_rad_s: nodes.iter().map(|node| node.rate_rad_s.into()).collect(),
         })
     }
@@ -208,7 +205,7 @@ impl Source<'_> {
             (tables.et_s.last().copied().unwrap_or_default() - start_s) / last.max(1) as f64;
         let of_sample = |sample: &OrientationSample| {
             let to_mars = *mars_rotation::<MarsIau2000>(sample.et).matrix();
-            let mars_to_camera = matrix_of_spice_quaternion(sample.camera_to_mars).transpose();
+            let mars_to_camera = sample.pose().mars_to_camera;
             let at = (sample.et.seconds() - start_s) / step_s;
             Node {
                 exposure: sample.et,

@@ -11,13 +11,9 @@ use super::{
 };
 use crate::{
     error::Result,
-    frames::Position,
+    frames::{MarsIau2000, Position},
     products::{GeometricProducts, ImageProducts, SiteProducts, Writer},
-    stages::{
-        adjust::{CorrectedPoint, PointKind},
-        prepare_adjustment::shot_id,
-    },
-    ties::{TieMeasure, TiePoint},
+    stages::adjust::{CorrectedPoint, PointKind},
     time::Et,
 };
 
@@ -58,15 +54,15 @@ fn isis_name(site: &SiteProducts, image: &ImageProducts) -> String {
         .unwrap_or_else(|| id.clone())
 }
 
-fn estimate(ground_m: [f64; 3], covariance_m2: Matrix3<f64>) -> GroundEstimate {
+fn estimate(position: Position<MarsIau2000>, covariance_m2: Matrix3<f64>) -> GroundEstimate {
     GroundEstimate {
-        position: Position::new(ground_m.into()),
+        position,
         covariance_m2,
     }
 }
 
 fn adjusted(point: &CorrectedPoint) -> GroundEstimate {
-    estimate(point.ground_m, point.covariance_m2.into())
+    estimate(point.ground, point.covariance_m2)
 }
 
 /// Shots with a range that an adjusted image sees, where it sees them: others have no observation equation of
@@ -78,25 +74,14 @@ fn lidar_points<'a>(
 ) -> Vec<LidarPoint<'a>> {
     let config = &site.config.adjustment;
     let result = geometric.adjusted;
-    let rows: BTreeMap<String, u32> = site
-        .profiles
-        .iter()
-        .flat_map(|profile| {
-            profile
-                .rows
-                .iter()
-                .map(|row| (shot_id(profile, *row), *row))
-        })
-        .collect();
-    let places: Vec<BTreeMap<u32, [f64; 2]>> =
+    let places: Vec<BTreeMap<usize, [f64; 2]>> =
         geometric.adjusted_images.iter().map(places).collect();
     let shots = result.ranges.iter().filter_map(|range| {
         let point = &result.points[range.point];
-        let row = *rows.get(&point.id)?;
         let image = &result.images[range.image];
         let time_bias_s = image.time_bias_s.map_or(0.0, |(bias_s, _)| bias_s);
         let measures = names.iter().zip(&places).filter_map(|(image, places)| {
-            let [line, sample] = *places.get(&row)?;
+            let [line, sample] = *places.get(&point.index)?;
             Some(ImageMeasure {
                 image,
                 line,
@@ -110,11 +95,11 @@ fn lidar_points<'a>(
         Some(LidarPoint {
             id: &point.id,
             // A time bias of the image is folded into its adjusted kernels.
-            et: Et::from_seconds(site.footprints.et_s[row as usize] - time_bias_s),
+            et: Et::from_seconds(site.footprints.et_s[point.index] - time_bias_s),
             range_m: range.range_m,
             range_sigma_m: config.range_sigma_m,
             apriori: estimate(
-                point.initial_m,
+                point.initial,
                 Matrix3::from_diagonal_element(config.ground_sigma_m.powi(2)),
             ),
             adjusted: Some(adjusted(point)),
@@ -126,13 +111,13 @@ fn lidar_points<'a>(
 }
 
 /// Line and sample of the footprints that the delivered image shows, by their rows.
-fn places(image: &ImageProducts) -> BTreeMap<u32, [f64; 2]> {
+fn places(image: &ImageProducts) -> BTreeMap<usize, [f64; 2]> {
     let points = &image.registration.points;
     (0..points.len())
         .filter(|index| points.inside[*index])
         .map(|index| {
             (
-                points.row[index],
+                points.row[index] as usize,
                 [points.line[index], points.sample[index]],
             )
         })
@@ -146,28 +131,22 @@ fn control_points<'a>(
     files: &'a [String],
 ) -> Vec<ControlPoint<'a>> {
     let [along_px, across_px] = site.config.adjustment.tie_sigma_px;
-    let file_of = |measure: &TieMeasure| {
-        let mut images = site.images.iter().zip(files).enumerate();
-        images.find(|(_, (image, _))| image.times.id == measure.image)
-    };
-    let mut measured: BTreeMap<&str, &TiePoint> = BTreeMap::new();
-    for tie in &geometric.ties.points {
-        // Of points with the same identifier the first took part.
-        measured.entry(&tie.id).or_insert(tie);
-    }
     let points = geometric.adjusted.points.iter();
     let ties = points.filter(|point| point.kind == PointKind::Tie);
     ties.filter_map(|point| {
-        let tie = measured.get(point.id.as_str())?;
+        let tie = geometric.ties.points.get(point.index)?;
         let measures = tie.measures.iter().filter_map(|measure| {
-            let (index, (_, file)) = file_of(measure)?;
+            let file = files.get(measure.image)?;
             Some(ControlMeasure {
                 measure: ImageMeasure {
                     image: file,
                     line: measure.line,
                     sample: measure.sample,
                 },
-                sigma_px: [across_px, along_px / focal_px_per_line(geometric, index)],
+                sigma_px: [
+                    across_px,
+                    along_px / focal_px_per_line(geometric, measure.image),
+                ],
             })
         });
         Some(ControlPoint {

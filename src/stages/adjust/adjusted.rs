@@ -1,11 +1,20 @@
-//! The result of an adjustment as plain numbers, for reports, tables and storage.
+//! The result of an adjustment, for reports, tables and storage.
 
+use nalgebra::Matrix3;
 use serde::{Deserialize, Serialize};
 
-use super::{AdjustImage, AdjustmentSummary, LeftOut, network::Assembled};
-use crate::geom::{
-    bundle::{Adjustment, ORIENTATION_UNKNOWNS, Residual},
-    pushbroom::OrientationCorrection,
+use super::{
+    input::AdjustImage,
+    network::Assembled,
+    points::{LeftOut, PointKind},
+    summary::AdjustmentSummary,
+};
+use crate::{
+    frames::{MarsIau2000, Position},
+    geom::{
+        bundle::{Adjustment, ORIENTATION_UNKNOWNS, Residual},
+        pushbroom::OrientationCorrection,
+    },
 };
 
 /// The adjusted site.
@@ -45,29 +54,21 @@ pub struct CorrectedImage {
     pub half_lines: f64,
 }
 
-/// The kinds of point.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum PointKind {
-    /// A footprint of the laser altimeter.
-    Shot,
-    /// A tie point.
-    Tie,
-}
-
 /// An adjusted ground point.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct CorrectedPoint {
     /// Shot or tie point.
     pub kind: PointKind,
+    /// Row of the footprint, or index of the tie point.
+    pub index: usize,
     /// Identifier.
     pub id: String,
-    /// Initial coordinates, Mars-fixed, metres.
-    pub initial_m: [f64; 3],
-    /// Adjusted coordinates, Mars-fixed, metres.
-    pub ground_m: [f64; 3],
-    /// Their covariance, m², with the a posteriori standard deviation of unit weight.
-    pub covariance_m2: [[f64; 3]; 3],
+    /// Where it was initially.
+    pub initial: Position<MarsIau2000>,
+    /// Where it is adjusted.
+    pub ground: Position<MarsIau2000>,
+    /// Covariance of the adjusted coordinates, m², with the a posteriori standard deviation of unit weight.
+    pub covariance_m2: Matrix3<f64>,
 }
 
 /// One scalar observation after the adjustment.
@@ -107,8 +108,8 @@ pub struct RangeResidual {
     pub point: usize,
     /// Index of the image.
     pub image: usize,
-    /// Profile.
-    pub profile: String,
+    /// Index of the profile.
+    pub profile: usize,
     /// Measured distance, metres.
     pub range_m: f64,
     /// Its residual, metres.
@@ -154,10 +155,11 @@ pub(super) fn collect<M>(
         index_of[point] = Some(points.len());
         points.push(CorrectedPoint {
             kind: assembled.kind(point),
-            id: assembled.points[point].clone(),
-            initial_m: assembled.network.points[point].ground_m.into(),
-            ground_m: found.ground_m.into(),
-            covariance_m2: (found.cofactor_m2 * variance).into(),
+            index: assembled.points[point].index,
+            id: assembled.points[point].name.clone(),
+            initial: Position::new(assembled.network.points[point].ground_m),
+            ground: Position::new(found.ground_m),
+            covariance_m2: found.cofactor_m2 * variance,
         });
     }
     let views = assembled.network.views.iter().zip(&adjustment.views);
@@ -184,7 +186,7 @@ pub(super) fn collect<M>(
                 Some(RangeResidual {
                     point: index_of[range.point]?,
                     image: range.image,
-                    profile: assembled.profiles[range.profile].clone(),
+                    profile: assembled.profiles[range.profile].index,
                     range_m: range.range_m,
                     residual_m: (*residual)?.into(),
                 })

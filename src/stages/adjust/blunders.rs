@@ -1,6 +1,9 @@
 //! Tie points that are no ties: found by their standardised residuals, left out, and adjusted again.
 
-use super::{LeftOut, LeftOutReason, PointKind, network::Assembled};
+use super::{
+    network::Assembled,
+    points::{LeftOut, LeftOutReason, PointKind},
+};
 use crate::geom::{
     bundle::{Adjustment, BundleFault, BundleOptions, Network, Residual, solve},
     pushbroom::ExteriorOrientation,
@@ -38,7 +41,8 @@ pub(super) fn solve_without_blunders<M: ExteriorOrientation>(
         {
             assembled.left_out.push(LeftOut {
                 kind: PointKind::Tie,
-                id: assembled.points[point].clone(),
+                index: assembled.points[point].index,
+                id: assembled.points[point].name.clone(),
                 reason: LeftOutReason::Blunder {
                     standardised: *standardised,
                 },

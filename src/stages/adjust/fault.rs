@@ -1,13 +1,12 @@
-//! Why a site cannot be adjusted, in the words of its identifiers.
+//! Why a site cannot be adjusted.
 
-use super::{AdjustImage, CONTRADICTION, PointKind, network::Assembled};
 use crate::{
     error::{Fault, Kind},
-    geom::{
-        bundle::{BundleFault, Part, Unknown},
-        pushbroom::Unseen,
-    },
+    geom::{bundle::BundleFault, pushbroom::Unseen},
 };
+
+/// An initial value so far from its adjusted one is a contradiction, in its standard deviations.
+pub(super) const CONTRADICTION: f64 = 10.0;
 
 /// Why a site cannot be adjusted.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -36,17 +35,7 @@ pub enum AdjustFault {
     /// Nothing tells unknowns apart.
     #[error("the network is singular: nothing tells apart {0}")]
     Singular(String),
-    /// A range names an image that is not there.
-    #[error("shot {shot} was fired during image {image}, which is none of the images {known}")]
-    UnknownImage {
-        /// Identifier of the shot.
-        shot: String,
-        /// The name.
-        image: String,
-        /// The names that are known.
-        known: String,
-    },
-    /// Two shots have the same identifier.
+    /// A shot occurs twice.
     #[error("two shots have the identifier {0}")]
     DuplicateShot(String),
     /// An orientation that sees nothing.
@@ -81,79 +70,10 @@ impl Fault for AdjustFault {
             Self::Network(_) => "check the input of the adjustment, and give orientations and footprints finite standard deviations",
             Self::Value { .. } => "correct this value, or leave out what it belongs to",
             Self::Singular(_) => "give these unknowns finite standard deviations, or hold them fixed with 0",
-            Self::UnknownImage { .. } => "give shots the identifiers of the images",
             Self::DuplicateShot(_) => "leave out the second file, or number the shots anew",
             Self::Blind { .. } => "check the orientation samples of the image",
             Self::Contradiction { .. } => "check the datum, the clock and the units of this value, or raise its standard deviation",
         }
         .to_owned()
     }
-}
-
-/// The fault with identifiers in place of indices.
-pub(super) fn in_words<M>(
-    fault: BundleFault,
-    images: &[AdjustImage<M>],
-    assembled: &Assembled<&M>,
-) -> AdjustFault {
-    match fault {
-        BundleFault::Singular { unknowns } => {
-            let words: Vec<String> = unknowns
-                .iter()
-                .map(|unknown| unknown_in_words(*unknown, images, &assembled.profiles))
-                .collect();
-            AdjustFault::Singular(words.join(", "))
-        }
-        BundleFault::Value {
-            part,
-            what,
-            value,
-            expected,
-        } => AdjustFault::Value {
-            what: format!("the {what} of {}", part_in_words(part, images, assembled)),
-            value,
-            expected,
-        },
-        _ => AdjustFault::Network(fault),
-    }
-}
-
-/// A part of the network by its identifiers.
-fn part_in_words<M>(part: Part, images: &[AdjustImage<M>], assembled: &Assembled<&M>) -> String {
-    let image = |index: usize| format!("image {}", images[index].stereo.id);
-    let point = |index: usize| {
-        let kind = match assembled.kind(index) {
-            PointKind::Shot => "shot",
-            PointKind::Tie => "tie point",
-        };
-        format!("{kind} {}", assembled.points[index])
-    };
-    match part {
-        Part::Image(index) => image(index),
-        Part::Point(index) => point(index),
-        Part::View(index) => {
-            let view = &assembled.network.views[index];
-            format!("{} in {}", point(view.point), image(view.image))
-        }
-        Part::Range(index) => {
-            let range = &assembled.network.ranges[index];
-            format!("the range of {}", point(range.point))
-        }
-        Part::Profile(index) => format!("profile {}", assembled.profiles[index]),
-    }
-}
-
-/// An unknown as a surveyor names it.
-pub(super) fn unknown_in_words<M>(
-    unknown: Unknown,
-    images: &[AdjustImage<M>],
-    profiles: &[String],
-) -> String {
-    let owner = match unknown {
-        Unknown::Orientation { image, .. } | Unknown::TimeBias { image } => {
-            format!("image {}", images[image].stereo.id)
-        }
-        Unknown::RangeBias { profile } => format!("profile {}", profiles[profile]),
-    };
-    format!("the {} of {owner}", unknown.quantity())
 }

@@ -2,30 +2,40 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use nalgebra::Vector3;
+use nalgebra::{Vector2, Vector3};
 
 use super::{
-    AdjustFault, AdjustImage, LaserShot, LeftOut, LeftOutReason, PointKind, image_index, pair,
+    fault::AdjustFault,
+    input::{AdjustImage, LaserShots},
+    points::{LeftOut, LeftOutReason, PointKind},
 };
 use crate::{
     config::AdjustmentConfig,
     error::Result,
     footprints::FootprintImageCoordinates,
+    frames::{MarsIau2000, Position},
     geom::{
         bundle::{BundleImage, BundlePoint, Network, Range, View},
         pushbroom::{ExteriorOrientation, Projector},
     },
     stages::intersect::IntersectedTies,
-    ties::{TiePoint, image_indices},
+    ties::{TiePoint, require_images},
 };
+
+/// A point or a profile of the network by its index at the site, and by its name for messages.
+pub(super) struct Named {
+    pub(super) index: usize,
+    pub(super) name: String,
+}
 
 /// A network with the names of its parts.
 pub(super) struct Assembled<M> {
     pub(super) network: Network<M>,
-    /// Identifiers of the points: shots, then tie points.
-    pub(super) points: Vec<String>,
+    /// Shots, by the rows of their footprints, then tie points.
+    pub(super) points: Vec<Named>,
     pub(super) shots: usize,
-    pub(super) profiles: Vec<String>,
+    /// Profiles with a range.
+    pub(super) profiles: Vec<Named>,
     pub(super) left_out: Vec<LeftOut>,
     /// Where the initial orientations put the footprints.
     pub(super) mola: Vec<View>,
@@ -33,7 +43,7 @@ pub(super) struct Assembled<M> {
 
 pub(super) fn assemble<'a, M: ExteriorOrientation>(
     images: &'a [AdjustImage<M>],
-    shots: &[LaserShot],
+    shots: &LaserShots,
     ties: &[TiePoint],
     starts: &IntersectedTies,
     config: &AdjustmentConfig,
@@ -43,13 +53,13 @@ pub(super) fn assemble<'a, M: ExteriorOrientation>(
             images: images.iter().map(bundle_image).collect(),
             ..Network::default()
         },
-        points: Vec::with_capacity(shots.len() + ties.len()),
-        shots: shots.len(),
+        points: Vec::with_capacity(shots.shots.len() + ties.len()),
+        shots: shots.shots.len(),
         profiles: Vec::new(),
         left_out: Vec::new(),
         mola: Vec::new(),
     };
-    assembled.add_shots(images, shots, config)?;
+    assembled.add_shots(shots, config)?;
     assembled.mola = footprints_in_images(images, shots, config)?;
     if config.footprint_image_coordinates == FootprintImageCoordinates::Weighted {
         assembled.network.views.extend(&assembled.mola);
@@ -86,7 +96,7 @@ pub(super) fn projector<'a, M, O: ExteriorOrientation>(
 /// Where the initial orientations put the footprints, in and around each image.
 fn footprints_in_images<M: ExteriorOrientation>(
     images: &[AdjustImage<M>],
-    shots: &[LaserShot],
+    shots: &LaserShots,
     config: &AdjustmentConfig,
 ) -> std::result::Result<Vec<View>, AdjustFault> {
     let mut views = Vec::new();
@@ -94,9 +104,9 @@ fn footprints_in_images<M: ExteriorOrientation>(
         let projector = projector(image, &image.stereo.orientation)?;
         let detector = &image.stereo.detector;
         let samples = -config.footprint_margin_px..=detector.samples + config.footprint_margin_px;
-        for (point, shot) in shots.iter().enumerate() {
+        for (point, shot) in shots.shots.iter().enumerate() {
             // What a camera does not see is not in its image.
-            let Ok(seen) = projector.project(&Vector3::from(shot.ground_m)) else {
+            let Ok(seen) = projector.project(&shot.ground.xyz_m) else {
                 continue;
             };
             let Ok(focal) = detector.focal_px(&seen.camera_m) else {
@@ -110,7 +120,7 @@ fn footprints_in_images<M: ExteriorOrientation>(
                     image: index,
                     x_lines: seen.x,
                     y_px: focal.y,
-                    sigma_px: pair(config.footprint_sigma_px),
+                    sigma_px: Vector2::from(config.footprint_sigma_px),
                 });
             }
         }
@@ -132,32 +142,28 @@ impl<M> Assembled<M> {
 impl<'a, M: ExteriorOrientation> Assembled<&'a M> {
     fn add_shots(
         &mut self,
-        images: &'a [AdjustImage<M>],
-        shots: &[LaserShot],
+        shots: &LaserShots,
         config: &AdjustmentConfig,
     ) -> std::result::Result<(), AdjustFault> {
-        let image_index = image_index(images);
         let mut used = BTreeSet::new();
         let mut profiles = BTreeMap::new();
-        for (point, shot) in shots.iter().enumerate() {
-            if !used.insert(shot.id.as_str()) {
-                return Err(AdjustFault::DuplicateShot(shot.id.clone()));
+        for (point, shot) in shots.shots.iter().enumerate() {
+            let name = shots.name(shot);
+            if !used.insert((shot.profile, shot.row)) {
+                return Err(AdjustFault::DuplicateShot(name));
             }
-            self.points.push(shot.id.clone());
+            let index = shot.row as usize;
+            self.points.push(Named { index, name });
             self.network.points.push(BundlePoint {
-                ground_m: shot.ground_m.into(),
+                ground_m: shot.ground.xyz_m,
                 sigma_m: Some(Vector3::repeat(config.ground_sigma_m)),
             });
             let Some(range) = &shot.range else { continue };
-            let Some(image) = image_index.get(range.image.as_str()) else {
-                return Err(AdjustFault::UnknownImage {
-                    shot: shot.id.clone(),
-                    image: range.image.clone(),
-                    known: image_index.keys().copied().collect::<Vec<_>>().join(", "),
+            let profile = *profiles.entry(shot.profile).or_insert_with_key(|index| {
+                self.profiles.push(Named {
+                    index: *index,
+                    name: shots.profiles[*index].clone(),
                 });
-            };
-            let profile = *profiles.entry(range.profile.as_str()).or_insert_with(|| {
-                self.profiles.push(range.profile.clone());
                 self.network
                     .range_bias_sigmas_m
                     .push(config.range_bias_sigma_m);
@@ -165,7 +171,7 @@ impl<'a, M: ExteriorOrientation> Assembled<&'a M> {
             });
             self.network.ranges.push(Range {
                 point,
-                image: *image,
+                image: range.image,
                 x_lines: range.x_lines,
                 range_m: range.range_m,
                 sigma_m: config.range_sigma_m,
@@ -182,36 +188,36 @@ impl<'a, M: ExteriorOrientation> Assembled<&'a M> {
         starts: &IntersectedTies,
         config: &AdjustmentConfig,
     ) -> Result<()> {
-        let ids: Vec<&str> = images
-            .iter()
-            .map(|image| image.stereo.id.as_str())
-            .collect();
-        let indices = image_indices(&ids, ties)?;
-        // Of tie points with the same identifier the first was intersected.
-        let mut starts: BTreeMap<&str, &[f64; 3]> = starts
+        require_images(ties, images.len())?;
+        let starts: BTreeMap<usize, &Position<MarsIau2000>> = starts
             .points
             .iter()
-            .map(|point| (point.id.as_str(), &point.ground_m))
+            .map(|point| (point.tie, &point.ground))
             .collect();
-        for (tie, indices) in ties.iter().zip(indices) {
-            let Some(ground_m) = starts.remove(tie.id.as_str()) else {
+        for (index, tie) in ties.iter().enumerate() {
+            let Some(ground) = starts.get(&index) else {
                 self.left_out.push(LeftOut {
                     kind: PointKind::Tie,
+                    index,
                     id: tie.id.clone(),
                     reason: LeftOutReason::NotIntersected,
                 });
                 continue;
             };
             let point = self.points.len();
-            self.points.push(tie.id.clone());
+            self.points.push(Named {
+                index,
+                name: tie.id.clone(),
+            });
             self.network.points.push(BundlePoint {
-                ground_m: Vector3::from(*ground_m),
+                ground_m: ground.xyz_m,
                 sigma_m: None,
             });
-            for (measure, image) in tie.measures.iter().zip(indices) {
+            for measure in &tie.measures {
+                let image = measure.image;
                 let stereo = &images[image].stereo;
                 let (x_lines, focal_px) = stereo.focal_place(measure.line, measure.sample);
-                let mut sigma_px = pair(config.tie_sigma_px);
+                let mut sigma_px = Vector2::from(config.tie_sigma_px);
                 sigma_px.y *= stereo.detector.focal_px_per_sample(focal_px.y);
                 self.network.views.push(View {
                     point,

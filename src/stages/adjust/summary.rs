@@ -4,9 +4,11 @@ use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
 use super::{
-    AdjustFault, AdjustImage, PointKind,
-    fault::unknown_in_words,
+    fault::AdjustFault,
+    input::AdjustImage,
     network::{Assembled, projector},
+    points::PointKind,
+    words::unknown_in_words,
 };
 use crate::geom::{
     bundle::{Adjustment, Residual},
@@ -128,7 +130,7 @@ pub(super) fn summarise<M: ExteriorOrientation>(
         range_biases_m: biases
             .filter_map(|(profile, bias)| {
                 let (value_m, root_m) = (*bias)?;
-                Some((profile.clone(), value_m, root_m * adjustment.sigma0()))
+                Some((profile.name.clone(), value_m, root_m * adjustment.sigma0()))
             })
             .collect(),
         correlated: adjustment

@@ -8,7 +8,7 @@ mod statistics;
 
 use std::collections::BTreeSet;
 
-use nalgebra::Vector2;
+use nalgebra::{Matrix3, Vector2};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
@@ -17,6 +17,7 @@ pub use statistics::{ImageResiduals, Residuals2};
 use crate::{
     config::IntersectionConfig,
     error::{Fault, Kind, Result},
+    frames::{MarsIau2000, Position},
     geom::{
         intersection::{
             Intersection, IntersectionLimits, Sight, Unintersected, Weighting, intersect,
@@ -24,7 +25,7 @@ use crate::{
         pushbroom::{ExteriorOrientation, Projector, Unseen},
         stereo::StereoImage,
     },
-    ties::{TiePoint, image_indices},
+    ties::{TiePoint, require_images},
 };
 
 /// How to intersect.
@@ -70,12 +71,14 @@ pub struct IntersectedTies {
 /// A ground point.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct IntersectedPoint {
-    /// Identifier of the tie point.
+    /// Index of the tie point.
+    pub tie: usize,
+    /// Its identifier.
     pub id: String,
-    /// Mars-fixed coordinates, metres.
-    pub ground_m: [f64; 3],
-    /// Their covariance with the common standard deviation of unit weight, m².
-    pub covariance_m2: [[f64; 3]; 3],
+    /// Where it lies.
+    pub ground: Position<MarsIau2000>,
+    /// Covariance of its coordinates with the common standard deviation of unit weight, m².
+    pub covariance_m2: Matrix3<f64>,
     /// Angle between the two rays that differ most, radians.
     pub convergence_rad: f64,
     /// Residuals of its measurements.
@@ -107,7 +110,9 @@ pub struct MeasureResidual {
 /// A tie point without a ground point.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct RejectedTie {
-    /// Identifier of the tie point.
+    /// Index of the tie point.
+    pub tie: usize,
+    /// Its identifier.
     pub id: String,
     /// Why.
     pub reason: TieReject,
@@ -187,6 +192,7 @@ pub fn intersect_ties<M: ExteriorOrientation>(
         .collect::<std::result::Result<_, BlindImage>>()?;
     let found: Vec<std::result::Result<(IntersectedPoint, Intersection), TieReject>> = ties
         .par_iter()
+        .enumerate()
         .zip(&places)
         .map(|(tie, places)| {
             let places = places.as_ref().map_err(|reject| *reject)?;
@@ -201,20 +207,20 @@ fn places<M: ExteriorOrientation>(
     images: &[StereoImage<M>],
     ties: &[TiePoint],
 ) -> Result<Vec<std::result::Result<Vec<Place>, TieReject>>> {
-    let ids: Vec<&str> = images.iter().map(|image| image.id.as_str()).collect();
-    let indices = image_indices(&ids, ties)?;
+    require_images(ties, images.len())?;
     let mut used = BTreeSet::new();
-    let places = ties.iter().zip(indices).map(|(tie, indices)| {
-        let seen_in: BTreeSet<usize> = indices.iter().copied().collect();
+    let places = ties.iter().map(|tie| {
+        let seen_in: BTreeSet<usize> = tie.measures.iter().map(|measure| measure.image).collect();
         if !used.insert(tie.id.as_str()) {
             return Err(TieReject::Duplicate);
         }
-        if seen_in.len() < indices.len() {
+        if seen_in.len() < tie.measures.len() {
             return Err(TieReject::TwiceInImage);
         }
-        let measures = tie.measures.iter().zip(indices);
-        measures
-            .map(|(measure, image)| {
+        tie.measures
+            .iter()
+            .map(|measure| {
+                let image = measure.image;
                 let (x_lines, focal_px) = images[image].focal_place(measure.line, measure.sample);
                 if !(x_lines.is_finite() && focal_px.y.is_finite()) {
                     return Err(TieReject::NotFinite);
@@ -236,7 +242,7 @@ fn places<M: ExteriorOrientation>(
 fn intersect_one<M: ExteriorOrientation>(
     images: &[StereoImage<M>],
     projectors: &[Projector<'_, M>],
-    tie: &TiePoint,
+    (index, tie): (usize, &TiePoint),
     places: &[Place],
     options: &IntersectOptions,
 ) -> std::result::Result<(IntersectedPoint, Intersection), TieReject> {
@@ -293,9 +299,10 @@ fn intersect_one<M: ExteriorOrientation>(
         .collect::<Option<Vec<_>>>()
         .ok_or(TieReject::Unseen)?;
     let found = IntersectedPoint {
+        tie: index,
         id: tie.id.clone(),
-        ground_m: point.ground_m.into(),
-        covariance_m2: point.cofactor_m2.into(),
+        ground: Position::new(point.ground_m),
+        covariance_m2: point.cofactor_m2,
         convergence_rad: point.convergence_rad,
         measures,
         outlier: false,
@@ -310,7 +317,7 @@ fn summarise<M>(
 ) -> IntersectedTies {
     let (mut points, mut rejected) = (Vec::new(), Vec::new());
     let (mut squares, mut redundancy) = (0.0, 0_usize);
-    for (tie, outcome) in ties.iter().zip(found) {
+    for ((index, tie), outcome) in ties.iter().enumerate().zip(found) {
         match outcome {
             Ok((point, intersection)) => {
                 squares += intersection.weighted_squares;
@@ -318,6 +325,7 @@ fn summarise<M>(
                 points.push(point);
             }
             Err(reason) => rejected.push(RejectedTie {
+                tie: index,
                 id: tie.id.clone(),
                 reason,
             }),
@@ -329,9 +337,7 @@ fn summarise<M>(
         1.0
     };
     for point in &mut points {
-        for entry in point.covariance_m2.as_flattened_mut() {
-            *entry *= sigma0 * sigma0;
-        }
+        point.covariance_m2 *= sigma0 * sigma0;
     }
     statistics::mark_outliers(&mut points, images.len());
     let images = images

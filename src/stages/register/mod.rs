@@ -17,8 +17,8 @@ pub use methods::{Method, MethodRun};
 pub use points::{PointOnImage, ProfileOnImage, RegisteredPoints};
 
 use super::{
-    fit_sensor_model::SensorModel, group_profiles::Profile, oriented::OrientedImage,
-    sample_orientation::Orientation, tag_times::ImageTimes,
+    fit_sensor_model::SensorModel, group_profiles::Profile, orientation::Orientation,
+    oriented::OrientedImage, tag_times::ImageTimes,
 };
 use crate::{
     config::RegistrationConfig,

@@ -2,18 +2,19 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::{CameraTables, InterpolationCheck, Reader};
+use super::Reader;
 use crate::{
     constants::MARS_IAU2000,
     error::Result,
     frames::MarsIau2000,
     geom::{
-        attitude::{make_continuous, matrix_of_spice_quaternion, spice_quaternion},
-        lagrange::lagrange,
+        attitude::{make_continuous, spice_quaternion},
         mars_rotation::mars_rotation,
-        statistics::largest,
     },
-    stages::tag_times::ImageTimes,
+    stages::{
+        orientation::{Camera, CameraTables, InterpolationCheck},
+        tag_times::ImageTimes,
+    },
     time::Et,
     units::{RADIANS_PER_DEGREE, SECONDS_PER_DAY},
 };
@@ -24,9 +25,6 @@ const TABLE_LINES: u32 = 10;
 const TABLE_NODES_MIN: u32 = 31;
 /// Nodes beyond each end of the image, so that an eighth-order interpolation never runs out.
 const TABLE_NODES_BEYOND: u32 = 8;
-/// Where between two nodes the interpolation is compared with the kernels, shares of their distance.
-const CHECKED_AT: [f64; 3] = [0.25, 0.5, 0.75];
-
 /// Tables whose interpolation keeps [`InterpolationCheck::LIMIT_PX`], or the densest ones: a node per line.
 pub(super) fn camera_tables(
     reader: &Reader,
@@ -40,7 +38,7 @@ pub(super) fn camera_tables(
     loop {
         let mut tables = tables(reader, &table_epochs(image, steps, padding_s))?;
         tables.interpolation =
-            check_interpolation(image, &tables, |et| apparent_camera(reader, et))?;
+            InterpolationCheck::of(image, &tables, |et| apparent_camera(reader, et))?;
         if tables.interpolation.keeps_limit() || steps >= image.lines_header {
             return Ok(tables);
         }
@@ -117,103 +115,12 @@ fn rows(matrix: &Matrix3<f64>) -> [[f64; 3]; 3] {
     std::array::from_fn(|row| std::array::from_fn(|column| matrix[(row, column)]))
 }
 
-/// Camera position in IAU 2000, metres, and the rotation from the camera to it.
-pub(in crate::stages) type Camera = (Vector3<f64>, Matrix3<f64>);
-
-/// What a camera model makes of the nodes: rotated to Mars first, then interpolated.
-pub(in crate::stages) struct Nodes {
-    start_s: f64,
-    step_s: f64,
-    position_m: Vec<[f64; 3]>,
-    camera_to_mars: Vec<[f64; 4]>,
-}
-
-impl Nodes {
-    /// Nodes of `tables`, which hold two or more.
-    pub(in crate::stages) fn new(tables: &CameraTables) -> Self {
-        let bus_to_camera = Matrix3::from_fn(|row, column| tables.bus_to_camera[row][column]);
-        let matrices: Vec<(Matrix3<f64>, Matrix3<f64>)> = tables
-            .inertial_to_mars
-            .iter()
-            .zip(&tables.inertial_to_bus)
-            .map(|(to_mars, to_bus)| {
-                let to_camera = bus_to_camera * matrix_of_spice_quaternion(*to_bus);
-                (matrix_of_spice_quaternion(*to_mars), to_camera)
-            })
-            .collect();
-        let mut camera_to_mars: Vec<[f64; 4]> = matrices
-            .iter()
-            .map(|(to_mars, to_camera)| spice_quaternion(&(to_mars * to_camera.transpose())))
-            .collect();
-        make_continuous(&mut camera_to_mars);
-        let last = tables.et_s.len() - 1;
-        Self {
-            start_s: tables.et_s[0],
-            step_s: (tables.et_s[last] - tables.et_s[0]) / last as f64,
-            position_m: matrices
-                .iter()
-                .zip(&tables.position_m)
-                .map(|((to_mars, _), position_m)| (to_mars * Vector3::from(*position_m)).into())
-                .collect(),
-            camera_to_mars,
-        }
-    }
-
-    /// The camera between the nodes.
-    pub(in crate::stages) fn camera(&self, et: Et) -> Camera {
-        let at = (et.seconds() - self.start_s) / self.step_s;
-        let position_m = lagrange(&self.position_m, at).into();
-        let camera_to_mars = matrix_of_spice_quaternion(lagrange(&self.camera_to_mars, at));
-        (position_m, camera_to_mars)
-    }
-}
-
-/// Compares the interpolated camera with `camera` between all nodes over the image.
-pub(in crate::stages) fn check_interpolation(
-    image: &ImageTimes,
-    tables: &CameraTables,
-    camera: impl Fn(Et) -> Result<Camera>,
-) -> Result<InterpolationCheck> {
-    let nodes = Nodes::new(tables);
-    let mut check = InterpolationCheck::default();
-    for pair in tables.et_s.windows(2) {
-        for share in CHECKED_AT {
-            let et = Et::from_seconds(pair[0] + share * (pair[1] - pair[0]));
-            if !image.exposures().contains(et) {
-                continue;
-            }
-            let error_px = error_px(image, &camera(et)?, &nodes.camera(et));
-            check.error_max_px = largest([check.error_max_px, error_px]).unwrap_or_default();
-            check.epochs += 1;
-        }
-    }
-    Ok(check)
-}
-
 /// What the kernels say of the camera, its position with light time and aberration as the tables have it.
 fn apparent_camera(reader: &Reader, et: Et) -> Result<Camera> {
     let to_mars = mars_rotation::<MarsIau2000>(et);
     let position = to_mars.apply(&reader.session.apparent_state(et)?.position);
-    let camera_to_mars = to_mars * reader.inertial_to_camera(et)?.inverse();
-    Ok((position.xyz_m, *camera_to_mars.matrix()))
-}
-
-/// How far apart two cameras see the same ground, in image pixels, at most over the middle and both ends
-/// of a line; the ground is taken as near as it can be, straight below.
-fn error_px(image: &ImageTimes, kernels: &Camera, interpolated: &Camera) -> f64 {
-    let (position_m, camera_to_mars) = kernels;
-    let distance_m = position_m.norm() - MARS_IAU2000.equatorial_radius_m;
-    let detector = image.detector();
-    let pixel_rad =
-        image.instrument.optics.pixel_pitch_mm / image.instrument.optics.focal_length_mm;
-    let errors_px = [0.0, 0.5, 1.0].map(|share| {
-        let look = detector.look(share * detector.samples);
-        let ground_m = position_m + camera_to_mars * look * distance_m;
-        let seen = interpolated.1.transpose() * (ground_m - interpolated.0);
-        let missed = seen.xy() / seen.z - look.xy();
-        let lines = missed.x / f64::from(image.downtrack_summing);
-        let samples = missed.y / f64::from(image.crosstrack_summing);
-        lines.hypot(samples) / pixel_rad
-    });
-    largest(errors_px).unwrap_or_default()
+    Ok(Camera {
+        position,
+        to_mars: to_mars * reader.inertial_to_camera(et)?.inverse(),
+    })
 }

@@ -2,18 +2,16 @@
 
 use std::collections::BTreeSet;
 
-use super::{
-    adjust::{AdjustImage, LaserShot, ShotRange, orientation_sigmas},
-    group_profiles::Profile,
-    register::ImageRegistration,
-    sample_orientation::Orientation,
-    tag_times::ImageTimes,
-};
+use super::input::{AdjustImage, LaserShot, LaserShots, ShotRange, orientation_sigmas};
 use crate::{
     config::AdjustmentConfig,
     footprints::Footprints,
-    frames::MarsIau2000,
+    frames::{MarsIau2000, Position},
     geom::{ellipsoid::spherical_to_xyz_m, pushbroom::ExteriorOrientation, stereo::StereoImage},
+    stages::{
+        group_profiles::Profile, orientation::Orientation, register::ImageRegistration,
+        tag_times::ImageTimes,
+    },
     time::Et,
     units::RADIANS_PER_DEGREE,
 };
@@ -84,7 +82,7 @@ impl<M: ExteriorOrientation> Candidate<'_, M> {
 ///
 /// Of the shots those take part that fall within an image's lines and not farther beside it than `config`
 /// says, and those that were fired while an image was exposed: these with their range. A shot in two windows
-/// counts once. It is named by [`shot_id`].
+/// counts once.
 ///
 /// # Source
 /// Yoon & Shan 2004: ranges only in the simultaneous image.
@@ -94,7 +92,7 @@ pub fn prepare_adjustment<M: ExteriorOrientation>(
     footprints: &Footprints<MarsIau2000>,
     profiles: &[Profile],
     config: &AdjustmentConfig,
-) -> (Vec<AdjustImage<M>>, Vec<LaserShot>) {
+) -> (Vec<AdjustImage<M>>, LaserShots) {
     let mut near = BTreeSet::new();
     for candidate in &candidates {
         let points = &candidate.registration.points;
@@ -108,19 +106,19 @@ pub fn prepare_adjustment<M: ExteriorOrientation>(
     let times: Vec<&ImageTimes> = candidates.iter().map(|candidate| candidate.times).collect();
     let mut taken = BTreeSet::new();
     let mut shots = Vec::new();
-    for profile in profiles {
+    for (index, profile) in profiles.iter().enumerate() {
         for row in &profile.rows {
-            let range = range_of(footprints, profile, *row, &times);
+            let range = range_of(footprints, *row, &times);
             if (range.is_some() || near.contains(row)) && taken.insert(*row) {
                 let at = *row as usize;
                 shots.push(LaserShot {
-                    id: shot_id(profile, *row),
-                    ground_m: spherical_to_xyz_m(
+                    profile: index,
+                    row: *row,
+                    ground: Position::new(spherical_to_xyz_m(
                         footprints.longitude_rad[at],
                         footprints.latitude_rad[at],
                         footprints.radius_m[at],
-                    )
-                    .into(),
+                    )),
                     range,
                 });
             }
@@ -129,30 +127,23 @@ pub fn prepare_adjustment<M: ExteriorOrientation>(
     let weighed = candidates
         .into_iter()
         .map(|candidate| candidate.weighed(config));
-    (weighed.collect(), shots)
-}
-
-/// Name of the shot in row `row` of the footprints, a shot of `profile`.
-#[must_use]
-pub fn shot_id(profile: &Profile, row: u32) -> String {
-    format!("{}:{row}", profile.id)
+    let profiles = profiles.iter().map(|profile| profile.id.clone()).collect();
+    (weighed.collect(), LaserShots { profiles, shots })
 }
 
 /// The range of a shot, when an image was exposed meanwhile.
 fn range_of(
     footprints: &Footprints<MarsIau2000>,
-    profile: &Profile,
     row: u32,
     images: &[&ImageTimes],
 ) -> Option<ShotRange> {
     let instant = Et::from_seconds(footprints.et_s[row as usize]);
     let image = images
         .iter()
-        .find(|image| image.exposures().contains(instant))?;
+        .position(|image| image.exposures().contains(instant))?;
     Some(ShotRange {
-        profile: profile.id.clone(),
-        image: image.id.clone(),
-        x_lines: image.line_offset(instant),
+        image,
+        x_lines: images[image].line_offset(instant),
         range_m: footprints.range_m[row as usize],
     })
 }

@@ -1,0 +1,69 @@
+//! What an adjustment takes: images with what is known of them beforehand, and laser shots.
+
+use crate::{
+    frames::{MarsIau2000, Position},
+    geom::{bundle::ORIENTATION_UNKNOWNS, stereo::StereoImage},
+};
+
+/// An image with what is known of its orientation beforehand.
+#[derive(Debug, Clone, PartialEq)]
+pub struct AdjustImage<M> {
+    /// Initial orientation and detector.
+    pub stereo: StereoImage<M>,
+    /// Time from line to line, seconds.
+    pub line_period_s: f64,
+    /// Standard deviation of each orientation unknown, see [`orientation_sigmas`]; infinite leaves it free,
+    /// 0 holds it fixed.
+    pub sigmas: [f64; ORIENTATION_UNKNOWNS],
+    /// Standard deviation of a bias of the line times, seconds; 0 for no such unknown.
+    pub time_bias_sigma_s: f64,
+}
+
+/// Standard deviations of an image's unknowns from one for positions and one for rotations.
+///
+/// All powers of `t`, half the image being its unit, get the same.
+#[must_use]
+pub fn orientation_sigmas(position_m: f64, angle_rad: f64) -> [f64; ORIENTATION_UNKNOWNS] {
+    std::array::from_fn(|index| if index < 9 { position_m } else { angle_rad })
+}
+
+/// The laser shots of an adjustment.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct LaserShots {
+    /// Identifiers of the site's profiles, in their order.
+    pub profiles: Vec<String>,
+    /// Shots, each row once.
+    pub shots: Vec<LaserShot>,
+}
+
+/// A laser shot.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LaserShot {
+    /// Index of its profile.
+    pub profile: usize,
+    /// Row of its footprint.
+    pub row: u32,
+    /// Footprint.
+    pub ground: Position<MarsIau2000>,
+    /// Its range, when an image was exposed from the same orbit meanwhile.
+    pub range: Option<ShotRange>,
+}
+
+/// Range of a shot that was fired while an image was exposed.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ShotRange {
+    /// Index of the image.
+    pub image: usize,
+    /// Instant of the shot as a line from the middle of that image.
+    pub x_lines: f64,
+    /// Distance, metres.
+    pub range_m: f64,
+}
+
+impl LaserShots {
+    /// Name of a shot in messages and products: its profile and its row.
+    #[must_use]
+    pub fn name(&self, shot: &LaserShot) -> String {
+        format!("{}:{}", self.profiles[shot.profile], shot.row)
+    }
+}

@@ -1,0 +1,44 @@
+//! The kinds of point in an adjustment, and points that are left out of it.
+
+use serde::{Deserialize, Serialize};
+
+/// The kinds of point.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum PointKind {
+    /// A footprint of the laser altimeter.
+    Shot,
+    /// A tie point.
+    Tie,
+}
+
+/// A point that was left out.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct LeftOut {
+    /// Shot or tie point.
+    pub kind: PointKind,
+    /// Row of the footprint, or index of the tie point.
+    pub index: usize,
+    /// Identifier.
+    pub id: String,
+    /// Why.
+    pub reason: LeftOutReason,
+}
+
+/// Why a point was left out.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, thiserror::Error)]
+#[serde(rename_all = "snake_case")]
+pub enum LeftOutReason {
+    /// Its intersection gave no ground point.
+    #[error("it could not be intersected")]
+    NotIntersected,
+    /// Too few rays, or behind a camera.
+    #[error("it is not determined")]
+    Undetermined,
+    /// A residual fails the test.
+    #[error("standardised residual {standardised:.1}")]
+    Blunder {
+        /// Its largest standardised residual, without sign.
+        standardised: f64,
+    },
+}

@@ -1,0 +1,115 @@
+//! From the site to its network, to the adjusted network, and back.
+
+use std::collections::BTreeSet;
+
+use super::{
+    adjusted::{self, Adjusted},
+    blunders,
+    fault::{AdjustFault, CONTRADICTION},
+    input::{AdjustImage, LaserShots},
+    network::{self, Named},
+    points::{LeftOut, LeftOutReason},
+    summary, words,
+};
+use crate::{
+    config::AdjustmentConfig,
+    error::Result,
+    geom::{
+        bundle::{Adjustment, BundleOptions, Residual, Unknown},
+        pushbroom::ExteriorOrientation,
+    },
+    stages::intersect::IntersectedTies,
+    ties::TiePoint,
+};
+
+/// Adjusts images, shots and tie points together.
+///
+/// Tie points start from their intersection; those without one are left out and listed.
+///
+/// # Errors
+/// No tie point with a ground point, identifiers that do not match, a singular network, initial values that the rest refutes.
+pub fn adjust<M: ExteriorOrientation>(
+    images: &[AdjustImage<M>],
+    shots: &LaserShots,
+    ties: &[TiePoint],
+    starts: &IntersectedTies,
+    config: &AdjustmentConfig,
+) -> Result<Adjusted> {
+    if starts.points.is_empty() {
+        let first = starts.rejected.first();
+        return Err(AdjustFault::NoTies {
+            ties: ties.len(),
+            first: first.map_or_else(
+                || "there are none".to_owned(),
+                |tie| format!("{}: {}", tie.id, tie.reason),
+            ),
+        }
+        .into());
+    }
+    let mut assembled = network::assemble(images, shots, ties, starts, config)?;
+    let bundle_options = BundleOptions {
+        robust: config.robust,
+        ..BundleOptions::default()
+    };
+    let adjustment =
+        blunders::solve_without_blunders(&mut assembled, &bundle_options, config.blunder_limit)
+            .map_err(|fault| words::in_words(fault, images, &assembled))?;
+    // Blunders have lost their measurements and are listed already.
+    let listed: BTreeSet<usize> = assembled.left_out.iter().map(|tie| tie.index).collect();
+    let dropped = adjustment
+        .points
+        .iter()
+        .enumerate()
+        .filter_map(|(point, outcome)| {
+            let Named { index, name } = &assembled.points[point];
+            let known = point >= assembled.shots && listed.contains(index);
+            (outcome.is_err() && !known).then(|| LeftOut {
+                kind: assembled.kind(point),
+                index: *index,
+                id: name.clone(),
+                reason: LeftOutReason::Undetermined,
+            })
+        });
+    let dropped: Vec<LeftOut> = dropped.collect();
+    assembled.left_out.extend(dropped);
+    contradictions(images, &assembled.points, &adjustment)?;
+    let summary = summary::summarise(
+        images,
+        &assembled,
+        &adjustment,
+        config.footprint_image_coordinates,
+    )?;
+    Ok(adjusted::collect(images, assembled, adjustment, summary))
+}
+
+fn contradictions<M>(
+    images: &[AdjustImage<M>],
+    points: &[Named],
+    adjustment: &Adjustment,
+) -> std::result::Result<(), AdjustFault> {
+    let refuse = |what: String, standardised: f64| {
+        if standardised > CONTRADICTION {
+            Err(AdjustFault::Contradiction { what, standardised })
+        } else {
+            Ok(())
+        }
+    };
+    let size = |residual: &Residual| (residual.value / residual.sigma).abs();
+    for (image, adjusted) in adjustment.images.iter().enumerate() {
+        for (coefficient, prior) in adjusted.priors.iter().enumerate() {
+            if let Some(prior) = prior {
+                let unknown = Unknown::Orientation { image, coefficient };
+                refuse(words::unknown_in_words(unknown, images, &[]), size(prior))?;
+            }
+        }
+    }
+    for (point, outcome) in points.iter().zip(&adjustment.points) {
+        for prior in outcome.iter().filter_map(|point| point.priors).flatten() {
+            refuse(
+                format!("the footprint of shot {}", point.name),
+                size(&prior),
+            )?;
+        }
+    }
+    Ok(())
+}

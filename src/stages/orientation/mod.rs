@@ -1,0 +1,172 @@
+//! The exterior orientation of an image, whether sampled from kernels or corrected.
+
+mod tables;
+
+use nalgebra::Vector3;
+use serde::{Deserialize, Serialize};
+
+pub(super) use tables::{Camera, Nodes};
+pub use tables::{CameraTables, InterpolationCheck};
+
+use super::tag_times::ImageTimes;
+use crate::{
+    constants::MARS_IAU2000,
+    error::Result,
+    frames::{CameraFrame, MarsIau2000, Position, Rotation},
+    geom::{
+        attitude::OmegaPhiKappa,
+        ellipsoid::{Spherical, ray_meets_ellipsoid},
+        pushbroom::Pose,
+    },
+    time::Et,
+};
+
+/// Intervals of the outline along the image: between two of them the track bends by centimetres.
+const OUTLINE_INTERVALS: u32 = 10;
+
+/// Orientation of one image.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Orientation {
+    /// Image identifier.
+    pub image: String,
+    /// Samples over the whole header image, both ends included.
+    pub samples: Vec<OrientationSample>,
+    /// Outline of the delivered image on the IAU 2000 ellipsoid: along the first pixel's outer edge,
+    /// back along the last one's, not closed. `None` when a corner sees no ground.
+    pub outline: Option<Vec<GroundPoint>>,
+    /// Tables for camera models, in J2000.
+    pub tables: CameraTables,
+    /// What the reader should know, one sentence each.
+    pub notes: Vec<String>,
+    /// Why the orientation is not to be trusted; empty when it is valid.
+    pub invalid_because: Vec<String>,
+}
+
+/// Orientation of the camera at one epoch.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct OrientationSample {
+    /// Epoch.
+    pub et: Et,
+    /// Lines from the middle of the header image.
+    pub line_offset: f64,
+    /// Perspective centre (geometric: no light time, no aberration).
+    pub position: Position<MarsIau2000>,
+    /// How the camera looks.
+    pub camera_to_mars: Rotation<CameraFrame, MarsIau2000>,
+    /// The same rotation as ω, φ, κ.
+    pub angles: OmegaPhiKappa,
+    /// Where the boresight meets the IAU 2000 ellipsoid, if it does.
+    pub boresight: Option<BoresightGround>,
+}
+
+/// A point on the ellipsoid.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct GroundPoint {
+    /// East longitude, radians.
+    pub longitude_rad: f64,
+    /// Areocentric latitude, radians.
+    pub latitude_rad: f64,
+}
+
+/// Ground point of the camera's boresight on the ellipsoid.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct BoresightGround {
+    /// East longitude, radians.
+    pub longitude_rad: f64,
+    /// Areocentric latitude, radians.
+    pub latitude_rad: f64,
+    /// Distance from the camera, metres.
+    pub range_m: f64,
+    /// Angle at the ground between the ellipsoid's normal and the camera, radians.
+    pub emission_rad: f64,
+}
+
+impl OrientationSample {
+    fn new(image: &ImageTimes, et: Et, camera: &Camera) -> Self {
+        Self {
+            et,
+            line_offset: image.line_offset(et),
+            position: camera.position,
+            camera_to_mars: camera.to_mars,
+            angles: OmegaPhiKappa::from_camera_to_mars(camera.to_mars.matrix()),
+            boresight: boresight_ground(camera),
+        }
+    }
+
+    /// Its pose.
+    #[must_use]
+    pub fn pose(&self) -> Pose {
+        Pose {
+            position_m: self.position.xyz_m,
+            mars_to_camera: self.camera_to_mars.matrix().transpose(),
+        }
+    }
+
+    /// Samples with the camera that `camera` gives for their epochs.
+    pub(super) fn at_epochs(
+        image: &ImageTimes,
+        epochs: &[Et],
+        camera: impl Fn(Et) -> Result<Camera>,
+    ) -> Result<Vec<Self>> {
+        let sample = |epoch: &Et| Ok(Self::new(image, *epoch, &camera(*epoch)?));
+        epochs.iter().map(sample).collect()
+    }
+}
+
+impl GroundPoint {
+    fn of(ground: &Position<MarsIau2000>) -> Self {
+        let coordinates = Spherical::from_xyz_m(&ground.xyz_m);
+        Self {
+            longitude_rad: coordinates.longitude_rad,
+            latitude_rad: coordinates.latitude.0,
+        }
+    }
+
+    /// Outline of the delivered lines and samples, seen by the camera that `camera` gives for an instant.
+    pub(super) fn outline(
+        image: &ImageTimes,
+        camera: impl Fn(Et) -> Result<Camera>,
+    ) -> Result<Option<Vec<Self>>> {
+        let duration_s = f64::from(image.lines_delivered) * image.line_period_s;
+        let step_s = duration_s / f64::from(OUTLINE_INTERVALS);
+        let (mut first_edge, mut last_edge) = (Vec::new(), Vec::new());
+        for k in 0..=OUTLINE_INTERVALS {
+            let Camera { position, to_mars } = camera(image.start.plus(f64::from(k) * step_s))?;
+            let [first, last] = swath_directions(image).map(|direction| {
+                let ground = ray_meets_ellipsoid(&position, &(to_mars.matrix() * direction));
+                ground.map(|ground| Self::of(&ground))
+            });
+            let (Some(first), Some(last)) = (first, last) else {
+                return Ok(None);
+            };
+            first_edge.push(first);
+            last_edge.push(last);
+        }
+        let back = last_edge.into_iter().rev();
+        Ok(Some(first_edge.into_iter().chain(back).collect()))
+    }
+}
+
+/// Where the outer edges of the first and the last sample look, camera frame.
+fn swath_directions(image: &ImageTimes) -> [Vector3<f64>; 2] {
+    let detector = image.detector();
+    [0.0, detector.samples].map(|sample| detector.look(sample))
+}
+
+fn boresight_ground(camera: &Camera) -> Option<BoresightGround> {
+    let boresight = camera.to_mars.matrix() * Vector3::z();
+    let ground = ray_meets_ellipsoid(&camera.position, &boresight)?;
+    let scale = Vector3::new(
+        MARS_IAU2000.equatorial_radius_m.powi(-2),
+        MARS_IAU2000.equatorial_radius_m.powi(-2),
+        MARS_IAU2000.polar_radius_m.powi(-2),
+    );
+    let normal = ground.xyz_m.component_mul(&scale);
+    let point = GroundPoint::of(&ground);
+    Some(BoresightGround {
+        longitude_rad: point.longitude_rad,
+        latitude_rad: point.latitude_rad,
+        range_m: camera.position.distance_m(&ground),
+        emission_rad: normal.angle(&-boresight),
+    })
+}

@@ -1,0 +1,171 @@
+//! Tables of an orientation for camera models, and how well they are interpolated.
+
+use nalgebra::{Matrix3, Vector3};
+use serde::{Deserialize, Serialize};
+
+use crate::{
+    constants::MARS_IAU2000,
+    error::Result,
+    frames::{CameraFrame, MarsIau2000, Position, Rotation},
+    geom::{
+        attitude::{make_continuous, matrix_of_spice_quaternion, spice_quaternion},
+        lagrange::lagrange,
+        statistics::largest,
+    },
+    stages::tag_times::ImageTimes,
+    time::Et,
+};
+
+/// Where between two nodes the interpolation is compared with the kernels, shares of their distance.
+const CHECKED_AT: [f64; 3] = [0.25, 0.5, 0.75];
+
+/// Uniform tables from a little before to a little after the image, as camera models want them.
+///
+/// Positions carry light time and stellar aberration (`LT+S`), as the tables of ISIS and ALE do.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct CameraTables {
+    /// Epochs, ET seconds.
+    pub et_s: Vec<f64>,
+    /// Mars to spacecraft, J2000, LT+S, metres.
+    pub position_m: Vec<[f64; 3]>,
+    /// Velocity, metres per second.
+    pub velocity_m_s: Vec<[f64; 3]>,
+    /// Mars to Sun, J2000, LT+S, metres, at the first and the last epoch.
+    pub sun_position_m: [[f64; 3]; 2],
+    /// Velocity of the Sun from Mars, metres per second, at the same epochs.
+    pub sun_velocity_m_s: [[f64; 3]; 2],
+    /// J2000 → bus, read with the pointing bias, (w, x, y, z), continuous.
+    pub inertial_to_bus: Vec<[f64; 4]>,
+    /// Angular velocity of the bus in J2000, radians per second.
+    pub bus_angular_velocity_rad_s: Vec<[f64; 3]>,
+    /// J2000 → IAU 2000, (w, x, y, z), continuous.
+    pub inertial_to_mars: Vec<[f64; 4]>,
+    /// Angular velocity of Mars in J2000, radians per second.
+    pub mars_angular_velocity_rad_s: Vec<[f64; 3]>,
+    /// Bus → camera by rows.
+    pub bus_to_camera: [[f64; 3]; 3],
+    /// How well the tables are interpolated over the image.
+    pub interpolation: InterpolationCheck,
+}
+
+/// Interpolation between the nodes of [`CameraTables`], as camera models do it, against the kernels.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
+pub struct InterpolationCheck {
+    /// Largest distance between what both see of the same ground, image pixels.
+    pub error_max_px: f64,
+    /// Epochs that were compared.
+    pub epochs: usize,
+}
+
+impl InterpolationCheck {
+    /// Largest error that tables should have, image pixels: tables with more get more nodes.
+    pub const LIMIT_PX: f64 = 0.01;
+
+    /// Whether the error is below the limit.
+    #[must_use]
+    pub fn keeps_limit(&self) -> bool {
+        self.error_max_px < Self::LIMIT_PX
+    }
+
+    /// Compares the interpolated camera with `camera` between all nodes over the image.
+    pub(in crate::stages) fn of(
+        image: &ImageTimes,
+        tables: &CameraTables,
+        camera: impl Fn(Et) -> Result<Camera>,
+    ) -> Result<Self> {
+        let nodes = Nodes::new(tables);
+        let mut check = Self::default();
+        for pair in tables.et_s.windows(2) {
+            for share in CHECKED_AT {
+                let et = Et::from_seconds(pair[0] + share * (pair[1] - pair[0]));
+                if !image.exposures().contains(et) {
+                    continue;
+                }
+                let error_px = error_px(image, &camera(et)?, &nodes.camera(et));
+                check.error_max_px = largest([check.error_max_px, error_px]).unwrap_or_default();
+                check.epochs += 1;
+            }
+        }
+        Ok(check)
+    }
+}
+
+/// Where the camera is and how it looks at one instant.
+#[derive(Debug, Clone, Copy)]
+pub(in crate::stages) struct Camera {
+    /// Perspective centre.
+    pub(in crate::stages) position: Position<MarsIau2000>,
+    /// Rotation to the axes of Mars.
+    pub(in crate::stages) to_mars: Rotation<CameraFrame, MarsIau2000>,
+}
+
+/// What a camera model makes of the nodes: rotated to Mars first, then interpolated.
+pub(in crate::stages) struct Nodes {
+    start_s: f64,
+    step_s: f64,
+    position_m: Vec<[f64; 3]>,
+    camera_to_mars: Vec<[f64; 4]>,
+}
+
+impl Nodes {
+    /// Nodes of `tables`, which hold two or more.
+    pub(in crate::stages) fn new(tables: &CameraTables) -> Self {
+        let bus_to_camera = Matrix3::from_fn(|row, column| tables.bus_to_camera[row][column]);
+        let matrices: Vec<(Matrix3<f64>, Matrix3<f64>)> = tables
+            .inertial_to_mars
+            .iter()
+            .zip(&tables.inertial_to_bus)
+            .map(|(to_mars, to_bus)| {
+                let to_camera = bus_to_camera * matrix_of_spice_quaternion(*to_bus);
+                (matrix_of_spice_quaternion(*to_mars), to_camera)
+            })
+            .collect();
+        let mut camera_to_mars: Vec<[f64; 4]> = matrices
+            .iter()
+            .map(|(to_mars, to_camera)| spice_quaternion(&(to_mars * to_camera.transpose())))
+            .collect();
+        make_continuous(&mut camera_to_mars);
+        let last = tables.et_s.len() - 1;
+        Self {
+            start_s: tables.et_s[0],
+            step_s: (tables.et_s[last] - tables.et_s[0]) / last as f64,
+            position_m: matrices
+                .iter()
+                .zip(&tables.position_m)
+                .map(|((to_mars, _), position_m)| (to_mars * Vector3::from(*position_m)).into())
+                .collect(),
+            camera_to_mars,
+        }
+    }
+
+    /// The camera between the nodes.
+    pub(in crate::stages) fn camera(&self, et: Et) -> Camera {
+        let at = (et.seconds() - self.start_s) / self.step_s;
+        let camera_to_mars = matrix_of_spice_quaternion(lagrange(&self.camera_to_mars, at));
+        Camera {
+            position: Position::new(lagrange(&self.position_m, at).into()),
+            to_mars: Rotation::new(camera_to_mars, et),
+        }
+    }
+}
+
+/// How far apart two cameras see the same ground, in image pixels, at most over the middle and both ends
+/// of a line; the ground is taken as near as it can be, straight below.
+fn error_px(image: &ImageTimes, kernels: &Camera, interpolated: &Camera) -> f64 {
+    let position_m = kernels.position.xyz_m;
+    let distance_m = position_m.norm() - MARS_IAU2000.equatorial_radius_m;
+    let detector = image.detector();
+    let pixel_rad =
+        image.instrument.optics.pixel_pitch_mm / image.instrument.optics.focal_length_mm;
+    let errors_px = [0.0, 0.5, 1.0].map(|share| {
+        let look = detector.look(share * detector.samples);
+        let ground_m = position_m + kernels.to_mars.matrix() * look * distance_m;
+        let seen =
+            interpolated.to_mars.matrix().transpose() * (ground_m - interpolated.position.xyz_m);
+        let missed = seen.xy() / seen.z - look.xy();
+        let lines = missed.x / f64::from(image.downtrack_summing);
+        let samples = missed.y / f64::from(image.crosstrack_summing);
+        lines.hypot(samples) / pixel_rad
+    });
+    largest(errors_px).unwrap_or_default()
+}
