@@ -63,16 +63,19 @@ fn of_the_program<T>(read: Result<T, Problems>) -> T {
 }
 
 /// The cameras that the program knows.
+#[must_use]
 pub fn built_in_instruments() -> &'static [Instrument] {
     &CAMERAS
 }
 
 /// The camera of images that name none, in configuration or label.
+#[must_use]
 pub fn usual_instrument() -> &'static Instrument {
     &CAMERAS[0]
 }
 
 /// The altimeter that the program knows.
+#[must_use]
 pub fn built_in_altimeter() -> &'static Altimeter {
     &ALTIMETER
 }

@@ -281,16 +281,13 @@ fn labelled(image: &ImageConfig) -> Result<(Instrument, ImageFields)> {
         Some(named) => std::slice::from_ref(named),
         None => built_in_instruments(),
     };
-    let (instrument, fields) = match &image.label {
-        Some(path) => {
-            let label = moc::read_label(path, cameras)?;
-            (label.instrument, label.fields)
-        }
-        None => {
-            let named = image.instrument.as_ref();
-            let camera = named.unwrap_or_else(|| usual_instrument());
-            (camera.clone(), ImageFields::default())
-        }
+    let (instrument, fields) = if let Some(path) = &image.label {
+        let label = moc::read_label(path, cameras)?;
+        (label.instrument, label.fields)
+    } else {
+        let named = image.instrument.as_ref();
+        let camera = named.unwrap_or_else(|| usual_instrument());
+        (camera.clone(), ImageFields::default())
     };
     Ok((instrument, fields))
 }

@@ -228,7 +228,8 @@ fn radial_coefficients_are_found_again() {
     assert!(fit.error_max_px < 1e-6, "{} px", fit.error_max_px);
     // Without distortion all is zero, exactly.
     let none = camera("moc_na");
-    assert_eq!(detector(&none, 1).radial_fit(&none).coefficients, [0.0; 3]);
+    let fit = detector(&none, 1).radial_fit(&none);
+    assert!(fit.coefficients.iter().all(|k| k.abs() <= 0.0));
 }
 
 #[test]
