@@ -44,6 +44,7 @@ declare_table! {
             .example(r#""E02-02855""#)
             .example_in(1, r#""M04-02852""#),
         /// PDS3 or ISIS label, attached or detached.
+        #[serde(skip)]
         label: Option<PathBuf> = key(FILE).example(r#""../labels/e0202855.lbl""#),
         /// The camera: `moc_na`, `moc_wa_red`, `moc_wa_blue`, or the path of an instrument file like those in
         /// `config/instruments`. Without it, the camera that the label names, and without a label `moc_na`.
