@@ -77,7 +77,7 @@ fn tables(reader: &Reader, epochs: &[Et]) -> Result<CameraTables> {
         bus_angular_velocity_rad_s: Vec::new(),
         inertial_to_mars: Vec::new(),
         mars_angular_velocity_rad_s: Vec::new(),
-        bus_to_camera: rows(session.mounting(first)?.matrix()),
+        bus_to_camera: rows(session.mounting(reader.instrument, first)?.matrix()),
         interpolation: InterpolationCheck::default(),
     };
     for epoch in epochs {
