@@ -15,6 +15,7 @@
 //! * Distortion is zero, as the instrument kernel says. ALE repeats the pixel pitch in these places, which
 //!   `usgscsm` takes for radial coefficients per mm² and mm⁴: wrong by hundreds of pixels at the edges.
 
+use nalgebra::Vector3;
 use serde::Serialize;
 use serde_json::{Value, json};
 
@@ -30,6 +31,8 @@ use crate::{
         NAIF_IAU_MARS, NAIF_MARS, NAIF_MGS_BUS, NAIF_MOC_NA,
     },
     error::Result,
+    frames::{self, Frame, J2000},
+    geom::attitude::continuous_quaternions,
     stages::{
         reorient::geometric_tables,
         sample_orientation::{CameraTables, InterpolationCheck, Orientation},
@@ -193,11 +196,11 @@ fn isd(site: &SiteProducts, image: &ImageProducts) -> Isd {
     }
 }
 
-fn rotation(
+fn rotation<To: Frame>(
     tables: &CameraTables,
     frame: i32,
-    quaternions: &[[f64; 4]],
-    rates: &[[f64; 3]],
+    rotations: &[frames::Rotation<J2000, To>],
+    rates_rad_s: &[Vector3<f64>],
 ) -> Rotation {
     let (start, end) = ends(&tables.et_s);
     Rotation {
@@ -206,8 +209,8 @@ fn rotation(
         ck_table_end_time: end,
         ck_table_original_size: tables.et_s.len(),
         ephemeris_times: tables.et_s.clone(),
-        quaternions: quaternions.to_vec(),
-        angular_velocities: rates.to_vec(),
+        quaternions: continuous_quaternions(rotations.iter().map(frames::Rotation::matrix)),
+        angular_velocities: rates_rad_s.iter().map(|rate| (*rate).into()).collect(),
         reference_frame: NAIF_J2000,
         constant_frames: None,
         constant_rotation: None,
@@ -226,7 +229,14 @@ fn body_rotation(tables: &CameraTables) -> Rotation {
 fn instrument_pointing(tables: &CameraTables) -> Rotation {
     Rotation {
         constant_frames: Some([NAIF_MOC_NA, NAIF_MGS_BUS]),
-        constant_rotation: Some(tables.bus_to_camera.concat()),
+        constant_rotation: Some(
+            tables
+                .bus_to_camera
+                .matrix()
+                .transpose()
+                .as_slice()
+                .to_vec(),
+        ),
         ..rotation(
             tables,
             NAIF_MGS_BUS,
@@ -236,10 +246,14 @@ fn instrument_pointing(tables: &CameraTables) -> Rotation {
     }
 }
 
-fn positions(et_s: &[f64], position_m: &[[f64; 3]], velocity_m_s: &[[f64; 3]]) -> Positions {
-    let km = |rows: &[[f64; 3]]| {
+fn positions(
+    et_s: &[f64],
+    position_m: &[Vector3<f64>],
+    velocity_m_s: &[Vector3<f64>],
+) -> Positions {
+    let km = |rows: &[Vector3<f64>]| {
         rows.iter()
-            .map(|row| row.map(|value| value / METRES_PER_KM))
+            .map(|row| (row / METRES_PER_KM).into())
             .collect()
     };
     let (start, end) = ends(et_s);
