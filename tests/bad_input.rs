@@ -14,7 +14,7 @@ mod common;
 
 use std::{fs, process::Command};
 
-use common::{case::Case, golden::Golden};
+use common::{case::Case, golden::Golden, outside};
 
 type Spoil = fn(&Case) -> Command;
 
@@ -31,6 +31,42 @@ fn compare(case: &Case, arguments: &[&str]) -> Command {
         .args(["--quiet", "kernels", "compare"])
         .args(arguments);
     command
+}
+
+fn integer(bytes: &[u8], at: usize) -> usize {
+    let bytes = bytes[at..at + 4].try_into().unwrap();
+    usize::try_from(i32::from_le_bytes(bytes)).unwrap()
+}
+
+/// A count, which binary kernels hold as a double.
+#[allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "a small whole number"
+)]
+fn count(bytes: &[u8], at: usize) -> usize {
+    f64::from_le_bytes(bytes[at..at + 8].try_into().unwrap()) as usize
+}
+
+/// Where the segment summaries of a small binary kernel begin (NAIF, DAF Required Reading).
+fn summaries(bytes: &[u8]) -> Vec<usize> {
+    let record = 1024 * (integer(bytes, 76) - 1);
+    let segments = 0..count(bytes, record + 16);
+    segments.map(|index| record + 24 + 40 * index).collect()
+}
+
+/// Writes `value` into a word of every packet of every segment (SPK type 13, CK type 3).
+fn spoil_packets(case: &Case, kernel: &str, [words, word]: [usize; 2], value: f64) {
+    let mut bytes = case.read(kernel);
+    for summary in summaries(&bytes) {
+        let [first, last] = [32, 36].map(|at| integer(&bytes, summary + at) - 1);
+        let packets = count(&bytes, 8 * last);
+        for packet in 0..packets {
+            let at = 8 * (first + words * packet + word);
+            bytes[at..at + 8].copy_from_slice(&value.to_le_bytes());
+        }
+    }
+    case.write(kernel, bytes);
 }
 
 fn run_into(case: &Case, out: &str) -> Command {
@@ -228,6 +264,22 @@ const CASES: &[(&str, Spoil)] = &[
             "[[images]]",
             "[range_check]\nmean_max_m = 0.001\n[[images]]",
         );
+        case.run()
+    }),
+    ("spk_state_is_not_finite", |case| {
+        spoil_packets(case, "kernels/mgs_nav_scene.bsp", [6, 2], f64::NAN);
+        case.run()
+    }),
+    ("ck_rate_is_not_finite", |case| {
+        spoil_packets(case, "kernels/mgs_sc_scene.bc", [7, 5], f64::INFINITY);
+        case.run()
+    }),
+    ("spk_segment_begins_at_minus_infinity", |case| {
+        let kernel = "kernels/mgs_nav_scene.bsp";
+        let mut bytes = case.read(kernel);
+        let first = summaries(&bytes)[0];
+        bytes[first..first + 8].copy_from_slice(&f64::NEG_INFINITY.to_le_bytes());
+        case.write(kernel, bytes);
         case.run()
     }),
     ("out_is_a_file", |case| {
@@ -507,7 +559,6 @@ fn products_named_outside_the_folder_are_left_alone() {
 
 /// Runs a shell script in the case's folder, with a tmpfs of `size` mounted at `small` in it and the
 /// program as `$0`; `None` for a user who cannot mount (only root, or who may make namespaces, can).
-#[allow(clippy::print_stderr, reason = "says what is skipped")]
 fn on_a_small_disk(case: &Case, size: &str, script: &str) -> Option<String> {
     fs::create_dir_all(case.path("small")).unwrap();
     let unshared = |script: String| {
@@ -521,9 +572,10 @@ fn on_a_small_disk(case: &Case, size: &str, script: &str) -> Option<String> {
     let mount = format!("mount -t tmpfs -o size={size} tmpfs small");
     let possible = unshared(mount.clone()).output();
     if !possible.is_ok_and(|output| output.status.success()) {
-        eprintln!("skipped full disk: this user cannot mount a tmpfs");
+        outside::skipped("full disk", "this user cannot mount a tmpfs");
         return None;
     }
+    outside::found("full disk");
     Some(case.outcome(unshared(format!("{mount} && {script}"))))
 }
 

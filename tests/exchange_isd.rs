@@ -8,7 +8,7 @@ mod fixture;
 #[path = "exchange/pushbroom.rs"]
 mod pushbroom;
 
-use std::{fs, path::PathBuf};
+use std::fs;
 
 use areograph::{
     config::{ImageConfig, KernelsConfig, OrientationConfig, PointingConfig},
@@ -49,10 +49,7 @@ fn real(test: &str) -> Option<Real> {
 /// The image with another number of summed detectors, and so with other pixels, in the same time.
 fn real_with_summing(test: &str, summing: u32) -> Option<Real> {
     let folder = common::real_data("ale_mgs/m0402852", test)?;
-    let files: Vec<PathBuf> = common::M0402852_KERNELS
-        .iter()
-        .map(|name| folder.join(name))
-        .collect();
+    let files = common::m0402852_files(&folder);
     let session = Session::open(&KernelSet::from_files(&files).unwrap()).unwrap();
     let image = ImageConfig {
         id: "m04-02852".to_owned(),

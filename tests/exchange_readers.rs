@@ -5,6 +5,7 @@
     reason = "helpers of tests may fail loudly"
 )]
 
+mod common;
 #[path = "products_site/fixture.rs"]
 #[allow(dead_code, reason = "the fixture serves several tests")]
 mod fixture;
@@ -24,6 +25,7 @@ use areograph::{
     stages::group_profiles::group_profiles,
     time::{Et, Interval, Intervals},
 };
+use common::json;
 use fixture::{SHOTS, START_S, Site};
 use nalgebra::Vector3;
 use readers::{output, program, python};
@@ -37,10 +39,6 @@ fn written(site: &Site, image: bool) -> tempfile::TempDir {
     })
     .unwrap();
     folder
-}
-
-fn json(path: &Path) -> Value {
-    serde_json::from_slice(&fs::read(path).unwrap()).unwrap()
 }
 
 fn close(value: f64, expected: f64, tolerance: f64) {

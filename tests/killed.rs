@@ -1,5 +1,8 @@
 //! A run that is killed leaves nothing half-made, and the next one ends with the same bytes, in an
 //! empty folder as over a published site.
+//!
+//! Kills hit at chosen system calls, so that none depends on how fast the machine is.
+#![cfg(all(target_os = "linux", target_arch = "x86_64"))]
 #![allow(
     clippy::unwrap_used,
     clippy::panic,
@@ -7,23 +10,27 @@
 )]
 
 mod common;
+#[path = "killed/traced.rs"]
+mod traced;
 
 use std::{
     collections::BTreeSet,
-    fs,
     path::{Path, PathBuf},
-    thread::sleep,
-    time::{Duration, Instant},
+    process::Command,
 };
 
 use common::{
     case::Case,
     mission::{areograph, mission, products, succeed},
 };
+use traced::{Call, Then, traced};
 
-/// Moments at which a run is killed.
-const KILLS: u32 = 20;
-fn run(site: &Path, out: &Path, threads: &str) -> std::process::Command {
+/// Kills of first runs: half of them at any change of a file, half where files get their names.
+const KILLS: usize = 20;
+/// Kills of each part of a run over a published site.
+const KILLS_REPUBLISHING: usize = 12;
+
+fn run(site: &Path, out: &Path, threads: &str) -> Command {
     let mut command = areograph();
     command
         .args(["--quiet", "run"])
@@ -31,47 +38,82 @@ fn run(site: &Path, out: &Path, threads: &str) -> std::process::Command {
         .arg("--out")
         .arg(out)
         .args(["--threads", threads]);
-    command.stdout(std::process::Stdio::null());
     command
 }
 
+/// Every change of a file below `out` that an undisturbed run makes, in order.
+fn changes(command: &Command, out: &Path) -> Vec<Call> {
+    let mut changes = Vec::new();
+    let ended = traced(command, |call| {
+        if call.changes() && call.path.starts_with(out) {
+            changes.push(call.clone());
+        }
+        Then::GoOn
+    });
+    assert_eq!(ended.code, Some(0), "{}", ended.stderr);
+    changes
+}
+
+/// Runs until just before the change at `place` in their order, and kills there.
+fn kill_before(command: &Command, out: &Path, place: usize) {
+    let mut made = 0;
+    let ended = traced(command, |call| {
+        if !(call.changes() && call.path.starts_with(out)) {
+            return Then::GoOn;
+        }
+        made += 1;
+        if made > place { Then::Kill } else { Then::GoOn }
+    });
+    assert_eq!(ended.code, None, "ended before change {place}");
+}
+
+/// Places of the calls that `of` wants.
+fn places(changes: &[Call], of: impl Fn(&Call) -> bool) -> Vec<usize> {
+    let wanted = changes.iter().enumerate().filter(|(_, call)| of(call));
+    wanted.map(|(place, _)| place).collect()
+}
+
+/// So many of `places`, equally spaced, both ends among them.
+fn spread(places: &[usize], count: usize) -> Vec<usize> {
+    let last = places.len() - 1;
+    (0..count)
+        .map(|index| places[index * last / (count - 1)])
+        .collect()
+}
+
+fn names_files(call: &Call) -> bool {
+    matches!(call.name, "rename" | "remove")
+}
+
 #[test]
-fn killed_at_twenty_moments() {
+fn killed_at_twenty_changes_of_a_first_run() {
     let site = mission().join("sites/isidis.toml");
     let folder = tempfile::tempdir().unwrap();
-    let undisturbed_out = folder.path().join("undisturbed");
-    let started = Instant::now();
-    succeed(&mut run(&site, &undisturbed_out, "2"));
-    let whole_run = started.elapsed();
+    let root = folder.path().canonicalize().unwrap();
+    let undisturbed_out = root.join("undisturbed");
+    let changes = changes(&run(&site, &undisturbed_out, "2"), &undisturbed_out);
     let undisturbed = products(&undisturbed_out);
     assert!(undisturbed.len() > 10);
-    let mut killed = 0;
-    for moment in 0..KILLS {
-        let out = folder.path().join(format!("killed-{moment}"));
-        let mut child = run(&site, &out, "2").spawn().unwrap();
-        // Moments over the whole run, shifted by a golden-ratio sequence so that they never line up.
-        let share =
-            (f64::from(moment) + (f64::from(moment) * 0.618_034).fract()) / f64::from(KILLS);
-        sleep(Duration::from_secs_f64(whole_run.as_secs_f64() * share));
-        child.kill().unwrap();
-        killed += u32::from(!child.wait().unwrap().success());
+    let all = places(&changes, |_| true);
+    let mut kills = spread(&all, KILLS / 2);
+    kills.extend(spread(&places(&changes, names_files), KILLS / 2));
+    for place in kills {
+        let call = &changes[place];
+        let out = root.join(format!("killed-{place}"));
+        kill_before(&run(&site, &out, "2"), &out, place);
         for (path, bytes) in products(&out) {
             assert!(
                 undisturbed.get(&path) == Some(&bytes),
-                "half-made {} after kill {moment}",
+                "half-made {} after a kill before {call:?}",
                 path.display()
             );
         }
         succeed(&mut run(&site, &out, "2"));
         assert!(
             products(&out) == undisturbed,
-            "products differ after kill {moment}"
+            "products differ after a kill before {call:?}"
         );
     }
-    assert!(
-        killed >= KILLS / 2,
-        "only {killed} runs were killed before they ended"
-    );
 }
 
 /// Adds a second image, the same label under another name, or takes it away.
@@ -83,17 +125,6 @@ fn change(case: &Case, second_image: bool) {
     } else {
         case.replace("site.toml", second, "");
     }
-}
-
-/// Starts a run, waits until `begun`, and kills it this long after; whether it was still running.
-fn kill(case: &Case, begun: impl Fn() -> bool, after: Duration) -> bool {
-    let mut child = case.run().spawn().unwrap();
-    while !begun() && child.try_wait().unwrap().is_none() {
-        sleep(Duration::from_micros(20));
-    }
-    sleep(after);
-    child.kill().unwrap();
-    !child.wait().unwrap().success()
 }
 
 /// Paths that the manifest lists, and its own.
@@ -110,77 +141,87 @@ fn listed(case: &Case) -> BTreeSet<PathBuf> {
         .collect()
 }
 
-/// Kills runs over a published site at 0 to `last` after something of theirs has begun, each followed by
-/// a run to the end. By turns they add the second image and take it away, and by turns the run to the
-/// end is of the new configuration and of the one before.
-fn kill_republishing(kills: u32, last: Duration, begins: fn(&Case) -> Box<dyn Fn() -> bool>) {
+/// Kills runs over a published site at the changes that `of` chooses, each followed by a run to the end. By turns
+/// they add the second image and take it away, and by turns the run to the end is of the new configuration and of
+/// the one before.
+fn kill_republishing(of: fn(&[Call]) -> Vec<usize>) {
     let case = Case::new();
-    let undisturbed = [false, true].map(|second_image| {
-        if second_image {
-            change(&case, true);
-        }
-        succeed(&mut case.run());
-        let found = products(&case.path("out/case"));
-        fs::remove_dir_all(case.path("out")).unwrap();
-        found
-    });
-    assert!(undisturbed[1].len() > undisturbed[0].len());
+    let out = case.path("").canonicalize().unwrap().join("out");
     succeed(&mut case.run());
-    let (mut second_image, mut killed) = (true, 0);
-    for attempt in 0..kills {
+    // What a run changes that adds the second image, and one that takes it away; and what they leave.
+    let measured = [true, false].map(|second_image| {
+        change(&case, second_image);
+        let changes = changes(&case.run(), &out);
+        (changes, products(&case.path("out/case")))
+    });
+    let [(adding, with), (removing, without)] = &measured;
+    assert!(with.len() > without.len());
+    let [adding, removing] =
+        [adding, removing].map(|changes| (changes, spread(&of(changes), KILLS_REPUBLISHING / 2)));
+    let mut second_image = false;
+    for attempt in 0..KILLS_REPUBLISHING {
         second_image = !second_image;
         change(&case, second_image);
-        let after = last * attempt / (kills - 1);
-        killed += u32::from(kill(&case, begins(&case), after));
-        if attempt % 2 == 1 {
+        let (changes, kills) = if second_image { &adding } else { &removing };
+        let place = kills[attempt / 2];
+        let call = &changes[place];
+        kill_before(&case.run(), &out, place);
+        // By turns of two: each direction meets both.
+        if attempt / 2 % 2 == 1 {
             second_image = !second_image;
             change(&case, second_image);
         }
         succeed(&mut case.run());
         let found = products(&case.path("out/case"));
         let files: BTreeSet<PathBuf> = found.keys().cloned().collect();
-        assert_eq!(files, listed(&case), "kill {attempt}, after {after:?}");
+        assert_eq!(files, listed(&case), "after a kill before {call:?}");
+        let undisturbed = if second_image { with } else { without };
         assert!(
-            found == undisturbed[usize::from(second_image)],
-            "products differ after kill {attempt}, after {after:?}"
+            found == *undisturbed,
+            "products differ after a kill before {call:?}"
         );
     }
-    assert!(killed > 0, "no run was killed before it ended");
+}
+
+/// Where the journal of the publication gets its name.
+fn publication(changes: &[Call]) -> usize {
+    let journal = |call: &Call| call.name == "rename" && call.path.ends_with(".publishing");
+    changes.iter().position(journal).unwrap()
 }
 
 #[test]
 fn killed_while_staging_over_a_published_site() {
-    kill_republishing(12, Duration::from_millis(30), |case| {
-        let staging = case.path("out/case/.staging");
-        assert!(!staging.exists(), "the run before left its staging folder");
-        Box::new(move || staging.exists())
+    kill_republishing(|changes| {
+        let staged = places(changes, |call| {
+            call.path.iter().any(|part| part == ".staging")
+        });
+        let begun = publication(changes);
+        staged.into_iter().filter(|place| *place < begun).collect()
     });
 }
 
 #[test]
 fn killed_while_publishing_over_a_published_site() {
-    // Publishing some twenty files takes a few milliseconds; the first of them is this one.
-    kill_republishing(12, Duration::from_millis(4), |case| {
-        let path = case.path("out/case/exchange/README.txt");
-        let written = move || fs::metadata(&path).and_then(|file| file.modified()).ok();
-        let before = written();
-        Box::new(move || written() != before)
-    });
+    kill_republishing(|changes| (publication(changes)..changes.len()).collect());
 }
 
 #[test]
-fn killed_when_an_image_has_just_come_or_gone() {
-    kill_republishing(12, Duration::from_micros(500), |case| {
-        let path = case.path("out/case/images/second/isd.json");
-        let before = path.exists();
-        Box::new(move || path.exists() != before)
+fn killed_when_an_image_comes_or_goes() {
+    kill_republishing(|changes| {
+        let begun = publication(changes);
+        let of_the_image = places(changes, |call| {
+            call.path.iter().any(|part| part == "second")
+        });
+        of_the_image
+            .into_iter()
+            .filter(|place| *place > begun)
+            .collect()
     });
 }
 
 /// Ctrl-C while forty large PEDR files are hashed and searched: the run ends soon, says where, and the
 /// next run begins where it was.
 #[test]
-#[cfg(unix)]
 fn an_interrupt_leaves_the_search_and_keeps_finished_stages() {
     let case = Case::new();
     let large = mission().join("pedr/ap18933l.b");
@@ -188,26 +229,26 @@ fn an_interrupt_leaves_the_search_and_keeps_finished_stages() {
         let link = case.path(&format!("pedr/link{number:02}.b"));
         std::os::unix::fs::symlink(&large, link).unwrap();
     }
-    let mut command = case.run();
-    let child = command
-        .stdout(std::process::Stdio::piped())
-        .stderr(std::process::Stdio::piped())
-        .spawn()
-        .unwrap();
-    let begun = Instant::now();
-    while !case.path("out/case/.cache/tag_times").exists() {
-        assert!(begun.elapsed() < Duration::from_mins(1), "never begun");
-        sleep(Duration::from_millis(1));
-    }
-    succeed(std::process::Command::new("kill").args(["-INT", &child.id().to_string()]));
-    let output = child.wait_with_output().unwrap();
-    let said = String::from_utf8(output.stderr).unwrap();
-    assert_eq!(output.status.code(), Some(130), "{said}");
+    let tagged = case.path("out/case/.cache/tag_times");
+    let mut interrupted = false;
+    let ended = traced(&case.run(), |call| {
+        let searching = call.path.ends_with("pedr/link00.b") && tagged.exists();
+        if interrupted || !searching {
+            return Then::GoOn;
+        }
+        interrupted = true;
+        Then::Interrupt
+    });
+    assert!(interrupted, "never begun");
+    assert_eq!(ended.code, Some(130), "{}", ended.stderr);
     assert!(
-        said.contains("case/search_footprints: stopped before its end"),
-        "{said}"
+        ended
+            .stderr
+            .contains("case/search_footprints: stopped before its end"),
+        "{}",
+        ended.stderr
     );
-    assert!(case.path("out/case/.cache/tag_times").exists());
+    assert!(tagged.exists());
     assert!(!case.path("out/case/.cache/search_footprints").exists());
 }
 

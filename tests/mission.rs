@@ -29,7 +29,7 @@ use areograph::{
     },
     time::{Intervals, PointingBias},
 };
-use common::mission::mission;
+use common::{mission::mission, number};
 use nalgebra::Vector3;
 use serde_json::Value;
 
@@ -51,10 +51,6 @@ fn truth() -> Value {
 fn session(version: &str) -> Session {
     let metakernel = mission().join(format!("kernels/{version}.tm"));
     Session::open(&KernelSet::from_metakernel(&metakernel).unwrap()).unwrap()
-}
-
-fn number(value: &Value) -> f64 {
-    value.as_f64().unwrap()
 }
 
 fn vector(value: &Value) -> Vector3<f64> {

@@ -25,6 +25,7 @@ use areograph::{
 };
 use arrow::array::{AsArray, RecordBatch};
 use arrow::datatypes::{Float64Type, UInt32Type};
+use common::json;
 use fixture::{SHOTS, START_S, Site};
 use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 use serde_json::Value;
@@ -46,10 +47,6 @@ fn written(name: &str, site: &Site, image: bool) -> (PathBuf, Vec<(String, u64)>
         .iter()
         .map(|product| (product.path.to_string_lossy().into_owned(), product.rows));
     (folder, list.collect())
-}
-
-fn json(path: &Path) -> Value {
-    serde_json::from_slice(&fs::read(path).unwrap()).unwrap()
 }
 
 fn check_schema(schema: &str, document: &Value) {

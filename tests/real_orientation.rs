@@ -44,10 +44,7 @@ fn m0402852(test: &str) -> Option<(ImageTimes, Orientation, Value)> {
     let folder = common::real_data("ale_mgs/m0402852", test)?;
     let truth = common::real_data("derived/cspice_truth.json", test)?;
     let truth: Value = serde_json::from_str(&fs::read_to_string(truth).unwrap()).unwrap();
-    let files: Vec<PathBuf> = common::M0402852_KERNELS
-        .iter()
-        .map(|name| folder.join(name))
-        .collect();
+    let files = common::m0402852_files(&folder);
     let session = Session::open(&KernelSet::from_files(&files).unwrap()).unwrap();
     let image = image("M04-02852", folder.join("m0402852_isis.lbl"));
     let times = tag_times(&[image], &session).unwrap().remove(0);

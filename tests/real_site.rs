@@ -12,8 +12,10 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use common::mission::{areograph, products, succeed};
-use serde_json::Value;
+use common::{
+    json,
+    mission::{areograph, products, succeed},
+};
 
 /// A metakernel over the real kernels, its strings cut to the 80 characters that NAIF allows.
 #[allow(
@@ -46,10 +48,6 @@ fn metakernel(folder: &Path, data: &Path) -> PathBuf {
     let path = folder.join("m0402852.tm");
     fs::write(&path, text).unwrap();
     path
-}
-
-fn json(path: &Path) -> Value {
-    serde_json::from_slice(&fs::read(path).unwrap()).unwrap()
 }
 
 #[test]

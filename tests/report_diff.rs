@@ -13,7 +13,7 @@ mod fixture;
 use std::fs;
 
 use areograph::units::RADIANS_PER_ARCSECOND;
-use common::case::Case;
+use common::{case::Case, number};
 use fixture::{TURN_ARCSEC, after_a_first_run, copy_products, diff, turn_attitudes};
 use serde_json::Value;
 
@@ -31,12 +31,6 @@ fn difference(case: &Case) -> Value {
     common::assert_keeps_schema(&answer, "difference");
     assert_eq!(answer["sites"].as_array().unwrap().len(), 1);
     answer["sites"][0].take()
-}
-
-fn number(value: &Value) -> f64 {
-    value
-        .as_f64()
-        .unwrap_or_else(|| panic!("no number: {value}"))
 }
 
 fn names(items: &Value) -> Vec<&str> {

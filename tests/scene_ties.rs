@@ -27,7 +27,7 @@ use areograph::{
     },
     ties::TiePoint,
 };
-use common::mission::mission;
+use common::{mission::mission, number};
 use nalgebra::Vector3;
 use serde_json::Value;
 
@@ -42,10 +42,6 @@ const RADIUS_M: f64 = 3.39e6;
 
 fn truth() -> Value {
     serde_json::from_slice(&fs::read(mission().join("truth.json")).unwrap()).unwrap()
-}
-
-fn number(value: &Value) -> f64 {
-    value.as_f64().unwrap()
 }
 
 fn vector(value: &Value) -> Vector3<f64> {

@@ -7,7 +7,7 @@
 
 mod common;
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use areograph::{
     constants::{MARS_IAU1991, MARS_IAU1994, MARS_IAU2000, MGS_POINTING_BIAS, MarsModel},
@@ -21,30 +21,12 @@ use areograph::{
     time::{Et, Interval, Intervals, PointingBias},
     units::{RADIANS_PER_DEGREE, wrap_pi},
 };
-use common::real_data;
+use common::{json, m0402852_files, number, real_data};
 use nalgebra::{Matrix3, Vector3};
 use serde_json::Value;
 
-/// The kernels of MOC image M04/02852, in load order.
-const KERNELS: [&str; 9] = [
-    "naif0012.tls",
-    "MGS_SCLKSCET.00061.tsc",
-    "pck00009.tpc",
-    "moc20.ti",
-    "mocAddendum004.ti",
-    "m0402852.ale_0.bsp",
-    "m0402852.ale_1.bsp",
-    "mgs_sc_map2_0_sliced_-94000.bc",
-    "mgs_sc_map2_1_sliced_-94000.bc",
-];
-
 fn kernels(folder: &Path) -> KernelSet {
-    let files: Vec<PathBuf> = KERNELS.iter().map(|name| folder.join(name)).collect();
-    KernelSet::from_files(&files).unwrap()
-}
-
-fn json(path: &Path) -> Value {
-    serde_json::from_slice(&std::fs::read(path).unwrap()).unwrap()
+    KernelSet::from_files(&m0402852_files(folder)).unwrap()
 }
 
 /// The kernels of the image, and the truth beside them.
@@ -52,10 +34,6 @@ fn image(test: &str) -> Option<(KernelSet, Value)> {
     let folder = real_data("ale_mgs/m0402852", test)?;
     let truth = real_data("derived/cspice_truth.json", test)?;
     Some((kernels(&folder), json(&truth)))
-}
-
-fn number(value: &Value) -> f64 {
-    value.as_f64().unwrap()
 }
 
 fn rows(value: &Value) -> &[Value] {

@@ -192,7 +192,10 @@ impl Reader {
             segment.integers[integers - 1],
         );
         let addresses_fit = 1 <= begin && begin <= end && i64::from(end) < first_free_word;
-        if !addresses_fit || segment.start.total_cmp(&segment.stop).is_gt() {
+        // Written so that NaN is refused too; an infinite time is no end of a segment either.
+        let ordered = segment.start <= segment.stop;
+        let finite = segment.start.is_finite() && segment.stop.is_finite();
+        if !(addresses_fit && ordered && finite) {
             return Err(damaged(format!(
                 "a segment from {} to {} at words {begin} to {end} of {first_free_word}",
                 segment.start, segment.stop

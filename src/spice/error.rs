@@ -107,6 +107,18 @@ pub enum SpiceFault {
         /// How far it was allowed to look.
         tolerance_s: f64,
     },
+    /// A kernel holds NaN or an infinity.
+    #[error("{what} at {instant} (UTC {utc}) is not finite{part}")]
+    NotFinite {
+        /// Whose position, velocity or attitude.
+        what: &'static str,
+        /// When, as the kernel counts time.
+        instant: Et,
+        /// The same in UTC.
+        utc: String,
+        /// Which part of the kernel holds it, as the end of the sentence.
+        part: String,
+    },
     /// The kernels' motion cannot be tabulated this well.
     #[error(
         "trajectory near {near}: {error_m} m off with pieces of {piece_s} s; wanted {tolerance_m} m"
@@ -202,6 +214,9 @@ impl Fault for SpiceFault {
             Self::Unusable { .. } => "use shorter paths without control characters, for example by a link",
             Self::CoverageGap { .. } | Self::NoAttitude { .. } => {
                 "add kernels that fill the gap, or leave out the image or profile that needs it"
+            }
+            Self::NotFinite { .. } => {
+                "fetch the kernel again, or leave it out of the list: this part of it holds NaN or infinity"
             }
             Self::NoConvergence { .. } => {
                 "check the SPK for jumps there, or allow a larger tolerance"

@@ -305,7 +305,15 @@ impl Cspice {
         self.check("ckcov_c")?;
         let used = usize::try_from(cell.card).unwrap_or(0).min(size);
         let (ends, _) = data[CELL_CONTROL_SIZE..CELL_CONTROL_SIZE + used].as_chunks::<2>();
-        Ok(ends.to_vec())
+        match ends
+            .iter()
+            .find(|[start, stop]| !(start <= stop && stop - start < f64::INFINITY))
+        {
+            Some([start, stop]) => Err(SpiceFault::DamagedKernel {
+                problem: format!("attitude from ET {start} to {stop}"),
+            }),
+            None => Ok(ends.to_vec()),
+        }
     }
 }
 

@@ -18,6 +18,7 @@ mod gaps;
 mod kernels;
 mod metakernel;
 mod needs;
+mod origin;
 mod select;
 mod session;
 mod text_kernel;

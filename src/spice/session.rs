@@ -10,10 +10,11 @@ use super::{
     ffi::{Cspice, Rows, StateKm},
     kernels::KernelSet,
     needs::{BUS_FRAME, CAMERA_FRAME, CLOCKS, LEAP_SECONDS, Need, explain},
+    origin::{self, Origin, all_finite},
 };
 use crate::{
     constants::{NAIF_MARS, NAIF_MGS, NAIF_MGS_BUS, NAIF_SUN},
-    error::{Place, Result},
+    error::{Failure, Place, Result},
     frames::{J2000, MgsBus, MocNa, Position, Rotation},
     time::{CkLookup, Et},
     units::METRES_PER_KM,
@@ -169,12 +170,13 @@ impl Session {
     /// Geometric state of MGS relative to Mars: no light time, no aberration.
     ///
     /// # Errors
-    /// [`SpiceFault::Spice`], of kind coverage when the kernels do not reach there.
+    /// [`SpiceFault::Spice`], of kind coverage when the kernels do not reach there;
+    /// [`SpiceFault::NotFinite`] with the kernel that holds NaN or an infinity.
     pub fn state(&self, et: Et) -> Result<State> {
         let state = self
             .cspice
             .geometric_state(NAIF_MGS, et.seconds(), NAIF_MARS)?;
-        Ok(State::from_km(state))
+        self.finite("position or velocity of MGS", et, state)
     }
 
     /// State of MGS as seen from the centre of Mars, corrected for light time and aberration (`LT+S`).
@@ -187,7 +189,7 @@ impl Session {
         let state = self
             .cspice
             .apparent_state(NAIF_MGS, et.seconds(), NAIF_MARS)?;
-        Ok(State::from_km(state))
+        self.finite("apparent position or velocity of MGS", et, state)
     }
 
     /// State of the Sun as seen from the centre of Mars (`LT+S`).
@@ -198,7 +200,34 @@ impl Session {
         let state = self
             .cspice
             .apparent_state(NAIF_SUN, et.seconds(), NAIF_MARS)?;
-        Ok(State::from_km(state))
+        self.finite("apparent position or velocity of the Sun", et, state)
+    }
+
+    /// The state in metres, refused with the kernel that makes it no number.
+    fn finite(&self, what: &'static str, et: Et, state_km: StateKm) -> Result<State> {
+        let state = State::from_km(state_km);
+        let finite = all_finite(state.position.xyz_m.as_slice())
+            && all_finite(state.velocity_m_s.as_slice());
+        if finite {
+            return Ok(state);
+        }
+        let origin = origin::of_state(&self.kernels, &self.cspice, et);
+        Err(self.not_finite(what, et, origin))
+    }
+
+    fn not_finite(&self, what: &'static str, instant: Et, origin: Option<Origin>) -> Failure {
+        let utc = self.et_to_utc(instant);
+        let part = origin.as_ref().map(|origin| origin.part);
+        let failure = Failure::from(SpiceFault::NotFinite {
+            what,
+            instant,
+            utc: utc.unwrap_or_else(|_| "unknown".to_owned()),
+            part: part.map_or_else(String::new, |part| format!(", in its part of {part}")),
+        });
+        match origin {
+            Some(origin) => failure.in_file(origin.path),
+            None => failure,
+        }
     }
 
     /// Attitude of the bus at `exposure`, read from the C-kernel at `lookup`.
@@ -208,6 +237,7 @@ impl Session {
     ///
     /// # Errors
     /// [`SpiceFault::NoAttitude`] when there is no attitude with rates within the tolerance;
+    /// [`SpiceFault::NotFinite`] with the kernel that holds NaN or an infinity;
     /// [`SpiceFault::MissingText`] without clock or leap seconds.
     pub fn attitude(&self, lookup: CkLookup, exposure: Et, tolerance_s: f64) -> Result<Attitude> {
         let kernel_time = lookup.kernel_time();
@@ -220,6 +250,14 @@ impl Session {
                 kernel_time,
                 tolerance_s,
             })?;
+        let rows = pointing.matrix.as_flattened();
+        let rates = &pointing.angular_velocity_rad_s;
+        if !(all_finite(rows) && all_finite(rates) && pointing.ticks.is_finite()) {
+            let reach_s = tolerance_s.max(0.0);
+            let origin = origin::of_attitude(&self.kernels, &self.cspice, kernel_time, reach_s);
+            let what = "attitude of MGS or its rate";
+            return Err(self.not_finite(what, kernel_time, origin));
+        }
         Ok(Attitude {
             inertial_to_bus: Rotation::new(matrix(&pointing.matrix), exposure),
             angular_velocity_rad_s: Vector3::from(pointing.angular_velocity_rad_s),

@@ -92,7 +92,13 @@ impl Session {
         let polynomial = ChebyshevVector::interpolate(interval, position)?;
         let mut error_m = 0.0_f64;
         for et in polynomial.check_instants() {
-            error_m = error_m.max((polynomial.value(et) - position(et)?).norm());
+            let distance_m = (polynomial.value(et) - position(et)?).norm();
+            // `max` would pass over NaN, which huge coordinates can make.
+            error_m = error_m.max(if distance_m.is_nan() {
+                f64::INFINITY
+            } else {
+                distance_m
+            });
         }
         if error_m <= tolerance_m {
             trajectory.max_error_m = trajectory.max_error_m.max(error_m);

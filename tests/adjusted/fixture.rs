@@ -84,10 +84,7 @@ impl Image {
     /// Image M04/02852 on real kernels.
     pub(crate) fn real(test: &str) -> Option<Self> {
         let folder = common::real_data("ale_mgs/m0402852", test)?;
-        let files: Vec<PathBuf> = common::M0402852_KERNELS
-            .iter()
-            .map(|name| folder.join(name))
-            .collect();
+        let files = common::m0402852_files(&folder);
         let set = KernelSet::from_files(&files).unwrap();
         Some(Self::new(
             set,

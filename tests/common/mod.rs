@@ -3,12 +3,14 @@
 #![allow(
     clippy::disallowed_methods,
     clippy::unwrap_used,
+    clippy::panic,
     reason = "helpers of tests work in temporary folders and may fail loudly"
 )]
 
 pub(crate) mod case;
 pub(crate) mod golden;
 pub(crate) mod mission;
+pub(crate) mod outside;
 
 use std::path::{Path, PathBuf};
 
@@ -17,8 +19,7 @@ pub(crate) fn assert_keeps_schema(answer: &serde_json::Value, name: &str) {
     let path = Path::new(env!("CARGO_MANIFEST_DIR"))
         .join("config/schema")
         .join(format!("{name}.schema.json"));
-    let schema: serde_json::Value = serde_json::from_slice(&std::fs::read(path).unwrap()).unwrap();
-    let validator = jsonschema::validator_for(&schema).unwrap();
+    let validator = jsonschema::validator_for(&json(&path)).unwrap();
     let errors: Vec<String> = validator
         .iter_errors(answer)
         .map(|error| format!("{}: {error}", error.instance_path()))
@@ -26,11 +27,11 @@ pub(crate) fn assert_keeps_schema(answer: &serde_json::Value, name: &str) {
     assert!(errors.is_empty(), "{name}: {errors:#?}");
 }
 
-/// A path below `AREOGRAPH_DATA` or `../shared/data`; without the data one line says what is skipped.
+/// A path below `AREOGRAPH_DATA` or `../shared/data`; without the data the test is counted as skipped, and under `CI`
+/// it fails.
 #[allow(
     clippy::disallowed_methods,
-    clippy::print_stderr,
-    reason = "tests find their data by an environment variable and say what they skip"
+    reason = "tests find their data by an environment variable"
 )]
 pub(crate) fn real_data(relative: &str, test: &str) -> Option<PathBuf> {
     let root = std::env::var("AREOGRAPH_DATA").map_or_else(
@@ -39,10 +40,30 @@ pub(crate) fn real_data(relative: &str, test: &str) -> Option<PathBuf> {
     );
     let path = root.join(relative);
     if path.exists() {
+        outside::found(test);
         return Some(path);
     }
-    eprintln!("skipped {test}: no {} (set AREOGRAPH_DATA)", path.display());
+    let lack = format!("no {} (set AREOGRAPH_DATA)", path.display());
+    assert!(std::env::var_os("CI").is_none(), "{test}: {lack}");
+    outside::skipped(test, &lack);
     None
+}
+
+/// A JSON file.
+pub(crate) fn json(path: &Path) -> serde_json::Value {
+    serde_json::from_slice(&std::fs::read(path).unwrap()).unwrap()
+}
+
+/// A number of a JSON document.
+pub(crate) fn number(value: &serde_json::Value) -> f64 {
+    value
+        .as_f64()
+        .unwrap_or_else(|| panic!("no number: {value}"))
+}
+
+/// Files of [`M0402852_KERNELS`] in their folder.
+pub(crate) fn m0402852_files(folder: &Path) -> Vec<PathBuf> {
+    M0402852_KERNELS.map(|name| folder.join(name)).to_vec()
 }
 
 /// Kernels of image M04/02852 in `ale_mgs/m0402852`, in load order.

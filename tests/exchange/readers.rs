@@ -5,6 +5,8 @@ use std::{
     process::Command,
 };
 
+use crate::common::outside;
+
 /// Where `scripts/readers` put the Python packages, and whether every reader must be there: `scripts/test`
 /// names the folder in `AREOGRAPH_READERS` once it has provided them.
 #[allow(
@@ -17,22 +19,18 @@ fn folder() -> (PathBuf, bool) {
     named.map_or((usual, false), |folder| (PathBuf::from(folder), true))
 }
 
-#[allow(
-    clippy::print_stderr,
-    clippy::panic,
-    reason = "tests say what they skip, and fail on what must be there"
-)]
 fn absent(reader: &str, test: &str, required: bool) {
     assert!(
         !required,
         "{test}: {reader} must be there; run scripts/readers"
     );
-    eprintln!("skipped {test}: no {reader} (run scripts/readers)");
+    outside::skipped(test, &format!("no {reader} (run scripts/readers)"));
 }
 
-/// A program, if it can be run; without it one line says what is skipped.
+/// A program, if it can be run; without it the test is counted as skipped.
 pub(crate) fn program(name: &str, test: &str) -> Option<Command> {
     if Command::new(name).arg("--version").output().is_ok() {
+        outside::found(test);
         return Some(Command::new(name));
     }
     absent(name, test, folder().1);
@@ -46,6 +44,7 @@ pub(crate) fn python(script: &str, test: &str) -> Option<Command> {
         absent("Python packages", test, required);
         return None;
     }
+    outside::found(test);
     let mut command = Command::new("python3");
     let path = format!("{}/tests/exchange/{script}", env!("CARGO_MANIFEST_DIR"));
     command.env("PYTHONPATH", folder).arg("-B").arg(path);

@@ -1,0 +1,66 @@
+//! Which kernel a number comes from that is none: asked only when one was read.
+
+use std::path::PathBuf;
+
+use super::{
+    coverage::interval_of,
+    daf,
+    ffi::Cspice,
+    kernels::{KernelRole, KernelSet},
+};
+use crate::{
+    constants::NAIF_MGS_BUS,
+    time::{Et, Interval},
+};
+
+/// A part of a kernel.
+pub(super) struct Origin {
+    /// The file.
+    pub(super) path: PathBuf,
+    /// The segment of an SPK, the interval of a CK.
+    pub(super) part: Interval,
+}
+
+/// The segment whose state at `et` is not finite: the first in CSPICE's order, later kernels before earlier ones.
+pub(super) fn of_state(set: &KernelSet, cspice: &Cspice, et: Et) -> Option<Origin> {
+    let spks = set.kernels().iter().rev();
+    for kernel in spks.filter(|kernel| kernel.role == KernelRole::Spk) {
+        for segment in daf::segments(&kernel.path).ok()?.iter().rev() {
+            let part = interval_of([segment.start, segment.stop]);
+            let [target, centre, ..] = segment.integers;
+            if !part.contains(et) {
+                continue;
+            }
+            let state = cspice.geometric_state(target, et.seconds(), centre).ok();
+            if state.is_some_and(|state| !all_finite(&state)) {
+                let path = kernel.path.clone();
+                return Some(Origin { path, part });
+            }
+        }
+    }
+    None
+}
+
+/// The interval of attitude that CSPICE reads at `kernel_time`, or within `reach_s` seconds of it.
+pub(super) fn of_attitude(
+    set: &KernelSet,
+    cspice: &Cspice,
+    kernel_time: Et,
+    reach_s: f64,
+) -> Option<Origin> {
+    let cks = set.kernels().iter().rev();
+    for kernel in cks.filter(|kernel| kernel.role == KernelRole::Ck) {
+        let intervals = cspice.ck_coverage(&kernel.path, NAIF_MGS_BUS).ok()?;
+        let mut parts = intervals.into_iter().map(interval_of);
+        if let Some(part) = parts.find(|part| part.padded(reach_s).contains(kernel_time)) {
+            let path = kernel.path.clone();
+            return Some(Origin { path, part });
+        }
+    }
+    None
+}
+
+/// Whether every one of `values` is a number.
+pub(super) fn all_finite(values: &[f64]) -> bool {
+    values.iter().all(|value| value.is_finite())
+}
