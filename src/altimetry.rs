@@ -1,13 +1,15 @@
 //! Vocabulary of the altimeter: its clock bias, the datum of its files, the shots that are kept.
 
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::frames::MarsDatum;
 
 /// The clock bias of MOLA: how shot tags become shot times.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct MolaClock {
     /// Size, seconds, not negative.
+    #[schemars(range(min = 0.0))]
     pub bias_s: f64,
     /// On which side of the true time the tags lie.
     pub sign: TagSign,
@@ -18,7 +20,7 @@ pub struct MolaClock {
 }
 
 /// On which side of the true time a tag lies.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum TagSign {
     /// Tags are late: true time = tag − bias.
@@ -28,7 +30,7 @@ pub enum TagSign {
 }
 
 /// What the corrected shot time is used for.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum BiasScope {
     /// The spacecraft's position in the range check; the default, which is what Shan 2005 did.

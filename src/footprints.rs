@@ -25,6 +25,7 @@
 
 use std::marker::PhantomData;
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::frames::MarsDatum;
@@ -47,7 +48,7 @@ pub struct SourceFile {
 }
 
 /// What image coordinates of footprints are to an adjustment.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum FootprintImageCoordinates {
     /// Observations with their own standard deviations, as in the paper.

@@ -28,6 +28,8 @@ const FLOORS: [&[&str]; 6] = [
         "footprints",
         "ties",
         "files",
+        "stage",
+        "schema",
         "altimetry",
         "image",
         "kernel_source",

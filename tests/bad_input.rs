@@ -582,7 +582,7 @@ fn on_a_small_disk(case: &Case, size: &str, script: &str) -> Option<String> {
 #[test]
 fn a_full_disk_leaves_nothing_half_made() {
     let script = "\"$0\" --quiet run site.toml --out small; code=$?; \
-                  find small -type f ! -path '*/.*'; exit $code";
+                  find small -type f ! -path '*/.*'; find small -name .staging; exit $code";
     let Some(found) = on_a_small_disk(&Case::new(), "300k", script) else {
         return;
     };
@@ -590,6 +590,7 @@ fn a_full_disk_leaves_nothing_half_made() {
     assert!(found.contains("No space left on device"), "{found}");
     assert!(found.contains("free some space"), "{found}");
     assert!(!found.contains("small/case/manifest.json\n"), "{found}");
+    assert!(!found.contains("/.staging\n"), "{found}");
 }
 
 #[test]

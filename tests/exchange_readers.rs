@@ -21,8 +21,8 @@ use std::{
 use areograph::{
     footprints::{Footprint, Footprints},
     geom::ellipsoid::spherical_to_xyz_m,
-    products::{KernelLine, write_products},
-    stages::group_profiles::group_profiles,
+    products::write_products,
+    stages::{describe_kernels::KernelLine, group_profiles::group_profiles},
     time::{Et, Interval, Intervals},
 };
 use common::json;
@@ -354,6 +354,7 @@ fn kernel(name: &str, role: &str, held: Option<&[[f64; 2]]>) -> KernelLine {
         bytes: 1024,
         blake3: "0f".repeat(32),
         held: held.map(|held| Intervals::union_of(held.iter().map(interval))),
+        used: Vec::new(),
     }
 }
 

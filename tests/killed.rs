@@ -229,7 +229,7 @@ fn an_interrupt_leaves_the_search_and_keeps_finished_stages() {
         let link = case.path(&format!("pedr/link{number:02}.b"));
         std::os::unix::fs::symlink(&large, link).unwrap();
     }
-    let tagged = case.path("out/case/.cache/tag_times");
+    let tagged = case.path("out/case/.cache/tag_times+image");
     let mut interrupted = false;
     let ended = traced(&case.run(), |call| {
         let searching = call.path.ends_with("pedr/link00.b") && tagged.exists();

@@ -52,6 +52,7 @@ fn a_turned_ck_is_found_and_nothing_else() {
     turn_attitudes(&case);
     let ran = [
         "sample_orientation/image",
+        "describe_kernels",
         "fit_sensor_model/image",
         "register/image",
         "publish",
@@ -198,6 +199,7 @@ fn another_orbit_moves_the_camera_by_the_injected_difference() {
     let ran = [
         "check_ranges",
         "sample_orientation/image",
+        "describe_kernels",
         "fit_sensor_model/image",
         "register/image",
         "publish",

@@ -35,7 +35,7 @@ fn run(case: &Case) -> Vec<String> {
 
 fn fresh() -> Case {
     let case = Case::new();
-    assert_eq!(run(&case).len(), 9);
+    assert_eq!(run(&case).len(), 11);
     assert_eq!(plan(&case), BTreeMap::new());
     assert_eq!(run(&case), [""; 0]);
     case
@@ -56,11 +56,12 @@ fn a_limit_of_the_range_check_touches_the_range_check() {
         "[[images]]",
         "[range_check]\nmean_max_m = 9.0\n[[images]]",
     );
-    let publish = "key configuration changed, output of check_ranges may change";
+    let publish = "inputs of check_ranges may change, key range_check.mean_max_m is new, \
+                   output of check_ranges may change";
     assert_plan(
         &case,
         &[
-            ("check_ranges", "key range_check changed"),
+            ("check_ranges", "key range_check.mean_max_m changed"),
             ("publish", publish),
         ],
     );
@@ -84,13 +85,23 @@ fn a_new_leap_second_kernel_with_the_same_seconds_stops_at_the_times() {
     text.extend(b"\nA remark after the last table.\n");
     case.write("kernels/leapseconds.tls", text);
     let planned = plan(&case);
-    assert_eq!(planned["tag_times"], "kernel leapseconds.tls changed");
-    assert_eq!(planned["group_profiles"], "output of tag_times may change");
+    assert_eq!(planned["tag_times/image"], "kernel leapseconds.tls changed");
+    assert_eq!(
+        planned["group_profiles"],
+        "output of tag_times/image may change"
+    );
     assert!(!planned.contains_key("search_footprints"));
-    // Times come out the same: profiles and ranges stay. Attitude depends on every kernel.
+    // Times come out the same: profiles stay. Any text kernel may define a frame of ephemeris or attitude.
     assert_eq!(
         run(&case),
-        ["tag_times", "sample_orientation/image", "publish"]
+        [
+            "tag_times/image",
+            "check_ranges",
+            "sample_orientation/image",
+            "describe_kernels",
+            "tag_utc",
+            "publish"
+        ]
     );
 }
 
@@ -108,13 +119,14 @@ fn another_orbit_touches_ranges_and_orientation() {
         planned["sample_orientation/image"],
         "kernel mgs_nav_scene.bsp changed"
     );
-    assert!(!planned.contains_key("tag_times"));
+    assert!(!planned.contains_key("tag_times/image"));
     let ran = run(&case);
     assert_eq!(
         ran,
         [
             "check_ranges",
             "sample_orientation/image",
+            "describe_kernels",
             "fit_sensor_model/image",
             "register/image",
             "publish"
@@ -131,7 +143,7 @@ fn another_camera_model_touches_registration_alone() {
         "[registration]\nmodel = \"samples\"\n[pedr]",
     );
     let planned = plan(&case);
-    assert_eq!(planned["register/image"], "key registration changed");
+    assert_eq!(planned["register/image"], "key registration.model changed");
     assert!(!planned.contains_key("fit_sensor_model/image"));
     assert_eq!(run(&case), ["register/image", "publish"]);
 }
@@ -146,7 +158,8 @@ fn a_changed_pedr_file_is_searched_again() {
     // The file's hash is part of the footprints' origin, so what holds it follows; times do not.
     let ran = run(&case);
     assert!(
-        ran.contains(&"search_footprints".to_owned()) && !ran.contains(&"tag_times".to_owned())
+        ran.contains(&"search_footprints".to_owned())
+            && !ran.contains(&"tag_times/image".to_owned())
     );
 }
 

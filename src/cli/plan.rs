@@ -9,7 +9,7 @@ use super::{load_sites, output};
 use crate::{
     config::SiteConfig,
     error::Failure,
-    flow::{Stage, check_out, plan_site},
+    flow::{PUBLISH, StageReason, check_out, plan_site},
 };
 
 /// Says which stages would run, and why.
@@ -29,20 +29,14 @@ pub(super) struct Arguments {
 pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let sites = load_sites(&arguments.sites)?;
     check_out(&arguments.out, &sites)?;
-    print(
-        &sites,
-        &arguments.out,
-        Stage::Publish,
-        false,
-        arguments.json,
-    )
+    print(&sites, &arguments.out, PUBLISH, false, arguments.json)
 }
 
 /// Prints the plan of every site.
 pub(super) fn print(
     sites: &[SiteConfig],
     out: &Path,
-    until: Stage,
+    until: &str,
     force: bool,
     as_json: bool,
 ) -> Result<(), Failure> {
@@ -50,29 +44,20 @@ pub(super) fn print(
     for site in sites {
         let stages = plan_site(site, out, until, force)?;
         if as_json {
-            let stages: Vec<_> = stages
-                .iter()
-                .map(|planned| {
-                    json!({
-                        "stage": planned.stage,
-                        "runs": planned.because.runs(),
-                        "because": planned.because.to_string(),
-                    })
-                })
-                .collect();
+            let stages: Vec<_> = stages.iter().map(stage_json).collect();
             answers.push(json!({ "site": site.site, "stages": stages }));
             continue;
         }
         output::line(format_args!("{}:", site.site));
         for planned in stages {
-            let word = if planned.because.runs() {
+            let word = if planned.reason.runs() {
                 "run "
             } else {
                 "keep"
             };
             output::line(format_args!(
                 "  {word}  {:32} {}",
-                planned.stage, planned.because
+                planned.stage, planned.reason
             ));
         }
     }
@@ -80,4 +65,13 @@ pub(super) fn print(
         output::json(&answers.into());
     }
     Ok(())
+}
+
+/// A stage with its reason, as plans and runs answer.
+pub(super) fn stage_json(stage: &StageReason) -> serde_json::Value {
+    json!({
+        "stage": stage.stage,
+        "runs": stage.reason.runs(),
+        "because": stage.reason.to_string(),
+    })
 }

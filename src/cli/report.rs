@@ -3,11 +3,11 @@
 use std::{path::PathBuf, process::ExitCode};
 
 use clap::{Args, Subcommand};
-use serde_json::{Value, json};
+use serde_json::json;
 
 use super::output;
 use crate::{
-    difference::{Limits, Outcome, Pairs, RunDifference, compare, pairs},
+    difference::{Answer, Limits, Outcome, Pairs, RunDifference, SiteAnswer, compare, pairs},
     error::{Failure, Kind},
     report::difference_page,
     store::page::PagePath,
@@ -87,7 +87,7 @@ fn diff(arguments: &DiffArguments) -> Result<u8, Failure> {
         .map(|(a, b)| (crate::files::file_name(b), compare(a, b, &limits)))
         .collect();
     if arguments.json {
-        output::json(&answer(&sites, &pairs));
+        output::json(&json!(answer(&sites, &pairs)));
     } else {
         print(&sites, &lonely(&pairs, &limits));
     }
@@ -143,23 +143,20 @@ fn print(sites: &[Compared], lonely: &[String]) {
     lonely.iter().for_each(output::line);
 }
 
-fn answer(sites: &[Compared], pairs: &Pairs) -> Value {
-    let sites: Vec<Value> = sites
-        .iter()
-        .map(|(site, compared)| match compared {
-            Ok(difference) => json!(difference),
-            Err(failure) => json!({
-                "site": site,
-                "error": failure.to_string(),
-                "exit_code": failure.kind().exit_code(),
-            }),
-        })
-        .collect();
-    json!({
-        "sites": sites,
-        "only_in_a": pairs.only_in_a,
-        "only_in_b": pairs.only_in_b,
-    })
+fn answer<'a>(sites: &'a [Compared], pairs: &'a Pairs) -> Answer<'a> {
+    let of_site = |(site, compared): &'a Compared| match compared {
+        Ok(difference) => SiteAnswer::Difference(difference),
+        Err(failure) => SiteAnswer::Failed {
+            site,
+            error: failure.to_string(),
+            exit_code: failure.kind().exit_code(),
+        },
+    };
+    Answer {
+        sites: sites.iter().map(of_site).collect(),
+        only_in_a: &pairs.only_in_a,
+        only_in_b: &pairs.only_in_b,
+    }
 }
 
 /// A failure says more than a limit; a site that is gone keeps no limit.

@@ -9,7 +9,7 @@ use std::{
     },
 };
 
-use clap::Args;
+use clap::{Args, builder::PossibleValuesParser};
 use serde_json::json;
 use tokio::{sync::Semaphore, task::JoinHandle};
 
@@ -17,7 +17,7 @@ use super::{load_sites, output, plan, report};
 use crate::{
     config::SiteConfig,
     error::{Failure, Kind},
-    flow::{Ending, RunOptions, SiteOutcome, Stage, check_out, publish_sites, run_site},
+    flow::{Ending, PUBLISH, RunOptions, STAGES, SiteOutcome, check_out, publish_sites, run_site},
     store::{manifest::Manifest, publish::read_manifest},
 };
 
@@ -45,10 +45,11 @@ pub(super) struct Arguments {
     #[arg(
         long,
         value_name = "STAGE",
-        default_value = "publish",
-        hide_default_value = true
+        default_value = PUBLISH,
+        hide_default_value = true,
+        value_parser = PossibleValuesParser::new(STAGES)
     )]
-    until: Stage,
+    until: String,
     /// Run every stage, whatever is stored.
     #[arg(long)]
     force: bool,
@@ -73,7 +74,7 @@ pub(super) fn run(arguments: &Arguments) -> ExitCode {
         return super::finish(plan::print(
             &sites,
             &arguments.out,
-            arguments.until,
+            &arguments.until,
             arguments.force,
             arguments.json,
         ));
@@ -128,13 +129,17 @@ async fn run_all(sites: Vec<SiteConfig>, arguments: &Arguments) -> Vec<Outcome> 
         .into_iter()
         .map(|site| {
             let (stop, places) = (Arc::clone(&stop), Arc::clone(&places));
-            let (out, until, force) = (arguments.out.clone(), arguments.until, arguments.force);
+            let (out, until, force) = (
+                arguments.out.clone(),
+                arguments.until.clone(),
+                arguments.force,
+            );
             tokio::spawn(async move {
                 let _place = places.acquire_owned().await;
                 let work = move || {
                     let options = RunOptions {
                         out,
-                        until,
+                        until: &until,
                         force,
                         stop: &stop,
                     };
@@ -258,17 +263,19 @@ fn outcome_json(outcome: &Outcome) -> serde_json::Value {
         Ok(SiteOutcome {
             site,
             folder,
+            stages,
             ending,
         }) => {
             let ending = match ending {
                 Ending::Published(manifest) => products(true, manifest),
                 Ending::Unchanged(manifest) => products(false, manifest),
                 Ending::StoppedAfter(stage) => json!({
-                    "stopped_after": stage.name(),
+                    "stopped_after": stage,
                     "earlier_products_utc": read_manifest(folder).map(|earlier| earlier.finished_utc),
                 }),
             };
-            json!({ "site": site, "folder": folder, "ending": ending })
+            let stages: Vec<_> = stages.iter().map(plan::stage_json).collect();
+            json!({ "site": site, "folder": folder, "stages": stages, "ending": ending })
         }
     }
 }

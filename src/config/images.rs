@@ -42,6 +42,7 @@ declare_table! {
             .example(r#""E02-02855""#)
             .example_in(1, r#""M04-02852""#),
         /// PDS3 or ISIS label, attached or detached.
+        #[serde(skip)]
         label: Option<PathBuf> = key(FILE).example(r#""../labels/e0202855.lbl""#),
         /// Its name in tie point files and in what is written for ISIS, when that is not the identifier: for a
         /// control network the ISIS serial number. Without it, the identifier.

@@ -29,6 +29,7 @@ declare_table! {
     /// `sets`.
     pub struct KernelsConfig {
         /// The source of the kernel list.
+        #[serde(skip)]
         source: KernelSource = group::<SourceKeys>().map(SourceKeys::source),
         /// How far from an attitude sample the C-kernel may be asked; 0 only inside its intervals, so that gaps
         /// are reported. (The ISIS addendum for MOC uses 1 s.) Beyond the intervals the nearest attitude is

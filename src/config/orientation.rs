@@ -1,5 +1,7 @@
 //! `[orientation]` and `[registration]`: the sensor model and its use.
 
+use schemars::JsonSchema;
+
 use crate::{geom::pushbroom::CameraModel, units::RADIANS_PER_ARCSECOND};
 
 use super::{
@@ -24,7 +26,7 @@ declare_table! {
 
 declare_table! {
     /// Projection of the footprints into the images.
-    pub struct RegistrationConfig {
+    pub struct RegistrationConfig: JsonSchema {
         /// The orientation that points are projected with. How far the others are from the one chosen is
         /// told in `registration.json` and in the report.
         model: CameraModel = key(words_of(CameraModel::WORDS, [

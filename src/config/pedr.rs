@@ -20,6 +20,7 @@ declare_table! {
         /// PEDR files: paths or globs with `*`, `?`, `[..]`, in at most three parts of the path, `**` not
         /// taken; letter case counts. A glob that matches no file is a problem. Every shot counts once: a copy
         /// of a file is read once, two versions of one orbit are refused.
+        #[serde(skip)]
         files: Vec<PathBuf> = key(Globs)
             .required_as("paths or globs of PEDR files (or no table pedr at all)")
             .example(r#"["../pedr/*.b"]"#),

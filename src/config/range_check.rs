@@ -1,5 +1,7 @@
 //! `[range_check]`.
 
+use schemars::JsonSchema;
+
 use super::{
     declare::{Keys, declare_table, key},
     forms::{above_to, from_to, whole_from_to},
@@ -10,7 +12,7 @@ pub const SCAN_STEPS_MAX: u32 = 10_000;
 
 declare_table! {
     /// Limits that make a profile valid or invalid.
-    pub struct RangeCheckConfig {
+    pub struct RangeCheckConfig: JsonSchema {
         /// Largest |mean| of range minus distance. The default is the limit of Shan et al. 2005.
         mean_max_m: f64 = key(above_to(0.0, 1e6)).or(10.0),
         /// A shot farther from the median than this many robust standard deviations is an outlier.

@@ -2,6 +2,8 @@
 
 use std::path::PathBuf;
 
+use schemars::JsonSchema;
+
 use crate::{geom::intersection::Weighting, units::RADIANS_PER_DEGREE};
 
 use super::{
@@ -18,6 +20,7 @@ declare_table! {
         /// `line`, one row a measurement, or ISIS control networks in PVL (a binary one: cnetbin2pvl). Lines and
         /// samples count as in ISIS, the middle of the first pixel is 1. `serial_number` is an image's
         /// `serial_number` above, or its `id`; measurements in other images are counted and left out.
+        #[serde(skip)]
         files: Vec<PathBuf> = key(Globs)
             .required_as("paths or globs of tie point files (or no table ties at all)")
             .example(r#"["../ties/*.csv"]"#),
@@ -26,7 +29,7 @@ declare_table! {
 
 declare_table! {
     /// Ground points of the tie points, with the orientation held fixed.
-    pub struct IntersectionConfig: Copy {
+    pub struct IntersectionConfig: Copy, JsonSchema {
         /// Weights of the measurements.
         weighting: Weighting = group::<WeightingKeys>().map(WeightingKeys::weighting),
         /// Smallest angle between the two rays of a point that differ most.

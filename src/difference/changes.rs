@@ -2,13 +2,14 @@
 
 use std::collections::BTreeMap;
 
+use schemars::JsonSchema;
 use serde::Serialize;
 use serde_json::{Value, json};
 
 use crate::store::manifest::Manifest;
 
 /// A value that differs; missing where a run does not have it.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Change {
     /// Key, with dots between tables.
     pub what: String,
@@ -21,7 +22,7 @@ pub struct Change {
 }
 
 /// Texts of one run alone.
-#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, JsonSchema)]
 pub struct Texts {
     /// Only in the first run.
     pub only_in_a: Vec<String>,

@@ -3,6 +3,7 @@
 use std::{cmp::Ordering, collections::BTreeMap, path::Path};
 
 use nalgebra::Vector3;
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::movement::{Component, ROUNDING, Size};
@@ -12,7 +13,7 @@ use crate::{
 };
 
 /// Footprints of both runs, matched by file, orbit, record and shot.
-#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, JsonSchema)]
 pub struct FootprintsDifference {
     /// In both runs.
     pub matched: usize,
@@ -26,7 +27,7 @@ pub struct FootprintsDifference {
 }
 
 /// Movement of the footprints that are in both runs.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct FootprintsMovement {
     /// How many moved by more than rounding.
     pub moved: usize,
@@ -42,15 +43,17 @@ pub struct FootprintsMovement {
 }
 
 /// Which shot.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, JsonSchema)]
 pub struct ShotName {
     /// PEDR file.
     pub source_file: String,
     /// Orbit.
     pub orbit: u32,
     /// Record of the file, counted from 1.
+    #[schemars(range(min = 1))]
     pub record: u32,
     /// Shot in the frame.
+    #[schemars(range(min = 1, max = 20))]
     pub shot: u32,
 }
 

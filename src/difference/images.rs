@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use nalgebra::{Matrix3, Vector3};
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::{
@@ -26,7 +27,7 @@ use crate::{
 const SAME_LINE: f64 = 1e-3;
 
 /// An image in both runs or in one.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct ImageDifference {
     /// Image identifier.
     pub image: String,
@@ -54,7 +55,7 @@ pub struct ImageDifference {
 /// Radial, along and cross are the axes of the first run: away from Mars, along the flight in inertial
 /// space, along the orbit's angular momentum. Turns about x, y and z are those of the camera's own axes,
 /// right-handed; a turn about z, the boresight, moves nothing in the middle of the image.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct ImageMovement {
     /// Epoch of a line.
     pub time_s: Component,
@@ -81,17 +82,19 @@ pub struct ImageMovement {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub boresight_ground_m: Option<Size>,
     /// The samples, in order of lines.
+    #[schemars(length(min = 1))]
     pub samples: Vec<SampleMovement>,
 }
 
 /// Movement of one sample; see [`ImageMovement`].
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
 pub struct SampleMovement {
     /// Lines from the middle of the header image.
     pub line_offset: f64,
     /// Epoch.
     pub time_s: f64,
     /// Distance between the perspective centres.
+    #[schemars(range(min = 0.0))]
     pub distance_m: f64,
     /// Away from Mars.
     pub radial_m: f64,
@@ -100,6 +103,7 @@ pub struct SampleMovement {
     /// Along the orbit's angular momentum.
     pub cross_m: f64,
     /// Angle of the whole turn.
+    #[schemars(range(min = 0.0))]
     pub turn_arcsec: f64,
     /// About the camera's x axis.
     pub about_x_arcsec: f64,
@@ -109,9 +113,11 @@ pub struct SampleMovement {
     pub about_z_arcsec: f64,
     /// Turn of the boresight × its range.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(range(min = 0.0))]
     pub pointing_ground_m: Option<f64>,
     /// Distance between the boresight's ground points.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(range(min = 0.0))]
     pub boresight_ground_m: Option<f64>,
 }
 

@@ -1,11 +1,12 @@
 //! Named things with a hash: kernels, stages, products.
 
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::store::manifest::Manifest;
 
 /// A named thing.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, JsonSchema)]
 pub struct Item {
     /// Name; a further thing of one name counts as `name (2)` and so on.
     pub name: String,
@@ -13,11 +14,12 @@ pub struct Item {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub role: Option<String>,
     /// BLAKE3 of the file, or the fingerprint of the stage.
+    #[schemars(regex(pattern = "^[0-9a-f]{64}$"))]
     pub hash: String,
 }
 
 /// A thing that both runs have, not the same in both.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, JsonSchema)]
 pub struct ChangedItem {
     /// Name.
     pub name: String,
@@ -25,13 +27,15 @@ pub struct ChangedItem {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub role: Option<String>,
     /// Hash in the first run.
+    #[schemars(regex(pattern = "^[0-9a-f]{64}$"))]
     pub a: String,
     /// Hash in the second run.
+    #[schemars(regex(pattern = "^[0-9a-f]{64}$"))]
     pub b: String,
 }
 
 /// How two lists of things differ.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, JsonSchema)]
 pub struct Items {
     /// Only in the second run.
     pub added: Vec<Item>,

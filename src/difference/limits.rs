@@ -1,17 +1,20 @@
 //! Movements judged by limits.
 
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::{Outcome, RunDifference, images::ImageDifference, movement::ROUNDING, words::quantity};
 
 /// How far things may move; without a limit everything may.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, JsonSchema)]
 pub struct Limits {
     /// For footprints, perspective centres and the boresight's ground points, metres.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(range(min = 0.0))]
     pub movement_m: Option<f64>,
     /// For the camera's turn, arcseconds.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(range(min = 0.0))]
     pub pointing_arcsec: Option<f64>,
 }
 

@@ -4,6 +4,7 @@
 //! `B − A`. What is in both is compared by identity: shots by file, orbit, record and shot number,
 //! samples of an image by their line, profiles, images, kernels, stages and products by name.
 
+mod answer;
 mod changes;
 mod fault;
 mod footprints;
@@ -16,6 +17,7 @@ mod words;
 
 use std::path::Path;
 
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::{
@@ -27,6 +29,7 @@ use crate::{
     },
 };
 
+pub use answer::{Answer, SiteAnswer, schema};
 pub use changes::{Change, Texts, text};
 pub use footprints::{FootprintsDifference, FootprintsMovement, ShotName};
 pub use images::{ImageDifference, ImageMovement, SampleMovement};
@@ -39,9 +42,10 @@ pub use words::quantity;
 use fault::DifferenceFault;
 
 /// Everything that differs between two runs of one site.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct RunDifference {
     /// Always `areograph difference 1`.
+    #[schemars(extend("const" = "areograph difference 1"))]
     pub format: &'static str,
     /// Site identifier.
     pub site: String,
@@ -86,7 +90,7 @@ pub struct RunDifference {
 }
 
 /// What came of a comparison.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Outcome {
     /// Manifests are equal but for the time of publication.
@@ -100,7 +104,7 @@ pub enum Outcome {
 }
 
 /// A run, as its manifest introduces it.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct RunEntry {
     /// Version of the program.
     pub version: String,
@@ -109,6 +113,7 @@ pub struct RunEntry {
     /// Configuration file, without folders.
     pub configuration: String,
     /// BLAKE3 of its keys and values.
+    #[schemars(regex(pattern = "^[0-9a-f]{64}$"))]
     pub configuration_blake3: String,
     /// Whether the products keep the limits of the configuration, and which are broken.
     pub verdict: Verdict,
@@ -127,7 +132,7 @@ impl RunEntry {
 }
 
 /// A profile in both runs or in one.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct ProfileDifference {
     /// Window, orbit and crossing.
     pub profile: String,

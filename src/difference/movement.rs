@@ -1,5 +1,6 @@
 //! Statistics of movements.
 
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::geom::statistics::largest;
@@ -11,20 +12,23 @@ use crate::geom::statistics::largest;
 pub(super) const ROUNDING: f64 = 1e-6;
 
 /// Statistics of sizes, none negative; the unit is that of the member's name.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, JsonSchema)]
 pub struct Size {
     /// Mean.
+    #[schemars(range(min = 0.0))]
     pub mean: f64,
     /// Largest.
+    #[schemars(range(min = 0.0))]
     pub max: f64,
 }
 
 /// Statistics of values with a sign; the unit is that of the member's name.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, JsonSchema)]
 pub struct Component {
     /// Mean.
     pub mean: f64,
     /// Largest absolute value.
+    #[schemars(range(min = 0.0))]
     pub max_abs: f64,
 }
 

@@ -1,26 +1,20 @@
-//! Configuration, files and kernel coverage of a site, without writing anything.
+//! The flow that tries: configuration, files and kernel coverage of a site, without writing anything.
 
-use std::{path::Path, sync::atomic::AtomicBool};
+use std::{path::PathBuf, sync::atomic::AtomicBool};
 
 use super::{
-    Stage,
-    kernels::{load_kernels, wanted},
+    driver::{Driver, Flow, Leave},
+    kernels::wanted,
+    site::{Prepared, Site, kernels, orient, prepare, ties},
 };
 use crate::{
-    altimetry::DatumChoice,
     config::SiteConfig,
     error::{Failure, Place, Result},
+    files::{HashedFile, InputFiles},
     kernel_source::KernelSource,
-    pds::pedr,
-    spice::{Session, Wanted},
-    stages::{
-        convert_datum::convert_datum,
-        group_profiles::{Profile, group_profiles},
-        read_ties::read_ties,
-        sample_orientation::sample_orientation,
-        search_footprints::search_footprints,
-        tag_times::{ImageTimes, tag_times},
-    },
+    spice::Wanted,
+    stage::{Output, Provenance, Stage},
+    stages::{group_profiles::Profile, tag_times::ImageTimes},
 };
 
 /// What a check found.
@@ -32,189 +26,173 @@ pub struct Checked {
     pub failures: Vec<Failure>,
 }
 
-impl Checked {
-    fn note(&mut self, result: Result<String>, config: &SiteConfig) {
-        match result.in_site(&config.site) {
-            Ok(finding) => self.findings.push(finding),
-            Err(failure) => self.failures.push(failure),
-        }
-    }
-}
-
-/// Checks a site's kernels, labels, PEDR and tie point files, and coverage at its images and at its shots.
+/// Checks a site's kernels, labels, PEDR and tie point files, and coverage at its images and at its shots; of rival
+/// sets of kernels every one, since any of them may be chosen.
 ///
 /// The PEDR files are searched as a run does it: only shots in the windows tell which times are needed.
 #[must_use]
 pub fn check_site(config: &SiteConfig) -> Checked {
-    let mut checked = Checked::default();
-    for path in &config.pedr.files {
-        checked.note(check_pedr(path, config.pedr.datum), config);
+    let mut check = Check::of(config);
+    if let Err(Leave::Failed(failure)) = check.all(config) {
+        check.checked.failures.push(failure.in_site(&config.site));
     }
-    if !config.ties.files.is_empty() {
-        checked.note(check_ties(config), config);
+    check.checked
+}
+
+/// The times at which a site reads kernels, found by the stages that need no orbit; nothing is stored.
+///
+/// # Errors
+/// What those stages say of labels, clocks and PEDR files.
+pub(super) fn required(config: &SiteConfig) -> Result<Wanted> {
+    let mut check = Check::of(config);
+    let prepared = prepare(&mut check, config);
+    if let Some(failure) = check.checked.failures.into_iter().next() {
+        return Err(failure);
     }
-    if let Err(failure) = check_kernels(config, &mut checked) {
-        checked.failures.push(failure.in_site(&config.site));
+    match prepared {
+        Ok(prepared) => Ok(prepared.required.unwrap_or_default()),
+        Err(Leave::StageReached) => Ok(Wanted::default()),
+        Err(Leave::Failed(failure)) => Err(failure.in_site(&config.site)),
     }
-    checked
 }
 
-fn check_pedr(path: &Path, choice: DatumChoice) -> Result<String> {
-    let file = pedr::File::open(path)?;
-    file.require_records()?;
-    let version = file.name().map(|name| name.version);
-    let datum = pedr::decide_datum(choice, version, file.label().datum).in_file(path)?;
-    let complaints: Vec<String> = file
-        .label_complaints()
-        .iter()
-        .map(|complaint| format!("; {}", complaint.text))
-        .collect();
-    let frames = file.records().len();
-    Ok(format!(
-        "{}: {frames} frames in {datum}{}",
-        path.display(),
-        complaints.concat()
-    ))
+struct Check<'a> {
+    site: &'a str,
+    files: InputFiles,
+    never: AtomicBool,
+    /// Set of kernels that findings are about.
+    prefix: String,
+    checked: Checked,
 }
 
-fn check_ties(config: &SiteConfig) -> Result<String> {
-    let ties = read_ties(&config.ties, &config.images).in_stage(Stage::ReadTies.name())?;
-    let (points, joining) = (ties.points.len(), ties.joining());
-    let bad = match ties.complaint_count {
-        0 => String::new(),
-        count => format!("; {count} records that cannot be read"),
-    };
-    Ok(format!(
-        "{points} tie points, {joining} of them in two or more images{bad}"
-    ))
-}
+impl<'a> Check<'a> {
+    fn of(config: &'a SiteConfig) -> Self {
+        Self {
+            site: &config.site,
+            files: InputFiles::default(),
+            never: AtomicBool::new(false),
+            prefix: String::new(),
+            checked: Checked::default(),
+        }
+    }
 
-/// Profiles of the site's shots, as [`super::run_site`] finds them; nothing is stored.
-pub(super) fn find_profiles(config: &SiteConfig, images: &[ImageTimes]) -> Result<Vec<Profile>> {
-    let correction_s = config.mola_clock.correction_s();
-    let never = AtomicBool::new(false);
-    let found = search_footprints(&config.pedr, &config.windows, correction_s, &never)?;
-    let footprints = convert_datum(found.footprints, &config.mola_clock).footprints;
-    Ok(group_profiles(&footprints, &config.windows, images))
-}
+    fn all(&mut self, config: &SiteConfig) -> Flow<()> {
+        let prepared = prepare(self, config)?;
+        let searched = !config.pedr.files.is_empty() && self.checked.failures.is_empty();
+        if searched && prepared.profiles.get().is_some_and(Vec::is_empty) {
+            self.tell("no shot in any window: products would be invalid");
+        }
+        if !config.ties.files.is_empty() {
+            ties(self, config)?;
+        }
+        let KernelSource::Sets(sets) = &config.kernels.source else {
+            return self.check_kernels(config, prepared, 0);
+        };
+        for (index, set) in sets.iter().enumerate() {
+            self.prefix = format!("kernel set {}: ", set.id);
+            self.check_kernels(config, prepared.clone(), index)?;
+        }
+        Ok(())
+    }
 
-/// Position at the shots of every profile; one finding for all that have it.
-fn check_profiles(
-    needs: &Needs,
-    session: &Session,
-    config: &SiteConfig,
-    prefix: &str,
-    checked: &mut Checked,
-) {
-    let (mut covered, mut shots) = (0, 0);
-    for profile in &needs.profiles {
-        let position = session.require_position(profile.interval);
-        match position.in_stage(Stage::CheckRanges.name()) {
-            Ok(()) => {
-                covered += 1;
-                shots += profile.rows.len();
+    /// Orbit and orientation with one set of kernels.
+    fn check_kernels(&mut self, config: &SiteConfig, prepared: Prepared, set: usize) -> Flow<()> {
+        let kernels = kernels(self, config, prepared.required.as_ref(), set)?;
+        if let Some(kernels) = &kernels {
+            for line in kernels.explanation() {
+                self.tell(line);
             }
-            Err(failure) => checked.failures.push(failure.in_site(&config.site)),
         }
+        orient(self, config, prepared, kernels).map(|_| ())
     }
-    let of = needs.profiles.len();
-    if of > 0 {
-        let finding =
-            format!("{prefix}{covered} of {of} profiles ({shots} shots): position covered");
-        checked.findings.push(finding);
+
+    fn tell(&mut self, finding: &str) {
+        self.checked
+            .findings
+            .push(format!("{}{finding}", self.prefix));
+    }
+
+    /// Notes a finding or a failure; whether it was a finding.
+    fn note<T>(&mut self, stage: &str, result: Result<T>) -> Option<T> {
+        match result.in_stage(stage).in_site(self.site) {
+            Ok(found) => Some(found),
+            Err(failure) => {
+                self.checked.failures.push(failure);
+                None
+            }
+        }
     }
 }
 
-/// What the site asks of its kernels.
-struct Needs {
-    images: Vec<ImageTimes>,
-    /// Empty when a PEDR file cannot be used: that was told before.
-    profiles: Vec<Profile>,
-}
+impl Driver for Check<'_> {
+    fn files(&self) -> &InputFiles {
+        &self.files
+    }
 
-/// Coverage at images and shots; of rival sets of kernels every one, since any of them may be chosen.
-fn check_kernels(config: &SiteConfig, checked: &mut Checked) -> Result<()> {
-    let needs = needs(config, checked)?;
-    let KernelSource::Sets(sets) = &config.kernels.source else {
-        return check_set(config, 0, "", &needs, checked);
-    };
-    for (index, set) in sets.iter().enumerate() {
-        let prefix = format!("kernel set {}: ", set.id);
-        if let Err(failure) = check_set(config, index, &prefix, &needs, checked) {
-            checked.failures.push(failure.in_site(&config.site));
-        }
+    fn stop(&self) -> &AtomicBool {
+        &self.never
     }
-    Ok(())
-}
 
-/// Times of the images by the clocks of the first set, and the shots in the windows.
-fn needs(config: &SiteConfig, checked: &mut Checked) -> Result<Needs> {
-    let searchable = !config.pedr.files.is_empty() && checked.failures.is_empty();
-    let clocks = load_kernels(config, &Wanted::default(), 0)?;
-    let session = Session::open(&clocks)?;
-    let mut images = Vec::new();
-    for image in &config.images {
-        match tag_times(std::slice::from_ref(image), &session) {
-            Ok(mut times) => images.append(&mut times),
-            Err(failure) => checked.failures.push(failure.in_site(&config.site)),
-        }
+    fn enter(&mut self, _stage: &'static str) -> Flow<()> {
+        Ok(())
     }
-    drop(session);
-    let mut found = Vec::new();
-    if searchable {
-        match find_profiles(config, &images) {
-            Ok(profiles) => found = profiles,
-            Err(failure) => checked.failures.push(failure.in_site(&config.site)),
-        }
-        if found.is_empty() && checked.failures.is_empty() {
-            let finding = "no shot in any window: products would be invalid";
-            checked.findings.push(finding.to_owned());
-        }
-    }
-    Ok(Needs {
-        images,
-        profiles: found,
-    })
-}
 
-fn check_set(
-    config: &SiteConfig,
-    index: usize,
-    prefix: &str,
-    needs: &Needs,
-    checked: &mut Checked,
-) -> Result<()> {
-    let wanted = wanted(config, &needs.images, &needs.profiles);
-    let kernels = load_kernels(config, &wanted, index)?;
-    let explanation = kernels.explanation().iter();
-    checked
-        .findings
-        .extend(explanation.map(|line| format!("{prefix}{line}")));
-    let session = Session::open(&kernels)?;
-    for image in &needs.images {
-        // One pass of the stage itself meets whatever a run would: ephemerides, frames, gaps.
-        let pointing = &config.pointing;
-        let sampled = sample_orientation(
-            &session,
-            image,
-            &config.kernels,
-            pointing,
-            &config.orientation,
-        );
-        let finding = sampled.in_stage(&Stage::SampleOrientation.of_image(&image.id)).map(|orientation| {
-            let invalid = orientation.invalid_because.iter();
-            let invalid = invalid.map(|reason| format!("; products would be invalid: {reason}"));
-            format!(
-                "{prefix}image {}: {} lines from {} UTC, first line centre {}, position and attitude covered{}",
-                image.id,
-                image.lines_header,
-                image.utc_start,
-                image.line_centre(0),
-                invalid.collect::<String>()
-            )
-        });
-        checked.note(finding, config);
+    /// Nothing is stored, so no hash is needed.
+    fn hash(&mut self, _stage: &'static str, _paths: &[PathBuf]) -> Flow<Vec<HashedFile>> {
+        Ok(Vec::new())
     }
-    check_profiles(needs, &session, config, prefix, checked);
-    Ok(())
+
+    /// An image without times fails by itself; it does not keep profiles from being checked.
+    fn usable(&self, images: &[Output<ImageTimes>]) -> Vec<Output<ImageTimes>> {
+        let usable = images.iter().filter(|image| image.get().is_some());
+        usable.cloned().collect()
+    }
+
+    fn attempt<T>(&mut self, stage: &str, result: Result<T>) -> Flow<Option<T>> {
+        Ok(self.note(stage, result))
+    }
+
+    /// The times as far as they are known.
+    fn required(
+        &self,
+        config: &SiteConfig,
+        images: &[Output<ImageTimes>],
+        profiles: &Output<Vec<Profile>>,
+    ) -> Option<Wanted> {
+        let images: Vec<&ImageTimes> = images.iter().filter_map(Output::get).collect();
+        let profiles = profiles.get().map_or(&[][..], Vec::as_slice);
+        Some(wanted(config, &images, profiles))
+    }
+
+    fn stage<S: Stage>(&mut self, stage: &S) -> Flow<Output<S::Output>> {
+        let label = stage.label();
+        let mut sound = true;
+        for found in stage.examine() {
+            match self.note(&label, found) {
+                Some(finding) => self.tell(&finding),
+                None => sound = false,
+            }
+        }
+        let pending = Output::pending(label.clone());
+        if !(sound && S::CHECKED && stage.inputs().is_complete()) {
+            return Ok(pending);
+        }
+        let made = stage.run(&self.never);
+        let Some(value) = self.note(&label, made) else {
+            return Ok(pending);
+        };
+        for finding in stage.findings(&value) {
+            self.tell(&finding);
+        }
+        // Nothing is kept by an output's origin here.
+        let nowhere = Provenance {
+            blake3: String::new(),
+            fingerprint: String::new(),
+        };
+        Ok(Output::known(label, value, nowhere))
+    }
+
+    fn publish(&mut self, _config: &SiteConfig, _site: &Site) -> Flow<()> {
+        Ok(())
+    }
 }

@@ -1,42 +1,91 @@
 //! Of rival kernel sets the one whose trajectory is closest to the mean of all.
 
+use std::sync::atomic::AtomicBool;
+
 use serde::{Deserialize, Serialize};
 
 use super::{
-    Stage,
-    check::find_profiles,
+    check,
     compare::{Compared, Request, RivalSet, compare_kernels},
-    kernels::{load_kernels, load_rivals, wanted},
+    kernels::load_rivals,
 };
 use crate::{
     config::SiteConfig,
     error::{Place, Result},
-    spice::{KernelRole, Session, Wanted},
-    stages::tag_times::tag_times,
+    files::InputFiles,
+    spice::{KernelRole, Wanted, position_kernels},
+    stage::{Input, Inputs, Stage},
+    stage_inputs,
+    stages::describe_kernels::Required,
     store::manifest::{FileEntry, KernelChoiceEntry},
+    time::PointingBias,
 };
 
 /// Which set was chosen, and by which distances.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub(super) struct KernelChoice {
+pub struct KernelChoice {
     /// Index of the chosen set.
-    pub(super) chosen: usize,
+    pub chosen: usize,
     /// All sets, as the manifest tells of them.
-    pub(super) entries: Vec<KernelChoiceEntry>,
+    pub entries: Vec<KernelChoiceEntry>,
     /// The choice and what was left out, one sentence each.
-    pub(super) notes: Vec<String>,
+    pub notes: Vec<String>,
+}
+
+stage_inputs! {
+    /// The rival sets, and the positions over which they are compared.
+    pub struct ChooseKernels<'a> {
+        /// The sets.
+        pub sets: RivalKernelSets<'a>,
+        /// Times at which the site reads kernels.
+        pub required: Required<'a>,
+        /// Whether the clocks must agree: times of images rest on them.
+        pub compare_clocks: &'a bool,
+    }
+}
+
+/// Rival sets in the order of the configuration; those of their kernels that positions may depend on.
+#[derive(Debug)]
+pub struct RivalKernelSets<'a>(&'a [RivalSet]);
+
+impl<'a> RivalKernelSets<'a> {
+    /// These sets, which hold only kernels that positions may depend on.
+    pub(super) const fn new(sets: &'a [RivalSet]) -> Self {
+        Self(sets)
+    }
+}
+
+impl Input for RivalKernelSets<'_> {
+    fn add_to(&self, _field: &str, inputs: &mut Inputs) {
+        let names: Vec<&str> = self.0.iter().map(|set| &*set.id).collect();
+        inputs.setting("kernels.sets (names)", &names);
+        for set in self.0 {
+            let sort = format!("kernel of set {}", set.id);
+            for (place, kernel) in set.kernels.kernels().iter().enumerate() {
+                inputs.file(&sort, &kernel.path, Some(place), &kernel.blake3);
+            }
+        }
+    }
+}
+
+impl Stage for ChooseKernels<'_> {
+    const NAME: &'static str = "choose_kernels";
+    type Output = KernelChoice;
+    stage_inputs!(fingerprint);
+
+    fn run(&self, _stop: &AtomicBool) -> Result<KernelChoice> {
+        let nothing = Wanted::default();
+        let required = self.required.0.unwrap_or(&nothing);
+        choose_kernels(self.sets.0, required, *self.compare_clocks)
+    }
 }
 
 /// Compares the trajectories of at least two sets over the positions that the site needs.
 ///
 /// # Errors
 /// As [`compare_kernels`].
-pub(super) fn choose_kernels(
-    config: &SiteConfig,
-    wanted: &Wanted,
-    rivals: &[RivalSet],
-) -> Result<KernelChoice> {
-    if wanted.positions.duration_s() <= 0.0 {
+fn choose_kernels(rivals: &[RivalSet], required: &Wanted, clocks: bool) -> Result<KernelChoice> {
+    if required.positions.duration_s() <= 0.0 {
         let first = &rivals[0].id;
         return Ok(KernelChoice {
             chosen: 0,
@@ -47,11 +96,11 @@ pub(super) fn choose_kernels(
         });
     }
     let request = Request {
-        stage: Stage::ChooseKernels.name(),
-        wanted: Some(wanted),
-        bias: config.pointing.ck_bias,
+        stage: ChooseKernels::NAME,
+        wanted: Some(required),
+        bias: PointingBias::from_seconds(0.0),
         attitudes: false,
-        clocks: !config.images.is_empty(),
+        clocks,
     };
     let compared = compare_kernels(rivals, &request)?;
     Ok(KernelChoice {
@@ -61,12 +110,26 @@ pub(super) fn choose_kernels(
     })
 }
 
+/// The rival sets of the configuration with the kernels that positions may depend on; none when it names one source.
+///
+/// # Errors
+/// Kernels that cannot be read.
+pub(super) fn rival_positions(config: &SiteConfig, files: &InputFiles) -> Result<Vec<RivalSet>> {
+    let rivals = load_rivals(config, files)?.into_iter().map(|rival| {
+        Ok(RivalSet {
+            kernels: position_kernels(&rival.kernels)?,
+            id: rival.id,
+        })
+    });
+    rivals.collect()
+}
+
 /// The rival sets of the configuration; none when it names one source of kernels.
 ///
 /// # Errors
 /// Kernels that cannot be read.
 pub fn rival_sets(config: &SiteConfig) -> Result<Vec<RivalSet>> {
-    load_rivals(config).in_site(&config.site)
+    load_rivals(config, &InputFiles::default()).in_site(&config.site)
 }
 
 /// The times at which a site reads kernels, found by the stages that need no orbit; nothing is stored.
@@ -74,12 +137,7 @@ pub fn rival_sets(config: &SiteConfig) -> Result<Vec<RivalSet>> {
 /// # Errors
 /// What those stages say of labels, clocks and PEDR files.
 pub fn wanted_by_site(config: &SiteConfig) -> Result<Wanted> {
-    let clocks = load_kernels(config, &Wanted::default(), 0).in_site(&config.site)?;
-    let session = Session::open(&clocks)?;
-    let images = tag_times(&config.images, &session).in_site(&config.site)?;
-    drop(session);
-    let profiles = find_profiles(config, &images).in_site(&config.site)?;
-    Ok(wanted(config, &images, &profiles))
+    check::required(config)
 }
 
 fn entries(rivals: &[RivalSet], compared: &Compared) -> Vec<KernelChoiceEntry> {

@@ -4,14 +4,12 @@ use super::RivalSet;
 use crate::{
     config::SiteConfig,
     error::Result,
+    files::InputFiles,
     kernel_source::{KernelList, KernelSource},
     spice::{KernelSet, Wanted},
-    stages::{group_profiles::Profile, tag_times::ImageTimes},
+    stages::{check_ranges::trajectory_reach_s, group_profiles::Profile, tag_times::ImageTimes},
     time::Intervals,
 };
-
-/// Seconds of trajectory beyond what the scan of the clock bias reaches.
-const TRAJECTORY_MARGIN_S: f64 = 0.5;
 
 /// The kernels of the configuration; from a folder, those that cover `wanted` (text kernels always);
 /// of rival sets the `chosen` one, which is the first as long as only clocks are needed.
@@ -19,47 +17,47 @@ pub(super) fn load_kernels(
     config: &SiteConfig,
     wanted: &Wanted,
     chosen: usize,
+    files: &InputFiles,
 ) -> Result<KernelSet> {
     match &config.kernels.source {
-        KernelSource::Listed(list) => load_list(list),
-        KernelSource::Root(selection) => KernelSet::select(selection, wanted),
-        KernelSource::Sets(sets) => sets
-            .get(chosen)
-            .map_or_else(|| Ok(KernelSet::default()), |set| load_list(&set.list)),
+        KernelSource::Listed(list) => load_list(list, files),
+        KernelSource::Root(selection) => KernelSet::select_of(files, selection, wanted),
+        KernelSource::Sets(sets) => sets.get(chosen).map_or_else(
+            || Ok(KernelSet::default()),
+            |set| load_list(&set.list, files),
+        ),
     }
 }
 
-fn load_list(list: &KernelList) -> Result<KernelSet> {
+fn load_list(list: &KernelList, files: &InputFiles) -> Result<KernelSet> {
     match list {
-        KernelList::Metakernel(path) => KernelSet::from_metakernel(path),
-        KernelList::Files(paths) => KernelSet::from_files(paths),
+        KernelList::Metakernel(path) => KernelSet::from_metakernel_of(files, path),
+        KernelList::Files(paths) => KernelSet::from_files_of(files, paths),
     }
 }
 
 /// The rival sets of the configuration; none when it names one source.
-pub(super) fn load_rivals(config: &SiteConfig) -> Result<Vec<RivalSet>> {
+pub(super) fn load_rivals(config: &SiteConfig, files: &InputFiles) -> Result<Vec<RivalSet>> {
     let KernelSource::Sets(sets) = &config.kernels.source else {
         return Ok(Vec::new());
     };
     let rivals = sets.iter().map(|set| {
         Ok(RivalSet {
             id: set.id.clone(),
-            kernels: load_list(&set.list)?,
+            kernels: load_list(&set.list, files)?,
         })
     });
     rivals.collect()
 }
 
-/// Seconds beyond a profile for which the spacecraft's path is tabulated.
-pub(super) fn trajectory_reach_s(config: &SiteConfig) -> f64 {
-    config.range_check.scan_half_width_s + config.mola_clock.bias_s + TRAJECTORY_MARGIN_S
-}
-
 /// Times at which the site reads kernels: exposures with their padding, flights over the windows as
 /// far as the scan reaches, and attitudes at the exposures shifted by the pointing bias.
-pub(super) fn wanted(config: &SiteConfig, images: &[ImageTimes], profiles: &[Profile]) -> Wanted {
-    let (kernels, reach_s) = (&config.kernels, trajectory_reach_s(config));
-    let exposures = images.iter().map(ImageTimes::exposures);
+pub(super) fn wanted(config: &SiteConfig, images: &[&ImageTimes], profiles: &[Profile]) -> Wanted {
+    let (kernels, reach_s) = (
+        &config.kernels,
+        trajectory_reach_s(&config.range_check, &config.mola_clock),
+    );
+    let exposures = images.iter().map(|image| image.exposures());
     let flights = profiles
         .iter()
         .map(|profile| profile.interval.padded(reach_s));

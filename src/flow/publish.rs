@@ -1,142 +1,179 @@
-//! The last stage: products staged, read back, named, and explained by the manifest.
+//! The last step: products staged, read back, named, and explained by the manifest.
 
 use std::path::{Path, PathBuf};
 
 use super::{
-    Ending, Stage,
-    manifest::{Account, kernel_entries, kernel_lines, pck_note},
-    parts,
-    results::Results,
+    PUBLISH,
+    driver::Ledger,
+    evidence::{complaints, judged, notes, rejected},
+    manifest::{Account, manifest},
+    site::{Adjustment, Site},
 };
 use crate::{
+    config::SiteConfig,
     error::Result,
-    products::{SiteProducts, write_products},
+    files::file_name,
+    products::{GeometricProducts, ImageProducts, SiteProducts, write_products},
     report,
-    spice::Session,
+    spice::{KernelSet, KernelView},
+    stage::{Input, Inputs, Output, Reason},
+    stages::site_image::SiteImage,
     store::{
-        cache::{Output, StageCache},
-        fingerprint::{Because, Parts},
+        cache::StageCache,
         manifest::Manifest,
         publish::{
             MANIFEST, damaged_product, entries, publish as publish_files, read_manifest, staging,
         },
     },
-    time::Et,
 };
 
-/// The products that stand for these parts, or why they have to be made.
+/// Raised when products are laid out anew.
+const METHOD: u32 = 10;
+
+/// The configuration as written, the outlines that it names, all kernels and where they lie from `folder`, and
+/// every stage with what it was made from.
+pub(super) fn inputs(config: &SiteConfig, site: &Site, folder: &Path, ledger: &Ledger) -> Inputs {
+    let mut inputs = Inputs::new(METHOD);
+    for (key, value) in &config.keys {
+        inputs.setting(key, value);
+    }
+    inputs.setting("(file name)", &file_name(&config.file));
+    inputs.setting("windows (outlines)", &config.windows);
+    (&KernelView::all(site.kernels.as_ref())).add_to("kernels", &mut inputs);
+    if let Some(kernels) = &site.kernels {
+        inputs.setting("kernels (places)", &kernels.metakernel_text(Some(folder)));
+        inputs.setting("kernels (selection)", kernels.explanation());
+    }
+    for (label, provenance) in ledger {
+        let provenance = provenance.as_ref();
+        inputs.output(label, provenance.map(|of| &*of.blake3));
+        inputs.fingerprint_of(label, provenance.map(|of| &*of.fingerprint));
+    }
+    if let Some(failure) = &site.adjustment_failure {
+        inputs.setting("(failed adjustment)", &failure.to_string());
+    }
+    inputs
+}
+
+/// The products that stand for these inputs, or why they have to be made.
 pub(super) fn standing(
     folder: &Path,
     cache: &StageCache,
-    parts: &Parts,
-) -> std::result::Result<Manifest, Because> {
-    let output: Output<Manifest> = cache.load(Stage::Publish.name(), parts)?;
-    let manifest = output.value;
-    if read_manifest(folder).as_ref() != Some(&manifest) {
-        return Err(Because::Moved(vec![format!(
-            "{MANIFEST} is missing or was changed"
-        )]));
+    inputs: &Inputs,
+) -> std::result::Result<Manifest, Reason> {
+    let stored: Output<Manifest> = cache.load(PUBLISH, inputs)?;
+    let changed = |what: &str| Reason::Changed(vec![format!("{what} is missing or was changed")]);
+    let manifest = stored.get().ok_or(Reason::Damaged)?;
+    if read_manifest(folder).as_ref() != Some(manifest) {
+        return Err(changed(MANIFEST));
     }
-    match damaged_product(folder, &manifest) {
-        Some(path) => Err(Because::Moved(vec![format!(
-            "{path} is missing or was changed"
-        )])),
-        None => Ok(manifest),
+    match damaged_product(folder, manifest) {
+        Some(path) => Err(changed(&path)),
+        None => Ok(manifest.clone()),
     }
 }
 
-/// Publishes the products unless those of an earlier run stand.
+/// Makes the products and puts them under their final names.
 ///
 /// # Errors
-/// A kernel that changed during the run, a product that does not read back, a disk that refuses.
-pub(super) fn publish(folder: &Path, cache: &StageCache, results: &Results<'_>) -> Result<Ending> {
-    let name = Stage::Publish.name();
-    let parts = parts::publish(results.config, results.kernels, folder, results.outputs());
-    match standing(folder, cache, &parts) {
-        Ok(manifest) => {
-            tracing::info!(stage = name, "kept: {}", Because::Unchanged);
-            return Ok(Ending::Unchanged(manifest));
-        }
-        Err(because) => tracing::info!(stage = name, "running: {because}"),
-    }
-    let fingerprint = parts.fingerprint();
-    let manifest = make_products(folder, results, fingerprint)?;
-    let published = cache.store(name, parts, manifest)?.value;
-    tracing::info!(
-        stage = name,
-        products = published.products.len(),
-        "published"
-    );
-    let stages = published.stages.iter().map(|stage| &*stage.name);
-    cache.keep_only(stages);
-    Ok(Ending::Published(published))
-}
-
-fn make_products(folder: &Path, results: &Results<'_>, fingerprint: String) -> Result<Manifest> {
-    let session = Session::open(results.kernels)?;
-    let footprints = &results.converted.value.footprints;
-    let utc = utc(&session, &footprints.et_s)?;
-    let notes = results.notes();
-    let warnings: Vec<String> = pck_note(&session, &results.wanted.positions)
-        .into_iter()
-        .collect();
-    for warning in &warnings {
+/// A product that does not read back, a disk that refuses.
+pub(super) fn publish(
+    config: &SiteConfig,
+    site: &Site,
+    folder: &Path,
+    ledger: &Ledger,
+    inputs: &Inputs,
+) -> Result<Manifest> {
+    let none = KernelSet::default();
+    let kernels = site.kernels.as_ref().unwrap_or(&none);
+    let described = site.described.value()?;
+    let (notes, complaints, rejected) = (notes(site)?, complaints(site)?, rejected(site)?);
+    let warnings = described.pck_note.as_slice();
+    for warning in warnings {
         tracing::warn!("{warning}");
     }
-    let kernels = kernel_entries(&session, results)?;
-    let lines = kernel_lines(&session, results.kernels)?;
-    drop(session);
-
-    let (images, complaints, rejected) = (
-        results.image_products(),
-        results.complaints(),
-        results.rejected(),
-    );
-    let adjusted_images = results.adjusted_image_products();
-    let site = SiteProducts {
-        config: results.config,
-        kernels: &lines,
-        metakernel: &results.kernels.metakernel_text(Some(folder)),
-        wanted: results.wanted,
+    let (verdict, images_agree) = judged(config, site, warnings, &complaints)?;
+    let images = image_products(&site.images)?;
+    let adjusted_images = site
+        .adjustment
+        .as_ref()
+        .map(|of| image_products(&of.adjusted_images));
+    let adjusted_images = adjusted_images.transpose()?.unwrap_or_default();
+    let geometric = site.adjustment.as_ref().map(|adjustment| {
+        geometric_products(adjustment, kernels, folder, &adjusted_images, images_agree)
+    });
+    let converted = site.converted.value()?;
+    let products = SiteProducts {
+        config,
+        kernels: &described.kernels,
+        metakernel: &kernels.metakernel_text(Some(folder)),
+        wanted: &site.required.clone().unwrap_or_default(),
         images: &images,
-        conversions: &results.converted.value.files,
-        footprints,
-        utc: &utc,
-        profiles: &results.profiles.value,
-        ranges: &results.ranges.value,
+        conversions: &converted.files,
+        footprints: &converted.footprints,
+        utc: site.utc.value()?,
+        profiles: site.profiles.value()?,
+        ranges: site.ranges.value()?,
         rejected: &rejected,
         complaints: &complaints,
         notes: &notes,
-        warnings: &warnings,
-        geometric: results.geometric_products(folder, &adjusted_images),
+        verdict: &verdict,
+        geometric: geometric.transpose()?,
     };
-    let (invalid_because, remarks) = (site.invalid_because(), site.remarks());
     let staging = staging(folder)?;
-    let files: Vec<(PathBuf, u64)> = write_products(&staging, &site, &report::page(&site)?)?
-        .into_iter()
-        .map(|product| (product.path, product.rows))
-        .collect();
-    results.kernels.verify_unchanged()?;
-
+    let files: Vec<(PathBuf, u64)> =
+        write_products(&staging, &products, &report::page(&products)?)?
+            .into_iter()
+            .map(|product| (product.path, product.rows))
+            .collect();
     let account = Account {
-        invalid_because,
-        kernels,
+        verdict,
         products: entries(&staging, &files)?,
         notes,
-        remarks,
         complaints,
+        rejected,
     };
-    let manifest = results.manifest(account, fingerprint);
+    let manifest = manifest(config, site, account, ledger, inputs)?;
     publish_files(folder, &staging, &manifest)?;
+    tracing::info!(
+        stage = PUBLISH,
+        products = manifest.products.len(),
+        "published"
+    );
     Ok(manifest)
 }
 
-/// Digits of a second in the UTC of shots: programs take the time from it, and MGS flies 3 m in a millisecond.
-const SHOT_UTC_DECIMALS: u8 = 6;
+/// The images as products want them.
+fn image_products(images: &[SiteImage]) -> Result<Vec<ImageProducts<'_>>> {
+    let images = images.iter().map(|image| {
+        Ok(ImageProducts {
+            times: image.times.value()?,
+            orientation: image.orientation.value()?,
+            model: image.model.value()?,
+            registration: image.registration.value()?,
+        })
+    });
+    images.collect()
+}
 
-fn utc(session: &Session, et_s: &[f64]) -> Result<Vec<String>> {
-    let instants = et_s.iter().copied().map(Et::from_seconds);
-    instants
-        .map(|et| session.et_to_utc_with(et, SHOT_UTC_DECIMALS))
-        .collect()
+/// What tie points make of the site in `folder`.
+fn geometric_products<'a>(
+    adjustment: &'a Adjustment,
+    kernels: &'a KernelSet,
+    folder: &'a Path,
+    adjusted_images: &'a [ImageProducts<'a>],
+    images_agree: bool,
+) -> Result<GeometricProducts<'a>> {
+    Ok(GeometricProducts {
+        kernels,
+        folder,
+        ties: adjustment.ties.value()?,
+        intersected: adjustment.intersected.value()?,
+        pairs: adjustment.pairs.value()?,
+        adjusted: adjustment.adjusted.value()?,
+        adjusted_images,
+        adjusted_intersected: adjustment.adjusted_intersected.value()?,
+        adjusted_pairs: adjustment.adjusted_pairs.value()?,
+        images_agree,
+    })
 }

@@ -1,5 +1,6 @@
 //! Plain and robust statistics of residuals.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Factor that makes the median absolute deviation of a normal distribution its standard deviation.
@@ -19,17 +20,19 @@ const CORRELATED_MIN: usize = 10;
 pub const BAARDA_LIMIT: f64 = 3.29;
 
 /// Statistics of a column; all 0 for an empty one.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Summary {
     /// Number of values.
     pub n: u32,
     /// Mean, in the unit of the values.
     pub mean: f64,
     /// Standard deviation with divisor n − 1.
+    #[schemars(range(min = 0.0))]
     pub standard_deviation: f64,
     /// Median.
     pub median: f64,
     /// Normalised median absolute deviation, 1.4826 · median |v − median|.
+    #[schemars(range(min = 0.0))]
     pub nmad: f64,
     /// Smallest value.
     pub min: f64,
@@ -118,7 +121,7 @@ const BLOCKS: usize = 10;
 const BLOCK_MIN: usize = 10;
 
 /// Straight line through values, in most uses over time.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Trend {
     /// Slope, unit of the values per unit of the abscissa (per second).
     pub slope: f64,

@@ -1,11 +1,5 @@
 //! Adjusted orientations as SPICE kernels that are loaded after the original ones.
 //!
-//! | file | what |
-//! |---|---|
-//! | `adjusted/<image>.bsp` | MGS relative to Mars around the image, geometric, J2000 (type 13) |
-//! | `adjusted/<image>.bc` | attitude of the bus around the image, J2000 (type 3) |
-//! | `adjusted.tm` | the kernels of the site, and then these |
-//!
 //! Time tags of the attitude follow the rule of the kernels that they replace: the attitude of an exposure at
 //! `t` stands at `t` + bias. ISIS and ALE read MOC attitude 1.15 s before the exposure of their own accord
 //! (`SetTimeBias(-1.15)` in ISIS, `instrument_time_bias` in ALE), as areograph does with its usual bias, so
@@ -27,7 +21,10 @@ use std::{
 };
 
 use super::{
-    GeometricProducts, Product, SiteProducts, Writer, fault::ProductFault, files::write_text,
+    fault::ProductFault,
+    files::write_text,
+    product::{Content, Context, Declaration, Product, Program, Role, Use, Write, Written},
+    site::GeometricProducts,
 };
 use crate::{
     config::{KernelsConfig, PointingConfig},
@@ -76,28 +73,56 @@ pub struct AdjustedKernels<'a> {
     pub pointing: &'a PointingConfig,
 }
 
-/// Writes the adjusted kernels of a site with tie points.
-pub(super) fn write(
-    written: &mut Writer,
-    site: &SiteProducts,
-    geometric: &GeometricProducts,
-) -> Result<()> {
+pub(super) static ATTITUDE: Declaration = Declaration {
+    path: "adjusted/<image>.bc",
+    what: "adjusted attitude of the bus around the image, J2000 (CK type 3)",
+    readers: "SPICE, ISIS, ALE",
+    rows: "epochs",
+    role: Role::Data,
+    content: Content::Foreign,
+    write: Write::WithAnother,
+    uses: &[Use {
+        program: Program::AdjustedKernels,
+        lines: "spiceinit from=<image>.cub spk=../adjusted/<image>.bsp ck=../adjusted/<image>.bc",
+    }],
+};
+
+pub(super) static POSITION: Declaration = Declaration {
+    path: "adjusted/<image>.bsp",
+    what: "adjusted position of MGS from Mars around the image, geometric, J2000 (SPK type 13)",
+    readers: "SPICE, ISIS, ALE",
+    rows: "epochs",
+    role: Role::Data,
+    content: Content::Foreign,
+    write: Write::WithAnother,
+    uses: &[],
+};
+
+pub(super) static METAKERNEL: Declaration = Declaration {
+    path: "adjusted.tm",
+    what: "the kernels of the site, and then the adjusted ones",
+    readers: "SPICE",
+    rows: "",
+    role: Role::Metadata,
+    content: Content::Foreign,
+    write: Write::Several(of_site),
+    uses: &[],
+};
+
+/// The adjusted kernels of a site with tie points.
+fn of_site(of: &Context, geometric: &GeometricProducts) -> Result<Vec<Written>> {
     let to = AdjustedKernels {
-        directory: written.directory,
+        directory: of.directory,
         site_folder: geometric.folder,
         originals: geometric.kernels,
-        kernels: &site.config.kernels,
-        pointing: &site.config.pointing,
+        kernels: &of.site.config.kernels,
+        pointing: &of.site.config.pointing,
     };
     let images = geometric.adjusted_images.iter().map(|image| AdjustedImage {
         times: image.times,
         orientation: image.orientation,
     });
-    let images: Vec<AdjustedImage> = images.collect();
-    written
-        .products
-        .extend(write_adjusted_kernels(&to, &images)?);
-    Ok(())
+    written(&to, &images.collect::<Vec<_>>())
 }
 
 /// Writes an SPK and a CK of every image, and the metakernel; reads every sample back through them.
@@ -115,13 +140,19 @@ pub fn write_adjusted_kernels(
     to: &AdjustedKernels,
     images: &[AdjustedImage],
 ) -> Result<Vec<Product>> {
-    let mut written = Writer {
-        directory: to.directory,
-        products: Vec::new(),
-    };
+    let written = written(to, images)?.into_iter();
+    Ok(written.map(|(product, _)| product).collect())
+}
+
+fn written(to: &AdjustedKernels, images: &[AdjustedImage]) -> Result<Vec<Written>> {
+    let mut written = Vec::new();
     if images.is_empty() {
-        return Ok(written.products);
+        return Ok(written);
     }
+    let mut add = |path: String, rows: u64, declaration| {
+        let path = PathBuf::from(path);
+        written.push((Product { path, rows }, declaration));
+    };
     let folder = to.directory.join("adjusted");
     fs::create_dir_all(&folder)
         .map_err(IoFault::on("make the folder"))
@@ -137,36 +168,35 @@ pub fn write_adjusted_kernels(
             orbit_span: span(images, index, to.kernels.padding_s + LIGHT_TIME_S),
         };
         let segment = source.attitudes()?;
-        written.add(attitude_name(image), |path| {
-            segment.write(path, &session, &comment(image, to))
-        })?;
+        let name = attitude_name(image);
+        let rows = segment.write(&to.directory.join(&name), &session, &comment(image, to))?;
+        add(name, rows, &ATTITUDE);
         states.push(source.states()?);
     }
     // CSPICE has one user at a time.
     drop(session);
     for (image, states) in images.iter().zip(&states) {
-        written.add(position_kernel(&image.times.id), |path| {
-            states.write(path, &comment(image, to))
-        })?;
+        let name = position_kernel(&image.times.id);
+        let rows = states.write(&to.directory.join(&name), &comment(image, to))?;
+        add(name, rows, &POSITION);
     }
     for image in images {
         read_back(to, image).in_file(position_kernel(&image.times.id))?;
     }
-    written.add("adjusted.tm", |path| {
-        write_text(path, &metakernel(to, images)?)?;
-        Ok(0)
-    })?;
-    Ok(written.products)
+    let path = to.directory.join(METAKERNEL.path);
+    write_text(&path, &metakernel(to, images)?)?;
+    add(METAKERNEL.path.to_owned(), 0, &METAKERNEL);
+    Ok(written)
 }
 
 /// Path of the SPK of an image below the folder of the products, the longest that CSPICE writes there.
 #[must_use]
 pub fn position_kernel(image: &str) -> String {
-    format!("adjusted/{image}.bsp")
+    POSITION.path_of(image)
 }
 
 fn attitude_name(image: &AdjustedImage) -> String {
-    format!("adjusted/{}.bc", image.times.id)
+    ATTITUDE.path_of(&image.times.id)
 }
 
 /// The time that the kernels of an image hold: its exposures with padding, half way to other images at most.

@@ -2,12 +2,16 @@
 
 use std::collections::BTreeMap;
 
+use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::{GeometricProducts, SiteProducts, Writer, files::write_json};
+use super::{
+    GeometricProducts, SiteProducts,
+    files::write_json,
+    product::{Content, Declaration, Role, Write},
+};
 use crate::{
     config::{AdjustmentConfig, IntersectionConfig, OrientationPrior},
-    error::Result,
     footprints::FootprintImageCoordinates,
     geom::{
         bundle::ORIENTATION_UNKNOWNS,
@@ -16,6 +20,7 @@ use crate::{
         statistics::Summary,
         uncertainty::{ResidualMoments, UncertaintyBudget},
     },
+    schema::{DocumentSchema, all_positive, at, none_negative},
     stages::{
         adjust::{AdjustmentSummary, CorrectedImage, PointKind},
         compare_pairs::{PairComparison, ProfileByTies},
@@ -68,10 +73,16 @@ const DEFINITIONS: [(&str, &str); 9] = [
     ),
 ];
 
-#[derive(Serialize)]
+#[derive(Serialize, JsonSchema)]
+#[schemars(
+    title = "Adjustment of a site",
+    description = "adjustment.json of areograph: tie points intersected with the orientation of the kernels and with the adjusted one, every pair of images compared, and the combined adjustment. Metres, radians, seconds, pixels of the image; what is unknown is left out."
+)]
 struct Document<'a> {
+    #[schemars(extend("const" = "areograph adjustment 1"))]
     format: &'static str,
     site: &'a str,
+    #[schemars(length(min = 1))]
     definitions: Vec<Definition>,
     configured: Configured<'a>,
     ties: TiesDocument<'a>,
@@ -80,13 +91,13 @@ struct Document<'a> {
     adjustment: AdjustmentDocument<'a>,
 }
 
-#[derive(Serialize)]
+#[derive(Serialize, JsonSchema)]
 struct Definition {
     of: &'static str,
     is: &'static str,
 }
 
-#[derive(Serialize)]
+#[derive(Serialize, JsonSchema)]
 struct Configured<'a> {
     model: CameraModel,
     intersection: &'a IntersectionConfig,
@@ -94,31 +105,43 @@ struct Configured<'a> {
 }
 
 /// [`AdjustmentConfig`] without what is not set.
-#[derive(Serialize)]
+#[derive(Serialize, JsonSchema)]
 struct AdjustmentKeys<'a> {
+    #[schemars(transform = all_positive)]
     tie_sigma_px: [f64; 2],
     mola_image: FootprintImageCoordinates,
+    #[schemars(transform = all_positive)]
     mola_sigma_px: [f64; 2],
+    #[schemars(range(min = 0.0))]
     mola_margin_px: f64,
+    #[schemars(extend("exclusiveMinimum" = 0))]
     ground_sigma_m: f64,
+    #[schemars(extend("exclusiveMinimum" = 0))]
     range_sigma_m: f64,
+    #[schemars(range(min = 0.0))]
     range_bias_sigma_m: f64,
+    #[schemars(range(min = 0.0))]
     time_bias_sigma_s: f64,
+    #[schemars(range(min = 0.0))]
     nadir_sigma_m: f64,
+    #[schemars(range(min = 0.0))]
     off_nadir_sigma_m: f64,
     #[serde(skip_serializing_if = "Option::is_none")]
     robust: Option<&'a RobustWeight>,
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("exclusiveMinimum" = 0))]
     blunder_limit: Option<f64>,
     images: Vec<PriorKeys<'a>>,
 }
 
-#[derive(Serialize)]
+#[derive(Serialize, JsonSchema)]
 struct PriorKeys<'a> {
     id: &'a str,
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(transform = none_negative)]
     position_m: Option<[f64; 9]>,
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(transform = none_negative)]
     rotation_rad: Option<[f64; 9]>,
 }
 
@@ -149,7 +172,7 @@ impl<'a> AdjustmentKeys<'a> {
     }
 }
 
-#[derive(Serialize)]
+#[derive(Serialize, JsonSchema)]
 struct TiesDocument<'a> {
     points: usize,
     joining_images: usize,
@@ -158,27 +181,34 @@ struct TiesDocument<'a> {
     complaints: u64,
 }
 
-#[derive(Serialize)]
+#[derive(Serialize, JsonSchema)]
 struct StateDocument<'a> {
     intersected: usize,
     outliers: usize,
+    #[schemars(range(min = 0.0))]
     sigma0: f64,
     rejected: Vec<LeftOutDocument<'a>>,
     images: &'a [ImageResiduals],
     pairs: Vec<PairDocument<'a>>,
 }
 
-#[derive(Serialize)]
+#[derive(Serialize, JsonSchema)]
 struct PairDocument<'a> {
     images: &'a [String; 2],
     ties: u32,
+    #[schemars(range(min = 0.0))]
     convergence_rad: f64,
+    #[schemars(extend("exclusiveMinimum" = 0))]
     height_over_base: f64,
+    #[schemars(transform = all_positive)]
     line_spacing_m: [f64; 2],
+    #[schemars(transform = all_positive)]
     pixel_size_m: [f64; 2],
     residuals: &'a [ResidualMoments; 2],
+    #[schemars(range(min = 0.0))]
     disagreement_m: f64,
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("exclusiveMinimum" = 0))]
     mola_spacing_m: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     footprints: Option<FootprintsDocument<'a>>,
@@ -188,8 +218,9 @@ struct PairDocument<'a> {
     no_budget_because: Option<&'a str>,
 }
 
-#[derive(Serialize)]
+#[derive(Serialize, JsonSchema)]
 struct FootprintsDocument<'a> {
+    #[schemars(range(min = 1, max = 2))]
     order: u8,
     ties: u32,
     ties_rejected: u32,
@@ -198,7 +229,7 @@ struct FootprintsDocument<'a> {
     profiles: Vec<ProfileDocument<'a>>,
 }
 
-#[derive(Serialize)]
+#[derive(Serialize, JsonSchema)]
 struct ProfileDocument<'a> {
     profile: &'a str,
     lines: &'a Summary,
@@ -209,44 +240,61 @@ struct ProfileDocument<'a> {
     beyond_ties: u32,
 }
 
-#[derive(Serialize)]
+#[derive(Serialize, JsonSchema)]
 struct LeftOutDocument<'a> {
     kind: PointKind,
     id: &'a str,
     reason: String,
 }
 
-#[derive(Serialize)]
+#[derive(Serialize, JsonSchema)]
 struct AdjustmentDocument<'a> {
     summary: &'a AdjustmentSummary,
     /// Weighted sum of squared residuals before each step and after the last.
+    #[schemars(length(min = 1), transform = none_negative)]
     weighted_squares: &'a [f64],
     images: Vec<ImageDocument<'a>>,
     left_out: Vec<LeftOutDocument<'a>>,
 }
 
-#[derive(Serialize)]
+#[derive(Serialize, JsonSchema)]
 struct ImageDocument<'a> {
     image: &'a str,
+    #[schemars(extend("exclusiveMinimum" = 0))]
     half_lines: f64,
+    #[schemars(extend("exclusiveMinimum" = 0))]
     line_period_s: f64,
     correction: &'a [f64; ORIENTATION_UNKNOWNS],
+    #[schemars(transform = none_negative)]
     sigmas: &'a [f64; ORIENTATION_UNKNOWNS],
     /// With its standard deviation.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(transform = at("/prefixItems/1", "minimum", 0))]
     time_bias_s: Option<(f64, f64)>,
 }
 
-/// Writes `adjustment.json` of a site with tie points.
-pub(super) fn write(
-    written: &mut Writer,
-    site: &SiteProducts,
-    geometric: &GeometricProducts,
-) -> Result<()> {
-    written.add("adjustment.json", |path| {
-        write_json(path, &document(site, geometric))?;
-        Ok(geometric.adjusted.points.len() as u64)
-    })
+pub(super) static DOCUMENT: Declaration = Declaration {
+    path: "adjustment.json",
+    what: "tie points intersected before and after the adjustment, every pair of images compared, the adjustment itself",
+    readers: "scripts",
+    rows: "adjusted points",
+    role: Role::Data,
+    content: Content::Document(schema),
+    write: Write::Ties(|path, of, geometric| {
+        write_json(path, &document(of.site, geometric))?;
+        Ok(Some(geometric.adjusted.points.len() as u64))
+    }),
+    uses: &[],
+};
+
+/// Schema of the document.
+pub(super) fn schema() -> DocumentSchema {
+    let keys = "/$defs/IntersectionConfig/properties";
+    DocumentSchema::of::<Document>("adjustment").with(
+        &format!("{keys}/convergence_min_rad"),
+        "exclusiveMinimum",
+        0,
+    )
 }
 
 fn document<'a>(site: &SiteProducts<'a>, geometric: &GeometricProducts<'a>) -> Document<'a> {

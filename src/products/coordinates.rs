@@ -17,11 +17,6 @@ pub(super) fn degrees(angle_rad: f64) -> f64 {
     angle_rad / RADIANS_PER_DEGREE
 }
 
-/// All of a column in degrees.
-pub(super) fn column_deg(angles_rad: &[f64]) -> Vec<f64> {
-    angles_rad.iter().map(|angle| degrees(*angle)).collect()
-}
-
 /// East longitude in `-180..180` degrees, as GIS expects it, of one in `0..2π` radians.
 pub(super) fn signed_longitude_deg(longitude_rad: f64) -> f64 {
     let east_deg = degrees(longitude_rad);

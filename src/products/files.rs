@@ -34,7 +34,7 @@ pub(super) fn finish(path: &Path, mut file: BufWriter<File>) -> Result<()> {
 }
 
 /// Writes `bytes` to `path`, its folder made where missing, through to the disk.
-fn write_bytes(path: &Path, bytes: &[u8]) -> Result<()> {
+pub(super) fn write_bytes(path: &Path, bytes: &[u8]) -> Result<()> {
     let mut file = create(path)?;
     file.write_all(bytes)
         .map_err(IoFault::on("write"))

@@ -1,251 +1,399 @@
-//! Footprints as GeoParquet, CSV and GeoJSON.
+//! Footprints: what is said of a shot, once for all formats.
 
 use serde_json::{Value, json};
 
 use super::{
-    Writer,
-    coordinates::{FRAME, bounding_box_deg, column_deg, signed_longitude_deg},
-    geojson, parquet, pds4_label,
-    site::SiteProducts,
-    table::{Column, Table, Values},
+    SiteProducts,
+    coordinates::{FRAME, bounding_box_deg, degrees, signed_longitude_deg},
+    geojson,
+    gis::{Features, SPHERE_RADIUS_M},
+    parquet, pds4_label,
+    product::{Content, Declaration, Program, Role, Use, Write},
+    table::{Column, Meaning, Table, Unit, column, meanings},
     text_table,
 };
 use crate::{
     constants::MARS_IAU2000,
-    error::Result,
+    footprints::Footprints,
+    frames::MarsIau2000,
     geom::ellipsoid::{AreocentricLatitude, spherical_to_xyz_m},
+    schema::DocumentSchema,
 };
 
-pub(super) fn write(written: &mut Writer, site: &SiteProducts) -> Result<()> {
-    let points = points_deg(site);
-    let mut table = Table::new(columns(site))?;
-    let csv = written.directory.join("footprints.csv");
-    written.add("footprints.csv", |path| text_table::write(path, &table))?;
-    if table.rows() > 0 {
-        written.add("footprints.xml", |path| {
-            pds4_label::write(path, &csv, &table, site)
-        })?;
+pub(super) static CSV: Declaration = Declaration {
+    path: "footprints.csv",
+    what: "laser shots inside the windows, IAU 2000",
+    readers: "scripts",
+    rows: "shots",
+    role: Role::Data,
+    content: Content::Table(text_columns),
+    write: Write::Site(|path, of| text_table::write(path, table(of.site)).map(Some)),
+    uses: &[],
+};
+
+pub(super) static LABEL: Declaration = Declaration {
+    path: "footprints.xml",
+    what: "label of footprints.csv in the style of PDS4",
+    readers: "archives",
+    rows: "shots",
+    role: Role::Metadata,
+    content: Content::Foreign,
+    write: Write::Footprints(|path, of| {
+        pds4_label::write(path, &of.directory.join(CSV.path), table(of.site), of.site)
+    }),
+    uses: &[],
+};
+
+pub(super) static PARQUET: Declaration = Declaration {
+    path: "footprints.parquet",
+    what: "the same shots as GeoParquet 1.1",
+    readers: "scripts, GIS",
+    rows: "shots",
+    role: Role::Data,
+    content: Content::Table(|| meanings(&columns())),
+    write: Write::Site(|path, of| {
+        let metadata = vec![
+            ("geo", geo_metadata(&points_deg(of.site)).to_string()),
+            ("frame", FRAME.to_owned()),
+        ];
+        parquet::write(path, table(of.site), metadata).map(Some)
+    }),
+    uses: &[Use {
+        program: Program::Gis,
+        lines: "python3 -c 'import geopandas; print(geopandas.read_parquet(\"../footprints.parquet\"))'",
+    }],
+};
+
+pub(super) static GEOJSON: Declaration = Declaration {
+    path: "footprints.geojson",
+    what: "the same shots as two-dimensional points",
+    readers: "GIS, web maps",
+    rows: "shots",
+    role: Role::Data,
+    content: Content::Document(schema),
+    write: Write::Site(|path, of| geojson::write(path, features(of.site)).map(Some)),
+    uses: &[Use {
+        program: Program::Gis,
+        lines: "ogrinfo -al -so ../footprints.geojson            two-dimensional",
+    }],
+};
+
+/// A footprint of a site.
+#[derive(Clone, Copy)]
+pub(super) struct Shot<'a> {
+    pub(super) site: &'a SiteProducts<'a>,
+    pub(super) row: usize,
+}
+
+impl<'a> Shot<'a> {
+    /// All of a site.
+    pub(super) fn all(site: &'a SiteProducts<'a>) -> Vec<Self> {
+        let rows = 0..site.footprints.len();
+        rows.map(|row| Self { site, row }).collect()
     }
-    table.columns.push(Column::new(
-        "geometry",
-        "point, longitude (-180..180) and areocentric latitude in degrees, well-known binary",
-        Values::Binary(points.iter().map(well_known_binary).collect()),
-    ));
-    let metadata = vec![
-        ("geo", geo_metadata(&points).to_string()),
-        ("frame", FRAME.to_owned()),
-    ];
-    written.add("footprints.parquet", |path| {
-        parquet::write(path, &table, metadata)
-    })?;
-    drop(table);
-    written.add("footprints.geojson", |path| {
-        geojson::write(path, site, &points)
-    })
+
+    /// The column of footprints that `of` picks, in the shot's row.
+    pub(super) fn get<T: Copy>(&self, of: fn(&Footprints<MarsIau2000>) -> &Vec<T>) -> T {
+        of(self.site.footprints)[self.row]
+    }
+
+    pub(super) fn utc(&self) -> String {
+        self.site.utc[self.row].clone()
+    }
+
+    /// Height above the areoid, after the crossover correction, metres.
+    pub(super) fn topography_m(&self) -> f64 {
+        self.site.footprints.row(self.row).topography_m()
+    }
+
+    fn areographic_deg(&self) -> f64 {
+        let latitude = AreocentricLatitude(self.get(|of| &of.latitude_rad));
+        degrees(latitude.to_areographic(&MARS_IAU2000).0)
+    }
+
+    fn xyz_m(&self, axis: usize) -> f64 {
+        let shot = self.site.footprints.row(self.row);
+        spherical_to_xyz_m(shot.longitude_rad, shot.latitude_rad, shot.radius_m)[axis]
+    }
+
+    fn point_deg(&self) -> [f64; 2] {
+        [
+            signed_longitude_deg(self.get(|of| &of.longitude_rad)),
+            degrees(self.get(|of| &of.latitude_rad)),
+        ]
+    }
+}
+
+/// All footprints of a site.
+pub(super) fn table<'a>(site: &'a SiteProducts<'a>) -> Table<'a> {
+    Table::new(columns(), Shot::all(site))
+}
+
+/// The footprints of a site as GIS has them.
+pub(super) fn features<'a>(site: &'a SiteProducts<'a>) -> Features<'a> {
+    let point = |shot: &Shot| {
+        let [longitude_deg, latitude_deg] = shot.point_deg();
+        let height_m = shot.get(|of| &of.radius_crossover_m) - SPHERE_RADIUS_M;
+        [longitude_deg, latitude_deg, height_m]
+    };
+    Features {
+        name: &site.config.site,
+        newest_utc: site.utc.iter().max().map_or("", String::as_str),
+        points: Shot::all(site).iter().map(point).collect(),
+        attributes: table(site),
+    }
+}
+
+/// The columns of the CSV file.
+fn text_columns() -> Vec<Meaning> {
+    Table::new(columns(), Vec::new())
+        .for_text()
+        .columns()
+        .copied()
+        .collect()
+}
+
+/// Schema of the GeoJSON file.
+pub(super) fn schema() -> DocumentSchema {
+    let table = Table::new(columns(), Vec::new()).for_gis();
+    let schema = geojson::schema(
+        "Footprints as GeoJSON",
+        "footprints.geojson of areograph: laser shots inside the windows, Mars sphere, areocentric; west > east in \
+         bbox when it crosses the antimeridian.",
+        &table.columns().copied().collect::<Vec<_>>(),
+    );
+    DocumentSchema {
+        name: "footprints",
+        schema,
+    }
 }
 
 /// Longitude (-180..180) and latitude of every footprint, degrees.
 pub(super) fn points_deg(site: &SiteProducts) -> Vec<[f64; 2]> {
-    let shots = site.footprints;
-    shots
-        .longitude_rad
-        .iter()
-        .zip(column_deg(&shots.latitude_rad))
-        .map(|(longitude_rad, latitude_deg)| [signed_longitude_deg(*longitude_rad), latitude_deg])
-        .collect()
+    Shot::all(site).iter().map(Shot::point_deg).collect()
 }
 
-/// Areographic latitudes, degrees, of areocentric ones in radians.
-fn areographic_deg(latitude_rad: &[f64]) -> Vec<f64> {
-    let areographic = |latitude: &f64| {
-        AreocentricLatitude(*latitude)
-            .to_areographic(&MARS_IAU2000)
-            .0
-    };
-    let latitudes: Vec<f64> = latitude_rad.iter().map(areographic).collect();
-    column_deg(&latitudes)
-}
-
-fn columns(site: &SiteProducts) -> Vec<Column> {
-    let mut columns = identity(site);
-    columns.extend(quality(site));
-    columns.push(windows(site));
-    columns.extend(ground(site));
-    columns.extend(spacecraft(site));
+fn columns<'a>() -> Vec<Column<Shot<'a>>> {
+    let mut columns = identity();
+    columns.extend(quality());
+    columns.extend(ground());
+    columns.extend(heights());
+    columns.extend(spacecraft());
+    columns.push(column(
+        "geometry",
+        Unit::None,
+        "point, longitude (-180..180) and areocentric latitude in degrees, well-known binary",
+        |shot: &Shot| well_known_binary(shot.point_deg()),
+    ));
     columns
 }
 
 /// When and where in its file a shot was taken.
-fn identity(site: &SiteProducts) -> Vec<Column> {
-    let shots = site.footprints;
-    let source = shots
-        .file
-        .iter()
-        .map(|file| site.file_name(*file))
-        .collect();
+fn identity<'a>() -> Vec<Column<Shot<'a>>> {
     vec![
-        Column::new(
+        column(
             "et_tag_s",
+            Unit::Second,
             "time tag of the shot in the file, TDB seconds past J2000",
-            Values::F64(shots.et_tag_s.clone()),
+            |shot: &Shot| shot.get(|of| &of.et_tag_s),
         ),
-        Column::new(
+        column(
             "et_s",
+            Unit::Second,
             "time of the shot after the MOLA clock correction, TDB seconds past J2000",
-            Values::F64(shots.et_s.clone()),
-        ),
-        Column::new(
+            |shot: &Shot| shot.get(|of| &of.et_s),
+        )
+        .in_gis()
+        .in_dbase("et_s", 20, 6),
+        column("utc", Unit::None, "the same as UTC, ISO 8601", Shot::utc)
+            .only_in_gis()
+            .in_dbase("utc", 0, 0),
+        column(
             "orbit",
+            Unit::None,
             "orbit number of the frame",
-            Values::U32(shots.orbit.clone()),
-        ),
-        Column::new("source_file", "PEDR file", Values::Text(source)),
-        Column::new(
-            "record",
-            "record of that file, counted from 1 with its label records",
-            Values::U32(shots.record.clone()),
-        ),
-        Column::new(
-            "shot",
-            "shot in the frame, 1 to 20",
-            Values::U32(shots.shot.iter().copied().map(u32::from).collect()),
-        ),
-    ]
-}
-
-/// What the file says of how good a shot is.
-fn quality(site: &SiteProducts) -> Vec<Column> {
-    let shots = site.footprints;
-    let wide = |codes: &[u16]| Values::U32(codes.iter().copied().map(u32::from).collect());
-    vec![
-        Column::new(
-            "channel",
-            "trigger channel",
-            Values::U32(shots.channel.iter().copied().map(u32::from).collect()),
-        ),
-        Column::new(
-            "class",
-            "classification: 1 ground, 0 cloud or noise",
-            Values::I32(shots.class.iter().copied().map(i32::from).collect()),
-        ),
-        Column::new(
-            "attitude_flag",
-            "0 attitude known, 2 known for part of the frame, 3 unknown",
-            wide(&shots.attitude_flag),
-        ),
-        Column::new(
-            "orbit_quality",
-            "0 orbit from JPL, 1 or more: MOLA team's gravity model number",
-            wide(&shots.orbit_quality),
-        ),
-    ]
-}
-
-fn windows(site: &SiteProducts) -> Column {
-    let masks = site.footprints.windows.iter();
-    Column::new(
-        "windows",
-        "identifiers of the windows that hold the shot, separated by semicolons",
-        Values::Text(masks.map(|mask| site.window_ids(*mask)).collect()),
-    )
-}
-
-fn ground(site: &SiteProducts) -> Vec<Column> {
-    let shots = site.footprints;
-    let xyz: Vec<[f64; 3]> = (0..shots.len())
-        .map(|row| {
-            let shot = shots.row(row);
-            spherical_to_xyz_m(shot.longitude_rad, shot.latitude_rad, shot.radius_m).into()
+            |shot: &Shot| shot.get(|of| &of.orbit),
+        )
+        .in_gis()
+        .in_dbase("orbit", 10, 0),
+        column("source_file", Unit::None, "PEDR file", |shot: &Shot| {
+            shot.site.file_name(shot.get(|of| &of.file))
         })
-        .collect();
-    let axis = |axis: usize| Values::F64(xyz.iter().map(|xyz| xyz[axis]).collect());
+        .in_gis()
+        .in_dbase("file", 0, 0),
+        column(
+            "record",
+            Unit::None,
+            "record of that file, counted from 1 with its label records",
+            |shot: &Shot| shot.get(|of| &of.record),
+        )
+        .in_gis()
+        .in_dbase("record", 10, 0),
+        column(
+            "shot",
+            Unit::None,
+            "shot in the frame, 1 to 20",
+            |shot: &Shot| u32::from(shot.get(|of| &of.shot)),
+        )
+        .between(1, 20)
+        .in_gis()
+        .in_dbase("shot", 3, 0),
+    ]
+}
+
+/// What the file says of how good a shot is, and which windows hold it.
+fn quality<'a>() -> Vec<Column<Shot<'a>>> {
     vec![
-        Column::new(
+        column("channel", Unit::None, "trigger channel", |shot: &Shot| {
+            u32::from(shot.get(|of| &of.channel))
+        }),
+        column(
+            "class",
+            Unit::None,
+            "classification: 1 ground, 0 cloud or noise",
+            |shot: &Shot| i32::from(shot.get(|of| &of.class)),
+        ),
+        column(
+            "attitude_flag",
+            Unit::None,
+            "0 attitude known, 2 known for part of the frame, 3 unknown",
+            |shot: &Shot| u32::from(shot.get(|of| &of.attitude_flag)),
+        ),
+        column(
+            "orbit_quality",
+            Unit::None,
+            "0 orbit from JPL, 1 or more: MOLA team's gravity model number",
+            |shot: &Shot| u32::from(shot.get(|of| &of.orbit_quality)),
+        ),
+        column(
+            "windows",
+            Unit::None,
+            "identifiers of the windows that hold the shot, separated by semicolons",
+            |shot: &Shot| shot.site.window_ids(shot.get(|of| &of.windows)),
+        )
+        .last_in_gis(),
+    ]
+}
+
+/// Where the laser hit the ground.
+fn ground<'a>() -> Vec<Column<Shot<'a>>> {
+    vec![
+        column(
             "longitude_deg",
+            Unit::Degree,
             "east longitude, 0..360 degrees, IAU 2000",
-            Values::F64(column_deg(&shots.longitude_rad)),
-        ),
-        Column::new(
+            |shot: &Shot| degrees(shot.get(|of| &of.longitude_rad)),
+        )
+        .in_dbase("lon_deg", 14, 9),
+        column(
             "latitude_deg",
+            Unit::Degree,
             "areocentric latitude, degrees, IAU 2000",
-            Values::F64(column_deg(&shots.latitude_rad)),
-        ),
-        Column::new(
+            |shot: &Shot| degrees(shot.get(|of| &of.latitude_rad)),
+        )
+        .in_dbase("lat_deg", 14, 9),
+        column(
             "latitude_areographic_deg",
+            Unit::Degree,
             "areographic latitude, degrees, IAU 2000 radii; as older maps count",
-            Values::F64(areographic_deg(&shots.latitude_rad)),
-        ),
-        Column::new(
-            "radius_m",
-            "planetary radius before the crossover correction, metres",
-            Values::F64(shots.radius_m.clone()),
-        ),
-        Column::new(
-            "radius_crossover_m",
-            "planetary radius after the crossover correction, metres",
-            Values::F64(shots.radius_crossover_m.clone()),
-        ),
-        Column::new(
-            "areoid_radius_m",
-            "areoid radius, metres",
-            Values::F64(shots.areoid_radius_m.clone()),
-        ),
-        Column::new(
-            "topography_m",
-            "radius after the crossover correction minus areoid radius, metres",
-            Values::F64(shots.topography_m()),
-        ),
-        Column::new(
-            "x_m",
-            "IAU 2000 body-fixed X of the point with radius_m, metres",
-            axis(0),
-        ),
-        Column::new(
-            "y_m",
-            "IAU 2000 body-fixed Y of the point with radius_m, metres",
-            axis(1),
-        ),
-        Column::new(
-            "z_m",
-            "IAU 2000 body-fixed Z of the point with radius_m, metres",
-            axis(2),
+            Shot::areographic_deg,
         ),
     ]
 }
 
-fn spacecraft(site: &SiteProducts) -> Vec<Column> {
-    let shots = site.footprints;
+/// How high that is.
+fn heights<'a>() -> Vec<Column<Shot<'a>>> {
     vec![
-        Column::new(
+        column(
+            "radius_m",
+            Unit::Metre,
+            "planetary radius before the crossover correction, metres",
+            |shot: &Shot| shot.get(|of| &of.radius_m),
+        )
+        .in_gis()
+        .in_dbase("radius_m", 12, 3),
+        column(
+            "radius_crossover_m",
+            Unit::Metre,
+            "planetary radius after the crossover correction, metres",
+            |shot: &Shot| shot.get(|of| &of.radius_crossover_m),
+        )
+        .in_gis()
+        .in_dbase("radius_x_m", 12, 3),
+        column(
+            "areoid_radius_m",
+            Unit::Metre,
+            "areoid radius, metres",
+            |shot: &Shot| shot.get(|of| &of.areoid_radius_m),
+        ),
+        column(
+            "topography_m",
+            Unit::Metre,
+            "radius after the crossover correction minus areoid radius, metres",
+            Shot::topography_m,
+        )
+        .in_gis()
+        .in_dbase("topo_m", 12, 3),
+        column(
+            "x_m",
+            Unit::Metre,
+            "IAU 2000 body-fixed X of the point with radius_m, metres",
+            |shot: &Shot| shot.xyz_m(0),
+        ),
+        column(
+            "y_m",
+            Unit::Metre,
+            "IAU 2000 body-fixed Y of the point with radius_m, metres",
+            |shot: &Shot| shot.xyz_m(1),
+        ),
+        column(
+            "z_m",
+            Unit::Metre,
+            "IAU 2000 body-fixed Z of the point with radius_m, metres",
+            |shot: &Shot| shot.xyz_m(2),
+        ),
+    ]
+}
+
+fn spacecraft<'a>() -> Vec<Column<Shot<'a>>> {
+    vec![
+        column(
             "range_m",
+            Unit::Metre,
             "one-way range to the spacecraft's centre of mass, metres",
-            Values::F64(shots.range_m.clone()),
-        ),
-        Column::new(
+            |shot: &Shot| shot.get(|of| &of.range_m),
+        )
+        .in_gis()
+        .in_dbase("range_m", 12, 3),
+        column(
             "spacecraft_longitude_deg",
+            Unit::Degree,
             "east longitude of the spacecraft, the file's orbit, IAU 2000",
-            Values::F64(column_deg(&shots.spacecraft_longitude_rad)),
+            |shot: &Shot| degrees(shot.get(|of| &of.spacecraft_longitude_rad)),
         ),
-        Column::new(
+        column(
             "spacecraft_latitude_deg",
+            Unit::Degree,
             "areocentric latitude of the spacecraft, the file's orbit",
-            Values::F64(column_deg(&shots.spacecraft_latitude_rad)),
+            |shot: &Shot| degrees(shot.get(|of| &of.spacecraft_latitude_rad)),
         ),
-        Column::new(
+        column(
             "spacecraft_radius_m",
+            Unit::Metre,
             "distance of the spacecraft from the centre of Mars, the file's orbit",
-            Values::F64(shots.spacecraft_radius_m.clone()),
+            |shot: &Shot| shot.get(|of| &of.spacecraft_radius_m),
         ),
-        Column::new(
+        column(
             "off_nadir_deg",
+            Unit::Degree,
             "off-nadir angle of the laser, degrees",
-            Values::F64(column_deg(&shots.off_nadir_rad)),
+            |shot: &Shot| degrees(shot.get(|of| &of.off_nadir_rad)),
         ),
     ]
 }
 
 /// Little-endian well-known binary of a point (OGC 06-103r4, 8.2).
-fn well_known_binary(point: &[f64; 2]) -> Vec<u8> {
+fn well_known_binary(point: [f64; 2]) -> Vec<u8> {
     const LITTLE_ENDIAN: u8 = 1;
     const POINT: u32 = 1;
     let mut bytes = vec![LITTLE_ENDIAN];

@@ -1,4 +1,4 @@
-//! Footprints as GeoJSON (RFC 7946, on Mars), one feature per line.
+//! Points with attributes as GeoJSON (RFC 7946, on Mars), one feature per line.
 
 use std::{
     fmt::Write as _,
@@ -6,66 +6,190 @@ use std::{
     path::Path,
 };
 
-use serde::Serialize;
-use serde_json::{Value, json};
+use serde::{Serialize, Serializer, ser::SerializeMap as _};
+use serde_json::{Map, Value, json};
 
 use super::{
     coordinates::{FRAME, bounding_box_deg},
     fault::ProductFault,
     files::{create, finish, open, to_value},
-    shot::Shot,
-    site::SiteProducts,
+    gis::Features,
+    table::{Kind, Meaning, Values},
 };
 use crate::error::{IoFault, Place, Result};
 
-/// The `crs` member of GeoJSON 2008, which GIS still reads: RFC 7946 knows the Earth only.
-#[derive(Debug, Serialize)]
-struct NamedCrs {
-    r#type: &'static str,
-    properties: CrsName,
-}
+/// Name of the CRS in the `crs` member of GeoJSON 2008, which GIS still reads: RFC 7946 knows the Earth only.
+pub(super) const CRS_URN: &str = "urn:ogc:def:crs:IAU:2015:49900";
 
-#[derive(Debug, Serialize)]
-struct CrsName {
-    name: &'static str,
-}
-
-#[derive(Debug, Serialize)]
-struct Feature {
+#[derive(Serialize)]
+struct Feature<'a> {
     r#type: &'static str,
     geometry: Point,
-    properties: Shot,
+    properties: Properties<'a>,
 }
 
-#[derive(Debug, Serialize)]
+#[derive(Serialize)]
 struct Point {
     r#type: &'static str,
     coordinates: [f64; 2],
 }
 
-/// Writes the footprints, which lie at `points` (degrees), and reads them back, one line at a time: a
-/// document of a million features would take gigabytes.
-///
-/// # Errors
-/// What the disk refuses; lines that come back different.
-pub(super) fn write(path: &Path, site: &SiteProducts, points: &[[f64; 2]]) -> Result<u64> {
-    let features = || {
-        points
-            .iter()
-            .enumerate()
-            .map(|(row, point)| feature(site, row, *point))
-    };
-    let head = head(site, points).in_file(path)?;
-    write_lines(path, &head, features())?;
-    read_back(path, &head, features())?;
-    Ok(points.len() as u64)
+/// The attributes of a row in the order of their columns; those without a value are left out.
+struct Properties<'a> {
+    columns: &'a [Meaning],
+    values: &'a [Values],
+    row: usize,
 }
 
-fn write_lines(
+impl Serialize for Properties<'_> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> std::result::Result<S::Ok, S::Error> {
+        let mut map = serializer.serialize_map(None)?;
+        for (column, values) in self.columns.iter().zip(self.values) {
+            match values {
+                Values::Real(of) => map.serialize_entry(column.name, &of[self.row])?,
+                Values::OptionalReal(of) => {
+                    if let Some(value) = of[self.row] {
+                        map.serialize_entry(column.name, &value)?;
+                    }
+                }
+                Values::Natural(of) => map.serialize_entry(column.name, &of[self.row])?,
+                Values::Integer(of) => map.serialize_entry(column.name, &of[self.row])?,
+                Values::Flag(of) => map.serialize_entry(column.name, &of[self.row])?,
+                Values::Text(of) => map.serialize_entry(column.name, &of[self.row])?,
+                Values::Bytes(_) => {}
+            }
+        }
+        map.end()
+    }
+}
+
+/// JSON Schema of points with these attributes.
+pub(super) fn schema(title: &str, description: &str, attributes: &[Meaning]) -> Value {
+    let closed = |properties: Value, optional: &[&str]| {
+        let names = properties.as_object().into_iter().flatten();
+        let names = names.map(|(name, _)| name.as_str());
+        let required: Vec<&str> = names.filter(|name| !optional.contains(name)).collect();
+        json!({
+            "type": "object",
+            "additionalProperties": false,
+            "required": required,
+            "properties": properties,
+        })
+    };
+    let longitude = json!({ "type": "number", "minimum": -180, "maximum": 180 });
+    let latitude = json!({ "type": "number", "minimum": -90, "maximum": 90 });
+    let numbers = |of: &[&Value]| json!({ "type": "array", "prefixItems": of, "minItems": of.len(), "maxItems": of.len() });
+    let optional: Vec<&str> = attributes
+        .iter()
+        .filter(|column| column.optional)
+        .map(|column| column.name)
+        .collect();
+    let properties: Map<String, Value> = attributes
+        .iter()
+        .map(|column| (column.name.to_owned(), attribute(column)))
+        .collect();
+    let geometry = closed(
+        json!({
+            "type": { "const": "Point" },
+            "coordinates": numbers(&[&longitude, &latitude]),
+        }),
+        &[],
+    );
+    let feature = closed(
+        json!({
+            "type": { "const": "Feature" },
+            "geometry": geometry,
+            "properties": closed(properties.into(), &optional),
+        }),
+        &[],
+    );
+    let crs_name = closed(json!({ "name": { "const": CRS_URN } }), &[]);
+    let crs = json!({ "type": { "const": "name" }, "properties": crs_name });
+    let mut schema = closed(
+        json!({
+            "type": { "const": "FeatureCollection" },
+            "name": { "type": "string" },
+            "crs": closed(crs, &[]),
+            "frame": {
+                "description": "The frame of the coordinates, and how far that of the CRS code is from it.",
+                "type": "string",
+                "minLength": 1,
+            },
+            "features": { "type": "array", "items": feature },
+            "bbox": numbers(&[&longitude, &latitude, &longitude, &latitude]),
+        }),
+        &["bbox"],
+    );
+    schema["$schema"] = json!("https://json-schema.org/draft/2020-12/schema");
+    schema["title"] = json!(title);
+    schema["description"] = json!(description);
+    schema
+}
+
+/// JSON Schema of an attribute.
+fn attribute(column: &Meaning) -> Value {
+    let mut schema = match column.kind {
+        Kind::Real => json!({ "type": "number" }),
+        Kind::Natural => json!({ "type": "integer", "minimum": 0 }),
+        Kind::Integer => json!({ "type": "integer" }),
+        Kind::Flag => json!({ "type": "boolean" }),
+        Kind::Text | Kind::Bytes => json!({ "type": "string" }),
+    };
+    schema["description"] = json!(column.description);
+    if let Some([least, greatest]) = column.limits {
+        schema["minimum"] = json!(least);
+        schema["maximum"] = json!(greatest);
+    }
+    schema
+}
+
+/// Writes the points and reads them back, one line at a time: a document of a million features would take
+/// gigabytes.
+///
+/// # Errors
+/// Numbers that are not finite; what the disk refuses; lines that come back different.
+pub(super) fn write(path: &Path, features: Features) -> Result<u64> {
+    let features = Features {
+        attributes: features.attributes.for_gis(),
+        ..features
+    };
+    let head = head(&features).in_file(path)?;
+    write_lines(path, &head, &features)?;
+    read_back(path, &head, &features)?;
+    Ok(features.points.len() as u64)
+}
+
+/// Calls `take` with every feature and what follows it.
+fn each(
+    features: &Features,
     path: &Path,
-    head: &str,
-    features: impl ExactSizeIterator<Item = Feature>,
+    mut take: impl FnMut(usize, &Feature, &'static str) -> Result<()>,
 ) -> Result<()> {
+    let columns: Vec<Meaning> = features.attributes.columns().copied().collect();
+    for rows in features.attributes.pieces() {
+        let values = features.attributes.values(rows.clone()).in_file(path)?;
+        for (row, index) in rows.enumerate() {
+            let [longitude_deg, latitude_deg, _] = features.points[index];
+            let feature = Feature {
+                r#type: "Feature",
+                geometry: Point {
+                    r#type: "Point",
+                    coordinates: [longitude_deg, latitude_deg],
+                },
+                properties: Properties {
+                    columns: &columns,
+                    values: &values,
+                    row,
+                },
+            };
+            let is_last = index + 1 == features.points.len();
+            take(index, &feature, if is_last { "\n" } else { ",\n" })?;
+        }
+    }
+    Ok(())
+}
+
+fn write_lines(path: &Path, head: &str, features: &Features) -> Result<()> {
     let mut file = create(path)?;
     let mut put = |text: &str| {
         file.write_all(text.as_bytes())
@@ -73,33 +197,27 @@ fn write_lines(
             .in_file(path)
     };
     put(head)?;
-    let rows = features.len();
-    for (row, feature) in features.enumerate() {
-        let line = serde_json::to_string(&feature)
+    each(features, path, |_, feature, separator| {
+        let line = serde_json::to_string(feature)
             .map_err(ProductFault::refused("encode GeoJSON"))
             .in_file(path)?;
         put(&line)?;
-        put(separator(row, rows))?;
-    }
+        put(separator)
+    })?;
     put(TAIL)?;
     finish(path, file)
 }
 
 /// The lines before the first feature.
-fn head(site: &SiteProducts, points: &[[f64; 2]]) -> std::result::Result<String, ProductFault> {
-    let crs = NamedCrs {
-        r#type: "name",
-        properties: CrsName {
-            name: "urn:ogc:def:crs:IAU:2015:49900",
-        },
-    };
+fn head(features: &Features) -> std::result::Result<String, ProductFault> {
+    let crs = json!({ "type": "name", "properties": { "name": CRS_URN } });
     let mut members = vec![
         ("type", json!("FeatureCollection")),
-        ("name", json!(site.config.site)),
-        ("crs", to_value(&crs)?),
+        ("name", json!(features.name)),
+        ("crs", crs),
         ("frame", json!(FRAME)),
     ];
-    if let Some(bounds) = bounding_box_deg(points) {
+    if let Some(bounds) = bounding_box_deg(&features.points_deg()) {
         members.push(("bbox", to_value(&bounds)?));
     }
     let mut head = "{\n".to_owned();
@@ -113,28 +231,8 @@ fn head(site: &SiteProducts, points: &[[f64; 2]]) -> std::result::Result<String,
 /// The lines after the last feature.
 const TAIL: &str = "]\n}\n";
 
-/// What follows the feature in `row` of `rows`.
-const fn separator(row: usize, rows: usize) -> &'static str {
-    if row + 1 < rows { ",\n" } else { "\n" }
-}
-
-fn feature(site: &SiteProducts, row: usize, point: [f64; 2]) -> Feature {
-    Feature {
-        r#type: "Feature",
-        geometry: Point {
-            r#type: "Point",
-            coordinates: point,
-        },
-        properties: Shot::of(site, row),
-    }
-}
-
 /// Checks that the file holds `head`, every feature with exact numbers, and nothing else.
-fn read_back(
-    path: &Path,
-    head: &str,
-    features: impl ExactSizeIterator<Item = Feature>,
-) -> Result<()> {
+fn read_back(path: &Path, head: &str, features: &Features) -> Result<()> {
     let mut file = BufReader::new(open(path)?);
     let mut line = String::new();
     let mut next = |line: &mut String| {
@@ -150,17 +248,17 @@ fn read_back(
             return differs(format!("{line:?} before the features"));
         }
     }
-    let rows = features.len();
-    for (row, feature) in features.enumerate() {
+    each(features, path, |row, feature, separator| {
         next(&mut line)?;
-        let expected = to_value(&feature).in_file(path)?;
+        let expected = to_value(feature).in_file(path)?;
         let found = line
-            .strip_suffix(separator(row, rows))
+            .strip_suffix(separator)
             .and_then(|text| serde_json::from_str::<Value>(text).ok());
         if found != Some(expected) {
             return differs(format!("feature {}", row + 1));
         }
-    }
+        Ok(())
+    })?;
     for expected in TAIL.split_inclusive('\n').chain([""]) {
         next(&mut line)?;
         if line != expected {
@@ -173,29 +271,19 @@ fn read_back(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::products::{files::write_text, shot::example};
-
-    fn features() -> impl ExactSizeIterator<Item = Feature> {
-        [1.0_f64, 2.0]
-            .map(f64::sqrt)
-            .into_iter()
-            .map(|et_s| Feature {
-                r#type: "Feature",
-                geometry: Point {
-                    r#type: "Point",
-                    coordinates: [0.1 + 0.2, -0.0],
-                },
-                properties: example(1, et_s),
-            })
-    }
+    use crate::products::{files::write_text, gis::tests::example};
 
     #[test]
     fn a_changed_line_is_noticed() {
         let head = "{\n\"features\": [\n";
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("footprints.geojson");
-        write_lines(&path, head, features()).unwrap();
-        read_back(&path, head, features()).unwrap();
+        let features = Features {
+            attributes: example().attributes.for_gis(),
+            ..example()
+        };
+        write_lines(&path, head, &features).unwrap();
+        read_back(&path, head, &features).unwrap();
         let text = std::fs::read_to_string(&path).unwrap();
         for (from, to, complaint) in [
             ("{\n", "[\n", "\"[\\n\" before the features"),
@@ -207,7 +295,7 @@ mod tests {
         ] {
             assert!(text.contains(from), "{from}");
             write_text(&path, &text.replacen(from, to, 1)).unwrap();
-            let failure = read_back(&path, head, features()).unwrap_err();
+            let failure = read_back(&path, head, &features).unwrap_err();
             assert_eq!(
                 failure.fault.to_string(),
                 format!("read back differently: {complaint}")

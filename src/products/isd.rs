@@ -15,14 +15,16 @@
 //! * Distortion is zero, as the instrument kernel says. ALE repeats the pixel pitch in these places, which
 //!   `usgscsm` takes for radial coefficients per mm² and mm⁴: wrong by hundreds of pixels at the edges.
 
+use std::path::Path;
+
 use nalgebra::Vector3;
 use serde::Serialize;
 use serde_json::{Value, json};
 
 use super::{
-    Writer,
     files::write_json,
     kernel_report::{names_by_type, qualities},
+    product::{Content, Context, Declaration, Program, Role, Use, Write},
     site::{ImageProducts, SiteProducts},
 };
 use crate::{
@@ -110,44 +112,46 @@ struct Positions {
     reference_frame: i32,
 }
 
-pub(super) fn write(
-    written: &mut Writer,
-    site: &SiteProducts,
-    image: &ImageProducts,
-) -> Result<()> {
-    write_as(written, site, image, "isd.json")
-}
+pub(super) static ISD: Declaration = Declaration {
+    path: "images/<image>/isd.json",
+    what: "camera model of the Community Sensor Model (usgscsm)",
+    readers: "usgscsm, Ames Stereo Pipeline, ISIS",
+    rows: "table nodes",
+    role: Role::Data,
+    content: Content::Described("isd"),
+    write: Write::Image(write),
+    uses: &[Use {
+        program: Program::CameraModel,
+        lines: "usgscsm_cam_test --model ../images/<image>/isd.json --sample-rate 100",
+    }],
+};
 
-/// Writes the adjusted camera model of an image.
-///
 /// Its positions are geometric: what was adjusted is where the camera was, not where light of it seemed to come
 /// from, and adjusted ground must be seen at the measured pixels.
-pub(super) fn write_adjusted(
-    written: &mut Writer,
-    site: &SiteProducts,
-    image: &ImageProducts,
-) -> Result<()> {
-    let orientation = Orientation {
-        tables: geometric_tables(image.orientation)?,
-        ..image.orientation.clone()
-    };
-    let image = ImageProducts {
-        orientation: &orientation,
-        ..*image
-    };
-    write_as(written, site, &image, "adjusted_isd.json")
-}
+pub(super) static ADJUSTED: Declaration = Declaration {
+    path: "images/<image>/adjusted_isd.json",
+    what: "adjusted camera model; its positions are geometric, those of isd.json have light time and aberration",
+    readers: "usgscsm, Ames Stereo Pipeline, ISIS",
+    rows: "table nodes",
+    role: Role::Data,
+    content: Content::Described("isd"),
+    write: Write::AdjustedImage(|path, of, image| {
+        let orientation = Orientation {
+            tables: geometric_tables(image.orientation)?,
+            ..image.orientation.clone()
+        };
+        let image = ImageProducts {
+            orientation: &orientation,
+            ..*image
+        };
+        write(path, of, &image)
+    }),
+    uses: &[],
+};
 
-fn write_as(
-    written: &mut Writer,
-    site: &SiteProducts,
-    image: &ImageProducts,
-    name: &str,
-) -> Result<()> {
-    written.add(format!("images/{}/{name}", image.times.id), |path| {
-        write_json(path, &isd(site, image))?;
-        Ok(image.orientation.tables.et_s.len() as u64)
-    })
+fn write(path: &Path, of: &Context, image: &ImageProducts) -> Result<u64> {
+    write_json(path, &isd(of.site, image))?;
+    Ok(image.orientation.tables.et_s.len() as u64)
 }
 
 fn isd(site: &SiteProducts, image: &ImageProducts) -> Isd {

@@ -2,11 +2,32 @@
 
 use std::{collections::BTreeMap, path::Path};
 
+use schemars::JsonSchema;
 use serde::Serialize;
-use serde_json::{Map, Value, json};
 
-use super::site::{KernelLine, SiteProducts};
-use crate::{kernel_source::CkQuality, spice::quality_of, time::Intervals};
+use super::{
+    files::write_json,
+    product::{Content, Declaration, Role, Write},
+    site::SiteProducts,
+};
+use crate::{
+    kernel_source::CkQuality, schema::DocumentSchema, spice::quality_of,
+    stages::describe_kernels::KernelLine, time::Intervals,
+};
+
+pub(super) static KERNELS: Declaration = Declaration {
+    path: "exchange/kernels.json",
+    what: "kernels by type with the keys of SpiceQL, and under areograph hashes and coverage",
+    readers: "SpiceQL, scripts",
+    rows: "kernels",
+    role: Role::Data,
+    content: Content::Document(schema),
+    write: Write::Site(|path, of| {
+        write_json(path, &report(of.site))?;
+        Ok(Some(of.site.kernels.len() as u64))
+    }),
+    uses: &[],
+};
 
 /// Kernel names by SpiceQL's types, in load order: `ck`, `spk`, `tspk` (ephemerides of other bodies), `pck`,
 /// `fk`, `ik`, `iak` (ISIS addenda), `lsk`, `sclk`.
@@ -55,46 +76,114 @@ pub(super) fn qualities(site: &SiteProducts) -> BTreeMap<&'static str, &'static 
         .collect()
 }
 
+/// SpiceQL's members, and `areograph` with a kernel per entry.
+#[derive(Serialize, JsonSchema)]
+#[schemars(
+    title = "Kernels of a site",
+    description = "exchange/kernels.json of areograph: kernel names by type and qualities as SpiceQL reports them; \
+                   under areograph each kernel with size, hash and coverage.",
+    extend("dependentRequired" = {
+        "ck": ["mgs_ck_quality"],
+        "spk": ["mgs_spk_quality"],
+        "mgs_ck_quality": ["ck"],
+        "mgs_spk_quality": ["spk"],
+    })
+)]
+struct Report<'a> {
+    areograph: Extension<'a>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    ck: Option<Names<'a>>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    fk: Option<Names<'a>>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    iak: Option<Names<'a>>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    ik: Option<Names<'a>>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    lsk: Option<Names<'a>>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("enum" = QUALITIES))]
+    mgs_ck_quality: Option<&'static str>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("enum" = QUALITIES))]
+    mgs_spk_quality: Option<&'static str>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pck: Option<Names<'a>>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    sclk: Option<Names<'a>>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    spk: Option<Names<'a>>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    tspk: Option<Names<'a>>,
+}
+
+/// SpiceQL's words for the quality of a kernel.
+const QUALITIES: [&str; 4] = ["smithed", "reconstructed", "predicted", "noquality"];
+
+/// File names of the kernels of one type, in load order.
+#[derive(Serialize, JsonSchema)]
+#[serde(transparent)]
+struct Names<'a>(#[schemars(length(min = 1), inner(regex(pattern = "^[^/]+$")))] Vec<&'a str>);
+
+#[derive(Serialize, JsonSchema)]
+struct Extension<'a> {
+    coverage: &'static str,
+    wanted_positions_et_s: Vec<[f64; 2]>,
+    wanted_attitudes_et_s: Vec<[f64; 2]>,
+    kernels: Vec<Entry<'a>>,
+}
+
 /// A kernel's identity and coverage.
-#[derive(Serialize)]
+#[derive(Serialize, JsonSchema)]
 struct Entry<'a> {
+    #[schemars(regex(pattern = "^[^/]+$"))]
     name: &'a str,
+    #[schemars(extend("enum" = ["ck", "spk", "tspk", "pck", "fk", "ik", "iak", "lsk", "sclk"]))]
     r#type: String,
     bytes: u64,
+    #[schemars(regex(pattern = "^[0-9a-f]{64}$"))]
     blake3: &'a str,
     #[serde(skip_serializing_if = "Option::is_none")]
     coverage_et_s: Option<Vec<[f64; 2]>>,
 }
 
-/// The report: SpiceQL's members, and `areograph` with a kernel per entry.
-pub(super) fn report(site: &SiteProducts) -> Value {
-    let mut report = Map::new();
-    for (kind, names) in names_by_type(site) {
-        report.insert(kind, json!(names));
+/// Schema of the report.
+fn schema() -> DocumentSchema {
+    DocumentSchema::of::<Report>("kernels")
+}
+
+fn report<'a>(site: &SiteProducts<'a>) -> Report<'a> {
+    let entry = |kernel: &'a KernelLine| Entry {
+        name: &kernel.name,
+        r#type: type_of(kernel),
+        bytes: kernel.bytes,
+        blake3: &kernel.blake3,
+        coverage_et_s: kernel.held.as_ref().map(ends),
+    };
+    let areograph = Extension {
+        coverage: "intervals of TDB seconds past J2000 in which the kernel holds Mars Global Surveyor: its position \
+                   in an spk, its attitude in a ck, whose gaps lie between the intervals",
+        wanted_positions_et_s: ends(&site.wanted.positions),
+        wanted_attitudes_et_s: ends(&site.wanted.attitudes),
+        kernels: site.kernels.iter().map(entry).collect(),
+    };
+    let mut names = names_by_type(site);
+    let qualities = qualities(site);
+    let mut of_type = |kind: &str| names.remove(kind).map(Names);
+    Report {
+        areograph,
+        ck: of_type("ck"),
+        fk: of_type("fk"),
+        iak: of_type("iak"),
+        ik: of_type("ik"),
+        lsk: of_type("lsk"),
+        mgs_ck_quality: qualities.get("mgs_ck_quality").copied(),
+        mgs_spk_quality: qualities.get("mgs_spk_quality").copied(),
+        pck: of_type("pck"),
+        sclk: of_type("sclk"),
+        spk: of_type("spk"),
+        tspk: of_type("tspk"),
     }
-    for (key, quality) in qualities(site) {
-        report.insert(key.to_owned(), json!(quality));
-    }
-    let entries: Vec<Entry> = site
-        .kernels
-        .iter()
-        .map(|kernel| Entry {
-            name: &kernel.name,
-            r#type: type_of(kernel),
-            bytes: kernel.bytes,
-            blake3: &kernel.blake3,
-            coverage_et_s: kernel.held.as_ref().map(ends),
-        })
-        .collect();
-    let extension = json!({
-        "coverage": "intervals of TDB seconds past J2000 in which the kernel holds Mars Global Surveyor: its position \
-                     in an spk, its attitude in a ck, whose gaps lie between the intervals",
-        "wanted_positions_et_s": ends(&site.wanted.positions),
-        "wanted_attitudes_et_s": ends(&site.wanted.attitudes),
-        "kernels": entries,
-    });
-    report.insert("areograph".to_owned(), extension);
-    Value::Object(report)
 }
 
 fn ends(intervals: &Intervals) -> Vec<[f64; 2]> {

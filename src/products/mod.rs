@@ -1,19 +1,7 @@
 //! Rows become the files that people's tools read; every file is read back before it counts.
 //!
-//! | file | for |
-//! |---|---|
-//! | `footprints.parquet`, `.csv`, `.geojson` | GIS and scripts: shots in the windows, IAU 2000 |
-//! | `ranges.parquet`, `ranges.json` | range residuals per shot; statistics per profile |
-//! | `registration.parquet`, `registration.json` | line and sample of every footprint in every image; how the iterations converge |
-//! | `ties.parquet`, `adjusted_footprints.parquet`, `adjustment.json` | tie points and footprints in the adjustment; what it says of the site |
-//! | `registration_adjusted.parquet` | line and sample of every footprint with the adjusted orientation |
-//! | `images/<id>/adjusted_*`, `adjusted/…`, `adjusted.tm` | the adjusted orientation: samples, camera model, SPICE kernels |
-//! | `images/<id>/orientation.parquet`, `.json` | orientation samples; polynomials with residuals |
-//! | `images/<id>/isd.json` | camera models of the Community Sensor Model (`usgscsm`) |
-//! | `footprints.xml` | a PDS4-style label of `footprints.csv` |
-//! | `exchange/…` | ISIS, Ames Stereo Pipeline, GIS, STAC catalogues; see its `README.txt` |
-//! | `kernels.tm` | SPICE: the same kernels in the same order |
-//! | `report/index.html` | people |
+//! A product is a [`Declaration`](product::Declaration) in its file and a line of the [registry](registry); the
+//! files, the manifest's entries, the STAC item, `exchange/README.txt` and `docs/products.md` follow from it.
 //!
 //! The same site gives the same bytes; nothing here looks at a clock.
 
@@ -24,22 +12,26 @@ mod exchange;
 pub(crate) mod fault;
 mod files;
 mod footprints;
+mod generated;
 mod geojson;
+mod gis;
 mod isd;
 mod kernel_report;
 mod orientation;
+mod page;
 mod parquet;
 mod pds4_label;
+mod product;
 mod ranges;
 pub mod read;
 mod registration;
-mod shot;
+mod registry;
 mod site;
 mod table;
 mod text_table;
 mod ties;
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 pub use adjusted_kernels::{
     AdjustedImage, AdjustedKernels, position_kernel, write_adjusted_kernels,
@@ -48,18 +40,13 @@ pub use exchange::{
     ControlMeasure, ControlPoint, GroundEstimate, ImageMeasure, LidarPoint, moc_serial_number,
     write_gcp, write_lidar_data,
 };
-pub use site::{GeometricProducts, ImageProducts, KernelLine, SiteProducts};
+pub use generated::{documentation, schemas};
+pub use product::Product;
+pub use site::{GeometricProducts, ImageProducts, SiteProducts};
 
-use crate::error::Result;
-
-/// A file that was written.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Product {
-    /// Path below the site's folder, for example `images/m0402852/isd.json`.
-    pub path: PathBuf,
-    /// What the file has of what it is about: shots, samples, profiles, table nodes; 0 for plain text.
-    pub rows: u64,
-}
+use crate::error::{Place, Result};
+use product::{Context, Declaration, Scope, Write, Written};
+use registry::PRODUCTS;
 
 /// Writes every product of `site` below `directory`, with `page` as its report, and reads each of them back.
 ///
@@ -69,56 +56,65 @@ pub struct Product {
 /// differently.
 pub fn write_products(directory: &Path, site: &SiteProducts, page: &str) -> Result<Vec<Product>> {
     site.check()?;
-    let mut written = Writer {
-        directory,
-        products: Vec::new(),
-    };
-    footprints::write(&mut written, site)?;
-    ranges::write(&mut written, site)?;
-    registration::write(&mut written, site)?;
-    for image in site.images {
-        orientation::write(&mut written, image, "")?;
-        isd::write(&mut written, site, image)?;
-    }
-    if let Some(geometric) = &site.geometric {
-        ties::write(&mut written, site, geometric)?;
-        adjustment::write(&mut written, site, geometric)?;
-        registration::write_adjusted(&mut written, site, geometric)?;
-        for image in geometric.adjusted_images {
-            orientation::write(&mut written, image, "adjusted_")?;
-            isd::write_adjusted(&mut written, site, image)?;
+    let mut written: Vec<Written> = Vec::new();
+    for group in PRODUCTS.chunk_by(|one, next| one.scope() == next.scope()) {
+        let images: Vec<Option<&ImageProducts>> = match group[0].scope() {
+            Scope::Site => vec![None],
+            Scope::Image => site.images.iter().map(Some).collect(),
+            Scope::AdjustedImage => {
+                let geometric = site.geometric.iter();
+                geometric
+                    .flat_map(|of| of.adjusted_images)
+                    .map(Some)
+                    .collect()
+            }
+        };
+        for image in images {
+            for declaration in group {
+                let context = Context {
+                    site,
+                    page,
+                    directory,
+                    products: PRODUCTS,
+                    written: &written,
+                };
+                let files = write(declaration, &context, image)?;
+                written.extend(files);
+            }
         }
-        adjusted_kernels::write(&mut written, site, geometric)?;
     }
-    written.add("report/index.html", |path| {
-        files::write_text(path, page)?;
-        Ok(0)
-    })?;
-    written.add("kernels.tm", |path| {
-        files::write_text(path, site.metakernel)?;
-        Ok(0)
-    })?;
-    // Last, as its catalogue lists the others.
-    exchange::write(&mut written, site)?;
-    Ok(written.products)
+    Ok(written.into_iter().map(|(product, _)| product).collect())
 }
 
-/// Where products go, and what has been written.
-struct Writer<'a> {
-    directory: &'a Path,
-    products: Vec<Product>,
-}
-
-impl Writer<'_> {
-    /// Writes the product at `path` by a function that returns its rows.
-    fn add(
-        &mut self,
-        path: impl Into<PathBuf>,
-        write: impl FnOnce(&Path) -> Result<u64>,
-    ) -> Result<()> {
-        let path = path.into();
-        let rows = write(&self.directory.join(&path))?;
-        self.products.push(Product { path, rows });
-        Ok(())
-    }
+/// Writes one product, of an image if it is of one.
+fn write(
+    declaration: &'static Declaration,
+    of: &Context,
+    image: Option<&ImageProducts>,
+) -> Result<Vec<Written>> {
+    let relative = image.map_or_else(
+        || declaration.path.to_owned(),
+        |image| declaration.path_of(&image.times.id),
+    );
+    let path = of.directory.join(&relative);
+    let rows = match (&declaration.write, image, &of.site.geometric) {
+        (Write::Site(write), ..) => write(&path, of),
+        (Write::Footprints(write), ..) if !of.site.footprints.is_empty() => {
+            write(&path, of).map(Some)
+        }
+        (Write::Image(write) | Write::AdjustedImage(write), Some(image), _) => {
+            write(&path, of, image).map(Some)
+        }
+        (Write::Ties(write), _, Some(geometric)) => write(&path, of, geometric),
+        (Write::Several(write), _, Some(geometric)) => return write(of, geometric),
+        _ => Ok(None),
+    };
+    let product = rows.in_file(&path)?.map(|rows| Product {
+        path: relative.into(),
+        rows,
+    });
+    Ok(product
+        .map(|product| (product, declaration))
+        .into_iter()
+        .collect())
 }

@@ -1,18 +1,22 @@
 //! Orientation of an image: samples as Parquet, times and polynomials as JSON.
 
+use std::path::Path;
+
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::{
-    Writer,
     coordinates::degrees,
     files::write_json,
     parquet,
+    product::{Content, Context, Declaration, Role, Write},
     site::ImageProducts,
-    table::{Column, Table, Values},
+    table::{Column, Table, Unit, column, meanings},
 };
 use crate::{
     error::Result,
     geom::{attitude::continuous_quaternions, polynomial::Fit},
+    schema::DocumentSchema,
     stages::{
         fit_sensor_model::{EulerModel, RotationVectorModel, SensorModel},
         sample_orientation::{BoresightGround, GroundPoint, Orientation, OrientationSample},
@@ -33,26 +37,34 @@ const CONVENTIONS: [&str; 6] = [
      order; to be used near gimbal lock, where |cos phi| < 0.1 leaves omega and kappa badly determined",
 ];
 
-#[derive(Serialize)]
+#[derive(Serialize, JsonSchema)]
+#[schemars(
+    title = "Exterior orientation of an image",
+    description = "images/<id>/orientation.json of areograph: times, polynomial sensor models of first and second order with residuals (the paper's Table 4), and the rotation-vector form."
+)]
 struct Document<'a> {
+    #[schemars(extend("const" = "areograph orientation 1"))]
     format: &'static str,
     image: &'a str,
     valid: bool,
     invalid_because: Vec<&'a str>,
     times: Times<'a>,
     conventions: [&'static str; 6],
+    #[schemars(range(min = 3))]
     samples: usize,
     /// East longitude and areocentric latitude, degrees: along the first edge and back along the last.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(length(min = 3))]
     outline_deg: Option<Vec<[f64; 2]>>,
     first_order: Euler<'a>,
     second_order: Euler<'a>,
     rotation_vector: RotationVector<'a>,
+    #[schemars(range(min = 0.0, max = 1.0))]
     cos_phi_min: f64,
     near_gimbal_lock: bool,
 }
 
-#[derive(Serialize)]
+#[derive(Serialize, JsonSchema)]
 struct Times<'a> {
     start_et_s: f64,
     start_from: StartFrom,
@@ -61,6 +73,7 @@ struct Times<'a> {
     utc_start: &'a str,
     middle_et_s: f64,
     stop_et_s: f64,
+    #[schemars(extend("exclusiveMinimum" = 0))]
     line_period_s: f64,
     exposure_s: f64,
     downtrack_summing: u32,
@@ -72,111 +85,212 @@ struct Times<'a> {
     notes: &'a [String],
 }
 
-#[derive(Serialize)]
+#[derive(Serialize, JsonSchema)]
 struct Euler<'a> {
+    #[schemars(range(min = 0.0))]
     position_rmse_m: f64,
     /// Root mean square on the ellipsoid of what the residuals of the angles do there.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(range(min = 0.0))]
     pointing_ground_rmse_m: Option<f64>,
-    x_m: Polynomial<'a>,
-    y_m: Polynomial<'a>,
-    z_m: Polynomial<'a>,
-    omega_rad: Polynomial<'a>,
-    phi_rad: Polynomial<'a>,
-    kappa_rad: Polynomial<'a>,
+    x_m: Length<'a>,
+    y_m: Length<'a>,
+    z_m: Length<'a>,
+    omega_rad: Angle<'a>,
+    phi_rad: Angle<'a>,
+    kappa_rad: Angle<'a>,
 }
 
-#[derive(Serialize)]
+#[derive(Serialize, JsonSchema)]
 struct RotationVector<'a> {
     reference: [[f64; 3]; 3],
-    x_rad: Polynomial<'a>,
-    y_rad: Polynomial<'a>,
-    z_rad: Polynomial<'a>,
+    x_rad: Angle<'a>,
+    y_rad: Angle<'a>,
+    z_rad: Angle<'a>,
 }
 
-/// A fit; RMSE and residuals in the unit of the samples.
-#[derive(Serialize)]
-struct Polynomial<'a> {
+/// Coefficients from the constant upwards in metres per power of a line; residual = sample - polynomial.
+#[derive(Serialize, JsonSchema)]
+struct Length<'a> {
+    #[schemars(length(min = 2, max = 3))]
     coefficients: &'a [f64],
+    #[schemars(range(min = 0.0))]
     rmse: f64,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    rmse_arcsec: Option<f64>,
     residuals: &'a [f64],
 }
 
-/// Writes samples and models of an image; the names of the files begin with `prefix`.
-pub(super) fn write(written: &mut Writer, image: &ImageProducts, prefix: &str) -> Result<()> {
-    let folder = format!("images/{}", image.times.id);
-    let table = Table::new(columns(&image.orientation.samples))?;
-    written.add(format!("{folder}/{prefix}orientation.parquet"), |path| {
-        parquet::write(path, &table, Vec::new())
-    })?;
-    written.add(format!("{folder}/{prefix}orientation.json"), |path| {
-        write_json(path, &document(image))?;
-        Ok(table.rows() as u64)
-    })
+/// Coefficients from the constant upwards in radians per power of a line; RMSE in arcseconds as well.
+#[derive(Serialize, JsonSchema)]
+struct Angle<'a> {
+    #[schemars(length(min = 2, max = 3))]
+    coefficients: &'a [f64],
+    #[schemars(range(min = 0.0))]
+    rmse: f64,
+    #[schemars(range(min = 0.0))]
+    rmse_arcsec: f64,
+    residuals: &'a [f64],
 }
 
-fn columns(samples: &[OrientationSample]) -> Vec<Column> {
-    let number = |name, description, value: fn(&OrientationSample) -> f64| {
-        Column::new(
-            name,
-            description,
-            Values::F64(samples.iter().map(value).collect()),
-        )
+macro_rules! declared {
+    ($path:literal, $what:literal, $content:expr, $write:expr) => {
+        Declaration {
+            path: $path,
+            what: $what,
+            readers: "scripts",
+            rows: "samples",
+            role: Role::Data,
+            content: $content,
+            write: $write,
+            uses: &[],
+        }
     };
+}
+
+pub(super) static TABLE: Declaration = declared!(
+    "images/<image>/orientation.parquet",
+    "positions and rotations of the camera, sampled along the image",
+    Content::Table(|| meanings(&columns())),
+    Write::Image(write_table)
+);
+
+pub(super) static DOCUMENT: Declaration = declared!(
+    "images/<image>/orientation.json",
+    "times and sensor models: polynomials of first and second order with residuals, rotation-vector form",
+    Content::Document(schema),
+    Write::Image(write_document)
+);
+
+pub(super) static ADJUSTED_TABLE: Declaration = declared!(
+    "images/<image>/adjusted_orientation.parquet",
+    "adjusted positions and rotations of the camera",
+    Content::Table(|| meanings(&columns())),
+    Write::AdjustedImage(write_table)
+);
+
+pub(super) static ADJUSTED_DOCUMENT: Declaration = declared!(
+    "images/<image>/adjusted_orientation.json",
+    "the sensor models fitted to them",
+    Content::Document(schema),
+    Write::AdjustedImage(write_document)
+);
+
+fn write_table(path: &Path, _: &Context, image: &ImageProducts) -> Result<u64> {
+    let samples = &image.orientation.samples;
     let rotations = samples.iter().map(|sample| sample.camera_to_mars.matrix());
     let quaternions = continuous_quaternions(rotations);
-    let quaternion = |name, description, component: usize| {
-        let values = quaternions.iter().map(|quaternion| quaternion[component]);
-        Column::new(name, description, Values::F64(values.collect()))
-    };
-    let boresight = |name, description, value: fn(&BoresightGround) -> f64| {
-        let values = samples
-            .iter()
-            .map(|sample| sample.boresight.as_ref().map(value));
-        Column::new(name, description, Values::OptionalF64(values.collect()))
-    };
+    let rows = samples.iter().zip(quaternions);
+    parquet::write(path, Table::new(columns(), rows.collect()), Vec::new())
+}
+
+fn write_document(path: &Path, _: &Context, image: &ImageProducts) -> Result<u64> {
+    write_json(path, &document(image))?;
+    Ok(image.orientation.samples.len() as u64)
+}
+
+/// A sample and its quaternion, camera to Mars, continuous over the image.
+type Sample<'a> = (&'a OrientationSample, [f64; 4]);
+
+/// Schema of the document.
+pub(super) fn schema() -> DocumentSchema {
+    DocumentSchema::of::<Document>("orientation")
+}
+
+fn columns<'a>() -> Vec<Column<Sample<'a>>> {
+    fn boresight<'a>(
+        name: &'static str,
+        unit: Unit,
+        description: &'static str,
+        of: fn(&BoresightGround) -> f64,
+    ) -> Column<Sample<'a>> {
+        column(name, unit, description, move |s: &Sample| {
+            s.0.boresight.as_ref().map(of)
+        })
+    }
     vec![
-        number("et_s", "epoch, TDB seconds past J2000", |s| s.et.seconds()),
-        number(
-            "line_offset",
-            "lines from the middle of the header image",
-            |s| s.line_offset,
+        column(
+            "et_s",
+            Unit::Second,
+            "epoch, TDB seconds past J2000",
+            |s: &Sample| s.0.et.seconds(),
         ),
-        number("x_m", "perspective centre, IAU 2000 X, metres", |s| {
-            s.position.xyz_m.x
+        column(
+            "line_offset",
+            Unit::Line,
+            "lines from the middle of the header image",
+            |s: &Sample| s.0.line_offset,
+        ),
+        column(
+            "x_m",
+            Unit::Metre,
+            "perspective centre, IAU 2000 X, metres",
+            |s: &Sample| s.0.position.xyz_m.x,
+        ),
+        column(
+            "y_m",
+            Unit::Metre,
+            "perspective centre, IAU 2000 Y, metres",
+            |s: &Sample| s.0.position.xyz_m.y,
+        ),
+        column(
+            "z_m",
+            Unit::Metre,
+            "perspective centre, IAU 2000 Z, metres",
+            |s: &Sample| s.0.position.xyz_m.z,
+        ),
+        column("omega_rad", Unit::Radian, "omega, radians", |s: &Sample| {
+            s.0.angles.omega_rad
         }),
-        number("y_m", "perspective centre, IAU 2000 Y, metres", |s| {
-            s.position.xyz_m.y
+        column("phi_rad", Unit::Radian, "phi, radians", |s: &Sample| {
+            s.0.angles.phi_rad
         }),
-        number("z_m", "perspective centre, IAU 2000 Z, metres", |s| {
-            s.position.xyz_m.z
+        column("kappa_rad", Unit::Radian, "kappa, radians", |s: &Sample| {
+            s.0.angles.kappa_rad
         }),
-        number("omega_rad", "omega, radians", |s| s.angles.omega_rad),
-        number("phi_rad", "phi, radians", |s| s.angles.phi_rad),
-        number("kappa_rad", "kappa, radians", |s| s.angles.kappa_rad),
-        quaternion("quaternion_w", "camera to Mars, SPICE convention, w", 0),
-        quaternion("quaternion_x", "camera to Mars, SPICE convention, x", 1),
-        quaternion("quaternion_y", "camera to Mars, SPICE convention, y", 2),
-        quaternion("quaternion_z", "camera to Mars, SPICE convention, z", 3),
+        column(
+            "quaternion_w",
+            Unit::None,
+            "camera to Mars, SPICE convention, w",
+            |s: &Sample| s.1[0],
+        ),
+        column(
+            "quaternion_x",
+            Unit::None,
+            "camera to Mars, SPICE convention, x",
+            |s: &Sample| s.1[1],
+        ),
+        column(
+            "quaternion_y",
+            Unit::None,
+            "camera to Mars, SPICE convention, y",
+            |s: &Sample| s.1[2],
+        ),
+        column(
+            "quaternion_z",
+            Unit::None,
+            "camera to Mars, SPICE convention, z",
+            |s: &Sample| s.1[3],
+        ),
         boresight(
             "boresight_longitude_deg",
+            Unit::Degree,
             "east longitude where the boresight meets the ellipsoid",
             |ground| degrees(ground.longitude_rad),
         ),
         boresight(
             "boresight_latitude_deg",
+            Unit::Degree,
             "areocentric latitude where the boresight meets the ellipsoid",
             |ground| degrees(ground.latitude_rad),
         ),
         boresight(
             "boresight_range_m",
+            Unit::Metre,
             "distance of that point, metres",
             |ground| ground.range_m,
         ),
         boresight(
             "boresight_emission_deg",
+            Unit::Degree,
             "angle between normal and camera there, degrees",
             |ground| degrees(ground.emission_rad),
         ),
@@ -229,19 +343,20 @@ fn times(times: &ImageTimes) -> Times<'_> {
     }
 }
 
-fn length(fit: &Fit) -> Polynomial<'_> {
-    Polynomial {
+fn length(fit: &Fit) -> Length<'_> {
+    Length {
         coefficients: fit.polynomial.coefficients(),
         rmse: fit.rmse,
-        rmse_arcsec: None,
         residuals: &fit.residuals,
     }
 }
 
-fn angle(fit: &Fit) -> Polynomial<'_> {
-    Polynomial {
-        rmse_arcsec: Some(fit.rmse / RADIANS_PER_ARCSECOND),
-        ..length(fit)
+fn angle(fit: &Fit) -> Angle<'_> {
+    Angle {
+        coefficients: fit.polynomial.coefficients(),
+        rmse: fit.rmse,
+        rmse_arcsec: fit.rmse / RADIANS_PER_ARCSECOND,
+        residuals: &fit.residuals,
     }
 }
 

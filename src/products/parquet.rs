@@ -12,29 +12,27 @@ use arrow::{
     array::{
         ArrayRef, BinaryArray, BooleanArray, Float64Array, Int32Array, StringArray, UInt32Array,
     },
-    datatypes::{Field, Schema},
+    datatypes::{DataType, Field, Metadata, Schema, SchemaRef},
     record_batch::RecordBatch,
 };
 
 use super::{
     fault::ProductFault,
     files::{create, finish, open},
-    table::{Table, Values},
+    table::{Kind, Meaning, Table, Values},
 };
 use crate::error::{Failure, IoFault, Place, Result};
-
-/// Rows that stand in memory a second time, as arrays.
-const ROWS_AT_ONCE: usize = 65_536;
 
 /// Writes `table` with `metadata` (key, value) and reads it back.
 ///
 /// # Errors
-/// What the disk refuses; values that come back different.
-pub(super) fn write(path: &Path, table: &Table, metadata: Vec<(&str, String)>) -> Result<u64> {
+/// Numbers that are not finite; what the disk refuses; columns and values that come back different.
+pub(super) fn write(path: &Path, table: Table, metadata: Vec<(&str, String)>) -> Result<u64> {
+    let table = table.for_parquet();
     let mut file = create(path)?;
-    encode(&mut file, table, metadata).in_file(path)?;
+    encode(&mut file, &table, metadata).in_file(path)?;
     finish(path, file)?;
-    read_back(path, table).in_file(path)?;
+    read_back(path, &table).in_file(path)?;
     Ok(table.rows() as u64)
 }
 
@@ -48,11 +46,12 @@ fn encode(file: impl Write + Send, table: &Table, metadata: Vec<(&str, String)>)
         .set_compression(Compression::ZSTD(::parquet::basic::ZstdLevel::default()))
         .set_key_value_metadata(Some(metadata))
         .build();
-    let schema = record_batch(table, 0..0)?.schema();
-    let mut writer = ArrowWriter::try_new(file, schema, Some(properties)).map_err(refused)?;
-    for start in (0..table.rows()).step_by(ROWS_AT_ONCE) {
-        let rows = start..table.rows().min(start + ROWS_AT_ONCE);
-        writer.write(&record_batch(table, rows)?).map_err(refused)?;
+    let schema = schema(table);
+    let mut writer =
+        ArrowWriter::try_new(file, Arc::clone(&schema), Some(properties)).map_err(refused)?;
+    for rows in table.pieces() {
+        let batch = record_batch(table, &schema, rows)?;
+        writer.write(&batch).map_err(refused)?;
     }
     writer.close().map_err(refused)?;
     Ok(())
@@ -69,55 +68,67 @@ fn refused(error: ParquetError) -> Failure {
     }
 }
 
+fn schema(table: &Table) -> SchemaRef {
+    let fields: Vec<Field> = table.columns().map(field).collect();
+    Arc::new(Schema::new(fields))
+}
+
+/// Name and type of a column; its description and its unit are the field's metadata.
+fn field(column: &Meaning) -> Field {
+    let data_type = match column.kind {
+        Kind::Real => DataType::Float64,
+        Kind::Natural => DataType::UInt32,
+        Kind::Integer => DataType::Int32,
+        Kind::Flag => DataType::Boolean,
+        Kind::Text => DataType::Utf8,
+        Kind::Bytes => DataType::Binary,
+    };
+    let description = ("description".to_owned(), column.description.to_owned());
+    let unit = column.unit.symbol();
+    let unit = unit.map(|symbol| ("unit".to_owned(), symbol.to_owned()));
+    Field::new(column.name, data_type, column.optional)
+        .with_metadata([description].into_iter().chain(unit).collect::<Metadata>())
+}
+
 /// The given rows, which `table` must have, as arrays.
 fn record_batch(
     table: &Table,
+    schema: &SchemaRef,
     rows: Range<usize>,
 ) -> std::result::Result<RecordBatch, ProductFault> {
-    let (fields, arrays): (Vec<Field>, Vec<ArrayRef>) = table
-        .columns
-        .iter()
-        .map(|column| {
-            let array = array(&column.values, rows.clone());
-            let nullable = matches!(column.values, Values::OptionalF64(_));
-            // One entry only: a map of several would be written in random order.
-            let description = [("description".to_owned(), column.description.to_owned())];
-            let field = Field::new(column.name, array.data_type().clone(), nullable)
-                .with_metadata(description);
-            (field, array)
-        })
-        .unzip();
-    RecordBatch::try_new(Arc::new(Schema::new(fields)), arrays)
+    let arrays = table.values(rows)?.into_iter().map(array).collect();
+    RecordBatch::try_new(Arc::clone(schema), arrays)
         .map_err(ProductFault::refused("assemble columns"))
 }
 
-fn array(values: &Values, rows: Range<usize>) -> ArrayRef {
+fn array(values: Values) -> ArrayRef {
     match values {
-        Values::F64(values) | Values::Fixed(values, _) => {
-            Arc::new(Float64Array::from_iter_values(values[rows].iter().copied()))
-        }
-        Values::OptionalF64(values) => Arc::new(Float64Array::from(values[rows].to_vec())),
-        Values::U32(values) => Arc::new(UInt32Array::from(values[rows].to_vec())),
-        Values::I32(values) => Arc::new(Int32Array::from(values[rows].to_vec())),
-        Values::Bool(values) => Arc::new(BooleanArray::from(values[rows].to_vec())),
-        Values::Text(values) => Arc::new(StringArray::from_iter_values(&values[rows])),
-        Values::Binary(values) => Arc::new(BinaryArray::from_iter_values(&values[rows])),
+        Values::Real(values) => Arc::new(Float64Array::from(values)),
+        Values::OptionalReal(values) => Arc::new(Float64Array::from(values)),
+        Values::Natural(values) => Arc::new(UInt32Array::from(values)),
+        Values::Integer(values) => Arc::new(Int32Array::from(values)),
+        Values::Flag(values) => Arc::new(BooleanArray::from(values)),
+        Values::Text(values) => Arc::new(StringArray::from_iter_values(values)),
+        Values::Bytes(values) => Arc::new(BinaryArray::from_iter_values(values)),
     }
 }
 
 fn read_back(path: &Path, table: &Table) -> Result<()> {
     let file: File = open(path)?;
-    let reader = ParquetRecordBatchReaderBuilder::try_new(file)
-        .and_then(ParquetRecordBatchReaderBuilder::build)
-        .map_err(ProductFault::unreadable)?;
+    let builder =
+        ParquetRecordBatchReaderBuilder::try_new(file).map_err(ProductFault::unreadable)?;
+    let schema = schema(table);
+    if builder.schema().fields() != schema.fields() {
+        let what = "names, types, units or descriptions of columns".to_owned();
+        return Err(ProductFault::ReadBack { what }.into());
+    }
     let mut rows = 0;
-    for batch in reader {
+    for batch in builder.build().map_err(ProductFault::unreadable)? {
         let batch = batch.map_err(ProductFault::unreadable)?;
         let end = rows + batch.num_rows();
-        let expected = record_batch(table, rows..end.min(table.rows()))?;
+        let expected = record_batch(table, &schema, rows..end.min(table.rows()))?;
         for (column, (found, expected)) in table
-            .columns
-            .iter()
+            .columns()
             .zip(batch.columns().iter().zip(expected.columns()))
         {
             if found != expected {

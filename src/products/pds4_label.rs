@@ -14,7 +14,7 @@ use super::{
     coordinates::FRAME,
     files::{open, write_text},
     site::SiteProducts,
-    table::{Column, Table, Values},
+    table::{Kind, Meaning, Table},
 };
 use crate::error::{IoFault, Place, Result};
 
@@ -33,11 +33,11 @@ struct Described {
 pub(super) fn write(
     path: &Path,
     described: &Path,
-    table: &Table,
+    table: Table,
     site: &SiteProducts,
 ) -> Result<u64> {
-    let file = describe(described)?;
-    write_text(path, &label(&file, table, site))?;
+    let (file, table) = (describe(described)?, table.for_text());
+    write_text(path, &label(&file, &table, site))?;
     Ok(table.rows() as u64)
 }
 
@@ -81,56 +81,42 @@ fn escaped(text: &str) -> String {
         .replace('>', "&gt;")
 }
 
-/// The unit that a column's name ends in.
-fn unit(column: &str) -> Option<&'static str> {
-    Some(match column.rsplit_once('_')?.1 {
-        "deg" => "deg",
-        "m" => "m",
-        "s" => "s",
-        _ => return None,
+/// `None` for what no text has.
+const fn data_type(kind: Kind) -> Option<&'static str> {
+    Some(match kind {
+        Kind::Real => "ASCII_Real",
+        Kind::Natural | Kind::Integer => "ASCII_Integer",
+        Kind::Flag => "ASCII_Boolean",
+        Kind::Text => "UTF8_String",
+        Kind::Bytes => return None,
     })
 }
 
-fn data_type(values: &Values) -> Option<&'static str> {
-    Some(match values {
-        Values::F64(_) | Values::OptionalF64(_) | Values::Fixed(..) => "ASCII_Real",
-        Values::U32(_) | Values::I32(_) => "ASCII_Integer",
-        Values::Bool(_) => "ASCII_Boolean",
-        Values::Text(_) => "UTF8_String",
-        Values::Binary(_) => return None,
-    })
-}
-
-/// The fields of columns that CSV has, and how many they are.
-fn fields(columns: &[Column]) -> (String, usize) {
-    let mut text = String::new();
-    let mut number = 0;
-    for column in columns {
-        let Some(data_type) = data_type(&column.values) else {
-            continue;
-        };
-        number += 1;
-        let unit = unit(column.name).map_or(String::new(), |unit| {
-            format!("          <unit>{unit}</unit>\n")
-        });
-        let _infallible = write!(
-            text,
-            "        <Field_Delimited>\n\
-             \x20         <name>{}</name>\n\
-             \x20         <field_number>{number}</field_number>\n\
-             \x20         <data_type>{data_type}</data_type>\n\
-             {unit}\
-             \x20         <description>{}</description>\n\
-             \x20       </Field_Delimited>\n",
-            escaped(column.name),
-            escaped(column.description),
-        );
-    }
-    (text, number)
+/// A field and its number, counted from 1; `None` for what no text has.
+fn field(number: usize, column: &Meaning) -> Option<String> {
+    let unit = column.unit.symbol().map_or(String::new(), |unit| {
+        format!("          <unit>{unit}</unit>\n")
+    });
+    Some(format!(
+        "        <Field_Delimited>\n\
+         \x20         <name>{}</name>\n\
+         \x20         <field_number>{number}</field_number>\n\
+         \x20         <data_type>{}</data_type>\n\
+         {unit}\
+         \x20         <description>{}</description>\n\
+         \x20       </Field_Delimited>\n",
+        escaped(column.name),
+        data_type(column.kind)?,
+        escaped(column.description),
+    ))
 }
 
 fn label(file: &Described, table: &Table, site: &SiteProducts) -> String {
-    let (fields, count) = fields(&table.columns);
+    let fields: String = (1..)
+        .zip(table.columns())
+        .filter_map(|(number, column)| field(number, column))
+        .collect();
+    let count = table.columns().count();
     let rows = table.rows();
     let table_bytes = file.bytes - file.header_bytes;
     format!(

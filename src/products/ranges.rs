@@ -2,22 +2,24 @@
 
 use std::collections::HashSet;
 
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::{
-    Writer,
     files::write_json,
     parquet,
+    product::{Content, Declaration, Role, Write},
     site::SiteProducts,
-    table::{Column, Table, Values},
+    table::{Column, Table, Unit, column, meanings},
 };
 use crate::{
     altimetry::MolaClock,
     config::RangeCheckConfig,
-    error::Result,
+    footprints::Footprint,
     geom::statistics::{Summary, Trend},
+    schema::DocumentSchema,
     stages::{
-        check_ranges::{BiasScan, ProfileRanges},
+        check_ranges::{BiasScan, ProfileRanges, ShotResiduals},
         group_profiles::Profile,
     },
 };
@@ -71,35 +73,42 @@ fn each_once(rows: &[u32]) -> Vec<usize> {
         .collect()
 }
 
-#[derive(Serialize)]
+#[derive(Serialize, JsonSchema)]
+#[schemars(
+    title = "Range check of a site",
+    description = "ranges.json of areograph: residuals of measured ranges per profile (the paper's Table 3), their limits and verdicts. Metres and seconds; what is unknown is left out."
+)]
 struct Document<'a> {
+    #[schemars(extend("const" = "areograph ranges 1"))]
     format: &'static str,
     site: &'a str,
     valid: bool,
-    invalid_because: Vec<String>,
+    invalid_because: &'a [String],
     units: &'static str,
+    #[schemars(length(min = 1))]
     definitions: Vec<Definition>,
     mola_clock: Clock<'a>,
     limits: &'a RangeCheckConfig,
+    #[schemars(range(min = 0.0))]
     trajectory_error_m: f64,
     summary: SiteSummary,
     profiles: Vec<ProfileDocument<'a>>,
 }
 
-#[derive(Serialize)]
+#[derive(Serialize, JsonSchema)]
 struct Definition {
     residual: &'static str,
     is: &'static str,
 }
 
-#[derive(Serialize)]
+#[derive(Serialize, JsonSchema)]
 struct Clock<'a> {
     #[serde(flatten)]
     configured: &'a MolaClock,
     correction_s: f64,
 }
 
-#[derive(Serialize)]
+#[derive(Serialize, JsonSchema)]
 struct SiteSummary {
     profiles: usize,
     profiles_valid: usize,
@@ -109,20 +118,22 @@ struct SiteSummary {
 }
 
 /// An image that was exposed during a profile.
-#[derive(Serialize)]
-struct Simultaneous<'a> {
+#[derive(Serialize, JsonSchema)]
+struct SimultaneousImage<'a> {
+    /// Image identifier.
     image: &'a str,
+    /// Shots of the profile fired while the image was exposed.
     shots: u32,
 }
 
-#[derive(Serialize)]
+#[derive(Serialize, JsonSchema)]
 struct ProfileDocument<'a> {
     id: &'a str,
     window: &'a str,
     orbit: u32,
     et_start_s: f64,
     et_stop_s: f64,
-    simultaneous: Vec<Simultaneous<'a>>,
+    simultaneous: Vec<SimultaneousImage<'a>>,
     valid: bool,
     invalid_because: &'a [String],
     range_minus_distance_m: Summary,
@@ -139,7 +150,7 @@ struct ProfileDocument<'a> {
 }
 
 /// A scan without the members that are not known.
-#[derive(Serialize)]
+#[derive(Serialize, JsonSchema)]
 struct Scan<'a> {
     correction_s: &'a [f64],
     spread_m: &'a [f64],
@@ -149,80 +160,119 @@ struct Scan<'a> {
     uncertainty_s: Option<f64>,
 }
 
-pub(super) fn write(written: &mut Writer, site: &SiteProducts) -> Result<()> {
-    let table = Table::new(columns(site))?;
-    written.add("ranges.parquet", |path| {
-        parquet::write(path, &table, Vec::new())
-    })?;
-    written.add("ranges.json", |path| {
-        write_json(path, &document(site))?;
-        Ok(site.profiles.len() as u64)
-    })
+pub(super) static TABLE: Declaration = Declaration {
+    path: "ranges.parquet",
+    what: "residuals of the range check per shot",
+    readers: "scripts",
+    rows: "shots in profiles",
+    role: Role::Data,
+    content: Content::Table(|| meanings(&columns())),
+    write: Write::Site(|path, of| {
+        let site = of.site;
+        let shots = (0..site.ranges.shots.len()).map(|at| RangedShot { site, at });
+        let table = Table::new(columns(), shots.collect());
+        parquet::write(path, table, Vec::new()).map(Some)
+    }),
+    uses: &[],
+};
+
+pub(super) static DOCUMENT: Declaration = Declaration {
+    path: "ranges.json",
+    what: "statistics of the residuals per profile, limits and verdicts",
+    readers: "scripts",
+    rows: "profiles",
+    role: Role::Data,
+    content: Content::Document(schema),
+    write: Write::Site(|path, of| {
+        write_json(path, &document(of.site))?;
+        Ok(Some(of.site.profiles.len() as u64))
+    }),
+    uses: &[],
+};
+
+/// A shot of a profile, by its place among the residuals.
+struct RangedShot<'a> {
+    site: &'a SiteProducts<'a>,
+    at: usize,
 }
 
-fn columns(site: &SiteProducts) -> Vec<Column> {
-    let shots = &site.ranges.shots;
-    let row = |row: &u32| site.footprints.row(*row as usize);
-    let profile = |index: &u32| {
-        let profile = site.profiles.get(*index as usize);
+impl RangedShot<'_> {
+    fn row(&self) -> u32 {
+        self.site.ranges.shots.row[self.at]
+    }
+
+    fn footprint(&self) -> Footprint {
+        self.site.footprints.row(self.row() as usize)
+    }
+
+    fn profile(&self) -> String {
+        let index = self.site.ranges.shots.profile[self.at];
+        let profile = self.site.profiles.get(index as usize);
         profile.map_or_else(String::new, |profile| profile.id.clone())
-    };
-    let residual = |name, description, values: &[f64]| {
-        Column::new(name, description, Values::F64(values.to_vec()))
-    };
+    }
+}
+
+fn columns<'a>() -> Vec<Column<RangedShot<'a>>> {
+    fn residual<'a>(
+        name: &'static str,
+        description: &'static str,
+        of: fn(&ShotResiduals) -> &Vec<f64>,
+    ) -> Column<RangedShot<'a>> {
+        column(name, Unit::Metre, description, move |shot: &RangedShot| {
+            of(&shot.site.ranges.shots)[shot.at]
+        })
+    }
+    let definition = |index: usize| DEFINITIONS[index].1;
     vec![
-        Column::new(
+        column(
             "profile",
+            Unit::None,
             "profile: window, orbit and crossing",
-            Values::Text(shots.profile.iter().map(profile).collect()),
+            RangedShot::profile,
         ),
-        Column::new(
+        column(
             "footprint_row",
+            Unit::None,
             "row of the footprint in footprints.parquet, counted from 0",
-            Values::U32(shots.row.clone()),
+            RangedShot::row,
         ),
-        Column::new(
+        column(
             "et_s",
+            Unit::Second,
             "time of the shot after the MOLA clock correction, TDB seconds past J2000",
-            Values::F64(shots.row.iter().map(|index| row(index).et_s).collect()),
+            |shot: &RangedShot| shot.footprint().et_s,
         ),
-        Column::new(
-            "orbit",
-            "orbit number",
-            Values::U32(shots.row.iter().map(|index| row(index).orbit).collect()),
-        ),
-        residual(
-            "range_minus_distance_m",
-            DEFINITIONS[0].1,
-            &shots.range_minus_distance_m,
-        ),
-        residual(
-            "range_minus_distance_crossover_m",
-            DEFINITIONS[1].1,
-            &shots.range_minus_distance_crossover_m,
-        ),
-        residual("decoding_m", DEFINITIONS[2].1, &shots.decoding_m),
-        residual(
-            "spacecraft_radial_m",
-            DEFINITIONS[3].1,
-            &shots.spacecraft_radial_m,
-        ),
-        residual(
-            "spacecraft_along_m",
-            DEFINITIONS[3].1,
-            &shots.spacecraft_along_m,
-        ),
-        residual(
-            "spacecraft_cross_m",
-            DEFINITIONS[3].1,
-            &shots.spacecraft_cross_m,
-        ),
-        Column::new(
+        column("orbit", Unit::None, "orbit number", |shot: &RangedShot| {
+            shot.footprint().orbit
+        }),
+        residual("range_minus_distance_m", definition(0), |shots| {
+            &shots.range_minus_distance_m
+        }),
+        residual("range_minus_distance_crossover_m", definition(1), |shots| {
+            &shots.range_minus_distance_crossover_m
+        }),
+        residual("decoding_m", definition(2), |shots| &shots.decoding_m),
+        residual("spacecraft_radial_m", definition(3), |shots| {
+            &shots.spacecraft_radial_m
+        }),
+        residual("spacecraft_along_m", definition(3), |shots| {
+            &shots.spacecraft_along_m
+        }),
+        residual("spacecraft_cross_m", definition(3), |shots| {
+            &shots.spacecraft_cross_m
+        }),
+        column(
             "outlier",
+            Unit::None,
             "whether range_minus_distance_m is an outlier of its profile",
-            Values::Bool(shots.outlier.clone()),
+            |shot: &RangedShot| shot.site.ranges.shots.outlier[shot.at],
         ),
     ]
+}
+
+/// Schema of the document.
+pub(super) fn schema() -> DocumentSchema {
+    DocumentSchema::of::<Document>("ranges")
 }
 
 fn document<'a>(site: &SiteProducts<'a>) -> Document<'a> {
@@ -231,14 +281,13 @@ fn document<'a>(site: &SiteProducts<'a>) -> Document<'a> {
         .iter()
         .map(|shot| site.ranges.shots.range_minus_distance_m[*shot]);
     let residuals_m: Vec<f64> = residuals.collect();
-    let invalid_because = site.invalid_because();
     let ranges = site.ranges;
     let valid = |profile: &&ProfileRanges| profile.invalid_because.is_empty();
     Document {
         format: "areograph ranges 1",
         site: &site.config.site,
-        valid: invalid_because.is_empty(),
-        invalid_because,
+        valid: site.verdict.valid,
+        invalid_because: &site.verdict.reasons,
         units: "metres, seconds, metres per second; angles in limits in radians",
         definitions: DEFINITIONS
             .iter()
@@ -284,7 +333,7 @@ fn profile_document<'a>(
         simultaneous: profile
             .simultaneous
             .iter()
-            .map(|of| Simultaneous {
+            .map(|of| SimultaneousImage {
                 image: &site.images[of.image].times.id,
                 shots: of.shots,
             })

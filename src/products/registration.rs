@@ -2,19 +2,20 @@
 
 use std::collections::BTreeMap;
 
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::{
-    Writer,
     files::write_json,
     parquet,
-    site::{GeometricProducts, ImageProducts, SiteProducts},
-    table::{Column, Table, Values},
+    product::{Content, Declaration, Role, Write},
+    site::{ImageProducts, SiteProducts},
+    table::{Column, Table, Unit, column, meanings},
 };
 use crate::{
     config::RegistrationConfig,
-    error::Result,
     geom::{pushbroom::CameraModel, statistics::Summary},
+    schema::DocumentSchema,
     stages::{
         group_profiles::Profile,
         register::{MethodRun, ModelDifference, ProfileOnImage, RegisteredPoints},
@@ -54,22 +55,28 @@ const DEFINITIONS: [(&str, &str); 6] = [
     ),
 ];
 
-#[derive(Serialize)]
+#[derive(Serialize, JsonSchema)]
+#[schemars(
+    title = "Registration of a site",
+    description = "registration.json of areograph: footprints in every image, what the published iterations cost on them, and what the choice of the camera model moves. Lines, samples and image pixels; what is unknown is left out."
+)]
 struct Document<'a> {
+    #[schemars(extend("const" = "areograph registration 1"))]
     format: &'static str,
     site: &'a str,
+    #[schemars(length(min = 1))]
     definitions: Vec<Definition>,
     configured: &'a RegistrationConfig,
     images: Vec<ImageDocument<'a>>,
 }
 
-#[derive(Serialize)]
+#[derive(Serialize, JsonSchema)]
 struct Definition {
     of: &'static str,
     is: &'static str,
 }
 
-#[derive(Serialize)]
+#[derive(Serialize, JsonSchema)]
 struct ImageDocument<'a> {
     image: &'a str,
     model: CameraModel,
@@ -84,139 +91,189 @@ struct ImageDocument<'a> {
     models: &'a [ModelDifference],
 }
 
-#[derive(Serialize)]
+#[derive(Serialize, JsonSchema)]
 struct ProfileDocument<'a> {
     id: &'a str,
     points: u32,
     inside: u32,
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(range(min = 0.0))]
     shot_spacing_lines: Option<f64>,
 }
 
-pub(super) fn write(written: &mut Writer, site: &SiteProducts) -> Result<()> {
-    let table = Table::new(columns(site, site.images))?;
-    written.add("registration.parquet", |path| {
-        parquet::write(path, &table, Vec::new())
-    })?;
-    written.add("registration.json", |path| {
-        write_json(path, &document(site))?;
-        Ok(site.images.len() as u64)
-    })
+pub(super) static TABLE: Declaration = Declaration {
+    path: "registration.parquet",
+    what: "line and sample of every footprint in every image",
+    readers: "scripts",
+    rows: "footprints in images",
+    role: Role::Data,
+    content: Content::Table(|| meanings(&columns())),
+    write: Write::Site(|path, of| {
+        parquet::write(path, table(of.site, of.site.images), Vec::new()).map(Some)
+    }),
+    uses: &[],
+};
+
+pub(super) static DOCUMENT: Declaration = Declaration {
+    path: "registration.json",
+    what: "how the published iterations converge on them, and what the choice of the camera model moves",
+    readers: "scripts",
+    rows: "images",
+    role: Role::Data,
+    content: Content::Document(schema),
+    write: Write::Site(|path, of| {
+        write_json(path, &document(of.site))?;
+        Ok(Some(of.site.images.len() as u64))
+    }),
+    uses: &[],
+};
+
+pub(super) static ADJUSTED: Declaration = Declaration {
+    path: "registration_adjusted.parquet",
+    what: "line and sample of every footprint with the adjusted orientation",
+    readers: "scripts",
+    rows: "footprints in images",
+    role: Role::Data,
+    content: Content::Table(|| meanings(&columns())),
+    write: Write::Ties(|path, of, geometric| {
+        let table = table(of.site, geometric.adjusted_images);
+        parquet::write(path, table, Vec::new()).map(Some)
+    }),
+    uses: &[],
+};
+
+/// A footprint in an image.
+struct Registered<'a> {
+    site: &'a SiteProducts<'a>,
+    image: &'a ImageProducts<'a>,
+    at: usize,
 }
 
-/// Writes where the adjusted images have the footprints.
-pub(super) fn write_adjusted(
-    written: &mut Writer,
-    site: &SiteProducts,
-    geometric: &GeometricProducts,
-) -> Result<()> {
-    let table = Table::new(columns(site, geometric.adjusted_images))?;
-    written.add("registration_adjusted.parquet", |path| {
-        parquet::write(path, &table, Vec::new())
-    })
+impl Registered<'_> {
+    /// The column that `of` picks, in the footprint's row.
+    fn get<T: Copy>(&self, of: fn(&RegisteredPoints) -> &Vec<T>) -> T {
+        of(&self.image.registration.points)[self.at]
+    }
+
+    fn profile(&self) -> String {
+        let index = self.get(|points| &points.profile);
+        let profile = self.site.profiles.get(index as usize);
+        profile.map_or_else(String::new, |profile| profile.id.clone())
+    }
 }
 
-/// One column over all images.
-fn all<T>(
-    images: &[ImageProducts],
-    of: impl Fn(&ImageProducts<'_>, &RegisteredPoints) -> Vec<T>,
-) -> Vec<T> {
-    let images = images.iter();
-    images
-        .flat_map(|image| of(image, &image.registration.points))
-        .collect()
+/// The footprints in `images`.
+fn table<'a>(site: &'a SiteProducts<'a>, images: &'a [ImageProducts<'a>]) -> Table<'a> {
+    let of_image = |image: &'a ImageProducts<'a>| {
+        let points = 0..image.registration.points.len();
+        points.map(move |at| Registered { site, image, at })
+    };
+    Table::new(columns(), images.iter().flat_map(of_image).collect())
 }
 
-fn columns(site: &SiteProducts, images: &[ImageProducts]) -> Vec<Column> {
-    let number = |name, description, of: fn(&RegisteredPoints) -> &Vec<f64>| {
-        let values = all(images, |_, points| of(points).clone());
-        Column::new(name, description, Values::F64(values))
-    };
-    let count = |name, description, of: fn(&RegisteredPoints) -> &Vec<u32>| {
-        let values = all(images, |_, points| of(points).clone());
-        Column::new(name, description, Values::U32(values))
-    };
-    let flag = |name, description, of: fn(&RegisteredPoints) -> &Vec<bool>| {
-        let values = all(images, |_, points| of(points).clone());
-        Column::new(name, description, Values::Bool(values))
-    };
-    let ids = all(images, |image, points| {
-        vec![image.times.id.clone(); points.len()]
-    });
-    let profiles = all(images, |_, points| {
-        let id = |index: &u32| {
-            let profile = site.profiles.get(*index as usize);
-            profile.map_or_else(String::new, |profile| profile.id.clone())
-        };
-        points.profile.iter().map(id).collect()
-    });
+fn columns<'a>() -> Vec<Column<Registered<'a>>> {
     vec![
-        Column::new("image", "image identifier", Values::Text(ids)),
-        Column::new(
+        column(
+            "image",
+            Unit::None,
+            "image identifier",
+            |point: &Registered| point.image.times.id.clone(),
+        ),
+        column(
             "profile",
+            Unit::None,
             "profile: window, orbit and crossing",
-            Values::Text(profiles),
+            Registered::profile,
         ),
-        count(
+        column(
             "footprint_row",
+            Unit::None,
             "row of the footprint in footprints.parquet, counted from 0",
-            |points| &points.row,
+            |point: &Registered| point.get(|of| &of.row),
         ),
-        number("line", DEFINITIONS[0].1, |points| &points.line),
-        number("sample", DEFINITIONS[0].1, |points| &points.sample),
-        number(
+        column(
+            "line",
+            Unit::Line,
+            DEFINITIONS[0].1,
+            |point: &Registered| point.get(|of| &of.line),
+        ),
+        column(
+            "sample",
+            Unit::Pixel,
+            DEFINITIONS[0].1,
+            |point: &Registered| point.get(|of| &of.sample),
+        ),
+        column(
             "line_offset",
+            Unit::Line,
             "lines from the middle of the header image, x of the papers",
-            |points| &points.line_offset,
+            |point: &Registered| point.get(|of| &of.line_offset),
         ),
-        number(
+        column(
             "y_px",
+            Unit::Pixel,
             "across-track focal-plane coordinate from the boresight, image pixels, y of the papers \
             (against the samples)",
-            |points| &points.y_px,
+            |point: &Registered| point.get(|of| &of.y_px),
         ),
-        number(
+        column(
             "range_m",
+            Unit::Metre,
             "distance from the camera's position to the footprint, metres",
-            |points| &points.range_m,
+            |point: &Registered| point.get(|of| &of.range_m),
         ),
-        number(
+        column(
             "residual_px",
+            Unit::Pixel,
             "along-track focal-plane coordinate at the solution, image pixels: what the iteration leaves",
-            |points| &points.residual_px,
+            |point: &Registered| point.get(|of| &of.residual_px),
         ),
-        number(
+        column(
             "step_lines",
+            Unit::Line,
             "last step of Newton's method, lines",
-            |points| &points.step_lines,
+            |point: &Registered| point.get(|of| &of.step_lines),
         ),
-        count(
+        column(
             "evaluations",
+            Unit::None,
             "evaluations of the orientation by Newton's method",
-            |points| &points.evaluations,
+            |point: &Registered| point.get(|of| &of.evaluations),
         ),
-        count(
+        column(
             "evaluations_frame_first",
+            Unit::None,
             "evaluations of the frame-first iteration with the second-order model; 0 outside the image's \
             lines, and where it does not converge",
-            |points| &points.evaluations_frame_first,
+            |point: &Registered| point.get(|of| &of.evaluations_frame_first),
         ),
-        count(
+        column(
             "evaluations_fixed_point",
+            Unit::None,
             "the same of eq. 4 of Shan et al. 2005",
-            |points| &points.evaluations_fixed_point,
+            |point: &Registered| point.get(|of| &of.evaluations_fixed_point),
         ),
-        flag(
+        column(
             "inside",
+            Unit::None,
             "whether the delivered image shows the footprint",
-            |points| &points.inside,
+            |point: &Registered| point.get(|of| &of.inside),
         ),
-        flag(
+        column(
             "extrapolated",
+            Unit::None,
             "whether it lies beyond the first or last header line, where the orientation is extrapolated",
-            |points| &points.extrapolated,
+            |point: &Registered| point.get(|of| &of.extrapolated),
         ),
     ]
+}
+
+/// Schema of the document.
+pub(super) fn schema() -> DocumentSchema {
+    let keys = "/$defs/RegistrationConfig/properties";
+    DocumentSchema::of::<Document>("registration")
+        .with(&format!("{keys}/tolerance_lines"), "exclusiveMinimum", 0)
+        .with(&format!("{keys}/steps_max"), "minimum", 1)
 }
 
 fn document<'a>(site: &SiteProducts<'a>) -> Document<'a> {

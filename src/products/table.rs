@@ -1,103 +1,364 @@
-//! Columns with names and meanings: what Parquet and CSV files are written from and checked against.
+//! Tables: a column's name, unit, meaning, type and place in each format are declared once, and every format is
+//! written and checked from that.
+//!
+//! ```text
+//! column("range_m", Unit::Metre, "one-way range", |shot: &Shot| shot.range_m).in_gis().in_dbase("range_m", 12, 3)
+//! ```
+
+use std::ops::Range;
 
 use super::fault::ProductFault;
-use crate::error::Result;
 
-/// A table, all columns of one length.
-#[derive(Debug)]
-pub(super) struct Table {
-    pub(super) columns: Vec<Column>,
+/// Rows whose values stand in memory at once.
+const ROWS_AT_ONCE: usize = 65_536;
+
+/// What a column counts in; names of our own columns end in it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Unit {
+    /// A name, a number without a unit, or a flag.
+    None,
+    Metre,
+    Kilometre,
+    Second,
+    Degree,
+    Radian,
+    /// Lines of the image.
+    Line,
+    /// Pixels of the image.
+    Pixel,
 }
 
-/// A column; its name ends in its unit.
-#[derive(Debug)]
-pub(super) struct Column {
+impl Unit {
+    /// The symbol, as PDS4 and people write it.
+    pub(super) const fn symbol(self) -> Option<&'static str> {
+        Some(match self {
+            Self::None => return None,
+            Self::Metre => "m",
+            Self::Kilometre => "km",
+            Self::Second => "s",
+            Self::Degree => "deg",
+            Self::Radian => "rad",
+            Self::Line => "line",
+            Self::Pixel => "pixel",
+        })
+    }
+}
+
+/// Type of a column's values.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Kind {
+    Real,
+    Natural,
+    Integer,
+    Flag,
+    Text,
+    /// Only Parquet has such columns.
+    Bytes,
+}
+
+/// Which attributes of points GIS formats get.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Gis {
+    No,
+    /// In the order of the columns.
+    Yes,
+    /// Behind all others.
+    Last,
+    /// And no other format does.
+    Only,
+}
+
+/// A field of a dBASE table, whose names have ten letters.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct DbaseField {
     pub(super) name: &'static str,
-    pub(super) description: &'static str,
-    pub(super) values: Values,
+    /// Digits of a number; texts are as wide as the longest.
+    pub(super) width: u8,
+    pub(super) decimals: u8,
 }
 
-/// Values of one kind.
-#[derive(Debug)]
-pub(super) enum Values {
-    F64(Vec<f64>),
-    /// Numbers that may be missing.
-    OptionalF64(Vec<Option<f64>>),
-    /// Numbers that CSV prints with a fixed number of decimals, for other people's readers.
-    Fixed(Vec<f64>, usize),
-    U32(Vec<u32>),
-    I32(Vec<i32>),
-    Bool(Vec<bool>),
-    Text(Vec<String>),
-    /// Bytes; CSV has no such columns.
-    Binary(Vec<Vec<u8>>),
+/// What a column is.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Meaning {
+    pub(super) name: &'static str,
+    pub(super) unit: Unit,
+    pub(super) description: &'static str,
+    pub(super) kind: Kind,
+    /// Whether rows may lack a value.
+    pub(super) optional: bool,
+    /// Decimals that text formats print, for other people's readers; else as many as give the number back.
+    pub(super) decimals: Option<usize>,
+    /// Least and greatest value of a count.
+    pub(super) limits: Option<[u32; 2]>,
+    pub(super) dbase: Option<DbaseField>,
+    gis: Gis,
+}
+
+/// Gives the values of rows.
+type Gather<R> = dyn Fn(&[R]) -> Values;
+
+/// A column of a table whose rows are `R`.
+pub(super) struct Column<R> {
+    meaning: Meaning,
+    values: Box<Gather<R>>,
+}
+
+/// The column `name`, whose value in a row is what `of` gives.
+pub(super) fn column<R, T: Cell>(
+    name: &'static str,
+    unit: Unit,
+    description: &'static str,
+    of: impl Fn(&R) -> T + 'static,
+) -> Column<R> {
+    Column {
+        meaning: Meaning {
+            name,
+            unit,
+            description,
+            kind: T::KIND,
+            optional: T::OPTIONAL,
+            decimals: None,
+            limits: None,
+            dbase: None,
+            gis: Gis::No,
+        },
+        values: Box::new(move |rows| T::gather(rows.iter().map(&of).collect())),
+    }
+}
+
+impl<R> Column<R> {
+    /// Printed with so many decimals.
+    pub(super) const fn decimals(mut self, decimals: usize) -> Self {
+        self.meaning.decimals = Some(decimals);
+        self
+    }
+
+    /// A count within these limits.
+    pub(super) const fn between(mut self, least: u32, greatest: u32) -> Self {
+        self.meaning.limits = Some([least, greatest]);
+        self
+    }
+
+    /// An attribute of points in GeoJSON and GeoPackage too.
+    pub(super) const fn in_gis(mut self) -> Self {
+        self.meaning.gis = Gis::Yes;
+        self
+    }
+
+    /// The same, behind the others.
+    pub(super) const fn last_in_gis(mut self) -> Self {
+        self.meaning.gis = Gis::Last;
+        self
+    }
+
+    /// An attribute of points, and no column of Parquet and CSV.
+    pub(super) const fn only_in_gis(mut self) -> Self {
+        self.meaning.gis = Gis::Only;
+        self
+    }
+
+    /// A field of the shapefile's table too, under this name.
+    pub(super) const fn in_dbase(mut self, name: &'static str, width: u8, decimals: u8) -> Self {
+        self.meaning.dbase = Some(DbaseField {
+            name,
+            width,
+            decimals,
+        });
+        self
+    }
+}
+
+/// What a value of a column may be.
+pub(super) trait Cell: Sized {
+    const KIND: Kind;
+    const OPTIONAL: bool = false;
+
+    /// The values of successive rows.
+    fn gather(cells: Vec<Self>) -> Values;
+}
+
+macro_rules! cells {
+    ($($type:ty: $kind:ident, $values:ident;)*) => {
+        $(impl Cell for $type {
+            const KIND: Kind = Kind::$kind;
+
+            fn gather(cells: Vec<Self>) -> Values {
+                Values::$values(cells)
+            }
+        })*
+
+        /// Values of one type.
+        #[derive(Debug, PartialEq)]
+        pub(super) enum Values {
+            OptionalReal(Vec<Option<f64>>),
+            $($values(Vec<$type>),)*
+        }
+    };
+}
+
+cells! {
+    f64: Real, Real;
+    u32: Natural, Natural;
+    i32: Integer, Integer;
+    bool: Flag, Flag;
+    String: Text, Text;
+    Vec<u8>: Bytes, Bytes;
+}
+
+impl Cell for Option<f64> {
+    const KIND: Kind = Kind::Real;
+    const OPTIONAL: bool = true;
+
+    fn gather(cells: Vec<Self>) -> Values {
+        Values::OptionalReal(cells)
+    }
 }
 
 impl Values {
-    pub(super) const fn len(&self) -> usize {
-        match self {
-            Self::F64(values) | Self::Fixed(values, _) => values.len(),
-            Self::OptionalF64(values) => values.len(),
-            Self::U32(values) => values.len(),
-            Self::I32(values) => values.len(),
-            Self::Bool(values) => values.len(),
-            Self::Text(values) => values.len(),
-            Self::Binary(values) => values.len(),
-        }
-    }
-
     /// The first row that is not a finite number.
     fn not_finite(&self) -> Option<usize> {
         match self {
-            Self::F64(values) | Self::Fixed(values, _) => {
-                values.iter().position(|value| !value.is_finite())
+            Self::Real(values) => values.iter().position(|value| !value.is_finite()),
+            Self::OptionalReal(values) => {
+                let infinite = |value: &Option<f64>| value.is_some_and(|value| !value.is_finite());
+                values.iter().position(infinite)
             }
-            Self::OptionalF64(values) => values
-                .iter()
-                .position(|value| value.is_some_and(|value| !value.is_finite())),
             _ => None,
         }
     }
 }
 
-impl Column {
-    pub(super) const fn new(name: &'static str, description: &'static str, values: Values) -> Self {
+/// Rows with what their columns are; their values are computed piece by piece.
+pub(super) struct Table<'a> {
+    columns: Vec<(usize, Meaning)>,
+    rows: usize,
+    values: Box<dyn Fn(usize, Range<usize>) -> Values + 'a>,
+}
+
+impl<'a> Table<'a> {
+    /// The table of these rows.
+    pub(super) fn new<R: 'a>(columns: Vec<Column<R>>, rows: Vec<R>) -> Self {
         Self {
-            name,
-            description,
-            values,
+            columns: meanings(&columns).into_iter().enumerate().collect(),
+            rows: rows.len(),
+            values: Box::new(move |column, range| (columns[column].values)(&rows[range])),
         }
+    }
+
+    /// With the columns of Parquet alone.
+    pub(super) fn for_parquet(self) -> Self {
+        self.keep(|column| column.gis != Gis::Only)
+    }
+
+    /// With the columns of text formats alone.
+    pub(super) fn for_text(self) -> Self {
+        self.keep(|column| column.gis != Gis::Only && column.kind != Kind::Bytes)
+    }
+
+    /// With the attributes of GeoJSON and GeoPackage alone.
+    pub(super) fn for_gis(mut self) -> Self {
+        self.columns
+            .sort_by_key(|(_, column)| column.gis == Gis::Last);
+        self.keep(|column| column.gis != Gis::No)
+    }
+
+    /// With the fields of dBASE alone, numbers first.
+    pub(super) fn for_dbase(mut self) -> Self {
+        self.columns
+            .sort_by_key(|(_, column)| column.kind == Kind::Text);
+        self.keep(|column| column.dbase.is_some())
+    }
+
+    fn keep(mut self, wanted: impl Fn(&Meaning) -> bool) -> Self {
+        self.columns.retain(|(_, column)| wanted(column));
+        self
+    }
+
+    /// What the columns are, in order.
+    pub(super) fn columns(&self) -> impl Iterator<Item = &Meaning> {
+        self.columns.iter().map(|(_, column)| column)
+    }
+
+    pub(super) const fn rows(&self) -> usize {
+        self.rows
+    }
+
+    /// The values of some rows, which the table must have, column by column.
+    ///
+    /// # Errors
+    /// A number that is not finite, which no reader could use.
+    pub(super) fn values(&self, rows: Range<usize>) -> Result<Vec<Values>, ProductFault> {
+        let of_column = |(index, column): &(usize, Meaning)| {
+            let values = (self.values)(*index, rows.clone());
+            match values.not_finite() {
+                None => Ok(values),
+                Some(row) => Err(ProductFault::NotFinite {
+                    what: format!(
+                        "column {}, row {} of {}",
+                        column.name,
+                        rows.start + row + 1,
+                        self.rows
+                    ),
+                }),
+            }
+        };
+        self.columns.iter().map(of_column).collect()
+    }
+
+    /// All rows in pieces that fit into memory.
+    pub(super) fn pieces(&self) -> impl Iterator<Item = Range<usize>> + use<> {
+        let rows = self.rows;
+        (0..rows)
+            .step_by(ROWS_AT_ONCE)
+            .map(move |start| start..rows.min(start + ROWS_AT_ONCE))
     }
 }
 
-impl Table {
-    /// The table, its lengths and numbers checked.
-    ///
-    /// # Errors
-    /// Columns of different length, numbers that are not finite.
-    pub(super) fn new(columns: Vec<Column>) -> Result<Self> {
-        let table = Self { columns };
-        let rows = table.rows();
-        for column in &table.columns {
-            if column.values.len() != rows {
-                return Err(ProductFault::Inconsistent {
-                    what: format!("rows of column {}", column.name),
-                    found: column.values.len(),
-                    expected: rows,
-                }
-                .into());
-            }
-            if let Some(row) = column.values.not_finite() {
-                return Err(ProductFault::NotFinite {
-                    what: format!("column {}, row {} of {rows}", column.name, row + 1),
-                }
-                .into());
-            }
-        }
-        Ok(table)
+/// What columns are, whatever the rows.
+pub(super) fn meanings<R>(columns: &[Column<R>]) -> Vec<Meaning> {
+    columns.iter().map(|column| column.meaning).collect()
+}
+
+#[cfg(test)]
+pub(super) mod tests {
+    use super::*;
+
+    /// A table of numbers alone.
+    pub(in crate::products) fn numbers(name: &'static str, values: Vec<f64>) -> Table<'static> {
+        Table::new(
+            vec![column(name, Unit::Metre, "", |value: &f64| *value)],
+            values,
+        )
     }
 
-    pub(super) fn rows(&self) -> usize {
-        self.columns.first().map_or(0, |column| column.values.len())
+    #[test]
+    fn numbers_that_are_not_finite_are_named_and_refused() {
+        let table = numbers("a_m", vec![1.0, f64::NAN]);
+        assert_eq!(
+            table.values(1..2).unwrap_err().to_string(),
+            "column a_m, row 2 of 2 is not a finite number"
+        );
+        assert_eq!(table.values(0..1).unwrap(), [Values::Real(vec![1.0])]);
+    }
+
+    #[test]
+    fn formats_get_their_columns_in_their_order() {
+        let table = || {
+            let none = |name| column(name, Unit::None, "", |(): &()| String::new());
+            let columns = vec![
+                none("text").in_dbase("text", 0, 0).last_in_gis(),
+                column("bytes", Unit::None, "", |(): &()| vec![1_u8]),
+                column("number_m", Unit::Metre, "", |(): &()| 1.0).in_dbase("number", 5, 1),
+                none("utc").only_in_gis(),
+            ];
+            Table::new(columns, vec![()])
+        };
+        let names = |table: Table| table.columns().map(|of| of.name).collect::<Vec<_>>();
+        assert_eq!(names(table().for_parquet()), ["text", "bytes", "number_m"]);
+        assert_eq!(names(table().for_text()), ["text", "number_m"]);
+        assert_eq!(names(table().for_gis()), ["utc", "text"]);
+        assert_eq!(names(table().for_dbase()), ["number_m", "text"]);
+        let text = [Values::Real(vec![1.0]), Values::Text(vec![String::new()])];
+        assert_eq!(table().for_dbase().values(0..1).unwrap(), text);
     }
 }

@@ -4,13 +4,13 @@
 use std::collections::BTreeMap;
 
 use super::{
-    GeometricProducts, SiteProducts, Writer,
+    GeometricProducts, SiteProducts,
     coordinates::degrees,
     parquet,
-    table::{Column, Table, Values},
+    product::{Content, Declaration, Role, Write},
+    table::{Column, Table, Unit, column, meanings},
 };
 use crate::{
-    error::Result,
     geom::ellipsoid::Spherical,
     stages::{
         adjust::{CorrectedPoint, ImageResidual, PointKind, RangeResidual},
@@ -18,21 +18,33 @@ use crate::{
     },
 };
 
-/// Writes the tables of a site with tie points.
-pub(super) fn write(
-    written: &mut Writer,
-    site: &SiteProducts,
-    geometric: &GeometricProducts,
-) -> Result<()> {
-    let table = Table::new(tie_columns(&measurements(site, geometric)))?;
-    written.add("ties.parquet", |path| {
-        parquet::write(path, &table, Vec::new())
-    })?;
-    let table = Table::new(shot_columns(&shots(geometric)))?;
-    written.add("adjusted_footprints.parquet", |path| {
-        parquet::write(path, &table, Vec::new())
-    })
-}
+pub(super) static TABLE: Declaration = Declaration {
+    path: "ties.parquet",
+    what: "every measurement of a tie point with its ground point and residuals, before and after the adjustment",
+    readers: "scripts",
+    rows: "measurements",
+    role: Role::Data,
+    content: Content::Table(|| meanings(&tie_columns())),
+    write: Write::Ties(|path, of, geometric| {
+        let table = Table::new(tie_columns(), measurements(of.site, geometric));
+        parquet::write(path, table, Vec::new()).map(Some)
+    }),
+    uses: &[],
+};
+
+pub(super) static FOOTPRINTS: Declaration = Declaration {
+    path: "adjusted_footprints.parquet",
+    what: "the footprints that took part in the adjustment",
+    readers: "scripts",
+    rows: "footprints",
+    role: Role::Data,
+    content: Content::Table(|| meanings(&shot_columns())),
+    write: Write::Ties(|path, _, geometric| {
+        let table = Table::new(shot_columns(), shots(geometric));
+        parquet::write(path, table, Vec::new()).map(Some)
+    }),
+    uses: &[],
+};
 
 /// All that is known of one measurement.
 struct Measurement<'a> {
@@ -118,164 +130,192 @@ fn reasons(geometric: &GeometricProducts) -> BTreeMap<usize, String> {
     reasons
 }
 
-fn tie_columns(rows: &[Measurement]) -> Vec<Column> {
-    let mut columns = measured_columns(rows);
-    columns.extend(intersected_columns(rows));
-    columns.extend(adjusted_columns(rows));
+fn tie_columns<'a>() -> Vec<Column<Measurement<'a>>> {
+    let mut columns = measured_columns();
+    columns.extend(intersected_columns());
+    columns.extend(adjusted_columns());
     columns
 }
 
-/// A column of what is not known of every measurement.
-fn known(
-    rows: &[Measurement],
-    name: &'static str,
-    description: &'static str,
-    of: fn(&Measurement) -> Option<f64>,
-) -> Column {
-    let values = rows.iter().map(of).collect();
-    Column::new(name, description, Values::OptionalF64(values))
-}
-
-fn measured_columns(rows: &[Measurement]) -> Vec<Column> {
-    let text = |name, description, of: for<'a> fn(&Measurement<'a>) -> &'a str| {
-        let values = rows.iter().map(|row| of(row).to_owned()).collect();
-        Column::new(name, description, Values::Text(values))
-    };
-    let number = |name, description, of: fn(&Measurement) -> f64| {
-        Column::new(
-            name,
-            description,
-            Values::F64(rows.iter().map(of).collect()),
-        )
-    };
+fn measured_columns<'a>() -> Vec<Column<Measurement<'a>>> {
     vec![
-        text("tie", "identifier of the tie point", |row| row.id),
-        text("image", "image identifier", |row| row.image),
-        number(
+        column(
+            "tie",
+            Unit::None,
+            "identifier of the tie point",
+            |row: &Measurement| row.id.to_owned(),
+        ),
+        column(
+            "image",
+            Unit::None,
+            "image identifier",
+            |row: &Measurement| row.image.to_owned(),
+        ),
+        column(
             "line",
+            Unit::Line,
             "measured line, 0 at the start of the first line of the header image, 0.5 at its centre",
-            |row| row.line,
+            |row: &Measurement| row.line,
         ),
-        number(
+        column(
             "sample",
+            Unit::Pixel,
             "measured sample, 0 at the outer edge of the first pixel, 0.5 at its centre",
-            |row| row.sample,
+            |row: &Measurement| row.sample,
         ),
-        Column::new(
+        column(
             "left_out",
+            Unit::None,
             "why the tie point took no part in the adjustment; empty when it did",
-            Values::Text(rows.iter().map(|row| row.left_out.clone()).collect()),
+            |row: &Measurement| row.left_out.clone(),
         ),
     ]
 }
 
-fn intersected_columns(rows: &[Measurement]) -> Vec<Column> {
-    let known = |name, description, of| known(rows, name, description, of);
+fn intersected_columns<'a>() -> Vec<Column<Measurement<'a>>> {
     vec![
-        known(
+        column(
             "x_m",
+            Unit::Metre,
             "intersected point with the orientation of the kernels, IAU 2000, metres",
-            |row| Some(row.before?.0.ground.xyz_m[0]),
+            |row: &Measurement| Some(row.before?.0.ground.xyz_m[0]),
         ),
-        known("y_m", "likewise", |row| Some(row.before?.0.ground.xyz_m[1])),
-        known("z_m", "likewise", |row| Some(row.before?.0.ground.xyz_m[2])),
-        known(
-            "convergence_deg",
-            "angle between the two rays that differ most, degrees",
-            |row| Some(degrees(row.before?.0.convergence_rad)),
-        ),
-        known(
-            "focal_along_px",
-            "what the intersection leaves in the focal plane along the track, image pixels",
-            |row| Some(row.before?.1.focal_along_px),
-        ),
-        known("focal_across_px", "the same across the track", |row| {
-            Some(row.before?.1.focal_across_px)
+        column("y_m", Unit::Metre, "likewise", |row: &Measurement| {
+            Some(row.before?.0.ground.xyz_m[1])
         }),
-        known(
-            "reprojection_lines",
-            "measured minus projected line of the intersected point (Table 5 of Shan et al. 2005)",
-            |row| Some(row.before?.1.reprojection_lines),
+        column("z_m", Unit::Metre, "likewise", |row: &Measurement| {
+            Some(row.before?.0.ground.xyz_m[2])
+        }),
+        column(
+            "convergence_deg",
+            Unit::Degree,
+            "angle between the two rays that differ most, degrees",
+            |row: &Measurement| Some(degrees(row.before?.0.convergence_rad)),
         ),
-        known(
+        column(
+            "focal_along_px",
+            Unit::Pixel,
+            "what the intersection leaves in the focal plane along the track, image pixels",
+            |row: &Measurement| Some(row.before?.1.focal_along_px),
+        ),
+        column(
+            "focal_across_px",
+            Unit::Pixel,
+            "the same across the track",
+            |row: &Measurement| Some(row.before?.1.focal_across_px),
+        ),
+        column(
+            "reprojection_lines",
+            Unit::Line,
+            "measured minus projected line of the intersected point (Table 5 of Shan et al. 2005)",
+            |row: &Measurement| Some(row.before?.1.reprojection_lines),
+        ),
+        column(
             "reprojection_px",
+            Unit::Pixel,
             "measured minus projected focal coordinate across the track, image pixels",
-            |row| Some(row.before?.1.reprojection_px),
+            |row: &Measurement| Some(row.before?.1.reprojection_px),
         ),
     ]
 }
 
-fn adjusted_columns(rows: &[Measurement]) -> Vec<Column> {
-    let known = |name, description, of| known(rows, name, description, of);
+fn adjusted_columns<'a>() -> Vec<Column<Measurement<'a>>> {
     vec![
-        known("adjusted_x_m", "adjusted point, IAU 2000, metres", |row| {
-            Some(row.adjusted?.0.ground.xyz_m[0])
-        }),
-        known("adjusted_y_m", "likewise", |row| {
-            Some(row.adjusted?.0.ground.xyz_m[1])
-        }),
-        known("adjusted_z_m", "likewise", |row| {
-            Some(row.adjusted?.0.ground.xyz_m[2])
-        }),
-        known(
+        column(
+            "adjusted_x_m",
+            Unit::Metre,
+            "adjusted point, IAU 2000, metres",
+            |row: &Measurement| Some(row.adjusted?.0.ground.xyz_m[0]),
+        ),
+        column(
+            "adjusted_y_m",
+            Unit::Metre,
+            "likewise",
+            |row: &Measurement| Some(row.adjusted?.0.ground.xyz_m[1]),
+        ),
+        column(
+            "adjusted_z_m",
+            Unit::Metre,
+            "likewise",
+            |row: &Measurement| Some(row.adjusted?.0.ground.xyz_m[2]),
+        ),
+        column(
             "adjusted_longitude_deg",
+            Unit::Degree,
             "east longitude of the adjusted point, degrees",
-            |row| Some(degrees(spherical(row.adjusted?.0).longitude_rad)),
+            |row: &Measurement| Some(degrees(spherical(row.adjusted?.0).longitude_rad)),
         ),
-        known(
+        column(
             "adjusted_latitude_deg",
+            Unit::Degree,
             "areocentric latitude of the adjusted point, degrees",
-            |row| Some(degrees(spherical(row.adjusted?.0).latitude.0)),
+            |row: &Measurement| Some(degrees(spherical(row.adjusted?.0).latitude.0)),
         ),
-        known(
+        column(
             "adjusted_radius_m",
+            Unit::Metre,
             "distance of the adjusted point from the centre of Mars, metres",
-            |row| Some(spherical(row.adjusted?.0).radius_m),
+            |row: &Measurement| Some(spherical(row.adjusted?.0).radius_m),
         ),
-        known(
+        column(
             "sigma_x_m",
+            Unit::Metre,
             "standard deviation of adjusted_x_m, metres: formal, and too small for the absolute position",
-            |row| Some(sigma_m(row.adjusted?.0, 0)),
+            |row: &Measurement| Some(sigma_m(row.adjusted?.0, 0)),
         ),
-        known("sigma_y_m", "likewise", |row| {
+        column("sigma_y_m", Unit::Metre, "likewise", |row: &Measurement| {
             Some(sigma_m(row.adjusted?.0, 1))
         }),
-        known("sigma_z_m", "likewise", |row| {
+        column("sigma_z_m", Unit::Metre, "likewise", |row: &Measurement| {
             Some(sigma_m(row.adjusted?.0, 2))
         }),
-        known(
+        column(
             "residual_along_px",
+            Unit::Pixel,
             "observed minus adjusted along the track, focal plane, image pixels",
-            |row| Some(row.adjusted?.1.along_px.value),
+            |row: &Measurement| Some(row.adjusted?.1.along_px.value),
         ),
-        known("residual_across_px", "the same across the track", |row| {
-            Some(row.adjusted?.1.across_px.value)
-        }),
-        known(
+        column(
+            "residual_across_px",
+            Unit::Pixel,
+            "the same across the track",
+            |row: &Measurement| Some(row.adjusted?.1.across_px.value),
+        ),
+        column(
             "redundancy_along",
+            Unit::None,
             "share of an error of the measurement along the track that shows in its residual, 0 to 1",
-            |row| Some(row.adjusted?.1.along_px.redundancy),
+            |row: &Measurement| Some(row.adjusted?.1.along_px.redundancy),
         ),
-        known("redundancy_across", "the same across the track", |row| {
-            Some(row.adjusted?.1.across_px.redundancy)
-        }),
-        known(
+        column(
+            "redundancy_across",
+            Unit::None,
+            "the same across the track",
+            |row: &Measurement| Some(row.adjusted?.1.across_px.redundancy),
+        ),
+        column(
             "standardised_along",
+            Unit::None,
             "residual along the track over its own standard deviation; missing where nothing controls it",
-            |row| row.adjusted?.1.along_px.standardised,
+            |row: &Measurement| row.adjusted?.1.along_px.standardised,
         ),
-        known("standardised_across", "the same across the track", |row| {
-            row.adjusted?.1.across_px.standardised
-        }),
-        known(
+        column(
+            "standardised_across",
+            Unit::None,
+            "the same across the track",
+            |row: &Measurement| row.adjusted?.1.across_px.standardised,
+        ),
+        column(
             "adjusted_reprojection_lines",
+            Unit::Line,
             "as reprojection_lines, with the adjusted orientation",
-            |row| Some(row.after?.1.reprojection_lines),
+            |row: &Measurement| Some(row.after?.1.reprojection_lines),
         ),
-        known(
+        column(
             "adjusted_reprojection_px",
+            Unit::Pixel,
             "as reprojection_px, with the adjusted orientation",
-            |row| Some(row.after?.1.reprojection_px),
+            |row: &Measurement| Some(row.after?.1.reprojection_px),
         ),
     ]
 }
@@ -305,20 +345,22 @@ fn shots<'a>(geometric: &GeometricProducts<'a>) -> Vec<Shot<'a>> {
         .collect()
 }
 
-fn shot_columns(rows: &[Shot]) -> Vec<Column> {
-    let number = |name, description, of: &dyn Fn(&CorrectedPoint) -> f64| {
-        let values = rows.iter().map(|(point, _)| of(point)).collect();
-        Column::new(name, description, Values::F64(values))
-    };
-    let range = |name, description, of: fn(&RangeResidual) -> Option<f64>| {
-        let values = rows.iter().map(|(_, range)| range.and_then(of)).collect();
-        Column::new(name, description, Values::OptionalF64(values))
-    };
-    let ids = rows.iter().map(|(point, _)| point.id.clone()).collect();
-    let mut columns = vec![Column::new(
+fn shot_columns<'a>() -> Vec<Column<Shot<'a>>> {
+    fn range<'a>(
+        name: &'static str,
+        unit: Unit,
+        description: &'static str,
+        of: fn(&RangeResidual) -> Option<f64>,
+    ) -> Column<Shot<'a>> {
+        column(name, unit, description, move |shot: &Shot| {
+            shot.1.and_then(of)
+        })
+    }
+    let mut columns = vec![column(
         "footprint",
+        Unit::None,
         "profile and, after the last colon, row of the footprint in footprints.parquet, counted from 0",
-        Values::Text(ids),
+        |shot: &Shot| shot.0.id.clone(),
     )];
     for (axis, [initial, adjusted, sigma]) in [
         ["x_m", "adjusted_x_m", "sigma_x_m"],
@@ -328,38 +370,47 @@ fn shot_columns(rows: &[Shot]) -> Vec<Column> {
     .into_iter()
     .enumerate()
     {
-        columns.push(number(initial, "footprint, IAU 2000, metres", &|point| {
-            point.initial.xyz_m[axis]
-        }));
-        columns.push(number(
-            adjusted,
-            "adjusted footprint, IAU 2000, metres",
-            &|point| point.ground.xyz_m[axis],
+        columns.push(column(
+            initial,
+            Unit::Metre,
+            "footprint, IAU 2000, metres",
+            move |shot: &Shot| shot.0.initial.xyz_m[axis],
         ));
-        columns.push(number(
+        columns.push(column(
+            adjusted,
+            Unit::Metre,
+            "adjusted footprint, IAU 2000, metres",
+            move |shot: &Shot| shot.0.ground.xyz_m[axis],
+        ));
+        columns.push(column(
             sigma,
+            Unit::Metre,
             "standard deviation of the adjusted coordinate, metres",
-            &|point| sigma_m(point, axis),
+            move |shot: &Shot| sigma_m(shot.0, axis),
         ));
     }
     columns.extend([
         range(
             "range_m",
+            Unit::Metre,
             "measured range, metres; missing when no image was exposed meanwhile",
             |range| Some(range.range_m),
         ),
         range(
             "range_residual_m",
+            Unit::Metre,
             "measured minus adjusted range, metres",
             |range| Some(range.residual_m.value),
         ),
         range(
             "range_redundancy",
+            Unit::None,
             "share of an error of the range that shows in its residual, 0 to 1",
             |range| Some(range.residual_m.redundancy),
         ),
         range(
             "range_standardised",
+            Unit::None,
             "residual over its own standard deviation; missing where nothing controls it",
             |range| range.residual_m.standardised,
         ),

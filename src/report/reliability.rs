@@ -48,7 +48,7 @@ pub(super) fn absolute(site: &SiteProducts, geometric: &GeometricProducts) -> St
     if ties.corrections_m[0].n == 0 {
         return format!("{relative}No tie point took part: nothing was adjusted to anything.");
     }
-    let healed = if geometric.is_healed() {
+    let healed = if geometric.images_agree {
         "Relative registration is healed, absolute position is not."
     } else {
         "Relative registration is not healed, nor is absolute position."

@@ -12,7 +12,7 @@ const REASONS_SHOWN: usize = 12;
 
 /// Valid or not, why, and what to weigh: the first lines of the page.
 pub(super) fn lead(site: &SiteProducts) -> String {
-    let (reasons, remarks) = (site.invalid_because(), site.remarks());
+    let (reasons, remarks) = (&site.verdict.reasons, &site.verdict.remarks);
     let (tone, headline) = match (reasons.len(), remarks.len()) {
         (0, 0) => (
             Tone::Good,
@@ -23,11 +23,11 @@ pub(super) fn lead(site: &SiteProducts) -> String {
         (1, _) => (Tone::Bad, "Invalid, for one reason:".to_owned()),
         (count, _) => (Tone::Bad, format!("Invalid, for {count} reasons:")),
     };
-    let mut body = first_of(&reasons);
+    let mut body = first_of(reasons);
     if !reasons.is_empty() && !remarks.is_empty() {
         body += &paragraph("Also:");
     }
-    body += &first_of(&remarks);
+    body += &first_of(remarks);
     body += &paragraph(&counts(site));
     body += &paragraph(&together(site));
     paragraph(&site.config.description) + &verdict(tone, &headline, &body)
@@ -41,7 +41,7 @@ fn counts(site: &SiteProducts) -> String {
         counted(site.images.len(), "image")
     );
     // Of an invalid site the reasons say what is beyond its limit, and by how much.
-    let nearest = nearest_limit(site).filter(|_| site.invalid_because().is_empty());
+    let nearest = nearest_limit(site).filter(|_| site.verdict.valid);
     if let Some((share, what)) = nearest {
         text += &format!(
             " Nearest to its limit: {what}, at {:.0} % of it.",

@@ -10,7 +10,8 @@ use super::{
 };
 use crate::{
     error::Result,
-    products::{KernelLine, SiteProducts},
+    products::SiteProducts,
+    stages::describe_kernels::KernelLine,
     time::{Et, Interval, Intervals},
 };
 

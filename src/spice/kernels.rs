@@ -12,7 +12,7 @@ use serde::Serialize;
 use super::{daf, error::SpiceFault, ffi, text_kernel};
 use crate::{
     error::{IoFault, Place, Result},
-    files::{file_name, hash_file},
+    files::{InputFiles, file_name, hash_file},
 };
 
 /// Largest text kernel that is read, bytes; the archive's largest is below 2 MB.
@@ -72,19 +72,19 @@ pub struct Kernel {
 }
 
 impl Kernel {
-    /// Looks into a file and hashes it.
+    /// Looks into a file and hashes it, unless the run has hashed it before.
     ///
     /// # Errors
     /// [`IoFault`]; [`SpiceFault::NotAKernel`]; [`SpiceFault::DamagedKernel`].
-    pub(super) fn inspect(path: &Path) -> Result<Self> {
+    pub(super) fn inspect(path: &Path, files: &InputFiles) -> Result<Self> {
         ffi::c_path(path).in_file(path)?;
         let role = role_of(path)?;
-        let (blake3, bytes) = hash_file(path)?;
+        let file = files.hash(path)?;
         Ok(Self {
-            path: path.to_owned(),
+            path: file.path,
             role,
-            bytes,
-            blake3,
+            bytes: file.bytes,
+            blake3: file.blake3,
         })
     }
 
@@ -110,9 +110,17 @@ impl KernelSet {
     /// [`IoFault`] for a file that cannot be read, [`SpiceFault::NotAKernel`] for a file that is none
     /// (its role is found by content, never by name), [`SpiceFault::DamagedKernel`] for a truncated one.
     pub fn from_files(files: &[PathBuf]) -> Result<Self> {
+        Self::from_files_of(&InputFiles::default(), files)
+    }
+
+    /// As [`Self::from_files`], with the hashes that a run has of its input files.
+    ///
+    /// # Errors
+    /// Those of [`Self::from_files`]; a file that is no longer what the run has read.
+    pub fn from_files_of(run: &InputFiles, files: &[PathBuf]) -> Result<Self> {
         let mut set = Self::default();
         for path in files {
-            set.add(path, "listed")?;
+            set.add(path, "listed", run)?;
         }
         Ok(set)
     }
@@ -124,14 +132,14 @@ impl KernelSet {
     pub fn followed_by(&self, files: &[PathBuf]) -> Result<Self> {
         let mut set = self.clone();
         for path in files {
-            set.add(path, "follows the listed ones")?;
+            set.add(path, "follows the listed ones", &InputFiles::default())?;
         }
         Ok(set)
     }
 
     /// Appends a file; an earlier one of the same content gives up its place, since later files win.
-    pub(super) fn add(&mut self, path: &Path, reason: &str) -> Result<()> {
-        let kernel = Kernel::inspect(path)?;
+    pub(super) fn add(&mut self, path: &Path, reason: &str, files: &InputFiles) -> Result<()> {
+        let kernel = Kernel::inspect(path, files)?;
         if kernel.role == KernelRole::Meta {
             let fault = SpiceFault::NotAKernel {
                 found: "a metakernel".to_owned(),
@@ -156,6 +164,16 @@ impl KernelSet {
     #[must_use]
     pub fn kernels(&self) -> &[Kernel] {
         &self.kernels
+    }
+
+    /// The kernels of some roles, in the same order.
+    #[must_use]
+    pub fn of_roles(&self, wanted: impl Fn(KernelRole) -> bool) -> Self {
+        let kernels = self.kernels.iter().filter(|kernel| wanted(kernel.role));
+        Self {
+            kernels: kernels.cloned().collect(),
+            explanation: self.explanation.clone(),
+        }
     }
 
     /// Why each kernel was chosen or left out, one line each.

@@ -13,7 +13,10 @@ use super::{
     kernels::{Kernel, KernelRole, KernelSet, read_text, role_of},
     text_kernel::{self, Assignment, Value, values_of},
 };
-use crate::error::{Place, Result};
+use crate::{
+    error::{Place, Result},
+    files::InputFiles,
+};
 
 /// Longest string value of a text kernel.
 const STRING_MAX: usize = 80;
@@ -28,6 +31,14 @@ impl KernelSet {
     /// [`SpiceFault::NotAKernel`] for a file that is no metakernel, [`SpiceFault::TextKernel`] for a
     /// broken line, [`SpiceFault::MissingKernel`], and those of [`KernelSet::from_files`].
     pub fn from_metakernel(metakernel: &Path) -> Result<Self> {
+        Self::from_metakernel_of(&InputFiles::default(), metakernel)
+    }
+
+    /// As [`Self::from_metakernel`], with the hashes that a run has of its input files.
+    ///
+    /// # Errors
+    /// Those of [`Self::from_metakernel`]; a file that is no longer what the run has read.
+    pub fn from_metakernel_of(run: &InputFiles, metakernel: &Path) -> Result<Self> {
         let role = role_of(metakernel)?;
         if role != KernelRole::Meta {
             let fault = SpiceFault::NotAKernel {
@@ -43,10 +54,11 @@ impl KernelSet {
         for name in listed_names(&assignments).in_file(metakernel)? {
             let written = folder.join(&name);
             if written.exists() {
-                set.add(&written, &format!("listed by {list}"))?;
+                set.add(&written, &format!("listed by {list}"), run)?;
             } else {
                 let found = same_name(&written, &name).in_file(metakernel)?;
-                set.add(&found, &format!("stands in for {name} of {list}"))?;
+                let reason = format!("stands in for {name} of {list}");
+                set.add(&found, &reason, run)?;
             }
         }
         for other in assignments.iter().filter(|found| !is_list_variable(found)) {

@@ -3,6 +3,7 @@
 //! | to | use |
 //! |---|---|
 //! | choose and check kernels | [`KernelSet`] |
+//! | show a stage some of them | [`KernelView`] |
 //! | ask CSPICE | [`Session`], one at a time in a process |
 //! | know where the gaps are | [`Session::coverage`], [`Session::require_position`], [`Session::require_attitude`] |
 //! | leave CSPICE behind, for parallel work | [`Session::trajectory`] |
@@ -23,6 +24,7 @@ mod select;
 mod session;
 mod text_kernel;
 mod trajectory;
+mod view;
 mod write;
 
 pub use coverage::{Coverage, Wanted};
@@ -32,4 +34,5 @@ pub use kernels::{Kernel, KernelRole, KernelSet};
 pub use select::quality_of;
 pub use session::{Attitude, Session, State};
 pub use trajectory::Trajectory;
+pub use view::{KernelView, position_kernels};
 pub use write::{CkSegment, SpkSegment, write_ck, write_spk};

@@ -17,7 +17,7 @@ use super::{
 use crate::{
     constants::{MARS_IAU2000, NAIF_MGS, NAIF_MGS_BUS},
     error::{Failure, IoFault, Kind, Place, Result},
-    files::file_name,
+    files::{InputFiles, file_name},
     kernel_source::{CkQuality, KernelSelection},
     time::Intervals,
 };
@@ -51,16 +51,43 @@ impl KernelSet {
     /// [`SpiceFault::NothingToSelect`] when a needed text kernel or the orbit solution is missing;
     /// [`IoFault`] when the folder cannot be read.
     pub fn select(selection: &KernelSelection, wanted: &Wanted) -> Result<Self> {
+        Self::select_of(&InputFiles::default(), selection, wanted)
+    }
+
+    /// As [`Self::select`], with the hashes that a run has of its input files.
+    ///
+    /// # Errors
+    /// Those of [`Self::select`]; a file that is no longer what the run has read.
+    pub fn select_of(
+        run: &InputFiles,
+        selection: &KernelSelection,
+        wanted: &Wanted,
+    ) -> Result<Self> {
         let found = Found::in_folder(&selection.root)?;
-        let mut set = Self::default();
+        let mut set = Selected {
+            set: Self::default(),
+            run,
+        };
         select_texts(selection, &found.texts, &mut set).in_file(&selection.root)?;
         if *wanted != Wanted::default() {
             select_ephemerides(selection, &found.ephemerides, &wanted.positions, &mut set)
                 .in_file(&selection.root)?;
             select_attitudes(selection, &found.attitudes, &wanted.attitudes, &mut set)?;
         }
-        set.explanation.extend(found.notes);
-        Ok(set)
+        set.set.explanation.extend(found.notes);
+        Ok(set.set)
+    }
+}
+
+/// The kernels chosen so far, and the hashes that the run has.
+struct Selected<'a> {
+    set: KernelSet,
+    run: &'a InputFiles,
+}
+
+impl Selected<'_> {
+    fn add(&mut self, path: &Path, reason: &str) -> Result<()> {
+        self.set.add(path, reason, self.run)
     }
 }
 
@@ -134,7 +161,7 @@ fn files_below(root: &Path) -> Result<Vec<PathBuf>> {
 fn select_texts(
     selection: &KernelSelection,
     texts: &[(PathBuf, Vec<Assignment>)],
-    set: &mut KernelSet,
+    set: &mut Selected<'_>,
 ) -> Result<()> {
     let pinned = |path: &Path| selection.pinned.iter().any(|name| *name == file_name(path));
     for name in &selection.pinned {
@@ -190,7 +217,7 @@ fn select_ephemerides(
     selection: &KernelSelection,
     ephemerides: &[(PathBuf, Vec<Segment>)],
     wanted: &Intervals,
-    set: &mut KernelSet,
+    set: &mut Selected<'_>,
 ) -> Result<()> {
     let holds_mgs = |segments: &[Segment]| segments.iter().any(|s| s.integers[0] == NAIF_MGS);
     let family = selection.spk_family.to_ascii_lowercase();
@@ -221,10 +248,10 @@ fn select_ephemerides(
         let name = file_name(path);
         if mgs && !family_of(path, &family) {
             let line = format!("{name}: left out, not of the orbit solution {family}");
-            set.explanation.push(line);
+            set.set.explanation.push(line);
         } else if !touches {
             let line = format!("{name}: left out, holds none of the wanted times");
-            set.explanation.push(line);
+            set.set.explanation.push(line);
         } else if mgs {
             set.add(path, &format!("orbit of MGS, solution {family}"))?;
         } else {
@@ -239,10 +266,10 @@ fn select_attitudes(
     selection: &KernelSelection,
     attitudes: &[PathBuf],
     wanted: &Intervals,
-    set: &mut KernelSet,
+    set: &mut Selected<'_>,
 ) -> Result<()> {
     // Times of a C-kernel are clock ticks: the text kernels chosen so far turn them into ET.
-    let session = Session::open(set)?;
+    let session = Session::open(&set.set)?;
     let (mut telemetry, mut commanded) = (Vec::new(), Vec::new());
     for quality in selection.ck_quality.iter().rev() {
         let mut of_quality: Vec<&PathBuf> = attitudes
@@ -261,7 +288,7 @@ fn select_attitudes(
             let hull = Intervals::union_of(hull);
             if hull.intersection(wanted).as_slice().is_empty() {
                 let line = format!("{name}: left out, holds no attitude near the wanted times");
-                set.explanation.push(line);
+                set.set.explanation.push(line);
                 continue;
             }
             let held = held.into_iter().map(interval_of);
@@ -278,7 +305,7 @@ fn select_attitudes(
         let quality = quality_of(path);
         if !selection.ck_quality.contains(&quality) {
             let line = format!("{}: left out, {quality:?} attitude", file_name(path));
-            set.explanation.push(line);
+            set.set.explanation.push(line);
         }
     }
     if selection.ck_quality.first() == Some(&CkQuality::Nominal) {
@@ -293,7 +320,7 @@ fn explain_commanded(
     wanted: &Intervals,
     telemetry: &Intervals,
     commanded: Vec<(String, Intervals)>,
-    set: &mut KernelSet,
+    set: &mut Selected<'_>,
 ) {
     let mut missing = wanted.without(telemetry);
     // The last one wins where several hold the same instant.
@@ -301,7 +328,7 @@ fn explain_commanded(
         for filled in missing.intersection(&held).as_slice() {
             if filled.duration_s() > 0.0 {
                 let line = format!("attitude of {filled} comes from nominal {name}");
-                set.explanation.push(line);
+                set.set.explanation.push(line);
             }
         }
         missing = missing.without(&held);

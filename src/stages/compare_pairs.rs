@@ -1,26 +1,32 @@
 //! What every pair of images says of itself: how it sees, how far footprints and tie points disagree in it, and
 //! how uncertain that makes ground points.
 
-use std::collections::BTreeMap;
+use std::{collections::BTreeMap, sync::atomic::AtomicBool};
 
 use serde::{Deserialize, Serialize};
 
 use super::{
+    convert_datum::Converted,
     group_profiles::Profile,
     intersect::{IntersectedPoint, IntersectedTies, MeasureResidual},
+    read_ties::Ties,
     register::ImageRegistration,
+    site_image::{SiteImage, oriented_images},
 };
 use crate::{
+    error::Result,
     footprints::Footprints,
     frames::MarsIau2000,
     geom::{
         ellipsoid::spherical_to_xyz_m,
         misregistration::{ImageToImage, Pair},
-        pushbroom::ExteriorOrientation,
+        pushbroom::{CameraModel, ExteriorOrientation},
         statistics::Summary,
         stereo::StereoImage,
         uncertainty::{BudgetInput, ResidualMoments, UncertaintyBudget, uncertainty_budget},
     },
+    stage::{InOrder, Output, Round, Stage},
+    stage_inputs,
     ties::TiePoint,
 };
 
@@ -49,7 +55,7 @@ pub struct PairComparison {
     /// Median distance of successive footprints, metres; `None` without any.
     pub mola_spacing_m: Option<f64>,
     /// The budget of Shan et al. 2005, or why there is none.
-    pub budget: Result<UncertaintyBudget, String>,
+    pub budget: std::result::Result<UncertaintyBudget, String>,
 }
 
 /// Footprints of both images under the transformation that tie points determine.
@@ -88,6 +94,53 @@ pub struct ProfileByTies {
 
 /// Pairs with fewer tie points are not compared.
 const TIES_MIN: usize = 2;
+
+stage_inputs! {
+    /// The images with one orientation, tie points and their ground points, and the footprints.
+    pub struct ComparePairs<'a> {
+        /// Which orientation.
+        pub round: Round,
+        /// The images.
+        pub images: InOrder<'a, SiteImage>,
+        /// The form of the orientation.
+        pub model: &'a CameraModel,
+        /// Tie points.
+        pub ties: &'a Output<Ties>,
+        /// Their ground points.
+        pub intersected: &'a Output<IntersectedTies>,
+        /// Footprints in IAU 2000.
+        pub converted: &'a Output<Converted>,
+        /// Profiles.
+        pub profiles: &'a Output<Vec<Profile>>,
+    }
+}
+
+impl Stage for ComparePairs<'_> {
+    const NAME: &'static str = "compare_pairs";
+    type Output = Vec<PairComparison>;
+    stage_inputs!(fingerprint);
+
+    fn part(&self) -> Option<String> {
+        self.round.part()
+    }
+
+    fn run(&self, _stop: &AtomicBool) -> Result<Vec<PairComparison>> {
+        let oriented = oriented_images(self.images.0)?;
+        let images: Vec<_> = oriented
+            .iter()
+            .map(|image| image.stereo(*self.model))
+            .collect();
+        let registrations = self.images.0.iter().map(|image| image.registration.value());
+        Ok(compare_pairs(
+            &images,
+            &registrations.collect::<Result<Vec<_>>>()?,
+            &self.ties.value()?.points,
+            self.intersected.value()?,
+            &self.converted.value()?.footprints,
+            self.profiles.value()?,
+        ))
+    }
+}
 
 /// Compares all pairs of `images` that share tie points.
 ///

@@ -1,10 +1,14 @@
 //! Footprints and the file's own spacecraft positions go from the file's datum to IAU 2000.
 
+use std::sync::atomic::AtomicBool;
+
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
+use super::search_footprints::SearchResult;
 use crate::{
     altimetry::MolaClock,
+    error::Result,
     footprints::{AsRead, Footprints},
     frames::{MarsDatum, MarsIau2000},
     geom::{
@@ -12,6 +16,8 @@ use crate::{
         mars_rotation::convert_datum as convert_vector,
         statistics::Summary,
     },
+    stage::{Output, Stage},
+    stage_inputs,
     time::Et,
     units::{RADIANS_PER_DEGREE, wrap_pi},
 };
@@ -36,6 +42,28 @@ pub struct FileConversion {
     pub shift_m: Summary,
     /// Change of east longitude, degrees.
     pub longitude_shift_deg: Summary,
+}
+
+stage_inputs! {
+    /// Footprints as read, and whether the clock correction turns Mars.
+    pub struct ConvertDatum<'a> {
+        /// What the search found.
+        pub found: &'a Output<SearchResult>,
+        /// The clock of MOLA.
+        pub mola_clock: &'a MolaClock,
+    }
+}
+
+impl Stage for ConvertDatum<'_> {
+    const NAME: &'static str = "convert_datum";
+    const CHECKED: bool = true;
+    type Output = Converted;
+    stage_inputs!(fingerprint);
+
+    fn run(&self, _stop: &AtomicBool) -> Result<Converted> {
+        let footprints = self.found.value()?.footprints.clone();
+        Ok(convert_datum(footprints, self.mola_clock))
+    }
 }
 
 /// Rotates every shot out of its file's datum and into IAU 2000, through J2000.

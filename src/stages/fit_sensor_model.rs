@@ -1,5 +1,7 @@
 //! Exterior orientation as polynomials in the image line, of first and second order.
 
+use std::sync::atomic::AtomicBool;
+
 use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 
@@ -14,6 +16,8 @@ use crate::{
         pushbroom::{EulerPolynomial, RotationVectorPolynomial, VectorPolynomial},
         statistics::largest,
     },
+    stage::{Output, Round, Stage},
+    stage_inputs,
     units::RADIANS_PER_ARCSECOND,
 };
 
@@ -138,6 +142,34 @@ impl Fault for Undetermined {
 
     fn advice(&self) -> String {
         "raise orientation.intervals, and check that the image has more than a few lines".to_owned()
+    }
+}
+
+stage_inputs! {
+    /// The samples of one image, and the limits.
+    pub struct FitSensorModel<'a> {
+        /// Identifier of the image.
+        pub image: &'a str,
+        /// Which orientation.
+        pub round: Round,
+        /// Its samples.
+        pub samples: &'a Output<Orientation>,
+        /// Limits.
+        pub orientation: &'a OrientationConfig,
+    }
+}
+
+impl Stage for FitSensorModel<'_> {
+    const NAME: &'static str = "fit_sensor_model";
+    type Output = SensorModel;
+    stage_inputs!(fingerprint);
+
+    fn part(&self) -> Option<String> {
+        self.round.part_of(self.image)
+    }
+
+    fn run(&self, _stop: &AtomicBool) -> Result<SensorModel> {
+        fit_sensor_model(self.samples.value()?, self.orientation)
     }
 }
 

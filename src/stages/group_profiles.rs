@@ -1,12 +1,17 @@
 //! Footprints of one orbit inside one window become a profile, marked where an image was taken with it.
 
+use std::sync::atomic::AtomicBool;
+
 use serde::{Deserialize, Serialize};
 
-use super::tag_times::ImageTimes;
+use super::{convert_datum::Converted, tag_times::ImageTimes};
 use crate::{
     config::WindowConfig,
+    error::Result,
     footprints::Footprints,
     frames::MarsIau2000,
+    stage::{InOrder, Output, Stage},
+    stage_inputs,
     time::{Et, Interval},
 };
 
@@ -40,6 +45,32 @@ pub struct SimultaneousImage {
     pub image: usize,
     /// Shots of the profile fired while the image was exposed.
     pub shots: u32,
+}
+
+stage_inputs! {
+    /// Footprints, windows, and the images that may be simultaneous.
+    pub struct GroupProfiles<'a> {
+        /// Footprints in IAU 2000.
+        pub converted: &'a Output<Converted>,
+        /// Windows in the order of the footprints' bits.
+        pub windows: &'a [WindowConfig],
+        /// Line times of the images.
+        pub images: InOrder<'a, Output<ImageTimes>>,
+    }
+}
+
+impl Stage for GroupProfiles<'_> {
+    const NAME: &'static str = "group_profiles";
+    const CHECKED: bool = true;
+    type Output = Vec<Profile>;
+    stage_inputs!(fingerprint);
+
+    fn run(&self, _stop: &AtomicBool) -> Result<Vec<Profile>> {
+        let images = self.images.0.iter().map(|image| Ok(image.value()?.clone()));
+        let images = images.collect::<Result<Vec<_>>>()?;
+        let footprints = &self.converted.value()?.footprints;
+        Ok(group_profiles(footprints, self.windows, &images))
+    }
 }
 
 /// Groups footprints by window, orbit and pause.

@@ -1,14 +1,19 @@
 //! Reads tie points and finds their images among the site's.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    sync::atomic::AtomicBool,
+};
 
 use serde::{Deserialize, Serialize};
 
 use crate::{
     config::{ImageConfig, TiesConfig},
     error::{Fault, Kind, Result},
-    files::file_name,
+    files::{HashedFile, file_name},
     pds,
+    stage::{InOrder, Input, Inputs, Stage},
+    stage_inputs,
     ties::TiePoint,
 };
 
@@ -59,6 +64,64 @@ impl Fault for TiesFault {
             }
         }
         .to_owned()
+    }
+}
+
+stage_inputs! {
+    /// Tie point files, and the names that they have for the images.
+    pub struct ReadTies<'a> {
+        /// Paths of the files.
+        pub ties: &'a TiesConfig,
+        /// The same files with their hashes.
+        pub files: TieFiles<'a>,
+        /// The images.
+        pub images: ImageNames<'a>,
+    }
+}
+
+/// The tie point files of a site, in order.
+#[derive(Debug)]
+pub struct TieFiles<'a>(pub &'a [HashedFile]);
+
+impl Input for TieFiles<'_> {
+    fn add_to(&self, _field: &str, inputs: &mut Inputs) {
+        InOrder(self.0).add_to("ties", inputs);
+    }
+}
+
+/// The images of a site, of which tie points see the names.
+#[derive(Debug)]
+pub struct ImageNames<'a>(pub &'a [ImageConfig]);
+
+impl Input for ImageNames<'_> {
+    fn add_to(&self, _field: &str, inputs: &mut Inputs) {
+        let images = self.0.iter();
+        let names: Vec<[&str; 2]> = images
+            .map(|image| [image.name_in_ties(), image.id.as_str()])
+            .collect();
+        inputs.setting("images (names in tie points)", &names);
+    }
+}
+
+impl Stage for ReadTies<'_> {
+    const NAME: &'static str = "read_ties";
+    const CHECKED: bool = true;
+    type Output = Ties;
+    stage_inputs!(fingerprint);
+
+    fn run(&self, _stop: &AtomicBool) -> Result<Ties> {
+        read_ties(self.ties, self.images.0)
+    }
+
+    fn findings(&self, ties: &Ties) -> Vec<String> {
+        let (points, joining) = (ties.points.len(), ties.joining());
+        let bad = match ties.complaint_count {
+            0 => String::new(),
+            count => format!("; {count} records that cannot be read"),
+        };
+        vec![format!(
+            "{points} tie points, {joining} of them in two or more images{bad}"
+        )]
     }
 }
 

@@ -1,8 +1,11 @@
 //! An orientation after a correction: samples and camera tables moved together, and the lines' times with them.
 
+use std::sync::atomic::AtomicBool;
+
 use nalgebra::Vector3;
 
 use super::{
+    adjust::Adjusted,
     orientation::{
         Camera, CameraTables, GroundPoint, InterpolationCheck, Nodes, Orientation,
         OrientationSample,
@@ -18,6 +21,8 @@ use crate::{
         mars_rotation::mars_rotation,
         pushbroom::{ExteriorOrientation, Pose, SampledOrientation, SamplesFault},
     },
+    stage::{Output, Stage},
+    stage_inputs,
     time::{Et, Interval},
 };
 
@@ -76,6 +81,44 @@ impl Fault for ReorientFault {
             _ => "report this with the site's configuration and the log",
         }
         .to_owned()
+    }
+}
+
+stage_inputs! {
+    /// The orientation of one image, and what the adjustment adds to it.
+    pub struct Reorient<'a> {
+        /// Identifier of the image.
+        pub image: &'a str,
+        /// Its place among the images of the adjustment.
+        pub index: &'a usize,
+        /// Its line times.
+        pub times: &'a Output<ImageTimes>,
+        /// Its orientation by the kernels.
+        pub orientation: &'a Output<Orientation>,
+        /// The adjustment.
+        pub adjusted: &'a Output<Adjusted>,
+    }
+}
+
+impl Stage for Reorient<'_> {
+    const NAME: &'static str = "reorient";
+    const METHOD: u32 = 2;
+    type Output = Orientation;
+    stage_inputs!(fingerprint);
+
+    fn part(&self) -> Option<String> {
+        Some(self.image.to_owned())
+    }
+
+    fn run(&self, _stop: &AtomicBool) -> Result<Orientation> {
+        let correction = self.adjusted.value()?.correction(*self.index);
+        let (orientation, times) = (self.orientation.value()?, self.times.value()?);
+        reorient(orientation, times, correction.time_shift_lines, |x| {
+            LineCorrection {
+                position_m: correction.shift_m(x),
+                rotation_rad: correction.turn_rad(x),
+            }
+        })
     }
 }
 

@@ -2,11 +2,7 @@
 
 mod camera_tables;
 
-use std::fmt;
-
-pub use super::orientation::{
-    BoresightGround, CameraTables, GroundPoint, InterpolationCheck, Orientation, OrientationSample,
-};
+use std::{fmt, sync::atomic::AtomicBool};
 
 use super::{orientation::Camera, tag_times::ImageTimes};
 use crate::{
@@ -14,13 +10,75 @@ use crate::{
     error::Result,
     frames::{J2000, MarsIau2000, MocNa, Rotation},
     geom::{mars_rotation::mars_rotation, statistics::largest},
-    spice::{Attitude, Session},
+    spice::{Attitude, KernelView, Session},
+    stage::{Output, Stage},
+    stage_inputs,
     time::Et,
+};
+
+pub use super::orientation::{
+    BoresightGround, CameraTables, GroundPoint, InterpolationCheck, Orientation, OrientationSample,
 };
 
 /// Time between the attitude samples of the mission's C-kernels, seconds: an attitude that is held for
 /// longer is not explained by their spacing, and the bus turns by 0.2° meanwhile.
 const ATTITUDE_SPACING_S: f64 = 4.0;
+
+stage_inputs! {
+    /// The times of one image, the kernels, and how they are sampled.
+    pub struct SampleOrientation<'a> {
+        /// Identifier of the image.
+        pub image: &'a str,
+        /// Its line times.
+        pub times: &'a Output<ImageTimes>,
+        /// All kernels: attitude may pass through any frame.
+        pub kernels: &'a KernelView,
+        /// Tolerance and padding.
+        pub coverage: &'a KernelsConfig,
+        /// Pointing bias.
+        pub pointing: &'a PointingConfig,
+        /// Number of samples.
+        pub orientation: &'a OrientationConfig,
+    }
+}
+
+impl Stage for SampleOrientation<'_> {
+    const NAME: &'static str = "sample_orientation";
+    const METHOD: u32 = 2;
+    const CHECKED: bool = true;
+    type Output = Orientation;
+    stage_inputs!(fingerprint);
+
+    fn part(&self) -> Option<String> {
+        Some(self.image.to_owned())
+    }
+
+    fn run(&self, _stop: &AtomicBool) -> Result<Orientation> {
+        sample_orientation(
+            self.kernels.session()?,
+            self.times.value()?,
+            self.coverage,
+            self.pointing,
+            self.orientation,
+        )
+    }
+
+    fn findings(&self, orientation: &Orientation) -> Vec<String> {
+        let Some(times) = self.times.get() else {
+            return Vec::new();
+        };
+        let invalid = orientation.invalid_because.iter();
+        let invalid = invalid.map(|reason| format!("; products would be invalid: {reason}"));
+        vec![format!(
+            "image {}: {} lines from {} UTC, first line centre {}, position and attitude covered{}",
+            times.id,
+            times.lines_header,
+            times.utc_start,
+            times.line_centre(0),
+            invalid.collect::<String>()
+        )]
+    }
+}
 
 /// Samples the orientation of `image`.
 ///

@@ -9,10 +9,10 @@ use serde::{Deserialize, Serialize};
 
 use self::repeats::{Copies, require_distinct};
 use crate::{
-    altimetry::ShotFilter,
+    altimetry::{DatumChoice, ShotFilter},
     config::{PedrConfig, WindowConfig},
     error::{Fault, Kind, Place, Result, Stopped},
-    files::file_name,
+    files::{HashedFile, file_name},
     footprints::{AsRead, Footprint, Footprints, SourceFile},
     frames::{MarsDatum, MarsIau2000},
     geom::{
@@ -21,6 +21,8 @@ use crate::{
         window::Region,
     },
     pds::pedr::{Complaint, FieldGuard, File, FileName, Frame, Reason, SHOTS, decide_datum},
+    stage::{InOrder, Input, Inputs, Stage},
+    stage_inputs,
     time::Et,
     units::RADIANS_PER_DEGREE,
 };
@@ -96,6 +98,64 @@ impl Fault for TooManyFiles {
     fn advice(&self) -> String {
         "name only the files of the site's orbits in pedr.files".to_owned()
     }
+}
+
+stage_inputs! {
+    /// PEDR files, what to keep of them, and the windows.
+    pub struct SearchFootprints<'a> {
+        /// Datum, filter, and the paths of the files.
+        pub pedr: &'a PedrConfig,
+        /// The same files with their hashes.
+        pub files: PedrFiles<'a>,
+        /// Windows on the ground.
+        pub windows: &'a [WindowConfig],
+        /// Seconds to add to time tags.
+        pub clock_correction_s: &'a f64,
+    }
+}
+
+/// The PEDR files of a site, in order.
+#[derive(Debug)]
+pub struct PedrFiles<'a>(pub &'a [HashedFile]);
+
+impl Input for PedrFiles<'_> {
+    fn add_to(&self, _field: &str, inputs: &mut Inputs) {
+        InOrder(self.0).add_to("pedr", inputs);
+    }
+}
+
+impl Stage for SearchFootprints<'_> {
+    const NAME: &'static str = "search_footprints";
+    const CHECKED: bool = true;
+    type Output = SearchResult;
+    stage_inputs!(fingerprint);
+
+    fn run(&self, stop: &AtomicBool) -> Result<SearchResult> {
+        search_footprints(self.pedr, self.windows, *self.clock_correction_s, stop)
+    }
+
+    fn examine(&self) -> Vec<Result<String>> {
+        let files = self.pedr.files.iter();
+        files
+            .map(|path| examine_file(path, self.pedr.datum))
+            .collect()
+    }
+}
+
+/// What can be said of a PEDR file without searching it.
+fn examine_file(path: &Path, choice: DatumChoice) -> Result<String> {
+    let file = File::open(path)?;
+    file.require_records()?;
+    let version = file.name().map(|name| name.version);
+    let datum = decide_datum(choice, version, file.label().datum).in_file(path)?;
+    let complaints = file.label_complaints().iter();
+    let complaints = complaints.map(|complaint| format!("; {}", complaint.text));
+    Ok(format!(
+        "{}: {} frames in {datum}{}",
+        path.display(),
+        file.records().len(),
+        complaints.collect::<String>()
+    ))
 }
 
 /// Searches all files of `pedr` for shots in any of `windows`.

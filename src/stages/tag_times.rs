@@ -1,13 +1,19 @@
 //! Image labels become line times: spacecraft clock or UTC to ET, line period, header and delivered lines.
 
+use std::sync::atomic::AtomicBool;
+
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::{
     config::ImageConfig,
     error::{Failure, Fault, Kind, Place, Result},
+    files::HashedFile,
     image::{IMAGE_DURATION_END_S, IMAGE_LINES_MIN, ImageFields, line_period_agrees},
     pds::moc,
-    spice::Session,
+    spice::{KernelView, Session},
+    stage::Stage,
+    stage_inputs,
     time::{Et, Interval},
     units::SECONDS_PER_MS,
 };
@@ -51,7 +57,7 @@ pub struct ImageTimes {
 }
 
 /// Source of an image's start time.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum StartFrom {
     /// Spacecraft clock.
@@ -162,6 +168,33 @@ impl Fault for ImageFault {
             }
             Self::Duration { .. } => "check lines_header, the exposure (milliseconds) and the summing".to_owned(),
         }
+    }
+}
+
+stage_inputs! {
+    /// Label and keys of one image, and the clocks.
+    pub struct TagTimes<'a> {
+        /// Identifier and keys written in the configuration.
+        pub image: &'a ImageConfig,
+        /// The label that the configuration names.
+        pub label: Option<HashedFile>,
+        /// Text kernels.
+        pub kernels: &'a KernelView,
+    }
+}
+
+impl Stage for TagTimes<'_> {
+    const NAME: &'static str = "tag_times";
+    const CHECKED: bool = true;
+    type Output = ImageTimes;
+    stage_inputs!(fingerprint);
+
+    fn part(&self) -> Option<String> {
+        Some(self.image.id.clone())
+    }
+
+    fn run(&self, _stop: &AtomicBool) -> Result<ImageTimes> {
+        tag_image(self.image, self.kernels.session()?)
     }
 }
 

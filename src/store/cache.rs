@@ -1,4 +1,4 @@
-//! Stage outputs on disk, each with the parts it was made from.
+//! Stage outputs on disk, each with the inputs it was made from.
 
 use std::{
     collections::BTreeSet,
@@ -8,11 +8,11 @@ use std::{
 
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
 
-use super::{
-    atomic,
-    fingerprint::{Because, Parts},
+use super::atomic;
+use crate::{
+    error::{Fault, Kind, Place, Result},
+    stage::{Inputs, Output, Provenance, Reason},
 };
-use crate::error::{Fault, Kind, Place, Result};
 
 /// Outputs of a site's stages, in `<out>/<site>/.cache`.
 #[derive(Debug)]
@@ -24,22 +24,9 @@ pub struct StageCache {
 /// A stage output with its origin; the file is this struct in postcard.
 #[derive(Serialize, Deserialize)]
 struct Stored {
-    parts: Parts,
+    inputs: Inputs,
     blake3: String,
     payload: Vec<u8>,
-}
-
-/// A value together with the hash of its stored form.
-#[derive(Debug)]
-pub struct Output<T> {
-    /// The stage's output.
-    pub value: T,
-    /// BLAKE3 of its stored form, for the parts of later stages.
-    pub blake3: String,
-    /// Hash over the parts it was made from, for the manifest.
-    pub fingerprint: String,
-    /// Whether it was made just now.
-    pub fresh: bool,
 }
 
 /// A stage output that cannot be stored.
@@ -70,83 +57,58 @@ impl StageCache {
         }
     }
 
-    /// The stored output of `stage` for these parts, or why the stage has to run.
+    /// The stored output of the stage with this label for these inputs, or why the stage has to run.
     ///
     /// # Errors
-    /// The reason, never [`Because::Unchanged`].
+    /// The reason, never [`Reason::Unchanged`].
     pub fn load<T: DeserializeOwned>(
         &self,
-        stage: &str,
-        parts: &Parts,
-    ) -> std::result::Result<Output<T>, Because> {
+        label: &str,
+        inputs: &Inputs,
+    ) -> std::result::Result<Output<T>, Reason> {
         if self.forced {
-            return Err(Because::Forced);
+            return Err(Reason::Forced);
         }
-        let bytes = fs::read(self.path(stage)).map_err(|_| Because::First)?;
-        let stored: Stored = postcard::from_bytes(&bytes).map_err(|_| Because::Damaged)?;
-        let changes = parts.changed_since(&stored.parts);
+        let bytes = fs::read(self.path(label)).map_err(|_| Reason::First)?;
+        let stored: Stored = postcard::from_bytes(&bytes).map_err(|_| Reason::Damaged)?;
+        let changes = inputs.changed_since(&stored.inputs);
         if !changes.is_empty() {
-            return Err(Because::Moved(changes));
+            return Err(Reason::Changed(changes));
         }
         if *blake3::hash(&stored.payload).to_hex() != *stored.blake3 {
-            return Err(Because::Damaged);
+            return Err(Reason::Damaged);
         }
-        let value = postcard::from_bytes(&stored.payload).map_err(|_| Because::Damaged)?;
-        Ok(Output {
-            value,
+        let value = postcard::from_bytes(&stored.payload).map_err(|_| Reason::Damaged)?;
+        let provenance = Provenance {
             blake3: stored.blake3,
-            fingerprint: parts.fingerprint(),
-            fresh: false,
-        })
-    }
-
-    /// The stored output of `stage` for these parts, or what `run` gives, then stored.
-    ///
-    /// # Errors
-    /// Those of `run`, and of writing the output.
-    pub fn stage<T: Serialize + DeserializeOwned>(
-        &self,
-        stage: &str,
-        parts: Parts,
-        run: impl FnOnce() -> Result<T>,
-    ) -> Result<Output<T>> {
-        let because = match self.load(stage, &parts) {
-            Ok(output) => {
-                tracing::info!(stage, "kept: {}", Because::Unchanged);
-                return Ok(output);
-            }
-            Err(because) => because,
+            fingerprint: inputs.fingerprint(),
         };
-        tracing::info!(stage, "running: {because}");
-        self.store(stage, parts, run()?)
+        Ok(Output::known(label.to_owned(), value, provenance))
     }
 
-    /// Stores the output of `stage` with the parts it was made from.
+    /// Stores the output of the stage with this label, with the inputs it was made from.
     ///
     /// # Errors
     /// The output cannot be written.
-    pub fn store<T: Serialize>(&self, stage: &str, parts: Parts, value: T) -> Result<Output<T>> {
+    pub fn store<T: Serialize>(&self, label: &str, inputs: Inputs, value: T) -> Result<Output<T>> {
         let unstorable = |source| Unstorable {
-            stage: stage.to_owned(),
+            stage: label.to_owned(),
             source,
         };
         let payload = postcard::to_stdvec(&value).map_err(unstorable)?;
-        let blake3 = blake3::hash(&payload).to_hex().to_string();
-        let fingerprint = parts.fingerprint();
+        let provenance = Provenance {
+            blake3: blake3::hash(&payload).to_hex().to_string(),
+            fingerprint: inputs.fingerprint(),
+        };
         let stored = Stored {
-            parts,
-            blake3: blake3.clone(),
+            inputs,
+            blake3: provenance.blake3.clone(),
             payload,
         };
         let bytes = postcard::to_stdvec(&stored).map_err(unstorable)?;
-        let path = self.path(stage);
+        let path = self.path(label);
         atomic::write(&path, &bytes).in_file(path)?;
-        Ok(Output {
-            value,
-            blake3,
-            fingerprint,
-            fresh: true,
-        })
+        Ok(Output::known(label.to_owned(), value, provenance))
     }
 
     /// Forgets the output of `stage`, so that it runs again.
@@ -177,27 +139,31 @@ mod tests {
     use super::*;
 
     #[test]
-    fn an_output_is_kept_until_a_part_moves_or_the_file_is_damaged() {
+    fn an_output_is_kept_until_an_input_changes_or_the_file_is_damaged() {
         let folder = tempfile::tempdir().unwrap();
         let cache = StageCache::new(folder.path(), false);
-        let parts = |value: u32| Parts::new(1).key("windows", &value);
-        let run = |value: u32, output: u32| cache.stage("search", parts(value), || Ok(output));
-        assert_eq!(run(1, 10).unwrap().value, 10);
-        assert_eq!(run(1, 11).unwrap().value, 10);
-        assert_eq!(run(2, 12).unwrap().value, 12);
-        let why = |cache: &StageCache, value| cache.load::<u32>("search", &parts(value)).err();
-        let moved = Because::Moved(vec!["key windows changed".to_owned()]);
-        assert_eq!(why(&cache, 3), Some(moved));
+        let inputs = |value: u32| {
+            let mut inputs = Inputs::new(1);
+            inputs.setting("windows", &value);
+            inputs
+        };
+        let why = |cache: &StageCache, value| cache.load::<u32>("search", &inputs(value)).err();
+        assert_eq!(why(&cache, 1), Some(Reason::First));
+        let stored = cache.store("search", inputs(1), 10).unwrap();
+        let loaded = cache.load::<u32>("search", &inputs(1)).unwrap();
+        assert_eq!(loaded.value().unwrap(), &10);
+        assert_eq!(loaded.provenance(), stored.provenance());
+        let changed = Reason::Changed(vec!["key windows changed".to_owned()]);
+        assert_eq!(why(&cache, 2), Some(changed));
         let path = folder.path().join("search");
         let mut bytes = fs::read(&path).unwrap();
         let last = bytes.len() - 1;
         bytes[last] ^= 1;
         atomic::write(&path, &bytes).unwrap();
-        assert_eq!(why(&cache, 2), Some(Because::Damaged));
-        assert_eq!(run(2, 13).unwrap().value, 13);
+        assert_eq!(why(&cache, 1), Some(Reason::Damaged));
         let forced = StageCache::new(folder.path(), true);
-        assert_eq!(why(&forced, 2), Some(Because::Forced));
+        assert_eq!(why(&forced, 1), Some(Reason::Forced));
         cache.forget("search");
-        assert_eq!(why(&cache, 2), Some(Because::First));
+        assert_eq!(why(&cache, 1), Some(Reason::First));
     }
 }

@@ -2,14 +2,27 @@
 
 use std::collections::BTreeMap;
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::time::Interval;
+pub use crate::stages::judge::Verdict;
+use crate::{schema::DocumentSchema, time::Interval};
+
+/// Schema of the manifest.
+#[must_use]
+pub fn schema() -> DocumentSchema {
+    DocumentSchema::of::<Manifest>("manifest")
+}
 
 /// The manifest of one site.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[schemars(
+    title = "Manifest of a site",
+    description = "manifest.json of areograph: what the products of a site were made from. finished_utc is the only entry that depends on the clock."
+)]
 pub struct Manifest {
     /// Always `areograph`.
+    #[schemars(extend("const" = "areograph"))]
     pub tool: String,
     /// Version of the program.
     pub version: String,
@@ -28,10 +41,12 @@ pub struct Manifest {
     /// Stages with the fingerprint of everything that entered them.
     pub stages: Vec<StageEntry>,
     /// Product files.
+    #[schemars(length(min = 1))]
     pub products: Vec<ProductEntry>,
     /// Rows and things counted.
     pub counts: BTreeMap<String, u64>,
     /// The largest figures of the site under the names in [`figures`]; absent when there is none.
+    #[schemars(schema_with = "figures::schema")]
     pub figures: BTreeMap<String, f64>,
     /// Shots inside a window that were left out, by reason.
     pub rejected: BTreeMap<String, u64>,
@@ -45,6 +60,9 @@ pub struct Manifest {
 
 /// Names of [`Manifest::figures`].
 pub mod figures {
+    use schemars::{Schema, SchemaGenerator, json_schema};
+    use serde_json::{Map, Value, json};
+
     /// Largest |mean| of range − distance of a profile, metres.
     pub const RANGE_MEAN_M: &str = "range_mean_m";
     /// Largest second-order position RMSE of an image, metres.
@@ -57,46 +75,63 @@ pub mod figures {
     pub const ADJUSTED_DISAGREEMENT_M: &str = "adjusted_disagreement_m";
     /// A posteriori standard deviation of unit weight of the adjustment.
     pub const ADJUSTMENT_SIGMA0: &str = "adjustment_sigma0";
-}
 
-/// Whether the products keep the limits of the configuration.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Verdict {
-    /// No limit is broken.
-    pub valid: bool,
-    /// Every broken limit, with its profile or image.
-    pub reasons: Vec<String>,
-    /// What a reader must weigh although no limit is broken.
-    pub remarks: Vec<String>,
-}
+    /// All of them, and what they are.
+    const ALL: [(&str, &str); 6] = [
+        (
+            RANGE_MEAN_M,
+            "Largest |mean| of range minus distance of a profile, metres.",
+        ),
+        (
+            POSITION_RMSE_M,
+            "Largest second-order position RMSE of an image, metres.",
+        ),
+        (
+            POINTING_RMSE_RAD,
+            "Largest second-order pointing RMSE of an image, radians.",
+        ),
+        (
+            DISAGREEMENT_M,
+            "Largest disagreement of two images along the flight at their tie points, metres.",
+        ),
+        (
+            ADJUSTED_DISAGREEMENT_M,
+            "The same with the adjusted orientation, metres.",
+        ),
+        (
+            ADJUSTMENT_SIGMA0,
+            "A posteriori standard deviation of unit weight of the adjustment.",
+        ),
+    ];
 
-impl Verdict {
-    /// The verdict in one word or three, as every message and page has it.
-    #[must_use]
-    pub const fn word(&self) -> &'static str {
-        match (self.valid, self.remarks.as_slice()) {
-            (false, _) => "INVALID",
-            (true, []) => "valid",
-            (true, _) => "valid with remarks",
-        }
+    /// Schema of the map of figures.
+    pub(super) fn schema(_: &mut SchemaGenerator) -> Schema {
+        let figure = |(name, what): (&str, &str)| {
+            let figure = json!({ "description": what, "type": "number", "minimum": 0 });
+            (name.to_owned(), figure)
+        };
+        let properties: Map<String, Value> = ALL.into_iter().map(figure).collect();
+        json_schema!({ "type": "object", "properties": properties })
     }
 }
 
 /// The configuration of a run.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub struct ConfigurationEntry {
     /// File name, without folders.
     pub file_name: String,
     /// BLAKE3 of the keys and values as written; comments and layout do not change it.
+    #[schemars(regex(pattern = "^[0-9a-f]{64}$"))]
     pub blake3: String,
     /// These keys and values, with dots between tables.
     pub keys: BTreeMap<String, String>,
 }
 
 /// A time correction as used.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct BiasEntry {
     /// `ck_bias` or `mola_clock`.
+    #[schemars(extend("enum" = ["ck_bias", "mola_clock"]))]
     pub name: String,
     /// Seconds added to the time of a look-up.
     pub correction_s: f64,
@@ -107,7 +142,7 @@ pub struct BiasEntry {
 }
 
 /// A kernel of a run.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct KernelEntry {
     /// File name, without folders.
     pub name: String,
@@ -116,23 +151,27 @@ pub struct KernelEntry {
     /// Size.
     pub bytes: u64,
     /// BLAKE3 of the file.
+    #[schemars(regex(pattern = "^[0-9a-f]{64}$"))]
     pub blake3: String,
     /// Which of the needed intervals were read from this kernel, ET seconds: later kernels come first.
     pub coverage_used: Vec<Interval>,
 }
 
 /// One of several kernel sets, compared over the positions that the site needs.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct KernelChoiceEntry {
     /// Identifier in the configuration.
     pub set: String,
     /// Whether it was used: its trajectory is closest to the mean of all, by root mean square distance.
     pub chosen: bool,
     /// Instants at which all sets were compared.
+    #[schemars(range(min = 1))]
     pub epochs: u64,
     /// Root mean square distance from the mean of all, metres.
+    #[schemars(range(min = 0.0))]
     pub distance_rms_m: f64,
     /// Largest distance from the mean of all, metres.
+    #[schemars(range(min = 0.0))]
     pub distance_max_m: f64,
     /// Mean radial deviation from the mean of all, metres.
     pub radial_mean_m: f64,
@@ -145,38 +184,41 @@ pub struct KernelChoiceEntry {
 }
 
 /// A file by name and content.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub struct FileEntry {
     /// File name, without folders.
     pub name: String,
     /// BLAKE3 of the file.
+    #[schemars(regex(pattern = "^[0-9a-f]{64}$"))]
     pub blake3: String,
 }
 
 /// A stage of a run.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub struct StageEntry {
     /// Name, for a stage of one image followed by `/` and the image.
     pub name: String,
     /// BLAKE3 over its parts.
+    #[schemars(regex(pattern = "^[0-9a-f]{64}$"))]
     pub fingerprint: String,
 }
 
 /// A product file.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub struct ProductEntry {
     /// Path below the site's folder, with `/`.
     pub path: String,
     /// Size.
     pub bytes: u64,
     /// BLAKE3 of the file.
+    #[schemars(regex(pattern = "^[0-9a-f]{64}$"))]
     pub blake3: String,
     /// Rows, or 1 for a document.
     pub rows: u64,
 }
 
 /// Complaints about input records.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub struct Complaints {
     /// How many there are.
     pub count: u64,

@@ -3,7 +3,6 @@
 
 pub mod atomic;
 pub mod cache;
-pub mod fingerprint;
 pub mod lock;
 pub mod manifest;
 pub mod page;

@@ -7,6 +7,7 @@
 use std::{
     collections::BTreeSet,
     fs,
+    ops::Deref,
     path::{Component, Path, PathBuf},
 };
 
@@ -58,16 +59,37 @@ pub fn staging_path(site_folder: &Path) -> PathBuf {
     site_folder.join(STAGING)
 }
 
+/// A folder for half-made products, which goes away with this value.
+#[derive(Debug)]
+pub struct Staging {
+    folder: PathBuf,
+}
+
+impl Deref for Staging {
+    type Target = Path;
+
+    fn deref(&self) -> &Path {
+        &self.folder
+    }
+}
+
+impl Drop for Staging {
+    fn drop(&mut self) {
+        // After a publication it is gone; what the disk does not give back now, the next run removes.
+        let _ = fs::remove_dir_all(&self.folder);
+    }
+}
+
 /// An empty folder for half-made products inside the site's folder, hence on the same file system.
 ///
 /// # Errors
 /// The folder cannot be made, or an earlier one could not be removed.
-pub fn staging(site_folder: &Path) -> Result<PathBuf> {
-    let folder = staging_path(site_folder);
+pub fn staging(site_folder: &Path) -> Result<Staging> {
+    let folder = site_folder.join(STAGING);
     fs::create_dir(&folder)
         .map_err(IoFault::on("create the folder"))
         .in_file(&folder)?;
-    Ok(folder)
+    Ok(Staging { folder })
 }
 
 /// Whether a run ever worked in the folder: it holds stored stages or a publication under way.

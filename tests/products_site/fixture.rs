@@ -19,13 +19,15 @@ use areograph::{
         window::WindowShape,
     },
     kernel_source::{KernelList, KernelSource},
-    products::{ImageProducts, KernelLine, SiteProducts},
+    products::{ImageProducts, SiteProducts},
     spice::Wanted,
     stages::{
         check_ranges::{BiasScan, ProfileRanges, RangeCheck, ShotResiduals},
         convert_datum::FileConversion,
+        describe_kernels::KernelLine,
         fit_sensor_model::{SensorModel, fit_sensor_model},
         group_profiles::{Profile, group_profiles},
+        judge::{Evidence, JudgedImage, judge},
         register::{ImageRegistration, register},
         sample_orientation::{
             BoresightGround, CameraTables, GroundPoint, InterpolationCheck, Orientation,
@@ -163,6 +165,22 @@ impl Site {
             model: &self.model,
             registration: &self.registration,
         }];
+        let judged = [JudgedImage {
+            id: &self.times.id,
+            orientation: &self.orientation,
+            model: &self.model,
+        }];
+        let searched = !self.config.pedr.files.is_empty();
+        let verdict = judge(&Evidence {
+            footprints: searched.then_some(self.footprints.len()),
+            ranges: &self.ranges,
+            clock_correction_s: self.config.mola_clock.correction_s(),
+            images: if image { &judged } else { &[] },
+            warnings: &self.warnings,
+            complaints: &self.complaints,
+            adjustment: None,
+            adjustment_failure: None,
+        });
         with(&SiteProducts {
             config: &self.config,
             kernels: &self.kernels,
@@ -176,7 +194,7 @@ impl Site {
             rejected: &self.rejected,
             complaints: &self.complaints,
             notes: &self.notes,
-            warnings: &self.warnings,
+            verdict: &verdict,
             geometric: None,
             conversions: &self.conversions,
         })
@@ -198,6 +216,7 @@ fn kernel(name: &str, role: &str, held: Option<Vec<Interval>>) -> KernelLine {
         bytes: 5257,
         blake3: "ab".repeat(32),
         held: held.map(Intervals::union_of),
+        used: Vec::new(),
     }
 }
 

@@ -8,10 +8,18 @@ use areograph::{
     report,
     spice::{KernelSet, Wanted},
     stages::{
-        adjust::Adjusted, check_ranges::RangeCheck, compare_pairs::PairComparison,
-        convert_datum::Converted, fit_sensor_model::SensorModel, group_profiles::Profile,
-        intersect::IntersectedTies, read_ties::Ties, register::ImageRegistration,
-        sample_orientation::Orientation, tag_times::ImageTimes,
+        adjust::Adjusted,
+        check_ranges::RangeCheck,
+        compare_pairs::PairComparison,
+        convert_datum::Converted,
+        fit_sensor_model::SensorModel,
+        group_profiles::Profile,
+        intersect::IntersectedTies,
+        judge::{AdjustmentEvidence, Evidence, JudgedImage, Verdict, judge},
+        read_ties::Ties,
+        register::ImageRegistration,
+        sample_orientation::Orientation,
+        tag_times::ImageTimes,
     },
 };
 use serde::de::DeserializeOwned;
@@ -39,7 +47,7 @@ pub(crate) struct Site {
     pub(crate) adjusted_pairs: Vec<PairComparison>,
 }
 
-/// The stored output of a stage: parts, hash, payload.
+/// The stored output of a stage: inputs, hash, payload.
 fn stored<T: DeserializeOwned>(folder: &Path, stage: &str) -> T {
     let bytes = fs::read(folder.join(".cache").join(stage)).unwrap();
     let (_, _, payload): (BTreeMap<String, String>, String, Vec<u8>) =
@@ -48,9 +56,9 @@ fn stored<T: DeserializeOwned>(folder: &Path, stage: &str) -> T {
 }
 
 /// The same for every image.
-fn each<T: DeserializeOwned>(folder: &Path, times: &[ImageTimes], stage: &str) -> Vec<T> {
-    let of = |times: &ImageTimes| stored(folder, &format!("{stage}+{}", times.id));
-    times.iter().map(of).collect()
+fn each<T: DeserializeOwned>(folder: &Path, ids: &[&str], stage: &str, round: &str) -> Vec<T> {
+    let of = |id: &&str| stored(folder, &format!("{stage}+{id}{round}"));
+    ids.iter().map(of).collect()
 }
 
 impl Site {
@@ -62,28 +70,32 @@ impl Site {
         run.args(["--quiet", "run"]).arg(&site);
         succeed(run.arg("--out").arg(out.path()));
         let folder = out.path().join("gusev_crater");
-        let times: Vec<ImageTimes> = stored(&folder, "tag_times");
-        let (intersected, pairs) = stored(&folder, "intersect");
-        let (adjusted_images, (adjusted_intersected, adjusted_pairs)) =
-            stored(&folder, "apply_adjustment");
+        let config = load(&site).unwrap().site;
+        let ids: Vec<&str> = config.images.iter().map(|image| &*image.id).collect();
+        let orientations: Vec<Orientation> = each(&folder, &ids, "reorient", "");
+        let models: Vec<SensorModel> = each(&folder, &ids, "fit_sensor_model", "+adjusted");
+        let registrations: Vec<ImageRegistration> = each(&folder, &ids, "register", "+adjusted");
+        let adjusted_images = orientations.into_iter().zip(models).zip(registrations);
+        let adjusted_images = adjusted_images
+            .map(|((orientation, model), registration)| (orientation, model, registration));
         Self {
             published: fs::read_to_string(folder.join("report/index.html")).unwrap(),
-            config: load(&site).unwrap().site,
             kernels: KernelSet::from_metakernel(&mission().join("kernels/nav.tm")).unwrap(),
             converted: stored(&folder, "convert_datum"),
             profiles: stored(&folder, "group_profiles"),
             ranges: stored(&folder, "check_ranges"),
-            orientations: each(&folder, &times, "sample_orientation"),
-            models: each(&folder, &times, "fit_sensor_model"),
-            registrations: each(&folder, &times, "register"),
+            orientations: each(&folder, &ids, "sample_orientation", ""),
+            models: each(&folder, &ids, "fit_sensor_model", ""),
+            registrations: each(&folder, &ids, "register", ""),
             ties: stored(&folder, "read_ties"),
             adjusted: stored(&folder, "adjust"),
-            times,
-            intersected,
-            pairs,
-            adjusted_images,
-            adjusted_intersected,
-            adjusted_pairs,
+            times: each(&folder, &ids, "tag_times", ""),
+            intersected: stored(&folder, "intersect"),
+            pairs: stored(&folder, "compare_pairs"),
+            adjusted_images: adjusted_images.collect(),
+            adjusted_intersected: stored(&folder, "intersect+adjusted"),
+            adjusted_pairs: stored(&folder, "compare_pairs+adjusted"),
+            config,
         }
     }
 
@@ -108,6 +120,7 @@ impl Site {
                 },
             )
             .collect();
+        let verdict = self.verdict();
         with(&SiteProducts {
             config: &self.config,
             kernels: &[],
@@ -122,7 +135,7 @@ impl Site {
             rejected: &BTreeMap::new(),
             complaints: &[],
             notes: &[],
-            warnings: &[],
+            verdict: &verdict,
             geometric: Some(GeometricProducts {
                 kernels: &self.kernels,
                 folder: Path::new(""),
@@ -133,8 +146,58 @@ impl Site {
                 adjusted_images: &adjusted_images,
                 adjusted_intersected: &self.adjusted_intersected,
                 adjusted_pairs: &self.adjusted_pairs,
+                images_agree: self.images_agree(),
             }),
         })
+    }
+
+    /// Calls `with` on what the site is judged by.
+    fn judged<T>(&self, with: impl FnOnce(&Evidence, &AdjustmentEvidence) -> T) -> T {
+        fn judged<'a>(
+            times: &'a ImageTimes,
+            orientation: &'a Orientation,
+            model: &'a SensorModel,
+        ) -> JudgedImage<'a> {
+            JudgedImage {
+                id: &times.id,
+                orientation,
+                model,
+            }
+        }
+        let oriented = self.orientations.iter().zip(&self.models);
+        let images = self.times.iter().zip(oriented);
+        let images: Vec<_> = images
+            .map(|(times, (orientation, model))| judged(times, orientation, model))
+            .collect();
+        let adjusted = self.times.iter().zip(&self.adjusted_images);
+        let adjusted: Vec<_> = adjusted
+            .map(|(times, (orientation, model, _))| judged(times, orientation, model))
+            .collect();
+        let adjustment = AdjustmentEvidence {
+            ties: &self.ties,
+            adjusted: &self.adjusted,
+            images: &adjusted,
+            pairs: &self.adjusted_pairs,
+        };
+        let evidence = Evidence {
+            footprints: Some(self.converted.footprints.len()),
+            ranges: &self.ranges,
+            clock_correction_s: self.config.mola_clock.correction_s(),
+            images: &images,
+            warnings: &[],
+            complaints: &[],
+            adjustment: Some(adjustment),
+            adjustment_failure: None,
+        };
+        with(&evidence, &adjustment)
+    }
+
+    fn verdict(&self) -> Verdict {
+        self.judged(|evidence, _| judge(evidence))
+    }
+
+    fn images_agree(&self) -> bool {
+        self.judged(|_, adjustment| adjustment.images_agree())
     }
 
     /// Its report.

@@ -130,18 +130,23 @@ where
 ///
 /// Each entry is `field: Type = declaration`; a key that is named differently from its field, for its
 /// unit, is given by `field as "key"`. The documentation of an entry is that of the field and of the key.
+/// `#[serde(skip)]` keeps a path out of what stages are told apart by: files enter by their content.
 /// `struct Name: Trait` derives `Trait`. `check function` names what must hold between keys: `fn(&Name, &mut Keys)`.
 macro_rules! declare_table {
     (
         $(#[doc = $about:literal])+
         $vis:vis struct $name:ident $(: $($derive:ident),+)? {
-            $($(#[doc = $doc:literal])+ $field:ident $(as $key:literal)? : $type:ty = $declared:expr,)+
+            $(
+                $(#[doc = $doc:literal])+
+                $(#[serde($skip:ident)])?
+                $field:ident $(as $key:literal)? : $type:ty = $declared:expr,
+            )+
         }
         $(check $check:path)?
     ) => {
         $(#[doc = $about])+
         #[derive(Debug, Clone, PartialEq, serde::Serialize $(, $($derive),+)?)]
-        $vis struct $name { $($(#[doc = $doc])+ $vis $field: $type,)+ }
+        $vis struct $name { $($(#[doc = $doc])+ $(#[serde($skip)])? $vis $field: $type,)+ }
 
         impl Default for $name {
             /// Every key as where the file leaves it out; what has no default is empty.

@@ -1,6 +1,7 @@
 //! Orientation as polynomials: with pointing angles, and with a rotation vector.
 
 use nalgebra::{Matrix3, Vector3};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::{ExteriorOrientation, Motion, PolynomialPath, Pose};
@@ -10,7 +11,9 @@ use crate::geom::{
 };
 
 /// The forms of an image's orientation.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[derive(
+    Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema,
+)]
 #[serde(rename_all = "snake_case")]
 pub enum CameraModel {
     /// Positions and angles as polynomials of first order.

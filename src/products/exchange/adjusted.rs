@@ -10,39 +10,58 @@ use super::{
     points::{GroundEstimate, ImageMeasure},
 };
 use crate::{
-    error::Result,
     frames::{MarsIau2000, Position},
-    products::{GeometricProducts, ImageProducts, SiteProducts, Writer},
+    products::{
+        GeometricProducts, ImageProducts, SiteProducts,
+        product::{Content, Declaration, Program, Role, Use, Write},
+    },
     stages::adjust::{CorrectedPoint, PointKind},
     time::Et,
 };
 
-/// Writes `lidar.json` and `adjusted.gcp` of a site with tie points.
-pub(super) fn write(
-    written: &mut Writer,
-    site: &SiteProducts,
-    geometric: &GeometricProducts,
-) -> Result<()> {
-    let names: Vec<String> = site
-        .images
-        .iter()
-        .map(|image| isis_name(site, image))
-        .collect();
-    let shots = lidar_points(site, geometric, &names);
-    if !shots.is_empty() {
-        written.add("exchange/lidar.json", |path| write_lidar_data(path, &shots))?;
-    }
-    let files: Vec<String> = site
-        .images
-        .iter()
-        .map(|image| format!("{}.cub", image.times.id))
-        .collect();
-    let points = control_points(site, geometric, &files);
-    if !points.is_empty() {
-        written.add("exchange/adjusted.gcp", |path| write_gcp(path, &points))?;
-    }
-    Ok(())
-}
+pub(in crate::products) static LIDAR: Declaration = Declaration {
+    path: "exchange/lidar.json",
+    what: "shots with ranges for ISIS: a priori and adjusted points, where the adjusted images see them",
+    readers: "ISIS",
+    rows: "shots",
+    role: Role::Data,
+    content: Content::Foreign,
+    write: Write::Ties(|path, of, geometric| {
+        let images = of.site.images.iter();
+        let names: Vec<String> = images.map(|image| isis_name(of.site, image)).collect();
+        let shots = lidar_points(of.site, geometric, &names);
+        let some = !shots.is_empty();
+        some.then(|| write_lidar_data(path, &shots)).transpose()
+    }),
+    uses: &[Use {
+        program: Program::Isis,
+        lines: "jigsaw fromlist=cubes.lis cnet=ties.net onet=out.net lidardata=lidar.json olidarfile=out \\\n  \
+                spsolve=position",
+    }],
+};
+
+pub(in crate::products) static CONTROL: Declaration = Declaration {
+    path: "exchange/adjusted.gcp",
+    what: "adjusted tie points as ground control; the images are called <image>.cub",
+    readers: "Ames Stereo Pipeline",
+    rows: "tie points",
+    role: Role::Data,
+    content: Content::Foreign,
+    write: Write::Ties(|path, of, geometric| {
+        let images = of.site.images.iter();
+        let files: Vec<String> = images
+            .map(|image| format!("{}.cub", image.times.id))
+            .collect();
+        let points = control_points(of.site, geometric, &files);
+        let some = !points.is_empty();
+        some.then(|| write_gcp(path, &points)).transpose()
+    }),
+    uses: &[Use {
+        program: Program::StereoPipeline,
+        lines: "# Standard deviations along x, y, z, so not with --use-lon-lat-height-gcp-error:\n\
+                bundle_adjust --datum D_MARS IMAGES CAMERAS adjusted.gcp -o run/out",
+    }],
+};
 
 /// The serial number that ISIS has for an image: as configured, else as ISIS composes it.
 fn isis_name(site: &SiteProducts, image: &ImageProducts) -> String {

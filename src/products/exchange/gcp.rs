@@ -12,12 +12,12 @@
 use std::{fmt::Write as _, path::Path};
 
 use super::{
-    DEGREE_DECIMALS, METRE_DECIMALS, SPHERE_RADIUS_M,
+    DEGREE_DECIMALS, METRE_DECIMALS,
     points::{GroundEstimate, ImageMeasure, above_zero},
 };
 use crate::{
     error::{Place, Result},
-    products::{fault::ProductFault, files::write_text},
+    products::{fault::ProductFault, files::write_text, gis::SPHERE_RADIUS_M},
     units::RADIANS_PER_DEGREE,
 };
 

@@ -4,18 +4,33 @@
 
 use std::path::Path;
 
-use rusqlite::{Connection, OpenFlags, Row, params};
+use rusqlite::{Connection, OpenFlags, params, params_from_iter, types::Value};
 
-use super::{CRS_NAME, CRS_WKT, POINT_Z_HEIGHT, SPHERE_RADIUS_M};
 use crate::{
     error::{Failure, IoFault, Place, Result},
     products::{
         coordinates::FRAME,
         fault::ProductFault,
         files::{create, finish, open},
-        shot::Shot,
-        site::SiteProducts,
+        footprints::features,
+        gis::{CRS_NAME, CRS_WKT, Features, POINT_Z_HEIGHT},
+        product::{Content, Declaration, Program, Role, Use, Write},
+        table::{Kind, Meaning, Table, Values},
     },
+};
+
+pub(in crate::products) static GEOPACKAGE: Declaration = Declaration {
+    path: "exchange/footprints.gpkg",
+    what: "the footprints as GeoPackage 1.3",
+    readers: "GIS",
+    rows: "shots",
+    role: Role::Data,
+    content: Content::Foreign,
+    write: Write::Footprints(|path, of| write(path, features(of.site))),
+    uses: &[Use {
+        program: Program::Gis,
+        lines: "ogrinfo -al -so footprints.gpkg                  GeoPackage, all columns",
+    }],
 };
 
 /// Identifies the coordinate system inside the file, and with the organization `IAU_2015`.
@@ -43,60 +58,84 @@ const LAYOUT: &str = "
         PRIMARY KEY (table_name, column_name), UNIQUE (table_name),
         FOREIGN KEY (table_name) REFERENCES gpkg_contents(table_name),
         FOREIGN KEY (srs_id) REFERENCES gpkg_spatial_ref_sys(srs_id));
-    CREATE TABLE footprints (
-        fid INTEGER PRIMARY KEY AUTOINCREMENT NOT NULL, geom POINT NOT NULL, et_s DOUBLE NOT NULL,
-        utc TEXT NOT NULL, orbit INTEGER NOT NULL, source_file TEXT NOT NULL, record INTEGER NOT NULL,
-        shot INTEGER NOT NULL, radius_m DOUBLE NOT NULL, radius_crossover_m DOUBLE NOT NULL,
-        topography_m DOUBLE NOT NULL, range_m DOUBLE NOT NULL, windows TEXT NOT NULL);
 ";
 /// The Earth's system that every GeoPackage must list.
 const WGS84_WKT: &str = "GEOGCS[\"WGS 84\",DATUM[\"WGS_1984\",SPHEROID[\"WGS 84\",6378137,298.257223563]],\
     PRIMEM[\"Greenwich\",0],UNIT[\"degree\",0.0174532925199433],AUTHORITY[\"EPSG\",\"4326\"]]";
 
-/// A row of the table `footprints` but for its number.
-#[derive(Debug, PartialEq)]
-struct Feature {
-    geometry: Vec<u8>,
-    shot: Shot,
-}
-
-/// What the file says of its table.
-struct Contents {
-    site: String,
-    /// That of the newest shot, as a clock would give other bytes each time.
-    last_change: String,
-    longitude_deg: [f64; 2],
-    latitude_deg: [f64; 2],
-}
-
-impl Contents {
-    fn of(site: &SiteProducts, points: &[[f64; 2]]) -> Self {
-        let newest = site.utc.iter().max().map_or("", String::as_str);
-        Self {
-            site: site.config.site.clone(),
-            last_change: format!("{newest}Z"),
-            longitude_deg: ends(points.iter().map(|point| point[0])),
-            latitude_deg: ends(points.iter().map(|point| point[1])),
-        }
-    }
-}
-
-/// Writes the footprints, which lie at `points` (degrees), and reads them back.
+/// Writes the points and reads them back.
 ///
 /// # Errors
-/// What the disk or SQLite refuses; rows that come back different.
-pub(super) fn write(path: &Path, site: &SiteProducts, points: &[[f64; 2]]) -> Result<u64> {
-    let features = || (points.iter().enumerate()).map(|(row, point)| feature(site, row, point));
+/// Numbers that are not finite; what the disk or SQLite refuses; rows that come back different.
+fn write(path: &Path, features: Features) -> Result<u64> {
+    let features = Features {
+        attributes: features.attributes.for_gis(),
+        ..features
+    };
     // Makes the folder and an empty file, which SQLite takes for a new database.
     finish(path, create(path)?)?;
-    let contents = Contents::of(site, points);
-    fill(path, &contents, features()).in_file(path)?;
+    fill(path, &features).in_file(path)?;
     open(path)?
         .sync_all()
         .map_err(IoFault::on("write"))
         .in_file(path)?;
-    read_back(path, features()).in_file(path)?;
-    Ok(points.len() as u64)
+    read_back(path, &features).in_file(path)?;
+    Ok(features.points.len() as u64)
+}
+
+/// The statement that makes the table of the points.
+fn create_table(attributes: &Table) -> String {
+    let column = |column: &Meaning| {
+        let kind = match column.kind {
+            Kind::Real => "DOUBLE",
+            Kind::Natural | Kind::Integer => "INTEGER",
+            Kind::Flag => "BOOLEAN",
+            Kind::Text => "TEXT",
+            Kind::Bytes => "BLOB",
+        };
+        let missing = if column.optional { "" } else { " NOT NULL" };
+        format!(", {} {kind}{missing}", column.name)
+    };
+    let columns: String = attributes.columns().map(column).collect();
+    format!(
+        "CREATE TABLE footprints (fid INTEGER PRIMARY KEY AUTOINCREMENT NOT NULL, geom POINT NOT NULL{columns})"
+    )
+}
+
+/// The columns of the points as statements list them.
+fn names(attributes: &Table) -> String {
+    let names = attributes.columns().map(|column| column.name);
+    ["geom"]
+        .into_iter()
+        .chain(names)
+        .collect::<Vec<_>>()
+        .join(", ")
+}
+
+/// A value as SQLite has it.
+fn value(values: &Values, row: usize) -> Value {
+    match values {
+        Values::Real(of) => Value::Real(of[row]),
+        Values::OptionalReal(of) => of[row].map_or(Value::Null, Value::Real),
+        Values::Natural(of) => Value::Integer(of[row].into()),
+        Values::Integer(of) => Value::Integer(of[row].into()),
+        Values::Flag(of) => Value::Integer(of[row].into()),
+        Values::Text(of) => Value::Text(of[row].clone()),
+        Values::Bytes(of) => Value::Blob(of[row].clone()),
+    }
+}
+
+/// Calls `take` with every row, its geometry first.
+fn each(features: &Features, mut take: impl FnMut(Vec<Value>) -> Result<()>) -> Result<()> {
+    for rows in features.attributes.pieces() {
+        let values = features.attributes.values(rows.clone())?;
+        for (row, point) in features.points[rows].iter().enumerate() {
+            let geometry = Value::Blob(geometry(point));
+            let attributes = values.iter().map(|of| value(of, row));
+            take([geometry].into_iter().chain(attributes).collect())?;
+        }
+    }
+    Ok(())
 }
 
 /// The disk's refusal, or SQLite's.
@@ -110,41 +149,34 @@ fn refused(error: rusqlite::Error) -> Failure {
     }
 }
 
-fn fill(path: &Path, contents: &Contents, features: impl Iterator<Item = Feature>) -> Result<()> {
+fn fill(path: &Path, features: &Features) -> Result<()> {
     let database = Connection::open(path).map_err(refused)?;
     database.execute_batch(LAYOUT).map_err(refused)?;
-    describe(&database, contents).map_err(refused)?;
+    let table = create_table(&features.attributes);
+    database.execute_batch(&table).map_err(refused)?;
+    describe(&database, features).map_err(refused)?;
+    let names = names(&features.attributes);
+    let places = names
+        .split(", ")
+        .map(|_| "?")
+        .collect::<Vec<_>>()
+        .join(", ");
     let mut insert = database
-        .prepare(
-            "INSERT INTO footprints (geom, et_s, utc, orbit, source_file, record, shot, radius_m, \
-             radius_crossover_m, topography_m, range_m, windows) VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
-        )
+        .prepare(&format!(
+            "INSERT INTO footprints ({names}) VALUES ({places})"
+        ))
         .map_err(refused)?;
-    for Feature { geometry, shot } in features {
-        insert
-            .execute(params![
-                geometry,
-                shot.et_s,
-                shot.utc,
-                shot.orbit,
-                shot.source_file,
-                shot.record,
-                shot.shot,
-                shot.radius_m,
-                shot.radius_crossover_m,
-                shot.topography_m,
-                shot.range_m,
-                shot.windows,
-            ])
-            .map_err(refused)?;
-    }
+    each(features, |row| {
+        insert.execute(params_from_iter(row)).map_err(refused)?;
+        Ok(())
+    })?;
     drop(insert);
     database.execute_batch("COMMIT").map_err(refused)?;
     database.close().map_err(|(_, error)| refused(error))
 }
 
 /// Fills the tables of contents.
-fn describe(database: &Connection, contents: &Contents) -> rusqlite::Result<()> {
+fn describe(database: &Connection, features: &Features) -> rusqlite::Result<()> {
     let systems = "INSERT INTO gpkg_spatial_ref_sys VALUES (?, ?, ?, ?, ?, ?)";
     for (name, id, organization, definition, description) in [
         ("Undefined Cartesian SRS", -1, "NONE", "undefined", ""),
@@ -155,13 +187,14 @@ fn describe(database: &Connection, contents: &Contents) -> rusqlite::Result<()> 
         let row = params![name, id, organization, id, definition, description];
         database.execute(systems, row)?;
     }
-    let ([west, east], [south, north]) = (contents.longitude_deg, contents.latitude_deg);
+    let axis = |axis: usize| ends(features.points.iter().map(|point| point[axis]));
+    let ([west, east], [south, north]) = (axis(0), axis(1));
     database.execute(
         "INSERT INTO gpkg_contents VALUES ('footprints', 'features', ?, ?, ?, ?, ?, ?, ?, ?)",
         params![
-            contents.site,
+            features.name,
             POINT_Z_HEIGHT,
-            contents.last_change,
+            format!("{}Z", features.newest_utc),
             west,
             south,
             east,
@@ -184,16 +217,8 @@ fn ends(values: impl Iterator<Item = f64>) -> [f64; 2] {
     )
 }
 
-fn feature(site: &SiteProducts, row: usize, point: &[f64; 2]) -> Feature {
-    let shot = Shot::of(site, row);
-    Feature {
-        geometry: geometry(point, shot.radius_crossover_m - SPHERE_RADIUS_M),
-        shot,
-    }
-}
-
 /// `GeoPackageBinary` without an envelope (2.1.3), around the well-known binary of a point with a height.
-fn geometry([longitude_deg, latitude_deg]: &[f64; 2], height_m: f64) -> Vec<u8> {
+fn geometry(point: &[f64; 3]) -> Vec<u8> {
     const VERSION: u8 = 0;
     const LITTLE_ENDIAN: u8 = 1;
     const POINT_Z: u32 = 1001;
@@ -201,77 +226,57 @@ fn geometry([longitude_deg, latitude_deg]: &[f64; 2], height_m: f64) -> Vec<u8> 
     bytes.extend(SRS_ID.to_le_bytes());
     bytes.push(LITTLE_ENDIAN);
     bytes.extend(POINT_Z.to_le_bytes());
-    for coordinate in [longitude_deg, latitude_deg, &height_m] {
+    for coordinate in point {
         bytes.extend(coordinate.to_le_bytes());
     }
     bytes
 }
 
-fn read_back(path: &Path, features: impl Iterator<Item = Feature>) -> Result<()> {
+fn read_back(path: &Path, features: &Features) -> Result<()> {
     let unreadable = |error: rusqlite::Error| Failure::from(ProductFault::unreadable(error));
+    let differs = |what: String| Err(ProductFault::ReadBack { what }.into());
     let database =
         Connection::open_with_flags(path, OpenFlags::SQLITE_OPEN_READ_ONLY).map_err(unreadable)?;
+    let names = names(&features.attributes);
+    let columns = names.split(", ").count();
     let mut select = database
-        .prepare(
-            "SELECT geom, et_s, utc, orbit, source_file, record, shot, radius_m, radius_crossover_m, \
-             topography_m, range_m, windows FROM footprints ORDER BY fid",
-        )
+        .prepare(&format!("SELECT {names} FROM footprints ORDER BY fid"))
         .map_err(unreadable)?;
-    let mut found = select.query_map([], from_row).map_err(unreadable)?;
-    let differs = |what: String| Err(ProductFault::ReadBack { what }.into());
+    let mut found = select
+        .query_map([], |row| {
+            let values = (0..columns).map(|column| row.get(column));
+            values.collect::<rusqlite::Result<Vec<Value>>>()
+        })
+        .map_err(unreadable)?;
     let mut rows = 0;
-    for expected in features {
+    each(features, |expected| {
         rows += 1;
         if found.next().transpose().map_err(unreadable)? != Some(expected) {
             return differs(format!("footprint {rows}"));
         }
-    }
+        Ok(())
+    })?;
     if found.next().is_some() {
         return differs(format!("more than {rows} footprints"));
     }
     Ok(())
 }
 
-fn from_row(row: &Row) -> rusqlite::Result<Feature> {
-    Ok(Feature {
-        geometry: row.get(0)?,
-        shot: Shot {
-            et_s: row.get(1)?,
-            utc: row.get(2)?,
-            orbit: row.get(3)?,
-            source_file: row.get(4)?,
-            record: row.get(5)?,
-            shot: row.get(6)?,
-            radius_m: row.get(7)?,
-            radius_crossover_m: row.get(8)?,
-            topography_m: row.get(9)?,
-            range_m: row.get(10)?,
-            windows: row.get(11)?,
-        },
-    })
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::products::shot::example;
+    use crate::products::gis::tests::example;
 
-    fn features() -> impl Iterator<Item = Feature> {
-        [1, 2].into_iter().map(|shot| Feature {
-            geometry: geometry(&[175.3, -14.6], -1_950.25),
-            shot: example(shot, 2.0_f64.sqrt()),
-        })
+    fn for_gis() -> Features<'static> {
+        Features {
+            attributes: example().attributes.for_gis(),
+            ..example()
+        }
     }
 
     #[test]
     fn a_changed_row_is_noticed() {
         let folder = tempfile::tempdir().unwrap();
-        let contents = Contents {
-            site: "a".to_owned(),
-            last_change: "1999-08-24T14:12:13.000Z".to_owned(),
-            longitude_deg: [175.3; 2],
-            latitude_deg: [-14.6; 2],
-        };
         for (number, (change, complaint)) in [
             (
                 "UPDATE footprints SET et_s = 1.414213562373095 WHERE fid = 2",
@@ -283,20 +288,20 @@ mod tests {
                 "UPDATE footprints SET geom = substr(geom, 1, 30) WHERE fid = 1",
                 "footprint 1",
             ),
+            (
+                "INSERT INTO footprints SELECT 3, geom, et_s, utc, orbit, source_file FROM footprints WHERE fid = 1",
+                "more than 2 footprints",
+            ),
         ]
         .into_iter()
         .enumerate()
         {
             let path = folder.path().join(format!("{number}.gpkg"));
-            fill(&path, &contents, features()).unwrap();
-            read_back(&path, features()).unwrap();
-            let longer = read_back(&path, features().take(1)).unwrap_err();
-            assert!(longer.fault.to_string().ends_with("more than 1 footprints"));
-            Connection::open(&path)
-                .unwrap()
-                .execute(change, [])
-                .unwrap();
-            let failure = read_back(&path, features()).unwrap_err();
+            fill(&path, &for_gis()).unwrap();
+            read_back(&path, &for_gis()).unwrap();
+            let changed = Connection::open(&path).unwrap().execute(change, []);
+            assert_eq!(changed.unwrap(), 1);
+            let failure = read_back(&path, &for_gis()).unwrap_err();
             assert_eq!(
                 failure.fault.to_string(),
                 format!("read back differently: {complaint}")

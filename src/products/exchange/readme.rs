@@ -2,94 +2,130 @@
 
 use std::fmt::Write as _;
 
-use super::{LOLA_LIKE_FORMAT, ODE_FORMAT, POINT_Z_HEIGHT};
-use crate::products::{coordinates::FRAME, site::SiteProducts};
+use crate::products::{
+    coordinates::FRAME,
+    files::write_text,
+    gis::POINT_Z_HEIGHT,
+    product::{Content, Context, Declaration, IMAGE, Program, Role, Write},
+};
 
-pub(super) fn text(site: &SiteProducts) -> String {
+pub(in crate::products) static README: Declaration = Declaration {
+    path: "exchange/README.txt",
+    what: "what the files of this folder are, and the commands that read them",
+    readers: "people",
+    rows: "",
+    role: Role::Metadata,
+    content: Content::Foreign,
+    write: Write::Site(|path, of| write_text(path, &text(of)).map(|()| Some(0))),
+    uses: &[],
+};
+
+/// Programs in the order of their sections.
+const PROGRAMS: [Program; 6] = [
+    Program::StereoPipeline,
+    Program::Isis,
+    Program::Gis,
+    Program::CameraModel,
+    Program::AdjustedKernels,
+    Program::Catalogue,
+];
+
+/// Columns of the file names.
+const NAME_WIDTH: usize = 20;
+
+fn text(of: &Context) -> String {
+    let site = of.site;
     let mut text = format!(
         "Products of the site {} for other programs. Commands are given for this folder.\n\n\
-         Frame: {FRAME}.\n",
+         Frame: {FRAME}.\n\n",
         site.config.site
     );
     if site.footprints.is_empty() {
-        text += "\nThe site has no footprints, so there are no tables of footprints here.\n";
-    } else {
-        text += &footprints();
+        text += "The site has no footprints, so there are no tables of footprints here.\n\n";
     }
-    if !site.images.is_empty() {
-        text += "\nCommunity Sensor Model (usgscsm): image support data of the MOC narrow-angle camera\n";
-        for image in site.images {
-            let _infallible = writeln!(
-                text,
-                "  usgscsm_cam_test --model ../images/{}/isd.json --sample-rate 100",
-                image.times.id
-            );
-        }
-        text += ISD;
-    }
-    if let Some(geometric) = &site.geometric {
-        text += ADJUSTED;
-        for image in geometric.adjusted_images {
-            let id = &image.times.id;
-            let _infallible = writeln!(
-                text,
-                "  spiceinit from={id}.cub spk=../adjusted/{id}.bsp ck=../adjusted/{id}.bc"
-            );
+    let files = files(of);
+    for file in &files {
+        if let Some(name) = file.path.strip_prefix("exchange/") {
+            let _infallible = writeln!(text, "{name:NAME_WIDTH$} {}", file.what);
         }
     }
-    text += CATALOGUE;
+    for program in PROGRAMS {
+        let uses = files.iter().flat_map(|file| file.uses);
+        let lines: Vec<&str> = uses
+            .filter(|of| of.program == program)
+            .flat_map(|of| of.lines.lines())
+            .collect();
+        if lines.is_empty() {
+            continue;
+        }
+        let _infallible = write!(text, "\n{}\n", about(program));
+        for line in lines {
+            for line in for_images(line, of) {
+                let _infallible = writeln!(text, "  {line}");
+            }
+        }
+    }
     text
 }
 
-fn footprints() -> String {
-    format!(
-        "\n\
-Tables of footprints, radii instead of heights, so that the choice of a datum does not matter; the .json beside\n\
-each file names its columns, its --csv-format and what its radii are. The first line names the columns.\n\
-\x20 lola_like.csv    as LOLA's reduced data records: UTC, longitude, latitude, radius km, range km, ...\n\
-\x20 ode_pts.csv      as the Orbital Data Explorer's points\n\
-\n\
-Ames Stereo Pipeline (D_MARS is a sphere of 3396190 m)\n\
-\x20 pc_align --max-displacement 1000 --csv-format '{LOLA_LIKE_FORMAT}' --datum D_MARS dem.tif lola_like.csv -o run/out\n\
-\x20 pc_align --max-displacement 1000 --csv-format '{ODE_FORMAT}' --datum D_MARS dem.tif ode_pts.csv -o run/out\n\
-\n\
-ISIS (cubes need spiceinit first)\n\
-\x20 lrolola2isis from=lola_like.csv cubes=cubes.lis pointid=MOLA???? to=lidar.json\n\
-Lidar points of ISIS need the line and sample at which each image sees the shot, which lrolola2isis computes (a\n\
-site with tie points has them ready in lidar.json). It reads column 4, the radius after the crossover correction; the measured range of\n\
-column 5 belongs to the radius before it, column 6. For range constraints exchange the two first:\n\
-\x20 awk -F, -v OFS=, '{{ t = $4; $4 = $6; $6 = t; print }}' lola_like.csv > lola_raw.csv\n\
-\n\
-GIS: IAU_2015:49900, longitudes -180..180, areocentric latitudes; {POINT_Z_HEIGHT}\n\
-\x20 ogrinfo -al -so footprints.gpkg                  GeoPackage, all columns\n\
-\x20 ogrinfo -al -so footprints.shp                   3-D shapefile; names of at most ten letters, no windows\n\
-\x20 ogrinfo -al -so ../footprints.geojson            two-dimensional\n\
-\x20 python3 -c 'import geopandas; print(geopandas.read_parquet(\"../footprints.parquet\"))'\n\
-\x20 QGIS: Layer > Add Layer > Add Vector Layer, any of these.\n\
-The dates inside the GeoPackage and the shapefile are those of the newest shot.\n\
-\n\
-../footprints.xml is a label in the style of PDS4 for ../footprints.csv.\n"
-    )
+/// What was written and is not empty, each file of images once, and what will be: those declared after this text.
+fn files(of: &Context) -> Vec<&'static Declaration> {
+    let mut files: Vec<&Declaration> = Vec::new();
+    // An empty table is there, but no program is told to read it.
+    let used = of
+        .written
+        .iter()
+        .filter(|(product, declaration)| product.rows > 0 || declaration.rows.is_empty());
+    let written = used.map(|(_, declaration)| *declaration);
+    let to_come = of
+        .products
+        .iter()
+        .skip_while(|file| file.path != README.path);
+    for file in written.chain(to_come.skip(1).copied()) {
+        if files.iter().all(|known| known.path != file.path) {
+            files.push(file);
+        }
+    }
+    files
 }
 
-const ISD: &str = "\
-They differ from the files of ALE where those do not say what the camera does: the time of a line includes the\n\
-summing, samples and the detector's centre count from the detector's edge, there is no distortion, and the\n\
-pointing covers the whole image. The member areograph.interpolation holds the measured interpolation error.\n";
+/// The line, for every image if it is of images.
+fn for_images(line: &str, of: &Context) -> Vec<String> {
+    if !line.contains(IMAGE) {
+        return vec![line.to_owned()];
+    }
+    let images = of.site.images.iter();
+    images
+        .map(|image| line.replace(IMAGE, &image.times.id))
+        .collect()
+}
 
-const ADJUSTED: &str = "\n\
-The adjusted site (../adjustment.json says what was adjusted and how well)\n\
-\x20 lidar.json       shots with ranges for ISIS: a priori and adjusted points, where the adjusted images see them\n\
-\x20   jigsaw fromlist=cubes.lis cnet=ties.net onet=out.net lidardata=lidar.json olidarfile=out spsolve=position\n\
-\x20 adjusted.gcp     adjusted tie points for Ames Stereo Pipeline; standard deviations along x, y, z, so not with\n\
-\x20                  --use-lon-lat-height-gcp-error; the images are called <id>.cub\n\
-\x20   bundle_adjust --datum D_MARS IMAGES CAMERAS adjusted.gcp -o run/out\n\
-../images/<id>/adjusted_isd.json is the adjusted camera. Its positions are geometric, those of ../images/<id>/isd.json\n\
-have light time and aberration as ISIS and ALE have them. Kernels to be loaded after the original ones, each pair for\n\
-its image alone:\n";
-
-const CATALOGUE: &str = "\n\
-kernels.json       kernels by type with the keys of SpiceQL, and under areograph hashes and coverage\n\
-stac_item.json     the site for STAC catalogues: where, when, files with sizes and hashes; there is none for a\n\
-\x20                  site of which nothing says where it lies\n\
-\x20 stac-validator stac_item.json\n";
+/// What users of a program must know before they see its commands.
+fn about(program: Program) -> String {
+    match program {
+        Program::StereoPipeline => "\
+            Ames Stereo Pipeline (D_MARS is a sphere of 3396190 m). Tables have radii instead of heights, so that the\n\
+            choice of a datum does not matter; the .json beside each names its columns, its --csv-format and what its\n\
+            radii are. The first line names the columns."
+            .to_owned(),
+        Program::Isis => "ISIS (cubes need spiceinit first)".to_owned(),
+        Program::Gis => format!(
+            "GIS: IAU_2015:49900, longitudes -180..180, areocentric latitudes; {POINT_Z_HEIGHT}.\n\
+             The dates inside the GeoPackage and the shapefile are those of the newest shot.\n\
+             QGIS: Layer > Add Layer > Add Vector Layer, any of these."
+        ),
+        Program::CameraModel => "\
+            Community Sensor Model (usgscsm): image support data of the MOC narrow-angle camera. They differ from the\n\
+            files of ALE where those do not say what the camera does: the time of a line includes the summing, samples\n\
+            and the detector's centre count from the detector's edge, there is no distortion, and the pointing covers\n\
+            the whole image. The member areograph.interpolation holds the measured interpolation error."
+            .to_owned(),
+        Program::AdjustedKernels => "\
+            The adjusted site (../adjustment.json says what was adjusted and how well).\n\
+            ../images/<image>/adjusted_isd.json is the adjusted camera. Its positions are geometric, those of\n\
+            ../images/<image>/isd.json have light time and aberration as ISIS and ALE have them. Kernels to be loaded\n\
+            after the original ones, each pair for its image alone:"
+            .to_owned(),
+        Program::Catalogue => "STAC".to_owned(),
+    }
+}

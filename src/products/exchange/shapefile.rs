@@ -1,7 +1,10 @@
-//! Footprints as a shapefile of three-dimensional points, as made from `pedr2tab` tables.
+//! Points as a shapefile, three-dimensional, with a dBASE table of attributes.
+//!
+//! A shapefile is five files of one name. The table is encoded in memory: the library that encodes it hides
+//! what the disk refuses.
 
 use std::{
-    io::{BufReader, Seek as _, SeekFrom, Write},
+    io::{BufReader, Cursor},
     path::Path,
 };
 
@@ -12,100 +15,96 @@ use shapefile::{
     },
 };
 
-use super::{CRS_WKT, SPHERE_RADIUS_M};
 use crate::{
     error::{Failure, IoFault, Place, Result},
     products::{
-        coordinates::degrees,
         fault::ProductFault,
-        files::{create, finish, open, write_text},
-        shot::Shot,
-        site::SiteProducts,
+        files::{create, finish, open, write_bytes, write_text},
+        footprints::features,
+        gis::{CRS_WKT, Features},
+        product::{Content, Context, Declaration, Program, Role, Use, Write},
+        table::{DbaseField, Kind, Table, Values},
     },
 };
 
-/// Where a file's field ends: dBASE counts its bytes in one byte, of which shapefiles use this much.
+pub(in crate::products) static POINTS: Declaration = Declaration {
+    path: "exchange/footprints.shp",
+    what: "the footprints as a shapefile of three-dimensional points",
+    readers: "GIS",
+    rows: "shots",
+    role: Role::Data,
+    content: Content::Foreign,
+    write: Write::Footprints(|path, of| {
+        let points = points(&features(of.site));
+        write_points(path, points.iter().copied())?;
+        read_points(path, points.iter().copied()).in_file(path)?;
+        Ok(points.len() as u64)
+    }),
+    uses: &[Use {
+        program: Program::Gis,
+        lines: "ogrinfo -al -so footprints.shp                   3-D shapefile; names of at most ten letters, no windows",
+    }],
+};
+
+/// A file that makes `footprints.shp` a shapefile.
+macro_rules! part {
+    ($path:literal, $what:literal, $write:expr) => {
+        Declaration {
+            path: $path,
+            what: $what,
+            readers: "GIS",
+            rows: "",
+            role: Role::Data,
+            content: Content::Foreign,
+            write: Write::Footprints(|path, of| {
+                let write: fn(&Path, &Context) -> Result<()> = $write;
+                write(path, of).map(|()| 0)
+            }),
+            uses: &[],
+        }
+    };
+}
+
+pub(in crate::products) static INDEX: Declaration = part!(
+    "exchange/footprints.shx",
+    "index of footprints.shp",
+    |path, of| {
+        // Written with the points.
+        check_index(path, of.site.footprints.len()).in_file(path)
+    }
+);
+
+pub(in crate::products) static ATTRIBUTES: Declaration = part!(
+    "exchange/footprints.dbf",
+    "attributes of footprints.shp",
+    |path, of| {
+        let features = features(of.site);
+        write_attributes(path, features.newest_utc, &features.attributes.for_dbase())
+    }
+);
+
+pub(in crate::products) static PROJECTION: Declaration = part!(
+    "exchange/footprints.prj",
+    "coordinate system of footprints.shp",
+    |path, _| write_text(path, CRS_WKT)
+);
+
+pub(in crate::products) static ENCODING: Declaration = part!(
+    "exchange/footprints.cpg",
+    "encoding of footprints.dbf",
+    |path, _| write_text(path, "UTF-8")
+);
+
+/// dBASE counts the bytes of a field in one byte, of which shapefiles use this much.
 const TEXT_MAX: usize = 254;
+/// Bytes of the head of an index, and of a record in it.
+const INDEX_BYTES: [u64; 2] = [100, 8];
 
-/// Fields of numbers: name (ten letters are all that dBASE holds), width, decimals.
-const NUMBERS: [(&str, u8, u8); 10] = [
-    ("et_s", 20, 6),
-    ("orbit", 10, 0),
-    ("record", 10, 0),
-    ("shot", 3, 0),
-    ("lon_deg", 14, 9),
-    ("lat_deg", 14, 9),
-    ("radius_m", 12, 3),
-    ("radius_x_m", 12, 3),
-    ("topo_m", 12, 3),
-    ("range_m", 12, 3),
-];
-/// Fields of text.
-const TEXTS: [&str; 2] = ["utc", "file"];
-
-/// A record of the attribute table.
-struct Attributes {
-    numbers: [f64; NUMBERS.len()],
-    texts: [String; TEXTS.len()],
-}
-
-impl WritableRecord for Attributes {
-    fn write_using<W: Write>(
-        &self,
-        writer: &mut FieldWriter<'_, W>,
-    ) -> std::result::Result<(), FieldError> {
-        for number in &self.numbers {
-            writer.write_next_field_value(number)?;
-        }
-        for text in &self.texts {
-            writer.write_next_field_value(text)?;
-        }
-        Ok(())
-    }
-}
-
-/// Writes `.shp`, `.shx`, `.dbf`, `.prj` and `.cpg` beside each other and reads points and attributes back.
-///
-/// # Errors
-/// What the disk or the encoder refuses; records that come back different.
-pub(super) fn write(path: &Path, site: &SiteProducts, points: &[[f64; 2]]) -> Result<u64> {
-    let shapes = || (points.iter().enumerate()).map(|(row, at)| point(site, row, at));
-    let records = || (0..points.len()).map(|row| attributes(site, row));
-    write_points(path, shapes())?;
-    let table = path.with_extension("dbf");
-    write_attributes(&table, text_widths(site), newest_day(site), records())?;
-    write_text(&path.with_extension("prj"), CRS_WKT)?;
-    write_text(&path.with_extension("cpg"), "UTF-8")?;
-    read_points(path, shapes()).in_file(path)?;
-    read_attributes(&table, records()).in_file(&table)?;
-    Ok(points.len() as u64)
-}
-
-/// Files beside `.shp` that make it a shapefile.
-pub(super) const COMPANIONS: [&str; 4] = ["shx", "dbf", "prj", "cpg"];
-
-fn point(site: &SiteProducts, row: usize, [longitude_deg, latitude_deg]: &[f64; 2]) -> PointZ {
-    let height_m = site.footprints.radius_crossover_m[row] - SPHERE_RADIUS_M;
-    PointZ::new(*longitude_deg, *latitude_deg, height_m, NO_DATA)
-}
-
-fn attributes(site: &SiteProducts, row: usize) -> Attributes {
-    let shot = Shot::of(site, row);
-    Attributes {
-        numbers: [
-            shot.et_s,
-            f64::from(shot.orbit),
-            f64::from(shot.record),
-            f64::from(shot.shot),
-            degrees(site.footprints.longitude_rad[row]),
-            degrees(site.footprints.latitude_rad[row]),
-            shot.radius_m,
-            shot.radius_crossover_m,
-            shot.topography_m,
-            shot.range_m,
-        ],
-        texts: [shot.utc, shot.source_file],
-    }
+fn points(features: &Features) -> Vec<PointZ> {
+    let points = features.points.iter();
+    points
+        .map(|[x, y, z]| PointZ::new(*x, *y, *z, NO_DATA))
+        .collect()
 }
 
 /// The disk's refusal, or the library's.
@@ -129,76 +128,14 @@ fn write_points(path: &Path, points: impl Iterator<Item = PointZ>) -> Result<()>
     finish(&index, shx)
 }
 
-/// * `widths` – bytes of each field of text
-/// * `day` – what the header holds as the date of the last change: years since 1900, month, day
-fn write_attributes(
-    path: &Path,
-    widths: [u8; TEXTS.len()],
-    day: [u8; 3],
-    records: impl Iterator<Item = Attributes>,
-) -> Result<()> {
-    let mut file = create(path)?;
-    let refused = |error: dbase::Error| ProductFault::refused("encode dBASE")(error);
-    let mut fields = TableWriterBuilder::with_encoding(dbase::encoding::Unicode);
-    for (name, width, decimals) in NUMBERS {
-        fields = fields.add_numeric_field(field_name(name).in_file(path)?, width, decimals);
+/// Checks that the index has as many records as there are points.
+fn check_index(path: &Path, points: usize) -> Result<()> {
+    let found = open(path)?.metadata().map_err(IoFault::on("read"))?.len();
+    let [head, record] = INDEX_BYTES;
+    if found == head + record * points as u64 {
+        return Ok(());
     }
-    for (name, width) in TEXTS.into_iter().zip(widths) {
-        fields = fields.add_character_field(field_name(name).in_file(path)?, width);
-    }
-    let mut writer = fields.build_with_dest(&mut file);
-    for record in records {
-        writer
-            .write_record(&record)
-            .map_err(refused)
-            .in_file(path)?;
-    }
-    writer.finalize().map_err(refused).in_file(path)?;
-    drop(writer);
-    // The library has written today's date there.
-    file.seek(SeekFrom::Start(1))
-        .and_then(|_| file.write_all(&day))
-        .map_err(IoFault::on("write"))
-        .in_file(path)?;
-    finish(path, file)
-}
-
-fn field_name(name: &str) -> std::result::Result<FieldName, ProductFault> {
-    FieldName::try_from(name).map_err(|error| ProductFault::Refused {
-        action: "name a field",
-        reason: error.to_string(),
-    })
-}
-
-/// Bytes of the longest text of each field.
-fn text_widths(site: &SiteProducts) -> [u8; TEXTS.len()] {
-    let longest = |lengths: &mut dyn Iterator<Item = usize>| {
-        let width = lengths.max().unwrap_or(1).clamp(1, TEXT_MAX);
-        u8::try_from(width).unwrap_or(u8::MAX)
-    };
-    [
-        longest(&mut site.utc.iter().map(String::len)),
-        longest(&mut site.footprints.files.iter().map(|file| file.name.len())),
-    ]
-}
-
-/// Day of the newest shot, for the same bytes each day: years since 1900, month, day.
-fn newest_day(site: &SiteProducts) -> [u8; 3] {
-    let newest = site.utc.iter().max().map_or("", String::as_str);
-    let number = |range| -> u16 {
-        let digits: Option<&str> = newest.get(range);
-        digits.and_then(|text| text.parse().ok()).unwrap_or(0)
-    };
-    [
-        number(0..4).saturating_sub(1900),
-        number(5..7),
-        number(8..10),
-    ]
-    .map(|value| u8::try_from(value).unwrap_or(u8::MAX))
-}
-
-fn differs(what: String) -> Failure {
-    ProductFault::ReadBack { what }.into()
+    Err(differs(format!("an index of {found} bytes")))
 }
 
 fn read_points(path: &Path, points: impl Iterator<Item = PointZ>) -> Result<()> {
@@ -218,39 +155,163 @@ fn read_points(path: &Path, points: impl Iterator<Item = PointZ>) -> Result<()> 
     Ok(())
 }
 
-fn read_attributes(path: &Path, records: impl Iterator<Item = Attributes>) -> Result<()> {
+/// A record of the attribute table, which borrows its values.
+struct Record<'a> {
+    values: &'a [Values],
+    row: usize,
+}
+
+impl WritableRecord for Record<'_> {
+    fn write_using<W: std::io::Write>(
+        &self,
+        writer: &mut FieldWriter<'_, W>,
+    ) -> std::result::Result<(), FieldError> {
+        for values in self.values {
+            match cell(values, self.row) {
+                Cell::Number(number) => writer.write_next_field_value(&number)?,
+                Cell::Text(text) => writer.write_next_field_value(&text)?,
+            }
+        }
+        Ok(())
+    }
+}
+
+/// A value as dBASE has it.
+enum Cell<'a> {
+    Number(Option<f64>),
+    Text(&'a str),
+}
+
+fn cell(values: &Values, row: usize) -> Cell<'_> {
+    match values {
+        Values::Real(of) => Cell::Number(Some(of[row])),
+        Values::OptionalReal(of) => Cell::Number(of[row]),
+        Values::Natural(of) => Cell::Number(Some(of[row].into())),
+        Values::Integer(of) => Cell::Number(Some(of[row].into())),
+        Values::Flag(of) => Cell::Number(Some(of[row].into())),
+        Values::Text(of) => Cell::Text(&of[row]),
+        Values::Bytes(_) => Cell::Text(""),
+    }
+}
+
+/// Writes the table of attributes and reads it back.
+///
+/// # Errors
+/// Numbers that are not finite; what the disk or the encoder refuses; records that come back different.
+fn write_attributes(path: &Path, newest_utc: &str, table: &Table) -> Result<()> {
+    let bytes = encode_attributes(newest_utc, table).in_file(path)?;
+    write_bytes(path, &bytes)?;
+    drop(bytes);
+    read_attributes(path, table).in_file(path)
+}
+
+fn encode_attributes(newest_utc: &str, table: &Table) -> Result<Vec<u8>> {
+    let refused = |error: dbase::Error| ProductFault::refused("encode dBASE")(error);
+    let mut fields = TableWriterBuilder::with_encoding(dbase::encoding::Unicode);
+    for (field, width) in dbase_fields(table).zip(text_widths(table)?) {
+        let name =
+            FieldName::try_from(field.name).map_err(ProductFault::refused("name a field"))?;
+        fields = match width {
+            Some(width) => fields.add_character_field(name, width),
+            None => fields.add_numeric_field(name, field.width, field.decimals),
+        };
+    }
+    let mut bytes = Cursor::new(Vec::new());
+    let mut writer = fields.build_with_dest(&mut bytes);
+    for rows in table.pieces() {
+        let values = &table.values(rows.clone())?;
+        for row in 0..rows.len() {
+            let record = Record { values, row };
+            writer.write_record(&record).map_err(refused)?;
+        }
+    }
+    writer.finalize().map_err(refused)?;
+    drop(writer);
+    let mut bytes = bytes.into_inner();
+    // The library has written today's date there.
+    bytes[1..4].copy_from_slice(&day(newest_utc));
+    Ok(bytes)
+}
+
+fn dbase_fields(table: &Table) -> impl Iterator<Item = DbaseField> {
+    table.columns().filter_map(|column| column.dbase)
+}
+
+/// Bytes of the longest text of each column of texts; `None` for the others.
+fn text_widths(table: &Table) -> Result<Vec<Option<u8>>> {
+    let mut widths = vec![None; table.columns().count()];
+    for (width, column) in widths.iter_mut().zip(table.columns()) {
+        *width = (column.kind == Kind::Text).then_some(1);
+    }
+    for rows in table.pieces() {
+        for (width, values) in widths.iter_mut().zip(table.values(rows)?) {
+            if let (Some(width), Values::Text(texts)) = (width, values) {
+                let longest = texts.iter().map(String::len).max().unwrap_or(0);
+                let longest = u8::try_from(longest.min(TEXT_MAX)).unwrap_or(u8::MAX);
+                *width = longest.max(*width);
+            }
+        }
+    }
+    Ok(widths)
+}
+
+/// Day of a time, for the same bytes each day: years since 1900, month, day.
+fn day(utc: &str) -> [u8; 3] {
+    let number = |range| -> u16 {
+        let digits: Option<&str> = utc.get(range);
+        digits.and_then(|text| text.parse().ok()).unwrap_or(0)
+    };
+    [
+        number(0..4).saturating_sub(1900),
+        number(5..7),
+        number(8..10),
+    ]
+    .map(|value| u8::try_from(value).unwrap_or(u8::MAX))
+}
+
+fn differs(what: String) -> Failure {
+    ProductFault::ReadBack { what }.into()
+}
+
+fn read_attributes(path: &Path, table: &Table) -> Result<()> {
     let unreadable = |error: dbase::Error| Failure::from(ProductFault::unreadable(error));
     let mut reader = dbase::Reader::new(BufReader::new(open(path)?)).map_err(unreadable)?;
     let mut found = reader.iter_records();
-    let mut rows = 0;
-    for expected in records {
-        rows += 1;
-        let record = found.next().transpose().map_err(unreadable)?;
-        if !record.is_some_and(|record| holds(&record, &expected)) {
-            return Err(differs(format!("attributes of point {rows}")));
+    for rows in table.pieces() {
+        let values = table.values(rows.clone())?;
+        for row in 0..rows.len() {
+            let record = found.next().transpose().map_err(unreadable)?;
+            let holds = |record: dbase::Record| {
+                let mut fields = dbase_fields(table).zip(&values);
+                fields.all(|(field, values)| holds(&record, field, &cell(values, row)))
+            };
+            if !record.is_some_and(holds) {
+                let number = rows.start + row + 1;
+                return Err(differs(format!("attributes of point {number}")));
+            }
         }
     }
     if found.next().is_some() {
+        let rows = table.rows();
         return Err(differs(format!("attributes of more than {rows} points")));
     }
     Ok(())
 }
 
-/// Whether a record holds the attributes, numbers within half a unit of their last decimal.
-fn holds(record: &dbase::Record, expected: &Attributes) -> bool {
-    let numbers = NUMBERS.iter().zip(&expected.numbers);
-    let texts = TEXTS.iter().zip(&expected.texts);
-    numbers.clone().all(|((name, _, decimals), expected)| {
-        let tolerance =
-            0.5 * 10_f64.powi(-i32::from(*decimals)) + 4.0 * f64::EPSILON * expected.abs();
-        matches!(record.get(name), Some(FieldValue::Numeric(Some(found)))
-            if (found - expected).abs() <= tolerance)
-    }) && texts
-        .clone()
-        .all(|(name, expected)| match record.get(name) {
-            Some(FieldValue::Character(found)) => found.as_deref().unwrap_or_default() == expected,
-            _ => false,
-        })
+/// Whether a record holds the value, a number within half a unit of its last decimal.
+fn holds(record: &dbase::Record, field: DbaseField, expected: &Cell) -> bool {
+    match (record.get(field.name), expected) {
+        (Some(FieldValue::Numeric(Some(found))), Cell::Number(Some(expected))) => {
+            let digit = 10_f64.powi(-i32::from(field.decimals));
+            let tolerance = 0.5 * digit + 4.0 * f64::EPSILON * expected.abs();
+            (found - expected).abs() <= tolerance
+        }
+        (Some(FieldValue::Numeric(None)), Cell::Number(None)) => true,
+        (Some(FieldValue::Character(found)), Cell::Text(expected)) => {
+            found.as_deref().unwrap_or_default() == *expected
+        }
+        _ => false,
+    }
 }
 
 #[cfg(test)]
@@ -258,50 +319,42 @@ mod tests {
     use super::*;
     use std::fs;
 
-    fn records() -> impl Iterator<Item = Attributes> {
-        [1.0, 2.0].into_iter().map(|shot| Attributes {
-            numbers: [
-                -11_224_002.182_053_322,
-                9019.0,
-                11.0,
-                shot,
-                175.312_345_678_9,
-                -14.6,
-                3_394_000.12,
-                3_394_001.37,
-                -1_498.63,
-                380_000.1,
-            ],
-            texts: ["1999-08-24T14:12:13.000".to_owned(), "å.b".to_owned()],
-        })
+    use crate::{error::Kind as FailureKind, products::gis::tests::example};
+
+    fn table() -> Table<'static> {
+        example().attributes.for_dbase()
     }
 
     #[test]
     fn a_changed_attribute_is_noticed() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.dbf");
-        write_attributes(&path, [23, 5], [99, 8, 24], records()).unwrap();
-        read_attributes(&path, records()).unwrap();
+        write_attributes(&path, example().newest_utc, &table()).unwrap();
         let bytes = fs::read(&path).unwrap();
         assert_eq!(bytes[1..4], [99, 8, 24]);
-        let longer = read_attributes(&path, records().take(1)).unwrap_err();
-        assert!(longer.fault.to_string().ends_with("more than 1 points"));
         // The last digit that stands there of a longitude.
-        let digits = b"175.312345679";
+        let digits = b"177.312345679";
         let at = bytes
             .windows(digits.len())
             .rposition(|window| window == digits);
         let mut changed = bytes;
         changed[at.unwrap() + digits.len() - 1] = b'8';
-        fs::File::create(&path)
-            .unwrap()
-            .write_all(&changed)
-            .unwrap();
-        let failure = read_attributes(&path, records()).unwrap_err();
+        write_bytes(&path, &changed).unwrap();
+        let failure = read_attributes(&path, &table()).unwrap_err();
         assert_eq!(
             failure.fault.to_string(),
             "read back differently: attributes of point 2"
         );
+    }
+
+    /// The library would tell a full disk as its own trouble.
+    #[test]
+    fn a_full_disk_is_told_as_such() {
+        let full = Path::new("/dev/full");
+        let failure = write_attributes(full, example().newest_utc, &table()).unwrap_err();
+        assert_eq!(failure.kind(), FailureKind::Io);
+        assert_eq!(failure.file.as_deref(), Some(full));
+        assert!(failure.to_string().contains("free some space"), "{failure}");
     }
 
     #[test]

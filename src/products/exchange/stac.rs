@@ -9,9 +9,11 @@ use crate::{
     error::{Place, Result},
     files::hash_file,
     products::{
-        Product,
         coordinates::{FRAME, bounding_box_deg, degrees, signed_longitude_deg},
         fault::ProductFault,
+        files::write_json,
+        footprints::points_deg,
+        product::{Content, Context, Declaration, Program, Role, Use, Write},
         site::SiteProducts,
     },
 };
@@ -26,17 +28,31 @@ const BLAKE3_MULTIHASH: &str = "1e20";
 /// Degrees (6 cm) by which the box reaches beyond its outermost points, so that one point has an area too.
 const MARGIN_DEG: f64 = 1e-6;
 
-/// The item, for a file in the folder `exchange` of `directory`; `None` when nothing says where the site is.
+pub(in crate::products) static ITEM: Declaration = Declaration {
+    path: "exchange/stac_item.json",
+    what: "the site for STAC catalogues: where, when, files with sizes and hashes; none where nothing says where it lies",
+    readers: "STAC catalogues",
+    rows: "",
+    role: Role::Metadata,
+    content: Content::Foreign,
+    write: Write::Site(|path, of| {
+        let item = item(of)?;
+        item.map(|item| write_json(path, &item).map(|()| 0))
+            .transpose()
+    }),
+    uses: &[Use {
+        program: Program::Catalogue,
+        lines: "stac-validator stac_item.json",
+    }],
+};
+
+/// The item; `None` when nothing says where the site is.
 ///
 /// # Errors
 /// A product that cannot be read; a time that is no ISO 8601.
-pub(super) fn item(
-    directory: &Path,
-    products: &[Product],
-    site: &SiteProducts,
-    shots_deg: &[[f64; 2]],
-) -> Result<Option<Value>> {
-    let mut points = shots_deg.to_vec();
+fn item(of: &Context) -> Result<Option<Value>> {
+    let site = of.site;
+    let mut points = points_deg(site);
     points.extend(outlines_deg(site));
     let Some(bounds) = bounding_box_deg(&points).map(with_margin) else {
         return Ok(None);
@@ -66,7 +82,7 @@ pub(super) fn item(
             "ssys:target_class": "planet",
         },
         "links": [],
-        "assets": assets(directory, products)?,
+        "assets": assets(of)?,
     })))
 }
 
@@ -156,19 +172,20 @@ fn instant(utc: &str) -> Result<NaiveDateTime> {
 }
 
 /// The products by their paths, with what a reader needs to fetch and check them.
-fn assets(directory: &Path, products: &[Product]) -> Result<Value> {
+fn assets(of: &Context) -> Result<Value> {
     let mut assets = Map::new();
-    for product in products {
-        let path = directory.join(&product.path);
+    for (product, declaration) in of.written {
+        let path = of.directory.join(&product.path);
         let (blake3, bytes) = hash_file(&path).in_file(&path)?;
         let relative = slashes(&product.path);
         let mut asset = json!({
             "href": format!("../{relative}"),
-            "roles": [role(&relative)],
+            "description": declaration.what,
+            "roles": [declaration.role.name()],
             "file:size": bytes,
             "file:checksum": format!("{BLAKE3_MULTIHASH}{blake3}"),
         });
-        if let Some(media) = media_type(&product.path) {
+        if let Some(media) = declaration.media_type() {
             asset["type"] = json!(media);
         }
         assets.insert(relative, asset);
@@ -179,32 +196,6 @@ fn assets(directory: &Path, products: &[Product]) -> Result<Value> {
 fn slashes(path: &Path) -> String {
     let parts: Vec<_> = path.iter().map(|part| part.to_string_lossy()).collect();
     parts.join("/")
-}
-
-fn role(path: &str) -> &'static str {
-    match path {
-        "report/index.html" => "overview",
-        "footprints.xml" | "exchange/README.txt" | "kernels.tm" => "metadata",
-        sidecar if sidecar.ends_with(".csv.json") => "metadata",
-        _ => "data",
-    }
-}
-
-fn media_type(path: &Path) -> Option<&'static str> {
-    Some(match path.extension()?.to_str()? {
-        "parquet" => "application/vnd.apache.parquet",
-        "geojson" => "application/geo+json",
-        "json" => "application/json",
-        "csv" => "text/csv",
-        "gpkg" => "application/geopackage+sqlite3",
-        "shp" => "application/vnd.shp",
-        "shx" => "application/vnd.shx",
-        "dbf" => "application/vnd.dbf",
-        "html" => "text/html",
-        "xml" => "application/xml",
-        "txt" | "prj" | "cpg" | "tm" => "text/plain",
-        _ => return None,
-    })
 }
 
 #[cfg(test)]

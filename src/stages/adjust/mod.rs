@@ -12,6 +12,7 @@ mod network;
 mod points;
 mod prepare;
 mod run;
+mod stage;
 mod summary;
 mod words;
 
@@ -23,4 +24,5 @@ pub use input::{AdjustImage, LaserShot, LaserShots, ShotRange, orientation_sigma
 pub use points::{LeftOut, LeftOutReason, PointKind};
 pub use prepare::{Candidate, prepare_adjustment};
 pub use run::adjust;
+pub use stage::Adjust;
 pub use summary::{AdjustmentSummary, GroundSummary, ImageSummary, ObservationType, TypeSummary};

@@ -1,6 +1,7 @@
 //! Statistics of an adjustment, as its report and its tables need them.
 
 use nalgebra::Vector3;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::{
@@ -15,10 +16,13 @@ use crate::geom::{
     pushbroom::{CorrectedOrientation, ExteriorOrientation},
     statistics::Summary,
 };
+use crate::schema::at;
 use crate::{footprints::FootprintImageCoordinates, geom::statistics::BAARDA_LIMIT};
 
 /// The kinds of observation.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[derive(
+    Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema,
+)]
 #[serde(rename_all = "snake_case")]
 pub enum ObservationType {
     /// Image coordinates of tie points.
@@ -36,25 +40,28 @@ pub enum ObservationType {
 }
 
 /// What the residuals of one kind of observation say.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct TypeSummary {
     /// The kind.
     pub kind: ObservationType,
     /// Scalar observations.
     pub observations: usize,
     /// Sum of their redundancy numbers.
+    #[schemars(range(min = 0.0))]
     pub redundancy: f64,
     /// Their part of the weighted sum of squares.
+    #[schemars(range(min = 0.0))]
     pub weighted_squares: f64,
     /// `sqrt(weighted squares / redundancy)`: near 1 when their standard deviations are right; 0 without
     /// redundancy.
+    #[schemars(range(min = 0.0))]
     pub variance_component: f64,
     /// Observations whose standardised residual exceeds 3.29.
     pub beyond_limit: usize,
 }
 
 /// Coordinates of one kind of point.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct GroundSummary {
     /// Adjusted minus initial X, Y and Z, metres.
     pub corrections_m: [Summary; 3],
@@ -63,7 +70,7 @@ pub struct GroundSummary {
 }
 
 /// What one image shows.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct ImageSummary {
     /// Identifier.
     pub image: String,
@@ -74,13 +81,14 @@ pub struct ImageSummary {
 }
 
 /// Statistics of an adjustment.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct AdjustmentSummary {
     /// Steps of the iteration.
     pub steps: usize,
     /// Degrees of freedom.
     pub degrees_of_freedom: usize,
     /// A posteriori standard deviation of unit weight.
+    #[schemars(range(min = 0.0))]
     pub sigma0: f64,
     /// One entry for each kind of observation that occurs.
     pub types: Vec<TypeSummary>,
@@ -91,8 +99,11 @@ pub struct AdjustmentSummary {
     /// One entry for each image, in their order.
     pub images: Vec<ImageSummary>,
     /// Range bias of each profile with its standard deviation, metres, where they are unknown.
+    #[schemars(transform = at("/items/prefixItems/2", "minimum", 0))]
     pub range_biases_m: Vec<(String, f64, f64)>,
     /// Unknowns with a correlation above 0.95: single values of them must not be interpreted.
+    #[schemars(transform = at("/items/prefixItems/2", "minimum", -1.000_001))]
+    #[schemars(transform = at("/items/prefixItems/2", "maximum", 1.000_001))]
     pub correlated: Vec<(String, String, f64)>,
 }
 

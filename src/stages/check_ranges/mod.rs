@@ -16,10 +16,7 @@ use std::sync::atomic::AtomicBool;
 
 use serde::{Deserialize, Serialize};
 
-pub use residuals::{ShotResiduals, range_residual_m};
-pub use scan::BiasScan;
-
-use super::group_profiles::Profile;
+use super::{convert_datum::Converted, group_profiles::Profile};
 use crate::{
     altimetry::MolaClock,
     config::RangeCheckConfig,
@@ -27,9 +24,14 @@ use crate::{
     footprints::Footprints,
     frames::MarsIau2000,
     geom::statistics::{Summary, Trend, outliers},
-    spice::Trajectory,
-    time::Et,
+    spice::{KernelView, Session, Trajectory},
+    stage::{Output, Stage},
+    stage_inputs,
+    time::{Et, Intervals},
 };
+
+pub use residuals::{ShotResiduals, range_residual_m};
+pub use scan::BiasScan;
 
 /// Residuals of every shot, and what they say about every profile.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -40,6 +42,84 @@ pub struct RangeCheck {
     pub profiles: Vec<ProfileRanges>,
     /// Largest error of the tabulated trajectory against the kernels, metres.
     pub trajectory_error_m: f64,
+}
+
+stage_inputs! {
+    /// Footprints, profiles, limits, the clock of MOLA, and what the trajectory comes from.
+    pub struct CheckRanges<'a> {
+        /// Footprints in IAU 2000.
+        pub converted: &'a Output<Converted>,
+        /// Profiles.
+        pub profiles: &'a Output<Vec<Profile>>,
+        /// Kernels that positions may depend on.
+        pub kernels: &'a KernelView,
+        /// The clock of MOLA.
+        pub mola_clock: &'a MolaClock,
+        /// Limits and the scan of clock biases.
+        pub range_check: &'a RangeCheckConfig,
+    }
+}
+
+impl Stage for CheckRanges<'_> {
+    const NAME: &'static str = "check_ranges";
+    type Output = RangeCheck;
+    stage_inputs!(fingerprint);
+
+    fn run(&self, stop: &AtomicBool) -> Result<RangeCheck> {
+        let profiles = self.profiles.value()?;
+        let reach_s = trajectory_reach_s(self.range_check, self.mola_clock);
+        check_ranges(
+            &self.converted.value()?.footprints,
+            profiles,
+            &trajectory(self.kernels.session()?, profiles, reach_s)?,
+            self.mola_clock,
+            self.range_check,
+            stop,
+        )
+    }
+
+    /// Position at the shots of every profile; one finding for all that have it.
+    fn examine(&self) -> Vec<Result<String>> {
+        let profiles = self.profiles.get().map_or(&[][..], Vec::as_slice);
+        let (mut covered, mut shots, mut found) = (0, 0, Vec::new());
+        for profile in profiles {
+            let session = self.kernels.session();
+            match session.and_then(|session| session.require_position(profile.interval)) {
+                Ok(()) => {
+                    covered += 1;
+                    shots += profile.rows.len();
+                }
+                Err(failure) => found.push(Err(failure)),
+            }
+        }
+        let of = profiles.len();
+        let finding = format!("{covered} of {of} profiles ({shots} shots): position covered");
+        found.extend((of > 0).then_some(Ok(finding)));
+        found
+    }
+}
+
+/// Seconds of trajectory beyond what the scan of the clock bias reaches.
+const TRAJECTORY_MARGIN_S: f64 = 0.5;
+/// The tabulated trajectory stays this close to the kernels, metres: a tenth of a PEDR centimetre.
+const TRAJECTORY_TOLERANCE_M: f64 = 0.001;
+
+/// Seconds beyond a profile for which the spacecraft's trajectory is tabulated.
+#[must_use]
+pub fn trajectory_reach_s(range_check: &RangeCheckConfig, mola_clock: &MolaClock) -> f64 {
+    range_check.scan_half_width_s + mola_clock.bias_s + TRAJECTORY_MARGIN_S
+}
+
+/// Tabulates the spacecraft's trajectory over all profiles, `reach_s` beyond them as far as the kernels go.
+fn trajectory(session: &Session, profiles: &[Profile], reach_s: f64) -> Result<Trajectory> {
+    for profile in profiles {
+        session.require_position(profile.interval)?;
+    }
+    let reach = profiles
+        .iter()
+        .map(|profile| profile.interval.padded(reach_s));
+    let covered = Intervals::union_of(reach).intersection(&session.coverage()?.spk);
+    session.trajectory(&covered, TRAJECTORY_TOLERANCE_M)
 }
 
 /// Statistics of one profile.

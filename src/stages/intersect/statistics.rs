@@ -1,5 +1,6 @@
 //! Residuals by image, and points whose residuals are out of line.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::{IntersectedPoint, MeasureResidual};
@@ -10,7 +11,7 @@ use crate::geom::statistics::Summary;
 const OUTLIER_SIGMA: f64 = 5.0;
 
 /// Statistics along and across the track.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Residuals2 {
     /// Along the track: focal pixels, or lines.
     pub along: Summary,
@@ -19,7 +20,7 @@ pub struct Residuals2 {
 }
 
 /// Residuals of one image over all points.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct ImageResiduals {
     /// Identifier of the image.
     pub image: String,

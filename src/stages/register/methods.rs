@@ -4,6 +4,7 @@ use std::{collections::BTreeMap, sync::atomic::AtomicBool};
 
 use nalgebra::Vector3;
 use rayon::prelude::*;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::super::oriented::OrientedImage;
@@ -14,10 +15,11 @@ use crate::{
         pushbroom::{CameraModel, FixedPoint, FrameFirst, Limits, Solution, Unseen},
         statistics::Summary,
     },
+    schema::none_negative,
 };
 
 /// A published iteration.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Method {
     /// The image as a frame with the orientation of the current line (Konecny et al. 1987, Wang 1990).
@@ -27,11 +29,12 @@ pub enum Method {
 }
 
 /// One iteration with one model on all points within the image's lines.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct MethodRun {
     /// The iteration.
     pub method: Method,
     /// The orientation: of first order as in Shan, Lee & Yoon 2002, or of second as in Shan et al. 2005.
+    #[schemars(extend("enum" = ["first_order", "second_order"]))]
     pub model: CameraModel,
     /// Points that were tried.
     pub points: u64,
@@ -42,6 +45,7 @@ pub struct MethodRun {
     /// Line found minus the one of Newton's method with the same model.
     pub difference_lines: Summary,
     /// Mean |step| of each iteration over the points with a result, lines; a point that has ended counts as 0.
+    #[schemars(transform = none_negative)]
     pub mean_step_lines: Vec<f64>,
 }
 

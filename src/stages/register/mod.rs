@@ -11,14 +11,12 @@ use std::{collections::BTreeMap, sync::atomic::AtomicBool};
 
 use nalgebra::Vector3;
 use rayon::prelude::*;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-pub use methods::{Method, MethodRun};
-pub use points::{PointOnImage, ProfileOnImage, RegisteredPoints};
-
 use super::{
-    fit_sensor_model::SensorModel, group_profiles::Profile, orientation::Orientation,
-    oriented::OrientedImage, tag_times::ImageTimes,
+    convert_datum::Converted, fit_sensor_model::SensorModel, group_profiles::Profile,
+    orientation::Orientation, oriented::OrientedImage, tag_times::ImageTimes,
 };
 use crate::{
     config::RegistrationConfig,
@@ -30,7 +28,12 @@ use crate::{
         pushbroom::{CameraModel, ExteriorOrientation, Projector, Unseen},
         statistics::Summary,
     },
+    stage::{Output, Round, Stage},
+    stage_inputs,
 };
+
+pub use methods::{Method, MethodRun};
+pub use points::{PointOnImage, ProfileOnImage, RegisteredPoints};
 
 /// Points between two looks at whether the user stops the program.
 const POINTS_AT_ONCE: usize = 65_536;
@@ -55,7 +58,7 @@ pub struct ImageRegistration {
 }
 
 /// What another model of the same image makes of the same points.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct ModelDifference {
     /// The other model.
     pub model: CameraModel,
@@ -73,6 +76,50 @@ enum Reject {
     /// Mars itself stands between camera and point.
     #[error("beyond the horizon")]
     BeyondHorizon,
+}
+
+stage_inputs! {
+    /// One image with its orientation, and the footprints.
+    pub struct Register<'a> {
+        /// Identifier of the image.
+        pub image: &'a str,
+        /// Which orientation.
+        pub round: Round,
+        /// Its line times.
+        pub times: &'a Output<ImageTimes>,
+        /// Its orientation.
+        pub orientation: &'a Output<Orientation>,
+        /// Its sensor models.
+        pub model: &'a Output<SensorModel>,
+        /// Footprints in IAU 2000.
+        pub converted: &'a Output<Converted>,
+        /// Profiles.
+        pub profiles: &'a Output<Vec<Profile>>,
+        /// Model to project with, and the published iterations.
+        pub registration: &'a RegistrationConfig,
+    }
+}
+
+impl Stage for Register<'_> {
+    const NAME: &'static str = "register";
+    type Output = ImageRegistration;
+    stage_inputs!(fingerprint);
+
+    fn part(&self) -> Option<String> {
+        self.round.part_of(self.image)
+    }
+
+    fn run(&self, stop: &AtomicBool) -> Result<ImageRegistration> {
+        register(
+            self.times.value()?,
+            self.orientation.value()?,
+            self.model.value()?,
+            &self.converted.value()?.footprints,
+            self.profiles.value()?,
+            self.registration,
+            stop,
+        )
+    }
 }
 
 /// Projects all profiles into `image`.

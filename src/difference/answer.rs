@@ -1,0 +1,47 @@
+//! What `report diff --json` answers.
+
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use super::RunDifference;
+use crate::schema::DocumentSchema;
+
+/// What differs between two outputs, site by site.
+#[derive(Debug, Serialize, JsonSchema)]
+#[schemars(
+    title = "Differences between two runs",
+    description = "Answer of `areograph report diff --json`: for every site of both outputs what differs, B - A. \
+                   Metres, arcseconds and seconds; what is unknown is left out."
+)]
+pub struct Answer<'a> {
+    /// Sites of both.
+    pub sites: Vec<SiteAnswer<'a>>,
+    /// Sites that only A has.
+    pub only_in_a: &'a [String],
+    /// Sites that only B has.
+    pub only_in_b: &'a [String],
+}
+
+/// What came of a site of both outputs.
+#[derive(Debug, Serialize, JsonSchema)]
+#[serde(untagged)]
+pub enum SiteAnswer<'a> {
+    /// What differs.
+    Difference(&'a RunDifference),
+    /// A site that could not be compared.
+    Failed {
+        /// Its name.
+        site: &'a str,
+        /// Why.
+        error: String,
+        /// Exit code of such a failure.
+        #[schemars(range(min = 1))]
+        exit_code: u8,
+    },
+}
+
+/// Schema of the answer.
+#[must_use]
+pub fn schema() -> DocumentSchema {
+    DocumentSchema::of::<Answer>("difference")
+}

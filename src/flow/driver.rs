@@ -1,0 +1,107 @@
+//! What a driver of the flow does with its stages.
+
+use std::{path::PathBuf, sync::atomic::AtomicBool};
+
+use super::{STAGES, site::Site};
+use crate::{
+    config::SiteConfig,
+    error::{Failure, Place, Result, Stopped},
+    files::{HashedFile, InputFiles},
+    spice::Wanted,
+    stage::{Output, Provenance, Reason, Stage},
+    stages::{group_profiles::Profile, tag_times::ImageTimes},
+};
+
+/// Why the flow ends before its end.
+#[derive(Debug)]
+pub(super) enum Leave {
+    /// The last stage that was asked for is done.
+    StageReached,
+    /// Something failed.
+    Failed(Failure),
+}
+
+impl From<Failure> for Leave {
+    fn from(failure: Failure) -> Self {
+        Self::Failed(failure)
+    }
+}
+
+/// What a step of the flow gives, unless the flow ends there.
+pub(super) type Flow<T> = std::result::Result<T, Leave>;
+
+/// A stage with the reason why it runs, or [`Reason::Unchanged`].
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct StageReason {
+    /// Label of the stage, for example `register/E02-00665`.
+    pub stage: String,
+    /// Why it runs, or that it does not.
+    pub reason: Reason,
+}
+
+/// Stages that the flow has passed, with the origin of their outputs where these are known.
+pub(super) type Ledger = Vec<(String, Option<Provenance>)>;
+
+/// Carries out one description of the flow: run, plan or check.
+pub(super) trait Driver {
+    /// The input files of the site.
+    fn files(&self) -> &InputFiles;
+
+    /// Set from outside to stop.
+    fn stop(&self) -> &AtomicBool;
+
+    /// Before the stage with this name.
+    fn enter(&mut self, stage: &'static str) -> Flow<()>;
+
+    /// The output of a stage, or a pending one.
+    fn stage<S: Stage>(&mut self, stage: &S) -> Flow<Output<S::Output>>;
+
+    /// Files that a stage reads, with their hashes.
+    fn hash(&mut self, stage: &'static str, paths: &[PathBuf]) -> Flow<Vec<HashedFile>> {
+        self.enter(stage)?;
+        Ok(self.files().hash_all(paths, self.stop()).in_stage(stage)?)
+    }
+
+    /// The images that profiles may be simultaneous with.
+    fn usable(&self, images: &[Output<ImageTimes>]) -> Vec<Output<ImageTimes>> {
+        images.to_vec()
+    }
+
+    /// What a step between stages gave; `None` when it failed and the driver goes on.
+    fn attempt<T>(&mut self, stage: &str, result: Result<T>) -> Flow<Option<T>> {
+        Ok(Some(result.in_stage(stage)?))
+    }
+
+    /// The times at which the site reads kernels; `None` while they are not known.
+    fn required(
+        &self,
+        config: &SiteConfig,
+        images: &[Output<ImageTimes>],
+        profiles: &Output<Vec<Profile>>,
+    ) -> Option<Wanted> {
+        let images = images.iter().map(Output::get);
+        let images: Vec<&ImageTimes> = images.collect::<Option<_>>()?;
+        Some(super::kernels::wanted(config, &images, profiles.get()?))
+    }
+
+    /// The products.
+    fn publish(&mut self, config: &SiteConfig, site: &Site) -> Flow<()>;
+}
+
+/// Where a run or a plan ends, and the files that it reads.
+pub(super) struct Bounds<'a> {
+    pub(super) until: &'a str,
+    pub(super) stop: &'a AtomicBool,
+    pub(super) files: InputFiles,
+}
+
+impl Bounds<'_> {
+    /// Leaves the flow before `stage` when it is not asked for, or when the user stops the program.
+    pub(super) fn enter(&self, stage: &'static str) -> Flow<()> {
+        let place = |name: &str| STAGES.iter().position(|stage| *stage == name);
+        if place(self.until) < place(stage) {
+            return Err(Leave::StageReached);
+        }
+        Ok(Stopped::check(self.stop).in_stage(stage)?)
+    }
+}

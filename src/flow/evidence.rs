@@ -1,0 +1,102 @@
+//! What the verdict rests on, and what a reader of the products should know.
+
+use std::collections::BTreeMap;
+
+use super::site::Site;
+use crate::{
+    config::SiteConfig,
+    error::Result,
+    stages::{
+        judge::{AdjustmentEvidence, Evidence, JudgedImage, Verdict, judge},
+        site_image::SiteImage,
+    },
+};
+
+/// The verdict, and whether the images of every pair place their tie points together after the adjustment.
+pub(super) fn judged(
+    config: &SiteConfig,
+    site: &Site,
+    warnings: &[String],
+    complaints: &[String],
+) -> Result<(Verdict, bool)> {
+    let images = judged_images(&site.images)?;
+    let adjusted = site.adjustment.as_ref();
+    let adjusted_images = adjusted.map_or(&[][..], |of| &of.adjusted_images);
+    let adjusted_images = judged_images(adjusted_images)?;
+    let adjustment = match adjusted {
+        Some(adjustment) => Some(AdjustmentEvidence {
+            ties: adjustment.ties.value()?,
+            adjusted: adjustment.adjusted.value()?,
+            images: &adjusted_images,
+            pairs: adjustment.adjusted_pairs.value()?,
+        }),
+        None => None,
+    };
+    let failure = site
+        .adjustment_failure
+        .as_ref()
+        .map(|failure| failure.fault.to_string());
+    let searched = !config.pedr.files.is_empty();
+    let verdict = judge(&Evidence {
+        footprints: searched.then_some(site.converted.value()?.footprints.len()),
+        ranges: site.ranges.value()?,
+        clock_correction_s: config.mola_clock.correction_s(),
+        images: &images,
+        warnings,
+        complaints,
+        adjustment,
+        adjustment_failure: failure.as_deref(),
+    });
+    Ok((verdict, adjustment.is_some_and(|of| of.images_agree())))
+}
+
+fn judged_images(images: &[SiteImage]) -> Result<Vec<JudgedImage<'_>>> {
+    let images = images.iter().map(|image| {
+        Ok(JudgedImage {
+            id: &image.times.value()?.id,
+            orientation: image.orientation.value()?,
+            model: image.model.value()?,
+        })
+    });
+    images.collect()
+}
+
+/// What a reader of the products should know, one sentence each.
+pub(super) fn notes(site: &Site) -> Result<Vec<String>> {
+    let mut notes = Vec::new();
+    if let Some(choice) = &site.choice {
+        notes.extend(choice.value()?.notes.iter().cloned());
+    }
+    if let Some(kernels) = &site.kernels {
+        notes.extend(kernels.notes().cloned());
+    }
+    notes.extend(site.found.value()?.notes.iter().cloned());
+    notes.extend(site.converted.value()?.notes.iter().cloned());
+    for image in &site.images {
+        let times = image.times.value()?;
+        let of_image = times.notes.iter();
+        notes.extend(of_image.map(|note| format!("image {}: {note}", times.id)));
+    }
+    if let Some(adjustment) = &site.adjustment {
+        notes.extend(adjustment.ties.value()?.notes());
+    }
+    Ok(notes)
+}
+
+/// What was wrong with input records, one sentence each.
+pub(super) fn complaints(site: &Site) -> Result<Vec<String>> {
+    let complaints = site.found.value()?.complaints.iter();
+    let mut complaints: Vec<String> = complaints.map(ToString::to_string).collect();
+    if let Some(adjustment) = &site.adjustment {
+        complaints.extend(adjustment.ties.value()?.complaints.iter().cloned());
+    }
+    Ok(complaints)
+}
+
+/// Shots inside a window that were left out, by reason.
+pub(super) fn rejected(site: &Site) -> Result<BTreeMap<String, u64>> {
+    let rejected = site.found.value()?.rejected.iter();
+    Ok(rejected
+        .map(|(reason, count)| (reason.to_string(), *count))
+        .collect())
+}

@@ -1,0 +1,197 @@
+//! The flow that makes products: a stage runs when something that it sees has changed.
+
+use std::{path::PathBuf, sync::atomic::AtomicBool};
+
+use super::{
+    PUBLISH,
+    driver::{Bounds, Driver, Flow, Leave, Ledger, StageReason},
+    publish::{inputs, publish, standing},
+    site::{Site, site},
+};
+use crate::{
+    config::SiteConfig,
+    error::{Place, Result},
+    files::InputFiles,
+    stage::{Output, Reason, Stage},
+    store::{
+        cache::StageCache,
+        lock::SiteLock,
+        manifest::Manifest,
+        publish::{CACHE, note_failure},
+    },
+};
+
+/// How a site is run.
+#[derive(Debug)]
+pub struct RunOptions<'a> {
+    /// Products go to `<out>/<site>`.
+    pub out: PathBuf,
+    /// Last stage to run, one of [`STAGES`](super::STAGES).
+    pub until: &'a str,
+    /// Use no stored output.
+    pub force: bool,
+    /// Set from outside to stop between two stages, or inside the long ones.
+    pub stop: &'a AtomicBool,
+}
+
+/// What a run did.
+#[derive(Debug)]
+pub struct SiteOutcome {
+    /// Site identifier.
+    pub site: String,
+    /// Folder of the products.
+    pub folder: PathBuf,
+    /// Every stage that the run passed, with the reason why it ran, or that it was kept.
+    pub stages: Vec<StageReason>,
+    /// How the run ended.
+    pub ending: Ending,
+}
+
+/// How a run ended.
+#[derive(Debug)]
+pub enum Ending {
+    /// Products were published.
+    Published(Manifest),
+    /// Nothing had changed; the products of an earlier run stand.
+    Unchanged(Manifest),
+    /// Stopped after the stage that was asked for.
+    StoppedAfter(String),
+}
+
+/// Runs one site from its configuration to its products.
+///
+/// A stage whose inputs did not change is not run; its stored output is used.
+///
+/// # Errors
+/// The first failure, with site, stage and file; products of an earlier run stay as they are.
+pub fn run_site(config: &SiteConfig, options: &RunOptions<'_>) -> Result<SiteOutcome> {
+    let span = tracing::info_span!("site", id = %config.site);
+    let _entered = span.enter();
+    let folder = options.out.join(&config.site);
+    let _lock = SiteLock::take(&folder).in_site(&config.site)?;
+    let mut run = Run {
+        cache: StageCache::new(&folder.join(CACHE), options.force),
+        folder,
+        bounds: Bounds {
+            until: options.until,
+            stop: options.stop,
+            files: InputFiles::default(),
+        },
+        ledger: Ledger::new(),
+        passed: Vec::new(),
+        ending: Ending::StoppedAfter(options.until.to_owned()),
+    };
+    let driven = match site(&mut run, config) {
+        Ok(()) | Err(Leave::StageReached) => run.verify_inputs(),
+        Err(Leave::Failed(failure)) => {
+            // What was made from files that changed is forgotten; the failure itself says more than the change.
+            let _ = run.verify_inputs();
+            Err(failure)
+        }
+    };
+    let driven = driven.in_site(&config.site);
+    note_failure(
+        &run.folder,
+        driven.as_ref().err().map(ToString::to_string).as_deref(),
+    );
+    driven?;
+    Ok(SiteOutcome {
+        site: config.site.clone(),
+        folder: run.folder,
+        stages: run.passed,
+        ending: run.ending,
+    })
+}
+
+struct Run<'a> {
+    cache: StageCache,
+    folder: PathBuf,
+    bounds: Bounds<'a>,
+    ledger: Ledger,
+    /// Every stage so far.
+    passed: Vec<StageReason>,
+    ending: Ending,
+}
+
+impl Run<'_> {
+    /// Notes and tells why a stage runs, or that it is kept.
+    fn pass(&mut self, label: &str, reason: Reason) {
+        let word = if reason.runs() { "running" } else { "kept" };
+        tracing::info!(stage = label, "{word}: {reason}");
+        self.passed.push(StageReason {
+            stage: label.to_owned(),
+            reason,
+        });
+    }
+
+    /// Makes sure that all stages have read the same files. Otherwise their outputs would stand under the hashes
+    /// of other ones: those that were made just now are forgotten.
+    fn verify_inputs(&self) -> Result<()> {
+        let unchanged = self.bounds.files.verify_all();
+        if unchanged.is_err() {
+            for fresh in self.passed.iter().filter(|of| of.reason.runs()) {
+                self.cache.forget(&fresh.stage);
+            }
+        }
+        unchanged
+    }
+}
+
+impl Driver for Run<'_> {
+    fn files(&self) -> &InputFiles {
+        &self.bounds.files
+    }
+
+    fn stop(&self) -> &AtomicBool {
+        self.bounds.stop
+    }
+
+    fn enter(&mut self, stage: &'static str) -> Flow<()> {
+        self.bounds.enter(stage)
+    }
+
+    fn stage<S: Stage>(&mut self, stage: &S) -> Flow<Output<S::Output>> {
+        self.enter(S::NAME)?;
+        let (label, inputs) = (stage.label(), stage.inputs());
+        let output = match self.cache.load(&label, &inputs) {
+            Ok(output) => {
+                self.pass(&label, Reason::Unchanged);
+                output
+            }
+            Err(reason) => {
+                self.pass(&label, reason);
+                let value = stage.run(self.bounds.stop).in_stage(&label)?;
+                for path in inputs.file_paths() {
+                    self.bounds.files.verify(path).in_stage(&label)?;
+                }
+                self.cache.store(&label, inputs, value).in_stage(&label)?
+            }
+        };
+        self.ledger.push((label, output.provenance().cloned()));
+        Ok(output)
+    }
+
+    /// Publishes the products unless those of an earlier run stand.
+    fn publish(&mut self, config: &SiteConfig, site: &Site) -> Flow<()> {
+        self.enter(PUBLISH)?;
+        let inputs = inputs(config, site, &self.folder, &self.ledger);
+        self.ending = match standing(&self.folder, &self.cache, &inputs) {
+            Ok(manifest) => {
+                self.pass(PUBLISH, Reason::Unchanged);
+                Ending::Unchanged(manifest)
+            }
+            Err(reason) => {
+                self.pass(PUBLISH, reason);
+                self.verify_inputs().in_stage(PUBLISH)?;
+                let manifest = publish(config, site, &self.folder, &self.ledger, &inputs);
+                let manifest = manifest.in_stage(PUBLISH)?;
+                let stored = self.cache.store(PUBLISH, inputs, manifest.clone());
+                stored.in_stage(PUBLISH)?;
+                self.cache
+                    .keep_only(manifest.stages.iter().map(|stage| &*stage.name));
+                Ending::Published(manifest)
+            }
+        };
+        Ok(())
+    }
+}

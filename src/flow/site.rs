@@ -1,0 +1,391 @@
+//! The flow of one site, told once: [`site`] is driven by run and plan, its parts by check.
+
+use super::{
+    LOAD_KERNELS,
+    choice::{ChooseKernels, KernelChoice, RivalKernelSets, rival_positions},
+    driver::{Driver, Flow, Leave},
+    kernels::load_kernels,
+};
+use crate::{
+    config::{ImageConfig, SiteConfig},
+    error::{Failure, Kind},
+    kernel_source::KernelSource,
+    spice::{KernelSet, KernelView, Wanted},
+    stage::{InOrder, Output, Round, Stage},
+    stages::{
+        adjust::{Adjust, Adjusted},
+        check_ranges::{CheckRanges, RangeCheck},
+        compare_pairs::{ComparePairs, PairComparison},
+        convert_datum::{ConvertDatum, Converted},
+        describe_kernels::{DescribeKernels, KernelDescription, Required},
+        fit_sensor_model::FitSensorModel,
+        group_profiles::{GroupProfiles, Profile},
+        intersect::{Intersect, IntersectedTies},
+        orientation::Orientation,
+        read_ties::{ImageNames, ReadTies, TieFiles, Ties},
+        register::Register,
+        reorient::Reorient,
+        sample_orientation::SampleOrientation,
+        search_footprints::{PedrFiles, SearchFootprints, SearchResult},
+        site_image::SiteImage,
+        tag_times::{ImageTimes, TagTimes},
+        tag_utc::TagUtc,
+    },
+};
+
+/// What the stages before the kernels' choice make of a site.
+#[derive(Clone)]
+pub(super) struct Prepared {
+    pub(super) found: Output<SearchResult>,
+    pub(super) converted: Output<Converted>,
+    pub(super) profiles: Output<Vec<Profile>>,
+    /// Line times, in the order of the configuration.
+    pub(super) images: Vec<Output<ImageTimes>>,
+    /// The times at which the site reads kernels; `None` while they are not known.
+    pub(super) required: Option<Wanted>,
+}
+
+/// A site with the outputs of all its stages.
+pub(super) struct Site {
+    pub(super) found: Output<SearchResult>,
+    pub(super) converted: Output<Converted>,
+    pub(super) utc: Output<Vec<String>>,
+    pub(super) profiles: Output<Vec<Profile>>,
+    pub(super) required: Option<Wanted>,
+    pub(super) choice: Option<Output<KernelChoice>>,
+    pub(super) kernels: Option<KernelSet>,
+    pub(super) described: Output<KernelDescription>,
+    pub(super) ranges: Output<RangeCheck>,
+    /// In the order of the configuration.
+    pub(super) images: Vec<SiteImage>,
+    /// Nothing for a site without tie points, and none when it failed.
+    pub(super) adjustment: Option<Adjustment>,
+    /// Why there is no adjustment although there are tie points.
+    pub(super) adjustment_failure: Option<Failure>,
+}
+
+/// What tie points make of a site, before and after the adjustment.
+pub(super) struct Adjustment {
+    pub(super) ties: Output<Ties>,
+    pub(super) intersected: Output<IntersectedTies>,
+    pub(super) pairs: Output<Vec<PairComparison>>,
+    pub(super) adjusted: Output<Adjusted>,
+    /// The same images with their adjusted orientation.
+    pub(super) adjusted_images: Vec<SiteImage>,
+    pub(super) adjusted_intersected: Output<IntersectedTies>,
+    pub(super) adjusted_pairs: Output<Vec<PairComparison>>,
+}
+
+/// The flow of one site, from its configuration to its products.
+pub(super) fn site<D: Driver>(flow: &mut D, config: &SiteConfig) -> Flow<()> {
+    let prepared = prepare(flow, config)?;
+    let (choice, chosen) = choose(flow, config, prepared.required.as_ref())?;
+    let kernels = match chosen {
+        Some(chosen) => kernels(flow, config, prepared.required.as_ref(), chosen)?,
+        None => None,
+    };
+    let mut site = orient(flow, config, prepared, kernels)?;
+    site.choice = choice;
+    match adjust(flow, config, &site) {
+        Ok(adjustment) => site.adjustment = adjustment,
+        // What the measurements do not determine keeps no other product from its readers.
+        Err(Leave::Failed(failure)) if is_of_adjustment(&failure) => {
+            tracing::warn!("{failure}");
+            site.adjustment_failure = Some(failure);
+        }
+        Err(leave) => return Err(leave),
+    }
+    flow.publish(config, &site)
+}
+
+/// Times, footprints and profiles: what needs clocks and no orbit.
+pub(super) fn prepare<D: Driver>(flow: &mut D, config: &SiteConfig) -> Flow<Prepared> {
+    let clocks = kernels(flow, config, Some(&Wanted::default()), 0)?;
+    let images = {
+        let kernels = &KernelView::text(clocks.as_ref());
+        let tag = |image: &ImageConfig| {
+            let label = flow.hash(TagTimes::NAME, image.label.as_slice())?.pop();
+            flow.stage(&TagTimes {
+                image,
+                label,
+                kernels,
+            })
+        };
+        config.images.iter().map(tag).collect::<Flow<Vec<_>>>()?
+    };
+    let files = flow.hash(SearchFootprints::NAME, &config.pedr.files)?;
+    let found = flow.stage(&SearchFootprints {
+        pedr: &config.pedr,
+        files: PedrFiles(&files),
+        windows: &config.windows,
+        clock_correction_s: &config.mola_clock.correction_s(),
+    })?;
+    let converted = flow.stage(&ConvertDatum {
+        found: &found,
+        mola_clock: &config.mola_clock,
+    })?;
+    let profiles = flow.stage(&GroupProfiles {
+        converted: &converted,
+        windows: &config.windows,
+        images: InOrder(&flow.usable(&images)),
+    })?;
+    Ok(Prepared {
+        required: flow.required(config, &images, &profiles),
+        found,
+        converted,
+        profiles,
+        images,
+    })
+}
+
+/// Of rival kernel sets the one to use, by its index; the first where there is one source. The index is `None`
+/// while it is not known.
+fn choose<D: Driver>(
+    flow: &mut D,
+    config: &SiteConfig,
+    required: Option<&Wanted>,
+) -> Flow<(Option<Output<KernelChoice>>, Option<usize>)> {
+    flow.enter(ChooseKernels::NAME)?;
+    let rivals = rival_positions(config, flow.files());
+    let rivals = flow
+        .attempt(ChooseKernels::NAME, rivals)?
+        .unwrap_or_default();
+    if rivals.is_empty() {
+        return Ok((None, Some(0)));
+    }
+    let choice = flow.stage(&ChooseKernels {
+        sets: RivalKernelSets::new(&rivals),
+        required: Required(required),
+        compare_clocks: &!config.images.is_empty(),
+    })?;
+    let chosen = choice.get().map(|choice| choice.chosen);
+    Ok((Some(choice), chosen))
+}
+
+/// Ranges, orientation, sensor models and registration with the kernels that were chosen.
+pub(super) fn orient<D: Driver>(
+    flow: &mut D,
+    config: &SiteConfig,
+    prepared: Prepared,
+    kernels: Option<KernelSet>,
+) -> Flow<Site> {
+    let Prepared {
+        found,
+        converted,
+        profiles,
+        images,
+        required,
+    } = prepared;
+    let ranges = {
+        let view = KernelView::positions(kernels.as_ref());
+        let view = flow.attempt(CheckRanges::NAME, view)?;
+        flow.stage(&CheckRanges {
+            converted: &converted,
+            profiles: &profiles,
+            kernels: &view.unwrap_or_else(|| KernelView::all(None)),
+            mola_clock: &config.mola_clock,
+            range_check: &config.range_check,
+        })?
+    };
+    let (orientations, described, utc) = {
+        let view = &KernelView::all(kernels.as_ref());
+        let orientations = orientations(flow, config, &images, view)?;
+        let described = flow.stage(&DescribeKernels {
+            kernels: view,
+            required: Required(required.as_ref()),
+            ck_tolerance_s: &config.kernels.ck_tolerance_s,
+        })?;
+        let utc = flow.stage(&TagUtc {
+            converted: &converted,
+            kernels: view,
+        })?;
+        (orientations, described, utc)
+    };
+    let shots = (&converted, &profiles);
+    let images = registered(flow, config, Round::Initial, &images, orientations, shots)?;
+    Ok(Site {
+        found,
+        converted,
+        utc,
+        profiles,
+        required,
+        choice: None,
+        kernels,
+        described,
+        ranges,
+        images,
+        adjustment: None,
+        adjustment_failure: None,
+    })
+}
+
+/// Orientation of every image by the kernels.
+fn orientations<D: Driver>(
+    flow: &mut D,
+    config: &SiteConfig,
+    images: &[Output<ImageTimes>],
+    kernels: &KernelView,
+) -> Flow<Vec<Output<Orientation>>> {
+    let images = config.images.iter().zip(images);
+    let sample = |(image, times): (&ImageConfig, _)| {
+        flow.stage(&SampleOrientation {
+            image: &image.id,
+            times,
+            kernels,
+            coverage: &config.kernels,
+            pointing: &config.pointing,
+            orientation: &config.orientation,
+        })
+    };
+    images.map(sample).collect()
+}
+
+/// Every image with its orientation, sensor models and footprints.
+fn registered<D: Driver>(
+    flow: &mut D,
+    config: &SiteConfig,
+    round: Round,
+    times: &[Output<ImageTimes>],
+    orientations: Vec<Output<Orientation>>,
+    (converted, profiles): (&Output<Converted>, &Output<Vec<Profile>>),
+) -> Flow<Vec<SiteImage>> {
+    let oriented = config.images.iter().zip(times).zip(orientations);
+    let register = |((image, times), orientation): ((&ImageConfig, &Output<_>), _)| {
+        let image = &*image.id;
+        let model = flow.stage(&FitSensorModel {
+            image,
+            round,
+            samples: &orientation,
+            orientation: &config.orientation,
+        })?;
+        let registration = flow.stage(&Register {
+            image,
+            round,
+            times,
+            orientation: &orientation,
+            model: &model,
+            converted,
+            profiles,
+            registration: &config.registration,
+        })?;
+        Ok(SiteImage {
+            times: times.clone(),
+            orientation,
+            model,
+            registration,
+        })
+    };
+    oriented.map(register).collect()
+}
+
+/// Tie points, their ground points, the combined adjustment, and the images once more as adjusted; nothing for a
+/// site without tie points.
+fn adjust<D: Driver>(flow: &mut D, config: &SiteConfig, site: &Site) -> Flow<Option<Adjustment>> {
+    if config.ties.files.is_empty() {
+        return Ok(None);
+    }
+    let ties = ties(flow, config)?;
+    let (intersected, pairs) = intersect(flow, config, Round::Initial, &site.images, &ties, site)?;
+    let adjusted = flow.stage(&Adjust {
+        images: InOrder(&site.images),
+        model: &config.registration.model,
+        converted: &site.converted,
+        profiles: &site.profiles,
+        ties: &ties,
+        intersected: &intersected,
+        adjustment: &config.adjustment,
+    })?;
+    let reorient = |(index, image): (usize, &SiteImage)| {
+        flow.stage(&Reorient {
+            image: &config.images[index].id,
+            index: &index,
+            times: &image.times,
+            orientation: &image.orientation,
+            adjusted: &adjusted,
+        })
+    };
+    let orientations = site.images.iter().enumerate().map(reorient);
+    let orientations = orientations.collect::<Flow<Vec<_>>>()?;
+    let times: Vec<_> = site
+        .images
+        .iter()
+        .map(|image| image.times.clone())
+        .collect();
+    let shots = (&site.converted, &site.profiles);
+    let adjusted_images = registered(flow, config, Round::Adjusted, &times, orientations, shots)?;
+    let (adjusted_intersected, adjusted_pairs) =
+        intersect(flow, config, Round::Adjusted, &adjusted_images, &ties, site)?;
+    Ok(Some(Adjustment {
+        ties,
+        intersected,
+        pairs,
+        adjusted,
+        adjusted_images,
+        adjusted_intersected,
+        adjusted_pairs,
+    }))
+}
+
+/// Whether a failure lies in what the tie points and the orientation determine, not in a file that cannot be read.
+fn is_of_adjustment(failure: &Failure) -> bool {
+    let stage = failure.stage.as_deref().unwrap_or_default();
+    let name = stage.split('/').next().unwrap_or_default();
+    let of_adjustment = [Intersect::NAME, Adjust::NAME, Reorient::NAME].contains(&name);
+    failure.kind() == Kind::Input && (of_adjustment || stage.ends_with("/adjusted"))
+}
+
+/// The tie points of the site's files.
+pub(super) fn ties<D: Driver>(flow: &mut D, config: &SiteConfig) -> Flow<Output<Ties>> {
+    let files = flow.hash(ReadTies::NAME, &config.ties.files)?;
+    flow.stage(&ReadTies {
+        ties: &config.ties,
+        files: TieFiles(&files),
+        images: ImageNames(&config.images),
+    })
+}
+
+/// Ground points of the tie points, and what every pair of images says of itself.
+fn intersect<D: Driver>(
+    flow: &mut D,
+    config: &SiteConfig,
+    round: Round,
+    images: &[SiteImage],
+    ties: &Output<Ties>,
+    site: &Site,
+) -> Flow<(Output<IntersectedTies>, Output<Vec<PairComparison>>)> {
+    let (images, model) = (InOrder(images), &config.registration.model);
+    let intersected = flow.stage(&Intersect {
+        round,
+        images,
+        model,
+        ties,
+        intersection: &config.intersection,
+    })?;
+    let pairs = flow.stage(&ComparePairs {
+        round,
+        images,
+        model,
+        ties,
+        intersected: &intersected,
+        converted: &site.converted,
+        profiles: &site.profiles,
+    })?;
+    Ok((intersected, pairs))
+}
+
+/// The kernels of the configuration for the `required` times; `None` while it is not known which these are.
+pub(super) fn kernels<D: Driver>(
+    flow: &mut D,
+    config: &SiteConfig,
+    required: Option<&Wanted>,
+    chosen: usize,
+) -> Flow<Option<KernelSet>> {
+    flow.enter(LOAD_KERNELS)?;
+    let nothing = Wanted::default();
+    let required = match (&config.kernels.source, required) {
+        (KernelSource::Root(_), None) => return Ok(None),
+        (_, required) => required.unwrap_or(&nothing),
+    };
+    let loaded = load_kernels(config, required, chosen, flow.files());
+    flow.attempt(LOAD_KERNELS, loaded)
+}

@@ -1,0 +1,122 @@
+//! What is generated from the declarations and kept in the repository: `docs/products.md`, `config/schema`.
+
+use std::fmt::Write as _;
+
+use super::{
+    product::{Content, Declaration},
+    registry::PRODUCTS,
+    table::{Kind, Meaning},
+};
+use crate::schema::DocumentSchema;
+
+/// JSON Schemas of the documents, each once.
+#[must_use]
+pub fn schemas() -> Vec<DocumentSchema> {
+    let mut schemas: Vec<DocumentSchema> = Vec::new();
+    for product in PRODUCTS {
+        if let Content::Document(schema) = product.content {
+            let schema = schema();
+            if !schemas.contains(&schema) {
+                schemas.push(schema);
+            }
+        }
+    }
+    schemas
+}
+
+/// `docs/products.md`: every product, and the columns of every table.
+#[must_use]
+pub fn documentation() -> String {
+    let mut text = "# Products\n\n\
+        Generated from the declarations in `src/products`; `tests/generated.rs` says when it is stale.\n\n\
+        Paths count from the site's folder, `<image>` stands for the identifier of an image. `manifest.json`, which \
+        is written last, says what all of them were made from.\n\n\
+        | file | what it is | for | there is one for | rows | schema |\n|---|---|---|---|---|---|\n"
+        .to_owned();
+    for product in PRODUCTS {
+        let _infallible = writeln!(
+            text,
+            "| `{}` | {} | {} | {} | {} | {} |",
+            product.path,
+            product.what,
+            product.readers,
+            product.when(),
+            product.rows,
+            schema_link(product),
+        );
+    }
+    text +=
+        "\n## Columns\n\nNames end in the unit. `?` marks columns without a value in some rows.\n";
+    for product in PRODUCTS {
+        if let Content::Table(columns) = product.content {
+            let _infallible = write!(
+                text,
+                "\n### `{}`\n\n| column | type | unit | what it is |\n|---|---|---|---|\n",
+                product.path
+            );
+            for column in columns() {
+                text += &row(&column);
+            }
+        }
+    }
+    text
+}
+
+fn schema_link(product: &Declaration) -> String {
+    let name = match product.content {
+        Content::Document(schema) => schema().name,
+        Content::Described(name) => name,
+        Content::Table(_) | Content::Foreign => return String::new(),
+    };
+    format!("[{name}](../config/schema/{name}.schema.json)")
+}
+
+fn row(column: &Meaning) -> String {
+    let kind = match column.kind {
+        Kind::Real => "real",
+        Kind::Natural => "natural number",
+        Kind::Integer => "integer",
+        Kind::Flag => "true or false",
+        Kind::Text => "text",
+        Kind::Bytes => "bytes",
+    };
+    format!(
+        "| `{}` | {kind}{} | {} | {} |\n",
+        column.name,
+        if column.optional { " ?" } else { "" },
+        column.unit.symbol().unwrap_or_default(),
+        column.description.replace('|', "\\|"),
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeSet;
+
+    use super::*;
+
+    #[test]
+    fn names_of_our_columns_end_in_their_unit() {
+        let columns = PRODUCTS.iter().filter_map(|product| match product.content {
+            Content::Table(columns) => Some(columns()),
+            _ => None,
+        });
+        for column in columns.flatten() {
+            let foreign = column.name.chars().all(|of| of.is_uppercase() || of == '_');
+            let ending = match column.name.rsplit('_').next() {
+                Some("line" | "lines") => Some("line"),
+                Some("offset") if column.name == "line_offset" => Some("line"),
+                Some("px" | "sample") => Some("pixel"),
+                Some(unit @ ("m" | "km" | "s" | "deg" | "rad")) => Some(unit),
+                _ => None,
+            };
+            assert!(foreign || ending == column.unit.symbol(), "{}", column.name);
+        }
+    }
+
+    #[test]
+    fn a_product_is_declared_once() {
+        let paths: BTreeSet<&str> = PRODUCTS.iter().map(|product| product.path).collect();
+        assert_eq!(paths.len(), PRODUCTS.len());
+    }
+}

@@ -1,0 +1,74 @@
+//! Points with attributes, as formats for GIS take them.
+
+use super::table::Table;
+use crate::constants::MARS_IAU2000;
+
+/// The sphere of the CRS, and of `D_MARS` in Ames Stereo Pipeline, metres.
+pub(super) const SPHERE_RADIUS_M: f64 = MARS_IAU2000.equatorial_radius_m;
+/// `IAU_2015:49900`; [`FRAME`](super::coordinates::FRAME) says whose longitudes the coordinates are.
+pub(super) const CRS_NAME: &str = "Mars (2015) - Sphere / Ocentric";
+/// The same as text for GIS.
+pub(super) const CRS_WKT: &str = "GEOGCS[\"Mars (2015) - Sphere / Ocentric\",DATUM[\"Mars (2015) - Sphere\",\
+    SPHEROID[\"Mars (2015) - Sphere\",3396190,0]],PRIMEM[\"Reference Meridian\",0],\
+    UNIT[\"degree\",0.0174532925199433],AUTHORITY[\"IAU_2015\",\"49900\"]]";
+/// What the third coordinate is.
+pub(super) const POINT_Z_HEIGHT: &str =
+    "z: radius after the crossover correction minus 3396190 m, metres";
+
+/// Points with attributes.
+pub(super) struct Features<'a> {
+    /// Name of the whole.
+    pub(super) name: &'a str,
+    /// UTC of the newest, for formats that hold a date: a clock would give other bytes each time.
+    pub(super) newest_utc: &'a str,
+    /// Longitude (-180..180), areocentric latitude, degrees, and height, metres: [`POINT_Z_HEIGHT`].
+    pub(super) points: Vec<[f64; 3]>,
+    /// A row per point.
+    pub(super) attributes: Table<'a>,
+}
+
+impl Features<'_> {
+    /// Longitudes and latitudes, degrees.
+    pub(super) fn points_deg(&self) -> Vec<[f64; 2]> {
+        let points = self.points.iter();
+        points.map(|[east, north, _]| [*east, *north]).collect()
+    }
+}
+
+#[cfg(test)]
+pub(super) mod tests {
+    use super::*;
+    use crate::products::table::{Unit, column};
+
+    /// Two points with a time, the square root of 1 and of 2, a number and texts.
+    pub(in crate::products) fn example() -> Features<'static> {
+        let columns = vec![
+            column("et_s", Unit::Second, "", |shot: &f64| shot.sqrt())
+                .in_gis()
+                .in_dbase("et_s", 20, 6),
+            column("utc", Unit::None, "", |_: &f64| {
+                "1999-08-24T14:12:13.000".to_owned()
+            })
+            .only_in_gis()
+            .in_dbase("utc", 0, 0),
+            column("orbit", Unit::None, "", |_: &f64| 9019_u32)
+                .in_gis()
+                .in_dbase("orbit", 10, 0),
+            column("source_file", Unit::None, "", |_: &f64| {
+                "å\n\"b\" 'c'.b".to_owned()
+            })
+            .in_gis()
+            .in_dbase("file", 0, 0),
+            column("longitude_deg", Unit::Degree, "", |shot: &f64| {
+                175.312_345_678_9 + shot
+            })
+            .in_dbase("lon_deg", 14, 9),
+        ];
+        Features {
+            name: "a",
+            newest_utc: "1999-08-24T14:12:13.000",
+            points: vec![[0.1 + 0.2, -0.0, -1950.25], [2.0, -0.0, -1950.25]],
+            attributes: Table::new(columns, vec![1.0, 2.0]),
+        }
+    }
+}

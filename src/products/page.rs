@@ -1,0 +1,28 @@
+//! Products that others than this room make: the report, and the metakernel.
+
+use super::{
+    files::write_text,
+    product::{Content, Declaration, Role, Write},
+};
+
+pub(super) static REPORT: Declaration = Declaration {
+    path: "report/index.html",
+    what: "the report of the site",
+    readers: "people",
+    rows: "",
+    role: Role::Overview,
+    content: Content::Foreign,
+    write: Write::Site(|path, of| write_text(path, of.page).map(|()| Some(0))),
+    uses: &[],
+};
+
+pub(super) static METAKERNEL: Declaration = Declaration {
+    path: "kernels.tm",
+    what: "the same kernels in the same order",
+    readers: "SPICE",
+    rows: "",
+    role: Role::Metadata,
+    content: Content::Foreign,
+    write: Write::Site(|path, of| write_text(path, of.site.metakernel).map(|()| Some(0))),
+    uses: &[],
+};

@@ -1,0 +1,174 @@
+//! What a product is: its file, for whom, when there is one, and how it is written.
+
+use std::path::{Path, PathBuf};
+
+use super::{
+    site::{GeometricProducts, ImageProducts, SiteProducts},
+    table::Meaning,
+};
+use crate::{error::Result, schema::DocumentSchema};
+
+/// A file that was written.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Product {
+    /// Path below the site's folder, for example `images/m0402852/isd.json`.
+    pub path: PathBuf,
+    /// What the file has of what it is about: shots, samples, profiles, table nodes; 0 for plain text.
+    pub rows: u64,
+}
+
+/// A product, declared once: the files, the STAC item, `exchange/README.txt` and `docs/products.md` follow.
+pub(super) struct Declaration {
+    /// Path below the site's folder; [`IMAGE`] stands for an image's identifier.
+    pub(super) path: &'static str,
+    /// What the file holds.
+    pub(super) what: &'static str,
+    /// Who reads it.
+    pub(super) readers: &'static str,
+    /// What its rows are; empty for a file without rows.
+    pub(super) rows: &'static str,
+    /// What it is to a catalogue.
+    pub(super) role: Role,
+    /// Columns or schema.
+    pub(super) content: Content,
+    /// How it is written, for which sites.
+    pub(super) write: Write,
+    /// How other programs are told to read it.
+    pub(super) uses: &'static [Use],
+}
+
+/// Stands for an image in paths and commands.
+pub(super) const IMAGE: &str = "<image>";
+
+/// Roles of STAC assets.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Role {
+    Data,
+    Metadata,
+    Overview,
+}
+
+impl Role {
+    pub(super) const fn name(self) -> &'static str {
+        match self {
+            Self::Data => "data",
+            Self::Metadata => "metadata",
+            Self::Overview => "overview",
+        }
+    }
+}
+
+/// What says how a file is built.
+pub(super) enum Content {
+    /// A table with these columns.
+    Table(fn() -> Vec<Meaning>),
+    /// A document of this schema.
+    Document(fn() -> DocumentSchema),
+    /// A document of others' making, with this schema of ours in `config/schema`.
+    Described(&'static str),
+    /// A format of others.
+    Foreign,
+}
+
+/// How a product is written. The functions give its rows, or nothing where there was nothing to write.
+pub(super) enum Write {
+    /// For every site.
+    Site(fn(&Path, &Context) -> Result<Option<u64>>),
+    /// For a site with footprints: GIS readers refuse tables without a row, or guess their types.
+    Footprints(fn(&Path, &Context) -> Result<u64>),
+    /// For every image.
+    Image(fn(&Path, &Context, &ImageProducts) -> Result<u64>),
+    /// For a site with tie points.
+    Ties(fn(&Path, &Context, &GeometricProducts) -> Result<Option<u64>>),
+    /// For every image of a site with tie points.
+    AdjustedImage(fn(&Path, &Context, &ImageProducts) -> Result<u64>),
+    /// For every image of a site with tie points, by the product that writes several.
+    WithAnother,
+    /// For a site with tie points, others with it.
+    Several(fn(&Context, &GeometricProducts) -> Result<Vec<Written>>),
+}
+
+/// What there is a file of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Scope {
+    Site,
+    Image,
+    AdjustedImage,
+}
+
+/// A file that was written, and its declaration.
+pub(super) type Written = (Product, &'static Declaration);
+
+/// What products are made of.
+pub(super) struct Context<'a> {
+    pub(super) site: &'a SiteProducts<'a>,
+    /// The report.
+    pub(super) page: &'a str,
+    /// Where products are written.
+    pub(super) directory: &'a Path,
+    /// All declarations, in order.
+    pub(super) products: &'a [&'static Declaration],
+    /// What has been written, with its declaration.
+    pub(super) written: &'a [Written],
+}
+
+/// A program, or programs of a kind, to which `exchange/README.txt` has a section.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Program {
+    StereoPipeline,
+    Isis,
+    Gis,
+    CameraModel,
+    AdjustedKernels,
+    Catalogue,
+}
+
+/// How a program reads a product: lines for `exchange/README.txt`, the same for every image but for [`IMAGE`].
+pub(super) struct Use {
+    pub(super) program: Program,
+    pub(super) lines: &'static str,
+}
+
+impl Declaration {
+    pub(super) const fn scope(&self) -> Scope {
+        match self.write {
+            Write::Image(_) => Scope::Image,
+            Write::AdjustedImage(_) => Scope::AdjustedImage,
+            _ => Scope::Site,
+        }
+    }
+
+    /// When there is such a file, in words.
+    pub(super) const fn when(&self) -> &'static str {
+        match self.write {
+            Write::Site(_) => "every site",
+            Write::Footprints(_) => "a site with footprints",
+            Write::Image(_) => "every image",
+            Write::Ties(_) | Write::Several(_) => "a site with tie points",
+            Write::AdjustedImage(_) | Write::WithAnother => "every image of a site with tie points",
+        }
+    }
+
+    /// The path of an image's file.
+    pub(super) fn path_of(&self, image: &str) -> String {
+        self.path.replace(IMAGE, image)
+    }
+
+    /// Media type by the ending of the name; `None` for formats that have none.
+    pub(super) fn media_type(&self) -> Option<&'static str> {
+        Some(match self.path.rsplit_once('.')?.1 {
+            "parquet" => "application/vnd.apache.parquet",
+            "geojson" => "application/geo+json",
+            "json" => "application/json",
+            "csv" => "text/csv",
+            "gpkg" => "application/geopackage+sqlite3",
+            "shp" => "application/vnd.shp",
+            "shx" => "application/vnd.shx",
+            "dbf" => "application/vnd.dbf",
+            "html" => "text/html",
+            "xml" => "application/xml",
+            "txt" | "prj" | "cpg" | "tm" => "text/plain",
+            _ => return None,
+        })
+    }
+}

@@ -1,0 +1,52 @@
+//! All products, in the order in which they are written.
+
+use super::{
+    adjusted_kernels, adjustment,
+    exchange::{adjusted, geopackage, readme, shapefile, stac, tables},
+    footprints, isd, kernel_report, orientation, page,
+    product::Declaration,
+    ranges, registration, ties,
+};
+
+/// The products. Those of an image that follow each other are written image by image; the catalogue is last, as it
+/// lists the others.
+pub(super) static PRODUCTS: &[&Declaration] = &[
+    &footprints::CSV,
+    &footprints::LABEL,
+    &footprints::PARQUET,
+    &footprints::GEOJSON,
+    &ranges::TABLE,
+    &ranges::DOCUMENT,
+    &registration::TABLE,
+    &registration::DOCUMENT,
+    &orientation::TABLE,
+    &orientation::DOCUMENT,
+    &isd::ISD,
+    &ties::TABLE,
+    &ties::FOOTPRINTS,
+    &adjustment::DOCUMENT,
+    &registration::ADJUSTED,
+    &orientation::ADJUSTED_TABLE,
+    &orientation::ADJUSTED_DOCUMENT,
+    &isd::ADJUSTED,
+    &adjusted_kernels::ATTITUDE,
+    &adjusted_kernels::POSITION,
+    &adjusted_kernels::METAKERNEL,
+    &page::REPORT,
+    &page::METAKERNEL,
+    &tables::LOLA_LIKE,
+    &tables::LOLA_LIKE_SIDECAR,
+    &tables::ODE,
+    &tables::ODE_SIDECAR,
+    &geopackage::GEOPACKAGE,
+    &shapefile::POINTS,
+    &shapefile::INDEX,
+    &shapefile::ATTRIBUTES,
+    &shapefile::PROJECTION,
+    &shapefile::ENCODING,
+    &adjusted::LIDAR,
+    &adjusted::CONTROL,
+    &kernel_report::KERNELS,
+    &readme::README,
+    &stac::ITEM,
+];

@@ -1,0 +1,66 @@
+//! The combined adjustment as a stage.
+
+use std::sync::atomic::AtomicBool;
+
+use super::{Adjusted, Candidate, adjust, prepare_adjustment};
+use crate::{
+    config::AdjustmentConfig,
+    error::Result,
+    geom::pushbroom::CameraModel,
+    stage::{InOrder, Output, Stage},
+    stage_inputs,
+    stages::{
+        convert_datum::Converted,
+        group_profiles::Profile,
+        intersect::IntersectedTies,
+        read_ties::Ties,
+        site_image::{SiteImage, oriented_images},
+    },
+};
+
+stage_inputs! {
+    /// Images, footprints, tie points with their ground points, and the standard deviations.
+    pub struct Adjust<'a> {
+        /// The images with the orientation of the kernels.
+        pub images: InOrder<'a, SiteImage>,
+        /// The form of the orientation.
+        pub model: &'a CameraModel,
+        /// Footprints in IAU 2000.
+        pub converted: &'a Output<Converted>,
+        /// Profiles.
+        pub profiles: &'a Output<Vec<Profile>>,
+        /// Tie points.
+        pub ties: &'a Output<Ties>,
+        /// Their ground points.
+        pub intersected: &'a Output<IntersectedTies>,
+        /// Standard deviations and options.
+        pub adjustment: &'a AdjustmentConfig,
+    }
+}
+
+impl Stage for Adjust<'_> {
+    const NAME: &'static str = "adjust";
+    type Output = Adjusted;
+    stage_inputs!(fingerprint);
+
+    fn run(&self, _stop: &AtomicBool) -> Result<Adjusted> {
+        let oriented = oriented_images(self.images.0)?;
+        let candidates = self.images.0.iter().zip(&oriented);
+        let candidates = candidates.map(|(image, oriented)| {
+            Ok(Candidate {
+                times: image.times.value()?,
+                orientation: image.orientation.value()?,
+                stereo: oriented.stereo(*self.model),
+                registration: image.registration.value()?,
+            })
+        });
+        let (images, shots) = prepare_adjustment(
+            candidates.collect::<Result<Vec<_>>>()?,
+            &self.converted.value()?.footprints,
+            self.profiles.value()?,
+            self.adjustment,
+        );
+        let (ties, starts) = (&self.ties.value()?.points, self.intersected.value()?);
+        adjust(&images, &shots, ties, starts, self.adjustment)
+    }
+}

@@ -1,0 +1,137 @@
+//! What each kernel holds and what the site uses of it, for the manifest and the report.
+
+use std::sync::atomic::AtomicBool;
+
+use serde::{Deserialize, Serialize};
+
+use crate::{
+    error::Result,
+    frames::MarsIau2000,
+    geom::{attitude::rotation_vector, mars_rotation::mars_rotation},
+    spice::{KernelView, Session, Wanted},
+    stage::{Input, Inputs, Stage},
+    stage_inputs,
+    time::{Et, Interval, Intervals},
+    units::RADIANS_PER_DEGREE,
+};
+
+/// A PCK that turns Mars by more than this against the IAU 2000 formula holds another model, radians
+/// (1e-7 rad is 0.3 m on the ground; the models differ by 4e-3 rad).
+const PCK_TOLERANCE_RAD: f64 = 1e-7;
+
+/// Kernels in load order, and what a reader must know of them.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct KernelDescription {
+    /// One entry per kernel, in load order.
+    pub kernels: Vec<KernelLine>,
+    /// A planetary constants kernel that does not follow IAU 2000, in a sentence.
+    pub pck_note: Option<String>,
+}
+
+/// A kernel as manifest and report show it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct KernelLine {
+    /// File name.
+    pub name: String,
+    /// What it holds: `LSK`, `SCLK`, `PCK`, `FK`, `IK`, `SPK`, `CK`.
+    pub role: String,
+    /// Size.
+    pub bytes: u64,
+    /// BLAKE3 of its bytes, hexadecimal.
+    pub blake3: String,
+    /// When it holds MGS itself, its position in an SPK, its attitude in a CK; `None` for other kernels.
+    pub held: Option<Intervals>,
+    /// Which of the required intervals are read from this kernel: where several hold an instant, the last one is.
+    pub used: Vec<Interval>,
+}
+
+stage_inputs! {
+    /// The kernels, and the times at which the site reads them.
+    pub struct DescribeKernels<'a> {
+        /// All kernels.
+        pub kernels: &'a KernelView,
+        /// Times at which they are read.
+        pub required: Required<'a>,
+        /// How far outside its intervals a C-kernel may be asked, seconds.
+        pub ck_tolerance_s: &'a f64,
+    }
+}
+
+/// The times at which a site reads kernels; `None` while they are not known.
+#[derive(Debug, Clone, Copy)]
+pub struct Required<'a>(pub Option<&'a Wanted>);
+
+impl Input for Required<'_> {
+    fn add_to(&self, field: &str, inputs: &mut Inputs) {
+        match self.0 {
+            Some(required) => {
+                inputs.setting(&format!("{field} positions"), &required.positions);
+                inputs.setting(&format!("{field} attitudes"), &required.attitudes);
+            }
+            None => inputs.not_known_yet(&format!("key {field} positions")),
+        }
+    }
+}
+
+impl Stage for DescribeKernels<'_> {
+    const NAME: &'static str = "describe_kernels";
+    type Output = KernelDescription;
+    stage_inputs!(fingerprint);
+
+    fn run(&self, _stop: &AtomicBool) -> Result<KernelDescription> {
+        let nothing = Wanted::default();
+        let required = self.required.0.unwrap_or(&nothing);
+        describe_kernels(self.kernels.session()?, required, *self.ck_tolerance_s)
+    }
+}
+
+/// Describes the kernels of `session`.
+///
+/// * `ck_tolerance_s` – how far outside its intervals a C-kernel may be asked, seconds
+///
+/// # Errors
+/// As [`Session::coverage`].
+pub fn describe_kernels(
+    session: &Session,
+    required: &Wanted,
+    ck_tolerance_s: f64,
+) -> Result<KernelDescription> {
+    let in_use = session.coverage_in_use(required, ck_tolerance_s)?;
+    let held = &session.coverage()?.per_kernel;
+    let of = |entries: &[(usize, Intervals)], index: usize| {
+        let mut entries = entries.iter();
+        let entry = entries.find(|(of, _)| *of == index);
+        entry.map(|(_, intervals)| intervals.clone())
+    };
+    let kernels = session.kernels().kernels().iter().enumerate();
+    let kernels = kernels.map(|(index, kernel)| KernelLine {
+        name: kernel.file_name(),
+        role: kernel.role.to_string(),
+        bytes: kernel.bytes,
+        blake3: kernel.blake3.clone(),
+        held: of(held, index),
+        used: of(&in_use, index).map_or_else(Vec::new, |used| used.as_slice().to_vec()),
+    });
+    Ok(KernelDescription {
+        kernels: kernels.collect(),
+        pck_note: pck_note(session, &required.positions),
+    })
+}
+
+/// Products use the IAU 2000 formula whatever the PCK says; whoever loads `kernels.tm` should know.
+fn pck_note(session: &Session, positions: &Intervals) -> Option<String> {
+    let at = positions
+        .as_slice()
+        .first()
+        .map_or(Et::from_seconds(0.0), |interval| interval.start);
+    let ours = *mars_rotation::<MarsIau2000>(at).matrix();
+    // Without a PCK there is nothing to compare, and nothing that could mislead.
+    let theirs = session.mars_matrix(at).ok()?;
+    let turn_rad = rotation_vector(&(theirs * ours.transpose())).norm();
+    (turn_rad > PCK_TOLERANCE_RAD).then(|| {
+        format!(
+            "the PCK turns IAU_MARS by {:.5}° against IAU 2000; products use the IAU 2000 constants",
+            turn_rad / RADIANS_PER_DEGREE
+        )
+    })
+}

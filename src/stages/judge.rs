@@ -1,0 +1,265 @@
+//! The verdict on a site: the one place where it is made.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::{
+    adjust::{Adjusted, PointKind},
+    check_ranges::{BiasScan, RangeCheck},
+    compare_pairs::PairComparison,
+    fit_sensor_model::SensorModel,
+    orientation::Orientation,
+    read_ties::Ties,
+};
+
+/// Whether the products keep the limits of the configuration.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+pub struct Verdict {
+    /// No limit is broken.
+    pub valid: bool,
+    /// Every broken limit, with its profile or image.
+    pub reasons: Vec<String>,
+    /// What a reader must weigh although no limit is broken.
+    pub remarks: Vec<String>,
+}
+
+impl Verdict {
+    /// The verdict in one word or three, as every message and page has it.
+    #[must_use]
+    pub const fn word(&self) -> &'static str {
+        match (self.valid, self.remarks.as_slice()) {
+            (false, _) => "INVALID",
+            (true, []) => "valid",
+            (true, _) => "valid with remarks",
+        }
+    }
+}
+
+/// What is known of a site when it is judged.
+#[derive(Debug, Clone, Copy)]
+pub struct Evidence<'a> {
+    /// Footprints in the windows; `None` for a site without PEDR files.
+    pub footprints: Option<usize>,
+    /// Ranges of every profile.
+    pub ranges: &'a RangeCheck,
+    /// The configured correction of the clock of MOLA, seconds.
+    pub clock_correction_s: f64,
+    /// The images with the orientation of the kernels.
+    pub images: &'a [JudgedImage<'a>],
+    /// What is wrong with the kernels, one sentence each.
+    pub warnings: &'a [String],
+    /// What was wrong with input that was read around, one sentence each.
+    pub complaints: &'a [String],
+    /// The adjustment; nothing for a site without tie points.
+    pub adjustment: Option<AdjustmentEvidence<'a>>,
+    /// Why there is no adjustment although there are tie points.
+    pub adjustment_failure: Option<&'a str>,
+}
+
+/// An image that is judged.
+#[derive(Debug, Clone, Copy)]
+pub struct JudgedImage<'a> {
+    /// Identifier.
+    pub id: &'a str,
+    /// Its orientation.
+    pub orientation: &'a Orientation,
+    /// Its sensor models.
+    pub model: &'a SensorModel,
+}
+
+/// What is known of an adjustment.
+#[derive(Debug, Clone, Copy)]
+pub struct AdjustmentEvidence<'a> {
+    /// The tie points.
+    pub ties: &'a Ties,
+    /// The adjustment.
+    pub adjusted: &'a Adjusted,
+    /// The images with their adjusted orientation.
+    pub images: &'a [JudgedImage<'a>],
+    /// Every pair with the adjusted orientation.
+    pub pairs: &'a [PairComparison],
+}
+
+/// More tie points than this share are not left out of a sound adjustment.
+const LEFT_OUT_SHARE: f64 = 0.1;
+/// An a posteriori standard deviation of unit weight above this contradicts the configured ones.
+const SIGMA0_MAX: f64 = 2.0;
+/// Fewer tie points than this do not outweigh the image coordinates of hundreds of footprints.
+const TIES_FEW: usize = 10;
+/// Images whose adjusted tie points lie farther apart than this along the flight, metres, were not brought together:
+/// six lines of MOC's usual 4 m, and a thirteenth of a spacing of footprints.
+const APART_MAX_M: f64 = 25.0;
+
+fn is_together(pair: &PairComparison) -> bool {
+    // Written so that NaN counts as apart.
+    pair.disagreement_m <= APART_MAX_M
+}
+
+impl AdjustmentEvidence<'_> {
+    /// Why the adjusted orientation is invalid, one sentence per reason.
+    fn invalid_because(&self) -> Vec<String> {
+        let reasons = |image: &JudgedImage| -> Vec<String> {
+            let id = image.id;
+            // What is wrong with the orientation of the kernels is told with it.
+            let of_model = image.model.invalid_because.iter();
+            of_model
+                .map(|reason| format!("adjusted image {id}: {reason}"))
+                .collect()
+        };
+        let mut invalid: Vec<String> = self.images.iter().flat_map(reasons).collect();
+        let (left_out, ties) = (self.left_out(), self.ties.joining());
+        if 2 * left_out > ties {
+            invalid.push(format!(
+                "adjustment: {left_out} of {ties} tie points were left out; ties.parquet says why"
+            ));
+        }
+        for pair in self.pairs.iter().filter(|pair| !is_together(pair)) {
+            invalid.push(format!(
+                "adjustment: tie points of {} and {} still lie {:.1} m apart along the flight, expected at most {} m",
+                pair.images[0], pair.images[1], pair.disagreement_m, APART_MAX_M
+            ));
+        }
+        invalid
+    }
+
+    /// Tie points that took part in the adjustment.
+    fn taken(&self) -> usize {
+        let points = self.adjusted.points.iter();
+        points.filter(|point| point.kind == PointKind::Tie).count()
+    }
+
+    /// Tie points that join images and yet took no part.
+    fn left_out(&self) -> usize {
+        self.ties.joining().saturating_sub(self.taken())
+    }
+
+    /// Whether the images of every pair place tie points together after the adjustment, and most of these took
+    /// part in it.
+    #[must_use]
+    pub fn images_agree(&self) -> bool {
+        2 * self.left_out() <= self.ties.joining()
+            && !self.pairs.is_empty()
+            && self.pairs.iter().all(is_together)
+    }
+
+    /// What a reader must weigh, one sentence each.
+    fn remarks(&self) -> Vec<String> {
+        let mut remarks = Vec::new();
+        let (left_out, ties) = (self.left_out(), self.ties.joining());
+        if left_out as f64 > LEFT_OUT_SHARE * ties as f64 && 2 * left_out <= ties {
+            remarks.push(format!(
+                "{left_out} of {ties} tie points were left out of the adjustment; ties.parquet says why"
+            ));
+        }
+        let taken = self.taken();
+        if taken < TIES_FEW {
+            remarks.push(format!(
+                "only {taken} tie points took part in the adjustment: image coordinates of footprints, where weighted \
+                 (adjustment.footprint_image_coordinates), hold the images against so few"
+            ));
+        }
+        let sigma0 = self.adjusted.summary.sigma0;
+        if sigma0 > SIGMA0_MAX {
+            remarks.push(format!(
+                "the adjustment's standard deviation of unit weight is {sigma0:.2}: measurements are worse than \
+                 configured, or a model does not hold"
+            ));
+        }
+        remarks
+    }
+}
+
+/// Judges a site by its limits and by what contradicts itself.
+#[must_use]
+pub fn judge(evidence: &Evidence<'_>) -> Verdict {
+    let reasons = evidence.invalid_because();
+    Verdict {
+        valid: reasons.is_empty(),
+        reasons,
+        remarks: evidence.remarks(),
+    }
+}
+
+impl Evidence<'_> {
+    /// Why the site is invalid, one sentence per reason; empty when it is valid.
+    fn invalid_because(&self) -> Vec<String> {
+        let mut reasons = Vec::new();
+        if self.footprints == Some(0) {
+            reasons.push("no footprint in any window".to_owned());
+        }
+        for profile in &self.ranges.profiles {
+            for reason in &profile.invalid_because {
+                reasons.push(format!("profile {}: {reason}", profile.profile));
+            }
+        }
+        for image in self.images {
+            let of_orientation = image.orientation.invalid_because.iter();
+            for reason in of_orientation.chain(&image.model.invalid_because) {
+                reasons.push(format!("image {}: {reason}", image.id));
+            }
+        }
+        reasons.extend(
+            self.adjustment
+                .iter()
+                .flat_map(AdjustmentEvidence::invalid_because),
+        );
+        let failed = self.adjustment_failure;
+        reasons.extend(failed.map(|failure| format!("no adjustment: {failure}")));
+        reasons
+    }
+
+    /// What a reader must weigh although no limit is broken, one sentence each.
+    fn remarks(&self) -> Vec<String> {
+        let mut remarks = self.warnings.to_vec();
+        match self.complaints {
+            [] => {}
+            [only] => remarks.push(format!("input that was read around: {only}")),
+            [first, rest @ ..] => remarks.push(format!(
+                "input that was read around: {first} (and {} more)",
+                rest.len()
+            )),
+        }
+        for image in self.images {
+            let notes = image.orientation.notes.iter();
+            remarks.extend(notes.map(|note| format!("image {}: {note}", image.id)));
+        }
+        let images = self
+            .images
+            .iter()
+            .filter(|image| image.model.near_gimbal_lock);
+        remarks.extend(images.map(|image| {
+            format!(
+                "image {}: |cos φ| falls to {:.3}, where ω and κ are badly determined; use the rotation-vector form",
+                image.id, image.model.cos_phi_min
+            )
+        }));
+        let configured_s = self.clock_correction_s;
+        for ranges in &self.ranges.profiles {
+            let doubt = ranges
+                .scan
+                .as_ref()
+                .and_then(|scan| doubt(scan, configured_s));
+            remarks.extend(doubt.map(|doubt| format!("profile {}: {doubt}", ranges.profile)));
+        }
+        remarks.extend(self.adjustment.iter().flat_map(AdjustmentEvidence::remarks));
+        remarks
+    }
+}
+
+/// Differences from the configured clock correction below this are not remarked on, seconds: rival orbits
+/// differ by tens of metres along the track, which the spacecraft flies in this time.
+const CLOCK_DOUBT_S: f64 = 0.02;
+/// Nor are those below so many standard uncertainties.
+const CLOCK_DOUBT_SIGMA: f64 = 5.0;
+
+/// What a scan says against the configured correction.
+fn doubt(scan: &BiasScan, configured_s: f64) -> Option<String> {
+    let (best_s, uncertainty_s) = (scan.best_s?, scan.uncertainty_s?);
+    let apart_s = (best_s - configured_s).abs();
+    (apart_s > CLOCK_DOUBT_S && apart_s > CLOCK_DOUBT_SIGMA * uncertainty_s).then(|| {
+        format!(
+            "its ranges want a clock correction of {best_s:+.4} ± {uncertainty_s:.4} s, not the configured \
+             {configured_s:+.3} s"
+        )
+    })
+}

@@ -1,0 +1,48 @@
+//! An image of the site with the outputs of its stages: what the stages behind the registration see.
+
+use super::{
+    fit_sensor_model::SensorModel, orientation::Orientation, oriented::OrientedImage,
+    register::ImageRegistration, tag_times::ImageTimes,
+};
+use crate::{
+    error::Result,
+    stage::{InOrder, Input, Inputs, Output},
+};
+
+/// What the stages made of one image, with the orientation of the kernels or the adjusted one.
+#[derive(Debug, Clone)]
+pub struct SiteImage {
+    /// Line times.
+    pub times: Output<ImageTimes>,
+    /// Orientation samples.
+    pub orientation: Output<Orientation>,
+    /// Sensor models.
+    pub model: Output<SensorModel>,
+    /// Where the image has the footprints.
+    pub registration: Output<ImageRegistration>,
+}
+
+impl Input for InOrder<'_, SiteImage> {
+    fn add_to(&self, field: &str, inputs: &mut Inputs) {
+        let labels: Vec<&str> = self.0.iter().map(|image| image.times.label()).collect();
+        inputs.setting(&format!("{field} (order)"), &labels);
+        for image in self.0 {
+            (&image.times).add_to(field, inputs);
+            (&image.orientation).add_to(field, inputs);
+            (&image.model).add_to(field, inputs);
+            (&image.registration).add_to(field, inputs);
+        }
+    }
+}
+
+/// The images with their orientation in every form.
+///
+/// # Errors
+/// Samples that are no orientation.
+pub fn oriented_images(images: &[SiteImage]) -> Result<Vec<OrientedImage<'_>>> {
+    let oriented = images.iter().map(|image| {
+        let (times, orientation) = (image.times.value()?, image.orientation.value()?);
+        OrientedImage::of(times, orientation, image.model.value()?)
+    });
+    oriented.collect()
+}

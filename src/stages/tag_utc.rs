@@ -1,0 +1,42 @@
+//! UTC of every shot, as products for GIS and catalogues have it.
+
+use std::sync::atomic::AtomicBool;
+
+use super::convert_datum::Converted;
+use crate::{
+    error::{Result, Stopped},
+    spice::KernelView,
+    stage::{Output, Stage},
+    stage_inputs,
+    time::Et,
+};
+
+/// Digits of a second in the UTC of shots: programs take the time from it, and MGS flies 3 m in a millisecond.
+const SHOT_UTC_DECIMALS: u8 = 6;
+
+stage_inputs! {
+    /// Footprints with their corrected times, and the leap seconds.
+    pub struct TagUtc<'a> {
+        /// Footprints in IAU 2000.
+        pub converted: &'a Output<Converted>,
+        /// Text kernels.
+        pub kernels: &'a KernelView,
+    }
+}
+
+/// One string per footprint: ISO 8601 without a zone letter.
+impl Stage for TagUtc<'_> {
+    const NAME: &'static str = "tag_utc";
+    type Output = Vec<String>;
+    stage_inputs!(fingerprint);
+
+    fn run(&self, stop: &AtomicBool) -> Result<Vec<String>> {
+        let session = self.kernels.session()?;
+        let instants = self.converted.value()?.footprints.et_s.iter();
+        let utc = instants.map(|et_s| {
+            Stopped::check(stop)?;
+            session.et_to_utc_with(Et::from_seconds(*et_s), SHOT_UTC_DECIMALS)
+        });
+        utc.collect()
+    }
+}
