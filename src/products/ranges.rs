@@ -333,9 +333,11 @@ fn profile_document<'a>(
         simultaneous: profile
             .simultaneous
             .iter()
-            .map(|of| SimultaneousImage {
-                image: &site.images[of.image].times.id,
-                shots: of.shots,
+            .filter_map(|of| {
+                Some(SimultaneousImage {
+                    image: &site.images.get(of.image)?.times.id,
+                    shots: of.shots,
+                })
             })
             .collect(),
         valid: ranges.invalid_because.is_empty(),

@@ -69,7 +69,10 @@ fn statistics(site: &SiteProducts) -> String {
         let images: Vec<String> = profile
             .simultaneous
             .iter()
-            .map(|of| format!("{} ({} shots)", site.images[of.image].times.id, of.shots))
+            .filter_map(|of| {
+                let image = site.images.get(of.image)?;
+                Some(format!("{} ({} shots)", image.times.id, of.shots))
+            })
             .collect();
         let valid = ranges.invalid_because.is_empty();
         table.row(

@@ -95,7 +95,7 @@ pub fn position_kernels(kernels: &KernelSet) -> Result<KernelSet> {
 impl Input for &KernelView {
     fn add_to(&self, _field: &str, inputs: &mut Inputs) {
         let Some(kernels) = &self.kernels else {
-            return inputs.not_known_yet("kernels");
+            return inputs.not_known_yet("kernels", "kernel ");
         };
         for (place, kernel) in kernels.kernels().iter().enumerate() {
             inputs.file("kernel", &kernel.path, Some(place), &kernel.blake3);

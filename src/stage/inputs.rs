@@ -33,6 +33,9 @@ pub struct Inputs {
     /// Files behind the inputs, which must not change while the stage runs; not part of what is compared.
     #[serde(skip)]
     files: Vec<PathBuf>,
+    /// What the names of inputs begin with that are not known yet.
+    #[serde(skip)]
+    pending: Vec<String>,
 }
 
 /// A field of what a stage may see.
@@ -100,6 +103,7 @@ impl Inputs {
         Self {
             named: BTreeMap::from([("areograph".to_owned(), version)]),
             files: Vec::new(),
+            pending: Vec::new(),
         }
     }
 
@@ -124,9 +128,11 @@ impl Inputs {
         }
     }
 
-    /// Adds an input that is not known before earlier stages have run.
-    pub fn not_known_yet(&mut self, name: &str) {
+    /// Adds an input that is not known before earlier stages have run, and whose parts have names that begin with
+    /// `prefix`.
+    pub fn not_known_yet(&mut self, name: &str, prefix: &str) {
         self.named.insert(name.to_owned(), NOT_KNOWN_YET.to_owned());
+        self.pending.push(prefix.to_owned());
     }
 
     /// Adds a file under its name without folders, with its place (from 0) where the order matters; further
@@ -198,7 +204,8 @@ impl Inputs {
             }
         }
         let gone = earlier.named.keys();
-        let gone = gone.filter(|name| !self.named.contains_key(*name));
+        let pending = |name: &str| self.pending.iter().any(|prefix| name.starts_with(prefix));
+        let gone = gone.filter(|name| !self.named.contains_key(*name) && !pending(name));
         changes.extend(gone.map(|name| format!("{name} is gone")));
         changes
     }
@@ -266,6 +273,7 @@ mod tests {
         let stored = Inputs {
             named: BTreeMap::from([("areograph".to_owned(), "0.0.1".to_owned())]),
             files: Vec::new(),
+            pending: Vec::new(),
         };
         assert_eq!(Inputs::new(1).changed_since(&stored), ["areograph changed"]);
         assert_eq!(

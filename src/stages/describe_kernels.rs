@@ -68,7 +68,7 @@ impl Input for Required<'_> {
                 inputs.setting(&format!("{field} positions"), &required.positions);
                 inputs.setting(&format!("{field} attitudes"), &required.attitudes);
             }
-            None => inputs.not_known_yet(&format!("key {field} positions")),
+            None => inputs.not_known_yet(&format!("key {field}"), &format!("key {field}")),
         }
     }
 }
