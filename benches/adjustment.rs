@@ -19,8 +19,8 @@ use areograph::geom::{
     bundle::{Adjustment, BundleOptions, Network, View, solve},
     collinearity::by_camera_point,
     pushbroom::{
-        CorrectedOrientation, EulerPolynomial, ExteriorOrientation, Pose, SampledOrientation,
-        Sighting,
+        CorrectedOrientation, Distortion, EulerPolynomial, ExteriorOrientation, Pose,
+        SampledOrientation, Sighting,
     },
 };
 use recipe::{Normals, Recipe, Simulated};
@@ -122,7 +122,7 @@ fn document(
         let correction = adjustment.images[view.image].correction;
         let ground_m = adjustment.points[view.point].unwrap().ground_m;
         let adjusted = CorrectedOrientation { base, correction };
-        let x_lines = Sighting::near(&adjusted, view.x_lines, &ground_m, 1e-3)
+        let x_lines = Sighting::near(&adjusted, &Distortion::NONE, view.x_lines, &ground_m, 1e-3)
             .unwrap()
             .solution
             .x;

@@ -1,34 +1,15 @@
-//! Constants of the mission, each with its source and sign.
+//! Constants of the mission, each with its source and sign; those of Mars stand in `config/bodies/mars.toml`.
 
-use crate::time::PointingBias;
+use std::sync::LazyLock;
 
-/// Attitude kernel bias of Mars Global Surveyor: the attitude of an exposure at `t` is read at `t − 1.15 s`.
-///
-/// Source: `INS-94031_CK_TIME_BIAS` in the ISIS addendum `mocAddendum004.ti`; Shan et al. 2005, p. 98.
-pub const MGS_POINTING_BIAS: PointingBias = PointingBias::from_seconds(-1.15);
-
-/// Clock bias of MOLA in seconds, applied by Shan et al. 2005 (p. 98, citing NAIF 2001).
-///
-/// Neither its sign nor whether PEDR tags already include it is published; see `MolaClock`.
-pub const MOLA_CLOCK_BIAS_S: f64 = 0.117;
+use serde::Deserialize;
 
 /// NAIF id of the Mars Global Surveyor spacecraft and of its clock.
 pub const NAIF_MGS: i32 = -94;
 /// NAIF id of the spacecraft bus frame `MGS_SPACECRAFT` and of its attitude kernels.
 pub const NAIF_MGS_BUS: i32 = -94_000;
-/// NAIF id of the MOC narrow-angle camera.
-pub const NAIF_MOC_NA: i32 = -94_031;
 /// NAIF id of the frame `IAU_MARS`.
 pub const NAIF_IAU_MARS: i32 = 10_014;
-/// Focal length of the MOC narrow-angle camera, millimetres; nominal (instrument kernel `moc20.ti`).
-pub const MOC_NA_FOCAL_LENGTH_MM: f64 = 3_500.0;
-/// Pixel pitch that goes with the nominal focal length, millimetres.
-///
-/// Source: `INS-94031_PIXEL_PITCH` of the ISIS addendum `mocAddendum004.ti`; the detector's own pitch is
-/// 0.013 mm, the difference stands for the true focal length.
-pub const MOC_NA_PIXEL_PITCH_MM: f64 = 0.013_124_057_852_294_9;
-/// Pixels of the narrow-angle detector (`moc20.ti`).
-pub const MOC_NA_DETECTORS: u32 = 2_048;
 /// NAIF id of the centre of Mars.
 pub const NAIF_MARS: i32 = 499;
 /// NAIF id of the Sun.
@@ -62,40 +43,66 @@ pub struct MarsModel {
 }
 
 /// Mars in the 1991 IAU report, the likely "IAU 1991" of MOLA products before version L.
-///
-/// Source: NAIF's test planetary constants; W₀ = 176.868° also in the "old values" of `mars_iau2000_v0.tpc`.
-pub const MARS_IAU1991: MarsModel = MarsModel {
-    name: "iau1991",
-    pole_ra_deg: 317.681,
-    pole_ra_deg_per_century: -0.108,
-    pole_dec_deg: 52.886,
-    pole_dec_deg_per_century: -0.061,
-    meridian_deg: 176.868,
-    meridian_deg_per_day: 350.891_983_0,
-    equatorial_radius_m: 3_397_000.0,
-    polar_radius_m: 3_375_000.0,
-};
-
+pub static MARS_IAU1991: LazyLock<MarsModel> = LazyLock::new(|| MARS.iau1991.named("iau1991"));
 /// Mars in the 1994 IAU report: `pck00005`, and the `pck00006` that Shan et al. 2005 calls IAU 1991.
-///
-/// Source: the 1994 values quoted in NAIF's `pck00008.tpc`.
-pub const MARS_IAU1994: MarsModel = MarsModel {
-    name: "iau1994",
-    meridian_deg: 176.901,
-    ..MARS_IAU1991
-};
-
+pub static MARS_IAU1994: LazyLock<MarsModel> = LazyLock::new(|| MARS.iau1994.named("iau1994"));
 /// Mars in the 2000 IAU report, the frame of every areograph product.
-///
-/// Source: `mars_iau2000_v0.tpc`, `pck00008.tpc` to `pck00010.tpc`.
-pub const MARS_IAU2000: MarsModel = MarsModel {
-    name: "iau2000",
-    pole_ra_deg: 317.681_43,
-    pole_ra_deg_per_century: -0.106_1,
-    pole_dec_deg: 52.886_50,
-    pole_dec_deg_per_century: -0.060_9,
-    meridian_deg: 176.630,
-    meridian_deg_per_day: 350.891_982_26,
-    equatorial_radius_m: 3_396_190.0,
-    polar_radius_m: 3_376_200.0,
-};
+pub static MARS_IAU2000: LazyLock<MarsModel> = LazyLock::new(|| MARS.iau2000.named("iau2000"));
+
+/// What `config/bodies/mars.toml` says.
+static MARS: LazyLock<Body> =
+    LazyLock::new(|| of_the_program(include_str!("../config/bodies/mars.toml")));
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+#[allow(
+    dead_code,
+    reason = "names and sources are for those who read the file"
+)]
+struct Body {
+    id: String,
+    name: String,
+    iau1991: Report,
+    iau1994: Report,
+    iau2000: Report,
+}
+
+/// Rotation and shape of one report, with their source.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+#[allow(dead_code, reason = "sources are for those who read the file")]
+struct Report {
+    pole_ra_deg: f64,
+    pole_ra_deg_per_century: f64,
+    pole_dec_deg: f64,
+    pole_dec_deg_per_century: f64,
+    meridian_deg: f64,
+    meridian_deg_per_day: f64,
+    equatorial_radius_m: f64,
+    polar_radius_m: f64,
+    source: String,
+}
+
+impl Report {
+    const fn named(&self, name: &'static str) -> MarsModel {
+        MarsModel {
+            name,
+            pole_ra_deg: self.pole_ra_deg,
+            pole_ra_deg_per_century: self.pole_ra_deg_per_century,
+            pole_dec_deg: self.pole_dec_deg,
+            pole_dec_deg_per_century: self.pole_dec_deg_per_century,
+            meridian_deg: self.meridian_deg,
+            meridian_deg_per_day: self.meridian_deg_per_day,
+            equatorial_radius_m: self.equatorial_radius_m,
+            polar_radius_m: self.polar_radius_m,
+        }
+    }
+}
+
+#[expect(
+    clippy::panic,
+    reason = "a program built with a bad file of its own; every test on Mars reads it"
+)]
+fn of_the_program(text: &str) -> Body {
+    toml::from_str(text).unwrap_or_else(|error| panic!("built with a bad file of Mars: {error}"))
+}

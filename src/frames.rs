@@ -66,7 +66,7 @@ pub trait Frame: Copy + fmt::Debug + Send + Sync + 'static {
 /// A frame fixed to the body of Mars by one IAU report.
 pub trait MarsFixed: Frame {
     /// Rotation and shape of that report.
-    const MODEL: MarsModel;
+    fn model() -> &'static MarsModel;
 }
 
 macro_rules! frames {
@@ -75,7 +75,7 @@ macro_rules! frames {
         #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
         pub struct $frame;
         impl Frame for $frame { const NAME: &'static str = $name; }
-        $(impl MarsFixed for $frame { const MODEL: MarsModel = $model; })?
+        $(impl MarsFixed for $frame { fn model() -> &'static MarsModel { &$model } })?
     )*};
 }
 
@@ -90,8 +90,8 @@ frames! {
     MarsIau2000 = "IAU_MARS (2000)": MARS_IAU2000;
     /// Bus of Mars Global Surveyor: +Z towards nadir, flight along −X.
     MgsBus = "MGS_SPACECRAFT";
-    /// MOC narrow-angle camera: +Z boresight, +Y along the detector.
-    MocNa = "MGS_MOC_NA";
+    /// A camera: +Z boresight, +Y along the detector.
+    CameraFrame = "camera";
 }
 
 /// Which IAU report a file's Mars-fixed coordinates follow, known only when the file is read.
@@ -109,11 +109,11 @@ pub enum MarsDatum {
 impl MarsDatum {
     /// Rotation and shape of the report.
     #[must_use]
-    pub const fn model(self) -> MarsModel {
+    pub fn model(self) -> &'static MarsModel {
         match self {
-            Self::Iau1991 => MARS_IAU1991,
-            Self::Iau1994 => MARS_IAU1994,
-            Self::Iau2000 => MARS_IAU2000,
+            Self::Iau1991 => &MARS_IAU1991,
+            Self::Iau1994 => &MARS_IAU1994,
+            Self::Iau2000 => &MARS_IAU2000,
         }
     }
 }

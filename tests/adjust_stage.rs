@@ -19,8 +19,8 @@ use areograph::{
     geom::{
         bundle::{BundleOptions, Network, View, solve},
         pushbroom::{
-            CorrectedOrientation, Detector, EulerPolynomial, OrientationCorrection, Projector,
-            Sighting,
+            CorrectedOrientation, Detector, Distortion, EulerPolynomial, OrientationCorrection,
+            Projector, Sighting,
         },
         robust::RobustWeight,
         statistics::BAARDA_LIMIT,
@@ -64,6 +64,7 @@ fn stereo<M>(
             boresight_sample: HALF_SWATH_PX,
             sample_sense: -1.0,
             samples: 2.0 * HALF_SWATH_PX,
+            distortion: Distortion::NONE,
         },
         lines: 2.0 * entry.half_lines,
     }
@@ -547,7 +548,14 @@ fn the_result_is_kept_and_read_back() {
             .filter(|view| view.image == index && view.kind == PointKind::Tie);
         for view in ties {
             let ground_m = adjusted.points[view.point].ground.xyz_m;
-            let seen = Sighting::near(&orientation, view.x_lines, &ground_m, 1e-3).unwrap();
+            let seen = Sighting::near(
+                &orientation,
+                &Distortion::NONE,
+                view.x_lines,
+                &ground_m,
+                1e-3,
+            )
+            .unwrap();
             let seen = seen.solution;
             let focal = image.stereo.detector.focal_px(&seen.camera_m).unwrap();
             // Lines count as pixels at the initial point: its height differs by less than 1 km in 400 km.

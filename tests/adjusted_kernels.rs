@@ -14,7 +14,6 @@ use std::{fs, path::Path};
 
 use areograph::{
     config::PointingConfig,
-    constants::{MOC_NA_FOCAL_LENGTH_MM, MOC_NA_PIXEL_PITCH_MM},
     error::Kind,
     frames::Rotation,
     geom::attitude::matrix_of_rotation_vector,
@@ -28,6 +27,9 @@ use areograph::{
 };
 use fixture::{Image, angle_rad, apart, kernel_camera};
 use nalgebra::{Matrix3, Vector3};
+
+/// A pixel of the narrow angle, radians.
+const PIXEL_RAD: f64 = 0.013_124_057_852_294_9 / 3_500.0;
 
 /// Tens of metres and of arcseconds, with slopes and bends.
 fn curved(x: f64) -> LineCorrection {
@@ -76,8 +78,7 @@ fn between_samples(image: &Image, set: &KernelSet, shift_lines: f64) {
             matrix_of_rotation_vector(&correction.rotation_rad) * camera_to_mars.transpose();
         let turn_rad = angle_rad(&found.1, &mars_to_camera.transpose());
         // The tables are good to 0.01 px: bends of the original attitude between their nodes are cut off.
-        let pixel_rad = f64::from(image.times.downtrack_summing) * MOC_NA_PIXEL_PITCH_MM
-            / MOC_NA_FOCAL_LENGTH_MM;
+        let pixel_rad = f64::from(image.times.downtrack_summing) * PIXEL_RAD;
         assert!(
             distance_m < 1e-3 && turn_rad < 0.01 * pixel_rad,
             "{distance_m} m, {turn_rad} rad"

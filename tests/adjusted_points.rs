@@ -242,6 +242,7 @@ fn serial_numbers_are_those_of_a_real_network() {
     let image = ImageConfig {
         id: "m01-00115".to_owned(),
         label: Some(label),
+        instrument: None,
         serial_number: None,
         fields: ImageFields::default(),
     };

@@ -32,6 +32,7 @@ const FLOORS: [&[&str]; 6] = [
         "schema",
         "altimetry",
         "image",
+        "instruments",
         "kernel_source",
     ],
     &["geom", "config"],

@@ -190,6 +190,27 @@ const CASES: &[(&str, Spoil)] = &[
         case.replace("site.toml", "label", "lines_delivered = 99999\nlabel");
         case.run()
     }),
+    ("summing_beyond_the_camera", |case| {
+        case.replace("site.toml", "label", "crosstrack_summing = 9\nlabel");
+        case.run()
+    }),
+    ("samples_beyond_the_detector", |case| {
+        case.replace("site.toml", "label", "first_detector = 100\nlabel");
+        case.run()
+    }),
+    ("instrument_file_is_bad", |case| {
+        let file = include_str!("../config/instruments/moc_na.toml")
+            .replace("pixels = 2048", "pixel = 2048")
+            .replace("samples_along = \"+y\"", "samples_along = \"y\"")
+            .replace("focal_length_mm = 3500.0", "focal_length_mm = 0.0");
+        case.write("camera.toml", file);
+        case.replace("site.toml", "label", "instrument = \"camera.toml\"\nlabel");
+        case.run()
+    }),
+    ("instrument_is_unknown", |case| {
+        case.replace("site.toml", "label", "instrument = \"moc_wa\"\nlabel");
+        case.run()
+    }),
     ("pedr_shorter_than_its_label", |case| {
         case.truncate("pedr/ap19117l.b", 5_000);
         case.run()
@@ -598,7 +619,7 @@ fn a_scene_on_a_full_disk_names_the_file_that_did_not_fit() {
     let script = "\"$0\" --quiet scene small/scene; code=$?; ls -A small; exit $code";
     // Full at a text kernel, at the start and in the middle of the C-kernel, and at a PEDR file.
     let sizes = [
-        ("30k", "kernels/gsfc.tm"),
+        ("30k", "kernels/nav.tm"),
         ("100k", "kernels/mgs_sc_scene.bc"),
         ("2500k", "kernels/mgs_sc_scene.bc"),
         ("20000k", "pedr/"),

@@ -11,7 +11,7 @@ mod common;
 use std::{fs, path::Path, process::Command};
 
 use areograph::{
-    constants::MGS_POINTING_BIAS,
+    config::usual_instrument,
     frames::{MarsIau2000, Position},
     geom::{
         attitude::{matrix_of_rotation_vector, spice_quaternion},
@@ -353,13 +353,13 @@ fn write_turned(case: &Case, exposed: [Et; 2], turn_rad: f64) -> f64 {
         .collect();
     let lookups: Vec<Et> = exposures
         .iter()
-        .map(|et| MGS_POINTING_BIAS.lookup(*et).kernel_time())
+        .map(|et| usual_instrument().pointing_bias().lookup(*et).kernel_time())
         .collect();
     let (mut quaternions, mut rates_rad_s) = (Vec::new(), Vec::new());
     let mut range_m = 0.0;
     for (index, et) in exposures.iter().enumerate() {
         let attitude = session
-            .attitude(MGS_POINTING_BIAS.lookup(*et), *et, 0.0)
+            .attitude(usual_instrument().pointing_bias().lookup(*et), *et, 0.0)
             .unwrap();
         let bus = *attitude.inertial_to_bus.matrix();
         let state = session.state(*et).unwrap();

@@ -11,8 +11,7 @@ mod pushbroom;
 use std::fs;
 
 use areograph::{
-    config::{ImageConfig, KernelsConfig, OrientationConfig, PointingConfig},
-    constants::MGS_POINTING_BIAS,
+    config::{ImageConfig, KernelsConfig, OrientationConfig, PointingConfig, usual_instrument},
     image::ImageFields,
     kernel_source::{KernelList, KernelSource},
     products::write_products,
@@ -54,6 +53,7 @@ fn real_with_summing(test: &str, summing: u32) -> Option<Real> {
     let image = ImageConfig {
         id: "m04-02852".to_owned(),
         label: Some(folder.join("m0402852_isis.lbl")),
+        instrument: None,
         serial_number: None,
         fields: ImageFields::default(),
     };
@@ -62,7 +62,7 @@ fn real_with_summing(test: &str, summing: u32) -> Option<Real> {
         ..KernelsConfig::default()
     };
     let pointing = PointingConfig {
-        ck_bias: MGS_POINTING_BIAS,
+        ck_bias: usual_instrument().pointing_bias(),
         source: String::new(),
     };
     let mut site = fixture::Site::small();
@@ -279,7 +279,7 @@ fn positions_and_rotations_are_those_of_ale() {
         let rates = Nodes::new(&isd["instrument_pointing"], "angular_velocities");
         for (index, et_s) in nodes.et_s.iter().enumerate() {
             let exposure = Et::from_seconds(*et_s);
-            let lookup = MGS_POINTING_BIAS.lookup(exposure);
+            let lookup = usual_instrument().pointing_bias().lookup(exposure);
             let kernels = real.session.attitude(lookup, exposure, 0.0).unwrap();
             let apart = matrix(&nodes.values[index]) - kernels.inertial_to_bus.matrix();
             assert!(apart.abs().max() < 1e-9, "{et_s}: {apart}"); // matrix elements

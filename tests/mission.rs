@@ -11,7 +11,7 @@ use std::{fs, path::PathBuf, sync::atomic::AtomicBool};
 
 use areograph::{
     altimetry::BiasScope,
-    config::{SiteConfig, load},
+    config::{SiteConfig, load, usual_instrument},
     footprints::Footprints,
     frames::MarsIau2000,
     geom::{
@@ -307,7 +307,7 @@ fn orientation_comes_back() {
     let truth = truth();
     let mut images = 0;
     for name in SITES {
-        for orientation in orientations(name, areograph::constants::MGS_POINTING_BIAS) {
+        for orientation in orientations(name, usual_instrument().pointing_bias()) {
             images += 1;
             let truth = list(&truth["images"])
                 .iter()
@@ -337,7 +337,7 @@ fn orientation_comes_back() {
 
 #[test]
 fn without_the_pointing_bias_a_nadir_image_moves_380_m() {
-    let with = orientations("gusev_crater", areograph::constants::MGS_POINTING_BIAS);
+    let with = orientations("gusev_crater", usual_instrument().pointing_bias());
     let without = orientations("gusev_crater", PointingBias::from_seconds(0.0));
     let truth = truth();
     let nadir = |image: &str| {

@@ -2,7 +2,7 @@
 
 mod common;
 
-use areograph::{image::ImageFields, pds::moc::read_label};
+use areograph::{config::built_in_instruments, image::ImageFields, pds::moc::read_label};
 use common::real_data;
 
 /// All three images were exposed for 0.4821 ms a line.
@@ -19,7 +19,7 @@ fn attached_pds_label() {
     let Some(path) = real_data("asp_moc/M0100115.imq", "attached_pds_label") else {
         return;
     };
-    let label = read_label(&path).unwrap();
+    let label = read_label(&path, built_in_instruments()).unwrap();
     assert_exposure(&label.fields);
     assert_eq!(label.product_id.as_deref(), Some("M01/00115"));
     let expected = ImageFields {
@@ -63,7 +63,7 @@ fn isis_labels() {
         let Some(path) = real_data(file, "isis_labels") else {
             return;
         };
-        let label = read_label(&path).unwrap();
+        let label = read_label(&path, built_in_instruments()).unwrap();
         assert_exposure(&label.fields);
         assert_eq!(label.product_id.as_deref(), Some(product));
         let expected = ImageFields {
@@ -88,6 +88,8 @@ fn a_label_of_another_instrument_is_refused() {
     let Some(path) = real_data(file, "a_label_of_another_instrument_is_refused") else {
         return;
     };
-    let message = read_label(&path).unwrap_err().to_string();
+    let message = read_label(&path, built_in_instruments())
+        .unwrap_err()
+        .to_string();
     assert!(message.contains("expected MOC-NA"), "{message}");
 }

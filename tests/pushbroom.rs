@@ -5,6 +5,8 @@
     reason = "helpers of tests may fail loudly"
 )]
 
+#[path = "pushbroom/distortion.rs"]
+mod distortion;
 #[path = "pushbroom/edges.rs"]
 mod edges;
 #[path = "pushbroom/misregistration.rs"]

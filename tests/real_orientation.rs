@@ -10,8 +10,7 @@ mod common;
 use std::{fs, path::PathBuf};
 
 use areograph::{
-    config::{ImageConfig, KernelsConfig, OrientationConfig, PointingConfig},
-    constants::MGS_POINTING_BIAS,
+    config::{ImageConfig, KernelsConfig, OrientationConfig, PointingConfig, usual_instrument},
     image::ImageFields,
     kernel_source::{KernelList, KernelSource},
     spice::{KernelSet, Session},
@@ -29,6 +28,7 @@ fn image(id: &str, label: PathBuf) -> ImageConfig {
     ImageConfig {
         id: id.to_owned(),
         label: Some(label),
+        instrument: None,
         serial_number: None,
         fields: ImageFields::default(),
     }
@@ -53,7 +53,7 @@ fn m0402852(test: &str) -> Option<(ImageTimes, Orientation, Value)> {
         ..KernelsConfig::default()
     };
     let pointing = PointingConfig {
-        ck_bias: MGS_POINTING_BIAS,
+        ck_bias: usual_instrument().pointing_bias(),
         source: String::new(),
     };
     let orientation = sample_orientation(&session, &times, &kernels, &pointing, &SAMPLING).unwrap();

@@ -11,7 +11,6 @@ mod common;
 mod fixture;
 
 use areograph::{
-    constants::{MOC_NA_FOCAL_LENGTH_MM, MOC_NA_PIXEL_PITCH_MM},
     error::Kind,
     geom::{
         attitude::{matrix_of_rotation_vector, rotation_vector},
@@ -27,7 +26,7 @@ use fixture::{Image, angle_rad, apart, kernel_camera};
 use nalgebra::{Matrix3, Vector3};
 
 /// One focal pixel as an angle, radians.
-const PIXEL_RAD: f64 = MOC_NA_PIXEL_PITCH_MM / MOC_NA_FOCAL_LENGTH_MM;
+const PIXEL_RAD: f64 = 0.013_124_057_852_294_9 / 3_500.0;
 
 fn nothing(_: f64) -> LineCorrection {
     moved(Vector3::zeros())

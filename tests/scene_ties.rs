@@ -11,7 +11,7 @@ mod common;
 use std::{collections::BTreeMap, fs};
 
 use areograph::{
-    config::{SiteConfig, load},
+    config::{SiteConfig, load, usual_instrument},
     geom::{
         ellipsoid::spherical_to_xyz_m,
         intersection::Weighting,
@@ -111,7 +111,8 @@ impl Pair {
         StereoImage {
             id: times.id.clone(),
             orientation: SampledOrientation::new(&poses).unwrap(),
-            detector: Detector::moc_na(
+            detector: Detector::new(
+                usual_instrument(),
                 times.crosstrack_summing,
                 times.first_detector,
                 times.samples,

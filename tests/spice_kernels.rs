@@ -14,6 +14,7 @@ use std::{
 };
 
 use areograph::{
+    config::usual_instrument,
     error::{Failure, Kind},
     spice::{KernelRole, KernelSet, Session},
     time::Et,
@@ -133,7 +134,9 @@ fn faults_of_cspice_carry_both_messages_of_naif() {
         session.sclk_to_et(&long).unwrap_err().fault.to_string(),
         "a clock string cannot be given to CSPICE: 300 bytes long, at most 255 are possible"
     );
-    assert!(session.state(et(0.0)).is_err() && session.mounting(et(0.0)).is_err());
+    assert!(
+        session.state(et(0.0)).is_err() && session.mounting(usual_instrument(), et(0.0)).is_err()
+    );
     assert!(session.mars_matrix(et(0.0)).is_err() && session.sun_state(et(0.0)).is_err());
     drop(session);
     let empty = Session::open(&KernelSet::default()).unwrap();

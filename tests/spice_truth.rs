@@ -10,7 +10,8 @@ mod common;
 use std::path::Path;
 
 use areograph::{
-    constants::{MARS_IAU1991, MARS_IAU1994, MARS_IAU2000, MGS_POINTING_BIAS, MarsModel},
+    config::usual_instrument,
+    constants::{MARS_IAU1991, MARS_IAU1994, MARS_IAU2000, MarsModel},
     error::Kind,
     frames::{MarsDatum, MarsIau2000},
     geom::{
@@ -113,10 +114,11 @@ fn orientation_samples_of_a_real_image_are_met() {
             worst_km = worst_km.max(worst(&(ours / 1_000.0), &vector(&sample[key])));
         }
         let attitude = session
-            .attitude(MGS_POINTING_BIAS.lookup(et), et, 0.0)
+            .attitude(usual_instrument().pointing_bias().lookup(et), et, 0.0)
             .unwrap();
         assert!(attitude.distance_s < 1e-9 && attitude.inertial_to_bus.at() == et);
-        let to_camera = session.mounting(et).unwrap() * attitude.inertial_to_bus;
+        let to_camera =
+            session.mounting(usual_instrument(), et).unwrap() * attitude.inertial_to_bus;
         let camera_to_mars = to_mars * to_camera.inverse();
         for (ours, key) in [
             (to_mars.matrix(), "r_j2000_to_iau_mars"),
@@ -166,13 +168,13 @@ fn apparent_positions_and_the_sun_are_those_of_the_support_data() {
 #[test]
 fn closed_rotation_of_mars_equals_the_kernels() {
     let cases: [(&str, MarsModel); 7] = [
-        ("derived/mars_iau1991_w176868.tpc", MARS_IAU1991),
-        ("derived/mars_iau1994_pck00006.tpc", MARS_IAU1994),
-        ("mgs_text/mars_iau2000_v0.tpc", MARS_IAU2000),
-        ("mgs_text/pck00008.tpc", MARS_IAU2000),
-        ("mgs_text/pck00009.tpc", MARS_IAU2000),
-        ("mgs_text/pck00010.tpc", MARS_IAU2000),
-        ("ale_mgs/m0402852/pck00009.tpc", MARS_IAU2000),
+        ("derived/mars_iau1991_w176868.tpc", *MARS_IAU1991),
+        ("derived/mars_iau1994_pck00006.tpc", *MARS_IAU1994),
+        ("mgs_text/mars_iau2000_v0.tpc", *MARS_IAU2000),
+        ("mgs_text/pck00008.tpc", *MARS_IAU2000),
+        ("mgs_text/pck00009.tpc", *MARS_IAU2000),
+        ("mgs_text/pck00010.tpc", *MARS_IAU2000),
+        ("ale_mgs/m0402852/pck00009.tpc", *MARS_IAU2000),
     ];
     for (file, model) in cases {
         let Some(path) = real_data(file, "rotation of Mars") else {
@@ -230,8 +232,8 @@ fn areographic_latitudes_are_met() {
     };
     for case in rows(&json(&path)["areographic_to_areocentric"]) {
         let model = match case["ellipsoid"].as_str().unwrap() {
-            "iau1991" => MARS_IAU1991,
-            _ => MARS_IAU2000,
+            "iau1991" => *MARS_IAU1991,
+            _ => *MARS_IAU2000,
         };
         let graphic = AreographicLatitude(number(&case["lat_graphic"]) * RADIANS_PER_DEGREE);
         let expected_rad = number(&case["lat_centric"]) * RADIANS_PER_DEGREE;
@@ -265,7 +267,7 @@ fn a_gap_between_attitude_files_is_named_with_its_kernels() {
     let at = |utc: &str| session.utc_to_et(utc).unwrap();
     let gap = Interval::new(at("1999-08-24T14:00:00"), at("1999-08-24T14:11:00"));
     let failure = session
-        .require_attitude(gap, MGS_POINTING_BIAS, 1.0, 0.0)
+        .require_attitude(gap, usual_instrument().pointing_bias(), 1.0, 0.0)
         .unwrap_err();
     assert_eq!(failure.kind(), Kind::Coverage);
     let text = failure.to_string();
@@ -291,10 +293,12 @@ fn a_gap_between_attitude_files_is_named_with_its_kernels() {
     );
     assert!(
         session
-            .require_attitude(exposures, MGS_POINTING_BIAS, 0.0, 0.0)
+            .require_attitude(exposures, usual_instrument().pointing_bias(), 0.0, 0.0)
             .is_err()
     );
-    let inside = MGS_POINTING_BIAS.lookup(at("1999-08-24T14:05:00"));
+    let inside = usual_instrument()
+        .pointing_bias()
+        .lookup(at("1999-08-24T14:05:00"));
     let failure = session
         .attitude(inside, at("1999-08-24T14:05:00"), 1.0)
         .unwrap_err();

@@ -14,7 +14,7 @@ use areograph::{
     error::Kind,
     geom::{
         intersection::{Unintersected, Weighting},
-        pushbroom::{Detector, EulerPolynomial},
+        pushbroom::{Detector, Distortion, EulerPolynomial},
         stereo::StereoImage,
     },
     stages::intersect::{IntersectOptions, IntersectedTies, TieReject, intersect_ties},
@@ -37,6 +37,7 @@ fn images() -> Vec<StereoImage<EulerPolynomial>> {
                 boresight_sample: recipe::HALF_SWATH_PX,
                 sample_sense: -1.0,
                 samples: 2.0 * recipe::HALF_SWATH_PX,
+                distortion: Distortion::NONE,
             },
             lines: f64::from(scene.lines),
         })

@@ -6,12 +6,14 @@ use serde_json::json;
 
 use crate::{
     image::{IMAGE_DURATION_END_S, IMAGE_LINES_MIN, ImageFields, line_period_agrees},
+    instruments::Instrument,
     units::SECONDS_PER_MS,
 };
 
 use super::{
     declare::{Declare, Keys, Many, declare_table, group, key},
     forms::{Whole, above_to, identifier, matching, text, whole_from_to},
+    instruments::Camera,
     paths::FILE,
 };
 
@@ -44,6 +46,9 @@ declare_table! {
         /// PDS3 or ISIS label, attached or detached.
         #[serde(skip)]
         label: Option<PathBuf> = key(FILE).example(r#""../labels/e0202855.lbl""#),
+        /// The camera: `moc_na`, `moc_wa_red`, `moc_wa_blue`, or the path of an instrument file like those in
+        /// `config/instruments`. Without it, the camera that the label names, and without a label `moc_na`.
+        instrument: Option<Instrument> = key(Camera).example(r#""moc_na""#),
         /// Its name in tie point files and in what is written for ISIS, when that is not the identifier: for a
         /// control network the ISIS serial number. Without it, the identifier.
         serial_number: Option<String> =

@@ -6,10 +6,12 @@
 //! documents every key, and `config/schema/site.schema.json` are made from the declarations.
 
 mod adjustment;
+mod data_file;
 mod declare;
 mod forms;
 mod geojson;
 mod images;
+mod instruments;
 mod kernels;
 mod orientation;
 mod paths;
@@ -30,6 +32,9 @@ use toml::de::DeTable;
 pub use adjustment::{AdjustmentConfig, OrientationPrior};
 pub use declare::{Accept, DeclaredKey, ValueKind, Word};
 pub use images::ImageConfig;
+pub use instruments::{
+    altimeter, built_in_altimeter, built_in_instruments, instrument, usual_instrument,
+};
 pub use kernels::KernelsConfig;
 pub use orientation::{OrientationConfig, RegistrationConfig};
 pub use pedr::PedrConfig;

@@ -2,13 +2,13 @@
 
 use crate::{
     altimetry::{BiasScope, MolaClock, TagSign},
-    constants::{MGS_POINTING_BIAS, MOLA_CLOCK_BIAS_S},
     time::PointingBias,
 };
 
 use super::{
     declare::{Declare as _, Keys, declare_table, key},
     forms::{from_to, text, words},
+    instruments::{built_in_altimeter, usual_instrument},
 };
 
 declare_table! {
@@ -19,11 +19,11 @@ declare_table! {
         /// Known: value and sign for MOC, from ISIS and ALE (`INS-94031_CK_TIME_BIAS`) and Shan et al. 2005.
         /// Unknown: whether the same value holds for kernels before the mapping phase (before April 1999).
         ck_bias as "ck_bias_s": PointingBias = key(from_to(-10.0, 10.0))
-            .or(MGS_POINTING_BIAS.seconds())
+            .or(usual_instrument().pointing.ck_bias_s)
             .map(PointingBias::from_seconds),
         /// Citation that products repeat; change it together with the value.
         source: String = key(text())
-            .or("INS-94031_CK_TIME_BIAS in mocAddendum004.ti; Shan et al. 2005, p. 98".to_owned()),
+            .or(usual_instrument().pointing.source.clone()),
     }
 }
 
@@ -35,7 +35,7 @@ declare_table! {
     /// (353 to 398 m) along the track, 28 m of Mars rotation at the equator, at most 3.2 m of height.
     fill MolaClock {
         /// Size of the bias.
-        bias_s = key(from_to(0.0, 10.0)).or(MOLA_CLOCK_BIAS_S),
+        bias_s = key(from_to(0.0, 10.0)).or(built_in_altimeter().clock_bias_s),
         /// On which side of the true time a tag lies.
         sign = key(words([
             ("late", TagSign::Late, "true time = tag - bias"),
@@ -53,9 +53,7 @@ declare_table! {
             ("none", BiasScope::None, "nothing: tags are taken as they are"),
         ])).or(BiasScope::SpkLookup),
         /// Citation that products repeat; change it together with the values.
-        source = key(text()).or(
-            "Shan et al. 2005, p. 98, citing NAIF 2001; sign and scope not published".to_owned(),
-        ),
+        source = key(text()).or(built_in_altimeter().clock_source.clone()),
     }
     check bias_is_used
 }

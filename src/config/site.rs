@@ -80,6 +80,7 @@ fn across_tables(site: &SiteConfig, keys: &mut Keys<'_, '_>) {
     });
     something_to_do(site, keys);
     serial_numbers(keys);
+    pointing_of_instruments(site, keys);
     if site.images.len() < 2 {
         keys.refuse("ties", "at least two images that tie points can join");
     }
@@ -109,6 +110,27 @@ fn something_to_do(site: &SiteConfig, keys: &mut Keys<'_, '_>) {
             "pedr",
             "a table pedr, tables [[images]], or both: a site without either has nothing to do",
         ),
+    }
+}
+
+/// One pointing bias holds for all images; that of an instrument file may be another.
+fn pointing_of_instruments(site: &SiteConfig, keys: &mut Keys<'_, '_>) {
+    let used_s = site.pointing.ck_bias.seconds();
+    let named = site
+        .images
+        .iter()
+        .filter_map(|image| image.instrument.as_ref());
+    for camera in named {
+        let own_s = camera.pointing.ck_bias_s;
+        if own_s.total_cmp(&used_s).is_ne()
+            && let Some(images) = keys.span_of("images")
+        {
+            let text = format!(
+                "the {own_s} s of {} are never used: pointing.ck_bias_s is {used_s}",
+                camera.name
+            );
+            keys.review().warn(images, text);
+        }
     }
 }
 

@@ -97,9 +97,9 @@ pub fn ray_meets_ellipsoid<F: MarsFixed>(
     direction: &Vector3<f64>,
 ) -> Option<Position<F>> {
     let scale = Vector3::new(
-        1.0 / F::MODEL.equatorial_radius_m,
-        1.0 / F::MODEL.equatorial_radius_m,
-        1.0 / F::MODEL.polar_radius_m,
+        1.0 / F::model().equatorial_radius_m,
+        1.0 / F::model().equatorial_radius_m,
+        1.0 / F::model().polar_radius_m,
     );
     let start = origin.xyz_m.component_mul(&scale);
     let step = direction.component_mul(&scale);

@@ -44,8 +44,9 @@ pub struct Sight {
     pub mars_to_camera: Matrix3<f64>,
     /// Focal length in pixels of the image.
     pub focal_length_px: f64,
-    /// Measured distance from the principal point across the track, pixels of the image.
-    pub across_px: f64,
+    /// Measured place in the focal plane along and across the track, pixels of the image; along it is 0 but for
+    /// distortion.
+    pub focal_px: Vector2<f64>,
     /// Standard deviation along the track, in focal pixels of the image.
     pub along_sigma_px: f64,
     /// Standard deviation across the track, pixels.
@@ -56,7 +57,7 @@ impl Sight {
     /// Unit vector from the perspective centre towards the measured point, Mars-fixed.
     #[must_use]
     pub fn direction(&self) -> Vector3<f64> {
-        let camera = Vector3::new(0.0, -self.across_px / self.focal_length_px, 1.0);
+        let camera = (-self.focal_px / self.focal_length_px).push(1.0);
         self.mars_to_camera.tr_mul(&camera).normalize()
     }
 
@@ -248,7 +249,7 @@ fn residuals_px(
         .iter()
         .map(|sight| {
             let focal = project(&sight.camera_point_m(ground_m), sight.focal_length_px)?;
-            Ok(Vector2::new(0.0, sight.across_px) - focal)
+            Ok(sight.focal_px - focal)
         })
         .collect()
 }
@@ -274,7 +275,7 @@ fn normal_equations(
         let focal = project(&camera_point_m, sight.focal_length_px)?;
         let mut rows =
             by_camera_point(&camera_point_m, sight.focal_length_px) * sight.mars_to_camera;
-        let mut misclosure = Vector2::new(0.0, sight.across_px) - focal;
+        let mut misclosure = sight.focal_px - focal;
         for (row, sigma) in [sight.along_sigma_px, sight.across_sigma_px]
             .into_iter()
             .enumerate()
@@ -314,7 +315,7 @@ mod tests {
             position_m,
             mars_to_camera: camera_to_mars.transpose().into_inner(),
             focal_length_px: FOCAL_LENGTH_PX,
-            across_px,
+            focal_px: Vector2::new(0.0, across_px),
             along_sigma_px: 1.0,
             across_sigma_px: 1.0,
         }
@@ -369,7 +370,7 @@ mod tests {
             Err(Unintersected::Height { height_m }) if (height_m + 74e3).abs() < 1e3
         ));
         let broken = Sight {
-            across_px: f64::NAN,
+            focal_px: Vector2::new(0.0, f64::NAN),
             ..aside
         };
         assert!(intersect(&[above, broken], &limits).is_err());

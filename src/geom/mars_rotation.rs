@@ -54,7 +54,7 @@ pub fn mars_matrix(model: &MarsModel, et: Et) -> Matrix3<f64> {
 /// Rotation from J2000 to the Mars-fixed frame `F` at `et`.
 #[must_use]
 pub fn mars_rotation<F: MarsFixed>(et: Et) -> Rotation<J2000, F> {
-    Rotation::new(mars_matrix(&F::MODEL, et), et)
+    Rotation::new(mars_matrix(F::model(), et), et)
 }
 
 /// Takes a position out of the Mars-fixed frame of `datum` at `out_at` and into `F` at `into_at`.
@@ -67,6 +67,6 @@ pub fn convert_datum<F: MarsFixed>(
     out_at: Et,
     into_at: Et,
 ) -> Position<F> {
-    let inertial = mars_matrix(&datum.model(), out_at).tr_mul(&xyz_m);
+    let inertial = mars_matrix(datum.model(), out_at).tr_mul(&xyz_m);
     mars_rotation::<F>(into_at).apply(&Position::new(inertial))
 }

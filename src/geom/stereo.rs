@@ -1,8 +1,8 @@
 //! An image as intersection and adjustment use it: orientation and detector together.
 
-use nalgebra::Vector3;
+use nalgebra::{Vector2, Vector3};
 
-use super::pushbroom::{Detector, ExteriorOrientation};
+use super::pushbroom::{Detector, ExteriorOrientation, missed_m};
 
 /// An image that takes part in intersection or adjustment.
 #[derive(Debug, Clone, PartialEq)]
@@ -18,15 +18,12 @@ pub struct StereoImage<M> {
 }
 
 impl<M: ExteriorOrientation> StereoImage<M> {
-    /// Line from the middle, and focal coordinate across the track in pixels, of a place in the image.
+    /// Line from the middle, and focal coordinates along and across the track in pixels, of a place in the image.
     ///
     /// Lines and samples are 0 at the outer edge of the first one.
     #[must_use]
-    pub fn focal_place(&self, line: f64, sample: f64) -> (f64, f64) {
-        (
-            line - 0.5 * self.lines,
-            self.detector.y_of_sample_px(sample),
-        )
+    pub fn focal_place(&self, line: f64, sample: f64) -> (f64, Vector2<f64>) {
+        (line - 0.5 * self.lines, self.detector.place_px(sample))
     }
 
     /// Whether a place lies in the image, its edges included.
@@ -41,8 +38,9 @@ impl<M: ExteriorOrientation> StereoImage<M> {
         let (pose, motion) = self.orientation.moving(x_lines);
         let camera_m = pose.camera_vector_m(ground_m);
         let rate_m = motion.camera_vector_rate_m(&pose, &camera_m);
+        let [_, missed_rate_m] = missed_m(&self.detector.distortion, &camera_m, &rate_m);
         // The point lies in the plane of its line, so that the change of its depth does not count.
-        self.detector.focal_length_px * rate_m.x.abs() / camera_m.z
+        self.detector.focal_length_px * missed_rate_m.abs() / camera_m.z
     }
 
     /// How far apart line `x_lines` and the next lie on the ground at a point of it, metres, across the ray.

@@ -48,8 +48,13 @@ pub enum LabelFault {
         expected: &'static str,
     },
     /// Another instrument's image.
-    #[error("instrument is {0:?}; expected MOC-NA")]
-    Instrument(String),
+    #[error("instrument is {found:?}; expected {}", listed(known))]
+    Instrument {
+        /// Instrument and filter of the label.
+        found: String,
+        /// Those of the cameras that are known.
+        known: Vec<String>,
+    },
 }
 
 impl Fault for LabelFault {
@@ -63,9 +68,21 @@ impl Fault for LabelFault {
             Self::Value { .. } => {
                 "correct the label, or write the key in the image's table of the configuration"
             }
-            Self::Instrument(_) => "only narrow-angle images of the Mars Orbiter Camera are read",
+            Self::Instrument { .. } => {
+                "name the camera's instrument file with `instrument` in the image's table"
+            }
         }
         .to_owned()
+    }
+}
+
+/// `a, b or c`.
+fn listed(words: &[String]) -> String {
+    match words {
+        [first @ .., before, last] => [first, &[format!("{before} or {last}")]]
+            .concat()
+            .join(", "),
+        _ => words.concat(),
     }
 }
 

@@ -1,4 +1,4 @@
-//! Labels of MOC narrow-angle images, as archived by PDS and as ISIS writes them.
+//! Labels of MOC images, as archived by PDS and as ISIS writes them.
 
 use std::{fs::File, io::Read, path::Path};
 
@@ -6,6 +6,7 @@ use super::label::{Entry, LABEL_BYTES_MAX, Label, LabelFault, parse};
 use crate::{
     error::{IoFault, Place, Result},
     image::ImageFields,
+    instruments::{Instrument, LabelNames},
     units::SECONDS_PER_MS,
 };
 
@@ -14,15 +15,17 @@ use crate::{
 pub struct MocLabel {
     /// Product, for example `M04/02852`.
     pub product_id: Option<String>,
+    /// The camera that took it.
+    pub instrument: Instrument,
     /// Times, exposure, summing and size.
     pub fields: ImageFields,
 }
 
-/// Reads a PDS3 label (attached or detached) or an ISIS label.
+/// Reads a PDS3 label (attached or detached) or an ISIS label of an image by one of `cameras`.
 ///
 /// # Errors
 /// The system's refusal to read; no label; another instrument; a value that is not of its kind.
-pub fn read_label(path: &Path) -> Result<MocLabel> {
+pub fn read_label(path: &Path, cameras: &[Instrument]) -> Result<MocLabel> {
     let mut bytes = Vec::new();
     File::open(path)
         .map_err(IoFault::on("open"))
@@ -32,7 +35,7 @@ pub fn read_label(path: &Path) -> Result<MocLabel> {
         .map_err(IoFault::on("read"))
         .in_file(path)?;
     parse(&bytes)
-        .and_then(|label| moc_label(&label))
+        .and_then(|label| moc_label(&label, cameras))
         .in_file(path)
 }
 
@@ -41,13 +44,12 @@ pub fn read_label(path: &Path) -> Result<MocLabel> {
 /// `lines_delivered` is never set: image data are compressed, so their length in bytes says nothing.
 ///
 /// # Errors
-/// Another instrument than MOC-NA, or none; a value that is not of its kind.
-pub fn moc_label(label: &Label) -> std::result::Result<MocLabel, LabelFault> {
-    let instrument = either(label, "INSTRUMENT_ID", "INSTRUMENTID");
-    let instrument = instrument.map_or("", |entry| entry.value.as_str());
-    if !instrument.eq_ignore_ascii_case("MOC-NA") {
-        return Err(LabelFault::Instrument(instrument.to_owned()));
-    }
+/// An instrument that is not among `cameras`, or none; a value that is not of its kind.
+pub fn moc_label(
+    label: &Label,
+    cameras: &[Instrument],
+) -> std::result::Result<MocLabel, LabelFault> {
+    let instrument = camera(label, cameras)?;
     let lines = label
         .find_in("IMAGE", "LINES")
         .or_else(|| label.find_in("DIMENSIONS", "LINES"));
@@ -61,6 +63,7 @@ pub fn moc_label(label: &Label) -> std::result::Result<MocLabel, LabelFault> {
     let summing = |pds, isis| optional_count(either(label, pds, isis), 1);
     Ok(MocLabel {
         product_id: text(either(label, "PRODUCT_ID", "PRODUCTID")),
+        instrument: instrument.clone(),
         fields: ImageFields {
             sclk_start: text(either(
                 label,
@@ -79,6 +82,28 @@ pub fn moc_label(label: &Label) -> std::result::Result<MocLabel, LabelFault> {
             samples: optional_count(samples, 1)?,
             first_detector,
         },
+    })
+}
+
+/// The first of `cameras` whose names the label has; a camera that is known without a filter takes any.
+fn camera<'a>(
+    label: &Label,
+    cameras: &'a [Instrument],
+) -> std::result::Result<&'a Instrument, LabelFault> {
+    let value = |pds, isis| either(label, pds, isis).map_or("", |entry| entry.value.as_str());
+    let instrument = value("INSTRUMENT_ID", "INSTRUMENTID");
+    let filter = value("FILTER_NAME", "FILTERNAME");
+    let fits = |names: &LabelNames| {
+        let own_filter = names.filter.as_deref().unwrap_or(filter);
+        names.instrument.eq_ignore_ascii_case(instrument) && own_filter.eq_ignore_ascii_case(filter)
+    };
+    let found = cameras.iter().find(|camera| fits(&camera.label));
+    found.ok_or_else(|| LabelFault::Instrument {
+        found: format!("{instrument} {filter}").trim().to_owned(),
+        known: cameras
+            .iter()
+            .map(|camera| camera.label.to_string())
+            .collect(),
     })
 }
 
@@ -156,9 +181,10 @@ fn exposure_s(entry: &Entry) -> std::result::Result<f64, LabelFault> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::config::built_in_instruments;
 
     fn read(text: &str) -> std::result::Result<MocLabel, LabelFault> {
-        moc_label(&parse(text.as_bytes()).unwrap())
+        moc_label(&parse(text.as_bytes()).unwrap(), built_in_instruments())
     }
 
     #[test]
@@ -193,19 +219,41 @@ mod tests {
 
     #[test]
     fn other_instruments_are_refused_and_unknown_values_left_out() {
-        assert_eq!(
-            read("INSTRUMENT_ID = MOC-WA\n"),
-            Err(LabelFault::Instrument("MOC-WA".to_owned()))
-        );
-        assert_eq!(
-            read("LINES = 3\n"),
-            Err(LabelFault::Instrument(String::new()))
-        );
+        let refused = |text: &str| read(text).unwrap_err().to_string();
+        let expected = "expected MOC-NA, MOC-WA RED or MOC-WA BLUE";
+        for (text, found) in [
+            ("INSTRUMENT_ID = MOC-WA\n", "MOC-WA"),
+            (
+                "INSTRUMENT_ID = MOC-WA\nFILTER_NAME = GREEN\n",
+                "MOC-WA GREEN",
+            ),
+            ("LINES = 3\n", ""),
+        ] {
+            assert_eq!(
+                refused(text),
+                format!("instrument is {found:?}; {expected}")
+            );
+        }
         let label =
             read("INSTRUMENT_ID = MOC-NA\nSTART_TIME = UNK\nPRODUCT_ID = \"N/A\"\n").unwrap();
         assert_eq!(
             (label.product_id, label.fields),
             (None, ImageFields::default())
         );
+    }
+
+    #[test]
+    fn instrument_and_filter_tell_the_cameras_apart() {
+        for (text, id) in [
+            ("INSTRUMENT_ID = \"MOC-NA\"\n", "moc_na"),
+            ("INSTRUMENTID = MOC-NA\nFILTERNAME = BROAD_BAND\n", "moc_na"),
+            (
+                "INSTRUMENT_ID = MOC-WA\nFILTER_NAME = \"RED\"\n",
+                "moc_wa_red",
+            ),
+            ("INSTRUMENTID = MOC-WA\nFILTERNAME = Blue\n", "moc_wa_blue"),
+        ] {
+            assert_eq!(read(text).unwrap().instrument.id, id);
+        }
     }
 }

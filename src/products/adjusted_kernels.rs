@@ -28,7 +28,6 @@ use super::{
 };
 use crate::{
     config::{KernelsConfig, PointingConfig},
-    constants::MGS_POINTING_BIAS,
     error::{IoFault, Place, Result},
     frames::MarsIau2000,
     geom::{attitude::rotation_vector, mars_rotation::mars_rotation, statistics::largest},
@@ -227,13 +226,13 @@ fn earlier(a: Et, b: Et) -> Et {
 /// What is written into the comment areas of both kernels.
 fn comment(image: &AdjustedImage, to: &AdjustedKernels) -> String {
     let (times, bias_s) = (image.times, to.pointing.ck_bias.seconds());
-    let others = if (bias_s - MGS_POINTING_BIAS.seconds()).abs() < BIAS_TOLERANCE_S {
+    let usual_s = times.instrument.pointing.ck_bias_s;
+    let others = if (bias_s - usual_s).abs() < BIAS_TOLERANCE_S {
         "ISIS and ALE read MOC attitude there by themselves: load the file as it is.".to_owned()
     } else {
         format!(
-            "ISIS and ALE read MOC attitude {:.3} s from the exposure whatever the kernel says: this file is \n\
-             not for them.",
-            MGS_POINTING_BIAS.seconds()
+            "ISIS and ALE read MOC attitude {usual_s:.3} s from the exposure whatever the kernel says: this file is \n\
+             not for them."
         )
     };
     format!(
@@ -270,7 +269,8 @@ fn read_back(to: &AdjustedKernels, image: &AdjustedImage) -> Result<()> {
         let position = to_mars.apply(&session.state(sample.et)?.position);
         let lookup = to.pointing.ck_bias.lookup(sample.et);
         let attitude = session.attitude(lookup, sample.et, to.kernels.ck_tolerance_s)?;
-        let to_camera = session.mounting(sample.et)? * attitude.inertial_to_bus;
+        let to_camera =
+            session.mounting(&image.times.instrument, sample.et)? * attitude.inertial_to_bus;
         let camera_to_mars = to_mars * to_camera.inverse();
         let expected = sample.pose().mars_to_camera;
         distances_m.push(position.distance_m(&sample.position));

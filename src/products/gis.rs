@@ -1,10 +1,9 @@
 //! Points with attributes, as formats for GIS take them.
 
 use super::table::Table;
-use crate::constants::MARS_IAU2000;
 
 /// The sphere of the CRS, and of `D_MARS` in Ames Stereo Pipeline, metres.
-pub(super) const SPHERE_RADIUS_M: f64 = MARS_IAU2000.equatorial_radius_m;
+pub(super) const SPHERE_RADIUS_M: f64 = 3_396_190.0;
 /// `IAU_2015:49900`; [`FRAME`](super::coordinates::FRAME) says whose longitudes the coordinates are.
 pub(super) const CRS_NAME: &str = "Mars (2015) - Sphere / Ocentric";
 /// The same as text for GIS.

@@ -1,4 +1,4 @@
-//! Image support data of a MOC narrow-angle image for the Community Sensor Model, as `usgscsm` reads it.
+//! Image support data of an image for the Community Sensor Model, as `usgscsm` reads it.
 //!
 //! Keys and nesting are those of ALE's image support data. Where ALE's file for MOC does not say what
 //! the camera does, the numbers here are those that make `usgscsm` see the right pixel at the right time:
@@ -8,12 +8,15 @@
 //!   (`UsgsAstroLsSensorModel::getImageTime`); ALE writes the exposure of one detector line.
 //! * `usgscsm` puts the centre of the first sample at 0.5 and computes the detector coordinate
 //!   `sample · summing + starting_detector_sample − detector_center.sample`. With the edge of the detector
-//!   at 0 the centre lies at 2048 / 2 = 1024; ALE's 1023.5 with a start of 1 is off by 1.5 pixels.
-//! * The line of the detector is taken at coordinate 0, so its centre is 0 (`losToEcf`; ISIS sets 0 too).
+//!   at 0 the centre of the narrow angle lies at 2048 / 2 = 1024; ALE's 1023.5 with a start of 1 is off by 1.5
+//!   pixels.
+//! * The line of the detector is taken at coordinate 0 (`losToEcf`), so its centre is 0, or what puts a line
+//!   that lies off the boresight there.
 //! * Pointing is sampled from before the first line to after the last; ALE's table starts 1.15 s late. Nodes are
 //!   as dense as an interpolation error below 0.01 pixels wants, which is measured and stated.
-//! * Distortion is zero, as the instrument kernel says. ALE repeats the pixel pitch in these places, which
-//!   `usgscsm` takes for radial coefficients per mm² and mm⁴: wrong by hundreds of pixels at the edges.
+//! * Distortion of the narrow angle is zero, as the instrument kernel says. ALE repeats the pixel pitch in these
+//!   places, which `usgscsm` takes for radial coefficients per mm² and mm⁴: wrong by hundreds of pixels at the
+//!   edges. Other cameras have the three coefficients that fit the image's samples best, and what they leave.
 
 use std::path::Path;
 
@@ -28,13 +31,11 @@ use super::{
     site::{ImageProducts, SiteProducts},
 };
 use crate::{
-    constants::{
-        MARS_IAU2000, MOC_NA_DETECTORS, MOC_NA_FOCAL_LENGTH_MM, MOC_NA_PIXEL_PITCH_MM,
-        NAIF_IAU_MARS, NAIF_MARS, NAIF_MGS_BUS, NAIF_MOC_NA,
-    },
+    constants::{MARS_IAU2000, NAIF_IAU_MARS, NAIF_MARS},
     error::Result,
     frames::{self, Frame, J2000},
-    geom::attitude::continuous_quaternions,
+    geom::{attitude::continuous_quaternions, pushbroom::Distortion},
+    instruments::{Instrument, NaifNames},
     stages::{
         reorient::geometric_tables,
         sample_orientation::{CameraTables, InterpolationCheck, Orientation},
@@ -55,7 +56,7 @@ struct Isd {
     image_lines: u32,
     image_samples: u32,
     name_platform: &'static str,
-    name_sensor: &'static str,
+    name_sensor: String,
     reference_height: Value,
     name_model: &'static str,
     interpolation_method: &'static str,
@@ -160,14 +161,20 @@ fn isd(site: &SiteProducts, image: &ImageProducts) -> Isd {
     let start_s = times.start.seconds();
     // Of the delivered lines: camera models know no others.
     let half_s = 0.5 * f64::from(times.lines_delivered) * times.line_period_s;
-    let pixels_per_mm = MOC_NA_PIXEL_PITCH_MM.recip();
+    let Instrument {
+        naif,
+        optics,
+        detector,
+        ..
+    } = &times.instrument;
+    let pixels_per_mm = optics.pixel_pitch_mm.recip();
     Isd {
         isis_camera_version: 1,
         image_identifier: times.id.clone(),
         image_lines: times.lines_delivered,
         image_samples: times.samples,
         name_platform: "MARS GLOBAL SURVEYOR",
-        name_sensor: "MGS_MOC_NA",
+        name_sensor: naif.frame.clone(),
         reference_height: json!({
             "maxheight": REFERENCE_HEIGHT_M, "minheight": -REFERENCE_HEIGHT_M, "unit": "m",
         }),
@@ -182,15 +189,19 @@ fn isd(site: &SiteProducts, image: &ImageProducts) -> Isd {
             "unit": "km",
         }),
         body_rotation: body_rotation(tables),
-        instrument_pointing: instrument_pointing(tables),
-        naif_keywords: naif_keywords(site),
+        instrument_pointing: instrument_pointing(tables, naif),
+        naif_keywords: naif_keywords(site, &times.instrument),
         detector_sample_summing: times.crosstrack_summing,
         detector_line_summing: times.downtrack_summing,
-        focal_length_model: json!({ "focal_length": MOC_NA_FOCAL_LENGTH_MM }),
-        detector_center: json!({ "line": 0.0, "sample": f64::from(MOC_NA_DETECTORS) / 2.0 }),
+        focal_length_model: json!({ "focal_length": optics.focal_length_mm }),
+        detector_center: json!({
+            "line": 0.0 - detector.along_track_px, "sample": detector.boresight_px,
+        }),
         focal2pixel_lines: [0.0, pixels_per_mm, 0.0],
-        focal2pixel_samples: [0.0, 0.0, pixels_per_mm],
-        optical_distortion: json!({ "radial": { "coefficients": [0.0, 0.0, 0.0] } }),
+        focal2pixel_samples: [0.0, 0.0, detector.samples_along.sign() * pixels_per_mm],
+        optical_distortion: json!({
+            "radial": { "coefficients": times.detector().radial_fit(&times.instrument).coefficients }
+        }),
         starting_detector_line: 0,
         starting_detector_sample: times.first_detector,
         instrument_position: positions(&tables.et_s, &tables.position_m, &tables.velocity_m_s),
@@ -230,9 +241,9 @@ fn body_rotation(tables: &CameraTables) -> Rotation {
     )
 }
 
-fn instrument_pointing(tables: &CameraTables) -> Rotation {
+fn instrument_pointing(tables: &CameraTables, naif: &NaifNames) -> Rotation {
     Rotation {
-        constant_frames: Some([NAIF_MOC_NA, NAIF_MGS_BUS]),
+        constant_frames: Some([naif.instrument, naif.bus]),
         constant_rotation: Some(
             tables
                 .bus_to_camera
@@ -243,7 +254,7 @@ fn instrument_pointing(tables: &CameraTables) -> Rotation {
         ),
         ..rotation(
             tables,
-            NAIF_MGS_BUS,
+            naif.bus,
             &tables.inertial_to_bus,
             &tables.bus_angular_velocity_rad_s,
         )
@@ -291,23 +302,31 @@ fn ends(et_s: &[f64]) -> (f64, f64) {
 }
 
 /// The keywords that the numbers above come from, under NAIF's names.
-fn naif_keywords(site: &SiteProducts) -> Value {
-    let mars = MARS_IAU2000;
+fn naif_keywords(site: &SiteProducts, instrument: &Instrument) -> Value {
+    let mars = &MARS_IAU2000;
     let [a_km, c_km] =
         [mars.equatorial_radius_m, mars.polar_radius_m].map(|radius_m| radius_m / METRES_PER_KM);
-    json!({
+    let mut keywords = json!({
         "BODY_CODE": NAIF_MARS,
         "BODY_FRAME_CODE": NAIF_IAU_MARS,
         "BODY499_RADII": [a_km, a_km, c_km],
         "BODY499_POLE_RA": [mars.pole_ra_deg, mars.pole_ra_deg_per_century, 0.0],
         "BODY499_POLE_DEC": [mars.pole_dec_deg, mars.pole_dec_deg_per_century, 0.0],
         "BODY499_PM": [mars.meridian_deg, mars.meridian_deg_per_day, 0.0],
-        "INS-94031_FOCAL_LENGTH": MOC_NA_FOCAL_LENGTH_MM,
-        "INS-94031_PIXEL_PITCH": MOC_NA_PIXEL_PITCH_MM,
-        "INS-94031_PIXEL_SAMPLES": MOC_NA_DETECTORS,
-        "INS-94031_CK_TIME_BIAS": site.config.pointing.ck_bias.seconds(),
-        "INS-94031_SPK_TIME_BIAS": 0.0,
-    })
+    });
+    for (key, value) in [
+        ("FOCAL_LENGTH", json!(instrument.optics.focal_length_mm)),
+        ("PIXEL_PITCH", json!(instrument.optics.pixel_pitch_mm)),
+        ("PIXEL_SAMPLES", json!(instrument.detector.pixels)),
+        (
+            "CK_TIME_BIAS",
+            json!(site.config.pointing.ck_bias.seconds()),
+        ),
+        ("SPK_TIME_BIAS", json!(0.0)),
+    ] {
+        keywords[format!("INS{}_{key}", instrument.naif.instrument)] = value;
+    }
+    keywords
 }
 
 /// Kernel names by type, in load order, and qualities, as ALE lists them.
@@ -323,6 +342,17 @@ fn kernels(site: &SiteProducts) -> Value {
 fn provenance(site: &SiteProducts, image: &ImageProducts) -> Value {
     let times = image.times;
     let interpolation = &image.orientation.tables.interpolation;
+    let detector = times.detector();
+    let distortion = if detector.distortion == Distortion::NONE {
+        "optical_distortion: none, as the instrument kernel says".to_owned()
+    } else {
+        let fit = detector.radial_fit(&times.instrument);
+        format!(
+            "optical_distortion: the three radial coefficients that fit the camera best over the samples of this \
+             image; they leave {:.1e} pixels at most",
+            fit.error_max_px,
+        )
+    };
     // A list, as two kernels may have one name.
     let kernels = site.kernels.iter();
     let kernels = kernels.map(|kernel| json!({"name": kernel.name, "blake3": kernel.blake3}));
@@ -346,11 +376,17 @@ fn provenance(site: &SiteProducts, image: &ImageProducts) -> Value {
         },
         "notes": [
             "line_scan_rate: seconds per image line (summing included), from the top edge of the first line",
-            "detector coordinates count from the detector's edge: centre at sample 1024, starting_detector_sample \
-             from 0, so that the centre of the first sample is 0.5 * summing + starting_detector_sample",
-            "optical_distortion: none, as the instrument kernel says",
+            format!(
+                "detector coordinates count from the detector's edge: centre at sample {}, starting_detector_sample \
+                 from 0, so that the centre of the first sample is 0.5 * summing + starting_detector_sample",
+                times.instrument.detector.boresight_px,
+            ),
+            distortion,
             "instrument_position: light time and stellar aberration corrected (LT+S), as in ISIS and ALE",
-            "instrument_pointing: attitude of each epoch read from the C-kernel at epoch + INS-94031_CK_TIME_BIAS",
+            format!(
+                "instrument_pointing: attitude of each epoch read from the C-kernel at epoch + INS{}_CK_TIME_BIAS",
+                times.instrument.naif.instrument,
+            ),
             "image_lines: delivered lines; lines_header were exposed",
         ],
     })

@@ -8,7 +8,7 @@ use super::plots::{
 };
 use crate::{
     error::Result,
-    geom::{pushbroom::Detector, statistics::Summary},
+    geom::statistics::Summary,
     products::{GeometricProducts, ImageProducts, SiteProducts},
     stages::{intersect::IntersectedTies, register::RegisteredPoints},
 };
@@ -204,11 +204,7 @@ fn vectors(
 /// Residual vectors of good points in lines and samples, and the number of outliers.
 fn residuals(image: &ImageProducts, index: usize, ties: &IntersectedTies) -> (Vec<Arrow>, usize) {
     let times = image.times;
-    let detector = Detector::moc_na(
-        times.crosstrack_summing,
-        times.first_detector,
-        times.samples,
-    );
+    let detector = times.detector();
     let middle = 0.5 * f64::from(times.lines_header);
     let mut outliers = 0;
     let mut arrows = Vec::new();

@@ -18,7 +18,7 @@ use super::{
     truth::{KeptShot, ProfileTruth, Truth},
 };
 use crate::{
-    constants::{MGS_POINTING_BIAS, MOLA_CLOCK_BIAS_S},
+    config::{built_in_altimeter, built_in_instruments, usual_instrument},
     error::{IoFault, Place, Result},
     frames::MarsDatum,
     geom::ellipsoid::Spherical,
@@ -136,7 +136,7 @@ fn stretches(session: &Session) -> Result<Vec<Interval>> {
             .ck
             .as_slice()
             .iter()
-            .map(|held| held.shifted(-MGS_POINTING_BIAS.seconds())),
+            .map(|held| held.shifted(-usual_instrument().pointing.ck_bias_s)),
     );
     let flown: Vec<Interval> = coverage
         .spk
@@ -165,13 +165,14 @@ struct TabulatedFlight {
 impl TabulatedFlight {
     fn new(session: &Session, tags: Vec<Et>) -> Result<Self> {
         let first = tags.first().map_or(Et::from_seconds(0.0), |tag| {
-            tag.plus(-MOLA_CLOCK_BIAS_S - FRAME_S / 2.0)
+            tag.plus(-built_in_altimeter().clock_bias_s - FRAME_S / 2.0)
         });
         let count = tags.len() * 40 + 1;
         let beams = (0..count)
             .map(|index| {
                 let et = first.plus(BEAM_STEP_S * index as f64);
-                let attitude = session.attitude(MGS_POINTING_BIAS.lookup(et), et, 0.0)?;
+                let attitude =
+                    session.attitude(usual_instrument().pointing_bias().lookup(et), et, 0.0)?;
                 Ok(Beam {
                     spacecraft_m: session.state(et)?.position.xyz_m,
                     direction: attitude.inertial_to_bus.matrix().row(2).transpose(),
@@ -262,7 +263,7 @@ fn hundredths(degrees: f64) -> f64 {
 /// An image of the site file, named after the product that its label tells.
 fn site_image(label: &Path) -> Result<SiteImage> {
     let label = absolute(label)?;
-    let product = read_label(&label)?.product_id;
+    let product = read_label(&label, built_in_instruments())?.product_id;
     let stem = label
         .file_stem()
         .unwrap_or_default()

@@ -9,6 +9,7 @@ use super::{
     plan::{Look, PlannedImage},
 };
 use crate::{
+    config::usual_instrument,
     constants::MARS_IAU2000,
     error::Result,
     frames::{MarsIau2000, Position},
@@ -90,7 +91,7 @@ impl Arc {
 
     /// Matrix from the camera to Mars (IAU 2000) at `et`.
     pub(super) fn camera_to_mars(&self, et: Et) -> Matrix3<f64> {
-        let j2000_to_camera = bus_to_camera() * self.attitude.j2000_to_bus(et);
+        let j2000_to_camera = bus_to_camera(usual_instrument()) * self.attitude.j2000_to_bus(et);
         mars_matrix(&MARS_IAU2000, et) * j2000_to_camera.transpose()
     }
 
@@ -130,7 +131,7 @@ impl Geometry {
     fn miss(self, image: &PlannedImage, middle: Et) -> Option<Vector3<f64>> {
         let state: OrbitState = self.orbit(middle).state(middle);
         let mars = mars_matrix(&MARS_IAU2000, middle);
-        let camera = bus_to_camera() * rolled_attitude(&state, self.0.z);
+        let camera = bus_to_camera(usual_instrument()) * rolled_attitude(&state, self.0.z);
         let spacecraft = Position::<MarsIau2000>::new(mars * state.position_m);
         let boresight = mars * camera.row(2).transpose();
         let hit = ray_meets_ellipsoid(&spacecraft, &boresight)?;

@@ -8,8 +8,8 @@ use crate::{
         attitude::{matrix_of_rotation_vector, rotation_vector},
         mars_rotation::{frame_rotation_1, frame_rotation_2, frame_rotation_3},
     },
+    instruments::Instrument,
     time::{Et, Interval},
-    units::RADIANS_PER_DEGREE,
 };
 
 /// Seconds between attitude samples, as in the mission's C-kernels.
@@ -19,14 +19,12 @@ const HOLD_MARGIN_S: f64 = 40.0;
 /// Seconds of the slew from nadir to the held attitude, and back.
 const SLEW_S: f64 = 240.0;
 
-/// Matrix from bus to camera: the in-flight mounting.
-///
-/// # Source
-/// Kirk et al., LPSC 2001, Table 2, as in the MOC instrument kernel 2.0 and `kernels.example/moc.ti`.
-pub(super) fn bus_to_camera() -> Matrix3<f64> {
-    frame_rotation_3(0.180_00 * RADIANS_PER_DEGREE)
-        * frame_rotation_2(-0.071_62 * RADIANS_PER_DEGREE)
-        * frame_rotation_1(0.114_63 * RADIANS_PER_DEGREE)
+/// Matrix from bus to camera: the in-flight mounting, as in `kernels.example/moc.ti`.
+pub(super) fn bus_to_camera(camera: &Instrument) -> Matrix3<f64> {
+    let mounting = &camera.mounting;
+    frame_rotation_3(mounting.yaw_rad)
+        * frame_rotation_2(mounting.pitch_rad)
+        * frame_rotation_1(mounting.roll_rad)
 }
 
 /// Matrix from J2000 to the bus that looks at the centre of Mars: +Z down, flight along −X.
@@ -144,6 +142,7 @@ fn quaternion(matrix: &Matrix3<f64>) -> UnitQuaternion<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::{config::usual_instrument, units::RADIANS_PER_DEGREE};
 
     fn orbit() -> Orbit {
         Orbit::new(Et::from_seconds(3.7e7), 1.0, 1.3)
@@ -169,7 +168,7 @@ mod tests {
             -0.002_000_668_0,
             0.999_997_217_4,
         );
-        assert!((bus_to_camera() - published).abs().max() < 1e-10); // ten printed digits
+        assert!((bus_to_camera(usual_instrument()) - published).abs().max() < 1e-10); // ten printed digits
     }
 
     #[test]

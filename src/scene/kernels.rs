@@ -13,7 +13,8 @@ use super::{
     versions::{FAMILIES, Version},
 };
 use crate::{
-    constants::{MGS_POINTING_BIAS, NAIF_MARS, NAIF_MGS, NAIF_SUN},
+    config::usual_instrument,
+    constants::{NAIF_MARS, NAIF_MGS, NAIF_SUN},
     error::{IoFault, Place, Result},
     frames::Position,
     geom::attitude::make_continuous,
@@ -29,6 +30,8 @@ const NAIF_SOLAR_SYSTEM_BARYCENTRE: i32 = 0;
 const SPK_STEP_S: f64 = 60.0;
 /// Degree of Hermite interpolation.
 const SPK_DEGREE: i32 = 7;
+/// Name of the kernel with the frames of the wide-angle cameras.
+const WIDE_ANGLE_NAME: &str = "moc_wa.ti";
 /// Name of the attitude kernel.
 const CK_NAME: &str = "mgs_sc_scene.bc";
 /// Name of the kernel with Mars and the Sun.
@@ -37,7 +40,7 @@ const PLANETS_NAME: &str = "mars_sun_scene.bsp";
 const SYNTHETIC: &str = "SYNTHETIC: written by areograph scene, not from mission data.";
 
 /// Text kernels by file name, in load order of the first four.
-const TEXT_KERNELS: [(&str, &str); 6] = [
+const TEXT_KERNELS: [(&str, &str); 7] = [
     (
         "leapseconds.tls",
         include_str!("../../kernels.example/leapseconds.tls"),
@@ -58,6 +61,10 @@ const TEXT_KERNELS: [(&str, &str); 6] = [
     (
         "mars_iau1994.tpc",
         include_str!("../../kernels.example/mars_iau1994.tpc"),
+    ),
+    (
+        WIDE_ANGLE_NAME,
+        include_str!("../../kernels.example/moc_wa.ti"),
     ),
 ];
 /// How many of them a metakernel loads; the other Mars models would replace the first.
@@ -86,16 +93,32 @@ pub(super) fn write_text_kernels(folder: &Path) -> Result<()> {
             spk_name(family),
             CK_NAME.to_owned(),
         ]);
-        let list: Vec<String> = names.iter().map(|name| format!("'{name}'")).collect();
-        let text = format!(
-            "KPL/MK\n\nKernels of a synthetic mission with the orbit of family {family}; written by\n\
-             `areograph scene`. Paths count from the folder of this file.\n\n\\begindata\n\n\
-             KERNELS_TO_LOAD = ( {} )\n\n\\begintext\n",
-            list.join("\n                    ")
-        );
-        put(&folder.join(format!("{family}.tm")), &text)?;
+        put(
+            &folder.join(format!("{family}.tm")),
+            &metakernel(family, &names),
+        )?;
+        names.push(WIDE_ANGLE_NAME.to_owned());
+        put(
+            &folder.join(wide_angle_metakernel(family)),
+            &metakernel(family, &names),
+        )?;
     }
     Ok(())
+}
+
+/// Name of the metakernel that knows the wide-angle cameras too.
+pub(super) fn wide_angle_metakernel(family: &str) -> String {
+    format!("{family}_wa.tm")
+}
+
+fn metakernel(family: &str, names: &[String]) -> String {
+    let list: Vec<String> = names.iter().map(|name| format!("'{name}'")).collect();
+    format!(
+        "KPL/MK\n\nKernels of a synthetic mission with the orbit of family {family}; written by\n\
+         `areograph scene`. Paths count from the folder of this file.\n\n\\begindata\n\n\
+         KERNELS_TO_LOAD = ( {} )\n\n\\begintext\n",
+        list.join("\n                    ")
+    )
 }
 
 /// A session with the clock and the leap seconds of `folder`.
@@ -134,7 +157,12 @@ impl AttitudeColumns {
         Self {
             instants: samples
                 .iter()
-                .map(|sample| MGS_POINTING_BIAS.lookup(sample.et).kernel_time())
+                .map(|sample| {
+                    usual_instrument()
+                        .pointing_bias()
+                        .lookup(sample.et)
+                        .kernel_time()
+                })
                 .collect(),
             quaternions,
             rates_rad_s: samples

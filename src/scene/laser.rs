@@ -10,7 +10,8 @@ use super::{
     terrain::Terrain,
 };
 use crate::{
-    constants::{MARS_IAU2000, MOLA_CLOCK_BIAS_S},
+    config::built_in_altimeter,
+    constants::MARS_IAU2000,
     error::Result,
     frames::MarsDatum,
     geom::{
@@ -119,7 +120,7 @@ impl Look {
         let mars = mars_matrix(&MARS_IAU2000, et);
         let to_file = match datum {
             MarsDatum::Iau2000 => Matrix3::identity(),
-            older => mars_matrix(&older.model(), et) * mars.transpose(),
+            older => mars_matrix(older.model(), et) * mars.transpose(),
         };
         Ok(Self {
             et,
@@ -172,7 +173,7 @@ pub(super) fn fly_frame(
     terrain: &Terrain,
     request: &FrameRequest,
 ) -> Result<Frame> {
-    let middle_et = request.tag.plus(-MOLA_CLOCK_BIAS_S);
+    let middle_et = request.tag.plus(-built_in_altimeter().clock_bias_s);
     let look = |et: Et| Look::new(flight, et, request.datum);
     let middle = look(middle_et)?;
     let first = look(middle_et.plus(-FRAME_S / 2.0))?;

@@ -5,22 +5,26 @@ use std::path::Path;
 use super::{
     SceneOptions, SceneSummary,
     arc::Arc,
+    context::{CONTEXT_SITE, ContextImage, context_site, context_ties, in_window},
     error::SceneError,
     files::{Draft, put},
     kernels::{
-        clock_session, image_starts, versions, write_attitude, write_orbits, write_text_kernels,
+        clock_session, image_starts, versions, wide_angle_metakernel, write_attitude, write_orbits,
+        write_text_kernels,
     },
+    laser::Shot,
     pedr::{PedrRequest, frame_tags, write_pedr},
     plan::{IMAGES, SITES},
-    sites::{README, image_label, planned_site},
+    sites::{README, planned_label, planned_site},
     terrain::Terrain,
-    ties::write_ties,
-    truth::{FileTruth, ImageTruth, KeptShot, OrbitDifference, ProfileTruth, Truth},
+    ties::{ties_name, write_ties},
+    truth::{ContextTruth, FileTruth, ImageTruth, KeptShot, OrbitDifference, ProfileTruth, Truth},
 };
 use crate::{
     constants::MARS_IAU2000,
     error::{IoFault, Place, Result},
     geom::{ellipsoid::Spherical, mars_rotation::mars_matrix},
+    pds::ties::ties_table,
 };
 
 /// Fewest and most seconds of frames in a day's file.
@@ -51,13 +55,15 @@ pub fn write_scene(directory: &Path, options: &SceneOptions) -> Result<SceneSumm
     let terrain = Terrain::new(options.seed, &directions);
     let mut truth = Truth::new(options.seed);
     let pedr = draft.folder("pedr")?;
+    let mut kept = Vec::new();
     for arc in &arcs {
         truth
             .images
             .push(ImageTruth::of(arc, &versions(arc, options.seed)));
-        let (file, profile) = write_day(&pedr, arc, &terrain, options.seed)?;
-        truth.files.push(file);
-        truth.profiles.push(profile);
+        let day = write_day(&pedr, arc, &terrain, options.seed)?;
+        truth.files.push(day.file);
+        truth.profiles.push(day.profile);
+        kept.push(day.kept);
     }
     let sites = draft.folder("sites")?;
     let ties = draft.folder("ties")?;
@@ -75,9 +81,45 @@ pub fn write_scene(directory: &Path, options: &SceneOptions) -> Result<SceneSumm
             truth.ties.push(pair);
         }
     }
+    truth.wide_angle = write_context(&draft, &arcs, &kept, &terrain, options.seed)?;
     write_truth(&draft, &truth)?;
     draft.finish()?;
-    Ok(SceneSummary::of(directory, &truth, SITES.len()))
+    Ok(SceneSummary::of(directory, &truth, SITES.len() + 1))
+}
+
+/// Writes labels, tie points and the site file of the wide-angle images; `kept` are the shots of each arc.
+fn write_context(
+    draft: &Draft,
+    arcs: &[Arc],
+    kept: &[Vec<KeptShot>],
+    terrain: &Terrain,
+    seed: u64,
+) -> Result<Vec<ContextTruth>> {
+    let session = clock_session(&draft.folder("kernels")?)?;
+    let images = ContextImage::all(arcs, &session)?;
+    let labels = draft.folder("labels")?;
+    for image in &images {
+        let path = labels.join(format!("{}.lbl", image.id()));
+        put(&path, &image.label(&session)?)?;
+    }
+    let id = CONTEXT_SITE.id;
+    let ties = context_ties(&images, terrain, seed);
+    put(
+        &draft.folder("ties")?.join(ties_name(id)),
+        &ties_table(&ties),
+    )?;
+    let site = context_site(&images, &wide_angle_metakernel("nav"));
+    let path = draft.folder("sites")?.join(format!("{id}.toml"));
+    put(&path, &site.to_toml())?;
+    let shots = |image: &ContextImage<'_>| {
+        let days = arcs.iter().zip(kept);
+        let mut own = days.filter(|(arc, _)| image.is_of(arc));
+        own.next().map_or(&[][..], |(_, kept)| kept)
+    };
+    Ok(images
+        .iter()
+        .map(|image| image.truth(shots(image)))
+        .collect())
 }
 
 /// Writes `truth.json`.
@@ -107,7 +149,7 @@ fn write_kernels(draft: &Draft, options: &SceneOptions) -> Result<Vec<Arc>> {
     for arc in &arcs {
         put(
             &labels.join(format!("{}.lbl", arc.image.id)),
-            &image_label(arc, &session)?,
+            &planned_label(arc, &session)?,
         )?;
     }
     write_attitude(&kernels, &session, &arcs)?;
@@ -116,13 +158,17 @@ fn write_kernels(draft: &Draft, options: &SceneOptions) -> Result<Vec<Arc>> {
     Ok(arcs)
 }
 
-/// Writes the PEDR file of one day; the profile is that over the day's site.
-fn write_day(
-    folder: &Path,
-    arc: &Arc,
-    terrain: &Terrain,
-    seed: u64,
-) -> Result<(FileTruth, ProfileTruth)> {
+/// What was written for one day.
+struct Day {
+    file: FileTruth,
+    /// Over the day's site.
+    profile: ProfileTruth,
+    /// Shots in the window of the wide-angle images.
+    kept: Vec<KeptShot>,
+}
+
+/// Writes the PEDR file of one day.
+fn write_day(folder: &Path, arc: &Arc, terrain: &Terrain, seed: u64) -> Result<Day> {
     let image = arc.image;
     let first = arc.orbit.revolution(arc.frames.start);
     let name = image.pedr_name();
@@ -136,10 +182,18 @@ fn write_day(
         },
         seed: seed ^ u64::from(image.pedr_number),
     };
-    let (file, kept) = write_pedr(folder, arc, terrain, &request, |shot| {
+    let within = |holds: &dyn Fn(f64, f64) -> bool, shot: &Shot| {
         let ground = Spherical::from_xyz_m(&shot.ground_m);
-        image.site.contains(ground.longitude_rad, ground.latitude.0)
+        holds(ground.longitude_rad, ground.latitude.0)
+    };
+    let in_site = |shot: &Shot| within(&|east, north| image.site.contains(east, north), shot);
+    let in_context = |shot: &Shot| within(&in_window, shot);
+    let (file, shots) = write_pedr(folder, arc, terrain, &request, |shot| {
+        in_site(shot) || in_context(shot)
     })?;
+    let (mut kept, mut context) = (shots.clone(), shots);
+    kept.retain(|kept| in_site(&kept.truth));
+    context.retain(|kept| in_context(&kept.truth));
     let mut profile = ProfileTruth::new(image.site.id, &name, &kept);
     profile.image = Some(image.id);
     for version in versions(arc, seed) {
@@ -155,7 +209,11 @@ fn write_day(
         };
         profile.orbit_differences.insert(version.family, difference);
     }
-    Ok((file, profile))
+    Ok(Day {
+        file,
+        profile,
+        kept: context,
+    })
 }
 
 /// Mean of some values, 0 of none.

@@ -6,6 +6,7 @@
 //! | `orbit`, `versions` | the true orbit of a day, and two rivals that are metres off |
 //! | `attitude`, `arc` | pointing, and orbit and attitude solved so that an image shows its site |
 //! | `terrain`, `laser` | the ground, and laser shots on it as a PEDR frame tells them |
+//! | `context` | wide-angle images around two of the six, a fourth site |
 //! | `ties` | places that two images show, in images that were truly taken elsewhere and at other times |
 //! | `kernels`, `pedr`, `sites`, `truth` | the files |
 //! | `mission`, `along` | the two entry points |
@@ -17,6 +18,7 @@
 mod along;
 mod arc;
 mod attitude;
+mod context;
 mod error;
 mod files;
 mod kernels;
@@ -81,7 +83,7 @@ impl SceneSummary {
         Self {
             directory: directory.to_owned(),
             sites,
-            images: truth.images.len(),
+            images: truth.images.len() + truth.wide_angle.len(),
             pedr_files: truth.files.len(),
             frames: truth.files.iter().map(|file| file.frames).sum(),
         }

@@ -11,7 +11,7 @@ use super::{
     truth::{FileTruth, KeptShot},
 };
 use crate::{
-    constants::MOLA_CLOCK_BIAS_S,
+    config::built_in_altimeter,
     error::{Place, Result},
     frames::MarsDatum,
     pds::pedr::{LABEL_RECORDS, LabelInfo, PedrWriter, Record},
@@ -48,7 +48,8 @@ pub(super) struct PedrRequest<'a> {
     reason = "a day has 43 200 frames"
 )]
 pub(super) fn frame_tags(span: Interval) -> Vec<Et> {
-    let first_us = ((span.start.seconds() + FRAME_S / 2.0 + MOLA_CLOCK_BIAS_S) * 1e6).ceil();
+    let first_us =
+        ((span.start.seconds() + FRAME_S / 2.0 + built_in_altimeter().clock_bias_s) * 1e6).ceil();
     let count = (span.duration_s() / FRAME_S).floor().max(0.0) as u32;
     (0..count)
         .map(|index| Et::from_seconds((first_us + f64::from(index) * FRAME_S * 1e6) / 1e6))
@@ -93,7 +94,7 @@ pub(super) fn write_pedr(
                 let frame_request = FrameRequest {
                     tag: *tag,
                     index: (block * BLOCK + index) as u64,
-                    orbit: (request.orbit)(tag.plus(-MOLA_CLOCK_BIAS_S)),
+                    orbit: (request.orbit)(tag.plus(-built_in_altimeter().clock_bias_s)),
                     datum: request.datum,
                     seed: request.seed,
                 };

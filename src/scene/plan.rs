@@ -1,7 +1,7 @@
 //! What the invented mission does: the six images of Shan et al. 2005 and the days around them.
 
 use crate::{
-    constants::MOC_NA_DETECTORS,
+    config::usual_instrument,
     frames::MarsDatum,
     time::{Et, Interval},
     units::{RADIANS_PER_DEGREE, SECONDS_PER_MS},
@@ -37,12 +37,20 @@ impl Site {
 
     /// Whether a point in radians lies in the site's window.
     pub(super) fn contains(&self, longitude_rad: f64, latitude_rad: f64) -> bool {
+        let half_deg = [
+            Self::WINDOW_HALF_LONGITUDE_DEG,
+            Self::WINDOW_HALF_LATITUDE_DEG,
+        ];
+        self.holds(longitude_rad, latitude_rad, half_deg)
+    }
+
+    /// Whether a point in radians lies in a window of this half width and height around the site, degrees.
+    pub(super) fn holds(&self, longitude_rad: f64, latitude_rad: f64, half_deg: [f64; 2]) -> bool {
         let east_deg =
             crate::units::wrap_pi(longitude_rad - self.longitude_deg * RADIANS_PER_DEGREE)
                 / RADIANS_PER_DEGREE;
         let north_deg = latitude_rad / RADIANS_PER_DEGREE - self.latitude_deg;
-        east_deg.abs() <= Self::WINDOW_HALF_LONGITUDE_DEG
-            && north_deg.abs() <= Self::WINDOW_HALF_LATITUDE_DEG
+        east_deg.abs() <= half_deg[0] && north_deg.abs() <= half_deg[1]
     }
 }
 
@@ -101,7 +109,7 @@ impl PlannedImage {
 
     /// Samples per line: a multiple of 16.
     pub(super) fn samples(&self) -> u32 {
-        MOC_NA_DETECTORS / self.summing / 16 * 16
+        usual_instrument().detector.pixels / self.summing / 16 * 16
     }
 
     /// Time of exposure when the first line begins at `start`.

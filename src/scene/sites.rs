@@ -8,7 +8,7 @@ use super::{
     ties::ties_name,
 };
 use crate::{
-    constants::{MGS_POINTING_BIAS, MOLA_CLOCK_BIAS_S},
+    config::{built_in_altimeter, usual_instrument},
     error::Result,
     spice::Session,
 };
@@ -36,6 +36,16 @@ pub(super) struct SiteImage {
     pub lines_delivered: Option<u32>,
 }
 
+/// Tie points of a site file.
+pub(super) struct SiteTies {
+    /// Path of the file.
+    pub file: String,
+    /// What the site file says of their noise.
+    pub note: &'static str,
+    /// Standard deviations along and across the track, focal pixels.
+    pub sigma_px: [f64; 2],
+}
+
 /// What a site file says.
 pub(super) struct SiteFile<'a> {
     /// Identifier.
@@ -46,8 +56,8 @@ pub(super) struct SiteFile<'a> {
     pub metakernel: String,
     /// Paths of the PEDR files.
     pub pedr: Vec<String>,
-    /// Path of the tie points, where there are any.
-    pub ties: Option<String>,
+    /// Tie points, where there are any.
+    pub ties: Option<SiteTies>,
     /// Windows.
     pub windows: Vec<Window>,
     /// Images.
@@ -72,19 +82,19 @@ impl SiteFile<'_> {
             quoted(self.id),
             quoted(&self.description),
             quoted(&self.metakernel),
-            MGS_POINTING_BIAS.seconds(),
+            usual_instrument().pointing.ck_bias_s,
             quoted(INJECTED),
-            MOLA_CLOCK_BIAS_S,
+            built_in_altimeter().clock_bias_s,
             quoted(INJECTED),
             files.join(", "),
         );
         if let Some(ties) = &self.ties {
             let _infallible = write!(
                 text,
-                "\n[ties]\nfiles = [{}]\n\n\
-                 [adjustment]\n# A line, the noise of these tie points, is 1.3 to 1.6 focal pixels.\n\
-                 tie_sigma_px = [1.6, 1.0]\n",
-                quoted(ties)
+                "\n[ties]\nfiles = [{}]\n\n[adjustment]\n# {}\ntie_sigma_px = {:?}\n",
+                quoted(&ties.file),
+                ties.note,
+                ties.sigma_px,
             );
         }
         for window in &self.windows {
@@ -111,12 +121,21 @@ impl SiteFile<'_> {
     }
 }
 
-/// The site file of `site`, whose images and PEDR files are those of its arcs.
-pub(super) fn planned_site<'a>(site: &'a Site, arcs: &[&Arc]) -> SiteFile<'a> {
+/// The window of this half width and height around a site.
+pub(super) fn window(site: &Site, [east_deg, north_deg]: [f64; 2]) -> Window {
     let around = |centre: f64, half: f64| {
         // Whole hundredths of a degree print without rounding noise.
         [centre - half, centre + half].map(|edge| (edge * 100.0).round() / 100.0)
     };
+    Window {
+        id: site.id.to_owned(),
+        longitude_deg: around(site.longitude_deg, east_deg),
+        latitude_deg: around(site.latitude_deg, north_deg),
+    }
+}
+
+/// The site file of `site`, whose images and PEDR files are those of its arcs.
+pub(super) fn planned_site<'a>(site: &'a Site, arcs: &[&Arc]) -> SiteFile<'a> {
     SiteFile {
         id: site.id,
         description: format!("{}, synthetic", site.name),
@@ -125,12 +144,18 @@ pub(super) fn planned_site<'a>(site: &'a Site, arcs: &[&Arc]) -> SiteFile<'a> {
             .iter()
             .map(|arc| format!("../pedr/{}", arc.image.pedr_name()))
             .collect(),
-        ties: Some(format!("../ties/{}", ties_name(site.id))),
-        windows: vec![Window {
-            id: site.id.to_owned(),
-            longitude_deg: around(site.longitude_deg, Site::WINDOW_HALF_LONGITUDE_DEG),
-            latitude_deg: around(site.latitude_deg, Site::WINDOW_HALF_LATITUDE_DEG),
-        }],
+        ties: Some(SiteTies {
+            file: format!("../ties/{}", ties_name(site.id)),
+            note: "A line, the noise of these tie points, is 1.3 to 1.6 focal pixels.",
+            sigma_px: [1.6, 1.0],
+        }),
+        windows: vec![window(
+            site,
+            [
+                Site::WINDOW_HALF_LONGITUDE_DEG,
+                Site::WINDOW_HALF_LATITUDE_DEG,
+            ],
+        )],
         images: arcs
             .iter()
             .map(|arc| {
@@ -146,59 +171,112 @@ pub(super) fn planned_site<'a>(site: &'a Site, arcs: &[&Arc]) -> SiteFile<'a> {
     }
 }
 
-/// A detached PDS3 label of the arc's image, in the archive's keywords.
+/// What a label says.
+pub(super) struct Label<'a> {
+    /// Product id with `-` for `/`.
+    pub id: &'a str,
+    /// Instrument.
+    pub instrument: &'a str,
+    /// Filter, where the camera has one.
+    pub filter: Option<&'a str>,
+    /// UTC of the first line.
+    pub start: &'a str,
+    /// UTC of the end of the last line.
+    pub stop: &'a str,
+    /// Clock string of the first line.
+    pub sclk_start: &'a str,
+    /// Exposure of a detector line, milliseconds.
+    pub exposure_ms: f64,
+    /// Detector lines and pixels summed.
+    pub summing: u32,
+    /// First detector pixel, counted from 0.
+    pub first_detector: u32,
+    /// Why it was taken.
+    pub rationale: &'a str,
+    /// Lines.
+    pub lines: u32,
+    /// Samples per line.
+    pub samples: u32,
+}
+
+/// A detached PDS3 label of the arc's image.
 ///
 /// # Errors
 /// What the session says of the time of the last line.
-pub(super) fn image_label(arc: &Arc, session: &Session) -> Result<String> {
+pub(super) fn planned_label(arc: &Arc, session: &Session) -> Result<String> {
     let image = arc.image;
-    let stop = session.et_to_utc(arc.exposed.stop)?;
-    let rationale = match image.look {
-        Look::Nadir => format!("SYNTHETIC {}, nadir", image.site.name),
-        Look::Roll { .. } => format!("SYNTHETIC {}, off nadir", image.site.name),
+    let look = match image.look {
+        Look::Nadir => "nadir",
+        Look::Roll { .. } => "off nadir",
     };
-    let lines = [
+    Ok(image_label(&Label {
+        id: image.id,
+        instrument: &usual_instrument().label.instrument,
+        filter: None,
+        start: image.utc_start,
+        stop: &session.et_to_utc(arc.exposed.stop)?,
+        sclk_start: image.sclk_start,
+        exposure_ms: image.exposure_ms,
+        summing: image.summing,
+        first_detector: 0,
+        rationale: &format!("SYNTHETIC {}, {look}", image.site.name),
+        lines: image.lines_header,
+        samples: image.samples(),
+    }))
+}
+
+/// A detached PDS3 label in the archive's keywords.
+pub(super) fn image_label(label: &Label<'_>) -> String {
+    let mut lines = vec![
         "PDS_VERSION_ID = PDS3".to_owned(),
         "NOTE = \"SYNTHETIC: written by areograph scene, there is no such image file\"".to_owned(),
-        format!("FILE_NAME = \"{}.IMQ\"", image.id.replace('-', "")),
+        format!("FILE_NAME = \"{}.IMQ\"", label.id.replace('-', "")),
         "RECORD_TYPE = UNDEFINED".to_owned(),
         "SPACECRAFT_NAME = MARS_GLOBAL_SURVEYOR".to_owned(),
         "MISSION_PHASE_NAME = \"EXTENDED\"".to_owned(),
         "TARGET_NAME = MARS".to_owned(),
-        "INSTRUMENT_ID = \"MOC-NA\"".to_owned(),
+        format!("INSTRUMENT_ID = \"{}\"", label.instrument),
+    ];
+    lines.extend(
+        label
+            .filter
+            .map(|filter| format!("FILTER_NAME = \"{filter}\"")),
+    );
+    lines.extend([
         "SOFTWARE_NAME = \"areograph scene\"".to_owned(),
-        format!("PRODUCT_ID = \"{}\"", image.id.replace('-', "/")),
-        format!("START_TIME = {}", image.utc_start),
-        format!("IMAGE_TIME = {}", image.utc_start),
-        format!("STOP_TIME = {stop}"),
-        format!("SPACECRAFT_CLOCK_START_COUNT = \"{}\"", image.sclk_start),
+        format!("PRODUCT_ID = \"{}\"", label.id.replace('-', "/")),
+        format!("START_TIME = {}", label.start),
+        format!("IMAGE_TIME = {}", label.start),
+        format!("STOP_TIME = {}", label.stop),
+        format!("SPACECRAFT_CLOCK_START_COUNT = \"{}\"", label.sclk_start),
         "SPACECRAFT_CLOCK_STOP_COUNT = \"N/A\"".to_owned(),
         format!(
             "LINE_EXPOSURE_DURATION = {:.6} <MILLISECONDS>",
-            image.exposure_ms
+            label.exposure_ms
         ),
-        format!("DOWNTRACK_SUMMING = {}", image.summing),
-        format!("CROSSTRACK_SUMMING = {}", image.summing),
-        "EDIT_MODE_ID = \"0\"".to_owned(),
-        format!("RATIONALE_DESC = \"{rationale}\""),
+        format!("DOWNTRACK_SUMMING = {}", label.summing),
+        format!("CROSSTRACK_SUMMING = {}", label.summing),
+        format!("EDIT_MODE_ID = \"{}\"", label.first_detector),
+        format!("RATIONALE_DESC = \"{}\"", label.rationale),
         "DATA_QUALITY_DESC = \"OK\"".to_owned(),
         "OBJECT = IMAGE".to_owned(),
-        format!("LINES = {}", image.lines_header),
-        format!("LINE_SAMPLES = {}", image.samples()),
+        format!("LINES = {}", label.lines),
+        format!("LINE_SAMPLES = {}", label.samples),
         "SAMPLE_TYPE = UNSIGNED_INTEGER".to_owned(),
         "SAMPLE_BITS = 8".to_owned(),
         "END_OBJECT = IMAGE".to_owned(),
         "END".to_owned(),
-    ];
-    Ok(lines.join("\r\n") + "\r\n")
+    ]);
+    lines.join("\r\n") + "\r\n"
 }
 
 /// What `README.txt` says below its first line.
 pub(super) const README: &str = "\
 kernels/     text kernels; orbit (three rival versions), attitude, Mars and Sun as binary kernels;
-             nav.tm, gsfc.tm, ipng.tm load them with one version of the orbit each
+             nav.tm, gsfc.tm, ipng.tm load them with one version of the orbit each, and nav_wa.tm, gsfc_wa.tm
+             and ipng_wa.tm with the frames of the wide-angle cameras as well
 pedr/        MOLA PEDR files: two whole days, four single revolutions; version K is in IAU 1991, L in IAU 2000
-labels/      labels of six images
+labels/      labels of six narrow-angle images and three wide-angle ones
 ties/        places that both images of a site show, as measured in them; some are blunders
 sites/       configurations for `areograph run`
 truth.json   what really happened: biases, orientation of the images, footprints in the sites' windows,
@@ -207,6 +285,7 @@ truth.json   what really happened: biases, orientation of the images, footprints
 
 Image ids, times, line counts and line periods are those of Shan et al. 2005, Table 2. Terrain, orbits and
 attitudes are invented. Emission angles of E02-01301 and E02-01453 are invented too; the paper does not tell them.
+The wide-angle images of gusev_context are invented.
 ";
 
 /// What `README.txt` says of a flight along given kernels.

@@ -14,6 +14,7 @@ use super::{
     truth::{BlunderTruth, TieCameraTruth, TieTruth, TiesTruth},
 };
 use crate::{
+    config::usual_instrument,
     constants::MARS_IAU2000,
     error::Result,
     geom::{
@@ -63,7 +64,12 @@ impl<'a> TrueImage<'a> {
         let position_bias_m = POSITION_BIAS_M * Vector3::from_fn(|_axis, _column| random.normal());
         let orientation = SampledOrientation::new(&poses(arc, &position_bias_m))
             .map_err(|fault| no_camera(arc, &fault))?;
-        let detector = Detector::moc_na(arc.image.summing, 0, arc.image.samples());
+        let detector = Detector::new(
+            usual_instrument(),
+            arc.image.summing,
+            0,
+            arc.image.samples(),
+        );
         Ok(Self {
             arc,
             position_bias_m,
@@ -92,9 +98,9 @@ impl<'a> TrueImage<'a> {
         let [line, sample] = self
             .extent_px()
             .map(|end_px| random.between(EDGE_PX, end_px));
-        let (x_lines, y_px) = self.stereo.focal_place(line, sample);
+        let (x_lines, _) = self.stereo.focal_place(line, sample);
         let pose = self.stereo.orientation.pose(x_lines);
-        let camera = Vector3::new(0.0, -y_px / self.stereo.detector.focal_length_px, 1.0);
+        let camera = self.stereo.detector.look(sample);
         let direction = pose.mars_to_camera.tr_mul(&camera).normalize();
         let range_m = terrain.range_m(&pose.position_m, &direction)?;
         Some(pose.position_m + range_m * direction)
@@ -261,13 +267,13 @@ mod tests {
     }
 
     fn sight(image: &TrueImage<'_>, measure: &TieMeasure<String>) -> Sight {
-        let (x_lines, across_px) = image.stereo.focal_place(measure.line, measure.sample);
+        let (x_lines, focal_px) = image.stereo.focal_place(measure.line, measure.sample);
         let pose = image.stereo.orientation.pose(x_lines);
         Sight {
             position_m: pose.position_m,
             mars_to_camera: pose.mars_to_camera,
             focal_length_px: image.stereo.detector.focal_length_px,
-            across_px,
+            focal_px,
             along_sigma_px: 1.0,
             across_sigma_px: 1.0,
         }

@@ -11,7 +11,8 @@ use super::{
     versions::Version,
 };
 use crate::{
-    constants::{MARS_IAU2000, MGS_POINTING_BIAS, MOLA_CLOCK_BIAS_S},
+    config::{built_in_altimeter, usual_instrument},
+    constants::MARS_IAU2000,
     geom::{
         attitude::{make_continuous, spice_quaternion},
         mars_rotation::mars_matrix,
@@ -37,6 +38,8 @@ pub(super) struct Truth {
     pub profiles: Vec<ProfileTruth>,
     pub tie_rule: &'static str,
     pub ties: Vec<TiesTruth>,
+    pub wide_angle_rule: &'static str,
+    pub wide_angle: Vec<ContextTruth>,
 }
 
 /// Injected time errors.
@@ -102,6 +105,30 @@ pub(super) struct KeptShot {
     pub shot: u8,
     /// The truth.
     pub truth: Shot,
+}
+
+/// A wide-angle image in `truth.json`.
+#[derive(Debug, Serialize)]
+pub(super) struct ContextTruth {
+    pub id: &'static str,
+    pub camera: &'static str,
+    pub start_et_s: f64,
+    pub line_period_s: f64,
+    pub lines: u32,
+    pub epochs_et_s: Vec<f64>,
+    pub position_iau2000_m: Vec<[f64; 3]>,
+    pub camera_to_mars_quaternion_wxyz: Vec<[f64; 4]>,
+    /// Shots of the PEDR file of the image's day that the image shows.
+    pub shots: Vec<ContextShot>,
+}
+
+/// Where an image shows a shot; lines and samples are 0 at the outer edge of the first one.
+#[derive(Debug, Serialize)]
+pub(super) struct ContextShot {
+    pub record: u32,
+    pub shot: u8,
+    pub line: f64,
+    pub sample: f64,
 }
 
 /// The shots of one file in one window.
@@ -172,9 +199,9 @@ impl Truth {
             orbit: "all positions below, of images and behind the shots, belong to the true orbit, which is gsfc (kernels/gsfc.tm); nav and ipng, and the site files use nav, differ from it by orbit_differences",
             seed,
             biases: Biases {
-                ck_bias_s: MGS_POINTING_BIAS.seconds(),
+                ck_bias_s: usual_instrument().pointing.ck_bias_s,
                 ck_rule: "the attitude of true time t stands in the C-kernel at t + ck_bias_s",
-                mola_clock_bias_s: MOLA_CLOCK_BIAS_S,
+                mola_clock_bias_s: built_in_altimeter().clock_bias_s,
                 mola_clock_sign: "late",
                 mola_clock_rule: "true time = tag - mola_clock_bias_s, in all files; coordinates hold at the true time",
             },
@@ -189,6 +216,8 @@ impl Truth {
             profiles: Vec::new(),
             tie_rule: "line n of an image was truly exposed when its label has line n + time_bias_lines, from the place of the true orbit (gsfc) at that time plus position_bias_m (IAU 2000), with the true attitude of that time; tie points, and nothing else, are measured in images taken like that; the position bias against nav is position_bias_m less the orbit difference of nav; time_bias_lines are the residuals of Shan et al. 2005, Table 5, to half a line and with the other sign, position_bias_m has a standard deviation of 20 m an axis; measurements have noise of 1 line and 1 sample, blunders come on top of it",
             ties: Vec::new(),
+            wide_angle_rule: "wide-angle images are taken when their labels say, from the true orbit (gsfc) with the true attitude; lines and samples of shots follow the formula of the instrument kernel moc20.ti",
+            wide_angle: Vec::new(),
         }
     }
 }

@@ -61,11 +61,11 @@ pub enum SpiceFault {
     #[error("no {kernel} in the set{}", without(set, variable))]
     MissingText {
         /// The kernel that usually holds it.
-        kernel: &'static str,
+        kernel: String,
         /// The variable that is not defined.
-        variable: &'static str,
+        variable: String,
         /// A file of the archive that holds it.
-        example: &'static str,
+        example: String,
         /// Names of the kernels of the set.
         set: Vec<String>,
     },

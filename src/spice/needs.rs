@@ -1,54 +1,60 @@
 //! What times and geometry need from text kernels, and how its absence is told.
 
+use std::borrow::Cow;
+
 use super::{
     error::SpiceFault,
     kernels::{Kernel, KernelRole, KernelSet, read_text},
     text_kernel::{self, values_of},
 };
+use crate::instruments::Instrument;
 
 /// Something that one text kernel of a set must define.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Need {
     /// A variable by which it is recognised.
-    pub(super) variable: &'static str,
+    pub(super) variable: Cow<'static, str>,
     /// What it is.
-    pub(super) what: &'static str,
+    pub(super) what: Cow<'static, str>,
     /// The kernel that usually holds it.
-    pub(super) kernel: &'static str,
+    pub(super) kernel: Cow<'static, str>,
     /// A file of the mission's archive that holds it.
-    pub(super) example: &'static str,
+    pub(super) example: Cow<'static, str>,
 }
 
 pub(super) const LEAP_SECONDS: Need = Need {
-    variable: "DELTET/DELTA_AT",
-    what: "leap seconds",
-    kernel: "leap-second kernel (.tls)",
-    example: "naif0012.tls",
+    variable: Cow::Borrowed("DELTET/DELTA_AT"),
+    what: Cow::Borrowed("leap seconds"),
+    kernel: Cow::Borrowed("leap-second kernel (.tls)"),
+    example: Cow::Borrowed("naif0012.tls"),
 };
 pub(super) const CLOCK: Need = Need {
-    variable: "SCLK_DATA_TYPE_94",
-    what: "the MGS clock",
-    kernel: "spacecraft clock kernel of MGS (.tsc)",
-    example: "mgs_sclkscet_00061.tsc",
+    variable: Cow::Borrowed("SCLK_DATA_TYPE_94"),
+    what: Cow::Borrowed("the MGS clock"),
+    kernel: Cow::Borrowed("spacecraft clock kernel of MGS (.tsc)"),
+    example: Cow::Borrowed("mgs_sclkscet_00061.tsc"),
 };
 pub(super) const MARS: Need = Need {
-    variable: "BODY499_PM",
-    what: "the rotation of Mars",
-    kernel: "planetary constants kernel (.tpc)",
-    example: "pck00010.tpc",
+    variable: Cow::Borrowed("BODY499_PM"),
+    what: Cow::Borrowed("the rotation of Mars"),
+    kernel: Cow::Borrowed("planetary constants kernel (.tpc)"),
+    example: Cow::Borrowed("pck00010.tpc"),
 };
 pub(super) const BUS_FRAME: Need = Need {
-    variable: "FRAME_-94000_NAME",
-    what: "the frame of the MGS bus",
-    kernel: "kernel that defines the frame MGS_SPACECRAFT (.tsc or .tf)",
-    example: "mgs_sclkscet_00061.tsc",
+    variable: Cow::Borrowed("FRAME_-94000_NAME"),
+    what: Cow::Borrowed("the frame of the MGS bus"),
+    kernel: Cow::Borrowed("kernel that defines the frame MGS_SPACECRAFT (.tsc or .tf)"),
+    example: Cow::Borrowed("mgs_sclkscet_00061.tsc"),
 };
-pub(super) const CAMERA_FRAME: Need = Need {
-    variable: "FRAME_-94031_NAME",
-    what: "the frame of the MOC narrow-angle camera",
-    kernel: "instrument kernel of MOC (.ti)",
-    example: "moc20.ti",
-};
+/// The frame of a camera.
+pub(super) fn camera_frame(instrument: &Instrument) -> Need {
+    Need {
+        variable: format!("FRAME_{}_NAME", instrument.naif.instrument).into(),
+        what: format!("the frame of the camera {}", instrument.name).into(),
+        kernel: format!("instrument kernel of {} (.ti)", instrument.name).into(),
+        example: instrument.naif.kernel.clone().into(),
+    }
+}
 
 /// What clock strings and attitude need.
 pub(super) const CLOCKS: [Need; 2] = [LEAP_SECONDS, CLOCK];
@@ -67,15 +73,15 @@ pub(super) fn explain(set: &KernelSet, fault: SpiceFault, needs: &[Need]) -> Spi
         .filter_map(|kernel| text_kernel::assignments(&read_text(&kernel.path).ok()?).ok())
         .collect();
     let missing = needs.iter().find(|need| {
-        let defines = |text| !values_of(text, need.variable).is_empty();
+        let defines = |text| !values_of(text, &need.variable).is_empty();
         !defined.iter().any(|text| defines(text))
     });
     match missing {
         None => fault,
         Some(need) => SpiceFault::MissingText {
-            kernel: need.kernel,
-            variable: need.variable,
-            example: need.example,
+            kernel: need.kernel.clone().into_owned(),
+            variable: need.variable.clone().into_owned(),
+            example: need.example.clone().into_owned(),
             set: set.kernels().iter().map(Kernel::file_name).collect(),
         },
     }

@@ -10,11 +10,12 @@ use super::{
     daf::{self, Segment},
     error::SpiceFault,
     kernels::{KernelRole, KernelSet, read_text, role_of},
-    needs::{BUS_FRAME, CAMERA_FRAME, CLOCK, LEAP_SECONDS, MARS, Need},
+    needs::{BUS_FRAME, CLOCK, LEAP_SECONDS, MARS, Need, camera_frame},
     session::Session,
     text_kernel::{self, Assignment, values_of},
 };
 use crate::{
+    config::built_in_instruments,
     constants::{MARS_IAU2000, NAIF_MGS, NAIF_MGS_BUS},
     error::{Failure, IoFault, Kind, Place, Result},
     files::{InputFiles, file_name},
@@ -26,8 +27,8 @@ use crate::{
 const DEPTH_MAX: usize = 16;
 /// Most files that are looked into.
 const FILES_MAX: usize = 100_000;
-/// What time tagging and geometry need from text kernels.
-const NEEDS: [Need; 5] = [LEAP_SECONDS, CLOCK, MARS, BUS_FRAME, CAMERA_FRAME];
+/// What time tagging and geometry need from text kernels, but for the frame of the camera.
+const NEEDS: [Need; 4] = [LEAP_SECONDS, CLOCK, MARS, BUS_FRAME];
 /// Orbit solutions that mark their files by name; a file without a mark is `nav`.
 const MARKED_FAMILIES: [&str; 2] = ["gsfc", "ipng"];
 
@@ -157,6 +158,27 @@ fn files_below(root: &Path) -> Result<Vec<PathBuf>> {
     Ok(files)
 }
 
+fn defines(assignments: &[Assignment], variable: &str) -> bool {
+    !values_of(assignments, variable).is_empty()
+}
+
+/// What all images need, and the frames of those cameras that `texts` know: one at least.
+fn needs(texts: &[(PathBuf, Vec<Assignment>)]) -> Vec<Need> {
+    let cameras: Vec<Need> = built_in_instruments().iter().map(camera_frame).collect();
+    let known = |need: &&Need| {
+        texts
+            .iter()
+            .any(|(_, assignments)| defines(assignments, &need.variable))
+    };
+    let known_cameras: Vec<Need> = cameras.iter().filter(known).cloned().collect();
+    let cameras = if known_cameras.is_empty() {
+        cameras.into_iter().take(1).collect()
+    } else {
+        known_cameras
+    };
+    NEEDS.into_iter().chain(cameras).collect()
+}
+
 /// For each need the pinned kernel that defines it, or the latest one.
 fn select_texts(
     selection: &KernelSelection,
@@ -171,12 +193,12 @@ fn select_texts(
         }
     }
     let mut chosen: Vec<&Path> = Vec::new();
-    for Need { variable, what, .. } in NEEDS {
-        let defines = |assignments: &[Assignment]| !values_of(assignments, variable).is_empty();
+    for Need { variable, what, .. } in needs(texts) {
         let mut candidates: Vec<&(PathBuf, Vec<Assignment>)> = texts
             .iter()
             .filter(|(path, assignments)| {
-                defines(assignments) && (pinned(path) || mars_fits(variable, assignments))
+                defines(assignments, &variable)
+                    && (pinned(path) || mars_fits(&variable, assignments))
             })
             .collect();
         candidates.sort_by_key(|(path, _)| version_of(path));

@@ -1,6 +1,6 @@
 //! A session with CSPICE: times, states and attitudes from one set of kernels.
 
-use std::cell::OnceCell;
+use std::{cell::OnceCell, ffi::CString};
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -9,13 +9,14 @@ use super::{
     error::SpiceFault,
     ffi::{Cspice, Rows, StateKm},
     kernels::KernelSet,
-    needs::{BUS_FRAME, CAMERA_FRAME, CLOCKS, LEAP_SECONDS, Need, explain},
+    needs::{BUS_FRAME, CLOCKS, LEAP_SECONDS, Need, camera_frame, explain},
     origin::{self, Origin, all_finite},
 };
 use crate::{
     constants::{NAIF_MARS, NAIF_MGS, NAIF_MGS_BUS, NAIF_SUN},
     error::{Failure, Place, Result},
-    frames::{J2000, MgsBus, MocNa, Position, Rotation},
+    frames::{CameraFrame, J2000, MgsBus, Position, Rotation},
+    instruments::Instrument,
     time::{CkLookup, Et},
     units::METRES_PER_KM,
 };
@@ -271,15 +272,26 @@ impl Session {
         Ok(ticks.map_err(|fault| self.explain(fault, &CLOCKS))?)
     }
 
-    /// Mounting of the narrow-angle camera as the instrument kernel has it.
+    /// Mounting of `instrument` as the loaded kernels have it.
     ///
     /// # Errors
     /// [`SpiceFault::MissingText`] when no loaded kernel defines the two frames.
-    pub fn mounting(&self, et: Et) -> Result<Rotation<MgsBus, MocNa>> {
+    pub fn mounting(
+        &self,
+        instrument: &Instrument,
+        et: Et,
+    ) -> Result<Rotation<MgsBus, CameraFrame>> {
+        let [bus, camera] = [&instrument.naif.bus_frame, &instrument.naif.frame]
+            // A name with a zero byte is cut there, and then no kernel defines it.
+            .map(|name| CString::new(name.split('\0').next().unwrap_or_default()));
         let rows = self
             .cspice
-            .frame_matrix(c"MGS_SPACECRAFT", c"MGS_MOC_NA", et.seconds())
-            .map_err(|fault| self.explain(fault, &[CAMERA_FRAME, BUS_FRAME]))?;
+            .frame_matrix(
+                &bus.unwrap_or_default(),
+                &camera.unwrap_or_default(),
+                et.seconds(),
+            )
+            .map_err(|fault| self.explain(fault, &[camera_frame(instrument), BUS_FRAME]))?;
         Ok(Rotation::new(matrix(&rows), et))
     }
 

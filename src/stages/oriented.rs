@@ -63,10 +63,9 @@ impl<'a> OrientedImage<'a> {
             let image = image.id.clone();
             NoOrientation { image, fault }
         })?;
-        let (summing, first) = (image.crosstrack_summing, image.first_detector);
         Ok(Self {
             image,
-            detector: Detector::moc_na(summing, first, image.samples),
+            detector: image.detector(),
             first_order: model.first_order.orientation(),
             second_order: model.second_order.orientation(),
             rotation_vector: model.rotation_vector_orientation(),
@@ -99,7 +98,8 @@ impl<'a> OrientedImage<'a> {
         &self,
         wanted: CameraModel,
     ) -> std::result::Result<Projector<'_, dyn ExteriorOrientation>, Unseen> {
-        Projector::new(self.orientation(wanted), self.lines())
+        let projector = Projector::new(self.orientation(wanted), self.lines())?;
+        Ok(projector.through(self.detector.distortion))
     }
 
     /// The image for intersection and adjustment, with the form `wanted`.

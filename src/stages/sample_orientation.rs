@@ -8,8 +8,9 @@ use super::{orientation::Camera, tag_times::ImageTimes};
 use crate::{
     config::{KernelsConfig, OrientationConfig, PointingConfig},
     error::Result,
-    frames::{J2000, MarsIau2000, MocNa, Rotation},
+    frames::{CameraFrame, J2000, MarsIau2000, Rotation},
     geom::{mars_rotation::mars_rotation, statistics::largest},
+    instruments::Instrument,
     spice::{Attitude, KernelView, Session},
     stage::{Output, Stage},
     stage_inputs,
@@ -99,6 +100,7 @@ pub fn sample_orientation(
     require_coverage(session, image, kernels, pointing)?;
     let reader = Reader {
         session,
+        instrument: &image.instrument,
         pointing,
         tolerance_s: kernels.ck_tolerance_s,
     };
@@ -173,6 +175,7 @@ fn require_coverage(
 
 struct Reader<'a> {
     session: &'a Session,
+    instrument: &'a Instrument,
     pointing: &'a PointingConfig,
     tolerance_s: f64,
 }
@@ -199,9 +202,10 @@ impl Reader<'_> {
         }))
     }
 
-    fn inertial_to_camera(&self, exposure: Et) -> Result<Rotation<J2000, MocNa>> {
+    fn inertial_to_camera(&self, exposure: Et) -> Result<Rotation<J2000, CameraFrame>> {
         let attitude = self.attitude(exposure)?;
-        Ok(self.session.mounting(exposure)? * attitude.inertial_to_bus)
+        let mounting = self.session.mounting(self.instrument, exposure)?;
+        Ok(mounting * attitude.inertial_to_bus)
     }
 
     /// Geometric position in IAU 2000 and the rotation from the camera to it.

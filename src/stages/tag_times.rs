@@ -1,15 +1,21 @@
 //! Image labels become line times: spacecraft clock or UTC to ET, line period, header and delivered lines.
 
+mod detector;
+
 use std::sync::atomic::AtomicBool;
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use detector::fits_detector;
+
 use crate::{
-    config::ImageConfig,
+    config::{ImageConfig, built_in_instruments, usual_instrument},
     error::{Failure, Fault, Kind, Place, Result},
     files::HashedFile,
+    geom::pushbroom::Detector,
     image::{IMAGE_DURATION_END_S, IMAGE_LINES_MIN, ImageFields, line_period_agrees},
+    instruments::Instrument,
     pds::moc,
     spice::{KernelView, Session},
     stage::Stage,
@@ -28,6 +34,8 @@ const START_TOLERANCE_S: f64 = 1.0;
 pub struct ImageTimes {
     /// Image identifier.
     pub id: String,
+    /// The camera.
+    pub instrument: Instrument,
     /// Start (top edge) of the first line.
     pub start: Et,
     /// Whether `start` comes from the spacecraft clock or from UTC.
@@ -67,6 +75,17 @@ pub enum StartFrom {
 }
 
 impl ImageTimes {
+    /// Where the samples of a line look.
+    #[must_use]
+    pub fn detector(&self) -> Detector {
+        Detector::new(
+            &self.instrument,
+            self.crosstrack_summing,
+            self.first_detector,
+            self.samples,
+        )
+    }
+
     /// Exposure of the whole header image, seconds: lines × line period.
     #[must_use]
     pub fn duration_s(&self) -> f64 {
@@ -211,10 +230,7 @@ pub fn tag_times(images: &[ImageConfig], session: &Session) -> Result<Vec<ImageT
 
 fn tag_image(image: &ImageConfig, session: &Session) -> Result<ImageTimes> {
     let mut notes = Vec::new();
-    let label = match &image.label {
-        Some(path) => moc::read_label(path)?.fields,
-        None => ImageFields::default(),
-    };
+    let (instrument, label) = labelled(image)?;
     let fields = merged(&image.fields, label, &mut notes);
     let place = |fault: ImageFault| match &image.label {
         Some(path) => Failure::from(fault).in_file(path),
@@ -244,6 +260,19 @@ fn tag_image(image: &ImageConfig, session: &Session) -> Result<ImageTimes> {
     let downtrack_summing = fields
         .downtrack_summing
         .ok_or_else(|| missing("downtrack_summing"))?;
+    let crosstrack_summing = fields.crosstrack_summing.unwrap_or(downtrack_summing);
+    let samples = fields.samples.ok_or_else(|| missing("samples"))?;
+    let first_detector = fields.first_detector.unwrap_or(0);
+    let fits = fits_detector(
+        &image.id,
+        &instrument,
+        [downtrack_summing, crosstrack_summing],
+        [first_detector, samples],
+    );
+    match &image.label {
+        Some(path) => fits.in_file(path)?,
+        None => fits?,
+    }
     let (line_period_s, exposure_s) = line_period(image, &fields, downtrack_summing)
         .map_err(place)?
         .ok_or_else(|| missing("exposure_ms"))?;
@@ -261,6 +290,7 @@ fn tag_image(image: &ImageConfig, session: &Session) -> Result<ImageTimes> {
         .ok_or_else(|| missing("sclk_start"))?;
     Ok(ImageTimes {
         id: image.id.clone(),
+        instrument,
         start,
         start_from,
         utc_start: session.et_to_utc(start)?,
@@ -268,13 +298,31 @@ fn tag_image(image: &ImageConfig, session: &Session) -> Result<ImageTimes> {
         line_period_s,
         exposure_s,
         downtrack_summing,
-        crosstrack_summing: fields.crosstrack_summing.unwrap_or(downtrack_summing),
+        crosstrack_summing,
         lines_header,
         lines_delivered,
-        samples: fields.samples.ok_or_else(|| missing("samples"))?,
-        first_detector: fields.first_detector.unwrap_or(0),
+        samples,
+        first_detector,
         notes,
     })
+}
+
+/// The camera that the configuration names, else that of the label, else the first one that is known; and what
+/// the label says.
+fn labelled(image: &ImageConfig) -> Result<(Instrument, ImageFields)> {
+    let cameras = match &image.instrument {
+        Some(named) => std::slice::from_ref(named),
+        None => built_in_instruments(),
+    };
+    let (instrument, fields) = if let Some(path) = &image.label {
+        let label = moc::read_label(path, cameras)?;
+        (label.instrument, label.fields)
+    } else {
+        let named = image.instrument.as_ref();
+        let camera = named.unwrap_or_else(|| usual_instrument());
+        (camera.clone(), ImageFields::default())
+    };
+    Ok((instrument, fields))
 }
 
 /// Configuration over label, with a note for every key in which they differ.

@@ -3,8 +3,8 @@
 use std::{path::PathBuf, sync::LazyLock};
 
 use areograph::{
-    config::{ImageConfig, KernelsConfig, OrientationConfig, PointingConfig},
-    constants::{MARS_IAU2000, MGS_POINTING_BIAS},
+    config::{ImageConfig, KernelsConfig, OrientationConfig, PointingConfig, usual_instrument},
+    constants::MARS_IAU2000,
     geom::mars_rotation::mars_matrix,
     image::ImageFields,
     kernel_source::{KernelList, KernelSource},
@@ -52,13 +52,14 @@ impl Image {
             ..KernelsConfig::default()
         };
         let pointing = PointingConfig {
-            ck_bias: MGS_POINTING_BIAS,
+            ck_bias: usual_instrument().pointing_bias(),
             source: String::new(),
         };
         let session = Session::open(&set).unwrap();
         let config = ImageConfig {
             id: id.to_owned(),
             label: Some(label),
+            instrument: None,
             serial_number: None,
             fields: ImageFields::default(),
         };
@@ -115,7 +116,7 @@ pub(crate) fn kernel_camera(
     let to_mars = mars_matrix(&MARS_IAU2000, et);
     let lookup = image.pointing.ck_bias.lookup(et);
     let attitude = session.attitude(lookup, et, 0.0).unwrap();
-    let to_camera = session.mounting(et).unwrap() * attitude.inertial_to_bus;
+    let to_camera = session.mounting(usual_instrument(), et).unwrap() * attitude.inertial_to_bus;
     (
         to_mars * session.state(et).unwrap().position.xyz_m,
         to_mars * to_camera.matrix().transpose(),

@@ -8,7 +8,7 @@ use areograph::{
     geom::{
         attitude::matrix_of_spice_quaternion,
         ellipsoid::spherical_to_xyz_m,
-        pushbroom::{Detector, Pose, Projector, SampledOrientation},
+        pushbroom::{Detector, Distortion, Pose, Projector, SampledOrientation},
     },
     units::{METRES_PER_KM, RADIANS_PER_DEGREE},
 };
@@ -182,6 +182,7 @@ impl Image {
                 boresight_sample: number("/detector_center/sample"),
                 sample_sense: -1.0,
                 samples: number("/image_samples"),
+                distortion: Distortion::NONE,
             },
             lines,
             start_s,
@@ -207,7 +208,7 @@ impl Image {
 
     /// Where a camera without distortion has what this one has at `sample`; both 0 at the outer edge.
     pub(crate) fn ideal_sample(&self, sample: f64) -> f64 {
-        let distorted_mm = self.detector.y_of_sample_px(sample) / self.pixels_per_mm;
+        let distorted_mm = self.detector.place_px(sample).y / self.pixels_per_mm;
         let ideal_mm = distorted_mm / (1.0 + self.distortion_per_mm2 * distorted_mm * distorted_mm);
         self.detector.sample(ideal_mm * self.pixels_per_mm)
     }

@@ -9,8 +9,8 @@ use areograph::geom::{
     bundle::{BundleImage, BundlePoint, Network, Range, View},
     intersection::{IntersectionLimits, Sight, intersect},
     pushbroom::{
-        CorrectedOrientation, EulerPolynomial, ExteriorOrientation, OrientationCorrection,
-        Projector,
+        CorrectedOrientation, Distortion, EulerPolynomial, ExteriorOrientation,
+        OrientationCorrection, Projector,
     },
 };
 use nalgebra::{Vector2, Vector3};
@@ -125,6 +125,7 @@ impl<M: ExteriorOrientation> Simulated<M> {
             half_lines: image.half_lines,
             line_period_s: image.line_period_s,
             focal_length_px: image.focal_length_px,
+            distortion: image.distortion,
             sigmas: image.sigmas,
             time_bias_sigma_s: image.time_bias_sigma_s,
         });
@@ -200,7 +201,7 @@ pub(crate) fn sight(
         position_m: pose.position_m,
         mars_to_camera: pose.mars_to_camera,
         focal_length_px: image.focal_length_px,
-        across_px: y_px,
+        focal_px: Vector2::new(0.0, y_px),
         along_sigma_px: 1.0,
         across_sigma_px: 1.0,
     }
@@ -236,6 +237,7 @@ impl Recipe {
                         half_lines,
                         line_period_s: scenes[image].line_period_s(),
                         focal_length_px,
+                        distortion: Distortion::NONE,
                         sigmas: sigmas([100.0, 200.0][image]),
                         time_bias_sigma_s: 0.0,
                     }

@@ -6,9 +6,8 @@ use areograph::{
     altimetry::{BiasScope, DatumChoice, MolaClock, ShotFilter, TagSign},
     config::{
         KernelsConfig, OrientationConfig, PedrConfig, PointingConfig, RangeCheckConfig, SiteConfig,
-        WindowConfig,
+        WindowConfig, usual_instrument,
     },
-    constants::MGS_POINTING_BIAS,
     footprints::{Footprint, Footprints, SourceFile},
     frames::{Frame, MarsDatum, MarsIau2000, Position, Rotation},
     geom::{
@@ -231,7 +230,7 @@ fn config() -> SiteConfig {
             ..KernelsConfig::default()
         },
         pointing: PointingConfig {
-            ck_bias: MGS_POINTING_BIAS,
+            ck_bias: usual_instrument().pointing_bias(),
             source: "mocAddendum004.ti".to_owned(),
         },
         mola_clock: MolaClock {
@@ -295,6 +294,7 @@ pub(crate) fn line_offset(row: usize) -> f64 {
 fn image_times() -> ImageTimes {
     ImageTimes {
         id: "m04-02852".to_owned(),
+        instrument: usual_instrument().clone(),
         start: Et::from_seconds(START_S),
         start_from: StartFrom::Sclk,
         sclk_start: Some("619971158:28".to_owned()),

@@ -1,5 +1,6 @@
 //! What cannot be projected is told by its reason.
 
+use areograph::config::usual_instrument;
 use areograph::geom::pushbroom::{
     Detector, EulerPolynomial, ExteriorOrientation, FixedPoint, FrameFirst, Limits, Pose,
     Projector, SampledOrientation, SamplesFault, Unseen, VectorPolynomial,
@@ -141,7 +142,7 @@ fn samples_that_are_no_orientation_are_told() {
 #[test]
 fn samples_run_from_edge_to_edge_of_the_detector() {
     // Summed by three from detector 40: 600 samples.
-    let detector = Detector::moc_na(3, 40, 600);
+    let detector = Detector::new(usual_instrument(), 3, 40, 600);
     let at = |y_mm: f64| {
         // A camera vector whose ray meets the detector y_mm from the boresight, along the camera's +Y.
         let camera_m = Vector3::new(0.0, y_mm / 3_500.0 * 4e5, 4e5);
@@ -151,7 +152,7 @@ fn samples_run_from_edge_to_edge_of_the_detector() {
     let edge_mm = |detector: f64| (detector - 1_024.0) * pitch_mm;
     assert!(at(edge_mm(40.0)).abs() < 1e-9); // pixels
     assert!((at(edge_mm(40.0 + 1_800.0)) - 600.0).abs() < 1e-9);
-    assert!((detector.sample(detector.y_of_sample_px(17.25)) - 17.25).abs() < 1e-12);
+    assert!((detector.sample(detector.place_px(17.25).y) - 17.25).abs() < 1e-12);
     let ahead = detector.focal_px(&Vector3::new(-1.0, 0.0, 4e5)).unwrap();
     assert!(ahead.x > 0.0); // the camera flies along its −X
     assert!(detector.focal_px(&Vector3::new(0.0, 0.0, -1.0)).is_err());

@@ -3,6 +3,7 @@
 use std::{fs, path::Path};
 
 use areograph::{
+    config::usual_instrument,
     frames::{J2000, MgsBus, Rotation},
     geom::{
         attitude::{make_continuous, spice_quaternion},
@@ -85,7 +86,7 @@ fn turned_attitudes(session: &Session, interval: Interval) -> Attitudes {
     let samples = (0..).map(|index| interval.start.plus(4.0 * f64::from(index)));
     for at in samples.take_while(|at| at.since(interval.stop) < 0.01) {
         let attitude = session.attitude(unbiased.lookup(at), at, 0.01).unwrap();
-        let mounting = *session.mounting(at).unwrap().matrix();
+        let mounting = *session.mounting(usual_instrument(), at).unwrap().matrix();
         let turned = mounting.transpose() * turn * mounting * attitude.inertial_to_bus.matrix();
         let turned: Rotation<J2000, MgsBus> = Rotation::new(turned, at);
         instants.push(at);

@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 
 use super::super::{load_sites, output};
 use crate::{
-    constants::MGS_POINTING_BIAS,
+    config::usual_instrument,
     error::{Failure, Fault, Kind},
     flow::{
         Compared, Request, RivalSet, compare_kernels, require_different, rival_sets, wanted_by_site,
@@ -89,7 +89,9 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
     }
     let bias = site
         .as_ref()
-        .map_or(MGS_POINTING_BIAS, |site| site.pointing.ck_bias);
+        .map_or(usual_instrument().pointing_bias(), |site| {
+            site.pointing.ck_bias
+        });
     let wanted = match (&arguments.time, &site) {
         (Some(time), _) => Some(wanted_by_time(time, bias, &sets[0].kernels)?),
         (None, Some(site)) => Some(wanted_by_site(site)?),

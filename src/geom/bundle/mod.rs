@@ -100,7 +100,10 @@ use nalgebra::{DMatrix, Matrix3, Vector2, Vector3};
 pub use solve::solve;
 pub use unknowns::Unknown;
 
-use super::{pushbroom::OrientationCorrection, robust::RobustWeight};
+use super::{
+    pushbroom::{Distortion, OrientationCorrection},
+    robust::RobustWeight,
+};
 
 /// Orientation unknowns of an image: X, Y, Z and the rotations about the camera's x, y and z axis, each with
 /// powers 0, 1 and 2 of `t`.
@@ -117,6 +120,8 @@ pub struct BundleImage<M> {
     pub line_period_s: f64,
     /// Focal length, pixels of the image.
     pub focal_length_px: f64,
+    /// Where its detector line lies in the focal plane.
+    pub distortion: Distortion,
     /// Standard deviation of each unknown, initially zero, at `[3·quantity + power]`, metres and radians;
     /// infinite leaves it free, 0 holds it fixed.
     pub sigmas: [f64; ORIENTATION_UNKNOWNS],

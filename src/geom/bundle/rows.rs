@@ -1,6 +1,6 @@
 //! Observation equations of single views and ranges.
 
-use nalgebra::Vector3;
+use nalgebra::{Matrix2x3, Vector3};
 
 use super::{BundleImage, ORIENTATION_UNKNOWNS, Range, View};
 use crate::geom::{
@@ -64,7 +64,16 @@ pub(super) fn initial_px_per_line<M: ExteriorOrientation>(
     let (pose, motion) = image.base.moving(view.x_lines);
     let camera_m = pose.camera_vector_m(ground_m);
     let rate_m = motion.camera_vector_rate_m(&pose, &camera_m);
-    (by_camera_point(&camera_m, image.focal_length_px) * rate_m).x
+    (by_camera_point_off_line(image, &camera_m) * rate_m).x
+}
+
+/// Change of how far the line misses a point, and of the point's place across the track, by the point.
+fn by_camera_point_off_line<M>(image: &BundleImage<M>, camera_m: &Vector3<f64>) -> Matrix2x3<f64> {
+    let mut partials = by_camera_point(camera_m, image.focal_length_px);
+    let [_, slope] = image.distortion.curve(camera_m.y / camera_m.z);
+    let along = partials.row(0) - partials.row(1) * slope;
+    partials.set_row(0, &along);
+    partials
 }
 
 /// The rows of a view of `ground_m`, along the track and across it: what was measured minus where the
@@ -80,7 +89,13 @@ pub(super) fn of_view<M: ExteriorOrientation>(
         base: &image.base,
         correction: *correction,
     };
-    let seen = Sighting::near(&orientation, view.x_lines, ground_m, LAST_STEP_LINES)?;
+    let seen = Sighting::near(
+        &orientation,
+        &image.distortion,
+        view.x_lines,
+        ground_m,
+        LAST_STEP_LINES,
+    )?;
     let (x_lines, camera_m) = (seen.solution.x, seen.solution.camera_m);
     let focal_y_px = -image.focal_length_px * camera_m.y / camera_m.z;
     // The sense is that of the point's place in the focal plane of the measured line.
@@ -90,7 +105,7 @@ pub(super) fn of_view<M: ExteriorOrientation>(
     ];
     // What moves the point along the focal plane by one pixel is made up for by `1/rate_px.x` lines less,
     // and these move it across.
-    let by_camera_point = by_camera_point(&camera_m, image.focal_length_px);
+    let by_camera_point = by_camera_point_off_line(image, &camera_m);
     let rate_px = by_camera_point * seen.rate_m;
     let [along, across] = [0, 1].map(|axis| by_camera_point.row(axis).transpose());
     let by_camera_point = [

@@ -12,7 +12,7 @@ use super::{
 };
 use crate::geom::{
     collinearity::project,
-    pushbroom::{EulerPolynomial, ExteriorOrientation, VectorPolynomial},
+    pushbroom::{Distortion, EulerPolynomial, ExteriorOrientation, VectorPolynomial},
 };
 
 const FOCAL_LENGTH_PX: f64 = 3_500.0 / 0.026;
@@ -39,6 +39,7 @@ fn image(east_m: f64, roll_rad: f64) -> BundleImage<EulerPolynomial> {
         half_lines: 5_000.0,
         line_period_s: 1.4e-3,
         focal_length_px: FOCAL_LENGTH_PX,
+        distortion: Distortion::NONE,
         sigmas: std::array::from_fn(|index| if index < 9 { 100.0 } else { 2.6e-4 }),
         time_bias_sigma_s: 0.05,
     }

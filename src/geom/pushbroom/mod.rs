@@ -2,10 +2,11 @@
 //!
 //! The image line is `x`, in lines from the middle of the header image. `M` takes Mars-fixed components
 //! to camera components; the camera looks along +Z. A ground point `P` has the camera vector
-//! `q = M (P − C)`, and is seen by the line where `q1 = 0`.
+//! `q = M (P − C)`, and is seen by the line where `q1 = 0`, or where `q1/q3` is that of the distorted
+//! detector at `q2/q3`.
 //!
 //! ```
-//! use areograph::geom::pushbroom::{EulerPolynomial, ExteriorOrientation, Sighting, VectorPolynomial};
+//! use areograph::geom::pushbroom::{Distortion, EulerPolynomial, ExteriorOrientation, Sighting, VectorPolynomial};
 //! use nalgebra::Vector3;
 //!
 //! // A camera that flies north over the equator, 4.4 m per line, and looks straight down.
@@ -19,13 +20,14 @@
 //! };
 //! // The point below line 250 is seen by line 250.
 //! let below_m = camera.pose(250.0).position_m - Vector3::new(380e3, 0.0, 0.0);
-//! let seen = Sighting::near(&camera, 0.0, &below_m, 1e-2)?;
+//! let seen = Sighting::near(&camera, &Distortion::NONE, 0.0, &below_m, 1e-2)?;
 //! assert!((seen.solution.x - 250.0).abs() < 1e-6); // lines; the last step is below 1e-2
 //! # Ok::<(), areograph::geom::pushbroom::Unseen>(())
 //! ```
 
 mod corrected;
 mod detector;
+mod distortion;
 mod models;
 mod newton;
 mod published;
@@ -34,8 +36,10 @@ mod sampled;
 use nalgebra::{Matrix3, Vector3};
 
 pub use corrected::{CorrectedOrientation, OrientationCorrection};
-pub use detector::Detector;
+pub use detector::{Detector, RadialFit};
+pub use distortion::{Distortion, FoldedLine};
 pub use models::{CameraModel, EulerPolynomial, RotationVectorPolynomial, VectorPolynomial};
+pub(super) use newton::missed_m;
 pub use newton::{Projector, Sighting};
 pub use published::{FixedPoint, FrameFirst, Limits, Solution};
 pub use sampled::{SampledOrientation, SamplesFault};

@@ -1,8 +1,9 @@
-//! From the ground to the image by Newton's method on `q1(x) = M1(x)·(P − C(x))`.
+//! From the ground to the image by Newton's method on `q1(x) = M1(x)·(P − C(x))`, or with distortion on
+//! `q1 − q3 g(q2/q3)`, `g` the tangent along the track of the detector line.
 
 use nalgebra::Vector3;
 
-use super::{ExteriorOrientation, Pose, Solution, Unseen, flight_sense};
+use super::{Distortion, ExteriorOrientation, Pose, Solution, Unseen, flight_sense};
 
 /// Lines of the table that start the iteration, equally spaced over the image.
 const NODES: u32 = 65;
@@ -23,13 +24,14 @@ pub struct Sighting {
 }
 
 impl Sighting {
-    /// Finds the line of `model` that sees `point_m` (Mars-fixed) by steps from line `x`; one of at most
-    /// `last_step_lines` is the last. The change per line is that before it.
+    /// Finds the line of `model` that sees `point_m` (Mars-fixed) through `distortion` by steps from line
+    /// `x`; one of at most `last_step_lines` is the last. The change per line is that before it.
     ///
     /// # Errors
     /// [`Unseen::BehindCamera`], [`Unseen::NotConverged`], [`Unseen::NotFinite`].
     pub fn near(
         model: &(impl ExteriorOrientation + ?Sized),
+        distortion: &Distortion,
         mut x: f64,
         point_m: &Vector3<f64>,
         last_step_lines: f64,
@@ -38,7 +40,8 @@ impl Sighting {
             let (pose, motion) = model.moving(x);
             let camera_m = pose.camera_vector_m(point_m);
             let rate_m = motion.camera_vector_rate_m(&pose, &camera_m);
-            let step_lines = -camera_m.x / rate_m.x;
+            let [missed_m, missed_rate_m] = missed_m(distortion, &camera_m, &rate_m);
+            let step_lines = -missed_m / missed_rate_m;
             x += step_lines;
             if !x.is_finite() {
                 return Err(Unseen::NotFinite);
@@ -66,6 +69,21 @@ impl Sighting {
     }
 }
 
+/// How far the detector line misses a point along the track, and how that changes with the point, metres
+/// in the plane of the point.
+pub(crate) fn missed_m(
+    distortion: &Distortion,
+    camera_m: &Vector3<f64>,
+    rate_m: &Vector3<f64>,
+) -> [f64; 2] {
+    let across = camera_m.y / camera_m.z;
+    let [along, slope] = distortion.curve(across);
+    [
+        camera_m.x - along * camera_m.z,
+        rate_m.x - along * rate_m.z - slope * (rate_m.y - across * rate_m.z),
+    ]
+}
+
 /// Finds the line that sees a point, for many points of one image.
 ///
 /// `q1` and its slope are tabulated at a few lines, so that a point in the image needs one or two
@@ -73,6 +91,7 @@ impl Sighting {
 #[derive(Debug, Clone)]
 pub struct Projector<'a, M: ?Sized> {
     model: &'a M,
+    distortion: Distortion,
     half_lines: f64,
     nodes_per_line: f64,
     nodes: Vec<Node>,
@@ -111,7 +130,7 @@ impl Node {
 }
 
 impl<'a, M: ExteriorOrientation + ?Sized> Projector<'a, M> {
-    /// Prepares an image of `lines` lines.
+    /// Prepares an image of `lines` lines of a camera without distortion.
     ///
     /// # Errors
     /// [`Unseen::AcrossFlight`] and [`Unseen::NotFinite`] for orientations that see nothing.
@@ -127,10 +146,17 @@ impl<'a, M: ExteriorOrientation + ?Sized> Projector<'a, M> {
             .collect();
         Ok(Self {
             model,
+            distortion: Distortion::NONE,
             half_lines,
             nodes_per_line: spacing.recip(),
             nodes,
         })
+    }
+
+    /// The same image, seen through `distortion`.
+    #[must_use]
+    pub fn through(self, distortion: Distortion) -> Self {
+        Self { distortion, ..self }
     }
 
     /// The orientation.
@@ -156,6 +182,6 @@ impl<'a, M: ExteriorOrientation + ?Sized> Projector<'a, M> {
     pub fn project(&self, point_m: &Vector3<f64>) -> Result<Solution, Unseen> {
         let start = self.nearest(0.0).newton(point_m);
         let x = self.nearest(start).newton(point_m);
-        Ok(Sighting::near(self.model, x, point_m, LAST_STEP_LINES)?.solution)
+        Ok(Sighting::near(self.model, &self.distortion, x, point_m, LAST_STEP_LINES)?.solution)
     }
 }

@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 
-use super::{ExteriorOrientation, PolynomialPath, Unseen, flight_sense};
+use super::{Distortion, ExteriorOrientation, PolynomialPath, Unseen, flight_sense};
 use crate::geom::collinearity::project;
 
 /// When an iteration ends.
@@ -50,7 +50,8 @@ impl Solution {
 pub struct FrameFirst<'a, M> {
     model: &'a M,
     focal_length_px: f64,
-    /// +1 where the camera flies along −X, as MOC does.
+    distortion: Distortion,
+    /// +1 where the camera flies along −X.
     sense: f64,
 }
 
@@ -63,11 +64,19 @@ impl<'a, M: ExteriorOrientation> FrameFirst<'a, M> {
         Ok(Self {
             model,
             focal_length_px,
+            distortion: Distortion::NONE,
             sense: -flight_sense(model)?,
         })
     }
 
-    /// Along-track frame coordinate of a point with the orientation of line `x`, pixels along the flight.
+    /// The same for a camera with distortion.
+    #[must_use]
+    pub const fn through(self, distortion: Distortion) -> Self {
+        Self { distortion, ..self }
+    }
+
+    /// Along-track frame coordinate of a point from the detector line, with the orientation of line `x`, pixels
+    /// along the flight.
     fn ahead_px(&self, x: f64, point_m: &Vector3<f64>) -> Result<f64, Unseen> {
         let camera_m = self.model.pose(x).camera_vector_m(point_m);
         if camera_m.z.is_nan() {
@@ -75,7 +84,8 @@ impl<'a, M: ExteriorOrientation> FrameFirst<'a, M> {
         }
         let focal_px =
             project(&camera_m, self.focal_length_px).map_err(|_| Unseen::BehindCamera)?;
-        Ok(self.sense * focal_px.x)
+        let [along, _] = self.distortion.curve(camera_m.y / camera_m.z);
+        Ok(self.sense * (focal_px.x + self.focal_length_px * along))
     }
 
     /// Finds the line of `point_m` from the middle of the image; `on_step` is told every step, lines.
@@ -132,6 +142,15 @@ impl<'a, M: PolynomialPath> FixedPoint<'a, M> {
         })
     }
 
+    /// The same for a camera with distortion: the plane of the line is that of the point's sample.
+    #[must_use]
+    pub const fn through(self, distortion: Distortion) -> Self {
+        Self {
+            frame: self.frame.through(distortion),
+            ..self
+        }
+    }
+
     /// Finds the line of `point_m` from its frame coordinate; `on_step` is told every step, lines.
     ///
     /// # Errors
@@ -160,8 +179,11 @@ impl<'a, M: PolynomialPath> FixedPoint<'a, M> {
         let [constant, linear, square] = &self.model.path_m().coefficients;
         let least_m = super::ALONG_SHARE_MIN * linear.norm();
         let step = |x: f64| {
-            let matrix = self.model.pose(x).mars_to_camera;
-            let axis = matrix.row(0);
+            let pose = self.model.pose(x);
+            let camera_m = pose.camera_vector_m(point_m);
+            let [along, _] = self.frame.distortion.curve(camera_m.y / camera_m.z);
+            let matrix = pose.mars_to_camera;
+            let axis = matrix.row(0) - matrix.row(2) * along;
             let along_m = axis.dot(&linear.transpose());
             if along_m.abs() <= least_m {
                 return Err(Unseen::AcrossFlight);

@@ -85,7 +85,7 @@ struct Measure<'a> {
     serial_number: &'a str,
 }
 
-/// Serial number that ISIS composes for a MOC narrow-angle image; `None` when its label has no clock string.
+/// Serial number that ISIS composes for an image; `None` when its label has no clock string.
 ///
 /// # Source
 /// `MgsMocSerialNumber.trn` of ISIS (spacecraft, clock, instrument, filter) and the network of M01/00115, which names that image
@@ -93,7 +93,8 @@ struct Measure<'a> {
 #[must_use]
 pub fn moc_serial_number(image: &ImageTimes) -> Option<String> {
     let clock = image.sclk_start.as_ref()?;
-    Some(format!("MGS/{}/MOC-NA/BROAD_BAND", clock.trim()))
+    let camera = &image.instrument.label.serial;
+    Some(format!("MGS/{}/{camera}", clock.trim()))
 }
 
 /// Writes `points` to `path`, which must end in `.json` for ISIS to take it, and reads it back.

@@ -115,7 +115,7 @@ fn about(program: Program) -> String {
              QGIS: Layer > Add Layer > Add Vector Layer, any of these."
         ),
         Program::CameraModel => "\
-            Community Sensor Model (usgscsm): image support data of the MOC narrow-angle camera. They differ from the\n\
+            Community Sensor Model (usgscsm): image support data of the cameras. They differ from the\n\
             files of ALE where those do not say what the camera does: the time of a line includes the summing, samples\n\
             and the detector's centre count from the detector's edge, there is no distortion, and the pointing covers\n\
             the whole image. The member areograph.interpolation holds the measured interpolation error."

@@ -74,6 +74,7 @@ fn bundle_image<M>(image: &AdjustImage<M>) -> BundleImage<&M> {
         half_lines: 0.5 * image.stereo.lines,
         line_period_s: image.line_period_s,
         focal_length_px: image.stereo.detector.focal_length_px,
+        distortion: image.stereo.detector.distortion,
         sigmas: image.sigmas,
         time_bias_sigma_s: image.time_bias_sigma_s,
     }
@@ -84,10 +85,12 @@ pub(super) fn projector<'a, M, O: ExteriorOrientation>(
     image: &AdjustImage<M>,
     orientation: &'a O,
 ) -> std::result::Result<Projector<'a, O>, AdjustFault> {
-    Projector::new(orientation, image.stereo.lines).map_err(|unseen| AdjustFault::Blind {
+    let projector = Projector::new(orientation, image.stereo.lines);
+    let projector = projector.map_err(|unseen| AdjustFault::Blind {
         image: image.stereo.id.clone(),
         unseen,
-    })
+    })?;
+    Ok(projector.through(image.stereo.detector.distortion))
 }
 
 /// Where the initial orientations put the footprints, in and around each image.
@@ -213,13 +216,15 @@ impl<'a, M: ExteriorOrientation> Assembled<&'a M> {
             for measure in &tie.measures {
                 let image = measure.image;
                 let stereo = &images[image].stereo;
-                let (x_lines, y_px) = stereo.focal_place(measure.line, measure.sample);
+                let (x_lines, focal_px) = stereo.focal_place(measure.line, measure.sample);
+                let mut sigma_px = Vector2::from(config.tie_sigma_px);
+                sigma_px.y *= stereo.detector.focal_px_per_sample(focal_px.y);
                 self.network.views.push(View {
                     point,
                     image,
                     x_lines,
-                    y_px,
-                    sigma_px: Vector2::from(config.tie_sigma_px),
+                    y_px: focal_px.y,
+                    sigma_px,
                 });
             }
         }

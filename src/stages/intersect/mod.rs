@@ -8,7 +8,7 @@ mod statistics;
 
 use std::{collections::BTreeSet, sync::atomic::AtomicBool};
 
-use nalgebra::Matrix3;
+use nalgebra::{Matrix3, Vector2};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
@@ -171,7 +171,7 @@ impl Fault for BlindImage {
 struct Place {
     image: usize,
     x_lines: f64,
-    y_px: f64,
+    focal_px: Vector2<f64>,
 }
 
 stage_inputs! {
@@ -227,12 +227,14 @@ pub fn intersect_ties<M: ExteriorOrientation>(
     let projectors: Vec<Projector<'_, M>> = images
         .iter()
         .map(|image| {
-            Projector::new(&image.orientation, image.lines).map_err(|unseen| BlindImage {
+            let projector = Projector::new(&image.orientation, image.lines);
+            let projector = projector.map_err(|unseen| BlindImage {
                 image: image.id.clone(),
                 unseen,
-            })
+            });
+            Ok(projector?.through(image.detector.distortion))
         })
-        .collect::<std::result::Result<_, _>>()?;
+        .collect::<std::result::Result<_, BlindImage>>()?;
     let found: Vec<std::result::Result<(IntersectedPoint, Intersection), TieReject>> = ties
         .par_iter()
         .enumerate()
@@ -264,8 +266,8 @@ fn places<M: ExteriorOrientation>(
             .iter()
             .map(|measure| {
                 let image = measure.image;
-                let (x_lines, y_px) = images[image].focal_place(measure.line, measure.sample);
-                if !(x_lines.is_finite() && y_px.is_finite()) {
+                let (x_lines, focal_px) = images[image].focal_place(measure.line, measure.sample);
+                if !(x_lines.is_finite() && focal_px.y.is_finite()) {
                     return Err(TieReject::NotFinite);
                 }
                 if !images[image].shows(measure.line, measure.sample) {
@@ -274,7 +276,7 @@ fn places<M: ExteriorOrientation>(
                 Ok(Place {
                     image,
                     x_lines,
-                    y_px,
+                    focal_px,
                 })
             })
             .collect()
@@ -296,14 +298,19 @@ fn intersect_one<M: ExteriorOrientation>(
     let mut sights: Vec<Sight> = places
         .iter()
         .map(|place| {
-            let pose = images[place.image].orientation.pose(place.x_lines);
+            let StereoImage {
+                orientation,
+                detector,
+                ..
+            } = &images[place.image];
+            let pose = orientation.pose(place.x_lines);
             Sight {
                 position_m: pose.position_m,
                 mars_to_camera: pose.mars_to_camera,
-                focal_length_px: images[place.image].detector.focal_length_px,
-                across_px: place.y_px,
+                focal_length_px: detector.focal_length_px,
+                focal_px: place.focal_px,
                 along_sigma_px,
-                across_sigma_px,
+                across_sigma_px: across_sigma_px * detector.focal_px_per_sample(place.focal_px.y),
             }
         })
         .collect();
@@ -327,11 +334,11 @@ fn intersect_one<M: ExteriorOrientation>(
             Some(MeasureResidual {
                 image: place.image,
                 x_lines: place.x_lines,
-                y_px: place.y_px,
+                y_px: place.focal_px.y,
                 focal_along_px: focal.x,
                 focal_across_px: focal.y,
                 reprojection_lines: place.x_lines - seen.x,
-                reprojection_px: place.y_px - y_px,
+                reprojection_px: place.focal_px.y - y_px,
             })
         })
         .collect::<Option<Vec<_>>>()

@@ -10,9 +10,9 @@ pub use tables::{CameraTables, InterpolationCheck};
 
 use super::tag_times::ImageTimes;
 use crate::{
-    constants::{MARS_IAU2000, MOC_NA_DETECTORS, MOC_NA_FOCAL_LENGTH_MM, MOC_NA_PIXEL_PITCH_MM},
+    constants::MARS_IAU2000,
     error::Result,
-    frames::{MarsIau2000, MocNa, Position, Rotation},
+    frames::{CameraFrame, MarsIau2000, Position, Rotation},
     geom::{
         attitude::OmegaPhiKappa,
         ellipsoid::{Spherical, ray_meets_ellipsoid},
@@ -52,7 +52,7 @@ pub struct OrientationSample {
     /// Perspective centre (geometric: no light time, no aberration).
     pub position: Position<MarsIau2000>,
     /// How the camera looks.
-    pub camera_to_mars: Rotation<MocNa, MarsIau2000>,
+    pub camera_to_mars: Rotation<CameraFrame, MarsIau2000>,
     /// The same rotation as ω, φ, κ.
     pub angles: OmegaPhiKappa,
     /// Where the boresight meets the IAU 2000 ellipsoid, if it does.
@@ -147,19 +147,10 @@ impl GroundPoint {
     }
 }
 
-/// Where the outer edges of the first and the last sample look, camera frame, millimetres.
-///
-/// Samples follow +Y of the camera, detector 1024 of 2048 lies on the boresight (instrument kernel).
+/// Where the outer edges of the first and the last sample look, camera frame.
 fn swath_directions(image: &ImageTimes) -> [Vector3<f64>; 2] {
-    let last_detector = image.first_detector + image.samples * image.crosstrack_summing;
-    [image.first_detector, last_detector].map(|detector| {
-        let from_centre = f64::from(detector) - 0.5 * f64::from(MOC_NA_DETECTORS);
-        Vector3::new(
-            0.0,
-            from_centre * MOC_NA_PIXEL_PITCH_MM,
-            MOC_NA_FOCAL_LENGTH_MM,
-        )
-    })
+    let detector = image.detector();
+    [0.0, detector.samples].map(|sample| detector.look(sample))
 }
 
 fn boresight_ground(camera: &Camera) -> Option<BoresightGround> {

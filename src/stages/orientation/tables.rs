@@ -4,9 +4,9 @@ use nalgebra::{Matrix3, Vector3, Vector4};
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    constants::{MARS_IAU2000, MOC_NA_DETECTORS, MOC_NA_FOCAL_LENGTH_MM, MOC_NA_PIXEL_PITCH_MM},
+    constants::MARS_IAU2000,
     error::Result,
-    frames::{J2000, MarsIau2000, MgsBus, MocNa, Position, Rotation},
+    frames::{CameraFrame, J2000, MarsIau2000, MgsBus, Position, Rotation},
     geom::{
         attitude::{continuous_quaternions, matrix_of_spice_quaternion},
         lagrange::lagrange,
@@ -43,7 +43,7 @@ pub struct CameraTables {
     /// Angular velocity of Mars in J2000, radians per second.
     pub mars_angular_velocity_rad_s: Vec<Vector3<f64>>,
     /// Bus → camera, at the first epoch.
-    pub bus_to_camera: Rotation<MgsBus, MocNa>,
+    pub bus_to_camera: Rotation<MgsBus, CameraFrame>,
     /// How well the tables are interpolated over the image.
     pub interpolation: InterpolationCheck,
 }
@@ -96,7 +96,7 @@ pub(in crate::stages) struct Camera {
     /// Perspective centre.
     pub(in crate::stages) position: Position<MarsIau2000>,
     /// Rotation to the axes of Mars.
-    pub(in crate::stages) to_mars: Rotation<MocNa, MarsIau2000>,
+    pub(in crate::stages) to_mars: Rotation<CameraFrame, MarsIau2000>,
 }
 
 /// What a camera model makes of the nodes: rotated to Mars first, then interpolated.
@@ -146,19 +146,18 @@ impl Nodes {
 fn error_px(image: &ImageTimes, kernels: &Camera, interpolated: &Camera) -> f64 {
     let position_m = kernels.position.xyz_m;
     let distance_m = position_m.norm() - MARS_IAU2000.equatorial_radius_m;
-    let detector_rad = MOC_NA_PIXEL_PITCH_MM / MOC_NA_FOCAL_LENGTH_MM;
-    let first = f64::from(image.first_detector);
-    let width = f64::from(image.samples * image.crosstrack_summing);
-    let centre = f64::from(MOC_NA_DETECTORS) / 2.0;
-    let errors_px = [first, first + 0.5 * width, first + width].map(|detector| {
-        let across = (detector - centre) * detector_rad;
-        let ground_m =
-            position_m + kernels.to_mars.matrix() * Vector3::new(0.0, across, 1.0) * distance_m;
+    let detector = image.detector();
+    let pixel_rad =
+        image.instrument.optics.pixel_pitch_mm / image.instrument.optics.focal_length_mm;
+    let errors_px = [0.0, 0.5, 1.0].map(|share| {
+        let look = detector.look(share * detector.samples);
+        let ground_m = position_m + kernels.to_mars.matrix() * look * distance_m;
         let seen =
             interpolated.to_mars.matrix().transpose() * (ground_m - interpolated.position.xyz_m);
-        let lines = seen.x / seen.z / f64::from(image.downtrack_summing);
-        let samples = (seen.y / seen.z - across) / f64::from(image.crosstrack_summing);
-        lines.hypot(samples) / detector_rad
+        let missed = seen.xy() / seen.z - look.xy();
+        let lines = missed.x / f64::from(image.downtrack_summing);
+        let samples = missed.y / f64::from(image.crosstrack_summing);
+        lines.hypot(samples) / pixel_rad
     });
     largest(errors_px).unwrap_or_default()
 }

@@ -63,7 +63,8 @@ pub(super) fn run(
         tolerance_lines: config.tolerance_lines,
         steps_max: config.steps_max,
     };
-    let focal_length_px = camera.detector.focal_length_px;
+    let (focal_length_px, distortion) =
+        (camera.detector.focal_length_px, camera.detector.distortion);
     let mut runs = Vec::new();
     for (model, euler) in [
         (CameraModel::FirstOrder, &camera.first_order),
@@ -72,13 +73,17 @@ pub(super) fn run(
         Stopped::check(stop)?;
         let frame_first = FrameFirst::new(euler, focal_length_px);
         let ways = all_ways(ground, |point_m, on_step| {
-            frame_first?.solve(point_m, &limits, on_step)
+            frame_first?
+                .through(distortion)
+                .solve(point_m, &limits, on_step)
         });
         runs.push(summed(camera, (Method::FrameFirst, model), ground, &ways));
         Stopped::check(stop)?;
         let fixed_point = FixedPoint::new(euler, focal_length_px);
         let ways = all_ways(ground, |point_m, on_step| {
-            fixed_point?.solve(point_m, &limits, on_step)
+            fixed_point?
+                .through(distortion)
+                .solve(point_m, &limits, on_step)
         });
         runs.push(summed(camera, (Method::FixedPoint, model), ground, &ways));
     }

@@ -217,7 +217,7 @@ impl OrientedImage<'_> {
             line_offset: solution.x,
             y_px: focal_px.y,
             range_m: solution.camera_m.norm(),
-            residual_px: focal_px.x,
+            residual_px: self.detector.missed_px(&focal_px),
             step_lines: solution.step_lines,
             evaluations: solution.evaluations,
             inside: delivered.contains(&line) && (0.0..=self.detector.samples).contains(&sample),

@@ -74,7 +74,7 @@ fn tables(reader: &Reader, epochs: &[Et]) -> Result<CameraTables> {
         bus_angular_velocity_rad_s: Vec::new(),
         inertial_to_mars: Vec::new(),
         mars_angular_velocity_rad_s: Vec::new(),
-        bus_to_camera: session.mounting(first)?,
+        bus_to_camera: session.mounting(reader.instrument, first)?,
         interpolation: InterpolationCheck::default(),
     };
     for epoch in epochs {

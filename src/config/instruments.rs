@@ -1,0 +1,246 @@
+//! Instrument files: those of the program, and those that a site names.
+
+use std::{path::Path, sync::LazyLock};
+
+use toml::Value;
+
+use super::{
+    data_file::{self, DataTable},
+    declare::{Form, Found, ValueKind},
+    problems::{Problems, Review},
+};
+use crate::{
+    geom::pushbroom::Distortion,
+    instruments::{
+        Altimeter, COEFFICIENTS_MAX, DetectorLine, DistortionModel, Instrument, LabelNames,
+        Mounting, NaifNames, Optics, PointingTime, Sense, SummingLimits,
+    },
+    units::RADIANS_PER_DEGREE,
+};
+
+/// Files of cameras that the program knows; the first is that of images which name none.
+const INSTRUMENTS: [(&str, &str); 3] = [
+    (
+        "config/instruments/moc_na.toml",
+        include_str!("../../config/instruments/moc_na.toml"),
+    ),
+    (
+        "config/instruments/moc_wa_red.toml",
+        include_str!("../../config/instruments/moc_wa_red.toml"),
+    ),
+    (
+        "config/instruments/moc_wa_blue.toml",
+        include_str!("../../config/instruments/moc_wa_blue.toml"),
+    ),
+];
+/// Files of altimeters that the program knows.
+const ALTIMETERS: [(&str, &str); 1] = [(
+    "config/altimeters/mola.toml",
+    include_str!("../../config/altimeters/mola.toml"),
+)];
+/// Numbers of NAIF for spacecraft, instruments and frames.
+const NAIF_IDS: [i32; 2] = [-999_999_999, -1];
+
+static CAMERAS: LazyLock<Vec<Instrument>> = LazyLock::new(|| {
+    let files = INSTRUMENTS.iter();
+    let cameras: Result<Vec<Instrument>, Problems> = files
+        .map(|(file, text)| instrument(text, Path::new(file)))
+        .collect();
+    of_the_program(cameras)
+});
+static ALTIMETER: LazyLock<Altimeter> = LazyLock::new(|| {
+    let [(file, text)] = ALTIMETERS;
+    of_the_program(altimeter(text, Path::new(file)))
+});
+
+/// What a file of the program itself says.
+#[expect(
+    clippy::panic,
+    reason = "a program built with a bad file of its own; a test reads them all"
+)]
+fn of_the_program<T>(read: Result<T, Problems>) -> T {
+    read.unwrap_or_else(|problems| panic!("built with a bad file: {problems}"))
+}
+
+/// The cameras that the program knows.
+#[must_use]
+pub fn built_in_instruments() -> &'static [Instrument] {
+    &CAMERAS
+}
+
+/// The camera of images that name none, in configuration or label.
+#[must_use]
+pub fn usual_instrument() -> &'static Instrument {
+    &CAMERAS[0]
+}
+
+/// The altimeter that the program knows.
+#[must_use]
+pub fn built_in_altimeter() -> &'static Altimeter {
+    &ALTIMETER
+}
+
+/// The camera of an image: one of the program's, or an instrument file.
+pub(super) struct Camera;
+
+impl Form for Camera {
+    type Value = Instrument;
+
+    fn kind(&self) -> ValueKind {
+        ValueKind::Text { empty: false }
+    }
+
+    fn read(&self, found: &Found<'_>, review: &mut Review<'_>) -> Option<Instrument> {
+        let known = built_in_instruments();
+        let Some(written) = found.value.get_ref().as_str() else {
+            found.refuse(review, self.kind());
+            return None;
+        };
+        if let Some(camera) = known.iter().find(|camera| camera.id == written) {
+            return Some(camera.clone());
+        }
+        let path = review.resolve(written);
+        if !path.is_file() {
+            let ids: Vec<&str> = known.iter().map(|camera| camera.id.as_str()).collect();
+            let expected = format!("{}, or the path of an instrument file", ids.join(", "));
+            found.refuse(review, expected);
+            return None;
+        }
+        let read = super::read(&path).map_err(|failure| failure.fault.to_string());
+        let read = read.and_then(|text| instrument(&text, &path).map_err(|all| all.to_string()));
+        read.map_err(|problems| {
+            let text = format!("{} names a file with problems:\n{problems}", found.key);
+            review.problem(Some(found.value.span()), text);
+        })
+        .ok()
+    }
+
+    fn written(&self, value: &Instrument) -> Value {
+        Value::from(value.id.clone())
+    }
+}
+
+/// The camera that the instrument file `text` describes.
+///
+/// # Errors
+/// Everything that is wrong with it, each with its place.
+pub fn instrument(text: &str, file: &Path) -> Result<Instrument, Problems> {
+    data_file::read(text, file, |top, review| {
+        let instrument = camera(top, review);
+        if !review.has_problems()
+            && let Err(folded) = Distortion::check(&instrument)
+        {
+            review.problem(None, format!("distortion: {folded}"));
+        }
+        instrument
+    })
+}
+
+fn camera(top: &mut DataTable<'_>, review: &mut Review<'_>) -> Instrument {
+    Instrument {
+        id: top.text(review, "id"),
+        name: top.text(review, "name"),
+        label: top.table(review, "label", |table, _, review| LabelNames {
+            instrument: table.text(review, "instrument"),
+            filter: table.optional_text(review, "filter"),
+            serial: table.text(review, "serial"),
+        }),
+        naif: top.table(review, "naif", |table, _, review| NaifNames {
+            instrument: table.whole(review, "instrument", NAIF_IDS),
+            frame: table.text(review, "frame"),
+            bus: table.whole(review, "bus", NAIF_IDS),
+            bus_frame: table.text(review, "bus_frame"),
+            kernel: table.text(review, "kernel"),
+        }),
+        mounting: top.table(review, "mounting", mounting),
+        optics: top.table(review, "optics", |table, _, review| Optics {
+            focal_length_mm: table.number(review, "focal_length_mm", [0.1, 1e6]),
+            pixel_pitch_mm: table.number(review, "pixel_pitch_mm", [1e-4, 1.0]),
+        }),
+        detector: top.table(review, "detector", detector),
+        distortion: top.table(review, "distortion", distortion),
+        summing: top.table(review, "summing", |table, _, review| SummingLimits {
+            max: table.whole(review, "max", [1, 1_000]).unsigned_abs(),
+            variable_codes: table.optional_counts(review, "variable_codes", 1_000),
+        }),
+        pointing: top.table(review, "pointing", |table, source, review| PointingTime {
+            ck_bias_s: table.number(review, "ck_bias_s", [-10.0, 10.0]),
+            source,
+        }),
+    }
+}
+
+fn mounting(table: &mut DataTable<'_>, _source: String, review: &mut Review<'_>) -> Mounting {
+    let [roll_rad, pitch_rad, yaw_rad] = ["roll_deg", "pitch_deg", "yaw_deg"]
+        .map(|key| table.number(review, key, [-360.0, 360.0]) * RADIANS_PER_DEGREE);
+    Mounting {
+        roll_rad,
+        pitch_rad,
+        yaw_rad,
+    }
+}
+
+fn detector(table: &mut DataTable<'_>, _source: String, review: &mut Review<'_>) -> DetectorLine {
+    let senses = [("+y", Sense::PlusY), ("-y", Sense::MinusY)];
+    DetectorLine {
+        pixels: table.whole(review, "pixels", [1, 1_000_000]).unsigned_abs(),
+        boresight_px: table.number(review, "boresight_px", [-1e6, 1e6]),
+        along_track_px: table.number(review, "along_track_px", [-1e6, 1e6]),
+        samples_along: table
+            .word(review, "samples_along", &senses)
+            .unwrap_or(Sense::PlusY),
+    }
+}
+
+/// The forms of distortion.
+#[derive(Clone, Copy)]
+enum Model {
+    None,
+    Radial,
+    Angle,
+}
+
+fn distortion(
+    table: &mut DataTable<'_>,
+    _source: String,
+    review: &mut Review<'_>,
+) -> DistortionModel {
+    let models = [
+        ("none", Model::None),
+        ("radial_polynomial", Model::Radial),
+        ("angle_polynomial", Model::Angle),
+    ];
+    match table.word(review, "model", &models) {
+        None | Some(Model::None) => DistortionModel::None,
+        Some(Model::Radial) => DistortionModel::RadialPolynomial {
+            coefficients: table.numbers(review, "coefficients", COEFFICIENTS_MAX),
+        },
+        Some(Model::Angle) => DistortionModel::AnglePolynomial {
+            coefficients_rad: table
+                .numbers(review, "coefficients_deg", COEFFICIENTS_MAX)
+                .into_iter()
+                .map(|degrees| degrees * RADIANS_PER_DEGREE)
+                .collect(),
+            scale: table.number(review, "scale", [0.5, 2.0]),
+        },
+    }
+}
+
+/// The altimeter that the file `text` describes.
+///
+/// # Errors
+/// Everything that is wrong with it, each with its place.
+pub fn altimeter(text: &str, file: &Path) -> Result<Altimeter, Problems> {
+    data_file::read(text, file, |top, review| {
+        let (id, name) = (top.text(review, "id"), top.text(review, "name"));
+        let (clock_bias_s, clock_source) = top.table(review, "clock", |table, source, review| {
+            (table.number(review, "bias_s", [0.0, 10.0]), source)
+        });
+        Altimeter {
+            id,
+            name,
+            clock_bias_s,
+            clock_source,
+        }
+    })
+}

@@ -1,0 +1,189 @@
+//! Instruments as data: what a camera or an altimeter is, as its file under `config/` says.
+
+use std::fmt;
+
+use serde::{Deserialize, Serialize};
+
+use crate::time::PointingBias;
+
+/// Most coefficients of a distortion.
+pub const COEFFICIENTS_MAX: usize = 10;
+
+/// A line-scan camera.
+///
+/// Camera axes: +Z along the boresight, +Y along the detector, +X against the flight or with it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Instrument {
+    /// Identifier, the name of its file.
+    pub id: String,
+    /// Its name, for people.
+    pub name: String,
+    /// Its names in labels.
+    pub label: LabelNames,
+    /// Numbers and frames in kernels.
+    pub naif: NaifNames,
+    /// Rotation from the bus to the camera, where no kernel is at hand.
+    pub mounting: Mounting,
+    /// Focal length and pixel pitch.
+    pub optics: Optics,
+    /// The detector line.
+    pub detector: DetectorLine,
+    /// Departure from an ideal camera.
+    pub distortion: DistortionModel,
+    /// How many detector lines and pixels may be summed.
+    pub summing: SummingLimits,
+    /// Time correction of its attitude.
+    pub pointing: PointingTime,
+}
+
+/// How labels and image identifiers of ISIS name an instrument.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct LabelNames {
+    /// Instrument keyword.
+    pub instrument: String,
+    /// Filter keyword, where it tells cameras of one instrument apart.
+    pub filter: Option<String>,
+    /// Instrument and filter in the serial numbers of ISIS.
+    pub serial: String,
+}
+
+impl fmt::Display for LabelNames {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.write_str(&self.instrument)?;
+        match &self.filter {
+            Some(filter) => write!(formatter, " {filter}"),
+            None => Ok(()),
+        }
+    }
+}
+
+/// Names and numbers of NAIF.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct NaifNames {
+    /// Number of the instrument.
+    pub instrument: i32,
+    /// Frame of the camera.
+    pub frame: String,
+    /// Number of the bus, the object of attitude kernels.
+    pub bus: i32,
+    /// Frame of the bus.
+    pub bus_frame: String,
+    /// A file of the mission's archive that defines the frame of the camera.
+    pub kernel: String,
+}
+
+/// Rotations of the frame about X, Y and Z, in this order, from the bus to the camera, radians.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Mounting {
+    /// About X.
+    pub roll_rad: f64,
+    /// About Y.
+    pub pitch_rad: f64,
+    /// About Z.
+    pub yaw_rad: f64,
+}
+
+/// Focal length and pixel pitch; only their ratio enters geometry without distortion.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Optics {
+    /// Focal length, millimetres.
+    pub focal_length_mm: f64,
+    /// Pixel pitch, millimetres.
+    pub pixel_pitch_mm: f64,
+}
+
+/// A line of detector pixels.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct DetectorLine {
+    /// Pixels.
+    pub pixels: u32,
+    /// Pixel coordinate of the boresight, 0 at the outer edge of the first pixel.
+    pub boresight_px: f64,
+    /// Distance of the line from the boresight towards +X, pixels.
+    pub along_track_px: f64,
+    /// The axis that pixel numbers follow.
+    pub samples_along: Sense,
+}
+
+/// An axis or its opposite.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Sense {
+    /// Along +Y of the camera.
+    #[serde(rename = "+y")]
+    PlusY,
+    /// Against +Y of the camera.
+    #[serde(rename = "-y")]
+    MinusY,
+}
+
+impl Sense {
+    /// +1 along +Y, −1 against it.
+    #[must_use]
+    pub const fn sign(self) -> f64 {
+        match self {
+            Self::PlusY => 1.0,
+            Self::MinusY => -1.0,
+        }
+    }
+}
+
+/// Departure of a camera from an ideal one.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub enum DistortionModel {
+    /// The detector lies in the focal plane of an ideal camera.
+    None,
+    /// Ideal focal-plane coordinates are the distorted ones times `1 − (k₀ + k₁ r² + k₂ r⁴ + …)`, `r` the
+    /// distance of the distorted place from the boresight in millimetres: the form of usgscsm and ISIS.
+    RadialPolynomial {
+        /// `k₀`, `k₁` …, powers of 1/mm².
+        coefficients: Vec<f64>,
+    },
+    /// The angle off the boresight is `c₁ r + c₃ r³ + …`, `r` the distance of the detector place from the
+    /// boresight in thousands of pixels, across the track after multiplication by a scale: the form of the
+    /// MOC instrument kernel.
+    AnglePolynomial {
+        /// `c₁`, `c₃` …, radians.
+        coefficients_rad: Vec<f64>,
+        /// Scale of the coordinate across the track.
+        scale: f64,
+    },
+}
+
+/// Limits of summing.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct SummingLimits {
+    /// Most detector lines or pixels in a line or sample.
+    pub max: u32,
+    /// Numbers across the track that stand for a summing that varies over the line.
+    pub variable_codes: Vec<u32>,
+}
+
+/// Time correction of attitude kernels for an instrument.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct PointingTime {
+    /// Attitude of an exposure at `t` is read at `t` plus this, seconds.
+    pub ck_bias_s: f64,
+    /// Where it comes from; products repeat it.
+    pub source: String,
+}
+
+impl Instrument {
+    /// Time correction of its attitude.
+    #[must_use]
+    pub const fn pointing_bias(&self) -> PointingBias {
+        PointingBias::from_seconds(self.pointing.ck_bias_s)
+    }
+}
+
+/// A laser altimeter.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Altimeter {
+    /// Identifier, the name of its file.
+    pub id: String,
+    /// Its name, for people.
+    pub name: String,
+    /// Size of the error of its time tags, seconds.
+    pub clock_bias_s: f64,
+    /// Where that comes from; products repeat it.
+    pub clock_source: String,
+}

@@ -1,0 +1,111 @@
+//! What a camera can sum, and the pixels that it has.
+
+use crate::{
+    error::{Fault, Kind, Result},
+    instruments::Instrument,
+};
+
+/// An image that its camera cannot have taken.
+#[derive(Debug, thiserror::Error)]
+enum DetectorFault {
+    #[error("image {image}: {key} is {summing}; expected 1 to {max}, as {instrument} sums")]
+    Summing {
+        image: String,
+        key: &'static str,
+        summing: u32,
+        instrument: String,
+        max: u32,
+    },
+    #[error(
+        "image {image}: crosstrack_summing {code} of {instrument} stands for summing that varies over the line; \
+         expected one summing for all samples"
+    )]
+    VariableSumming {
+        image: String,
+        code: u32,
+        instrument: String,
+    },
+    #[error(
+        "image {image}: {samples} samples of {crosstrack} pixels from pixel {first} end at {end}; expected at most \
+         {pixels}, the pixels of {instrument}"
+    )]
+    Detector {
+        image: String,
+        samples: u32,
+        crosstrack: u32,
+        first: u32,
+        end: u64,
+        instrument: String,
+        pixels: u32,
+    },
+}
+
+impl Fault for DetectorFault {
+    fn kind(&self) -> Kind {
+        Kind::Input
+    }
+
+    fn advice(&self) -> String {
+        match self {
+            Self::Summing { .. } | Self::Detector { .. } => {
+                "check summing, samples and first detector, and that the image is of this camera"
+                    .to_owned()
+            }
+            Self::VariableSumming { .. } => {
+                "leave the image out: its samples differ in width, which areograph does not model"
+                    .to_owned()
+            }
+        }
+    }
+}
+
+/// Makes sure that `instrument` sums so many lines and pixels, and has the pixels of these samples.
+///
+/// # Errors
+/// The limit of the instrument that the image breaks.
+pub(super) fn fits_detector(
+    image: &str,
+    instrument: &Instrument,
+    [downtrack, crosstrack]: [u32; 2],
+    [first, samples]: [u32; 2],
+) -> Result<()> {
+    let limits = &instrument.summing;
+    for (key, summing) in [
+        ("downtrack_summing", downtrack),
+        ("crosstrack_summing", crosstrack),
+    ] {
+        if summing == 0 || summing > limits.max {
+            return Err(DetectorFault::Summing {
+                image: image.to_owned(),
+                key,
+                summing,
+                instrument: instrument.name.clone(),
+                max: limits.max,
+            }
+            .into());
+        }
+    }
+    if limits.variable_codes.contains(&crosstrack) {
+        return Err(DetectorFault::VariableSumming {
+            image: image.to_owned(),
+            code: crosstrack,
+            instrument: instrument.name.clone(),
+        }
+        .into());
+    }
+    let pixels = instrument.detector.pixels;
+    let end = u64::from(first) + u64::from(samples) * u64::from(crosstrack);
+    if samples == 0 || end > u64::from(pixels) {
+        return Err(DetectorFault::Detector {
+            image: image.to_owned(),
+            samples,
+            crosstrack,
+            first,
+            end,
+            instrument: instrument.name.clone(),
+            pixels,
+        }
+        .into());
+    }
+    Ok(())
+}
