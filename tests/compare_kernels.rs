@@ -284,7 +284,11 @@ fn a_change_of_any_set_is_seen_and_may_change_the_choice() {
     case.replace("kernels/ipng.tm", "'moc.ti'", "'moc2.ti'");
     fs::copy(case.path("kernels/moc.ti"), case.path("kernels/moc2.ti")).unwrap();
     case.replace("kernels/moc2.ti", "KPL/IK", "KPL/IK\n");
-    assert!(planned(&case).contains("run   choose_kernels"), "{}", planned(&case));
+    assert!(
+        planned(&case).contains("run   choose_kernels"),
+        "{}",
+        planned(&case)
+    );
     assert_eq!(case.stages_run(), ["choose_kernels", "publish"]);
 }
 
