@@ -302,7 +302,7 @@ fn what_is_in_one_run_only_is_counted_and_keeps_no_limit() {
         "{footprints}"
     );
     assert_eq!(footprints["movement"]["moved"], 0);
-    assert_eq!(names(&found["stages"]["added"]).len(), 3);
+    assert_eq!(names(&found["stages"]["added"]).len(), 4);
     assert_eq!(found["images"][0]["valid_in_a"], true);
     assert_eq!(found["images"][1]["samples_only_in_b"], 31);
     assert!(found["images"][0]["valid_in_b"].is_null());

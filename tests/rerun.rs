@@ -96,10 +96,10 @@ fn a_new_leap_second_kernel_with_the_same_seconds_stops_at_the_times() {
         run(&case),
         [
             "tag_times/image",
+            "tag_utc",
             "check_ranges",
             "sample_orientation/image",
             "describe_kernels",
-            "tag_utc",
             "publish"
         ]
     );

@@ -18,6 +18,7 @@ use crate::{
 pub(super) struct Prepared {
     pub(super) found: Output<SearchResult>,
     pub(super) converted: Output<Converted>,
+    pub(super) utc: Output<Vec<String>>,
     pub(super) profiles: Output<Vec<Profile>>,
     /// Line times, in the order of the configuration.
     pub(super) images: Vec<Output<ImageTimes>>,

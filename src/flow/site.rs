@@ -82,6 +82,10 @@ pub(super) fn prepare<D: Driver>(flow: &mut D, config: &SiteConfig) -> Flow<Prep
         found: &found,
         mola_clock: &config.mola_clock,
     })?;
+    let utc = flow.stage(&TagUtc {
+        converted: &converted,
+        kernels: &KernelView::text(clocks.as_ref()),
+    })?;
     let profiles = flow.stage(&GroupProfiles {
         converted: &converted,
         windows: &config.windows,
@@ -91,6 +95,7 @@ pub(super) fn prepare<D: Driver>(flow: &mut D, config: &SiteConfig) -> Flow<Prep
         required: flow.required(config, &images, &profiles),
         found,
         converted,
+        utc,
         profiles,
         images,
     })
@@ -130,6 +135,7 @@ pub(super) fn orient<D: Driver>(
     let Prepared {
         found,
         converted,
+        utc,
         profiles,
         images,
         required,
@@ -145,7 +151,7 @@ pub(super) fn orient<D: Driver>(
             range_check: &config.range_check,
         })?
     };
-    let (orientations, described, utc) = {
+    let (orientations, described) = {
         let view = &KernelView::all(kernels.as_ref());
         let orientations = orientations(flow, config, &images, view)?;
         let described = flow.stage(&DescribeKernels {
@@ -153,11 +159,7 @@ pub(super) fn orient<D: Driver>(
             required: Required(required.as_ref()),
             ck_tolerance_s: &config.kernels.ck_tolerance_s,
         })?;
-        let utc = flow.stage(&TagUtc {
-            converted: &converted,
-            kernels: view,
-        })?;
-        (orientations, described, utc)
+        (orientations, described)
     };
     let shots = (&converted, &profiles);
     let images = registered(flow, config, Round::Initial, &images, orientations, shots)?;
