@@ -110,8 +110,21 @@ impl Walk {
 fn agree(what: &str, planned: &[StageReason], ran: &[StageReason]) {
     let names =
         |of: &[StageReason]| -> Vec<String> { of.iter().map(|one| one.stage.clone()).collect() };
-    assert_eq!(names(planned), names(ran), "{what}");
-    for (planned, ran) in planned.iter().zip(ran) {
+    let (planned_names, mut ran_names) = (names(planned), names(ran));
+    if planned_names != ran_names {
+        // Behind an adjustment that fails the run goes on with the products.
+        assert_eq!(ran_names.pop().as_deref(), Some(PUBLISH), "{what}");
+        let failed = ran_names.last().map_or("", |stage| stage.as_str());
+        let mut of_adjustment = ["intersect", "adjust", "reorient"].iter();
+        let failed_there = of_adjustment.any(|stage| failed.starts_with(stage));
+        assert!(
+            failed_there || failed.ends_with("adjusted"),
+            "{what}: {failed}"
+        );
+        assert_eq!(planned_names[..ran_names.len()], ran_names, "{what}");
+    }
+    for ran in ran {
+        let planned = planned.iter().find(|of| of.stage == ran.stage).unwrap();
         let may_change = |reason: &Reason| reason.to_string().contains("may change");
         let open = may_change(&planned.reason);
         assert!(!may_change(&ran.reason), "{what}: {ran:?}");
