@@ -122,8 +122,7 @@ fn sampling_with_the_adjusted_kernels_gives_the_adjusted_orientation() {
                 let Some(other) = theirs.et_s.iter().position(|t| (t - et_s).abs() < 1e-6) else {
                     continue;
                 };
-                let position =
-                    Vector3::from(ours.position_m[row]) - Vector3::from(theirs.position_m[other]);
+                let position = ours.position_m[row] - theirs.position_m[other];
                 assert!(position.norm() < 0.4, "{} m at {row}", position.norm());
                 compared += 1;
             }

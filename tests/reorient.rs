@@ -13,7 +13,7 @@ mod fixture;
 use areograph::{
     error::Kind,
     geom::{
-        attitude::{matrix_of_rotation_vector, matrix_of_spice_quaternion, rotation_vector},
+        attitude::{matrix_of_rotation_vector, rotation_vector},
         lagrange::lagrange,
     },
     spice::Session,
@@ -54,11 +54,11 @@ fn images(test: &str) -> Vec<Image> {
 }
 
 fn camera_of_tables(tables: &CameraTables, row: usize) -> (Vector3<f64>, Matrix3<f64>) {
-    let to_mars = matrix_of_spice_quaternion(tables.inertial_to_mars[row]);
-    let to_bus = matrix_of_spice_quaternion(tables.inertial_to_bus[row]);
-    let to_camera = Matrix3::from_fn(|r, c| tables.bus_to_camera[r][c]) * to_bus;
+    let to_mars = tables.inertial_to_mars[row].matrix();
+    let to_bus = tables.inertial_to_bus[row].matrix();
+    let to_camera = tables.bus_to_camera.matrix() * to_bus;
     (
-        to_mars * Vector3::from(tables.position_m[row]),
+        to_mars * tables.position_m[row],
         to_mars * to_camera.transpose(),
     )
 }
@@ -81,8 +81,8 @@ fn no_correction_changes_nothing() {
             // Epochs of nodes are rounded to 7e-9 s: 3e-5 m and 7e-12 rad, a little more between them.
             assert!((ours.0 - theirs.0).norm() < 1e-4);
             assert!(angle_rad(&ours.1, &theirs.1) < 3e-11);
-            let velocity = [&same, original]
-                .map(|orientation| Vector3::from(orientation.tables.velocity_m_s[row]));
+            let velocity =
+                [&same, original].map(|orientation| orientation.tables.velocity_m_s[row]);
             assert!((velocity[0] - velocity[1]).norm() < 1e-6); // epochs rounded as above, 3 m/s²
         }
         let corners = [&same, original].map(|orientation| orientation.outline.clone().unwrap());
@@ -169,18 +169,17 @@ fn tables_against_samples_px(orientation: &Orientation, tables: &CameraTables) -
     let cameras: Vec<_> = (0..=last)
         .map(|row| camera_of_tables(tables, row))
         .collect();
-    let positions: Vec<[f64; 3]> = cameras.iter().map(|camera| camera.0.into()).collect();
+    let positions: Vec<Vector3<f64>> = cameras.iter().map(|camera| camera.0).collect();
     let reference = cameras[0].1;
-    let vectors: Vec<[f64; 3]> = cameras
+    let vectors: Vec<Vector3<f64>> = cameras
         .iter()
-        .map(|camera| rotation_vector(&(camera.1 * reference.transpose())).into())
+        .map(|camera| rotation_vector(&(camera.1 * reference.transpose())))
         .collect();
     let mut worst_px = 0.0_f64;
     for sample in &orientation.samples {
         let at = (sample.et.seconds() - tables.et_s[0]) / step_s;
-        let position_m = Vector3::from(lagrange(&positions, at));
-        let camera_to_mars =
-            matrix_of_rotation_vector(&Vector3::from(lagrange(&vectors, at))) * reference;
+        let position_m = lagrange(&positions, at);
+        let camera_to_mars = matrix_of_rotation_vector(&lagrange(&vectors, at)) * reference;
         let expected = *sample.camera_to_mars.matrix();
         let range_m = sample.boresight.unwrap().range_m;
         let ground_m = sample.position.xyz_m + expected * Vector3::z() * range_m;
@@ -220,16 +219,16 @@ fn geometric_tables_see_what_the_samples_see() {
 fn apart_from_differences(tables: &CameraTables) -> (f64, f64) {
     let mut worst = (0.0_f64, 0.0_f64);
     for row in 8..tables.et_s.len() - 8 {
-        let [before, after] = [row - 8, row + 8].map(|row| Vector3::from(tables.position_m[row]));
+        let [before, after] = [row - 8, row + 8].map(|row| tables.position_m[row]);
         let velocity = (after - before) / (tables.et_s[row + 8] - tables.et_s[row - 8]);
-        let apart_m_s = (velocity - Vector3::from(tables.velocity_m_s[row])).norm();
-        let [before, bus, after] = [row - 1, row, row + 1]
-            .map(|row| matrix_of_spice_quaternion(tables.inertial_to_bus[row]));
+        let apart_m_s = (velocity - tables.velocity_m_s[row]).norm();
+        let [before, bus, after] =
+            [row - 1, row, row + 1].map(|row| tables.inertial_to_bus[row].matrix());
         // The frame turns by ω: components of what stands still turn back.
         let in_bus = -rotation_vector(&(after * before.transpose()))
             / (tables.et_s[row + 1] - tables.et_s[row - 1]);
         let rate = bus.transpose() * in_bus;
-        let apart_rad_s = (rate - Vector3::from(tables.bus_angular_velocity_rad_s[row])).norm();
+        let apart_rad_s = (rate - tables.bus_angular_velocity_rad_s[row]).norm();
         worst = (worst.0.max(apart_m_s), worst.1.max(apart_rad_s));
     }
     worst

@@ -1,5 +1,7 @@
 //! Interpolation between uniform nodes as camera models of the Community Sensor Model do it.
 
+use nalgebra::SVector;
+
 /// Most nodes that one value is made from.
 const NODES_MAX: usize = 8;
 
@@ -16,9 +18,9 @@ const NODES_MAX: usize = 8;
     clippy::cast_sign_loss,
     reason = "a table position: not negative after max, far below 2^52"
 )]
-pub fn lagrange<const N: usize>(values: &[[f64; N]], at: f64) -> [f64; N] {
+pub fn lagrange<const N: usize>(values: &[SVector<f64, N>], at: f64) -> SVector<f64, N> {
     if values.len() < 2 {
-        return values.first().copied().unwrap_or([0.0; N]);
+        return values.first().copied().unwrap_or_else(SVector::zeros);
     }
     let before = (at.max(0.0) as usize).min(values.len() - 2);
     let half = (before + 1)
@@ -27,26 +29,26 @@ pub fn lagrange<const N: usize>(values: &[[f64; N]], at: f64) -> [f64; N] {
     let first = before + 1 - half;
     let nodes = &values[first..first + 2 * half];
     let at = at - first as f64;
-    let mut sum = [0.0; N];
+    let mut sum = SVector::zeros();
     for (j, node) in nodes.iter().enumerate() {
         let weight: f64 = (0..nodes.len())
             .filter(|k| *k != j)
             .map(|k| (at - k as f64) / (j as f64 - k as f64))
             .product();
-        for (sum, value) in sum.iter_mut().zip(node) {
-            *sum += weight * value;
-        }
+        sum += node * weight;
     }
     sum
 }
 
 #[cfg(test)]
 mod tests {
+    use nalgebra::Vector1;
+
     use super::*;
 
-    fn power(exponent: i32) -> Vec<[f64; 1]> {
+    fn power(exponent: i32) -> Vec<Vector1<f64>> {
         (0..12)
-            .map(|node| [(f64::from(node) - 5.0).powi(exponent)])
+            .map(|node| Vector1::new((f64::from(node) - 5.0).powi(exponent)))
             .collect()
     }
 
@@ -73,6 +75,6 @@ mod tests {
     fn beyond_the_table_the_last_two_nodes_go_on() {
         assert!((lagrange(&power(1), -2.0)[0] + 7.0).abs() < 1e-12); // rounding
         assert!((lagrange(&power(1), 14.0)[0] - 9.0).abs() < 1e-12);
-        assert!((lagrange(&[[3.0]], 14.0)[0] - 3.0).abs() < 1e-15);
+        assert!((lagrange(&[Vector1::new(3.0)], 14.0)[0] - 3.0).abs() < 1e-15);
     }
 }

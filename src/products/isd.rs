@@ -20,6 +20,7 @@
 
 use std::path::Path;
 
+use nalgebra::Vector3;
 use serde::Serialize;
 use serde_json::{Value, json};
 
@@ -32,7 +33,8 @@ use super::{
 use crate::{
     constants::{MARS_IAU2000, NAIF_IAU_MARS, NAIF_MARS},
     error::Result,
-    geom::pushbroom::Distortion,
+    frames::{self, Frame, J2000},
+    geom::{attitude::continuous_quaternions, pushbroom::Distortion},
     instruments::{Instrument, NaifNames},
     stages::{
         reorient::geometric_tables,
@@ -209,11 +211,11 @@ fn isd(site: &SiteProducts, image: &ImageProducts) -> Isd {
     }
 }
 
-fn rotation(
+fn rotation<To: Frame>(
     tables: &CameraTables,
     frame: i32,
-    quaternions: &[[f64; 4]],
-    rates: &[[f64; 3]],
+    rotations: &[frames::Rotation<J2000, To>],
+    rates_rad_s: &[Vector3<f64>],
 ) -> Rotation {
     let (start, end) = ends(&tables.et_s);
     Rotation {
@@ -222,8 +224,8 @@ fn rotation(
         ck_table_end_time: end,
         ck_table_original_size: tables.et_s.len(),
         ephemeris_times: tables.et_s.clone(),
-        quaternions: quaternions.to_vec(),
-        angular_velocities: rates.to_vec(),
+        quaternions: continuous_quaternions(rotations.iter().map(frames::Rotation::matrix)),
+        angular_velocities: rates_rad_s.iter().map(|rate| (*rate).into()).collect(),
         reference_frame: NAIF_J2000,
         constant_frames: None,
         constant_rotation: None,
@@ -242,7 +244,14 @@ fn body_rotation(tables: &CameraTables) -> Rotation {
 fn instrument_pointing(tables: &CameraTables, naif: &NaifNames) -> Rotation {
     Rotation {
         constant_frames: Some([naif.instrument, naif.bus]),
-        constant_rotation: Some(tables.bus_to_camera.concat()),
+        constant_rotation: Some(
+            tables
+                .bus_to_camera
+                .matrix()
+                .transpose()
+                .as_slice()
+                .to_vec(),
+        ),
         ..rotation(
             tables,
             naif.bus,
@@ -252,10 +261,14 @@ fn instrument_pointing(tables: &CameraTables, naif: &NaifNames) -> Rotation {
     }
 }
 
-fn positions(et_s: &[f64], position_m: &[[f64; 3]], velocity_m_s: &[[f64; 3]]) -> Positions {
-    let km = |rows: &[[f64; 3]]| {
+fn positions(
+    et_s: &[f64],
+    position_m: &[Vector3<f64>],
+    velocity_m_s: &[Vector3<f64>],
+) -> Positions {
+    let km = |rows: &[Vector3<f64>]| {
         rows.iter()
-            .map(|row| row.map(|value| value / METRES_PER_KM))
+            .map(|row| (row / METRES_PER_KM).into())
             .collect()
     };
     let (start, end) = ends(et_s);

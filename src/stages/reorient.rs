@@ -2,7 +2,7 @@
 
 use std::sync::atomic::AtomicBool;
 
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::Vector3;
 
 use super::{
     adjust::Adjusted,
@@ -16,7 +16,7 @@ use crate::{
     error::{Fault, Kind, Result},
     frames::{MarsIau2000, Position, Rotation},
     geom::{
-        attitude::{make_continuous, matrix_of_rotation_vector, spice_quaternion},
+        attitude::matrix_of_rotation_vector,
         lagrange::lagrange,
         mars_rotation::mars_rotation,
         pushbroom::{ExteriorOrientation, Pose, SampledOrientation, SamplesFault},
@@ -102,6 +102,7 @@ stage_inputs! {
 
 impl Stage for Reorient<'_> {
     const NAME: &'static str = "reorient";
+    const METHOD: u32 = 2;
     type Output = Orientation;
     stage_inputs!(fingerprint);
 
@@ -183,14 +184,12 @@ pub fn geometric_tables(orientation: &Orientation) -> Result<CameraTables> {
         let et = Et::from_seconds(tables.et_s[row]);
         let from_mars = mars_rotation::<MarsIau2000>(et).matrix().transpose();
         let offset_rate_m_s = residual.moving(et.seconds()).1.advance_m;
-        let spin = Vector3::from(tables.mars_angular_velocity_rad_s[row]);
+        let spin = tables.mars_angular_velocity_rad_s[row];
         let in_j2000_m = from_mars * offset_m(et);
         let position_m = from_mars * (nodes.camera(et).position.xyz_m + offset_m(et));
-        let velocity_m_s = Vector3::from(tables.velocity_m_s[row])
-            + from_mars * offset_rate_m_s
-            + spin.cross(&in_j2000_m);
-        tables.position_m[row] = position_m.into();
-        tables.velocity_m_s[row] = velocity_m_s.into();
+        tables.position_m[row] = position_m;
+        tables.velocity_m_s[row] += from_mars * offset_rate_m_s;
+        tables.velocity_m_s[row] += spin.cross(&in_j2000_m);
     }
     Ok(tables)
 }
@@ -312,14 +311,16 @@ impl<F: Fn(f64) -> LineCorrection> Corrected<'_, F> {
         let rows: Vec<usize> = (0..=last)
             .filter(|row| known.contains(&place(original.et_s[*row] + self.shift_s())))
             .collect();
-        let kept = |values: &[[f64; 4]]| rows.iter().map(|row| values[*row]).collect();
         let mut tables = CameraTables {
             et_s: rows.iter().map(|row| original.et_s[*row]).collect(),
             position_m: Vec::new(),
             velocity_m_s: Vec::new(),
             inertial_to_bus: Vec::new(),
             bus_angular_velocity_rad_s: Vec::new(),
-            inertial_to_mars: kept(&original.inertial_to_mars),
+            inertial_to_mars: rows
+                .iter()
+                .map(|row| original.inertial_to_mars[*row])
+                .collect(),
             mars_angular_velocity_rad_s: rows
                 .iter()
                 .map(|row| original.mars_angular_velocity_rad_s[*row])
@@ -330,7 +331,6 @@ impl<F: Fn(f64) -> LineCorrection> Corrected<'_, F> {
             let at = place(original.et_s[*row] + self.shift_s());
             self.push_node(&mut tables, original, *row, at)?;
         }
-        make_continuous(&mut tables.inertial_to_bus);
         let sun_at =
             [rows.first(), rows.last()].map(|row| row.map_or(0.0, |row| *row as f64 / last as f64));
         tables.sun_position_m = sun_at.map(|at| lagrange(&original.sun_position_m, at));
@@ -358,14 +358,13 @@ impl<F: Fn(f64) -> LineCorrection> Corrected<'_, F> {
         let camera = self.camera(tag, Convention::Apparent)?;
         let [to_mars, to_mars_then] =
             [tag, et].map(|et| *mars_rotation::<MarsIau2000>(et).matrix());
-        let bus_to_camera = Matrix3::from_fn(|row, column| tables.bus_to_camera[row][column]);
         let to_camera = camera.to_mars.matrix().transpose() * to_mars;
-        let to_bus = bus_to_camera.transpose() * to_camera;
+        let to_bus = tables.bus_to_camera.matrix().transpose() * to_camera;
         let (drift_m_s, turn_rad_s) = self.rates(self.image.line_offset(tag))?;
-        let spin = Vector3::from(original.mars_angular_velocity_rad_s[row]);
-        let old_position_m = Vector3::from(lagrange(&original.position_m, at));
-        let old_velocity_m_s = Vector3::from(lagrange(&original.velocity_m_s, at));
-        let old_turn_rad_s = Vector3::from(lagrange(&original.bus_angular_velocity_rad_s, at));
+        let spin = original.mars_angular_velocity_rad_s[row];
+        let old_position_m = lagrange(&original.position_m, at);
+        let old_velocity_m_s = lagrange(&original.velocity_m_s, at);
+        let old_turn_rad_s = lagrange(&original.bus_angular_velocity_rad_s, at);
         // Velocities relative to Mars are the same at the tag and at the kernels' instant.
         let over_ground_m_s = to_mars_then * (old_velocity_m_s - spin.cross(&old_position_m));
         let position_m = to_mars.transpose() * camera.position.xyz_m;
@@ -374,10 +373,10 @@ impl<F: Fn(f64) -> LineCorrection> Corrected<'_, F> {
         // To first order in θ, which leaves 1e-3 of a rate that is small itself.
         let bus_rad_s = to_mars.transpose() * (to_mars_then * old_turn_rad_s)
             - to_camera.transpose() * turn_rad_s;
-        tables.position_m.push(position_m.into());
-        tables.velocity_m_s.push(velocity_m_s.into());
-        tables.inertial_to_bus.push(spice_quaternion(&to_bus));
-        tables.bus_angular_velocity_rad_s.push(bus_rad_s.into());
+        tables.position_m.push(position_m);
+        tables.velocity_m_s.push(velocity_m_s);
+        tables.inertial_to_bus.push(Rotation::new(to_bus, tag));
+        tables.bus_angular_velocity_rad_s.push(bus_rad_s);
         Ok(())
     }
 

@@ -45,6 +45,7 @@ stage_inputs! {
 
 impl Stage for SampleOrientation<'_> {
     const NAME: &'static str = "sample_orientation";
+    const METHOD: u32 = 2;
     const CHECKED: bool = true;
     type Output = Orientation;
     stage_inputs!(fingerprint);

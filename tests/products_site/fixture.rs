@@ -9,9 +9,9 @@ use areograph::{
         WindowConfig, usual_instrument,
     },
     footprints::{Footprint, Footprints, SourceFile},
-    frames::{MarsDatum, MarsIau2000, Position, Rotation},
+    frames::{Frame, MarsDatum, MarsIau2000, Position, Rotation},
     geom::{
-        attitude::OmegaPhiKappa,
+        attitude::{OmegaPhiKappa, matrix_of_spice_quaternion},
         ellipsoid::Spherical,
         pushbroom::ExteriorOrientation,
         statistics::{Summary, Trend},
@@ -36,7 +36,7 @@ use areograph::{
     },
     time::{Et, Interval, Intervals},
 };
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Vector3};
 
 /// Shots of the profile; one in ten seconds lies on either side of the antimeridian.
 pub(crate) const SHOTS: u32 = 60;
@@ -355,19 +355,18 @@ fn orientation(times: &ImageTimes) -> Orientation {
                 .to_vec(),
         ),
         tables: CameraTables {
-            position_m: vec![[-1_745_703.3, 1_342_962.3, -3_030_553.6]; nodes],
-            velocity_m_s: vec![[-2_248.8, 1_571.6, 1_992.2]; nodes],
-            sun_position_m: [[-3.2e10, 1.9e11, 8.9e10]; 2],
-            sun_velocity_m_s: [[-24_866.9, -5_461.1, -1_832.5]; 2],
-            inertial_to_bus: vec![[0.9, -0.1, -0.3, 0.3]; nodes],
-            bus_angular_velocity_rad_s: vec![[5e-4, 7e-4, 8e-6]; nodes],
-            inertial_to_mars: vec![[0.95, -0.2, -0.2, 0.0]; nodes],
-            mars_angular_velocity_rad_s: vec![[3e-5, -3e-5, 6e-5]; nodes],
-            bus_to_camera: [
-                [1.0, 0.003, 0.001],
-                [-0.003, 1.0, 0.002],
-                [-0.001, -0.002, 1.0],
-            ],
+            position_m: vec![Vector3::new(-1_745_703.3, 1_342_962.3, -3_030_553.6); nodes],
+            velocity_m_s: vec![Vector3::new(-2_248.8, 1_571.6, 1_992.2); nodes],
+            sun_position_m: [Vector3::new(-3.2e10, 1.9e11, 8.9e10); 2],
+            sun_velocity_m_s: [Vector3::new(-24_866.9, -5_461.1, -1_832.5); 2],
+            inertial_to_bus: turned(&et_s, [0.9, -0.1, -0.3, 0.3]),
+            bus_angular_velocity_rad_s: vec![Vector3::new(5e-4, 7e-4, 8e-6); nodes],
+            inertial_to_mars: turned(&et_s, [0.95, -0.2, -0.2, 0.0]),
+            mars_angular_velocity_rad_s: vec![Vector3::new(3e-5, -3e-5, 6e-5); nodes],
+            bus_to_camera: Rotation::new(
+                Matrix3::new(1.0, 0.003, 0.001, -0.003, 1.0, 0.002, -0.001, -0.002, 1.0),
+                Et::from_seconds(START_S),
+            ),
             interpolation: InterpolationCheck {
                 error_max_px: 0.002,
                 epochs: 117,
@@ -377,6 +376,14 @@ fn orientation(times: &ImageTimes) -> Orientation {
         notes: Vec::new(),
         invalid_because: Vec::new(),
     }
+}
+
+/// The same rotation at every epoch.
+fn turned<A: Frame, B: Frame>(et_s: &[f64], quaternion: [f64; 4]) -> Vec<Rotation<A, B>> {
+    let matrix = matrix_of_spice_quaternion(quaternion);
+    et_s.iter()
+        .map(|et_s| Rotation::new(matrix, Et::from_seconds(*et_s)))
+        .collect()
 }
 
 fn footprints() -> Footprints<MarsIau2000> {

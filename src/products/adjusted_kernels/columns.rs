@@ -10,7 +10,7 @@ use crate::{
     error::Result,
     frames::{MarsIau2000, Position},
     geom::{
-        attitude::{continuous_quaternions, matrix_of_spice_quaternion},
+        attitude::continuous_quaternions,
         lagrange::lagrange,
         mars_rotation::mars_rotation,
         pushbroom::{ExteriorOrientation, Pose, SampledOrientation},
@@ -199,7 +199,7 @@ impl Source<'_> {
             samples, tables, ..
         } = self.image.orientation;
         let last = tables.et_s.len().saturating_sub(1);
-        let bus_to_camera = Matrix3::from_fn(|row, column| tables.bus_to_camera[row][column]);
+        let bus_to_camera = tables.bus_to_camera.matrix();
         let start_s = tables.et_s.first().copied().unwrap_or_default();
         let step_s =
             (tables.et_s.last().copied().unwrap_or_default() - start_s) / last.max(1) as f64;
@@ -210,13 +210,13 @@ impl Source<'_> {
             Node {
                 exposure: sample.et,
                 to_bus: bus_to_camera.transpose() * mars_to_camera * to_mars,
-                rate_rad_s: lagrange(&tables.bus_angular_velocity_rad_s, at).into(),
+                rate_rad_s: lagrange(&tables.bus_angular_velocity_rad_s, at),
             }
         };
         let of_table = |row: usize| Node {
             exposure: Et::from_seconds(tables.et_s[row]),
-            to_bus: matrix_of_spice_quaternion(tables.inertial_to_bus[row]),
-            rate_rad_s: tables.bus_angular_velocity_rad_s[row].into(),
+            to_bus: *tables.inertial_to_bus[row].matrix(),
+            rate_rad_s: tables.bus_angular_velocity_rad_s[row],
         };
         let is_sample = |et_s: f64| {
             let mut samples = samples.iter();

@@ -1,14 +1,14 @@
 //! Tables of an orientation for camera models, and how well they are interpolated.
 
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{Matrix3, Vector3, Vector4};
 use serde::{Deserialize, Serialize};
 
 use crate::{
     constants::MARS_IAU2000,
     error::Result,
-    frames::{CameraFrame, MarsIau2000, Position, Rotation},
+    frames::{CameraFrame, J2000, MarsIau2000, MgsBus, Position, Rotation},
     geom::{
-        attitude::{make_continuous, matrix_of_spice_quaternion, spice_quaternion},
+        attitude::{continuous_quaternions, matrix_of_spice_quaternion},
         lagrange::lagrange,
         statistics::largest,
     },
@@ -27,23 +27,23 @@ pub struct CameraTables {
     /// Epochs, ET seconds.
     pub et_s: Vec<f64>,
     /// Mars to spacecraft, J2000, LT+S, metres.
-    pub position_m: Vec<[f64; 3]>,
+    pub position_m: Vec<Vector3<f64>>,
     /// Velocity, metres per second.
-    pub velocity_m_s: Vec<[f64; 3]>,
+    pub velocity_m_s: Vec<Vector3<f64>>,
     /// Mars to Sun, J2000, LT+S, metres, at the first and the last epoch.
-    pub sun_position_m: [[f64; 3]; 2],
+    pub sun_position_m: [Vector3<f64>; 2],
     /// Velocity of the Sun from Mars, metres per second, at the same epochs.
-    pub sun_velocity_m_s: [[f64; 3]; 2],
-    /// J2000 → bus, read with the pointing bias, (w, x, y, z), continuous.
-    pub inertial_to_bus: Vec<[f64; 4]>,
+    pub sun_velocity_m_s: [Vector3<f64>; 2],
+    /// J2000 → bus, read with the pointing bias.
+    pub inertial_to_bus: Vec<Rotation<J2000, MgsBus>>,
     /// Angular velocity of the bus in J2000, radians per second.
-    pub bus_angular_velocity_rad_s: Vec<[f64; 3]>,
-    /// J2000 → IAU 2000, (w, x, y, z), continuous.
-    pub inertial_to_mars: Vec<[f64; 4]>,
+    pub bus_angular_velocity_rad_s: Vec<Vector3<f64>>,
+    /// J2000 → IAU 2000.
+    pub inertial_to_mars: Vec<Rotation<J2000, MarsIau2000>>,
     /// Angular velocity of Mars in J2000, radians per second.
-    pub mars_angular_velocity_rad_s: Vec<[f64; 3]>,
-    /// Bus → camera by rows.
-    pub bus_to_camera: [[f64; 3]; 3],
+    pub mars_angular_velocity_rad_s: Vec<Vector3<f64>>,
+    /// Bus → camera, at the first epoch.
+    pub bus_to_camera: Rotation<MgsBus, CameraFrame>,
     /// How well the tables are interpolated over the image.
     pub interpolation: InterpolationCheck,
 }
@@ -103,47 +103,39 @@ pub(in crate::stages) struct Camera {
 pub(in crate::stages) struct Nodes {
     start_s: f64,
     step_s: f64,
-    position_m: Vec<[f64; 3]>,
-    camera_to_mars: Vec<[f64; 4]>,
+    position_m: Vec<Vector3<f64>>,
+    /// Quaternions (w, x, y, z), continuous.
+    camera_to_mars: Vec<Vector4<f64>>,
 }
 
 impl Nodes {
     /// Nodes of `tables`, which hold two or more.
     pub(in crate::stages) fn new(tables: &CameraTables) -> Self {
-        let bus_to_camera = Matrix3::from_fn(|row, column| tables.bus_to_camera[row][column]);
-        let matrices: Vec<(Matrix3<f64>, Matrix3<f64>)> = tables
-            .inertial_to_mars
-            .iter()
+        let bus_to_camera = tables.bus_to_camera.matrix();
+        let rotations = || tables.inertial_to_mars.iter().map(Rotation::matrix);
+        let camera_to_mars: Vec<Matrix3<f64>> = rotations()
             .zip(&tables.inertial_to_bus)
-            .map(|(to_mars, to_bus)| {
-                let to_camera = bus_to_camera * matrix_of_spice_quaternion(*to_bus);
-                (matrix_of_spice_quaternion(*to_mars), to_camera)
-            })
+            .map(|(to_mars, to_bus)| to_mars * (bus_to_camera * to_bus.matrix()).transpose())
             .collect();
-        let mut camera_to_mars: Vec<[f64; 4]> = matrices
-            .iter()
-            .map(|(to_mars, to_camera)| spice_quaternion(&(to_mars * to_camera.transpose())))
-            .collect();
-        make_continuous(&mut camera_to_mars);
+        let quaternions = continuous_quaternions(&camera_to_mars).into_iter();
         let last = tables.et_s.len() - 1;
         Self {
             start_s: tables.et_s[0],
             step_s: (tables.et_s[last] - tables.et_s[0]) / last as f64,
-            position_m: matrices
-                .iter()
+            position_m: rotations()
                 .zip(&tables.position_m)
-                .map(|((to_mars, _), position_m)| (to_mars * Vector3::from(*position_m)).into())
+                .map(|(to_mars, position_m)| to_mars * position_m)
                 .collect(),
-            camera_to_mars,
+            camera_to_mars: quaternions.map(Vector4::from).collect(),
         }
     }
 
     /// The camera between the nodes.
     pub(in crate::stages) fn camera(&self, et: Et) -> Camera {
         let at = (et.seconds() - self.start_s) / self.step_s;
-        let camera_to_mars = matrix_of_spice_quaternion(lagrange(&self.camera_to_mars, at));
+        let camera_to_mars = matrix_of_spice_quaternion(lagrange(&self.camera_to_mars, at).into());
         Camera {
-            position: Position::new(lagrange(&self.position_m, at).into()),
+            position: Position::new(lagrange(&self.position_m, at)),
             to_mars: Rotation::new(camera_to_mars, et),
         }
     }

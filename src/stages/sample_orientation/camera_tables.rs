@@ -7,10 +7,7 @@ use crate::{
     constants::MARS_IAU2000,
     error::Result,
     frames::MarsIau2000,
-    geom::{
-        attitude::{make_continuous, spice_quaternion},
-        mars_rotation::mars_rotation,
-    },
+    geom::mars_rotation::mars_rotation,
     stages::{
         orientation::{Camera, CameraTables, InterpolationCheck},
         tag_times::ImageTimes,
@@ -71,13 +68,13 @@ fn tables(reader: &Reader, epochs: &[Et]) -> Result<CameraTables> {
         et_s: Vec::new(),
         position_m: Vec::new(),
         velocity_m_s: Vec::new(),
-        sun_position_m: suns.map(|sun| sun.position.xyz_m.into()),
-        sun_velocity_m_s: suns.map(|sun| sun.velocity_m_s.into()),
+        sun_position_m: suns.map(|sun| sun.position.xyz_m),
+        sun_velocity_m_s: suns.map(|sun| sun.velocity_m_s),
         inertial_to_bus: Vec::new(),
         bus_angular_velocity_rad_s: Vec::new(),
         inertial_to_mars: Vec::new(),
         mars_angular_velocity_rad_s: Vec::new(),
-        bus_to_camera: rows(session.mounting(reader.instrument, first)?.matrix()),
+        bus_to_camera: session.mounting(reader.instrument, first)?,
         interpolation: InterpolationCheck::default(),
     };
     for epoch in epochs {
@@ -85,23 +82,17 @@ fn tables(reader: &Reader, epochs: &[Et]) -> Result<CameraTables> {
         let attitude = reader.attitude(*epoch)?;
         let to_mars = mars_rotation::<MarsIau2000>(*epoch);
         tables.et_s.push(epoch.seconds());
-        tables.position_m.push(apparent.position.xyz_m.into());
-        tables.velocity_m_s.push(apparent.velocity_m_s.into());
-        tables
-            .inertial_to_bus
-            .push(spice_quaternion(attitude.inertial_to_bus.matrix()));
+        tables.position_m.push(apparent.position.xyz_m);
+        tables.velocity_m_s.push(apparent.velocity_m_s);
+        tables.inertial_to_bus.push(attitude.inertial_to_bus);
         tables
             .bus_angular_velocity_rad_s
-            .push(attitude.angular_velocity_rad_s.into());
-        tables
-            .inertial_to_mars
-            .push(spice_quaternion(to_mars.matrix()));
+            .push(attitude.angular_velocity_rad_s);
+        tables.inertial_to_mars.push(to_mars);
         tables
             .mars_angular_velocity_rad_s
-            .push(mars_angular_velocity(to_mars.matrix()).into());
+            .push(mars_angular_velocity(to_mars.matrix()));
     }
-    make_continuous(&mut tables.inertial_to_bus);
-    make_continuous(&mut tables.inertial_to_mars);
     Ok(tables)
 }
 
@@ -109,10 +100,6 @@ fn tables(reader: &Reader, epochs: &[Et]) -> Result<CameraTables> {
 fn mars_angular_velocity(inertial_to_mars: &Matrix3<f64>) -> Vector3<f64> {
     let rate_rad_s = MARS_IAU2000.meridian_deg_per_day * RADIANS_PER_DEGREE / SECONDS_PER_DAY;
     inertial_to_mars.row(2).transpose() * rate_rad_s
-}
-
-fn rows(matrix: &Matrix3<f64>) -> [[f64; 3]; 3] {
-    std::array::from_fn(|row| std::array::from_fn(|column| matrix[(row, column)]))
 }
 
 /// What the kernels say of the camera, its position with light time and aberration as the tables have it.
