@@ -22,7 +22,7 @@
 //! use areograph::geom::{
 //!     bundle::{BundleImage, BundleOptions, BundlePoint, Network, View, solve},
 //!     collinearity::project,
-//!     pushbroom::{EulerPolynomial, Sighting, VectorPolynomial},
+//!     pushbroom::{Distortion, EulerPolynomial, Sighting, VectorPolynomial},
 //! };
 //! use nalgebra::{Vector2, Vector3};
 //!
@@ -56,6 +56,7 @@
 //!         half_lines: 2_000.0,
 //!         line_period_s: 1.4e-3,
 //!         focal_length_px,
+//!         distortion: Distortion::NONE,
 //!         sigmas,
 //!         time_bias_sigma_s: 0.0,
 //!     });
@@ -64,7 +65,7 @@
 //!     let ground_m = Vector3::new(3_396e3, 300.0 * f64::from(point), 1_500.0 * (f64::from(point) - 2.0));
 //!     network.points.push(BundlePoint { ground_m, sigma_m: None });
 //!     for (image, camera) in truth.iter().enumerate() {
-//!         let seen = Sighting::near(camera, 0.0, &ground_m, 1e-3)?.solution;
+//!         let seen = Sighting::near(camera, &Distortion::NONE, 0.0, &ground_m, 1e-3)?.solution;
 //!         network.views.push(View {
 //!             point: point as usize,
 //!             image,
