@@ -50,7 +50,7 @@ pub(super) const BUS_FRAME: Need = Need {
 pub(super) fn camera_frame(instrument: &Instrument) -> Need {
     Need {
         variable: format!("FRAME_{}_NAME", instrument.naif.instrument).into(),
-        what: format!("the frame of the camera {}", instrument.name).into(),
+        what: format!("the frame of the {} camera", instrument.name).into(),
         kernel: format!("instrument kernel of {} (.ti)", instrument.name).into(),
         example: instrument.naif.kernel.clone().into(),
     }
