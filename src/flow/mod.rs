@@ -1,7 +1,7 @@
 //! The data flow: kernels → times → footprints → IAU 2000 → ranges → orientation → model → registration →
 //! adjustment → products.
 //!
-//! [`site`] is one description of it, read top to bottom. A driver says what becomes of each stage: a run makes or
+//! `flow/site.rs` is one description of it, read top to bottom. A driver says what becomes of each stage: a run makes or
 //! keeps its output, a plan looks whether it would be kept, a check runs what tells whether a run can succeed.
 
 mod check;

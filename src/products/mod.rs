@@ -1,6 +1,6 @@
 //! Rows become the files that people's tools read; every file is read back before it counts.
 //!
-//! A product is a [`Declaration`](product::Declaration) in its file and a line of the [registry](registry); the
+//! A product is a `Declaration` in its file and a line of the registry; the
 //! files, the manifest's entries, the STAC item, `exchange/README.txt` and `docs/products.md` follow from it.
 //!
 //! The same site gives the same bytes; nothing here looks at a clock.
