@@ -207,7 +207,7 @@ fn what_is_missing_in_a_folder_is_named() {
     let failure = text(&selection);
     assert!(
         failure
-            .contains("no kernel in this folder defines the frame of the camera MOC narrow angle"),
+            .contains("no kernel in this folder defines the frame of the MOC narrow angle camera"),
         "{failure}"
     );
     selection.root = temporary.path().join("absent");
