@@ -1,7 +1,7 @@
 //! areograph: Mars Global Surveyor data preparation, from SPICE kernels, MOLA shots and MOC images
 //! to validated, photogrammetry-ready products.
 //!
-//! The way of the data is [`flow::run_site`], read top to bottom; `ARCHITECTURE.md` is the map.
+//! [`flow::run_site`] runs a site; `flow/site.rs` tells how, read top to bottom; `ARCHITECTURE.md` is the map.
 
 pub mod altimetry;
 pub mod cli;

@@ -264,7 +264,8 @@ fn after_a_change_of_any_key_a_run_gives_what_a_clean_run_gives() {
             untried.push(key.path);
         }
     }
-    // What is left names files or identifiers, or excludes keys that the site has; the walk changes these.
+    // No other value follows from a declaration that names a file, an identifier or a clock string, or from a table
+    // that the site does not have: those keys are printed, and not tried.
     println!("{tried} keys tried; not tried: {untried:?}");
     assert!(tried >= 50, "{tried} keys tried; not tried: {untried:?}");
 }
