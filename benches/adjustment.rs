@@ -126,9 +126,9 @@ fn document(
             .unwrap()
             .solution
             .x;
-        let (pose, motion) = base.moving(x_lines);
+        let (pose, motion) = base.pose_and_rate(x_lines);
         let rows: [[f64; 3]; 3] = pose.mars_to_camera.transpose().into();
-        let (initial, advance) = base.moving(view.x_lines);
+        let (initial, advance) = base.pose_and_rate(view.x_lines);
         let camera_m = initial.camera_vector_m(&network.points[view.point].ground_m);
         let rate_m = advance.camera_vector_rate_m(&initial, &camera_m);
         let focal_length_px = network.images[view.image].focal_length_px;

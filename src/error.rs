@@ -1,7 +1,7 @@
 //! What can go wrong, and where: one wrapper adds the place, each room's own enum says the cause.
 //!
-//! A cause is a [`Fault`]: it knows its [`Kind`] (hence the exit code) and what to do about it.
-//! [`Failure`] carries it upwards and collects site, stage and file on the way.
+//! A cause is a [`Cause`]: it knows its [`Kind`] (hence the exit code) and what to do about it.
+//! [`Error`] carries it upwards and collects site, stage and file on the way.
 
 use std::{
     fmt,
@@ -13,7 +13,7 @@ use std::{
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 #[repr(u8)]
 pub enum Kind {
-    /// A fault of areograph itself.
+    /// A bug in areograph.
     Bug = 1,
     /// Command line or configuration.
     Configuration = 2,
@@ -38,16 +38,16 @@ impl Kind {
 }
 
 /// A cause of failure, with its kind and advice.
-pub trait Fault: std::error::Error + Send + Sync + 'static {
+pub trait Cause: std::error::Error + Send + Sync + 'static {
     /// Which kind of failure this is.
     fn kind(&self) -> Kind;
     /// What the user can do about it, one sentence.
     fn advice(&self) -> String;
 }
 
-/// A fault together with the place where it happened.
+/// A cause together with the place where it happened.
 #[derive(Debug)]
-pub struct Failure {
+pub struct Error {
     /// Site, once the flow knows it.
     pub site: Option<String>,
     /// Stage of the flow, for a stage of one image followed by `/` and the image.
@@ -55,17 +55,17 @@ pub struct Failure {
     /// File that was read or written.
     pub file: Option<PathBuf>,
     /// The cause.
-    pub fault: Box<dyn Fault>,
+    pub cause: Box<dyn Cause>,
 }
 
-impl Failure {
+impl Error {
     /// A failure whose place is not known yet.
-    pub fn new(fault: impl Fault) -> Self {
+    pub fn new(error: impl Cause) -> Self {
         Self {
             site: None,
             stage: None,
             file: None,
-            fault: Box::new(fault),
+            cause: Box::new(error),
         }
     }
 
@@ -93,17 +93,17 @@ impl Failure {
     /// The kind of the cause.
     #[must_use]
     pub fn kind(&self) -> Kind {
-        self.fault.kind()
+        self.cause.kind()
     }
 }
 
-impl<F: Fault> From<F> for Failure {
-    fn from(fault: F) -> Self {
-        Self::new(fault)
+impl<F: Cause> From<F> for Error {
+    fn from(error: F) -> Self {
+        Self::new(error)
     }
 }
 
-impl fmt::Display for Failure {
+impl fmt::Display for Error {
     /// `site/stage: file: cause`, then a second line with the advice.
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         match (&self.site, &self.stage) {
@@ -115,8 +115,8 @@ impl fmt::Display for Failure {
         if let Some(file) = &self.file {
             write!(formatter, "{}: ", file.display())?;
         }
-        write!(formatter, "{}", self.fault)?;
-        let advice = self.fault.advice();
+        write!(formatter, "{}", self.cause)?;
+        let advice = self.cause.advice();
         if !advice.is_empty() {
             write!(formatter, "\n  what to do: {advice}")?;
         }
@@ -125,28 +125,28 @@ impl fmt::Display for Failure {
 }
 
 /// What fallible functions above the lowest floor return.
-pub type Result<T> = std::result::Result<T, Failure>;
+pub type Result<T> = std::result::Result<T, Error>;
 
 /// Adds the place to a result on its way up.
-pub trait Place<T> {
-    /// See [`Failure::in_file`].
+pub trait Locate<T> {
+    /// See [`Error::in_file`].
     ///
     /// # Errors
     /// The same failure, with its place.
     fn in_file(self, file: impl Into<PathBuf>) -> Result<T>;
-    /// See [`Failure::in_stage`].
+    /// See [`Error::in_stage`].
     ///
     /// # Errors
     /// The same failure, with its place.
     fn in_stage(self, stage: &str) -> Result<T>;
-    /// See [`Failure::in_site`].
+    /// See [`Error::in_site`].
     ///
     /// # Errors
     /// The same failure, with its place.
     fn in_site(self, site: &str) -> Result<T>;
 }
 
-impl<T, E: Into<Failure>> Place<T> for std::result::Result<T, E> {
+impl<T, E: Into<Error>> Locate<T> for std::result::Result<T, E> {
     fn in_file(self, file: impl Into<PathBuf>) -> Result<T> {
         self.map_err(|error| error.into().in_file(file))
     }
@@ -163,21 +163,21 @@ impl<T, E: Into<Failure>> Place<T> for std::result::Result<T, E> {
 /// The operating system refused a file operation.
 #[derive(Debug, thiserror::Error)]
 #[error("cannot {action}: {source}")]
-pub struct IoFault {
+pub struct IoError {
     /// What was tried, for example "read" or "rename into place".
     pub action: &'static str,
     /// The system's reason.
     pub source: std::io::Error,
 }
 
-impl IoFault {
-    /// For `map_err`: `File::open(path).map_err(IoFault::on("open")).in_file(path)?`.
+impl IoError {
+    /// For `map_err`: `File::open(path).map_err(IoError::on("open")).in_file(path)?`.
     pub fn on(action: &'static str) -> impl Fn(std::io::Error) -> Self {
         move |source| Self { action, source }
     }
 }
 
-impl Fault for IoFault {
+impl Cause for IoError {
     fn kind(&self) -> Kind {
         Kind::Io
     }
@@ -203,14 +203,14 @@ impl Fault for IoFault {
 
 /// The user stopped the program, and the stage at work gave up.
 #[derive(Debug, thiserror::Error)]
-#[error("stopped before its end")]
+#[error("interrupted")]
 pub struct Stopped;
 
 impl Stopped {
     /// For long loops, before each part of their work.
     ///
     /// # Errors
-    /// This fault, once `stop` is set.
+    /// This error, once `stop` is set.
     pub fn check(stop: &AtomicBool) -> std::result::Result<(), Self> {
         if stop.load(Ordering::Relaxed) {
             Err(Self)
@@ -220,7 +220,7 @@ impl Stopped {
     }
 }
 
-impl Fault for Stopped {
+impl Cause for Stopped {
     fn kind(&self) -> Kind {
         Kind::Interrupted
     }
@@ -236,8 +236,8 @@ mod tests {
 
     #[test]
     fn a_failure_names_its_whole_place_and_its_advice() {
-        let fault = IoFault::on("read")(std::io::ErrorKind::NotFound.into());
-        let failure = Failure::from(fault)
+        let error = IoError::on("read")(std::io::ErrorKind::NotFound.into());
+        let failure = Error::from(error)
             .in_file("ap19019k.b")
             .in_stage("search_footprints")
             .in_site("gusev")

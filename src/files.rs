@@ -10,7 +10,7 @@ use std::{
 
 use rayon::prelude::*;
 
-use crate::error::{Fault, IoFault, Kind, Place, Result, Stopped};
+use crate::error::{Cause, IoError, Kind, Locate, Result, Stopped};
 
 /// A file as it was when it was first read.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -59,7 +59,7 @@ struct ChangedFile {
     is: String,
 }
 
-impl Fault for ChangedFile {
+impl Cause for ChangedFile {
     fn kind(&self) -> Kind {
         Kind::Input
     }
@@ -134,7 +134,7 @@ impl InputFiles {
 }
 
 fn identity(path: &Path) -> Result<Identity> {
-    let metadata = path.metadata().map_err(IoFault::on("open")).in_file(path)?;
+    let metadata = path.metadata().map_err(IoError::on("open")).in_file(path)?;
     Ok(Identity::of(&metadata))
 }
 
@@ -156,10 +156,10 @@ fn unchanged(earlier: &HashedFile, now: &HashedFile) -> Result<()> {
 pub fn hash_file(path: &Path) -> Result<(String, u64)> {
     let mut hasher = blake3::Hasher::new();
     let file = File::open(path)
-        .map_err(IoFault::on("open"))
+        .map_err(IoError::on("open"))
         .in_file(path)?;
     let bytes = std::io::copy(&mut &file, &mut hasher)
-        .map_err(IoFault::on("read"))
+        .map_err(IoError::on("read"))
         .in_file(path)?;
     Ok((hasher.finalize().to_hex().to_string(), bytes))
 }

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::error::{Fault, Kind};
+use crate::error::{Cause, Kind};
 
 /// A point measured in images; its ground coordinates are not known.
 ///
@@ -71,7 +71,7 @@ pub struct UnknownImage {
     pub images: usize,
 }
 
-impl Fault for UnknownImage {
+impl Cause for UnknownImage {
     fn kind(&self) -> Kind {
         Kind::Bug
     }

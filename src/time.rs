@@ -179,20 +179,20 @@ impl Intervals {
         &self.0
     }
 
-    /// Whether one interval holds all of `wanted`.
+    /// Whether one interval holds all of `required`.
     #[must_use]
-    pub fn cover(&self, wanted: Interval) -> bool {
+    pub fn cover(&self, required: Interval) -> bool {
         self.0
             .iter()
-            .any(|held| held.start <= wanted.start && wanted.stop <= held.stop)
+            .any(|held| held.start <= required.start && required.stop <= held.stop)
     }
 
-    /// The parts of `wanted` that no interval holds, in order of time.
+    /// The parts of `required` that no interval holds, in order of time.
     #[must_use]
-    pub fn gaps_in(&self, wanted: Interval) -> Vec<Interval> {
+    pub fn gaps_in(&self, required: Interval) -> Vec<Interval> {
         let mut gaps = Vec::new();
-        let mut reached = wanted.start;
-        for held in self.0.iter().filter(|held| held.overlaps(wanted)) {
+        let mut reached = required.start;
+        for held in self.0.iter().filter(|held| held.overlaps(required)) {
             if held.start > reached {
                 gaps.push(Interval::new(reached, held.start));
             }
@@ -200,8 +200,8 @@ impl Intervals {
                 reached = held.stop;
             }
         }
-        if reached < wanted.stop {
-            gaps.push(Interval::new(reached, wanted.stop));
+        if reached < required.stop {
+            gaps.push(Interval::new(reached, required.stop));
         }
         gaps
     }

@@ -12,7 +12,9 @@ mod scene;
 
 use areograph::geom::{
     attitude::{OmegaPhiKappa, rotation_vector},
-    bundle::{Adjustment, BundleImage, BundleOptions, Dropped, Network, Residual, View, solve},
+    bundle::{
+        Adjustment, BundleImage, BundleOptions, Network, PointRejection, Residual, View, solve,
+    },
     polynomial::Polynomial,
     pushbroom::{
         CorrectedOrientation, EulerPolynomial, ExteriorOrientation, Pose, Projector,
@@ -366,7 +368,7 @@ fn two_time_biases_explain_the_disagreement() {
         .iter_mut()
         .for_each(|point| point.sigma_m = None);
     let adjustment = adjust(&network);
-    assert_eq!(adjustment.points[0], Err(Dropped::Undetermined));
+    assert_eq!(adjustment.points[0], Err(PointRejection::Undetermined));
     let biases: Vec<(f64, f64)> = adjustment
         .images
         .iter()
@@ -439,8 +441,11 @@ fn points_that_cannot_take_part_are_told() {
     network.views.remove(lost);
     network.points[tie + 1].ground_m *= 1.2;
     let adjustment = adjust(network);
-    assert_eq!(adjustment.points[tie], Err(Dropped::Undetermined));
-    assert_eq!(adjustment.points[tie + 1], Err(Dropped::BehindCamera));
+    assert_eq!(adjustment.points[tie], Err(PointRejection::Undetermined));
+    assert_eq!(
+        adjustment.points[tie + 1],
+        Err(PointRejection::BehindCamera)
+    );
     assert_eq!(adjustment.degrees_of_freedom(), 1_278);
     assert_eq!(
         adjustment
@@ -552,7 +557,7 @@ fn over_the_equator_it_adjusts_as_well_as_elsewhere() {
         }
         for tie in simulated.shots..simulated.points_m.len() {
             let error_m = adjustment.points[tie].unwrap().ground_m - simulated.points_m[tie];
-            assert!(error_m.norm() < 300.0, "{error_m}"); // as at Gusev: absolute position is not healed
+            assert!(error_m.norm() < 300.0, "{error_m}"); // as at Gusev: the absolute position is not corrected
         }
     }
 }

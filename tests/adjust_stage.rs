@@ -18,18 +18,18 @@ use areograph::{
     frames::Position,
     geom::{
         bundle::{BundleOptions, Network, View, solve},
+        oriented_camera::OrientedCamera,
         pushbroom::{
             CorrectedOrientation, Detector, Distortion, EulerPolynomial, OrientationCorrection,
             Projector, Sighting,
         },
         robust::RobustWeight,
         statistics::BAARDA_LIMIT,
-        stereo::StereoImage,
     },
     stages::{
         adjust::{
-            AdjustImage, Adjusted, LaserShot, LaserShots, LeftOutReason, ObservationType,
-            PointKind, ShotRange, adjust,
+            AdjustImage, Adjusted, LaserShot, LaserShots, ObservationType, PointKind,
+            RejectionReason, ShotRange, adjust,
         },
         intersect::{IntersectOptions, IntersectedTies, intersect_ties},
     },
@@ -50,13 +50,13 @@ struct Site {
     ties: Vec<TiePoint>,
 }
 
-fn stereo<M>(
+fn oriented_camera<M>(
     simulated: &Simulated<EulerPolynomial>,
     image: usize,
     orientation: M,
-) -> StereoImage<M> {
+) -> OrientedCamera<M> {
     let entry = &simulated.network.images[image];
-    StereoImage {
+    OrientedCamera {
         id: NAMES[image].to_owned(),
         orientation,
         detector: Detector {
@@ -79,7 +79,7 @@ impl Site {
             .iter()
             .enumerate()
             .map(|(index, image)| AdjustImage {
-                stereo: stereo(&simulated, index, image.base),
+                oriented_camera: oriented_camera(&simulated, index, image.base),
                 line_period_s: image.line_period_s,
                 sigmas: image.sigmas,
                 time_bias_sigma_s: 0.0,
@@ -115,7 +115,10 @@ impl Site {
                     .map(|view| TieMeasure {
                         image: view.image,
                         line: view.x_lines + network.images[view.image].half_lines,
-                        sample: images[view.image].stereo.detector.sample(view.y_px),
+                        sample: images[view.image]
+                            .oriented_camera
+                            .detector
+                            .sample(view.y_px),
                     })
                     .collect(),
             })
@@ -132,7 +135,7 @@ impl Site {
         let images: Vec<_> = self
             .images
             .iter()
-            .map(|image| image.stereo.clone())
+            .map(|image| image.oriented_camera.clone())
             .collect();
         intersect_ties(&images, &self.ties, &IntersectOptions::default()).unwrap()
     }
@@ -152,7 +155,7 @@ const HUBER: RobustWeight = RobustWeight::Huber {
     limit: RobustWeight::HUBER_LIMIT,
 };
 
-/// The defaults, but no tie point is left out.
+/// The defaults, but no tie point is rejected.
 fn every_tie() -> AdjustmentConfig {
     AdjustmentConfig {
         blunder_limit: None,
@@ -169,7 +172,7 @@ fn matched(site: &Site) -> AdjustmentConfig {
 }
 
 fn focal_px_per_line(simulated: &Simulated<EulerPolynomial>, image: usize) -> f64 {
-    let truth = stereo(simulated, image, simulated.orientations[image]);
+    let truth = oriented_camera(simulated, image, simulated.orientations[image]);
     truth.focal_px_per_line(0.0, &simulated.points_m[simulated.shots])
 }
 
@@ -186,7 +189,7 @@ fn the_stage_gives_what_the_geometry_gives() {
         direct.degrees_of_freedom()
     );
     assert!((adjusted.summary.sigma0 / direct.sigma0() - 1.0).abs() < 1e-9); // sums in another order
-    assert!(adjusted.left_out.is_empty());
+    assert!(adjusted.rejected.is_empty());
     let redundancy: f64 = adjusted
         .summary
         .types
@@ -280,12 +283,12 @@ fn blunders_are_found_and_good_ties_kept() {
             entry.sample += 50.0 * (normals.uniform() - 0.5);
         }
         let tested = site.adjust(&options).unwrap();
-        for left_out in &tested.left_out {
+        for rejected in &tested.rejected {
             assert!(
-                matches!(left_out.reason, LeftOutReason::Blunder { .. }),
-                "{left_out:?}"
+                matches!(rejected.reason, RejectionReason::Blunder { .. }),
+                "{rejected:?}"
             );
-            let number: usize = left_out.id.trim_start_matches('T').parse().unwrap();
+            let number: usize = rejected.id.trim_start_matches('T').parse().unwrap();
             if wrong.contains(&(number - site.simulated.shots)) {
                 found += 1;
             } else {
@@ -432,9 +435,9 @@ fn ties_without_a_ground_point_are_listed() {
     let mut site = Site::of(Recipe::GUSEV);
     site.ties[0].measures.truncate(1);
     let adjusted = site.adjust(&every_tie()).unwrap();
-    assert_eq!(adjusted.left_out.len(), 1);
-    assert_eq!(adjusted.left_out[0].id, site.ties[0].id);
-    assert_eq!(adjusted.left_out[0].reason, LeftOutReason::NotIntersected);
+    assert_eq!(adjusted.rejected.len(), 1);
+    assert_eq!(adjusted.rejected[0].id, site.ties[0].id);
+    assert_eq!(adjusted.rejected[0].reason, RejectionReason::NotIntersected);
 }
 
 /// One draw of every observation from its own standard deviation about the truth.
@@ -539,7 +542,7 @@ fn the_result_is_kept_and_read_back() {
     // The corrected orientation puts the adjusted ties where they were measured, up to their residuals.
     for (index, image) in site.images.iter().enumerate() {
         let orientation = CorrectedOrientation {
-            base: image.stereo.orientation,
+            base: image.oriented_camera.orientation,
             correction: adjusted.correction(index),
         };
         let ties = adjusted
@@ -557,10 +560,16 @@ fn the_result_is_kept_and_read_back() {
             )
             .unwrap();
             let seen = seen.solution;
-            let focal = image.stereo.detector.focal_px(&seen.camera_m).unwrap();
+            let focal = image
+                .oriented_camera
+                .detector
+                .focal_px(&seen.camera_m)
+                .unwrap();
             // Lines count as pixels at the initial point: its height differs by less than 1 km in 400 km.
-            let lines_px =
-                (view.x_lines - seen.x) * image.stereo.focal_px_per_line(view.x_lines, &ground_m);
+            let lines_px = (view.x_lines - seen.x)
+                * image
+                    .oriented_camera
+                    .focal_px_per_line(view.x_lines, &ground_m);
             let difference_px = (lines_px - view.along_px.value).abs();
             assert!(
                 difference_px < 5e-3 * lines_px.abs() + 1e-6,

@@ -260,7 +260,7 @@ fn lidar_points_that_isis_would_refuse_are_refused() {
     let refused = |points: &[LidarPoint]| {
         let failure = write_lidar_data(&folder.path().join("lidar.json"), points).unwrap_err();
         assert_eq!(failure.kind(), Kind::Bug);
-        failure.fault.to_string()
+        failure.cause.to_string()
     };
     let changed = |change: fn(&mut LidarPoint)| {
         let mut point = shot();
@@ -372,7 +372,7 @@ fn ground_control_that_would_be_misread_is_refused() {
         change(&mut point);
         let failure = write_gcp(&folder.path().join("a.gcp"), &[point]).unwrap_err();
         assert_eq!(failure.kind(), Kind::Bug);
-        failure.fault.to_string()
+        failure.cause.to_string()
     };
     assert!(
         refused(|point| point.ground.covariance_m2[(1, 1)] = 0.0)

@@ -42,7 +42,7 @@ fn coverage_is_asked_at_the_shifted_instants_with_their_padding() {
     // Exposures to 05:17:37.0: with padding beyond the C-kernel, shifted by -1.15 s inside it.
     let good = outcome(&case, "05:17:30.0", 700, "", "ck_bias_s = -1.15");
     assert!(good.starts_with("exit 0"), "{good}");
-    // 05:17:30 UTC is ET 38596714.186; the flow wanted the exposures of 7 s, shifted, with 1 s around.
+    // 05:17:30 UTC is ET 38596714.186; the flow required the exposures of 7 s, shifted, with 1 s around.
     let kernels = manifest(&case)["kernels"].clone();
     let mut kernels = kernels.as_array().unwrap().iter();
     let used = &kernels.find(|kernel| kernel["role"] == "CK").unwrap()["coverage_used"][0];
@@ -80,7 +80,7 @@ fn held_attitudes_are_noted_and_beyond_their_spacing_invalid() {
     let invalid = outcome(&case, "05:17:35.0", 1_200, "ck_tolerance_s = 60.0", "");
     assert!(invalid.starts_with("exit 5"), "{invalid}");
     assert!(
-        invalid.contains("image edge: attitude held for up to "),
+        invalid.contains("image edge: attitude extrapolated for up to "),
         "{invalid}"
     );
     // A short image wholly beyond the end has constant attitude, which polynomials fit perfectly.
@@ -90,7 +90,10 @@ fn held_attitudes_are_noted_and_beyond_their_spacing_invalid() {
     let orientation: serde_json::Value = serde_json::from_slice(&orientation).unwrap();
     assert_eq!(orientation["valid"], false);
     let reasons = orientation["invalid_because"].to_string();
-    assert!(reasons.contains("attitude held for up to "), "{reasons}");
+    assert!(
+        reasons.contains("attitude extrapolated for up to "),
+        "{reasons}"
+    );
     // Inside the intervals a tolerance changes nothing and says nothing.
     let inside = outcome(&case, "05:17:20.0", 700, "ck_tolerance_s = 60.0", "");
     assert!(inside.starts_with("exit 0"), "{inside}");

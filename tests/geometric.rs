@@ -66,7 +66,7 @@ fn the_adjustment_cures_the_misregistration() {
     keeps_schema(&json(&site.join("manifest.json")), "manifest");
 
     // 34.5 and 25.5 lines of 3.26 and 4.40 m and position biases of tens of metres, along the flight.
-    let before_m = number(&found, "/before/pairs/0/disagreement_m");
+    let before_m = number(&found, "/before/pairs/0/along_track_parallax_m");
     assert!((190.0..330.0).contains(&before_m), "{before_m} m");
     let spacings: Vec<f64> = found["before"]["pairs"][0]["footprints"]["profiles"]
         .as_array()
@@ -83,7 +83,7 @@ fn the_adjustment_cures_the_misregistration() {
     );
     // 146 ties of a line's noise tell the mean to 0.1 lines of 4 m; the image-to-image transformation adds what
     // relief does to it.
-    let after_m = number(&found, "/after/pairs/0/disagreement_m");
+    let after_m = number(&found, "/after/pairs/0/along_track_parallax_m");
     assert!(after_m < 1.0, "{after_m} m");
     for profile in found["after"]["pairs"][0]["footprints"]["profiles"]
         .as_array()
@@ -93,19 +93,19 @@ fn the_adjustment_cures_the_misregistration() {
     }
 
     // Who is left out is a blunder; two of eight lie across the track, where a pair controls nothing.
-    let left_out: BTreeSet<String> = found["adjustment"]["left_out"]
+    let rejected: BTreeSet<String> = found["adjustment"]["rejected"]
         .as_array()
         .unwrap()
         .iter()
         .map(|point| point["id"].as_str().unwrap().to_owned())
         .collect();
     assert!(
-        left_out.is_subset(&blunders()) && left_out.len() >= 6,
-        "{left_out:?}"
+        rejected.is_subset(&blunders()) && rejected.len() >= 6,
+        "{rejected:?}"
     );
     let manifest = json(&site.join("manifest.json"));
-    assert!((number(&manifest, "/figures/disagreement_m") - before_m).abs() < 1e-9); // the same number
-    assert!((number(&manifest, "/figures/adjusted_disagreement_m") - after_m).abs() < 1e-9);
+    assert!((number(&manifest, "/figures/along_track_parallax_m") - before_m).abs() < 1e-9); // the same number
+    assert!((number(&manifest, "/figures/adjusted_along_track_parallax_m") - after_m).abs() < 1e-9);
     assert_eq!(
         manifest["figures"]["adjustment_sigma0"],
         found["adjustment"]["summary"]["sigma0"]
@@ -126,13 +126,13 @@ fn the_products_of_the_adjustment_agree_with_each_other() {
             .as_primitive::<Float64Type>()
             .clone()
     };
-    let left_out = ties
-        .column_by_name("left_out")
+    let rejected = ties
+        .column_by_name("rejected")
         .unwrap()
         .as_string::<i32>()
         .clone();
-    let out = left_out.iter().filter(|reason| *reason != Some("")).count();
-    let named = found["adjustment"]["left_out"].as_array().unwrap().len();
+    let out = rejected.iter().filter(|reason| *reason != Some("")).count();
+    let named = found["adjustment"]["rejected"].as_array().unwrap().len();
     assert_eq!(out, 2 * named);
     assert_eq!(
         column("adjusted_x_m").iter().flatten().count(),
@@ -187,7 +187,7 @@ fn the_products_of_the_adjustment_agree_with_each_other() {
     case.replace("site.toml", "site = \"isidis\"", "site = \"again\"");
     case.stages_run();
     let again = json(&case.path("out/again/adjustment.json"));
-    let starts_m = number(&again, "/before/pairs/0/disagreement_m");
+    let starts_m = number(&again, "/before/pairs/0/along_track_parallax_m");
     assert!(starts_m < 1.0, "{starts_m} m"); // as the_adjustment_cures_the_misregistration
     let orientation = |path: &str| table(&case.path(path));
     for id in ["E02-01301", "E02-02016"] {
@@ -315,7 +315,7 @@ fn ties_that_are_none_make_the_site_invalid() {
     let outcome = case.outcome(case.run());
     assert!(outcome.starts_with("exit 5\nisidis: INVALID"), "{outcome}");
     assert!(
-        outcome.contains("of 154 tie points were left out"),
+        outcome.contains("of 154 tie points were rejected"),
         "{outcome}"
     );
     let page = fs::read_to_string(case.path("out/isidis/report/index.html")).unwrap();
@@ -329,7 +329,7 @@ fn a_failed_adjustment_keeps_no_other_product_from_its_readers() {
     case.replace("site.toml", "tie_sigma_px", free);
     let outcome = case.outcome(case.run());
     let invalid = "exit 5\nisidis: INVALID; products in out/isidis, see report/index.html\n  \
-                   no adjustment: the network is singular: nothing tells apart the ";
+                   no adjustment: the network is singular: the observations do not separate the ";
     assert!(outcome.starts_with(invalid), "{outcome}");
     assert!(outcome.contains("finite standard deviations"), "{outcome}");
     let made: Vec<_> = products(&case.path("out/isidis")).into_keys().collect();

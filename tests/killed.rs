@@ -69,8 +69,8 @@ fn kill_before(command: &Command, out: &Path, place: usize) {
 
 /// Places of the calls that `of` wants.
 fn places(changes: &[Call], of: impl Fn(&Call) -> bool) -> Vec<usize> {
-    let wanted = changes.iter().enumerate().filter(|(_, call)| of(call));
-    wanted.map(|(place, _)| place).collect()
+    let required = changes.iter().enumerate().filter(|(_, call)| of(call));
+    required.map(|(place, _)| place).collect()
 }
 
 /// So many of `places`, equally spaced, both ends among them.
@@ -242,9 +242,7 @@ fn an_interrupt_leaves_the_search_and_keeps_finished_stages() {
     assert!(interrupted, "never begun");
     assert_eq!(ended.code, Some(130), "{}", ended.stderr);
     assert!(
-        ended
-            .stderr
-            .contains("case/search_footprints: stopped before its end"),
+        ended.stderr.contains("case/search_footprints: interrupted"),
         "{}",
         ended.stderr
     );

@@ -319,7 +319,7 @@ fn damaged_files_are_complained_of_and_read_as_far_as_they_go() {
     let complaint = truncated.trailing_complaint().expect("a complaint");
     assert_eq!(
         complaint.to_string(),
-        "AP19019L.B record 12: 700 bytes after the last whole record of 776; left out"
+        "AP19019L.B record 12: 700 bytes after the last whole record of 776; ignored"
     );
 
     let stub = file(bytes[..1000].to_vec());

@@ -18,7 +18,7 @@ use areograph::{
         window::{Region, WindowShape},
     },
     pds::pedr::{FieldGuard, File, FrameValues, LabelInfo, PedrWriter, Reason, Record},
-    stages::search_footprints::{Reject, SearchResult, search_footprints},
+    stages::search_footprints::{SearchResult, ShotRejection, search_footprints},
     time::Et,
     units::wrap_pi,
 };
@@ -272,11 +272,11 @@ fn a_window_across_zero_and_one_over_the_pole_in_one_pass() {
     );
     let rejects: Vec<_> = result.rejected.keys().copied().collect();
     let expected = [
-        Reject::NoReturn,
-        Reject::Class,
-        Reject::Channel,
-        Reject::Attitude,
-        Reject::OffNadir,
+        ShotRejection::NoReturn,
+        ShotRejection::Class,
+        ShotRejection::Channel,
+        ShotRejection::Attitude,
+        ShotRejection::OffNadir,
     ];
     assert_eq!(rejects, expected);
     assert_eq!(
@@ -372,8 +372,8 @@ fn damaged_records_are_complained_of_and_the_others_kept() {
     assert_eq!(result.complaint_counts[&Reason::TimeOrder], 1);
     assert_eq!(
         (
-            result.rejected[&Reject::Radius],
-            result.rejected[&Reject::Channel]
+            result.rejected[&ShotRejection::Radius],
+            result.rejected[&ShotRejection::Channel]
         ),
         (1, 18)
     );

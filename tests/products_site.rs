@@ -472,7 +472,7 @@ fn numbers_that_are_not_finite_are_refused_with_their_place() {
         .unwrap_err();
     assert_eq!(failure.kind(), Kind::Bug);
     assert_eq!(
-        failure.fault.to_string(),
+        failure.cause.to_string(),
         "column range_m, row 5 of 60 is not a finite number"
     );
 
@@ -484,7 +484,7 @@ fn numbers_that_are_not_finite_are_refused_with_their_place() {
         })
         .unwrap_err();
     assert_eq!(
-        failure.fault.to_string(),
+        failure.cause.to_string(),
         "/instrument_position/velocities/1/2 is not a finite number"
     );
     assert!(failure.file.unwrap().ends_with("images/m04-02852/isd.json"));
@@ -501,7 +501,7 @@ fn parts_that_do_not_belong_together_are_refused() {
         })
         .unwrap_err();
     assert_eq!(
-        failure.fault.to_string(),
+        failure.cause.to_string(),
         "UTC strings of footprints: 59; expected 60"
     );
 }

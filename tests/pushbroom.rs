@@ -23,7 +23,7 @@ use scene::{EOS_NADIR, EOS_OBLIQUE, GUSEV, Scene};
 
 /// `dC/dx` and `dM/dx` of the model against central differences of its poses, `step` lines wide.
 fn derivatives_agree(model: &impl ExteriorOrientation, x: f64, step: f64) {
-    let (pose, motion) = model.moving(x);
+    let (pose, motion) = model.pose_and_rate(x);
     assert_eq!(pose, model.pose(x)); // one formula
     let (before, after) = (model.pose(x - step), model.pose(x + step));
     let advance_m = (after.position_m - before.position_m) / (2.0 * step);
@@ -72,7 +72,7 @@ proptest! {
             reference: Matrix3::identity(),
         };
         let step = 1e-5;
-        let (pose, motion) = model.moving(0.0);
+        let (pose, motion) = model.pose_and_rate(0.0);
         let turned = (model.pose(step).mars_to_camera - model.pose(-step).mars_to_camera) / (2.0 * step);
         let ours = motion.turn_rad.cross_matrix() * pose.mars_to_camera;
         // The cubic term of the difference is 1e-10 × 1.7³; rounding 1e-16 / 1e-5.

@@ -28,9 +28,9 @@ use areograph::{
     frames::Position,
     geom::{
         intersection::{IntersectionLimits, Unintersected},
+        oriented_camera::OrientedCamera,
         pushbroom::{CorrectedOrientation, ExteriorOrientation, SampledOrientation},
         statistics::Summary,
-        stereo::StereoImage,
     },
     pds::ties::read_ties,
     stages::{
@@ -38,7 +38,7 @@ use areograph::{
             AdjustImage, Adjusted, LaserShot, LaserShots, PointKind, ShotRange, adjust,
             orientation_sigmas,
         },
-        intersect::{IntersectOptions, IntersectedTies, TieReject, intersect_ties},
+        intersect::{IntersectOptions, IntersectedTies, TieRejection, intersect_ties},
     },
     ties::TiePoint,
     units::RADIANS_PER_DEGREE,
@@ -111,10 +111,10 @@ impl Site {
         })
     }
 
-    fn stereo(&self) -> Vec<StereoImage<SampledOrientation>> {
+    fn oriented_camera(&self) -> Vec<OrientedCamera<SampledOrientation>> {
         let named = SERIALS.iter().zip(&self.images);
         named
-            .map(|(serial, image)| StereoImage {
+            .map(|(serial, image)| OrientedCamera {
                 id: (*serial).to_owned(),
                 orientation: image.orientation.clone(),
                 detector: image.detector,
@@ -130,7 +130,7 @@ impl Site {
             polar_radius_m: MOON_RADIUS_M,
             ..options.limits
         };
-        intersect_ties(&self.stereo(), ties, &options).unwrap()
+        intersect_ties(&self.oriented_camera(), ties, &options).unwrap()
     }
 
     fn shots(&self, with_ranges: bool) -> LaserShots {
@@ -151,10 +151,14 @@ impl Site {
     }
 
     fn adjust(&self, priors: &Priors, options: &AdjustmentConfig, with_ranges: bool) -> Adjusted {
-        let images = self.stereo().into_iter().zip(&self.images).zip(priors);
+        let images = self
+            .oriented_camera()
+            .into_iter()
+            .zip(&self.images)
+            .zip(priors);
         let images: Vec<_> = images
-            .map(|((stereo, image), sigmas)| AdjustImage {
-                stereo,
+            .map(|((oriented_camera, image), sigmas)| AdjustImage {
+                oriented_camera,
                 line_period_s: image.period_s,
                 sigmas: *sigmas,
                 time_bias_sigma_s: 0.0,
@@ -378,13 +382,18 @@ fn the_limits_of_mars_refuse_every_tie_on_the_moon() {
     let Some(site) = Site::read("real intersection with the limits of Mars") else {
         return;
     };
-    let found = intersect_ties(&site.stereo(), &site.ties, &IntersectOptions::default()).unwrap();
+    let found = intersect_ties(
+        &site.oriented_camera(),
+        &site.ties,
+        &IntersectOptions::default(),
+    )
+    .unwrap();
     assert!(found.points.is_empty());
     assert_eq!(found.rejected.len(), 311);
     // Metres: the radii differ by 1650 km.
     assert!(found.rejected.iter().all(|tie| matches!(
         tie.reason,
-        TieReject::Rays(Unintersected::Height { height_m }) if height_m < -1.6e6
+        TieRejection::Rays(Unintersected::Height { height_m }) if height_m < -1.6e6
     )));
 }
 
@@ -442,7 +451,7 @@ fn every_distance_comes_closer_to_its_range_with_the_priors_of_isis() {
     assert!(site.misclosures_m(&without).iter().all(|m| *m > 5.0));
     assert!(site.misclosures_m(&with).iter().all(|m| m.abs() < 0.05));
     for adjusted in [&without, &with] {
-        assert!(adjusted.left_out.is_empty());
+        assert!(adjusted.rejected.is_empty());
         let Summary { n, .. } = adjusted.summary.ties.corrections_m[0];
         assert_eq!(n, 311);
         for sigmas_m in adjusted.summary.shots.sigmas_m {

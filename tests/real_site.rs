@@ -94,7 +94,7 @@ fn a_site_on_real_kernels_ends_valid_and_stays() {
     }
 
     let before = products(&out);
-    assert!(run().starts_with("m04-02852: valid; nothing changed; products stand in "));
+    assert!(run().starts_with("m04-02852: valid; nothing changed; products are up to date in "));
     assert!(products(&out) == before);
     // The kernels.tm of the products reproduces the run.
     let again =

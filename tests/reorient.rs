@@ -25,7 +25,7 @@ use areograph::{
 use fixture::{Image, angle_rad, apart, kernel_camera};
 use nalgebra::{Matrix3, Vector3};
 
-/// One focal pixel as an angle, radians.
+/// One focal-plane pixel as an angle, radians.
 const PIXEL_RAD: f64 = 0.013_124_057_852_294_9 / 3_500.0;
 
 fn nothing(_: f64) -> LineCorrection {
@@ -162,7 +162,7 @@ fn a_shift_of_lines_and_a_curved_correction_are_those_of_the_kernels() {
     }
 }
 
-/// How far apart the ground that tables and samples see lies, focal pixels, over all samples.
+/// How far apart the ground that tables and samples see lies, focal-plane pixels, over all samples.
 fn tables_against_samples_px(orientation: &Orientation, tables: &CameraTables) -> f64 {
     let last = tables.et_s.len() - 1;
     let step_s = (tables.et_s[last] - tables.et_s[0]) / last as f64;

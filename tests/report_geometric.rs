@@ -16,7 +16,7 @@ use areograph::{
     geom::uncertainty::GroundPart,
     report,
     stages::{
-        adjust::{LeftOut, LeftOutReason, PointKind},
+        adjust::{PointKind, RejectedPoint, RejectionReason},
         compare_pairs::PairComparison,
     },
     units::RADIANS_PER_ARCSECOND,
@@ -99,7 +99,7 @@ fn pairs_tell_their_residuals_and_footprints_before_and_after() {
         agree(&seen[row][3], pair.convergence_rad.to_degrees(), 2);
         agree(&seen[row][4], pair.height_over_base, 2);
         agree(&seen[row][5], pair.line_spacing_m[0], 3);
-        agree(&seen[row][7], pair.disagreement_m, 2);
+        agree(&seen[row][7], pair.along_track_parallax_m, 2);
         for (image, of) in pair.residuals.iter().enumerate() {
             let moments = [of.mean_x, of.deviation_x, of.mean_y, of.deviation_y];
             for (column, value) in moments.into_iter().enumerate() {
@@ -294,7 +294,7 @@ fn what_cannot_be_trusted_is_said() {
     let site = Site::gusev();
     let page = site.page();
     let text = section(&page, SECTIONS[1]);
-    assert!(text.contains("Relative registration is healed, absolute position is not."));
+    assert!(text.contains("The relative registration is corrected, the absolute position is not."));
     assert!(text.contains(
         "A gross error in a tie point across the track shows only &lt; 0.1 % in its residual: such errors cannot be found."
     ));
@@ -304,8 +304,8 @@ fn what_cannot_be_trusted_is_said() {
     assert_eq!(rows.len(), correlated.len().min(12));
     agree(&number(&rows[0][0]).abs().to_string(), most, 4);
     let blunders = table(&page, "Blunders");
-    let found = |of: &&LeftOut| matches!(of.reason, LeftOutReason::Blunder { .. });
-    let expected: Vec<&LeftOut> = site.adjusted.left_out.iter().filter(found).collect();
+    let found = |of: &&RejectedPoint| matches!(of.reason, RejectionReason::Blunder { .. });
+    let expected: Vec<&RejectedPoint> = site.adjusted.rejected.iter().filter(found).collect();
     assert_eq!(blunders.len(), expected.len());
     assert!(
         blunders
@@ -360,12 +360,12 @@ fn budgets_that_cannot_be_are_told_in_words() {
 #[test]
 fn many_blunders_are_counted_and_their_names_stay_text() {
     let mut site = Site::gusev();
-    site.adjusted.left_out = (0..33)
-        .map(|index| LeftOut {
+    site.adjusted.rejected = (0..33)
+        .map(|index| RejectedPoint {
             kind: PointKind::Tie,
             index,
             id: format!("<i>{index}"),
-            reason: LeftOutReason::Blunder { standardised: 5.0 },
+            reason: RejectionReason::Blunder { standardised: 5.0 },
         })
         .collect();
     site.adjusted.summary.range_biases_m = vec![("gusev & co".to_owned(), -7.25, 0.125)];

@@ -39,7 +39,7 @@ fn a_failed_range_check_is_said_in_the_first_lines() {
     assert!(lead.contains("class=\"verdict invalid\""));
     assert!(lead.contains("<strong>Invalid, for one reason:</strong>"));
     assert!(lead.contains("<li>profile antimeridian/9019: mean of range − distance 11.000 m"));
-    assert!(lead.contains("input that was read around: ap19019l.b record 4"));
+    assert!(lead.contains("skipped records: ap19019l.b record 4"));
     assert!(page.contains("beyond the limit"));
 }
 
@@ -100,7 +100,7 @@ fn a_gap_in_attitude_is_seen_and_measured() {
     let caption = between(picture, "<figcaption>", '\n').next().unwrap();
     assert!(
         caption.contains(
-            "Of what is asked, margins included, 2.000 s are not held, the first 2.000 s at"
+            "Of the requested time, margins included, 2.000 s are not covered, the first 2.000 s at"
         ),
         "{caption:.300}"
     );

@@ -15,8 +15,8 @@ use areograph::{
     geom::{
         ellipsoid::spherical_to_xyz_m,
         intersection::Weighting,
+        oriented_camera::OrientedCamera,
         pushbroom::{Detector, Pose, Projector, SampledOrientation},
-        stereo::StereoImage,
     },
     pds::ties::read_ties,
     spice::{KernelSet, Session},
@@ -98,7 +98,7 @@ impl Pair {
         times: &ImageTimes,
         orientation: &Orientation,
         aside_m: Vector3<f64>,
-    ) -> StereoImage<SampledOrientation> {
+    ) -> OrientedCamera<SampledOrientation> {
         let poses: Vec<(f64, Pose)> = orientation
             .samples
             .iter()
@@ -108,7 +108,7 @@ impl Pair {
                 (sample.line_offset, pose)
             })
             .collect();
-        StereoImage {
+        OrientedCamera {
             id: times.id.clone(),
             orientation: SampledOrientation::new(&poses).unwrap(),
             detector: Detector::new(
@@ -122,13 +122,13 @@ impl Pair {
     }
 
     /// The images as labels and kernels tell them.
-    fn as_told(&self) -> Vec<StereoImage<SampledOrientation>> {
+    fn as_told(&self) -> Vec<OrientedCamera<SampledOrientation>> {
         let image = |times| Self::image(times, &self.orientation(times), Vector3::zeros());
         self.times.iter().map(image).collect()
     }
 
     /// The images as they were truly taken, by the truth's biases.
-    fn as_taken(&self) -> Vec<StereoImage<SampledOrientation>> {
+    fn as_taken(&self) -> Vec<OrientedCamera<SampledOrientation>> {
         let cameras = self.truth["cameras"].as_array().unwrap();
         let image = |(times, camera): (&ImageTimes, &Value)| {
             assert_eq!(camera["image"], times.id.as_str());
@@ -175,7 +175,7 @@ impl Pair {
 }
 
 fn intersected(
-    images: &[StereoImage<SampledOrientation>],
+    images: &[OrientedCamera<SampledOrientation>],
     ties: &[TiePoint],
     weighting: Weighting,
 ) -> IntersectedTies {
@@ -265,20 +265,20 @@ fn blunders_are_where_the_truth_says() {
             let [line, sample] = [&blunder["line_error"], &blunder["sample_error"]].map(number);
             let length_px = line.hypot(sample);
             assert!((20.0..100.0).contains(&length_px), "{blunder}");
-            let mut mended = tie.clone();
-            for measure in &mut mended.measures {
+            let mut corrected = tie.clone();
+            for measure in &mut corrected.measures {
                 if blunder["image"] == pair.times[measure.image].id.as_str() {
                     measure.line -= line;
                     measure.sample -= sample;
                 }
             }
-            assert!(square(&mended) < SQUARE_MAX, "{site} {}", tie.id);
+            assert!(square(&corrected) < SQUARE_MAX, "{site} {}", tie.id);
         }
     }
 }
 
 /// Mean of how many lines after its true ground each image as told has its tie points.
-fn shifts_lines(pair: &Pair, images: &[StereoImage<SampledOrientation>]) -> [f64; 2] {
+fn shifts_lines(pair: &Pair, images: &[OrientedCamera<SampledOrientation>]) -> [f64; 2] {
     let truth = pair.truth_of_ties();
     let good = pair.good();
     [0, 1].map(|index| {
@@ -287,7 +287,7 @@ fn shifts_lines(pair: &Pair, images: &[StereoImage<SampledOrientation>]) -> [f64
         let shifts = good.iter().map(|tie| {
             let ground_m = vector(&truth[&tie.id]["ground_iau2000_m"]);
             let measure = tie.measures.iter().find(|measure| measure.image == index);
-            let (x_lines, _) = image.focal_place(measure.unwrap().line, 0.0);
+            let (x_lines, _) = image.focal_plane_coordinates(measure.unwrap().line, 0.0);
             x_lines - projector.project(&ground_m).unwrap().x
         });
         shifts.sum::<f64>() / good.len() as f64

@@ -15,7 +15,7 @@ use std::{
 
 use areograph::{
     config::usual_instrument,
-    error::{Failure, Kind},
+    error::{Error, Kind},
     spice::{KernelRole, KernelSet, Session},
     time::Et,
 };
@@ -49,7 +49,7 @@ fn folders(test: &str) -> Option<(PathBuf, TempDir)> {
     Some((real_data("ale_mgs/m0402852", test)?, tempdir().unwrap()))
 }
 
-fn one(path: &Path) -> Failure {
+fn one(path: &Path) -> Error {
     KernelSet::from_files(&[path.to_owned()]).unwrap_err()
 }
 
@@ -102,7 +102,7 @@ fn sessions_follow_one_another_and_threads_wait() {
     let _session = Session::open(&set).unwrap();
     let second = Session::open(&set).unwrap_err();
     assert_eq!(second.kind(), Kind::Bug);
-    let text = second.fault.to_string();
+    let text = second.cause.to_string();
     assert_eq!(text, "a SPICE session is open on this thread already");
 }
 
@@ -114,7 +114,7 @@ fn faults_of_cspice_carry_both_messages_of_naif() {
     let session = Session::open(&times(&folder)).unwrap();
     let failure = session.utc_to_et("1999-13-24T25:00:00").unwrap_err();
     println!("{failure}");
-    let text = failure.fault.to_string();
+    let text = failure.cause.to_string();
     assert!(text.starts_with(
         "str2et_c(\"1999-13-24T25:00:00\"): SPICE(BADTIMESTRING): The month specified was 13."
     ));
@@ -131,7 +131,7 @@ fn faults_of_cspice_carry_both_messages_of_naif() {
     }
     let long = "9".repeat(300);
     assert_eq!(
-        session.sclk_to_et(&long).unwrap_err().fault.to_string(),
+        session.sclk_to_et(&long).unwrap_err().cause.to_string(),
         "a clock string cannot be given to CSPICE: 300 bytes long, at most 255 are possible"
     );
     assert!(
@@ -143,7 +143,7 @@ fn faults_of_cspice_carry_both_messages_of_naif() {
     let failure = empty.utc_to_et("1999-08-24").unwrap_err();
     assert_eq!(failure.kind(), Kind::Coverage);
     assert_eq!(
-        failure.fault.to_string(),
+        failure.cause.to_string(),
         "no leap-second kernel (.tls) in the set, which is empty"
     );
 }
@@ -309,7 +309,7 @@ fn roles_follow_content_and_nothing_is_loaded_twice() {
     );
     assert_eq!(
         set.explanation().last().unwrap(),
-        "one.bsp: left out at its earlier place, same content as seven.tls"
+        "one.bsp: not loaded at its earlier place, same content as seven.tls"
     );
     let last = set.kernels().last().unwrap();
     assert_eq!(

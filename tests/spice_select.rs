@@ -13,7 +13,8 @@ use areograph::{
     frames::Position,
     kernel_source::{CkQuality, KernelSelection},
     spice::{
-        CkSegment, Kernel, KernelSet, Session, SpkSegment, State, Wanted, write_ck, write_spk,
+        CkSegment, Kernel, KernelSet, RequiredCoverage, Session, SpkSegment, State, write_ck,
+        write_spk,
     },
     time::{Interval, Intervals, PointingBias},
 };
@@ -44,7 +45,7 @@ const FILES: [(&str, &str); 11] = [
 
 const BIAS: PointingBias = PointingBias::from_seconds(-1.15);
 
-/// A folder of kernels, a rival orbit and commanded attitudes among them, and the time that is wanted.
+/// A folder of kernels, a rival orbit and commanded attitudes among them, and the time that is required.
 fn archive(test: &str) -> Option<(TempDir, Interval)> {
     let temporary = tempdir().unwrap();
     let root = temporary.path();
@@ -100,9 +101,9 @@ fn selection(root: &Path) -> KernelSelection {
 }
 
 /// Positions at the exposures, attitudes where the pointing bias of MGS moves them, a second more each.
-fn around(exposures: Interval) -> Wanted {
+fn around(exposures: Interval) -> RequiredCoverage {
     let attitudes = exposures.shifted(BIAS.seconds()).padded(1.0);
-    Wanted {
+    RequiredCoverage {
         positions: Intervals::union_of([exposures.padded(1.0)]),
         attitudes: Intervals::union_of([attitudes]),
     }
@@ -114,11 +115,11 @@ fn names(set: &KernelSet) -> Vec<String> {
 
 #[test]
 fn the_latest_texts_and_the_files_of_the_wanted_time_are_chosen() {
-    let Some((temporary, wanted)) = archive("selection") else {
+    let Some((temporary, required)) = archive("selection") else {
         return;
     };
     let selection = selection(temporary.path());
-    let set = KernelSet::select(&selection, &around(wanted)).unwrap();
+    let set = KernelSet::select(&selection, &around(required)).unwrap();
     let texts = [
         "naif0012.tls",
         "MGS_SCLKSCET.00061.tsc",
@@ -132,25 +133,25 @@ fn the_latest_texts_and_the_files_of_the_wanted_time_are_chosen() {
     for line in [
         "naif0012.tls: latest of 2 with leap seconds",
         "pck00010.tpc: latest of 1 with the rotation of Mars",
-        "mgs_map2_first.bsp: left out, holds none of the wanted times",
-        "mgs_map2_gsfc_mgm0827.bsp: left out, not of the orbit solution nav",
-        "mgs_sc_map2_first.bc: left out, holds no attitude near the wanted times",
-        "README: left out, is a text without a \\begindata block",
+        "mgs_map2_first.bsp: not used, holds none of the required times",
+        "mgs_map2_gsfc_mgm0827.bsp: not used, not of the orbit solution nav",
+        "mgs_sc_map2_first.bc: not used, holds no attitude near the required times",
+        "README: not used, is a text without a \\begindata block",
     ] {
         assert!(explanation.contains(line), "{line} in {explanation}");
     }
     let session = Session::open(&set).unwrap();
-    session.require_attitude(wanted, BIAS, 1.0, 0.0).unwrap();
+    session.require_attitude(required, BIAS, 1.0, 0.0).unwrap();
     drop(session);
     assert_eq!(
-        names(&KernelSet::select(&selection, &Wanted::default()).unwrap()),
+        names(&KernelSet::select(&selection, &RequiredCoverage::default()).unwrap()),
         texts
     );
 }
 
 #[test]
 fn pins_families_and_qualities_are_obeyed() {
-    let Some((temporary, wanted)) = archive("selection by wish") else {
+    let Some((temporary, required)) = archive("selection by wish") else {
         return;
     };
     let mut selection = selection(temporary.path());
@@ -162,7 +163,7 @@ fn pins_families_and_qualities_are_obeyed() {
         .to_vec();
     selection.spk_family = "gsfc".to_owned();
     selection.ck_quality = vec![CkQuality::Reconstructed];
-    let set = names(&KernelSet::select(&selection, &around(wanted)).unwrap());
+    let set = names(&KernelSet::select(&selection, &around(required)).unwrap());
     assert_eq!(
         set,
         [
@@ -179,12 +180,12 @@ fn pins_families_and_qualities_are_obeyed() {
 
 #[test]
 fn what_is_missing_in_a_folder_is_named() {
-    let Some((temporary, wanted)) = archive("selection of missing kernels") else {
+    let Some((temporary, required)) = archive("selection of missing kernels") else {
         return;
     };
     let mut selection = selection(temporary.path());
     let text = |selection: &KernelSelection| {
-        KernelSet::select(selection, &around(wanted))
+        KernelSet::select(selection, &around(required))
             .unwrap_err()
             .to_string()
     };
@@ -221,7 +222,7 @@ fn kernels_that_meet_inside_the_bias_are_chosen_and_versions_count() {
     };
     let root = temporary.path();
     let mut selection = selection(root);
-    let texts = KernelSet::select(&selection, &Wanted::default()).unwrap();
+    let texts = KernelSet::select(&selection, &RequiredCoverage::default()).unwrap();
     let session = Session::open(&texts).unwrap();
     fs::remove_file(root.join("ck/mgs_sc_map2.bc")).unwrap();
     // Telemetry of two files that meet half a second before the exposures, and ends inside them.
@@ -247,8 +248,8 @@ fn kernels_that_meet_inside_the_bias_are_chosen_and_versions_count() {
         bytes.extend_from_slice(name.as_bytes());
         write(root, name, &bytes);
     }
-    let wanted = around(exposures);
-    let set = KernelSet::select(&selection, &wanted).unwrap();
+    let required = around(exposures);
+    let set = KernelSet::select(&selection, &required).unwrap();
     let chosen = names(&set);
     let expected = [
         "mgs_map2.bsp",
@@ -274,6 +275,6 @@ fn kernels_that_meet_inside_the_bias_are_chosen_and_versions_count() {
         assert!(explanation.contains(&line), "{line} in {explanation}");
     }
     selection.ck_quality = vec![CkQuality::Reconstructed];
-    let set = KernelSet::select(&selection, &wanted).unwrap();
+    let set = KernelSet::select(&selection, &required).unwrap();
     assert!(!set.explanation().join("\n").contains("comes from nominal"));
 }

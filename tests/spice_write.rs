@@ -166,7 +166,7 @@ fn columns_that_do_not_fit_are_refused() {
     let text = |name: &str, segment: SpkSegment| {
         write_spk(&at.join(name), &[segment], "")
             .unwrap_err()
-            .fault
+            .cause
             .to_string()
     };
     let long = SpkSegment {
@@ -196,7 +196,7 @@ fn columns_that_do_not_fit_are_refused() {
     };
     let failure = write_ck(&at.join("uneven.bc"), &session, &[ck], "").unwrap_err();
     assert_eq!(
-        failure.fault.to_string(),
+        failure.cause.to_string(),
         "segment turning: a column of 2 for 3 instants"
     );
 }

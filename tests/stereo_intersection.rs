@@ -14,22 +14,22 @@ use areograph::{
     error::Kind,
     geom::{
         intersection::{Unintersected, Weighting},
+        oriented_camera::OrientedCamera,
         pushbroom::{Detector, Distortion, EulerPolynomial},
-        stereo::StereoImage,
     },
-    stages::intersect::{IntersectOptions, IntersectedTies, TieReject, intersect_ties},
+    stages::intersect::{IntersectOptions, IntersectedTies, TieRejection, intersect_ties},
     ties::{TieMeasure, TiePoint},
 };
 use nalgebra::Vector3;
 use recipe::{Normals, Recipe};
 
-fn images() -> Vec<StereoImage<EulerPolynomial>> {
+fn images() -> Vec<OrientedCamera<EulerPolynomial>> {
     let scenes = recipe::pair(recipe::Recipe::GUSEV.place_deg);
     let names = ["nadir", "oblique"];
     scenes
         .iter()
         .zip(names)
-        .map(|(scene, id)| StereoImage {
+        .map(|(scene, id)| OrientedCamera {
             id: id.to_owned(),
             orientation: scene.euler(2),
             detector: Detector {
@@ -156,7 +156,7 @@ fn noise_comes_out_as_simulated_and_as_the_covariance_says() {
         assert!((value / expected - 1.0).abs() < 0.1, "{value} {expected}");
     };
     let focal = intersected(&ties, FOCAL);
-    // Standard deviations of a prototype: lines, then focal pixels.
+    // Standard deviations of a prototype: lines, then focal-plane pixels.
     for (image, (lines, focal_px)) in focal.images.iter().zip([(0.71, 1.11), (0.73, 1.19)]) {
         near(image.reprojection.along.standard_deviation, lines);
         near(image.focal.along.standard_deviation, focal_px);
@@ -192,15 +192,15 @@ fn what_cannot_be_intersected_is_counted() {
     ties[4].measures[0].sample = f64::NAN;
     ties[5].measures.clear();
     let result = intersected(&ties, FOCAL);
-    let reasons: Vec<TieReject> = result.rejected.iter().map(|tie| tie.reason).collect();
+    let reasons: Vec<TieRejection> = result.rejected.iter().map(|tie| tie.reason).collect();
     assert_eq!(
         reasons,
         [
-            TieReject::Rays(Unintersected::FewRays { rays: 1 }),
-            TieReject::TwiceInImage,
-            TieReject::Duplicate,
-            TieReject::NotFinite,
-            TieReject::Rays(Unintersected::FewRays { rays: 0 }),
+            TieRejection::Rays(Unintersected::FewRays { rays: 1 }),
+            TieRejection::TwiceInImage,
+            TieRejection::Duplicate,
+            TieRejection::NotFinite,
+            TieRejection::Rays(Unintersected::FewRays { rays: 0 }),
         ]
     );
     assert_eq!(result.points.len(), 1);
@@ -220,7 +220,7 @@ fn what_cannot_be_intersected_is_counted() {
 fn an_image_with_itself_gives_no_height() {
     let (mut ties, _) = ties(3, |_| (0.0, 0.0));
     let mut twice = images();
-    twice[1] = StereoImage {
+    twice[1] = OrientedCamera {
         id: "oblique".to_owned(),
         ..twice[0].clone()
     };
@@ -235,7 +235,7 @@ fn an_image_with_itself_gives_no_height() {
     for tie in &result.rejected {
         let parallel = matches!(
             tie.reason,
-            TieReject::Rays(Unintersected::NearParallel { .. })
+            TieRejection::Rays(Unintersected::NearParallel { .. })
         );
         assert!(parallel, "{tie:?}");
     }
@@ -255,6 +255,6 @@ fn places_outside_the_image_are_no_measurements() {
         let mut ties = ties.clone();
         (ties[0].measures[0].line, ties[0].measures[0].sample) = (line, sample);
         let result = intersect_ties(&images, &ties, &IntersectOptions::default()).unwrap();
-        assert_eq!(result.rejected[0].reason, TieReject::OutsideImage);
+        assert_eq!(result.rejected[0].reason, TieRejection::OutsideImage);
     }
 }

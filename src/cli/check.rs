@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 
 use super::{load_sites, output};
-use crate::{error::Failure, flow::check_site};
+use crate::{error::Error, flow::check_site};
 
 /// Checks configuration, files and kernel coverage; reports everything that a run would stumble over.
 #[derive(Debug, Args)]
@@ -15,7 +15,7 @@ pub(super) struct Arguments {
     sites: Vec<PathBuf>,
 }
 
-pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
+pub(super) fn run(arguments: &Arguments) -> Result<(), Error> {
     let mut last = None;
     for site in load_sites(&arguments.sites)? {
         let checked = check_site(&site);

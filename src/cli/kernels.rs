@@ -9,7 +9,7 @@ use serde_json::json;
 
 use super::output;
 use crate::{
-    error::Failure,
+    error::Error,
     spice::{KernelSet, Session},
     time::Intervals,
 };
@@ -35,13 +35,13 @@ struct Files {
     /// One metakernel (.tm), or kernels in load order.
     #[arg(required = true, value_name = "KERNEL")]
     files: Vec<PathBuf>,
-    /// Answer in JSON.
+    /// Print JSON.
     #[arg(long)]
     json: bool,
 }
 
 impl Files {
-    fn load(&self) -> Result<KernelSet, Failure> {
+    fn load(&self) -> Result<KernelSet, Error> {
         match &self.files[..] {
             [one]
                 if one
@@ -55,7 +55,7 @@ impl Files {
     }
 }
 
-pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
+pub(super) fn run(arguments: &Arguments) -> Result<(), Error> {
     match &arguments.command {
         Command::List(files) => list(files),
         Command::Coverage(files) => coverage(files),
@@ -63,7 +63,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
     }
 }
 
-fn list(files: &Files) -> Result<(), Failure> {
+fn list(files: &Files) -> Result<(), Error> {
     let kernels = files.load()?;
     if files.json {
         output::json(&json!({
@@ -87,7 +87,7 @@ fn list(files: &Files) -> Result<(), Failure> {
     Ok(())
 }
 
-fn coverage(files: &Files) -> Result<(), Failure> {
+fn coverage(files: &Files) -> Result<(), Error> {
     let session = Session::open(&files.load()?)?;
     let coverage = session.coverage()?;
     if files.json {
@@ -101,7 +101,7 @@ fn coverage(files: &Files) -> Result<(), Failure> {
     Ok(())
 }
 
-fn print_intervals(session: &Session, intervals: &Intervals) -> Result<(), Failure> {
+fn print_intervals(session: &Session, intervals: &Intervals) -> Result<(), Error> {
     if intervals.as_slice().is_empty() {
         output::line("  none");
     }

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::{Args, CommandFactory};
 
 use super::Cli;
-use crate::error::{IoFault, Place, Result};
+use crate::error::{IoError, Locate, Result};
 
 /// Writes the manual pages, one for each command, as `man` reads them.
 ///
@@ -19,6 +19,6 @@ pub(super) struct Arguments {
 
 pub(super) fn run(arguments: &Arguments) -> Result<()> {
     clap_mangen::generate_to(Cli::command(), &arguments.directory)
-        .map_err(IoFault::on("write the manual pages"))
+        .map_err(IoError::on("write the manual pages"))
         .in_file(&arguments.directory)
 }

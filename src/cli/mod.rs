@@ -18,20 +18,20 @@ use tracing::level_filters::LevelFilter;
 
 use crate::{
     config::{Loaded, SiteConfig, check_sites, load},
-    error::Failure,
+    error::Error,
 };
 
 /// Mars Global Surveyor data preparation: SPICE kernels, MOLA shots and MOC images to validated products.
 ///
-/// Exit codes: 0 done, 1 fault of areograph, 2 usage or configuration, 3 input data, 4 kernel coverage,
+/// Exit codes: 0 done, 1 bug in areograph, 2 usage or configuration, 3 input data, 4 kernel coverage,
 /// 5 products written but invalid, or moved beyond a limit, 6 input/output, 130 interrupted.
 #[derive(Debug, Parser)]
 #[command(name = "areograph", version, arg_required_else_help = true)]
 struct Cli {
-    /// Say less (errors only) or, given as -v, more.
+    /// Print errors only.
     #[arg(short, long, global = true, conflicts_with = "verbose")]
     quiet: bool,
-    /// Say more.
+    /// Print more detail.
     #[arg(short, long, global = true)]
     verbose: bool,
     #[command(subcommand)]
@@ -44,13 +44,13 @@ enum Command {
     Run(run::Arguments),
     /// Check configuration, files and kernel coverage, gaps included; writes nothing.
     Check(check::Arguments),
-    /// Say which stages would run, and why; writes nothing.
+    /// Show which stages would run, and why; writes nothing.
     Plan(plan::Arguments),
-    /// Look at kernels: what is loaded, where the gaps are, how rival sets differ.
+    /// Inspect kernels: what is loaded, where the gaps are, how alternative sets differ.
     Kernels(kernels::Arguments),
-    /// Look into PEDR files.
+    /// Inspect PEDR files.
     Pedr(pedr::Arguments),
-    /// Say what differs between two runs.
+    /// Report what differs between two runs.
     Report(report::Arguments),
     /// Write a synthetic mission with known truth.
     Scene(scene::Arguments),
@@ -93,7 +93,7 @@ pub fn main() -> ExitCode {
 }
 
 /// Success, or one failure reported.
-fn finish(result: Result<(), Failure>) -> ExitCode {
+fn finish(result: Result<(), Error>) -> ExitCode {
     match result {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => report(&failure),
@@ -101,13 +101,13 @@ fn finish(result: Result<(), Failure>) -> ExitCode {
 }
 
 /// Prints a failure and gives its exit code.
-fn report(failure: &Failure) -> ExitCode {
+fn report(failure: &Error) -> ExitCode {
     output::error(failure);
     ExitCode::from(failure.kind().exit_code())
 }
 
 /// Loads site files; every problem of every file is reported before the first failure is given back.
-fn load_sites(paths: &[std::path::PathBuf]) -> Result<Vec<SiteConfig>, Failure> {
+fn load_sites(paths: &[std::path::PathBuf]) -> Result<Vec<SiteConfig>, Error> {
     let mut sites = Vec::with_capacity(paths.len());
     let mut first_failure = None;
     for path in paths {

@@ -10,7 +10,7 @@ use serde_json::json;
 
 use super::output;
 use crate::{
-    error::{Failure, Place as _},
+    error::{Error, Locate as _},
     pds::pedr::{Complaint, FieldGuard, File},
     spice::{KernelSet, Session},
     time::Et,
@@ -33,7 +33,7 @@ enum Command {
         /// Leap seconds (LSK, such as naif0012.tls): shows the time span in UTC as well.
         #[arg(long, value_name = "FILE")]
         leap_seconds: Option<PathBuf>,
-        /// Answer in JSON.
+        /// Print JSON.
         #[arg(long)]
         json: bool,
     },
@@ -42,7 +42,7 @@ enum Command {
 /// Complaints printed for a file; all are counted.
 const COMPLAINTS_PRINTED: usize = 20;
 
-pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
+pub(super) fn run(arguments: &Arguments) -> Result<(), Error> {
     let Command::Info {
         files,
         leap_seconds,
@@ -74,14 +74,14 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
     last.map_or(Ok(()), Err)
 }
 
-fn info(path: &Path, file: &File, clock: Option<&Session>) -> Result<serde_json::Value, Failure> {
+fn info(path: &Path, file: &File, clock: Option<&Session>) -> Result<serde_json::Value, Error> {
     let guard = FieldGuard::new(file.label().software_version);
     let mut complaints: Vec<Complaint> = file.label_complaints().to_vec();
     let mut orbits: BTreeMap<u32, u64> = BTreeMap::new();
     let mut span_s: Option<[f64; 2]> = None;
     for (row, frame) in file.frames(0..file.records().len(), guard) {
-        if let Err(fault) = &frame {
-            complaints.push(file.record_complaint(row, fault));
+        if let Err(error) = &frame {
+            complaints.push(file.record_complaint(row, error));
             continue;
         }
         let record = &file.records()[row];

@@ -8,7 +8,7 @@ use serde_json::json;
 use super::{load_sites, output};
 use crate::{
     config::SiteConfig,
-    error::Failure,
+    error::Error,
     flow::{PUBLISH, StageReason, check_out, plan_site},
 };
 
@@ -21,12 +21,12 @@ pub(super) struct Arguments {
     /// Folder of the products.
     #[arg(long, default_value = "out")]
     out: PathBuf,
-    /// Answer in JSON.
+    /// Print JSON.
     #[arg(long)]
     json: bool,
 }
 
-pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
+pub(super) fn run(arguments: &Arguments) -> Result<(), Error> {
     let sites = load_sites(&arguments.sites)?;
     check_out(&arguments.out, &sites)?;
     print(&sites, &arguments.out, PUBLISH, false, arguments.json)
@@ -39,7 +39,7 @@ pub(super) fn print(
     until: &str,
     force: bool,
     as_json: bool,
-) -> Result<(), Failure> {
+) -> Result<(), Error> {
     let mut answers = Vec::new();
     for site in sites {
         let stages = plan_site(site, out, until, force)?;

@@ -8,7 +8,7 @@ use serde_json::json;
 use super::output;
 use crate::{
     difference::{Answer, Limits, Outcome, Pairs, RunDifference, SiteAnswer, compare, pairs},
-    error::{Failure, Kind},
+    error::{Error, Kind},
     report::difference_page,
     store::page::PagePath,
 };
@@ -41,7 +41,7 @@ struct DiffArguments {
     /// Products of the second run.
     #[arg(value_name = "OUT_B")]
     b: PathBuf,
-    /// Answer in JSON.
+    /// Print JSON.
     #[arg(long)]
     json: bool,
     /// Write a page to this file as well; its folder must exist, and products are not overwritten.
@@ -72,9 +72,9 @@ pub(super) fn run(arguments: &Arguments) -> ExitCode {
 }
 
 /// A site and what came of its comparison.
-type Compared = (String, Result<RunDifference, Failure>);
+type Compared = (String, Result<RunDifference, Error>);
 
-fn diff(arguments: &DiffArguments) -> Result<u8, Failure> {
+fn diff(arguments: &DiffArguments) -> Result<u8, Error> {
     let limits = Limits {
         movement_m: arguments.limit_m,
         pointing_arcsec: arguments.limit_arcsec,
@@ -89,7 +89,7 @@ fn diff(arguments: &DiffArguments) -> Result<u8, Failure> {
     if arguments.json {
         output::json(&json!(answer(&sites, &pairs)));
     } else {
-        print(&sites, &lonely(&pairs, &limits));
+        print(&sites, &unmatched(&pairs, &limits));
     }
     let failures = || {
         sites
@@ -101,7 +101,7 @@ fn diff(arguments: &DiffArguments) -> Result<u8, Failure> {
         let compared = sites
             .iter()
             .filter_map(|(_, compared)| compared.as_ref().ok());
-        let mut not_compared = lonely(&pairs, &limits);
+        let mut not_compared = unmatched(&pairs, &limits);
         not_compared.extend(failures().map(ToString::to_string));
         let page = difference_page(&compared.collect::<Vec<_>>(), &not_compared)?;
         path.write(&page)?;
@@ -110,7 +110,7 @@ fn diff(arguments: &DiffArguments) -> Result<u8, Failure> {
 }
 
 /// Sites that only one output has, one sentence each.
-fn lonely(pairs: &Pairs, limits: &Limits) -> Vec<String> {
+fn unmatched(pairs: &Pairs, limits: &Limits) -> Vec<String> {
     let gone = if *limits == Limits::default() {
         "only in A, not compared"
     } else {
@@ -126,7 +126,7 @@ fn lonely(pairs: &Pairs, limits: &Limits) -> Vec<String> {
     sentences.collect()
 }
 
-fn print(sites: &[Compared], lonely: &[String]) {
+fn print(sites: &[Compared], unmatched: &[String]) {
     for (_, compared) in sites {
         let Ok(difference) = compared else { continue };
         output::line(format_args!(
@@ -140,7 +140,7 @@ fn print(sites: &[Compared], lonely: &[String]) {
             output::line(format_args!("  {sentence}"));
         }
     }
-    lonely.iter().for_each(output::line);
+    unmatched.iter().for_each(output::line);
 }
 
 fn answer<'a>(sites: &'a [Compared], pairs: &'a Pairs) -> Answer<'a> {

@@ -16,7 +16,7 @@ use tokio::{sync::Semaphore, task::JoinHandle};
 use super::{load_sites, output, plan, report};
 use crate::{
     config::SiteConfig,
-    error::{Failure, Kind},
+    error::{Error, Kind},
     flow::{Ending, PUBLISH, RunOptions, STAGES, SiteOutcome, check_out, publish_sites, run_site},
     store::{manifest::Manifest, publish::read_manifest},
 };
@@ -53,10 +53,10 @@ pub(super) struct Arguments {
     /// Run every stage, whatever is stored.
     #[arg(long)]
     force: bool,
-    /// Say which stages would run, and why; write nothing.
+    /// Show which stages would run, and why; write nothing.
     #[arg(long)]
     dry_run: bool,
-    /// Answer in JSON.
+    /// Print JSON.
     #[arg(long)]
     json: bool,
 }
@@ -87,7 +87,7 @@ pub(super) fn run(arguments: &Arguments) -> ExitCode {
     }
     let runtime = match tokio::runtime::Runtime::new() {
         Ok(runtime) => runtime,
-        Err(error) => return report(&crate::error::IoFault::on("start threads")(error).into()),
+        Err(error) => return report(&crate::error::IoError::on("start threads")(error).into()),
     };
     let outcomes = runtime.block_on(run_all(sites, arguments));
     print(&outcomes, arguments.json);
@@ -119,7 +119,7 @@ pub(super) fn run(arguments: &Arguments) -> ExitCode {
     ExitCode::from(failed.or(codes.first()).copied().unwrap_or(0))
 }
 
-type Outcome = Result<SiteOutcome, Failure>;
+type Outcome = Result<SiteOutcome, Error>;
 
 /// Runs at most `jobs` sites at a time; Ctrl-C lets each finish its stage, or leave a long one, and stop.
 async fn run_all(sites: Vec<SiteConfig>, arguments: &Arguments) -> Vec<Outcome> {
@@ -153,7 +153,9 @@ async fn run_all(sites: Vec<SiteConfig>, arguments: &Arguments) -> Vec<Outcome> 
         let stop = Arc::clone(&stop);
         async move {
             if tokio::signal::ctrl_c().await.is_ok() {
-                tracing::warn!("stopping as soon as the stages at work can; again to stop at once");
+                tracing::warn!(
+                    "stopping when the running stages allow it; press again to stop at once"
+                );
                 stop.store(true, Ordering::Relaxed);
             }
             if tokio::signal::ctrl_c().await.is_ok() {
@@ -170,7 +172,7 @@ async fn run_all(sites: Vec<SiteConfig>, arguments: &Arguments) -> Vec<Outcome> 
     outcomes
 }
 
-/// A task that panicked is a fault of areograph, reported like any other failure.
+/// A task that panicked is a bug in areograph, reported like any other failure.
 fn flatten(joined: Result<Outcome, tokio::task::JoinError>) -> Outcome {
     joined.unwrap_or_else(|error| Err(Panicked(error.to_string()).into()))
 }
@@ -179,13 +181,13 @@ fn flatten(joined: Result<Outcome, tokio::task::JoinError>) -> Outcome {
 #[error("areograph itself failed: {0}")]
 struct Panicked(String);
 
-impl crate::error::Fault for Panicked {
+impl crate::error::Cause for Panicked {
     fn kind(&self) -> Kind {
         Kind::Bug
     }
 
     fn advice(&self) -> String {
-        "please report it with the configuration; running again finds and mends what was left"
+        "please report it with the configuration; running again finds and repairs what was left"
             .to_owned()
     }
 }
@@ -231,7 +233,7 @@ fn print_outcome(outcome: &SiteOutcome) {
             return output::line(format_args!("{site}: stopped after {stage}{products}"));
         }
         Ending::Published(manifest) => ("products", manifest),
-        Ending::Unchanged(manifest) => ("nothing changed; products stand", manifest),
+        Ending::Unchanged(manifest) => ("nothing changed; products are up to date", manifest),
     };
     let verdict = &manifest.verdict;
     output::line(format_args!(

@@ -6,7 +6,7 @@ use clap::Args;
 
 use super::output;
 use crate::{
-    error::Failure,
+    error::Error,
     scene::{SceneOptions, write_scene, write_scene_along},
 };
 
@@ -29,7 +29,7 @@ pub(super) struct Arguments {
     label: Vec<PathBuf>,
 }
 
-pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
+pub(super) fn run(arguments: &Arguments) -> Result<(), Error> {
     let options = SceneOptions {
         seed: arguments.seed,
         ..SceneOptions::default()

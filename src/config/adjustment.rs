@@ -62,7 +62,7 @@ declare_table! {
         position_sigma_off_nadir_m: f64 = key(SIGMA_OR_FREE).or(200.0).was("off_nadir_sigma_m"),
         /// Weights of image coordinates that fall with their residual.
         robust: Option<RobustWeight> = group::<RobustKeys>().map(RobustKeys::weight),
-        /// Standardised residual above which a tie point is a blunder and left out; 0 keeps all. Beyond the
+        /// Standardised residual above which a tie point is a blunder and rejected; 0 keeps all. Beyond the
         /// default is one good observation in a thousand.
         blunder_limit: Option<f64> = key(from_to(0.0, 1000.0))
             .or(BAARDA_LIMIT)

@@ -15,7 +15,7 @@ const VERTICES_MAX: usize = 100_000;
 pub(super) type Polygons = Vec<Vec<Vec<[f64; 2]>>>;
 
 #[derive(Debug, thiserror::Error)]
-pub(super) enum GeoJsonFault {
+pub(super) enum GeoJsonError {
     #[error("cannot read: {0}")]
     Io(#[from] std::io::Error),
     #[error("is longer than {} MiB", BYTES_MAX >> 20)]
@@ -26,16 +26,16 @@ pub(super) enum GeoJsonFault {
     Empty,
     #[error("has more than {VERTICES_MAX} vertices")]
     TooManyVertices,
-    #[error("polygon {polygon} ring {ring} {fault}")]
+    #[error("polygon {polygon} ring {ring} {error}")]
     Ring {
         polygon: usize,
         ring: usize,
-        fault: RingFault,
+        error: RingError,
     },
 }
 
 #[derive(Debug, thiserror::Error)]
-pub(super) enum RingFault {
+pub(super) enum RingError {
     #[error("has {0} positions; at least 4 make a closed ring")]
     Short(usize),
     #[error("is not closed: its last position must repeat its first")]
@@ -64,40 +64,40 @@ enum Object {
 type Rings = Vec<Vec<Vec<f64>>>;
 
 /// The polygons of the file, radians.
-pub(super) fn read(path: &Path) -> Result<Polygons, GeoJsonFault> {
+pub(super) fn read(path: &Path) -> Result<Polygons, GeoJsonError> {
     let mut bytes = Vec::new();
     File::open(path)?
         .take(BYTES_MAX + 1)
         .read_to_end(&mut bytes)?;
     if bytes.len() as u64 > BYTES_MAX {
-        return Err(GeoJsonFault::TooLong);
+        return Err(GeoJsonError::TooLong);
     }
     parse(&bytes)
 }
 
 /// The polygons of a GeoJSON text, radians; some writers put a byte order mark before it.
-fn parse(bytes: &[u8]) -> Result<Polygons, GeoJsonFault> {
+fn parse(bytes: &[u8]) -> Result<Polygons, GeoJsonError> {
     let bytes = bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(bytes);
     let mut found = Vec::new();
     collect(serde_json::from_slice(bytes)?, &mut found);
     if found.is_empty() {
-        return Err(GeoJsonFault::Empty);
+        return Err(GeoJsonError::Empty);
     }
     if found.iter().flatten().map(Vec::len).sum::<usize>() > VERTICES_MAX {
-        return Err(GeoJsonFault::TooManyVertices);
+        return Err(GeoJsonError::TooManyVertices);
     }
     let place = |polygon, ring| {
-        move |fault| GeoJsonFault::Ring {
+        move |error| GeoJsonError::Ring {
             polygon,
             ring,
-            fault,
+            error,
         }
     };
     (1..)
         .zip(&found)
         .map(|(polygon, rings)| {
             if rings.is_empty() {
-                return Err(place(polygon, 1)(RingFault::Short(0)));
+                return Err(place(polygon, 1)(RingError::Short(0)));
             }
             (1..)
                 .zip(rings)
@@ -124,24 +124,24 @@ fn collect(object: Object, found: &mut Vec<Rings>) {
     }
 }
 
-fn ring(positions: &[Vec<f64>]) -> Result<Vec<[f64; 2]>, RingFault> {
+fn ring(positions: &[Vec<f64>]) -> Result<Vec<[f64; 2]>, RingError> {
     if positions.len() < 4 {
-        return Err(RingFault::Short(positions.len()));
+        return Err(RingError::Short(positions.len()));
     }
     if positions.first() != positions.last() {
-        return Err(RingFault::Open);
+        return Err(RingError::Open);
     }
     let (mut west, mut east) = (f64::INFINITY, f64::NEG_INFINITY);
     let mut vertices = Vec::with_capacity(positions.len());
     for (number, position) in (1..).zip(positions) {
         let [longitude, latitude, ..] = position[..] else {
-            return Err(RingFault::Position(number));
+            return Err(RingError::Position(number));
         };
         if !(-180.0..=360.0).contains(&longitude) {
-            return Err(RingFault::Longitude(number, longitude));
+            return Err(RingError::Longitude(number, longitude));
         }
         if !(-90.0..=90.0).contains(&latitude) {
-            return Err(RingFault::Latitude(number, latitude));
+            return Err(RingError::Latitude(number, latitude));
         }
         west = west.min(longitude);
         east = east.max(longitude);
@@ -151,10 +151,10 @@ fn ring(positions: &[Vec<f64>]) -> Result<Vec<[f64; 2]>, RingFault> {
         ]);
     }
     if east - west >= 360.0 {
-        return Err(RingFault::Wide(east - west));
+        return Err(RingError::Wide(east - west));
     }
     match crossing(&vertices) {
-        Some((one, other)) => Err(RingFault::Crossed(one, other)),
+        Some((one, other)) => Err(RingError::Crossed(one, other)),
         None => Ok(vertices),
     }
 }

@@ -106,7 +106,7 @@ impl Form for Camera {
             found.refuse(review, expected);
             return None;
         }
-        let read = super::read(&path).map_err(|failure| failure.fault.to_string());
+        let read = super::read(&path).map_err(|failure| failure.cause.to_string());
         let read = read.and_then(|text| instrument(&text, &path).map_err(|all| all.to_string()));
         read.map_err(|problems| {
             let text = format!("{} names a file with problems:\n{problems}", found.key);

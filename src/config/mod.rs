@@ -45,7 +45,7 @@ pub use site::SiteConfig;
 pub use ties::{IntersectionConfig, TiesConfig};
 pub use windows::WindowConfig;
 
-use crate::error::{Failure, Fault, IoFault, Kind, Place as _};
+use crate::error::{Cause, Error, IoError, Kind, Locate as _};
 use declare::{Keys, Table as _, described};
 use problems::Review;
 use written::Written;
@@ -65,15 +65,15 @@ pub struct Loaded {
 /// Reads and checks the configuration `path`; relative paths in it count from its own folder.
 ///
 /// # Errors
-/// [`Problems`] with everything that is wrong, or [`IoFault`] when the file cannot be read.
-pub fn load(path: &Path) -> Result<Loaded, Failure> {
+/// [`Problems`] with everything that is wrong, or [`IoError`] when the file cannot be read.
+pub fn load(path: &Path) -> Result<Loaded, Error> {
     let text = read(path)?;
     Ok(parse(&text, path)?)
 }
 
 /// The text of the file, of bounded length.
-fn read(path: &Path) -> Result<String, Failure> {
-    let size = path.metadata().map_err(IoFault::on("read")).in_file(path)?;
+fn read(path: &Path) -> Result<String, Error> {
+    let size = path.metadata().map_err(IoError::on("read")).in_file(path)?;
     // Devices and pipes could be read for ever.
     if !size.is_file() {
         return Err(Problems::of_file(path, "is no regular file; expected a TOML file").into());
@@ -81,7 +81,7 @@ fn read(path: &Path) -> Result<String, Failure> {
     let mut bytes = Vec::new();
     File::open(path)
         .and_then(|file| file.take(BYTES_MAX + 1).read_to_end(&mut bytes))
-        .map_err(IoFault::on("read"))
+        .map_err(IoError::on("read"))
         .in_file(path)?;
     if bytes.len() as u64 > BYTES_MAX {
         let text = format!("is longer than {BYTES_MAX} bytes; expected the TOML file of one site");
@@ -176,7 +176,7 @@ pub struct DuplicateSite {
     pub second: String,
 }
 
-impl Fault for DuplicateSite {
+impl Cause for DuplicateSite {
     fn kind(&self) -> Kind {
         Kind::Configuration
     }

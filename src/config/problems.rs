@@ -7,7 +7,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use crate::error::{Fault, Kind};
+use crate::error::{Cause, Kind};
 
 /// Problems reported one by one; a file with more is told how many were left out.
 const LISTED_MAX: usize = 100;
@@ -44,7 +44,7 @@ impl fmt::Display for Problems {
 
 impl std::error::Error for Problems {}
 
-impl Fault for Problems {
+impl Cause for Problems {
     fn kind(&self) -> Kind {
         Kind::Configuration
     }
@@ -56,7 +56,7 @@ impl Fault for Problems {
 }
 
 /// Where something stands: a byte range of the text, or the file as a whole.
-type Place = Option<Range<usize>>;
+type TextSpan = Option<Range<usize>>;
 
 /// A key that stands in the file under its former name.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
@@ -73,9 +73,9 @@ pub(super) struct Rename {
 pub(super) struct Review<'a> {
     file: &'a Path,
     text: &'a str,
-    problems: Vec<(Place, String)>,
+    problems: Vec<(TextSpan, String)>,
     unlisted: usize,
-    warnings: Vec<(Place, String)>,
+    warnings: Vec<(TextSpan, String)>,
     renames: BTreeSet<Rename>,
 }
 
@@ -99,7 +99,7 @@ impl<'a> Review<'a> {
     }
 
     /// A problem in words of its own.
-    pub(super) fn problem(&mut self, place: Place, text: String) {
+    pub(super) fn problem(&mut self, place: TextSpan, text: String) {
         if self.problems.len() < LISTED_MAX {
             self.problems.push((place, text));
         } else {
@@ -114,7 +114,7 @@ impl<'a> Review<'a> {
     }
 
     /// `key` is absent from the table at `place`.
-    pub(super) fn missing(&mut self, place: Place, key: &str, expected: impl fmt::Display) {
+    pub(super) fn missing(&mut self, place: TextSpan, key: &str, expected: impl fmt::Display) {
         self.problem(place, format!("{key} is missing; expected {expected}"));
     }
 
@@ -159,7 +159,7 @@ impl<'a> Review<'a> {
     }
 
     /// `file:line:column: text` for each entry, in order of place.
-    fn placed(&self, mut entries: Vec<(Place, String)>) -> Vec<String> {
+    fn placed(&self, mut entries: Vec<(TextSpan, String)>) -> Vec<String> {
         entries.sort_by_key(|(place, _)| place.as_ref().map(|span| span.start));
         let file = self.file.display();
         entries

@@ -104,8 +104,8 @@ fn outline(path: &Path, keys: &mut Keys<'_, '_>) -> Option<WindowShape> {
     }
     match geojson::read(path) {
         Ok(polygons) => Some(WindowShape::Polygons { polygons }),
-        Err(fault) => {
-            let expected = format!("GeoJSON polygons; {}: {fault}", path.display());
+        Err(error) => {
+            let expected = format!("GeoJSON polygons; {}: {error}", path.display());
             keys.refuse("polygon", expected);
             None
         }

@@ -42,8 +42,8 @@ impl Change {
 impl Texts {
     pub(super) fn between(a: &[String], b: &[String]) -> Self {
         let without = |texts: &[String], others: &[String]| {
-            let lonely = texts.iter().filter(|text| !others.contains(text));
-            lonely.cloned().collect()
+            let unmatched = texts.iter().filter(|text| !others.contains(text));
+            unmatched.cloned().collect()
         };
         Self {
             only_in_a: without(a, b),

@@ -31,7 +31,7 @@ const SAME_LINE: f64 = 1e-3;
 pub struct ImageDifference {
     /// Image identifier.
     pub image: String,
-    /// Whether its model keeps the limits in the first run; missing when the image is not there.
+    /// Whether its model is within the limits in the first run; missing when the image is not there.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub valid_in_a: Option<bool>,
     /// The same in the second run.

@@ -53,11 +53,11 @@ impl Items {
     pub(super) fn between(a: &[Item], b: &[Item]) -> Self {
         let find =
             |items: &[Item], name: &str| items.iter().find(|item| item.name == name).cloned();
-        let lonely = |items: &[Item], others: &[Item]| -> Vec<Item> {
-            let lonely = items
+        let unmatched = |items: &[Item], others: &[Item]| -> Vec<Item> {
+            let unmatched = items
                 .iter()
                 .filter(|item| find(others, &item.name).is_none());
-            lonely.cloned().collect()
+            unmatched.cloned().collect()
         };
         let pairs: Vec<(&Item, Item)> = a
             .iter()
@@ -75,8 +75,8 @@ impl Items {
             .collect();
         let order_of_b = b.iter().filter(|second| find(a, &second.name).is_some());
         Self {
-            added: lonely(b, a),
-            removed: lonely(a, b),
+            added: unmatched(b, a),
+            removed: unmatched(a, b),
             unchanged: pairs.len() - changed.len(),
             reordered: !pairs
                 .iter()
@@ -96,7 +96,7 @@ impl Items {
     }
 }
 
-/// Items of one list, names that come again told apart.
+/// Items of one list, repeated names numbered.
 fn items<'a>(entries: impl Iterator<Item = (&'a str, Option<&'a str>, &'a str)>) -> Vec<Item> {
     let mut items: Vec<Item> = Vec::new();
     for (plain, role, hash) in entries {
@@ -147,8 +147,8 @@ pub(super) fn images(manifest: &Manifest) -> Vec<String> {
 
 /// Names of `a` in their order, then those of `b` alone.
 pub(super) fn united(a: &[String], b: &[String]) -> Vec<String> {
-    let lonely = b.iter().filter(|name| !a.contains(name));
-    a.iter().chain(lonely).cloned().collect()
+    let unmatched = b.iter().filter(|name| !a.contains(name));
+    a.iter().chain(unmatched).cloned().collect()
 }
 
 #[cfg(test)]

@@ -6,7 +6,7 @@
 
 mod answer;
 mod changes;
-mod fault;
+mod error;
 mod footprints;
 mod images;
 mod items;
@@ -21,7 +21,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::{
-    error::{Place, Result},
+    error::{Locate, Result},
     products::read::{ImageDocument, ProfileDocument, read_image, read_ranges},
     store::{
         manifest::{Manifest, Verdict},
@@ -39,7 +39,7 @@ pub use movement::{Component, Size};
 pub use outputs::{Pairs, pairs};
 pub use words::quantity;
 
-use fault::DifferenceFault;
+use error::DifferenceError;
 
 /// Everything that differs between two runs of one site.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
@@ -71,9 +71,9 @@ pub struct RunDifference {
     pub counts: Vec<Change>,
     /// Largest figures of the site that differ.
     pub figures: Vec<Change>,
-    /// Shots left out, by reason, that differ.
+    /// Rejected shots by reason, that differ.
     pub rejected: Vec<Change>,
-    /// Complaints about input of one run alone; manifests quote the first ones.
+    /// Problems in the input of one run alone; manifests quote the first ones.
     pub complaints: Texts,
     /// Notes of one run alone; that a list names a kernel is told by the kernels.
     pub notes: Texts,
@@ -154,11 +154,11 @@ pub struct ProfileDifference {
 pub fn compare(a: &Path, b: &Path, limits: &Limits) -> Result<RunDifference> {
     let (first, second) = (read_published(a)?, read_published(b)?);
     if first.site != second.site {
-        let fault = DifferenceFault::DifferentSites {
+        let error = DifferenceError::DifferentSites {
             a: first.site,
             b: second.site,
         };
-        return Err(fault).in_file(b);
+        return Err(error).in_file(b);
     }
     let site = first.site.clone();
     let difference = of_manifests(&first, &second, limits);

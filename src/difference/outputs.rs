@@ -6,9 +6,9 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use super::fault::DifferenceFault;
+use super::error::DifferenceError;
 use crate::{
-    error::{IoFault, Place, Result},
+    error::{IoError, Locate, Result},
     store::published::is_site_folder,
 };
 
@@ -31,11 +31,11 @@ pub struct Pairs {
 pub fn pairs(a: &Path, b: &Path) -> Result<Pairs> {
     let real = |path: &Path| {
         fs::canonicalize(path)
-            .map_err(IoFault::on("read the folder"))
+            .map_err(IoError::on("read the folder"))
             .in_file(path)
     };
     if real(a)? == real(b)? {
-        return Err(DifferenceFault::SameFolder).in_file(b);
+        return Err(DifferenceError::SameFolder).in_file(b);
     }
     match (is_site_folder(a), is_site_folder(b)) {
         (true, true) => Ok(Pairs {
@@ -47,7 +47,7 @@ pub fn pairs(a: &Path, b: &Path) -> Result<Pairs> {
         (one_in_a, _) => {
             // The other one may hold nothing at all, which is then the better message.
             sites(if one_in_a { b } else { a })?;
-            Err(DifferenceFault::OneAndSeveral).in_file(if one_in_a { a } else { b })
+            Err(DifferenceError::OneAndSeveral).in_file(if one_in_a { a } else { b })
         }
     }
 }
@@ -64,7 +64,7 @@ fn common(a: &Path, b: &Path) -> Result<Pairs> {
         }
     }
     if both.is_empty() {
-        return Err(DifferenceFault::NoneInBoth {
+        return Err(DifferenceError::NoneInBoth {
             a: names_a.join(", "),
             b: names_b.join(", "),
         }
@@ -81,11 +81,11 @@ fn common(a: &Path, b: &Path) -> Result<Pairs> {
 fn sites(root: &Path) -> Result<BTreeMap<String, PathBuf>> {
     let mut sites = BTreeMap::new();
     let entries = fs::read_dir(root)
-        .map_err(IoFault::on("read the folder"))
+        .map_err(IoError::on("read the folder"))
         .in_file(root)?;
     for entry in entries {
         let entry = entry
-            .map_err(IoFault::on("read the folder"))
+            .map_err(IoError::on("read the folder"))
             .in_file(root)?;
         if is_site_folder(&entry.path()) {
             let name = entry.file_name().to_string_lossy().into_owned();
@@ -93,7 +93,7 @@ fn sites(root: &Path) -> Result<BTreeMap<String, PathBuf>> {
         }
     }
     if sites.is_empty() {
-        return Err(DifferenceFault::NoProducts).in_file(root);
+        return Err(DifferenceError::NoProducts).in_file(root);
     }
     Ok(sites)
 }

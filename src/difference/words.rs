@@ -166,7 +166,7 @@ impl RunDifference {
                 told.push(format!("times by {}", signed(movement.time_s, "s")));
             }
         }
-        told.extend(lonely(footprints.only_in_a, footprints.only_in_b, ""));
+        told.extend(unmatched(footprints.only_in_a, footprints.only_in_b, ""));
         told.join(", ")
     }
 
@@ -245,7 +245,7 @@ fn items(what: &str, items: &Items) -> Option<String> {
         Some(role) => format!("{name} ({role}) {happened}"),
         None => format!("{name} {happened}"),
     };
-    let lonely = |items: &[Item], happened: &str| -> Vec<String> {
+    let unmatched = |items: &[Item], happened: &str| -> Vec<String> {
         let items = items.iter();
         items
             .map(|item| named(&item.name, item.role.as_ref(), happened))
@@ -255,8 +255,8 @@ fn items(what: &str, items: &Items) -> Option<String> {
     let mut told: Vec<String> = changed
         .map(|item| named(&item.name, item.role.as_ref(), "changed"))
         .collect();
-    told.extend(lonely(&items.removed, "removed"));
-    told.extend(lonely(&items.added, "added"));
+    told.extend(unmatched(&items.removed, "removed"));
+    told.extend(unmatched(&items.added, "added"));
     if items.reordered {
         told.push("another load order".to_owned());
     }
@@ -310,12 +310,12 @@ fn image_sentence(image: &ImageDifference) -> String {
         told.push(format!("lines at other times, by {times}"));
     }
     let (a, b) = (image.samples_only_in_a, image.samples_only_in_b);
-    told.extend(lonely(a, b, " samples"));
+    told.extend(unmatched(a, b, " samples"));
     format!("image {name}: {}", told.join("; "))
 }
 
 /// What is in one run only.
-fn lonely(in_a: usize, in_b: usize, what: &'static str) -> impl Iterator<Item = String> {
+fn unmatched(in_a: usize, in_b: usize, what: &'static str) -> impl Iterator<Item = String> {
     let runs = [(in_a, "A"), (in_b, "B")].into_iter();
     runs.filter(|(count, _)| *count > 0)
         .map(move |(count, whose)| format!("{count}{what} only in {whose}"))

@@ -5,16 +5,16 @@ use std::{path::PathBuf, sync::atomic::AtomicBool};
 use super::{
     RivalSet,
     driver::{Driver, Flow, Leave},
-    kernels::{load_rivals, wanted},
+    kernels::{load_rivals, required_coverage},
     outputs::{Prepared, Site},
     site::{kernels, orient, prepare, ties},
 };
 use crate::{
     config::SiteConfig,
-    error::{Failure, Place, Result},
+    error::{Error, Locate, Result},
     files::{HashedFile, InputFiles},
     kernel_source::KernelSource,
-    spice::Wanted,
+    spice::RequiredCoverage,
     stage::{Output, Provenance, Stage},
     stages::{group_profiles::Profile, tag_times::ImageTimes},
 };
@@ -25,7 +25,7 @@ pub struct Checked {
     /// What is well, one line each.
     pub findings: Vec<String>,
     /// What a run would stumble over; all of it, not only the first.
-    pub failures: Vec<Failure>,
+    pub failures: Vec<Error>,
 }
 
 /// Checks a site's kernels, labels, PEDR and tie point files, and coverage at its images and at its shots; of rival
@@ -45,7 +45,7 @@ pub fn check_site(config: &SiteConfig) -> Checked {
 ///
 /// # Errors
 /// What those stages say of labels, clocks and PEDR files.
-pub fn wanted_by_site(config: &SiteConfig) -> Result<Wanted> {
+pub fn required_by_site(config: &SiteConfig) -> Result<RequiredCoverage> {
     let mut check = Check::of(config);
     let prepared = prepare(&mut check, config);
     if let Some(failure) = check.checked.failures.into_iter().next() {
@@ -53,7 +53,7 @@ pub fn wanted_by_site(config: &SiteConfig) -> Result<Wanted> {
     }
     match prepared {
         Ok(prepared) => Ok(prepared.required.unwrap_or_default()),
-        Err(Leave::StageReached) => Ok(Wanted::default()),
+        Err(Leave::StageReached) => Ok(RequiredCoverage::default()),
         Err(Leave::Failed(failure)) => Err(failure.in_site(&config.site)),
     }
 }
@@ -168,10 +168,10 @@ impl Driver for Check<'_> {
         config: &SiteConfig,
         images: &[Output<ImageTimes>],
         profiles: &Output<Vec<Profile>>,
-    ) -> Option<Wanted> {
+    ) -> Option<RequiredCoverage> {
         let images: Vec<&ImageTimes> = images.iter().filter_map(Output::get).collect();
         let profiles = profiles.get().map_or(&[][..], Vec::as_slice);
-        Some(wanted(config, &images, profiles))
+        Some(required_coverage(config, &images, profiles))
     }
 
     fn stage<S: Stage>(&mut self, stage: &S) -> Flow<Output<S::Output>> {

@@ -12,7 +12,7 @@ use crate::{
     config::SiteConfig,
     error::Result,
     files::InputFiles,
-    spice::{KernelRole, Wanted, position_kernels},
+    spice::{KernelRole, RequiredCoverage, position_kernels},
     stage::{Input, Inputs, Stage},
     stage_inputs,
     stages::describe_kernels::Required,
@@ -73,7 +73,7 @@ impl Stage for ChooseKernels<'_> {
     stage_inputs!(fingerprint);
 
     fn run(&self, _stop: &AtomicBool) -> Result<KernelChoice> {
-        let nothing = Wanted::default();
+        let nothing = RequiredCoverage::default();
         let required = self.required.0.unwrap_or(&nothing);
         choose_kernels(self.sets.0, required, *self.compare_clocks)
     }
@@ -83,7 +83,11 @@ impl Stage for ChooseKernels<'_> {
 ///
 /// # Errors
 /// As [`compare_kernels`].
-fn choose_kernels(rivals: &[RivalSet], required: &Wanted, clocks: bool) -> Result<KernelChoice> {
+fn choose_kernels(
+    rivals: &[RivalSet],
+    required: &RequiredCoverage,
+    clocks: bool,
+) -> Result<KernelChoice> {
     if required.positions.duration_s() <= 0.0 {
         let first = &rivals[0].id;
         return Ok(KernelChoice {
@@ -96,7 +100,7 @@ fn choose_kernels(rivals: &[RivalSet], required: &Wanted, clocks: bool) -> Resul
     }
     let request = Request {
         stage: ChooseKernels::NAME,
-        wanted: Some(required),
+        required: Some(required),
         bias: PointingBias::from_seconds(0.0),
         attitudes: false,
         clocks,
@@ -166,11 +170,11 @@ fn notes(compared: &Compared) -> Vec<String> {
     )];
     if !orbit.tied.is_empty() {
         notes.push(format!(
-            "kernel set {} is the first of several that are equally close; as close: {}",
+            "kernel set {} is the first of several that are equally close: {}",
             orbit.closest().set,
             orbit.tied_sets().collect::<Vec<_>>().join(", ")
         ));
     }
-    notes.extend(compared.left_out_lines());
+    notes.extend(compared.uncovered_lines());
     notes
 }

@@ -2,11 +2,11 @@
 
 mod clocks;
 mod epochs;
-mod left_out;
+mod uncovered;
 
 use crate::{
-    error::{Fault, Kind, Place, Result},
-    spice::{Coverage, KernelSet, Session, Wanted},
+    error::{Cause, Kind, Locate, Result},
+    spice::{Coverage, KernelSet, RequiredCoverage, Session},
     stages::compare_kernels::{
         AttitudeComparison, AttitudeSample, Comparison, compare_attitudes, compare_orbits,
     },
@@ -14,7 +14,7 @@ use crate::{
 };
 
 pub use epochs::EPOCHS_MAX;
-pub use left_out::LeftOut;
+pub use uncovered::Uncovered;
 
 use clocks::{check_clocks, read_clocks};
 use epochs::{Gap, equally_spaced, shared, turn_epochs};
@@ -34,7 +34,7 @@ pub struct Request<'a> {
     /// What asks; failures of one set are placed there, followed by `/` and the set.
     pub stage: &'static str,
     /// The instants of interest; without them all that every set holds.
-    pub wanted: Option<&'a Wanted>,
+    pub required: Option<&'a RequiredCoverage>,
     /// How C-kernels are read.
     pub bias: PointingBias,
     /// Whether attitudes are compared too, as far as the sets hold any.
@@ -53,7 +53,7 @@ pub struct Compared {
     /// First and last epoch of the orbits in UTC.
     pub utc: [String; 2],
     /// Instants that were of interest but that one set does not hold.
-    pub left_out: Vec<LeftOut>,
+    pub uncovered: Vec<Uncovered>,
     /// What a reader should know, one sentence each.
     pub notes: Vec<String>,
 }
@@ -68,14 +68,14 @@ impl Request<'_> {
 impl Compared {
     /// For each set what it lacks: how much, and the first spans; one sentence each.
     #[must_use]
-    pub fn left_out_lines(&self) -> Vec<String> {
-        left_out::lines(&self.left_out)
+    pub fn uncovered_lines(&self) -> Vec<String> {
+        uncovered::lines(&self.uncovered)
     }
 }
 
 /// Sets that cannot be compared.
 #[derive(Debug, thiserror::Error)]
-enum CompareFault {
+enum CompareError {
     #[error("kernel set {other} holds the same kernels as {first}")]
     Same { first: String, other: String },
     #[error("no time at which all kernel sets hold the position of MGS; {held}")]
@@ -91,7 +91,7 @@ enum CompareFault {
     },
 }
 
-impl Fault for CompareFault {
+impl Cause for CompareError {
     fn kind(&self) -> Kind {
         match self {
             Self::Same { .. } => Kind::Configuration,
@@ -128,11 +128,11 @@ pub fn compare_kernels(sets: &[RivalSet], request: &Request<'_>) -> Result<Compa
     let mut notes = Vec::new();
 
     let positions: Vec<Intervals> = held.iter().map(|coverage| coverage.spk.clone()).collect();
-    let wanted = request.wanted.map(|wanted| &wanted.positions);
-    let (common, mut gaps) = shared(wanted, &positions, "position");
+    let required = request.required.map(|required| &required.positions);
+    let (common, mut gaps) = shared(required, &positions, "position");
     let epochs = equally_spaced(&common);
     if epochs.is_empty() {
-        return Err(nothing_in_common(sets, &positions, wanted).into());
+        return Err(nothing_in_common(sets, &positions, required).into());
     }
     let (turn_epochs, more) = turn_epochs(sets, &held, request, &mut notes);
     gaps.extend(more);
@@ -140,8 +140,8 @@ pub fn compare_kernels(sets: &[RivalSet], request: &Request<'_>) -> Result<Compa
     let first = Session::open(&sets[0].kernels)?;
     let hull = Interval::new(epochs[0], epochs[epochs.len() - 1]);
     let utc = utc_of(&first, hull)?;
-    let left_out = gaps.into_iter().map(|gap| left_out(sets, gap, &first));
-    let left_out = left_out.collect::<Result<_>>()?;
+    let uncovered = gaps.into_iter().map(|gap| uncovered(sets, gap, &first));
+    let uncovered = uncovered.collect::<Result<_>>()?;
     let readings = read_clocks(&first, &epochs, request.clocks || !turn_epochs.is_empty())?;
     drop(first);
 
@@ -167,7 +167,7 @@ pub fn compare_kernels(sets: &[RivalSet], request: &Request<'_>) -> Result<Compa
         orbit: compare_orbits(&epochs, &orbits),
         attitude,
         utc,
-        left_out,
+        uncovered,
         notes,
     })
 }
@@ -176,22 +176,26 @@ pub fn compare_kernels(sets: &[RivalSet], request: &Request<'_>) -> Result<Compa
 fn nothing_in_common(
     sets: &[RivalSet],
     positions: &[Intervals],
-    wanted: Option<&Intervals>,
-) -> CompareFault {
+    required: Option<&Intervals>,
+) -> CompareError {
     let held = sets.iter().zip(positions).map(|(set, held)| {
-        let held = wanted.map_or_else(|| held.clone(), |wanted| wanted.intersection(held));
+        let held = required.map_or_else(|| held.clone(), |required| required.intersection(held));
         format!("{} holds {:.3} s", set.id, held.duration_s())
     });
-    let of = wanted.map_or_else(String::new, |wanted| {
-        format!(" of {:.3} s asked for", wanted.duration_s())
+    let of = required.map_or_else(String::new, |required| {
+        format!(" of {:.3} s asked for", required.duration_s())
     });
-    CompareFault::NothingInCommon {
+    CompareError::NothingInCommon {
         held: held.collect::<Vec<_>>().join(", ") + &of,
     }
 }
 
-fn left_out(sets: &[RivalSet], (set, what, interval): Gap, session: &Session) -> Result<LeftOut> {
-    Ok(LeftOut {
+fn uncovered(
+    sets: &[RivalSet],
+    (set, what, interval): Gap,
+    session: &Session,
+) -> Result<Uncovered> {
+    Ok(Uncovered {
         set: sets[set].id.clone(),
         what,
         interval,
@@ -212,7 +216,7 @@ pub fn require_different(sets: &[RivalSet]) -> Result<()> {
     for (other, set) in sets.iter().enumerate() {
         if let Some(first) = all[..other].iter().position(|hashes| *hashes == all[other]) {
             let (first, other) = (sets[first].id.clone(), set.id.clone());
-            return Err(CompareFault::Same { first, other }.into());
+            return Err(CompareError::Same { first, other }.into());
         }
     }
     Ok(())

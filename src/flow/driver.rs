@@ -5,9 +5,9 @@ use std::{path::PathBuf, sync::atomic::AtomicBool};
 use super::{STAGES, outputs::Site};
 use crate::{
     config::SiteConfig,
-    error::{Failure, Place, Result, Stopped},
+    error::{Error, Locate, Result, Stopped},
     files::{HashedFile, InputFiles},
-    spice::Wanted,
+    spice::RequiredCoverage,
     stage::{Output, Provenance, Reason, Stage},
     stages::{group_profiles::Profile, tag_times::ImageTimes},
 };
@@ -18,11 +18,11 @@ pub(super) enum Leave {
     /// The last stage that was asked for is done.
     StageReached,
     /// Something failed.
-    Failed(Failure),
+    Failed(Error),
 }
 
-impl From<Failure> for Leave {
-    fn from(failure: Failure) -> Self {
+impl From<Error> for Leave {
+    fn from(failure: Error) -> Self {
         Self::Failed(failure)
     }
 }
@@ -78,10 +78,14 @@ pub(super) trait Driver {
         config: &SiteConfig,
         images: &[Output<ImageTimes>],
         profiles: &Output<Vec<Profile>>,
-    ) -> Option<Wanted> {
+    ) -> Option<RequiredCoverage> {
         let images = images.iter().map(Output::get);
         let images: Vec<&ImageTimes> = images.collect::<Option<_>>()?;
-        Some(super::kernels::wanted(config, &images, profiles.get()?))
+        Some(super::kernels::required_coverage(
+            config,
+            &images,
+            profiles.get()?,
+        ))
     }
 
     /// The products.

@@ -35,7 +35,7 @@ pub(super) fn judged(
     let failure = site
         .adjustment_failure
         .as_ref()
-        .map(|failure| format!("{}; {}", failure.fault, failure.fault.advice()));
+        .map(|failure| format!("{}; {}", failure.cause, failure.cause.advice()));
     let searched = !config.pedr.files.is_empty();
     let verdict = judge(&Evidence {
         footprints: searched.then_some(site.converted.value()?.footprints.len()),
@@ -93,7 +93,7 @@ pub(super) fn complaints(site: &Site) -> Result<Vec<String>> {
     Ok(complaints)
 }
 
-/// Shots inside a window that were left out, by reason.
+/// Rejected shots inside a window, by reason.
 pub(super) fn rejected(site: &Site) -> Result<BTreeMap<String, u64>> {
     let rejected = site.found.value()?.rejected.iter();
     Ok(rejected

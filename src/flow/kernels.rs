@@ -6,22 +6,22 @@ use crate::{
     error::Result,
     files::InputFiles,
     kernel_source::{KernelList, KernelSource},
-    spice::{KernelSet, Wanted},
+    spice::{KernelSet, RequiredCoverage},
     stages::{check_ranges::trajectory_reach_s, group_profiles::Profile, tag_times::ImageTimes},
     time::Intervals,
 };
 
-/// The kernels of the configuration; from a folder, those that cover `wanted` (text kernels always);
+/// The kernels of the configuration; from a folder, those that cover `required` (text kernels always);
 /// of rival sets the `chosen` one, which is the first as long as only clocks are needed.
 pub(super) fn load_kernels(
     config: &SiteConfig,
-    wanted: &Wanted,
+    required: &RequiredCoverage,
     chosen: usize,
     files: &InputFiles,
 ) -> Result<KernelSet> {
     match &config.kernels.source {
         KernelSource::Listed(list) => load_list(list, files),
-        KernelSource::Root(selection) => KernelSet::select_of(files, selection, wanted),
+        KernelSource::Root(selection) => KernelSet::select_of(files, selection, required),
         KernelSource::Sets(sets) => sets.get(chosen).map_or_else(
             || Ok(KernelSet::default()),
             |set| load_list(&set.list, files),
@@ -52,7 +52,11 @@ pub(super) fn load_rivals(config: &SiteConfig, files: &InputFiles) -> Result<Vec
 
 /// Times at which the site reads kernels: exposures with their padding, flights over the windows as
 /// far as the scan reaches, and attitudes at the exposures shifted by the pointing bias.
-pub(super) fn wanted(config: &SiteConfig, images: &[&ImageTimes], profiles: &[Profile]) -> Wanted {
+pub(super) fn required_coverage(
+    config: &SiteConfig,
+    images: &[&ImageTimes],
+    profiles: &[Profile],
+) -> RequiredCoverage {
     let (kernels, reach_s) = (
         &config.kernels,
         trajectory_reach_s(&config.range_check, &config.mola_clock),
@@ -70,7 +74,7 @@ pub(super) fn wanted(config: &SiteConfig, images: &[&ImageTimes], profiles: &[Pr
         kernels.padding_s + kernels.ck_tolerance_s,
     );
     let attitudes = exposures.map(|exposures| exposures.shifted(bias_s).padded(padding_s));
-    Wanted {
+    RequiredCoverage {
         positions: Intervals::union_of(positions.chain(flights)),
         attitudes: Intervals::union_of(attitudes),
     }

@@ -32,8 +32,8 @@ pub(super) struct Account {
     pub(super) rejected: BTreeMap<String, u64>,
 }
 
-fn largest_disagreement_m(pairs: &[PairComparison]) -> Option<f64> {
-    let pairs = pairs.iter().map(|pair| pair.disagreement_m);
+fn largest_along_track_parallax_m(pairs: &[PairComparison]) -> Option<f64> {
+    let pairs = pairs.iter().map(|pair| pair.along_track_parallax_m);
     pairs.max_by(f64::total_cmp)
 }
 
@@ -156,8 +156,8 @@ fn figures_of(site: &Site) -> Result<BTreeMap<String, f64>> {
         (figures::RANGE_MEAN_M, means.max_by(f64::total_cmp)),
         (figures::POSITION_RMSE_M, positions.max_by(f64::total_cmp)),
         (figures::POINTING_RMSE_RAD, pointings.max_by(f64::total_cmp)),
-        (figures::DISAGREEMENT_M, before),
-        (figures::ADJUSTED_DISAGREEMENT_M, after),
+        (figures::ALONG_TRACK_PARALLAX_M, before),
+        (figures::ADJUSTED_ALONG_TRACK_PARALLAX_M, after),
         (figures::ADJUSTMENT_SIGMA0, sigma0),
     ];
     let figures = figures.into_iter();
@@ -166,11 +166,11 @@ fn figures_of(site: &Site) -> Result<BTreeMap<String, f64>> {
         .collect())
 }
 
-/// Disagreement of the images before and after the adjustment, and its standard deviation of unit weight.
+/// Misregistration of the images before and after the adjustment, and its standard deviation of unit weight.
 fn adjustment_figures(adjustment: &Adjustment) -> Result<[Option<f64>; 3]> {
     Ok([
-        largest_disagreement_m(adjustment.pairs.value()?),
-        largest_disagreement_m(adjustment.adjusted_pairs.value()?),
+        largest_along_track_parallax_m(adjustment.pairs.value()?),
+        largest_along_track_parallax_m(adjustment.adjusted_pairs.value()?),
         Some(adjustment.adjusted.value()?.summary.sigma0),
     ])
 }

@@ -19,13 +19,13 @@ mod run;
 mod site;
 mod sites;
 
-pub use check::{Checked, check_site, rival_sets, wanted_by_site};
+pub use check::{Checked, check_site, required_by_site, rival_sets};
 pub use choice::{ChooseKernels, KernelChoice, RivalKernelSets};
 pub use compare::{
-    Compared, EPOCHS_MAX, LeftOut, Request, RivalSet, compare_kernels, require_different,
+    Compared, EPOCHS_MAX, Request, RivalSet, Uncovered, compare_kernels, require_different,
 };
 pub use driver::StageReason;
-pub use out::{OutFault, check_out};
+pub use out::{OutError, check_out};
 pub use plan::plan_site;
 pub use run::{Ending, RunOptions, SiteOutcome, run_site};
 pub use sites::publish_sites;

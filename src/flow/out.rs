@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use crate::{
     config::SiteConfig,
-    error::{Fault, Kind, Place, Result},
+    error::{Cause, Kind, Locate, Result},
     products::position_kernel,
     spice::PATH_LENGTH_MAX,
     store::publish::staging_path,
@@ -15,7 +15,7 @@ const PART_LENGTH_MAX: usize = 255;
 
 /// Why no products can be written into a folder.
 #[derive(Debug, thiserror::Error)]
-pub enum OutFault {
+pub enum OutError {
     /// Metakernels and CSPICE cannot name files in it.
     #[error("--out is {out:?}: it {holds}; expected UTF-8 without control characters")]
     Unspeakable {
@@ -43,7 +43,7 @@ pub enum OutFault {
     },
 }
 
-impl Fault for OutFault {
+impl Cause for OutError {
     fn kind(&self) -> Kind {
         Kind::Configuration
     }
@@ -62,9 +62,9 @@ impl Fault for OutFault {
 /// Makes sure that the paths of all products of `sites` in `out` can be written.
 ///
 /// # Errors
-/// [`OutFault`], of kind configuration.
+/// [`OutError`], of kind configuration.
 pub fn check_out(out: &Path, sites: &[SiteConfig]) -> Result<()> {
-    let unspeakable = |holds| OutFault::Unspeakable {
+    let unspeakable = |holds| OutError::Unspeakable {
         out: out.to_owned(),
         holds,
     };
@@ -76,7 +76,7 @@ pub fn check_out(out: &Path, sites: &[SiteConfig]) -> Result<()> {
         if part.len() > PART_LENGTH_MAX {
             let part = part.to_string_lossy().into_owned();
             let bytes = part.len();
-            return Err(OutFault::LongPart { part, bytes }.into());
+            return Err(OutError::LongPart { part, bytes }.into());
         }
     }
     for site in sites.iter().filter(|site| !site.ties.files.is_empty()) {
@@ -85,7 +85,7 @@ pub fn check_out(out: &Path, sites: &[SiteConfig]) -> Result<()> {
         let products = ids.map(|id| staging.join(position_kernel(id)));
         let longest = products.max_by_key(|product| product.as_os_str().len());
         if let Some(product) = longest.filter(|path| path.as_os_str().len() > PATH_LENGTH_MAX) {
-            return Err(OutFault::LongPath { product }).in_site(&site.site);
+            return Err(OutError::LongPath { product }).in_site(&site.site);
         }
     }
     Ok(())

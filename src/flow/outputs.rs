@@ -2,8 +2,8 @@
 
 use super::choice::KernelChoice;
 use crate::{
-    error::Failure,
-    spice::{KernelSet, Wanted},
+    error::Error,
+    spice::{KernelSet, RequiredCoverage},
     stage::Output,
     stages::{
         adjust::Adjusted, check_ranges::RangeCheck, compare_pairs::PairComparison,
@@ -23,7 +23,7 @@ pub(super) struct Prepared {
     /// Line times, in the order of the configuration.
     pub(super) images: Vec<Output<ImageTimes>>,
     /// The times at which the site reads kernels; `None` while they are not known.
-    pub(super) required: Option<Wanted>,
+    pub(super) required: Option<RequiredCoverage>,
 }
 
 /// A site with the outputs of all its stages.
@@ -32,7 +32,7 @@ pub(super) struct Site {
     pub(super) converted: Output<Converted>,
     pub(super) utc: Output<Vec<String>>,
     pub(super) profiles: Output<Vec<Profile>>,
-    pub(super) required: Option<Wanted>,
+    pub(super) required: Option<RequiredCoverage>,
     pub(super) choice: Option<Output<KernelChoice>>,
     pub(super) kernels: Option<KernelSet>,
     pub(super) described: Output<KernelDescription>,
@@ -42,7 +42,7 @@ pub(super) struct Site {
     /// Nothing for a site without tie points, and none when it failed.
     pub(super) adjustment: Option<Adjustment>,
     /// Why there is no adjustment although there are tie points.
-    pub(super) adjustment_failure: Option<Failure>,
+    pub(super) adjustment_failure: Option<Error>,
 }
 
 /// What tie points make of a site, before and after the adjustment.

@@ -107,7 +107,7 @@ pub(super) fn publish(
         config,
         kernels: &described.kernels,
         metakernel: &kernels.metakernel_text(Some(folder)),
-        wanted: &site.required.clone().unwrap_or_default(),
+        required: &site.required.clone().unwrap_or_default(),
         images: &images,
         conversions: &converted.files,
         footprints: &converted.footprints,

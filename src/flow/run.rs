@@ -11,7 +11,7 @@ use super::{
 };
 use crate::{
     config::SiteConfig,
-    error::{Place, Result},
+    error::{Locate, Result},
     files::InputFiles,
     stage::{Output, Reason, Stage},
     store::{

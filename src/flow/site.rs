@@ -9,9 +9,9 @@ use super::{
 };
 use crate::{
     config::{ImageConfig, SiteConfig},
-    error::{Failure, Kind},
+    error::{Error, Kind},
     kernel_source::KernelSource,
-    spice::{KernelSet, KernelView, Wanted},
+    spice::{KernelSet, KernelView, RequiredCoverage},
     stage::{InOrder, Output, Round, Stage},
     stages::{
         adjust::Adjust,
@@ -58,7 +58,7 @@ pub(super) fn site<D: Driver>(flow: &mut D, config: &SiteConfig) -> Flow<()> {
 
 /// Times, footprints and profiles: what needs clocks and no orbit.
 pub(super) fn prepare<D: Driver>(flow: &mut D, config: &SiteConfig) -> Flow<Prepared> {
-    let clocks = kernels(flow, config, Some(&Wanted::default()), 0)?;
+    let clocks = kernels(flow, config, Some(&RequiredCoverage::default()), 0)?;
     let images = {
         let kernels = &KernelView::text(clocks.as_ref());
         let tag = |image: &ImageConfig| {
@@ -106,7 +106,7 @@ pub(super) fn prepare<D: Driver>(flow: &mut D, config: &SiteConfig) -> Flow<Prep
 fn choose<D: Driver>(
     flow: &mut D,
     config: &SiteConfig,
-    required: Option<&Wanted>,
+    required: Option<&RequiredCoverage>,
 ) -> Flow<(Option<Output<KernelChoice>>, Option<usize>)> {
     flow.enter(ChooseKernels::NAME)?;
     let rivals = rival_positions(config, flow.files());
@@ -287,7 +287,7 @@ fn adjust<D: Driver>(flow: &mut D, config: &SiteConfig, site: &Site) -> Flow<Opt
 }
 
 /// Whether a failure lies in what the tie points and the orientation determine, not in a file that cannot be read.
-fn is_of_adjustment(failure: &Failure) -> bool {
+fn is_of_adjustment(failure: &Error) -> bool {
     let stage = failure.stage.as_deref().unwrap_or_default();
     let name = stage.split('/').next().unwrap_or_default();
     let of_adjustment = [Intersect::NAME, Adjust::NAME, Reorient::NAME].contains(&name);
@@ -337,11 +337,11 @@ fn intersect<D: Driver>(
 pub(super) fn kernels<D: Driver>(
     flow: &mut D,
     config: &SiteConfig,
-    required: Option<&Wanted>,
+    required: Option<&RequiredCoverage>,
     chosen: usize,
 ) -> Flow<Option<KernelSet>> {
     flow.enter(LOAD_KERNELS)?;
-    let nothing = Wanted::default();
+    let nothing = RequiredCoverage::default();
     let required = match (&config.kernels.source, required) {
         (KernelSource::Root(_), None) => return Ok(None),
         (_, required) => required.unwrap_or(&nothing),

@@ -7,7 +7,7 @@ use std::{
 };
 
 use crate::{
-    error::{IoFault, Place, Result},
+    error::{IoError, Locate, Result},
     report::{SiteLine, SiteSummary, sites_page},
     store::{
         atomic,
@@ -24,10 +24,10 @@ use crate::{
 pub fn publish_sites(out: &Path) -> Result<PathBuf> {
     let mut lines = BTreeMap::new();
     let entries = fs::read_dir(out)
-        .map_err(IoFault::on("list"))
+        .map_err(IoError::on("list"))
         .in_file(out)?;
     for entry in entries {
-        let folder = entry.map_err(IoFault::on("list")).in_file(out)?.path();
+        let folder = entry.map_err(IoError::on("list")).in_file(out)?.path();
         let name = folder.file_name().unwrap_or_default().to_string_lossy();
         let manifest = read_manifest(&folder);
         let failure = last_failure(&folder);
@@ -61,8 +61,8 @@ fn summary(manifest: &Manifest) -> SiteSummary {
         range_mean_m: figure(figures::RANGE_MEAN_M),
         position_rmse_m: figure(figures::POSITION_RMSE_M),
         pointing_rmse_rad: figure(figures::POINTING_RMSE_RAD),
-        disagreement_m: figure(figures::DISAGREEMENT_M),
-        adjusted_disagreement_m: figure(figures::ADJUSTED_DISAGREEMENT_M),
+        along_track_parallax_m: figure(figures::ALONG_TRACK_PARALLAX_M),
+        adjusted_along_track_parallax_m: figure(figures::ADJUSTED_ALONG_TRACK_PARALLAX_M),
         finished_utc: manifest.finished_utc.clone(),
         version: manifest.version.clone(),
     }

@@ -116,14 +116,14 @@ pub fn matrix_of_rotation_vector(vector_rad: &Vector3<f64>) -> Matrix3<f64> {
     Rotation3::new(*vector_rad).into_inner()
 }
 
-/// Below this angle, radians, the two factors of [`turn_of_rotation_vector`] are taken from their series,
+/// Below this angle, radians, the two factors of [`left_jacobian_product`] are taken from their series,
 /// whose next terms are below 1e-11 of them there.
 const SERIES_BELOW_RAD: f64 = 1e-2;
 
 /// `Ω`, radians, with `d exp([r]×) = [Ω]× exp([r]×)` while `r` changes by `rate`: the left Jacobian of the
 /// rotation times `rate`. Its transpose is the same with `−r`.
 #[must_use]
-pub fn turn_of_rotation_vector(vector_rad: &Vector3<f64>, rate_rad: &Vector3<f64>) -> Vector3<f64> {
+pub fn left_jacobian_product(vector_rad: &Vector3<f64>, rate_rad: &Vector3<f64>) -> Vector3<f64> {
     let square = vector_rad.norm_squared();
     let angle = square.sqrt();
     let (first, second) = if angle < SERIES_BELOW_RAD {

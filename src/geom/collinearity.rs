@@ -6,7 +6,7 @@
 
 use nalgebra::{Matrix2x3, Vector2, Vector3};
 
-use crate::error::{Fault, Kind};
+use crate::error::{Cause, Kind};
 
 /// A point that the camera cannot see because it lies behind the plane of the perspective centre.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
@@ -18,7 +18,7 @@ pub struct BehindCamera {
     pub depth_m: f64,
 }
 
-impl Fault for BehindCamera {
+impl Cause for BehindCamera {
     fn kind(&self) -> Kind {
         Kind::Input
     }
@@ -107,8 +107,8 @@ mod tests {
     #[test]
     fn points_behind_the_camera_are_refused() {
         let behind_m = Vector3::new(10.0, 20.0, -380e3);
-        let fault = project(&behind_m, FOCAL_LENGTH_PX).unwrap_err();
-        assert!((fault.depth_m + 380e3).abs() < 1e-9); // metres, rounding
+        let error = project(&behind_m, FOCAL_LENGTH_PX).unwrap_err();
+        assert!((error.depth_m + 380e3).abs() < 1e-9); // metres, rounding
         assert!(project(&Vector3::zeros(), FOCAL_LENGTH_PX).is_err());
         assert!(project(&Vector3::new(0.0, 0.0, f64::NAN), FOCAL_LENGTH_PX).is_err());
     }

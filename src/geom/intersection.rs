@@ -37,7 +37,7 @@ pub enum Weighting {
 
 /// One measurement: the orientation of the measured line and the place in that line.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Sight {
+pub struct Ray {
     /// Perspective centre of the line, Mars-fixed, metres.
     pub position_m: Vector3<f64>,
     /// Rotation from Mars-fixed to camera components.
@@ -47,13 +47,13 @@ pub struct Sight {
     /// Measured place in the focal plane along and across the track, pixels of the image; along it is 0 but for
     /// distortion.
     pub focal_px: Vector2<f64>,
-    /// Standard deviation along the track, in focal pixels of the image.
+    /// Standard deviation along the track, in focal-plane pixels of the image.
     pub along_sigma_px: f64,
     /// Standard deviation across the track, pixels.
     pub across_sigma_px: f64,
 }
 
-impl Sight {
+impl Ray {
     /// Unit vector from the perspective centre towards the measured point, Mars-fixed.
     #[must_use]
     pub fn direction(&self) -> Vector3<f64> {
@@ -132,15 +132,15 @@ pub enum Unintersected {
         /// Height above the ellipsoid, metres.
         height_m: f64,
     },
-    /// The iteration did not come to rest, or the numbers are not finite.
-    #[error("the iteration did not come to rest")]
-    Unsettled,
+    /// The iteration did not converge, or the numbers are not finite.
+    #[error("the iteration did not converge")]
+    NotConverged,
 }
 
 impl From<BehindCamera> for Unintersected {
-    fn from(fault: BehindCamera) -> Self {
+    fn from(error: BehindCamera) -> Self {
         Self::BehindCamera {
-            depth_m: fault.depth_m,
+            depth_m: error.depth_m,
         }
     }
 }
@@ -150,7 +150,7 @@ impl From<BehindCamera> for Unintersected {
 pub struct Intersection {
     /// The point, Mars-fixed, metres.
     pub ground_m: Vector3<f64>,
-    /// `(JᵀWJ)⁻¹`, m²: the covariance when the standard deviations of the sights are true.
+    /// `(JᵀWJ)⁻¹`, m²: the covariance when the standard deviations of the rays are true.
     pub cofactor_m2: Matrix3<f64>,
     /// Measured minus computed focal coordinates (along, across) of each sight, pixels.
     pub residuals_px: Vec<Vector2<f64>>,
@@ -170,35 +170,32 @@ impl Intersection {
     }
 }
 
-/// Intersects two or more sights by least squares.
+/// Intersects two or more rays by least squares.
 ///
 /// # Errors
-/// Why the sights give no point.
+/// Why the rays give no point.
 /// # Source
 /// Shan et al. 2005, ground point determination: exterior orientation held fixed, focal coordinates
 /// observed, X, Y, Z unknown; the start is the point nearest to all rays.
-pub fn intersect(
-    sights: &[Sight],
-    limits: &IntersectionLimits,
-) -> Result<Intersection, Unintersected> {
-    if sights.len() < 2 {
-        return Err(Unintersected::FewRays { rays: sights.len() });
+pub fn intersect(rays: &[Ray], limits: &IntersectionLimits) -> Result<Intersection, Unintersected> {
+    if rays.len() < 2 {
+        return Err(Unintersected::FewRays { rays: rays.len() });
     }
-    let convergence_rad = convergence_rad(sights);
+    let convergence_rad = convergence_rad(rays);
     // Written so that NaN is refused.
     if !(convergence_rad >= limits.convergence_min_rad) {
         return Err(Unintersected::NearParallel {
             angle_deg: convergence_rad.to_degrees(),
         });
     }
-    let mut ground_m = nearest_to_rays(sights).ok_or(Unintersected::IllConditioned)?;
+    let mut ground_m = nearest_to_rays(rays).ok_or(Unintersected::IllConditioned)?;
     for steps in 1..=STEPS_MAX {
-        let (normal, right) = normal_equations(sights, &ground_m)?;
+        let (normal, right) = normal_equations(rays, &ground_m)?;
         let cofactor_m2 = well_conditioned_inverse(&normal).ok_or(Unintersected::IllConditioned)?;
         let step_m = cofactor_m2 * right;
         ground_m += step_m;
         if step_m.norm() < STEP_M {
-            let residuals_px = residuals_px(sights, &ground_m)?;
+            let residuals_px = residuals_px(rays, &ground_m)?;
             let height_m = limits.height_m(&ground_m);
             if !(height_m.abs() <= limits.height_max_m) {
                 return Err(Unintersected::Height { height_m });
@@ -206,18 +203,18 @@ pub fn intersect(
             return Ok(Intersection {
                 ground_m,
                 cofactor_m2,
-                weighted_squares: weighted_squares(sights, &residuals_px),
+                weighted_squares: weighted_squares(rays, &residuals_px),
                 residuals_px,
                 convergence_rad,
                 steps,
             });
         }
     }
-    Err(Unintersected::Unsettled)
+    Err(Unintersected::NotConverged)
 }
 
-fn convergence_rad(sights: &[Sight]) -> f64 {
-    let directions: Vec<Vector3<f64>> = sights.iter().map(Sight::direction).collect();
+fn convergence_rad(rays: &[Ray]) -> f64 {
+    let directions: Vec<Vector3<f64>> = rays.iter().map(Ray::direction).collect();
     let mut largest: f64 = 0.0;
     for (index, first) in directions.iter().enumerate() {
         for second in &directions[index + 1..] {
@@ -229,10 +226,10 @@ fn convergence_rad(sights: &[Sight]) -> f64 {
 }
 
 /// The point with the least sum of squared distances to the rays; for two, midway between them.
-fn nearest_to_rays(sights: &[Sight]) -> Option<Vector3<f64>> {
+fn nearest_to_rays(rays: &[Ray]) -> Option<Vector3<f64>> {
     let mut normal = Matrix3::zeros();
     let mut right = Vector3::zeros();
-    for sight in sights {
+    for sight in rays {
         let direction = sight.direction();
         let across = Matrix3::identity() - direction * direction.transpose();
         normal += across;
@@ -241,12 +238,8 @@ fn nearest_to_rays(sights: &[Sight]) -> Option<Vector3<f64>> {
     Some(normal.cholesky()?.solve(&right))
 }
 
-fn residuals_px(
-    sights: &[Sight],
-    ground_m: &Vector3<f64>,
-) -> Result<Vec<Vector2<f64>>, BehindCamera> {
-    sights
-        .iter()
+fn residuals_px(rays: &[Ray], ground_m: &Vector3<f64>) -> Result<Vec<Vector2<f64>>, BehindCamera> {
+    rays.iter()
         .map(|sight| {
             let focal = project(&sight.camera_point_m(ground_m), sight.focal_length_px)?;
             Ok(sight.focal_px - focal)
@@ -254,9 +247,8 @@ fn residuals_px(
         .collect()
 }
 
-fn weighted_squares(sights: &[Sight], residuals_px: &[Vector2<f64>]) -> f64 {
-    sights
-        .iter()
+fn weighted_squares(rays: &[Ray], residuals_px: &[Vector2<f64>]) -> f64 {
+    rays.iter()
         .zip(residuals_px)
         .map(|(sight, v)| {
             (v.x / sight.along_sigma_px).powi(2) + (v.y / sight.across_sigma_px).powi(2)
@@ -265,12 +257,12 @@ fn weighted_squares(sights: &[Sight], residuals_px: &[Vector2<f64>]) -> f64 {
 }
 
 fn normal_equations(
-    sights: &[Sight],
+    rays: &[Ray],
     ground_m: &Vector3<f64>,
 ) -> Result<(Matrix3<f64>, Vector3<f64>), BehindCamera> {
     let mut normal = Matrix3::zeros();
     let mut right = Vector3::zeros();
-    for sight in sights {
+    for sight in rays {
         let camera_point_m = sight.camera_point_m(ground_m);
         let focal = project(&camera_point_m, sight.focal_length_px)?;
         let mut rows =
@@ -308,10 +300,10 @@ mod tests {
     const FOCAL_LENGTH_PX: f64 = 3500.0 / 0.026;
 
     /// A camera at `position_m` that looks straight at `target_m`, the point `across_px` off its axis.
-    fn sight(position_m: Vector3<f64>, target_m: &Vector3<f64>, across_px: f64) -> Sight {
+    fn ray(position_m: Vector3<f64>, target_m: &Vector3<f64>, across_px: f64) -> Ray {
         let camera_to_mars =
             Rotation3::face_towards(&(target_m - position_m), &Vector3::new(0.3, 0.2, 1.0));
-        Sight {
+        Ray {
             position_m,
             mars_to_camera: camera_to_mars.transpose().into_inner(),
             focal_length_px: FOCAL_LENGTH_PX,
@@ -328,9 +320,9 @@ mod tests {
     #[test]
     fn exact_rays_of_three_cameras_give_the_point() {
         let target = surface();
-        let sights = [-150e3, 20e3, 100e3]
-            .map(|east_m| sight(target + Vector3::new(380e3, east_m, 10e3), &target, 0.0));
-        let point = intersect(&sights, &IntersectionLimits::default()).unwrap();
+        let rays = [-150e3, 20e3, 100e3]
+            .map(|east_m| ray(target + Vector3::new(380e3, east_m, 10e3), &target, 0.0));
+        let point = intersect(&rays, &IntersectionLimits::default()).unwrap();
         assert!((point.ground_m - target).norm() < 1e-6); // metres: rounding of 3.4e6 m
         assert!(point.residuals_px.iter().all(|v| v.norm() < 1e-6));
         assert_eq!(point.redundancy(), 3);
@@ -342,8 +334,8 @@ mod tests {
     fn what_gives_no_point_says_why() {
         let target = surface();
         let limits = IntersectionLimits::default();
-        let above = sight(target + Vector3::new(380e3, 0.0, 0.0), &target, 0.0);
-        let aside = sight(target + Vector3::new(380e3, 150e3, 0.0), &target, 0.0);
+        let above = ray(target + Vector3::new(380e3, 0.0, 0.0), &target, 0.0);
+        let aside = ray(target + Vector3::new(380e3, 150e3, 0.0), &target, 0.0);
         assert!(matches!(
             intersect(&[above], &limits),
             Err(Unintersected::FewRays { rays: 1 })
@@ -353,7 +345,7 @@ mod tests {
             Err(Unintersected::NearParallel { .. })
         ));
         // Mirrored through both cameras the rays meet above them.
-        let backwards = |sight: Sight| Sight {
+        let backwards = |sight: Ray| Ray {
             mars_to_camera: Matrix3::from_diagonal(&Vector3::new(1.0, -1.0, -1.0))
                 * sight.mars_to_camera,
             ..sight
@@ -363,13 +355,13 @@ mod tests {
             Err(Unintersected::BehindCamera { .. })
         ));
         let deep = surface() * 0.98;
-        let sights =
-            [0.0, 150e3].map(|east_m| sight(target + Vector3::new(380e3, east_m, 0.0), &deep, 0.0));
+        let rays =
+            [0.0, 150e3].map(|east_m| ray(target + Vector3::new(380e3, east_m, 0.0), &deep, 0.0));
         assert!(matches!(
-            intersect(&sights, &limits),
+            intersect(&rays, &limits),
             Err(Unintersected::Height { height_m }) if (height_m + 74e3).abs() < 1e3
         ));
-        let broken = Sight {
+        let broken = Ray {
             focal_px: Vector2::new(0.0, f64::NAN),
             ..aside
         };

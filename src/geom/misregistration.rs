@@ -19,7 +19,7 @@ pub struct ImageToImage {
     transformation: Transformation,
     /// Tie points that it rests on.
     pub ties: usize,
-    /// Tie points that were left out as outliers.
+    /// Tie points rejected as outliers.
     pub ties_rejected: usize,
     /// What it leaves of the tie points' lines.
     pub tie_lines: Summary,
@@ -29,9 +29,9 @@ pub struct ImageToImage {
     ends: [f64; 2],
 }
 
-/// Disagreement of footprints between two images, lines and samples of the second.
+/// Misregistration of footprints between two images, lines and samples of the second.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Disagreement {
+pub struct Misregistration {
     /// Transformed minus projected line of every footprint.
     pub lines: Summary,
     /// Transformed minus projected sample of every footprint.
@@ -103,12 +103,12 @@ impl ImageToImage {
     /// Relief moves a tie point across the track between images of different emission: only tie points near
     /// the profile tell of its samples.
     #[must_use]
-    pub fn disagreement(&self, footprints: &[Pair]) -> Disagreement {
+    pub fn misregistration(&self, footprints: &[Pair]) -> Misregistration {
         let [low, high] = self.ends;
         let between = |footprint: &&Pair| low <= footprint.first[0] && footprint.first[0] <= high;
         let seen: Vec<Pair> = footprints.iter().filter(between).copied().collect();
         let summary = |axis| Summary::of(&self.transformation.residuals(&seen, axis));
-        Disagreement {
+        Misregistration {
             lines: summary(0),
             samples: summary(1),
             beyond_ties: footprints.len() - seen.len(),

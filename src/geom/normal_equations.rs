@@ -8,7 +8,7 @@ const PIVOT_MIN: f64 = 1e-12;
 /// Unknowns that a message names.
 const NAMED_MAX: usize = 4;
 
-/// Unknowns that the observations do not tell apart, or do not touch.
+/// Unknowns that the observations do not separate, or do not touch.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Singular {
     /// Indices of the unknowns in the weakest combination, the strongest first, four at most.

@@ -8,7 +8,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::error::{Fault, Kind};
+use crate::error::{Cause, Kind};
 
 /// Mean and standard deviation of the reprojection residuals of one image.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -95,7 +95,7 @@ pub struct UncertaintyBudget {
 
 /// Input without a meaning.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum BudgetFault {
+pub enum BudgetError {
     /// No site at all.
     #[error("no residuals of any stereo pair, expected at least one")]
     NoSites,
@@ -111,7 +111,7 @@ pub enum BudgetFault {
     },
 }
 
-impl Fault for BudgetFault {
+impl Cause for BudgetError {
     fn kind(&self) -> Kind {
         Kind::Input
     }
@@ -129,7 +129,7 @@ impl Fault for BudgetFault {
 ///
 /// # Errors
 /// No pair; numbers that are not finite or not positive where they must be.
-pub fn uncertainty_budget(input: &BudgetInput) -> Result<UncertaintyBudget, BudgetFault> {
+pub fn uncertainty_budget(input: &BudgetInput) -> Result<UncertaintyBudget, BudgetError> {
     check(input)?;
     let sites = input.sites.len() as f64;
     // Squares are averaged over the sites, then summed over the two images.
@@ -172,9 +172,9 @@ pub fn uncertainty_budget(input: &BudgetInput) -> Result<UncertaintyBudget, Budg
     })
 }
 
-fn check(input: &BudgetInput) -> Result<(), BudgetFault> {
+fn check(input: &BudgetInput) -> Result<(), BudgetError> {
     if input.sites.is_empty() {
-        return Err(BudgetFault::NoSites);
+        return Err(BudgetError::NoSites);
     }
     for (what, value) in [
         ("the spacing of footprints, metres,", input.mola_spacing_m),
@@ -182,7 +182,7 @@ fn check(input: &BudgetInput) -> Result<(), BudgetFault> {
         ("height over base", input.height_over_base),
     ] {
         if !(value > 0.0 && value.is_finite()) {
-            return Err(BudgetFault::Value {
+            return Err(BudgetError::Value {
                 what,
                 value,
                 expected: "a positive number",
@@ -195,7 +195,7 @@ fn check(input: &BudgetInput) -> Result<(), BudgetFault> {
             ("a residual across the track", image.size_y()),
         ] {
             if !value.is_finite() {
-                return Err(BudgetFault::Value {
+                return Err(BudgetError::Value {
                     what,
                     value,
                     expected: "a finite number",
@@ -317,13 +317,13 @@ mod tests {
             change(&mut input);
             uncertainty_budget(&input).unwrap_err()
         };
-        assert_eq!(refused(|input| input.sites.clear()), BudgetFault::NoSites);
-        for fault in [
+        assert_eq!(refused(|input| input.sites.clear()), BudgetError::NoSites);
+        for error in [
             refused(|input| input.pixel_size_m = 0.0),
             refused(|input| input.height_over_base = f64::NAN),
             refused(|input| input.sites[1][0].mean_y = f64::NAN),
         ] {
-            assert!(matches!(fault, BudgetFault::Value { .. }), "{fault}");
+            assert!(matches!(error, BudgetError::Value { .. }), "{error}");
         }
     }
 }

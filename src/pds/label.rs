@@ -4,7 +4,7 @@
 //! The parser is tolerant: what is no assignment is skipped, so that a label can stand before binary
 //! data and a damaged one still gives what it holds.
 
-use crate::error::{Fault, Kind};
+use crate::error::{Cause, Kind};
 
 /// Bytes of a file that are looked at; labels are a few kilobytes.
 pub const LABEL_BYTES_MAX: usize = 1 << 20;
@@ -33,7 +33,7 @@ pub struct Label {
 
 /// A label is not what it should be.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-pub enum LabelFault {
+pub enum LabelError {
     /// No assignment at all.
     #[error("no label found: expected lines KEY = value in the first {LABEL_BYTES_MAX} bytes")]
     NoLabel,
@@ -57,7 +57,7 @@ pub enum LabelFault {
     },
 }
 
-impl Fault for LabelFault {
+impl Cause for LabelError {
     fn kind(&self) -> Kind {
         Kind::Input
     }
@@ -89,16 +89,16 @@ fn listed(words: &[String]) -> String {
 /// The label at the start of `bytes`; at most [`LABEL_BYTES_MAX`] of them are looked at.
 ///
 /// # Errors
-/// [`LabelFault::NoLabel`] when there is no assignment.
-pub fn parse(bytes: &[u8]) -> Result<Label, LabelFault> {
+/// [`LabelError::NoLabel`] when there is no assignment.
+pub fn parse(bytes: &[u8]) -> Result<Label, LabelError> {
     parse_whole(&bytes[..bytes.len().min(LABEL_BYTES_MAX)])
 }
 
 /// The same for text of any length, as that of control networks.
 ///
 /// # Errors
-/// [`LabelFault::NoLabel`] when there is no assignment.
-pub fn parse_whole(bytes: &[u8]) -> Result<Label, LabelFault> {
+/// [`LabelError::NoLabel`] when there is no assignment.
+pub fn parse_whole(bytes: &[u8]) -> Result<Label, LabelError> {
     let mut scanner = Scanner { bytes, at: 0 };
     let mut label = Label::default();
     let mut groups: Vec<(String, usize)> = Vec::new();
@@ -141,7 +141,7 @@ pub fn parse_whole(bytes: &[u8]) -> Result<Label, LabelFault> {
         }
     }
     if label.entries.is_empty() {
-        return Err(LabelFault::NoLabel);
+        return Err(LabelError::NoLabel);
     }
     Ok(label)
 }
@@ -173,9 +173,9 @@ impl Scanner<'_> {
         self.bytes.get(self.at).copied()
     }
 
-    fn take(&mut self, wanted: u8) -> bool {
+    fn take(&mut self, required: u8) -> bool {
         self.skip_space();
-        let found = self.peek() == Some(wanted);
+        let found = self.peek() == Some(required);
         self.at += usize::from(found);
         found
     }
@@ -291,9 +291,9 @@ mod tests {
     #[test]
     fn what_is_no_label_is_refused() {
         for bytes in [&b""[..], b"END", b"\xFF\xD8\xFF\xE0\0\x10JFIF\0", b"= = ="] {
-            assert_eq!(parse(bytes), Err(LabelFault::NoLabel));
+            assert_eq!(parse(bytes), Err(LabelError::NoLabel));
         }
-        assert_eq!(parse(b"no assignment\nat all"), Err(LabelFault::NoLabel));
+        assert_eq!(parse(b"no assignment\nat all"), Err(LabelError::NoLabel));
     }
 
     proptest! {

@@ -2,9 +2,9 @@
 
 use std::{fs::File, io::Read, path::Path};
 
-use super::label::{Entry, LABEL_BYTES_MAX, Label, LabelFault, parse};
+use super::label::{Entry, LABEL_BYTES_MAX, Label, LabelError, parse};
 use crate::{
-    error::{IoFault, Place, Result},
+    error::{IoError, Locate, Result},
     image::ImageFields,
     instruments::{Instrument, LabelNames},
     units::SECONDS_PER_MS,
@@ -28,11 +28,11 @@ pub struct MocLabel {
 pub fn read_label(path: &Path, cameras: &[Instrument]) -> Result<MocLabel> {
     let mut bytes = Vec::new();
     File::open(path)
-        .map_err(IoFault::on("open"))
+        .map_err(IoError::on("open"))
         .in_file(path)?
         .take(LABEL_BYTES_MAX as u64)
         .read_to_end(&mut bytes)
-        .map_err(IoFault::on("read"))
+        .map_err(IoError::on("read"))
         .in_file(path)?;
     parse(&bytes)
         .and_then(|label| moc_label(&label, cameras))
@@ -48,7 +48,7 @@ pub fn read_label(path: &Path, cameras: &[Instrument]) -> Result<MocLabel> {
 pub fn moc_label(
     label: &Label,
     cameras: &[Instrument],
-) -> std::result::Result<MocLabel, LabelFault> {
+) -> std::result::Result<MocLabel, LabelError> {
     let instrument = camera(label, cameras)?;
     let lines = label
         .find_in("IMAGE", "LINES")
@@ -89,7 +89,7 @@ pub fn moc_label(
 fn camera<'a>(
     label: &Label,
     cameras: &'a [Instrument],
-) -> std::result::Result<&'a Instrument, LabelFault> {
+) -> std::result::Result<&'a Instrument, LabelError> {
     let value = |pds, isis| either(label, pds, isis).map_or("", |entry| entry.value.as_str());
     let instrument = value("INSTRUMENT_ID", "INSTRUMENTID");
     let filter = value("FILTER_NAME", "FILTERNAME");
@@ -98,7 +98,7 @@ fn camera<'a>(
         names.instrument.eq_ignore_ascii_case(instrument) && own_filter.eq_ignore_ascii_case(filter)
     };
     let found = cameras.iter().find(|camera| fits(&camera.label));
-    found.ok_or_else(|| LabelFault::Instrument {
+    found.ok_or_else(|| LabelError::Instrument {
         found: format!("{instrument} {filter}").trim().to_owned(),
         known: cameras
             .iter()
@@ -125,26 +125,26 @@ fn text(entry: Option<&Entry>) -> Option<String> {
     entry.map(|entry| entry.value.clone())
 }
 
-fn fault(entry: &Entry, expected: &'static str) -> LabelFault {
+fn error(entry: &Entry, expected: &'static str) -> LabelError {
     let value = match &entry.unit {
         Some(unit) => format!("{} <{unit}>", entry.value),
         None => entry.value.clone(),
     };
-    LabelFault::Value {
+    LabelError::Value {
         key: entry.key.clone(),
         value,
         expected,
     }
 }
 
-fn count(entry: &Entry, least: u32) -> std::result::Result<u32, LabelFault> {
+fn count(entry: &Entry, least: u32) -> std::result::Result<u32, LabelError> {
     entry
         .value
         .parse()
         .ok()
         .filter(|count| (least..=1_000_000).contains(count))
         .ok_or_else(|| {
-            fault(
+            error(
                 entry,
                 if least == 0 {
                     "a count from 0"
@@ -158,7 +158,7 @@ fn count(entry: &Entry, least: u32) -> std::result::Result<u32, LabelFault> {
 fn optional_count(
     entry: Option<&Entry>,
     least: u32,
-) -> std::result::Result<Option<u32>, LabelFault> {
+) -> std::result::Result<Option<u32>, LabelError> {
     entry
         .filter(|entry| known(entry))
         .map(|entry| count(entry, least))
@@ -166,7 +166,7 @@ fn optional_count(
 }
 
 /// The exposure in seconds; the archive writes milliseconds, with or without the unit.
-fn exposure_s(entry: &Entry) -> std::result::Result<f64, LabelFault> {
+fn exposure_s(entry: &Entry) -> std::result::Result<f64, LabelError> {
     const EXPECTED: &str = "milliseconds above 0, below 1000";
     let milliseconds = match entry.unit.as_deref() {
         None | Some("ms" | "msec" | "millisecond" | "milliseconds") => entry.value.parse().ok(),
@@ -175,7 +175,7 @@ fn exposure_s(entry: &Entry) -> std::result::Result<f64, LabelFault> {
     milliseconds
         .filter(|ms: &f64| 0.0 < *ms && *ms < 1_000.0)
         .map(|ms| ms * SECONDS_PER_MS)
-        .ok_or_else(|| fault(entry, EXPECTED))
+        .ok_or_else(|| error(entry, EXPECTED))
 }
 
 #[cfg(test)]
@@ -183,7 +183,7 @@ mod tests {
     use super::*;
     use crate::config::built_in_instruments;
 
-    fn read(text: &str) -> std::result::Result<MocLabel, LabelFault> {
+    fn read(text: &str) -> std::result::Result<MocLabel, LabelError> {
         moc_label(&parse(text.as_bytes()).unwrap(), built_in_instruments())
     }
 

@@ -7,9 +7,9 @@ use std::{collections::BTreeMap, fs, path::Path};
 
 use serde::Deserialize;
 
-use super::label::{Entry, LabelFault, parse_whole};
+use super::label::{Entry, LabelError, parse_whole};
 use crate::{
-    error::{Fault, IoFault, Kind, Place, Result},
+    error::{Cause, IoError, Kind, Locate, Result},
     ties::{TieMeasure, TiePoint},
 };
 
@@ -27,7 +27,7 @@ pub struct TieFile {
     pub complaints: Vec<TieComplaint>,
 }
 
-/// A record that was left out.
+/// A skipped record.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct TieComplaint {
     /// Line of a table, or number of the object or group in a network, both from 1.
@@ -38,7 +38,7 @@ pub struct TieComplaint {
 
 /// A file that holds no tie points.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-enum TieFault {
+enum TieError {
     #[error("this is a binary control network; expected its text form (PVL)")]
     Binary,
     #[error("no ControlNetwork object found")]
@@ -48,10 +48,10 @@ enum TieFault {
     #[error("the table cannot be read: {0}")]
     Table(String),
     #[error(transparent)]
-    Label(#[from] LabelFault),
+    Label(#[from] LabelError),
 }
 
-impl Fault for TieFault {
+impl Cause for TieError {
     fn kind(&self) -> Kind {
         Kind::Input
     }
@@ -73,7 +73,7 @@ impl Fault for TieFault {
 /// # Errors
 /// The system's refusal to read; a binary network; no network; columns that are missing.
 pub fn read_ties(path: &Path) -> Result<TieFile> {
-    let bytes = fs::read(path).map_err(IoFault::on("read")).in_file(path)?;
+    let bytes = fs::read(path).map_err(IoError::on("read")).in_file(path)?;
     let table = path
         .extension()
         .is_some_and(|extension| extension.eq_ignore_ascii_case("csv"));
@@ -140,15 +140,15 @@ impl Gathered {
     }
 }
 
-fn parse_table(bytes: &[u8]) -> std::result::Result<TieFile, TieFault> {
+fn parse_table(bytes: &[u8]) -> std::result::Result<TieFile, TieError> {
     let mut reader = csv::ReaderBuilder::new()
         .trim(csv::Trim::All)
         .from_reader(bytes);
-    let unreadable = |error: csv::Error| TieFault::Table(error.to_string());
+    let unreadable = |error: csv::Error| TieError::Table(error.to_string());
     let header = reader.headers().map_err(unreadable)?.clone();
     for column in ["point_id", "serial_number", "sample", "line"] {
         if !header.iter().any(|name| name == column) {
-            return Err(TieFault::Column(column));
+            return Err(TieError::Column(column));
         }
     }
     let mut gathered = Gathered::default();
@@ -179,15 +179,15 @@ fn parse_table(bytes: &[u8]) -> std::result::Result<TieFile, TieFault> {
     Ok(gathered.file)
 }
 
-fn parse_network(bytes: &[u8]) -> std::result::Result<TieFile, TieFault> {
+fn parse_network(bytes: &[u8]) -> std::result::Result<TieFile, TieError> {
     let label = parse_whole(bytes)?;
     let is_in = |name: &str| label.entries.iter().any(|entry| entry.group == name);
     if !is_in("CONTROLNETWORK") {
         // The label of the binary form describes where its bytes start.
         return Err(if is_in("PROTOBUFFER") || is_in("CORE") {
-            TieFault::Binary
+            TieError::Binary
         } else {
-            TieFault::NoNetwork
+            TieError::NoNetwork
         });
     }
     let mut gathered = Gathered::default();
@@ -322,7 +322,7 @@ mod tests {
         assert_eq!(rows, [3, 5, 6]);
         assert_eq!(
             parse_table(b"point_id,line\n"),
-            Err(TieFault::Column("serial_number"))
+            Err(TieError::Column("serial_number"))
         );
     }
 
@@ -340,9 +340,9 @@ mod tests {
     #[test]
     fn what_is_no_network_is_refused() {
         let binary = b"Object = ProtoBuffer\n Object = Core\n HeaderStartByte = 65536\n End_Object\nEnd_Object\nEnd\n\0\x01";
-        assert_eq!(parse_network(binary), Err(TieFault::Binary));
-        assert_eq!(parse_network(b"A = 1\n"), Err(TieFault::NoNetwork));
-        assert!(matches!(parse_network(b"\x00"), Err(TieFault::Label(_))));
+        assert_eq!(parse_network(binary), Err(TieError::Binary));
+        assert_eq!(parse_network(b"A = 1\n"), Err(TieError::NoNetwork));
+        assert!(matches!(parse_network(b"\x00"), Err(TieError::Label(_))));
     }
 
     proptest! {

@@ -21,14 +21,14 @@ use std::{
 };
 
 use super::{
-    fault::ProductFault,
+    error::ProductError,
     files::write_text,
     product::{Content, Context, Declaration, Product, Program, Role, Use, Write, Written},
     site::GeometricProducts,
 };
 use crate::{
     config::{KernelsConfig, PointingConfig},
-    error::{IoFault, Place, Result},
+    error::{IoError, Locate, Result},
     frames::MarsIau2000,
     geom::{attitude::rotation_vector, mars_rotation::mars_rotation, statistics::largest},
     spice::{Kernel, KernelSet, Session},
@@ -154,7 +154,7 @@ fn written(to: &AdjustedKernels, images: &[AdjustedImage]) -> Result<Vec<Written
     };
     let folder = to.directory.join("adjusted");
     fs::create_dir_all(&folder)
-        .map_err(IoFault::on("make the folder"))
+        .map_err(IoError::on("make the folder"))
         .in_file(&folder)?;
     let session = Session::open(to.originals)?;
     let mut states = Vec::new();
@@ -287,7 +287,7 @@ fn read_back(to: &AdjustedKernels, image: &AdjustedImage) -> Result<()> {
          {POSITION_TOLERANCE_M} m and {ROTATION_TOLERANCE_RAD} rad",
         image.times.id
     );
-    Err(ProductFault::ReadBack { what }.into())
+    Err(ProductError::ReadBack { what }.into())
 }
 
 /// The original kernels and behind them those of all images.

@@ -44,7 +44,7 @@ const DEFINITIONS: [(&str, &str); 9] = [
          across it; residuals of the pairs too (Table 5 of Shan et al. 2005)",
     ),
     (
-        "disagreement_m",
+        "along_track_parallax_m",
         "how far apart along the flight the two images place a tie point, mean, metres",
     ),
     (
@@ -175,7 +175,7 @@ impl<'a> AdjustmentKeys<'a> {
 #[derive(Serialize, JsonSchema)]
 struct TiesDocument<'a> {
     points: usize,
-    joining_images: usize,
+    multi_image: usize,
     measured_elsewhere: &'a BTreeMap<String, u64>,
     ignored: u64,
     complaints: u64,
@@ -187,7 +187,7 @@ struct StateDocument<'a> {
     outliers: usize,
     #[schemars(range(min = 0.0))]
     sigma0: f64,
-    rejected: Vec<LeftOutDocument<'a>>,
+    rejected: Vec<RejectedPointDocument<'a>>,
     images: &'a [ImageResiduals],
     pairs: Vec<PairDocument<'a>>,
 }
@@ -206,7 +206,7 @@ struct PairDocument<'a> {
     pixel_size_m: [f64; 2],
     residuals: &'a [ResidualMoments; 2],
     #[schemars(range(min = 0.0))]
-    disagreement_m: f64,
+    along_track_parallax_m: f64,
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(extend("exclusiveMinimum" = 0))]
     mola_spacing_m: Option<f64>,
@@ -241,7 +241,7 @@ struct ProfileDocument<'a> {
 }
 
 #[derive(Serialize, JsonSchema)]
-struct LeftOutDocument<'a> {
+struct RejectedPointDocument<'a> {
     kind: PointKind,
     id: &'a str,
     reason: String,
@@ -254,7 +254,7 @@ struct AdjustmentDocument<'a> {
     #[schemars(length(min = 1), transform = none_negative)]
     weighted_squares: &'a [f64],
     images: Vec<ImageDocument<'a>>,
-    left_out: Vec<LeftOutDocument<'a>>,
+    rejected: Vec<RejectedPointDocument<'a>>,
 }
 
 #[derive(Serialize, JsonSchema)]
@@ -300,7 +300,7 @@ pub(super) fn schema() -> DocumentSchema {
 fn document<'a>(site: &SiteProducts<'a>, geometric: &GeometricProducts<'a>) -> Document<'a> {
     let ties = geometric.ties;
     let adjusted = geometric.adjusted;
-    let left_out = adjusted.left_out.iter().map(|point| LeftOutDocument {
+    let rejected = adjusted.rejected.iter().map(|point| RejectedPointDocument {
         kind: point.kind,
         id: &point.id,
         reason: point.reason.to_string(),
@@ -319,7 +319,7 @@ fn document<'a>(site: &SiteProducts<'a>, geometric: &GeometricProducts<'a>) -> D
         },
         ties: TiesDocument {
             points: ties.points.len(),
-            joining_images: ties.joining(),
+            multi_image: ties.multi_image(),
             measured_elsewhere: &ties.elsewhere,
             ignored: ties.ignored,
             complaints: ties.complaint_count,
@@ -330,13 +330,13 @@ fn document<'a>(site: &SiteProducts<'a>, geometric: &GeometricProducts<'a>) -> D
             summary: &adjusted.summary,
             weighted_squares: &adjusted.weighted_squares,
             images: adjusted.images.iter().map(image).collect(),
-            left_out: left_out.collect(),
+            rejected: rejected.collect(),
         },
     }
 }
 
 fn state<'a>(ties: &'a IntersectedTies, pairs: &'a [PairComparison]) -> StateDocument<'a> {
-    let rejected = ties.rejected.iter().map(|tie| LeftOutDocument {
+    let rejected = ties.rejected.iter().map(|tie| RejectedPointDocument {
         kind: PointKind::Tie,
         id: &tie.id,
         reason: tie.reason.to_string(),
@@ -381,7 +381,7 @@ fn pair(pair: &PairComparison) -> PairDocument<'_> {
         line_spacing_m: pair.line_spacing_m,
         pixel_size_m: pair.pixel_size_m,
         residuals: &pair.residuals,
-        disagreement_m: pair.disagreement_m,
+        along_track_parallax_m: pair.along_track_parallax_m,
         mola_spacing_m: pair.mola_spacing_m,
         footprints: pair.footprints.as_ref().map(|by_ties| FootprintsDocument {
             order: by_ties.order,

@@ -9,18 +9,18 @@ use std::{
 use serde::Serialize;
 use serde_json::Value;
 
-use super::fault::ProductFault;
-use crate::error::{IoFault, Place, Result};
+use super::error::ProductError;
+use crate::error::{IoError, Locate, Result};
 
 /// Creates `path`, its folder made where missing, to be written piece by piece and [`finish`]ed.
 pub(super) fn create(path: &Path) -> Result<BufWriter<File>> {
     if let Some(folder) = path.parent() {
         fs::create_dir_all(folder)
-            .map_err(IoFault::on("make the folder"))
+            .map_err(IoError::on("make the folder"))
             .in_file(folder)?;
     }
     let file = File::create(path)
-        .map_err(IoFault::on("create"))
+        .map_err(IoError::on("create"))
         .in_file(path)?;
     Ok(BufWriter::new(file))
 }
@@ -29,7 +29,7 @@ pub(super) fn create(path: &Path) -> Result<BufWriter<File>> {
 pub(super) fn finish(path: &Path, mut file: BufWriter<File>) -> Result<()> {
     file.flush()
         .and_then(|()| file.get_ref().sync_all())
-        .map_err(IoFault::on("write"))
+        .map_err(IoError::on("write"))
         .in_file(path)
 }
 
@@ -37,14 +37,14 @@ pub(super) fn finish(path: &Path, mut file: BufWriter<File>) -> Result<()> {
 pub(super) fn write_bytes(path: &Path, bytes: &[u8]) -> Result<()> {
     let mut file = create(path)?;
     file.write_all(bytes)
-        .map_err(IoFault::on("write"))
+        .map_err(IoError::on("write"))
         .in_file(path)?;
     finish(path, file)
 }
 
 /// Opens `path` for reading.
 pub(super) fn open(path: &Path) -> Result<File> {
-    File::open(path).map_err(IoFault::on("open")).in_file(path)
+    File::open(path).map_err(IoError::on("open")).in_file(path)
 }
 
 /// Writes `text` and checks that the file holds it.
@@ -53,7 +53,7 @@ pub(super) fn write_text(path: &Path, text: &str) -> Result<()> {
     if read(path)? == text.as_bytes() {
         return Ok(());
     }
-    Err(ProductFault::ReadBack {
+    Err(ProductError::ReadBack {
         what: format!("{} bytes of text", text.len()),
     })
     .in_file(path)
@@ -64,7 +64,7 @@ pub(super) fn read(path: &Path) -> Result<Vec<u8>> {
     let mut bytes = Vec::new();
     open(path)?
         .read_to_end(&mut bytes)
-        .map_err(IoFault::on("read"))
+        .map_err(IoError::on("read"))
         .in_file(path)?;
     Ok(bytes)
 }
@@ -76,16 +76,16 @@ pub(super) fn read(path: &Path) -> Result<Vec<u8>> {
 pub(super) fn write_json(path: &Path, document: &impl Serialize) -> Result<()> {
     let written = to_value(document).in_file(path)?;
     let text = serde_json::to_string_pretty(document)
-        .map_err(ProductFault::refused("encode JSON"))
+        .map_err(ProductError::refused("encode JSON"))
         .in_file(path)?;
     write_bytes(path, (text + "\n").as_bytes())?;
     let found: Value = serde_json::from_slice(&read(path)?)
-        .map_err(ProductFault::unreadable)
+        .map_err(ProductError::unreadable)
         .in_file(path)?;
     if found == written {
         return Ok(());
     }
-    Err(ProductFault::ReadBack {
+    Err(ProductError::ReadBack {
         what: "the document".to_owned(),
     })
     .in_file(path)
@@ -96,9 +96,9 @@ pub(super) fn write_json(path: &Path, document: &impl Serialize) -> Result<()> {
 /// # Errors
 /// Numbers that are not finite, which JSON would turn into null: products have no nulls, what is
 /// unknown is left out.
-pub(super) fn to_value(document: &impl Serialize) -> std::result::Result<Value, ProductFault> {
-    let value = serde_json::to_value(document).map_err(ProductFault::refused("encode JSON"))?;
-    find_null(&value, "").map_or(Ok(value), |what| Err(ProductFault::NotFinite { what }))
+pub(super) fn to_value(document: &impl Serialize) -> std::result::Result<Value, ProductError> {
+    let value = serde_json::to_value(document).map_err(ProductError::refused("encode JSON"))?;
+    find_null(&value, "").map_or(Ok(value), |what| Err(ProductError::NotFinite { what }))
 }
 
 /// JSON pointer to the first null.
@@ -127,7 +127,7 @@ mod tests {
         let path = folder.path().join("a/b.json");
         let failure = write_json(&path, &serde_json::json!({"a": [1.0, f64::NAN]})).unwrap_err();
         assert_eq!(failure.kind(), Kind::Bug);
-        assert_eq!(failure.fault.to_string(), "/a/1 is not a finite number");
+        assert_eq!(failure.cause.to_string(), "/a/1 is not a finite number");
         assert!(!path.exists());
     }
 

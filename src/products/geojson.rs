@@ -11,12 +11,12 @@ use serde_json::{Map, Value, json};
 
 use super::{
     coordinates::{FRAME, bounding_box_deg},
-    fault::ProductFault,
+    error::ProductError,
     files::{create, finish, open, to_value},
     gis::Features,
     table::{Kind, Meaning, Values},
 };
-use crate::error::{IoFault, Place, Result};
+use crate::error::{IoError, Locate, Result};
 
 /// Name of the CRS in the `crs` member of GeoJSON 2008, which GIS still reads: RFC 7946 knows the Earth only.
 pub(super) const CRS_URN: &str = "urn:ogc:def:crs:IAU:2015:49900";
@@ -193,13 +193,13 @@ fn write_lines(path: &Path, head: &str, features: &Features) -> Result<()> {
     let mut file = create(path)?;
     let mut put = |text: &str| {
         file.write_all(text.as_bytes())
-            .map_err(IoFault::on("write"))
+            .map_err(IoError::on("write"))
             .in_file(path)
     };
     put(head)?;
     each(features, path, |_, feature, separator| {
         let line = serde_json::to_string(feature)
-            .map_err(ProductFault::refused("encode GeoJSON"))
+            .map_err(ProductError::refused("encode GeoJSON"))
             .in_file(path)?;
         put(&line)?;
         put(separator)
@@ -209,7 +209,7 @@ fn write_lines(path: &Path, head: &str, features: &Features) -> Result<()> {
 }
 
 /// The lines before the first feature.
-fn head(features: &Features) -> std::result::Result<String, ProductFault> {
+fn head(features: &Features) -> std::result::Result<String, ProductError> {
     let crs = json!({ "type": "name", "properties": { "name": CRS_URN } });
     let mut members = vec![
         ("type", json!("FeatureCollection")),
@@ -238,10 +238,10 @@ fn read_back(path: &Path, head: &str, features: &Features) -> Result<()> {
     let mut next = |line: &mut String| {
         line.clear();
         file.read_line(line)
-            .map_err(IoFault::on("read"))
+            .map_err(IoError::on("read"))
             .in_file(path)
     };
-    let differs = |what: String| Err(ProductFault::ReadBack { what }).in_file(path);
+    let differs = |what: String| Err(ProductError::ReadBack { what }).in_file(path);
     for expected in head.split_inclusive('\n') {
         next(&mut line)?;
         if line != expected {
@@ -297,7 +297,7 @@ mod tests {
             write_text(&path, &text.replacen(from, to, 1)).unwrap();
             let failure = read_back(&path, head, &features).unwrap_err();
             assert_eq!(
-                failure.fault.to_string(),
+                failure.cause.to_string(),
                 format!("read back differently: {complaint}")
             );
         }

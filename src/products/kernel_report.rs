@@ -66,8 +66,8 @@ pub(super) fn qualities(site: &SiteProducts) -> BTreeMap<&'static str, &'static 
         }
     };
     // Alphabetic order is that of quality, the least first.
-    let least = |wanted: &str| {
-        let of_type = site.kernels.iter().filter(|line| type_of(line) == wanted);
+    let least = |required: &str| {
+        let of_type = site.kernels.iter().filter(|line| type_of(line) == required);
         of_type.map(|kernel| quality(&kernel)).min()
     };
     [("mgs_ck_quality", "ck"), ("mgs_spk_quality", "spk")]
@@ -163,8 +163,8 @@ fn report<'a>(site: &SiteProducts<'a>) -> Report<'a> {
     let areograph = Extension {
         coverage: "intervals of TDB seconds past J2000 in which the kernel holds Mars Global Surveyor: its position \
                    in an spk, its attitude in a ck, whose gaps lie between the intervals",
-        wanted_positions_et_s: ends(&site.wanted.positions),
-        wanted_attitudes_et_s: ends(&site.wanted.attitudes),
+        wanted_positions_et_s: ends(&site.required.positions),
+        wanted_attitudes_et_s: ends(&site.required.attitudes),
         kernels: site.kernels.iter().map(entry).collect(),
     };
     let mut names = names_by_type(site);

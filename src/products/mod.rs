@@ -8,8 +8,8 @@
 mod adjusted_kernels;
 mod adjustment;
 mod coordinates;
+pub(crate) mod error;
 mod exchange;
-pub(crate) mod fault;
 mod files;
 mod footprints;
 mod generated;
@@ -44,7 +44,7 @@ pub use generated::{documentation, schemas};
 pub use product::Product;
 pub use site::{GeometricProducts, ImageProducts, SiteProducts};
 
-use crate::error::{Place, Result};
+use crate::error::{Locate, Result};
 use product::{Context, Declaration, Scope, Write, Written};
 use registry::PRODUCTS;
 

@@ -17,11 +17,11 @@ use arrow::{
 };
 
 use super::{
-    fault::ProductFault,
+    error::ProductError,
     files::{create, finish, open},
     table::{Kind, Meaning, Table, Values},
 };
-use crate::error::{Failure, IoFault, Place, Result};
+use crate::error::{Error, IoError, Locate, Result};
 
 /// Writes `table` with `metadata` (key, value) and reads it back.
 ///
@@ -58,13 +58,13 @@ fn encode(file: impl Write + Send, table: &Table, metadata: Vec<(&str, String)>)
 }
 
 /// The disk's refusal, or the library's.
-fn refused(error: ParquetError) -> Failure {
+fn refused(error: ParquetError) -> Error {
     match error {
         ParquetError::External(source) => match source.downcast::<std::io::Error>() {
-            Ok(source) => IoFault::on("write")(*source).into(),
-            Err(source) => ProductFault::refused("encode Parquet")(source).into(),
+            Ok(source) => IoError::on("write")(*source).into(),
+            Err(source) => ProductError::refused("encode Parquet")(source).into(),
         },
-        error => ProductFault::refused("encode Parquet")(error).into(),
+        error => ProductError::refused("encode Parquet")(error).into(),
     }
 }
 
@@ -95,10 +95,10 @@ fn record_batch(
     table: &Table,
     schema: &SchemaRef,
     rows: Range<usize>,
-) -> std::result::Result<RecordBatch, ProductFault> {
+) -> std::result::Result<RecordBatch, ProductError> {
     let arrays = table.values(rows)?.into_iter().map(array).collect();
     RecordBatch::try_new(Arc::clone(schema), arrays)
-        .map_err(ProductFault::refused("assemble columns"))
+        .map_err(ProductError::refused("assemble columns"))
 }
 
 fn array(values: Values) -> ArrayRef {
@@ -116,15 +116,15 @@ fn array(values: Values) -> ArrayRef {
 fn read_back(path: &Path, table: &Table) -> Result<()> {
     let file: File = open(path)?;
     let builder =
-        ParquetRecordBatchReaderBuilder::try_new(file).map_err(ProductFault::unreadable)?;
+        ParquetRecordBatchReaderBuilder::try_new(file).map_err(ProductError::unreadable)?;
     let schema = schema(table);
     if builder.schema().fields() != schema.fields() {
         let what = "names, types, units or descriptions of columns".to_owned();
-        return Err(ProductFault::ReadBack { what }.into());
+        return Err(ProductError::ReadBack { what }.into());
     }
     let mut rows = 0;
-    for batch in builder.build().map_err(ProductFault::unreadable)? {
-        let batch = batch.map_err(ProductFault::unreadable)?;
+    for batch in builder.build().map_err(ProductError::unreadable)? {
+        let batch = batch.map_err(ProductError::unreadable)?;
         let end = rows + batch.num_rows();
         let expected = record_batch(table, &schema, rows..end.min(table.rows()))?;
         for (column, (found, expected)) in table
@@ -132,7 +132,7 @@ fn read_back(path: &Path, table: &Table) -> Result<()> {
             .zip(batch.columns().iter().zip(expected.columns()))
         {
             if found != expected {
-                return Err(ProductFault::ReadBack {
+                return Err(ProductError::ReadBack {
                     what: format!("column {}, from row {}", column.name, rows + 1),
                 }
                 .into());
@@ -141,7 +141,7 @@ fn read_back(path: &Path, table: &Table) -> Result<()> {
         rows = end;
     }
     if rows != table.rows() {
-        return Err(ProductFault::ReadBack {
+        return Err(ProductError::ReadBack {
             what: format!("{rows} rows of {}", table.rows()),
         }
         .into());

@@ -16,7 +16,7 @@ use super::{
     site::SiteProducts,
     table::{Kind, Meaning, Table},
 };
-use crate::error::{IoFault, Place, Result};
+use crate::error::{IoError, Locate, Result};
 
 /// What the label says of the file.
 struct Described {
@@ -45,7 +45,7 @@ fn describe(path: &Path) -> Result<Described> {
     let mut file = BufReader::with_capacity(1 << 16, open(path)?);
     let mut hasher = Md5::new();
     let mut header = Vec::new();
-    let read = |error| IoFault::on("read")(error);
+    let read = |error| IoError::on("read")(error);
     file.read_until(b'\n', &mut header)
         .map_err(read)
         .in_file(path)?;

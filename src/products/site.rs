@@ -2,13 +2,13 @@
 
 use std::{collections::BTreeMap, path::Path};
 
-use super::fault::ProductFault;
+use super::error::ProductError;
 use crate::{
     config::SiteConfig,
     error::Result,
     footprints::Footprints,
     frames::MarsIau2000,
-    spice::{KernelSet, Wanted},
+    spice::{KernelSet, RequiredCoverage},
     stages::{
         adjust::Adjusted, check_ranges::RangeCheck, compare_pairs::PairComparison,
         convert_datum::FileConversion, describe_kernels::KernelLine, fit_sensor_model::SensorModel,
@@ -27,7 +27,7 @@ pub struct SiteProducts<'a> {
     /// Text of the metakernel that loads them again, its paths relative to the folder of the products.
     pub metakernel: &'a str,
     /// The instants that the site asks of the kernels.
-    pub wanted: &'a Wanted,
+    pub required: &'a RequiredCoverage,
     /// Images in the order of the configuration.
     pub images: &'a [ImageProducts<'a>],
     /// What the conversion of the datum did, in the order of the footprints' files.
@@ -42,7 +42,7 @@ pub struct SiteProducts<'a> {
     pub ranges: &'a RangeCheck,
     /// Rejected shots by reason.
     pub rejected: &'a BTreeMap<String, u64>,
-    /// What was wrong with input that was read around, one sentence each.
+    /// What was wrong with skipped records, one sentence each.
     pub complaints: &'a [String],
     /// What the reader should know, one sentence each.
     pub notes: &'a [String],
@@ -151,7 +151,7 @@ impl SiteProducts<'_> {
         ];
         for (what, found, expected) in lengths {
             if found != expected {
-                return Err(ProductFault::Inconsistent {
+                return Err(ProductError::Inconsistent {
                     what: what.to_owned(),
                     found,
                     expected,

@@ -7,7 +7,7 @@
 
 use std::ops::Range;
 
-use super::fault::ProductFault;
+use super::error::ProductError;
 
 /// Rows whose values stand in memory at once.
 const ROWS_AT_ONCE: usize = 65_536;
@@ -269,8 +269,8 @@ impl<'a> Table<'a> {
         self.keep(|column| column.dbase.is_some())
     }
 
-    fn keep(mut self, wanted: impl Fn(&Meaning) -> bool) -> Self {
-        self.columns.retain(|(_, column)| wanted(column));
+    fn keep(mut self, required: impl Fn(&Meaning) -> bool) -> Self {
+        self.columns.retain(|(_, column)| required(column));
         self
     }
 
@@ -287,12 +287,12 @@ impl<'a> Table<'a> {
     ///
     /// # Errors
     /// A number that is not finite, which no reader could use.
-    pub(super) fn values(&self, rows: Range<usize>) -> Result<Vec<Values>, ProductFault> {
+    pub(super) fn values(&self, rows: Range<usize>) -> Result<Vec<Values>, ProductError> {
         let of_column = |(index, column): &(usize, Meaning)| {
             let values = (self.values)(*index, rows.clone());
             match values.not_finite() {
                 None => Ok(values),
-                Some(row) => Err(ProductFault::NotFinite {
+                Some(row) => Err(ProductError::NotFinite {
                     what: format!(
                         "column {}, row {} of {}",
                         column.name,

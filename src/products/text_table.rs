@@ -3,11 +3,11 @@
 use std::{io::Write, path::Path};
 
 use super::{
-    fault::ProductFault,
+    error::ProductError,
     files::{create, finish, open},
     table::{Meaning, Table, Values},
 };
-use crate::error::{Failure, IoFault, Place, Result};
+use crate::error::{Error, IoError, Locate, Result};
 
 /// Writes the columns of `table` that are no bytes, and reads them back.
 ///
@@ -36,16 +36,16 @@ fn encode(file: impl Write, table: &Table) -> Result<()> {
                 .map_err(refused)?;
         }
     }
-    writer.flush().map_err(IoFault::on("write"))?;
+    writer.flush().map_err(IoError::on("write"))?;
     Ok(())
 }
 
 /// The disk's refusal, or the library's.
-fn refused(error: csv::Error) -> Failure {
+fn refused(error: csv::Error) -> Error {
     let reason = error.to_string();
     match error.into_kind() {
-        csv::ErrorKind::Io(source) => IoFault::on("write")(source).into(),
-        _ => ProductFault::refused("encode CSV")(reason).into(),
+        csv::ErrorKind::Io(source) => IoError::on("write")(source).into(),
+        _ => ProductError::refused("encode CSV")(reason).into(),
     }
 }
 
@@ -86,9 +86,9 @@ fn holds(column: &Meaning, values: &Values, row: usize, text: &str) -> bool {
 }
 
 fn read_back(path: &Path, table: &Table) -> Result<()> {
-    let differs = |what: String| Err(ProductFault::ReadBack { what }.into());
+    let differs = |what: String| Err(ProductError::ReadBack { what }.into());
     let mut reader = csv::Reader::from_reader(open(path)?);
-    let names = reader.headers().map_err(ProductFault::unreadable)?;
+    let names = reader.headers().map_err(ProductError::unreadable)?;
     if !names.iter().eq(table.columns().map(|column| column.name)) {
         return differs("names of columns".to_owned());
     }
@@ -100,7 +100,7 @@ fn read_back(path: &Path, table: &Table) -> Result<()> {
             let Some(record) = records.next() else {
                 return differs(format!("{number} rows of {}", table.rows()));
             };
-            let record = record.map_err(ProductFault::unreadable)?;
+            let record = record.map_err(ProductError::unreadable)?;
             for (index, (column, values)) in table.columns().zip(&values).enumerate() {
                 let text = record.get(index).unwrap_or_default();
                 if !holds(column, values, row, text) {
@@ -166,7 +166,7 @@ mod tests {
         ] {
             write_text(&path, text).unwrap();
             let failure = read_back(&path, &numbers("a_m", vec![1.5, 2.5])).unwrap_err();
-            assert_eq!(failure.fault.to_string(), complaint);
+            assert_eq!(failure.cause.to_string(), complaint);
         }
     }
 }

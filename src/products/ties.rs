@@ -53,7 +53,7 @@ struct Measurement<'a> {
     line: f64,
     sample: f64,
     /// Empty for a tie point that took part in the adjustment, else why not.
-    left_out: String,
+    rejected: String,
     before: Option<(&'a IntersectedPoint, &'a MeasureResidual)>,
     after: Option<(&'a IntersectedPoint, &'a MeasureResidual)>,
     adjusted: Option<(&'a CorrectedPoint, &'a ImageResidual)>,
@@ -96,7 +96,7 @@ fn measurements<'a>(
                 let view = views.get(&(*index, measure.image)).copied()?;
                 Some((*point, view))
             });
-            let left_out = if view.is_some() {
+            let rejected = if view.is_some() {
                 String::new()
             } else {
                 reasons.get(&index).cloned().unwrap_or_default()
@@ -106,7 +106,7 @@ fn measurements<'a>(
                 image: &site.images[measure.image].times.id,
                 line: measure.line,
                 sample: measure.sample,
-                left_out,
+                rejected,
                 before: seen(before),
                 after: seen(after),
                 adjusted: view,
@@ -116,9 +116,9 @@ fn measurements<'a>(
     found
 }
 
-/// Why tie points were left out; what the intersection says of a point comes first.
+/// Why tie points were rejected; what the intersection says of a point comes first.
 fn reasons(geometric: &GeometricProducts) -> BTreeMap<usize, String> {
-    let adjusted = geometric.adjusted.left_out.iter();
+    let adjusted = geometric.adjusted.rejected.iter();
     let ties = adjusted.filter(|point| point.kind == PointKind::Tie);
     let rejected = geometric.intersected.rejected.iter();
     let rejected = rejected.map(|tie| (tie.tie, tie.reason.to_string()));
@@ -164,10 +164,10 @@ fn measured_columns<'a>() -> Vec<Column<Measurement<'a>>> {
             |row: &Measurement| row.sample,
         ),
         column(
-            "left_out",
+            "rejected",
             Unit::None,
             "why the tie point took no part in the adjustment; empty when it did",
-            |row: &Measurement| row.left_out.clone(),
+            |row: &Measurement| row.rejected.clone(),
         ),
     ]
 }

@@ -40,29 +40,29 @@ fn write(site: &SiteProducts, geometric: &GeometricProducts) -> Result<String> {
     html += &image_coordinates(summary);
     html += &ground_sigmas(summary);
     html += &observations(summary);
-    html += &heading("What was added to the orientation");
+    html += &heading("Corrections to the orientation");
     html += &corrections::tables(site, adjusted);
-    html += &heading("What can be trusted");
+    html += &heading("Reliability");
     html += &reliability::redundancy(site, adjusted);
     html += &reliability::correlations(summary);
-    html += &reliability::left_out(adjusted);
+    html += &reliability::rejected(adjusted);
     Ok(html)
 }
 
 fn overview(adjusted: &Adjusted) -> String {
     let summary = &adjusted.summary;
     let verdict = if summary.degrees_of_freedom == 0 {
-        "nothing is redundant, so that nothing can be said of it".to_owned()
+        "nothing is redundant, so nothing can be said about the observations".to_owned()
     } else if summary.sigma0 < 0.9 {
-        "the observations agree better than their standard deviations promise".to_owned()
+        "the observations agree better than their standard deviations suggest".to_owned()
     } else if summary.sigma0 <= 1.1 {
-        "the observations agree as their standard deviations promise".to_owned()
+        "the observations agree as their standard deviations suggest".to_owned()
     } else {
-        "the observations agree worse than their standard deviations promise".to_owned()
+        "the observations agree worse than their standard deviations suggest".to_owned()
     };
     format!(
         "{}, {} and {} were adjusted together in {}; {} degrees of freedom. The a posteriori standard deviation of unit \
-         weight σ0 is {} (1 was put in): {verdict}.",
+         weight σ0 is {} (a priori 1): {verdict}.",
         counted(adjusted.images.len(), "image"),
         counted(summary.shots.corrections_m[0].n as usize, "footprint"),
         counted(summary.ties.corrections_m[0].n as usize, "tie point"),
@@ -162,7 +162,7 @@ fn image_coordinates(summary: &AdjustmentSummary) -> String {
     for image in &summary.images {
         for (name, of) in [
             ("MOLA, lines and px", &image.mola_corrections),
-            ("tie points, focal px", &image.tie_residuals_px),
+            ("tie points, focal-plane px", &image.tie_residuals_px),
         ] {
             let mut cells: Vec<Cell> = vec![
                 (&image.image).into(),
@@ -249,7 +249,7 @@ fn observations(summary: &AdjustmentSummary) -> String {
     }
     let words = format!(
         "The variance component is the standard deviation of unit weight of one kind, √(vᵀPv / redundancy): near 1 where \
-         the standard deviations put in are right, below 1 where they are too large. Beyond {BAARDA_LIMIT}: \
+         the a priori standard deviations are right, below 1 where they are too large. Beyond {BAARDA_LIMIT}: \
          observations that fail Baarda's test; one good one in a thousand does."
     );
     table.finish() + &paragraph(&words)

@@ -40,7 +40,7 @@ pub struct KernelComparison<'a> {
 /// A comparison of rival kernel sets as one HTML page.
 ///
 /// # Errors
-/// A plot that cannot be drawn, which is a fault of areograph.
+/// A plot that cannot be drawn, which is a bug in areograph.
 pub fn comparison_page(comparison: &KernelComparison) -> Result<String> {
     let sections = [
         Section::new("Orbit", orbit(comparison.orbit)?),

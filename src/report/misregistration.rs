@@ -13,9 +13,9 @@ use crate::{
     geom::intersection::Unintersected,
     products::{GeometricProducts, SiteProducts},
     stages::{
-        adjust::{LeftOutReason, PointKind},
+        adjust::{PointKind, RejectionReason},
         compare_pairs::{PairComparison, ProfileByTies},
-        intersect::TieReject,
+        intersect::TieRejection,
     },
     units::RADIANS_PER_DEGREE,
 };
@@ -139,7 +139,7 @@ fn apart(pair: &PairComparison) -> Apart {
     let metres = if footprints {
         metres / shots
     } else {
-        pair.disagreement_m
+        pair.along_track_parallax_m
     };
     Apart {
         metres,
@@ -158,7 +158,7 @@ fn read(geometric: &GeometricProducts) -> String {
         "{} read, {} of them measured in at least two images; {} have a ground point with the orientation of the \
          kernels, {} with the adjusted one.",
         counted(ties.points.len(), "tie point"),
-        ties.joining(),
+        ties.multi_image(),
         points.len(),
         geometric.adjusted_intersected.points.len()
     );
@@ -183,36 +183,36 @@ fn read(geometric: &GeometricProducts) -> String {
              in the pairs' statistics."
         );
     }
-    paragraph(&words) + &left_out(geometric)
+    paragraph(&words) + &rejected(geometric)
 }
 
 /// Tie points by the reason that they were left out for.
-fn left_out(geometric: &GeometricProducts) -> String {
+fn rejected(geometric: &GeometricProducts) -> String {
     let mut reasons: BTreeMap<(&str, &str), u64> = BTreeMap::new();
     for tie in &geometric.intersected.rejected {
         *reasons
             .entry(("intersection", rejection(tie.reason)))
             .or_insert(0) += 1;
     }
-    let ties = geometric.adjusted.left_out.iter();
+    let ties = geometric.adjusted.rejected.iter();
     for tie in ties.filter(|left| left.kind == PointKind::Tie) {
         let reason = match tie.reason {
             // The intersection has said why.
-            LeftOutReason::NotIntersected => continue,
-            LeftOutReason::Undetermined => "not determined",
-            LeftOutReason::Blunder { .. } => "blunder: its standardised residual is too large",
+            RejectionReason::NotIntersected => continue,
+            RejectionReason::Undetermined => "not determined",
+            RejectionReason::Blunder { .. } => "blunder: its standardised residual is too large",
         };
         *reasons.entry(("adjustment", reason)).or_insert(0) += 1;
     }
     if reasons.is_empty() {
-        return paragraph("No tie point was left out.");
+        return paragraph("No tie point was rejected.");
     }
     let columns = &[
-        Column::Text("left out of"),
+        Column::Text("rejected by"),
         Column::Number("tie points"),
         Column::Text("reason"),
     ];
-    let mut table = Table::new("Tie points that were left out", columns);
+    let mut table = Table::new("Rejected tie points", columns);
     for ((of, reason), count) in reasons {
         table.row(true, [of.into(), count.to_string().into(), reason.into()]);
     }
@@ -220,21 +220,21 @@ fn left_out(geometric: &GeometricProducts) -> String {
 }
 
 /// A reason without the numbers of a single tie point.
-const fn rejection(reason: TieReject) -> &'static str {
+const fn rejection(reason: TieRejection) -> &'static str {
     match reason {
-        TieReject::Rays(rays) => match rays {
+        TieRejection::Rays(rays) => match rays {
             Unintersected::FewRays { .. } => "measured in one image only",
             Unintersected::NearParallel { .. } => "rays too close to parallel",
             Unintersected::IllConditioned => "rays do not determine the point",
             Unintersected::BehindCamera { .. } => "rays meet behind a camera",
             Unintersected::Height { .. } => "rays meet far from the ellipsoid",
-            Unintersected::Unsettled => "the iteration did not come to rest",
+            Unintersected::NotConverged => "the iteration did not converge",
         },
-        TieReject::Unseen => "an image does not see the intersected point",
-        TieReject::Duplicate => "identifier used before",
-        TieReject::TwiceInImage => "measured twice in one image",
-        TieReject::OutsideImage => "measured outside its image",
-        TieReject::NotFinite => "measurement not a finite number",
+        TieRejection::Unseen => "an image does not see the intersected point",
+        TieRejection::Duplicate => "identifier used before",
+        TieRejection::TwiceInImage => "measured twice in one image",
+        TieRejection::OutsideImage => "measured outside its image",
+        TieRejection::NotFinite => "measurement not a finite number",
     }
 }
 
@@ -249,7 +249,7 @@ fn geometry(pairs: &[BeforeAfter]) -> String {
             Column::Number("H/B"),
             Column::Number("line spacing 1, m"),
             Column::Number("line spacing 2, m"),
-            Column::Number("tie points apart along the flight, m"),
+            Column::Number("along-track parallax of tie points, m"),
         ],
     );
     for pair in pairs {
@@ -259,7 +259,7 @@ fn geometry(pairs: &[BeforeAfter]) -> String {
                 (found.height_over_base, 2),
                 (found.line_spacing_m[0], 3),
                 (found.line_spacing_m[1], 3),
-                (found.disagreement_m, 2),
+                (found.along_track_parallax_m, 2),
             ];
             let mut cells: Vec<Cell> = vec![
                 pair.name().into(),
@@ -345,7 +345,7 @@ fn footprints(pairs: &[BeforeAfter]) -> String {
             table.row(true, profile_cells(&pair.name(), profile, after));
         }
         notes += &paragraph(&format!(
-            "{}: a polynomial of order {} through {} tie points ({} left out) takes the first image to the second; it \
+            "{}: a polynomial of order {} through {} tie points ({} rejected) takes the first image to the second; it \
              leaves {} lines and {} samples of them (standard deviations).",
             pair.name(),
             found.order,

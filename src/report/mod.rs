@@ -69,7 +69,7 @@ const SECTIONS: &[Section] = &[
 /// The report of `site` as one HTML page.
 ///
 /// # Errors
-/// A plot that cannot be drawn, which is a fault of areograph.
+/// A plot that cannot be drawn, which is a bug in areograph.
 pub fn page(site: &SiteProducts) -> Result<String> {
     let sections = SECTIONS.iter().map(|section| section.of(site));
     let sections: Vec<html::Section> = sections

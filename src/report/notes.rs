@@ -20,7 +20,7 @@ fn write(site: &SiteProducts) -> String {
     let mut body = list(site.notes);
     if !site.complaints.is_empty() {
         let shown = &site.complaints[..site.complaints.len().min(COMPLAINTS_SHOWN)];
-        body += &heading("Complaints about input");
+        body += &heading("Problems in the input");
         body += &list(shown);
         body += &paragraph(&format!(
             "{} of {} shown.",

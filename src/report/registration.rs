@@ -288,10 +288,10 @@ fn models(images: &[&ImageProducts]) -> String {
             Column::Number("standard deviation"),
         ],
     );
-    let word = |wanted: CameraModel| {
+    let word = |required: CameraModel| {
         let words = CameraModel::WORDS.into_iter();
         words
-            .filter(|(_, model)| *model == wanted)
+            .filter(|(_, model)| *model == required)
             .map(|(word, _)| word.replace('_', " "))
             .collect::<String>()
     };

@@ -1,5 +1,5 @@
 //! What of the adjustment can be trusted, in the words of surveyors: absolute position, gross errors that no
-//! residual shows, unknowns that cannot be told apart, and points that were left out.
+//! residual shows, unknowns that cannot be separated, and rejected points.
 
 use super::{
     html::{Cell, Column, Table, counted, paragraph},
@@ -10,7 +10,7 @@ use crate::{
     footprints::FootprintImageCoordinates,
     geom::statistics::Summary,
     products::{GeometricProducts, SiteProducts},
-    stages::adjust::{Adjusted, AdjustmentSummary, LeftOutReason, PointKind, ScalarResidual},
+    stages::adjust::{Adjusted, AdjustmentSummary, PointKind, RejectionReason, ScalarResidual},
 };
 
 /// Error in standard deviations over the root of the redundancy number that Baarda's test at 3.29 finds in
@@ -27,7 +27,7 @@ const SHOWN: f64 = 0.3;
 const CORRELATED_SHOWN: usize = 12;
 const BLUNDERS_SHOWN: usize = 20;
 
-/// Relative registration is healed, absolute position is not: with numbers.
+/// The relative registration is corrected, the absolute position is not: with numbers.
 pub(super) fn absolute(site: &SiteProducts, geometric: &GeometricProducts) -> String {
     let pairs = BeforeAfter::all(geometric);
     let relative = BeforeAfter::worst(&pairs);
@@ -48,18 +48,18 @@ pub(super) fn absolute(site: &SiteProducts, geometric: &GeometricProducts) -> St
     if ties.corrections_m[0].n == 0 {
         return format!("{relative}No tie point took part: nothing was adjusted to anything.");
     }
-    let healed = if geometric.images_agree {
-        "Relative registration is healed, absolute position is not."
+    let corrected = if geometric.images_agree {
+        "The relative registration is corrected, the absolute position is not."
     } else {
-        "Relative registration is not healed, nor is absolute position."
+        "Neither the relative registration nor the absolute position is corrected."
     };
     let of = |axes: &[Summary; 3]| {
         let means = axes.each_ref().map(|axis| label(axis.mean, 1));
         means.join(", ")
     };
     format!(
-        "{relative}Where the images lie on Mars the adjustment cannot tell: {witness}. The tie points moved by {} m in X, Y, Z \
-         on average; their formal standard deviations of {} m are optimistic. {healed}",
+        "{relative}The adjustment cannot determine where the images lie on Mars: {witness}. The tie points moved by {} m in X, Y, Z \
+         on average; their formal standard deviations of {} m are optimistic. {corrected}",
         of(&ties.corrections_m),
         of(&ties.sigmas_m)
     )
@@ -142,11 +142,11 @@ impl Controlled {
     }
 }
 
-/// How much of a gross error its own residual shows.
+/// Share of a gross error that its own residual shows.
 pub(super) fn redundancy(site: &SiteProducts, adjusted: &Adjusted) -> String {
     let all = Controlled::all(site, adjusted);
     let mut table = Table::new(
-        "How much of a gross error its own residual shows",
+        "Share of a gross error that its own residual shows",
         &[
             Column::Text("observation"),
             Column::Number("number"),
@@ -199,7 +199,7 @@ fn per_cent(share: f64) -> String {
     }
 }
 
-/// Unknowns that cannot be told apart.
+/// Unknowns that cannot be separated.
 pub(super) fn correlations(summary: &AdjustmentSummary) -> String {
     let mut all: Vec<_> = summary.correlated.iter().collect();
     all.sort_by(|a, b| b.2.abs().total_cmp(&a.2.abs()));
@@ -234,30 +234,30 @@ fn rest(all: usize, shown: usize) -> String {
     paragraph(&format!("And {} more.", all - shown))
 }
 
-/// Points that the adjustment left out.
-pub(super) fn left_out(adjusted: &Adjusted) -> String {
+/// Points that the adjustment rejected.
+pub(super) fn rejected(adjusted: &Adjusted) -> String {
     let mut blunders = Vec::new();
     let mut undetermined = [0_usize; 2];
-    for point in &adjusted.left_out {
+    for point in &adjusted.rejected {
         match point.reason {
-            LeftOutReason::Blunder { standardised } => blunders.push((&point.id, standardised)),
-            LeftOutReason::Undetermined => {
+            RejectionReason::Blunder { standardised } => blunders.push((&point.id, standardised)),
+            RejectionReason::Undetermined => {
                 undetermined[usize::from(point.kind == PointKind::Tie)] += 1;
             }
-            LeftOutReason::NotIntersected => {}
+            RejectionReason::NotIntersected => {}
         }
     }
     let mut html = String::new();
     for (count, what) in undetermined.into_iter().zip(["footprint", "tie point"]) {
         if count > 0 {
             html += &paragraph(&format!(
-                "{} left out as not determined.",
+                "{} rejected as not determined.",
                 counted(count, what)
             ));
         }
     }
     if blunders.is_empty() {
-        return html + &paragraph("No tie point was left out as a blunder.");
+        return html + &paragraph("No tie point was rejected as a blunder.");
     }
     let columns = &[
         Column::Text("tie point"),

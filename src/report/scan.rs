@@ -47,7 +47,7 @@ fn table(site: &SiteProducts) -> String {
             Column::Number("uncertainty"),
             Column::Number("configured"),
             Column::Number("best − configured"),
-            Column::Number("spread at best, m"),
+            Column::Number("smallest spread, m"),
         ],
     );
     for ranges in &site.ranges.profiles {

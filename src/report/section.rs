@@ -20,7 +20,7 @@ impl Section {
     /// The section of this site, if it has one.
     ///
     /// # Errors
-    /// A plot that cannot be drawn, which is a fault of areograph.
+    /// A plot that cannot be drawn, which is a bug in areograph.
     pub(super) fn of(&self, site: &SiteProducts) -> Result<Option<html::Section>> {
         if !(self.appears)(site) {
             return Ok(None);

@@ -1,4 +1,4 @@
-//! Windows and filters, and what they left out.
+//! Windows and filters, and what they rejected.
 
 use super::{
     html::{Column, Table, paragraph},
@@ -61,12 +61,12 @@ fn filter(site: &SiteProducts) -> String {
 
 fn rejects(site: &SiteProducts) -> String {
     if site.rejected.is_empty() {
-        return paragraph("No shot inside a window was left out.");
+        return paragraph("No shot inside a window was rejected.");
     }
     let left_out: u64 = site.rejected.values().sum();
     let all = left_out + site.footprints.len() as u64;
     let mut table = Table::new(
-        "Shots inside a window that were left out",
+        "Rejected shots inside a window",
         &[
             Column::Text("reason"),
             Column::Number("shots"),

@@ -31,10 +31,10 @@ pub struct SiteSummary {
     pub position_rmse_m: Option<f64>,
     /// Largest second-order pointing RMSE of an image, radians.
     pub pointing_rmse_rad: Option<f64>,
-    /// Largest disagreement of two images along the flight at their tie points, metres.
-    pub disagreement_m: Option<f64>,
+    /// Largest along-track parallax of two images at their tie points, metres.
+    pub along_track_parallax_m: Option<f64>,
     /// The same with the adjusted orientation, metres.
-    pub adjusted_disagreement_m: Option<f64>,
+    pub adjusted_along_track_parallax_m: Option<f64>,
     /// When the products were published.
     pub finished_utc: String,
     /// Version of the program that made them.
@@ -44,7 +44,7 @@ pub struct SiteSummary {
 /// The page over `sites`, which stand in the order given.
 #[must_use]
 pub fn sites_page(sites: &[SiteLine]) -> String {
-    let with = |wanted: Tone| sites.iter().filter(|site| tone(site) == wanted).count();
+    let with = |required: Tone| sites.iter().filter(|site| tone(site) == required).count();
     let unfinished = sites.iter().filter(|site| site.products.is_none()).count();
     let (valid, remarks) = (with(Tone::Good), with(Tone::Remarks));
     let invalid = with(Tone::Bad) - unfinished;
@@ -107,15 +107,15 @@ fn table(sites: &[SiteLine]) -> String {
 
 fn cells(site: &SiteLine) -> Vec<Cell> {
     let Some(summary) = &site.products else {
-        let because = site.failure.as_deref().map_or(
-            "the last run did not come to its end; see its log",
-            first_line,
-        );
+        let because = site
+            .failure
+            .as_deref()
+            .map_or("the last run did not finish; see its log", first_line);
         return vec![(&site.folder).into(), "no products".into(), because.into()];
     };
     let (word, why) = match &site.failure {
         Some(failure) => (
-            "last run failed, products of an earlier one",
+            "last run failed; products of an earlier run",
             first_line(failure).to_owned(),
         ),
         None => (summary.verdict, because(summary)),
@@ -140,8 +140,8 @@ fn cells(site: &SiteLine) -> Vec<Cell> {
         summary.pointing_rmse_rad,
         RADIANS_PER_ARCSECOND.recip(),
     ));
-    cells.push(figure(summary.disagreement_m, 1.0));
-    cells.push(figure(summary.adjusted_disagreement_m, 1.0));
+    cells.push(figure(summary.along_track_parallax_m, 1.0));
+    cells.push(figure(summary.adjusted_along_track_parallax_m, 1.0));
     cells.push((&summary.finished_utc).into());
     cells.push((&summary.version).into());
     cells
@@ -177,8 +177,8 @@ mod tests {
             range_mean_m: Some(1.25),
             position_rmse_m: None,
             pointing_rmse_rad: None,
-            disagreement_m: None,
-            adjusted_disagreement_m: None,
+            along_track_parallax_m: None,
+            adjusted_along_track_parallax_m: None,
             finished_utc: "2026-01-01T00:00:00Z".to_owned(),
             version: "1".to_owned(),
         };

@@ -16,7 +16,7 @@ pub(super) fn lead(site: &SiteProducts) -> String {
     let (tone, headline) = match (reasons.len(), remarks.len()) {
         (0, 0) => (
             Tone::Good,
-            "Valid: every profile and image keeps the limits of the configuration.".to_owned(),
+            "Valid: every profile and image is within the limits of the configuration.".to_owned(),
         ),
         (0, 1) => (Tone::Remarks, "Valid, with one remark:".to_owned()),
         (0, count) => (Tone::Remarks, format!("Valid, with {count} remarks:")),

@@ -50,12 +50,12 @@ fn write(site: &SiteProducts) -> Result<String> {
         );
         body += &paragraph(&words);
     }
-    Ok(body + &heading("What the kernels hold") + &table(site))
+    Ok(body + &heading("Kernel coverage") + &table(site))
 }
 
 /// What is asked, merged where it lies close together, with room at both sides.
 fn stretches(site: &SiteProducts) -> Vec<Interval> {
-    let asked = [&site.wanted.positions, &site.wanted.attitudes];
+    let asked = [&site.required.positions, &site.required.attitudes];
     let wide = asked
         .into_iter()
         .flat_map(Intervals::as_slice)
@@ -81,8 +81,8 @@ struct Row {
 fn rows(site: &SiteProducts, stretch: Interval) -> Vec<Row> {
     let mut rows = Vec::new();
     for (role, name, asked) in [
-        ("SPK", "position, all kernels", &site.wanted.positions),
-        ("CK", "attitude, all kernels", &site.wanted.attitudes),
+        ("SPK", "position, all kernels", &site.required.positions),
+        ("CK", "attitude, all kernels", &site.required.attitudes),
     ] {
         let within = Intervals::union_of([stretch]);
         let asked = asked.intersection(&within);
@@ -132,18 +132,18 @@ fn picture(site: &SiteProducts, stretch: Interval) -> Result<String> {
         stretch.start.seconds()
     );
     words += &match gaps.as_slice() {
-        [] => " Everything that is asked is held.".to_owned(),
+        [] => " Everything requested is covered.".to_owned(),
         [first, ..] => format!(
-            " Of what is asked, margins included, {:.3} s are not held, the first {:.3} s at \
+            " Of the requested time, margins included, {:.3} s are not covered, the first {:.3} s at \
              {first}.",
             total_s(&gaps),
             first.duration_s()
         ),
     };
     let keys = [
-        Key::colour("held", HELD),
-        Key::colour("asked by the site, with its margin", ASKED),
-        Key::mark("asked and not held"),
+        Key::colour("covered", HELD),
+        Key::colour("requested by the site, with its margin", ASKED),
+        Key::mark("requested but not covered"),
     ];
     let title = format!("Kernels at {}", calendar(stretch.start));
     Ok(figure_html(&title, &svg, &keys, &words, &csv(&rows)))
@@ -217,15 +217,15 @@ fn csv(rows: &[Row]) -> String {
 
 fn table(site: &SiteProducts) -> String {
     let mut table = Table::new(
-        "Kernels that hold MGS",
+        "Kernels with data of MGS",
         &[
             Column::Text("kernel"),
             Column::Text("role"),
             Column::Text("from (TDB)"),
             Column::Text("to (TDB)"),
             Column::Number("intervals"),
-            Column::Number("held of the span, %"),
-            Column::Number("asked of it, s"),
+            Column::Number("covered part of the span, %"),
+            Column::Number("requested of it, s"),
         ],
     );
     for kernel in site
@@ -237,8 +237,8 @@ fn table(site: &SiteProducts) -> String {
         let span = Interval::new(intervals[0].start, intervals[intervals.len() - 1].stop);
         let held_s = total_s(intervals);
         let asked = match &*kernel.role {
-            "CK" => &site.wanted.attitudes,
-            _ => &site.wanted.positions,
+            "CK" => &site.required.attitudes,
+            _ => &site.required.positions,
         };
         let used = Intervals::union_of(intervals.iter().copied()).intersection(asked);
         let used_s = total_s(used.as_slice());

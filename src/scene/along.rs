@@ -19,7 +19,7 @@ use super::{
 };
 use crate::{
     config::{built_in_altimeter, built_in_instruments, usual_instrument},
-    error::{IoFault, Place, Result},
+    error::{IoError, Locate, Result},
     frames::MarsDatum,
     geom::ellipsoid::Spherical,
     pds::moc::read_label,
@@ -205,12 +205,12 @@ struct Flights(Vec<TabulatedFlight>);
 
 impl Flight for Flights {
     fn beam(&self, et: Et) -> Result<Beam> {
-        let fault = SceneError::NotTabulated { et_s: et.seconds() };
+        let error = SceneError::NotTabulated { et_s: et.seconds() };
         Ok(self
             .0
             .iter()
             .find_map(|flight| flight.beam(et))
-            .ok_or(fault)?)
+            .ok_or(error)?)
     }
 }
 
@@ -281,7 +281,7 @@ fn site_image(label: &Path) -> Result<SiteImage> {
 
 fn absolute(path: &Path) -> Result<PathBuf> {
     fs::canonicalize(path)
-        .map_err(IoFault::on("find"))
+        .map_err(IoError::on("find"))
         .in_file(path)
 }
 

@@ -133,13 +133,13 @@ impl<'a> ContextImage<'a> {
                 let (Some(arc), Some(camera)) = (arc, camera) else {
                     return Err(SceneError::NoCamera {
                         image: plan.id.to_owned(),
-                        fault: format!("no {} around {}", plan.camera, plan.around),
+                        error: format!("no {} around {}", plan.camera, plan.around),
                     }
                     .into());
                 };
                 let middle = arc.exposed.start.plus(0.5 * arc.exposed.duration_s());
-                let wanted = middle.plus(-0.5 * f64::from(plan.lines) * line_period_s(plan));
-                let sclk = session.et_to_sclk(wanted)?;
+                let required = middle.plus(-0.5 * f64::from(plan.lines) * line_period_s(plan));
+                let sclk = session.et_to_sclk(required)?;
                 let sclk_start = sclk.trim().trim_start_matches("1/").to_owned();
                 Ok(Self {
                     plan,

@@ -1,6 +1,6 @@
 //! What can go wrong while a mission is invented.
 
-use crate::error::{Fault, Kind};
+use crate::error::{Cause, Kind};
 
 /// Faults of the scene writer.
 #[derive(Debug, thiserror::Error)]
@@ -38,12 +38,12 @@ pub enum SceneError {
         iterations: u32,
     },
     /// The true orientation of an image is none.
-    #[error("image {image}: no camera sees its tie points: {fault}")]
+    #[error("image {image}: no camera sees its tie points: {error}")]
     NoCamera {
         /// Image id.
         image: String,
         /// What is wrong with it.
-        fault: String,
+        error: String,
     },
     /// The beam leaves Mars.
     #[error("the laser beam misses Mars at ET {et_s:.3}")]
@@ -77,7 +77,7 @@ pub enum SceneError {
     },
 }
 
-impl Fault for SceneError {
+impl Cause for SceneError {
     fn kind(&self) -> Kind {
         match self {
             Self::NotAScene { .. }

@@ -12,7 +12,7 @@ use tempfile::TempDir;
 
 use super::error::SceneError;
 use crate::{
-    error::{IoFault, Place, Result},
+    error::{IoError, Locate, Result},
     files::hash_file,
 };
 
@@ -25,7 +25,7 @@ const LIST: &str = ".scene";
 
 /// A scene that is being written in a temporary folder beside its final place.
 ///
-/// Dropped unfinished, it leaves nothing; a process that is killed leaves a folder `.partial-…`.
+/// PointRejection unfinished, it leaves nothing; a process that is killed leaves a folder `.partial-…`.
 pub(super) struct Draft {
     final_place: PathBuf,
     /// Holds the new scene and, for the moment of the exchange, the older one.
@@ -41,7 +41,7 @@ impl Draft {
     pub(super) fn begin(directory: &Path, readme: &str) -> Result<Self> {
         refuse_foreign(directory)?;
         let final_place = path::absolute(directory)
-            .map_err(IoFault::on("resolve"))
+            .map_err(IoError::on("resolve"))
             .in_file(directory)?;
         let parent = final_place.parent().unwrap_or(&final_place);
         let workshop = fs::create_dir_all(parent)
@@ -50,12 +50,12 @@ impl Draft {
                     .prefix(".partial-")
                     .tempdir_in(parent)
             })
-            .map_err(IoFault::on("create a folder"))
+            .map_err(IoError::on("create a folder"))
             .in_file(parent)?;
         // A folder of its own: temporary ones are private, a scene is for everyone.
         let folder = workshop.path().join("new");
         fs::create_dir(&folder)
-            .map_err(IoFault::on("create"))
+            .map_err(IoError::on("create"))
             .in_file(&folder)?;
         put(&folder.join(README), &format!("{README_LINE}\n\n{readme}"))?;
         Ok(Self {
@@ -69,7 +69,7 @@ impl Draft {
     pub(super) fn folder(&self, name: &str) -> Result<PathBuf> {
         let folder = self.folder.join(name);
         fs::create_dir_all(&folder)
-            .map_err(IoFault::on("create"))
+            .map_err(IoError::on("create"))
             .in_file(&folder)?;
         Ok(folder)
     }
@@ -90,7 +90,7 @@ impl Draft {
         let older = self.workshop.path().join("older");
         match fs::rename(&self.final_place, &older) {
             Err(error) if error.kind() != ErrorKind::NotFound => {
-                return Err(IoFault::on("move the older scene aside")(error))
+                return Err(IoError::on("move the older scene aside")(error))
                     .in_file(&self.final_place);
             }
             _ => {}
@@ -100,7 +100,7 @@ impl Draft {
                 // Nothing more can be done when this fails too; the first error is the one to tell.
                 let _ = fs::rename(&older, &self.final_place);
             })
-            .map_err(IoFault::on("rename into place"))
+            .map_err(IoError::on("rename into place"))
             .in_file(&self.final_place)
     }
 }
@@ -109,7 +109,7 @@ impl Draft {
 pub(super) fn put(path: &Path, text: &str) -> Result<()> {
     File::create(path)
         .and_then(|mut file| file.write_all(text.as_bytes()))
-        .map_err(IoFault::on("write"))
+        .map_err(IoError::on("write"))
         .in_file(path)
 }
 
@@ -140,7 +140,7 @@ fn refuse_foreign(folder: &Path) -> Result<()> {
         .collect();
     for (name, path) in held {
         let kind = fs::symlink_metadata(&path)
-            .map_err(IoFault::on("look at"))
+            .map_err(IoError::on("look at"))
             .in_file(&path)?
             .file_type();
         let inside = format!("{name}/");
@@ -181,7 +181,7 @@ fn below(folder: &Path) -> Result<BTreeMap<String, PathBuf>> {
 fn entries(folder: &Path) -> Result<Vec<DirEntry>> {
     match fs::read_dir(folder).and_then(Iterator::collect) {
         Err(error) if error.kind() == ErrorKind::NotFound => Ok(Vec::new()),
-        entries => entries.map_err(IoFault::on("look into")).in_file(folder),
+        entries => entries.map_err(IoError::on("look into")).in_file(folder),
     }
 }
 
@@ -197,7 +197,7 @@ mod tests {
     }
 
     fn refusal(place: &Path) -> String {
-        Draft::begin(place, "").err().unwrap().fault.to_string()
+        Draft::begin(place, "").err().unwrap().cause.to_string()
     }
 
     #[test]

@@ -15,7 +15,7 @@ use super::{
 use crate::{
     config::usual_instrument,
     constants::{NAIF_MARS, NAIF_MGS, NAIF_SUN},
-    error::{IoFault, Place, Result},
+    error::{IoError, Locate, Result},
     frames::Position,
     geom::attitude::make_continuous,
     spice::{CkSegment, KernelSet, Session, SpkSegment, State, write_ck, write_spk},
@@ -78,7 +78,7 @@ fn spk_name(family: &str) -> String {
 /// Writes text kernels and metakernels into `folder`.
 pub(super) fn write_text_kernels(folder: &Path) -> Result<()> {
     fs::create_dir_all(folder)
-        .map_err(IoFault::on("create"))
+        .map_err(IoError::on("create"))
         .in_file(folder)?;
     for (name, text) in TEXT_KERNELS {
         put(&folder.join(name), text)?;

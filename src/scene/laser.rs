@@ -96,7 +96,7 @@ pub(super) struct FrameRequest {
 
 /// A place in the file's frame.
 #[derive(Debug, Clone, Copy)]
-struct Place {
+struct FileCoordinates {
     longitude_rad: f64,
     latitude_rad: f64,
     radius_m: f64,
@@ -130,9 +130,9 @@ impl Look {
         })
     }
 
-    fn place(&self, point_m: &Vector3<f64>) -> Place {
+    fn place(&self, point_m: &Vector3<f64>) -> FileCoordinates {
         let spherical = Spherical::from_xyz_m(&(self.to_file * point_m));
-        Place {
+        FileCoordinates {
             longitude_rad: spherical.longitude_rad,
             latitude_rad: spherical.latitude.0,
             radius_m: spherical.radius_m,
@@ -141,12 +141,12 @@ impl Look {
 
     /// Range to the ground.
     fn range_m(&self, terrain: &Terrain) -> Result<f64> {
-        let fault = SceneError::BeamMisses {
+        let error = SceneError::BeamMisses {
             et_s: self.et.seconds(),
         };
         Ok(terrain
             .range_m(&self.spacecraft_m, &self.direction)
-            .ok_or(fault)?)
+            .ok_or(error)?)
     }
 
     fn at_range_m(&self, range_m: f64) -> Vector3<f64> {
@@ -154,7 +154,7 @@ impl Look {
     }
 
     /// Where the beam passes the sphere of `radius_m`; for a beam that only grazes it, the nearest point.
-    fn at_radius(&self, radius_m: f64) -> Place {
+    fn at_radius(&self, radius_m: f64) -> FileCoordinates {
         let b = self.spacecraft_m.dot(&self.direction);
         let c = self.spacecraft_m.norm_squared() - radius_m * radius_m;
         self.place(&self.at_range_m(-b - (b * b - c).max(0.0).sqrt()))
@@ -185,10 +185,10 @@ pub(super) fn fly_frame(
         shots.push(fly_shot(&shot_look, index, terrain, request, &mut values)?);
     }
     let mut shots = shots.into_iter();
-    let fault = SceneError::BeamMisses {
+    let error = SceneError::BeamMisses {
         et_s: middle_et.seconds(),
     };
-    let first_shot = shots.next().ok_or(fault)?;
+    let first_shot = shots.next().ok_or(error)?;
     let mut all = [first_shot; SHOTS];
     for (slot, shot) in all.iter_mut().skip(1).zip(shots) {
         *slot = shot;

@@ -22,7 +22,7 @@ use super::{
 };
 use crate::{
     constants::MARS_IAU2000,
-    error::{IoFault, Place, Result},
+    error::{IoError, Locate, Result},
     geom::{ellipsoid::Spherical, mars_rotation::mars_matrix},
     pds::ties::ties_table,
 };
@@ -126,7 +126,7 @@ fn write_context(
 pub(super) fn write_truth(draft: &Draft, truth: &Truth) -> Result<()> {
     let path = draft.root().join("truth.json");
     let text = serde_json::to_string(truth)
-        .map_err(|error| IoFault {
+        .map_err(|error| IoError {
             action: "write",
             source: error.into(),
         })

@@ -12,7 +12,7 @@ use super::{
 };
 use crate::{
     config::built_in_altimeter,
-    error::{Place, Result},
+    error::{Locate, Result},
     frames::MarsDatum,
     pds::pedr::{LABEL_RECORDS, LabelInfo, PedrWriter, Record},
     time::{Et, Interval},
@@ -110,8 +110,8 @@ pub(super) fn write_pedr(
             counts.frames += 1;
             count(&mut counts, frame);
             kept.extend((1_u8..).zip(&frame.shots).filter_map(|(shot, truth)| {
-                let wanted = truth.echo == Echo::Ground && keep(truth);
-                wanted.then_some(KeptShot {
+                let required = truth.echo == Echo::Ground && keep(truth);
+                required.then_some(KeptShot {
                     record,
                     shot,
                     truth: *truth,

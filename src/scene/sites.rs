@@ -42,7 +42,7 @@ pub(super) struct SiteTies {
     pub file: String,
     /// What the site file says of their noise.
     pub note: &'static str,
-    /// Standard deviations along and across the track, focal pixels.
+    /// Standard deviations along and across the track, focal-plane pixels.
     pub sigma_px: [f64; 2],
 }
 
@@ -146,7 +146,7 @@ pub(super) fn planned_site<'a>(site: &'a Site, arcs: &[&Arc]) -> SiteFile<'a> {
             .collect(),
         ties: Some(SiteTies {
             file: format!("../ties/{}", ties_name(site.id)),
-            note: "A line, the noise of these tie points, is 1.3 to 1.6 focal pixels.",
+            note: "A line, the noise of these tie points, is 1.3 to 1.6 focal-plane pixels.",
             sigma_px: [1.6, 1.0],
         }),
         windows: vec![window(

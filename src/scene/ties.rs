@@ -19,8 +19,8 @@ use crate::{
     error::Result,
     geom::{
         mars_rotation::mars_matrix,
+        oriented_camera::OrientedCamera,
         pushbroom::{Detector, ExteriorOrientation, Pose, Projector, SampledOrientation},
-        stereo::StereoImage,
     },
     pds::ties::ties_table,
     ties::{TieMeasure, TiePoint},
@@ -48,7 +48,7 @@ const INTERVALS: u32 = 160;
 struct TrueImage<'a> {
     arc: &'a Arc,
     position_bias_m: Vector3<f64>,
-    stereo: StereoImage<SampledOrientation>,
+    oriented_camera: OrientedCamera<SampledOrientation>,
 }
 
 /// A point on the ground and where both images see it.
@@ -63,7 +63,7 @@ impl<'a> TrueImage<'a> {
         let mut random = Random::new(seed, &format!("camera {}", arc.image.id));
         let position_bias_m = POSITION_BIAS_M * Vector3::from_fn(|_axis, _column| random.normal());
         let orientation = SampledOrientation::new(&poses(arc, &position_bias_m))
-            .map_err(|fault| no_camera(arc, &fault))?;
+            .map_err(|error| no_camera(arc, &error))?;
         let detector = Detector::new(
             usual_instrument(),
             arc.image.summing,
@@ -73,7 +73,7 @@ impl<'a> TrueImage<'a> {
         Ok(Self {
             arc,
             position_bias_m,
-            stereo: StereoImage {
+            oriented_camera: OrientedCamera {
                 id: arc.image.id.to_owned(),
                 orientation,
                 detector,
@@ -83,14 +83,17 @@ impl<'a> TrueImage<'a> {
     }
 
     fn projector(&self) -> Result<Projector<'_, SampledOrientation>> {
-        let projector = Projector::new(&self.stereo.orientation, self.stereo.lines);
-        Ok(projector.map_err(|fault| no_camera(self.arc, &fault))?)
+        let projector = Projector::new(
+            &self.oriented_camera.orientation,
+            self.oriented_camera.lines,
+        );
+        Ok(projector.map_err(|error| no_camera(self.arc, &error))?)
     }
 
     /// Line and sample at the far edges of where tie points may lie.
     fn extent_px(&self) -> [f64; 2] {
         let lines = f64::from(self.arc.image.lines_delivered);
-        [lines, self.stereo.detector.samples].map(|length| length - EDGE_PX)
+        [lines, self.oriented_camera.detector.samples].map(|length| length - EDGE_PX)
     }
 
     /// The ground that a random place of the image shows.
@@ -98,9 +101,9 @@ impl<'a> TrueImage<'a> {
         let [line, sample] = self
             .extent_px()
             .map(|end_px| random.between(EDGE_PX, end_px));
-        let (x_lines, _) = self.stereo.focal_place(line, sample);
-        let pose = self.stereo.orientation.pose(x_lines);
-        let camera = self.stereo.detector.look(sample);
+        let (x_lines, _) = self.oriented_camera.focal_plane_coordinates(line, sample);
+        let pose = self.oriented_camera.orientation.pose(x_lines);
+        let camera = self.oriented_camera.detector.look(sample);
         let direction = pose.mars_to_camera.tr_mul(&camera).normalize();
         let range_m = terrain.range_m(&pose.position_m, &direction)?;
         Some(pose.position_m + range_m * direction)
@@ -113,11 +116,16 @@ impl<'a> TrueImage<'a> {
         ground_m: &Vector3<f64>,
     ) -> Option<TieMeasure<String>> {
         let seen = projector.project(ground_m).ok()?;
-        let y_px = self.stereo.detector.focal_px(&seen.camera_m).ok()?.y;
+        let y_px = self
+            .oriented_camera
+            .detector
+            .focal_px(&seen.camera_m)
+            .ok()?
+            .y;
         let measure = TieMeasure {
-            image: self.stereo.id.clone(),
-            line: seen.x + 0.5 * self.stereo.lines,
-            sample: self.stereo.detector.sample(y_px),
+            image: self.oriented_camera.id.clone(),
+            line: seen.x + 0.5 * self.oriented_camera.lines,
+            sample: self.oriented_camera.detector.sample(y_px),
         };
         let [line_end, sample_end] = self.extent_px();
         let inside = (EDGE_PX..line_end).contains(&measure.line)
@@ -153,10 +161,10 @@ fn poses(arc: &Arc, position_bias_m: &Vector3<f64>) -> Vec<(f64, Pose)> {
         .collect()
 }
 
-fn no_camera(arc: &Arc, fault: &dyn std::error::Error) -> SceneError {
+fn no_camera(arc: &Arc, error: &dyn std::error::Error) -> SceneError {
     SceneError::NoCamera {
         image: arc.image.id.to_owned(),
-        fault: fault.to_string(),
+        error: error.to_string(),
     }
 }
 
@@ -250,7 +258,7 @@ fn blunder(measures: &mut [TieMeasure<String>], random: &mut Random) -> BlunderT
 mod tests {
     use super::*;
     use crate::{
-        geom::intersection::{IntersectionLimits, Sight, intersect},
+        geom::intersection::{IntersectionLimits, Ray, intersect},
         scene::plan::{IMAGES, SITES, Site},
         time::Et,
     };
@@ -266,13 +274,15 @@ mod tests {
         Terrain::new(seed, &SITES.map(Site::direction))
     }
 
-    fn sight(image: &TrueImage<'_>, measure: &TieMeasure<String>) -> Sight {
-        let (x_lines, focal_px) = image.stereo.focal_place(measure.line, measure.sample);
-        let pose = image.stereo.orientation.pose(x_lines);
-        Sight {
+    fn ray(image: &TrueImage<'_>, measure: &TieMeasure<String>) -> Ray {
+        let (x_lines, focal_px) = image
+            .oriented_camera
+            .focal_plane_coordinates(measure.line, measure.sample);
+        let pose = image.oriented_camera.orientation.pose(x_lines);
+        Ray {
             position_m: pose.position_m,
             mars_to_camera: pose.mars_to_camera,
-            focal_length_px: image.stereo.detector.focal_length_px,
+            focal_length_px: image.oriented_camera.detector.focal_length_px,
             focal_px,
             along_sigma_px: 1.0,
             across_sigma_px: 1.0,
@@ -294,8 +304,8 @@ mod tests {
             for tie in &ties {
                 let height_m = tie.ground_m.norm() - terrain.radius_m(&tie.ground_m.normalize());
                 assert!(height_m.abs() < 1e-4, "{height_m}"); // metres; rays end 0.01 mm from the ground
-                let sights = [0, 1].map(|image| sight(&pair[image], &tie.measures[image]));
-                let met = intersect(&sights, &IntersectionLimits::default()).unwrap();
+                let rays = [0, 1].map(|image| ray(&pair[image], &tie.measures[image]));
+                let met = intersect(&rays, &IntersectionLimits::default()).unwrap();
                 let off_m = (met.ground_m - tie.ground_m).norm();
                 assert!(off_m < 1e-3, "{off_m} m"); // intersection itself stops at 0.1 mm
             }
@@ -308,9 +318,9 @@ mod tests {
             let arc = Arc::new(image, Et::from_seconds(3.9e7), 1_200.0).unwrap();
             let camera = TrueImage::new(&arc, 1).unwrap();
             for share in [0.123, 0.345, 0.567, 0.789] {
-                let line = share * camera.stereo.lines;
-                let x_lines = line - 0.5 * camera.stereo.lines;
-                let pose = camera.stereo.orientation.pose(x_lines);
+                let line = share * camera.oriented_camera.lines;
+                let x_lines = line - 0.5 * camera.oriented_camera.lines;
+                let pose = camera.oriented_camera.orientation.pose(x_lines);
                 let exposed_s = (line + image.time_bias_lines) * image.line_period_s();
                 let et = arc.exposed.start.plus(exposed_s);
                 let orbit_m = mars_matrix(&MARS_IAU2000, et) * arc.orbit.state(et).position_m;
@@ -328,13 +338,13 @@ mod tests {
         let arcs = arcs("isidis");
         let pair = [0, 1].map(|image| TrueImage::new(&arcs[image], 1).unwrap());
         let exact = exact_ties(&pair, &terrain(1), &mut Random::new(1, "test")).unwrap();
-        let wanted: Vec<[TieMeasure<String>; 2]> =
+        let required: Vec<[TieMeasure<String>; 2]> =
             exact.iter().map(|tie| tie.measures.clone()).collect();
         let (measured, truth) = spoil(exact, &mut Random::new(1, "noise"));
         let (mut squares, mut count) = (0.0, 0.0);
-        for ((tie, truth), wanted) in measured.iter().zip(&truth).zip(&wanted) {
+        for ((tie, truth), required) in measured.iter().zip(&truth).zip(&required) {
             assert_eq!(tie.id, truth.id);
-            for (measure, wanted) in tie.measures.iter().zip(wanted) {
+            for (measure, required) in tie.measures.iter().zip(required) {
                 let told = truth
                     .blunder
                     .as_ref()
@@ -342,8 +352,8 @@ mod tests {
                 let [line_error, sample_error] =
                     told.map_or([0.0; 2], |told| [told.line_error, told.sample_error]);
                 for noise in [
-                    measure.line - wanted.line - line_error,
-                    measure.sample - wanted.sample - sample_error,
+                    measure.line - required.line - line_error,
+                    measure.sample - required.sample - sample_error,
                 ] {
                     squares += noise * noise;
                     count += 1.0;

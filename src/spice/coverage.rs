@@ -12,7 +12,7 @@ use super::{
 };
 use crate::{
     constants::{NAIF_MARS, NAIF_MGS, NAIF_MGS_BUS},
-    error::{Place, Result},
+    error::{Locate, Result},
     time::{Et, Interval, Intervals},
 };
 
@@ -36,7 +36,7 @@ impl Coverage {
     /// What `set` holds, which `cspice` has loaded.
     ///
     /// # Errors
-    /// [`super::SpiceFault::Spice`] when a C-kernel cannot be read; [`super::SpiceFault::MissingText`] without clock.
+    /// [`super::SpiceError::Spice`] when a C-kernel cannot be read; [`super::SpiceError::MissingText`] without clock.
     pub(super) fn of(set: &KernelSet, cspice: &Cspice) -> Result<Self> {
         let mut coverage = Self::default();
         let (mut of_mgs, mut of_mars) = (ByCentre::new(), ByCentre::new());
@@ -63,7 +63,7 @@ impl Coverage {
                 KernelRole::Ck => {
                     let windows = cspice
                         .ck_coverage(&kernel.path, NAIF_MGS_BUS)
-                        .map_err(|fault| explain(set, fault, &CLOCKS))
+                        .map_err(|error| explain(set, error, &CLOCKS))
                         .in_file(&kernel.path)?;
                     held.extend(windows.into_iter().map(interval_of));
                     attitude.extend_from_slice(&held);
@@ -91,7 +91,7 @@ impl Coverage {
 
 /// Times for which kernels are needed.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct Wanted {
+pub struct RequiredCoverage {
     /// Instants that ephemerides must touch.
     pub positions: Intervals,
     /// Instants that attitudes must touch, as the C-kernels count time: exposures with the pointing bias.

@@ -8,8 +8,8 @@ use std::{
     path::Path,
 };
 
-use super::error::SpiceFault;
-use crate::error::{IoFault, Place, Result};
+use super::error::SpiceError;
+use crate::error::{IoError, Locate, Result};
 
 /// Bytes of a DAF record.
 const RECORD_SIZE: usize = 1_024;
@@ -35,7 +35,7 @@ pub(super) struct Segment {
 /// The segments of a binary kernel, in file order; later ones win.
 ///
 /// # Errors
-/// [`SpiceFault::DamagedKernel`] when the file is shorter than it says or its list is broken.
+/// [`SpiceError::DamagedKernel`] when the file is shorter than it says or its list is broken.
 pub(super) fn segments(path: &Path) -> Result<Vec<Segment>> {
     let mut reader = Reader::open(path)?;
     reader.segments().in_file(path)
@@ -50,11 +50,11 @@ struct Reader {
 impl Reader {
     fn open(path: &Path) -> Result<Self> {
         let file = File::open(path)
-            .map_err(IoFault::on("open kernel"))
+            .map_err(IoError::on("open kernel"))
             .in_file(path)?;
         let size = file
             .metadata()
-            .map_err(IoFault::on("read size of kernel"))
+            .map_err(IoError::on("read size of kernel"))
             .in_file(path)?
             .len();
         Ok(Self {
@@ -77,7 +77,7 @@ impl Reader {
         self.file
             .seek(SeekFrom::Start(offset))
             .and_then(|_| self.file.read_exact(&mut record))
-            .map_err(IoFault::on("read kernel"))?;
+            .map_err(IoError::on("read kernel"))?;
         Ok(record)
     }
 
@@ -205,6 +205,6 @@ impl Reader {
     }
 }
 
-fn damaged(problem: String) -> crate::error::Failure {
-    SpiceFault::DamagedKernel { problem }.into()
+fn damaged(problem: String) -> crate::error::Error {
+    SpiceError::DamagedKernel { problem }.into()
 }

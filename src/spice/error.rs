@@ -1,13 +1,13 @@
 //! What can go wrong with kernels and with CSPICE.
 
 use crate::{
-    error::{Fault, Kind},
+    error::{Cause, Kind},
     time::{Et, Interval},
 };
 
-/// A fault of kernels, of what they hold, or of a CSPICE call.
+/// An error of kernels, of what they hold, or of a CSPICE call.
 #[derive(Debug, thiserror::Error)]
-pub enum SpiceFault {
+pub enum SpiceError {
     /// CSPICE signalled an error.
     #[error("{call}: {short}: {long}")]
     Spice {
@@ -86,7 +86,7 @@ pub enum SpiceFault {
         problem: String,
     },
     /// Kernels do not hold what was asked.
-    #[error("no {what} of MGS for {gap} ({gap_utc}), wanted for {wanted}; {neighbours}")]
+    #[error("no {what} of MGS for {gap} ({gap_utc}), required for {required}; {neighbours}")]
     CoverageGap {
         /// `position` or `attitude`.
         what: &'static str,
@@ -95,7 +95,7 @@ pub enum SpiceFault {
         /// The same in UTC.
         gap_utc: String,
         /// What was asked for.
-        wanted: Interval,
+        required: Interval,
         /// Which kernels end or begin there.
         neighbours: String,
     },
@@ -121,7 +121,7 @@ pub enum SpiceFault {
     },
     /// The kernels' motion cannot be tabulated this well.
     #[error(
-        "trajectory near {near}: {error_m} m off with pieces of {piece_s} s; wanted {tolerance_m} m"
+        "trajectory near {near}: {error_m} m off with pieces of {piece_s} s; required {tolerance_m} m"
     )]
     NoConvergence {
         /// Where.
@@ -164,8 +164,8 @@ const COVERAGE_MESSAGES: [&str; 3] = [
     "SPICE(CKINSUFFDATA)",
 ];
 
-impl SpiceFault {
-    /// The same fault of CSPICE, known to come from `value`.
+impl SpiceError {
+    /// The same error of CSPICE, known to come from `value`.
     pub(super) fn of(mut self, value: &str) -> Self {
         if let Self::Spice { call, .. } = &mut self {
             *call = format!("{call}(\"{value}\")");
@@ -174,7 +174,7 @@ impl SpiceFault {
     }
 }
 
-impl Fault for SpiceFault {
+impl Cause for SpiceError {
     fn kind(&self) -> Kind {
         match self {
             Self::Spice { short, .. } if COVERAGE_MESSAGES.contains(&short.as_str()) => {

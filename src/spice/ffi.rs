@@ -1,4 +1,4 @@
-//! The only calls into CSPICE: each checks CSPICE's error state and turns it into a [`SpiceFault`].
+//! The only calls into CSPICE: each checks CSPICE's error state and turns it into a [`SpiceError`].
 //!
 //! CSPICE keeps global state and is not thread safe. Every call is a method of [`Cspice`], and a
 //! `Cspice` exists only while the process-wide lock is held, so no call can happen without it.
@@ -18,14 +18,14 @@ use std::{
 
 use cspice_sys as naif;
 
-use super::error::SpiceFault;
+use super::error::SpiceError;
 
 mod write;
 
 pub(super) use write::CkColumns;
 
 /// What a CSPICE call gives back.
-pub(super) type Called<T> = Result<T, SpiceFault>;
+pub(super) type Called<T> = Result<T, SpiceError>;
 
 /// Longest file name that CSPICE takes (`FILSIZ` in its kernel loader).
 pub const PATH_LENGTH_MAX: usize = 255;
@@ -71,7 +71,7 @@ impl Cspice {
     /// Waits for the lock and makes CSPICE return on errors without printing.
     pub(super) fn lock() -> Called<Self> {
         if HELD_HERE.get() {
-            return Err(SpiceFault::SessionOpen);
+            return Err(SpiceError::SessionOpen);
         }
         // A thread that panicked inside a session has unloaded its kernels on the way out.
         let lock = CSPICE.lock().unwrap_or_else(PoisonError::into_inner);
@@ -88,7 +88,7 @@ impl Cspice {
         Ok(cspice)
     }
 
-    /// Turns CSPICE's error state, if set, into a fault and clears it.
+    /// Turns CSPICE's error state, if set, into an error and clears it.
     fn check(&self, call: &'static str) -> Called<()> {
         // SAFETY: the lock is held.
         if unsafe { naif::failed_c() } == 0 {
@@ -106,14 +106,14 @@ impl Cspice {
             }
             text_of(&text)
         };
-        let fault = SpiceFault::Spice {
+        let error = SpiceError::Spice {
             call: call.to_owned(),
             short: message(c"SHORT", SHORT_MESSAGE_SIZE),
             long: message(c"LONG", LONG_MESSAGE_SIZE),
         };
         // SAFETY: the lock is held.
         unsafe { naif::reset_c() };
-        Err(fault)
+        Err(error)
     }
 
     /// `furnsh_c`: loads one kernel.
@@ -132,7 +132,7 @@ impl Cspice {
         unsafe { naif::str2et_c(text.as_ptr().cast_mut(), &raw mut et) };
         self.check("str2et_c")
             .map(|()| et)
-            .map_err(|fault| fault.of(utc))
+            .map_err(|error| error.of(utc))
     }
 
     /// `et2utc_c`: ET to ISO calendar UTC with `decimals` digits of a second.
@@ -159,7 +159,7 @@ impl Cspice {
         unsafe { naif::scs2e_c(clock, text.as_ptr().cast_mut(), &raw mut et) };
         self.check("scs2e_c")
             .map(|()| et)
-            .map_err(|fault| fault.of(sclk))
+            .map_err(|error| error.of(sclk))
     }
 
     /// `sce2s_c`: ET to clock string.
@@ -268,7 +268,7 @@ impl Cspice {
             outcome = self.ck_window(&path, object, size);
             match &outcome {
                 // The window was too small for all intervals of the kernel.
-                Err(SpiceFault::Spice { short, .. }) if short.contains("EXCESS") => {}
+                Err(SpiceError::Spice { short, .. }) if short.contains("EXCESS") => {}
                 _ => break,
             }
         }
@@ -309,7 +309,7 @@ impl Cspice {
             .iter()
             .find(|[start, stop]| !(start <= stop && stop - start < f64::INFINITY))
         {
-            Some([start, stop]) => Err(SpiceFault::DamagedKernel {
+            Some([start, stop]) => Err(SpiceError::DamagedKernel {
                 problem: format!("attitude from ET {start} to {stop}"),
             }),
             None => Ok(ends.to_vec()),
@@ -348,13 +348,13 @@ fn c_text(what: &'static str, text: &str) -> Called<CString> {
             "{} bytes long, at most {PATH_LENGTH_MAX} are possible",
             text.len()
         );
-        return Err(SpiceFault::Unusable { what, problem });
+        return Err(SpiceError::Unusable { what, problem });
     }
     if text.chars().any(char::is_control) {
         let problem = format!("{text:?} holds control characters");
-        return Err(SpiceFault::Unusable { what, problem });
+        return Err(SpiceError::Unusable { what, problem });
     }
-    CString::new(text).map_err(|error| SpiceFault::Unusable {
+    CString::new(text).map_err(|error| SpiceError::Unusable {
         what,
         problem: error.to_string(),
     })
@@ -362,7 +362,7 @@ fn c_text(what: &'static str, text: &str) -> Called<CString> {
 
 /// The path for CSPICE, refused when it could not be taken whole.
 pub(super) fn c_path(path: &Path) -> Called<CString> {
-    let text = path.to_str().ok_or_else(|| SpiceFault::Unusable {
+    let text = path.to_str().ok_or_else(|| SpiceError::Unusable {
         what: "a path",
         problem: format!("{} is not valid UTF-8", path.display()),
     })?;

@@ -1,13 +1,13 @@
 //! Making sure that kernels hold what is needed, and telling which gap is in the way.
 
-use super::{coverage::Wanted, error::SpiceFault, kernels::KernelRole, session::Session};
+use super::{coverage::RequiredCoverage, error::SpiceError, kernels::KernelRole, session::Session};
 use crate::{
     error::Result,
     time::{Et, Interval, Intervals, PointingBias},
 };
 
 impl Session {
-    /// For each kernel that holds MGS: its index in the set, and the wanted instants for which CSPICE reads
+    /// For each kernel that holds MGS: its index in the set, and the required instants for which CSPICE reads
     /// it, because no later kernel of its role holds them.
     ///
     /// * `tolerance_s` – how far outside its intervals a C-kernel may be asked, seconds
@@ -16,10 +16,11 @@ impl Session {
     /// As [`Self::coverage`].
     pub fn coverage_in_use(
         &self,
-        wanted: &Wanted,
+        required: &RequiredCoverage,
         tolerance_s: f64,
     ) -> Result<Vec<(usize, Intervals)>> {
-        let (mut positions, mut attitudes) = (wanted.positions.clone(), wanted.attitudes.clone());
+        let (mut positions, mut attitudes) =
+            (required.positions.clone(), required.attitudes.clone());
         let mut in_use = Vec::new();
         for (index, held) in self.coverage()?.per_kernel.iter().rev() {
             let (open, reach_s) = match self.kernels().kernels()[*index].role {
@@ -34,13 +35,13 @@ impl Session {
         Ok(in_use)
     }
 
-    /// Makes sure that the position of MGS is known throughout `wanted`.
+    /// Makes sure that the position of MGS is known throughout `required`.
     ///
     /// # Errors
-    /// [`SpiceFault::CoverageGap`] with the first gap and the kernels beside it.
-    pub fn require_position(&self, wanted: Interval) -> Result<()> {
+    /// [`SpiceError::CoverageGap`] with the first gap and the kernels beside it.
+    pub fn require_position(&self, required: Interval) -> Result<()> {
         let held = &self.coverage()?.spk;
-        self.require(wanted, held, "position", KernelRole::Spk)
+        self.require(required, held, "position", KernelRole::Spk)
     }
 
     /// Makes sure that the attitude is known for every exposure in `exposures`.
@@ -50,7 +51,7 @@ impl Session {
     /// [`Session::attitude`].
     ///
     /// # Errors
-    /// [`SpiceFault::CoverageGap`] with the first gap and the kernels beside it.
+    /// [`SpiceError::CoverageGap`] with the first gap and the kernels beside it.
     pub fn require_attitude(
         &self,
         exposures: Interval,
@@ -58,31 +59,31 @@ impl Session {
         padding_s: f64,
         tolerance_s: f64,
     ) -> Result<()> {
-        let wanted = exposures.shifted(bias.seconds()).padded(padding_s);
+        let required = exposures.shifted(bias.seconds()).padded(padding_s);
         let intervals = self.coverage()?.ck.as_slice().iter();
         let held = Intervals::union_of(intervals.map(|interval| interval.padded(tolerance_s)));
-        self.require(wanted, &held, "attitude", KernelRole::Ck)
+        self.require(required, &held, "attitude", KernelRole::Ck)
     }
 
     fn require(
         &self,
-        wanted: Interval,
+        required: Interval,
         held: &Intervals,
         what: &'static str,
         role: KernelRole,
     ) -> Result<()> {
-        if held.cover(wanted) {
+        if held.cover(required) {
             return Ok(());
         }
         // An instant without length has no gap of any length either.
-        let gap = held.gaps_in(wanted).first().copied().unwrap_or(wanted);
+        let gap = held.gaps_in(required).first().copied().unwrap_or(required);
         let gap_utc = format!("UTC {} .. {}", self.utc(gap.start), self.utc(gap.stop));
         let neighbours = self.neighbours(gap, role)?;
-        Err(SpiceFault::CoverageGap {
+        Err(SpiceError::CoverageGap {
             what,
             gap,
             gap_utc,
-            wanted,
+            required,
             neighbours,
         }
         .into())

@@ -9,9 +9,9 @@ use std::{
 
 use serde::Serialize;
 
-use super::{daf, error::SpiceFault, ffi, text_kernel};
+use super::{daf, error::SpiceError, ffi, text_kernel};
 use crate::{
-    error::{IoFault, Place, Result},
+    error::{IoError, Locate, Result},
     files::{InputFiles, file_name, hash_file},
 };
 
@@ -75,7 +75,7 @@ impl Kernel {
     /// Looks into a file and hashes it, unless the run has hashed it before.
     ///
     /// # Errors
-    /// [`IoFault`]; [`SpiceFault::NotAKernel`]; [`SpiceFault::DamagedKernel`].
+    /// [`IoError`]; [`SpiceError::NotAKernel`]; [`SpiceError::DamagedKernel`].
     pub(super) fn inspect(path: &Path, files: &InputFiles) -> Result<Self> {
         ffi::c_path(path).in_file(path)?;
         let role = role_of(path)?;
@@ -107,8 +107,8 @@ impl KernelSet {
     /// the last one win.
     ///
     /// # Errors
-    /// [`IoFault`] for a file that cannot be read, [`SpiceFault::NotAKernel`] for a file that is none
-    /// (its role is found by content, never by name), [`SpiceFault::DamagedKernel`] for a truncated one.
+    /// [`IoError`] for a file that cannot be read, [`SpiceError::NotAKernel`] for a file that is none
+    /// (its role is found by content, never by name), [`SpiceError::DamagedKernel`] for a truncated one.
     pub fn from_files(files: &[PathBuf]) -> Result<Self> {
         Self::from_files_of(&InputFiles::default(), files)
     }
@@ -141,11 +141,11 @@ impl KernelSet {
     pub(super) fn add(&mut self, path: &Path, reason: &str, files: &InputFiles) -> Result<()> {
         let kernel = Kernel::inspect(path, files)?;
         if kernel.role == KernelRole::Meta {
-            let fault = SpiceFault::NotAKernel {
+            let error = SpiceError::NotAKernel {
                 found: "a metakernel".to_owned(),
                 expected: "a kernel; a metakernel stands alone and lists no other",
             };
-            return Err(fault).in_file(path);
+            return Err(error).in_file(path);
         }
         let name = kernel.file_name();
         self.explanation.push(format!("{name}: {reason}"));
@@ -153,7 +153,7 @@ impl KernelSet {
         if let Some(index) = self.kernels.iter().position(same) {
             let earlier = self.kernels.remove(index).file_name();
             self.explanation.push(format!(
-                "{earlier}: left out at its earlier place, same content as {name}"
+                "{earlier}: not loaded at its earlier place, same content as {name}"
             ));
         }
         self.kernels.push(kernel);
@@ -168,8 +168,8 @@ impl KernelSet {
 
     /// The kernels of some roles, in the same order.
     #[must_use]
-    pub fn of_roles(&self, wanted: impl Fn(KernelRole) -> bool) -> Self {
-        let kernels = self.kernels.iter().filter(|kernel| wanted(kernel.role));
+    pub fn of_roles(&self, required: impl Fn(KernelRole) -> bool) -> Self {
+        let kernels = self.kernels.iter().filter(|kernel| required(kernel.role));
         Self {
             kernels: kernels.cloned().collect(),
             explanation: self.explanation.clone(),
@@ -197,13 +197,13 @@ impl KernelSet {
     /// Hashes every kernel again, after use.
     ///
     /// # Errors
-    /// [`SpiceFault::KernelChanged`] naming the file that is no longer what was loaded.
+    /// [`SpiceError::KernelChanged`] naming the file that is no longer what was loaded.
     pub fn verify_unchanged(&self) -> Result<()> {
         for kernel in &self.kernels {
             let (is, _) = hash_file(&kernel.path)?;
             if is != kernel.blake3 {
                 let was = kernel.blake3.clone();
-                return Err(SpiceFault::KernelChanged { was, is }).in_file(&kernel.path);
+                return Err(SpiceError::KernelChanged { was, is }).in_file(&kernel.path);
             }
         }
         Ok(())
@@ -230,7 +230,7 @@ pub(super) fn role_of(path: &Path) -> Result<KernelRole> {
 }
 
 fn not_a_kernel<T>(path: &Path, found: &str) -> Result<T> {
-    Err(SpiceFault::NotAKernel {
+    Err(SpiceError::NotAKernel {
         found: found.to_owned(),
         expected: EXPECTED,
     })
@@ -240,7 +240,7 @@ fn not_a_kernel<T>(path: &Path, found: &str) -> Result<T> {
 /// At most eight bytes from the start of a regular file.
 fn first_bytes(path: &Path) -> Result<Vec<u8>> {
     let metadata = fs::metadata(path)
-        .map_err(IoFault::on("open kernel"))
+        .map_err(IoError::on("open kernel"))
         .in_file(path)?;
     if !metadata.is_file() {
         return not_a_kernel(path, "no regular file");
@@ -248,7 +248,7 @@ fn first_bytes(path: &Path) -> Result<Vec<u8>> {
     let mut start = Vec::new();
     File::open(path)
         .and_then(|file| file.take(8).read_to_end(&mut start))
-        .map_err(IoFault::on("open kernel"))
+        .map_err(IoError::on("open kernel"))
         .in_file(path)?;
     Ok(start)
 }
@@ -256,12 +256,12 @@ fn first_bytes(path: &Path) -> Result<Vec<u8>> {
 /// The text of a text kernel.
 ///
 /// # Errors
-/// [`SpiceFault::NotAKernel`] for other files.
+/// [`SpiceError::NotAKernel`] for other files.
 pub(super) fn read_text(path: &Path) -> Result<String> {
     let mut bytes = Vec::new();
     File::open(path)
         .and_then(|file| file.take(TEXT_SIZE_MAX + 1).read_to_end(&mut bytes))
-        .map_err(IoFault::on("read kernel"))
+        .map_err(IoError::on("read kernel"))
         .in_file(path)?;
     if bytes.contains(&0) {
         return not_a_kernel(path, "a binary file of another kind");

@@ -9,12 +9,12 @@ use std::{
 };
 
 use super::{
-    error::SpiceFault,
+    error::SpiceError,
     kernels::{Kernel, KernelRole, KernelSet, read_text, role_of},
     text_kernel::{self, Assignment, Value, values_of},
 };
 use crate::{
-    error::{Place, Result},
+    error::{Locate, Result},
     files::InputFiles,
 };
 
@@ -28,8 +28,8 @@ impl KernelSet {
     /// since archives and tools write the same name differently; the explanation then says so.
     ///
     /// # Errors
-    /// [`SpiceFault::NotAKernel`] for a file that is no metakernel, [`SpiceFault::TextKernel`] for a
-    /// broken line, [`SpiceFault::MissingKernel`], and those of [`KernelSet::from_files`].
+    /// [`SpiceError::NotAKernel`] for a file that is no metakernel, [`SpiceError::TextKernel`] for a
+    /// broken line, [`SpiceError::MissingKernel`], and those of [`KernelSet::from_files`].
     pub fn from_metakernel(metakernel: &Path) -> Result<Self> {
         Self::from_metakernel_of(&InputFiles::default(), metakernel)
     }
@@ -41,11 +41,11 @@ impl KernelSet {
     pub fn from_metakernel_of(run: &InputFiles, metakernel: &Path) -> Result<Self> {
         let role = role_of(metakernel)?;
         if role != KernelRole::Meta {
-            let fault = SpiceFault::NotAKernel {
+            let error = SpiceError::NotAKernel {
                 found: format!("a kernel of role {role}"),
                 expected: "a metakernel (KERNELS_TO_LOAD)",
             };
-            return Err(fault).in_file(metakernel);
+            return Err(error).in_file(metakernel);
         }
         let assignments = text_kernel::assignments(&read_text(metakernel)?).in_file(metakernel)?;
         let folder = metakernel.parent().unwrap_or(Path::new(""));
@@ -117,11 +117,11 @@ fn is_list_variable(assignment: &Assignment) -> bool {
 }
 
 /// Names to load, symbols replaced.
-fn listed_names(assignments: &[Assignment]) -> std::result::Result<Vec<String>, SpiceFault> {
+fn listed_names(assignments: &[Assignment]) -> std::result::Result<Vec<String>, SpiceError> {
     let symbols = strings(assignments, "PATH_SYMBOLS")?;
     let values = strings(assignments, "PATH_VALUES")?;
     if symbols.len() != values.len() {
-        return Err(SpiceFault::NotAKernel {
+        return Err(SpiceError::NotAKernel {
             found: format!(
                 "a metakernel of {} PATH_SYMBOLS and {} PATH_VALUES",
                 symbols.len(),
@@ -135,7 +135,7 @@ fn listed_names(assignments: &[Assignment]) -> std::result::Result<Vec<String>, 
     pairs.sort_by_key(|(symbol, _)| std::cmp::Reverse(symbol.len()));
     let names = strings(assignments, "KERNELS_TO_LOAD")?;
     if names.is_empty() {
-        return Err(SpiceFault::NotAKernel {
+        return Err(SpiceError::NotAKernel {
             found: "a metakernel that lists nothing".to_owned(),
             expected: "names in KERNELS_TO_LOAD",
         });
@@ -147,7 +147,7 @@ fn listed_names(assignments: &[Assignment]) -> std::result::Result<Vec<String>, 
     };
     let names: Vec<String> = names.into_iter().map(replace).collect();
     match names.iter().find(|name| name.starts_with('$')) {
-        Some(name) => Err(SpiceFault::NotAKernel {
+        Some(name) => Err(SpiceError::NotAKernel {
             found: format!("a metakernel that names {name}"),
             expected: "that path symbol in PATH_SYMBOLS, with its value in PATH_VALUES",
         }),
@@ -159,12 +159,12 @@ fn listed_names(assignments: &[Assignment]) -> std::result::Result<Vec<String>, 
 fn strings(
     assignments: &[Assignment],
     variable: &str,
-) -> std::result::Result<Vec<String>, SpiceFault> {
+) -> std::result::Result<Vec<String>, SpiceError> {
     let mut joined = Vec::new();
     let mut begun = String::new();
     for value in values_of(assignments, variable) {
         let Value::Text(text) = value else {
-            return Err(SpiceFault::NotAKernel {
+            return Err(SpiceError::NotAKernel {
                 found: format!("a metakernel with the number {value:?} in {variable}"),
                 expected: "quoted strings",
             });
@@ -178,7 +178,7 @@ fn strings(
         }
     }
     if !begun.is_empty() {
-        return Err(SpiceFault::NotAKernel {
+        return Err(SpiceError::NotAKernel {
             found: format!("a metakernel whose {variable} ends with '+'"),
             expected: "another string behind it",
         });
@@ -187,17 +187,17 @@ fn strings(
 }
 
 /// The one file beside `written` whose name differs only in case and separators.
-fn same_name(written: &Path, name: &str) -> std::result::Result<PathBuf, SpiceFault> {
+fn same_name(written: &Path, name: &str) -> std::result::Result<PathBuf, SpiceError> {
     let folded = |path: &Path| {
         let name = path.file_name().unwrap_or_default().to_string_lossy();
         name.to_ascii_lowercase().replace(['.', '-'], "_")
     };
-    let wanted = folded(written);
+    let required = folded(written);
     let folder = written.parent().unwrap_or(Path::new(""));
     let entries = fs::read_dir(folder).into_iter().flatten().flatten();
     let mut similar: Vec<PathBuf> = entries
         .map(|entry| entry.path())
-        .filter(|path| folded(path) == wanted)
+        .filter(|path| folded(path) == required)
         .collect();
     similar.sort();
     if let [only] = similar.as_slice() {
@@ -209,7 +209,7 @@ fn same_name(written: &Path, name: &str) -> std::result::Result<PathBuf, SpiceFa
         let names: Vec<String> = similar.iter().map(|p| p.display().to_string()).collect();
         format!("; it could mean any of {}", names.join(", "))
     };
-    Err(SpiceFault::MissingKernel {
+    Err(SpiceError::MissingKernel {
         name: name.to_owned(),
         candidates,
     })

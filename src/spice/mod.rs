@@ -27,8 +27,8 @@ mod trajectory;
 mod view;
 mod write;
 
-pub use coverage::{Coverage, Wanted};
-pub use error::SpiceFault;
+pub use coverage::{Coverage, RequiredCoverage};
+pub use error::SpiceError;
 pub use ffi::PATH_LENGTH_MAX;
 pub use kernels::{Kernel, KernelRole, KernelSet};
 pub use select::quality_of;

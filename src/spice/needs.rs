@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 
 use super::{
-    error::SpiceFault,
+    error::SpiceError,
     kernels::{Kernel, KernelRole, KernelSet, read_text},
     text_kernel::{self, values_of},
 };
@@ -59,9 +59,9 @@ pub(super) fn camera_frame(instrument: &Instrument) -> Need {
 /// What clock strings and attitude need.
 pub(super) const CLOCKS: [Need; 2] = [LEAP_SECONDS, CLOCK];
 
-/// A fault of CSPICE, or the kernel whose absence explains it: the first of `needs` that no text
+/// An error of CSPICE, or the kernel whose absence explains it: the first of `needs` that no text
 /// kernel of `set` defines.
-pub(super) fn explain(set: &KernelSet, fault: SpiceFault, needs: &[Need]) -> SpiceFault {
+pub(super) fn explain(set: &KernelSet, error: SpiceError, needs: &[Need]) -> SpiceError {
     let texts = set.kernels().iter().filter(|kernel| {
         !matches!(
             kernel.role,
@@ -77,8 +77,8 @@ pub(super) fn explain(set: &KernelSet, fault: SpiceFault, needs: &[Need]) -> Spi
         !defined.iter().any(|text| defines(text))
     });
     match missing {
-        None => fault,
-        Some(need) => SpiceFault::MissingText {
+        None => error,
+        Some(need) => SpiceError::MissingText {
             kernel: need.kernel.clone().into_owned(),
             variable: need.variable.clone().into_owned(),
             example: need.example.clone().into_owned(),

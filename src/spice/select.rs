@@ -6,9 +6,9 @@ use std::{
 };
 
 use super::{
-    coverage::{Wanted, interval_of},
+    coverage::{RequiredCoverage, interval_of},
     daf::{self, Segment},
-    error::SpiceFault,
+    error::SpiceError,
     kernels::{KernelRole, KernelSet, read_text, role_of},
     needs::{BUS_FRAME, CLOCK, LEAP_SECONDS, MARS, Need, camera_frame},
     session::Session,
@@ -17,7 +17,7 @@ use super::{
 use crate::{
     config::built_in_instruments,
     constants::{MARS_IAU2000, NAIF_MGS, NAIF_MGS_BUS},
-    error::{Failure, IoFault, Kind, Place, Result},
+    error::{Error, IoError, Kind, Locate, Result},
     files::{InputFiles, file_name},
     kernel_source::{CkQuality, KernelSelection},
     time::Intervals,
@@ -45,14 +45,14 @@ impl KernelSet {
     /// Chooses from a folder: the latest text kernels (pinned ones win), planetary ephemerides, the
     /// chosen orbit solution, and attitudes from the worst quality to the best, so that the best wins.
     ///
-    /// * `wanted` – instants that ephemerides and attitudes must touch; without any, only text
+    /// * `required` – instants that ephemerides and attitudes must touch; without any, only text
     ///   kernels are chosen, which is enough to tag times
     ///
     /// # Errors
-    /// [`SpiceFault::NothingToSelect`] when a needed text kernel or the orbit solution is missing;
-    /// [`IoFault`] when the folder cannot be read.
-    pub fn select(selection: &KernelSelection, wanted: &Wanted) -> Result<Self> {
-        Self::select_of(&InputFiles::default(), selection, wanted)
+    /// [`SpiceError::NothingToSelect`] when a needed text kernel or the orbit solution is missing;
+    /// [`IoError`] when the folder cannot be read.
+    pub fn select(selection: &KernelSelection, required: &RequiredCoverage) -> Result<Self> {
+        Self::select_of(&InputFiles::default(), selection, required)
     }
 
     /// As [`Self::select`], with the hashes that a run has of its input files.
@@ -62,7 +62,7 @@ impl KernelSet {
     pub fn select_of(
         run: &InputFiles,
         selection: &KernelSelection,
-        wanted: &Wanted,
+        required: &RequiredCoverage,
     ) -> Result<Self> {
         let found = Found::in_folder(&selection.root)?;
         let mut set = Selected {
@@ -70,10 +70,10 @@ impl KernelSet {
             run,
         };
         select_texts(selection, &found.texts, &mut set).in_file(&selection.root)?;
-        if *wanted != Wanted::default() {
-            select_ephemerides(selection, &found.ephemerides, &wanted.positions, &mut set)
+        if *required != RequiredCoverage::default() {
+            select_ephemerides(selection, &found.ephemerides, &required.positions, &mut set)
                 .in_file(&selection.root)?;
-            select_attitudes(selection, &found.attitudes, &wanted.attitudes, &mut set)?;
+            select_attitudes(selection, &found.attitudes, &required.attitudes, &mut set)?;
         }
         set.set.explanation.extend(found.notes);
         Ok(set.set)
@@ -111,7 +111,7 @@ impl Found {
                 }
                 KernelRole::Ck => found.attitudes.push(path),
                 KernelRole::Meta => {
-                    let note = format!("{}: left out, a metakernel", file_name(&path));
+                    let note = format!("{}: not used, a metakernel", file_name(&path));
                     found.notes.push(note);
                 }
                 _ => match read_text(&path).and_then(|text| Ok(text_kernel::assignments(&text)?)) {
@@ -123,8 +123,8 @@ impl Found {
         Ok(found)
     }
 
-    fn leave_out(&mut self, path: &Path, failure: &Failure) {
-        let note = format!("{}: left out, {}", file_name(path), failure.fault);
+    fn leave_out(&mut self, path: &Path, failure: &Error) {
+        let note = format!("{}: not used, {}", file_name(path), failure.cause);
         self.notes.push(note);
     }
 }
@@ -135,13 +135,13 @@ fn files_below(root: &Path) -> Result<Vec<PathBuf>> {
     let mut folders = vec![(root.to_owned(), 0)];
     while let Some((folder, depth)) = folders.pop() {
         let entries = fs::read_dir(&folder)
-            .map_err(IoFault::on("list folder"))
+            .map_err(IoError::on("list folder"))
             .in_file(&folder)?;
         for entry in entries {
-            let entry = entry.map_err(IoFault::on("list folder")).in_file(&folder)?;
+            let entry = entry.map_err(IoError::on("list folder")).in_file(&folder)?;
             let kind = entry
                 .file_type()
-                .map_err(IoFault::on("list folder"))
+                .map_err(IoError::on("list folder"))
                 .in_file(entry.path())?;
             if kind.is_dir() && depth < DEPTH_MAX {
                 folders.push((entry.path(), depth + 1));
@@ -150,7 +150,7 @@ fn files_below(root: &Path) -> Result<Vec<PathBuf>> {
             }
             if files.len() > FILES_MAX {
                 let what = format!("could be found among more than {FILES_MAX} files");
-                return Err(SpiceFault::NothingToSelect { what }).in_file(root);
+                return Err(SpiceError::NothingToSelect { what }).in_file(root);
             }
         }
     }
@@ -189,7 +189,7 @@ fn select_texts(
     for name in &selection.pinned {
         if !texts.iter().any(|(path, _)| file_name(path) == *name) {
             let what = format!("is the text kernel {name}, which the configuration pins");
-            return Err(SpiceFault::NothingToSelect { what }.into());
+            return Err(SpiceError::NothingToSelect { what }.into());
         }
     }
     let mut chosen: Vec<&Path> = Vec::new();
@@ -204,7 +204,7 @@ fn select_texts(
         candidates.sort_by_key(|(path, _)| version_of(path));
         let Some((best, _)) = candidates.last() else {
             let what = format!("defines {what} ({variable})");
-            return Err(SpiceFault::NothingToSelect { what }.into());
+            return Err(SpiceError::NothingToSelect { what }.into());
         };
         // One file may serve two needs: the clock kernel of MGS also defines its bus frame.
         let served = candidates
@@ -238,7 +238,7 @@ fn mars_fits(variable: &str, assignments: &[Assignment]) -> bool {
 fn select_ephemerides(
     selection: &KernelSelection,
     ephemerides: &[(PathBuf, Vec<Segment>)],
-    wanted: &Intervals,
+    required: &Intervals,
     set: &mut Selected<'_>,
 ) -> Result<()> {
     let holds_mgs = |segments: &[Segment]| segments.iter().any(|s| s.integers[0] == NAIF_MGS);
@@ -252,7 +252,7 @@ fn select_ephemerides(
             "holds the orbit of MGS in the solution {family} (found: {})",
             names.join(", ")
         );
-        return Err(SpiceFault::NothingToSelect { what }.into());
+        return Err(SpiceError::NothingToSelect { what }.into());
     }
     // Planets first; of several versions the latest last, so that it wins.
     let mut ordered: Vec<&(PathBuf, Vec<Segment>)> = ephemerides.iter().collect();
@@ -264,15 +264,15 @@ fn select_ephemerides(
             .filter(|segment| !mgs || segment.integers[0] == NAIF_MGS)
             .map(|segment| interval_of([segment.start, segment.stop]));
         let touches = !Intervals::union_of(held)
-            .intersection(wanted)
+            .intersection(required)
             .as_slice()
             .is_empty();
         let name = file_name(path);
         if mgs && !family_of(path, &family) {
-            let line = format!("{name}: left out, not of the orbit solution {family}");
+            let line = format!("{name}: not used, not of the orbit solution {family}");
             set.set.explanation.push(line);
         } else if !touches {
-            let line = format!("{name}: left out, holds none of the wanted times");
+            let line = format!("{name}: not used, holds none of the required times");
             set.set.explanation.push(line);
         } else if mgs {
             set.add(path, &format!("orbit of MGS, solution {family}"))?;
@@ -283,11 +283,11 @@ fn select_ephemerides(
     Ok(())
 }
 
-/// Attitudes that touch the wanted times, the worst quality first, and what commanded ones fill in.
+/// Attitudes that touch the required times, the worst quality first, and what commanded ones fill in.
 fn select_attitudes(
     selection: &KernelSelection,
     attitudes: &[PathBuf],
-    wanted: &Intervals,
+    required: &Intervals,
     set: &mut Selected<'_>,
 ) -> Result<()> {
     // Times of a C-kernel are clock ticks: the text kernels chosen so far turn them into ET.
@@ -308,8 +308,8 @@ fn select_attitudes(
             let hull = held.first().zip(held.last());
             let hull = hull.map(|(first, last)| interval_of([first[0], last[1]]));
             let hull = Intervals::union_of(hull);
-            if hull.intersection(wanted).as_slice().is_empty() {
-                let line = format!("{name}: left out, holds no attitude near the wanted times");
+            if hull.intersection(required).as_slice().is_empty() {
+                let line = format!("{name}: not used, holds no attitude near the required times");
                 set.set.explanation.push(line);
                 continue;
             }
@@ -326,25 +326,25 @@ fn select_attitudes(
     for path in attitudes {
         let quality = quality_of(path);
         if !selection.ck_quality.contains(&quality) {
-            let line = format!("{}: left out, {quality:?} attitude", file_name(path));
+            let line = format!("{}: not used, {quality:?} attitude", file_name(path));
             set.set.explanation.push(line);
         }
     }
     if selection.ck_quality.first() == Some(&CkQuality::Nominal) {
         telemetry.clear();
     }
-    explain_commanded(wanted, &Intervals::union_of(telemetry), commanded, set);
+    explain_commanded(required, &Intervals::union_of(telemetry), commanded, set);
     Ok(())
 }
 
-/// Says which wanted attitudes come from commanded kernels, because no telemetry that wins holds them.
+/// Says which required attitudes come from commanded kernels, because no telemetry that wins holds them.
 fn explain_commanded(
-    wanted: &Intervals,
+    required: &Intervals,
     telemetry: &Intervals,
     commanded: Vec<(String, Intervals)>,
     set: &mut Selected<'_>,
 ) {
-    let mut missing = wanted.without(telemetry);
+    let mut missing = required.without(telemetry);
     // The last one wins where several hold the same instant.
     for (name, held) in commanded.into_iter().rev() {
         for filled in missing.intersection(&held).as_slice() {

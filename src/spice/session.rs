@@ -6,7 +6,7 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::{
     coverage::Coverage,
-    error::SpiceFault,
+    error::SpiceError,
     ffi::{Cspice, Rows, StateKm},
     kernels::KernelSet,
     needs::{BUS_FRAME, CLOCKS, LEAP_SECONDS, Need, camera_frame, explain},
@@ -14,7 +14,7 @@ use super::{
 };
 use crate::{
     constants::{NAIF_MARS, NAIF_MGS, NAIF_MGS_BUS, NAIF_SUN},
-    error::{Failure, Place, Result},
+    error::{Error, Locate, Result},
     frames::{CameraFrame, J2000, MgsBus, Position, Rotation},
     instruments::Instrument,
     time::{CkLookup, Et},
@@ -83,7 +83,7 @@ impl Session {
     /// Waits for the lock and loads `kernels` in their order.
     ///
     /// # Errors
-    /// [`SpiceFault::Spice`] with the file whose loading failed; [`SpiceFault::SessionOpen`].
+    /// [`SpiceError::Spice`] with the file whose loading failed; [`SpiceError::SessionOpen`].
     pub fn open(kernels: &KernelSet) -> Result<Self> {
         let cspice = Cspice::lock()?;
         for kernel in kernels.kernels() {
@@ -105,7 +105,7 @@ impl Session {
     /// Coverage of all loaded kernels, at the level of intervals.
     ///
     /// # Errors
-    /// [`SpiceFault::Spice`] when a C-kernel cannot be read; [`SpiceFault::MissingText`] without clock.
+    /// [`SpiceError::Spice`] when a C-kernel cannot be read; [`SpiceError::MissingText`] without clock.
     pub fn coverage(&self) -> Result<&Coverage> {
         if let Some(coverage) = self.coverage.get() {
             return Ok(coverage);
@@ -114,28 +114,28 @@ impl Session {
         Ok(self.coverage.get_or_init(|| coverage))
     }
 
-    /// A fault of CSPICE, or the absence of a kernel that explains it.
-    fn explain(&self, fault: SpiceFault, needs: &[Need]) -> SpiceFault {
-        explain(&self.kernels, fault, needs)
+    /// An error of CSPICE, or the absence of a kernel that explains it.
+    fn explain(&self, error: SpiceError, needs: &[Need]) -> SpiceError {
+        explain(&self.kernels, error, needs)
     }
 
     /// Instant of a UTC string such as `1999-08-24T14:12:13.64`, with or without a closing `Z`.
     ///
     /// # Errors
-    /// [`SpiceFault::Spice`] when the string is no date; [`SpiceFault::MissingText`].
+    /// [`SpiceError::Spice`] when the string is no date; [`SpiceError::MissingText`].
     pub fn utc_to_et(&self, utc: &str) -> Result<Et> {
         let utc = utc.trim();
         let seconds = self
             .cspice
             .utc_to_et(utc.strip_suffix('Z').unwrap_or(utc))
-            .map_err(|fault| self.explain(fault, &[LEAP_SECONDS]))?;
+            .map_err(|error| self.explain(error, &[LEAP_SECONDS]))?;
         Ok(Et::from_seconds(seconds))
     }
 
     /// ISO calendar UTC with three decimals, for example `1999-08-24T14:12:13.635`.
     ///
     /// # Errors
-    /// [`SpiceFault::MissingText`] without a leap-second kernel.
+    /// [`SpiceError::MissingText`] without a leap-second kernel.
     pub fn et_to_utc(&self, et: Et) -> Result<String> {
         self.et_to_utc_with(et, UTC_DECIMALS)
     }
@@ -143,36 +143,36 @@ impl Session {
     /// UTC of an instant with so many digits of a second, ISO 8601 without a zone letter.
     ///
     /// # Errors
-    /// [`SpiceFault::MissingText`] without a leap-second kernel.
+    /// [`SpiceError::MissingText`] without a leap-second kernel.
     pub fn et_to_utc_with(&self, et: Et, decimals: u8) -> Result<String> {
         let utc = self.cspice.et_to_utc(et.seconds(), decimals);
-        Ok(utc.map_err(|fault| self.explain(fault, &[LEAP_SECONDS]))?)
+        Ok(utc.map_err(|error| self.explain(error, &[LEAP_SECONDS]))?)
     }
 
     /// Instant of a spacecraft clock string of MGS, such as `619971158:28` or `1/0844996544.086`.
     ///
     /// # Errors
-    /// [`SpiceFault::Spice`] when the string is no clock reading; [`SpiceFault::MissingText`].
+    /// [`SpiceError::Spice`] when the string is no clock reading; [`SpiceError::MissingText`].
     pub fn sclk_to_et(&self, sclk: &str) -> Result<Et> {
         let seconds = self.cspice.sclk_to_et(NAIF_MGS, sclk.trim());
-        let seconds = seconds.map_err(|fault| self.explain(fault, &CLOCKS))?;
+        let seconds = seconds.map_err(|error| self.explain(error, &CLOCKS))?;
         Ok(Et::from_seconds(seconds))
     }
 
     /// Spacecraft clock string of MGS, with partition, rounded to 1/256 s.
     ///
     /// # Errors
-    /// [`SpiceFault::Spice`] outside the clock kernel's range; [`SpiceFault::MissingText`].
+    /// [`SpiceError::Spice`] outside the clock kernel's range; [`SpiceError::MissingText`].
     pub fn et_to_sclk(&self, et: Et) -> Result<String> {
         let sclk = self.cspice.et_to_sclk(NAIF_MGS, et.seconds());
-        Ok(sclk.map_err(|fault| self.explain(fault, &CLOCKS))?)
+        Ok(sclk.map_err(|error| self.explain(error, &CLOCKS))?)
     }
 
     /// Geometric state of MGS relative to Mars: no light time, no aberration.
     ///
     /// # Errors
-    /// [`SpiceFault::Spice`], of kind coverage when the kernels do not reach there;
-    /// [`SpiceFault::NotFinite`] with the kernel that holds NaN or an infinity.
+    /// [`SpiceError::Spice`], of kind coverage when the kernels do not reach there;
+    /// [`SpiceError::NotFinite`] with the kernel that holds NaN or an infinity.
     pub fn state(&self, et: Et) -> Result<State> {
         let state = self
             .cspice
@@ -216,10 +216,10 @@ impl Session {
         Err(self.not_finite(what, et, origin))
     }
 
-    fn not_finite(&self, what: &'static str, instant: Et, origin: Option<Origin>) -> Failure {
+    fn not_finite(&self, what: &'static str, instant: Et, origin: Option<Origin>) -> Error {
         let utc = self.et_to_utc(instant);
         let part = origin.as_ref().map(|origin| origin.part);
-        let failure = Failure::from(SpiceFault::NotFinite {
+        let failure = Error::from(SpiceError::NotFinite {
             what,
             instant,
             utc: utc.unwrap_or_else(|_| "unknown".to_owned()),
@@ -237,9 +237,9 @@ impl Session {
     /// * `tolerance_s` – how far outside its intervals the C-kernel may be asked, seconds
     ///
     /// # Errors
-    /// [`SpiceFault::NoAttitude`] when there is no attitude with rates within the tolerance;
-    /// [`SpiceFault::NotFinite`] with the kernel that holds NaN or an infinity;
-    /// [`SpiceFault::MissingText`] without clock or leap seconds.
+    /// [`SpiceError::NoAttitude`] when there is no attitude with rates within the tolerance;
+    /// [`SpiceError::NotFinite`] with the kernel that holds NaN or an infinity;
+    /// [`SpiceError::MissingText`] without clock or leap seconds.
     pub fn attitude(&self, lookup: CkLookup, exposure: Et, tolerance_s: f64) -> Result<Attitude> {
         let kernel_time = lookup.kernel_time();
         let ticks = self.ticks(kernel_time)?;
@@ -247,7 +247,7 @@ impl Session {
         let pointing = self
             .cspice
             .pointing(NAIF_MGS_BUS, ticks, tolerance_s * ticks_per_s)?
-            .ok_or(SpiceFault::NoAttitude {
+            .ok_or(SpiceError::NoAttitude {
                 kernel_time,
                 tolerance_s,
             })?;
@@ -269,13 +269,13 @@ impl Session {
     /// Encoded clock of MGS.
     fn ticks(&self, et: Et) -> Result<f64> {
         let ticks = self.cspice.et_to_ticks(NAIF_MGS, et.seconds());
-        Ok(ticks.map_err(|fault| self.explain(fault, &CLOCKS))?)
+        Ok(ticks.map_err(|error| self.explain(error, &CLOCKS))?)
     }
 
     /// Mounting of `instrument` as the loaded kernels have it.
     ///
     /// # Errors
-    /// [`SpiceFault::MissingText`] when no loaded kernel defines the two frames.
+    /// [`SpiceError::MissingText`] when no loaded kernel defines the two frames.
     pub fn mounting(
         &self,
         instrument: &Instrument,
@@ -291,14 +291,14 @@ impl Session {
                 &camera.unwrap_or_default(),
                 et.seconds(),
             )
-            .map_err(|fault| self.explain(fault, &[camera_frame(instrument), BUS_FRAME]))?;
+            .map_err(|error| self.explain(error, &[camera_frame(instrument), BUS_FRAME]))?;
         Ok(Rotation::new(matrix(&rows), et))
     }
 
     /// Matrix from J2000 to the `IAU_MARS` of the loaded planetary constants, to tell which report they follow.
     ///
     /// # Errors
-    /// [`SpiceFault::Spice`] when no planetary constants are loaded.
+    /// [`SpiceError::Spice`] when no planetary constants are loaded.
     pub fn mars_matrix(&self, et: Et) -> Result<Matrix3<f64>> {
         let rows = self
             .cspice

@@ -3,7 +3,7 @@
 //! Source: NAIF, Kernel Required Reading: data blocks between `\begindata` and `\begintext`,
 //! `NAME = value`, `NAME = ( value, value … )`, `+=` appends, `''` is a quote inside a string.
 
-use super::error::SpiceFault;
+use super::error::SpiceError;
 
 /// One assignment.
 #[derive(Debug, Clone, PartialEq)]
@@ -50,8 +50,8 @@ pub(super) fn values_of<'a>(assignments: &'a [Assignment], name: &str) -> Vec<&'
 /// All assignments of a text kernel.
 ///
 /// # Errors
-/// [`SpiceFault::TextKernel`] with the line that breaks the rules.
-pub(super) fn assignments(text: &str) -> Result<Vec<Assignment>, SpiceFault> {
+/// [`SpiceError::TextKernel`] with the line that breaks the rules.
+pub(super) fn assignments(text: &str) -> Result<Vec<Assignment>, SpiceError> {
     let mut tokens = tokens(text)?.into_iter().peekable();
     let mut found = Vec::new();
     while let Some((line, token)) = tokens.next() {
@@ -96,7 +96,7 @@ enum Token {
     PlusEquals,
 }
 
-fn tokens(text: &str) -> Result<Vec<(usize, Token)>, SpiceFault> {
+fn tokens(text: &str) -> Result<Vec<(usize, Token)>, SpiceError> {
     let mut found = Vec::new();
     let mut inside_data = false;
     for (index, line) in text.lines().enumerate() {
@@ -114,7 +114,7 @@ fn line_tokens(
     line: usize,
     content: &str,
     found: &mut Vec<(usize, Token)>,
-) -> Result<(), SpiceFault> {
+) -> Result<(), SpiceError> {
     let mut rest = content.trim_start();
     while let Some(first) = rest.chars().next() {
         let (token, used) = match first {
@@ -132,7 +132,7 @@ fn line_tokens(
 }
 
 /// A quoted string at the start of `rest`, and how many bytes it takes.
-fn quoted(line: usize, rest: &str) -> Result<(Token, usize), SpiceFault> {
+fn quoted(line: usize, rest: &str) -> Result<(Token, usize), SpiceError> {
     let mut text = String::new();
     let mut position = 1;
     while let Some(length) = rest[position..].find('\'') {
@@ -164,8 +164,8 @@ fn word(rest: &str) -> (Token, usize) {
     (Token::Word(rest[..end].to_owned()), end)
 }
 
-fn fault(line: usize, problem: String) -> SpiceFault {
-    SpiceFault::TextKernel { line, problem }
+fn fault(line: usize, problem: String) -> SpiceError {
+    SpiceError::TextKernel { line, problem }
 }
 
 #[cfg(test)]

@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
-use super::{error::SpiceFault, session::Session};
+use super::{error::SpiceError, session::Session};
 use crate::{
     error::Result,
     frames::{J2000, Position},
@@ -61,8 +61,8 @@ impl Session {
     /// until instants apart from the samples agree.
     ///
     /// # Errors
-    /// [`SpiceFault::CoverageGap`] when the kernels do not hold an interval;
-    /// [`SpiceFault::NoConvergence`] when pieces of a second still miss the tolerance.
+    /// [`SpiceError::CoverageGap`] when the kernels do not hold an interval;
+    /// [`SpiceError::NoConvergence`] when pieces of a second still miss the tolerance.
     pub fn trajectory(&self, intervals: &Intervals, tolerance_m: f64) -> Result<Trajectory> {
         let mut trajectory = Trajectory {
             pieces: Vec::new(),
@@ -108,13 +108,13 @@ impl Session {
         let piece_s = interval.duration_s();
         let middle = interval.start.plus(0.5 * piece_s);
         if piece_s < 2.0 * PIECE_SHORTEST_S {
-            let fault = SpiceFault::NoConvergence {
+            let error = SpiceError::NoConvergence {
                 near: middle,
                 error_m,
                 piece_s,
                 tolerance_m,
             };
-            return Err(fault.into());
+            return Err(error.into());
         }
         to_do.push(Interval::new(middle, interval.stop));
         to_do.push(Interval::new(interval.start, middle));

@@ -9,13 +9,13 @@ use std::{
 
 use super::{
     daf,
-    error::SpiceFault,
+    error::SpiceError,
     ffi::{CkColumns, Cspice, StateKm},
     session::{Session, State},
 };
 use crate::{
     constants::{NAIF_MGS, NAIF_MGS_BUS},
-    error::{IoFault, Place, Result},
+    error::{IoError, Locate, Result},
     time::Et,
     units::METRES_PER_KM,
 };
@@ -61,8 +61,8 @@ pub struct CkSegment<'a> {
 /// Writes a new SPK; `comment` goes into its comment area.
 ///
 /// # Errors
-/// [`SpiceFault::Segment`] for columns that do not fit, [`SpiceFault::Spice`] from CSPICE (an existing
-/// file is never overwritten), [`SpiceFault::SessionOpen`] when this thread has a session, [`IoFault`]
+/// [`SpiceError::Segment`] for columns that do not fit, [`SpiceError::Spice`] from CSPICE (an existing
+/// file is never overwritten), [`SpiceError::SessionOpen`] when this thread has a session, [`IoError`]
 /// when the system refuses to write. A kernel that is not whole is removed.
 pub fn write_spk(path: &Path, segments: &[SpkSegment], comment: &str) -> Result<()> {
     for segment in segments {
@@ -148,7 +148,7 @@ fn fill(
         return whole.in_file(path);
     }
     let refused = refusal(path);
-    // What is left is no kernel; when it cannot even be removed, the first fault is the one to tell.
+    // What is left is no kernel; when it cannot even be removed, the first error is the one to tell.
     let _ = fs::remove_file(path);
     refused
         .map_or(whole, |refused| Err(refused.into()))
@@ -156,13 +156,13 @@ fn fill(
 }
 
 /// Why the system refuses to write at `path`, if it does: CSPICE's messages do not tell.
-fn refusal(path: &Path) -> Option<IoFault> {
+fn refusal(path: &Path) -> Option<IoError> {
     let probe = || -> io::Result<()> {
         let mut file = OpenOptions::new().append(true).create(true).open(path)?;
         file.write_all(&vec![0; PROBE_BYTES])?;
         file.sync_all()
     };
-    probe().err().map(IoFault::on("write"))
+    probe().err().map(IoError::on("write"))
 }
 
 impl State {
@@ -186,7 +186,7 @@ fn check_lengths(name: &str, instants: &[Et], columns: &[usize]) -> Result<()> {
     } else {
         return Ok(());
     };
-    Err(SpiceFault::Segment {
+    Err(SpiceError::Segment {
         segment: name.to_owned(),
         problem,
     }

@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use crate::{
-    error::{Fault, Kind},
+    error::{Cause, Kind},
     files::{HashedFile, file_name},
 };
 
@@ -85,13 +85,13 @@ impl Input for InOrder<'_, HashedFile> {
 #[error("the output of {0} was used before it was made")]
 pub(super) struct Pending(pub(super) String);
 
-impl Fault for Pending {
+impl Cause for Pending {
     fn kind(&self) -> Kind {
         Kind::Bug
     }
 
     fn advice(&self) -> String {
-        "this is a fault of areograph; please report it with the configuration".to_owned()
+        "this is a bug in areograph; please report it with the configuration".to_owned()
     }
 }
 

@@ -56,7 +56,7 @@ impl<T> Output<T> {
     /// The value.
     ///
     /// # Errors
-    /// A fault of areograph that no stage meets: the flow runs it when everything that it sees is known.
+    /// A bug in areograph that no stage meets: the flow runs it when everything that it sees is known.
     pub fn value(&self) -> Result<&T> {
         let pending = || Pending(self.label.clone()).into();
         self.get().ok_or_else(pending)

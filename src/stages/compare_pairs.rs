@@ -20,9 +20,9 @@ use crate::{
     geom::{
         ellipsoid::spherical_to_xyz_m,
         misregistration::{ImageToImage, Pair},
+        oriented_camera::OrientedCamera,
         pushbroom::{CameraModel, ExteriorOrientation},
         statistics::Summary,
-        stereo::StereoImage,
         uncertainty::{BudgetInput, ResidualMoments, UncertaintyBudget, uncertainty_budget},
     },
     stage::{InOrder, Output, Round, Stage},
@@ -49,7 +49,7 @@ pub struct PairComparison {
     pub residuals: [ResidualMoments; 2],
     /// How far apart along the flight the images place a tie point, metres, mean: what their reprojection
     /// residuals add up to.
-    pub disagreement_m: f64,
+    pub along_track_parallax_m: f64,
     /// Footprints against tie points; `None` where tie points determine no transformation.
     pub footprints: Option<FootprintsByTies>,
     /// Median distance of successive footprints, metres; `None` without any.
@@ -65,7 +65,7 @@ pub struct FootprintsByTies {
     pub order: u8,
     /// Tie points that it rests on.
     pub ties: u32,
-    /// Tie points that were left out as outliers.
+    /// Tie points rejected as outliers.
     pub ties_rejected: u32,
     /// What it leaves of the tie points' lines.
     pub tie_lines: Summary,
@@ -128,7 +128,7 @@ impl Stage for ComparePairs<'_> {
         let oriented = SiteImage::oriented(self.images.0)?;
         let images: Vec<_> = oriented
             .iter()
-            .map(|image| image.stereo(*self.model))
+            .map(|image| image.oriented_camera(*self.model))
             .collect();
         let registrations = self.images.0.iter().map(|image| image.registration.value());
         Ok(compare_pairs(
@@ -150,7 +150,7 @@ impl Stage for ComparePairs<'_> {
 /// Shan et al. 2005, p. 104 and eq. 5 to 9; their eye is replaced by a transformation through tie points.
 #[must_use]
 pub fn compare_pairs<M: ExteriorOrientation>(
-    images: &[StereoImage<M>],
+    images: &[OrientedCamera<M>],
     registrations: &[&ImageRegistration],
     ties: &[TiePoint],
     intersected: &IntersectedTies,
@@ -212,7 +212,7 @@ impl<'a> Shared<'a> {
         median(values).unwrap_or_default()
     }
 
-    fn line_spacing_m<M: ExteriorOrientation>(&self, images: &[StereoImage<M>]) -> [f64; 2] {
+    fn line_spacing_m<M: ExteriorOrientation>(&self, images: &[OrientedCamera<M>]) -> [f64; 2] {
         [0, 1].map(|at| {
             let image = &images[self.pair[at]];
             self.each(|point, measures| {
@@ -223,7 +223,7 @@ impl<'a> Shared<'a> {
 
     fn compare<M: ExteriorOrientation>(
         &self,
-        images: &[StereoImage<M>],
+        images: &[OrientedCamera<M>],
         line_spacing_m: [f64; 2],
         footprints: Option<FootprintsByTies>,
         mola_spacing_m: Option<f64>,
@@ -246,7 +246,7 @@ impl<'a> Shared<'a> {
                 pixel_size_m: 0.5 * (line_spacing_m[0] + line_spacing_m[1]),
                 height_over_base,
             })
-            .map_err(|fault| fault.to_string())
+            .map_err(|error| error.to_string())
         });
         PairComparison {
             images: pair.map(|image| image.id.clone()),
@@ -262,7 +262,7 @@ impl<'a> Shared<'a> {
                 })
             }),
             residuals,
-            disagreement_m: (residuals[0].mean_x * line_spacing_m[0]
+            along_track_parallax_m: (residuals[0].mean_x * line_spacing_m[0]
                 - residuals[1].mean_x * line_spacing_m[1])
                 .abs(),
             footprints,
@@ -308,7 +308,7 @@ fn footprints_by_ties(
                 })
             })
             .collect();
-        let found = fit.disagreement(&seen);
+        let found = fit.misregistration(&seen);
         if found.lines.n == 0 {
             continue;
         }

@@ -8,7 +8,7 @@ use crate::{
     error::Result,
     frames::MarsIau2000,
     geom::{attitude::rotation_vector, mars_rotation::mars_rotation},
-    spice::{KernelView, Session, Wanted},
+    spice::{KernelView, RequiredCoverage, Session},
     stage::{Input, Inputs, Stage},
     stage_inputs,
     time::{Et, Interval, Intervals},
@@ -59,7 +59,7 @@ stage_inputs! {
 
 /// The times at which a site reads kernels; `None` while they are not known.
 #[derive(Debug, Clone, Copy)]
-pub struct Required<'a>(pub Option<&'a Wanted>);
+pub struct Required<'a>(pub Option<&'a RequiredCoverage>);
 
 impl Input for Required<'_> {
     fn add_to(&self, field: &str, inputs: &mut Inputs) {
@@ -79,7 +79,7 @@ impl Stage for DescribeKernels<'_> {
     stage_inputs!(fingerprint);
 
     fn run(&self, _stop: &AtomicBool) -> Result<KernelDescription> {
-        let nothing = Wanted::default();
+        let nothing = RequiredCoverage::default();
         let required = self.required.0.unwrap_or(&nothing);
         describe_kernels(self.kernels.session()?, required, *self.ck_tolerance_s)
     }
@@ -93,7 +93,7 @@ impl Stage for DescribeKernels<'_> {
 /// As [`Session::coverage`].
 pub fn describe_kernels(
     session: &Session,
-    required: &Wanted,
+    required: &RequiredCoverage,
     ck_tolerance_s: f64,
 ) -> Result<KernelDescription> {
     let in_use = session.coverage_in_use(required, ck_tolerance_s)?;

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use super::orientation::{InterpolationCheck, Orientation, OrientationSample};
 use crate::{
     config::OrientationConfig,
-    error::{Fault, Kind, Result},
+    error::{Cause, Kind, Result},
     geom::{
         attitude::{OmegaPhiKappa, matrix_of_rotation_vector, rotation_vector, unwrap_angles},
         ellipsoid::ray_meets_ellipsoid,
@@ -135,7 +135,7 @@ struct Undetermined {
     order: usize,
 }
 
-impl Fault for Undetermined {
+impl Cause for Undetermined {
     fn kind(&self) -> Kind {
         Kind::Input
     }

@@ -48,7 +48,7 @@ pub struct Evidence<'a> {
     pub images: &'a [JudgedImage<'a>],
     /// What is wrong with the kernels, one sentence each.
     pub warnings: &'a [String],
-    /// What was wrong with input that was read around, one sentence each.
+    /// What was wrong with skipped records, one sentence each.
     pub complaints: &'a [String],
     /// The adjustment; nothing for a site without tie points.
     pub adjustment: Option<AdjustmentEvidence<'a>>,
@@ -81,7 +81,7 @@ pub struct AdjustmentEvidence<'a> {
 }
 
 /// More tie points than this share are not left out of a sound adjustment.
-const LEFT_OUT_SHARE: f64 = 0.1;
+const REJECTED_SHARE: f64 = 0.1;
 /// An a posteriori standard deviation of unit weight above this contradicts the configured ones.
 const SIGMA0_MAX: f64 = 2.0;
 /// Fewer tie points than this do not outweigh the image coordinates of hundreds of footprints.
@@ -92,7 +92,7 @@ const APART_MAX_M: f64 = 25.0;
 
 fn is_together(pair: &PairComparison) -> bool {
     // Written so that NaN counts as apart.
-    pair.disagreement_m <= APART_MAX_M
+    pair.along_track_parallax_m <= APART_MAX_M
 }
 
 impl AdjustmentEvidence<'_> {
@@ -107,16 +107,16 @@ impl AdjustmentEvidence<'_> {
                 .collect()
         };
         let mut invalid: Vec<String> = self.images.iter().flat_map(reasons).collect();
-        let (left_out, ties) = (self.left_out(), self.ties.joining());
+        let (left_out, ties) = (self.left_out(), self.ties.multi_image());
         if 2 * left_out > ties {
             invalid.push(format!(
-                "adjustment: {left_out} of {ties} tie points were left out; ties.parquet says why"
+                "adjustment: {left_out} of {ties} tie points were rejected; ties.parquet says why"
             ));
         }
         for pair in self.pairs.iter().filter(|pair| !is_together(pair)) {
             invalid.push(format!(
                 "adjustment: tie points of {} and {} still lie {:.1} m apart along the flight, expected at most {} m",
-                pair.images[0], pair.images[1], pair.disagreement_m, APART_MAX_M
+                pair.images[0], pair.images[1], pair.along_track_parallax_m, APART_MAX_M
             ));
         }
         invalid
@@ -130,14 +130,14 @@ impl AdjustmentEvidence<'_> {
 
     /// Tie points that join images and yet took no part.
     fn left_out(&self) -> usize {
-        self.ties.joining().saturating_sub(self.taken())
+        self.ties.multi_image().saturating_sub(self.taken())
     }
 
     /// Whether the images of every pair place tie points together after the adjustment, and most of these took
     /// part in it.
     #[must_use]
     pub fn images_agree(&self) -> bool {
-        2 * self.left_out() <= self.ties.joining()
+        2 * self.left_out() <= self.ties.multi_image()
             && !self.pairs.is_empty()
             && self.pairs.iter().all(is_together)
     }
@@ -145,10 +145,10 @@ impl AdjustmentEvidence<'_> {
     /// What a reader must weigh, one sentence each.
     fn remarks(&self) -> Vec<String> {
         let mut remarks = Vec::new();
-        let (left_out, ties) = (self.left_out(), self.ties.joining());
-        if left_out as f64 > LEFT_OUT_SHARE * ties as f64 && 2 * left_out <= ties {
+        let (left_out, ties) = (self.left_out(), self.ties.multi_image());
+        if left_out as f64 > REJECTED_SHARE * ties as f64 && 2 * left_out <= ties {
             remarks.push(format!(
-                "{left_out} of {ties} tie points were left out of the adjustment; ties.parquet says why"
+                "{left_out} of {ties} tie points were rejected by the adjustment; ties.parquet says why"
             ));
         }
         let taken = self.taken();
@@ -213,9 +213,9 @@ impl Evidence<'_> {
         let mut remarks = self.warnings.to_vec();
         match self.complaints {
             [] => {}
-            [only] => remarks.push(format!("input that was read around: {only}")),
+            [only] => remarks.push(format!("skipped records: {only}")),
             [first, rest @ ..] => remarks.push(format!(
-                "input that was read around: {first} (and {} more)",
+                "skipped records: {first} (and {} more)",
                 rest.len()
             )),
         }
@@ -229,7 +229,7 @@ impl Evidence<'_> {
             .filter(|image| image.model.near_gimbal_lock);
         remarks.extend(images.map(|image| {
             format!(
-                "image {}: |cos φ| falls to {:.3}, where ω and κ are badly determined; use the rotation-vector form",
+                "image {}: |cos φ| falls to {:.3}, where ω and κ are poorly determined; use the rotation-vector form",
                 image.id, image.model.cos_phi_min
             )
         }));
@@ -258,7 +258,7 @@ fn doubt(scan: &BiasScan, configured_s: f64) -> Option<String> {
     let apart_s = (best_s - configured_s).abs();
     (apart_s > CLOCK_DOUBT_S && apart_s > CLOCK_DOUBT_SIGMA * uncertainty_s).then(|| {
         format!(
-            "its ranges want a clock correction of {best_s:+.4} ± {uncertainty_s:.4} s, not the configured \
+            "its ranges fit a clock correction of {best_s:+.4} ± {uncertainty_s:.4} s, not the configured \
              {configured_s:+.3} s"
         )
     })

@@ -2,13 +2,13 @@
 
 use super::{fit_sensor_model::SensorModel, orientation::Orientation, tag_times::ImageTimes};
 use crate::{
-    error::{Fault, Kind, Result},
+    error::{Cause, Kind, Result},
     geom::{
+        oriented_camera::OrientedCamera,
         pushbroom::{
             CameraModel, Detector, EulerPolynomial, ExteriorOrientation, Projector,
-            RotationVectorPolynomial, SampledOrientation, SamplesFault, Unseen,
+            RotationVectorPolynomial, SampledOrientation, SamplesError, Unseen,
         },
-        stereo::StereoImage,
     },
 };
 
@@ -29,13 +29,13 @@ pub struct OrientedImage<'a> {
 
 /// Samples that are no orientation.
 #[derive(Debug, thiserror::Error)]
-#[error("image {image}: {fault}")]
+#[error("image {image}: {error}")]
 struct NoOrientation {
     image: String,
-    fault: SamplesFault,
+    error: SamplesError,
 }
 
-impl Fault for NoOrientation {
+impl Cause for NoOrientation {
     fn kind(&self) -> Kind {
         Kind::Input
     }
@@ -59,9 +59,9 @@ impl<'a> OrientedImage<'a> {
         let poses: Vec<_> = samples
             .map(|sample| (sample.line_offset, sample.pose()))
             .collect();
-        let sampled = SampledOrientation::new(&poses).map_err(|fault| {
+        let sampled = SampledOrientation::new(&poses).map_err(|error| {
             let image = image.id.clone();
-            NoOrientation { image, fault }
+            NoOrientation { image, error }
         })?;
         Ok(Self {
             image,
@@ -79,10 +79,10 @@ impl<'a> OrientedImage<'a> {
         f64::from(self.image.lines_header)
     }
 
-    /// The orientation in the form `wanted`.
+    /// The orientation in the form `required`.
     #[must_use]
-    pub fn orientation(&self, wanted: CameraModel) -> &(dyn ExteriorOrientation + 'static) {
-        match wanted {
+    pub fn orientation(&self, required: CameraModel) -> &(dyn ExteriorOrientation + 'static) {
+        match required {
             CameraModel::FirstOrder => &self.first_order,
             CameraModel::SecondOrder => &self.second_order,
             CameraModel::RotationVector => &self.rotation_vector,
@@ -90,24 +90,27 @@ impl<'a> OrientedImage<'a> {
         }
     }
 
-    /// Finds lines for points with the form `wanted`.
+    /// Finds lines for points with the form `required`.
     ///
     /// # Errors
     /// An orientation that sees nothing.
     pub fn projector(
         &self,
-        wanted: CameraModel,
+        required: CameraModel,
     ) -> std::result::Result<Projector<'_, dyn ExteriorOrientation>, Unseen> {
-        let projector = Projector::new(self.orientation(wanted), self.lines())?;
+        let projector = Projector::new(self.orientation(required), self.lines())?;
         Ok(projector.through(self.detector.distortion))
     }
 
-    /// The image for intersection and adjustment, with the form `wanted`.
+    /// The image for intersection and adjustment, with the form `required`.
     #[must_use]
-    pub fn stereo(&self, wanted: CameraModel) -> StereoImage<&(dyn ExteriorOrientation + 'static)> {
-        StereoImage {
+    pub fn oriented_camera(
+        &self,
+        required: CameraModel,
+    ) -> OrientedCamera<&(dyn ExteriorOrientation + 'static)> {
+        OrientedCamera {
             id: self.image.id.clone(),
-            orientation: self.orientation(wanted),
+            orientation: self.orientation(required),
             detector: self.detector,
             lines: self.lines(),
         }

@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::{
     config::{ImageConfig, TiesConfig},
-    error::{Fault, Kind, Result},
+    error::{Cause, Kind, Result},
     files::{HashedFile, file_name},
     pds,
     stage::{InOrder, Input, Inputs, Stage},
@@ -39,7 +39,7 @@ pub struct Ties {
 
 /// Tie points that belong to other images.
 #[derive(Debug, thiserror::Error)]
-enum TiesFault {
+enum TiesError {
     #[error("no tie point file holds a measurement")]
     Empty,
     #[error("{points} tie points, none of them measured in two images of the site")]
@@ -48,7 +48,7 @@ enum TiesFault {
     NoImage { found: String, expected: String },
 }
 
-impl Fault for TiesFault {
+impl Cause for TiesError {
     fn kind(&self) -> Kind {
         Kind::Input
     }
@@ -114,13 +114,13 @@ impl Stage for ReadTies<'_> {
     }
 
     fn findings(&self, ties: &Ties) -> Vec<String> {
-        let (points, joining) = (ties.points.len(), ties.joining());
+        let (points, multi_image) = (ties.points.len(), ties.multi_image());
         let bad = match ties.complaint_count {
             0 => String::new(),
             count => format!("; {count} records that cannot be read"),
         };
         vec![format!(
-            "{points} tie points, {joining} of them in two or more images{bad}"
+            "{points} tie points, {multi_image} of them in two or more images{bad}"
         )]
     }
 }
@@ -158,9 +158,9 @@ pub fn read_ties(ties: &TiesConfig, images: &[ImageConfig]) -> Result<Ties> {
     if read.points.is_empty() {
         return Err(nothing_found(&read, &names).into());
     }
-    if read.joining() == 0 {
+    if read.multi_image() == 0 {
         let points = read.points.len();
-        return Err(TiesFault::NoneJoins { points }.into());
+        return Err(TiesError::NoneJoins { points }.into());
     }
     Ok(read)
 }
@@ -195,7 +195,7 @@ impl Ties {
         }
     }
 
-    /// What was read around, one sentence each.
+    /// What was skipped, one sentence each.
     #[must_use]
     pub fn notes(&self) -> Vec<String> {
         let elsewhere: u64 = self.elsewhere.values().sum();
@@ -217,7 +217,7 @@ impl Ties {
 
     /// Tie points measured in at least two images.
     #[must_use]
-    pub fn joining(&self) -> usize {
+    pub fn multi_image(&self) -> usize {
         let images = |tie: &&TiePoint| {
             let images: BTreeSet<usize> = tie.measures.iter().map(|m| m.image).collect();
             images.len() > 1
@@ -226,9 +226,9 @@ impl Ties {
     }
 }
 
-fn nothing_found(read: &Ties, names: &BTreeMap<&str, usize>) -> TiesFault {
+fn nothing_found(read: &Ties, names: &BTreeMap<&str, usize>) -> TiesError {
     if read.elsewhere.is_empty() {
-        return TiesFault::Empty;
+        return TiesError::Empty;
     }
     let mut found: Vec<&str> = read.elsewhere.keys().map(String::as_str).collect();
     let more = found.len().saturating_sub(NAMES_QUOTED);
@@ -237,7 +237,7 @@ fn nothing_found(read: &Ties, names: &BTreeMap<&str, usize>) -> TiesFault {
         0 => String::new(),
         more => format!(" and {more} more"),
     };
-    TiesFault::NoImage {
+    TiesError::NoImage {
         found: found.join(", ") + &more,
         expected: names.keys().copied().collect::<Vec<_>>().join(", "),
     }
@@ -279,7 +279,7 @@ mod tests {
         assert_eq!(ids, ["1", "3"]);
         let images: Vec<usize> = ties.points[0].measures.iter().map(|m| m.image).collect();
         assert_eq!(images, [0, 1]);
-        assert_eq!(ties.joining(), 1);
+        assert_eq!(ties.multi_image(), 1);
         assert_eq!(ties.elsewhere, BTreeMap::from([("C".to_owned(), 2)]));
         assert_eq!(ties.complaint_count, 1);
         assert!(ties.complaints[0].starts_with("ties.csv: record 7: "));
@@ -311,7 +311,7 @@ mod tests {
         let failure = read(TABLE, &[image("x", None), image("y", None)]).unwrap_err();
         assert_eq!(failure.kind(), Kind::Input);
         assert_eq!(
-            failure.fault.to_string(),
+            failure.cause.to_string(),
             "tie points are measured in A, B, C; expected images of the site: x, y"
         );
         let single = read(
@@ -319,12 +319,12 @@ mod tests {
             &[image("x", None), image("y", None)],
         );
         assert_eq!(
-            single.unwrap_err().fault.to_string(),
+            single.unwrap_err().cause.to_string(),
             "2 tie points, none of them measured in two images of the site"
         );
         let empty = read("point_id,serial_number,sample,line\n", &[image("x", None)]);
         assert_eq!(
-            empty.unwrap_err().fault.to_string(),
+            empty.unwrap_err().cause.to_string(),
             "no tie point file holds a measurement"
         );
     }

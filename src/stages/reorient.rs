@@ -13,13 +13,13 @@ use super::{
     tag_times::ImageTimes,
 };
 use crate::{
-    error::{Fault, Kind, Result},
+    error::{Cause, Kind, Result},
     frames::{MarsIau2000, Position, Rotation},
     geom::{
         attitude::matrix_of_rotation_vector,
         lagrange::lagrange,
         mars_rotation::mars_rotation,
-        pushbroom::{ExteriorOrientation, Pose, SampledOrientation, SamplesFault},
+        pushbroom::{ExteriorOrientation, Pose, SampledOrientation, SamplesError},
     },
     stage::{Output, Stage},
     stage_inputs,
@@ -40,15 +40,15 @@ pub struct LineCorrection {
 
 /// An orientation that cannot be corrected.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-enum ReorientFault {
+enum ReorientError {
     #[error(
-        "image {image}: lines shifted by {shift_lines:.3} lines want the orientation over {wanted}; expected within \
+        "image {image}: lines shifted by {shift_lines:.3} lines need the orientation over {required}; expected within \
          the camera tables, {known}"
     )]
     Shift {
         image: String,
         shift_lines: f64,
-        wanted: Interval,
+        required: Interval,
         known: Interval,
     },
     #[error(
@@ -62,10 +62,10 @@ enum ReorientFault {
     #[error("image {image}: camera tables with {nodes} nodes; expected at least 2")]
     NoTables { image: String, nodes: usize },
     #[error("image {image}: {source}")]
-    Samples { image: String, source: SamplesFault },
+    Samples { image: String, source: SamplesError },
 }
 
-impl Fault for ReorientFault {
+impl Cause for ReorientError {
     fn kind(&self) -> Kind {
         match self {
             Self::Shift { .. } => Kind::Input,
@@ -183,7 +183,7 @@ pub fn geometric_tables(orientation: &Orientation) -> Result<CameraTables> {
     for row in 0..tables.et_s.len() {
         let et = Et::from_seconds(tables.et_s[row]);
         let from_mars = mars_rotation::<MarsIau2000>(et).matrix().transpose();
-        let offset_rate_m_s = residual.moving(et.seconds()).1.advance_m;
+        let offset_rate_m_s = residual.pose_and_rate(et.seconds()).1.advance_m;
         let spin = tables.mars_angular_velocity_rad_s[row];
         let in_j2000_m = from_mars * offset_m(et);
         let position_m = from_mars * (nodes.camera(et).position.xyz_m + offset_m(et));
@@ -198,7 +198,7 @@ fn nodes(orientation: &Orientation) -> Result<Nodes> {
     let nodes = orientation.tables.et_s.len();
     if nodes < 2 {
         let image = orientation.image.clone();
-        return Err(ReorientFault::NoTables { image, nodes }.into());
+        return Err(ReorientError::NoTables { image, nodes }.into());
     }
     Ok(Nodes::new(&orientation.tables))
 }
@@ -222,7 +222,7 @@ fn residual(orientation: &Orientation) -> Result<SampledOrientation> {
     let samples: Vec<(f64, Pose)> = orientation.samples.iter().map(relative).collect();
     let image = orientation.image.clone();
     SampledOrientation::new(&samples)
-        .map_err(|source| ReorientFault::Samples { image, source }.into())
+        .map_err(|source| ReorientError::Samples { image, source }.into())
 }
 
 /// Which positions are asked for.
@@ -252,17 +252,17 @@ impl<F: Fn(f64) -> LineCorrection> Corrected<'_, F> {
     fn require_known(&self, tables: &CameraTables) -> Result<()> {
         let ends = [tables.et_s[0], tables.et_s[tables.et_s.len() - 1]].map(Et::from_seconds);
         let known = Interval::new(ends[0], ends[1]);
-        let wanted = self.image.exposures().shifted(self.shift_s());
+        let required = self.image.exposures().shifted(self.shift_s());
         let rounding_s = NODE_TOLERANCE * known.duration_s() / tables.et_s.len() as f64;
         let held = known.padded(rounding_s);
         // Written so that NaN is refused too.
-        if held.contains(wanted.start) && held.contains(wanted.stop) {
+        if held.contains(required.start) && held.contains(required.stop) {
             return Ok(());
         }
-        Err(ReorientFault::Shift {
+        Err(ReorientError::Shift {
             image: self.image.id.clone(),
             shift_lines: self.shift_lines,
-            wanted,
+            required,
             known,
         }
         .into())
@@ -274,7 +274,7 @@ impl<F: Fn(f64) -> LineCorrection> Corrected<'_, F> {
         let mut values = values.chain(correction.rotation_rad.iter());
         match values.find(|value| !value.is_finite()) {
             None => Ok(correction),
-            Some(value) => Err(ReorientFault::NotFinite {
+            Some(value) => Err(ReorientError::NotFinite {
                 image: self.image.id.clone(),
                 line_offset,
                 value: *value,

@@ -137,7 +137,7 @@ impl HeldAttitudes {
 
     fn reason(&self) -> String {
         format!(
-            "attitude held for up to {:.3} s beyond the C-kernels; limit {ATTITUDE_SPACING_S} s, the time between \
+            "attitude extrapolated for up to {:.3} s beyond the C-kernels; limit {ATTITUDE_SPACING_S} s, the time between \
              their samples",
             self.distance_max_s
         )
@@ -149,7 +149,7 @@ impl fmt::Display for HeldAttitudes {
         write!(
             formatter,
             "{} of {} attitudes lie outside the C-kernels' intervals, up to {:.3} s; within \
-             kernels.ck_tolerance_s the nearest one is held, though the bus turns",
+             kernels.ck_tolerance_s the nearest one is taken, though the bus turns",
             self.lookups, self.of, self.distance_max_s
         )
     }

@@ -11,7 +11,7 @@ use self::repeats::{Copies, require_distinct};
 use crate::{
     altimetry::{DatumChoice, ShotFilter},
     config::{PedrConfig, WindowConfig},
-    error::{Fault, Kind, Place, Result, Stopped},
+    error::{Cause, Kind, Locate, Result, Stopped},
     files::{HashedFile, file_name},
     footprints::{AsRead, Footprint, Footprints, SourceFile},
     frames::{MarsDatum, MarsIau2000},
@@ -35,25 +35,25 @@ const BLOCK_RECORDS: usize = 2_048;
 /// 0.003° per decade, and pole differences of 0.0006°.
 const DATUM_MARGIN_RAD: f64 = 0.3 * RADIANS_PER_DEGREE;
 
-/// Why a shot inside a window was left out; the first that applies counts.
+/// Why a shot inside a window was rejected; the first that applies counts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Reject {
+pub enum ShotRejection {
     /// No laser return.
     NoReturn,
     /// An impossible radius.
     Radius,
-    /// Classification not wanted.
+    /// Classification not accepted.
     Class,
-    /// Trigger channel not wanted.
+    /// Trigger channel not accepted.
     Channel,
-    /// Attitude flag not wanted.
+    /// Attitude flag not accepted.
     Attitude,
     /// Off-nadir angle too large.
     OffNadir,
 }
 
-impl fmt::Display for Reject {
+impl fmt::Display for ShotRejection {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         formatter.write_str(match self {
             Self::NoReturn => "no return",
@@ -75,8 +75,8 @@ pub struct SearchResult {
     pub complaints: Vec<Complaint>,
     /// All complaints by reason.
     pub complaint_counts: BTreeMap<Reason, u64>,
-    /// Shots inside a window that were left out, by reason.
-    pub rejected: BTreeMap<Reject, u64>,
+    /// Rejected shots inside a window, by reason.
+    pub rejected: BTreeMap<ShotRejection, u64>,
     /// Records looked at.
     pub frames_read: u64,
     /// Shots whose own position was tested, those of frames near a window.
@@ -90,7 +90,7 @@ pub struct SearchResult {
 #[error("{0} PEDR files; expected at most {max}", max = u16::MAX)]
 struct TooManyFiles(usize);
 
-impl Fault for TooManyFiles {
+impl Cause for TooManyFiles {
     fn kind(&self) -> Kind {
         Kind::Configuration
     }
@@ -238,7 +238,7 @@ struct Found {
     footprints: Footprints<AsRead>,
     complaints: Vec<Complaint>,
     complaint_counts: BTreeMap<Reason, u64>,
-    rejected: BTreeMap<Reject, u64>,
+    rejected: BTreeMap<ShotRejection, u64>,
     frames_read: u64,
     shots_read: u64,
 }
@@ -352,12 +352,12 @@ impl Search<'_> {
             found.frames_read += 1;
             match frame {
                 Ok(frame) => {
-                    if let Err(fault) = frame.record().check_radii() {
-                        found.complain(self.file.record_complaint(row, &fault));
+                    if let Err(error) = frame.record().check_radii() {
+                        found.complain(self.file.record_complaint(row, &error));
                     }
                     self.frame(row, &frame, &mut found);
                 }
-                Err(fault) => found.complain(self.file.record_complaint(row, &fault)),
+                Err(error) => found.complain(self.file.record_complaint(row, &error)),
             }
         }
         Ok(found)
@@ -415,24 +415,27 @@ impl Search<'_> {
         (spherical.longitude_rad, spherical.latitude.0)
     }
 
-    fn reject(&self, shot: &Footprint, frame: &Frame<'_>) -> Option<Reject> {
+    fn reject(&self, shot: &Footprint, frame: &Frame<'_>) -> Option<ShotRejection> {
         let filter = self.filter;
         let tests = [
-            (Reject::NoReturn, shot.range_m > 0.0),
+            (ShotRejection::NoReturn, shot.range_m > 0.0),
             (
-                Reject::Radius,
+                ShotRejection::Radius,
                 frame
                     .record()
                     .radius_is_possible(usize::from(shot.shot) - 1),
             ),
-            (Reject::Class, filter.classes.contains(&shot.class)),
-            (Reject::Channel, filter.channels.contains(&shot.channel)),
+            (ShotRejection::Class, filter.classes.contains(&shot.class)),
             (
-                Reject::Attitude,
+                ShotRejection::Channel,
+                filter.channels.contains(&shot.channel),
+            ),
+            (
+                ShotRejection::Attitude,
                 filter.attitude_flags.contains(&shot.attitude_flag),
             ),
             (
-                Reject::OffNadir,
+                ShotRejection::OffNadir,
                 shot.off_nadir_rad.abs() <= filter.off_nadir_max_rad,
             ),
         ];

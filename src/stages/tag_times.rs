@@ -11,7 +11,7 @@ use detector::fits_detector;
 
 use crate::{
     config::{ImageConfig, built_in_instruments, usual_instrument},
-    error::{Failure, Fault, Kind, Place, Result},
+    error::{Cause, Error, Kind, Locate, Result},
     files::HashedFile,
     geom::pushbroom::Detector,
     image::{IMAGE_DURATION_END_S, IMAGE_LINES_MIN, ImageFields, line_period_agrees},
@@ -123,7 +123,7 @@ impl ImageTimes {
 
 /// An image whose times cannot be told.
 #[derive(Debug, thiserror::Error)]
-enum ImageFault {
+enum ImageError {
     #[error("image {image}: no {key}, neither in the label nor in the configuration")]
     Missing { image: String, key: &'static str },
     #[error(
@@ -165,7 +165,7 @@ enum ImageFault {
     },
 }
 
-impl Fault for ImageFault {
+impl Cause for ImageError {
     fn kind(&self) -> Kind {
         match self {
             Self::Missing { .. } => Kind::Configuration,
@@ -232,12 +232,12 @@ fn tag_image(image: &ImageConfig, session: &Session) -> Result<ImageTimes> {
     let mut notes = Vec::new();
     let (instrument, label) = labelled(image)?;
     let fields = merged(&image.fields, label, &mut notes);
-    let place = |fault: ImageFault| match &image.label {
-        Some(path) => Failure::from(fault).in_file(path),
-        None => Failure::from(fault),
+    let place = |error: ImageError| match &image.label {
+        Some(path) => Error::from(error).in_file(path),
+        None => Error::from(error),
     };
     let missing = |key| {
-        place(ImageFault::Missing {
+        place(ImageError::Missing {
             image: image.id.clone(),
             key,
         })
@@ -245,7 +245,7 @@ fn tag_image(image: &ImageConfig, session: &Session) -> Result<ImageTimes> {
     let lines_header = fields.lines_header.ok_or_else(|| missing("lines_header"))?;
     let lines_delivered = fields.lines_delivered.unwrap_or(lines_header);
     if lines_delivered > lines_header {
-        return Err(place(ImageFault::Lines {
+        return Err(place(ImageError::Lines {
             image: image.id.clone(),
             delivered: lines_delivered,
             header: lines_header,
@@ -279,7 +279,7 @@ fn tag_image(image: &ImageConfig, session: &Session) -> Result<ImageTimes> {
     let duration_s = f64::from(lines_header) * line_period_s;
     if lines_header < IMAGE_LINES_MIN || !(line_period_s > 0.0 && duration_s < IMAGE_DURATION_END_S)
     {
-        return Err(place(ImageFault::Duration {
+        return Err(place(ImageError::Duration {
             image: image.id.clone(),
             lines: lines_header,
             line_period_s,
@@ -369,13 +369,13 @@ fn line_period(
     image: &ImageConfig,
     fields: &ImageFields,
     summing: u32,
-) -> std::result::Result<Option<(f64, f64)>, ImageFault> {
+) -> std::result::Result<Option<(f64, f64)>, ImageError> {
     let summed = |exposure_s: f64| exposure_s * f64::from(summing);
     match (fields.line_period_s, fields.exposure_s) {
         (Some(period_s), Some(exposure_s)) => {
             let computed_s = summed(exposure_s);
             if !line_period_agrees(period_s, exposure_s, summing) {
-                return Err(ImageFault::Period {
+                return Err(ImageError::Period {
                     image: image.id.clone(),
                     stated_ms: period_s / SECONDS_PER_MS,
                     exposure_ms: exposure_s / SECONDS_PER_MS,
@@ -391,7 +391,7 @@ fn line_period(
     }
 }
 
-type Start = std::result::Result<Option<(Et, StartFrom)>, ImageFault>;
+type Start = std::result::Result<Option<(Et, StartFrom)>, ImageError>;
 
 /// The clock where there is one, else UTC; both together must agree.
 fn start_time(
@@ -418,7 +418,7 @@ fn start_time(
     if let Some((utc, utc_start)) = from_utc
         && start.since(utc_start).abs() > START_TOLERANCE_S
     {
-        return Ok(Err(ImageFault::Start {
+        return Ok(Err(ImageError::Start {
             image: image.id.clone(),
             sclk: sclk.clone(),
             utc: utc.clone(),

@@ -6,7 +6,7 @@ use std::{
     path::Path,
 };
 
-use crate::error::{IoFault, Place, Result};
+use crate::error::{IoError, Locate, Result};
 
 /// How names of half-written files begin.
 pub(super) const TEMPORARY: &str = ".partial-";
@@ -18,23 +18,23 @@ pub(super) const TEMPORARY: &str = ".partial-";
 pub fn write(path: &Path, bytes: &[u8]) -> Result<()> {
     let folder = path.parent().unwrap_or(Path::new("."));
     fs::create_dir_all(folder)
-        .map_err(IoFault::on("create the folder"))
+        .map_err(IoError::on("create the folder"))
         .in_file(folder)?;
     let mut temporary = tempfile::Builder::new()
         .prefix(TEMPORARY)
         .tempfile_in(folder)
-        .map_err(IoFault::on("create a file"))
+        .map_err(IoError::on("create a file"))
         .in_file(folder)?;
     let written = temporary
         .write_all(bytes)
         .and_then(|()| temporary.as_file().sync_all());
-    written.map_err(IoFault::on("write")).in_file(path)?;
+    written.map_err(IoError::on("write")).in_file(path)?;
     make_readable(temporary.as_file())
-        .map_err(IoFault::on("set permissions of"))
+        .map_err(IoError::on("set permissions of"))
         .in_file(path)?;
     temporary
         .persist(path)
-        .map_err(|error| IoFault::on("rename into place")(error.error))
+        .map_err(|error| IoError::on("rename into place")(error.error))
         .in_file(path)?;
     sync_folder(folder);
     Ok(())
@@ -59,7 +59,7 @@ fn make_readable(_file: &File) -> std::io::Result<()> {
 pub fn sync_file(path: &Path) -> Result<()> {
     File::open(path)
         .and_then(|file| file.sync_all())
-        .map_err(IoFault::on("flush"))
+        .map_err(IoError::on("flush"))
         .in_file(path)
 }
 

@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize, de::DeserializeOwned};
 
 use super::atomic;
 use crate::{
-    error::{Fault, Kind, Place, Result},
+    error::{Cause, Kind, Locate, Result},
     stage::{Inputs, Output, Provenance, Reason},
 };
 
@@ -37,13 +37,13 @@ struct Unstorable {
     source: postcard::Error,
 }
 
-impl Fault for Unstorable {
+impl Cause for Unstorable {
     fn kind(&self) -> Kind {
         Kind::Bug
     }
 
     fn advice(&self) -> String {
-        "this is a fault of areograph; please report it with the configuration".to_owned()
+        "this is a bug in areograph; please report it with the configuration".to_owned()
     }
 }
 

@@ -9,7 +9,7 @@ use super::{
     atomic::TEMPORARY,
     publish::{CACHE, STAGING},
 };
-use crate::error::{Fault, IoFault, Kind, Place, Result};
+use crate::error::{Cause, IoError, Kind, Locate, Result};
 
 /// Held while a run works in a site's folder; the system frees it when the process ends, however it ends.
 #[derive(Debug)]
@@ -19,10 +19,10 @@ pub struct SiteLock {
 
 /// Another run is at work in the folder.
 #[derive(Debug, thiserror::Error)]
-#[error("another run is at work in this folder")]
+#[error("another run is using this folder")]
 struct Busy;
 
-impl Fault for Busy {
+impl Cause for Busy {
     fn kind(&self) -> Kind {
         Kind::Io
     }
@@ -39,11 +39,11 @@ impl SiteLock {
     /// Another process holds it, or the folder cannot be written.
     pub fn take(folder: &Path) -> Result<Self> {
         fs::create_dir_all(folder)
-            .map_err(IoFault::on("create the folder"))
+            .map_err(IoError::on("create the folder"))
             .in_file(folder)?;
         let path: PathBuf = folder.join(".lock");
         let file = File::create(&path)
-            .map_err(IoFault::on("create"))
+            .map_err(IoError::on("create"))
             .in_file(&path)?;
         match file.try_lock() {
             Ok(()) => {
@@ -54,7 +54,7 @@ impl SiteLock {
                 Ok(Self { _file: file })
             }
             Err(TryLockError::WouldBlock) => Err(Busy).in_file(folder),
-            Err(TryLockError::Error(error)) => Err(IoFault::on("lock")(error)).in_file(&path),
+            Err(TryLockError::Error(error)) => Err(IoError::on("lock")(error)).in_file(&path),
         }
     }
 }

@@ -48,7 +48,7 @@ pub struct Manifest {
     /// The largest figures of the site under the names in [`figures`]; absent when there is none.
     #[schemars(schema_with = "figures::schema")]
     pub figures: BTreeMap<String, f64>,
-    /// Shots inside a window that were left out, by reason.
+    /// Rejected shots inside a window, by reason.
     pub rejected: BTreeMap<String, u64>,
     /// What was wrong with input records.
     pub complaints: Complaints,
@@ -69,10 +69,10 @@ pub mod figures {
     pub const POSITION_RMSE_M: &str = "position_rmse_m";
     /// Largest second-order pointing RMSE of an image, radians.
     pub const POINTING_RMSE_RAD: &str = "pointing_rmse_rad";
-    /// Largest disagreement of two images along the flight at their tie points, metres.
-    pub const DISAGREEMENT_M: &str = "disagreement_m";
+    /// Largest along-track parallax of two images at their tie points, metres.
+    pub const ALONG_TRACK_PARALLAX_M: &str = "along_track_parallax_m";
     /// The same with the adjusted orientation, metres.
-    pub const ADJUSTED_DISAGREEMENT_M: &str = "adjusted_disagreement_m";
+    pub const ADJUSTED_ALONG_TRACK_PARALLAX_M: &str = "adjusted_along_track_parallax_m";
     /// A posteriori standard deviation of unit weight of the adjustment.
     pub const ADJUSTMENT_SIGMA0: &str = "adjustment_sigma0";
 
@@ -91,11 +91,11 @@ pub mod figures {
             "Largest second-order pointing RMSE of an image, radians.",
         ),
         (
-            DISAGREEMENT_M,
-            "Largest disagreement of two images along the flight at their tie points, metres.",
+            ALONG_TRACK_PARALLAX_M,
+            "Largest along-track parallax of two images at their tie points, metres.",
         ),
         (
-            ADJUSTED_DISAGREEMENT_M,
+            ADJUSTED_ALONG_TRACK_PARALLAX_M,
             "The same with the adjusted orientation, metres.",
         ),
         (
@@ -217,7 +217,7 @@ pub struct ProductEntry {
     pub rows: u64,
 }
 
-/// Complaints about input records.
+/// Problems in the input records.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub struct Complaints {
     /// How many there are.

@@ -10,14 +10,14 @@ use super::{
     atomic,
     publish::{JOURNAL, read_manifest},
 };
-use crate::error::{Fault, IoFault, Kind, Place, Result};
+use crate::error::{Cause, IoError, Kind, Locate, Result};
 
 /// File of the page over all sites, in the folder that holds the sites' folders.
 pub const SITES_PAGE: &str = "index.html";
 
 /// Why a page must not be written to a place.
 #[derive(Debug, thiserror::Error)]
-pub enum PageFault {
+pub enum PageError {
     /// Replacing it would take away something else than a file.
     #[error("is {found}; a page replaces a regular file, or nothing")]
     NotAFile {
@@ -32,7 +32,7 @@ pub enum PageFault {
     },
 }
 
-impl Fault for PageFault {
+impl Cause for PageError {
     fn kind(&self) -> Kind {
         Kind::Configuration
     }
@@ -54,7 +54,7 @@ impl PagePath {
     /// Checks the place, before the work whose result the page will show.
     ///
     /// # Errors
-    /// [`PageFault`] for what is no regular file and for products; [`IoFault`] when its folder cannot be found.
+    /// [`PageError`] for what is no regular file and for products; [`IoError`] when its folder cannot be found.
     pub fn new(path: &Path) -> Result<Self> {
         check(path).in_file(path)?;
         Ok(Self(path.to_owned()))
@@ -63,7 +63,7 @@ impl PagePath {
     /// Writes the page, whole or not at all.
     ///
     /// # Errors
-    /// As [`Self::new`], should the place have changed meanwhile; [`IoFault`] when the system refuses to write.
+    /// As [`Self::new`], should the place have changed meanwhile; [`IoError`] when the system refuses to write.
     pub fn write(&self, page: &str) -> Result<()> {
         check(&self.0).in_file(&self.0)?;
         atomic::write(&self.0, page.as_bytes())
@@ -74,10 +74,10 @@ fn check(path: &Path) -> Result<()> {
     match fs::symlink_metadata(path) {
         Ok(found) if !found.is_file() => {
             let found = kind_of(found.file_type());
-            return Err(PageFault::NotAFile { found }.into());
+            return Err(PageError::NotAFile { found }.into());
         }
         Err(error) if error.kind() != ErrorKind::NotFound => {
-            return Err(IoFault::on("look at")(error).into());
+            return Err(IoError::on("look at")(error).into());
         }
         _ => {}
     }
@@ -86,12 +86,12 @@ fn check(path: &Path) -> Result<()> {
         _ => Path::new("."),
     };
     let folder = fs::canonicalize(folder)
-        .map_err(IoFault::on("find the folder"))
+        .map_err(IoError::on("find the folder"))
         .in_file(folder)?;
     let over_all_sites = path.ends_with(SITES_PAGE) && holds_sites(&folder);
     let product_of = folder.ancestors().find(|folder| is_published(folder));
     match product_of.or(over_all_sites.then_some(&*folder)) {
-        Some(folder) => Err(PageFault::Product {
+        Some(folder) => Err(PageError::Product {
             folder: folder.to_owned(),
         }
         .into()),

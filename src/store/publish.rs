@@ -16,7 +16,7 @@ use super::{
     manifest::{Manifest, ProductEntry},
 };
 use crate::{
-    error::{Fault, IoFault, Kind, Place, Result},
+    error::{Cause, IoError, Kind, Locate, Result},
     files::{hash_file, short_hash},
 };
 
@@ -87,7 +87,7 @@ impl Drop for Staging {
 pub fn staging(site_folder: &Path) -> Result<Staging> {
     let folder = site_folder.join(STAGING);
     fs::create_dir(&folder)
-        .map_err(IoFault::on("create the folder"))
+        .map_err(IoError::on("create the folder"))
         .in_file(&folder)?;
     Ok(Staging { folder })
 }
@@ -124,7 +124,7 @@ pub fn entries(staging: &Path, files: &[(PathBuf, u64)]) -> Result<Vec<ProductEn
 /// Renames staged products into place, removes earlier ones that are no longer made, writes the manifest last.
 ///
 /// # Errors
-/// A file cannot be renamed or removed; publishing again mends the folder.
+/// A file cannot be renamed or removed; publishing again repairs the folder.
 pub fn publish(site_folder: &Path, staging: &Path, manifest: &Manifest) -> Result<()> {
     let made: BTreeSet<&str> = manifest
         .products
@@ -146,10 +146,10 @@ pub fn publish(site_folder: &Path, staging: &Path, manifest: &Manifest) -> Resul
         let target = site_folder.join(path);
         let folder = target.parent().unwrap_or(site_folder).to_owned();
         fs::create_dir_all(&folder)
-            .map_err(IoFault::on("create the folder"))
+            .map_err(IoError::on("create the folder"))
             .in_file(&folder)?;
         fs::rename(staging.join(path), &target)
-            .map_err(IoFault::on("rename into place"))
+            .map_err(IoError::on("rename into place"))
             .in_file(&target)?;
         folders.insert(folder);
     }
@@ -165,7 +165,7 @@ pub fn publish(site_folder: &Path, staging: &Path, manifest: &Manifest) -> Resul
     atomic::write(&site_folder.join(MANIFEST), &manifest_bytes(manifest)?)?;
     remove_if_there(&journal)?;
     fs::remove_dir_all(staging)
-        .map_err(IoFault::on("remove the folder"))
+        .map_err(IoError::on("remove the folder"))
         .in_file(staging)
 }
 
@@ -190,7 +190,7 @@ fn earlier_products(site_folder: &Path) -> BTreeSet<String> {
 fn remove_if_there(path: &Path) -> Result<()> {
     match fs::remove_file(path) {
         Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
-            Err(IoFault::on("remove")(error)).in_file(path)
+            Err(IoError::on("remove")(error)).in_file(path)
         }
         _ => Ok(()),
     }
@@ -201,13 +201,13 @@ fn remove_if_there(path: &Path) -> Result<()> {
 #[error("the manifest cannot be written as JSON: {0}")]
 struct Unwritable(serde_json::Error);
 
-impl Fault for Unwritable {
+impl Cause for Unwritable {
     fn kind(&self) -> Kind {
         Kind::Bug
     }
 
     fn advice(&self) -> String {
-        "this is a fault of areograph; please report it with the configuration".to_owned()
+        "this is a bug in areograph; please report it with the configuration".to_owned()
     }
 }
 

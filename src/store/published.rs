@@ -7,13 +7,13 @@ use super::{
     publish::{JOURNAL, MANIFEST, damaged, has_work, read_manifest},
 };
 use crate::{
-    error::{Fault, IoFault, Kind, Place, Result},
+    error::{Cause, IoError, Kind, Locate, Result},
     files::short_hash,
 };
 
 /// Why products in a folder are not to be used.
 #[derive(Debug, thiserror::Error)]
-pub enum PublishedFault {
+pub enum PublishedError {
     /// Nothing was published.
     #[error("there is no {MANIFEST}, so there are no products")]
     NoManifest,
@@ -39,11 +39,11 @@ pub enum PublishedFault {
         expected: String,
     },
     /// Another run published meanwhile.
-    #[error("products were published anew while they were read")]
+    #[error("products were published again while they were read")]
     Replaced,
 }
 
-impl Fault for PublishedFault {
+impl Cause for PublishedError {
     fn kind(&self) -> Kind {
         match self {
             Self::Replaced => Kind::Io,
@@ -54,13 +54,11 @@ impl Fault for PublishedFault {
     fn advice(&self) -> String {
         match self {
             Self::NoManifest => "name a site's folder of products, and run the site to the end",
-            Self::Unfinished => {
-                "wait for the run that is at work, or run the site again to mend it"
-            }
+            Self::Unfinished => "wait for the run in progress, or run the site again to repair it",
             Self::Unreadable { .. } | Self::Contradicts { .. } => {
-                "run the site again, which makes damaged products anew"
+                "run the site again, which writes damaged products again"
             }
-            Self::Replaced => "ask again when the run is over",
+            Self::Replaced => "try again when the run has finished",
         }
         .to_owned()
     }
@@ -75,25 +73,25 @@ pub fn is_site_folder(folder: &Path) -> bool {
 /// The manifest of a site's folder, every product checked against it.
 ///
 /// # Errors
-/// [`PublishedFault`], of kind input; the disk's refusal.
+/// [`PublishedError`], of kind input; the disk's refusal.
 pub fn read_published(folder: &Path) -> Result<Manifest> {
     if folder.join(JOURNAL).exists() {
-        return Err(PublishedFault::Unfinished).in_file(folder);
+        return Err(PublishedError::Unfinished).in_file(folder);
     }
     let path = folder.join(MANIFEST);
     let bytes = match fs::read(&path) {
         Err(error) if error.kind() == ErrorKind::NotFound && folder.is_dir() => {
-            return Err(PublishedFault::NoManifest).in_file(folder);
+            return Err(PublishedError::NoManifest).in_file(folder);
         }
-        read => read.map_err(IoFault::on("read")).in_file(&path)?,
+        read => read.map_err(IoError::on("read")).in_file(&path)?,
     };
     let manifest: Manifest = serde_json::from_slice(&bytes)
-        .map_err(|error| PublishedFault::Unreadable {
+        .map_err(|error| PublishedError::Unreadable {
             reason: error.to_string(),
         })
         .in_file(&path)?;
     if let Some((product, found)) = damaged(folder, &manifest).next() {
-        return Err(PublishedFault::Contradicts {
+        return Err(PublishedError::Contradicts {
             found: found?,
             expected_bytes: product.bytes,
             expected: short_hash(&product.blake3),
@@ -106,10 +104,10 @@ pub fn read_published(folder: &Path) -> Result<Manifest> {
 /// Checks that `manifest` still stands when its products have been read.
 ///
 /// # Errors
-/// [`PublishedFault::Replaced`].
+/// [`PublishedError::Replaced`].
 pub fn still_published(folder: &Path, manifest: &Manifest) -> Result<()> {
     if read_manifest(folder).as_ref() == Some(manifest) {
         return Ok(());
     }
-    Err(PublishedFault::Replaced).in_file(folder)
+    Err(PublishedError::Replaced).in_file(folder)
 }

@@ -7,7 +7,7 @@
 
 use areograph::geom::{
     bundle::{BundleImage, BundlePoint, Network, Range, View},
-    intersection::{IntersectionLimits, Sight, intersect},
+    intersection::{IntersectionLimits, Ray, intersect},
     pushbroom::{
         CorrectedOrientation, Distortion, EulerPolynomial, ExteriorOrientation,
         OrientationCorrection, Projector,
@@ -190,14 +190,10 @@ pub(crate) fn project(
     (seen.x, y_px)
 }
 
-/// A measurement for intersection, one focal pixel in both axes.
-pub(crate) fn sight(
-    image: &BundleImage<impl ExteriorOrientation>,
-    x_lines: f64,
-    y_px: f64,
-) -> Sight {
+/// A measurement for intersection, one focal-plane pixel in both axes.
+pub(crate) fn ray(image: &BundleImage<impl ExteriorOrientation>, x_lines: f64, y_px: f64) -> Ray {
     let pose = image.base.pose(x_lines);
-    Sight {
+    Ray {
         position_m: pose.position_m,
         mars_to_camera: pose.mars_to_camera,
         focal_length_px: image.focal_length_px,
@@ -364,9 +360,9 @@ impl Recipe {
                     y_px + self.tie_noise * normals.next(),
                 )
             });
-            let sights = [0, 1]
-                .map(|image| sight(&network.images[image], measured[image].0, measured[image].1));
-            let start = intersect(&sights, &IntersectionLimits::default()).unwrap();
+            let rays = [0, 1]
+                .map(|image| ray(&network.images[image], measured[image].0, measured[image].1));
+            let start = intersect(&rays, &IntersectionLimits::default()).unwrap();
             for (image, (x_lines, y_px)) in measured.into_iter().enumerate() {
                 network.views.push(View {
                     point: points_m.len(),

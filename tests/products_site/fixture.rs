@@ -19,7 +19,7 @@ use areograph::{
     },
     kernel_source::{KernelList, KernelSource},
     products::{ImageProducts, SiteProducts},
-    spice::Wanted,
+    spice::RequiredCoverage,
     stages::{
         check_ranges::{BiasScan, ProfileRanges, RangeCheck, ShotResiduals},
         convert_datum::FileConversion,
@@ -47,7 +47,7 @@ pub(crate) const START_S: f64 = -11_224_002.182_053_322;
 pub(crate) struct Site {
     pub(crate) config: SiteConfig,
     pub(crate) kernels: Vec<KernelLine>,
-    pub(crate) wanted: Wanted,
+    pub(crate) required: RequiredCoverage,
     pub(crate) times: ImageTimes,
     pub(crate) orientation: Orientation,
     pub(crate) model: SensorModel,
@@ -95,7 +95,7 @@ impl Site {
                     Some(vec![seconds(-900.0, 1.0), seconds(3.0, 900.0)]),
                 ),
             ],
-            wanted: Wanted {
+            required: RequiredCoverage {
                 positions: Intervals::union_of([seconds(-1.0, 8.0)]),
                 attitudes: Intervals::union_of([seconds(-2.15, 6.0)]),
             },
@@ -184,7 +184,7 @@ impl Site {
             config: &self.config,
             kernels: &self.kernels,
             metakernel: "KPL/MK\n",
-            wanted: &self.wanted,
+            required: &self.required,
             images: if image { &images } else { &[] },
             footprints: &self.footprints,
             utc: &self.utc,

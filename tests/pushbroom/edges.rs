@@ -3,7 +3,7 @@
 use areograph::config::usual_instrument;
 use areograph::geom::pushbroom::{
     Detector, EulerPolynomial, ExteriorOrientation, FixedPoint, FrameFirst, Limits, Pose,
-    Projector, SampledOrientation, SamplesFault, Unseen, VectorPolynomial,
+    Projector, SampledOrientation, SamplesError, Unseen, VectorPolynomial,
 };
 use nalgebra::{Matrix3, Vector3};
 
@@ -19,12 +19,12 @@ struct TurnedAround<M>(M);
 
 impl<M: ExteriorOrientation> ExteriorOrientation for TurnedAround<M> {
     fn pose(&self, x: f64) -> Pose {
-        self.moving(x).0
+        self.pose_and_rate(x).0
     }
 
-    fn moving(&self, x: f64) -> (Pose, areograph::geom::pushbroom::Motion) {
+    fn pose_and_rate(&self, x: f64) -> (Pose, areograph::geom::pushbroom::PoseRate) {
         let half_turn = Matrix3::from_diagonal(&Vector3::new(-1.0, -1.0, 1.0));
-        let (mut pose, mut motion) = self.0.moving(x);
+        let (mut pose, mut motion) = self.0.pose_and_rate(x);
         pose.mars_to_camera = half_turn * pose.mars_to_camera;
         motion.turn_rad = half_turn * motion.turn_rad;
         (pose, motion)
@@ -94,7 +94,7 @@ fn a_camera_that_flies_across_its_lines_is_refused() {
     let quarter = Matrix3::new(0.0, 1.0, 0.0, -1.0, 0.0, 0.0, 0.0, 0.0, 1.0);
     model.reference = quarter * model.reference;
     // Mars turns under the orbit: the flight is 4° off the orbit's plane, so the camera is turned on.
-    let (pose, motion) = model.moving(0.0);
+    let (pose, motion) = model.pose_and_rate(0.0);
     let flight = pose.mars_to_camera * motion.advance_m;
     let rest =
         nalgebra::Rotation3::from_axis_angle(&Vector3::z_axis(), (flight.x / flight.y).atan());
@@ -118,24 +118,24 @@ fn points_far_outside_are_still_found() {
 fn samples_that_are_no_orientation_are_told() {
     let samples = GUSEV.samples();
     let fault = |samples: &[(f64, Pose)]| SampledOrientation::new(samples).unwrap_err();
-    assert_eq!(fault(&samples[..2]), SamplesFault::TooFew(2));
+    assert_eq!(fault(&samples[..2]), SamplesError::TooFew(2));
     let mut swapped = samples.clone();
     swapped[7].0 = swapped[6].0;
     assert!(matches!(
         fault(&swapped),
-        SamplesFault::NotIncreasing { row: 7, .. }
+        SamplesError::NotIncreasing { row: 7, .. }
     ));
     let mut stretched = samples.clone();
     stretched[3].1.mars_to_camera *= 1.001;
     assert!(matches!(
         fault(&stretched),
-        SamplesFault::NotAPose { row: 3, .. }
+        SamplesError::NotAPose { row: 3, .. }
     ));
     let mut lost = samples;
     lost[4].1.position_m.y = f64::NAN;
     assert!(matches!(
         fault(&lost),
-        SamplesFault::NotAPose { row: 4, .. }
+        SamplesError::NotAPose { row: 4, .. }
     ));
 }
 

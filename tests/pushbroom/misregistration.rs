@@ -60,7 +60,7 @@ fn a_late_clock_is_seen_in_lines() {
     for (along, across, order, tolerance) in [(20, 5, 2, 0.05), (8, 4, 1, 3.0)] {
         let ties = ties(along, across);
         let fit = ImageToImage::through(&ties).unwrap();
-        let found = fit.disagreement(&footprints(72.0));
+        let found = fit.misregistration(&footprints(72.0));
         assert_eq!((fit.order(), fit.ties_rejected), (order, 0));
         // Lines and samples: what a plane transformation of this order leaves of two orbits over a sphere.
         assert!((found.lines.mean + 72.0).abs() < tolerance, "{found:?}");
@@ -84,7 +84,7 @@ fn blunders_among_the_ties_are_left_out() {
         }
     }
     let fit = ImageToImage::through(&ties).unwrap();
-    let found = fit.disagreement(&footprints(-23.5));
+    let found = fit.misregistration(&footprints(-23.5));
     assert_eq!((fit.ties, fit.ties_rejected), (95, 5));
     // Lines: the mean of a hundred waves of 0.2, and 0.05 of the transformation.
     assert!((found.lines.mean - 23.5).abs() < 0.1, "{found:?}");
@@ -103,6 +103,6 @@ fn ties_that_determine_nothing_give_nothing() {
     let mut lost = all.clone();
     lost[3].second[0] = f64::NAN;
     assert!(ImageToImage::through(&lost).is_none());
-    let found = ImageToImage::through(&all).unwrap().disagreement(&[]);
+    let found = ImageToImage::through(&all).unwrap().misregistration(&[]);
     assert_eq!((found.lines.n, found.beyond_ties), (0, 0));
 }

@@ -92,7 +92,7 @@ fn contraction_is_what_theory_says() {
         frame_first
             .solve(&point, &fine, |step| steps.push(step))
             .unwrap();
-        // ρ: line spacing on the ground over the ground size of a focal pixel.
+        // ρ: line spacing on the ground over the ground size of a focal-plane pixel.
         let next = scene.boresight_ground_m(at_s + scene.line_period_s());
         let range_m = (model.pose(x).position_m - point).norm();
         let rho = (next - point).norm() / (range_m / scene.focal_length_px());
@@ -102,7 +102,7 @@ fn contraction_is_what_theory_says() {
             "A {r_a}, ρ {rho}"
         );
 
-        let (pose, motion) = model.moving(x);
+        let (pose, motion) = model.pose_and_rate(x);
         let away_m = point - pose.position_m;
         let axis = pose.mars_to_camera.row(0);
         let turning = motion.turn_rad.cross_matrix() * pose.mars_to_camera;
@@ -227,7 +227,7 @@ fn the_corrected_table_of_2002_looks_at_nadir() {
             (off_nadir_deg - expected_deg).abs() < 1e-3,
             "{off_nadir_deg}"
         );
-        let flight = model.moving(x).1.advance_m;
+        let flight = model.pose_and_rate(x).1.advance_m;
         let forward = -pose.mars_to_camera.row(0).transpose();
         assert!((forward.dot(&flight.normalize()) - 0.997).abs() < 1e-3); // three printed digits
     }

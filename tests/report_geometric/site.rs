@@ -6,7 +6,7 @@ use areograph::{
     config::{SiteConfig, load},
     products::{GeometricProducts, ImageProducts, SiteProducts},
     report,
-    spice::{KernelSet, Wanted},
+    spice::{KernelSet, RequiredCoverage},
     stages::{
         adjust::Adjusted,
         check_ranges::RangeCheck,
@@ -125,7 +125,7 @@ impl Site {
             config: &self.config,
             kernels: &[],
             metakernel: "KPL/MK\n",
-            wanted: &Wanted::default(),
+            required: &RequiredCoverage::default(),
             images: &images,
             conversions: &self.converted.files,
             footprints: &self.converted.footprints,

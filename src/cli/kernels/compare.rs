@@ -8,13 +8,14 @@ use serde_json::{Value, json};
 use super::super::{load_sites, output};
 use crate::{
     config::usual_instrument,
-    error::{Failure, Fault, Kind},
+    error::{Cause, Error, Kind},
     flow::{
-        Compared, Request, RivalSet, compare_kernels, require_different, rival_sets, wanted_by_site,
+        Compared, Request, RivalSet, compare_kernels, require_different, required_by_site,
+        rival_sets,
     },
     geom::{polynomial::root_mean_square, statistics::Summary},
     report::{KernelComparison, comparison_page},
-    spice::{KernelSet, Session, Wanted},
+    spice::{KernelSet, RequiredCoverage, Session},
     stages::compare_kernels::{AttitudeComparison, Comparison, Size},
     store::page::PagePath,
     time::{Et, Interval, Intervals, PointingBias},
@@ -58,7 +59,7 @@ enum Usage {
     Time { written: String },
 }
 
-impl Fault for Usage {
+impl Cause for Usage {
     fn kind(&self) -> Kind {
         Kind::Configuration
     }
@@ -74,7 +75,7 @@ impl Fault for Usage {
     }
 }
 
-pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
+pub(super) fn run(arguments: &Arguments) -> Result<(), Error> {
     let page_path = arguments.page.as_deref().map(PagePath::new).transpose()?;
     let site = match &arguments.site {
         Some(path) => load_sites(std::slice::from_ref(path))?.pop(),
@@ -92,14 +93,14 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
         .map_or(usual_instrument().pointing_bias(), |site| {
             site.pointing.ck_bias
         });
-    let wanted = match (&arguments.time, &site) {
+    let required = match (&arguments.time, &site) {
         (Some(time), _) => Some(wanted_by_time(time, bias, &sets[0].kernels)?),
-        (None, Some(site)) => Some(wanted_by_site(site)?),
+        (None, Some(site)) => Some(required_by_site(site)?),
         (None, None) => None,
     };
     let request = Request {
         stage: "compare_kernels",
-        wanted: wanted.as_ref(),
+        required: required.as_ref(),
         bias,
         attitudes: true,
         clocks: site.is_some_and(|site| !site.images.is_empty()),
@@ -120,9 +121,9 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Failure> {
     Ok(())
 }
 
-fn page(compared: &Compared) -> Result<String, Failure> {
+fn page(compared: &Compared) -> Result<String, Error> {
     let mut remarks = compared.notes.clone();
-    remarks.extend(compared.left_out_lines());
+    remarks.extend(compared.uncovered_lines());
     comparison_page(&KernelComparison {
         orbit: &compared.orbit,
         attitude: compared.attitude.as_ref(),
@@ -132,7 +133,7 @@ fn page(compared: &Compared) -> Result<String, Failure> {
 }
 
 /// The sets by the names of their metakernels, by their paths where two have one name.
-fn named(paths: &[PathBuf]) -> Result<Vec<RivalSet>, Failure> {
+fn named(paths: &[PathBuf]) -> Result<Vec<RivalSet>, Error> {
     let stem = |path: &Path| path.file_stem().map(ToOwned::to_owned);
     let sets = paths.iter().map(|path| {
         let alone = paths
@@ -155,13 +156,13 @@ fn wanted_by_time(
     written: &str,
     bias: PointingBias,
     kernels: &KernelSet,
-) -> Result<Wanted, Failure> {
+) -> Result<RequiredCoverage, Error> {
     let unclear = || Usage::Time {
         written: written.to_owned(),
     };
     let (from, to) = written.split_once("..").ok_or_else(unclear)?;
     let session = Session::open(kernels)?;
-    let instant = |utc: &str| -> Result<Et, Failure> {
+    let instant = |utc: &str| -> Result<Et, Error> {
         session
             .utc_to_et(utc)
             .map_err(|failure| match failure.kind() {
@@ -174,7 +175,7 @@ fn wanted_by_time(
         return Err(unclear().into());
     }
     let span = Intervals::union_of([span]);
-    Ok(Wanted {
+    Ok(RequiredCoverage {
         attitudes: span.shifted(bias.seconds()),
         positions: span,
     })
@@ -196,7 +197,7 @@ fn print(compared: &Compared) {
         ));
         print_table(&attitude.turns, RADIANS_PER_ARCSECOND, Some(attitude));
     }
-    for line in compared.left_out_lines() {
+    for line in compared.uncovered_lines() {
         output::line(line);
     }
     for note in &compared.notes {
@@ -256,7 +257,7 @@ fn ground_size(attitude: &AttitudeComparison, set: usize) -> Option<[f64; 2]> {
 }
 
 fn answer(compared: &Compared) -> Value {
-    let left_out = compared.left_out.iter().map(|one| {
+    let uncovered = compared.uncovered.iter().map(|one| {
         json!({
             "set": one.set,
             "what": one.what,
@@ -272,7 +273,7 @@ fn answer(compared: &Compared) -> Value {
         "orbit": comparison_json(&compared.orbit, 1.0, "m"),
         "start_utc": compared.utc[0],
         "stop_utc": compared.utc[1],
-        "left_out": left_out.collect::<Vec<_>>(),
+        "left_out": uncovered.collect::<Vec<_>>(),
         "notes": compared.notes,
     });
     if let Some(attitude) = &compared.attitude {

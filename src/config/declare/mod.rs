@@ -130,7 +130,7 @@ where
 ///
 /// Each entry is `field: Type = declaration`; a key that is named differently from its field, for its
 /// unit, is given by `field as "key"`. The documentation of an entry is that of the field and of the key.
-/// `#[serde(skip)]` keeps a path out of what stages are told apart by: files enter by their content.
+/// `#[serde(skip)]` keeps a path out of what stages are distinguished by: files enter by their content.
 /// `struct Name: Trait` derives `Trait`. `check function` names what must hold between keys: `fn(&Name, &mut Keys)`.
 macro_rules! declare_table {
     (

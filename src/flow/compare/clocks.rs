@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use super::CompareFault;
+use super::CompareError;
 use crate::{error::Result, spice::Session, time::Et};
 
 /// Instants at which clocks are compared.
@@ -64,7 +64,7 @@ pub(super) fn check_clocks(
     for (reading, et) in readings {
         let apart_s = reading.et(session)?.since(*et);
         if apart_s.abs() > CLOCK_TOLERANCE_S {
-            return Err(CompareFault::Clocks {
+            return Err(CompareError::Clocks {
                 first: first.to_owned(),
                 other: other.to_owned(),
                 reading: reading.to_string(),

@@ -27,10 +27,10 @@ pub(super) fn turn_epochs(
     if !request.attitudes || !may_turn(sets, &turned, notes) {
         return (Vec::new(), Vec::new());
     }
-    let wanted = request
-        .wanted
-        .map(|wanted| wanted.attitudes.shifted(shift_s));
-    let (common, gaps) = shared(wanted.as_ref(), &turned, "attitude");
+    let required = request
+        .required
+        .map(|required| required.attitudes.shifted(shift_s));
+    let (common, gaps) = shared(required.as_ref(), &turned, "attitude");
     let positions: Vec<Intervals> = held.iter().map(|coverage| coverage.spk.clone()).collect();
     let epochs = equally_spaced(&common.intersection(&held_by_all(&positions)));
     if epochs.is_empty() {
@@ -73,14 +73,14 @@ pub(super) type Gap = (usize, &'static str, Interval);
 ///
 /// Without stated interest, what any set holds is of interest.
 pub(super) fn shared(
-    wanted: Option<&Intervals>,
+    required: Option<&Intervals>,
     held: &[Intervals],
     what: &'static str,
 ) -> (Intervals, Vec<Gap>) {
     let of_any = || Intervals::union_of(held.iter().flat_map(Intervals::as_slice).copied());
-    let wanted = wanted.map_or_else(of_any, Intervals::clone);
+    let required = required.map_or_else(of_any, Intervals::clone);
     let gaps = held.iter().enumerate().flat_map(|(set, held)| {
-        let gaps = wanted.without(held);
+        let gaps = required.without(held);
         let gaps: Vec<Gap> = gaps
             .as_slice()
             .iter()
@@ -89,7 +89,7 @@ pub(super) fn shared(
         gaps
     });
     let gaps = gaps.collect();
-    (wanted.intersection(&held_by_all(held)), gaps)
+    (required.intersection(&held_by_all(held)), gaps)
 }
 
 fn held_by_all(held: &[Intervals]) -> Intervals {

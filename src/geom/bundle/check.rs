@@ -1,11 +1,11 @@
 //! Values and indices that a network must have before anything is computed.
 
-use super::{BundleFault, Network, Part};
+use super::{BundleError, Network, Part};
 use crate::geom::pushbroom::ExteriorOrientation;
 
 /// # Errors
 /// The first value that is none, the first index without a target.
-pub(super) fn check<M: ExteriorOrientation>(network: &Network<M>) -> Result<(), BundleFault> {
+pub(super) fn check<M: ExteriorOrientation>(network: &Network<M>) -> Result<(), BundleError> {
     for (index, image) in network.images.iter().enumerate() {
         let part = Part::Image(index);
         positive(part, "half the number of lines", image.half_lines)?;
@@ -19,7 +19,7 @@ pub(super) fn check<M: ExteriorOrientation>(network: &Network<M>) -> Result<(), 
         for sigma in image.sigmas {
             deviation(part, "standard deviation of an orientation unknown", sigma)?;
         }
-        let (pose, motion) = image.base.moving(0.0);
+        let (pose, motion) = image.base.pose_and_rate(0.0);
         for vector in [pose.position_m, motion.advance_m, motion.turn_rad] {
             for component in &vector {
                 finite(part, "initial orientation", *component)?;
@@ -52,7 +52,7 @@ pub(super) fn check<M: ExteriorOrientation>(network: &Network<M>) -> Result<(), 
         matched(network, part, range.point, range.image)?;
         if range.profile >= network.range_bias_sigmas_m.len() {
             let missing = Part::Profile(range.profile);
-            return Err(BundleFault::Unmatched { part, missing });
+            return Err(BundleError::Unmatched { part, missing });
         }
         finite(part, "line", range.x_lines)?;
         positive(part, "distance", range.range_m)?;
@@ -67,11 +67,11 @@ fn value(
     value: f64,
     valid: bool,
     expected: &'static str,
-) -> Result<(), BundleFault> {
+) -> Result<(), BundleError> {
     if valid {
         Ok(())
     } else {
-        Err(BundleFault::Value {
+        Err(BundleError::Value {
             part,
             what,
             value,
@@ -80,16 +80,16 @@ fn value(
     }
 }
 
-fn positive(part: Part, what: &'static str, number: f64) -> Result<(), BundleFault> {
+fn positive(part: Part, what: &'static str, number: f64) -> Result<(), BundleError> {
     let valid = number > 0.0 && number.is_finite();
     value(part, what, number, valid, "a positive number")
 }
 
-fn finite(part: Part, what: &'static str, number: f64) -> Result<(), BundleFault> {
+fn finite(part: Part, what: &'static str, number: f64) -> Result<(), BundleError> {
     value(part, what, number, number.is_finite(), "a finite number")
 }
 
-fn deviation(part: Part, what: &'static str, sigma: f64) -> Result<(), BundleFault> {
+fn deviation(part: Part, what: &'static str, sigma: f64) -> Result<(), BundleError> {
     value(part, what, sigma, sigma >= 0.0, "0 or more")
 }
 
@@ -98,14 +98,14 @@ fn matched<M>(
     part: Part,
     point: usize,
     image: usize,
-) -> Result<(), BundleFault> {
+) -> Result<(), BundleError> {
     if point >= network.points.len() {
         let missing = Part::Point(point);
-        return Err(BundleFault::Unmatched { part, missing });
+        return Err(BundleError::Unmatched { part, missing });
     }
     if image >= network.images.len() {
         let missing = Part::Image(image);
-        return Err(BundleFault::Unmatched { part, missing });
+        return Err(BundleError::Unmatched { part, missing });
     }
     Ok(())
 }

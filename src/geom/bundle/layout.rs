@@ -4,7 +4,7 @@ use nalgebra::Vector3;
 use rayon::prelude::*;
 
 use super::{
-    Dropped, Network,
+    Network, PointRejection,
     point_rows::PointRows,
     rows::{self, Row},
     unknowns::{Columns, State},
@@ -184,14 +184,14 @@ impl<'a, M: ExteriorOrientation> Layout<'a, M> {
         rows: &mut PointRows,
         state: &State,
         point: usize,
-    ) -> Result<(), Dropped> {
+    ) -> Result<(), PointRejection> {
         self.fill(rows, state, point)
             .map_err(|unseen| match unseen {
-                Unseen::BehindCamera => Dropped::BehindCamera,
-                _ => Dropped::Unseen,
+                Unseen::BehindCamera => PointRejection::BehindCamera,
+                _ => PointRejection::Unseen,
             })?;
         if rows.weights.len() < 3 {
-            return Err(Dropped::Undetermined);
+            return Err(PointRejection::Undetermined);
         }
         // The triangle has the singular values of the rows.
         let singular_values = rows.eliminate().singular_values();
@@ -199,7 +199,7 @@ impl<'a, M: ExteriorOrientation> Layout<'a, M> {
         if singular_values.min() > DIRECTION_RATIO_MIN * singular_values.max() {
             Ok(())
         } else {
-            Err(Dropped::Undetermined)
+            Err(PointRejection::Undetermined)
         }
     }
 }

@@ -8,11 +8,11 @@
 //! deviations. Residuals are observed minus computed.
 //!
 //! A view is compared with where the unknowns project its point: the line that sees it, and the place in
-//! that line. Lines count as focal pixels, as many as they are initially.
+//! that line. Lines count as focal-plane pixels, as many as they are initially.
 //!
 //! # Source
-//! Yoon & Shan 2004. They adjust the coefficients of ω, φ and κ, which near the equator cannot be told
-//! apart; here a rotation about the camera's own axes is added to them. They state one standard deviation
+//! Yoon & Shan 2004. They adjust the coefficients of ω, φ and κ, which near the equator cannot be
+//! separated; here a rotation about the camera's own axes is added to them. They state one standard deviation
 //! an image for 18 unknowns, in metres; here each unknown has its own.
 //! Their residual along the track is the point's place in the focal plane of the measured line. An error of
 //! the line then counts as the more pixels the faster the image flies over the ground, and the adjustment
@@ -150,7 +150,7 @@ pub struct View {
     pub x_lines: f64,
     /// Measured place in the line, pixels from the principal point.
     pub y_px: f64,
-    /// Standard deviations along and across the track, focal pixels.
+    /// Standard deviations along and across the track, focal-plane pixels.
     pub sigma_px: Vector2<f64>,
 }
 
@@ -218,7 +218,7 @@ impl Default for BundleOptions {
 
 /// Why a point takes no part.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, thiserror::Error)]
-pub enum Dropped {
+pub enum PointRejection {
     /// It is observed in no two images and has no coordinates of its own.
     #[error("too few rays to determine the point")]
     Undetermined,
@@ -292,8 +292,8 @@ pub struct Adjustment {
     /// Images, in the order of the network.
     pub images: Vec<AdjustedImage>,
     /// Points, in the order of the network.
-    pub points: Vec<Result<AdjustedPoint, Dropped>>,
-    /// Residuals along and across the track of each view, focal pixels; `None` for dropped points.
+    pub points: Vec<Result<AdjustedPoint, PointRejection>>,
+    /// Residuals along and across the track of each view, focal-plane pixels; `None` for dropped points.
     pub views: Vec<Option<[Residual; 2]>>,
     /// Residuals of the ranges, metres; `None` for dropped points.
     pub ranges: Vec<Option<Residual>>,
@@ -356,7 +356,7 @@ pub enum Part {
 
 /// A network that cannot be adjusted.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum BundleFault {
+pub enum BundleError {
     /// A standard deviation, coordinate or number that is none.
     #[error("{what} of {part} is {value}, expected {expected}")]
     Value {
@@ -377,8 +377,8 @@ pub enum BundleFault {
         /// What is missing.
         missing: Part,
     },
-    /// Unknowns that nothing tells apart.
-    #[error("the network is singular: nothing tells apart {}", unknowns::names(.unknowns))]
+    /// Unknowns that the observations do not separate.
+    #[error("the network is singular: the observations do not separate {}", unknowns::names(.unknowns))]
     Singular {
         /// The weakest combination.
         unknowns: Vec<Unknown>,
@@ -391,9 +391,9 @@ pub enum BundleFault {
         /// Unknowns.
         unknowns: usize,
     },
-    /// The steps do not come to rest.
-    #[error("no rest after {steps} steps; weighted sum of squares {weighted_squares:.6e}")]
-    Unsettled {
+    /// The steps do not converge.
+    #[error("did not converge after {steps} steps; weighted sum of squares {weighted_squares:.6e}")]
+    NotConverged {
         /// Steps taken.
         steps: usize,
         /// The sum where it was given up.

@@ -4,7 +4,7 @@ use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 use rayon::prelude::*;
 
 use super::{
-    AdjustedImage, AdjustedPoint, Adjustment, Dropped, ORIENTATION_UNKNOWNS, Residual,
+    AdjustedImage, AdjustedPoint, Adjustment, ORIENTATION_UNKNOWNS, PointRejection, Residual,
     layout::Layout,
     point_rows::PointRows,
     unknowns::{State, Unknown},
@@ -24,14 +24,14 @@ struct Judged {
 pub(super) fn judge<M: ExteriorOrientation>(
     layout: &Layout<'_, M>,
     state: &State,
-    fitness: &[Result<(), Dropped>],
+    fitness: &[Result<(), PointRejection>],
     cofactors: &DMatrix<f64>,
 ) -> Adjustment {
-    let judged: Vec<Result<Judged, Dropped>> = (0..fitness.len())
+    let judged: Vec<Result<Judged, PointRejection>> = (0..fitness.len())
         .into_par_iter()
         .map_init(Default::default, |room, point| {
             fitness[point]?;
-            judge_point(layout, state, point, cofactors, room).ok_or(Dropped::Undetermined)
+            judge_point(layout, state, point, cofactors, room).ok_or(PointRejection::Undetermined)
         })
         .collect();
     let mut adjustment = Adjustment {

@@ -4,7 +4,7 @@ use nalgebra::{Matrix2x3, Vector3};
 
 use super::{BundleImage, ORIENTATION_UNKNOWNS, Range, View};
 use crate::geom::{
-    attitude::{matrix_of_rotation_vector, turn_of_rotation_vector},
+    attitude::{left_jacobian_product, matrix_of_rotation_vector},
     collinearity::by_camera_point,
     pushbroom::{
         CorrectedOrientation, ExteriorOrientation, OrientationCorrection, Sighting, Unseen,
@@ -52,7 +52,7 @@ impl Row {
 const LAST_STEP_LINES: f64 = 1e-3;
 
 /// How far a point at its initial coordinates moves along the focal plane from the measured line to the next,
-/// with the initial orientation, focal pixels.
+/// with the initial orientation, focal-plane pixels.
 ///
 /// The unit of the residuals along the track must not depend on the unknowns: a model that flies slower
 /// would make them smaller.
@@ -61,7 +61,7 @@ pub(super) fn initial_px_per_line<M: ExteriorOrientation>(
     view: &View,
     ground_m: &Vector3<f64>,
 ) -> f64 {
-    let (pose, motion) = image.base.moving(view.x_lines);
+    let (pose, motion) = image.base.pose_and_rate(view.x_lines);
     let camera_m = pose.camera_vector_m(ground_m);
     let rate_m = motion.camera_vector_rate_m(&pose, &camera_m);
     (by_camera_point_off_line(image, &camera_m) * rate_m).x
@@ -77,7 +77,7 @@ fn by_camera_point_off_line<M>(image: &BundleImage<M>, camera_m: &Vector3<f64>) 
 }
 
 /// The rows of a view of `ground_m`, along the track and across it: what was measured minus where the
-/// line that sees the point lies, `px_per_line` focal pixels each, and where in that line the point does.
+/// line that sees the point lies, `px_per_line` focal-plane pixels each, and where in that line the point does.
 pub(super) fn of_view<M: ExteriorOrientation>(
     image: &BundleImage<M>,
     correction: &OrientationCorrection,
@@ -115,7 +115,9 @@ pub(super) fn of_view<M: ExteriorOrientation>(
     let vector_rad = correction.turn_rad(x_lines);
     let by_time_m = if image.time_bias_sigma_s > 0.0 {
         // The initial orientation turns and advances under its correction.
-        let (_, motion) = image.base.moving(x_lines + correction.time_shift_lines);
+        let (_, motion) = image
+            .base
+            .pose_and_rate(x_lines + correction.time_shift_lines);
         let turn_rad = matrix_of_rotation_vector(&vector_rad) * motion.turn_rad;
         let rate_m = turn_rad.cross(&camera_m) - seen.pose.mars_to_camera * motion.advance_m;
         rate_m / image.line_period_s
@@ -130,7 +132,7 @@ pub(super) fn of_view<M: ExteriorOrientation>(
             misclosure: misclosures[axis],
             sigma: view.sigma_px[axis],
             by_point: seen.pose.mars_to_camera.tr_mul(&by_camera_point[axis]),
-            by_rotation: turn_of_rotation_vector(&-vector_rad, &by_turn),
+            by_rotation: left_jacobian_product(&-vector_rad, &by_turn),
             by_time: by_camera_point[axis].dot(&by_time_m),
             t: x_lines / image.half_lines,
         }

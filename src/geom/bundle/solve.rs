@@ -4,7 +4,7 @@ use nalgebra::{DVector, Vector3};
 use rayon::prelude::*;
 
 use super::{
-    Adjustment, BundleFault, BundleOptions, Dropped, Network,
+    Adjustment, BundleError, BundleOptions, Network, PointRejection,
     check::check,
     layout::Layout,
     point_rows::PointRows,
@@ -22,7 +22,7 @@ const STEP: f64 = 1e-8;
 /// So does a relative change of the weighted sum of squares below this.
 const CHANGE: f64 = 1e-8;
 /// The same with robust weights: how a blunder is shared between the two rays of a tie hardly changes the
-/// sum, so that the point creeps long after everything else is at rest.
+/// sum, so that the point creeps long after everything else is converged.
 const CHANGE_ROBUST: f64 = 1e-6;
 /// A relative rise of the sum below this is rounding, of positions of 4e6 m in the main.
 const ROUNDING: f64 = 1e-10;
@@ -33,17 +33,17 @@ const DAMPING: f64 = 1e-6;
 ///
 /// # Errors
 /// Values that are none, indices without a target, too few observations, a singular network, an
-/// iteration that does not settle.
+/// iteration that does not converge.
 pub fn solve<M: ExteriorOrientation>(
     network: &Network<M>,
     options: &BundleOptions,
-) -> Result<Adjustment, BundleFault> {
+) -> Result<Adjustment, BundleError> {
     check(network)?;
     let mut layout = Layout::of(network);
     let initial_m = network.points.iter().map(|point| point.ground_m).collect();
     let corrections = DVector::zeros(layout.columns.len());
     let start = State::new(network, &layout.columns, corrections, initial_m);
-    let fitness: Vec<Result<(), Dropped>> = (0..network.points.len())
+    let fitness: Vec<Result<(), PointRejection>> = (0..network.points.len())
         .into_par_iter()
         .map_init(PointRows::default, |rows, point| {
             layout.fitness(rows, &start, point)
@@ -54,7 +54,7 @@ pub fn solve<M: ExteriorOrientation>(
         .collect();
     let (observations, unknowns) = count(&layout, &active);
     if observations < unknowns || unknowns == 0 {
-        return Err(BundleFault::Underdetermined {
+        return Err(BundleError::Underdetermined {
             observations,
             unknowns,
         });
@@ -111,8 +111,8 @@ fn settle<M: ExteriorOrientation>(
     active: &[usize],
     steps_max: u32,
     history: &mut Vec<f64>,
-) -> Result<Settled, BundleFault> {
-    let reduced = reduce(layout, &start, active).map_err(|_| unsettled(history))?;
+) -> Result<Settled, BundleError> {
+    let reduced = reduce(layout, &start, active).map_err(|_| not_converged(history))?;
     // The second of two iterations begins where the first ended.
     if history.is_empty() {
         history.push(reduced.cost);
@@ -131,7 +131,7 @@ fn settle<M: ExteriorOrientation>(
         let factor = factorise(layout, &now.reduced, damping)?;
         let shared = factor.solve(&now.reduced.right);
         let (next, step) =
-            advance(layout, &now.state, active, &shared).ok_or_else(|| unsettled(history))?;
+            advance(layout, &now.state, active, &shared).ok_or_else(|| not_converged(history))?;
         let before = now.reduced.cost;
         match reduce(layout, &next, active) {
             Ok(reduced) if reduced.cost <= before * (1.0 + ROUNDING) || step < STEP => {
@@ -154,11 +154,11 @@ fn settle<M: ExteriorOrientation>(
             _ => damping = DAMPING.max(10.0 * damping),
         }
     }
-    Err(unsettled(history))
+    Err(not_converged(history))
 }
 
-fn unsettled(history: &[f64]) -> BundleFault {
-    BundleFault::Unsettled {
+fn not_converged(history: &[f64]) -> BundleError {
+    BundleError::NotConverged {
         steps: history.len().saturating_sub(1),
         weighted_squares: history.last().copied().unwrap_or_default(),
     }
@@ -168,12 +168,12 @@ fn factorise<M>(
     layout: &Layout<'_, M>,
     reduced: &Reduced,
     damping: f64,
-) -> Result<ScaledCholesky, BundleFault> {
+) -> Result<ScaledCholesky, BundleError> {
     let mut matrix = reduced.matrix.clone();
     for index in 0..matrix.nrows() {
         matrix[(index, index)] *= 1.0 + damping;
     }
-    ScaledCholesky::new(matrix).map_err(|singular| BundleFault::Singular {
+    ScaledCholesky::new(matrix).map_err(|singular| BundleError::Singular {
         unknowns: singular
             .unknowns
             .into_iter()

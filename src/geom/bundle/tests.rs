@@ -341,16 +341,16 @@ fn cofactors_of_points_equal_those_of_the_dense_equations() {
 fn what_the_network_does_not_have_is_told() {
     let mut lost = network();
     lost.views[3].point = 99;
-    let fault = solve(&lost, &BundleOptions::default()).unwrap_err();
+    let error = solve(&lost, &BundleOptions::default()).unwrap_err();
     assert_eq!(
-        fault.to_string(),
+        error.to_string(),
         "view 3 belongs to point 99, which the network does not have"
     );
     let mut lost = network();
     lost.ranges[1].profile = 7;
-    let fault = solve(&lost, &BundleOptions::default()).unwrap_err();
+    let error = solve(&lost, &BundleOptions::default()).unwrap_err();
     assert_eq!(
-        fault.to_string(),
+        error.to_string(),
         "range 1 belongs to profile 7, which the network does not have"
     );
 }

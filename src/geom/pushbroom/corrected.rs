@@ -2,13 +2,13 @@
 
 use nalgebra::Vector3;
 
-use super::{ExteriorOrientation, Motion, Pose};
-use crate::geom::attitude::{matrix_of_rotation_vector, turn_of_rotation_vector};
+use super::{ExteriorOrientation, Pose, PoseRate};
+use crate::geom::attitude::{left_jacobian_product, matrix_of_rotation_vector};
 
 /// Small polynomials of second order in `t = x/half_lines`, of position and of rotation.
 ///
 /// The rotation vector `θ(t)` has camera components: `M = exp([θ]×) M_base`, the sense of
-/// [`Motion::turn_rad`]. Hence no gimbal lock, wherever the camera looks.
+/// [`PoseRate::turn_rad`]. Hence no gimbal lock, wherever the camera looks.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct OrientationCorrection {
     /// Coefficients of `1`, `t` and `t²` of the position, Mars-fixed, metres.
@@ -96,9 +96,9 @@ impl<M: ExteriorOrientation> ExteriorOrientation for CorrectedOrientation<M> {
         self.correction.applied(x, &base)
     }
 
-    fn moving(&self, x: f64) -> (Pose, Motion) {
+    fn pose_and_rate(&self, x: f64) -> (Pose, PoseRate) {
         let correction = &self.correction;
-        let (base, motion) = self.base.moving(x + correction.time_shift_lines);
+        let (base, motion) = self.base.pose_and_rate(x + correction.time_shift_lines);
         let t = x / correction.half_lines;
         let vector_rad = value(&correction.rotation_rad, t);
         let vector_rate_rad = rate(&correction.rotation_rad, t) / correction.half_lines;
@@ -107,9 +107,9 @@ impl<M: ExteriorOrientation> ExteriorOrientation for CorrectedOrientation<M> {
             position_m: base.position_m + value(&correction.position_m, t),
             mars_to_camera: rotation * base.mars_to_camera,
         };
-        let motion = Motion {
+        let motion = PoseRate {
             advance_m: motion.advance_m + rate(&correction.position_m, t) / correction.half_lines,
-            turn_rad: turn_of_rotation_vector(&vector_rad, &vector_rate_rad)
+            turn_rad: left_jacobian_product(&vector_rad, &vector_rate_rad)
                 + rotation * motion.turn_rad,
         };
         (pose, motion)
@@ -152,7 +152,10 @@ mod tests {
     fn no_correction_changes_nothing() {
         let orientation = corrected(0.0);
         for x in [-4_000.0, 0.0, 731.5] {
-            assert_eq!(orientation.moving(x), orientation.base.moving(x));
+            assert_eq!(
+                orientation.pose_and_rate(x),
+                orientation.base.pose_and_rate(x)
+            );
             assert_eq!(orientation.pose(x), orientation.base.pose(x));
         }
     }
@@ -162,7 +165,7 @@ mod tests {
         const STEP: f64 = 1.0; // lines
         let orientation = corrected(1.0);
         for x in [-4_900.0, -3.0, 2_500.0] {
-            let (pose, motion) = orientation.moving(x);
+            let (pose, motion) = orientation.pose_and_rate(x);
             assert_eq!(pose, orientation.pose(x));
             let (before, after) = (orientation.pose(x - STEP), orientation.pose(x + STEP));
             let advance_m = (after.position_m - before.position_m) / (2.0 * STEP);

@@ -31,7 +31,7 @@ struct DistortedLine {
     /// Unit of the law per sample.
     per_sample: f64,
     /// First and last place, by the coordinate across the track.
-    ends: [Place; 2],
+    ends: [CurvePoint; 2],
 }
 
 /// The unit in which a law measures distances from the boresight, and what it makes of them.
@@ -45,7 +45,7 @@ enum Law {
 
 /// A place of the line and how it changes with the coordinate `c` across the track.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Place {
+struct CurvePoint {
     c: f64,
     along: f64,
     across: f64,
@@ -106,7 +106,7 @@ impl Distortion {
             -detector.boresight_px,
             f64::from(detector.pixels) - detector.boresight_px,
         ];
-        let nowhere = Place {
+        let nowhere = CurvePoint {
             c: 0.0,
             along: 0.0,
             across: 0.0,
@@ -206,9 +206,9 @@ impl DistortedLine {
     }
 
     /// The place with coordinate `c`, by the law.
-    fn within(&self, c: f64) -> Place {
+    fn within(&self, c: f64) -> CurvePoint {
         let [scale, rate] = self.scale(c.hypot(self.along));
-        Place {
+        CurvePoint {
             c,
             along: self.along * scale,
             across: c * scale,
@@ -218,7 +218,7 @@ impl DistortedLine {
     }
 
     /// The same, beyond the ends straight on.
-    fn at(&self, c: f64) -> Place {
+    fn at(&self, c: f64) -> CurvePoint {
         let [first, last] = &self.ends;
         let end = if c < first.c {
             first
@@ -227,7 +227,7 @@ impl DistortedLine {
         } else {
             return self.within(c);
         };
-        Place {
+        CurvePoint {
             c,
             along: end.along + end.along_by_c * (c - end.c),
             across: end.across + end.across_by_c * (c - end.c),

@@ -42,7 +42,7 @@ pub use models::{CameraModel, EulerPolynomial, RotationVectorPolynomial, VectorP
 pub(super) use newton::missed_m;
 pub use newton::{Projector, Sighting};
 pub use published::{FixedPoint, FrameFirst, Limits, Solution};
-pub use sampled::{SampledOrientation, SamplesFault};
+pub use sampled::{SampledOrientation, SamplesError};
 
 /// Where the camera is and looks while one line is exposed.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -55,7 +55,7 @@ pub struct Pose {
 
 /// How a [`Pose`] changes from line to line.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Motion {
+pub struct PoseRate {
     /// `dC/dx`, Mars-fixed, metres per line.
     pub advance_m: Vector3<f64>,
     /// `Ω` with `dM/dx = [Ω]× M`, camera components, radians per line.
@@ -68,7 +68,7 @@ pub trait ExteriorOrientation: Sync {
     fn pose(&self, x: f64) -> Pose;
 
     /// The pose with its change per line.
-    fn moving(&self, x: f64) -> (Pose, Motion);
+    fn pose_and_rate(&self, x: f64) -> (Pose, PoseRate);
 }
 
 impl<M: ExteriorOrientation + ?Sized> ExteriorOrientation for &M {
@@ -76,8 +76,8 @@ impl<M: ExteriorOrientation + ?Sized> ExteriorOrientation for &M {
         (**self).pose(x)
     }
 
-    fn moving(&self, x: f64) -> (Pose, Motion) {
-        (**self).moving(x)
+    fn pose_and_rate(&self, x: f64) -> (Pose, PoseRate) {
+        (**self).pose_and_rate(x)
     }
 }
 
@@ -115,7 +115,7 @@ impl Pose {
     }
 }
 
-impl Motion {
+impl PoseRate {
     /// `dq/dx` of the camera vector `camera_m` of a fixed point, metres per line.
     #[must_use]
     pub fn camera_vector_rate_m(&self, pose: &Pose, camera_m: &Vector3<f64>) -> Vector3<f64> {
@@ -131,7 +131,7 @@ const ALONG_SHARE_MIN: f64 = 0.01;
 /// # Errors
 /// [`Unseen::AcrossFlight`], [`Unseen::NotFinite`].
 fn flight_sense(model: &(impl ExteriorOrientation + ?Sized)) -> Result<f64, Unseen> {
-    let (pose, motion) = model.moving(0.0);
+    let (pose, motion) = model.pose_and_rate(0.0);
     let along_m = (pose.mars_to_camera * motion.advance_m).x;
     if !along_m.is_finite() {
         return Err(Unseen::NotFinite);

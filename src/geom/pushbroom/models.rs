@@ -4,9 +4,9 @@ use nalgebra::{Matrix3, Vector3};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::{ExteriorOrientation, Motion, PolynomialPath, Pose};
+use super::{ExteriorOrientation, PolynomialPath, Pose, PoseRate};
 use crate::geom::{
-    attitude::{matrix_of_rotation_vector, turn_of_rotation_vector},
+    attitude::{left_jacobian_product, matrix_of_rotation_vector},
     polynomial::Polynomial,
 };
 
@@ -149,13 +149,13 @@ impl ExteriorOrientation for EulerPolynomial {
         }
     }
 
-    fn moving(&self, x: f64) -> (Pose, Motion) {
+    fn pose_and_rate(&self, x: f64) -> (Pose, PoseRate) {
         let rotation = EulerRotation::of(&self.angles_rad.value(x));
         let pose = Pose {
             position_m: self.path_m.value(x),
             mars_to_camera: rotation.mars_to_camera(),
         };
-        let motion = Motion {
+        let motion = PoseRate {
             advance_m: self.path_m.rate(x),
             turn_rad: rotation.turn_rad(&self.angles_rad.rate(x)),
         };
@@ -177,10 +177,10 @@ impl ExteriorOrientation for RotationVectorPolynomial {
         }
     }
 
-    fn moving(&self, x: f64) -> (Pose, Motion) {
-        let motion = Motion {
+    fn pose_and_rate(&self, x: f64) -> (Pose, PoseRate) {
+        let motion = PoseRate {
             advance_m: self.path_m.rate(x),
-            turn_rad: turn_of_rotation_vector(&self.vector_rad.value(x), &self.vector_rad.rate(x)),
+            turn_rad: left_jacobian_product(&self.vector_rad.value(x), &self.vector_rad.rate(x)),
         };
         (self.pose(x), motion)
     }

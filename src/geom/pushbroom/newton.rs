@@ -37,7 +37,7 @@ impl Sighting {
         last_step_lines: f64,
     ) -> Result<Self, Unseen> {
         for evaluations in 1..=EVALUATIONS_MAX {
-            let (pose, motion) = model.moving(x);
+            let (pose, motion) = model.pose_and_rate(x);
             let camera_m = pose.camera_vector_m(point_m);
             let rate_m = motion.camera_vector_rate_m(&pose, &camera_m);
             let [missed_m, missed_rate_m] = missed_m(distortion, &camera_m, &rate_m);
@@ -109,7 +109,7 @@ struct Node {
 
 impl Node {
     fn of(model: &(impl ExteriorOrientation + ?Sized), x: f64) -> Self {
-        let (pose, motion) = model.moving(x);
+        let (pose, motion) = model.pose_and_rate(x);
         let m = &pose.mars_to_camera;
         let turn = &motion.turn_rad;
         let axis = m.row(0).transpose();

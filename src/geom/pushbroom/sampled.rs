@@ -2,8 +2,8 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::{ExteriorOrientation, Motion, Pose};
-use crate::geom::attitude::{matrix_of_rotation_vector, rotation_vector, turn_of_rotation_vector};
+use super::{ExteriorOrientation, Pose, PoseRate};
+use crate::geom::attitude::{left_jacobian_product, matrix_of_rotation_vector, rotation_vector};
 
 /// Orientation that agrees with every one of its samples.
 ///
@@ -32,7 +32,7 @@ struct Curve {
 
 /// Samples that are no orientation.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
-pub enum SamplesFault {
+pub enum SamplesError {
     /// Fewer than three.
     #[error("{0} orientation samples; expected at least 3")]
     TooFew(usize),
@@ -64,9 +64,9 @@ impl SampledOrientation {
     ///
     /// # Errors
     /// Fewer than three samples, lines that do not increase, poses that are none.
-    pub fn new(samples: &[(f64, Pose)]) -> Result<Self, SamplesFault> {
+    pub fn new(samples: &[(f64, Pose)]) -> Result<Self, SamplesError> {
         if samples.len() < 3 {
-            return Err(SamplesFault::TooFew(samples.len()));
+            return Err(SamplesError::TooFew(samples.len()));
         }
         for (row, (_, pose)) in samples.iter().enumerate() {
             let matrix = &pose.mars_to_camera;
@@ -78,14 +78,14 @@ impl SampledOrientation {
                 && skew <= ROTATION_TOLERANCE
                 && pose.position_m.iter().all(|value| value.is_finite());
             if !rotates {
-                return Err(SamplesFault::NotAPose { row, determinant });
+                return Err(SamplesError::NotAPose { row, determinant });
             }
         }
         for (row, pair) in samples.windows(2).enumerate() {
             let (before, x) = (pair[0].0, pair[1].0);
             if !(before < x && before.is_finite() && x.is_finite()) {
                 let row = row + 1;
-                return Err(SamplesFault::NotIncreasing { row, x, before });
+                return Err(SamplesError::NotIncreasing { row, x, before });
             }
         }
         let reference = samples[samples.len() / 2].1.mars_to_camera;
@@ -157,18 +157,18 @@ impl Curve {
 
 impl ExteriorOrientation for SampledOrientation {
     fn pose(&self, x: f64) -> Pose {
-        self.moving(x).0
+        self.pose_and_rate(x).0
     }
 
-    fn moving(&self, x: f64) -> (Pose, Motion) {
+    fn pose_and_rate(&self, x: f64) -> (Pose, PoseRate) {
         let (position_m, vector_rad) = self.curves(x);
         let pose = Pose {
             position_m: position_m.value,
             mars_to_camera: matrix_of_rotation_vector(&vector_rad.value) * self.reference,
         };
-        let motion = Motion {
+        let motion = PoseRate {
             advance_m: position_m.slope,
-            turn_rad: turn_of_rotation_vector(&vector_rad.value, &vector_rad.slope),
+            turn_rad: left_jacobian_product(&vector_rad.value, &vector_rad.slope),
         };
         (pose, motion)
     }

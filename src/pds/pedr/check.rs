@@ -49,7 +49,7 @@ pub enum Reason {
 
 /// An impossible value in a record.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
-pub enum RecordFault {
+pub enum RecordError {
     /// The double is no number.
     #[error("time is {0}; expected seconds past J2000")]
     NoTime(f64),
@@ -92,7 +92,7 @@ pub enum RecordFault {
     },
 }
 
-impl RecordFault {
+impl RecordError {
     /// The code under which it is counted.
     #[must_use]
     pub const fn reason(&self) -> Reason {
@@ -127,26 +127,26 @@ impl Record {
     ///
     /// # Errors
     /// The first impossible value.
-    pub(super) fn check(&self, mapping_orbit: bool) -> Result<(), RecordFault> {
+    pub(super) fn check(&self, mapping_orbit: bool) -> Result<(), RecordError> {
         let time_s = self.time_s.get();
         if !time_s.is_finite() {
-            return Err(RecordFault::NoTime(time_s));
+            return Err(RecordError::NoTime(time_s));
         }
         let fraction_s = f64::from(self.time_fraction_us.get()) * 1e-6;
         let integers_s = f64::from(self.time_whole_s.get()) + fraction_s;
         if (time_s - integers_s).abs() > TIMES_AGREE_S {
-            return Err(RecordFault::TwoTimes { time_s, integers_s });
+            return Err(RecordError::TwoTimes { time_s, integers_s });
         }
         let frequency_hz = self.clock_frequency_hz.get();
         if !FREQUENCY_HZ.contains(&frequency_hz) {
-            return Err(RecordFault::Frequency(frequency_hz));
+            return Err(RecordError::Frequency(frequency_hz));
         }
         for (whose, microdegrees) in [
             ("ground", self.ground_latitude_microdegrees.get()),
             ("spacecraft", self.spacecraft_latitude_microdegrees.get()),
         ] {
             if !LATITUDE.contains(&microdegrees) {
-                return Err(RecordFault::Latitude {
+                return Err(RecordError::Latitude {
                     whose,
                     microdegrees,
                 });
@@ -159,7 +159,7 @@ impl Record {
         };
         let radius_cm = self.spacecraft_radius_cm.get();
         if !orbit_cm.contains(&radius_cm) {
-            return Err(RecordFault::SpacecraftRadius(radius_cm, mapping_orbit));
+            return Err(RecordError::SpacecraftRadius(radius_cm, mapping_orbit));
         }
         Ok(())
     }
@@ -169,20 +169,20 @@ impl Record {
     ///
     /// # Errors
     /// The first impossible radius.
-    pub fn check_radii(&self) -> Result<(), RecordFault> {
+    pub fn check_radii(&self) -> Result<(), RecordError> {
         let mut any = false;
         for (shot, radius_cm) in (1..).zip(self.shot_radius_cm) {
             if self.returned(usize::from(shot) - 1) {
                 any = true;
                 let centimetres = radius_cm.get();
                 if !RADIUS_CM.contains(&centimetres) {
-                    return Err(RecordFault::Radius { shot, centimetres });
+                    return Err(RecordError::Radius { shot, centimetres });
                 }
             }
         }
         let centimetres = self.mid_radius_cm.get();
         if any && !RADIUS_CM.contains(&centimetres) {
-            return Err(RecordFault::Radius {
+            return Err(RecordError::Radius {
                 shot: 0,
                 centimetres,
             });
@@ -266,11 +266,11 @@ mod tests {
     fn said(spoil: impl Fn(&mut Record)) -> (Reason, String) {
         let mut record = good();
         spoil(&mut record);
-        let fault = record
+        let error = record
             .check(true)
             .and_then(|()| record.check_radii())
             .unwrap_err();
-        (fault.reason(), fault.to_string())
+        (error.reason(), error.to_string())
     }
 
     #[test]
@@ -339,7 +339,7 @@ mod tests {
     #[test]
     fn impossible_times_are_told_in_few_digits() {
         let told = |time_s| {
-            RecordFault::TwoTimes {
+            RecordError::TwoTimes {
                 time_s,
                 integers_s: 4.5,
             }

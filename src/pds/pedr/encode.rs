@@ -5,7 +5,7 @@ use zerocopy::{
     byteorder::big_endian::{F64, I16, I32, U16, U32},
 };
 
-use super::{EncodeFault, FrameValues, PARALLAX_UNIT_RAD_PER_M, Record, SHOTS};
+use super::{EncodeError, FrameValues, PARALLAX_UNIT_RAD_PER_M, Record, SHOTS};
 use crate::units::{METRES_PER_CM, RADIANS_PER_MICRODEGREE};
 
 /// Radians in the angle unit of the illumination fields.
@@ -20,7 +20,7 @@ impl Record {
     ///
     /// # Errors
     /// A value that is not finite or does not fit its field.
-    pub fn from_frame(values: &FrameValues) -> Result<Self, EncodeFault> {
+    pub fn from_frame(values: &FrameValues) -> Result<Self, EncodeError> {
         let mut record = Self::new_zeroed();
         record.put_time(values)?;
         record.put_positions(values)?;
@@ -30,7 +30,7 @@ impl Record {
         Ok(record)
     }
 
-    fn put_time(&mut self, values: &FrameValues) -> Result<(), EncodeFault> {
+    fn put_time(&mut self, values: &FrameValues) -> Result<(), EncodeError> {
         let time_s = values.time_s;
         // Truncation gives both integers the sign of the time, as the archive has them before J2000.
         let whole_s = time_s.trunc();
@@ -46,7 +46,7 @@ impl Record {
         Ok(())
     }
 
-    fn put_positions(&mut self, values: &FrameValues) -> Result<(), EncodeFault> {
+    fn put_positions(&mut self, values: &FrameValues) -> Result<(), EncodeError> {
         self.spacecraft_longitude_microdegrees =
             longitude("spacecraft_longitude_rad", values.spacecraft_longitude_rad)?;
         self.spacecraft_latitude_microdegrees =
@@ -72,7 +72,7 @@ impl Record {
         Ok(())
     }
 
-    fn put_ground(&mut self, values: &FrameValues) -> Result<(), EncodeFault> {
+    fn put_ground(&mut self, values: &FrameValues) -> Result<(), EncodeError> {
         self.ground_longitude_microdegrees =
             longitude("ground_longitude_rad", values.ground_longitude_rad)?;
         self.ground_latitude_microdegrees =
@@ -108,7 +108,7 @@ impl Record {
         Ok(())
     }
 
-    fn put_shots(&mut self, values: &FrameValues) -> Result<(), EncodeFault> {
+    fn put_shots(&mut self, values: &FrameValues) -> Result<(), EncodeError> {
         for shot in 0..SHOTS {
             self.shot_radius_cm[shot] = centimetres("shot_radius_m", values.shot_radius_m[shot])?;
             self.range_cm[shot] = centimetres("range_m", values.range_m[shot])?;
@@ -133,7 +133,7 @@ impl Record {
         Ok(())
     }
 
-    fn put_flags(&mut self, values: &FrameValues) -> Result<(), EncodeFault> {
+    fn put_flags(&mut self, values: &FrameValues) -> Result<(), EncodeError> {
         if !(1..=7).contains(&values.frame_index) {
             let expected = "1 to 7".to_owned();
             return Err(fault(
@@ -169,8 +169,8 @@ impl Record {
     }
 }
 
-fn fault(field: &'static str, value: f64, expected: String) -> EncodeFault {
-    EncodeFault {
+fn fault(field: &'static str, value: f64, expected: String) -> EncodeError {
+    EncodeError {
         field,
         value,
         expected,
@@ -183,7 +183,7 @@ fn counts(
     value: f64,
     unit: f64,
     [least, most]: [f64; 2],
-) -> Result<f64, EncodeFault> {
+) -> Result<f64, EncodeError> {
     let counts = (value / unit).round();
     if (least..=most).contains(&counts) {
         return Ok(counts);
@@ -199,7 +199,7 @@ fn counts(
     clippy::cast_possible_truncation,
     reason = "counts() checked the range"
 )]
-fn scaled_i32(field: &'static str, value: f64, unit: f64) -> Result<i32, EncodeFault> {
+fn scaled_i32(field: &'static str, value: f64, unit: f64) -> Result<i32, EncodeError> {
     counts(
         field,
         value,
@@ -213,7 +213,7 @@ fn scaled_i32(field: &'static str, value: f64, unit: f64) -> Result<i32, EncodeF
     clippy::cast_possible_truncation,
     reason = "counts() checked the range"
 )]
-fn to_i16(field: &'static str, value: f64, unit: f64) -> Result<i16, EncodeFault> {
+fn to_i16(field: &'static str, value: f64, unit: f64) -> Result<i16, EncodeError> {
     counts(
         field,
         value,
@@ -228,7 +228,7 @@ fn to_i16(field: &'static str, value: f64, unit: f64) -> Result<i16, EncodeFault
     clippy::cast_sign_loss,
     reason = "counts() checked the range"
 )]
-fn to_u32(field: &'static str, value: f64, unit: f64) -> Result<u32, EncodeFault> {
+fn to_u32(field: &'static str, value: f64, unit: f64) -> Result<u32, EncodeError> {
     counts(field, value, unit, [0.0, f64::from(u32::MAX)]).map(|counts| counts as u32)
 }
 
@@ -237,31 +237,31 @@ fn to_u32(field: &'static str, value: f64, unit: f64) -> Result<u32, EncodeFault
     clippy::cast_sign_loss,
     reason = "counts() checked the range"
 )]
-fn to_u16(field: &'static str, value: f64, unit: f64) -> Result<u16, EncodeFault> {
+fn to_u16(field: &'static str, value: f64, unit: f64) -> Result<u16, EncodeError> {
     counts(field, value, unit, [0.0, f64::from(u16::MAX)]).map(|counts| counts as u16)
 }
 
 /// An integer that is already in the unit of the file; messages show `value`.
-fn to_i32(field: &'static str, value: f64, integer: f64) -> Result<i32, EncodeFault> {
-    scaled_i32(field, integer, 1.0).map_err(|fault| EncodeFault { value, ..fault })
+fn to_i32(field: &'static str, value: f64, integer: f64) -> Result<i32, EncodeError> {
+    scaled_i32(field, integer, 1.0).map_err(|fault| EncodeError { value, ..fault })
 }
 
-fn centimetres(field: &'static str, value_m: f64) -> Result<I32, EncodeFault> {
+fn centimetres(field: &'static str, value_m: f64) -> Result<I32, EncodeError> {
     scaled_i32(field, value_m, METRES_PER_CM).map(I32::new)
 }
 
-fn microdegrees(field: &'static str, angle_rad: f64) -> Result<I32, EncodeFault> {
+fn microdegrees(field: &'static str, angle_rad: f64) -> Result<I32, EncodeError> {
     scaled_i32(field, angle_rad, RADIANS_PER_MICRODEGREE).map(I32::new)
 }
 
 /// East longitude, brought into `0..360` degrees.
-fn longitude(field: &'static str, longitude_rad: f64) -> Result<I32, EncodeFault> {
+fn longitude(field: &'static str, longitude_rad: f64) -> Result<I32, EncodeError> {
     let microdegrees = scaled_i32(field, longitude_rad, RADIANS_PER_MICRODEGREE)?;
     Ok(I32::new(microdegrees.rem_euclid(TURN_MICRODEGREES)))
 }
 
 /// Latitude, within 90 degrees of the equator.
-fn latitude(field: &'static str, latitude_rad: f64) -> Result<I32, EncodeFault> {
+fn latitude(field: &'static str, latitude_rad: f64) -> Result<I32, EncodeError> {
     counts(field, latitude_rad, RADIANS_PER_MICRODEGREE, [-9e7, 9e7])?;
     microdegrees(field, latitude_rad)
 }

@@ -10,10 +10,10 @@ use memmap2::Mmap;
 
 use super::{
     Complaint, FieldGuard, FileName, Frame, LABEL_BYTES, LABEL_RECORDS, PedrLabel, RECORD_BYTES,
-    Reason, Record, RecordFault, check::out_of_order,
+    Reason, Record, RecordError, check::out_of_order,
 };
 use crate::{
-    error::{Fault, IoFault, Kind, Place, Result},
+    error::{Cause, IoError, Kind, Locate, Result},
     files::file_name,
 };
 
@@ -49,7 +49,7 @@ impl Deref for Bytes {
 #[error("not a regular file")]
 struct NotAFile;
 
-impl Fault for NotAFile {
+impl Cause for NotAFile {
     fn kind(&self) -> Kind {
         Kind::Input
     }
@@ -66,7 +66,7 @@ struct NoGoodRecord {
     why: String,
 }
 
-impl Fault for NoGoodRecord {
+impl Cause for NoGoodRecord {
     fn kind(&self) -> Kind {
         Kind::Input
     }
@@ -84,13 +84,13 @@ impl File {
     pub fn open(path: &Path) -> Result<Self> {
         // Asked before opening: opening a pipe would wait for its writer.
         let metadata = fs::metadata(path)
-            .map_err(IoFault::on("open"))
+            .map_err(IoError::on("open"))
             .in_file(path)?;
         if !metadata.is_file() {
             return Err(NotAFile).in_file(path);
         }
         let file = fs::File::open(path)
-            .map_err(IoFault::on("open"))
+            .map_err(IoError::on("open"))
             .in_file(path)?;
         #[allow(
             unsafe_code,
@@ -100,7 +100,7 @@ impl File {
         // and archive files are not written while they are read. Whoever truncates one nevertheless
         // ends the process with SIGBUS, the usual price of a mapping; it cannot corrupt the file.
         let map = unsafe { Mmap::map(&file) };
-        let map = map.map_err(IoFault::on("map")).in_file(path)?;
+        let map = map.map_err(IoError::on("map")).in_file(path)?;
         Ok(Self::new(Bytes::Mapped(map), path.to_owned()))
     }
 
@@ -132,7 +132,7 @@ impl File {
         }
         match PedrLabel::parse(&self.bytes) {
             Ok(label) => self.label = label,
-            Err(fault) => self.complain_of_label(Reason::UnreadableLabel, fault.to_string()),
+            Err(error) => self.complain_of_label(Reason::UnreadableLabel, error.to_string()),
         }
         let records = LABEL_RECORDS as u64 + self.records().len() as u64;
         if let Some(stated) = self.label.file_records.filter(|stated| *stated != records) {
@@ -180,7 +180,7 @@ impl File {
         let trailing = data.len() % RECORD_BYTES;
         (trailing > 0).then(|| {
             let text =
-                format!("{trailing} bytes after the last whole record of {RECORD_BYTES}; left out");
+                format!("{trailing} bytes after the last whole record of {RECORD_BYTES}; ignored");
             self.complaint(
                 Some(Self::record_number(self.records().len())),
                 Reason::TrailingBytes,
@@ -191,11 +191,11 @@ impl File {
 
     /// The complaint of the record in row `row`, counted from 0.
     #[must_use]
-    pub fn record_complaint(&self, row: usize, fault: &RecordFault) -> Complaint {
+    pub fn record_complaint(&self, row: usize, error: &RecordError) -> Complaint {
         self.complaint(
             Some(Self::record_number(row)),
-            fault.reason(),
-            fault.to_string(),
+            error.reason(),
+            error.to_string(),
         )
     }
 
@@ -219,8 +219,8 @@ impl File {
         let label = self.label_complaints.first();
         let why = match (label, first) {
             (Some(complaint), _) => complaint.text.clone(),
-            (None, Some((row, Err(fault)))) => {
-                format!("record {}: {fault}", Self::record_number(row))
+            (None, Some((row, Err(error)))) => {
+                format!("record {}: {error}", Self::record_number(row))
             }
             _ => format!("nothing of {RECORD_BYTES} bytes follows the label"),
         };
@@ -239,7 +239,7 @@ impl File {
         &self,
         rows: Range<usize>,
         guard: FieldGuard,
-    ) -> impl Iterator<Item = (usize, std::result::Result<Frame<'_>, RecordFault>)> {
+    ) -> impl Iterator<Item = (usize, std::result::Result<Frame<'_>, RecordError>)> {
         let end = rows.end.min(self.records().len());
         (rows.start..end)
             .zip(self.records().get(rows.start..end).unwrap_or_default())
@@ -251,7 +251,7 @@ impl File {
         row: usize,
         record: &'a Record,
         guard: FieldGuard,
-    ) -> std::result::Result<Frame<'a>, RecordFault> {
+    ) -> std::result::Result<Frame<'a>, RecordError> {
         record.check(self.is_mapping())?;
         let time_s = |row: Option<usize>| Some(self.sound_record(row?)?.time_s.get());
         let neighbours_s = [
@@ -261,7 +261,7 @@ impl File {
             time_s(row.checked_add(1)),
         ];
         if out_of_order(neighbours_s) {
-            return Err(RecordFault::Order(record.time_s.get()));
+            return Err(RecordError::Order(record.time_s.get()));
         }
         Ok(Frame::new(
             record,

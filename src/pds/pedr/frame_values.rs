@@ -1,12 +1,12 @@
 //! Physical values of a frame, as a writer knows them.
 
 use super::SHOTS;
-use crate::error::{Fault, Kind};
+use crate::error::{Cause, Kind};
 
 /// A value does not fit its field of the record.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error("{field} is {value}; expected {expected}")]
-pub struct EncodeFault {
+pub struct EncodeError {
     /// The field.
     pub field: &'static str,
     /// Its value in SI units.
@@ -15,7 +15,7 @@ pub struct EncodeFault {
     pub expected: String,
 }
 
-impl Fault for EncodeFault {
+impl Cause for EncodeError {
     fn kind(&self) -> Kind {
         Kind::Input
     }

@@ -5,9 +5,9 @@ use std::path::Path;
 use super::{LABEL_BYTES, RECORD_BYTES};
 use crate::{
     altimetry::DatumChoice,
-    error::{Fault, Kind},
+    error::{Cause, Kind},
     frames::MarsDatum,
-    pds::label::{Label, LabelFault, parse},
+    pds::label::{Label, LabelError, parse},
 };
 
 /// The parts of a name `AP#####v.B`, in upper or lower case.
@@ -65,7 +65,7 @@ impl PedrLabel {
     ///
     /// # Errors
     /// No assignment within the label's ten records.
-    pub fn parse(bytes: &[u8]) -> Result<Self, LabelFault> {
+    pub fn parse(bytes: &[u8]) -> Result<Self, LabelError> {
         let bytes = &bytes[..bytes.len().min(LABEL_BYTES)];
         let label = parse(bytes)?;
         let text = |key: &str| label.find(key).map(|entry| entry.value.clone());
@@ -99,11 +99,11 @@ fn software_version(bytes: &[u8], label: &Label) -> Option<f64> {
 
 /// The datum in the entries about coordinates, or else anywhere in the label.
 fn named_datum(label: &Label) -> Option<MarsDatum> {
-    let only = |wanted: &str| {
+    let only = |required: &str| {
         let mut named: Vec<MarsDatum> = label
             .entries
             .iter()
-            .filter(|entry| entry.key.contains(wanted))
+            .filter(|entry| entry.key.contains(required))
             .flat_map(|entry| datums_in(&entry.value))
             .collect();
         named.dedup();
@@ -127,7 +127,7 @@ fn datums_in(text: &str) -> Vec<MarsDatum> {
 
 /// The datum of a file cannot be told, or its sources contradict each other.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-pub enum DatumFault {
+pub enum DatumError {
     /// Neither name nor label tell.
     #[error(
         "the datum is not known: the name has no version letter A to L and the label names no datum"
@@ -168,7 +168,7 @@ impl std::fmt::Display for DatumSource {
     }
 }
 
-impl Fault for DatumFault {
+impl Cause for DatumError {
     fn kind(&self) -> Kind {
         Kind::Input
     }
@@ -197,7 +197,7 @@ pub fn decide_datum(
     choice: DatumChoice,
     version: Option<char>,
     label: Option<MarsDatum>,
-) -> Result<MarsDatum, DatumFault> {
+) -> Result<MarsDatum, DatumError> {
     let stated = match choice {
         DatumChoice::Stated(datum) => Some((DatumSource::Configuration, datum)),
         DatumChoice::Auto => None,
@@ -217,7 +217,7 @@ pub fn decide_datum(
             let refined = matches!(first, DatumSource::Letter(_))
                 && (*first_datum, *second_datum) == (MarsDatum::Iau1991, MarsDatum::Iau1994);
             if first_datum != second_datum && !refined {
-                return Err(DatumFault::Contradiction {
+                return Err(DatumError::Contradiction {
                     first: *first,
                     first_datum: *first_datum,
                     second: *second,
@@ -229,7 +229,7 @@ pub fn decide_datum(
     // The later sources are the more exact ones.
     said.last()
         .map(|(_, datum)| *datum)
-        .ok_or(DatumFault::Undecided)
+        .ok_or(DatumError::Undecided)
 }
 
 #[cfg(test)]
@@ -312,7 +312,7 @@ mod tests {
             ),
         ];
         for (choice, letter, label, expected) in cases {
-            let found = decide_datum(choice, letter, label).map_err(|fault| fault.to_string());
+            let found = decide_datum(choice, letter, label).map_err(|error| error.to_string());
             assert_eq!(
                 found,
                 expected.map_err(str::to_owned),

@@ -14,11 +14,11 @@ mod label;
 mod record;
 mod writer;
 
-pub use check::{Reason, RecordFault};
+pub use check::{Reason, RecordError};
 pub use complaint::Complaint;
 pub use file::File;
 pub use frame::{FieldGuard, Frame};
-pub use frame_values::{EncodeFault, FrameValues};
+pub use frame_values::{EncodeError, FrameValues};
 pub use label::{FileName, PedrLabel, decide_datum};
 pub use record::{RECORD_BYTES, Record};
 pub use writer::{LabelInfo, PedrWriter};

@@ -148,7 +148,7 @@ impl Record {
         zerocopy::transmute!(*self)
     }
 
-    /// The records in `bytes`, without a copy; bytes after the last whole record are left out.
+    /// The records in `bytes`, without a copy; bytes after the last whole record are ignored.
     #[must_use]
     pub fn slice_of(bytes: &[u8]) -> &[Self] {
         // Any bytes are a record and records need no alignment, so the prefix of whole records always exists.

@@ -8,7 +8,7 @@ use std::{
 
 use super::{LABEL_BYTES, LABEL_RECORDS, RECORD_BYTES, Record};
 use crate::{
-    error::{Fault, IoFault, Kind, Place, Result},
+    error::{Cause, IoError, Kind, Locate, Result},
     frames::MarsDatum,
 };
 
@@ -30,7 +30,7 @@ pub struct LabelInfo {
 
 /// The label does not fit its format.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub(super) enum LabelFault {
+pub(super) enum LabelError {
     /// The version has no four characters.
     #[error("software version is {0}; expected 0 to 9.99")]
     Version(f64),
@@ -46,7 +46,7 @@ pub(super) enum LabelFault {
     },
 }
 
-impl Fault for LabelFault {
+impl Cause for LabelError {
     fn kind(&self) -> Kind {
         Kind::Input
     }
@@ -64,15 +64,15 @@ impl LabelInfo {
     ///
     /// # Errors
     /// A version or text that does not fit.
-    fn to_bytes(&self) -> std::result::Result<Vec<u8>, LabelFault> {
+    fn to_bytes(&self) -> std::result::Result<Vec<u8>, LabelError> {
         if !(0.0..9.995).contains(&self.software_version) {
-            return Err(LabelFault::Version(self.software_version));
+            return Err(LabelError::Version(self.software_version));
         }
         for (keyword, text) in [("PRODUCT_ID", &self.product_id), ("NOTE", &self.note)] {
             let printable = |byte: u8| (b' '..=b'~').contains(&byte) && byte != b'"';
             if text.len() > 600 || !text.bytes().all(printable) {
                 let text = text.clone();
-                return Err(LabelFault::Text { keyword, text });
+                return Err(LabelError::Text { keyword, text });
             }
         }
         let lines = [
@@ -116,7 +116,7 @@ impl PedrWriter {
     pub fn create(path: &Path, label: &LabelInfo) -> Result<Self> {
         let bytes = label.to_bytes().in_file(path)?;
         let file = File::create(path)
-            .map_err(IoFault::on("create"))
+            .map_err(IoError::on("create"))
             .in_file(path)?;
         let mut writer = Self {
             path: path.to_owned(),
@@ -145,7 +145,7 @@ impl PedrWriter {
         self.file
             .flush()
             .and_then(|()| self.file.get_ref().sync_all())
-            .map_err(IoFault::on("write"))
+            .map_err(IoError::on("write"))
             .in_file(&self.path)?;
         Ok(self.records)
     }
@@ -153,7 +153,7 @@ impl PedrWriter {
     fn write(&mut self, bytes: &[u8]) -> Result<()> {
         self.file
             .write_all(bytes)
-            .map_err(IoFault::on("write"))
+            .map_err(IoError::on("write"))
             .in_file(&self.path)
     }
 }
@@ -187,7 +187,7 @@ mod tests {
             software_version: 10.0,
             ..label()
         };
-        assert_eq!(version.to_bytes(), Err(LabelFault::Version(10.0)));
+        assert_eq!(version.to_bytes(), Err(LabelError::Version(10.0)));
         for note in ["a \"quote\"", "two\nlines", "überall", &"x".repeat(601)] {
             let note = note.to_owned();
             assert!(LabelInfo { note, ..label() }.to_bytes().is_err());

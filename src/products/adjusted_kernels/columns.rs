@@ -15,7 +15,7 @@ use crate::{
         mars_rotation::mars_rotation,
         pushbroom::{ExteriorOrientation, Pose, SampledOrientation},
     },
-    products::fault::ProductFault,
+    products::error::ProductError,
     spice::{Attitude, CkSegment, Session, SpkSegment, State, write_ck, write_spk},
     stages::sample_orientation::{Orientation, OrientationSample},
     time::{Et, Interval},
@@ -116,7 +116,7 @@ impl Source<'_> {
             samples.push((sample.et.seconds(), pose));
         }
         let difference = SampledOrientation::new(&samples);
-        Ok(difference.map_err(ProductFault::refused("continue an adjusted orbit"))?)
+        Ok(difference.map_err(ProductError::refused("continue an adjusted orbit"))?)
     }
 
     pub(super) fn states(&self) -> Result<States> {
@@ -125,7 +125,7 @@ impl Source<'_> {
         let epochs = self.epochs_of_states()?;
         for et in &epochs {
             let original = self.session.state(*et)?;
-            let (pose, motion) = difference.moving(et.seconds());
+            let (pose, motion) = difference.pose_and_rate(et.seconds());
             let from_mars = |et: Et| mars_rotation::<MarsIau2000>(et).matrix().transpose();
             let [before, after] =
                 [-HALF_DIFFERENCE_S, HALF_DIFFERENCE_S].map(|s| from_mars(et.plus(s)));

@@ -177,7 +177,7 @@ fn control_points<'a>(
     .collect()
 }
 
-/// How many focal pixels a line is, from the pairs of the image.
+/// How many focal-plane pixels a line is, from the pairs of the image.
 fn focal_px_per_line(geometric: &GeometricProducts, image: usize) -> f64 {
     let id = &geometric.adjusted_images[image].times.id;
     let mut pairs = geometric.adjusted_pairs.iter().filter_map(|pair| {

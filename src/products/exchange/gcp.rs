@@ -16,8 +16,8 @@ use super::{
     points::{GroundEstimate, ImageMeasure, above_zero},
 };
 use crate::{
-    error::{Place, Result},
-    products::{fault::ProductFault, files::write_text, gis::SPHERE_RADIUS_M},
+    error::{Locate, Result},
+    products::{error::ProductError, files::write_text, gis::SPHERE_RADIUS_M},
     units::RADIANS_PER_DEGREE,
 };
 
@@ -74,7 +74,7 @@ fn comment(id: &str) -> String {
     id.replace(char::is_control, " ")
 }
 
-fn line(number: u64, point: &ControlPoint) -> std::result::Result<String, ProductFault> {
+fn line(number: u64, point: &ControlPoint) -> std::result::Result<String, ProductError> {
     let id = point.id;
     let spherical = point.ground.spherical();
     let sigmas_m = point.ground.covariance_m2.diagonal().map(f64::sqrt);
@@ -100,7 +100,7 @@ fn line(number: u64, point: &ControlPoint) -> std::result::Result<String, Produc
                 measure.line, measure.sample
             );
             let action = "write a point";
-            return Err(ProductFault::Refused { action, reason });
+            return Err(ProductError::Refused { action, reason });
         }
         let [column, row] = place;
         let _infallible = write!(

@@ -7,10 +7,10 @@ use std::path::Path;
 use rusqlite::{Connection, OpenFlags, params, params_from_iter, types::Value};
 
 use crate::{
-    error::{Failure, IoFault, Place, Result},
+    error::{Error, IoError, Locate, Result},
     products::{
         coordinates::FRAME,
-        fault::ProductFault,
+        error::ProductError,
         files::{create, finish, open},
         footprints::features,
         gis::{CRS_NAME, CRS_WKT, Features, POINT_Z_HEIGHT},
@@ -77,7 +77,7 @@ fn write(path: &Path, features: Features) -> Result<u64> {
     fill(path, &features).in_file(path)?;
     open(path)?
         .sync_all()
-        .map_err(IoFault::on("write"))
+        .map_err(IoError::on("write"))
         .in_file(path)?;
     read_back(path, &features).in_file(path)?;
     Ok(features.points.len() as u64)
@@ -139,13 +139,13 @@ fn each(features: &Features, mut take: impl FnMut(Vec<Value>) -> Result<()>) -> 
 }
 
 /// The disk's refusal, or SQLite's.
-fn refused(error: rusqlite::Error) -> Failure {
+fn refused(error: rusqlite::Error) -> Error {
     use rusqlite::ErrorCode::{CannotOpen, DiskFull, PermissionDenied, ReadOnly, SystemIoFailure};
     match error.sqlite_error_code() {
         Some(CannotOpen | DiskFull | PermissionDenied | ReadOnly | SystemIoFailure) => {
-            IoFault::on("write")(std::io::Error::other(error)).into()
+            IoError::on("write")(std::io::Error::other(error)).into()
         }
-        _ => ProductFault::refused("write GeoPackage")(error).into(),
+        _ => ProductError::refused("write GeoPackage")(error).into(),
     }
 }
 
@@ -233,8 +233,8 @@ fn geometry(point: &[f64; 3]) -> Vec<u8> {
 }
 
 fn read_back(path: &Path, features: &Features) -> Result<()> {
-    let unreadable = |error: rusqlite::Error| Failure::from(ProductFault::unreadable(error));
-    let differs = |what: String| Err(ProductFault::ReadBack { what }.into());
+    let unreadable = |error: rusqlite::Error| Error::from(ProductError::unreadable(error));
+    let differs = |what: String| Err(ProductError::ReadBack { what }.into());
     let database =
         Connection::open_with_flags(path, OpenFlags::SQLITE_OPEN_READ_ONLY).map_err(unreadable)?;
     let names = names(&features.attributes);
@@ -303,7 +303,7 @@ mod tests {
             assert_eq!(changed.unwrap(), 1);
             let failure = read_back(&path, &for_gis()).unwrap_err();
             assert_eq!(
-                failure.fault.to_string(),
+                failure.cause.to_string(),
                 format!("read back differently: {complaint}")
             );
         }

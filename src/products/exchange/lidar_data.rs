@@ -16,8 +16,8 @@ use serde::Serialize;
 
 use super::points::{GroundEstimate, ImageMeasure, above_zero};
 use crate::{
-    error::{Place, Result},
-    products::{fault::ProductFault, files::write_json},
+    error::{Locate, Result},
+    products::{error::ProductError, files::write_json},
     stages::tag_times::ImageTimes,
     time::Et,
     units::{METRES_PER_KM, RADIANS_PER_DEGREE},
@@ -117,12 +117,12 @@ pub fn write_lidar_data(path: &Path, points: &[LidarPoint]) -> Result<u64> {
 fn check<'a>(
     point: &LidarPoint<'a>,
     ids: &mut BTreeSet<&'a str>,
-) -> std::result::Result<(), ProductFault> {
+) -> std::result::Result<(), ProductError> {
     let id = point.id;
     if !ids.insert(id) {
         let reason = format!("two points have the identifier {id}; expected each once");
         let action = "write a point";
-        return Err(ProductFault::Refused { action, reason });
+        return Err(ProductError::Refused { action, reason });
     }
     above_zero(&format!("range of {id}, metres,"), point.range_m)?;
     above_zero(

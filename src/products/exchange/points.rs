@@ -5,7 +5,7 @@ use nalgebra::{Matrix3, RowVector3};
 use crate::{
     frames::{MarsIau2000, Position},
     geom::ellipsoid::Spherical,
-    products::fault::ProductFault,
+    products::error::ProductError,
 };
 
 /// A point on the ground and how well it is known.
@@ -54,12 +54,12 @@ impl GroundEstimate {
 }
 
 /// Refuses a value that is not above 0.
-pub(super) fn above_zero(what: &str, value: f64) -> Result<(), ProductFault> {
+pub(super) fn above_zero(what: &str, value: f64) -> Result<(), ProductError> {
     // Written so that NaN is refused too.
     if value > 0.0 && value.is_finite() {
         return Ok(());
     }
-    Err(ProductFault::Refused {
+    Err(ProductError::Refused {
         action: "write a point",
         reason: format!("{what} is {value}; expected a number above 0"),
     })

@@ -16,9 +16,9 @@ use shapefile::{
 };
 
 use crate::{
-    error::{Failure, IoFault, Place, Result},
+    error::{Error, IoError, Locate, Result},
     products::{
-        fault::ProductFault,
+        error::ProductError,
         files::{create, finish, open, write_bytes, write_text},
         footprints::features,
         gis::{CRS_WKT, Features},
@@ -108,10 +108,10 @@ fn points(features: &Features) -> Vec<PointZ> {
 }
 
 /// The disk's refusal, or the library's.
-fn refused(error: shapefile::Error) -> Failure {
+fn refused(error: shapefile::Error) -> Error {
     match error {
-        shapefile::Error::IoError(source) => IoFault::on("write")(source).into(),
-        error => ProductFault::refused("encode shapefile")(error).into(),
+        shapefile::Error::IoError(source) => IoError::on("write")(source).into(),
+        error => ProductError::refused("encode shapefile")(error).into(),
     }
 }
 
@@ -130,7 +130,7 @@ fn write_points(path: &Path, points: impl Iterator<Item = PointZ>) -> Result<()>
 
 /// Checks that the index has as many records as there are points.
 fn check_index(path: &Path, points: usize) -> Result<()> {
-    let found = open(path)?.metadata().map_err(IoFault::on("read"))?.len();
+    let found = open(path)?.metadata().map_err(IoError::on("read"))?.len();
     let [head, record] = INDEX_BYTES;
     if found == head + record * points as u64 {
         return Ok(());
@@ -139,7 +139,7 @@ fn check_index(path: &Path, points: usize) -> Result<()> {
 }
 
 fn read_points(path: &Path, points: impl Iterator<Item = PointZ>) -> Result<()> {
-    let unreadable = |error: shapefile::Error| Failure::from(ProductFault::unreadable(error));
+    let unreadable = |error: shapefile::Error| Error::from(ProductError::unreadable(error));
     let mut reader = ShapeReader::new(BufReader::new(open(path)?)).map_err(unreadable)?;
     let mut found = reader.iter_shapes_as::<PointZ>();
     let mut rows = 0;
@@ -206,11 +206,11 @@ fn write_attributes(path: &Path, newest_utc: &str, table: &Table) -> Result<()> 
 }
 
 fn encode_attributes(newest_utc: &str, table: &Table) -> Result<Vec<u8>> {
-    let refused = |error: dbase::Error| ProductFault::refused("encode dBASE")(error);
+    let refused = |error: dbase::Error| ProductError::refused("encode dBASE")(error);
     let mut fields = TableWriterBuilder::with_encoding(dbase::encoding::Unicode);
     for (field, width) in dbase_fields(table).zip(text_widths(table)?) {
         let name =
-            FieldName::try_from(field.name).map_err(ProductFault::refused("name a field"))?;
+            FieldName::try_from(field.name).map_err(ProductError::refused("name a field"))?;
         fields = match width {
             Some(width) => fields.add_character_field(name, width),
             None => fields.add_numeric_field(name, field.width, field.decimals),
@@ -269,12 +269,12 @@ fn day(utc: &str) -> [u8; 3] {
     .map(|value| u8::try_from(value).unwrap_or(u8::MAX))
 }
 
-fn differs(what: String) -> Failure {
-    ProductFault::ReadBack { what }.into()
+fn differs(what: String) -> Error {
+    ProductError::ReadBack { what }.into()
 }
 
 fn read_attributes(path: &Path, table: &Table) -> Result<()> {
-    let unreadable = |error: dbase::Error| Failure::from(ProductFault::unreadable(error));
+    let unreadable = |error: dbase::Error| Error::from(ProductError::unreadable(error));
     let mut reader = dbase::Reader::new(BufReader::new(open(path)?)).map_err(unreadable)?;
     let mut found = reader.iter_records();
     for rows in table.pieces() {
@@ -342,7 +342,7 @@ mod tests {
         write_bytes(&path, &changed).unwrap();
         let failure = read_attributes(&path, &table()).unwrap_err();
         assert_eq!(
-            failure.fault.to_string(),
+            failure.cause.to_string(),
             "read back differently: attributes of point 2"
         );
     }
@@ -370,7 +370,7 @@ mod tests {
         ] {
             let failure = read_points(&path, expected.iter().copied()).unwrap_err();
             assert_eq!(
-                failure.fault.to_string(),
+                failure.cause.to_string(),
                 format!("read back differently: {complaint}")
             );
         }

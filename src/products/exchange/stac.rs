@@ -6,11 +6,11 @@ use chrono::{NaiveDateTime, TimeDelta};
 use serde_json::{Map, Value, json};
 
 use crate::{
-    error::{Place, Result},
+    error::{Locate, Result},
     files::hash_file,
     products::{
         coordinates::{FRAME, bounding_box_deg, degrees, signed_longitude_deg},
-        fault::ProductFault,
+        error::ProductError,
         files::write_json,
         footprints::points_deg,
         product::{Content, Context, Declaration, Program, Role, Use, Write},
@@ -168,7 +168,7 @@ fn period(site: &SiteProducts) -> Result<Option<[String; 2]>> {
 
 fn instant(utc: &str) -> Result<NaiveDateTime> {
     Ok(NaiveDateTime::parse_from_str(utc, "%Y-%m-%dT%H:%M:%S%.f")
-        .map_err(ProductFault::refused("read a UTC string"))?)
+        .map_err(ProductError::refused("read a UTC string"))?)
 }
 
 /// The products by their paths, with what a reader needs to fetch and check them.

@@ -8,9 +8,9 @@ use arrow::{
     record_batch::RecordBatch,
 };
 
-use super::ReadFault;
+use super::ReadError;
 use crate::{
-    error::{Place, Result},
+    error::{Locate, Result},
     products::files::open,
 };
 
@@ -21,21 +21,21 @@ const PARQUET: &str = "Parquet";
 pub(super) fn read(
     path: &Path,
     names: &[&str],
-    mut take: impl FnMut(&Batch) -> std::result::Result<(), ReadFault>,
+    mut take: impl FnMut(&Batch) -> std::result::Result<(), ReadError>,
 ) -> Result<()> {
     let builder = ParquetRecordBatchReaderBuilder::try_new(open(path)?)
-        .map_err(ReadFault::unreadable(PARQUET))
+        .map_err(ReadError::unreadable(PARQUET))
         .in_file(path)?;
-    let wanted = ProjectionMask::columns(builder.parquet_schema(), names.iter().copied());
+    let required = ProjectionMask::columns(builder.parquet_schema(), names.iter().copied());
     let batches = builder
-        .with_projection(wanted)
+        .with_projection(required)
         .build()
-        .map_err(ReadFault::unreadable(PARQUET))
+        .map_err(ReadError::unreadable(PARQUET))
         .in_file(path)?;
     let mut rows_before = 0;
     for batch in batches {
         let columns = batch
-            .map_err(ReadFault::unreadable(PARQUET))
+            .map_err(ReadError::unreadable(PARQUET))
             .in_file(path)?;
         let batch = Batch {
             columns,
@@ -64,8 +64,8 @@ impl Batch {
         name: &'static str,
         expected: &'static str,
         may_be_null: bool,
-    ) -> std::result::Result<&T, ReadFault> {
-        let wrong = |found: String| ReadFault::Column {
+    ) -> std::result::Result<&T, ReadError> {
+        let wrong = |found: String| ReadError::Column {
             name,
             found,
             expected,
@@ -87,7 +87,7 @@ impl Batch {
     pub(super) fn numbers(
         &self,
         name: &'static str,
-    ) -> std::result::Result<&Float64Array, ReadFault> {
+    ) -> std::result::Result<&Float64Array, ReadError> {
         self.finite(name, false)
     }
 
@@ -95,7 +95,7 @@ impl Batch {
     pub(super) fn optional_numbers(
         &self,
         name: &'static str,
-    ) -> std::result::Result<&Float64Array, ReadFault> {
+    ) -> std::result::Result<&Float64Array, ReadError> {
         self.finite(name, true)
     }
 
@@ -103,12 +103,12 @@ impl Batch {
         &self,
         name: &'static str,
         may_be_null: bool,
-    ) -> std::result::Result<&Float64Array, ReadFault> {
+    ) -> std::result::Result<&Float64Array, ReadError> {
         let numbers: &Float64Array = self.column(name, "64-bit floating point", may_be_null)?;
         let mut rows = numbers.iter().zip(self.rows_before + 1..);
         match rows.find_map(|(number, row)| Some((number.filter(|n| !n.is_finite())?, row))) {
             None => Ok(numbers),
-            Some((number, row)) => Err(ReadFault::Column {
+            Some((number, row)) => Err(ReadError::Column {
                 name,
                 found: format!("{number} in row {row}"),
                 expected: "finite numbers",
@@ -120,12 +120,12 @@ impl Batch {
     pub(super) fn counts(
         &self,
         name: &'static str,
-    ) -> std::result::Result<&UInt32Array, ReadFault> {
+    ) -> std::result::Result<&UInt32Array, ReadError> {
         self.column(name, "32-bit unsigned integer", false)
     }
 
     /// A column of texts.
-    pub(super) fn texts(&self, name: &'static str) -> std::result::Result<&StringArray, ReadFault> {
+    pub(super) fn texts(&self, name: &'static str) -> std::result::Result<&StringArray, ReadError> {
         self.column(name, "text", false)
     }
 }
@@ -148,8 +148,8 @@ mod tests {
             .unwrap(),
             rows_before: 100,
         };
-        let refused = |fault: std::result::Result<&Float64Array, ReadFault>| {
-            fault.map(drop).unwrap_err().to_string()
+        let refused = |error: std::result::Result<&Float64Array, ReadError>| {
+            error.map(drop).unwrap_err().to_string()
         };
         let expected = "column x_m is NaN in row 103; expected finite numbers";
         let spoilt = batch([Some(1.0), Some(2.0), Some(f64::NAN)]);

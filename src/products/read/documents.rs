@@ -6,9 +6,9 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
 use serde_json::Value;
 
-use super::ReadFault;
+use super::ReadError;
 use crate::{
-    error::{Place, Result},
+    error::{Locate, Result},
     geom::statistics::Summary,
     products::files::read,
 };
@@ -25,7 +25,7 @@ pub struct RangesDocument {
 pub struct ProfileDocument {
     /// Window, orbit and crossing.
     pub id: String,
-    /// Whether the profile keeps the limits.
+    /// Whether the profile is within the limits.
     pub valid: bool,
     /// Measured range − distance to the spacecraft in the kernels, metres.
     pub range_minus_distance_m: Summary,
@@ -36,7 +36,7 @@ pub struct ProfileDocument {
 /// `orientation.json`: times and polynomial models of one image.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 pub struct ImageDocument {
-    /// Whether the model keeps the limits.
+    /// Whether the model is within the limits.
     pub valid: bool,
     /// When and how the image was taken, by key.
     pub times: Value,
@@ -112,6 +112,6 @@ pub fn read_image(path: &Path) -> Result<ImageDocument> {
 
 fn document<T: DeserializeOwned>(path: &Path, what: &'static str) -> Result<T> {
     serde_json::from_slice(&read(path)?)
-        .map_err(ReadFault::unreadable(what))
+        .map_err(ReadError::unreadable(what))
         .in_file(path)
 }

@@ -14,11 +14,11 @@ pub use documents::{
 pub use footprints::{FootprintRows, read_footprints};
 pub use orientation::{SampleRow, read_samples};
 
-use crate::error::{Fault, Kind};
+use crate::error::{Cause, Kind};
 
 /// A product that is whole, but not what this program writes.
 #[derive(Debug, thiserror::Error)]
-pub(super) enum ReadFault {
+pub(super) enum ReadError {
     /// Not Parquet, or not the document.
     #[error("cannot be read as {what}: {reason}")]
     Unreadable { what: &'static str, reason: String },
@@ -34,7 +34,7 @@ pub(super) enum ReadFault {
     },
 }
 
-impl ReadFault {
+impl ReadError {
     /// For `map_err` on errors of decoding libraries.
     fn unreadable<E: std::fmt::Display>(what: &'static str) -> impl Fn(E) -> Self {
         move |error| Self::Unreadable {
@@ -44,7 +44,7 @@ impl ReadFault {
     }
 }
 
-impl Fault for ReadFault {
+impl Cause for ReadError {
     fn kind(&self) -> Kind {
         Kind::Input
     }

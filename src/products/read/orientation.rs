@@ -4,9 +4,9 @@ use std::path::Path;
 
 use arrow::array::Array as _;
 
-use super::{ReadFault, columns};
+use super::{ReadError, columns};
 use crate::{
-    error::{Place, Result},
+    error::{Locate, Result},
     frames::{MarsIau2000, Position},
     time::Et,
 };
@@ -63,7 +63,7 @@ pub fn read_samples(path: &Path) -> Result<Vec<SampleRow>> {
         Ok(())
     })?;
     if rows.len() < 2 {
-        return Err(ReadFault::TooFew { found: rows.len() }).in_file(path);
+        return Err(ReadError::TooFew { found: rows.len() }).in_file(path);
     }
     Ok(rows)
 }

@@ -130,7 +130,7 @@ pub(super) fn items(site: &RunDifference) -> String {
     let mut body = String::new();
     for (what, items) in [
         ("Kernels", &site.kernels),
-        ("Stages, by what entered them", &site.stages),
+        ("Stages, by their inputs", &site.stages),
         ("Products", &site.products),
     ] {
         if !items.is_empty() {

@@ -12,7 +12,7 @@ use crate::{
 /// The differences of one or several sites as one HTML page; `not_compared` tells why others are not here.
 ///
 /// # Errors
-/// A plot that cannot be drawn, which is a fault of areograph.
+/// A plot that cannot be drawn, which is a bug in areograph.
 pub fn difference_page(sites: &[&RunDifference], not_compared: &[String]) -> Result<String> {
     let title = match sites {
         [one] => format!("{}: difference of two runs", one.site),

@@ -79,7 +79,7 @@ fn footprints(site: &RunDifference) -> String {
 
 fn positions(images: &[ImageDifference], limits: &Limits) -> String {
     let mut table = Table::new(
-        "Cameras: where they were",
+        "Camera positions",
         &[
             Column::Text("image"),
             Column::Number("samples in both"),
@@ -119,7 +119,7 @@ fn positions(images: &[ImageDifference], limits: &Limits) -> String {
 
 fn pointing(images: &[ImageDifference], limits: &Limits) -> String {
     let mut table = Table::new(
-        "Cameras: where they looked",
+        "Camera pointing",
         &[
             Column::Text("image"),
             Column::Number("turn mean, ″"),

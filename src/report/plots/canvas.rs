@@ -7,7 +7,7 @@ use plotters::{
 };
 
 use super::{INK, LETTERS, WIDTH};
-use crate::{error::Result, products::fault::ProductFault};
+use crate::{error::Result, products::error::ProductError};
 
 /// A drawing in progress.
 pub(in crate::report) type Canvas<'a> = DrawingArea<SVGBackend<'a>, Shift>;
@@ -20,7 +20,7 @@ pub(super) type Chart<'a, 'b> =
 /// SVG of the given height, filled by `with`.
 ///
 /// # Errors
-/// A drawing that the library refuses, which is a fault of areograph.
+/// A drawing that the library refuses, which is a bug in areograph.
 pub(in crate::report) fn drawn(
     height: u32,
     with: impl for<'a> FnOnce(&Canvas<'a>) -> Drawn<'a>,
@@ -30,7 +30,7 @@ pub(in crate::report) fn drawn(
         let area = SVGBackend::with_string(&mut svg, (WIDTH, height)).into_drawing_area();
         with(&area)
             .and_then(|()| area.present())
-            .map_err(ProductFault::refused("draw a plot"))?;
+            .map_err(ProductError::refused("draw a plot"))?;
     }
     Ok(svg)
 }

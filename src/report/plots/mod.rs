@@ -214,7 +214,7 @@ pub(super) fn quoted(text: &str) -> String {
 /// The plot as a figure.
 ///
 /// # Errors
-/// A plot that the library refuses, which is a fault of areograph.
+/// A plot that the library refuses, which is a bug in areograph.
 pub(super) fn figure(plot: &Plot) -> Result<String> {
     let height = plot.panels.iter().map(|panel| panel.height).sum::<u32>() + draw::FOOT;
     let svg = drawn(height, |area| draw::plot(plot, area))?;

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use super::{
     input::AdjustImage,
     network::Assembled,
-    points::{LeftOut, PointKind},
+    points::{PointKind, RejectedPoint},
     summary::AdjustmentSummary,
 };
 use crate::{
@@ -30,8 +30,8 @@ pub struct Adjusted {
     pub views: Vec<ImageResidual>,
     /// Ranges of these points.
     pub ranges: Vec<RangeResidual>,
-    /// Points that were left out.
-    pub left_out: Vec<LeftOut>,
+    /// Rejected points.
+    pub rejected: Vec<RejectedPoint>,
     /// Weighted sum of squared residuals before each step and after the last.
     pub weighted_squares: Vec<f64>,
 }
@@ -95,9 +95,9 @@ pub struct ImageResidual {
     pub x_lines: f64,
     /// Measured place in the line, pixels from the principal point.
     pub y_px: f64,
-    /// Along the track, focal pixels.
+    /// Along the track, focal-plane pixels.
     pub along_px: ScalarResidual,
-    /// Across the track, focal pixels.
+    /// Across the track, focal-plane pixels.
     pub across_px: ScalarResidual,
 }
 
@@ -140,7 +140,7 @@ impl From<Residual> for ScalarResidual {
     }
 }
 
-/// Puts the result together; points without adjusted coordinates are left to `left_out`.
+/// Puts the result together; points without adjusted coordinates are left to `rejected`.
 pub(super) fn collect<M>(
     images: &[AdjustImage<M>],
     assembled: Assembled<&M>,
@@ -193,7 +193,7 @@ pub(super) fn collect<M>(
             })
             .collect(),
         points,
-        left_out: assembled.left_out,
+        rejected: assembled.rejected,
         weighted_squares: adjustment.history,
     }
 }
@@ -203,7 +203,7 @@ fn corrected_images<M>(images: &[AdjustImage<M>], adjustment: &Adjustment) -> Ve
     let found = images.iter().zip(&adjustment.images);
     found
         .map(|(image, adjusted)| CorrectedImage {
-            id: image.stereo.id.clone(),
+            id: image.oriented_camera.id.clone(),
             correction: adjusted.correction.coefficients(),
             sigmas: std::array::from_fn(|unknown| {
                 sigma0 * adjusted.cofactors[(unknown, unknown)].sqrt()

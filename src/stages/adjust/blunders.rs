@@ -2,14 +2,14 @@
 
 use super::{
     network::Assembled,
-    points::{LeftOut, LeftOutReason, PointKind},
+    points::{PointKind, RejectedPoint, RejectionReason},
 };
 use crate::geom::{
-    bundle::{Adjustment, BundleFault, BundleOptions, Network, Residual, solve},
+    bundle::{Adjustment, BundleError, BundleOptions, Network, Residual, solve},
     pushbroom::ExteriorOrientation,
 };
 
-/// Rounds after which no more tie points are left out.
+/// Rounds after which no more tie points are rejected.
 const ROUNDS_MAX: u32 = 20;
 /// In each round only points whose residual reaches this share of the largest are left out: a blunder
 /// pulls at its neighbours, and they come right when it is gone.
@@ -21,7 +21,7 @@ pub(super) fn solve_without_blunders<M: ExteriorOrientation>(
     assembled: &mut Assembled<M>,
     bundle_options: &BundleOptions,
     limit: Option<f64>,
-) -> Result<Adjustment, BundleFault> {
+) -> Result<Adjustment, BundleError> {
     let mut adjustment = solve(&assembled.network, bundle_options)?;
     let Some(limit) = limit else {
         return Ok(adjustment);
@@ -33,22 +33,22 @@ pub(super) fn solve_without_blunders<M: ExteriorOrientation>(
             break;
         }
         let threshold = limit.max(SHARE_OF_LARGEST * largest);
-        let left_out: Vec<bool> = worst.iter().map(|value| *value >= threshold).collect();
+        let rejected: Vec<bool> = worst.iter().map(|value| *value >= threshold).collect();
         for (point, standardised) in worst
             .iter()
             .enumerate()
-            .filter(|(point, _)| left_out[*point])
+            .filter(|(point, _)| rejected[*point])
         {
-            assembled.left_out.push(LeftOut {
+            assembled.rejected.push(RejectedPoint {
                 kind: PointKind::Tie,
                 index: assembled.points[point].index,
                 id: assembled.points[point].name.clone(),
-                reason: LeftOutReason::Blunder {
+                reason: RejectionReason::Blunder {
                     standardised: *standardised,
                 },
             });
         }
-        assembled.network.views.retain(|view| !left_out[view.point]);
+        assembled.network.views.retain(|view| !rejected[view.point]);
         adjustment = solve(&assembled.network, bundle_options)?;
     }
     Ok(adjustment)

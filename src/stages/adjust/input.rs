@@ -2,14 +2,14 @@
 
 use crate::{
     frames::{MarsIau2000, Position},
-    geom::{bundle::ORIENTATION_UNKNOWNS, stereo::StereoImage},
+    geom::{bundle::ORIENTATION_UNKNOWNS, oriented_camera::OrientedCamera},
 };
 
 /// An image with what is known of its orientation beforehand.
 #[derive(Debug, Clone, PartialEq)]
 pub struct AdjustImage<M> {
     /// Initial orientation and detector.
-    pub stereo: StereoImage<M>,
+    pub oriented_camera: OrientedCamera<M>,
     /// Time from line to line, seconds.
     pub line_period_s: f64,
     /// Standard deviation of each orientation unknown, see [`orientation_sigmas`]; infinite leaves it free,

@@ -6,7 +6,7 @@
 
 mod adjusted;
 mod blunders;
-mod fault;
+mod error;
 mod input;
 mod network;
 mod points;
@@ -19,9 +19,9 @@ mod words;
 pub use adjusted::{
     Adjusted, CorrectedImage, CorrectedPoint, ImageResidual, RangeResidual, ScalarResidual,
 };
-pub use fault::AdjustFault;
+pub use error::AdjustError;
 pub use input::{AdjustImage, LaserShot, LaserShots, ShotRange, orientation_sigmas};
-pub use points::{LeftOut, LeftOutReason, PointKind};
+pub use points::{PointKind, RejectedPoint, RejectionReason};
 pub use prepare::{Candidate, prepare_adjustment};
 pub use run::adjust;
 pub use stage::Adjust;

@@ -5,9 +5,9 @@ use std::collections::{BTreeMap, BTreeSet};
 use nalgebra::{Vector2, Vector3};
 
 use super::{
-    fault::AdjustFault,
+    error::AdjustError,
     input::{AdjustImage, LaserShots},
-    points::{LeftOut, LeftOutReason, PointKind},
+    points::{PointKind, RejectedPoint, RejectionReason},
 };
 use crate::{
     config::AdjustmentConfig,
@@ -36,7 +36,7 @@ pub(super) struct Assembled<M> {
     pub(super) shots: usize,
     /// Profiles with a range.
     pub(super) profiles: Vec<Named>,
-    pub(super) left_out: Vec<LeftOut>,
+    pub(super) rejected: Vec<RejectedPoint>,
     /// Where the initial orientations put the footprints.
     pub(super) mola: Vec<View>,
 }
@@ -56,7 +56,7 @@ pub(super) fn assemble<'a, M: ExteriorOrientation>(
         points: Vec::with_capacity(shots.shots.len() + ties.len()),
         shots: shots.shots.len(),
         profiles: Vec::new(),
-        left_out: Vec::new(),
+        rejected: Vec::new(),
         mola: Vec::new(),
     };
     assembled.add_shots(shots, config)?;
@@ -70,11 +70,11 @@ pub(super) fn assemble<'a, M: ExteriorOrientation>(
 
 fn bundle_image<M>(image: &AdjustImage<M>) -> BundleImage<&M> {
     BundleImage {
-        base: &image.stereo.orientation,
-        half_lines: 0.5 * image.stereo.lines,
+        base: &image.oriented_camera.orientation,
+        half_lines: 0.5 * image.oriented_camera.lines,
         line_period_s: image.line_period_s,
-        focal_length_px: image.stereo.detector.focal_length_px,
-        distortion: image.stereo.detector.distortion,
+        focal_length_px: image.oriented_camera.detector.focal_length_px,
+        distortion: image.oriented_camera.detector.distortion,
         sigmas: image.sigmas,
         time_bias_sigma_s: image.time_bias_sigma_s,
     }
@@ -84,13 +84,13 @@ fn bundle_image<M>(image: &AdjustImage<M>) -> BundleImage<&M> {
 pub(super) fn projector<'a, M, O: ExteriorOrientation>(
     image: &AdjustImage<M>,
     orientation: &'a O,
-) -> std::result::Result<Projector<'a, O>, AdjustFault> {
-    let projector = Projector::new(orientation, image.stereo.lines);
-    let projector = projector.map_err(|unseen| AdjustFault::Blind {
-        image: image.stereo.id.clone(),
+) -> std::result::Result<Projector<'a, O>, AdjustError> {
+    let projector = Projector::new(orientation, image.oriented_camera.lines);
+    let projector = projector.map_err(|unseen| AdjustError::Blind {
+        image: image.oriented_camera.id.clone(),
         unseen,
     })?;
-    Ok(projector.through(image.stereo.detector.distortion))
+    Ok(projector.through(image.oriented_camera.detector.distortion))
 }
 
 /// Where the initial orientations put the footprints, in and around each image.
@@ -98,11 +98,11 @@ fn footprints_in_images<M: ExteriorOrientation>(
     images: &[AdjustImage<M>],
     shots: &LaserShots,
     config: &AdjustmentConfig,
-) -> std::result::Result<Vec<View>, AdjustFault> {
+) -> std::result::Result<Vec<View>, AdjustError> {
     let mut views = Vec::new();
     for (index, image) in images.iter().enumerate() {
-        let projector = projector(image, &image.stereo.orientation)?;
-        let detector = &image.stereo.detector;
+        let projector = projector(image, &image.oriented_camera.orientation)?;
+        let detector = &image.oriented_camera.detector;
         let samples = -config.footprint_margin_px..=detector.samples + config.footprint_margin_px;
         for (point, shot) in shots.shots.iter().enumerate() {
             // What a camera does not see is not in its image.
@@ -112,7 +112,7 @@ fn footprints_in_images<M: ExteriorOrientation>(
             let Ok(focal) = detector.focal_px(&seen.camera_m) else {
                 continue;
             };
-            let inside = seen.x.abs() <= 0.5 * image.stereo.lines
+            let inside = seen.x.abs() <= 0.5 * image.oriented_camera.lines
                 && samples.contains(&detector.sample(focal.y));
             if inside {
                 views.push(View {
@@ -144,13 +144,13 @@ impl<'a, M: ExteriorOrientation> Assembled<&'a M> {
         &mut self,
         shots: &LaserShots,
         config: &AdjustmentConfig,
-    ) -> std::result::Result<(), AdjustFault> {
+    ) -> std::result::Result<(), AdjustError> {
         let mut used = BTreeSet::new();
         let mut profiles = BTreeMap::new();
         for (point, shot) in shots.shots.iter().enumerate() {
             let name = shots.name(shot);
             if !used.insert((shot.profile, shot.row)) {
-                return Err(AdjustFault::DuplicateShot(name));
+                return Err(AdjustError::DuplicateShot(name));
             }
             let index = shot.row as usize;
             self.points.push(Named { index, name });
@@ -196,11 +196,11 @@ impl<'a, M: ExteriorOrientation> Assembled<&'a M> {
             .collect();
         for (index, tie) in ties.iter().enumerate() {
             let Some(ground) = starts.get(&index) else {
-                self.left_out.push(LeftOut {
+                self.rejected.push(RejectedPoint {
                     kind: PointKind::Tie,
                     index,
                     id: tie.id.clone(),
-                    reason: LeftOutReason::NotIntersected,
+                    reason: RejectionReason::NotIntersected,
                 });
                 continue;
             };
@@ -215,10 +215,11 @@ impl<'a, M: ExteriorOrientation> Assembled<&'a M> {
             });
             for measure in &tie.measures {
                 let image = measure.image;
-                let stereo = &images[image].stereo;
-                let (x_lines, focal_px) = stereo.focal_place(measure.line, measure.sample);
+                let oriented_camera = &images[image].oriented_camera;
+                let (x_lines, focal_px) =
+                    oriented_camera.focal_plane_coordinates(measure.line, measure.sample);
                 let mut sigma_px = Vector2::from(config.tie_sigma_px);
-                sigma_px.y *= stereo.detector.focal_px_per_sample(focal_px.y);
+                sigma_px.y *= oriented_camera.detector.focal_px_per_sample(focal_px.y);
                 self.network.views.push(View {
                     point,
                     image,

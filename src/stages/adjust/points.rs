@@ -15,9 +15,9 @@ pub enum PointKind {
     Tie,
 }
 
-/// A point that was left out.
+/// A rejected point.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct LeftOut {
+pub struct RejectedPoint {
     /// Shot or tie point.
     pub kind: PointKind,
     /// Row of the footprint, or index of the tie point.
@@ -25,13 +25,13 @@ pub struct LeftOut {
     /// Identifier.
     pub id: String,
     /// Why.
-    pub reason: LeftOutReason,
+    pub reason: RejectionReason,
 }
 
-/// Why a point was left out.
+/// Why a point was rejected.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, thiserror::Error)]
 #[serde(rename_all = "snake_case")]
-pub enum LeftOutReason {
+pub enum RejectionReason {
     /// Its intersection gave no ground point.
     #[error("it could not be intersected")]
     NotIntersected,

@@ -7,7 +7,10 @@ use crate::{
     config::AdjustmentConfig,
     footprints::Footprints,
     frames::{MarsIau2000, Position},
-    geom::{ellipsoid::spherical_to_xyz_m, pushbroom::ExteriorOrientation, stereo::StereoImage},
+    geom::{
+        ellipsoid::spherical_to_xyz_m, oriented_camera::OrientedCamera,
+        pushbroom::ExteriorOrientation,
+    },
     stages::{
         group_profiles::Profile, orientation::Orientation, register::ImageRegistration,
         tag_times::ImageTimes,
@@ -28,7 +31,7 @@ pub struct Candidate<'a, M> {
     /// Orientation samples.
     pub orientation: &'a Orientation,
     /// The form of the orientation that is adjusted.
-    pub stereo: StereoImage<M>,
+    pub oriented_camera: OrientedCamera<M>,
     /// Where the image has the footprints.
     pub registration: &'a ImageRegistration,
 }
@@ -39,7 +42,7 @@ impl<M: ExteriorOrientation> Candidate<'_, M> {
     /// An image that `config` names keeps those written there. Otherwise all position unknowns get the one
     /// of nadir or of other images, and rotations what moves the ground as far: `σ/range`.
     fn weighed(self, config: &AdjustmentConfig) -> AdjustImage<M> {
-        let pose = self.stereo.orientation.pose(0.0);
+        let pose = self.oriented_camera.orientation.pose(0.0);
         let look = pose.mars_to_camera.row(2).transpose();
         let position_sigma_m = if look.angle(&-pose.position_m) < NADIR_RAD {
             config.position_sigma_nadir_m
@@ -56,7 +59,7 @@ impl<M: ExteriorOrientation> Candidate<'_, M> {
             }
         }
         AdjustImage {
-            stereo: self.stereo,
+            oriented_camera: self.oriented_camera,
             line_period_s: self.times.line_period_s,
             sigmas,
             time_bias_sigma_s: config.time_bias_sigma_s,
@@ -72,7 +75,7 @@ impl<M: ExteriorOrientation> Candidate<'_, M> {
             .get(self.orientation.samples.len() / 2);
         let ground = middle.and_then(|sample| sample.boresight);
         ground.map_or_else(
-            || self.stereo.orientation.pose(0.0).position_m.norm(),
+            || self.oriented_camera.orientation.pose(0.0).position_m.norm(),
             |ground| ground.range_m,
         )
     }

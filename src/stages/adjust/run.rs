@@ -5,10 +5,10 @@ use std::collections::BTreeSet;
 use super::{
     adjusted::{self, Adjusted},
     blunders,
-    fault::{AdjustFault, CONTRADICTION},
+    error::{AdjustError, CONTRADICTION},
     input::{AdjustImage, LaserShots},
     network::{self, Named},
-    points::{LeftOut, LeftOutReason},
+    points::{RejectedPoint, RejectionReason},
     summary, words,
 };
 use crate::{
@@ -24,7 +24,7 @@ use crate::{
 
 /// Adjusts images, shots and tie points together.
 ///
-/// Tie points start from their intersection; those without one are left out and listed.
+/// Tie points start from their intersection; those without one are rejected and listed.
 ///
 /// # Errors
 /// No tie point with a ground point, identifiers that do not match, a singular network, initial values that the rest refutes.
@@ -37,7 +37,7 @@ pub fn adjust<M: ExteriorOrientation>(
 ) -> Result<Adjusted> {
     if starts.points.is_empty() {
         let first = starts.rejected.first();
-        return Err(AdjustFault::NoTies {
+        return Err(AdjustError::NoTies {
             ties: ties.len(),
             first: first.map_or_else(
                 || "there are none".to_owned(),
@@ -53,9 +53,9 @@ pub fn adjust<M: ExteriorOrientation>(
     };
     let adjustment =
         blunders::solve_without_blunders(&mut assembled, &bundle_options, config.blunder_limit)
-            .map_err(|fault| words::in_words(fault, images, &assembled))?;
+            .map_err(|error| words::in_words(error, images, &assembled))?;
     // Blunders have lost their measurements and are listed already.
-    let listed: BTreeSet<usize> = assembled.left_out.iter().map(|tie| tie.index).collect();
+    let listed: BTreeSet<usize> = assembled.rejected.iter().map(|tie| tie.index).collect();
     let dropped = adjustment
         .points
         .iter()
@@ -63,15 +63,15 @@ pub fn adjust<M: ExteriorOrientation>(
         .filter_map(|(point, outcome)| {
             let Named { index, name } = &assembled.points[point];
             let known = point >= assembled.shots && listed.contains(index);
-            (outcome.is_err() && !known).then(|| LeftOut {
+            (outcome.is_err() && !known).then(|| RejectedPoint {
                 kind: assembled.kind(point),
                 index: *index,
                 id: name.clone(),
-                reason: LeftOutReason::Undetermined,
+                reason: RejectionReason::Undetermined,
             })
         });
-    let dropped: Vec<LeftOut> = dropped.collect();
-    assembled.left_out.extend(dropped);
+    let dropped: Vec<RejectedPoint> = dropped.collect();
+    assembled.rejected.extend(dropped);
     contradictions(images, &assembled.points, &adjustment)?;
     let summary = summary::summarise(
         images,
@@ -86,10 +86,10 @@ fn contradictions<M>(
     images: &[AdjustImage<M>],
     points: &[Named],
     adjustment: &Adjustment,
-) -> std::result::Result<(), AdjustFault> {
+) -> std::result::Result<(), AdjustError> {
     let refuse = |what: String, standardised: f64| {
         if standardised > CONTRADICTION {
-            Err(AdjustFault::Contradiction { what, standardised })
+            Err(AdjustError::Contradiction { what, standardised })
         } else {
             Ok(())
         }

@@ -47,7 +47,7 @@ impl Stage for Adjust<'_> {
             Ok(Candidate {
                 times: image.times.value()?,
                 orientation: image.orientation.value()?,
-                stereo: oriented.stereo(*self.model),
+                oriented_camera: oriented.oriented_camera(*self.model),
                 registration: image.registration.value()?,
             })
         });

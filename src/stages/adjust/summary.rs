@@ -5,7 +5,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::{
-    fault::AdjustFault,
+    error::AdjustError,
     input::AdjustImage,
     network::{Assembled, projector},
     points::PointKind,
@@ -74,7 +74,7 @@ pub struct GroundSummary {
 pub struct ImageSummary {
     /// Identifier.
     pub image: String,
-    /// Residuals of tie points, along and across the track, focal pixels.
+    /// Residuals of tie points, along and across the track, focal-plane pixels.
     pub tie_residuals_px: [Summary; 2],
     /// Adjusted minus initial image coordinates of footprints, lines and pixels; empty when these are off.
     pub mola_corrections: [Summary; 2],
@@ -112,7 +112,7 @@ pub(super) fn summarise<M: ExteriorOrientation>(
     assembled: &Assembled<&M>,
     adjustment: &Adjustment,
     mola_image: FootprintImageCoordinates,
-) -> Result<AdjustmentSummary, AdjustFault> {
+) -> Result<AdjustmentSummary, AdjustError> {
     let (shots, ties) = (0..assembled.shots, assembled.shots..assembled.points.len());
     let in_words = |unknown| unknown_in_words(unknown, images, &assembled.profiles);
     let biases = assembled.profiles.iter().zip(&adjustment.range_biases_m);
@@ -128,7 +128,7 @@ pub(super) fn summarise<M: ExteriorOrientation>(
             .enumerate()
             .map(|(index, image)| {
                 Ok(ImageSummary {
-                    image: image.stereo.id.clone(),
+                    image: image.oriented_camera.id.clone(),
                     tie_residuals_px: tie_residuals(assembled, adjustment, index),
                     mola_corrections: if mola_image == FootprintImageCoordinates::Off {
                         [Summary::default(); 2]
@@ -137,7 +137,7 @@ pub(super) fn summarise<M: ExteriorOrientation>(
                     },
                 })
             })
-            .collect::<Result<_, AdjustFault>>()?,
+            .collect::<Result<_, AdjustError>>()?,
         range_biases_m: biases
             .filter_map(|(profile, bias)| {
                 let (value_m, root_m) = (*bias)?;
@@ -155,10 +155,10 @@ pub(super) fn summarise<M: ExteriorOrientation>(
 fn types<M>(assembled: &Assembled<M>, adjustment: &Adjustment) -> Vec<TypeSummary> {
     let views = assembled.network.views.iter().zip(&adjustment.views);
     let of_views = |kind: PointKind| -> Vec<Residual> {
-        let wanted = views
+        let required = views
             .clone()
             .filter(|(view, _)| assembled.kind(view.point) == kind);
-        wanted
+        required
             .filter_map(|(_, residuals)| *residuals)
             .flatten()
             .collect()
@@ -269,9 +269,9 @@ fn mola_corrections<M: ExteriorOrientation>(
     assembled: &Assembled<&M>,
     adjustment: &Adjustment,
     index: usize,
-) -> Result<[Summary; 2], AdjustFault> {
+) -> Result<[Summary; 2], AdjustError> {
     let orientation = CorrectedOrientation {
-        base: &image.stereo.orientation,
+        base: &image.oriented_camera.orientation,
         correction: adjustment.images[index].correction,
     };
     let projector = projector(image, &orientation)?;
@@ -282,7 +282,11 @@ fn mola_corrections<M: ExteriorOrientation>(
         .filter_map(|view| {
             let point = adjustment.points[view.point].as_ref().ok()?;
             let seen = projector.project(&point.ground_m).ok()?;
-            let focal = image.stereo.detector.focal_px(&seen.camera_m).ok()?;
+            let focal = image
+                .oriented_camera
+                .detector
+                .focal_px(&seen.camera_m)
+                .ok()?;
             Some([seen.x - view.x_lines, focal.y - view.y_px])
         })
         .collect();

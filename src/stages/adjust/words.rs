@@ -1,44 +1,44 @@
 //! Parts, unknowns and faults of a network by the identifiers of the site.
 
 use super::{
-    fault::AdjustFault,
+    error::AdjustError,
     input::AdjustImage,
     network::{Assembled, Named},
     points::PointKind,
 };
-use crate::geom::bundle::{BundleFault, Part, Unknown};
+use crate::geom::bundle::{BundleError, Part, Unknown};
 
-/// The fault with identifiers in place of indices.
+/// The error with identifiers in place of indices.
 pub(super) fn in_words<M>(
-    fault: BundleFault,
+    error: BundleError,
     images: &[AdjustImage<M>],
     assembled: &Assembled<&M>,
-) -> AdjustFault {
-    match fault {
-        BundleFault::Singular { unknowns } => {
+) -> AdjustError {
+    match error {
+        BundleError::Singular { unknowns } => {
             let words: Vec<String> = unknowns
                 .iter()
                 .map(|unknown| unknown_in_words(*unknown, images, &assembled.profiles))
                 .collect();
-            AdjustFault::Singular(words.join(", "))
+            AdjustError::Singular(words.join(", "))
         }
-        BundleFault::Value {
+        BundleError::Value {
             part,
             what,
             value,
             expected,
-        } => AdjustFault::Value {
+        } => AdjustError::Value {
             what: format!("the {what} of {}", part_in_words(part, images, assembled)),
             value,
             expected,
         },
-        _ => AdjustFault::Network(fault),
+        _ => AdjustError::Network(error),
     }
 }
 
 /// A part of the network by its identifiers.
 fn part_in_words<M>(part: Part, images: &[AdjustImage<M>], assembled: &Assembled<&M>) -> String {
-    let image = |index: usize| format!("image {}", images[index].stereo.id);
+    let image = |index: usize| format!("image {}", images[index].oriented_camera.id);
     let point = |index: usize| {
         let kind = match assembled.kind(index) {
             PointKind::Shot => "shot",
@@ -69,7 +69,7 @@ pub(super) fn unknown_in_words<M>(
 ) -> String {
     let owner = match unknown {
         Unknown::Orientation { image, .. } | Unknown::TimeBias { image } => {
-            format!("image {}", images[image].stereo.id)
+            format!("image {}", images[image].oriented_camera.id)
         }
         Unknown::RangeBias { profile } => format!("profile {}", profiles[profile].name),
     };

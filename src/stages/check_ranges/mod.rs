@@ -20,7 +20,7 @@ use super::{convert_datum::Converted, group_profiles::Profile};
 use crate::{
     altimetry::MolaClock,
     config::RangeCheckConfig,
-    error::{Fault, Kind, Result, Stopped},
+    error::{Cause, Kind, Result, Stopped},
     footprints::Footprints,
     frames::MarsIau2000,
     geom::statistics::{Summary, Trend, outliers},
@@ -153,7 +153,7 @@ struct OutsideTrajectory {
     at: Et,
 }
 
-impl Fault for OutsideTrajectory {
+impl Cause for OutsideTrajectory {
     fn kind(&self) -> Kind {
         Kind::Coverage
     }

@@ -1,6 +1,6 @@
 //! Ground points of tie points, from images whose orientation is held fixed.
 //!
-//! Two kinds of residual are told apart. The *focal* residual is what is left in an image's focal plane,
+//! Two kinds of residual are distinguished. The *focal* residual is what is left in an image's focal plane,
 //! in pixels. The *reprojection* residual is the measured place minus the one where the image sees the
 //! intersected point, in lines and pixels; it is the one that Shan et al. 2005 print in their Table 5.
 
@@ -15,14 +15,14 @@ use serde::{Deserialize, Serialize};
 use super::{read_ties::Ties, site_image::SiteImage};
 use crate::{
     config::IntersectionConfig,
-    error::{Fault, Kind, Result},
+    error::{Cause, Kind, Result},
     frames::{MarsIau2000, Position},
     geom::{
         intersection::{
-            Intersection, IntersectionLimits, Sight, Unintersected, Weighting, intersect,
+            Intersection, IntersectionLimits, Ray, Unintersected, Weighting, intersect,
         },
+        oriented_camera::OrientedCamera,
         pushbroom::{CameraModel, ExteriorOrientation, Projector, Unseen},
-        stereo::StereoImage,
     },
     stage::{InOrder, Output, Round, Stage},
     stage_inputs,
@@ -100,9 +100,9 @@ pub struct MeasureResidual {
     pub x_lines: f64,
     /// Measured focal coordinate across the track, pixels.
     pub y_px: f64,
-    /// Along the track, focal pixels.
+    /// Along the track, focal-plane pixels.
     pub focal_along_px: f64,
-    /// Across the track, focal pixels.
+    /// Across the track, focal-plane pixels.
     pub focal_across_px: f64,
     /// Measured minus projected line.
     pub reprojection_lines: f64,
@@ -118,13 +118,13 @@ pub struct RejectedTie {
     /// Its identifier.
     pub id: String,
     /// Why.
-    pub reason: TieReject,
+    pub reason: TieRejection,
 }
 
-/// Why a tie point is left out.
+/// Why a tie point is rejected.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, thiserror::Error)]
 #[serde(rename_all = "snake_case")]
-pub enum TieReject {
+pub enum TieRejection {
     /// Its rays give no point.
     #[error("{0}")]
     Rays(Unintersected),
@@ -153,7 +153,7 @@ struct BlindImage {
     unseen: Unseen,
 }
 
-impl Fault for BlindImage {
+impl Cause for BlindImage {
     fn kind(&self) -> Kind {
         Kind::Input
     }
@@ -165,7 +165,7 @@ impl Fault for BlindImage {
 
 /// A measurement in focal coordinates.
 #[derive(Debug, Clone, Copy)]
-struct Place {
+struct ImagePoint {
     image: usize,
     x_lines: f64,
     focal_px: Vector2<f64>,
@@ -200,7 +200,7 @@ impl Stage for Intersect<'_> {
         let oriented = SiteImage::oriented(self.images.0)?;
         let images: Vec<_> = oriented
             .iter()
-            .map(|image| image.stereo(*self.model))
+            .map(|image| image.oriented_camera(*self.model))
             .collect();
         intersect_ties(
             &images,
@@ -216,7 +216,7 @@ impl Stage for Intersect<'_> {
 /// Measurements in images that are not there; orientations that see nothing. Single points that cannot
 /// be intersected are listed instead.
 pub fn intersect_ties<M: ExteriorOrientation>(
-    images: &[StereoImage<M>],
+    images: &[OrientedCamera<M>],
     ties: &[TiePoint],
     options: &IntersectOptions,
 ) -> Result<IntersectedTies> {
@@ -232,7 +232,7 @@ pub fn intersect_ties<M: ExteriorOrientation>(
             Ok(projector?.through(image.detector.distortion))
         })
         .collect::<std::result::Result<_, BlindImage>>()?;
-    let found: Vec<std::result::Result<(IntersectedPoint, Intersection), TieReject>> = ties
+    let found: Vec<std::result::Result<(IntersectedPoint, Intersection), TieRejection>> = ties
         .par_iter()
         .enumerate()
         .zip(&places)
@@ -244,33 +244,34 @@ pub fn intersect_ties<M: ExteriorOrientation>(
     Ok(summarise(images, ties, found))
 }
 
-/// Measurements of each tie point, or why it is left out.
+/// Measurements of each tie point, or why it is rejected.
 fn places<M: ExteriorOrientation>(
-    images: &[StereoImage<M>],
+    images: &[OrientedCamera<M>],
     ties: &[TiePoint],
-) -> Result<Vec<std::result::Result<Vec<Place>, TieReject>>> {
+) -> Result<Vec<std::result::Result<Vec<ImagePoint>, TieRejection>>> {
     require_images(ties, images.len())?;
     let mut used = BTreeSet::new();
     let places = ties.iter().map(|tie| {
         let seen_in: BTreeSet<usize> = tie.measures.iter().map(|measure| measure.image).collect();
         if !used.insert(tie.id.as_str()) {
-            return Err(TieReject::Duplicate);
+            return Err(TieRejection::Duplicate);
         }
         if seen_in.len() < tie.measures.len() {
-            return Err(TieReject::TwiceInImage);
+            return Err(TieRejection::TwiceInImage);
         }
         tie.measures
             .iter()
             .map(|measure| {
                 let image = measure.image;
-                let (x_lines, focal_px) = images[image].focal_place(measure.line, measure.sample);
+                let (x_lines, focal_px) =
+                    images[image].focal_plane_coordinates(measure.line, measure.sample);
                 if !(x_lines.is_finite() && focal_px.y.is_finite()) {
-                    return Err(TieReject::NotFinite);
+                    return Err(TieRejection::NotFinite);
                 }
                 if !images[image].shows(measure.line, measure.sample) {
-                    return Err(TieReject::OutsideImage);
+                    return Err(TieRejection::OutsideImage);
                 }
-                Ok(Place {
+                Ok(ImagePoint {
                     image,
                     x_lines,
                     focal_px,
@@ -282,26 +283,26 @@ fn places<M: ExteriorOrientation>(
 }
 
 fn intersect_one<M: ExteriorOrientation>(
-    images: &[StereoImage<M>],
+    images: &[OrientedCamera<M>],
     projectors: &[Projector<'_, M>],
     (index, tie): (usize, &TiePoint),
-    places: &[Place],
+    places: &[ImagePoint],
     options: &IntersectOptions,
-) -> std::result::Result<(IntersectedPoint, Intersection), TieReject> {
+) -> std::result::Result<(IntersectedPoint, Intersection), TieRejection> {
     let (along_sigma_px, across_sigma_px) = match options.weighting {
         Weighting::Focal { sigma_px } => (sigma_px, sigma_px),
         Weighting::Line { across_px, .. } => (1.0, across_px),
     };
-    let mut sights: Vec<Sight> = places
+    let mut rays: Vec<Ray> = places
         .iter()
         .map(|place| {
-            let StereoImage {
+            let OrientedCamera {
                 orientation,
                 detector,
                 ..
             } = &images[place.image];
             let pose = orientation.pose(place.x_lines);
-            Sight {
+            Ray {
                 position_m: pose.position_m,
                 mars_to_camera: pose.mars_to_camera,
                 focal_length_px: detector.focal_length_px,
@@ -311,15 +312,15 @@ fn intersect_one<M: ExteriorOrientation>(
             }
         })
         .collect();
-    let mut point = intersect(&sights, &options.limits).map_err(TieReject::Rays)?;
+    let mut point = intersect(&rays, &options.limits).map_err(TieRejection::Rays)?;
     if let Weighting::Line { along_lines, .. } = options.weighting {
-        // A line is so many focal pixels at the range of this point.
-        for (sight, place) in sights.iter_mut().zip(places) {
+        // A line is so many focal-plane pixels at the range of this point.
+        for (sight, place) in rays.iter_mut().zip(places) {
             let image = &images[place.image];
             let rate_px = image.focal_px_per_line(place.x_lines, &point.ground_m);
             sight.along_sigma_px = along_lines * rate_px;
         }
-        point = intersect(&sights, &options.limits).map_err(TieReject::Rays)?;
+        point = intersect(&rays, &options.limits).map_err(TieRejection::Rays)?;
     }
     let measures = places
         .iter()
@@ -339,7 +340,7 @@ fn intersect_one<M: ExteriorOrientation>(
             })
         })
         .collect::<Option<Vec<_>>>()
-        .ok_or(TieReject::Unseen)?;
+        .ok_or(TieRejection::Unseen)?;
     let found = IntersectedPoint {
         tie: index,
         id: tie.id.clone(),
@@ -353,9 +354,9 @@ fn intersect_one<M: ExteriorOrientation>(
 }
 
 fn summarise<M>(
-    images: &[StereoImage<M>],
+    images: &[OrientedCamera<M>],
     ties: &[TiePoint],
-    found: Vec<std::result::Result<(IntersectedPoint, Intersection), TieReject>>,
+    found: Vec<std::result::Result<(IntersectedPoint, Intersection), TieRejection>>,
 ) -> IntersectedTies {
     let (mut points, mut rejected) = (Vec::new(), Vec::new());
     let (mut squares, mut redundancy) = (0.0, 0_usize);

@@ -13,7 +13,7 @@ const OUTLIER_SIGMA: f64 = 5.0;
 /// Statistics along and across the track.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Residuals2 {
-    /// Along the track: focal pixels, or lines.
+    /// Along the track: focal-plane pixels, or lines.
     pub along: Summary,
     /// Across the track, pixels.
     pub across: Summary,

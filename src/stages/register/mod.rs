@@ -70,7 +70,7 @@ pub struct ModelDifference {
 
 /// Why a footprint has no place in an image.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-enum Reject {
+enum FootprintRejection {
     #[error(transparent)]
     Unseen(#[from] Unseen),
     /// Mars itself stands between camera and point.
@@ -199,12 +199,12 @@ impl OrientedImage<'_> {
         &self,
         projector: &Projector<'_, dyn ExteriorOrientation>,
         point_m: &Vector3<f64>,
-    ) -> std::result::Result<PointOnImage, Reject> {
+    ) -> std::result::Result<PointOnImage, FootprintRejection> {
         let solution = projector.project(point_m)?;
         let pose = projector.model().pose(solution.x);
         // Seen from the point, the camera must stand above the horizon of a sphere through it.
         if !(point_m.dot(&(pose.position_m - point_m)) > 0.0) {
-            return Err(Reject::BeyondHorizon);
+            return Err(FootprintRejection::BeyondHorizon);
         }
         let focal_px = self.detector.focal_px(&pose.camera_vector_m(point_m));
         let focal_px = focal_px.map_err(|_| Unseen::BehindCamera)?;

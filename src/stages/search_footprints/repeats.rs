@@ -3,7 +3,7 @@
 use std::{collections::BTreeMap, path::PathBuf};
 
 use crate::{
-    error::{Failure, Fault, Kind, Result},
+    error::{Cause, Error, Kind, Result},
     footprints::{AsRead, Footprints, SourceFile},
     time::Et,
 };
@@ -27,14 +27,14 @@ struct SharedShots {
     at: Et,
 }
 
-impl Fault for SharedShots {
+impl Cause for SharedShots {
     fn kind(&self) -> Kind {
         Kind::Input
     }
 
     fn advice(&self) -> String {
-        "name only one of the two in pedr.files: every shot counts once, and which version of an orbit \
-         is meant is yours to say"
+        "name only one of the two in pedr.files: every shot counts once, and only you can say which \
+         version of an orbit is meant"
             .to_owned()
     }
 }
@@ -86,7 +86,7 @@ pub(super) fn require_distinct(footprints: &Footprints<AsRead>, paths: &[PathBuf
         (first[1], first[0])
     };
     let path = |row: usize| &paths[usize::from(footprints.file[row])];
-    let fault = SharedShots {
+    let error = SharedShots {
         shots: others as u64 + 1,
         other: path(earlier).display().to_string(),
         record: footprints.record[later],
@@ -94,5 +94,5 @@ pub(super) fn require_distinct(footprints: &Footprints<AsRead>, paths: &[PathBuf
         orbit: footprints.orbit[later],
         at: Et::from_seconds(tag_s(later)),
     };
-    Err(Failure::from(fault).in_file(path(later)))
+    Err(Error::from(error).in_file(path(later)))
 }

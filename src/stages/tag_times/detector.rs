@@ -1,13 +1,13 @@
 //! What a camera can sum, and the pixels that it has.
 
 use crate::{
-    error::{Fault, Kind, Result},
+    error::{Cause, Kind, Result},
     instruments::Instrument,
 };
 
 /// An image that its camera cannot have taken.
 #[derive(Debug, thiserror::Error)]
-enum DetectorFault {
+enum DetectorError {
     #[error("image {image}: {key} is {summing}; expected 1 to {max}, as {instrument} sums")]
     Summing {
         image: String,
@@ -40,7 +40,7 @@ enum DetectorFault {
     },
 }
 
-impl Fault for DetectorFault {
+impl Cause for DetectorError {
     fn kind(&self) -> Kind {
         Kind::Input
     }
@@ -75,7 +75,7 @@ pub(super) fn fits_detector(
         ("crosstrack_summing", crosstrack),
     ] {
         if summing == 0 || summing > limits.max {
-            return Err(DetectorFault::Summing {
+            return Err(DetectorError::Summing {
                 image: image.to_owned(),
                 key,
                 summing,
@@ -86,7 +86,7 @@ pub(super) fn fits_detector(
         }
     }
     if limits.variable_codes.contains(&crosstrack) {
-        return Err(DetectorFault::VariableSumming {
+        return Err(DetectorError::VariableSumming {
             image: image.to_owned(),
             code: crosstrack,
             instrument: instrument.name.clone(),
@@ -96,7 +96,7 @@ pub(super) fn fits_detector(
     let pixels = instrument.detector.pixels;
     let end = u64::from(first) + u64::from(samples) * u64::from(crosstrack);
     if samples == 0 || end > u64::from(pixels) {
-        return Err(DetectorFault::Detector {
+        return Err(DetectorError::Detector {
             image: image.to_owned(),
             samples,
             crosstrack,

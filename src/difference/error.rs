@@ -1,9 +1,9 @@
 //! Why two outputs cannot be compared.
 
-use crate::error::{Fault, Kind};
+use crate::error::{Cause, Kind};
 
 #[derive(Debug, thiserror::Error)]
-pub(super) enum DifferenceFault {
+pub(super) enum DifferenceError {
     /// Neither a site's folder nor a folder of such.
     #[error(
         "there is no manifest.json in it or in a folder below; expected products of `areograph run`"
@@ -23,7 +23,7 @@ pub(super) enum DifferenceFault {
     NoneInBoth { a: String, b: String },
 }
 
-impl Fault for DifferenceFault {
+impl Cause for DifferenceError {
     fn kind(&self) -> Kind {
         match self {
             Self::NoProducts => Kind::Input,

@@ -1,8 +1,8 @@
 //! Why a site cannot be adjusted.
 
 use crate::{
-    error::{Fault, Kind},
-    geom::{bundle::BundleFault, pushbroom::Unseen},
+    error::{Cause, Kind},
+    geom::{bundle::BundleError, pushbroom::Unseen},
 };
 
 /// An initial value so far from its adjusted one is a contradiction, in its standard deviations.
@@ -10,7 +10,7 @@ pub(super) const CONTRADICTION: f64 = 10.0;
 
 /// Why a site cannot be adjusted.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum AdjustFault {
+pub enum AdjustError {
     /// No tie point could be intersected.
     #[error("none of {ties} tie points has a ground point; {first}")]
     NoTies {
@@ -21,7 +21,7 @@ pub enum AdjustFault {
     },
     /// The network as a whole.
     #[error("{0}")]
-    Network(BundleFault),
+    Network(BundleError),
     /// A standard deviation, coordinate or number that is none.
     #[error("{what} is {value}, expected {expected}")]
     Value {
@@ -33,7 +33,7 @@ pub enum AdjustFault {
         expected: &'static str,
     },
     /// Nothing tells unknowns apart.
-    #[error("the network is singular: nothing tells apart {0}")]
+    #[error("the network is singular: the observations do not separate {0}")]
     Singular(String),
     /// A shot occurs twice.
     #[error("two shots have the identifier {0}")]
@@ -58,7 +58,7 @@ pub enum AdjustFault {
     },
 }
 
-impl Fault for AdjustFault {
+impl Cause for AdjustError {
     fn kind(&self) -> Kind {
         Kind::Input
     }
@@ -66,11 +66,11 @@ impl Fault for AdjustFault {
     fn advice(&self) -> String {
         match self {
             Self::NoTies { .. } => "check that the images overlap and that the tie points are theirs",
-            Self::Network(BundleFault::Unsettled { .. }) => "check the tie points and the images' times and kernels: so far apart the observations have no common solution",
+            Self::Network(BundleError::NotConverged { .. }) => "check the tie points and the images' times and kernels: so far apart the observations have no common solution",
             Self::Network(_) => "check the input of the adjustment, and give orientations and footprints finite standard deviations",
             Self::Value { .. } => "correct this value, or leave out what it belongs to",
             Self::Singular(_) => "give these unknowns finite standard deviations, or hold them fixed with 0",
-            Self::DuplicateShot(_) => "leave out the second file, or number the shots anew",
+            Self::DuplicateShot(_) => "leave out the second file, or renumber the shots",
             Self::Blind { .. } => "check the orientation samples of the image",
             Self::Contradiction { .. } => "check the datum, the clock and the units of this value, or raise its standard deviation",
         }

@@ -7,7 +7,7 @@ const SPANS_NAMED: usize = 5;
 
 /// Time that a set does not hold, and that is therefore not compared.
 #[derive(Debug, Clone, PartialEq)]
-pub struct LeftOut {
+pub struct Uncovered {
     /// The set.
     pub set: String,
     /// `position` or `attitude`.
@@ -19,9 +19,9 @@ pub struct LeftOut {
 }
 
 /// For each set what it lacks: how much, and the first spans.
-pub(super) fn lines(left_out: &[LeftOut]) -> Vec<String> {
-    let same = |a: &LeftOut, b: &LeftOut| a.set == b.set && a.what == b.what;
-    let of_one_set = left_out.chunk_by(same);
+pub(super) fn lines(uncovered: &[Uncovered]) -> Vec<String> {
+    let same = |a: &Uncovered, b: &Uncovered| a.set == b.set && a.what == b.what;
+    let of_one_set = uncovered.chunk_by(same);
     let lines = of_one_set.map(|spans| {
         let (set, what) = (&spans[0].set, spans[0].what);
         let total_s: f64 = spans.iter().map(|one| one.interval.duration_s()).sum();
@@ -52,7 +52,7 @@ mod tests {
 
     #[test]
     fn many_spans_of_a_set_are_one_line() {
-        let span = |set: &str, start_s: u32| LeftOut {
+        let span = |set: &str, start_s: u32| Uncovered {
             set: set.to_owned(),
             what: "position",
             interval: Interval::new(
@@ -61,9 +61,9 @@ mod tests {
             ),
             utc: [format!("from {start_s}"), format!("to {start_s}")],
         };
-        let mut left_out: Vec<LeftOut> = (0..40).map(|start_s| span("nav", start_s)).collect();
-        left_out.push(span("ipng", 3));
-        let told = lines(&left_out);
+        let mut uncovered: Vec<Uncovered> = (0..40).map(|start_s| span("nav", start_s)).collect();
+        uncovered.push(span("ipng", 3));
+        let told = lines(&uncovered);
         assert_eq!(told.len(), 2);
         assert!(
             told[0].starts_with("left out of the comparison: nav has no position for 20.000 s: from 0 .. to 0 UTC (0.500 s), ")

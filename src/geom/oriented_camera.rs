@@ -6,7 +6,7 @@ use super::pushbroom::{Detector, ExteriorOrientation, missed_m};
 
 /// An image that takes part in intersection or adjustment.
 #[derive(Debug, Clone, PartialEq)]
-pub struct StereoImage<M> {
+pub struct OrientedCamera<M> {
     /// Identifier that measurements name.
     pub id: String,
     /// Exterior orientation as a function of the line from the middle.
@@ -17,12 +17,12 @@ pub struct StereoImage<M> {
     pub lines: f64,
 }
 
-impl<M: ExteriorOrientation> StereoImage<M> {
+impl<M: ExteriorOrientation> OrientedCamera<M> {
     /// Line from the middle, and focal coordinates along and across the track in pixels, of a place in the image.
     ///
     /// Lines and samples are 0 at the outer edge of the first one.
     #[must_use]
-    pub fn focal_place(&self, line: f64, sample: f64) -> (f64, Vector2<f64>) {
+    pub fn focal_plane_coordinates(&self, line: f64, sample: f64) -> (f64, Vector2<f64>) {
         (line - 0.5 * self.lines, self.detector.place_px(sample))
     }
 
@@ -35,7 +35,7 @@ impl<M: ExteriorOrientation> StereoImage<M> {
     /// How far a ground point moves along the focal plane from line `x_lines` to the next, pixels.
     #[must_use]
     pub fn focal_px_per_line(&self, x_lines: f64, ground_m: &Vector3<f64>) -> f64 {
-        let (pose, motion) = self.orientation.moving(x_lines);
+        let (pose, motion) = self.orientation.pose_and_rate(x_lines);
         let camera_m = pose.camera_vector_m(ground_m);
         let rate_m = motion.camera_vector_rate_m(&pose, &camera_m);
         let [_, missed_rate_m] = missed_m(&self.detector.distortion, &camera_m, &rate_m);

@@ -1,10 +1,10 @@
-//! What can go wrong while products are written; all of it is a fault of areograph itself.
+//! What can go wrong while products are written; all of it is a bug in areograph.
 
-use crate::error::{Fault, Kind};
+use crate::error::{Cause, Kind};
 
 /// A product that would be wrong, or came out wrong.
 #[derive(Debug, thiserror::Error)]
-pub(crate) enum ProductFault {
+pub(crate) enum ProductError {
     /// A value that no reader of the product could use.
     #[error("{what} is not a finite number")]
     NotFinite { what: String },
@@ -26,7 +26,7 @@ pub(crate) enum ProductFault {
     },
 }
 
-impl ProductFault {
+impl ProductError {
     /// For `map_err` on errors of encoding libraries.
     pub(crate) fn refused<E: std::fmt::Display>(action: &'static str) -> impl Fn(E) -> Self {
         move |error| Self::Refused {
@@ -43,7 +43,7 @@ impl ProductFault {
     }
 }
 
-impl Fault for ProductFault {
+impl Cause for ProductError {
     fn kind(&self) -> Kind {
         Kind::Bug
     }
