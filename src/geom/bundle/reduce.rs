@@ -8,6 +8,7 @@ use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use super::{
+    heights::ReducedHeights,
     layout::Layout,
     point_rows::{PointRows, add_multiple},
     unknowns::State,
@@ -25,6 +26,8 @@ pub(super) struct Reduced {
     pub(super) right: DVector<f64>,
     /// The sum that is made small.
     pub(super) cost: f64,
+    /// Heights, where they are observed; matrix, right side and sum contain them.
+    pub(super) heights: Option<ReducedHeights>,
 }
 
 impl Reduced {
@@ -33,6 +36,7 @@ impl Reduced {
             matrix: DMatrix::zeros(columns, columns),
             right: DVector::zeros(columns),
             cost: 0.0,
+            heights: None,
         }
     }
 
@@ -94,6 +98,14 @@ pub(super) fn reduce<M: ExteriorOrientation>(
         sum.matrix[(column, column)] += weight;
         sum.right[column] -= weight * correction;
         sum.cost += weight * correction * correction;
+    }
+    if let Some(heights) = &layout.heights {
+        let heights = ReducedHeights::of(layout, heights, state)?;
+        let (matrix, right, cost) = heights.equations();
+        sum.matrix += matrix;
+        sum.right += right;
+        sum.cost += cost;
+        sum.heights = Some(heights);
     }
     Ok(sum)
 }
