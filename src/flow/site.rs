@@ -253,6 +253,7 @@ fn adjust<D: Driver>(flow: &mut D, config: &SiteConfig, site: &Site) -> Flow<Opt
         profiles: &site.profiles,
         ties: &ties,
         intersected: &intersected,
+        mola_surface: &config.mola_surface,
         adjustment: &config.adjustment,
     })?;
     let reorient = |(index, image): (usize, &SiteImage)| {

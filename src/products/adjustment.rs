@@ -12,7 +12,7 @@ use super::{
 };
 use crate::{
     config::{AdjustmentConfig, IntersectionConfig, OrientationPrior},
-    footprints::FootprintImageCoordinates,
+    footprints::{AdjustmentModel, FootprintImageCoordinates},
     geom::{
         bundle::ORIENTATION_UNKNOWNS,
         pushbroom::CameraModel,
@@ -109,11 +109,12 @@ struct Configured<'a> {
 struct AdjustmentKeys<'a> {
     #[schemars(transform = all_positive)]
     tie_sigma_px: [f64; 2],
-    mola_image: FootprintImageCoordinates,
+    model: AdjustmentModel,
+    footprint_image_coordinates: FootprintImageCoordinates,
     #[schemars(transform = all_positive)]
-    mola_sigma_px: [f64; 2],
+    footprint_sigma_px: [f64; 2],
     #[schemars(range(min = 0.0))]
-    mola_margin_px: f64,
+    footprint_margin_px: f64,
     #[schemars(extend("exclusiveMinimum" = 0))]
     ground_sigma_m: f64,
     #[schemars(extend("exclusiveMinimum" = 0))]
@@ -122,10 +123,18 @@ struct AdjustmentKeys<'a> {
     range_bias_sigma_m: f64,
     #[schemars(range(min = 0.0))]
     time_bias_sigma_s: f64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(transform = none_negative)]
+    position_sigma_m: Option<[f64; 3]>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(transform = none_negative)]
+    rotation_sigma_rad: Option<[f64; 3]>,
+    #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 0.0))]
-    nadir_sigma_m: f64,
+    position_sigma_nadir_m: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 0.0))]
-    off_nadir_sigma_m: f64,
+    position_sigma_off_nadir_m: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     robust: Option<&'a RobustWeight>,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -149,6 +158,8 @@ impl<'a> AdjustmentKeys<'a> {
     fn of(config: &'a AdjustmentConfig) -> Self {
         // JSON has no infinity.
         let number = |sigma: f64| sigma.min(f64::MAX);
+        let is_of_surface = config.model == AdjustmentModel::MolaSurface;
+        let published_m = (!is_of_surface).then(|| config.published_sigmas_m().map(number));
         let prior = |prior: &'a OrientationPrior| PriorKeys {
             id: &prior.id,
             position_m: prior.position_m.map(|sigmas| sigmas.map(number)),
@@ -156,15 +167,18 @@ impl<'a> AdjustmentKeys<'a> {
         };
         Self {
             tie_sigma_px: config.tie_sigma_px,
-            mola_image: config.footprint_image_coordinates,
-            mola_sigma_px: config.footprint_sigma_px,
-            mola_margin_px: config.footprint_margin_px,
+            model: config.model,
+            footprint_image_coordinates: config.footprints_in_images(),
+            footprint_sigma_px: config.footprint_sigma_px,
+            footprint_margin_px: config.footprint_margin_px,
             ground_sigma_m: config.ground_sigma_m,
             range_sigma_m: config.range_sigma_m,
-            range_bias_sigma_m: config.range_bias_sigma_m,
+            range_bias_sigma_m: config.range_bias_m(),
             time_bias_sigma_s: config.time_bias_sigma_s,
-            nadir_sigma_m: number(config.position_sigma_nadir_m),
-            off_nadir_sigma_m: number(config.position_sigma_off_nadir_m),
+            position_sigma_m: is_of_surface.then(|| config.position_sigma_m.map(number)),
+            rotation_sigma_rad: is_of_surface.then(|| config.rotation_sigma_rad.map(number)),
+            position_sigma_nadir_m: published_m.map(|[nadir_m, _]| nadir_m),
+            position_sigma_off_nadir_m: published_m.map(|[_, other_m]| other_m),
             robust: config.robust.as_ref(),
             blunder_limit: config.blunder_limit,
             images: config.images.iter().map(prior).collect(),

@@ -206,6 +206,7 @@ fn ground_sigmas(summary: &AdjustmentSummary) -> String {
 const fn kind(of: ObservationType) -> &'static str {
     match of {
         ObservationType::TieImage => "image coordinates of tie points",
+        ObservationType::MolaHeight => "heights by the MOLA surface",
         ObservationType::MolaImage => "image coordinates of MOLA",
         ObservationType::MolaRange => "MOLA ranges",
         ObservationType::Orientation => "initial orientation",

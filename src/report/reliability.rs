@@ -33,7 +33,7 @@ pub(super) fn absolute(site: &SiteProducts, geometric: &GeometricProducts) -> St
     let relative = BeforeAfter::worst(&pairs);
     let relative = relative.map_or_else(String::new, |pair| pair.sentence() + " ");
     let summary = &geometric.adjusted.summary;
-    let witness = match site.config.adjustment.footprint_image_coordinates {
+    let witness = match site.config.adjustment.footprints_in_images() {
         FootprintImageCoordinates::Weighted if summary.shots.corrections_m[0].n > 0 => {
             "the image coordinates of footprints were computed from the very orientation that is adjusted and are no \
              measurements of their own; these, by their weight, and the standard deviations that the orientation was \
@@ -240,7 +240,10 @@ pub(super) fn rejected(adjusted: &Adjusted) -> String {
     let mut undetermined = [0_usize; 2];
     for point in &adjusted.rejected {
         match point.reason {
-            RejectionReason::Blunder { standardised } => blunders.push((&point.id, standardised)),
+            RejectionReason::Blunder { standardised }
+            | RejectionReason::Height { standardised, .. } => {
+                blunders.push((&point.id, standardised));
+            }
             RejectionReason::Undetermined => {
                 undetermined[usize::from(point.kind == PointKind::Tie)] += 1;
             }

@@ -3,6 +3,7 @@
 use nalgebra::{Vector2, Vector3};
 
 use super::LaserSurface;
+use crate::geom::ellipsoid::local_axes;
 
 /// An azimuthal equidistant map on the sphere through the middle of a site: distances of a few kilometres are true to
 /// 1e-4 within 80 km of it, at the poles too.
@@ -19,13 +20,11 @@ impl Plan {
     pub(super) fn around(places_m: impl Iterator<Item = Vector3<f64>>) -> Self {
         let sum: Vector3<f64> = places_m.map(|place| place.normalize()).sum();
         let up = sum.try_normalize(0.0).unwrap_or_else(Vector3::z);
-        // At a pole every direction is as good for east.
-        let east = Vector3::z().cross(&up);
-        let east = east.try_normalize(1e-9).unwrap_or_else(Vector3::y);
+        let axes = local_axes(&up);
         Self {
             up,
-            east,
-            north: up.cross(&east),
+            east: axes.row(0).transpose(),
+            north: axes.row(1).transpose(),
             radius_m: LaserSurface::on_ellipsoid_m(&up).norm(),
         }
     }

@@ -7,6 +7,7 @@
 mod adjusted;
 mod blunders;
 mod error;
+mod heights;
 mod input;
 mod network;
 mod points;
