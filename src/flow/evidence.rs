@@ -28,7 +28,10 @@ pub(super) fn judged(
             ties: adjustment.ties.value()?,
             adjusted: adjustment.adjusted.value()?,
             images: &adjusted_images,
-            pairs: adjustment.adjusted_pairs.value()?,
+            pairs: adjustment.pairs.value()?,
+            adjusted_pairs: adjustment.adjusted_pairs.value()?,
+            heights: adjustment.heights.value()?,
+            adjusted_heights: adjustment.adjusted_heights.value()?,
         }),
         None => None,
     };
@@ -39,6 +42,7 @@ pub(super) fn judged(
     let searched = !config.pedr.files.is_empty();
     let verdict = judge(&Evidence {
         footprints: searched.then_some(site.converted.value()?.footprints.len()),
+        limits: &config.limits,
         ranges: site.ranges.value()?,
         clock_correction_s: config.mola_clock.correction_s(),
         images: &images,
@@ -47,7 +51,10 @@ pub(super) fn judged(
         adjustment,
         adjustment_failure: failure.as_deref(),
     });
-    Ok((verdict, adjustment.is_some_and(|of| of.images_agree())))
+    Ok((
+        verdict,
+        adjustment.is_some_and(|of| of.images_agree(&config.limits)),
+    ))
 }
 
 fn judged_images(images: &[SiteImage]) -> Result<Vec<JudgedImage<'_>>> {

@@ -33,12 +33,12 @@ pub use sites::publish_sites;
 use crate::{
     stage::Stage,
     stages::{
-        adjust::Adjust, check_ranges::CheckRanges, compare_pairs::ComparePairs,
-        convert_datum::ConvertDatum, describe_kernels::DescribeKernels,
-        fit_sensor_model::FitSensorModel, group_profiles::GroupProfiles, intersect::Intersect,
-        read_ties::ReadTies, register::Register, reorient::Reorient,
-        sample_orientation::SampleOrientation, search_footprints::SearchFootprints,
-        tag_times::TagTimes, tag_utc::TagUtc,
+        adjust::Adjust, check_heights::CheckHeights, check_ranges::CheckRanges,
+        compare_pairs::ComparePairs, convert_datum::ConvertDatum,
+        describe_kernels::DescribeKernels, fit_sensor_model::FitSensorModel,
+        group_profiles::GroupProfiles, intersect::Intersect, read_ties::ReadTies,
+        register::Register, reorient::Reorient, sample_orientation::SampleOrientation,
+        search_footprints::SearchFootprints, tag_times::TagTimes, tag_utc::TagUtc,
     },
 };
 
@@ -48,7 +48,7 @@ pub const LOAD_KERNELS: &str = "load_kernels";
 pub const PUBLISH: &str = "publish";
 
 /// The names of the stages in the order of the flow, for `--until`.
-pub const STAGES: [&str; 18] = [
+pub const STAGES: [&str; 19] = [
     LOAD_KERNELS,
     TagTimes::NAME,
     SearchFootprints::NAME,
@@ -64,6 +64,7 @@ pub const STAGES: [&str; 18] = [
     ReadTies::NAME,
     Intersect::NAME,
     ComparePairs::NAME,
+    CheckHeights::NAME,
     Adjust::NAME,
     Reorient::NAME,
     PUBLISH,

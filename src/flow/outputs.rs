@@ -6,10 +6,11 @@ use crate::{
     spice::{KernelSet, RequiredCoverage},
     stage::Output,
     stages::{
-        adjust::Adjusted, check_ranges::RangeCheck, compare_pairs::PairComparison,
-        convert_datum::Converted, describe_kernels::KernelDescription, group_profiles::Profile,
-        intersect::IntersectedTies, read_ties::Ties, search_footprints::SearchResult,
-        site_image::SiteImage, tag_times::ImageTimes,
+        adjust::Adjusted, check_heights::HeightCheck, check_ranges::RangeCheck,
+        compare_pairs::PairComparison, convert_datum::Converted,
+        describe_kernels::KernelDescription, group_profiles::Profile, intersect::IntersectedTies,
+        read_ties::Ties, search_footprints::SearchResult, site_image::SiteImage,
+        tag_times::ImageTimes,
     },
 };
 
@@ -50,7 +51,11 @@ pub(super) struct Adjustment {
     pub(super) ties: Output<Ties>,
     pub(super) intersected: Output<IntersectedTies>,
     pub(super) pairs: Output<Vec<PairComparison>>,
+    /// Heights of the intersected points.
+    pub(super) heights: Output<HeightCheck>,
     pub(super) adjusted: Output<Adjusted>,
+    /// Heights of the adjusted points.
+    pub(super) adjusted_heights: Output<HeightCheck>,
     /// The same images with their adjusted orientation.
     pub(super) adjusted_images: Vec<SiteImage>,
     pub(super) adjusted_intersected: Output<IntersectedTies>,

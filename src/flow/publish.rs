@@ -28,7 +28,7 @@ use crate::{
 };
 
 /// Raised when products are laid out anew.
-const METHOD: u32 = 10;
+const METHOD: u32 = 11;
 
 /// The configuration as written, the outlines that it names, all kernels and where they lie from `folder`, and
 /// every stage with what it was made from.
@@ -170,7 +170,9 @@ fn geometric_products<'a>(
         ties: adjustment.ties.value()?,
         intersected: adjustment.intersected.value()?,
         pairs: adjustment.pairs.value()?,
+        heights: adjustment.heights.value()?,
         adjusted: adjustment.adjusted.value()?,
+        adjusted_heights: adjustment.adjusted_heights.value()?,
         adjusted_images,
         adjusted_intersected: adjustment.adjusted_intersected.value()?,
         adjusted_pairs: adjustment.adjusted_pairs.value()?,

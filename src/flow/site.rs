@@ -15,6 +15,7 @@ use crate::{
     stage::{InOrder, Output, Round, Stage},
     stages::{
         adjust::Adjust,
+        check_heights::{CheckHeights, CheckedPoints},
         check_ranges::CheckRanges,
         compare_pairs::{ComparePairs, PairComparison},
         convert_datum::{ConvertDatum, Converted},
@@ -246,6 +247,15 @@ fn adjust<D: Driver>(flow: &mut D, config: &SiteConfig, site: &Site) -> Flow<Opt
     }
     let ties = ties(flow, config)?;
     let (intersected, pairs) = intersect(flow, config, Round::Initial, &site.images, &ties, site)?;
+    let check_heights = |round, points| CheckHeights {
+        round,
+        points,
+        converted: &site.converted,
+        profiles: &site.profiles,
+        mola_surface: &config.mola_surface,
+    };
+    let points = CheckedPoints::Intersected(&intersected);
+    let heights = flow.stage(&check_heights(Round::Initial, points))?;
     let adjusted = flow.stage(&Adjust {
         images: InOrder(&site.images),
         model: &config.registration.model,
@@ -256,6 +266,8 @@ fn adjust<D: Driver>(flow: &mut D, config: &SiteConfig, site: &Site) -> Flow<Opt
         mola_surface: &config.mola_surface,
         adjustment: &config.adjustment,
     })?;
+    let points = CheckedPoints::Adjusted(&adjusted);
+    let adjusted_heights = flow.stage(&check_heights(Round::Adjusted, points))?;
     let reorient = |(index, image): (usize, &SiteImage)| {
         flow.stage(&Reorient {
             image: &config.images[index].id,
@@ -280,7 +292,9 @@ fn adjust<D: Driver>(flow: &mut D, config: &SiteConfig, site: &Site) -> Flow<Opt
         ties,
         intersected,
         pairs,
+        heights,
         adjusted,
+        adjusted_heights,
         adjusted_images,
         adjusted_intersected,
         adjusted_pairs,

@@ -15,6 +15,7 @@ mod footprints;
 mod generated;
 mod geojson;
 mod gis;
+mod heights;
 mod isd;
 mod kernel_report;
 mod orientation;

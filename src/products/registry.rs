@@ -3,7 +3,7 @@
 use super::{
     adjusted_kernels, adjustment,
     exchange::{adjusted, geopackage, readme, shapefile, stac, tables},
-    footprints, isd, kernel_report, orientation, page,
+    footprints, heights, isd, kernel_report, orientation, page,
     product::Declaration,
     ranges, registration, ties,
 };
@@ -24,6 +24,7 @@ pub(super) static PRODUCTS: &[&Declaration] = &[
     &isd::ISD,
     &ties::TABLE,
     &ties::FOOTPRINTS,
+    &heights::TABLE,
     &adjustment::DOCUMENT,
     &registration::ADJUSTED,
     &orientation::ADJUSTED_TABLE,

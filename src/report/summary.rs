@@ -3,7 +3,6 @@
 use super::{
     html::{Tone, counted, list, paragraph, verdict},
     misregistration::BeforeAfter,
-    plots::label,
 };
 use crate::products::SiteProducts;
 
@@ -64,8 +63,7 @@ fn together(site: &SiteProducts) -> String {
         };
         pair.sentence() + &others
     });
-    let sigma0 = label(geometric.adjusted.summary.sigma0, 2);
-    format!("{words} σ0 of the adjustment: {sigma0}.")
+    format!("{words} {}", super::heights::in_a_sentence(geometric))
         .trim_start()
         .to_owned()
 }

@@ -46,6 +46,8 @@ pub struct CorrectedImage {
     pub correction: [f64; ORIENTATION_UNKNOWNS],
     /// Their standard deviations; 0 where held fixed.
     pub sigmas: [f64; ORIENTATION_UNKNOWNS],
+    /// What they were expected to be within, standard deviations; 0 where held fixed, infinite where free.
+    pub prior_sigmas: [f64; ORIENTATION_UNKNOWNS],
     /// Bias of the line times with its standard deviation, seconds, where it is unknown.
     pub time_bias_s: Option<(f64, f64)>,
     /// Time from line to line, seconds.
@@ -212,6 +214,7 @@ fn corrected_images<M>(
             sigmas: std::array::from_fn(|unknown| {
                 root * adjusted.cofactors[(unknown, unknown)].sqrt()
             }),
+            prior_sigmas: image.sigmas,
             time_bias_s: adjusted
                 .time_bias_s
                 .map(|(bias_s, root_s)| (bias_s, root * root_s)),

@@ -274,7 +274,7 @@ pub(super) fn tie_components<M>(assembled: &Assembled<M>, adjustment: &Adjustmen
 }
 
 /// A standard deviation of unit weight up to this is what chance gives some hundred tie points.
-const WORSE_THAN_CONFIGURED: f64 = 1.12;
+pub const WORSE_THAN_CONFIGURED: f64 = 1.12;
 
 /// What a priori variances are multiplied with in covariances.
 pub(super) fn variance_factor<M>(assembled: &Assembled<M>, adjustment: &Adjustment) -> f64 {
