@@ -24,7 +24,7 @@ use std::{
 
 use areograph::{
     config::AdjustmentConfig,
-    footprints::FootprintImageCoordinates,
+    footprints::{AdjustmentModel, FootprintImageCoordinates},
     frames::Position,
     geom::{
         intersection::{IntersectionLimits, Unintersected},
@@ -85,8 +85,9 @@ fn priors_of_the_paper() -> Priors {
 /// coordinates.
 fn options(footprint_image_coordinates: FootprintImageCoordinates) -> AdjustmentConfig {
     AdjustmentConfig {
+        model: AdjustmentModel::Published,
         tie_sigma_px: [1.4; 2],
-        footprint_image_coordinates,
+        footprint_image_coordinates: Some(footprint_image_coordinates),
         footprint_sigma_px: [30.0; 2],
         ground_sigma_m: 10.0,
         range_sigma_m: 10.0,
@@ -147,6 +148,7 @@ impl Site {
         LaserShots {
             profiles: vec!["LOLA".to_owned()],
             shots: (0..).zip(&self.points).map(shot).collect(),
+            surface: None,
         }
     }
 

@@ -24,10 +24,11 @@ use areograph::{
 use page::{csv, lead, number, section, table};
 use site::Site;
 
-const SECTIONS: [&str; 3] = [
+const SECTIONS: [&str; 4] = [
     "tie-points-and-misregistration",
     "combined-adjustment",
-    "uncertainty-of-ground-points",
+    "reproduction-eq-5-to-9",
+    "accuracy",
 ];
 
 /// Numbers of a page have so many decimals.
@@ -58,11 +59,14 @@ fn the_first_lines_tell_how_far_images_disagree_before_and_after() {
     assert!(before_m > 0.5 * spacing_m && after_m < 0.05 * spacing_m);
     let words = format!(
         "before the adjustment a footprint falls {:.2} MOLA spacings ({before_m:.0} m) apart in the two images along \
-         the flight; after it {:.3} MOLA spacings ({after_m:.1} m). σ0 of the adjustment: {:.2}.",
+         the flight; after it {:.3} MOLA spacings ({after_m:.1} m). Against MOLA tie points lie {:.1} m high before the \
+         adjustment and {:.1} m after it (medians).",
         before_m / spacing_m,
         after_m / spacing_m,
-        site.adjusted.summary.sigma0
-    );
+        site.heights.above_m.median,
+        site.adjusted_heights.above_m.median
+    )
+    .replace('-', "−");
     assert!(lead(&page).contains(&words), "{words}\n{}", lead(&page));
 }
 
@@ -294,17 +298,29 @@ fn what_cannot_be_trusted_is_said() {
     let site = Site::gusev();
     let page = site.page();
     let text = section(&page, SECTIONS[1]);
-    assert!(text.contains("The relative registration is corrected, the absolute position is not."));
-    assert!(text.contains(
-        "A gross error in a tie point across the track shows only &lt; 0.1 % in its residual: such errors cannot be found."
-    ));
+    let [east_m, north_m, up_m] = site.adjusted.summary.heights.unwrap().mean_sigma_m;
+    assert!(text.contains(&format!(
+        "The relative registration is corrected; heights are those of MOLA, to {up_m:.1} m on average; the place is what was \
+         known of orbit and attitude beforehand, to {east_m:.0} m east and {north_m:.0} m north."
+    )));
+    // The surface controls tie points across the track in part: with its spacing of shots not all of them.
+    let shown = table(&page, "Share of a gross error that its own residual shows");
+    let across = shown
+        .iter()
+        .find(|row| row[0] == "tie point across the track")
+        .unwrap();
+    let mean = number(across[2].trim_end_matches(" %"));
+    assert!((20.0..60.0).contains(&mean), "{mean}");
     let correlated = &site.adjusted.summary.correlated;
     let most = correlated.iter().map(|of| of.2.abs()).fold(0.0, f64::max);
     let rows = table(&page, "Largest correlations");
     assert_eq!(rows.len(), correlated.len().min(12));
     agree(&number(&rows[0][0]).abs().to_string(), most, 4);
     let blunders = table(&page, "Blunders");
-    let found = |of: &&RejectedPoint| matches!(of.reason, RejectionReason::Blunder { .. });
+    let found = |of: &&RejectedPoint| {
+        use RejectionReason::{Blunder, Height};
+        matches!(of.reason, Blunder { .. } | Height { .. })
+    };
     let expected: Vec<&RejectedPoint> = site.adjusted.rejected.iter().filter(found).collect();
     assert_eq!(blunders.len(), expected.len());
     assert!(
@@ -388,7 +404,7 @@ fn images_without_a_common_tie_point_are_said_to_be_so() {
     let page = site.page();
     assert!(section(&page, SECTIONS[0]).contains("No two images share tie points"));
     assert!(!page.contains(&format!("id=\"{}\"", SECTIONS[2])));
-    assert!(lead(&page).contains("<p>σ0 of the adjustment"));
+    assert!(lead(&page).contains("<p>Against MOLA tie points lie"));
 }
 
 #[test]
@@ -404,5 +420,5 @@ fn a_site_without_tie_points_has_none_of_it() {
     for id in SECTIONS {
         assert!(!page.contains(id), "{id}");
     }
-    assert!(!lead(&page).contains("σ0"));
+    assert!(!lead(&page).contains("MOLA tie points"));
 }

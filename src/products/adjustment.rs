@@ -23,13 +23,14 @@ use crate::{
     schema::{DocumentSchema, all_positive, at, none_negative},
     stages::{
         adjust::{AdjustmentSummary, CorrectedImage, PointKind},
+        check_heights::{HeightCheck, ProfilesApart, SurfaceFigures},
         compare_pairs::{PairComparison, ProfileByTies},
         intersect::{ImageResiduals, IntersectedTies},
     },
 };
 
 /// What the numbers are, for readers of the file.
-const DEFINITIONS: [(&str, &str); 9] = [
+const DEFINITIONS: [(&str, &str); 10] = [
     (
         "before, after",
         "with the orientation of the kernels, and with the adjusted one; ground points are intersected anew",
@@ -42,6 +43,11 @@ const DEFINITIONS: [(&str, &str); 9] = [
         "reprojection",
         "measured minus projected place of the intersected point: lines along the track, pixels of the image \
          across it; residuals of the pairs too (Table 5 of Shan et al. 2005)",
+    ),
+    (
+        "heights",
+        "tie points above the MOLA surface, metres: before the adjustment a test of the orientation, after it how well the \
+         adjustment meets what controls it",
     ),
     (
         "along_track_parallax_m",
@@ -204,6 +210,35 @@ struct StateDocument<'a> {
     rejected: Vec<RejectedPointDocument<'a>>,
     images: &'a [ImageResiduals],
     pairs: Vec<PairDocument<'a>>,
+    heights: HeightDocument<'a>,
+}
+
+/// Heights of tie points against the MOLA surface.
+#[derive(Serialize, JsonSchema)]
+struct HeightDocument<'a> {
+    #[serde(skip_serializing_if = "Option::is_none")]
+    surface: Option<&'a SurfaceFigures>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    no_surface_because: Option<&'a str>,
+    above_surface_m: &'a Summary,
+    #[schemars(range(min = 0.0))]
+    mean_sigma_m: f64,
+    near_shots: usize,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    profiles_apart: Option<&'a ProfilesApart>,
+}
+
+impl<'a> HeightDocument<'a> {
+    fn of(check: &'a HeightCheck) -> Self {
+        Self {
+            surface: check.surface.as_ref().ok(),
+            no_surface_because: check.surface.as_ref().err().map(String::as_str),
+            above_surface_m: &check.above_m,
+            mean_sigma_m: check.mean_sigma_m,
+            near_shots: check.near_shots,
+            profiles_apart: check.apart.as_ref(),
+        }
+    }
 }
 
 #[derive(Serialize, JsonSchema)]
@@ -338,8 +373,12 @@ fn document<'a>(site: &SiteProducts<'a>, geometric: &GeometricProducts<'a>) -> D
             ignored: ties.ignored,
             complaints: ties.complaint_count,
         },
-        before: state(geometric.intersected, geometric.pairs),
-        after: state(geometric.adjusted_intersected, geometric.adjusted_pairs),
+        before: state(geometric.intersected, geometric.pairs, geometric.heights),
+        after: state(
+            geometric.adjusted_intersected,
+            geometric.adjusted_pairs,
+            geometric.adjusted_heights,
+        ),
         adjustment: AdjustmentDocument {
             summary: &adjusted.summary,
             weighted_squares: &adjusted.weighted_squares,
@@ -349,7 +388,11 @@ fn document<'a>(site: &SiteProducts<'a>, geometric: &GeometricProducts<'a>) -> D
     }
 }
 
-fn state<'a>(ties: &'a IntersectedTies, pairs: &'a [PairComparison]) -> StateDocument<'a> {
+fn state<'a>(
+    ties: &'a IntersectedTies,
+    pairs: &'a [PairComparison],
+    heights: &'a HeightCheck,
+) -> StateDocument<'a> {
     let rejected = ties.rejected.iter().map(|tie| RejectedPointDocument {
         kind: PointKind::Tie,
         id: &tie.id,
@@ -362,6 +405,7 @@ fn state<'a>(ties: &'a IntersectedTies, pairs: &'a [PairComparison]) -> StateDoc
         rejected: rejected.collect(),
         images: &ties.images,
         pairs: pairs.iter().map(pair).collect(),
+        heights: HeightDocument::of(heights),
     }
 }
 

@@ -11,7 +11,7 @@ use super::{
     table::{Column, Table, Unit, column, meanings},
 };
 use crate::{
-    geom::ellipsoid::Spherical,
+    geom::ellipsoid::{Spherical, local_axes},
     stages::{
         adjust::{CorrectedPoint, ImageResidual, PointKind, RangeResidual},
         intersect::{IntersectedPoint, IntersectedTies, MeasureResidual},
@@ -260,7 +260,7 @@ fn adjusted_columns<'a>() -> Vec<Column<Measurement<'a>>> {
         column(
             "sigma_x_m",
             Unit::Metre,
-            "standard deviation of adjusted_x_m, metres: formal, and too small for the absolute position",
+            "standard deviation of adjusted_x_m, metres; in the published model that of agreement between the images alone",
             |row: &Measurement| Some(sigma_m(row.adjusted?.0, 0)),
         ),
         column("sigma_y_m", Unit::Metre, "likewise", |row: &Measurement| {
@@ -269,6 +269,24 @@ fn adjusted_columns<'a>() -> Vec<Column<Measurement<'a>>> {
         column("sigma_z_m", Unit::Metre, "likewise", |row: &Measurement| {
             Some(sigma_m(row.adjusted?.0, 2))
         }),
+        column(
+            "sigma_east_m",
+            Unit::Metre,
+            "the same towards east, metres",
+            |row: &Measurement| Some(local_sigmas_m(row.adjusted?.0)[0]),
+        ),
+        column(
+            "sigma_north_m",
+            Unit::Metre,
+            "the same towards north, metres",
+            |row: &Measurement| Some(local_sigmas_m(row.adjusted?.0)[1]),
+        ),
+        column(
+            "sigma_up_m",
+            Unit::Metre,
+            "the same of the height, metres",
+            |row: &Measurement| Some(local_sigmas_m(row.adjusted?.0)[2]),
+        ),
         column(
             "residual_along_px",
             Unit::Pixel,
@@ -322,6 +340,13 @@ fn adjusted_columns<'a>() -> Vec<Column<Measurement<'a>>> {
 
 fn spherical(point: &CorrectedPoint) -> Spherical {
     Spherical::from_xyz_m(&point.ground.xyz_m)
+}
+
+/// Standard deviations towards east, north and up, metres.
+fn local_sigmas_m(point: &CorrectedPoint) -> [f64; 3] {
+    let to_local = local_axes(&point.ground.xyz_m);
+    let local_m2 = to_local * point.covariance_m2 * to_local.transpose();
+    [0, 1, 2].map(|axis| local_m2[(axis, axis)].sqrt())
 }
 
 fn sigma_m(point: &CorrectedPoint, axis: usize) -> f64 {

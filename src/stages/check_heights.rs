@@ -6,6 +6,7 @@
 use std::sync::atomic::AtomicBool;
 
 use nalgebra::{DMatrix, Vector3};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::{
@@ -51,7 +52,7 @@ pub struct HeightCheck {
 }
 
 /// The surface that heights are compared with.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct SurfaceFigures {
     /// Shots.
     pub shots: usize,
@@ -89,7 +90,7 @@ impl TieHeight {
 }
 
 /// Surfaces of two profiles at the same tie points.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct ProfilesApart {
     /// Identifiers.
     pub profiles: [String; 2],
