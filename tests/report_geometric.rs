@@ -60,7 +60,7 @@ fn the_first_lines_tell_how_far_images_disagree_before_and_after() {
     let words = format!(
         "before the adjustment a footprint falls {:.2} MOLA spacings ({before_m:.0} m) apart in the two images along \
          the flight; after it {:.3} MOLA spacings ({after_m:.1} m). Against MOLA tie points lie {:.1} m high before the \
-         adjustment and {:.1} m after it (medians).",
+         adjustment and {:.1} m after it (median).",
         before_m / spacing_m,
         after_m / spacing_m,
         site.heights.above_m.median,

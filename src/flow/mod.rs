@@ -15,6 +15,7 @@ mod out;
 mod outputs;
 mod plan;
 mod publish;
+mod read_back;
 mod run;
 mod site;
 mod sites;
@@ -38,7 +39,8 @@ use crate::{
         describe_kernels::DescribeKernels, fit_sensor_model::FitSensorModel,
         group_profiles::GroupProfiles, intersect::Intersect, read_ties::ReadTies,
         register::Register, reorient::Reorient, sample_orientation::SampleOrientation,
-        search_footprints::SearchFootprints, tag_times::TagTimes, tag_utc::TagUtc,
+        search_footprints::SearchFootprints, tabulate_kernels::TabulateKernels,
+        tag_times::TagTimes, tag_utc::TagUtc,
     },
 };
 
@@ -48,7 +50,7 @@ pub const LOAD_KERNELS: &str = "load_kernels";
 pub const PUBLISH: &str = "publish";
 
 /// The names of the stages in the order of the flow, for `--until`.
-pub const STAGES: [&str; 19] = [
+pub const STAGES: [&str; 20] = [
     LOAD_KERNELS,
     TagTimes::NAME,
     SearchFootprints::NAME,
@@ -67,5 +69,6 @@ pub const STAGES: [&str; 19] = [
     CheckHeights::NAME,
     Adjust::NAME,
     Reorient::NAME,
+    TabulateKernels::NAME,
     PUBLISH,
 ];

@@ -10,7 +10,7 @@ use crate::{
         compare_pairs::PairComparison, convert_datum::Converted,
         describe_kernels::KernelDescription, group_profiles::Profile, intersect::IntersectedTies,
         read_ties::Ties, search_footprints::SearchResult, site_image::SiteImage,
-        tag_times::ImageTimes,
+        tabulate_kernels::KernelTables, tag_times::ImageTimes,
     },
 };
 
@@ -40,24 +40,31 @@ pub(super) struct Site {
     pub(super) ranges: Output<RangeCheck>,
     /// In the order of the configuration.
     pub(super) images: Vec<SiteImage>,
-    /// Nothing for a site without tie points, and none when it failed.
+    /// Nothing for a site without tie point files.
+    pub(super) ties: Option<Output<Ties>>,
+    /// With the orientation of the kernels; none when it failed.
+    pub(super) intersection: Option<Intersection>,
+    /// None when it failed.
     pub(super) adjustment: Option<Adjustment>,
     /// Why there is no adjustment although there are tie points.
     pub(super) adjustment_failure: Option<Error>,
 }
 
-/// What tie points make of a site, before and after the adjustment.
-pub(super) struct Adjustment {
-    pub(super) ties: Output<Ties>,
+/// Ground points of the tie points, and what every pair of images says of itself.
+pub(super) struct Intersection {
     pub(super) intersected: Output<IntersectedTies>,
     pub(super) pairs: Output<Vec<PairComparison>>,
-    /// Heights of the intersected points.
+    /// Heights of the intersected points, or of those of the adjustment.
     pub(super) heights: Output<HeightCheck>,
+}
+
+/// What the adjustment makes of a site.
+pub(super) struct Adjustment {
     pub(super) adjusted: Output<Adjusted>,
-    /// Heights of the adjusted points.
-    pub(super) adjusted_heights: Output<HeightCheck>,
-    /// The same images with their adjusted orientation.
-    pub(super) adjusted_images: Vec<SiteImage>,
-    pub(super) adjusted_intersected: Output<IntersectedTies>,
-    pub(super) adjusted_pairs: Output<Vec<PairComparison>>,
+    /// The images with their adjusted orientation.
+    pub(super) images: Vec<SiteImage>,
+    /// What the adjusted kernels of every image hold.
+    pub(super) tables: Vec<Output<KernelTables>>,
+    /// With the adjusted orientation.
+    pub(super) intersection: Intersection,
 }

@@ -5,7 +5,7 @@ use super::{
     choice::{ChooseKernels, KernelChoice, RivalKernelSets, rival_positions},
     driver::{Driver, Flow, Leave},
     kernels::load_kernels,
-    outputs::{Adjustment, Prepared, Site},
+    outputs::{Adjustment, Intersection, Prepared, Site},
 };
 use crate::{
     config::{ImageConfig, SiteConfig},
@@ -14,15 +14,15 @@ use crate::{
     spice::{KernelSet, KernelView, RequiredCoverage},
     stage::{InOrder, Output, Round, Stage},
     stages::{
-        adjust::Adjust,
+        adjust::{Adjust, Adjusted},
         check_heights::{CheckHeights, CheckedPoints},
         check_ranges::CheckRanges,
-        compare_pairs::{ComparePairs, PairComparison},
+        compare_pairs::ComparePairs,
         convert_datum::{ConvertDatum, Converted},
         describe_kernels::{DescribeKernels, Required},
         fit_sensor_model::FitSensorModel,
         group_profiles::{GroupProfiles, Profile},
-        intersect::{Intersect, IntersectedTies},
+        intersect::Intersect,
         orientation::Orientation,
         read_ties::{ImageNames, ReadTies, TieFiles, Ties},
         register::Register,
@@ -30,10 +30,14 @@ use crate::{
         sample_orientation::SampleOrientation,
         search_footprints::{PedrFiles, SearchFootprints},
         site_image::SiteImage,
+        tabulate_kernels::TabulateKernels,
         tag_times::{ImageTimes, TagTimes},
         tag_utc::TagUtc,
     },
 };
+
+/// Footprints and their profiles.
+type Shots<'a> = (&'a Output<Converted>, &'a Output<Vec<Profile>>);
 
 /// The flow of one site, from its configuration to its products.
 pub(super) fn site<D: Driver>(flow: &mut D, config: &SiteConfig) -> Flow<()> {
@@ -45,8 +49,8 @@ pub(super) fn site<D: Driver>(flow: &mut D, config: &SiteConfig) -> Flow<()> {
     };
     let mut site = orient(flow, config, prepared, kernels)?;
     site.choice = choice;
-    match adjust(flow, config, &site) {
-        Ok(adjustment) => site.adjustment = adjustment,
+    match triangulate(flow, config, &mut site) {
+        Ok(()) => {}
         // What the measurements do not determine keeps no other product from its readers.
         Err(Leave::Failed(failure)) if is_of_adjustment(&failure) => {
             tracing::warn!("{failure}");
@@ -175,6 +179,8 @@ pub(super) fn orient<D: Driver>(
         described,
         ranges,
         images,
+        ties: None,
+        intersection: None,
         adjustment: None,
         adjustment_failure: None,
     })
@@ -208,7 +214,7 @@ fn registered<D: Driver>(
     round: Round,
     times: &[Output<ImageTimes>],
     orientations: Vec<Output<Orientation>>,
-    (converted, profiles): (&Output<Converted>, &Output<Vec<Profile>>),
+    (converted, profiles): Shots,
 ) -> Flow<Vec<SiteImage>> {
     let oriented = config.images.iter().zip(times).zip(orientations);
     let register = |((image, times), orientation): ((&ImageConfig, &Output<_>), _)| {
@@ -239,35 +245,42 @@ fn registered<D: Driver>(
     oriented.map(register).collect()
 }
 
-/// Tie points, their ground points, the combined adjustment, and the images once more as adjusted; nothing for a
-/// site without tie points.
-fn adjust<D: Driver>(flow: &mut D, config: &SiteConfig, site: &Site) -> Flow<Option<Adjustment>> {
+/// Tie points, their ground points, and the adjustment, as far as it goes; nothing for a site without tie points.
+fn triangulate<D: Driver>(flow: &mut D, config: &SiteConfig, site: &mut Site) -> Flow<()> {
     if config.ties.files.is_empty() {
-        return Ok(None);
+        return Ok(());
     }
-    let ties = ties(flow, config)?;
-    let (intersected, pairs) = intersect(flow, config, Round::Initial, &site.images, &ties, site)?;
-    let check_heights = |round, points| CheckHeights {
-        round,
-        points,
-        converted: &site.converted,
-        profiles: &site.profiles,
-        mola_surface: &config.mola_surface,
-    };
-    let points = CheckedPoints::Intersected(&intersected);
-    let heights = flow.stage(&check_heights(Round::Initial, points))?;
+    let ties = &*site.ties.insert(ties(flow, config)?);
+    let shots = (&site.converted, &site.profiles);
+    let initial = intersect(flow, config, None, &site.images, ties, shots)?;
+    let initial = &*site.intersection.insert(initial);
+    let kernels = &KernelView::all(site.kernels.as_ref());
+    let adjustment = adjust(flow, config, &site.images, ties, initial, shots, kernels)?;
+    site.adjustment = Some(adjustment);
+    Ok(())
+}
+
+/// The combined adjustment, and the images and tie points once more with the adjusted orientation.
+fn adjust<D: Driver>(
+    flow: &mut D,
+    config: &SiteConfig,
+    images: &[SiteImage],
+    ties: &Output<Ties>,
+    initial: &Intersection,
+    shots: Shots,
+    kernels: &KernelView,
+) -> Flow<Adjustment> {
+    let (converted, profiles) = shots;
     let adjusted = flow.stage(&Adjust {
-        images: InOrder(&site.images),
+        images: InOrder(images),
         model: &config.registration.model,
-        converted: &site.converted,
-        profiles: &site.profiles,
-        ties: &ties,
-        intersected: &intersected,
+        converted,
+        profiles,
+        ties,
+        intersected: &initial.intersected,
         mola_surface: &config.mola_surface,
         adjustment: &config.adjustment,
     })?;
-    let points = CheckedPoints::Adjusted(&adjusted);
-    let adjusted_heights = flow.stage(&check_heights(Round::Adjusted, points))?;
     let reorient = |(index, image): (usize, &SiteImage)| {
         flow.stage(&Reorient {
             image: &config.images[index].id,
@@ -277,28 +290,30 @@ fn adjust<D: Driver>(flow: &mut D, config: &SiteConfig, site: &Site) -> Flow<Opt
             adjusted: &adjusted,
         })
     };
-    let orientations = site.images.iter().enumerate().map(reorient);
+    let orientations = images.iter().enumerate().map(reorient);
     let orientations = orientations.collect::<Flow<Vec<_>>>()?;
-    let times: Vec<_> = site
-        .images
-        .iter()
-        .map(|image| image.times.clone())
-        .collect();
-    let shots = (&site.converted, &site.profiles);
-    let adjusted_images = registered(flow, config, Round::Adjusted, &times, orientations, shots)?;
-    let (adjusted_intersected, adjusted_pairs) =
-        intersect(flow, config, Round::Adjusted, &adjusted_images, &ties, site)?;
-    Ok(Some(Adjustment {
-        ties,
-        intersected,
-        pairs,
-        heights,
+    let times: Vec<_> = images.iter().map(|image| image.times.clone()).collect();
+    let images = registered(flow, config, Round::Adjusted, &times, orientations, shots)?;
+    let intersection = intersect(flow, config, Some(&adjusted), &images, ties, shots)?;
+    let tabulate = |(index, image): (usize, &SiteImage)| {
+        flow.stage(&TabulateKernels {
+            image: &config.images[index].id,
+            index: &index,
+            times: InOrder(&times),
+            orientation: &image.orientation,
+            kernels,
+            coverage: &config.kernels,
+            pointing: &config.pointing,
+        })
+    };
+    let tables = images.iter().enumerate().map(tabulate);
+    let tables = tables.collect::<Flow<Vec<_>>>()?;
+    Ok(Adjustment {
         adjusted,
-        adjusted_heights,
-        adjusted_images,
-        adjusted_intersected,
-        adjusted_pairs,
-    }))
+        images,
+        tables,
+        intersection,
+    })
 }
 
 /// Whether a failure lies in what the tie points and the orientation determine, not in a file that cannot be read.
@@ -319,15 +334,17 @@ pub(super) fn ties<D: Driver>(flow: &mut D, config: &SiteConfig) -> Flow<Output<
     })
 }
 
-/// Ground points of the tie points, and what every pair of images says of itself.
+/// Ground points of the tie points, what every pair of images says of itself, and what MOLA says of heights: with the
+/// orientation of the kernels, or with the adjusted one.
 fn intersect<D: Driver>(
     flow: &mut D,
     config: &SiteConfig,
-    round: Round,
+    adjusted: Option<&Output<Adjusted>>,
     images: &[SiteImage],
     ties: &Output<Ties>,
-    site: &Site,
-) -> Flow<(Output<IntersectedTies>, Output<Vec<PairComparison>>)> {
+    (converted, profiles): Shots,
+) -> Flow<Intersection> {
+    let round = adjusted.map_or(Round::Initial, |_| Round::Adjusted);
     let (images, model) = (InOrder(images), &config.registration.model);
     let intersected = flow.stage(&Intersect {
         round,
@@ -342,10 +359,25 @@ fn intersect<D: Driver>(
         model,
         ties,
         intersected: &intersected,
-        converted: &site.converted,
-        profiles: &site.profiles,
+        converted,
+        profiles,
     })?;
-    Ok((intersected, pairs))
+    let points = adjusted.map_or(
+        CheckedPoints::Intersected(&intersected),
+        CheckedPoints::Adjusted,
+    );
+    let heights = flow.stage(&CheckHeights {
+        round,
+        points,
+        converted,
+        profiles,
+        mola_surface: &config.mola_surface,
+    })?;
+    Ok(Intersection {
+        intersected,
+        pairs,
+        heights,
+    })
 }
 
 /// The kernels of the configuration for the `required` times; `None` while it is not known which these are.

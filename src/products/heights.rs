@@ -23,7 +23,7 @@ pub(super) static TABLE: Declaration = Declaration {
     content: Content::Table(|| meanings(&columns())),
     write: Write::Ties(|path, _, geometric| {
         let table = Table::new(columns(), rows(geometric));
-        parquet::write(path, table, Vec::new()).map(Some)
+        parquet::write(path, table, Vec::new())
     }),
     uses: &[],
 };
@@ -52,11 +52,12 @@ fn rows<'a>(geometric: &GeometricProducts<'a>) -> Vec<Compared<'a>> {
     let by_tie = |ties: &'a [TieHeight]| -> BTreeMap<usize, &'a TieHeight> {
         ties.iter().map(|height| (height.tie, height)).collect()
     };
+    let adjusted = geometric.adjustment.as_ref();
     let (before, after) = (
         by_tie(&geometric.heights.ties),
-        by_tie(&geometric.adjusted_heights.ties),
+        by_tie(adjusted.map_or(&[], |of| &of.heights.ties)),
     );
-    let rejected = geometric.adjusted.rejected.iter();
+    let rejected = adjusted.map_or(&[][..], |of| &of.adjusted.rejected).iter();
     let rejected = rejected.filter(|point| point.kind == PointKind::Tie);
     let rejected: BTreeMap<usize, String> = rejected
         .map(|point| (point.index, point.reason.to_string()))

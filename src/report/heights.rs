@@ -1,7 +1,7 @@
 //! What MOLA says of the heights of tie points, and what may be said of their accuracy.
 
 use super::{
-    html::{Column, Table, heading, paragraph},
+    html::{Cell, Column, Table, heading, paragraph},
     misregistration::BeforeAfter,
     plots::{Panel, Plot, Series, Style, figure, label, thinned},
     section::Section,
@@ -9,8 +9,11 @@ use super::{
 use crate::{
     error::Result,
     footprints::AdjustmentModel,
-    products::{GeometricProducts, SiteProducts},
-    stages::check_heights::{HeightCheck, SurfaceFigures, TieHeight},
+    products::{AdjustmentProducts, GeometricProducts, SiteProducts},
+    stages::{
+        check_heights::{HeightCheck, SurfaceFigures, TieHeight},
+        compare_pairs::PairComparison,
+    },
     units::METRES_PER_KM,
 };
 
@@ -48,16 +51,24 @@ fn write(site: &SiteProducts, geometric: &GeometricProducts) -> Result<String> {
 
 /// What MOLA says of heights, and what is known of them and of the place.
 pub(super) fn in_a_sentence(geometric: &GeometricProducts) -> String {
-    let [before, after] = [geometric.heights, geometric.adjusted_heights];
+    let before = geometric.heights;
+    let after = geometric
+        .adjustment
+        .as_ref()
+        .map_or_else(String::new, |after| {
+            format!(" and {} m after it", label(after.heights.above_m.median, 1))
+        });
     let mola = match &before.surface {
         Ok(_) => format!(
-            "Against MOLA tie points lie {} m high before the adjustment and {} m after it (medians).",
-            label(before.above_m.median, 1),
-            label(after.above_m.median, 1)
+            "Against MOLA tie points lie {} m high before the adjustment{after} (median).",
+            label(before.above_m.median, 1)
         ),
         Err(reason) => format!("MOLA does not control heights: {reason}."),
     };
-    let [height, place] = absolute(geometric);
+    let Some(adjustment) = &geometric.adjustment else {
+        return mola;
+    };
+    let [height, place] = absolute(geometric, adjustment);
     format!("{mola} Height, absolute: {height}. Place, absolute: {place}.")
 }
 
@@ -72,57 +83,46 @@ fn statements(geometric: &GeometricProducts) -> String {
             Column::Text("it says"),
         ],
     );
+    let nothing = || "–".to_owned();
+    let adjustment = geometric.adjustment.as_ref();
     let pairs = BeforeAfter::all(geometric);
     let worst = BeforeAfter::worst(&pairs);
-    let parallax = |pair: Option<f64>| {
-        pair.map_or_else(
-            || "–".to_owned(),
-            |metres| format!("{} m", label(metres.abs(), 1)),
-        )
-    };
-    let [along, _] = geometric.adjusted.summary.tie_components;
-    table.row(
-        true,
+    let parallax =
+        |pair: &PairComparison| format!("{} m", label(pair.along_track_parallax_m.abs(), 1));
+    let residuals = adjustment.map(|of| {
+        let [along, _] = of.adjusted.summary.tie_components;
+        format!("; residuals {} σ", label(along, 2))
+    });
+    let after = worst.and_then(|pair| pair.after).map(parallax);
+    let statements = [
         [
-            "internal agreement".into(),
-            parallax(worst.map(|pair| pair.before.along_track_parallax_m)).into(),
-            format!(
-                "{}; residuals {} σ",
-                parallax(worst.and_then(|pair| Some(pair.after?.along_track_parallax_m))),
-                label(along, 2)
-            )
-            .into(),
-            "how well images agree along the flight; nothing of height or place".into(),
+            "internal agreement".to_owned(),
+            worst.map_or_else(nothing, |pair| parallax(pair.before)),
+            after.map_or_else(nothing, |after| after + &residuals.unwrap_or_default()),
+            "how well images agree along the flight; nothing of height or place".to_owned(),
         ],
-    );
-    table.row(
-        true,
         [
-            "agreement with MOLA, height".into(),
-            agreement(geometric.heights).into(),
-            agreement(geometric.adjusted_heights).into(),
-            agreement_says(geometric).into(),
+            "agreement with MOLA, height".to_owned(),
+            agreement(geometric.heights),
+            adjustment.map_or_else(nothing, |of| agreement(of.heights)),
+            agreement_says(adjustment).to_owned(),
         ],
-    );
-    let [height, place] = absolute(geometric);
-    table.row(
-        true,
         [
-            "absolute, height".into(),
-            format!("±{A_PRIORI_HEIGHT_M} m, a priori").into(),
-            height.into(),
-            "standard deviation of what all tie points share, and of single ones".into(),
+            "absolute, height".to_owned(),
+            format!("±{A_PRIORI_HEIGHT_M} m, a priori"),
+            adjustment.map_or_else(nothing, |of| absolute(geometric, of)[0].clone()),
+            "standard deviation of what all tie points share, and of single ones".to_owned(),
         ],
-    );
-    table.row(
-        true,
         [
-            "absolute, place".into(),
-            "as after it".into(),
-            place.into(),
-            "a priori, not measured: by what is known of orbit and attitude".into(),
+            "absolute, place".to_owned(),
+            "as after it".to_owned(),
+            adjustment.map_or_else(nothing, |of| absolute(geometric, of)[1].clone()),
+            "a priori, not measured: by what is known of orbit and attitude".to_owned(),
         ],
-    );
+    ];
+    for cells in statements {
+        table.row(true, cells.map(Cell::from));
+    }
     table.finish()
 }
 
@@ -138,8 +138,8 @@ fn agreement(check: &HeightCheck) -> String {
     }
 }
 
-const fn agreement_says(geometric: &GeometricProducts) -> &'static str {
-    if geometric.adjusted.summary.heights.is_some() {
+fn agreement_says(adjustment: Option<&AdjustmentProducts>) -> &'static str {
+    if adjustment.is_some_and(|of| of.adjusted.summary.heights.is_some()) {
         "before: an independent test; after: how well the adjustment meets what controls it"
     } else {
         "an independent test of heights: MOLA took no part"
@@ -147,8 +147,8 @@ const fn agreement_says(geometric: &GeometricProducts) -> &'static str {
 }
 
 /// What is stated of height and place after the adjustment.
-fn absolute(geometric: &GeometricProducts) -> [String; 2] {
-    let summary = &geometric.adjusted.summary;
+fn absolute(geometric: &GeometricProducts, adjustment: &AdjustmentProducts) -> [String; 2] {
+    let summary = &adjustment.adjusted.summary;
     let Some(heights) = &summary.heights else {
         let reason = if summary.model == AdjustmentModel::Published {
             "not determined: the published model does not control heights"
@@ -157,7 +157,7 @@ fn absolute(geometric: &GeometricProducts) -> [String; 2] {
         };
         return [reason.to_owned(), "not determined".to_owned()];
     };
-    let single = single_sigmas_m(geometric);
+    let single = single_sigmas_m(adjustment);
     let [east_m, north_m, up_m] = heights.mean_sigma_m;
     let pairs = BeforeAfter::all(geometric);
     let worst = BeforeAfter::worst(&pairs);
@@ -186,8 +186,8 @@ fn absolute(geometric: &GeometricProducts) -> [String; 2] {
 }
 
 /// Least and largest standard deviation of the height of a tie point, metres.
-fn single_sigmas_m(geometric: &GeometricProducts) -> [f64; 2] {
-    let ties = geometric.adjusted_ties();
+fn single_sigmas_m(adjustment: &AdjustmentProducts) -> [f64; 2] {
+    let ties = adjustment.adjusted_ties();
     let sigmas_m = ties.map(|point| {
         let up = point.ground.xyz_m.normalize();
         up.dot(&(point.covariance_m2 * up)).sqrt()
@@ -223,10 +223,8 @@ fn compared(geometric: &GeometricProducts) -> String {
             Column::Number("σ of the mean, surface"),
         ],
     );
-    for (state, check) in [
-        ("before", geometric.heights),
-        ("after", geometric.adjusted_heights),
-    ] {
+    let after = geometric.adjustment.iter().map(|of| ("after", of.heights));
+    for (state, check) in [("before", geometric.heights)].into_iter().chain(after) {
         table.row(
             true,
             [
@@ -278,10 +276,10 @@ fn profile_plot(site: &SiteProducts, geometric: &GeometricProducts) -> Plot {
         let points: Vec<_> = ties.map(|tie| (north_km(tie), tie.above_m())).collect();
         thinned(&points, POINTS_SHOWN)
     };
-    let series = vec![
-        dots("before the adjustment", 0, points(geometric.heights)),
-        dots("after it", 1, points(geometric.adjusted_heights)),
-    ];
+    let after = geometric.adjustment.iter();
+    let after = after.map(|of| dots("after it", 1, points(of.heights)));
+    let before = dots("before the adjustment", 0, points(geometric.heights));
+    let series = [before].into_iter().chain(after).collect();
     let words = format!(
         "Heights of tie points of {} above the MOLA surface, from south to north, before and after the adjustment.",
         site.config.site

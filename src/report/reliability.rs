@@ -9,7 +9,7 @@ use super::{
 use crate::{
     footprints::AdjustmentModel,
     geom::statistics::Summary,
-    products::{GeometricProducts, SiteProducts},
+    products::{AdjustmentProducts, GeometricProducts, SiteProducts},
     stages::adjust::{Adjusted, AdjustmentSummary, PointKind, RejectionReason, ScalarResidual},
 };
 
@@ -28,16 +28,16 @@ const CORRELATED_SHOWN: usize = 12;
 const BLUNDERS_SHOWN: usize = 20;
 
 /// What the adjustment determines and what it does not, with numbers.
-pub(super) fn absolute(geometric: &GeometricProducts) -> String {
+pub(super) fn absolute(geometric: &GeometricProducts, adjustment: &AdjustmentProducts) -> String {
     let pairs = BeforeAfter::all(geometric);
     let relative = BeforeAfter::worst(&pairs);
     let relative = relative.map_or_else(String::new, |pair| pair.sentence() + " ");
-    let summary = &geometric.adjusted.summary;
+    let summary = &adjustment.adjusted.summary;
     let ties = &summary.ties;
     if ties.corrections_m[0].n == 0 {
         return format!("{relative}No tie point took part: nothing was adjusted to anything.");
     }
-    let registration = if geometric.images_agree {
+    let registration = if adjustment.images_agree {
         "The relative registration is corrected"
     } else {
         "The relative registration is not corrected"
