@@ -582,7 +582,9 @@ fn the_result_is_kept_and_read_back() {
         }
         let entry = &adjusted.images[index];
         assert!(entry.sigmas.iter().all(|sigma| *sigma > 0.0));
-        assert!(entry.time_bias_s.unwrap().1 < 0.05);
+        // No observation enlarges a variance; measurements worse than configured enlarge all.
+        let largest_s = 0.05 * adjusted.summary.variance_factor.sqrt();
+        assert!(entry.time_bias_s.unwrap().1 < largest_s);
     }
     let tie = adjusted.points.last().unwrap();
     let sigma_m = (0..3).map(|axis| tie.covariance_m2[(axis, axis)].sqrt());

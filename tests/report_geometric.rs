@@ -231,6 +231,10 @@ fn the_tables_of_the_adjustment_are_its_summary() {
     assert_eq!(coordinates.len(), 2 * summary.images.len());
     for (row, of) in coordinates.iter().zip(expected) {
         assert_eq!(row[2], of[0].n.to_string());
+        if of[0].n == 0 {
+            assert_eq!(row[3], "–");
+            continue;
+        }
         agree(&row[3], of[0].mean, 3);
         agree(&row[6], of[1].standard_deviation, 3);
     }
@@ -268,8 +272,9 @@ fn corrections_of_images_and_their_ranges_are_told() {
         }
         // Axes of the orbit turn the shift and keep its length, to the tenth of a metre of each number.
         assert!((square_m2[0].sqrt() - square_m2[1].sqrt()).abs() < 0.1);
-        // The mission's misregistration is along the flight.
-        assert!(number(&shift[4]).abs() > 5.0 * number(&shift[5]).abs());
+        // The mission's misregistration is along the flight: pitch takes it up, as line times and positions may not.
+        let turned = |axis: usize| number(&at(&turn[1 + axis], 0)).abs();
+        assert!(turned(1) > turned(2), "{turn:?}");
     }
     let ranges = table(&page, "Ranges of shots");
     let taken: usize = ranges
@@ -298,7 +303,7 @@ fn what_cannot_be_trusted_is_said() {
     let site = Site::gusev();
     let page = site.page();
     let text = section(&page, SECTIONS[1]);
-    let [east_m, north_m, up_m] = site.adjusted.summary.heights.unwrap().mean_sigma_m;
+    let [east_m, north_m, up_m] = site.adjusted.heights.unwrap().mean_sigma_m;
     assert!(text.contains(&format!(
         "The relative registration is corrected; heights are those of MOLA, to {up_m:.1} m on average; the place is what was \
          known of orbit and attitude beforehand, to {east_m:.0} m east and {north_m:.0} m north."
@@ -313,9 +318,13 @@ fn what_cannot_be_trusted_is_said() {
     assert!((20.0..60.0).contains(&mean), "{mean}");
     let correlated = &site.adjusted.summary.correlated;
     let most = correlated.iter().map(|of| of.2.abs()).fold(0.0, f64::max);
-    let rows = table(&page, "Largest correlations");
-    assert_eq!(rows.len(), correlated.len().min(12));
-    agree(&number(&rows[0][0]).abs().to_string(), most, 4);
+    if correlated.is_empty() {
+        assert!(text.contains("No two unknowns of the orientation correlate by more than 0.95."));
+    } else {
+        let rows = table(&page, "Largest correlations");
+        assert_eq!(rows.len(), correlated.len().min(12));
+        agree(&number(&rows[0][0]).abs().to_string(), most, 4);
+    }
     let blunders = table(&page, "Blunders");
     let found = |of: &&RejectedPoint| {
         use RejectionReason::{Blunder, Height};

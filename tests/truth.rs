@@ -99,7 +99,7 @@ impl Judged {
             name: format!("{} {site}", mission.file_name().unwrap().to_string_lossy()),
             errors_m: Vec::new(),
             sigmas_m: Vec::new(),
-            mean_sigmas_m: vector(&summary["heights"]["mean_sigma_m"]),
+            mean_sigmas_m: vector(&document["adjustment"]["heights"]["mean_sigma_m"]),
             against_mola_m: document["before"]["heights"]["above_surface_m"]["median"]
                 .as_f64()
                 .unwrap(),

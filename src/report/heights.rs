@@ -139,7 +139,7 @@ fn agreement(check: &HeightCheck) -> String {
 }
 
 fn agreement_says(adjustment: Option<&AdjustmentProducts>) -> &'static str {
-    if adjustment.is_some_and(|of| of.adjusted.summary.heights.is_some()) {
+    if adjustment.is_some_and(|of| of.adjusted.heights.is_some()) {
         "before: an independent test; after: how well the adjustment meets what controls it"
     } else {
         "an independent test of heights: MOLA took no part"
@@ -149,7 +149,7 @@ fn agreement_says(adjustment: Option<&AdjustmentProducts>) -> &'static str {
 /// What is stated of height and place after the adjustment.
 fn absolute(geometric: &GeometricProducts, adjustment: &AdjustmentProducts) -> [String; 2] {
     let summary = &adjustment.adjusted.summary;
-    let Some(heights) = &summary.heights else {
+    let Some(heights) = &adjustment.adjusted.heights else {
         let reason = if summary.model == AdjustmentModel::Published {
             "not determined: the published model does not control heights"
         } else {

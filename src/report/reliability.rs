@@ -47,7 +47,7 @@ pub(super) fn absolute(geometric: &GeometricProducts, adjustment: &AdjustmentPro
         .each_ref()
         .map(|axis| label(axis.mean, 1));
     let moved = means.join(", ");
-    let determined = match &summary.heights {
+    let determined = match &adjustment.adjusted.heights {
         Some(heights) => {
             let [east_m, north_m, up_m] = heights.mean_sigma_m;
             format!(

@@ -14,7 +14,7 @@ use super::{
     convert_datum::Converted,
     group_profiles::Profile,
     intersect::IntersectedTies,
-    mola_surface::surface_shots,
+    mola_surface::MolaShots,
 };
 use crate::{
     config::MolaSurfaceConfig,
@@ -23,7 +23,7 @@ use crate::{
     frames::{MarsIau2000, Position},
     geom::{
         statistics::Summary,
-        surface::{LaserSurface, SurfaceHeights, SurfaceOptions, SurfaceShot},
+        surface::{LaserSurface, SurfaceHeights, SurfaceOptions},
     },
     stage::{Input, Inputs, Output, Round, Stage},
     stage_inputs,
@@ -181,8 +181,8 @@ pub fn check_heights(
     let step = points.len().div_ceil(COMPARED_MAX).max(1);
     let points: Vec<_> = points.iter().step_by(step).copied().collect();
     let places_m: Vec<Vector3<f64>> = points.iter().map(|(_, ground)| ground.xyz_m).collect();
-    let shots = surface_shots(footprints, profiles, |_| true);
-    let surface = match LaserSurface::new(&shots, &places_m, options) {
+    let shots = MolaShots::of(footprints, profiles);
+    let surface = match shots.surface(&places_m, options) {
         Ok(surface) => surface,
         Err(error) => return HeightCheck::without_surface(error.to_string()),
     };
@@ -245,32 +245,25 @@ fn mean_variance_m2(covariance_m2: &DMatrix<f64>) -> f64 {
 
 /// The surfaces of the two profiles with most shots, each alone.
 fn apart(
-    shots: &[SurfaceShot],
+    shots: &MolaShots,
     places_m: &[Vector3<f64>],
     profiles: &[Profile],
     options: &SurfaceOptions,
 ) -> Option<ProfilesApart> {
-    let mut counts = vec![0_usize; profiles.len()];
-    for shot in shots {
-        counts[shot.profile] += 1;
-    }
-    let mut by_shots: Vec<usize> = (0..profiles.len()).collect();
-    by_shots.sort_by_key(|profile| std::cmp::Reverse(counts[*profile]));
-    let &[first, second, ..] = by_shots.as_slice() else {
-        return None;
-    };
-    let alone = |profile: usize| {
-        let own = shots.iter().filter(|shot| shot.profile == profile);
-        let own: Vec<SurfaceShot> = own.copied().collect();
-        let surface = LaserSurface::new(&own, places_m, options).ok()?;
+    let largest = shots.largest_profiles()?;
+    let names = largest
+        .each_ref()
+        .map(|(index, _)| profiles[*index].id.clone());
+    let [one, other] = largest.map(|(_, shots)| {
+        let surface = shots.surface(places_m, options).ok()?;
         Some(surface.predict(places_m))
-    };
-    let (one, other) = (alone(first)?, alone(second)?);
+    });
+    let (one, other) = (one?, other?);
     let differences = one.heights_m.iter().zip(&other.heights_m);
     let differences_m: f64 = differences.map(|(one, other)| one - other).sum();
     let variance_m2 = mean_variance_m2(&one.covariance_m2) + mean_variance_m2(&other.covariance_m2);
     Some(ProfilesApart {
-        profiles: [first, second].map(|profile| profiles[profile].id.clone()),
+        profiles: names,
         mean_m: differences_m / places_m.len() as f64,
         sigma_m: variance_m2.sqrt(),
     })

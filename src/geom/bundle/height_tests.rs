@@ -6,8 +6,9 @@ use super::{
     BundleOptions, HeightControl, Network, Residual,
     heights::Heights,
     quality::judge,
+    reduce::Settled,
     solve,
-    solve::{Settled, settle},
+    solve::settle,
     tests::{dense_rows, layout, network},
     unknowns::State,
 };

@@ -89,6 +89,7 @@ mod layout;
 mod point_rows;
 mod quality;
 mod reduce;
+mod reduced_heights;
 mod rows;
 mod solve;
 mod unknowns;

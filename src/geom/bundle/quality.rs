@@ -5,10 +5,10 @@ use rayon::prelude::*;
 
 use super::{
     AdjustedImage, AdjustedPoint, Adjustment, ORIENTATION_UNKNOWNS, PointRejection, Residual,
-    heights::ReducedHeights,
     layout::Layout,
     point_rows::PointRows,
-    solve::Settled,
+    reduce::Settled,
+    reduced_heights::ReducedHeights,
     unknowns::{State, Unknown},
 };
 use crate::geom::pushbroom::ExteriorOrientation;

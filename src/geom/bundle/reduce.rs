@@ -8,9 +8,9 @@ use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use super::{
-    heights::ReducedHeights,
     layout::Layout,
     point_rows::{PointRows, add_multiple},
+    reduced_heights::ReducedHeights,
     unknowns::State,
 };
 use crate::geom::pushbroom::{ExteriorOrientation, Unseen};
@@ -28,6 +28,12 @@ pub(super) struct Reduced {
     pub(super) cost: f64,
     /// Heights, where they are observed; matrix, right side and sum contain them.
     pub(super) heights: Option<ReducedHeights>,
+}
+
+/// Where an iteration has come to.
+pub(super) struct Settled {
+    pub(super) state: State,
+    pub(super) reduced: Reduced,
 }
 
 impl Reduced {

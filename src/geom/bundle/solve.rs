@@ -8,11 +8,12 @@ use rayon::prelude::*;
 use super::{
     Adjustment, BundleError, BundleOptions, HeightControl, Network, PointRejection,
     check::check,
-    heights::{Heights, ReducedHeights},
+    heights::Heights,
     layout::Layout,
     point_rows::PointRows,
     quality,
-    reduce::{Reduced, reduce},
+    reduce::{Reduced, Settled, reduce},
+    reduced_heights::ReducedHeights,
     unknowns::State,
 };
 use crate::{
@@ -110,12 +111,6 @@ fn count<M: ExteriorOrientation>(layout: &Layout<'_, M>, active: &[usize]) -> (u
     )
 }
 
-/// Where an iteration has come to.
-pub(super) struct Settled {
-    pub(super) state: State,
-    pub(super) reduced: Reduced,
-}
-
 /// Rounds in which heights find their surface and their weights.
 const HEIGHT_ROUNDS_MAX: u32 = 15;
 /// Standard deviations that change by less than this leave the weights of heights as they are, metres.
@@ -148,7 +143,7 @@ fn with_heights<M: ExteriorOrientation>(
         let (Some(reduced), Some(heights)) = (reduced, layout.heights.as_mut()) else {
             break;
         };
-        let changed_m = heights.reweigh(reduced);
+        let changed_m = heights.reweigh(&reduced.misclosures_m, &reduced.ray_variances_m2);
         if !heights.follow(&control.surface, &settled.state) && changed_m < HEIGHT_CHANGE_M {
             break;
         }

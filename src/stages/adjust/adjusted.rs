@@ -7,7 +7,7 @@ use super::{
     input::AdjustImage,
     network::Assembled,
     points::{PointKind, RejectedPoint},
-    summary::AdjustmentSummary,
+    summary::{self, AdjustmentSummary, HeightSummary},
 };
 use crate::{
     frames::{MarsIau2000, Position},
@@ -22,6 +22,8 @@ use crate::{
 pub struct Adjusted {
     /// Statistics.
     pub summary: AdjustmentSummary,
+    /// Heights of tie points by the MOLA surface; `None` where they are no observations.
+    pub heights: Option<HeightSummary>,
     /// One entry for each image, in their order.
     pub images: Vec<CorrectedImage>,
     /// Points with adjusted coordinates: shots, then tie points, each in their order.
@@ -167,6 +169,7 @@ pub(super) fn collect<M>(
     let views = assembled.network.views.iter().zip(&adjustment.views);
     let ranges = assembled.network.ranges.iter().zip(&adjustment.ranges);
     Adjusted {
+        heights: summary::heights(&assembled, &adjustment),
         images: corrected_images(images, &adjustment, summary.variance_factor),
         views: views
             .filter_map(|(view, residuals)| {

@@ -12,7 +12,7 @@ use crate::{
     stage_inputs,
     stages::{
         convert_datum::Converted, group_profiles::Profile, intersect::IntersectedTies,
-        mola_surface::mola_surface, read_ties::Ties, site_image::SiteImage,
+        mola_surface::MolaShots, read_ties::Ties, site_image::SiteImage,
     },
 };
 
@@ -62,7 +62,8 @@ impl Stage for Adjust<'_> {
             AdjustmentModel::MolaSurface => {
                 let around = starts.points.iter().map(|point| point.ground.xyz_m);
                 let around: Vec<_> = around.collect();
-                mola_surface(footprints, profiles, &around, &self.mola_surface.options()).ok()
+                let shots = MolaShots::of(footprints, profiles);
+                shots.surface(&around, &self.mola_surface.options()).ok()
             }
             AdjustmentModel::Published => None,
         };

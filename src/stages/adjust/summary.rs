@@ -125,8 +125,6 @@ pub struct AdjustmentSummary {
     /// says that measurements are worse than configured. A good fit makes nothing more certain.
     #[schemars(range(min = 1.0))]
     pub variance_factor: f64,
-    /// Heights of tie points by the MOLA surface; `None` where they are no observations.
-    pub heights: Option<HeightSummary>,
     /// One entry for each kind of observation that occurs.
     pub types: Vec<TypeSummary>,
     /// Footprints.
@@ -160,7 +158,6 @@ pub(super) fn summarise<M: ExteriorOrientation>(
         model: config.model,
         tie_components: tie_components(assembled, adjustment),
         variance_factor: variance_factor(assembled, adjustment),
-        heights: heights(assembled, adjustment),
         types: types(assembled, adjustment),
         shots: ground(assembled, adjustment, shots),
         ties: ground(assembled, adjustment, ties),
@@ -287,7 +284,10 @@ pub(super) fn variance_factor<M>(assembled: &Assembled<M>, adjustment: &Adjustme
 }
 
 /// Heights as observations, where they are.
-fn heights<M>(assembled: &Assembled<M>, adjustment: &Adjustment) -> Option<HeightSummary> {
+pub(super) fn heights<M>(
+    assembled: &Assembled<M>,
+    adjustment: &Adjustment,
+) -> Option<HeightSummary> {
     let control = assembled.network.heights.as_ref().filter(|of| of.weighed)?;
     let above_m: Vec<f64> = adjustment
         .heights
