@@ -250,7 +250,7 @@ fn a_tie_point_file_touches_what_comes_after_it() {
         "tie_sigma_px = [1.6, 1.0]",
         "tie_sigma_px = [1.7, 1.0]",
     );
-    assert_eq!(case.stages_run(), stages[3..]);
+    assert_eq!(case.stages_run(), stages[4..]);
     // A site whose tie points are gone has no product of them left.
     let site = String::from_utf8(case.read("site.toml")).unwrap();
     let (before, after) = (

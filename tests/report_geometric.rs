@@ -59,14 +59,13 @@ fn the_first_lines_tell_how_far_images_disagree_before_and_after() {
     assert!(before_m > 0.5 * spacing_m && after_m < 0.05 * spacing_m);
     let words = format!(
         "before the adjustment a footprint falls {:.2} MOLA spacings ({before_m:.0} m) apart in the two images along \
-         the flight; after it {:.3} MOLA spacings ({after_m:.1} m). Against MOLA tie points lie {:.1} m high before the \
-         adjustment and {:.1} m after it (median).",
+         the flight; after it {:.3} MOLA spacings ({after_m:.1} m). Tie points lie {:.1} m below the MOLA surface before \
+         the adjustment and {:.1} m below it after the adjustment (median).",
         before_m / spacing_m,
         after_m / spacing_m,
-        site.heights.above_m.median,
-        site.adjusted_heights.above_m.median
-    )
-    .replace('-', "−");
+        -site.heights.above_m.median,
+        -site.adjusted_heights.above_m.median
+    );
     assert!(lead(&page).contains(&words), "{words}\n{}", lead(&page));
 }
 
@@ -413,7 +412,7 @@ fn images_without_a_common_tie_point_are_said_to_be_so() {
     let page = site.page();
     assert!(section(&page, SECTIONS[0]).contains("No two images share tie points"));
     assert!(!page.contains(&format!("id=\"{}\"", SECTIONS[2])));
-    assert!(lead(&page).contains("<p>Against MOLA tie points lie"));
+    assert!(lead(&page).contains("<p>Tie points lie "));
 }
 
 #[test]
@@ -429,5 +428,5 @@ fn a_site_without_tie_points_has_none_of_it() {
     for id in SECTIONS {
         assert!(!page.contains(id), "{id}");
     }
-    assert!(!lead(&page).contains("MOLA tie points"));
+    assert!(!lead(&page).contains("Tie points lie"));
 }

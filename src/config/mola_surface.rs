@@ -8,8 +8,8 @@ use super::{
 };
 
 declare_table! {
-    /// The ground between the shots of all profiles, with which heights of tie points are compared and, in an adjustment
-    /// of model "mola_surface", controlled.
+    /// The ground between the shots of all profiles, with which heights of tie points are compared and, in the
+    /// default adjustment, controlled.
     pub struct MolaSurfaceConfig {
         /// Standard deviation of the height of a shot.
         shot_sigma_m: f64 = key(from_to(0.01, 1e4)).or(SurfaceOptions::default().shot_sigma_m),

@@ -136,7 +136,8 @@ fn reasons(geometric: &GeometricProducts) -> BTreeMap<usize, String> {
 fn tie_columns<'a>() -> Vec<Column<Measurement<'a>>> {
     let mut columns = measured_columns();
     columns.extend(intersected_columns());
-    columns.extend(adjusted_columns());
+    columns.extend(adjusted_point_columns());
+    columns.extend(residual_columns());
     columns
 }
 
@@ -222,7 +223,7 @@ fn intersected_columns<'a>() -> Vec<Column<Measurement<'a>>> {
     ]
 }
 
-fn adjusted_columns<'a>() -> Vec<Column<Measurement<'a>>> {
+fn adjusted_point_columns<'a>() -> Vec<Column<Measurement<'a>>> {
     vec![
         column(
             "adjusted_x_m",
@@ -290,6 +291,11 @@ fn adjusted_columns<'a>() -> Vec<Column<Measurement<'a>>> {
             "the same of the height, metres",
             |row: &Measurement| Some(local_sigmas_m(row.adjusted?.0)[2]),
         ),
+    ]
+}
+
+fn residual_columns<'a>() -> Vec<Column<Measurement<'a>>> {
+    vec![
         column(
             "residual_along_px",
             Unit::Pixel,

@@ -35,7 +35,8 @@ pub(super) const SECTION: Section = Section {
 };
 
 fn write(site: &SiteProducts, geometric: &GeometricProducts) -> Result<String> {
-    let mut html = statements(geometric);
+    let adjustment = geometric.adjustment.as_ref();
+    let mut html = adjustment.map_or_else(String::new, |of| statements(geometric, of));
     if let Ok(surface) = &geometric.heights.surface {
         html += &heading("Heights against the MOLA surface");
         html += &paragraph(&surface_in_words(surface));
@@ -56,12 +57,15 @@ pub(super) fn in_a_sentence(geometric: &GeometricProducts) -> String {
         .adjustment
         .as_ref()
         .map_or_else(String::new, |after| {
-            format!(" and {} m after it", label(after.heights.above_m.median, 1))
+            format!(
+                " and {} it after the adjustment",
+                off_surface(after.heights)
+            )
         });
     let mola = match &before.surface {
         Ok(_) => format!(
-            "Against MOLA tie points lie {} m high before the adjustment{after} (median).",
-            label(before.above_m.median, 1)
+            "Tie points lie {} the MOLA surface before the adjustment{after} (median).",
+            off_surface(before)
         ),
         Err(reason) => format!("MOLA does not control heights: {reason}."),
     };
@@ -72,8 +76,15 @@ pub(super) fn in_a_sentence(geometric: &GeometricProducts) -> String {
     format!("{mola} Height, absolute: {height}. Place, absolute: {place}.")
 }
 
+/// Median height above or below the surface.
+fn off_surface(check: &HeightCheck) -> String {
+    let median_m = check.above_m.median;
+    let side = if median_m < 0.0 { "below" } else { "above" };
+    format!("{} m {side}", label(median_m.abs(), 1))
+}
+
 /// The three statements that may be made, and by whose judgement.
-fn statements(geometric: &GeometricProducts) -> String {
+fn statements(geometric: &GeometricProducts, adjustment: &AdjustmentProducts) -> String {
     let mut table = Table::new(
         "What is known of the tie points, and by whom",
         &[
@@ -84,39 +95,38 @@ fn statements(geometric: &GeometricProducts) -> String {
         ],
     );
     let nothing = || "–".to_owned();
-    let adjustment = geometric.adjustment.as_ref();
     let pairs = BeforeAfter::all(geometric);
     let worst = BeforeAfter::worst(&pairs);
     let parallax =
         |pair: &PairComparison| format!("{} m", label(pair.along_track_parallax_m.abs(), 1));
-    let residuals = adjustment.map(|of| {
-        let [along, _] = of.adjusted.summary.tie_components;
-        format!("; residuals {} σ", label(along, 2))
-    });
+    let [along, _] = adjustment.adjusted.summary.tie_components;
     let after = worst.and_then(|pair| pair.after).map(parallax);
+    let [height, place] = absolute(geometric, adjustment);
     let statements = [
         [
             "internal agreement".to_owned(),
             worst.map_or_else(nothing, |pair| parallax(pair.before)),
-            after.map_or_else(nothing, |after| after + &residuals.unwrap_or_default()),
+            after.map_or_else(nothing, |after| {
+                format!("{after}; residuals {} σ", label(along, 2))
+            }),
             "how well images agree along the flight; nothing of height or place".to_owned(),
         ],
         [
             "agreement with MOLA, height".to_owned(),
             agreement(geometric.heights),
-            adjustment.map_or_else(nothing, |of| agreement(of.heights)),
+            agreement(adjustment.heights),
             agreement_says(adjustment).to_owned(),
         ],
         [
             "absolute, height".to_owned(),
             format!("±{A_PRIORI_HEIGHT_M} m, a priori"),
-            adjustment.map_or_else(nothing, |of| absolute(geometric, of)[0].clone()),
+            height,
             "standard deviation of what all tie points share, and of single ones".to_owned(),
         ],
         [
             "absolute, place".to_owned(),
             "as after it".to_owned(),
-            adjustment.map_or_else(nothing, |of| absolute(geometric, of)[1].clone()),
+            place,
             "a priori, not measured: by what is known of orbit and attitude".to_owned(),
         ],
     ];
@@ -138,8 +148,8 @@ fn agreement(check: &HeightCheck) -> String {
     }
 }
 
-fn agreement_says(adjustment: Option<&AdjustmentProducts>) -> &'static str {
-    if adjustment.is_some_and(|of| of.adjusted.heights.is_some()) {
+const fn agreement_says(adjustment: &AdjustmentProducts) -> &'static str {
+    if adjustment.adjusted.heights.is_some() {
         "before: an independent test; after: how well the adjustment meets what controls it"
     } else {
         "an independent test of heights: MOLA took no part"
@@ -281,7 +291,7 @@ fn profile_plot(site: &SiteProducts, geometric: &GeometricProducts) -> Plot {
     let before = dots("before the adjustment", 0, points(geometric.heights));
     let series = [before].into_iter().chain(after).collect();
     let words = format!(
-        "Heights of tie points of {} above the MOLA surface, from south to north, before and after the adjustment.",
+        "Heights of tie points of {} above the MOLA surface, from south to north, with the orientation of the kernels and, where there is one, with the adjusted one.",
         site.config.site
     );
     Plot::of(

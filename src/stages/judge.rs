@@ -180,12 +180,9 @@ impl AdjustmentEvidence<'_> {
     /// Corrections of orientations that what was known of them does not allow.
     fn corrected_too_far(&self, limits: &LimitsConfig) -> Vec<String> {
         let largest = |image: &CorrectedImage| -> Option<(f64, usize)> {
-            let corrections = image.correction.iter().zip(&image.prior_sigmas);
-            let sigmas = corrections
-                .enumerate()
-                .filter_map(|(index, (correction, sigma))| {
-                    (*sigma > 0.0 && sigma.is_finite()).then(|| ((correction / sigma).abs(), index))
-                });
+            let corrections = image.correction.iter().zip(&image.prior_sigmas).enumerate();
+            let known = corrections.filter(|(_, (_, sigma))| **sigma > 0.0 && sigma.is_finite());
+            let sigmas = known.map(|(index, (value, sigma))| ((value / sigma).abs(), index));
             sigmas.max_by(|one, other| one.0.total_cmp(&other.0))
         };
         let far = self.adjusted.images.iter().filter_map(|image| {
