@@ -51,7 +51,7 @@ fn coverage_is_asked_at_the_shifted_instants_with_their_padding() {
         assert!((end_s - expected_s).abs() < 0.001, "{end}: {end_s} s"); // ET above has milliseconds
     }
     // The same image, covered as it stands, but not at the instants that this bias asks for.
-    for (start, bias) in [("05:17:30.0", "1.15"), ("03:18:04.0", "-5.0")] {
+    for (start, bias) in [("05:17:30.0", "2.0"), ("03:18:04.0", "-5.0")] {
         let refused = outcome(&case, start, 700, "", &format!("ck_bias_s = {bias}"));
         assert!(refused.starts_with("exit 4"), "{bias}: {refused}");
         assert!(refused.contains("no attitude of MGS for ET"), "{refused}");

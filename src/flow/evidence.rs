@@ -50,6 +50,26 @@ pub(super) fn judged(
     Ok((verdict, adjustment.is_some_and(|of| of.images_agree())))
 }
 
+/// What a reader must weigh of kernels, clocks, labels and tie points, one sentence each.
+pub(super) fn warnings(config: &SiteConfig, site: &Site) -> Result<Vec<String>> {
+    let described = site.described.value()?;
+    let mut warnings: Vec<String> = described.pck_note.iter().cloned().collect();
+    warnings.extend(described.rates_note.iter().cloned());
+    if !site.images.is_empty() {
+        warnings.extend(config.pointing.departure());
+    }
+    for image in &site.images {
+        let times = image.times.value()?;
+        let remarks = times.remarks.iter();
+        warnings.extend(remarks.map(|remark| format!("image {}: {remark}", times.id)));
+    }
+    if let Some(adjustment) = &site.adjustment {
+        let remarks = adjustment.ties.value()?.remarks.iter();
+        warnings.extend(remarks.map(|remark| format!("tie points: {remark}")));
+    }
+    Ok(warnings)
+}
+
 fn judged_images(images: &[SiteImage]) -> Result<Vec<JudgedImage<'_>>> {
     let images = images.iter().map(|image| {
         Ok(JudgedImage {
