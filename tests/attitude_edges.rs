@@ -32,6 +32,18 @@ fn outcome(case: &Case, start: &str, lines: u32, kernels: &str, pointing: &str) 
     case.outcome(command)
 }
 
+/// What `check` says of the case that was run last.
+fn checked(case: &Case) -> String {
+    let mut command = case.areograph();
+    command.args(["--quiet", "check", "edge.toml"]);
+    case.outcome(command)
+}
+
+fn errors(outcome: &str) -> Vec<&str> {
+    let lines = outcome.lines();
+    lines.filter(|line| line.starts_with("error: ")).collect()
+}
+
 fn manifest(case: &Case) -> serde_json::Value {
     serde_json::from_slice(&case.read("out/case/manifest.json")).unwrap()
 }
@@ -101,5 +113,37 @@ fn held_attitudes_are_noted_and_beyond_their_spacing_invalid() {
         !manifest(&case)["verdict"]["remarks"]
             .to_string()
             .contains("outside the C-kernels")
+    );
+}
+
+#[test]
+fn a_check_finds_what_a_run_finds() {
+    let case = Case::new();
+    for (start, kernels, pointing) in [
+        ("05:17:30.0", "", "ck_bias_s = 1.15"),
+        ("05:17:31.0", "ck_tolerance_s = 0.5", ""),
+        ("05:18:00.0", "ck_tolerance_s = 60.0", ""),
+    ] {
+        let refused = outcome(&case, start, 700, kernels, pointing);
+        let told = checked(&case);
+        assert!(refused.starts_with("exit 4"), "{refused}");
+        assert!(told.starts_with("exit 4"), "{told}");
+        assert_eq!(errors(&told), errors(&refused));
+    }
+    let noted = outcome(&case, "05:17:31.0", 700, "ck_tolerance_s = 1.0", "");
+    let told = checked(&case);
+    assert!(noted.starts_with("exit 0"), "{noted}");
+    assert!(told.starts_with("exit 0"), "{told}");
+    assert!(told.ends_with("position and attitude covered\n"), "{told}");
+    let invalid = outcome(&case, "05:17:35.0", 1_200, "ck_tolerance_s = 60.0", "");
+    let told = checked(&case);
+    assert!(told.starts_with("exit 0"), "{told}");
+    let (_, reason) = told
+        .split_once("covered; products would be invalid: ")
+        .unwrap();
+    let expected = format!("image edge: {}", reason.trim_end());
+    assert!(
+        invalid.contains(&expected),
+        "{expected}\nis not in\n{invalid}"
     );
 }

@@ -327,6 +327,10 @@ fn a_failed_adjustment_keeps_no_other_product_from_its_readers() {
     let case = Case::pair();
     let free = "position_sigma_nadir_m = inf\nposition_sigma_off_nadir_m = inf\nfootprint_image_coordinates = \"off\"\ntie_sigma_px";
     case.replace("site.toml", "tie_sigma_px", free);
+    let mut table = String::from_utf8(case.read("ties/isidis.csv")).unwrap();
+    table += "bad,E02-01301,elsewhere,1.0\n";
+    table += "foreign,M04-00001,1.0,1.0\n";
+    case.write("ties/isidis.csv", table);
     let outcome = case.outcome(case.run());
     let invalid = "exit 5\nisidis: INVALID; products in out/isidis, see report/index.html\n  \
                    no adjustment: the network is singular: the observations do not separate the ";
@@ -336,6 +340,35 @@ fn a_failed_adjustment_keeps_no_other_product_from_its_readers() {
     let named = |name: &str| made.iter().any(|path| path.ends_with(name));
     assert!(named("footprints.parquet") && named("registration.parquet"));
     assert!(!named("adjustment.json") && !named("registration_adjusted.parquet"));
+    // What is known of the tie points is told.
+    assert!(named("ties.parquet") && !named("adjusted_footprints.parquet"));
+    let manifest: serde_json::Value =
+        serde_json::from_slice(&case.read("out/isidis/manifest.json")).unwrap();
+    assert_eq!(manifest["complaints"]["count"], 1);
+    let complaint = "isidis.csv: record 310: ";
+    let note = "tie points: 1 measurements in 1 images";
+    let told = manifest["complaints"]["texts"][0].as_str().unwrap();
+    assert!(told.starts_with(complaint), "{told}");
+    assert!(manifest["notes"].to_string().contains(note));
+    let apart_m = manifest["figures"]["along_track_parallax_m"].as_f64();
+    assert!(apart_m.is_some_and(|apart_m| apart_m > 0.0), "{apart_m:?}");
+    let page = String::from_utf8(case.read("out/isidis/report/index.html")).unwrap();
+    for told in [
+        complaint,
+        note,
+        "Pairs of images",
+        "Residual vectors on E02-01301",
+        "the adjustment failed",
+    ] {
+        assert!(page.contains(told), "{told}");
+    }
+    for absent in [
+        "Combined adjustment</h2>",
+        "before the adjustment a ",
+        "after it",
+    ] {
+        assert!(!page.contains(absent), "{absent}");
+    }
     // The adjustment is tried again, and what stands is kept.
     let again = case.outcome(case.run());
     assert!(

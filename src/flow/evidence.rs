@@ -21,16 +21,16 @@ pub(super) fn judged(
 ) -> Result<(Verdict, bool)> {
     let images = judged_images(&site.images)?;
     let adjusted = site.adjustment.as_ref();
-    let adjusted_images = adjusted.map_or(&[][..], |of| &of.adjusted_images);
+    let adjusted_images = adjusted.map_or(&[][..], |of| &of.images);
     let adjusted_images = judged_images(adjusted_images)?;
-    let adjustment = match adjusted {
-        Some(adjustment) => Some(AdjustmentEvidence {
-            ties: adjustment.ties.value()?,
+    let adjustment = match (&site.ties, adjusted) {
+        (Some(ties), Some(adjustment)) => Some(AdjustmentEvidence {
+            ties: ties.value()?,
             adjusted: adjustment.adjusted.value()?,
             images: &adjusted_images,
-            pairs: adjustment.adjusted_pairs.value()?,
+            pairs: adjustment.intersection.pairs.value()?,
         }),
-        None => None,
+        _ => None,
     };
     let failure = site
         .adjustment_failure
@@ -97,8 +97,8 @@ pub(super) fn notes(site: &Site) -> Result<Vec<String>> {
         let of_image = times.notes.iter();
         notes.extend(of_image.map(|note| format!("image {}: {note}", times.id)));
     }
-    if let Some(adjustment) = &site.adjustment {
-        notes.extend(adjustment.ties.value()?.notes());
+    if let Some(ties) = &site.ties {
+        notes.extend(ties.value()?.notes());
     }
     Ok(notes)
 }
@@ -107,8 +107,8 @@ pub(super) fn notes(site: &Site) -> Result<Vec<String>> {
 pub(super) fn complaints(site: &Site) -> Result<Vec<String>> {
     let complaints = site.found.value()?.complaints.iter();
     let mut complaints: Vec<String> = complaints.map(ToString::to_string).collect();
-    if let Some(adjustment) = &site.adjustment {
-        complaints.extend(adjustment.ties.value()?.complaints.iter().cloned());
+    if let Some(ties) = &site.ties {
+        complaints.extend(ties.value()?.complaints.iter().cloned());
     }
     Ok(complaints)
 }

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use super::{
     PUBLISH,
     driver::Ledger,
-    outputs::{Adjustment, Site},
+    outputs::{Intersection, Site},
 };
 use crate::{
     altimetry::BiasScope,
@@ -13,7 +13,7 @@ use crate::{
     error::Result,
     files::file_name,
     stage::Inputs,
-    stages::{compare_pairs::PairComparison, describe_kernels::KernelLine, judge::Verdict},
+    stages::{describe_kernels::KernelLine, judge::Verdict},
     store::manifest::{
         BiasEntry, Complaints, ConfigurationEntry, KernelEntry, Manifest, ProductEntry, StageEntry,
         figures,
@@ -32,9 +32,14 @@ pub(super) struct Account {
     pub(super) rejected: BTreeMap<String, u64>,
 }
 
-fn largest_along_track_parallax_m(pairs: &[PairComparison]) -> Option<f64> {
-    let pairs = pairs.iter().map(|pair| pair.along_track_parallax_m);
-    pairs.max_by(f64::total_cmp)
+/// How far apart along the flight the images of the worst pair place their tie points, metres.
+fn largest_along_track_parallax_m(intersection: Option<&Intersection>) -> Result<Option<f64>> {
+    let Some(intersection) = intersection else {
+        return Ok(None);
+    };
+    let pairs = intersection.pairs.value()?.iter();
+    let parallaxes_m = pairs.map(|pair| pair.along_track_parallax_m);
+    Ok(parallaxes_m.max_by(f64::total_cmp))
 }
 
 /// The manifest of a site whose products are made from `inputs`.
@@ -46,8 +51,8 @@ pub(super) fn manifest(
     inputs: &Inputs,
 ) -> Result<Manifest> {
     let (found, complaints) = (site.found.value()?, account.complaints);
-    let of_ties = match &site.adjustment {
-        Some(adjustment) => adjustment.ties.value()?.complaint_count,
+    let of_ties = match &site.ties {
+        Some(ties) => ties.value()?.complaint_count,
         None => 0,
     };
     let choice = site.choice.as_ref().map(|choice| choice.value());
@@ -146,33 +151,25 @@ fn figures_of(site: &Site) -> Result<BTreeMap<String, f64>> {
         .iter()
         .map(|model| model.second_order.position_rmse_m());
     let pointings = models.iter().map(|model| model.rotation_vector.rmse_rad());
-    let adjustment = site
-        .adjustment
-        .as_ref()
-        .map(adjustment_figures)
-        .transpose()?;
-    let [before, after, sigma0] = adjustment.unwrap_or_default();
+    let adjustment = site.adjustment.as_ref();
+    let before = largest_along_track_parallax_m(site.intersection.as_ref())?;
+    let after = largest_along_track_parallax_m(adjustment.map(|of| &of.intersection))?;
+    let adjusted = adjustment.map(|of| of.adjusted.value()).transpose()?;
     let figures = [
         (figures::RANGE_MEAN_M, means.max_by(f64::total_cmp)),
         (figures::POSITION_RMSE_M, positions.max_by(f64::total_cmp)),
         (figures::POINTING_RMSE_RAD, pointings.max_by(f64::total_cmp)),
         (figures::ALONG_TRACK_PARALLAX_M, before),
         (figures::ADJUSTED_ALONG_TRACK_PARALLAX_M, after),
-        (figures::ADJUSTMENT_SIGMA0, sigma0),
+        (
+            figures::ADJUSTMENT_SIGMA0,
+            adjusted.map(|of| of.summary.sigma0),
+        ),
     ];
     let figures = figures.into_iter();
     Ok(figures
         .filter_map(|(name, figure)| Some((name.to_owned(), figure?)))
         .collect())
-}
-
-/// Misregistration of the images before and after the adjustment, and its standard deviation of unit weight.
-fn adjustment_figures(adjustment: &Adjustment) -> Result<[Option<f64>; 3]> {
-    Ok([
-        largest_along_track_parallax_m(adjustment.pairs.value()?),
-        largest_along_track_parallax_m(adjustment.adjusted_pairs.value()?),
-        Some(adjustment.adjusted.value()?.summary.sigma0),
-    ])
 }
 
 fn biases(config: &SiteConfig) -> Vec<BiasEntry> {

@@ -39,20 +39,27 @@ pub(super) struct Site {
     pub(super) ranges: Output<RangeCheck>,
     /// In the order of the configuration.
     pub(super) images: Vec<SiteImage>,
-    /// Nothing for a site without tie points, and none when it failed.
+    /// Nothing for a site without tie point files.
+    pub(super) ties: Option<Output<Ties>>,
+    /// With the orientation of the kernels; none when it failed.
+    pub(super) intersection: Option<Intersection>,
+    /// None when it failed.
     pub(super) adjustment: Option<Adjustment>,
     /// Why there is no adjustment although there are tie points.
     pub(super) adjustment_failure: Option<Error>,
 }
 
-/// What tie points make of a site, before and after the adjustment.
-pub(super) struct Adjustment {
-    pub(super) ties: Output<Ties>,
+/// Ground points of the tie points, and what every pair of images says of itself.
+pub(super) struct Intersection {
     pub(super) intersected: Output<IntersectedTies>,
     pub(super) pairs: Output<Vec<PairComparison>>,
+}
+
+/// What the adjustment makes of a site.
+pub(super) struct Adjustment {
     pub(super) adjusted: Output<Adjusted>,
-    /// The same images with their adjusted orientation.
-    pub(super) adjusted_images: Vec<SiteImage>,
-    pub(super) adjusted_intersected: Output<IntersectedTies>,
-    pub(super) adjusted_pairs: Output<Vec<PairComparison>>,
+    /// The images with their adjusted orientation.
+    pub(super) images: Vec<SiteImage>,
+    /// With the adjusted orientation.
+    pub(super) intersection: Intersection,
 }

@@ -13,7 +13,9 @@ use crate::{
     config::SiteConfig,
     error::Result,
     files::file_name,
-    products::{GeometricProducts, ImageProducts, SiteProducts, write_products},
+    products::{
+        AdjustmentProducts, GeometricProducts, ImageProducts, SiteProducts, write_products,
+    },
     report,
     spice::{KernelSet, KernelView},
     stage::{Input, Inputs, Output, Reason},
@@ -97,10 +99,10 @@ pub(super) fn publish(
     let adjusted_images = site
         .adjustment
         .as_ref()
-        .map(|of| image_products(&of.adjusted_images));
+        .map(|of| image_products(&of.images));
     let adjusted_images = adjusted_images.transpose()?.unwrap_or_default();
-    let geometric = site.adjustment.as_ref().map(|adjustment| {
-        geometric_products(adjustment, kernels, folder, &adjusted_images, images_agree)
+    let adjustment = site.adjustment.as_ref().map(|adjustment| {
+        adjustment_products(adjustment, kernels, folder, &adjusted_images, images_agree)
     });
     let converted = site.converted.value()?;
     let products = SiteProducts {
@@ -118,7 +120,7 @@ pub(super) fn publish(
         complaints: &complaints,
         notes: &notes,
         verdict: &verdict,
-        geometric: geometric.transpose()?,
+        geometric: geometric_products(site, adjustment.transpose()?)?,
     };
     let staging = staging(folder)?;
     let files: Vec<(PathBuf, u64)> =
@@ -156,24 +158,37 @@ fn image_products(images: &[SiteImage]) -> Result<Vec<ImageProducts<'_>>> {
     images.collect()
 }
 
-/// What tie points make of the site in `folder`.
+/// What tie points make of the site; nothing where they could not be intersected.
 fn geometric_products<'a>(
+    site: &'a Site,
+    adjustment: Option<AdjustmentProducts<'a>>,
+) -> Result<Option<GeometricProducts<'a>>> {
+    let (Some(ties), Some(initial)) = (&site.ties, &site.intersection) else {
+        return Ok(None);
+    };
+    Ok(Some(GeometricProducts {
+        ties: ties.value()?,
+        intersected: initial.intersected.value()?,
+        pairs: initial.pairs.value()?,
+        adjustment,
+    }))
+}
+
+/// What the adjustment makes of the site in `folder`.
+fn adjustment_products<'a>(
     adjustment: &'a Adjustment,
     kernels: &'a KernelSet,
     folder: &'a Path,
-    adjusted_images: &'a [ImageProducts<'a>],
+    images: &'a [ImageProducts<'a>],
     images_agree: bool,
-) -> Result<GeometricProducts<'a>> {
-    Ok(GeometricProducts {
+) -> Result<AdjustmentProducts<'a>> {
+    Ok(AdjustmentProducts {
         kernels,
         folder,
-        ties: adjustment.ties.value()?,
-        intersected: adjustment.intersected.value()?,
-        pairs: adjustment.pairs.value()?,
         adjusted: adjustment.adjusted.value()?,
-        adjusted_images,
-        adjusted_intersected: adjustment.adjusted_intersected.value()?,
-        adjusted_pairs: adjustment.adjusted_pairs.value()?,
+        images,
+        intersected: adjustment.intersection.intersected.value()?,
+        pairs: adjustment.intersection.pairs.value()?,
         images_agree,
     })
 }

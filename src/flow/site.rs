@@ -5,7 +5,7 @@ use super::{
     choice::{ChooseKernels, KernelChoice, RivalKernelSets, rival_positions},
     driver::{Driver, Flow, Leave},
     kernels::load_kernels,
-    outputs::{Adjustment, Prepared, Site},
+    outputs::{Adjustment, Intersection, Prepared, Site},
 };
 use crate::{
     config::{ImageConfig, SiteConfig},
@@ -16,12 +16,12 @@ use crate::{
     stages::{
         adjust::Adjust,
         check_ranges::CheckRanges,
-        compare_pairs::{ComparePairs, PairComparison},
+        compare_pairs::ComparePairs,
         convert_datum::{ConvertDatum, Converted},
         describe_kernels::{DescribeKernels, Required},
         fit_sensor_model::FitSensorModel,
         group_profiles::{GroupProfiles, Profile},
-        intersect::{Intersect, IntersectedTies},
+        intersect::Intersect,
         orientation::Orientation,
         read_ties::{ImageNames, ReadTies, TieFiles, Ties},
         register::Register,
@@ -34,6 +34,9 @@ use crate::{
     },
 };
 
+/// Footprints and their profiles.
+type Shots<'a> = (&'a Output<Converted>, &'a Output<Vec<Profile>>);
+
 /// The flow of one site, from its configuration to its products.
 pub(super) fn site<D: Driver>(flow: &mut D, config: &SiteConfig) -> Flow<()> {
     let prepared = prepare(flow, config)?;
@@ -44,8 +47,8 @@ pub(super) fn site<D: Driver>(flow: &mut D, config: &SiteConfig) -> Flow<()> {
     };
     let mut site = orient(flow, config, prepared, kernels)?;
     site.choice = choice;
-    match adjust(flow, config, &site) {
-        Ok(adjustment) => site.adjustment = adjustment,
+    match triangulate(flow, config, &mut site) {
+        Ok(()) => {}
         // What the measurements do not determine keeps no other product from its readers.
         Err(Leave::Failed(failure)) if is_of_adjustment(&failure) => {
             tracing::warn!("{failure}");
@@ -174,6 +177,8 @@ pub(super) fn orient<D: Driver>(
         described,
         ranges,
         images,
+        ties: None,
+        intersection: None,
         adjustment: None,
         adjustment_failure: None,
     })
@@ -207,7 +212,7 @@ fn registered<D: Driver>(
     round: Round,
     times: &[Output<ImageTimes>],
     orientations: Vec<Output<Orientation>>,
-    (converted, profiles): (&Output<Converted>, &Output<Vec<Profile>>),
+    (converted, profiles): Shots,
 ) -> Flow<Vec<SiteImage>> {
     let oriented = config.images.iter().zip(times).zip(orientations);
     let register = |((image, times), orientation): ((&ImageConfig, &Output<_>), _)| {
@@ -238,21 +243,37 @@ fn registered<D: Driver>(
     oriented.map(register).collect()
 }
 
-/// Tie points, their ground points, the combined adjustment, and the images once more as adjusted; nothing for a
-/// site without tie points.
-fn adjust<D: Driver>(flow: &mut D, config: &SiteConfig, site: &Site) -> Flow<Option<Adjustment>> {
+/// Tie points, their ground points, and the adjustment, as far as it goes; nothing for a site without tie points.
+fn triangulate<D: Driver>(flow: &mut D, config: &SiteConfig, site: &mut Site) -> Flow<()> {
     if config.ties.files.is_empty() {
-        return Ok(None);
+        return Ok(());
     }
-    let ties = ties(flow, config)?;
-    let (intersected, pairs) = intersect(flow, config, Round::Initial, &site.images, &ties, site)?;
+    let ties = &*site.ties.insert(ties(flow, config)?);
+    let shots = (&site.converted, &site.profiles);
+    let initial = intersect(flow, config, Round::Initial, &site.images, ties, shots)?;
+    let initial = &*site.intersection.insert(initial);
+    let adjustment = adjust(flow, config, &site.images, ties, initial, shots)?;
+    site.adjustment = Some(adjustment);
+    Ok(())
+}
+
+/// The combined adjustment, and the images and tie points once more with the adjusted orientation.
+fn adjust<D: Driver>(
+    flow: &mut D,
+    config: &SiteConfig,
+    images: &[SiteImage],
+    ties: &Output<Ties>,
+    initial: &Intersection,
+    shots: Shots,
+) -> Flow<Adjustment> {
+    let (converted, profiles) = shots;
     let adjusted = flow.stage(&Adjust {
-        images: InOrder(&site.images),
+        images: InOrder(images),
         model: &config.registration.model,
-        converted: &site.converted,
-        profiles: &site.profiles,
-        ties: &ties,
-        intersected: &intersected,
+        converted,
+        profiles,
+        ties,
+        intersected: &initial.intersected,
         adjustment: &config.adjustment,
     })?;
     let reorient = |(index, image): (usize, &SiteImage)| {
@@ -264,26 +285,16 @@ fn adjust<D: Driver>(flow: &mut D, config: &SiteConfig, site: &Site) -> Flow<Opt
             adjusted: &adjusted,
         })
     };
-    let orientations = site.images.iter().enumerate().map(reorient);
+    let orientations = images.iter().enumerate().map(reorient);
     let orientations = orientations.collect::<Flow<Vec<_>>>()?;
-    let times: Vec<_> = site
-        .images
-        .iter()
-        .map(|image| image.times.clone())
-        .collect();
-    let shots = (&site.converted, &site.profiles);
-    let adjusted_images = registered(flow, config, Round::Adjusted, &times, orientations, shots)?;
-    let (adjusted_intersected, adjusted_pairs) =
-        intersect(flow, config, Round::Adjusted, &adjusted_images, &ties, site)?;
-    Ok(Some(Adjustment {
-        ties,
-        intersected,
-        pairs,
+    let times: Vec<_> = images.iter().map(|image| image.times.clone()).collect();
+    let images = registered(flow, config, Round::Adjusted, &times, orientations, shots)?;
+    let intersection = intersect(flow, config, Round::Adjusted, &images, ties, shots)?;
+    Ok(Adjustment {
         adjusted,
-        adjusted_images,
-        adjusted_intersected,
-        adjusted_pairs,
-    }))
+        images,
+        intersection,
+    })
 }
 
 /// Whether a failure lies in what the tie points and the orientation determine, not in a file that cannot be read.
@@ -311,8 +322,8 @@ fn intersect<D: Driver>(
     round: Round,
     images: &[SiteImage],
     ties: &Output<Ties>,
-    site: &Site,
-) -> Flow<(Output<IntersectedTies>, Output<Vec<PairComparison>>)> {
+    (converted, profiles): Shots,
+) -> Flow<Intersection> {
     let (images, model) = (InOrder(images), &config.registration.model);
     let intersected = flow.stage(&Intersect {
         round,
@@ -327,10 +338,10 @@ fn intersect<D: Driver>(
         model,
         ties,
         intersected: &intersected,
-        converted: &site.converted,
-        profiles: &site.profiles,
+        converted,
+        profiles,
     })?;
-    Ok((intersected, pairs))
+    Ok(Intersection { intersected, pairs })
 }
 
 /// The kernels of the configuration for the `required` times; `None` while it is not known which these are.

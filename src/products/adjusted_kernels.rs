@@ -24,7 +24,7 @@ use super::{
     error::ProductError,
     files::write_text,
     product::{Content, Context, Declaration, Product, Program, Role, Use, Write, Written},
-    site::GeometricProducts,
+    site::AdjustmentProducts,
 };
 use crate::{
     config::{KernelsConfig, PointingConfig},
@@ -108,16 +108,16 @@ pub(super) static METAKERNEL: Declaration = Declaration {
     uses: &[],
 };
 
-/// The adjusted kernels of a site with tie points.
-fn of_site(of: &Context, geometric: &GeometricProducts) -> Result<Vec<Written>> {
+/// The adjusted kernels of a site.
+fn of_site(of: &Context, adjustment: &AdjustmentProducts) -> Result<Vec<Written>> {
     let to = AdjustedKernels {
         directory: of.directory,
-        site_folder: geometric.folder,
-        originals: geometric.kernels,
+        site_folder: adjustment.folder,
+        originals: adjustment.kernels,
         kernels: &of.site.config.kernels,
         pointing: &of.site.config.pointing,
     };
-    let images = geometric.adjusted_images.iter().map(|image| AdjustedImage {
+    let images = adjustment.images.iter().map(|image| AdjustedImage {
         times: image.times,
         orientation: image.orientation,
     });

@@ -6,7 +6,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::{
-    GeometricProducts, SiteProducts,
+    AdjustmentProducts, GeometricProducts, SiteProducts,
     files::write_json,
     product::{Content, Declaration, Role, Write},
 };
@@ -280,9 +280,9 @@ pub(super) static DOCUMENT: Declaration = Declaration {
     rows: "adjusted points",
     role: Role::Data,
     content: Content::Document(schema),
-    write: Write::Ties(|path, of, geometric| {
-        write_json(path, &document(of.site, geometric))?;
-        Ok(Some(geometric.adjusted.points.len() as u64))
+    write: Write::Adjustment(|path, of, geometric, adjustment| {
+        write_json(path, &document(of.site, geometric, adjustment))?;
+        Ok(Some(adjustment.adjusted.points.len() as u64))
     }),
     uses: &[],
 };
@@ -297,9 +297,13 @@ pub(super) fn schema() -> DocumentSchema {
     )
 }
 
-fn document<'a>(site: &SiteProducts<'a>, geometric: &GeometricProducts<'a>) -> Document<'a> {
+fn document<'a>(
+    site: &SiteProducts<'a>,
+    geometric: &GeometricProducts<'a>,
+    adjustment: &AdjustmentProducts<'a>,
+) -> Document<'a> {
     let ties = geometric.ties;
-    let adjusted = geometric.adjusted;
+    let adjusted = adjustment.adjusted;
     let rejected = adjusted.rejected.iter().map(|point| RejectedPointDocument {
         kind: point.kind,
         id: &point.id,
@@ -325,7 +329,7 @@ fn document<'a>(site: &SiteProducts<'a>, geometric: &GeometricProducts<'a>) -> D
             complaints: ties.complaint_count,
         },
         before: state(geometric.intersected, geometric.pairs),
-        after: state(geometric.adjusted_intersected, geometric.adjusted_pairs),
+        after: state(adjustment.intersected, adjustment.pairs),
         adjustment: AdjustmentDocument {
             summary: &adjusted.summary,
             weighted_squares: &adjusted.weighted_squares,

@@ -42,7 +42,7 @@ pub use exchange::{
 };
 pub use generated::{documentation, schemas};
 pub use product::Product;
-pub use site::{GeometricProducts, ImageProducts, SiteProducts};
+pub use site::{AdjustmentProducts, GeometricProducts, ImageProducts, SiteProducts};
 
 use crate::error::{Locate, Result};
 use product::{Context, Declaration, Scope, Write, Written};
@@ -62,11 +62,8 @@ pub fn write_products(directory: &Path, site: &SiteProducts, page: &str) -> Resu
             Scope::Site => vec![None],
             Scope::Image => site.images.iter().map(Some).collect(),
             Scope::AdjustedImage => {
-                let geometric = site.geometric.iter();
-                geometric
-                    .flat_map(|of| of.adjusted_images)
-                    .map(Some)
-                    .collect()
+                let images = site.adjustment().map(|(_, adjustment)| adjustment.images);
+                images.unwrap_or_default().iter().map(Some).collect()
             }
         };
         for image in images {
@@ -105,8 +102,15 @@ fn write(
         (Write::Image(write) | Write::AdjustedImage(write), Some(image), _) => {
             write(&path, of, image).map(Some)
         }
-        (Write::Ties(write), _, Some(geometric)) => write(&path, of, geometric),
-        (Write::Several(write), _, Some(geometric)) => return write(of, geometric),
+        (Write::Ties(write), _, Some(geometric)) => write(&path, of, geometric).map(Some),
+        (Write::Adjustment(write), _, Some(geometric)) => match &geometric.adjustment {
+            Some(adjustment) => write(&path, of, geometric, adjustment),
+            None => Ok(None),
+        },
+        (Write::Several(write), _, Some(geometric)) => match &geometric.adjustment {
+            Some(adjustment) => return write(of, adjustment),
+            None => Ok(None),
+        },
         _ => Ok(None),
     };
     let product = rows.in_file(&path)?.map(|rows| Product {

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use super::{
-    site::{GeometricProducts, ImageProducts, SiteProducts},
+    site::{AdjustmentProducts, GeometricProducts, ImageProducts, SiteProducts},
     table::Meaning,
 };
 use crate::{error::Result, schema::DocumentSchema};
@@ -79,13 +79,15 @@ pub(super) enum Write {
     /// For every image.
     Image(fn(&Path, &Context, &ImageProducts) -> Result<u64>),
     /// For a site with tie points.
-    Ties(fn(&Path, &Context, &GeometricProducts) -> Result<Option<u64>>),
-    /// For every image of a site with tie points.
+    Ties(fn(&Path, &Context, &GeometricProducts) -> Result<u64>),
+    /// For a site with an adjustment.
+    Adjustment(fn(&Path, &Context, &GeometricProducts, &AdjustmentProducts) -> Result<Option<u64>>),
+    /// For every image of a site with an adjustment.
     AdjustedImage(fn(&Path, &Context, &ImageProducts) -> Result<u64>),
-    /// For every image of a site with tie points, by the product that writes several.
+    /// For every image of a site with an adjustment, by the product that writes several.
     WithAnother,
-    /// For a site with tie points, others with it.
-    Several(fn(&Context, &GeometricProducts) -> Result<Vec<Written>>),
+    /// For a site with an adjustment, others with it.
+    Several(fn(&Context, &AdjustmentProducts) -> Result<Vec<Written>>),
 }
 
 /// What there is a file of.
@@ -144,8 +146,11 @@ impl Declaration {
             Write::Site(_) => "every site",
             Write::Footprints(_) => "a site with footprints",
             Write::Image(_) => "every image",
-            Write::Ties(_) | Write::Several(_) => "a site with tie points",
-            Write::AdjustedImage(_) | Write::WithAnother => "every image of a site with tie points",
+            Write::Ties(_) => "a site with tie points",
+            Write::Adjustment(_) | Write::Several(_) => "a site with an adjustment",
+            Write::AdjustedImage(_) | Write::WithAnother => {
+                "every image of a site with an adjustment"
+            }
         }
     }
 

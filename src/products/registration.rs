@@ -135,8 +135,8 @@ pub(super) static ADJUSTED: Declaration = Declaration {
     rows: "footprints in images",
     role: Role::Data,
     content: Content::Table(|| meanings(&columns())),
-    write: Write::Ties(|path, of, geometric| {
-        let table = table(of.site, geometric.adjusted_images);
+    write: Write::Adjustment(|path, of, _, adjustment| {
+        let table = table(of.site, adjustment.images);
         parquet::write(path, table, Vec::new()).map(Some)
     }),
     uses: &[],

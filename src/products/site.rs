@@ -48,31 +48,38 @@ pub struct SiteProducts<'a> {
     pub notes: &'a [String],
     /// The verdict.
     pub verdict: &'a Verdict,
-    /// Intersection and adjustment; nothing for a site without tie points.
+    /// Tie points and the adjustment; nothing for a site without tie points that could be intersected.
     pub geometric: Option<GeometricProducts<'a>>,
 }
 
-/// What tie points make of a site, before and after the adjustment.
+/// What tie points make of a site.
 #[derive(Debug, Clone, Copy)]
 pub struct GeometricProducts<'a> {
-    /// The kernels that the adjusted ones follow.
-    pub kernels: &'a KernelSet,
-    /// Folder of the site's products, where `adjusted.tm` will lie.
-    pub folder: &'a Path,
     /// The tie points.
     pub ties: &'a Ties,
     /// Their ground points with the orientation of the kernels.
     pub intersected: &'a IntersectedTies,
     /// Every pair of images with tie points in both, likewise.
     pub pairs: &'a [PairComparison],
+    /// Nothing where the adjustment failed.
+    pub adjustment: Option<AdjustmentProducts<'a>>,
+}
+
+/// What the adjustment makes of a site.
+#[derive(Debug, Clone, Copy)]
+pub struct AdjustmentProducts<'a> {
+    /// The kernels that the adjusted ones follow.
+    pub kernels: &'a KernelSet,
+    /// Folder of the site's products, where `adjusted.tm` will lie.
+    pub folder: &'a Path,
     /// The adjustment.
     pub adjusted: &'a Adjusted,
     /// The images with their adjusted orientation, in the order of the site's.
-    pub adjusted_images: &'a [ImageProducts<'a>],
+    pub images: &'a [ImageProducts<'a>],
     /// Ground points of the tie points with the adjusted orientation.
-    pub adjusted_intersected: &'a IntersectedTies,
+    pub intersected: &'a IntersectedTies,
     /// Every pair with the adjusted orientation.
-    pub adjusted_pairs: &'a [PairComparison],
+    pub pairs: &'a [PairComparison],
     /// Whether the images of every pair place their tie points together after the adjustment.
     pub images_agree: bool,
 }
@@ -100,7 +107,13 @@ impl<'a> ImageProducts<'a> {
     }
 }
 
-impl SiteProducts<'_> {
+impl<'a> SiteProducts<'a> {
+    /// The tie points and their adjustment; nothing where there is none.
+    pub(crate) fn adjustment(&self) -> Option<(GeometricProducts<'a>, AdjustmentProducts<'a>)> {
+        let geometric = self.geometric?;
+        Some((geometric, geometric.adjustment?))
+    }
+
     /// Name of a source file; its folder belongs to the machine, not to the product.
     pub(super) fn file_name(&self, file: u16) -> String {
         let source = self.footprints.files.get(usize::from(file));

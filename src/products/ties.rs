@@ -13,7 +13,7 @@ use super::{
 use crate::{
     geom::ellipsoid::Spherical,
     stages::{
-        adjust::{CorrectedPoint, ImageResidual, PointKind, RangeResidual},
+        adjust::{Adjusted, CorrectedPoint, ImageResidual, PointKind, RangeResidual},
         intersect::{IntersectedPoint, IntersectedTies, MeasureResidual},
     },
 };
@@ -27,7 +27,7 @@ pub(super) static TABLE: Declaration = Declaration {
     content: Content::Table(|| meanings(&tie_columns())),
     write: Write::Ties(|path, of, geometric| {
         let table = Table::new(tie_columns(), measurements(of.site, geometric));
-        parquet::write(path, table, Vec::new()).map(Some)
+        parquet::write(path, table, Vec::new())
     }),
     uses: &[],
 };
@@ -39,8 +39,8 @@ pub(super) static FOOTPRINTS: Declaration = Declaration {
     rows: "footprints",
     role: Role::Data,
     content: Content::Table(|| meanings(&shot_columns())),
-    write: Write::Ties(|path, _, geometric| {
-        let table = Table::new(shot_columns(), shots(geometric));
+    write: Write::Adjustment(|path, _, _, adjustment| {
+        let table = Table::new(shot_columns(), shots(adjustment.adjusted));
         parquet::write(path, table, Vec::new()).map(Some)
     }),
     uses: &[],
@@ -68,19 +68,21 @@ fn measurements<'a>(
     site: &SiteProducts<'a>,
     geometric: &GeometricProducts<'a>,
 ) -> Vec<Measurement<'a>> {
-    let adjusted = geometric.adjusted;
-    let ties = (0_usize..).zip(&adjusted.points);
+    let adjusted = geometric.adjustment.map(|of| of.adjusted);
+    let points = adjusted.map_or(&[][..], |of| &of.points);
+    let ties = (0_usize..).zip(points);
     let ties = ties.filter(|(_, point)| point.kind == PointKind::Tie);
     let points: BTreeMap<usize, (usize, &CorrectedPoint)> = ties
         .map(|(index, point)| (point.index, (index, point)))
         .collect();
     let views: BTreeMap<(usize, usize), &ImageResidual> = adjusted
-        .views
         .iter()
+        .flat_map(|adjusted| &adjusted.views)
         .map(|view| ((view.point, view.image), view))
         .collect();
     let before = by_tie(geometric.intersected);
-    let after = by_tie(geometric.adjusted_intersected);
+    let after = geometric.adjustment.map(|of| by_tie(of.intersected));
+    let after = after.unwrap_or_default();
     let reasons = reasons(geometric);
     let mut found = Vec::new();
     for (index, tie) in geometric.ties.points.iter().enumerate() {
@@ -118,8 +120,9 @@ fn measurements<'a>(
 
 /// Why tie points were rejected; what the intersection says of a point comes first.
 fn reasons(geometric: &GeometricProducts) -> BTreeMap<usize, String> {
-    let adjusted = geometric.adjusted.rejected.iter();
-    let ties = adjusted.filter(|point| point.kind == PointKind::Tie);
+    let adjusted = geometric.adjustment.iter();
+    let ties = adjusted.flat_map(|of| &of.adjusted.rejected);
+    let ties = ties.filter(|point| point.kind == PointKind::Tie);
     let rejected = geometric.intersected.rejected.iter();
     let rejected = rejected.map(|tie| (tie.tie, tie.reason.to_string()));
     let ties = ties.map(|point| (point.index, point.reason.to_string()));
@@ -166,7 +169,7 @@ fn measured_columns<'a>() -> Vec<Column<Measurement<'a>>> {
         column(
             "rejected",
             Unit::None,
-            "why the tie point took no part in the adjustment; empty when it did",
+            "why the tie point took no part in the adjustment; empty when it did, and where the adjustment failed",
             |row: &Measurement| row.rejected.clone(),
         ),
     ]
@@ -331,8 +334,7 @@ fn sigma_m(point: &CorrectedPoint, axis: usize) -> f64 {
 /// A footprint that took part, with its range.
 type Shot<'a> = (&'a CorrectedPoint, Option<&'a RangeResidual>);
 
-fn shots<'a>(geometric: &GeometricProducts<'a>) -> Vec<Shot<'a>> {
-    let adjusted = geometric.adjusted;
+fn shots(adjusted: &Adjusted) -> Vec<Shot<'_>> {
     let ranges: BTreeMap<usize, &RangeResidual> = adjusted
         .ranges
         .iter()

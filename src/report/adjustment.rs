@@ -10,7 +10,7 @@ use super::{
 use crate::{
     error::Result,
     geom::statistics::{BAARDA_LIMIT, Summary},
-    products::{GeometricProducts, SiteProducts},
+    products::{AdjustmentProducts, GeometricProducts, SiteProducts},
     stages::adjust::{Adjusted, AdjustmentSummary, GroundSummary, ObservationType},
 };
 
@@ -20,18 +20,23 @@ const STEPS_SHOWN_MIN: f64 = 8.0;
 pub(super) const SECTION: Section = Section {
     title: "Combined adjustment",
     anchor: "combined-adjustment",
-    appears: |site| site.geometric.is_some(),
+    appears: |site| site.adjustment().is_some(),
     write: |site| {
-        let geometric = site.geometric.iter();
-        geometric.map(|geometric| write(site, geometric)).collect()
+        let adjustment = site.adjustment();
+        let written = adjustment.map(|(ties, adjustment)| write(site, &ties, &adjustment));
+        Ok(written.transpose()?.unwrap_or_default())
     },
 };
 
-fn write(site: &SiteProducts, geometric: &GeometricProducts) -> Result<String> {
-    let adjusted = geometric.adjusted;
+fn write(
+    site: &SiteProducts,
+    geometric: &GeometricProducts,
+    adjustment: &AdjustmentProducts,
+) -> Result<String> {
+    let adjusted = adjustment.adjusted;
     let summary = &adjusted.summary;
     let mut html = paragraph(&overview(adjusted));
-    html += &paragraph(&reliability::absolute(site, geometric));
+    html += &paragraph(&reliability::absolute(site, geometric, adjustment));
     html += &format!(
         "<div class=\"plots\">\n{}</div>\n",
         figure(&convergence(adjusted))?

@@ -46,7 +46,10 @@ fn write(site: &SiteProducts, geometric: &GeometricProducts) -> Result<String> {
         html += &reprojection(&pairs);
         html += &footprints(&pairs);
     }
-    html += &heading("Before and after on the image planes");
+    html += &heading(match geometric.adjustment {
+        Some(_) => "Before and after on the image planes",
+        None => "On the image planes",
+    });
     html += &moved::figures(site, geometric)?;
     Ok(html)
 }
@@ -55,16 +58,19 @@ fn write(site: &SiteProducts, geometric: &GeometricProducts) -> Result<String> {
 pub(super) struct BeforeAfter<'a> {
     pub(super) before: &'a PairComparison,
     pub(super) after: Option<&'a PairComparison>,
+    /// Whether there is an adjustment.
+    adjusted: bool,
 }
 
 impl<'a> BeforeAfter<'a> {
     pub(super) fn all(geometric: &GeometricProducts<'a>) -> Vec<Self> {
-        let (pairs, adjusted) = (geometric.pairs, geometric.adjusted_pairs);
+        let adjusted = geometric.adjustment.map_or(&[][..], |of| of.pairs);
         let of = |before: &'a PairComparison| Self {
             before,
             after: adjusted.iter().find(|pair| pair.images == before.images),
+            adjusted: geometric.adjustment.is_some(),
         };
-        pairs.iter().map(of).collect()
+        geometric.pairs.iter().map(of).collect()
     }
 
     /// The pair whose images disagree most before the adjustment.
@@ -92,6 +98,13 @@ impl<'a> BeforeAfter<'a> {
         } else {
             "a tie point falls"
         };
+        if !self.adjusted {
+            return format!(
+                "{}: {what} {} apart in the two images along the flight.",
+                self.name(),
+                before.in_words()
+            );
+        }
         let after = after.map_or_else(
             || "after it no tie point joins them".to_owned(),
             |after| format!("after it {}", after.in_words()),
@@ -154,13 +167,16 @@ fn read(geometric: &GeometricProducts) -> String {
     let points = &geometric.intersected.points;
     let elsewhere: u64 = ties.elsewhere.values().sum();
     let outliers = points.iter().filter(|point| point.outlier).count();
+    let adjusted = geometric.adjustment.map_or_else(
+        || "; the adjustment failed".to_owned(),
+        |of| format!(", {} with the adjusted one", of.intersected.points.len()),
+    );
     let mut words = format!(
         "{} read, {} of them measured in at least two images; {} have a ground point with the orientation of the \
-         kernels, {} with the adjusted one.",
+         kernels{adjusted}.",
         counted(ties.points.len(), "tie point"),
         ties.multi_image(),
         points.len(),
-        geometric.adjusted_intersected.points.len()
     );
     for (count, what) in [
         (
@@ -194,7 +210,8 @@ fn rejected(geometric: &GeometricProducts) -> String {
             .entry(("intersection", rejection(tie.reason)))
             .or_insert(0) += 1;
     }
-    let ties = geometric.adjusted.rejected.iter();
+    let ties = geometric.adjustment.iter();
+    let ties = ties.flat_map(|of| &of.adjusted.rejected);
     for tie in ties.filter(|left| left.kind == PointKind::Tie) {
         let reason = match tie.reason {
             // The intersection has said why.

@@ -38,12 +38,13 @@ pub(super) fn figures(site: &SiteProducts, geometric: &GeometricProducts) -> Res
     let mut html = String::new();
     let panels = 2 * site.images.len().max(1);
     let limit = (ARROWS_ALL / panels).clamp(20, ARROWS_MAX);
-    let images = site.images.iter().zip(geometric.adjusted_images);
-    for (index, (before, after)) in images.enumerate() {
-        if let Some(plot) = footprints(before, after) {
+    let adjusted = geometric.adjustment.map_or(&[][..], |of| of.images);
+    for (index, image) in site.images.iter().enumerate() {
+        let after = adjusted.get(index);
+        if let Some(plot) = after.and_then(|after| footprints(image, after)) {
             html += &figure(&plot)?;
         }
-        html += &figure(&vectors(before, index, geometric, limit))?;
+        html += &figure(&vectors(image, index, geometric, limit))?;
     }
     Ok(format!("<div class=\"plots\">\n{html}</div>\n"))
 }
@@ -156,10 +157,12 @@ fn vectors(
     let mut words = "Reprojection residuals of tie points, measured minus projected, from where they were measured; \
                      flight to the right."
         .to_owned();
+    let after = geometric.adjustment.map(|of| of.intersected);
     for (state, title, colour, ties) in [
-        ("before", "Before", BEFORE, geometric.intersected),
-        ("after", "After", AFTER, geometric.adjusted_intersected),
+        ("before", "Before", BEFORE, Some(geometric.intersected)),
+        ("after", "After", AFTER, after),
     ] {
+        let Some(ties) = ties else { continue };
         let (all, outliers) = residuals(image, index, ties);
         let each = thinned(&all, limit);
         let room = (LONGEST * lines, LONGEST * samples);

@@ -9,7 +9,7 @@ use super::{
 use crate::{
     footprints::FootprintImageCoordinates,
     geom::statistics::Summary,
-    products::{GeometricProducts, SiteProducts},
+    products::{AdjustmentProducts, GeometricProducts, SiteProducts},
     stages::adjust::{Adjusted, AdjustmentSummary, PointKind, RejectionReason, ScalarResidual},
 };
 
@@ -28,11 +28,15 @@ const CORRELATED_SHOWN: usize = 12;
 const BLUNDERS_SHOWN: usize = 20;
 
 /// The relative registration is corrected, the absolute position is not: with numbers.
-pub(super) fn absolute(site: &SiteProducts, geometric: &GeometricProducts) -> String {
+pub(super) fn absolute(
+    site: &SiteProducts,
+    geometric: &GeometricProducts,
+    adjustment: &AdjustmentProducts,
+) -> String {
     let pairs = BeforeAfter::all(geometric);
     let relative = BeforeAfter::worst(&pairs);
     let relative = relative.map_or_else(String::new, |pair| pair.sentence() + " ");
-    let summary = &geometric.adjusted.summary;
+    let summary = &adjustment.adjusted.summary;
     let witness = match site.config.adjustment.footprint_image_coordinates {
         FootprintImageCoordinates::Weighted if summary.shots.corrections_m[0].n > 0 => {
             "the image coordinates of footprints were computed from the very orientation that is adjusted and are no \
@@ -48,7 +52,7 @@ pub(super) fn absolute(site: &SiteProducts, geometric: &GeometricProducts) -> St
     if ties.corrections_m[0].n == 0 {
         return format!("{relative}No tie point took part: nothing was adjusted to anything.");
     }
-    let corrected = if geometric.images_agree {
+    let corrected = if adjustment.images_agree {
         "The relative registration is corrected, the absolute position is not."
     } else {
         "Neither the relative registration nor the absolute position is corrected."

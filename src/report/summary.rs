@@ -64,7 +64,10 @@ fn together(site: &SiteProducts) -> String {
         };
         pair.sentence() + &others
     });
-    let sigma0 = label(geometric.adjusted.summary.sigma0, 2);
+    let Some(adjustment) = &geometric.adjustment else {
+        return words;
+    };
+    let sigma0 = label(adjustment.adjusted.summary.sigma0, 2);
     format!("{words} σ0 of the adjustment: {sigma0}.")
         .trim_start()
         .to_owned()

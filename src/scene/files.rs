@@ -25,7 +25,7 @@ const LIST: &str = ".scene";
 
 /// A scene that is being written in a temporary folder beside its final place.
 ///
-/// PointRejection unfinished, it leaves nothing; a process that is killed leaves a folder `.partial-…`.
+/// Dropped unfinished, it leaves nothing; a process that is killed leaves a folder `.partial-…`.
 pub(super) struct Draft {
     final_place: PathBuf,
     /// Holds the new scene and, for the moment of the exchange, the older one.

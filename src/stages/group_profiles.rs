@@ -128,11 +128,9 @@ fn profile(
         .enumerate()
         .filter_map(|(index, image)| {
             let exposures = image.exposures();
-            let shots = rows
-                .iter()
-                .filter(|row| exposures.contains(time(row)))
-                .count();
-            let shots = u32::try_from(shots).unwrap_or(u32::MAX);
+            let before = rows.partition_point(|row| time(row) < exposures.start);
+            let until = rows.partition_point(|row| time(row) <= exposures.stop);
+            let shots = u32::try_from(until - before).unwrap_or(u32::MAX);
             (shots > 0).then_some(SimultaneousImage {
                 image: index,
                 shots,

@@ -46,7 +46,6 @@ stage_inputs! {
 impl Stage for SampleOrientation<'_> {
     const NAME: &'static str = "sample_orientation";
     const METHOD: u32 = 2;
-    const CHECKED: bool = true;
     type Output = Orientation;
     stage_inputs!(fingerprint);
 
@@ -64,21 +63,38 @@ impl Stage for SampleOrientation<'_> {
         )
     }
 
-    fn findings(&self, orientation: &Orientation) -> Vec<String> {
-        let Some(times) = self.times.get() else {
+    /// Whether position and attitude can be read throughout the image, and are to be trusted.
+    fn examine(&self) -> Vec<Result<String>> {
+        // What failed to give times or kernels has been told.
+        let (Some(times), Some(_)) = (self.times.get(), self.kernels.kernels()) else {
             return Vec::new();
         };
-        let invalid = orientation.invalid_because.iter();
-        let invalid = invalid.map(|reason| format!("; products would be invalid: {reason}"));
-        vec![format!(
-            "image {}: {} lines from {} UTC, first line centre {}, position and attitude covered{}",
-            times.id,
-            times.lines_header,
-            times.utc_start,
-            times.line_centre(0),
-            invalid.collect::<String>()
-        )]
+        let session = self.kernels.session();
+        let invalid = session.and_then(|session| {
+            require_orientation(
+                session,
+                times,
+                self.coverage,
+                self.pointing,
+                self.orientation,
+            )
+        });
+        vec![invalid.map(|reasons| finding(times, &reasons))]
     }
+}
+
+/// What is told of an image whose orientation can be read, and why it would not be trusted.
+fn finding(times: &ImageTimes, invalid_because: &[String]) -> String {
+    let invalid = invalid_because.iter();
+    let invalid = invalid.map(|reason| format!("; products would be invalid: {reason}"));
+    format!(
+        "image {}: {} lines from {} UTC, first line centre {}, position and attitude covered{}",
+        times.id,
+        times.lines_header,
+        times.utc_start,
+        times.line_centre(0),
+        invalid.collect::<String>()
+    )
 }
 
 /// Samples the orientation of `image`.
@@ -104,9 +120,7 @@ pub fn sample_orientation(
         pointing,
         tolerance_s: kernels.ck_tolerance_s,
     };
-    let step_s = image.duration_s() / f64::from(sampling.intervals);
-    let epochs = (0..=sampling.intervals).map(|k| image.start.plus(f64::from(k) * step_s));
-    let epochs: Vec<Et> = epochs.collect();
+    let epochs = epochs(image, sampling.intervals);
     let samples = OrientationSample::at_epochs(image, &epochs, |et| reader.camera(et))?;
     let tables = camera_tables::camera_tables(&reader, image, kernels.padding_s)?;
     let nodes: Vec<Et> = tables.et_s.iter().copied().map(Et::from_seconds).collect();
@@ -120,6 +134,48 @@ pub fn sample_orientation(
         invalid_because: far.map(HeldAttitudes::reason).into_iter().collect(),
         notes: held.iter().map(ToString::to_string).collect(),
     })
+}
+
+/// Makes sure that [`sample_orientation`] succeeds, by as few readings as tell it; gives why its orientation would
+/// not be trusted.
+///
+/// Positions and attitudes are read at the samples, more often where the samples are farther apart than those of the
+/// C-kernels, and at the ends of the camera tables. How far attitudes are extrapolated depends on every reading: where
+/// the tolerance lets them be extrapolated too far, all are made.
+fn require_orientation(
+    session: &Session,
+    image: &ImageTimes,
+    kernels: &KernelsConfig,
+    pointing: &PointingConfig,
+    sampling: &OrientationConfig,
+) -> Result<Vec<String>> {
+    if kernels.ck_tolerance_s >= ATTITUDE_SPACING_S {
+        let sampled = sample_orientation(session, image, kernels, pointing, sampling)?;
+        return Ok(sampled.invalid_because);
+    }
+    require_coverage(session, image, kernels, pointing)?;
+    let reader = Reader {
+        session,
+        instrument: &image.instrument,
+        pointing,
+        tolerance_s: kernels.ck_tolerance_s,
+    };
+    let mut intervals = sampling.intervals;
+    while image.duration_s() / f64::from(intervals) > ATTITUDE_SPACING_S {
+        intervals *= 2;
+    }
+    for epoch in epochs(image, intervals) {
+        reader.camera(epoch)?;
+    }
+    camera_tables::require_ends(&reader, image, kernels.padding_s)?;
+    Ok(Vec::new())
+}
+
+/// Equally spaced epochs over the whole header image, both ends included.
+fn epochs(image: &ImageTimes, intervals: u32) -> Vec<Et> {
+    let step_s = image.duration_s() / f64::from(intervals);
+    let epochs = (0..=intervals).map(|k| image.start.plus(f64::from(k) * step_s));
+    epochs.collect()
 }
 
 /// Attitudes that were read outside the C-kernels' intervals, where their last or next one is held.

@@ -4,7 +4,7 @@ use std::{collections::BTreeMap, fs, path::Path};
 
 use areograph::{
     config::{SiteConfig, load},
-    products::{GeometricProducts, ImageProducts, SiteProducts},
+    products::{AdjustmentProducts, GeometricProducts, ImageProducts, SiteProducts},
     report,
     spice::{KernelSet, RequiredCoverage},
     stages::{
@@ -137,16 +137,18 @@ impl Site {
             notes: &[],
             verdict: &verdict,
             geometric: Some(GeometricProducts {
-                kernels: &self.kernels,
-                folder: Path::new(""),
                 ties: &self.ties,
                 intersected: &self.intersected,
                 pairs: &self.pairs,
-                adjusted: &self.adjusted,
-                adjusted_images: &adjusted_images,
-                adjusted_intersected: &self.adjusted_intersected,
-                adjusted_pairs: &self.adjusted_pairs,
-                images_agree: self.images_agree(),
+                adjustment: Some(AdjustmentProducts {
+                    kernels: &self.kernels,
+                    folder: Path::new(""),
+                    adjusted: &self.adjusted,
+                    images: &adjusted_images,
+                    intersected: &self.adjusted_intersected,
+                    pairs: &self.adjusted_pairs,
+                    images_agree: self.images_agree(),
+                }),
             }),
         })
     }

@@ -12,10 +12,13 @@ use super::{
 use crate::{
     frames::{MarsIau2000, Position},
     products::{
-        GeometricProducts, ImageProducts, SiteProducts,
+        AdjustmentProducts, ImageProducts, SiteProducts,
         product::{Content, Declaration, Program, Role, Use, Write},
     },
-    stages::adjust::{CorrectedPoint, PointKind},
+    stages::{
+        adjust::{CorrectedPoint, PointKind},
+        read_ties::Ties,
+    },
     time::Et,
 };
 
@@ -26,10 +29,10 @@ pub(in crate::products) static LIDAR: Declaration = Declaration {
     rows: "shots",
     role: Role::Data,
     content: Content::Foreign,
-    write: Write::Ties(|path, of, geometric| {
+    write: Write::Adjustment(|path, of, _, adjustment| {
         let images = of.site.images.iter();
         let names: Vec<String> = images.map(|image| isis_name(of.site, image)).collect();
-        let shots = lidar_points(of.site, geometric, &names);
+        let shots = lidar_points(of.site, adjustment, &names);
         let some = !shots.is_empty();
         some.then(|| write_lidar_data(path, &shots)).transpose()
     }),
@@ -47,12 +50,12 @@ pub(in crate::products) static CONTROL: Declaration = Declaration {
     rows: "tie points",
     role: Role::Data,
     content: Content::Foreign,
-    write: Write::Ties(|path, of, geometric| {
+    write: Write::Adjustment(|path, of, geometric, adjustment| {
         let images = of.site.images.iter();
         let files: Vec<String> = images
             .map(|image| format!("{}.cub", image.times.id))
             .collect();
-        let points = control_points(of.site, geometric, &files);
+        let points = control_points(of.site, geometric.ties, adjustment, &files);
         let some = !points.is_empty();
         some.then(|| write_gcp(path, &points)).transpose()
     }),
@@ -88,13 +91,12 @@ fn adjusted(point: &CorrectedPoint) -> GroundEstimate {
 /// their own in ISIS.
 fn lidar_points<'a>(
     site: &SiteProducts<'a>,
-    geometric: &GeometricProducts<'a>,
+    adjustment: &AdjustmentProducts<'a>,
     names: &'a [String],
 ) -> Vec<LidarPoint<'a>> {
     let config = &site.config.adjustment;
-    let result = geometric.adjusted;
-    let places: Vec<BTreeMap<usize, [f64; 2]>> =
-        geometric.adjusted_images.iter().map(places).collect();
+    let result = adjustment.adjusted;
+    let places: Vec<BTreeMap<usize, [f64; 2]>> = adjustment.images.iter().map(places).collect();
     let shots = result.ranges.iter().filter_map(|range| {
         let point = &result.points[range.point];
         let image = &result.images[range.image];
@@ -146,14 +148,15 @@ fn places(image: &ImageProducts) -> BTreeMap<usize, [f64; 2]> {
 /// Adjusted tie points where they were measured.
 fn control_points<'a>(
     site: &SiteProducts<'a>,
-    geometric: &GeometricProducts<'a>,
+    ties: &'a Ties,
+    adjustment: &AdjustmentProducts<'a>,
     files: &'a [String],
 ) -> Vec<ControlPoint<'a>> {
     let [along_px, across_px] = site.config.adjustment.tie_sigma_px;
-    let points = geometric.adjusted.points.iter();
-    let ties = points.filter(|point| point.kind == PointKind::Tie);
-    ties.filter_map(|point| {
-        let tie = geometric.ties.points.get(point.index)?;
+    let points = adjustment.adjusted.points.iter();
+    let adjusted_ties = points.filter(|point| point.kind == PointKind::Tie);
+    let points = adjusted_ties.filter_map(|point| {
+        let tie = ties.points.get(point.index)?;
         let measures = tie.measures.iter().filter_map(|measure| {
             let file = files.get(measure.image)?;
             Some(ControlMeasure {
@@ -164,7 +167,7 @@ fn control_points<'a>(
                 },
                 sigma_px: [
                     across_px,
-                    along_px / focal_px_per_line(geometric, measure.image),
+                    along_px / focal_px_per_line(adjustment, measure.image),
                 ],
             })
         });
@@ -173,14 +176,14 @@ fn control_points<'a>(
             ground: adjusted(point),
             measures: measures.collect(),
         })
-    })
-    .collect()
+    });
+    points.collect()
 }
 
 /// How many focal-plane pixels a line is, from the pairs of the image.
-fn focal_px_per_line(geometric: &GeometricProducts, image: usize) -> f64 {
-    let id = &geometric.adjusted_images[image].times.id;
-    let mut pairs = geometric.adjusted_pairs.iter().filter_map(|pair| {
+fn focal_px_per_line(adjustment: &AdjustmentProducts, image: usize) -> f64 {
+    let id = &adjustment.images[image].times.id;
+    let mut pairs = adjustment.pairs.iter().filter_map(|pair| {
         let at = pair.images.iter().position(|of| of == id)?;
         Some(pair.line_spacing_m[at] / pair.pixel_size_m[at])
     });

@@ -22,16 +22,14 @@ const TABLE_LINES: u32 = 10;
 const TABLE_NODES_MIN: u32 = 31;
 /// Nodes beyond each end of the image, so that an eighth-order interpolation never runs out.
 const TABLE_NODES_BEYOND: u32 = 8;
+
 /// Tables whose interpolation keeps [`InterpolationCheck::LIMIT_PX`], or the densest ones: a node per line.
 pub(super) fn camera_tables(
     reader: &Reader,
     image: &ImageTimes,
     padding_s: f64,
 ) -> Result<CameraTables> {
-    let mut steps = image
-        .lines_header
-        .div_ceil(TABLE_LINES)
-        .max(TABLE_NODES_MIN - 1);
+    let mut steps = first_steps(image);
     loop {
         let mut tables = tables(reader, &table_epochs(image, steps, padding_s))?;
         tables.interpolation =
@@ -41,6 +39,18 @@ pub(super) fn camera_tables(
         }
         steps = (2 * steps).min(image.lines_header);
     }
+}
+
+/// Makes sure that the tables can be read at both of their ends, the Sun included.
+pub(super) fn require_ends(reader: &Reader, image: &ImageTimes, padding_s: f64) -> Result<()> {
+    let epochs = table_epochs(image, first_steps(image), padding_s);
+    tables(reader, &[epochs[0], epochs[epochs.len() - 1]]).map(|_| ())
+}
+
+/// Steps over the image to begin with.
+fn first_steps(image: &ImageTimes) -> u32 {
+    let steps = image.lines_header.div_ceil(TABLE_LINES);
+    steps.max(TABLE_NODES_MIN - 1)
 }
 
 /// Epochs of the camera tables: uniform, both image ends on the grid, beyond them within the padding.
