@@ -14,14 +14,19 @@ use std::{fs, path::Path};
 
 use areograph::{
     config::PointingConfig,
-    error::Kind,
+    error::{Kind, Locate, Result},
     frames::Rotation,
     geom::attitude::matrix_of_rotation_vector,
-    products::{AdjustedImage, AdjustedKernels, write_adjusted_kernels},
+    products::{
+        AdjustedImage, AdjustedKernels, Product, attitude_kernel, position_kernel,
+        write_adjusted_kernels,
+    },
     spice::{KernelRole, KernelSet, Session},
     stages::{
         reorient::{LineCorrection, reorient},
         sample_orientation::Orientation,
+        tabulate_kernels::{KernelTables, require_same, tabulate_kernels},
+        tag_times::ImageTimes,
     },
     time::{Et, PointingBias},
 };
@@ -49,9 +54,49 @@ fn kernels_of<'a>(image: &'a Image, folder: &'a Path) -> AdjustedKernels<'a> {
         directory: folder,
         site_folder: folder,
         originals: &image.set,
-        kernels: &image.kernels,
         pointing: &image.pointing,
     }
+}
+
+/// An image with its adjusted orientation.
+#[derive(Clone, Copy)]
+struct Adjusted<'a> {
+    times: &'a ImageTimes,
+    orientation: &'a Orientation,
+}
+
+/// Tabulates, writes and reads back the kernels of `images`, which were sampled as `of` was.
+fn written(of: &Image, to: &AdjustedKernels, images: &[Adjusted]) -> Result<Vec<Product>> {
+    let times: Vec<&ImageTimes> = images.iter().map(|image| image.times).collect();
+    let session = Session::open(to.originals)?;
+    let tabulate = |(index, image): (usize, &Adjusted)| {
+        let (kernels, pointing) = (&of.kernels, to.pointing);
+        tabulate_kernels(
+            &session,
+            &times,
+            index,
+            image.orientation,
+            kernels,
+            pointing,
+        )
+    };
+    let tables = images.iter().enumerate().map(tabulate);
+    let tables = tables.collect::<Result<Vec<_>>>()?;
+    drop(session);
+    let adjusted = times.iter().zip(&tables);
+    let adjusted: Vec<_> = adjusted
+        .map(|(times, tables)| AdjustedImage { times, tables })
+        .collect();
+    let products = write_adjusted_kernels(to, &adjusted)?;
+    for image in images {
+        let id = &image.times.id;
+        let own = [position_kernel(id), attitude_kernel(id)].map(|name| to.directory.join(name));
+        let session = Session::open(&to.originals.followed_by(&own)?)?;
+        let (kernels, pointing) = (&of.kernels, to.pointing);
+        require_same(&session, image.times, image.orientation, kernels, pointing)
+            .in_file(position_kernel(id))?;
+    }
+    Ok(products)
 }
 
 /// The adjusted kernels against the original ones with the correction, at instants that are no samples.
@@ -93,12 +138,12 @@ fn sampling_with_the_adjusted_kernels_gives_the_adjusted_orientation() {
         for shift_lines in [0.0, 22.6] {
             let adjusted = adjusted(image, shift_lines);
             let folder = tempfile::tempdir().unwrap();
-            let of_image = AdjustedImage {
+            let of_image = Adjusted {
                 times: &image.times,
                 orientation: &adjusted,
             };
             let to = kernels_of(image, folder.path());
-            let products = write_adjusted_kernels(&to, &[of_image]).unwrap();
+            let products = written(image, &to, &[of_image]).unwrap();
             let id = &image.times.id;
             let paths: Vec<String> = products
                 .iter()
@@ -143,12 +188,12 @@ fn the_metakernel_lists_the_adjusted_kernels_last_and_the_comments_say_the_rule(
     let image = Image::of_scene("E02-02016");
     let adjusted = adjusted(&image, 0.0);
     let folder = tempfile::tempdir().unwrap();
-    let of_image = AdjustedImage {
+    let of_image = Adjusted {
         times: &image.times,
         orientation: &adjusted,
     };
     let to = kernels_of(&image, folder.path());
-    write_adjusted_kernels(&to, &[of_image]).unwrap();
+    written(&image, &to, &[of_image]).unwrap();
     let set = KernelSet::from_metakernel(&folder.path().join("adjusted.tm")).unwrap();
     let roles: Vec<KernelRole> = set.kernels().iter().map(|kernel| kernel.role).collect();
     assert_eq!(set.kernels().len(), image.set.kernels().len() + 2);
@@ -176,7 +221,7 @@ fn the_metakernel_lists_the_adjusted_kernels_last_and_the_comments_say_the_rule(
     assert_eq!(state(&set), state(&image.set));
     // The same input gives the same bytes.
     let again = tempfile::tempdir().unwrap();
-    write_adjusted_kernels(&kernels_of(&image, again.path()), &[of_image]).unwrap();
+    written(&image, &kernels_of(&image, again.path()), &[of_image]).unwrap();
     for name in ["adjusted/E02-02016.bsp", "adjusted/E02-02016.bc"] {
         let bytes = |folder: &Path| fs::read(folder.join(name)).unwrap();
         assert!(bytes(folder.path()) == bytes(again.path()), "{name}");
@@ -192,11 +237,11 @@ fn the_metakernel_counts_paths_from_where_the_files_go_in_the_end() {
         directory: &staging,
         ..kernels_of(&image, folder.path())
     };
-    let of_image = AdjustedImage {
+    let of_image = Adjusted {
         times: &image.times,
         orientation: &image.orientation,
     };
-    write_adjusted_kernels(&to, &[of_image]).unwrap();
+    written(&image, &to, &[of_image]).unwrap();
     for name in ["adjusted", "adjusted.tm"] {
         fs::rename(staging.join(name), folder.path().join(name)).unwrap();
     }
@@ -217,11 +262,11 @@ fn another_bias_is_kept_and_the_comment_warns_of_isis() {
     let original = image.sampled_with(&image.set);
     let adjusted = reorient(&original, &image.times, 0.0, curved).unwrap();
     let folder = tempfile::tempdir().unwrap();
-    let of_image = AdjustedImage {
+    let of_image = Adjusted {
         times: &image.times,
         orientation: &adjusted,
     };
-    write_adjusted_kernels(&kernels_of(&image, folder.path()), &[of_image]).unwrap();
+    written(&image, &kernels_of(&image, folder.path()), &[of_image]).unwrap();
     let set = KernelSet::from_metakernel(&folder.path().join("adjusted.tm")).unwrap();
     let (distance_m, turn_rad) = apart(&image.sampled_with(&set), &adjusted);
     assert!(distance_m < 1e-3 && turn_rad < 1e-9); // as with the usual bias
@@ -234,11 +279,11 @@ fn two_images_share_a_metakernel() {
     let images = ["E02-02016", "E04-01275"].map(Image::of_scene);
     let adjusted = [0, 1].map(|index| adjusted(&images[index], -9.5));
     let folder = tempfile::tempdir().unwrap();
-    let both = [0, 1].map(|index| AdjustedImage {
+    let both = [0, 1].map(|index| Adjusted {
         times: &images[index].times,
         orientation: &adjusted[index],
     });
-    let products = write_adjusted_kernels(&kernels_of(&images[0], folder.path()), &both).unwrap();
+    let products = written(&images[0], &kernels_of(&images[0], folder.path()), &both).unwrap();
     assert_eq!(products.len(), 5);
     let set = KernelSet::from_metakernel(&folder.path().join("adjusted.tm")).unwrap();
     for (image, adjusted) in images.iter().zip(&adjusted) {
@@ -258,11 +303,11 @@ fn images_shortly_after_one_another_do_not_reach_into_each_other() {
     let images = [first, second];
     let adjusted = [0, 1].map(|index| adjusted(&images[index], 5.0));
     let folder = tempfile::tempdir().unwrap();
-    let both = [0, 1].map(|index| AdjustedImage {
+    let both = [0, 1].map(|index| Adjusted {
         times: &images[index].times,
         orientation: &adjusted[index],
     });
-    write_adjusted_kernels(&kernels_of(&images[0], folder.path()), &both).unwrap();
+    written(&images[0], &kernels_of(&images[0], folder.path()), &both).unwrap();
     let set = KernelSet::from_metakernel(&folder.path().join("adjusted.tm")).unwrap();
     for (image, adjusted) in images.iter().zip(&adjusted) {
         let (distance_m, turn_rad) = apart(&image.sampled_with(&set), adjusted);
@@ -275,9 +320,9 @@ fn orientations_that_are_none_and_kernels_that_end_are_refused() {
     let image = Image::of_scene("E02-02016");
     let folder = tempfile::tempdir().unwrap();
     let to = kernels_of(&image, folder.path());
-    assert!(write_adjusted_kernels(&to, &[]).unwrap().is_empty());
+    assert!(written(&image, &to, &[]).unwrap().is_empty());
     let refused = |orientation: &Orientation| {
-        let image = AdjustedImage {
+        let adjusted = Adjusted {
             times: &image.times,
             orientation,
         };
@@ -286,7 +331,7 @@ fn orientations_that_are_none_and_kernels_that_end_are_refused() {
             directory: folder.path(),
             ..to
         };
-        write_adjusted_kernels(&to, &[image]).unwrap_err()
+        written(&image, &to, &[adjusted]).unwrap_err()
     };
     let mut broken = image.orientation.clone();
     let sample = &mut broken.samples[7];
@@ -303,7 +348,24 @@ fn orientations_that_are_none_and_kernels_that_end_are_refused() {
     let mut empty = image.orientation.clone();
     empty.samples.clear();
     empty.tables.et_s.clear();
-    assert!(refused(&empty).to_string().contains("it holds no instants"));
+    assert!(
+        refused(&empty)
+            .to_string()
+            .contains("0 orientation samples")
+    );
+    let tables = KernelTables {
+        epochs: Vec::new(),
+        states: Vec::new(),
+        ticks: Vec::new(),
+        quaternions: Vec::new(),
+        rates_rad_s: Vec::new(),
+    };
+    let nothing = AdjustedImage {
+        times: &image.times,
+        tables: &tables,
+    };
+    let failure = write_adjusted_kernels(&to, &[nothing]).unwrap_err();
+    assert!(failure.to_string().contains("it holds no instants"));
     let session = Session::open(&image.set).unwrap();
     assert!(
         refused(&image.orientation)

@@ -150,6 +150,30 @@ fn no_stage_calls_another() {
     );
 }
 
+/// What products hold is known before they are written: writers and pages see no kernels loaded.
+#[test]
+fn no_writer_opens_spice() {
+    let sources = Sources::of_this_crate();
+    let mut opened = Vec::new();
+    let writers = sources.modules().filter(|module| {
+        let rooms = ["products", "report", "difference", "store"];
+        rooms.contains(&&*module[0])
+    });
+    for module in writers {
+        for used in sources.uses(module) {
+            let file = used.file.join("/");
+            if ["spice/session", "spice/view"].contains(&&*file) {
+                opened.push(format!("{}: {file}", module.join("/")));
+            }
+        }
+    }
+    assert!(
+        opened.is_empty(),
+        "writers that open SPICE:\n{}",
+        opened.join("\n")
+    );
+}
+
 fn texts(files: &[(&str, &str)]) -> Sources {
     let module = |path: &str| path.split_terminator('/').map(str::to_owned).collect();
     Sources::of_texts(

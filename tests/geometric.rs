@@ -238,6 +238,8 @@ fn a_tie_point_file_touches_what_comes_after_it() {
         "register/E02-02016/adjusted",
         "intersect/adjusted",
         "compare_pairs/adjusted",
+        "tabulate_kernels/E02-01301",
+        "tabulate_kernels/E02-02016",
         "publish",
     ];
     assert_eq!(case.stages_run(), stages);

@@ -15,6 +15,7 @@ mod out;
 mod outputs;
 mod plan;
 mod publish;
+mod read_back;
 mod run;
 mod site;
 mod sites;
@@ -38,7 +39,7 @@ use crate::{
         fit_sensor_model::FitSensorModel, group_profiles::GroupProfiles, intersect::Intersect,
         read_ties::ReadTies, register::Register, reorient::Reorient,
         sample_orientation::SampleOrientation, search_footprints::SearchFootprints,
-        tag_times::TagTimes, tag_utc::TagUtc,
+        tabulate_kernels::TabulateKernels, tag_times::TagTimes, tag_utc::TagUtc,
     },
 };
 
@@ -48,7 +49,7 @@ pub const LOAD_KERNELS: &str = "load_kernels";
 pub const PUBLISH: &str = "publish";
 
 /// The names of the stages in the order of the flow, for `--until`.
-pub const STAGES: [&str; 18] = [
+pub const STAGES: [&str; 19] = [
     LOAD_KERNELS,
     TagTimes::NAME,
     SearchFootprints::NAME,
@@ -66,5 +67,6 @@ pub const STAGES: [&str; 18] = [
     ComparePairs::NAME,
     Adjust::NAME,
     Reorient::NAME,
+    TabulateKernels::NAME,
     PUBLISH,
 ];

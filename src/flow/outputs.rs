@@ -9,7 +9,7 @@ use crate::{
         adjust::Adjusted, check_ranges::RangeCheck, compare_pairs::PairComparison,
         convert_datum::Converted, describe_kernels::KernelDescription, group_profiles::Profile,
         intersect::IntersectedTies, read_ties::Ties, search_footprints::SearchResult,
-        site_image::SiteImage, tag_times::ImageTimes,
+        site_image::SiteImage, tabulate_kernels::KernelTables, tag_times::ImageTimes,
     },
 };
 
@@ -60,6 +60,8 @@ pub(super) struct Adjustment {
     pub(super) adjusted: Output<Adjusted>,
     /// The images with their adjusted orientation.
     pub(super) images: Vec<SiteImage>,
+    /// What the adjusted kernels of every image hold.
+    pub(super) tables: Vec<Output<KernelTables>>,
     /// With the adjusted orientation.
     pub(super) intersection: Intersection,
 }

@@ -7,11 +7,12 @@ use super::{
     driver::Ledger,
     evidence::{complaints, judged, notes, rejected, warnings},
     manifest::{Account, manifest},
-    outputs::{Adjustment, Site},
+    outputs::Site,
+    read_back::read_back,
 };
 use crate::{
     config::SiteConfig,
-    error::Result,
+    error::{Error, Result},
     files::file_name,
     products::{
         AdjustmentProducts, GeometricProducts, ImageProducts, SiteProducts, write_products,
@@ -101,8 +102,19 @@ pub(super) fn publish(
         .as_ref()
         .map(|of| image_products(&of.images));
     let adjusted_images = adjusted_images.transpose()?.unwrap_or_default();
+    let tables = site.adjustment.iter().flat_map(|of| &of.tables);
+    let tables = tables.map(Output::value).collect::<Result<Vec<_>>>()?;
     let adjustment = site.adjustment.as_ref().map(|adjustment| {
-        adjustment_products(adjustment, kernels, folder, &adjusted_images, images_agree)
+        Ok::<_, Error>(AdjustmentProducts {
+            kernels,
+            folder,
+            adjusted: adjustment.adjusted.value()?,
+            images: &adjusted_images,
+            tables: &tables,
+            intersected: adjustment.intersection.intersected.value()?,
+            pairs: adjustment.intersection.pairs.value()?,
+            images_agree,
+        })
     });
     let converted = site.converted.value()?;
     let products = SiteProducts {
@@ -128,6 +140,7 @@ pub(super) fn publish(
             .into_iter()
             .map(|product| (product.path, product.rows))
             .collect();
+    read_back(config, site, kernels, &staging)?;
     let account = Account {
         verdict,
         products: entries(&staging, &files)?,
@@ -172,23 +185,4 @@ fn geometric_products<'a>(
         pairs: initial.pairs.value()?,
         adjustment,
     }))
-}
-
-/// What the adjustment makes of the site in `folder`.
-fn adjustment_products<'a>(
-    adjustment: &'a Adjustment,
-    kernels: &'a KernelSet,
-    folder: &'a Path,
-    images: &'a [ImageProducts<'a>],
-    images_agree: bool,
-) -> Result<AdjustmentProducts<'a>> {
-    Ok(AdjustmentProducts {
-        kernels,
-        folder,
-        adjusted: adjustment.adjusted.value()?,
-        images,
-        intersected: adjustment.intersection.intersected.value()?,
-        pairs: adjustment.intersection.pairs.value()?,
-        images_agree,
-    })
 }

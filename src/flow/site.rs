@@ -29,6 +29,7 @@ use crate::{
         sample_orientation::SampleOrientation,
         search_footprints::{PedrFiles, SearchFootprints},
         site_image::SiteImage,
+        tabulate_kernels::TabulateKernels,
         tag_times::{ImageTimes, TagTimes},
         tag_utc::TagUtc,
     },
@@ -252,7 +253,8 @@ fn triangulate<D: Driver>(flow: &mut D, config: &SiteConfig, site: &mut Site) ->
     let shots = (&site.converted, &site.profiles);
     let initial = intersect(flow, config, Round::Initial, &site.images, ties, shots)?;
     let initial = &*site.intersection.insert(initial);
-    let adjustment = adjust(flow, config, &site.images, ties, initial, shots)?;
+    let kernels = &KernelView::all(site.kernels.as_ref());
+    let adjustment = adjust(flow, config, &site.images, ties, initial, shots, kernels)?;
     site.adjustment = Some(adjustment);
     Ok(())
 }
@@ -265,6 +267,7 @@ fn adjust<D: Driver>(
     ties: &Output<Ties>,
     initial: &Intersection,
     shots: Shots,
+    kernels: &KernelView,
 ) -> Flow<Adjustment> {
     let (converted, profiles) = shots;
     let adjusted = flow.stage(&Adjust {
@@ -290,9 +293,23 @@ fn adjust<D: Driver>(
     let times: Vec<_> = images.iter().map(|image| image.times.clone()).collect();
     let images = registered(flow, config, Round::Adjusted, &times, orientations, shots)?;
     let intersection = intersect(flow, config, Round::Adjusted, &images, ties, shots)?;
+    let tabulate = |(index, image): (usize, &SiteImage)| {
+        flow.stage(&TabulateKernels {
+            image: &config.images[index].id,
+            index: &index,
+            times: InOrder(&times),
+            orientation: &image.orientation,
+            kernels,
+            coverage: &config.kernels,
+            pointing: &config.pointing,
+        })
+    };
+    let tables = images.iter().enumerate().map(tabulate);
+    let tables = tables.collect::<Flow<Vec<_>>>()?;
     Ok(Adjustment {
         adjusted,
         images,
+        tables,
         intersection,
     })
 }

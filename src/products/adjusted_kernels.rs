@@ -1,19 +1,5 @@
-//! Adjusted orientations as SPICE kernels that are loaded after the original ones.
-//!
-//! Time tags of the attitude follow the rule of the kernels that they replace: the attitude of an exposure at
-//! `t` stands at `t` + bias. ISIS and ALE read MOC attitude 1.15 s before the exposure of their own accord
-//! (`SetTimeBias(-1.15)` in ISIS, `instrument_time_bias` in ALE), as areograph does with its usual bias, so
-//! that one kernel serves all three. A second one without the bias would be wrong in each of them.
-//!
-//! A shift of line times is folded into both kernels: at the tag of a line they have the orientation of the
-//! instant at which it was exposed. Therefore each pair belongs to its image alone, and to nothing else that
-//! happened meanwhile, laser shots among them.
-//!
-//! Between two images the kernels end half way. Of two that were exposed at once, or nearer to each other than
-//! the tolerance with which attitude is asked (CSPICE takes the last file that has any within it), the later
-//! one wins in `adjusted.tm`; with its own pair alone each is right.
-
-mod columns;
+//! Adjusted orientations as SPICE kernels that are loaded after the original ones; what they hold is tabulated by
+//! [`crate::stages::tabulate_kernels`].
 
 use std::{
     fs,
@@ -21,40 +7,31 @@ use std::{
 };
 
 use super::{
-    error::ProductError,
     files::write_text,
     product::{Content, Context, Declaration, Product, Program, Role, Use, Write, Written},
     site::AdjustmentProducts,
 };
 use crate::{
-    config::{KernelsConfig, PointingConfig},
+    config::PointingConfig,
+    constants::{NAIF_MARS, NAIF_MGS},
     error::{IoError, Locate, Result},
-    frames::MarsIau2000,
-    geom::{attitude::rotation_vector, mars_rotation::mars_rotation, statistics::largest},
-    spice::{Kernel, KernelSet, Session},
-    stages::{sample_orientation::Orientation, tag_times::ImageTimes},
-    time::{Et, Interval},
+    spice::{EncodedCkSegment, Kernel, KernelSet, SpkSegment, write_encoded_ck, write_spk},
+    stages::{tabulate_kernels::KernelTables, tag_times::ImageTimes},
 };
-use columns::Source;
 
-/// What may be lost on the way into a kernel and back, metres: 30 times the 3e-5 m that MGS flies in the
-/// 7e-9 s to which ET is rounded.
-const POSITION_TOLERANCE_M: f64 = 1e-3;
-/// The same for rotations, radians: 100 times what the bus turns in the 1.5e-8 s to which ticks are rounded.
-const ROTATION_TOLERANCE_RAD: f64 = 1e-9;
-
-/// Positions reach this far beyond attitudes, seconds: light from MGS to the centre of Mars takes 0.013 s.
-const LIGHT_TIME_S: f64 = 0.1;
 /// A bias this near to the usual one is the usual one, seconds.
 const BIAS_TOLERANCE_S: f64 = 1e-9;
 
-/// An image with its adjusted orientation.
+/// Longest name of a segment.
+const SEGMENT_NAME_MAX: usize = 40;
+
+/// An image with what its adjusted kernels hold.
 #[derive(Debug, Clone, Copy)]
 pub struct AdjustedImage<'a> {
     /// Line times.
     pub times: &'a ImageTimes,
-    /// The orientation by the tags of the lines, see [`crate::stages::reorient`].
-    pub orientation: &'a Orientation,
+    /// States and attitudes.
+    pub tables: &'a KernelTables,
 }
 
 /// Where the kernels go and what they replace.
@@ -66,8 +43,6 @@ pub struct AdjustedKernels<'a> {
     pub site_folder: &'a Path,
     /// The original kernels.
     pub originals: &'a KernelSet,
-    /// Padding and tolerance with which the images were sampled.
-    pub kernels: &'a KernelsConfig,
     /// The pointing bias that readers of the kernels will apply.
     pub pointing: &'a PointingConfig,
 }
@@ -114,27 +89,21 @@ fn of_site(of: &Context, adjustment: &AdjustmentProducts) -> Result<Vec<Written>
         directory: of.directory,
         site_folder: adjustment.folder,
         originals: adjustment.kernels,
-        kernels: &of.site.config.kernels,
         pointing: &of.site.config.pointing,
     };
-    let images = adjustment.images.iter().map(|image| AdjustedImage {
+    let images = adjustment.images.iter().zip(adjustment.tables);
+    let images = images.map(|(image, tables)| AdjustedImage {
         times: image.times,
-        orientation: image.orientation,
+        tables,
     });
     written(&to, &images.collect::<Vec<_>>())
 }
 
-/// Writes an SPK and a CK of every image, and the metakernel; reads every sample back through them.
-///
-/// Attitudes are those of samples and camera tables; positions those of the original kernels with the
-/// difference at the samples, interpolated, added. Around the image, where there are neither, the original
-/// motion goes on with the difference at the end. Sampling an image with its pair loaded gives its
-/// orientation back within 1 mm and 1e-9 rad.
+/// Writes an SPK and a CK of every image, and the metakernel.
 ///
 /// # Errors
-/// [`Kind::Coverage`](crate::error::Kind::Coverage) where the original kernels do not reach around an image;
-/// [`Kind::Bug`](crate::error::Kind::Bug) for orientations that do not come back, and for a session that is
-/// open on this thread; [`Kind::Io`](crate::error::Kind::Io).
+/// [`Kind::Bug`](crate::error::Kind::Bug) for tables that no kernel takes, and for a session that is open on this
+/// thread; [`Kind::Io`](crate::error::Kind::Io).
 pub fn write_adjusted_kernels(
     to: &AdjustedKernels,
     images: &[AdjustedImage],
@@ -156,31 +125,15 @@ fn written(to: &AdjustedKernels, images: &[AdjustedImage]) -> Result<Vec<Written
     fs::create_dir_all(&folder)
         .map_err(IoError::on("make the folder"))
         .in_file(&folder)?;
-    let session = Session::open(to.originals)?;
-    let mut states = Vec::new();
-    for (index, image) in images.iter().enumerate() {
-        let source = Source {
-            session: &session,
-            to,
-            image,
-            attitude_span: span(images, index, to.kernels.padding_s),
-            orbit_span: span(images, index, to.kernels.padding_s + LIGHT_TIME_S),
-        };
-        let segment = source.attitudes()?;
-        let name = attitude_name(image);
-        let rows = segment.write(&to.directory.join(&name), &session, &comment(image, to))?;
+    for image in images {
+        let name = attitude_kernel(&image.times.id);
+        let rows = write_attitude(&to.directory.join(&name), image, &comment(image, to))?;
         add(name, rows, &ATTITUDE);
-        states.push(source.states()?);
-    }
-    // CSPICE has one user at a time.
-    drop(session);
-    for (image, states) in images.iter().zip(&states) {
-        let name = position_kernel(&image.times.id);
-        let rows = states.write(&to.directory.join(&name), &comment(image, to))?;
-        add(name, rows, &POSITION);
     }
     for image in images {
-        read_back(to, image).in_file(position_kernel(&image.times.id))?;
+        let name = position_kernel(&image.times.id);
+        let rows = write_position(&to.directory.join(&name), image, &comment(image, to))?;
+        add(name, rows, &POSITION);
     }
     let path = to.directory.join(METAKERNEL.path);
     write_text(&path, &metakernel(to, images)?)?;
@@ -194,33 +147,42 @@ pub fn position_kernel(image: &str) -> String {
     POSITION.path_of(image)
 }
 
-fn attitude_name(image: &AdjustedImage) -> String {
-    ATTITUDE.path_of(&image.times.id)
+/// Path of the CK of an image below the folder of the products.
+#[must_use]
+pub fn attitude_kernel(image: &str) -> String {
+    ATTITUDE.path_of(image)
 }
 
-/// The time that the kernels of an image hold: its exposures with padding, half way to other images at most.
-fn span(images: &[AdjustedImage], index: usize, padding_s: f64) -> Interval {
-    let exposed = images[index].times.exposures();
-    let mut span = exposed.padded(padding_s);
-    for other in images {
-        let others = other.times.exposures();
-        if others.stop <= exposed.start {
-            let middle = others.stop.plus(0.5 * exposed.start.since(others.stop));
-            span.start = later(span.start, middle);
-        } else if exposed.stop <= others.start {
-            let middle = exposed.stop.plus(0.5 * others.start.since(exposed.stop));
-            span.stop = earlier(span.stop, middle);
-        }
-    }
-    span
+fn segment_name(image: &AdjustedImage) -> String {
+    let id = image.times.id.chars();
+    id.take(SEGMENT_NAME_MAX).collect()
 }
 
-fn later(a: Et, b: Et) -> Et {
-    if a < b { b } else { a }
+fn write_attitude(path: &Path, image: &AdjustedImage, comment: &str) -> Result<u64> {
+    let tables = image.tables;
+    let segment = EncodedCkSegment {
+        name: &segment_name(image),
+        ticks: &tables.ticks,
+        quaternions: &tables.quaternions,
+        angular_velocities_rad_s: &tables.rates_rad_s,
+        interval_starts: tables.ticks.get(..1).unwrap_or_default(),
+    };
+    write_encoded_ck(path, &[segment], comment)?;
+    Ok(tables.ticks.len() as u64)
 }
 
-fn earlier(a: Et, b: Et) -> Et {
-    if b < a { b } else { a }
+fn write_position(path: &Path, image: &AdjustedImage, comment: &str) -> Result<u64> {
+    let tables = image.tables;
+    let segment = SpkSegment {
+        target: NAIF_MGS,
+        centre: NAIF_MARS,
+        name: &segment_name(image),
+        degree: KernelTables::STATE_DEGREE,
+        epochs: &tables.epochs,
+        states: &tables.states,
+    };
+    write_spk(path, &[segment], comment)?;
+    Ok(tables.epochs.len() as u64)
 }
 
 /// What is written into the comment areas of both kernels.
@@ -258,43 +220,14 @@ fn comment(image: &AdjustedImage, to: &AdjustedKernels) -> String {
     )
 }
 
-/// Reads every sample of `image` through the original kernels and its own pair.
-fn read_back(to: &AdjustedKernels, image: &AdjustedImage) -> Result<()> {
-    let own = [position_kernel(&image.times.id), attitude_name(image)]
-        .map(|name| to.directory.join(name));
-    let session = Session::open(&to.originals.followed_by(&own)?)?;
-    let (mut distances_m, mut turns_rad) = (Vec::new(), Vec::new());
-    for sample in &image.orientation.samples {
-        let to_mars = mars_rotation::<MarsIau2000>(sample.et);
-        let position = to_mars.apply(&session.state(sample.et)?.position);
-        let lookup = to.pointing.ck_bias.lookup(sample.et);
-        let attitude = session.attitude(lookup, sample.et, to.kernels.ck_tolerance_s)?;
-        let to_camera =
-            session.mounting(&image.times.instrument, sample.et)? * attitude.inertial_to_bus;
-        let camera_to_mars = to_mars * to_camera.inverse();
-        let expected = sample.pose().mars_to_camera;
-        distances_m.push(position.distance_m(&sample.position));
-        turns_rad.push(rotation_vector(&(camera_to_mars.matrix() * expected)).norm());
-    }
-    let distance_m = largest(distances_m).unwrap_or_default();
-    let turn_rad = largest(turns_rad).unwrap_or_default();
-    // Written so that NaN is refused too.
-    if distance_m <= POSITION_TOLERANCE_M && turn_rad <= ROTATION_TOLERANCE_RAD {
-        return Ok(());
-    }
-    let what = format!(
-        "image {}: positions {distance_m:.1e} m and rotations {turn_rad:.1e} rad apart; expected at most \
-         {POSITION_TOLERANCE_M} m and {ROTATION_TOLERANCE_RAD} rad",
-        image.times.id
-    );
-    Err(ProductError::ReadBack { what }.into())
-}
-
 /// The original kernels and behind them those of all images.
 fn metakernel(to: &AdjustedKernels, images: &[AdjustedImage]) -> Result<String> {
-    let names = images
-        .iter()
-        .flat_map(|image| [position_kernel(&image.times.id), attitude_name(image)]);
+    let names = images.iter().flat_map(|image| {
+        [
+            position_kernel(&image.times.id),
+            attitude_kernel(&image.times.id),
+        ]
+    });
     let names: Vec<PathBuf> = names.map(PathBuf::from).collect();
     let files: Vec<PathBuf> = names.iter().map(|name| to.directory.join(name)).collect();
     let own = KernelSet::from_files(&files)?;

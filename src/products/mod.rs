@@ -34,7 +34,7 @@ mod ties;
 use std::path::Path;
 
 pub use adjusted_kernels::{
-    AdjustedImage, AdjustedKernels, position_kernel, write_adjusted_kernels,
+    AdjustedImage, AdjustedKernels, attitude_kernel, position_kernel, write_adjusted_kernels,
 };
 pub use exchange::{
     ControlMeasure, ControlPoint, GroundEstimate, ImageMeasure, LidarPoint, moc_serial_number,

@@ -13,7 +13,8 @@ use crate::{
         adjust::Adjusted, check_ranges::RangeCheck, compare_pairs::PairComparison,
         convert_datum::FileConversion, describe_kernels::KernelLine, fit_sensor_model::SensorModel,
         group_profiles::Profile, intersect::IntersectedTies, judge::Verdict, read_ties::Ties,
-        register::ImageRegistration, sample_orientation::Orientation, tag_times::ImageTimes,
+        register::ImageRegistration, sample_orientation::Orientation,
+        tabulate_kernels::KernelTables, tag_times::ImageTimes,
     },
 };
 
@@ -76,6 +77,8 @@ pub struct AdjustmentProducts<'a> {
     pub adjusted: &'a Adjusted,
     /// The images with their adjusted orientation, in the order of the site's.
     pub images: &'a [ImageProducts<'a>],
+    /// What their adjusted kernels hold.
+    pub tables: &'a [&'a KernelTables],
     /// Ground points of the tie points with the adjusted orientation.
     pub intersected: &'a IntersectedTies,
     /// Every pair with the adjusted orientation.

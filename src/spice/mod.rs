@@ -7,7 +7,7 @@
 //! | ask CSPICE | [`Session`], one at a time in a process |
 //! | know where the gaps are | [`Session::coverage`], [`Session::require_position`], [`Session::require_attitude`] |
 //! | leave CSPICE behind, for parallel work | [`Session::trajectory`] |
-//! | write kernels: of an invented mission, of adjusted orientations | [`write_spk`], [`write_ck`] |
+//! | write kernels: of an invented mission, of adjusted orientations | [`write_spk`], [`write_ck`], [`write_encoded_ck`] |
 //!
 //! Kilometres become metres here, and nowhere else.
 
@@ -35,4 +35,4 @@ pub use select::quality_of;
 pub use session::{Attitude, Session, State};
 pub use trajectory::Trajectory;
 pub use view::{KernelView, position_kernels};
-pub use write::{CkSegment, SpkSegment, write_ck, write_spk};
+pub use write::{CkSegment, EncodedCkSegment, SpkSegment, write_ck, write_encoded_ck, write_spk};

@@ -3,6 +3,7 @@
 use std::{cell::OnceCell, ffi::CString};
 
 use nalgebra::{Matrix3, Vector3};
+use serde::{Deserialize, Serialize};
 
 use super::{
     coverage::Coverage,
@@ -25,7 +26,7 @@ use crate::{
 const UTC_DECIMALS: u8 = 3;
 
 /// Position and velocity relative to the centre of Mars, inertial.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct State {
     /// Position, metres.
     pub position: Position<J2000>,
@@ -242,8 +243,8 @@ impl Session {
     /// [`SpiceError::MissingText`] without clock or leap seconds.
     pub fn attitude(&self, lookup: CkLookup, exposure: Et, tolerance_s: f64) -> Result<Attitude> {
         let kernel_time = lookup.kernel_time();
-        let ticks = self.ticks(kernel_time)?;
-        let ticks_per_s = self.ticks(kernel_time.plus(1.0))? - ticks;
+        let ticks = self.et_to_ticks(kernel_time)?;
+        let ticks_per_s = self.et_to_ticks(kernel_time.plus(1.0))? - ticks;
         let pointing = self
             .cspice
             .pointing(NAIF_MGS_BUS, ticks, tolerance_s * ticks_per_s)?
@@ -266,8 +267,11 @@ impl Session {
         })
     }
 
-    /// Encoded clock of MGS.
-    fn ticks(&self, et: Et) -> Result<f64> {
+    /// Encoded clock of MGS, ticks of 1/256 s.
+    ///
+    /// # Errors
+    /// As [`Self::et_to_sclk`].
+    pub fn et_to_ticks(&self, et: Et) -> Result<f64> {
         let ticks = self.cspice.et_to_ticks(NAIF_MGS, et.seconds());
         Ok(ticks.map_err(|error| self.explain(error, &CLOCKS))?)
     }

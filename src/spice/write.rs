@@ -14,7 +14,7 @@ use super::{
     session::{Session, State},
 };
 use crate::{
-    constants::{NAIF_MGS, NAIF_MGS_BUS},
+    constants::NAIF_MGS_BUS,
     error::{IoError, Locate, Result},
     time::Et,
     units::METRES_PER_KM,
@@ -56,6 +56,21 @@ pub struct CkSegment<'a> {
     pub angular_velocities_rad_s: &'a [[f64; 3]],
     /// Instants at which an interpolation interval begins; the first is the first instant.
     pub interval_starts: &'a [Et],
+}
+
+/// The same with instants encoded by the spacecraft clock, which takes no kernel to write.
+#[derive(Debug, Clone, Copy)]
+pub struct EncodedCkSegment<'a> {
+    /// Name of the segment, at most 40 characters.
+    pub name: &'a str,
+    /// Encoded clock of every attitude, increasing.
+    pub ticks: &'a [f64],
+    /// As in [`CkSegment`].
+    pub quaternions: &'a [[f64; 4]],
+    /// As in [`CkSegment`].
+    pub angular_velocities_rad_s: &'a [[f64; 3]],
+    /// Encoded clock at which an interpolation interval begins; the first is the first of `ticks`.
+    pub interval_starts: &'a [f64],
 }
 
 /// Writes a new SPK; `comment` goes into its comment area.
@@ -100,29 +115,57 @@ pub fn write_ck(
     segments: &[CkSegment],
     comment: &str,
 ) -> Result<()> {
+    let ticks = |instants: &[Et]| -> Result<Vec<f64>> {
+        let encode = |instant: &Et| session.et_to_ticks(*instant);
+        instants.iter().map(encode).collect()
+    };
+    let mut encoded = Vec::new();
+    for segment in segments {
+        encoded.push((ticks(segment.instants)?, ticks(segment.interval_starts)?));
+    }
+    let encoded = segments.iter().zip(&encoded);
+    let encoded = encoded.map(|(segment, (ticks, starts))| EncodedCkSegment {
+        name: segment.name,
+        ticks,
+        quaternions: segment.quaternions,
+        angular_velocities_rad_s: segment.angular_velocities_rad_s,
+        interval_starts: starts,
+    });
+    fill_ck(&session.cspice, path, &encoded.collect::<Vec<_>>(), comment)
+}
+
+/// Writes a new CK whose instants are encoded already.
+///
+/// # Errors
+/// As [`write_spk`].
+pub fn write_encoded_ck(path: &Path, segments: &[EncodedCkSegment], comment: &str) -> Result<()> {
+    fill_ck(&Cspice::lock()?, path, segments, comment)
+}
+
+fn fill_ck(
+    cspice: &Cspice,
+    path: &Path,
+    segments: &[EncodedCkSegment],
+    comment: &str,
+) -> Result<()> {
     for segment in segments {
         let columns = [
             segment.quaternions.len(),
             segment.angular_velocities_rad_s.len(),
         ];
-        check_lengths(segment.name, segment.instants, &columns)?;
+        check_lengths(segment.name, segment.ticks, &columns)?;
     }
-    let cspice = &session.cspice;
     let lines = comment_lines(comment);
-    let ticks = |instants: &[Et]| -> Result<Vec<f64>> {
-        let encode = |instant: &Et| Ok(cspice.et_to_ticks(NAIF_MGS, instant.seconds())?);
-        instants.iter().map(encode).collect()
-    };
     let create = || Ok(cspice.create_ck(path, comment_size(&lines))?);
     fill(cspice, path, create, |handle| {
         cspice.add_comments(handle, &lines)?;
         for segment in segments {
             let columns = CkColumns {
                 name: segment.name,
-                ticks: &ticks(segment.instants)?,
+                ticks: segment.ticks,
                 quaternions: segment.quaternions,
                 rates_rad_s: segment.angular_velocities_rad_s,
-                starts: &ticks(segment.interval_starts)?,
+                starts: segment.interval_starts,
             };
             cspice.write_ck_3(handle, NAIF_MGS_BUS, &columns)?;
         }
@@ -176,7 +219,7 @@ impl State {
     }
 }
 
-fn check_lengths(name: &str, instants: &[Et], columns: &[usize]) -> Result<()> {
+fn check_lengths<T>(name: &str, instants: &[T], columns: &[usize]) -> Result<()> {
     let problem = if name.is_empty() || name.len() > SEGMENT_NAME_MAX {
         format!("its name must have 1 to {SEGMENT_NAME_MAX} characters")
     } else if instants.is_empty() {

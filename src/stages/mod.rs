@@ -20,5 +20,6 @@ pub mod reorient;
 pub mod sample_orientation;
 pub mod search_footprints;
 pub mod site_image;
+pub mod tabulate_kernels;
 pub mod tag_times;
 pub mod tag_utc;

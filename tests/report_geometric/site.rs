@@ -145,6 +145,7 @@ impl Site {
                     folder: Path::new(""),
                     adjusted: &self.adjusted,
                     images: &adjusted_images,
+                    tables: &[],
                     intersected: &self.adjusted_intersected,
                     pairs: &self.adjusted_pairs,
                     images_agree: self.images_agree(),

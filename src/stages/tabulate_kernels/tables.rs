@@ -1,12 +1,9 @@
-//! States and attitudes of an adjusted image, as kernels take them.
-
-use std::path::Path;
+//! States and attitudes of an adjusted image.
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::{AdjustedImage, AdjustedKernels, earlier, later};
+use super::{KernelTables, TabulateError, earlier, later};
 use crate::{
-    constants::{NAIF_MARS, NAIF_MGS},
     error::Result,
     frames::{MarsIau2000, Position},
     geom::{
@@ -15,78 +12,35 @@ use crate::{
         mars_rotation::mars_rotation,
         pushbroom::{ExteriorOrientation, Pose, SampledOrientation},
     },
-    products::error::ProductError,
-    spice::{Attitude, CkSegment, Session, SpkSegment, State, write_ck, write_spk},
-    stages::sample_orientation::{Orientation, OrientationSample},
-    time::{Et, Interval},
+    spice::{Attitude, Session, State},
+    stages::{
+        orientation::{Orientation, OrientationSample},
+        tag_times::ImageTimes,
+    },
+    time::{Et, Interval, PointingBias},
 };
 
 /// Longest time between two states around the image, seconds: degree 3 leaves nanometres of the orbit.
 const STATE_STEP_S: f64 = 0.5;
-/// Degree of Hermite interpolation: with a state at every sample a cubic holds what lies between two of them.
-const STATE_DEGREE: i32 = 3;
 /// Longest time between two attitudes beyond the camera tables, seconds.
 const ATTITUDE_STEP_S: f64 = 0.5;
 /// Attitudes nearer than this to one of a sample are left out, seconds.
 const SAME_INSTANT_S: f64 = 1e-4;
 /// Half the time over which the rotation of Mars is differentiated, seconds.
 const HALF_DIFFERENCE_S: f64 = 0.5;
-/// Longest name of a segment.
-const SEGMENT_NAME_MAX: usize = 40;
 
 /// One image, and the original kernels.
 pub(super) struct Source<'a> {
     pub(super) session: &'a Session,
-    pub(super) to: &'a AdjustedKernels<'a>,
-    pub(super) image: &'a AdjustedImage<'a>,
+    pub(super) times: &'a ImageTimes,
+    /// As adjusted.
+    pub(super) orientation: &'a Orientation,
+    pub(super) tolerance_s: f64,
+    pub(super) bias: PointingBias,
     /// When the CK holds attitudes.
     pub(super) attitude_span: Interval,
     /// When the SPK holds positions.
     pub(super) orbit_span: Interval,
-}
-
-/// States of one image.
-pub(super) struct States {
-    name: String,
-    epochs: Vec<Et>,
-    states: Vec<State>,
-}
-
-impl States {
-    pub(super) fn write(&self, path: &Path, comment: &str) -> Result<u64> {
-        let segment = SpkSegment {
-            target: NAIF_MGS,
-            centre: NAIF_MARS,
-            name: &self.name,
-            degree: STATE_DEGREE,
-            epochs: &self.epochs,
-            states: &self.states,
-        };
-        write_spk(path, &[segment], comment)?;
-        Ok(self.epochs.len() as u64)
-    }
-}
-
-/// Attitudes of one image by the instants of their exposures.
-pub(super) struct Attitudes {
-    name: String,
-    instants: Vec<Et>,
-    quaternions: Vec<[f64; 4]>,
-    rates_rad_s: Vec<[f64; 3]>,
-}
-
-impl Attitudes {
-    pub(super) fn write(&self, path: &Path, session: &Session, comment: &str) -> Result<u64> {
-        let segment = CkSegment {
-            name: &self.name,
-            instants: &self.instants,
-            quaternions: &self.quaternions,
-            angular_velocities_rad_s: &self.rates_rad_s,
-            interval_starts: self.instants.get(..1).unwrap_or_default(),
-        };
-        write_ck(path, session, &[segment], comment)?;
-        Ok(self.instants.len() as u64)
-    }
 }
 
 /// Attitude of the bus at an exposure: from J2000, and its angular velocity in J2000.
@@ -98,15 +52,26 @@ struct Node {
 }
 
 impl Source<'_> {
-    fn name(&self) -> String {
-        let id = self.image.times.id.chars();
-        id.take(SEGMENT_NAME_MAX).collect()
+    pub(super) fn tables(&self) -> Result<KernelTables> {
+        let nodes = self.nodes()?;
+        let ticks = nodes.iter().map(|node| {
+            let lookup = self.bias.lookup(node.exposure);
+            self.session.et_to_ticks(lookup.kernel_time())
+        });
+        let epochs = self.epochs_of_states()?;
+        Ok(KernelTables {
+            ticks: ticks.collect::<Result<_>>()?,
+            quaternions: continuous_quaternions(nodes.iter().map(|node| &node.to_bus)),
+            rates_rad_s: nodes.iter().map(|node| node.rate_rad_s.into()).collect(),
+            states: self.states(&epochs)?,
+            epochs,
+        })
     }
 
     /// What the adjustment adds to positions in IAU 2000, metres, over ET.
     fn difference(&self) -> Result<SampledOrientation> {
         let mut samples = Vec::new();
-        for sample in &self.image.orientation.samples {
+        for sample in &self.orientation.samples {
             let to_mars = mars_rotation::<MarsIau2000>(sample.et);
             let original = to_mars.apply(&self.session.state(sample.et)?.position);
             let pose = Pose {
@@ -116,14 +81,17 @@ impl Source<'_> {
             samples.push((sample.et.seconds(), pose));
         }
         let difference = SampledOrientation::new(&samples);
-        Ok(difference.map_err(ProductError::refused("continue an adjusted orbit"))?)
+        let refused = |source| TabulateError::Samples {
+            image: self.times.id.clone(),
+            source,
+        };
+        Ok(difference.map_err(refused)?)
     }
 
-    pub(super) fn states(&self) -> Result<States> {
+    fn states(&self, epochs: &[Et]) -> Result<Vec<State>> {
         let difference = self.difference()?;
         let mut states = Vec::new();
-        let epochs = self.epochs_of_states()?;
-        for et in &epochs {
+        for et in epochs {
             let original = self.session.state(*et)?;
             let (pose, motion) = difference.pose_and_rate(et.seconds());
             let from_mars = |et: Et| mars_rotation::<MarsIau2000>(et).matrix().transpose();
@@ -137,17 +105,13 @@ impl Source<'_> {
                     + turning_per_s * pose.position_m,
             });
         }
-        Ok(States {
-            name: self.name(),
-            epochs,
-            states,
-        })
+        Ok(states)
     }
 
     /// The epochs of the samples, between which the difference is one cubic, and steps around them.
     fn epochs_of_states(&self) -> Result<Vec<Et>> {
         let known = self.known_orbit()?;
-        let samples = self.image.orientation.samples.iter();
+        let samples = self.orientation.samples.iter();
         let mut epochs: Vec<Et> = samples.map(|sample| sample.et).collect();
         if let (Some(first), Some(last)) = (epochs.first().copied(), epochs.last().copied()) {
             epochs.extend(steps_beyond(first, known.start, STATE_STEP_S));
@@ -159,7 +123,7 @@ impl Source<'_> {
 
     /// As much of the span as the original kernels hold.
     fn known_orbit(&self) -> Result<Interval> {
-        let exposed = self.image.times.exposures();
+        let exposed = self.times.exposures();
         self.session.require_position(exposed)?;
         let mut known = self.orbit_span;
         let held = self.session.coverage()?.spk.as_slice().iter();
@@ -171,33 +135,26 @@ impl Source<'_> {
     }
 
     fn original(&self, exposure: Et) -> Result<Attitude> {
-        let lookup = self.to.pointing.ck_bias.lookup(exposure);
-        let tolerance_s = self.to.kernels.ck_tolerance_s;
-        self.session.attitude(lookup, exposure, tolerance_s)
+        let lookup = self.bias.lookup(exposure);
+        self.session.attitude(lookup, exposure, self.tolerance_s)
     }
 
-    pub(super) fn attitudes(&self) -> Result<Attitudes> {
+    /// Attitudes at their exposures, in order.
+    fn nodes(&self) -> Result<Vec<Node>> {
         let mut nodes = self.known_attitudes();
         if let (Some(first), Some(last)) = (nodes.first().copied(), nodes.last().copied()) {
             nodes.extend(self.continued(&first, self.attitude_span.start)?);
             nodes.extend(self.continued(&last, self.attitude_span.stop)?);
         }
         nodes.sort_by(|a, b| a.exposure.seconds().total_cmp(&b.exposure.seconds()));
-        let bias = self.to.pointing.ck_bias;
-        let lookup = |node: &Node| bias.lookup(node.exposure).kernel_time();
-        Ok(Attitudes {
-            name: self.name(),
-            instants: nodes.iter().map(lookup).collect(),
-            quaternions: continuous_quaternions(nodes.iter().map(|node| &node.to_bus)),
-            rates_rad_s: nodes.iter().map(|node| node.rate_rad_s.into()).collect(),
-        })
+        Ok(nodes)
     }
 
     /// Attitudes at the samples, and at the nodes of the camera tables between them.
     fn known_attitudes(&self) -> Vec<Node> {
         let Orientation {
             samples, tables, ..
-        } = self.image.orientation;
+        } = self.orientation;
         let last = tables.et_s.len().saturating_sub(1);
         let bus_to_camera = tables.bus_to_camera.matrix();
         let start_s = tables.et_s.first().copied().unwrap_or_default();

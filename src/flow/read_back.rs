@@ -1,0 +1,40 @@
+//! Adjusted kernels as SPICE reads them, before they get their final names.
+
+use std::path::Path;
+
+use super::outputs::Site;
+use crate::{
+    config::SiteConfig,
+    error::{Locate, Result},
+    products::{attitude_kernel, position_kernel},
+    spice::{KernelSet, Session},
+    stages::tabulate_kernels::require_same,
+};
+
+/// Samples every adjusted image through the original kernels and its own pair in `staging`.
+///
+/// # Errors
+/// [`Kind::Bug`](crate::error::Kind::Bug) for orientations that do not come back.
+pub(super) fn read_back(
+    config: &SiteConfig,
+    site: &Site,
+    kernels: &KernelSet,
+    staging: &Path,
+) -> Result<()> {
+    let images = site.adjustment.iter().flat_map(|of| &of.images);
+    for image in images {
+        let (times, orientation) = (image.times.value()?, image.orientation.value()?);
+        let position = position_kernel(&times.id);
+        let own = [&position, &attitude_kernel(&times.id)].map(|name| staging.join(name));
+        let session = Session::open(&kernels.followed_by(&own)?)?;
+        let same = require_same(
+            &session,
+            times,
+            orientation,
+            &config.kernels,
+            &config.pointing,
+        );
+        same.in_file(position)?;
+    }
+    Ok(())
+}

@@ -1,0 +1,178 @@
+//! Adjusted orientations as states and attitudes for SPICE kernels that are loaded after the original ones.
+//!
+//! Time tags of the attitude follow the rule of the kernels that they replace: the attitude of an exposure at
+//! `t` stands at `t` + bias. ISIS and ALE read MOC attitude 1.15 s before the exposure of their own accord
+//! (`SetTimeBias(-1.15)` in ISIS, `instrument_time_bias` in ALE), as areograph does with its usual bias, so
+//! that one kernel serves all three. A second one without the bias would be wrong in each of them.
+//!
+//! A shift of line times is folded into both kernels: at the tag of a line they have the orientation of the
+//! instant at which it was exposed. Therefore each pair belongs to its image alone, and to nothing else that
+//! happened meanwhile, laser shots among them.
+//!
+//! Between two images the kernels end half way. Of two that were exposed at once, or nearer to each other than
+//! the tolerance with which attitude is asked (CSPICE takes the last file that has any within it), the later
+//! one wins in `adjusted.tm`; with its own pair alone each is right.
+
+mod read_back;
+mod tables;
+
+use std::sync::atomic::AtomicBool;
+
+use serde::{Deserialize, Serialize};
+
+use super::{orientation::Orientation, tag_times::ImageTimes};
+use crate::{
+    config::{KernelsConfig, PointingConfig},
+    error::{Cause, Kind, Result},
+    geom::pushbroom::SamplesError,
+    spice::{KernelView, Session, State},
+    stage::{InOrder, Output, Stage},
+    stage_inputs,
+    time::{Et, Interval},
+};
+pub use read_back::require_same;
+use tables::Source;
+
+/// Positions reach this far beyond attitudes, seconds: light from MGS to the centre of Mars takes 0.013 s.
+const LIGHT_TIME_S: f64 = 0.1;
+
+/// What an SPK and a CK hold of one image.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct KernelTables {
+    /// Instants of the states, increasing.
+    pub epochs: Vec<Et>,
+    /// MGS from Mars, geometric, J2000, for Hermite interpolation of [`Self::STATE_DEGREE`].
+    pub states: Vec<State>,
+    /// Encoded clock of the attitudes as the CK counts time, increasing.
+    pub ticks: Vec<f64>,
+    /// J2000 → bus, scalar first, SPICE's convention.
+    pub quaternions: Vec<[f64; 4]>,
+    /// Angular velocity of the bus in J2000, radians per second.
+    pub rates_rad_s: Vec<[f64; 3]>,
+}
+
+impl KernelTables {
+    /// Degree of the interpolation: with a state at every sample a cubic holds what lies between two of them.
+    pub const STATE_DEGREE: i32 = 3;
+}
+
+stage_inputs! {
+    /// The adjusted orientation of one image, and the kernels around it.
+    pub struct TabulateKernels<'a> {
+        /// Identifier of the image.
+        pub image: &'a str,
+        /// Its place among the images.
+        pub index: &'a usize,
+        /// Line times of all images.
+        pub times: InOrder<'a, Output<ImageTimes>>,
+        /// Its orientation by the tags of the lines, see [`super::reorient`].
+        pub orientation: &'a Output<Orientation>,
+        /// The original kernels.
+        pub kernels: &'a KernelView,
+        /// Padding and tolerance with which the image was sampled.
+        pub coverage: &'a KernelsConfig,
+        /// The pointing bias that readers of the kernels will apply.
+        pub pointing: &'a PointingConfig,
+    }
+}
+
+impl Stage for TabulateKernels<'_> {
+    const NAME: &'static str = "tabulate_kernels";
+    type Output = KernelTables;
+    stage_inputs!(fingerprint);
+
+    fn part(&self) -> Option<String> {
+        Some(self.image.to_owned())
+    }
+
+    fn run(&self, _stop: &AtomicBool) -> Result<KernelTables> {
+        let times = self.times.0.iter().map(Output::value);
+        tabulate_kernels(
+            self.kernels.session()?,
+            &times.collect::<Result<Vec<_>>>()?,
+            *self.index,
+            self.orientation.value()?,
+            self.coverage,
+            self.pointing,
+        )
+    }
+}
+
+/// An orientation that kernels cannot hold.
+#[derive(Debug, thiserror::Error)]
+enum TabulateError {
+    #[error("image {image}: {source}")]
+    Samples { image: String, source: SamplesError },
+    #[error("read back differently: {what}")]
+    ReadBack { what: String },
+}
+
+impl Cause for TabulateError {
+    fn kind(&self) -> Kind {
+        Kind::Bug
+    }
+
+    fn advice(&self) -> String {
+        match self {
+            Self::Samples { .. } => "report this with the site's configuration and the log",
+            Self::ReadBack { .. } => {
+                "check the disk and run again; if it happens twice, report it with the site's configuration"
+            }
+        }
+        .to_owned()
+    }
+}
+
+/// States and attitudes around one of `images`, whose adjusted orientation is `orientation`.
+///
+/// Attitudes are those of samples and camera tables; positions those of the original kernels with the
+/// difference at the samples, interpolated, added. Around the image, where there are neither, the original
+/// motion goes on with the difference at the end. Sampling an image with its kernels loaded gives its
+/// orientation back within 1 mm and 1e-9 rad.
+///
+/// # Errors
+/// [`Kind::Coverage`] where the original kernels do not reach around an image; [`Kind::Bug`] for too few samples.
+pub fn tabulate_kernels(
+    session: &Session,
+    images: &[&ImageTimes],
+    index: usize,
+    orientation: &Orientation,
+    kernels: &KernelsConfig,
+    pointing: &PointingConfig,
+) -> Result<KernelTables> {
+    let source = Source {
+        session,
+        times: images[index],
+        orientation,
+        tolerance_s: kernels.ck_tolerance_s,
+        bias: pointing.ck_bias,
+        attitude_span: span(images, index, kernels.padding_s),
+        orbit_span: span(images, index, kernels.padding_s + LIGHT_TIME_S),
+    };
+    source.tables()
+}
+
+/// The time that the kernels of an image hold: its exposures with padding, half way to other images at most.
+fn span(images: &[&ImageTimes], index: usize, padding_s: f64) -> Interval {
+    let exposed = images[index].exposures();
+    let mut span = exposed.padded(padding_s);
+    for other in images {
+        let others = other.exposures();
+        if others.stop <= exposed.start {
+            let middle = others.stop.plus(0.5 * exposed.start.since(others.stop));
+            span.start = later(span.start, middle);
+        } else if exposed.stop <= others.start {
+            let middle = exposed.stop.plus(0.5 * others.start.since(exposed.stop));
+            span.stop = earlier(span.stop, middle);
+        }
+    }
+    span
+}
+
+fn later(a: Et, b: Et) -> Et {
+    if a < b { b } else { a }
+}
+
+fn earlier(a: Et, b: Et) -> Et {
+    if b < a { b } else { a }
+}
