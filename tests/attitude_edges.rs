@@ -120,7 +120,7 @@ fn held_attitudes_are_noted_and_beyond_their_spacing_invalid() {
 fn a_check_finds_what_a_run_finds() {
     let case = Case::new();
     for (start, kernels, pointing) in [
-        ("05:17:30.0", "", "ck_bias_s = 1.15"),
+        ("05:17:30.0", "", "ck_bias_s = 2.0"),
         ("05:17:31.0", "ck_tolerance_s = 0.5", ""),
         ("05:18:00.0", "ck_tolerance_s = 60.0", ""),
     ] {

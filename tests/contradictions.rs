@@ -156,6 +156,24 @@ const MISTAKES: &[Mistake] = &[
         "holds another clock",
     ),
     (
+        "one_label_for_both_images",
+        |case| {
+            case.write(LABEL, case.read("labels/E02-01301.lbl"));
+            for (id, free) in [("E02-01301", "left"), ("E02-02016", "right")] {
+                let renamed = format!("id = \"{free}\"\nserial_number = \"{id}\"");
+                site(case, &format!("id = \"{id}\""), &renamed);
+            }
+        },
+        End::Invalid,
+        "images left and right were exposed at the same time by the same pixels",
+    ),
+    (
+        "first_pixel_not_told",
+        |case| label(case, "EDIT_MODE_ID", "OTHER_MODE_ID"),
+        End::Remark,
+        "nothing says where on the 2048 pixels its 672 samples begin",
+    ),
+    (
         "first_pixel_beyond_the_detector",
         |case| label(case, "EDIT_MODE_ID = \"0\"", "EDIT_MODE_ID = \"1024\""),
         End::Error(3),
@@ -186,16 +204,16 @@ const MISTAKES: &[Mistake] = &[
                 case,
                 "STOP_TIME = 2001-03-23T04",
                 "STOP_TIME = 2001-03-23T05",
-            )
+            );
         },
         End::Error(3),
-        "is 3611.66",
+        "is 3611.658 s after the start",
     ),
     (
         "stop_two_seconds_off",
         |case| label(case, "04:17:56.238", "04:17:58.238"),
         End::Remark,
-        "\n  image E02-02016: STOP_TIME 2001-03-23T04:17:58.238 is 13.66",
+        "\n  image E02-02016: STOP_TIME 2001-03-23T04:17:58.238 is 13.658 s after the start",
     ),
     (
         "lines_twice",
@@ -246,7 +264,7 @@ const MISTAKES: &[Mistake] = &[
         |case| {
             ties(case, |[id, image, sample, _]| {
                 format!("{id},{image},{sample},")
-            })
+            });
         },
         End::Error(3),
         "line \"\": expected two names and two numbers",

@@ -42,7 +42,7 @@ declare_table! {
     /// Images, none to many: a label, the keys below, or both; keys written here win over the label.
     pub struct ImageConfig {
         /// Identifier, unique in the site; also the name of a folder. One that begins with a MOC product, such
-        /// as "E02-02855" or "m0402852_part", is for the label of that product only.
+        /// as `E02-02855` or `m0402852_part`, is for the label of that product only.
         id: String = key(identifier())
             .required()
             .example(r#""E02-02855""#)

@@ -63,11 +63,31 @@ pub(super) fn warnings(config: &SiteConfig, site: &Site) -> Result<Vec<String>> 
         let remarks = times.remarks.iter();
         warnings.extend(remarks.map(|remark| format!("image {}: {remark}", times.id)));
     }
-    if let Some(adjustment) = &site.adjustment {
-        let remarks = adjustment.ties.value()?.remarks.iter();
+    warnings.extend(same_exposures(&site.images)?);
+    if let Some(ties) = &site.ties {
+        let remarks = ties.value()?.remarks.iter();
         warnings.extend(remarks.map(|remark| format!("tie points: {remark}")));
     }
     Ok(warnings)
+}
+
+/// Images that one camera took at one time with the same pixels: one label may stand for another.
+fn same_exposures(images: &[SiteImage]) -> Result<Vec<String>> {
+    let mut same = Vec::new();
+    for (index, image) in images.iter().enumerate() {
+        let times = image.times.value()?;
+        for earlier in &images[..index] {
+            let other = earlier.times.value()?;
+            let apart_s = times.start.since(other.start).abs();
+            if apart_s < times.line_period_s && times.detector() == other.detector() {
+                same.push(format!(
+                    "images {} and {} were exposed at the same time by the same pixels: one label may stand for another",
+                    other.id, times.id
+                ));
+            }
+        }
+    }
+    Ok(same)
 }
 
 fn judged_images(images: &[SiteImage]) -> Result<Vec<JudgedImage<'_>>> {

@@ -134,9 +134,11 @@ impl Stage for ReadTies<'_> {
             0 => String::new(),
             count => format!("; {count} records that cannot be read"),
         };
-        vec![format!(
-            "{points} tie points, {multi_image} of them in two or more images{bad}"
-        )]
+        let found =
+            format!("{points} tie points, {multi_image} of them in two or more images{bad}");
+        let remarks = ties.remarks.iter();
+        let remarks = remarks.map(|remark| format!("tie points: {remark}"));
+        [found].into_iter().chain(remarks).collect()
     }
 }
 

@@ -203,6 +203,13 @@ impl Stage for TagTimes<'_> {
     fn run(&self, _stop: &AtomicBool) -> Result<ImageTimes> {
         tag_image(self.image, self.kernels.session()?)
     }
+
+    fn findings(&self, times: &ImageTimes) -> Vec<String> {
+        let remarks = times.remarks.iter();
+        remarks
+            .map(|remark| format!("image {}: {remark}", times.id))
+            .collect()
+    }
 }
 
 /// Times of every image, in the order of the configuration.
@@ -242,6 +249,14 @@ fn image_times(image: &ImageConfig, session: &Session) -> Result<ImageTimes> {
     let crosstrack_summing = fields.crosstrack_summing.unwrap_or(downtrack_summing);
     let samples = fields.samples.ok_or_else(|| missing("samples"))?;
     let first_detector = fields.first_detector.unwrap_or(0);
+    if fields.first_detector.is_none() && samples * crosstrack_summing < instrument.detector.pixels
+    {
+        remarks.push(format!(
+            "nothing says where on the {} pixels its {samples} samples begin (EDIT_MODE_ID, first_detector); pixel 0 is \
+             taken",
+            instrument.detector.pixels
+        ));
+    }
     fits_detector(
         &image.id,
         &instrument,

@@ -271,7 +271,7 @@ mod tests {
         let clock = Some("669788295:103");
         for serial in [
             "MGS/669788295:103/MOC-NA/BROAD_BAND",
-            "MGS/1/669788295/MOC-NA",
+            "MGS/669788296:001/MOC-NA",
             "A",
         ] {
             assert!(
