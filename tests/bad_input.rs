@@ -259,7 +259,7 @@ const CASES: &[(&str, Spoil)] = &[
     }),
     ("spk_state_is_not_finite", |case| {
         change_packets(case, "kernels/mgs_nav_scene.bsp", 6, |state| {
-            state[2] = f64::NAN
+            state[2] = f64::NAN;
         });
         case.run()
     }),
@@ -271,7 +271,7 @@ const CASES: &[(&str, Spoil)] = &[
     }),
     ("check_spk_state_is_not_finite", |case| {
         change_packets(case, "kernels/mgs_nav_scene.bsp", 6, |state| {
-            state[2] = f64::NAN
+            state[2] = f64::NAN;
         });
         case.check()
     }),

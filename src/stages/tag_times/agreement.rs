@@ -194,15 +194,12 @@ fn on_ground(seconds: f64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::image::ImageFields;
 
     fn image(id: &str, serial_number: Option<&str>) -> ImageConfig {
         ImageConfig {
             id: id.to_owned(),
-            label: None,
-            instrument: None,
             serial_number: serial_number.map(str::to_owned),
-            fields: ImageFields::default(),
+            ..ImageConfig::default()
         }
     }
 
