@@ -25,7 +25,7 @@ use areograph::{
         mars_rotation::{convert_datum, mars_matrix},
     },
     pds::pedr::{LABEL_BYTES, LABEL_RECORDS, RECORD_BYTES, Record},
-    scene::{SceneOptions, write_scene, write_scene_along},
+    scene::{SceneErrors, SceneOptions, write_scene, write_scene_along},
     spice::{KernelSet, Session},
     time::Et,
     units::{RADIANS_PER_DEGREE, RADIANS_PER_MICRODEGREE},
@@ -37,6 +37,7 @@ use serde_json::Value;
 const SHORT: SceneOptions = SceneOptions {
     seed: 3,
     day_s: 1_800.0,
+    errors: SceneErrors::demo(),
 };
 
 struct Mission {

@@ -2,12 +2,13 @@
 
 use std::path::PathBuf;
 
-use clap::Args;
+use clap::{Args, ValueEnum};
 
 use super::output;
 use crate::{
     error::Error,
-    scene::{SceneOptions, write_scene, write_scene_along},
+    scene::{Roughness, SceneErrors, SceneOptions, write_scene, write_scene_along},
+    units::SECONDS_PER_DAY,
 };
 
 /// Writes a synthetic mission: kernels, PEDR files, labels, site files, and the truth behind them.
@@ -21,6 +22,27 @@ pub(super) struct Arguments {
     /// Seed of terrain and noise; the same seed gives the same bytes.
     #[arg(long, default_value_t = 1)]
     seed: u64,
+    /// Seconds of shots in the files of whole days, 600 to 90000; images and windows fit into 600.
+    #[arg(long, value_name = "SECONDS", default_value_t = SECONDS_PER_DAY, conflicts_with = "along")]
+    day_s: f64,
+    /// Draw what the real mission may have been wrong by, instead of the errors of the worked example: line times,
+    /// attitude and jitter, orbit, MOLA profiles that are shifted, noisy shots over rough ground.
+    #[arg(long, conflicts_with = "along")]
+    realistic: bool,
+    /// With --realistic: how rough the ground is (heights 300 m apart differ by 5, 10 or 25 m).
+    #[arg(long, value_enum, default_value_t = Ground::Plains, requires = "realistic")]
+    roughness: Ground,
+    /// With --realistic: noise of tie points, lines and samples, 0 to 5; stereo matching reaches 0.22.
+    #[arg(
+        long,
+        value_name = "PIXELS",
+        default_value_t = 1.0,
+        requires = "realistic"
+    )]
+    tie_noise_px: f64,
+    /// With --realistic: one offset of the attitude's clock for all images instead of line times of each.
+    #[arg(long, requires = "realistic")]
+    attitude_clock: bool,
     /// Fly these kernels instead of the invented orbit.
     #[arg(long, value_name = "KERNELS.tm")]
     along: Option<PathBuf>,
@@ -29,10 +51,41 @@ pub(super) struct Arguments {
     label: Vec<PathBuf>,
 }
 
+/// How rough the ground is, as typed.
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum Ground {
+    Plains,
+    Medium,
+    Rough,
+}
+
+impl Arguments {
+    fn errors(&self) -> SceneErrors {
+        if !self.realistic {
+            return SceneErrors::demo();
+        }
+        let realistic = SceneErrors::realistic(match self.roughness {
+            Ground::Plains => Roughness::Plains,
+            Ground::Medium => Roughness::Medium,
+            Ground::Rough => Roughness::Rough,
+        });
+        let drawn = if self.attitude_clock {
+            realistic.with_attitude_clock()
+        } else {
+            realistic
+        };
+        SceneErrors {
+            tie_noise_px: self.tie_noise_px,
+            ..drawn
+        }
+    }
+}
+
 pub(super) fn run(arguments: &Arguments) -> Result<(), Error> {
     let options = SceneOptions {
         seed: arguments.seed,
-        ..SceneOptions::default()
+        day_s: arguments.day_s,
+        errors: arguments.errors(),
     };
     let summary = match &arguments.along {
         None => write_scene(&arguments.directory, &options)?,

@@ -5,12 +5,16 @@ use std::{
     path::{Path, PathBuf},
 };
 
+use nalgebra::Vector3;
+
 use super::{
     SceneOptions, SceneSummary,
     arc::{Beam, Flight},
+    drawn::ProfileShift,
     error::SceneError,
+    error_sources::{Relief, SceneErrors},
     files::{Draft, put},
-    laser::FRAME_S,
+    laser::{FRAME_S, LaserErrors},
     mission::write_truth,
     pedr::{PedrRequest, frame_tags, write_pedr},
     sites::{README_ALONG, SiteFile, SiteImage, Window},
@@ -43,7 +47,7 @@ const PEDR_NAME: &str = "ap10001l.b";
 /// has one window per stretch of flight and one image per label.
 ///
 /// The laser looks along the bus's +Z. Attitude is read 1.15 s early and time tags are 0.117 s late, as in
-/// [`super::write_scene`]. No session may be open on this thread.
+/// [`super::write_scene`]. Shots are exact: of the options the seed counts. No session may be open on this thread.
 ///
 /// # Errors
 /// [`SceneError::NothingToFly`], [`SceneError::BeamMisses`]; [`SceneError::NotAScene`],
@@ -82,13 +86,17 @@ pub fn write_scene_along(
         datum: MarsDatum::Iau2000,
         orbit: &|_| ORBIT,
         seed: options.seed,
+        errors: LaserErrors {
+            altimeter: SceneErrors::demo().altimeter,
+            shift: ProfileShift::none(),
+        },
     };
-    let terrain = Terrain::new(options.seed, &[]);
+    let terrain = Terrain::new(options.seed, &[], Relief::Gentle);
     let (file, kept) = write_pedr(&draft.folder("pedr")?, &flight, &terrain, &request, |_| {
         true
     })?;
 
-    let mut truth = Truth::new(options.seed);
+    let mut truth = Truth::new(options.seed, SceneErrors::demo());
     truth.files.push(file);
     let mut windows = Vec::new();
     for (number, stretch) in (1..).zip(&stretches) {
@@ -110,6 +118,7 @@ pub fn write_scene_along(
         metakernel: metakernel.display().to_string(),
         pedr: vec![format!("../pedr/{PEDR_NAME}")],
         ties: None,
+        range_mean_max_m: None,
         windows,
         images,
     };
@@ -173,9 +182,12 @@ impl TabulatedFlight {
                 let et = first.plus(BEAM_STEP_S * index as f64);
                 let attitude =
                     session.attitude(usual_instrument().pointing_bias().lookup(et), et, 0.0)?;
+                let direction = attitude.inertial_to_bus.matrix().row(2).transpose();
                 Ok(Beam {
                     spacecraft_m: session.state(et)?.position.xyz_m,
-                    direction: attitude.inertial_to_bus.matrix().row(2).transpose(),
+                    position_error_m: Vector3::zeros(),
+                    direction,
+                    steady_direction: direction,
                 })
             })
             .collect::<Result<Vec<Beam>>>()?;

@@ -31,10 +31,14 @@ const STEP_MAX_RAD: f64 = 1e-13;
 /// Where the spacecraft is and where the laser looks.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Beam {
-    /// Spacecraft from the centre of Mars, J2000, metres.
+    /// Spacecraft from the centre of Mars as the orbit has it, J2000, metres.
     pub spacecraft_m: Vector3<f64>,
+    /// Where it truly is, minus that, IAU 2000, metres.
+    pub position_error_m: Vector3<f64>,
     /// Direction of the laser (bus +Z), J2000, unit length.
     pub direction: Vector3<f64>,
+    /// The same without jitter: what the altimeter's products know of it.
+    pub steady_direction: Vector3<f64>,
 }
 
 /// Something that flies: knows its beam at any time that it is asked for.
@@ -46,7 +50,7 @@ pub(super) trait Flight {
     fn beam(&self, et: Et) -> Result<Beam>;
 }
 
-/// The flight of one image day.
+/// The flight of one image day as the kernels tell it.
 #[derive(Debug)]
 pub(super) struct Arc {
     /// The image.
@@ -55,9 +59,9 @@ pub(super) struct Arc {
     pub exposed: Interval,
     /// Frames of the day's PEDR file lie within.
     pub frames: Interval,
-    /// The true orbit.
+    /// The orbit `gsfc`.
     pub orbit: Orbit,
-    /// The true attitude, over the frames and a margin.
+    /// The attitude, over the frames and a margin.
     pub attitude: Attitude,
 }
 
@@ -89,7 +93,7 @@ impl Arc {
         })
     }
 
-    /// Matrix from the camera to Mars (IAU 2000) at `et`.
+    /// Matrix from the camera to Mars (IAU 2000) at `et`, as the kernels tell it.
     pub(super) fn camera_to_mars(&self, et: Et) -> Matrix3<f64> {
         let j2000_to_camera = bus_to_camera(usual_instrument()) * self.attitude.j2000_to_bus(et);
         mars_matrix(&MARS_IAU2000, et) * j2000_to_camera.transpose()
@@ -98,15 +102,6 @@ impl Arc {
     /// The times that the kernels cover.
     pub(super) fn kernel_span(&self) -> Interval {
         self.frames.padded(KERNEL_MARGIN_S)
-    }
-}
-
-impl Flight for Arc {
-    fn beam(&self, et: Et) -> Result<Beam> {
-        Ok(Beam {
-            spacecraft_m: self.orbit.state(et).position_m,
-            direction: self.attitude.j2000_to_bus(et).row(2).transpose(),
-        })
     }
 }
 

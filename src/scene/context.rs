@@ -3,27 +3,25 @@
 //! Where their samples look follows the formula of the instrument kernel word for word, and where a point lies
 //! in an image is searched for with it: nothing here goes through the camera models of the program.
 
-use nalgebra::{Matrix2, Matrix3, Vector2, Vector3};
+use nalgebra::{Matrix2, Vector2, Vector3};
 
 use super::{
-    arc::Arc,
     attitude::bus_to_camera,
+    drawn::Flown,
     error::SceneError,
+    error_sources::SceneErrors,
     plan::Site,
     random::Random,
-    sites::{Label, SiteFile, SiteImage, SiteTies, image_label, window},
+    sites::{Label, SiteFile, SiteImage, SiteTies, image_label, range_mean_max_m, window},
     terrain::Terrain,
     ties::ties_name,
-    truth::{ContextShot, ContextTruth, KeptShot},
+    truth::{ContextShot, ContextTruth, KeptShot, Poses},
 };
 use crate::{
     config::built_in_instruments,
     constants::MARS_IAU2000,
     error::Result,
-    geom::{
-        attitude::{make_continuous, spice_quaternion},
-        mars_rotation::mars_matrix,
-    },
+    geom::{mars_rotation::mars_matrix, pushbroom::Pose},
     instruments::{DistortionModel, Instrument},
     spice::Session,
     ties::{TieMeasure, TiePoint},
@@ -112,7 +110,7 @@ pub(super) static CONTEXT_IMAGES: [PlannedContext; 3] = [
 /// A wide-angle image and its flight.
 pub(super) struct ContextImage<'a> {
     plan: &'static PlannedContext,
-    arc: &'a Arc,
+    flown: &'a Flown,
     camera: &'static Instrument,
     sclk_start: String,
     start: Et,
@@ -123,27 +121,28 @@ impl<'a> ContextImage<'a> {
     ///
     /// # Errors
     /// [`SceneError::NoCamera`] when the program does not know a camera, what the clock kernel says.
-    pub(super) fn all(arcs: &'a [Arc], session: &Session) -> Result<Vec<Self>> {
+    pub(super) fn all(days: &'a [Flown], session: &Session) -> Result<Vec<Self>> {
         let planned = CONTEXT_IMAGES.iter();
         planned
             .map(|plan| {
-                let arc = arcs.iter().find(|arc| arc.image.id == plan.around);
+                let flown = days.iter().find(|flown| flown.arc.image.id == plan.around);
                 let cameras = built_in_instruments().iter();
                 let camera = cameras.into_iter().find(|camera| camera.id == plan.camera);
-                let (Some(arc), Some(camera)) = (arc, camera) else {
+                let (Some(flown), Some(camera)) = (flown, camera) else {
                     return Err(SceneError::NoCamera {
                         image: plan.id.to_owned(),
                         error: format!("no {} around {}", plan.camera, plan.around),
                     }
                     .into());
                 };
-                let middle = arc.exposed.start.plus(0.5 * arc.exposed.duration_s());
+                let exposed = flown.arc.exposed;
+                let middle = exposed.start.plus(0.5 * exposed.duration_s());
                 let required = middle.plus(-0.5 * f64::from(plan.lines) * line_period_s(plan));
                 let sclk = session.et_to_sclk(required)?;
                 let sclk_start = sclk.trim().trim_start_matches("1/").to_owned();
                 Ok(Self {
                     plan,
-                    arc,
+                    flown,
                     camera,
                     start: session.sclk_to_et(&sclk_start)?,
                     sclk_start,
@@ -157,9 +156,9 @@ impl<'a> ContextImage<'a> {
         self.plan.id
     }
 
-    /// Whether it was taken during this arc.
-    pub(super) fn is_of(&self, arc: &Arc) -> bool {
-        arc.image.id == self.plan.around
+    /// Whether it was taken on this day.
+    pub(super) fn is_of(&self, flown: &Flown) -> bool {
+        flown.arc.image.id == self.plan.around
     }
 
     fn exposed(&self) -> Interval {
@@ -188,15 +187,14 @@ impl<'a> ContextImage<'a> {
         }))
     }
 
-    /// Where the camera is, and the matrix from Mars (IAU 2000) to its axes.
-    fn pose(&self, et: Et) -> (Vector3<f64>, Matrix3<f64>) {
-        let mars = mars_matrix(&MARS_IAU2000, et);
-        let to_bus = self.arc.attitude.j2000_to_bus(et);
-        let position_m = mars * self.arc.orbit.state(et).position_m;
-        (
-            position_m,
-            bus_to_camera(self.camera) * to_bus * mars.transpose(),
-        )
+    /// Where the camera truly is, and its axes.
+    fn pose(&self, et: Et) -> Pose {
+        let to_bus = self.flown.j2000_to_bus(et);
+        let from_mars = mars_matrix(&MARS_IAU2000, et).transpose();
+        Pose {
+            position_m: self.flown.bus_position_m(et),
+            mars_to_camera: bus_to_camera(self.camera) * to_bus * from_mars,
+        }
     }
 
     fn time_of(&self, line: f64) -> Et {
@@ -236,8 +234,8 @@ impl<'a> ContextImage<'a> {
     /// are none near the image.
     fn place(&self, ground_m: &Vector3<f64>) -> Option<[f64; 2]> {
         let missed = |place: &Vector2<f64>| {
-            let (position_m, to_camera) = self.pose(self.time_of(place.x));
-            let seen = to_camera * (ground_m - position_m);
+            let pose = self.pose(self.time_of(place.x));
+            let seen = pose.mars_to_camera * (ground_m - pose.position_m);
             let look = self.look(place.y);
             seen.xy() / seen.z - look.xy() / look.z
         };
@@ -268,23 +266,15 @@ impl<'a> ContextImage<'a> {
     /// How the image was taken, and where it shows the shots among `kept`.
     pub(super) fn truth(&self, kept: &[KeptShot]) -> ContextTruth {
         let step_s = self.exposed().duration_s() / f64::from(EPOCHS - 1);
-        let epochs: Vec<Et> = (0..EPOCHS)
-            .map(|index| self.start.plus(step_s * f64::from(index)))
-            .collect();
-        let mut quaternions: Vec<[f64; 4]> = epochs
-            .iter()
-            .map(|et| spice_quaternion(&self.pose(*et).1.transpose()))
-            .collect();
-        make_continuous(&mut quaternions);
+        let epochs = (0..EPOCHS).map(|index| self.start.plus(step_s * f64::from(index)));
+        let poses: Vec<(Et, Pose)> = epochs.map(|et| (et, self.pose(et))).collect();
         ContextTruth {
             id: self.plan.id,
             camera: self.plan.camera,
             start_et_s: self.start.seconds(),
             line_period_s: line_period_s(self.plan),
             lines: self.plan.lines,
-            position_iau2000_m: epochs.iter().map(|et| self.pose(*et).0.into()).collect(),
-            camera_to_mars_quaternion_wxyz: quaternions,
-            epochs_et_s: epochs.iter().map(|et| et.seconds()).collect(),
+            poses: Poses::of(&poses),
             shots: kept
                 .iter()
                 .filter_map(|kept| {
@@ -325,12 +315,12 @@ pub(super) fn context_ties(
     for _ in 0..tried {
         let line = random.between(EDGE_PX, f64::from(first.plan.lines) - EDGE_PX);
         let sample = random.between(EDGE_PX, f64::from(first.plan.samples) - EDGE_PX);
-        let (position_m, to_camera) = first.pose(first.time_of(line));
-        let direction = to_camera.tr_mul(&first.look(sample));
-        let Some(range_m) = terrain.range_m(&position_m, &direction) else {
+        let pose = first.pose(first.time_of(line));
+        let direction = pose.mars_to_camera.tr_mul(&first.look(sample));
+        let Some(range_m) = terrain.range_m(&pose.position_m, &direction) else {
             continue;
         };
-        let seen = second.place(&(position_m + range_m * direction));
+        let seen = second.place(&(pose.position_m + range_m * direction));
         let Some(other) = seen.filter(|place| second.shows(*place, EDGE_PX)) else {
             continue;
         };
@@ -351,10 +341,14 @@ pub(super) fn context_ties(
 }
 
 /// The site file of the images; `pedr` are the names of the files of their days.
-pub(super) fn context_site(images: &[ContextImage<'_>], metakernel: &str) -> SiteFile<'static> {
+pub(super) fn context_site(
+    images: &[ContextImage<'_>],
+    metakernel: &str,
+    errors: &SceneErrors,
+) -> SiteFile<'static> {
     let mut pedr: Vec<String> = images
         .iter()
-        .map(|image| format!("../pedr/{}", image.arc.image.pedr_name()))
+        .map(|image| format!("../pedr/{}", image.flown.arc.image.pedr_name()))
         .collect();
     pedr.dedup();
     SiteFile {
@@ -364,9 +358,10 @@ pub(super) fn context_site(images: &[ContextImage<'_>], metakernel: &str) -> Sit
         pedr,
         ties: Some(SiteTies {
             file: format!("../ties/{}", ties_name(CONTEXT_SITE.id)),
-            note: "The noise of these tie points is a fifth of a pixel.",
+            note: "The noise of these tie points is a fifth of a pixel.".to_owned(),
             sigma_px: [NOISE_PX; 2],
         }),
+        range_mean_max_m: range_mean_max_m(errors),
         windows: vec![window(&CONTEXT_SITE, WINDOW_HALF_DEG)],
         images: images
             .iter()

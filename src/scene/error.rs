@@ -57,14 +57,17 @@ pub enum SceneError {
         /// True time that was asked for.
         et_s: f64,
     },
-    /// A day is shorter than its image or longer than a file may be.
-    #[error("day_s is {day_s}; expected {least} to {most}")]
-    Day {
+    /// A number out of its range: a day shorter than its image or longer than a file may be, more noise than images
+    /// have room for.
+    #[error("{option} is {value}; expected {least} to {most}")]
+    Option {
+        /// Name of the option.
+        option: &'static str,
         /// What was asked.
-        day_s: f64,
-        /// Fewest seconds.
+        value: f64,
+        /// Least value.
         least: f64,
-        /// Most seconds.
+        /// Largest value.
         most: f64,
     },
     /// The kernels to fly along do not cover a single stretch of 20 s.
@@ -83,7 +86,7 @@ impl Cause for SceneError {
             Self::NotAScene { .. }
             | Self::Foreign { .. }
             | Self::Changed { .. }
-            | Self::Day { .. } => Kind::Configuration,
+            | Self::Option { .. } => Kind::Configuration,
             Self::NoOrbit { .. } | Self::NoCamera { .. } | Self::NotTabulated { .. } => Kind::Bug,
             Self::BeamMisses { .. } => Kind::Input,
             Self::NothingToFly { .. } => Kind::Coverage,
@@ -100,7 +103,7 @@ impl Cause for SceneError {
                 "report this with the seed and the kernels that were used"
             }
             Self::BeamMisses { .. } => "the attitude kernels do not point +Z at Mars there; leave them out",
-            Self::Day { .. } => "choose a length within these bounds",
+            Self::Option { .. } => "choose a value within these bounds",
             Self::NothingToFly { .. } => {
                 "check that the metakernel loads SPK for -94 and 499 and CK for -94000 of the same time"
             }

@@ -4,8 +4,10 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::{
     arc::{Beam, Flight},
+    drawn::ProfileShift,
     error::SceneError,
-    random::{mix, unit_of},
+    error_sources::AltimeterErrors,
+    random::{mix, normal_of, unit_of},
     sun::mars_from_sun_m,
     terrain::Terrain,
 };
@@ -60,13 +62,15 @@ pub(super) enum Echo {
 pub(super) struct Shot {
     /// True time.
     pub et: Et,
-    /// Spacecraft, IAU 2000, metres.
-    pub spacecraft_m: Vector3<f64>,
     /// Where the beam meets the ground, IAU 2000, metres.
     pub ground_m: Vector3<f64>,
     /// What it met.
     pub echo: Echo,
-    /// How far the linear frame of a PEDR places the footprint from the truth, before rounding, metres.
+    /// Range that was measured, metres; 0 when nothing was heard.
+    pub range_m: f64,
+    /// Where the product has the ground, IAU 2000, metres, but for its rounding and its linear frame.
+    pub told_ground_m: Vector3<f64>,
+    /// How far the linear frame of a PEDR places the footprint from there, before rounding, metres.
     pub frame_error_m: f64,
 }
 
@@ -79,9 +83,18 @@ pub(super) struct Frame {
     pub shots: [Shot; SHOTS],
 }
 
+/// Errors of the shots of a file.
+#[derive(Debug, Clone)]
+pub(super) struct LaserErrors {
+    /// Sizes of those of a single shot.
+    pub altimeter: AltimeterErrors,
+    /// Shift of the file's coordinates.
+    pub shift: ProfileShift,
+}
+
 /// Which frame to fly.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct FrameRequest {
+pub(super) struct FrameRequest<'a> {
     /// Mid-point as the file tags it, a whole number of microseconds.
     pub tag: Et,
     /// Number of the frame in its file, from 0.
@@ -90,8 +103,10 @@ pub(super) struct FrameRequest {
     pub orbit: u32,
     /// Datum of the file's coordinates.
     pub datum: MarsDatum,
-    /// Seed of clouds and missing returns.
+    /// Seed of clouds, missing returns and noise.
     pub seed: u64,
+    /// Errors of the shots.
+    pub errors: &'a LaserErrors,
 }
 
 /// A place in the file's frame.
@@ -102,41 +117,58 @@ struct FileCoordinates {
     radius_m: f64,
 }
 
-/// The beam at one instant, in IAU 2000 and in the file's frame.
-struct Look {
-    et: Et,
-    spacecraft_m: Vector3<f64>,
-    direction: Vector3<f64>,
-    /// From IAU 2000 to the file's frame.
-    to_file: Matrix3<f64>,
-}
-
-impl Look {
-    fn new(flight: &impl Flight, et: Et, datum: MarsDatum) -> Result<Self> {
-        let Beam {
-            spacecraft_m,
-            direction,
-        } = flight.beam(et)?;
-        let mars = mars_matrix(&MARS_IAU2000, et);
-        let to_file = match datum {
-            MarsDatum::Iau2000 => Matrix3::identity(),
-            older => mars_matrix(older.model(), et) * mars.transpose(),
-        };
-        Ok(Self {
-            et,
-            spacecraft_m: mars * spacecraft_m,
-            direction: mars * direction,
-            to_file,
-        })
-    }
-
-    fn place(&self, point_m: &Vector3<f64>) -> FileCoordinates {
-        let spherical = Spherical::from_xyz_m(&(self.to_file * point_m));
-        FileCoordinates {
+impl FileCoordinates {
+    fn of(point_m: &Vector3<f64>) -> Self {
+        let spherical = Spherical::from_xyz_m(point_m);
+        Self {
             longitude_rad: spherical.longitude_rad,
             latitude_rad: spherical.latitude.0,
             radius_m: spherical.radius_m,
         }
+    }
+}
+
+/// The beam at one instant, in IAU 2000 and in the file's frame.
+struct Look {
+    et: Et,
+    /// Spacecraft as the orbit has it, and as it is.
+    orbit_m: Vector3<f64>,
+    spacecraft_m: Vector3<f64>,
+    direction: Vector3<f64>,
+    /// From IAU 2000 to the file's frame, of the spacecraft and of the ground.
+    to_file: Matrix3<f64>,
+    ground_to_file: Matrix3<f64>,
+}
+
+impl Look {
+    fn new(beam: &Beam, direction: &Vector3<f64>, et: Et, request: &FrameRequest<'_>) -> Self {
+        let mars = mars_matrix(&MARS_IAU2000, et);
+        let to_file = match request.datum {
+            MarsDatum::Iau2000 => Matrix3::identity(),
+            older => mars_matrix(older.model(), et) * mars.transpose(),
+        };
+        let orbit_m = mars * beam.spacecraft_m;
+        Self {
+            et,
+            orbit_m,
+            spacecraft_m: orbit_m + beam.position_error_m,
+            direction: mars * direction,
+            to_file,
+            ground_to_file: to_file * request.errors.shift.rotation(),
+        }
+    }
+
+    /// Where the file has a point of the ground, but for the shift along the radius.
+    fn place(&self, ground_m: &Vector3<f64>) -> FileCoordinates {
+        FileCoordinates::of(&(self.ground_to_file * ground_m))
+    }
+
+    /// Where the file has the spacecraft: on the orbit, but moved along the beam until ranges of about `range_m` agree
+    /// with the ground as the file has it. In the archive's files they do.
+    fn place_spacecraft(&self, range_m: f64, shift: &ProfileShift) -> FileCoordinates {
+        let ground_m = shift.applied(&self.at_range_m(range_m));
+        let beam = (ground_m - self.orbit_m).normalize();
+        FileCoordinates::of(&(self.to_file * (ground_m - range_m * beam)))
     }
 
     /// Range to the ground.
@@ -163,7 +195,7 @@ impl Look {
 
 /// Flies one frame.
 ///
-/// The frame's straight track is that of the beam on the sphere of the mid-point's radius; each shot is
+/// The frame's straight track is that of the beam, without jitter, on the sphere of the mid-point's radius; each shot is
 /// displaced along the beam by the parallax times the difference of its radius from the mid-point's.
 ///
 /// # Errors
@@ -171,17 +203,22 @@ impl Look {
 pub(super) fn fly_frame(
     flight: &impl Flight,
     terrain: &Terrain,
-    request: &FrameRequest,
+    request: &FrameRequest<'_>,
 ) -> Result<Frame> {
     let middle_et = request.tag.plus(-built_in_altimeter().clock_bias_s);
-    let look = |et: Et| Look::new(flight, et, request.datum);
-    let middle = look(middle_et)?;
-    let first = look(middle_et.plus(-FRAME_S / 2.0))?;
-    let last = look(middle_et.plus(FRAME_S / 2.0))?;
+    let steady = |et: Et| -> Result<Look> {
+        let beam = flight.beam(et)?;
+        Ok(Look::new(&beam, &beam.steady_direction, et, request))
+    };
+    let middle = steady(middle_et)?;
+    let first = steady(middle_et.plus(-FRAME_S / 2.0))?;
+    let last = steady(middle_et.plus(FRAME_S / 2.0))?;
     let mut values = frame_values(&middle, [&first, &last], terrain, request)?;
     let mut shots = Vec::with_capacity(SHOTS);
     for index in 0..SHOTS {
-        let shot_look = look(middle_et.plus((index as f64 - 9.5) * SHOT_S))?;
+        let et = middle_et.plus((index as f64 - 9.5) * SHOT_S);
+        let beam = flight.beam(et)?;
+        let shot_look = Look::new(&beam, &beam.direction, et, request);
         shots.push(fly_shot(&shot_look, index, terrain, request, &mut values)?);
     }
     let mut shots = shots.into_iter();
@@ -201,7 +238,7 @@ fn frame_values(
     middle: &Look,
     [first, last]: [&Look; 2],
     terrain: &Terrain,
-    request: &FrameRequest,
+    request: &FrameRequest<'_>,
 ) -> Result<FrameValues> {
     /// Half the height over which the parallax is taken, metres.
     const PARALLAX_STEP_M: f64 = 500.0;
@@ -212,14 +249,16 @@ fn frame_values(
 
     let ground = middle.place(&ground_m);
     let [ground_first, ground_last] = [first, last].map(|look| look.at_radius(mid_radius_m));
-    let spacecraft = middle.place(&middle.spacecraft_m);
-    let [craft_first, craft_last] = [first, last].map(|look| look.place(&look.spacecraft_m));
+    let shift = &request.errors.shift;
+    let spacecraft = middle.place_spacecraft(mid_range_m, shift);
+    let [craft_first, craft_last] =
+        [first, last].map(|look| look.place_spacecraft(mid_range_m, shift));
     let [lower, upper] =
         [-PARALLAX_STEP_M, PARALLAX_STEP_M].map(|step_m| middle.at_radius(mid_radius_m + step_m));
     let [areoid_first, areoid_last] = [first, last].map(|look| {
         let place = look.at_radius(mid_radius_m);
         let direction = spherical_to_xyz_m(place.longitude_rad, place.latitude_rad, 1.0);
-        terrain.areoid_radius_m(&look.to_file.tr_mul(&direction))
+        terrain.areoid_radius_m(&look.ground_to_file.tr_mul(&direction))
     });
     let sun = mars_matrix(&MARS_IAU2000, middle.et) * -mars_from_sun_m(middle.et);
     let frame_number = request.index;
@@ -248,7 +287,7 @@ fn frame_values(
         areoid_radius_m: terrain.areoid_radius_m(&up),
         areoid_radius_change_m: areoid_last - areoid_first,
         crossover_residual_m: crossover_residual_m(middle.et),
-        mid_radius_m,
+        mid_radius_m: mid_radius_m + shift.radial_m(),
         mid_range_m,
         frame_index: u16::try_from(frame_number % 7 + 1).unwrap_or(1),
         packet: u16::try_from(frame_number / 7 % 0x4000).unwrap_or(0),
@@ -268,7 +307,7 @@ fn fly_shot(
     look: &Look,
     index: usize,
     terrain: &Terrain,
-    request: &FrameRequest,
+    request: &FrameRequest<'_>,
     values: &mut FrameValues,
 ) -> Result<Shot> {
     let chance = |purpose: u64, number: u64| {
@@ -276,6 +315,7 @@ fn fly_shot(
             ^ (request.index << 8)
             ^ number))
     };
+    let LaserErrors { altimeter, shift } = request.errors;
     let ground_range_m = look.range_m(terrain)?;
     let ground_m = look.at_range_m(ground_range_m);
     let half = (index / 10) as u64;
@@ -287,8 +327,11 @@ fn fly_shot(
         Echo::Ground
     };
     let cloud_height_m = 3_000.0 + 9_000.0 * chance(3, index as u64);
+    let noise = normal_of(chance(7, index as u64), chance(8, index as u64));
+    let measured_m = measured_range_m(look, terrain, altimeter, ground_range_m, noise);
+    let heard_m = look.at_range_m(measured_m);
     let (range_m, radius_m) = match echo {
-        Echo::Ground => (ground_range_m, ground_m.norm()),
+        Echo::Ground => (measured_m, heard_m.norm()),
         Echo::Cloud => {
             let range_m = ground_range_m - cloud_height_m;
             (range_m, look.at_range_m(range_m).norm())
@@ -296,7 +339,10 @@ fn fly_shot(
         Echo::Missing => (0.0, 0.0),
     };
     values.range_m[index] = range_m;
-    values.shot_radius_m[index] = radius_m;
+    values.shot_radius_m[index] = match echo {
+        Echo::Missing => 0.0,
+        Echo::Ground | Echo::Cloud => radius_m + shift.radial_m(),
+    };
     values.class[index] = i16::from(echo == Echo::Ground);
     values.channel[index] = match chance(4, index as u64) {
         x if x < 0.80 => 1,
@@ -311,18 +357,44 @@ fn fly_shot(
     };
     Ok(Shot {
         et: look.et,
-        spacecraft_m: look.spacecraft_m,
         ground_m,
         echo,
-        frame_error_m: frame_error_m(look, index, &ground_m, values),
+        range_m,
+        told_ground_m: shift.applied(&heard_m),
+        frame_error_m: frame_error_m(look, index, &heard_m, shift, values),
     })
 }
 
-/// Distance from where the linear frame places a ground shot to where it is, metres.
-fn frame_error_m(look: &Look, index: usize, ground_m: &Vector3<f64>, values: &FrameValues) -> f64 {
-    let radius_m = ground_m.norm();
+/// The range that is measured: the mean over the spot with noise, in steps.
+fn measured_range_m(
+    look: &Look,
+    terrain: &Terrain,
+    errors: &AltimeterErrors,
+    ground_range_m: f64,
+    noise: f64,
+) -> f64 {
+    let mut range_m = ground_range_m + errors.shot_noise_m * noise;
+    if errors.spot_m > 0.0 {
+        let ground_m = look.at_range_m(ground_range_m);
+        range_m += terrain.spot_farther_m(&ground_m, &look.direction, errors.spot_m);
+    }
+    if errors.range_step_m > 0.0 {
+        range_m = (range_m / errors.range_step_m).round() * errors.range_step_m;
+    }
+    range_m
+}
+
+/// Distance from where the linear frame places a ground shot to where the file should have it, metres.
+fn frame_error_m(
+    look: &Look,
+    index: usize,
+    heard_m: &Vector3<f64>,
+    shift: &ProfileShift,
+    values: &FrameValues,
+) -> f64 {
+    let radius_m = heard_m.norm();
     let share = (index as f64 - 9.5) / SHOTS as f64;
-    let higher_m = radius_m - values.mid_radius_m;
+    let higher_m = radius_m + shift.radial_m() - values.mid_radius_m;
     let longitude_rad = values.ground_longitude_rad
         + share * values.ground_longitude_change_rad
         + higher_m * values.parallax_longitude_rad_per_m;
@@ -330,5 +402,5 @@ fn frame_error_m(look: &Look, index: usize, ground_m: &Vector3<f64>, values: &Fr
         + share * values.ground_latitude_change_rad
         + higher_m * values.parallax_latitude_rad_per_m;
     let placed_m = spherical_to_xyz_m(longitude_rad, latitude_rad, radius_m);
-    (placed_m - look.to_file * ground_m).norm()
+    (placed_m - look.ground_to_file * heard_m).norm()
 }

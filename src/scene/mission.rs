@@ -6,19 +6,23 @@ use super::{
     SceneOptions, SceneSummary,
     arc::Arc,
     context::{CONTEXT_SITE, ContextImage, context_site, context_ties, in_window},
+    drawn::{DayErrors, Flown},
     error::SceneError,
     files::{Draft, put},
     kernels::{
         clock_session, image_starts, versions, wide_angle_metakernel, write_attitude, write_orbits,
         write_text_kernels,
     },
-    laser::Shot,
+    laser::{LaserErrors, Shot},
     pedr::{PedrRequest, frame_tags, write_pedr},
     plan::{IMAGES, SITES},
     sites::{README, planned_label, planned_site},
     terrain::Terrain,
     ties::{ties_name, write_ties},
-    truth::{ContextTruth, FileTruth, ImageTruth, KeptShot, OrbitDifference, ProfileTruth, Truth},
+    truth::{
+        ContextTruth, DrawnTruth, FileTruth, ImageTruth, KeptShot, OrbitDifference, ProfileTruth,
+        Truth,
+    },
 };
 use crate::{
     constants::MARS_IAU2000,
@@ -29,6 +33,8 @@ use crate::{
 
 /// Fewest and most seconds of frames in a day's file.
 const DAY_S: [f64; 2] = [600.0, 90_000.0];
+/// Least and largest noise of tie points: what is left of the edge that images keep free for it.
+const TIE_NOISE_PX: [f64; 2] = [0.0, 5.0];
 
 /// Writes the synthetic mission into `directory`, replacing an older one that nobody added to or changed.
 ///
@@ -39,28 +45,27 @@ const DAY_S: [f64; 2] = [600.0, 90_000.0];
 /// [`SceneError::NotAScene`], [`SceneError::Foreign`] and [`SceneError::Changed`] when the folder holds
 /// something else, [`SceneError::Day`], the system's refusal to write.
 pub fn write_scene(directory: &Path, options: &SceneOptions) -> Result<SceneSummary> {
-    let [least, most] = DAY_S;
-    if !(least..=most).contains(&options.day_s) {
-        return Err(SceneError::Day {
-            day_s: options.day_s,
-            least,
-            most,
-        }
-        .into());
-    }
+    check(options)?;
     let draft = Draft::begin(directory, README)?;
-    let arcs = write_kernels(&draft, options)?;
+    let fly = |arc: Arc| {
+        let errors = DayErrors::draw(&options.errors, &arc, options.seed);
+        Flown { arc, errors }
+    };
+    let days: Vec<Flown> = write_kernels(&draft, options)?
+        .into_iter()
+        .map(fly)
+        .collect();
 
     let directions = SITES.map(super::plan::Site::direction);
-    let terrain = Terrain::new(options.seed, &directions);
-    let mut truth = Truth::new(options.seed);
+    let terrain = Terrain::new(options.seed, &directions, options.errors.relief);
+    let mut truth = Truth::new(options.seed, options.errors);
     let pedr = draft.folder("pedr")?;
     let mut kept = Vec::new();
-    for arc in &arcs {
-        truth
-            .images
-            .push(ImageTruth::of(arc, &versions(arc, options.seed)));
-        let day = write_day(&pedr, arc, &terrain, options.seed)?;
+    for flown in &days {
+        let versions = versions(&flown.arc, options.seed);
+        truth.images.push(ImageTruth::of(&flown.arc, &versions));
+        truth.errors_drawn.push(DrawnTruth::of(flown));
+        let day = write_day(&pedr, flown, &terrain, options)?;
         truth.files.push(day.file);
         truth.profiles.push(day.profile);
         kept.push(day.kept);
@@ -68,52 +73,71 @@ pub fn write_scene(directory: &Path, options: &SceneOptions) -> Result<SceneSumm
     let sites = draft.folder("sites")?;
     let ties = draft.folder("ties")?;
     for site in SITES {
-        let own: Vec<&Arc> = arcs
+        let own: Vec<&Flown> = days
             .iter()
-            .filter(|arc| arc.image.site.id == site.id)
+            .filter(|flown| flown.arc.image.site.id == site.id)
             .collect();
-        put(
-            &sites.join(format!("{}.toml", site.id)),
-            &planned_site(site, &own).to_toml(),
-        )?;
         if let [first, second] = own[..] {
-            let pair = write_ties(&ties, [first, second], &terrain, options.seed)?;
+            let noise_px = options.errors.tie_noise_px;
+            let pair = write_ties(&ties, [first, second], &terrain, noise_px, options.seed)?;
+            let file = planned_site(site, [&first.arc, &second.arc], &options.errors, &pair);
+            put(&sites.join(format!("{}.toml", site.id)), &file.to_toml())?;
             truth.ties.push(pair);
         }
     }
-    truth.wide_angle = write_context(&draft, &arcs, &kept, &terrain, options.seed)?;
+    truth.wide_angle = write_context(&draft, &days, &kept, &terrain, options)?;
     write_truth(&draft, &truth)?;
     draft.finish()?;
     Ok(SceneSummary::of(directory, &truth, SITES.len() + 1))
 }
 
-/// Writes labels, tie points and the site file of the wide-angle images; `kept` are the shots of each arc.
+/// Refuses options that no mission can be made with.
+fn check(options: &SceneOptions) -> Result<()> {
+    let named = [
+        ("day_s", options.day_s, DAY_S),
+        ("tie_noise_px", options.errors.tie_noise_px, TIE_NOISE_PX),
+    ];
+    for (option, value, [least, most]) in named {
+        if !(least..=most).contains(&value) {
+            return Err(SceneError::Option {
+                option,
+                value,
+                least,
+                most,
+            }
+            .into());
+        }
+    }
+    Ok(())
+}
+
+/// Writes labels, tie points and the site file of the wide-angle images; `kept` are the shots of each day.
 fn write_context(
     draft: &Draft,
-    arcs: &[Arc],
+    days: &[Flown],
     kept: &[Vec<KeptShot>],
     terrain: &Terrain,
-    seed: u64,
+    options: &SceneOptions,
 ) -> Result<Vec<ContextTruth>> {
     let session = clock_session(&draft.folder("kernels")?)?;
-    let images = ContextImage::all(arcs, &session)?;
+    let images = ContextImage::all(days, &session)?;
     let labels = draft.folder("labels")?;
     for image in &images {
         let path = labels.join(format!("{}.lbl", image.id()));
         put(&path, &image.label(&session)?)?;
     }
     let id = CONTEXT_SITE.id;
-    let ties = context_ties(&images, terrain, seed);
+    let ties = context_ties(&images, terrain, options.seed);
     put(
         &draft.folder("ties")?.join(ties_name(id)),
         &ties_table(&ties),
     )?;
-    let site = context_site(&images, &wide_angle_metakernel("nav"));
+    let site = context_site(&images, &wide_angle_metakernel("nav"), &options.errors);
     let path = draft.folder("sites")?.join(format!("{id}.toml"));
     put(&path, &site.to_toml())?;
     let shots = |image: &ContextImage<'_>| {
-        let days = arcs.iter().zip(kept);
-        let mut own = days.filter(|(arc, _)| image.is_of(arc));
+        let days = days.iter().zip(kept);
+        let mut own = days.filter(|(flown, _)| image.is_of(flown));
         own.next().map_or(&[][..], |(_, kept)| kept)
     };
     Ok(images
@@ -168,7 +192,13 @@ struct Day {
 }
 
 /// Writes the PEDR file of one day.
-fn write_day(folder: &Path, arc: &Arc, terrain: &Terrain, seed: u64) -> Result<Day> {
+fn write_day(
+    folder: &Path,
+    flown: &Flown,
+    terrain: &Terrain,
+    options: &SceneOptions,
+) -> Result<Day> {
+    let Flown { arc, errors } = flown;
     let image = arc.image;
     let first = arc.orbit.revolution(arc.frames.start);
     let name = image.pedr_name();
@@ -180,7 +210,11 @@ fn write_day(folder: &Path, arc: &Arc, terrain: &Terrain, seed: u64) -> Result<D
         orbit: &|et| {
             (image.pedr_number - 10_000).saturating_add_signed(arc.orbit.revolution(et) - first)
         },
-        seed: seed ^ u64::from(image.pedr_number),
+        seed: options.seed ^ u64::from(image.pedr_number),
+        errors: LaserErrors {
+            altimeter: options.errors.altimeter,
+            shift: errors.profile_shift.clone(),
+        },
     };
     let within = |holds: &dyn Fn(f64, f64) -> bool, shot: &Shot| {
         let ground = Spherical::from_xyz_m(&shot.ground_m);
@@ -188,7 +222,7 @@ fn write_day(folder: &Path, arc: &Arc, terrain: &Terrain, seed: u64) -> Result<D
     };
     let in_site = |shot: &Shot| within(&|east, north| image.site.contains(east, north), shot);
     let in_context = |shot: &Shot| within(&in_window, shot);
-    let (file, shots) = write_pedr(folder, arc, terrain, &request, |shot| {
+    let (file, shots) = write_pedr(folder, flown, terrain, &request, |shot| {
         in_site(shot) || in_context(shot)
     })?;
     let (mut kept, mut context) = (shots.clone(), shots);
@@ -196,12 +230,12 @@ fn write_day(folder: &Path, arc: &Arc, terrain: &Terrain, seed: u64) -> Result<D
     context.retain(|kept| in_context(&kept.truth));
     let mut profile = ProfileTruth::new(image.site.id, &name, &kept);
     profile.image = Some(image.id);
-    for version in versions(arc, seed) {
+    for version in versions(arc, options.seed) {
         let mean_m = mean(kept.iter().map(|kept| {
             let KeptShot { truth, .. } = kept;
             let rival_m =
                 mars_matrix(&MARS_IAU2000, truth.et) * version.position_m(&arc.orbit, truth.et);
-            (truth.spacecraft_m - truth.ground_m).norm() - (rival_m - truth.ground_m).norm()
+            truth.range_m - (rival_m - truth.told_ground_m).norm()
         }));
         let difference = OrbitDifference {
             radial_along_cross_m: version.offset_m.into(),

@@ -3,9 +3,10 @@
 //! | file | what it invents |
 //! |---|---|
 //! | `plan` | six images, three sites, which days are written in full |
+//! | `error_sources`, `drawn` | what is wrong with the data: kinds and sizes, and what one mission has of them |
 //! | `orbit`, `versions` | the true orbit of a day, and two rivals that are metres off |
 //! | `attitude`, `arc` | pointing, and orbit and attitude solved so that an image shows its site |
-//! | `terrain`, `laser` | the ground, and laser shots on it as a PEDR frame tells them |
+//! | `terrain`, `roughness`, `laser` | the ground, and laser shots on it as a PEDR frame tells them |
 //! | `context` | wide-angle images around two of the six, a fourth site |
 //! | `ties` | places that two images show, in images that were truly taken elsewhere and at other times |
 //! | `kernels`, `pedr`, `sites`, `truth` | the files |
@@ -13,13 +14,15 @@
 //!
 //! Injected errors: attitude stands 1.15 s early in the C-kernel, laser time tags are 0.117 s late,
 //! version K files are in IAU 1991; tie points see images that were exposed some lines off their labels,
-//! and a few of them are blunders. `truth.json` tells all of it.
+//! and a few of them are blunders. [`SceneErrors`] has more of them. `truth.json` tells all of it.
 
 mod along;
 mod arc;
 mod attitude;
 mod context;
+mod drawn;
 mod error;
+mod error_sources;
 mod files;
 mod kernels;
 mod laser;
@@ -28,6 +31,7 @@ mod orbit;
 mod pedr;
 mod plan;
 mod random;
+mod roughness;
 mod sites;
 mod sun;
 mod terrain;
@@ -42,23 +46,30 @@ use std::{
 
 pub use along::write_scene_along;
 pub use error::SceneError;
+pub use error_sources::{
+    AltimeterErrors, AttitudeErrors, Jitter, Misregistration, PositionErrors, Relief, Roughness,
+    SceneErrors,
+};
 pub use mission::write_scene;
 
 /// How a mission is invented.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SceneOptions {
-    /// Seed of terrain, clouds and orbit differences.
+    /// Seed of terrain, clouds, orbit differences and all errors that are drawn.
     pub seed: u64,
     /// Seconds of frames in the files of whole days, 600 to 90 000; other files hold at most one revolution.
     pub day_s: f64,
+    /// What is wrong with the data, and the relief.
+    pub errors: SceneErrors,
 }
 
 impl Default for SceneOptions {
-    /// Seed 1, days of 24 h.
+    /// Seed 1, days of 24 h, errors of the worked example.
     fn default() -> Self {
         Self {
             seed: 1,
             day_s: crate::units::SECONDS_PER_DAY,
+            errors: SceneErrors::demo(),
         }
     }
 }

@@ -6,7 +6,7 @@ use rayon::prelude::*;
 
 use super::{
     arc::Flight,
-    laser::{Echo, FRAME_S, Frame, FrameRequest, Shot, fly_frame},
+    laser::{Echo, FRAME_S, Frame, FrameRequest, LaserErrors, Shot, fly_frame},
     terrain::Terrain,
     truth::{FileTruth, KeptShot},
 };
@@ -36,8 +36,10 @@ pub(super) struct PedrRequest<'a> {
     pub datum: MarsDatum,
     /// Orbit number at a true time.
     pub orbit: &'a (dyn Fn(Et) -> u32 + Sync),
-    /// Seed of clouds and missing returns.
+    /// Seed of clouds, missing returns and noise.
     pub seed: u64,
+    /// Errors of the shots.
+    pub errors: LaserErrors,
 }
 
 /// Mid-points of the frames that fit into `span`, as late clocks tag them: whole microseconds, so that
@@ -97,6 +99,7 @@ pub(super) fn write_pedr(
                     orbit: (request.orbit)(tag.plus(-built_in_altimeter().clock_bias_s)),
                     datum: request.datum,
                     seed: request.seed,
+                    errors: &request.errors,
                 };
                 let frame = fly_frame(flight, terrain, &frame_request)?;
                 let record = Record::from_frame(&frame.values).in_file(&path)?;

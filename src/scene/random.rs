@@ -16,6 +16,13 @@ pub(super) fn unit_of(bits: u64) -> f64 {
     (bits >> 11) as f64 / (1_u64 << 53) as f64
 }
 
+/// A normal number, of mean 0 and standard deviation 1, from two numbers in `0 <= x < 1`, by Box and Muller.
+pub(super) fn normal_of(first: f64, second: f64) -> f64 {
+    // 1 − x, so that the logarithm is finite.
+    let radius = (-2.0 * (1.0 - first).ln()).sqrt();
+    radius * (std::f64::consts::TAU * second).cos()
+}
+
 /// A stream of random numbers.
 pub(super) struct Random {
     state: u64,
@@ -30,10 +37,15 @@ impl Random {
         Self { state }
     }
 
+    /// The next 64 bits.
+    pub(super) fn bits(&mut self) -> u64 {
+        self.state = mix(self.state);
+        self.state
+    }
+
     /// The next number in `low <= x < high`.
     pub(super) fn between(&mut self, low: f64, high: f64) -> f64 {
-        self.state = mix(self.state);
-        low + (high - low) * unit_of(self.state)
+        low + (high - low) * unit_of(self.bits())
     }
 
     /// The next number between `low` and `high`, evenly spread in its logarithm.
@@ -41,11 +53,10 @@ impl Random {
         self.between(low.ln(), high.ln()).exp()
     }
 
-    /// The next normal number, of mean 0 and standard deviation 1, by Box and Muller.
+    /// The next normal number, of mean 0 and standard deviation 1.
     pub(super) fn normal(&mut self) -> f64 {
-        // 1 − x, so that the logarithm is finite.
-        let radius = (-2.0 * (1.0 - self.between(0.0, 1.0)).ln()).sqrt();
-        radius * self.between(0.0, std::f64::consts::TAU).cos()
+        let first = self.between(0.0, 1.0);
+        normal_of(first, self.between(0.0, 1.0))
     }
 
     /// The next direction, evenly spread over the sphere.

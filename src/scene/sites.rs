@@ -4,8 +4,10 @@ use std::fmt::Write as _;
 
 use super::{
     arc::Arc,
+    error_sources::SceneErrors,
     plan::{Look, Site},
     ties::ties_name,
+    truth::TiesTruth,
 };
 use crate::{
     config::{built_in_altimeter, usual_instrument},
@@ -41,7 +43,7 @@ pub(super) struct SiteTies {
     /// Path of the file.
     pub file: String,
     /// What the site file says of their noise.
-    pub note: &'static str,
+    pub note: String,
     /// Standard deviations along and across the track, focal-plane pixels.
     pub sigma_px: [f64; 2],
 }
@@ -58,6 +60,8 @@ pub(super) struct SiteFile<'a> {
     pub pedr: Vec<String>,
     /// Tie points, where there are any.
     pub ties: Option<SiteTies>,
+    /// How far ranges may be off on average, where more than usual.
+    pub range_mean_max_m: Option<f64>,
     /// Windows.
     pub windows: Vec<Window>,
     /// Images.
@@ -97,6 +101,12 @@ impl SiteFile<'_> {
                 ties.sigma_px,
             );
         }
+        if let Some(mean_max_m) = self.range_mean_max_m {
+            let _infallible = write!(
+                text,
+                "\n[range_check]\n# Shifted profiles off nadir and errors of the orbit: three standard deviations.\nmean_max_m = {mean_max_m:?}\n",
+            );
+        }
         for window in &self.windows {
             let [west, east] = window.longitude_deg;
             let [south, north] = window.latitude_deg;
@@ -134,8 +144,43 @@ pub(super) fn window(site: &Site, [east_deg, north_deg]: [f64; 2]) -> Window {
     }
 }
 
-/// The site file of `site`, whose images and PEDR files are those of its arcs.
-pub(super) fn planned_site<'a>(site: &'a Site, arcs: &[&Arc]) -> SiteFile<'a> {
+/// Limit of mean range residuals where errors are drawn, metres. A profile that lies 70 m beside its place is
+/// 26 m too near or too far at 22 degrees off nadir; orbits add 9 m.
+const RANGE_MEAN_MAX_M: f64 = 85.0;
+
+/// Limit of mean range residuals, where it is not the usual one.
+pub(super) fn range_mean_max_m(errors: &SceneErrors) -> Option<f64> {
+    (*errors != SceneErrors::demo()).then_some(RANGE_MEAN_MAX_M)
+}
+
+/// The site file of `site`, whose images and PEDR files are those of its arcs and whose tie points are those of `ties`.
+pub(super) fn planned_site<'a>(
+    site: &'a Site,
+    arcs: [&Arc; 2],
+    errors: &SceneErrors,
+    ties: &TiesTruth,
+) -> SiteFile<'a> {
+    let is_demo = *errors == SceneErrors::demo();
+    let ties_of_demo = || {
+        let note = "A line, the noise of these tie points, is 1.3 to 1.6 focal-plane pixels.";
+        (note.to_owned(), [1.6, 1.0])
+    };
+    let ties_with_noise = |noise_px: f64| {
+        let [first, second] = ties
+            .cameras
+            .each_ref()
+            .map(|camera| camera.focal_px_per_line);
+        let note = format!(
+            "The noise of these tie points is {noise_px} lines and samples; a line is {first:.2} and {second:.2} focal-plane pixels."
+        );
+        let along_px = 0.5 * (first + second) * noise_px;
+        (note, [(1_000.0 * along_px).round() / 1_000.0, noise_px])
+    };
+    let (note, sigma_px) = if is_demo {
+        ties_of_demo()
+    } else {
+        ties_with_noise(errors.tie_noise_px)
+    };
     SiteFile {
         id: site.id,
         description: format!("{}, synthetic", site.name),
@@ -146,9 +191,10 @@ pub(super) fn planned_site<'a>(site: &'a Site, arcs: &[&Arc]) -> SiteFile<'a> {
             .collect(),
         ties: Some(SiteTies {
             file: format!("../ties/{}", ties_name(site.id)),
-            note: "A line, the noise of these tie points, is 1.3 to 1.6 focal-plane pixels.",
-            sigma_px: [1.6, 1.0],
+            note,
+            sigma_px,
         }),
+        range_mean_max_m: range_mean_max_m(errors),
         windows: vec![window(
             site,
             [
@@ -281,7 +327,7 @@ ties/        places that both images of a site show, as measured in them; some a
 sites/       configurations for `areograph run`
 truth.json   what really happened: biases, orientation of the images, footprints in the sites' windows,
              how far the rival orbits are off (the orbit `gsfc` is the true one), and for the tie points when and
-             from where the images were truly taken
+             from where the images were truly taken; which errors were drawn from which sizes
 
 Image ids, times, line counts and line periods are those of Shan et al. 2005, Table 2. Terrain, orbits and
 attitudes are invented. Emission angles of E02-01301 and E02-01453 are invented too; the paper does not tell them.

@@ -1,22 +1,25 @@
-//! Invented relief: an ellipsoid with swells, craters and small hills, the same for the same seed.
+//! Invented relief: an ellipsoid with swells, craters, and small hills or rough ground around the sites, the same for the
+//! same seed.
 //!
 //! Everything is a function of the direction in three dimensions, so there is no seam in longitude and
 //! nothing special about the poles. One radius costs about 25 sines and the craters of one grid cell,
-//! well under a microsecond.
+//! well under a microsecond; on rough ground three quarters of one.
 
 use std::collections::HashMap;
 
 use nalgebra::Vector3;
 
-use super::random::Random;
+use super::{
+    error_sources::Relief,
+    random::Random,
+    roughness::{Bowl, RoughPatch},
+};
 use crate::constants::MARS_IAU2000;
 
 /// Radius of the sphere on which lengths along the ground are counted, metres.
-const REFERENCE_RADIUS_M: f64 = 3_390_000.0;
+pub(super) const REFERENCE_RADIUS_M: f64 = 3_390_000.0;
 /// Edge of a cell of the crater grid, metres; no smaller than the reach of the largest crater.
 const CELL_M: f64 = 130_000.0;
-/// Reach of a crater's ejecta in crater radii.
-const REACH: f64 = 2.5;
 /// Large craters are kept this far from the sites, metres beyond their reach.
 const SITE_CLEARANCE_M: f64 = 60_000.0;
 
@@ -27,11 +30,10 @@ struct Wave {
     height_m: f64,
 }
 
-/// A bowl with a raised rim.
+/// A bowl and where it is.
 struct Crater {
     centre_m: Vector3<f64>,
-    radius_m: f64,
-    depth_m: f64,
+    bowl: Bowl,
 }
 
 /// The shape of the invented Mars, in IAU 2000 body-fixed components.
@@ -40,11 +42,12 @@ pub(super) struct Terrain {
     relief: Vec<Wave>,
     craters: Vec<Crater>,
     cells: HashMap<[i32; 3], Vec<usize>>,
+    rough: Vec<RoughPatch>,
 }
 
 impl Terrain {
-    /// The terrain of `seed`, gentle around `sites` (directions) but for craters of up to 2 km.
-    pub(super) fn new(seed: u64, sites: &[Vector3<f64>]) -> Self {
+    /// The terrain of `seed`; around `sites` (directions) large craters are missing, and the ground is as `near_sites`.
+    pub(super) fn new(seed: u64, sites: &[Vector3<f64>], near_sites: Relief) -> Self {
         let mut random = Random::new(seed, "terrain");
         // Number, wavelengths and heights: swells of kilometres, plains, hills.
         let areoid = waves(&mut random, 4, [3.0e6, 9.0e6], |_| 40.0);
@@ -52,42 +55,53 @@ impl Terrain {
         relief.extend(waves(&mut random, 8, [1.5e5, 6.0e5], |length_m| {
             3e-4 * length_m
         }));
-        relief.extend(waves(&mut random, 8, [4.0e3, 3.0e4], |length_m| {
-            7e-4 * length_m
-        }));
+        let hills = waves(&mut random, 8, [4.0e3, 3.0e4], |length_m| 7e-4 * length_m);
+        let is_gentle = near_sites == Relief::Gentle;
+        if is_gentle {
+            relief.extend(hills);
+        }
 
         let mut craters = Vec::new();
         while craters.len() < 1_500 {
             let centre_m = REFERENCE_RADIUS_M * random.direction();
             let radius_m = random.between_log(4_000.0, 50_000.0);
             let clear = sites.iter().all(|site| {
-                (REFERENCE_RADIUS_M * site - centre_m).norm() > REACH * radius_m + SITE_CLEARANCE_M
+                (REFERENCE_RADIUS_M * site - centre_m).norm()
+                    > Bowl::REACH * radius_m + SITE_CLEARANCE_M
             });
             if clear {
+                let depth_m = 0.08 * radius_m;
                 craters.push(Crater {
                     centre_m,
-                    radius_m,
-                    depth_m: 0.08 * radius_m,
+                    bowl: Bowl { radius_m, depth_m },
                 });
             }
         }
-        for site in sites {
+        for site in sites.iter().filter(|_| is_gentle) {
             for _ in 0..40 {
                 let offset = 0.012 * random.between(0.0, 1.0).sqrt() * random.direction();
                 let radius_m = random.between_log(500.0, 2_000.0);
+                let depth_m = 0.06 * radius_m;
                 craters.push(Crater {
                     centre_m: REFERENCE_RADIUS_M * (site + offset).normalize(),
-                    radius_m,
-                    depth_m: 0.06 * radius_m,
+                    bowl: Bowl { radius_m, depth_m },
                 });
             }
         }
         let cells = grid(&craters);
+        let rough = match near_sites {
+            Relief::Gentle => Vec::new(),
+            Relief::SelfAffine(roughness) => sites
+                .iter()
+                .map(|site| RoughPatch::new(seed, site, roughness))
+                .collect(),
+        };
         Self {
             areoid,
             relief,
             craters,
             cells,
+            rough,
         }
     }
 
@@ -106,7 +120,46 @@ impl Terrain {
             .flatten()
             .map(|&index| self.craters[index].height_m(&place_m))
             .sum();
-        self.areoid_radius_m(direction) + height_m(&self.relief, &place_m) + bowls_m
+        let smooth_m = self.areoid_radius_m(direction) + height_m(&self.relief, &place_m) + bowls_m;
+        smooth_m + self.roughness_m(&place_m).unwrap_or(0.0)
+    }
+
+    /// What the rough ground near a site adds, metres; `None` elsewhere.
+    fn roughness_m(&self, place_m: &Vector3<f64>) -> Option<f64> {
+        self.rough.iter().find_map(|patch| patch.height_m(place_m))
+    }
+
+    /// How much farther than along its middle a beam is on the mean over a round spot, metres; 0 on smooth ground.
+    ///
+    /// * `ground_m` – where the middle meets the ground
+    /// * `direction` – of the beam, unit length
+    /// * `diameter_m` – of the spot, in the plane across the beam
+    pub(super) fn spot_farther_m(
+        &self,
+        ground_m: &Vector3<f64>,
+        direction: &Vector3<f64>,
+        diameter_m: f64,
+    ) -> f64 {
+        /// Points on each of two circles that stand for equal areas, and radii of the circles.
+        const POINTS: u32 = 6;
+        const CIRCLES: [f64; 2] = [0.5, 0.866_025_403_784_438_6];
+        let up = ground_m.normalize();
+        if self.roughness_m(&(REFERENCE_RADIUS_M * up)).is_none() {
+            return 0.0;
+        }
+        let side = direction.cross(&Vector3::z()).normalize();
+        let other = direction.cross(&side);
+        let mut above_m = 0.0;
+        for circle in CIRCLES {
+            for point in 0..POINTS {
+                let angle_rad = std::f64::consts::TAU * f64::from(point) / f64::from(POINTS);
+                let (sin, cos) = angle_rad.sin_cos();
+                let place_m = ground_m + 0.5 * diameter_m * circle * (cos * side + sin * other);
+                above_m += place_m.norm() - self.radius_m(&place_m.normalize());
+            }
+        }
+        let mean_m = above_m / f64::from(2 * POINTS);
+        mean_m / -up.dot(direction)
     }
 
     /// Distance from `origin_m` along `direction` (unit length) to the ground, metres; `None` when the
@@ -139,15 +192,7 @@ impl Terrain {
 
 impl Crater {
     fn height_m(&self, place_m: &Vector3<f64>) -> f64 {
-        let distance = (place_m - self.centre_m).norm() / self.radius_m;
-        let rim_m = 0.2 * self.depth_m;
-        if distance < 1.0 {
-            rim_m + self.depth_m * (distance * distance - 1.0)
-        } else if distance < REACH {
-            rim_m * ((REACH - distance) / (REACH - 1.0)).powi(2)
-        } else {
-            0.0
-        }
+        self.bowl.height_m((place_m - self.centre_m).norm())
     }
 }
 
@@ -194,7 +239,7 @@ fn cell(place_m: &Vector3<f64>) -> [i32; 3] {
 fn grid(craters: &[Crater]) -> HashMap<[i32; 3], Vec<usize>> {
     let mut cells: HashMap<[i32; 3], Vec<usize>> = HashMap::new();
     for (index, crater) in craters.iter().enumerate() {
-        let reach_m = Vector3::repeat(REACH * crater.radius_m);
+        let reach_m = Vector3::repeat(Bowl::REACH * crater.bowl.radius_m);
         let low = cell(&(crater.centre_m - reach_m));
         let high = cell(&(crater.centre_m + reach_m));
         for x in low[0]..=high[0] {
@@ -214,7 +259,8 @@ mod tests {
     use proptest::prelude::*;
     use std::sync::LazyLock;
 
-    static TERRAIN: LazyLock<Terrain> = LazyLock::new(|| Terrain::new(7, &[Vector3::x()]));
+    static TERRAIN: LazyLock<Terrain> =
+        LazyLock::new(|| Terrain::new(7, &[Vector3::x()], Relief::Gentle));
 
     proptest! {
         #[test]
@@ -253,12 +299,12 @@ mod tests {
     #[test]
     fn the_same_seed_makes_the_same_ground_and_another_seed_another() {
         let direction = Vector3::new(0.4, -0.5, 0.2).normalize();
-        let again = Terrain::new(7, &[Vector3::x()]);
+        let again = Terrain::new(7, &[Vector3::x()], Relief::Gentle);
         assert_eq!(
             again.radius_m(&direction).to_bits(),
             TERRAIN.radius_m(&direction).to_bits()
         );
-        let other = Terrain::new(8, &[Vector3::x()]);
+        let other = Terrain::new(8, &[Vector3::x()], Relief::Gentle);
         assert!((other.radius_m(&direction) - TERRAIN.radius_m(&direction)).abs() > 1.0);
     }
 

@@ -6,48 +6,46 @@ use std::path::Path;
 use nalgebra::Vector3;
 
 use super::{
-    arc::Arc,
+    drawn::Flown,
     error::SceneError,
     files::put,
     random::Random,
     terrain::Terrain,
-    truth::{BlunderTruth, TieCameraTruth, TieTruth, TiesTruth},
+    truth::{BlunderTruth, Poses, TieCameraTruth, TieTruth, TiesTruth},
 };
 use crate::{
     config::usual_instrument,
-    constants::MARS_IAU2000,
     error::Result,
     geom::{
-        mars_rotation::mars_matrix,
         oriented_camera::OrientedCamera,
         pushbroom::{Detector, ExteriorOrientation, Pose, Projector, SampledOrientation},
     },
     pds::ties::ties_table,
     ties::{TieMeasure, TiePoint},
+    time::Et,
 };
 
 /// Tie points of a pair, as many as the paper has at Gusev; fewer where the images hardly overlap.
 const TIES: usize = 154;
 /// Places of the first image that are looked at for one tie point.
 const PLACES_PER_TIE: usize = 20;
-/// No tie point is nearer to the edge of an image, pixels: blunders stay inside.
-const EDGE_PX: f64 = BLUNDER_PX[1] + 5.0 * NOISE_PX;
-/// Standard deviation of a measurement, lines and samples.
-const NOISE_PX: f64 = 1.0;
+/// No tie point is nearer to the edge of an image, pixels: blunders stay inside, and noise of a pixel.
+const EDGE_PX: f64 = BLUNDER_PX[1] + 5.0;
 /// One tie point of so many is a blunder, the first of them in the middle of the first so many.
 const BLUNDER_EVERY: usize = 20;
 /// Shortest and longest blunder, in any direction.
 const BLUNDER_PX: [f64; 2] = [20.0, 100.0];
-/// Standard deviation of the error of a camera's place along each axis, metres.
-const POSITION_BIAS_M: f64 = 20.0;
 /// Intervals between poses of an image, a tenth of a second each: where the bus changes its rate,
 /// interpolation is off by 0.1 mm on the ground.
 const INTERVALS: u32 = 160;
+/// The same of an image with jitter, 2 to 5 ms each: a twentieth of the shortest period, for 2 mm on the ground.
+const INTERVALS_OF_JITTER: u32 = 3_600;
+/// Lines at which the truth tells the pose: the ends of 30 equal intervals.
+const TOLD_POSES: u32 = 31;
 
 /// An image as it was truly taken.
 struct TrueImage<'a> {
-    arc: &'a Arc,
-    position_bias_m: Vector3<f64>,
+    flown: &'a Flown,
     oriented_camera: OrientedCamera<SampledOrientation>,
 }
 
@@ -58,26 +56,24 @@ struct Tie {
 }
 
 impl<'a> TrueImage<'a> {
-    /// The image of `arc`, with an error of its place from `seed`.
-    fn new(arc: &'a Arc, seed: u64) -> Result<Self> {
-        let mut random = Random::new(seed, &format!("camera {}", arc.image.id));
-        let position_bias_m = POSITION_BIAS_M * Vector3::from_fn(|_axis, _column| random.normal());
-        let orientation = SampledOrientation::new(&poses(arc, &position_bias_m))
-            .map_err(|error| no_camera(arc, &error))?;
-        let detector = Detector::new(
-            usual_instrument(),
-            arc.image.summing,
-            0,
-            arc.image.samples(),
-        );
+    /// The image of the day `flown`.
+    fn new(flown: &'a Flown) -> Result<Self> {
+        let image = flown.arc.image;
+        let intervals = if flown.errors.has_jitter() {
+            INTERVALS_OF_JITTER
+        } else {
+            INTERVALS
+        };
+        let orientation = SampledOrientation::new(&poses(flown, intervals))
+            .map_err(|error| no_camera(flown, &error))?;
+        let detector = Detector::new(usual_instrument(), image.summing, 0, image.samples());
         Ok(Self {
-            arc,
-            position_bias_m,
+            flown,
             oriented_camera: OrientedCamera {
-                id: arc.image.id.to_owned(),
+                id: image.id.to_owned(),
                 orientation,
                 detector,
-                lines: f64::from(arc.image.lines_header),
+                lines: f64::from(image.lines_header),
             },
         })
     }
@@ -87,12 +83,12 @@ impl<'a> TrueImage<'a> {
             &self.oriented_camera.orientation,
             self.oriented_camera.lines,
         );
-        Ok(projector.map_err(|error| no_camera(self.arc, &error))?)
+        Ok(projector.map_err(|error| no_camera(self.flown, &error))?)
     }
 
     /// Line and sample at the far edges of where tie points may lie.
     fn extent_px(&self) -> [f64; 2] {
-        let lines = f64::from(self.arc.image.lines_delivered);
+        let lines = f64::from(self.flown.arc.image.lines_delivered);
         [lines, self.oriented_camera.detector.samples].map(|length| length - EDGE_PX)
     }
 
@@ -101,6 +97,11 @@ impl<'a> TrueImage<'a> {
         let [line, sample] = self
             .extent_px()
             .map(|end_px| random.between(EDGE_PX, end_px));
+        self.ground_m(terrain, line, sample)
+    }
+
+    /// The ground that a place of the image shows.
+    fn ground_m(&self, terrain: &Terrain, line: f64, sample: f64) -> Option<Vector3<f64>> {
         let (x_lines, _) = self.oriented_camera.focal_plane_coordinates(line, sample);
         let pose = self.oriented_camera.orientation.pose(x_lines);
         let camera = self.oriented_camera.detector.look(sample);
@@ -133,60 +134,87 @@ impl<'a> TrueImage<'a> {
         inside.then_some(measure)
     }
 
-    fn truth(&self) -> TieCameraTruth {
-        TieCameraTruth {
-            image: self.arc.image.id,
-            time_bias_lines: self.arc.image.time_bias_lines,
-            position_bias_m: self.position_bias_m.into(),
-        }
+    /// How many focal-plane pixels a line is in the middle of the image.
+    fn focal_px_per_line(&self, terrain: &Terrain) -> Result<f64> {
+        let camera = &self.oriented_camera;
+        let [line, sample] = [camera.lines, camera.detector.samples].map(|length| 0.5 * length);
+        let et_s = exposed(self.flown, line).seconds();
+        let ground_m = self.ground_m(terrain, line, sample);
+        let ground_m = ground_m.ok_or(SceneError::BeamMisses { et_s })?;
+        Ok(camera.focal_px_per_line(0.0, &ground_m))
+    }
+
+    fn truth(&self, terrain: &Terrain) -> Result<TieCameraTruth> {
+        let errors = &self.flown.errors;
+        let lines = self.oriented_camera.lines;
+        let step = lines / f64::from(TOLD_POSES - 1);
+        let told: Vec<f64> = (0..TOLD_POSES).map(|row| step * f64::from(row)).collect();
+        let times = told.iter().map(|line| exposed(self.flown, *line));
+        let poses: Vec<(Et, Pose)> = times.map(|et| (et, pose(self.flown, et))).collect();
+        Ok(TieCameraTruth {
+            image: self.flown.arc.image.id,
+            time_bias_lines: errors.time_bias_lines,
+            position_bias_m: (errors.bus_position_m + errors.camera_position_m).into(),
+            focal_px_per_line: self.focal_px_per_line(terrain)?,
+            line: told,
+            poses: Poses::of(&poses),
+        })
     }
 }
 
-/// Lines from the middle with true poses: those that the label's time would give, `time_bias_lines` later,
-/// and `position_bias_m` aside.
-fn poses(arc: &Arc, position_bias_m: &Vector3<f64>) -> Vec<(f64, Pose)> {
-    let lines = f64::from(arc.image.lines_header);
-    (0..=INTERVALS)
+/// When a line was truly exposed, counted from the outer edge of the first one.
+fn exposed(flown: &Flown, line: f64) -> Et {
+    let arc = &flown.arc;
+    let exposed_s = (line + flown.errors.time_bias_lines) * arc.image.line_period_s();
+    arc.exposed.start.plus(exposed_s)
+}
+
+/// True pose of the camera.
+fn pose(flown: &Flown, et: Et) -> Pose {
+    Pose {
+        position_m: flown.bus_position_m(et) + flown.errors.camera_position_m,
+        mars_to_camera: flown.camera_to_mars(et).transpose(),
+    }
+}
+
+/// Lines from the middle with true poses.
+fn poses(flown: &Flown, intervals: u32) -> Vec<(f64, Pose)> {
+    let lines = f64::from(flown.arc.image.lines_header);
+    (0..=intervals)
         .map(|index| {
-            let line = lines * f64::from(index) / f64::from(INTERVALS);
-            let exposed_s = (line + arc.image.time_bias_lines) * arc.image.line_period_s();
-            let et = arc.exposed.start.plus(exposed_s);
-            let orbit_m = mars_matrix(&MARS_IAU2000, et) * arc.orbit.state(et).position_m;
-            let pose = Pose {
-                position_m: orbit_m + position_bias_m,
-                mars_to_camera: arc.camera_to_mars(et).transpose(),
-            };
-            (line - 0.5 * lines, pose)
+            let line = lines * f64::from(index) / f64::from(intervals);
+            (line - 0.5 * lines, pose(flown, exposed(flown, line)))
         })
         .collect()
 }
 
-fn no_camera(arc: &Arc, error: &dyn std::error::Error) -> SceneError {
+fn no_camera(flown: &Flown, error: &dyn std::error::Error) -> SceneError {
     SceneError::NoCamera {
-        image: arc.image.id.to_owned(),
+        image: flown.arc.image.id.to_owned(),
         error: error.to_string(),
     }
 }
 
-/// Writes the tie points of a site's images, the first two of `arcs`, into `folder`.
+/// Writes the tie points of a pair into `folder`, measured with noise of `noise_px`.
 ///
 /// # Errors
 /// [`SceneError::NoCamera`]; the system's refusal to write.
 pub(super) fn write_ties(
     folder: &Path,
-    [first, second]: [&Arc; 2],
+    [first, second]: [&Flown; 2],
     terrain: &Terrain,
+    noise_px: f64,
     seed: u64,
 ) -> Result<TiesTruth> {
-    let site = first.image.site.id;
-    let pair = [TrueImage::new(first, seed)?, TrueImage::new(second, seed)?];
+    let site = first.arc.image.site.id;
+    let pair = [TrueImage::new(first)?, TrueImage::new(second)?];
     let mut random = Random::new(seed, &format!("ties {site}"));
     let exact = exact_ties(&pair, terrain, &mut random)?;
-    let (measured, truth) = spoil(exact, &mut random);
+    let (measured, truth) = spoil(exact, noise_px, &mut random);
     put(&folder.join(ties_name(site)), &ties_table(&measured))?;
     Ok(TiesTruth {
         site,
-        cameras: pair.each_ref().map(TrueImage::truth),
+        cameras: [pair[0].truth(terrain)?, pair[1].truth(terrain)?],
         ties: truth,
     })
 }
@@ -217,13 +245,17 @@ fn exact_ties(
 }
 
 /// Adds noise to all measurements, and blunders to a few.
-fn spoil(ties: Vec<Tie>, random: &mut Random) -> (Vec<TiePoint<String>>, Vec<TieTruth>) {
+fn spoil(
+    ties: Vec<Tie>,
+    noise_px: f64,
+    random: &mut Random,
+) -> (Vec<TiePoint<String>>, Vec<TieTruth>) {
     let spoilt = ties.into_iter().enumerate().map(|(index, tie)| {
         let id = format!("tie-{:03}", index + 1);
         let mut measures = tie.measures.to_vec();
         for measure in &mut measures {
-            measure.line += NOISE_PX * random.normal();
-            measure.sample += NOISE_PX * random.normal();
+            measure.line += noise_px * random.normal();
+            measure.sample += noise_px * random.normal();
         }
         let blunder =
             (index % BLUNDER_EVERY == BLUNDER_EVERY / 2).then(|| blunder(&mut measures, random));
@@ -259,19 +291,29 @@ mod tests {
     use super::*;
     use crate::{
         geom::intersection::{IntersectionLimits, Ray, intersect},
-        scene::plan::{IMAGES, SITES, Site},
-        time::Et,
+        scene::{
+            arc::Arc,
+            drawn::DayErrors,
+            error_sources::{Roughness, SceneErrors},
+            plan::{IMAGES, PlannedImage, SITES, Site},
+        },
     };
 
-    fn arcs(site: &str) -> Vec<Arc> {
-        let of_site = IMAGES.iter().filter(|image| image.site.id == site);
-        of_site
-            .map(|image| Arc::new(image, Et::from_seconds(3.9e7), 1_200.0).unwrap())
-            .collect()
+    const ROUGH: SceneErrors = SceneErrors::realistic(Roughness::Rough);
+
+    fn flown(image: &'static PlannedImage, errors: &SceneErrors, seed: u64) -> Flown {
+        let arc = Arc::new(image, Et::from_seconds(3.9e7), 1_200.0).unwrap();
+        let errors = DayErrors::draw(errors, &arc, seed);
+        Flown { arc, errors }
     }
 
-    fn terrain(seed: u64) -> Terrain {
-        Terrain::new(seed, &SITES.map(Site::direction))
+    fn days(site: &str, errors: &SceneErrors, seed: u64) -> Vec<Flown> {
+        let of_site = IMAGES.iter().filter(|image| image.site.id == site);
+        of_site.map(|image| flown(image, errors, seed)).collect()
+    }
+
+    fn terrain(seed: u64, errors: &SceneErrors) -> Terrain {
+        Terrain::new(seed, &SITES.map(Site::direction), errors.relief)
     }
 
     fn ray(image: &TrueImage<'_>, measure: &TieMeasure<String>) -> Ray {
@@ -291,13 +333,15 @@ mod tests {
 
     #[test]
     fn exact_ties_lie_on_the_ground_and_meet_there() {
-        for (site, seed) in SITES
-            .iter()
-            .flat_map(|site| [1, 2, 3, 4, 5, 6].map(|s| (site, s)))
-        {
-            let arcs = arcs(site.id);
-            let pair = [0, 1].map(|image| TrueImage::new(&arcs[image], seed).unwrap());
-            let terrain = terrain(seed);
+        let cases = SITES.iter().flat_map(|site| {
+            let seeds = [1, 2, 3, 4, 5, 6].map(|seed| (seed, SceneErrors::demo()));
+            let rough = [(1, ROUGH), (2, ROUGH)];
+            seeds.into_iter().chain(rough).map(move |case| (site, case))
+        });
+        for (site, (seed, errors)) in cases {
+            let days = days(site.id, &errors, seed);
+            let pair = [0, 1].map(|image| TrueImage::new(&days[image]).unwrap());
+            let terrain = terrain(seed, &errors);
             let ties = exact_ties(&pair, &terrain, &mut Random::new(seed, "test")).unwrap();
             println!("{} seed {seed}: {} ties", site.id, ties.len());
             assert_eq!(ties.len(), TIES, "{} seed {seed}", site.id);
@@ -313,34 +357,43 @@ mod tests {
     }
 
     #[test]
-    fn poses_between_those_of_the_arc_are_those_of_the_arc() {
-        for image in &IMAGES {
-            let arc = Arc::new(image, Et::from_seconds(3.9e7), 1_200.0).unwrap();
-            let camera = TrueImage::new(&arc, 1).unwrap();
+    fn poses_between_those_of_the_flight_are_those_of_the_flight() {
+        let cases = IMAGES.iter().flat_map(|image| {
+            // Turns, radians: 1e-9 is 0.4 mm on the ground, 6e-9 of jitter 2 mm.
+            [(image, SceneErrors::demo(), 1e-9), (image, ROUGH, 6e-9)]
+        });
+        for (image, errors, turn_max_rad) in cases {
+            let flown = flown(image, &errors, 1);
+            let camera = TrueImage::new(&flown).unwrap();
             for share in [0.123, 0.345, 0.567, 0.789] {
                 let line = share * camera.oriented_camera.lines;
                 let x_lines = line - 0.5 * camera.oriented_camera.lines;
                 let pose = camera.oriented_camera.orientation.pose(x_lines);
-                let exposed_s = (line + image.time_bias_lines) * image.line_period_s();
-                let et = arc.exposed.start.plus(exposed_s);
-                let orbit_m = mars_matrix(&MARS_IAU2000, et) * arc.orbit.state(et).position_m;
-                let off_m = (pose.position_m - orbit_m - camera.position_bias_m).norm();
+                let true_pose = super::pose(&flown, exposed(&flown, line));
+                let off_m = (pose.position_m - true_pose.position_m).norm();
                 assert!(off_m < 1e-4, "{} {off_m} m", image.id); // as the kernels themselves
-                let turned = pose.mars_to_camera * arc.camera_to_mars(et);
+                let turned = pose.mars_to_camera * true_pose.mars_to_camera.transpose();
                 let off_rad = (turned - nalgebra::Matrix3::identity()).abs().max();
-                assert!(off_rad < 1e-9, "{} {off_rad} rad", image.id); // 0.4 mm on the ground
+                assert!(off_rad < turn_max_rad, "{} {off_rad} rad", image.id);
             }
         }
     }
 
     #[test]
     fn noise_and_blunders_are_as_told() {
-        let arcs = arcs("isidis");
-        let pair = [0, 1].map(|image| TrueImage::new(&arcs[image], 1).unwrap());
-        let exact = exact_ties(&pair, &terrain(1), &mut Random::new(1, "test")).unwrap();
+        for noise_px in [1.0, 0.22] {
+            noise_and_blunders_are_as_told_with(noise_px);
+        }
+    }
+
+    fn noise_and_blunders_are_as_told_with(noise_px: f64) {
+        let days = days("isidis", &SceneErrors::demo(), 1);
+        let pair = [0, 1].map(|image| TrueImage::new(&days[image]).unwrap());
+        let terrain = terrain(1, &SceneErrors::demo());
+        let exact = exact_ties(&pair, &terrain, &mut Random::new(1, "test")).unwrap();
         let required: Vec<[TieMeasure<String>; 2]> =
             exact.iter().map(|tie| tie.measures.clone()).collect();
-        let (measured, truth) = spoil(exact, &mut Random::new(1, "noise"));
+        let (measured, truth) = spoil(exact, noise_px, &mut Random::new(1, "noise"));
         let (mut squares, mut count) = (0.0, 0.0);
         for ((tie, truth), required) in measured.iter().zip(&truth).zip(&required) {
             assert_eq!(tie.id, truth.id);
@@ -361,7 +414,7 @@ mod tests {
             }
         }
         let sigma_px = f64::sqrt(squares / count);
-        assert!((sigma_px - NOISE_PX).abs() < 0.1, "{sigma_px}"); // 616 numbers: 0.03 px, times three
+        assert!((sigma_px / noise_px - 1.0).abs() < 0.1, "{sigma_px}"); // 616 numbers: 0.03 of it, times three
         let blunders: Vec<f64> = truth
             .iter()
             .filter_map(|tie| tie.blunder.as_ref())

@@ -6,6 +6,8 @@ use serde::Serialize;
 
 use super::{
     arc::Arc,
+    drawn::{DayErrors, Flown},
+    error_sources::SceneErrors,
     laser::{CROSSOVER_AMPLITUDE_M, CROSSOVER_PERIOD_S, Shot},
     plan::Look,
     versions::Version,
@@ -16,7 +18,9 @@ use crate::{
     geom::{
         attitude::{make_continuous, spice_quaternion},
         mars_rotation::mars_matrix,
+        pushbroom::Pose,
     },
+    time::Et,
     units::SECONDS_PER_MS,
 };
 
@@ -30,6 +34,9 @@ pub(super) struct Truth {
     pub synthetic: &'static str,
     pub orbit: &'static str,
     pub seed: u64,
+    pub errors: SceneErrors,
+    pub errors_rule: &'static str,
+    pub errors_drawn: Vec<DrawnTruth>,
     pub biases: Biases,
     pub crossover: Crossover,
     pub frame_model: &'static str,
@@ -40,6 +47,51 @@ pub(super) struct Truth {
     pub ties: Vec<TiesTruth>,
     pub wide_angle_rule: &'static str,
     pub wide_angle: Vec<ContextTruth>,
+}
+
+/// The errors of the day of one image.
+#[derive(Debug, Serialize)]
+pub(super) struct DrawnTruth {
+    image: &'static str,
+    #[serde(flatten)]
+    errors: DayErrors,
+}
+
+impl DrawnTruth {
+    /// What was drawn for a day.
+    pub(super) fn of(flown: &Flown) -> Self {
+        Self {
+            image: flown.arc.image.id,
+            errors: flown.errors.clone(),
+        }
+    }
+}
+
+/// Poses of a camera.
+#[derive(Debug, Serialize)]
+pub(super) struct Poses {
+    epochs_et_s: Vec<f64>,
+    position_iau2000_m: Vec<[f64; 3]>,
+    camera_to_mars_quaternion_wxyz: Vec<[f64; 4]>,
+}
+
+impl Poses {
+    /// These poses, in order of time.
+    pub(super) fn of(poses: &[(Et, Pose)]) -> Self {
+        let mut quaternions: Vec<[f64; 4]> = poses
+            .iter()
+            .map(|(_, pose)| spice_quaternion(&pose.mars_to_camera.transpose()))
+            .collect();
+        make_continuous(&mut quaternions);
+        Self {
+            epochs_et_s: poses.iter().map(|(et, _)| et.seconds()).collect(),
+            position_iau2000_m: poses
+                .iter()
+                .map(|(_, pose)| pose.position_m.into())
+                .collect(),
+            camera_to_mars_quaternion_wxyz: quaternions,
+        }
+    }
 }
 
 /// Injected time errors.
@@ -60,7 +112,7 @@ pub(super) struct Crossover {
     rule: &'static str,
 }
 
-/// Orientation of one image.
+/// One image.
 #[derive(Debug, Serialize)]
 pub(super) struct ImageTruth {
     id: &'static str,
@@ -72,12 +124,11 @@ pub(super) struct ImageTruth {
     look: &'static str,
     emission_deg: Option<f64>,
     emission_source: Option<&'static str>,
-    /// ET, position in the true orbit (`gsfc`) and attitude, one entry per epoch.
-    epochs_et_s: Vec<f64>,
-    position_iau2000_m: Vec<[f64; 3]>,
-    camera_to_mars_quaternion_wxyz: Vec<[f64; 4]>,
-    /// Each family's orbit minus the true one along the radial, along-track and cross-track axes of the
-    /// true orbit, metres, one entry per epoch.
+    /// By the label's times, the orbit `gsfc` and the attitude of the C-kernel, one entry per epoch.
+    #[serde(flatten)]
+    poses: Poses,
+    /// Each family's orbit minus `gsfc` along the radial, along-track and cross-track axes of `gsfc`, metres, one
+    /// entry per epoch.
     orbit_radial_along_cross_m: BTreeMap<&'static str, Vec<[f64; 3]>>,
 }
 
@@ -115,9 +166,8 @@ pub(super) struct ContextTruth {
     pub start_et_s: f64,
     pub line_period_s: f64,
     pub lines: u32,
-    pub epochs_et_s: Vec<f64>,
-    pub position_iau2000_m: Vec<[f64; 3]>,
-    pub camera_to_mars_quaternion_wxyz: Vec<[f64; 4]>,
+    #[serde(flatten)]
+    pub poses: Poses,
     /// Shots of the PEDR file of the image's day that the image shows.
     pub shots: Vec<ContextShot>,
 }
@@ -138,7 +188,7 @@ pub(super) struct ProfileTruth {
     pub image: Option<&'static str>,
     pub file: String,
     pub orbit_differences: BTreeMap<&'static str, OrbitDifference>,
-    /// Largest distance between the linear frame model and the truth, metres, before rounding.
+    /// Largest distance between the linear frame model and where the file should have a shot, metres, before rounding.
     pub frame_error_max_m: f64,
     /// Record of the file, counted from 1 with the label, one entry per shot that met the ground.
     pub record: Vec<u32>,
@@ -172,6 +222,12 @@ pub(super) struct TieCameraTruth {
     pub image: &'static str,
     pub time_bias_lines: f64,
     pub position_bias_m: [f64; 3],
+    /// How many focal-plane pixels a line is, in the middle of the image.
+    pub focal_px_per_line: f64,
+    /// Lines, 0 at the outer edge of the first one, with the poses in which they were truly exposed.
+    pub line: Vec<f64>,
+    #[serde(flatten)]
+    pub poses: Poses,
 }
 
 /// One tie point.
@@ -192,12 +248,15 @@ pub(super) struct BlunderTruth {
 
 impl Truth {
     /// The truth that all missions share; images, files and profiles are still to come.
-    pub(super) fn new(seed: u64) -> Self {
+    pub(super) fn new(seed: u64, errors: SceneErrors) -> Self {
         Self {
             made_by: "areograph scene",
             synthetic: "all of this is invented; only ids, times and geometry of the images follow Shan et al. 2005",
-            orbit: "all positions below, of images and behind the shots, belong to the true orbit, which is gsfc (kernels/gsfc.tm); nav and ipng, and the site files use nav, differ from it by orbit_differences",
+            orbit: "positions of images belong to the orbit gsfc (kernels/gsfc.tm), which is the true one but for errors_drawn; nav and ipng, and the site files use nav, differ from it by orbit_differences",
             seed,
+            errors,
+            errors_rule: "errors are standard deviations and ranges, errors_drawn what was drawn from them for the day of each image; lines were exposed time_bias_lines later than the label says; the bus had the attitude that the C-kernel, its bias removed, has attitude_clock_s later, turned by attitude: matrix from J2000 to the bus = exp([e]x) times that of the kernel, e = constant + linear x + quadratic x^2 (x = (et - middle) / half_image, held beyond -4 and 4) + jitter; bus_position_m (camera and laser) and camera_position_m (camera alone) are added to the orbit gsfc, IAU 2000; east_north_radial_m is where the PEDR file has its shots minus where they were, and its spacecraft is that of gsfc, moved along the beam until ranges agree with the ground as the file has it",
+            errors_drawn: Vec::new(),
             biases: Biases {
                 ck_bias_s: usual_instrument().pointing.ck_bias_s,
                 ck_rule: "the attitude of true time t stands in the C-kernel at t + ck_bias_s",
@@ -208,33 +267,33 @@ impl Truth {
             crossover: Crossover {
                 amplitude_m: CROSSOVER_AMPLITUDE_M,
                 period_s: CROSSOVER_PERIOD_S,
-                rule: "residual = amplitude_m sin(2 pi et / period_s) at the frame's mid-point; true radii are the raw ones, before its subtraction",
+                rule: "residual = amplitude_m sin(2 pi et / period_s) at the frame's mid-point; radii are the raw ones, before its subtraction",
             },
-            frame_model: "a PEDR frame is linear in latitude and longitude: near the poles, in slews and on steep ground seen off nadir it cannot hold 20 true footprints to 0.2 m; the counts are under files and profiles",
+            frame_model: "a PEDR frame is linear in latitude and longitude: near the poles, in slews and on steep ground seen off nadir it cannot hold 20 true footprints to 0.2 m, nor does it know of jitter; the counts are under files and profiles",
             images: Vec::new(),
             files: Vec::new(),
             profiles: Vec::new(),
-            tie_rule: "line n of an image was truly exposed when its label has line n + time_bias_lines, from the place of the true orbit (gsfc) at that time plus position_bias_m (IAU 2000), with the true attitude of that time; tie points, and nothing else, are measured in images taken like that; the position bias against nav is position_bias_m less the orbit difference of nav; time_bias_lines are the residuals of Shan et al. 2005, Table 5, to half a line and with the other sign, position_bias_m has a standard deviation of 20 m an axis; measurements have noise of 1 line and 1 sample, blunders come on top of it",
+            tie_rule: "line n of an image was truly exposed when its label has line n + time_bias_lines, from the place of the orbit gsfc at that time plus position_bias_m (IAU 2000), with the true attitude of that time (errors_rule); line, position and quaternion of a camera are its true poses; tie points are measured in images taken like that, at ground_iau2000_m; the position bias against nav is position_bias_m less the orbit difference of nav; measurements have the noise tie_noise_px of errors in lines and samples, blunders come on top of it",
             ties: Vec::new(),
-            wide_angle_rule: "wide-angle images are taken when their labels say, from the true orbit (gsfc) with the true attitude; lines and samples of shots follow the formula of the instrument kernel moc20.ti",
+            wide_angle_rule: "wide-angle images are taken when their labels say, from the true place of the bus with its true attitude; lines and samples of shots follow the formula of the instrument kernel moc20.ti",
             wide_angle: Vec::new(),
         }
     }
 }
 
 impl ImageTruth {
-    /// Orientation of the arc's image, and how far the rival orbits are off.
+    /// Orientation of the arc's image as the kernels tell it, and how far the rival orbits are off.
     pub(super) fn of(arc: &Arc, versions: &[Version]) -> Self {
         let image = arc.image;
         let step_s = arc.exposed.duration_s() / f64::from(EPOCHS - 1);
         let epochs: Vec<_> = (0..EPOCHS)
             .map(|index| arc.exposed.start.plus(step_s * f64::from(index)))
             .collect();
-        let mut quaternions: Vec<[f64; 4]> = epochs
-            .iter()
-            .map(|et| spice_quaternion(&arc.camera_to_mars(*et)))
-            .collect();
-        make_continuous(&mut quaternions);
+        let pose = |et: Et| Pose {
+            position_m: mars_matrix(&MARS_IAU2000, et) * arc.orbit.state(et).position_m,
+            mars_to_camera: arc.camera_to_mars(et).transpose(),
+        };
+        let poses: Vec<(Et, Pose)> = epochs.iter().map(|et| (*et, pose(*et))).collect();
         let (look, emission_deg, emission_source) = match image.look {
             Look::Nadir => ("nadir", None, None),
             Look::Roll {
@@ -257,12 +316,7 @@ impl ImageTruth {
             look,
             emission_deg,
             emission_source,
-            position_iau2000_m: epochs
-                .iter()
-                .map(|et| {
-                    (mars_matrix(&MARS_IAU2000, *et) * arc.orbit.state(*et).position_m).into()
-                })
-                .collect(),
+            poses: Poses::of(&poses),
             orbit_radial_along_cross_m: versions
                 .iter()
                 .map(|version| {
@@ -272,8 +326,6 @@ impl ImageTruth {
                     (version.family, off.collect())
                 })
                 .collect(),
-            epochs_et_s: epochs.iter().map(|et| et.seconds()).collect(),
-            camera_to_mars_quaternion_wxyz: quaternions,
         }
     }
 }

@@ -8,7 +8,7 @@ use areograph::{
     geom::mars_rotation::mars_matrix,
     image::ImageFields,
     kernel_source::{KernelList, KernelSource},
-    scene::{SceneOptions, write_scene},
+    scene::{SceneErrors, SceneOptions, write_scene},
     spice::{KernelSet, Session},
     stages::{
         sample_orientation::{Orientation, sample_orientation},
@@ -32,6 +32,7 @@ static MISSION: LazyLock<tempfile::TempDir> = LazyLock::new(|| {
     let options = SceneOptions {
         seed: 5,
         day_s: 1_800.0,
+        errors: SceneErrors::demo(),
     };
     write_scene(&folder.path().join("mission"), &options).unwrap();
     folder

@@ -1,0 +1,274 @@
+//! Errors as drawn for the day of one image, and the flight with them.
+
+use nalgebra::{Matrix3, Rotation3, Vector3};
+use serde::Serialize;
+
+use super::{
+    arc::{Arc, Beam, Flight},
+    attitude::bus_to_camera,
+    error_sources::{AttitudeErrors, Jitter, Misregistration, PositionErrors, SceneErrors},
+    random::Random,
+    terrain::REFERENCE_RADIUS_M,
+};
+use crate::{
+    config::usual_instrument,
+    constants::MARS_IAU2000,
+    error::Result,
+    geom::{
+        attitude::matrix_of_rotation_vector, mars_rotation::mars_matrix,
+        orbit_axes::radial_along_cross,
+    },
+    time::Et,
+};
+
+/// The polynomial of an attitude error is held from so many half images from the middle on: shots of the window are
+/// nearer, and it does not grow over the day.
+const POLYNOMIAL_REACH: f64 = 4.0;
+
+/// What went wrong on the day of one image.
+#[derive(Debug, Clone, Serialize)]
+pub(super) struct DayErrors {
+    /// Lines by which all lines were exposed later than the label says.
+    pub time_bias_lines: f64,
+    /// Seconds by which the attitude of the C-kernel is too late: at `t` the bus had its attitude of `t` + this.
+    pub attitude_clock_s: f64,
+    /// Place of bus, camera and laser minus the orbit `gsfc`, IAU 2000, metres.
+    pub bus_position_m: Vector3<f64>,
+    /// Place of the camera minus that of the bus, IAU 2000, metres.
+    pub camera_position_m: Vector3<f64>,
+    /// Turn of the bus.
+    pub attitude: Option<AttitudeError>,
+    /// Shift of the day's profile in the PEDR file.
+    pub profile_shift: ProfileShift,
+}
+
+/// By how much the bus was turned against the C-kernel: its matrix from J2000 was `exp([e]×)` times the C-kernel's.
+#[derive(Debug, Clone, Serialize)]
+pub(super) struct AttitudeError {
+    /// Where `x` is 0.
+    middle_et_s: f64,
+    /// Where `x` is 1, seconds later.
+    half_image_s: f64,
+    /// Terms of `e` in `x`, about the axes of the bus (roll, pitch, yaw), radians.
+    constant_rad: Vector3<f64>,
+    linear_rad: Vector3<f64>,
+    quadratic_rad: Vector3<f64>,
+    /// Added to `e`.
+    jitter: Vec<Sinusoid>,
+}
+
+/// `amplitude sin(2π (t − middle) / period + phase)` about one axis.
+#[derive(Debug, Clone, Serialize)]
+struct Sinusoid {
+    /// 0 roll, 1 pitch.
+    axis: usize,
+    amplitude_rad: f64,
+    period_s: f64,
+    phase_rad: f64,
+}
+
+/// How far the PEDR file has a profile from where it is.
+#[derive(Debug, Clone, Serialize)]
+pub(super) struct ProfileShift {
+    /// Towards the east, the north and up, metres.
+    pub east_north_radial_m: [f64; 3],
+    /// The first two as a turn of Mars.
+    #[serde(skip)]
+    rotation: Matrix3<f64>,
+}
+
+impl ProfileShift {
+    /// No shift.
+    pub(super) fn none() -> Self {
+        Self {
+            east_north_radial_m: [0.0; 3],
+            rotation: Matrix3::identity(),
+        }
+    }
+
+    /// The shift of a profile near `site`, a direction.
+    fn near(site: &Vector3<f64>, east_north_radial_m: [f64; 3]) -> Self {
+        let [east_m, north_m, _] = east_north_radial_m;
+        let east = Vector3::z().cross(site).normalize();
+        let north = site.cross(&east);
+        let moved = east_m * east + north_m * north;
+        let turn_rad = site.cross(&moved) / REFERENCE_RADIUS_M;
+        Self {
+            east_north_radial_m,
+            rotation: Rotation3::new(turn_rad).into_inner(),
+        }
+    }
+
+    /// Radial part, metres.
+    pub(super) const fn radial_m(&self) -> f64 {
+        self.east_north_radial_m[2]
+    }
+
+    /// The turn that takes true directions to those of the file, both IAU 2000.
+    pub(super) const fn rotation(&self) -> &Matrix3<f64> {
+        &self.rotation
+    }
+
+    /// Where the file has a point, IAU 2000, metres.
+    pub(super) fn applied(&self, ground_m: &Vector3<f64>) -> Vector3<f64> {
+        let radius_m = ground_m.norm();
+        self.rotation * ground_m * ((radius_m + self.radial_m()) / radius_m)
+    }
+}
+
+impl AttitudeError {
+    fn draw(sizes: &AttitudeErrors, arc: &Arc, random: &mut Random) -> Self {
+        let half_image_s = 0.5 * arc.exposed.duration_s();
+        let mut term = |sigma_rad: f64| sigma_rad * Vector3::from_fn(|_, _| random.normal());
+        let constant_rad = term(sizes.constant_sigma_rad);
+        let linear_rad = term(sizes.linear_sigma_rad);
+        let quadratic_rad = term(sizes.quadratic_sigma_rad);
+        Self {
+            middle_et_s: arc.exposed.start.plus(half_image_s).seconds(),
+            half_image_s,
+            constant_rad,
+            linear_rad,
+            quadratic_rad,
+            jitter: sinusoids(&sizes.jitter, random),
+        }
+    }
+
+    /// Turn at `et` without jitter, radians about the axes of the bus.
+    fn steady_at(&self, et: Et) -> Vector3<f64> {
+        let late_s = et.since(Et::from_seconds(self.middle_et_s));
+        let x = (late_s / self.half_image_s).clamp(-POLYNOMIAL_REACH, POLYNOMIAL_REACH);
+        self.constant_rad + x * (self.linear_rad + x * self.quadratic_rad)
+    }
+
+    /// Turn at `et`, radians about the axes of the bus.
+    fn at(&self, et: Et) -> Vector3<f64> {
+        let late_s = et.since(Et::from_seconds(self.middle_et_s));
+        let mut turn_rad = self.steady_at(et);
+        for sinusoid in &self.jitter {
+            let angle_rad = std::f64::consts::TAU * late_s / sinusoid.period_s + sinusoid.phase_rad;
+            turn_rad[sinusoid.axis] += sinusoid.amplitude_rad * angle_rad.sin();
+        }
+        turn_rad
+    }
+}
+
+fn sinusoids(sizes: &Jitter, random: &mut Random) -> Vec<Sinusoid> {
+    let axes = (0..sizes.sinusoids).flat_map(|_| [0, 1]);
+    axes.map(|axis| Sinusoid {
+        axis,
+        amplitude_rad: random.between_log(sizes.amplitude_rad[0], sizes.amplitude_rad[1]),
+        period_s: random.between_log(sizes.period_s[0], sizes.period_s[1]),
+        phase_rad: random.between(0.0, std::f64::consts::TAU),
+    })
+    .collect()
+}
+
+impl DayErrors {
+    /// Draws the errors of the day of `arc`.
+    pub(super) fn draw(errors: &SceneErrors, arc: &Arc, seed: u64) -> Self {
+        let id = arc.image.id;
+        let stream = |of: &str| Random::new(seed, &format!("{of} {id}"));
+        let (time_bias_lines, attitude_clock_s) = match errors.misregistration {
+            Misregistration::Published => (arc.image.time_bias_lines, 0.0),
+            Misregistration::LineTimes { sigma_lines } => {
+                (sigma_lines * stream("line times").normal(), 0.0)
+            }
+            Misregistration::AttitudeClock { sigma_s } => {
+                (0.0, sigma_s * Random::new(seed, "attitude clock").normal())
+            }
+        };
+        let normal = |random: &mut Random| Vector3::from_fn(|_axis, _column| random.normal());
+        let none = Vector3::zeros();
+        let (bus_position_m, camera_position_m) = match errors.position {
+            PositionErrors::Camera { sigma_m } => (none, sigma_m * normal(&mut stream("camera"))),
+            PositionErrors::Bus {
+                sigma_radial_along_cross_m,
+            } => {
+                let sigma_m = Vector3::from(sigma_radial_along_cross_m);
+                let off_m = sigma_m.component_mul(&normal(&mut stream("orbit")));
+                (orbit_axes(arc) * off_m, none)
+            }
+        };
+        let sizes = &errors.attitude;
+        let is_turned = sizes.constant_sigma_rad > 0.0 || sizes.jitter.sinusoids > 0;
+        let mut laser = stream("profile");
+        let [east_m, north_m] = [0, 1].map(|_| errors.altimeter.plan_sigma_m * laser.normal());
+        let radial_m = errors.altimeter.radial_sigma_m * laser.normal();
+        Self {
+            time_bias_lines,
+            attitude_clock_s,
+            bus_position_m,
+            camera_position_m,
+            attitude: is_turned.then(|| AttitudeError::draw(sizes, arc, &mut stream("attitude"))),
+            profile_shift: ProfileShift::near(
+                &arc.image.site.direction(),
+                [east_m, north_m, radial_m],
+            ),
+        }
+    }
+
+    /// Whether the bus shakes.
+    pub(super) fn has_jitter(&self) -> bool {
+        let jitter = self.attitude.as_ref().map(|attitude| &attitude.jitter);
+        jitter.is_some_and(|sinusoids| !sinusoids.is_empty())
+    }
+}
+
+/// Radial, along-track and cross-track axes of the orbit at the middle of the image, in IAU 2000.
+fn orbit_axes(arc: &Arc) -> Matrix3<f64> {
+    let middle = arc.exposed.start.plus(0.5 * arc.exposed.duration_s());
+    let state = arc.orbit.state(middle);
+    mars_matrix(&MARS_IAU2000, middle) * radial_along_cross(&state.position_m, &state.velocity_m_s)
+}
+
+/// The day of an image as it was flown. The kernels tell the arc, the truth is the arc with the errors.
+#[derive(Debug)]
+pub(super) struct Flown {
+    /// What the kernels tell.
+    pub arc: Arc,
+    /// How the truth differs.
+    pub errors: DayErrors,
+}
+
+impl Flown {
+    /// True place of the bus, IAU 2000, metres.
+    pub(super) fn bus_position_m(&self, et: Et) -> Vector3<f64> {
+        mars_matrix(&MARS_IAU2000, et) * self.arc.orbit.state(et).position_m
+            + self.errors.bus_position_m
+    }
+
+    /// True matrix from J2000 to the bus.
+    pub(super) fn j2000_to_bus(&self, et: Et) -> Matrix3<f64> {
+        self.turned_by(AttitudeError::at, et)
+    }
+
+    /// The matrix that the C-kernel has for `et`, turned by what `turn` says of the attitude's error.
+    fn turned_by(&self, turn: impl Fn(&AttitudeError, Et) -> Vector3<f64>, et: Et) -> Matrix3<f64> {
+        let read = et.plus(self.errors.attitude_clock_s);
+        let told = self.arc.attitude.j2000_to_bus(read);
+        match &self.errors.attitude {
+            None => told,
+            Some(error) => matrix_of_rotation_vector(&turn(error, et)) * told,
+        }
+    }
+
+    /// True matrix from the narrow-angle camera to Mars (IAU 2000).
+    pub(super) fn camera_to_mars(&self, et: Et) -> Matrix3<f64> {
+        let j2000_to_camera = bus_to_camera(usual_instrument()) * self.j2000_to_bus(et);
+        mars_matrix(&MARS_IAU2000, et) * j2000_to_camera.transpose()
+    }
+}
+
+impl Flight for Flown {
+    fn beam(&self, et: Et) -> Result<Beam> {
+        Ok(Beam {
+            spacecraft_m: self.arc.orbit.state(et).position_m,
+            position_error_m: self.errors.bus_position_m,
+            direction: self.j2000_to_bus(et).row(2).transpose(),
+            steady_direction: self
+                .turned_by(AttitudeError::steady_at, et)
+                .row(2)
+                .transpose(),
+        })
+    }
+}

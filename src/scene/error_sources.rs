@@ -1,0 +1,223 @@
+//! What is wrong with the data of a mission, and how rough its ground is: kinds and sizes of errors.
+
+use serde::Serialize;
+
+/// Errors of an invented mission. What is drawn from them is in `truth.json`.
+///
+/// All are normally distributed about 0 with the given standard deviation, unless a field says otherwise.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct SceneErrors {
+    /// Why the two images of a site do not meet along the track.
+    pub misregistration: Misregistration,
+    /// Errors of the place, against the orbit `gsfc`.
+    pub position: PositionErrors,
+    /// Errors of the attitude of the bus, hence of camera and laser alike, against the C-kernel.
+    pub attitude: AttitudeErrors,
+    /// Errors of the laser altimeter and of its products.
+    pub altimeter: AltimeterErrors,
+    /// The ground around the sites.
+    pub relief: Relief,
+    /// Noise of the measurements of tie points, lines and samples.
+    pub tie_noise_px: f64,
+}
+
+/// Why images do not meet along the track.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Misregistration {
+    /// Lines were exposed later than labels say by the residuals of Shan et al. 2005, Table 5, to half a line and
+    /// with the other sign: the same in every mission.
+    Published,
+    /// Lines of each image were exposed later by a number of lines of its own.
+    LineTimes {
+        /// Standard deviation, lines.
+        sigma_lines: f64,
+    },
+    /// The attitude was read at a time that is off by the same amount in all images. A bus that points at nadir turns
+    /// by 0.05 degrees a second, 0.3 km on the ground; one that is held inertially does not turn.
+    AttitudeClock {
+        /// Standard deviation, seconds.
+        sigma_s: f64,
+    },
+}
+
+/// Whose place is wrong.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum PositionErrors {
+    /// Of the camera alone; the laser is where the orbit says.
+    Camera {
+        /// Standard deviation along each axis of IAU 2000, metres.
+        sigma_m: f64,
+    },
+    /// Of the bus: camera and laser are off together.
+    Bus {
+        /// Standard deviations along radius, track and orbit normal, metres.
+        sigma_radial_along_cross_m: [f64; 3],
+    },
+}
+
+/// Errors of the attitude: rotations about the axes of the bus as `constant + linear x + quadratic x²` with `x` from
+/// −1 to 1 over the image, and jitter on top.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct AttitudeErrors {
+    /// Standard deviation of the constant about each axis, radians.
+    pub constant_sigma_rad: f64,
+    /// Standard deviation of the linear term, radians at the end of the image.
+    pub linear_sigma_rad: f64,
+    /// Standard deviation of the quadratic term, radians at the end of the image.
+    pub quadratic_sigma_rad: f64,
+    /// Jitter about the first two axes, roll and pitch.
+    pub jitter: Jitter,
+}
+
+/// Sinusoids of the attitude; amplitudes and periods are spread evenly in their logarithm.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Jitter {
+    /// Sinusoids about each axis.
+    pub sinusoids: u32,
+    /// Smallest and largest amplitude, radians.
+    pub amplitude_rad: [f64; 2],
+    /// Shortest and longest period, seconds.
+    pub period_s: [f64; 2],
+}
+
+/// Errors of the laser altimeter and of its products.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct AltimeterErrors {
+    /// Standard deviation of where a profile lies to the east and to the north, metres.
+    pub plan_sigma_m: f64,
+    /// Standard deviation of how high a profile lies, metres.
+    pub radial_sigma_m: f64,
+    /// Standard deviation of a single range, metres.
+    pub shot_noise_m: f64,
+    /// Ranges are multiples of this, metres; 0 where they are exact.
+    pub range_step_m: f64,
+    /// Diameter of the spot whose mean range is measured, metres.
+    pub spot_m: f64,
+}
+
+/// The ground around the sites.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Relief {
+    /// Hills of 4 km and more, and craters of 1 to 4 km.
+    Gentle,
+    /// Self-affine roughness down to 25 m, and craters from 100 m.
+    SelfAffine(Roughness),
+}
+
+/// How rough self-affine ground is: heights `d` apart differ by `ν (d / 300 m)^0.7` (root mean square).
+///
+/// The sizes span what MOLA has seen of plains and of highlands, the exponent is the usual one of Mars at these
+/// lengths: both are choices, not the relief of the real sites.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Roughness {
+    /// ν = 5 m.
+    Plains,
+    /// ν = 10 m.
+    Medium,
+    /// ν = 25 m.
+    Rough,
+}
+
+impl Roughness {
+    /// ν, metres: how much heights 300 m apart differ (root mean square).
+    #[must_use]
+    pub const fn height_difference_at_300_m(self) -> f64 {
+        match self {
+            Self::Plains => 5.0,
+            Self::Medium => 10.0,
+            Self::Rough => 25.0,
+        }
+    }
+}
+
+impl SceneErrors {
+    /// Those of the worked example: exact shots over gentle ground, attitudes without error, line times that reproduce
+    /// Shan et al. 2005, Table 5, and cameras 20 m off their place along each axis.
+    #[must_use]
+    pub const fn demo() -> Self {
+        Self {
+            misregistration: Misregistration::Published,
+            position: PositionErrors::Camera { sigma_m: 20.0 },
+            attitude: AttitudeErrors {
+                constant_sigma_rad: 0.0,
+                linear_sigma_rad: 0.0,
+                quadratic_sigma_rad: 0.0,
+                jitter: Jitter {
+                    sinusoids: 0,
+                    amplitude_rad: [0.0; 2],
+                    period_s: [0.0; 2],
+                },
+            },
+            altimeter: AltimeterErrors {
+                plan_sigma_m: 0.0,
+                radial_sigma_m: 0.0,
+                shot_noise_m: 0.0,
+                range_step_m: 0.0,
+                spot_m: 0.0,
+            },
+            relief: Relief::Gentle,
+            tie_noise_px: 1.0,
+        }
+    }
+
+    /// Those that the real mission may have had, drawn anew for every seed: a fair test of stated uncertainties.
+    ///
+    /// # Source
+    /// * line times 30 lines: half of the 225 to 271 m by which the images of a pair disagree (Shan et al. 2005, Table 5);
+    /// * orbit 5.2, 24.8 and 8.6 m along radius, track and normal: differences of overlapping arcs, Lemoine et al.,
+    ///   AAS 99-328;
+    /// * attitude 0.4 mrad: two images of a pair that disagree by 231 to 271 m; between the 0.26 mrad of 100 m, which
+    ///   the crossovers of MOLA leave in the horizontal, and the 0.5 mrad of the 200 m that Yoon & Shan 2004 take for
+    ///   images off nadir. Drift and bend 1e-5 rad, 2 arcseconds: residuals of C-kernels to a parabola (Shan et
+    ///   al. 2005, Table 4) reach 5;
+    /// * jitter of 1 to 5 µrad and 0.1 to 2 s: a choice, below those 5 arcseconds (24 µrad);
+    /// * MOLA profiles 70 m east and north, 1 m in radius: 100 m in the horizontal and 1 m radially (Neumann et al. 2001, as
+    ///   Shan et al. 2005 cite them);
+    /// * shot noise 1 m: roughness within a spot on plains (Garvin et al. 1999; Neumann et al. 2003), which also
+    ///   give the 75 m of the spot; ranges in steps of 0.375 m, 2.5 ns of the clock (Shan et al. 2005, Table 1).
+    #[must_use]
+    pub const fn realistic(roughness: Roughness) -> Self {
+        Self {
+            misregistration: Misregistration::LineTimes { sigma_lines: 30.0 },
+            position: PositionErrors::Bus {
+                sigma_radial_along_cross_m: [5.2, 24.8, 8.6],
+            },
+            attitude: AttitudeErrors {
+                constant_sigma_rad: 4e-4,
+                linear_sigma_rad: 1e-5,
+                quadratic_sigma_rad: 1e-5,
+                jitter: Jitter {
+                    sinusoids: 3,
+                    amplitude_rad: [1e-6, 5e-6],
+                    period_s: [0.1, 2.0],
+                },
+            },
+            altimeter: AltimeterErrors {
+                plan_sigma_m: 70.0,
+                radial_sigma_m: 1.0,
+                shot_noise_m: 1.0,
+                range_step_m: 0.375,
+                spot_m: 75.0,
+            },
+            relief: Relief::SelfAffine(roughness),
+            tie_noise_px: 1.0,
+        }
+    }
+
+    /// These errors, but the disagreement of the images comes from one offset of the attitude's clock.
+    ///
+    /// # Source
+    /// 0.73 s: what nadir-pointing buses turn by in the 225 to 271 m of Shan et al. 2005, Table 5, where the image off
+    /// nadir is the right one. An inference from that table, which does not say it.
+    #[must_use]
+    pub const fn with_attitude_clock(self) -> Self {
+        Self {
+            misregistration: Misregistration::AttitudeClock { sigma_s: 0.73 },
+            ..self
+        }
+    }
+}
