@@ -278,7 +278,7 @@ fn a_change_of_any_set_is_seen_and_may_change_the_choice() {
     assert!(
         manifest(&case)["notes"]
             .to_string()
-            .contains("as close: ipng")
+            .contains("equally close: ipng")
     );
     // A frame of an ephemeris may stand in any text kernel: the sets are compared again, and the choice stands.
     case.replace("kernels/ipng.tm", "'moc.ti'", "'moc2.ti'");
