@@ -42,6 +42,7 @@ fn schemas_are_up_to_date() {
     let mut schemas = areograph::products::schemas();
     schemas.push(areograph::store::manifest::schema());
     schemas.push(areograph::difference::schema());
+    schemas.push(areograph::flow::comparison_schema());
     for DocumentSchema { name, schema } in schemas {
         let text = serde_json::to_string_pretty(&schema).unwrap() + "\n";
         is_up_to_date(&format!("config/schema/{name}.schema.json"), &text);

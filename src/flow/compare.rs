@@ -1,5 +1,6 @@
 //! Rival sets of kernels, asked for the same instants one session after the other.
 
+mod answer;
 mod clocks;
 mod epochs;
 mod uncovered;
@@ -13,6 +14,7 @@ use crate::{
     time::{Et, Interval, Intervals, PointingBias},
 };
 
+pub use answer::{Answer, comparison_schema};
 pub use epochs::EPOCHS_MAX;
 pub use uncovered::Uncovered;
 

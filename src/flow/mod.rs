@@ -23,7 +23,8 @@ mod sites;
 pub use check::{Checked, check_site, required_by_site, rival_sets};
 pub use choice::{ChooseKernels, KernelChoice, RivalKernelSets};
 pub use compare::{
-    Compared, EPOCHS_MAX, Request, RivalSet, Uncovered, compare_kernels, require_different,
+    Answer, Compared, EPOCHS_MAX, Request, RivalSet, Uncovered, compare_kernels, comparison_schema,
+    require_different,
 };
 pub use driver::StageReason;
 pub use out::{OutError, check_out};

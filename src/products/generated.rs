@@ -65,7 +65,6 @@ pub fn documentation() -> String {
 fn schema_link(product: &Declaration) -> String {
     let name = match product.content {
         Content::Document(schema) => schema().name,
-        Content::Described(name) => name,
         Content::Table(_) | Content::Foreign => return String::new(),
     };
     format!("[{name}](../config/schema/{name}.schema.json)")

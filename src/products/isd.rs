@@ -18,15 +18,15 @@
 //!   places, which `usgscsm` takes for radial coefficients per mm² and mm⁴: wrong by hundreds of pixels at the
 //!   edges. Other cameras have the three coefficients that fit the image's samples best, and what they leave.
 
-use std::path::Path;
+mod document;
+
+use std::{collections::BTreeMap, path::Path};
 
 use nalgebra::Vector3;
-use serde::Serialize;
-use serde_json::{Value, json};
 
 use super::{
     files::write_json,
-    kernel_report::{names_by_type, qualities},
+    kernel_report::kernels_by_type,
     product::{Content, Context, Declaration, Program, Role, Use, Write},
     site::{ImageProducts, SiteProducts},
 };
@@ -42,76 +42,15 @@ use crate::{
     },
     units::METRES_PER_KM,
 };
+use document::{
+    DetectorCentre, FocalLength, InstrumentPointing, Interpolation, Isd, KernelName, Keyword,
+    OpticalDistortion, Positions, Provenance, Radial, Radii, ReferenceHeight, Rotation, schema,
+};
 
 /// J2000 in NAIF's numbering of inertial frames.
 const NAIF_J2000: i32 = 1;
 /// Height that camera models try when they look for the ground, metres above and below the ellipsoid (ALE's).
 const REFERENCE_HEIGHT_M: i32 = 1_000;
-
-#[derive(Serialize)]
-#[allow(clippy::struct_field_names, reason = "the keys that usgscsm reads")]
-struct Isd {
-    isis_camera_version: u32,
-    image_identifier: String,
-    image_lines: u32,
-    image_samples: u32,
-    name_platform: &'static str,
-    name_sensor: String,
-    reference_height: Value,
-    name_model: &'static str,
-    interpolation_method: &'static str,
-    line_scan_rate: [[f64; 3]; 1],
-    starting_ephemeris_time: f64,
-    center_ephemeris_time: f64,
-    radii: Value,
-    body_rotation: Rotation,
-    instrument_pointing: Rotation,
-    naif_keywords: Value,
-    detector_sample_summing: u32,
-    detector_line_summing: u32,
-    focal_length_model: Value,
-    detector_center: Value,
-    focal2pixel_lines: [f64; 3],
-    focal2pixel_samples: [f64; 3],
-    optical_distortion: Value,
-    starting_detector_line: u32,
-    starting_detector_sample: u32,
-    instrument_position: Positions,
-    sun_position: Positions,
-    kernels: Value,
-    areograph: Value,
-}
-
-/// Quaternions (w, x, y, z) from J2000.
-#[derive(Serialize)]
-#[allow(clippy::struct_field_names, reason = "the keys that usgscsm reads")]
-struct Rotation {
-    time_dependent_frames: [i32; 2],
-    ck_table_start_time: f64,
-    ck_table_end_time: f64,
-    ck_table_original_size: usize,
-    ephemeris_times: Vec<f64>,
-    quaternions: Vec<[f64; 4]>,
-    angular_velocities: Vec<[f64; 3]>,
-    reference_frame: i32,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    constant_frames: Option<[i32; 2]>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    constant_rotation: Option<Vec<f64>>,
-}
-
-/// Kilometres and kilometres per second from the centre of Mars, J2000.
-#[derive(Serialize)]
-#[allow(clippy::struct_field_names, reason = "the keys that usgscsm reads")]
-struct Positions {
-    spk_table_start_time: f64,
-    spk_table_end_time: f64,
-    spk_table_original_size: usize,
-    ephemeris_times: Vec<f64>,
-    positions: Vec<[f64; 3]>,
-    velocities: Vec<[f64; 3]>,
-    reference_frame: i32,
-}
 
 pub(super) static ISD: Declaration = Declaration {
     path: "images/<image>/isd.json",
@@ -119,7 +58,7 @@ pub(super) static ISD: Declaration = Declaration {
     readers: "usgscsm, Ames Stereo Pipeline, ISIS",
     rows: "table nodes",
     role: Role::Data,
-    content: Content::Described("isd"),
+    content: Content::Document(schema),
     write: Write::Image(write),
     uses: &[Use {
         program: Program::CameraModel,
@@ -135,7 +74,7 @@ pub(super) static ADJUSTED: Declaration = Declaration {
     readers: "usgscsm, Ames Stereo Pipeline, ISIS",
     rows: "table nodes",
     role: Role::Data,
-    content: Content::Described("isd"),
+    content: Content::Document(schema),
     write: Write::AdjustedImage(|path, of, image| {
         let orientation = Orientation {
             tables: geometric_tables(image.orientation)?,
@@ -155,7 +94,7 @@ fn write(path: &Path, of: &Context, image: &ImageProducts) -> Result<u64> {
     Ok(image.orientation.tables.et_s.len() as u64)
 }
 
-fn isd(site: &SiteProducts, image: &ImageProducts) -> Isd {
+fn isd<'a>(site: &SiteProducts<'a>, image: &ImageProducts<'a>) -> Isd<'a> {
     let times = image.times;
     let tables = &image.orientation.tables;
     let start_s = times.start.seconds();
@@ -170,43 +109,50 @@ fn isd(site: &SiteProducts, image: &ImageProducts) -> Isd {
     let pixels_per_mm = optics.pixel_pitch_mm.recip();
     Isd {
         isis_camera_version: 1,
-        image_identifier: times.id.clone(),
+        image_identifier: &times.id,
         image_lines: times.lines_delivered,
         image_samples: times.samples,
         name_platform: "MARS GLOBAL SURVEYOR",
-        name_sensor: naif.frame.clone(),
-        reference_height: json!({
-            "maxheight": REFERENCE_HEIGHT_M, "minheight": -REFERENCE_HEIGHT_M, "unit": "m",
-        }),
+        name_sensor: &naif.frame,
+        reference_height: ReferenceHeight {
+            maxheight: REFERENCE_HEIGHT_M,
+            minheight: -REFERENCE_HEIGHT_M,
+            unit: "m",
+        },
         name_model: "USGS_ASTRO_LINE_SCANNER_SENSOR_MODEL",
         interpolation_method: "lagrange",
         line_scan_rate: [[0.5, -half_s, times.line_period_s]],
         starting_ephemeris_time: start_s,
         center_ephemeris_time: start_s + half_s,
-        radii: json!({
-            "semimajor": MARS_IAU2000.equatorial_radius_m / METRES_PER_KM,
-            "semiminor": MARS_IAU2000.polar_radius_m / METRES_PER_KM,
-            "unit": "km",
-        }),
+        radii: Radii {
+            semimajor: MARS_IAU2000.equatorial_radius_m / METRES_PER_KM,
+            semiminor: MARS_IAU2000.polar_radius_m / METRES_PER_KM,
+            unit: "km",
+        },
         body_rotation: body_rotation(tables),
         instrument_pointing: instrument_pointing(tables, naif),
         naif_keywords: naif_keywords(site, &times.instrument),
         detector_sample_summing: times.crosstrack_summing,
         detector_line_summing: times.downtrack_summing,
-        focal_length_model: json!({ "focal_length": optics.focal_length_mm }),
-        detector_center: json!({
-            "line": 0.0 - detector.along_track_px, "sample": detector.boresight_px,
-        }),
+        focal_length_model: FocalLength {
+            focal_length: optics.focal_length_mm,
+        },
+        detector_center: DetectorCentre {
+            line: 0.0 - detector.along_track_px,
+            sample: detector.boresight_px,
+        },
         focal2pixel_lines: [0.0, pixels_per_mm, 0.0],
         focal2pixel_samples: [0.0, 0.0, detector.samples_along.sign() * pixels_per_mm],
-        optical_distortion: json!({
-            "radial": { "coefficients": times.detector().radial_fit(&times.instrument).coefficients }
-        }),
+        optical_distortion: OpticalDistortion {
+            radial: Radial {
+                coefficients: times.detector().radial_fit(&times.instrument).coefficients,
+            },
+        },
         starting_detector_line: 0,
         starting_detector_sample: times.first_detector,
         instrument_position: positions(&tables.et_s, &tables.position_m, &tables.velocity_m_s),
         sun_position: sun_position(tables),
-        kernels: kernels(site),
+        kernels: kernels_by_type(site),
         areograph: provenance(site, image),
     }
 }
@@ -227,8 +173,6 @@ fn rotation<To: Frame>(
         quaternions: continuous_quaternions(rotations.iter().map(frames::Rotation::matrix)),
         angular_velocities: rates_rad_s.iter().map(|rate| (*rate).into()).collect(),
         reference_frame: NAIF_J2000,
-        constant_frames: None,
-        constant_rotation: None,
     }
 }
 
@@ -241,23 +185,17 @@ fn body_rotation(tables: &CameraTables) -> Rotation {
     )
 }
 
-fn instrument_pointing(tables: &CameraTables, naif: &NaifNames) -> Rotation {
-    Rotation {
-        constant_frames: Some([naif.instrument, naif.bus]),
-        constant_rotation: Some(
-            tables
-                .bus_to_camera
-                .matrix()
-                .transpose()
-                .as_slice()
-                .to_vec(),
-        ),
-        ..rotation(
+fn instrument_pointing(tables: &CameraTables, naif: &NaifNames) -> InstrumentPointing {
+    let camera_to_bus = tables.bus_to_camera.matrix().transpose();
+    InstrumentPointing {
+        bus: rotation(
             tables,
             naif.bus,
             &tables.inertial_to_bus,
             &tables.bus_angular_velocity_rad_s,
-        )
+        ),
+        constant_frames: [naif.instrument, naif.bus],
+        constant_rotation: camera_to_bus.as_slice().to_vec(),
     }
 }
 
@@ -302,44 +240,37 @@ fn ends(et_s: &[f64]) -> (f64, f64) {
 }
 
 /// The keywords that the numbers above come from, under NAIF's names.
-fn naif_keywords(site: &SiteProducts, instrument: &Instrument) -> Value {
+fn naif_keywords(site: &SiteProducts, instrument: &Instrument) -> BTreeMap<String, Keyword> {
     let mars = &MARS_IAU2000;
     let [a_km, c_km] =
         [mars.equatorial_radius_m, mars.polar_radius_m].map(|radius_m| radius_m / METRES_PER_KM);
-    let mut keywords = json!({
-        "BODY_CODE": NAIF_MARS,
-        "BODY_FRAME_CODE": NAIF_IAU_MARS,
-        "BODY499_RADII": [a_km, a_km, c_km],
-        "BODY499_POLE_RA": [mars.pole_ra_deg, mars.pole_ra_deg_per_century, 0.0],
-        "BODY499_POLE_DEC": [mars.pole_dec_deg, mars.pole_dec_deg_per_century, 0.0],
-        "BODY499_PM": [mars.meridian_deg, mars.meridian_deg_per_day, 0.0],
-    });
-    for (key, value) in [
-        ("FOCAL_LENGTH", json!(instrument.optics.focal_length_mm)),
-        ("PIXEL_PITCH", json!(instrument.optics.pixel_pitch_mm)),
-        ("PIXEL_SAMPLES", json!(instrument.detector.pixels)),
-        (
-            "CK_TIME_BIAS",
-            json!(site.config.pointing.ck_bias.seconds()),
-        ),
-        ("SPK_TIME_BIAS", json!(0.0)),
-    ] {
-        keywords[format!("INS{}_{key}", instrument.naif.instrument)] = value;
-    }
-    keywords
-}
-
-/// Kernel names by type, in load order, and qualities, as ALE lists them.
-fn kernels(site: &SiteProducts) -> Value {
-    let mut kernels = json!(names_by_type(site));
-    for (key, quality) in qualities(site) {
-        kernels[key] = json!(quality);
-    }
-    kernels
+    let ra = [mars.pole_ra_deg, mars.pole_ra_deg_per_century, 0.0];
+    let dec = [mars.pole_dec_deg, mars.pole_dec_deg_per_century, 0.0];
+    let meridian = [mars.meridian_deg, mars.meridian_deg_per_day, 0.0];
+    let of_mars = [
+        ("BODY_CODE", Keyword::Code(NAIF_MARS)),
+        ("BODY_FRAME_CODE", Keyword::Code(NAIF_IAU_MARS)),
+        ("BODY499_RADII", Keyword::Numbers([a_km, a_km, c_km])),
+        ("BODY499_POLE_RA", Keyword::Numbers(ra)),
+        ("BODY499_POLE_DEC", Keyword::Numbers(dec)),
+        ("BODY499_PM", Keyword::Numbers(meridian)),
+    ];
+    let (optics, pointing) = (&instrument.optics, &site.config.pointing);
+    let of_camera = [
+        ("FOCAL_LENGTH", Keyword::Number(optics.focal_length_mm)),
+        ("PIXEL_PITCH", Keyword::Number(optics.pixel_pitch_mm)),
+        ("PIXEL_SAMPLES", Keyword::Pixels(instrument.detector.pixels)),
+        ("CK_TIME_BIAS", Keyword::Number(pointing.ck_bias.seconds())),
+        ("SPK_TIME_BIAS", Keyword::Number(0.0)),
+    ];
+    let id = instrument.naif.instrument;
+    let of_camera = of_camera.map(|(key, value)| (format!("INS{id}_{key}"), value));
+    let of_mars = of_mars.map(|(key, value)| (key.to_owned(), value));
+    of_mars.into_iter().chain(of_camera).collect()
 }
 
 /// What the reader of this file should know; camera models ignore it.
-fn provenance(site: &SiteProducts, image: &ImageProducts) -> Value {
+fn provenance<'a>(site: &SiteProducts<'a>, image: &ImageProducts<'a>) -> Provenance<'a> {
     let times = image.times;
     let interpolation = &image.orientation.tables.interpolation;
     let detector = times.detector();
@@ -355,39 +286,44 @@ fn provenance(site: &SiteProducts, image: &ImageProducts) -> Value {
     };
     // A list, as two kernels may have one name.
     let kernels = site.kernels.iter();
-    let kernels = kernels.map(|kernel| json!({"name": kernel.name, "blake3": kernel.blake3}));
-    json!({
-        "version": env!("CARGO_PKG_VERSION"),
-        "site": site.config.site,
-        "configuration_blake3": site.config.blake3,
-        "kernels": kernels.collect::<Vec<_>>(),
-        "line_period_s": times.line_period_s,
-        "detector_line_exposure_s": times.exposure_s,
-        "lines_header": times.lines_header,
-        "utc_start": times.utc_start,
-        "start_from": times.start_from,
-        "interpolation": {
-            "method": "Lagrange over uniform nodes, eighth order inside, lower towards the ends, of the positions \
-                       and the camera's quaternions turned to Mars, as usgscsm does",
-            "error_max_px": interpolation.error_max_px,
-            "limit_px": InterpolationCheck::LIMIT_PX,
-            "within_limit": interpolation.keeps_limit(),
-            "epochs_compared_with_kernels": interpolation.epochs,
+    let kernels = kernels.map(|kernel| KernelName {
+        blake3: &kernel.blake3,
+        name: &kernel.name,
+    });
+    Provenance {
+        configuration_blake3: &site.config.blake3,
+        detector_line_exposure_s: times.exposure_s,
+        interpolation: Interpolation {
+            epochs_compared_with_kernels: interpolation.epochs,
+            error_max_px: interpolation.error_max_px,
+            limit_px: InterpolationCheck::LIMIT_PX,
+            method: "Lagrange over uniform nodes, eighth order inside, lower towards the ends, of the positions \
+                     and the camera's quaternions turned to Mars, as usgscsm does",
+            within_limit: interpolation.keeps_limit(),
         },
-        "notes": [
-            "line_scan_rate: seconds per image line (summing included), from the top edge of the first line",
+        kernels: kernels.collect(),
+        line_period_s: times.line_period_s,
+        lines_header: times.lines_header,
+        notes: vec![
+            "line_scan_rate: seconds per image line (summing included), from the top edge of the first line"
+                .to_owned(),
             format!(
                 "detector coordinates count from the detector's edge: centre at sample {}, starting_detector_sample \
                  from 0, so that the centre of the first sample is 0.5 * summing + starting_detector_sample",
                 times.instrument.detector.boresight_px,
             ),
             distortion,
-            "instrument_position: light time and stellar aberration corrected (LT+S), as in ISIS and ALE",
+            "instrument_position: light time and stellar aberration corrected (LT+S), as in ISIS and ALE"
+                .to_owned(),
             format!(
                 "instrument_pointing: attitude of each epoch read from the C-kernel at epoch + INS{}_CK_TIME_BIAS",
                 times.instrument.naif.instrument,
             ),
-            "image_lines: delivered lines; lines_header were exposed",
+            "image_lines: delivered lines; lines_header were exposed".to_owned(),
         ],
-    })
+        site: &site.config.site,
+        start_from: times.start_from,
+        utc_start: &times.utc_start,
+        version: env!("CARGO_PKG_VERSION"),
+    }
 }

@@ -31,7 +31,7 @@ pub(super) static KERNELS: Declaration = Declaration {
 
 /// Kernel names by SpiceQL's types, in load order: `ck`, `spk`, `tspk` (ephemerides of other bodies), `pck`,
 /// `fk`, `ik`, `iak` (ISIS addenda), `lsk`, `sclk`.
-pub(super) fn names_by_type<'a>(site: &SiteProducts<'a>) -> BTreeMap<String, Vec<&'a str>> {
+fn names_by_type<'a>(site: &SiteProducts<'a>) -> BTreeMap<String, Vec<&'a str>> {
     let mut names: BTreeMap<String, Vec<&str>> = BTreeMap::new();
     for kernel in site.kernels {
         names.entry(type_of(kernel)).or_default().push(&kernel.name);
@@ -54,7 +54,7 @@ fn type_of(kernel: &KernelLine) -> String {
 
 /// The least of the qualities of the spacecraft's kernels of one type, in SpiceQL's words: commanded attitude
 /// is `predicted`, archived kernels are `reconstructed`, names that tell nothing give `noquality`.
-pub(super) fn qualities(site: &SiteProducts) -> BTreeMap<&'static str, &'static str> {
+fn qualities(site: &SiteProducts) -> BTreeMap<&'static str, &'static str> {
     let quality = |kernel: &&KernelLine| {
         let name = kernel.name.to_lowercase();
         if quality_of(Path::new(&name)) == CkQuality::Nominal {
@@ -91,6 +91,13 @@ pub(super) fn qualities(site: &SiteProducts) -> BTreeMap<&'static str, &'static 
 )]
 struct Report<'a> {
     areograph: Extension<'a>,
+    #[serde(flatten)]
+    kernels: KernelsByType<'a>,
+}
+
+/// Names of the kernels by their types, and qualities, as SpiceQL and ALE list them.
+#[derive(Serialize, JsonSchema)]
+pub(super) struct KernelsByType<'a> {
     #[serde(skip_serializing_if = "Option::is_none")]
     ck: Option<Names<'a>>,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -123,7 +130,9 @@ const QUALITIES: [&str; 4] = ["smithed", "reconstructed", "predicted", "noqualit
 /// File names of the kernels of one type, in load order.
 #[derive(Serialize, JsonSchema)]
 #[serde(transparent)]
-struct Names<'a>(#[schemars(length(min = 1), inner(regex(pattern = "^[^/]+$")))] Vec<&'a str>);
+pub(super) struct Names<'a>(
+    #[schemars(length(min = 1), inner(regex(pattern = "^[^/]+$")))] Vec<&'a str>,
+);
 
 #[derive(Serialize, JsonSchema)]
 struct Extension<'a> {
@@ -167,11 +176,18 @@ fn report<'a>(site: &SiteProducts<'a>) -> Report<'a> {
         wanted_attitudes_et_s: ends(&site.required.attitudes),
         kernels: site.kernels.iter().map(entry).collect(),
     };
+    Report {
+        areograph,
+        kernels: kernels_by_type(site),
+    }
+}
+
+/// Names of the site's kernels in load order.
+pub(super) fn kernels_by_type<'a>(site: &SiteProducts<'a>) -> KernelsByType<'a> {
     let mut names = names_by_type(site);
     let qualities = qualities(site);
     let mut of_type = |kind: &str| names.remove(kind).map(Names);
-    Report {
-        areograph,
+    KernelsByType {
         ck: of_type("ck"),
         fk: of_type("fk"),
         iak: of_type("iak"),

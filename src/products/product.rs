@@ -64,8 +64,6 @@ pub(super) enum Content {
     Table(fn() -> Vec<Meaning>),
     /// A document of this schema.
     Document(fn() -> DocumentSchema),
-    /// A document of others' making, with this schema of ours in `config/schema`.
-    Described(&'static str),
     /// A format of others.
     Foreign,
 }

@@ -70,6 +70,16 @@ pub struct AttitudeComparison {
     pub ground_m: Vec<Vec<f64>>,
 }
 
+impl AttitudeComparison {
+    /// Root mean square and largest distance on the ground, metres; nothing when no boresight meets Mars.
+    #[must_use]
+    pub fn ground_size_m(&self, set: usize) -> Option<[f64; 2]> {
+        let ground_m = &self.ground_m[set];
+        let max_m = ground_m.iter().copied().reduce(f64::max)?;
+        Some([root_mean_square(ground_m), max_m])
+    }
+}
+
 /// Attitude of the bus at an exposure, and where the spacecraft is then.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct AttitudeSample {

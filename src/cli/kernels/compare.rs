@@ -3,17 +3,16 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use serde_json::{Value, json};
+use serde_json::json;
 
 use super::super::{load_sites, output};
 use crate::{
     config::usual_instrument,
     error::{Cause, Error, Kind},
     flow::{
-        Compared, Request, RivalSet, compare_kernels, require_different, required_by_site,
+        Answer, Compared, Request, RivalSet, compare_kernels, require_different, required_by_site,
         rival_sets,
     },
-    geom::{polynomial::root_mean_square, statistics::Summary},
     report::{KernelComparison, comparison_page},
     spice::{KernelSet, RequiredCoverage, Session},
     stages::compare_kernels::{AttitudeComparison, Comparison, Size},
@@ -111,7 +110,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Error> {
         path.write(&page(&compared)?)?;
     }
     if arguments.json {
-        output::json(&answer(&compared));
+        output::json(&json!(Answer::of(&compared)));
     } else {
         print(&compared);
         if let Some(path) = &arguments.page {
@@ -228,7 +227,7 @@ fn print_table(comparison: &Comparison, unit: f64, attitude: Option<&AttitudeCom
         ));
     };
     for (index, deviation) in comparison.deviations.iter().enumerate() {
-        let ground = attitude.and_then(|attitude| ground_size(attitude, index));
+        let ground = attitude.and_then(|attitude| attitude.ground_size_m(index));
         let ground =
             ground.map_or_else(String::new, |[rms, max]| format!("{rms:>12.3}{max:>12.3}"));
         row(&deviation.set, &deviation.size, &ground);
@@ -247,93 +246,4 @@ fn print_table(comparison: &Comparison, unit: f64, attitude: Option<&AttitudeCom
             tied.join(", ")
         ));
     }
-}
-
-/// Root mean square and largest distance on the ground, metres; nothing when no boresight meets Mars.
-fn ground_size(attitude: &AttitudeComparison, set: usize) -> Option<[f64; 2]> {
-    let ground_m = &attitude.ground_m[set];
-    let max_m = ground_m.iter().copied().reduce(f64::max)?;
-    Some([root_mean_square(ground_m), max_m])
-}
-
-fn answer(compared: &Compared) -> Value {
-    let uncovered = compared.uncovered.iter().map(|one| {
-        json!({
-            "set": one.set,
-            "what": one.what,
-            "start_et_s": one.interval.start.seconds(),
-            "stop_et_s": one.interval.stop.seconds(),
-            "start_utc": one.utc[0],
-            "stop_utc": one.utc[1],
-        })
-    });
-    let mut answer = json!({
-        "format": "areograph kernel comparison 1",
-        "rule": "least root mean square distance from the mean of all sets",
-        "orbit": comparison_json(&compared.orbit, 1.0, "m"),
-        "start_utc": compared.utc[0],
-        "stop_utc": compared.utc[1],
-        "left_out": uncovered.collect::<Vec<_>>(),
-        "notes": compared.notes,
-    });
-    if let Some(attitude) = &compared.attitude {
-        let mut turns = comparison_json(&attitude.turns, RADIANS_PER_ARCSECOND, "arcsec");
-        let on_ground = attitude.on_ground.iter().map(|et| et.seconds());
-        turns["ground_epochs_et_s"] = on_ground.collect::<Vec<_>>().into();
-        for (set, ground_m) in attitude.ground_m.iter().enumerate() {
-            let entry = &mut turns["sets"][set];
-            entry["ground_m"] = json!(ground_m);
-            if let Some([rms_m, max_m]) = ground_size(attitude, set) {
-                entry["ground_rms_m"] = rms_m.into();
-                entry["ground_max_m"] = max_m.into();
-            }
-        }
-        answer["attitude"] = turns;
-    }
-    answer
-}
-
-/// A comparison in units of `unit`, whose name ends the keys.
-fn comparison_json(comparison: &Comparison, unit: f64, name: &str) -> Value {
-    let keyed = |key: &str| format!("{key}_{name}");
-    let size = |size: &Size| {
-        let [radial, along, cross] = size.components.map(|summary| summary_json(&summary, unit));
-        json!({
-            keyed("rms"): size.rms / unit,
-            keyed("max"): size.max / unit,
-            keyed("radial"): radial,
-            keyed("along_track"): along,
-            keyed("cross_track"): cross,
-        })
-    };
-    let sets = comparison.deviations.iter().map(|deviation| {
-        let mut entry = size(&deviation.size);
-        let in_unit = |vector: &[f64; 3]| vector.map(|component| component / unit);
-        let series = deviation.radial_along_cross.iter().map(in_unit);
-        entry["set"] = deviation.set.clone().into();
-        entry[keyed("radial_along_cross")] = series.collect::<Vec<_>>().into_iter().collect();
-        entry
-    });
-    let differences = comparison.pairs().map(|(first, second)| {
-        let mut entry = size(&comparison.difference(first, second));
-        entry["set"] = comparison.deviations[second].set.clone().into();
-        entry["minus"] = comparison.deviations[first].set.clone().into();
-        entry
-    });
-    json!({
-        "closest": comparison.closest().set,
-        "equally_close": comparison.tied_sets().collect::<Vec<_>>(),
-        "epochs_et_s": comparison.epochs.iter().map(|et| et.seconds()).collect::<Vec<_>>(),
-        "sets": sets.collect::<Vec<_>>(),
-        "differences": differences.collect::<Vec<_>>(),
-    })
-}
-
-fn summary_json(summary: &Summary, unit: f64) -> Value {
-    json!({
-        "mean": summary.mean / unit,
-        "standard_deviation": summary.standard_deviation / unit,
-        "min": summary.min / unit,
-        "max": summary.max / unit,
-    })
 }
