@@ -33,7 +33,7 @@ pub enum TagSign {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum BiasScope {
-    /// The spacecraft's position in the range check; the default, which is what Shan 2005 did.
+    /// The spacecraft's position in the range check: the default, one of three readings of Shan et al. 2005.
     SpkLookup,
     /// The rotation into IAU 2000 (the one out of the file's datum stays at the tag).
     Rotation,

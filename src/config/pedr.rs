@@ -49,8 +49,8 @@ declare_table! {
         /// assumes nadir pointing, which off nadir can be 100 km wrong. 1 has no published meaning; in files
         /// before 1998-10 the field is undefined: there, list the values found.
         attitude_flags = key(list(whole_from_to(u16::MIN, u16::MAX))).or(vec![0, 1]).map(sorted),
-        /// Largest off-nadir angle of the laser. The default keeps all, because the paper's sites are seen up
-        /// to 18 degrees off nadir. (The MOLA team's grids stop at 1.0 or 1.2.)
+        /// Largest off-nadir angle of the laser. The default keeps all, because images are taken off nadir too: Shan
+        /// et al. 2005, Table 2, has emission angles of up to 22.1 degrees. (The MOLA team's grids stop at 1.0 or 1.2.)
         off_nadir_max_rad as "off_nadir_max_deg" =
             key(above_to(0.0, 90.0)).or(90.0).map(|degrees| degrees * RADIANS_PER_DEGREE),
     }

@@ -41,7 +41,11 @@ declare_table! {
             ("late", TagSign::Late, "true time = tag - bias"),
             ("early", TagSign::Early, "true time = tag + bias"),
         ])).or(TagSign::Late),
-        /// What the corrected time is used for. Shan et al. 2005 used it for the position.
+        /// What the corrected time is used for. Shan et al. 2005 correct the bias in the datum conversion, and look the
+        /// spacecraft up at the corrected time; they give no formula. Three readings: one corrected time serves both
+        /// rotations and the look-up, then footprints stay (0.3 mm) and only the look-up counts ("spk_lookup", our
+        /// choice); the rotation into IAU 2000 has it and the one out of the file's datum has not ("both", 28 m);
+        /// that rotation alone ("rotation") contradicts their look-up.
         scope = key(words([
             ("spk_lookup", BiasScope::SpkLookup, "the spacecraft's position in the range check"),
             (

@@ -13,10 +13,11 @@ pub const SCAN_STEPS_MAX: u32 = 10_000;
 declare_table! {
     /// Limits that make a profile valid or invalid.
     pub struct RangeCheckConfig: JsonSchema {
-        /// Largest |mean| of range minus distance. The default is the limit of Shan et al. 2005.
+        /// Largest |mean| of range minus distance. The default is our choice: Shan et al. 2005 state no limit; the profiles
+        /// of their Table 3 reach 2 m at nadir and 25.4 m off nadir.
         mean_max_m: f64 = key(above_to(0.0, 1e6)).or(10.0),
-        /// A shot farther from the median than this many robust standard deviations is an outlier.
-        /// Shan et al. 2005 take 5 standard deviations from the mean.
+        /// A shot farther from the median than this many robust standard deviations is an outlier. The default is our
+        /// choice; Shan et al. 2005 mention single shots about 5 standard deviations off.
         outlier_sigma: f64 = key(above_to(0.0, 1000.0)).or(5.0),
         /// Largest share of outliers. The default is our choice.
         outlier_share_max: f64 = key(from_to(0.0, 1.0)).or(0.05),

@@ -272,3 +272,96 @@ impl Flight for Flown {
         })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::{
+        error_sources::Roughness,
+        plan::{IMAGES, PlannedImage},
+    };
+
+    fn arc(image: &'static PlannedImage) -> Arc {
+        Arc::new(image, Et::from_seconds(3.9e7), 600.0).unwrap()
+    }
+
+    #[test]
+    fn draws_have_the_sizes_of_their_sources() {
+        const SEEDS: u64 = 600;
+        let errors = SceneErrors::realistic(Roughness::Plains);
+        let arc = arc(&IMAGES[0]);
+        let axes = orbit_axes(&arc);
+        let mut squares = [0.0; 9];
+        for seed in 0..SEEDS {
+            let drawn = DayErrors::draw(&errors, &arc, seed);
+            let attitude = drawn.attitude.unwrap();
+            let off_m = axes.tr_mul(&drawn.bus_position_m);
+            let [east_m, _, radial_m] = drawn.profile_shift.east_north_radial_m;
+            let shares = [
+                drawn.time_bias_lines / 30.0,
+                off_m.x / 5.2,
+                off_m.y / 24.8,
+                off_m.z / 8.6,
+                attitude.constant_rad.x / 4e-4,
+                attitude.constant_rad.y / 4e-4,
+                attitude.linear_rad.x / 1e-5,
+                east_m / 70.0,
+                radial_m / 1.0,
+            ];
+            for (sum, share) in squares.iter_mut().zip(shares) {
+                *sum += share * share / SEEDS as f64;
+            }
+            for sinusoid in &attitude.jitter {
+                assert!((1e-6..=5e-6).contains(&sinusoid.amplitude_rad));
+                assert!((0.1..=2.0).contains(&sinusoid.period_s) && sinusoid.axis < 2);
+            }
+        }
+        for square in squares {
+            // A variance of 600 draws: 6 %, times four.
+            assert!((square - 1.0).abs() < 0.24, "{squares:?}");
+        }
+    }
+
+    #[test]
+    fn a_clock_offset_is_that_of_all_images() {
+        let errors = SceneErrors::realistic(Roughness::Plains).with_attitude_clock();
+        let [first, second] = [0, 3].map(|image| DayErrors::draw(&errors, &arc(&IMAGES[image]), 5));
+        assert_eq!(
+            first.attitude_clock_s.to_bits(),
+            second.attitude_clock_s.to_bits()
+        );
+        assert!(first.attitude_clock_s.abs() > 0.0 && first.time_bias_lines.abs() <= 0.0);
+        assert!((first.bus_position_m - second.bus_position_m).norm() > 1.0);
+    }
+
+    #[test]
+    fn the_demo_has_no_errors_but_those_of_its_cameras() {
+        for image in &IMAGES {
+            let drawn = DayErrors::draw(&SceneErrors::demo(), &arc(image), 1);
+            assert!(drawn.attitude.is_none() && !drawn.has_jitter());
+            assert!(drawn.bus_position_m.norm() <= 0.0 && drawn.camera_position_m.norm() > 1.0);
+            assert!(drawn.attitude_clock_s.abs() <= 0.0);
+            assert!((drawn.time_bias_lines - image.time_bias_lines).abs() <= 0.0);
+            assert_eq!(drawn.profile_shift.rotation(), &Matrix3::identity());
+        }
+    }
+
+    #[test]
+    fn a_profile_moves_east_north_and_up() {
+        let site = IMAGES[0].site.direction();
+        let shift = ProfileShift::near(&site, [70.0, -30.0, 2.0]);
+        let east = Vector3::z().cross(&site).normalize();
+        let north = site.cross(&east);
+        // At the site, and 30 km to the north of it.
+        for away_rad in [0.0, 0.009_f64] {
+            let up = away_rad.cos() * site + away_rad.sin() * north;
+            let moved_m = shift.applied(&(REFERENCE_RADIUS_M * up)) - REFERENCE_RADIUS_M * up;
+            assert!((moved_m.dot(&east) - 70.0).abs() < 0.1, "{moved_m}"); // meridians converge by 0.1 %
+            assert!(
+                (moved_m.dot(&up.cross(&east)) + 30.0).abs() < 0.1,
+                "{moved_m}"
+            );
+            assert!((moved_m.dot(&up) - 2.0).abs() < 0.01, "{moved_m}"); // the plane of the shift: 1 mm
+        }
+    }
+}

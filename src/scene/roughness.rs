@@ -94,11 +94,6 @@ impl RoughPatch {
             return None;
         }
         let share = ((end_m - distance_m) / (end_m - full_m)).min(1.0);
-        let noise_m: f64 = self
-            .octaves
-            .iter()
-            .map(|octave| octave.height_m(&plan_m))
-            .sum();
         let near = self.cells.get(&cell(&plan_m)).into_iter().flatten();
         let bowls_m: f64 = near
             .map(|&index| {
@@ -106,7 +101,13 @@ impl RoughPatch {
                 crater.bowl.height_m((plan_m - crater.centre_m).norm())
             })
             .sum();
-        Some(fade(share) * (noise_m + bowls_m))
+        Some(fade(share) * (self.noise_m(&plan_m) + bowls_m))
+    }
+
+    /// Height without craters, metres.
+    fn noise_m(&self, plan_m: &Vector2<f64>) -> f64 {
+        let octaves = self.octaves.iter();
+        octaves.map(|octave| octave.height_m(plan_m)).sum()
     }
 }
 
@@ -219,4 +220,90 @@ fn grid(craters: &[Crater]) -> HashMap<[i32; 2], Vec<usize>> {
         }
     }
     cells
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::terrain::REFERENCE_RADIUS_M;
+
+    const SITE: Vector3<f64> = Vector3::new(0.6, 0.8, 0.0);
+
+    /// How much heights `apart_m` apart differ (root mean square), over places and directions of some patches, metres.
+    fn differ_m(roughness: Roughness, apart_m: f64) -> f64 {
+        const PATCHES: u64 = 12;
+        const PAIRS: u64 = 1_500;
+        let mut squares_m2 = 0.0;
+        for seed in 0..PATCHES {
+            let patch = RoughPatch::new(seed, &SITE, roughness);
+            let mut random = Random::new(seed, "pairs");
+            for _ in 0..PAIRS {
+                let from_m = Vector2::from_fn(|_, _| random.between(-30_000.0, 30_000.0));
+                let (sin, cos) = random.between(0.0, std::f64::consts::TAU).sin_cos();
+                let to_m = from_m + apart_m * Vector2::new(cos, sin);
+                squares_m2 += (patch.noise_m(&to_m) - patch.noise_m(&from_m)).powi(2);
+            }
+        }
+        (squares_m2 / (PATCHES * PAIRS) as f64).sqrt()
+    }
+
+    #[test]
+    fn heights_differ_as_the_structure_function_says() {
+        for roughness in [Roughness::Plains, Roughness::Medium, Roughness::Rough] {
+            for apart_m in [50.0, 100.0, 300.0, 1_000.0, 2_000.0_f64] {
+                let expected_m =
+                    roughness.height_difference_at_300_m() * (apart_m / 300.0).powf(HURST);
+                let found_m = differ_m(roughness, apart_m);
+                println!("{roughness:?} {apart_m} m: {found_m:.3} m, expected {expected_m:.3} m");
+                // 4 % because there are but thirteen octaves; 18 000 pairs, fewer independent ones at 2 km: 1 %.
+                assert!(
+                    (found_m / expected_m - 1.0).abs() < 0.07,
+                    "{found_m} {expected_m}"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn the_finest_waves_are_some_25_m_long() {
+        // Below the finest lattice the ground is smooth: heights differ in proportion to the distance.
+        let [near_m, nearer_m] = [2.0, 1.0].map(|apart_m| differ_m(Roughness::Medium, apart_m));
+        assert!(
+            (near_m / nearer_m - 2.0).abs() < 0.05,
+            "{near_m} {nearer_m}"
+        ); // 2^0.7 = 1.62 if it went on
+    }
+
+    #[test]
+    fn craters_are_as_many_as_told_and_few_are_large() {
+        let craters = craters(&mut Random::new(1, "craters"));
+        assert_eq!(craters.len(), 1_440); // 120 km squared, 0.1 a square kilometre
+        let beyond = |radius_m: f64| {
+            let larger = craters
+                .iter()
+                .filter(|crater| crater.bowl.radius_m > radius_m);
+            larger.count()
+        };
+        // Of diameters above 200 m there are a quarter: 360, and 16 in standard deviation; times four.
+        assert!(beyond(100.0).abs_diff(360) < 65, "{}", beyond(100.0));
+        assert!((3..30).contains(&beyond(500.0)), "{}", beyond(500.0)); // 14 of 1 km
+        let all_in = craters.iter().all(|crater| {
+            (CRATER_RADIUS_M[0]..=CRATER_RADIUS_M[1]).contains(&crater.bowl.radius_m)
+        });
+        assert!(all_in);
+    }
+
+    #[test]
+    fn a_patch_ends_without_a_step() {
+        let patch = RoughPatch::new(1, &SITE, Roughness::Rough);
+        let place = |north_m: f64| {
+            let angle_rad = north_m / REFERENCE_RADIUS_M;
+            REFERENCE_RADIUS_M * (angle_rad.cos() * SITE + angle_rad.sin() * Vector3::z())
+        };
+        assert!(patch.height_m(&place(30_000.0)).unwrap().abs() > 0.1);
+        // A metre before the end nothing is left; beyond it, and on the other side of Mars, there is none.
+        assert!(patch.height_m(&place(59_998.0)).unwrap().abs() < 1e-3);
+        assert!(patch.height_m(&place(60_010.0)).is_none());
+        assert!(patch.height_m(&-place(0.0)).is_none());
+    }
 }

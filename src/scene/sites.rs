@@ -330,7 +330,8 @@ truth.json   what really happened: biases, orientation of the images, footprints
              from where the images were truly taken; which errors were drawn from which sizes
 
 Image ids, times, line counts and line periods are those of Shan et al. 2005, Table 2. Terrain, orbits and
-attitudes are invented. Emission angles of E02-01301 and E02-01453 are invented too; the paper does not tell them.
+attitudes are invented. So are the emission angles of E02-01301 and E02-01453 (Table 2 has 13.0 and 22.1 degrees)
+and the summing of E02-02016 (2 there).
 The wide-angle images of gusev_context are invented.
 ";
 

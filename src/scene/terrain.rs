@@ -256,6 +256,7 @@ fn grid(craters: &[Crater]) -> HashMap<[i32; 3], Vec<usize>> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::scene::error_sources::Roughness;
     use proptest::prelude::*;
     use std::sync::LazyLock;
 
@@ -294,6 +295,37 @@ mod tests {
                 prop_assert!((TERRAIN.radius_m(&there) - here).abs() < 1.0);
             }
         }
+    }
+
+    static ROUGH: LazyLock<Terrain> =
+        LazyLock::new(|| Terrain::new(7, &[Vector3::x()], Relief::SelfAffine(Roughness::Rough)));
+
+    proptest! {
+        #[test]
+        fn a_beam_ends_on_rough_ground(
+            east in -0.009..0.009_f64, north in -0.009..0.009_f64,
+            look_rad in 0.0..0.4_f64, azimuth_rad in 0.0..std::f64::consts::TAU,
+        ) {
+            let up = Vector3::new(1.0, east, north).normalize();
+            let (sin, cos) = azimuth_rad.sin_cos();
+            let direction =
+                (-look_rad.cos() * up + look_rad.sin() * Vector3::new(0.0, cos, sin)).normalize();
+            let ground_m = ROUGH.radius_m(&up) * up;
+            let origin = ground_m - 385_000.0 * direction;
+            let range_m = ROUGH.range_m(&origin, &direction).unwrap();
+            let hit = origin + range_m * direction;
+            let error_m = hit.norm() - ROUGH.radius_m(&hit.normalize());
+            prop_assert!(error_m.abs() < 1e-4, "{error_m}"); // metres: a tenth of what a PEDR can say
+            // The mean over a spot is nearer to the ground than the relief within it: slopes reach 1.
+            let farther_m = ROUGH.spot_farther_m(&hit, &direction, 75.0);
+            prop_assert!(farther_m.abs() < 75.0, "{farther_m}");
+        }
+    }
+
+    #[test]
+    fn a_spot_on_smooth_ground_is_measured_in_its_middle() {
+        let far = ROUGH.radius_m(&Vector3::y()) * Vector3::y();
+        assert!(ROUGH.spot_farther_m(&far, &-Vector3::y(), 75.0).abs() <= 0.0);
     }
 
     #[test]

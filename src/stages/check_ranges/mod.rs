@@ -170,7 +170,7 @@ impl Cause for OutsideTrajectory {
 /// # Errors
 /// A shot whose time the trajectory does not cover; [`Stopped`].
 /// # Source
-/// Shan et al. 2005, Table 3; limits there: |mean| above 10 m, |Δ − mean| above 5 standard deviations.
+/// Shan et al. 2005, Table 3; the limits are ours, the paper has none.
 pub fn check_ranges(
     footprints: &Footprints<MarsIau2000>,
     profiles: &[Profile],
