@@ -16,7 +16,7 @@ use std::{
 
 use areograph::{
     config::{self, DeclaredKey, ValueKind},
-    flow::{Ending, PUBLISH, RunOptions, STAGES, StageReason, plan_site, run_site},
+    flow::{Ending, PUBLISH, RunOptions, StageReason, plan_site, run_site, stages},
     stage::Reason,
 };
 use common::case::Case;
@@ -384,7 +384,7 @@ fn over_a_random_walk_of_changes_a_run_gives_what_a_clean_run_gives() {
             _ => change_order(&mut site, &walk.site, &mut dice).to_owned(),
         };
         let until = if dice.below(8) == 0 {
-            STAGES[dice.below(STAGES.len())]
+            stages()[dice.below(stages().len())]
         } else {
             PUBLISH
         };
