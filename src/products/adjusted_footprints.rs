@@ -3,15 +3,11 @@
 use std::collections::BTreeMap;
 
 use super::{
-    coordinates::degrees,
     parquet,
     product::{Content, Declaration, Role, Write},
     table::{Column, Table, Unit, column, meanings},
 };
-use crate::{
-    geom::ellipsoid::Spherical,
-    stages::adjust::{Adjusted, CorrectedPoint, PointKind, RangeResidual},
-};
+use crate::stages::adjust::{Adjusted, CorrectedPoint, PointKind, RangeResidual};
 
 pub(super) static TABLE: Declaration = Declaration {
     path: "adjusted_footprints.parquet",
@@ -114,10 +110,6 @@ fn shot_columns<'a>() -> Vec<Column<Shot<'a>>> {
         ),
     ]);
     columns
-}
-
-fn spherical(point: &CorrectedPoint) -> Spherical {
-    Spherical::from_xyz_m(&point.ground.xyz_m)
 }
 
 fn sigma_m(point: &CorrectedPoint, axis: usize) -> f64 {

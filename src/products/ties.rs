@@ -13,7 +13,7 @@ use super::{
 use crate::{
     geom::ellipsoid::{Spherical, local_axes},
     stages::{
-        adjust::{Adjusted, CorrectedPoint, ImageResidual, PointKind, RangeResidual},
+        adjust::{CorrectedPoint, ImageResidual, PointKind},
         intersect::{IntersectedPoint, IntersectedTies, MeasureResidual},
     },
 };
