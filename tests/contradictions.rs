@@ -94,7 +94,7 @@ const MISTAKES: &[Mistake] = &[
             case.replace("kernels/moc.ti", flight, withdrawn);
         },
         End::Remark,
-        "the kernels mount MOC narrow angle 0.1999° from where its instrument file has it, 1.3 km on the ground",
+        "the kernels mount MOC narrow angle 0.2000° from where its instrument file has it, 1.3 km on the ground",
     ),
     (
         "clock_2_s_off",
