@@ -64,8 +64,8 @@ pub struct SurfaceOptions {
     pub shot_sigma_m: f64,
     /// Radial error that all shots of a profile share, metres.
     pub profile_sigma_m: f64,
-    /// Error in plan between the places that are asked for and the shots, common to all of them, metres; on a slope
-    /// it becomes one of height.
+    /// Error in plan between the places that are asked for and the shots on each axis, common to all of them, metres; on
+    /// a slope it becomes one of height.
     pub plan_sigma_m: f64,
     /// Roughness that is assumed at least, metres at 300 m, see [`Variogram`].
     pub roughness_min_m: f64,
@@ -217,6 +217,7 @@ impl LaserSurface {
         covariance_m2 += of_profiles.tr_mul(&of_profiles) * self.options.profile_sigma_m.powi(2);
         let slopes_matrix = DMatrix::from_fn(2, at.len(), |axis, place| slopes[place][axis]);
         covariance_m2 += slopes_matrix.tr_mul(&slopes_matrix) * self.options.plan_sigma_m.powi(2);
+        covariance_m2 += self.elsewhere_m2(&at);
         SurfaceHeights {
             heights_m: at
                 .iter()
@@ -229,6 +230,22 @@ impl LaserSurface {
             slopes,
             covariance_m2,
         }
+    }
+
+    /// Covariance of what the ground itself changes by when all places are shifted by an error in plan: beside the slope
+    /// of the surface, which is known, that of the ground between the shots, which is not.
+    fn elsewhere_m2(&self, at: &[Vector2<f64>]) -> DMatrix<f64> {
+        let shift_m = std::f64::consts::SQRT_2 * self.options.plan_sigma_m;
+        let shifts = [Vector2::new(shift_m, 0.0), Vector2::new(0.0, shift_m)];
+        let variogram = self.kriging.variogram;
+        DMatrix::from_fn(at.len(), at.len(), |row, column| {
+            let apart = at[row] - at[column];
+            let of_shifts = shifts.iter().map(|shift| {
+                variogram.at((apart + shift).norm()) + variogram.at((apart - shift).norm())
+                    - 2.0 * variogram.at(apart.norm())
+            });
+            of_shifts.sum::<f64>() / shifts.len() as f64
+        })
     }
 
     fn slope(&self, place: &Vector2<f64>) -> Vector2<f64> {
