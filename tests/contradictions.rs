@@ -250,7 +250,7 @@ const MISTAKES: &[Mistake] = &[
                 _ => format!("{id},{image},398.3738,1592.3391"),
             });
         },
-        End::Invalid,
+        End::Remark,
         "repeat the measurements of another one",
     ),
     (
