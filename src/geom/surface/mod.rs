@@ -212,12 +212,11 @@ impl LaserSurface {
         let at: Vec<Vector2<f64>> = places_m.iter().map(|place| self.plan.of(place)).collect();
         let weights = self.kriging.weights(&at);
         let slopes: Vec<Vector2<f64>> = at.iter().map(|place| self.slope(place)).collect();
-        let mut covariance_m2 = self.kriging.covariance_m2(&at, &weights);
+        let mut covariance_m2 = self.errors_m2(&at);
         let of_profiles = self.kriging.weights_of_profiles(&weights);
         covariance_m2 += of_profiles.tr_mul(&of_profiles) * self.options.profile_sigma_m.powi(2);
         let slopes_matrix = DMatrix::from_fn(2, at.len(), |axis, place| slopes[place][axis]);
         covariance_m2 += slopes_matrix.tr_mul(&slopes_matrix) * self.options.plan_sigma_m.powi(2);
-        covariance_m2 += self.elsewhere_m2(&at);
         SurfaceHeights {
             heights_m: at
                 .iter()
@@ -232,20 +231,28 @@ impl LaserSurface {
         }
     }
 
-    /// Covariance of what the ground itself changes by when all places are shifted by an error in plan: beside the slope
-    /// of the surface, which is known, that of the ground between the shots, which is not.
-    fn elsewhere_m2(&self, at: &[Vector2<f64>]) -> DMatrix<f64> {
+    /// Covariance of what the surface errs by where the places may truly be: an error in plan takes them away from a
+    /// profile, where the ground is known, as well as towards one.
+    fn errors_m2(&self, at: &[Vector2<f64>]) -> DMatrix<f64> {
         let shift_m = std::f64::consts::SQRT_2 * self.options.plan_sigma_m;
-        let shifts = [Vector2::new(shift_m, 0.0), Vector2::new(0.0, shift_m)];
-        let variogram = self.kriging.variogram;
-        DMatrix::from_fn(at.len(), at.len(), |row, column| {
-            let apart = at[row] - at[column];
-            let of_shifts = shifts.iter().map(|shift| {
-                variogram.at((apart + shift).norm()) + variogram.at((apart - shift).norm())
-                    - 2.0 * variogram.at(apart.norm())
-            });
-            of_shifts.sum::<f64>() / shifts.len() as f64
-        })
+        let all_around = [
+            Vector2::new(shift_m, 0.0),
+            Vector2::new(-shift_m, 0.0),
+            Vector2::new(0.0, shift_m),
+            Vector2::new(0.0, -shift_m),
+        ];
+        let shifts = if shift_m > 0.0 {
+            &all_around[..]
+        } else {
+            &[Vector2::zeros()]
+        };
+        let mut covariance_m2 = DMatrix::zeros(at.len(), at.len());
+        for shift in shifts {
+            let shifted: Vec<Vector2<f64>> = at.iter().map(|place| place + shift).collect();
+            let weights = self.kriging.weights(&shifted);
+            covariance_m2 += self.kriging.covariance_m2(&shifted, &weights);
+        }
+        covariance_m2 / shifts.len() as f64
     }
 
     fn slope(&self, place: &Vector2<f64>) -> Vector2<f64> {
