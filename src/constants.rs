@@ -6,12 +6,16 @@ use serde::Deserialize;
 
 /// NAIF id of the Mars Global Surveyor spacecraft and of its clock.
 pub const NAIF_MGS: i32 = -94;
+/// Name of the spacecraft in labels, where underscores may stand for blanks.
+pub const MGS_NAME: &str = "MARS GLOBAL SURVEYOR";
 /// NAIF id of the spacecraft bus frame `MGS_SPACECRAFT` and of its attitude kernels.
 pub const NAIF_MGS_BUS: i32 = -94_000;
 /// NAIF id of the frame `IAU_MARS`.
 pub const NAIF_IAU_MARS: i32 = 10_014;
 /// NAIF id of the centre of Mars.
 pub const NAIF_MARS: i32 = 499;
+/// Name of Mars in labels.
+pub const MARS_NAME: &str = "MARS";
 /// NAIF id of the Sun.
 pub const NAIF_SUN: i32 = 10;
 

@@ -34,6 +34,26 @@ pub const IMAGE_LINES_MIN: u32 = 3;
 /// later the orientation is no polynomial of second order any more.
 pub const IMAGE_DURATION_END_S: f64 = 600.0;
 
+/// What a clock string looks like, for messages.
+pub const CLOCK_STRING: &str =
+    "a spacecraft clock `seconds:ticks` with ticks below 256, such as 619971158:028";
+
+/// Whether `text` is `[1/]seconds:ticks`, the two fields of the MGS clock (32 bits and 1/256 s) in its one partition.
+///
+/// Without ticks a clock is known to a second only, which is 3 km on the ground.
+#[must_use]
+pub fn is_clock_string(text: &str) -> bool {
+    let (partition, count) = text.split_once('/').unwrap_or(("1", text));
+    let below = |part: &str, limit: u64| {
+        part.bytes().all(|byte| byte.is_ascii_digit())
+            && part.parse::<u64>().is_ok_and(|value| value < limit)
+    };
+    partition == "1"
+        && count
+            .split_once([':', '.'])
+            .is_some_and(|(seconds, ticks)| below(seconds, 1 << 32) && below(ticks, 256))
+}
+
 /// Labels print exposures and periods to 0.0001 ms; half of that is their rounding, seconds.
 const EXPOSURE_ROUNDING_S: f64 = 0.5e-7;
 
@@ -48,7 +68,31 @@ pub fn line_period_agrees(line_period_s: f64, exposure_s: f64, downtrack_summing
 
 #[cfg(test)]
 mod tests {
-    use super::line_period_agrees;
+    use super::*;
+
+    #[test]
+    fn clock_strings_have_seconds_and_256ths() {
+        for good in ["619971158:28", "619971158.028", "1/0844996544.086"] {
+            assert!(is_clock_string(good), "{good}");
+        }
+        for bad in [
+            "",
+            "619971158",
+            "4294967296:0",
+            "1:256",
+            "0/1:1",
+            "2/1:1",
+            "1/2/1:1",
+            "1:",
+            ":1",
+            "a:1",
+            "1:1:1",
+            "-1:1",
+            "1:+1",
+        ] {
+            assert!(!is_clock_string(bad), "{bad}");
+        }
+    }
 
     #[test]
     fn periods_agree_within_the_rounding_of_what_labels_print() {

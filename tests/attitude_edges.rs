@@ -63,7 +63,7 @@ fn coverage_is_asked_at_the_shifted_instants_with_their_padding() {
         assert!((end_s - expected_s).abs() < 0.001, "{end}: {end_s} s"); // ET above has milliseconds
     }
     // The same image, covered as it stands, but not at the instants that this bias asks for.
-    for (start, bias) in [("05:17:30.0", "1.15"), ("03:18:04.0", "-5.0")] {
+    for (start, bias) in [("05:17:30.0", "2.0"), ("03:18:04.0", "-5.0")] {
         let refused = outcome(&case, start, 700, "", &format!("ck_bias_s = {bias}"));
         assert!(refused.starts_with("exit 4"), "{bias}: {refused}");
         assert!(refused.contains("no attitude of MGS for ET"), "{refused}");
@@ -120,7 +120,7 @@ fn held_attitudes_are_noted_and_beyond_their_spacing_invalid() {
 fn a_check_finds_what_a_run_finds() {
     let case = Case::new();
     for (start, kernels, pointing) in [
-        ("05:17:30.0", "", "ck_bias_s = 1.15"),
+        ("05:17:30.0", "", "ck_bias_s = 2.0"),
         ("05:17:31.0", "ck_tolerance_s = 0.5", ""),
         ("05:18:00.0", "ck_tolerance_s = 60.0", ""),
     ] {

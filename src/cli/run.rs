@@ -17,7 +17,7 @@ use super::{load_sites, output, plan, report};
 use crate::{
     config::SiteConfig,
     error::{Error, Kind},
-    flow::{Ending, PUBLISH, RunOptions, STAGES, SiteOutcome, check_out, publish_sites, run_site},
+    flow::{Ending, PUBLISH, RunOptions, SiteOutcome, check_out, publish_sites, run_site, stages},
     store::{manifest::Manifest, publish::read_manifest},
 };
 
@@ -47,7 +47,7 @@ pub(super) struct Arguments {
         value_name = "STAGE",
         default_value = PUBLISH,
         hide_default_value = true,
-        value_parser = PossibleValuesParser::new(STAGES)
+        value_parser = PossibleValuesParser::new(stages())
     )]
     until: String,
     /// Run every stage, whatever is stored.

@@ -5,7 +5,10 @@ use std::path::PathBuf;
 use serde_json::json;
 
 use crate::{
-    image::{IMAGE_DURATION_END_S, IMAGE_LINES_MIN, ImageFields, line_period_agrees},
+    image::{
+        CLOCK_STRING, IMAGE_DURATION_END_S, IMAGE_LINES_MIN, ImageFields, is_clock_string,
+        line_period_agrees,
+    },
     instruments::Instrument,
     units::SECONDS_PER_MS,
 };
@@ -38,7 +41,8 @@ pub(super) const IMAGES: Many = Many {
 declare_table! {
     /// Images, none to many: a label, the keys below, or both; keys written here win over the label.
     pub struct ImageConfig {
-        /// Identifier, unique in the site; also the name of a folder.
+        /// Identifier, unique in the site; also the name of a folder. One that begins with a MOC product, such
+        /// as `E02-02855` or `m0402852_part`, is for the label of that product only.
         id: String = key(identifier())
             .required()
             .example(r#""E02-02855""#)
@@ -50,7 +54,8 @@ declare_table! {
         /// `config/instruments`. Without it, the camera that the label names, and without a label `moc_na`.
         instrument: Option<Instrument> = key(Camera).example(r#""moc_na""#),
         /// Its name in tie point files and in what is written for ISIS, when that is not the identifier: for a
-        /// control network the ISIS serial number. Without it, the identifier.
+        /// control network the ISIS serial number, in which the clock must be that of the image. Without it, the
+        /// identifier.
         serial_number: Option<String> =
             key(text()).example(r#""MGS/651158134:116/MOC-NA""#),
         /// Keys written in the configuration.
@@ -71,10 +76,11 @@ declare_table! {
     /// What the configuration says of an image.
     fill ImageFields {
         /// Spacecraft clock at the start of the first line, seconds:ticks with 256 ticks a second (":28" and
-        /// ":028" are both 28/256 s). Preferred: label UTC is rounded, 1.0 to 4.8 ms off in five labels.
+        /// ":028" are both 28/256 s). Preferred: label UTC is rounded, 1.0 to 4.8 ms off in five labels. Farther
+        /// apart than 20 ms they are remarked on, farther than 1 s refused.
         sclk_start = key(matching(
-            "a spacecraft clock `seconds:ticks` with ticks below 256, such as 619971158:028",
-            "^(1/)?[0-9]+([:.][0-9]+)?$",
+            CLOCK_STRING,
+            "^(1/)?[0-9]+[:.][0-9]+$",
             is_clock_string,
         )).example_in(1, r#""619971158:028""#),
         /// UTC at the start of the first line, used when there is no clock string.
@@ -190,17 +196,6 @@ fn duration(fields: &ImageFields, keys: &mut Keys<'_, '_>) {
     }
 }
 
-/// `[partition/]seconds[:ticks]`, the two fields of the MGS clock (32 bits and 1/256 s).
-fn is_clock_string(text: &str) -> bool {
-    let digits = |part: &str| !part.is_empty() && part.bytes().all(|byte| byte.is_ascii_digit());
-    let (partition, count) = text.split_once('/').unwrap_or(("1", text));
-    let (seconds, ticks) = count.split_once([':', '.']).unwrap_or((count, "0"));
-    let below = |part: &str, limit: u64| {
-        digits(part) && part.parse::<u64>().is_ok_and(|value| value < limit)
-    };
-    partition == "1" && below(seconds, 1 << 32) && below(ticks, 256)
-}
-
 /// `YYYY-MM-DDThh:mm:ss[.fff][Z]`, or with the day of the year `YYYY-DDD`.
 ///
 /// Only the form; leap seconds and month lengths are for the leap-second kernel.
@@ -242,31 +237,6 @@ fn whole(text: &str, width: usize, range: std::ops::RangeInclusive<u32>) -> bool
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn clock_strings_have_seconds_and_256ths() {
-        for good in [
-            "619971158:28",
-            "619971158.028",
-            "1/0844996544.086",
-            "619971158",
-        ] {
-            assert!(is_clock_string(good), "{good}");
-        }
-        for bad in [
-            "",
-            "4294967296:0",
-            "1:256",
-            "2/1:1",
-            "1:",
-            "a:1",
-            "1:1:1",
-            "-1:1",
-            "1:+1",
-        ] {
-            assert!(!is_clock_string(bad), "{bad}");
-        }
-    }
 
     #[test]
     fn utc_strings_have_the_forms_of_labels() {

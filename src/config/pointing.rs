@@ -11,12 +11,20 @@ use super::{
     instruments::{built_in_altimeter, usual_instrument},
 };
 
+/// A bias this close to the known one with its sign turned is that one, seconds: NAIF measured 1.140 ± 0.010 s.
+const TURNED_SIGN_S: f64 = 0.05;
+/// A bias this close to the known one is the known one, seconds: 0.2 m on the ground.
+const KNOWN_S: f64 = 0.0005;
+/// What a second of attitude time is on the ground when the bus keeps nadir, metres: it turns by 0.0501° meanwhile.
+const NADIR_TURN_M_S: f64 = 330.0;
+
 declare_table! {
     /// Pointing bias and where its value comes from.
     pub struct PointingConfig {
         /// Time correction of attitude kernels: the attitude of an exposure at t is read at t + `ck_bias_s`.
         /// Position, Mars rotation and mounting stay at t.
         /// Known: value and sign for MOC, from ISIS and ALE (`INS-94031_CK_TIME_BIAS`) and Shan et al. 2005.
+        /// The known value with its sign turned is refused; any other one is remarked on.
         /// Unknown: whether the same value holds for kernels before the mapping phase (before April 1999).
         ck_bias as "ck_bias_s": PointingBias = key(from_to(-10.0, 10.0))
             .or(usual_instrument().pointing.ck_bias_s)
@@ -24,6 +32,43 @@ declare_table! {
         /// Citation that products repeat; change it together with the value.
         source: String = key(text())
             .or(usual_instrument().pointing.source.clone()),
+    }
+    check sign_is_known
+}
+
+fn sign_is_known(pointing: &PointingConfig, keys: &mut Keys<'_, '_>) {
+    let camera = usual_instrument();
+    if has_turned_sign(pointing.ck_bias.seconds(), camera.pointing.ck_bias_s) {
+        keys.refuse(
+            "ck_bias_s",
+            format!(
+                "{}, the known bias of {} with its sign: the attitude of an exposure at t is read at t + ck_bias_s",
+                camera.pointing.ck_bias_s, camera.name
+            ),
+        );
+    }
+}
+
+/// Whether a bias is the known one but for its sign.
+pub(super) fn has_turned_sign(bias_s: f64, known_s: f64) -> bool {
+    known_s.abs() > TURNED_SIGN_S && (bias_s + known_s).abs() < TURNED_SIGN_S
+}
+
+impl PointingConfig {
+    /// How far the bias is from the known one, in a sentence; `None` for the known one.
+    #[must_use]
+    pub fn departure(&self) -> Option<String> {
+        let (camera, bias_s) = (usual_instrument(), self.ck_bias.seconds());
+        let known_s = camera.pointing.ck_bias_s;
+        let apart_s = (bias_s - known_s).abs();
+        (apart_s > KNOWN_S).then(|| {
+            format!(
+                "pointing.ck_bias_s is {bias_s} s, the known bias of {} {known_s} s: {apart_s:.3} s more or less are up \
+                 to {:.0} m on the ground",
+                camera.name,
+                apart_s * NADIR_TURN_M_S
+            )
+        })
     }
 }
 

@@ -17,7 +17,7 @@ use super::{
     kernels::KernelsConfig,
     orientation::{OrientationConfig, RegistrationConfig},
     pedr::PedrConfig,
-    pointing::PointingConfig,
+    pointing::{PointingConfig, has_turned_sign},
     range_check::RangeCheckConfig,
     ties::{IntersectionConfig, TiesConfig},
     windows::{WINDOWS, WINDOWS_MAX, WindowConfig},
@@ -122,9 +122,16 @@ fn pointing_of_instruments(site: &SiteConfig, keys: &mut Keys<'_, '_>) {
         .filter_map(|image| image.instrument.as_ref());
     for camera in named {
         let own_s = camera.pointing.ck_bias_s;
-        if own_s.total_cmp(&used_s).is_ne()
-            && let Some(images) = keys.span_of("images")
-        {
+        let Some(images) = keys.span_of("images") else {
+            continue;
+        };
+        if has_turned_sign(own_s, used_s) {
+            let text = format!(
+                "the pointing bias of {} is {own_s} s, pointing.ck_bias_s is {used_s}; expected one sign",
+                camera.name
+            );
+            keys.review().problem(Some(images), text);
+        } else if own_s.total_cmp(&used_s).is_ne() {
             let text = format!(
                 "the {own_s} s of {} are never used: pointing.ck_bias_s is {used_s}",
                 camera.name

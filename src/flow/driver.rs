@@ -2,7 +2,7 @@
 
 use std::{path::PathBuf, sync::atomic::AtomicBool};
 
-use super::{STAGES, outputs::Site};
+use super::{outline::stages, outputs::Site};
 use crate::{
     config::SiteConfig,
     error::{Error, Locate, Result, Stopped},
@@ -102,7 +102,7 @@ pub(super) struct Bounds<'a> {
 impl Bounds<'_> {
     /// Leaves the flow before `stage` when it is not asked for, or when the user stops the program.
     pub(super) fn enter(&self, stage: &'static str) -> Flow<()> {
-        let place = |name: &str| STAGES.iter().position(|stage| *stage == name);
+        let place = |name: &str| stages().iter().position(|stage| *stage == name);
         if place(self.until) < place(stage) {
             return Err(Leave::StageReached);
         }

@@ -50,6 +50,46 @@ pub(super) fn judged(
     Ok((verdict, adjustment.is_some_and(|of| of.images_agree())))
 }
 
+/// What a reader must weigh of kernels, clocks, labels and tie points, one sentence each.
+pub(super) fn warnings(config: &SiteConfig, site: &Site) -> Result<Vec<String>> {
+    let described = site.described.value()?;
+    let mut warnings: Vec<String> = described.pck_note.iter().cloned().collect();
+    warnings.extend(described.rates_note.iter().cloned());
+    if !site.images.is_empty() {
+        warnings.extend(config.pointing.departure());
+    }
+    for image in &site.images {
+        let times = image.times.value()?;
+        let remarks = times.remarks.iter();
+        warnings.extend(remarks.map(|remark| format!("image {}: {remark}", times.id)));
+    }
+    warnings.extend(same_exposures(&site.images)?);
+    if let Some(ties) = &site.ties {
+        let remarks = ties.value()?.remarks.iter();
+        warnings.extend(remarks.map(|remark| format!("tie points: {remark}")));
+    }
+    Ok(warnings)
+}
+
+/// Images that one camera took at one time with the same pixels: one label may stand for another.
+fn same_exposures(images: &[SiteImage]) -> Result<Vec<String>> {
+    let mut same = Vec::new();
+    for (index, image) in images.iter().enumerate() {
+        let times = image.times.value()?;
+        for earlier in &images[..index] {
+            let other = earlier.times.value()?;
+            let apart_s = times.start.since(other.start).abs();
+            if apart_s < times.line_period_s && times.detector() == other.detector() {
+                same.push(format!(
+                    "images {} and {} were exposed at the same time by the same pixels: one label may stand for another",
+                    other.id, times.id
+                ));
+            }
+        }
+    }
+    Ok(same)
+}
+
 fn judged_images(images: &[SiteImage]) -> Result<Vec<JudgedImage<'_>>> {
     let images = images.iter().map(|image| {
         Ok(JudgedImage {

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use super::{
     PUBLISH,
     driver::Ledger,
-    evidence::{complaints, judged, notes, rejected},
+    evidence::{complaints, judged, notes, rejected, warnings},
     manifest::{Account, manifest},
     outputs::Site,
     read_back::read_back,
@@ -91,11 +91,11 @@ pub(super) fn publish(
     let kernels = site.kernels.as_ref().unwrap_or(&none);
     let described = site.described.value()?;
     let (notes, complaints, rejected) = (notes(site)?, complaints(site)?, rejected(site)?);
-    let warnings = described.pck_note.as_slice();
-    for warning in warnings {
+    let warnings = warnings(config, site)?;
+    for warning in &warnings {
         tracing::warn!("{warning}");
     }
-    let (verdict, images_agree) = judged(config, site, warnings, &complaints)?;
+    let (verdict, images_agree) = judged(config, site, &warnings, &complaints)?;
     let images = image_products(&site.images)?;
     let adjusted_images = site
         .adjustment

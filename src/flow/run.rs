@@ -27,7 +27,7 @@ use crate::{
 pub struct RunOptions<'a> {
     /// Products go to `<out>/<site>`.
     pub out: PathBuf,
-    /// Last stage to run, one of [`STAGES`](super::STAGES).
+    /// Last stage to run, one of [`stages`](super::stages).
     pub until: &'a str,
     /// Use no stored output.
     pub force: bool,

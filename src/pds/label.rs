@@ -24,11 +24,24 @@ pub struct Entry {
     pub unit: Option<String>,
 }
 
+impl Entry {
+    /// The value with its unit, as it was written.
+    #[must_use]
+    pub fn written(&self) -> String {
+        match &self.unit {
+            Some(unit) => format!("{} <{unit}>", self.value),
+            None => self.value.clone(),
+        }
+    }
+}
+
 /// A parsed label.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Label {
     /// The assignments in the order of the file.
     pub entries: Vec<Entry>,
+    /// Whether the statement `END` was found behind them.
+    pub ended: bool,
 }
 
 /// A label is not what it should be.
@@ -40,6 +53,29 @@ pub enum LabelError {
     /// A value that is not of its kind.
     #[error("{key} is {value:?}; expected {expected}")]
     Value {
+        /// The keyword.
+        key: String,
+        /// Its value.
+        value: String,
+        /// What it should be.
+        expected: &'static str,
+    },
+    /// Nothing says that the label is whole.
+    #[error("the label has no END; expected that statement behind its last line")]
+    NoEnd,
+    /// Two values under one keyword.
+    #[error("{key} stands in the label as {first:?} and as {second:?}; expected one value")]
+    Twice {
+        /// The keyword.
+        key: String,
+        /// Its first value.
+        first: String,
+        /// The first one that differs from it.
+        second: String,
+    },
+    /// The image of another mission, of something else than Mars, or no longer as the camera took it.
+    #[error("{key} is {value:?}; expected {expected}")]
+    OtherImage {
         /// The keyword.
         key: String,
         /// Its value.
@@ -65,6 +101,13 @@ impl Cause for LabelError {
     fn advice(&self) -> String {
         match self {
             Self::NoLabel => "give a PDS3 label (.lbl, .imq) or an ISIS label (.lbl, .cub)",
+            Self::NoEnd => "fetch the file again: its label is cut off or damaged",
+            Self::Twice { .. } => {
+                "find out which of the two holds, and leave only that in the label"
+            }
+            Self::OtherImage { .. } => {
+                "give the label of an image that MGS took of Mars, as its camera took it"
+            }
             Self::Value { .. } => {
                 "correct the label, or write the key in the image's table of the configuration"
             }
@@ -110,7 +153,10 @@ pub fn parse_whole(bytes: &[u8]) -> Result<Label, LabelError> {
             && scanner.take(b'='))
         {
             match key.as_str() {
-                "END" => break,
+                "END" => {
+                    label.ended = true;
+                    break;
+                }
                 "END_OBJECT" | "END_GROUP" | "ENDOBJECT" | "ENDGROUP" => drop(groups.pop()),
                 _ => {}
             }
@@ -153,12 +199,36 @@ impl Label {
         self.entries.iter().find(|entry| entry.key == key)
     }
 
-    /// The first entry with this keyword directly in an object or group of this name (both upper case).
-    #[must_use]
-    pub fn find_in(&self, group: &str, key: &str) -> Option<&Entry> {
-        self.entries
-            .iter()
-            .find(|entry| entry.key == key && entry.group == group)
+    /// The one value with this keyword (upper case), wherever it stands; it may stand there several times.
+    ///
+    /// # Errors
+    /// [`LabelError::Twice`] for another value under the same keyword.
+    pub fn only(&self, key: &str) -> Result<Option<&Entry>, LabelError> {
+        only(self.entries.iter().filter(|entry| entry.key == key))
+    }
+
+    /// The same directly in objects or groups of this name (upper case too).
+    ///
+    /// # Errors
+    /// [`LabelError::Twice`] for another value under the same keyword.
+    pub fn only_in(&self, group: &str, key: &str) -> Result<Option<&Entry>, LabelError> {
+        let entries = self.entries.iter();
+        only(entries.filter(|entry| entry.key == key && entry.group == group))
+    }
+}
+
+fn only<'a>(mut entries: impl Iterator<Item = &'a Entry>) -> Result<Option<&'a Entry>, LabelError> {
+    let first = entries.next();
+    let differs = |entry: &&Entry| {
+        first.is_some_and(|first| first.value != entry.value || first.unit != entry.unit)
+    };
+    match (first, entries.find(differs)) {
+        (Some(first), Some(second)) => Err(LabelError::Twice {
+            key: first.key.clone(),
+            first: first.written(),
+            second: second.written(),
+        }),
+        _ => Ok(first),
     }
 }
 
@@ -281,9 +351,10 @@ mod tests {
         assert_eq!(entry(&label, "D"), ("4".into(), Some("km".into())));
         assert_eq!(entry(&label, "E"), ("5".into(), None));
         assert_eq!(label.find("F"), None);
-        let lines = label.find_in("DIMENSIONS", "LINES").unwrap();
+        let lines = label.only_in("DIMENSIONS", "LINES").unwrap().unwrap();
         assert_eq!(lines.value, "12");
-        assert_eq!(label.find_in("ISISCUBE", "LINES"), None);
+        assert_eq!(label.only_in("ISISCUBE", "LINES"), Ok(None));
+        assert!(label.ended);
         let blocks = ["A", "LINES", "D", "E"].map(|key| label.find(key).unwrap().block);
         assert_eq!(blocks, [0, 2, 1, 0]);
     }
@@ -294,6 +365,19 @@ mod tests {
             assert_eq!(parse(bytes), Err(LabelError::NoLabel));
         }
         assert_eq!(parse(b"no assignment\nat all"), Err(LabelError::NoLabel));
+    }
+
+    #[test]
+    fn one_keyword_has_one_value_and_a_whole_label_an_end() {
+        let label = parse(b"A = 1\nOBJECT = X\nA = 1\nB = 2\nEND_OBJECT\nB = 3 <km>\n").unwrap();
+        assert!(!label.ended);
+        assert_eq!(label.only("A").unwrap().unwrap().value, "1");
+        assert_eq!(label.only_in("X", "B").unwrap().unwrap().value, "2");
+        assert_eq!(label.only("C"), Ok(None));
+        assert_eq!(
+            label.only("B").unwrap_err().to_string(),
+            "B stands in the label as \"2\" and as \"3 <km>\"; expected one value"
+        );
     }
 
     proptest! {

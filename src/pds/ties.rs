@@ -5,8 +5,6 @@
 
 use std::{collections::BTreeMap, fs, path::Path};
 
-use serde::Deserialize;
-
 use super::label::{Entry, LabelError, parse_whole};
 use crate::{
     error::{Cause, IoError, Kind, Locate, Result},
@@ -14,7 +12,7 @@ use crate::{
 };
 
 /// Where ISIS has the middle of the first pixel, we have its outer edge at 0.
-const ISIS_TO_EDGE: f64 = -0.5;
+pub const ISIS_TO_EDGE: f64 = -0.5;
 
 /// Tie points of a file, and what was not taken.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -47,6 +45,12 @@ enum TieError {
     Column(&'static str),
     #[error("the table cannot be read: {0}")]
     Table(String),
+    #[error("not one of its records can be read ({records} in all); record {record}: {text}")]
+    Unreadable {
+        records: usize,
+        record: u64,
+        text: String,
+    },
     #[error(transparent)]
     Label(#[from] LabelError),
 }
@@ -60,7 +64,7 @@ impl Cause for TieError {
         match self {
             Self::Binary => "convert it with ISIS: cnetbin2pvl from=control.net to=control.pvl",
             Self::NoNetwork | Self::Label(_) => "give an ISIS control network in PVL, or a CSV table",
-            Self::Column(_) | Self::Table(_) => {
+            Self::Column(_) | Self::Table(_) | Self::Unreadable { .. } => {
                 "give a comma-separated table with a header line; lines and samples count from 1 at the middle of the first pixel"
             }
         }
@@ -71,7 +75,8 @@ impl Cause for TieError {
 /// Reads tie points; a file whose name ends in `.csv` is a table, any other a control network.
 ///
 /// # Errors
-/// The system's refusal to read; a binary network; no network; columns that are missing.
+/// The system's refusal to read; a binary network; no network; columns that are missing; records of which none
+/// can be read.
 pub fn read_ties(path: &Path) -> Result<TieFile> {
     let bytes = fs::read(path).map_err(IoError::on("read")).in_file(path)?;
     let table = path
@@ -82,7 +87,19 @@ pub fn read_ties(path: &Path) -> Result<TieFile> {
     } else {
         parse_network(&bytes)
     };
-    ties.in_file(path)
+    ties.and_then(readable).in_file(path)
+}
+
+/// A file of which nothing was taken says why.
+fn readable(file: TieFile) -> std::result::Result<TieFile, TieError> {
+    match file.complaints.first() {
+        Some(first) if file.ties.is_empty() => Err(TieError::Unreadable {
+            records: file.complaints.len(),
+            record: first.record,
+            text: first.text.clone(),
+        }),
+        _ => Ok(file),
+    }
 }
 
 /// The table of some tie points, as [`read_ties`] reads it; places to a ten-thousandth of a pixel.
@@ -90,7 +107,7 @@ pub fn read_ties(path: &Path) -> Result<TieFile> {
 pub fn ties_table(ties: &[TiePoint<String>]) -> String {
     let mut table = csv::Writer::from_writer(Vec::new());
     // Writing into memory cannot fail.
-    let _infallible = table.write_record(["point_id", "serial_number", "sample", "line"]);
+    let _infallible = table.write_record(COLUMNS);
     for tie in ties {
         for measure in &tie.measures {
             let [sample, line] =
@@ -102,13 +119,23 @@ pub fn ties_table(ties: &[TiePoint<String>]) -> String {
     String::from_utf8_lossy(&bytes).into_owned()
 }
 
-/// One row of a table; other columns are left alone.
-#[derive(Deserialize)]
-struct Row {
-    point_id: String,
-    serial_number: String,
-    sample: f64,
-    line: f64,
+/// Columns of a table; others are left alone.
+const COLUMNS: [&str; 4] = ["point_id", "serial_number", "sample", "line"];
+
+/// Where a table has its columns.
+fn places(header: &csv::StringRecord) -> std::result::Result<[usize; 4], TieError> {
+    let mut places = [0; 4];
+    for (place, column) in places.iter_mut().zip(COLUMNS) {
+        let mut names = header.iter();
+        *place = names
+            .position(|name| name == column)
+            .ok_or(TieError::Column(column))?;
+    }
+    Ok(places)
+}
+
+fn finite(text: &str) -> Option<f64> {
+    text.parse().ok().filter(|number: &f64| number.is_finite())
 }
 
 /// Gathers measurements into points by their identifiers.
@@ -146,37 +173,44 @@ fn parse_table(bytes: &[u8]) -> std::result::Result<TieFile, TieError> {
         .from_reader(bytes);
     let unreadable = |error: csv::Error| TieError::Table(error.to_string());
     let header = reader.headers().map_err(unreadable)?.clone();
-    for column in ["point_id", "serial_number", "sample", "line"] {
-        if !header.iter().any(|name| name == column) {
-            return Err(TieError::Column(column));
-        }
-    }
+    let places = places(&header)?;
     let mut gathered = Gathered::default();
     for record in reader.into_records() {
         let record = match record {
             Ok(record) => record,
             Err(error) => {
                 let line = error.position().map_or(0, csv::Position::line);
-                gathered.complain(line, error.to_string());
+                gathered.complain(line, unreadable_record(&error));
                 continue;
             }
         };
         let line = record.position().map_or(0, csv::Position::line);
-        match record.deserialize::<Row>(Some(&header)) {
-            Ok(row) if row.line.is_finite() && row.sample.is_finite() => {
-                gathered.add(row.point_id, row.serial_number, row.line, row.sample);
-            }
-            Ok(row) => gathered.complain(
-                line,
-                format!(
-                    "line {}, sample {}: expected finite numbers",
-                    row.line, row.sample
-                ),
-            ),
-            Err(error) => gathered.complain(line, error.to_string()),
+        let [id, image, sample, along] = places.map(|at| record.get(at).unwrap_or_default());
+        if let (false, Some(sample), Some(along)) = (
+            id.is_empty() || image.is_empty(),
+            finite(sample),
+            finite(along),
+        ) {
+            gathered.add(id.to_owned(), image.to_owned(), along, sample);
+        } else {
+            let text = format!(
+                "point_id {id:?}, serial_number {image:?}, sample {sample:?}, line {along:?}: expected two names and two \
+                 numbers"
+            );
+            gathered.complain(line, text);
         }
     }
     Ok(gathered.file)
+}
+
+/// Why a record is none, without the place that is told with it.
+fn unreadable_record(error: &csv::Error) -> String {
+    match error.kind() {
+        csv::ErrorKind::UnequalLengths {
+            expected_len, len, ..
+        } => format!("{len} fields; expected {expected_len}, as in the header"),
+        _ => error.to_string(),
+    }
 }
 
 fn parse_network(bytes: &[u8]) -> std::result::Result<TieFile, TieError> {
@@ -229,8 +263,7 @@ impl<'a> BlockEntries<'a> {
     }
 
     fn finite(&self, key: &str) -> Option<f64> {
-        let number: f64 = self.value(key)?.parse().ok()?;
-        number.is_finite().then_some(number)
+        finite(self.value(key)?)
     }
 }
 
@@ -324,6 +357,27 @@ mod tests {
             parse_table(b"point_id,line\n"),
             Err(TieError::Column("serial_number"))
         );
+    }
+
+    #[test]
+    fn a_file_without_a_readable_record_says_what_these_lack() {
+        let refused = |rows: &str| {
+            let table = format!("point_id,serial_number,sample,line\n{rows}");
+            readable(parse_table(table.as_bytes()).unwrap())
+                .unwrap_err()
+                .to_string()
+        };
+        assert_eq!(
+            refused("1,A,,2\n1,B,3,x\n"),
+            "not one of its records can be read (2 in all); record 2: point_id \"1\", serial_number \"A\", sample \"\", line \
+             \"2\": expected two names and two numbers"
+        );
+        assert_eq!(
+            refused("1,A,1\n"),
+            "not one of its records can be read (1 in all); record 2: 3 fields; expected 4, as in the header"
+        );
+        assert!(refused(",A,1,2\n").contains("point_id \"\""));
+        assert!(readable(parse_table(b"point_id,serial_number,sample,line\n").unwrap()).is_ok());
     }
 
     #[test]

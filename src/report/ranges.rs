@@ -173,8 +173,9 @@ fn three_ways(site: &SiteProducts) -> String {
         ),
         format!(
             "PEDR − kernels: the file's spacecraft minus the kernels', radial, along the flight and across it: what \
-             the choice of orbit changes. The tabulated trajectory is within {:.1e} m of the kernels.",
-            site.ranges.trajectory_error_m
+             the choice of orbit changes. Beyond {} m in all they are not of one orbit, clock and datum. The tabulated \
+             trajectory is within {:.1e} m of the kernels.",
+            limits.orbit_max_m, site.ranges.trajectory_error_m
         ),
     ];
     table.finish() + &list(&words)

@@ -100,6 +100,13 @@ fn nearest_limit(site: &SiteProducts) -> Option<(f64, String)> {
                 share(ranges.decoding_m.mean, limits.decoding_max_m),
                 format!("the decoding residual of profile {}", ranges.profile),
             ),
+            (
+                share(ranges.orbits_apart_m(), limits.orbit_max_m),
+                format!(
+                    "the distance of the two orbits in profile {}",
+                    ranges.profile
+                ),
+            ),
         ]
     });
     let limits = &site.config.orientation;

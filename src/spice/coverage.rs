@@ -28,6 +28,9 @@ pub struct Coverage {
     pub ck: Intervals,
     /// For each kernel that holds MGS: its index in the set, and its own intervals.
     pub per_kernel: Vec<(usize, Intervals)>,
+    /// C-kernels with attitudes of the bus that have no rates, by their index: these are not read.
+    #[serde(skip)]
+    pub without_rates: Vec<usize>,
     #[serde(skip)]
     seams: Vec<Et>,
 }
@@ -67,6 +70,10 @@ impl Coverage {
                         .in_file(&kernel.path)?;
                     held.extend(windows.into_iter().map(interval_of));
                     attitude.extend_from_slice(&held);
+                    let mut segments = daf::segments(&kernel.path)?.into_iter();
+                    if segments.any(|segment| is_without_rates(&segment)) {
+                        coverage.without_rates.push(index);
+                    }
                 }
                 _ => {}
             }
@@ -96,6 +103,11 @@ pub struct RequiredCoverage {
     pub positions: Intervals,
     /// Instants that attitudes must touch, as the C-kernels count time: exposures with the pointing bias.
     pub attitudes: Intervals,
+}
+
+fn is_without_rates(segment: &daf::Segment) -> bool {
+    let [object, _, _, rates, ..] = segment.integers;
+    object == NAIF_MGS_BUS && rates == 0
 }
 
 pub(super) fn interval_of([start, stop]: [f64; 2]) -> Interval {

@@ -126,6 +126,15 @@ impl Session {
         if let Some((start, index)) = after {
             sentences.push(format!("{} begins at UTC {}", name(index), self.utc(start)));
         }
+        if role == KernelRole::Ck {
+            let without = self.coverage()?.without_rates.iter();
+            sentences.extend(without.map(|index| {
+                format!(
+                    "{} holds attitude without angular rates, which is not read",
+                    name(*index)
+                )
+            }));
+        }
         if sentences.is_empty() {
             sentences.push("no kernel with it is loaded".to_owned());
         }

@@ -26,6 +26,8 @@ pub struct KernelDescription {
     pub kernels: Vec<KernelLine>,
     /// A planetary constants kernel that does not follow IAU 2000, in a sentence.
     pub pck_note: Option<String>,
+    /// C-kernels whose attitudes have no angular rates and are not read, in a sentence.
+    pub rates_note: Option<String>,
 }
 
 /// A kernel as manifest and report show it.
@@ -75,6 +77,7 @@ impl Input for Required<'_> {
 
 impl Stage for DescribeKernels<'_> {
     const NAME: &'static str = "describe_kernels";
+    const METHOD: u32 = 2;
     type Output = KernelDescription;
     stage_inputs!(fingerprint);
 
@@ -115,7 +118,22 @@ pub fn describe_kernels(
     Ok(KernelDescription {
         kernels: kernels.collect(),
         pck_note: pck_note(session, &required.positions),
+        rates_note: rates_note(session)?,
     })
+}
+
+/// CSPICE passes over attitudes without rates as if they were not there; whoever loads them should know.
+fn rates_note(session: &Session) -> Result<Option<String>> {
+    let kernels = session.kernels().kernels();
+    let without = session.coverage()?.without_rates.iter();
+    let names: Vec<String> = without.map(|index| kernels[*index].file_name()).collect();
+    Ok((!names.is_empty()).then(|| {
+        format!(
+            "{}: attitudes without angular rates, which are not read; where another C-kernel reaches, its attitude is \
+             taken",
+            names.join(", ")
+        )
+    }))
 }
 
 /// Products use the IAU 2000 formula whatever the PCK says; whoever loads `kernels.tm` should know.

@@ -1,7 +1,10 @@
 //! Reads tie points and finds their images among the site's.
 
+mod repeats;
+
 use std::{
     collections::{BTreeMap, BTreeSet},
+    path::PathBuf,
     sync::atomic::AtomicBool,
 };
 
@@ -10,12 +13,14 @@ use serde::{Deserialize, Serialize};
 use crate::{
     config::{ImageConfig, TiesConfig},
     error::{Cause, Kind, Result},
-    files::{HashedFile, file_name},
+    files::{HashedFile, file_name, hash_file},
     pds,
     stage::{InOrder, Input, Inputs, Stage},
     stage_inputs,
     ties::TiePoint,
 };
+
+use repeats::SharedPlaces;
 
 /// Complaints kept with their text; all are counted.
 const COMPLAINTS_MAX: usize = 1_000;
@@ -35,6 +40,10 @@ pub struct Ties {
     pub complaints: Vec<String>,
     /// All of them.
     pub complaint_count: u64,
+    /// Files that are copies of another one, one sentence each.
+    pub copies: Vec<String>,
+    /// What does not agree, and must be weighed, one sentence each.
+    pub remarks: Vec<String>,
 }
 
 /// Tie points that belong to other images.
@@ -46,6 +55,8 @@ enum TiesError {
     NoneJoins { points: usize },
     #[error("tie points are measured in {found}; expected images of the site: {expected}")]
     NoImage { found: String, expected: String },
+    #[error("tie points: {0}; expected at most half of the points at such places")]
+    SharedPlaces(SharedPlaces),
 }
 
 impl Cause for TiesError {
@@ -61,6 +72,9 @@ impl Cause for TiesError {
             }
             Self::NoImage { .. } => {
                 "give each image the name that the file has for it as images.serial_number"
+            }
+            Self::SharedPlaces(_) => {
+                "a place of an image is one tie point: check how the table was made"
             }
         }
         .to_owned()
@@ -105,6 +119,7 @@ impl Input for ImageNames<'_> {
 
 impl Stage for ReadTies<'_> {
     const NAME: &'static str = "read_ties";
+    const METHOD: u32 = 2;
     const CHECKED: bool = true;
     type Output = Ties;
     stage_inputs!(fingerprint);
@@ -119,18 +134,21 @@ impl Stage for ReadTies<'_> {
             0 => String::new(),
             count => format!("; {count} records that cannot be read"),
         };
-        vec![format!(
-            "{points} tie points, {multi_image} of them in two or more images{bad}"
-        )]
+        let found =
+            format!("{points} tie points, {multi_image} of them in two or more images{bad}");
+        let remarks = ties.remarks.iter();
+        let remarks = remarks.map(|remark| format!("tie points: {remark}"));
+        [found].into_iter().chain(remarks).collect()
     }
 }
 
 /// Reads all files of `ties`. A point that two files know by the same identifier is one when they measured it
-/// in different images; otherwise it stays two, of which an intersection takes the first.
+/// in different images; otherwise it stays two, of which an intersection takes the first. A copy of a file is not
+/// read again, and a point that repeats the measurements of another one is left out, whatever it is called.
 ///
 /// # Errors
-/// A file that is no table and no network; no measurement at all; none in an image of the site; none
-/// that joins two of them.
+/// A file that is no table and no network, or has no readable record; no measurement at all; none in an image of
+/// the site; none that joins two of them; most points measured at places of other points.
 pub fn read_ties(ties: &TiesConfig, images: &[ImageConfig]) -> Result<Ties> {
     let names: BTreeMap<&str, usize> = images
         .iter()
@@ -139,7 +157,16 @@ pub fn read_ties(ties: &TiesConfig, images: &[ImageConfig]) -> Result<Ties> {
         .collect();
     let mut read = Ties::default();
     let mut first = BTreeMap::new();
+    let mut contents: BTreeMap<String, &PathBuf> = BTreeMap::new();
     for path in &ties.files {
+        let (blake3, _) = hash_file(path)?;
+        if let Some(original) = contents.get(&blake3) {
+            let (copy, original) = (file_name(path), file_name(original));
+            read.copies
+                .push(format!("{copy}: a copy of {original}, read once"));
+            continue;
+        }
+        contents.insert(blake3, path);
         let file = pds::ties::read_ties(path)?;
         read.ignored += file.ignored as u64;
         for complaint in file.complaints {
@@ -161,6 +188,14 @@ pub fn read_ties(ties: &TiesConfig, images: &[ImageConfig]) -> Result<Ties> {
     if read.multi_image() == 0 {
         let points = read.points.len();
         return Err(TiesError::NoneJoins { points }.into());
+    }
+    read.remarks.extend(repeats::leave_out(&mut read.points));
+    let name = |image: usize| images.get(image).map_or("", |image| &*image.id);
+    if let Some(shared) = repeats::shared_places(&read.points, name) {
+        if 2 * shared.points > read.points.len() {
+            return Err(TiesError::SharedPlaces(shared).into());
+        }
+        read.remarks.push(shared.to_string());
     }
     Ok(read)
 }
@@ -199,7 +234,8 @@ impl Ties {
     #[must_use]
     pub fn notes(&self) -> Vec<String> {
         let elsewhere: u64 = self.elsewhere.values().sum();
-        let mut notes = Vec::new();
+        let copies = self.copies.iter();
+        let mut notes: Vec<String> = copies.map(|copy| format!("tie points: {copy}")).collect();
         if elsewhere > 0 {
             notes.push(format!(
                 "tie points: {elsewhere} measurements in {} images that the site does not have",
@@ -249,6 +285,8 @@ fn nothing_found(read: &Ties, names: &BTreeMap<&str, usize>) -> TiesError {
     reason = "files in a temporary folder need no atomic writer"
 )]
 mod tests {
+    use std::path::Path;
+
     use super::*;
     use crate::image::ImageFields;
 
@@ -262,11 +300,19 @@ mod tests {
         }
     }
 
+    fn file(folder: &Path, name: &str, text: &str) -> PathBuf {
+        let path = folder.join(name);
+        std::fs::write(&path, text).unwrap();
+        path
+    }
+
+    fn read_files(files: Vec<PathBuf>, images: &[ImageConfig]) -> Result<Ties> {
+        read_ties(&TiesConfig { files }, images)
+    }
+
     fn read(text: &str, images: &[ImageConfig]) -> Result<Ties> {
         let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("ties.csv");
-        std::fs::write(&path, text).unwrap();
-        read_ties(&TiesConfig { files: vec![path] }, images)
+        read_files(vec![file(folder.path(), "ties.csv", text)], images)
     }
 
     const TABLE: &str = "point_id,serial_number,sample,line\n\
@@ -288,22 +334,66 @@ mod tests {
     #[test]
     fn a_point_in_two_files_is_one_when_its_images_differ() {
         let folder = tempfile::tempdir().unwrap();
-        let files = ["1,A,1,1\n2,A,1,1\n", "1,B,2,2\n2,A,5,5\n"].map(|rows| {
-            let path = folder.path().join(format!("{}.csv", &rows[2..3]));
+        let files = ["1,A,1,1\n2,A,3,1\n", "1,B,2,2\n2,A,5,5\n"].map(|rows| {
             let text = format!("point_id,serial_number,sample,line\n{rows}");
-            std::fs::write(&path, text).unwrap();
-            path
+            file(folder.path(), &format!("{}.csv", &rows[2..3]), &text)
         });
         let images = [image("A", None), image("B", None)];
-        let ties = read_ties(
-            &TiesConfig {
-                files: files.to_vec(),
-            },
+        let ties = read_files(files.to_vec(), &images).unwrap();
+        let measures: Vec<usize> = ties.points.iter().map(|tie| tie.measures.len()).collect();
+        assert_eq!(measures, [2, 1, 1]);
+    }
+
+    #[test]
+    fn a_copy_of_a_file_is_read_once_and_points_under_several_names_count_once() {
+        const HEADER: &str = "point_id,serial_number,sample,line\n";
+        let rows = "1,A,1,1\n1,B,2,2\n2,A,3,3\n2,B,4,4\n3,A,5,5\n3,B,6,6\n";
+        let folder = tempfile::tempdir().unwrap();
+        let (text, images) = (
+            format!("{HEADER}{rows}"),
+            [image("A", None), image("B", None)],
+        );
+        let original = file(folder.path(), "ties.csv", &text);
+        let copy = file(folder.path(), "ties (1).csv", &text);
+        let ties = read_files(vec![original.clone(), copy], &images).unwrap();
+        assert_eq!(ties.points.len(), 3);
+        assert_eq!(
+            ties.notes(),
+            ["tie points: ties (1).csv: a copy of ties.csv, read once"]
+        );
+        assert_eq!(ties.remarks, [""; 0]);
+        // Saved anew: the same points in other bytes and under other names.
+        let anew = file(
+            folder.path(),
+            "anew.csv",
+            &text.replace("1,B,2,2", "1,B,2.0,2").replace("\n3", "\nx"),
+        );
+        let again = read_files(vec![original.clone(), anew], &images).unwrap();
+        assert_eq!(again.points, ties.points);
+        assert_eq!(
+            again.remarks,
+            ["3 repeat the measurements of another one and are left out, for example 1 those of 1"]
+        );
+        // One place of A, two of B.
+        let text = format!("{HEADER}{}", rows.replace("3,A,5,5", "3,A,1,1"));
+        let shared = "2 are measured at a place of another one, for example 1 and 3 at line 1.00, sample 1.00 of image A";
+        let failure = read(&text, &images).unwrap_err();
+        assert!(
+            failure.cause.to_string().contains(shared),
+            "{}",
+            failure.cause
+        );
+        let more = file(
+            folder.path(),
+            "more.csv",
+            &format!("{HEADER}7,A,7,7\n7,B,8,8\n"),
+        );
+        let ties = read_files(
+            vec![file(folder.path(), "shared.csv", &text), more],
             &images,
         )
         .unwrap();
-        let measures: Vec<usize> = ties.points.iter().map(|tie| tie.measures.len()).collect();
-        assert_eq!(measures, [2, 1, 1]);
+        assert_eq!(ties.remarks, [shared]);
     }
 
     #[test]

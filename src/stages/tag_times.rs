@@ -1,5 +1,6 @@
 //! Image labels become line times: spacecraft clock or UTC to ET, line period, header and delivered lines.
 
+mod agreement;
 mod detector;
 
 use std::sync::atomic::AtomicBool;
@@ -7,6 +8,7 @@ use std::sync::atomic::AtomicBool;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use agreement::{of_one_clock, of_one_product, start_agrees, stop_agrees};
 use detector::fits_detector;
 
 use crate::{
@@ -16,18 +18,13 @@ use crate::{
     geom::pushbroom::Detector,
     image::{IMAGE_DURATION_END_S, IMAGE_LINES_MIN, ImageFields, line_period_agrees},
     instruments::Instrument,
-    pds::moc,
+    pds::moc::{self, MocLabel},
     spice::{KernelView, Session},
     stage::Stage,
     stage_inputs,
     time::{Et, Interval},
     units::SECONDS_PER_MS,
 };
-
-/// A clock string and a UTC string farther apart than this contradict each other, seconds.
-///
-/// UTC in MOC labels is cut to 10 ms and lies up to 5 ms from the clock; a second means another image.
-const START_TOLERANCE_S: f64 = 1.0;
 
 /// When and how the lines of an image were exposed.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -62,6 +59,8 @@ pub struct ImageTimes {
     pub first_detector: u32,
     /// What the reader should know, one sentence each.
     pub notes: Vec<String>,
+    /// What does not agree, and must be weighed, one sentence each.
+    pub remarks: Vec<String>,
 }
 
 /// Source of an image's start time.
@@ -138,15 +137,6 @@ enum ImageError {
         computed_ms: f64,
     },
     #[error(
-        "image {image}: clock {sclk} is {apart_s:.3} s away from UTC {utc}; expected at most {START_TOLERANCE_S} s"
-    )]
-    Start {
-        image: String,
-        sclk: String,
-        utc: String,
-        apart_s: f64,
-    },
-    #[error(
         "image {image}: {delivered} lines delivered, {header} in the header; expected no more than in the header"
     )]
     Lines {
@@ -179,9 +169,6 @@ impl Cause for ImageError {
             Self::Period { .. } => {
                 "give the exposure of one detector line, or the period of summed lines, not a mixture".to_owned()
             }
-            Self::Start { .. } => {
-                "check which of the two belongs to this image; the clock is what would be used".to_owned()
-            }
             Self::Lines { .. } => {
                 "lines_header is what the camera exposed, lines_delivered what the file holds".to_owned()
             }
@@ -204,6 +191,7 @@ stage_inputs! {
 
 impl Stage for TagTimes<'_> {
     const NAME: &'static str = "tag_times";
+    const METHOD: u32 = 2;
     const CHECKED: bool = true;
     type Output = ImageTimes;
     stage_inputs!(fingerprint);
@@ -214,6 +202,13 @@ impl Stage for TagTimes<'_> {
 
     fn run(&self, _stop: &AtomicBool) -> Result<ImageTimes> {
         tag_image(self.image, self.kernels.session()?)
+    }
+
+    fn findings(&self, times: &ImageTimes) -> Vec<String> {
+        let remarks = times.remarks.iter();
+        remarks
+            .map(|remark| format!("image {}: {remark}", times.id))
+            .collect()
     }
 }
 
@@ -229,65 +224,69 @@ pub fn tag_times(images: &[ImageConfig], session: &Session) -> Result<Vec<ImageT
 }
 
 fn tag_image(image: &ImageConfig, session: &Session) -> Result<ImageTimes> {
-    let mut notes = Vec::new();
+    let times = image_times(image, session);
+    match &image.label {
+        Some(path) => times.in_file(path),
+        None => times,
+    }
+}
+
+fn image_times(image: &ImageConfig, session: &Session) -> Result<ImageTimes> {
+    let (mut notes, mut remarks) = (Vec::new(), Vec::new());
     let (instrument, label) = labelled(image)?;
-    let fields = merged(&image.fields, label, &mut notes);
-    let place = |error: ImageError| match &image.label {
-        Some(path) => Error::from(error).in_file(path),
-        None => Error::from(error),
-    };
-    let missing = |key| {
-        place(ImageError::Missing {
-            image: image.id.clone(),
-            key,
-        })
+    let utc_stop = label.as_ref().and_then(|label| label.utc_stop.clone());
+    let of_label = label.map_or_else(ImageFields::default, |label| label.fields);
+    let fields = merged(&image.fields, of_label, &mut notes);
+    let missing = |key| ImageError::Missing {
+        image: image.id.clone(),
+        key,
     };
     let lines_header = fields.lines_header.ok_or_else(|| missing("lines_header"))?;
-    let lines_delivered = fields.lines_delivered.unwrap_or(lines_header);
-    if lines_delivered > lines_header {
-        return Err(place(ImageError::Lines {
-            image: image.id.clone(),
-            delivered: lines_delivered,
-            header: lines_header,
-        }));
-    }
-    if lines_delivered < lines_header {
-        notes.push(format!(
-            "{} of {lines_header} header lines are not in the delivered file; times count header lines",
-            lines_header - lines_delivered
-        ));
-    }
+    let lines_delivered = lines_delivered(image, &fields, lines_header, &mut notes)?;
     let downtrack_summing = fields
         .downtrack_summing
         .ok_or_else(|| missing("downtrack_summing"))?;
     let crosstrack_summing = fields.crosstrack_summing.unwrap_or(downtrack_summing);
     let samples = fields.samples.ok_or_else(|| missing("samples"))?;
     let first_detector = fields.first_detector.unwrap_or(0);
-    let fits = fits_detector(
+    if fields.first_detector.is_none() && samples * crosstrack_summing < instrument.detector.pixels
+    {
+        remarks.push(format!(
+            "nothing says where on the {} pixels its {samples} samples begin (EDIT_MODE_ID, first_detector); pixel 0 is \
+             taken",
+            instrument.detector.pixels
+        ));
+    }
+    fits_detector(
         &image.id,
         &instrument,
         [downtrack_summing, crosstrack_summing],
         [first_detector, samples],
-    );
-    match &image.label {
-        Some(path) => fits.in_file(path)?,
-        None => fits?,
-    }
-    let (line_period_s, exposure_s) = line_period(image, &fields, downtrack_summing)
-        .map_err(place)?
-        .ok_or_else(|| missing("exposure_ms"))?;
+    )?;
+    let (line_period_s, exposure_s) =
+        line_period(image, &fields, downtrack_summing)?.ok_or_else(|| missing("exposure_ms"))?;
     let duration_s = f64::from(lines_header) * line_period_s;
     if lines_header < IMAGE_LINES_MIN || !(line_period_s > 0.0 && duration_s < IMAGE_DURATION_END_S)
     {
-        return Err(place(ImageError::Duration {
+        return Err(Error::from(ImageError::Duration {
             image: image.id.clone(),
             lines: lines_header,
             line_period_s,
         }));
     }
-    let (start, start_from) = start_time(image, &fields, session, &mut notes)?
-        .map_err(place)?
+    of_one_clock(image, fields.sclk_start.as_deref())?;
+    let (start, start_from) = start_time(image, &fields, session, &mut notes, &mut remarks)?
         .ok_or_else(|| missing("sclk_start"))?;
+    if let Some(utc) = &utc_stop {
+        let stop = (&**utc, session.utc_to_et(utc)?);
+        // Both are UTC of the label: whether the clock agrees with it is another question.
+        let start = fields
+            .utc_start
+            .as_deref()
+            .map_or(Ok(start), |utc| session.utc_to_et(utc))?;
+        let remark = stop_agrees(&image.id, start, stop, (lines_header, line_period_s))?;
+        remarks.extend(remark);
+    }
     Ok(ImageTimes {
         id: image.id.clone(),
         instrument,
@@ -304,25 +303,49 @@ fn tag_image(image: &ImageConfig, session: &Session) -> Result<ImageTimes> {
         samples,
         first_detector,
         notes,
+        remarks,
     })
+}
+
+/// Lines in the delivered file, with a note when they are fewer than in the header.
+fn lines_delivered(
+    image: &ImageConfig,
+    fields: &ImageFields,
+    header: u32,
+    notes: &mut Vec<String>,
+) -> std::result::Result<u32, ImageError> {
+    let delivered = fields.lines_delivered.unwrap_or(header);
+    if delivered > header {
+        return Err(ImageError::Lines {
+            image: image.id.clone(),
+            delivered,
+            header,
+        });
+    }
+    if delivered < header {
+        notes.push(format!(
+            "{} of {header} header lines are not in the delivered file; times count header lines",
+            header - delivered
+        ));
+    }
+    Ok(delivered)
 }
 
 /// The camera that the configuration names, else that of the label, else the first one that is known; and what
 /// the label says.
-fn labelled(image: &ImageConfig) -> Result<(Instrument, ImageFields)> {
+fn labelled(image: &ImageConfig) -> Result<(Instrument, Option<MocLabel>)> {
+    let Some(path) = &image.label else {
+        let named = image.instrument.as_ref();
+        let camera = named.unwrap_or_else(|| usual_instrument());
+        return Ok((camera.clone(), None));
+    };
     let cameras = match &image.instrument {
         Some(named) => std::slice::from_ref(named),
         None => built_in_instruments(),
     };
-    let (instrument, fields) = if let Some(path) = &image.label {
-        let label = moc::read_label(path, cameras)?;
-        (label.instrument, label.fields)
-    } else {
-        let named = image.instrument.as_ref();
-        let camera = named.unwrap_or_else(|| usual_instrument());
-        (camera.clone(), ImageFields::default())
-    };
-    Ok((instrument, fields))
+    let label = moc::read_label(path, cameras)?;
+    of_one_product(image, label.product_id.as_deref())?;
+    Ok((label.instrument.clone(), Some(label)))
 }
 
 /// Configuration over label, with a note for every key in which they differ.
@@ -391,39 +414,28 @@ fn line_period(
     }
 }
 
-type Start = std::result::Result<Option<(Et, StartFrom)>, ImageError>;
-
 /// The clock where there is one, else UTC; both together must agree.
 fn start_time(
     image: &ImageConfig,
     fields: &ImageFields,
     session: &Session,
     notes: &mut Vec<String>,
-) -> Result<Start> {
-    let convert = |result: Result<Et>| match &image.label {
-        Some(path) => result.in_file(path),
-        None => result,
-    };
-    let from_utc = match &fields.utc_start {
-        Some(utc) => Some((utc, convert(session.utc_to_et(utc))?)),
+    remarks: &mut Vec<String>,
+) -> Result<Option<(Et, StartFrom)>> {
+    let utc = fields.utc_start.as_deref();
+    let from_utc = match utc {
+        Some(utc) => Some((utc, session.utc_to_et(utc)?)),
         None => None,
     };
-    let Some(sclk) = &fields.sclk_start else {
+    let Some(sclk) = fields.sclk_start.as_deref() else {
         if from_utc.is_some() {
             notes.push("start from UTC, which MOC labels cut to 10 ms; no clock string".to_owned());
         }
-        return Ok(Ok(from_utc.map(|(_, start)| (start, StartFrom::Utc))));
+        return Ok(from_utc.map(|(_, start)| (start, StartFrom::Utc)));
     };
-    let start = convert(session.sclk_to_et(sclk))?;
-    if let Some((utc, utc_start)) = from_utc
-        && start.since(utc_start).abs() > START_TOLERANCE_S
-    {
-        return Ok(Err(ImageError::Start {
-            image: image.id.clone(),
-            sclk: sclk.clone(),
-            utc: utc.clone(),
-            apart_s: start.since(utc_start).abs(),
-        }));
+    let start = session.sclk_to_et(sclk)?;
+    if let Some(utc) = from_utc {
+        remarks.extend(start_agrees(&image.id, (sclk, start), utc)?);
     }
-    Ok(Ok(Some((start, StartFrom::Sclk))))
+    Ok(Some((start, StartFrom::Sclk)))
 }

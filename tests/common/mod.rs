@@ -8,6 +8,7 @@
 )]
 
 pub(crate) mod case;
+pub(crate) mod daf;
 pub(crate) mod golden;
 pub(crate) mod mission;
 pub(crate) mod outside;

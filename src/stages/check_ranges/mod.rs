@@ -9,11 +9,13 @@
 //! Geometric states only: the range is to the spacecraft's centre of mass, so there is no lever arm,
 //! and ISIS's apparent positions would be 0.14 km off.
 
+mod orbit;
 mod residuals;
 mod scan;
 
 use std::sync::atomic::AtomicBool;
 
+use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
 use super::{convert_datum::Converted, group_profiles::Profile};
@@ -62,6 +64,7 @@ stage_inputs! {
 
 impl Stage for CheckRanges<'_> {
     const NAME: &'static str = "check_ranges";
+    const METHOD: u32 = 2;
     type Output = RangeCheck;
     stage_inputs!(fingerprint);
 
@@ -145,6 +148,14 @@ pub struct ProfileRanges {
     pub invalid_because: Vec<String>,
 }
 
+impl ProfileRanges {
+    /// Mean distance of the file's own spacecraft from that of the kernels, metres.
+    #[must_use]
+    pub fn orbits_apart_m(&self) -> f64 {
+        Vector3::from(self.spacecraft_m.each_ref().map(|axis| axis.mean)).norm()
+    }
+}
+
 /// A shot outside the tabulated trajectory.
 #[derive(Debug, thiserror::Error)]
 #[error("profile {profile}: no spacecraft position at {at}, the time of a shot")]
@@ -205,7 +216,11 @@ pub fn check_ranges(
         let flags = outliers(&shots.range_minus_distance_m[first..], limits.outlier_sigma);
         shots.outlier.extend(flags);
         let scan = scan::scan(footprints, &shots, first, trajectory, limits);
-        checked.push(judged(profile, &shots, first, scan, footprints, limits));
+        let mut ranges = judged(profile, &shots, first, scan, footprints, limits);
+        let explain = || orbit::cause(footprints, profile, trajectory, clock, limits.orbit_max_m);
+        let apart = orbit::broken_limit(&ranges, limits.orbit_max_m, explain);
+        ranges.invalid_because.extend(apart);
+        checked.push(ranges);
     }
     Ok(RangeCheck {
         shots,

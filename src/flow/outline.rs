@@ -1,0 +1,96 @@
+//! The flow told without a site: the names of its stages, in their order.
+
+use std::{
+    path::PathBuf,
+    sync::{LazyLock, atomic::AtomicBool},
+};
+
+use super::{
+    PUBLISH,
+    driver::{Driver, Flow},
+    outputs::Site,
+    site::site,
+};
+use crate::{
+    config::{ImageConfig, SiteConfig},
+    error::Result,
+    files::{HashedFile, InputFiles},
+    stage::{Output, Stage},
+};
+
+/// The names of the stages in the order of the flow, for `--until`.
+#[must_use]
+pub fn stages() -> &'static [&'static str] {
+    static NAMES: LazyLock<Vec<&str>> = LazyLock::new(|| {
+        let mut outline = Outline {
+            files: InputFiles::default(),
+            never: AtomicBool::new(false),
+            names: Vec::new(),
+        };
+        // Of no kernels; with an image and tie points, so that no stage is passed over.
+        let mut config = SiteConfig::default();
+        config.images.push(ImageConfig::default());
+        config.ties.files.push(PathBuf::new());
+        // Nothing is read and nothing runs, so nothing fails.
+        let _ = site(&mut outline, &config);
+        outline.names
+    });
+    &NAMES
+}
+
+struct Outline {
+    files: InputFiles,
+    never: AtomicBool,
+    names: Vec<&'static str>,
+}
+
+impl Driver for Outline {
+    fn files(&self) -> &InputFiles {
+        &self.files
+    }
+
+    fn stop(&self) -> &AtomicBool {
+        &self.never
+    }
+
+    fn enter(&mut self, stage: &'static str) -> Flow<()> {
+        if !self.names.contains(&stage) {
+            self.names.push(stage);
+        }
+        Ok(())
+    }
+
+    fn stage<S: Stage>(&mut self, stage: &S) -> Flow<Output<S::Output>> {
+        self.enter(S::NAME)?;
+        Ok(Output::pending(stage.label()))
+    }
+
+    fn hash(&mut self, stage: &'static str, _paths: &[PathBuf]) -> Flow<Vec<HashedFile>> {
+        self.enter(stage)?;
+        Ok(Vec::new())
+    }
+
+    fn attempt<T>(&mut self, _stage: &str, result: Result<T>) -> Flow<Option<T>> {
+        Ok(result.ok())
+    }
+
+    fn publish(&mut self, _config: &SiteConfig, _site: &Site) -> Flow<()> {
+        self.enter(PUBLISH)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::flow::LOAD_KERNELS;
+
+    #[test]
+    fn the_flow_begins_with_kernels_passes_the_adjustment_and_ends_with_products() {
+        let stages = stages();
+        assert_eq!(stages.first(), Some(&LOAD_KERNELS));
+        assert_eq!(stages.last(), Some(&PUBLISH));
+        let place = |name| stages.iter().position(|stage| *stage == name).unwrap();
+        let adjustment = ["register", "read_ties", "adjust", "reorient"].map(place);
+        assert!(adjustment.is_sorted(), "{stages:?}");
+    }
+}

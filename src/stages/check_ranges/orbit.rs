@@ -1,0 +1,91 @@
+//! The file's own spacecraft and that of the kernels: whether both are of one orbit, one clock and one datum.
+//!
+//! Both hold for the same shots, so what is between them is no noise: rival orbits lie tens of metres apart,
+//! another clock correction as far along the flight as the spacecraft flies in it, another datum kilometres.
+
+use super::{
+    ProfileRanges,
+    residuals::{own_spacecraft, spacecraft_time},
+};
+use crate::{
+    altimetry::MolaClock,
+    footprints::Footprints,
+    frames::{MarsDatum, MarsIau2000},
+    geom::{
+        mars_rotation::{mars_matrix, mars_rotation},
+        orbit_axes::radial_along_cross,
+    },
+    spice::Trajectory,
+    stages::group_profiles::Profile,
+};
+
+/// Says that the two lie too far apart, and by `explain` why that may be; nothing within the limit.
+pub(super) fn broken_limit(
+    ranges: &ProfileRanges,
+    limit_m: f64,
+    explain: impl FnOnce() -> String,
+) -> Option<String> {
+    let apart_m = ranges.orbits_apart_m();
+    let [radial, along, cross] = ranges.spacecraft_m.each_ref().map(|axis| axis.mean);
+    // Written so that NaN breaks the limit.
+    (!(apart_m <= limit_m)).then(|| {
+        format!(
+            "the file's own spacecraft lies {apart_m:.0} m from that of the kernels ({radial:+.0} m up, {along:+.0} m \
+             along the flight, {cross:+.0} m across it); limit {limit_m} m: {}",
+            explain()
+        )
+    })
+}
+
+/// What would bring the two together in the middle of the profile: another datum, another clock correction, or neither.
+pub(super) fn cause(
+    footprints: &Footprints<MarsIau2000>,
+    profile: &Profile,
+    trajectory: &Trajectory,
+    clock: &MolaClock,
+    limit_m: f64,
+) -> String {
+    together(footprints, profile, trajectory, clock, limit_m)
+        .unwrap_or_else(|| "the kernels hold another orbit than the file".to_owned())
+}
+
+fn together(
+    footprints: &Footprints<MarsIau2000>,
+    profile: &Profile,
+    trajectory: &Trajectory,
+    clock: &MolaClock,
+    limit_m: f64,
+) -> Option<String> {
+    let shot = footprints.row(*profile.rows.get(profile.rows.len() / 2)? as usize);
+    let at = spacecraft_time(&shot, clock);
+    let (position, velocity_m_s) = (trajectory.position(at)?, trajectory.velocity_m_s(at)?);
+    let to_mars = *mars_rotation::<MarsIau2000>(at).matrix();
+    let datum = footprints.files.get(usize::from(shot.file))?.datum;
+    let own_m = to_mars.tr_mul(&own_spacecraft(&shot).xyz_m);
+    for other in [MarsDatum::Iau1991, MarsDatum::Iau1994, MarsDatum::Iau2000] {
+        // Back into the file's coordinates, and out of them as if they were of the other datum.
+        let coordinates_m = mars_matrix(datum.model(), at) * own_m;
+        let moved_m = mars_matrix(other.model(), at).tr_mul(&coordinates_m);
+        if other != datum && (moved_m - position.xyz_m).norm() <= limit_m {
+            return Some(format!(
+                "they agree when its coordinates are of {other}, not of {datum} (pedr.datum)"
+            ));
+        }
+    }
+    let difference_m =
+        radial_along_cross(&position.xyz_m, &velocity_m_s).tr_mul(&(own_m - position.xyz_m));
+    let [radial, along, cross] = [difference_m.x, difference_m.y, difference_m.z];
+    if radial.hypot(cross) > limit_m {
+        return None;
+    }
+    let used_s = if clock.moves_spacecraft() {
+        clock.correction_s()
+    } else {
+        0.0
+    };
+    Some(format!(
+        "they agree when time tags are corrected by {:+.3} s, not by {used_s:+.3} s (mola_clock), or the kernels hold \
+         another orbit",
+        used_s + along / velocity_m_s.norm()
+    ))
+}

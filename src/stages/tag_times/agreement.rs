@@ -1,0 +1,283 @@
+//! What is said of an image twice must agree: its product, its clock and UTC, its stop time and lines.
+
+use crate::{
+    config::ImageConfig,
+    error::{Cause, Kind},
+    pds::moc::product_named,
+    time::Et,
+    units::SECONDS_PER_MS,
+};
+
+/// Clock and UTC, or stop time and lines, that lie farther apart than this are remarked on, seconds.
+///
+/// UTC in MOC labels is cut to 10 ms: in five labels it lies 1 to 5 ms from the clock, and in three the time from
+/// start to stop is 4 to 6 ms less than that of the lines. It is 60 m on the ground.
+const CLOSE_S: f64 = 0.02;
+/// Farther apart than this they are those of two images, seconds.
+const TOLERANCE_S: f64 = 1.0;
+/// Speed of the spacecraft's shadow on the ground, metres per second: what a time is worth there.
+const GROUND_SPEED_M_S: f64 = 3_000.0;
+
+/// Two statements of which one belongs to another image.
+#[derive(Debug, thiserror::Error)]
+pub(super) enum Contradiction {
+    #[error(
+        "image {image}: the label is that of product {product}; expected {expected}, which its identifier names"
+    )]
+    Product {
+        image: String,
+        product: String,
+        expected: String,
+    },
+    #[error(
+        "image {image}: serial number {serial} holds another clock than {sclk}; expected them within {TOLERANCE_S} s"
+    )]
+    Serial {
+        image: String,
+        serial: String,
+        sclk: String,
+    },
+    #[error(
+        "image {image}: clock {sclk} is {apart_s:.3} s away from UTC {utc}; expected at most {TOLERANCE_S} s"
+    )]
+    Start {
+        image: String,
+        sclk: String,
+        utc: String,
+        apart_s: f64,
+    },
+    #[error(
+        "image {image}: STOP_TIME {stop} is {after_s:.3} s after the start, but its lines take {duration_s:.3} s; \
+         expected them to agree"
+    )]
+    Stop {
+        image: String,
+        stop: String,
+        after_s: f64,
+        duration_s: f64,
+    },
+}
+
+impl Cause for Contradiction {
+    fn kind(&self) -> Kind {
+        Kind::Input
+    }
+
+    fn advice(&self) -> String {
+        match self {
+            Self::Product { .. } => {
+                "check that labels are not exchanged; an identifier that names no product goes with any label"
+            }
+            Self::Serial { .. } => {
+                "check that labels or serial numbers are not exchanged; ISIS writes the clock of the label into the latter"
+            }
+            Self::Start { .. } => {
+                "check which of the two belongs to this image; the clock is what would be used"
+            }
+            Self::Stop { .. } => {
+                "check start and stop time, lines, exposure and downtrack summing; one of them is not of this image"
+            }
+        }
+        .to_owned()
+    }
+}
+
+/// What the label of `product` is for must be what the image's identifier names, where both name a product.
+pub(super) fn of_one_product(
+    image: &ImageConfig,
+    product: Option<&str>,
+) -> Result<(), Contradiction> {
+    let (Some(product), Some(named)) = (product, product_named(&image.id)) else {
+        return Ok(());
+    };
+    match product_named(product) {
+        Some(found) if found != named => Err(Contradiction::Product {
+            image: image.id.clone(),
+            product: product.to_owned(),
+            expected: named,
+        }),
+        _ => Ok(()),
+    }
+}
+
+/// A serial number of ISIS, `MGS/<clock>/MOC-NA/…`, holds the clock of the image.
+pub(super) fn of_one_clock(image: &ImageConfig, sclk: Option<&str>) -> Result<(), Contradiction> {
+    let serial = image.serial_number.as_deref();
+    let serial_clock = serial.and_then(|serial| serial.strip_prefix("MGS/")?.split('/').next());
+    let seconds = |clock: &str| -> Option<i64> {
+        let count = clock.strip_prefix("1/").unwrap_or(clock);
+        count.split([':', '.']).next()?.parse().ok()
+    };
+    let (Some(sclk), Some(serial)) = (sclk, serial) else {
+        return Ok(());
+    };
+    match (serial_clock.and_then(seconds), seconds(sclk)) {
+        (Some(held), Some(expected)) if held.abs_diff(expected) > 1 => Err(Contradiction::Serial {
+            image: image.id.clone(),
+            serial: serial.to_owned(),
+            sclk: sclk.to_owned(),
+        }),
+        _ => Ok(()),
+    }
+}
+
+/// A remark on a clock and a UTC of the start that do not agree.
+pub(super) fn start_agrees(
+    image: &str,
+    (sclk, start): (&str, Et),
+    (utc, utc_start): (&str, Et),
+) -> Result<Option<String>, Contradiction> {
+    let apart_s = start.since(utc_start).abs();
+    // Written so that NaN contradicts.
+    if !(apart_s <= TOLERANCE_S) {
+        return Err(Contradiction::Start {
+            image: image.to_owned(),
+            sclk: sclk.to_owned(),
+            utc: utc.to_owned(),
+            apart_s,
+        });
+    }
+    Ok((apart_s > close_s(utc)).then(|| {
+        format!(
+            "clock {sclk} is {apart_s:.3} s away from UTC {utc}, {} on the ground; labels agree within 0.005 s, and \
+             the clock is used",
+            on_ground(apart_s)
+        )
+    }))
+}
+
+/// A remark on a stop time that does not agree with the lines.
+pub(super) fn stop_agrees(
+    image: &str,
+    start: Et,
+    (utc, stop): (&str, Et),
+    (lines, line_period_s): (u32, f64),
+) -> Result<Option<String>, Contradiction> {
+    let (after_s, duration_s) = (stop.since(start), f64::from(lines) * line_period_s);
+    let apart_s = (after_s - duration_s).abs();
+    if apart_s <= close_s(utc) + line_period_s {
+        return Ok(None);
+    }
+    let alike = after_s <= 2.0 * duration_s && duration_s <= 2.0 * after_s;
+    // Written so that NaN contradicts.
+    if !(alike || apart_s <= TOLERANCE_S) {
+        return Err(Contradiction::Stop {
+            image: image.to_owned(),
+            stop: utc.to_owned(),
+            after_s,
+            duration_s,
+        });
+    }
+    Ok(Some(format!(
+        "STOP_TIME {utc} is {after_s:.3} s after the start, but {lines} lines of {:.4} ms take {duration_s:.3} s; lines, \
+         exposure or summing may not be those of the image",
+        line_period_s / SECONDS_PER_MS
+    )))
+}
+
+/// How close to an instant its UTC is, written with so many digits.
+fn close_s(utc: &str) -> f64 {
+    let decimals = utc.split_once('.').map_or(0, |(_, fraction)| {
+        fraction.bytes().take_while(u8::is_ascii_digit).count()
+    });
+    let written_s = 0.1_f64.powi(i32::try_from(decimals).unwrap_or(i32::MAX));
+    written_s.max(CLOSE_S)
+}
+
+fn on_ground(seconds: f64) -> String {
+    match seconds * GROUND_SPEED_M_S {
+        metres if metres < 1_000.0 => format!("{metres:.0} m"),
+        metres => format!("{:.1} km", metres / 1_000.0),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn image(id: &str, serial_number: Option<&str>) -> ImageConfig {
+        ImageConfig {
+            id: id.to_owned(),
+            serial_number: serial_number.map(str::to_owned),
+            ..ImageConfig::default()
+        }
+    }
+
+    /// What is said of a start so many seconds from its UTC.
+    fn start(apart_s: f64, utc: &str) -> Result<Option<String>, Contradiction> {
+        let at = Et::from_seconds;
+        start_agrees(
+            "i",
+            ("669788295:103", at(100.0 + apart_s)),
+            (utc, at(100.0)),
+        )
+    }
+
+    #[test]
+    fn a_clock_is_close_to_its_utc_as_far_as_that_is_written() {
+        const UTC: &str = "2001-03-23T04:17:44.58";
+        for close_s in [0.0, 0.0048, -0.0199] {
+            assert_eq!(start(close_s, UTC).unwrap(), None, "{close_s} s");
+        }
+        let remark = start(-0.9, UTC).unwrap().unwrap();
+        assert!(
+            remark
+                .contains("is 0.900 s away from UTC 2001-03-23T04:17:44.58, 2.7 km on the ground"),
+            "{remark}"
+        );
+        assert!(start(0.021, UTC).unwrap().unwrap().contains("63 m"));
+        assert!(start(1.001, UTC).is_err());
+        assert!(start(f64::NAN, UTC).is_err());
+        assert_eq!(start(0.6, "2001-03-23T04:17:44Z").unwrap(), None);
+    }
+
+    #[test]
+    fn a_stop_time_belongs_to_the_lines() {
+        let stop = |after_s: f64| {
+            let at = Et::from_seconds;
+            let lines = (8_064, 0.001_446_201);
+            stop_agrees(
+                "i",
+                at(5.0),
+                ("2001-03-23T04:17:56.238", at(5.0 + after_s)),
+                lines,
+            )
+        };
+        assert_eq!(stop(11.658).unwrap(), None);
+        // The lines that the file lacks, of this image and of one with half as many.
+        assert!(stop(11.107).unwrap().unwrap().contains("take 11.662 s"));
+        assert!(stop(22.0).unwrap().is_some());
+        for contradicting_s in [3_611.658, -0.1, 5.0, 24.0, f64::NAN] {
+            assert!(stop(contradicting_s).is_err(), "{contradicting_s} s");
+        }
+    }
+
+    #[test]
+    fn identifier_and_serial_number_are_those_of_the_label() {
+        let label = Some("E02/02016");
+        for id in ["E02-02016", "e0202016_part", "nadir"] {
+            assert!(of_one_product(&image(id, None), label).is_ok(), "{id}");
+        }
+        assert!(of_one_product(&image("E02-01301", None), None).is_ok());
+        assert_eq!(
+            of_one_product(&image("E02-01301", None), label)
+                .unwrap_err()
+                .to_string(),
+            "image E02-01301: the label is that of product E02/02016; expected E0201301, which its identifier names"
+        );
+        let clock = Some("669788295:103");
+        for serial in [
+            "MGS/669788295:103/MOC-NA/BROAD_BAND",
+            "MGS/669788296:001/MOC-NA",
+            "A",
+        ] {
+            assert!(
+                of_one_clock(&image("i", Some(serial)), clock).is_ok(),
+                "{serial}"
+            );
+        }
+        let exchanged = image("i", Some("MGS/669166526:3/MOC-NA/BROAD_BAND"));
+        assert!(of_one_clock(&exchanged, clock).is_err());
+        assert!(of_one_clock(&exchanged, None).is_ok());
+    }
+}
