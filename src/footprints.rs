@@ -47,6 +47,34 @@ pub struct SourceFile {
     pub blake3: String,
 }
 
+/// What controls an adjustment.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum AdjustmentModel {
+    /// Heights of tie points by the surface of all MOLA shots; orientations by what is known of orbit and attitude.
+    MolaSurface,
+    /// As published: image coordinates of footprints hold the images, one standard deviation an image stands for all
+    /// unknowns (Yoon & Shan 2004).
+    Published,
+}
+
+impl AdjustmentModel {
+    /// Every model, with its word in the configuration.
+    pub const WORDS: [(&'static str, Self); 2] = [
+        ("mola_surface", Self::MolaSurface),
+        ("published", Self::Published),
+    ];
+
+    /// Its word in the configuration.
+    #[must_use]
+    pub const fn word(self) -> &'static str {
+        match self {
+            Self::MolaSurface => "mola_surface",
+            Self::Published => "published",
+        }
+    }
+}
+
 /// What image coordinates of footprints are to an adjustment.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]

@@ -419,7 +419,7 @@ const PAIR_CASES: &[(&str, Spoil)] = &[
         case.replace(
             "site.toml",
             "tie_sigma_px",
-            "position_sigma_nadir_m = 0.01\nposition_sigma_off_nadir_m = 0.01\nblunder_limit = 0\ntie_sigma_px",
+            "model = \"published\"\nposition_sigma_nadir_m = 0.01\nposition_sigma_off_nadir_m = 0.01\nblunder_limit = 0\ntie_sigma_px",
         );
         case.run()
     }),

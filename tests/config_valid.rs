@@ -291,6 +291,12 @@ fn declarations_are_complete() {
         "range_check.outlier_share_max",
         "adjustment.robust_limit",
         "adjustment.blunder_limit",
+        "adjustment.height_blunder_limit",
+        "limits.profiles_apart_max_sigma",
+        "limits.correction_max_sigma",
+        "limits.sigma0_max",
+        "limits.ties_min",
+        "limits.rejected_share_max",
     ];
     for key in &keys {
         let path = &*key.path;
@@ -322,7 +328,7 @@ fn former_names_are_understood() {
              images = [{{ id = 'i', label = '../labels/e0202855.lbl' }}]\n\
              pedr.files = ['../pedr/*.b']\n\
              windows = [{{ id = 'w', longitude_deg = [0, 1], latitude_deg = [0, 1] }}]\n\
-             [adjustment]\n{lines}"
+             [adjustment]\nmodel = 'published'\n{lines}"
         )
     };
     let now = parse_in(
@@ -345,10 +351,10 @@ fn former_names_are_understood() {
     let prefix = format!("{}/sites/", folder.path().display());
     assert_eq!(
         before.warnings.join("\n").replace(&prefix, ""),
-        "site.toml:7:1: adjustment.mola_image is now called adjustment.footprint_image_coordinates\n\
-         site.toml:8:1: adjustment.mola_sigma_px is now called adjustment.footprint_sigma_px\n\
-         site.toml:9:1: adjustment.mola_margin_px is now called adjustment.footprint_margin_px\n\
-         site.toml:10:1: adjustment.nadir_sigma_m is now called adjustment.position_sigma_nadir_m\n\
-         site.toml:11:1: adjustment.off_nadir_sigma_m is now called adjustment.position_sigma_off_nadir_m"
+        "site.toml:8:1: adjustment.mola_image is now called adjustment.footprint_image_coordinates\n\
+         site.toml:9:1: adjustment.mola_sigma_px is now called adjustment.footprint_sigma_px\n\
+         site.toml:10:1: adjustment.mola_margin_px is now called adjustment.footprint_margin_px\n\
+         site.toml:11:1: adjustment.nadir_sigma_m is now called adjustment.position_sigma_nadir_m\n\
+         site.toml:12:1: adjustment.off_nadir_sigma_m is now called adjustment.position_sigma_off_nadir_m"
     );
 }

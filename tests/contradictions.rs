@@ -82,6 +82,21 @@ const MISTAKES: &[Mistake] = &[
         "\n  image E02-02016: clock 669788296:077 is 0.895 s away from UTC 2001-03-23T04:17:44.58, 2.7 km on the ground",
     ),
     (
+        "leap_second_missing",
+        |case| case.replace("kernels/leapseconds.tls", "32,   @1999-JAN-1", ""),
+        End::Remark,
+        "a leap second that the kernels lack may be the cause",
+    ),
+    (
+        "mounting_of_a_withdrawn_kernel",
+        |case| {
+            let (flight, withdrawn) = ("( -0.11463   0.07162", "(  0.06700  -0.01200");
+            case.replace("kernels/moc.ti", flight, withdrawn);
+        },
+        End::Remark,
+        "the kernels mount MOC narrow angle 0.2000° from where its instrument file has it, 1.3 km on the ground",
+    ),
+    (
         "clock_2_s_off",
         |case| label(case, CLOCK, "669788297:103"),
         End::Error(3),
@@ -238,7 +253,7 @@ const MISTAKES: &[Mistake] = &[
                 _ => format!("{id},{image},630.3337,1591.1327"),
             });
         },
-        End::Invalid,
+        End::Remark,
         "repeat the measurements of another one",
     ),
     (

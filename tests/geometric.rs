@@ -229,6 +229,7 @@ fn a_tie_point_file_touches_what_comes_after_it() {
         "read_ties",
         "intersect",
         "compare_pairs",
+        "check_heights",
         "adjust",
         "reorient/E02-01301",
         "reorient/E02-02016",
@@ -238,6 +239,7 @@ fn a_tie_point_file_touches_what_comes_after_it() {
         "register/E02-02016/adjusted",
         "intersect/adjusted",
         "compare_pairs/adjusted",
+        "check_heights/adjusted",
         "tabulate_kernels/E02-01301",
         "tabulate_kernels/E02-02016",
         "publish",
@@ -248,7 +250,7 @@ fn a_tie_point_file_touches_what_comes_after_it() {
         "tie_sigma_px = [1.6, 1.0]",
         "tie_sigma_px = [1.7, 1.0]",
     );
-    assert_eq!(case.stages_run(), stages[3..]);
+    assert_eq!(case.stages_run(), stages[4..]);
     // A site whose tie points are gone has no product of them left.
     let site = String::from_utf8(case.read("site.toml")).unwrap();
     let (before, after) = (
@@ -327,7 +329,7 @@ fn ties_that_are_none_make_the_site_invalid() {
 #[test]
 fn a_failed_adjustment_keeps_no_other_product_from_its_readers() {
     let case = Case::pair();
-    let free = "position_sigma_nadir_m = inf\nposition_sigma_off_nadir_m = inf\nfootprint_image_coordinates = \"off\"\ntie_sigma_px";
+    let free = "model = \"published\"\nposition_sigma_nadir_m = inf\nposition_sigma_off_nadir_m = inf\nfootprint_image_coordinates = \"off\"\ntie_sigma_px";
     case.replace("site.toml", "tie_sigma_px", free);
     let mut table = String::from_utf8(case.read("ties/isidis.csv")).unwrap();
     table += "bad,E02-01301,elsewhere,1.0\n";

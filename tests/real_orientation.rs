@@ -129,6 +129,29 @@ fn position_rmse_equals_cspice() {
     }
 }
 
+/// What real labels say twice agrees: the limits of remarks are above all that occurs.
+#[test]
+fn real_labels_are_not_remarked_on() {
+    let test = "clock, UTC, stop time and mounting of real labels";
+    let Some(folder) = common::real_data("ale_mgs/m0402852", test) else {
+        return;
+    };
+    let files = common::m0402852_files(&folder);
+    let session = Session::open(&KernelSet::from_files(&files).unwrap()).unwrap();
+    let labels = [
+        ("M04-02852", "ale_mgs/m0402852/m0402852_isis.lbl"),
+        ("M01-00115", "asp_moc/M0100115.imq"),
+        ("M13-01260", "isis_moc/m1301260_isis.lbl"),
+    ];
+    for (id, label) in labels {
+        let Some(label) = common::real_data(label, test) else {
+            return;
+        };
+        let times = tag_times(&[image(id, label)], &session).unwrap().remove(0);
+        assert_eq!(times.remarks, [""; 0], "{id}");
+    }
+}
+
 #[test]
 fn m0100115_starts_when_ames_stereo_pipeline_says() {
     let test = "real label of M01/00115";

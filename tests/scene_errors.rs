@@ -46,7 +46,7 @@ const NO_JITTER: Jitter = Jitter {
     period_s: [0.0; 2],
 };
 const NO_TURN: AttitudeErrors = AttitudeErrors {
-    constant_sigma_rad: 0.0,
+    constant_sigma_rad: [0.0; 3],
     linear_sigma_rad: 0.0,
     quadratic_sigma_rad: 0.0,
     jitter: NO_JITTER,

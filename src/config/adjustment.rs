@@ -1,7 +1,7 @@
 //! `[adjustment]`.
 
 use crate::{
-    footprints::FootprintImageCoordinates,
+    footprints::{AdjustmentModel, FootprintImageCoordinates},
     geom::{robust::RobustWeight, statistics::BAARDA_LIMIT},
     units::{RADIANS_PER_ARCSECOND, SECONDS_PER_MS},
 };
@@ -23,23 +23,43 @@ const SIGMAS: Several<Number, 2> = several(SIGMA, "2 numbers");
 /// Standard deviations of three quantities, each with three powers of time.
 const SIGMAS_OF_POWERS: Several<Number, 9> = several(SIGMA_OR_FREE, "9 numbers");
 
+/// Standard deviations of the three powers of time.
+const SIGMAS_OF_TIME: Several<Number, 3> = several(SIGMA_OR_FREE, "3 numbers");
+
 declare_table! {
-    /// Combined adjustment of images, footprints, ranges and tie points (Yoon & Shan 2004). Standard deviations
-    /// are those of the paper where it gives one.
+    /// Combined adjustment of images, laser shots and tie points. Standard deviations are those of Yoon & Shan 2004 where
+    /// the paper gives one.
     pub struct AdjustmentConfig {
+        /// What controls it. In the published model the image coordinates of footprints come from the orientations
+        /// that are adjusted and hold them where they were; it is there for comparison.
+        model: AdjustmentModel = key(words_of(
+            AdjustmentModel::WORDS,
+            [
+                "heights of tie points by the MOLA surface, orientations by what is known of orbit and attitude",
+                "image coordinates of footprints as observations, one standard deviation an image (Yoon & Shan 2004)",
+            ],
+        )).or(AdjustmentModel::MolaSurface),
         /// Standard deviations of tie points, along and across the track, in the focal plane (the paper).
         tie_sigma_px: [f64; 2] = key(SIGMAS).or([1.0, 1.0]),
-        /// What image coordinates of footprints are. They come from the orientation that is being adjusted and
-        /// are no measurements of their own; the paper has them all the same. Weighted, hundreds of them hold
-        /// the images where they were against a handful of tie points: with fewer than about ten, choose "off".
-        footprint_image_coordinates: FootprintImageCoordinates = key(words_of(
+        /// Standard deviations of X, Y and Z of every image for the powers 0, 1, 2 of t, which is 0 in the middle of the
+        /// image and 1 at its end; inf leaves free, 0 holds fixed. Orbits of three families lie up to 50 m apart
+        /// (Shan et al. 2005), and errors go with the revolution.
+        position_sigma_m: [f64; 3] = key(SIGMAS_OF_TIME).or([25.0, 0.2, 0.0]),
+        /// Standard deviations of the rotations about the camera's axes, likewise: 0.4 mrad, 150 m on the ground, as the
+        /// distances between images of a pair ask for, with drifts of the size of the attitude's own residuals.
+        rotation_sigma_rad as "rotation_sigma_arcsec": [f64; 3] = key(SIGMAS_OF_TIME)
+            .or([82.5, 2.0, 2.0])
+            .map(|sigmas| sigmas.map(|sigma| sigma * RADIANS_PER_ARCSECOND)),
+        /// What image coordinates of footprints are: "off" unless the model is the published one, where they are
+        /// "weighted". They come from the orientation that is being adjusted and are no measurements of their own.
+        footprint_image_coordinates: Option<FootprintImageCoordinates> = key(words_of(
             FootprintImageCoordinates::WORDS,
             [
                 "observations",
                 "nothing",
                 "projections with the adjusted orientation, without weight, freedom or covariance",
             ],
-        )).or(FootprintImageCoordinates::Weighted).was("mola_image"),
+        )).unused(r#""off""#).was("mola_image"),
         /// Their standard deviations, along and across the track, in the focal plane: one MOLA spacing (325 m
         /// at 4.4 m a pixel), and 4; the paper gives none.
         footprint_sigma_px: [f64; 2] = key(SIGMAS).or([74.0, 4.0]).was("mola_sigma_px"),
@@ -50,16 +70,18 @@ declare_table! {
         /// Standard deviation of ranges (the paper; the instrument: 7 m at 400 km).
         range_sigma_m: f64 = key(SIGMA).or(10.0),
         /// Range bias of each profile as an unknown with this standard deviation; 0 for no such unknown. Biases
-        /// up to 25 m occur off nadir (Table 3 of Shan et al. 2005): 30 lets them go.
-        range_bias_sigma_m: f64 = key(SIGMA_OR_NONE).or(0.0),
+        /// up to 25 m occur off nadir (Table 3 of Shan et al. 2005). 30 unless the model is the published one, where
+        /// there is none.
+        range_bias_sigma_m: Option<f64> = key(SIGMA_OR_NONE).unused("30.0"),
         /// Time bias of each image as an unknown with this standard deviation; 0 for no such unknown.
         time_bias_sigma_s as "time_bias_sigma_ms": f64 =
             key(SIGMA_OR_NONE).or(0.0).map(|milliseconds| milliseconds * SECONDS_PER_MS),
-        /// Standard deviation of the position unknowns of images that look to nadir (within 5 degrees); inf
-        /// leaves free, 0 holds fixed. Rotations get what moves the ground as far (the paper).
-        position_sigma_nadir_m: f64 = key(SIGMA_OR_FREE).or(100.0).was("nadir_sigma_m"),
+        /// Published model: standard deviation of the position unknowns of images that look to nadir (within 5
+        /// degrees); inf leaves free, 0 holds fixed. Rotations get what moves the ground as far (the paper).
+        position_sigma_nadir_m: Option<f64> = key(SIGMA_OR_FREE).unused("100.0").was("nadir_sigma_m"),
         /// The same for all other images (the paper).
-        position_sigma_off_nadir_m: f64 = key(SIGMA_OR_FREE).or(200.0).was("off_nadir_sigma_m"),
+        position_sigma_off_nadir_m: Option<f64> =
+            key(SIGMA_OR_FREE).unused("200.0").was("off_nadir_sigma_m"),
         /// Weights of image coordinates that fall with their residual.
         robust: Option<RobustWeight> = group::<RobustKeys>().map(RobustKeys::weight),
         /// Standardised residual above which a tie point is a blunder and rejected; 0 keeps all. Beyond the
@@ -67,8 +89,60 @@ declare_table! {
         blunder_limit: Option<f64> = key(from_to(0.0, 1000.0))
             .or(BAARDA_LIMIT)
             .map(|limit| (limit > 0.0).then_some(limit)),
+        /// Height against the MOLA surface, in standard deviations, above which a tie point is a blunder and rejected
+        /// unless a neighbour lies off to the same side; 0 keeps all. Not used in the published model.
+        height_blunder_limit: Option<f64> = key(from_to(0.0, 1000.0))
+            .or(5.0)
+            .map(|limit| (limit > 0.0).then_some(limit)),
         /// Images whose unknowns have their own standard deviations.
         images: Vec<OrientationPrior> = tables(Many::ANY),
+    }
+    check keys_of_the_model
+}
+
+/// Keys of one model are not used by the other.
+fn keys_of_the_model(checked: &AdjustmentConfig, keys: &mut Keys<'_, '_>) {
+    let others: &[&str] = match checked.model {
+        AdjustmentModel::MolaSurface => &["position_sigma_nadir_m", "position_sigma_off_nadir_m"],
+        AdjustmentModel::Published => &[
+            "position_sigma_m",
+            "rotation_sigma_arcsec",
+            "height_blunder_limit",
+        ],
+    };
+    let reason = format!("adjustment.model is {:?}", checked.model.word());
+    for key in others {
+        keys.unused(key, &reason);
+    }
+}
+
+impl AdjustmentConfig {
+    /// What image coordinates of footprints are.
+    #[must_use]
+    pub fn footprints_in_images(&self) -> FootprintImageCoordinates {
+        self.footprint_image_coordinates
+            .unwrap_or(match self.model {
+                AdjustmentModel::MolaSurface => FootprintImageCoordinates::Off,
+                AdjustmentModel::Published => FootprintImageCoordinates::Weighted,
+            })
+    }
+
+    /// Standard deviation of the range bias of a profile, metres; 0 for no such unknown.
+    #[must_use]
+    pub fn range_bias_m(&self) -> f64 {
+        self.range_bias_sigma_m.unwrap_or(match self.model {
+            AdjustmentModel::MolaSurface => 30.0,
+            AdjustmentModel::Published => 0.0,
+        })
+    }
+
+    /// Standard deviations of position unknowns of nadir images and of others in the published model, metres.
+    #[must_use]
+    pub fn published_sigmas_m(&self) -> [f64; 2] {
+        [
+            self.position_sigma_nadir_m.unwrap_or(100.0),
+            self.position_sigma_off_nadir_m.unwrap_or(200.0),
+        ]
     }
 }
 

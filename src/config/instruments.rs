@@ -18,26 +18,21 @@ use crate::{
     units::RADIANS_PER_DEGREE,
 };
 
+/// Files below `config` with their text, built into the program.
+macro_rules! built_in {
+    ($($file:literal),+ $(,)?) => {
+        [$((concat!("config/", $file), include_str!(concat!("../../config/", $file)))),+]
+    };
+}
+
 /// Files of cameras that the program knows; the first is that of images which name none.
-const INSTRUMENTS: [(&str, &str); 3] = [
-    (
-        "config/instruments/moc_na.toml",
-        include_str!("../../config/instruments/moc_na.toml"),
-    ),
-    (
-        "config/instruments/moc_wa_red.toml",
-        include_str!("../../config/instruments/moc_wa_red.toml"),
-    ),
-    (
-        "config/instruments/moc_wa_blue.toml",
-        include_str!("../../config/instruments/moc_wa_blue.toml"),
-    ),
+const INSTRUMENTS: &[(&str, &str)] = &built_in![
+    "instruments/moc_na.toml",
+    "instruments/moc_wa_red.toml",
+    "instruments/moc_wa_blue.toml",
 ];
 /// Files of altimeters that the program knows.
-const ALTIMETERS: [(&str, &str); 1] = [(
-    "config/altimeters/mola.toml",
-    include_str!("../../config/altimeters/mola.toml"),
-)];
+const ALTIMETERS: [(&str, &str); 1] = built_in!["altimeters/mola.toml"];
 /// Numbers of NAIF for spacecraft, instruments and frames.
 const NAIF_IDS: [i32; 2] = [-999_999_999, -1];
 

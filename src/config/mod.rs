@@ -13,6 +13,8 @@ mod geojson;
 mod images;
 mod instruments;
 mod kernels;
+mod limits;
+mod mola_surface;
 mod orientation;
 mod paths;
 mod pedr;
@@ -36,6 +38,8 @@ pub use instruments::{
     altimeter, built_in_altimeter, built_in_instruments, instrument, usual_instrument,
 };
 pub use kernels::KernelsConfig;
+pub use limits::LimitsConfig;
+pub use mola_surface::MolaSurfaceConfig;
 pub use orientation::{OrientationConfig, RegistrationConfig};
 pub use pedr::PedrConfig;
 pub use pointing::PointingConfig;

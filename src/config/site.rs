@@ -15,6 +15,8 @@ use super::{
     forms::{any_text, lower_case_identifier},
     images::{IMAGES, ImageConfig},
     kernels::KernelsConfig,
+    limits::LimitsConfig,
+    mola_surface::MolaSurfaceConfig,
     orientation::{OrientationConfig, RegistrationConfig},
     pedr::PedrConfig,
     pointing::{PointingConfig, has_turned_sign},
@@ -64,8 +66,12 @@ declare_table! {
         ties: TiesConfig = table(),
         /// Intersection of tie points.
         intersection: IntersectionConfig = table(),
+        /// The MOLA surface.
+        mola_surface: MolaSurfaceConfig = table(),
         /// Combined adjustment.
         adjustment: AdjustmentConfig = table(),
+        /// Limits on tie points and their adjustment.
+        limits: LimitsConfig = table(),
     }
     check across_tables
 }

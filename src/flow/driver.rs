@@ -2,10 +2,10 @@
 
 use std::{path::PathBuf, sync::atomic::AtomicBool};
 
-use super::{outline::stages, outputs::Site};
+use super::outputs::Site;
 use crate::{
     config::SiteConfig,
-    error::{Error, Locate, Result, Stopped},
+    error::{Error, Locate, Result},
     files::{HashedFile, InputFiles},
     spice::RequiredCoverage,
     stage::{Output, Provenance, Reason, Stage},
@@ -90,22 +90,4 @@ pub(super) trait Driver {
 
     /// The products.
     fn publish(&mut self, config: &SiteConfig, site: &Site) -> Flow<()>;
-}
-
-/// Where a run or a plan ends, and the files that it reads.
-pub(super) struct Bounds<'a> {
-    pub(super) until: &'a str,
-    pub(super) stop: &'a AtomicBool,
-    pub(super) files: InputFiles,
-}
-
-impl Bounds<'_> {
-    /// Leaves the flow before `stage` when it is not asked for, or when the user stops the program.
-    pub(super) fn enter(&self, stage: &'static str) -> Flow<()> {
-        let place = |name: &str| stages().iter().position(|stage| *stage == name);
-        if place(self.until) < place(stage) {
-            return Err(Leave::StageReached);
-        }
-        Ok(Stopped::check(self.stop).in_stage(stage)?)
-    }
 }

@@ -23,12 +23,15 @@ pub(super) fn judged(
     let adjusted = site.adjustment.as_ref();
     let adjusted_images = adjusted.map_or(&[][..], |of| &of.images);
     let adjusted_images = judged_images(adjusted_images)?;
-    let adjustment = match (&site.ties, adjusted) {
-        (Some(ties), Some(adjustment)) => Some(AdjustmentEvidence {
+    let adjustment = match (&site.ties, &site.intersection, adjusted) {
+        (Some(ties), Some(initial), Some(adjustment)) => Some(AdjustmentEvidence {
             ties: ties.value()?,
             adjusted: adjustment.adjusted.value()?,
             images: &adjusted_images,
-            pairs: adjustment.intersection.pairs.value()?,
+            pairs: initial.pairs.value()?,
+            adjusted_pairs: adjustment.intersection.pairs.value()?,
+            heights: initial.heights.value()?,
+            adjusted_heights: adjustment.intersection.heights.value()?,
         }),
         _ => None,
     };
@@ -39,6 +42,7 @@ pub(super) fn judged(
     let searched = !config.pedr.files.is_empty();
     let verdict = judge(&Evidence {
         footprints: searched.then_some(site.converted.value()?.footprints.len()),
+        limits: &config.limits,
         ranges: site.ranges.value()?,
         clock_correction_s: config.mola_clock.correction_s(),
         images: &images,
@@ -47,7 +51,10 @@ pub(super) fn judged(
         adjustment,
         adjustment_failure: failure.as_deref(),
     });
-    Ok((verdict, adjustment.is_some_and(|of| of.images_agree())))
+    Ok((
+        verdict,
+        adjustment.is_some_and(|of| of.images_agree(&config.limits)),
+    ))
 }
 
 /// What a reader must weigh of kernels, clocks, labels and tie points, one sentence each.

@@ -4,6 +4,7 @@
 //! `flow/site.rs` is one description of it, read top to bottom. A driver says what becomes of each stage: a run makes or
 //! keeps its output, a plan looks whether it would be kept, a check runs what tells whether a run can succeed.
 
+mod bounds;
 mod check;
 mod choice;
 mod compare;

@@ -6,10 +6,11 @@ use crate::{
     spice::{KernelSet, RequiredCoverage},
     stage::Output,
     stages::{
-        adjust::Adjusted, check_ranges::RangeCheck, compare_pairs::PairComparison,
-        convert_datum::Converted, describe_kernels::KernelDescription, group_profiles::Profile,
-        intersect::IntersectedTies, read_ties::Ties, search_footprints::SearchResult,
-        site_image::SiteImage, tabulate_kernels::KernelTables, tag_times::ImageTimes,
+        adjust::Adjusted, check_heights::HeightCheck, check_ranges::RangeCheck,
+        compare_pairs::PairComparison, convert_datum::Converted,
+        describe_kernels::KernelDescription, group_profiles::Profile, intersect::IntersectedTies,
+        read_ties::Ties, search_footprints::SearchResult, site_image::SiteImage,
+        tabulate_kernels::KernelTables, tag_times::ImageTimes,
     },
 };
 
@@ -53,6 +54,8 @@ pub(super) struct Site {
 pub(super) struct Intersection {
     pub(super) intersected: Output<IntersectedTies>,
     pub(super) pairs: Output<Vec<PairComparison>>,
+    /// Heights of the intersected points, or of those of the adjustment.
+    pub(super) heights: Output<HeightCheck>,
 }
 
 /// What the adjustment makes of a site.

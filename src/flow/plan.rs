@@ -7,7 +7,8 @@ use std::{
 
 use super::{
     PUBLISH,
-    driver::{Bounds, Driver, Flow, Leave, Ledger, StageReason},
+    bounds::Bounds,
+    driver::{Driver, Flow, Leave, Ledger, StageReason},
     outputs::Site,
     publish::{inputs, standing},
     site::site,

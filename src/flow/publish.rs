@@ -109,6 +109,7 @@ pub(super) fn publish(
             kernels,
             folder,
             adjusted: adjustment.adjusted.value()?,
+            heights: adjustment.intersection.heights.value()?,
             images: &adjusted_images,
             tables: &tables,
             intersected: adjustment.intersection.intersected.value()?,
@@ -183,6 +184,7 @@ fn geometric_products<'a>(
         ties: ties.value()?,
         intersected: initial.intersected.value()?,
         pairs: initial.pairs.value()?,
+        heights: initial.heights.value()?,
         adjustment,
     }))
 }

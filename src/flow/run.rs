@@ -4,7 +4,8 @@ use std::{path::PathBuf, sync::atomic::AtomicBool};
 
 use super::{
     PUBLISH,
-    driver::{Bounds, Driver, Flow, Leave, Ledger, StageReason},
+    bounds::Bounds,
+    driver::{Driver, Flow, Leave, Ledger, StageReason},
     outputs::Site,
     publish::{inputs, publish, standing},
     site::site,

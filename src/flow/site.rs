@@ -14,7 +14,8 @@ use crate::{
     spice::{KernelSet, KernelView, RequiredCoverage},
     stage::{InOrder, Output, Round, Stage},
     stages::{
-        adjust::Adjust,
+        adjust::{Adjust, Adjusted},
+        check_heights::{CheckHeights, CheckedPoints},
         check_ranges::CheckRanges,
         compare_pairs::ComparePairs,
         convert_datum::{ConvertDatum, Converted},
@@ -251,7 +252,7 @@ fn triangulate<D: Driver>(flow: &mut D, config: &SiteConfig, site: &mut Site) ->
     }
     let ties = &*site.ties.insert(ties(flow, config)?);
     let shots = (&site.converted, &site.profiles);
-    let initial = intersect(flow, config, Round::Initial, &site.images, ties, shots)?;
+    let initial = intersect(flow, config, None, &site.images, ties, shots)?;
     let initial = &*site.intersection.insert(initial);
     let kernels = &KernelView::all(site.kernels.as_ref());
     let adjustment = adjust(flow, config, &site.images, ties, initial, shots, kernels)?;
@@ -277,6 +278,7 @@ fn adjust<D: Driver>(
         profiles,
         ties,
         intersected: &initial.intersected,
+        mola_surface: &config.mola_surface,
         adjustment: &config.adjustment,
     })?;
     let reorient = |(index, image): (usize, &SiteImage)| {
@@ -292,7 +294,7 @@ fn adjust<D: Driver>(
     let orientations = orientations.collect::<Flow<Vec<_>>>()?;
     let times: Vec<_> = images.iter().map(|image| image.times.clone()).collect();
     let images = registered(flow, config, Round::Adjusted, &times, orientations, shots)?;
-    let intersection = intersect(flow, config, Round::Adjusted, &images, ties, shots)?;
+    let intersection = intersect(flow, config, Some(&adjusted), &images, ties, shots)?;
     let tabulate = |(index, image): (usize, &SiteImage)| {
         flow.stage(&TabulateKernels {
             image: &config.images[index].id,
@@ -332,15 +334,17 @@ pub(super) fn ties<D: Driver>(flow: &mut D, config: &SiteConfig) -> Flow<Output<
     })
 }
 
-/// Ground points of the tie points, and what every pair of images says of itself.
+/// Ground points of the tie points, what every pair of images says of itself, and what MOLA says of heights: with the
+/// orientation of the kernels, or with the adjusted one.
 fn intersect<D: Driver>(
     flow: &mut D,
     config: &SiteConfig,
-    round: Round,
+    adjusted: Option<&Output<Adjusted>>,
     images: &[SiteImage],
     ties: &Output<Ties>,
     (converted, profiles): Shots,
 ) -> Flow<Intersection> {
+    let round = adjusted.map_or(Round::Initial, |_| Round::Adjusted);
     let (images, model) = (InOrder(images), &config.registration.model);
     let intersected = flow.stage(&Intersect {
         round,
@@ -358,7 +362,22 @@ fn intersect<D: Driver>(
         converted,
         profiles,
     })?;
-    Ok(Intersection { intersected, pairs })
+    let points = adjusted.map_or(
+        CheckedPoints::Intersected(&intersected),
+        CheckedPoints::Adjusted,
+    );
+    let heights = flow.stage(&CheckHeights {
+        round,
+        points,
+        converted,
+        profiles,
+        mola_surface: &config.mola_surface,
+    })?;
+    Ok(Intersection {
+        intersected,
+        pairs,
+        heights,
+    })
 }
 
 /// The kernels of the configuration for the `required` times; `None` while it is not known which these are.

@@ -4,7 +4,7 @@ use nalgebra::{Matrix3, Quaternion, Rotation3, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
 
 use super::mars_rotation::{frame_rotation_1, frame_rotation_2, frame_rotation_3};
-use crate::units::wrap_pi;
+use crate::{instruments::Mounting, units::wrap_pi};
 
 /// Pointing angles of a camera, radians.
 ///
@@ -102,6 +102,14 @@ pub fn make_continuous(quaternions: &mut [[f64; 4]]) {
             quaternions[index] = quaternions[index].map(|component| -component);
         }
     }
+}
+
+/// Matrix from the bus to a camera that is mounted so.
+#[must_use]
+pub fn bus_to_camera(mounting: &Mounting) -> Matrix3<f64> {
+    frame_rotation_3(mounting.yaw_rad)
+        * frame_rotation_2(mounting.pitch_rad)
+        * frame_rotation_1(mounting.roll_rad)
 }
 
 /// Rotation vector `r`, radians, with `exp([r]×) = matrix`.

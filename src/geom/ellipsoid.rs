@@ -1,6 +1,6 @@
 //! Areocentric and areographic coordinates, and where a ray meets the ellipsoid.
 
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 
 use crate::{
@@ -86,6 +86,19 @@ impl Spherical {
             self.radius_m,
         ))
     }
+}
+
+/// Rows that turn Mars-fixed vectors into east, north and up at a place; at a pole east is the Y axis.
+#[must_use]
+pub fn local_axes(place_m: &Vector3<f64>) -> Matrix3<f64> {
+    let up = place_m.try_normalize(0.0).unwrap_or_else(Vector3::z);
+    let east = Vector3::z().cross(&up);
+    let east = east.try_normalize(1e-9).unwrap_or_else(Vector3::y);
+    Matrix3::from_rows(&[
+        east.transpose(),
+        up.cross(&east).transpose(),
+        up.transpose(),
+    ])
 }
 
 /// Where the ray from `origin` along `direction` first meets the ellipsoid of frame `F`, metres.

@@ -17,5 +17,6 @@ pub mod polynomial;
 pub mod pushbroom;
 pub mod robust;
 pub mod statistics;
+pub mod surface;
 pub mod uncertainty;
 pub mod window;

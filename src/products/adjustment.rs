@@ -1,5 +1,7 @@
 //! What tie points, intersection and adjustment say of a site, as JSON.
 
+mod configured;
+
 use std::collections::BTreeMap;
 
 use schemars::JsonSchema;
@@ -11,25 +13,25 @@ use super::{
     product::{Content, Declaration, Role, Write},
 };
 use crate::{
-    config::{AdjustmentConfig, IntersectionConfig, OrientationPrior},
-    footprints::FootprintImageCoordinates,
+    config::IntersectionConfig,
     geom::{
         bundle::ORIENTATION_UNKNOWNS,
         pushbroom::CameraModel,
-        robust::RobustWeight,
         statistics::Summary,
         uncertainty::{ResidualMoments, UncertaintyBudget},
     },
     schema::{DocumentSchema, all_positive, at, none_negative},
     stages::{
-        adjust::{AdjustmentSummary, CorrectedImage, PointKind},
+        adjust::{AdjustmentSummary, CorrectedImage, HeightSummary, PointKind},
+        check_heights::{HeightCheck, ProfilesApart, SurfaceFigures},
         compare_pairs::{PairComparison, ProfileByTies},
         intersect::{ImageResiduals, IntersectedTies},
     },
 };
+use configured::AdjustmentKeys;
 
 /// What the numbers are, for readers of the file.
-const DEFINITIONS: [(&str, &str); 9] = [
+const DEFINITIONS: [(&str, &str); 10] = [
     (
         "before, after",
         "with the orientation of the kernels, and with the adjusted one; ground points are intersected anew",
@@ -42,6 +44,11 @@ const DEFINITIONS: [(&str, &str); 9] = [
         "reprojection",
         "measured minus projected place of the intersected point: lines along the track, pixels of the image \
          across it; residuals of the pairs too (Table 5 of Shan et al. 2005)",
+    ),
+    (
+        "heights",
+        "tie points above the MOLA surface, metres: before the adjustment a test of the orientation, after it how well the \
+         adjustment meets what controls it",
     ),
     (
         "along_track_parallax_m",
@@ -104,74 +111,6 @@ struct Configured<'a> {
     adjustment: AdjustmentKeys<'a>,
 }
 
-/// [`AdjustmentConfig`] without what is not set.
-#[derive(Serialize, JsonSchema)]
-struct AdjustmentKeys<'a> {
-    #[schemars(transform = all_positive)]
-    tie_sigma_px: [f64; 2],
-    mola_image: FootprintImageCoordinates,
-    #[schemars(transform = all_positive)]
-    mola_sigma_px: [f64; 2],
-    #[schemars(range(min = 0.0))]
-    mola_margin_px: f64,
-    #[schemars(extend("exclusiveMinimum" = 0))]
-    ground_sigma_m: f64,
-    #[schemars(extend("exclusiveMinimum" = 0))]
-    range_sigma_m: f64,
-    #[schemars(range(min = 0.0))]
-    range_bias_sigma_m: f64,
-    #[schemars(range(min = 0.0))]
-    time_bias_sigma_s: f64,
-    #[schemars(range(min = 0.0))]
-    nadir_sigma_m: f64,
-    #[schemars(range(min = 0.0))]
-    off_nadir_sigma_m: f64,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    robust: Option<&'a RobustWeight>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schemars(extend("exclusiveMinimum" = 0))]
-    blunder_limit: Option<f64>,
-    images: Vec<PriorKeys<'a>>,
-}
-
-#[derive(Serialize, JsonSchema)]
-struct PriorKeys<'a> {
-    id: &'a str,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schemars(transform = none_negative)]
-    position_m: Option<[f64; 9]>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schemars(transform = none_negative)]
-    rotation_rad: Option<[f64; 9]>,
-}
-
-impl<'a> AdjustmentKeys<'a> {
-    fn of(config: &'a AdjustmentConfig) -> Self {
-        // JSON has no infinity.
-        let number = |sigma: f64| sigma.min(f64::MAX);
-        let prior = |prior: &'a OrientationPrior| PriorKeys {
-            id: &prior.id,
-            position_m: prior.position_m.map(|sigmas| sigmas.map(number)),
-            rotation_rad: prior.rotation_rad.map(|sigmas| sigmas.map(number)),
-        };
-        Self {
-            tie_sigma_px: config.tie_sigma_px,
-            mola_image: config.footprint_image_coordinates,
-            mola_sigma_px: config.footprint_sigma_px,
-            mola_margin_px: config.footprint_margin_px,
-            ground_sigma_m: config.ground_sigma_m,
-            range_sigma_m: config.range_sigma_m,
-            range_bias_sigma_m: config.range_bias_sigma_m,
-            time_bias_sigma_s: config.time_bias_sigma_s,
-            nadir_sigma_m: number(config.position_sigma_nadir_m),
-            off_nadir_sigma_m: number(config.position_sigma_off_nadir_m),
-            robust: config.robust.as_ref(),
-            blunder_limit: config.blunder_limit,
-            images: config.images.iter().map(prior).collect(),
-        }
-    }
-}
-
 #[derive(Serialize, JsonSchema)]
 struct TiesDocument<'a> {
     points: usize,
@@ -190,6 +129,35 @@ struct StateDocument<'a> {
     rejected: Vec<RejectedPointDocument<'a>>,
     images: &'a [ImageResiduals],
     pairs: Vec<PairDocument<'a>>,
+    heights: HeightDocument<'a>,
+}
+
+/// Heights of tie points against the MOLA surface.
+#[derive(Serialize, JsonSchema)]
+struct HeightDocument<'a> {
+    #[serde(skip_serializing_if = "Option::is_none")]
+    surface: Option<&'a SurfaceFigures>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    no_surface_because: Option<&'a str>,
+    above_surface_m: &'a Summary,
+    #[schemars(range(min = 0.0))]
+    mean_sigma_m: f64,
+    near_shots: usize,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    profiles_apart: Option<&'a ProfilesApart>,
+}
+
+impl<'a> HeightDocument<'a> {
+    fn of(check: &'a HeightCheck) -> Self {
+        Self {
+            surface: check.surface.as_ref().ok(),
+            no_surface_because: check.surface.as_ref().err().map(String::as_str),
+            above_surface_m: &check.above_m,
+            mean_sigma_m: check.mean_sigma_m,
+            near_shots: check.near_shots,
+            profiles_apart: check.apart.as_ref(),
+        }
+    }
 }
 
 #[derive(Serialize, JsonSchema)]
@@ -250,6 +218,8 @@ struct RejectedPointDocument<'a> {
 #[derive(Serialize, JsonSchema)]
 struct AdjustmentDocument<'a> {
     summary: &'a AdjustmentSummary,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    heights: Option<&'a HeightSummary>,
     /// Weighted sum of squared residuals before each step and after the last.
     #[schemars(length(min = 1), transform = none_negative)]
     weighted_squares: &'a [f64],
@@ -328,10 +298,11 @@ fn document<'a>(
             ignored: ties.ignored,
             complaints: ties.complaint_count,
         },
-        before: state(geometric.intersected, geometric.pairs),
-        after: state(adjustment.intersected, adjustment.pairs),
+        before: state(geometric.intersected, geometric.pairs, geometric.heights),
+        after: state(adjustment.intersected, adjustment.pairs, adjustment.heights),
         adjustment: AdjustmentDocument {
             summary: &adjusted.summary,
+            heights: adjusted.heights.as_ref(),
             weighted_squares: &adjusted.weighted_squares,
             images: adjusted.images.iter().map(image).collect(),
             rejected: rejected.collect(),
@@ -339,7 +310,11 @@ fn document<'a>(
     }
 }
 
-fn state<'a>(ties: &'a IntersectedTies, pairs: &'a [PairComparison]) -> StateDocument<'a> {
+fn state<'a>(
+    ties: &'a IntersectedTies,
+    pairs: &'a [PairComparison],
+    heights: &'a HeightCheck,
+) -> StateDocument<'a> {
     let rejected = ties.rejected.iter().map(|tie| RejectedPointDocument {
         kind: PointKind::Tie,
         id: &tie.id,
@@ -352,6 +327,7 @@ fn state<'a>(ties: &'a IntersectedTies, pairs: &'a [PairComparison]) -> StateDoc
         rejected: rejected.collect(),
         images: &ties.images,
         pairs: pairs.iter().map(pair).collect(),
+        heights: HeightDocument::of(heights),
     }
 }
 

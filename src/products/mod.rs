@@ -5,6 +5,7 @@
 //!
 //! The same site gives the same bytes; nothing here looks at a clock.
 
+mod adjusted_footprints;
 mod adjusted_kernels;
 mod adjustment;
 mod coordinates;
@@ -15,6 +16,7 @@ mod footprints;
 mod generated;
 mod geojson;
 mod gis;
+mod heights;
 mod isd;
 mod kernel_report;
 mod orientation;

@@ -1,9 +1,9 @@
 //! All products, in the order in which they are written.
 
 use super::{
-    adjusted_kernels, adjustment,
+    adjusted_footprints, adjusted_kernels, adjustment,
     exchange::{adjusted, geopackage, readme, shapefile, stac, tables},
-    footprints, isd, kernel_report, orientation, page,
+    footprints, heights, isd, kernel_report, orientation, page,
     product::Declaration,
     ranges, registration, ties,
 };
@@ -23,7 +23,8 @@ pub(super) static PRODUCTS: &[&Declaration] = &[
     &orientation::DOCUMENT,
     &isd::ISD,
     &ties::TABLE,
-    &ties::FOOTPRINTS,
+    &adjusted_footprints::TABLE,
+    &heights::TABLE,
     &adjustment::DOCUMENT,
     &registration::ADJUSTED,
     &orientation::ADJUSTED_TABLE,

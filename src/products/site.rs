@@ -10,11 +10,21 @@ use crate::{
     frames::MarsIau2000,
     spice::{KernelSet, RequiredCoverage},
     stages::{
-        adjust::Adjusted, check_ranges::RangeCheck, compare_pairs::PairComparison,
-        convert_datum::FileConversion, describe_kernels::KernelLine, fit_sensor_model::SensorModel,
-        group_profiles::Profile, intersect::IntersectedTies, judge::Verdict, read_ties::Ties,
-        register::ImageRegistration, sample_orientation::Orientation,
-        tabulate_kernels::KernelTables, tag_times::ImageTimes,
+        adjust::{Adjusted, CorrectedPoint, PointKind},
+        check_heights::HeightCheck,
+        check_ranges::RangeCheck,
+        compare_pairs::PairComparison,
+        convert_datum::FileConversion,
+        describe_kernels::KernelLine,
+        fit_sensor_model::SensorModel,
+        group_profiles::Profile,
+        intersect::IntersectedTies,
+        judge::Verdict,
+        read_ties::Ties,
+        register::ImageRegistration,
+        sample_orientation::Orientation,
+        tabulate_kernels::KernelTables,
+        tag_times::ImageTimes,
     },
 };
 
@@ -62,6 +72,8 @@ pub struct GeometricProducts<'a> {
     pub intersected: &'a IntersectedTies,
     /// Every pair of images with tie points in both, likewise.
     pub pairs: &'a [PairComparison],
+    /// Heights of these points against the MOLA surface.
+    pub heights: &'a HeightCheck,
     /// Nothing where the adjustment failed.
     pub adjustment: Option<AdjustmentProducts<'a>>,
 }
@@ -75,6 +87,8 @@ pub struct AdjustmentProducts<'a> {
     pub folder: &'a Path,
     /// The adjustment.
     pub adjusted: &'a Adjusted,
+    /// Heights of the adjusted points.
+    pub heights: &'a HeightCheck,
     /// The images with their adjusted orientation, in the order of the site's.
     pub images: &'a [ImageProducts<'a>],
     /// What their adjusted kernels hold.
@@ -98,6 +112,14 @@ pub struct ImageProducts<'a> {
     pub model: &'a SensorModel,
     /// The footprints in the image.
     pub registration: &'a ImageRegistration,
+}
+
+impl AdjustmentProducts<'_> {
+    /// The adjusted tie points.
+    pub fn adjusted_ties(&self) -> impl Iterator<Item = &CorrectedPoint> {
+        let points = self.adjusted.points.iter();
+        points.filter(|point| point.kind == PointKind::Tie)
+    }
 }
 
 impl<'a> ImageProducts<'a> {

@@ -1,5 +1,5 @@
 //! Tie points as Parquet: every measurement with its ground point and its residuals, before and after the
-//! adjustment; and the footprints that took part in it.
+//! adjustment.
 
 use std::collections::BTreeMap;
 
@@ -11,9 +11,9 @@ use super::{
     table::{Column, Table, Unit, column, meanings},
 };
 use crate::{
-    geom::ellipsoid::Spherical,
+    geom::ellipsoid::{Spherical, local_axes},
     stages::{
-        adjust::{Adjusted, CorrectedPoint, ImageResidual, PointKind, RangeResidual},
+        adjust::{CorrectedPoint, ImageResidual, PointKind},
         intersect::{IntersectedPoint, IntersectedTies, MeasureResidual},
     },
 };
@@ -28,20 +28,6 @@ pub(super) static TABLE: Declaration = Declaration {
     write: Write::Ties(|path, of, geometric| {
         let table = Table::new(tie_columns(), measurements(of.site, geometric));
         parquet::write(path, table, Vec::new())
-    }),
-    uses: &[],
-};
-
-pub(super) static FOOTPRINTS: Declaration = Declaration {
-    path: "adjusted_footprints.parquet",
-    what: "the footprints that took part in the adjustment",
-    readers: "scripts",
-    rows: "footprints",
-    role: Role::Data,
-    content: Content::Table(|| meanings(&shot_columns())),
-    write: Write::Adjustment(|path, _, _, adjustment| {
-        let table = Table::new(shot_columns(), shots(adjustment.adjusted));
-        parquet::write(path, table, Vec::new()).map(Some)
     }),
     uses: &[],
 };
@@ -136,7 +122,8 @@ fn reasons(geometric: &GeometricProducts) -> BTreeMap<usize, String> {
 fn tie_columns<'a>() -> Vec<Column<Measurement<'a>>> {
     let mut columns = measured_columns();
     columns.extend(intersected_columns());
-    columns.extend(adjusted_columns());
+    columns.extend(adjusted_point_columns());
+    columns.extend(residual_columns());
     columns
 }
 
@@ -222,7 +209,7 @@ fn intersected_columns<'a>() -> Vec<Column<Measurement<'a>>> {
     ]
 }
 
-fn adjusted_columns<'a>() -> Vec<Column<Measurement<'a>>> {
+fn adjusted_point_columns<'a>() -> Vec<Column<Measurement<'a>>> {
     vec![
         column(
             "adjusted_x_m",
@@ -263,7 +250,7 @@ fn adjusted_columns<'a>() -> Vec<Column<Measurement<'a>>> {
         column(
             "sigma_x_m",
             Unit::Metre,
-            "standard deviation of adjusted_x_m, metres: formal, and too small for the absolute position",
+            "standard deviation of adjusted_x_m, metres; in the published model that of agreement between the images alone",
             |row: &Measurement| Some(sigma_m(row.adjusted?.0, 0)),
         ),
         column("sigma_y_m", Unit::Metre, "likewise", |row: &Measurement| {
@@ -272,6 +259,29 @@ fn adjusted_columns<'a>() -> Vec<Column<Measurement<'a>>> {
         column("sigma_z_m", Unit::Metre, "likewise", |row: &Measurement| {
             Some(sigma_m(row.adjusted?.0, 2))
         }),
+        column(
+            "sigma_east_m",
+            Unit::Metre,
+            "the same towards east, metres",
+            |row: &Measurement| Some(local_sigmas_m(row.adjusted?.0)[0]),
+        ),
+        column(
+            "sigma_north_m",
+            Unit::Metre,
+            "the same towards north, metres",
+            |row: &Measurement| Some(local_sigmas_m(row.adjusted?.0)[1]),
+        ),
+        column(
+            "sigma_up_m",
+            Unit::Metre,
+            "the same of the height, metres",
+            |row: &Measurement| Some(local_sigmas_m(row.adjusted?.0)[2]),
+        ),
+    ]
+}
+
+fn residual_columns<'a>() -> Vec<Column<Measurement<'a>>> {
+    vec![
         column(
             "residual_along_px",
             Unit::Pixel,
@@ -327,95 +337,13 @@ fn spherical(point: &CorrectedPoint) -> Spherical {
     Spherical::from_xyz_m(&point.ground.xyz_m)
 }
 
+/// Standard deviations towards east, north and up, metres.
+fn local_sigmas_m(point: &CorrectedPoint) -> [f64; 3] {
+    let to_local = local_axes(&point.ground.xyz_m);
+    let local_m2 = to_local * point.covariance_m2 * to_local.transpose();
+    [0, 1, 2].map(|axis| local_m2[(axis, axis)].sqrt())
+}
+
 fn sigma_m(point: &CorrectedPoint, axis: usize) -> f64 {
     point.covariance_m2[(axis, axis)].sqrt()
-}
-
-/// A footprint that took part, with its range.
-type Shot<'a> = (&'a CorrectedPoint, Option<&'a RangeResidual>);
-
-fn shots(adjusted: &Adjusted) -> Vec<Shot<'_>> {
-    let ranges: BTreeMap<usize, &RangeResidual> = adjusted
-        .ranges
-        .iter()
-        .map(|range| (range.point, range))
-        .collect();
-    let points = adjusted.points.iter().enumerate();
-    points
-        .filter(|(_, point)| point.kind == PointKind::Shot)
-        .map(|(index, point)| (point, ranges.get(&index).copied()))
-        .collect()
-}
-
-fn shot_columns<'a>() -> Vec<Column<Shot<'a>>> {
-    fn range<'a>(
-        name: &'static str,
-        unit: Unit,
-        description: &'static str,
-        of: fn(&RangeResidual) -> Option<f64>,
-    ) -> Column<Shot<'a>> {
-        column(name, unit, description, move |shot: &Shot| {
-            shot.1.and_then(of)
-        })
-    }
-    let mut columns = vec![column(
-        "footprint",
-        Unit::None,
-        "profile and, after the last colon, row of the footprint in footprints.parquet, counted from 0",
-        |shot: &Shot| shot.0.id.clone(),
-    )];
-    for (axis, [initial, adjusted, sigma]) in [
-        ["x_m", "adjusted_x_m", "sigma_x_m"],
-        ["y_m", "adjusted_y_m", "sigma_y_m"],
-        ["z_m", "adjusted_z_m", "sigma_z_m"],
-    ]
-    .into_iter()
-    .enumerate()
-    {
-        columns.push(column(
-            initial,
-            Unit::Metre,
-            "footprint, IAU 2000, metres",
-            move |shot: &Shot| shot.0.initial.xyz_m[axis],
-        ));
-        columns.push(column(
-            adjusted,
-            Unit::Metre,
-            "adjusted footprint, IAU 2000, metres",
-            move |shot: &Shot| shot.0.ground.xyz_m[axis],
-        ));
-        columns.push(column(
-            sigma,
-            Unit::Metre,
-            "standard deviation of the adjusted coordinate, metres",
-            move |shot: &Shot| sigma_m(shot.0, axis),
-        ));
-    }
-    columns.extend([
-        range(
-            "range_m",
-            Unit::Metre,
-            "measured range, metres; missing when no image was exposed meanwhile",
-            |range| Some(range.range_m),
-        ),
-        range(
-            "range_residual_m",
-            Unit::Metre,
-            "measured minus adjusted range, metres",
-            |range| Some(range.residual_m.value),
-        ),
-        range(
-            "range_redundancy",
-            Unit::None,
-            "share of an error of the range that shows in its residual, 0 to 1",
-            |range| Some(range.residual_m.redundancy),
-        ),
-        range(
-            "range_standardised",
-            Unit::None,
-            "residual over its own standard deviation; missing where nothing controls it",
-            |range| range.residual_m.standardised,
-        ),
-    ]);
-    columns
 }

@@ -11,7 +11,9 @@ use crate::{
     error::Result,
     geom::statistics::{BAARDA_LIMIT, Summary},
     products::{AdjustmentProducts, GeometricProducts, SiteProducts},
-    stages::adjust::{Adjusted, AdjustmentSummary, GroundSummary, ObservationType},
+    stages::adjust::{
+        Adjusted, AdjustmentSummary, GroundSummary, ObservationType, WORSE_THAN_CONFIGURED,
+    },
 };
 
 /// Steps that the axis of the convergence has room for at least, so that its labels are whole numbers.
@@ -36,7 +38,7 @@ fn write(
     let adjusted = adjustment.adjusted;
     let summary = &adjusted.summary;
     let mut html = paragraph(&overview(adjusted));
-    html += &paragraph(&reliability::absolute(site, geometric, adjustment));
+    html += &paragraph(&reliability::absolute(geometric, adjustment));
     html += &format!(
         "<div class=\"plots\">\n{}</div>\n",
         figure(&convergence(adjusted))?
@@ -56,23 +58,26 @@ fn write(
 
 fn overview(adjusted: &Adjusted) -> String {
     let summary = &adjusted.summary;
+    let [along, across] = summary.tie_components;
     let verdict = if summary.degrees_of_freedom == 0 {
-        "nothing is redundant, so nothing can be said about the observations".to_owned()
-    } else if summary.sigma0 < 0.9 {
-        "the observations agree better than their standard deviations suggest".to_owned()
-    } else if summary.sigma0 <= 1.1 {
-        "the observations agree as their standard deviations suggest".to_owned()
+        "nothing is redundant, so nothing can be said about the observations"
+    } else if along < WORSE_THAN_CONFIGURED.recip() {
+        "they agree better along the track than their standard deviations suggest"
+    } else if along <= WORSE_THAN_CONFIGURED {
+        "they agree along the track as their standard deviations suggest"
     } else {
-        "the observations agree worse than their standard deviations suggest".to_owned()
+        "they agree worse along the track than their standard deviations suggest"
     };
     format!(
-        "{}, {} and {} were adjusted together in {}; {} degrees of freedom. The a posteriori standard deviation of unit \
-         weight σ0 is {} (a priori 1): {verdict}.",
+        "{}, {} and {} were adjusted together in {}; {} degrees of freedom. The standard deviation of unit weight of tie \
+         points is {} along the track and {} across it (a priori 1): {verdict}. Over all observations σ0 is {}.",
         counted(adjusted.images.len(), "image"),
         counted(summary.shots.corrections_m[0].n as usize, "footprint"),
         counted(summary.ties.corrections_m[0].n as usize, "tie point"),
         counted(summary.steps, "step"),
         summary.degrees_of_freedom,
+        label(along, 3),
+        label(across, 3),
         label(summary.sigma0, 3)
     )
 }
@@ -211,6 +216,7 @@ fn ground_sigmas(summary: &AdjustmentSummary) -> String {
 const fn kind(of: ObservationType) -> &'static str {
     match of {
         ObservationType::TieImage => "image coordinates of tie points",
+        ObservationType::MolaHeight => "heights by the MOLA surface",
         ObservationType::MolaImage => "image coordinates of MOLA",
         ObservationType::MolaRange => "MOLA ranges",
         ObservationType::Orientation => "initial orientation",

@@ -218,6 +218,9 @@ fn rejected(geometric: &GeometricProducts) -> String {
             RejectionReason::NotIntersected => continue,
             RejectionReason::Undetermined => "not determined",
             RejectionReason::Blunder { .. } => "blunder: its standardised residual is too large",
+            RejectionReason::Height { .. } => {
+                "blunder: no ground explains its height above the MOLA surface"
+            }
         };
         *reasons.entry(("adjustment", reason)).or_insert(0) += 1;
     }

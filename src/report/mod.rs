@@ -21,6 +21,7 @@ mod compare;
 mod corrections;
 mod diff;
 mod graticule;
+mod heights;
 mod html;
 mod images;
 mod map;
@@ -56,14 +57,15 @@ const SECTIONS: &[Section] = &[
     images::SECTION,
     registration::SECTION,
     misregistration::SECTION,
+    heights::SECTION,
     adjustment::SECTION,
-    uncertainty::SECTION,
     map::SECTION,
     selection::SECTION,
     clocks_and_datum::SECTION,
     timeline::SECTION,
     notes::SECTION,
     provenance::SECTION,
+    uncertainty::SECTION,
 ];
 
 /// The report of `site` as one HTML page.

@@ -7,7 +7,7 @@ use super::{
     plots::label,
 };
 use crate::{
-    footprints::FootprintImageCoordinates,
+    footprints::AdjustmentModel,
     geom::statistics::Summary,
     products::{AdjustmentProducts, GeometricProducts, SiteProducts},
     stages::adjust::{Adjusted, AdjustmentSummary, PointKind, RejectionReason, ScalarResidual},
@@ -27,45 +27,46 @@ const SHOWN: f64 = 0.3;
 const CORRELATED_SHOWN: usize = 12;
 const BLUNDERS_SHOWN: usize = 20;
 
-/// The relative registration is corrected, the absolute position is not: with numbers.
-pub(super) fn absolute(
-    site: &SiteProducts,
-    geometric: &GeometricProducts,
-    adjustment: &AdjustmentProducts,
-) -> String {
+/// What the adjustment determines and what it does not, with numbers.
+pub(super) fn absolute(geometric: &GeometricProducts, adjustment: &AdjustmentProducts) -> String {
     let pairs = BeforeAfter::all(geometric);
     let relative = BeforeAfter::worst(&pairs);
     let relative = relative.map_or_else(String::new, |pair| pair.sentence() + " ");
     let summary = &adjustment.adjusted.summary;
-    let witness = match site.config.adjustment.footprint_image_coordinates {
-        FootprintImageCoordinates::Weighted if summary.shots.corrections_m[0].n > 0 => {
-            "the image coordinates of footprints were computed from the very orientation that is adjusted and are no \
-             measurements of their own; these, by their weight, and the standard deviations that the orientation was \
-             given beforehand decide how much each image moves"
-        }
-        _ => {
-            "nothing was measured in the images that has known coordinates; the standard deviations that the \
-             orientation was given beforehand decide how much each image moves"
-        }
-    };
     let ties = &summary.ties;
     if ties.corrections_m[0].n == 0 {
         return format!("{relative}No tie point took part: nothing was adjusted to anything.");
     }
-    let corrected = if adjustment.images_agree {
-        "The relative registration is corrected, the absolute position is not."
+    let registration = if adjustment.images_agree {
+        "The relative registration is corrected"
     } else {
-        "Neither the relative registration nor the absolute position is corrected."
+        "The relative registration is not corrected"
     };
-    let of = |axes: &[Summary; 3]| {
-        let means = axes.each_ref().map(|axis| label(axis.mean, 1));
-        means.join(", ")
+    let means = ties
+        .corrections_m
+        .each_ref()
+        .map(|axis| label(axis.mean, 1));
+    let moved = means.join(", ");
+    let determined = match &adjustment.adjusted.heights {
+        Some(heights) => {
+            let [east_m, north_m, up_m] = heights.mean_sigma_m;
+            format!(
+                "heights are those of MOLA, to {} m on average; the place is what was known of orbit and attitude beforehand, \
+                 to {} m east and {} m north",
+                label(up_m, 1),
+                label(east_m, 0),
+                label(north_m, 0)
+            )
+        }
+        None if summary.model == AdjustmentModel::Published => {
+            "neither heights nor place are determined: the image coordinates of footprints were computed from the very \
+             orientation that is adjusted"
+                .to_owned()
+        }
+        None => "heights and place are what was known of orbit and attitude beforehand".to_owned(),
     };
     format!(
-        "{relative}The adjustment cannot determine where the images lie on Mars: {witness}. The tie points moved by {} m in X, Y, Z \
-         on average; their formal standard deviations of {} m are optimistic. {corrected}",
-        of(&ties.corrections_m),
-        of(&ties.sigmas_m)
+        "{relative}The tie points moved by {moved} m in X, Y, Z on average. {registration}; {determined}."
     )
 }
 
@@ -244,7 +245,10 @@ pub(super) fn rejected(adjusted: &Adjusted) -> String {
     let mut undetermined = [0_usize; 2];
     for point in &adjusted.rejected {
         match point.reason {
-            RejectionReason::Blunder { standardised } => blunders.push((&point.id, standardised)),
+            RejectionReason::Blunder { standardised }
+            | RejectionReason::Height { standardised, .. } => {
+                blunders.push((&point.id, standardised));
+            }
             RejectionReason::Undetermined => {
                 undetermined[usize::from(point.kind == PointKind::Tie)] += 1;
             }

@@ -3,7 +3,6 @@
 use super::{
     html::{Tone, counted, list, paragraph, verdict},
     misregistration::BeforeAfter,
-    plots::label,
 };
 use crate::products::SiteProducts;
 
@@ -64,11 +63,7 @@ fn together(site: &SiteProducts) -> String {
         };
         pair.sentence() + &others
     });
-    let Some(adjustment) = &geometric.adjustment else {
-        return words;
-    };
-    let sigma0 = label(adjustment.adjusted.summary.sigma0, 2);
-    format!("{words} σ0 of the adjustment: {sigma0}.")
+    format!("{words} {}", super::heights::in_a_sentence(geometric))
         .trim_start()
         .to_owned()
 }

@@ -1,4 +1,4 @@
-//! The uncertainty budget of ground points, eq. 5 to 9 of Shan et al. 2005.
+//! The budget of eq. 5 to 9 of Shan et al. 2005: how far apart the two footprints of one point lie.
 
 use super::{
     html::{Cell, Column, Table, paragraph},
@@ -12,8 +12,8 @@ use crate::{
 };
 
 pub(super) const SECTION: Section = Section {
-    title: "Uncertainty of ground points",
-    anchor: "uncertainty-of-ground-points",
+    title: "Reproduction of the paper: eq. 5 to 9",
+    anchor: "reproduction-eq-5-to-9",
     appears: |site| {
         let pairs = site.geometric.as_ref().map(|geometric| geometric.pairs);
         pairs.is_some_and(|pairs| !pairs.is_empty())
@@ -30,7 +30,7 @@ fn write(geometric: &GeometricProducts) -> String {
                      Across the track the paper takes the average of both images, though its eq. 7 says the root of the \
                      sum of squares, which makes heights worse by about √2. Heights are H/B times the part across the \
                      track. After the adjustment footprints no longer lie a spacing apart, so that eq. 6 says nothing \
-                     then, and eq. 8 and 9 tell how well the images agree, not where on Mars they are.";
+                     then. Eq. 8 and 9 tell how well the two images agree, never how accurate heights or places are.";
     words + &along(&pairs) + &points(&pairs) + &paragraph(explained)
 }
 
@@ -132,7 +132,8 @@ fn in_words(pair: &BeforeAfter) -> String {
         };
         let (paper, sum) = (&budget.paper_average, &budget.equation_7);
         html += &paragraph(&format!(
-            "{place}: a ground point is uncertain by {} m in plan and by {} m in height, or {} m by the sum of squares.",
+            "{place}: the two footprints of one ground point lie {} m apart in plan, which eq. 9 turns into {} m of height, or {} m by \
+             the sum of squares.",
             label(paper.planimetric_m, 1),
             label(paper.height_m, 1),
             label(sum.height_m, 1)

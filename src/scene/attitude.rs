@@ -5,8 +5,8 @@ use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 use super::orbit::{Orbit, OrbitState};
 use crate::{
     geom::{
-        attitude::{matrix_of_rotation_vector, rotation_vector},
-        mars_rotation::{frame_rotation_1, frame_rotation_2, frame_rotation_3},
+        attitude::{self, matrix_of_rotation_vector, rotation_vector},
+        mars_rotation::frame_rotation_1,
     },
     instruments::Instrument,
     time::{Et, Interval},
@@ -21,10 +21,7 @@ const SLEW_S: f64 = 240.0;
 
 /// Matrix from bus to camera: the in-flight mounting, as in `kernels.example/moc.ti`.
 pub(super) fn bus_to_camera(camera: &Instrument) -> Matrix3<f64> {
-    let mounting = &camera.mounting;
-    frame_rotation_3(mounting.yaw_rad)
-        * frame_rotation_2(mounting.pitch_rad)
-        * frame_rotation_1(mounting.roll_rad)
+    attitude::bus_to_camera(&camera.mounting)
 }
 
 /// Matrix from J2000 to the bus that looks at the centre of Mars: +Z down, flight along −X.

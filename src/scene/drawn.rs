@@ -119,10 +119,10 @@ impl ProfileShift {
 impl AttitudeError {
     fn draw(sizes: &AttitudeErrors, arc: &Arc, random: &mut Random) -> Self {
         let half_image_s = 0.5 * arc.exposed.duration_s();
-        let mut term = |sigma_rad: f64| sigma_rad * Vector3::from_fn(|_, _| random.normal());
-        let constant_rad = term(sizes.constant_sigma_rad);
-        let linear_rad = term(sizes.linear_sigma_rad);
-        let quadratic_rad = term(sizes.quadratic_sigma_rad);
+        let mut normal = || Vector3::from_fn(|_axis, _column| random.normal());
+        let constant_rad = Vector3::from(sizes.constant_sigma_rad).component_mul(&normal());
+        let linear_rad = sizes.linear_sigma_rad * normal();
+        let quadratic_rad = sizes.quadratic_sigma_rad * normal();
         Self {
             middle_et_s: arc.exposed.start.plus(half_image_s).seconds(),
             half_image_s,
@@ -190,7 +190,9 @@ impl DayErrors {
             }
         };
         let sizes = &errors.attitude;
-        let is_turned = sizes.constant_sigma_rad > 0.0 || sizes.jitter.sinusoids > 0;
+        let constant = sizes.constant_sigma_rad.iter();
+        let is_turned =
+            constant.fold(0.0_f64, |a, b| a.max(*b)) > 0.0 || sizes.jitter.sinusoids > 0;
         let mut laser = stream("profile");
         let [east_m, north_m] = [0, 1].map(|_| errors.altimeter.plan_sigma_m * laser.normal());
         let radial_m = errors.altimeter.radial_sigma_m * laser.normal();
@@ -303,7 +305,7 @@ mod tests {
                 off_m.y / 24.8,
                 off_m.z / 8.6,
                 attitude.constant_rad.x / 4e-4,
-                attitude.constant_rad.y / 4e-4,
+                attitude.constant_rad.y / 1.5e-4,
                 attitude.linear_rad.x / 1e-5,
                 east_m / 70.0,
                 radial_m / 1.0,

@@ -61,8 +61,8 @@ pub enum PositionErrors {
 /// −1 to 1 over the image, and jitter on top.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct AttitudeErrors {
-    /// Standard deviation of the constant about each axis, radians.
-    pub constant_sigma_rad: f64,
+    /// Standard deviations of the constant in roll, pitch and yaw, radians.
+    pub constant_sigma_rad: [f64; 3],
     /// Standard deviation of the linear term, radians at the end of the image.
     pub linear_sigma_rad: f64,
     /// Standard deviation of the quadratic term, radians at the end of the image.
@@ -143,7 +143,7 @@ impl SceneErrors {
             misregistration: Misregistration::Published,
             position: PositionErrors::Camera { sigma_m: 20.0 },
             attitude: AttitudeErrors {
-                constant_sigma_rad: 0.0,
+                constant_sigma_rad: [0.0; 3],
                 linear_sigma_rad: 0.0,
                 quadratic_sigma_rad: 0.0,
                 jitter: Jitter {
@@ -170,10 +170,11 @@ impl SceneErrors {
     /// * line times 30 lines: half of the 225 to 271 m by which the images of a pair disagree (Shan et al. 2005, Table 5);
     /// * orbit 5.2, 24.8 and 8.6 m along radius, track and normal: differences of overlapping arcs, Lemoine et al.,
     ///   AAS 99-328;
-    /// * attitude 0.4 mrad: two images of a pair that disagree by 231 to 271 m; between the 0.26 mrad of 100 m, which
-    ///   the crossovers of MOLA leave in the horizontal, and the 0.5 mrad of the 200 m that Yoon & Shan 2004 take for
-    ///   images off nadir. Drift and bend 1e-5 rad, 2 arcseconds: residuals of C-kernels to a parabola (Shan et
-    ///   al. 2005, Table 4) reach 5;
+    /// * attitude 0.4 mrad: between the 0.26 mrad of 100 m, which the crossovers of MOLA leave in the horizontal, and the
+    ///   0.5 mrad of the 200 m that Yoon & Shan 2004 take for images off nadir. Along the track 0.4 mrad, 150 m,
+    ///   is what two images that disagree by 225 to 271 m allow for line times and pitch together, which no tie
+    ///   point tells apart: 30 lines are 100 to 165 m of it, 0.15 mrad are left to pitch. Drift and bend 1e-5 rad,
+    ///   2 arcseconds: residuals of C-kernels to a parabola (Shan et al. 2005, Table 4) reach 5;
     /// * jitter of 1 to 5 µrad and 0.1 to 2 s: a choice, below those 5 arcseconds (24 µrad);
     /// * MOLA profiles 70 m east and north, 1 m in radius: 100 m in the horizontal and 1 m radially (Neumann et al. 2001, as
     ///   Shan et al. 2005 cite them);
@@ -187,7 +188,7 @@ impl SceneErrors {
                 sigma_radial_along_cross_m: [5.2, 24.8, 8.6],
             },
             attitude: AttitudeErrors {
-                constant_sigma_rad: 4e-4,
+                constant_sigma_rad: [4e-4, 1.5e-4, 4e-4],
                 linear_sigma_rad: 1e-5,
                 quadratic_sigma_rad: 1e-5,
                 jitter: Jitter {

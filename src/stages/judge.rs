@@ -4,13 +4,15 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::{
-    adjust::{Adjusted, PointKind},
+    adjust::{Adjusted, CorrectedImage, PointKind},
+    check_heights::HeightCheck,
     check_ranges::{BiasScan, RangeCheck},
     compare_pairs::PairComparison,
     fit_sensor_model::SensorModel,
     orientation::Orientation,
     read_ties::Ties,
 };
+use crate::{config::LimitsConfig, footprints::AdjustmentModel};
 
 /// Whether the products keep the limits of the configuration.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -40,6 +42,8 @@ impl Verdict {
 pub struct Evidence<'a> {
     /// Footprints in the windows; `None` for a site without PEDR files.
     pub footprints: Option<usize>,
+    /// The limits of the configuration.
+    pub limits: &'a LimitsConfig,
     /// Ranges of every profile.
     pub ranges: &'a RangeCheck,
     /// The configured correction of the clock of MOLA, seconds.
@@ -76,28 +80,35 @@ pub struct AdjustmentEvidence<'a> {
     pub adjusted: &'a Adjusted,
     /// The images with their adjusted orientation.
     pub images: &'a [JudgedImage<'a>],
-    /// Every pair with the adjusted orientation.
+    /// Every pair with the orientation of the kernels.
     pub pairs: &'a [PairComparison],
+    /// Every pair with the adjusted orientation.
+    pub adjusted_pairs: &'a [PairComparison],
+    /// Heights of tie points with the orientation of the kernels.
+    pub heights: &'a HeightCheck,
+    /// Heights of the adjusted tie points.
+    pub adjusted_heights: &'a HeightCheck,
 }
 
-/// More tie points than this share are not left out of a sound adjustment.
-const REJECTED_SHARE: f64 = 0.1;
-/// An a posteriori standard deviation of unit weight above this contradicts the configured ones.
-const SIGMA0_MAX: f64 = 2.0;
-/// Fewer tie points than this do not outweigh the image coordinates of hundreds of footprints.
-const TIES_FEW: usize = 10;
-/// Images whose adjusted tie points lie farther apart than this along the flight, metres, were not brought together:
-/// six lines of MOC's usual 4 m, and a thirteenth of a spacing of footprints.
-const APART_MAX_M: f64 = 25.0;
-
-fn is_together(pair: &PairComparison) -> bool {
-    // Written so that NaN counts as apart.
-    pair.along_track_parallax_m <= APART_MAX_M
-}
+/// Fewer tie points than this near shots leave their height to what is known of orbit and attitude.
+const NEAR_SHOTS_FEW: usize = 20;
+/// A mean height within this many of its standard deviations is no contradiction.
+const HEIGHT_SIGMAS: f64 = 3.0;
+/// Names of the quantities that an orientation is corrected by.
+const CORRECTED: [&str; 6] = [
+    "position along X",
+    "position along Y",
+    "position along Z",
+    "rotation about the camera's x axis",
+    "rotation about the camera's y axis",
+    "rotation about the camera's z axis",
+];
 
 impl AdjustmentEvidence<'_> {
-    /// Why the adjusted orientation is invalid, one sentence per reason.
-    fn invalid_because(&self) -> Vec<String> {
+    /// Why the adjusted orientation is invalid, one sentence per reason: what MOLA says first, then what images say of
+    /// each other, then what was known beforehand.
+    fn invalid_because(&self, limits: &LimitsConfig) -> Vec<String> {
+        let mut invalid = self.heights_off(limits);
         let reasons = |image: &JudgedImage| -> Vec<String> {
             let id = image.id;
             // What is wrong with the orientation of the kernels is told with it.
@@ -106,20 +117,87 @@ impl AdjustmentEvidence<'_> {
                 .map(|reason| format!("adjusted image {id}: {reason}"))
                 .collect()
         };
-        let mut invalid: Vec<String> = self.images.iter().flat_map(reasons).collect();
+        invalid.extend(self.images.iter().flat_map(reasons));
         let (left_out, ties) = (self.left_out(), self.ties.multi_image());
         if 2 * left_out > ties {
             invalid.push(format!(
                 "adjustment: {left_out} of {ties} tie points were rejected; ties.parquet says why"
             ));
         }
-        for pair in self.pairs.iter().filter(|pair| !is_together(pair)) {
-            invalid.push(format!(
-                "adjustment: tie points of {} and {} still lie {:.1} m apart along the flight, expected at most {} m",
-                pair.images[0], pair.images[1], pair.along_track_parallax_m, APART_MAX_M
-            ));
+        let rounds = [
+            ("before", self.pairs, limits.parallax_before_max_m),
+            ("after", self.adjusted_pairs, limits.parallax_after_max_m),
+        ];
+        for (round, pairs, limit_m) in rounds {
+            for pair in pairs.iter().filter(|pair| !is_together(pair, limit_m)) {
+                invalid.push(format!(
+                    "tie points of {} and {} lie {:.1} m apart along the flight {round} the adjustment, expected at most \
+                     {limit_m} m",
+                    pair.images[0], pair.images[1], pair.along_track_parallax_m
+                ));
+            }
         }
+        invalid.extend(self.corrected_too_far(limits));
         invalid
+    }
+
+    /// What MOLA says against the heights of tie points.
+    fn heights_off(&self, limits: &LimitsConfig) -> Vec<String> {
+        let after_max_m = limits
+            .height_after_max_m
+            .max(HEIGHT_SIGMAS * self.adjusted_heights.mean_sigma_m);
+        let rounds = [
+            ("before", self.heights, limits.height_before_max_m),
+            ("after", self.adjusted_heights, after_max_m),
+        ];
+        let mut reasons = Vec::new();
+        for (round, check, limit_m) in rounds {
+            // Written so that NaN counts.
+            if check.surface.is_ok() && !(check.above_m.median.abs() <= limit_m) {
+                reasons.push(format!(
+                    "tie points lie {:+.1} m from the MOLA surface {round} the adjustment (median of {}), expected at most \
+                     {limit_m:.1} m",
+                    check.above_m.median, check.above_m.n
+                ));
+            }
+        }
+        if let Some(apart) = &self.heights.apart {
+            let sigmas = apart.mean_m.abs() / apart.sigma_m;
+            if !(sigmas <= limits.profiles_apart_max_sigma) {
+                reasons.push(format!(
+                    "profiles {} and {} contradict each other: at the tie points their surfaces lie {:.1} m apart on \
+                     average, {sigmas:.1} standard deviations, expected at most {}",
+                    apart.profiles[0],
+                    apart.profiles[1],
+                    apart.mean_m.abs(),
+                    limits.profiles_apart_max_sigma
+                ));
+            }
+        }
+        reasons
+    }
+
+    /// Corrections of orientations that what was known of them does not allow.
+    fn corrected_too_far(&self, limits: &LimitsConfig) -> Vec<String> {
+        let largest = |image: &CorrectedImage| -> Option<(f64, usize)> {
+            let corrections = image.correction.iter().zip(&image.prior_sigmas).enumerate();
+            let known = corrections.filter(|(_, (_, sigma))| **sigma > 0.0 && sigma.is_finite());
+            let sigmas = known.map(|(index, (value, sigma))| ((value / sigma).abs(), index));
+            sigmas.max_by(|one, other| one.0.total_cmp(&other.0))
+        };
+        let far = self.adjusted.images.iter().filter_map(|image| {
+            let (sigmas, index) = largest(image)?;
+            (!(sigmas <= limits.correction_max_sigma)).then(|| {
+                format!(
+                    "image {}: the adjustment corrects its {} by {sigmas:.1} standard deviations, expected at most {}; check \
+                     its time, its kernels and pointing.ck_bias_s",
+                    image.id,
+                    CORRECTED[index / 3],
+                    limits.correction_max_sigma
+                )
+            })
+        });
+        far.collect()
     }
 
     /// Tie points that took part in the adjustment.
@@ -136,37 +214,66 @@ impl AdjustmentEvidence<'_> {
     /// Whether the images of every pair place tie points together after the adjustment, and most of these took
     /// part in it.
     #[must_use]
-    pub fn images_agree(&self) -> bool {
+    pub fn images_agree(&self, limits: &LimitsConfig) -> bool {
+        let limit_m = limits.parallax_after_max_m;
         2 * self.left_out() <= self.ties.multi_image()
-            && !self.pairs.is_empty()
-            && self.pairs.iter().all(is_together)
+            && !self.adjusted_pairs.is_empty()
+            && self
+                .adjusted_pairs
+                .iter()
+                .all(|pair| is_together(pair, limit_m))
     }
 
     /// What a reader must weigh, one sentence each.
-    fn remarks(&self) -> Vec<String> {
+    fn remarks(&self, limits: &LimitsConfig) -> Vec<String> {
         let mut remarks = Vec::new();
+        match &self.heights.surface {
+            Err(reason) => remarks.push(format!(
+                "heights of tie points are not controlled by MOLA ({reason}): they are known as well as orbit and attitude \
+                 beforehand, to some 500 m"
+            )),
+            Ok(_) if self.heights.near_shots < NEAR_SHOTS_FEW => remarks.push(format!(
+                "only {} tie points lie within a kilometre of a shot: their heights are known little better than orbit and \
+                 attitude beforehand",
+                self.heights.near_shots
+            )),
+            Ok(_) => {}
+        }
+        if self.adjusted.summary.model == AdjustmentModel::Published {
+            remarks.push(
+                "the adjustment follows the published model (adjustment.model): its heights are not controlled, and its \
+                 standard deviations are those of agreement between the images"
+                    .to_owned(),
+            );
+        }
         let (left_out, ties) = (self.left_out(), self.ties.multi_image());
-        if left_out as f64 > REJECTED_SHARE * ties as f64 && 2 * left_out <= ties {
+        let share = limits.rejected_share_max;
+        if left_out as f64 > share * ties as f64 && 2 * left_out <= ties {
             remarks.push(format!(
                 "{left_out} of {ties} tie points were rejected by the adjustment; ties.parquet says why"
             ));
         }
         let taken = self.taken();
-        if taken < TIES_FEW {
+        if taken < limits.ties_min as usize {
             remarks.push(format!(
-                "only {taken} tie points took part in the adjustment: image coordinates of footprints, where weighted \
-                 (adjustment.footprint_image_coordinates), hold the images against so few"
+                "only {taken} tie points took part in the adjustment, expected at least {}",
+                limits.ties_min
             ));
         }
-        let sigma0 = self.adjusted.summary.sigma0;
-        if sigma0 > SIGMA0_MAX {
+        let [along, _] = self.adjusted.summary.tie_components;
+        if !(along <= limits.sigma0_max) {
             remarks.push(format!(
-                "the adjustment's standard deviation of unit weight is {sigma0:.2}: measurements are worse than \
-                 configured, or a model does not hold"
+                "residuals of the tie points along the track are {along:.2} times what adjustment.tie_sigma_px expects: \
+                 measurements are worse than configured, or a model does not hold"
             ));
         }
         remarks
     }
+}
+
+fn is_together(pair: &PairComparison, limit_m: f64) -> bool {
+    // Written so that NaN counts as apart.
+    pair.along_track_parallax_m.abs() <= limit_m
 }
 
 /// Judges a site by its limits and by what contradicts itself.
@@ -201,7 +308,7 @@ impl Evidence<'_> {
         reasons.extend(
             self.adjustment
                 .iter()
-                .flat_map(AdjustmentEvidence::invalid_because),
+                .flat_map(|of| of.invalid_because(self.limits)),
         );
         let failed = self.adjustment_failure;
         reasons.extend(failed.map(|failure| format!("no adjustment: {failure}")));
@@ -241,7 +348,11 @@ impl Evidence<'_> {
                 .and_then(|scan| doubt(scan, configured_s));
             remarks.extend(doubt.map(|doubt| format!("profile {}: {doubt}", ranges.profile)));
         }
-        remarks.extend(self.adjustment.iter().flat_map(AdjustmentEvidence::remarks));
+        remarks.extend(
+            self.adjustment
+                .iter()
+                .flat_map(|of| of.remarks(self.limits)),
+        );
         remarks
     }
 }

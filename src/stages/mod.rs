@@ -3,6 +3,7 @@
 //! No stage calls another, prints, or knows of another's files. [`crate::flow`] puts them in order.
 
 pub mod adjust;
+pub mod check_heights;
 pub mod check_ranges;
 pub mod compare_kernels;
 pub mod compare_pairs;
@@ -12,6 +13,7 @@ pub mod fit_sensor_model;
 pub mod group_profiles;
 pub mod intersect;
 pub mod judge;
+pub mod mola_surface;
 pub mod orientation;
 pub mod oriented;
 pub mod read_ties;

@@ -2,18 +2,20 @@
 
 mod agreement;
 mod detector;
+mod error;
 
 use std::sync::atomic::AtomicBool;
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use agreement::{of_one_clock, of_one_product, start_agrees, stop_agrees};
+use agreement::{mounting_agrees, of_one_clock, of_one_product, start_agrees, stop_agrees};
 use detector::fits_detector;
+use error::ImageError;
 
 use crate::{
     config::{ImageConfig, built_in_instruments, usual_instrument},
-    error::{Cause, Error, Kind, Locate, Result},
+    error::{Error, Locate, Result},
     files::HashedFile,
     geom::pushbroom::Detector,
     image::{IMAGE_DURATION_END_S, IMAGE_LINES_MIN, ImageFields, line_period_agrees},
@@ -120,63 +122,6 @@ impl ImageTimes {
     }
 }
 
-/// An image whose times cannot be told.
-#[derive(Debug, thiserror::Error)]
-enum ImageError {
-    #[error("image {image}: no {key}, neither in the label nor in the configuration")]
-    Missing { image: String, key: &'static str },
-    #[error(
-        "image {image}: line period {stated_ms} ms is stated, but exposure {exposure_ms} ms × summing \
-         {summing} makes {computed_ms} ms; expected them to agree within the rounding of 0.0001 ms"
-    )]
-    Period {
-        image: String,
-        stated_ms: f64,
-        exposure_ms: f64,
-        summing: u32,
-        computed_ms: f64,
-    },
-    #[error(
-        "image {image}: {delivered} lines delivered, {header} in the header; expected no more than in the header"
-    )]
-    Lines {
-        image: String,
-        delivered: u32,
-        header: u32,
-    },
-    #[error(
-        "image {image}: {lines} lines of {line_period_s} s; expected at least {IMAGE_LINES_MIN} lines, a \
-         positive period and less than {IMAGE_DURATION_END_S} s in all"
-    )]
-    Duration {
-        image: String,
-        lines: u32,
-        line_period_s: f64,
-    },
-}
-
-impl Cause for ImageError {
-    fn kind(&self) -> Kind {
-        match self {
-            Self::Missing { .. } => Kind::Configuration,
-            _ => Kind::Input,
-        }
-    }
-
-    fn advice(&self) -> String {
-        match self {
-            Self::Missing { key, .. } => format!("add `{key}` to the image's table, or name its label"),
-            Self::Period { .. } => {
-                "give the exposure of one detector line, or the period of summed lines, not a mixture".to_owned()
-            }
-            Self::Lines { .. } => {
-                "lines_header is what the camera exposed, lines_delivered what the file holds".to_owned()
-            }
-            Self::Duration { .. } => "check lines_header, the exposure (milliseconds) and the summing".to_owned(),
-        }
-    }
-}
-
 stage_inputs! {
     /// Label and keys of one image, and the clocks.
     pub struct TagTimes<'a> {
@@ -277,6 +222,10 @@ fn image_times(image: &ImageConfig, session: &Session) -> Result<ImageTimes> {
     of_one_clock(image, fields.sclk_start.as_deref())?;
     let (start, start_from) = start_time(image, &fields, session, &mut notes, &mut remarks)?
         .ok_or_else(|| missing("sclk_start"))?;
+    // Without the camera's frame its orientation says what is missing.
+    if let Ok(mounting) = session.mounting(&instrument, start) {
+        remarks.extend(mounting_agrees(&instrument, mounting.matrix()));
+    }
     if let Some(utc) = &utc_stop {
         let stop = (&**utc, session.utc_to_et(utc)?);
         // Both are UTC of the label: whether the clock agrees with it is another question.

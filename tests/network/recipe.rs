@@ -135,6 +135,7 @@ impl<M: ExteriorOrientation> Simulated<M> {
             views: self.network.views.clone(),
             ranges: self.network.ranges.clone(),
             range_bias_sigmas_m: self.network.range_bias_sigmas_m.clone(),
+            heights: None,
         }
     }
 }

@@ -173,6 +173,7 @@ impl Site {
         let verdict = judge(&Evidence {
             footprints: searched.then_some(self.footprints.len()),
             ranges: &self.ranges,
+            limits: &self.config.limits,
             clock_correction_s: self.config.mola_clock.correction_s(),
             images: if image { &judged } else { &[] },
             warnings: &self.warnings,

@@ -9,6 +9,7 @@ use areograph::{
     spice::{KernelSet, RequiredCoverage},
     stages::{
         adjust::Adjusted,
+        check_heights::HeightCheck,
         check_ranges::RangeCheck,
         compare_pairs::PairComparison,
         convert_datum::Converted,
@@ -41,7 +42,9 @@ pub(crate) struct Site {
     pub(crate) ties: Ties,
     pub(crate) intersected: IntersectedTies,
     pub(crate) pairs: Vec<PairComparison>,
+    pub(crate) heights: HeightCheck,
     pub(crate) adjusted: Adjusted,
+    pub(crate) adjusted_heights: HeightCheck,
     pub(crate) adjusted_images: Vec<(Orientation, SensorModel, ImageRegistration)>,
     pub(crate) adjusted_intersected: IntersectedTies,
     pub(crate) adjusted_pairs: Vec<PairComparison>,
@@ -88,7 +91,9 @@ impl Site {
             models: each(&folder, &ids, "fit_sensor_model", ""),
             registrations: each(&folder, &ids, "register", ""),
             ties: stored(&folder, "read_ties"),
+            heights: stored(&folder, "check_heights"),
             adjusted: stored(&folder, "adjust"),
+            adjusted_heights: stored(&folder, "check_heights+adjusted"),
             times: each(&folder, &ids, "tag_times", ""),
             intersected: stored(&folder, "intersect"),
             pairs: stored(&folder, "compare_pairs"),
@@ -140,10 +145,12 @@ impl Site {
                 ties: &self.ties,
                 intersected: &self.intersected,
                 pairs: &self.pairs,
+                heights: &self.heights,
                 adjustment: Some(AdjustmentProducts {
                     kernels: &self.kernels,
                     folder: Path::new(""),
                     adjusted: &self.adjusted,
+                    heights: &self.adjusted_heights,
                     images: &adjusted_images,
                     tables: &[],
                     intersected: &self.adjusted_intersected,
@@ -180,10 +187,14 @@ impl Site {
             ties: &self.ties,
             adjusted: &self.adjusted,
             images: &adjusted,
-            pairs: &self.adjusted_pairs,
+            pairs: &self.pairs,
+            adjusted_pairs: &self.adjusted_pairs,
+            heights: &self.heights,
+            adjusted_heights: &self.adjusted_heights,
         };
         let evidence = Evidence {
             footprints: Some(self.converted.footprints.len()),
+            limits: &self.config.limits,
             ranges: &self.ranges,
             clock_correction_s: self.config.mola_clock.correction_s(),
             images: &images,
@@ -200,7 +211,7 @@ impl Site {
     }
 
     fn images_agree(&self) -> bool {
-        self.judged(|_, adjustment| adjustment.images_agree())
+        self.judged(|_, adjustment| adjustment.images_agree(&self.config.limits))
     }
 
     /// Its report.

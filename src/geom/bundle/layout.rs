@@ -5,6 +5,7 @@ use rayon::prelude::*;
 
 use super::{
     Network, PointRejection,
+    heights::Heights,
     point_rows::PointRows,
     rows::{self, Row},
     unknowns::{Columns, State},
@@ -25,6 +26,8 @@ pub(super) struct Layout<'a, M> {
     pub(super) views: Lists,
     pub(super) ranges: Lists,
     pub(super) robust: Option<RobustWeight>,
+    /// Heights that are observed.
+    pub(super) heights: Option<Heights>,
     /// Focal pixels per line of each view, initially: the unit of its residual along the track.
     px_per_line: Vec<f64>,
     /// Initial position at the instant of each range.
@@ -71,6 +74,7 @@ impl<'a, M: ExteriorOrientation> Layout<'a, M> {
             views: Lists::of(points, network.views.iter().map(|view| view.point)),
             ranges: Lists::of(points, network.ranges.iter().map(|range| range.point)),
             robust: None,
+            heights: None,
             px_per_line: views
                 .map(|view| {
                     let ground_m = &network.points[view.point].ground_m;

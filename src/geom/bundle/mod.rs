@@ -84,15 +84,18 @@
 //! ```
 
 mod check;
-
+mod heights;
 mod layout;
 mod point_rows;
 mod quality;
 mod reduce;
+mod reduced_heights;
 mod rows;
 mod solve;
 mod unknowns;
 
+#[cfg(test)]
+mod height_tests;
 #[cfg(test)]
 mod tests;
 
@@ -104,6 +107,7 @@ pub use unknowns::Unknown;
 use super::{
     pushbroom::{Distortion, OrientationCorrection},
     robust::RobustWeight,
+    surface::LaserSurface,
 };
 
 /// Orientation unknowns of an image: X, Y, Z and the rotations about the camera's x, y and z axis, each with
@@ -171,8 +175,19 @@ pub struct Range {
     pub profile: usize,
 }
 
+/// Points whose height is that of a surface.
+#[derive(Debug, Clone)]
+pub struct HeightControl {
+    /// The ground.
+    pub surface: LaserSurface,
+    /// Indices of the points.
+    pub points: Vec<usize>,
+    /// Whether the heights are observations; if not, they are only compared with what the others say.
+    pub weighed: bool,
+}
+
 /// All that enters an adjustment.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone)]
 pub struct Network<M> {
     /// Images.
     pub images: Vec<BundleImage<M>>,
@@ -184,6 +199,8 @@ pub struct Network<M> {
     pub ranges: Vec<Range>,
     /// Standard deviation of each profile's range bias, metres; 0 for no such unknown.
     pub range_bias_sigmas_m: Vec<f64>,
+    /// Heights of points above a surface.
+    pub heights: Option<HeightControl>,
 }
 
 impl<M> Default for Network<M> {
@@ -194,6 +211,7 @@ impl<M> Default for Network<M> {
             views: Vec::new(),
             ranges: Vec::new(),
             range_bias_sigmas_m: Vec::new(),
+            heights: None,
         }
     }
 }
@@ -262,6 +280,25 @@ impl Residual {
     }
 }
 
+/// Height of an adjusted point against the surface.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct HeightResidual {
+    /// Index of the point.
+    pub point: usize,
+    /// Height above the surface, metres.
+    pub above_m: f64,
+    /// Standard deviation of the surface, metres, without robust weights.
+    pub surface_sigma_m: f64,
+    /// Standard deviation that the point's own rays leave to its height when orientations are known, metres.
+    pub ray_sigma_m: f64,
+    /// Distance of the nearest shot, metres.
+    pub nearest_shot_m: f64,
+    /// Factor of its weight from robust estimation, 1 without.
+    pub weight_factor: f64,
+    /// Redundancy number; `None` where heights are only compared.
+    pub redundancy: Option<f64>,
+}
+
 /// An adjusted image.
 #[derive(Debug, Clone, PartialEq)]
 pub struct AdjustedImage {
@@ -299,6 +336,12 @@ pub struct Adjustment {
     pub ranges: Vec<Option<Residual>>,
     /// Range bias of each profile with the square root of its cofactor, metres, when it is unknown.
     pub range_biases_m: Vec<Option<(f64, f64)>>,
+    /// Heights of the points of [`Network::heights`] that take part.
+    pub heights: Vec<HeightResidual>,
+    /// Weighted sum of squares of the heights, with their full covariance; 0 where they are only compared.
+    pub height_squares: f64,
+    /// Cofactors of the mean of these points, m²: what they share does not average out. `None` without heights.
+    pub mean_cofactor_m2: Option<Matrix3<f64>>,
     /// Scalar observations, initial values with a standard deviation included.
     pub observations: usize,
     /// Unknowns.

@@ -1,12 +1,14 @@
 //! Covariances, residuals, redundancy numbers and correlations of the settled adjustment.
 
-use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
+use nalgebra::{DMatrix, DVector, Matrix3, Matrix3xX, Vector3};
 use rayon::prelude::*;
 
 use super::{
     AdjustedImage, AdjustedPoint, Adjustment, ORIENTATION_UNKNOWNS, PointRejection, Residual,
     layout::Layout,
     point_rows::PointRows,
+    reduce::Settled,
+    reduced_heights::ReducedHeights,
     unknowns::{State, Unknown},
 };
 use crate::geom::pushbroom::ExteriorOrientation;
@@ -20,18 +22,74 @@ struct Judged {
     residuals: Vec<Residual>,
 }
 
-/// The adjustment at `state`; observations, unknowns and history are left to the caller.
+/// What observed heights do to the points that carry them.
+struct Controls {
+    /// Index among the heights of each point that has one.
+    of_point: Vec<Option<usize>>,
+    /// `u` of each.
+    turned: Vec<Vector3<f64>>,
+    /// `Σ⁻¹`.
+    weights: DMatrix<f64>,
+    /// `Q Gᵀ Σ⁻¹`, one column a height, and `Gᵀ Σ⁻¹`.
+    through: DMatrix<f64>,
+    weighted: DMatrix<f64>,
+}
+
+/// What an observed height does to its point.
+struct Control<'a> {
+    turned: &'a Vector3<f64>,
+    weight: f64,
+    through: &'a [f64],
+    /// `Σ⁻¹ G Q Gᵀ Σ⁻¹` of it.
+    fed_back: f64,
+}
+
+impl Controls {
+    fn of(reduced: &ReducedHeights, points: &[usize], of: usize, cofactors: &DMatrix<f64>) -> Self {
+        let mut of_point = vec![None; of];
+        for (index, point) in points.iter().enumerate() {
+            of_point[*point] = Some(index);
+        }
+        let weighted = reduced.weighted().transpose();
+        Self {
+            of_point,
+            turned: reduced.turned.clone(),
+            weights: reduced.weights(),
+            through: cofactors * &weighted,
+            weighted,
+        }
+    }
+
+    fn of_point(&self, point: usize) -> Option<Control<'_>> {
+        let index = self.of_point[point]?;
+        let through = column_of(&self.through, index);
+        Some(Control {
+            turned: &self.turned[index],
+            weight: self.weights[(index, index)],
+            fed_back: dot(through, column_of(&self.weighted, index)),
+            through,
+        })
+    }
+}
+
+/// The adjustment where it has settled; observations, unknowns and history are left to the caller.
 pub(super) fn judge<M: ExteriorOrientation>(
     layout: &Layout<'_, M>,
-    state: &State,
+    Settled { state, reduced }: &Settled,
     fitness: &[Result<(), PointRejection>],
     cofactors: &DMatrix<f64>,
 ) -> Adjustment {
+    let weighed = layout.network.heights.as_ref().filter(|of| of.weighed);
+    let heights = layout.heights.as_ref().zip(reduced.heights.as_ref());
+    let controls = heights
+        .filter(|_| weighed.is_some())
+        .map(|(of, reduced)| Controls::of(reduced, &of.points, fitness.len(), cofactors));
     let judged: Vec<Result<Judged, PointRejection>> = (0..fitness.len())
         .into_par_iter()
         .map_init(Default::default, |room, point| {
             fitness[point]?;
-            judge_point(layout, state, point, cofactors, room).ok_or(PointRejection::Undetermined)
+            judge_point(layout, state, point, cofactors, controls.as_ref(), room)
+                .ok_or(PointRejection::Undetermined)
         })
         .collect();
     let mut adjustment = Adjustment {
@@ -47,6 +105,11 @@ pub(super) fn judge<M: ExteriorOrientation>(
             .iter()
             .map(|column| column.map(|column| estimate(state, cofactors, column)))
             .collect(),
+        heights: heights.map_or_else(Vec::new, |(of, reduced)| {
+            reduced.residuals(of, weighed.map(|_| cofactors))
+        }),
+        height_squares: 0.0,
+        mean_cofactor_m2: None,
         observations: 0,
         unknowns: 0,
         weighted_squares: 0.0,
@@ -71,6 +134,14 @@ pub(super) fn judge<M: ExteriorOrientation>(
     for (column, sigma) in layout.columns.sigmas.iter().enumerate() {
         adjustment.weighted_squares += (state.corrections[column] / sigma).powi(2);
     }
+    if let Some((of, reduced)) = heights {
+        if weighed.is_some() {
+            adjustment.height_squares = reduced.weighted_squares();
+            adjustment.weighted_squares += adjustment.height_squares;
+        }
+        adjustment.mean_cofactor_m2 =
+            mean_cofactor_m2(layout, state, &of.points, cofactors, controls.as_ref());
+    }
     adjustment
 }
 
@@ -88,6 +159,7 @@ fn judge_point<M: ExteriorOrientation>(
     state: &State,
     point: usize,
     cofactors: &DMatrix<f64>,
+    controls: Option<&Controls>,
     room: &mut Room,
 ) -> Option<Judged> {
     let Room {
@@ -108,15 +180,32 @@ fn judge_point<M: ExteriorOrientation>(
                 .sum()
         }))
     }));
-    let mut through_shared = Matrix3::zeros();
+    // Cofactors of the point transformed by its triangle: what its rays leave open, what the shared unknowns add, and
+    // what an observed height takes away.
+    let mut transformed_cofactor = Matrix3::identity();
     for (place, between) in between.iter().enumerate() {
-        through_shared += between * Vector3::from(coupling.map(|row| row[place])).transpose();
+        transformed_cofactor += between * Vector3::from(coupling.map(|row| row[place])).transpose();
+    }
+    if let Some(control) = controls.and_then(|of| of.of_point(point)) {
+        let through = Vector3::from(coupling.map(|row| {
+            let columns = rows.columns().zip(row);
+            columns
+                .map(|(column, partial)| partial * control.through[column])
+                .sum()
+        }));
+        let mixed = through * control.turned.transpose();
+        let own = control.turned * control.turned.transpose();
+        transformed_cofactor +=
+            mixed + mixed.transpose() + own * (control.fed_back - control.weight);
+        for (between, column) in between.iter_mut().zip(rows.columns()) {
+            *between += control.turned * control.through[column];
+        }
     }
     let residuals: Vec<Residual> = (0..rows.weights.len())
         .map(|row| {
             // What the point does to the row, what the shared unknowns do, and what both do together.
             let own = inverse.tr_mul(&rows.by_point[row]);
-            let mut leverage = own.norm_squared() + own.dot(&(through_shared * own));
+            let mut leverage = own.dot(&(transformed_cofactor * own));
             let partials = rows.row(row);
             let of_row = || {
                 let places = rows.columns().zip(partials).zip(&*between);
@@ -140,14 +229,49 @@ fn judge_point<M: ExteriorOrientation>(
     Some(Judged {
         point: AdjustedPoint {
             ground_m: state.points_m[point],
-            cofactor_m2: inverse * (Matrix3::identity() + through_shared) * inverse.transpose(),
+            cofactor_m2: inverse * transformed_cofactor * inverse.transpose(),
             priors,
         },
         residuals,
     })
 }
 
-/// A column of a square matrix.
+/// Cofactors of the mean of `points`: what their rays leave open averages out, what they share does not.
+fn mean_cofactor_m2<M: ExteriorOrientation>(
+    layout: &Layout<'_, M>,
+    state: &State,
+    points: &[usize],
+    cofactors: &DMatrix<f64>,
+    controls: Option<&Controls>,
+) -> Option<Matrix3<f64>> {
+    let columns = layout.columns.len();
+    let mut own_m2 = Matrix3::zeros();
+    let mut by_shared = Matrix3xX::zeros(columns);
+    let mut moves = Matrix3xX::zeros(points.len());
+    let mut rows = PointRows::default();
+    for (index, point) in points.iter().enumerate() {
+        layout.fill(&mut rows, state, *point).ok()?;
+        let inverse = rows.eliminate().try_inverse()?;
+        own_m2 += inverse * inverse.transpose();
+        for (place, column) in rows.columns().enumerate() {
+            let coupling = Vector3::new(rows.row(0)[place], rows.row(1)[place], rows.row(2)[place]);
+            let mut shared = by_shared.column_mut(column);
+            shared -= inverse * coupling;
+        }
+        if let Some(controls) = controls {
+            moves.set_column(index, &(inverse * controls.turned[index]));
+        }
+    }
+    if let Some(controls) = controls {
+        own_m2 -= &moves * &controls.weights * moves.transpose();
+        by_shared -= &moves * controls.weighted.transpose();
+    }
+    let count = points.len() as f64;
+    let sum_m2 = own_m2 + &by_shared * cofactors * by_shared.transpose();
+    (count > 0.0).then(|| sum_m2 / (count * count))
+}
+
+/// A column of a matrix.
 fn column_of(matrix: &DMatrix<f64>, column: usize) -> &[f64] {
     &matrix.as_slice()[column * matrix.nrows()..(column + 1) * matrix.nrows()]
 }

@@ -10,6 +10,7 @@ use rayon::prelude::*;
 use super::{
     layout::Layout,
     point_rows::{PointRows, add_multiple},
+    reduced_heights::ReducedHeights,
     unknowns::State,
 };
 use crate::geom::pushbroom::{ExteriorOrientation, Unseen};
@@ -25,6 +26,14 @@ pub(super) struct Reduced {
     pub(super) right: DVector<f64>,
     /// The sum that is made small.
     pub(super) cost: f64,
+    /// Heights, where they are observed; matrix, right side and sum contain them.
+    pub(super) heights: Option<ReducedHeights>,
+}
+
+/// Where an iteration has come to.
+pub(super) struct Settled {
+    pub(super) state: State,
+    pub(super) reduced: Reduced,
 }
 
 impl Reduced {
@@ -33,6 +42,7 @@ impl Reduced {
             matrix: DMatrix::zeros(columns, columns),
             right: DVector::zeros(columns),
             cost: 0.0,
+            heights: None,
         }
     }
 
@@ -94,6 +104,14 @@ pub(super) fn reduce<M: ExteriorOrientation>(
         sum.matrix[(column, column)] += weight;
         sum.right[column] -= weight * correction;
         sum.cost += weight * correction * correction;
+    }
+    if let Some(heights) = &layout.heights {
+        let heights = ReducedHeights::of(layout, heights, state)?;
+        let (matrix, right, cost) = heights.equations();
+        sum.matrix += matrix;
+        sum.right += right;
+        sum.cost += cost;
+        sum.heights = Some(heights);
     }
     Ok(sum)
 }

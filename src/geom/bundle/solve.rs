@@ -1,15 +1,19 @@
 //! Gauss–Newton steps, with damping only where a step makes matters worse.
 
+use std::collections::BTreeSet;
+
 use nalgebra::{DVector, Vector3};
 use rayon::prelude::*;
 
 use super::{
-    Adjustment, BundleError, BundleOptions, Network, PointRejection,
+    Adjustment, BundleError, BundleOptions, HeightControl, Network, PointRejection,
     check::check,
+    heights::Heights,
     layout::Layout,
     point_rows::PointRows,
     quality,
-    reduce::{Reduced, reduce},
+    reduce::{Reduced, Settled, reduce},
+    reduced_heights::ReducedHeights,
     unknowns::State,
 };
 use crate::{
@@ -71,9 +75,16 @@ pub fn solve<M: ExteriorOrientation>(
             &mut history,
         )?;
     }
+    if let Some(control) = &network.heights {
+        let mut room = (options.steps_max, &mut history);
+        settled = with_heights(&mut layout, control, settled, &active, &mut room)?;
+    }
     let factor = factorise(&layout, &settled.reduced, 0.0)?;
-    let mut adjustment = quality::judge(&layout, &settled.state, &fitness, &factor.inverse());
-    adjustment.observations = observations;
+    let cofactors = factor.inverse();
+    let mut adjustment = quality::judge(&layout, &settled, &fitness, &cofactors);
+    let weighed = network.heights.as_ref().is_some_and(|of| of.weighed);
+    let heights = if weighed { adjustment.heights.len() } else { 0 };
+    adjustment.observations = observations + heights;
     adjustment.unknowns = unknowns;
     adjustment.history = history;
     Ok(adjustment)
@@ -100,12 +111,48 @@ fn count<M: ExteriorOrientation>(layout: &Layout<'_, M>, active: &[usize]) -> (u
     )
 }
 
-struct Settled {
-    state: State,
-    reduced: Reduced,
+/// Rounds in which heights find their surface and their weights.
+const HEIGHT_ROUNDS_MAX: u32 = 15;
+/// Standard deviations that change by less than this leave the weights of heights as they are, metres.
+const HEIGHT_CHANGE_M: f64 = 0.01;
+
+/// Goes on with heights as observations; where they are only compared, measures them.
+fn with_heights<M: ExteriorOrientation>(
+    layout: &mut Layout<'_, M>,
+    control: &HeightControl,
+    mut settled: Settled,
+    active: &[usize],
+    (steps_max, history): &mut (u32, &mut Vec<f64>),
+) -> Result<Settled, BundleError> {
+    let active_points: BTreeSet<usize> = active.iter().copied().collect();
+    let points = control.points.iter().copied();
+    let points = points
+        .filter(|point| active_points.contains(point))
+        .collect();
+    let heights = Heights::at(&control.surface, points, &settled.state);
+    if !control.weighed {
+        let measured = ReducedHeights::of(layout, &heights, &settled.state);
+        settled.reduced.heights = Some(measured.map_err(|_| not_converged(history))?);
+        layout.heights = Some(heights);
+        return Ok(settled);
+    }
+    layout.heights = Some(heights);
+    for _ in 0..HEIGHT_ROUNDS_MAX {
+        settled = settle(layout, settled.state, active, *steps_max, history)?;
+        let reduced = settled.reduced.heights.as_ref();
+        let (Some(reduced), Some(heights)) = (reduced, layout.heights.as_mut()) else {
+            break;
+        };
+        let changed_m = heights.reweigh(&reduced.misclosures_m, &reduced.ray_variances_m2);
+        if !heights.follow(&control.surface, &settled.state) && changed_m < HEIGHT_CHANGE_M {
+            break;
+        }
+    }
+    settled.reduced = reduce(layout, &settled.state, active).map_err(|_| not_converged(history))?;
+    Ok(settled)
 }
 
-fn settle<M: ExteriorOrientation>(
+pub(super) fn settle<M: ExteriorOrientation>(
     layout: &Layout<'_, M>,
     start: State,
     active: &[usize],
@@ -130,8 +177,9 @@ fn settle<M: ExteriorOrientation>(
     for _ in 0..steps_max {
         let factor = factorise(layout, &now.reduced, damping)?;
         let shared = factor.solve(&now.reduced.right);
-        let (next, step) =
-            advance(layout, &now.state, active, &shared).ok_or_else(|| not_converged(history))?;
+        let heights = now.reduced.heights.as_ref();
+        let (next, step) = advance(layout, &now.state, active, &shared, heights)
+            .ok_or_else(|| not_converged(history))?;
         let before = now.reduced.cost;
         match reduce(layout, &next, active) {
             Ok(reduced) if reduced.cost <= before * (1.0 + ROUNDING) || step < STEP => {
@@ -188,6 +236,7 @@ fn advance<M: ExteriorOrientation>(
     state: &State,
     active: &[usize],
     shared: &DVector<f64>,
+    heights: Option<&ReducedHeights>,
 ) -> Option<(State, f64)> {
     let steps_m: Vec<Vector3<f64>> = active
         .par_iter()
@@ -197,9 +246,17 @@ fn advance<M: ExteriorOrientation>(
         })
         .collect::<Option<_>>()?;
     let mut points_m = state.points_m.clone();
-    let mut longest = 0.0_f64;
     for (point, step_m) in active.iter().zip(&steps_m) {
         points_m[*point] += step_m;
+    }
+    if let (Some(heights), Some(reduced)) = (&layout.heights, heights) {
+        for (point, move_m) in heights.points.iter().zip(reduced.moves_m(shared)) {
+            points_m[*point] += move_m;
+        }
+    }
+    let mut longest = 0.0_f64;
+    for point in active {
+        let step_m = points_m[*point] - state.points_m[*point];
         longest = longest.max(step_m.norm() / METRES_PER_KM);
     }
     for (unknown, step) in layout.columns.unknowns.iter().zip(shared) {

@@ -46,7 +46,7 @@ fn image(east_m: f64, roll_rad: f64) -> BundleImage<EulerPolynomial> {
 }
 
 /// Three images, nine points; the first four carry coordinates and ranges, the last is seen by three.
-fn network() -> Network<EulerPolynomial> {
+pub(super) fn network() -> Network<EulerPolynomial> {
     let images = vec![image(0.0, 0.02), image(-150e3, 0.39), image(90e3, -0.22)];
     let mut network = Network {
         range_bias_sigmas_m: vec![30.0],
@@ -95,7 +95,9 @@ fn network() -> Network<EulerPolynomial> {
     network
 }
 
-fn layout(network: &Network<EulerPolynomial>) -> (Layout<'_, EulerPolynomial>, State, Vec<usize>) {
+pub(super) fn layout(
+    network: &Network<EulerPolynomial>,
+) -> (Layout<'_, EulerPolynomial>, State, Vec<usize>) {
     let layout = Layout::of(network);
     let corrections = DVector::zeros(layout.columns.len());
     let points_m = network.points.iter().map(|point| point.ground_m).collect();
@@ -211,7 +213,7 @@ fn derivatives_at(
 }
 
 /// Rows of a point in all shared unknowns and all coordinates, and their misclosures.
-fn dense_rows(
+pub(super) fn dense_rows(
     layout: &Layout<'_, EulerPolynomial>,
     state: &State,
     point: usize,

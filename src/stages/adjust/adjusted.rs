@@ -7,7 +7,7 @@ use super::{
     input::AdjustImage,
     network::Assembled,
     points::{PointKind, RejectedPoint},
-    summary::AdjustmentSummary,
+    summary::{self, AdjustmentSummary, HeightSummary},
 };
 use crate::{
     frames::{MarsIau2000, Position},
@@ -22,6 +22,8 @@ use crate::{
 pub struct Adjusted {
     /// Statistics.
     pub summary: AdjustmentSummary,
+    /// Heights of tie points by the MOLA surface; `None` where they are no observations.
+    pub heights: Option<HeightSummary>,
     /// One entry for each image, in their order.
     pub images: Vec<CorrectedImage>,
     /// Points with adjusted coordinates: shots, then tie points, each in their order.
@@ -46,6 +48,8 @@ pub struct CorrectedImage {
     pub correction: [f64; ORIENTATION_UNKNOWNS],
     /// Their standard deviations; 0 where held fixed.
     pub sigmas: [f64; ORIENTATION_UNKNOWNS],
+    /// What they were expected to be within, standard deviations; 0 where held fixed, infinite where free.
+    pub prior_sigmas: [f64; ORIENTATION_UNKNOWNS],
     /// Bias of the line times with its standard deviation, seconds, where it is unknown.
     pub time_bias_s: Option<(f64, f64)>,
     /// Time from line to line, seconds.
@@ -67,7 +71,7 @@ pub struct CorrectedPoint {
     pub initial: Position<MarsIau2000>,
     /// Where it is adjusted.
     pub ground: Position<MarsIau2000>,
-    /// Covariance of the adjusted coordinates, m², with the a posteriori standard deviation of unit weight.
+    /// Covariance of the adjusted coordinates, m²: a priori variances times the summary's variance factor.
     pub covariance_m2: Matrix3<f64>,
 }
 
@@ -149,7 +153,7 @@ pub(super) fn collect<M>(
 ) -> Adjusted {
     let mut index_of = vec![None; assembled.points.len()];
     let mut points = Vec::with_capacity(assembled.points.len());
-    let variance = adjustment.sigma0().powi(2);
+    let variance = summary.variance_factor;
     for (point, outcome) in adjustment.points.iter().enumerate() {
         let Ok(found) = outcome else { continue };
         index_of[point] = Some(points.len());
@@ -165,8 +169,8 @@ pub(super) fn collect<M>(
     let views = assembled.network.views.iter().zip(&adjustment.views);
     let ranges = assembled.network.ranges.iter().zip(&adjustment.ranges);
     Adjusted {
-        summary,
-        images: corrected_images(images, &adjustment),
+        heights: summary::heights(&assembled, &adjustment),
+        images: corrected_images(images, &adjustment, summary.variance_factor),
         views: views
             .filter_map(|(view, residuals)| {
                 let [along, across] = (*residuals)?;
@@ -195,22 +199,28 @@ pub(super) fn collect<M>(
         points,
         rejected: assembled.rejected,
         weighted_squares: adjustment.history,
+        summary,
     }
 }
 
-fn corrected_images<M>(images: &[AdjustImage<M>], adjustment: &Adjustment) -> Vec<CorrectedImage> {
-    let sigma0 = adjustment.sigma0();
+fn corrected_images<M>(
+    images: &[AdjustImage<M>],
+    adjustment: &Adjustment,
+    variance_factor: f64,
+) -> Vec<CorrectedImage> {
+    let root = variance_factor.sqrt();
     let found = images.iter().zip(&adjustment.images);
     found
         .map(|(image, adjusted)| CorrectedImage {
             id: image.oriented_camera.id.clone(),
             correction: adjusted.correction.coefficients(),
             sigmas: std::array::from_fn(|unknown| {
-                sigma0 * adjusted.cofactors[(unknown, unknown)].sqrt()
+                root * adjusted.cofactors[(unknown, unknown)].sqrt()
             }),
+            prior_sigmas: image.sigmas,
             time_bias_s: adjusted
                 .time_bias_s
-                .map(|(bias_s, root_s)| (bias_s, sigma0 * root_s)),
+                .map(|(bias_s, root_s)| (bias_s, root * root_s)),
             line_period_s: image.line_period_s,
             half_lines: adjusted.correction.half_lines,
         })

@@ -1,12 +1,16 @@
-//! Tie points that are no ties: found by their standardised residuals, left out, and adjusted again.
+//! Tie points that are no ties: found by their residuals and heights, rejected, and adjusted again.
 
 use super::{
+    heights::height_blunders,
     network::Assembled,
     points::{PointKind, RejectedPoint, RejectionReason},
 };
-use crate::geom::{
-    bundle::{Adjustment, BundleError, BundleOptions, Network, Residual, solve},
-    pushbroom::ExteriorOrientation,
+use crate::{
+    config::AdjustmentConfig,
+    geom::{
+        bundle::{Adjustment, BundleError, BundleOptions, Network, Residual, solve},
+        pushbroom::ExteriorOrientation,
+    },
 };
 
 /// Rounds after which no more tie points are rejected.
@@ -15,9 +19,27 @@ const ROUNDS_MAX: u32 = 20;
 /// pulls at its neighbours, and they come right when it is gone.
 const SHARE_OF_LARGEST: f64 = 0.5;
 
-/// Adjusts, leaves out the worst tie points and repeats until no standardised residual exceeds `limit`; without one
-/// all stay.
+/// Adjusts without the tie points that are none.
+///
+/// First by what images say of each other, heights being only compared; then, where there is a surface, by heights;
+/// then with heights as observations.
 pub(super) fn solve_without_blunders<M: ExteriorOrientation>(
+    assembled: &mut Assembled<M>,
+    bundle_options: &BundleOptions,
+    config: &AdjustmentConfig,
+) -> Result<Adjustment, BundleError> {
+    let adjustment = by_residuals(assembled, bundle_options, config.blunder_limit)?;
+    if assembled.network.heights.is_none() {
+        return Ok(adjustment);
+    }
+    by_heights(assembled, bundle_options, config, adjustment)?;
+    assembled.weigh_heights();
+    solve(&assembled.network, bundle_options)
+}
+
+/// Adjusts, rejects the worst tie points and repeats until no standardised residual exceeds `limit`; without one all
+/// stay.
+fn by_residuals<M: ExteriorOrientation>(
     assembled: &mut Assembled<M>,
     bundle_options: &BundleOptions,
     limit: Option<f64>,
@@ -33,25 +55,61 @@ pub(super) fn solve_without_blunders<M: ExteriorOrientation>(
             break;
         }
         let threshold = limit.max(SHARE_OF_LARGEST * largest);
-        let rejected: Vec<bool> = worst.iter().map(|value| *value >= threshold).collect();
-        for (point, standardised) in worst
-            .iter()
-            .enumerate()
-            .filter(|(point, _)| rejected[*point])
-        {
-            assembled.rejected.push(RejectedPoint {
-                kind: PointKind::Tie,
-                index: assembled.points[point].index,
-                id: assembled.points[point].name.clone(),
-                reason: RejectionReason::Blunder {
-                    standardised: *standardised,
-                },
-            });
-        }
-        assembled.network.views.retain(|view| !rejected[view.point]);
+        let rejected = worst.iter().enumerate();
+        let rejected = rejected.filter(|(_, standardised)| **standardised >= threshold);
+        let rejected = rejected.map(|(point, standardised)| {
+            let standardised = *standardised;
+            (point, RejectionReason::Blunder { standardised })
+        });
+        assembled.reject(rejected.collect());
         adjustment = solve(&assembled.network, bundle_options)?;
     }
     Ok(adjustment)
+}
+
+/// Rejects tie points that no ground explains until none is left.
+fn by_heights<M: ExteriorOrientation>(
+    assembled: &mut Assembled<M>,
+    bundle_options: &BundleOptions,
+    config: &AdjustmentConfig,
+    mut adjustment: Adjustment,
+) -> Result<(), BundleError> {
+    let Some(limit) = config.height_blunder_limit else {
+        return Ok(());
+    };
+    for _ in 0..ROUNDS_MAX {
+        let blunders = height_blunders(assembled, &adjustment, limit);
+        if blunders.is_empty() {
+            break;
+        }
+        let rejected = blunders.iter().map(|blunder| {
+            let reason = RejectionReason::Height {
+                above_m: blunder.above_m,
+                standardised: blunder.standardised,
+            };
+            (blunder.point, reason)
+        });
+        assembled.reject(rejected.collect());
+        adjustment = solve(&assembled.network, bundle_options)?;
+    }
+    Ok(())
+}
+
+impl<M> Assembled<M> {
+    /// Takes tie points out of the network, by their indices.
+    fn reject(&mut self, rejected: Vec<(usize, RejectionReason)>) {
+        let mut is_rejected = vec![false; self.points.len()];
+        for (point, reason) in rejected {
+            is_rejected[point] = true;
+            self.rejected.push(RejectedPoint {
+                kind: PointKind::Tie,
+                index: self.points[point].index,
+                id: self.points[point].name.clone(),
+                reason,
+            });
+        }
+        self.network.views.retain(|view| !is_rejected[view.point]);
+    }
 }
 
 /// The largest standardised residual of each tie point, without sign; 0 for shots and dropped points.

@@ -2,7 +2,7 @@
 
 use crate::{
     frames::{MarsIau2000, Position},
-    geom::{bundle::ORIENTATION_UNKNOWNS, oriented_camera::OrientedCamera},
+    geom::{bundle::ORIENTATION_UNKNOWNS, oriented_camera::OrientedCamera, surface::LaserSurface},
 };
 
 /// An image with what is known of its orientation beforehand.
@@ -27,13 +27,27 @@ pub fn orientation_sigmas(position_m: f64, angle_rad: f64) -> [f64; ORIENTATION_
     std::array::from_fn(|index| if index < 9 { position_m } else { angle_rad })
 }
 
+/// Standard deviations of an image's unknowns from those of the three powers of `t`, the same on all axes.
+#[must_use]
+pub(super) fn sigmas_of_powers(
+    position_m: &[f64; 3],
+    rotation_rad: &[f64; 3],
+) -> [f64; ORIENTATION_UNKNOWNS] {
+    std::array::from_fn(|index| {
+        let of_power = if index < 9 { position_m } else { rotation_rad };
+        of_power[index % 3]
+    })
+}
+
 /// The laser shots of an adjustment.
-#[derive(Debug, Clone, Default, PartialEq)]
+#[derive(Debug, Clone, Default)]
 pub struct LaserShots {
     /// Identifiers of the site's profiles, in their order.
     pub profiles: Vec<String>,
     /// Shots, each row once.
     pub shots: Vec<LaserShot>,
+    /// The ground between all shots of the site, where it controls the heights of tie points.
+    pub surface: Option<LaserSurface>,
 }
 
 /// A laser shot.

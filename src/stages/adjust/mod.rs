@@ -7,6 +7,7 @@
 mod adjusted;
 mod blunders;
 mod error;
+mod heights;
 mod input;
 mod network;
 mod points;
@@ -25,4 +26,7 @@ pub use points::{PointKind, RejectedPoint, RejectionReason};
 pub use prepare::{Candidate, prepare_adjustment};
 pub use run::adjust;
 pub use stage::Adjust;
-pub use summary::{AdjustmentSummary, GroundSummary, ImageSummary, ObservationType, TypeSummary};
+pub use summary::{
+    AdjustmentSummary, GroundSummary, HeightSummary, ImageSummary, ObservationType, TypeSummary,
+    WORSE_THAN_CONFIGURED,
+};

@@ -15,7 +15,7 @@ use crate::{
     footprints::FootprintImageCoordinates,
     frames::{MarsIau2000, Position},
     geom::{
-        bundle::{BundleImage, BundlePoint, Network, Range, View},
+        bundle::{BundleImage, BundlePoint, HeightControl, Network, Range, View},
         pushbroom::{ExteriorOrientation, Projector},
     },
     stages::intersect::IntersectedTies,
@@ -61,10 +61,18 @@ pub(super) fn assemble<'a, M: ExteriorOrientation>(
     };
     assembled.add_shots(shots, config)?;
     assembled.mola = footprints_in_images(images, shots, config)?;
-    if config.footprint_image_coordinates == FootprintImageCoordinates::Weighted {
+    if config.footprints_in_images() == FootprintImageCoordinates::Weighted {
         assembled.network.views.extend(&assembled.mola);
     }
     assembled.add_ties(images, ties, starts, config)?;
+    if let Some(surface) = &shots.surface {
+        let ties = assembled.shots..assembled.points.len();
+        assembled.network.heights = Some(HeightControl {
+            surface: surface.clone(),
+            points: evenly(&assembled.along_the_flight(ties), COMPARED_MAX),
+            weighed: false,
+        });
+    }
     Ok(assembled)
 }
 
@@ -128,7 +136,41 @@ fn footprints_in_images<M: ExteriorOrientation>(
     Ok(views)
 }
 
+/// Tie points that are compared with the surface at most: their covariance is full.
+const COMPARED_MAX: usize = 2_000;
+/// Tie points whose height is observed at most: errors of the surface at neighbours are alike, so more tell nothing new.
+const CONTROLLED_MAX: usize = 400;
+
+/// At most `most` of the entries, evenly spread.
+fn evenly(entries: &[usize], most: usize) -> Vec<usize> {
+    let step = entries.len().div_ceil(most).max(1);
+    entries.iter().copied().step_by(step).collect()
+}
+
 impl<M> Assembled<M> {
+    /// Makes heights observations.
+    pub(super) fn weigh_heights(&mut self) {
+        let Some(mut control) = self.network.heights.take() else {
+            return;
+        };
+        let measured: BTreeSet<usize> = self.network.views.iter().map(|view| view.point).collect();
+        control.points.retain(|point| measured.contains(point));
+        control.points = evenly(&control.points, CONTROLLED_MAX);
+        control.weighed = true;
+        self.network.heights = Some(control);
+    }
+
+    /// Points by the line of their first measurement.
+    fn along_the_flight(&self, points: std::ops::Range<usize>) -> Vec<usize> {
+        let mut lines = vec![f64::INFINITY; self.points.len()];
+        for view in self.network.views.iter().rev() {
+            lines[view.point] = view.x_lines;
+        }
+        let mut points: Vec<usize> = points.collect();
+        points.sort_by(|one, other| lines[*one].total_cmp(&lines[*other]));
+        points
+    }
+
     /// Whether the point at this index is a shot or a tie point.
     pub(super) fn kind(&self, point: usize) -> PointKind {
         if point < self.shots {
@@ -164,9 +206,7 @@ impl<'a, M: ExteriorOrientation> Assembled<&'a M> {
                     index: *index,
                     name: shots.profiles[*index].clone(),
                 });
-                self.network
-                    .range_bias_sigmas_m
-                    .push(config.range_bias_sigma_m);
+                self.network.range_bias_sigmas_m.push(config.range_bias_m());
                 self.profiles.len() - 1
             });
             self.network.ranges.push(Range {

@@ -44,4 +44,12 @@ pub enum RejectionReason {
         /// Its largest standardised residual, without sign.
         standardised: f64,
     },
+    /// No ground explains its height.
+    #[error("{above_m:+.0} m from the MOLA surface, standardised {standardised:.1}")]
+    Height {
+        /// Height above the surface beyond what tie points share, metres.
+        above_m: f64,
+        /// The same in its standard deviations, without sign.
+        standardised: f64,
+    },
 }

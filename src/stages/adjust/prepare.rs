@@ -2,14 +2,16 @@
 
 use std::collections::BTreeSet;
 
-use super::input::{AdjustImage, LaserShot, LaserShots, ShotRange, orientation_sigmas};
+use super::input::{
+    AdjustImage, LaserShot, LaserShots, ShotRange, orientation_sigmas, sigmas_of_powers,
+};
 use crate::{
     config::AdjustmentConfig,
-    footprints::Footprints,
+    footprints::{AdjustmentModel, Footprints},
     frames::{MarsIau2000, Position},
     geom::{
-        ellipsoid::spherical_to_xyz_m, oriented_camera::OrientedCamera,
-        pushbroom::ExteriorOrientation,
+        bundle::ORIENTATION_UNKNOWNS, ellipsoid::spherical_to_xyz_m,
+        oriented_camera::OrientedCamera, pushbroom::ExteriorOrientation, surface::LaserSurface,
     },
     stages::{
         group_profiles::Profile, orientation::Orientation, register::ImageRegistration,
@@ -37,19 +39,14 @@ pub struct Candidate<'a, M> {
 }
 
 impl<M: ExteriorOrientation> Candidate<'_, M> {
-    /// The image with its standard deviations.
-    ///
-    /// An image that `config` names keeps those written there. Otherwise all position unknowns get the one
-    /// of nadir or of other images, and rotations what moves the ground as far: `σ/range`.
+    /// The image with its standard deviations: those of the model, or what `config` says of this image.
     fn weighed(self, config: &AdjustmentConfig) -> AdjustImage<M> {
-        let pose = self.oriented_camera.orientation.pose(0.0);
-        let look = pose.mars_to_camera.row(2).transpose();
-        let position_sigma_m = if look.angle(&-pose.position_m) < NADIR_RAD {
-            config.position_sigma_nadir_m
-        } else {
-            config.position_sigma_off_nadir_m
+        let mut sigmas = match config.model {
+            AdjustmentModel::MolaSurface => {
+                sigmas_of_powers(&config.position_sigma_m, &config.rotation_sigma_rad)
+            }
+            AdjustmentModel::Published => self.published_sigmas(config),
         };
-        let mut sigmas = orientation_sigmas(position_sigma_m, position_sigma_m / self.range_m());
         if let Some(own) = config.images.iter().find(|own| own.id == self.times.id) {
             if let Some(position_m) = own.position_m {
                 sigmas[..9].copy_from_slice(&position_m);
@@ -64,6 +61,20 @@ impl<M: ExteriorOrientation> Candidate<'_, M> {
             sigmas,
             time_bias_sigma_s: config.time_bias_sigma_s,
         }
+    }
+
+    /// All position unknowns get the standard deviation of nadir or of other images, and rotations what moves the
+    /// ground as far: `σ/range` (Yoon & Shan 2004).
+    fn published_sigmas(&self, config: &AdjustmentConfig) -> [f64; ORIENTATION_UNKNOWNS] {
+        let pose = self.oriented_camera.orientation.pose(0.0);
+        let look = pose.mars_to_camera.row(2).transpose();
+        let [nadir_m, off_nadir_m] = config.published_sigmas_m();
+        let position_m = if look.angle(&-pose.position_m) < NADIR_RAD {
+            nadir_m
+        } else {
+            off_nadir_m
+        };
+        orientation_sigmas(position_m, position_m / self.range_m())
     }
 
     /// Distance of the ground in the middle of the image, metres; that of the centre of Mars where the image
@@ -94,6 +105,7 @@ pub fn prepare_adjustment<M: ExteriorOrientation>(
     candidates: Vec<Candidate<'_, M>>,
     footprints: &Footprints<MarsIau2000>,
     profiles: &[Profile],
+    surface: Option<LaserSurface>,
     config: &AdjustmentConfig,
 ) -> (Vec<AdjustImage<M>>, LaserShots) {
     let mut near = BTreeSet::new();
@@ -131,7 +143,12 @@ pub fn prepare_adjustment<M: ExteriorOrientation>(
         .into_iter()
         .map(|candidate| candidate.weighed(config));
     let profiles = profiles.iter().map(|profile| profile.id.clone()).collect();
-    (weighed.collect(), LaserShots { profiles, shots })
+    let laser = LaserShots {
+        profiles,
+        shots,
+        surface,
+    };
+    (weighed.collect(), laser)
 }
 
 /// The range of a shot, when an image was exposed meanwhile.

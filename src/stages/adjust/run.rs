@@ -51,9 +51,8 @@ pub fn adjust<M: ExteriorOrientation>(
         robust: config.robust,
         ..BundleOptions::default()
     };
-    let adjustment =
-        blunders::solve_without_blunders(&mut assembled, &bundle_options, config.blunder_limit)
-            .map_err(|error| words::in_words(error, images, &assembled))?;
+    let adjustment = blunders::solve_without_blunders(&mut assembled, &bundle_options, config)
+        .map_err(|error| words::in_words(error, images, &assembled))?;
     // Blunders have lost their measurements and are listed already.
     let listed: BTreeSet<usize> = assembled.rejected.iter().map(|tie| tie.index).collect();
     let dropped = adjustment
@@ -73,12 +72,7 @@ pub fn adjust<M: ExteriorOrientation>(
     let dropped: Vec<RejectedPoint> = dropped.collect();
     assembled.rejected.extend(dropped);
     contradictions(images, &assembled.points, &adjustment)?;
-    let summary = summary::summarise(
-        images,
-        &assembled,
-        &adjustment,
-        config.footprint_image_coordinates,
-    )?;
+    let summary = summary::summarise(images, &assembled, &adjustment, config)?;
     Ok(adjusted::collect(images, assembled, adjustment, summary))
 }
 

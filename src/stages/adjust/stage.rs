@@ -4,14 +4,15 @@ use std::sync::atomic::AtomicBool;
 
 use super::{Adjusted, Candidate, adjust, prepare_adjustment};
 use crate::{
-    config::AdjustmentConfig,
+    config::{AdjustmentConfig, MolaSurfaceConfig},
     error::Result,
+    footprints::AdjustmentModel,
     geom::pushbroom::CameraModel,
     stage::{InOrder, Output, Stage},
     stage_inputs,
     stages::{
         convert_datum::Converted, group_profiles::Profile, intersect::IntersectedTies,
-        read_ties::Ties, site_image::SiteImage,
+        mola_surface::MolaShots, read_ties::Ties, site_image::SiteImage,
     },
 };
 
@@ -30,6 +31,8 @@ stage_inputs! {
         pub ties: &'a Output<Ties>,
         /// Their ground points.
         pub intersected: &'a Output<IntersectedTies>,
+        /// What is uncertain about the MOLA surface.
+        pub mola_surface: &'a MolaSurfaceConfig,
         /// Standard deviations and options.
         pub adjustment: &'a AdjustmentConfig,
     }
@@ -37,6 +40,7 @@ stage_inputs! {
 
 impl Stage for Adjust<'_> {
     const NAME: &'static str = "adjust";
+    const METHOD: u32 = 2;
     type Output = Adjusted;
     stage_inputs!(fingerprint);
 
@@ -51,13 +55,25 @@ impl Stage for Adjust<'_> {
                 registration: image.registration.value()?,
             })
         });
+        let (footprints, profiles) = (&self.converted.value()?.footprints, self.profiles.value()?);
+        let (ties, starts) = (&self.ties.value()?.points, self.intersected.value()?);
+        let surface = match self.adjustment.model {
+            // Without enough shots heights are what the orientations say.
+            AdjustmentModel::MolaSurface => {
+                let around = starts.points.iter().map(|point| point.ground.xyz_m);
+                let around: Vec<_> = around.collect();
+                let shots = MolaShots::of(footprints, profiles);
+                shots.surface(&around, &self.mola_surface.options()).ok()
+            }
+            AdjustmentModel::Published => None,
+        };
         let (images, shots) = prepare_adjustment(
             candidates.collect::<Result<Vec<_>>>()?,
-            &self.converted.value()?.footprints,
-            self.profiles.value()?,
+            footprints,
+            profiles,
+            surface,
             self.adjustment,
         );
-        let (ties, starts) = (&self.ties.value()?.points, self.intersected.value()?);
         adjust(&images, &shots, ties, starts, self.adjustment)
     }
 }

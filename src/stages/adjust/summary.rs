@@ -16,8 +16,12 @@ use crate::geom::{
     pushbroom::{CorrectedOrientation, ExteriorOrientation},
     statistics::Summary,
 };
-use crate::schema::at;
-use crate::{footprints::FootprintImageCoordinates, geom::statistics::BAARDA_LIMIT};
+use crate::{
+    config::AdjustmentConfig,
+    footprints::{AdjustmentModel, FootprintImageCoordinates},
+    geom::{ellipsoid::local_axes, statistics::BAARDA_LIMIT},
+    schema::{at, none_negative},
+};
 
 /// The kinds of observation.
 #[derive(
@@ -27,6 +31,8 @@ use crate::{footprints::FootprintImageCoordinates, geom::statistics::BAARDA_LIMI
 pub enum ObservationType {
     /// Image coordinates of tie points.
     TieImage,
+    /// Heights of tie points above the MOLA surface.
+    MolaHeight,
     /// Image coordinates of footprints.
     MolaImage,
     /// Ranges.
@@ -80,6 +86,25 @@ pub struct ImageSummary {
     pub mola_corrections: [Summary; 2],
 }
 
+/// Heights of tie points against the MOLA surface, as observations.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct HeightSummary {
+    /// Tie points whose height is observed.
+    pub ties: usize,
+    /// Shots of the surface.
+    pub shots: usize,
+    /// Profiles that they belong to.
+    pub profiles: usize,
+    /// Root mean square difference of heights 300 m apart, metres.
+    #[schemars(range(min = 0.0))]
+    pub roughness_m: f64,
+    /// Adjusted heights above the surface, metres.
+    pub above_m: Summary,
+    /// Standard deviations of the mean of these points towards east, north and up, metres: what they have in common.
+    #[schemars(transform = none_negative)]
+    pub mean_sigma_m: [f64; 3],
+}
+
 /// Statistics of an adjustment.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct AdjustmentSummary {
@@ -87,9 +112,19 @@ pub struct AdjustmentSummary {
     pub steps: usize,
     /// Degrees of freedom.
     pub degrees_of_freedom: usize,
-    /// A posteriori standard deviation of unit weight.
+    /// A posteriori standard deviation of unit weight over all observations. It mixes what has little to do with each
+    /// other; `along` is what tests the tie points.
     #[schemars(range(min = 0.0))]
     pub sigma0: f64,
+    /// What controls the adjustment.
+    pub model: AdjustmentModel,
+    /// Standard deviation of unit weight of tie points along and across the track.
+    #[schemars(transform = none_negative)]
+    pub tie_components: [f64; 2],
+    /// What the a priori variances are multiplied with in covariances: 1, or the square of the first of these where it
+    /// says that measurements are worse than configured. A good fit makes nothing more certain.
+    #[schemars(range(min = 1.0))]
+    pub variance_factor: f64,
     /// One entry for each kind of observation that occurs.
     pub types: Vec<TypeSummary>,
     /// Footprints.
@@ -111,7 +146,7 @@ pub(super) fn summarise<M: ExteriorOrientation>(
     images: &[AdjustImage<M>],
     assembled: &Assembled<&M>,
     adjustment: &Adjustment,
-    mola_image: FootprintImageCoordinates,
+    config: &AdjustmentConfig,
 ) -> Result<AdjustmentSummary, AdjustError> {
     let (shots, ties) = (0..assembled.shots, assembled.shots..assembled.points.len());
     let in_words = |unknown| unknown_in_words(unknown, images, &assembled.profiles);
@@ -120,6 +155,9 @@ pub(super) fn summarise<M: ExteriorOrientation>(
         steps: adjustment.steps(),
         degrees_of_freedom: adjustment.degrees_of_freedom(),
         sigma0: adjustment.sigma0(),
+        model: config.model,
+        tie_components: tie_components(assembled, adjustment),
+        variance_factor: variance_factor(assembled, adjustment),
         types: types(assembled, adjustment),
         shots: ground(assembled, adjustment, shots),
         ties: ground(assembled, adjustment, ties),
@@ -130,7 +168,9 @@ pub(super) fn summarise<M: ExteriorOrientation>(
                 Ok(ImageSummary {
                     image: image.oriented_camera.id.clone(),
                     tie_residuals_px: tie_residuals(assembled, adjustment, index),
-                    mola_corrections: if mola_image == FootprintImageCoordinates::Off {
+                    mola_corrections: if config.footprints_in_images()
+                        == FootprintImageCoordinates::Off
+                    {
                         [Summary::default(); 2]
                     } else {
                         mola_corrections(image, assembled, adjustment, index)?
@@ -141,7 +181,11 @@ pub(super) fn summarise<M: ExteriorOrientation>(
         range_biases_m: biases
             .filter_map(|(profile, bias)| {
                 let (value_m, root_m) = (*bias)?;
-                Some((profile.name.clone(), value_m, root_m * adjustment.sigma0()))
+                Some((
+                    profile.name.clone(),
+                    value_m,
+                    root_m * variance_factor(assembled, adjustment).sqrt(),
+                ))
             })
             .collect(),
         correlated: adjustment
@@ -183,10 +227,87 @@ fn types<M>(assembled: &Assembled<M>, adjustment: &Adjustment) -> Vec<TypeSummar
         (ObservationType::MolaGround, grounds.flatten().collect()),
         (ObservationType::Bias, biases(assembled, adjustment)),
     ];
-    all.into_iter()
-        .filter(|(_, residuals)| !residuals.is_empty())
-        .map(|(kind, residuals)| of_type(kind, &residuals))
-        .collect()
+    let plain = all.into_iter();
+    let plain = plain.filter(|(_, residuals)| !residuals.is_empty());
+    let plain = plain.map(|(kind, residuals)| of_type(kind, &residuals));
+    plain.chain(of_heights(adjustment)).collect()
+}
+
+/// Heights, whose weighted sum of squares has no parts: their errors are correlated.
+fn of_heights(adjustment: &Adjustment) -> Option<TypeSummary> {
+    let redundancies = adjustment.heights.iter().map(|height| height.redundancy);
+    let redundancy = redundancies.sum::<Option<f64>>()?;
+    (!adjustment.heights.is_empty()).then(|| TypeSummary {
+        kind: ObservationType::MolaHeight,
+        observations: adjustment.heights.len(),
+        redundancy,
+        weighted_squares: adjustment.height_squares,
+        variance_component: component(adjustment.height_squares, redundancy),
+        beyond_limit: 0,
+    })
+}
+
+/// `sqrt(weighted squares / redundancy)`, 0 without redundancy.
+fn component(weighted_squares: f64, redundancy: f64) -> f64 {
+    if redundancy > 0.0 {
+        (weighted_squares / redundancy).sqrt()
+    } else {
+        0.0
+    }
+}
+
+/// Standard deviation of unit weight of tie points along and across the track.
+pub(super) fn tie_components<M>(assembled: &Assembled<M>, adjustment: &Adjustment) -> [f64; 2] {
+    let views = assembled.network.views.iter().zip(&adjustment.views);
+    let ties = views.filter(|(view, _)| assembled.kind(view.point) == PointKind::Tie);
+    let residuals: Vec<[Residual; 2]> = ties.filter_map(|(_, residuals)| *residuals).collect();
+    [0, 1].map(|axis| {
+        let of_axis = || residuals.iter().map(|pair| &pair[axis]);
+        component(
+            of_axis().map(Residual::weighted_square).sum(),
+            of_axis().map(|residual| residual.redundancy).sum(),
+        )
+    })
+}
+
+/// A standard deviation of unit weight up to this is what chance gives some hundred tie points.
+pub const WORSE_THAN_CONFIGURED: f64 = 1.12;
+
+/// What a priori variances are multiplied with in covariances.
+pub(super) fn variance_factor<M>(assembled: &Assembled<M>, adjustment: &Adjustment) -> f64 {
+    let [along, _] = tie_components(assembled, adjustment);
+    if along > WORSE_THAN_CONFIGURED {
+        along * along
+    } else {
+        1.0
+    }
+}
+
+/// Heights as observations, where they are.
+pub(super) fn heights<M>(
+    assembled: &Assembled<M>,
+    adjustment: &Adjustment,
+) -> Option<HeightSummary> {
+    let control = assembled.network.heights.as_ref().filter(|of| of.weighed)?;
+    let above_m: Vec<f64> = adjustment
+        .heights
+        .iter()
+        .map(|height| height.above_m)
+        .collect();
+    let points = adjustment.heights.iter();
+    let points = points.filter_map(|height| adjustment.points[height.point].as_ref().ok());
+    let middle_m: Vector3<f64> = points.map(|point| point.ground_m).sum();
+    let to_local = local_axes(&middle_m);
+    let mean_m2 = to_local * adjustment.mean_cofactor_m2? * to_local.transpose();
+    let factor = variance_factor(assembled, adjustment);
+    Some(HeightSummary {
+        ties: adjustment.heights.len(),
+        shots: control.surface.shots(),
+        profiles: control.surface.profiles().len(),
+        roughness_m: control.surface.variogram().roughness_m,
+        above_m: Summary::of(&above_m),
+        mean_sigma_m: [0, 1, 2].map(|axis| (factor * mean_m2[(axis, axis)]).sqrt()),
+    })
 }
 
 /// Residuals of time and range biases, whose initial value is 0.
@@ -221,11 +342,7 @@ fn of_type(kind: ObservationType, residuals: &[Residual]) -> TypeSummary {
         observations: residuals.len(),
         redundancy,
         weighted_squares,
-        variance_component: if redundancy > 0.0 {
-            (weighted_squares / redundancy).sqrt()
-        } else {
-            0.0
-        },
+        variance_component: component(weighted_squares, redundancy),
         beyond_limit: residuals.iter().filter(beyond).count(),
     }
 }
@@ -235,11 +352,12 @@ fn ground<M>(
     adjustment: &Adjustment,
     points: std::ops::Range<usize>,
 ) -> GroundSummary {
+    let factor = variance_factor(assembled, adjustment);
     let found: Vec<(Vector3<f64>, Vector3<f64>)> = points
         .filter_map(|point| {
             let adjusted = adjustment.points[point].as_ref().ok()?;
             let correction_m = adjusted.ground_m - assembled.network.points[point].ground_m;
-            let sigma_m = adjusted.cofactor_m2.diagonal().map(f64::sqrt) * adjustment.sigma0();
+            let sigma_m = adjusted.cofactor_m2.diagonal().map(f64::sqrt) * factor.sqrt();
             Some((correction_m, sigma_m))
         })
         .collect();

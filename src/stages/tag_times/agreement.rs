@@ -1,11 +1,15 @@
 //! What is said of an image twice must agree: its product, its clock and UTC, its stop time and lines.
 
+use nalgebra::Matrix3;
+
 use crate::{
     config::ImageConfig,
     error::{Cause, Kind},
+    geom::attitude::{bus_to_camera, rotation_vector},
+    instruments::Instrument,
     pds::moc::product_named,
     time::Et,
-    units::SECONDS_PER_MS,
+    units::{RADIANS_PER_DEGREE, SECONDS_PER_MS},
 };
 
 /// Clock and UTC, or stop time and lines, that lie farther apart than this are remarked on, seconds.
@@ -17,6 +21,12 @@ const CLOSE_S: f64 = 0.02;
 const TOLERANCE_S: f64 = 1.0;
 /// Speed of the spacecraft's shadow on the ground, metres per second: what a time is worth there.
 const GROUND_SPEED_M_S: f64 = 3_000.0;
+
+/// A camera that kernels mount this far from its instrument file is mounted otherwise, radians: 4 m on the ground, a
+/// hundred times the rounding of angles in kernels.
+const MOUNTING_RAD: f64 = 1e-5;
+/// What a radian is on the ground, metres: the height of the mapping orbit.
+const HEIGHT_M: f64 = 380_000.0;
 
 /// Two statements of which one belongs to another image.
 #[derive(Debug, thiserror::Error)]
@@ -72,7 +82,8 @@ impl Cause for Contradiction {
                 "check that labels or serial numbers are not exchanged; ISIS writes the clock of the label into the latter"
             }
             Self::Start { .. } => {
-                "check which of the two belongs to this image; the clock is what would be used"
+                "check which of the two belongs to this image, and that no leap second before it is missing in the kernels; the \
+                 clock is what would be used"
             }
             Self::Stop { .. } => {
                 "check start and stop time, lines, exposure and downtrack summing; one of them is not of this image"
@@ -137,11 +148,16 @@ pub(super) fn start_agrees(
             apart_s,
         });
     }
+    let lacks_second = if apart_s > TOLERANCE_S - CLOSE_S {
+        "; of a whole second, a leap second that the kernels lack may be the cause"
+    } else {
+        ""
+    };
     Ok((apart_s > close_s(utc)).then(|| {
         format!(
             "clock {sclk} is {apart_s:.3} s away from UTC {utc}, {} on the ground; labels agree within 0.005 s, and \
-             the clock is used",
-            on_ground(apart_s)
+             the clock is used{lacks_second}",
+            ground(apart_s * GROUND_SPEED_M_S)
         )
     }))
 }
@@ -175,6 +191,21 @@ pub(super) fn stop_agrees(
     )))
 }
 
+/// A remark on a camera that the kernels mount otherwise than its instrument file.
+pub(super) fn mounting_agrees(camera: &Instrument, kernels: &Matrix3<f64>) -> Option<String> {
+    let turn = kernels * bus_to_camera(&camera.mounting).transpose();
+    let turn_rad = rotation_vector(&turn).norm();
+    // Written so that NaN is told.
+    (!(turn_rad <= MOUNTING_RAD)).then(|| {
+        format!(
+            "the kernels mount {} {:.4}° from where its instrument file has it, {} on the ground; the kernels are used",
+            camera.name,
+            turn_rad / RADIANS_PER_DEGREE,
+            ground(turn_rad * HEIGHT_M)
+        )
+    })
+}
+
 /// How close to an instant its UTC is, written with so many digits.
 fn close_s(utc: &str) -> f64 {
     let decimals = utc.split_once('.').map_or(0, |(_, fraction)| {
@@ -184,10 +215,11 @@ fn close_s(utc: &str) -> f64 {
     written_s.max(CLOSE_S)
 }
 
-fn on_ground(seconds: f64) -> String {
-    match seconds * GROUND_SPEED_M_S {
-        metres if metres < 1_000.0 => format!("{metres:.0} m"),
-        metres => format!("{:.1} km", metres / 1_000.0),
+fn ground(metres: f64) -> String {
+    if metres < 1_000.0 {
+        format!("{metres:.0} m")
+    } else {
+        format!("{:.1} km", metres / 1_000.0)
     }
 }
 

@@ -1,0 +1,35 @@
+//! `[limits]`.
+
+use super::{
+    declare::{declare_table, key},
+    forms::{above_to, from_to, whole_from_to},
+};
+
+declare_table! {
+    /// Limits on tie points and their adjustment that make a site valid or invalid. What took no part in a result
+    /// judges it first: heights by MOLA, then what images say of each other.
+    pub struct LimitsConfig {
+        /// Largest |median| height of tie points above the MOLA surface before the adjustment. A priori the height of a
+        /// pair is known to some 500 m; the default is three times that.
+        height_before_max_m: f64 = key(above_to(0.0, 1e6)).or(1500.0),
+        /// Largest |median| height of tie points above the MOLA surface after the adjustment, where it is not within
+        /// three of its own standard deviations.
+        height_after_max_m: f64 = key(above_to(0.0, 1e6)).or(10.0),
+        /// Largest mean difference between the surfaces of single profiles at the tie points, in its standard
+        /// deviations: profiles that contradict each other are no control.
+        profiles_apart_max_sigma: f64 = key(above_to(0.0, 1000.0)).or(4.0),
+        /// Largest correction of an image's position or pointing by the adjustment, in its standard deviations.
+        correction_max_sigma: f64 = key(above_to(0.0, 1000.0)).or(4.0),
+        /// Largest distance along the flight between two images at their tie points before the adjustment. Shan et al.
+        /// 2005 find 225 to 271 m; the default is what the attitude turns in 3 s.
+        parallax_before_max_m: f64 = key(above_to(0.0, 1e6)).or(1000.0),
+        /// The same after the adjustment: six lines of MOC's usual 4 m.
+        parallax_after_max_m: f64 = key(above_to(0.0, 1e6)).or(25.0),
+        /// Largest standard deviation of unit weight of the tie points along the track.
+        sigma0_max: f64 = key(above_to(0.0, 1000.0)).or(2.0),
+        /// Fewest tie points of a sound adjustment.
+        ties_min: u32 = key(whole_from_to(0, 1_000_000)).or(10),
+        /// Largest share of tie points that a sound adjustment rejects; of more than half the site is invalid.
+        rejected_share_max: f64 = key(from_to(0.0, 1.0)).or(0.1),
+    }
+}

@@ -1,0 +1,30 @@
+//! How far a run or a plan goes.
+
+use std::sync::atomic::AtomicBool;
+
+use super::{
+    driver::{Flow, Leave},
+    outline::stages,
+};
+use crate::{
+    error::{Locate, Stopped},
+    files::InputFiles,
+};
+
+/// Where a run or a plan ends, and the files that it reads.
+pub(super) struct Bounds<'a> {
+    pub(super) until: &'a str,
+    pub(super) stop: &'a AtomicBool,
+    pub(super) files: InputFiles,
+}
+
+impl Bounds<'_> {
+    /// Leaves the flow before `stage` when it is not asked for, or when the user stops the program.
+    pub(super) fn enter(&self, stage: &'static str) -> Flow<()> {
+        let place = |name: &str| stages().iter().position(|stage| *stage == name);
+        if place(self.until) < place(stage) {
+            return Err(Leave::StageReached);
+        }
+        Ok(Stopped::check(self.stop).in_stage(stage)?)
+    }
+}

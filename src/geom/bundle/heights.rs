@@ -1,0 +1,87 @@
+//! Heights that are observed: where the surface lies under the points, and how well it is known.
+
+use nalgebra::{DMatrix, DVector, Vector3};
+
+use super::unknowns::State;
+use crate::geom::surface::{LaserSurface, SurfaceHeights};
+
+/// Heights that are observed, as they were when the surface was last asked.
+pub(super) struct Heights {
+    /// Their points.
+    pub(super) points: Vec<usize>,
+    /// Where the points were then.
+    places_m: Vec<Vector3<f64>>,
+    pub(super) surface: SurfaceHeights,
+    /// What is added to each variance because its residual is too large for it.
+    pub(super) inflation_m2: DVector<f64>,
+}
+
+/// Points that moved by less than this find the surface as it was, metres: a hundredth of a metre in height on a
+/// slope of 1 %.
+const MOVED_M: f64 = 1.0;
+/// Degrees of freedom of Student's distribution, whose weights heights get: craters between the profiles make the
+/// errors of a surface longer in the tail than normal ones.
+const STUDENT_FREEDOM: f64 = 4.0;
+
+impl Heights {
+    /// The surface under those of `points` that take part.
+    pub(super) fn at(surface: &LaserSurface, points: Vec<usize>, state: &State) -> Self {
+        let places_m: Vec<Vector3<f64>> = points.iter().map(|at| state.points_m[*at]).collect();
+        Self {
+            surface: surface.predict(&places_m),
+            inflation_m2: DVector::zeros(points.len()),
+            places_m,
+            points,
+        }
+    }
+
+    /// The same with the surface where the points are now; whether they had moved.
+    pub(super) fn follow(&mut self, surface: &LaserSurface, state: &State) -> bool {
+        let places_m: Vec<Vector3<f64>> =
+            self.points.iter().map(|at| state.points_m[*at]).collect();
+        let moved = places_m.iter().zip(&self.places_m);
+        let moved = moved.map(|(now, before)| (now - before).norm());
+        if moved.fold(0.0, f64::max) < MOVED_M {
+            return false;
+        }
+        self.surface = surface.predict(&places_m);
+        self.places_m = places_m;
+        true
+    }
+
+    /// Covariance of the observed heights, robust weights included, m².
+    pub(super) fn covariance_m2(&self) -> DMatrix<f64> {
+        let mut covariance_m2 = self.surface.covariance_m2.clone();
+        for (index, inflation_m2) in self.inflation_m2.iter().enumerate() {
+            covariance_m2[(index, index)] += inflation_m2;
+        }
+        covariance_m2
+    }
+
+    /// Height of the point at `index` above the surface, metres, and its change with the point.
+    pub(super) fn difference_m(&self, state: &State, index: usize) -> (f64, Vector3<f64>) {
+        let (height_m, by_point) = LaserSurface::height_m(&state.points_m[self.points[index]]);
+        (height_m - self.surface.heights_m[index], by_point)
+    }
+
+    /// Weights by what the rays alone leave of each height; the largest change of a standard deviation, metres.
+    pub(super) fn reweigh(
+        &mut self,
+        misclosures_m: &DVector<f64>,
+        ray_variances_m2: &DVector<f64>,
+    ) -> f64 {
+        let mut changed_m = 0.0_f64;
+        for (index, of_rays_m) in misclosures_m.iter().enumerate() {
+            let variance_m2 = self.surface.covariance_m2[(index, index)] + ray_variances_m2[index];
+            let weight =
+                (STUDENT_FREEDOM + 1.0) / (STUDENT_FREEDOM + of_rays_m * of_rays_m / variance_m2);
+            let inflation_m2 = variance_m2 * (1.0 / weight.min(1.0) - 1.0);
+            let before_m2 = self.inflation_m2[index];
+            changed_m = changed_m.max(
+                ((variance_m2 + inflation_m2).sqrt() - (variance_m2 + before_m2).sqrt()).abs(),
+            );
+            self.inflation_m2[index] = inflation_m2;
+        }
+        changed_m
+    }
+}

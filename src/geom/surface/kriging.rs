@@ -1,0 +1,132 @@
+//! Ordinary kriging in plan.
+
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Vector2};
+
+use super::{Placed, Variogram};
+
+/// The kriging equations of some shots, factorised.
+#[derive(Debug, Clone)]
+pub(super) struct Kriging {
+    pub(super) shots: Vec<Placed>,
+    pub(super) variogram: Variogram,
+    /// A variance above that of any two places: with it the equations are positive definite, and as weights sum up
+    /// to 1 it changes nothing.
+    sill_m2: f64,
+    factor: Cholesky<f64, Dyn>,
+    /// The equations' solution for ones, and its sum.
+    of_ones: DVector<f64>,
+    /// Mean height, and what each shot adds to the height of a place by its covariance with it.
+    mean_m: f64,
+    strengths: DVector<f64>,
+}
+
+/// Weights of shots, one column a place, with the multiplier that keeps their sum at 1.
+pub(super) struct Weights {
+    of_shots: DMatrix<f64>,
+    multipliers: DVector<f64>,
+}
+
+#[cfg(test)]
+impl Weights {
+    pub(super) const fn of_shots(&self) -> &DMatrix<f64> {
+        &self.of_shots
+    }
+}
+
+impl Kriging {
+    /// `None` when a number is none.
+    pub(super) fn new(shots: Vec<Placed>, variogram: Variogram, shot_sigma_m: f64) -> Option<Self> {
+        let first = shots.first()?.plan_m;
+        let reach_m = shots.iter().map(|shot| (shot.plan_m - first).norm());
+        let sill_m2 = 2.0 * variogram.at(2.0 * reach_m.fold(1.0, f64::max));
+        let matrix = DMatrix::from_fn(shots.len(), shots.len(), |row, column| {
+            let noise_m2 = if row == column {
+                shot_sigma_m.powi(2)
+            } else {
+                0.0
+            };
+            sill_m2 - variogram.between(&shots[row].plan_m, &shots[column].plan_m) + noise_m2
+        });
+        let factor = Cholesky::new(matrix)?;
+        let of_ones = factor.solve(&DVector::repeat(shots.len(), 1.0));
+        let heights_m = DVector::from_iterator(shots.len(), shots.iter().map(|shot| shot.height_m));
+        let mean_m = of_ones.dot(&heights_m) / of_ones.sum();
+        let strengths = factor.solve(&heights_m.add_scalar(-mean_m));
+        mean_m.is_finite().then_some(Self {
+            shots,
+            variogram,
+            sill_m2,
+            factor,
+            of_ones,
+            mean_m,
+            strengths,
+        })
+    }
+
+    /// Height of the surface at a place, metres.
+    pub(super) fn height_m(&self, place: &Vector2<f64>) -> f64 {
+        let shots = self.shots.iter().zip(&self.strengths);
+        let above_m = shots.map(|(shot, strength)| strength * self.covariance(shot, place));
+        self.mean_m + above_m.sum::<f64>()
+    }
+
+    /// Distance of the nearest shot, metres.
+    pub(super) fn nearest_m(&self, place: &Vector2<f64>) -> f64 {
+        let distances_m = self.shots.iter().map(|shot| (shot.plan_m - place).norm());
+        distances_m.fold(f64::INFINITY, f64::min)
+    }
+
+    fn covariance(&self, shot: &Placed, place: &Vector2<f64>) -> f64 {
+        self.sill_m2 - self.variogram.between(&shot.plan_m, place)
+    }
+
+    pub(super) fn weights(&self, places: &[Vector2<f64>]) -> Weights {
+        let between = DMatrix::from_fn(self.shots.len(), places.len(), |shot, place| {
+            self.covariance(&self.shots[shot], &places[place])
+        });
+        let mut of_shots = self.factor.solve(&between);
+        let multipliers = DVector::from_iterator(
+            places.len(),
+            of_shots
+                .column_iter()
+                .map(|weights| (weights.sum() - 1.0) / self.of_ones.sum()),
+        );
+        of_shots -= &self.of_ones * multipliers.transpose();
+        Weights {
+            of_shots,
+            multipliers,
+        }
+    }
+
+    /// Covariance of surface minus ground between all `places`, m².
+    ///
+    /// By the equations of the weights, `Γwⱼ − σ²wⱼ = γⱼ + μⱼ`, three of the five terms of
+    /// `−γᵢⱼ + wᵢᵀγⱼ + wⱼᵀγᵢ − wᵢᵀΓwⱼ + σ²wᵢᵀwⱼ` are one.
+    pub(super) fn covariance_m2(&self, places: &[Vector2<f64>], weights: &Weights) -> DMatrix<f64> {
+        let from_shots = DMatrix::from_fn(self.shots.len(), places.len(), |shot, place| {
+            self.variogram
+                .between(&self.shots[shot].plan_m, &places[place])
+        });
+        let mut covariance = from_shots.tr_mul(&weights.of_shots);
+        for (column, place) in places.iter().enumerate() {
+            for (row, other) in places.iter().enumerate() {
+                covariance[(row, column)] -=
+                    self.variogram.between(place, other) + weights.multipliers[column];
+            }
+        }
+        // Rounding leaves it a little lopsided.
+        0.5 * (&covariance + covariance.transpose())
+    }
+
+    /// Sums of the weights of each profile, one row a profile.
+    pub(super) fn weights_of_profiles(&self, weights: &Weights) -> DMatrix<f64> {
+        let profiles = self.shots.iter().map(|shot| shot.profile + 1).max();
+        let places = weights.of_shots.ncols();
+        let mut sums = DMatrix::zeros(profiles.unwrap_or_default(), places);
+        for (shot, row) in self.shots.iter().zip(weights.of_shots.row_iter()) {
+            let mut sum = sums.row_mut(shot.profile);
+            sum += row;
+        }
+        sums
+    }
+}

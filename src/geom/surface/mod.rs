@@ -1,0 +1,284 @@
+//! The ground between laser shots: its height by ordinary kriging, with the covariance of its errors.
+//!
+//! Profiles of a laser altimeter sample the ground every 300 m along the track and every few kilometres across it.
+//! How far the ground strays from what lies between is learnt from the profiles themselves ([`Variogram::learn`]);
+//! errors at neighbouring places are alike, so their covariance is full ([`SurfaceHeights::covariance_m2`]).
+//!
+//! # Source
+//! Ordinary kriging: Cressie 1993, Statistics for spatial data, section 3.2.
+//!
+//! ```
+//! use areograph::geom::surface::{LaserSurface, SurfaceOptions, SurfaceShot};
+//! use nalgebra::Vector3;
+//!
+//! // A profile along a meridian, 300 m from shot to shot, 50 m above the ellipsoid.
+//! let shots: Vec<SurfaceShot> = (0..40)
+//!     .map(|shot| {
+//!         let north_rad = f64::from(shot) * 300.0 / 3_396_190.0;
+//!         let up = Vector3::new(north_rad.cos(), 0.0, north_rad.sin());
+//!         let ground_m = LaserSurface::on_ellipsoid_m(&up) + 50.0 * up;
+//!         SurfaceShot { ground_m, profile: 0 }
+//!     })
+//!     .collect();
+//! let surface = LaserSurface::new(&shots, &[], &SurfaceOptions::default())?;
+//! let beside = surface.predict(&[shots[20].ground_m + Vector3::new(0.0, 300.0, 0.0)]);
+//! assert!((beside.heights_m[0] - 50.0).abs() < 1e-6); // metres; a constant comes back
+//! // Beside the profile the ground may be anything like what it is along it.
+//! assert!((4.0..4.5).contains(&beside.sigma_m(0)));
+//! # Ok::<(), areograph::geom::surface::SurfaceError>(())
+//! ```
+
+mod kriging;
+mod plan;
+mod variogram;
+
+use nalgebra::{DMatrix, Vector2, Vector3};
+
+use self::{kriging::Kriging, plan::Plan};
+use crate::constants::MARS_IAU2000;
+
+pub use variogram::Variogram;
+
+/// More shots than this are not kriged with: the equations grow with their cube.
+const SHOTS_MAX: usize = 1500;
+/// Of more shots those within this of a place that is asked for are taken, metres.
+const NEAR_M: f64 = 3_000.0;
+/// Fewer shots than this make no surface.
+const SHOTS_MIN: usize = 10;
+/// Gradients are differences over this to both sides, metres: less than a spot of the laser.
+const GRADIENT_STEP_M: f64 = 30.0;
+
+/// A laser shot on the ground. Shots of a profile stand in their order along it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SurfaceShot {
+    /// Where it met the ground, Mars-fixed, metres.
+    pub ground_m: Vector3<f64>,
+    /// Index of its profile.
+    pub profile: usize,
+}
+
+/// What is uncertain about a surface of laser shots.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SurfaceOptions {
+    /// Noise of the height of a shot, metres.
+    pub shot_sigma_m: f64,
+    /// Radial error that all shots of a profile share, metres.
+    pub profile_sigma_m: f64,
+    /// Error in plan between the places that are asked for and the shots, common to all of them, metres; on a slope
+    /// it becomes one of height.
+    pub plan_sigma_m: f64,
+    /// Roughness that is assumed at least, metres at 300 m, see [`Variogram`].
+    pub roughness_min_m: f64,
+}
+
+impl Default for SurfaceOptions {
+    /// Shots of MOLA to 1 m and their profiles to 1 m radially after crossovers (Neumann et al. 2001); 130 m in
+    /// plan: 110 m of the images and 70 m of MOLA on an axis.
+    fn default() -> Self {
+        Self {
+            shot_sigma_m: 1.0,
+            profile_sigma_m: 1.0,
+            plan_sigma_m: 130.0,
+            roughness_min_m: 4.0,
+        }
+    }
+}
+
+/// A surface that cannot be made.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum SurfaceError {
+    /// Too few shots.
+    #[error("{shots} laser shots make no surface, expected at least {SHOTS_MIN}")]
+    TooFew {
+        /// Shots.
+        shots: usize,
+    },
+    /// Shots or options that give no positive definite covariance.
+    #[error("laser shots determine no surface: a coordinate or a standard deviation is no number")]
+    NotANumber,
+}
+
+/// The ground by laser shots.
+#[derive(Debug, Clone)]
+pub struct LaserSurface {
+    plan: Plan,
+    kriging: Kriging,
+    options: SurfaceOptions,
+}
+
+/// Heights of the surface at some places, above the ellipsoid along the radius.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SurfaceHeights {
+    /// Heights, metres.
+    pub heights_m: Vec<f64>,
+    /// Slopes towards east and north, metres per metre.
+    pub slopes: Vec<Vector2<f64>>,
+    /// Distance of the nearest shot in plan, metres.
+    pub nearest_m: Vec<f64>,
+    /// Covariance of the errors of the heights, m².
+    pub covariance_m2: DMatrix<f64>,
+}
+
+impl SurfaceHeights {
+    /// Standard deviation of the height at `index`, metres.
+    #[must_use]
+    pub fn sigma_m(&self, index: usize) -> f64 {
+        self.covariance_m2[(index, index)].sqrt()
+    }
+}
+
+impl LaserSurface {
+    /// The surface of `shots` for heights near the places `around`, Mars-fixed, metres: of very many shots those near
+    /// them are taken.
+    ///
+    /// # Errors
+    /// Too few shots, a coordinate or standard deviation that is no number.
+    pub fn new(
+        shots: &[SurfaceShot],
+        around: &[Vector3<f64>],
+        options: &SurfaceOptions,
+    ) -> Result<Self, SurfaceError> {
+        if shots.len() < SHOTS_MIN {
+            return Err(SurfaceError::TooFew { shots: shots.len() });
+        }
+        let plan = Plan::around(shots.iter().map(|shot| shot.ground_m));
+        let placed: Vec<Placed> = shots.iter().map(|shot| Placed::new(&plan, shot)).collect();
+        let variogram = Variogram::learn(&placed, options);
+        let around: Vec<Vector2<f64>> = around.iter().map(|place| plan.of(place)).collect();
+        let taken = thinned(near(placed, &around));
+        if taken.len() < SHOTS_MIN {
+            return Err(SurfaceError::TooFew { shots: taken.len() });
+        }
+        let kriging =
+            Kriging::new(taken, variogram, options.shot_sigma_m).ok_or(SurfaceError::NotANumber)?;
+        Ok(Self {
+            plan,
+            kriging,
+            options: *options,
+        })
+    }
+
+    /// How rough the ground is.
+    #[must_use]
+    pub const fn variogram(&self) -> Variogram {
+        self.kriging.variogram
+    }
+
+    /// Profiles that shots of the surface belong to, by their indices, ascending.
+    #[must_use]
+    pub fn profiles(&self) -> Vec<usize> {
+        let mut profiles: Vec<usize> = self.kriging.shots.iter().map(|shot| shot.profile).collect();
+        profiles.sort_unstable();
+        profiles.dedup();
+        profiles
+    }
+
+    /// Shots that the surface rests on.
+    #[must_use]
+    pub fn shots(&self) -> usize {
+        self.kriging.shots.len()
+    }
+
+    /// The point of the ellipsoid in the direction of `place_m`, metres.
+    #[must_use]
+    pub fn on_ellipsoid_m(place_m: &Vector3<f64>) -> Vector3<f64> {
+        let up = place_m.normalize();
+        let (a, c) = (
+            MARS_IAU2000.equatorial_radius_m,
+            MARS_IAU2000.polar_radius_m,
+        );
+        up / ((up.x / a).powi(2) + (up.y / a).powi(2) + (up.z / c).powi(2)).sqrt()
+    }
+
+    /// Height of a place above the ellipsoid along the radius, metres, and how it changes with the place.
+    #[must_use]
+    pub fn height_m(place_m: &Vector3<f64>) -> (f64, Vector3<f64>) {
+        let up = place_m.normalize();
+        let below_m = Self::on_ellipsoid_m(place_m);
+        let (a, c) = (
+            MARS_IAU2000.equatorial_radius_m,
+            MARS_IAU2000.polar_radius_m,
+        );
+        // The radius is q^(-1/2) of the direction; what changes the direction is across `up`.
+        let by_up =
+            -below_m.norm().powi(3) * Vector3::new(up.x / (a * a), up.y / (a * a), up.z / (c * c));
+        let across = (by_up - up * by_up.dot(&up)) / place_m.norm();
+        (place_m.norm() - below_m.norm(), up - across)
+    }
+
+    /// Heights of the surface at `places_m`, with the covariance of their errors.
+    #[must_use]
+    pub fn predict(&self, places_m: &[Vector3<f64>]) -> SurfaceHeights {
+        let at: Vec<Vector2<f64>> = places_m.iter().map(|place| self.plan.of(place)).collect();
+        let weights = self.kriging.weights(&at);
+        let slopes: Vec<Vector2<f64>> = at.iter().map(|place| self.slope(place)).collect();
+        let mut covariance_m2 = self.kriging.covariance_m2(&at, &weights);
+        let of_profiles = self.kriging.weights_of_profiles(&weights);
+        covariance_m2 += of_profiles.tr_mul(&of_profiles) * self.options.profile_sigma_m.powi(2);
+        let slopes_matrix = DMatrix::from_fn(2, at.len(), |axis, place| slopes[place][axis]);
+        covariance_m2 += slopes_matrix.tr_mul(&slopes_matrix) * self.options.plan_sigma_m.powi(2);
+        SurfaceHeights {
+            heights_m: at
+                .iter()
+                .map(|place| self.kriging.height_m(place))
+                .collect(),
+            nearest_m: at
+                .iter()
+                .map(|place| self.kriging.nearest_m(place))
+                .collect(),
+            slopes,
+            covariance_m2,
+        }
+    }
+
+    fn slope(&self, place: &Vector2<f64>) -> Vector2<f64> {
+        let along = |step: Vector2<f64>| {
+            let [after_m, before_m] =
+                [place + step, place - step].map(|place| self.kriging.height_m(&place));
+            (after_m - before_m) / (2.0 * GRADIENT_STEP_M)
+        };
+        Vector2::new(
+            along(Vector2::new(GRADIENT_STEP_M, 0.0)),
+            along(Vector2::new(0.0, GRADIENT_STEP_M)),
+        )
+    }
+}
+
+/// A shot in plan.
+#[derive(Debug, Clone, Copy)]
+struct Placed {
+    plan_m: Vector2<f64>,
+    height_m: f64,
+    profile: usize,
+}
+
+impl Placed {
+    fn new(plan: &Plan, shot: &SurfaceShot) -> Self {
+        Self {
+            plan_m: plan.of(&shot.ground_m),
+            height_m: LaserSurface::height_m(&shot.ground_m).0,
+            profile: shot.profile,
+        }
+    }
+}
+
+/// Of too many shots those near the places `around`.
+fn near(shots: Vec<Placed>, around: &[Vector2<f64>]) -> Vec<Placed> {
+    if shots.len() <= SHOTS_MAX || around.is_empty() {
+        return shots;
+    }
+    let is_near = |shot: &Placed| {
+        let mut distances_m = around.iter().map(|place| (place - shot.plan_m).norm());
+        distances_m.any(|distance_m| distance_m < NEAR_M)
+    };
+    shots.into_iter().filter(is_near).collect()
+}
+
+/// Of too many shots every second, third …
+fn thinned(shots: Vec<Placed>) -> Vec<Placed> {
+    let step = shots.len().div_ceil(SHOTS_MAX).max(1);
+    shots.into_iter().step_by(step).collect()
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,303 @@
+//! What MOLA says of the heights of tie points, and what may be said of their accuracy.
+
+use super::{
+    html::{Cell, Column, Table, heading, paragraph},
+    misregistration::BeforeAfter,
+    plots::{Panel, Plot, Series, Style, figure, label, thinned},
+    section::Section,
+};
+use crate::{
+    error::Result,
+    footprints::AdjustmentModel,
+    products::{AdjustmentProducts, GeometricProducts, SiteProducts},
+    stages::{
+        check_heights::{HeightCheck, SurfaceFigures, TieHeight},
+        compare_pairs::PairComparison,
+    },
+    units::METRES_PER_KM,
+};
+
+/// Tie points that a plot shows.
+const POINTS_SHOWN: usize = 2_000;
+/// What is known of the height of a pair beforehand, metres: an error of 0.4 mrad of the roll of each image.
+const A_PRIORI_HEIGHT_M: f64 = 500.0;
+/// Errors of the MOLA frame in plan, metres, which come on top of what images say against it.
+const MOLA_PLAN_M: f64 = 100.0;
+
+pub(super) const SECTION: Section = Section {
+    title: "Accuracy, and agreement with MOLA",
+    anchor: "accuracy",
+    appears: |site| site.geometric.is_some(),
+    write: |site| {
+        let geometric = site.geometric.iter();
+        geometric.map(|geometric| write(site, geometric)).collect()
+    },
+};
+
+fn write(site: &SiteProducts, geometric: &GeometricProducts) -> Result<String> {
+    let adjustment = geometric.adjustment.as_ref();
+    let mut html = adjustment.map_or_else(String::new, |of| statements(geometric, of));
+    if let Ok(surface) = &geometric.heights.surface {
+        html += &heading("Heights against the MOLA surface");
+        html += &paragraph(&surface_in_words(surface));
+        html += &compared(geometric);
+        html += &paragraph(&apart(geometric.heights));
+        html += &format!(
+            "<div class=\"plots\">\n{}</div>\n",
+            figure(&profile_plot(site, geometric))?
+        );
+    }
+    Ok(html)
+}
+
+/// What MOLA says of heights, and what is known of them and of the place.
+pub(super) fn in_a_sentence(geometric: &GeometricProducts) -> String {
+    let before = geometric.heights;
+    let after = geometric
+        .adjustment
+        .as_ref()
+        .map_or_else(String::new, |after| {
+            format!(
+                " and {} it after the adjustment",
+                off_surface(after.heights)
+            )
+        });
+    let mola = match &before.surface {
+        Ok(_) => format!(
+            "Tie points lie {} the MOLA surface before the adjustment{after} (median).",
+            off_surface(before)
+        ),
+        Err(reason) => format!("MOLA does not control heights: {reason}."),
+    };
+    let Some(adjustment) = &geometric.adjustment else {
+        return mola;
+    };
+    let [height, place] = absolute(geometric, adjustment);
+    format!("{mola} Height, absolute: {height}. Place, absolute: {place}.")
+}
+
+/// Median height above or below the surface.
+fn off_surface(check: &HeightCheck) -> String {
+    let median_m = check.above_m.median;
+    let side = if median_m < 0.0 { "below" } else { "above" };
+    format!("{} m {side}", label(median_m.abs(), 1))
+}
+
+/// The three statements that may be made, and by whose judgement.
+fn statements(geometric: &GeometricProducts, adjustment: &AdjustmentProducts) -> String {
+    let mut table = Table::new(
+        "What is known of the tie points, and by whom",
+        &[
+            Column::Text("statement"),
+            Column::Text("before the adjustment"),
+            Column::Text("after it"),
+            Column::Text("it says"),
+        ],
+    );
+    let nothing = || "–".to_owned();
+    let pairs = BeforeAfter::all(geometric);
+    let worst = BeforeAfter::worst(&pairs);
+    let parallax =
+        |pair: &PairComparison| format!("{} m", label(pair.along_track_parallax_m.abs(), 1));
+    let [along, _] = adjustment.adjusted.summary.tie_components;
+    let after = worst.and_then(|pair| pair.after).map(parallax);
+    let [height, place] = absolute(geometric, adjustment);
+    let statements = [
+        [
+            "internal agreement".to_owned(),
+            worst.map_or_else(nothing, |pair| parallax(pair.before)),
+            after.map_or_else(nothing, |after| {
+                format!("{after}; residuals {} σ", label(along, 2))
+            }),
+            "how well images agree along the flight; nothing of height or place".to_owned(),
+        ],
+        [
+            "agreement with MOLA, height".to_owned(),
+            agreement(geometric.heights),
+            agreement(adjustment.heights),
+            agreement_says(adjustment).to_owned(),
+        ],
+        [
+            "absolute, height".to_owned(),
+            format!("±{A_PRIORI_HEIGHT_M} m, a priori"),
+            height,
+            "standard deviation of what all tie points share, and of single ones".to_owned(),
+        ],
+        [
+            "absolute, place".to_owned(),
+            "as after it".to_owned(),
+            place,
+            "a priori, not measured: by what is known of orbit and attitude".to_owned(),
+        ],
+    ];
+    for cells in statements {
+        table.row(true, cells.map(Cell::from));
+    }
+    table.finish()
+}
+
+fn agreement(check: &HeightCheck) -> String {
+    match &check.surface {
+        Ok(_) => format!(
+            "{} m median, {} m spread (1.48 MAD), {} tie points",
+            label(check.above_m.median, 1),
+            label(check.above_m.nmad, 1),
+            check.above_m.n
+        ),
+        Err(reason) => format!("not known: {reason}"),
+    }
+}
+
+const fn agreement_says(adjustment: &AdjustmentProducts) -> &'static str {
+    if adjustment.adjusted.heights.is_some() {
+        "before: an independent test; after: how well the adjustment meets what controls it"
+    } else {
+        "an independent test of heights: MOLA took no part"
+    }
+}
+
+/// What is stated of height and place after the adjustment.
+fn absolute(geometric: &GeometricProducts, adjustment: &AdjustmentProducts) -> [String; 2] {
+    let summary = &adjustment.adjusted.summary;
+    let Some(heights) = &adjustment.adjusted.heights else {
+        let reason = if summary.model == AdjustmentModel::Published {
+            "not determined: the published model does not control heights"
+        } else {
+            "a priori, ±500 m: no surface controls heights"
+        };
+        return [reason.to_owned(), "not determined".to_owned()];
+    };
+    let single = single_sigmas_m(adjustment);
+    let [east_m, north_m, up_m] = heights.mean_sigma_m;
+    let pairs = BeforeAfter::all(geometric);
+    let worst = BeforeAfter::worst(&pairs);
+    let half_m = worst.map_or(0.0, |pair| 0.5 * pair.before.along_track_parallax_m.abs());
+    let half = if half_m > MOLA_PLAN_M {
+        format!(
+            "; half of what the images disagree by along the flight, {} m, is open: which of them is right is not known",
+            label(half_m, 0)
+        )
+    } else {
+        String::new()
+    };
+    [
+        format!(
+            "mean ±{} m, single tie points ±{} to ±{} m",
+            label(up_m, 1),
+            label(single[0], 0),
+            label(single[1], 0)
+        ),
+        format!(
+            "±{} m east, ±{} m north{half}",
+            label(east_m, 0),
+            label(north_m, 0)
+        ),
+    ]
+}
+
+/// Least and largest standard deviation of the height of a tie point, metres.
+fn single_sigmas_m(adjustment: &AdjustmentProducts) -> [f64; 2] {
+    let ties = adjustment.adjusted_ties();
+    let sigmas_m = ties.map(|point| {
+        let up = point.ground.xyz_m.normalize();
+        up.dot(&(point.covariance_m2 * up)).sqrt()
+    });
+    sigmas_m.fold([f64::INFINITY, 0.0], |[least, most], sigma_m| {
+        [least.min(sigma_m), most.max(sigma_m)]
+    })
+}
+
+fn surface_in_words(surface: &SurfaceFigures) -> String {
+    format!(
+        "The surface is kriged from {} shots of {} profiles; heights 300 m apart differ by {} m (root mean square), the \
+         slope at the tie points is {} on an axis. Its errors at neighbouring tie points are alike, so the standard deviation \
+         of a mean does not fall with the number of tie points.",
+        surface.shots,
+        surface.profiles,
+        label(surface.roughness_m, 1),
+        label(surface.slope, 3)
+    )
+}
+
+fn compared(geometric: &GeometricProducts) -> String {
+    let mut table = Table::new(
+        "Heights of tie points above the MOLA surface, metres",
+        &[
+            Column::Text("adjustment"),
+            Column::Number("tie points"),
+            Column::Number("within 1 km of a shot"),
+            Column::Number("median"),
+            Column::Number("1.48 MAD"),
+            Column::Number("mean"),
+            Column::Number("standard deviation"),
+            Column::Number("σ of the mean, surface"),
+        ],
+    );
+    let after = geometric.adjustment.iter().map(|of| ("after", of.heights));
+    for (state, check) in [("before", geometric.heights)].into_iter().chain(after) {
+        table.row(
+            true,
+            [
+                state.into(),
+                check.above_m.n.to_string().into(),
+                check.near_shots.to_string().into(),
+                label(check.above_m.median, 1).into(),
+                label(check.above_m.nmad, 1).into(),
+                label(check.above_m.mean, 1).into(),
+                label(check.above_m.standard_deviation, 1).into(),
+                label(check.mean_sigma_m, 1).into(),
+            ],
+        );
+    }
+    table.finish()
+}
+
+fn apart(check: &HeightCheck) -> String {
+    check.apart.as_ref().map_or_else(
+        || "A single profile: no other one tests the surface.".to_owned(),
+        |apart| {
+            format!(
+                "The surface of profile {} alone lies {} m above that of {} alone at the tie points, with an expected standard \
+                 deviation of {} m.",
+                apart.profiles[0],
+                label(apart.mean_m, 1),
+                apart.profiles[1],
+                label(apart.sigma_m, 1)
+            )
+        },
+    )
+}
+
+fn dots(label: &str, colour: usize, points: Vec<(f64, f64)>) -> Series {
+    Series {
+        style: Style::Dots,
+        ..Series::line(label, colour, points)
+    }
+}
+
+/// Heights above the surface by latitude.
+fn profile_plot(site: &SiteProducts, geometric: &GeometricProducts) -> Plot {
+    let middle_m = geometric.heights.ties.iter().map(|tie| tie.ground.xyz_m);
+    let middle_m = middle_m.fold(nalgebra::Vector3::zeros(), |sum, place| sum + place);
+    let axes = crate::geom::ellipsoid::local_axes(&middle_m);
+    let north_km = |tie: &TieHeight| axes.row(1).transpose().dot(&tie.ground.xyz_m) / METRES_PER_KM;
+    let points = |check: &HeightCheck| -> Vec<(f64, f64)> {
+        let ties = check.ties.iter();
+        let points: Vec<_> = ties.map(|tie| (north_km(tie), tie.above_m())).collect();
+        thinned(&points, POINTS_SHOWN)
+    };
+    let after = geometric.adjustment.iter();
+    let after = after.map(|of| dots("after it", 1, points(of.heights)));
+    let before = dots("before the adjustment", 0, points(geometric.heights));
+    let series = [before].into_iter().chain(after).collect();
+    let words = format!(
+        "Heights of tie points of {} above the MOLA surface, from south to north, with the orientation of the kernels and, where there is one, with the adjusted one.",
+        site.config.site
+    );
+    Plot::of(
+        "Tie points above the MOLA surface".to_owned(),
+        words,
+        "north of the middle, km",
+        vec![Panel::of("height above the surface, m", series)],
+    )
+}

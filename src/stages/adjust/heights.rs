@@ -1,0 +1,132 @@
+//! Tie points whose height no ground explains.
+//!
+//! An error of a measurement across the track changes nothing but the height of its tie point, which no other image
+//! controls. Against the surface of MOLA it shows, when the height errors that all tie points share, a slow bend along
+//! the flight, are taken off first.
+
+use nalgebra::{Matrix3, Vector3};
+
+use super::network::Assembled;
+use crate::geom::bundle::{Adjustment, HeightResidual};
+
+/// Neighbours within this share the ground, metres.
+const NEIGHBOUR_M: f64 = 700.0;
+/// A neighbour that lies off to the same side by this share of a tie point's own residual vouches for it.
+const NEIGHBOUR_SHARE: f64 = 0.4;
+/// Ground that strays farther than this from between the shots is no crater, metres.
+const CRATER_MAX_M: f64 = 150.0;
+/// Normalised residual at which the weight of a height in the bend is a half.
+const CAUCHY: f64 = 2.385;
+/// Rounds of the robust fit of the bend.
+const BEND_ROUNDS: u32 = 30;
+/// Fewer heights than this show no bend and no blunder.
+const HEIGHTS_MIN: usize = 10;
+
+/// A tie point whose height is a blunder.
+pub(super) struct HeightBlunder {
+    /// Index in the network.
+    pub(super) point: usize,
+    /// Height above the surface beyond what tie points share, metres.
+    pub(super) above_m: f64,
+    /// The same in its standard deviations.
+    pub(super) standardised: f64,
+}
+
+/// Tie points farther from the surface than `limit` standard deviations, unless a neighbour is so too.
+pub(super) fn height_blunders<M>(
+    assembled: &Assembled<M>,
+    adjustment: &Adjustment,
+    limit: f64,
+) -> Vec<HeightBlunder> {
+    let heights = &adjustment.heights;
+    if heights.len() < HEIGHTS_MIN {
+        return Vec::new();
+    }
+    let along: Vec<f64> = heights
+        .iter()
+        .map(|height| place(assembled, height))
+        .collect();
+    let sigmas_m: Vec<f64> = heights.iter().map(sigma_m).collect();
+    let above_m = beyond_bend(heights, &along, &sigmas_m);
+    let grounds_m: Vec<Option<Vector3<f64>>> = heights
+        .iter()
+        .map(|height| {
+            adjustment.points[height.point]
+                .map(|point| point.ground_m)
+                .ok()
+        })
+        .collect();
+    let has_neighbour = |index: usize| {
+        let Some(ground_m) = grounds_m[index] else {
+            return false;
+        };
+        above_m
+            .iter()
+            .zip(&grounds_m)
+            .enumerate()
+            .any(|(other, (other_m, place))| {
+                other != index
+                    && other_m * above_m[index] > 0.0
+                    && other_m.abs() > NEIGHBOUR_SHARE * above_m[index].abs()
+                    && place.is_some_and(|place| (place - ground_m).norm() < NEIGHBOUR_M)
+            })
+    };
+    let blunders = (0..heights.len()).filter(|index| {
+        let residual_m = above_m[*index].abs();
+        let is_ground = residual_m <= CRATER_MAX_M && has_neighbour(*index);
+        residual_m > limit * sigmas_m[*index] && !is_ground
+    });
+    blunders
+        .map(|index| HeightBlunder {
+            point: heights[index].point,
+            above_m: above_m[index],
+            standardised: above_m[index].abs() / sigmas_m[index],
+        })
+        .collect()
+}
+
+/// Standard deviation of a height by its own rays against the surface, metres.
+fn sigma_m(height: &HeightResidual) -> f64 {
+    height.surface_sigma_m.hypot(height.ray_sigma_m)
+}
+
+/// Where a point lies along the flight, half its first image being 1.
+fn place<M>(assembled: &Assembled<M>, height: &HeightResidual) -> f64 {
+    let mut views = assembled.network.views.iter();
+    let first = views.find(|view| view.point == height.point);
+    first.map_or(0.0, |view| {
+        view.x_lines / assembled.network.images[view.image].half_lines
+    })
+}
+
+/// Heights without a robust parabola along the flight.
+fn beyond_bend(heights: &[HeightResidual], along: &[f64], sigmas_m: &[f64]) -> Vec<f64> {
+    let powers = |t: f64| Vector3::new(1.0, t, t * t);
+    let mut sorted_m: Vec<f64> = heights.iter().map(|height| height.above_m).collect();
+    sorted_m.sort_unstable_by(f64::total_cmp);
+    let mut bend = Vector3::new(sorted_m[sorted_m.len() / 2], 0.0, 0.0);
+    let left_m = |bend: &Vector3<f64>| -> Vec<f64> {
+        let heights = heights.iter().zip(along);
+        heights
+            .map(|(height, t)| height.above_m - bend.dot(&powers(*t)))
+            .collect()
+    };
+    for _ in 0..BEND_ROUNDS {
+        let (mut normal, mut right) = (Matrix3::zeros(), Vector3::zeros());
+        let entries = left_m(&bend)
+            .into_iter()
+            .zip(sigmas_m)
+            .zip(heights.iter().zip(along));
+        for ((residual_m, sigma_m), (height, t)) in entries {
+            let weight = sigma_m.powi(-2) / (1.0 + (residual_m / (sigma_m * CAUCHY)).powi(2));
+            normal += weight * powers(*t) * powers(*t).transpose();
+            right += weight * height.above_m * powers(*t);
+        }
+        // Heights in one place show no bend: what they share is left as it is.
+        let Some(solution) = normal.cholesky().map(|factor| factor.solve(&right)) else {
+            break;
+        };
+        bend = solution;
+    }
+    left_m(&bend)
+}

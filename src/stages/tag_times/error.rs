@@ -1,0 +1,63 @@
+//! What keeps the times of an image from being told.
+
+use crate::{
+    error::{Cause, Kind},
+    image::{IMAGE_DURATION_END_S, IMAGE_LINES_MIN},
+};
+
+/// An image whose times cannot be told.
+#[derive(Debug, thiserror::Error)]
+pub(super) enum ImageError {
+    #[error("image {image}: no {key}, neither in the label nor in the configuration")]
+    Missing { image: String, key: &'static str },
+    #[error(
+        "image {image}: line period {stated_ms} ms is stated, but exposure {exposure_ms} ms × summing \
+         {summing} makes {computed_ms} ms; expected them to agree within the rounding of 0.0001 ms"
+    )]
+    Period {
+        image: String,
+        stated_ms: f64,
+        exposure_ms: f64,
+        summing: u32,
+        computed_ms: f64,
+    },
+    #[error(
+        "image {image}: {delivered} lines delivered, {header} in the header; expected no more than in the header"
+    )]
+    Lines {
+        image: String,
+        delivered: u32,
+        header: u32,
+    },
+    #[error(
+        "image {image}: {lines} lines of {line_period_s} s; expected at least {IMAGE_LINES_MIN} lines, a \
+         positive period and less than {IMAGE_DURATION_END_S} s in all"
+    )]
+    Duration {
+        image: String,
+        lines: u32,
+        line_period_s: f64,
+    },
+}
+
+impl Cause for ImageError {
+    fn kind(&self) -> Kind {
+        match self {
+            Self::Missing { .. } => Kind::Configuration,
+            _ => Kind::Input,
+        }
+    }
+
+    fn advice(&self) -> String {
+        match self {
+            Self::Missing { key, .. } => format!("add `{key}` to the image's table, or name its label"),
+            Self::Period { .. } => {
+                "give the exposure of one detector line, or the period of summed lines, not a mixture".to_owned()
+            }
+            Self::Lines { .. } => {
+                "lines_header is what the camera exposed, lines_delivered what the file holds".to_owned()
+            }
+            Self::Duration { .. } => "check lines_header, the exposure (milliseconds) and the summing".to_owned(),
+        }
+    }
+}
