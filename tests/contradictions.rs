@@ -211,9 +211,9 @@ const MISTAKES: &[Mistake] = &[
     ),
     (
         "summing_of_another_image",
-        |case| label(case, "DOWNTRACK_SUMMING = 2", "DOWNTRACK_SUMMING = 1"),
+        |case| label(case, "DOWNTRACK_SUMMING = 2", "DOWNTRACK_SUMMING = 8"),
         End::Error(3),
-        "after the start, but its lines take 5.831 s",
+        "after the start, but its lines take 46.649 s",
     ),
     (
         "stop_an_hour_off",
