@@ -292,6 +292,7 @@ fn declarations_are_complete() {
         "adjustment.robust_limit",
         "adjustment.blunder_limit",
         "adjustment.height_blunder_limit",
+        "limits.height_outliers_max",
         "limits.profiles_apart_max_sigma",
         "limits.correction_max_sigma",
         "limits.sigma0_max",

@@ -15,6 +15,8 @@ declare_table! {
         /// Largest |median| height of tie points above the MOLA surface after the adjustment, where it is not within
         /// three of its own standard deviations.
         height_after_max_m: f64 = key(above_to(0.0, 1e6)).or(10.0),
+        /// Largest share of tie points farther from the MOLA surface than 3.29 of their standard deviations.
+        height_outliers_max: f64 = key(from_to(0.0, 1.0)).or(0.1),
         /// Largest mean difference between the surfaces of single profiles at the tie points, in its standard
         /// deviations: profiles that contradict each other are no control.
         profiles_apart_max_sigma: f64 = key(above_to(0.0, 1000.0)).or(4.0),
@@ -25,8 +27,8 @@ declare_table! {
         parallax_before_max_m: f64 = key(above_to(0.0, 1e6)).or(1000.0),
         /// The same after the adjustment: six lines of MOC's usual 4 m.
         parallax_after_max_m: f64 = key(above_to(0.0, 1e6)).or(25.0),
-        /// Largest standard deviation of unit weight of the tie points along the track.
-        sigma0_max: f64 = key(above_to(0.0, 1000.0)).or(2.0),
+        /// Largest standard deviation of unit weight of the tie points along and across the track.
+        sigma0_max: f64 = key(above_to(0.0, 1000.0)).or(1.5),
         /// Fewest tie points of a sound adjustment.
         ties_min: u32 = key(whole_from_to(0, 1_000_000)).or(10),
         /// Largest share of tie points that a sound adjustment rejects; of more than half the site is invalid.

@@ -71,12 +71,13 @@ const DEFINITIONS: [(&str, &str); 10] = [
     ),
     (
         "sigmas",
-        "a posteriori. They take footprints in images as measured independently, which they are not: they hold for \
-         positions of points to each other, not for absolute ones",
+        "a priori variances times the variance factor. In the published model they take footprints in images as measured \
+         independently, which they are not: there they say how well images agree, not how accurate heights and places are",
     ),
     (
         "configured",
-        "a standard deviation above 1e300 leaves the unknown free; without blunder_limit all tie points stay",
+        "a standard deviation above 1e300 leaves the unknown free; without blunder_limit and height_blunder_limit all tie \
+         points stay",
     ),
 ];
 

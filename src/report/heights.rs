@@ -256,12 +256,16 @@ fn apart(check: &HeightCheck) -> String {
     check.apart.as_ref().map_or_else(
         || "A single profile: no other one tests the surface.".to_owned(),
         |apart| {
+            let [first, second] = &apart.profiles;
+            let (upper, lower) = if apart.mean_m < 0.0 {
+                (second, first)
+            } else {
+                (first, second)
+            };
             format!(
-                "The surface of profile {} alone lies {} m above that of {} alone at the tie points, with an expected standard \
-                 deviation of {} m.",
-                apart.profiles[0],
-                label(apart.mean_m, 1),
-                apart.profiles[1],
+                "The surface of profile {upper} alone lies {} m above that of {lower} alone at the tie points, with an expected \
+                 standard deviation of {} m.",
+                label(apart.mean_m.abs(), 1),
                 label(apart.sigma_m, 1)
             )
         },

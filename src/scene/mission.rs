@@ -43,7 +43,7 @@ const TIE_NOISE_PX: [f64; 2] = [0.0, 5.0];
 ///
 /// # Errors
 /// [`SceneError::NotAScene`], [`SceneError::Foreign`] and [`SceneError::Changed`] when the folder holds
-/// something else, [`SceneError::Day`], the system's refusal to write.
+/// something else, [`SceneError::Option`], the system's refusal to write.
 pub fn write_scene(directory: &Path, options: &SceneOptions) -> Result<SceneSummary> {
     check(options)?;
     let draft = Draft::begin(directory, README)?;

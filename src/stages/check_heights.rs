@@ -31,8 +31,10 @@ use crate::{
 
 /// A tie point nearer to a shot than this counts as controlled by it, metres.
 const NEAR_SHOT_M: f64 = 1_000.0;
-/// Tie points that are compared at most; of more they are taken evenly, as the covariance between them is full.
-const COMPARED_MAX: usize = 2_000;
+/// Tie points whose surface is predicted together.
+const TOGETHER: usize = 64;
+/// Of more tie points than this some are taken evenly for what all have in common: its covariance is full.
+const IN_COMMON_MAX: usize = 1_000;
 
 /// Heights of the tie points of a site with one orientation.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -178,8 +180,6 @@ pub fn check_heights(
     profiles: &[Profile],
     options: &SurfaceOptions,
 ) -> HeightCheck {
-    let step = points.len().div_ceil(COMPARED_MAX).max(1);
-    let points: Vec<_> = points.iter().step_by(step).copied().collect();
     let places_m: Vec<Vector3<f64>> = points.iter().map(|(_, ground)| ground.xyz_m).collect();
     let shots = MolaShots::of(footprints, profiles);
     let surface = match shots.surface(&places_m, options) {
@@ -189,19 +189,13 @@ pub fn check_heights(
     if points.is_empty() {
         return HeightCheck::without_surface("no tie point has a ground point".to_owned());
     }
-    let found = surface.predict(&places_m);
     let ties: Vec<TieHeight> = points
-        .iter()
-        .enumerate()
-        .map(|(index, (tie, ground))| TieHeight {
-            tie: *tie,
-            ground: *ground,
-            height_m: LaserSurface::height_m(&ground.xyz_m).0,
-            surface_m: found.heights_m[index],
-            surface_sigma_m: found.sigma_m(index),
-            nearest_shot_m: found.nearest_m[index],
-        })
+        .chunks(TOGETHER)
+        .flat_map(|points| heights(&surface, points))
         .collect();
+    let step = places_m.len().div_ceil(IN_COMMON_MAX).max(1);
+    let places_m: Vec<Vector3<f64>> = places_m.into_iter().step_by(step).collect();
+    let found = surface.predict(&places_m);
     let above_m: Vec<f64> = ties.iter().map(TieHeight::above_m).collect();
     let near = ties.iter().filter(|tie| tie.nearest_shot_m < NEAR_SHOT_M);
     HeightCheck {
@@ -217,6 +211,21 @@ pub fn check_heights(
         apart: apart(&shots, &places_m, profiles, options),
         ties,
     }
+}
+
+/// Each of `points` beside the surface.
+fn heights(surface: &LaserSurface, points: &[(usize, Position<MarsIau2000>)]) -> Vec<TieHeight> {
+    let places_m: Vec<Vector3<f64>> = points.iter().map(|(_, ground)| ground.xyz_m).collect();
+    let found = surface.predict(&places_m);
+    let height = |(index, (tie, ground)): (usize, &(usize, Position<MarsIau2000>))| TieHeight {
+        tie: *tie,
+        ground: *ground,
+        height_m: LaserSurface::height_m(&ground.xyz_m).0,
+        surface_m: found.heights_m[index],
+        surface_sigma_m: found.sigma_m(index),
+        nearest_shot_m: found.nearest_m[index],
+    };
+    points.iter().enumerate().map(height).collect()
 }
 
 impl HeightCheck {

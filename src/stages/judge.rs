@@ -1,10 +1,12 @@
 //! The verdict on a site: the one place where it is made.
 
+mod adjustment;
+
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::{
-    adjust::{Adjusted, CorrectedImage, PointKind},
+    adjust::Adjusted,
     check_heights::HeightCheck,
     check_ranges::{BiasScan, RangeCheck},
     compare_pairs::PairComparison,
@@ -12,7 +14,7 @@ use super::{
     orientation::Orientation,
     read_ties::Ties,
 };
-use crate::{config::LimitsConfig, footprints::AdjustmentModel};
+use crate::config::LimitsConfig;
 
 /// Whether the products keep the limits of the configuration.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -88,192 +90,6 @@ pub struct AdjustmentEvidence<'a> {
     pub heights: &'a HeightCheck,
     /// Heights of the adjusted tie points.
     pub adjusted_heights: &'a HeightCheck,
-}
-
-/// Fewer tie points than this near shots leave their height to what is known of orbit and attitude.
-const NEAR_SHOTS_FEW: usize = 20;
-/// A mean height within this many of its standard deviations is no contradiction.
-const HEIGHT_SIGMAS: f64 = 3.0;
-/// Names of the quantities that an orientation is corrected by.
-const CORRECTED: [&str; 6] = [
-    "position along X",
-    "position along Y",
-    "position along Z",
-    "rotation about the camera's x axis",
-    "rotation about the camera's y axis",
-    "rotation about the camera's z axis",
-];
-
-impl AdjustmentEvidence<'_> {
-    /// Why the adjusted orientation is invalid, one sentence per reason: what MOLA says first, then what images say of
-    /// each other, then what was known beforehand.
-    fn invalid_because(&self, limits: &LimitsConfig) -> Vec<String> {
-        let mut invalid = self.heights_off(limits);
-        let reasons = |image: &JudgedImage| -> Vec<String> {
-            let id = image.id;
-            // What is wrong with the orientation of the kernels is told with it.
-            let of_model = image.model.invalid_because.iter();
-            of_model
-                .map(|reason| format!("adjusted image {id}: {reason}"))
-                .collect()
-        };
-        invalid.extend(self.images.iter().flat_map(reasons));
-        let (left_out, ties) = (self.left_out(), self.ties.multi_image());
-        if 2 * left_out > ties {
-            invalid.push(format!(
-                "adjustment: {left_out} of {ties} tie points were rejected; ties.parquet says why"
-            ));
-        }
-        let rounds = [
-            ("before", self.pairs, limits.parallax_before_max_m),
-            ("after", self.adjusted_pairs, limits.parallax_after_max_m),
-        ];
-        for (round, pairs, limit_m) in rounds {
-            for pair in pairs.iter().filter(|pair| !is_together(pair, limit_m)) {
-                invalid.push(format!(
-                    "tie points of {} and {} lie {:.1} m apart along the flight {round} the adjustment, expected at most \
-                     {limit_m} m",
-                    pair.images[0], pair.images[1], pair.along_track_parallax_m
-                ));
-            }
-        }
-        invalid.extend(self.corrected_too_far(limits));
-        invalid
-    }
-
-    /// What MOLA says against the heights of tie points.
-    fn heights_off(&self, limits: &LimitsConfig) -> Vec<String> {
-        let after_max_m = limits
-            .height_after_max_m
-            .max(HEIGHT_SIGMAS * self.adjusted_heights.mean_sigma_m);
-        let rounds = [
-            ("before", self.heights, limits.height_before_max_m),
-            ("after", self.adjusted_heights, after_max_m),
-        ];
-        let mut reasons = Vec::new();
-        for (round, check, limit_m) in rounds {
-            // Written so that NaN counts.
-            if check.surface.is_ok() && !(check.above_m.median.abs() <= limit_m) {
-                reasons.push(format!(
-                    "tie points lie {:+.1} m from the MOLA surface {round} the adjustment (median of {}), expected at most \
-                     {limit_m:.1} m",
-                    check.above_m.median, check.above_m.n
-                ));
-            }
-        }
-        if let Some(apart) = &self.heights.apart {
-            let sigmas = apart.mean_m.abs() / apart.sigma_m;
-            if !(sigmas <= limits.profiles_apart_max_sigma) {
-                reasons.push(format!(
-                    "profiles {} and {} contradict each other: at the tie points their surfaces lie {:.1} m apart on \
-                     average, {sigmas:.1} standard deviations, expected at most {}",
-                    apart.profiles[0],
-                    apart.profiles[1],
-                    apart.mean_m.abs(),
-                    limits.profiles_apart_max_sigma
-                ));
-            }
-        }
-        reasons
-    }
-
-    /// Corrections of orientations that what was known of them does not allow.
-    fn corrected_too_far(&self, limits: &LimitsConfig) -> Vec<String> {
-        let largest = |image: &CorrectedImage| -> Option<(f64, usize)> {
-            let corrections = image.correction.iter().zip(&image.prior_sigmas).enumerate();
-            let known = corrections.filter(|(_, (_, sigma))| **sigma > 0.0 && sigma.is_finite());
-            let sigmas = known.map(|(index, (value, sigma))| ((value / sigma).abs(), index));
-            sigmas.max_by(|one, other| one.0.total_cmp(&other.0))
-        };
-        let far = self.adjusted.images.iter().filter_map(|image| {
-            let (sigmas, index) = largest(image)?;
-            (!(sigmas <= limits.correction_max_sigma)).then(|| {
-                format!(
-                    "image {}: the adjustment corrects its {} by {sigmas:.1} standard deviations, expected at most {}; check \
-                     its time, its kernels and pointing.ck_bias_s",
-                    image.id,
-                    CORRECTED[index / 3],
-                    limits.correction_max_sigma
-                )
-            })
-        });
-        far.collect()
-    }
-
-    /// Tie points that took part in the adjustment.
-    fn taken(&self) -> usize {
-        let points = self.adjusted.points.iter();
-        points.filter(|point| point.kind == PointKind::Tie).count()
-    }
-
-    /// Tie points that join images and yet took no part.
-    fn left_out(&self) -> usize {
-        self.ties.multi_image().saturating_sub(self.taken())
-    }
-
-    /// Whether the images of every pair place tie points together after the adjustment, and most of these took
-    /// part in it.
-    #[must_use]
-    pub fn images_agree(&self, limits: &LimitsConfig) -> bool {
-        let limit_m = limits.parallax_after_max_m;
-        2 * self.left_out() <= self.ties.multi_image()
-            && !self.adjusted_pairs.is_empty()
-            && self
-                .adjusted_pairs
-                .iter()
-                .all(|pair| is_together(pair, limit_m))
-    }
-
-    /// What a reader must weigh, one sentence each.
-    fn remarks(&self, limits: &LimitsConfig) -> Vec<String> {
-        let mut remarks = Vec::new();
-        match &self.heights.surface {
-            Err(reason) => remarks.push(format!(
-                "heights of tie points are not controlled by MOLA ({reason}): they are known as well as orbit and attitude \
-                 beforehand, to some 500 m"
-            )),
-            Ok(_) if self.heights.near_shots < NEAR_SHOTS_FEW => remarks.push(format!(
-                "only {} tie points lie within a kilometre of a shot: their heights are known little better than orbit and \
-                 attitude beforehand",
-                self.heights.near_shots
-            )),
-            Ok(_) => {}
-        }
-        if self.adjusted.summary.model == AdjustmentModel::Published {
-            remarks.push(
-                "the adjustment follows the published model (adjustment.model): its heights are not controlled, and its \
-                 standard deviations are those of agreement between the images"
-                    .to_owned(),
-            );
-        }
-        let (left_out, ties) = (self.left_out(), self.ties.multi_image());
-        let share = limits.rejected_share_max;
-        if left_out as f64 > share * ties as f64 && 2 * left_out <= ties {
-            remarks.push(format!(
-                "{left_out} of {ties} tie points were rejected by the adjustment; ties.parquet says why"
-            ));
-        }
-        let taken = self.taken();
-        if taken < limits.ties_min as usize {
-            remarks.push(format!(
-                "only {taken} tie points took part in the adjustment, expected at least {}",
-                limits.ties_min
-            ));
-        }
-        let [along, _] = self.adjusted.summary.tie_components;
-        if !(along <= limits.sigma0_max) {
-            remarks.push(format!(
-                "residuals of the tie points along the track are {along:.2} times what adjustment.tie_sigma_px expects: \
-                 measurements are worse than configured, or a model does not hold"
-            ));
-        }
-        remarks
-    }
-}
-
-fn is_together(pair: &PairComparison, limit_m: f64) -> bool {
-    // Written so that NaN counts as apart.
-    pair.along_track_parallax_m.abs() <= limit_m
 }
 
 /// Judges a site by its limits and by what contradicts itself.

@@ -123,8 +123,8 @@ fn heights_by_parts_equal_the_dense_equations() {
     let surface = surface(&network, 35.0);
     network.heights = Some(HeightControl {
         surface: surface.clone(),
-        points: CONTROLLED.collect(),
-        weighed: true,
+        compared: Vec::new(),
+        observed: CONTROLLED.collect(),
     });
     let (mut layout, start, active) = layout(&network);
     let shared = layout.columns.len();
@@ -194,7 +194,7 @@ fn heights_by_parts_equal_the_dense_equations() {
         sum += 1.0 - cofactors[(column, column)] / sigma.powi(2);
     }
     let heights = adjustment.heights.iter();
-    sum += heights.filter_map(|height| height.redundancy).sum::<f64>();
+    sum += heights.map(|height| height.redundancy).sum::<f64>();
     let observations = 2 * network.views.len()
         + network.ranges.len()
         + 3 * (active.len() - CONTROLLED.len())
@@ -211,8 +211,8 @@ fn ground_that_stands_higher_lifts_the_points_and_moves_them_little_in_plan() {
         let surface = surface(&network, above_m);
         network.heights = Some(HeightControl {
             surface,
-            points: CONTROLLED.collect(),
-            weighed: true,
+            compared: Vec::new(),
+            observed: CONTROLLED.collect(),
         });
         let adjusted = solve(&network, &BundleOptions::default()).unwrap();
         let heights = CONTROLLED
@@ -231,16 +231,16 @@ fn heights_that_are_only_compared_change_nothing() {
     let surface = surface(&network, 60.0);
     network.heights = Some(HeightControl {
         surface,
-        points: CONTROLLED.collect(),
-        weighed: false,
+        compared: CONTROLLED.collect(),
+        observed: Vec::new(),
     });
     let compared = solve(&network, &BundleOptions::default()).unwrap();
     assert_eq!(alone.points, compared.points);
     assert_eq!(alone.images, compared.images);
     assert_eq!(alone.observations, compared.observations);
-    assert_eq!(compared.heights.len(), CONTROLLED.len());
-    for height in &compared.heights {
-        assert!(height.redundancy.is_none());
+    assert!(compared.heights.is_empty());
+    assert_eq!(compared.compared.len(), CONTROLLED.len());
+    for height in &compared.compared {
         assert!(height.ray_sigma_m > 0.0 && height.surface_sigma_m > 0.0);
     }
 }
@@ -255,8 +255,8 @@ fn a_height_that_no_surface_explains_loses_its_weight() {
     let mut network = measured(network);
     network.heights = Some(HeightControl {
         surface,
-        points: CONTROLLED.collect(),
-        weighed: true,
+        compared: Vec::new(),
+        observed: CONTROLLED.collect(),
     });
     let adjusted = solve(&network, &BundleOptions::default()).unwrap();
     let in_hole = adjusted

@@ -84,6 +84,7 @@
 //! ```
 
 mod check;
+mod compared_heights;
 mod heights;
 mod layout;
 mod point_rows;
@@ -180,10 +181,10 @@ pub struct Range {
 pub struct HeightControl {
     /// The ground.
     pub surface: LaserSurface,
-    /// Indices of the points.
-    pub points: Vec<usize>,
-    /// Whether the heights are observations; if not, they are only compared with what the others say.
-    pub weighed: bool,
+    /// Indices of the points whose height is compared with it.
+    pub compared: Vec<usize>,
+    /// Indices of those whose height is an observation; their covariance is full.
+    pub observed: Vec<usize>,
 }
 
 /// All that enters an adjustment.
@@ -295,8 +296,8 @@ pub struct HeightResidual {
     pub nearest_shot_m: f64,
     /// Factor of its weight from robust estimation, 1 without.
     pub weight_factor: f64,
-    /// Redundancy number; `None` where heights are only compared.
-    pub redundancy: Option<f64>,
+    /// Redundancy number; 0 of heights that are only compared.
+    pub redundancy: f64,
 }
 
 /// An adjusted image.
@@ -336,11 +337,13 @@ pub struct Adjustment {
     pub ranges: Vec<Option<Residual>>,
     /// Range bias of each profile with the square root of its cofactor, metres, when it is unknown.
     pub range_biases_m: Vec<Option<(f64, f64)>>,
-    /// Heights of the points of [`Network::heights`] that take part.
+    /// Heights that are observations.
     pub heights: Vec<HeightResidual>,
-    /// Weighted sum of squares of the heights, with their full covariance; 0 where they are only compared.
+    /// Heights that are compared, each with the standard deviation that rays and surface give it alone.
+    pub compared: Vec<HeightResidual>,
+    /// Weighted sum of squares of the observed heights, with their full covariance.
     pub height_squares: f64,
-    /// Cofactors of the mean of these points, m²: what they share does not average out. `None` without heights.
+    /// Cofactors of the mean of the points with an observed height, m²: what they share does not average out.
     pub mean_cofactor_m2: Option<Matrix3<f64>>,
     /// Scalar observations, initial values with a standard deviation included.
     pub observations: usize,

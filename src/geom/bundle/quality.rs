@@ -79,11 +79,9 @@ pub(super) fn judge<M: ExteriorOrientation>(
     fitness: &[Result<(), PointRejection>],
     cofactors: &DMatrix<f64>,
 ) -> Adjustment {
-    let weighed = layout.network.heights.as_ref().filter(|of| of.weighed);
     let heights = layout.heights.as_ref().zip(reduced.heights.as_ref());
-    let controls = heights
-        .filter(|_| weighed.is_some())
-        .map(|(of, reduced)| Controls::of(reduced, &of.points, fitness.len(), cofactors));
+    let controls =
+        heights.map(|(of, reduced)| Controls::of(reduced, &of.points, fitness.len(), cofactors));
     let judged: Vec<Result<Judged, PointRejection>> = (0..fitness.len())
         .into_par_iter()
         .map_init(Default::default, |room, point| {
@@ -105,9 +103,8 @@ pub(super) fn judge<M: ExteriorOrientation>(
             .iter()
             .map(|column| column.map(|column| estimate(state, cofactors, column)))
             .collect(),
-        heights: heights.map_or_else(Vec::new, |(of, reduced)| {
-            reduced.residuals(of, weighed.map(|_| cofactors))
-        }),
+        heights: heights.map_or_else(Vec::new, |(of, reduced)| reduced.residuals(of, cofactors)),
+        compared: Vec::new(),
         height_squares: 0.0,
         mean_cofactor_m2: None,
         observations: 0,
@@ -135,10 +132,8 @@ pub(super) fn judge<M: ExteriorOrientation>(
         adjustment.weighted_squares += (state.corrections[column] / sigma).powi(2);
     }
     if let Some((of, reduced)) = heights {
-        if weighed.is_some() {
-            adjustment.height_squares = reduced.weighted_squares();
-            adjustment.weighted_squares += adjustment.height_squares;
-        }
+        adjustment.height_squares = reduced.weighted_squares();
+        adjustment.weighted_squares += adjustment.height_squares;
         adjustment.mean_cofactor_m2 =
             mean_cofactor_m2(layout, state, &of.points, cofactors, controls.as_ref());
     }

@@ -118,14 +118,13 @@ impl ReducedHeights {
         moves.map(|(step, pull)| -step * *pull).collect()
     }
 
-    /// Residuals of the heights. With `cofactors` of the shared unknowns they took part; without, they are compared
-    /// only and control nothing.
+    /// Residuals of the heights, with `cofactors` of the shared unknowns.
     pub(super) fn residuals(
         &self,
         heights: &Heights,
-        cofactors: Option<&DMatrix<f64>>,
+        cofactors: &DMatrix<f64>,
     ) -> Vec<HeightResidual> {
-        let redundancies = cofactors.map(|cofactors| self.redundancies(heights, cofactors));
+        let redundancies = self.redundancies(heights, cofactors);
         (0..heights.points.len())
             .map(|index| {
                 let variance_m2 = heights.surface.covariance_m2[(index, index)];
@@ -138,7 +137,7 @@ impl ReducedHeights {
                     nearest_shot_m: heights.surface.nearest_m[index],
                     weight_factor: (variance_m2 + ray_m2)
                         / (variance_m2 + ray_m2 + heights.inflation_m2[index]),
-                    redundancy: redundancies.as_ref().map(|of| of[index]),
+                    redundancy: redundancies[index],
                 }
             })
             .collect()

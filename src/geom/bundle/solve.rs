@@ -8,6 +8,7 @@ use rayon::prelude::*;
 use super::{
     Adjustment, BundleError, BundleOptions, HeightControl, Network, PointRejection,
     check::check,
+    compared_heights::compared,
     heights::Heights,
     layout::Layout,
     point_rows::PointRows,
@@ -75,16 +76,20 @@ pub fn solve<M: ExteriorOrientation>(
             &mut history,
         )?;
     }
-    if let Some(control) = &network.heights {
+    let control = network.heights.as_ref();
+    if let Some(control) = control.filter(|of| !of.observed.is_empty()) {
         let mut room = (options.steps_max, &mut history);
         settled = with_heights(&mut layout, control, settled, &active, &mut room)?;
     }
     let factor = factorise(&layout, &settled.reduced, 0.0)?;
     let cofactors = factor.inverse();
     let mut adjustment = quality::judge(&layout, &settled, &fitness, &cofactors);
-    let weighed = network.heights.as_ref().is_some_and(|of| of.weighed);
-    let heights = if weighed { adjustment.heights.len() } else { 0 };
-    adjustment.observations = observations + heights;
+    adjustment.compared = control.map_or_else(Vec::new, |control| {
+        compared(&layout, &settled.state, control, |point| {
+            fitness[point].is_ok()
+        })
+    });
+    adjustment.observations = observations + adjustment.heights.len();
     adjustment.unknowns = unknowns;
     adjustment.history = history;
     Ok(adjustment)
@@ -116,7 +121,7 @@ const HEIGHT_ROUNDS_MAX: u32 = 15;
 /// Standard deviations that change by less than this leave the weights of heights as they are, metres.
 const HEIGHT_CHANGE_M: f64 = 0.01;
 
-/// Goes on with heights as observations; where they are only compared, measures them.
+/// Goes on with heights as observations.
 fn with_heights<M: ExteriorOrientation>(
     layout: &mut Layout<'_, M>,
     control: &HeightControl,
@@ -125,17 +130,11 @@ fn with_heights<M: ExteriorOrientation>(
     (steps_max, history): &mut (u32, &mut Vec<f64>),
 ) -> Result<Settled, BundleError> {
     let active_points: BTreeSet<usize> = active.iter().copied().collect();
-    let points = control.points.iter().copied();
+    let points = control.observed.iter().copied();
     let points = points
         .filter(|point| active_points.contains(point))
         .collect();
     let heights = Heights::at(&control.surface, points, &settled.state);
-    if !control.weighed {
-        let measured = ReducedHeights::of(layout, &heights, &settled.state);
-        settled.reduced.heights = Some(measured.map_err(|_| not_converged(history))?);
-        layout.heights = Some(heights);
-        return Ok(settled);
-    }
     layout.heights = Some(heights);
     for _ in 0..HEIGHT_ROUNDS_MAX {
         settled = settle(layout, settled.state, active, *steps_max, history)?;

@@ -1,7 +1,7 @@
 //! The ground between laser shots: its height by ordinary kriging, with the covariance of its errors.
 //!
 //! Profiles of a laser altimeter sample the ground every 300 m along the track and every few kilometres across it.
-//! How far the ground strays from what lies between is learnt from the profiles themselves ([`Variogram::learn`]);
+//! How far the ground strays from what lies between is learnt from the profiles themselves ([`Variogram`]);
 //! errors at neighbouring places are alike, so their covariance is full ([`SurfaceHeights::covariance_m2`]).
 //!
 //! # Source

@@ -46,6 +46,9 @@ pub(super) struct AdjustmentKeys<'a> {
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(extend("exclusiveMinimum" = 0))]
     blunder_limit: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    height_blunder_limit: Option<f64>,
     images: Vec<PriorKeys<'a>>,
 }
 
@@ -87,6 +90,7 @@ impl<'a> AdjustmentKeys<'a> {
             position_sigma_off_nadir_m: published_m.map(|[_, other_m]| other_m),
             robust: config.robust.as_ref(),
             blunder_limit: config.blunder_limit,
+            height_blunder_limit: config.height_blunder_limit.filter(|_| is_of_surface),
             images: config.images.iter().map(prior).collect(),
         }
     }

@@ -4,10 +4,11 @@ use nalgebra::Matrix3;
 use serde::{Deserialize, Serialize};
 
 use super::{
+    height_summary::{self, HeightSummary},
     input::AdjustImage,
     network::Assembled,
     points::{PointKind, RejectedPoint},
-    summary::{self, AdjustmentSummary, HeightSummary},
+    summary::AdjustmentSummary,
 };
 use crate::{
     frames::{MarsIau2000, Position},
@@ -169,7 +170,7 @@ pub(super) fn collect<M>(
     let views = assembled.network.views.iter().zip(&adjustment.views);
     let ranges = assembled.network.ranges.iter().zip(&adjustment.ranges);
     Adjusted {
-        heights: summary::heights(&assembled, &adjustment),
+        heights: height_summary::heights(&assembled, &adjustment),
         images: corrected_images(images, &adjustment, summary.variance_factor),
         views: views
             .filter_map(|(view, residuals)| {

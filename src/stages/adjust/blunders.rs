@@ -33,8 +33,10 @@ pub(super) fn solve_without_blunders<M: ExteriorOrientation>(
         return Ok(adjustment);
     }
     by_heights(assembled, bundle_options, config, adjustment)?;
-    assembled.weigh_heights();
-    solve(&assembled.network, bundle_options)
+    assembled.observe_heights();
+    let adjustment = solve(&assembled.network, bundle_options)?;
+    // Once the heights bend as the ground does, others stand out.
+    by_heights(assembled, bundle_options, config, adjustment)
 }
 
 /// Adjusts, rejects the worst tie points and repeats until no standardised residual exceeds `limit`; without one all
@@ -67,15 +69,15 @@ fn by_residuals<M: ExteriorOrientation>(
     Ok(adjustment)
 }
 
-/// Rejects tie points that no ground explains until none is left.
+/// Rejects tie points that no ground explains until none is left; the adjustment without them.
 fn by_heights<M: ExteriorOrientation>(
     assembled: &mut Assembled<M>,
     bundle_options: &BundleOptions,
     config: &AdjustmentConfig,
     mut adjustment: Adjustment,
-) -> Result<(), BundleError> {
+) -> Result<Adjustment, BundleError> {
     let Some(limit) = config.height_blunder_limit else {
-        return Ok(());
+        return Ok(adjustment);
     };
     for _ in 0..ROUNDS_MAX {
         let blunders = height_blunders(assembled, &adjustment, limit);
@@ -92,7 +94,7 @@ fn by_heights<M: ExteriorOrientation>(
         assembled.reject(rejected.collect());
         adjustment = solve(&assembled.network, bundle_options)?;
     }
-    Ok(())
+    Ok(adjustment)
 }
 
 impl<M> Assembled<M> {

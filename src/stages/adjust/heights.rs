@@ -38,7 +38,7 @@ pub(super) fn height_blunders<M>(
     adjustment: &Adjustment,
     limit: f64,
 ) -> Vec<HeightBlunder> {
-    let heights = &adjustment.heights;
+    let heights = &adjustment.compared;
     if heights.len() < HEIGHTS_MIN {
         return Vec::new();
     }

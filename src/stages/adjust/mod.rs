@@ -6,7 +6,9 @@
 
 mod adjusted;
 mod blunders;
+mod components;
 mod error;
+mod height_summary;
 mod heights;
 mod input;
 mod network;
@@ -20,13 +22,12 @@ mod words;
 pub use adjusted::{
     Adjusted, CorrectedImage, CorrectedPoint, ImageResidual, RangeResidual, ScalarResidual,
 };
+pub use components::WORSE_THAN_CONFIGURED;
 pub use error::AdjustError;
+pub use height_summary::HeightSummary;
 pub use input::{AdjustImage, LaserShot, LaserShots, ShotRange, orientation_sigmas};
 pub use points::{PointKind, RejectedPoint, RejectionReason};
 pub use prepare::{Candidate, prepare_adjustment};
 pub use run::adjust;
 pub use stage::Adjust;
-pub use summary::{
-    AdjustmentSummary, GroundSummary, HeightSummary, ImageSummary, ObservationType, TypeSummary,
-    WORSE_THAN_CONFIGURED,
-};
+pub use summary::{AdjustmentSummary, GroundSummary, ImageSummary, ObservationType, TypeSummary};

@@ -69,8 +69,8 @@ pub(super) fn assemble<'a, M: ExteriorOrientation>(
         let ties = assembled.shots..assembled.points.len();
         assembled.network.heights = Some(HeightControl {
             surface: surface.clone(),
-            points: evenly(&assembled.along_the_flight(ties), COMPARED_MAX),
-            weighed: false,
+            compared: ties.collect(),
+            observed: Vec::new(),
         });
     }
     Ok(assembled)
@@ -136,39 +136,36 @@ fn footprints_in_images<M: ExteriorOrientation>(
     Ok(views)
 }
 
-/// Tie points that are compared with the surface at most: their covariance is full.
-const COMPARED_MAX: usize = 2_000;
 /// Tie points whose height is observed at most: errors of the surface at neighbours are alike, so more tell nothing new.
 const CONTROLLED_MAX: usize = 400;
 
 /// At most `most` of the entries, evenly spread.
 fn evenly(entries: &[usize], most: usize) -> Vec<usize> {
-    let step = entries.len().div_ceil(most).max(1);
-    entries.iter().copied().step_by(step).collect()
+    let count = entries.len().min(most);
+    (0..count)
+        .map(|index| entries[index * entries.len() / count])
+        .collect()
 }
 
 impl<M> Assembled<M> {
     /// Makes heights observations.
-    pub(super) fn weigh_heights(&mut self) {
-        let Some(mut control) = self.network.heights.take() else {
+    pub(super) fn observe_heights(&mut self) {
+        let measured: BTreeSet<usize> = self.network.views.iter().map(|view| view.point).collect();
+        let places_m = |point: &usize| self.network.points[*point].ground_m;
+        let Some(control) = &mut self.network.heights else {
             return;
         };
-        let measured: BTreeSet<usize> = self.network.views.iter().map(|view| view.point).collect();
-        control.points.retain(|point| measured.contains(point));
-        control.points = evenly(&control.points, CONTROLLED_MAX);
-        control.weighed = true;
-        self.network.heights = Some(control);
-    }
-
-    /// Points by the line of their first measurement.
-    fn along_the_flight(&self, points: std::ops::Range<usize>) -> Vec<usize> {
-        let mut lines = vec![f64::INFINITY; self.points.len()];
-        for view in self.network.views.iter().rev() {
-            lines[view.point] = view.x_lines;
-        }
-        let mut points: Vec<usize> = points.collect();
-        points.sort_by(|one, other| lines[*one].total_cmp(&lines[*other]));
-        points
+        control.compared.retain(|point| measured.contains(point));
+        let mut points = control.compared.clone();
+        // By where they lie, so that which of very many are taken does not depend on their order in files.
+        let by_place = |one: &usize, other: &usize| {
+            let (one, other) = (places_m(one), places_m(other));
+            let axes = [2, 1, 0].map(|axis| one[axis].total_cmp(&other[axis]));
+            axes.into_iter()
+                .fold(std::cmp::Ordering::Equal, std::cmp::Ordering::then)
+        };
+        points.sort_by(by_place);
+        control.observed = evenly(&points, CONTROLLED_MAX);
     }
 
     /// Whether the point at this index is a shot or a tie point.

@@ -5,7 +5,9 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::{
+    components::{component, tie_components, variance_factor},
     error::AdjustError,
+    height_summary::beyond_limit,
     input::AdjustImage,
     network::{Assembled, projector},
     points::PointKind,
@@ -19,7 +21,7 @@ use crate::geom::{
 use crate::{
     config::AdjustmentConfig,
     footprints::{AdjustmentModel, FootprintImageCoordinates},
-    geom::{ellipsoid::local_axes, statistics::BAARDA_LIMIT},
+    geom::statistics::BAARDA_LIMIT,
     schema::{at, none_negative},
 };
 
@@ -86,25 +88,6 @@ pub struct ImageSummary {
     pub mola_corrections: [Summary; 2],
 }
 
-/// Heights of tie points against the MOLA surface, as observations.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
-pub struct HeightSummary {
-    /// Tie points whose height is observed.
-    pub ties: usize,
-    /// Shots of the surface.
-    pub shots: usize,
-    /// Profiles that they belong to.
-    pub profiles: usize,
-    /// Root mean square difference of heights 300 m apart, metres.
-    #[schemars(range(min = 0.0))]
-    pub roughness_m: f64,
-    /// Adjusted heights above the surface, metres.
-    pub above_m: Summary,
-    /// Standard deviations of the mean of these points towards east, north and up, metres: what they have in common.
-    #[schemars(transform = none_negative)]
-    pub mean_sigma_m: [f64; 3],
-}
-
 /// Statistics of an adjustment.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct AdjustmentSummary {
@@ -121,7 +104,7 @@ pub struct AdjustmentSummary {
     /// Standard deviation of unit weight of tie points along and across the track.
     #[schemars(transform = none_negative)]
     pub tie_components: [f64; 2],
-    /// What the a priori variances are multiplied with in covariances: 1, or the square of the first of these where it
+    /// What the a priori variances are multiplied with in covariances: 1, or the square of the larger of these where it
     /// says that measurements are worse than configured. A good fit makes nothing more certain.
     #[schemars(range(min = 1.0))]
     pub variance_factor: f64,
@@ -235,78 +218,18 @@ fn types<M>(assembled: &Assembled<M>, adjustment: &Adjustment) -> Vec<TypeSummar
 
 /// Heights, whose weighted sum of squares has no parts: their errors are correlated.
 fn of_heights(adjustment: &Adjustment) -> Option<TypeSummary> {
-    let redundancies = adjustment.heights.iter().map(|height| height.redundancy);
-    let redundancy = redundancies.sum::<Option<f64>>()?;
+    let redundancy = adjustment
+        .heights
+        .iter()
+        .map(|height| height.redundancy)
+        .sum();
     (!adjustment.heights.is_empty()).then(|| TypeSummary {
         kind: ObservationType::MolaHeight,
         observations: adjustment.heights.len(),
         redundancy,
         weighted_squares: adjustment.height_squares,
         variance_component: component(adjustment.height_squares, redundancy),
-        beyond_limit: 0,
-    })
-}
-
-/// `sqrt(weighted squares / redundancy)`, 0 without redundancy.
-fn component(weighted_squares: f64, redundancy: f64) -> f64 {
-    if redundancy > 0.0 {
-        (weighted_squares / redundancy).sqrt()
-    } else {
-        0.0
-    }
-}
-
-/// Standard deviation of unit weight of tie points along and across the track.
-pub(super) fn tie_components<M>(assembled: &Assembled<M>, adjustment: &Adjustment) -> [f64; 2] {
-    let views = assembled.network.views.iter().zip(&adjustment.views);
-    let ties = views.filter(|(view, _)| assembled.kind(view.point) == PointKind::Tie);
-    let residuals: Vec<[Residual; 2]> = ties.filter_map(|(_, residuals)| *residuals).collect();
-    [0, 1].map(|axis| {
-        let of_axis = || residuals.iter().map(|pair| &pair[axis]);
-        component(
-            of_axis().map(Residual::weighted_square).sum(),
-            of_axis().map(|residual| residual.redundancy).sum(),
-        )
-    })
-}
-
-/// A standard deviation of unit weight up to this is what chance gives some hundred tie points.
-pub const WORSE_THAN_CONFIGURED: f64 = 1.12;
-
-/// What a priori variances are multiplied with in covariances.
-pub(super) fn variance_factor<M>(assembled: &Assembled<M>, adjustment: &Adjustment) -> f64 {
-    let [along, _] = tie_components(assembled, adjustment);
-    if along > WORSE_THAN_CONFIGURED {
-        along * along
-    } else {
-        1.0
-    }
-}
-
-/// Heights as observations, where they are.
-pub(super) fn heights<M>(
-    assembled: &Assembled<M>,
-    adjustment: &Adjustment,
-) -> Option<HeightSummary> {
-    let control = assembled.network.heights.as_ref().filter(|of| of.weighed)?;
-    let above_m: Vec<f64> = adjustment
-        .heights
-        .iter()
-        .map(|height| height.above_m)
-        .collect();
-    let points = adjustment.heights.iter();
-    let points = points.filter_map(|height| adjustment.points[height.point].as_ref().ok());
-    let middle_m: Vector3<f64> = points.map(|point| point.ground_m).sum();
-    let to_local = local_axes(&middle_m);
-    let mean_m2 = to_local * adjustment.mean_cofactor_m2? * to_local.transpose();
-    let factor = variance_factor(assembled, adjustment);
-    Some(HeightSummary {
-        ties: adjustment.heights.len(),
-        shots: control.surface.shots(),
-        profiles: control.surface.profiles().len(),
-        roughness_m: control.surface.variogram().roughness_m,
-        above_m: Summary::of(&above_m),
-        mean_sigma_m: [0, 1, 2].map(|axis| (factor * mean_m2[(axis, axis)]).sqrt()),
+        beyond_limit: beyond_limit(adjustment),
     })
 }
 

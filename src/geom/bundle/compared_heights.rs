@@ -1,0 +1,51 @@
+//! Heights of points beside the surface, whether they took part or not: each by itself, so that there may be many.
+
+use nalgebra::Vector3;
+use rayon::prelude::*;
+
+use super::{
+    HeightControl, HeightResidual, layout::Layout, point_rows::PointRows, unknowns::State,
+};
+use crate::geom::{pushbroom::ExteriorOrientation, surface::LaserSurface};
+
+/// Points whose surface is predicted together; the covariance between them is not used.
+const TOGETHER: usize = 64;
+
+/// Every compared point of `control` that is determined, at `state`.
+pub(super) fn compared<M: ExteriorOrientation>(
+    layout: &Layout<'_, M>,
+    state: &State,
+    control: &HeightControl,
+    is_active: impl Fn(usize) -> bool + Sync,
+) -> Vec<HeightResidual> {
+    let points: Vec<usize> = control
+        .compared
+        .iter()
+        .copied()
+        .filter(|at| is_active(*at))
+        .collect();
+    let pieces: Vec<Vec<HeightResidual>> = points
+        .par_chunks(TOGETHER)
+        .map_init(PointRows::default, |rows, points| {
+            let places_m: Vec<Vector3<f64>> = points.iter().map(|at| state.points_m[*at]).collect();
+            let surface = control.surface.predict(&places_m);
+            let residual = |(index, point): (usize, &usize)| {
+                layout.fill(rows, state, *point).ok()?;
+                let triangle = rows.eliminate();
+                let (height_m, by_point) = LaserSurface::height_m(&places_m[index]);
+                let turned = triangle.tr_solve_upper_triangular(&by_point)?;
+                Some(HeightResidual {
+                    point: *point,
+                    above_m: height_m - surface.heights_m[index],
+                    surface_sigma_m: surface.sigma_m(index),
+                    ray_sigma_m: turned.norm(),
+                    nearest_shot_m: surface.nearest_m[index],
+                    weight_factor: 1.0,
+                    redundancy: 0.0,
+                })
+            };
+            points.iter().enumerate().filter_map(residual).collect()
+        })
+        .collect();
+    pieces.into_iter().flatten().collect()
+}

@@ -1,0 +1,235 @@
+//! What is judged of an adjustment: by MOLA first, then by what images say of each other, then by what was known.
+
+use super::{AdjustmentEvidence, JudgedImage};
+use crate::{
+    config::LimitsConfig,
+    footprints::AdjustmentModel,
+    stages::{
+        adjust::{CorrectedImage, HeightSummary, PointKind},
+        compare_pairs::PairComparison,
+    },
+};
+
+/// Mean heights that are stated worse than this, metres, are hardly controlled.
+const HEIGHT_LOOSE_M: f64 = 20.0;
+/// Craters between the profiles make a smaller share than this of the tie points stand out.
+const HEIGHT_OUTLIERS_FEW: f64 = 0.03;
+/// Fewer tie points than this show no blunder by their heights.
+const HEIGHTS_FEW: usize = 10;
+/// A mean height within this many of its standard deviations is no contradiction.
+const HEIGHT_SIGMAS: f64 = 3.0;
+/// Names of the quantities that an orientation is corrected by.
+const CORRECTED: [&str; 6] = [
+    "position along X",
+    "position along Y",
+    "position along Z",
+    "rotation about the camera's x axis",
+    "rotation about the camera's y axis",
+    "rotation about the camera's z axis",
+];
+
+impl AdjustmentEvidence<'_> {
+    /// Why the adjusted orientation is invalid, one sentence per reason: what MOLA says first, then what images say of
+    /// each other, then what was known beforehand.
+    pub(super) fn invalid_because(&self, limits: &LimitsConfig) -> Vec<String> {
+        let mut invalid = self.heights_off(limits);
+        let reasons = |image: &JudgedImage| -> Vec<String> {
+            let id = image.id;
+            // What is wrong with the orientation of the kernels is told with it.
+            let of_model = image.model.invalid_because.iter();
+            of_model
+                .map(|reason| format!("adjusted image {id}: {reason}"))
+                .collect()
+        };
+        invalid.extend(self.images.iter().flat_map(reasons));
+        let (left_out, ties) = (self.left_out(), self.ties.multi_image());
+        if 2 * left_out > ties {
+            invalid.push(format!(
+                "adjustment: {left_out} of {ties} tie points were rejected; ties.parquet says why"
+            ));
+        }
+        let rounds = [
+            ("before", self.pairs, limits.parallax_before_max_m),
+            ("after", self.adjusted_pairs, limits.parallax_after_max_m),
+        ];
+        let heights = self.adjusted.heights.iter();
+        let spread = heights.filter(|of| !(of.beyond_share() <= limits.height_outliers_max));
+        invalid.extend(spread.map(heights_beyond));
+        for (round, pairs, limit_m) in rounds {
+            for pair in pairs.iter().filter(|pair| !is_together(pair, limit_m)) {
+                invalid.push(format!(
+                    "tie points of {} and {} lie {:.1} m apart along the flight {round} the adjustment, expected at most \
+                     {limit_m} m",
+                    pair.images[0], pair.images[1], pair.along_track_parallax_m
+                ));
+            }
+        }
+        invalid.extend(self.corrected_too_far(limits));
+        invalid
+    }
+
+    /// What MOLA says against the heights of tie points.
+    fn heights_off(&self, limits: &LimitsConfig) -> Vec<String> {
+        let after_max_m = limits
+            .height_after_max_m
+            .max(HEIGHT_SIGMAS * self.adjusted_heights.mean_sigma_m);
+        let rounds = [
+            ("before", self.heights, limits.height_before_max_m),
+            ("after", self.adjusted_heights, after_max_m),
+        ];
+        let mut reasons = Vec::new();
+        for (round, check, limit_m) in rounds {
+            // Written so that NaN counts.
+            if check.surface.is_ok() && !(check.above_m.median.abs() <= limit_m) {
+                reasons.push(format!(
+                    "tie points lie {:+.1} m from the MOLA surface {round} the adjustment (median of {}), expected at most \
+                     {limit_m:.1} m",
+                    check.above_m.median, check.above_m.n
+                ));
+            }
+        }
+        if let Some(apart) = &self.heights.apart {
+            let sigmas = apart.mean_m.abs() / apart.sigma_m;
+            if !(sigmas <= limits.profiles_apart_max_sigma) {
+                reasons.push(format!(
+                    "profiles {} and {} contradict each other: at the tie points their surfaces lie {:.1} m apart on \
+                     average, {sigmas:.1} standard deviations, expected at most {}",
+                    apart.profiles[0],
+                    apart.profiles[1],
+                    apart.mean_m.abs(),
+                    limits.profiles_apart_max_sigma
+                ));
+            }
+        }
+        reasons
+    }
+
+    /// What a reader must know of heights that MOLA controls, but not well.
+    fn heights_loose(&self, limits: &LimitsConfig) -> Vec<String> {
+        let Some(heights) = &self.adjusted.heights else {
+            return Vec::new();
+        };
+        let mut remarks = Vec::new();
+        let [_, _, up_m] = heights.mean_sigma_m;
+        if !(up_m <= HEIGHT_LOOSE_M) {
+            remarks.push(format!(
+                "MOLA controls heights to ±{up_m:.0} m only: the tie points lie far from its shots, or mola_surface says that \
+                 little is known of it"
+            ));
+        }
+        let share = heights.beyond_share();
+        if share > HEIGHT_OUTLIERS_FEW && share <= limits.height_outliers_max {
+            remarks.push(heights_beyond(heights));
+        }
+        if heights.compared < HEIGHTS_FEW {
+            remarks.push(format!(
+                "{} tie points are too few for a search of blunders by their heights",
+                heights.compared
+            ));
+        }
+        remarks
+    }
+
+    /// Corrections of orientations that what was known of them does not allow.
+    fn corrected_too_far(&self, limits: &LimitsConfig) -> Vec<String> {
+        let largest = |image: &CorrectedImage| -> Option<(f64, usize)> {
+            let corrections = image.correction.iter().zip(&image.prior_sigmas).enumerate();
+            let known = corrections.filter(|(_, (_, sigma))| **sigma > 0.0 && sigma.is_finite());
+            let sigmas = known.map(|(index, (value, sigma))| ((value / sigma).abs(), index));
+            sigmas.max_by(|one, other| one.0.total_cmp(&other.0))
+        };
+        let far = self.adjusted.images.iter().filter_map(|image| {
+            let (sigmas, index) = largest(image)?;
+            (!(sigmas <= limits.correction_max_sigma)).then(|| {
+                format!(
+                    "image {}: the adjustment corrects its {} by {sigmas:.1} standard deviations, expected at most {}; check \
+                     its time, its kernels and pointing.ck_bias_s",
+                    image.id,
+                    CORRECTED[index / 3],
+                    limits.correction_max_sigma
+                )
+            })
+        });
+        far.collect()
+    }
+
+    /// Tie points that took part in the adjustment.
+    fn taken(&self) -> usize {
+        let points = self.adjusted.points.iter();
+        points.filter(|point| point.kind == PointKind::Tie).count()
+    }
+
+    /// Tie points that join images and yet took no part.
+    fn left_out(&self) -> usize {
+        self.ties.multi_image().saturating_sub(self.taken())
+    }
+
+    /// Whether the images of every pair place tie points together after the adjustment, and most of these took
+    /// part in it.
+    #[must_use]
+    pub fn images_agree(&self, limits: &LimitsConfig) -> bool {
+        let limit_m = limits.parallax_after_max_m;
+        2 * self.left_out() <= self.ties.multi_image()
+            && !self.adjusted_pairs.is_empty()
+            && self
+                .adjusted_pairs
+                .iter()
+                .all(|pair| is_together(pair, limit_m))
+    }
+
+    /// What a reader must weigh, one sentence each.
+    pub(super) fn remarks(&self, limits: &LimitsConfig) -> Vec<String> {
+        let mut remarks = Vec::new();
+        match &self.heights.surface {
+            Err(reason) => remarks.push(format!(
+                "heights of tie points are not controlled by MOLA ({reason}): they are known as well as orbit and attitude \
+                 beforehand, to some 500 m"
+            )),
+            Ok(_) => remarks.extend(self.heights_loose(limits)),
+        }
+        if self.adjusted.summary.model == AdjustmentModel::Published {
+            remarks.push(
+                "the adjustment follows the published model (adjustment.model): its heights are not controlled, and its \
+                 standard deviations are those of agreement between the images"
+                    .to_owned(),
+            );
+        }
+        let (left_out, ties) = (self.left_out(), self.ties.multi_image());
+        let share = limits.rejected_share_max;
+        if left_out as f64 > share * ties as f64 && 2 * left_out <= ties {
+            remarks.push(format!(
+                "{left_out} of {ties} tie points were rejected by the adjustment; ties.parquet says why"
+            ));
+        }
+        let taken = self.taken();
+        if taken < limits.ties_min as usize {
+            remarks.push(format!(
+                "only {taken} tie points took part in the adjustment, expected at least {}",
+                limits.ties_min
+            ));
+        }
+        let components = self.adjusted.summary.tie_components.into_iter();
+        for (found, axis) in components.zip(["along", "across"]) {
+            if !(found <= limits.sigma0_max) {
+                remarks.push(format!(
+                    "residuals of the tie points {axis} the track are {found:.2} times what adjustment.tie_sigma_px expects: \
+                     measurements are worse than configured, or a model does not hold"
+                ));
+            }
+        }
+        remarks
+    }
+}
+
+fn is_together(pair: &PairComparison, limit_m: f64) -> bool {
+    // Written so that NaN counts as apart.
+    pair.along_track_parallax_m.abs() <= limit_m
+}
+
+fn heights_beyond(heights: &HeightSummary) -> String {
+    format!(
+        "{} of {} tie points lie farther from the MOLA surface than their standard deviations allow: measurements that err \
+         across the track move heights by more than is stated; height_check.parquet has them",
+        heights.beyond_limit, heights.compared
+    )
+}
