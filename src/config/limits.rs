@@ -10,8 +10,8 @@ declare_table! {
     /// judges it first: heights by MOLA, then what images say of each other.
     pub struct LimitsConfig {
         /// Largest |median| height of tie points above the MOLA surface before the adjustment. A priori the height of a
-        /// pair is known to some 500 m; the default is three times that.
-        height_before_max_m: f64 = key(above_to(0.0, 1e6)).or(1500.0),
+        /// pair is known to some 500 m; the default is five times that.
+        height_before_max_m: f64 = key(above_to(0.0, 1e6)).or(2500.0),
         /// Largest |median| height of tie points above the MOLA surface after the adjustment, where it is not within
         /// three of its own standard deviations.
         height_after_max_m: f64 = key(above_to(0.0, 1e6)).or(10.0),

@@ -65,8 +65,6 @@ pub(super) enum Look {
         emission_deg: f64,
         /// Whether the camera looks east.
         east: bool,
-        /// Where the angle comes from.
-        source: &'static str,
     },
 }
 
@@ -171,12 +169,13 @@ pub(super) static SITES: [&Site; 3] = [&EOS_CHASMA, &GUSEV_CRATER, &ISIDIS];
 
 /// The six images in order of time.
 ///
-/// Ids, dates, lines and line periods are those of Shan et al. 2005, Table 2; of E04-01275 the table prints 7 424 header
-/// lines, of which the first-order RMSE in their Table 4 would be 9.7 m instead of the 11.45 m printed: 8 064 are
-/// flown, 7 424 delivered. Line spacing over line period is 3.04 km/s for the three nadir images and
-/// 3.39 to 3.42 km/s for the three that are held inertially. The emission angle of E04-01275 is theirs, those of
-/// the other two are not; E02-02016 has a summing of 2 there. Exposures are line periods divided by the summing. Time
-/// biases are the mean residuals of their Table 5 along the track, to half a line and with the other sign.
+/// Ids, dates, summing, lines, line periods and emission angles are those of Shan et al. 2005, Table 2. Of E04-01275 the
+/// table prints 7 424 header lines, of which the first-order RMSE in their Table 4 would be 9.7 m instead of the
+/// 11.45 m printed: 8 064 are flown, 7 424 delivered. The table does not say at which end of the ray the emission
+/// angle is; it is taken at the ground, as the archive has it. Line spacing over line period is 3.04 km/s for the
+/// three nadir images and 3.39 to 3.42 km/s for the three that are held inertially. Exposures are line periods
+/// divided by the summing. Time biases are the mean residuals of their Table 5 along the track, to half a line and with
+/// the other sign.
 pub(super) static IMAGES: [PlannedImage; 6] = [
     PlannedImage {
         id: "E02-00665",
@@ -204,9 +203,8 @@ pub(super) static IMAGES: [PlannedImage; 6] = [
         lines_delivered: 7_680,
         time_bias_lines: -34.5,
         look: Look::Roll {
-            emission_deg: 15.0,
+            emission_deg: 13.0,
             east: false,
-            source: "invented; Shan et al. 2005, Table 2, has 13.0",
         },
         pedr_number: 19_019,
         pedr_version: 'K',
@@ -223,9 +221,8 @@ pub(super) static IMAGES: [PlannedImage; 6] = [
         lines_delivered: 8_960,
         time_bias_lines: -23.5,
         look: Look::Roll {
-            emission_deg: 20.0,
+            emission_deg: 22.1,
             east: false,
-            source: "invented; Shan et al. 2005, Table 2, has 22.1",
         },
         pedr_number: 19_043,
         pedr_version: 'K',
@@ -236,8 +233,8 @@ pub(super) static IMAGES: [PlannedImage; 6] = [
         site: &ISIDIS,
         utc_start: "2001-03-23T04:17:44.58",
         sclk_start: "669788295:103",
-        exposure_ms: 0.482_067,
-        summing: 3,
+        exposure_ms: 0.7231,
+        summing: 2,
         lines_header: 8_064,
         lines_delivered: 7_680,
         time_bias_lines: 25.5,
@@ -274,7 +271,6 @@ pub(super) static IMAGES: [PlannedImage; 6] = [
         look: Look::Roll {
             emission_deg: 17.97,
             east: true,
-            source: "Shan et al. 2005, Table 2",
         },
         pedr_number: 19_802,
         pedr_version: 'L',

@@ -162,7 +162,7 @@ pub(super) fn planned_site<'a>(
 ) -> SiteFile<'a> {
     let is_demo = *errors == SceneErrors::demo();
     let ties_of_demo = || {
-        let note = "A line, the noise of these tie points, is 1.3 to 1.6 focal-plane pixels.";
+        let note = "A line, the noise of these tie points, is 1.1 to 1.6 focal-plane pixels.";
         (note.to_owned(), [1.6, 1.0])
     };
     let ties_with_noise = |noise_px: f64| {
@@ -329,9 +329,9 @@ truth.json   what really happened: biases, orientation of the images, footprints
              how far the rival orbits are off (the orbit `gsfc` is the true one), and for the tie points when and
              from where the images were truly taken; which errors were drawn from which sizes
 
-Image ids, times, line counts and line periods are those of Shan et al. 2005, Table 2. Terrain, orbits and
-attitudes are invented. So are the emission angles of E02-01301 and E02-01453 (Table 2 has 13.0 and 22.1 degrees)
-and the summing of E02-02016 (2 there).
+Image ids, times, summing, line counts, line periods and emission angles are those of Shan et al. 2005, Table 2; of
+E04-01275, for which it prints 7424 lines, 8064 are exposed, as their Table 4 demands. Terrain, orbits and
+attitudes are invented.
 The wide-angle images of gusev_context are invented.
 ";
 

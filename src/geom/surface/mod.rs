@@ -64,8 +64,8 @@ pub struct SurfaceOptions {
     pub shot_sigma_m: f64,
     /// Radial error that all shots of a profile share, metres.
     pub profile_sigma_m: f64,
-    /// Error in plan between the places that are asked for and the shots, common to all of them, metres; on a slope
-    /// it becomes one of height.
+    /// Error in plan between the places that are asked for and the shots on each axis, common to all of them, metres; on
+    /// a slope it becomes one of height.
     pub plan_sigma_m: f64,
     /// Roughness that is assumed at least, metres at 300 m, see [`Variogram`].
     pub roughness_min_m: f64,
@@ -212,7 +212,7 @@ impl LaserSurface {
         let at: Vec<Vector2<f64>> = places_m.iter().map(|place| self.plan.of(place)).collect();
         let weights = self.kriging.weights(&at);
         let slopes: Vec<Vector2<f64>> = at.iter().map(|place| self.slope(place)).collect();
-        let mut covariance_m2 = self.kriging.covariance_m2(&at, &weights);
+        let mut covariance_m2 = self.errors_m2(&at);
         let of_profiles = self.kriging.weights_of_profiles(&weights);
         covariance_m2 += of_profiles.tr_mul(&of_profiles) * self.options.profile_sigma_m.powi(2);
         let slopes_matrix = DMatrix::from_fn(2, at.len(), |axis, place| slopes[place][axis]);
@@ -229,6 +229,30 @@ impl LaserSurface {
             slopes,
             covariance_m2,
         }
+    }
+
+    /// Covariance of what the surface errs by where the places may truly be: an error in plan takes them away from a
+    /// profile, where the ground is known, as well as towards one.
+    fn errors_m2(&self, at: &[Vector2<f64>]) -> DMatrix<f64> {
+        let shift_m = std::f64::consts::SQRT_2 * self.options.plan_sigma_m;
+        let all_around = [
+            Vector2::new(shift_m, 0.0),
+            Vector2::new(-shift_m, 0.0),
+            Vector2::new(0.0, shift_m),
+            Vector2::new(0.0, -shift_m),
+        ];
+        let shifts = if shift_m > 0.0 {
+            &all_around[..]
+        } else {
+            &[Vector2::zeros()]
+        };
+        let mut covariance_m2 = DMatrix::zeros(at.len(), at.len());
+        for shift in shifts {
+            let shifted: Vec<Vector2<f64>> = at.iter().map(|place| place + shift).collect();
+            let weights = self.kriging.weights(&shifted);
+            covariance_m2 += self.kriging.covariance_m2(&shifted, &weights);
+        }
+        covariance_m2 / shifts.len() as f64
     }
 
     fn slope(&self, place: &Vector2<f64>) -> Vector2<f64> {
