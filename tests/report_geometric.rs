@@ -416,6 +416,33 @@ fn images_without_a_common_tie_point_are_said_to_be_so() {
 }
 
 #[test]
+fn tie_points_tell_the_misregistration_where_no_footprint_is_in_both_images() {
+    let mut site = Site::gusev();
+    // In one of the two states is enough: the two numbers of a sentence are of one kind.
+    let adjusted = site.adjusted_pairs[0].footprints.as_mut().unwrap();
+    adjusted.profiles.clear();
+    let (before_m, after_m) = (
+        site.pairs[0].along_track_parallax_m,
+        site.adjusted_pairs[0].along_track_parallax_m,
+    );
+    let page = site.page();
+    let words = lead(&page);
+    assert!(
+        words.contains("before the adjustment a tie point falls")
+            && words.contains(&format!("({before_m:.0} m) apart"))
+            && words.contains(&format!("({after_m:.1} m)")),
+        "{words}"
+    );
+    let before = site.pairs[0].footprints.as_mut().unwrap();
+    before.profiles.clear();
+    before.outside = 1;
+    let page = site.page();
+    let text = section(&page, SECTIONS[0]);
+    assert!(text.contains("No footprint counts here: tie points alone tell"));
+    assert!(text.contains("1 footprint within the lines of both images lies outside one of them"));
+}
+
+#[test]
 fn a_site_without_tie_points_has_none_of_it() {
     let site = Site::gusev();
     let page = site

@@ -8,6 +8,8 @@
 )]
 
 mod common;
+#[path = "truth/misregistration.rs"]
+mod misregistration;
 
 use std::{
     collections::BTreeMap,

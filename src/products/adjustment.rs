@@ -57,7 +57,9 @@ const DEFINITIONS: [(&str, &str); 10] = [
     (
         "footprints",
         "where tie points say that a footprint of the first image lies in the second, minus where it is projected: \
-         lines and samples of the second image, metres on the ground, and distances of successive footprints",
+         lines and samples of the second image, metres on the ground, and distances of successive footprints. Only \
+         footprints count that both images show, on a line between those of the tie points; outside are those within the \
+         lines of both images that lie outside one of them",
     ),
     (
         "budget",
@@ -196,6 +198,7 @@ struct FootprintsDocument<'a> {
     tie_lines: &'a Summary,
     tie_samples: &'a Summary,
     profiles: Vec<ProfileDocument<'a>>,
+    outside: u32,
 }
 
 #[derive(Serialize, JsonSchema)]
@@ -371,6 +374,7 @@ fn pair(pair: &PairComparison) -> PairDocument<'_> {
             tie_lines: &by_ties.tie_lines,
             tie_samples: &by_ties.tie_samples,
             profiles: by_ties.profiles.iter().map(profile).collect(),
+            outside: by_ties.outside,
         }),
         budget: pair.budget.as_ref().ok(),
         no_budget_because: pair.budget.as_ref().err().map(String::as_str),

@@ -14,7 +14,7 @@ use crate::{
     products::{GeometricProducts, SiteProducts},
     stages::{
         adjust::{PointKind, RejectionReason},
-        compare_pairs::{PairComparison, ProfileByTies},
+        compare_pairs::{FootprintsByTies, PairComparison, ProfileByTies},
         intersect::TieRejection,
     },
     units::RADIANS_PER_DEGREE,
@@ -75,7 +75,7 @@ impl<'a> BeforeAfter<'a> {
 
     /// The pair whose images disagree most before the adjustment.
     pub(super) fn worst(pairs: &[Self]) -> Option<&Self> {
-        let size = |pair: &&Self| apart(pair.before).metres;
+        let size = |pair: &&Self| pair.apart(pair.before).metres;
         pairs.iter().max_by(|a, b| size(a).total_cmp(&size(b)))
     }
 
@@ -92,8 +92,11 @@ impl<'a> BeforeAfter<'a> {
 
     /// How far apart the two images place the same thing, before and after.
     pub(super) fn sentence(&self) -> String {
-        let (before, after) = (apart(self.before), self.after.map(apart));
-        let what = if before.footprints {
+        let (before, after) = (
+            self.apart(self.before),
+            self.after.map(|after| self.apart(after)),
+        );
+        let what = if self.by_footprints() {
             "a footprint falls"
         } else {
             "a tie point falls"
@@ -115,6 +118,22 @@ impl<'a> BeforeAfter<'a> {
             before.in_words()
         )
     }
+
+    /// Whether footprints tell how far apart the images are, before and after alike; otherwise tie points do.
+    fn by_footprints(&self) -> bool {
+        self.states()
+            .all(|(_, pair)| footprints_apart_m(pair).is_some())
+    }
+
+    /// How far apart the images of `pair`, one of the states, place the same thing.
+    fn apart(&self, pair: &PairComparison) -> Apart {
+        let by_footprints_m = footprints_apart_m(pair).filter(|_| self.by_footprints());
+        let metres = by_footprints_m.unwrap_or(pair.along_track_parallax_m);
+        Apart {
+            metres,
+            spacings: pair.mola_spacing_m.map(|spacing_m| metres / spacing_m),
+        }
+    }
 }
 
 /// How far apart along the flight two images place the same thing.
@@ -123,8 +142,6 @@ struct Apart {
     metres: f64,
     /// The same in distances of successive footprints.
     spacings: Option<f64>,
-    /// Whether footprints tell it; otherwise tie points do.
-    footprints: bool,
 }
 
 impl Apart {
@@ -140,25 +157,15 @@ impl Apart {
     }
 }
 
-/// The mean over all footprints that both images of `pair` show; the tie points' where there are none.
-fn apart(pair: &PairComparison) -> Apart {
+/// Mean size over all footprints that both images of `pair` show, metres; `None` where there are none.
+fn footprints_apart_m(pair: &PairComparison) -> Option<f64> {
     let profiles = pair.footprints.iter().flat_map(|found| &found.profiles);
     let (mut shots, mut metres) = (0.0, 0.0);
     for profile in profiles {
         shots += f64::from(profile.lines.n);
         metres += f64::from(profile.lines.n) * profile.along_m.abs();
     }
-    let footprints = shots > 0.0;
-    let metres = if footprints {
-        metres / shots
-    } else {
-        pair.along_track_parallax_m
-    };
-    Apart {
-        metres,
-        spacings: pair.mola_spacing_m.map(|spacing_m| metres / spacing_m),
-        footprints,
-    }
+    (shots > 0.0).then(|| metres / shots)
 }
 
 /// How many tie points there are, and which say nothing.
@@ -374,6 +381,7 @@ fn footprints(pairs: &[BeforeAfter]) -> String {
             label(found.tie_lines.standard_deviation, 2),
             label(found.tie_samples.standard_deviation, 2)
         ));
+        notes += &paragraph(&not_counted(found));
         if let Some(spacing_m) = pair.before.mola_spacing_m {
             notes += &paragraph(&format!(
                 "One MOLA spacing is {} m here.",
@@ -385,6 +393,21 @@ fn footprints(pairs: &[BeforeAfter]) -> String {
         "Samples also hold the parallax of relief, which no transformation of the images takes away.",
     );
     table.finish() + &notes
+}
+
+/// Which footprints are not in the table.
+fn not_counted(found: &FootprintsByTies) -> String {
+    let none = if found.profiles.is_empty() {
+        "No footprint counts here: tie points alone tell how far apart the images are. "
+    } else {
+        ""
+    };
+    format!(
+        "{none}A footprint counts where both images show it, between the first and the last line of the tie points; {} \
+         within the lines of both images {} outside one of them before the adjustment.",
+        counted(found.outside as usize, "footprint"),
+        if found.outside == 1 { "lies" } else { "lie" }
+    )
 }
 
 fn profile_cells(pair: &str, before: &ProfileByTies, after: Option<&ProfileByTies>) -> Vec<Cell> {

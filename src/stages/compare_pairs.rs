@@ -71,8 +71,10 @@ pub struct FootprintsByTies {
     pub tie_lines: Summary,
     /// What it leaves of the tie points' samples.
     pub tie_samples: Summary,
-    /// Profiles with footprints within the lines of both images.
+    /// Profiles with footprints that both images show.
     pub profiles: Vec<ProfileByTies>,
+    /// Footprints within the lines of both images that one of them does not show: they do not count.
+    pub outside: u32,
 }
 
 /// One profile of a pair.
@@ -117,6 +119,7 @@ stage_inputs! {
 
 impl Stage for ComparePairs<'_> {
     const NAME: &'static str = "compare_pairs";
+    const METHOD: u32 = 2;
     type Output = Vec<PairComparison>;
     stage_inputs!(fingerprint);
 
@@ -297,18 +300,23 @@ fn footprints_by_ties(
     let fit = ImageToImage::through(&pairs)?;
     let places = registrations.map(places);
     let mut compared = Vec::new();
+    let mut outside = 0;
     for ((index, profile), spacing_m) in (0_u32..).zip(profiles).zip(spacings) {
-        let seen: Vec<Pair> = profile
-            .rows
+        let in_both = profile.rows.iter().filter_map(|row| {
+            let shot = (index, *row);
+            Some([places[0].get(&shot)?, places[1].get(&shot)?])
+        });
+        let (shown, not_shown): (Vec<[&Place; 2]>, Vec<_>) =
+            in_both.partition(|both| both.iter().all(|place| place.inside));
+        outside += not_shown.len();
+        let shown: Vec<Pair> = shown
             .iter()
-            .filter_map(|row| {
-                Some(Pair {
-                    first: *places[0].get(&(index, *row))?,
-                    second: *places[1].get(&(index, *row))?,
-                })
+            .map(|[first, second]| Pair {
+                first: first.at,
+                second: second.at,
             })
             .collect();
-        let found = fit.misregistration(&seen);
+        let found = fit.misregistration(&shown);
         if found.lines.n == 0 {
             continue;
         }
@@ -330,6 +338,7 @@ fn footprints_by_ties(
         tie_lines: fit.tie_lines,
         tie_samples: fit.tie_samples,
         profiles: compared,
+        outside: count(outside),
     })
 }
 
@@ -345,14 +354,26 @@ fn tie_pair(tie: &TiePoint, pair: [usize; 2]) -> Option<Pair> {
     })
 }
 
-/// Line and sample of footprints within the image's lines, by profile and row.
-fn places(registration: &ImageRegistration) -> BTreeMap<(u32, u32), [f64; 2]> {
+/// Where an image has a footprint that lies within its lines.
+struct Place {
+    /// Line and sample.
+    at: [f64; 2],
+    /// Whether the delivered image shows it.
+    inside: bool,
+}
+
+/// Footprints within the image's lines, by profile and row.
+fn places(registration: &ImageRegistration) -> BTreeMap<(u32, u32), Place> {
     let points = &registration.points;
     (0..points.len())
         .filter(|index| !points.extrapolated[*index])
         .map(|index| {
             let shot = (points.profile[index], points.row[index]);
-            (shot, [points.line[index], points.sample[index]])
+            let place = Place {
+                at: [points.line[index], points.sample[index]],
+                inside: points.inside[index],
+            };
+            (shot, place)
         })
         .collect()
 }
