@@ -7,6 +7,8 @@
     reason = "helpers of tests may fail loudly"
 )]
 
+#[path = "truth/across.rs"]
+mod across;
 mod common;
 #[path = "truth/misregistration.rs"]
 mod misregistration;
@@ -54,7 +56,15 @@ struct Judged {
 
 fn table(path: &Path) -> RecordBatch {
     let builder = ParquetRecordBatchReaderBuilder::try_new(File::open(path).unwrap()).unwrap();
-    builder.build().unwrap().next().unwrap().unwrap()
+    // All rows at once.
+    let reader = builder.with_batch_size(1 << 20).build();
+    reader.unwrap().next().unwrap().unwrap()
+}
+
+/// A column of texts.
+fn texts(table: &RecordBatch, name: &str) -> Vec<String> {
+    let column = table.column_by_name(name).unwrap().as_string::<i32>();
+    column.iter().map(|text| text.unwrap().to_owned()).collect()
 }
 
 fn vector(value: &Value) -> Vector3<f64> {
@@ -137,6 +147,30 @@ impl Judged {
         before_m.sort_by(f64::total_cmp);
         judged.before_m = before_m[before_m.len() / 2];
         judged
+    }
+
+    /// Mean error of adjusted heights, metres, whatever is stated of them.
+    fn height_error_m(mission: &Path, out: &Path, site: &str) -> f64 {
+        let truth = json(&mission.join("truth.json"));
+        let mut sites = truth["ties"].as_array().unwrap().iter();
+        let own = sites.find(|of| of["site"] == site).unwrap();
+        let found = table(&out.join(site).join("ties.parquet"));
+        let names = texts(&found, "tie");
+        let axes = ["adjusted_x_m", "adjusted_y_m", "adjusted_z_m"].map(|axis| {
+            let column = found.column_by_name(axis).unwrap();
+            column.as_primitive::<Float64Type>().clone()
+        });
+        let errors = own["ties"].as_array().unwrap().iter().filter_map(|tie| {
+            let row = names.iter().position(|name| tie["id"] == name.as_str())?;
+            let is_good = tie["blunder"].is_null() && !axes[0].is_null(row);
+            is_good.then(|| {
+                let true_m = vector(&tie["ground_iau2000_m"]);
+                let adjusted_m = Vector3::from_fn(|axis, _| axes[axis].value(row));
+                adjusted_m.norm() - true_m.norm()
+            })
+        });
+        let errors: Vec<f64> = errors.collect();
+        errors.iter().sum::<f64>() / errors.len() as f64
     }
 
     fn mean_m(&self) -> Vector3<f64> {

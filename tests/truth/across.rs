@@ -1,0 +1,100 @@
+//! Measurements that err across the track: no residual of a pair shows them, and heights take up the error.
+
+use super::{
+    Judged,
+    common::{case::Case, mission::mission},
+};
+
+/// The tie points' table with each row's sample moved as `wrong` says, by the number of its tie point and its image.
+fn moved(table: &str, wrong: impl Fn(usize, &str) -> f64) -> String {
+    let mut lines = table.lines();
+    let mut text = lines.next().unwrap().to_owned();
+    for (index, row) in lines.enumerate() {
+        let [tie, image, sample, line] = row.split(',').collect::<Vec<_>>()[..] else {
+            panic!("{row}");
+        };
+        let sample: f64 = sample.parse().unwrap();
+        let sample = sample + wrong(index / 2, image);
+        text += &format!("\n{tie},{image},{sample},{line}");
+    }
+    text
+}
+
+fn ties(case: &Case) -> String {
+    String::from_utf8(case.read("ties/isidis.csv")).unwrap()
+}
+
+#[test]
+fn many_errors_of_one_sign_are_found_or_make_the_site_invalid() {
+    for (one_in, wrong_px) in [(2, 20.0), (2, 10.0), (3, 10.0)] {
+        let case = Case::pair();
+        let wrong = |tie: usize, image: &str| {
+            if image == "E02-02016" && tie.is_multiple_of(one_in) {
+                wrong_px
+            } else {
+                0.0
+            }
+        };
+        case.write("ties/isidis.csv", moved(&ties(&case), wrong));
+        let outcome = case.outcome(case.run());
+        let error_m = Judged::height_error_m(&mission(), &case.path("out"), "isidis");
+        println!("one in {one_in} by {wrong_px} px: {error_m:.1} m; {outcome}");
+        let is_invalid = outcome.starts_with("exit 5\nisidis: INVALID");
+        // Three standard deviations of the mean height of this site.
+        assert!(is_invalid || error_m.abs() < 6.0, "{error_m}: {outcome}");
+    }
+}
+
+#[test]
+fn blunders_of_height_are_found_among_more_ties_than_are_observed() {
+    let case = Case::pair();
+    let table = ties(&case);
+    // Four times 154 tie points, each copy three lines further along so that none is a copy of another.
+    let (head, rows) = table.split_once('\n').unwrap();
+    let mut many = head.to_owned();
+    for copy in 0..4 {
+        for row in rows.lines() {
+            let [tie, image, sample, line] = row.split(',').collect::<Vec<_>>()[..] else {
+                panic!("{row}");
+            };
+            let line: f64 = line.parse::<f64>().unwrap() + f64::from(3 * copy);
+            many += &format!("\n{tie}-{copy},{image},{sample},{line}");
+        }
+    }
+    let one_in_forty = |tie: usize, image: &str| {
+        if image == "E02-02016" && tie % 40 == 7 {
+            60.0
+        } else {
+            0.0
+        }
+    };
+    case.write("ties/isidis.csv", moved(&many, one_in_forty));
+    case.stages_run();
+    let found = super::table(&case.path("out/isidis/ties.parquet"));
+    let names = super::texts(&found, "tie");
+    let reasons = super::texts(&found, "rejected");
+    let wrong: Vec<&String> = names.iter().step_by(2).skip(7).step_by(40).collect();
+    assert_eq!(wrong.len(), 16);
+    for name in wrong {
+        let row = names.iter().position(|other| other == name).unwrap();
+        assert!(!reasons[row].is_empty(), "{name} was kept");
+    }
+}
+
+#[test]
+fn the_published_model_is_judged_by_mola() {
+    let case = Case::pair();
+    case.replace(
+        "site.toml",
+        "tie_sigma_px",
+        "model = \"published\"\ntie_sigma_px",
+    );
+    let outcome = case.outcome(case.run());
+    assert!(outcome.starts_with("exit 5\nisidis: INVALID"), "{outcome}");
+    let truth_m = Judged::height_error_m(&mission(), &case.path("out"), "isidis");
+    let words = outcome.split("tie points lie ").nth(1).unwrap();
+    let stated_m: f64 = words.split(" m from").next().unwrap().parse().unwrap();
+    // MOLA states the error that truth knows, to the errors of its surface: 2 m, four times.
+    assert!((stated_m - truth_m).abs() < 8.0, "{stated_m} {truth_m}");
+    assert!(truth_m.abs() > 20.0, "{truth_m}");
+}
