@@ -1,5 +1,7 @@
 //! Measurements that err across the track: no residual of a pair shows them, and heights take up the error.
 
+use std::fmt::Write as _;
+
 use super::{
     Judged,
     common::{case::Case, mission::mission},
@@ -15,7 +17,7 @@ fn moved(table: &str, wrong: impl Fn(usize, &str) -> f64) -> String {
         };
         let sample: f64 = sample.parse().unwrap();
         let sample = sample + wrong(index / 2, image);
-        text += &format!("\n{tie},{image},{sample},{line}");
+        write!(text, "\n{tie},{image},{sample},{line}").unwrap();
     }
     text
 }
@@ -58,7 +60,7 @@ fn blunders_of_height_are_found_among_more_ties_than_are_observed() {
                 panic!("{row}");
             };
             let line: f64 = line.parse::<f64>().unwrap() + f64::from(3 * copy);
-            many += &format!("\n{tie}-{copy},{image},{sample},{line}");
+            write!(many, "\n{tie}-{copy},{image},{sample},{line}").unwrap();
         }
     }
     let one_in_forty = |tie: usize, image: &str| {
