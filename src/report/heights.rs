@@ -19,10 +19,6 @@ use crate::{
 
 /// Tie points that a plot shows.
 const POINTS_SHOWN: usize = 2_000;
-/// What is known of the height of a pair beforehand, metres: an error of 0.4 mrad of the roll of each image.
-const A_PRIORI_HEIGHT_M: f64 = 500.0;
-/// Errors of the MOLA frame in plan, metres, which come on top of what images say against it.
-const MOLA_PLAN_M: f64 = 100.0;
 
 pub(super) const SECTION: Section = Section {
     title: "Accuracy, and agreement with MOLA",
@@ -119,7 +115,7 @@ fn statements(geometric: &GeometricProducts, adjustment: &AdjustmentProducts) ->
         ],
         [
             "absolute, height".to_owned(),
-            format!("±{A_PRIORI_HEIGHT_M} m, a priori"),
+            "a priori: what is known of orbit and attitude".to_owned(),
             height,
             "standard deviation of what all tie points share, and of single ones".to_owned(),
         ],
@@ -152,7 +148,7 @@ const fn agreement_says(adjustment: &AdjustmentProducts) -> &'static str {
     if adjustment.adjusted.heights.is_some() {
         "before: an independent test; after: how well the adjustment meets what controls it"
     } else {
-        "an independent test of heights: MOLA took no part"
+        "a test of heights: the MOLA surface did not control them"
     }
 }
 
@@ -160,19 +156,26 @@ const fn agreement_says(adjustment: &AdjustmentProducts) -> &'static str {
 fn absolute(geometric: &GeometricProducts, adjustment: &AdjustmentProducts) -> [String; 2] {
     let summary = &adjustment.adjusted.summary;
     let Some(heights) = &adjustment.adjusted.heights else {
-        let reason = if summary.model == AdjustmentModel::Published {
-            "not determined: the published model does not control heights"
+        let statements = if summary.model == AdjustmentModel::Published {
+            [
+                "not determined: the published model does not control heights",
+                "not determined",
+            ]
         } else {
-            "a priori, ±500 m: no surface controls heights"
+            [
+                "a priori: no surface controls heights",
+                "a priori; ties.parquet has the standard deviations of single tie points",
+            ]
         };
-        return [reason.to_owned(), "not determined".to_owned()];
+        return statements.map(str::to_owned);
     };
     let single = single_sigmas_m(adjustment);
     let [east_m, north_m, up_m] = heights.mean_sigma_m;
     let pairs = BeforeAfter::all(geometric);
     let worst = BeforeAfter::worst(&pairs);
     let half_m = worst.map_or(0.0, |pair| 0.5 * pair.before.along_track_parallax_m.abs());
-    let half = if half_m > MOLA_PLAN_M {
+    // What is stated holds only if errors of both images are as likely; half of their difference is no less open.
+    let half = if half_m > east_m.max(north_m) {
         format!(
             "; half of what the images disagree by along the flight, {} m, is open: which of them is right is not known",
             label(half_m, 0)

@@ -11,6 +11,14 @@ use crate::geom::{pushbroom::ExteriorOrientation, surface::LaserSurface};
 /// Points whose surface is predicted together; the covariance between them is not used.
 const TOGETHER: usize = 64;
 
+impl HeightResidual {
+    /// Standard deviation of the height against the surface by the point's own rays, metres.
+    #[must_use]
+    pub fn sigma_m(&self) -> f64 {
+        self.surface_sigma_m.hypot(self.ray_sigma_m)
+    }
+}
+
 /// Every compared point of `control` that is determined, at `state`.
 pub(super) fn compared<M: ExteriorOrientation>(
     layout: &Layout<'_, M>,

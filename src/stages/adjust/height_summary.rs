@@ -74,16 +74,15 @@ pub(super) fn heights<M>(
         roughness_m: control.surface.variogram().roughness_m,
         above_m: Summary::of(&above_m),
         compared: adjustment.compared.len(),
-        beyond_limit: beyond_limit(adjustment),
+        beyond_limit: beyond_limit(&adjustment.compared),
         mean_sigma_m: [0, 1, 2].map(|axis| (factor * mean_m2[(axis, axis)]).sqrt()),
     })
 }
 
-/// Compared heights beyond the limit of the test.
-pub(super) fn beyond_limit(adjustment: &Adjustment) -> usize {
-    let beyond = |height: &&HeightResidual| {
-        let sigma_m = height.surface_sigma_m.hypot(height.ray_sigma_m);
-        !(height.above_m.abs() <= BAARDA_LIMIT * sigma_m)
-    };
-    adjustment.compared.iter().filter(beyond).count()
+/// Heights beyond the limit of the test.
+pub(super) fn beyond_limit(heights: &[HeightResidual]) -> usize {
+    // Written so that NaN counts.
+    let beyond =
+        |height: &&HeightResidual| !(height.above_m.abs() <= BAARDA_LIMIT * height.sigma_m());
+    heights.iter().filter(beyond).count()
 }

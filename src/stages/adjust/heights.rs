@@ -7,7 +7,10 @@
 use nalgebra::{Matrix3, Vector3};
 
 use super::network::Assembled;
-use crate::geom::bundle::{Adjustment, HeightResidual};
+use crate::geom::{
+    bundle::{Adjustment, HeightResidual},
+    robust::RobustWeight,
+};
 
 /// Neighbours within this share the ground, metres.
 const NEIGHBOUR_M: f64 = 700.0;
@@ -15,12 +18,14 @@ const NEIGHBOUR_M: f64 = 700.0;
 const NEIGHBOUR_SHARE: f64 = 0.4;
 /// Ground that strays farther than this from between the shots is no crater, metres.
 const CRATER_MAX_M: f64 = 150.0;
-/// Normalised residual at which the weight of a height in the bend is a half.
-const CAUCHY: f64 = 2.385;
+/// Weights of heights in the bend.
+const WEIGHT: RobustWeight = RobustWeight::Cauchy {
+    limit: RobustWeight::CAUCHY_LIMIT,
+};
 /// Rounds of the robust fit of the bend.
 const BEND_ROUNDS: u32 = 30;
 /// Fewer heights than this show no bend and no blunder.
-const HEIGHTS_MIN: usize = 10;
+pub const HEIGHTS_MIN: usize = 10;
 
 /// A tie point whose height is a blunder.
 pub(super) struct HeightBlunder {
@@ -42,11 +47,9 @@ pub(super) fn height_blunders<M>(
     if heights.len() < HEIGHTS_MIN {
         return Vec::new();
     }
-    let along: Vec<f64> = heights
-        .iter()
-        .map(|height| place(assembled, height))
-        .collect();
-    let sigmas_m: Vec<f64> = heights.iter().map(sigma_m).collect();
+    let places = places(assembled);
+    let along: Vec<f64> = heights.iter().map(|height| places[height.point]).collect();
+    let sigmas_m: Vec<f64> = heights.iter().map(HeightResidual::sigma_m).collect();
     let above_m = beyond_bend(heights, &along, &sigmas_m);
     let grounds_m: Vec<Option<Vector3<f64>>> = heights
         .iter()
@@ -73,8 +76,8 @@ pub(super) fn height_blunders<M>(
     };
     let blunders = (0..heights.len()).filter(|index| {
         let residual_m = above_m[*index].abs();
-        let is_ground = residual_m <= CRATER_MAX_M && has_neighbour(*index);
-        residual_m > limit * sigmas_m[*index] && !is_ground
+        let stands_out = residual_m > limit * sigmas_m[*index];
+        stands_out && !(residual_m <= CRATER_MAX_M && has_neighbour(*index))
     });
     blunders
         .map(|index| HeightBlunder {
@@ -85,18 +88,13 @@ pub(super) fn height_blunders<M>(
         .collect()
 }
 
-/// Standard deviation of a height by its own rays against the surface, metres.
-fn sigma_m(height: &HeightResidual) -> f64 {
-    height.surface_sigma_m.hypot(height.ray_sigma_m)
-}
-
-/// Where a point lies along the flight, half its first image being 1.
-fn place<M>(assembled: &Assembled<M>, height: &HeightResidual) -> f64 {
-    let mut views = assembled.network.views.iter();
-    let first = views.find(|view| view.point == height.point);
-    first.map_or(0.0, |view| {
-        view.x_lines / assembled.network.images[view.image].half_lines
-    })
+/// Where each point lies along the flight, half its first image being 1; 0 for one without a view.
+fn places<M>(assembled: &Assembled<M>) -> Vec<f64> {
+    let mut places = vec![0.0; assembled.points.len()];
+    for view in assembled.network.views.iter().rev() {
+        places[view.point] = view.x_lines / assembled.network.images[view.image].half_lines;
+    }
+    places
 }
 
 /// Heights without a robust parabola along the flight.
@@ -118,7 +116,7 @@ fn beyond_bend(heights: &[HeightResidual], along: &[f64], sigmas_m: &[f64]) -> V
             .zip(sigmas_m)
             .zip(heights.iter().zip(along));
         for ((residual_m, sigma_m), (height, t)) in entries {
-            let weight = sigma_m.powi(-2) / (1.0 + (residual_m / (sigma_m * CAUCHY)).powi(2));
+            let weight = sigma_m.powi(-2) * WEIGHT.factor(residual_m / sigma_m);
             normal += weight * powers(*t) * powers(*t).transpose();
             right += weight * height.above_m * powers(*t);
         }

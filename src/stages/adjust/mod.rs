@@ -25,6 +25,7 @@ pub use adjusted::{
 pub use components::WORSE_THAN_CONFIGURED;
 pub use error::AdjustError;
 pub use height_summary::HeightSummary;
+pub use heights::HEIGHTS_MIN;
 pub use input::{AdjustImage, LaserShot, LaserShots, ShotRange, orientation_sigmas};
 pub use points::{PointKind, RejectedPoint, RejectionReason};
 pub use prepare::{Candidate, prepare_adjustment};

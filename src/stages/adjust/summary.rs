@@ -229,7 +229,7 @@ fn of_heights(adjustment: &Adjustment) -> Option<TypeSummary> {
         redundancy,
         weighted_squares: adjustment.height_squares,
         variance_component: component(adjustment.height_squares, redundancy),
-        beyond_limit: beyond_limit(adjustment),
+        beyond_limit: beyond_limit(&adjustment.heights),
     })
 }
 

@@ -4,8 +4,9 @@ use super::{AdjustmentEvidence, JudgedImage};
 use crate::{
     config::LimitsConfig,
     footprints::AdjustmentModel,
+    geom::bundle::Unknown,
     stages::{
-        adjust::{CorrectedImage, HeightSummary, PointKind},
+        adjust::{CorrectedImage, HEIGHTS_MIN, HeightSummary, PointKind},
         compare_pairs::PairComparison,
     },
 };
@@ -14,19 +15,8 @@ use crate::{
 const HEIGHT_LOOSE_M: f64 = 20.0;
 /// Craters between the profiles make a smaller share than this of the tie points stand out.
 const HEIGHT_OUTLIERS_FEW: f64 = 0.03;
-/// Fewer tie points than this show no blunder by their heights.
-const HEIGHTS_FEW: usize = 10;
 /// A mean height within this many of its standard deviations is no contradiction.
 const HEIGHT_SIGMAS: f64 = 3.0;
-/// Names of the quantities that an orientation is corrected by.
-const CORRECTED: [&str; 6] = [
-    "position along X",
-    "position along Y",
-    "position along Z",
-    "rotation about the camera's x axis",
-    "rotation about the camera's y axis",
-    "rotation about the camera's z axis",
-];
 
 impl AdjustmentEvidence<'_> {
     /// Why the adjusted orientation is invalid, one sentence per reason: what MOLA says first, then what images say of
@@ -121,7 +111,7 @@ impl AdjustmentEvidence<'_> {
         if share > HEIGHT_OUTLIERS_FEW && share <= limits.height_outliers_max {
             remarks.push(heights_beyond(heights));
         }
-        if heights.compared < HEIGHTS_FEW {
+        if heights.compared < HEIGHTS_MIN {
             remarks.push(format!(
                 "{} tie points are too few for a search of blunders by their heights",
                 heights.compared
@@ -139,13 +129,17 @@ impl AdjustmentEvidence<'_> {
             sigmas.max_by(|one, other| one.0.total_cmp(&other.0))
         };
         let far = self.adjusted.images.iter().filter_map(|image| {
-            let (sigmas, index) = largest(image)?;
+            let (sigmas, coefficient) = largest(image)?;
+            let unknown = Unknown::Orientation {
+                image: 0,
+                coefficient,
+            };
             (!(sigmas <= limits.correction_max_sigma)).then(|| {
                 format!(
                     "image {}: the adjustment corrects its {} by {sigmas:.1} standard deviations, expected at most {}; check \
                      its time, its kernels and pointing.ck_bias_s",
                     image.id,
-                    CORRECTED[index / 3],
+                    unknown.quantity(),
                     limits.correction_max_sigma
                 )
             })
@@ -183,7 +177,7 @@ impl AdjustmentEvidence<'_> {
         match &self.heights.surface {
             Err(reason) => remarks.push(format!(
                 "heights of tie points are not controlled by MOLA ({reason}): they are known as well as orbit and attitude \
-                 beforehand, to some 500 m"
+                 beforehand"
             )),
             Ok(_) => remarks.extend(self.heights_loose(limits)),
         }
