@@ -85,10 +85,13 @@
 
 mod check;
 mod compared_heights;
+mod factor;
+mod groups;
 mod heights;
 mod layout;
 mod point_rows;
 mod quality;
+mod quasi_newton;
 mod reduce;
 mod reduced_heights;
 mod rows;
@@ -353,7 +356,8 @@ pub struct Adjustment {
     pub weighted_squares: f64,
     /// The weighted sum before each step and after the last.
     pub history: Vec<f64>,
-    /// Pairs of unknowns that are correlated by more than 0.95, with the coefficient.
+    /// Pairs of unknowns, of one image or of images that share points, that are correlated by more than 0.95, with the
+    /// coefficient.
     pub correlated: Vec<(Unknown, Unknown, f64)>,
 }
 
