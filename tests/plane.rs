@@ -1,6 +1,10 @@
 //! Plane triangulation against synthetic nets whose truth is known, after Arthur & McMacken 1977.
 
-#![allow(clippy::unwrap_used, reason = "tests may fail loudly")]
+#![allow(
+    clippy::unwrap_used,
+    clippy::cast_possible_truncation,
+    reason = "tests may fail loudly, and seeds are small"
+)]
 
 #[path = "plane/blunders.rs"]
 mod blunders;
@@ -83,7 +87,7 @@ fn exact_data_give_the_truth() {
                 .map(|of| of.unwrap().norm())
         ) < limit_m
     );
-    assert!(largest(errors(&scene, &solution.places).map(|of| of.norm())) < limit_m);
+    assert!(largest(errors(&scene, &solution.places).map(Place::norm)) < limit_m);
     for (found, truth) in solution.pictures.iter().zip(&scene.pictures) {
         // 1e-9 of the scale; the shift is extrapolated over a few thousand units.
         assert!((found.turn - truth.turn).norm() < 1e-9 * truth.turn.norm());

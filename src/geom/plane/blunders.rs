@@ -3,13 +3,15 @@
 use super::{
     Place,
     bricks::{Figure, brick},
-    net::{Net, PlaneError},
+    net::{Net, Part, PlaneError},
 };
 
 /// Robust standard deviations beyond which a deviation is flagged.
 pub const FLAG_LIMIT: f64 = 3.5;
 /// Factor that makes the median of normal values without their signs their standard deviation.
 const NORMAL_MEDIAN: f64 = 1.4826;
+/// Deviations below this share of a figure's extent are rounding.
+const ROUNDING: f64 = 1e-9;
 /// A removal stands when it takes more than this share from the root mean square.
 const DROP: f64 = 0.30;
 /// Measurements that are removed together where one alone takes too little: blunders of one size hide each other.
@@ -35,10 +37,8 @@ pub struct Cleaned {
     pub figure: Figure,
     /// What was removed, in order.
     pub blunders: Vec<Blunder>,
-    /// The net without what was removed; its measurements are those of the former one that are `kept`.
-    pub net: Net,
-    /// Indices of the measurements of `net` in the net that was given.
-    pub kept: Vec<usize>,
+    /// Indices of all measurements that are left out.
+    pub removed: Vec<usize>,
 }
 
 /// Standard deviation of a coordinate by the median of all of them without their signs; 0 for none.
@@ -62,42 +62,53 @@ pub fn robust_sigma(deviations: impl Iterator<Item = Place>) -> f64 {
 /// # Errors
 /// Those of [`brick`], for the net as it is given.
 pub fn clean(net: &Net, pictures: &[usize]) -> Result<Cleaned, PlaneError> {
+    let Part {
+        net: part,
+        points,
+        measurements,
+    } = net.part(pictures);
+    let all: Vec<usize> = (0..pictures.len()).collect();
+    let figure = brick(&part, &all).map_err(|error| error.of_part(&points, pictures))?;
     let mut best = State {
-        figure: brick(net, pictures)?,
+        figure,
         blunders: Vec::new(),
-        kept: (0..net.measurements.len()).collect(),
-        net: net.clone(),
+        kept: measurements.clone(),
+        net: part,
     };
     loop {
         let before = best.rms();
         let (mut trial, mut accepted) = (None, None);
         for _ in 0..TOGETHER {
-            let Some(next) = trial.as_ref().unwrap_or(&best).without_the_worst(pictures) else {
+            let Some(worse) = trial.as_ref().unwrap_or(&best).without_the_worst(&all) else {
                 break;
             };
-            if next.rms() < (1.0 - DROP) * before {
-                accepted = Some(next);
+            if worse.rms() < (1.0 - DROP) * before {
+                accepted = Some(worse);
                 break;
             }
-            trial = Some(next);
+            trial = Some(worse);
         }
         match accepted {
             Some(better) => best = better,
             None => break,
         }
     }
+    let removed = measurements.iter().copied();
     Ok(Cleaned {
-        figure: best.figure,
+        removed: removed
+            .filter(|index| best.kept.binary_search(index).is_err())
+            .collect(),
+        figure: best.figure.in_net(pictures, &points, &best.kept),
         blunders: best.blunders,
-        net: best.net,
-        kept: best.kept,
     })
 }
 
+/// A part of a net on the way.
 struct State {
     figure: Figure,
     blunders: Vec<Blunder>,
     net: Net,
+    /// Its measurements in the whole net.
     kept: Vec<usize>,
 }
 
@@ -121,27 +132,26 @@ impl State {
     }
 
     /// The brick without its worst deviation, if that is flagged and the rest still hangs together.
-    fn without_the_worst(&self, pictures: &[usize]) -> Option<Self> {
+    fn without_the_worst(&self, all: &[usize]) -> Option<Self> {
         let tied = self.tied();
         let sigma = robust_sigma(tied.iter().map(|(_, deviation)| *deviation));
+        let limit = (FLAG_LIMIT * sigma).max(ROUNDING * self.figure.extent());
         let worst = tied.iter().copied();
         let worst = worst.reduce(|a, b| if b.1.norm() > a.1.norm() { b } else { a });
-        let (index, deviation) = worst.filter(|(_, of)| of.norm() > FLAG_LIMIT * sigma)?;
+        let (index, deviation) = worst.filter(|(_, of)| of.norm() > limit)?;
         let point = self.net.measurements[index].point;
         let of_point = |index: &usize| self.net.measurements[*index].point == point;
         let whole_point = tied.iter().filter(|(index, _)| of_point(index)).count() == 2;
-        // What other bricks show of the point stays, the point is then no tie of this one.
-        let in_brick = |index: usize| tied.iter().any(|(of, _)| *of == index);
-        let goes = |at: usize| at == index || whole_point && of_point(&at) && in_brick(at);
+        let goes = |at: usize| at == index || whole_point && of_point(&at);
         let mut net = self.net.clone();
         let mut at = 0;
         net.measurements.retain(|_| {
             at += 1;
             !goes(at - 1)
         });
-        let figure = brick(&net, pictures).ok()?;
+        let figure = brick(&net, all).ok()?;
         let kept = self.kept.iter().enumerate();
-        let mut next = Self {
+        let mut without = Self {
             figure,
             blunders: self.blunders.clone(),
             kept: kept
@@ -150,12 +160,12 @@ impl State {
                 .collect(),
             net,
         };
-        next.blunders.push(Blunder {
+        without.blunders.push(Blunder {
             measurement: self.kept[index],
             deviation,
-            rms: [self.rms(), next.rms()],
+            rms: [self.rms(), without.rms()],
             whole_point,
         });
-        Some(next)
+        Some(without)
     }
 }

@@ -3,6 +3,7 @@
 use super::{
     Place,
     net::{Control, Measurement, Net, Part, PlaneError},
+    shrinkage::Shrinkage,
     similarity::Similarity,
     solve::{Redundancy, solve},
 };
@@ -23,6 +24,8 @@ pub struct Figure {
     pub deviations: Vec<(usize, Place)>,
     /// Equations of ties, and unknowns without the four of the figure.
     pub redundancy: Redundancy,
+    /// What the two guesses shrank, before that was put back; none of a single picture.
+    pub shrinkage: Option<Shrinkage>,
 }
 
 /// Bricks on controls.
@@ -36,6 +39,8 @@ pub struct Block {
     pub seams: Vec<(usize, usize, Place)>,
     /// Equations and unknowns.
     pub redundancy: Redundancy,
+    /// What two controls shrank, before that was put back.
+    pub shrinkage: Option<Shrinkage>,
 }
 
 /// BRICK: ties `pictures` together on two rough guesses, points of the picture with most ties, far apart, where that
@@ -49,45 +54,49 @@ pub fn brick(net: &Net, pictures: &[usize]) -> Result<Figure, PlaneError> {
         points,
         measurements,
     } = net.part(pictures);
-    let (similarities, places, deviations, redundancy);
-    if pictures.len() == 1 {
-        similarities = vec![Similarity::IDENTITY];
-        places = part
-            .measurements
-            .iter()
-            .map(|of| (of.point, of.at))
-            .collect();
-        deviations = vec![Place::new(0.0, 0.0); part.measurements.len()];
-        redundancy = Redundancy {
+    let figure = if pictures.len() == 1 {
+        alone(&part)
+    } else {
+        part.controls = rough_guesses(&part);
+        let solution = solve(&part).map_err(|error| error.of_part(&points, pictures))?;
+        let shrinkage = Shrinkage::of(&part, &solution);
+        let solution = solution.unshrunk(&part);
+        let places = solution.places.into_iter().enumerate();
+        Figure {
+            pictures: (0..pictures.len()).collect(),
+            similarities: solution.pictures,
+            places: places
+                .filter_map(|(point, place)| Some((point, place?)))
+                .collect(),
+            deviations: solution.deviations.into_iter().enumerate().collect(),
+            redundancy: Redundancy {
+                controls: 0,
+                unknowns: solution.redundancy.unknowns - 4,
+                ..solution.redundancy
+            },
+            shrinkage,
+        }
+    };
+    Ok(figure.in_net(pictures, &points, &measurements))
+}
+
+/// A single picture, which is its own figure.
+fn alone(part: &Net) -> Figure {
+    let measured = part.measurements.iter();
+    Figure {
+        pictures: vec![0],
+        similarities: vec![Similarity::IDENTITY],
+        places: measured.map(|of| (of.point, of.at)).collect(),
+        deviations: (0..part.measurements.len())
+            .map(|index| (index, Place::new(0.0, 0.0)))
+            .collect(),
+        redundancy: Redundancy {
             ties: 0,
             controls: 0,
             unknowns: 0,
-        };
-    } else {
-        part.controls = rough_guesses(&part);
-        let solution = solve(&part).map_err(|error| in_net(error, &points, pictures))?;
-        let solution = solution.unshrunk(&part);
-        redundancy = Redundancy {
-            controls: 0,
-            unknowns: solution.redundancy.unknowns - 4,
-            ..solution.redundancy
-        };
-        (similarities, deviations) = (solution.pictures, solution.deviations);
-        let found = solution.places.into_iter().enumerate();
-        places = found
-            .filter_map(|(point, place)| Some((point, place?)))
-            .collect::<Vec<_>>();
+        },
+        shrinkage: None,
     }
-    Ok(Figure {
-        pictures: pictures.to_vec(),
-        similarities,
-        places: places
-            .into_iter()
-            .map(|(point, place)| (points[point], place))
-            .collect(),
-        deviations: measurements.into_iter().zip(deviations).collect(),
-        redundancy,
-    })
 }
 
 /// Two ties of the picture with most of them, the farther apart the better, where that picture has them.
@@ -125,31 +134,71 @@ fn rough_guesses(part: &Net) -> Vec<Control> {
     }
 }
 
-/// The failure of a part with the indices of the whole net; that it has no two guesses is for want of ties.
-fn in_net(error: PlaneError, points: &[usize], pictures: &[usize]) -> PlaneError {
-    match error {
-        PlaneError::TooFewControls { found } => PlaneError::UnderconnectedPicture {
-            picture: pictures[0],
-            ties: found,
-        },
-        PlaneError::UnderconnectedPicture { picture, ties } => PlaneError::UnderconnectedPicture {
-            picture: pictures[picture],
-            ties,
-        },
-        PlaneError::EqualPoints {
-            picture,
-            first,
-            second,
-        } => PlaneError::EqualPoints {
-            picture: pictures[picture],
-            first: points[first],
-            second: points[second],
-        },
-        PlaneError::EqualControls { first, second } => PlaneError::EqualControls {
-            first: points[first],
-            second: points[second],
-        },
-        other => other,
+impl PlaneError {
+    /// The failure of a part with the indices of the whole net; that it has no two guesses is for want of ties.
+    pub(super) fn of_part(self, points: &[usize], pictures: &[usize]) -> Self {
+        match self {
+            Self::TooFewControls { found } => Self::UnderconnectedPicture {
+                picture: pictures[0],
+                ties: found,
+            },
+            Self::UnderconnectedPicture { picture, ties } => Self::UnderconnectedPicture {
+                picture: pictures[picture],
+                ties,
+            },
+            Self::EqualPoints {
+                picture,
+                first,
+                second,
+            } => Self::EqualPoints {
+                picture: pictures[picture],
+                first: points[first],
+                second: points[second],
+            },
+            Self::EqualControls { first, second } => Self::EqualControls {
+                first: points[first],
+                second: points[second],
+            },
+            other => other,
+        }
+    }
+}
+
+impl Figure {
+    /// Distance of the farthest point from the first, figure units.
+    #[must_use]
+    pub fn extent(&self) -> f64 {
+        let first = self
+            .places
+            .first()
+            .map_or(Place::new(0.0, 0.0), |(_, place)| *place);
+        let distances = self.places.iter().map(|(_, place)| (place - first).norm());
+        distances.fold(0.0, f64::max)
+    }
+
+    /// The figure of a part with the indices of the whole net.
+    pub(super) fn in_net(
+        self,
+        pictures: &[usize],
+        points: &[usize],
+        measurements: &[usize],
+    ) -> Self {
+        let places = self.places.into_iter();
+        let deviations = self.deviations.into_iter();
+        Self {
+            pictures: self
+                .pictures
+                .iter()
+                .map(|picture| pictures[*picture])
+                .collect(),
+            places: places
+                .map(|(point, place)| (points[point], place))
+                .collect(),
+            deviations: deviations
+                .map(|(index, of)| (measurements[index], of))
+                .collect(),
+            ..self
+        }
     }
 }
 
@@ -218,6 +267,7 @@ fn join(
         controls,
     };
     let mut solution = solve(&of_bricks)?;
+    let shrinkage = Shrinkage::of(&of_bricks, &solution).filter(|_| unshrunk);
     if unshrunk {
         solution = solution.unshrunk(&of_bricks);
     }
@@ -231,6 +281,7 @@ fn join(
         bricks: solution.pictures,
         places: solution.places,
         redundancy: solution.redundancy,
+        shrinkage,
     })
 }
 
@@ -266,7 +317,7 @@ pub fn local(net: &Net, figures: &[Figure], block: &Block) -> Result<Vec<Similar
         if part.controls.len() < 2 {
             continue;
         }
-        let solution = solve(&part).map_err(|error| in_net(error, &points, &figure.pictures))?;
+        let solution = solve(&part).map_err(|error| error.of_part(&points, &figure.pictures))?;
         for (picture, similarity) in figure.pictures.iter().zip(solution.pictures) {
             pictures[*picture] = similarity;
         }

@@ -17,8 +17,7 @@ const EXACT: f64 = 1e-18;
 ///
 /// Each two pictures with three points in common are compared by a similarity and by one with a mirror; where one of
 /// them leaves a tenth of the squares of the other, the pictures are said to have the same hand or not. Of pictures that hang
-/// together the fewer are mirrored. `places` are those of the points in a figure that has all pictures, for the
-/// comparison with the controls, of which three are needed.
+/// together the fewer are mirrored.
 ///
 /// # Errors
 /// [`PlaneError::MirroredPicture`].
@@ -83,7 +82,8 @@ fn hands(net: &Net) -> BTreeMap<(usize, usize), bool> {
 }
 
 /// Whether places have the same hand in two pictures; none where three points, or their spread, do not tell.
-pub(super) fn same_hand(places: &[(Place, Place)]) -> Option<bool> {
+#[must_use]
+pub fn same_hand(places: &[(Place, Place)]) -> Option<bool> {
     if places.len() < 3 {
         return None;
     }

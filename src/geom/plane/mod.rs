@@ -39,7 +39,7 @@ pub use check::check;
 pub use controls::{Scaled, fit_similarity, scale};
 pub use film::{CornerZero, FilmError, FourCorners, box_centre};
 pub use grow::grow_bricks;
-pub use mirror::find_mirrored;
+pub use mirror::{find_mirrored, same_hand};
 pub use net::{Control, Measurement, Net, PlaneError};
 pub use shrinkage::{Shrinkage, shrinkage_factor};
 pub use similarity::{Similarity, ToPicture, projection_floor_m};
