@@ -326,6 +326,71 @@ fn blunders_are_found_and_good_ties_kept() {
 }
 
 #[test]
+fn blunders_that_leave_no_common_solution_are_found() {
+    let mut site = Site::of(Recipe {
+        ties: 2_000,
+        tie_noise: 0.3,
+        ..Recipe::GUSEV
+    });
+    let mut normals = Normals::new(5);
+    let mut wrong = Vec::new();
+    // Every twentieth match is lost: steps over the plain sum of squares swing about for ever.
+    for (index, tie) in site.ties.iter_mut().enumerate().step_by(20) {
+        let error_lines = 100.0 * normals.next();
+        tie.measures[1].line += error_lines;
+        tie.measures[1].sample += 100.0 * normals.next();
+        // Smaller ones may look like noise, of 1 px in two images.
+        if error_lines.abs() > 10.0 {
+            wrong.push(index);
+        }
+    }
+    let adjusted = site.adjust(&AdjustmentConfig {
+        blunder_limit: Some(BAARDA_LIMIT),
+        ..every_tie()
+    });
+    let adjusted = adjusted.unwrap();
+    let rejected: Vec<usize> = adjusted.rejected.iter().map(|point| point.index).collect();
+    let found = wrong.iter().filter(|tie| rejected.contains(*tie)).count();
+    assert!(
+        found as f64 >= 0.98 * wrong.len() as f64,
+        "{found} of {}",
+        wrong.len()
+    );
+    let good = rejected
+        .iter()
+        .filter(|tie| !tie.is_multiple_of(20))
+        .count();
+    assert!(good <= 4, "{good} good ties of 1900 were lost"); // 0.2 %
+}
+
+#[test]
+fn orientations_left_free_converge_or_are_refused_by_name() {
+    let mut outcomes = Vec::new();
+    for sigma_m in [1e4, f64::INFINITY] {
+        for footprints in [
+            FootprintImageCoordinates::Weighted,
+            FootprintImageCoordinates::Off,
+        ] {
+            let mut site = Site::of(Recipe::GUSEV);
+            site.images[0].sigmas = recipe::sigmas(sigma_m);
+            let outcome = site.adjust(&AdjustmentConfig {
+                position_sigma_nadir_m: Some(sigma_m),
+                footprint_image_coordinates: Some(footprints),
+                ..every_tie()
+            });
+            if let Err(error) = &outcome {
+                let message = error.to_string();
+                let named = format!("adjustment.position_sigma_nadir_m = {sigma_m} and");
+                assert!(message.contains(&named), "{message}");
+            }
+            outcomes.push(outcome.is_ok());
+        }
+    }
+    // Footprints in the images hold what nothing else holds.
+    assert!(outcomes[0] && outcomes[2], "{outcomes:?}");
+}
+
+#[test]
 fn across_the_track_a_pair_does_not_control_itself() {
     let site = Site::of(Recipe::GUSEV);
     let adjusted = site.adjust(&every_tie()).unwrap();

@@ -11,7 +11,7 @@ use super::{
     quality::judge,
     reduce::Settled,
     solve,
-    solve::settle,
+    solve::{Stop, settle},
     tests::{dense_rows, layout, network},
 };
 use crate::geom::{
@@ -148,7 +148,11 @@ fn heights_by_parts_equal_the_dense_equations() {
     }
 
     let mut history = Vec::new();
-    let settled = settle(&layout, start, &groups, 100, &mut history).unwrap();
+    let stop = Stop {
+        steps_max: 100,
+        change: 1e-8,
+    };
+    let settled = settle(&layout, start, &groups, stop, &mut history).unwrap();
     let heights = layout.heights.as_ref().unwrap();
     let dense = dense(&layout, &settled.at, heights, active.len());
     for step in dense.step.iter().skip(shared) {
@@ -224,6 +228,25 @@ fn ground_that_stands_higher_lifts_the_points_and_moves_them_little_in_plan() {
     let lifted_m = mean_height_m(50.0) - mean_height_m(0.0);
     // Metres. The four points with coordinates of their own hold back: heights of 10 m and of 5 m share the lift.
     assert!((30.0..51.0).contains(&lifted_m), "{lifted_m}");
+}
+
+#[test]
+fn heights_that_do_not_come_to_rest_are_told() {
+    let mut network = network();
+    let surface = surface(&network, 35.0);
+    network.heights = Some(HeightControl {
+        surface,
+        compared: Vec::new(),
+        observed: CONTROLLED.collect(),
+    });
+    let settled = |height_rounds_max| {
+        let options = BundleOptions {
+            height_rounds_max,
+            ..BundleOptions::default()
+        };
+        solve(&network, &options).unwrap().heights_settled
+    };
+    assert!(settled(15) && !settled(1));
 }
 
 #[test]

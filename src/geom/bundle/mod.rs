@@ -229,6 +229,8 @@ pub struct BundleOptions {
     pub robust: Option<RobustWeight>,
     /// Steps that are taken in each of the two.
     pub steps_max: u32,
+    /// Rounds in which observed heights find their surface and their weights.
+    pub height_rounds_max: u32,
 }
 
 impl Default for BundleOptions {
@@ -236,6 +238,7 @@ impl Default for BundleOptions {
         Self {
             robust: None,
             steps_max: 100,
+            height_rounds_max: 15,
         }
     }
 }
@@ -344,6 +347,8 @@ pub struct Adjustment {
     pub range_biases_m: Vec<Option<(f64, f64)>>,
     /// Heights that are observations.
     pub heights: Vec<HeightResidual>,
+    /// Whether surface and weights had come to rest in the last round.
+    pub heights_settled: bool,
     /// Heights that are compared, each with the standard deviation that rays and surface give it alone.
     pub compared: Vec<HeightResidual>,
     /// Weighted sum of squares of the observed heights, with their full covariance.

@@ -99,6 +99,7 @@ pub(super) fn judge<M: ExteriorOrientation>(
             .map_or_else(Vec::new, |((of, reduced), controls)| {
                 reduced.residuals(of, &controls.left)
             }),
+        heights_settled: true,
         compared: Vec::new(),
         height_squares: 0.0,
         mean_cofactor_m2: None,

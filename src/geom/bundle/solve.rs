@@ -28,6 +28,8 @@ const CHANGE: f64 = 1e-8;
 /// The same with robust weights: how a blunder is shared between the two rays of a tie hardly changes the
 /// sum, so that the point creeps long after everything else is converged.
 const CHANGE_ROBUST: f64 = 1e-6;
+/// The same before robust weights are given: where blunders make the sum, it need not be the least.
+const CHANGE_ROUGH: f64 = 0.1;
 /// A relative rise of the sum below this is rounding, of positions of 4e6 m in the main.
 const ROUNDING: f64 = 1e-10;
 /// Damping after a first step that made matters worse, as a share of each unknown's own information. What only
@@ -71,21 +73,31 @@ pub fn solve<M: ExteriorOrientation>(
     }
     let groups = PointGroups::of(&layout, active);
     let mut history = Vec::new();
-    let mut settled = settle(&layout, start, &groups, options.steps_max, &mut history)?;
+    let mut stop = Stop {
+        steps_max: options.steps_max,
+        change: CHANGE,
+    };
+    if options.robust.is_some() {
+        stop.change = CHANGE_ROUGH;
+    }
+    let mut settled = settle(&layout, start, &groups, stop, &mut history)?;
     if options.robust.is_some() {
         layout.robust = options.robust;
-        settled = settle(
-            &layout,
-            settled.at,
-            &groups,
-            options.steps_max,
-            &mut history,
-        )?;
+        stop.change = CHANGE_ROBUST;
+        settled = settle(&layout, settled.at, &groups, stop, &mut history)?;
     }
     let control = network.heights.as_ref();
+    let mut heights_settled = true;
     if let Some(control) = control.filter(|of| !of.observed.is_empty()) {
-        let mut room = (options.steps_max, &mut history);
-        settled = with_heights(&mut layout, control, settled, &groups, &mut room)?;
+        let mut iteration = (stop, &mut history);
+        let rounds_max = options.height_rounds_max;
+        (settled, heights_settled) = with_heights(
+            &mut layout,
+            (control, rounds_max),
+            settled,
+            &groups,
+            &mut iteration,
+        )?;
     }
     let factor = factorise(&layout, &settled.reduced, 0.0)?;
     let mut adjustment = quality::judge(&layout, &settled, &groups, &fitness, &factor);
@@ -96,6 +108,7 @@ pub fn solve<M: ExteriorOrientation>(
     });
     adjustment.observations = observations + adjustment.heights.len();
     adjustment.unknowns = unknowns;
+    adjustment.heights_settled = heights_settled;
     adjustment.history = history;
     Ok(adjustment)
 }
@@ -121,19 +134,25 @@ fn count<M: ExteriorOrientation>(layout: &Layout<'_, M>, active: &[usize]) -> (u
     )
 }
 
-/// Rounds in which heights find their surface and their weights.
-const HEIGHT_ROUNDS_MAX: u32 = 15;
 /// Standard deviations that change by less than this leave the weights of heights as they are, metres.
 const HEIGHT_CHANGE_M: f64 = 0.01;
 
-/// Goes on with heights as observations.
+/// Where an iteration ends.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Stop {
+    pub(super) steps_max: u32,
+    /// Relative change of the weighted sum of squares.
+    pub(super) change: f64,
+}
+
+/// Goes on with heights as observations; and whether they came to rest.
 fn with_heights<M: ExteriorOrientation>(
     layout: &mut Layout<'_, M>,
-    control: &HeightControl,
+    (control, rounds_max): (&HeightControl, u32),
     mut settled: Settled,
     groups: &PointGroups,
-    (steps_max, history): &mut (u32, &mut Vec<f64>),
-) -> Result<Settled, BundleError> {
+    (stop, history): &mut (Stop, &mut Vec<f64>),
+) -> Result<(Settled, bool), BundleError> {
     let active_points: BTreeSet<usize> = groups.points.iter().copied().collect();
     let points = control.observed.iter().copied();
     let points = points
@@ -141,26 +160,28 @@ fn with_heights<M: ExteriorOrientation>(
         .collect();
     let heights = Heights::at(&control.surface, points, &settled.at.state);
     layout.heights = Some(heights);
-    for _ in 0..HEIGHT_ROUNDS_MAX {
-        settled = settle(layout, settled.at, groups, *steps_max, history)?;
+    let mut is_settled = false;
+    for _ in 0..rounds_max {
+        settled = settle(layout, settled.at, groups, *stop, history)?;
         let reduced = settled.reduced.heights.as_ref();
         let (Some(reduced), Some(heights)) = (reduced, layout.heights.as_mut()) else {
             break;
         };
         let changed_m = heights.reweigh(&reduced.misclosures_m, &reduced.ray_variances_m2);
         if !heights.follow(&control.surface, &settled.at.state) && changed_m < HEIGHT_CHANGE_M {
+            is_settled = true;
             break;
         }
     }
     settled.reduced = reduce(layout, &settled.at, groups).map_err(|_| not_converged(history))?;
-    Ok(settled)
+    Ok((settled, is_settled))
 }
 
 pub(super) fn settle<M: ExteriorOrientation>(
     layout: &Layout<'_, M>,
     start: Linearised,
     groups: &PointGroups,
-    steps_max: u32,
+    stop: Stop,
     history: &mut Vec<f64>,
 ) -> Result<Settled, BundleError> {
     let reduced = reduce(layout, &start, groups).map_err(|_| not_converged(history))?;
@@ -169,14 +190,9 @@ pub(super) fn settle<M: ExteriorOrientation>(
         history.push(reduced.cost);
     }
     let mut now = Settled { at: start, reduced };
-    let least_change = if layout.robust.is_some() {
-        CHANGE_ROBUST
-    } else {
-        CHANGE
-    };
     let mut damping = 0.0;
     let mut curvature = QuasiNewton::default();
-    for _ in 0..steps_max {
+    for _ in 0..stop.steps_max {
         let factor = factorise(layout, &now.reduced, damping)?;
         let (shared, is_corrected) = curvature.step(&now, &factor);
         let (next, step) =
@@ -189,7 +205,7 @@ pub(super) fn settle<M: ExteriorOrientation>(
                 history.push(reduced.cost);
                 let expected = shared.dot(&now.reduced.right);
                 now = Settled { at: next, reduced };
-                if step < STEP || fall.abs() <= least_change * before {
+                if step < STEP || fall.abs() <= stop.change * before {
                     return Ok(now);
                 }
                 if fall > GOOD_SHARE * expected {

@@ -10,6 +10,7 @@ use crate::{
     geom::{
         bundle::{Adjustment, BundleError, BundleOptions, Network, Residual, solve},
         pushbroom::ExteriorOrientation,
+        robust::RobustWeight,
     },
 };
 
@@ -18,6 +19,10 @@ const ROUNDS_MAX: u32 = 20;
 /// In each round only points whose residual reaches this share of the largest are left out: a blunder
 /// pulls at its neighbours, and they come right when it is gone.
 const SHARE_OF_LARGEST: f64 = 0.5;
+/// Weights with which very many blunders are found.
+const WHERE_MANY: RobustWeight = RobustWeight::Cauchy {
+    limit: RobustWeight::CAUCHY_LIMIT,
+};
 
 /// Adjusts without the tie points that are none.
 ///
@@ -46,10 +51,33 @@ fn by_residuals<M: ExteriorOrientation>(
     bundle_options: &BundleOptions,
     limit: Option<f64>,
 ) -> Result<Adjustment, BundleError> {
-    let mut adjustment = solve(&assembled.network, bundle_options)?;
+    let adjustment = solve(&assembled.network, bundle_options);
     let Some(limit) = limit else {
-        return Ok(adjustment);
+        return adjustment;
     };
+    let adjustment = match adjustment {
+        // So many blunders, or so large, that they leave no common solution: they show where they weigh little.
+        Err(BundleError::NotConverged { .. }) if bundle_options.robust.is_none() => {
+            let robust = BundleOptions {
+                robust: Some(WHERE_MANY),
+                ..*bundle_options
+            };
+            let adjustment = solve(&assembled.network, &robust)?;
+            reject_worst(assembled, &robust, limit, adjustment)?;
+            solve(&assembled.network, bundle_options)?
+        }
+        other => other?,
+    };
+    reject_worst(assembled, bundle_options, limit, adjustment)
+}
+
+/// Rejects the worst tie points of `adjustment`, adjusts again and repeats until none is beyond `limit`.
+fn reject_worst<M: ExteriorOrientation>(
+    assembled: &mut Assembled<M>,
+    bundle_options: &BundleOptions,
+    limit: f64,
+    mut adjustment: Adjustment,
+) -> Result<Adjustment, BundleError> {
     for _ in 0..ROUNDS_MAX {
         let worst = worst_standardised(&assembled.network, &adjustment, assembled.shots);
         let largest = worst.iter().copied().fold(0.0, f64::max);

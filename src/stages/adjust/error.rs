@@ -22,6 +22,18 @@ pub enum AdjustError {
     /// The network as a whole.
     #[error("{0}")]
     Network(BundleError),
+    /// The steps do not converge.
+    #[error(
+        "the adjustment did not converge after {steps} steps (weighted sum of squares {weighted_squares:.3e}) with {held_by}"
+    )]
+    NotConverged {
+        /// Steps taken.
+        steps: usize,
+        /// The sum where it was given up.
+        weighted_squares: f64,
+        /// The keys that hold the orientations, with their values.
+        held_by: String,
+    },
     /// A standard deviation, coordinate or number that is none.
     #[error("{what} is {value}, expected {expected}")]
     Value {
@@ -66,10 +78,10 @@ impl Cause for AdjustError {
     fn advice(&self) -> String {
         match self {
             Self::NoTies { .. } => "check that the images overlap and that the tie points are theirs",
-            Self::Network(BundleError::NotConverged { .. }) => "check the tie points and the images' times and kernels: so far apart the observations have no common solution",
+            Self::NotConverged { .. } => "lower these standard deviations where they leave an orientation freer than its kernels are uncertain; otherwise check the tie points and the images' times and kernels: so far apart the observations have no common solution",
             Self::Network(_) => "check the input of the adjustment, and give orientations and footprints finite standard deviations",
             Self::Value { .. } => "correct this value, or leave out what it belongs to",
-            Self::Singular(_) => "give these unknowns finite standard deviations, or hold them fixed with 0",
+            Self::Singular(_) => "give these unknowns smaller standard deviations in [adjustment], or hold them fixed with 0",
             Self::DuplicateShot(_) => "leave out the second file, or renumber the shots",
             Self::Blind { .. } => "check the orientation samples of the image",
             Self::Contradiction { .. } => "check the datum, the clock and the units of this value, or raise its standard deviation",

@@ -26,6 +26,9 @@ pub struct HeightSummary {
     /// Root mean square difference of heights 300 m apart, metres.
     #[schemars(range(min = 0.0))]
     pub roughness_m: f64,
+    /// Whether the surface under these tie points and the weights of their heights had come to rest; if not, both
+    /// still changed in the last of 15 rounds.
+    pub settled: bool,
     /// Adjusted heights above the surface, metres.
     pub above_m: Summary,
     /// Tie points that are compared with the surface, and those of them that lie farther from it than 3.29 of their own
@@ -72,6 +75,7 @@ pub(super) fn heights<M>(
         shots: control.surface.shots(),
         profiles: control.surface.profiles().len(),
         roughness_m: control.surface.variogram().roughness_m,
+        settled: adjustment.heights_settled,
         above_m: Summary::of(&above_m),
         compared: adjustment.compared.len(),
         beyond_limit: beyond_limit(&adjustment.compared),

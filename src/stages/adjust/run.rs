@@ -52,7 +52,7 @@ pub fn adjust<M: ExteriorOrientation>(
         ..BundleOptions::default()
     };
     let adjustment = blunders::solve_without_blunders(&mut assembled, &bundle_options, config)
-        .map_err(|error| words::in_words(error, images, &assembled))?;
+        .map_err(|error| words::in_words(error, images, &assembled, config))?;
     // Blunders have lost their measurements and are listed already.
     let listed: BTreeSet<usize> = assembled.rejected.iter().map(|tie| tie.index).collect();
     let dropped = adjustment

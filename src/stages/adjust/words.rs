@@ -6,15 +6,29 @@ use super::{
     network::{Assembled, Named},
     points::PointKind,
 };
-use crate::geom::bundle::{BundleError, Part, Unknown};
+use crate::{
+    config::AdjustmentConfig,
+    footprints::AdjustmentModel,
+    geom::bundle::{BundleError, Part, Unknown},
+    units::RADIANS_PER_ARCSECOND,
+};
 
 /// The error with identifiers in place of indices.
 pub(super) fn in_words<M>(
     error: BundleError,
     images: &[AdjustImage<M>],
     assembled: &Assembled<&M>,
+    config: &AdjustmentConfig,
 ) -> AdjustError {
     match error {
+        BundleError::NotConverged {
+            steps,
+            weighted_squares,
+        } => AdjustError::NotConverged {
+            steps,
+            weighted_squares,
+            held_by: held_by(config),
+        },
         BundleError::Singular { unknowns } => {
             let words: Vec<String> = unknowns
                 .iter()
@@ -33,6 +47,33 @@ pub(super) fn in_words<M>(
             expected,
         },
         _ => AdjustError::Network(error),
+    }
+}
+
+/// The keys that hold orientations, with their values.
+fn held_by(config: &AdjustmentConfig) -> String {
+    let of_model = match config.model {
+        AdjustmentModel::MolaSurface => {
+            // Rounded as one would write them.
+            let arcsec = config
+                .rotation_sigma_rad
+                .map(|sigma_rad| (sigma_rad / RADIANS_PER_ARCSECOND * 1e6).round() / 1e6);
+            format!(
+                "adjustment.position_sigma_m = {:?} and rotation_sigma_arcsec = {arcsec:?}",
+                config.position_sigma_m
+            )
+        }
+        AdjustmentModel::Published => {
+            let [nadir_m, off_nadir_m] = config.published_sigmas_m();
+            format!(
+                "adjustment.position_sigma_nadir_m = {nadir_m} and position_sigma_off_nadir_m = {off_nadir_m}"
+            )
+        }
+    };
+    if config.images.is_empty() {
+        of_model
+    } else {
+        format!("{of_model}, and the values of adjustment.images")
     }
 }
 

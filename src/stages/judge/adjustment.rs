@@ -100,6 +100,13 @@ impl AdjustmentEvidence<'_> {
             return Vec::new();
         };
         let mut remarks = Vec::new();
+        if !heights.settled {
+            remarks.push(
+                "heights of tie points, and the MOLA surface under them, had not come to rest when the adjustment ended: \
+                 they are less certain than stated"
+                    .to_owned(),
+            );
+        }
         let [_, _, up_m] = heights.mean_sigma_m;
         if !(up_m <= HEIGHT_LOOSE_M) {
             remarks.push(format!(
