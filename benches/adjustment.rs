@@ -114,7 +114,7 @@ fn document(
     let points = network.points.iter().map(|point| {
         json!({
             "ground_m": point.ground_m.as_slice(),
-            "sigma_m": point.sigma_m.map(|sigma_m| [sigma_m.x, sigma_m.y, sigma_m.z]),
+            "sigma_m": point.known.map(|known| [known.sigma_m.x, known.sigma_m.y, known.sigma_m.z]),
         })
     });
     let views = network.views.iter().map(|view| {

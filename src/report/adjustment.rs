@@ -221,6 +221,7 @@ const fn kind(of: ObservationType) -> &'static str {
         ObservationType::MolaRange => "MOLA ranges",
         ObservationType::Orientation => "initial orientation",
         ObservationType::MolaGround => "ground coordinates of MOLA",
+        ObservationType::TieGround => "given coordinates of tie points",
         ObservationType::Bias => "time and range biases",
     }
 }

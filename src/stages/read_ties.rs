@@ -119,7 +119,7 @@ impl Input for ImageNames<'_> {
 
 impl Stage for ReadTies<'_> {
     const NAME: &'static str = "read_ties";
-    const METHOD: u32 = 2;
+    const METHOD: u32 = 3;
     const CHECKED: bool = true;
     type Output = Ties;
     stage_inputs!(fingerprint);
@@ -223,6 +223,7 @@ impl Ties {
                 .all(|new| !images().any(|image| *image == new.image))
         };
         if let Some(known) = known.filter(joins) {
+            known.known = known.known.or(tie.known);
             known.measures.extend(tie.measures);
         } else {
             first.entry(tie.id.clone()).or_insert(self.points.len());

@@ -43,6 +43,8 @@ pub enum ObservationType {
     Orientation,
     /// Initial coordinates of footprints.
     MolaGround,
+    /// Coordinates of tie points that are known beforehand.
+    TieGround,
     /// Time and range biases, initially 0.
     Bias,
 }
@@ -191,11 +193,14 @@ fn types<M>(assembled: &Assembled<M>, adjustment: &Adjustment) -> Vec<TypeSummar
             .collect()
     };
     let orientations = adjustment.images.iter().flat_map(|image| image.priors);
-    let grounds = adjustment
-        .points
-        .iter()
-        .flatten()
-        .filter_map(|point| point.priors);
+    let of_grounds = |kind: PointKind| -> Vec<Residual> {
+        let points = adjustment.points.iter().enumerate();
+        let required = points.filter(|(point, _)| assembled.kind(*point) == kind);
+        required
+            .filter_map(|(_, outcome)| outcome.as_ref().ok()?.priors)
+            .flatten()
+            .collect()
+    };
     let all = [
         (ObservationType::TieImage, of_views(PointKind::Tie)),
         (ObservationType::MolaImage, of_views(PointKind::Shot)),
@@ -207,7 +212,8 @@ fn types<M>(assembled: &Assembled<M>, adjustment: &Adjustment) -> Vec<TypeSummar
             ObservationType::Orientation,
             orientations.flatten().collect(),
         ),
-        (ObservationType::MolaGround, grounds.flatten().collect()),
+        (ObservationType::MolaGround, of_grounds(PointKind::Shot)),
+        (ObservationType::TieGround, of_grounds(PointKind::Tie)),
         (ObservationType::Bias, biases(assembled, adjustment)),
     ];
     let plain = all.into_iter();
