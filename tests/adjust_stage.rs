@@ -207,13 +207,13 @@ fn the_stage_gives_what_the_geometry_gives() {
         .iter()
         .map(|kind| kind.kind)
         .collect();
-    assert_eq!(kinds.len(), 5, "{kinds:?}");
+    assert_eq!(kinds.len(), 6, "{kinds:?}");
     for image in &adjusted.summary.images {
         println!("{image:.3?}");
         assert_eq!(image.tie_residuals_px[0].n, 154);
     }
     // Noise of ranges 7 m, of footprints 10 m: corrections by both.
-    let range = adjusted.summary.types[2];
+    let range = adjusted.summary.types[3];
     assert!((0.6..1.1).contains(&range.variance_component), "{range:?}");
     assert!(adjusted.summary.ties.sigmas_m[0].mean > 0.0);
     for (first, second, coefficient) in &adjusted.summary.correlated {

@@ -158,13 +158,13 @@ fn measured_columns<'a>() -> Vec<Column<Measurement<'a>>> {
             |row: &Measurement| row.sample,
         ),
         column(
-            "sigma_lines",
+            "sigma_line",
             Unit::Line,
             "standard deviation of the measured line, where its file has its own",
             |row: &Measurement| Some(row.sigma_px?[0]),
         ),
         column(
-            "sigma_samples",
+            "sigma_sample",
             Unit::Pixel,
             "the same of the sample",
             |row: &Measurement| Some(row.sigma_px?[1]),

@@ -37,6 +37,7 @@ fn write(site: &SiteProducts, geometric: &GeometricProducts) -> Result<String> {
         html += &heading("Heights against the MOLA surface");
         html += &paragraph(&surface_in_words(surface));
         html += &compared(geometric);
+        html += &footprints(geometric);
         html += &paragraph(&apart(geometric.heights));
         html += &format!(
             "<div class=\"plots\">\n{}</div>\n",
@@ -253,6 +254,49 @@ fn compared(geometric: &GeometricProducts) -> String {
         );
     }
     table.finish()
+}
+
+/// Heights of footprints that both images of a pair show.
+fn footprints(geometric: &GeometricProducts) -> String {
+    let mut table = Table::new(
+        "Heights of footprints by the images that show them, above MOLA, metres",
+        &[
+            Column::Text("adjustment"),
+            Column::Text("pair"),
+            Column::Text("profile"),
+            Column::Number("footprints"),
+            Column::Number("median"),
+            Column::Number("1.48 MAD"),
+        ],
+    );
+    let after = geometric.adjustment.iter().map(|of| ("after", of.pairs));
+    let mut rows = 0;
+    for (state, pairs) in [("before", geometric.pairs)].into_iter().chain(after) {
+        for pair in pairs {
+            for profile in pair.footprints.iter().flat_map(|of| &of.profiles) {
+                let above_m = &profile.above_m;
+                rows += 1;
+                table.row(
+                    true,
+                    [
+                        state.into(),
+                        pair.images.join(" and ").into(),
+                        profile.profile.clone().into(),
+                        above_m.n.to_string().into(),
+                        label(above_m.median, 1).into(),
+                        label(above_m.nmad, 1).into(),
+                    ],
+                );
+            }
+        }
+    }
+    if rows == 0 {
+        return String::new();
+    }
+    let words = "Of a footprint only the altimeter knows the height; where the second image shows it is what a surface of second \
+         order at most through the tie points says. Relief between tie points therefore spreads single heights; their median \
+         tells what the images have in common.";
+    table.finish() + &paragraph(words)
 }
 
 fn apart(check: &HeightCheck) -> String {

@@ -228,7 +228,7 @@ mod tests {
     /// One point with these entries and a measurement with those.
     fn one(point: &str, measure: &str) -> TieFile {
         let text = format!(
-            "Object = ControlNetwork\n Object = ControlPoint\n PointId = p\n {point}\n Group = ControlMeasure\n \
+            "Object = ControlNetwork\n NetworkId = n\n Object = ControlPoint\n PointId = p\n {point}\n Group = ControlMeasure\n \
              SerialNumber = A\n Line = 1\n Sample = 1\n {measure}\n End_Group\n End_Object\n End_Object\nEnd\n"
         );
         parse_network(text.as_bytes()).unwrap()
