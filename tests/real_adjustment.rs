@@ -496,7 +496,7 @@ fn above_lola_m(judging: &LaserSurface, ties: impl Iterator<Item = Vector3<f64>>
 }
 
 /// Ties count where the ground between footprints is known to this, metres.
-const SURFACE_KNOWN_M: f64 = 5.0;
+const SURFACE_KNOWN_M: f64 = 10.0;
 
 /// A surface of some of the footprints. It counts heights from the ellipsoid of Mars, 1650 km below: what that adds is
 /// smooth, and the same for ties.
@@ -512,9 +512,9 @@ fn lola(site: &Site, taken: impl Fn(usize) -> bool) -> LaserSurface {
             profile: 0,
         })
         .collect();
-    // Images and LOLA agree in plan to some metres, which their own adjustment left.
+    // Lines of half a metre, of which the network was off by some tens.
     let options = SurfaceOptions {
-        plan_sigma_m: 20.0,
+        plan_sigma_m: 10.0,
         ..SurfaceOptions::default()
     };
     LaserSurface::new(&shots, &[], &options).unwrap()

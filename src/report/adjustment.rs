@@ -249,10 +249,11 @@ fn observations(summary: &AdjustmentSummary) -> String {
             "–".to_owned()
         };
         let limits = of.variance_component_limits;
-        let by_chance = limits.map_or_else(
-            || "–".to_owned(),
-            |[least, most]| format!("{} to {}", label(least, 2), label(most, 2)),
-        );
+        let by_chance = if limits[1] > 0.0 {
+            format!("{} to {}", label(limits[0], 2), label(limits[1], 2))
+        } else {
+            "–".to_owned()
+        };
         table.row(
             true,
             [

@@ -116,7 +116,7 @@ fn statements(geometric: &GeometricProducts, adjustment: &AdjustmentProducts) ->
         ],
         [
             "absolute, height".to_owned(),
-            "a priori: what is known of orbit and attitude".to_owned(),
+            format!("a priori: what is known of {}", known_beforehand(geometric)),
             height,
             "standard deviation of what all tie points share, and of single ones".to_owned(),
         ],
@@ -124,13 +124,25 @@ fn statements(geometric: &GeometricProducts, adjustment: &AdjustmentProducts) ->
             "absolute, place".to_owned(),
             "as after it".to_owned(),
             place,
-            "a priori, not measured: by what is known of orbit and attitude".to_owned(),
+            format!(
+                "a priori, not measured by images: by what is known of {}",
+                known_beforehand(geometric)
+            ),
         ],
     ];
     for cells in statements {
         table.row(true, cells.map(Cell::from));
     }
     table.finish()
+}
+
+/// What says where a site lies before the images do.
+pub(super) fn known_beforehand(geometric: &GeometricProducts) -> &'static str {
+    if geometric.ties.points.iter().any(|tie| tie.known.is_some()) {
+        "orbit, attitude and given ground points"
+    } else {
+        "orbit and attitude"
+    }
 }
 
 fn agreement(check: &HeightCheck) -> String {
@@ -175,6 +187,20 @@ fn absolute(geometric: &GeometricProducts, adjustment: &AdjustmentProducts) -> [
     let pairs = BeforeAfter::all(geometric);
     let worst = BeforeAfter::worst(&pairs);
     let half_m = worst.map_or(0.0, |pair| 0.5 * pair.before.along_track_parallax_m.abs());
+    let other = adjustment.adjusted.other_reading.as_ref();
+    let other = other.map_or_else(String::new, |other| {
+        let [east_m, north_m, _] = other.moved_m;
+        let reading = if other.attitude_clock {
+            "read as an offset of the attitude's clock of nadir images"
+        } else {
+            "read without an offset of the attitude's clock"
+        };
+        format!(
+            "; {reading}, the same data place tie points {} m east and {} m north of here",
+            label(east_m, 0),
+            label(north_m, 0)
+        )
+    });
     // What is stated holds only if errors of both images are as likely; half of their difference is no less open.
     let half = if half_m > east_m.max(north_m) {
         format!(
@@ -192,7 +218,7 @@ fn absolute(geometric: &GeometricProducts, adjustment: &AdjustmentProducts) -> [
             label(single[1], 0)
         ),
         format!(
-            "±{} m east, ±{} m north{half}",
+            "±{} m east, ±{} m north{half}{other}",
             label(east_m, 0),
             label(north_m, 0)
         ),

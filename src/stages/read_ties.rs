@@ -243,6 +243,18 @@ impl Ties {
                 self.elsewhere.len()
             ));
         }
+        let known: Vec<bool> = self
+            .points
+            .iter()
+            .filter_map(|tie| Some(tie.known?.covariance_m2.is_none()))
+            .collect();
+        if !known.is_empty() {
+            notes.push(format!(
+                "tie points: {} have known ground coordinates, {} of them held fixed",
+                known.len(),
+                known.iter().filter(|fixed| **fixed).count()
+            ));
+        }
         if self.ignored > 0 {
             notes.push(format!(
                 "tie points: {} points and measurements that their network says to ignore",

@@ -8,10 +8,12 @@ use super::{
     height_summary::{self, HeightSummary},
     input::AdjustImage,
     network::Assembled,
+    other_reading::OtherReading,
     points::{PointKind, RejectedPoint},
     summary::AdjustmentSummary,
 };
 use crate::{
+    config::AdjustmentConfig,
     frames::{MarsIau2000, Position},
     geom::{
         bundle::{Adjustment, ORIENTATION_UNKNOWNS, Residual, View},
@@ -26,6 +28,8 @@ pub struct Adjusted {
     pub summary: AdjustmentSummary,
     /// Heights of tie points by the MOLA surface; `None` where they are no observations.
     pub heights: Option<HeightSummary>,
+    /// What another reading of a disagreement along the flight says, where there is a large one.
+    pub other_reading: Option<OtherReading>,
     /// One entry for each image, in their order.
     pub images: Vec<CorrectedImage>,
     /// Points with adjusted coordinates: shots, then tie points, each in their order.
@@ -75,7 +79,8 @@ pub struct CorrectedPoint {
     pub initial: Position<MarsIau2000>,
     /// Where it is adjusted.
     pub ground: Position<MarsIau2000>,
-    /// Covariance of the adjusted coordinates, m²: a priori variances times the summary's variance factor.
+    /// Covariance of the adjusted coordinates, m²: a priori variances times the summary's variance factor; of a tie point
+    /// that lies beyond the limit of heights and yet was kept, its distance from the surface too.
     pub covariance_m2: Matrix3<f64>,
 }
 
@@ -158,7 +163,9 @@ pub(super) fn collect<M: ExteriorOrientation>(
     assembled: Assembled<&M>,
     adjustment: Adjustment,
     summary: AdjustmentSummary,
+    config: &AdjustmentConfig,
 ) -> Adjusted {
+    let contradicted_m2 = contradicted_m2(&adjustment, config.height_blunder_limit);
     let mut index_of = vec![None; assembled.points.len()];
     let mut points = Vec::with_capacity(assembled.points.len());
     let variance = summary.variance_factor;
@@ -171,13 +178,14 @@ pub(super) fn collect<M: ExteriorOrientation>(
             id: assembled.points[point].name.clone(),
             initial: Position::new(assembled.network.points[point].ground_m),
             ground: Position::new(found.ground_m),
-            covariance_m2: found.cofactor_m2 * variance,
+            covariance_m2: found.cofactor_m2 * variance + contradicted_m2[point],
         });
     }
     let views = assembled.network.views.par_iter().zip(&adjustment.views);
     let ranges = assembled.network.ranges.iter().zip(&adjustment.ranges);
     Adjusted {
         heights: height_summary::heights(&assembled, &adjustment),
+        other_reading: None,
         images: corrected_images(images, &adjustment, summary.variance_factor),
         views: views
             .filter_map(|(view, residuals)| {
@@ -242,6 +250,25 @@ fn in_image_px<M: ExteriorOrientation>(
         view.x_lines - seen.x,
         detector.sample(view.y_px) - detector.sample(focal_px.y),
     ])
+}
+
+/// What the heights of points beyond `limit` standard deviations from the surface are uncertain by besides, m².
+///
+/// These are points for which a neighbour vouches: ground between the profiles, or two measurements that err alike. Nothing
+/// tells which of image and altimeter is right of them.
+fn contradicted_m2(adjustment: &Adjustment, limit: Option<f64>) -> Vec<Matrix3<f64>> {
+    let mut added_m2 = vec![Matrix3::zeros(); adjustment.points.len()];
+    let Some(limit) = limit else {
+        return added_m2;
+    };
+    for height in &adjustment.compared {
+        let stands_out = height.above_m.abs() > limit * height.sigma_m();
+        if let (true, Ok(point)) = (stands_out, &adjustment.points[height.point]) {
+            let up_m = point.ground_m.normalize() * height.above_m;
+            added_m2[height.point] = up_m * up_m.transpose();
+        }
+    }
+    added_m2
 }
 
 /// A step below this many lines finds the line of a view to 1e-7 lines.

@@ -73,7 +73,9 @@ pub fn adjust<M: ExteriorOrientation>(
     assembled.rejected.extend(dropped);
     contradictions(images, &assembled, &adjustment)?;
     let summary = summary::summarise(images, &assembled, &adjustment, config)?;
-    Ok(adjusted::collect(images, assembled, adjustment, summary))
+    Ok(adjusted::collect(
+        images, assembled, adjustment, summary, config,
+    ))
 }
 
 fn contradictions<M>(

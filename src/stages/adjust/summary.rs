@@ -68,9 +68,10 @@ pub struct TypeSummary {
     /// redundancy.
     #[schemars(range(min = 0.0))]
     pub variance_component: f64,
-    /// Where 99 % of such values lie when the standard deviations are right, by the χ² distribution; none where the
+    /// Where 99 % of such values lie when the standard deviations are right, by the χ² distribution; 0 where the
     /// redundancy is below 1. Robust weights and roughness that is taken for larger than it is leave heights below it.
-    pub variance_component_limits: Option<[f64; 2]>,
+    #[schemars(transform = none_negative)]
+    pub variance_component_limits: [f64; 2],
     /// Observations whose standardised residual exceeds 3.29.
     pub beyond_limit: usize,
 }
@@ -243,7 +244,7 @@ fn of_heights(adjustment: &Adjustment) -> Option<TypeSummary> {
         redundancy,
         weighted_squares: adjustment.height_squares,
         variance_component: component(adjustment.height_squares, redundancy),
-        variance_component_limits: unit_weight_limits(redundancy),
+        variance_component_limits: unit_weight_limits(redundancy).unwrap_or_default(),
         beyond_limit: beyond_limit(&adjustment.heights),
     })
 }
@@ -281,7 +282,7 @@ fn of_type(kind: ObservationType, residuals: &[Residual]) -> TypeSummary {
         redundancy,
         weighted_squares,
         variance_component: component(weighted_squares, redundancy),
-        variance_component_limits: unit_weight_limits(redundancy),
+        variance_component_limits: unit_weight_limits(redundancy).unwrap_or_default(),
         beyond_limit: residuals.iter().filter(beyond).count(),
     }
 }
