@@ -280,7 +280,8 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    fn measure(image: &str, line: f64, sample: f64) -> TieMeasure<String> {
+    /// A measurement without standard deviations.
+    pub(in crate::pds::ties) fn measure(image: &str, line: f64, sample: f64) -> TieMeasure<String> {
         TieMeasure {
             image: image.to_owned(),
             line,

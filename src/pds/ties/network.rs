@@ -184,6 +184,7 @@ fn add_measure(gathered: &mut Gathered, point: &Point<'_>, measure: &BlockEntrie
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::pds::ties::tests::measure;
 
     const NETWORK: &str = "Object = ControlNetwork\n NetworkId = n\n \
         Object = ControlPoint\n PointId = p1\n \
@@ -196,15 +197,6 @@ mod tests {
         Object = ControlPoint\n PointId = p3\n Ignore = True\n \
         Group = ControlMeasure\n SerialNumber = A\n Line = 1\n Sample = 1\n End_Group\n End_Object\n\
         End_Object\nEnd\n";
-
-    fn measure(image: &str, line: f64, sample: f64) -> TieMeasure<String> {
-        TieMeasure {
-            image: image.to_owned(),
-            line,
-            sample,
-            sigma_px: None,
-        }
-    }
 
     #[test]
     fn a_network_is_read_and_what_is_left_out_is_told() {
