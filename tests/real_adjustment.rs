@@ -569,10 +569,15 @@ fn heights_follow_lola_where_its_surface_controls_them() {
         row("standard deviations of single heights, m", &sigmas_m);
         (above, sigmas_m.median, with)
     });
-    let [(without, without_sigma_m, _), (with, _, mean_sigma_m)] = adjusted;
+    let [
+        (without, without_sigma_m, _),
+        (with, with_sigma_m, mean_sigma_m),
+    ] = adjusted;
     assert!(with.n > 20, "{}", with.n);
-    assert!(without.median.abs() < 3.0 * without_sigma_m);
-    assert!(with.median.abs() < without.median.abs());
+    // Without the surface heights are where the network's own orientations leave them, and stated as what these priors
+    // allow: nothing of LOLA is known then.
+    assert!(without.median.abs() < 3.0 * without_sigma_m && without_sigma_m > 100.0);
+    assert!(with_sigma_m < 10.0, "{with_sigma_m}");
     // The halves share the errors of the footprints' coordinates; a mean of each errs by as much as the other.
     let expected_m = mean_sigma_m.unwrap() * 2.0_f64.sqrt();
     assert!(

@@ -5,7 +5,7 @@ use std::{fs, ops::RangeInclusive, path::PathBuf};
 
 use super::{SITES, judged, root_mean_square, scene};
 
-const SEEDS: RangeInclusive<u32> = 201..=206;
+const SEEDS: RangeInclusive<u32> = 201..=204;
 
 #[test]
 fn an_offset_of_the_attitudes_clock_moves_places_where_it_is_read_so() {
@@ -41,7 +41,7 @@ fn an_offset_of_the_attitudes_clock_moves_places_where_it_is_read_so() {
             assert!((apart + told_m - read).abs() < 2.0, "{}", even.name);
         }
     }
-    // 0.73 s are 240 m: half of the missions and more disagree by over 100.
+    // 0.73 s are 240 m: most missions disagree by over 100.
     assert!(disputed >= 6, "{disputed}");
     // The flight goes north: what half of the disagreement does is an error of the mean there.
     let [apart_m, read_m] =
