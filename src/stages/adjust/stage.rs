@@ -55,7 +55,7 @@ impl Stage for Adjust<'_> {
         let ties = &self.ties.value()?.points;
         let mut adjusted = adjust(&images, &shots, ties, starts, config)?;
         if config.model == AdjustmentModel::MolaSurface && is_disputed(&images, starts) {
-            let attitude_clock = !(config.attitude_clock_sigma_s > 0.0);
+            let attitude_clock = config.attitude_clock_sigma_s <= 0.0;
             let other = AdjustmentConfig {
                 attitude_clock_sigma_s: if attitude_clock { CLOCK_SIGMA_S } else { 0.0 },
                 ..config.clone()
