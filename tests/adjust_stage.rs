@@ -321,7 +321,8 @@ fn coordinates_that_are_known_place_the_rest() {
     let heights_m2 = Matrix3::identity() * 1e8 - up * up.transpose() * (1e8 - 1.0);
     let (place_m, up_m, _) = with(&mut site, Some(heights_m2), 0.0);
     println!("{place_m} {up_m}");
-    assert!(up_m < 5.0 && place_m > 30.0, "{up_m} {place_m}");
+    // Eight heights of 11 m by their own rays: 4 m, and what the rest of the site tilts by.
+    assert!(up_m < 10.0 && place_m > 30.0, "{up_m} {place_m}");
 }
 
 #[test]

@@ -496,7 +496,7 @@ fn above_lola_m(judging: &LaserSurface, ties: impl Iterator<Item = Vector3<f64>>
 }
 
 /// Ties count where the ground between footprints is known to this, metres.
-const SURFACE_KNOWN_M: f64 = 10.0;
+const SURFACE_KNOWN_M: f64 = 25.0;
 
 /// A surface of some of the footprints. It counts heights from the ellipsoid of Mars, 1650 km below: what that adds is
 /// smooth, and the same for ties.
