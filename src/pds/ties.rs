@@ -161,15 +161,13 @@ fn sigmas(written: [Option<&str>; 2]) -> std::result::Result<Option<[f64; 2]>, S
         return Ok(None);
     }
     let positive = |text: Option<&str>| finite(text?).filter(|sigma| *sigma > 0.0);
-    match written.map(positive) {
-        [Some(line), Some(sample)] => Ok(Some([line, sample])),
-        _ => {
-            let [line, sample] = written.map(|text| text.unwrap_or("missing"));
-            Err(format!(
-                "standard deviations of line {line}, of sample {sample}: expected two numbers above 0, or neither"
-            ))
-        }
+    if let [Some(line), Some(sample)] = written.map(positive) {
+        return Ok(Some([line, sample]));
     }
+    let [line, sample] = written.map(|text| text.unwrap_or("missing"));
+    Err(format!(
+        "standard deviations of line {line}, of sample {sample}: expected two numbers above 0, or neither"
+    ))
 }
 
 fn finite(text: &str) -> Option<f64> {

@@ -13,11 +13,11 @@ use super::{
     summary::AdjustmentSummary,
 };
 use crate::{
-    config::AdjustmentConfig,
     frames::{MarsIau2000, Position},
     geom::{
         bundle::{Adjustment, ORIENTATION_UNKNOWNS, Residual, View},
         pushbroom::{CorrectedOrientation, ExteriorOrientation, OrientationCorrection, Sighting},
+        statistics::BAARDA_LIMIT,
     },
 };
 
@@ -80,7 +80,7 @@ pub struct CorrectedPoint {
     /// Where it is adjusted.
     pub ground: Position<MarsIau2000>,
     /// Covariance of the adjusted coordinates, m²: a priori variances times the summary's variance factor; of a tie point
-    /// that lies beyond the limit of heights and yet was kept, its distance from the surface too.
+    /// that fails the test against the surface and yet was kept, its distance from that too.
     pub covariance_m2: Matrix3<f64>,
 }
 
@@ -163,9 +163,8 @@ pub(super) fn collect<M: ExteriorOrientation>(
     assembled: Assembled<&M>,
     adjustment: Adjustment,
     summary: AdjustmentSummary,
-    config: &AdjustmentConfig,
 ) -> Adjusted {
-    let contradicted_m2 = contradicted_m2(&adjustment, config.height_blunder_limit);
+    let contradicted_m2 = contradicted_m2(&adjustment);
     let mut index_of = vec![None; assembled.points.len()];
     let mut points = Vec::with_capacity(assembled.points.len());
     let variance = summary.variance_factor;
@@ -252,17 +251,14 @@ fn in_image_px<M: ExteriorOrientation>(
     ])
 }
 
-/// What the heights of points beyond `limit` standard deviations from the surface are uncertain by besides, m².
+/// What the heights of points that fail the test against the surface are uncertain by besides, m².
 ///
-/// These are points for which a neighbour vouches: ground between the profiles, or two measurements that err alike. Nothing
-/// tells which of image and altimeter is right of them.
-fn contradicted_m2(adjustment: &Adjustment, limit: Option<f64>) -> Vec<Matrix3<f64>> {
+/// These are points that stand out, but not enough for blunders, or for which a neighbour vouches: ground between the
+/// profiles, or measurements that err alike. Nothing tells which of image and altimeter is right of them.
+fn contradicted_m2(adjustment: &Adjustment) -> Vec<Matrix3<f64>> {
     let mut added_m2 = vec![Matrix3::zeros(); adjustment.points.len()];
-    let Some(limit) = limit else {
-        return added_m2;
-    };
     for height in &adjustment.compared {
-        let stands_out = height.above_m.abs() > limit * height.sigma_m();
+        let stands_out = height.above_m.abs() > BAARDA_LIMIT * height.sigma_m();
         if let (true, Ok(point)) = (stands_out, &adjustment.points[height.point]) {
             let up_m = point.ground_m.normalize() * height.above_m;
             added_m2[height.point] = up_m * up_m.transpose();
