@@ -573,7 +573,10 @@ fn heights_follow_lola_where_its_surface_controls_them() {
         (without, without_sigma_m, _),
         (with, with_sigma_m, mean_sigma_m),
     ] = adjusted;
-    assert!(with.n > 20, "{}", with.n);
+    // Most ties lie where LOLA's ground is not known so well.
+    assert!(with.n >= 15, "{}", with.n);
+    // Metres: the network's own orientations, and the same with a surface of which these ties know nothing.
+    assert!(with.median.abs() < before.median.abs() && with.median.abs() < without.median.abs());
     // Without the surface heights are where the network's own orientations leave them, and stated as what these priors
     // allow: nothing of LOLA is known then.
     assert!(without.median.abs() < 3.0 * without_sigma_m && without_sigma_m > 100.0);

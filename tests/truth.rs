@@ -9,8 +9,6 @@
 
 #[path = "truth/across.rs"]
 mod across;
-#[path = "truth/attitude_clock.rs"]
-mod attitude_clock;
 mod common;
 #[path = "truth/misregistration.rs"]
 mod misregistration;
@@ -52,8 +50,6 @@ struct Judged {
     surface_sigma_m: f64,
     /// Standard deviation of unit weight along the track.
     along: f64,
-    /// How far north of these the other reading of the disagreement along the flight places tie points, metres.
-    other_north_m: Option<f64>,
     lost: Vec<String>,
     kept_blunders: Vec<String>,
 }
@@ -124,7 +120,6 @@ impl Judged {
                 .as_f64()
                 .unwrap(),
             along: summary["tie_components"][0].as_f64().unwrap(),
-            other_north_m: document["adjustment"]["other_reading"]["moved_m"][1].as_f64(),
             lost: Vec::new(),
             kept_blunders: Vec::new(),
         };

@@ -89,11 +89,6 @@ declare_table! {
         /// Time bias of each image as an unknown with this standard deviation; 0 for no such unknown.
         time_bias_sigma_s as "time_bias_sigma_ms": f64 =
             key(SIGMA_OR_NONE).or(0.0).map(|milliseconds| milliseconds * SECONDS_PER_MS),
-        /// Standard deviation of an offset of the attitude's clock; 0 for no such unknown. It moves images that look to nadir
-        /// (within 5 degrees), whose bus turns by 0.05 degrees a second, 0.3 km on the ground, and none that is held
-        /// inertially. All other images are then held to 0.15 mrad along the flight. The nadir image of Shan et al. 2005 is
-        /// off to the same side at all three sites, by 0.70 to 0.82 s of this turn; their paper does not say why.
-        attitude_clock_sigma_s: f64 = key(SIGMA_OR_NONE).or(0.0),
         /// Published model: standard deviation of the position unknowns of images that look to nadir (within 5
         /// degrees); inf leaves free, 0 holds fixed. Rotations get what moves the ground as far (the paper).
         position_sigma_nadir_m: Option<f64> = key(SIGMA_OR_FREE).unused("100.0").was("nadir_sigma_m"),
@@ -125,7 +120,6 @@ fn keys_of_the_model(checked: &AdjustmentConfig, keys: &mut Keys<'_, '_>) {
         AdjustmentModel::Published => &[
             "position_sigma_m",
             "rotation_sigma_arcsec",
-            "attitude_clock_sigma_s",
             "height_blunder_limit",
         ],
     };

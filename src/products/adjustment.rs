@@ -22,7 +22,7 @@ use crate::{
     },
     schema::{DocumentSchema, all_positive, at, none_negative},
     stages::{
-        adjust::{AdjustmentSummary, CorrectedImage, HeightSummary, OtherReading, PointKind},
+        adjust::{AdjustmentSummary, CorrectedImage, HeightSummary, PointKind},
         check_heights::{HeightCheck, ProfilesApart, SurfaceFigures},
         compare_pairs::{PairComparison, ProfileByTies},
         intersect::{ImageResiduals, IntersectedTies},
@@ -31,7 +31,7 @@ use crate::{
 use configured::AdjustmentKeys;
 
 /// What the numbers are, for readers of the file.
-const DEFINITIONS: [(&str, &str); 11] = [
+const DEFINITIONS: [(&str, &str); 10] = [
     (
         "before, after",
         "with the orientation of the kernels, and with the adjusted one; ground points are intersected anew",
@@ -66,12 +66,6 @@ const DEFINITIONS: [(&str, &str); 11] = [
         "budget",
         "eq. 5 to 9 of Shan et al. 2005; pixels are the mean line spacing of the pair. paper_average takes the average of \
          the images' across-track residuals as the paper computes, equation_7 their sum of squares as its eq. 7 says",
-    ),
-    (
-        "other_reading",
-        "where images of a pair place tie points more than 100 m apart along the flight: what the adjustment says with an \
-         offset of the attitude's clock of nadir images (1 s), or without one where it has one; tie points do not tell \
-         which reading is right",
     ),
     (
         "correction, sigmas",
@@ -232,8 +226,6 @@ struct AdjustmentDocument<'a> {
     summary: &'a AdjustmentSummary,
     #[serde(skip_serializing_if = "Option::is_none")]
     heights: Option<&'a HeightSummary>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    other_reading: Option<&'a OtherReading>,
     /// Weighted sum of squared residuals before each step and after the last.
     #[schemars(length(min = 1), transform = none_negative)]
     weighted_squares: &'a [f64],
@@ -317,7 +309,6 @@ fn document<'a>(
         adjustment: AdjustmentDocument {
             summary: &adjusted.summary,
             heights: adjusted.heights.as_ref(),
-            other_reading: adjusted.other_reading.as_ref(),
             weighted_squares: &adjusted.weighted_squares,
             images: adjusted.images.iter().map(image).collect(),
             rejected: rejected.collect(),

@@ -187,20 +187,6 @@ fn absolute(geometric: &GeometricProducts, adjustment: &AdjustmentProducts) -> [
     let pairs = BeforeAfter::all(geometric);
     let worst = BeforeAfter::worst(&pairs);
     let half_m = worst.map_or(0.0, |pair| 0.5 * pair.before.along_track_parallax_m.abs());
-    let other = adjustment.adjusted.other_reading.as_ref();
-    let other = other.map_or_else(String::new, |other| {
-        let [east_m, north_m, _] = other.moved_m;
-        let reading = if other.attitude_clock {
-            "read as an offset of the attitude's clock of nadir images"
-        } else {
-            "read without an offset of the attitude's clock"
-        };
-        format!(
-            "; {reading}, the same data place tie points {} m east and {} m north of here",
-            label(east_m, 0),
-            label(north_m, 0)
-        )
-    });
     // What is stated holds only if errors of both images are as likely; half of their difference is no less open.
     let half = if half_m > east_m.max(north_m) {
         format!(
@@ -218,7 +204,7 @@ fn absolute(geometric: &GeometricProducts, adjustment: &AdjustmentProducts) -> [
             label(single[1], 0)
         ),
         format!(
-            "±{} m east, ±{} m north{half}{other}",
+            "±{} m east, ±{} m north{half}",
             label(east_m, 0),
             label(north_m, 0)
         ),

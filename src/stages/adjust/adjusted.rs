@@ -8,7 +8,6 @@ use super::{
     height_summary::{self, HeightSummary},
     input::AdjustImage,
     network::Assembled,
-    other_reading::OtherReading,
     points::{PointKind, RejectedPoint},
     summary::AdjustmentSummary,
 };
@@ -28,8 +27,6 @@ pub struct Adjusted {
     pub summary: AdjustmentSummary,
     /// Heights of tie points by the MOLA surface; `None` where they are no observations.
     pub heights: Option<HeightSummary>,
-    /// What another reading of a disagreement along the flight says, where there is a large one.
-    pub other_reading: Option<OtherReading>,
     /// One entry for each image, in their order.
     pub images: Vec<CorrectedImage>,
     /// Points with adjusted coordinates: shots, then tie points, each in their order.
@@ -184,7 +181,6 @@ pub(super) fn collect<M: ExteriorOrientation>(
     let ranges = assembled.network.ranges.iter().zip(&adjustment.ranges);
     Adjusted {
         heights: height_summary::heights(&assembled, &adjustment),
-        other_reading: None,
         images: corrected_images(images, &adjustment, summary.variance_factor),
         views: views
             .filter_map(|(view, residuals)| {

@@ -26,18 +26,6 @@ use crate::{
 /// degree, and off nadir by ten and more.
 const NADIR_RAD: f64 = 5.0 * RADIANS_PER_DEGREE;
 
-/// The unknown that an offset of the attitude's clock becomes: the constant rotation about the camera's y axis, across the
-/// flight.
-const PITCH: usize = 12;
-/// Turn of a bus that follows the nadir, radians per second.
-///
-/// # Source
-/// A revolution in 7056 s, seen from Mars, which turns itself: 0.0501 degrees per second.
-const NADIR_TURN_RAD_S: f64 = 0.0501 * RADIANS_PER_DEGREE;
-/// Standard deviation of what an offset of the attitude's clock leaves of this rotation, radians: 57 m on the ground, to
-/// which 0.73 s explain the distances of 225 to 271 m between images (Shan et al. 2005, Table 5).
-const PITCH_BESIDE_CLOCK_RAD: f64 = 1.5e-4;
-
 /// An image before the adjustment.
 #[derive(Debug, Clone)]
 pub struct Candidate<'a, M> {
@@ -56,17 +44,7 @@ impl<M: ExteriorOrientation> Candidate<'_, M> {
     fn weighed(self, config: &AdjustmentConfig) -> AdjustImage<M> {
         let mut sigmas = match config.model {
             AdjustmentModel::MolaSurface => {
-                let mut sigmas =
-                    sigmas_of_powers(&config.position_sigma_m, &config.rotation_sigma_rad);
-                if config.attitude_clock_sigma_s > 0.0 {
-                    let pitch_rad = &mut sigmas[PITCH];
-                    *pitch_rad = pitch_rad.min(PITCH_BESIDE_CLOCK_RAD);
-                    if self.looks_to_nadir() {
-                        *pitch_rad =
-                            pitch_rad.hypot(NADIR_TURN_RAD_S * config.attitude_clock_sigma_s);
-                    }
-                }
-                sigmas
+                sigmas_of_powers(&config.position_sigma_m, &config.rotation_sigma_rad)
             }
             AdjustmentModel::Published => self.published_sigmas(config),
         };
@@ -92,17 +70,13 @@ impl<M: ExteriorOrientation> Candidate<'_, M> {
         }
     }
 
-    fn looks_to_nadir(&self) -> bool {
-        let pose = self.oriented_camera.orientation.pose(0.0);
-        let look = pose.mars_to_camera.row(2).transpose();
-        look.angle(&-pose.position_m) < NADIR_RAD
-    }
-
     /// All position unknowns get the standard deviation of nadir or of other images, and rotations what moves the
     /// ground as far: `σ/range` (Yoon & Shan 2004).
     fn published_sigmas(&self, config: &AdjustmentConfig) -> [f64; ORIENTATION_UNKNOWNS] {
+        let pose = self.oriented_camera.orientation.pose(0.0);
+        let look = pose.mars_to_camera.row(2).transpose();
         let [nadir_m, off_nadir_m] = config.published_sigmas_m();
-        let position_m = if self.looks_to_nadir() {
+        let position_m = if look.angle(&-pose.position_m) < NADIR_RAD {
             nadir_m
         } else {
             off_nadir_m

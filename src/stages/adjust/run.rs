@@ -73,9 +73,7 @@ pub fn adjust<M: ExteriorOrientation>(
     assembled.rejected.extend(dropped);
     contradictions(images, &assembled, &adjustment)?;
     let summary = summary::summarise(images, &assembled, &adjustment, config)?;
-    Ok(adjusted::collect(
-        images, assembled, adjustment, summary, config,
-    ))
+    Ok(adjusted::collect(images, assembled, adjustment, summary))
 }
 
 fn contradictions<M>(

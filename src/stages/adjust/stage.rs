@@ -2,20 +2,17 @@
 
 use std::sync::atomic::AtomicBool;
 
-use super::{
-    AdjustImage, Adjusted, Candidate, LaserShots, adjust, prepare_adjustment,
-    reading::{CLOCK_SIGMA_S, is_disputed, other_reading},
-};
+use super::{Adjusted, Candidate, adjust, prepare_adjustment};
 use crate::{
     config::{AdjustmentConfig, MolaSurfaceConfig},
     error::Result,
     footprints::AdjustmentModel,
-    geom::pushbroom::{CameraModel, ExteriorOrientation},
+    geom::pushbroom::CameraModel,
     stage::{InOrder, Output, Stage},
     stage_inputs,
     stages::{
         convert_datum::Converted, group_profiles::Profile, intersect::IntersectedTies,
-        mola_surface::MolaShots, oriented::OrientedImage, read_ties::Ties, site_image::SiteImage,
+        mola_surface::MolaShots, read_ties::Ties, site_image::SiteImage,
     },
 };
 
@@ -43,44 +40,13 @@ stage_inputs! {
 
 impl Stage for Adjust<'_> {
     const NAME: &'static str = "adjust";
-    const METHOD: u32 = 3;
+    const METHOD: u32 = 4;
     type Output = Adjusted;
     stage_inputs!(fingerprint);
 
     fn run(&self, _stop: &AtomicBool) -> Result<Adjusted> {
-        let config = self.adjustment;
-        let starts = self.intersected.value()?;
         let oriented = SiteImage::oriented(self.images.0)?;
-        let (images, shots) = self.prepare(&oriented, config)?;
-        let ties = &self.ties.value()?.points;
-        let mut adjusted = adjust(&images, &shots, ties, starts, config)?;
-        if config.model == AdjustmentModel::MolaSurface && is_disputed(&images, starts) {
-            let attitude_clock = config.attitude_clock_sigma_s <= 0.0;
-            let other = AdjustmentConfig {
-                attitude_clock_sigma_s: if attitude_clock { CLOCK_SIGMA_S } else { 0.0 },
-                ..config.clone()
-            };
-            let (images, shots) = self.prepare(&oriented, &other)?;
-            // What cannot be read in another way needs no second result.
-            if let Ok(other) = adjust(&images, &shots, ties, starts, &other) {
-                adjusted.other_reading = other_reading(&adjusted, &other, attitude_clock);
-            }
-        }
-        Ok(adjusted)
-    }
-}
-
-/// An image with its camera in any form.
-type Image<'a> = AdjustImage<&'a (dyn ExteriorOrientation + 'static)>;
-
-impl Adjust<'_> {
-    /// Images and shots, weighed as `config` says.
-    fn prepare<'b>(
-        &'b self,
-        oriented: &'b [OrientedImage<'b>],
-        config: &AdjustmentConfig,
-    ) -> Result<(Vec<Image<'b>>, LaserShots)> {
-        let candidates = self.images.0.iter().zip(oriented);
+        let candidates = self.images.0.iter().zip(&oriented);
         let candidates = candidates.map(|(image, oriented)| {
             Ok(Candidate {
                 times: image.times.value()?,
@@ -90,22 +56,24 @@ impl Adjust<'_> {
             })
         });
         let (footprints, profiles) = (&self.converted.value()?.footprints, self.profiles.value()?);
-        let surface = match config.model {
+        let (ties, starts) = (&self.ties.value()?.points, self.intersected.value()?);
+        let surface = match self.adjustment.model {
             // Without enough shots heights are what the orientations say.
             AdjustmentModel::MolaSurface => {
-                let around = self.intersected.value()?.points.iter();
-                let around: Vec<_> = around.map(|point| point.ground.xyz_m).collect();
+                let around = starts.points.iter().map(|point| point.ground.xyz_m);
+                let around: Vec<_> = around.collect();
                 let shots = MolaShots::of(footprints, profiles);
                 shots.surface(&around, &self.mola_surface.options()).ok()
             }
             AdjustmentModel::Published => None,
         };
-        Ok(prepare_adjustment(
+        let (images, shots) = prepare_adjustment(
             candidates.collect::<Result<Vec<_>>>()?,
             footprints,
             profiles,
             surface,
-            config,
-        ))
+            self.adjustment,
+        );
+        adjust(&images, &shots, ties, starts, self.adjustment)
     }
 }
