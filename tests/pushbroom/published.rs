@@ -1,4 +1,4 @@
-//! What the papers print of the two iterations, and what theory says of their convergence.
+//! What theory says of the convergence of the two published iterations, and the points of Shan 2002.
 
 use areograph::{
     geom::{
@@ -12,51 +12,7 @@ use areograph::{
 };
 use nalgebra::Vector3;
 
-use super::scene::{EOS_NADIR, EOS_OBLIQUE, GUSEV, Held, Scene};
-
-/// The papers' tolerance.
-const PAPER: Limits = Limits {
-    tolerance_lines: 0.1,
-    steps_max: 100,
-};
-
-/// Mean evaluations of the frame-first iteration and of the fixed point, and the largest difference of
-/// their lines.
-fn counts(scene: &Scene, points_m: &[Vector3<f64>], limits: &Limits) -> (f64, f64, f64) {
-    let model = scene.euler(2);
-    let frame_first = FrameFirst::new(&model, scene.focal_length_px()).unwrap();
-    let fixed_point = FixedPoint::new(&model, scene.focal_length_px()).unwrap();
-    let (mut a, mut b, mut apart) = (0, 0, 0.0_f64);
-    for point in points_m {
-        let by_a = frame_first.solve(point, limits, |_| {}).unwrap();
-        let by_b = fixed_point.solve(point, limits, |_| {}).unwrap();
-        a += by_a.evaluations;
-        b += by_b.evaluations;
-        apart = apart.max((by_a.x - by_b.x).abs());
-    }
-    let count = points_m.len() as f64;
-    (f64::from(a) / count, f64::from(b) / count, apart)
-}
-
-#[test]
-fn gusev_needs_the_iterations_that_the_paper_prints() {
-    // Shan et al. 2005 print 17.1 and 5.6 for 142 footprints on E02-00665.
-    let (a, b, _) = counts(&GUSEV, &GUSEV.profile_m(142, 305.0), &PAPER);
-    assert!((5.2..=6.0).contains(&b), "B {b}");
-    assert!((16.5..=19.5).contains(&a), "A {a}");
-    assert!(a / b > 3.0);
-}
-
-#[test]
-fn the_fixed_point_needs_fewer_iterations_everywhere() {
-    for (scene, name) in [(EOS_NADIR, "E02-02855"), (EOS_OBLIQUE, "E04-01275")] {
-        let (a, b, _) = counts(&scene, &scene.profile_m(174, 305.0), &PAPER);
-        assert!(b < a, "{name}: A {a}, B {b}");
-    }
-    // The only image of the paper whose orientation is held: its printed 2.9.
-    let (_, b, _) = counts(&EOS_OBLIQUE, &EOS_OBLIQUE.profile_m(174, 305.0), &PAPER);
-    assert!((2.5..=3.3).contains(&b), "B {b}");
-}
+use super::scene::{EOS_NADIR, EOS_OBLIQUE, GUSEV, Held, PAPER, Scene};
 
 /// Ratio of successive steps once the first ones are over, and long before rounding.
 fn contraction(steps: &[f64]) -> f64 {
@@ -175,7 +131,7 @@ fn all_methods_find_the_same_line() {
             // Lines: tolerance / (1 − r) with r = 0.1.
             assert!((by_newton - by_b).abs() < 1.2e-3, "{by_newton} {by_b}");
         }
-        let (_, _, apart) = counts(&scene, &points_m, &limits);
+        let apart = scene.iterations(&points_m, &limits).apart_lines;
         assert!(apart < 3e-3, "{apart}"); // lines: tolerance / (1 − |r|) of both, |r| up to 0.56
     }
 }
