@@ -10,6 +10,8 @@
 mod arthur_1977;
 #[path = "fidelity/document.rs"]
 mod document;
+#[path = "pushbroom/eos_2002.rs"]
+mod eos_2002;
 #[path = "common/kept.rs"]
 mod kept;
 #[path = "fidelity/li_2023.rs"]

@@ -254,8 +254,8 @@ fn the_images_are_flown_as_table_2_prints_them() {
         let camera = Position::<MarsIau2000>::new(vectors(&truth["position_iau2000_m"])[15]);
         let ground_m = ray_meets_ellipsoid(&camera, &boresight).unwrap().xyz_m;
         let flown_deg = ground_m.angle(&-boresight) / RADIANS_PER_DEGREE;
-        // Nadir images are printed to 0.04° of each other, and share one mounting.
-        assert!((flown_deg - emission_deg).abs() < 0.05, "{id}: {flown_deg}");
+        // Degrees: two of the nadir images are printed to a tenth, and one mounting serves all.
+        assert!((flown_deg - emission_deg).abs() < 0.06, "{id}: {flown_deg}");
         let path = MISSION.path(&format!("labels/{id}.lbl"));
         let label = areograph::pds::moc::read_label(&path, built_in_instruments()).unwrap();
         let fields = &label.fields;
@@ -266,6 +266,7 @@ fn the_images_are_flown_as_table_2_prints_them() {
             .flat_map(|site| site.images)
             .find(|image| image.id == id)
             .unwrap()
+            .fields
             .lines_delivered;
         assert_eq!(delivered.unwrap_or(header_lines), file_lines, "{id}");
     }
@@ -396,7 +397,7 @@ fn the_same_seed_gives_the_same_bytes() {
             }
         }
     }
-    assert_eq!(compared, 7 + 6 + 5 + 6 + 9 + 4 + 4 + 3);
+    assert_eq!(compared, 7 + 6 + 5 + 7 + 9 + 4 + 4 + 3);
     assert_eq!(
         fs::read_dir(folder.path()).unwrap().count(),
         1,

@@ -165,7 +165,7 @@ fn write_kernels(draft: &Draft, options: &SceneOptions) -> Result<Vec<Arc>> {
     let labels = draft.folder("labels")?;
     write_text_kernels(&kernels)?;
     let session = clock_session(&kernels)?;
-    let arcs = IMAGES
+    let mut arcs = IMAGES
         .iter()
         .chain([&LOST_IMAGE])
         .map(|image| {
@@ -173,6 +173,12 @@ fn write_kernels(draft: &Draft, options: &SceneOptions) -> Result<Vec<Arc>> {
             Arc::new(image, start, image.pedr_duration_s(options.day_s))
         })
         .collect::<Result<Vec<Arc>>>()?;
+    arcs.sort_by(|a, b| {
+        a.exposed
+            .start
+            .seconds()
+            .total_cmp(&b.exposed.start.seconds())
+    });
     for arc in arcs.iter().filter(|arc| arc.image.is_delivered()) {
         put(
             &labels.join(format!("{}.lbl", arc.image.id)),

@@ -2,12 +2,13 @@
 
 use areograph::{
     constants::MARS_IAU2000,
-    geom::pushbroom::{EulerPolynomial, ExteriorOrientation, Projector, VectorPolynomial},
+    geom::pushbroom::{EulerPolynomial, ExteriorOrientation, Projector},
     units::RADIANS_PER_DEGREE,
 };
 use nalgebra::Vector3;
 
 use super::{
+    eos_2002::{Ends, FOCAL_LENGTH_PX, LEFT, POINTS_KM, RIGHT},
     row::{Account, Comparison, Paper, Row, number},
     scene::GROUND_RADIUS_M,
     table_2::TABLE_2,
@@ -21,75 +22,12 @@ pub(crate) static PAPER: Paper = Paper {
     rows: &[&ROWS],
 };
 
-/// Orientation of an image at its first and last line: kilometres, degrees.
-struct Ends {
-    start_km: [f64; 3],
-    end_km: [f64; 3],
-    start_deg: [f64; 3],
-    end_deg: [f64; 3],
-    lines: f64,
-    line_period_s: f64,
-}
-
-/// "Right": E02-02855, its start Y as it must read.
-const RIGHT: Ends = Ends {
-    start_km: [2_743.679, -2_435.358, -895.114],
-    end_km: [2_749.133, -2_450.626, -836.828],
-    start_deg: [11.370_1, -75.964_8, -126.576],
-    end_deg: [12.181_0, -76.869_2, -125.672_8],
-    lines: 9_856.0,
-    line_period_s: 1.807_8e-3,
-};
-/// The start Y of "right" as it is printed.
-const MISPRINTED_Y_KM: f64 = -2_453.358;
-/// "Left": E04-01275.
-const LEFT: Ends = Ends {
-    start_km: [2_638.162, -2_549.221, -891.875],
-    end_km: [2_640.863, -2_557.746, -860.101],
-    start_deg: [-8.629_6, -75.946_7, -124.566_6],
-    end_deg: [-8.639_2, -75.945_2, -124.534_5],
-    lines: 8_064.0,
-    line_period_s: 1.205_2e-3,
-};
-/// Focal length over the pixel of three detectors.
-const FOCAL_LENGTH_PX: f64 = 3_500.0 / 0.039;
 /// Half the width of E02-02855, pixels.
 const HALF_SWATH_PX: f64 = 336.0;
-/// Table 2: MOLA points, kilometres.
-const POINTS_KM: [[f64; 3]; 10] = [
-    [2_469.471, -2_191.971, -792.691],
-    [2_469.504, -2_192.054, -792.363],
-    [2_469.540, -2_192.134, -792.035],
-    [2_469.596, -2_192.310, -791.380],
-    [2_469.625, -2_192.397, -791.052],
-    [2_469.659, -2_192.479, -790.724],
-    [2_469.701, -2_192.552, -790.395],
-    [2_469.764, -2_192.720, -789.740],
-    [2_469.845, -2_192.987, -788.758],
-    [2_469.876, -2_193.071, -788.430],
-];
 /// Numbers of the points in their profile, by their distances.
 const NUMBERS: [f64; 10] = [0.0, 1.0, 2.0, 4.0, 5.0, 6.0, 7.0, 9.0, 12.0, 13.0];
 
 impl Ends {
-    /// Orientation of first order through both ends.
-    fn model(&self) -> EulerPolynomial {
-        let through = |start: [f64; 3], end: [f64; 3], scale: f64| {
-            let (start, end) = (Vector3::from(start) * scale, Vector3::from(end) * scale);
-            VectorPolynomial {
-                coefficients: [
-                    (start + end) / 2.0,
-                    (end - start) / self.lines,
-                    Vector3::zeros(),
-                ],
-            }
-        };
-        EulerPolynomial {
-            path_m: through(self.start_km, self.end_km, 1e3),
-            angles_rad: through(self.start_deg, self.end_deg, RADIANS_PER_DEGREE),
-        }
-    }
-
     /// Angle of the boresight from the centre of Mars at a share of the image, degrees.
     fn look_deg(&self, share: f64) -> f64 {
         let pose = self.model().pose(share * self.lines);
@@ -130,7 +68,7 @@ pub(crate) fn base_and_height() -> BaseAndHeight {
 }
 
 fn right() -> Vec<Comparison> {
-    let as_printed = [RIGHT.start_km[0], MISPRINTED_Y_KM, RIGHT.start_km[2]];
+    let as_printed = RIGHT.misprinted().start_km;
     let radius = |place_km: [f64; 3]| Vector3::from(place_km).norm();
     let end = format!("{:.2}", radius(RIGHT.end_km));
     vec![
@@ -225,11 +163,7 @@ fn points() -> Vec<Comparison> {
     let way_m = (Vector3::from(POINTS_KM[9]) - Vector3::from(POINTS_KM[0])).norm() * 1e3;
     let spacing_m = way_m / (seen[9][0] - seen[0][0]);
     all.push(number("line spacing, m", TABLE_2[0].pixel_m, spacing_m, 3).within(0.05));
-    let misprinted = Ends {
-        start_km: [RIGHT.start_km[0], MISPRINTED_Y_KM, RIGHT.start_km[2]],
-        ..RIGHT
-    };
-    let [_, pixel] = image_of(&misprinted.model(), POINTS_KM[0]);
+    let [_, pixel] = image_of(&RIGHT.misprinted().model(), POINTS_KM[0]);
     let of = "y of the first point with the misprinted Y, px";
     all.push(number(of, "in the image", pixel, 0).shown());
     all

@@ -125,10 +125,17 @@ pub(crate) const TABLE_2: [Printed; 6] = [
     },
 ];
 
-/// How fast the boresight of a nadir image runs over the ground, and that of one held inertially, metres per second.
+/// How fast the boresight of a nadir image runs over the ground; one held inertially runs as fast as the spacecraft
+/// against the turning ground, metres per second.
 pub(crate) fn ground_speed_m_s(nadir: bool) -> f64 {
-    let scene = if nadir { GUSEV } else { EOS_OBLIQUE };
-    (scene.boresight_ground_m(0.5) - scene.boresight_ground_m(-0.5)).norm()
+    let [after_m, before_m] = [0.5, -0.5].map(|at_s| {
+        if nadir {
+            GUSEV.boresight_ground_m(at_s)
+        } else {
+            EOS_OBLIQUE.pose(at_s).position_m
+        }
+    });
+    (after_m - before_m).norm()
 }
 
 impl Printed {

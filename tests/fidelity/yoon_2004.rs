@@ -92,12 +92,21 @@ fn ties(site: Site, printed: [[&'static str; 2]; 4]) -> Vec<Comparison> {
             ours.standard_deviation,
             3,
         );
-        all.push(if name.starts_with('x') {
-            deviation.between(0.3, 0.8)
-        } else {
-            deviation.shown()
+        all.push(match site {
+            Site::Gusev if name.starts_with('x') => deviation.share(0.2),
+            _ => deviation.shown(),
         });
     }
+    let [[first, _], [second, _]] = ours;
+    let [of_first, of_second] =
+        [0, 2].map(|column: usize| -> f64 { printed[column][1].parse().unwrap() });
+    let share = number(
+        "standard deviation of x1 over that of x2",
+        fixed(of_first / of_second, 3),
+        first.standard_deviation / second.standard_deviation,
+        3,
+    );
+    all.push(share.share(0.1));
     all
 }
 
@@ -370,7 +379,7 @@ static ROWS: [Row; 23] = [
                 )
             },
         },
-        note: "σ y: see Y04-12.",
+        note: "The size of σ x is that of the noise, a whole line; how the images share it is geometry. σ y: see Y04-12.",
     },
     Row {
         id: "Y04-11",
@@ -434,7 +443,7 @@ static ROWS: [Row; 23] = [
                 )
             },
         },
-        note: "σ y: see Y04-12.",
+        note: "As Y04-10.",
     },
     Row {
         id: "Y04-15",
