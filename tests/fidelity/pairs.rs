@@ -143,7 +143,7 @@ fn off_nadir(image: &Printed, below: &Scene) -> Scene {
             longitude_deg: below.longitude_deg - west_deg,
             ..scene
         };
-        scene = recipe::aimed(placed, &target_m);
+        scene = recipe::held_on(placed, &target_m);
         let found_rad = (scene.pose(0.0).position_m - target_m).angle(&target_m);
         west_deg *= emission_rad / found_rad;
     }
