@@ -12,88 +12,19 @@ mod scene;
 
 use areograph::geom::{
     attitude::{OmegaPhiKappa, rotation_vector},
-    bundle::{
-        Adjustment, BundleImage, BundleOptions, Network, PointRejection, Residual, View, solve,
-    },
+    bundle::{Adjustment, BundleImage, BundleOptions, Network, PointRejection, Residual, solve},
     polynomial::Polynomial,
     pushbroom::{
-        CorrectedOrientation, EulerPolynomial, ExteriorOrientation, Pose, Projector,
-        RotationVectorPolynomial, SampledOrientation, VectorPolynomial,
+        CorrectedOrientation, EulerPolynomial, ExteriorOrientation, Pose, RotationVectorPolynomial,
+        SampledOrientation, VectorPolynomial,
     },
     statistics::Summary,
 };
 use nalgebra::Vector3;
-use recipe::{Recipe, Simulated, project};
+use recipe::{Recipe, adjusted_orientation, line_spacing_m, mola_shift_lines, reprojection};
 
 fn adjust(network: &Network<impl ExteriorOrientation>) -> Adjustment {
     solve(network, &BundleOptions::default()).unwrap()
-}
-
-/// Measured minus projected: lines and pixels of each view of the ties of an image.
-fn reprojection(
-    simulated: &Simulated<EulerPolynomial>,
-    image: usize,
-    orientation: &impl ExteriorOrientation,
-    ground_m: impl Fn(usize) -> Vector3<f64>,
-) -> [Vec<f64>; 2] {
-    let entry = &simulated.network.images[image];
-    let projector = Projector::new(orientation, 2.0 * entry.half_lines).unwrap();
-    let ties = |view: &&View| view.image == image && view.point >= simulated.shots;
-    let differences: Vec<(f64, f64)> = simulated
-        .network
-        .views
-        .iter()
-        .filter(ties)
-        .map(|view| {
-            let (x, y) = project(&projector, entry.focal_length_px, &ground_m(view.point));
-            (view.x_lines - x, view.y_px - y)
-        })
-        .collect();
-    let (lines, pixels) = differences.into_iter().unzip();
-    [lines, pixels]
-}
-
-/// The initial orientation of an image with its correction.
-fn adjusted_orientation<'a>(
-    simulated: &'a Simulated<EulerPolynomial>,
-    adjustment: &Adjustment,
-    image: usize,
-) -> impl ExteriorOrientation + use<'a> {
-    CorrectedOrientation {
-        base: &simulated.network.images[image].base,
-        correction: adjustment.images[image].correction,
-    }
-}
-
-/// Ground length of a line of an image at its middle, metres.
-fn line_spacing_m(simulated: &Simulated<EulerPolynomial>, image: usize) -> f64 {
-    let ground =
-        |shift: f64| recipe::pair(Recipe::GUSEV.place_deg)[image].boresight_ground_m(shift);
-    let period_s = simulated.network.images[image].line_period_s;
-    (ground(period_s) - ground(0.0)).norm()
-}
-
-/// Mean shift of the shots' image coordinates from the initial to the adjusted orientation, lines.
-fn mola_shift_lines(
-    simulated: &Simulated<EulerPolynomial>,
-    adjustment: &Adjustment,
-    image: usize,
-) -> Summary {
-    let entry = &simulated.network.images[image];
-    let orientation = adjusted_orientation(simulated, adjustment, image);
-    let projector = Projector::new(&orientation, 2.0 * entry.half_lines).unwrap();
-    let shots = |view: &&View| view.image == image && view.point < simulated.shots;
-    let shifts: Vec<f64> = simulated
-        .network
-        .views
-        .iter()
-        .filter(shots)
-        .map(|view| {
-            let ground_m = adjustment.points[view.point].unwrap().ground_m;
-            project(&projector, entry.focal_length_px, &ground_m).0 - view.x_lines
-        })
-        .collect();
-    Summary::of(&shifts)
 }
 
 fn residuals(adjustment: &Adjustment) -> Vec<Residual> {

@@ -6,31 +6,11 @@
     reason = "the test may fail loudly, and writes into the repository when asked"
 )]
 
-use std::{env, fs, path::Path};
+#[path = "common/kept.rs"]
+mod kept;
 
 use areograph::schema::DocumentSchema;
-
-fn is_up_to_date(relative: &str, expected: &str) {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(relative);
-    if env::var("SNAPSHOTS").is_ok_and(|mode| mode == "overwrite") {
-        fs::write(path, expected).unwrap();
-        return;
-    }
-    let found = fs::read_to_string(path).unwrap_or_default();
-    let differs = found
-        .lines()
-        .zip(expected.lines())
-        .position(|(a, b)| a != b);
-    let line = differs.unwrap_or_else(|| found.lines().count().min(expected.lines().count()));
-    assert!(
-        found == expected,
-        "{relative}: line {} is {:?}, the declarations say {:?}; write it anew with \
-         `SNAPSHOTS=overwrite cargo test --test generated`",
-        line + 1,
-        found.lines().nth(line),
-        expected.lines().nth(line),
-    );
-}
+use kept::is_up_to_date;
 
 #[test]
 fn the_list_of_products_is_up_to_date() {

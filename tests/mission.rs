@@ -381,6 +381,37 @@ fn without_the_clock_bias_shots_are_late_by_it() {
 }
 
 #[test]
+fn the_three_readings_of_the_clock_bias_differ_as_told() {
+    let mut config = site("isidis");
+    let mut read = |scope: BiasScope| {
+        config.mola_clock.scope = scope;
+        (
+            found(&config).footprints,
+            config.mola_clock.moves_spacecraft(),
+        )
+    };
+    let (stay, looks_up) = read(BiasScope::SpkLookup);
+    assert!(looks_up);
+    for (scope, looks_up) in [(BiasScope::Both, true), (BiasScope::Rotation, false)] {
+        let (moved, moves_spacecraft) = read(scope);
+        assert_eq!(moves_spacecraft, looks_up, "{scope:?}");
+        assert_eq!(moved.et_s, stay.et_s, "{scope:?}");
+        for row in 0..stay.len() {
+            let place = |of: &Footprints<MarsIau2000>| {
+                spherical_to_xyz_m(
+                    of.longitude_rad[row],
+                    of.latitude_rad[row],
+                    of.radius_m[row],
+                )
+            };
+            let moved_m = (place(&moved) - place(&stay)).norm();
+            // 0.117 s of Mars' rotation at 4° to 5° north, 3393 to 3397 km from the centre.
+            assert!((28.0..28.2).contains(&moved_m), "{scope:?} {moved_m} m");
+        }
+    }
+}
+
+#[test]
 fn a_stated_datum_against_the_version_letter_is_refused() {
     let mut config = site("eos_chasma");
     config.pedr.files = vec![mission().join("pedr/ap19802l.b") as PathBuf];

@@ -8,8 +8,6 @@
 
 #[path = "plane/blunders.rs"]
 mod blunders;
-#[path = "plane/published.rs"]
-mod published;
 #[path = "plane/refused.rs"]
 mod refused;
 #[path = "plane/uncertainty.rs"]

@@ -9,6 +9,8 @@
 mod distortion;
 #[path = "pushbroom/edges.rs"]
 mod edges;
+#[path = "pushbroom/eos_2002.rs"]
+mod eos_2002;
 #[path = "pushbroom/misregistration.rs"]
 mod misregistration;
 #[path = "pushbroom/published.rs"]

@@ -135,6 +135,36 @@ fn ground_m(products: &Path, file: &str) -> BTreeMap<(u64, u64), Vector3<f64>> {
         .collect()
 }
 
+/// The site chooses the orbit nearest to the mean of three, and knows which profile no image goes with.
+fn chooses_among_rivals(products: &Path) {
+    let manifest: Value =
+        serde_json::from_slice(&fs::read(products.join("manifest.json")).unwrap()).unwrap();
+    let sets = manifest["kernel_choice"].as_array().unwrap();
+    let names: Vec<&str> = sets
+        .iter()
+        .map(|set| set["set"].as_str().unwrap())
+        .collect();
+    assert_eq!(names, ["nav", "gsfc", "ipng"]);
+    let distance_m = |set: &Value| set["distance_rms_m"].as_f64().unwrap();
+    let nearest = sets
+        .iter()
+        .min_by(|a, b| distance_m(a).total_cmp(&distance_m(b)))
+        .unwrap();
+    for set in sets {
+        assert_eq!(set["chosen"] == true, set == nearest, "{set}");
+    }
+    let ranges: Value =
+        serde_json::from_slice(&fs::read(products.join("ranges.json")).unwrap()).unwrap();
+    let simultaneous: Vec<usize> = ranges["profiles"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|profile| profile["simultaneous"].as_array().unwrap().len())
+        .collect();
+    // Two images of the first day, none of the second, one of the third.
+    assert_eq!(simultaneous, [2, 0, 1]);
+}
+
 #[test]
 fn shots_lie_where_the_instrument_kernel_sees_them() {
     let out = tempfile::tempdir().unwrap();
@@ -143,6 +173,7 @@ fn shots_lie_where_the_instrument_kernel_sees_them() {
     run.arg(mission().join("sites/gusev_context.toml"));
     succeed(run.arg("--out").arg(out.path()));
     let (site, truth) = (site(), truth());
+    chooses_among_rivals(&out.path().join("gusev_context"));
     for (image, orientation) in images(&site) {
         let model = fit_sensor_model(&orientation, &site.orientation).unwrap();
         let oriented = OrientedImage::of(&image, &orientation, &model).unwrap();

@@ -15,7 +15,7 @@ declare_table! {
         /// Equal intervals over the image; one epoch more than intervals. The default is that of Shan et
         /// al. 2005; a second-order polynomial through four epochs is the least that leaves residuals.
         intervals: u32 = key(whole_from_to(3, 10_000)).or(30),
-        /// Largest second-order position RMSE, norm of x, y, z. The default is twice the largest in Table 4
+        /// Largest second-order position RMSE, norm of x, y, z. The default is about twice the largest in Table 4
         /// of Shan et al. 2005 (2.3 m).
         position_rmse_max_m: f64 = key(above_to(0.0, 1e6)).or(5.0),
         /// Largest second-order pointing RMSE of each angle. The default is twice the largest there (5.0″).

@@ -74,7 +74,7 @@ impl PointingConfig {
 
 declare_table! {
     /// Clock bias of MOLA.
-    /// Known: Shan et al. 2005 (p. 98, citing NAIF 2001) corrected it. Unknown: its sign, and whether PEDR
+    /// Known: Shan et al. 2005 (data preparation, citing NAIF 2001) corrected it. Unknown: its sign, and whether PEDR
     /// time tags, of which versions, already include it. The defaults below are therefore a choice; the
     /// bias scan of the range check tells which one a profile supports. Size: about one shot spacing
     /// (353 to 398 m) along the track, 28 m of Mars rotation at the equator, at most 3.2 m of height.

@@ -8,7 +8,7 @@ use std::{
 
 use crate::{
     error::{IoError, Locate, Result},
-    report::{SiteLine, SiteSummary, sites_page},
+    report::{FIDELITY_FILE, FIDELITY_PAGE, SiteLine, SiteSummary, sites_page},
     store::{
         atomic,
         manifest::{Manifest, figures},
@@ -17,7 +17,8 @@ use crate::{
     },
 };
 
-/// Writes the page over the sites whose folders lie in `out`; returns its path.
+/// Writes the page over the sites whose folders lie in `out`, and the one that it links to; returns the path of the
+/// former.
 ///
 /// # Errors
 /// The folder cannot be read, the page cannot be written.
@@ -45,6 +46,7 @@ pub fn publish_sites(out: &Path) -> Result<PathBuf> {
             failure,
         })
         .collect();
+    atomic::write(&out.join(FIDELITY_FILE), FIDELITY_PAGE.as_bytes())?;
     let page = out.join(SITES_PAGE);
     atomic::write(&page, sites_page(&lines).as_bytes())?;
     Ok(page)

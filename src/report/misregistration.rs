@@ -333,7 +333,7 @@ fn reprojection(pairs: &[BeforeAfter]) -> String {
     }
     let words = "Measured minus projected: every tie point is intersected from both images and projected back. M is the \
                  mean, σ the standard deviation; x along the flight, y across it and against the samples; 1 and 2 are the images in the order of \
-                 the pair's name. Table 5 prints means of 20.5 to 34.3 lines with opposite signs.";
+                 the pair's name.";
     table.finish() + &paragraph(words)
 }
 

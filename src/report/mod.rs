@@ -20,6 +20,7 @@ mod clocks_and_datum;
 mod compare;
 mod corrections;
 mod diff;
+mod fidelity;
 mod graticule;
 mod heights;
 mod html;
@@ -46,6 +47,9 @@ use crate::{error::Result, products::SiteProducts};
 
 pub use compare::{KernelComparison, comparison_page};
 pub use diff::difference_page;
+pub use fidelity::{
+    FIDELITY_FILE, FIDELITY_PAGE, Fidelity, FidelityPaper, FidelityRow, fidelity_page,
+};
 pub use sites::{SiteLine, SiteSummary, sites_page};
 
 use section::Section;

@@ -237,8 +237,7 @@ fn methods(site: &SiteProducts, images: &[&ImageProducts]) -> String {
         }
     }
     let words = format!(
-        "Tolerance {} lines, at most {} steps. Shan et al. 2005 print 13.6 (frame first) and 2.9 (eq. 4) for Eos, 17.1 \
-         and 5.6 for Gusev. Frame first converges by the aspect ratio of the pixels and diverges where a line is \
+        "Tolerance {} lines, at most {} steps. Frame first converges by the aspect ratio of the pixels and diverges where a line is \
          more than twice as long as a pixel; eq. 4 by what the camera turns from line to line.",
         site.config.registration.tolerance_lines, site.config.registration.steps_max
     );

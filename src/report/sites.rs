@@ -1,6 +1,9 @@
 //! The page over all sites of an output folder.
 
-use super::html::{Cell, Column, Table, Tone, link, page, paragraph, verdict};
+use super::{
+    fidelity::FIDELITY_FILE,
+    html::{Cell, Column, Table, Tone, link, page, paragraph, verdict},
+};
 use crate::units::RADIANS_PER_ARCSECOND;
 
 /// What the page says of one site.
@@ -59,13 +62,17 @@ pub fn sites_page(sites: &[SiteLine]) -> String {
     } else {
         Tone::Good
     };
+    let fidelity = format!(
+        "<p>{}: every number that the papers print, with areograph's beside it.</p>\n",
+        link(FIDELITY_FILE, "Fidelity to the papers")
+    );
     let words = paragraph(
         "Each name leads to the site's report. Figures are the largest of the site: |mean| of range − distance over \
          its profiles, RMSE of the second-order models over its images.",
     );
     page(
         "Sites",
-        &(verdict(overall, &headline, "") + &table(sites) + &words),
+        &(verdict(overall, &headline, "") + &table(sites) + &words + &fidelity),
         &[],
     )
 }

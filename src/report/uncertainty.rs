@@ -12,8 +12,8 @@ use crate::{
 };
 
 pub(super) const SECTION: Section = Section {
-    title: "Reproduction of the paper: eq. 5 to 9",
-    anchor: "reproduction-eq-5-to-9",
+    title: "Gap between the footprints of one point",
+    anchor: "gap-of-footprints",
     appears: |site| {
         let pairs = site.geometric.as_ref().map(|geometric| geometric.pairs);
         pairs.is_some_and(|pairs| !pairs.is_empty())
@@ -23,128 +23,75 @@ pub(super) const SECTION: Section = Section {
 
 fn write(geometric: &GeometricProducts) -> String {
     let pairs = BeforeAfter::all(geometric);
-    let words: String = pairs.iter().map(in_words).collect();
-    let explained = "Every tie point's reprojection residuals give D = √(M² + σ²) per image; along the track the squares \
-                     of both images add up to what the orientation explains. One MOLA spacing is taken for the whole \
-                     discrepancy of a footprint, and what orientation does not explain of it is the footprints' own. \
-                     Across the track the paper takes the average of both images, though its eq. 7 says the root of the \
-                     sum of squares, which makes heights worse by about √2. Heights are H/B times the part across the \
-                     track. After the adjustment footprints no longer lie a spacing apart, so that eq. 6 says nothing \
-                     then. Eq. 8 and 9 tell how well the two images agree, never how accurate heights or places are.";
-    words + &along(&pairs) + &points(&pairs) + &paragraph(explained)
+    let explained = "Reprojection residuals of tie points give D = √(M² + σ²) per image; both images together are what \
+                     orientation explains along the track, and one MOLA spacing is taken for the whole. After the adjustment \
+                     footprints no longer lie a spacing apart. Across the track the paper averages the images, though its \
+                     eq. 7 says the root of the sum of squares: both heights are given. All of it tells how well the two \
+                     images agree, never how accurate heights or places are.";
+    budgets(&pairs) + &pairs.iter().map(without_budget).collect::<String>() + &paragraph(explained)
 }
 
-/// What makes a footprint fall apart in two images, before the adjustment.
-fn along(pairs: &[BeforeAfter]) -> String {
+fn budgets(pairs: &[BeforeAfter]) -> String {
     let mut table = Table::new(
-        "Along the track before the adjustment, pixels (eq. 6 and 7)",
-        &[
-            Column::Text("pair"),
-            Column::Number("pixel, m"),
-            Column::Number("one MOLA spacing"),
-            Column::Number("orientation"),
-            Column::Number("footprints"),
-        ],
-    );
-    for pair in pairs {
-        let spacings_m = pair.before.line_spacing_m;
-        if let Ok(budget) = &pair.before.budget {
-            let ground = match budget.ground {
-                GroundPart::Resolved { along_px } => label(along_px, 2),
-                GroundPart::NotResolvable => "not resolvable".to_owned(),
-            };
-            table.row(
-                true,
-                [
-                    pair.name().into(),
-                    label(0.5 * (spacings_m[0] + spacings_m[1]), 3).into(),
-                    label(budget.total_along_px, 2).into(),
-                    label(budget.along_px, 2).into(),
-                    ground.into(),
-                ],
-            );
-        }
-    }
-    table.finish()
-}
-
-fn points(pairs: &[BeforeAfter]) -> String {
-    let mut table = Table::new(
-        "Ground points (eq. 8 and 9), by two readings of the discrepancy across the track",
+        "How far apart the two footprints of a point lie (eq. 5 to 9 of Shan et al. 2005)",
         &[
             Column::Text("pair"),
             Column::Text("adjustment"),
-            Column::Text("across the track"),
-            Column::Number("across, px"),
-            Column::Number("planimetric, px"),
-            Column::Number("planimetric, m"),
-            Column::Number("height, px"),
-            Column::Number("height, m"),
+            Column::Number("one MOLA spacing, px"),
+            Column::Number("by orientation, px"),
+            Column::Number("by footprints, px"),
+            Column::Number("in plan, m"),
+            Column::Number("in height, m"),
+            Column::Number("in height by eq. 7, m"),
         ],
     );
     for pair in pairs {
+        let mut before = true;
         for (state, found) in pair.states() {
-            for cells in found.budget.iter().flat_map(point_cells) {
+            if let Ok(budget) = &found.budget {
                 let head = [Cell::from(pair.name()), state.into()];
-                table.row(true, head.into_iter().chain(cells));
+                table.row(true, head.into_iter().chain(cells(budget, before)));
             }
+            before = false;
         }
     }
     table.finish()
 }
 
-fn point_cells(budget: &UncertaintyBudget) -> [[Cell; 6]; 2] {
+/// What orientation and footprints have of a spacing counts before the adjustment alone.
+fn cells(budget: &UncertaintyBudget, before: bool) -> [Cell; 6] {
+    let footprints = match budget.ground {
+        _ if !before => "–".into(),
+        GroundPart::Resolved { along_px } => label(along_px, 2).into(),
+        GroundPart::NotResolvable => {
+            "not resolvable: orientation explains more than a spacing".into()
+        }
+    };
+    let spacing = if before {
+        label(budget.total_along_px, 2)
+    } else {
+        "–".to_owned()
+    };
     [
-        ("average (paper)", &budget.paper_average),
-        ("sum of squares (eq. 7)", &budget.equation_7),
+        spacing.into(),
+        label(budget.along_px, 2).into(),
+        footprints,
+        label(budget.paper_average.planimetric_m, 2).into(),
+        label(budget.paper_average.height_m, 2).into(),
+        label(budget.equation_7.height_m, 2).into(),
     ]
-    .map(|(reading, point)| {
-        let [across, planimetric, planimetric_m, height, height_m] = [
-            point.across_px,
-            point.planimetric_px,
-            point.planimetric_m,
-            point.height_px,
-            point.height_m,
-        ]
-        .map(|value| label(value, 2).into());
-        [
-            reading.into(),
-            across,
-            planimetric,
-            planimetric_m,
-            height,
-            height_m,
-        ]
-    })
 }
 
-/// What the budgets of a pair say, or why there is none.
-fn in_words(pair: &BeforeAfter) -> String {
+/// Why a pair has no budget.
+fn without_budget(pair: &BeforeAfter) -> String {
     let mut html = String::new();
     for (state, found) in pair.states() {
-        let place = format!("{}, {state} the adjustment", pair.name());
-        let budget = match &found.budget {
-            Ok(budget) => budget,
-            Err(reason) => {
-                html += &paragraph(&format!("{place}: there is no budget, for {reason}."));
-                continue;
-            }
-        };
-        let (paper, sum) = (&budget.paper_average, &budget.equation_7);
-        html += &paragraph(&format!(
-            "{place}: the two footprints of one ground point lie {} m apart in plan, which eq. 9 turns into {} m of height, or {} m by \
-             the sum of squares.",
-            label(paper.planimetric_m, 1),
-            label(paper.height_m, 1),
-            label(sum.height_m, 1)
-        ));
-    }
-    if let Ok(budget) = &pair.before.budget
-        && budget.ground == GroundPart::NotResolvable
-    {
-        html += &paragraph(
-            "The part of the footprints cannot be resolved: orientation alone explains more than one MOLA spacing.",
-        );
+        if let Err(reason) = &found.budget {
+            let name = pair.name();
+            html += &paragraph(&format!(
+                "{name}, {state} the adjustment: there is no budget, for {reason}."
+            ));
+        }
     }
     html
 }

@@ -17,7 +17,7 @@ use super::{
     laser::{FRAME_S, LaserErrors},
     mission::write_truth,
     pedr::{PedrRequest, frame_tags, write_pedr},
-    sites::{README_ALONG, SiteFile, SiteImage, Window},
+    sites::{README_ALONG, SiteFile, SiteImage, SiteKernels, Window},
     terrain::Terrain,
     truth::{KeptShot, ProfileTruth, Truth},
 };
@@ -115,7 +115,7 @@ pub fn write_scene_along(
     let site = SiteFile {
         id: &id,
         description: "Given kernels over invented terrain, synthetic PEDR".to_owned(),
-        metakernel: metakernel.display().to_string(),
+        kernels: SiteKernels::Metakernel(metakernel.display().to_string()),
         pedr: vec![format!("../pedr/{PEDR_NAME}")],
         ties: None,
         range_mean_max_m: None,

@@ -10,12 +10,16 @@ use super::{
     drawn::Flown,
     error::SceneError,
     error_sources::SceneErrors,
-    plan::Site,
+    kernels::wide_angle_metakernel,
+    plan::{LOST_IMAGE, Site},
     random::Random,
-    sites::{Label, SiteFile, SiteImage, SiteTies, image_label, range_mean_max_m, window},
+    sites::{
+        Label, SiteFile, SiteImage, SiteKernels, SiteTies, image_label, range_mean_max_m, window,
+    },
     terrain::Terrain,
     ties::ties_name,
     truth::{ContextShot, ContextTruth, KeptShot, Poses},
+    versions::FAMILIES,
 };
 use crate::{
     config::built_in_instruments,
@@ -342,21 +346,22 @@ pub(super) fn context_ties(
     ties
 }
 
-/// The site file of the images; `pedr` are the names of the files of their days.
-pub(super) fn context_site(
-    images: &[ContextImage<'_>],
-    metakernel: &str,
-    errors: &SceneErrors,
-) -> SiteFile<'static> {
-    let mut pedr: Vec<String> = images
-        .iter()
-        .map(|image| format!("../pedr/{}", image.flown.arc.image.pedr_name()))
+/// The site file of the images: PEDR files of their days and of one without an image, rival orbits to choose from.
+pub(super) fn context_site(images: &[ContextImage<'_>], errors: &SceneErrors) -> SiteFile<'static> {
+    let days = images.iter().map(|image| image.flown.arc.image);
+    let mut pedr: Vec<String> = days
+        .chain([&LOST_IMAGE])
+        .map(|image| format!("../pedr/{}", image.pedr_name()))
         .collect();
     pedr.dedup();
+    let rivals = FAMILIES.map(|family| {
+        let metakernel = format!("../kernels/{}", wide_angle_metakernel(family));
+        (family, metakernel)
+    });
     SiteFile {
         id: CONTEXT_SITE.id,
         description: format!("{}, synthetic", CONTEXT_SITE.name),
-        metakernel: format!("../kernels/{metakernel}"),
+        kernels: SiteKernels::Rivals(rivals),
         pedr,
         ties: Some(SiteTies {
             file: format!("../ties/{}", ties_name(CONTEXT_SITE.id)),

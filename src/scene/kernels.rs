@@ -8,7 +8,7 @@ use std::{
 use super::{
     arc::Arc,
     files::put,
-    plan::{IMAGES, PlannedImage},
+    plan::PlannedImage,
     sun::mars_state_from_sun,
     versions::{FAMILIES, Version},
 };
@@ -130,10 +130,9 @@ pub(super) fn clock_session(folder: &Path) -> Result<Session> {
     Session::open(&KernelSet::from_files(&files)?)
 }
 
-/// When the first line of each planned image begins, by its clock string.
-pub(super) fn image_starts(session: &Session) -> Result<Vec<Et>> {
-    let start = |image: &PlannedImage| session.sclk_to_et(image.sclk_start);
-    IMAGES.iter().map(start).collect()
+/// When the first line of a planned image begins, by its clock string.
+pub(super) fn image_start(session: &Session, image: &PlannedImage) -> Result<Et> {
+    session.sclk_to_et(image.sclk_start)
 }
 
 /// Attitude samples of an arc as a C-kernel takes them.

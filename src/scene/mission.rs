@@ -10,12 +10,11 @@ use super::{
     error::SceneError,
     files::{Draft, put},
     kernels::{
-        clock_session, image_starts, versions, wide_angle_metakernel, write_attitude, write_orbits,
-        write_text_kernels,
+        clock_session, image_start, versions, write_attitude, write_orbits, write_text_kernels,
     },
     laser::{LaserErrors, Shot},
     pedr::{PedrRequest, frame_tags, write_pedr},
-    plan::{IMAGES, SITES},
+    plan::{IMAGES, LOST_IMAGE, SITES},
     sites::{README, planned_label, planned_site},
     terrain::Terrain,
     ties::{ties_name, write_ties},
@@ -62,13 +61,15 @@ pub fn write_scene(directory: &Path, options: &SceneOptions) -> Result<SceneSumm
     let pedr = draft.folder("pedr")?;
     let mut kept = Vec::new();
     for flown in &days {
-        let versions = versions(&flown.arc, options.seed);
-        truth.images.push(ImageTruth::of(&flown.arc, &versions));
-        truth.errors_drawn.push(DrawnTruth::of(flown));
         let day = write_day(&pedr, flown, &terrain, options)?;
         truth.files.push(day.file);
-        truth.profiles.push(day.profile);
         kept.push(day.kept);
+        if flown.arc.image.is_delivered() {
+            let versions = versions(&flown.arc, options.seed);
+            truth.images.push(ImageTruth::of(&flown.arc, &versions));
+            truth.errors_drawn.push(DrawnTruth::of(flown));
+            truth.profiles.push(day.profile);
+        }
     }
     let sites = draft.folder("sites")?;
     let ties = draft.folder("ties")?;
@@ -132,7 +133,7 @@ fn write_context(
         &draft.folder("ties")?.join(ties_name(id)),
         &ties_table(&ties),
     )?;
-    let site = context_site(&images, &wide_angle_metakernel("nav"), &options.errors);
+    let site = context_site(&images, &options.errors);
     let path = draft.folder("sites")?.join(format!("{id}.toml"));
     put(&path, &site.to_toml())?;
     let shots = |image: &ContextImage<'_>| {
@@ -158,19 +159,27 @@ pub(super) fn write_truth(draft: &Draft, truth: &Truth) -> Result<()> {
     put(&path, &text)
 }
 
-/// Solves the six arcs and writes their kernels and labels.
+/// Solves the arcs and writes their kernels, and labels of the images that came down.
 fn write_kernels(draft: &Draft, options: &SceneOptions) -> Result<Vec<Arc>> {
     let kernels = draft.folder("kernels")?;
     let labels = draft.folder("labels")?;
     write_text_kernels(&kernels)?;
     let session = clock_session(&kernels)?;
-    let starts = image_starts(&session)?;
-    let arcs = IMAGES
+    let mut arcs = IMAGES
         .iter()
-        .zip(starts)
-        .map(|(image, start)| Arc::new(image, start, image.pedr_duration_s(options.day_s)))
+        .chain([&LOST_IMAGE])
+        .map(|image| {
+            let start = image_start(&session, image)?;
+            Arc::new(image, start, image.pedr_duration_s(options.day_s))
+        })
         .collect::<Result<Vec<Arc>>>()?;
-    for arc in &arcs {
+    arcs.sort_by(|a, b| {
+        a.exposed
+            .start
+            .seconds()
+            .total_cmp(&b.exposed.start.seconds())
+    });
+    for arc in arcs.iter().filter(|arc| arc.image.is_delivered()) {
         put(
             &labels.join(format!("{}.lbl", arc.image.id)),
             &planned_label(arc, &session)?,

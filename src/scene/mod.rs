@@ -29,7 +29,7 @@ mod laser;
 mod mission;
 mod orbit;
 mod pedr;
-mod plan;
+pub mod plan;
 mod plane_net;
 mod random;
 mod roughness;

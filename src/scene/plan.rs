@@ -9,7 +9,7 @@ use crate::{
 
 /// A place that two images show.
 #[derive(Debug)]
-pub(super) struct Site {
+pub struct Site {
     /// Identifier, as the site's TOML has it.
     pub id: &'static str,
     /// What the report calls it.
@@ -22,12 +22,13 @@ pub(super) struct Site {
 
 impl Site {
     /// Half the window's extent in latitude, degrees: 59 km in all, where the longest image has 54 km.
-    pub(super) const WINDOW_HALF_LATITUDE_DEG: f64 = 0.5;
+    pub const WINDOW_HALF_LATITUDE_DEG: f64 = 0.5;
     /// Half the window's extent in longitude, degrees.
-    pub(super) const WINDOW_HALF_LONGITUDE_DEG: f64 = 0.25;
+    pub const WINDOW_HALF_LONGITUDE_DEG: f64 = 0.25;
 
     /// Unit vector towards the site, IAU 2000.
-    pub(super) fn direction(&self) -> nalgebra::Vector3<f64> {
+    #[must_use]
+    pub fn direction(&self) -> nalgebra::Vector3<f64> {
         crate::geom::ellipsoid::spherical_to_xyz_m(
             self.longitude_deg * RADIANS_PER_DEGREE,
             self.latitude_deg * RADIANS_PER_DEGREE,
@@ -36,7 +37,8 @@ impl Site {
     }
 
     /// Whether a point in radians lies in the site's window.
-    pub(super) fn contains(&self, longitude_rad: f64, latitude_rad: f64) -> bool {
+    #[must_use]
+    pub fn contains(&self, longitude_rad: f64, latitude_rad: f64) -> bool {
         let half_deg = [
             Self::WINDOW_HALF_LONGITUDE_DEG,
             Self::WINDOW_HALF_LATITUDE_DEG,
@@ -45,7 +47,8 @@ impl Site {
     }
 
     /// Whether a point in radians lies in a window of this half width and height around the site, degrees.
-    pub(super) fn holds(&self, longitude_rad: f64, latitude_rad: f64, half_deg: [f64; 2]) -> bool {
+    #[must_use]
+    pub fn holds(&self, longitude_rad: f64, latitude_rad: f64, half_deg: [f64; 2]) -> bool {
         let east_deg =
             crate::units::wrap_pi(longitude_rad - self.longitude_deg * RADIANS_PER_DEGREE)
                 / RADIANS_PER_DEGREE;
@@ -56,7 +59,7 @@ impl Site {
 
 /// Where the camera looks during an image.
 #[derive(Debug, Clone, Copy)]
-pub(super) enum Look {
+pub enum Look {
     /// The bus at nadir; the camera's mounting leaves 0.14°.
     Nadir,
     /// The bus rolled out of nadir and held inertially.
@@ -70,7 +73,7 @@ pub(super) enum Look {
 
 /// An image and the PEDR file of its day.
 #[derive(Debug)]
-pub(super) struct PlannedImage {
+pub struct PlannedImage {
     /// Product id with `-` for `/`.
     pub id: &'static str,
     /// The place it shows.
@@ -100,24 +103,34 @@ pub(super) struct PlannedImage {
 }
 
 impl PlannedImage {
+    /// Whether any of it came down.
+    #[must_use]
+    pub fn is_delivered(&self) -> bool {
+        self.lines_delivered > 0
+    }
+
     /// Time between two image lines, seconds.
-    pub(super) fn line_period_s(&self) -> f64 {
+    #[must_use]
+    pub fn line_period_s(&self) -> f64 {
         self.exposure_ms * SECONDS_PER_MS * f64::from(self.summing)
     }
 
     /// Samples per line: a multiple of 16.
-    pub(super) fn samples(&self) -> u32 {
+    #[must_use]
+    pub fn samples(&self) -> u32 {
         usual_instrument().detector.pixels / self.summing / 16 * 16
     }
 
     /// Time of exposure when the first line begins at `start`.
-    pub(super) fn exposed(&self, start: Et) -> Interval {
+    #[must_use]
+    pub fn exposed(&self, start: Et) -> Interval {
         let duration_s = self.line_period_s() * f64::from(self.lines_header);
         Interval::new(start, start.plus(duration_s))
     }
 
     /// Datum of the day's PEDR file: version L is IAU 2000, older ones IAU 1991.
-    pub(super) fn datum(&self) -> MarsDatum {
+    #[must_use]
+    pub fn datum(&self) -> MarsDatum {
         if self.pedr_version == 'L' {
             MarsDatum::Iau2000
         } else {
@@ -126,7 +139,8 @@ impl PlannedImage {
     }
 
     /// Name of the day's PEDR file.
-    pub(super) fn pedr_name(&self) -> String {
+    #[must_use]
+    pub fn pedr_name(&self) -> String {
         format!(
             "ap{}{}.b",
             self.pedr_number,
@@ -135,7 +149,8 @@ impl PlannedImage {
     }
 
     /// Seconds of frames in that file, when whole days have `day_s`.
-    pub(super) fn pedr_duration_s(&self, day_s: f64) -> f64 {
+    #[must_use]
+    pub fn pedr_duration_s(&self, day_s: f64) -> f64 {
         const ONE_REVOLUTION_S: f64 = 7_056.0;
         if self.whole_day {
             day_s
@@ -164,8 +179,16 @@ static ISIDIS: Site = Site {
     longitude_deg: 88.0,
 };
 
+/// Beside Gusev crater, in the window of its wide-angle images.
+static EAST_OF_GUSEV: Site = Site {
+    id: "east_of_gusev",
+    name: "east of Gusev crater",
+    latitude_deg: -14.6,
+    longitude_deg: 176.2,
+};
+
 /// The sites, in the order of their names.
-pub(super) static SITES: [&Site; 3] = [&EOS_CHASMA, &GUSEV_CRATER, &ISIDIS];
+pub static SITES: [&Site; 3] = [&EOS_CHASMA, &GUSEV_CRATER, &ISIDIS];
 
 /// The six images in order of time.
 ///
@@ -176,7 +199,7 @@ pub(super) static SITES: [&Site; 3] = [&EOS_CHASMA, &GUSEV_CRATER, &ISIDIS];
 /// three nadir images and 3.39 to 3.42 km/s for the three that are held inertially. Exposures are line periods
 /// divided by the summing. Time biases are the mean residuals of their Table 5 along the track, to half a line and with
 /// the other sign.
-pub(super) static IMAGES: [PlannedImage; 6] = [
+pub static IMAGES: [PlannedImage; 6] = [
     PlannedImage {
         id: "E02-00665",
         site: &GUSEV_CRATER,
@@ -277,6 +300,24 @@ pub(super) static IMAGES: [PlannedImage; 6] = [
         whole_day: false,
     },
 ];
+
+/// An image that was exposed and never came down, invented as a whole. The laser's profile of its day is simultaneous
+/// with no image.
+pub static LOST_IMAGE: PlannedImage = PlannedImage {
+    id: "E02-01071",
+    site: &EAST_OF_GUSEV,
+    utc_start: "2001-03-12T15:31:00.00",
+    sclk_start: "668878290:169",
+    exposure_ms: 0.7231,
+    summing: 2,
+    lines_header: 10_496,
+    lines_delivered: 0,
+    time_bias_lines: 0.0,
+    look: Look::Nadir,
+    pedr_number: 18_983,
+    pedr_version: 'L',
+    whole_day: false,
+};
 
 #[cfg(test)]
 mod tests {

@@ -48,14 +48,41 @@ pub(super) struct SiteTies {
     pub sigma_px: [f64; 2],
 }
 
+/// Where the kernels of a site file come from.
+pub(super) enum SiteKernels {
+    /// Path of a metakernel.
+    Metakernel(String),
+    /// Families of orbits and the metakernels that load them, to choose from.
+    Rivals([(&'static str, String); 3]),
+}
+
+impl SiteKernels {
+    /// The tables of the site file.
+    fn to_toml(&self) -> String {
+        match self {
+            Self::Metakernel(path) => format!("[kernels]\nmetakernel = {}\n", quoted(path)),
+            Self::Rivals(rivals) => {
+                let sets = rivals.each_ref().map(|(id, path)| {
+                    format!(
+                        "[[kernels.sets]]\nid = {}\nmetakernel = {}\n",
+                        quoted(id),
+                        quoted(path)
+                    )
+                });
+                sets.join("\n")
+            }
+        }
+    }
+}
+
 /// What a site file says.
 pub(super) struct SiteFile<'a> {
     /// Identifier.
     pub id: &'a str,
     /// Free text.
     pub description: String,
-    /// Path of the metakernel.
-    pub metakernel: String,
+    /// Where its kernels come from.
+    pub kernels: SiteKernels,
     /// Paths of the PEDR files.
     pub pedr: Vec<String>,
     /// Tie points, where there are any.
@@ -79,13 +106,13 @@ impl SiteFile<'_> {
         let files: Vec<String> = self.pedr.iter().map(|file| quoted(file)).collect();
         let mut text = format!(
             "# Written by `areograph scene`; paths count from the folder of this file.\n\
-             site = {}\ndescription = {}\n\n[kernels]\nmetakernel = {}\n\n\
+             site = {}\ndescription = {}\n\n{}\n\
              [pointing]\nck_bias_s = {}\nsource = {}\n\n\
              [mola_clock]\nbias_s = {}\nsign = \"late\"\nscope = \"spk_lookup\"\nsource = {}\n\n\
              [pedr]\nfiles = [{}]\ndatum = \"auto\"\n",
             quoted(self.id),
             quoted(&self.description),
-            quoted(&self.metakernel),
+            self.kernels.to_toml(),
             usual_instrument().pointing.ck_bias_s,
             quoted(INJECTED),
             built_in_altimeter().clock_bias_s,
@@ -184,7 +211,7 @@ pub(super) fn planned_site<'a>(
     SiteFile {
         id: site.id,
         description: format!("{}, synthetic", site.name),
-        metakernel: "../kernels/nav.tm".to_owned(),
+        kernels: SiteKernels::Metakernel("../kernels/nav.tm".to_owned()),
         pedr: arcs
             .iter()
             .map(|arc| format!("../pedr/{}", arc.image.pedr_name()))
@@ -321,10 +348,11 @@ pub(super) const README: &str = "\
 kernels/     text kernels; orbit (three rival versions), attitude, Mars and Sun as binary kernels;
              nav.tm, gsfc.tm, ipng.tm load them with one version of the orbit each, and nav_wa.tm, gsfc_wa.tm
              and ipng_wa.tm with the frames of the wide-angle cameras as well
-pedr/        MOLA PEDR files: two whole days, four single revolutions; version K is in IAU 1991, L in IAU 2000
+pedr/        MOLA PEDR files: two whole days, five single revolutions; version K is in IAU 1991, L in IAU 2000
 labels/      labels of six narrow-angle images and three wide-angle ones
 ties/        places that both images of a site show, as measured in them; some are blunders
-sites/       configurations for `areograph run`
+sites/       configurations for `areograph run`; gusev_context chooses among the three orbits, and has a profile
+             that is simultaneous with no image
 truth.json   what really happened: biases, orientation of the images, footprints in the sites' windows,
              how far the rival orbits are off (the orbit `gsfc` is the true one), and for the tie points when and
              from where the images were truly taken; which errors were drawn from which sizes
@@ -332,7 +360,7 @@ truth.json   what really happened: biases, orientation of the images, footprints
 Image ids, times, summing, line counts, line periods and emission angles are those of Shan et al. 2005, Table 2; of
 E04-01275, for which it prints 7424 lines, 8064 are exposed, as their Table 4 demands. Terrain, orbits and
 attitudes are invented.
-The wide-angle images of gusev_context are invented.
+The wide-angle images of gusev_context are invented, and so is its profile of 2001-03-12 (ap18983l.b).
 ";
 
 /// What `README.txt` says of a flight along given kernels.

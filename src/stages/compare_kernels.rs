@@ -165,7 +165,7 @@ impl Size {
 ///   one set
 ///
 /// # Source
-/// Shan et al. 2005, p. 98: of the orbit solutions that of the navigation team was taken, which lies
+/// Shan et al. 2005, data preparation: of the orbit solutions that of the navigation team was taken, which lies
 /// closest to the mean of all.
 #[must_use]
 pub fn compare_orbits(epochs: &[Et], orbits: &[(String, Vec<State>)]) -> Comparison {

@@ -6,18 +6,19 @@
 )]
 
 use areograph::geom::{
-    bundle::{BundleImage, BundlePoint, KnownCoordinates, Network, Range, View},
+    bundle::{Adjustment, BundleImage, BundlePoint, KnownCoordinates, Network, Range, View},
     intersection::{IntersectionLimits, Ray, intersect},
     pushbroom::{
         CorrectedOrientation, Distortion, EulerPolynomial, ExteriorOrientation,
         OrientationCorrection, Projector,
     },
+    statistics::Summary,
 };
 use nalgebra::{Vector2, Vector3};
 
 use super::scene::{GUSEV, Held, Scene};
 
-/// Half the width of an image, pixels.
+/// Half the width of an image that sums two pixels, pixels.
 pub(crate) const HALF_SWATH_PX: f64 = 512.0;
 /// Shots so far outside a swath still count as measured in it, pixels.
 const OUTSIDE_PX: f64 = 200.0;
@@ -106,6 +107,8 @@ impl Recipe {
 pub(crate) struct Simulated<M> {
     /// Initial orientations are the true ones, late and off their place.
     pub(crate) network: Network<CorrectedOrientation<M>>,
+    /// The images.
+    pub(crate) scenes: [Scene; 2],
     /// True orientation of each image.
     pub(crate) orientations: [M; 2],
     /// True points: shots of the first track, of the second, then ties.
@@ -152,20 +155,23 @@ pub(crate) fn pair([latitude_deg, longitude_deg]: [f64; 2]) -> [Scene; 2] {
 
 /// An image from an orbit `east_deg` beside that of `nadir` which looks at the same ground.
 pub(crate) fn aimed(nadir: &Scene, east_deg: f64) -> Scene {
-    let target_m = nadir.boresight_ground_m(0.0);
-    let mut oblique = Scene {
+    let oblique = Scene {
         longitude_deg: nadir.longitude_deg + east_deg,
         lines: 8_960,
         duration_s: 12.958,
-        held: Held::Inertial { roll_deg: 0.0 },
         ..*nadir
     };
+    held_on(oblique, &nadir.boresight_ground_m(0.0))
+}
+
+/// The image held inertially, its middle on the target.
+pub(crate) fn held_on(mut oblique: Scene, target_m: &Vector3<f64>) -> Scene {
     for _ in 0..4 {
         let unrolled = Scene {
             held: Held::Inertial { roll_deg: 0.0 },
             ..oblique
         };
-        let camera_m = unrolled.pose(0.0).camera_vector_m(&target_m);
+        let camera_m = unrolled.pose(0.0).camera_vector_m(target_m);
         let roll_deg = camera_m.y.atan2(camera_m.z).to_degrees();
         // The camera flies along its −X: what lies ahead has a negative x.
         oblique.latitude_deg -= (camera_m.x / target_m.norm()).to_degrees();
@@ -220,10 +226,17 @@ impl Recipe {
         &self,
         model: impl Fn(&Scene) -> M,
     ) -> Simulated<M> {
-        let scenes = pair(self.place_deg);
+        self.simulate_pair(pair(self.place_deg), model)
+    }
+
+    /// The same for other images, of which the first looks down.
+    pub(crate) fn simulate_pair<M: ExteriorOrientation + Clone>(
+        &self,
+        scenes: [Scene; 2],
+        model: impl Fn(&Scene) -> M,
+    ) -> Simulated<M> {
         let mut normals = Normals::new(self.seed);
         let orientations = scenes.each_ref().map(model);
-        let focal_length_px = scenes[0].focal_length_px();
         let mut network = Network {
             images: (0..2)
                 .map(|image| {
@@ -238,7 +251,7 @@ impl Recipe {
                         },
                         half_lines,
                         line_period_s: scenes[image].line_period_s(),
-                        focal_length_px,
+                        focal_length_px: scenes[image].focal_length_px(),
                         distortion: Distortion::NONE,
                         sigmas: sigmas([100.0, 200.0][image]),
                         time_bias_sigma_s: 0.0,
@@ -266,6 +279,7 @@ impl Recipe {
         );
         Simulated {
             network,
+            scenes,
             orientations,
             points_m,
             shots,
@@ -308,7 +322,8 @@ impl Recipe {
             let projector = Projector::new(&entry.base, 2.0 * entry.half_lines).unwrap();
             for (index, point) in network.points.iter().enumerate() {
                 let (x_lines, y_px) = project(&projector, entry.focal_length_px, &point.ground_m);
-                if x_lines.abs() <= entry.half_lines && y_px.abs() <= HALF_SWATH_PX + OUTSIDE_PX {
+                let outside_px = y_px.abs() - scenes[image].half_swath_px();
+                if x_lines.abs() <= entry.half_lines && outside_px <= OUTSIDE_PX {
                     views.push(View {
                         point: index,
                         image,
@@ -339,22 +354,26 @@ impl Recipe {
         let projectors = [0, 1].map(|image| {
             Projector::new(&orientations[image], f64::from(scenes[image].lines)).unwrap()
         });
-        let focal_length_px = scenes[0].focal_length_px();
+        let [focal_length_px, swath_px] = [scenes[0].focal_length_px(), scenes[0].half_swath_px()];
         let mut left = self.ties;
         while left > 0 {
             let at_s = (normals.uniform() - 0.5) * scenes[0].duration_s;
             let pose = scenes[0].pose(at_s);
             let below_m = scenes[0].boresight_ground_m(at_s);
-            let across = (2.0 * normals.uniform() - 1.0) * HALF_SWATH_PX / focal_length_px;
+            let across = (2.0 * normals.uniform() - 1.0) * swath_px / focal_length_px;
             let aside_m = below_m
                 + pose.mars_to_camera.row(1).transpose()
                     * (across * (pose.position_m - below_m).norm());
             let point_m = aside_m.normalize() * (below_m.norm() + 150.0 * normals.next());
-            let seen = projectors
-                .each_ref()
-                .map(|projector| project(projector, focal_length_px, &point_m));
+            let seen = [0, 1].map(|image| {
+                project(
+                    &projectors[image],
+                    scenes[image].focal_length_px(),
+                    &point_m,
+                )
+            });
             let inside = seen.iter().zip(scenes).all(|((x_lines, y_px), scene)| {
-                x_lines.abs() < 0.5 * f64::from(scene.lines) && y_px.abs() < HALF_SWATH_PX
+                x_lines.abs() < 0.5 * f64::from(scene.lines) && y_px.abs() < scene.half_swath_px()
             });
             if !inside {
                 continue;
@@ -385,4 +404,69 @@ impl Recipe {
             points_m.push(point_m);
         }
     }
+}
+
+/// Measured minus projected: lines and pixels of each view of the ties of an image.
+pub(crate) fn reprojection(
+    simulated: &Simulated<EulerPolynomial>,
+    image: usize,
+    orientation: &impl ExteriorOrientation,
+    ground_m: impl Fn(usize) -> Vector3<f64>,
+) -> [Vec<f64>; 2] {
+    let entry = &simulated.network.images[image];
+    let projector = Projector::new(orientation, 2.0 * entry.half_lines).unwrap();
+    let ties = |view: &&View| view.image == image && view.point >= simulated.shots;
+    let differences: Vec<(f64, f64)> = simulated
+        .network
+        .views
+        .iter()
+        .filter(ties)
+        .map(|view| {
+            let (x, y) = project(&projector, entry.focal_length_px, &ground_m(view.point));
+            (view.x_lines - x, view.y_px - y)
+        })
+        .collect();
+    let (lines, pixels) = differences.into_iter().unzip();
+    [lines, pixels]
+}
+
+/// The initial orientation of an image with its correction.
+pub(crate) fn adjusted_orientation<'a>(
+    simulated: &'a Simulated<EulerPolynomial>,
+    adjustment: &Adjustment,
+    image: usize,
+) -> impl ExteriorOrientation + use<'a> {
+    CorrectedOrientation {
+        base: &simulated.network.images[image].base,
+        correction: adjustment.images[image].correction,
+    }
+}
+
+/// Ground length of a line of an image at its middle, metres.
+pub(crate) fn line_spacing_m(simulated: &Simulated<EulerPolynomial>, image: usize) -> f64 {
+    let scene = &simulated.scenes[image];
+    (scene.boresight_ground_m(scene.line_period_s()) - scene.boresight_ground_m(0.0)).norm()
+}
+
+/// Mean shift of the shots' image coordinates from the initial to the adjusted orientation, lines.
+pub(crate) fn mola_shift_lines(
+    simulated: &Simulated<EulerPolynomial>,
+    adjustment: &Adjustment,
+    image: usize,
+) -> Summary {
+    let entry = &simulated.network.images[image];
+    let orientation = adjusted_orientation(simulated, adjustment, image);
+    let projector = Projector::new(&orientation, 2.0 * entry.half_lines).unwrap();
+    let shots = |view: &&View| view.image == image && view.point < simulated.shots;
+    let shifts: Vec<f64> = simulated
+        .network
+        .views
+        .iter()
+        .filter(shots)
+        .map(|view| {
+            let ground_m = adjustment.points[view.point].unwrap().ground_m;
+            project(&projector, entry.focal_length_px, &ground_m).0 - view.x_lines
+        })
+        .collect();
+    Summary::of(&shifts)
 }

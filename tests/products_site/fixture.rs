@@ -238,7 +238,7 @@ fn config() -> SiteConfig {
             bias_s: 0.117,
             sign: TagSign::Late,
             scope: BiasScope::SpkLookup,
-            source: "Shan et al. 2005, p. 98".to_owned(),
+            source: "Shan et al. 2005, data preparation".to_owned(),
         },
         pedr: PedrConfig {
             files: vec!["data/ap19019l.b".into()],

@@ -1,62 +1,18 @@
-//! What the papers print of the two iterations, and what theory says of their convergence.
+//! What theory says of the convergence of the two published iterations, and the points of Shan 2002.
 
 use areograph::{
     geom::{
         attitude::OmegaPhiKappa,
-        pushbroom::{
-            EulerPolynomial, ExteriorOrientation, FixedPoint, FrameFirst, Limits, Projector,
-            Unseen, VectorPolynomial,
-        },
+        pushbroom::{ExteriorOrientation, FixedPoint, FrameFirst, Limits, Projector, Unseen},
     },
     units::RADIANS_PER_DEGREE,
 };
 use nalgebra::Vector3;
 
-use super::scene::{EOS_NADIR, EOS_OBLIQUE, GUSEV, Held, Scene};
-
-/// The papers' tolerance.
-const PAPER: Limits = Limits {
-    tolerance_lines: 0.1,
-    steps_max: 100,
+use super::{
+    eos_2002::{FOCAL_LENGTH_PX, POINTS_KM, RIGHT},
+    scene::{EOS_NADIR, EOS_OBLIQUE, GUSEV, Held, PAPER, Scene},
 };
-
-/// Mean evaluations of the frame-first iteration and of the fixed point, and the largest difference of
-/// their lines.
-fn counts(scene: &Scene, points_m: &[Vector3<f64>], limits: &Limits) -> (f64, f64, f64) {
-    let model = scene.euler(2);
-    let frame_first = FrameFirst::new(&model, scene.focal_length_px()).unwrap();
-    let fixed_point = FixedPoint::new(&model, scene.focal_length_px()).unwrap();
-    let (mut a, mut b, mut apart) = (0, 0, 0.0_f64);
-    for point in points_m {
-        let by_a = frame_first.solve(point, limits, |_| {}).unwrap();
-        let by_b = fixed_point.solve(point, limits, |_| {}).unwrap();
-        a += by_a.evaluations;
-        b += by_b.evaluations;
-        apart = apart.max((by_a.x - by_b.x).abs());
-    }
-    let count = points_m.len() as f64;
-    (f64::from(a) / count, f64::from(b) / count, apart)
-}
-
-#[test]
-fn gusev_needs_the_iterations_that_the_paper_prints() {
-    // Shan et al. 2005 print 17.1 and 5.6 for 142 footprints on E02-00665.
-    let (a, b, _) = counts(&GUSEV, &GUSEV.profile_m(142, 305.0), &PAPER);
-    assert!((5.2..=6.0).contains(&b), "B {b}");
-    assert!((16.5..=19.5).contains(&a), "A {a}");
-    assert!(a / b > 3.0);
-}
-
-#[test]
-fn the_fixed_point_needs_fewer_iterations_everywhere() {
-    for (scene, name) in [(EOS_NADIR, "E02-02855"), (EOS_OBLIQUE, "E04-01275")] {
-        let (a, b, _) = counts(&scene, &scene.profile_m(174, 305.0), &PAPER);
-        assert!(b < a, "{name}: A {a}, B {b}");
-    }
-    // The only image of the paper whose orientation is held: its printed 2.9.
-    let (_, b, _) = counts(&EOS_OBLIQUE, &EOS_OBLIQUE.profile_m(174, 305.0), &PAPER);
-    assert!((2.5..=3.3).contains(&b), "B {b}");
-}
 
 /// Ratio of successive steps once the first ones are over, and long before rounding.
 fn contraction(steps: &[f64]) -> f64 {
@@ -175,50 +131,26 @@ fn all_methods_find_the_same_line() {
             // Lines: tolerance / (1 − r) with r = 0.1.
             assert!((by_newton - by_b).abs() < 1.2e-3, "{by_newton} {by_b}");
         }
-        let (_, _, apart) = counts(&scene, &points_m, &limits);
+        let apart = scene.iterations(&points_m, &limits).apart_lines;
         assert!(apart < 3e-3, "{apart}"); // lines: tolerance / (1 − |r|) of both, |r| up to 0.56
     }
 }
 
-// The right image of Shan, Lee & Yoon 2002 (E02-02855), start and end of their table of orientation.
-const START_KM: [f64; 3] = [2743.679, -2435.358, -895.114]; // Y is misprinted as −2453.358
-const END_KM: [f64; 3] = [2749.133, -2450.626, -836.828];
-const START_DEG: [f64; 3] = [11.3701, -75.9648, -126.5760];
-const END_DEG: [f64; 3] = [12.1810, -76.8692, -125.6728];
-const LINES_2002: f64 = 9_856.0;
-const FOCAL_LENGTH_2002_PX: f64 = 3_500.0 / 0.039;
-/// Their first and tenth MOLA point, km, and where the corrected table puts them, lines and pixels.
-const POINTS_2002: [([f64; 3], f64, f64); 2] = [
-    ([2469.471, -2191.971, -792.691], -2681.9, 194.9),
-    ([2469.876, -2193.071, -788.430], -1879.7, 199.7),
-];
+/// Where the corrected table puts the first and the tenth of its points, lines and pixels.
+const SEEN_2002: [(usize, f64, f64); 2] = [(0, -2681.9, 194.9), (9, -1879.7, 199.7)];
 
-/// The linear orientation of 2002 through its ends.
-fn linear_2002(start_km: [f64; 3]) -> EulerPolynomial {
-    let through = |start: [f64; 3], end: [f64; 3], scale: f64| {
-        let (start, end) = (Vector3::from(start) * scale, Vector3::from(end) * scale);
-        VectorPolynomial {
-            coefficients: [
-                (start + end) / 2.0,
-                (end - start) / LINES_2002,
-                Vector3::zeros(),
-            ],
-        }
-    };
-    EulerPolynomial {
-        path_m: through(start_km, END_KM, 1e3),
-        angles_rad: through(START_DEG, END_DEG, RADIANS_PER_DEGREE),
-    }
+fn point_m(index: usize) -> Vector3<f64> {
+    Vector3::from(POINTS_KM[index]) * 1e3
 }
 
 fn y_px(camera_m: &Vector3<f64>) -> f64 {
-    -FOCAL_LENGTH_2002_PX * camera_m.y / camera_m.z
+    -FOCAL_LENGTH_PX * camera_m.y / camera_m.z
 }
 
 #[test]
 fn the_corrected_table_of_2002_looks_at_nadir() {
-    let model = linear_2002(START_KM);
-    for (x, expected_deg) in [(-0.5 * LINES_2002, 0.125), (0.5 * LINES_2002, 0.116)] {
+    let model = RIGHT.model();
+    for (x, expected_deg) in [(-0.5 * RIGHT.lines, 0.125), (0.5 * RIGHT.lines, 0.116)] {
         let pose = model.pose(x);
         let boresight = pose.mars_to_camera.row(2).transpose();
         let off_nadir_deg = boresight.angle(&-pose.position_m) / RADIANS_PER_DEGREE;
@@ -233,24 +165,24 @@ fn the_corrected_table_of_2002_looks_at_nadir() {
     }
     // The textbook matrix with the same angles is the transpose, and looks elsewhere.
     let angles = OmegaPhiKappa {
-        omega_rad: START_DEG[0] * RADIANS_PER_DEGREE,
-        phi_rad: START_DEG[1] * RADIANS_PER_DEGREE,
-        kappa_rad: START_DEG[2] * RADIANS_PER_DEGREE,
+        omega_rad: RIGHT.start_deg[0] * RADIANS_PER_DEGREE,
+        phi_rad: RIGHT.start_deg[1] * RADIANS_PER_DEGREE,
+        kappa_rad: RIGHT.start_deg[2] * RADIANS_PER_DEGREE,
     };
     let textbook = angles.camera_to_mars().row(2).transpose();
-    let off_nadir_deg = textbook.angle(&-Vector3::from(START_KM)) / RADIANS_PER_DEGREE;
+    let off_nadir_deg = textbook.angle(&-Vector3::from(RIGHT.start_km)) / RADIANS_PER_DEGREE;
     assert!(off_nadir_deg > 10.0, "{off_nadir_deg}");
 }
 
 #[test]
 fn the_points_of_2002_fall_where_its_table_says() {
-    let model = linear_2002(START_KM);
-    let frame_first = FrameFirst::new(&model, FOCAL_LENGTH_2002_PX).unwrap();
-    let fixed_point = FixedPoint::new(&model, FOCAL_LENGTH_2002_PX).unwrap();
-    let projector = Projector::new(&model, LINES_2002).unwrap();
+    let model = RIGHT.model();
+    let frame_first = FrameFirst::new(&model, FOCAL_LENGTH_PX).unwrap();
+    let fixed_point = FixedPoint::new(&model, FOCAL_LENGTH_PX).unwrap();
+    let projector = Projector::new(&model, RIGHT.lines).unwrap();
     let mut lines = Vec::new();
-    for (point_km, x, y) in POINTS_2002 {
-        let point = Vector3::from(point_km) * 1e3;
+    for (index, x, y) in SEEN_2002 {
+        let point = point_m(index);
         let by_a = frame_first.solve(&point, &PAPER, |_| {}).unwrap();
         let by_b = fixed_point.solve(&point, &PAPER, |_| {}).unwrap();
         let by_newton = projector.project(&point).unwrap();
@@ -262,16 +194,16 @@ fn the_points_of_2002_fall_where_its_table_says() {
         assert_eq!((by_a.evaluations, by_b.evaluations), (10, 5));
         lines.push(by_newton.x);
     }
-    let apart_m = (Vector3::from(POINTS_2002[1].0) - Vector3::from(POINTS_2002[0].0)).norm() * 1e3;
+    let apart_m = (point_m(9) - point_m(0)).norm();
     let spacing_m = apart_m / (lines[1] - lines[0]);
     assert!((spacing_m - 5.509).abs() < 0.005, "{spacing_m} m"); // points printed to a metre of 4.4 km
 }
 
 #[test]
 fn the_misprinted_table_of_2002_is_rejected() {
-    let model = linear_2002([START_KM[0], -2453.358, START_KM[2]]);
-    let projector = Projector::new(&model, LINES_2002).unwrap();
-    let point = Vector3::from(POINTS_2002[0].0) * 1e3;
+    let model = RIGHT.misprinted().model();
+    let projector = Projector::new(&model, RIGHT.lines).unwrap();
+    let point = point_m(0);
     let y = y_px(&projector.project(&point).unwrap().camera_m);
     // Half the swath is 336 pixels (2048 detectors, summed by three, and a bit).
     assert!((y.abs() - 2657.0).abs() < 2.0, "{y}");
@@ -279,10 +211,10 @@ fn the_misprinted_table_of_2002_is_rejected() {
 
 #[test]
 fn far_starts_cost_a_few_iterations() {
-    let model = linear_2002(START_KM);
-    let frame_first = FrameFirst::new(&model, FOCAL_LENGTH_2002_PX).unwrap();
-    let fixed_point = FixedPoint::new(&model, FOCAL_LENGTH_2002_PX).unwrap();
-    let point = Vector3::from(POINTS_2002[0].0) * 1e3;
+    let model = RIGHT.model();
+    let frame_first = FrameFirst::new(&model, FOCAL_LENGTH_PX).unwrap();
+    let fixed_point = FixedPoint::new(&model, FOCAL_LENGTH_PX).unwrap();
+    let point = point_m(0);
     for start in [-1e5, -1e4, 1e4, 1e5] {
         let a = frame_first
             .solve_from(start, &point, &PAPER, |_| {})

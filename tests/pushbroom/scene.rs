@@ -10,22 +10,25 @@ use areograph::{
         attitude::{OmegaPhiKappa, rotation_vector, unwrap_angles},
         mars_rotation::frame_rotation_3,
         polynomial::Polynomial,
-        pushbroom::{EulerPolynomial, Pose, RotationVectorPolynomial, VectorPolynomial},
+        pushbroom::{
+            EulerPolynomial, FixedPoint, FrameFirst, Limits, Pose, RotationVectorPolynomial,
+            VectorPolynomial,
+        },
     },
     units::RADIANS_PER_DEGREE,
 };
 use nalgebra::{Matrix3, Rotation3, Unit, Vector3};
 
 /// Gravity parameter of Mars, m³/s².
-const GRAVITY: f64 = 4.282_837e13;
+pub(crate) const GRAVITY: f64 = 4.282_837e13;
 /// Distance of the spacecraft from the centre of Mars at the sites, metres.
-const ORBIT_RADIUS_M: f64 = 3_776_300.0;
+pub(crate) const ORBIT_RADIUS_M: f64 = 3_776_300.0;
 /// Inclination of the orbit, degrees.
-const INCLINATION_DEG: f64 = 92.9;
+pub(crate) const INCLINATION_DEG: f64 = 92.9;
 /// Rotation rate of Mars, radians per second.
 const MARS_RATE_RAD_S: f64 = 7.088_218e-5;
 /// Radius of the ground, metres.
-const GROUND_RADIUS_M: f64 = 3_395_800.0;
+pub(crate) const GROUND_RADIUS_M: f64 = 3_395_800.0;
 /// Focal length over the detector's pitch, as the papers have them (3500 mm, 13 µm).
 const FOCAL_LENGTH_DETECTORS: f64 = 3_500.0 / 0.013;
 
@@ -36,6 +39,23 @@ pub(crate) enum Held {
     Nadir,
     /// At rest among the stars, this many degrees to the side.
     Inertial { roll_deg: f64 },
+}
+
+/// When the published iterations end: the papers' tolerance.
+pub(crate) const PAPER: Limits = Limits {
+    tolerance_lines: 0.1,
+    steps_max: 100,
+};
+
+/// What the published iterations cost on some points.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Iterations {
+    /// Mean evaluations of the frame-first iteration.
+    pub(crate) frame_first: f64,
+    /// Mean evaluations of the fixed point.
+    pub(crate) fixed_point: f64,
+    /// Largest difference of their lines.
+    pub(crate) apart_lines: f64,
 }
 
 /// One image.
@@ -83,6 +103,11 @@ impl Scene {
     /// Focal length in image pixels.
     pub(crate) fn focal_length_px(&self) -> f64 {
         FOCAL_LENGTH_DETECTORS / self.summing
+    }
+
+    /// Half the width of the image, pixels: 2048 detectors.
+    pub(crate) fn half_swath_px(&self) -> f64 {
+        1_024.0 / self.summing
     }
 
     pub(crate) fn line_period_s(&self) -> f64 {
@@ -153,6 +178,37 @@ impl Scene {
                 self.boresight_ground_m(from_middle * spacing_m / speed_m_s)
             })
             .collect()
+    }
+
+    /// Both iterations of second order, on points that they all find.
+    pub(crate) fn iterations(&self, points_m: &[Vector3<f64>], limits: &Limits) -> Iterations {
+        let model = self.euler(2);
+        let frame_first = FrameFirst::new(&model, self.focal_length_px()).unwrap();
+        let fixed_point = FixedPoint::new(&model, self.focal_length_px()).unwrap();
+        let (mut a, mut b, mut apart_lines) = (0, 0, 0.0_f64);
+        for point in points_m {
+            let by_a = frame_first.solve(point, limits, |_| {}).unwrap();
+            let by_b = fixed_point.solve(point, limits, |_| {}).unwrap();
+            a += by_a.evaluations;
+            b += by_b.evaluations;
+            apart_lines = apart_lines.max((by_a.x - by_b.x).abs());
+        }
+        let count = points_m.len() as f64;
+        Iterations {
+            frame_first: f64::from(a) / count,
+            fixed_point: f64::from(b) / count,
+            apart_lines,
+        }
+    }
+
+    /// Residuals of polynomials through the samples' positions, root mean square, metres.
+    pub(crate) fn position_rmse_m(&self, order: usize) -> Vector3<f64> {
+        let samples = self.samples();
+        let x: Vec<f64> = samples.iter().map(|sample| sample.0).collect();
+        Vector3::from_fn(|axis, _| {
+            let y: Vec<f64> = samples.iter().map(|s| s.1.position_m[axis]).collect();
+            Polynomial::fit(&x, &y, order).unwrap().rmse
+        })
     }
 
     /// Poses at the 31 instants of the paper.

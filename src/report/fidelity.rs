@@ -1,0 +1,113 @@
+//! The page that sets every number of the papers beside areograph's.
+
+use super::html::{Cell, Column, Section, Table, escape, page, paragraph};
+
+/// The page of this version, which `tests/fidelity.rs` makes and checks; it lies beside the page over all sites.
+pub const FIDELITY_PAGE: &str = include_str!("../../docs/fidelity.html");
+/// File of the page, in the folder that holds the sites' folders.
+pub const FIDELITY_FILE: &str = "fidelity.html";
+
+/// What the page says.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Fidelity {
+    /// How the list is to be read, a paragraph each.
+    pub rules: Vec<String>,
+    /// Each verdict: the word, the number of rows that have it, what it means.
+    pub verdicts: Vec<(&'static str, usize, &'static str)>,
+    /// The papers.
+    pub papers: Vec<FidelityPaper>,
+}
+
+/// A paper.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct FidelityPaper {
+    /// Authors and year.
+    pub name: &'static str,
+    /// What it is about, and where it stands.
+    pub citation: &'static str,
+    /// What it prints, in its order.
+    pub rows: Vec<FidelityRow>,
+}
+
+/// What a paper prints in one place.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct FidelityRow {
+    /// Identifier.
+    pub id: &'static str,
+    /// Section or table of the paper.
+    pub place: &'static str,
+    /// What is printed there.
+    pub what: &'static str,
+    /// Its numbers, each with the printed one, ours and the tolerance in a line.
+    pub numbers: Vec<String>,
+    /// What ours is computed from.
+    pub from: String,
+    /// The verdict.
+    pub verdict: &'static str,
+    /// What a reader must know.
+    pub note: &'static str,
+}
+
+/// The page.
+#[must_use]
+pub fn fidelity_page(fidelity: &Fidelity) -> String {
+    let rules: String = fidelity.rules.iter().map(|rule| paragraph(rule)).collect();
+    let sections: Vec<Section> = fidelity.papers.iter().map(section).collect();
+    page(
+        "Fidelity to the papers",
+        &(rules + &verdicts(fidelity)),
+        &sections,
+    )
+}
+
+fn verdicts(fidelity: &Fidelity) -> String {
+    let mut table = Table::new(
+        "Rows by verdict",
+        &[
+            Column::Text("verdict"),
+            Column::Number("rows"),
+            Column::Text("meaning"),
+        ],
+    );
+    let mut all = 0;
+    for (word, rows, meaning) in &fidelity.verdicts {
+        all += rows;
+        table.row(
+            true,
+            [(*word).into(), rows.to_string().into(), (*meaning).into()],
+        );
+    }
+    table.row(true, ["all".into(), all.to_string().into()]);
+    table.finish()
+}
+
+fn section(paper: &FidelityPaper) -> Section {
+    let mut table = Table::new(
+        paper.name,
+        &[
+            Column::Text("row"),
+            Column::Text("place"),
+            Column::Text("what"),
+            Column::Text("printed; ours (tolerance)"),
+            Column::Text("verdict"),
+            Column::Text("ours from"),
+            Column::Text("notes"),
+        ],
+    );
+    for row in &paper.rows {
+        let numbers: Vec<String> = row.numbers.iter().map(|number| escape(number)).collect();
+        table.row(
+            true,
+            [
+                row.id.into(),
+                row.place.into(),
+                row.what.into(),
+                Cell::Html(numbers.join("<br>")),
+                row.verdict.into(),
+                Cell::from(&row.from),
+                row.note.into(),
+            ],
+        );
+    }
+    Section::new(paper.name, paragraph(paper.citation) + &table.finish())
+}

@@ -1,0 +1,391 @@
+//! One printed statement of a paper, what areograph makes of it, and the verdict that follows.
+
+use std::fmt::Write as _;
+
+/// A paper and its statements.
+pub(crate) struct Paper {
+    /// Authors and year.
+    pub(crate) name: &'static str,
+    /// What it is about, and where it stands.
+    pub(crate) citation: &'static str,
+    /// Letters before the numbers of its rows.
+    pub(crate) prefix: &'static str,
+    /// How many rows it has; numbers run from 1 without a gap.
+    pub(crate) count: usize,
+    /// The rows in their order, in lists.
+    pub(crate) rows: &'static [&'static [Row]],
+}
+
+/// What a paper prints in one place.
+pub(crate) struct Row {
+    /// Identifier: the paper's prefix and a number.
+    pub(crate) id: &'static str,
+    /// Section or table of the paper.
+    pub(crate) place: &'static str,
+    /// What is printed there.
+    pub(crate) what: &'static str,
+    /// What comes of it.
+    pub(crate) account: Account,
+    /// What a reader must know: how a number was read, why it is not met, what stays out of reach.
+    pub(crate) note: &'static str,
+}
+
+/// What becomes of a row.
+pub(crate) enum Account {
+    /// Ours lies within the tolerance of what is printed.
+    Met {
+        /// What ours is computed from.
+        from: &'static str,
+        /// Printed and ours.
+        ours: fn() -> Vec<Comparison>,
+    },
+    /// The same for a part of the row; the rest needs data that nobody here has.
+    MetInPart {
+        /// What ours is computed from.
+        from: &'static str,
+        /// Printed and ours.
+        ours: fn() -> Vec<Comparison>,
+    },
+    /// Not met, or contradictory in print, for a reason that the note gives.
+    Explained {
+        /// What ours is computed from.
+        from: &'static str,
+        /// Printed and ours; at least one departs.
+        ours: fn() -> Vec<Comparison>,
+    },
+    /// A given of the method.
+    Input {
+        /// Where ours is taken from.
+        from: &'static str,
+        /// Printed and ours.
+        ours: fn() -> Vec<Comparison>,
+        /// File and function of the test that it is used: `tests/mission.rs::orientation_comes_back`.
+        test: &'static str,
+    },
+    /// Needs data that nobody here has.
+    Data {
+        /// As the paper has it.
+        printed: &'static str,
+    },
+    /// The paper quotes somebody else.
+    Cited {
+        /// As the paper has it.
+        printed: &'static str,
+    },
+    /// What would compute it does not exist yet.
+    NotYetComputed {
+        /// As the paper has it.
+        printed: &'static str,
+    },
+}
+
+/// What a reader takes from a row.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Verdict {
+    Met,
+    MetInPart,
+    Explained,
+    Input,
+    NeedsData,
+    Cited,
+    NotYetComputed,
+}
+
+impl Verdict {
+    /// Every verdict, in the order of the counts.
+    pub(crate) const ALL: [Self; 7] = [
+        Self::Met,
+        Self::MetInPart,
+        Self::Explained,
+        Self::Input,
+        Self::NeedsData,
+        Self::Cited,
+        Self::NotYetComputed,
+    ];
+
+    /// As the page says it.
+    pub(crate) const fn words(self) -> &'static str {
+        match self {
+            Self::Met => "met",
+            Self::MetInPart => "met in part",
+            Self::Explained => "explained",
+            Self::Input => "input",
+            Self::NeedsData => "not reproducible (data)",
+            Self::Cited => "not reproducible (cited)",
+            Self::NotYetComputed => "not yet computed",
+        }
+    }
+
+    /// What the word means.
+    pub(crate) const fn meaning(self) -> &'static str {
+        match self {
+            Self::Met => "ours lies within the stated tolerance of every number of the row",
+            Self::MetInPart => {
+                "so does ours where it can be computed; the rest of the row needs data that nobody here has"
+            }
+            Self::Explained => "not met, or contradictory in print; the reason is known and stated",
+            Self::Input => {
+                "a given of the method; ours is what the program uses, and a test says so"
+            }
+            Self::NeedsData => {
+                "needs kernels, altimetry or images of those days that nobody here has: no target"
+            }
+            Self::Cited => "the paper quotes somebody else: nothing to compute",
+            Self::NotYetComputed => "areograph has no code for it yet",
+        }
+    }
+}
+
+impl Account {
+    pub(crate) const fn verdict(&self) -> Verdict {
+        match self {
+            Self::Met { .. } => Verdict::Met,
+            Self::MetInPart { .. } => Verdict::MetInPart,
+            Self::Explained { .. } => Verdict::Explained,
+            Self::Input { .. } => Verdict::Input,
+            Self::Data { .. } => Verdict::NeedsData,
+            Self::Cited { .. } => Verdict::Cited,
+            Self::NotYetComputed { .. } => Verdict::NotYetComputed,
+        }
+    }
+
+    /// What ours is computed from, and the test that it is used.
+    pub(crate) fn inputs(&self) -> String {
+        match self {
+            Self::Met { from, .. }
+            | Self::MetInPart { from, .. }
+            | Self::Explained { from, .. } => (*from).to_owned(),
+            Self::Input { from, test, .. } => format!("{from}; tested by {test}"),
+            Self::Data { .. } | Self::Cited { .. } | Self::NotYetComputed { .. } => String::new(),
+        }
+    }
+
+    /// Printed and ours.
+    pub(crate) fn comparisons(&self) -> Vec<Comparison> {
+        match self {
+            Self::Met { ours, .. }
+            | Self::MetInPart { ours, .. }
+            | Self::Explained { ours, .. }
+            | Self::Input { ours, .. } => ours(),
+            Self::Data { printed } | Self::Cited { printed } | Self::NotYetComputed { printed } => {
+                vec![Comparison {
+                    of: String::new(),
+                    printed: (*printed).to_owned(),
+                    ours: String::new(),
+                    tolerance: String::new(),
+                    agreement: Agreement::Shown,
+                }]
+            }
+        }
+    }
+}
+
+/// How ours stands to what is printed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Agreement {
+    /// Within the tolerance.
+    Within,
+    /// Ours departs from the print, as the row says.
+    Departs,
+    /// Side by side, without a claim.
+    Shown,
+    /// The row claims something that is not so.
+    Broken,
+}
+
+/// A printed number or word, and ours.
+#[derive(Debug, Clone)]
+pub(crate) struct Comparison {
+    /// Which of the row's numbers; may be empty where there is but one.
+    pub(crate) of: String,
+    pub(crate) printed: String,
+    pub(crate) ours: String,
+    pub(crate) tolerance: String,
+    pub(crate) agreement: Agreement,
+}
+
+/// A number whose claim is still to be made.
+pub(crate) struct Number {
+    of: String,
+    printed: String,
+    ours: f64,
+    decimals: usize,
+}
+
+/// Printed `printed`, ours `ours`, shown with `decimals`.
+pub(crate) fn number(
+    of: impl Into<String>,
+    printed: impl Into<String>,
+    ours: f64,
+    decimals: usize,
+) -> Number {
+    Number {
+        of: of.into(),
+        printed: printed.into(),
+        ours,
+        decimals,
+    }
+}
+
+/// `ours` without a minus before zeros.
+pub(crate) fn fixed(value: f64, decimals: usize) -> String {
+    let text = format!("{value:.decimals$}");
+    match text.strip_prefix('-') {
+        Some(zeros) if zeros.chars().all(|digit| "0.".contains(digit)) => zeros.to_owned(),
+        _ => text,
+    }
+}
+
+impl Number {
+    /// What the paper prints; NaN, which agrees with nothing, where it prints no number.
+    fn value(&self) -> f64 {
+        self.printed.replace('−', "-").parse().unwrap_or(f64::NAN)
+    }
+
+    fn finish(self, tolerance: String, agreement: Agreement) -> Comparison {
+        Comparison {
+            ours: fixed(self.ours, self.decimals),
+            printed: self.printed,
+            of: self.of,
+            tolerance,
+            agreement,
+        }
+    }
+
+    fn claim(self, tolerance: String, holds: bool) -> Comparison {
+        let agreement = if holds {
+            Agreement::Within
+        } else {
+            Agreement::Broken
+        };
+        self.finish(tolerance, agreement)
+    }
+
+    /// Not farther than `tolerance` from the print.
+    pub(crate) fn within(self, tolerance: f64) -> Comparison {
+        let holds = (self.ours - self.value()).abs() <= tolerance;
+        self.claim(format!("±{tolerance}"), holds)
+    }
+
+    /// Not farther than `share` of the print.
+    pub(crate) fn share(self, share: f64) -> Comparison {
+        let holds = (self.ours / self.value() - 1.0).abs() <= share;
+        let percent = fixed(100.0 * share, 1);
+        self.claim(format!("±{} %", percent.trim_end_matches(".0")), holds)
+    }
+
+    /// The print up to rounding of the computer.
+    pub(crate) fn exact(self) -> Comparison {
+        let holds = (self.ours - self.value()).abs() <= 1e-9 * self.value().abs();
+        self.claim("exact".to_owned(), holds)
+    }
+
+    /// Where the paper gives a range, or says "about".
+    pub(crate) fn between(self, low: f64, high: f64) -> Comparison {
+        let holds = (low..=high).contains(&self.ours);
+        self.claim(format!("{low} to {high}"), holds)
+    }
+
+    /// Ours departs from the print by more than `least`.
+    pub(crate) fn departs(self, least: f64) -> Comparison {
+        let holds = (self.ours - self.value()).abs() > least;
+        let agreement = if holds {
+            Agreement::Departs
+        } else {
+            Agreement::Broken
+        };
+        self.finish("departs".to_owned(), agreement)
+    }
+
+    /// Side by side, without a claim.
+    pub(crate) fn shown(self) -> Comparison {
+        self.finish(String::new(), Agreement::Shown)
+    }
+}
+
+/// Words of the paper and of areograph, which must be the same.
+pub(crate) fn words(of: &str, printed: &str, ours: &str) -> Comparison {
+    Comparison {
+        of: of.to_owned(),
+        printed: printed.to_owned(),
+        ours: ours.to_owned(),
+        tolerance: "same".to_owned(),
+        agreement: if printed == ours {
+            Agreement::Within
+        } else {
+            Agreement::Broken
+        },
+    }
+}
+
+/// What is printed and cannot be computed beside numbers that can.
+pub(crate) fn beyond_reach(of: impl Into<String>, printed: impl Into<String>) -> Comparison {
+    Comparison {
+        of: of.into(),
+        printed: printed.into(),
+        ours: "needs data".to_owned(),
+        tolerance: String::new(),
+        agreement: Agreement::Shown,
+    }
+}
+
+/// A row with its numbers.
+pub(crate) struct Outcome {
+    pub(crate) row: &'static Row,
+    pub(crate) comparisons: Vec<Comparison>,
+}
+
+impl Outcome {
+    pub(crate) fn of(row: &'static Row) -> Self {
+        Self {
+            row,
+            comparisons: row.account.comparisons(),
+        }
+    }
+
+    /// Why the row does not come out as declared; empty where it does.
+    pub(crate) fn complaint(&self) -> String {
+        let mut complaint = String::new();
+        for comparison in &self.comparisons {
+            if comparison.agreement == Agreement::Broken {
+                let Comparison {
+                    of,
+                    printed,
+                    ours,
+                    tolerance,
+                    ..
+                } = comparison;
+                writeln!(
+                    complaint,
+                    "{} {of}: printed {printed}, ours {ours}, claimed {tolerance}",
+                    self.row.id
+                )
+                .unwrap();
+            }
+        }
+        let has = |agreement| {
+            let mut all = self.comparisons.iter();
+            all.any(|comparison| comparison.agreement == agreement)
+        };
+        let claims = match self.row.account.verdict() {
+            Verdict::Met => has(Agreement::Within) && !has(Agreement::Departs),
+            // What the program uses otherwise is explained in the note.
+            Verdict::Input => {
+                has(Agreement::Within) && (!has(Agreement::Departs) || !self.row.note.is_empty())
+            }
+            Verdict::MetInPart => has(Agreement::Within),
+            Verdict::Explained => has(Agreement::Departs),
+            Verdict::NeedsData | Verdict::Cited | Verdict::NotYetComputed => true,
+        };
+        if !claims {
+            writeln!(
+                complaint,
+                "{}: its numbers do not make it \"{}\"",
+                self.row.id,
+                self.row.account.verdict().words()
+            )
+            .unwrap();
+        }
+        complaint
+    }
+}

@@ -1,0 +1,180 @@
+//! Registration: iterations, and how far footprints lie apart.
+
+use areograph::{config::RegistrationConfig, geom::pushbroom::Projector};
+
+use super::super::{
+    row::{Account, Comparison, Row, number},
+    scene::{EOS_NADIR, EOS_OBLIQUE, GUSEV, Iterations, PAPER, Scene},
+    table_2::TABLE_2,
+};
+
+fn iterations(scene: &Scene, shots: u32) -> Iterations {
+    scene.iterations(&scene.profile_m(shots, 305.0), &PAPER)
+}
+
+fn tolerance() -> Vec<Comparison> {
+    let config = RegistrationConfig::default();
+    vec![number("px", "0.1", config.tolerance_lines, 1).exact()]
+}
+
+fn eos() -> Vec<Comparison> {
+    let [nadir, oblique] = [EOS_NADIR, EOS_OBLIQUE].map(|scene| iterations(&scene, 174));
+    let mean = |of: fn(&Iterations) -> f64| 0.5 * (of(&nadir) + of(&oblique));
+    let mut all = vec![
+        number("eq. 4, both images", "2.9", mean(|of| of.fixed_point), 2).departs(0.5),
+        number(
+            "frame first, both images",
+            "13.6",
+            mean(|of| of.frame_first),
+            2,
+        )
+        .departs(0.5),
+        number("eq. 4, E04-01275 alone", "2.9", oblique.fixed_point, 2).within(0.4),
+    ];
+    for (of, found) in [("E02-02855", nadir), ("E04-01275", oblique)] {
+        let share = found.frame_first / found.fixed_point;
+        all.push(
+            number(format!("{of}, frame first over eq. 4"), "4.7", share, 1).between(1.0, 100.0),
+        );
+    }
+    all
+}
+
+fn gusev() -> Vec<Comparison> {
+    let found = iterations(&GUSEV, 142);
+    vec![
+        number("eq. 4", "5.6", found.fixed_point, 2).between(5.2, 6.0),
+        number("frame first", "17.1", found.frame_first, 2).between(16.5, 19.5),
+    ]
+}
+
+fn gain() -> Vec<Comparison> {
+    vec![
+        number("Eos", "3–4", 13.6 / 2.9, 1).shown(),
+        number("Gusev", "3–4", 17.1 / 5.6, 1).between(3.0, 4.0),
+        number("Eos, above 4", "4", 13.6 / 2.9, 1).departs(0.5),
+    ]
+}
+
+fn spacing() -> Vec<Comparison> {
+    vec![
+        number(
+            "E02-02855, 305 m",
+            "55",
+            305.0 / TABLE_2[0].line_spacing_m(),
+            1,
+        )
+        .within(0.5),
+        number(
+            "E02-01301, 340 m",
+            "104",
+            340.0 / TABLE_2[4].line_spacing_m(),
+            1,
+        )
+        .within(0.5),
+    ]
+}
+
+/// By how many footprints a profile moves in the image when the image's clock is off by the time between two shots.
+fn same_place() -> Vec<Comparison> {
+    let model = GUSEV.rotation_vector();
+    let projector = Projector::new(&model, f64::from(GUSEV.lines)).unwrap();
+    let lines: Vec<f64> = GUSEV
+        .profile_m(142, 305.0)
+        .iter()
+        .map(|point_m| projector.project(point_m).unwrap().x)
+        .collect();
+    let spacing_lines = (lines[141] - lines[0]) / 141.0;
+    let shot_s = 305.0 / super::super::table_2::ground_speed_m_s(true);
+    let shifted = shot_s / GUSEV.line_period_s() / spacing_lines;
+    vec![number("footprints for one spacing of time", "1", shifted, 3).within(5e-3)]
+}
+
+fn measuring() -> Vec<Comparison> {
+    let sigma_px = areograph::config::AdjustmentConfig::default().tie_sigma_px[0];
+    vec![
+        number(
+            "standard deviation of a tie point, better than, px",
+            "2",
+            sigma_px,
+            0,
+        )
+        .between(0.0, 2.0),
+    ]
+}
+
+pub(super) static ROWS: [Row; 7] = [
+    Row {
+        id: "S05-42",
+        place: "registration",
+        what: "tolerance of the iterations",
+        account: Account::Input {
+            from: "default of `registration.tolerance_lines`",
+            ours: tolerance,
+            test: "tests/registration.rs::iterations_are_counted_for_every_point_within_the_lines",
+        },
+        note: "One line in x.",
+    },
+    Row {
+        id: "S05-43",
+        place: "registration",
+        what: "iterations at Eos, 174 points in two images",
+        account: Account::Explained {
+            from: "circular orbit, both images, 174 points at 305 m",
+            ours: eos,
+        },
+        note: "2.9 is what the off-nadir image alone needs. Whether the sum was divided by 174 or 348 is not said. \
+               Eq. 4 needs fewer in each image.",
+    },
+    Row {
+        id: "S05-44",
+        place: "registration",
+        what: "iterations at Gusev, 142 points in E02-00665",
+        account: Account::Met {
+            from: "circular orbit, nadir, 142 points at 305 m",
+            ours: gusev,
+        },
+        note: "One image, no pair.",
+    },
+    Row {
+        id: "S05-45",
+        place: "registration",
+        what: "eq. 4 is 3–4 times faster",
+        account: Account::Explained {
+            from: "the printed counts of both sites",
+            ours: gain,
+        },
+        note: "4.7 at Eos.",
+    },
+    Row {
+        id: "S05-46",
+        place: "results",
+        what: "one MOLA GSD, 55 to 104 px",
+        account: Account::Met {
+            from: "exposure time and ground speed",
+            ours: spacing,
+        },
+        note: "",
+    },
+    Row {
+        id: "S05-47",
+        place: "results",
+        what: "point 74 of ap19215 left where 73 is right; 109 and 108 of ap18933",
+        account: Account::MetInPart {
+            from: "circular orbit, E02-00665, a clock that is off by the time between two shots",
+            ours: same_place,
+        },
+        note: "Closed loop. The images themselves were compared by eye.",
+    },
+    Row {
+        id: "S05-48",
+        place: "intersection",
+        what: "about 24 seed points a pair, measured to better than 2 px",
+        account: Account::Input {
+            from: "default of `adjustment.tie_sigma_px`",
+            ours: measuring,
+            test: "tests/stereo_intersection.rs::noise_comes_out_as_simulated_and_as_the_covariance_says",
+        },
+        note: "areograph reads tie points; it does not measure them.",
+    },
+];

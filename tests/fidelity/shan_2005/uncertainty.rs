@@ -1,0 +1,257 @@
+//! Equations 5 to 9: how far the two footprints of one point lie apart.
+
+use areograph::geom::uncertainty::{
+    BudgetInput, GroundPart, PointUncertainty, UncertaintyBudget, uncertainty_budget,
+};
+
+use super::{
+    super::{
+        row::{Account, Comparison, Row, number},
+        shan_2002,
+        table_2::TABLE_2,
+    },
+    TABLE_5,
+};
+
+/// The mean pixel of the paper, metres.
+const PIXEL_M: f64 = 4.4;
+
+/// The budget of the printed table 5.
+fn budget() -> UncertaintyBudget {
+    uncertainty_budget(&BudgetInput {
+        sites: TABLE_5.map(|site| site.images).to_vec(),
+        mola_spacing_m: 325.0,
+        pixel_size_m: PIXEL_M,
+        height_over_base: 385.0 / 155.0,
+    })
+    .unwrap()
+}
+
+/// The paper rounds to a tenth after each step.
+fn rounded(value: f64) -> f64 {
+    (value * 10.0).round() / 10.0
+}
+
+fn along() -> Vec<Comparison> {
+    vec![number("px", "41.0", budget().along_px, 3).within(0.05)]
+}
+
+fn total() -> Vec<Comparison> {
+    vec![number("px", "74.0", budget().total_along_px, 2).within(0.2)]
+}
+
+fn ground() -> Vec<Comparison> {
+    let budget = budget();
+    let GroundPart::Resolved { along_px } = budget.ground else {
+        panic!("{budget:?}");
+    };
+    let with_roundings =
+        (budget.total_along_px.round().powi(2) - rounded(budget.along_px).powi(2)).sqrt();
+    vec![
+        number("with the paper's roundings, px", "61.6", with_roundings, 3).within(0.005),
+        number("unrounded, px", "61.6", along_px, 2).shown(),
+    ]
+}
+
+fn across() -> Vec<Comparison> {
+    let budget = budget();
+    vec![
+        number(
+            "average of the images, px",
+            "2.8",
+            budget.paper_average.across_px,
+            3,
+        )
+        .within(0.05),
+        number("by eq. 7, px", "2.8", budget.equation_7.across_px, 3).departs(1.0),
+    ]
+}
+
+fn plan() -> Vec<Comparison> {
+    let budget = budget();
+    let PointUncertainty { across_px, .. } = budget.paper_average;
+    let plan_px = rounded(budget.along_px).hypot(rounded(across_px));
+    vec![
+        number("with the paper's roundings, px", "41.1", plan_px, 3).within(0.05),
+        number(
+            "with the paper's roundings, m",
+            "180.8",
+            plan_px * PIXEL_M,
+            2,
+        )
+        .within(0.1),
+        number(
+            "unrounded, m",
+            "180.8",
+            budget.paper_average.planimetric_m,
+            2,
+        )
+        .shown(),
+        number(
+            "by eq. 7 across as well, m",
+            "180.8",
+            budget.equation_7.planimetric_m,
+            2,
+        )
+        .shown(),
+    ]
+}
+
+fn mean_pixel() -> Vec<Comparison> {
+    let sum_m: f64 = TABLE_2
+        .iter()
+        .map(|image| image.pixel_m.parse::<f64>().unwrap())
+        .sum();
+    vec![number("mean of six, m", "4.4", sum_m / 6.0, 3).within(0.05)]
+}
+
+fn height_and_base() -> Vec<Comparison> {
+    let table = shan_2002::base_and_height();
+    vec![
+        number(
+            "H by the table of 2002, km",
+            "385",
+            table.altitude_m / 1e3,
+            1,
+        )
+        .share(0.02),
+        number("B by the table of 2002, km", "155", table.base_m / 1e3, 1).share(0.02),
+    ]
+}
+
+fn height_over_base() -> Vec<Comparison> {
+    let table = shan_2002::base_and_height();
+    vec![
+        number("385/155", "2.5", 385.0 / 155.0, 3).within(0.02),
+        number(
+            "by the table of 2002",
+            "2.5",
+            table.altitude_m / table.base_m,
+            3,
+        )
+        .within(0.03),
+    ]
+}
+
+fn height() -> Vec<Comparison> {
+    let budget = budget();
+    let height_px = 385.0 / 155.0 * rounded(budget.paper_average.across_px);
+    vec![
+        number("with the paper's roundings, px", "7.0", height_px, 3).within(0.05),
+        number(
+            "with the paper's roundings, m",
+            "30.8",
+            rounded(height_px) * PIXEL_M,
+            2,
+        )
+        .within(0.3),
+        number("unrounded, m", "30.8", budget.paper_average.height_m, 2).shown(),
+        number("by eq. 7 across, px", "7.0", budget.equation_7.height_px, 2).shown(),
+        number("by eq. 7 across, m", "30.8", budget.equation_7.height_m, 2).shown(),
+    ]
+}
+
+pub(super) static ROWS: [Row; 10] = [
+    Row {
+        id: "S05-54",
+        place: "eq. 7",
+        what: "D_Δx(EO)",
+        account: Account::Met {
+            from: "table 5: squares averaged over the sites for each image, then added",
+            ours: along,
+        },
+        note: "Averages of D instead of its square give 40.7.",
+    },
+    Row {
+        id: "S05-55",
+        place: "text on eq. 6",
+        what: "D_Δx(MOLA total)",
+        account: Account::Met {
+            from: "325 m over 4.4 m",
+            ours: total,
+        },
+        note: "",
+    },
+    Row {
+        id: "S05-56",
+        place: "eq. 6",
+        what: "D_Δx(MOLA)",
+        account: Account::Met {
+            from: "S05-54 and S05-55",
+            ours: ground,
+        },
+        note: "",
+    },
+    Row {
+        id: "S05-57",
+        place: "eq. 7, across the track",
+        what: "D_Δy(EO)",
+        account: Account::Explained {
+            from: "table 5",
+            ours: across,
+        },
+        note: "Along the track the paper sums over both images as its eq. 7 says, across the track it averages. \
+               Products and report have both readings.",
+    },
+    Row {
+        id: "S05-58",
+        place: "eq. 8",
+        what: "D_p",
+        account: Account::Met {
+            from: "S05-54 and S05-57, 4.4 m",
+            ours: plan,
+        },
+        note: "The gap between the two footprints of one point, not a standard deviation of a point.",
+    },
+    Row {
+        id: "S05-59",
+        place: "text on eq. 8",
+        what: "mean pixel",
+        account: Account::Met {
+            from: "table 2",
+            ours: mean_pixel,
+        },
+        note: "Unrounded it would make D_p 182.2 m.",
+    },
+    Row {
+        id: "S05-60",
+        place: "text on eq. 9",
+        what: "height H and base B, across the track",
+        account: Account::Met {
+            from: "table 1 of Shan, Lee & Yoon 2002 (Eos)",
+            ours: height_and_base,
+        },
+        note: "One pair stands for three sites: with the printed emission angles B would be 123 km at Eos, 154 km at \
+               Gusev and 88 km at Isidis.",
+    },
+    Row {
+        id: "S05-61",
+        place: "text on eq. 9",
+        what: "H/B",
+        account: Account::Met {
+            from: "S05-60",
+            ours: height_over_base,
+        },
+        note: "",
+    },
+    Row {
+        id: "S05-62",
+        place: "eq. 9",
+        what: "D_h",
+        account: Account::Met {
+            from: "S05-57 and S05-61, 4.4 m",
+            ours: height,
+        },
+        note: "The same gap in height. With eq. 7 across the track as along it, it would be √2 larger.",
+    },
+    Row {
+        id: "S05-63",
+        place: "introduction, discussion",
+        what: "results of others",
+        account: Account::Cited {
+            printed: "740 m of Pathfinder control; MOLA 1 m and 100 m; offsets of 10–20 km and 1.8 km; grids of \
+                      1/256°; 3,000 images",
+        },
+        note: "",
+    },
+];
