@@ -4,6 +4,7 @@ pub mod attitude;
 pub mod bundle;
 pub mod chebyshev;
 pub mod collinearity;
+pub mod conformal_map;
 pub mod ellipsoid;
 pub mod intersection;
 pub mod lagrange;

@@ -18,9 +18,15 @@ pub(super) const POINT_Z_HEIGHT: &str =
 pub(super) struct Features<'a> {
     /// Name of the whole.
     pub(super) name: &'a str,
+    /// What a point is, in the plural: the table of a GeoPackage.
+    pub(super) table: &'static str,
     /// UTC of the newest, for formats that hold a date: a clock would give other bytes each time.
     pub(super) newest_utc: &'a str,
-    /// Longitude (-180..180), areocentric latitude, degrees, and height, metres: [`POINT_Z_HEIGHT`].
+    /// Whose longitudes and latitudes these are.
+    pub(super) frame: &'static str,
+    /// What the third coordinate is.
+    pub(super) z: &'static str,
+    /// Longitude (-180..180), areocentric latitude, degrees, and what `z` says.
     pub(super) points: Vec<[f64; 3]>,
     /// A row per point.
     pub(super) attributes: Table<'a>,
@@ -65,6 +71,9 @@ pub(super) mod tests {
         ];
         Features {
             name: "a",
+            table: "footprints",
+            frame: "a frame",
+            z: POINT_Z_HEIGHT,
             newest_utc: "1999-08-24T14:12:13.000",
             points: vec![[0.1 + 0.2, -0.0, -1950.25], [2.0, -0.0, -1950.25]],
             attributes: Table::new(columns, vec![1.0, 2.0]),
