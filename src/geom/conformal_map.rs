@@ -47,12 +47,10 @@ impl ConformalMap {
                 let (sin_turn, cos_turn) = turn_rad.sin_cos();
                 let cos_distance = sin_centre * sin + cos_centre * cos * cos_turn;
                 let scale_m = 2.0 * self.radius_m / (1.0 + cos_distance);
-                (1.0 + cos_distance > 1e-12).then(|| {
-                    (
-                        scale_m * cos * sin_turn,
-                        scale_m * (cos_centre * sin - sin_centre * cos * cos_turn),
-                    )
-                })
+                (1.0 + cos_distance > 1e-12).then_some((
+                    scale_m * cos * sin_turn,
+                    scale_m * (cos_centre * sin - sin_centre * cos * cos_turn),
+                ))
             }
         }
     }

@@ -74,7 +74,7 @@ pub fn documentation() -> String {
     // The CSV files have the columns of the Parquet files.
     for product in NET_PRODUCTS
         .iter()
-        .filter(|product| product.path.ends_with(".parquet"))
+        .filter(|product| product.path.contains(".parquet"))
     {
         text += &columns_of(product, "net: ");
     }

@@ -108,7 +108,7 @@ fn map(title: &str, caption: &str, mut arrows: Vec<Arrows>, series: Vec<Series>)
 }
 
 fn deviations(net: &Triangulation) -> Result<String> {
-    let tied: Vec<&MeasurementResult> = net.measurements.iter().filter(shown).collect();
+    let tied: Vec<&MeasurementResult> = net.measurements.iter().filter(|of| shown(of)).collect();
     if tied.is_empty() {
         return Ok(paragraph("No point is on several pictures."));
     }
@@ -153,7 +153,7 @@ fn deviations(net: &Triangulation) -> Result<String> {
 }
 
 /// Whether a measurement has a deviation within its brick, or was left out.
-fn shown(of: &&MeasurementResult) -> bool {
+fn shown(of: &MeasurementResult) -> bool {
     of.in_brick.is_some() || of.removed
 }
 
@@ -253,7 +253,8 @@ fn bricks(net: &Triangulation) -> String {
 }
 
 fn blunders(net: &Triangulation) -> String {
-    let mut worst: Vec<&MeasurementResult> = net.measurements.iter().filter(shown).collect();
+    let mut worst: Vec<&MeasurementResult> =
+        net.measurements.iter().filter(|of| shown(of)).collect();
     worst.sort_by(|a, b| {
         b.removed
             .cmp(&a.removed)

@@ -141,7 +141,7 @@ impl ColumnsDocument {
     fn new() -> Self {
         let tables = NET_PRODUCTS
             .iter()
-            .filter(|product| product.path.ends_with(".csv"));
+            .filter(|product| product.media_type() == Some("text/csv"));
         let tables = tables.filter_map(|product| match product.content {
             Content::Table(columns) => Some(TableColumns {
                 file: product.path,

@@ -232,7 +232,8 @@ impl Report<'_> {
             let middle =
                 own[picture].iter().map(at).sum::<Place>() / own[picture].len().max(1) as f64;
             let centre = way.map(middle);
-            let half_side = half_side(own[picture].iter().map(at)) * way.scale();
+            let places: Vec<Place> = own[picture].iter().map(at).collect();
+            let half_side = half_side(&places) * way.scale();
             let place = (centre.re, centre.im);
             let deviations: Vec<Place> = own[picture]
                 .iter()
@@ -402,11 +403,10 @@ fn shrinkage(of: Shrinkage) -> ShrinkageResult {
 }
 
 /// Half of the longer side of the box round places.
-fn half_side(places: impl Iterator<Item = Place> + Clone) -> f64 {
+fn half_side(places: &[Place]) -> f64 {
     let side = |part: fn(&Place) -> f64| {
-        let ends = places.clone().map(|of| part(&of));
-        let low = ends.clone().fold(f64::INFINITY, f64::min);
-        let high = ends.fold(f64::NEG_INFINITY, f64::max);
+        let low = places.iter().map(part).fold(f64::INFINITY, f64::min);
+        let high = places.iter().map(part).fold(f64::NEG_INFINITY, f64::max);
         (high - low).max(0.0)
     };
     0.5 * side(|of| of.re).max(side(|of| of.im))
