@@ -6,7 +6,7 @@ use super::{
     SiteProducts,
     coordinates::{FRAME, bounding_box_deg, degrees, signed_longitude_deg},
     geojson,
-    gis::{Features, POINT_Z_HEIGHT, SPHERE_RADIUS_M},
+    gis::{Features, SPHERE_RADIUS_M},
     parquet, pds4_label,
     product::{Content, Declaration, Program, Role, Use, Write},
     table::{Column, Meaning, Table, Unit, column, meanings},
@@ -133,21 +133,15 @@ pub(super) fn table<'a>(site: &'a SiteProducts<'a>) -> Table<'a> {
 pub(super) fn features<'a>(site: &'a SiteProducts<'a>) -> Features<'a> {
     let point = |shot: &Shot| {
         let [east_deg, north_deg] = shot.point_deg();
-        [
-            east_deg,
-            north_deg,
-            shot.get(|of| &of.radius_crossover_m) - SPHERE_RADIUS_M,
-        ]
+        let height_m = shot.get(|of| &of.radius_crossover_m) - SPHERE_RADIUS_M;
+        [east_deg, north_deg, height_m]
     };
-    Features {
-        name: &site.config.site,
-        table: "footprints",
-        frame: FRAME,
-        z: POINT_Z_HEIGHT,
-        newest_utc: site.utc.iter().max().map_or("", String::as_str),
-        points: Shot::all(site).iter().map(point).collect(),
-        attributes: table(site),
-    }
+    Features::of_footprints(
+        &site.config.site,
+        site.utc.iter().max().map_or("", String::as_str),
+        Shot::all(site).iter().map(point).collect(),
+        table(site),
+    )
 }
 
 /// The columns of the CSV file.

@@ -1,6 +1,6 @@
 //! Points with attributes, as formats for GIS take them.
 
-use super::table::Table;
+use super::{coordinates::FRAME, table::Table};
 
 /// The sphere of the CRS, and of `D_MARS` in Ames Stereo Pipeline, metres.
 pub(super) const SPHERE_RADIUS_M: f64 = 3_396_190.0;
@@ -32,7 +32,25 @@ pub(super) struct Features<'a> {
     pub(super) attributes: Table<'a>,
 }
 
-impl Features<'_> {
+impl<'a> Features<'a> {
+    /// Footprints by longitude, latitude and height.
+    pub(super) const fn of_footprints(
+        name: &'a str,
+        newest_utc: &'a str,
+        points: Vec<[f64; 3]>,
+        attributes: Table<'a>,
+    ) -> Self {
+        Self {
+            name,
+            table: "footprints",
+            newest_utc,
+            frame: FRAME,
+            z: POINT_Z_HEIGHT,
+            points,
+            attributes,
+        }
+    }
+
     /// Longitudes and latitudes, degrees.
     pub(super) fn points_deg(&self) -> Vec<[f64; 2]> {
         let points = self.points.iter();

@@ -39,7 +39,7 @@ pub struct PictureResult {
     pub brick: String,
     /// `P`, `Q`, `A` and `B` of equation 3: metres per unit, and metres.
     pub coefficients: [f64; 4],
-    /// Angle from the picture's x axis to east, anticlockwise, radians.
+    /// Angle from east to the picture's x axis, anticlockwise, radians.
     pub angle_rad: f64,
     /// Middle of its measured points on the map, metres.
     pub centre_m: [f64; 2],

@@ -22,3 +22,13 @@ pub(super) fn rms_of_both(of: &[Place]) -> f64 {
     let [x, y] = rms(of);
     (0.5 * (x * x + y * y)).sqrt()
 }
+
+/// Half of the longer side of the box round places.
+pub(super) fn half_side(places: &[Place]) -> f64 {
+    let side = |part: fn(&Place) -> f64| {
+        let low = places.iter().map(part).fold(f64::INFINITY, f64::min);
+        let high = places.iter().map(part).fold(f64::NEG_INFINITY, f64::max);
+        (high - low).max(0.0)
+    };
+    0.5 * side(|of| of.re).max(side(|of| of.im))
+}

@@ -11,7 +11,7 @@ use super::{
         BrickResult, ControlResult, Deviation, MeasurementResult, PictureResult, PointResult,
         Seams, ShrinkageResult, Totals, Triangulation,
     },
-    spread::{largest, rms, rms_of_both},
+    spread::{half_side, largest, rms, rms_of_both},
 };
 use crate::{
     config::NetConfig,
@@ -229,10 +229,8 @@ impl Report<'_> {
         let pictures = self.placed.pictures.iter().enumerate();
         let pictures = pictures.map(|(picture, way)| {
             let at = |index: &usize| self.data.net.measurements[*index].at;
-            let middle =
-                own[picture].iter().map(at).sum::<Place>() / own[picture].len().max(1) as f64;
-            let centre = way.map(middle);
             let places: Vec<Place> = own[picture].iter().map(at).collect();
+            let centre = way.map(places.iter().sum::<Place>() / places.len().max(1) as f64);
             let half_side = half_side(&places) * way.scale();
             let place = (centre.re, centre.im);
             let deviations: Vec<Place> = own[picture]
@@ -400,14 +398,4 @@ fn shrinkage(of: Shrinkage) -> ShrinkageResult {
         factor: of.factor,
         law: of.law,
     }
-}
-
-/// Half of the longer side of the box round places.
-fn half_side(places: &[Place]) -> f64 {
-    let side = |part: fn(&Place) -> f64| {
-        let low = places.iter().map(part).fold(f64::INFINITY, f64::min);
-        let high = places.iter().map(part).fold(f64::NEG_INFINITY, f64::max);
-        (high - low).max(0.0)
-    };
-    0.5 * side(|of| of.re).max(side(|of| of.im))
 }
