@@ -289,6 +289,10 @@ impl Report<'_> {
     }
 
     fn bricks(&self, measurements: &[MeasurementResult]) -> Vec<BrickResult> {
+        let mut removed_in = vec![0; self.data.pictures.len()];
+        for (measured, removed) in self.data.net.measurements.iter().zip(&self.laid.removed) {
+            removed_in[measured.picture] += usize::from(*removed);
+        }
         let bricks = self.laid.figures.iter().enumerate();
         let bricks = bricks.map(|(brick, figure)| {
             let turn = self.placed.bricks[brick].turn;
@@ -301,11 +305,7 @@ impl Report<'_> {
             let flagged = tied
                 .iter()
                 .filter(|(index, _)| measurements[*index].flagged);
-            let removed = figure.pictures.iter().map(|picture| {
-                let own = self.data.net.measurements.iter().zip(&self.laid.removed);
-                own.filter(|(of, removed)| of.picture == *picture && **removed)
-                    .count()
-            });
+            let removed = figure.pictures.iter().map(|picture| removed_in[*picture]);
             BrickResult {
                 brick: self.laid.names[brick].clone(),
                 pictures: count(figure.pictures.len()),
