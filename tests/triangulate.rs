@@ -5,7 +5,9 @@
     clippy::disallowed_methods,
     clippy::unwrap_used,
     clippy::panic,
-    reason = "tests work in temporary folders and may fail loudly"
+    clippy::format_push_string,
+    clippy::too_many_lines,
+    reason = "tests work in temporary folders and may fail loudly; a list of refused nets is read in one go"
 )]
 
 mod common;
