@@ -7,6 +7,7 @@ pub mod collinearity;
 pub mod ellipsoid;
 pub mod intersection;
 pub mod lagrange;
+pub mod light_time;
 pub mod map_projection;
 pub mod mars_rotation;
 pub mod misregistration;

@@ -12,6 +12,8 @@
 //!   pixels.
 //! * The line of the detector is taken at coordinate 0 (`losToEcf`), so its centre is 0, or what puts a line
 //!   that lies off the boresight there.
+//! * `usgscsm` corrects no light time itself: positions follow the convention of the run. ALE's are those seen from the
+//!   centre of Mars; they can be had by `light_time = "centre"`.
 //! * Pointing is sampled from before the first line to after the last; ALE's table starts 1.15 s late. Nodes are
 //!   as dense as an interpolation error below 0.01 pixels wants, which is measured and stated.
 //! * Distortion of the narrow angle is zero, as the instrument kernel says. ALE repeats the pixel pitch in these
@@ -36,10 +38,7 @@ use crate::{
     frames::{self, Frame, J2000},
     geom::{attitude::continuous_quaternions, pushbroom::Distortion},
     instruments::{Instrument, NaifNames},
-    stages::{
-        reorient::geometric_tables,
-        sample_orientation::{CameraTables, InterpolationCheck, Orientation},
-    },
+    stages::sample_orientation::{CameraTables, InterpolationCheck},
     units::METRES_PER_KM,
 };
 use document::{
@@ -66,26 +65,14 @@ pub(super) static ISD: Declaration = Declaration {
     }],
 };
 
-/// Its positions are geometric: what was adjusted is where the camera was, not where light of it seemed to come
-/// from, and adjusted ground must be seen at the measured pixels.
 pub(super) static ADJUSTED: Declaration = Declaration {
     path: "images/<image>/adjusted_isd.json",
-    what: "adjusted camera model; its positions are geometric, those of isd.json have light time and aberration",
+    what: "adjusted camera model; its positions follow the light-time convention of the run, like all others",
     readers: "usgscsm, Ames Stereo Pipeline, ISIS",
     rows: "table nodes",
     role: Role::Data,
     content: Content::Document(schema),
-    write: Write::AdjustedImage(|path, of, image| {
-        let orientation = Orientation {
-            tables: geometric_tables(image.orientation)?,
-            ..image.orientation.clone()
-        };
-        let image = ImageProducts {
-            orientation: &orientation,
-            ..*image
-        };
-        write(path, of, &image)
-    }),
+    write: Write::AdjustedImage(write),
     uses: &[],
 };
 
@@ -302,6 +289,7 @@ fn provenance<'a>(site: &SiteProducts<'a>, image: &ImageProducts<'a>) -> Provena
             within_limit: interpolation.keeps_limit(),
         },
         kernels: kernels.collect(),
+        light_time: &image.orientation.light_time,
         line_period_s: times.line_period_s,
         lines_header: times.lines_header,
         notes: vec![
@@ -313,8 +301,10 @@ fn provenance<'a>(site: &SiteProducts<'a>, image: &ImageProducts<'a>) -> Provena
                 times.instrument.detector.boresight_px,
             ),
             distortion,
-            "instrument_position: light time and stellar aberration corrected (LT+S), as in ISIS and ALE"
-                .to_owned(),
+            format!(
+                "instrument_position: {}, the convention of the whole run; reading programs must add none",
+                image.orientation.light_time.convention.positions(),
+            ),
             format!(
                 "instrument_pointing: attitude of each epoch read from the C-kernel at epoch + INS{}_CK_TIME_BIAS",
                 times.instrument.naif.instrument,

@@ -19,6 +19,7 @@ mod gis;
 mod heights;
 mod isd;
 mod kernel_report;
+mod light_time;
 mod orientation;
 mod page;
 mod parquet;
