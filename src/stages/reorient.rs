@@ -336,8 +336,8 @@ impl<F: Fn(f64) -> LineCorrection> Corrected<'_, F> {
         let et = tag.plus(self.shift_s());
         let camera = self.tabulated(tag)?;
         let to_mars = *original.inertial_to_mars[row].matrix();
-        // Of velocities, which the millisecond of light time turns by 1e-7.
-        let to_mars_then = *mars_rotation::<MarsIau2000>(et).matrix();
+        let [mars, mars_then] = [tag, et].map(|et| *mars_rotation::<MarsIau2000>(et).matrix());
+        let to_mars_then = mars_then * mars.transpose() * to_mars;
         let to_camera = camera.to_mars.matrix().transpose() * to_mars;
         let to_bus = tables.bus_to_camera.matrix().transpose() * to_camera;
         let (drift_m_s, turn_rad_s) = self.rates(self.image.line_offset(tag))?;
