@@ -127,8 +127,9 @@ fn surface_is_light_time_to_the_ground_and_aberration() {
         }
     }
     println!("{worst_px:?} px");
-    // Pixels of 7.5e-6 rad and more. What both leave out of the square of Mars' velocity over that of light, 6.5e-9.
-    assert!(worst_px[1] < 3e-4, "{worst_px:?} px");
+    // CSPICE adds the velocities of Mars and MGS, which leaves half the square of that of Mars over that of light: 3.2e-9
+    // rad at most, of pixels of 7.5e-6 rad; in axes that move with Mars nothing is left.
+    assert!(worst_px[1] < 4.3e-4, "{worst_px:?} px");
     // The edges of an image that looks 20 degrees off nadir are 550 m farther or nearer: 6 mm of 4 m.
     assert!(worst_px[0] < 4e-3 && worst_px[2] < 4e-3, "{worst_px:?} px");
 }
