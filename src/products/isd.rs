@@ -38,6 +38,7 @@ use crate::{
     frames::{self, Frame, J2000},
     geom::{attitude::continuous_quaternions, pushbroom::Distortion},
     instruments::{Instrument, NaifNames},
+    stage::Round,
     stages::sample_orientation::{CameraTables, InterpolationCheck},
     units::METRES_PER_KM,
 };
@@ -58,7 +59,7 @@ pub(super) static ISD: Declaration = Declaration {
     rows: "table nodes",
     role: Role::Data,
     content: Content::Document(schema),
-    write: Write::Image(write),
+    write: Write::Image(|path, of, image| write(path, of, image, Round::Initial)),
     uses: &[Use {
         program: Program::CameraModel,
         lines: "usgscsm_cam_test --model ../images/<image>/isd.json --sample-rate 100",
@@ -72,16 +73,16 @@ pub(super) static ADJUSTED: Declaration = Declaration {
     rows: "table nodes",
     role: Role::Data,
     content: Content::Document(schema),
-    write: Write::AdjustedImage(write),
+    write: Write::AdjustedImage(|path, of, image| write(path, of, image, Round::Adjusted)),
     uses: &[],
 };
 
-fn write(path: &Path, of: &Context, image: &ImageProducts) -> Result<u64> {
-    write_json(path, &isd(of.site, image))?;
+fn write(path: &Path, of: &Context, image: &ImageProducts, round: Round) -> Result<u64> {
+    write_json(path, &isd(of.site, image, round))?;
     Ok(image.orientation.tables.et_s.len() as u64)
 }
 
-fn isd<'a>(site: &SiteProducts<'a>, image: &ImageProducts<'a>) -> Isd<'a> {
+fn isd<'a>(site: &SiteProducts<'a>, image: &ImageProducts<'a>, round: Round) -> Isd<'a> {
     let times = image.times;
     let tables = &image.orientation.tables;
     let start_s = times.start.seconds();
@@ -140,7 +141,7 @@ fn isd<'a>(site: &SiteProducts<'a>, image: &ImageProducts<'a>) -> Isd<'a> {
         instrument_position: positions(&tables.et_s, &tables.position_m, &tables.velocity_m_s),
         sun_position: sun_position(tables),
         kernels: kernels_by_type(site),
-        areograph: provenance(site, image),
+        areograph: provenance(site, image, round),
     }
 }
 
@@ -257,7 +258,11 @@ fn naif_keywords(site: &SiteProducts, instrument: &Instrument) -> BTreeMap<Strin
 }
 
 /// What the reader of this file should know; camera models ignore it.
-fn provenance<'a>(site: &SiteProducts<'a>, image: &ImageProducts<'a>) -> Provenance<'a> {
+fn provenance<'a>(
+    site: &SiteProducts<'a>,
+    image: &ImageProducts<'a>,
+    round: Round,
+) -> Provenance<'a> {
     let times = image.times;
     let interpolation = &image.orientation.tables.interpolation;
     let detector = times.detector();
@@ -302,12 +307,20 @@ fn provenance<'a>(site: &SiteProducts<'a>, image: &ImageProducts<'a>) -> Provena
             ),
             distortion,
             format!(
-                "instrument_position: {}, the convention of the whole run; reading programs must add none",
+                "instrument_position: {}, the convention of the whole run; reading programs must add none{}",
                 image.orientation.light_time.convention.positions(),
+                match round {
+                    Round::Initial => "",
+                    Round::Adjusted => "; with the correction and the shift of line times in ../../adjustment.json",
+                },
             ),
             format!(
-                "instrument_pointing: attitude of each epoch read from the C-kernel at epoch + INS{}_CK_TIME_BIAS",
+                "instrument_pointing: attitude of each epoch read from the C-kernel at epoch + INS{}_CK_TIME_BIAS{}",
                 times.instrument.naif.instrument,
+                match round {
+                    Round::Initial => "",
+                    Round::Adjusted => ", turned by the correction and shifted as the lines are",
+                },
             ),
             "image_lines: delivered lines; lines_header were exposed".to_owned(),
         ],
