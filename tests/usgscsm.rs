@@ -105,9 +105,9 @@ fn registered(site: &Path, name: &str) -> Registered {
     let rows = column("footprint_row").as_primitive::<UInt32Type>();
     let inside = column("inside").as_boolean();
     let mut found = Registered::new();
-    for index in 0..registration.num_rows() {
+    for (index, row) in rows.values().iter().enumerate() {
         if inside.value(index) {
-            let row = rows.value(index) as usize;
+            let row = *row as usize;
             let (ground_m, place) = found.entry(images.value(index).to_owned()).or_default();
             ground_m.push(Vector3::from_fn(|axis, _| xyz_m[axis][row]));
             place.push([0, 1].map(|axis: usize| places[axis][index]));
