@@ -19,6 +19,11 @@ pub const MARS_NAME: &str = "MARS";
 /// NAIF id of the Sun.
 pub const NAIF_SUN: i32 = 10;
 
+/// NAIF id of the barycentre of the solar system.
+pub const NAIF_SOLAR_SYSTEM_BARYCENTRE: i32 = 0;
+/// Speed of light, metres per second.
+pub const SPEED_OF_LIGHT_M_S: f64 = 299_792_458.0;
+
 /// Rotation and shape of Mars in one IAU report.
 ///
 /// `ra = ra0 + ra1·T`, `dec = dec0 + dec1·T`, `W = w0 + w1·d`, with `T` in Julian centuries of

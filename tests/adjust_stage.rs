@@ -98,6 +98,7 @@ impl Site {
                     row: u32::try_from(range.point).unwrap(),
                     ground: Position::new(network.points[range.point].ground_m),
                     range: Some(ShotRange {
+                        to_laser_m: Vector3::zeros(),
                         image: range.image,
                         x_lines: range.x_lines,
                         range_m: range.range_m,

@@ -12,6 +12,7 @@ use std::fs;
 
 use areograph::{
     config::{ImageConfig, KernelsConfig, OrientationConfig, PointingConfig, usual_instrument},
+    geom::light_time::LightTime,
     image::ImageFields,
     kernel_source::{KernelList, KernelSource},
     products::write_products,
@@ -27,11 +28,14 @@ use nalgebra::Vector3;
 use pushbroom::{Nodes, Pushbroom, matrix, numbers, rows};
 use serde_json::Value;
 
-const SAMPLING: OrientationConfig = OrientationConfig {
-    intervals: 30,
-    position_rmse_max_m: 1.0,
-    pointing_rmse_max_rad: 1e-3,
-};
+const fn sampling(light_time: LightTime) -> OrientationConfig {
+    OrientationConfig {
+        intervals: 30,
+        light_time,
+        position_rmse_max_m: 1.0,
+        pointing_rmse_max_rad: 1e-3,
+    }
+}
 
 /// The site with the real image, its kernels open, and the image support data that was written for it.
 struct Real {
@@ -41,12 +45,13 @@ struct Real {
     _folder: tempfile::TempDir,
 }
 
+/// With the positions of ALE.
 fn real(test: &str) -> Option<Real> {
-    real_with_summing(test, 8)
+    real_with(test, 8, LightTime::Centre)
 }
 
 /// The image with another number of summed detectors, and so with other pixels, in the same time.
-fn real_with_summing(test: &str, summing: u32) -> Option<Real> {
+fn real_with(test: &str, summing: u32, light_time: LightTime) -> Option<Real> {
     let folder = common::real_data("ale_mgs/m0402852", test)?;
     let files = common::m0402852_files(&folder);
     let session = Session::open(&KernelSet::from_files(&files).unwrap()).unwrap();
@@ -69,9 +74,15 @@ fn real_with_summing(test: &str, summing: u32) -> Option<Real> {
     site.times = tag_times(&[image], &session).unwrap().remove(0);
     site.times.downtrack_summing = summing;
     site.times.crosstrack_summing = summing;
-    site.orientation =
-        sample_orientation(&session, &site.times, &kernels, &pointing, &SAMPLING).unwrap();
-    site.model = fit_sensor_model(&site.orientation, &SAMPLING).unwrap();
+    site.orientation = sample_orientation(
+        &session,
+        &site.times,
+        &kernels,
+        &pointing,
+        &sampling(light_time),
+    )
+    .unwrap();
+    site.model = fit_sensor_model(&site.orientation, &sampling(light_time)).unwrap();
     assert!(site.model.invalid_because.is_empty());
     let folder = tempfile::tempdir().unwrap();
     site.with(true, |site| write_products(folder.path(), site, ""))
@@ -310,9 +321,20 @@ fn image_to_ground_to_image_closes() {
 
 #[test]
 fn the_line_scanner_agrees_with_spice() {
-    let Some(real) = real("a line scanner beside SPICE") else {
-        return;
-    };
+    for (_, light_time) in LightTime::WORDS {
+        let Some(real) = real_with("a line scanner beside SPICE", 8, light_time) else {
+            return;
+        };
+        let (stated, rotation, position_m) = beside_spice(&real);
+        println!("stated {stated:e} px; rotation {rotation:e}, position {position_m:e} m");
+        // 0.01 pixel of 8 summed detectors of 3.75e-6 rad; 0.01 pixel of 11 m on the ground.
+        assert!(rotation < 3e-7, "{rotation}");
+        assert!(position_m < 0.1, "{position_m} m");
+    }
+}
+
+/// The stated error, and the largest distances of rotations (elements) and positions from those of the samples.
+fn beside_spice(real: &Real) -> (f64, f64, f64) {
     let camera = Pushbroom::new(real.isd.clone());
     let stated = real.isd["areograph"]["interpolation"]["error_max_px"]
         .as_f64()
@@ -323,32 +345,22 @@ fn the_line_scanner_agrees_with_spice() {
         let (position_km, camera_to_mars) = camera.camera(sample.et.seconds());
         let spice = sample.camera_to_mars.matrix();
         rotation = rotation.max((camera_to_mars - spice).abs().max());
-        // The samples are geometric; camera models want the apparent position.
-        let body = Nodes::new(&real.isd["body_rotation"], "quaternions");
-        let to_mars = matrix(&body.at(sample.et.seconds()));
-        let apparent = real
-            .session
-            .apparent_state(Et::from_seconds(sample.et.seconds()))
-            .unwrap();
-        let apart = METRES_PER_KM * position_km - to_mars * apparent.position.xyz_m;
+        let apart = METRES_PER_KM * position_km - sample.position.xyz_m;
         position_m = position_m.max(apart.norm());
     }
-    println!("stated {stated:e} px; rotation {rotation:e}, position {position_m:e} m");
-    // 0.01 pixel of 8 summed detectors of 3.75e-6 rad; 0.01 pixel of 11 m on the ground.
-    assert!(rotation < 3e-7, "{rotation}");
-    assert!(position_m < 0.1, "{position_m} m");
     // Nothing of the image lies outside the tables: `Nodes::at` would refuse.
     let times = rows(&real.isd["line_scan_rate"]);
     assert_eq!(times.len(), 1);
     let nodes = numbers(&real.isd["instrument_pointing"]["ephemeris_times"]);
     assert!(nodes[0] < camera.time(0.0) && camera.time(camera.lines()) < nodes[nodes.len() - 1]);
+    (stated, rotation, position_m)
 }
 
 /// Pixels eight times finer want the same attitude eight times better.
 #[test]
 fn tables_get_the_nodes_that_the_limit_needs() {
     let measured = |summing| {
-        let real = real_with_summing("nodes of tables", summing)?;
+        let real = real_with("nodes of tables", summing, LightTime::Surface)?;
         let epochs = numbers(&real.isd["instrument_pointing"]["ephemeris_times"]);
         Some((epochs.len(), real.site.orientation.tables.interpolation))
     };

@@ -10,6 +10,7 @@ mod common;
 #[allow(dead_code, reason = "the fixture serves several tests")]
 mod fixture;
 #[path = "exchange/readers.rs"]
+#[allow(dead_code, reason = "the readers serve several tests")]
 mod readers;
 
 use std::{

@@ -141,6 +141,7 @@ impl Site {
             row,
             ground: Position::new(point.ground_m),
             range: with_ranges.then(|| ShotRange {
+                to_laser_m: Vector3::zeros(),
                 image: 0,
                 x_lines: self.images[0].x_lines(point.et_s),
                 range_m: point.range_m,

@@ -11,6 +11,7 @@ use std::{fs, path::PathBuf};
 
 use areograph::{
     config::{ImageConfig, KernelsConfig, OrientationConfig, PointingConfig, usual_instrument},
+    geom::light_time::LightTime,
     image::ImageFields,
     kernel_source::{KernelList, KernelSource},
     spice::{KernelSet, Session},
@@ -36,6 +37,7 @@ fn image(id: &str, label: PathBuf) -> ImageConfig {
 
 const SAMPLING: OrientationConfig = OrientationConfig {
     intervals: 30,
+    light_time: LightTime::None, // as the numbers beside
     position_rmse_max_m: 1.0,
     pointing_rmse_max_rad: 1e-3,
 };

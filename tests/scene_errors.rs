@@ -146,7 +146,9 @@ impl Mission {
             let mut images = list(&self.truth["images"]).iter();
             number(&images.find(|truth| truth["id"] == image).unwrap()["lines_header"])
         };
-        let told = self.told(image);
+        let mut cameras = list(&truth["cameras"]).iter();
+        let camera = cameras.find(|camera| camera["image"] == image).unwrap();
+        let told = by_light(&self.told(image), camera);
         let projector = Projector::new(&told, lines).unwrap();
         let file = read_ties(&self.path(&format!("ties/{site}.csv"))).unwrap();
         let late = file.ties.iter().filter_map(|tie| {
@@ -174,6 +176,28 @@ fn orientation(truth: &Value, lines: f64, line_of: impl Fn(usize) -> f64) -> Sam
             (line_of(row) - 0.5 * lines, pose)
         })
         .collect();
+    SampledOrientation::new(&poses).unwrap()
+}
+
+/// The same camera from where it sees the ground: where it was when the light left there, by the truth of `camera`.
+fn by_light(orientation: &SampledOrientation, camera: &Value) -> SampledOrientation {
+    let (told, times) = (list(&camera["line"]), list(&camera["epochs_et_s"]));
+    let last = told.len() - 1;
+    let (lines, duration_s) = (
+        number(&told[last]),
+        number(&times[last]) - number(&times[0]),
+    );
+    let late_s = list(&camera["light_time_s"]);
+    let pose = |(line, late_s): (&Value, &Value)| {
+        let x_lines = number(line) - 0.5 * lines;
+        let late_lines = number(late_s) * lines / duration_s;
+        let pose = Pose {
+            position_m: orientation.pose(x_lines - late_lines).position_m,
+            ..orientation.pose(x_lines)
+        };
+        (x_lines, pose)
+    };
+    let poses: Vec<(f64, Pose)> = told.iter().zip(late_s).map(pose).collect();
     SampledOrientation::new(&poses).unwrap()
 }
 
@@ -396,7 +420,8 @@ fn ties_lie_on_rough_ground_that_both_true_cameras_see() {
     for (site, camera, taken) in MISSION.cameras() {
         let image = camera["image"].as_str().unwrap();
         let lines = number(&list(&camera["line"])[30]);
-        let projector = Projector::new(&taken, lines).unwrap();
+        let seeing = by_light(&taken, camera);
+        let projector = Projector::new(&seeing, lines).unwrap();
         let mut all = list(&MISSION.truth["ties"]).iter();
         let truth = all.find(|ties| ties["site"] == site).unwrap();
         let file = read_ties(&MISSION.path(&format!("ties/{site}.csv"))).unwrap();

@@ -10,6 +10,8 @@
 #[path = "truth/across.rs"]
 mod across;
 mod common;
+#[path = "truth/light_time.rs"]
+mod light_time;
 #[path = "truth/misregistration.rs"]
 mod misregistration;
 

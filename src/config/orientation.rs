@@ -2,7 +2,10 @@
 
 use schemars::JsonSchema;
 
-use crate::{geom::pushbroom::CameraModel, units::RADIANS_PER_ARCSECOND};
+use crate::{
+    geom::{light_time::LightTime, pushbroom::CameraModel},
+    units::RADIANS_PER_ARCSECOND,
+};
 
 use super::{
     declare::{Declare as _, declare_table, key},
@@ -15,6 +18,13 @@ declare_table! {
         /// Equal intervals over the image; one epoch more than intervals. The default is that of Shan et
         /// al. 2005; a second-order polynomial through four epochs is the least that leaves residuals.
         intervals: u32 = key(whole_from_to(3, 10_000)).or(30),
+        /// From where straight rays to the ground start: one convention for all positions of the camera in all
+        /// products. How far the others are from it is told for every image. Ranges are geometric always.
+        light_time: LightTime = key(words_of(LightTime::WORDS, [
+            "where the camera was when the light left the ground: light time to the surface and aberration",
+            "where it was at the exposure, as papers without a word on it are read",
+            "where it seems to be from the centre of Mars (LT+S): to match ISIS and ALE",
+        ])).or(LightTime::Surface),
         /// Largest second-order position RMSE, norm of x, y, z. The default is about twice the largest in Table 4
         /// of Shan et al. 2005 (2.3 m).
         position_rmse_max_m: f64 = key(above_to(0.0, 1e6)).or(5.0),

@@ -50,8 +50,8 @@ pub(super) fn load_rivals(config: &SiteConfig, files: &InputFiles) -> Result<Vec
     rivals.collect()
 }
 
-/// Times at which the site reads kernels: exposures with their padding, flights over the windows as
-/// far as the scan reaches, and attitudes at the exposures shifted by the pointing bias.
+/// Times at which the site reads kernels: exposures with their padding and the time that light takes, flights over
+/// the windows as far as the scan reaches, and attitudes at the exposures shifted by the pointing bias.
 pub(super) fn required_coverage(
     config: &SiteConfig,
     images: &[&ImageTimes],
@@ -65,9 +65,10 @@ pub(super) fn required_coverage(
     let flights = profiles
         .iter()
         .map(|profile| profile.interval.padded(reach_s));
-    let positions = exposures
-        .clone()
-        .map(|exposures| exposures.padded(kernels.padding_s));
+    let positions = exposures.clone().map(|exposures| {
+        let light_time = config.orientation.light_time;
+        light_time.read_over(exposures.padded(kernels.padding_s))
+    });
     // Within the tolerance a look-up reaches kernels that end before it or begin after it.
     let (bias_s, padding_s) = (
         config.pointing.ck_bias.seconds(),

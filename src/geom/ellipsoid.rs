@@ -127,6 +127,19 @@ pub fn ray_meets_ellipsoid<F: MarsFixed>(
     (along > 0.0).then(|| Position::new(origin.xyz_m + along * direction))
 }
 
+/// Distance from `origin` along `direction` to the ellipsoid of frame `F`, metres; for a direction that misses it, to
+/// the horizon of a sphere with its equatorial radius.
+#[must_use]
+pub fn range_to_ellipsoid_m<F: MarsFixed>(origin: &Position<F>, direction: &Vector3<f64>) -> f64 {
+    let radius_m = F::model().equatorial_radius_m;
+    let horizon_m = || {
+        let square_m2 = origin.xyz_m.norm_squared() - radius_m * radius_m;
+        square_m2.max(0.0).sqrt()
+    };
+    let ground = ray_meets_ellipsoid(origin, direction);
+    ground.map_or_else(horizon_m, |ground| origin.distance_m(&ground))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -163,5 +176,9 @@ mod tests {
         assert!((hit.xyz_m.z - 3_376_200.0).abs() < 1e-6); // micrometre
         assert!(ray_meets_ellipsoid(&origin, &Vector3::new(0.0, 0.0, 1.0)).is_none());
         assert!(ray_meets_ellipsoid(&origin, &Vector3::new(1.0, 0.0, 0.0)).is_none());
+        let range_m = range_to_ellipsoid_m(&origin, &-Vector3::z());
+        assert!((range_m - (3.76e6 - 3_376_200.0)).abs() < 1e-6); // micrometre
+        let horizon_m = range_to_ellipsoid_m(&origin, &Vector3::x());
+        assert!((horizon_m - 1_613_534.5).abs() < 1.0); // √(3.76² − 3.39619²) Mm
     }
 }

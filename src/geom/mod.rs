@@ -9,6 +9,7 @@ pub mod conformal_map;
 pub mod ellipsoid;
 pub mod intersection;
 pub mod lagrange;
+pub mod light_time;
 pub mod map_projection;
 pub mod mars_rotation;
 pub mod misregistration;

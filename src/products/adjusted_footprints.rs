@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::{
-    parquet,
+    light_time, parquet,
     product::{Content, Declaration, Role, Write},
     table::{Column, Table, Unit, column, meanings},
 };
@@ -16,9 +16,9 @@ pub(super) static TABLE: Declaration = Declaration {
     rows: "footprints",
     role: Role::Data,
     content: Content::Table(|| meanings(&shot_columns())),
-    write: Write::Adjustment(|path, _, _, adjustment| {
+    write: Write::Adjustment(|path, of, _, adjustment| {
         let table = Table::new(shot_columns(), shots(adjustment.adjusted));
-        parquet::write(path, table, Vec::new()).map(Some)
+        parquet::write(path, table, light_time::metadata(of.site)).map(Some)
     }),
     uses: &[],
 };

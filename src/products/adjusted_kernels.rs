@@ -15,6 +15,7 @@ use crate::{
     config::PointingConfig,
     constants::{NAIF_MARS, NAIF_MGS},
     error::{IoError, Locate, Result},
+    geom::light_time::LightTime,
     spice::{EncodedCkSegment, Kernel, KernelSet, SpkSegment, write_encoded_ck, write_spk},
     stages::{tabulate_kernels::KernelTables, tag_times::ImageTimes},
 };
@@ -32,6 +33,8 @@ pub struct AdjustedImage<'a> {
     pub times: &'a ImageTimes,
     /// States and attitudes.
     pub tables: &'a KernelTables,
+    /// The convention that they were adjusted with.
+    pub light_time: LightTime,
 }
 
 /// Where the kernels go and what they replace.
@@ -95,6 +98,7 @@ fn of_site(of: &Context, adjustment: &AdjustmentProducts) -> Result<Vec<Written>
     let images = images.map(|(image, tables)| AdjustedImage {
         times: image.times,
         tables,
+        light_time: image.orientation.light_time.convention,
     });
     written(&to, &images.collect::<Vec<_>>())
 }
@@ -205,9 +209,8 @@ fn comment(image: &AdjustedImage, to: &AdjustedKernels) -> String {
          than their tags say, the orientation of a line stands at its tag, so that nothing else that\n\
          happened meanwhile, a laser shot for one, may be placed with this file.\n\
          \n\
-         Positions: MGS relative to the centre of Mars, geometric, J2000. With the rotation of Mars of the\n\
-         IAU 2000 report (pck00008 to pck00010) they give the adjusted positions. Programs that add light\n\
-         time and stellar aberration (LT+S: ISIS, ALE) move MGS by some 140 m, adjusted or not.\n\
+         Positions: MGS relative to the centre of Mars, geometric, J2000, with the rotation of Mars of the\n\
+         IAU 2000 report (pck00008 to pck00010). {positions}\n\
          \n\
          Attitudes: J2000 to MGS_SPACECRAFT. The attitude of an exposure at t stands at t {sign} {size:.3} s,\n\
          as in the kernels that this file replaces. {others}\n",
@@ -215,9 +218,30 @@ fn comment(image: &AdjustedImage, to: &AdjustedKernels) -> String {
         version = env!("CARGO_PKG_VERSION"),
         exposed = times.exposures(),
         utc = times.utc_start,
+        positions = positions(image.light_time),
         sign = if bias_s < 0.0 { '-' } else { '+' },
         size = bias_s.abs(),
     )
+}
+
+/// Who finds the adjusted positions in an SPK.
+const fn positions(light_time: LightTime) -> &'static str {
+    match light_time {
+        LightTime::Surface => {
+            "They were adjusted with light time to the\n\
+             surface and aberration: the position of an exposure is that of the instant at which the light left\n\
+             the ground. Programs that see MGS from the centre of Mars (LT+S: ISIS, ALE) place it elsewhere."
+        }
+        LightTime::None => {
+            "They were adjusted without light time:\n\
+             the position of an exposure is that of its instant. Programs that see MGS from the centre of Mars\n\
+             (LT+S: ISIS, ALE) place it elsewhere."
+        }
+        LightTime::Centre => {
+            "They were adjusted as seen from the centre\n\
+             of Mars with light time and aberration: programs that do so (LT+S: ISIS, ALE) find them adjusted."
+        }
+    }
 }
 
 /// The original kernels and behind them those of all images.

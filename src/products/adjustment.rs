@@ -16,6 +16,7 @@ use crate::{
     config::IntersectionConfig,
     geom::{
         bundle::ORIENTATION_UNKNOWNS,
+        light_time::LightTime,
         pushbroom::CameraModel,
         statistics::Summary,
         uncertainty::{ResidualMoments, UncertaintyBudget},
@@ -111,6 +112,7 @@ struct Definition {
 #[derive(Serialize, JsonSchema)]
 struct Configured<'a> {
     model: CameraModel,
+    light_time: LightTime,
     intersection: &'a IntersectionConfig,
     adjustment: AdjustmentKeys<'a>,
 }
@@ -294,6 +296,7 @@ fn document<'a>(
             .collect(),
         configured: Configured {
             model: site.config.registration.model,
+            light_time: site.config.orientation.light_time,
             intersection: &site.config.intersection,
             adjustment: AdjustmentKeys::of(&site.config.adjustment),
         },

@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use super::{
     GeometricProducts,
     coordinates::degrees,
-    parquet,
+    light_time, parquet,
     product::{Content, Declaration, Role, Write},
     table::{Column, Table, Unit, column, meanings},
 };
@@ -27,9 +27,9 @@ pub(super) static TABLE: Declaration = Declaration {
     rows: "tie points and footprints",
     role: Role::Data,
     content: Content::Table(|| meanings(&columns())),
-    write: Write::Ties(|path, _, geometric| {
+    write: Write::Ties(|path, of, geometric| {
         let table = Table::new(columns(), rows(geometric));
-        parquet::write(path, table, Vec::new())
+        parquet::write(path, table, light_time::metadata(of.site))
     }),
     uses: &[],
 };

@@ -12,6 +12,8 @@
 //!   pixels.
 //! * The line of the detector is taken at coordinate 0 (`losToEcf`), so its centre is 0, or what puts a line
 //!   that lies off the boresight there.
+//! * `usgscsm` corrects no light time itself: positions follow the convention of the run. ALE's are those seen from the
+//!   centre of Mars; they can be had by `light_time = "centre"`.
 //! * Pointing is sampled from before the first line to after the last; ALE's table starts 1.15 s late. Nodes are
 //!   as dense as an interpolation error below 0.01 pixels wants, which is measured and stated.
 //! * Distortion of the narrow angle is zero, as the instrument kernel says. ALE repeats the pixel pitch in these
@@ -36,10 +38,8 @@ use crate::{
     frames::{self, Frame, J2000},
     geom::{attitude::continuous_quaternions, pushbroom::Distortion},
     instruments::{Instrument, NaifNames},
-    stages::{
-        reorient::geometric_tables,
-        sample_orientation::{CameraTables, InterpolationCheck, Orientation},
-    },
+    stage::Round,
+    stages::sample_orientation::{CameraTables, InterpolationCheck},
     units::METRES_PER_KM,
 };
 use document::{
@@ -59,42 +59,30 @@ pub(super) static ISD: Declaration = Declaration {
     rows: "table nodes",
     role: Role::Data,
     content: Content::Document(schema),
-    write: Write::Image(write),
+    write: Write::Image(|path, of, image| write(path, of, image, Round::Initial)),
     uses: &[Use {
         program: Program::CameraModel,
         lines: "usgscsm_cam_test --model ../images/<image>/isd.json --sample-rate 100",
     }],
 };
 
-/// Its positions are geometric: what was adjusted is where the camera was, not where light of it seemed to come
-/// from, and adjusted ground must be seen at the measured pixels.
 pub(super) static ADJUSTED: Declaration = Declaration {
     path: "images/<image>/adjusted_isd.json",
-    what: "adjusted camera model; its positions are geometric, those of isd.json have light time and aberration",
+    what: "adjusted camera model; its positions follow the light-time convention of the run, like all others",
     readers: "usgscsm, Ames Stereo Pipeline, ISIS",
     rows: "table nodes",
     role: Role::Data,
     content: Content::Document(schema),
-    write: Write::AdjustedImage(|path, of, image| {
-        let orientation = Orientation {
-            tables: geometric_tables(image.orientation)?,
-            ..image.orientation.clone()
-        };
-        let image = ImageProducts {
-            orientation: &orientation,
-            ..*image
-        };
-        write(path, of, &image)
-    }),
+    write: Write::AdjustedImage(|path, of, image| write(path, of, image, Round::Adjusted)),
     uses: &[],
 };
 
-fn write(path: &Path, of: &Context, image: &ImageProducts) -> Result<u64> {
-    write_json(path, &isd(of.site, image))?;
+fn write(path: &Path, of: &Context, image: &ImageProducts, round: Round) -> Result<u64> {
+    write_json(path, &isd(of.site, image, round))?;
     Ok(image.orientation.tables.et_s.len() as u64)
 }
 
-fn isd<'a>(site: &SiteProducts<'a>, image: &ImageProducts<'a>) -> Isd<'a> {
+fn isd<'a>(site: &SiteProducts<'a>, image: &ImageProducts<'a>, round: Round) -> Isd<'a> {
     let times = image.times;
     let tables = &image.orientation.tables;
     let start_s = times.start.seconds();
@@ -153,7 +141,7 @@ fn isd<'a>(site: &SiteProducts<'a>, image: &ImageProducts<'a>) -> Isd<'a> {
         instrument_position: positions(&tables.et_s, &tables.position_m, &tables.velocity_m_s),
         sun_position: sun_position(tables),
         kernels: kernels_by_type(site),
-        areograph: provenance(site, image),
+        areograph: provenance(site, image, round),
     }
 }
 
@@ -270,7 +258,11 @@ fn naif_keywords(site: &SiteProducts, instrument: &Instrument) -> BTreeMap<Strin
 }
 
 /// What the reader of this file should know; camera models ignore it.
-fn provenance<'a>(site: &SiteProducts<'a>, image: &ImageProducts<'a>) -> Provenance<'a> {
+fn provenance<'a>(
+    site: &SiteProducts<'a>,
+    image: &ImageProducts<'a>,
+    round: Round,
+) -> Provenance<'a> {
     let times = image.times;
     let interpolation = &image.orientation.tables.interpolation;
     let detector = times.detector();
@@ -302,6 +294,7 @@ fn provenance<'a>(site: &SiteProducts<'a>, image: &ImageProducts<'a>) -> Provena
             within_limit: interpolation.keeps_limit(),
         },
         kernels: kernels.collect(),
+        light_time: &image.orientation.light_time,
         line_period_s: times.line_period_s,
         lines_header: times.lines_header,
         notes: vec![
@@ -313,11 +306,21 @@ fn provenance<'a>(site: &SiteProducts<'a>, image: &ImageProducts<'a>) -> Provena
                 times.instrument.detector.boresight_px,
             ),
             distortion,
-            "instrument_position: light time and stellar aberration corrected (LT+S), as in ISIS and ALE"
-                .to_owned(),
             format!(
-                "instrument_pointing: attitude of each epoch read from the C-kernel at epoch + INS{}_CK_TIME_BIAS",
+                "instrument_position: {}, the convention of the whole run; reading programs must add none{}",
+                image.orientation.light_time.convention.positions(),
+                match round {
+                    Round::Initial => "",
+                    Round::Adjusted => "; with the correction and the shift of line times in ../../adjustment.json",
+                },
+            ),
+            format!(
+                "instrument_pointing: attitude of each epoch read from the C-kernel at epoch + INS{}_CK_TIME_BIAS{}",
                 times.instrument.naif.instrument,
+                match round {
+                    Round::Initial => "",
+                    Round::Adjusted => ", turned by the correction and shifted as the lines are",
+                },
             ),
             "image_lines: delivered lines; lines_header were exposed".to_owned(),
         ],

@@ -20,6 +20,7 @@ mod gis;
 mod heights;
 mod isd;
 mod kernel_report;
+mod light_time;
 mod net;
 mod orientation;
 mod page;

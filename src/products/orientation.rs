@@ -8,7 +8,7 @@ use serde::Serialize;
 use super::{
     coordinates::degrees,
     files::write_json,
-    parquet,
+    light_time, parquet,
     product::{Content, Context, Declaration, Role, Write},
     site::ImageProducts,
     table::{Column, Table, Unit, column, meanings},
@@ -19,14 +19,16 @@ use crate::{
     schema::DocumentSchema,
     stages::{
         fit_sensor_model::{EulerModel, RotationVectorModel, SensorModel},
-        sample_orientation::{BoresightGround, GroundPoint, Orientation, OrientationSample},
+        sample_orientation::{
+            BoresightGround, GroundPoint, LightTimeEffect, Orientation, OrientationSample,
+        },
         tag_times::{ImageTimes, StartFrom},
     },
     units::RADIANS_PER_ARCSECOND,
 };
 
 const CONVENTIONS: [&str; 6] = [
-    "frame: Mars body-fixed, IAU 2000; positions are geometric (no light time, no aberration), metres",
+    "frame: Mars body-fixed, IAU 2000, metres; straight rays to the ground start at the positions, see light_time",
     "abscissa x: lines from the middle of the header image, positive along flight; x = (t - t_middle) / line period",
     "polynomial: value = c0 + c1 x + c2 x^2, coefficients from the constant upwards; residual = sample - polynomial; \
      RMSE divides by the number of samples (Shan et al. 2005, Table 4)",
@@ -50,6 +52,9 @@ struct Document<'a> {
     invalid_because: Vec<&'a str>,
     times: Times<'a>,
     conventions: [&'static str; 6],
+    /// Of the kernels' orientation: others find ground that the boresight meets in the middle of the image so many
+    /// lines later, and at so many samples more.
+    light_time: &'a LightTimeEffect,
     #[schemars(range(min = 3))]
     samples: usize,
     /// East longitude and areocentric latitude, degrees: along the first edge and back along the last.
@@ -174,12 +179,13 @@ pub(super) static ADJUSTED_DOCUMENT: Declaration = declared!(
     Write::AdjustedImage(write_document)
 );
 
-fn write_table(path: &Path, _: &Context, image: &ImageProducts) -> Result<u64> {
+fn write_table(path: &Path, of: &Context, image: &ImageProducts) -> Result<u64> {
     let samples = &image.orientation.samples;
     let rotations = samples.iter().map(|sample| sample.camera_to_mars.matrix());
     let quaternions = continuous_quaternions(rotations);
     let rows = samples.iter().zip(quaternions);
-    parquet::write(path, Table::new(columns(), rows.collect()), Vec::new())
+    let table = Table::new(columns(), rows.collect());
+    parquet::write(path, table, light_time::metadata(of.site))
 }
 
 fn write_document(path: &Path, _: &Context, image: &ImageProducts) -> Result<u64> {
@@ -306,6 +312,7 @@ fn document<'a>(image: &ImageProducts<'a>) -> Document<'a> {
         invalid_because: image.invalid_because(),
         times: times(image.times),
         conventions: CONVENTIONS,
+        light_time: &image.orientation.light_time,
         samples: image.orientation.samples.len(),
         outline_deg: outline_deg(image.orientation),
         first_order: euler(&model.first_order),

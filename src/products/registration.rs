@@ -7,7 +7,7 @@ use serde::Serialize;
 
 use super::{
     files::write_json,
-    parquet,
+    light_time, parquet,
     product::{Content, Declaration, Role, Write},
     site::{ImageProducts, SiteProducts},
     table::{Column, Table, Unit, column, meanings},
@@ -19,11 +19,12 @@ use crate::{
     stages::{
         group_profiles::Profile,
         register::{MethodRun, ModelDifference, ProfileOnImage, RegisteredPoints},
+        sample_orientation::LightTimeEffect,
     },
 };
 
 /// What the numbers are, for readers of the files.
-const DEFINITIONS: [(&str, &str); 6] = [
+const DEFINITIONS: [(&str, &str); 7] = [
     (
         "line, sample",
         "0 at the start of the first line and the outer edge of the first pixel, 0.5 at their centres; \
@@ -33,6 +34,11 @@ const DEFINITIONS: [(&str, &str); 6] = [
         "points",
         "footprints with the radius before the crossover correction (x, y, z of footprints.parquet), \
         every profile in every image",
+    ),
+    (
+        "light_time",
+        "which positions of the camera lines and samples belong to; the other conventions find the ground in the middle \
+        of the image so many lines later and at so many samples more",
     ),
     (
         "methods",
@@ -80,6 +86,7 @@ struct Definition {
 struct ImageDocument<'a> {
     image: &'a str,
     model: CameraModel,
+    light_time: &'a LightTimeEffect,
     points: usize,
     inside: usize,
     extrapolated: usize,
@@ -109,7 +116,8 @@ pub(super) static TABLE: Declaration = Declaration {
     role: Role::Data,
     content: Content::Table(|| meanings(&columns())),
     write: Write::Site(|path, of| {
-        parquet::write(path, table(of.site, of.site.images), Vec::new()).map(Some)
+        let metadata = light_time::metadata(of.site);
+        parquet::write(path, table(of.site, of.site.images), metadata).map(Some)
     }),
     uses: &[],
 };
@@ -137,7 +145,7 @@ pub(super) static ADJUSTED: Declaration = Declaration {
     content: Content::Table(|| meanings(&columns())),
     write: Write::Adjustment(|path, of, _, adjustment| {
         let table = table(of.site, adjustment.images);
-        parquet::write(path, table, Vec::new()).map(Some)
+        parquet::write(path, table, light_time::metadata(of.site)).map(Some)
     }),
     uses: &[],
 };
@@ -306,6 +314,7 @@ fn image_document<'a>(image: &ImageProducts<'a>, profiles: &'a [Profile]) -> Ima
     ImageDocument {
         image: &registration.image,
         model: registration.model,
+        light_time: &image.orientation.light_time,
         points: points.len(),
         inside: points.inside_count(),
         extrapolated: points.extrapolated.iter().filter(|beyond| **beyond).count(),

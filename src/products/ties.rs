@@ -8,7 +8,7 @@ use nalgebra::Matrix3;
 use super::{
     GeometricProducts, SiteProducts,
     coordinates::degrees,
-    parquet,
+    light_time, parquet,
     product::{Content, Declaration, Role, Write},
     table::{Column, Table, Unit, column, meanings},
 };
@@ -29,7 +29,7 @@ pub(super) static TABLE: Declaration = Declaration {
     content: Content::Table(|| meanings(&tie_columns())),
     write: Write::Ties(|path, of, geometric| {
         let table = Table::new(tie_columns(), measurements(of.site, geometric));
-        parquet::write(path, table, Vec::new())
+        parquet::write(path, table, light_time::metadata(of.site))
     }),
     uses: &[],
 };

@@ -7,9 +7,12 @@ use super::{
 };
 use crate::{
     error::Result,
-    geom::polynomial::Fit,
+    geom::{light_time::LightTime, polynomial::Fit},
     products::{ImageProducts, SiteProducts},
-    stages::{fit_sensor_model::EulerModel, sample_orientation::BoresightGround},
+    stages::{
+        fit_sensor_model::EulerModel,
+        sample_orientation::{BoresightGround, OtherConvention},
+    },
     units::{METRES_PER_KM, RADIANS_PER_ARCSECOND, RADIANS_PER_DEGREE},
 };
 
@@ -26,7 +29,10 @@ fn write(site: &SiteProducts) -> Result<String> {
         .iter()
         .map(|image| figure(&residual_plot(image)))
         .collect::<Result<String>>()?;
-    Ok(taken(site) + &models(site) + &format!("<div class=\"plots\">\n{figures}</div>\n"))
+    Ok(taken(site)
+        + &light_time(site)
+        + &models(site)
+        + &format!("<div class=\"plots\">\n{figures}</div>\n"))
 }
 
 /// When and how the images were taken: Table 2.
@@ -75,6 +81,42 @@ fn taken(site: &SiteProducts) -> String {
         );
     }
     table.finish()
+}
+
+/// Which positions of cameras the site follows, and how far the others are from them.
+fn light_time(site: &SiteProducts) -> String {
+    let convention = site.config.orientation.light_time;
+    let effects = site
+        .images
+        .iter()
+        .map(|image| &image.orientation.light_time);
+    let others: Vec<OtherConvention> = effects.flat_map(|of| of.others.iter().copied()).collect();
+    let mut words = format!(
+        "Light time: positions of cameras are {} (convention {}).",
+        convention.positions(),
+        convention.word()
+    );
+    for (word, other) in LightTime::WORDS {
+        let of_images = || others.iter().filter(|of| of.convention == other);
+        let span = |value: fn(&OtherConvention) -> f64, decimals: usize| {
+            let low = of_images().map(value).fold(f64::INFINITY, f64::min);
+            let high = of_images().map(value).fold(f64::NEG_INFINITY, f64::max);
+            let [low, high] = [low, high].map(|end| format!("{end:.decimals$}"));
+            if low == high {
+                low
+            } else {
+                format!("{low} to {high}")
+            }
+        };
+        if of_images().next().is_some() {
+            words += &format!(
+                " With {word} images would see ground {} m away, and the same ground {} lines later.",
+                span(|of| of.ground_m, 1),
+                span(|of| of.lines, 2)
+            );
+        }
+    }
+    paragraph(&words)
 }
 
 /// RMSE per image: Table 4.

@@ -6,7 +6,6 @@
 use nalgebra::{Matrix2, Vector2, Vector3};
 
 use super::{
-    attitude::bus_to_camera,
     drawn::Flown,
     error::SceneError,
     error_sources::SceneErrors,
@@ -23,9 +22,8 @@ use super::{
 };
 use crate::{
     config::built_in_instruments,
-    constants::MARS_IAU2000,
     error::Result,
-    geom::{mars_rotation::mars_matrix, pushbroom::Pose},
+    geom::{light_time::light_time_s, pushbroom::Pose},
     instruments::{DistortionModel, Instrument},
     spice::Session,
     ties::{TieMeasure, TiePoint},
@@ -193,12 +191,13 @@ impl<'a> ContextImage<'a> {
 
     /// Where the camera truly is, and its axes.
     fn pose(&self, et: Et) -> Pose {
-        let to_bus = self.flown.j2000_to_bus(et);
-        let from_mars = mars_matrix(&MARS_IAU2000, et).transpose();
-        Pose {
-            position_m: self.flown.bus_position_m(et),
-            mars_to_camera: bus_to_camera(self.camera) * to_bus * from_mars,
-        }
+        self.flown.camera_pose(self.camera, et, 0.0)
+    }
+
+    /// From where it sees ground at a distance along straight rays.
+    fn seen_from(&self, et: Et, range_m: f64) -> Pose {
+        self.flown
+            .camera_pose(self.camera, et, light_time_s(range_m))
     }
 
     fn time_of(&self, line: f64) -> Et {
@@ -238,7 +237,9 @@ impl<'a> ContextImage<'a> {
     /// are none near the image.
     fn place(&self, ground_m: &Vector3<f64>) -> Option<[f64; 2]> {
         let missed = |place: &Vector2<f64>| {
-            let pose = self.pose(self.time_of(place.x));
+            let et = self.time_of(place.x);
+            let range_m = (ground_m - self.flown.bus_position_m(et)).norm();
+            let pose = self.seen_from(et, range_m);
             let seen = pose.mars_to_camera * (ground_m - pose.position_m);
             let look = self.look(place.y);
             seen.xy() / seen.z - look.xy() / look.z
@@ -319,12 +320,20 @@ pub(super) fn context_ties(
     for _ in 0..tried {
         let line = random.between(EDGE_PX, f64::from(first.plan.lines) - EDGE_PX);
         let sample = random.between(EDGE_PX, f64::from(first.plan.samples) - EDGE_PX);
-        let pose = first.pose(first.time_of(line));
-        let direction = pose.mars_to_camera.tr_mul(&first.look(sample));
-        let Some(range_m) = terrain.range_m(&pose.position_m, &direction) else {
+        let look = first.look(sample);
+        let ground = |pose: &Pose| {
+            let direction = pose.mars_to_camera.tr_mul(&look);
+            let range_m = terrain.range_m(&pose.position_m, &direction)?;
+            Some((range_m, pose.position_m + range_m * direction))
+        };
+        let et = first.time_of(line);
+        let Some((range_m, _)) = ground(&first.pose(et)) else {
             continue;
         };
-        let seen = second.place(&(pose.position_m + range_m * direction));
+        let Some((_, ground_m)) = ground(&first.seen_from(et, range_m)) else {
+            continue;
+        };
+        let seen = second.place(&ground_m);
         let Some(other) = seen.filter(|place| second.shows(*place, EDGE_PX)) else {
             continue;
         };

@@ -11,13 +11,13 @@ use super::{
     terrain::REFERENCE_RADIUS_M,
 };
 use crate::{
-    config::usual_instrument,
     constants::MARS_IAU2000,
     error::Result,
     geom::{
         attitude::matrix_of_rotation_vector, mars_rotation::mars_matrix,
-        orbit_axes::radial_along_cross,
+        orbit_axes::radial_along_cross, pushbroom::Pose,
     },
+    instruments::Instrument,
     time::Et,
 };
 
@@ -254,10 +254,15 @@ impl Flown {
         }
     }
 
-    /// True matrix from the narrow-angle camera to Mars (IAU 2000).
-    pub(super) fn camera_to_mars(&self, et: Et) -> Matrix3<f64> {
-        let j2000_to_camera = bus_to_camera(usual_instrument()) * self.j2000_to_bus(et);
-        mars_matrix(&MARS_IAU2000, et) * j2000_to_camera.transpose()
+    /// From where `camera` sees ground along straight rays at `exposure`, and its axes: the bus and Mars as they were
+    /// when the light left the ground, `light_time_s` earlier, the attitude as it is. Without light time the true pose.
+    pub(super) fn camera_pose(&self, camera: &Instrument, exposure: Et, light_time_s: f64) -> Pose {
+        let left = exposure.plus(-light_time_s);
+        let j2000_to_camera = bus_to_camera(camera) * self.j2000_to_bus(exposure);
+        Pose {
+            position_m: self.bus_position_m(left),
+            mars_to_camera: j2000_to_camera * mars_matrix(&MARS_IAU2000, left).transpose(),
+        }
     }
 }
 
@@ -278,9 +283,14 @@ impl Flight for Flown {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::{
-        error_sources::Roughness,
-        plan::{IMAGES, PlannedImage},
+    use crate::{
+        config::usual_instrument,
+        constants::SPEED_OF_LIGHT_M_S,
+        geom::light_time::light_time_s,
+        scene::{
+            error_sources::Roughness,
+            plan::{IMAGES, PlannedImage},
+        },
     };
 
     fn arc(image: &'static PlannedImage) -> Arc {
@@ -364,6 +374,47 @@ mod tests {
                 "{moved_m}"
             );
             assert!((moved_m.dot(&up) - 2.0).abs() < 0.01, "{moved_m}"); // the plane of the shift: 1 mm
+        }
+    }
+
+    /// A photon is followed from the ground to the camera in axes that neither turn nor move with Mars; in those of
+    /// the camera it has lost the camera's velocity.
+    #[test]
+    fn rays_are_straight_from_where_the_camera_stood_when_the_light_left() {
+        for image in &IMAGES {
+            let arc = arc(image);
+            let exposure = arc.exposed.start.plus(3.0);
+            let errors = DayErrors::draw(&SceneErrors::demo(), &arc, 1);
+            let flown = Flown { arc, errors };
+            let camera = usual_instrument();
+            let at_once = flown.camera_pose(camera, exposure, 0.0);
+            for look in [[0.0, 0.0], [0.002, 0.004], [-0.001, -0.004]] {
+                let look = Vector3::new(look[0], look[1], 1.0);
+                let ground_m = at_once.position_m + 4.1e5 * at_once.mars_to_camera.tr_mul(&look);
+                let orbit = |et: Et| flown.arc.orbit.state(et);
+                // Of the true orbit alone: the demo has no errors of the bus.
+                let there_m = |light_time_s: f64| {
+                    let left = exposure.plus(-light_time_s);
+                    mars_matrix(&MARS_IAU2000, left).tr_mul(&ground_m)
+                };
+                let here = orbit(exposure);
+                let mut late_s = 0.0;
+                for _ in 0..4 {
+                    late_s = light_time_s((here.position_m - there_m(late_s)).norm());
+                }
+                let photon_m_s =
+                    SPEED_OF_LIGHT_M_S * (here.position_m - there_m(late_s)).normalize();
+                let arriving = here.velocity_m_s - photon_m_s;
+                let axes = super::bus_to_camera(camera) * flown.j2000_to_bus(exposure);
+                let seen = (axes * arriving).normalize();
+                let pose = flown.camera_pose(camera, exposure, late_s);
+                let straight = pose.camera_vector_m(&ground_m).normalize();
+                // Second order of v/c: 1e-10 rad, 0.04 mm on the ground. The instants are rounded to 7e-9 s: 0.03 mm.
+                assert!((seen - straight).norm() < 3e-10, "{}", image.id);
+                let geometric = at_once.camera_vector_m(&ground_m).normalize();
+                let share = (seen - geometric).norm();
+                assert!((0.9e-5..1.3e-5).contains(&share), "{}: {share}", image.id); // v/c of 3.4 km/s
+            }
         }
     }
 }

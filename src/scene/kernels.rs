@@ -14,7 +14,7 @@ use super::{
 };
 use crate::{
     config::usual_instrument,
-    constants::{NAIF_MARS, NAIF_MGS, NAIF_SUN},
+    constants::{NAIF_MARS, NAIF_MGS, NAIF_SOLAR_SYSTEM_BARYCENTRE, NAIF_SUN},
     error::{IoError, Locate, Result},
     frames::Position,
     geom::attitude::make_continuous,
@@ -23,9 +23,8 @@ use crate::{
     units::SECONDS_PER_DAY,
 };
 
-/// NAIF id of the barycentre of Mars and its moons, and of the solar system's.
+/// NAIF id of the barycentre of Mars and its moons.
 const NAIF_MARS_BARYCENTRE: i32 = 4;
-const NAIF_SOLAR_SYSTEM_BARYCENTRE: i32 = 0;
 /// Seconds between states of an arc: degree 7 over four states leaves nanometres.
 const SPK_STEP_S: f64 = 60.0;
 /// Degree of Hermite interpolation.

@@ -17,6 +17,7 @@ use crate::{
     config::usual_instrument,
     error::Result,
     geom::{
+        light_time::light_time_s,
         oriented_camera::OrientedCamera,
         pushbroom::{Detector, ExteriorOrientation, Pose, Projector, SampledOrientation},
     },
@@ -57,14 +58,14 @@ struct Tie {
 
 impl<'a> TrueImage<'a> {
     /// The image of the day `flown`.
-    fn new(flown: &'a Flown) -> Result<Self> {
+    fn new(flown: &'a Flown, terrain: &Terrain) -> Result<Self> {
         let image = flown.arc.image;
         let intervals = if flown.errors.has_jitter() {
             INTERVALS_OF_JITTER
         } else {
             INTERVALS
         };
-        let orientation = SampledOrientation::new(&poses(flown, intervals))
+        let orientation = SampledOrientation::new(&poses(flown, terrain, intervals)?)
             .map_err(|error| no_camera(flown, &error))?;
         let detector = Detector::new(usual_instrument(), image.summing, 0, image.samples());
         Ok(Self {
@@ -150,14 +151,20 @@ impl<'a> TrueImage<'a> {
         let lines = self.oriented_camera.lines;
         let step = lines / f64::from(TOLD_POSES - 1);
         let told: Vec<f64> = (0..TOLD_POSES).map(|row| step * f64::from(row)).collect();
-        let times = told.iter().map(|line| exposed(self.flown, *line));
-        let poses: Vec<(Et, Pose)> = times.map(|et| (et, pose(self.flown, et))).collect();
+        let times: Vec<Et> = told.iter().map(|line| exposed(self.flown, *line)).collect();
+        let light_times_s = times
+            .iter()
+            .map(|et| seen_after_s(self.flown, terrain, *et));
+        let light_time_s = light_times_s.collect::<Result<_>>()?;
+        let times = times.into_iter();
+        let poses: Vec<(Et, Pose)> = times.map(|et| (et, pose(self.flown, et, 0.0))).collect();
         Ok(TieCameraTruth {
             image: self.flown.arc.image.id,
             time_bias_lines: errors.time_bias_lines,
             position_bias_m: (errors.bus_position_m + errors.camera_position_m).into(),
             focal_px_per_line: self.focal_px_per_line(terrain)?,
             line: told,
+            light_time_s,
             poses: Poses::of(&poses),
         })
     }
@@ -170,21 +177,34 @@ fn exposed(flown: &Flown, line: f64) -> Et {
     arc.exposed.start.plus(exposed_s)
 }
 
-/// True pose of the camera.
-fn pose(flown: &Flown, et: Et) -> Pose {
-    Pose {
-        position_m: flown.bus_position_m(et) + flown.errors.camera_position_m,
-        mars_to_camera: flown.camera_to_mars(et).transpose(),
-    }
+/// True pose of the camera, or the one that sees ground along straight rays after a light time.
+fn pose(flown: &Flown, exposure: Et, light_time_s: f64) -> Pose {
+    let mut pose = flown.camera_pose(usual_instrument(), exposure, light_time_s);
+    pose.position_m += flown.errors.camera_position_m;
+    pose
 }
 
-/// Lines from the middle with true poses.
-fn poses(flown: &Flown, intervals: u32) -> Vec<(f64, Pose)> {
+/// Light time from the ground on the boresight, seconds: within the narrow swath it changes by less than what MGS
+/// flies a centimetre in.
+fn seen_after_s(flown: &Flown, terrain: &Terrain, exposure: Et) -> Result<f64> {
+    let pose = pose(flown, exposure, 0.0);
+    let boresight = pose.mars_to_camera.row(2).transpose();
+    let range_m = terrain.range_m(&pose.position_m, &boresight);
+    let et_s = exposure.seconds();
+    Ok(light_time_s(
+        range_m.ok_or(SceneError::BeamMisses { et_s })?,
+    ))
+}
+
+/// Lines from the middle with the poses that see the ground along straight rays.
+fn poses(flown: &Flown, terrain: &Terrain, intervals: u32) -> Result<Vec<(f64, Pose)>> {
     let lines = f64::from(flown.arc.image.lines_header);
     (0..=intervals)
         .map(|index| {
             let line = lines * f64::from(index) / f64::from(intervals);
-            (line - 0.5 * lines, pose(flown, exposed(flown, line)))
+            let exposure = exposed(flown, line);
+            let pose = pose(flown, exposure, seen_after_s(flown, terrain, exposure)?);
+            Ok((line - 0.5 * lines, pose))
         })
         .collect()
 }
@@ -208,7 +228,10 @@ pub(super) fn write_ties(
     seed: u64,
 ) -> Result<TiesTruth> {
     let site = first.arc.image.site.id;
-    let pair = [TrueImage::new(first)?, TrueImage::new(second)?];
+    let pair = [
+        TrueImage::new(first, terrain)?,
+        TrueImage::new(second, terrain)?,
+    ];
     let mut random = Random::new(seed, &format!("ties {site}"));
     let exact = exact_ties(&pair, terrain, &mut random)?;
     let (measured, truth) = spoil(exact, noise_px, &mut random);
@@ -296,143 +319,4 @@ fn blunder(measures: &mut [TieMeasure<String>], random: &mut Random) -> BlunderT
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::{
-        geom::intersection::{IntersectionLimits, Ray, intersect},
-        scene::{
-            arc::Arc,
-            drawn::DayErrors,
-            error_sources::{Roughness, SceneErrors},
-            plan::{IMAGES, PlannedImage, SITES, Site},
-        },
-    };
-
-    const ROUGH: SceneErrors = SceneErrors::realistic(Roughness::Rough);
-
-    fn flown(image: &'static PlannedImage, errors: &SceneErrors, seed: u64) -> Flown {
-        let arc = Arc::new(image, Et::from_seconds(3.9e7), 1_200.0).unwrap();
-        let errors = DayErrors::draw(errors, &arc, seed);
-        Flown { arc, errors }
-    }
-
-    fn days(site: &str, errors: &SceneErrors, seed: u64) -> Vec<Flown> {
-        let of_site = IMAGES.iter().filter(|image| image.site.id == site);
-        of_site.map(|image| flown(image, errors, seed)).collect()
-    }
-
-    fn terrain(seed: u64, errors: &SceneErrors) -> Terrain {
-        Terrain::new(seed, &SITES.map(Site::direction), errors.relief)
-    }
-
-    fn ray(image: &TrueImage<'_>, measure: &TieMeasure<String>) -> Ray {
-        let (x_lines, focal_px) = image
-            .oriented_camera
-            .focal_plane_coordinates(measure.line, measure.sample);
-        let pose = image.oriented_camera.orientation.pose(x_lines);
-        Ray {
-            position_m: pose.position_m,
-            mars_to_camera: pose.mars_to_camera,
-            focal_length_px: image.oriented_camera.detector.focal_length_px,
-            focal_px,
-            along_sigma_px: 1.0,
-            across_sigma_px: 1.0,
-        }
-    }
-
-    #[test]
-    fn exact_ties_lie_on_the_ground_and_meet_there() {
-        let cases = SITES.iter().flat_map(|site| {
-            let seeds = [1, 2, 3, 4, 5, 6].map(|seed| (seed, SceneErrors::demo()));
-            let rough = [(1, ROUGH), (2, ROUGH)];
-            seeds.into_iter().chain(rough).map(move |case| (site, case))
-        });
-        for (site, (seed, errors)) in cases {
-            let days = days(site.id, &errors, seed);
-            let pair = [0, 1].map(|image| TrueImage::new(&days[image]).unwrap());
-            let terrain = terrain(seed, &errors);
-            let ties = exact_ties(&pair, &terrain, &mut Random::new(seed, "test")).unwrap();
-            println!("{} seed {seed}: {} ties", site.id, ties.len());
-            assert_eq!(ties.len(), TIES, "{} seed {seed}", site.id);
-            for tie in &ties {
-                let height_m = tie.ground_m.norm() - terrain.radius_m(&tie.ground_m.normalize());
-                assert!(height_m.abs() < 1e-4, "{height_m}"); // metres; rays end 0.01 mm from the ground
-                let rays = [0, 1].map(|image| ray(&pair[image], &tie.measures[image]));
-                let met = intersect(&rays, &IntersectionLimits::default()).unwrap();
-                let off_m = (met.ground_m - tie.ground_m).norm();
-                assert!(off_m < 1e-3, "{off_m} m"); // intersection itself stops at 0.1 mm
-            }
-        }
-    }
-
-    #[test]
-    fn poses_between_those_of_the_flight_are_those_of_the_flight() {
-        let cases = IMAGES.iter().flat_map(|image| {
-            // Turns, radians: 1e-9 is 0.4 mm on the ground, 6e-9 of jitter 2 mm.
-            [(image, SceneErrors::demo(), 1e-9), (image, ROUGH, 6e-9)]
-        });
-        for (image, errors, turn_max_rad) in cases {
-            let flown = flown(image, &errors, 1);
-            let camera = TrueImage::new(&flown).unwrap();
-            for share in [0.123, 0.345, 0.567, 0.789] {
-                let line = share * camera.oriented_camera.lines;
-                let x_lines = line - 0.5 * camera.oriented_camera.lines;
-                let pose = camera.oriented_camera.orientation.pose(x_lines);
-                let true_pose = super::pose(&flown, exposed(&flown, line));
-                let off_m = (pose.position_m - true_pose.position_m).norm();
-                assert!(off_m < 1e-4, "{} {off_m} m", image.id); // as the kernels themselves
-                let turned = pose.mars_to_camera * true_pose.mars_to_camera.transpose();
-                let off_rad = (turned - nalgebra::Matrix3::identity()).abs().max();
-                assert!(off_rad < turn_max_rad, "{} {off_rad} rad", image.id);
-            }
-        }
-    }
-
-    #[test]
-    fn noise_and_blunders_are_as_told() {
-        for noise_px in [1.0, 0.22] {
-            noise_and_blunders_are_as_told_with(noise_px);
-        }
-    }
-
-    fn noise_and_blunders_are_as_told_with(noise_px: f64) {
-        let days = days("isidis", &SceneErrors::demo(), 1);
-        let pair = [0, 1].map(|image| TrueImage::new(&days[image]).unwrap());
-        let terrain = terrain(1, &SceneErrors::demo());
-        let exact = exact_ties(&pair, &terrain, &mut Random::new(1, "test")).unwrap();
-        let required: Vec<[TieMeasure<String>; 2]> =
-            exact.iter().map(|tie| tie.measures.clone()).collect();
-        let (measured, truth) = spoil(exact, noise_px, &mut Random::new(1, "noise"));
-        let (mut squares, mut count) = (0.0, 0.0);
-        for ((tie, truth), required) in measured.iter().zip(&truth).zip(&required) {
-            assert_eq!(tie.id, truth.id);
-            for (measure, required) in tie.measures.iter().zip(required) {
-                let told = truth
-                    .blunder
-                    .as_ref()
-                    .filter(|told| told.image == measure.image);
-                let [line_error, sample_error] =
-                    told.map_or([0.0; 2], |told| [told.line_error, told.sample_error]);
-                for noise in [
-                    measure.line - required.line - line_error,
-                    measure.sample - required.sample - sample_error,
-                ] {
-                    squares += noise * noise;
-                    count += 1.0;
-                }
-            }
-        }
-        let sigma_px = f64::sqrt(squares / count);
-        assert!((sigma_px / noise_px - 1.0).abs() < 0.1, "{sigma_px}"); // 616 numbers: 0.03 of it, times three
-        let blunders: Vec<f64> = truth
-            .iter()
-            .filter_map(|tie| tie.blunder.as_ref())
-            .map(|blunder| blunder.line_error.hypot(blunder.sample_error))
-            .collect();
-        assert_eq!(blunders.len(), 8); // 5 % of 154
-        assert!(
-            blunders.iter().all(|px| (20.0..100.0).contains(px)),
-            "{blunders:?}"
-        );
-    }
-}
+mod tests;

@@ -226,6 +226,8 @@ pub(super) struct TieCameraTruth {
     pub focal_px_per_line: f64,
     /// Lines, 0 at the outer edge of the first one, with the poses in which they were truly exposed.
     pub line: Vec<f64>,
+    /// How much earlier the light left the ground on the boresight, one entry per line.
+    pub light_time_s: Vec<f64>,
     #[serde(flatten)]
     pub poses: Poses,
 }
@@ -274,9 +276,9 @@ impl Truth {
             images: Vec::new(),
             files: Vec::new(),
             profiles: Vec::new(),
-            tie_rule: "line n of an image was truly exposed when its label has line n + time_bias_lines, from the place of the orbit gsfc at that time plus position_bias_m (IAU 2000), with the true attitude of that time (errors_rule); line, position and quaternion of a camera are its true poses; tie points are measured in images taken like that, at ground_iau2000_m; the position bias against nav is position_bias_m less the orbit difference of nav; measurements have the noise tie_noise_px of errors in lines and samples, blunders come on top of it",
+            tie_rule: "line n of an image was truly exposed when its label has line n + time_bias_lines, from the place of the orbit gsfc at that time plus position_bias_m (IAU 2000), with the true attitude of that time (errors_rule); line, position and quaternion of a camera are its true poses; it sees ground by light that left it light_time_s before the exposure, from where the camera and Mars were then, with the attitude of the exposure (light time and aberration); tie points are measured in images taken like that, at ground_iau2000_m; the position bias against nav is position_bias_m less the orbit difference of nav; measurements have the noise tie_noise_px of errors in lines and samples, blunders come on top of it",
             ties: Vec::new(),
-            wide_angle_rule: "wide-angle images are taken when their labels say, from the true place of the bus with its true attitude; lines and samples of shots follow the formula of the instrument kernel moc20.ti",
+            wide_angle_rule: "wide-angle images are taken when their labels say, from the true place of the bus with its true attitude, by light that left the ground as much earlier as it takes from each point; lines and samples of shots follow the formula of the instrument kernel moc20.ti",
             wide_angle: Vec::new(),
         }
     }

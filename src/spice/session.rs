@@ -14,7 +14,7 @@ use super::{
     origin::{self, Origin, all_finite},
 };
 use crate::{
-    constants::{NAIF_MARS, NAIF_MGS, NAIF_MGS_BUS, NAIF_SUN},
+    constants::{NAIF_MARS, NAIF_MGS, NAIF_MGS_BUS, NAIF_SOLAR_SYSTEM_BARYCENTRE, NAIF_SUN},
     error::{Error, Locate, Result},
     frames::{CameraFrame, J2000, MgsBus, Position, Rotation},
     instruments::Instrument,
@@ -183,7 +183,7 @@ impl Session {
 
     /// State of MGS as seen from the centre of Mars, corrected for light time and aberration (`LT+S`).
     ///
-    /// Only for instrument support data, which carry this convention; geometry uses [`Self::state`].
+    /// The geometry takes it only where a run follows the convention of ISIS and ALE.
     ///
     /// # Errors
     /// As [`Self::state`].
@@ -192,6 +192,17 @@ impl Session {
             .cspice
             .apparent_state(NAIF_MGS, et.seconds(), NAIF_MARS)?;
         self.finite("apparent position or velocity of MGS", et, state)
+    }
+
+    /// Geometric state of Mars relative to the barycentre of the solar system.
+    ///
+    /// # Errors
+    /// As [`Self::state`].
+    pub fn mars_state(&self, et: Et) -> Result<State> {
+        let state =
+            self.cspice
+                .geometric_state(NAIF_MARS, et.seconds(), NAIF_SOLAR_SYSTEM_BARYCENTRE)?;
+        self.finite("position or velocity of Mars", et, state)
     }
 
     /// State of the Sun as seen from the centre of Mars (`LT+S`).

@@ -2,7 +2,7 @@
 
 use std::sync::atomic::AtomicBool;
 
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Vector3};
 
 use super::{
     adjust::Adjusted,
@@ -102,7 +102,7 @@ stage_inputs! {
 
 impl Stage for Reorient<'_> {
     const NAME: &'static str = "reorient";
-    const METHOD: u32 = 2;
+    const METHOD: u32 = 3;
     type Output = Orientation;
     stage_inputs!(fingerprint);
 
@@ -131,9 +131,9 @@ impl Stage for Reorient<'_> {
 /// The line with the tag `x` gets the camera of `x + s`: `C(x) = C₀(x + s) + Δ(x)` and
 /// `M(x) = exp([θ(x)]×) M₀(x + s)`, all relative to Mars, as
 /// [`CorrectedOrientation`](crate::geom::pushbroom::CorrectedOrientation) has it. Samples keep their epochs. Tables keep their
-/// nodes but those that the shift takes beyond what is known; their positions keep the light time and
-/// aberration that the original ones carry (a correction of 100 m would change those by 1 cm, one that grows
-/// by 10 m/s by 0.1 m).
+/// nodes but those that the shift takes beyond what is known. Positions are corrected as they are, whatever the
+/// convention for light time: light time and aberration are those of the kernels' positions, which a correction of
+/// 100 m would change by 1 mm of `surface` and 1 cm of `centre`.
 ///
 /// # Errors
 /// [`Kind::Input`] for a shift beyond the camera tables; [`Kind::Bug`] for a correction that is not finite.
@@ -158,40 +158,20 @@ pub fn reorient(
     };
     corrected.require_known(tables)?;
     let epochs: Vec<Et> = orientation.samples.iter().map(|s| s.et).collect();
-    let geometric = |et| corrected.camera(et, Convention::Geometric);
+    let camera = |et| corrected.camera(et);
+    let mut samples = OrientationSample::at_epochs(image, &epochs, camera)?;
+    for (sample, before) in samples.iter_mut().zip(&orientation.samples) {
+        sample.to_spacecraft_m = before.to_spacecraft_m;
+    }
     Ok(Orientation {
         image: orientation.image.clone(),
-        samples: OrientationSample::at_epochs(image, &epochs, geometric)?,
-        outline: GroundPoint::outline(image, geometric)?,
+        samples,
+        outline: GroundPoint::outline(image, camera)?,
         tables: corrected.tables(tables)?,
+        light_time: orientation.light_time.clone(),
         notes: orientation.notes.clone(),
         invalid_because: orientation.invalid_because.clone(),
     })
-}
-
-/// The tables of `orientation` with geometric positions, those of its samples: no light time, no aberration.
-///
-/// The positions of [`CameraTables`] lie some 140 m from them, as those of ISIS and ALE do. A camera model
-/// that is to see adjusted ground at the measured pixels needs the positions that were adjusted.
-///
-/// # Errors
-/// [`Kind::Bug`] for tables of fewer than two nodes and fewer than three samples.
-pub fn geometric_tables(orientation: &Orientation) -> Result<CameraTables> {
-    let (nodes, residual) = (nodes(orientation)?, residual(orientation)?);
-    let mut tables = orientation.tables.clone();
-    let offset_m = |et: Et| residual.pose(et.seconds()).position_m;
-    for row in 0..tables.et_s.len() {
-        let et = Et::from_seconds(tables.et_s[row]);
-        let from_mars = mars_rotation::<MarsIau2000>(et).matrix().transpose();
-        let offset_rate_m_s = residual.pose_and_rate(et.seconds()).1.advance_m;
-        let spin = tables.mars_angular_velocity_rad_s[row];
-        let in_j2000_m = from_mars * offset_m(et);
-        let position_m = from_mars * (nodes.camera(et).position.xyz_m + offset_m(et));
-        tables.position_m[row] = position_m;
-        tables.velocity_m_s[row] += from_mars * offset_rate_m_s;
-        tables.velocity_m_s[row] += spin.cross(&in_j2000_m);
-    }
-    Ok(tables)
 }
 
 fn nodes(orientation: &Orientation) -> Result<Nodes> {
@@ -203,8 +183,7 @@ fn nodes(orientation: &Orientation) -> Result<Nodes> {
     Ok(Nodes::new(&orientation.tables))
 }
 
-/// Samples relative to the interpolated tables, over ET: light time and aberration taken out of positions,
-/// and what interpolation misses of rotations.
+/// Samples relative to the interpolated tables, over ET: what interpolation misses.
 fn residual(orientation: &Orientation) -> Result<SampledOrientation> {
     let nodes = nodes(orientation)?;
     let relative = |sample: &OrientationSample| {
@@ -223,15 +202,6 @@ fn residual(orientation: &Orientation) -> Result<SampledOrientation> {
     let image = orientation.image.clone();
     SampledOrientation::new(&samples)
         .map_err(|source| ReorientError::Samples { image, source }.into())
-}
-
-/// Which positions are asked for.
-#[derive(Clone, Copy, PartialEq)]
-enum Convention {
-    /// As the samples have them.
-    Geometric,
-    /// With light time and aberration, as the tables have them.
-    Apparent,
 }
 
 /// The camera after the correction, by the tags of its lines.
@@ -283,22 +253,33 @@ impl<F: Fn(f64) -> LineCorrection> Corrected<'_, F> {
         }
     }
 
-    /// Position in IAU 2000 and the rotation from the camera to it, for the line with the tag `tag`.
-    fn camera(&self, tag: Et, convention: Convention) -> Result<Camera> {
+    /// Where rays start in IAU 2000 and the rotation from the camera to it, for the line with the tag `tag`.
+    fn camera(&self, tag: Et) -> Result<Camera> {
         let et = tag.plus(self.shift_s());
         let camera = self.nodes.camera(et);
-        let mut position_m = camera.position.xyz_m;
-        let mut camera_to_mars = *camera.to_mars.matrix();
-        if convention == Convention::Geometric {
-            let residual = self.residual.pose(et.seconds());
-            position_m += residual.position_m;
-            camera_to_mars *= residual.mars_to_camera.transpose();
-        }
+        let missed = self.residual.pose(et.seconds());
+        let to_mars = camera.to_mars.matrix() * missed.mars_to_camera.transpose();
+        self.corrected(tag, camera.position.xyz_m + missed.position_m, to_mars)
+    }
+
+    /// The same as the tables have it.
+    fn tabulated(&self, tag: Et) -> Result<Camera> {
+        let camera = self.nodes.camera(tag.plus(self.shift_s()));
+        self.corrected(tag, camera.position.xyz_m, *camera.to_mars.matrix())
+    }
+
+    /// A position and a rotation to Mars with what the correction adds at the line with the tag `tag`.
+    fn corrected(
+        &self,
+        tag: Et,
+        position_m: Vector3<f64>,
+        to_mars: Matrix3<f64>,
+    ) -> Result<Camera> {
         let correction = self.correction(self.image.line_offset(tag))?;
         let turned = matrix_of_rotation_vector(&correction.rotation_rad);
         Ok(Camera {
             position: Position::new(position_m + correction.position_m),
-            to_mars: Rotation::new(camera_to_mars * turned.transpose(), tag),
+            to_mars: Rotation::new(to_mars * turned.transpose(), tag),
         })
     }
 
@@ -335,9 +316,7 @@ impl<F: Fn(f64) -> LineCorrection> Corrected<'_, F> {
             [rows.first(), rows.last()].map(|row| row.map_or(0.0, |row| *row as f64 / last as f64));
         tables.sun_position_m = sun_at.map(|at| lagrange(&original.sun_position_m, at));
         tables.sun_velocity_m_s = sun_at.map(|at| lagrange(&original.sun_velocity_m_s, at));
-        let own = InterpolationCheck::of(self.image, &tables, |et| {
-            self.camera(et, Convention::Apparent)
-        })?;
+        let own = InterpolationCheck::of(self.image, &tables, |et| self.tabulated(et))?;
         tables.interpolation = InterpolationCheck {
             error_max_px: original.interpolation.error_max_px + own.error_max_px,
             epochs: own.epochs,
@@ -355,9 +334,10 @@ impl<F: Fn(f64) -> LineCorrection> Corrected<'_, F> {
     ) -> Result<()> {
         let tag = Et::from_seconds(original.et_s[row]);
         let et = tag.plus(self.shift_s());
-        let camera = self.camera(tag, Convention::Apparent)?;
-        let [to_mars, to_mars_then] =
-            [tag, et].map(|et| *mars_rotation::<MarsIau2000>(et).matrix());
+        let camera = self.tabulated(tag)?;
+        let to_mars = *original.inertial_to_mars[row].matrix();
+        let [mars, mars_then] = [tag, et].map(|et| *mars_rotation::<MarsIau2000>(et).matrix());
+        let to_mars_then = mars_then * mars.transpose() * to_mars;
         let to_camera = camera.to_mars.matrix().transpose() * to_mars;
         let to_bus = tables.bus_to_camera.matrix().transpose() * to_camera;
         let (drift_m_s, turn_rad_s) = self.rates(self.image.line_offset(tag))?;

@@ -1,15 +1,19 @@
 //! Exterior orientation of an image: position and rotation of the camera at equally spaced epochs.
 
 mod camera_tables;
+mod conventions;
 
 use std::{fmt, sync::atomic::AtomicBool};
 
-use super::{orientation::Camera, tag_times::ImageTimes};
+use super::{
+    orientation::{Camera, RayOrigin},
+    tag_times::ImageTimes,
+};
 use crate::{
     config::{KernelsConfig, OrientationConfig, PointingConfig},
     error::Result,
-    frames::{CameraFrame, J2000, MarsIau2000, Rotation},
-    geom::{mars_rotation::mars_rotation, statistics::largest},
+    frames::{CameraFrame, J2000, MarsIau2000, Position, Rotation},
+    geom::{light_time::LightTime, mars_rotation::mars_rotation, statistics::largest},
     instruments::Instrument,
     spice::{Attitude, KernelView, Session},
     stage::{Output, Stage},
@@ -18,7 +22,8 @@ use crate::{
 };
 
 pub use super::orientation::{
-    BoresightGround, CameraTables, GroundPoint, InterpolationCheck, Orientation, OrientationSample,
+    BoresightGround, CameraTables, GroundPoint, InterpolationCheck, LightTimeEffect, Orientation,
+    OrientationSample, OtherConvention,
 };
 
 /// Time between the attitude samples of the mission's C-kernels, seconds: an attitude that is held for
@@ -38,14 +43,14 @@ stage_inputs! {
         pub coverage: &'a KernelsConfig,
         /// Pointing bias.
         pub pointing: &'a PointingConfig,
-        /// Number of samples.
+        /// Number of samples, and the convention for light time.
         pub orientation: &'a OrientationConfig,
     }
 }
 
 impl Stage for SampleOrientation<'_> {
     const NAME: &'static str = "sample_orientation";
-    const METHOD: u32 = 2;
+    const METHOD: u32 = 3;
     type Output = Orientation;
     stage_inputs!(fingerprint);
 
@@ -99,8 +104,9 @@ fn finding(times: &ImageTimes, invalid_because: &[String]) -> String {
 
 /// Samples the orientation of `image`.
 ///
-/// Position and Mars rotation are those of the exposure; attitude is read where the pointing bias
-/// says. `R(camera → Mars) = R(J2000 → Mars) · R(J2000 → bus)ᵀ · R(bus → camera)ᵀ`.
+/// Position and Mars rotation are those of the exposure, or of the instant that the convention for light time asks
+/// for; attitude is read where the pointing bias says.
+/// `R(camera → Mars) = R(J2000 → Mars) · R(J2000 → bus)ᵀ · R(bus → camera)ᵀ`.
 ///
 /// # Errors
 /// Kernels that do not cover the image with its padding; the gap is named.
@@ -113,15 +119,19 @@ pub fn sample_orientation(
     pointing: &PointingConfig,
     sampling: &OrientationConfig,
 ) -> Result<Orientation> {
-    require_coverage(session, image, kernels, pointing)?;
     let reader = Reader {
         session,
         instrument: &image.instrument,
         pointing,
         tolerance_s: kernels.ck_tolerance_s,
+        light_time: sampling.light_time,
     };
+    reader.require_coverage(image, kernels.padding_s)?;
     let epochs = epochs(image, sampling.intervals);
-    let samples = OrientationSample::at_epochs(image, &epochs, |et| reader.camera(et))?;
+    let mut samples = OrientationSample::at_epochs(image, &epochs, |et| reader.camera(et))?;
+    for sample in &mut samples {
+        sample.to_spacecraft_m = reader.geometric(sample.et)?.xyz_m - sample.position.xyz_m;
+    }
     let tables = camera_tables::camera_tables(&reader, image, kernels.padding_s)?;
     let nodes: Vec<Et> = tables.et_s.iter().copied().map(Et::from_seconds).collect();
     let held = reader.held_attitudes(epochs.iter().chain(&nodes))?;
@@ -131,6 +141,7 @@ pub fn sample_orientation(
         samples,
         outline: GroundPoint::outline(image, |et| reader.camera(et))?,
         tables,
+        light_time: reader.effect(image)?,
         invalid_because: far.map(HeldAttitudes::reason).into_iter().collect(),
         notes: held.iter().map(ToString::to_string).collect(),
     })
@@ -153,13 +164,14 @@ fn require_orientation(
         let sampled = sample_orientation(session, image, kernels, pointing, sampling)?;
         return Ok(sampled.invalid_because);
     }
-    require_coverage(session, image, kernels, pointing)?;
     let reader = Reader {
         session,
         instrument: &image.instrument,
         pointing,
         tolerance_s: kernels.ck_tolerance_s,
+        light_time: sampling.light_time,
     };
+    reader.require_coverage(image, kernels.padding_s)?;
     let mut intervals = sampling.intervals;
     while image.duration_s() / f64::from(intervals) > ATTITUDE_SPACING_S {
         intervals *= 2;
@@ -211,32 +223,30 @@ impl fmt::Display for HeldAttitudes {
     }
 }
 
-/// Checks that position and attitude are covered over the image with its padding.
-///
-/// What is asked is what will be read: attitude at the exposures shifted by the pointing bias.
-///
-/// # Errors
-/// A gap, named with its ends and the kernels beside it.
-fn require_coverage(
-    session: &Session,
-    image: &ImageTimes,
-    kernels: &KernelsConfig,
-    pointing: &PointingConfig,
-) -> Result<()> {
-    let exposures = image.exposures();
-    session.require_position(exposures.padded(kernels.padding_s))?;
-    let (padding_s, tolerance_s) = (kernels.padding_s, kernels.ck_tolerance_s);
-    session.require_attitude(exposures, pointing.ck_bias, padding_s, tolerance_s)
-}
-
+#[derive(Clone, Copy)]
 struct Reader<'a> {
     session: &'a Session,
     instrument: &'a Instrument,
     pointing: &'a PointingConfig,
     tolerance_s: f64,
+    light_time: LightTime,
 }
 
 impl Reader<'_> {
+    /// Checks that position and attitude are covered over the image with its padding.
+    ///
+    /// What is asked is what will be read: attitude at the exposures shifted by the pointing bias, positions as much
+    /// earlier as light may take.
+    ///
+    /// # Errors
+    /// A gap, named with its ends and the kernels beside it.
+    fn require_coverage(&self, image: &ImageTimes, padding_s: f64) -> Result<()> {
+        let (session, exposures) = (self.session, image.exposures());
+        session.require_position(self.light_time.read_over(exposures.padded(padding_s)))?;
+        let (bias, tolerance_s) = (self.pointing.ck_bias, self.tolerance_s);
+        session.require_attitude(exposures, bias, padding_s, tolerance_s)
+    }
+
     fn attitude(&self, exposure: Et) -> Result<Attitude> {
         let lookup = self.pointing.ck_bias.lookup(exposure);
         self.session.attitude(lookup, exposure, self.tolerance_s)
@@ -264,13 +274,19 @@ impl Reader<'_> {
         Ok(mounting * attitude.inertial_to_bus)
     }
 
-    /// Geometric position in IAU 2000 and the rotation from the camera to it.
+    /// Where MGS is.
+    fn geometric(&self, et: Et) -> Result<Position<MarsIau2000>> {
+        Ok(mars_rotation(et).apply(&self.session.state(et)?.position))
+    }
+
+    /// Where rays start in IAU 2000, and the rotation from the camera to it.
     fn camera(&self, et: Et) -> Result<Camera> {
-        let to_mars = mars_rotation::<MarsIau2000>(et);
-        let position = to_mars.apply(&self.session.state(et)?.position);
+        let to_camera = self.inertial_to_camera(et)?;
+        let boresight = to_camera.matrix().row(2).transpose();
+        let origin = RayOrigin::at(self.session, self.light_time, et, &boresight)?;
         Ok(Camera {
-            position,
-            to_mars: to_mars * self.inertial_to_camera(et)?.inverse(),
+            position: origin.position(),
+            to_mars: origin.to_mars * to_camera.inverse(),
         })
     }
 }

@@ -5,7 +5,8 @@ use std::{path::PathBuf, sync::LazyLock};
 use areograph::{
     config::{ImageConfig, KernelsConfig, OrientationConfig, PointingConfig, usual_instrument},
     constants::MARS_IAU2000,
-    geom::mars_rotation::mars_matrix,
+    frames::{MarsIau2000, Position},
+    geom::{ellipsoid::ray_meets_ellipsoid, light_time::LightTime, mars_rotation::mars_matrix},
     image::ImageFields,
     kernel_source::{KernelList, KernelSource},
     scene::{SceneErrors, SceneOptions, write_scene},
@@ -20,11 +21,14 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::common;
 
-const SAMPLING: OrientationConfig = OrientationConfig {
-    intervals: 30,
-    position_rmse_max_m: 1.0,
-    pointing_rmse_max_rad: 1e-3,
-};
+const fn sampling(light_time: LightTime) -> OrientationConfig {
+    OrientationConfig {
+        intervals: 30,
+        light_time,
+        position_rmse_max_m: 1.0,
+        pointing_rmse_max_rad: 1e-3,
+    }
+}
 
 /// Days of half an hour: images and windows are all inside.
 static MISSION: LazyLock<tempfile::TempDir> = LazyLock::new(|| {
@@ -42,12 +46,13 @@ pub(crate) struct Image {
     pub(crate) set: KernelSet,
     pub(crate) kernels: KernelsConfig,
     pub(crate) pointing: PointingConfig,
+    pub(crate) light_time: LightTime,
     pub(crate) times: ImageTimes,
     pub(crate) orientation: Orientation,
 }
 
 impl Image {
-    fn new(set: KernelSet, id: &str, label: PathBuf) -> Self {
+    fn new(set: KernelSet, id: &str, label: PathBuf, light_time: LightTime) -> Self {
         let kernels = KernelsConfig {
             source: KernelSource::Listed(KernelList::Files(Vec::new())),
             ..KernelsConfig::default()
@@ -66,11 +71,13 @@ impl Image {
         };
         let times = tag_times(&[config], &session).unwrap().remove(0);
         let orientation =
-            sample_orientation(&session, &times, &kernels, &pointing, &SAMPLING).unwrap();
+            sample_orientation(&session, &times, &kernels, &pointing, &sampling(light_time))
+                .unwrap();
         Self {
             set,
             kernels,
             pointing,
+            light_time,
             times,
             orientation,
         }
@@ -78,13 +85,23 @@ impl Image {
 
     /// An image of the synthetic mission.
     pub(crate) fn of_scene(id: &str) -> Self {
+        Self::of_scene_with(id, LightTime::Surface)
+    }
+
+    /// The same by a convention for light time.
+    pub(crate) fn of_scene_with(id: &str, light_time: LightTime) -> Self {
         let mission = MISSION.path().join("mission");
         let set = KernelSet::from_metakernel(&mission.join("kernels/nav.tm")).unwrap();
-        Self::new(set, id, mission.join(format!("labels/{id}.lbl")))
+        Self::new(
+            set,
+            id,
+            mission.join(format!("labels/{id}.lbl")),
+            light_time,
+        )
     }
 
     /// Image M04/02852 on real kernels.
-    pub(crate) fn real(test: &str) -> Option<Self> {
+    pub(crate) fn real_with(test: &str, light_time: LightTime) -> Option<Self> {
         let folder = common::real_data("ale_mgs/m0402852", test)?;
         let files = common::m0402852_files(&folder);
         let set = KernelSet::from_files(&files).unwrap();
@@ -92,6 +109,7 @@ impl Image {
             set,
             "m04-02852",
             folder.join("m0402852_isis.lbl"),
+            light_time,
         ))
     }
 
@@ -102,13 +120,15 @@ impl Image {
             times,
             kernels,
             pointing,
+            light_time,
             ..
         } = self;
-        sample_orientation(&session, times, kernels, pointing, &SAMPLING).unwrap()
+        sample_orientation(&session, times, kernels, pointing, &sampling(*light_time)).unwrap()
     }
 }
 
-/// Position, metres, and rotation from the camera, both IAU 2000, as the kernels of `session` have them.
+/// Position, metres, and rotation from the camera, both IAU 2000, as the kernels of `session` and the image's
+/// convention for light time have them.
 pub(crate) fn kernel_camera(
     session: &Session,
     image: &Image,
@@ -118,10 +138,24 @@ pub(crate) fn kernel_camera(
     let lookup = image.pointing.ck_bias.lookup(et);
     let attitude = session.attitude(lookup, et, 0.0).unwrap();
     let to_camera = session.mounting(usual_instrument(), et).unwrap() * attitude.inertial_to_bus;
-    (
-        to_mars * session.state(et).unwrap().position.xyz_m,
-        to_mars * to_camera.matrix().transpose(),
-    )
+    let to_inertial = to_camera.matrix().transpose();
+    let geometric_m = session.state(et).unwrap().position.xyz_m;
+    match image.light_time {
+        LightTime::None => (to_mars * geometric_m, to_mars * to_inertial),
+        LightTime::Centre => {
+            let seen_m = session.apparent_state(et).unwrap().position.xyz_m;
+            (to_mars * seen_m, to_mars * to_inertial)
+        }
+        LightTime::Surface => {
+            let position = Position::<MarsIau2000>::new(to_mars * geometric_m);
+            let boresight = to_mars * to_inertial.column(2);
+            let ground = ray_meets_ellipsoid(&position, &boresight).unwrap();
+            let left = et.plus(-position.distance_m(&ground) / 299_792_458.0);
+            let to_mars = mars_matrix(&MARS_IAU2000, left);
+            let position_m = session.state(left).unwrap().position.xyz_m;
+            (to_mars * position_m, to_mars * to_inertial)
+        }
+    }
 }
 
 /// Largest distance of positions, metres, and largest angle between rotations, radians, over all samples.

@@ -62,3 +62,19 @@ pub(crate) fn output(command: &mut Command) -> String {
     );
     String::from_utf8(output.stdout).unwrap()
 }
+
+/// usgscsm's line scanner with the support data `isd` and a question, if `scripts/readers` found its sources.
+pub(crate) fn camera(isd: &Path, question: &str, test: &str) -> Option<Command> {
+    let program = folder().0.join("usgscsm/camera");
+    if !program.is_file() {
+        outside::skipped(
+            test,
+            "no usgscsm (its sources are beside the project or not at all)",
+        );
+        return None;
+    }
+    outside::found(test);
+    let mut command = Command::new(program);
+    command.arg(isd).arg(question);
+    Some(command)
+}

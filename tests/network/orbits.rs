@@ -216,6 +216,7 @@ fn shoot(
             point: network.points.len(),
             image,
             x_lines,
+            to_laser_m: Vector3::zeros(),
             range_m: distance_m + 7.0 * normals.next(),
             sigma_m: 10.0,
             profile: place,

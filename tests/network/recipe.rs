@@ -302,6 +302,7 @@ impl Recipe {
                 let x_lines = at_s / scene.line_period_s();
                 let distance_m = (orientations[image].pose(x_lines).position_m - point_m).norm();
                 network.ranges.push(Range {
+                    to_laser_m: Vector3::zeros(),
                     point: points_m.len(),
                     image,
                     x_lines,

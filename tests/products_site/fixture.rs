@@ -13,6 +13,7 @@ use areograph::{
     geom::{
         attitude::{OmegaPhiKappa, matrix_of_spice_quaternion},
         ellipsoid::Spherical,
+        light_time::LightTime,
         pushbroom::ExteriorOrientation,
         statistics::{Summary, Trend},
         window::WindowShape,
@@ -29,8 +30,8 @@ use areograph::{
         judge::{Evidence, JudgedImage, judge},
         register::{ImageRegistration, register},
         sample_orientation::{
-            BoresightGround, CameraTables, GroundPoint, InterpolationCheck, Orientation,
-            OrientationSample,
+            BoresightGround, CameraTables, GroundPoint, InterpolationCheck, LightTimeEffect,
+            Orientation, OrientationSample, OtherConvention,
         },
         tag_times::{ImageTimes, StartFrom},
     },
@@ -334,6 +335,7 @@ fn orientation(times: &ImageTimes) -> Orientation {
                 )),
                 camera_to_mars: Rotation::new(angles.camera_to_mars(), et),
                 angles,
+                to_spacecraft_m: Vector3::zeros(),
                 boresight: (k > 0).then(|| BoresightGround {
                     longitude_rad: 3.145 + 1e-4 * u,
                     latitude_rad: -0.1 + 0.005 * u,
@@ -374,6 +376,16 @@ fn orientation(times: &ImageTimes) -> Orientation {
                 epochs: 117,
             },
             et_s,
+        },
+        light_time: LightTimeEffect {
+            convention: LightTime::Surface,
+            light_time_s: 1.27e-3,
+            others: vec![OtherConvention {
+                convention: LightTime::None,
+                ground_m: 4.3,
+                lines: -0.4,
+                samples: 0.01,
+            }],
         },
         notes: Vec::new(),
         invalid_because: Vec::new(),

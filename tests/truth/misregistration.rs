@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use areograph::geom::{
     attitude::matrix_of_spice_quaternion,
-    pushbroom::{Pose, Projector, SampledOrientation},
+    pushbroom::{ExteriorOrientation as _, Pose, Projector, SampledOrientation},
 };
 use arrow::{
     array::{AsArray, RecordBatch},
@@ -22,7 +22,7 @@ use super::{
     table, vector,
 };
 
-/// A camera as it truly was, and how many lines its image has.
+/// A camera as it truly saw, and how many lines its image has: from where it was when the light left the ground.
 fn true_camera(truth: &Value) -> (SampledOrientation, f64) {
     let of = |name: &str| truth[name].as_array().unwrap();
     let at_lines: Vec<f64> = of("line").iter().map(|at| at.as_f64().unwrap()).collect();
@@ -39,7 +39,29 @@ fn true_camera(truth: &Value) -> (SampledOrientation, f64) {
     });
     let x_lines = at_lines.iter().map(|at| at - 0.5 * lines);
     let poses: Vec<(f64, Pose)> = x_lines.zip(poses).collect();
-    (SampledOrientation::new(&poses).unwrap(), lines)
+    let epochs_s: Vec<f64> = of("epochs_et_s")
+        .iter()
+        .map(|s| s.as_f64().unwrap())
+        .collect();
+    let lines_per_s = lines / (epochs_s[epochs_s.len() - 1] - epochs_s[0]);
+    let flown = SampledOrientation::new(&poses).unwrap();
+    let seen = poses
+        .iter()
+        .zip(of("light_time_s"))
+        .map(|((x, pose), late_s)| {
+            // Of Mars, which turns by 3 cm meanwhile, only the way of the camera counts.
+            let late_lines = late_s.as_f64().unwrap() * lines_per_s;
+            let position_m = flown.pose(x - late_lines).position_m;
+            (
+                *x,
+                Pose {
+                    position_m,
+                    ..*pose
+                },
+            )
+        });
+    let seen: Vec<(f64, Pose)> = seen.collect();
+    (SampledOrientation::new(&seen).unwrap(), lines)
 }
 
 /// True places of a site's footprints, metres, by row of its footprints.

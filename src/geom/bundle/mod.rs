@@ -175,6 +175,8 @@ pub struct Range {
     pub image: usize,
     /// The instant of the shot as a line, `(t_shot − t_mid)/τ`: not the line that the point falls in.
     pub x_lines: f64,
+    /// From where the image's rays start at that instant to the laser, Mars-fixed, metres: light time and aberration.
+    pub to_laser_m: Vector3<f64>,
     /// Measured distance, metres.
     pub range_m: f64,
     /// Its standard deviation, metres.

@@ -151,7 +151,8 @@ pub(super) fn of_range<M>(
     bias_m: f64,
     ground_m: &Vector3<f64>,
 ) -> Row {
-    let away_m = ground_m - base_m - correction.shift_m(range.x_lines);
+    let laser_m = base_m + range.to_laser_m + correction.shift_m(range.x_lines);
+    let away_m = ground_m - laser_m;
     let distance_m = away_m.norm();
     Row {
         misclosure: range.range_m - distance_m - bias_m,

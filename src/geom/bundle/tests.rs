@@ -85,6 +85,7 @@ pub(super) fn network() -> Network<EulerPolynomial> {
         }
         if mola {
             network.ranges.push(Range {
+                to_laser_m: Vector3::new(-0.2, 0.3, 4.1),
                 point,
                 image: usize::from(index % 2 == 1),
                 x_lines: x_lines + 20.0,

@@ -2,11 +2,15 @@
 
 use std::fmt::Write as _;
 
-use crate::products::{
-    coordinates::FRAME,
-    files::write_text,
-    gis::POINT_Z_HEIGHT,
-    product::{Content, Context, Declaration, IMAGE, Program, Role, Write},
+use crate::{
+    geom::light_time::LightTime,
+    products::{
+        coordinates::FRAME,
+        files::write_text,
+        gis::POINT_Z_HEIGHT,
+        light_time::convention,
+        product::{Content, Context, Declaration, IMAGE, Program, Role, Write},
+    },
 };
 
 pub(in crate::products) static README: Declaration = Declaration {
@@ -40,6 +44,9 @@ fn text(of: &Context) -> String {
          Frame: {FRAME}.\n\n",
         site.config.site
     );
+    if !site.images.is_empty() {
+        text += &light_time(site.config.orientation.light_time);
+    }
     if site.footprints.is_empty() {
         text += "The site has no footprints, so there are no tables of footprints here.\n\n";
     }
@@ -66,6 +73,24 @@ fn text(of: &Context) -> String {
         }
     }
     text
+}
+
+/// Which positions of cameras all files follow, and whom that suits.
+fn light_time(light_time: LightTime) -> String {
+    let others = match light_time {
+        LightTime::Surface | LightTime::None => {
+            "ISIS and ALE see MGS from the centre of Mars instead (LT+S), some 10 lines away: what they are given here, lidar\n\
+             data, ground control and adjusted kernels, fits them after a run with light_time = \"centre\"."
+        }
+        LightTime::Centre => {
+            "That is what ISIS and ALE do themselves; other programs see the ground some 10 lines away."
+        }
+    };
+    format!(
+        "Camera models, lines and samples, ground control, lidar data and adjusted kernels follow one convention,\n{}.\n\
+         {others}\n../registration.json has the difference of the others for each image.\n\n",
+        convention(light_time)
+    )
 }
 
 /// What was written and is not empty, each file of images once, and what will be: those declared after this text.
@@ -122,9 +147,8 @@ fn about(program: Program) -> String {
             .to_owned(),
         Program::AdjustedKernels => "\
             The adjusted site (../adjustment.json says what was adjusted and how well).\n\
-            ../images/<image>/adjusted_isd.json is the adjusted camera. Its positions are geometric, those of\n\
-            ../images/<image>/isd.json have light time and aberration as ISIS and ALE have them. Kernels to be loaded\n\
-            after the original ones, each pair for its image alone:"
+            ../images/<image>/adjusted_isd.json is the adjusted camera. Kernels to be loaded after the original ones,\n\
+            each pair for its image alone:"
             .to_owned(),
         Program::Catalogue => "STAC".to_owned(),
     }

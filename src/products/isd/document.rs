@@ -8,7 +8,10 @@ use serde::Serialize;
 use crate::{
     products::kernel_report::KernelsByType,
     schema::{DocumentSchema, at},
-    stages::{sample_orientation::InterpolationCheck, tag_times::StartFrom},
+    stages::{
+        sample_orientation::{InterpolationCheck, LightTimeEffect},
+        tag_times::StartFrom,
+    },
 };
 
 /// Schema of the document.
@@ -168,6 +171,8 @@ pub(super) struct Provenance<'a> {
     /// All kernels in load order.
     #[schemars(length(min = 1))]
     pub(super) kernels: Vec<KernelName<'a>>,
+    /// Which positions these are, and how far others would place the image, by the kernels' orientation.
+    pub(super) light_time: &'a LightTimeEffect,
     pub(super) line_period_s: f64,
     pub(super) lines_header: u32,
     pub(super) notes: Vec<String>,

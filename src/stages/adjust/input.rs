@@ -1,5 +1,7 @@
 //! What an adjustment takes: images with what is known of them beforehand, and laser shots.
 
+use nalgebra::Vector3;
+
 use crate::{
     config::{PositionUnknowns, RotationUnknowns},
     frames::{MarsIau2000, Position},
@@ -89,6 +91,8 @@ pub struct ShotRange {
     pub image: usize,
     /// Instant of the shot as a line from the middle of that image.
     pub x_lines: f64,
+    /// From where the image's rays start at that instant to the spacecraft: ranges are geometric, IAU 2000, metres.
+    pub to_laser_m: Vector3<f64>,
     /// Distance, metres.
     pub range_m: f64,
 }

@@ -231,6 +231,7 @@ impl<'a, M: ExteriorOrientation> Assembled<&'a M> {
                 point,
                 image: range.image,
                 x_lines: range.x_lines,
+                to_laser_m: range.to_laser_m,
                 range_m: range.range_m,
                 sigma_m: config.range_sigma_m,
                 profile,

@@ -125,12 +125,15 @@ pub fn prepare_adjustment<M: ExteriorOrientation>(
         });
         near.extend(seen.map(|index| points.row[index]));
     }
-    let times: Vec<&ImageTimes> = candidates.iter().map(|candidate| candidate.times).collect();
+    let images = candidates.iter();
+    let images: Vec<_> = images
+        .map(|image| (image.times, image.orientation))
+        .collect();
     let mut taken = BTreeSet::new();
     let mut shots = Vec::new();
     for (index, profile) in profiles.iter().enumerate() {
         for row in &profile.rows {
-            let range = range_of(footprints, *row, &times);
+            let range = range_of(footprints, *row, &images);
             if (range.is_some() || near.contains(row)) && taken.insert(*row) {
                 let at = *row as usize;
                 shots.push(LaserShot {
@@ -162,15 +165,18 @@ pub fn prepare_adjustment<M: ExteriorOrientation>(
 fn range_of(
     footprints: &Footprints<MarsIau2000>,
     row: u32,
-    images: &[&ImageTimes],
+    images: &[(&ImageTimes, &Orientation)],
 ) -> Option<ShotRange> {
     let instant = Et::from_seconds(footprints.et_s[row as usize]);
     let image = images
         .iter()
-        .position(|image| image.exposures().contains(instant))?;
+        .position(|(times, _)| times.exposures().contains(instant))?;
+    let (times, orientation) = images[image];
+    let x_lines = times.line_offset(instant);
     Some(ShotRange {
         image,
-        x_lines: images[image].line_offset(instant),
+        x_lines,
+        to_laser_m: orientation.to_spacecraft_m(x_lines),
         range_m: footprints.range_m[row as usize],
     })
 }

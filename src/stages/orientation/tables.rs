@@ -21,12 +21,12 @@ const CHECKED_AT: [f64; 3] = [0.25, 0.5, 0.75];
 
 /// Uniform tables from a little before to a little after the image, as camera models want them.
 ///
-/// Positions carry light time and stellar aberration (`LT+S`), as the tables of ISIS and ALE do.
+/// Positions follow the same convention as the samples, see [`super::LightTimeEffect`].
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct CameraTables {
     /// Epochs, ET seconds.
     pub et_s: Vec<f64>,
-    /// Mars to spacecraft, J2000, LT+S, metres.
+    /// Mars to the spacecraft, from where straight rays start, J2000, metres.
     pub position_m: Vec<Vector3<f64>>,
     /// Velocity, metres per second.
     pub velocity_m_s: Vec<Vector3<f64>>,
@@ -38,7 +38,7 @@ pub struct CameraTables {
     pub inertial_to_bus: Vec<Rotation<J2000, MgsBus>>,
     /// Angular velocity of the bus in J2000, radians per second.
     pub bus_angular_velocity_rad_s: Vec<Vector3<f64>>,
-    /// J2000 → IAU 2000.
+    /// J2000 → IAU 2000, for the ground that is seen.
     pub inertial_to_mars: Vec<Rotation<J2000, MarsIau2000>>,
     /// Angular velocity of Mars in J2000, radians per second.
     pub mars_angular_velocity_rad_s: Vec<Vector3<f64>>,

@@ -6,10 +6,8 @@ use super::Reader;
 use crate::{
     constants::MARS_IAU2000,
     error::Result,
-    frames::MarsIau2000,
-    geom::mars_rotation::mars_rotation,
     stages::{
-        orientation::{Camera, CameraTables, InterpolationCheck},
+        orientation::{CameraTables, InterpolationCheck, RayOrigin},
         tag_times::ImageTimes,
     },
     time::Et,
@@ -32,8 +30,7 @@ pub(super) fn camera_tables(
     let mut steps = first_steps(image);
     loop {
         let mut tables = tables(reader, &table_epochs(image, steps, padding_s))?;
-        tables.interpolation =
-            InterpolationCheck::of(image, &tables, |et| apparent_camera(reader, et))?;
+        tables.interpolation = InterpolationCheck::of(image, &tables, |et| reader.camera(et))?;
         if tables.interpolation.keeps_limit() || steps >= image.lines_header {
             return Ok(tables);
         }
@@ -88,12 +85,14 @@ fn tables(reader: &Reader, epochs: &[Et]) -> Result<CameraTables> {
         interpolation: InterpolationCheck::default(),
     };
     for epoch in epochs {
-        let apparent = session.apparent_state(*epoch)?;
         let attitude = reader.attitude(*epoch)?;
-        let to_mars = mars_rotation::<MarsIau2000>(*epoch);
+        let looks = tables.bus_to_camera.matrix() * attitude.inertial_to_bus.matrix();
+        let boresight = looks.row(2).transpose();
+        let RayOrigin { state, to_mars } =
+            RayOrigin::at(session, reader.light_time, *epoch, &boresight)?;
         tables.et_s.push(epoch.seconds());
-        tables.position_m.push(apparent.position.xyz_m);
-        tables.velocity_m_s.push(apparent.velocity_m_s);
+        tables.position_m.push(state.position.xyz_m);
+        tables.velocity_m_s.push(state.velocity_m_s);
         tables.inertial_to_bus.push(attitude.inertial_to_bus);
         tables
             .bus_angular_velocity_rad_s
@@ -110,14 +109,4 @@ fn tables(reader: &Reader, epochs: &[Et]) -> Result<CameraTables> {
 fn mars_angular_velocity(inertial_to_mars: &Matrix3<f64>) -> Vector3<f64> {
     let rate_rad_s = MARS_IAU2000.meridian_deg_per_day * RADIANS_PER_DEGREE / SECONDS_PER_DAY;
     inertial_to_mars.row(2).transpose() * rate_rad_s
-}
-
-/// What the kernels say of the camera, its position with light time and aberration as the tables have it.
-fn apparent_camera(reader: &Reader, et: Et) -> Result<Camera> {
-    let to_mars = mars_rotation::<MarsIau2000>(et);
-    let position = to_mars.apply(&reader.session.apparent_state(et)?.position);
-    Ok(Camera {
-        position,
-        to_mars: to_mars * reader.inertial_to_camera(et)?.inverse(),
-    })
 }

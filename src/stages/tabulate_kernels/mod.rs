@@ -24,7 +24,7 @@ use super::{orientation::Orientation, tag_times::ImageTimes};
 use crate::{
     config::{KernelsConfig, PointingConfig},
     error::{Cause, Kind, Result},
-    geom::pushbroom::SamplesError,
+    geom::{light_time::LightTime, pushbroom::SamplesError},
     spice::{KernelView, Session, State},
     stage::{InOrder, Output, Stage},
     stage_inputs,
@@ -32,9 +32,6 @@ use crate::{
 };
 pub use read_back::require_same;
 use tables::Source;
-
-/// Positions reach this far beyond attitudes, seconds: light from MGS to the centre of Mars takes 0.013 s.
-const LIGHT_TIME_S: f64 = 0.1;
 
 /// What an SPK and a CK hold of one image.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -78,6 +75,7 @@ stage_inputs! {
 
 impl Stage for TabulateKernels<'_> {
     const NAME: &'static str = "tabulate_kernels";
+    const METHOD: u32 = 2;
     type Output = KernelTables;
     stage_inputs!(fingerprint);
 
@@ -126,7 +124,8 @@ impl Cause for TabulateError {
 /// States and attitudes around one of `images`, whose adjusted orientation is `orientation`.
 ///
 /// Attitudes are those of samples and camera tables; positions those of the original kernels with the
-/// difference at the samples, interpolated, added. Around the image, where there are neither, the original
+/// difference at the samples, interpolated, added; they are geometric, so that a reader who follows the light-time
+/// convention of `orientation` finds its positions. Around the image, where there are neither, the original
 /// motion goes on with the difference at the end. Sampling an image with its kernels loaded gives its
 /// orientation back within 1 mm and 1e-9 rad.
 ///
@@ -147,7 +146,7 @@ pub fn tabulate_kernels(
         tolerance_s: kernels.ck_tolerance_s,
         bias: pointing.ck_bias,
         attitude_span: span(images, index, kernels.padding_s),
-        orbit_span: span(images, index, kernels.padding_s + LIGHT_TIME_S),
+        orbit_span: span(images, index, kernels.padding_s + LightTime::REACH_S),
     };
     source.tables()
 }

@@ -4,10 +4,12 @@ use super::TabulateError;
 use crate::{
     config::{KernelsConfig, PointingConfig},
     error::Result,
-    frames::MarsIau2000,
-    geom::{attitude::rotation_vector, mars_rotation::mars_rotation, statistics::largest},
+    geom::{attitude::rotation_vector, statistics::largest},
     spice::Session,
-    stages::{orientation::Orientation, tag_times::ImageTimes},
+    stages::{
+        orientation::{Orientation, RayOrigin},
+        tag_times::ImageTimes,
+    },
 };
 
 /// What may be lost on the way into a kernel and back, metres: 30 times the 3e-5 m that MGS flies in the
@@ -30,14 +32,15 @@ pub fn require_same(
 ) -> Result<()> {
     let (mut distances_m, mut turns_rad) = (Vec::new(), Vec::new());
     for sample in &orientation.samples {
-        let to_mars = mars_rotation::<MarsIau2000>(sample.et);
-        let position = to_mars.apply(&session.state(sample.et)?.position);
         let lookup = pointing.ck_bias.lookup(sample.et);
         let attitude = session.attitude(lookup, sample.et, kernels.ck_tolerance_s)?;
         let to_camera = session.mounting(&image.instrument, sample.et)? * attitude.inertial_to_bus;
-        let camera_to_mars = to_mars * to_camera.inverse();
+        let boresight = to_camera.matrix().row(2).transpose();
+        let convention = orientation.light_time.convention;
+        let origin = RayOrigin::at(session, convention, sample.et, &boresight)?;
+        let camera_to_mars = origin.to_mars * to_camera.inverse();
         let expected = sample.pose().mars_to_camera;
-        distances_m.push(position.distance_m(&sample.position));
+        distances_m.push(origin.position().distance_m(&sample.position));
         turns_rad.push(rotation_vector(&(camera_to_mars.matrix() * expected)).norm());
     }
     let distance_m = largest(distances_m).unwrap_or_default();

@@ -5,7 +5,7 @@ use nalgebra::{Matrix3, Vector3};
 use super::{KernelTables, TabulateError, earlier, later};
 use crate::{
     error::Result,
-    frames::{MarsIau2000, Position},
+    frames::{J2000, MarsIau2000, Position},
     geom::{
         attitude::continuous_quaternions,
         lagrange::lagrange,
@@ -58,27 +58,36 @@ impl Source<'_> {
             let lookup = self.bias.lookup(node.exposure);
             self.session.et_to_ticks(lookup.kernel_time())
         });
-        let epochs = self.epochs_of_states()?;
+        let flown = self.flown()?;
+        let epochs = self.epochs_of_states(&flown)?;
         Ok(KernelTables {
             ticks: ticks.collect::<Result<_>>()?,
             quaternions: continuous_quaternions(nodes.iter().map(|node| &node.to_bus)),
             rates_rad_s: nodes.iter().map(|node| node.rate_rad_s.into()).collect(),
-            states: self.states(&epochs)?,
+            states: self.states(&epochs, &flown)?,
             epochs,
         })
     }
 
-    /// What the adjustment adds to positions in IAU 2000, metres, over ET.
-    fn difference(&self) -> Result<SampledOrientation> {
+    /// When and where MGS was for each sample.
+    fn flown(&self) -> Result<Vec<(Et, Position<J2000>)>> {
+        let light_time = self.orientation.light_time.convention;
+        let samples = self.orientation.samples.iter();
+        let flown = samples.map(|sample| sample.flown(self.session, light_time));
+        flown.collect()
+    }
+
+    /// What the adjustment adds to geometric positions in IAU 2000, metres, over ET.
+    fn difference(&self, flown: &[(Et, Position<J2000>)]) -> Result<SampledOrientation> {
         let mut samples = Vec::new();
-        for sample in &self.orientation.samples {
-            let to_mars = mars_rotation::<MarsIau2000>(sample.et);
-            let original = to_mars.apply(&self.session.state(sample.et)?.position);
+        for (et, position) in flown {
+            let original = self.session.state(*et)?.position;
+            let to_mars = mars_rotation::<MarsIau2000>(*et);
             let pose = Pose {
-                position_m: sample.position.xyz_m - original.xyz_m,
+                position_m: to_mars.matrix() * (position.xyz_m - original.xyz_m),
                 mars_to_camera: Matrix3::identity(),
             };
-            samples.push((sample.et.seconds(), pose));
+            samples.push((et.seconds(), pose));
         }
         let difference = SampledOrientation::new(&samples);
         let refused = |source| TabulateError::Samples {
@@ -88,8 +97,8 @@ impl Source<'_> {
         Ok(difference.map_err(refused)?)
     }
 
-    fn states(&self, epochs: &[Et]) -> Result<Vec<State>> {
-        let difference = self.difference()?;
+    fn states(&self, epochs: &[Et], flown: &[(Et, Position<J2000>)]) -> Result<Vec<State>> {
+        let difference = self.difference(flown)?;
         let mut states = Vec::new();
         for et in epochs {
             let original = self.session.state(*et)?;
@@ -109,10 +118,9 @@ impl Source<'_> {
     }
 
     /// The epochs of the samples, between which the difference is one cubic, and steps around them.
-    fn epochs_of_states(&self) -> Result<Vec<Et>> {
+    fn epochs_of_states(&self, flown: &[(Et, Position<J2000>)]) -> Result<Vec<Et>> {
         let known = self.known_orbit()?;
-        let samples = self.orientation.samples.iter();
-        let mut epochs: Vec<Et> = samples.map(|sample| sample.et).collect();
+        let mut epochs: Vec<Et> = flown.iter().map(|(et, _)| *et).collect();
         if let (Some(first), Some(last)) = (epochs.first().copied(), epochs.last().copied()) {
             epochs.extend(steps_beyond(first, known.start, STATE_STEP_S));
             epochs.extend(steps_beyond(last, known.stop, STATE_STEP_S));
@@ -153,7 +161,10 @@ impl Source<'_> {
     /// Attitudes at the samples, and at the nodes of the camera tables between them.
     fn known_attitudes(&self) -> Vec<Node> {
         let Orientation {
-            samples, tables, ..
+            samples,
+            tables,
+            light_time,
+            ..
         } = self.orientation;
         let last = tables.et_s.len().saturating_sub(1);
         let bus_to_camera = tables.bus_to_camera.matrix();
@@ -161,12 +172,12 @@ impl Source<'_> {
         let step_s =
             (tables.et_s.last().copied().unwrap_or_default() - start_s) / last.max(1) as f64;
         let of_sample = |sample: &OrientationSample| {
-            let to_mars = *mars_rotation::<MarsIau2000>(sample.et).matrix();
+            let to_mars = sample.mars_seen(light_time.convention);
             let mars_to_camera = sample.pose().mars_to_camera;
             let at = (sample.et.seconds() - start_s) / step_s;
             Node {
                 exposure: sample.et,
-                to_bus: bus_to_camera.transpose() * mars_to_camera * to_mars,
+                to_bus: bus_to_camera.transpose() * mars_to_camera * to_mars.matrix(),
                 rate_rad_s: lagrange(&tables.bus_angular_velocity_rad_s, at),
             }
         };

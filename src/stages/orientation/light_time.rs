@@ -1,0 +1,159 @@
+//! The one place where light time enters: which position of the spacecraft and which rotation of Mars belong to an
+//! exposure, so that rays from there to the ground are straight.
+
+use nalgebra::Vector3;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::OrientationSample;
+use crate::{
+    error::Result,
+    frames::{J2000, MarsIau2000, Position, Rotation},
+    geom::{
+        ellipsoid::range_to_ellipsoid_m,
+        light_time::{LightTime, light_time_s, without_aberration_m},
+        mars_rotation::mars_rotation,
+    },
+    spice::{Session, State},
+    time::Et,
+};
+
+/// Steps of the search for the instant at which a position was left; each leaves 1e-5 of what the one before left.
+const STEPS: u32 = 3;
+
+/// Where the rays of an exposure start.
+#[derive(Debug, Clone, Copy)]
+pub(in crate::stages) struct RayOrigin {
+    /// MGS relative to the centre of Mars.
+    pub(in crate::stages) state: State,
+    /// Mars as it stands for the ground that is seen; stamped with the exposure's instant.
+    pub(in crate::stages) to_mars: Rotation<J2000, MarsIau2000>,
+}
+
+impl RayOrigin {
+    /// The origin at `exposure` of a camera that looks along `boresight`, J2000.
+    ///
+    /// # Errors
+    /// Kernels that do not reach there.
+    /// # Accuracy
+    /// For [`LightTime::Surface`] the light time is that to the ellipsoid along the boresight: ground one kilometre
+    /// above it is seen 0.011 m (`v/c`) away along the track, and the limb at the edge of a wide-angle image, four times
+    /// as far as nadir, 14 m, less than a tenth of its pixels.
+    pub(in crate::stages) fn at(
+        session: &Session,
+        light_time: LightTime,
+        exposure: Et,
+        boresight: &Vector3<f64>,
+    ) -> Result<Self> {
+        let to_mars = mars_rotation::<MarsIau2000>(exposure);
+        match light_time {
+            LightTime::None => Ok(Self {
+                state: session.state(exposure)?,
+                to_mars,
+            }),
+            LightTime::Centre => Ok(Self {
+                state: session.apparent_state(exposure)?,
+                to_mars,
+            }),
+            LightTime::Surface => {
+                let position = to_mars.apply(&session.state(exposure)?.position);
+                let left = left(exposure, &position, &(to_mars.matrix() * boresight));
+                Ok(Self {
+                    state: session.state(left)?,
+                    to_mars: mars_at(left, exposure),
+                })
+            }
+        }
+    }
+
+    /// The position, IAU 2000.
+    pub(in crate::stages) fn position(&self) -> Position<MarsIau2000> {
+        self.to_mars.apply(&self.state.position)
+    }
+}
+
+impl OrientationSample {
+    /// When and where the spacecraft was, geometrically, if this is its position: the inverse of [`RayOrigin::at`].
+    ///
+    /// # Errors
+    /// Kernels that do not reach there.
+    /// # Accuracy
+    /// [`LightTime::Centre`] takes the velocity of the kernels: one that is 10 m/s off leaves 0.01 mm.
+    pub(in crate::stages) fn flown(
+        &self,
+        session: &Session,
+        light_time: LightTime,
+    ) -> Result<(Et, Position<J2000>)> {
+        let seen = self.mars_seen(light_time).inverse().apply(&self.position);
+        match light_time {
+            LightTime::None => Ok((self.et, seen)),
+            LightTime::Surface => Ok((left(self.et, &self.position, &self.boresight()), seen)),
+            LightTime::Centre => {
+                let mars = session.mars_state(self.et)?;
+                let told_m = without_aberration_m(&seen.xyz_m, &mars.velocity_m_s);
+                let velocity_m_s = session.state(self.et)?.velocity_m_s;
+                // CSPICE's `LT` takes the light time of where the target is at the exposure.
+                let (mut earlier_s, mut flown_m) = (light_time_s(told_m.norm()), told_m);
+                for _ in 0..STEPS {
+                    let then = session.mars_state(self.et.plus(-earlier_s))?;
+                    flown_m = told_m + mars.position.xyz_m - then.position.xyz_m;
+                    earlier_s = light_time_s((flown_m + velocity_m_s * earlier_s).norm());
+                }
+                Ok((self.et.plus(-earlier_s), Position::new(flown_m)))
+            }
+        }
+    }
+
+    /// Mars as it stands for the ground that is seen, stamped with the exposure's instant.
+    pub(in crate::stages) fn mars_seen(
+        &self,
+        light_time: LightTime,
+    ) -> Rotation<J2000, MarsIau2000> {
+        match light_time {
+            LightTime::None | LightTime::Centre => mars_rotation(self.et),
+            LightTime::Surface => {
+                mars_at(left(self.et, &self.position, &self.boresight()), self.et)
+            }
+        }
+    }
+
+    fn boresight(&self) -> Vector3<f64> {
+        self.camera_to_mars.matrix() * Vector3::z()
+    }
+}
+
+/// When the light that `exposure` sees left the ground.
+fn left(exposure: Et, origin: &Position<MarsIau2000>, boresight: &Vector3<f64>) -> Et {
+    exposure.plus(-light_time_s(range_to_ellipsoid_m(origin, boresight)))
+}
+
+/// Mars at the instant `left`, stamped with that of the exposure.
+fn mars_at(left: Et, exposure: Et) -> Rotation<J2000, MarsIau2000> {
+    Rotation::new(*mars_rotation::<MarsIau2000>(left).matrix(), exposure)
+}
+
+/// What the convention of a run means for an image.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct LightTimeEffect {
+    /// That of all positions of the camera.
+    pub convention: LightTime,
+    /// Light time from the ground along the boresight in the middle of the image, seconds.
+    #[schemars(range(min = 0.0))]
+    pub light_time_s: f64,
+    /// The other conventions; none where the boresight misses the ground.
+    pub others: Vec<OtherConvention>,
+}
+
+/// What another convention would make of an image, in the middle of it.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct OtherConvention {
+    /// The other one.
+    pub convention: LightTime,
+    /// How far away on the ellipsoid the boresight would meet the ground, metres.
+    #[schemars(range(min = 0.0))]
+    pub ground_m: f64,
+    /// By how many lines later the same ground would be found.
+    pub lines: f64,
+    /// And at how many samples more.
+    pub samples: f64,
+}
