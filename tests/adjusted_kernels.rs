@@ -256,8 +256,8 @@ fn the_metakernel_counts_paths_from_where_the_files_go_in_the_end() {
 fn another_bias_is_kept_and_the_comment_warns_of_isis() {
     let mut image = Image::of_scene("E02-02016");
     image.pointing = PointingConfig {
-        ck_bias: PointingBias::from_seconds(-1.0),
-        source: String::new(),
+        ck_bias: Some(PointingBias::from_seconds(-1.0)),
+        source: None,
     };
     let original = image.sampled_with(&image.set);
     let adjusted = reorient(&original, &image.times, 0.0, curved).unwrap();

@@ -16,7 +16,7 @@ use areograph::{
     geom::ellipsoid::{Spherical, spherical_to_xyz_m},
     image::ImageFields,
     products::{
-        ControlMeasure, ControlPoint, GroundEstimate, ImageMeasure, LidarPoint, moc_serial_number,
+        ControlMeasure, ControlPoint, GroundEstimate, ImageMeasure, LidarPoint, isis_serial_number,
         write_gcp, write_lidar_data,
     },
     spice::{KernelSet, Session},
@@ -247,11 +247,11 @@ fn serial_numbers_are_those_of_a_real_network() {
         fields: ImageFields::default(),
     };
     let mut times = tag_times(&[image], &session).unwrap().remove(0);
-    let serial = moc_serial_number(&times).unwrap();
+    let serial = isis_serial_number(&times).unwrap();
     let network = fs::read_to_string(network).unwrap();
     assert!(network.contains(&format!(",{serial},")), "{serial}");
     times.sclk_start = None;
-    assert_eq!(moc_serial_number(&times), None);
+    assert_eq!(isis_serial_number(&times), None);
 }
 
 #[test]

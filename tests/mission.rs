@@ -284,7 +284,7 @@ fn scans_of_profiles_from_pole_to_pole_keep_within_their_uncertainty() {
 
 fn orientations(name: &str, bias: PointingBias) -> Vec<Orientation> {
     let mut config = site(name);
-    config.pointing.ck_bias = bias;
+    config.pointing.ck_bias = Some(bias);
     let session = session("gsfc");
     let images = tag_times(&config.images, &session).unwrap();
     images

@@ -53,8 +53,8 @@ fn m0402852(test: &str) -> Option<(ImageTimes, Orientation, Value)> {
         ..KernelsConfig::default()
     };
     let pointing = PointingConfig {
-        ck_bias: usual_instrument().pointing_bias(),
-        source: String::new(),
+        ck_bias: Some(usual_instrument().pointing_bias()),
+        source: None,
     };
     let orientation = sample_orientation(&session, &times, &kernels, &pointing, &SAMPLING).unwrap();
     Some((times, orientation, truth["eo_m0402852"].clone()))

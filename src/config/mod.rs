@@ -35,14 +35,15 @@ pub use adjustment::{AdjustmentConfig, OrientationPrior};
 pub use declare::{Accept, DeclaredKey, ValueKind, Word};
 pub use images::ImageConfig;
 pub use instruments::{
-    altimeter, built_in_altimeter, built_in_instruments, instrument, usual_instrument,
+    altimeter, built_in_altimeters, built_in_instruments, instrument, usual_altimeter,
+    usual_instrument,
 };
 pub use kernels::KernelsConfig;
 pub use limits::LimitsConfig;
 pub use mola_surface::MolaSurfaceConfig;
 pub use orientation::{OrientationConfig, RegistrationConfig};
 pub use pedr::PedrConfig;
-pub use pointing::PointingConfig;
+pub use pointing::{PointingConfig, UsedBias};
 pub use problems::Problems;
 pub use range_check::{RangeCheckConfig, SCAN_STEPS_MAX};
 pub use site::SiteConfig;

@@ -6,6 +6,7 @@ use super::outputs::Site;
 use crate::{
     config::SiteConfig,
     error::Result,
+    instruments::Instrument,
     stages::{
         judge::{AdjustmentEvidence, Evidence, JudgedImage, Verdict, judge},
         site_image::SiteImage,
@@ -62,8 +63,8 @@ pub(super) fn warnings(config: &SiteConfig, site: &Site) -> Result<Vec<String>> 
     let described = site.described.value()?;
     let mut warnings: Vec<String> = described.pck_note.iter().cloned().collect();
     warnings.extend(described.rates_note.iter().cloned());
-    if !site.images.is_empty() {
-        warnings.extend(config.pointing.departure());
+    for camera in cameras(&site.images)? {
+        warnings.extend(config.pointing.departure(camera));
     }
     for image in &site.images {
         let times = image.times.value()?;
@@ -76,6 +77,18 @@ pub(super) fn warnings(config: &SiteConfig, site: &Site) -> Result<Vec<String>> 
         warnings.extend(remarks.map(|remark| format!("tie points: {remark}")));
     }
     Ok(warnings)
+}
+
+/// The cameras of the images, each once.
+pub(super) fn cameras(images: &[SiteImage]) -> Result<Vec<&Instrument>> {
+    let mut cameras: Vec<&Instrument> = Vec::new();
+    for image in images {
+        let camera = &image.times.value()?.instrument;
+        if !cameras.contains(&camera) {
+            cameras.push(camera);
+        }
+    }
+    Ok(cameras)
 }
 
 /// Images that one camera took at one time with the same pixels: one label may stand for another.

@@ -4,3 +4,5 @@ pub mod label;
 pub mod moc;
 pub mod pedr;
 pub mod ties;
+
+pub use moc::{ImageLabel, product_named, read_label};

@@ -31,7 +31,7 @@ use super::{
     site::{ImageProducts, SiteProducts},
 };
 use crate::{
-    constants::{MARS_IAU2000, NAIF_IAU_MARS, NAIF_MARS},
+    constants::{MARS_IAU2000, NAIF_IAU_MARS, NAIF_MARS, SPACECRAFT},
     error::Result,
     frames::{self, Frame, J2000},
     geom::{attitude::continuous_quaternions, pushbroom::Distortion},
@@ -112,7 +112,7 @@ fn isd<'a>(site: &SiteProducts<'a>, image: &ImageProducts<'a>) -> Isd<'a> {
         image_identifier: &times.id,
         image_lines: times.lines_delivered,
         image_samples: times.samples,
-        name_platform: "MARS GLOBAL SURVEYOR",
+        name_platform: &SPACECRAFT.label_name,
         name_sensor: &naif.frame,
         reference_height: ReferenceHeight {
             maxheight: REFERENCE_HEIGHT_M,
@@ -255,12 +255,13 @@ fn naif_keywords(site: &SiteProducts, instrument: &Instrument) -> BTreeMap<Strin
         ("BODY499_POLE_DEC", Keyword::Numbers(dec)),
         ("BODY499_PM", Keyword::Numbers(meridian)),
     ];
-    let (optics, pointing) = (&instrument.optics, &site.config.pointing);
+    let optics = &instrument.optics;
+    let bias = site.config.pointing.bias_of(instrument);
     let of_camera = [
         ("FOCAL_LENGTH", Keyword::Number(optics.focal_length_mm)),
         ("PIXEL_PITCH", Keyword::Number(optics.pixel_pitch_mm)),
         ("PIXEL_SAMPLES", Keyword::Pixels(instrument.detector.pixels)),
-        ("CK_TIME_BIAS", Keyword::Number(pointing.ck_bias.seconds())),
+        ("CK_TIME_BIAS", Keyword::Number(bias.seconds())),
         ("SPK_TIME_BIAS", Keyword::Number(0.0)),
     ];
     let id = instrument.naif.instrument;

@@ -39,7 +39,7 @@ pub use adjusted_kernels::{
     AdjustedImage, AdjustedKernels, attitude_kernel, position_kernel, write_adjusted_kernels,
 };
 pub use exchange::{
-    ControlMeasure, ControlPoint, GroundEstimate, ImageMeasure, LidarPoint, moc_serial_number,
+    ControlMeasure, ControlPoint, GroundEstimate, ImageMeasure, LidarPoint, isis_serial_number,
     write_gcp, write_lidar_data,
 };
 pub use generated::{documentation, schemas};

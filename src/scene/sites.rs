@@ -10,7 +10,7 @@ use super::{
     truth::TiesTruth,
 };
 use crate::{
-    config::{built_in_altimeter, usual_instrument},
+    config::{usual_altimeter, usual_instrument},
     error::Result,
     spice::Session,
 };
@@ -88,7 +88,7 @@ impl SiteFile<'_> {
             quoted(&self.metakernel),
             usual_instrument().pointing.ck_bias_s,
             quoted(INJECTED),
-            built_in_altimeter().clock_bias_s,
+            usual_altimeter().clock_bias_s,
             quoted(INJECTED),
             files.join(", "),
         );

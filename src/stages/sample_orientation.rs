@@ -14,7 +14,7 @@ use crate::{
     spice::{Attitude, KernelView, Session},
     stage::{Output, Stage},
     stage_inputs,
-    time::Et,
+    time::{Et, PointingBias},
 };
 
 pub use super::orientation::{
@@ -36,7 +36,7 @@ stage_inputs! {
         pub kernels: &'a KernelView,
         /// Tolerance and padding.
         pub coverage: &'a KernelsConfig,
-        /// Pointing bias.
+        /// A pointing bias that is not that of the camera.
         pub pointing: &'a PointingConfig,
         /// Number of samples.
         pub orientation: &'a OrientationConfig,
@@ -117,7 +117,7 @@ pub fn sample_orientation(
     let reader = Reader {
         session,
         instrument: &image.instrument,
-        pointing,
+        bias: pointing.bias_of(&image.instrument),
         tolerance_s: kernels.ck_tolerance_s,
     };
     let epochs = epochs(image, sampling.intervals);
@@ -157,7 +157,7 @@ fn require_orientation(
     let reader = Reader {
         session,
         instrument: &image.instrument,
-        pointing,
+        bias: pointing.bias_of(&image.instrument),
         tolerance_s: kernels.ck_tolerance_s,
     };
     let mut intervals = sampling.intervals;
@@ -226,19 +226,20 @@ fn require_coverage(
     let exposures = image.exposures();
     session.require_position(exposures.padded(kernels.padding_s))?;
     let (padding_s, tolerance_s) = (kernels.padding_s, kernels.ck_tolerance_s);
-    session.require_attitude(exposures, pointing.ck_bias, padding_s, tolerance_s)
+    let bias = pointing.bias_of(&image.instrument);
+    session.require_attitude(exposures, bias, padding_s, tolerance_s)
 }
 
 struct Reader<'a> {
     session: &'a Session,
     instrument: &'a Instrument,
-    pointing: &'a PointingConfig,
+    bias: PointingBias,
     tolerance_s: f64,
 }
 
 impl Reader<'_> {
     fn attitude(&self, exposure: Et) -> Result<Attitude> {
-        let lookup = self.pointing.ck_bias.lookup(exposure);
+        let lookup = self.bias.lookup(exposure);
         self.session.attitude(lookup, exposure, self.tolerance_s)
     }
 

@@ -20,7 +20,7 @@ use crate::{
     geom::pushbroom::Detector,
     image::{IMAGE_DURATION_END_S, IMAGE_LINES_MIN, ImageFields, line_period_agrees},
     instruments::Instrument,
-    pds::moc::{self, MocLabel},
+    pds::{ImageLabel, read_label},
     spice::{KernelView, Session},
     stage::Stage,
     stage_inputs,
@@ -282,7 +282,7 @@ fn lines_delivered(
 
 /// The camera that the configuration names, else that of the label, else the first one that is known; and what
 /// the label says.
-fn labelled(image: &ImageConfig) -> Result<(Instrument, Option<MocLabel>)> {
+fn labelled(image: &ImageConfig) -> Result<(Instrument, Option<ImageLabel>)> {
     let Some(path) = &image.label else {
         let named = image.instrument.as_ref();
         let camera = named.unwrap_or_else(|| usual_instrument());
@@ -292,7 +292,7 @@ fn labelled(image: &ImageConfig) -> Result<(Instrument, Option<MocLabel>)> {
         Some(named) => std::slice::from_ref(named),
         None => built_in_instruments(),
     };
-    let label = moc::read_label(path, cameras)?;
+    let label = read_label(path, cameras)?;
     of_one_product(image, label.product_id.as_deref())?;
     Ok((label.instrument.clone(), Some(label)))
 }
@@ -378,7 +378,7 @@ fn start_time(
     };
     let Some(sclk) = fields.sclk_start.as_deref() else {
         if from_utc.is_some() {
-            notes.push("start from UTC, which MOC labels cut to 10 ms; no clock string".to_owned());
+            notes.push("start from UTC, which labels cut to 10 ms; no clock string".to_owned());
         }
         return Ok(from_utc.map(|(_, start)| (start, StartFrom::Utc)));
     };

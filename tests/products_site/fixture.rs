@@ -231,8 +231,8 @@ fn config() -> SiteConfig {
             ..KernelsConfig::default()
         },
         pointing: PointingConfig {
-            ck_bias: usual_instrument().pointing_bias(),
-            source: "mocAddendum004.ti".to_owned(),
+            ck_bias: Some(usual_instrument().pointing_bias()),
+            source: Some("mocAddendum004.ti".to_owned()),
         },
         mola_clock: MolaClock {
             bias_s: 0.117,

@@ -6,6 +6,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::{
+    constants::SPACECRAFT,
     products::kernel_report::KernelsByType,
     schema::{DocumentSchema, at},
     stages::{sample_orientation::InterpolationCheck, tag_times::StartFrom},
@@ -18,7 +19,7 @@ pub(super) fn schema() -> DocumentSchema {
 
 #[derive(Serialize, JsonSchema)]
 #[schemars(
-    title = "Image support data of a MOC image",
+    title = "Image support data of an image",
     description = "images/<id>/isd.json and adjusted_isd.json of areograph: the keys that usgscsm's line scanner model \
                    reads, kilometres and seconds, J2000; quaternions (w, x, y, z)."
 )]
@@ -31,8 +32,8 @@ pub(super) struct Isd<'a> {
     pub(super) image_lines: u32,
     #[schemars(range(min = 1))]
     pub(super) image_samples: u32,
-    #[schemars(extend("const" = "MARS GLOBAL SURVEYOR"))]
-    pub(super) name_platform: &'static str,
+    #[schemars(extend("const" = SPACECRAFT.label_name))]
+    pub(super) name_platform: &'a str,
     /// The camera's frame.
     pub(super) name_sensor: &'a str,
     pub(super) reference_height: ReferenceHeight,

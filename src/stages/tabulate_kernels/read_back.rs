@@ -32,7 +32,7 @@ pub fn require_same(
     for sample in &orientation.samples {
         let to_mars = mars_rotation::<MarsIau2000>(sample.et);
         let position = to_mars.apply(&session.state(sample.et)?.position);
-        let lookup = pointing.ck_bias.lookup(sample.et);
+        let lookup = pointing.bias_of(&image.instrument).lookup(sample.et);
         let attitude = session.attitude(lookup, sample.et, kernels.ck_tolerance_s)?;
         let to_camera = session.mounting(&image.instrument, sample.et)? * attitude.inertial_to_bus;
         let camera_to_mars = to_mars * to_camera.inverse();
