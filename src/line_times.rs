@@ -74,8 +74,10 @@ pub enum LineTimesError {
         first_line: u32,
     },
     /// A piece has no lines.
-    #[error("piece {piece} of the line times begins with line {first_line} and ends before line {next}; expected one line \
-             or more")]
+    #[error(
+        "piece {piece} of the line times begins with line {first_line} and ends before line {next}; expected one line \
+             or more"
+    )]
     NoLines {
         /// The piece, counted from 1.
         piece: usize,
@@ -85,7 +87,9 @@ pub enum LineTimesError {
         next: u32,
     },
     /// A period that is none.
-    #[error("piece {piece} of the line times has a line period of {period_s} s; expected a number above 0")]
+    #[error(
+        "piece {piece} of the line times has a line period of {period_s} s; expected a number above 0"
+    )]
     Period {
         /// The piece, counted from 1.
         piece: usize,
@@ -93,8 +97,10 @@ pub enum LineTimesError {
         period_s: f64,
     },
     /// A piece begins before the one before it has ended, or at no instant at all.
-    #[error("piece {piece} of the line times begins {overlap_s} s before the last line of the one before it ends; expected \
-             pieces one after the other")]
+    #[error(
+        "piece {piece} of the line times begins {overlap_s} s before the last line of the one before it ends; expected \
+             pieces one after the other"
+    )]
     Overlap {
         /// The piece, counted from 1.
         piece: usize,
@@ -251,6 +257,7 @@ impl LineTimes {
     }
 
     /// The pieces, in order.
+    #[must_use]
     pub fn pieces(&self) -> impl ExactSizeIterator<Item = LinePiece> + '_ {
         self.pieces.iter().map(|piece| LinePiece {
             first_line: piece.first_line,
@@ -272,7 +279,10 @@ impl LineTimes {
     #[must_use]
     pub fn line_at(&self, after_s: f64) -> f64 {
         let piece = self.piece(|piece| piece.after_s <= after_s);
-        self.held(piece, piece.first() + (after_s - piece.after_s) / piece.period_s)
+        self.held(
+            piece,
+            piece.first() + (after_s - piece.after_s) / piece.period_s,
+        )
     }
 
     /// The instant of a line coordinate, rounded as ET is.
@@ -285,14 +295,6 @@ impl LineTimes {
     #[must_use]
     pub fn line(&self, instant: Et) -> f64 {
         self.line_at(instant.since(self.start))
-    }
-
-    /// Whether some line is exposed at an instant: none is before, after and in gaps.
-    #[must_use]
-    pub fn exposes(&self, instant: Et) -> bool {
-        let after_s = instant.since(self.start);
-        let piece = self.piece(|piece| piece.after_s <= after_s);
-        (piece.after_s..=piece.end_s()).contains(&after_s)
     }
 
     /// Time in the unit of the sensor models: mean line periods from the middle of the exposure.
@@ -319,12 +321,21 @@ impl LineTimes {
         self.held(piece, piece.first() + after)
     }
 
-    /// Whether some line is exposed at a time in the unit of the sensor models.
+    /// Whether a time in the unit of the sensor models lies between two pieces, where no line is exposed.
     #[must_use]
-    pub fn exposes_offset(&self, offset: f64) -> bool {
+    pub fn in_gap(&self, offset: f64) -> bool {
+        let after_s = (offset + 0.5 * f64::from(self.lines)) * self.mean_period_s;
+        let ends = self.pieces.iter().map(Piece::end_s);
+        let begins = self.pieces.iter().skip(1).map(|piece| piece.after_s);
+        ends.zip(begins)
+            .any(|(end_s, begin_s)| end_s < after_s && after_s < begin_s)
+    }
+
+    /// How much of that unit the line passes that is exposed at `offset`: its period over the mean.
+    #[must_use]
+    pub fn offsets_per_line(&self, offset: f64) -> f64 {
         let piece = self.piece(|piece| self.first_offset(piece) <= offset);
-        let end = self.first_offset(piece) + f64::from(piece.lines) * (piece.period_s / self.mean_period_s);
-        (self.first_offset(piece)..=end).contains(&offset)
+        piece.period_s / self.mean_period_s
     }
 
     fn first_offset(&self, piece: &Piece) -> f64 {

@@ -34,6 +34,7 @@ const FLOORS: [&[&str]; 6] = [
         "image",
         "instruments",
         "kernel_source",
+        "line_times",
     ],
     &["geom", "config"],
     &["spice", "pds", "scene"],

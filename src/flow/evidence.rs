@@ -98,8 +98,12 @@ fn same_exposures(images: &[SiteImage]) -> Result<Vec<String>> {
         let times = image.times.value()?;
         for earlier in &images[..index] {
             let other = earlier.times.value()?;
-            let apart_s = times.start.since(other.start).abs();
-            if apart_s < times.line_period_s && times.detector() == other.detector() {
+            let apart_s = times
+                .line_times
+                .start()
+                .since(other.line_times.start())
+                .abs();
+            if apart_s < times.line_times.mean_period_s() && times.detector() == other.detector() {
                 same.push(format!(
                     "images {} and {} were exposed at the same time by the same pixels: one label may stand for another",
                     other.id, times.id

@@ -20,6 +20,7 @@ use crate::{
         oriented_camera::OrientedCamera,
         pushbroom::{Detector, ExteriorOrientation, Pose, Projector, SampledOrientation},
     },
+    line_times::LineTimes,
     pds::ties::ties_table,
     ties::{TieMeasure, TiePoint},
     time::Et,
@@ -73,7 +74,11 @@ impl<'a> TrueImage<'a> {
                 id: image.id.to_owned(),
                 orientation,
                 detector,
-                lines: f64::from(image.lines_header),
+                line_times: LineTimes::even(
+                    flown.arc.exposed.start,
+                    image.lines_header,
+                    image.line_period_s(),
+                )?,
             },
         })
     }
@@ -81,7 +86,7 @@ impl<'a> TrueImage<'a> {
     fn projector(&self) -> Result<Projector<'_, SampledOrientation>> {
         let projector = Projector::new(
             &self.oriented_camera.orientation,
-            self.oriented_camera.lines,
+            self.oriented_camera.lines(),
         );
         Ok(projector.map_err(|error| no_camera(self.flown, &error))?)
     }
@@ -125,7 +130,7 @@ impl<'a> TrueImage<'a> {
             .y;
         let measure = TieMeasure {
             image: self.oriented_camera.id.clone(),
-            line: seen.x + 0.5 * self.oriented_camera.lines,
+            line: seen.x + 0.5 * self.oriented_camera.lines(),
             sample: self.oriented_camera.detector.sample(y_px),
         };
         let [line_end, sample_end] = self.extent_px();
@@ -137,7 +142,7 @@ impl<'a> TrueImage<'a> {
     /// How many focal-plane pixels a line is in the middle of the image.
     fn focal_px_per_line(&self, terrain: &Terrain) -> Result<f64> {
         let camera = &self.oriented_camera;
-        let [line, sample] = [camera.lines, camera.detector.samples].map(|length| 0.5 * length);
+        let [line, sample] = [camera.lines(), camera.detector.samples].map(|length| 0.5 * length);
         let et_s = exposed(self.flown, line).seconds();
         let ground_m = self.ground_m(terrain, line, sample);
         let ground_m = ground_m.ok_or(SceneError::BeamMisses { et_s })?;
@@ -146,7 +151,7 @@ impl<'a> TrueImage<'a> {
 
     fn truth(&self, terrain: &Terrain) -> Result<TieCameraTruth> {
         let errors = &self.flown.errors;
-        let lines = self.oriented_camera.lines;
+        let lines = self.oriented_camera.lines();
         let step = lines / f64::from(TOLD_POSES - 1);
         let told: Vec<f64> = (0..TOLD_POSES).map(|row| step * f64::from(row)).collect();
         let times = told.iter().map(|line| exposed(self.flown, *line));
@@ -366,8 +371,8 @@ mod tests {
             let flown = flown(image, &errors, 1);
             let camera = TrueImage::new(&flown).unwrap();
             for share in [0.123, 0.345, 0.567, 0.789] {
-                let line = share * camera.oriented_camera.lines;
-                let x_lines = line - 0.5 * camera.oriented_camera.lines;
+                let line = share * camera.oriented_camera.lines();
+                let x_lines = line - 0.5 * camera.oriented_camera.lines();
                 let pose = camera.oriented_camera.orientation.pose(x_lines);
                 let true_pose = super::pose(&flown, exposed(&flown, line));
                 let off_m = (pose.position_m - true_pose.position_m).norm();

@@ -90,7 +90,7 @@ fn finding(times: &ImageTimes, invalid_because: &[String]) -> String {
     format!(
         "image {}: {} lines from {} UTC, first line centre {}, position and attitude covered{}",
         times.id,
-        times.lines_header,
+        times.line_times.lines(),
         times.utc_start,
         times.line_centre(0),
         invalid.collect::<String>()
@@ -174,7 +174,7 @@ fn require_orientation(
 /// Equally spaced epochs over the whole header image, both ends included.
 fn epochs(image: &ImageTimes, intervals: u32) -> Vec<Et> {
     let step_s = image.duration_s() / f64::from(intervals);
-    let epochs = (0..=intervals).map(|k| image.start.plus(f64::from(k) * step_s));
+    let epochs = (0..=intervals).map(|k| image.line_times.start().plus(f64::from(k) * step_s));
     epochs.collect()
 }
 

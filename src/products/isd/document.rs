@@ -41,8 +41,10 @@ pub(super) struct Isd<'a> {
     pub(super) name_model: &'static str,
     #[schemars(extend("const" = "lagrange"))]
     pub(super) interpolation_method: &'static str,
-    /// First line (0.5), its start relative to `center_ephemeris_time`, seconds per image line.
-    pub(super) line_scan_rate: [[f64; 3]; 1],
+    /// For every piece of the image: line coordinate from which it holds, time relative to `center_ephemeris_time`,
+    /// seconds per image line; a coordinate has the time of its row plus seconds per line × (coordinate − line + 0.5).
+    #[schemars(length(min = 1))]
+    pub(super) line_scan_rate: Vec<[f64; 3]>,
     pub(super) starting_ephemeris_time: f64,
     pub(super) center_ephemeris_time: f64,
     pub(super) radii: Radii,

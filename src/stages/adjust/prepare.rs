@@ -57,7 +57,7 @@ impl<M: ExteriorOrientation> Candidate<'_, M> {
         }
         AdjustImage {
             oriented_camera: self.oriented_camera,
-            line_period_s: self.times.line_period_s,
+            line_period_s: self.times.line_times.mean_period_s(),
             sigmas,
             time_bias_sigma_s: config.time_bias_sigma_s,
         }
