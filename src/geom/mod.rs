@@ -13,6 +13,7 @@ pub mod misregistration;
 pub mod normal_equations;
 pub mod orbit_axes;
 pub mod oriented_camera;
+pub mod plane;
 pub mod polynomial;
 pub mod pushbroom;
 pub mod robust;

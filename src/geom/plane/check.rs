@@ -1,0 +1,116 @@
+//! What must hold before a net is solved.
+
+use super::{
+    Place,
+    net::{Net, PlaneError},
+};
+
+/// Places closer than this share of all that is measured are one place.
+const EQUAL: f64 = 1e-9;
+
+/// Checks that every picture hangs on the net, every part of the net on two controls, and that no two points are one.
+///
+/// # Errors
+/// [`PlaneError`]; of a part without controls its first picture.
+pub fn check(net: &Net) -> Result<(), PlaneError> {
+    equal_points(net)?;
+    let (by_point, control_of) = (net.by_point(), net.control_of());
+    equal_controls(net)?;
+    let mut parts = Parts::new(net.pictures);
+    let mut ties = vec![0; net.pictures];
+    for (point, measured) in by_point.iter().enumerate() {
+        if measured.len() < 2 && control_of[point].is_none() {
+            continue;
+        }
+        for &index in measured {
+            let picture = net.measurements[index].picture;
+            ties[picture] += 1;
+            parts.join(picture, net.measurements[measured[0]].picture);
+        }
+    }
+    let seen = |point: usize| !by_point.get(point).is_empty();
+    let shown: Vec<usize> = net
+        .controls
+        .iter()
+        .map(|control| control.point)
+        .filter(|point| seen(*point))
+        .collect();
+    if shown.len() < 2 {
+        return Err(PlaneError::TooFewControls { found: shown.len() });
+    }
+    if let Some(picture) = (0..net.pictures).find(|picture| ties[*picture] < 2) {
+        let ties = ties[picture];
+        return Err(PlaneError::UnderconnectedPicture { picture, ties });
+    }
+    let mut controls = vec![0; net.pictures];
+    for point in shown {
+        let first = by_point.get(point)[0];
+        controls[parts.root(net.measurements[first].picture)] += 1;
+    }
+    let loose = (0..net.pictures).find(|picture| controls[parts.root(*picture)] < 2);
+    loose.map_or(Ok(()), |picture| {
+        let ties = ties[picture];
+        Err(PlaneError::UnderconnectedPicture { picture, ties })
+    })
+}
+
+fn equal_points(net: &Net) -> Result<(), PlaneError> {
+    for (picture, measured) in net.by_picture().iter().enumerate() {
+        let places = measured.iter();
+        let places =
+            places.map(|index| (net.measurements[*index].at, net.measurements[*index].point));
+        if let Some((first, second)) = equal_pair(places.collect()) {
+            return Err(PlaneError::EqualPoints {
+                picture,
+                first,
+                second,
+            });
+        }
+    }
+    Ok(())
+}
+
+fn equal_controls(net: &Net) -> Result<(), PlaneError> {
+    let places = net.controls.iter();
+    let places = places.map(|control| (control.at, control.point));
+    equal_pair(places.collect()).map_or(Ok(()), |(first, second)| {
+        Err(PlaneError::EqualControls { first, second })
+    })
+}
+
+/// Two that have one place, by the order in which they are named.
+fn equal_pair(mut places: Vec<(Place, usize)>) -> Option<(usize, usize)> {
+    places.sort_by(|(a, _), (b, _)| a.re.total_cmp(&b.re).then(a.im.total_cmp(&b.im)));
+    let first = places.first()?.0;
+    let extent = places
+        .iter()
+        .map(|(place, _)| (place - first).norm())
+        .fold(0.0, f64::max);
+    let pair = places
+        .windows(2)
+        .find(|pair| (pair[0].0 - pair[1].0).norm() <= EQUAL * extent)?;
+    let (one, two) = (pair[0].1, pair[1].1);
+    Some((one.min(two), one.max(two)))
+}
+
+/// Which pictures hang together.
+struct Parts(Vec<usize>);
+
+impl Parts {
+    fn new(count: usize) -> Self {
+        Self((0..count).collect())
+    }
+
+    fn root(&mut self, mut of: usize) -> usize {
+        while self.0[of] != of {
+            self.0[of] = self.0[self.0[of]];
+            of = self.0[of];
+        }
+        of
+    }
+
+    fn join(&mut self, one: usize, two: usize) {
+        let (one, two) = (self.root(one), self.root(two));
+        self.0[one.max(two)] = one.min(two);
+    }
+}

@@ -1,0 +1,46 @@
+//! Plane triangulation of rectified pictures: a similarity per picture, tied to its neighbours and to controls.
+//!
+//! Pictures that are rectified, or nearly vertical, differ from a conformal map by a similarity: four unknowns each,
+//! in which the equations from picture to map are linear. Places are complex numbers, `x + i y`, and so are the two
+//! unknowns of a picture, which halves every system. There is one solver ([`solve`]); the five programs of the paper are
+//! ways to use it.
+//!
+//! | program | here |
+//! |---|---|
+//! | BRICK | [`brick`]: a few pictures with ties among them, on two rough guesses |
+//! | EXTEND | [`extend`]: bricks as pictures, on two controls |
+//! | MORTAR | [`mortar`]: bricks as pictures, on all controls by weight |
+//! | SCALE | [`scale`]: one figure on all controls, its shape kept |
+//! | LOCAL | [`local`]: the pictures of each brick on the means of its seams |
+//!
+//! # Source
+//! Arthur & McMacken 1977; equations by their numbers there.
+
+mod blunders;
+mod bricks;
+mod check;
+mod controls;
+mod eliminate;
+mod film;
+mod grow;
+mod inverse;
+mod mirror;
+mod net;
+mod shrinkage;
+mod similarity;
+mod solve;
+
+/// A place in a picture or on a map: `x + i y`.
+pub type Place = nalgebra::Complex<f64>;
+
+pub use blunders::{Blunder, Cleaned, FLAG_LIMIT, clean, robust_sigma};
+pub use bricks::{Block, Figure, brick, extend, local, mortar};
+pub use check::check;
+pub use controls::{Scaled, fit_similarity, scale};
+pub use film::{CornerZero, FilmError, FourCorners, box_centre};
+pub use grow::grow_bricks;
+pub use mirror::{find_mirrored, same_hand};
+pub use net::{Control, Measurement, Net, PlaneError};
+pub use shrinkage::{Shrinkage, shrinkage_factor};
+pub use similarity::{Similarity, ToPicture, projection_floor_m};
+pub use solve::{Precision, Redundancy, Solution, solve};

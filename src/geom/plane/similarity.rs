@@ -1,0 +1,179 @@
+//! Similarities of the plane, both ways round.
+
+use super::Place;
+
+/// From picture to map, equation 3: `X = P x − Q y + A`, `Y = P y + Q x + B`, or `Z = turn · z + shift`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Similarity {
+    /// `P + iQ`: scale, map units per picture unit, and angle.
+    pub turn: Place,
+    /// `A + iB`, map units.
+    pub shift: Place,
+}
+
+/// From map to picture, equation 2: `pX + qY + a = x`, `pY − qX + b = y`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ToPicture {
+    /// `p = μ cos θ`, `q = μ sin θ`, picture units per map unit.
+    pub p: f64,
+    /// See `p`.
+    pub q: f64,
+    /// Picture units.
+    pub a: f64,
+    /// Picture units.
+    pub b: f64,
+}
+
+impl Similarity {
+    /// The similarity that leaves everything in its place.
+    pub const IDENTITY: Self = Self {
+        turn: Place::new(1.0, 0.0),
+        shift: Place::new(0.0, 0.0),
+    };
+
+    /// The place on the map of a place in the picture.
+    #[must_use]
+    pub fn map(&self, place: Place) -> Place {
+        self.turn * place + self.shift
+    }
+
+    /// Map units per picture unit, `1/μ = √(P² + Q²)`.
+    #[must_use]
+    pub fn scale(&self) -> f64 {
+        self.turn.norm()
+    }
+
+    /// Angle from the picture's axes to the map's, anticlockwise, radians: `θ = atan2(Q, P)`.
+    #[must_use]
+    pub fn angle_rad(&self) -> f64 {
+        self.turn.arg()
+    }
+
+    /// This one after `first`.
+    #[must_use]
+    pub fn after(&self, first: &Self) -> Self {
+        Self {
+            turn: self.turn * first.turn,
+            shift: self.map(first.shift),
+        }
+    }
+
+    /// The same transformation from map to picture; infinite where the scale is 0.
+    #[must_use]
+    pub fn to_picture(&self) -> ToPicture {
+        // Z = turn z + shift, so z = (p − iq) Z + (a + ib) with p − iq = 1/turn.
+        let back = self.turn.inv();
+        let shift = -self.shift * back;
+        ToPicture {
+            p: back.re,
+            q: -back.im,
+            a: shift.re,
+            b: shift.im,
+        }
+    }
+}
+
+impl ToPicture {
+    /// The same transformation from picture to map: `P = p/(p² + q²)`, `Q = q/(p² + q²)`, `A = −(Pa − Qb)`,
+    /// `B = −(Qa + Pb)`.
+    #[must_use]
+    pub fn to_map(&self) -> Similarity {
+        let squares = self.p * self.p + self.q * self.q;
+        let turn = Place::new(self.p / squares, self.q / squares);
+        Similarity {
+            turn,
+            shift: -turn * Place::new(self.a, self.b),
+        }
+    }
+
+    /// The place in the picture of a place on the map.
+    #[must_use]
+    pub fn picture(&self, map: Place) -> Place {
+        Place::new(
+            self.p * map.re + self.q * map.im + self.a,
+            self.p * map.im - self.q * map.re + self.b,
+        )
+    }
+}
+
+/// How far an orthographic picture departs from a conformal map by more than a similarity, metres: a floor under all
+/// deviations that no adjustment removes.
+///
+/// * `half_side_m` – half of the picture's side on the ground
+/// * `scale_gradient` – change of the map's scale with distance, `|∇ ln k|`, per metre: `tan φ / R` of Mercator's
+///   projection, `tan(c/2) / R` of the stereographic one at the angle `c` from its centre
+/// * `radius_m` – radius of the sphere
+///
+/// The first term is at the middle of an edge, the second (an orthographic picture against a conformal azimuthal map
+/// about its own centre) at the corner, `√2` times farther out.
+#[must_use]
+pub fn projection_floor_m(half_side_m: f64, scale_gradient: f64, radius_m: f64) -> f64 {
+    let corner_m = half_side_m * std::f64::consts::SQRT_2;
+    0.5 * scale_gradient * half_side_m.powi(2) + corner_m.powi(3) / (4.0 * radius_m.powi(2))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const RADIUS_M: f64 = 3_396_000.0;
+
+    #[test]
+    fn both_ways_round_are_one_transformation() {
+        let printed = ToPicture {
+            p: 0.3,
+            q: -1.2,
+            a: 17.0,
+            b: -5.5,
+        };
+        let to_map = printed.to_map();
+        let squares = 0.3_f64.powi(2) + 1.2_f64.powi(2);
+        let (p, q) = (0.3 / squares, -1.2 / squares);
+        // The printed formulas, term by term; rounding of numbers of order ten.
+        assert!((to_map.shift.re + (p * 17.0 + q * 5.5)).abs() < 1e-14);
+        assert!((to_map.shift.im + (q * 17.0 - p * 5.5)).abs() < 1e-14);
+        assert!((to_map.scale() - 1.0 / squares.sqrt()).abs() < 1e-15);
+        assert!((to_map.angle_rad() - (-1.2_f64).atan2(0.3)).abs() < 1e-15);
+        let place = Place::new(-3.0, 8.0);
+        assert!((printed.picture(to_map.map(place)) - place).norm() < 1e-14);
+        let back = to_map.to_picture();
+        let differences = [
+            back.p - printed.p,
+            back.q - printed.q,
+            back.a - printed.a,
+            back.b - printed.b,
+        ];
+        assert!(
+            differences
+                .iter()
+                .all(|difference| difference.abs() < 1e-14)
+        );
+    }
+
+    #[test]
+    fn one_after_the_other() {
+        let first = Similarity {
+            turn: Place::new(0.5, 2.0),
+            shift: Place::new(1.0, -1.0),
+        };
+        let second = Similarity {
+            turn: Place::new(-1.0, 0.25),
+            shift: Place::new(9.0, 4.0),
+        };
+        let place = Place::new(2.0, 3.0);
+        let expected = second.map(first.map(place));
+        assert!((second.after(&first).map(place) - expected).norm() < 1e-14); // rounding
+        assert!((Similarity::IDENTITY.after(&first).map(place) - first.map(place)).norm() < 1e-15);
+    }
+
+    #[test]
+    fn the_floor_of_viking_pictures() {
+        let half_m = 12_500.0;
+        // 25 km at 22.5° latitude: 9.5 m against Mercator's projection, 0.12 m against an azimuthal one; printed digits.
+        let mercator = 22.5_f64.to_radians().tan() / RADIUS_M;
+        let azimuthal_m = projection_floor_m(half_m, 0.0, RADIUS_M);
+        assert!((azimuthal_m - 0.12).abs() < 0.005, "{azimuthal_m}");
+        let floor_m = projection_floor_m(half_m, mercator, RADIUS_M) - azimuthal_m;
+        assert!((floor_m - 9.5).abs() < 0.05, "{floor_m}");
+    }
+}
