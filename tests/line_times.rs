@@ -25,7 +25,7 @@ use areograph::{
     geom::{
         ellipsoid::{Spherical, ray_meets_ellipsoid},
         mars_rotation::mars_matrix,
-        pushbroom::{CameraModel, ExteriorOrientation as _},
+        pushbroom::CameraModel,
     },
     line_times::{LinePiece, LineTimes, LineTimesError},
     products::write_products,
