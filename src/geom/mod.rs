@@ -1,6 +1,7 @@
 //! Pure geometry: no files, no clocks, no SPICE.
 
 pub mod attitude;
+pub mod block_equations;
 pub mod bundle;
 pub mod chebyshev;
 pub mod collinearity;
@@ -10,7 +11,6 @@ pub mod lagrange;
 pub mod map_projection;
 pub mod mars_rotation;
 pub mod misregistration;
-pub mod normal_equations;
 pub mod orbit_axes;
 pub mod oriented_camera;
 pub mod plane;

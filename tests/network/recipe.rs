@@ -22,9 +22,9 @@ pub(crate) const HALF_SWATH_PX: f64 = 512.0;
 /// Shots so far outside a swath still count as measured in it, pixels.
 const OUTSIDE_PX: f64 = 200.0;
 /// From perspective centre to ground, roughly: turns a standard deviation of positions into one of angles.
-const RANGE_M: f64 = 380e3;
+pub(crate) const RANGE_M: f64 = 380e3;
 /// Interval of MOLA's shots, seconds.
-const SHOT_INTERVAL_S: f64 = 0.1;
+pub(crate) const SHOT_INTERVAL_S: f64 = 0.1;
 
 /// Normal numbers by Box and Muller from a linear congruential generator, the same in every run.
 pub(crate) struct Normals(u64);
@@ -147,13 +147,18 @@ pub(crate) fn pair([latitude_deg, longitude_deg]: [f64; 2]) -> [Scene; 2] {
         longitude_deg,
         ..GUSEV
     };
+    [nadir, aimed(&nadir, -2.45)]
+}
+
+/// An image from an orbit `east_deg` beside that of `nadir` which looks at the same ground.
+pub(crate) fn aimed(nadir: &Scene, east_deg: f64) -> Scene {
     let target_m = nadir.boresight_ground_m(0.0);
     let mut oblique = Scene {
-        longitude_deg: longitude_deg - 2.45,
+        longitude_deg: nadir.longitude_deg + east_deg,
         lines: 8_960,
         duration_s: 12.958,
         held: Held::Inertial { roll_deg: 0.0 },
-        ..nadir
+        ..*nadir
     };
     for _ in 0..4 {
         let unrolled = Scene {
@@ -166,7 +171,7 @@ pub(crate) fn pair([latitude_deg, longitude_deg]: [f64; 2]) -> [Scene; 2] {
         oblique.latitude_deg -= (camera_m.x / target_m.norm()).to_degrees();
         oblique.held = Held::Inertial { roll_deg };
     }
-    [nadir, oblique]
+    oblique
 }
 
 /// Standard deviations of the paper: `sigma_m` for positions, the same on the ground for angles.

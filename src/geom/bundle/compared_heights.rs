@@ -4,7 +4,9 @@ use nalgebra::Vector3;
 use rayon::prelude::*;
 
 use super::{
-    HeightControl, HeightResidual, layout::Layout, point_rows::PointRows, unknowns::State,
+    HeightControl, HeightResidual,
+    layout::{Layout, Linearised},
+    point_rows::PointRows,
 };
 use crate::geom::{pushbroom::ExteriorOrientation, surface::LaserSurface};
 
@@ -19,10 +21,10 @@ impl HeightResidual {
     }
 }
 
-/// Every compared point of `control` that is determined, at `state`.
+/// Every compared point of `control` that is determined, there.
 pub(super) fn compared<M: ExteriorOrientation>(
     layout: &Layout<'_, M>,
-    state: &State,
+    at: &Linearised,
     control: &HeightControl,
     is_active: impl Fn(usize) -> bool + Sync,
 ) -> Vec<HeightResidual> {
@@ -30,15 +32,16 @@ pub(super) fn compared<M: ExteriorOrientation>(
         .compared
         .iter()
         .copied()
-        .filter(|at| is_active(*at))
+        .filter(|of| is_active(*of))
         .collect();
     let pieces: Vec<Vec<HeightResidual>> = points
         .par_chunks(TOGETHER)
         .map_init(PointRows::default, |rows, points| {
-            let places_m: Vec<Vector3<f64>> = points.iter().map(|at| state.points_m[*at]).collect();
+            let places_m: Vec<Vector3<f64>> =
+                points.iter().map(|of| at.state.points_m[*of]).collect();
             let surface = control.surface.predict(&places_m);
             let residual = |(index, point): (usize, &usize)| {
-                layout.fill(rows, state, *point).ok()?;
+                layout.fill(rows, at, *point).ok()?;
                 let triangle = rows.eliminate();
                 let (height_m, by_point) = LaserSurface::height_m(&places_m[index]);
                 let turned = triangle.tr_solve_upper_triangular(&by_point)?;

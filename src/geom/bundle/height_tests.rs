@@ -4,16 +4,17 @@ use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
 use super::{
     BundleOptions, HeightControl, Network, Residual,
+    factor::Factor,
+    groups::PointGroups,
     heights::Heights,
+    layout::Linearised,
     quality::judge,
     reduce::Settled,
     solve,
     solve::settle,
     tests::{dense_rows, layout, network},
-    unknowns::State,
 };
 use crate::geom::{
-    normal_equations::ScaledCholesky,
     pushbroom::{EulerPolynomial, ExteriorOrientation, Sighting},
     surface::{LaserSurface, SurfaceOptions, SurfaceShot},
 };
@@ -71,7 +72,7 @@ struct Dense {
 /// The equations of all unknowns at `state`, heights included, solved at once.
 fn dense(
     layout: &super::layout::Layout<'_, EulerPolynomial>,
-    state: &State,
+    at: &Linearised,
     heights: &Heights,
     points: usize,
 ) -> Dense {
@@ -80,18 +81,18 @@ fn dense(
     let mut normal = DMatrix::zeros(unknowns, unknowns);
     let mut right = DVector::zeros(unknowns);
     for point in 0..points {
-        let (rows, misclosures) = dense_rows(layout, state, point);
+        let (rows, misclosures) = dense_rows(layout, at, point);
         normal += rows.tr_mul(&rows);
         right += rows.tr_mul(&misclosures);
     }
     for (column, sigma) in layout.columns.sigmas.iter().enumerate() {
         normal[(column, column)] += sigma.powi(-2);
-        right[column] -= state.corrections[column] * sigma.powi(-2);
+        right[column] -= at.state.corrections[column] * sigma.powi(-2);
     }
     let mut rows = DMatrix::zeros(heights.points.len(), unknowns);
     let mut above_m = DVector::zeros(heights.points.len());
     for (index, point) in heights.points.iter().enumerate() {
-        let (difference_m, by_point) = heights.difference_m(state, index);
+        let (difference_m, by_point) = heights.difference_m(&at.state, index);
         above_m[index] = difference_m;
         for axis in 0..3 {
             rows[(index, shared + 3 * point + axis)] = by_point[axis];
@@ -129,11 +130,13 @@ fn heights_by_parts_equal_the_dense_equations() {
     let (mut layout, start, active) = layout(&network);
     let shared = layout.columns.len();
     let heights = Heights::at(&surface, CONTROLLED.collect(), &start);
+    let start = layout.linearise(start);
+    let groups = PointGroups::of(&layout, active.clone());
     let before = dense(&layout, &start, &heights, active.len());
 
     layout.heights = Some(heights);
-    let reduced = super::reduce::reduce(&layout, &start, &active).unwrap();
-    let step = ScaledCholesky::new(reduced.matrix)
+    let reduced = super::reduce::reduce(&layout, &start, &groups).unwrap();
+    let step = Factor::new(&reduced.matrix, reduced.heights.as_ref())
         .unwrap()
         .solve(&reduced.right);
     for (column, sigma) in layout.columns.sigmas.iter().enumerate() {
@@ -145,19 +148,18 @@ fn heights_by_parts_equal_the_dense_equations() {
     }
 
     let mut history = Vec::new();
-    let settled = settle(&layout, start, &active, 100, &mut history).unwrap();
+    let settled = settle(&layout, start, &groups, 100, &mut history).unwrap();
     let heights = layout.heights.as_ref().unwrap();
-    let dense = dense(&layout, &settled.state, heights, active.len());
+    let dense = dense(&layout, &settled.at, heights, active.len());
     for step in dense.step.iter().skip(shared) {
         // Metres: where the parts have settled, to 1e-8 of the sum of squares, the whole has little left to move.
         assert!(step.abs() < 1e-3, "{step}");
     }
     let Settled { reduced, .. } = &settled;
-    let cofactors = ScaledCholesky::new(reduced.matrix.clone())
-        .unwrap()
-        .inverse();
+    let factor = Factor::new(&reduced.matrix, reduced.heights.as_ref()).unwrap();
+    let cofactors = factor.cofactors(&reduced.matrix);
     let fitness = vec![Ok(()); active.len()];
-    let adjustment = judge(&layout, &settled, &fitness, &cofactors);
+    let adjustment = judge(&layout, &settled, &groups, &fitness, &factor);
     let block = |one: usize, other: usize| {
         let (row, column) = (shared + 3 * one, shared + 3 * other);
         dense.cofactors.fixed_view::<3, 3>(row, column).into_owned()
@@ -191,7 +193,7 @@ fn heights_by_parts_equal_the_dense_equations() {
         .map(|residual: Residual| residual.redundancy)
         .sum::<f64>();
     for (column, sigma) in layout.columns.sigmas.iter().enumerate() {
-        sum += 1.0 - cofactors[(column, column)] / sigma.powi(2);
+        sum += 1.0 - cofactors.element(column, column).unwrap() / sigma.powi(2);
     }
     let heights = adjustment.heights.iter();
     sum += heights.map(|height| height.redundancy).sum::<f64>();

@@ -1,5 +1,7 @@
 //! A network laid out for its adjustment: which observations belong to a point, and their weighted rows.
 
+use std::ops::Range;
+
 use nalgebra::Vector3;
 use rayon::prelude::*;
 
@@ -17,6 +19,12 @@ use crate::geom::{
 
 /// A point whose rows determine one direction this much worse than another counts as undetermined.
 const DIRECTION_RATIO_MIN: f64 = 1e-6;
+
+/// The rows of all views at a state: computed once, and used for the equations, the points and the covariances.
+pub(super) struct Linearised {
+    pub(super) state: State,
+    views: Vec<Result<[Row; 2], Unseen>>,
+}
 
 /// A network laid out for its adjustment.
 pub(super) struct Layout<'a, M> {
@@ -118,26 +126,53 @@ impl<'a, M: ExteriorOrientation> Layout<'a, M> {
         )
     }
 
-    /// Fills `rows` with the rows of `point` at `state`.
-    pub(super) fn fill(
-        &self,
-        rows: &mut PointRows,
-        state: &State,
-        point: usize,
-    ) -> Result<(), Unseen> {
-        let (views, ranges) = (self.views.of_key(point), self.ranges.of_key(point));
+    /// The rows of all views at `state`.
+    pub(super) fn linearise(&self, state: State) -> Linearised {
+        let views = (0..self.network.views.len()).into_par_iter();
+        let views = views.map(|index| self.view_rows(&state, index));
+        Linearised {
+            views: views.collect(),
+            state,
+        }
+    }
+
+    /// Columns of the images and profiles that the rows of `point` contain, in the order of these.
+    fn columns_of(&self, point: usize) -> impl Iterator<Item = Range<usize>> + '_ {
         let columns = &self.columns;
-        let of_views = views
-            .iter()
-            .map(|view| columns.images[self.network.views[*view].image].clone());
-        let of_ranges = ranges.iter().flat_map(|range| {
+        let of_views = self.views.of_key(point).iter();
+        let of_views = of_views.map(|view| columns.images[self.network.views[*view].image].clone());
+        let of_ranges = self.ranges.of_key(point).iter().flat_map(|range| {
             let range = &self.network.ranges[*range];
             let bias = columns.of_profile[range.profile].map_or(0..0, |column| column..column + 1);
             [columns.images[range.image].clone(), bias]
         });
-        rows.begin(of_views.chain(of_ranges));
+        of_views.chain(of_ranges)
+    }
+
+    /// Blocks of the unknowns that the rows of `point` contain, ascending.
+    pub(super) fn blocks_of(&self, point: usize) -> Vec<usize> {
+        let columns = self.columns_of(point).filter(|columns| !columns.is_empty());
+        let mut blocks: Vec<usize> = columns
+            .map(|columns| self.columns.block_of(columns.start))
+            .collect();
+        blocks.sort_unstable();
+        blocks.dedup();
+        blocks
+    }
+
+    /// Fills `rows` with the rows of `point`.
+    pub(super) fn fill(
+        &self,
+        rows: &mut PointRows,
+        at: &Linearised,
+        point: usize,
+    ) -> Result<(), Unseen> {
+        let state = &at.state;
+        let (views, ranges) = (self.views.of_key(point), self.ranges.of_key(point));
+        let columns = &self.columns;
+        rows.begin(self.columns_of(point));
         for view in views {
-            let pair = self.view_rows(state, *view)?;
+            let pair = at.views[*view]?;
             let (factor, cost) = self.robust_factor(&pair);
             rows.cost += cost;
             let of_image = &columns.of_image[self.network.views[*view].image];
@@ -186,10 +221,10 @@ impl<'a, M: ExteriorOrientation> Layout<'a, M> {
     pub(super) fn fitness(
         &self,
         rows: &mut PointRows,
-        state: &State,
+        start: &Linearised,
         point: usize,
     ) -> Result<(), PointRejection> {
-        self.fill(rows, state, point)
+        self.fill(rows, start, point)
             .map_err(|unseen| match unseen {
                 Unseen::BehindCamera => PointRejection::BehindCamera,
                 _ => PointRejection::Unseen,

@@ -85,10 +85,14 @@
 
 mod check;
 mod compared_heights;
+mod error;
+mod factor;
+mod groups;
 mod heights;
 mod layout;
 mod point_rows;
 mod quality;
+mod quasi_newton;
 mod reduce;
 mod reduced_heights;
 mod rows;
@@ -102,6 +106,7 @@ mod tests;
 
 use nalgebra::{DMatrix, Matrix3, Vector2, Vector3};
 
+pub use error::BundleError;
 pub use solve::solve;
 pub use unknowns::Unknown;
 
@@ -353,7 +358,8 @@ pub struct Adjustment {
     pub weighted_squares: f64,
     /// The weighted sum before each step and after the last.
     pub history: Vec<f64>,
-    /// Pairs of unknowns that are correlated by more than 0.95, with the coefficient.
+    /// Pairs of unknowns, of one image or of images that share points, that are correlated by more than 0.95, with the
+    /// coefficient.
     pub correlated: Vec<(Unknown, Unknown, f64)>,
 }
 
@@ -398,51 +404,4 @@ pub enum Part {
     /// A profile of ranges.
     #[error("profile {0}")]
     Profile(usize),
-}
-
-/// A network that cannot be adjusted.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum BundleError {
-    /// A standard deviation, coordinate or number that is none.
-    #[error("{what} of {part} is {value}, expected {expected}")]
-    Value {
-        /// What it belongs to.
-        part: Part,
-        /// What it is.
-        what: &'static str,
-        /// The value.
-        value: f64,
-        /// What it should be.
-        expected: &'static str,
-    },
-    /// An index of a point, image or profile that the network does not have.
-    #[error("{part} belongs to {missing}, which the network does not have")]
-    Unmatched {
-        /// View or range.
-        part: Part,
-        /// What is missing.
-        missing: Part,
-    },
-    /// Unknowns that the observations do not separate.
-    #[error("the network is singular: the observations do not separate {}", unknowns::names(.unknowns))]
-    Singular {
-        /// The weakest combination.
-        unknowns: Vec<Unknown>,
-    },
-    /// Fewer observations than unknowns.
-    #[error("{observations} observations for {unknowns} unknowns")]
-    Underdetermined {
-        /// Observations.
-        observations: usize,
-        /// Unknowns.
-        unknowns: usize,
-    },
-    /// The steps do not converge.
-    #[error("did not converge after {steps} steps; weighted sum of squares {weighted_squares:.6e}")]
-    NotConverged {
-        /// Steps taken.
-        steps: usize,
-        /// The sum where it was given up.
-        weighted_squares: f64,
-    },
 }

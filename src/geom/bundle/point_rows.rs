@@ -18,7 +18,7 @@ pub(super) struct Run {
 /// The weighted rows of one point: views by twos, then ranges, then its own coordinates if observed.
 ///
 /// It is used for one point after another, so that its memory is asked for only once.
-#[derive(Debug, Default)]
+#[derive(Debug, Clone, Default)]
 pub(super) struct PointRows {
     /// Which shared unknowns the rows contain.
     pub(super) runs: Vec<Run>,
@@ -176,7 +176,7 @@ impl PointRows {
 }
 
 /// Adds `factor · from` to `to`.
-pub(super) fn add_multiple(to: &mut [f64], factor: f64, from: &[f64]) {
+fn add_multiple(to: &mut [f64], factor: f64, from: &[f64]) {
     for (to, from) in to.iter_mut().zip(from) {
         *to += factor * from;
     }

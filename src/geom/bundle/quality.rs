@@ -1,17 +1,19 @@
 //! Covariances, residuals, redundancy numbers and correlations of the settled adjustment.
 
-use nalgebra::{DMatrix, DVector, Matrix3, Matrix3xX, Vector3};
+use nalgebra::{DMatrix, Matrix3, Matrix3xX, Vector3};
 use rayon::prelude::*;
 
 use super::{
     AdjustedImage, AdjustedPoint, Adjustment, ORIENTATION_UNKNOWNS, PointRejection, Residual,
-    layout::Layout,
+    factor::Factor,
+    groups::{Group, PointGroups},
+    layout::{Layout, Linearised},
     point_rows::PointRows,
     reduce::Settled,
     reduced_heights::ReducedHeights,
     unknowns::{State, Unknown},
 };
-use crate::geom::pushbroom::ExteriorOrientation;
+use crate::geom::{block_equations::BlockMatrix, pushbroom::ExteriorOrientation};
 
 /// Correlations above this are reported.
 const CORRELATION_REPORTED: f64 = 0.95;
@@ -28,46 +30,39 @@ struct Controls {
     of_point: Vec<Option<usize>>,
     /// `u` of each.
     turned: Vec<Vector3<f64>>,
-    /// `Σ⁻¹`.
-    weights: DMatrix<f64>,
-    /// `Q Gᵀ Σ⁻¹`, one column a height, and `Gᵀ Σ⁻¹`.
+    /// `Q Gᵀ Σ⁻¹`, one column a height, and `Σ⁻¹ − Σ⁻¹ G Q Gᵀ Σ⁻¹`.
     through: DMatrix<f64>,
-    weighted: DMatrix<f64>,
+    left: DMatrix<f64>,
 }
 
 /// What an observed height does to its point.
 struct Control<'a> {
     turned: &'a Vector3<f64>,
-    weight: f64,
     through: &'a [f64],
-    /// `Σ⁻¹ G Q Gᵀ Σ⁻¹` of it.
-    fed_back: f64,
+    left: f64,
 }
 
 impl Controls {
-    fn of(reduced: &ReducedHeights, points: &[usize], of: usize, cofactors: &DMatrix<f64>) -> Self {
+    fn of(reduced: &ReducedHeights, points: &[usize], of: usize, factor: &Factor) -> Option<Self> {
         let mut of_point = vec![None; of];
         for (index, point) in points.iter().enumerate() {
             of_point[*point] = Some(index);
         }
-        let weighted = reduced.weighted().transpose();
-        Self {
+        let (through, left) = factor.through_heights()?;
+        Some(Self {
             of_point,
             turned: reduced.turned.clone(),
-            weights: reduced.weights(),
-            through: cofactors * &weighted,
-            weighted,
-        }
+            through,
+            left,
+        })
     }
 
     fn of_point(&self, point: usize) -> Option<Control<'_>> {
         let index = self.of_point[point]?;
-        let through = column_of(&self.through, index);
         Some(Control {
             turned: &self.turned[index],
-            weight: self.weights[(index, index)],
-            fed_back: dot(through, column_of(&self.weighted, index)),
-            through,
+            left: self.left[(index, index)],
+            through: column_of(&self.through, index),
         })
     }
 }
@@ -75,21 +70,17 @@ impl Controls {
 /// The adjustment where it has settled; observations, unknowns and history are left to the caller.
 pub(super) fn judge<M: ExteriorOrientation>(
     layout: &Layout<'_, M>,
-    Settled { state, reduced }: &Settled,
+    Settled { at, reduced }: &Settled,
+    groups: &PointGroups,
     fitness: &[Result<(), PointRejection>],
-    cofactors: &DMatrix<f64>,
+    factor: &Factor,
 ) -> Adjustment {
+    let state = &at.state;
+    let cofactors = &factor.cofactors(&reduced.matrix);
     let heights = layout.heights.as_ref().zip(reduced.heights.as_ref());
     let controls =
-        heights.map(|(of, reduced)| Controls::of(reduced, &of.points, fitness.len(), cofactors));
-    let judged: Vec<Result<Judged, PointRejection>> = (0..fitness.len())
-        .into_par_iter()
-        .map_init(Default::default, |room, point| {
-            fitness[point]?;
-            judge_point(layout, state, point, cofactors, controls.as_ref(), room)
-                .ok_or(PointRejection::Undetermined)
-        })
-        .collect();
+        heights.and_then(|(of, reduced)| Controls::of(reduced, &of.points, fitness.len(), factor));
+    let judged = judge_points(layout, at, groups, fitness, cofactors, controls.as_ref());
     let mut adjustment = Adjustment {
         images: (0..layout.network.images.len())
             .map(|image| judge_image(layout, state, image, cofactors))
@@ -103,7 +94,11 @@ pub(super) fn judge<M: ExteriorOrientation>(
             .iter()
             .map(|column| column.map(|column| estimate(state, cofactors, column)))
             .collect(),
-        heights: heights.map_or_else(Vec::new, |(of, reduced)| reduced.residuals(of, cofactors)),
+        heights: heights
+            .zip(controls.as_ref())
+            .map_or_else(Vec::new, |((of, reduced), controls)| {
+                reduced.residuals(of, &controls.left)
+            }),
         compared: Vec::new(),
         height_squares: 0.0,
         mean_cofactor_m2: None,
@@ -134,10 +129,40 @@ pub(super) fn judge<M: ExteriorOrientation>(
     if let Some((of, reduced)) = heights {
         adjustment.height_squares = reduced.weighted_squares();
         adjustment.weighted_squares += adjustment.height_squares;
-        adjustment.mean_cofactor_m2 =
-            mean_cofactor_m2(layout, state, &of.points, cofactors, controls.as_ref());
+        adjustment.mean_cofactor_m2 = mean_cofactor_m2(layout, at, &of.points, factor, reduced);
     }
     adjustment
+}
+
+/// Every point, in the order of the network.
+fn judge_points<M: ExteriorOrientation>(
+    layout: &Layout<'_, M>,
+    at: &Linearised,
+    groups: &PointGroups,
+    fitness: &[Result<(), PointRejection>],
+    cofactors: &BlockMatrix,
+    controls: Option<&Controls>,
+) -> Vec<Result<Judged, PointRejection>> {
+    let of_group = |group: &Group| -> Vec<Option<Judged>> {
+        // What the points of a group need of the cofactors is one small matrix.
+        let local = cofactors.local(&group.blocks);
+        let mut room = Room::default();
+        let points = group.points.iter();
+        points
+            .map(|point| judge_point(layout, at, *point, &local, controls, &mut room))
+            .collect()
+    };
+    let by_groups: Vec<Vec<Option<Judged>>> = groups.groups.par_iter().map(of_group).collect();
+    let mut judged: Vec<Result<Judged, PointRejection>> = fitness
+        .iter()
+        .map(|fitness| Err(fitness.err().unwrap_or(PointRejection::Undetermined)))
+        .collect();
+    for (group, of_group) in groups.groups.iter().zip(by_groups) {
+        for (point, found) in group.points.iter().zip(of_group) {
+            judged[*point] = found.ok_or(PointRejection::Undetermined);
+        }
+    }
+    judged
 }
 
 /// Room for one point, used again for the next.
@@ -149,9 +174,10 @@ struct Room {
     between: Vec<Vector3<f64>>,
 }
 
+/// One point, with the cofactors of the shared unknowns in its rows.
 fn judge_point<M: ExteriorOrientation>(
     layout: &Layout<'_, M>,
-    state: &State,
+    at: &Linearised,
     point: usize,
     cofactors: &DMatrix<f64>,
     controls: Option<&Controls>,
@@ -162,18 +188,14 @@ fn judge_point<M: ExteriorOrientation>(
         transformed,
         between,
     } = room;
-    layout.fill(rows, state, point).ok()?;
-    layout.fill(transformed, state, point).ok()?;
+    layout.fill(rows, at, point).ok()?;
+    transformed.clone_from(rows);
     let inverse = transformed.eliminate().try_inverse()?;
     let coupling = [0, 1, 2].map(|row| transformed.row(row));
     between.clear();
-    between.extend(rows.columns().map(|column| {
-        let cofactors = column_of(cofactors, column);
-        Vector3::from(coupling.map(|coupling| {
-            let runs = rows.runs.iter();
-            runs.map(|run| dot(&cofactors[run.columns.clone()], &coupling[run.first..]))
-                .sum()
-        }))
+    between.extend((0..cofactors.ncols()).map(|place| {
+        let cofactors = column_of(cofactors, place);
+        Vector3::from(coupling.map(|coupling| dot(cofactors, coupling)))
     }));
     // Cofactors of the point transformed by its triangle: what its rays leave open, what the shared unknowns add, and
     // what an observed height takes away.
@@ -190,8 +212,7 @@ fn judge_point<M: ExteriorOrientation>(
         }));
         let mixed = through * control.turned.transpose();
         let own = control.turned * control.turned.transpose();
-        transformed_cofactor +=
-            mixed + mixed.transpose() + own * (control.fed_back - control.weight);
+        transformed_cofactor += mixed + mixed.transpose() - own * control.left;
         for (between, column) in between.iter_mut().zip(rows.columns()) {
             *between += control.turned * control.through[column];
         }
@@ -202,18 +223,14 @@ fn judge_point<M: ExteriorOrientation>(
             let own = inverse.tr_mul(&rows.by_point[row]);
             let mut leverage = own.dot(&(transformed_cofactor * own));
             let partials = rows.row(row);
-            let of_row = || {
-                let places = rows.columns().zip(partials).zip(&*between);
-                places.filter(|((_, partial), _)| **partial != 0.0)
-            };
-            for (index, ((column, partial), between)) in of_row().enumerate() {
-                let cofactors = column_of(cofactors, column);
-                let before: f64 = of_row()
-                    .take(index)
-                    .map(|((column, partial), _)| cofactors[column] * partial)
-                    .sum();
-                leverage += partial
-                    * (2.0 * before + cofactors[column] * partial - 2.0 * between.dot(&own));
+            for (place, between) in between.iter().enumerate() {
+                let partial = partials[place];
+                if partial != 0.0 {
+                    let cofactors = column_of(cofactors, place);
+                    let before = dot(&cofactors[..place], partials);
+                    leverage += partial
+                        * (2.0 * before + cofactors[place] * partial - 2.0 * between.dot(&own));
+                }
             }
             residual_of(rows, row, leverage)
         })
@@ -223,7 +240,7 @@ fn judge_point<M: ExteriorOrientation>(
         .and_then(|_| residuals.last_chunk::<3>().copied());
     Some(Judged {
         point: AdjustedPoint {
-            ground_m: state.points_m[point],
+            ground_m: at.state.points_m[point],
             cofactor_m2: inverse * transformed_cofactor * inverse.transpose(),
             priors,
         },
@@ -234,10 +251,10 @@ fn judge_point<M: ExteriorOrientation>(
 /// Cofactors of the mean of `points`: what their rays leave open averages out, what they share does not.
 fn mean_cofactor_m2<M: ExteriorOrientation>(
     layout: &Layout<'_, M>,
-    state: &State,
+    at: &Linearised,
     points: &[usize],
-    cofactors: &DMatrix<f64>,
-    controls: Option<&Controls>,
+    factor: &Factor,
+    heights: &ReducedHeights,
 ) -> Option<Matrix3<f64>> {
     let columns = layout.columns.len();
     let mut own_m2 = Matrix3::zeros();
@@ -245,7 +262,7 @@ fn mean_cofactor_m2<M: ExteriorOrientation>(
     let mut moves = Matrix3xX::zeros(points.len());
     let mut rows = PointRows::default();
     for (index, point) in points.iter().enumerate() {
-        layout.fill(&mut rows, state, *point).ok()?;
+        layout.fill(&mut rows, at, *point).ok()?;
         let inverse = rows.eliminate().try_inverse()?;
         own_m2 += inverse * inverse.transpose();
         for (place, column) in rows.columns().enumerate() {
@@ -253,16 +270,17 @@ fn mean_cofactor_m2<M: ExteriorOrientation>(
             let mut shared = by_shared.column_mut(column);
             shared -= inverse * coupling;
         }
-        if let Some(controls) = controls {
-            moves.set_column(index, &(inverse * controls.turned[index]));
-        }
+        moves.set_column(index, &(inverse * heights.turned[index]));
     }
-    if let Some(controls) = controls {
-        own_m2 -= &moves * &controls.weights * moves.transpose();
-        by_shared -= &moves * controls.weighted.transpose();
-    }
+    own_m2 -= &moves * heights.weights() * moves.transpose();
+    by_shared -= &moves * heights.weighted();
     let count = points.len() as f64;
-    let sum_m2 = own_m2 + &by_shared * cofactors * by_shared.transpose();
+    let mut sum_m2 = own_m2;
+    for axis in 0..3 {
+        let through = factor.solve(&by_shared.row(axis).transpose());
+        let mut column = sum_m2.column_mut(axis);
+        column += &by_shared * through;
+    }
     (count > 0.0).then(|| sum_m2 / (count * count))
 }
 
@@ -289,30 +307,36 @@ fn residual_of(rows: &PointRows, row: usize, leverage: f64) -> Residual {
 }
 
 /// Correction and square root of the cofactor of a column.
-fn estimate(state: &State, cofactors: &DMatrix<f64>, column: usize) -> (f64, f64) {
+fn estimate(state: &State, cofactors: &BlockMatrix, column: usize) -> (f64, f64) {
     (
         state.corrections[column],
-        cofactors[(column, column)].sqrt(),
+        variance(cofactors, column).sqrt(),
     )
+}
+
+fn variance(cofactors: &BlockMatrix, column: usize) -> f64 {
+    cofactors.element(column, column).unwrap_or_default()
 }
 
 fn judge_image<M: ExteriorOrientation>(
     layout: &Layout<'_, M>,
     state: &State,
     image: usize,
-    cofactors: &DMatrix<f64>,
+    cofactors: &BlockMatrix,
 ) -> AdjustedImage {
     let columns = &layout.columns.of_image[image];
-    let between = |row: usize, column: usize| match (columns[row], columns[column]) {
-        (Some(row), Some(column)) => cofactors[(row, column)],
-        _ => 0.0,
+    let between = |row: usize, column: usize| {
+        let pair = columns[row].zip(columns[column]);
+        let cofactor = pair.and_then(|(row, column)| cofactors.element(row, column));
+        cofactor.unwrap_or_default()
     };
     let prior = |column: usize| {
         let sigma = layout.columns.sigmas[column];
+        let share = variance(cofactors, column) / sigma.powi(2);
         sigma.is_finite().then(|| Residual {
             value: -state.corrections[column],
             sigma,
-            redundancy: (1.0 - cofactors[(column, column)] / sigma.powi(2)).clamp(0.0, 1.0),
+            redundancy: (1.0 - share).clamp(0.0, 1.0),
             weight_factor: 1.0,
         })
     };
@@ -324,20 +348,34 @@ fn judge_image<M: ExteriorOrientation>(
     }
 }
 
+/// Correlations of unknowns that occur together: of one image, and of images that share points.
 fn correlated<M: ExteriorOrientation>(
     layout: &Layout<'_, M>,
-    cofactors: &DMatrix<f64>,
+    cofactors: &BlockMatrix,
 ) -> Vec<(Unknown, Unknown, f64)> {
-    let deviations: DVector<f64> = cofactors.diagonal().map(f64::sqrt);
+    let deviations: Vec<f64> = cofactors.diagonal().into_iter().map(f64::sqrt).collect();
+    let unknowns = &layout.columns.unknowns;
+    let pattern = cofactors.pattern();
     let mut pairs = Vec::new();
-    for first in 0..deviations.len() {
-        for second in first + 1..deviations.len() {
-            let coefficient = cofactors[(second, first)] / (deviations[first] * deviations[second]);
-            if coefficient.abs() > CORRELATION_REPORTED {
-                let unknowns = &layout.columns.unknowns;
-                pairs.push((unknowns[first], unknowns[second], coefficient));
+    for right in 0..pattern.blocks() {
+        for left in pattern.met(right) {
+            let Some(block) = cofactors.block(*left, right) else {
+                continue;
+            };
+            for (row, first) in pattern.columns(*left).enumerate() {
+                for (column, second) in pattern.columns(right).enumerate() {
+                    let coefficient =
+                        block[(row, column)] / (deviations[first] * deviations[second]);
+                    if first < second && coefficient.abs() > CORRELATION_REPORTED {
+                        pairs.push((first, second, coefficient));
+                    }
+                }
             }
         }
     }
+    pairs.sort_by_key(|(first, second, _)| (*first, *second));
     pairs
+        .into_iter()
+        .map(|(first, second, coefficient)| (unknowns[first], unknowns[second], coefficient))
+        .collect()
 }

@@ -2,116 +2,138 @@
 //!
 //! An orthogonal transformation of a point's rows leaves its three coordinates in the first three of
 //! them. The squares of the other rows sum up to the Schur complement `U − W V⁻¹ Wᵀ`; nothing is
-//! subtracted, so nothing is lost to cancellation.
+//! subtracted, so nothing is lost to cancellation. Images that share no point have no block in it.
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{DMatrix, DMatrixView, DVector};
 use rayon::prelude::*;
 
 use super::{
-    layout::Layout,
-    point_rows::{PointRows, add_multiple},
+    groups::{Group, PointGroups},
+    layout::{Layout, Linearised},
+    point_rows::PointRows,
     reduced_heights::ReducedHeights,
-    unknowns::State,
 };
-use crate::geom::pushbroom::{ExteriorOrientation, Unseen};
+use crate::geom::{
+    block_equations::BlockMatrix,
+    pushbroom::{ExteriorOrientation, Unseen},
+};
 
-/// Parts in which points are summed: fixed, so that the sums do not depend on the number of threads.
-const PARTS: usize = 16;
+/// Groups that are summed side by side before they are added to the whole, one after the other: a bound of memory.
+const TOGETHER: usize = 64;
+/// Numbers of a group's rows that are multiplied together: as many as a processor's cache holds.
+const ROWS_TOGETHER: usize = 16_384;
 
 /// Reduced normal equations at a state.
-#[derive(Clone)]
 pub(super) struct Reduced {
-    /// Lower triangle.
-    pub(super) matrix: DMatrix<f64>,
+    /// Without the heights.
+    pub(super) matrix: BlockMatrix,
+    /// With them, as the sum.
     pub(super) right: DVector<f64>,
     /// The sum that is made small.
     pub(super) cost: f64,
-    /// Heights, where they are observed; matrix, right side and sum contain them.
+    /// Heights, where they are observed.
     pub(super) heights: Option<ReducedHeights>,
 }
 
 /// Where an iteration has come to.
 pub(super) struct Settled {
-    pub(super) state: State,
+    pub(super) at: Linearised,
     pub(super) reduced: Reduced,
 }
 
-impl Reduced {
-    fn zeros(columns: usize) -> Self {
-        Self {
-            matrix: DMatrix::zeros(columns, columns),
-            right: DVector::zeros(columns),
-            cost: 0.0,
-            heights: None,
-        }
-    }
+/// Sums of products of a group's rows.
+struct GroupSums {
+    /// In the unknowns of the group, and last the misclosures.
+    products: DMatrix<f64>,
+    cost: f64,
+}
 
-    /// Adds the rows of a point after [`PointRows::eliminate`].
-    fn add(&mut self, rows: &PointRows) {
-        self.cost += rows.cost;
-        let columns = self.right.len();
-        let matrix = self.matrix.as_mut_slice();
-        for row in rows.beside.chunks_exact(rows.width).skip(3) {
-            let misclosure = row[rows.width - 1];
-            for (index, run) in rows.runs.iter().enumerate() {
-                for (place, column) in (run.first..).zip(run.columns.clone()) {
-                    let partial = row[place];
-                    self.right[column] += partial * misclosure;
-                    let sums = &mut matrix[column * columns..(column + 1) * columns];
-                    let below = run.first + run.columns.len();
-                    add_multiple(&mut sums[column..], partial, &row[place..below]);
-                    for other in &rows.runs[index + 1..] {
-                        let partials = &row[other.first..][..other.columns.len()];
-                        add_multiple(&mut sums[other.columns.clone()], partial, partials);
-                    }
-                }
+impl GroupSums {
+    fn of<M: ExteriorOrientation>(
+        layout: &Layout<'_, M>,
+        at: &Linearised,
+        group: &Group,
+    ) -> Result<Self, Unseen> {
+        let blocks = group.blocks.iter();
+        let width = 1 + blocks
+            .map(|block| layout.columns.blocks[*block].len())
+            .sum::<usize>();
+        let mut sums = Self {
+            products: DMatrix::zeros(width, width),
+            cost: 0.0,
+        };
+        let mut rows = PointRows::default();
+        let mut left = Vec::new();
+        for point in &group.points {
+            layout.fill(&mut rows, at, *point)?;
+            rows.eliminate();
+            sums.cost += rows.cost;
+            left.extend_from_slice(&rows.beside[3 * width..]);
+            if left.len() > ROWS_TOGETHER {
+                sums.add(&mut left);
             }
         }
+        sums.add(&mut left);
+        Ok(sums)
+    }
+
+    /// Adds the products of `rows`, one after the other, and empties them.
+    fn add(&mut self, rows: &mut Vec<f64>) {
+        let width = self.products.nrows();
+        let transposed = DMatrixView::from_slice(rows, width, rows.len() / width);
+        self.products
+            .gemm(1.0, &transposed, &transposed.transpose(), 1.0);
+        rows.clear();
     }
 }
 
-/// Sums up the points of `active` and the initial values of the shared unknowns.
+/// The reduced equations of the points in `groups`.
 pub(super) fn reduce<M: ExteriorOrientation>(
     layout: &Layout<'_, M>,
-    state: &State,
-    active: &[usize],
+    at: &Linearised,
+    groups: &PointGroups,
 ) -> Result<Reduced, Unseen> {
-    let columns = layout.columns.len();
-    let part_len = active.len().div_ceil(PARTS).max(1);
-    let parts: Vec<Reduced> = active
-        .par_chunks(part_len)
-        .map(|points| {
-            let mut part = Reduced::zeros(columns);
-            let mut rows = PointRows::default();
-            for point in points {
-                layout.fill(&mut rows, state, *point)?;
-                rows.eliminate();
-                part.add(&rows);
-            }
-            Ok(part)
-        })
-        .collect::<Result<_, Unseen>>()?;
-    let mut sum = Reduced::zeros(columns);
-    for part in parts {
-        sum.matrix += part.matrix;
-        sum.right += part.right;
-        sum.cost += part.cost;
+    let mut sum = Reduced {
+        matrix: BlockMatrix::zeros(&groups.pattern),
+        right: DVector::zeros(layout.columns.len()),
+        cost: 0.0,
+        heights: None,
+    };
+    for groups in groups.groups.chunks(TOGETHER) {
+        let sums: Vec<GroupSums> = groups
+            .par_iter()
+            .map(|group| GroupSums::of(layout, at, group))
+            .collect::<Result<_, Unseen>>()?;
+        for (group, sums) in groups.iter().zip(&sums) {
+            sum.add(layout, group, sums);
+        }
     }
     for (column, sigma) in layout.columns.sigmas.iter().enumerate() {
         // Infinite standard deviations weigh nothing.
         let weight = sigma.powi(-2);
-        let correction = state.corrections[column];
-        sum.matrix[(column, column)] += weight;
+        let correction = at.state.corrections[column];
+        sum.matrix.add_to_diagonal(column, weight);
         sum.right[column] -= weight * correction;
         sum.cost += weight * correction * correction;
     }
     if let Some(heights) = &layout.heights {
-        let heights = ReducedHeights::of(layout, heights, state)?;
-        let (matrix, right, cost) = heights.equations();
-        sum.matrix += matrix;
-        sum.right += right;
-        sum.cost += cost;
+        let heights = ReducedHeights::of(layout, heights, at)?;
+        sum.right += heights.right();
+        sum.cost += heights.weighted_squares();
         sum.heights = Some(heights);
     }
     Ok(sum)
+}
+
+impl Reduced {
+    fn add<M>(&mut self, layout: &Layout<'_, M>, group: &Group, sums: &GroupSums) {
+        self.cost += sums.cost;
+        self.matrix.add(&group.blocks, &sums.products);
+        let columns = group.blocks.iter();
+        let columns = columns.flat_map(|block| layout.columns.blocks[*block].clone());
+        let misclosures = sums.products.column(sums.products.ncols() - 1);
+        for (column, product) in columns.zip(&misclosures) {
+            self.right[column] += product;
+        }
+    }
 }

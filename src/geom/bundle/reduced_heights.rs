@@ -11,7 +11,10 @@
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Vector3};
 
 use super::{
-    HeightResidual, heights::Heights, layout::Layout, point_rows::PointRows, unknowns::State,
+    HeightResidual,
+    heights::Heights,
+    layout::{Layout, Linearised},
+    point_rows::PointRows,
 };
 use crate::geom::pushbroom::{ExteriorOrientation, Unseen};
 
@@ -28,7 +31,8 @@ pub(super) struct ReducedHeights {
     /// `u` of each point, and how the point moves with its height.
     pub(super) turned: Vec<Vector3<f64>>,
     moves: Vec<Vector3<f64>>,
-    /// Covariance of surface and rays together.
+    /// Covariance of surface and rays together, `Σ`, m².
+    pub(super) covariance_m2: DMatrix<f64>,
     factor: Cholesky<f64, Dyn>,
     /// Covariance of the surface alone.
     of_surface: Cholesky<f64, Dyn>,
@@ -38,7 +42,7 @@ impl ReducedHeights {
     pub(super) fn of<M: ExteriorOrientation>(
         layout: &Layout<'_, M>,
         heights: &Heights,
-        state: &State,
+        at: &Linearised,
     ) -> Result<Self, Unseen> {
         let (count, columns) = (heights.points.len(), layout.columns.len());
         let mut misclosures_m = DVector::zeros(count);
@@ -47,9 +51,9 @@ impl ReducedHeights {
         let (mut turned, mut moves) = (Vec::with_capacity(count), Vec::with_capacity(count));
         let mut rows = PointRows::default();
         for (index, point) in heights.points.iter().enumerate() {
-            layout.fill(&mut rows, state, *point)?;
+            layout.fill(&mut rows, at, *point)?;
             let triangle = rows.eliminate();
-            let (difference_m, by_point) = heights.difference_m(state, index);
+            let (difference_m, by_point) = heights.difference_m(&at.state, index);
             let u = triangle
                 .tr_solve_upper_triangular(&by_point)
                 .ok_or(Unseen::BehindCamera)?;
@@ -73,7 +77,7 @@ impl ReducedHeights {
             DVector::from_iterator(count, turned.iter().map(Vector3::norm_squared));
         let with_rays_m2 = &covariance_m2 + DMatrix::from_diagonal(&ray_variances_m2);
         // A covariance that is none comes from points that are nowhere.
-        let factor = Cholesky::new(with_rays_m2).ok_or(Unseen::BehindCamera)?;
+        let factor = Cholesky::new(with_rays_m2.clone()).ok_or(Unseen::BehindCamera)?;
         let of_surface = Cholesky::new(covariance_m2).ok_or(Unseen::BehindCamera)?;
         Ok(Self {
             misclosures_m,
@@ -82,21 +86,17 @@ impl ReducedHeights {
             differences_m,
             turned,
             moves,
+            covariance_m2: with_rays_m2,
             factor,
             of_surface,
         })
     }
 
-    /// What the heights add to the normal equations of the shared unknowns: matrix, right-hand side, and the sum
-    /// that is made small.
-    pub(super) fn equations(&self) -> (DMatrix<f64>, DVector<f64>, f64) {
-        let weighted = self.weighted();
-        let right = -weighted.tr_mul(&self.misclosures_m);
-        (
-            self.by_shared.tr_mul(&weighted),
-            right,
-            self.weighted_squares(),
-        )
+    /// What the heights add to the right-hand side of the shared unknowns' normal equations.
+    pub(super) fn right(&self) -> DVector<f64> {
+        -self
+            .by_shared
+            .tr_mul(&self.factor.solve(&self.misclosures_m))
     }
 
     /// `Σ⁻¹G`.
@@ -118,13 +118,12 @@ impl ReducedHeights {
         moves.map(|(step, pull)| -step * *pull).collect()
     }
 
-    /// Residuals of the heights, with `cofactors` of the shared unknowns.
-    pub(super) fn residuals(
-        &self,
-        heights: &Heights,
-        cofactors: &DMatrix<f64>,
-    ) -> Vec<HeightResidual> {
-        let redundancies = self.redundancies(heights, cofactors);
+    /// Residuals of the heights, `left` being `Σ⁻¹ − Σ⁻¹ G Q Gᵀ Σ⁻¹`, `Q` the cofactors of the shared unknowns.
+    ///
+    /// Redundancy numbers are the diagonal of the covariance of the surface times `left`. Of correlated observations one
+    /// may lie outside `0..=1`; their sum is what counts.
+    pub(super) fn residuals(&self, heights: &Heights, left: &DMatrix<f64>) -> Vec<HeightResidual> {
+        let redundancies = (heights.covariance_m2() * left).diagonal();
         (0..heights.points.len())
             .map(|index| {
                 let variance_m2 = heights.surface.covariance_m2[(index, index)];
@@ -141,15 +140,6 @@ impl ReducedHeights {
                 }
             })
             .collect()
-    }
-
-    /// Diagonal of `C Σ⁻¹ (Σ − G Q Gᵀ) Σ⁻¹`, `C` the covariance of the surface. Of correlated observations one may lie
-    /// outside `0..=1`; their sum is what counts.
-    fn redundancies(&self, heights: &Heights, cofactors: &DMatrix<f64>) -> DVector<f64> {
-        let weighted = self.weighted();
-        let left = heights.covariance_m2()
-            * (self.weights() - &weighted * cofactors * weighted.transpose());
-        left.diagonal()
     }
 
     /// Weighted sum of squared residuals of the heights.

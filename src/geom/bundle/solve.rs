@@ -1,4 +1,4 @@
-//! Gauss–Newton steps, with damping only where a step makes matters worse.
+//! Gauss–Newton steps corrected by what they teach, with damping only where a step makes matters worse.
 
 use std::collections::BTreeSet;
 
@@ -9,18 +9,17 @@ use super::{
     Adjustment, BundleError, BundleOptions, HeightControl, Network, PointRejection,
     check::check,
     compared_heights::compared,
+    factor::Factor,
+    groups::PointGroups,
     heights::Heights,
-    layout::Layout,
+    layout::{Layout, Linearised},
     point_rows::PointRows,
     quality,
+    quasi_newton::QuasiNewton,
     reduce::{Reduced, Settled, reduce},
-    reduced_heights::ReducedHeights,
     unknowns::State,
 };
-use crate::{
-    geom::{normal_equations::ScaledCholesky, pushbroom::ExteriorOrientation},
-    units::METRES_PER_KM,
-};
+use crate::{geom::pushbroom::ExteriorOrientation, units::METRES_PER_KM};
 
 /// A step below this ends the iteration, kilometres and radians.
 const STEP: f64 = 1e-8;
@@ -31,8 +30,14 @@ const CHANGE: f64 = 1e-8;
 const CHANGE_ROBUST: f64 = 1e-6;
 /// A relative rise of the sum below this is rounding, of positions of 4e6 m in the main.
 const ROUNDING: f64 = 1e-10;
-/// Damping after a step that made matters worse, as a share of each unknown's own information.
-const DAMPING: f64 = 1e-6;
+/// Damping after a first step that made matters worse, as a share of each unknown's own information. What only
+/// the initial values hold has so little of its own.
+const DAMPING: f64 = 1e-10;
+/// What each further such step multiplies it with, and each good one.
+const RAISED: f64 = 10.0;
+const EASED: f64 = 0.1;
+/// A step is good when the sum falls by this share of what its equations expect.
+const GOOD_SHARE: f64 = 0.5;
 
 /// Adjusts a network.
 ///
@@ -47,7 +52,7 @@ pub fn solve<M: ExteriorOrientation>(
     let mut layout = Layout::of(network);
     let initial_m = network.points.iter().map(|point| point.ground_m).collect();
     let corrections = DVector::zeros(layout.columns.len());
-    let start = State::new(network, &layout.columns, corrections, initial_m);
+    let start = layout.linearise(State::new(network, &layout.columns, corrections, initial_m));
     let fitness: Vec<Result<(), PointRejection>> = (0..network.points.len())
         .into_par_iter()
         .map_init(PointRows::default, |rows, point| {
@@ -64,14 +69,15 @@ pub fn solve<M: ExteriorOrientation>(
             unknowns,
         });
     }
+    let groups = PointGroups::of(&layout, active);
     let mut history = Vec::new();
-    let mut settled = settle(&layout, start, &active, options.steps_max, &mut history)?;
+    let mut settled = settle(&layout, start, &groups, options.steps_max, &mut history)?;
     if options.robust.is_some() {
         layout.robust = options.robust;
         settled = settle(
             &layout,
-            settled.state,
-            &active,
+            settled.at,
+            &groups,
             options.steps_max,
             &mut history,
         )?;
@@ -79,13 +85,12 @@ pub fn solve<M: ExteriorOrientation>(
     let control = network.heights.as_ref();
     if let Some(control) = control.filter(|of| !of.observed.is_empty()) {
         let mut room = (options.steps_max, &mut history);
-        settled = with_heights(&mut layout, control, settled, &active, &mut room)?;
+        settled = with_heights(&mut layout, control, settled, &groups, &mut room)?;
     }
     let factor = factorise(&layout, &settled.reduced, 0.0)?;
-    let cofactors = factor.inverse();
-    let mut adjustment = quality::judge(&layout, &settled, &fitness, &cofactors);
+    let mut adjustment = quality::judge(&layout, &settled, &groups, &fitness, &factor);
     adjustment.compared = control.map_or_else(Vec::new, |control| {
-        compared(&layout, &settled.state, control, |point| {
+        compared(&layout, &settled.at, control, |point| {
             fitness[point].is_ok()
         })
     });
@@ -126,79 +131,81 @@ fn with_heights<M: ExteriorOrientation>(
     layout: &mut Layout<'_, M>,
     control: &HeightControl,
     mut settled: Settled,
-    active: &[usize],
+    groups: &PointGroups,
     (steps_max, history): &mut (u32, &mut Vec<f64>),
 ) -> Result<Settled, BundleError> {
-    let active_points: BTreeSet<usize> = active.iter().copied().collect();
+    let active_points: BTreeSet<usize> = groups.points.iter().copied().collect();
     let points = control.observed.iter().copied();
     let points = points
         .filter(|point| active_points.contains(point))
         .collect();
-    let heights = Heights::at(&control.surface, points, &settled.state);
+    let heights = Heights::at(&control.surface, points, &settled.at.state);
     layout.heights = Some(heights);
     for _ in 0..HEIGHT_ROUNDS_MAX {
-        settled = settle(layout, settled.state, active, *steps_max, history)?;
+        settled = settle(layout, settled.at, groups, *steps_max, history)?;
         let reduced = settled.reduced.heights.as_ref();
         let (Some(reduced), Some(heights)) = (reduced, layout.heights.as_mut()) else {
             break;
         };
         let changed_m = heights.reweigh(&reduced.misclosures_m, &reduced.ray_variances_m2);
-        if !heights.follow(&control.surface, &settled.state) && changed_m < HEIGHT_CHANGE_M {
+        if !heights.follow(&control.surface, &settled.at.state) && changed_m < HEIGHT_CHANGE_M {
             break;
         }
     }
-    settled.reduced = reduce(layout, &settled.state, active).map_err(|_| not_converged(history))?;
+    settled.reduced = reduce(layout, &settled.at, groups).map_err(|_| not_converged(history))?;
     Ok(settled)
 }
 
 pub(super) fn settle<M: ExteriorOrientation>(
     layout: &Layout<'_, M>,
-    start: State,
-    active: &[usize],
+    start: Linearised,
+    groups: &PointGroups,
     steps_max: u32,
     history: &mut Vec<f64>,
 ) -> Result<Settled, BundleError> {
-    let reduced = reduce(layout, &start, active).map_err(|_| not_converged(history))?;
+    let reduced = reduce(layout, &start, groups).map_err(|_| not_converged(history))?;
     // The second of two iterations begins where the first ended.
     if history.is_empty() {
         history.push(reduced.cost);
     }
-    let mut now = Settled {
-        state: start,
-        reduced,
-    };
+    let mut now = Settled { at: start, reduced };
     let least_change = if layout.robust.is_some() {
         CHANGE_ROBUST
     } else {
         CHANGE
     };
     let mut damping = 0.0;
+    let mut curvature = QuasiNewton::default();
     for _ in 0..steps_max {
         let factor = factorise(layout, &now.reduced, damping)?;
-        let shared = factor.solve(&now.reduced.right);
-        let heights = now.reduced.heights.as_ref();
-        let (next, step) = advance(layout, &now.state, active, &shared, heights)
-            .ok_or_else(|| not_converged(history))?;
+        let (shared, is_corrected) = curvature.step(&now, &factor);
+        let (next, step) =
+            advance(layout, &now, groups, &shared).ok_or_else(|| not_converged(history))?;
         let before = now.reduced.cost;
-        match reduce(layout, &next, active) {
+        let next = layout.linearise(next);
+        match reduce(layout, &next, groups) {
             Ok(reduced) if reduced.cost <= before * (1.0 + ROUNDING) || step < STEP => {
-                let change = (before - reduced.cost).abs();
+                let fall = before - reduced.cost;
                 history.push(reduced.cost);
-                now = Settled {
-                    state: next,
-                    reduced,
-                };
-                if step < STEP || change <= least_change * before {
+                let expected = shared.dot(&now.reduced.right);
+                now = Settled { at: next, reduced };
+                if step < STEP || fall.abs() <= least_change * before {
                     return Ok(now);
                 }
-                // What helped once helps again, until it is needed no more.
-                damping = if damping > DAMPING {
-                    0.1 * damping
-                } else {
-                    0.0
-                };
+                if fall > GOOD_SHARE * expected {
+                    damping *= EASED;
+                }
+                if damping < DAMPING {
+                    damping = 0.0;
+                }
             }
-            _ => damping = DAMPING.max(10.0 * damping),
+            _ => {
+                curvature.forget();
+                // A step that learnt from others may have learnt too much.
+                if !is_corrected {
+                    damping = DAMPING.max(RAISED * damping);
+                }
+            }
         }
     }
     Err(not_converged(history))
@@ -215,12 +222,16 @@ fn factorise<M>(
     layout: &Layout<'_, M>,
     reduced: &Reduced,
     damping: f64,
-) -> Result<ScaledCholesky, BundleError> {
-    let mut matrix = reduced.matrix.clone();
-    for index in 0..matrix.nrows() {
-        matrix[(index, index)] *= 1.0 + damping;
-    }
-    ScaledCholesky::new(matrix).map_err(|singular| BundleError::Singular {
+) -> Result<Factor, BundleError> {
+    let damped = (damping > 0.0).then(|| {
+        let mut matrix = reduced.matrix.clone();
+        for (column, information) in reduced.matrix.diagonal().into_iter().enumerate() {
+            matrix.add_to_diagonal(column, damping * information);
+        }
+        matrix
+    });
+    let matrix = damped.as_ref().unwrap_or(&reduced.matrix);
+    Factor::new(matrix, reduced.heights.as_ref()).map_err(|singular| BundleError::Singular {
         unknowns: singular
             .unknowns
             .into_iter()
@@ -232,29 +243,30 @@ fn factorise<M>(
 /// The state after a step of the shared unknowns, and the length of the whole step.
 fn advance<M: ExteriorOrientation>(
     layout: &Layout<'_, M>,
-    state: &State,
-    active: &[usize],
+    Settled { at, reduced }: &Settled,
+    groups: &PointGroups,
     shared: &DVector<f64>,
-    heights: Option<&ReducedHeights>,
 ) -> Option<(State, f64)> {
-    let steps_m: Vec<Vector3<f64>> = active
+    let steps_m: Vec<Vector3<f64>> = groups
+        .points
         .par_iter()
         .map_init(PointRows::default, |rows, point| {
-            layout.fill(rows, state, *point).ok()?;
+            layout.fill(rows, at, *point).ok()?;
             rows.point_step_m(shared)
         })
         .collect::<Option<_>>()?;
+    let state = &at.state;
     let mut points_m = state.points_m.clone();
-    for (point, step_m) in active.iter().zip(&steps_m) {
+    for (point, step_m) in groups.points.iter().zip(&steps_m) {
         points_m[*point] += step_m;
     }
-    if let (Some(heights), Some(reduced)) = (&layout.heights, heights) {
+    if let (Some(heights), Some(reduced)) = (&layout.heights, &reduced.heights) {
         for (point, move_m) in heights.points.iter().zip(reduced.moves_m(shared)) {
             points_m[*point] += move_m;
         }
     }
     let mut longest = 0.0_f64;
-    for point in active {
+    for point in &groups.points {
         let step_m = points_m[*point] - state.points_m[*point];
         longest = longest.max(step_m.norm() / METRES_PER_KM);
     }

@@ -4,7 +4,9 @@ use nalgebra::{DMatrix, DVector, Vector2, Vector3};
 
 use super::{
     BundleImage, BundleOptions, BundlePoint, Network, ORIENTATION_UNKNOWNS, Range, View,
-    layout::Layout,
+    factor::Factor,
+    groups::PointGroups,
+    layout::{Layout, Linearised},
     point_rows::PointRows,
     reduce::reduce,
     solve,
@@ -12,7 +14,7 @@ use super::{
 };
 use crate::geom::{
     collinearity::project,
-    pushbroom::{Distortion, EulerPolynomial, ExteriorOrientation, VectorPolynomial},
+    pushbroom::{Distortion, EulerPolynomial, ExteriorOrientation, Sighting, VectorPolynomial},
 };
 
 const FOCAL_LENGTH_PX: f64 = 3_500.0 / 0.026;
@@ -215,12 +217,12 @@ fn derivatives_at(
 /// Rows of a point in all shared unknowns and all coordinates, and their misclosures.
 pub(super) fn dense_rows(
     layout: &Layout<'_, EulerPolynomial>,
-    state: &State,
+    at: &Linearised,
     point: usize,
 ) -> (DMatrix<f64>, DVector<f64>) {
     let shared = layout.columns.len();
     let mut rows = PointRows::default();
-    layout.fill(&mut rows, state, point).unwrap();
+    layout.fill(&mut rows, at, point).unwrap();
     let count = rows.weights.len();
     let mut dense = DMatrix::zeros(count, shared + 3 * layout.network.points.len());
     let mut misclosures = DVector::zeros(count);
@@ -236,16 +238,73 @@ pub(super) fn dense_rows(
     (dense, misclosures)
 }
 
+/// A chain of images side by side: each point is seen by two neighbours, or by an image and the next but one.
+fn chain() -> Network<EulerPolynomial> {
+    let mut network = network();
+    network.images = (0..7)
+        .map(|number| {
+            image(
+                40e3 * f64::from(number) - 120e3,
+                0.1 * f64::from(3 - number),
+            )
+        })
+        .collect();
+    network.ranges.clear();
+    network.views.clear();
+    let ground_m: Vec<Vector3<f64>> = network.points.iter().map(|point| point.ground_m).collect();
+    network.points.clear();
+    for first in 0..6 {
+        let second = (first + 1 + first % 2).min(6);
+        for ground_m in &ground_m {
+            for image in [first, second] {
+                let base = &network.images[image].base;
+                let seen = Sighting::near(base, &Distortion::NONE, 0.0, ground_m, 1e-3).unwrap();
+                let focal = project(&seen.solution.camera_m, FOCAL_LENGTH_PX).unwrap();
+                let point = network.points.len();
+                let error = 0.4 * (1.7 * (point + 5 * image) as f64).sin();
+                network.views.push(View {
+                    point,
+                    image,
+                    x_lines: seen.solution.x + error,
+                    y_px: focal.y - error,
+                    sigma_px: Vector2::new(1.0, 0.8),
+                });
+            }
+            network.points.push(BundlePoint {
+                ground_m: *ground_m,
+                sigma_m: None,
+            });
+        }
+    }
+    network
+}
+
 #[test]
 fn elimination_equals_the_dense_equations() {
-    let network = network();
-    let (layout, state, active) = layout(&network);
+    against_dense(&network());
+}
+
+#[test]
+fn sparse_equations_equal_the_dense_ones() {
+    let network = chain();
+    let (layout, start, active) = layout(&network);
+    let at = layout.linearise(start);
+    let groups = PointGroups::of(&layout, active);
+    let reduced = reduce(&layout, &at, &groups).unwrap();
+    let last = layout.columns.len() - 1;
+    assert_eq!(reduced.matrix.element(0, last), None); // the first image shares nothing with the last
+    against_dense(&network);
+}
+
+fn against_dense(network: &Network<EulerPolynomial>) {
+    let (layout, state, active) = layout(network);
+    let at = layout.linearise(state);
     let shared = layout.columns.len();
     let unknowns = shared + 3 * active.len();
     let mut normal = DMatrix::zeros(unknowns, unknowns);
     let mut right = DVector::zeros(unknowns);
     for point in &active {
-        let (dense, misclosures) = dense_rows(&layout, &state, *point);
+        let (dense, misclosures) = dense_rows(&layout, &at, *point);
         normal += dense.tr_mul(&dense);
         right += dense.tr_mul(&misclosures);
     }
@@ -263,9 +322,10 @@ fn elimination_equals_the_dense_equations() {
         .component_mul(&scale);
     let dense_cofactors = factor.inverse();
 
-    let reduced = reduce(&layout, &state, &active).unwrap();
-    let cholesky = crate::geom::normal_equations::ScaledCholesky::new(reduced.matrix).unwrap();
-    let step = cholesky.solve(&reduced.right);
+    let groups = PointGroups::of(&layout, active);
+    let reduced = reduce(&layout, &at, &groups).unwrap();
+    let factor = Factor::new(&reduced.matrix, None).unwrap();
+    let step = factor.solve(&reduced.right);
     for (column, sigma) in layout.columns.sigmas.iter().enumerate() {
         // As shares of the standard deviations; steps are of their order.
         assert!(
@@ -273,20 +333,39 @@ fn elimination_equals_the_dense_equations() {
             "{column}"
         );
     }
-    let inverse = cholesky.inverse();
+    let inverse = factor.cofactors(&reduced.matrix);
     for column in 0..shared {
-        let dense = dense_cofactors[(column, column)] * scale[column].powi(2);
-        assert!((inverse[(column, column)] / dense - 1.0).abs() < 1e-9);
+        for row in 0..=column {
+            let Some(found) = inverse.element(row, column) else {
+                continue;
+            };
+            // As shares of the variances.
+            let variances = [row, column].map(|at| dense_cofactors[(at, at)].sqrt() * scale[at]);
+            let dense = dense_cofactors[(row, column)] * scale[row] * scale[column];
+            assert!((found - dense).abs() < 1e-9 * variances[0] * variances[1]);
+        }
     }
-    for point in active {
+    for point in &groups.points {
         let mut rows = PointRows::default();
-        layout.fill(&mut rows, &state, point).unwrap();
+        layout.fill(&mut rows, &at, *point).unwrap();
         let step_m = rows.point_step_m(&step).unwrap();
         for axis in 0..3 {
             let dense_m = dense_step[shared + 3 * point + axis];
-            assert!((step_m[axis] - dense_m).abs() < 1e-9 * dense_step.rows(shared, 3 * 9).amax());
+            let largest_m = dense_step.rows(shared, 3 * groups.points.len()).amax();
+            assert!((step_m[axis] - dense_m).abs() < 1e-9 * largest_m);
         }
     }
+}
+
+#[test]
+fn the_number_of_threads_changes_nothing() {
+    let network = chain();
+    let with_threads = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads);
+        let pool = pool.build().unwrap();
+        pool.install(|| solve(&network, &BundleOptions::default()).unwrap())
+    };
+    assert_eq!(with_threads(1), with_threads(5));
 }
 
 #[test]
@@ -309,11 +388,12 @@ fn cofactors_of_points_equal_those_of_the_dense_equations() {
         .map(|point| point.unwrap().ground_m)
         .collect();
     let state = State::new(&network, &layout.columns, corrections, points_m);
+    let at = layout.linearise(state);
     let shared = layout.columns.len();
     let unknowns = shared + 3 * active.len();
     let mut normal = DMatrix::zeros(unknowns, unknowns);
     for point in &active {
-        let (dense, _) = dense_rows(&layout, &state, *point);
+        let (dense, _) = dense_rows(&layout, &at, *point);
         normal += dense.tr_mul(&dense);
     }
     for (column, sigma) in layout.columns.sigmas.iter().enumerate() {

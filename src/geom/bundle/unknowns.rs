@@ -96,6 +96,8 @@ pub(super) struct Columns {
     pub(super) of_image: Vec<[Option<usize>; ORIENTATION_UNKNOWNS + 1]>,
     /// All columns of each image: they stand side by side.
     pub(super) images: Vec<Range<usize>>,
+    /// Columns that stand side by side because they belong to one image or profile.
+    pub(super) blocks: Vec<Range<usize>>,
     /// Column of each profile's bias.
     pub(super) of_profile: Vec<Option<usize>>,
 }
@@ -107,6 +109,7 @@ impl Columns {
             sigmas: Vec::new(),
             of_image: Vec::new(),
             images: Vec::new(),
+            blocks: Vec::new(),
             of_profile: Vec::new(),
         };
         for (image, entry) in network.images.iter().enumerate() {
@@ -125,6 +128,10 @@ impl Columns {
             let column = columns.add(Unknown::RangeBias { profile }, *sigma_m);
             columns.of_profile.push(column);
         }
+        let of_profiles = columns.of_profile.iter().flatten();
+        let of_profiles = of_profiles.map(|column| *column..column + 1);
+        let blocks = columns.images.iter().cloned().chain(of_profiles);
+        columns.blocks = blocks.filter(|block| !block.is_empty()).collect();
         columns
     }
 
@@ -139,6 +146,11 @@ impl Columns {
 
     pub(super) fn len(&self) -> usize {
         self.unknowns.len()
+    }
+
+    /// The block of a column.
+    pub(super) fn block_of(&self, column: usize) -> usize {
+        self.blocks.partition_point(|block| block.end <= column)
     }
 }
 

@@ -119,7 +119,8 @@ pub struct AdjustmentSummary {
     /// Range bias of each profile with its standard deviation, metres, where they are unknown.
     #[schemars(transform = at("/items/prefixItems/2", "minimum", 0))]
     pub range_biases_m: Vec<(String, f64, f64)>,
-    /// Unknowns with a correlation above 0.95: single values of them must not be interpreted.
+    /// Unknowns of one image, or of images that share points, with a correlation above 0.95: single values of them must
+    /// not be interpreted.
     #[schemars(transform = at("/items/prefixItems/2", "minimum", -1.000_001))]
     #[schemars(transform = at("/items/prefixItems/2", "maximum", 1.000_001))]
     pub correlated: Vec<(String, String, f64)>,

@@ -1,0 +1,60 @@
+//! An order of blocks in which those that occur together stand close together.
+
+use std::collections::VecDeque;
+
+use super::BlockPattern;
+
+/// The reverse Cuthill–McKee order: the block at each position. Equal candidates are taken by their index.
+pub(super) fn order(pattern: &BlockPattern) -> Vec<usize> {
+    let neighbours = neighbours(pattern);
+    let mut order = Vec::with_capacity(neighbours.len());
+    let mut is_taken = vec![false; neighbours.len()];
+    let mut by_degree: Vec<usize> = (0..neighbours.len()).collect();
+    by_degree.sort_by_key(|block| neighbours[*block].len());
+    for start in by_degree {
+        if is_taken[start] {
+            continue;
+        }
+        // An end of its part of the network: the last of a breadth-first walk, from anywhere.
+        let walk = breadth_first(&neighbours, start, &mut is_taken.clone());
+        let end = walk.last().copied().unwrap_or(start);
+        order.extend(breadth_first(&neighbours, end, &mut is_taken));
+    }
+    order.reverse();
+    order
+}
+
+/// What each block meets, those with the fewest neighbours first.
+fn neighbours(pattern: &BlockPattern) -> Vec<Vec<usize>> {
+    let mut neighbours = vec![Vec::new(); pattern.blocks()];
+    for block in 0..pattern.blocks() {
+        for other in pattern.met(block) {
+            if *other != block {
+                neighbours[block].push(*other);
+                neighbours[*other].push(block);
+            }
+        }
+    }
+    let degrees: Vec<usize> = neighbours.iter().map(Vec::len).collect();
+    for list in &mut neighbours {
+        list.sort_by_key(|block| (degrees[*block], *block));
+    }
+    neighbours
+}
+
+/// Blocks not yet taken that hang together with `start`, from near to far.
+fn breadth_first(neighbours: &[Vec<usize>], start: usize, is_taken: &mut [bool]) -> Vec<usize> {
+    let mut reached = Vec::new();
+    let mut queue = VecDeque::from([start]);
+    is_taken[start] = true;
+    while let Some(block) = queue.pop_front() {
+        reached.push(block);
+        for next in &neighbours[block] {
+            if !is_taken[*next] {
+                is_taken[*next] = true;
+                queue.push_back(*next);
+            }
+        }
+    }
+    reached
+}

@@ -1,0 +1,53 @@
+//! What cannot be adjusted.
+
+use super::{
+    Part,
+    unknowns::{Unknown, names},
+};
+
+/// A network that cannot be adjusted.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum BundleError {
+    /// A standard deviation, coordinate or number that is none.
+    #[error("{what} of {part} is {value}, expected {expected}")]
+    Value {
+        /// What it belongs to.
+        part: Part,
+        /// What it is.
+        what: &'static str,
+        /// The value.
+        value: f64,
+        /// What it should be.
+        expected: &'static str,
+    },
+    /// An index of a point, image or profile that the network does not have.
+    #[error("{part} belongs to {missing}, which the network does not have")]
+    Unmatched {
+        /// View or range.
+        part: Part,
+        /// What is missing.
+        missing: Part,
+    },
+    /// Unknowns that the observations do not separate.
+    #[error("the network is singular: the observations do not separate {}", names(.unknowns))]
+    Singular {
+        /// The weakest combination.
+        unknowns: Vec<Unknown>,
+    },
+    /// Fewer observations than unknowns.
+    #[error("{observations} observations for {unknowns} unknowns")]
+    Underdetermined {
+        /// Observations.
+        observations: usize,
+        /// Unknowns.
+        unknowns: usize,
+    },
+    /// The steps do not converge.
+    #[error("did not converge after {steps} steps; weighted sum of squares {weighted_squares:.6e}")]
+    NotConverged {
+        /// Steps taken.
+        steps: usize,
+        /// The sum where it was given up.
+        weighted_squares: f64,
+    },
+}

@@ -1,0 +1,93 @@
+//! What Gauss–Newton steps leave out, learnt from how the gradient changes.
+//!
+//! Gauss–Newton neglects the curvature of the observations times their residuals. Of very many noisy ties that sums up:
+//! along what only the initial orientations hold, slow bends that all images share, it is as large as all that is known,
+//! of either sign. Steps then come to rest only slowly, and where the sign is negative they swing from one side to the other.
+//! The change of the gradient from step to step shows this curvature.
+//!
+//! # Source
+//! Nocedal 1980, Updating quasi-Newton matrices with limited storage; the equations of Gauss–Newton are its initial matrix.
+
+use nalgebra::DVector;
+
+use super::{factor::Factor, reduce::Settled};
+
+/// Steps that are remembered.
+const REMEMBERED: usize = 8;
+/// A remembered step counts if the curvature along it is at least this share of that of Gauss–Newton.
+const CURVATURE_MIN: f64 = 1e-3;
+/// Steps are remembered where Gauss–Newton expects less than this relative fall of the sum of squares: farther off, the
+/// equations themselves change.
+const NEAR: f64 = 1e-3;
+
+/// Where the last steps began.
+#[derive(Default)]
+pub(super) struct QuasiNewton {
+    /// Corrections of the shared unknowns, and the right-hand side there: the gradient with its sign turned.
+    visited: Vec<(DVector<f64>, DVector<f64>)>,
+}
+
+impl QuasiNewton {
+    /// The step from `now`, and whether it is more than that of Gauss–Newton.
+    pub(super) fn step(&mut self, now: &Settled, factor: &Factor) -> (DVector<f64>, bool) {
+        let right = &now.reduced.right;
+        let step = factor.solve(right);
+        if step.dot(right) > NEAR * now.reduced.cost {
+            self.forget();
+            return (step, false);
+        }
+        let corrections = now.at.state.corrections.clone();
+        self.visited.push((corrections, right.clone()));
+        if self.visited.len() > REMEMBERED + 1 {
+            self.visited.remove(0);
+        }
+        let pairs = self.pairs(factor);
+        if pairs.is_empty() {
+            return (step, false);
+        }
+        let mut left = right.clone();
+        let mut shares = Vec::with_capacity(pairs.len());
+        for pair in pairs.iter().rev() {
+            let share = pair.step.dot(&left) / pair.curvature;
+            left -= &pair.change * share;
+            shares.push(share);
+        }
+        let mut step = factor.solve(&left);
+        for (pair, share) in pairs.iter().zip(shares.iter().rev()) {
+            let taken = pair.change.dot(&step) / pair.curvature;
+            step += &pair.step * (share - taken);
+        }
+        (step, true)
+    }
+
+    /// Forgets the former steps.
+    pub(super) fn forget(&mut self) {
+        self.visited.clear();
+    }
+
+    /// The steps that show a curvature, oldest first.
+    fn pairs(&self, factor: &Factor) -> Vec<Pair> {
+        let pairs = self.visited.windows(2).filter_map(|between| {
+            let [(from, before), (to, after)] = between else {
+                return None;
+            };
+            let (step, change) = (to - from, before - after);
+            let curvature = step.dot(&change);
+            let expected = change.dot(&factor.solve(&change));
+            (curvature > CURVATURE_MIN * expected).then_some(Pair {
+                step,
+                change,
+                curvature,
+            })
+        });
+        pairs.collect()
+    }
+}
+
+/// A step and what it did to the gradient.
+struct Pair {
+    step: DVector<f64>,
+    change: DVector<f64>,
+    /// Their product.
+    curvature: f64,
+}
