@@ -190,14 +190,11 @@ fn comment(image: &AdjustedImage, to: &AdjustedKernels) -> String {
     let times = image.times;
     let bias_s = to.pointing.bias_of(&times.instrument).seconds();
     let usual_s = times.instrument.pointing.ck_bias_s;
-    let camera = &times.instrument.name;
     let others = if (bias_s - usual_s).abs() < BIAS_TOLERANCE_S {
-        format!(
-            "ISIS and ALE read attitude of {camera} there by themselves: load the file as it is."
-        )
+        "ISIS and ALE read attitude there by themselves: load the file as it is.".to_owned()
     } else {
         format!(
-            "ISIS and ALE read attitude of {camera} {usual_s:.3} s from the exposure whatever the kernel says: this file is \n\
+            "ISIS and ALE read attitude {usual_s:.3} s from the exposure whatever the kernel says: this file is \n\
              not for them."
         )
     };
