@@ -1,15 +1,10 @@
-//! Constants of the mission, each with its source and sign; those of Mars stand in `config/bodies/mars.toml`.
+//! Constants of the mission, each with its source and sign; those of Mars stand in `config/bodies/mars.toml`, those
+//! of the spacecraft in `config/spacecraft`.
 
 use std::sync::LazyLock;
 
 use serde::Deserialize;
 
-/// NAIF id of the Mars Global Surveyor spacecraft and of its clock.
-pub const NAIF_MGS: i32 = -94;
-/// Name of the spacecraft in labels, where underscores may stand for blanks.
-pub const MGS_NAME: &str = "MARS GLOBAL SURVEYOR";
-/// NAIF id of the spacecraft bus frame `MGS_SPACECRAFT` and of its attitude kernels.
-pub const NAIF_MGS_BUS: i32 = -94_000;
 /// NAIF id of the frame `IAU_MARS`.
 pub const NAIF_IAU_MARS: i32 = 10_014;
 /// NAIF id of the centre of Mars.
@@ -62,6 +57,34 @@ pub static MARS_IAU2000: LazyLock<MarsModel> = LazyLock::new(|| MARS.iau2000.nam
 static MARS: LazyLock<Body> =
     LazyLock::new(|| of_the_program(include_str!("../config/bodies/mars.toml")));
 
+/// The spacecraft whose clock, orbit and attitude are read.
+pub static SPACECRAFT: LazyLock<Spacecraft> =
+    LazyLock::new(|| of_the_program(include_str!("../config/spacecraft/mgs.toml")));
+
+/// A spacecraft, as its file under `config/spacecraft` says.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Spacecraft {
+    /// Identifier, the name of its file; kernels of its archive have names that begin with it and an underscore.
+    pub id: String,
+    /// Its name in messages and in serial numbers of ISIS.
+    pub name: String,
+    /// Its name in full.
+    pub full_name: String,
+    /// Its name in labels, where underscores may stand for blanks.
+    pub label_name: String,
+    /// NAIF id of the spacecraft and of its clock.
+    pub naif: i32,
+    /// NAIF id of the frame of its bus, the object of attitude kernels.
+    pub bus: i32,
+    /// Name of that frame.
+    pub bus_frame: String,
+    /// A file of the archive that defines clock and frame.
+    pub clock_kernel: String,
+    /// Where these come from.
+    pub source: String,
+}
+
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 #[allow(
@@ -110,8 +133,8 @@ impl Report {
 
 #[expect(
     clippy::panic,
-    reason = "a program built with a bad file of its own; every test on Mars reads it"
+    reason = "a program built with a bad file of its own; every test on Mars or with kernels reads it"
 )]
-fn of_the_program(text: &str) -> Body {
-    toml::from_str(text).unwrap_or_else(|error| panic!("built with a bad file of Mars: {error}"))
+fn of_the_program<T: serde::de::DeserializeOwned>(text: &str) -> T {
+    toml::from_str(text).unwrap_or_else(|error| panic!("built with a bad file: {error}"))
 }

@@ -88,8 +88,8 @@ frames! {
     MarsIau1994 = "IAU_MARS (1994)": MARS_IAU1994;
     /// Mars body-fixed, IAU 2000 report (W₀ = 176.630°); the frame of every product.
     MarsIau2000 = "IAU_MARS (2000)": MARS_IAU2000;
-    /// Bus of Mars Global Surveyor: +Z towards nadir, flight along −X.
-    MgsBus = "MGS_SPACECRAFT";
+    /// Bus of the spacecraft: +Z towards nadir, flight along −X.
+    SpacecraftBus = "bus";
     /// A camera: +Z boresight, +Y along the detector.
     CameraFrame = "camera";
 }

@@ -176,12 +176,14 @@ impl Instrument {
 }
 
 /// A laser altimeter.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Altimeter {
     /// Identifier, the name of its file.
     pub id: String,
     /// Its name, for people.
     pub name: String,
+    /// Its name in full.
+    pub full_name: String,
     /// Size of the error of its time tags, seconds.
     pub clock_bias_s: f64,
     /// Where that comes from; products repeat it.

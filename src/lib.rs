@@ -17,6 +17,7 @@ pub mod geom;
 pub mod image;
 pub mod instruments;
 pub mod kernel_source;
+pub mod line_times;
 pub mod pds;
 pub mod products;
 pub mod report;

@@ -6,6 +6,7 @@
     reason = "helpers of tests may fail loudly"
 )]
 
+mod common;
 #[path = "network/recipe.rs"]
 mod recipe;
 #[path = "pushbroom/scene.rs"]
@@ -66,7 +67,7 @@ fn oriented_camera<M>(
             samples: 2.0 * HALF_SWATH_PX,
             distortion: Distortion::NONE,
         },
-        lines: 2.0 * entry.half_lines,
+        line_times: common::line_times(2.0 * entry.half_lines, entry.line_period_s),
     }
 }
 

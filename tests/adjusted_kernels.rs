@@ -17,6 +17,7 @@ use areograph::{
     error::{Kind, Locate, Result},
     frames::Rotation,
     geom::{attitude::matrix_of_rotation_vector, light_time::LightTime},
+    line_times::LineTimes,
     products::{
         AdjustedImage, AdjustedKernels, Product, attitude_kernel, position_kernel,
         write_adjusted_kernels,
@@ -109,7 +110,8 @@ fn between_samples(image: &Image, set: &KernelSet, shift_lines: f64) {
         .map(|k| {
             image
                 .times
-                .start
+                .line_times
+                .start()
                 .plus(image.times.duration_s() * (f64::from(k) + 0.37) / 97.0)
         })
         .collect();
@@ -119,7 +121,10 @@ fn between_samples(image: &Image, set: &KernelSet, shift_lines: f64) {
         instants.iter().map(camera).collect()
     };
     let found = cameras(set, 0.0);
-    let original = cameras(&image.set, shift_lines * image.times.line_period_s);
+    let original = cameras(
+        &image.set,
+        shift_lines * image.times.line_times.mean_period_s(),
+    );
     for ((et, found), (position_m, camera_to_mars)) in instants.iter().zip(&found).zip(original) {
         let correction = curved(image.times.line_offset(*et));
         let distance_m = (found.0 - position_m - correction.position_m).norm();
@@ -268,8 +273,8 @@ fn the_metakernel_counts_paths_from_where_the_files_go_in_the_end() {
 fn another_bias_is_kept_and_the_comment_warns_of_isis() {
     let mut image = Image::of_scene("E02-02016");
     image.pointing = PointingConfig {
-        ck_bias: PointingBias::from_seconds(-1.0),
-        source: String::new(),
+        ck_bias: Some(PointingBias::from_seconds(-1.0)),
+        source: None,
     };
     let original = image.sampled_with(&image.set);
     let adjusted = reorient(&original, &image.times, 0.0, curved).unwrap();
@@ -309,7 +314,13 @@ fn images_shortly_after_one_another_do_not_reach_into_each_other() {
     let first = Image::of_scene("E02-02016");
     let mut second = Image::of_scene("E02-02016");
     // Nearer than the padding of 1 s, and than what positions reach beyond it.
-    second.times.start = first.times.exposures().stop.plus(0.06);
+    let of_first = &first.times.line_times;
+    second.times.line_times = LineTimes::even(
+        of_first.interval().stop.plus(0.06),
+        of_first.lines(),
+        of_first.mean_period_s(),
+    )
+    .unwrap();
     second.times.id = "E02-02016b".to_owned();
     second.orientation = second.sampled_with(&second.set);
     let images = [first, second];

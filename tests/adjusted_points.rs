@@ -18,7 +18,7 @@ use areograph::{
     pds::ties::read_ties,
     products::{
         ControlMeasure, ControlNetwork, ControlPoint, GroundEstimate, ImageMeasure, LidarPoint,
-        NetworkMeasure, NetworkPoint, moc_serial_number, write_control_network, write_gcp,
+        NetworkMeasure, NetworkPoint, isis_serial_number, write_control_network, write_gcp,
         write_lidar_data,
     },
     spice::{KernelSet, Session},
@@ -250,11 +250,11 @@ fn serial_numbers_are_those_of_a_real_network() {
         fields: ImageFields::default(),
     };
     let mut times = tag_times(&[image], &session).unwrap().remove(0);
-    let serial = moc_serial_number(&times).unwrap();
+    let serial = isis_serial_number(&times).unwrap();
     let network = fs::read_to_string(network).unwrap();
     assert!(network.contains(&format!(",{serial},")), "{serial}");
     times.sclk_start = None;
-    assert_eq!(moc_serial_number(&times), None);
+    assert_eq!(isis_serial_number(&times), None);
 }
 
 #[test]

@@ -34,6 +34,7 @@ const FLOORS: [&[&str]; 6] = [
         "image",
         "instruments",
         "kernel_source",
+        "line_times",
     ],
     &["geom", "config"],
     &["spice", "pds", "scene"],
@@ -245,4 +246,83 @@ fn files_stay_short() {
             file.display()
         );
     }
+}
+
+/// Words that name the spacecraft or one of its cameras.
+const INSTRUMENT_WORDS: [&str; 2] = ["mgs", "moc"];
+
+/// Where they may stand in code, and why; comments may say where a rule comes from.
+const NAME_INSTRUMENTS: [(&str, &str); 8] = [
+    ("src/pds", "reads the labels and files of the mission"),
+    ("src/scene", "imitates the mission, whose files it names"),
+    (
+        "src/constants.rs",
+        "the one line that takes in the file of the spacecraft",
+    ),
+    (
+        "src/config/instruments.rs",
+        "the list of instrument files that are built in",
+    ),
+    ("src/config/images.rs", "examples of keys"),
+    ("src/config/kernels.rs", "examples of keys"),
+    ("src/config/pointing.rs", "examples of keys"),
+    ("src/products/kernel_report.rs", "keys of SpiceQL"),
+];
+
+#[test]
+fn only_data_and_label_reading_name_an_instrument() {
+    let mut named = Vec::new();
+    let mut unused: BTreeSet<&str> = NAME_INSTRUMENTS.iter().map(|(path, _)| *path).collect();
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let mut files = Vec::new();
+    files_below(&root.join("src"), &mut files);
+    for file in files {
+        let text = fs::read_to_string(&file).unwrap();
+        let path = file.strip_prefix(root).unwrap();
+        // Tests of a file stand at its end, and may take their examples from the mission.
+        let code = text.split("#[cfg(test)]").next().unwrap();
+        let lines = code.lines().enumerate();
+        let naming = lines.filter(|(_, line)| !line.trim_start().starts_with("//") && names(line));
+        for (number, line) in naming {
+            let excused = NAME_INSTRUMENTS
+                .iter()
+                .find(|(allowed, _)| path.starts_with(allowed));
+            match excused {
+                Some((allowed, _)) => {
+                    unused.remove(allowed);
+                }
+                None => named.push(format!(
+                    "{}:{}: {}",
+                    path.display(),
+                    number + 1,
+                    line.trim()
+                )),
+            }
+        }
+    }
+    assert!(
+        named.is_empty(),
+        "put what belongs to an instrument into a file under config/:\n{}",
+        named.join("\n")
+    );
+    assert!(
+        unused.is_empty(),
+        "nothing to excuse any more in {unused:?}"
+    );
+}
+
+/// Whether one of the words stands in a line of code, alone or as a part of a name.
+fn names(line: &str) -> bool {
+    // `MocLabel` and `NAIF_MGS` are words with parts, as `moc_na` is.
+    let mut parts = String::new();
+    let mut before = ' ';
+    for c in line.chars() {
+        if c.is_uppercase() && before.is_lowercase() {
+            parts.push(' ');
+        }
+        parts.push(if c.is_alphanumeric() { c } else { ' ' });
+        before = c;
+    }
+    let mut parts = parts.split_whitespace();
+    parts.any(|part| INSTRUMENT_WORDS.contains(&&*part.to_lowercase()))
 }

@@ -177,6 +177,22 @@ const CASES: &[(&str, Spoil)] = &[
         case.replace("site.toml", "label", "instrument = \"camera.toml\"\nlabel");
         case.run()
     }),
+    ("altimeter_file_is_bad", |case| {
+        let file = include_str!("../config/altimeters/mola.toml")
+            .replace("bias_s = 0.117", "bias_s = -0.117")
+            .replace("full_name", "fullname");
+        case.write("laser.toml", file);
+        case.replace(
+            "site.toml",
+            "site = ",
+            "altimeter = \"laser.toml\"\nsite = ",
+        );
+        case.run()
+    }),
+    ("altimeter_is_unknown", |case| {
+        case.replace("site.toml", "site = ", "altimeter = \"lola\"\nsite = ");
+        case.run()
+    }),
     ("instrument_is_unknown", |case| {
         case.replace("site.toml", "label", "instrument = \"moc_wa\"\nlabel");
         case.run()

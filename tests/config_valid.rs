@@ -153,6 +153,67 @@ fn the_hash_follows_values_and_nothing_else() {
     );
 }
 
+/// A site file without images, in the folder of the test.
+fn parse_with(folder: &tempfile::TempDir, lines: &str, images: &str) -> SiteConfig {
+    let text = format!(
+        "site = 'laser'\n{lines}\nkernels.metakernel = '../kernels/scene.tm'\n[[images]]\nid = 'a'\n\
+         sclk_start = '619971158:28'\nexposure_ms = 0.4821\ndowntrack_summing = 8\nlines_header = 1536\n\
+         samples = 256\n{images}\n"
+    );
+    parse_in(folder, &text).site
+}
+
+#[test]
+fn a_site_takes_the_clock_bias_of_its_own_altimeter() {
+    let folder = folder();
+    let own = fs::read_to_string(below_package("config/altimeters/mola.toml")).unwrap();
+    let own = own
+        .replace("bias_s = 0.117", "bias_s = 0.25")
+        .replace("source = \"", "source = \"own: ");
+    fs::write(folder.path().join("sites/laser.toml"), own).unwrap();
+    let of_file = parse_with(&folder, "altimeter = 'laser.toml'", "").mola_clock;
+    assert!((of_file.bias_s - 0.25).abs() < f64::EPSILON);
+    assert!(
+        of_file.source.starts_with("own: Shan et al. 2005"),
+        "{}",
+        of_file.source
+    );
+    let written = parse_with(
+        &folder,
+        "altimeter = 'laser.toml'\nmola_clock.bias_s = 0.1",
+        "",
+    );
+    assert!((written.mola_clock.bias_s - 0.1).abs() < f64::EPSILON);
+    let usual = parse_with(&folder, "", "").mola_clock;
+    assert!((usual.bias_s - config::usual_altimeter().clock_bias_s).abs() < f64::EPSILON);
+}
+
+#[test]
+fn every_camera_has_its_own_pointing_bias_unless_the_site_has_one() {
+    let folder = folder();
+    let own = fs::read_to_string(below_package("config/instruments/moc_na.toml")).unwrap();
+    let own = own.replace("ck_bias_s = -1.15", "ck_bias_s = -0.4");
+    fs::write(folder.path().join("sites/camera.toml"), own).unwrap();
+    let bias_s = |site: &SiteConfig| {
+        let camera = site.images[0].instrument.as_ref();
+        let camera = camera.unwrap_or(config::usual_instrument());
+        (
+            site.pointing.bias_of(camera).seconds(),
+            site.pointing.source_of(camera).to_owned(),
+        )
+    };
+    let images = "instrument = 'camera.toml'";
+    let (of_camera_s, source) = bias_s(&parse_with(&folder, "", images));
+    assert!(
+        (of_camera_s + 0.4).abs() < f64::EPSILON && source.starts_with("INS-94031"),
+        "{source}"
+    );
+    let (of_site_s, source) = bias_s(&parse_with(&folder, "pointing.ck_bias_s = -0.5", images));
+    assert!((of_site_s + 0.5).abs() < f64::EPSILON && source == "pointing.ck_bias_s of the site");
+    let (usual_s, _) = bias_s(&parse_with(&folder, "", ""));
+    assert!((usual_s + 1.15).abs() < f64::EPSILON);
+}
+
 #[test]
 fn entries_that_are_never_used_are_told() {
     let folder = folder();

@@ -67,8 +67,8 @@ fn real_with(test: &str, summing: u32, light_time: LightTime) -> Option<Real> {
         ..KernelsConfig::default()
     };
     let pointing = PointingConfig {
-        ck_bias: usual_instrument().pointing_bias(),
-        source: String::new(),
+        ck_bias: Some(usual_instrument().pointing_bias()),
+        source: None,
     };
     let mut site = fixture::Site::small();
     site.times = tag_times(&[image], &session).unwrap().remove(0);

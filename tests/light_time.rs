@@ -51,7 +51,7 @@ fn samples(image: &Image) -> SampledOrientation {
 }
 
 fn lines(image: &Image) -> f64 {
-    f64::from(image.times.lines_header)
+    f64::from(image.times.line_times.lines())
 }
 
 /// Where a sample of the detector looks onto the ellipsoid.
@@ -65,7 +65,7 @@ fn ground_m(image: &Image, at: &OrientationSample, sample: f64) -> Vector3<f64> 
 fn aberration_is_that_of_cspice() {
     for image in images("aberration beside CSPICE", LightTime::None) {
         let session = Session::open(&image.set).unwrap();
-        let et = image.times.start;
+        let et = image.times.line_times.start();
         let light_time_s = light_time_s(session.state(et).unwrap().position.xyz_m.norm());
         let left = et.plus(-light_time_s);
         let (now, then) = (
@@ -113,7 +113,10 @@ fn surface_is_light_time_to_the_ground_and_aberration() {
             for (worst_px, share) in worst_px.iter_mut().zip([0.0, 0.5, 1.0]) {
                 let sample = share * detector.samples;
                 let ground_m = ground_m(&image, at, sample);
-                let lookup = image.pointing.ck_bias.lookup(at.et);
+                let lookup = image
+                    .pointing
+                    .bias_of(&image.times.instrument)
+                    .lookup(at.et);
                 let attitude = session.attitude(lookup, at.et, 0.0).unwrap();
                 let to_camera =
                     session.mounting(usual_instrument(), at.et).unwrap() * attitude.inertial_to_bus;
@@ -155,7 +158,8 @@ fn surface_finds_ground_later_by_the_light_time() {
             let turning = motion.turn_rad.cross_matrix() * pose.mars_to_camera;
             let away_m = point_m - pose.position_m;
             let share = (turning.row(0) * away_m).x / (axis * motion.advance_m).x;
-            let expected = light_time_s(away_m.norm()) / (none.times.line_period_s * (1.0 - share));
+            let expected = light_time_s(away_m.norm())
+                / (none.times.line_times.mean_period_s() * (1.0 - share));
             let off = later - x - expected;
             // Mars turns by 9e-8 rad meanwhile, 0.03 m to the east, along the track 0.003 m of 4 m a line.
             assert!(
@@ -219,7 +223,10 @@ fn ranges_start_where_the_kernels_have_mgs() {
             let orientation = samples(&image);
             for share in [-0.5, -0.31, 0.0, 0.123, 0.5] {
                 let x = share * lines(&image);
-                let et = image.times.middle().plus(x * image.times.line_period_s);
+                let et = image
+                    .times
+                    .middle()
+                    .plus(x * image.times.line_times.mean_period_s());
                 let start_m = orientation.pose(x).position_m;
                 let found_m = start_m + image.orientation.to_spacecraft_m(x);
                 let mgs_m = session.state(et).unwrap().position.xyz_m;

@@ -285,7 +285,7 @@ fn scans_of_profiles_from_pole_to_pole_keep_within_their_uncertainty() {
 
 fn orientations(name: &str, bias: PointingBias) -> Vec<Orientation> {
     let mut config = site(name);
-    config.pointing.ck_bias = bias;
+    config.pointing.ck_bias = Some(bias);
     config.orientation.light_time = LightTime::None; // the truth tells where MGS was
     let session = session("gsfc");
     let images = tag_times(&config.images, &session).unwrap();

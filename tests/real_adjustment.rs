@@ -120,7 +120,7 @@ impl Site {
                 id: (*serial).to_owned(),
                 orientation: image.orientation.clone(),
                 detector: image.detector,
-                lines: image.lines,
+                line_times: common::line_times(image.lines, image.period_s),
             })
             .collect()
     }

@@ -55,8 +55,8 @@ fn m0402852(test: &str) -> Option<(ImageTimes, Orientation, Value)> {
         ..KernelsConfig::default()
     };
     let pointing = PointingConfig {
-        ck_bias: usual_instrument().pointing_bias(),
-        source: String::new(),
+        ck_bias: Some(usual_instrument().pointing_bias()),
+        source: None,
     };
     let orientation = sample_orientation(&session, &times, &kernels, &pointing, &SAMPLING).unwrap();
     Some((times, orientation, truth["eo_m0402852"].clone()))
@@ -78,12 +78,16 @@ fn line_times_come_from_the_clock_and_the_summed_exposure() {
     };
     assert_eq!(times.start_from, StartFrom::Sclk);
     assert_eq!(
-        (times.lines_header, times.samples, times.first_detector),
+        (
+            times.line_times.lines(),
+            times.samples,
+            times.first_detector
+        ),
         (1536, 256, 0)
     );
     let start_s = truth["start_et"].as_f64().unwrap();
-    assert!((times.start.seconds() - start_s).abs() < 1e-9); // seconds, as the issue demands
-    assert!((times.line_period_s - 0.003_856_8).abs() < 1e-12); // 0.4821 ms x 8
+    assert!((times.line_times.start().seconds() - start_s).abs() < 1e-9); // seconds, as the issue demands
+    assert!((times.line_times.mean_period_s() - 0.003_856_8).abs() < 1e-12); // 0.4821 ms x 8
     assert!((times.duration_s() - 5.924_044_8).abs() < 1e-9);
     // The first line's centre is half a line after the start; the last line's centre mirrors it.
     let first = times.line_offset(times.line_centre(0));
@@ -170,6 +174,6 @@ fn m0100115_starts_when_ames_stereo_pipeline_says() {
     let times = tag_times(&[image("M01-00115", label)], &session)
         .unwrap()
         .remove(0);
-    assert!((times.start.seconds() + 20_723_097.688_171).abs() < 1e-6); // printed to a microsecond
+    assert!((times.line_times.start().seconds() + 20_723_097.688_171).abs() < 1e-6); // printed to a microsecond
     assert!((times.duration_s() - 7.034_803_2).abs() < 1e-9); // 4864 x 0.4821 ms x 3
 }

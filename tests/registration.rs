@@ -62,7 +62,7 @@ fn footprints_under_the_boresight_come_back_to_their_lines() {
         }
         for (row, line) in found.points.line.iter().enumerate() {
             let line_offset = line_offset(row);
-            let expected = line_offset + 0.5 * f64::from(site.times.lines_header);
+            let expected = line_offset + 0.5 * f64::from(site.times.line_times.lines());
             let extrapolated = line_offset.abs() > 768.0;
             assert_eq!(found.points.extrapolated[row], extrapolated);
             // Lines: polynomials and samples agree on a bend of 1e-6 rad to a few centimetres of 50 m lines

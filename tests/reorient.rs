@@ -138,7 +138,9 @@ fn a_shift_of_lines_and_a_curved_correction_are_those_of_the_kernels() {
             * PIXEL_RAD
             * f64::from(image.times.downtrack_summing);
         for sample in &adjusted.samples {
-            let et = sample.et.plus(shift_lines * image.times.line_period_s);
+            let et = sample
+                .et
+                .plus(shift_lines * image.times.line_times.mean_period_s());
             let (position_m, camera_to_mars) = kernel_camera(&session, &image, et);
             let correction = curved(sample.line_offset);
             let expected_m = position_m + correction.position_m;

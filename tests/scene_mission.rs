@@ -16,7 +16,7 @@ use std::{
 };
 
 use areograph::{
-    config::{self, built_in_altimeter, built_in_instruments, usual_instrument},
+    config::{self, built_in_instruments, usual_altimeter, usual_instrument},
     constants::MARS_IAU2000,
     frames::{MarsDatum, MarsIau2000, Position},
     geom::{
@@ -296,7 +296,7 @@ fn footprints_come_back_within_0_2_m_and_times_within_2_us() {
         {
             let decoded = decode(&records[record], shot);
             assert_eq!(decoded.class, 1);
-            let et = Et::from_seconds(decoded.tag_s - built_in_altimeter().clock_bias_s);
+            let et = Et::from_seconds(decoded.tag_s - usual_altimeter().clock_bias_s);
             assert!((et.seconds() - time_s).abs() < 2e-6);
             let ground = convert_datum::<MarsIau2000>(decoded.ground_file_m, datum(file), et, et);
             let off_m = (ground.xyz_m - truth_m).norm();
@@ -319,7 +319,7 @@ fn range_minus_distance_has_the_expected_mean_for_every_orbit() {
                 .into_iter()
                 .map(|(record, shot)| {
                     let decoded = decode(&records[record], shot);
-                    let et = Et::from_seconds(decoded.tag_s - built_in_altimeter().clock_bias_s);
+                    let et = Et::from_seconds(decoded.tag_s - usual_altimeter().clock_bias_s);
                     let ground =
                         convert_datum::<MarsIau2000>(decoded.ground_file_m, datum(file), et, et);
                     let spacecraft =
@@ -462,7 +462,7 @@ fn a_flight_along_real_kernels_gives_shots_that_fit_them() {
         let mut sum_m = 0.0;
         for (record, shot) in shots(profile) {
             let decoded = decode(&records[record], shot);
-            let et = Et::from_seconds(decoded.tag_s - built_in_altimeter().clock_bias_s);
+            let et = Et::from_seconds(decoded.tag_s - usual_altimeter().clock_bias_s);
             let spacecraft =
                 mars_matrix(&MARS_IAU2000, et) * session.state(et).unwrap().position.xyz_m;
             let residual_m = decoded.range_m - (spacecraft - decoded.ground_file_m).norm();

@@ -18,6 +18,7 @@ use areograph::{
         oriented_camera::OrientedCamera,
         pushbroom::{Detector, Pose, Projector, SampledOrientation},
     },
+    line_times::LineTimes,
     pds::ties::read_ties,
     spice::{KernelSet, Session},
     stages::{
@@ -117,7 +118,7 @@ impl Pair {
                 times.first_detector,
                 times.samples,
             ),
-            lines: f64::from(times.lines_header),
+            line_times: times.line_times.clone(),
         }
     }
 
@@ -132,9 +133,14 @@ impl Pair {
         let cameras = self.truth["cameras"].as_array().unwrap();
         let image = |(times, camera): (&ImageTimes, &Value)| {
             assert_eq!(camera["image"], times.id.as_str());
-            let late_s = number(&camera["time_bias_lines"]) * times.line_period_s;
+            let late_s = number(&camera["time_bias_lines"]) * times.line_times.mean_period_s();
             let taken = ImageTimes {
-                start: times.start.plus(late_s),
+                line_times: LineTimes::even(
+                    times.line_times.start().plus(late_s),
+                    times.line_times.lines(),
+                    times.line_times.mean_period_s(),
+                )
+                .unwrap(),
                 ..times.clone()
             };
             Self::image(
@@ -170,7 +176,7 @@ impl Pair {
             let ground = sample.boresight.unwrap();
             spherical_to_xyz_m(ground.longitude_rad, ground.latitude_rad, RADIUS_M)
         });
-        (last - first).norm() / f64::from(self.times[image].lines_header)
+        (last - first).norm() / f64::from(self.times[image].line_times.lines())
     }
 }
 
@@ -283,7 +289,7 @@ fn shifts_lines(pair: &Pair, images: &[OrientedCamera<SampledOrientation>]) -> [
     let good = pair.good();
     [0, 1].map(|index| {
         let image = &images[index];
-        let projector = Projector::new(&image.orientation, image.lines).unwrap();
+        let projector = Projector::new(&image.orientation, image.lines()).unwrap();
         let shifts = good.iter().map(|tie| {
             let ground_m = vector(&truth[&tie.id]["ground_iau2000_m"]);
             let measure = tie.measures.iter().find(|measure| measure.image == index);

@@ -5,6 +5,7 @@
     reason = "helpers of tests may fail loudly"
 )]
 
+mod common;
 #[path = "network/recipe.rs"]
 mod recipe;
 #[path = "pushbroom/scene.rs"]
@@ -39,7 +40,7 @@ fn images() -> Vec<OrientedCamera<EulerPolynomial>> {
                 samples: 2.0 * recipe::HALF_SWATH_PX,
                 distortion: Distortion::NONE,
             },
-            lines: f64::from(scene.lines),
+            line_times: common::line_times(f64::from(scene.lines), scene.line_period_s()),
         })
         .collect()
 }
@@ -70,7 +71,7 @@ fn ties(
                     let image = &images[view.image];
                     TieMeasure {
                         image: view.image,
-                        line: view.x_lines + 0.5 * image.lines + lines,
+                        line: view.x_lines + 0.5 * image.lines() + lines,
                         sample: image.detector.sample(view.y_px) + pixels,
                         sigma_px: None,
                     }
@@ -249,7 +250,7 @@ fn places_outside_the_image_are_no_measurements() {
     let images = images();
     let samples = images[0].detector.samples;
     for (line, sample) in [
-        (images[0].lines + 1.0, 10.0),
+        (images[0].lines() + 1.0, 10.0),
         (-1.0, 10.0),
         (10.0, samples + 1.0),
         (10.0, -1.0),

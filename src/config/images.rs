@@ -16,7 +16,7 @@ use crate::{
 use super::{
     declare::{Declare, Keys, Many, declare_table, group, key},
     forms::{Whole, above_to, identifier, matching, text, whole_from_to},
-    instruments::Camera,
+    instruments::CAMERA,
     paths::FILE,
 };
 
@@ -52,7 +52,7 @@ declare_table! {
         label: Option<PathBuf> = key(FILE).example(r#""../labels/e0202855.lbl""#),
         /// The camera: `moc_na`, `moc_wa_red`, `moc_wa_blue`, or the path of an instrument file like those in
         /// `config/instruments`. Without it, the camera that the label names, and without a label `moc_na`.
-        instrument: Option<Instrument> = key(Camera).example(r#""moc_na""#),
+        instrument: Option<Instrument> = key(CAMERA).example(r#""moc_na""#),
         /// Its name in tie point files and in what is written for ISIS, when that is not the identifier: for a
         /// control network the ISIS serial number, in which the clock must be that of the image. Without it, the
         /// identifier.

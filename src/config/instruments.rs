@@ -31,22 +31,21 @@ const INSTRUMENTS: &[(&str, &str)] = &built_in![
     "instruments/moc_wa_red.toml",
     "instruments/moc_wa_blue.toml",
 ];
-/// Files of altimeters that the program knows.
-const ALTIMETERS: [(&str, &str); 1] = built_in!["altimeters/mola.toml"];
+/// Files of altimeters that the program knows; the first is that of sites which name none.
+const ALTIMETERS: &[(&str, &str)] = &built_in!["altimeters/mola.toml"];
 /// Numbers of NAIF for spacecraft, instruments and frames.
 const NAIF_IDS: [i32; 2] = [-999_999_999, -1];
 
-static CAMERAS: LazyLock<Vec<Instrument>> = LazyLock::new(|| {
-    let files = INSTRUMENTS.iter();
-    let cameras: Result<Vec<Instrument>, Problems> = files
-        .map(|(file, text)| instrument(text, Path::new(file)))
+static CAMERAS: LazyLock<Vec<Instrument>> = LazyLock::new(|| all_of(INSTRUMENTS, instrument));
+static LASERS: LazyLock<Vec<Altimeter>> = LazyLock::new(|| all_of(ALTIMETERS, altimeter));
+
+fn all_of<T>(files: &[(&str, &str)], read: fn(&str, &Path) -> Result<T, Problems>) -> Vec<T> {
+    let files = files.iter();
+    let all: Result<Vec<T>, Problems> = files
+        .map(|(file, text)| read(text, Path::new(file)))
         .collect();
-    of_the_program(cameras)
-});
-static ALTIMETER: LazyLock<Altimeter> = LazyLock::new(|| {
-    let [(file, text)] = ALTIMETERS;
-    of_the_program(altimeter(text, Path::new(file)))
-});
+    of_the_program(all)
+}
 
 /// What a file of the program itself says.
 #[expect(
@@ -69,40 +68,71 @@ pub fn usual_instrument() -> &'static Instrument {
     &CAMERAS[0]
 }
 
-/// The altimeter that the program knows.
+/// The altimeters that the program knows.
 #[must_use]
-pub fn built_in_altimeter() -> &'static Altimeter {
-    &ALTIMETER
+pub fn built_in_altimeters() -> &'static [Altimeter] {
+    &LASERS
+}
+
+/// The altimeter of sites that name none.
+#[must_use]
+pub fn usual_altimeter() -> &'static Altimeter {
+    &LASERS[0]
+}
+
+/// What a key names by its identifier, or by the path of a file like those of the program.
+pub(super) struct DataFile<T: 'static> {
+    /// The kind of file, with its article.
+    what: &'static str,
+    /// What the program knows.
+    known: fn() -> &'static [T],
+    /// The identifier of one.
+    id: fn(&T) -> &str,
+    /// What the text of a file describes.
+    read: fn(&str, &Path) -> Result<T, Problems>,
 }
 
 /// The camera of an image: one of the program's, or an instrument file.
-pub(super) struct Camera;
+pub(super) const CAMERA: DataFile<Instrument> = DataFile {
+    what: "an instrument file",
+    known: built_in_instruments,
+    id: |camera| &camera.id,
+    read: instrument,
+};
 
-impl Form for Camera {
-    type Value = Instrument;
+/// The altimeter of a site: one of the program's, or an altimeter file.
+pub(super) const ALTIMETER: DataFile<Altimeter> = DataFile {
+    what: "an altimeter file",
+    known: built_in_altimeters,
+    id: |altimeter| &altimeter.id,
+    read: altimeter,
+};
+
+impl<T: Clone> Form for DataFile<T> {
+    type Value = T;
 
     fn kind(&self) -> ValueKind {
         ValueKind::Text { empty: false }
     }
 
-    fn read(&self, found: &Found<'_>, review: &mut Review<'_>) -> Option<Instrument> {
-        let known = built_in_instruments();
+    fn read(&self, found: &Found<'_>, review: &mut Review<'_>) -> Option<T> {
+        let known = (self.known)();
         let Some(written) = found.value.get_ref().as_str() else {
             found.refuse(review, self.kind());
             return None;
         };
-        if let Some(camera) = known.iter().find(|camera| camera.id == written) {
-            return Some(camera.clone());
+        if let Some(one) = known.iter().find(|one| (self.id)(one) == written) {
+            return Some(one.clone());
         }
         let path = review.resolve(written);
         if !path.is_file() {
-            let ids: Vec<&str> = known.iter().map(|camera| camera.id.as_str()).collect();
-            let expected = format!("{}, or the path of an instrument file", ids.join(", "));
+            let ids: Vec<&str> = known.iter().map(self.id).collect();
+            let expected = format!("{}, or the path of {}", ids.join(", "), self.what);
             found.refuse(review, expected);
             return None;
         }
         let read = super::read(&path).map_err(|failure| failure.cause.to_string());
-        let read = read.and_then(|text| instrument(&text, &path).map_err(|all| all.to_string()));
+        let read = read.and_then(|text| (self.read)(&text, &path).map_err(|all| all.to_string()));
         read.map_err(|problems| {
             let text = format!("{} names a file with problems:\n{problems}", found.key);
             review.problem(Some(found.value.span()), text);
@@ -110,8 +140,8 @@ impl Form for Camera {
         .ok()
     }
 
-    fn written(&self, value: &Instrument) -> Value {
-        Value::from(value.id.clone())
+    fn written(&self, value: &T) -> Value {
+        Value::from((self.id)(value))
     }
 }
 
@@ -227,13 +257,14 @@ fn distortion(
 /// Everything that is wrong with it, each with its place.
 pub fn altimeter(text: &str, file: &Path) -> Result<Altimeter, Problems> {
     data_file::read(text, file, |top, review| {
-        let (id, name) = (top.text(review, "id"), top.text(review, "name"));
+        let [id, name, full_name] = ["id", "name", "full_name"].map(|key| top.text(review, key));
         let (clock_bias_s, clock_source) = top.table(review, "clock", |table, source, review| {
             (table.number(review, "bias_s", [0.0, 10.0]), source)
         });
         Altimeter {
             id,
             name,
+            full_name,
             clock_bias_s,
             clock_source,
         }

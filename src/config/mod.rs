@@ -37,7 +37,8 @@ pub use adjustment::{AdjustmentConfig, OrientationPrior};
 pub use declare::{Accept, DeclaredKey, ValueKind, Word};
 pub use images::ImageConfig;
 pub use instruments::{
-    altimeter, built_in_altimeter, built_in_instruments, instrument, usual_instrument,
+    altimeter, built_in_altimeters, built_in_instruments, instrument, usual_altimeter,
+    usual_instrument,
 };
 pub use kernels::KernelsConfig;
 pub use limits::LimitsConfig;
@@ -48,7 +49,7 @@ pub use net::{
 };
 pub use orientation::{OrientationConfig, RegistrationConfig};
 pub use pedr::PedrConfig;
-pub use pointing::PointingConfig;
+pub use pointing::{PointingConfig, UsedBias};
 pub use problems::Problems;
 pub use range_check::{RangeCheckConfig, SCAN_STEPS_MAX};
 pub use site::SiteConfig;

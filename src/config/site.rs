@@ -7,13 +7,18 @@ use std::{
 
 use serde_json::json;
 
-use crate::altimetry::MolaClock;
+use crate::{
+    altimetry::MolaClock,
+    instruments::{Altimeter, Instrument},
+    time::PointingBias,
+};
 
 use super::{
     adjustment::AdjustmentConfig,
     declare::{Keys, declare_table, key, no_repeats, of_the_file, table, tables},
     forms::{any_text, lower_case_identifier},
     images::{IMAGES, ImageConfig},
+    instruments::{ALTIMETER, usual_altimeter, usual_instrument},
     kernels::KernelsConfig,
     limits::LimitsConfig,
     mola_surface::MolaSurfaceConfig,
@@ -35,6 +40,9 @@ declare_table! {
         description: String = key(any_text())
             .or(String::new())
             .example(r#""Eos Chasma, one of the three study sites of Shan et al. 2005""#),
+        /// The altimeter of the PEDR files: `mola`, or the path of an altimeter file like that in
+        /// `config/altimeters`.
+        altimeter: Altimeter = key(ALTIMETER).or(usual_altimeter().clone()),
         /// The file it was read from.
         file: PathBuf = of_the_file(),
         /// BLAKE3, hexadecimal, of the keys and values as written: comments, spacing, order of keys and the
@@ -73,7 +81,20 @@ declare_table! {
         /// Limits on tie points and their adjustment.
         limits: LimitsConfig = table(),
     }
+    settle clock_of_altimeter
     check across_tables
+}
+
+/// The clock bias is that of the altimeter where the site gives no other.
+fn clock_of_altimeter(mut site: SiteConfig, keys: &Keys<'_, '_>) -> SiteConfig {
+    let (clock, altimeter) = (&mut site.mola_clock, &site.altimeter);
+    if !keys.writes("mola_clock", "bias_s") {
+        clock.bias_s = altimeter.clock_bias_s;
+    }
+    if !keys.writes("mola_clock", "source") {
+        clock.source.clone_from(&altimeter.clock_source);
+    }
+    site
 }
 
 fn across_tables(site: &SiteConfig, keys: &mut Keys<'_, '_>) {
@@ -119,32 +140,38 @@ fn something_to_do(site: &SiteConfig, keys: &mut Keys<'_, '_>) {
     }
 }
 
-/// One pointing bias holds for all images; that of an instrument file may be another.
+/// A pointing bias of the site has the sign of what is known of its cameras, and takes the place of it.
 fn pointing_of_instruments(site: &SiteConfig, keys: &mut Keys<'_, '_>) {
-    let used_s = site.pointing.ck_bias.seconds();
-    let named = site
-        .images
-        .iter()
-        .filter_map(|image| image.instrument.as_ref());
-    for camera in named {
-        let own_s = camera.pointing.ck_bias_s;
-        let Some(images) = keys.span_of("images") else {
+    let Some(used_s) = site.pointing.ck_bias.map(PointingBias::seconds) else {
+        return;
+    };
+    let mut told = BTreeSet::new();
+    for camera in cameras(&site.images) {
+        if !told.insert(&*camera.id) {
             continue;
-        };
-        if has_turned_sign(own_s, used_s) {
-            let text = format!(
-                "the pointing bias of {} is {own_s} s, pointing.ck_bias_s is {used_s}; expected one sign",
-                camera.name
+        }
+        let known_s = camera.pointing.ck_bias_s;
+        if has_turned_sign(used_s, known_s) {
+            keys.refuse_below(
+                "pointing",
+                "ck_bias_s",
+                format!(
+                    "{known_s}, the known bias of {} with its sign: the attitude of an exposure at t is read at t + \
+                     ck_bias_s",
+                    camera.name
+                ),
             );
-            keys.review().problem(Some(images), text);
-        } else if own_s.total_cmp(&used_s).is_ne() {
-            let text = format!(
-                "the {own_s} s of {} are never used: pointing.ck_bias_s is {used_s}",
-                camera.name
-            );
-            keys.review().warn(images, text);
         }
     }
+}
+
+/// The cameras that images name; the usual one where an image, or no image, names none.
+fn cameras(images: &[ImageConfig]) -> Vec<&Instrument> {
+    let named = images
+        .iter()
+        .map(|image| image.instrument.as_ref().unwrap_or(usual_instrument()));
+    let usual = images.is_empty().then(usual_instrument);
+    named.chain(usual).collect()
 }
 
 /// Names in tie point files are as unique as identifiers; an image without one has its identifier.

@@ -6,6 +6,7 @@ mod epochs;
 mod uncovered;
 
 use crate::{
+    constants::SPACECRAFT,
     error::{Cause, Kind, Locate, Result},
     spice::{Coverage, KernelSet, RequiredCoverage, Session},
     stages::compare_kernels::{
@@ -80,7 +81,7 @@ impl Compared {
 enum CompareError {
     #[error("kernel set {other} holds the same kernels as {first}")]
     Same { first: String, other: String },
-    #[error("no time at which all kernel sets hold the position of MGS; {held}")]
+    #[error("no time at which all kernel sets hold the position of {}; {held}", SPACECRAFT.name)]
     NothingInCommon { held: String },
     #[error(
         "the clocks of the kernel sets {first} and {other} differ: {reading} is {apart_s} s later in {other}"

@@ -6,6 +6,7 @@ use super::outputs::Site;
 use crate::{
     config::SiteConfig,
     error::Result,
+    instruments::Instrument,
     stages::{
         judge::{AdjustmentEvidence, Evidence, JudgedImage, Verdict, judge},
         site_image::SiteImage,
@@ -62,8 +63,8 @@ pub(super) fn warnings(config: &SiteConfig, site: &Site) -> Result<Vec<String>> 
     let described = site.described.value()?;
     let mut warnings: Vec<String> = described.pck_note.iter().cloned().collect();
     warnings.extend(described.rates_note.iter().cloned());
-    if !site.images.is_empty() {
-        warnings.extend(config.pointing.departure());
+    for camera in cameras(&site.images)? {
+        warnings.extend(config.pointing.departure(camera));
     }
     for image in &site.images {
         let times = image.times.value()?;
@@ -78,6 +79,18 @@ pub(super) fn warnings(config: &SiteConfig, site: &Site) -> Result<Vec<String>> 
     Ok(warnings)
 }
 
+/// The cameras of the images, each once.
+pub(super) fn cameras(images: &[SiteImage]) -> Result<Vec<&Instrument>> {
+    let mut cameras: Vec<&Instrument> = Vec::new();
+    for image in images {
+        let camera = &image.times.value()?.instrument;
+        if !cameras.contains(&camera) {
+            cameras.push(camera);
+        }
+    }
+    Ok(cameras)
+}
+
 /// Images that one camera took at one time with the same pixels: one label may stand for another.
 fn same_exposures(images: &[SiteImage]) -> Result<Vec<String>> {
     let mut same = Vec::new();
@@ -85,8 +98,12 @@ fn same_exposures(images: &[SiteImage]) -> Result<Vec<String>> {
         let times = image.times.value()?;
         for earlier in &images[..index] {
             let other = earlier.times.value()?;
-            let apart_s = times.start.since(other.start).abs();
-            if apart_s < times.line_period_s && times.detector() == other.detector() {
+            let apart_s = times
+                .line_times
+                .start()
+                .since(other.line_times.start())
+                .abs();
+            if apart_s < times.line_times.mean_period_s() && times.detector() == other.detector() {
                 same.push(format!(
                     "images {} and {} were exposed at the same time by the same pixels: one label may stand for another",
                     other.id, times.id

@@ -65,16 +65,15 @@ pub(super) fn required_coverage(
     let flights = profiles
         .iter()
         .map(|profile| profile.interval.padded(reach_s));
-    let positions = exposures.clone().map(|exposures| {
-        let light_time = config.orientation.light_time;
-        light_time.read_over(exposures.padded(kernels.padding_s))
-    });
+    let light_time = config.orientation.light_time;
+    let positions =
+        exposures.map(|exposures| light_time.read_over(exposures.padded(kernels.padding_s)));
     // Within the tolerance a look-up reaches kernels that end before it or begin after it.
-    let (bias_s, padding_s) = (
-        config.pointing.ck_bias.seconds(),
-        kernels.padding_s + kernels.ck_tolerance_s,
-    );
-    let attitudes = exposures.map(|exposures| exposures.shifted(bias_s).padded(padding_s));
+    let padding_s = kernels.padding_s + kernels.ck_tolerance_s;
+    let attitudes = images.iter().map(|image| {
+        let bias_s = config.pointing.bias_of(&image.instrument).seconds();
+        image.exposures().shifted(bias_s).padded(padding_s)
+    });
     RequiredCoverage {
         positions: Intervals::union_of(positions.chain(flights)),
         attitudes: Intervals::union_of(attitudes),

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use super::{
     PUBLISH,
     driver::Ledger,
+    evidence::cameras,
     outputs::{Intersection, Site},
 };
 use crate::{
@@ -12,6 +13,7 @@ use crate::{
     config::SiteConfig,
     error::Result,
     files::file_name,
+    instruments::Instrument,
     stage::Inputs,
     stages::{describe_kernels::KernelLine, judge::Verdict},
     store::manifest::{
@@ -66,7 +68,7 @@ pub(super) fn manifest(
             blake3: config.blake3.clone(),
             keys: config.keys.clone(),
         },
-        biases: biases(config),
+        biases: biases(config, &cameras(&site.images)?),
         kernels: site
             .described
             .value()?
@@ -172,7 +174,7 @@ fn figures_of(site: &Site) -> Result<BTreeMap<String, f64>> {
         .collect())
 }
 
-fn biases(config: &SiteConfig) -> Vec<BiasEntry> {
+fn biases(config: &SiteConfig, cameras: &[&Instrument]) -> Vec<BiasEntry> {
     let scope = match config.mola_clock.scope {
         BiasScope::SpkLookup => "spacecraft position in the range check",
         BiasScope::Rotation => "rotation of Mars into IAU 2000",
@@ -181,18 +183,23 @@ fn biases(config: &SiteConfig) -> Vec<BiasEntry> {
         }
         BiasScope::None => "nothing",
     };
-    vec![
-        BiasEntry {
-            name: "ck_bias".to_owned(),
-            correction_s: config.pointing.ck_bias.seconds(),
-            scope: "attitude look-ups".to_owned(),
-            source: config.pointing.source.clone(),
+    let clock = BiasEntry {
+        name: "mola_clock".to_owned(),
+        correction_s: config.mola_clock.correction_s(),
+        scope: scope.to_owned(),
+        source: config.mola_clock.source.clone(),
+    };
+    let pointing = config.pointing.used(cameras.iter().copied());
+    let several = pointing.len() > 1;
+    let pointing = pointing.into_iter().map(|of| BiasEntry {
+        name: "ck_bias".to_owned(),
+        correction_s: of.bias.seconds(),
+        scope: if several {
+            format!("attitude look-ups of {}", of.camera)
+        } else {
+            "attitude look-ups".to_owned()
         },
-        BiasEntry {
-            name: "mola_clock".to_owned(),
-            correction_s: config.mola_clock.correction_s(),
-            scope: scope.to_owned(),
-            source: config.mola_clock.source.clone(),
-        },
-    ]
+        source: of.source.to_owned(),
+    });
+    pointing.chain([clock]).collect()
 }

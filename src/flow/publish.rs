@@ -42,6 +42,7 @@ pub(super) fn inputs(config: &SiteConfig, site: &Site, folder: &Path, ledger: &L
     }
     inputs.setting("(file name)", &file_name(&config.file));
     inputs.setting("windows (outlines)", &config.windows);
+    inputs.setting("altimeter (file)", &config.altimeter);
     (&KernelView::all(site.kernels.as_ref())).add_to("kernels", &mut inputs);
     if let Some(kernels) = &site.kernels {
         inputs.setting("kernels (places)", &kernels.metakernel_text(Some(folder)));

@@ -4,7 +4,7 @@ use std::{fs::File, io::Read, path::Path};
 
 use super::label::{Entry, LABEL_BYTES_MAX, Label, LabelError, parse};
 use crate::{
-    constants::{MARS_NAME, MGS_NAME},
+    constants::{MARS_NAME, SPACECRAFT},
     error::{IoError, Locate, Result},
     image::{CLOCK_STRING, ImageFields, is_clock_string},
     instruments::{Instrument, LabelNames},
@@ -13,7 +13,7 @@ use crate::{
 
 /// What the label of a MOC image says.
 #[derive(Debug, Clone, PartialEq)]
-pub struct MocLabel {
+pub struct ImageLabel {
     /// Product, for example `M04/02852`.
     pub product_id: Option<String>,
     /// The camera that took it.
@@ -27,8 +27,8 @@ pub struct MocLabel {
 /// Reads a PDS3 label (attached or detached) or an ISIS label of an image by one of `cameras`.
 ///
 /// # Errors
-/// The system's refusal to read; no label, or a cut one; those of [`moc_label`].
-pub fn read_label(path: &Path, cameras: &[Instrument]) -> Result<MocLabel> {
+/// The system's refusal to read; no label, or a cut one; those of [`image_label`].
+pub fn read_label(path: &Path, cameras: &[Instrument]) -> Result<ImageLabel> {
     let mut bytes = Vec::new();
     File::open(path)
         .map_err(IoError::on("open"))
@@ -41,7 +41,7 @@ pub fn read_label(path: &Path, cameras: &[Instrument]) -> Result<MocLabel> {
     if !label.ended {
         return Err(LabelError::NoEnd).in_file(path);
     }
-    moc_label(&label, cameras).in_file(path)
+    image_label(&label, cameras).in_file(path)
 }
 
 /// The fields of a parsed label; what it does not say stays `None`.
@@ -51,10 +51,10 @@ pub fn read_label(path: &Path, cameras: &[Instrument]) -> Result<MocLabel> {
 /// # Errors
 /// An instrument that is not among `cameras`, or none; an image of another spacecraft or target, or one that is
 /// map-projected; a value that is not of its kind, or two values under one keyword.
-pub fn moc_label(
+pub fn image_label(
     label: &Label,
     cameras: &[Instrument],
-) -> std::result::Result<MocLabel, LabelError> {
+) -> std::result::Result<ImageLabel, LabelError> {
     let instrument = camera(label, cameras)?;
     of_mars_by_mgs(label)?;
     as_taken(label)?;
@@ -72,7 +72,7 @@ pub fn moc_label(
         "SPACECRAFT_CLOCK_START_COUNT",
         "SPACECRAFTCLOCKCOUNT",
     )?;
-    Ok(MocLabel {
+    Ok(ImageLabel {
         product_id: text(either(label, "PRODUCT_ID", "PRODUCTID")?),
         instrument: instrument.clone(),
         fields: ImageFields {
@@ -123,7 +123,10 @@ const PHASES: [&str; 5] = ["AB1", "SP1", "SP2", "FHA", "CAL"];
 /// Positions, attitudes and the shape of the target are those of MGS and Mars.
 fn of_mars_by_mgs(label: &Label) -> std::result::Result<(), LabelError> {
     let required = [
-        (["SPACECRAFT_NAME", "SPACECRAFTNAME"], MGS_NAME),
+        (
+            ["SPACECRAFT_NAME", "SPACECRAFTNAME"],
+            &*SPACECRAFT.label_name,
+        ),
         (["TARGET_NAME", "TARGETNAME"], MARS_NAME),
     ];
     for ([pds, isis], expected) in required {
@@ -270,8 +273,8 @@ mod tests {
     use super::*;
     use crate::config::built_in_instruments;
 
-    fn read(text: &str) -> std::result::Result<MocLabel, LabelError> {
-        moc_label(&parse(text.as_bytes()).unwrap(), built_in_instruments())
+    fn read(text: &str) -> std::result::Result<ImageLabel, LabelError> {
+        image_label(&parse(text.as_bytes()).unwrap(), built_in_instruments())
     }
 
     #[test]

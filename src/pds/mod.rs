@@ -5,3 +5,5 @@ pub mod moc;
 pub mod pedr;
 pub mod plane_tables;
 pub mod ties;
+
+pub use moc::{ImageLabel, product_named, read_label};

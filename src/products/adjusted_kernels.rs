@@ -13,7 +13,7 @@ use super::{
 };
 use crate::{
     config::PointingConfig,
-    constants::{NAIF_MARS, NAIF_MGS},
+    constants::{NAIF_MARS, SPACECRAFT},
     error::{IoError, Locate, Result},
     geom::light_time::LightTime,
     spice::{EncodedCkSegment, Kernel, KernelSet, SpkSegment, write_encoded_ck, write_spk},
@@ -46,7 +46,7 @@ pub struct AdjustedKernels<'a> {
     pub site_folder: &'a Path,
     /// The original kernels.
     pub originals: &'a KernelSet,
-    /// The pointing bias that readers of the kernels will apply.
+    /// The pointing bias that readers of the kernels will apply, where it is not that of the camera.
     pub pointing: &'a PointingConfig,
 }
 
@@ -66,7 +66,7 @@ pub(super) static ATTITUDE: Declaration = Declaration {
 
 pub(super) static POSITION: Declaration = Declaration {
     path: "adjusted/<image>.bsp",
-    what: "adjusted position of MGS from Mars around the image, geometric, J2000 (SPK type 13)",
+    what: "adjusted position of the spacecraft from Mars around the image, geometric, J2000 (SPK type 13)",
     readers: "SPICE, ISIS, ALE",
     rows: "epochs",
     role: Role::Data,
@@ -178,7 +178,7 @@ fn write_attitude(path: &Path, image: &AdjustedImage, comment: &str) -> Result<u
 fn write_position(path: &Path, image: &AdjustedImage, comment: &str) -> Result<u64> {
     let tables = image.tables;
     let segment = SpkSegment {
-        target: NAIF_MGS,
+        target: SPACECRAFT.naif,
         centre: NAIF_MARS,
         name: &segment_name(image),
         degree: KernelTables::STATE_DEGREE,
@@ -191,13 +191,14 @@ fn write_position(path: &Path, image: &AdjustedImage, comment: &str) -> Result<u
 
 /// What is written into the comment areas of both kernels.
 fn comment(image: &AdjustedImage, to: &AdjustedKernels) -> String {
-    let (times, bias_s) = (image.times, to.pointing.ck_bias.seconds());
+    let times = image.times;
+    let bias_s = to.pointing.bias_of(&times.instrument).seconds();
     let usual_s = times.instrument.pointing.ck_bias_s;
     let others = if (bias_s - usual_s).abs() < BIAS_TOLERANCE_S {
-        "ISIS and ALE read MOC attitude there by themselves: load the file as it is.".to_owned()
+        "ISIS and ALE read attitude there by themselves: load the file as it is.".to_owned()
     } else {
         format!(
-            "ISIS and ALE read MOC attitude {usual_s:.3} s from the exposure whatever the kernel says: this file is \n\
+            "ISIS and ALE read attitude {usual_s:.3} s from the exposure whatever the kernel says: this file is \n\
              not for them."
         )
     };
@@ -209,12 +210,14 @@ fn comment(image: &AdjustedImage, to: &AdjustedKernels) -> String {
          than their tags say, the orientation of a line stands at its tag, so that nothing else that\n\
          happened meanwhile, a laser shot for one, may be placed with this file.\n\
          \n\
-         Positions: MGS relative to the centre of Mars, geometric, J2000, with the rotation of Mars of the\n\
+         Positions: {spacecraft} relative to the centre of Mars, geometric, J2000, with the rotation of Mars of the\n\
          IAU 2000 report (pck00008 to pck00010). {positions}\n\
          \n\
-         Attitudes: J2000 to MGS_SPACECRAFT. The attitude of an exposure at t stands at t {sign} {size:.3} s,\n\
+         Attitudes: J2000 to {bus_frame}. The attitude of an exposure at t stands at t {sign} {size:.3} s,\n\
          as in the kernels that this file replaces. {others}\n",
         id = times.id,
+        spacecraft = SPACECRAFT.name,
+        bus_frame = SPACECRAFT.bus_frame,
         version = env!("CARGO_PKG_VERSION"),
         exposed = times.exposures(),
         utc = times.utc_start,
@@ -265,13 +268,18 @@ fn metakernel(to: &AdjustedKernels, images: &[AdjustedImage]) -> Result<String> 
     let text = to
         .originals
         .metakernel_text_before(Some(to.site_folder), &own);
+    let cameras = images.iter().map(|image| &image.times.instrument);
+    let biases = to.pointing.used(cameras).into_iter();
+    let biases: Vec<String> = biases
+        .map(|of| format!("{} s", of.bias.seconds()))
+        .collect();
     // Text before the first data block is comment.
     Ok(text.replacen(
         "\n\n",
         &format!(
             "\n\nThe last ones are adjusted: each pair for its image alone, not for laser shots nor other images, and with\n\
-             the pointing bias of {} s.\n\n",
-            to.pointing.ck_bias.seconds()
+             the pointing bias of {}.\n\n",
+            biases.join(", ")
         ),
         1,
     ))

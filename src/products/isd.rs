@@ -3,7 +3,7 @@
 //! Keys and nesting are those of ALE's image support data. Where ALE's file for MOC does not say what
 //! the camera does, the numbers here are those that make `usgscsm` see the right pixel at the right time:
 //!
-//! * `line_scan_rate` holds the period of an *image* line. `usgscsm` computes
+//! * `line_scan_rate` holds the period of an *image* line, in a row for every piece of the image. `usgscsm` computes
 //!   `t = start + rate · (line − 0.5 + 0.5)` with image lines and never multiplies by the summing
 //!   (`UsgsAstroLsSensorModel::getImageTime`); ALE writes the exposure of one detector line.
 //! * `usgscsm` puts the centre of the first sample at 0.5 and computes the detector coordinate
@@ -33,13 +33,17 @@ use super::{
     site::{ImageProducts, SiteProducts},
 };
 use crate::{
-    constants::{MARS_IAU2000, NAIF_IAU_MARS, NAIF_MARS},
+    constants::{MARS_IAU2000, NAIF_IAU_MARS, NAIF_MARS, SPACECRAFT},
     error::Result,
     frames::{self, Frame, J2000},
     geom::{attitude::continuous_quaternions, pushbroom::Distortion},
     instruments::{Instrument, NaifNames},
+    line_times::LinePiece,
     stage::Round,
-    stages::sample_orientation::{CameraTables, InterpolationCheck},
+    stages::{
+        sample_orientation::{CameraTables, InterpolationCheck},
+        tag_times::ImageTimes,
+    },
     units::METRES_PER_KM,
 };
 use document::{
@@ -85,9 +89,9 @@ fn write(path: &Path, of: &Context, image: &ImageProducts, round: Round) -> Resu
 fn isd<'a>(site: &SiteProducts<'a>, image: &ImageProducts<'a>, round: Round) -> Isd<'a> {
     let times = image.times;
     let tables = &image.orientation.tables;
-    let start_s = times.start.seconds();
+    let start_s = times.line_times.start().seconds();
     // Of the delivered lines: camera models know no others.
-    let half_s = 0.5 * f64::from(times.lines_delivered) * times.line_period_s;
+    let half_s = 0.5 * times.line_times.seconds(f64::from(times.lines_delivered));
     let Instrument {
         naif,
         optics,
@@ -100,7 +104,7 @@ fn isd<'a>(site: &SiteProducts<'a>, image: &ImageProducts<'a>, round: Round) -> 
         image_identifier: &times.id,
         image_lines: times.lines_delivered,
         image_samples: times.samples,
-        name_platform: "MARS GLOBAL SURVEYOR",
+        name_platform: &SPACECRAFT.label_name,
         name_sensor: &naif.frame,
         reference_height: ReferenceHeight {
             maxheight: REFERENCE_HEIGHT_M,
@@ -109,7 +113,7 @@ fn isd<'a>(site: &SiteProducts<'a>, image: &ImageProducts<'a>, round: Round) -> 
         },
         name_model: "USGS_ASTRO_LINE_SCANNER_SENSOR_MODEL",
         interpolation_method: "lagrange",
-        line_scan_rate: [[0.5, -half_s, times.line_period_s]],
+        line_scan_rate: line_scan_rate(times, half_s),
         starting_ephemeris_time: start_s,
         center_ephemeris_time: start_s + half_s,
         radii: Radii {
@@ -143,6 +147,25 @@ fn isd<'a>(site: &SiteProducts<'a>, image: &ImageProducts<'a>, round: Round) -> 
         kernels: kernels_by_type(site),
         areograph: provenance(site, image, round),
     }
+}
+
+/// Line, time from the middle of the delivered lines and line period, for every piece of them.
+///
+/// `usgscsm` takes the last row whose line is not above the line coordinate, and there
+/// `t = time + period · (coordinate − line + 0.5)`. The first row has the place that ALE gives it; those of further
+/// pieces begin at the top edge of their first line, so that the upper half of that line has its own period too.
+fn line_scan_rate(times: &ImageTimes, half_s: f64) -> Vec<[f64; 3]> {
+    let pieces = times.line_times.pieces();
+    let delivered = pieces.filter(|piece| piece.first_line < times.lines_delivered);
+    let row = |piece: LinePiece| {
+        let top = f64::from(piece.first_line);
+        let (after_s, period_s) = (times.line_times.seconds(top), piece.period_s);
+        match piece.first_line {
+            0 => [0.5, -half_s, period_s],
+            _ => [top, after_s - 0.5 * period_s - half_s, period_s],
+        }
+    };
+    delivered.map(row).collect()
 }
 
 fn rotation<To: Frame>(
@@ -243,12 +266,13 @@ fn naif_keywords(site: &SiteProducts, instrument: &Instrument) -> BTreeMap<Strin
         ("BODY499_POLE_DEC", Keyword::Numbers(dec)),
         ("BODY499_PM", Keyword::Numbers(meridian)),
     ];
-    let (optics, pointing) = (&instrument.optics, &site.config.pointing);
+    let optics = &instrument.optics;
+    let bias = site.config.pointing.bias_of(instrument);
     let of_camera = [
         ("FOCAL_LENGTH", Keyword::Number(optics.focal_length_mm)),
         ("PIXEL_PITCH", Keyword::Number(optics.pixel_pitch_mm)),
         ("PIXEL_SAMPLES", Keyword::Pixels(instrument.detector.pixels)),
-        ("CK_TIME_BIAS", Keyword::Number(pointing.ck_bias.seconds())),
+        ("CK_TIME_BIAS", Keyword::Number(bias.seconds())),
         ("SPK_TIME_BIAS", Keyword::Number(0.0)),
     ];
     let id = instrument.naif.instrument;
@@ -295,8 +319,8 @@ fn provenance<'a>(
         },
         kernels: kernels.collect(),
         light_time: &image.orientation.light_time,
-        line_period_s: times.line_period_s,
-        lines_header: times.lines_header,
+        line_period_s: times.line_times.mean_period_s(),
+        lines_header: times.line_times.lines(),
         notes: vec![
             "line_scan_rate: seconds per image line (summing included), from the top edge of the first line"
                 .to_owned(),

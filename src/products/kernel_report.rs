@@ -11,7 +11,7 @@ use super::{
     site::SiteProducts,
 };
 use crate::{
-    kernel_source::CkQuality, schema::DocumentSchema, spice::quality_of,
+    constants::SPACECRAFT, kernel_source::CkQuality, schema::DocumentSchema, spice::quality_of,
     stages::describe_kernels::KernelLine, time::Intervals,
 };
 
@@ -41,12 +41,12 @@ fn names_by_type<'a>(site: &SiteProducts<'a>) -> BTreeMap<String, Vec<&'a str>> 
 
 fn type_of(kernel: &KernelLine) -> String {
     let name = kernel.name.to_lowercase();
-    let holds_mgs = kernel
+    let holds_spacecraft = kernel
         .held
         .as_ref()
         .is_some_and(|held| !held.as_slice().is_empty());
     match kernel.role.as_str() {
-        "SPK" if !holds_mgs => "tspk".to_owned(),
+        "SPK" if !holds_spacecraft => "tspk".to_owned(),
         "IK" if name.contains("addendum") => "iak".to_owned(),
         role => role.to_lowercase(),
     }
@@ -59,7 +59,7 @@ fn qualities(site: &SiteProducts) -> BTreeMap<&'static str, &'static str> {
         let name = kernel.name.to_lowercase();
         if quality_of(Path::new(&name)) == CkQuality::Nominal {
             "predicted"
-        } else if name.starts_with("mgs_") {
+        } else if name.starts_with(&format!("{}_", SPACECRAFT.id)) {
             "reconstructed"
         } else {
             "noquality"
@@ -136,7 +136,7 @@ pub(super) struct Names<'a>(
 
 #[derive(Serialize, JsonSchema)]
 struct Extension<'a> {
-    coverage: &'static str,
+    coverage: String,
     wanted_positions_et_s: Vec<[f64; 2]>,
     wanted_attitudes_et_s: Vec<[f64; 2]>,
     kernels: Vec<Entry<'a>>,
@@ -170,8 +170,11 @@ fn report<'a>(site: &SiteProducts<'a>) -> Report<'a> {
         coverage_et_s: kernel.held.as_ref().map(ends),
     };
     let areograph = Extension {
-        coverage: "intervals of TDB seconds past J2000 in which the kernel holds Mars Global Surveyor: its position \
-                   in an spk, its attitude in a ck, whose gaps lie between the intervals",
+        coverage: format!(
+            "intervals of TDB seconds past J2000 in which the kernel holds {}: its position in an spk, its attitude in \
+             a ck, whose gaps lie between the intervals",
+            SPACECRAFT.full_name
+        ),
         wanted_positions_et_s: ends(&site.required.positions),
         wanted_attitudes_et_s: ends(&site.required.attitudes),
         kernels: site.kernels.iter().map(entry).collect(),

@@ -43,7 +43,7 @@ pub use adjusted_kernels::{
 };
 pub use exchange::{
     ControlMeasure, ControlNetwork, ControlPoint, GroundEstimate, ImageMeasure, LidarPoint,
-    NetworkMeasure, NetworkPoint, moc_serial_number, write_control_network, write_gcp,
+    NetworkMeasure, NetworkPoint, isis_serial_number, write_control_network, write_gcp,
     write_lidar_data,
 };
 pub use generated::{documentation, schemas};

@@ -16,6 +16,7 @@ use super::{
 use crate::{
     error::Result,
     geom::{attitude::continuous_quaternions, polynomial::Fit},
+    line_times::{LinePiece, LineTimes},
     schema::DocumentSchema,
     stages::{
         fit_sensor_model::{EulerModel, RotationVectorModel, SensorModel},
@@ -80,6 +81,9 @@ struct Times<'a> {
     stop_et_s: f64,
     #[schemars(extend("exclusiveMinimum" = 0))]
     line_period_s: f64,
+    /// Where the exposure changes inside the image: its pieces, in order; `line_period_s` is their mean then.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    line_pieces: Vec<LinePieceDocument>,
     exposure_s: f64,
     downtrack_summing: u32,
     crosstrack_summing: u32,
@@ -88,6 +92,15 @@ struct Times<'a> {
     samples_per_line: u32,
     first_detector: u32,
     notes: &'a [String],
+}
+
+#[derive(Serialize, JsonSchema)]
+struct LinePieceDocument {
+    /// Counted from 0.
+    first_line: u32,
+    start_et_s: f64,
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    line_period_s: f64,
 }
 
 #[derive(Serialize, JsonSchema)]
@@ -329,20 +342,35 @@ fn outline_deg(orientation: &Orientation) -> Option<Vec<[f64; 2]>> {
     Some(outline.iter().map(corner).collect())
 }
 
+/// The pieces of an image of several.
+fn line_pieces(line_times: &LineTimes) -> Vec<LinePieceDocument> {
+    let pieces = line_times.pieces();
+    if pieces.len() == 1 {
+        return Vec::new();
+    }
+    let document = |piece: LinePiece| LinePieceDocument {
+        first_line: piece.first_line,
+        start_et_s: piece.start.seconds(),
+        line_period_s: piece.period_s,
+    };
+    pieces.map(document).collect()
+}
+
 fn times(times: &ImageTimes) -> Times<'_> {
     let exposures = times.exposures();
     Times {
-        start_et_s: times.start.seconds(),
+        start_et_s: times.line_times.start().seconds(),
         start_from: times.start_from,
         sclk_start: times.sclk_start.as_deref(),
         utc_start: &times.utc_start,
         middle_et_s: times.middle().seconds(),
         stop_et_s: exposures.stop.seconds(),
-        line_period_s: times.line_period_s,
+        line_period_s: times.line_times.mean_period_s(),
+        line_pieces: line_pieces(&times.line_times),
         exposure_s: times.exposure_s,
         downtrack_summing: times.downtrack_summing,
         crosstrack_summing: times.crosstrack_summing,
-        lines_header: times.lines_header,
+        lines_header: times.line_times.lines(),
         lines_delivered: times.lines_delivered,
         samples_per_line: times.samples,
         first_detector: times.first_detector,

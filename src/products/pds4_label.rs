@@ -16,7 +16,10 @@ use super::{
     site::SiteProducts,
     table::{Kind, Meaning, Table},
 };
-use crate::error::{IoError, Locate, Result};
+use crate::{
+    constants::SPACECRAFT,
+    error::{IoError, Locate, Result},
+};
 
 /// What the label says of the file.
 struct Described {
@@ -166,7 +169,7 @@ fn identification(site: &SiteProducts) -> String {
     let identifier = site.config.site.to_lowercase();
     format!(
         "  <Identification_Area>
-    <logical_identifier>urn:areograph:mgs:footprints:{}</logical_identifier>
+    <logical_identifier>urn:areograph:{spacecraft}:footprints:{}</logical_identifier>
     <version_id>1.0</version_id>
     <title>MOLA footprints of the site {} in IAU 2000</title>
     <information_model_version>1.21.0.0</information_model_version>
@@ -175,12 +178,15 @@ fn identification(site: &SiteProducts) -> String {
 ",
         escaped(&identifier),
         escaped(&site.config.site),
+        spacecraft = SPACECRAFT.id,
     )
 }
 
 /// When, with what, and of what the shots are.
 fn observation(site: &SiteProducts) -> String {
     let utc = |text: Option<&String>| text.map_or(String::new(), |utc| format!("{utc}Z"));
+    let mission = &SPACECRAFT.full_name;
+    let altimeter = escaped(&site.config.altimeter.full_name);
     format!(
         "  <Observation_Area>
     <Time_Coordinates>
@@ -192,7 +198,7 @@ fn observation(site: &SiteProducts) -> String {
       <processing_level>Derived</processing_level>
     </Primary_Result_Summary>
     <Investigation_Area>
-      <name>Mars Global Surveyor</name>
+      <name>{mission}</name>
       <type>Mission</type>
       <Internal_Reference>
         <lid_reference>urn:nasa:pds:context:investigation:mission.mars_global_surveyor</lid_reference>
@@ -201,11 +207,11 @@ fn observation(site: &SiteProducts) -> String {
     </Investigation_Area>
     <Observing_System>
       <Observing_System_Component>
-        <name>Mars Global Surveyor</name>
+        <name>{mission}</name>
         <type>Host</type>
       </Observing_System_Component>
       <Observing_System_Component>
-        <name>Mars Orbiter Laser Altimeter</name>
+        <name>{altimeter}</name>
         <type>Instrument</type>
       </Observing_System_Component>
     </Observing_System>

@@ -17,7 +17,7 @@ pub(super) const SECTION: Section = Section {
 };
 
 fn biases(site: &SiteProducts) -> String {
-    let (clock, pointing) = (&site.config.mola_clock, &site.config.pointing);
+    let clock = &site.config.mola_clock;
     let sign = match clock.sign {
         TagSign::Late => "tags are late",
         TagSign::Early => "tags are early",
@@ -37,15 +37,23 @@ fn biases(site: &SiteProducts) -> String {
             Column::Text("source"),
         ],
     );
-    table.row(
-        true,
-        [
-            "attitude (CK)".into(),
-            format!("{:+.3}", pointing.ck_bias.seconds()).into(),
-            "the time at which attitude is read; position and Mars stay at the exposure".into(),
-            (&pointing.source).into(),
-        ],
-    );
+    let cameras = site.images.iter().map(|image| &image.times.instrument);
+    let pointing = site.config.pointing.used(cameras);
+    for of in &pointing {
+        let name = match pointing.len() {
+            1 => "attitude (CK)".to_owned(),
+            _ => format!("attitude (CK) of {}", of.camera),
+        };
+        table.row(
+            true,
+            [
+                name.into(),
+                format!("{:+.3}", of.bias.seconds()).into(),
+                "the time at which attitude is read; position and Mars stay at the exposure".into(),
+                of.source.into(),
+            ],
+        );
+    }
     table.row(
         true,
         [

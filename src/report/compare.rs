@@ -5,6 +5,7 @@ use super::{
     plots::{Panel, Plot, Series, Style, figure, thinned},
 };
 use crate::{
+    constants::SPACECRAFT,
     error::Result,
     stages::compare_kernels::{AttitudeComparison, Comparison, Size},
     time::{Et, Interval},
@@ -75,12 +76,13 @@ fn lead(comparison: &KernelComparison) -> String {
         (Tone::Remarks, headline)
     };
     let words = format!(
-        "{} epochs from {} to {} UTC, equally spaced over the time that all sets hold. Positions of MGS from \
+        "{} epochs from {} to {} UTC, equally spaced over the time that all sets hold. Positions of {} from \
          Mars, geometric; each set minus the mean of all, along the axes of the mean orbit. Closest is the least \
          root mean square distance, the rule by which Shan et al. 2005 chose the orbit of the navigation team.",
         orbit.epochs.len(),
         comparison.utc[0],
-        comparison.utc[1]
+        comparison.utc[1],
+        SPACECRAFT.name,
     );
     verdict(
         tone,

@@ -12,6 +12,7 @@ use crate::{
     stages::{
         fit_sensor_model::EulerModel,
         sample_orientation::{BoresightGround, OtherConvention},
+        tag_times::ImageTimes,
     },
     units::{METRES_PER_KM, RADIANS_PER_ARCSECOND, RADIANS_PER_DEGREE},
 };
@@ -69,11 +70,11 @@ fn taken(site: &SiteProducts) -> String {
             [
                 (&times.id).into(),
                 (&times.utc_start).into(),
-                times.lines_header.to_string().into(),
+                times.line_times.lines().to_string().into(),
                 times.lines_delivered.to_string().into(),
                 times.samples.to_string().into(),
                 format!("{} × {}", times.downtrack_summing, times.crosstrack_summing).into(),
-                format!("{:.4}", 1e3 * times.line_period_s).into(),
+                periods_ms(times).into(),
                 format!("{:.2}", times.duration_s()).into(),
                 seen(|ground| format!("{:.1}", ground.range_m / METRES_PER_KM)),
                 seen(|ground| format!("{:.2}", ground.emission_rad / RADIANS_PER_DEGREE)),
@@ -117,6 +118,15 @@ fn light_time(site: &SiteProducts) -> String {
         }
     }
     paragraph(&words)
+}
+
+/// The line period; where it changes inside the image every one.
+fn periods_ms(times: &ImageTimes) -> String {
+    let periods = times
+        .line_times
+        .pieces()
+        .map(|piece| format!("{:.4}", 1e3 * piece.period_s));
+    periods.collect::<Vec<_>>().join(", ")
 }
 
 /// RMSE per image: Table 4.

@@ -143,7 +143,7 @@ fn vectors(
     limit: usize,
 ) -> Plot {
     let samples = f64::from(image.times.samples);
-    let lines = f64::from(image.times.lines_header);
+    let lines = f64::from(image.times.line_times.lines());
     let ends = [0.0, f64::from(image.times.lines_delivered)].map(|x| Mark {
         x,
         half_width: 0.0,
@@ -208,7 +208,6 @@ fn vectors(
 fn residuals(image: &ImageProducts, index: usize, ties: &IntersectedTies) -> (Vec<Arrow>, usize) {
     let times = image.times;
     let detector = times.detector();
-    let middle = 0.5 * f64::from(times.lines_header);
     let mut outliers = 0;
     let mut arrows = Vec::new();
     for point in &ties.points {
@@ -220,7 +219,7 @@ fn residuals(image: &ImageProducts, index: usize, ties: &IntersectedTies) -> (Ve
             let sample = detector.sample(measure.y_px);
             let projected = detector.sample(measure.y_px - measure.reprojection_px);
             arrows.push(Arrow {
-                from: (measure.x_lines + middle, sample),
+                from: (times.line_times.line_of_offset(measure.x_lines), sample),
                 by: (measure.reprojection_lines, sample - projected),
             });
         }

@@ -119,7 +119,7 @@ fn profiles(site: &SiteProducts, images: &[&ImageProducts]) -> String {
 fn plane(profiles: &[Profile], image: &ImageProducts) -> Plot {
     let points = &image.registration.points;
     let (lines, samples) = (
-        f64::from(image.times.lines_header),
+        f64::from(image.times.line_times.lines()),
         f64::from(image.times.samples),
     );
     let beside = WIDTHS_BESIDE * samples;

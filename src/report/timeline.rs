@@ -9,6 +9,7 @@ use super::{
     section::Section,
 };
 use crate::{
+    constants::SPACECRAFT,
     error::Result,
     products::SiteProducts,
     stages::describe_kernels::KernelLine,
@@ -217,7 +218,7 @@ fn csv(rows: &[Row]) -> String {
 
 fn table(site: &SiteProducts) -> String {
     let mut table = Table::new(
-        "Kernels with data of MGS",
+        &format!("Kernels with data of {}", SPACECRAFT.name),
         &[
             Column::Text("kernel"),
             Column::Text("role"),

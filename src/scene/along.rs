@@ -22,7 +22,7 @@ use super::{
     truth::{KeptShot, ProfileTruth, Truth},
 };
 use crate::{
-    config::{built_in_altimeter, built_in_instruments, usual_instrument},
+    config::{built_in_instruments, usual_altimeter, usual_instrument},
     error::{IoError, Locate, Result},
     frames::MarsDatum,
     geom::ellipsoid::Spherical,
@@ -174,7 +174,7 @@ struct TabulatedFlight {
 impl TabulatedFlight {
     fn new(session: &Session, tags: Vec<Et>) -> Result<Self> {
         let first = tags.first().map_or(Et::from_seconds(0.0), |tag| {
-            tag.plus(-built_in_altimeter().clock_bias_s - FRAME_S / 2.0)
+            tag.plus(-usual_altimeter().clock_bias_s - FRAME_S / 2.0)
         });
         let count = tags.len() * 40 + 1;
         let beams = (0..count)

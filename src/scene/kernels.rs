@@ -14,7 +14,7 @@ use super::{
 };
 use crate::{
     config::usual_instrument,
-    constants::{NAIF_MARS, NAIF_MGS, NAIF_SOLAR_SYSTEM_BARYCENTRE, NAIF_SUN},
+    constants::{NAIF_MARS, NAIF_SOLAR_SYSTEM_BARYCENTRE, NAIF_SUN, SPACECRAFT},
     error::{IoError, Locate, Result},
     frames::Position,
     geom::attitude::make_continuous,
@@ -211,7 +211,7 @@ pub(super) fn write_orbits(folder: &Path, arcs: &[Arc], seed: u64) -> Result<()>
             .iter()
             .zip(&tables)
             .map(|(arc, (epochs, states))| SpkSegment {
-                target: NAIF_MGS,
+                target: SPACECRAFT.naif,
                 centre: NAIF_MARS_BARYCENTRE,
                 name: arc.image.id,
                 degree: SPK_DEGREE,

@@ -12,7 +12,7 @@ use super::{
     terrain::Terrain,
 };
 use crate::{
-    config::built_in_altimeter,
+    config::usual_altimeter,
     constants::MARS_IAU2000,
     error::Result,
     frames::MarsDatum,
@@ -205,7 +205,7 @@ pub(super) fn fly_frame(
     terrain: &Terrain,
     request: &FrameRequest<'_>,
 ) -> Result<Frame> {
-    let middle_et = request.tag.plus(-built_in_altimeter().clock_bias_s);
+    let middle_et = request.tag.plus(-usual_altimeter().clock_bias_s);
     let steady = |et: Et| -> Result<Look> {
         let beam = flight.beam(et)?;
         Ok(Look::new(&beam, &beam.steady_direction, et, request))

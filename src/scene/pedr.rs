@@ -11,7 +11,7 @@ use super::{
     truth::{FileTruth, KeptShot},
 };
 use crate::{
-    config::built_in_altimeter,
+    config::usual_altimeter,
     error::{Locate, Result},
     frames::MarsDatum,
     pds::pedr::{LABEL_RECORDS, LabelInfo, PedrWriter, Record},
@@ -51,7 +51,7 @@ pub(super) struct PedrRequest<'a> {
 )]
 pub(super) fn frame_tags(span: Interval) -> Vec<Et> {
     let first_us =
-        ((span.start.seconds() + FRAME_S / 2.0 + built_in_altimeter().clock_bias_s) * 1e6).ceil();
+        ((span.start.seconds() + FRAME_S / 2.0 + usual_altimeter().clock_bias_s) * 1e6).ceil();
     let count = (span.duration_s() / FRAME_S).floor().max(0.0) as u32;
     (0..count)
         .map(|index| Et::from_seconds((first_us + f64::from(index) * FRAME_S * 1e6) / 1e6))
@@ -96,7 +96,7 @@ pub(super) fn write_pedr(
                 let frame_request = FrameRequest {
                     tag: *tag,
                     index: (block * BLOCK + index) as u64,
-                    orbit: (request.orbit)(tag.plus(-built_in_altimeter().clock_bias_s)),
+                    orbit: (request.orbit)(tag.plus(-usual_altimeter().clock_bias_s)),
                     datum: request.datum,
                     seed: request.seed,
                     errors: &request.errors,

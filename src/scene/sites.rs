@@ -10,7 +10,7 @@ use super::{
     truth::TiesTruth,
 };
 use crate::{
-    config::{built_in_altimeter, usual_instrument},
+    config::{usual_altimeter, usual_instrument},
     error::Result,
     spice::Session,
 };
@@ -115,7 +115,7 @@ impl SiteFile<'_> {
             self.kernels.to_toml(),
             usual_instrument().pointing.ck_bias_s,
             quoted(INJECTED),
-            built_in_altimeter().clock_bias_s,
+            usual_altimeter().clock_bias_s,
             quoted(INJECTED),
             files.join(", "),
         );

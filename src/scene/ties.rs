@@ -21,6 +21,7 @@ use crate::{
         oriented_camera::OrientedCamera,
         pushbroom::{Detector, ExteriorOrientation, Pose, Projector, SampledOrientation},
     },
+    line_times::LineTimes,
     pds::ties::ties_table,
     ties::{TieMeasure, TiePoint},
     time::Et,
@@ -74,7 +75,11 @@ impl<'a> TrueImage<'a> {
                 id: image.id.to_owned(),
                 orientation,
                 detector,
-                lines: f64::from(image.lines_header),
+                line_times: LineTimes::even(
+                    flown.arc.exposed.start,
+                    image.lines_header,
+                    image.line_period_s(),
+                )?,
             },
         })
     }
@@ -82,7 +87,7 @@ impl<'a> TrueImage<'a> {
     fn projector(&self) -> Result<Projector<'_, SampledOrientation>> {
         let projector = Projector::new(
             &self.oriented_camera.orientation,
-            self.oriented_camera.lines,
+            self.oriented_camera.lines(),
         );
         Ok(projector.map_err(|error| no_camera(self.flown, &error))?)
     }
@@ -126,7 +131,7 @@ impl<'a> TrueImage<'a> {
             .y;
         let measure = TieMeasure {
             image: self.oriented_camera.id.clone(),
-            line: seen.x + 0.5 * self.oriented_camera.lines,
+            line: seen.x + 0.5 * self.oriented_camera.lines(),
             sample: self.oriented_camera.detector.sample(y_px),
             sigma_px: None,
         };
@@ -139,7 +144,7 @@ impl<'a> TrueImage<'a> {
     /// How many focal-plane pixels a line is in the middle of the image.
     fn focal_px_per_line(&self, terrain: &Terrain) -> Result<f64> {
         let camera = &self.oriented_camera;
-        let [line, sample] = [camera.lines, camera.detector.samples].map(|length| 0.5 * length);
+        let [line, sample] = [camera.lines(), camera.detector.samples].map(|length| 0.5 * length);
         let et_s = exposed(self.flown, line).seconds();
         let ground_m = self.ground_m(terrain, line, sample);
         let ground_m = ground_m.ok_or(SceneError::BeamMisses { et_s })?;
@@ -148,7 +153,7 @@ impl<'a> TrueImage<'a> {
 
     fn truth(&self, terrain: &Terrain) -> Result<TieCameraTruth> {
         let errors = &self.flown.errors;
-        let lines = self.oriented_camera.lines;
+        let lines = self.oriented_camera.lines();
         let step = lines / f64::from(TOLD_POSES - 1);
         let told: Vec<f64> = (0..TOLD_POSES).map(|row| step * f64::from(row)).collect();
         let times: Vec<Et> = told.iter().map(|line| exposed(self.flown, *line)).collect();

@@ -13,7 +13,7 @@ use super::{
     versions::Version,
 };
 use crate::{
-    config::{built_in_altimeter, usual_instrument},
+    config::{usual_altimeter, usual_instrument},
     constants::MARS_IAU2000,
     geom::{
         attitude::{make_continuous, spice_quaternion},
@@ -263,7 +263,7 @@ impl Truth {
             biases: Biases {
                 ck_bias_s: usual_instrument().pointing.ck_bias_s,
                 ck_rule: "the attitude of true time t stands in the C-kernel at t + ck_bias_s",
-                mola_clock_bias_s: built_in_altimeter().clock_bias_s,
+                mola_clock_bias_s: usual_altimeter().clock_bias_s,
                 mola_clock_sign: "late",
                 mola_clock_rule: "true time = tag - mola_clock_bias_s, in all files; coordinates hold at the true time",
             },

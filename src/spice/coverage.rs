@@ -11,7 +11,7 @@ use super::{
     needs::{CLOCKS, explain},
 };
 use crate::{
-    constants::{NAIF_MARS, NAIF_MGS, NAIF_MGS_BUS},
+    constants::{NAIF_MARS, SPACECRAFT},
     error::{Locate, Result},
     time::{Et, Interval, Intervals},
 };
@@ -42,7 +42,7 @@ impl Coverage {
     /// [`super::SpiceError::Spice`] when a C-kernel cannot be read; [`super::SpiceError::MissingText`] without clock.
     pub(super) fn of(set: &KernelSet, cspice: &Cspice) -> Result<Self> {
         let mut coverage = Self::default();
-        let (mut of_mgs, mut of_mars) = (ByCentre::new(), ByCentre::new());
+        let (mut of_spacecraft, mut of_mars) = (ByCentre::new(), ByCentre::new());
         let mut attitude = Vec::new();
         for (index, kernel) in set.kernels().iter().enumerate() {
             let mut held = Vec::new();
@@ -52,21 +52,21 @@ impl Coverage {
                         let [target, centre, ..] = segment.integers;
                         let interval = interval_of([segment.start, segment.stop]);
                         let by_centre = match target {
-                            NAIF_MGS => &mut of_mgs,
+                            target if target == SPACECRAFT.naif => &mut of_spacecraft,
                             NAIF_MARS => &mut of_mars,
                             _ => continue,
                         };
                         by_centre.entry(centre).or_default().push(interval);
                         coverage.seams.extend([interval.start, interval.stop]);
-                        if target == NAIF_MGS {
+                        if target == SPACECRAFT.naif {
                             held.push(interval);
                         }
                     }
                 }
                 KernelRole::Ck => {
                     let windows = cspice
-                        .ck_coverage(&kernel.path, NAIF_MGS_BUS)
-                        .map_err(|error| explain(set, error, &CLOCKS))
+                        .ck_coverage(&kernel.path, SPACECRAFT.bus)
+                        .map_err(|error| explain(set, error, &*CLOCKS))
                         .in_file(&kernel.path)?;
                     held.extend(windows.into_iter().map(interval_of));
                     attitude.extend_from_slice(&held);
@@ -82,7 +82,7 @@ impl Coverage {
                 coverage.per_kernel.push((index, intervals));
             }
         }
-        coverage.spk = relative_to_mars(&of_mgs, &of_mars);
+        coverage.spk = relative_to_mars(&of_spacecraft, &of_mars);
         coverage.ck = Intervals::union_of(attitude);
         coverage
             .seams
@@ -107,7 +107,7 @@ pub struct RequiredCoverage {
 
 fn is_without_rates(segment: &daf::Segment) -> bool {
     let [object, _, _, rates, ..] = segment.integers;
-    object == NAIF_MGS_BUS && rates == 0
+    object == SPACECRAFT.bus && rates == 0
 }
 
 pub(super) fn interval_of([start, stop]: [f64; 2]) -> Interval {
@@ -115,15 +115,15 @@ pub(super) fn interval_of([start, stop]: [f64; 2]) -> Interval {
 }
 
 /// When MGS relative to Mars follows: directly, or through a centre that both are known from.
-fn relative_to_mars(of_mgs: &ByCentre, of_mars: &ByCentre) -> Intervals {
+fn relative_to_mars(of_spacecraft: &ByCentre, of_mars: &ByCentre) -> Intervals {
     let mut known = Vec::new();
-    for (centre, intervals) in of_mgs {
-        let mgs = Intervals::union_of(intervals.iter().copied());
+    for (centre, intervals) in of_spacecraft {
+        let held = Intervals::union_of(intervals.iter().copied());
         let linked = if *centre == NAIF_MARS {
-            mgs
+            held
         } else {
             let mars = of_mars.get(centre).into_iter().flatten().copied();
-            mgs.intersection(&Intervals::union_of(mars))
+            held.intersection(&Intervals::union_of(mars))
         };
         known.extend_from_slice(linked.as_slice());
     }

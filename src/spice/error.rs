@@ -1,6 +1,7 @@
 //! What can go wrong with kernels and with CSPICE.
 
 use crate::{
+    constants::SPACECRAFT,
     error::{Cause, Kind},
     time::{Et, Interval},
 };
@@ -86,7 +87,7 @@ pub enum SpiceError {
         problem: String,
     },
     /// Kernels do not hold what was asked.
-    #[error("no {what} of MGS for {gap} ({gap_utc}), required for {required}; {neighbours}")]
+    #[error("no {what} of {} for {gap} ({gap_utc}), required for {required}; {neighbours}", SPACECRAFT.name)]
     CoverageGap {
         /// `position` or `attitude`.
         what: &'static str,
@@ -100,7 +101,7 @@ pub enum SpiceError {
         neighbours: String,
     },
     /// No attitude sample near enough.
-    #[error("no attitude of MGS within {tolerance_s} s of {kernel_time} (time of the C-kernel)")]
+    #[error("no attitude of {} within {tolerance_s} s of {kernel_time} (time of the C-kernel)", SPACECRAFT.name)]
     NoAttitude {
         /// Instant as the C-kernel counts time.
         kernel_time: Et,
@@ -111,7 +112,7 @@ pub enum SpiceError {
     #[error("{what} at {instant} (UTC {utc}) is not finite{part}")]
     NotFinite {
         /// Whose position, velocity or attitude.
-        what: &'static str,
+        what: String,
         /// When, as the kernel counts time.
         instant: Et,
         /// The same in UTC.

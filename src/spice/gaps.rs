@@ -2,6 +2,7 @@
 
 use super::{coverage::RequiredCoverage, error::SpiceError, kernels::KernelRole, session::Session};
 use crate::{
+    constants::SPACECRAFT,
     error::Result,
     time::{Et, Interval, Intervals, PointingBias},
 };
@@ -116,8 +117,9 @@ impl Session {
         let mut sentences = Vec::new();
         if let Some(index) = inside {
             sentences.push(format!(
-                "{} holds MGS then, but no kernel links its centre to Mars",
-                name(index)
+                "{} holds {} then, but no kernel links its centre to Mars",
+                name(index),
+                SPACECRAFT.name
             ));
         }
         if let Some((stop, index)) = before {

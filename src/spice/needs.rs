@@ -1,13 +1,13 @@
 //! What times and geometry need from text kernels, and how its absence is told.
 
-use std::borrow::Cow;
+use std::{borrow::Cow, sync::LazyLock};
 
 use super::{
     error::SpiceError,
     kernels::{Kernel, KernelRole, KernelSet, read_text},
     text_kernel::{self, values_of},
 };
-use crate::instruments::Instrument;
+use crate::{constants::SPACECRAFT, instruments::Instrument};
 
 /// Something that one text kernel of a set must define.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -28,24 +28,28 @@ pub(super) const LEAP_SECONDS: Need = Need {
     kernel: Cow::Borrowed("leap-second kernel (.tls)"),
     example: Cow::Borrowed("naif0012.tls"),
 };
-pub(super) const CLOCK: Need = Need {
-    variable: Cow::Borrowed("SCLK_DATA_TYPE_94"),
-    what: Cow::Borrowed("the MGS clock"),
-    kernel: Cow::Borrowed("spacecraft clock kernel of MGS (.tsc)"),
-    example: Cow::Borrowed("mgs_sclkscet_00061.tsc"),
-};
+pub(super) static CLOCK: LazyLock<Need> = LazyLock::new(|| Need {
+    variable: format!("SCLK_DATA_TYPE_{}", SPACECRAFT.naif.unsigned_abs()).into(),
+    what: format!("the {} clock", SPACECRAFT.name).into(),
+    kernel: format!("spacecraft clock kernel of {} (.tsc)", SPACECRAFT.name).into(),
+    example: Cow::Borrowed(&SPACECRAFT.clock_kernel),
+});
 pub(super) const MARS: Need = Need {
     variable: Cow::Borrowed("BODY499_PM"),
     what: Cow::Borrowed("the rotation of Mars"),
     kernel: Cow::Borrowed("planetary constants kernel (.tpc)"),
     example: Cow::Borrowed("pck00010.tpc"),
 };
-pub(super) const BUS_FRAME: Need = Need {
-    variable: Cow::Borrowed("FRAME_-94000_NAME"),
-    what: Cow::Borrowed("the frame of the MGS bus"),
-    kernel: Cow::Borrowed("kernel that defines the frame MGS_SPACECRAFT (.tsc or .tf)"),
-    example: Cow::Borrowed("mgs_sclkscet_00061.tsc"),
-};
+pub(super) static BUS_FRAME: LazyLock<Need> = LazyLock::new(|| Need {
+    variable: format!("FRAME_{}_NAME", SPACECRAFT.bus).into(),
+    what: format!("the frame of the {} bus", SPACECRAFT.name).into(),
+    kernel: format!(
+        "kernel that defines the frame {} (.tsc or .tf)",
+        SPACECRAFT.bus_frame
+    )
+    .into(),
+    example: Cow::Borrowed(&SPACECRAFT.clock_kernel),
+});
 /// The frame of a camera.
 pub(super) fn camera_frame(instrument: &Instrument) -> Need {
     Need {
@@ -57,7 +61,7 @@ pub(super) fn camera_frame(instrument: &Instrument) -> Need {
 }
 
 /// What clock strings and attitude need.
-pub(super) const CLOCKS: [Need; 2] = [LEAP_SECONDS, CLOCK];
+pub(super) static CLOCKS: LazyLock<[Need; 2]> = LazyLock::new(|| [LEAP_SECONDS, CLOCK.clone()]);
 
 /// An error of CSPICE, or the kernel whose absence explains it: the first of `needs` that no text
 /// kernel of `set` defines.

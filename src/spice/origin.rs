@@ -9,7 +9,7 @@ use super::{
     kernels::{KernelRole, KernelSet},
 };
 use crate::{
-    constants::NAIF_MGS_BUS,
+    constants::SPACECRAFT,
     time::{Et, Interval},
 };
 
@@ -50,7 +50,7 @@ pub(super) fn of_attitude(
 ) -> Option<Origin> {
     let cks = set.kernels().iter().rev();
     for kernel in cks.filter(|kernel| kernel.role == KernelRole::Ck) {
-        let intervals = cspice.ck_coverage(&kernel.path, NAIF_MGS_BUS).ok()?;
+        let intervals = cspice.ck_coverage(&kernel.path, SPACECRAFT.bus).ok()?;
         let mut parts = intervals.into_iter().map(interval_of);
         if let Some(part) = parts.find(|part| part.padded(reach_s).contains(kernel_time)) {
             let path = kernel.path.clone();

@@ -3,6 +3,7 @@
 use std::{
     fs,
     path::{Path, PathBuf},
+    sync::LazyLock,
 };
 
 use super::{
@@ -16,7 +17,7 @@ use super::{
 };
 use crate::{
     config::built_in_instruments,
-    constants::{MARS_IAU2000, NAIF_MGS, NAIF_MGS_BUS},
+    constants::{MARS_IAU2000, SPACECRAFT},
     error::{Error, IoError, Kind, Locate, Result},
     files::{InputFiles, file_name},
     kernel_source::{CkQuality, KernelSelection},
@@ -28,7 +29,8 @@ const DEPTH_MAX: usize = 16;
 /// Most files that are looked into.
 const FILES_MAX: usize = 100_000;
 /// What time tagging and geometry need from text kernels, but for the frame of the camera.
-const NEEDS: [Need; 4] = [LEAP_SECONDS, CLOCK, MARS, BUS_FRAME];
+static NEEDS: LazyLock<[Need; 4]> =
+    LazyLock::new(|| [LEAP_SECONDS, CLOCK.clone(), MARS, BUS_FRAME.clone()]);
 /// Orbit solutions that mark their files by name; a file without a mark is `nav`.
 const MARKED_FAMILIES: [&str; 2] = ["gsfc", "ipng"];
 
@@ -176,7 +178,7 @@ fn needs(texts: &[(PathBuf, Vec<Assignment>)]) -> Vec<Need> {
     } else {
         known_cameras
     };
-    NEEDS.into_iter().chain(cameras).collect()
+    NEEDS.iter().cloned().chain(cameras).collect()
 }
 
 /// For each need the pinned kernel that defines it, or the latest one.
@@ -241,41 +243,49 @@ fn select_ephemerides(
     required: &Intervals,
     set: &mut Selected<'_>,
 ) -> Result<()> {
-    let holds_mgs = |segments: &[Segment]| segments.iter().any(|s| s.integers[0] == NAIF_MGS);
+    let holds_spacecraft =
+        |segments: &[Segment]| segments.iter().any(|s| s.integers[0] == SPACECRAFT.naif);
     let family = selection.spk_family.to_ascii_lowercase();
-    let of_mgs = ephemerides
+    let of_spacecraft = ephemerides
         .iter()
-        .filter(|(_, segments)| holds_mgs(segments));
-    if !of_mgs.clone().any(|(path, _)| family_of(path, &family)) {
-        let names: Vec<String> = of_mgs.map(|(path, _)| file_name(path)).collect();
+        .filter(|(_, segments)| holds_spacecraft(segments));
+    if !of_spacecraft
+        .clone()
+        .any(|(path, _)| family_of(path, &family))
+    {
+        let names: Vec<String> = of_spacecraft.map(|(path, _)| file_name(path)).collect();
         let what = format!(
-            "holds the orbit of MGS in the solution {family} (found: {})",
+            "holds the orbit of {} in the solution {family} (found: {})",
+            SPACECRAFT.name,
             names.join(", ")
         );
         return Err(SpiceError::NothingToSelect { what }.into());
     }
     // Planets first; of several versions the latest last, so that it wins.
     let mut ordered: Vec<&(PathBuf, Vec<Segment>)> = ephemerides.iter().collect();
-    ordered.sort_by_key(|(path, segments)| (holds_mgs(segments), natural_order(path)));
+    ordered.sort_by_key(|(path, segments)| (holds_spacecraft(segments), natural_order(path)));
     for (path, segments) in ordered {
-        let mgs = holds_mgs(segments);
+        let own = holds_spacecraft(segments);
         let held = segments
             .iter()
-            .filter(|segment| !mgs || segment.integers[0] == NAIF_MGS)
+            .filter(|segment| !own || segment.integers[0] == SPACECRAFT.naif)
             .map(|segment| interval_of([segment.start, segment.stop]));
         let touches = !Intervals::union_of(held)
             .intersection(required)
             .as_slice()
             .is_empty();
         let name = file_name(path);
-        if mgs && !family_of(path, &family) {
+        if own && !family_of(path, &family) {
             let line = format!("{name}: not used, not of the orbit solution {family}");
             set.set.explanation.push(line);
         } else if !touches {
             let line = format!("{name}: not used, holds none of the required times");
             set.set.explanation.push(line);
-        } else if mgs {
-            set.add(path, &format!("orbit of MGS, solution {family}"))?;
+        } else if own {
+            set.add(
+                path,
+                &format!("orbit of {}, solution {family}", SPACECRAFT.name),
+            )?;
         } else {
             set.add(path, "ephemeris of planets")?;
         }
@@ -303,7 +313,7 @@ fn select_attitudes(
             let name = file_name(path);
             let held = session
                 .cspice
-                .ck_coverage(path, NAIF_MGS_BUS)
+                .ck_coverage(path, SPACECRAFT.bus)
                 .in_file(path)?;
             let hull = held.first().zip(held.last());
             let hull = hull.map(|(first, last)| interval_of([first[0], last[1]]));
@@ -315,10 +325,17 @@ fn select_attitudes(
             }
             let held = held.into_iter().map(interval_of);
             if *quality == CkQuality::Nominal {
-                set.add(path, "NOMINAL attitude of MGS: commanded, not measured")?;
+                let name_of = &SPACECRAFT.name;
+                set.add(
+                    path,
+                    &format!("NOMINAL attitude of {name_of}: commanded, not measured"),
+                )?;
                 commanded.push((name, Intervals::union_of(held)));
             } else {
-                set.add(path, "Reconstructed attitude of MGS")?;
+                set.add(
+                    path,
+                    &format!("Reconstructed attitude of {}", SPACECRAFT.name),
+                )?;
                 telemetry.extend(held);
             }
         }

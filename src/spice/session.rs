@@ -14,9 +14,9 @@ use super::{
     origin::{self, Origin, all_finite},
 };
 use crate::{
-    constants::{NAIF_MARS, NAIF_MGS, NAIF_MGS_BUS, NAIF_SOLAR_SYSTEM_BARYCENTRE, NAIF_SUN},
+    constants::{NAIF_MARS, NAIF_SOLAR_SYSTEM_BARYCENTRE, NAIF_SUN, SPACECRAFT},
     error::{Error, Locate, Result},
-    frames::{CameraFrame, J2000, MgsBus, Position, Rotation},
+    frames::{CameraFrame, J2000, Position, Rotation, SpacecraftBus},
     instruments::Instrument,
     time::{CkLookup, Et},
     units::METRES_PER_KM,
@@ -48,7 +48,7 @@ impl State {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Attitude {
     /// From J2000 to the bus; stamped with the exposure's instant, not the kernel's.
-    pub inertial_to_bus: Rotation<J2000, MgsBus>,
+    pub inertial_to_bus: Rotation<J2000, SpacecraftBus>,
     /// Angular velocity of the bus, J2000 components, radians per second.
     pub angular_velocity_rad_s: Vector3<f64>,
     /// How far from the asked instant the kernel's attitude holds, seconds; 0 inside its intervals.
@@ -155,8 +155,8 @@ impl Session {
     /// # Errors
     /// [`SpiceError::Spice`] when the string is no clock reading; [`SpiceError::MissingText`].
     pub fn sclk_to_et(&self, sclk: &str) -> Result<Et> {
-        let seconds = self.cspice.sclk_to_et(NAIF_MGS, sclk.trim());
-        let seconds = seconds.map_err(|error| self.explain(error, &CLOCKS))?;
+        let seconds = self.cspice.sclk_to_et(SPACECRAFT.naif, sclk.trim());
+        let seconds = seconds.map_err(|error| self.explain(error, &*CLOCKS))?;
         Ok(Et::from_seconds(seconds))
     }
 
@@ -165,8 +165,8 @@ impl Session {
     /// # Errors
     /// [`SpiceError::Spice`] outside the clock kernel's range; [`SpiceError::MissingText`].
     pub fn et_to_sclk(&self, et: Et) -> Result<String> {
-        let sclk = self.cspice.et_to_sclk(NAIF_MGS, et.seconds());
-        Ok(sclk.map_err(|error| self.explain(error, &CLOCKS))?)
+        let sclk = self.cspice.et_to_sclk(SPACECRAFT.naif, et.seconds());
+        Ok(sclk.map_err(|error| self.explain(error, &*CLOCKS))?)
     }
 
     /// Geometric state of MGS relative to Mars: no light time, no aberration.
@@ -177,8 +177,8 @@ impl Session {
     pub fn state(&self, et: Et) -> Result<State> {
         let state = self
             .cspice
-            .geometric_state(NAIF_MGS, et.seconds(), NAIF_MARS)?;
-        self.finite("position or velocity of MGS", et, state)
+            .geometric_state(SPACECRAFT.naif, et.seconds(), NAIF_MARS)?;
+        self.finite("position or velocity", &SPACECRAFT.name, et, state)
     }
 
     /// State of MGS as seen from the centre of Mars, corrected for light time and aberration (`LT+S`).
@@ -190,8 +190,8 @@ impl Session {
     pub fn apparent_state(&self, et: Et) -> Result<State> {
         let state = self
             .cspice
-            .apparent_state(NAIF_MGS, et.seconds(), NAIF_MARS)?;
-        self.finite("apparent position or velocity of MGS", et, state)
+            .apparent_state(SPACECRAFT.naif, et.seconds(), NAIF_MARS)?;
+        self.finite("apparent position or velocity", &SPACECRAFT.name, et, state)
     }
 
     /// Geometric state of Mars relative to the barycentre of the solar system.
@@ -202,7 +202,7 @@ impl Session {
         let state =
             self.cspice
                 .geometric_state(NAIF_MARS, et.seconds(), NAIF_SOLAR_SYSTEM_BARYCENTRE)?;
-        self.finite("position or velocity of Mars", et, state)
+        self.finite("position or velocity", "Mars", et, state)
     }
 
     /// State of the Sun as seen from the centre of Mars (`LT+S`).
@@ -213,11 +213,11 @@ impl Session {
         let state = self
             .cspice
             .apparent_state(NAIF_SUN, et.seconds(), NAIF_MARS)?;
-        self.finite("apparent position or velocity of the Sun", et, state)
+        self.finite("apparent position or velocity", "the Sun", et, state)
     }
 
     /// The state in metres, refused with the kernel that makes it no number.
-    fn finite(&self, what: &'static str, et: Et, state_km: StateKm) -> Result<State> {
+    fn finite(&self, what: &str, of: &str, et: Et, state_km: StateKm) -> Result<State> {
         let state = State::from_km(state_km);
         let finite = all_finite(state.position.xyz_m.as_slice())
             && all_finite(state.velocity_m_s.as_slice());
@@ -225,10 +225,10 @@ impl Session {
             return Ok(state);
         }
         let origin = origin::of_state(&self.kernels, &self.cspice, et);
-        Err(self.not_finite(what, et, origin))
+        Err(self.not_finite(format!("{what} of {of}"), et, origin))
     }
 
-    fn not_finite(&self, what: &'static str, instant: Et, origin: Option<Origin>) -> Error {
+    fn not_finite(&self, what: String, instant: Et, origin: Option<Origin>) -> Error {
         let utc = self.et_to_utc(instant);
         let part = origin.as_ref().map(|origin| origin.part);
         let failure = Error::from(SpiceError::NotFinite {
@@ -258,7 +258,7 @@ impl Session {
         let ticks_per_s = self.et_to_ticks(kernel_time.plus(1.0))? - ticks;
         let pointing = self
             .cspice
-            .pointing(NAIF_MGS_BUS, ticks, tolerance_s * ticks_per_s)?
+            .pointing(SPACECRAFT.bus, ticks, tolerance_s * ticks_per_s)?
             .ok_or(SpiceError::NoAttitude {
                 kernel_time,
                 tolerance_s,
@@ -268,7 +268,7 @@ impl Session {
         if !(all_finite(rows) && all_finite(rates) && pointing.ticks.is_finite()) {
             let reach_s = tolerance_s.max(0.0);
             let origin = origin::of_attitude(&self.kernels, &self.cspice, kernel_time, reach_s);
-            let what = "attitude of MGS or its rate";
+            let what = format!("attitude of {} or its rate", SPACECRAFT.name);
             return Err(self.not_finite(what, kernel_time, origin));
         }
         Ok(Attitude {
@@ -283,8 +283,8 @@ impl Session {
     /// # Errors
     /// As [`Self::et_to_sclk`].
     pub fn et_to_ticks(&self, et: Et) -> Result<f64> {
-        let ticks = self.cspice.et_to_ticks(NAIF_MGS, et.seconds());
-        Ok(ticks.map_err(|error| self.explain(error, &CLOCKS))?)
+        let ticks = self.cspice.et_to_ticks(SPACECRAFT.naif, et.seconds());
+        Ok(ticks.map_err(|error| self.explain(error, &*CLOCKS))?)
     }
 
     /// Mounting of `instrument` as the loaded kernels have it.
@@ -295,7 +295,7 @@ impl Session {
         &self,
         instrument: &Instrument,
         et: Et,
-    ) -> Result<Rotation<MgsBus, CameraFrame>> {
+    ) -> Result<Rotation<SpacecraftBus, CameraFrame>> {
         let [bus, camera] = [&instrument.naif.bus_frame, &instrument.naif.frame]
             // A name with a zero byte is cut there, and then no kernel defines it.
             .map(|name| CString::new(name.split('\0').next().unwrap_or_default()));
@@ -306,7 +306,7 @@ impl Session {
                 &camera.unwrap_or_default(),
                 et.seconds(),
             )
-            .map_err(|error| self.explain(error, &[camera_frame(instrument), BUS_FRAME]))?;
+            .map_err(|error| self.explain(error, &[camera_frame(instrument), BUS_FRAME.clone()]))?;
         Ok(Rotation::new(matrix(&rows), et))
     }
 

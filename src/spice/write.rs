@@ -14,7 +14,7 @@ use super::{
     session::{Session, State},
 };
 use crate::{
-    constants::NAIF_MGS_BUS,
+    constants::SPACECRAFT,
     error::{IoError, Locate, Result},
     time::Et,
     units::METRES_PER_KM,
@@ -167,7 +167,7 @@ fn fill_ck(
                 rates_rad_s: segment.angular_velocities_rad_s,
                 starts: segment.interval_starts,
             };
-            cspice.write_ck_3(handle, NAIF_MGS_BUS, &columns)?;
+            cspice.write_ck_3(handle, SPACECRAFT.bus, &columns)?;
         }
         Ok(())
     })

@@ -76,7 +76,7 @@ impl<'a> OrientedImage<'a> {
     /// Lines of the header image.
     #[must_use]
     pub fn lines(&self) -> f64 {
-        f64::from(self.image.lines_header)
+        f64::from(self.image.line_times.lines())
     }
 
     /// The orientation in the form `required`.
@@ -112,7 +112,7 @@ impl<'a> OrientedImage<'a> {
             id: self.image.id.clone(),
             orientation: self.orientation(required),
             detector: self.detector,
-            lines: self.lines(),
+            line_times: self.image.line_times.clone(),
         }
     }
 }

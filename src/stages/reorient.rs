@@ -215,7 +215,7 @@ struct Corrected<'a, F> {
 
 impl<F: Fn(f64) -> LineCorrection> Corrected<'_, F> {
     fn shift_s(&self) -> f64 {
-        self.shift_lines * self.image.line_period_s
+        self.shift_lines * self.image.line_times.mean_period_s()
     }
 
     /// Whether the tables reach as far as the shifted image.
@@ -366,7 +366,7 @@ impl<F: Fn(f64) -> LineCorrection> Corrected<'_, F> {
             self.correction(line_offset - 1.0)?,
             self.correction(line_offset + 1.0)?,
         );
-        let between_s = 2.0 * self.image.line_period_s;
+        let between_s = 2.0 * self.image.line_times.mean_period_s();
         Ok((
             (behind.position_m - before.position_m) / between_s,
             (behind.rotation_rad - before.rotation_rad) / between_s,

@@ -18,7 +18,7 @@ use crate::{
     spice::{Attitude, KernelView, Session},
     stage::{Output, Stage},
     stage_inputs,
-    time::Et,
+    time::{Et, PointingBias},
 };
 
 pub use super::orientation::{
@@ -41,7 +41,7 @@ stage_inputs! {
         pub kernels: &'a KernelView,
         /// Tolerance and padding.
         pub coverage: &'a KernelsConfig,
-        /// Pointing bias.
+        /// A pointing bias that is not that of the camera.
         pub pointing: &'a PointingConfig,
         /// Number of samples, and the convention for light time.
         pub orientation: &'a OrientationConfig,
@@ -95,7 +95,7 @@ fn finding(times: &ImageTimes, invalid_because: &[String]) -> String {
     format!(
         "image {}: {} lines from {} UTC, first line centre {}, position and attitude covered{}",
         times.id,
-        times.lines_header,
+        times.line_times.lines(),
         times.utc_start,
         times.line_centre(0),
         invalid.collect::<String>()
@@ -122,7 +122,7 @@ pub fn sample_orientation(
     let reader = Reader {
         session,
         instrument: &image.instrument,
-        pointing,
+        bias: pointing.bias_of(&image.instrument),
         tolerance_s: kernels.ck_tolerance_s,
         light_time: sampling.light_time,
     };
@@ -167,7 +167,7 @@ fn require_orientation(
     let reader = Reader {
         session,
         instrument: &image.instrument,
-        pointing,
+        bias: pointing.bias_of(&image.instrument),
         tolerance_s: kernels.ck_tolerance_s,
         light_time: sampling.light_time,
     };
@@ -186,7 +186,7 @@ fn require_orientation(
 /// Equally spaced epochs over the whole header image, both ends included.
 fn epochs(image: &ImageTimes, intervals: u32) -> Vec<Et> {
     let step_s = image.duration_s() / f64::from(intervals);
-    let epochs = (0..=intervals).map(|k| image.start.plus(f64::from(k) * step_s));
+    let epochs = (0..=intervals).map(|k| image.line_times.start().plus(f64::from(k) * step_s));
     epochs.collect()
 }
 
@@ -227,7 +227,7 @@ impl fmt::Display for HeldAttitudes {
 struct Reader<'a> {
     session: &'a Session,
     instrument: &'a Instrument,
-    pointing: &'a PointingConfig,
+    bias: PointingBias,
     tolerance_s: f64,
     light_time: LightTime,
 }
@@ -243,12 +243,11 @@ impl Reader<'_> {
     fn require_coverage(&self, image: &ImageTimes, padding_s: f64) -> Result<()> {
         let (session, exposures) = (self.session, image.exposures());
         session.require_position(self.light_time.read_over(exposures.padded(padding_s)))?;
-        let (bias, tolerance_s) = (self.pointing.ck_bias, self.tolerance_s);
-        session.require_attitude(exposures, bias, padding_s, tolerance_s)
+        session.require_attitude(exposures, self.bias, padding_s, self.tolerance_s)
     }
 
     fn attitude(&self, exposure: Et) -> Result<Attitude> {
-        let lookup = self.pointing.ck_bias.lookup(exposure);
+        let lookup = self.bias.lookup(exposure);
         self.session.attitude(lookup, exposure, self.tolerance_s)
     }
 

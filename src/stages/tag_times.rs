@@ -20,7 +20,8 @@ use crate::{
     geom::pushbroom::Detector,
     image::{IMAGE_DURATION_END_S, IMAGE_LINES_MIN, ImageFields, line_period_agrees},
     instruments::Instrument,
-    pds::moc::{self, MocLabel},
+    line_times::LineTimes,
+    pds::{ImageLabel, read_label},
     spice::{KernelView, Session},
     stage::Stage,
     stage_inputs,
@@ -35,24 +36,20 @@ pub struct ImageTimes {
     pub id: String,
     /// The camera.
     pub instrument: Instrument,
-    /// Start (top edge) of the first line.
-    pub start: Et,
-    /// Whether `start` comes from the spacecraft clock or from UTC.
+    /// When its lines were exposed: all of the header image.
+    pub line_times: LineTimes,
+    /// Whether their start comes from the spacecraft clock or from UTC.
     pub start_from: StartFrom,
     /// Clock string of the start, where the label has one.
     pub sclk_start: Option<String>,
-    /// UTC of the start, from `start`.
+    /// UTC of the start.
     pub utc_start: String,
-    /// Time between two image lines, seconds.
-    pub line_period_s: f64,
-    /// Exposure of one detector line, seconds.
+    /// Exposure of one detector line at the start of the image, seconds.
     pub exposure_s: f64,
     /// Detector lines summed along the track.
     pub downtrack_summing: u32,
     /// Detector pixels summed across the track.
     pub crosstrack_summing: u32,
-    /// Lines exposed; the time model counts these.
-    pub lines_header: u32,
     /// Lines in the delivered file.
     pub lines_delivered: u32,
     /// Samples per line.
@@ -87,38 +84,34 @@ impl ImageTimes {
         )
     }
 
-    /// Exposure of the whole header image, seconds: lines × line period.
+    /// Exposure of the whole header image, seconds.
     #[must_use]
     pub fn duration_s(&self) -> f64 {
-        f64::from(self.lines_header) * self.line_period_s
+        self.line_times.duration_s()
     }
 
     /// From the start of the first line to the end of the last header line.
     #[must_use]
     pub fn exposures(&self) -> Interval {
-        Interval::new(self.start, self.start.plus(self.duration_s()))
+        self.line_times.interval()
     }
 
     /// Middle of the header image, where the polynomial models have their origin.
     #[must_use]
     pub fn middle(&self) -> Et {
-        self.start.plus(0.5 * self.duration_s())
+        self.line_times.middle()
     }
 
     /// Centre of the exposure of image line `line`, counted from 0.
     #[must_use]
     pub fn line_centre(&self, line: u32) -> Et {
-        self.start
-            .plus((f64::from(line) + 0.5) * self.line_period_s)
+        self.line_times.et(f64::from(line) + 0.5)
     }
 
-    /// Line coordinate of an instant: lines from the middle of the header image, positive along flight.
-    ///
-    /// # Source
-    /// Shan et al. 2005: `x = (t − t_mid) / τ`; line `i` from 0 has `x = i − (n − 1)/2`.
+    /// Time in the unit of the sensor models, see [`LineTimes::offset`]; positive along flight.
     #[must_use]
     pub fn line_offset(&self, instant: Et) -> f64 {
-        instant.since(self.middle()) / self.line_period_s
+        self.line_times.offset(instant)
     }
 }
 
@@ -136,7 +129,7 @@ stage_inputs! {
 
 impl Stage for TagTimes<'_> {
     const NAME: &'static str = "tag_times";
-    const METHOD: u32 = 2;
+    const METHOD: u32 = 3;
     const CHECKED: bool = true;
     type Output = ImageTimes;
     stage_inputs!(fingerprint);
@@ -239,15 +232,13 @@ fn image_times(image: &ImageConfig, session: &Session) -> Result<ImageTimes> {
     Ok(ImageTimes {
         id: image.id.clone(),
         instrument,
-        start,
+        line_times: LineTimes::even(start, lines_header, line_period_s)?,
         start_from,
         utc_start: session.et_to_utc(start)?,
         sclk_start: fields.sclk_start,
-        line_period_s,
         exposure_s,
         downtrack_summing,
         crosstrack_summing,
-        lines_header,
         lines_delivered,
         samples,
         first_detector,
@@ -282,7 +273,7 @@ fn lines_delivered(
 
 /// The camera that the configuration names, else that of the label, else the first one that is known; and what
 /// the label says.
-fn labelled(image: &ImageConfig) -> Result<(Instrument, Option<MocLabel>)> {
+fn labelled(image: &ImageConfig) -> Result<(Instrument, Option<ImageLabel>)> {
     let Some(path) = &image.label else {
         let named = image.instrument.as_ref();
         let camera = named.unwrap_or_else(|| usual_instrument());
@@ -292,7 +283,7 @@ fn labelled(image: &ImageConfig) -> Result<(Instrument, Option<MocLabel>)> {
         Some(named) => std::slice::from_ref(named),
         None => built_in_instruments(),
     };
-    let label = moc::read_label(path, cameras)?;
+    let label = read_label(path, cameras)?;
     of_one_product(image, label.product_id.as_deref())?;
     Ok((label.instrument.clone(), Some(label)))
 }
@@ -378,7 +369,7 @@ fn start_time(
     };
     let Some(sclk) = fields.sclk_start.as_deref() else {
         if from_utc.is_some() {
-            notes.push("start from UTC, which MOC labels cut to 10 ms; no clock string".to_owned());
+            notes.push("start from UTC, which labels cut to 10 ms; no clock string".to_owned());
         }
         return Ok(from_utc.map(|(_, start)| (start, StartFrom::Utc)));
     };

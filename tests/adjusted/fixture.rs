@@ -58,8 +58,8 @@ impl Image {
             ..KernelsConfig::default()
         };
         let pointing = PointingConfig {
-            ck_bias: usual_instrument().pointing_bias(),
-            source: String::new(),
+            ck_bias: Some(usual_instrument().pointing_bias()),
+            source: None,
         };
         let session = Session::open(&set).unwrap();
         let config = ImageConfig {
@@ -135,7 +135,7 @@ pub(crate) fn kernel_camera(
     et: Et,
 ) -> (Vector3<f64>, Matrix3<f64>) {
     let to_mars = mars_matrix(&MARS_IAU2000, et);
-    let lookup = image.pointing.ck_bias.lookup(et);
+    let lookup = image.pointing.bias_of(usual_instrument()).lookup(et);
     let attitude = session.attitude(lookup, et, 0.0).unwrap();
     let to_camera = session.mounting(usual_instrument(), et).unwrap() * attitude.inertial_to_bus;
     let to_inertial = to_camera.matrix().transpose();

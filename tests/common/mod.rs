@@ -15,6 +15,8 @@ pub(crate) mod outside;
 
 use std::path::{Path, PathBuf};
 
+use areograph::{line_times::LineTimes, time::Et};
+
 /// Makes sure that `answer` keeps the shipped schema `config/schema/<name>.schema.json`.
 pub(crate) fn assert_keeps_schema(answer: &serde_json::Value, name: &str) {
     let path = Path::new(env!("CARGO_MANIFEST_DIR"))
@@ -79,3 +81,13 @@ pub(crate) const M0402852_KERNELS: [&str; 9] = [
     "mgs_sc_map2_0_sliced_-94000.bc",
     "mgs_sc_map2_1_sliced_-94000.bc",
 ];
+
+/// Line times of an image whose start does not matter: whole `lines` of `period_s` seconds.
+#[allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "tests make images of a few thousand lines"
+)]
+pub(crate) fn line_times(lines: f64, period_s: f64) -> LineTimes {
+    LineTimes::even(Et::from_seconds(0.0), lines as u32, period_s).unwrap()
+}

@@ -129,11 +129,13 @@ impl Pushbroom {
         self.value("/image_samples")
     }
 
-    /// Line coordinates count from the top edge of the first line, whose centre is 0.5.
+    /// Line coordinates count from the top edge of the first line, whose centre is 0.5. As in `getImageTime`, the last row
+    /// counts whose line is not above the coordinate, or the first.
     pub(crate) fn time(&self, line: f64) -> f64 {
-        self.value("/center_ephemeris_time")
-            + self.value("/line_scan_rate/0/1")
-            + self.value("/line_scan_rate/0/2") * line
+        let table = rows(&self.isd["line_scan_rate"]);
+        let after = table.partition_point(|row| row[0] <= line);
+        let row = &table[after.saturating_sub(1)];
+        self.value("/center_ephemeris_time") + row[1] + row[2] * (line - row[0] + 0.5)
     }
 
     /// Position in kilometres, Mars-fixed, and rotation from the camera.

@@ -19,6 +19,7 @@ use areograph::{
         window::WindowShape,
     },
     kernel_source::{KernelList, KernelSource},
+    line_times::LineTimes,
     products::{ImageProducts, SiteProducts},
     spice::RequiredCoverage,
     stages::{
@@ -232,8 +233,8 @@ fn config() -> SiteConfig {
             ..KernelsConfig::default()
         },
         pointing: PointingConfig {
-            ck_bias: usual_instrument().pointing_bias(),
-            source: "mocAddendum004.ti".to_owned(),
+            ck_bias: Some(usual_instrument().pointing_bias()),
+            source: Some("mocAddendum004.ti".to_owned()),
         },
         mola_clock: MolaClock {
             bias_s: 0.117,
@@ -297,15 +298,13 @@ fn image_times() -> ImageTimes {
     ImageTimes {
         id: "m04-02852".to_owned(),
         instrument: usual_instrument().clone(),
-        start: Et::from_seconds(START_S),
+        line_times: LineTimes::even(Et::from_seconds(START_S), 1536, 8.0 * 0.000_482_1).unwrap(),
         start_from: StartFrom::Sclk,
         sclk_start: Some("619971158:28".to_owned()),
         utc_start: "1999-08-24T14:12:13.635".to_owned(),
-        line_period_s: 8.0 * 0.000_482_1,
         exposure_s: 0.000_482_1,
         downtrack_summing: 8,
         crosstrack_summing: 8,
-        lines_header: 1536,
         lines_delivered: 1280,
         samples: 256,
         first_detector: 0,
@@ -318,7 +317,10 @@ fn image_times() -> ImageTimes {
 fn orientation(times: &ImageTimes) -> Orientation {
     let samples = (0..=30)
         .map(|k| {
-            let et = times.start.plus(f64::from(k) / 30.0 * times.duration_s());
+            let et = times
+                .line_times
+                .start()
+                .plus(f64::from(k) / 30.0 * times.duration_s());
             let u = f64::from(k) / 15.0 - 1.0;
             let angles = OmegaPhiKappa {
                 omega_rad: 1.57 + 0.01 * u,

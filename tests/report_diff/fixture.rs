@@ -4,7 +4,7 @@ use std::{fs, path::Path};
 
 use areograph::{
     config::usual_instrument,
-    frames::{J2000, MgsBus, Rotation},
+    frames::{J2000, Rotation, SpacecraftBus},
     geom::{
         attitude::{make_continuous, spice_quaternion},
         mars_rotation::frame_rotation_1,
@@ -88,7 +88,7 @@ fn turned_attitudes(session: &Session, interval: Interval) -> Attitudes {
         let attitude = session.attitude(unbiased.lookup(at), at, 0.01).unwrap();
         let mounting = *session.mounting(usual_instrument(), at).unwrap().matrix();
         let turned = mounting.transpose() * turn * mounting * attitude.inertial_to_bus.matrix();
-        let turned: Rotation<J2000, MgsBus> = Rotation::new(turned, at);
+        let turned: Rotation<J2000, SpacecraftBus> = Rotation::new(turned, at);
         instants.push(at);
         quaternions.push(spice_quaternion(turned.matrix()));
         rates.push(attitude.angular_velocity_rad_s.into());

@@ -7,7 +7,7 @@ use serde_json::json;
 
 use super::super::{load_sites, output};
 use crate::{
-    config::usual_instrument,
+    config::{SiteConfig, usual_instrument},
     error::{Cause, Error, Kind},
     flow::{
         Answer, Compared, Request, RivalSet, compare_kernels, require_different, required_by_site,
@@ -89,9 +89,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Error> {
     }
     let bias = site
         .as_ref()
-        .map_or(usual_instrument().pointing_bias(), |site| {
-            site.pointing.ck_bias
-        });
+        .map_or(usual_instrument().pointing_bias(), bias_of_site);
     let required = match (&arguments.time, &site) {
         (Some(time), _) => Some(wanted_by_time(time, bias, &sets[0].kernels)?),
         (None, Some(site)) => Some(required_by_site(site)?),
@@ -118,6 +116,13 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Error> {
         }
     }
     Ok(())
+}
+
+/// The pointing bias of the site's first camera.
+fn bias_of_site(site: &SiteConfig) -> PointingBias {
+    let named = site.images.first();
+    let named = named.and_then(|image| image.instrument.as_ref());
+    site.pointing.bias_of(named.unwrap_or(usual_instrument()))
 }
 
 fn page(compared: &Compared) -> Result<String, Error> {

@@ -131,7 +131,8 @@ where
 /// Each entry is `field: Type = declaration`; a key that is named differently from its field, for its
 /// unit, is given by `field as "key"`. The documentation of an entry is that of the field and of the key.
 /// `#[serde(skip)]` keeps a path out of what stages are distinguished by: files enter by their content.
-/// `struct Name: Trait` derives `Trait`. `check function` names what must hold between keys: `fn(&Name, &mut Keys)`.
+/// `struct Name: Trait` derives `Trait`. `settle function` completes defaults that follow from other keys:
+/// `fn(Name, &Keys) -> Name`; `check function` names what must hold between keys: `fn(&Name, &mut Keys)`.
 macro_rules! declare_table {
     (
         $(#[doc = $about:literal])+
@@ -142,6 +143,7 @@ macro_rules! declare_table {
                 $field:ident $(as $key:literal)? : $type:ty = $declared:expr,
             )+
         }
+        $(settle $settle:ident)?
         $(check $check:path)?
     ) => {
         $(#[doc = $about])+
@@ -158,6 +160,7 @@ macro_rules! declare_table {
         $crate::config::declare::declare_table! {
             $(#[doc = $about])+
             fill $name { $($(#[doc = $doc])+ $field $(as $key)? = $declared,)+ }
+            $(settle $settle)?
             $(check $check)?
         }
     };
@@ -166,6 +169,7 @@ macro_rules! declare_table {
         fill $name:ident {
             $($(#[doc = $doc:literal])+ $field:ident $(as $key:literal)? = $declared:expr,)+
         }
+        $(settle $settle:ident)?
         $(check $check:path)?
     ) => {
         impl $crate::config::declare::Table for $name {
@@ -180,6 +184,7 @@ macro_rules! declare_table {
                         keys,
                     ),)+
                 };
+                $(let read = $settle(read, keys);)?
                 $($check(&read, keys);)?
                 read
             }

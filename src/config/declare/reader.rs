@@ -166,6 +166,16 @@ impl<'a, 'r> Keys<'a, 'r> {
         self.written(name).map(|(_, value)| value.span())
     }
 
+    fn value_below(&self, table: &str, name: &str) -> Option<&'a Spanned<DeValue<'a>>> {
+        let below = self.table?.get(table)?.get_ref().as_table()?;
+        below.get(name)
+    }
+
+    /// Whether the key `name` of the table `table` below this one is written.
+    pub(in crate::config) fn writes(&self, table: &str, name: &str) -> bool {
+        self.value_below(table, name).is_some()
+    }
+
     /// Whether there is something in the table's place that is no table.
     pub(in crate::config) const fn is_no_table(&self) -> bool {
         self.table.is_none() && self.span.is_some()
@@ -176,6 +186,19 @@ impl<'a, 'r> Keys<'a, 'r> {
         if let Some((key, value)) = self.written(name) {
             let (key, span) = (self.path_of(key), value.span());
             self.review.refuse(span, &key, expected);
+        }
+    }
+
+    /// The same of a key of the table `table` below this one.
+    pub(in crate::config) fn refuse_below(
+        &mut self,
+        table: &str,
+        name: &str,
+        expected: impl std::fmt::Display,
+    ) {
+        if let Some(value) = self.value_below(table, name) {
+            let key = format!("{}.{name}", self.path_of(table));
+            self.review.refuse(value.span(), &key, expected);
         }
     }
 

@@ -16,6 +16,7 @@ use serde::Serialize;
 
 use super::points::{GroundEstimate, ImageMeasure, above_zero};
 use crate::{
+    constants::SPACECRAFT,
     error::{Locate, Result},
     products::{error::ProductError, files::write_json},
     stages::tag_times::ImageTimes,
@@ -91,10 +92,10 @@ struct Measure<'a> {
 /// `MgsMocSerialNumber.trn` of ISIS (spacecraft, clock, instrument, filter) and the network of M01/00115, which names that image
 /// `MGS/610472061:131/MOC-NA/BROAD_BAND`.
 #[must_use]
-pub fn moc_serial_number(image: &ImageTimes) -> Option<String> {
+pub fn isis_serial_number(image: &ImageTimes) -> Option<String> {
     let clock = image.sclk_start.as_ref()?;
     let camera = &image.instrument.label.serial;
-    Some(format!("MGS/{}/{camera}", clock.trim()))
+    Some(format!("{}/{}/{camera}", SPACECRAFT.name, clock.trim()))
 }
 
 /// Writes `points` to `path`, which must end in `.json` for ISIS to take it, and reads it back.

@@ -6,6 +6,7 @@ use chrono::{NaiveDateTime, TimeDelta};
 use serde_json::{Map, Value, json};
 
 use crate::{
+    constants::SPACECRAFT,
     error::{Locate, Result},
     files::hash_file,
     products::{
@@ -76,8 +77,8 @@ fn item(of: &Context) -> Result<Option<Value>> {
             "datetime": start,
             "start_datetime": start,
             "end_datetime": end,
-            "mission": "Mars Global Surveyor",
-            "platform": "mars-global-surveyor",
+            "mission": SPACECRAFT.full_name,
+            "platform": SPACECRAFT.full_name.to_lowercase().replace(' ', "-"),
             "instruments": instruments(site),
             "proj:code": "IAU_2015:49900",
             "ssys:targets": ["Mars"],
@@ -90,15 +91,23 @@ fn item(of: &Context) -> Result<Option<Value>> {
 
 fn description(site: &SiteProducts) -> String {
     match site.config.description.as_str() {
-        "" => format!("MOLA footprints and MOC images of {}", site.config.site),
+        "" => format!("MOLA footprints and images of {}", site.config.site),
         text => text.to_owned(),
     }
 }
 
-fn instruments(site: &SiteProducts) -> Vec<&'static str> {
-    let mola = (!site.footprints.is_empty()).then_some("mola");
-    let moc = (!site.images.is_empty()).then_some("moc-na");
-    mola.into_iter().chain(moc).collect()
+/// The altimeter, and the cameras in the order of their images.
+fn instruments(site: &SiteProducts) -> Vec<String> {
+    let altimeter = (!site.footprints.is_empty()).then_some(&site.config.altimeter.id);
+    let cameras = site.images.iter().map(|image| &image.times.instrument.id);
+    let mut names: Vec<String> = Vec::new();
+    for id in altimeter.into_iter().chain(cameras) {
+        let name = id.replace('_', "-");
+        if !names.contains(&name) {
+            names.push(name);
+        }
+    }
+    names
 }
 
 /// Outlines of the images on the ground.

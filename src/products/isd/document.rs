@@ -6,6 +6,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::{
+    constants::SPACECRAFT,
     products::kernel_report::KernelsByType,
     schema::{DocumentSchema, at},
     stages::{
@@ -21,7 +22,7 @@ pub(super) fn schema() -> DocumentSchema {
 
 #[derive(Serialize, JsonSchema)]
 #[schemars(
-    title = "Image support data of a MOC image",
+    title = "Image support data of an image",
     description = "images/<id>/isd.json and adjusted_isd.json of areograph: the keys that usgscsm's line scanner model \
                    reads, kilometres and seconds, J2000; quaternions (w, x, y, z)."
 )]
@@ -34,8 +35,8 @@ pub(super) struct Isd<'a> {
     pub(super) image_lines: u32,
     #[schemars(range(min = 1))]
     pub(super) image_samples: u32,
-    #[schemars(extend("const" = "MARS GLOBAL SURVEYOR"))]
-    pub(super) name_platform: &'static str,
+    #[schemars(extend("const" = SPACECRAFT.label_name))]
+    pub(super) name_platform: &'a str,
     /// The camera's frame.
     pub(super) name_sensor: &'a str,
     pub(super) reference_height: ReferenceHeight,
@@ -43,8 +44,10 @@ pub(super) struct Isd<'a> {
     pub(super) name_model: &'static str,
     #[schemars(extend("const" = "lagrange"))]
     pub(super) interpolation_method: &'static str,
-    /// First line (0.5), its start relative to `center_ephemeris_time`, seconds per image line.
-    pub(super) line_scan_rate: [[f64; 3]; 1],
+    /// For every piece of the image: line coordinate from which it holds, time relative to `center_ephemeris_time`,
+    /// seconds per image line; a coordinate has the time of its row plus seconds per line × (coordinate − line + 0.5).
+    #[schemars(length(min = 1))]
+    pub(super) line_scan_rate: Vec<[f64; 3]>,
     pub(super) starting_ephemeris_time: f64,
     pub(super) center_ephemeris_time: f64,
     pub(super) radii: Radii,

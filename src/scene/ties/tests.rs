@@ -79,8 +79,8 @@ fn poses_between_those_of_the_flight_are_those_of_the_flight() {
         let terrain = terrain(1, &errors);
         let camera = TrueImage::new(&flown, &terrain).unwrap();
         for share in [0.123, 0.345, 0.567, 0.789] {
-            let line = share * camera.oriented_camera.lines;
-            let x_lines = line - 0.5 * camera.oriented_camera.lines;
+            let line = share * camera.oriented_camera.lines();
+            let x_lines = line - 0.5 * camera.oriented_camera.lines();
             let pose = camera.oriented_camera.orientation.pose(x_lines);
             let exposure = exposed(&flown, line);
             let light_time_s = seen_after_s(&flown, &terrain, exposure).unwrap();

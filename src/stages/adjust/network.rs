@@ -79,7 +79,7 @@ pub(super) fn assemble<'a, M: ExteriorOrientation>(
 fn bundle_image<M>(image: &AdjustImage<M>) -> BundleImage<&M> {
     BundleImage {
         base: &image.oriented_camera.orientation,
-        half_lines: 0.5 * image.oriented_camera.lines,
+        half_lines: 0.5 * image.oriented_camera.lines(),
         line_period_s: image.line_period_s,
         focal_length_px: image.oriented_camera.detector.focal_length_px,
         distortion: image.oriented_camera.detector.distortion,
@@ -93,7 +93,7 @@ pub(super) fn projector<'a, M, O: ExteriorOrientation>(
     image: &AdjustImage<M>,
     orientation: &'a O,
 ) -> std::result::Result<Projector<'a, O>, AdjustError> {
-    let projector = Projector::new(orientation, image.oriented_camera.lines);
+    let projector = Projector::new(orientation, image.oriented_camera.lines());
     let projector = projector.map_err(|unseen| AdjustError::Blind {
         image: image.oriented_camera.id.clone(),
         unseen,
@@ -120,7 +120,7 @@ fn footprints_in_images<M: ExteriorOrientation>(
             let Ok(focal) = detector.focal_px(&seen.camera_m) else {
                 continue;
             };
-            let inside = seen.x.abs() <= 0.5 * image.oriented_camera.lines
+            let inside = seen.x.abs() <= 0.5 * image.oriented_camera.lines()
                 && samples.contains(&detector.sample(focal.y));
             if inside {
                 views.push(View {

@@ -64,7 +64,7 @@ impl<M: ExteriorOrientation> Candidate<'_, M> {
         hold_powers(&mut sigmas, position, rotation);
         AdjustImage {
             oriented_camera: self.oriented_camera,
-            line_period_s: self.times.line_period_s,
+            line_period_s: self.times.line_times.mean_period_s(),
             sigmas,
             time_bias_sigma_s: config.time_bias_sigma_s,
         }

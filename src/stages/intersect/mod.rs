@@ -224,7 +224,7 @@ pub fn intersect_ties<M: ExteriorOrientation>(
     let projectors: Vec<Projector<'_, M>> = images
         .iter()
         .map(|image| {
-            let projector = Projector::new(&image.orientation, image.lines);
+            let projector = Projector::new(&image.orientation, image.lines());
             let projector = projector.map_err(|unseen| BlindImage {
                 image: image.id.clone(),
                 unseen,

@@ -52,7 +52,7 @@ pub struct Orientation {
 pub struct OrientationSample {
     /// Epoch.
     pub et: Et,
-    /// Lines from the middle of the header image.
+    /// Lines from the middle of the header image, see [`LineTimes::offset`](crate::line_times::LineTimes::offset).
     pub line_offset: f64,
     /// Perspective centre, where straight rays start: see [`LightTimeEffect`].
     pub position: Position<MarsIau2000>,
@@ -162,11 +162,13 @@ impl GroundPoint {
         image: &ImageTimes,
         camera: impl Fn(Et) -> Result<Camera>,
     ) -> Result<Option<Vec<Self>>> {
-        let duration_s = f64::from(image.lines_delivered) * image.line_period_s;
+        let line_times = &image.line_times;
+        let duration_s = line_times.seconds(f64::from(image.lines_delivered));
         let step_s = duration_s / f64::from(OUTLINE_INTERVALS);
         let (mut first_edge, mut last_edge) = (Vec::new(), Vec::new());
         for k in 0..=OUTLINE_INTERVALS {
-            let Camera { position, to_mars } = camera(image.start.plus(f64::from(k) * step_s))?;
+            let Camera { position, to_mars } =
+                camera(line_times.start().plus(f64::from(k) * step_s))?;
             let [first, last] = swath_directions(image).map(|direction| {
                 let ground = ray_meets_ellipsoid(&position, &(to_mars.matrix() * direction));
                 ground.map(|ground| Self::of(&ground))

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use crate::{
     constants::MARS_IAU2000,
     error::Result,
-    frames::{CameraFrame, J2000, MarsIau2000, MgsBus, Position, Rotation},
+    frames::{CameraFrame, J2000, MarsIau2000, Position, Rotation, SpacecraftBus},
     geom::{
         attitude::{continuous_quaternions, matrix_of_spice_quaternion},
         lagrange::lagrange,
@@ -35,7 +35,7 @@ pub struct CameraTables {
     /// Velocity of the Sun from Mars, metres per second, at the same epochs.
     pub sun_velocity_m_s: [Vector3<f64>; 2],
     /// J2000 → bus, read with the pointing bias.
-    pub inertial_to_bus: Vec<Rotation<J2000, MgsBus>>,
+    pub inertial_to_bus: Vec<Rotation<J2000, SpacecraftBus>>,
     /// Angular velocity of the bus in J2000, radians per second.
     pub bus_angular_velocity_rad_s: Vec<Vector3<f64>>,
     /// J2000 → IAU 2000, for the ground that is seen.
@@ -43,7 +43,7 @@ pub struct CameraTables {
     /// Angular velocity of Mars in J2000, radians per second.
     pub mars_angular_velocity_rad_s: Vec<Vector3<f64>>,
     /// Bus → camera, at the first epoch.
-    pub bus_to_camera: Rotation<MgsBus, CameraFrame>,
+    pub bus_to_camera: Rotation<SpacecraftBus, CameraFrame>,
     /// How well the tables are interpolated over the image.
     pub interpolation: InterpolationCheck,
 }

@@ -208,7 +208,8 @@ impl OrientedImage<'_> {
         }
         let focal_px = self.detector.focal_px(&pose.camera_vector_m(point_m));
         let focal_px = focal_px.map_err(|_| Unseen::BehindCamera)?;
-        let line = solution.x + 0.5 * self.lines();
+        let line_times = &self.image.line_times;
+        let line = line_times.line_of_offset(solution.x);
         let sample = self.detector.sample(focal_px.y);
         let delivered = 0.0..=f64::from(self.image.lines_delivered);
         Ok(PointOnImage {
@@ -220,7 +221,9 @@ impl OrientedImage<'_> {
             residual_px: self.detector.missed_px(&focal_px),
             step_lines: solution.step_lines,
             evaluations: solution.evaluations,
-            inside: delivered.contains(&line) && (0.0..=self.detector.samples).contains(&sample),
+            inside: delivered.contains(&line)
+                && !line_times.in_gap(solution.x)
+                && (0.0..=self.detector.samples).contains(&sample),
             extrapolated: solution.x.abs() > 0.5 * self.lines(),
         })
     }

@@ -31,10 +31,10 @@ pub(super) fn camera_tables(
     loop {
         let mut tables = tables(reader, &table_epochs(image, steps, padding_s))?;
         tables.interpolation = InterpolationCheck::of(image, &tables, |et| reader.camera(et))?;
-        if tables.interpolation.keeps_limit() || steps >= image.lines_header {
+        if tables.interpolation.keeps_limit() || steps >= image.line_times.lines() {
             return Ok(tables);
         }
-        steps = (2 * steps).min(image.lines_header);
+        steps = (2 * steps).min(image.line_times.lines());
     }
 }
 
@@ -46,7 +46,7 @@ pub(super) fn require_ends(reader: &Reader, image: &ImageTimes, padding_s: f64) 
 
 /// Steps over the image to begin with.
 fn first_steps(image: &ImageTimes) -> u32 {
-    let steps = image.lines_header.div_ceil(TABLE_LINES);
+    let steps = image.line_times.lines().div_ceil(TABLE_LINES);
     steps.max(TABLE_NODES_MIN - 1)
 }
 
@@ -59,9 +59,8 @@ fn table_epochs(image: &ImageTimes, steps: u32, padding_s: f64) -> Vec<Et> {
         .unwrap_or(0);
     (0..=steps + 2 * beyond)
         .map(|k| {
-            image
-                .start
-                .plus((f64::from(k) - f64::from(beyond)) * step_s)
+            let start = image.line_times.start();
+            start.plus((f64::from(k) - f64::from(beyond)) * step_s)
         })
         .collect()
 }

@@ -48,7 +48,11 @@ impl Reader<'_> {
             ..*self
         };
         let camera = |lines: f64| -> Result<Camera> {
-            reader.camera(image.middle().plus(lines * image.line_period_s))
+            reader.camera(
+                image
+                    .line_times
+                    .et(image.line_times.line(image.middle()) + lines),
+            )
         };
         let middle = camera(0.0)?;
         let boresight = middle.to_mars.matrix() * Vector3::z();

@@ -68,7 +68,7 @@ stage_inputs! {
         pub kernels: &'a KernelView,
         /// Padding and tolerance with which the image was sampled.
         pub coverage: &'a KernelsConfig,
-        /// The pointing bias that readers of the kernels will apply.
+        /// The pointing bias that readers of the kernels will apply, where it is not that of the camera.
         pub pointing: &'a PointingConfig,
     }
 }
@@ -144,7 +144,7 @@ pub fn tabulate_kernels(
         times: images[index],
         orientation,
         tolerance_s: kernels.ck_tolerance_s,
-        bias: pointing.ck_bias,
+        bias: pointing.bias_of(&images[index].instrument),
         attitude_span: span(images, index, kernels.padding_s),
         orbit_span: span(images, index, kernels.padding_s + LightTime::REACH_S),
     };

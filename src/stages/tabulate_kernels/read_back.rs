@@ -32,7 +32,7 @@ pub fn require_same(
 ) -> Result<()> {
     let (mut distances_m, mut turns_rad) = (Vec::new(), Vec::new());
     for sample in &orientation.samples {
-        let lookup = pointing.ck_bias.lookup(sample.et);
+        let lookup = pointing.bias_of(&image.instrument).lookup(sample.et);
         let attitude = session.attitude(lookup, sample.et, kernels.ck_tolerance_s)?;
         let to_camera = session.mounting(&image.instrument, sample.et)? * attitude.inertial_to_bus;
         let boresight = to_camera.matrix().row(2).transpose();

@@ -4,10 +4,11 @@ use nalgebra::Matrix3;
 
 use crate::{
     config::ImageConfig,
+    constants::SPACECRAFT,
     error::{Cause, Kind},
     geom::attitude::{bus_to_camera, rotation_vector},
     instruments::Instrument,
-    pds::moc::product_named,
+    pds::product_named,
     time::Et,
     units::{RADIANS_PER_DEGREE, SECONDS_PER_MS},
 };
@@ -114,7 +115,10 @@ pub(super) fn of_one_product(
 /// A serial number of ISIS, `MGS/<clock>/MOC-NA/…`, holds the clock of the image.
 pub(super) fn of_one_clock(image: &ImageConfig, sclk: Option<&str>) -> Result<(), Contradiction> {
     let serial = image.serial_number.as_deref();
-    let serial_clock = serial.and_then(|serial| serial.strip_prefix("MGS/")?.split('/').next());
+    let serial_clock = serial.and_then(|serial| {
+        let of_spacecraft = serial.strip_prefix(&*SPACECRAFT.name)?.strip_prefix('/')?;
+        of_spacecraft.split('/').next()
+    });
     let seconds = |clock: &str| -> Option<i64> {
         let count = clock.strip_prefix("1/").unwrap_or(clock);
         count.split([':', '.']).next()?.parse().ok()
