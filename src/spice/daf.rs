@@ -1,6 +1,10 @@
-//! Segment lists of binary kernels, checked before CSPICE sees the file.
+//! Segments of binary kernels, checked before CSPICE sees the file: it believes what a file says of itself, and reads
+//! beyond its arrays where a count is wrong.
 //!
 //! Source: NAIF, DAF Required Reading: file record, summary records, addresses of 8-byte words.
+
+mod contents;
+mod layout;
 
 use std::{
     fs::File,
@@ -8,7 +12,7 @@ use std::{
     path::Path,
 };
 
-use super::error::SpiceError;
+use super::{error::SpiceError, kernels::KernelRole};
 use crate::error::{IoError, Locate, Result};
 
 /// Bytes of a DAF record.
@@ -32,6 +36,35 @@ pub(super) struct Segment {
     pub(super) integers: [i32; SUMMARY_INTEGERS_MAX],
 }
 
+/// What the integers of a summary say of a segment.
+#[derive(Debug, Clone, Copy)]
+struct Content {
+    body: i32,
+    kind: i32,
+    rates: bool,
+    first_word: u64,
+    words: usize,
+}
+
+impl Segment {
+    /// Its integers as those of a kernel of `role`; their addresses have been found to rise from 1.
+    fn content(&self, role: KernelRole) -> Content {
+        let [body, _, third, fourth, fifth, sixth] = self.integers;
+        let (kind, begin, end) = match role {
+            KernelRole::Pck => (third, fourth, fifth),
+            KernelRole::Ck => (third, fifth, sixth),
+            _ => (fourth, fifth, sixth),
+        };
+        Content {
+            body,
+            kind,
+            rates: fourth != 0,
+            first_word: u64::from(begin.unsigned_abs()),
+            words: end.abs_diff(begin) as usize + 1,
+        }
+    }
+}
+
 /// The segments of a binary kernel, in file order; later ones win.
 ///
 /// # Errors
@@ -39,6 +72,36 @@ pub(super) struct Segment {
 pub(super) fn segments(path: &Path) -> Result<Vec<Segment>> {
     let mut reader = Reader::open(path)?;
     reader.segments().in_file(path)
+}
+
+/// Makes sure that the words of every segment are what the counts of the segment say, finite and in order.
+///
+/// # Errors
+/// [`SpiceError::DamagedKernel`] with the segment and what is wrong.
+pub(super) fn check_contents(path: &Path, role: KernelRole) -> Result<()> {
+    let mut reader = Reader::open(path)?;
+    let segments = reader.segments().in_file(path)?;
+    for (index, segment) in segments.iter().enumerate() {
+        contents::check(&mut reader, role, segment)
+            .map_err(|problem| {
+                let Content { body, kind, .. } = segment.content(role);
+                let segment = format!("segment {} ({role} of {body}, type {kind})", index + 1);
+                problem.of(&segment)
+            })
+            .in_file(path)?;
+    }
+    Ok(())
+}
+
+/// A count, which segments hold as a double.
+fn whole(value: f64) -> Option<usize> {
+    #[allow(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "whole, positive and below 2^31"
+    )]
+    (value >= 0.0 && value <= f64::from(i32::MAX) && value.fract().abs() < f64::EPSILON)
+        .then_some(value as usize)
 }
 
 struct Reader {
@@ -79,6 +142,21 @@ impl Reader {
             .and_then(|_| self.file.read_exact(&mut record))
             .map_err(IoError::on("read kernel"))?;
         Ok(record)
+    }
+
+    /// `count` words from word `first` on, counted from 1.
+    fn words(&mut self, first: u64, count: usize) -> Result<Vec<f64>> {
+        let mut bytes = vec![0; count * WORD_SIZE];
+        self.file
+            .seek(SeekFrom::Start((first - 1) * WORD_SIZE as u64))
+            .and_then(|_| self.file.read_exact(&mut bytes))
+            .map_err(IoError::on("read kernel"))?;
+        let (words, _) = bytes.as_chunks::<WORD_SIZE>();
+        let double = |word: &[u8; WORD_SIZE]| match self.big_endian {
+            true => f64::from_be_bytes(*word),
+            false => f64::from_le_bytes(*word),
+        };
+        Ok(words.iter().map(double).collect())
     }
 
     fn integer(&self, record: &[u8; RECORD_SIZE], offset: usize) -> i32 {

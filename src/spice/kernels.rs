@@ -79,6 +79,9 @@ impl Kernel {
     pub(super) fn inspect(path: &Path, files: &InputFiles) -> Result<Self> {
         ffi::c_path(path).in_file(path)?;
         let role = role_of(path)?;
+        if first_bytes(path)?.starts_with(b"DAF/") {
+            daf::check_contents(path, role)?;
+        }
         let file = files.hash(path)?;
         Ok(Self {
             path: file.path,

@@ -28,6 +28,22 @@ pub(crate) fn summaries(bytes: &[u8]) -> Vec<usize> {
     segments.map(|index| record + 24 + 40 * index).collect()
 }
 
+/// First and last word of each segment, counted from 1.
+pub(crate) fn segment_words(bytes: &[u8]) -> Vec<(usize, usize)> {
+    let words = |summary| (integer(bytes, summary + 32), integer(bytes, summary + 36));
+    summaries(bytes).into_iter().map(words).collect()
+}
+
+/// A word, counted from 1.
+pub(crate) fn word(bytes: &[u8], word: usize) -> f64 {
+    double(bytes, 8 * (word - 1))
+}
+
+/// Puts another number in its place.
+pub(crate) fn set_word(bytes: &mut [u8], word: usize, value: f64) {
+    bytes[8 * (word - 1)..8 * word].copy_from_slice(&value.to_le_bytes());
+}
+
 /// Changes every packet of `words` doubles of every segment (SPK type 13, CK type 3).
 pub(crate) fn change_packets(case: &Case, kernel: &str, words: usize, change: impl Fn(&mut [f64])) {
     let mut bytes = case.read(kernel);
