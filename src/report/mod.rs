@@ -28,6 +28,7 @@ mod images;
 mod map;
 mod misregistration;
 mod moved;
+mod net;
 mod notes;
 mod outlines;
 mod plots;
@@ -50,6 +51,7 @@ pub use diff::difference_page;
 pub use fidelity::{
     FIDELITY_FILE, FIDELITY_PAGE, Fidelity, FidelityPaper, FidelityRow, fidelity_page,
 };
+pub use net::net_page;
 pub use sites::{SiteLine, SiteSummary, sites_page};
 
 use section::Section;
