@@ -81,7 +81,7 @@ fn footprints_moved(site: Site, printed: [[&'static str; 2]; 3]) -> Vec<Comparis
 
 /// Table 3: residuals of tie points; x1, y1, x2, y2.
 fn ties(site: Site, printed: [[&'static str; 2]; 4]) -> Vec<Comparison> {
-    let ours = site.adjusted().residuals();
+    let ours = site.adjusted_with_many_ties().residuals();
     let names = ["x1", "y1", "x2", "y2"];
     let mut all = Vec::new();
     for ((name, [mean, deviation]), ours) in names.iter().zip(printed).zip(ours.as_flattened()) {
