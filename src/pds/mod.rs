@@ -3,4 +3,5 @@
 pub mod label;
 pub mod moc;
 pub mod pedr;
+pub mod plane_tables;
 pub mod ties;

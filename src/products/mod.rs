@@ -20,6 +20,7 @@ mod heights;
 mod isd;
 mod kernel_report;
 mod light_time;
+mod net;
 mod orientation;
 mod page;
 mod parquet;
@@ -44,6 +45,7 @@ pub use exchange::{
     write_gcp, write_lidar_data,
 };
 pub use generated::{documentation, schemas};
+pub use net::{NetProducts, write_net_products};
 pub use product::Product;
 pub use site::{AdjustmentProducts, GeometricProducts, ImageProducts, SiteProducts};
 
