@@ -90,7 +90,8 @@ fn numbers(
     numbers.push(network.points.len() as f64);
     for point in &network.points {
         numbers.extend(point.ground_m.iter());
-        numbers.extend(point.sigma_m.unwrap_or_default().iter());
+        let sigma_m = point.known.map(|known| known.sigma_m);
+        numbers.extend(sigma_m.unwrap_or_default().iter());
     }
     numbers.push(network.views.len() as f64);
     for view in &network.views {

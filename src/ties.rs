@@ -1,18 +1,33 @@
 //! Tie points: places on the ground that were measured in several images.
 
+use nalgebra::Matrix3;
 use serde::{Deserialize, Serialize};
 
-use crate::error::{Cause, Kind};
+use crate::{
+    error::{Cause, Kind},
+    frames::{MarsIau2000, Position},
+};
 
-/// A point measured in images; its ground coordinates are not known.
+/// A point measured in images.
 ///
 /// Its measurements name their images by `I`: the text of a file, or the index among a site's images.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct TiePoint<I = usize> {
     /// Identifier in its file.
     pub id: String,
+    /// Its ground coordinates, where they are known beforehand.
+    pub known: Option<KnownGround>,
     /// Its measurements.
     pub measures: Vec<TieMeasure<I>>,
+}
+
+/// Ground coordinates that a point has from elsewhere.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct KnownGround {
+    /// Where it lies.
+    pub ground: Position<MarsIau2000>,
+    /// Covariance of its coordinates, m²; none where they are held fixed.
+    pub covariance_m2: Option<Matrix3<f64>>,
 }
 
 /// One measurement.
@@ -24,6 +39,8 @@ pub struct TieMeasure<I = usize> {
     pub line: f64,
     /// Sample, 0 at the outer edge of the first pixel and 0.5 at its middle.
     pub sample: f64,
+    /// Standard deviations of line and sample, where the file has its own, lines and pixels of the image.
+    pub sigma_px: Option<[f64; 2]>,
 }
 
 impl TiePoint<String> {
@@ -39,6 +56,7 @@ impl TiePoint<String> {
             image,
             line,
             sample,
+            sigma_px,
         } in self.measures
         {
             match index_of(&image) {
@@ -46,12 +64,14 @@ impl TiePoint<String> {
                     image,
                     line,
                     sample,
+                    sigma_px,
                 }),
                 None => unknown(image),
             }
         }
         TiePoint {
             id: self.id,
+            known: self.known,
             measures,
         }
     }
@@ -111,9 +131,11 @@ mod tests {
             image: image.to_owned(),
             line: 1.0,
             sample: 2.0,
+            sigma_px: None,
         };
         let tie = TiePoint {
             id: "t1".to_owned(),
+            known: None,
             measures: vec![measure("B"), measure("elsewhere"), measure("A")],
         };
         let mut unknown = Vec::new();

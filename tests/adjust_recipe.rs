@@ -366,7 +366,7 @@ fn two_time_biases_explain_the_disagreement() {
     network.ranges.clear();
     network.points[..simulated.shots]
         .iter_mut()
-        .for_each(|point| point.sigma_m = None);
+        .for_each(|point| point.known = None);
     let adjustment = adjust(&network);
     assert_eq!(adjustment.points[0], Err(PointRejection::Undetermined));
     let biases: Vec<(f64, f64)> = adjustment

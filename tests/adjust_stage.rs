@@ -33,9 +33,9 @@ use areograph::{
         },
         intersect::{IntersectOptions, IntersectedTies, intersect_ties},
     },
-    ties::{TieMeasure, TiePoint},
+    ties::{KnownGround, TieMeasure, TiePoint},
 };
-use nalgebra::{Vector2, Vector3};
+use nalgebra::{Matrix3, Vector2, Vector3};
 use recipe::{HALF_SWATH_PX, Normals, Recipe, Simulated, project};
 
 const NAMES: [&str; 2] = ["E02-00665", "E02-01453"];
@@ -110,6 +110,7 @@ impl Site {
         let ties = (simulated.shots..network.points.len())
             .map(|point| TiePoint {
                 id: format!("T{point}"),
+                known: None,
                 measures: network
                     .views
                     .iter()
@@ -121,6 +122,7 @@ impl Site {
                             .oriented_camera
                             .detector
                             .sample(view.y_px),
+                        sigma_px: None,
                     })
                     .collect(),
             })
@@ -206,13 +208,13 @@ fn the_stage_gives_what_the_geometry_gives() {
         .iter()
         .map(|kind| kind.kind)
         .collect();
-    assert_eq!(kinds.len(), 5, "{kinds:?}");
+    assert_eq!(kinds.len(), 6, "{kinds:?}");
     for image in &adjusted.summary.images {
         println!("{image:.3?}");
         assert_eq!(image.tie_residuals_px[0].n, 154);
     }
     // Noise of ranges 7 m, of footprints 10 m: corrections by both.
-    let range = adjusted.summary.types[2];
+    let range = adjusted.summary.types[3];
     assert!((0.6..1.1).contains(&range.variance_component), "{range:?}");
     assert!(adjusted.summary.ties.sigmas_m[0].mean > 0.0);
     for (first, second, coefficient) in &adjusted.summary.correlated {
@@ -253,6 +255,106 @@ fn footprints_in_images_weigh_as_the_mode_says() {
     println!("{shifts:.3?}");
     assert!(shifts[0].n + shifts[1].n >= 430);
     assert!(shifts[0].mean * shifts[1].mean < 0.0);
+}
+
+/// Mean error of the adjusted tie points without known coordinates, and of their heights, with the rms of errors over
+/// standard deviations; metres.
+fn tie_errors(site: &Site, adjusted: &Adjusted) -> (f64, f64, f64) {
+    let ties = adjusted.points.iter();
+    let ties = ties.filter(|point| point.kind == PointKind::Tie);
+    let free: Vec<_> = ties
+        .filter(|point| site.ties[point.index].known.is_none())
+        .collect();
+    let count = free.len() as f64;
+    let (mut mean_m, mut mean_up_m, mut squares) = (Vector3::zeros(), 0.0, 0.0);
+    for point in free {
+        let truth_m = site.simulated.points_m[site.simulated.shots + point.index];
+        let error_m = point.ground.xyz_m - truth_m;
+        mean_m += error_m / count;
+        mean_up_m += error_m.dot(&truth_m.normalize()) / count;
+        let weight = point.covariance_m2.try_inverse().unwrap();
+        squares += error_m.dot(&(weight * error_m)) / (3.0 * count);
+    }
+    (mean_m.norm(), mean_up_m.abs(), squares.sqrt())
+}
+
+#[test]
+fn coordinates_that_are_known_place_the_rest() {
+    let mut site = Site::of(Recipe::GUSEV);
+    let options = AdjustmentConfig {
+        footprint_image_coordinates: Some(FootprintImageCoordinates::Off),
+        ..matched(&site)
+    };
+    let (without_m, ..) = tie_errors(&site, &site.adjust(&options).unwrap());
+    // The recipe's images err along the flight by some hundred metres, and nothing says so.
+    assert!(without_m > 30.0, "{without_m}");
+    let controlled: Vec<usize> = (0..site.ties.len()).step_by(20).collect();
+    let with = |site: &mut Site, covariance_m2: Option<Matrix3<f64>>, noise_m: f64| {
+        let mut normals = Normals::new(3);
+        for tie in &controlled {
+            let truth_m = site.simulated.points_m[site.simulated.shots + tie];
+            site.ties[*tie].known = Some(KnownGround {
+                ground: Position::new(truth_m + noise_m * normals.vector()),
+                covariance_m2,
+            });
+        }
+        let adjusted = site.adjust(&options).unwrap();
+        let ground = adjusted.summary.types.iter();
+        let ground = ground.filter(|of| of.kind == ObservationType::TieGround);
+        assert_eq!(
+            ground.map(|of| of.observations).collect::<Vec<_>>(),
+            [3 * controlled.len()]
+        );
+        tie_errors(site, &adjusted)
+    };
+    // Eight points of which each tells the parallax to some metres.
+    let (fixed_m, _, fixed_z) = with(&mut site, None, 0.0);
+    let (constrained_m, _, constrained_z) = with(&mut site, Some(Matrix3::identity() * 25.0), 5.0);
+    println!("{without_m} {fixed_m} {fixed_z} {constrained_m} {constrained_z}");
+    assert!(
+        fixed_m < 10.0 && constrained_m < 10.0,
+        "{fixed_m} {constrained_m}"
+    );
+    assert!((0.5..1.5).contains(&fixed_z), "{fixed_z}");
+    assert!((0.5..1.5).contains(&constrained_z), "{constrained_z}");
+    // Of some points only the height is known: the height comes right, the place stays.
+    let up = site.simulated.points_m[site.simulated.shots].normalize();
+    let heights_m2 = Matrix3::identity() * 1e8 - up * up.transpose() * (1e8 - 1.0);
+    let (place_m, up_m, _) = with(&mut site, Some(heights_m2), 0.0);
+    println!("{place_m} {up_m}");
+    // Eight heights of 11 m by their own rays: 4 m, and what the rest of the site tilts by.
+    assert!(up_m < 10.0 && place_m > 30.0, "{up_m} {place_m}");
+}
+
+#[test]
+fn measurements_weigh_by_their_own_standard_deviations() {
+    const WORSE: f64 = 8.0;
+    let mut site = Site::of(Recipe::GUSEV);
+    let options = AdjustmentConfig {
+        footprint_image_coordinates: Some(FootprintImageCoordinates::Off),
+        ..matched(&site)
+    };
+    let mut normals = Normals::new(11);
+    for tie in site.ties.iter_mut().step_by(3) {
+        for measure in &mut tie.measures {
+            measure.line += WORSE * normals.next();
+            measure.sample += WORSE * normals.next();
+        }
+    }
+    let alike = site.adjust(&options).unwrap();
+    for tie in site.ties.iter_mut().step_by(3) {
+        for measure in &mut tie.measures {
+            measure.sigma_px = Some([WORSE.hypot(1.0); 2]);
+        }
+    }
+    let weighed = site.adjust(&options).unwrap();
+    let [alike, weighed] = [alike, weighed].map(|of| of.summary.tie_components[0]);
+    println!("{alike} {weighed}");
+    // sqrt((2·1 + 65)/3) = 4.7 and 1, along the track, of 154 redundancies.
+    assert!(
+        (3.5..6.0).contains(&alike) && (0.85..1.15).contains(&weighed),
+        "{alike} {weighed}"
+    );
 }
 
 #[test]
@@ -465,7 +567,9 @@ fn draw(
     }
     for (point, truth_m) in network.points.iter_mut().zip(&simulated.points_m) {
         // Ties start anywhere near; footprints are observed.
-        let sigma_m = point.sigma_m.unwrap_or(Vector3::repeat(1.0));
+        let sigma_m = point
+            .known
+            .map_or(Vector3::repeat(1.0), |known| known.sigma_m);
         point.ground_m = truth_m + normals.vector().component_mul(&sigma_m);
     }
     network.views = views.to_vec();

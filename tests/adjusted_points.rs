@@ -15,12 +15,15 @@ use areograph::{
     frames::Position,
     geom::ellipsoid::{Spherical, spherical_to_xyz_m},
     image::ImageFields,
+    pds::ties::read_ties,
     products::{
-        ControlMeasure, ControlPoint, GroundEstimate, ImageMeasure, LidarPoint, moc_serial_number,
-        write_gcp, write_lidar_data,
+        ControlMeasure, ControlNetwork, ControlPoint, GroundEstimate, ImageMeasure, LidarPoint,
+        NetworkMeasure, NetworkPoint, moc_serial_number, write_control_network, write_gcp,
+        write_lidar_data,
     },
     spice::{KernelSet, Session},
     stages::tag_times::tag_times,
+    ties::KnownGround,
     time::Et,
     units::{METRES_PER_KM, RADIANS_PER_DEGREE},
 };
@@ -287,6 +290,80 @@ fn lidar_points_that_isis_would_refuse_are_refused() {
             .contains("/points/0/measures/0/line")
     );
     assert!(refused(&[shot(), shot()]).contains("two points have the identifier"));
+}
+
+#[test]
+fn a_control_network_is_read_again_as_it_was_written() {
+    let serials = [
+        "MGS/610472061:131/MOC-NA/BROAD_BAND",
+        "MGS/669329623:36/MOC-NA/BROAD_BAND",
+    ];
+    let measure = |image: usize, line: f64, sample: f64| NetworkMeasure {
+        measure: seen(serials[image], line, sample),
+        sigma_px: Some([0.3, 0.2 + image as f64]),
+        residual_px: Some([-0.125, 1e-7]),
+    };
+    let measures = vec![measure(0, 0.1 + 0.2, 671.25), measure(1, 4863.75, 0.0)];
+    let known = |covariance_m2| KnownGround {
+        ground: gusev().position,
+        covariance_m2,
+    };
+    let point = |id, known: Option<KnownGround>| NetworkPoint {
+        id,
+        known,
+        initial_m: Some(gusev().position.xyz_m),
+        adjusted: Some(gusev()),
+        measures: measures.clone(),
+    };
+    let points = vec![
+        point("free", None),
+        point("held, or \"fixed\"", Some(known(None))),
+        point("it's constrained", Some(known(Some(gusev().covariance_m2)))),
+        NetworkPoint {
+            adjusted: None,
+            initial_m: None,
+            ..point("rejected", None)
+        },
+    ];
+    let network = ControlNetwork {
+        id: "gusev",
+        description: "made for a test",
+        created_utc: "1999-05-06T15:33:58.130",
+        points,
+    };
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("exchange/adjusted.pvl");
+    assert_eq!(write_control_network(&path, &network).unwrap(), 4);
+    let file = read_ties(&path).unwrap();
+    // The point that says to be ignored, and nothing else.
+    assert_eq!((file.ignored, file.complaints.len()), (1, 0));
+    assert_eq!(file.ties.len(), 3);
+    for (read, written) in file.ties.iter().zip(&network.points) {
+        assert_eq!((&*read.id, read.known), (written.id, written.known));
+        assert_eq!(read.measures.len(), 2);
+        for (read, written) in read.measures.iter().zip(&written.measures) {
+            assert_eq!(read.image, written.measure.image);
+            assert_eq!(read.sigma_px, written.sigma_px);
+            // Half a pixel there and back costs rounding of 5000.
+            assert!((read.line - written.measure.line).abs() < 1e-12);
+            assert!((read.sample - written.measure.sample).abs() < 1e-12);
+        }
+    }
+    let text = fs::read_to_string(&path).unwrap();
+    for line in [
+        "    PointType = Constrained\n    PointId = \"it's constrained\"\n",
+        "      JigsawRejected = True\n",
+        "      LineResidual = -0.125 <pixels>\n",
+        "    AdjustedCovarianceMatrix = (9e1, 2e1, -1.2e1, 6e1, 7e0, 1.1e2)\n",
+    ] {
+        assert!(text.contains(line), "{line} in\n{text}");
+    }
+    let unnamed = ControlNetwork {
+        points: vec![point("\"'", None)],
+        ..network
+    };
+    let failure = write_control_network(&path, &unnamed).unwrap_err();
+    assert_eq!(failure.kind(), Kind::Bug);
 }
 
 fn control(id: &str, ground: GroundEstimate) -> ControlPoint<'_> {

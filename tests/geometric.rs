@@ -10,6 +10,7 @@ mod common;
 
 use std::{collections::BTreeSet, fmt::Write as _, fs, fs::File, path::Path};
 
+use areograph::pds::ties::read_ties;
 use arrow::{
     array::{AsArray, RecordBatch},
     datatypes::Float64Type,
@@ -112,6 +113,43 @@ fn the_adjustment_cures_the_misregistration() {
     );
 }
 
+/// The files for users of jigsaw, `named` tie points being rejected.
+fn jigsaw_finds_its_files(site: &Path, named: usize) {
+    let network = read_ties(&site.join("exchange/adjusted.pvl")).unwrap();
+    assert_eq!((network.ties.len(), network.ignored), (154 - named, named));
+    assert_eq!(network.complaints, []);
+    let text = |path: &str| fs::read_to_string(site.join("exchange").join(path)).unwrap();
+    let rows = |text: &str, heads: usize| {
+        let rows = text.lines().skip(heads);
+        rows.map(|row| row.split(',').map(str::to_owned).collect())
+            .collect::<Vec<Vec<String>>>()
+    };
+    let residuals = rows(&text("residuals.csv"), 3);
+    assert_eq!(residuals.len(), 2 * 154);
+    let starred = residuals.iter().filter(|row| row[10] == "*").count();
+    assert_eq!(starred, 2 * named);
+    let points = rows(&text("bundleout_points.csv"), 3);
+    assert_eq!(points.len(), 154 - named);
+    let images = rows(&text("bundleout_images.csv"), 2);
+    // Lines of the residuals are those of the image: their root mean square, and that of the image's row.
+    let lines: Vec<f64> = residuals
+        .iter()
+        .filter(|row| row[1] == "E02-01301.cub" && row[10].is_empty())
+        .map(|row| row[8].parse().unwrap())
+        .collect();
+    let squares: f64 = lines.iter().map(|line| line * line).sum();
+    let rms = (squares / lines.len() as f64).sqrt();
+    let told: f64 = images[0][2].parse().unwrap();
+    assert!((rms - told).abs() < 1e-7, "{rms} {told}"); // eight decimals
+    // Noise of a line in both images, half of which the height of the point takes up.
+    assert!((0.5..1.1).contains(&rms), "{rms}");
+    // Of each image 15 unknowns: all but the quadratic positions.
+    assert_eq!(
+        table(&site.join("correlations.parquet")).num_rows(),
+        2 * 15 * 14 / 2
+    );
+}
+
 #[test]
 fn the_products_of_the_adjustment_agree_with_each_other() {
     let case = Case::pair();
@@ -163,6 +201,7 @@ fn the_products_of_the_adjustment_agree_with_each_other() {
         .filter(|line| !line.starts_with('#'))
         .count();
     assert_eq!(points, 154 - named);
+    jigsaw_finds_its_files(&site, named);
     let lidar = json(&site.join("exchange/lidar.json"));
     let shots = table(&site.join("adjusted_footprints.parquet"));
     let ranges = shots.column_by_name("range_m").unwrap();

@@ -31,6 +31,7 @@ use areograph::{
         oriented_camera::OrientedCamera,
         pushbroom::{CorrectedOrientation, ExteriorOrientation, SampledOrientation},
         statistics::Summary,
+        surface::{LaserSurface, SurfaceOptions, SurfaceShot},
     },
     pds::ties::read_ties,
     stages::{
@@ -154,6 +155,16 @@ impl Site {
     }
 
     fn adjust(&self, priors: &Priors, options: &AdjustmentConfig, with_ranges: bool) -> Adjusted {
+        self.adjust_with(priors, options, with_ranges, None)
+    }
+
+    fn adjust_with(
+        &self,
+        priors: &Priors,
+        options: &AdjustmentConfig,
+        with_ranges: bool,
+        surface: Option<LaserSurface>,
+    ) -> Adjusted {
         let images = self
             .oriented_camera()
             .into_iter()
@@ -168,7 +179,10 @@ impl Site {
             })
             .collect();
         let starts = self.intersect(&self.ties);
-        let shots = self.shots(with_ranges);
+        let shots = LaserShots {
+            surface,
+            ..self.shots(with_ranges)
+        };
         adjust(&images, &shots, &self.ties, &starts, options).unwrap()
     }
 
@@ -469,6 +483,112 @@ fn every_distance_comes_closer_to_its_range_with_the_priors_of_isis() {
         // Metres: the ties stay on the ground that the laser saw.
         assert!(adjusted_heights_m(&site, adjusted).median.abs() < 5.0);
     }
+}
+
+/// Ties above the footprints of `judging`, metres: by the ground between them, where it is known to `SURFACE_KNOWN_M`.
+fn above_lola_m(judging: &LaserSurface, ties: impl Iterator<Item = Vector3<f64>>) -> Summary {
+    let ties: Vec<Vector3<f64>> = ties.collect();
+    let found = judging.predict(&ties);
+    let known = ties
+        .iter()
+        .enumerate()
+        .filter(|(index, _)| found.sigma_m(*index) < SURFACE_KNOWN_M);
+    summary(known.map(|(index, tie_m)| LaserSurface::height_m(tie_m).0 - found.heights_m[index]))
+}
+
+/// Ties count where the ground between footprints is known to this, metres.
+const SURFACE_KNOWN_M: f64 = 25.0;
+
+/// A surface of some of the footprints. It counts heights from the ellipsoid of Mars, 1650 km below: what that adds is
+/// smooth, and the same for ties.
+fn lola(site: &Site, taken: impl Fn(usize) -> bool) -> LaserSurface {
+    let points = site
+        .points
+        .iter()
+        .enumerate()
+        .filter(|(index, _)| taken(*index));
+    let shots: Vec<SurfaceShot> = points
+        .map(|(_, point)| SurfaceShot {
+            ground_m: point.ground_m,
+            profile: 0,
+        })
+        .collect();
+    // Lines of half a metre, of which the network was off by some tens.
+    let options = SurfaceOptions {
+        plan_sigma_m: 10.0,
+        ..SurfaceOptions::default()
+    };
+    LaserSurface::new(&shots, &[], &options).unwrap()
+}
+
+#[test]
+fn heights_follow_lola_where_its_surface_controls_them() {
+    let Some(site) = Site::read("real heights against LOLA") else {
+        return;
+    };
+    // Every second footprint controls, the others judge.
+    let [controlling, judging] = [0, 1].map(|half| lola(&site, |index| index % 2 == half));
+    let before = site.intersect(&site.ties);
+    let before = above_lola_m(
+        &judging,
+        before.points.iter().map(|point| point.ground.xyz_m),
+    );
+    row("ties above LOLA before, m", &before);
+    let options = AdjustmentConfig {
+        model: AdjustmentModel::MolaSurface,
+        tie_sigma_px: [0.5; 2],
+        blunder_limit: None,
+        height_blunder_limit: None,
+        ..options(FootprintImageCoordinates::Off)
+    };
+    let powers = |constant: f64, linear: f64| [constant, linear, 0.0];
+    let (position_m, rotation_rad) = (powers(25.0, 0.2), powers(4e-4, 1e-5));
+    let sigmas = std::array::from_fn(|index| {
+        let of_power = if index < 9 { position_m } else { rotation_rad };
+        of_power[index % 3]
+    });
+    let adjusted = [None, Some(controlling)].map(|surface| {
+        let adjusted = site.adjust_with(&[sigmas; 2], &options, true, surface);
+        let ties = adjusted
+            .points
+            .iter()
+            .filter(|point| point.kind == PointKind::Tie);
+        let above = above_lola_m(&judging, ties.map(|point| point.ground.xyz_m));
+        let ties = adjusted
+            .points
+            .iter()
+            .filter(|point| point.kind == PointKind::Tie);
+        let sigmas_m = summary(ties.map(|point| {
+            let up = point.ground.xyz_m.normalize();
+            up.dot(&(point.covariance_m2 * up)).sqrt()
+        }));
+        let with = adjusted.heights.map(|heights| heights.mean_sigma_m[2]);
+        row(
+            &format!("ties above LOLA after, m (mean ±{with:?})"),
+            &above,
+        );
+        row("standard deviations of single heights, m", &sigmas_m);
+        (above, sigmas_m.median, with)
+    });
+    let [
+        (without, without_sigma_m, _),
+        (with, with_sigma_m, mean_sigma_m),
+    ] = adjusted;
+    // Most ties lie where LOLA's ground is not known so well.
+    assert!(with.n >= 15, "{}", with.n);
+    // Metres: the network's own orientations, and the same with a surface of which these ties know nothing.
+    assert!(with.median.abs() < before.median.abs() && with.median.abs() < without.median.abs());
+    // Without the surface heights are where the network's own orientations leave them, and stated as what these priors
+    // allow: nothing of LOLA is known then.
+    assert!(without.median.abs() < 3.0 * without_sigma_m && without_sigma_m > 100.0);
+    assert!(with_sigma_m < 10.0, "{with_sigma_m}");
+    // The halves share the errors of the footprints' coordinates; a mean of each errs by as much as the other.
+    let expected_m = mean_sigma_m.unwrap() * 2.0_f64.sqrt();
+    assert!(
+        with.median.abs() < 3.0 * expected_m,
+        "{} {expected_m}",
+        with.median
+    );
 }
 
 #[test]

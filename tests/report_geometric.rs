@@ -242,7 +242,7 @@ fn the_tables_of_the_adjustment_are_its_summary() {
     for (row, of) in observations.iter().zip(&summary.types) {
         assert_eq!(row[1], of.observations.to_string());
         agree(&row[2], of.redundancy, 1);
-        assert_eq!(row[6], of.beyond_limit.to_string());
+        assert_eq!(row[7], of.beyond_limit.to_string());
     }
     let steps = csv(&page, "convergence-of-the-adjustment");
     assert_eq!(steps.len(), 1 + site.adjusted.weighted_squares.len());

@@ -59,6 +59,7 @@ fn ties(
     let ties = (0..count)
         .map(|tie| TiePoint {
             id: format!("tie {tie}"),
+            known: None,
             measures: simulated
                 .network
                 .views
@@ -71,6 +72,7 @@ fn ties(
                         image: view.image,
                         line: view.x_lines + 0.5 * image.lines + lines,
                         sample: image.detector.sample(view.y_px) + pixels,
+                        sigma_px: None,
                     }
                 })
                 .collect(),

@@ -9,6 +9,7 @@ use crate::{
 use super::{
     declare::{Declare as _, Keys, Many, declare_table, group, key, tables},
     forms::{Number, Several, above_to, from_to, identifier, several, words, words_of, zero_or},
+    unknowns::{PositionUnknowns, RotationUnknowns},
 };
 
 /// Standard deviations of observations: none is better than a micrometre or a millionth of a pixel, and smaller
@@ -39,7 +40,8 @@ declare_table! {
                 "image coordinates of footprints as observations, one standard deviation an image (Yoon & Shan 2004)",
             ],
         )).or(AdjustmentModel::MolaSurface),
-        /// Standard deviations of tie points, along and across the track, in the focal plane (the paper).
+        /// Standard deviations of tie points, along and across the track, in the focal plane (the paper); measurements
+        /// that have their own in their file keep them.
         tie_sigma_px: [f64; 2] = key(SIGMAS).or([1.0, 1.0]),
         /// Standard deviations of X, Y and Z of every image for the powers 0, 1, 2 of t, which is 0 in the middle of the
         /// image and 1 at its end; inf leaves free, 0 holds fixed. Orbits of three families lie up to 50 m apart
@@ -50,6 +52,17 @@ declare_table! {
         rotation_sigma_rad as "rotation_sigma_arcsec": [f64; 3] = key(SIGMAS_OF_TIME)
             .or([82.5, 2.0, 2.0])
             .map(|sigmas| sigmas.map(|sigma| sigma * RADIANS_PER_ARCSECOND)),
+        /// How many powers of t are unknown of every image's position, as jigsaw's spsolve says: levels above have no
+        /// unknown, whatever their standard deviation.
+        position_unknowns: PositionUnknowns = key(words_of(
+            PositionUnknowns::WORDS,
+            ["", "a constant", "and what is linear in t", "and what is quadratic"],
+        )).or(PositionUnknowns::Acceleration),
+        /// The same of rotations, as jigsaw's camsolve says.
+        rotation_unknowns: RotationUnknowns = key(words_of(
+            RotationUnknowns::WORDS,
+            ["", "constants", "and what is linear in t", "and what is quadratic"],
+        )).or(RotationUnknowns::Acceleration),
         /// What image coordinates of footprints are: "off" unless the model is the published one, where they are
         /// "weighted". They come from the orientation that is being adjusted and are no measurements of their own.
         footprint_image_coordinates: Option<FootprintImageCoordinates> = key(words_of(
@@ -192,5 +205,11 @@ declare_table! {
         rotation_rad as "rotation_arcsec": Option<[f64; 9]> = key(SIGMAS_OF_POWERS)
             .unused("[54.0, 54.0, 54.0, 54.0, 54.0, 54.0, 54.0, 54.0, 54.0]")
             .map(|sigmas| sigmas.map(|sigmas| sigmas.map(|sigma| sigma * RADIANS_PER_ARCSECOND))),
+        /// Unknown powers of t of its position; those of `[adjustment]` where it is left out.
+        position_unknowns: Option<PositionUnknowns> =
+            key(words_of(PositionUnknowns::WORDS, [""; 4])).unused(r#""acceleration""#),
+        /// And of its rotation.
+        rotation_unknowns: Option<RotationUnknowns> =
+            key(words_of(RotationUnknowns::WORDS, [""; 4])).unused(r#""acceleration""#),
     }
 }

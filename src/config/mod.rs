@@ -24,6 +24,7 @@ mod problems;
 mod range_check;
 mod site;
 mod ties;
+mod unknowns;
 mod windows;
 mod written;
 
@@ -52,6 +53,7 @@ pub use problems::Problems;
 pub use range_check::{RangeCheckConfig, SCAN_STEPS_MAX};
 pub use site::SiteConfig;
 pub use ties::{IntersectionConfig, TiesConfig};
+pub use unknowns::{PositionUnknowns, RotationUnknowns};
 pub use windows::WindowConfig;
 
 use crate::error::{Cause, Error, IoError, Kind, Locate as _};

@@ -17,8 +17,9 @@ declare_table! {
     /// Tie points between the images. Without this table nothing is intersected or adjusted.
     pub struct TiesConfig {
         /// Paths or globs as in `[pedr]`: tables (.csv) with the columns `point_id`, `serial_number`, `sample`,
-        /// `line`, one row a measurement, or ISIS control networks in PVL (a binary one: cnetbin2pvl). Lines and
-        /// samples count as in ISIS, the middle of the first pixel is 1. `serial_number` is an image's
+        /// `line`, one row a measurement, and where known `line_sigma_px` and `sample_sigma_px`, its standard deviations;
+        /// or ISIS control networks in PVL (a binary one: cnetbin2pvl), of which points that are fixed or constrained
+        /// bring their coordinates, IAU 2000. Lines and samples count as in ISIS, the middle of the first pixel is 1. `serial_number` is an image's
         /// `serial_number` above, or its `id`; measurements in other images are counted and left out.
         #[serde(skip)]
         files: Vec<PathBuf> = key(Globs)

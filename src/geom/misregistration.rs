@@ -98,6 +98,20 @@ impl ImageToImage {
         self.transformation.order
     }
 
+    /// Line and sample of the second image that show what the first one shows at `first`; `None` beyond the lines of the tie
+    /// points.
+    #[must_use]
+    pub fn second(&self, first: [f64; 2]) -> Option<[f64; 2]> {
+        let [low, high] = self.ends;
+        // A residual is where the transformation leads, minus where a pair says.
+        let pair = Pair {
+            first,
+            second: [0.0; 2],
+        };
+        let lead = |axis| self.transformation.residuals(&[pair], axis);
+        (low <= first[0] && first[0] <= high).then(|| [0, 1].map(|axis| lead(axis)[0]))
+    }
+
     /// How far `footprints` lie in the second image from where the tie points say.
     ///
     /// Relief moves a tie point across the track between images of different emission: only tie points near

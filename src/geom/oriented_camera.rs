@@ -2,7 +2,10 @@
 
 use nalgebra::{Vector2, Vector3};
 
-use super::pushbroom::{Detector, ExteriorOrientation, missed_m};
+use super::{
+    intersection::Ray,
+    pushbroom::{Detector, ExteriorOrientation, missed_m},
+};
 
 /// An image that takes part in intersection or adjustment.
 #[derive(Debug, Clone, PartialEq)]
@@ -24,6 +27,21 @@ impl<M: ExteriorOrientation> OrientedCamera<M> {
     #[must_use]
     pub fn focal_plane_coordinates(&self, line: f64, sample: f64) -> (f64, Vector2<f64>) {
         (line - 0.5 * self.lines, self.detector.place_px(sample))
+    }
+
+    /// The ray of a place, with a standard deviation of a pixel along the track and of a sample across it.
+    #[must_use]
+    pub fn ray(&self, line: f64, sample: f64) -> Ray {
+        let (x_lines, focal_px) = self.focal_plane_coordinates(line, sample);
+        let pose = self.orientation.pose(x_lines);
+        Ray {
+            position_m: pose.position_m,
+            mars_to_camera: pose.mars_to_camera,
+            focal_length_px: self.detector.focal_length_px,
+            focal_px,
+            along_sigma_px: 1.0,
+            across_sigma_px: self.detector.focal_px_per_sample(focal_px.y),
+        }
     }
 
     /// Whether a place lies in the image, its edges included.

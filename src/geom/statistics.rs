@@ -19,6 +19,23 @@ const CORRELATED_MIN: usize = 10;
 /// Baarda 1968, A testing procedure for use in geodetic networks.
 pub const BAARDA_LIMIT: f64 = 3.29;
 
+/// Between which values 99 % of all `sqrt(weighted squares / redundancy)` lie when standard deviations are right: the
+/// roots of χ² over its `redundancy` degrees of freedom; `None` where there is not even one.
+///
+/// # Source
+/// Wilson & Hilferty 1931, The distribution of chi-square: within 0.01 of the exact roots from 10 degrees of freedom.
+#[must_use]
+pub fn unit_weight_limits(redundancy: f64) -> Option<[f64; 2]> {
+    /// Standard normal quantile of 0.995.
+    const QUANTILE: f64 = 2.575_829;
+    let variance = 2.0 / (9.0 * redundancy);
+    let root = |sense: f64| {
+        let cube_root = 1.0 - variance + sense * QUANTILE * variance.sqrt();
+        cube_root.max(0.0).powf(1.5)
+    };
+    (redundancy >= 1.0).then(|| [root(-1.0), root(1.0)])
+}
+
 /// Statistics of a column; all 0 for an empty one.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Summary {
@@ -285,6 +302,20 @@ mod tests {
             };
             (-2.0 * uniform().ln()).sqrt() * (std::f64::consts::TAU * uniform()).cos()
         })
+    }
+
+    #[test]
+    fn limits_of_unit_weight_are_those_of_chi_square() {
+        // χ² at 0.005 and 0.995 from printed tables, over its degrees of freedom.
+        for (freedom, least, most) in [(10.0, 2.156, 25.188), (100.0, 67.328, 140.169)] {
+            let [low, high] = unit_weight_limits(freedom).unwrap();
+            let exact = [least, most].map(|square: f64| (square / freedom).sqrt());
+            assert!(
+                (low - exact[0]).abs() < 0.01 && (high - exact[1]).abs() < 0.01,
+                "{low} {high} {exact:?}"
+            );
+        }
+        assert_eq!(unit_weight_limits(0.5), None);
     }
 
     #[test]

@@ -1,15 +1,17 @@
 //! Tie points from a table, and from ISIS control networks as text (PVL).
 //!
-//! Both count lines and samples as ISIS does: the middle of the first pixel is 1. Ground coordinates of
-//! a network are not read: here they come from intersection.
+//! Both count lines and samples as ISIS does: the middle of the first pixel is 1.
+
+mod network;
 
 use std::{collections::BTreeMap, fs, path::Path};
 
-use super::label::{Entry, LabelError, parse_whole};
+use super::label::LabelError;
 use crate::{
     error::{Cause, IoError, Kind, Locate, Result},
-    ties::{TieMeasure, TiePoint},
+    ties::{KnownGround, TieMeasure, TiePoint},
 };
+use network::parse_network;
 
 /// Where ISIS has the middle of the first pixel, we have its outer edge at 0.
 pub const ISIS_TO_EDGE: f64 = -0.5;
@@ -43,6 +45,10 @@ enum TieError {
     NoNetwork,
     #[error("column {0} is missing; expected point_id, serial_number, sample and line")]
     Column(&'static str),
+    #[error(
+        "column {0} is missing; a table has both of line_sigma_px and sample_sigma_px, or neither"
+    )]
+    Sigma(&'static str),
     #[error("the table cannot be read: {0}")]
     Table(String),
     #[error("not one of its records can be read ({records} in all); record {record}: {text}")]
@@ -64,7 +70,7 @@ impl Cause for TieError {
         match self {
             Self::Binary => "convert it with ISIS: cnetbin2pvl from=control.net to=control.pvl",
             Self::NoNetwork | Self::Label(_) => "give an ISIS control network in PVL, or a CSV table",
-            Self::Column(_) | Self::Table(_) | Self::Unreadable { .. } => {
+            Self::Column(_) | Self::Sigma(_) | Self::Table(_) | Self::Unreadable { .. } => {
                 "give a comma-separated table with a header line; lines and samples count from 1 at the middle of the first pixel"
             }
         }
@@ -121,17 +127,47 @@ pub fn ties_table(ties: &[TiePoint<String>]) -> String {
 
 /// Columns of a table; others are left alone.
 const COLUMNS: [&str; 4] = ["point_id", "serial_number", "sample", "line"];
+/// Columns that a table may have: standard deviations of a measurement; an empty field is none.
+const SIGMA_COLUMNS: [&str; 2] = ["line_sigma_px", "sample_sigma_px"];
 
 /// Where a table has its columns.
-fn places(header: &csv::StringRecord) -> std::result::Result<[usize; 4], TieError> {
-    let mut places = [0; 4];
-    for (place, column) in places.iter_mut().zip(COLUMNS) {
-        let mut names = header.iter();
-        *place = names
-            .position(|name| name == column)
-            .ok_or(TieError::Column(column))?;
+struct Places {
+    required: [usize; 4],
+    sigmas: [Option<usize>; 2],
+}
+
+impl Places {
+    fn of(header: &csv::StringRecord) -> std::result::Result<Self, TieError> {
+        let position = |column| header.iter().position(|name| name == column);
+        let mut required = [0; 4];
+        for (place, column) in required.iter_mut().zip(COLUMNS) {
+            *place = position(column).ok_or(TieError::Column(column))?;
+        }
+        let sigmas = SIGMA_COLUMNS.map(position);
+        if let [Some(_), None] | [None, Some(_)] = sigmas {
+            let missing = usize::from(sigmas[0].is_some());
+            return Err(TieError::Sigma(SIGMA_COLUMNS[missing]));
+        }
+        Ok(Self { required, sigmas })
     }
-    Ok(places)
+}
+
+/// Standard deviations of line and sample as a file writes them; both, or none where both are missing.
+///
+/// # Errors
+/// What was found instead of two positive numbers.
+fn sigmas(written: [Option<&str>; 2]) -> std::result::Result<Option<[f64; 2]>, String> {
+    if written == [None, None] {
+        return Ok(None);
+    }
+    let positive = |text: Option<&str>| finite(text?).filter(|sigma| *sigma > 0.0);
+    if let [Some(line), Some(sample)] = written.map(positive) {
+        return Ok(Some([line, sample]));
+    }
+    let [line, sample] = written.map(|text| text.unwrap_or("missing"));
+    Err(format!(
+        "standard deviations of line {line}, of sample {sample}: expected two numbers above 0, or neither"
+    ))
 }
 
 fn finite(text: &str) -> Option<f64> {
@@ -146,19 +182,28 @@ struct Gathered {
 }
 
 impl Gathered {
-    fn add(&mut self, id: String, image: String, line: f64, sample: f64) {
+    /// The point of this identifier, new where there was none.
+    fn point(&mut self, id: String) -> &mut TiePoint<String> {
         let ties = &mut self.file.ties;
         let at = *self.index.entry(id).or_insert_with_key(|id| {
             ties.push(TiePoint {
                 id: id.clone(),
+                known: None,
                 measures: Vec::new(),
             });
             ties.len() - 1
         });
-        ties[at].measures.push(TieMeasure {
-            image,
-            line: line + ISIS_TO_EDGE,
-            sample: sample + ISIS_TO_EDGE,
+        &mut ties[at]
+    }
+
+    /// Adds a measurement whose place is counted as ISIS does.
+    fn add(&mut self, id: String, known: Option<KnownGround>, measure: TieMeasure<String>) {
+        let point = self.point(id);
+        point.known = point.known.or(known);
+        point.measures.push(TieMeasure {
+            line: measure.line + ISIS_TO_EDGE,
+            sample: measure.sample + ISIS_TO_EDGE,
+            ..measure
         });
     }
 
@@ -173,7 +218,7 @@ fn parse_table(bytes: &[u8]) -> std::result::Result<TieFile, TieError> {
         .from_reader(bytes);
     let unreadable = |error: csv::Error| TieError::Table(error.to_string());
     let header = reader.headers().map_err(unreadable)?.clone();
-    let places = places(&header)?;
+    let places = Places::of(&header)?;
     let mut gathered = Gathered::default();
     for record in reader.into_records() {
         let record = match record {
@@ -185,22 +230,37 @@ fn parse_table(bytes: &[u8]) -> std::result::Result<TieFile, TieError> {
             }
         };
         let line = record.position().map_or(0, csv::Position::line);
-        let [id, image, sample, along] = places.map(|at| record.get(at).unwrap_or_default());
-        if let (false, Some(sample), Some(along)) = (
-            id.is_empty() || image.is_empty(),
-            finite(sample),
-            finite(along),
-        ) {
-            gathered.add(id.to_owned(), image.to_owned(), along, sample);
-        } else {
-            let text = format!(
-                "point_id {id:?}, serial_number {image:?}, sample {sample:?}, line {along:?}: expected two names and two \
-                 numbers"
-            );
-            gathered.complain(line, text);
+        match measurement(&places, &record) {
+            Ok((id, measure)) => gathered.add(id, None, measure),
+            Err(text) => gathered.complain(line, text),
         }
     }
     Ok(gathered.file)
+}
+
+/// The measurement of a record with the identifier of its point; otherwise what it lacks.
+fn measurement(
+    places: &Places,
+    record: &csv::StringRecord,
+) -> std::result::Result<(String, TieMeasure<String>), String> {
+    let [id, image, sample, line] = places.required.map(|at| record.get(at).unwrap_or_default());
+    let numbers = finite(line).zip(finite(sample));
+    let Some((line, sample)) = numbers.filter(|_| !id.is_empty() && !image.is_empty()) else {
+        return Err(format!(
+            "point_id {id:?}, serial_number {image:?}, sample {sample:?}, line {line:?}: expected two names and two \
+             numbers"
+        ));
+    };
+    let written = places
+        .sigmas
+        .map(|at| record.get(at?).filter(|text| !text.is_empty()));
+    let measure = TieMeasure {
+        image: image.to_owned(),
+        line,
+        sample,
+        sigma_px: sigmas(written)?,
+    };
+    Ok((id.to_owned(), measure))
 }
 
 /// Why a record is none, without the place that is told with it.
@@ -213,129 +273,19 @@ fn unreadable_record(error: &csv::Error) -> String {
     }
 }
 
-fn parse_network(bytes: &[u8]) -> std::result::Result<TieFile, TieError> {
-    let label = parse_whole(bytes)?;
-    let is_in = |name: &str| label.entries.iter().any(|entry| entry.group == name);
-    if !is_in("CONTROLNETWORK") {
-        // The label of the binary form describes where its bytes start.
-        return Err(if is_in("PROTOBUFFER") || is_in("CORE") {
-            TieError::Binary
-        } else {
-            TieError::NoNetwork
-        });
-    }
-    let mut gathered = Gathered::default();
-    let mut point = BlockEntries::default();
-    for block in label.entries.chunk_by(|a, b| a.block == b.block) {
-        let block = BlockEntries(block);
-        match block.0[0].group.as_str() {
-            "CONTROLPOINT" => {
-                point = block;
-                gathered.file.ignored += usize::from(block.ignored());
-                if point.value("POINTID").is_none() {
-                    gathered.complain(block.number(), "a point without PointId".to_owned());
-                }
-            }
-            "CONTROLMEASURE" => add_measure(&mut gathered, &point, &block),
-            _ => {}
-        }
-    }
-    Ok(gathered.file)
-}
-
-/// The entries of one object or group.
-#[derive(Clone, Copy, Default)]
-struct BlockEntries<'a>(&'a [Entry]);
-
-impl<'a> BlockEntries<'a> {
-    fn value(&self, key: &str) -> Option<&'a str> {
-        let entry = self.0.iter().find(|entry| entry.key == key);
-        entry.map(|entry| entry.value.as_str())
-    }
-
-    fn ignored(&self) -> bool {
-        self.value("IGNORE")
-            .is_some_and(|value| value.eq_ignore_ascii_case("true"))
-    }
-
-    fn number(&self) -> u64 {
-        self.0.first().map_or(0, |entry| entry.block as u64)
-    }
-
-    fn finite(&self, key: &str) -> Option<f64> {
-        finite(self.value(key)?)
-    }
-}
-
-fn add_measure(gathered: &mut Gathered, point: &BlockEntries<'_>, measure: &BlockEntries<'_>) {
-    if point.ignored() || measure.ignored() {
-        gathered.file.ignored += usize::from(measure.ignored());
-        return;
-    }
-    let Some(id) = point.value("POINTID") else {
-        return;
-    };
-    let place = (
-        measure.value("SERIALNUMBER"),
-        measure.finite("LINE"),
-        measure.finite("SAMPLE"),
-    );
-    if let (Some(image), Some(line), Some(sample)) = place {
-        gathered.add(id.to_owned(), image.to_owned(), line, sample);
-    } else {
-        let found = |key| measure.value(key).unwrap_or("missing");
-        let text = format!(
-            "point {id}: SerialNumber {}, Line {}, Sample {}: expected a name and two numbers",
-            found("SERIALNUMBER"),
-            found("LINE"),
-            found("SAMPLE")
-        );
-        gathered.complain(measure.number(), text);
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    const NETWORK: &str = "Object = ControlNetwork\n NetworkId = n\n \
-        Object = ControlPoint\n PointId = p1\n \
-        Group = ControlMeasure\n SerialNumber = A\n Line = 1.0\n Sample = 2.5\n End_Group\n \
-        Group = ControlMeasure\n Sample = 7.0\n Line = 8.0\n SerialNumber = B\n End_Group\n End_Object\n \
-        Object = ControlPoint\n PointId = p2\n \
-        Group = ControlMeasure\n SerialNumber = A\n Line = x\n Sample = 1\n End_Group\n \
-        Group = ControlMeasure\n SerialNumber = B\n Line = 3\n Sample = 1\n Ignore = True\n End_Group\n \
-        Group = ControlMeasure\n SerialNumber = C\n Line = 4\n Sample = 5\n End_Group\n End_Object\n \
-        Object = ControlPoint\n PointId = p3\n Ignore = True\n \
-        Group = ControlMeasure\n SerialNumber = A\n Line = 1\n Sample = 1\n End_Group\n End_Object\n\
-        End_Object\nEnd\n";
-
-    fn measure(image: &str, line: f64, sample: f64) -> TieMeasure<String> {
+    /// A measurement without standard deviations.
+    pub(in crate::pds::ties) fn measure(image: &str, line: f64, sample: f64) -> TieMeasure<String> {
         TieMeasure {
             image: image.to_owned(),
             line,
             sample,
+            sigma_px: None,
         }
-    }
-
-    #[test]
-    fn a_network_is_read_and_what_is_left_out_is_told() {
-        let file = parse_network(NETWORK.as_bytes()).unwrap();
-        assert_eq!(file.ties.len(), 2);
-        assert_eq!(file.ties[0].id, "p1");
-        assert_eq!(
-            file.ties[0].measures,
-            [measure("A", 0.5, 2.0), measure("B", 7.5, 6.5)]
-        );
-        assert_eq!(file.ties[1].measures, [measure("C", 3.5, 4.5)]);
-        assert_eq!(file.ignored, 2);
-        assert_eq!(file.complaints.len(), 1);
-        assert!(
-            file.complaints[0]
-                .text
-                .contains("point p2: SerialNumber A, Line x")
-        );
     }
 
     #[test]
@@ -356,6 +306,28 @@ mod tests {
         assert_eq!(
             parse_table(b"point_id,line\n"),
             Err(TieError::Column("serial_number"))
+        );
+    }
+
+    #[test]
+    fn standard_deviations_of_measurements_are_read_where_a_table_has_them() {
+        let table = "point_id,serial_number,sample,line,line_sigma_px,sample_sigma_px\n\
+            1,A,2.5,1,0.3,0.2\n1,B,7,8,,\n2,A,1,1,0.3,\n2,B,1,1,0,0.2\n";
+        let file = parse_table(table.as_bytes()).unwrap();
+        let sigmas: Vec<_> = file.ties[0].measures.iter().map(|of| of.sigma_px).collect();
+        assert_eq!(sigmas, [Some([0.3, 0.2]), None]);
+        assert_eq!(file.ties.len(), 1);
+        let texts: Vec<&str> = file.complaints.iter().map(|of| &*of.text).collect();
+        let expected = "expected two numbers above 0, or neither";
+        assert_eq!(
+            texts,
+            [("0.3", "missing"), ("0", "0.2")].map(|(line, sample)| format!(
+                "standard deviations of line {line}, of sample {sample}: {expected}"
+            ))
+        );
+        assert_eq!(
+            parse_table(b"point_id,serial_number,sample,line,sample_sigma_px\n"),
+            Err(TieError::Sigma("line_sigma_px"))
         );
     }
 
@@ -384,19 +356,12 @@ mod tests {
     fn a_table_that_is_written_is_read_again() {
         let ties = [("1", 0.5), ("two, or 2", 7.25)].map(|(id, line)| TiePoint {
             id: id.to_owned(),
+            known: None,
             measures: vec![measure("A", line, 3.0), measure("B", 9.0, line)],
         });
         let file = parse_table(ties_table(&ties).as_bytes()).unwrap();
         assert_eq!(file.ties, ties);
         assert_eq!((file.ignored, file.complaints.len()), (0, 0));
-    }
-
-    #[test]
-    fn what_is_no_network_is_refused() {
-        let binary = b"Object = ProtoBuffer\n Object = Core\n HeaderStartByte = 65536\n End_Object\nEnd_Object\nEnd\n\0\x01";
-        assert_eq!(parse_network(binary), Err(TieError::Binary));
-        assert_eq!(parse_network(b"A = 1\n"), Err(TieError::NoNetwork));
-        assert!(matches!(parse_network(b"\x00"), Err(TieError::Label(_))));
     }
 
     proptest! {

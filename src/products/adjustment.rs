@@ -60,7 +60,8 @@ const DEFINITIONS: [(&str, &str); 10] = [
         "where tie points say that a footprint of the first image lies in the second, minus where it is projected: \
          lines and samples of the second image, metres on the ground, and distances of successive footprints. Only \
          footprints count that both images show, on a line between those of the tie points; outside are those within the \
-         lines of both images that lie outside one of them",
+         lines of both images that lie outside one of them. above_mola_m: heights at which the rays of these places meet, minus \
+         those of the footprints",
     ),
     (
         "budget",
@@ -209,6 +210,7 @@ struct ProfileDocument<'a> {
     lines: &'a Summary,
     samples: &'a Summary,
     along_m: f64,
+    above_mola_m: &'a Summary,
     #[serde(skip_serializing_if = "Option::is_none")]
     along_spacings: Option<f64>,
     beyond_ties: u32,
@@ -356,6 +358,7 @@ fn pair(pair: &PairComparison) -> PairDocument<'_> {
             lines: &profile.lines,
             samples: &profile.samples,
             along_m: profile.along_m,
+            above_mola_m: &profile.above_m,
             along_spacings: profile.along_spacings,
             beyond_ties: profile.beyond_ties,
         }

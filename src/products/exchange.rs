@@ -1,8 +1,11 @@
 //! Products in the forms of other programs: ISIS, Ames Stereo Pipeline, GIS, catalogues.
 
 pub(super) mod adjusted;
+mod bundleout;
+mod control_network;
 mod gcp;
 pub(super) mod geopackage;
+pub(super) mod jigsaw;
 mod lidar_data;
 mod points;
 pub(super) mod readme;
@@ -10,6 +13,7 @@ pub(super) mod shapefile;
 pub(super) mod stac;
 pub(super) mod tables;
 
+pub use control_network::{ControlNetwork, NetworkMeasure, NetworkPoint, write_control_network};
 pub use gcp::{ControlMeasure, ControlPoint, write_gcp};
 pub use lidar_data::{LidarPoint, moc_serial_number, write_lidar_data};
 pub use points::{GroundEstimate, ImageMeasure};

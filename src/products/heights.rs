@@ -1,6 +1,6 @@
-//! Heights of tie points against the MOLA surface, before and after the adjustment, as Parquet.
+//! Heights of tie points and of footprints that both images of a pair show against MOLA, before and after the adjustment, as Parquet.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use super::{
     GeometricProducts,
@@ -10,15 +10,21 @@ use super::{
     table::{Column, Table, Unit, column, meanings},
 };
 use crate::{
+    frames::{MarsIau2000, Position},
     geom::ellipsoid::Spherical,
-    stages::{adjust::PointKind, check_heights::TieHeight},
+    stages::{
+        adjust::PointKind,
+        check_heights::TieHeight,
+        compare_pairs::{FootprintHeight, PairComparison},
+    },
 };
 
 pub(super) static TABLE: Declaration = Declaration {
     path: "height_check.parquet",
-    what: "heights of tie points against the ground between MOLA's shots, before and after the adjustment",
+    what: "heights of tie points against the ground between MOLA's shots, and of footprints that both images of a pair show, \
+           before and after the adjustment",
     readers: "scripts",
-    rows: "tie points",
+    rows: "tie points and footprints",
     role: Role::Data,
     content: Content::Table(|| meanings(&columns())),
     write: Write::Ties(|path, of, geometric| {
@@ -28,18 +34,53 @@ pub(super) static TABLE: Declaration = Declaration {
     uses: &[],
 };
 
-/// A tie point that is compared before or after the adjustment.
-struct Compared<'a> {
-    id: &'a str,
-    /// Why the adjustment rejected it; empty when it did not.
-    rejected: String,
-    before: Option<&'a TieHeight>,
-    after: Option<&'a TieHeight>,
+/// Heights of one point by the images and by the altimeter.
+#[derive(Clone, Copy)]
+struct Heights {
+    ground: Position<MarsIau2000>,
+    height_m: f64,
+    above_m: f64,
+    surface_sigma_m: Option<f64>,
+    nearest_shot_m: f64,
 }
 
-impl Compared<'_> {
+impl From<&TieHeight> for Heights {
+    fn from(tie: &TieHeight) -> Self {
+        Self {
+            ground: tie.ground,
+            height_m: tie.height_m,
+            above_m: tie.above_m(),
+            surface_sigma_m: Some(tie.surface_sigma_m),
+            nearest_shot_m: tie.nearest_shot_m,
+        }
+    }
+}
+
+impl From<&FootprintHeight> for Heights {
+    fn from(footprint: &FootprintHeight) -> Self {
+        Self {
+            ground: footprint.ground,
+            height_m: footprint.height_m,
+            above_m: footprint.above_m(),
+            surface_sigma_m: None,
+            nearest_shot_m: 0.0,
+        }
+    }
+}
+
+/// A point that is compared before or after the adjustment.
+struct Compared {
+    kind: &'static str,
+    id: String,
+    /// Why the adjustment rejected it; empty when it did not.
+    rejected: String,
+    before: Option<Heights>,
+    after: Option<Heights>,
+}
+
+impl Compared {
     /// The better known of both.
-    fn latest(&self) -> Option<&TieHeight> {
+    fn latest(&self) -> Option<Heights> {
         self.after.or(self.before)
     }
 
@@ -48,9 +89,47 @@ impl Compared<'_> {
     }
 }
 
-fn rows<'a>(geometric: &GeometricProducts<'a>) -> Vec<Compared<'a>> {
-    let by_tie = |ties: &'a [TieHeight]| -> BTreeMap<usize, &'a TieHeight> {
-        ties.iter().map(|height| (height.tie, height)).collect()
+fn rows(geometric: &GeometricProducts) -> Vec<Compared> {
+    let mut rows = ties(geometric);
+    rows.extend(footprints(geometric));
+    rows
+}
+
+/// Footprints by pair, profile and row.
+fn footprints(geometric: &GeometricProducts) -> Vec<Compared> {
+    let all = |pairs: &[PairComparison]| {
+        let mut heights = BTreeMap::new();
+        for (index, pair) in pairs.iter().enumerate() {
+            let profiles = pair.footprints.iter().flat_map(|of| &of.profiles);
+            for profile in profiles {
+                for footprint in &profile.heights {
+                    let id = format!("{}:{}", profile.profile, footprint.row);
+                    heights.insert((index, id), Heights::from(footprint));
+                }
+            }
+        }
+        heights
+    };
+    let before = all(geometric.pairs);
+    let after = geometric.adjustment.as_ref().map(|of| all(of.pairs));
+    let after = after.unwrap_or_default();
+    let both: BTreeSet<_> = before.keys().chain(after.keys()).collect();
+    both.into_iter()
+        .map(|key| Compared {
+            kind: "footprint",
+            id: key.1.clone(),
+            rejected: String::new(),
+            before: before.get(key).copied(),
+            after: after.get(key).copied(),
+        })
+        .collect()
+}
+
+fn ties(geometric: &GeometricProducts) -> Vec<Compared> {
+    let by_tie = |ties: &[TieHeight]| -> BTreeMap<usize, Heights> {
+        ties.iter()
+            .map(|height| (height.tie, Heights::from(height)))
+            .collect()
     };
     let adjusted = geometric.adjustment.as_ref();
     let (before, after) = (
@@ -64,7 +143,8 @@ fn rows<'a>(geometric: &GeometricProducts<'a>) -> Vec<Compared<'a>> {
         .collect();
     let ties = geometric.ties.points.iter().enumerate();
     ties.map(|(index, tie)| Compared {
-        id: &tie.id,
+        kind: "tie",
+        id: tie.id.clone(),
         rejected: rejected.get(&index).cloned().unwrap_or_default(),
         before: before.get(&index).copied(),
         after: after.get(&index).copied(),
@@ -73,13 +153,19 @@ fn rows<'a>(geometric: &GeometricProducts<'a>) -> Vec<Compared<'a>> {
     .collect()
 }
 
-fn columns<'a>() -> Vec<Column<Compared<'a>>> {
+fn columns() -> Vec<Column<Compared>> {
     vec![
+        column(
+            "kind",
+            Unit::None,
+            "tie for a tie point, footprint for a footprint where tie points say that both images of a pair show it",
+            |row: &Compared| row.kind.to_owned(),
+        ),
         column(
             "tie",
             Unit::None,
-            "identifier of the tie point",
-            |row: &Compared| row.id.to_owned(),
+            "identifier of the tie point; profile and row of a footprint",
+            |row: &Compared| row.id.clone(),
         ),
         column(
             "rejected",
@@ -108,8 +194,8 @@ fn columns<'a>() -> Vec<Column<Compared<'a>>> {
         column(
             "surface_sigma_m",
             Unit::Metre,
-            "standard deviation of the MOLA surface there, metres",
-            |row: &Compared| Some(row.latest()?.surface_sigma_m),
+            "standard deviation of the MOLA surface there, metres; missing of footprints, which are its shots",
+            |row: &Compared| row.latest()?.surface_sigma_m,
         ),
         column(
             "height_m",
@@ -120,8 +206,8 @@ fn columns<'a>() -> Vec<Column<Compared<'a>>> {
         column(
             "above_surface_m",
             Unit::Metre,
-            "the same above the MOLA surface, metres",
-            |row: &Compared| Some(row.before?.above_m()),
+            "the same above the MOLA surface, or above the footprint, metres",
+            |row: &Compared| Some(row.before?.above_m),
         ),
         column(
             "adjusted_height_m",
@@ -133,7 +219,7 @@ fn columns<'a>() -> Vec<Column<Compared<'a>>> {
             "adjusted_above_surface_m",
             Unit::Metre,
             "the same above the MOLA surface, metres",
-            |row: &Compared| Some(row.after?.above_m()),
+            |row: &Compared| Some(row.after?.above_m),
         ),
     ]
 }

@@ -9,6 +9,7 @@ mod adjusted_footprints;
 mod adjusted_kernels;
 mod adjustment;
 mod coordinates;
+mod correlations;
 pub(crate) mod error;
 mod exchange;
 mod files;
@@ -41,8 +42,9 @@ pub use adjusted_kernels::{
     AdjustedImage, AdjustedKernels, attitude_kernel, position_kernel, write_adjusted_kernels,
 };
 pub use exchange::{
-    ControlMeasure, ControlPoint, GroundEstimate, ImageMeasure, LidarPoint, moc_serial_number,
-    write_gcp, write_lidar_data,
+    ControlMeasure, ControlNetwork, ControlPoint, GroundEstimate, ImageMeasure, LidarPoint,
+    NetworkMeasure, NetworkPoint, moc_serial_number, write_control_network, write_gcp,
+    write_lidar_data,
 };
 pub use generated::{documentation, schemas};
 pub use net::{NetProducts, write_net_products};

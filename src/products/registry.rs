@@ -1,8 +1,8 @@
 //! All products, in the order in which they are written.
 
 use super::{
-    adjusted_footprints, adjusted_kernels, adjustment,
-    exchange::{adjusted, geopackage, readme, shapefile, stac, tables},
+    adjusted_footprints, adjusted_kernels, adjustment, correlations,
+    exchange::{adjusted, geopackage, jigsaw, readme, shapefile, stac, tables},
     footprints, heights, isd, kernel_report, orientation, page,
     product::Declaration,
     ranges, registration, ties,
@@ -25,6 +25,7 @@ pub(super) static PRODUCTS: &[&Declaration] = &[
     &ties::TABLE,
     &adjusted_footprints::TABLE,
     &heights::TABLE,
+    &correlations::TABLE,
     &adjustment::DOCUMENT,
     &registration::ADJUSTED,
     &orientation::ADJUSTED_TABLE,
@@ -47,6 +48,10 @@ pub(super) static PRODUCTS: &[&Declaration] = &[
     &shapefile::ENCODING,
     &adjusted::LIDAR,
     &adjusted::CONTROL,
+    &jigsaw::NETWORK,
+    &jigsaw::RESIDUALS,
+    &jigsaw::POINTS,
+    &jigsaw::IMAGES,
     &kernel_report::KERNELS,
     &readme::README,
     &stac::ITEM,

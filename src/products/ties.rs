@@ -3,6 +3,8 @@
 
 use std::collections::BTreeMap;
 
+use nalgebra::Matrix3;
+
 use super::{
     GeometricProducts, SiteProducts,
     coordinates::degrees,
@@ -38,6 +40,7 @@ struct Measurement<'a> {
     image: &'a str,
     line: f64,
     sample: f64,
+    sigma_px: Option<[f64; 2]>,
     /// Empty for a tie point that took part in the adjustment, else why not.
     rejected: String,
     before: Option<(&'a IntersectedPoint, &'a MeasureResidual)>,
@@ -94,6 +97,7 @@ fn measurements<'a>(
                 image: &site.images[measure.image].times.id,
                 line: measure.line,
                 sample: measure.sample,
+                sigma_px: measure.sigma_px,
                 rejected,
                 before: seen(before),
                 after: seen(after),
@@ -152,6 +156,18 @@ fn measured_columns<'a>() -> Vec<Column<Measurement<'a>>> {
             Unit::Pixel,
             "measured sample, 0 at the outer edge of the first pixel, 0.5 at its centre",
             |row: &Measurement| row.sample,
+        ),
+        column(
+            "sigma_line",
+            Unit::Line,
+            "standard deviation of the measured line, where its file has its own",
+            |row: &Measurement| Some(row.sigma_px?[0]),
+        ),
+        column(
+            "sigma_sample",
+            Unit::Pixel,
+            "the same of the sample",
+            |row: &Measurement| Some(row.sigma_px?[1]),
         ),
         column(
             "rejected",
@@ -277,6 +293,24 @@ fn adjusted_point_columns<'a>() -> Vec<Column<Measurement<'a>>> {
             "the same of the height, metres",
             |row: &Measurement| Some(local_sigmas_m(row.adjusted?.0)[2]),
         ),
+        column(
+            "correlation_east_north",
+            Unit::None,
+            "correlation of the adjusted point's errors towards east and north, -1 to 1",
+            |row: &Measurement| Some(local_correlation(row.adjusted?.0, 0, 1)),
+        ),
+        column(
+            "correlation_east_up",
+            Unit::None,
+            "the same towards east and up",
+            |row: &Measurement| Some(local_correlation(row.adjusted?.0, 0, 2)),
+        ),
+        column(
+            "correlation_north_up",
+            Unit::None,
+            "the same towards north and up",
+            |row: &Measurement| Some(local_correlation(row.adjusted?.0, 1, 2)),
+        ),
     ]
 }
 
@@ -337,11 +371,22 @@ fn spherical(point: &CorrectedPoint) -> Spherical {
     Spherical::from_xyz_m(&point.ground.xyz_m)
 }
 
+/// Covariance of errors towards east, north and up, m².
+fn local_covariance_m2(point: &CorrectedPoint) -> Matrix3<f64> {
+    let to_local = local_axes(&point.ground.xyz_m);
+    to_local * point.covariance_m2 * to_local.transpose()
+}
+
 /// Standard deviations towards east, north and up, metres.
 fn local_sigmas_m(point: &CorrectedPoint) -> [f64; 3] {
-    let to_local = local_axes(&point.ground.xyz_m);
-    let local_m2 = to_local * point.covariance_m2 * to_local.transpose();
+    let local_m2 = local_covariance_m2(point);
     [0, 1, 2].map(|axis| local_m2[(axis, axis)].sqrt())
+}
+
+/// Correlation of errors along two of these axes.
+fn local_correlation(point: &CorrectedPoint, axis: usize, other: usize) -> f64 {
+    let local_m2 = local_covariance_m2(point);
+    local_m2[(axis, other)] / (local_m2[(axis, axis)] * local_m2[(other, other)]).sqrt()
 }
 
 fn sigma_m(point: &CorrectedPoint, axis: usize) -> f64 {

@@ -215,12 +215,14 @@ fn ground_sigmas(summary: &AdjustmentSummary) -> String {
 /// A kind of observation in words.
 const fn kind(of: ObservationType) -> &'static str {
     match of {
-        ObservationType::TieImage => "image coordinates of tie points",
+        ObservationType::TieAlong => "tie points in images, along the track",
+        ObservationType::TieAcross => "tie points in images, across the track",
         ObservationType::MolaHeight => "heights by the MOLA surface",
         ObservationType::MolaImage => "image coordinates of MOLA",
         ObservationType::MolaRange => "MOLA ranges",
         ObservationType::Orientation => "initial orientation",
         ObservationType::MolaGround => "ground coordinates of MOLA",
+        ObservationType::TieGround => "given coordinates of tie points",
         ObservationType::Bias => "time and range biases",
     }
 }
@@ -235,6 +237,7 @@ fn observations(summary: &AdjustmentSummary) -> String {
             Column::Number("per observation"),
             Column::Number("vᵀPv"),
             Column::Number("variance component"),
+            Column::Number("by chance"),
             Column::Number("beyond 3.29"),
         ],
     );
@@ -242,6 +245,12 @@ fn observations(summary: &AdjustmentSummary) -> String {
         let each = 100.0 * of.redundancy / of.observations.max(1) as f64;
         let component = if of.redundancy > 0.0 {
             label(of.variance_component, 3)
+        } else {
+            "–".to_owned()
+        };
+        let limits = of.variance_component_limits;
+        let by_chance = if limits[1] > 0.0 {
+            format!("{} to {}", label(limits[0], 2), label(limits[1], 2))
         } else {
             "–".to_owned()
         };
@@ -254,13 +263,15 @@ fn observations(summary: &AdjustmentSummary) -> String {
                 format!("{} %", label(each, 1)).into(),
                 label(of.weighted_squares, 2).into(),
                 component.into(),
+                by_chance.into(),
                 of.beyond_limit.to_string().into(),
             ],
         );
     }
     let words = format!(
         "The variance component is the standard deviation of unit weight of one kind, √(vᵀPv / redundancy): near 1 where \
-         the a priori standard deviations are right, below 1 where they are too large. Beyond {BAARDA_LIMIT}: \
+         the a priori standard deviations are right, below 1 where they are too large; 99 of 100 lie \
+         within the limits of χ² by chance. Robust weights keep heights below theirs. Beyond {BAARDA_LIMIT}: \
          observations that fail Baarda's test; one good one in a thousand does."
     );
     table.finish() + &paragraph(&words)

@@ -37,6 +37,7 @@ fn write(site: &SiteProducts, geometric: &GeometricProducts) -> Result<String> {
         html += &heading("Heights against the MOLA surface");
         html += &paragraph(&surface_in_words(surface));
         html += &compared(geometric);
+        html += &footprints(geometric);
         html += &paragraph(&apart(geometric.heights));
         html += &format!(
             "<div class=\"plots\">\n{}</div>\n",
@@ -115,7 +116,7 @@ fn statements(geometric: &GeometricProducts, adjustment: &AdjustmentProducts) ->
         ],
         [
             "absolute, height".to_owned(),
-            "a priori: what is known of orbit and attitude".to_owned(),
+            format!("a priori: what is known of {}", known_beforehand(geometric)),
             height,
             "standard deviation of what all tie points share, and of single ones".to_owned(),
         ],
@@ -123,13 +124,25 @@ fn statements(geometric: &GeometricProducts, adjustment: &AdjustmentProducts) ->
             "absolute, place".to_owned(),
             "as after it".to_owned(),
             place,
-            "a priori, not measured: by what is known of orbit and attitude".to_owned(),
+            format!(
+                "a priori, not measured by images: by what is known of {}",
+                known_beforehand(geometric)
+            ),
         ],
     ];
     for cells in statements {
         table.row(true, cells.map(Cell::from));
     }
     table.finish()
+}
+
+/// What says where a site lies before the images do.
+pub(super) fn known_beforehand(geometric: &GeometricProducts) -> &'static str {
+    if geometric.ties.points.iter().any(|tie| tie.known.is_some()) {
+        "orbit, attitude and given ground points"
+    } else {
+        "orbit and attitude"
+    }
 }
 
 fn agreement(check: &HeightCheck) -> String {
@@ -253,6 +266,49 @@ fn compared(geometric: &GeometricProducts) -> String {
         );
     }
     table.finish()
+}
+
+/// Heights of footprints that both images of a pair show.
+fn footprints(geometric: &GeometricProducts) -> String {
+    let mut table = Table::new(
+        "Heights of footprints by the images that show them, above MOLA, metres",
+        &[
+            Column::Text("adjustment"),
+            Column::Text("pair"),
+            Column::Text("profile"),
+            Column::Number("footprints"),
+            Column::Number("median"),
+            Column::Number("1.48 MAD"),
+        ],
+    );
+    let after = geometric.adjustment.iter().map(|of| ("after", of.pairs));
+    let mut rows = 0;
+    for (state, pairs) in [("before", geometric.pairs)].into_iter().chain(after) {
+        for pair in pairs {
+            for profile in pair.footprints.iter().flat_map(|of| &of.profiles) {
+                let above_m = &profile.above_m;
+                rows += 1;
+                table.row(
+                    true,
+                    [
+                        state.into(),
+                        pair.images.join(" and ").into(),
+                        profile.profile.clone().into(),
+                        above_m.n.to_string().into(),
+                        label(above_m.median, 1).into(),
+                        label(above_m.nmad, 1).into(),
+                    ],
+                );
+            }
+        }
+    }
+    if rows == 0 {
+        return String::new();
+    }
+    let words = "Of a footprint only the altimeter knows the height; where the second image shows it is what a surface of second \
+         order at most through the tie points says. Relief between tie points therefore spreads single heights; their median \
+         tells what the images have in common.";
+    table.finish() + &paragraph(words)
 }
 
 fn apart(check: &HeightCheck) -> String {

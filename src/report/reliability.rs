@@ -2,6 +2,7 @@
 //! residual shows, unknowns that cannot be separated, and rejected points.
 
 use super::{
+    heights::known_beforehand,
     html::{Cell, Column, Table, counted, paragraph},
     misregistration::BeforeAfter,
     plots::label,
@@ -51,9 +52,10 @@ pub(super) fn absolute(geometric: &GeometricProducts, adjustment: &AdjustmentPro
         Some(heights) => {
             let [east_m, north_m, up_m] = heights.mean_sigma_m;
             format!(
-                "heights are those of MOLA, to {} m on average; the place is what was known of orbit and attitude beforehand, \
+                "heights are those of MOLA, to {} m on average; the place is what was known of {} beforehand, \
                  to {} m east and {} m north",
                 label(up_m, 1),
+                known_beforehand(geometric),
                 label(east_m, 0),
                 label(north_m, 0)
             )
@@ -63,7 +65,10 @@ pub(super) fn absolute(geometric: &GeometricProducts, adjustment: &AdjustmentPro
              orientation that is adjusted"
                 .to_owned()
         }
-        None => "heights and place are what was known of orbit and attitude beforehand".to_owned(),
+        None => format!(
+            "heights and place are what was known of {} beforehand",
+            known_beforehand(geometric)
+        ),
     };
     format!(
         "{relative}The tie points moved by {moved} m in X, Y, Z on average. {registration}; {determined}."

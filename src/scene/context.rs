@@ -337,9 +337,11 @@ pub(super) fn context_ties(
             image: image.plan.id.to_owned(),
             line: line + NOISE_PX * random.normal(),
             sample: sample + NOISE_PX * random.normal(),
+            sigma_px: None,
         };
         ties.push(TiePoint {
             id: format!("tie-{:03}", ties.len() + 1),
+            known: None,
             measures: vec![measured(first, [line, sample]), measured(second, other)],
         });
         if ties.len() == count {

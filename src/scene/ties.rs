@@ -128,6 +128,7 @@ impl<'a> TrueImage<'a> {
             image: self.oriented_camera.id.clone(),
             line: seen.x + 0.5 * self.oriented_camera.lines,
             sample: self.oriented_camera.detector.sample(y_px),
+            sigma_px: None,
         };
         let [line_end, sample_end] = self.extent_px();
         let inside = (EDGE_PX..line_end).contains(&measure.line)
@@ -287,7 +288,15 @@ fn spoil(
             ground_iau2000_m: tie.ground_m.into(),
             blunder,
         };
-        (TiePoint { id, measures }, truth)
+        let known = None;
+        (
+            TiePoint {
+                id,
+                known,
+                measures,
+            },
+            truth,
+        )
     });
     spoilt.unzip()
 }

@@ -1,6 +1,8 @@
 //! What every pair of images says of itself: how it sees, how far footprints and tie points disagree in it, and
 //! how uncertain that makes ground points.
 
+mod footprint_heights;
+
 use std::{collections::BTreeMap, sync::atomic::AtomicBool};
 
 use serde::{Deserialize, Serialize};
@@ -29,6 +31,9 @@ use crate::{
     stage_inputs,
     ties::TiePoint,
 };
+
+pub use footprint_heights::FootprintHeight;
+use footprint_heights::footprint_heights;
 
 /// A pair of images with tie points in both.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -92,6 +97,10 @@ pub struct ProfileByTies {
     pub along_spacings: Option<f64>,
     /// Footprints beyond the tie points.
     pub beyond_ties: u32,
+    /// Heights of the others by the rays that tie points say to be theirs.
+    pub heights: Vec<FootprintHeight>,
+    /// These above the altimeter's, metres.
+    pub above_m: Summary,
 }
 
 /// Pairs with fewer tie points are not compared.
@@ -119,7 +128,7 @@ stage_inputs! {
 
 impl Stage for ComparePairs<'_> {
     const NAME: &'static str = "compare_pairs";
-    const METHOD: u32 = 2;
+    const METHOD: u32 = 3;
     type Output = Vec<PairComparison>;
     stage_inputs!(fingerprint);
 
@@ -174,9 +183,10 @@ pub fn compare_pairs<M: ExteriorOrientation>(
             }
             let line_spacing_m = shared.line_spacing_m(images);
             let by_ties = footprints_by_ties(
-                pair.map(|index| registrations[index]),
+                pair.map(|index| (&images[index], registrations[index])),
                 pair,
                 ties,
+                footprints,
                 (profiles, &spacings),
                 line_spacing_m[1],
             );
@@ -289,38 +299,43 @@ impl<'a> Shared<'a> {
     }
 }
 
-fn footprints_by_ties(
-    registrations: [&ImageRegistration; 2],
+fn footprints_by_ties<M: ExteriorOrientation>(
+    images: [(&OrientedCamera<M>, &ImageRegistration); 2],
     pair: [usize; 2],
     ties: &[TiePoint],
+    footprints: &Footprints<MarsIau2000>,
     (profiles, spacings): (&[Profile], &[Option<f64>]),
     line_spacing_m: f64,
 ) -> Option<FootprintsByTies> {
     let pairs: Vec<Pair> = ties.iter().filter_map(|tie| tie_pair(tie, pair)).collect();
     let fit = ImageToImage::through(&pairs)?;
-    let places = registrations.map(places);
+    let places = images.map(|(_, registration)| places(registration));
     let mut compared = Vec::new();
     let mut outside = 0;
     for ((index, profile), spacing_m) in (0_u32..).zip(profiles).zip(spacings) {
         let in_both = profile.rows.iter().filter_map(|row| {
             let shot = (index, *row);
-            Some([places[0].get(&shot)?, places[1].get(&shot)?])
+            Some((*row, [places[0].get(&shot)?, places[1].get(&shot)?]))
         });
-        let (shown, not_shown): (Vec<[&Place; 2]>, Vec<_>) =
-            in_both.partition(|both| both.iter().all(|place| place.inside));
+        let (shown, not_shown): (Vec<(u32, [&Place; 2])>, Vec<_>) =
+            in_both.partition(|(_, both)| both.iter().all(|place| place.inside));
         outside += not_shown.len();
-        let shown: Vec<Pair> = shown
+        let pairs: Vec<Pair> = shown
             .iter()
-            .map(|[first, second]| Pair {
+            .map(|(_, [first, second])| Pair {
                 first: first.at,
                 second: second.at,
             })
             .collect();
-        let found = fit.misregistration(&shown);
+        let found = fit.misregistration(&pairs);
         if found.lines.n == 0 {
             continue;
         }
         let along_m = found.lines.mean * line_spacing_m;
+        let rows: Vec<_> = shown.iter().map(|(row, both)| (*row, both[0].at)).collect();
+        let cameras = images.map(|(camera, _)| camera);
+        let heights = footprint_heights(cameras, &fit, &rows, footprints);
+        let above_m: Vec<f64> = heights.iter().map(FootprintHeight::above_m).collect();
         compared.push(ProfileByTies {
             profile: profile.id.clone(),
             lines: found.lines,
@@ -328,6 +343,8 @@ fn footprints_by_ties(
             along_m,
             along_spacings: spacing_m.map(|spacing_m| along_m / spacing_m),
             beyond_ties: u32::try_from(found.beyond_ties).unwrap_or(u32::MAX),
+            heights,
+            above_m: Summary::of(&above_m),
         });
     }
     let count = |count: usize| u32::try_from(count).unwrap_or(u32::MAX);

@@ -119,7 +119,7 @@ impl Input for ImageNames<'_> {
 
 impl Stage for ReadTies<'_> {
     const NAME: &'static str = "read_ties";
-    const METHOD: u32 = 2;
+    const METHOD: u32 = 3;
     const CHECKED: bool = true;
     type Output = Ties;
     stage_inputs!(fingerprint);
@@ -223,6 +223,7 @@ impl Ties {
                 .all(|new| !images().any(|image| *image == new.image))
         };
         if let Some(known) = known.filter(joins) {
+            known.known = known.known.or(tie.known);
             known.measures.extend(tie.measures);
         } else {
             first.entry(tie.id.clone()).or_insert(self.points.len());
@@ -240,6 +241,18 @@ impl Ties {
             notes.push(format!(
                 "tie points: {elsewhere} measurements in {} images that the site does not have",
                 self.elsewhere.len()
+            ));
+        }
+        let known: Vec<bool> = self
+            .points
+            .iter()
+            .filter_map(|tie| Some(tie.known?.covariance_m2.is_none()))
+            .collect();
+        if !known.is_empty() {
+            notes.push(format!(
+                "tie points: {} have known ground coordinates, {} of them held fixed",
+                known.len(),
+                known.iter().filter(|fixed| **fixed).count()
             ));
         }
         if self.ignored > 0 {

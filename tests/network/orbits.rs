@@ -6,7 +6,7 @@
 )]
 
 use areograph::geom::{
-    bundle::{BundleImage, BundlePoint, Network, Range, View},
+    bundle::{BundleImage, BundlePoint, KnownCoordinates, Network, Range, View},
     intersection::{IntersectionLimits, intersect},
     pushbroom::{
         CorrectedOrientation, Distortion, ExteriorOrientation, OrientationCorrection, Pose,
@@ -190,7 +190,7 @@ impl Orbits {
             }
             network.points.push(BundlePoint {
                 ground_m: start.ground_m,
-                sigma_m: None,
+                known: None,
             });
             return;
         }
@@ -223,7 +223,7 @@ fn shoot(
         });
         network.points.push(BundlePoint {
             ground_m: point_m + normals.vector() * 10.0,
-            sigma_m: Some(Vector3::repeat(10.0)),
+            known: Some(KnownCoordinates::of_sigmas(Vector3::repeat(10.0))),
         });
     }
     network.range_bias_sigmas_m.push(0.0);

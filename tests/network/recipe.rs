@@ -6,7 +6,7 @@
 )]
 
 use areograph::geom::{
-    bundle::{BundleImage, BundlePoint, Network, Range, View},
+    bundle::{BundleImage, BundlePoint, KnownCoordinates, Network, Range, View},
     intersection::{IntersectionLimits, Ray, intersect},
     pushbroom::{
         CorrectedOrientation, Distortion, EulerPolynomial, ExteriorOrientation,
@@ -298,7 +298,7 @@ impl Recipe {
                 });
                 network.points.push(BundlePoint {
                     ground_m: point_m + normals.vector() * self.ground_noise_m,
-                    sigma_m: Some(Vector3::repeat(10.0)),
+                    known: Some(KnownCoordinates::of_sigmas(Vector3::repeat(10.0))),
                 });
                 points_m.push(point_m);
             }
@@ -381,7 +381,7 @@ impl Recipe {
             }
             network.points.push(BundlePoint {
                 ground_m: start.ground_m,
-                sigma_m: None,
+                known: None,
             });
             points_m.push(point_m);
         }

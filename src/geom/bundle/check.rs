@@ -34,8 +34,8 @@ pub(super) fn check<M: ExteriorOrientation>(network: &Network<M>) -> Result<(), 
         let part = Part::Point(index);
         for axis in 0..3 {
             finite(part, "initial coordinate", point.ground_m[axis])?;
-            if let Some(sigma_m) = point.sigma_m {
-                positive(part, "standard deviation", sigma_m[axis])?;
+            if let Some(known) = &point.known {
+                positive(part, "standard deviation", known.sigma_m[axis])?;
             }
         }
     }

@@ -189,14 +189,13 @@ impl<'a, M: ExteriorOrientation> Layout<'a, M> {
                 rows.set_last(column, 1.0 / row.sigma);
             }
         }
-        if let Some(sigma_m) = self.network.points[point].sigma_m {
+        if let Some(known) = &self.network.points[point].known {
             let from_initial_m = self.network.points[point].ground_m - state.points_m[point];
-            for axis in 0..3 {
-                let misclosure = from_initial_m[axis] / sigma_m[axis];
-                let mut by_point = Vector3::zeros();
-                by_point[axis] = 1.0 / sigma_m[axis];
+            for (axis, sigma_m) in known.axes.row_iter().zip(&known.sigma_m) {
+                let by_point: Vector3<f64> = axis.transpose() / *sigma_m;
+                let misclosure = by_point.dot(&from_initial_m);
                 rows.cost += misclosure * misclosure;
-                rows.push(by_point, misclosure, (sigma_m[axis], 1.0));
+                rows.push(by_point, misclosure, (*sigma_m, 1.0));
             }
         }
         Ok(())

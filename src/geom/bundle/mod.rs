@@ -63,7 +63,7 @@
 //! }
 //! for point in 0..5_u32 {
 //!     let ground_m = Vector3::new(3_396e3, 300.0 * f64::from(point), 1_500.0 * (f64::from(point) - 2.0));
-//!     network.points.push(BundlePoint { ground_m, sigma_m: None });
+//!     network.points.push(BundlePoint { ground_m, known: None });
 //!     for (image, camera) in truth.iter().enumerate() {
 //!         let seen = Sighting::near(camera, &Distortion::default(), 0.0, &ground_m, 1e-3)?.solution;
 //!         network.views.push(View {
@@ -89,6 +89,7 @@ mod error;
 mod factor;
 mod groups;
 mod heights;
+mod known;
 mod layout;
 mod point_rows;
 mod quality;
@@ -107,6 +108,7 @@ mod tests;
 use nalgebra::{DMatrix, Matrix3, Vector2, Vector3};
 
 pub use error::BundleError;
+pub use known::KnownCoordinates;
 pub use solve::solve;
 pub use unknowns::Unknown;
 
@@ -145,8 +147,8 @@ pub struct BundleImage<M> {
 pub struct BundlePoint {
     /// Initial coordinates, Mars-fixed, metres.
     pub ground_m: Vector3<f64>,
-    /// Standard deviation of each initial coordinate when they are observations, metres.
-    pub sigma_m: Option<Vector3<f64>>,
+    /// How well they are known beforehand, when they are observations.
+    pub known: Option<KnownCoordinates>,
 }
 
 /// A point measured in an image.
@@ -327,7 +329,7 @@ pub struct AdjustedPoint {
     pub ground_m: Vector3<f64>,
     /// Cofactors, m²; times σ0² the covariance.
     pub cofactor_m2: Matrix3<f64>,
-    /// Residuals of the initial coordinates when they were observed.
+    /// Residuals of the initial coordinates along their principal axes, when they were observed.
     pub priors: Option<[Residual; 3]>,
 }
 

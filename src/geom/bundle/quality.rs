@@ -236,7 +236,7 @@ fn judge_point<M: ExteriorOrientation>(
         })
         .collect();
     let priors = layout.network.points[point]
-        .sigma_m
+        .known
         .and_then(|_| residuals.last_chunk::<3>().copied());
     Some(Judged {
         point: AdjustedPoint {

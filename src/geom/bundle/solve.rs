@@ -107,7 +107,7 @@ fn count<M: ExteriorOrientation>(layout: &Layout<'_, M>, active: &[usize]) -> (u
         .map(|point| {
             2 * layout.views.of_key(*point).len()
                 + layout.ranges.of_key(*point).len()
-                + 3 * usize::from(layout.network.points[*point].sigma_m.is_some())
+                + 3 * usize::from(layout.network.points[*point].known.is_some())
         })
         .sum();
     let weighted = layout

@@ -3,7 +3,8 @@
 use nalgebra::{DMatrix, DVector, Vector2, Vector3};
 
 use super::{
-    BundleImage, BundleOptions, BundlePoint, Network, ORIENTATION_UNKNOWNS, Range, View,
+    BundleImage, BundleOptions, BundlePoint, KnownCoordinates, Network, ORIENTATION_UNKNOWNS,
+    Range, View,
     factor::Factor,
     groups::PointGroups,
     layout::{Layout, Linearised},
@@ -65,7 +66,7 @@ pub(super) fn network() -> Network<EulerPolynomial> {
         let mola = index < 4;
         network.points.push(BundlePoint {
             ground_m,
-            sigma_m: mola.then(|| Vector3::new(10.0, 12.0, 14.0)),
+            known: mola.then(|| KnownCoordinates::of_sigmas(Vector3::new(10.0, 12.0, 14.0))),
         });
         for (number, image) in images.iter().enumerate() {
             if number == 2 && index != 8 {
@@ -273,7 +274,7 @@ fn chain() -> Network<EulerPolynomial> {
             }
             network.points.push(BundlePoint {
                 ground_m: *ground_m,
-                sigma_m: None,
+                known: None,
             });
         }
     }

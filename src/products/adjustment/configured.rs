@@ -4,7 +4,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::{
-    config::{AdjustmentConfig, OrientationPrior},
+    config::{AdjustmentConfig, OrientationPrior, PositionUnknowns, RotationUnknowns},
     footprints::{AdjustmentModel, FootprintImageCoordinates},
     geom::robust::RobustWeight,
     schema::{all_positive, none_negative},
@@ -35,6 +35,8 @@ pub(super) struct AdjustmentKeys<'a> {
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(transform = none_negative)]
     rotation_sigma_rad: Option<[f64; 3]>,
+    position_unknowns: PositionUnknowns,
+    rotation_unknowns: RotationUnknowns,
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 0.0))]
     position_sigma_nadir_m: Option<f64>,
@@ -61,6 +63,10 @@ struct PriorKeys<'a> {
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(transform = none_negative)]
     rotation_rad: Option<[f64; 9]>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    position_unknowns: Option<PositionUnknowns>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    rotation_unknowns: Option<RotationUnknowns>,
 }
 
 impl<'a> AdjustmentKeys<'a> {
@@ -73,6 +79,8 @@ impl<'a> AdjustmentKeys<'a> {
             id: &prior.id,
             position_m: prior.position_m.map(|sigmas| sigmas.map(number)),
             rotation_rad: prior.rotation_rad.map(|sigmas| sigmas.map(number)),
+            position_unknowns: prior.position_unknowns,
+            rotation_unknowns: prior.rotation_unknowns,
         };
         Self {
             tie_sigma_px: config.tie_sigma_px,
@@ -86,6 +94,8 @@ impl<'a> AdjustmentKeys<'a> {
             time_bias_sigma_s: config.time_bias_sigma_s,
             position_sigma_m: is_of_surface.then(|| config.position_sigma_m.map(number)),
             rotation_sigma_rad: is_of_surface.then(|| config.rotation_sigma_rad.map(number)),
+            position_unknowns: config.position_unknowns,
+            rotation_unknowns: config.rotation_unknowns,
             position_sigma_nadir_m: published_m.map(|[nadir_m, _]| nadir_m),
             position_sigma_off_nadir_m: published_m.map(|[_, other_m]| other_m),
             robust: config.robust.as_ref(),

@@ -67,7 +67,7 @@ pub(in crate::products) static CONTROL: Declaration = Declaration {
 };
 
 /// The serial number that ISIS has for an image: as configured, else as ISIS composes it.
-fn isis_name(site: &SiteProducts, image: &ImageProducts) -> String {
+pub(super) fn isis_name(site: &SiteProducts, image: &ImageProducts) -> String {
     let id = &image.times.id;
     let configured = site.config.images.iter().find(|image| image.id == *id);
     let configured = configured.and_then(|image| image.serial_number.clone());
@@ -83,7 +83,7 @@ fn estimate(position: Position<MarsIau2000>, covariance_m2: Matrix3<f64>) -> Gro
     }
 }
 
-fn adjusted(point: &CorrectedPoint) -> GroundEstimate {
+pub(super) fn adjusted(point: &CorrectedPoint) -> GroundEstimate {
     estimate(point.ground, point.covariance_m2)
 }
 
@@ -165,10 +165,13 @@ fn control_points<'a>(
                     line: measure.line,
                     sample: measure.sample,
                 },
-                sigma_px: [
-                    across_px,
-                    along_px / focal_px_per_line(adjustment, measure.image),
-                ],
+                sigma_px: measure.sigma_px.map_or_else(
+                    || {
+                        let per_line = focal_px_per_line(adjustment, measure.image);
+                        [across_px, along_px / per_line]
+                    },
+                    |[line_px, sample_px]| [sample_px, line_px],
+                ),
             })
         });
         Some(ControlPoint {
@@ -181,7 +184,7 @@ fn control_points<'a>(
 }
 
 /// How many focal-plane pixels a line is, from the pairs of the image.
-fn focal_px_per_line(adjustment: &AdjustmentProducts, image: usize) -> f64 {
+pub(super) fn focal_px_per_line(adjustment: &AdjustmentProducts, image: usize) -> f64 {
     let id = &adjustment.images[image].times.id;
     let mut pairs = adjustment.pairs.iter().filter_map(|pair| {
         let at = pair.images.iter().position(|of| of == id)?;

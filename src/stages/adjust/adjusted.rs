@@ -1,6 +1,7 @@
 //! The result of an adjustment, for reports, tables and storage.
 
-use nalgebra::Matrix3;
+use nalgebra::{DMatrix, Matrix3, Vector3};
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::{
@@ -13,8 +14,9 @@ use super::{
 use crate::{
     frames::{MarsIau2000, Position},
     geom::{
-        bundle::{Adjustment, ORIENTATION_UNKNOWNS, Residual},
-        pushbroom::OrientationCorrection,
+        bundle::{Adjustment, ORIENTATION_UNKNOWNS, Residual, View},
+        pushbroom::{CorrectedOrientation, ExteriorOrientation, OrientationCorrection, Sighting},
+        statistics::BAARDA_LIMIT,
     },
 };
 
@@ -49,6 +51,8 @@ pub struct CorrectedImage {
     pub correction: [f64; ORIENTATION_UNKNOWNS],
     /// Their standard deviations; 0 where held fixed.
     pub sigmas: [f64; ORIENTATION_UNKNOWNS],
+    /// Their covariance; rows and columns of unknowns that are held fixed are 0.
+    pub covariance: DMatrix<f64>,
     /// What they were expected to be within, standard deviations; 0 where held fixed, infinite where free.
     pub prior_sigmas: [f64; ORIENTATION_UNKNOWNS],
     /// Bias of the line times with its standard deviation, seconds, where it is unknown.
@@ -72,7 +76,8 @@ pub struct CorrectedPoint {
     pub initial: Position<MarsIau2000>,
     /// Where it is adjusted.
     pub ground: Position<MarsIau2000>,
-    /// Covariance of the adjusted coordinates, m²: a priori variances times the summary's variance factor.
+    /// Covariance of the adjusted coordinates, m²: a priori variances times the summary's variance factor; of a tie point
+    /// that fails the test against the surface and yet was kept, its distance from that too.
     pub covariance_m2: Matrix3<f64>,
 }
 
@@ -104,6 +109,10 @@ pub struct ImageResidual {
     pub along_px: ScalarResidual,
     /// Across the track, focal-plane pixels.
     pub across_px: ScalarResidual,
+    /// Standard deviations of the measurement along and across the track, focal-plane pixels.
+    pub sigma_px: [f64; 2],
+    /// Measured minus adjusted line and sample, lines and pixels of the image.
+    pub in_image_px: [f64; 2],
 }
 
 /// A range.
@@ -146,12 +155,13 @@ impl From<Residual> for ScalarResidual {
 }
 
 /// Puts the result together; points without adjusted coordinates are left to `rejected`.
-pub(super) fn collect<M>(
+pub(super) fn collect<M: ExteriorOrientation>(
     images: &[AdjustImage<M>],
     assembled: Assembled<&M>,
     adjustment: Adjustment,
     summary: AdjustmentSummary,
 ) -> Adjusted {
+    let contradicted_m2 = contradicted_m2(&adjustment);
     let mut index_of = vec![None; assembled.points.len()];
     let mut points = Vec::with_capacity(assembled.points.len());
     let variance = summary.variance_factor;
@@ -164,10 +174,10 @@ pub(super) fn collect<M>(
             id: assembled.points[point].name.clone(),
             initial: Position::new(assembled.network.points[point].ground_m),
             ground: Position::new(found.ground_m),
-            covariance_m2: found.cofactor_m2 * variance,
+            covariance_m2: found.cofactor_m2 * variance + contradicted_m2[point],
         });
     }
-    let views = assembled.network.views.iter().zip(&adjustment.views);
+    let views = assembled.network.views.par_iter().zip(&adjustment.views);
     let ranges = assembled.network.ranges.iter().zip(&adjustment.ranges);
     Adjusted {
         heights: height_summary::heights(&assembled, &adjustment),
@@ -175,6 +185,8 @@ pub(super) fn collect<M>(
         views: views
             .filter_map(|(view, residuals)| {
                 let [along, across] = (*residuals)?;
+                let ground_m = &adjustment.points[view.point].as_ref().ok()?.ground_m;
+                let correction = &adjustment.images[view.image].correction;
                 Some(ImageResidual {
                     point: index_of[view.point]?,
                     image: view.image,
@@ -183,6 +195,8 @@ pub(super) fn collect<M>(
                     y_px: view.y_px,
                     along_px: along.into(),
                     across_px: across.into(),
+                    sigma_px: view.sigma_px.into(),
+                    in_image_px: in_image_px(&images[view.image], correction, view, ground_m)?,
                 })
             })
             .collect(),
@@ -204,6 +218,54 @@ pub(super) fn collect<M>(
     }
 }
 
+/// Measured minus adjusted line and sample of a view of `ground_m`.
+fn in_image_px<M: ExteriorOrientation>(
+    image: &AdjustImage<M>,
+    correction: &OrientationCorrection,
+    view: &View,
+    ground_m: &Vector3<f64>,
+) -> Option<[f64; 2]> {
+    let camera = &image.oriented_camera;
+    let orientation = CorrectedOrientation {
+        base: &camera.orientation,
+        correction: *correction,
+    };
+    let detector = &camera.detector;
+    let distortion = &detector.distortion;
+    let seen = Sighting::near(
+        &orientation,
+        distortion,
+        view.x_lines,
+        ground_m,
+        LAST_STEP_LINES,
+    );
+    let seen = seen.ok()?.solution;
+    let focal_px = detector.focal_px(&seen.camera_m).ok()?;
+    Some([
+        view.x_lines - seen.x,
+        detector.sample(view.y_px) - detector.sample(focal_px.y),
+    ])
+}
+
+/// What the heights of points that fail the test against the surface are uncertain by besides, m².
+///
+/// These are points that stand out, but not enough for blunders, or for which a neighbour vouches: ground between the
+/// profiles, or measurements that err alike. Nothing tells which of image and altimeter is right of them.
+fn contradicted_m2(adjustment: &Adjustment) -> Vec<Matrix3<f64>> {
+    let mut added_m2 = vec![Matrix3::zeros(); adjustment.points.len()];
+    for height in &adjustment.compared {
+        let stands_out = height.above_m.abs() > BAARDA_LIMIT * height.sigma_m();
+        if let (true, Ok(point)) = (stands_out, &adjustment.points[height.point]) {
+            let up_m = point.ground_m.normalize() * height.above_m;
+            added_m2[height.point] = up_m * up_m.transpose();
+        }
+    }
+    added_m2
+}
+
+/// A step below this many lines finds the line of a view to 1e-7 lines.
+const LAST_STEP_LINES: f64 = 1e-3;
+
 fn corrected_images<M>(
     images: &[AdjustImage<M>],
     adjustment: &Adjustment,
@@ -218,6 +280,7 @@ fn corrected_images<M>(
             sigmas: std::array::from_fn(|unknown| {
                 root * adjusted.cofactors[(unknown, unknown)].sqrt()
             }),
+            covariance: &adjusted.cofactors * variance_factor,
             prior_sigmas: image.sigmas,
             time_bias_s: adjusted
                 .time_bias_s

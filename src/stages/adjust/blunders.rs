@@ -103,6 +103,7 @@ impl<M> Assembled<M> {
         let mut is_rejected = vec![false; self.points.len()];
         for (point, reason) in rejected {
             is_rejected[point] = true;
+            self.network.points[point].known = None;
             self.rejected.push(RejectedPoint {
                 kind: PointKind::Tie,
                 index: self.points[point].index,

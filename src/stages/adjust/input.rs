@@ -3,6 +3,7 @@
 use nalgebra::Vector3;
 
 use crate::{
+    config::{PositionUnknowns, RotationUnknowns},
     frames::{MarsIau2000, Position},
     geom::{bundle::ORIENTATION_UNKNOWNS, oriented_camera::OrientedCamera, surface::LaserSurface},
 };
@@ -39,6 +40,24 @@ pub(super) fn sigmas_of_powers(
         let of_power = if index < 9 { position_m } else { rotation_rad };
         of_power[index % 3]
     })
+}
+
+/// Holds fixed what is not unknown of an image's position and rotation.
+pub(super) fn hold_powers(
+    sigmas: &mut [f64; ORIENTATION_UNKNOWNS],
+    position: PositionUnknowns,
+    rotation: RotationUnknowns,
+) {
+    for (index, sigma) in sigmas.iter_mut().enumerate() {
+        let powers = if index < 9 {
+            position.powers()
+        } else {
+            rotation.powers()
+        };
+        if index % 3 >= powers {
+            *sigma = 0.0;
+        }
+    }
 }
 
 /// The laser shots of an adjustment.
@@ -83,5 +102,26 @@ impl LaserShots {
     #[must_use]
     pub fn name(&self, shot: &LaserShot) -> String {
         format!("{}:{}", self.profiles[shot.profile], shot.row)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn levels_hold_the_powers_above_them() {
+        let held = |position, rotation| {
+            let mut sigmas = sigmas_of_powers(&[25.0, 0.2, 0.1], &[4e-4, 1e-5, f64::INFINITY]);
+            hold_powers(&mut sigmas, position, rotation);
+            let powers = |of: &[f64]| of.chunks(3).map(<[f64]>::to_vec).collect::<Vec<_>>();
+            (powers(&sigmas[..9]), powers(&sigmas[9..]))
+        };
+        let (position, rotation) = held(PositionUnknowns::Velocity, RotationUnknowns::Angles);
+        assert_eq!(position, vec![vec![25.0, 0.2, 0.0]; 3]);
+        assert_eq!(rotation, vec![vec![4e-4, 0.0, 0.0]; 3]);
+        let (position, rotation) = held(PositionUnknowns::None, RotationUnknowns::Acceleration);
+        assert_eq!(position, vec![vec![0.0; 3]; 3]);
+        assert_eq!(rotation, vec![vec![4e-4, 1e-5, f64::INFINITY]; 3]);
     }
 }

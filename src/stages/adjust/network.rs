@@ -15,11 +15,11 @@ use crate::{
     footprints::FootprintImageCoordinates,
     frames::{MarsIau2000, Position},
     geom::{
-        bundle::{BundleImage, BundlePoint, HeightControl, Network, Range, View},
+        bundle::{BundleImage, BundlePoint, HeightControl, KnownCoordinates, Network, Range, View},
         pushbroom::{ExteriorOrientation, Projector},
     },
     stages::intersect::IntersectedTies,
-    ties::{TiePoint, require_images},
+    ties::{KnownGround, TiePoint, require_images},
 };
 
 /// A point or a profile of the network by its index at the site, and by its name for messages.
@@ -136,6 +136,25 @@ fn footprints_in_images<M: ExteriorOrientation>(
     Ok(views)
 }
 
+/// Standard deviation of coordinates that are held fixed, metres: far below all that measurements resolve, and far enough
+/// above rounding.
+const FIXED_M: f64 = 1e-3;
+
+/// How well the coordinates of a tie point are known.
+fn known_coordinates(
+    id: &str,
+    known: &KnownGround,
+) -> std::result::Result<KnownCoordinates, AdjustError> {
+    let Some(covariance_m2) = &known.covariance_m2 else {
+        return Ok(KnownCoordinates::of_sigmas(Vector3::repeat(FIXED_M)));
+    };
+    KnownCoordinates::of_covariance(covariance_m2).map_err(|least_m2| AdjustError::Value {
+        what: format!("the least eigenvalue of the covariance matrix of tie point {id}, m²,"),
+        value: least_m2,
+        expected: "a positive number",
+    })
+}
+
 /// Tie points whose height is observed at most: errors of the surface at neighbours are alike, so more tell nothing new.
 const CONTROLLED_MAX: usize = 400;
 
@@ -195,7 +214,9 @@ impl<'a, M: ExteriorOrientation> Assembled<&'a M> {
             self.points.push(Named { index, name });
             self.network.points.push(BundlePoint {
                 ground_m: shot.ground.xyz_m,
-                sigma_m: Some(Vector3::repeat(config.ground_sigma_m)),
+                known: Some(KnownCoordinates::of_sigmas(Vector3::repeat(
+                    config.ground_sigma_m,
+                ))),
             });
             let Some(range) = &shot.range else { continue };
             let profile = *profiles.entry(shot.profile).or_insert_with_key(|index| {
@@ -233,7 +254,11 @@ impl<'a, M: ExteriorOrientation> Assembled<&'a M> {
             .map(|point| (point.tie, &point.ground))
             .collect();
         for (index, tie) in ties.iter().enumerate() {
-            let Some(ground) = starts.get(&index) else {
+            let known = tie.known.as_ref();
+            let start = known
+                .map(|known| &known.ground)
+                .or_else(|| starts.get(&index).copied());
+            let Some(ground) = start else {
                 self.rejected.push(RejectedPoint {
                     kind: PointKind::Tie,
                     index,
@@ -249,15 +274,24 @@ impl<'a, M: ExteriorOrientation> Assembled<&'a M> {
             });
             self.network.points.push(BundlePoint {
                 ground_m: ground.xyz_m,
-                sigma_m: None,
+                known: known
+                    .map(|known| known_coordinates(&tie.id, known))
+                    .transpose()?,
             });
             for measure in &tie.measures {
                 let image = measure.image;
                 let oriented_camera = &images[image].oriented_camera;
                 let (x_lines, focal_px) =
                     oriented_camera.focal_plane_coordinates(measure.line, measure.sample);
-                let mut sigma_px = Vector2::from(config.tie_sigma_px);
-                sigma_px.y *= oriented_camera.detector.focal_px_per_sample(focal_px.y);
+                let per_sample = oriented_camera.detector.focal_px_per_sample(focal_px.y);
+                let [along_px, across_px] = match measure.sigma_px {
+                    None => config.tie_sigma_px,
+                    Some([lines, samples]) => {
+                        let per_line = oriented_camera.focal_px_per_line(x_lines, &ground.xyz_m);
+                        [lines * per_line, samples]
+                    }
+                };
+                let sigma_px = Vector2::new(along_px, across_px * per_sample);
                 self.network.views.push(View {
                     point,
                     image,

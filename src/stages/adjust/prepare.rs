@@ -3,7 +3,8 @@
 use std::collections::BTreeSet;
 
 use super::input::{
-    AdjustImage, LaserShot, LaserShots, ShotRange, orientation_sigmas, sigmas_of_powers,
+    AdjustImage, LaserShot, LaserShots, ShotRange, hold_powers, orientation_sigmas,
+    sigmas_of_powers,
 };
 use crate::{
     config::AdjustmentConfig,
@@ -47,7 +48,8 @@ impl<M: ExteriorOrientation> Candidate<'_, M> {
             }
             AdjustmentModel::Published => self.published_sigmas(config),
         };
-        if let Some(own) = config.images.iter().find(|own| own.id == self.times.id) {
+        let own = config.images.iter().find(|own| own.id == self.times.id);
+        if let Some(own) = own {
             if let Some(position_m) = own.position_m {
                 sigmas[..9].copy_from_slice(&position_m);
             }
@@ -55,6 +57,11 @@ impl<M: ExteriorOrientation> Candidate<'_, M> {
                 sigmas[9..].copy_from_slice(&rotation_rad);
             }
         }
+        let position = own.and_then(|own| own.position_unknowns);
+        let position = position.unwrap_or(config.position_unknowns);
+        let rotation = own.and_then(|own| own.rotation_unknowns);
+        let rotation = rotation.unwrap_or(config.rotation_unknowns);
+        hold_powers(&mut sigmas, position, rotation);
         AdjustImage {
             oriented_camera: self.oriented_camera,
             line_period_s: self.times.line_period_s,

@@ -7,8 +7,8 @@ use super::{
     blunders,
     error::{AdjustError, CONTRADICTION},
     input::{AdjustImage, LaserShots},
-    network::{self, Named},
-    points::{RejectedPoint, RejectionReason},
+    network::{self, Assembled, Named},
+    points::{PointKind, RejectedPoint, RejectionReason},
     summary, words,
 };
 use crate::{
@@ -71,14 +71,14 @@ pub fn adjust<M: ExteriorOrientation>(
         });
     let dropped: Vec<RejectedPoint> = dropped.collect();
     assembled.rejected.extend(dropped);
-    contradictions(images, &assembled.points, &adjustment)?;
+    contradictions(images, &assembled, &adjustment)?;
     let summary = summary::summarise(images, &assembled, &adjustment, config)?;
     Ok(adjusted::collect(images, assembled, adjustment, summary))
 }
 
 fn contradictions<M>(
     images: &[AdjustImage<M>],
-    points: &[Named],
+    assembled: &Assembled<&M>,
     adjustment: &Adjustment,
 ) -> std::result::Result<(), AdjustError> {
     let refuse = |what: String, standardised: f64| {
@@ -97,12 +97,14 @@ fn contradictions<M>(
             }
         }
     }
-    for (point, outcome) in points.iter().zip(&adjustment.points) {
+    for (index, outcome) in adjustment.points.iter().enumerate() {
+        let (point, kind) = (&assembled.points[index], assembled.kind(index));
         for prior in outcome.iter().filter_map(|point| point.priors).flatten() {
-            refuse(
-                format!("the footprint of shot {}", point.name),
-                size(&prior),
-            )?;
+            let owner = match kind {
+                PointKind::Shot => "the footprint of shot",
+                PointKind::Tie => "the given place of tie point",
+            };
+            refuse(format!("{owner} {}", point.name), size(&prior))?;
         }
     }
     Ok(())

@@ -40,7 +40,7 @@ stage_inputs! {
 
 impl Stage for Adjust<'_> {
     const NAME: &'static str = "adjust";
-    const METHOD: u32 = 3;
+    const METHOD: u32 = 4;
     type Output = Adjusted;
     stage_inputs!(fingerprint);
 

@@ -21,7 +21,7 @@ use crate::geom::{
 use crate::{
     config::AdjustmentConfig,
     footprints::{AdjustmentModel, FootprintImageCoordinates},
-    geom::statistics::BAARDA_LIMIT,
+    geom::statistics::{BAARDA_LIMIT, unit_weight_limits},
     schema::{at, none_negative},
 };
 
@@ -31,8 +31,10 @@ use crate::{
 )]
 #[serde(rename_all = "snake_case")]
 pub enum ObservationType {
-    /// Image coordinates of tie points.
-    TieImage,
+    /// Image coordinates of tie points along the track.
+    TieAlong,
+    /// The same across it, which without heights by the MOLA surface nothing controls.
+    TieAcross,
     /// Heights of tie points above the MOLA surface.
     MolaHeight,
     /// Image coordinates of footprints.
@@ -43,6 +45,8 @@ pub enum ObservationType {
     Orientation,
     /// Initial coordinates of footprints.
     MolaGround,
+    /// Coordinates of tie points that are known beforehand.
+    TieGround,
     /// Time and range biases, initially 0.
     Bias,
 }
@@ -64,6 +68,10 @@ pub struct TypeSummary {
     /// redundancy.
     #[schemars(range(min = 0.0))]
     pub variance_component: f64,
+    /// Where 99 % of such values lie when the standard deviations are right, by the χ² distribution; 0 where the
+    /// redundancy is below 1. Robust weights and roughness that is taken for larger than it is leave heights below it.
+    #[schemars(transform = none_negative)]
+    pub variance_component_limits: [f64; 2],
     /// Observations whose standardised residual exceeds 3.29.
     pub beyond_limit: usize,
 }
@@ -182,24 +190,30 @@ pub(super) fn summarise<M: ExteriorOrientation>(
 
 fn types<M>(assembled: &Assembled<M>, adjustment: &Adjustment) -> Vec<TypeSummary> {
     let views = assembled.network.views.iter().zip(&adjustment.views);
-    let of_views = |kind: PointKind| -> Vec<Residual> {
+    let of_views = |kind: PointKind| -> Vec<[Residual; 2]> {
         let required = views
             .clone()
             .filter(|(view, _)| assembled.kind(view.point) == kind);
+        required.filter_map(|(_, residuals)| *residuals).collect()
+    };
+    let ties = of_views(PointKind::Tie);
+    let of_axis = |axis: usize| ties.iter().map(|pair| pair[axis]).collect();
+    let orientations = adjustment.images.iter().flat_map(|image| image.priors);
+    let of_grounds = |kind: PointKind| -> Vec<Residual> {
+        let points = adjustment.points.iter().enumerate();
+        let required = points.filter(|(point, _)| assembled.kind(*point) == kind);
         required
-            .filter_map(|(_, residuals)| *residuals)
+            .filter_map(|(_, outcome)| outcome.as_ref().ok()?.priors)
             .flatten()
             .collect()
     };
-    let orientations = adjustment.images.iter().flat_map(|image| image.priors);
-    let grounds = adjustment
-        .points
-        .iter()
-        .flatten()
-        .filter_map(|point| point.priors);
     let all = [
-        (ObservationType::TieImage, of_views(PointKind::Tie)),
-        (ObservationType::MolaImage, of_views(PointKind::Shot)),
+        (ObservationType::TieAlong, of_axis(0)),
+        (ObservationType::TieAcross, of_axis(1)),
+        (
+            ObservationType::MolaImage,
+            of_views(PointKind::Shot).into_iter().flatten().collect(),
+        ),
         (
             ObservationType::MolaRange,
             adjustment.ranges.iter().flatten().copied().collect(),
@@ -208,7 +222,8 @@ fn types<M>(assembled: &Assembled<M>, adjustment: &Adjustment) -> Vec<TypeSummar
             ObservationType::Orientation,
             orientations.flatten().collect(),
         ),
-        (ObservationType::MolaGround, grounds.flatten().collect()),
+        (ObservationType::MolaGround, of_grounds(PointKind::Shot)),
+        (ObservationType::TieGround, of_grounds(PointKind::Tie)),
         (ObservationType::Bias, biases(assembled, adjustment)),
     ];
     let plain = all.into_iter();
@@ -230,6 +245,7 @@ fn of_heights(adjustment: &Adjustment) -> Option<TypeSummary> {
         redundancy,
         weighted_squares: adjustment.height_squares,
         variance_component: component(adjustment.height_squares, redundancy),
+        variance_component_limits: unit_weight_limits(redundancy).unwrap_or_default(),
         beyond_limit: beyond_limit(&adjustment.heights),
     })
 }
@@ -267,6 +283,7 @@ fn of_type(kind: ObservationType, residuals: &[Residual]) -> TypeSummary {
         redundancy,
         weighted_squares,
         variance_component: component(weighted_squares, redundancy),
+        variance_component_limits: unit_weight_limits(redundancy).unwrap_or_default(),
         beyond_limit: residuals.iter().filter(beyond).count(),
     }
 }

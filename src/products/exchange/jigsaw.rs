@@ -1,0 +1,332 @@
+//! What jigsaw's users look for: the adjusted network, residuals, points and images as jigsaw writes them.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use nalgebra::{Matrix3, Vector3};
+
+use super::{
+    adjusted::{adjusted, focal_px_per_line, isis_name},
+    bundleout::{ImageRow, PointRow, ResidualRow, write_images, write_points, write_residuals},
+    control_network::{ControlNetwork, NetworkMeasure, NetworkPoint, write_control_network},
+    points::ImageMeasure,
+};
+use crate::{
+    geom::ellipsoid::local_axes,
+    products::{
+        AdjustmentProducts, GeometricProducts, ImageProducts, SiteProducts,
+        product::{Content, Declaration, Program, Role, Use, Write},
+    },
+    stages::{
+        adjust::{CorrectedImage, CorrectedPoint, ImageResidual, PointKind},
+        intersect::IntersectedPoint,
+    },
+    ties::{KnownGround, TieMeasure, TiePoint},
+};
+
+/// Where we have the outer edge of the first pixel at 0, ISIS has its middle at 1.
+const EDGE_TO_ISIS: f64 = 0.5;
+
+pub(in crate::products) static NETWORK: Declaration = Declaration {
+    path: "exchange/adjusted.pvl",
+    what: "the control network with adjusted points, their covariances and residuals, as text",
+    readers: "ISIS",
+    rows: "tie points",
+    role: Role::Data,
+    content: Content::Foreign,
+    write: Write::Adjustment(|path, of, geometric, adjustment| {
+        let joined = Joined::new(of.site, geometric, adjustment);
+        let network = joined.network(newest_utc(of.site));
+        write_control_network(path, &network).map(Some)
+    }),
+    uses: &[Use {
+        program: Program::Isis,
+        lines: "cnetpvl2bin from=adjusted.pvl to=adjusted.net",
+    }],
+};
+
+pub(in crate::products) static RESIDUALS: Declaration = Declaration {
+    path: "exchange/residuals.csv",
+    what: "residuals of tie points as jigsaw writes them, with their standard deviations and redundancy",
+    readers: "people who know jigsaw",
+    rows: "measurements",
+    role: Role::Data,
+    content: Content::Foreign,
+    write: Write::Adjustment(|path, of, geometric, adjustment| {
+        let joined = Joined::new(of.site, geometric, adjustment);
+        write_residuals(path, &joined.residuals()).map(Some)
+    }),
+    uses: &[],
+};
+
+pub(in crate::products) static POINTS: Declaration = Declaration {
+    path: "exchange/bundleout_points.csv",
+    what: "adjusted tie points as jigsaw writes them; latitude, longitude and radius in metres are north, east and up",
+    readers: "people who know jigsaw",
+    rows: "tie points",
+    role: Role::Data,
+    content: Content::Foreign,
+    write: Write::Adjustment(|path, of, geometric, adjustment| {
+        let joined = Joined::new(of.site, geometric, adjustment);
+        write_points(path, &joined.points()).map(Some)
+    }),
+    uses: &[],
+};
+
+pub(in crate::products) static IMAGES: Declaration = Declaration {
+    path: "exchange/bundleout_images.csv",
+    what: "corrections of the orientations as jigsaw writes them over existing kernels: kilometres and degrees for powers of \
+           t, which is 0 in the middle of the image and 1 at its end; rotations about the camera's axes",
+    readers: "people who know jigsaw",
+    rows: "images",
+    role: Role::Data,
+    content: Content::Foreign,
+    write: Write::Adjustment(|path, of, geometric, adjustment| {
+        let joined = Joined::new(of.site, geometric, adjustment);
+        write_images(path, &joined.images()).map(Some)
+    }),
+    uses: &[],
+};
+
+/// UTC of the newest shot, or of the first image where there is none: a clock would give other bytes each time.
+fn newest_utc<'a>(site: &SiteProducts<'a>) -> &'a str {
+    let newest = site.utc.iter().max().map(String::as_str);
+    let first = site.images.first();
+    newest
+        .or_else(|| first.map(|image| &*image.times.utc_start))
+        .unwrap_or_default()
+}
+
+/// The tie points of a site with what the adjustment made of them.
+struct Joined<'a> {
+    site: &'a SiteProducts<'a>,
+    adjustment: &'a AdjustmentProducts<'a>,
+    ties: &'a [TiePoint],
+    serials: Vec<String>,
+    files: Vec<String>,
+    /// Adjusted points by the index of their tie point.
+    points: BTreeMap<usize, &'a CorrectedPoint>,
+    /// Residuals by the indices of tie point and image.
+    views: BTreeMap<(usize, usize), &'a ImageResidual>,
+    /// Ground points with the adjusted orientation by the index of their tie point.
+    intersected: BTreeMap<usize, &'a IntersectedPoint>,
+    rejected: BTreeSet<usize>,
+}
+
+impl<'a> Joined<'a> {
+    fn new(
+        site: &'a SiteProducts<'a>,
+        geometric: &GeometricProducts<'a>,
+        adjustment: &'a AdjustmentProducts<'a>,
+    ) -> Self {
+        let result = adjustment.adjusted;
+        let points: BTreeMap<usize, &CorrectedPoint> = adjustment
+            .adjusted_ties()
+            .map(|point| (point.index, point))
+            .collect();
+        let rejected = (0..geometric.ties.points.len()).filter(|tie| !points.contains_key(tie));
+        let views = result.views.iter().filter_map(|view| {
+            let point = &result.points[view.point];
+            let is_tie = point.kind == PointKind::Tie;
+            is_tie.then_some(((point.index, view.image), view))
+        });
+        Self {
+            site,
+            adjustment,
+            ties: &geometric.ties.points,
+            serials: site
+                .images
+                .iter()
+                .map(|image| isis_name(site, image))
+                .collect(),
+            files: site
+                .images
+                .iter()
+                .map(|image| format!("{}.cub", image.times.id))
+                .collect(),
+            rejected: rejected.collect(),
+            views: views.collect(),
+            intersected: adjustment
+                .intersected
+                .points
+                .iter()
+                .map(|point| (point.tie, point))
+                .collect(),
+            points,
+        }
+    }
+
+    /// All measurements with the indices of their tie points.
+    fn measures(&self) -> impl Iterator<Item = (usize, &'a TieMeasure)> {
+        let ties = self.ties.iter().enumerate();
+        ties.flat_map(|(index, tie)| tie.measures.iter().map(move |measure| (index, measure)))
+    }
+
+    /// Standard deviations of line and sample of a measurement, lines and pixels.
+    fn sigma_px(&self, measure: &TieMeasure) -> [f64; 2] {
+        measure.sigma_px.unwrap_or_else(|| {
+            let [along_px, across_px] = self.site.config.adjustment.tie_sigma_px;
+            let per_line = focal_px_per_line(self.adjustment, measure.image);
+            [along_px / per_line, across_px]
+        })
+    }
+
+    /// Measured minus adjusted line and sample; of a rejected point by its intersection.
+    fn residual_px(&self, tie: usize, measure: &TieMeasure) -> Option<[f64; 2]> {
+        if let Some(view) = self.views.get(&(tie, measure.image)) {
+            return Some(view.in_image_px);
+        }
+        let point = self.intersected.get(&tie)?;
+        let mut own = point.measures.iter();
+        let own = own.find(|of| of.image == measure.image)?;
+        let sense = self.site.images[measure.image]
+            .times
+            .detector()
+            .sample_sense;
+        Some([own.reprojection_lines, sense * own.reprojection_px])
+    }
+
+    fn network(&'a self, created_utc: &'a str) -> ControlNetwork<'a> {
+        let point = |(index, tie): (usize, &'a TiePoint)| {
+            let found = self.points.get(&index);
+            let measures = tie.measures.iter().map(|measure| NetworkMeasure {
+                measure: ImageMeasure {
+                    image: &self.serials[measure.image],
+                    line: measure.line,
+                    sample: measure.sample,
+                },
+                sigma_px: Some(self.sigma_px(measure)),
+                residual_px: self.residual_px(index, measure),
+            });
+            NetworkPoint {
+                id: &tie.id,
+                known: tie.known,
+                initial_m: found.map(|point| point.initial.xyz_m),
+                adjusted: found.map(|point| adjusted(point)),
+                measures: measures.collect(),
+            }
+        };
+        ControlNetwork {
+            id: &self.site.config.site,
+            description: "tie points of areograph, adjusted; IAU 2000",
+            created_utc,
+            points: self.ties.iter().enumerate().map(point).collect(),
+        }
+    }
+
+    fn residuals(&self) -> Vec<ResidualRow<'_>> {
+        let row = |(tie, measure): (usize, &TieMeasure)| {
+            let image = measure.image;
+            let times = self.site.images[image].times;
+            let detector = times.detector();
+            let pixel_mm = times.instrument.optics.focal_length_mm / detector.focal_length_px;
+            let place_px = detector.place_px(measure.sample);
+            let view = self.views.get(&(tie, image));
+            let [line_sigma, sample_sigma] = self.sigma_px(measure);
+            let across_along = |view: &&ImageResidual| [view.across_px, view.along_px];
+            ResidualRow {
+                point: &self.ties[tie].id,
+                file: &self.files[image],
+                serial: &self.serials[image],
+                // Ours runs against the samples where their sense is negative, that of ISIS never does.
+                focal_mm: [
+                    pixel_mm * place_px.x,
+                    pixel_mm * detector.sample_sense * place_px.y,
+                ],
+                place: [measure.sample, measure.line].map(|edge| edge + EDGE_TO_ISIS),
+                residual_px: self
+                    .residual_px(tie, measure)
+                    .map(|[line, sample]| [sample, line]),
+                sigma_px: [sample_sigma, line_sigma],
+                redundancy: view
+                    .map(across_along)
+                    .map(|of| of.map(|one| one.redundancy)),
+                standardised: view
+                    .map(across_along)
+                    .map_or([None; 2], |of| of.map(|one| one.standardised)),
+                rejected: self.rejected.contains(&tie),
+            }
+        };
+        self.measures().map(row).collect()
+    }
+
+    fn points(&self) -> Vec<PointRow<'_>> {
+        let row = |(index, point): (&usize, &&'a CorrectedPoint)| {
+            let tie = &self.ties[*index];
+            let residuals = tie.measures.iter();
+            let residuals: Vec<[f64; 2]> = residuals
+                .filter_map(|measure| Some(self.views.get(&(*index, measure.image))?.in_image_px))
+                .collect();
+            PointRow {
+                id: &tie.id,
+                status: status(tie.known.as_ref()),
+                measures: residuals.len(),
+                rms_px: root_mean_square(residuals.iter().flatten().copied()),
+                ground: adjusted(point),
+                initial_m: point.initial.xyz_m,
+            }
+        };
+        self.points.iter().map(row).collect()
+    }
+
+    fn images(&self) -> Vec<ImageRow<'_>> {
+        let images = self.adjustment.adjusted.images.iter().enumerate();
+        let row = |(index, image): (usize, &'a CorrectedImage)| {
+            let own = self.views.iter().filter(|((_, of), _)| *of == index);
+            let residuals: Vec<[f64; 2]> = own.map(|(_, view)| view.in_image_px).collect();
+            let [line_px, sample_px] =
+                [0, 1].map(|axis| root_mean_square(residuals.iter().map(|of| of[axis])));
+            let all = root_mean_square(residuals.iter().flatten().copied());
+            let measured = self
+                .measures()
+                .filter(|(_, measure)| measure.image == index);
+            let constants = [0, 3, 6];
+            let position_m2 = Matrix3::from_fn(|row, column| {
+                image.covariance[(constants[row], constants[column])]
+            });
+            let local = local_axes(&middle_m(&self.site.images[index]));
+            let local_m2 = local * position_m2 * local.transpose();
+            ImageRow {
+                file: &self.files[index],
+                rms_px: [sample_px, line_px, all],
+                correction: &image.correction,
+                prior_sigmas: &image.prior_sigmas,
+                sigmas: &image.sigmas,
+                local_sigmas_m: [0, 1, 2].map(|axis| local_m2[(axis, axis)].sqrt()),
+                measures: [residuals.len(), measured.count() - residuals.len()],
+            }
+        };
+        images.map(row).collect()
+    }
+}
+
+/// The type of a point in jigsaw's words.
+const fn status(known: Option<&KnownGround>) -> &'static str {
+    match known {
+        None => "FREE",
+        Some(KnownGround {
+            covariance_m2: Some(_),
+            ..
+        }) => "CONSTRAINED",
+        Some(_) => "FIXED",
+    }
+}
+
+/// Where the camera was in the middle of an image, metres.
+fn middle_m(image: &ImageProducts) -> Vector3<f64> {
+    let samples = &image.orientation.samples;
+    samples
+        .get(samples.len() / 2)
+        .map(|sample| sample.position.xyz_m)
+        .unwrap_or_default()
+}
+
+/// 0 of no values.
+fn root_mean_square(values: impl Iterator<Item = f64> + Clone) -> f64 {
+    let count = values.clone().count();
+    let squares: f64 = values.map(|value| value * value).sum();
+    if count == 0 {
+        0.0
+    } else {
+        (squares / count as f64).sqrt()
+    }
+}
