@@ -13,9 +13,9 @@ use super::{
 /// Mean error of the pair's tie points before and after the adjustment, metres: heights before; east, north, up after.
 fn errors_m(light_time: &str) -> (f64, Vector3<f64>) {
     let case = Case::pair();
-    let mut site = String::from_utf8(case.read("site.toml")).unwrap();
-    site += &format!("\n[orientation]\nlight_time = \"{light_time}\"\n");
-    case.write("site.toml", site);
+    let site = String::from_utf8(case.read("site.toml")).unwrap();
+    let keys = format!("[orientation]\nlight_time = \"{light_time}\"\n");
+    case.write("site.toml", format!("{site}\n{keys}"));
     succeed(&mut case.run());
     let judged = Judged::of(&mission(), &case.path("out"), "isidis");
     (judged.before_m, judged.mean_m())
