@@ -24,15 +24,10 @@ use areograph::{
     scene::{PlaneRecipe, PlaneScene},
 };
 
-/// Twenty-five pictures of 25 km, as the tertiary net has them, in three bricks of columns.
+/// The tertiary net with noise.
 const TERTIARY: PlaneRecipe = PlaneRecipe {
-    grid: [5, 5],
-    side_m: 25_000.0,
-    spacing_m: 20_000.0,
-    points: 500,
     noise_m: 30.0,
-    controls: 6,
-    control_sigma_m: 0.0,
+    ..PlaneRecipe::TERTIARY
 };
 
 fn nine(noise_m: f64) -> PlaneRecipe {

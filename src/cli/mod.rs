@@ -10,6 +10,7 @@ mod plan;
 mod report;
 mod run;
 mod scene;
+mod triangulate;
 
 use std::process::ExitCode;
 
@@ -52,7 +53,9 @@ enum Command {
     Pedr(pedr::Arguments),
     /// Report what differs between two runs.
     Report(report::Arguments),
-    /// Write a synthetic mission with known truth.
+    /// Triangulate rectified pictures in the plane, by their ties and controls alone.
+    Triangulate(triangulate::Arguments),
+    /// Write a synthetic mission, or net of pictures, with known truth.
     Scene(scene::Arguments),
     /// Print shell completions.
     Completions(completions::Arguments),
@@ -83,6 +86,7 @@ pub fn main() -> ExitCode {
         Command::Kernels(arguments) => finish(kernels::run(&arguments)),
         Command::Pedr(arguments) => finish(pedr::run(&arguments)),
         Command::Report(arguments) => report::run(&arguments),
+        Command::Triangulate(arguments) => triangulate::run(&arguments),
         Command::Scene(arguments) => finish(scene::run(&arguments)),
         Command::Completions(arguments) => {
             completions::run(&arguments);

@@ -7,7 +7,9 @@ use clap::{Args, ValueEnum};
 use super::output;
 use crate::{
     error::Error,
-    scene::{Roughness, SceneErrors, SceneOptions, write_scene, write_scene_along},
+    scene::{
+        Roughness, SceneErrors, SceneOptions, write_plane_scene, write_scene, write_scene_along,
+    },
     units::SECONDS_PER_DAY,
 };
 
@@ -46,6 +48,9 @@ pub(super) struct Arguments {
     /// Fly these kernels instead of the invented orbit.
     #[arg(long, value_name = "KERNELS.tm")]
     along: Option<PathBuf>,
+    /// A net of rectified pictures for `areograph triangulate` instead of a mission.
+    #[arg(long, conflicts_with_all = ["along", "realistic", "day_s"])]
+    plane: bool,
     /// With --along: labels of images to put into the site file.
     #[arg(long, value_name = "FILE", requires = "along")]
     label: Vec<PathBuf>,
@@ -82,6 +87,10 @@ impl Arguments {
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<(), Error> {
+    if arguments.plane {
+        output::line(write_plane_scene(&arguments.directory, arguments.seed)?);
+        return Ok(());
+    }
     let options = SceneOptions {
         seed: arguments.seed,
         day_s: arguments.day_s,

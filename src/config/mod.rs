@@ -15,6 +15,7 @@ mod instruments;
 mod kernels;
 mod limits;
 mod mola_surface;
+mod net;
 mod orientation;
 mod paths;
 mod pedr;
@@ -41,6 +42,10 @@ pub use instruments::{
 pub use kernels::KernelsConfig;
 pub use limits::LimitsConfig;
 pub use mola_surface::MolaSurfaceConfig;
+pub use net::{
+    Blunders, LoadedNet, Method, NetConfig, TriangulationConfig, YAxis, load_net, net_example,
+    net_schema, parse_net,
+};
 pub use orientation::{OrientationConfig, RegistrationConfig};
 pub use pedr::PedrConfig;
 pub use pointing::{PointingConfig, UsedBias};
@@ -51,9 +56,20 @@ pub use ties::{IntersectionConfig, TiesConfig};
 pub use windows::WindowConfig;
 
 use crate::error::{Cause, Error, IoError, Kind, Locate as _};
-use declare::{Keys, Table as _, described};
-use problems::Review;
+use declare::{Keys, Table, described};
+use problems::{Review, SITE_EXAMPLE};
 use written::Written;
+
+/// How the example of a site begins.
+const HEADER: &str = "\
+# Site configuration of areograph, every key with its unit, range and default.
+#
+# Only `site`, one source of kernels, and either [pedr] with [[windows]] or [[images]] are required;
+# a key that is left out has the default written here. Relative paths count from this file's folder.
+# Angles are degrees, exposures milliseconds, times seconds; longitudes are east, latitudes
+# areocentric, both in the IAU 2000 frame of Mars. Schema: ../schema/site.schema.json
+
+";
 
 /// Longest configuration file, bytes.
 const BYTES_MAX: u64 = 1 << 20;
@@ -110,14 +126,33 @@ fn read(path: &Path) -> Result<String, Error> {
 /// # Errors
 /// [`Problems`] with everything that is wrong.
 pub fn parse(text: &str, file: &Path) -> Result<Loaded, Problems> {
-    let mut review = Review::new(file, text);
-    let site = read_site(text, file, &mut review);
-    let (site, warnings) = review.finish(site)?;
+    let ((site, Written { blake3, keys }), warnings) =
+        parse_file::<SiteConfig>(text, file, SITE_EXAMPLE)?;
+    let site = SiteConfig {
+        file: file.to_owned(),
+        blake3,
+        keys,
+        ..site
+    };
     Ok(Loaded { site, warnings })
 }
 
-/// The site of `text`, to be used only when `review` has found no problem.
-fn read_site(text: &str, file: &Path, review: &mut Review<'_>) -> Option<SiteConfig> {
+/// What was read, with the keys as written, and warnings.
+type Parsed<T> = ((T, Written), Vec<String>);
+
+/// Checks the `text` of `file`, whose keys are those of `T` and are documented in `documentation`.
+fn parse_file<T: Table>(
+    text: &str,
+    file: &Path,
+    documentation: &'static str,
+) -> Result<Parsed<T>, Problems> {
+    let mut review = Review::new(file, text).documented_in(documentation);
+    let read = read_table(text, &mut review);
+    review.finish(read)
+}
+
+/// What `text` says, to be used only when `review` has found no problem.
+fn read_table<T: Table>(text: &str, review: &mut Review<'_>) -> Option<(T, Written)> {
     let (document, syntax_errors) = DeTable::parse_recoverable(text);
     if !syntax_errors.is_empty() {
         for error in syntax_errors {
@@ -127,18 +162,10 @@ fn read_site(text: &str, file: &Path, review: &mut Review<'_>) -> Option<SiteCon
         return None;
     }
     let mut keys = Keys::of_file(document.get_ref(), review);
-    let site = SiteConfig::read(&mut keys);
+    let read = T::read(&mut keys);
     keys.finish();
     match toml::from_str(text) {
-        Ok(table) => {
-            let Written { blake3, keys } = Written::of(table, review.renames());
-            Some(SiteConfig {
-                file: file.to_owned(),
-                blake3,
-                keys,
-                ..site
-            })
-        }
+        Ok(table) => Some((read, Written::of(table, review.renames()))),
         // A value that TOML cannot hold, which its key has refused already.
         Err(error) => {
             if !review.has_problems() {
@@ -160,13 +187,18 @@ pub fn keys() -> Vec<DeclaredKey> {
 /// The example file, `config/sites/example.toml`.
 #[must_use]
 pub fn example() -> String {
-    declare::example(&described::<SiteConfig>())
+    declare::example(HEADER, &described::<SiteConfig>())
 }
 
 /// The JSON Schema of a site file, `config/schema/site.schema.json`.
 #[must_use]
 pub fn schema() -> impl Serialize {
-    declare::schema(&described::<SiteConfig>())
+    declare::schema(
+        "Site configuration of areograph",
+        "The TOML file of one site as JSON. areograph checks more than a schema can: files that are there, order \
+         within windows, agreement between keys.",
+        &described::<SiteConfig>(),
+    )
 }
 
 /// Two configurations name the same site, so their products would overwrite each other.

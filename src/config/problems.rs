@@ -14,11 +14,16 @@ const LISTED_MAX: usize = 100;
 /// Characters of a value that a message repeats.
 const EXCERPT_MAX: usize = 60;
 
+/// Documents every key of a site.
+pub(super) const SITE_EXAMPLE: &str = "config/sites/example.toml";
+
 /// Everything that is wrong with one configuration file, in order of place.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Problems {
     lines: Vec<String>,
     unlisted: usize,
+    /// The file that documents every key.
+    documentation: &'static str,
 }
 
 impl Problems {
@@ -27,6 +32,7 @@ impl Problems {
         Self {
             lines: vec![format!("{}: {text}", file.display())],
             unlisted: 0,
+            documentation: SITE_EXAMPLE,
         }
     }
 }
@@ -50,8 +56,10 @@ impl Cause for Problems {
     }
 
     fn advice(&self) -> String {
-        "correct these entries; config/sites/example.toml documents every key with its unit and default"
-            .to_owned()
+        format!(
+            "correct these entries; {} documents every key with its unit and default",
+            self.documentation
+        )
     }
 }
 
@@ -77,6 +85,7 @@ pub(super) struct Review<'a> {
     unlisted: usize,
     warnings: Vec<(TextSpan, String)>,
     renames: BTreeSet<Rename>,
+    documentation: &'static str,
 }
 
 impl<'a> Review<'a> {
@@ -88,6 +97,15 @@ impl<'a> Review<'a> {
             unlisted: 0,
             warnings: Vec::new(),
             renames: BTreeSet::new(),
+            documentation: SITE_EXAMPLE,
+        }
+    }
+
+    /// The same of a file whose keys another example documents.
+    pub(super) fn documented_in(self, documentation: &'static str) -> Self {
+        Self {
+            documentation,
+            ..self
         }
     }
 
@@ -154,6 +172,7 @@ impl<'a> Review<'a> {
             _ => Err(Problems {
                 lines: self.placed(problems),
                 unlisted: self.unlisted,
+                documentation: self.documentation,
             }),
         }
     }

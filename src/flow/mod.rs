@@ -12,6 +12,7 @@ mod driver;
 mod evidence;
 mod kernels;
 mod manifest;
+mod net;
 mod out;
 mod outline;
 mod outputs;
@@ -29,6 +30,7 @@ pub use compare::{
     require_different,
 };
 pub use driver::StageReason;
+pub use net::{NetOutcome, run_net};
 pub use out::{OutError, check_out};
 pub use outline::stages;
 pub use plan::plan_site;

@@ -64,6 +64,24 @@ impl Cause for OutError {
 /// # Errors
 /// [`OutError`], of kind configuration.
 pub fn check_out(out: &Path, sites: &[SiteConfig]) -> Result<()> {
+    check_out_path(out)?;
+    for site in sites.iter().filter(|site| !site.ties.files.is_empty()) {
+        let staging = staging_path(&out.join(&site.site));
+        let ids = site.images.iter().map(|image| &*image.id);
+        let products = ids.map(|id| staging.join(position_kernel(id)));
+        let longest = products.max_by_key(|product| product.as_os_str().len());
+        if let Some(product) = longest.filter(|path| path.as_os_str().len() > PATH_LENGTH_MAX) {
+            return Err(OutError::LongPath { product }).in_site(&site.site);
+        }
+    }
+    Ok(())
+}
+
+/// Makes sure that a folder has a path that file systems and metakernels hold.
+///
+/// # Errors
+/// [`OutError`], of kind configuration.
+pub(super) fn check_out_path(out: &Path) -> Result<()> {
     let unspeakable = |holds| OutError::Unspeakable {
         out: out.to_owned(),
         holds,
@@ -77,15 +95,6 @@ pub fn check_out(out: &Path, sites: &[SiteConfig]) -> Result<()> {
             let part = part.to_string_lossy().into_owned();
             let bytes = part.len();
             return Err(OutError::LongPart { part, bytes }.into());
-        }
-    }
-    for site in sites.iter().filter(|site| !site.ties.files.is_empty()) {
-        let staging = staging_path(&out.join(&site.site));
-        let ids = site.images.iter().map(|image| &*image.id);
-        let products = ids.map(|id| staging.join(position_kernel(id)));
-        let longest = products.max_by_key(|product| product.as_os_str().len());
-        if let Some(product) = longest.filter(|path| path.as_os_str().len() > PATH_LENGTH_MAX) {
-            return Err(OutError::LongPath { product }).in_site(&site.site);
         }
     }
     Ok(())

@@ -5,6 +5,7 @@ pub mod block_equations;
 pub mod bundle;
 pub mod chebyshev;
 pub mod collinearity;
+pub mod conformal_map;
 pub mod ellipsoid;
 pub mod intersection;
 pub mod lagrange;

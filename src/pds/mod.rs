@@ -3,6 +3,7 @@
 pub mod label;
 pub mod moc;
 pub mod pedr;
+pub mod plane_tables;
 pub mod ties;
 
 pub use moc::{ImageLabel, product_named, read_label};

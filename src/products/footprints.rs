@@ -132,16 +132,16 @@ pub(super) fn table<'a>(site: &'a SiteProducts<'a>) -> Table<'a> {
 /// The footprints of a site as GIS has them.
 pub(super) fn features<'a>(site: &'a SiteProducts<'a>) -> Features<'a> {
     let point = |shot: &Shot| {
-        let [longitude_deg, latitude_deg] = shot.point_deg();
+        let [east_deg, north_deg] = shot.point_deg();
         let height_m = shot.get(|of| &of.radius_crossover_m) - SPHERE_RADIUS_M;
-        [longitude_deg, latitude_deg, height_m]
+        [east_deg, north_deg, height_m]
     };
-    Features {
-        name: &site.config.site,
-        newest_utc: site.utc.iter().max().map_or("", String::as_str),
-        points: Shot::all(site).iter().map(point).collect(),
-        attributes: table(site),
-    }
+    Features::of_footprints(
+        &site.config.site,
+        site.utc.iter().max().map_or("", String::as_str),
+        Shot::all(site).iter().map(point).collect(),
+        table(site),
+    )
 }
 
 /// The columns of the CSV file.

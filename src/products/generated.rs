@@ -3,6 +3,7 @@
 use std::fmt::Write as _;
 
 use super::{
+    net::NET_PRODUCTS,
     product::{Content, Declaration},
     registry::PRODUCTS,
     table::{Kind, Meaning},
@@ -13,8 +14,13 @@ use crate::schema::DocumentSchema;
 #[must_use]
 pub fn schemas() -> Vec<DocumentSchema> {
     let mut schemas: Vec<DocumentSchema> = Vec::new();
-    for product in PRODUCTS {
-        if let Content::Document(schema) = product.content {
+    let of_nets = NET_PRODUCTS.iter().map(|product| &product.content);
+    for content in PRODUCTS
+        .iter()
+        .map(|product| &product.content)
+        .chain(of_nets)
+    {
+        if let Content::Document(schema) = content {
             let schema = schema();
             if !schemas.contains(&schema) {
                 schemas.push(schema);
@@ -48,21 +54,47 @@ pub fn documentation() -> String {
     text +=
         "\n## Columns\n\nNames end in the unit. `?` marks columns without a value in some rows.\n";
     for product in PRODUCTS {
-        if let Content::Table(columns) = product.content {
-            let _infallible = write!(
-                text,
-                "\n### `{}`\n\n| column | type | unit | what it is |\n|---|---|---|---|\n",
-                product.path
-            );
-            for column in columns() {
-                text += &row(&column);
-            }
-        }
+        text += &columns_of(product, "");
+    }
+    text += "\n## Nets of rectified pictures\n\n\
+        Products of `areograph triangulate`, in the folder of the net; `manifest.json` comes last here too. `net:` stands \
+        before their names below.\n\n\
+        | file | what it is | for | rows | schema |\n|---|---|---|---|---|\n";
+    for product in NET_PRODUCTS {
+        let _infallible = writeln!(
+            text,
+            "| `{}` | {} | {} | {} | {} |",
+            product.path,
+            product.what,
+            product.readers,
+            product.rows,
+            schema_link(product),
+        );
+    }
+    // The CSV files have the columns of the Parquet files.
+    for product in NET_PRODUCTS
+        .iter()
+        .filter(|product| product.path.contains(".parquet"))
+    {
+        text += &columns_of(product, "net: ");
     }
     text
 }
 
-fn schema_link(product: &Declaration) -> String {
+/// The columns of a table; nothing for other files.
+fn columns_of<W>(product: &Declaration<W>, of: &str) -> String {
+    let Content::Table(columns) = product.content else {
+        return String::new();
+    };
+    let rows: Vec<String> = columns().iter().map(row).collect();
+    format!(
+        "\n### {of}`{}`\n\n| column | type | unit | what it is |\n|---|---|---|---|\n{}",
+        product.path,
+        rows.concat()
+    )
+}
+
+fn schema_link<W>(product: &Declaration<W>) -> String {
     let name = match product.content {
         Content::Document(schema) => schema().name,
         Content::Table(_) | Content::Foreign => return String::new(),
@@ -96,7 +128,12 @@ mod tests {
 
     #[test]
     fn names_of_our_columns_end_in_their_unit() {
-        let columns = PRODUCTS.iter().filter_map(|product| match product.content {
+        let of_nets = NET_PRODUCTS.iter().map(|product| &product.content);
+        let contents = PRODUCTS
+            .iter()
+            .map(|product| &product.content)
+            .chain(of_nets);
+        let columns = contents.filter_map(|content| match content {
             Content::Table(columns) => Some(columns()),
             _ => None,
         });

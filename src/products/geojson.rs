@@ -10,7 +10,7 @@ use serde::{Serialize, Serializer, ser::SerializeMap as _};
 use serde_json::{Map, Value, json};
 
 use super::{
-    coordinates::{FRAME, bounding_box_deg},
+    coordinates::bounding_box_deg,
     error::ProductError,
     files::{create, finish, open, to_value},
     gis::Features,
@@ -215,7 +215,7 @@ fn head(features: &Features) -> std::result::Result<String, ProductError> {
         ("type", json!("FeatureCollection")),
         ("name", json!(features.name)),
         ("crs", crs),
-        ("frame", json!(FRAME)),
+        ("frame", json!(features.frame)),
     ];
     if let Some(bounds) = bounding_box_deg(&features.points_deg()) {
         members.push(("bbox", to_value(&bounds)?));

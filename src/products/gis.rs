@@ -1,6 +1,6 @@
 //! Points with attributes, as formats for GIS take them.
 
-use super::table::Table;
+use super::{coordinates::FRAME, table::Table};
 
 /// The sphere of the CRS, and of `D_MARS` in Ames Stereo Pipeline, metres.
 pub(super) const SPHERE_RADIUS_M: f64 = 3_396_190.0;
@@ -18,15 +18,39 @@ pub(super) const POINT_Z_HEIGHT: &str =
 pub(super) struct Features<'a> {
     /// Name of the whole.
     pub(super) name: &'a str,
+    /// What a point is, in the plural: the table of a GeoPackage.
+    pub(super) table: &'static str,
     /// UTC of the newest, for formats that hold a date: a clock would give other bytes each time.
     pub(super) newest_utc: &'a str,
-    /// Longitude (-180..180), areocentric latitude, degrees, and height, metres: [`POINT_Z_HEIGHT`].
+    /// Whose longitudes and latitudes these are.
+    pub(super) frame: &'static str,
+    /// What the third coordinate is.
+    pub(super) z: &'static str,
+    /// Longitude (-180..180), areocentric latitude, degrees, and what `z` says.
     pub(super) points: Vec<[f64; 3]>,
     /// A row per point.
     pub(super) attributes: Table<'a>,
 }
 
-impl Features<'_> {
+impl<'a> Features<'a> {
+    /// Footprints by longitude, latitude and height.
+    pub(super) const fn of_footprints(
+        name: &'a str,
+        newest_utc: &'a str,
+        points: Vec<[f64; 3]>,
+        attributes: Table<'a>,
+    ) -> Self {
+        Self {
+            name,
+            table: "footprints",
+            newest_utc,
+            frame: FRAME,
+            z: POINT_Z_HEIGHT,
+            points,
+            attributes,
+        }
+    }
+
     /// Longitudes and latitudes, degrees.
     pub(super) fn points_deg(&self) -> Vec<[f64; 2]> {
         let points = self.points.iter();
@@ -65,6 +89,9 @@ pub(super) mod tests {
         ];
         Features {
             name: "a",
+            table: "footprints",
+            frame: "a frame",
+            z: POINT_Z_HEIGHT,
             newest_utc: "1999-08-24T14:12:13.000",
             points: vec![[0.1 + 0.2, -0.0, -1950.25], [2.0, -0.0, -1950.25]],
             attributes: Table::new(columns, vec![1.0, 2.0]),

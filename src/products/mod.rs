@@ -19,6 +19,7 @@ mod gis;
 mod heights;
 mod isd;
 mod kernel_report;
+mod net;
 mod orientation;
 mod page;
 mod parquet;
@@ -43,6 +44,7 @@ pub use exchange::{
     write_gcp, write_lidar_data,
 };
 pub use generated::{documentation, schemas};
+pub use net::{NetProducts, write_net_products};
 pub use product::Product;
 pub use site::{AdjustmentProducts, GeometricProducts, ImageProducts, SiteProducts};
 

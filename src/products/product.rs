@@ -17,8 +17,9 @@ pub struct Product {
     pub rows: u64,
 }
 
-/// A product, declared once: the files, the STAC item, `exchange/README.txt` and `docs/products.md` follow.
-pub(super) struct Declaration {
+/// A product, declared once: the files, the STAC item, `exchange/README.txt` and `docs/products.md` follow. `W` is how it is
+/// written: for a site by [`Write`].
+pub(super) struct Declaration<W = Write> {
     /// Path below the site's folder; [`IMAGE`] stands for an image's identifier.
     pub(super) path: &'static str,
     /// What the file holds.
@@ -32,7 +33,7 @@ pub(super) struct Declaration {
     /// Columns or schema.
     pub(super) content: Content,
     /// How it is written, for which sites.
-    pub(super) write: Write,
+    pub(super) write: W,
     /// How other programs are told to read it.
     pub(super) uses: &'static [Use],
 }
@@ -156,7 +157,9 @@ impl Declaration {
     pub(super) fn path_of(&self, image: &str) -> String {
         self.path.replace(IMAGE, image)
     }
+}
 
+impl<W> Declaration<W> {
     /// Media type by the ending of the name; `None` for formats that have none.
     pub(super) fn media_type(&self) -> Option<&'static str> {
         Some(match self.path.rsplit_once('.')?.1 {

@@ -27,6 +27,7 @@ mod images;
 mod map;
 mod misregistration;
 mod moved;
+mod net;
 mod notes;
 mod outlines;
 mod plots;
@@ -46,6 +47,7 @@ use crate::{error::Result, products::SiteProducts};
 
 pub use compare::{KernelComparison, comparison_page};
 pub use diff::difference_page;
+pub use net::net_page;
 pub use sites::{SiteLine, SiteSummary, sites_page};
 
 use section::Section;

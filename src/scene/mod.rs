@@ -30,6 +30,7 @@ mod mission;
 mod orbit;
 mod pedr;
 mod plan;
+mod plane;
 mod plane_net;
 mod random;
 mod roughness;
@@ -52,6 +53,7 @@ pub use error_sources::{
     SceneErrors,
 };
 pub use mission::write_scene;
+pub use plane::write_plane_scene;
 pub use plane_net::{PlaneRecipe, PlaneScene};
 
 /// How a mission is invented.

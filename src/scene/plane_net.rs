@@ -33,6 +33,16 @@ impl PlaneRecipe {
         controls: 12,
         control_sigma_m: 0.0,
     };
+
+    /// Twenty-five pictures of 25 km, as the tertiary net of the paper has them, 20 km apart, 500 points, exact.
+    pub const TERTIARY: Self = Self {
+        grid: [5, 5],
+        side_m: 25_000.0,
+        spacing_m: 20_000.0,
+        points: 500,
+        controls: 6,
+        ..Self::NINE
+    };
 }
 
 /// An invented net and what is true of it.

@@ -25,3 +25,4 @@ pub mod site_image;
 pub mod tabulate_kernels;
 pub mod tag_times;
 pub mod tag_utc;
+pub mod triangulate;

@@ -76,8 +76,13 @@ pub mod figures {
     /// A posteriori standard deviation of unit weight of the adjustment.
     pub const ADJUSTMENT_SIGMA0: &str = "adjustment_sigma0";
 
+    /// Root mean square deviation of images of ties in a net of pictures, the larger coordinate, metres.
+    pub const TIE_DEVIATION_RMS_M: &str = "tie_deviation_rms_m";
+    /// Root mean square residual of the kept controls of a net, the larger coordinate, metres.
+    pub const CONTROL_RESIDUAL_RMS_M: &str = "control_residual_rms_m";
+
     /// All of them, and what they are.
-    const ALL: [(&str, &str); 6] = [
+    const ALL: [(&str, &str); 8] = [
         (
             RANGE_MEAN_M,
             "Largest |mean| of range minus distance of a profile, metres.",
@@ -101,6 +106,14 @@ pub mod figures {
         (
             ADJUSTMENT_SIGMA0,
             "A posteriori standard deviation of unit weight of the adjustment.",
+        ),
+        (
+            TIE_DEVIATION_RMS_M,
+            "Root mean square deviation of images of ties in a net of pictures, the larger coordinate, metres.",
+        ),
+        (
+            CONTROL_RESIDUAL_RMS_M,
+            "Root mean square residual of the kept controls of a net, the larger coordinate, metres.",
         ),
     ];
 

@@ -4,21 +4,11 @@ use toml::Value;
 
 use super::described::{Accept, DescribedKey, DescribedTable, Example, ValueKind};
 
-const HEADER: &str = "\
-# Site configuration of areograph, every key with its unit, range and default.
-#
-# Only `site`, one source of kernels, and either [pedr] with [[windows]] or [[images]] are required;
-# a key that is left out has the default written here. Relative paths count from this file's folder.
-# Angles are degrees, exposures milliseconds, times seconds; longitudes are east, latitudes
-# areocentric, both in the IAU 2000 frame of Mars. Schema: ../schema/site.schema.json
-
-";
-
-/// The text of the example file for `site`, the table that is the file itself.
-pub(in crate::config) fn example(site: &DescribedTable) -> String {
-    let mut text = HEADER.to_owned();
-    keys(site, 0, &mut text);
-    for below in &site.tables {
+/// The text of the example file for `file`, the table that is the file itself, below `header`.
+pub(in crate::config) fn example(header: &str, file: &DescribedTable) -> String {
+    let mut text = header.to_owned();
+    keys(file, 0, &mut text);
+    for below in &file.tables {
         table(below, &mut text);
     }
     text

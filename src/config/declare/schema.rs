@@ -6,15 +6,16 @@ use toml::Value;
 
 use super::described::{Accept, DescribedKey, DescribedTable, ValueKind};
 
-const DESCRIPTION: &str = "The TOML file of one site as JSON. areograph checks more than a schema can: files \
-     that are there, order within windows, agreement between keys.";
-
-/// The JSON Schema of the file whose table is `site`.
-pub(in crate::config) fn schema(site: &DescribedTable) -> impl Serialize + use<> {
+/// The JSON Schema of the file whose table is `file`.
+pub(in crate::config) fn schema(
+    title: &'static str,
+    description: &str,
+    file: &DescribedTable,
+) -> impl Serialize + use<> {
     Schema {
         schema: Some("https://json-schema.org/draft/2020-12/schema"),
-        title: Some("Site configuration of areograph"),
-        ..of_table(site, DESCRIPTION.to_owned())
+        title: Some(title),
+        ..of_table(file, description.to_owned())
     }
 }
 

@@ -246,12 +246,9 @@ fn shown_points(net: &Net, figures: &[Figure]) -> Vec<bool> {
     shown
 }
 
-fn join(
-    net: &Net,
-    figures: &[Figure],
-    controls: Vec<Control>,
-    unshrunk: bool,
-) -> Result<Block, PlaneError> {
+/// The net whose pictures are the figures of bricks, without controls.
+#[must_use]
+pub fn bricks_as_pictures(net: &Net, figures: &[Figure]) -> Net {
     let measurements = figures.iter().enumerate().flat_map(|(brick, figure)| {
         let places = figure.places.iter();
         places.map(move |(point, at)| Measurement {
@@ -260,11 +257,23 @@ fn join(
             at: *at,
         })
     });
-    let of_bricks = Net {
+    Net {
         pictures: figures.len(),
         points: net.points,
         measurements: measurements.collect(),
+        controls: Vec::new(),
+    }
+}
+
+fn join(
+    net: &Net,
+    figures: &[Figure],
+    controls: Vec<Control>,
+    unshrunk: bool,
+) -> Result<Block, PlaneError> {
+    let of_bricks = Net {
         controls,
+        ..bricks_as_pictures(net, figures)
     };
     let mut solution = solve(&of_bricks)?;
     let shrinkage = Shrinkage::of(&of_bricks, &solution).filter(|_| unshrunk);

@@ -34,7 +34,7 @@ mod solve;
 pub type Place = nalgebra::Complex<f64>;
 
 pub use blunders::{Blunder, Cleaned, FLAG_LIMIT, clean, robust_sigma};
-pub use bricks::{Block, Figure, brick, extend, local, mortar};
+pub use bricks::{Block, Figure, brick, bricks_as_pictures, extend, local, mortar};
 pub use check::check;
 pub use controls::{Scaled, fit_similarity, scale};
 pub use film::{CornerZero, FilmError, FourCorners, box_centre};

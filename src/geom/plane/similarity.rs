@@ -43,7 +43,7 @@ impl Similarity {
         self.turn.norm()
     }
 
-    /// Angle from the picture's axes to the map's, anticlockwise, radians: `θ = atan2(Q, P)`.
+    /// Angle from the map's x axis to the picture's on the map, anticlockwise, radians: `θ = atan2(Q, P)`.
     #[must_use]
     pub fn angle_rad(&self) -> f64 {
         self.turn.arg()

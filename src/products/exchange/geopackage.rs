@@ -1,4 +1,4 @@
-//! Footprints as a GeoPackage (OGC 12-128r18, version 1.3): three-dimensional points, one table.
+//! Points as a GeoPackage (OGC 12-128r18, version 1.3): three-dimensional points, one table.
 //!
 //! SQLite itself writes the file. There is no spatial index: it is an extension, and readers make their own.
 
@@ -9,11 +9,10 @@ use rusqlite::{Connection, OpenFlags, params, params_from_iter, types::Value};
 use crate::{
     error::{Error, IoError, Locate, Result},
     products::{
-        coordinates::FRAME,
         error::ProductError,
         files::{create, finish, open},
         footprints::features,
-        gis::{CRS_NAME, CRS_WKT, Features, POINT_Z_HEIGHT},
+        gis::{CRS_NAME, CRS_WKT, Features},
         product::{Content, Declaration, Program, Role, Use, Write},
         table::{Kind, Meaning, Table, Values},
     },
@@ -67,7 +66,7 @@ const WGS84_WKT: &str = "GEOGCS[\"WGS 84\",DATUM[\"WGS_1984\",SPHEROID[\"WGS 84\
 ///
 /// # Errors
 /// Numbers that are not finite; what the disk or SQLite refuses; rows that come back different.
-fn write(path: &Path, features: Features) -> Result<u64> {
+pub(in crate::products) fn write(path: &Path, features: Features) -> Result<u64> {
     let features = Features {
         attributes: features.attributes.for_gis(),
         ..features
@@ -84,7 +83,7 @@ fn write(path: &Path, features: Features) -> Result<u64> {
 }
 
 /// The statement that makes the table of the points.
-fn create_table(attributes: &Table) -> String {
+fn create_table(table: &str, attributes: &Table) -> String {
     let column = |column: &Meaning| {
         let kind = match column.kind {
             Kind::Real => "DOUBLE",
@@ -98,7 +97,7 @@ fn create_table(attributes: &Table) -> String {
     };
     let columns: String = attributes.columns().map(column).collect();
     format!(
-        "CREATE TABLE footprints (fid INTEGER PRIMARY KEY AUTOINCREMENT NOT NULL, geom POINT NOT NULL{columns})"
+        "CREATE TABLE {table} (fid INTEGER PRIMARY KEY AUTOINCREMENT NOT NULL, geom POINT NOT NULL{columns})"
     )
 }
 
@@ -152,7 +151,7 @@ fn refused(error: rusqlite::Error) -> Error {
 fn fill(path: &Path, features: &Features) -> Result<()> {
     let database = Connection::open(path).map_err(refused)?;
     database.execute_batch(LAYOUT).map_err(refused)?;
-    let table = create_table(&features.attributes);
+    let table = create_table(features.table, &features.attributes);
     database.execute_batch(&table).map_err(refused)?;
     describe(&database, features).map_err(refused)?;
     let names = names(&features.attributes);
@@ -163,7 +162,8 @@ fn fill(path: &Path, features: &Features) -> Result<()> {
         .join(", ");
     let mut insert = database
         .prepare(&format!(
-            "INSERT INTO footprints ({names}) VALUES ({places})"
+            "INSERT INTO {} ({names}) VALUES ({places})",
+            features.table
         ))
         .map_err(refused)?;
     each(features, |row| {
@@ -182,7 +182,7 @@ fn describe(database: &Connection, features: &Features) -> rusqlite::Result<()> 
         ("Undefined Cartesian SRS", -1, "NONE", "undefined", ""),
         ("Undefined geographic SRS", 0, "NONE", "undefined", ""),
         ("WGS 84 geodetic", 4326, "EPSG", WGS84_WKT, "the Earth"),
-        (CRS_NAME, SRS_ID, "IAU_2015", CRS_WKT, FRAME),
+        (CRS_NAME, SRS_ID, "IAU_2015", CRS_WKT, features.frame),
     ] {
         let row = params![name, id, organization, id, definition, description];
         database.execute(systems, row)?;
@@ -190,10 +190,11 @@ fn describe(database: &Connection, features: &Features) -> rusqlite::Result<()> 
     let axis = |axis: usize| ends(features.points.iter().map(|point| point[axis]));
     let ([west, east], [south, north]) = (axis(0), axis(1));
     database.execute(
-        "INSERT INTO gpkg_contents VALUES ('footprints', 'features', ?, ?, ?, ?, ?, ?, ?, ?)",
+        "INSERT INTO gpkg_contents VALUES (?, 'features', ?, ?, ?, ?, ?, ?, ?, ?)",
         params![
+            features.table,
             features.name,
-            POINT_Z_HEIGHT,
+            features.z,
             format!("{}Z", features.newest_utc),
             west,
             south,
@@ -203,8 +204,8 @@ fn describe(database: &Connection, features: &Features) -> rusqlite::Result<()> 
         ],
     )?;
     database.execute(
-        "INSERT INTO gpkg_geometry_columns VALUES ('footprints', 'geom', 'POINT', ?, 1, 0)",
-        params![SRS_ID],
+        "INSERT INTO gpkg_geometry_columns VALUES (?, 'geom', 'POINT', ?, 1, 0)",
+        params![features.table, SRS_ID],
     )?;
     Ok(())
 }
@@ -240,7 +241,10 @@ fn read_back(path: &Path, features: &Features) -> Result<()> {
     let names = names(&features.attributes);
     let columns = names.split(", ").count();
     let mut select = database
-        .prepare(&format!("SELECT {names} FROM footprints ORDER BY fid"))
+        .prepare(&format!(
+            "SELECT {names} FROM {} ORDER BY fid",
+            features.table
+        ))
         .map_err(unreadable)?;
     let mut found = select
         .query_map([], |row| {
@@ -252,12 +256,12 @@ fn read_back(path: &Path, features: &Features) -> Result<()> {
     each(features, |expected| {
         rows += 1;
         if found.next().transpose().map_err(unreadable)? != Some(expected) {
-            return differs(format!("footprint {rows}"));
+            return differs(format!("row {rows} of {}", features.table));
         }
         Ok(())
     })?;
     if found.next().is_some() {
-        return differs(format!("more than {rows} footprints"));
+        return differs(format!("more than {rows} {}", features.table));
     }
     Ok(())
 }
@@ -280,13 +284,13 @@ mod tests {
         for (number, (change, complaint)) in [
             (
                 "UPDATE footprints SET et_s = 1.414213562373095 WHERE fid = 2",
-                "footprint 2",
+                "row 2 of footprints",
             ),
-            ("DELETE FROM footprints WHERE fid = 1", "footprint 1"),
-            ("DELETE FROM footprints WHERE fid = 2", "footprint 2"),
+            ("DELETE FROM footprints WHERE fid = 1", "row 1 of footprints"),
+            ("DELETE FROM footprints WHERE fid = 2", "row 2 of footprints"),
             (
                 "UPDATE footprints SET geom = substr(geom, 1, 30) WHERE fid = 1",
-                "footprint 1",
+                "row 1 of footprints",
             ),
             (
                 "INSERT INTO footprints SELECT 3, geom, et_s, utc, orbit, source_file FROM footprints WHERE fid = 1",

@@ -1,0 +1,183 @@
+//! Why a net has no solution, with the names of its pictures and points.
+
+use crate::{
+    error::{Cause, Kind},
+    geom::plane::{FilmError, PlaneError},
+};
+
+/// A net without a solution.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum NetError {
+    /// The tables hold no measurement.
+    #[error("no table holds a measurement")]
+    NoMeasurement,
+    /// Fewer than two controls that a picture shows.
+    #[error("controls that a picture shows: {found}; expected two or more")]
+    TooFewControls {
+        /// How many there are.
+        found: usize,
+    },
+    /// A picture, or a brick, and what hangs on it can turn, shrink or move.
+    #[error(
+        "UnderconnectedPicture: {what} {name} has ties and controls: {ties}; expected two or more that lie apart, on a \
+         part of the net that has two controls"
+    )]
+    Underconnected {
+        /// `picture` or `brick`.
+        what: &'static str,
+        /// Its name.
+        name: String,
+        /// Its points that are ties or controls.
+        ties: usize,
+    },
+    /// Two points of a picture have one place.
+    #[error("points {first} and {second} have the same place in picture {picture}")]
+    EqualPoints {
+        /// The picture.
+        picture: String,
+        /// One point.
+        first: String,
+        /// The other.
+        second: String,
+    },
+    /// Two controls have one place.
+    #[error("controls {first} and {second} have the same place on the map")]
+    EqualControls {
+        /// One point.
+        first: String,
+        /// The other.
+        second: String,
+    },
+    /// A picture is a mirror image.
+    #[error("picture {picture} is a mirror image of what its neighbours show")]
+    MirroredPicture {
+        /// The picture.
+        picture: String,
+    },
+    /// All pictures are.
+    #[error("the pictures are a mirror image of the controls")]
+    MirroredFigure,
+    /// A picture has another size than its table says.
+    #[error(
+        "WrongUnits: a unit of picture {picture} is {found_m:.4e} m on the map; expected {expected_m:.4e} m within a factor of 2"
+    )]
+    WrongUnits {
+        /// The picture.
+        picture: String,
+        /// Adjusted size of a unit, metres.
+        found_m: f64,
+        /// Size by its table, metres.
+        expected_m: f64,
+    },
+    /// A control that the map does not hold.
+    #[error(
+        "WrongUnits: control {point} is {x_m:.4e} m east and {y_m:.4e} m north; the map reaches {limit_m:.4e} m"
+    )]
+    BeyondTheMap {
+        /// The point.
+        point: String,
+        /// East, metres.
+        x_m: f64,
+        /// North, metres.
+        y_m: f64,
+        /// How far the map reaches, metres.
+        limit_m: f64,
+    },
+    /// A control at a place that the projection does not have.
+    #[error("control {point} is at a place that the projection does not show")]
+    NotOnTheMap {
+        /// The point.
+        point: String,
+    },
+    /// Ticks that give no correction.
+    #[error("the film of picture {picture}: {problem}")]
+    Film {
+        /// The picture.
+        picture: String,
+        /// What is wrong.
+        problem: String,
+    },
+}
+
+impl Cause for NetError {
+    fn kind(&self) -> Kind {
+        Kind::Input
+    }
+
+    fn advice(&self) -> String {
+        match self {
+            Self::NoMeasurement => "give tables with measurements in measurements.files",
+            Self::TooFewControls { .. } => {
+                "give two controls at least, under the names that the measurements have for the points"
+            }
+            Self::Underconnected { .. } => {
+                "measure more points that it shares with its neighbours, or leave its measurements out"
+            }
+            Self::EqualPoints { .. } | Self::EqualControls { .. } => {
+                "one place is one point: give both the same name, or correct one of them"
+            }
+            Self::MirroredPicture { .. } => {
+                "change the sign of one coordinate of this picture, which may have been measured from the back of the film"
+            }
+            Self::MirroredFigure => "set measurements.y_axis to the way in which y counts in the pictures",
+            Self::WrongUnits { .. } => {
+                "check metres_per_unit of the picture, and the units in which controls and measurements are given"
+            }
+            Self::BeyondTheMap { .. } => {
+                "check the unit that the column names, x_m or x_km, and the map of the configuration"
+            }
+            Self::NotOnTheMap { .. } => "choose another projection in the table map",
+            Self::Film { .. } => {
+                "give the four corner ticks of the picture, and none or all four of the mid-edge ticks"
+            }
+        }
+        .to_owned()
+    }
+}
+
+/// Gives failures of the solver their names.
+pub(super) struct Names<'a> {
+    pub(super) pictures: &'a [String],
+    pub(super) points: &'a [String],
+}
+
+impl Names<'_> {
+    /// The failure with the names of the net; pictures are called `what`.
+    pub(super) fn of(&self, error: PlaneError, what: &'static str) -> NetError {
+        let picture = |index: usize| self.pictures[index].clone();
+        let point = |index: usize| self.points[index].clone();
+        match error {
+            PlaneError::TooFewControls { found } => NetError::TooFewControls { found },
+            PlaneError::UnderconnectedPicture { picture: at, ties } => NetError::Underconnected {
+                what,
+                name: picture(at),
+                ties,
+            },
+            PlaneError::EqualPoints {
+                picture: at,
+                first,
+                second,
+            } => NetError::EqualPoints {
+                picture: picture(at),
+                first: point(first),
+                second: point(second),
+            },
+            PlaneError::EqualControls { first, second } => NetError::EqualControls {
+                first: point(first),
+                second: point(second),
+            },
+            PlaneError::MirroredPicture { picture: at } => NetError::MirroredPicture {
+                picture: picture(at),
+            },
+            PlaneError::MirroredFigure => NetError::MirroredFigure,
+        }
+    }
+}
+
+/// A film that gives no correction.
+pub(super) fn film(picture: &str, problem: FilmError) -> NetError {
+    NetError::Film {
+        picture: picture.to_owned(),
+        problem: problem.to_string(),
+    }
+}

@@ -1,0 +1,110 @@
+//! The verdict on a net.
+
+use super::result::{BrickResult, ControlResult, Seams, Totals};
+use crate::stages::judge::Verdict;
+
+/// Share of measurements that may be blunders in a net that is to be used.
+const REMOVED_MAX: f64 = 0.1;
+
+/// What is known of a net when it is judged.
+pub(super) struct Evidence<'a> {
+    pub(super) totals: &'a Totals,
+    pub(super) bricks: &'a [BrickResult],
+    pub(super) seams: Option<&'a Seams>,
+    pub(super) controls: &'a [ControlResult],
+    pub(super) measurements: usize,
+    pub(super) complaints: u64,
+    pub(super) remarks: &'a [String],
+}
+
+/// Share of flagged measurements that a good net has: two in a thousand lie beyond the limit by chance.
+const FLAGGED_MAX: f64 = 0.01;
+
+/// A net is invalid when nothing controls its measurements, or too many of them are blunders.
+pub(super) fn judge(of: &Evidence) -> Verdict {
+    let totals = of.totals;
+    let mut reasons = Vec::new();
+    if totals.redundancy == 0 {
+        reasons.push(
+            "no equation is left over: nothing tells a wrong measurement from a right one"
+                .to_owned(),
+        );
+    }
+    if totals.removed as f64 > REMOVED_MAX * of.measurements as f64 {
+        reasons.push(format!(
+            "{} of {} measurements were left out as blunders; expected a tenth at most",
+            totals.removed, of.measurements
+        ));
+    }
+    Verdict {
+        valid: reasons.is_empty(),
+        reasons,
+        remarks: remarks(of),
+    }
+}
+
+fn remarks(of: &Evidence) -> Vec<String> {
+    let totals = of.totals;
+    let mut remarks = of.remarks.to_vec();
+    let mut say = |when: bool, text: String| {
+        if when {
+            remarks.push(text);
+        }
+    };
+    let blundered: Vec<&str> = of
+        .bricks
+        .iter()
+        .filter(|brick| brick.removed > 0)
+        .map(|brick| &*brick.brick)
+        .collect();
+    say(
+        totals.removed > 0,
+        format!(
+            "measurements left out as blunders: {}, in the bricks: {}",
+            totals.removed,
+            blundered.join(", ")
+        ),
+    );
+    say(
+        totals.flagged as f64 > FLAGGED_MAX * of.measurements as f64,
+        format!(
+            "{} measurements in use are beyond 3.5 robust standard deviations",
+            totals.flagged
+        ),
+    );
+    let rejected: Vec<&str> = of
+        .controls
+        .iter()
+        .filter(|control| !control.kept)
+        .map(|control| &*control.point)
+        .collect();
+    say(
+        !rejected.is_empty(),
+        format!("controls left out by SCALE: {}", rejected.join(", ")),
+    );
+    let kept = of.controls.len() - rejected.len();
+    say(
+        kept < 5,
+        format!("{kept} controls: a gross error of one could not be told from the others"),
+    );
+    say(
+        kept == 2 && of.controls.iter().all(|control| control.sigma_m.is_none()),
+        "two controls without standard deviations: those of the points count from them".to_owned(),
+    );
+    say(
+        of.complaints > 0,
+        format!("rows of tables left out: {}", of.complaints),
+    );
+    if let (Some(seams), Some(sigma_m)) = (of.seams, totals.tie_sigma_m) {
+        let [x, y] = seams.rms_m;
+        say(
+            x.max(y) > 3.0 * sigma_m,
+            format!(
+                "bricks differ at their seams by {:.1} m (rms), measurements within bricks by {sigma_m:.1} m: a brick may \
+                 be bent",
+                x.max(y)
+            ),
+        );
+    }
+    remarks
+}

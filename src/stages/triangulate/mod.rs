@@ -1,0 +1,84 @@
+//! Plane triangulation of a net of rectified pictures: bricks, figure, map, standard deviations and blunders.
+
+mod error;
+mod judge;
+mod lay;
+mod place;
+mod read;
+mod result;
+mod run;
+mod spread;
+mod write;
+
+use std::{path::PathBuf, sync::atomic::AtomicBool};
+
+use crate::{
+    config::NetConfig,
+    error::Result,
+    files::HashedFile,
+    stage::{InOrder, Input, Inputs, Stage},
+    stage_inputs,
+};
+
+pub use error::NetError;
+pub use read::{NetData, read_net};
+pub use result::{
+    BrickResult, ControlResult, Deviation, MeasurementResult, PictureResult, PointResult, Seams,
+    ShrinkageResult, Totals, Triangulation,
+};
+
+stage_inputs! {
+    /// A net and its files.
+    pub struct Triangulate<'a> {
+        /// The configuration of the net.
+        pub net: NetKeys<'a>,
+        /// Its files with their hashes.
+        pub files: NetFiles<'a>,
+    }
+}
+
+/// What of a net's configuration enters the result.
+#[derive(Debug)]
+pub struct NetKeys<'a>(pub &'a NetConfig);
+
+impl Input for NetKeys<'_> {
+    fn add_to(&self, _field: &str, inputs: &mut Inputs) {
+        inputs.setting("measurements", &self.0.measurements);
+        inputs.setting("controls", &self.0.controls);
+        inputs.setting("map", &self.0.map);
+        inputs.setting("triangulation", &self.0.triangulation);
+    }
+}
+
+/// The files of a net, in order.
+#[derive(Debug)]
+pub struct NetFiles<'a>(pub &'a [HashedFile]);
+
+impl Input for NetFiles<'_> {
+    fn add_to(&self, _field: &str, inputs: &mut Inputs) {
+        InOrder(self.0).add_to("table", inputs);
+    }
+}
+
+impl Stage for Triangulate<'_> {
+    const NAME: &'static str = "triangulate";
+    type Output = Triangulation;
+    stage_inputs!(fingerprint);
+
+    fn run(&self, _stop: &AtomicBool) -> Result<Triangulation> {
+        let data = read_net(self.net.0)?;
+        Ok(run::triangulate(self.net.0, &data)?)
+    }
+}
+
+/// Every file that a net names, tables of one kind after those of another.
+#[must_use]
+pub fn net_files(net: &NetConfig) -> Vec<PathBuf> {
+    let kinds = [
+        &net.measurements.files,
+        &net.controls.files,
+        &net.pictures.files,
+        &net.film.files,
+    ];
+    kinds.into_iter().flatten().cloned().collect()
+}
