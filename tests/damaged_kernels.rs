@@ -21,8 +21,11 @@ use common::{
 };
 use tempfile::tempdir;
 
+/// Its name, and what it makes of a word.
+type Damage = (&'static str, fn(f64) -> f64);
+
 /// What a damaged word may become.
-const DAMAGE: [(&str, fn(f64) -> f64); 7] = [
+const DAMAGE: [Damage; 7] = [
     ("large", |_| 1e300),
     ("negative", |value| -value - 1.0),
     ("NaN", |_| f64::NAN),

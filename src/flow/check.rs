@@ -107,13 +107,14 @@ impl<'a> Check<'a> {
 
     /// Orbit and orientation with one set of kernels.
     fn check_kernels(&mut self, config: &SiteConfig, prepared: Prepared, set: usize) -> Flow<()> {
-        let kernels = kernels(self, config, prepared.required.as_ref(), set)?;
-        if let Some(kernels) = &kernels {
-            for line in kernels.explanation() {
-                self.tell(line);
-            }
+        let Some(kernels) = kernels(self, config, prepared.required.as_ref(), set)? else {
+            // The failure is noted; without kernels every time would be a gap.
+            return Ok(());
+        };
+        for line in kernels.explanation() {
+            self.tell(line);
         }
-        orient(self, config, prepared, kernels).map(|_| ())
+        orient(self, config, prepared, Some(kernels)).map(|_| ())
     }
 
     fn tell(&mut self, finding: &str) {
@@ -122,12 +123,17 @@ impl<'a> Check<'a> {
             .push(format!("{}{finding}", self.prefix));
     }
 
-    /// Notes a finding or a failure; whether it was a finding.
+    /// Notes a finding or a failure, each failure once: kernels are read for clocks and for orbits; whether it was a
+    /// finding.
     fn note<T>(&mut self, stage: &str, result: Result<T>) -> Option<T> {
         match result.in_stage(stage).in_site(self.site) {
             Ok(found) => Some(found),
             Err(failure) => {
-                self.checked.failures.push(failure);
+                let told = failure.to_string();
+                let failures = &mut self.checked.failures;
+                if failures.iter().all(|earlier| earlier.to_string() != told) {
+                    failures.push(failure);
+                }
                 None
             }
         }

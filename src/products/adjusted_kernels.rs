@@ -233,12 +233,13 @@ const fn positions(light_time: LightTime) -> &'static str {
         LightTime::Surface => {
             "They were adjusted with light time to the\n\
              surface and aberration: the position of an exposure is that of the instant at which the light left\n\
-             the ground. Programs that see MGS from the centre of Mars (LT+S: ISIS, ALE) place it elsewhere."
+             the ground. Programs that see the spacecraft from the centre of Mars (LT+S: ISIS, ALE) place it\n\
+             elsewhere."
         }
         LightTime::None => {
             "They were adjusted without light time:\n\
-             the position of an exposure is that of its instant. Programs that see MGS from the centre of Mars\n\
-             (LT+S: ISIS, ALE) place it elsewhere."
+             the position of an exposure is that of its instant. Programs that see the spacecraft from the centre\n\
+             of Mars (LT+S: ISIS, ALE) place it elsewhere."
         }
         LightTime::Centre => {
             "They were adjusted as seen from the centre\n\

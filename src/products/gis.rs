@@ -4,7 +4,7 @@ use super::{coordinates::FRAME, table::Table};
 
 /// The sphere of the CRS, and of `D_MARS` in Ames Stereo Pipeline, metres.
 pub(super) const SPHERE_RADIUS_M: f64 = 3_396_190.0;
-/// `IAU_2015:49900`; [`FRAME`](super::coordinates::FRAME) says whose longitudes the coordinates are.
+/// `IAU_2015:49900`; [`FRAME`] says whose longitudes the coordinates are.
 pub(super) const CRS_NAME: &str = "Mars (2015) - Sphere / Ocentric";
 /// The same as text for GIS.
 pub(super) const CRS_WKT: &str = "GEOGCS[\"Mars (2015) - Sphere / Ocentric\",DATUM[\"Mars (2015) - Sphere\",\

@@ -7,8 +7,9 @@ use serde::Serialize;
 use super::{
     daf,
     ffi::Cspice,
-    kernels::{KernelRole, KernelSet},
+    kernels::KernelSet,
     needs::{CLOCKS, explain},
+    role::KernelRole,
 };
 use crate::{
     constants::{NAIF_MARS, SPACECRAFT},

@@ -12,7 +12,7 @@ use std::{
     path::Path,
 };
 
-use super::{error::SpiceError, kernels::KernelRole};
+use super::{error::SpiceError, role::KernelRole};
 use crate::error::{IoError, Locate, Result};
 
 /// Bytes of a DAF record.
@@ -152,9 +152,12 @@ impl Reader {
             .and_then(|_| self.file.read_exact(&mut bytes))
             .map_err(IoError::on("read kernel"))?;
         let (words, _) = bytes.as_chunks::<WORD_SIZE>();
-        let double = |word: &[u8; WORD_SIZE]| match self.big_endian {
-            true => f64::from_be_bytes(*word),
-            false => f64::from_le_bytes(*word),
+        let double = |word: &[u8; WORD_SIZE]| {
+            if self.big_endian {
+                f64::from_be_bytes(*word)
+            } else {
+                f64::from_le_bytes(*word)
+            }
         };
         Ok(words.iter().map(double).collect())
     }

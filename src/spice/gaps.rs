@@ -1,6 +1,6 @@
 //! Making sure that kernels hold what is needed, and telling which gap is in the way.
 
-use super::{coverage::RequiredCoverage, error::SpiceError, kernels::KernelRole, session::Session};
+use super::{coverage::RequiredCoverage, error::SpiceError, role::KernelRole, session::Session};
 use crate::{
     constants::SPACECRAFT,
     error::Result,

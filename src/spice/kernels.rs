@@ -1,7 +1,6 @@
 //! Kernel files: what they are, by their content, and in which order they are loaded.
 
 use std::{
-    fmt,
     fs::{self, File},
     io::Read,
     path::{Path, PathBuf},
@@ -9,7 +8,7 @@ use std::{
 
 use serde::Serialize;
 
-use super::{daf, error::SpiceError, ffi, text_kernel};
+use super::{daf, error::SpiceError, ffi, role::KernelRole, text_kernel};
 use crate::{
     error::{IoError, Locate, Result},
     files::{InputFiles, file_name, hash_file},
@@ -20,43 +19,6 @@ const TEXT_SIZE_MAX: u64 = 64 << 20;
 /// What a file should have been, for messages.
 const EXPECTED: &str =
     "a binary SPK, CK or PCK (DAF/...) or a text kernel with a \\begindata block";
-
-/// What a kernel is for.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum KernelRole {
-    /// Leap seconds.
-    Lsk,
-    /// Spacecraft clock.
-    Sclk,
-    /// Planetary constants.
-    Pck,
-    /// Frame definitions.
-    Fk,
-    /// Instrument.
-    Ik,
-    /// Ephemerides.
-    Spk,
-    /// Attitude.
-    Ck,
-    /// A list of kernels.
-    Meta,
-}
-
-impl fmt::Display for KernelRole {
-    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        formatter.write_str(match self {
-            Self::Lsk => "LSK",
-            Self::Sclk => "SCLK",
-            Self::Pck => "PCK",
-            Self::Fk => "FK",
-            Self::Ik => "IK",
-            Self::Spk => "SPK",
-            Self::Ck => "CK",
-            Self::Meta => "MK",
-        })
-    }
-}
 
 /// A kernel file as it was when it was chosen.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]

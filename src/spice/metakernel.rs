@@ -10,7 +10,8 @@ use std::{
 
 use super::{
     error::SpiceError,
-    kernels::{Kernel, KernelRole, KernelSet, read_text, role_of},
+    kernels::{Kernel, KernelSet, read_text, role_of},
+    role::KernelRole,
     text_kernel::{self, Assignment, Value, values_of},
 };
 use crate::{

@@ -4,7 +4,8 @@ use std::{borrow::Cow, sync::LazyLock};
 
 use super::{
     error::SpiceError,
-    kernels::{Kernel, KernelRole, KernelSet, read_text},
+    kernels::{Kernel, KernelSet, read_text},
+    role::KernelRole,
     text_kernel::{self, values_of},
 };
 use crate::{constants::SPACECRAFT, instruments::Instrument};

@@ -2,12 +2,7 @@
 
 use std::path::PathBuf;
 
-use super::{
-    coverage::interval_of,
-    daf,
-    ffi::Cspice,
-    kernels::{KernelRole, KernelSet},
-};
+use super::{coverage::interval_of, daf, ffi::Cspice, kernels::KernelSet, role::KernelRole};
 use crate::{
     constants::SPACECRAFT,
     time::{Et, Interval},

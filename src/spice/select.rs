@@ -10,8 +10,9 @@ use super::{
     coverage::{RequiredCoverage, interval_of},
     daf::{self, Segment},
     error::SpiceError,
-    kernels::{KernelRole, KernelSet, read_text, role_of},
+    kernels::{KernelSet, read_text, role_of},
     needs::{BUS_FRAME, CLOCK, LEAP_SECONDS, MARS, Need, camera_frame},
+    role::KernelRole,
     session::Session,
     text_kernel::{self, Assignment, values_of},
 };

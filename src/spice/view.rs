@@ -2,11 +2,7 @@
 
 use std::cell::OnceCell;
 
-use super::{
-    daf,
-    kernels::{KernelRole, KernelSet},
-    session::Session,
-};
+use super::{daf, kernels::KernelSet, role::KernelRole, session::Session};
 use crate::{
     error::Result,
     stage::{Input, Inputs},

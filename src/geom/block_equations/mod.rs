@@ -1,8 +1,8 @@
 //! Symmetric equations of many unknowns in blocks, most of which do not occur together.
 //!
 //! Images that share no point have no block between them. In an order that keeps neighbours together
-//! ([`ordering`]) the factor fills nothing but an envelope about the diagonal ([`factor`]), and the part of the
-//! inverse that covariances need lies in the same envelope ([`inverse`]). For `n` images whose envelope is `b` wide,
+//! (`ordering`) the factor fills nothing but an envelope about the diagonal (`factor`), and the part of the
+//! inverse that covariances need lies in the same envelope (`inverse`). For `n` images whose envelope is `b` wide,
 //! with `m` unknowns each, memory is `n b m²`, the factor costs `n b² m³` and the inverse twice that.
 //!
 //! # Source

@@ -2,7 +2,7 @@
 //!
 //! Pictures that are rectified, or nearly vertical, differ from a conformal map by a similarity: four unknowns each,
 //! in which the equations from picture to map are linear. Places are complex numbers, `x + i y`, and so are the two
-//! unknowns of a picture, which halves every system. There is one solver ([`solve`]); the five programs of the paper are
+//! unknowns of a picture, which halves every system. There is one solver ([`solve()`]); the five programs of the paper are
 //! ways to use it.
 //!
 //! | program | here |

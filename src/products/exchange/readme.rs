@@ -79,7 +79,7 @@ fn text(of: &Context) -> String {
 fn light_time(light_time: LightTime) -> String {
     let others = match light_time {
         LightTime::Surface | LightTime::None => {
-            "ISIS and ALE see MGS from the centre of Mars instead (LT+S), some 10 lines away: what they are given here, lidar\n\
+            "ISIS and ALE see the spacecraft from the centre of Mars instead (LT+S), some 10 lines away: what they are given here, lidar\n\
              data, ground control and adjusted kernels, fits them after a run with light_time = \"centre\"."
         }
         LightTime::Centre => {

@@ -4,7 +4,7 @@ use super::{
     Reader, Segment,
     layout::{DIRECTORY_STEP, Layout, List, Packet, layout},
 };
-use crate::{error::Error, spice::kernels::KernelRole};
+use crate::{error::Error, spice::role::KernelRole};
 
 /// Words read at a time.
 const CHUNK_WORDS: usize = 1 << 16;
@@ -177,7 +177,7 @@ fn check_differences(index: usize, lines: usize, words: &[f64]) -> Result<(), St
     };
     if let Some(of_axis) = counts[1..]
         .iter()
-        .find(|count| !super::whole(**count).is_some_and(|count| count <= lines))
+        .find(|count| super::whole(**count).is_none_or(|count| count > lines))
     {
         return Err(format!(
             "record {} has {of_axis} differences on an axis",

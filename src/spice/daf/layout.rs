@@ -3,7 +3,7 @@
 //! Source: NAIF, SPK, CK and PCK Required Reading, one section for each type.
 
 use super::whole;
-use crate::spice::kernels::KernelRole;
+use crate::spice::role::KernelRole;
 
 /// Entries of a time list between two entries of its directory.
 pub(super) const DIRECTORY_STEP: usize = 100;
@@ -203,7 +203,7 @@ fn chebyshev(tail: &Tail, components: usize) -> Result<Option<Layout>, String> {
     let length_s = tail.positive(3, "length of a record")?;
     let packet = Packet::Chebyshev {
         words,
-        begin_s: tail.from_end(4)?,
+        begin_s: tail.word_before_end(4)?,
         length_s,
     };
     Ok(Some(Layout {
@@ -271,7 +271,7 @@ struct Tail<'a> {
 
 impl Tail<'_> {
     /// The word `place` words before the end, from 1.
-    fn from_end(&self, place: usize) -> Result<f64, String> {
+    fn word_before_end(&self, place: usize) -> Result<f64, String> {
         let index = self.words.len().checked_sub(place);
         index
             .map(|index| self.words[index])
@@ -280,14 +280,14 @@ impl Tail<'_> {
 
     /// A count: at least one, and no more than the segment has words.
     fn count(&self, place: usize, what: &str) -> Result<usize, String> {
-        let value = self.from_end(place)?;
+        let value = self.word_before_end(place)?;
         whole(value)
             .filter(|count| (1..=self.segment).contains(count))
             .ok_or_else(|| format!("its number of {what} is {value}, of {} words", self.segment))
     }
 
     fn positive(&self, place: usize, what: &str) -> Result<f64, String> {
-        let value = self.from_end(place)?;
+        let value = self.word_before_end(place)?;
         if value.is_finite() && value > 0.0 {
             return Ok(value);
         }
@@ -306,7 +306,7 @@ impl Tail<'_> {
     }
 
     fn size_of_subtype(&self, place: usize, sizes: &[usize]) -> Result<usize, String> {
-        let value = self.from_end(place)?;
+        let value = self.word_before_end(place)?;
         let subtype = whole(value).and_then(|subtype| sizes.get(subtype));
         subtype
             .copied()
