@@ -14,7 +14,7 @@ use std::fs;
 
 use common::{
     case::Case,
-    daf::{change_packets, summaries},
+    daf::{change_packets, without_rates},
     golden::Golden,
     json,
 };
@@ -291,10 +291,7 @@ const MISTAKES: &[Mistake] = &[
         "attitude_without_rates",
         |case| {
             let kernel = "kernels/mgs_sc_scene.bc";
-            let mut bytes = case.read(kernel);
-            for summary in summaries(&bytes) {
-                bytes[summary + 28..summary + 32].fill(0);
-            }
+            let bytes = without_rates(case.read(kernel));
             case.write(kernel, bytes);
         },
         End::Error(4),

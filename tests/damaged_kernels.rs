@@ -99,21 +99,17 @@ fn what_is_wrong_is_told_with_segment_and_number() {
         (
             last,
             1e300,
-            "segment 1 (SPK of -94, type 13): its number of states is 1",
+            "segment 1 (SPK of -94, type 13): its number of states is 1e300, of ",
         ),
-        (last, 1443.0, "words, of which its counts explain"),
-        (
-            last - 1,
-            1e9,
-            "its number of degrees of interpolation is 1000000000",
-        ),
-        (last - 1, 28.0, "interpolation of degree 28"),
+        (last, 10.0, "words, of which its counts explain"),
+        (last - 1, 1e9, "interpolation of degree 1000000000.0 over"),
+        (last - 1, 28.0, "interpolation of degree 28.0 over"),
         (first + 7, f64::INFINITY, "record 2 holds inf"),
         (epochs + 3, word(&spk, epochs + 2), "time 4 is "),
         (
             epochs + states,
             0.0,
-            "entry 1 of the directory of times is 0",
+            "entry 1 of the directory of times is 0.0; the time is",
         ),
     ] {
         let told = says(&spk, at, value);
@@ -124,9 +120,9 @@ fn what_is_wrong_is_told_with_segment_and_number() {
         (
             first,
             3.0,
-            "segment 2 (CK of -94000, type 3): quaternion 1 has a norm of 3",
+            "segment 2 (CK of -94000, type 3): quaternion 1 has a norm of 3.",
         ),
-        (last - 1, 1e6, "its number of intervals is 1000000"),
+        (last - 1, 1e6, "its number of intervals is 1000000.0"),
         (last, 0.5, "its number of pointings is 0.5"),
     ] {
         let told = says(&ck, at, value);
@@ -169,7 +165,7 @@ fn damaged_words_of_real_kernels_are_found_or_do_no_harm() {
                     fs::write(&path, &bytes).unwrap();
                     match KernelSet::from_files(&[times.clone(), path.clone()]) {
                         Err(error) => {
-                            assert_eq!(error.kind(), Kind::Coverage, "{name}: {error}");
+                            assert_eq!(error.kind(), Kind::Input, "{name}: {error}");
                             refused += 1;
                         }
                         Ok(set) => ask(&set),

@@ -378,7 +378,10 @@ fn a_failed_adjustment_keeps_no_other_product_from_its_readers() {
     let invalid = "exit 5\nisidis: INVALID; products in out/isidis, see report/index.html\n  \
                    no adjustment: the network is singular: the observations do not separate the ";
     assert!(outcome.starts_with(invalid), "{outcome}");
-    assert!(outcome.contains("finite standard deviations"), "{outcome}");
+    assert!(
+        outcome.contains("give these unknowns smaller standard deviations in [adjustment]"),
+        "{outcome}"
+    );
     let made: Vec<_> = products(&case.path("out/isidis")).into_keys().collect();
     let named = |name: &str| made.iter().any(|path| path.ends_with(name));
     assert!(named("footprints.parquet") && named("registration.parquet"));

@@ -20,11 +20,9 @@ mod pushbroom;
 use std::{fs, sync::atomic::AtomicBool};
 
 use areograph::{
-    constants::MARS_IAU2000,
     frames::{MarsIau2000, Position},
     geom::{
         ellipsoid::{Spherical, ray_meets_ellipsoid},
-        mars_rotation::mars_matrix,
         pushbroom::CameraModel,
     },
     line_times::{LinePiece, LineTimes, LineTimesError},
@@ -327,11 +325,9 @@ fn camera_models_see_every_line_when_it_is_exposed() {
     for (line, sample) in places(&image.times) {
         let et = line_times.et(line);
         worst_s = worst_s.max((camera.time(line) - et.seconds()).abs());
-        let to_mars = mars_matrix(&MARS_IAU2000, et);
-        let (_, camera_to_mars) = kernel_camera(&session, &image, et);
-        let apparent_m = to_mars * session.apparent_state(et).unwrap().position.xyz_m;
+        let (position_m, camera_to_mars) = kernel_camera(&session, &image, et);
         let look = camera_to_mars * image.times.detector().look(sample);
-        let position = Position::<MarsIau2000>::new(apparent_m);
+        let position = Position::<MarsIau2000>::new(position_m);
         let ground_m = ray_meets_ellipsoid(&position, &look).unwrap().xyz_m;
         let (found_line, found_sample) = camera.image(&(ground_m / METRES_PER_KM));
         worst_px = worst_px.max((found_line - line).hypot(found_sample - sample));

@@ -44,6 +44,26 @@ pub(crate) fn set_word(bytes: &mut [u8], word: usize, value: f64) {
     bytes[8 * (word - 1)..8 * word].copy_from_slice(&value.to_le_bytes());
 }
 
+/// A C-kernel of type 3 whose segments have no angular rates: shorter ones, at their old places.
+pub(crate) fn without_rates(mut bytes: Vec<u8>) -> Vec<u8> {
+    for summary in summaries(&bytes) {
+        let [first, last] = [32, 36].map(|at| integer(&bytes, summary + at) - 1);
+        let packets = count(&bytes, 8 * last);
+        for packet in 0..packets {
+            let from = 8 * (first + 7 * packet);
+            bytes.copy_within(from..from + 32, 8 * (first + 4 * packet));
+        }
+        bytes.copy_within(
+            8 * (first + 7 * packets)..8 * (last + 1),
+            8 * (first + 4 * packets),
+        );
+        let last = i32::try_from(last + 1 - 3 * packets).unwrap();
+        bytes[summary + 28..summary + 32].fill(0);
+        bytes[summary + 36..summary + 40].copy_from_slice(&last.to_le_bytes());
+    }
+    bytes
+}
+
 /// Changes every packet of `words` doubles of every segment (SPK type 13, CK type 3).
 pub(crate) fn change_packets(case: &Case, kernel: &str, words: usize, change: impl Fn(&mut [f64])) {
     let mut bytes = case.read(kernel);

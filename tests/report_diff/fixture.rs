@@ -22,6 +22,9 @@ pub(crate) const TURN_ARCSEC: f64 = 20.0;
 /// A case that has run once, its products kept in `before/case`.
 pub(crate) fn after_a_first_run() -> Case {
     let case = Case::new();
+    // Light time depends on where the camera looks: without it a turned camera stays where it is.
+    let site = String::from_utf8(case.read("site.toml")).unwrap();
+    case.write("site.toml", site + "[orientation]\nlight_time = \"none\"\n");
     case.stages_run();
     copy_products(&case.path("out/case"), &case.path("before/case"));
     case

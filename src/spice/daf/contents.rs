@@ -94,7 +94,11 @@ fn check_lists(reader: &mut Reader, layout: &Layout, mut first_word: u64) -> Res
                 let mut last = f64::NEG_INFINITY;
                 Part { first_word, words }.each(reader, 1, |index, time| {
                     if time[0] <= last {
-                        return Err(format!("time {} is {}, after {last}", index + 1, time[0]));
+                        return Err(format!(
+                            "time {} is {:?}, after {last:?}",
+                            index + 1,
+                            time[0]
+                        ));
                     }
                     last = time[0];
                     if (index + 1) % DIRECTORY_STEP == 0 {
@@ -116,7 +120,7 @@ fn check_lists(reader: &mut Reader, layout: &Layout, mut first_word: u64) -> Res
                         return Ok(());
                     }
                     Err(format!(
-                        "entry {} of the directory of times is {}; the time is {}",
+                        "entry {} of the directory of times is {:?}; the time is {:?}",
                         index + 1,
                         entry[0],
                         listed.unwrap_or(f64::NAN)
@@ -146,7 +150,7 @@ fn check_packet(packet: Packet, index: usize, words: &[f64]) -> Result<(), Strin
                 return Ok(());
             }
             Err(format!(
-                "record {} is for {} s about {}; expected {} s about {middle_s}",
+                "record {} is for {:?} s about {:?}; expected {:?} s about {middle_s:?}",
                 index + 1,
                 2.0 * words[1],
                 words[0],
@@ -159,7 +163,7 @@ fn check_packet(packet: Packet, index: usize, words: &[f64]) -> Result<(), Strin
                 return Ok(());
             }
             let norm = square.sqrt();
-            Err(format!("quaternion {} has a norm of {norm}", index + 1))
+            Err(format!("quaternion {} has a norm of {norm:?}", index + 1))
         }
     }
 }
@@ -170,7 +174,7 @@ fn check_differences(index: usize, lines: usize, words: &[f64]) -> Result<(), St
     let order = super::whole(counts[0]).filter(|order| (2..=lines + 1).contains(order));
     let Some(order) = order else {
         return Err(format!(
-            "record {} has an order of {}",
+            "record {} has an order of {:?}",
             index + 1,
             counts[0]
         ));
@@ -180,7 +184,7 @@ fn check_differences(index: usize, lines: usize, words: &[f64]) -> Result<(), St
         .find(|count| super::whole(**count).is_none_or(|count| count > lines))
     {
         return Err(format!(
-            "record {} has {of_axis} differences on an axis",
+            "record {} has {of_axis:?} differences on an axis",
             index + 1
         ));
     }

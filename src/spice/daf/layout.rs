@@ -283,7 +283,12 @@ impl Tail<'_> {
         let value = self.word_before_end(place)?;
         whole(value)
             .filter(|count| (1..=self.segment).contains(count))
-            .ok_or_else(|| format!("its number of {what} is {value}, of {} words", self.segment))
+            .ok_or_else(|| {
+                format!(
+                    "its number of {what} is {value:?}, of {} words",
+                    self.segment
+                )
+            })
     }
 
     fn positive(&self, place: usize, what: &str) -> Result<f64, String> {
@@ -291,17 +296,18 @@ impl Tail<'_> {
         if value.is_finite() && value > 0.0 {
             return Ok(value);
         }
-        Err(format!("its {what} is {value}"))
+        Err(format!("its {what} is {value:?}"))
     }
 
-    /// A degree of interpolation, less than the number of `states`.
+    /// A degree of interpolation, or of Hermite interpolation half of it, less than the number of `states`.
     fn degree(&self, place: usize, states: usize) -> Result<(), String> {
-        let degree = self.count(place, "degrees of interpolation")?;
-        if degree <= DEGREE_MAX && degree < states.max(2) {
+        let degree = self.word_before_end(place)?;
+        let possible = |degree: &usize| *degree <= DEGREE_MAX && *degree < states;
+        if whole(degree).as_ref().is_some_and(possible) {
             return Ok(());
         }
         Err(format!(
-            "interpolation of degree {degree} over {states} states"
+            "interpolation of degree {degree:?} over {states} states"
         ))
     }
 
@@ -310,7 +316,7 @@ impl Tail<'_> {
         let subtype = whole(value).and_then(|subtype| sizes.get(subtype));
         subtype
             .copied()
-            .ok_or_else(|| format!("its subtype is {value}"))
+            .ok_or_else(|| format!("its subtype is {value:?}"))
     }
 }
 
@@ -368,8 +374,8 @@ mod tests {
             spk(2, &[0.0, 60.0, 36.0, 10.0]),
             "records of 36 words for 3 components"
         );
-        assert_eq!(spk(8, &[0.0, -60.0, 7.0, 20.0]), "its step is -60");
-        assert_eq!(spk(18, &[3.0, 8.0, 20.0]), "its subtype is 3");
+        assert_eq!(spk(8, &[0.0, -60.0, 7.0, 20.0]), "its step is -60.0");
+        assert_eq!(spk(18, &[3.0, 8.0, 20.0]), "its subtype is 3.0");
         assert!(
             layout(KernelRole::Spk, 15, false, 16, &[])
                 .unwrap()
