@@ -2,16 +2,9 @@
 
 use std::fmt::Write as _;
 
-use arrow::{
-    array::{Array as _, AsArray},
-    datatypes::Float64Type,
-};
-use nalgebra::Vector3;
-
 use super::{
     Judged,
-    common::{case::Case, json, mission::mission},
-    table, texts, vector,
+    common::{case::Case, mission::mission},
 };
 
 /// The tie points' table with each row's sample moved as `wrong` says, by the number of its tie point and its image.
@@ -106,54 +99,4 @@ fn the_published_model_is_judged_by_mola() {
     // MOLA states the error that truth knows, to the errors of its surface: 2 m, four times.
     assert!((stated_m - truth_m).abs() < 8.0, "{stated_m} {truth_m}");
     assert!(truth_m.abs() > 20.0, "{truth_m}");
-}
-
-#[test]
-fn neighbours_that_vouch_for_each_other_are_stated_uncertain() {
-    let case = Case::pair();
-    let truth = json(&mission().join("truth.json"));
-    let sites = truth["ties"].as_array().unwrap();
-    let site = sites.iter().find(|site| site["site"] == "isidis").unwrap();
-    let true_ties = site["ties"].as_array().unwrap();
-    let ground_m: Vec<Vector3<f64>> = true_ties
-        .iter()
-        .map(|tie| vector(&tie["ground_iau2000_m"]))
-        .collect();
-    let is_good = |tie: usize| true_ties[tie]["blunder"].is_null();
-    let pairs = (0..ground_m.len()).flat_map(|one| (0..one).map(move |other| [one, other]));
-    let nearest = pairs
-        .filter(|pair| pair.iter().all(|tie| is_good(*tie)))
-        .min_by(|a, b| {
-            let apart_m = |[one, other]: &[usize; 2]| (ground_m[*one] - ground_m[*other]).norm();
-            apart_m(a).total_cmp(&apart_m(b))
-        })
-        .unwrap();
-    // Eight pixels are some 130 m of height at this pair.
-    let wrong = |tie: usize, image: &str| {
-        let moves = image == "E02-02016" && nearest.contains(&tie);
-        if moves { 8.0 } else { 0.0 }
-    };
-    case.write("ties/isidis.csv", moved(&ties(&case), wrong));
-    case.stages_run();
-    let found = table(&case.path("out/isidis/ties.parquet"));
-    let names = texts(&found, "tie");
-    let number = |name: &str, row: usize| {
-        let column = found.column_by_name(name).unwrap();
-        let column = column.as_primitive::<Float64Type>();
-        (!column.is_null(row)).then(|| column.value(row))
-    };
-    for tie in nearest {
-        let row = names
-            .iter()
-            .position(|name| true_ties[tie]["id"] == name.as_str());
-        let row = row.unwrap();
-        // A blunder that is found is as good.
-        let Some(radius_m) = number("adjusted_radius_m", row) else {
-            continue;
-        };
-        let error_m = radius_m - ground_m[tie].norm();
-        let sigma_m = number("sigma_up_m", row).unwrap();
-        println!("{}: {error_m:.0} m off, stated {sigma_m:.0} m", names[row]);
-        assert!(error_m.abs() < 3.0 * sigma_m, "{error_m} {sigma_m}");
-    }
 }
