@@ -81,7 +81,7 @@ impl Cause for AdjustError {
             Self::NotConverged { .. } => "lower these standard deviations where they leave an orientation freer than its kernels are uncertain; otherwise check the tie points and the images' times and kernels: so far apart the observations have no common solution",
             Self::Network(_) => "check the input of the adjustment, and give orientations and footprints finite standard deviations",
             Self::Value { .. } => "correct this value, or leave out what it belongs to",
-            Self::Singular(_) => "give these unknowns smaller standard deviations in [adjustment], or hold them fixed with 0",
+            Self::Singular(_) => "give these unknowns finite standard deviations in [adjustment], or smaller ones, or hold them fixed with 0",
             Self::DuplicateShot(_) => "leave out the second file, or renumber the shots",
             Self::Blind { .. } => "check the orientation samples of the image",
             Self::Contradiction { .. } => "check the datum, the clock and the units of this value, or raise its standard deviation",
