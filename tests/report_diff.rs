@@ -121,8 +121,8 @@ fn denser_sampling_moves_nothing_and_is_told() {
     let case = after_a_first_run();
     case.replace(
         "site.toml",
-        "[pedr]",
-        "[orientation]\nintervals = 60\n[pedr]",
+        "[orientation]",
+        "[orientation]\nintervals = 60",
     );
     case.stages_run();
     let found = difference(&case);
