@@ -95,6 +95,12 @@ impl InputFiles {
         Ok(file)
     }
 
+    /// Whether the run has hashed this file before.
+    #[must_use]
+    pub fn knows(&self, path: &Path) -> bool {
+        self.lock().contains_key(path)
+    }
+
     /// Several files in their order; `stop` is looked at before each.
     ///
     /// # Errors
@@ -112,7 +118,7 @@ impl InputFiles {
     /// # Errors
     /// The file cannot be read, or is no longer what it was.
     pub fn verify(&self, path: &Path) -> Result<()> {
-        if !self.lock().contains_key(path) {
+        if !self.knows(path) {
             return Ok(());
         }
         self.hash(path).map(|_| ())

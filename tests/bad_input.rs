@@ -285,6 +285,19 @@ const CASES: &[(&str, Spoil)] = &[
         });
         case.run()
     }),
+    // Numbers themselves, but no longer when they have been interpolated.
+    ("spk_state_overflows", |case| {
+        change_packets(case, "kernels/mgs_nav_scene.bsp", 6, |state| {
+            state[2] = 1e308;
+        });
+        case.run()
+    }),
+    ("check_ck_rate_overflows", |case| {
+        change_packets(case, "kernels/mgs_sc_scene.bc", 7, |attitude| {
+            attitude[5] = 1e308;
+        });
+        case.check()
+    }),
     ("check_spk_state_is_not_finite", |case| {
         change_packets(case, "kernels/mgs_nav_scene.bsp", 6, |state| {
             state[2] = f64::NAN;

@@ -1,6 +1,6 @@
 //! The flow that tries: configuration, files and kernel coverage of a site, without writing anything.
 
-use std::{path::PathBuf, sync::atomic::AtomicBool};
+use std::{collections::BTreeSet, path::PathBuf, sync::atomic::AtomicBool};
 
 use super::{
     RivalSet,
@@ -73,6 +73,8 @@ struct Check<'a> {
     /// Set of kernels that findings are about.
     prefix: String,
     checked: Checked,
+    /// Failures that have been noted.
+    told: BTreeSet<String>,
 }
 
 impl<'a> Check<'a> {
@@ -83,6 +85,7 @@ impl<'a> Check<'a> {
             never: AtomicBool::new(false),
             prefix: String::new(),
             checked: Checked::default(),
+            told: BTreeSet::new(),
         }
     }
 
@@ -123,16 +126,13 @@ impl<'a> Check<'a> {
             .push(format!("{}{finding}", self.prefix));
     }
 
-    /// Notes a finding or a failure, each failure once: kernels are read for clocks and for orbits; whether it was a
-    /// finding.
+    /// Notes a finding or a failure; each failure once, for kernels are loaded for clocks and for orbits.
     fn note<T>(&mut self, stage: &str, result: Result<T>) -> Option<T> {
         match result.in_stage(stage).in_site(self.site) {
             Ok(found) => Some(found),
             Err(failure) => {
-                let told = failure.to_string();
-                let failures = &mut self.checked.failures;
-                if failures.iter().all(|earlier| earlier.to_string() != told) {
-                    failures.push(failure);
+                if self.told.insert(failure.to_string()) {
+                    self.checked.failures.push(failure);
                 }
                 None
             }
