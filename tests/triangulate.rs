@@ -524,6 +524,26 @@ fn every_problem_of_a_net_file_is_told_with_its_place() {
 }
 
 #[test]
+fn sizes_of_pictures_are_judged_on_the_ground() {
+    // 8000 km from the equator Mercator's map is larger than the ground by cosh(8000/3396.19).
+    let larger = (8_000.0_f64 / 3_396.19).cosh();
+    let folder = scene(&[]);
+    change(folder.path(), "controls.csv", |_, mut cells| {
+        let y_km: f64 = cells[2].parse().unwrap();
+        cells[2] = (y_km + 8_000.0).to_string();
+        Some(cells)
+    });
+    let refused = triangulated(folder.path()).unwrap_err().to_string();
+    assert!(refused.contains("m on the ground"), "{refused}");
+    change(folder.path(), "pictures.csv", |_, mut cells| {
+        let metres: f64 = cells[2].parse().unwrap();
+        cells[2] = (metres / larger).to_string();
+        Some(cells)
+    });
+    assert_eq!(triangulated(folder.path()).unwrap().pictures.len(), 25);
+}
+
+#[test]
 fn rows_that_cannot_be_read_are_told_and_the_others_are_used() {
     let folder = scene(&[]);
     let path = folder.path().join("net/measurements.csv");
