@@ -39,7 +39,7 @@ impl Report<'_> {
         let places = self.places(&of_point);
         let measurements = self.measurements(&precision, &of_point, &places);
         let points = self.points(&precision, &of_point, &places);
-        let pictures = self.pictures(&precision, &measurements);
+        let pictures = self.pictures(&precision, &of_point, &measurements);
         let controls = self.controls(&places);
         let bricks = self.bricks(&measurements);
         let seams = self.seams();
@@ -213,6 +213,7 @@ impl Report<'_> {
     fn pictures(
         &self,
         precision: &Precision,
+        of_point: &[Vec<usize>],
         measurements: &[MeasurementResult],
     ) -> Vec<PictureResult> {
         let mut own: Vec<Vec<usize>> = vec![Vec::new(); self.data.pictures.len()];
@@ -235,8 +236,9 @@ impl Report<'_> {
             let place = (centre.re, centre.im);
             let deviations: Vec<Place> = own[picture]
                 .iter()
+                .filter(|index| of_point[self.data.net.measurements[**index].point].len() > 1)
                 .map(|index| &measurements[*index])
-                .filter(|of| !of.removed && of.redundancy > ROUNDING)
+                .filter(|of| !of.removed)
                 .map(|of| Place::new(of.deviation.x_m, of.deviation.y_m))
                 .collect();
             let [turn, shift] = precision.picture(picture);
