@@ -98,13 +98,6 @@ impl Report<'_> {
             .collect()
     }
 
-    fn weight_of(&self, point: usize) -> Option<f64> {
-        let mut controls = self.placed.weighted.controls.iter();
-        controls
-            .find(|control| control.point == point)
-            .map(|control| control.weight)
-    }
-
     fn geographic(&self, place: Place) -> [f64; 2] {
         let (longitude, latitude) = self.config.map.map.unproject((place.re, place.im));
         [longitude, latitude]
@@ -284,7 +277,7 @@ impl Report<'_> {
                     residual_m: [residual.re, residual.im],
                     scale_residual_m: [of_scale.re, of_scale.im],
                     sigma_m: control_sigma_m(self.config, self.data, self.laid, *index),
-                    kept: *kept && self.weight_of(point).is_some(),
+                    kept: *kept,
                 }
             });
         controls.collect()
