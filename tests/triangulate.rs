@@ -253,6 +253,24 @@ fn products_are_whole_keep_their_schemas_and_are_not_made_twice() {
     assert!(!run(folder.path(), false).unwrap().unchanged);
 }
 
+#[test]
+fn at_once_pictures_have_the_size_that_scale_gives_them() {
+    let sizes = ["scale", "one_shot"].map(|method| {
+        let key = format!("method = \"{method}\"");
+        let folder = scene(&[("local = \"yes\"", &key)]);
+        let net = triangulated(folder.path()).unwrap();
+        let sizes = net
+            .pictures
+            .iter()
+            .map(|of| of.coefficients[0].hypot(of.coefficients[1]).ln());
+        sizes.sum::<f64>() / net.pictures.len() as f64
+    });
+    // Both stand on the same controls. What ties of 30 m leave would shrink the figure on controls of 800 m by 0.8 %; the bending
+    // that their weights allow changes its size by some parts in a hundred thousand.
+    let apart = (sizes[1] - sizes[0]).abs();
+    assert!(apart < 2e-4, "{apart}");
+}
+
 /// A row of the measurements changed by `change`.
 fn change(folder: &Path, table: &str, change: impl Fn(usize, Vec<String>) -> Option<Vec<String>>) {
     let path = folder.join("net").join(table);
@@ -503,6 +521,26 @@ fn every_problem_of_a_net_file_is_told_with_its_place() {
         ),
     ];
     assert_messages("net_bad_keys", &told);
+}
+
+#[test]
+fn sizes_of_pictures_are_judged_on_the_ground() {
+    // 8000 km from the equator Mercator's map is larger than the ground by cosh(8000/3396.19).
+    let larger = (8_000.0_f64 / 3_396.19).cosh();
+    let folder = scene(&[]);
+    change(folder.path(), "controls.csv", |_, mut cells| {
+        let y_km: f64 = cells[2].parse().unwrap();
+        cells[2] = (y_km + 8_000.0).to_string();
+        Some(cells)
+    });
+    let refused = triangulated(folder.path()).unwrap_err().to_string();
+    assert!(refused.contains("m on the ground"), "{refused}");
+    change(folder.path(), "pictures.csv", |_, mut cells| {
+        let metres: f64 = cells[2].parse().unwrap();
+        cells[2] = (metres / larger).to_string();
+        Some(cells)
+    });
+    assert_eq!(triangulated(folder.path()).unwrap().pictures.len(), 25);
 }
 
 #[test]

@@ -5,7 +5,7 @@ use std::{
     sync::atomic::AtomicBool,
 };
 
-use super::{PUBLISH, out::check_out_path};
+use super::{PUBLISH, out::check_out_path, publish::standing};
 use crate::{
     config::NetConfig,
     error::{Locate, Result},
@@ -21,8 +21,6 @@ use crate::{
         publish::{CACHE, entries, note_failure, publish, read_manifest, staging},
     },
 };
-
-use super::publish::standing;
 
 /// Raised when the products of a net are laid out anew.
 const METHOD: u32 = 1;
@@ -77,8 +75,10 @@ fn run(config: &NetConfig, folder: &Path, force: bool) -> Result<(Manifest, bool
         Ok(manifest) => return Ok((manifest, true)),
         Err(reason) => tracing::info!(stage = PUBLISH, %reason, "running"),
     }
-    let manifest = publish_net(config, folder, output.value()?, &output, &inputs)?;
-    cache.store(PUBLISH, inputs, manifest.clone())?;
+    let manifest = publish_net(config, folder, output.value()?, &output, &inputs);
+    let manifest = manifest.in_stage(PUBLISH)?;
+    let stored = cache.store(PUBLISH, inputs, manifest.clone());
+    stored.in_stage(PUBLISH)?;
     Ok((manifest, false))
 }
 

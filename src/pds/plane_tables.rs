@@ -5,10 +5,9 @@ use std::{fs, path::Path};
 use crate::{
     error::{Cause, IoError, Kind, Locate, Result},
     geom::plane::{Place, box_centre},
+    units::METRES_PER_KM,
 };
 
-/// Metres of a kilometre.
-const METRES_PER_KM: f64 = 1_000.0;
 /// Ticks at the corners of a picture, in the order in which [`TickRow::tick`] counts them.
 pub const CORNER_TICKS: [&str; 4] = ["lower_left", "lower_right", "upper_right", "upper_left"];
 /// Ticks at the middles of its edges, which follow.

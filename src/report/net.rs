@@ -78,7 +78,7 @@ fn way(config: &NetConfig) -> String {
             "BRICK, EXTEND, MORTAR, SCALE{local}: bricks give way to the controls by their weights."
         ),
         Method::OneShot => {
-            "All pictures and controls at once; bricks tell the blunders.".to_owned()
+            "All pictures and controls at once, then SCALE; bricks tell the blunders.".to_owned()
         }
     }
 }

@@ -49,18 +49,36 @@ impl Scaled {
 /// The similarity that takes `from` closest to `to`, all weights alike; none of fewer than two places that differ.
 #[must_use]
 pub fn fit_similarity(from: &[Place], to: &[Place]) -> Option<Similarity> {
+    fit_weighted(from, to, |_| 1.0)
+}
+
+/// The same with a weight of each pair of places, by its index, above 0.
+#[must_use]
+pub fn fit_weighted(
+    from: &[Place],
+    to: &[Place],
+    weight: impl Fn(usize) -> f64,
+) -> Option<Similarity> {
     let count = from.len().min(to.len());
     if count < 2 {
         return None;
     }
-    let mean = |of: &[Place]| of[..count].iter().sum::<Place>() / count as f64;
+    let weights: f64 = (0..count).map(&weight).sum();
+    let mean = |of: &[Place]| {
+        let places = of[..count].iter().enumerate();
+        let sum: Place = places.map(|(index, place)| *place * weight(index)).sum();
+        sum / weights
+    };
     let (middle, target) = (mean(from), mean(to));
     let pairs = || {
-        let pairs = from.iter().zip(to);
-        pairs.map(|(from, to)| (from - middle, to - target))
+        let pairs = from.iter().zip(to).enumerate();
+        pairs.map(|(index, (from, to))| (weight(index), from - middle, to - target))
     };
-    let squares: f64 = pairs().map(|(from, _)| from.norm_sqr()).sum();
-    let turn = pairs().map(|(from, to)| from.conj() * to).sum::<Place>() / squares;
+    let squares: f64 = pairs()
+        .map(|(weight, from, _)| weight * from.norm_sqr())
+        .sum();
+    let products = pairs().map(|(weight, from, to)| from.conj() * to * weight);
+    let turn = products.sum::<Place>() / squares;
     (squares > 0.0).then(|| Similarity {
         turn,
         shift: target - turn * middle,

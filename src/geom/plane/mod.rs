@@ -36,7 +36,7 @@ pub type Place = nalgebra::Complex<f64>;
 pub use blunders::{Blunder, Cleaned, FLAG_LIMIT, clean, robust_sigma};
 pub use bricks::{Block, Figure, brick, bricks_as_pictures, extend, local, mortar};
 pub use check::check;
-pub use controls::{Scaled, fit_similarity, scale};
+pub use controls::{Scaled, fit_similarity, fit_weighted, scale};
 pub use film::{CornerZero, FilmError, FourCorners, box_centre};
 pub use grow::grow_bricks;
 pub use mirror::{find_mirrored, same_hand};

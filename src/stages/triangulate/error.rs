@@ -59,12 +59,12 @@ pub enum NetError {
     MirroredFigure,
     /// A picture has another size than its table says.
     #[error(
-        "WrongUnits: a unit of picture {picture} is {found_m:.4e} m on the map; expected {expected_m:.4e} m within a factor of 2"
+        "WrongUnits: a unit of picture {picture} is {found_m:.4e} m on the ground; expected {expected_m:.4e} m within a factor of 2"
     )]
     WrongUnits {
         /// The picture.
         picture: String,
-        /// Adjusted size of a unit, metres.
+        /// Adjusted size of a unit on the ground, metres.
         found_m: f64,
         /// Size by its table, metres.
         expected_m: f64,

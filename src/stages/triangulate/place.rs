@@ -10,7 +10,7 @@ use super::{
 use crate::{
     config::{Method, NetConfig},
     geom::plane::{
-        Net, Place, PlaneError, Similarity, Solution, fit_similarity, local, mortar, solve,
+        Net, Place, PlaneError, Similarity, Solution, fit_weighted, local, mortar, solve,
     },
 };
 
@@ -45,11 +45,7 @@ pub(super) fn place(config: &NetConfig, data: &NetData, laid: &Laid) -> Result<P
     let solution = solve(&weighted)?;
     let (block, to_map) = if way.method == Method::Mortar {
         let block = mortar(&weighted, &laid.figures)?;
-        let (figure, given): (Vec<Place>, Vec<Place>) = shown_controls(&weighted, &block.places)
-            .into_iter()
-            .map(|(_, computed, given)| (computed, given))
-            .unzip();
-        let again = fit_similarity(&figure, &given).unwrap_or(Similarity::IDENTITY);
+        let again = on_controls(&weighted, &block.places);
         (block, again)
     } else {
         (laid.block.clone(), to_map)
@@ -73,7 +69,9 @@ pub(super) fn place(config: &NetConfig, data: &NetData, laid: &Laid) -> Result<P
         local_rms_m = Some(rms(&seams_of(laid, &pictures)));
     }
     if way.method == Method::OneShot {
-        pictures.clone_from(&solution.pictures);
+        let again = on_controls(&weighted, &solution.places);
+        let adjusted = solution.pictures.iter();
+        pictures = adjusted.map(|picture| again.after(picture)).collect();
     }
     Ok(Placed {
         pictures,
@@ -84,6 +82,20 @@ pub(super) fn place(config: &NetConfig, data: &NetData, laid: &Laid) -> Result<P
         local_rms_m,
         seams,
     })
+}
+
+/// SCALE of an adjusted figure on its controls, by their weights.
+///
+/// Residuals of ties lie in the map and shrink with it. An adjustment on controls of little weight therefore makes the figure
+/// too small, with many ties by more than the standard deviation of its size; place and direction it leaves as they are.
+fn on_controls(weighted: &Net, places: &[Option<Place>]) -> Similarity {
+    let shown = shown_controls(weighted, places);
+    let (figure, given): (Vec<Place>, Vec<Place>) = shown
+        .iter()
+        .map(|(_, computed, given)| (*computed, *given))
+        .unzip();
+    let weight = |at: usize| weighted.controls[shown[at].0].weight;
+    fit_weighted(&figure, &given, weight).unwrap_or(Similarity::IDENTITY)
 }
 
 /// Standard deviation of a coordinate of an image by what the bricks leave; none without redundancy.

@@ -1,6 +1,9 @@
 //! The tables of a net, its names turned into indices and its film corrected.
 
-use std::{collections::BTreeMap, path::Path};
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    path::Path,
+};
 
 use super::error::{NetError, film};
 use crate::{
@@ -68,7 +71,7 @@ pub fn read_net(config: &NetConfig) -> Result<NetData> {
             };
             let picture = index.picture(&row.picture, &mut data);
             let point = index.point(&row.point, &mut data);
-            if index.measured.insert((picture, point), at).is_some() {
+            if !index.measured.insert((picture, point)) {
                 let text = format!(
                     "point {} is measured twice in picture {}",
                     row.point, row.picture
@@ -96,7 +99,7 @@ pub fn read_net(config: &NetConfig) -> Result<NetData> {
 struct Index {
     pictures: BTreeMap<String, usize>,
     points: BTreeMap<String, usize>,
-    measured: BTreeMap<(usize, usize), Place>,
+    measured: BTreeSet<(usize, usize)>,
 }
 
 impl Index {
@@ -169,9 +172,9 @@ fn read_pictures_of(config: &NetConfig, index: &Index, data: &mut NetData) -> Re
 
 fn read_controls_of(config: &NetConfig, index: &Index, data: &mut NetData) -> Result<()> {
     let map = &config.map.map;
-    // Half way round the sphere, and as far on a stereographic map as doubles the scale.
+    // Half way round the sphere at the equator of Mercator's map; on a stereographic one the scale is 3.5 there.
     let limit_m = std::f64::consts::PI * map.radius_m;
-    let mut unseen = Vec::new();
+    let (mut given, mut unseen) = (BTreeSet::new(), Vec::new());
     for path in &config.controls.files {
         for row in data.take(path, read_controls(path)?) {
             let at = match row.at {
@@ -202,12 +205,7 @@ fn read_controls_of(config: &NetConfig, index: &Index, data: &mut NetData) -> Re
                 unseen.push(row.point);
                 continue;
             };
-            if data
-                .net
-                .controls
-                .iter()
-                .any(|control| control.point == point)
-            {
+            if !given.insert(point) {
                 let text = format!("control {} is given twice; the first is used", row.point);
                 data.complain(format!("{}: {text}", file_name(path)));
                 continue;

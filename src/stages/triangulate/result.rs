@@ -16,7 +16,7 @@ pub struct Triangulation {
     pub measurements: Vec<MeasurementResult>,
     /// Every control that a picture shows.
     pub controls: Vec<ControlResult>,
-    /// The bricks; none for a solution of all pictures at once.
+    /// The bricks; of a solution of all pictures at once those that told its blunders.
     pub bricks: Vec<BrickResult>,
     /// What lies between the bricks; none for a single one.
     pub seams: Option<Seams>,

@@ -10,7 +10,7 @@ use super::{
 };
 use crate::{
     config::NetConfig,
-    geom::plane::{PlaneError, check, find_mirrored},
+    geom::plane::{Place, PlaneError, check, find_mirrored},
 };
 
 /// Factor by which a picture may differ from its stated size.
@@ -27,7 +27,7 @@ pub(super) fn triangulate(config: &NetConfig, data: &NetData) -> Result<Triangul
     check(&data.net).map_err(refused)?;
     let laid = lay_with_fallback(config, data, &names)?;
     let placed = place(config, data, &laid).map_err(refused)?;
-    check_sizes(data, &placed)?;
+    check_sizes(config, data, &placed)?;
     Ok(Report {
         config,
         data,
@@ -37,16 +37,21 @@ pub(super) fn triangulate(config: &NetConfig, data: &NetData) -> Result<Triangul
     .write())
 }
 
-fn check_sizes(data: &NetData, placed: &Placed) -> Result<(), NetError> {
-    for (picture, (way, stated)) in placed
-        .pictures
-        .iter()
-        .zip(&data.metres_per_unit)
-        .enumerate()
-    {
-        let (Some(expected_m), found_m) = (*stated, way.scale()) else {
+/// A unit on the ground is shorter than on the map by the map's scale at the middle of the picture's points.
+fn check_sizes(config: &NetConfig, data: &NetData, placed: &Placed) -> Result<(), NetError> {
+    let map = &config.map.map;
+    let mut sums = vec![(Place::new(0.0, 0.0), 0.0); data.net.pictures];
+    for measured in &data.net.measurements {
+        let (sum, count) = &mut sums[measured.picture];
+        *sum += measured.at;
+        *count += 1.0;
+    }
+    for (picture, (way, (sum, count))) in placed.pictures.iter().zip(sums).enumerate() {
+        let Some(expected_m) = data.metres_per_unit[picture] else {
             continue;
         };
+        let middle = way.map(sum / count);
+        let found_m = way.scale() / map.scale((middle.re, middle.im));
         if !(found_m / expected_m < SIZE_FACTOR && expected_m / found_m < SIZE_FACTOR) {
             return Err(NetError::WrongUnits {
                 picture: data.pictures[picture].clone(),

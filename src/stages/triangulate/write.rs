@@ -39,7 +39,7 @@ impl Report<'_> {
         let places = self.places(&of_point);
         let measurements = self.measurements(&precision, &of_point, &places);
         let points = self.points(&precision, &of_point, &places);
-        let pictures = self.pictures(&precision, &measurements);
+        let pictures = self.pictures(&precision, &of_point, &measurements);
         let controls = self.controls(&places);
         let bricks = self.bricks(&measurements);
         let seams = self.seams();
@@ -96,13 +96,6 @@ impl Report<'_> {
         means
             .map(|(point, (sum, count))| (point, sum / count))
             .collect()
-    }
-
-    fn weight_of(&self, point: usize) -> Option<f64> {
-        let mut controls = self.placed.weighted.controls.iter();
-        controls
-            .find(|control| control.point == point)
-            .map(|control| control.weight)
     }
 
     fn geographic(&self, place: Place) -> [f64; 2] {
@@ -213,6 +206,7 @@ impl Report<'_> {
     fn pictures(
         &self,
         precision: &Precision,
+        of_point: &[Vec<usize>],
         measurements: &[MeasurementResult],
     ) -> Vec<PictureResult> {
         let mut own: Vec<Vec<usize>> = vec![Vec::new(); self.data.pictures.len()];
@@ -235,8 +229,9 @@ impl Report<'_> {
             let place = (centre.re, centre.im);
             let deviations: Vec<Place> = own[picture]
                 .iter()
+                .filter(|index| of_point[self.data.net.measurements[**index].point].len() > 1)
                 .map(|index| &measurements[*index])
-                .filter(|of| !of.removed && of.redundancy > ROUNDING)
+                .filter(|of| !of.removed)
                 .map(|of| Place::new(of.deviation.x_m, of.deviation.y_m))
                 .collect();
             let [turn, shift] = precision.picture(picture);
@@ -282,7 +277,7 @@ impl Report<'_> {
                     residual_m: [residual.re, residual.im],
                     scale_residual_m: [of_scale.re, of_scale.im],
                     sigma_m: control_sigma_m(self.config, self.data, self.laid, *index),
-                    kept: *kept && self.weight_of(point).is_some(),
+                    kept: *kept,
                 }
             });
         controls.collect()
