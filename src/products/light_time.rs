@@ -6,7 +6,7 @@ use crate::geom::light_time::LightTime;
 /// The convention as a sentence.
 pub(super) fn convention(light_time: LightTime) -> String {
     format!(
-        "light time {}: positions of cameras are {}; ranges are geometric",
+        "light time {}: positions of cameras are {}; ranges of shots are geometric",
         light_time.word(),
         light_time.positions()
     )

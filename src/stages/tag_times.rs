@@ -187,6 +187,12 @@ fn image_times(image: &ImageConfig, session: &Session) -> Result<ImageTimes> {
     let crosstrack_summing = fields.crosstrack_summing.unwrap_or(downtrack_summing);
     let samples = fields.samples.ok_or_else(|| missing("samples"))?;
     let first_detector = fields.first_detector.unwrap_or(0);
+    fits_detector(
+        &image.id,
+        &instrument,
+        [downtrack_summing, crosstrack_summing],
+        [first_detector, samples],
+    )?;
     if fields.first_detector.is_none() && samples * crosstrack_summing < instrument.detector.pixels
     {
         remarks.push(format!(
@@ -195,12 +201,6 @@ fn image_times(image: &ImageConfig, session: &Session) -> Result<ImageTimes> {
             instrument.detector.pixels
         ));
     }
-    fits_detector(
-        &image.id,
-        &instrument,
-        [downtrack_summing, crosstrack_summing],
-        [first_detector, samples],
-    )?;
     let (line_period_s, exposure_s) =
         line_period(image, &fields, downtrack_summing)?.ok_or_else(|| missing("exposure_ms"))?;
     let duration_s = f64::from(lines_header) * line_period_s;

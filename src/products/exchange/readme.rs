@@ -88,7 +88,9 @@ fn light_time(light_time: LightTime) -> String {
     };
     format!(
         "Camera models, lines and samples, ground control, lidar data and adjusted kernels follow one convention,\n{}.\n\
-         {others}\n../registration.json has the difference of the others for each image.\n\n",
+         {others}\n../registration.json has the difference of the others for each image.\n\
+         Ranges of lidar data are geometric in every convention: jigsaw, which measures them from where ISIS sees the spacecraft, finds\n\
+         them up to 330 m off.\n\n",
         convention(light_time)
     )
 }
