@@ -106,14 +106,6 @@ fn remarks() -> Vec<Comparison> {
     ]
 }
 
-/// Pictures of the tertiary net, 25 km wide, as the synthetic one has them.
-const TERTIARY: PlaneRecipe = PlaneRecipe {
-    grid: [5, 5],
-    side_m: 25e3,
-    spacing_m: 20e3,
-    points: 500,
-    ..PlaneRecipe::NINE
-};
 /// Noise of the secondary net's measurements and of its controls that leaves the printed deviations, metres.
 const SECONDARY_NOISE_M: f64 = 250.0 / 0.65;
 const CONTROL_NOISE_M: f64 = 800.0;
@@ -129,13 +121,13 @@ fn nine(noise_m: f64, seed: u64) -> PlaneScene {
 
 fn pictures() -> Vec<Comparison> {
     const MARS_RADIUS_M: f64 = 3_396e3;
-    let half_m = 0.5 * TERTIARY.side_m;
+    let half_m = 0.5 * PlaneRecipe::TERTIARY.side_m;
     let gradient = 22.5_f64.to_radians().tan() / MARS_RADIUS_M;
     vec![
         number(
             "side of a Viking picture, km",
             "25",
-            TERTIARY.side_m / 1e3,
+            PlaneRecipe::TERTIARY.side_m / 1e3,
             0,
         )
         .exact(),
@@ -199,7 +191,7 @@ fn thirds() -> Vec<Comparison> {
 }
 
 fn bricks() -> Vec<Comparison> {
-    let scene = TERTIARY.simulate(1);
+    let scene = PlaneRecipe::TERTIARY.simulate(1);
     let brick_of = grow_bricks(&scene.net, 8);
     let bricks = brick_of.iter().max().unwrap() + 1;
     let mean = scene.net.pictures as f64 / bricks as f64;

@@ -8,8 +8,8 @@ use super::row::{Comparison, Outcome, Paper, Verdict};
 
 /// How the list is to be read.
 const RULES: [&str; 4] = [
-    "Every number that the five papers print is here, with ours beside it. Ours is computed by areograph's own code: \
-     from printed numbers by a formula, or on invented orbits and images whose truth is known. Tolerances are on the \
+    "Every number that the five papers print is here, with ours beside it. Ours is computed: \
+     from printed numbers by a formula, or by areograph's own code on invented orbits and images whose truth is known. Tolerances are on the \
      unrounded value.",
     "Nothing is tuned to a print. A number that was put into a synthetic mission and read out again is a closed loop, no \
      reproduction, and is called so.",

@@ -182,7 +182,7 @@ impl Pair {
         self.ordered(|image| line_spacing_m(&self.simulated, image))
     }
 
-    /// How far a line bias of table 5 moves the image, in the papers' order; and the pixel on the ground, metres.
+    /// Size of a pixel on the ground in the middle of each image, in the papers' order, metres.
     pub(crate) fn pixels_m(&self) -> [f64; 2] {
         self.ordered(|image| {
             let scene = &self.simulated.scenes[image];
@@ -215,7 +215,7 @@ impl Adjusted {
             .ordered(|image| mola_shift_lines(&self.pair.simulated, &self.adjustment, image))
     }
 
-    /// Corrections of X, Y, Z of the points in `range`, metres.
+    /// Corrections of X, Y, Z of the shots, or else of the ties, metres.
     pub(crate) fn moved_m(&self, shots: bool) -> [Summary; 3] {
         let simulated = &self.pair.simulated;
         let points = self.points(shots);
@@ -231,7 +231,7 @@ impl Adjusted {
         })
     }
 
-    /// Mean standard deviations of X, Y, Z after the adjustment with its σ0, metres.
+    /// Mean standard deviations of X, Y, Z of the shots, or else of the ties, after the adjustment with its σ0, metres.
     pub(crate) fn sigmas_m(&self, shots: bool) -> [f64; 3] {
         let points: Vec<usize> = self.points(shots).collect();
         [0, 1, 2].map(|axis| {

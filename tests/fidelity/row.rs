@@ -39,7 +39,7 @@ pub(crate) enum Account {
         /// Printed and ours.
         ours: fn() -> Vec<Comparison>,
     },
-    /// The same for a part of the row; the rest needs data that nobody here has.
+    /// The same for a part of the row; the rest departs, or needs data or code that are not at hand.
     MetInPart {
         /// What ours is computed from.
         from: &'static str,
@@ -119,9 +119,12 @@ impl Verdict {
     /// What the word means.
     pub(crate) const fn meaning(self) -> &'static str {
         match self {
-            Self::Met => "ours lies within the stated tolerance of every number of the row",
+            Self::Met => {
+                "ours lies within every tolerance that the row states; numbers without one stand there to compare"
+            }
             Self::MetInPart => {
-                "so does ours where it can be computed; the rest of the row needs data that nobody here has"
+                "so does ours in a part of the row; in the rest ours departs and the notes say why, or data are missing, or \
+                 the code that areograph does not have"
             }
             Self::Explained => "not met, or contradictory in print; the reason is known and stated",
             Self::Input => {
@@ -286,15 +289,25 @@ impl Number {
         self.claim(format!("{low} to {high}"), holds)
     }
 
-    /// Ours departs from the print by more than `least`.
-    pub(crate) fn departs(self, least: f64) -> Comparison {
-        let holds = (self.ours - self.value()).abs() > least;
+    fn departing(self, holds: bool) -> Comparison {
         let agreement = if holds {
             Agreement::Departs
         } else {
             Agreement::Broken
         };
         self.finish("departs".to_owned(), agreement)
+    }
+
+    /// Ours departs from the print by more than `least`.
+    pub(crate) fn departs(self, least: f64) -> Comparison {
+        let holds = (self.ours - self.value()).abs() > least;
+        self.departing(holds)
+    }
+
+    /// Ours, an upper limit, is above the print by more than `least`.
+    pub(crate) fn exceeds(self, least: f64) -> Comparison {
+        let holds = self.ours - self.value() > least;
+        self.departing(holds)
     }
 
     /// Side by side, without a claim.

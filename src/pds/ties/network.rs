@@ -125,12 +125,12 @@ fn known(block: &BlockEntries<'_>) -> std::result::Result<Option<KnownGround>, S
 
 /// The covariance whose upper triangle stands in `text`, row after row.
 fn covariance_m2(text: &str) -> std::result::Result<Matrix3<f64>, String> {
-    let numbers: Vec<f64> = text
+    let numbers: Option<Vec<f64>> = text
         .split(',')
-        .filter_map(|number| finite(number.trim()))
+        .map(|number| finite(number.trim()))
         .collect();
-    let matrix = match numbers[..] {
-        [xx, xy, xz, yy, yz, zz] => Some(Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz)),
+    let matrix = match numbers.as_deref() {
+        Some(&[xx, xy, xz, yy, yz, zz]) => Some(Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz)),
         _ => None,
     };
     matrix
@@ -246,6 +246,10 @@ mod tests {
             ("", "it has no AprioriCovarianceMatrix"),
             (
                 "AprioriCovarianceMatrix = (4, 1, 0, 9)",
+                "expected the six numbers",
+            ),
+            (
+                "AprioriCovarianceMatrix = (4, x, 1, 0, 9, 0, 16)",
                 "expected the six numbers",
             ),
             (

@@ -152,26 +152,19 @@ fn control_points<'a>(
     adjustment: &AdjustmentProducts<'a>,
     files: &'a [String],
 ) -> Vec<ControlPoint<'a>> {
-    let [along_px, across_px] = site.config.adjustment.tie_sigma_px;
-    let points = adjustment.adjusted.points.iter();
-    let adjusted_ties = points.filter(|point| point.kind == PointKind::Tie);
-    let points = adjusted_ties.filter_map(|point| {
+    let usual_px = tie_sigmas_px(site, adjustment);
+    let points = adjustment.adjusted_ties().filter_map(|point| {
         let tie = ties.points.get(point.index)?;
         let measures = tie.measures.iter().filter_map(|measure| {
             let file = files.get(measure.image)?;
+            let [line_px, sample_px] = measure.sigma_px.unwrap_or(usual_px[measure.image]);
             Some(ControlMeasure {
                 measure: ImageMeasure {
                     image: file,
                     line: measure.line,
                     sample: measure.sample,
                 },
-                sigma_px: measure.sigma_px.map_or_else(
-                    || {
-                        let per_line = focal_px_per_line(adjustment, measure.image);
-                        [across_px, along_px / per_line]
-                    },
-                    |[line_px, sample_px]| [sample_px, line_px],
-                ),
+                sigma_px: [sample_px, line_px],
             })
         });
         Some(ControlPoint {
@@ -183,8 +176,18 @@ fn control_points<'a>(
     points.collect()
 }
 
+/// Standard deviations of line and sample of measurements whose file has none of their own, for each image, lines and
+/// pixels.
+pub(super) fn tie_sigmas_px(site: &SiteProducts, adjustment: &AdjustmentProducts) -> Vec<[f64; 2]> {
+    let [along_px, across_px] = site.config.adjustment.tie_sigma_px;
+    let images = 0..adjustment.images.len();
+    images
+        .map(|image| [along_px / focal_px_per_line(adjustment, image), across_px])
+        .collect()
+}
+
 /// How many focal-plane pixels a line is, from the pairs of the image.
-pub(super) fn focal_px_per_line(adjustment: &AdjustmentProducts, image: usize) -> f64 {
+fn focal_px_per_line(adjustment: &AdjustmentProducts, image: usize) -> f64 {
     let id = &adjustment.images[image].times.id;
     let mut pairs = adjustment.pairs.iter().filter_map(|pair| {
         let at = pair.images.iter().position(|of| of == id)?;

@@ -1,17 +1,17 @@
 //! What jigsaw's users look for: the adjusted network, residuals, points and images as jigsaw writes them.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 
 use nalgebra::{Matrix3, Vector3};
 
 use super::{
-    adjusted::{adjusted, focal_px_per_line, isis_name},
+    adjusted::{adjusted, isis_name, tie_sigmas_px},
     bundleout::{ImageRow, PointRow, ResidualRow, write_images, write_points, write_residuals},
     control_network::{ControlNetwork, NetworkMeasure, NetworkPoint, write_control_network},
     points::ImageMeasure,
 };
 use crate::{
-    geom::ellipsoid::local_axes,
+    geom::{ellipsoid::local_axes, polynomial::root_mean_square},
     products::{
         AdjustmentProducts, GeometricProducts, ImageProducts, SiteProducts,
         product::{Content, Declaration, Program, Role, Use, Write},
@@ -103,13 +103,14 @@ struct Joined<'a> {
     ties: &'a [TiePoint],
     serials: Vec<String>,
     files: Vec<String>,
+    /// Standard deviations of line and sample of measurements without their own, by image, lines and pixels.
+    usual_sigmas_px: Vec<[f64; 2]>,
     /// Adjusted points by the index of their tie point.
     points: BTreeMap<usize, &'a CorrectedPoint>,
     /// Residuals by the indices of tie point and image.
     views: BTreeMap<(usize, usize), &'a ImageResidual>,
     /// Ground points with the adjusted orientation by the index of their tie point.
     intersected: BTreeMap<usize, &'a IntersectedPoint>,
-    rejected: BTreeSet<usize>,
 }
 
 impl<'a> Joined<'a> {
@@ -123,7 +124,6 @@ impl<'a> Joined<'a> {
             .adjusted_ties()
             .map(|point| (point.index, point))
             .collect();
-        let rejected = (0..geometric.ties.points.len()).filter(|tie| !points.contains_key(tie));
         let views = result.views.iter().filter_map(|view| {
             let point = &result.points[view.point];
             let is_tie = point.kind == PointKind::Tie;
@@ -143,7 +143,7 @@ impl<'a> Joined<'a> {
                 .iter()
                 .map(|image| format!("{}.cub", image.times.id))
                 .collect(),
-            rejected: rejected.collect(),
+            usual_sigmas_px: tie_sigmas_px(site, adjustment),
             views: views.collect(),
             intersected: adjustment
                 .intersected
@@ -163,11 +163,9 @@ impl<'a> Joined<'a> {
 
     /// Standard deviations of line and sample of a measurement, lines and pixels.
     fn sigma_px(&self, measure: &TieMeasure) -> [f64; 2] {
-        measure.sigma_px.unwrap_or_else(|| {
-            let [along_px, across_px] = self.site.config.adjustment.tie_sigma_px;
-            let per_line = focal_px_per_line(self.adjustment, measure.image);
-            [along_px / per_line, across_px]
-        })
+        measure
+            .sigma_px
+            .unwrap_or(self.usual_sigmas_px[measure.image])
     }
 
     /// Measured minus adjusted line and sample; of a rejected point by its intersection.
@@ -243,7 +241,7 @@ impl<'a> Joined<'a> {
                 standardised: view
                     .map(across_along)
                     .map_or([None; 2], |of| of.map(|one| one.standardised)),
-                rejected: self.rejected.contains(&tie),
+                rejected: !self.points.contains_key(&tie),
             }
         };
         self.measures().map(row).collect()
@@ -260,7 +258,7 @@ impl<'a> Joined<'a> {
                 id: &tie.id,
                 status: status(tie.known.as_ref()),
                 measures: residuals.len(),
-                rms_px: root_mean_square(residuals.iter().flatten().copied()),
+                rms_px: root_mean_square(residuals.as_flattened()),
                 ground: adjusted(point),
                 initial_m: point.initial.xyz_m,
             }
@@ -270,15 +268,22 @@ impl<'a> Joined<'a> {
 
     fn images(&self) -> Vec<ImageRow<'_>> {
         let images = self.adjustment.adjusted.images.iter().enumerate();
+        // Lines and samples apart, and how many measurements there are, by image.
+        let mut residuals = vec![[Vec::new(), Vec::new()]; self.site.images.len()];
+        for ((_, image), view) in &self.views {
+            let [lines, samples] = &mut residuals[*image];
+            lines.push(view.in_image_px[0]);
+            samples.push(view.in_image_px[1]);
+        }
+        let mut measured = vec![0; self.site.images.len()];
+        for (_, measure) in self.measures() {
+            measured[measure.image] += 1;
+        }
         let row = |(index, image): (usize, &'a CorrectedImage)| {
-            let own = self.views.iter().filter(|((_, of), _)| *of == index);
-            let residuals: Vec<[f64; 2]> = own.map(|(_, view)| view.in_image_px).collect();
-            let [line_px, sample_px] =
-                [0, 1].map(|axis| root_mean_square(residuals.iter().map(|of| of[axis])));
-            let all = root_mean_square(residuals.iter().flatten().copied());
-            let measured = self
-                .measures()
-                .filter(|(_, measure)| measure.image == index);
+            let [lines, samples] = &residuals[index];
+            let [line_px, sample_px] = [lines, samples].map(|of| root_mean_square(of));
+            // As many lines as samples.
+            let all = (0.5 * (line_px.powi(2) + sample_px.powi(2))).sqrt();
             let constants = [0, 3, 6];
             let position_m2 = Matrix3::from_fn(|row, column| {
                 image.covariance[(constants[row], constants[column])]
@@ -292,7 +297,7 @@ impl<'a> Joined<'a> {
                 prior_sigmas: &image.prior_sigmas,
                 sigmas: &image.sigmas,
                 local_sigmas_m: [0, 1, 2].map(|axis| local_m2[(axis, axis)].sqrt()),
-                measures: [residuals.len(), measured.count() - residuals.len()],
+                measures: [lines.len(), measured[index] - lines.len()],
             }
         };
         images.map(row).collect()
@@ -318,15 +323,4 @@ fn middle_m(image: &ImageProducts) -> Vector3<f64> {
         .get(samples.len() / 2)
         .map(|sample| sample.position.xyz_m)
         .unwrap_or_default()
-}
-
-/// 0 of no values.
-fn root_mean_square(values: impl Iterator<Item = f64> + Clone) -> f64 {
-    let count = values.clone().count();
-    let squares: f64 = values.map(|value| value * value).sum();
-    if count == 0 {
-        0.0
-    } else {
-        (squares / count as f64).sqrt()
-    }
 }

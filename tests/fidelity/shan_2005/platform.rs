@@ -135,7 +135,7 @@ pub(super) static ROWS: [Row; 16] = [
             from: "MOLA GSD of table 2; ground speed of a circular orbit",
             ours: registration_uncertainty,
         },
-        note: "325 is a rounded mean. As an error of MOLA's clock it would be 0.106 s; the paper corrects 0.117 s.",
+        note: "325 is a rounded mean. As an error of MOLA's clock it would be 0.107 s; the paper corrects 0.117 s.",
     },
     Row {
         id: "S05-02",

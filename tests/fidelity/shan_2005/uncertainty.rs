@@ -33,7 +33,7 @@ fn rounded(value: f64) -> f64 {
 }
 
 fn along() -> Vec<Comparison> {
-    vec![number("px", "41.0", budget().along_px, 3).within(0.05)]
+    vec![number("px", "41.0", budget().along_px, 3).between(40.982, 40.992)]
 }
 
 fn total() -> Vec<Comparison> {
