@@ -23,6 +23,7 @@ pub mod products;
 pub mod report;
 pub mod scene;
 pub mod schema;
+pub mod service;
 pub mod spice;
 pub mod stage;
 pub mod stages;

@@ -22,6 +22,7 @@ mod pedr;
 mod pointing;
 mod problems;
 mod range_check;
+mod service;
 mod site;
 mod ties;
 mod unknowns;
@@ -52,6 +53,11 @@ pub use pedr::PedrConfig;
 pub use pointing::{PointingConfig, UsedBias};
 pub use problems::Problems;
 pub use range_check::{RangeCheckConfig, SCAN_STEPS_MAX};
+pub use service::{
+    AlertKind, ChangesConfig, FreshnessConfig, HookConfig, HttpConfig, LoadedService, MovedConfig,
+    RetentionConfig, ScheduleConfig, ServiceConfig, ServiceInputs, ServiceOutputs, WorkersConfig,
+    load_service, parse_service, service_example, service_schema,
+};
 pub use site::SiteConfig;
 pub use ties::{IntersectionConfig, TiesConfig};
 pub use unknowns::{PositionUnknowns, RotationUnknowns};

@@ -15,10 +15,7 @@ use crate::{
         AdjustmentProducts, ImageProducts, SiteProducts,
         product::{Content, Declaration, Program, Role, Use, Write},
     },
-    stages::{
-        adjust::{CorrectedPoint, PointKind},
-        read_ties::Ties,
-    },
+    stages::{adjust::CorrectedPoint, read_ties::Ties},
     time::Et,
 };
 
@@ -149,7 +146,7 @@ fn places(image: &ImageProducts) -> BTreeMap<usize, [f64; 2]> {
 fn control_points<'a>(
     site: &SiteProducts<'a>,
     ties: &'a Ties,
-    adjustment: &AdjustmentProducts<'a>,
+    adjustment: &'a AdjustmentProducts<'a>,
     files: &'a [String],
 ) -> Vec<ControlPoint<'a>> {
     let usual_px = tie_sigmas_px(site, adjustment);

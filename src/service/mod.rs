@@ -1,0 +1,10 @@
+//! The service: sites are run again when what they read changes, one worker process a site.
+//!
+//! Truth about products is on the disk, in their manifests; the database remembers and is compared with the disk at
+//! start. Files are listed, not watched. A job brings one site up to date, an attempt is one worker process, a run is what
+//! one attempt published.
+
+pub mod clock;
+pub mod database;
+pub mod state;
+pub mod worker;
