@@ -269,7 +269,7 @@ fn until_force_and_dry_run() {
     command.arg("--force");
     assert!(
         case.outcome(command)
-            .contains("valid with remarks; products in")
+            .contains("case: valid; products in")
     );
     assert!(common::mission::products(&case.path("out")) == before);
 }
