@@ -542,7 +542,10 @@ fn damaged_stores_and_products_are_made_again() {
     case.write("out/case/.cache/convert_datum", b"damaged");
     case.write("out/case/footprints.csv", b"edited");
     fs::remove_file(case.path("out/case/ranges.json")).unwrap();
-    assert!(case.outcome(case.run()).contains("case: valid; products in"));
+    assert!(
+        case.outcome(case.run())
+            .contains("case: valid; products in")
+    );
     assert!(common::mission::products(&case.path("out")) == before);
 }
 
