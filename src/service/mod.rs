@@ -6,5 +6,7 @@
 
 pub mod clock;
 pub mod database;
+pub mod shared;
 pub mod state;
+pub mod tokens;
 pub mod worker;

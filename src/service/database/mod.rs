@@ -53,6 +53,9 @@ pub enum DatabaseError {
         /// Its layout.
         found: i64,
     },
+    /// The system has no random numbers.
+    #[error("no random numbers: {0}")]
+    NoRandom(String),
     /// A job cannot go where it was sent.
     #[error(transparent)]
     Transition(#[from] WrongTransition),
@@ -61,7 +64,7 @@ pub enum DatabaseError {
 impl Cause for DatabaseError {
     fn kind(&self) -> Kind {
         match self {
-            Self::Sqlite(_) => Kind::Io,
+            Self::Sqlite(_) | Self::NoRandom(_) => Kind::Io,
             Self::Damaged(_) | Self::Newer { .. } => Kind::Input,
             Self::Transition(_) => Kind::Bug,
         }
@@ -69,6 +72,7 @@ impl Cause for DatabaseError {
 
     fn advice(&self) -> String {
         match self {
+            Self::NoRandom(_) => "check that the system has a source of random numbers",
             Self::Sqlite(_) => "check the disk of the state folder; the service tries again",
             Self::Damaged(_) => {
                 "put the newest copy from the folder copies in its place, or make a new one from the products: \
