@@ -6,6 +6,9 @@
 
 pub mod clock;
 pub mod database;
+pub mod engine;
+pub mod lock;
+pub mod random;
 pub mod shared;
 pub mod state;
 pub mod tokens;
