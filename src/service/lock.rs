@@ -63,7 +63,10 @@ impl Cause for LockError {
     fn advice(&self) -> String {
         match self {
             Self::Taken(owner) if !owner.address.is_empty() => {
-                format!("look at http://{}, or end that process first", owner.address)
+                format!(
+                    "look at http://{}, or end that process first",
+                    owner.address
+                )
             }
             Self::Taken(_) | Self::TakenByUnknown => "end that process first".to_owned(),
             Self::Network(_) => "give outputs.state a folder on a local disk".to_owned(),
@@ -155,7 +158,11 @@ mod tests {
         let refused = ServiceLock::take(folder.path(), &owner).unwrap_err();
         assert_eq!(refused.kind(), Kind::Io);
         let text = refused.to_string();
-        for told in ["process 4711", "1970-01-01T00:00:00", "http://127.0.0.1:8470"] {
+        for told in [
+            "process 4711",
+            "1970-01-01T00:00:00",
+            "http://127.0.0.1:8470",
+        ] {
             assert!(text.contains(told), "{text}");
         }
         drop(lock);

@@ -3,6 +3,7 @@
 use rusqlite::{Connection, Row, Transaction, params};
 
 use super::Stored;
+use crate::service::worker::process::ProcessIdentity;
 
 /// An attempt.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -11,17 +12,13 @@ pub struct Attempt {
     pub job: i64,
     /// Its number in the job, from 1.
     pub n: i64,
-    /// Its process, once that said hello.
-    pub pid: Option<i64>,
-    /// Start of the process, ticks since boot: another process may get the same number.
-    pub pid_start: Option<i64>,
-    /// The boot of the machine.
-    pub boot_id: Option<String>,
+    /// Its process, once that was started.
+    pub process: Option<ProcessIdentity>,
     /// The stage at work when last heard.
     pub stage: Option<String>,
-    /// Memory in use when last heard, kibibytes.
-    pub rss_kib: Option<i64>,
-    /// When it ended, milliseconds of UTC since 1970.
+    /// When it began, milliseconds of UTC since 1970.
+    pub started_ms: i64,
+    /// When it ended.
     pub ended_ms: Option<i64>,
 }
 
@@ -50,13 +47,12 @@ pub fn begin_attempt(
 pub fn put_process(
     transaction: &Transaction<'_>,
     (job, n): (i64, i64),
-    pid: u32,
-    pid_start: Option<i64>,
-    boot_id: &str,
+    process: &ProcessIdentity,
 ) -> Stored<()> {
+    let start = i64::try_from(process.start).unwrap_or(i64::MAX);
     transaction.execute(
         "UPDATE attempt SET pid = ?3, pid_start = ?4, boot_id = ?5 WHERE job = ?1 AND n = ?2",
-        params![job, n, pid, pid_start, boot_id],
+        params![job, n, process.pid, start, process.boot_id],
     )?;
     Ok(())
 }
@@ -113,21 +109,25 @@ pub fn end_attempt(
 /// # Errors
 /// SQLite's own.
 pub fn attempts(connection: &Connection, job: i64) -> Stored<Vec<Attempt>> {
-    let mut query =
-        connection.prepare_cached("SELECT * FROM attempt WHERE job = ?1 ORDER BY n")?;
+    let mut query = connection.prepare_cached("SELECT * FROM attempt WHERE job = ?1 ORDER BY n")?;
     let found = query.query_map([job], attempt_row)?;
     Ok(found.collect::<Result<_, _>>()?)
 }
 
 fn attempt_row(row: &Row<'_>) -> rusqlite::Result<Attempt> {
+    let (pid, start, boot_id): (Option<u32>, Option<i64>, Option<String>) =
+        (row.get("pid")?, row.get("pid_start")?, row.get("boot_id")?);
+    let process = pid.zip(start).zip(boot_id);
     Ok(Attempt {
         job: row.get("job")?,
         n: row.get("n")?,
-        pid: row.get("pid")?,
-        pid_start: row.get("pid_start")?,
-        boot_id: row.get("boot_id")?,
+        process: process.map(|((pid, start), boot_id)| ProcessIdentity {
+            pid,
+            start: start.unsigned_abs(),
+            boot_id,
+        }),
         stage: row.get("stage")?,
-        rss_kib: row.get("rss_kib")?,
+        started_ms: row.get("started_ms")?,
         ended_ms: row.get("ended_ms")?,
     })
 }

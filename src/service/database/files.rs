@@ -2,25 +2,9 @@
 
 use std::{collections::BTreeMap, path::Path};
 
-use rusqlite::{Connection, Row, Transaction, params};
-use serde::{Deserialize, Serialize};
-
 use super::{DatabaseError, Stored};
-
-/// What the file system says of a file; compared for equality alone, since mirrors set old times on new files.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Identity {
-    /// Number of the device.
-    pub device: i64,
-    /// Number on the device.
-    pub inode: i64,
-    /// Bytes.
-    pub size: i64,
-    /// Last change of the content, nanoseconds since 1970.
-    pub mtime_ns: i64,
-    /// Last change of content, name or attributes, nanoseconds since 1970.
-    pub ctime_ns: i64,
-}
+use crate::files::Identity;
+use rusqlite::{Connection, OptionalExtension as _, Row, Transaction, params};
 
 /// How far a file can be relied upon.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -151,14 +135,24 @@ pub fn files_below(connection: &Connection, folder: &str) -> Stored<BTreeMap<Str
     Ok(named.collect::<Result<_, _>>()?)
 }
 
-/// Files that wait for their folder to be quiet, or whose content has not been read since.
+/// A file by its path.
 ///
 /// # Errors
 /// SQLite's own.
-pub fn settling_files(connection: &Connection) -> Stored<Vec<FileRow>> {
-    let mut query = connection
-        .prepare_cached("SELECT * FROM file_version WHERE state = 'settling' ORDER BY path")?;
-    let found = query.query_map([], file_row)?;
+pub fn file(connection: &Connection, path: &str) -> Stored<Option<FileRow>> {
+    let mut query = connection.prepare_cached("SELECT * FROM file_version WHERE path = ?1")?;
+    Ok(query.query_row([path], file_row).optional()?)
+}
+
+/// Ready files whose content was found after a round, with the round that found it.
+///
+/// # Errors
+/// SQLite's own.
+pub fn files_since(connection: &Connection, round: i64) -> Stored<Vec<(String, i64)>> {
+    let mut query = connection.prepare_cached(
+        "SELECT path, round FROM file_version WHERE round > ?1 AND state = 'ready' ORDER BY path",
+    )?;
+    let found = query.query_map([round], |row| Ok((row.get(0)?, row.get(1)?)))?;
     Ok(found.collect::<Result<_, _>>()?)
 }
 
@@ -166,11 +160,7 @@ pub fn settling_files(connection: &Connection) -> Stored<Vec<FileRow>> {
 ///
 /// # Errors
 /// SQLite's own.
-pub fn oldest_checked(
-    connection: &Connection,
-    before_ms: i64,
-    limit: u32,
-) -> Stored<Vec<FileRow>> {
+pub fn oldest_checked(connection: &Connection, before_ms: i64, limit: u32) -> Stored<Vec<FileRow>> {
     let mut query = connection.prepare_cached(
         "SELECT * FROM file_version WHERE state = 'ready' AND checked_ms < ?1 ORDER BY checked_ms, path LIMIT ?2",
     )?;
@@ -188,20 +178,14 @@ pub fn put_file(transaction: &Transaction<'_>, file: &FileRow) -> Stored<()> {
          (path, device, inode, size, mtime_ns, ctime_ns, blake3, first_seen_ms, changed_ms, checked_ms, state, detail, round)
          VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13)",
     )?;
-    let Identity {
-        device,
-        inode,
-        size,
-        mtime_ns,
-        ctime_ns,
-    } = file.identity;
+    let identity = &file.identity;
     put.execute(params![
         file.path,
-        device,
-        inode,
-        size,
-        mtime_ns,
-        ctime_ns,
+        identity.device.cast_signed(),
+        identity.inode.cast_signed(),
+        identity.bytes.cast_signed(),
+        nanoseconds(identity.modified),
+        nanoseconds(identity.changed),
         file.blake3,
         file.first_seen_ms,
         file.changed_ms,
@@ -307,11 +291,11 @@ fn file_row(row: &Row<'_>) -> rusqlite::Result<FileRow> {
     Ok(FileRow {
         path: row.get("path")?,
         identity: Identity {
-            device: row.get("device")?,
-            inode: row.get("inode")?,
-            size: row.get("size")?,
-            mtime_ns: row.get("mtime_ns")?,
-            ctime_ns: row.get("ctime_ns")?,
+            device: row.get::<_, i64>("device")?.cast_unsigned(),
+            inode: row.get::<_, i64>("inode")?.cast_unsigned(),
+            bytes: row.get::<_, i64>("size")?.cast_unsigned(),
+            modified: parts(row.get("mtime_ns")?),
+            changed: parts(row.get("ctime_ns")?),
         },
         blake3: row.get("blake3")?,
         first_seen_ms: row.get("first_seen_ms")?,
@@ -321,6 +305,20 @@ fn file_row(row: &Row<'_>) -> rusqlite::Result<FileRow> {
         detail: row.get("detail")?,
         round: row.get("round")?,
     })
+}
+
+const NS_PER_S: i64 = 1_000_000_000;
+
+/// Seconds and nanoseconds since 1970 as nanoseconds, which fit for 292 years.
+fn nanoseconds([seconds, nanoseconds]: [i64; 2]) -> i64 {
+    seconds.saturating_mul(NS_PER_S).saturating_add(nanoseconds)
+}
+
+fn parts(nanoseconds: i64) -> [i64; 2] {
+    [
+        nanoseconds.div_euclid(NS_PER_S),
+        nanoseconds.rem_euclid(NS_PER_S),
+    ]
 }
 
 /// The tables admit no other names.

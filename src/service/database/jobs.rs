@@ -303,6 +303,18 @@ pub fn jobs_in(connection: &Connection, state: JobState) -> Stored<Vec<Job>> {
     Ok(found.collect::<Result<_, _>>()?)
 }
 
+/// Jobs that have waited for long enough.
+///
+/// # Errors
+/// SQLite's own.
+pub fn due_waiting(connection: &Connection, now_ms: i64) -> Stored<Vec<Job>> {
+    let mut query = connection.prepare_cached(
+        "SELECT * FROM job WHERE state = 'waiting' AND not_before_ms <= ?1 ORDER BY id",
+    )?;
+    let found = query.query_map([now_ms], read)?;
+    Ok(found.collect::<Result<_, _>>()?)
+}
+
 /// The job of a site that a worker is, or may be, at.
 ///
 /// # Errors

@@ -9,6 +9,7 @@ pub mod files;
 mod jobs;
 pub mod nights;
 pub mod runs;
+pub mod service;
 pub mod sites;
 
 use std::{
@@ -26,7 +27,7 @@ pub use causes::{CauseKind, CauseRow, add_cause, causes};
 pub use events::{About, Event, append, events_after, newest_event};
 pub use jobs::{
     Ask, Asked, Job, JobFilter, Moved, Priority, WrongTransition, active_job, advance, ask,
-    ask_cancel, job, jobs, jobs_in, next_queued, pending_job,
+    ask_cancel, due_waiting, job, jobs, jobs_in, next_queued, pending_job,
 };
 
 /// Name of the database in the folder of the state.
@@ -155,6 +156,16 @@ impl Database {
             readers.push(reader);
         }
         seen
+    }
+
+    /// Writes the log of the database back into it and shortens the log; readers at work may keep a part of it.
+    ///
+    /// # Errors
+    /// SQLite's own.
+    pub fn checkpoint(&self) -> Stored<()> {
+        let writer = lock(&self.writer);
+        writer.query_row("PRAGMA wal_checkpoint(TRUNCATE)", [], |_| Ok(()))?;
+        Ok(())
     }
 
     /// Copies the database, as it is at one instant, to `path`, where nothing may be.

@@ -98,11 +98,7 @@ pub struct Checked<'a> {
 ///
 /// # Errors
 /// SQLite's own.
-pub fn put_checked(
-    transaction: &Transaction<'_>,
-    name: &str,
-    checked: &Checked<'_>,
-) -> Stored<()> {
+pub fn put_checked(transaction: &Transaction<'_>, name: &str, checked: &Checked<'_>) -> Stored<()> {
     let bounds = checked.bounds_deg;
     let bound = |index: usize| bounds.map(|bounds| bounds[index]);
     transaction.execute(
@@ -241,10 +237,7 @@ pub fn changed_inputs(connection: &Connection) -> Stored<BTreeMap<String, Vec<St
     let mut rows = query.query([])?;
     let mut changed: BTreeMap<String, Vec<String>> = BTreeMap::new();
     while let Some(row) = rows.next()? {
-        changed
-            .entry(row.get(0)?)
-            .or_default()
-            .push(row.get(1)?);
+        changed.entry(row.get(0)?).or_default().push(row.get(1)?);
     }
     Ok(changed)
 }

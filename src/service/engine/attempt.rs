@@ -9,29 +9,27 @@ use std::{
 
 use rusqlite::Transaction;
 use serde_json::json;
-use tokio::{
-    sync::watch,
-    time::{Instant, sleep, sleep_until},
-};
+use tokio::{sync::watch, time::sleep};
 
 use super::{
     core::{Core, log_of, runs, working},
     ending::{Attempt, finish},
-    process::{boot_id, process_start},
     runs::run_id,
-    workers::{Effort, Workers},
+    workers::Workers,
 };
 use crate::service::{
     database::{
         About, Job, Moved, Priority, Stored, advance, append,
         attempts::{begin_attempt, put_beat, put_process},
-        job,
+        job, next_queued,
         runs::RunRow,
-        next_queued,
         sites::site,
     },
     state::JobState,
-    worker::protocol::{CancelWhy, Line, What},
+    worker::{
+        parent::Heard,
+        protocol::{CancelWhy, Line, What},
+    },
 };
 
 /// Time between two tries to note the end of an attempt while the database cannot be written.
@@ -202,26 +200,20 @@ pub async fn follow<W: Workers>(
         run: attempt.run.clone(),
         force: job.force,
     };
-    let effort = Effort {
-        silence: core.silence(),
-        log: config.outputs.state.join(log_of(job.id, attempt.n)),
-        log_max_bytes: core.log_max_bytes(),
-        cancel: cancel.clone(),
-    };
-    tracing::info!(site = job.site, job = job.id, attempt = attempt.n, "started");
+    tracing::info!(
+        site = job.site,
+        job = job.id,
+        attempt = attempt.n,
+        "started"
+    );
     let ended = {
-        let heard = |line: &Line| hear(&core, &mut attempt, line);
         let task = core.task(job.id, attempt.n, what);
-        let work = core.workers.work(task, effort, heard);
-        tokio::pin!(work);
-        let deadline = Instant::now() + Duration::from_secs_f64(config.workers.deadline_s);
-        tokio::select! {
-            ended = &mut work => ended,
-            () = sleep_until(deadline) => {
-                at_work.cancel(job.id, CancelWhy::Deadline);
-                work.await
-            }
-        }
+        let limits = core.limits(config.workers.deadline_s);
+        let log = config.outputs.state.join(log_of(job.id, attempt.n));
+        let heard = |heard: Heard<'_>| hear(&core, &mut attempt, heard);
+        core.workers
+            .work(task, limits, &log, cancel.clone(), heard)
+            .await
     };
     let why = *cancel.borrow();
     let run = loop {
@@ -242,16 +234,30 @@ pub async fn follow<W: Workers>(
 }
 
 /// Notes what a worker says; a line that cannot be noted is lost, its work is not.
-fn hear<W: Workers>(core: &Core<W>, attempt: &mut Attempt, line: &Line) {
+fn hear<W: Workers>(core: &Core<W>, attempt: &mut Attempt, heard: Heard<'_>) {
     let now_ms = core.now_ms();
     let at = (attempt.job, attempt.n);
+    let line = match heard {
+        Heard::Started(process) => {
+            let noted = core
+                .shared
+                .write(|transaction| put_process(transaction, at, process));
+            return told(noted, attempt);
+        }
+        Heard::Line(line) => line,
+    };
     let noted = core.shared.write(|transaction| match line {
-        Line::Hello { pid, .. } => {
-            put_process(transaction, at, *pid, process_start(*pid), &boot_id())?;
+        Line::Hello { .. } => {
             let stands = job(transaction, attempt.job)?.map(|job| job.state);
             if stands == Some(JobState::Starting) {
                 let running = Moved::default();
-                advance(transaction, now_ms, attempt.job, JobState::Running, &running)?;
+                advance(
+                    transaction,
+                    now_ms,
+                    attempt.job,
+                    JobState::Running,
+                    &running,
+                )?;
             }
             Ok(())
         }
@@ -272,12 +278,13 @@ fn hear<W: Workers>(core: &Core<W>, attempt: &mut Attempt, line: &Line) {
                 json!({ "stage": stage, "state": state, "because": because, "seconds": seconds });
             append(transaction, now_ms, "stage", about, &data).map(|_| ())
         }
-        Line::Beat { rss_kib } => {
-            attempt.rss_kib = attempt.rss_kib.max(*rss_kib);
-            put_beat(transaction, now_ms, at, Some(*rss_kib), None)
-        }
-        Line::Answer(_) | Line::Failure(_) => Ok(()),
+        Line::Beat { rss_kib } => put_beat(transaction, now_ms, at, Some(*rss_kib), None),
+        Line::Answer(_) | Line::Failure(_) | Line::Piece { .. } => Ok(()),
     });
+    told(noted, attempt);
+}
+
+fn told(noted: Stored<()>, attempt: &Attempt) {
     if let Err(error) = noted {
         tracing::warn!(job = attempt.job, "a line of a worker: {error}");
     }

@@ -13,17 +13,20 @@ use std::{
 
 use tokio::{sync::watch, time::timeout};
 
-use super::workers::{Effort, Ended, How, Workers};
+use super::workers::Workers;
 use crate::{
     error::{IoError, Locate as _, Result},
     service::{
         random::Random,
         shared::Shared,
-        worker::protocol::{CancelWhy, PROTOCOL, Task, What},
+        worker::{
+            parent::{Ended, How, WorkerLimits},
+            protocol::{CancelWhy, PROTOCOL, Task, What},
+        },
     },
 };
 
-/// Time after a cancel within which a worker is ended by force.
+/// Time within which a worker that took too long is ended by force, unless a dead mount holds it.
 const ENDED_WITHIN: Duration = Duration::from_secs(25);
 
 /// The engine, as its parts see it.
@@ -95,59 +98,49 @@ impl<W: Workers> Core<W> {
         }
     }
 
-    /// Has work done that belongs to no job. After `limit` it is asked to stop; what does not stop even then, since a dead mount
-    /// holds it, is given up, and nothing is begun for the same subject before it ends.
+    /// Has work done that belongs to no job. After `limit` it is ended; what cannot be ended, since a dead mount holds it, is
+    /// given up, and nothing is begun for the same subject before it ends.
     pub async fn ask(self: &Arc<Self>, subject: &str, what: What, limit: Duration) -> Ended {
         if !self.stuck().insert(subject.to_owned()) {
             return silent();
         }
         let (stop, cancel) = watch::channel(None);
-        let log = self.scratch();
-        let effort = Effort {
-            silence: self.silence(),
-            log: log.clone(),
-            log_max_bytes: self.log_max_bytes(),
-            cancel,
-        };
+        let limits = self.limits(limit.as_secs_f64());
         let (core, task) = (Arc::clone(self), self.task(0, 1, what));
-        let subject = subject.to_owned();
+        let of_work = subject.to_owned();
         let mut work = tokio::spawn(async move {
-            let ended = core.workers.work(task, effort, |_| ()).await;
-            core.stuck().remove(&subject);
+            let log = core.scratch();
+            let ended = core.workers.work(task, limits, &log, cancel, |_| ()).await;
+            core.stuck().remove(&of_work);
             let _ = fs::remove_file(log);
             ended
         });
         let ended = tokio::select! {
-            ended = timeout(limit, &mut work) => ended.ok(),
-            () = self.shared.ending.cancelled() => None,
+            ended = timeout(limit + ENDED_WITHIN, &mut work) => ended.ok(),
+            () = self.shared.ending.cancelled() => {
+                stop.send_replace(Some(CancelWhy::Shutdown));
+                timeout(ENDED_WITHIN, &mut work).await.ok()
+            }
         };
-        if let Some(ended) = ended {
-            return ended.unwrap_or_else(|error| lost(&error.to_string()));
-        }
-        let ending = self.shared.ending.is_cancelled();
-        let why = if ending {
-            CancelWhy::Shutdown
-        } else {
-            CancelWhy::Deadline
-        };
-        stop.send_replace(Some(why));
-        match timeout(ENDED_WITHIN, work).await {
-            Ok(Ok(ended)) => ended,
-            Ok(Err(error)) => lost(&error.to_string()),
-            Err(_) => silent(),
+        match ended {
+            Some(Ok(ended)) => ended,
+            Some(Err(panicked)) => {
+                tracing::error!("work for {subject}: {panicked}");
+                silent()
+            }
+            None => silent(),
         }
     }
 
-    /// How long a worker may give no sign of life.
+    /// Limits of a worker.
     #[must_use]
-    pub fn silence(&self) -> Duration {
-        Duration::from_secs_f64(self.shared.config().workers.silence_s)
-    }
-
-    /// Longest log.
-    #[must_use]
-    pub fn log_max_bytes(&self) -> u64 {
-        u64::from(self.shared.config().workers.log_max_kib) << 10
+    pub fn limits(&self, deadline_s: f64) -> WorkerLimits {
+        let workers = &self.shared.config().workers;
+        WorkerLimits {
+            deadline_s,
+            silence_s: workers.silence_s,
+            log_max_kib: workers.log_max_kib,
+        }
     }
 
     fn stuck(&self) -> MutexGuard<'_, BTreeSet<String>> {
@@ -189,29 +182,7 @@ pub fn runs(products: &Path, site: &str) -> PathBuf {
 fn silent() -> Ended {
     Ended {
         how: How::Silent,
-        exit: None,
-        signal: None,
-    }
-}
-
-fn lost(why: &str) -> Ended {
-    Ended {
-        how: How::Lost(why.to_owned()),
-        exit: None,
-        signal: None,
-    }
-}
-
-/// Why a worker did not answer, in words.
-#[must_use]
-pub fn words(ended: &Ended) -> String {
-    match (&ended.how, ended.signal) {
-        (How::Answered(_), _) => "done".to_owned(),
-        (How::Failed(failure), _) => failure.text.clone(),
-        (How::Lost(why), Some(signal)) => format!("the worker was ended by signal {signal}: {why}"),
-        (How::Lost(why), None) => format!("the worker ended without an answer: {why}"),
-        (How::Silent, _) => "the worker did not answer in time".to_owned(),
-        (How::OtherVersion(version), _) => format!("the worker is of areograph {version}"),
-        (How::NotStarted(why), _) => format!("the worker could not be started: {why}"),
+        answer: None,
+        rss_peak_kib: 0,
     }
 }

@@ -5,11 +5,11 @@ use serde_json::{Value, json};
 
 use super::{
     alerts::{Standing, tell_standing},
-    core::{Core, runs, site_folder, words},
+    core::{Core, runs, site_folder},
     fresh,
     retry::{Fruitless, after},
     runs::{Published, current, make_current, read_run, remove_folder, row},
-    workers::{Ended, How, Workers},
+    workers::{Workers, words},
 };
 use crate::{
     error::Error,
@@ -21,7 +21,10 @@ use crate::{
             runs::{RunRow, put_current, put_run},
         },
         state::JobState,
-        worker::protocol::{Answer, CancelWhy, Failure, RunAnswer},
+        worker::{
+            parent::{Ended, How},
+            protocol::{Answer, CancelWhy, Failure, RunAnswer},
+        },
     },
 };
 
@@ -38,8 +41,6 @@ pub struct Attempt {
     pub run: String,
     /// The stage at work.
     pub stage: Option<String>,
-    /// Most memory that it had, kibibytes.
-    pub rss_kib: u64,
 }
 
 /// What an attempt came to.
@@ -50,7 +51,7 @@ enum Fruit {
     /// Nothing had to be made.
     Unchanged,
     /// Nothing, and why.
-    None(How),
+    None(Ended),
 }
 
 /// Ends an attempt; gives the run that it published.
@@ -67,24 +68,28 @@ pub fn finish<W: Workers>(
     let config = core.shared.config();
     let now_ms = core.now_ms();
     core.shared.write(|transaction| {
-        let job = job(transaction, attempt.job)?.ok_or(DatabaseError::Sqlite(
-            rusqlite::Error::QueryReturnedNoRows,
-        ))?;
+        let job = job(transaction, attempt.job)?
+            .ok_or(DatabaseError::Sqlite(rusqlite::Error::QueryReturnedNoRows))?;
         let end = AttemptEnd {
             how: &words(ended),
-            exit: ended.exit,
-            signal: ended.signal,
+            exit: match ended.how {
+                How::Exited(code) => Some(code),
+                _ => None,
+            },
+            signal: match ended.how {
+                How::Signalled(signal) => Some(signal),
+                _ => None,
+            },
         };
         end_attempt(transaction, now_ms, (attempt.job, attempt.n), end)?;
         let (state, moved) = match &fruit {
             Fruit::Run(run) => after_run(transaction, now_ms, run)?,
             Fruit::Unchanged => (JobState::Unchanged, text("nothing had to be made")),
-            Fruit::None(how) => {
+            Fruit::None(ended) => {
                 let fruitless = Fruitless {
                     job: &job,
-                    how,
+                    ended,
                     stage: attempt.stage.as_deref(),
-                    rss_kib: attempt.rss_kib,
                     memory_mib: config.workers.memory_mib,
                     cancel,
                     retry_s: config.workers.retry_s,
@@ -94,7 +99,12 @@ pub fn finish<W: Workers>(
             }
         };
         let said = moved.outcome.as_ref().map(outcome_text).unwrap_or_default();
-        tracing::info!(site = attempt.site, job = job.id, attempt = attempt.n, "{state}: {said}");
+        tracing::info!(
+            site = attempt.site,
+            job = job.id,
+            attempt = attempt.n,
+            "{state}: {said}"
+        );
         go(transaction, now_ms, &job, state, &moved)?;
         if let Some(standing) = standing(state) {
             tell_standing(transaction, &config, now_ms, &attempt.site, standing, &said)?;
@@ -128,8 +138,8 @@ fn go(
     state: JobState,
     moved: &Moved,
 ) -> Stored<()> {
-    let from_start = job.state == JobState::Starting
-        && matches!(state, JobState::Unchanged | JobState::Blocked);
+    let from_start =
+        job.state == JobState::Starting && matches!(state, JobState::Unchanged | JobState::Blocked);
     if from_start {
         let running = Moved::default();
         advance(transaction, now_ms, job.id, JobState::Running, &running)?;
@@ -147,8 +157,8 @@ fn standing(state: JobState) -> Option<Standing> {
 }
 
 fn fruit<W: Workers>(core: &Core<W>, attempt: &Attempt, ended: &Ended) -> Stored<Fruit> {
-    let answer = match &ended.how {
-        How::Answered(Answer::Run(answer)) => Some(answer),
+    let answer = match &ended.answer {
+        Some(Ok(Answer::Run(answer))) => Some(answer),
         _ => None,
     };
     let products = core.shared.config().outputs.products.clone();
@@ -157,7 +167,7 @@ fn fruit<W: Workers>(core: &Core<W>, attempt: &Attempt, ended: &Ended) -> Stored
     if !folder.is_dir() {
         return Ok(match answer {
             Some(answer) if answer.run.is_none() => Fruit::Unchanged,
-            _ => Fruit::None(ended.how.clone()),
+            _ => Fruit::None(ended.clone()),
         });
     }
     let checked = read_run(&folder).and_then(|published| {
@@ -179,10 +189,11 @@ fn fruit<W: Workers>(core: &Core<W>, attempt: &Attempt, ended: &Ended) -> Stored
             if let Err(kept) = remove_folder(&folder) {
                 tracing::warn!("{kept}");
             }
-            Ok(Fruit::None(match &ended.how {
-                How::Answered(_) => How::Failed(as_failure(&failure)),
-                how => how.clone(),
-            }))
+            let mut ended = ended.clone();
+            if answer.is_some() {
+                ended.answer = Some(Err(as_failure(&failure)));
+            }
+            Ok(Fruit::None(ended))
         }
     }
 }

@@ -6,13 +6,21 @@ use std::collections::BTreeMap;
 use rusqlite::{Connection, Transaction, params};
 use serde_json::Value;
 
-use super::hold::not_ready;
-use crate::service::{
-    database::{
-        Stored, causes,
-        sites::{SiteRow, put_fresh, put_stale, site, sites},
+use super::{
+    alerts::{Alert, tell_edge},
+    hold::not_ready,
+    retry::milliseconds,
+};
+use crate::{
+    config::{AlertKind, ServiceConfig},
+    service::{
+        clock::utc_text,
+        database::{
+            Stored, causes,
+            sites::{SiteRow, put_fresh, put_stale, site, sites},
+        },
+        state::JobState,
     },
-    state::JobState,
 };
 
 /// Notes of one site, or of all, whether it is fresh.
@@ -99,4 +107,57 @@ fn by_job(
         state => format!("job {} is {state}: {}", job.id, job.outcome),
     };
     Ok(Some((job.created_ms, why)))
+}
+
+/// Hours as milliseconds.
+fn hours_ms(hours: f64) -> i64 {
+    milliseconds(hours * 3600.0)
+}
+
+/// Tells, once, of sites that have been stale, or were not compared, for too long.
+///
+/// # Errors
+/// SQLite's own.
+pub fn tell_stale(
+    transaction: &Transaction<'_>,
+    config: &ServiceConfig,
+    now_ms: i64,
+) -> Stored<()> {
+    let freshness = &config.freshness;
+    let stale_before_ms = now_ms.saturating_sub(hours_ms(freshness.stale_after_h));
+    let unchecked_before_ms = now_ms.saturating_sub(hours_ms(freshness.unchecked_after_h));
+    for site in sites(transaction)?.iter().filter(|site| site.enabled) {
+        let stale = site
+            .stale_since_ms
+            .filter(|since_ms| *since_ms < stale_before_ms);
+        let unchecked = site
+            .checked_ms
+            .filter(|checked_ms| *checked_ms < unchecked_before_ms);
+        let because = site.stale_because.as_deref().unwrap_or_default();
+        let text = match (stale, unchecked) {
+            (Some(since_ms), _) => {
+                format!("stale since {}: {because}", utc_text(since_ms))
+            }
+            (None, Some(checked_ms)) => {
+                format!("not compared since {}", utc_text(checked_ms))
+            }
+            (None, None) => String::new(),
+        };
+        let alert = Alert {
+            kind: AlertKind::Stale,
+            site: Some(&site.name),
+            run: None,
+            text: &text,
+        };
+        let subject = format!("freshness {}", site.name);
+        let wrong = !text.is_empty();
+        tell_edge(
+            transaction,
+            config,
+            now_ms,
+            (&subject, wrong),
+            (&alert, None),
+        )?;
+    }
+    Ok(())
 }

@@ -84,7 +84,12 @@ async fn run(command: &[String], body: &str) -> Result<(), String> {
         // Also what it left behind.
         let _ = kill_process_group(group, Signal::KILL);
     }
-    ended.unwrap_or_else(|_| Err(format!("{program} did not end within {} s", LIMIT.as_secs())))
+    ended.unwrap_or_else(|_| {
+        Err(format!(
+            "{program} did not end within {} s",
+            LIMIT.as_secs()
+        ))
+    })
 }
 
 async fn to_the_end(child: &mut Child, body: &str) -> Result<(), String> {
@@ -94,10 +99,7 @@ async fn to_the_end(child: &mut Child, body: &str) -> Result<(), String> {
     }
     let mut complaint = Vec::new();
     if let Some(errors) = child.stderr.take() {
-        let _ = errors
-            .take(COMPLAINT_MAX)
-            .read_to_end(&mut complaint)
-            .await;
+        let _ = errors.take(COMPLAINT_MAX).read_to_end(&mut complaint).await;
     }
     let status = child.wait().await.map_err(|error| error.to_string())?;
     if status.success() {
@@ -133,7 +135,9 @@ mod tests {
             body: String::new(),
             tries,
         };
-        let delays: Vec<i64> = [0, 1, 5, 6, 60].map(|tries| delay_ms(&letter(tries))).to_vec();
+        let delays: Vec<i64> = [0, 1, 5, 6, 60]
+            .map(|tries| delay_ms(&letter(tries)))
+            .to_vec();
         assert_eq!(delays, [60_000, 120_000, 1_920_000, 3_600_000, 3_600_000]);
     }
 }

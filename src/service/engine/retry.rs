@@ -6,12 +6,16 @@ use crate::{
     error::Kind,
     service::{
         database::{Job, Moved},
-        engine::workers::How,
         random::Random,
         state::JobState,
-        worker::protocol::{CancelWhy, Failure},
+        worker::{
+            parent::{Ended, How},
+            protocol::{CancelWhy, Failure},
+        },
     },
 };
+
+use super::workers::words;
 
 /// Attempts at a failure of input or output.
 pub const IO_ATTEMPTS: i64 = 5;
@@ -32,11 +36,9 @@ pub struct Fruitless<'a> {
     /// The job, as it stood when the attempt ended.
     pub job: &'a Job,
     /// How the worker ended.
-    pub how: &'a How,
+    pub ended: &'a Ended,
     /// The stage at work when it was last heard.
     pub stage: Option<&'a str>,
-    /// Most memory that it had, kibibytes.
-    pub rss_kib: u64,
     /// Memory that it might take, mebibytes.
     pub memory_mib: u32,
     /// Why it was asked to stop.
@@ -53,32 +55,32 @@ pub fn after(attempt: &Fruitless<'_>, random: Random) -> (JobState, Moved) {
     if attempt.job.state == JobState::Cancelling {
         return ended(JobState::Cancelled, "cancelled");
     }
-    match (attempt.cancel, attempt.how) {
-        (Some(CancelWhy::Shutdown), _) => ended(JobState::Queued, "the service ended"),
-        (Some(CancelWhy::Deadline), _) => counted(
+    if attempt.cancel == Some(CancelWhy::Shutdown) {
+        return ended(JobState::Queued, "the service ended");
+    }
+    if let Some(Err(failure)) = &attempt.ended.answer
+        && attempt.ended.how != How::DeadlinePassed
+    {
+        return after_failure(attempt, failure, random);
+    }
+    match &attempt.ended.how {
+        How::DeadlinePassed => counted(
             JobState::Failed,
             json!({ "text": "it took longer than workers.deadline_s", "stage": attempt.stage }),
         ),
-        (_, How::Failed(failure)) => after_failure(attempt, failure, random),
-        (_, How::OtherVersion(version)) => uncounted(
+        How::ForeignVersion(version) => uncounted(
             attempt,
             &format!("the program was replaced by areograph {version}: restart the service"),
         ),
-        (_, How::NotStarted(why)) => {
-            let text = format!("the worker could not be started: {why}");
-            again(attempt, IO_ATTEMPTS, json!({ "text": text }), random)
+        How::NotStarted(_) => {
+            let outcome = json!({ "text": words(attempt.ended) });
+            again(attempt, IO_ATTEMPTS, outcome, random)
         }
-        (_, How::Lost(why)) => after_crash(attempt, why, random),
-        (_, How::Silent) => after_crash(attempt, "it gave no sign of life", random),
-        (_, How::Answered(_)) => after_crash(attempt, "its answer was none to a run", random),
+        _ => after_crash(attempt, random),
     }
 }
 
-fn after_failure(
-    attempt: &Fruitless<'_>,
-    failure: &Failure,
-    random: Random,
-) -> (JobState, Moved) {
+fn after_failure(attempt: &Fruitless<'_>, failure: &Failure, random: Random) -> (JobState, Moved) {
     let outcome = json!({
         "text": failure.text,
         "code": failure.code,
@@ -100,9 +102,9 @@ fn after_failure(
     }
 }
 
-fn after_crash(attempt: &Fruitless<'_>, why: &str, random: Random) -> (JobState, Moved) {
+fn after_crash(attempt: &Fruitless<'_>, random: Random) -> (JobState, Moved) {
     let stage = attempt.stage.unwrap_or("the start");
-    let rss_mib = attempt.rss_kib as f64 / 1024.0;
+    let rss_mib = attempt.ended.rss_peak_kib as f64 / 1024.0;
     if rss_mib > MEMORY_SHARE * f64::from(attempt.memory_mib) {
         let text = format!(
             "needs more memory than workers.memory_mib = {} at stage {stage}",
@@ -112,19 +114,14 @@ fn after_crash(attempt: &Fruitless<'_>, why: &str, random: Random) -> (JobState,
         return counted(JobState::Failed, outcome);
     }
     let outcome = json!({
-        "text": format!("crashes at stage {stage}: {why}"),
+        "text": format!("crashes at stage {stage}: {}", words(attempt.ended)),
         "stage": attempt.stage,
     });
     again(attempt, CRASH_ATTEMPTS, outcome, random)
 }
 
 /// Once more after a growing delay, unless that was the last attempt of `most`.
-fn again(
-    attempt: &Fruitless<'_>,
-    most: i64,
-    outcome: Value,
-    random: Random,
-) -> (JobState, Moved) {
+fn again(attempt: &Fruitless<'_>, most: i64, outcome: Value, random: Random) -> (JobState, Moved) {
     let failed = attempt.job.failures;
     if failed + 1 >= most {
         return counted(JobState::Failed, outcome);
@@ -207,20 +204,32 @@ mod tests {
         }
     }
 
-    fn failure(code: u8, busy: bool) -> How {
-        How::Failed(Failure {
+    fn gone(how: How, rss_peak_kib: u64) -> Ended {
+        Ended {
+            how,
+            answer: None,
+            rss_peak_kib,
+        }
+    }
+
+    fn failure(code: u8, busy: bool) -> Ended {
+        let failure = Failure {
             code,
             busy,
             site: None,
             stage: None,
             file: None,
             text: "why".to_owned(),
-        })
+        };
+        Ended {
+            answer: Some(Err(failure)),
+            ..gone(How::Exited(i32::from(code)), 0)
+        }
     }
 
-    /// The state after an attempt with so many failures before it, and the delay.
+    /// The state after an attempt with so many failures before it, the delay, and whether it counts.
     fn next(
-        how: &How,
+        ended: &Ended,
         state: JobState,
         failures: i64,
         cancel: Option<CancelWhy>,
@@ -228,16 +237,19 @@ mod tests {
         let job = job(state, failures);
         let attempt = Fruitless {
             job: &job,
-            how,
+            ended,
             stage: Some("register/E02-00665"),
-            rss_kib: 100 << 10,
             memory_mib: 1000,
             cancel,
             retry_s: 30.0,
             now_ms: 0,
         };
         let (state, moved) = after(&attempt, Random::always(1.0));
-        assert!(job.state.next().contains(&state), "{} -> {state}", job.state);
+        assert!(
+            job.state.next().contains(&state),
+            "{} -> {state}",
+            job.state
+        );
         (
             state,
             moved.not_before_ms.unwrap_or_default(),
@@ -261,8 +273,9 @@ mod tests {
 
     #[test]
     fn crashes_are_tried_three_times_and_bugs_twice() {
-        let crash = How::Lost("signal 11".to_owned());
-        for (how, last) in [(crash, 2), (How::Silent, 2), (failure(1, false), 1)] {
+        let crash = gone(How::Signalled(11), 0);
+        let silent = gone(How::Silent, 0);
+        for (how, last) in [(crash, 2), (silent, 2), (failure(1, false), 1)] {
             let before = next(&how, JobState::Running, last - 1, None);
             assert_eq!((before.0, before.2), (JobState::Waiting, true));
             let at_last = next(&how, JobState::Running, last, None);
@@ -285,30 +298,31 @@ mod tests {
         let stopped = failure(130, false);
         let shutdown = next(&stopped, JobState::Running, 4, Some(CancelWhy::Shutdown));
         assert_eq!((shutdown.0, shutdown.2), (JobState::Queued, false));
-        let other = How::OtherVersion("9".to_owned());
+        let other = gone(How::ForeignVersion("9".to_owned()), 0);
         let other = next(&other, JobState::Starting, 4, None);
         assert_eq!((other.0, other.2), (JobState::Waiting, false));
     }
 
     #[test]
     fn a_cancel_wins_and_a_deadline_fails() {
-        for how in [failure(130, false), How::Silent, failure(6, false)] {
+        for how in [failure(130, false), gone(How::Silent, 0), failure(6, false)] {
             let ended = next(&how, JobState::Cancelling, 0, Some(CancelWhy::User));
             assert_eq!(ended.0, JobState::Cancelled);
-            let late = next(&how, JobState::Running, 0, Some(CancelWhy::Deadline));
-            assert_eq!(late.0, JobState::Failed);
         }
+        let late = Ended {
+            how: How::DeadlinePassed,
+            ..failure(130, false)
+        };
+        assert_eq!(next(&late, JobState::Running, 0, None).0, JobState::Failed);
     }
 
     #[test]
     fn a_worker_that_filled_its_memory_is_not_tried_again() {
         let job = job(JobState::Running, 0);
-        let how = How::Lost("signal 9".to_owned());
         let attempt = Fruitless {
             job: &job,
-            how: &how,
+            ended: &gone(How::Signalled(9), 950 << 10),
             stage: None,
-            rss_kib: 950 << 10,
             memory_mib: 1000,
             cancel: None,
             retry_s: 30.0,

@@ -14,10 +14,7 @@ use crate::{
     error::{Cause, IoError, Kind, Locate as _, Result},
     service::database::runs::RunRow,
     store::{
-        atomic::sync_folder,
-        manifest::Manifest,
-        publish::MANIFEST,
-        published::read_published,
+        atomic::sync_folder, manifest::Manifest, publish::MANIFEST, published::read_published,
     },
 };
 
@@ -57,7 +54,9 @@ pub struct Published {
 
 /// The folder holds another run than it should.
 #[derive(Debug, thiserror::Error)]
-#[error("this is the run of job {job}, attempt {attempt}, named {run}; expected that of its folder")]
+#[error(
+    "this is the run of job {job}, attempt {attempt}, named {run}; expected that of its folder"
+)]
 struct Foreign {
     job: i64,
     attempt: i64,
@@ -80,11 +79,7 @@ impl Cause for Foreign {
 /// It is not whole, or is another one's; the disk's refusal.
 pub fn read_run(folder: &Path) -> Result<Published> {
     let path = folder.join(RUN_JSON);
-    let read = |path: &Path| {
-        fs::read(path)
-            .map_err(IoError::on("read"))
-            .in_file(path)
-    };
+    let read = |path: &Path| fs::read(path).map_err(IoError::on("read")).in_file(path);
     let by: RunJson = serde_json::from_slice(&read(&path)?)
         .map_err(|error| IoError::on("read")(error.into()))
         .in_file(&path)?;

@@ -106,7 +106,8 @@ impl Schedule {
             seen_ms = next_ms;
         }
         let newest = instants.pop();
-        let instant_ms = newest.filter(|instant_ms| now_ms - instant_ms <= catch_up_ms.max(ON_TIME_MS));
+        let instant_ms =
+            newest.filter(|instant_ms| now_ms - instant_ms <= catch_up_ms.max(ON_TIME_MS));
         if instant_ms.is_none() {
             instants.extend(newest);
         }
@@ -136,7 +137,9 @@ mod tests {
     }
 
     fn at(text: &str) -> i64 {
-        DateTime::parse_from_rfc3339(text).unwrap().timestamp_millis()
+        DateTime::parse_from_rfc3339(text)
+            .unwrap()
+            .timestamp_millis()
     }
 
     /// Instants from one to the other, UTC.
@@ -156,18 +159,46 @@ mod tests {
     fn no_night_is_lost_or_doubled_when_clocks_change() {
         // The hour left out is made up for at its end; of the hour that comes twice the first counts.
         for (zone, spring, expected) in [
-            ("Europe/Berlin", "2026-03-28T12:00:00Z", ["29T01:00", "30T00:30"]),
-            ("America/New_York", "2026-03-07T12:00:00Z", ["08T07:00", "09T06:30"]),
-            ("Australia/Sydney", "2026-10-03T12:00:00Z", ["03T16:00", "04T15:30"]),
+            (
+                "Europe/Berlin",
+                "2026-03-28T12:00:00Z",
+                ["29T01:00", "30T00:30"],
+            ),
+            (
+                "America/New_York",
+                "2026-03-07T12:00:00Z",
+                ["08T07:00", "09T06:30"],
+            ),
+            (
+                "Australia/Sydney",
+                "2026-10-03T12:00:00Z",
+                ["03T16:00", "04T15:30"],
+            ),
         ] {
             let end = at(spring) + 48 * HOUR_MS;
             let end = crate::service::clock::utc_text(end);
-            assert_eq!(between("30 2 * * *", zone, spring, &end), expected, "{zone}");
+            assert_eq!(
+                between("30 2 * * *", zone, spring, &end),
+                expected,
+                "{zone}"
+            );
         }
         for (zone, autumn, expected) in [
-            ("Europe/Berlin", "2026-10-24T12:00:00Z", ["25T00:30", "26T01:30"]),
-            ("America/New_York", "2026-10-31T12:00:00Z", ["01T05:30", "02T06:30"]),
-            ("Australia/Sydney", "2026-04-04T12:00:00Z", ["04T15:30", "05T16:30"]),
+            (
+                "Europe/Berlin",
+                "2026-10-24T12:00:00Z",
+                ["25T00:30", "26T01:30"],
+            ),
+            (
+                "America/New_York",
+                "2026-10-31T12:00:00Z",
+                ["01T05:30", "02T06:30"],
+            ),
+            (
+                "Australia/Sydney",
+                "2026-04-04T12:00:00Z",
+                ["04T15:30", "05T16:30"],
+            ),
         ] {
             let end = at(autumn) + 48 * HOUR_MS;
             let end = crate::service::clock::utc_text(end);
@@ -187,9 +218,15 @@ mod tests {
         let due = |now: &str| schedule.due(last, at(now), 36 * HOUR_MS);
         assert_eq!(due("2026-05-02T02:29:59Z"), Due::default());
         let on_time = due("2026-05-02T02:30:01Z");
-        assert_eq!((on_time.instant_ms, on_time.late), (Some(at("2026-05-02T02:30:00Z")), false));
+        assert_eq!(
+            (on_time.instant_ms, on_time.late),
+            (Some(at("2026-05-02T02:30:00Z")), false)
+        );
         let late = due("2026-05-05T20:00:00Z");
-        assert_eq!((late.instant_ms, late.late), (Some(at("2026-05-05T02:30:00Z")), true));
+        assert_eq!(
+            (late.instant_ms, late.late),
+            (Some(at("2026-05-05T02:30:00Z")), true)
+        );
         assert_eq!(late.missed_ms.len(), 3);
         // A monthly one, missed for longer than is caught up with.
         let monthly = super::tests::schedule("0 0 1 * *", "UTC").unwrap();

@@ -2,12 +2,13 @@
 
 use std::collections::BTreeMap;
 
-use crate::service::{
-    clock::utc_text,
-    database::files::{FileRow, FileState, Identity, RootRow, RootState},
+use crate::{
+    files::Identity,
+    service::{
+        clock::utc_text,
+        database::files::{FileRow, FileState, RootRow, RootState},
+    },
 };
-
-const NS_PER_MS: i64 = 1_000_000;
 
 /// What was known of a folder and what was found in it.
 #[derive(Debug)]
@@ -51,10 +52,7 @@ pub fn compare(sweep: &Sweep<'_>) -> Swept {
         }
     };
     let changed = changed(sweep, found);
-    let news: BTreeMap<&str, &FileRow> = changed
-        .iter()
-        .map(|file| (&*file.path, file))
-        .collect();
+    let news: BTreeMap<&str, &FileRow> = changed.iter().map(|file| (&*file.path, file)).collect();
     let known = sweep.known.values();
     // A file counts as settling from the sweep that saw it change; only a later one may find it quiet.
     let waiting: Vec<&FileRow> = known
@@ -127,8 +125,10 @@ fn changed(sweep: &Sweep<'_>, found: &BTreeMap<String, Identity>) -> Vec<FileRow
     let mut changed = Vec::new();
     for (path, identity) in found {
         match sweep.known.get(path) {
-            Some(file) if file.identity == *identity && file.state != FileState::Gone
-                && !is_missing(file) => {}
+            Some(file)
+                if file.identity == *identity
+                    && file.state != FileState::Gone
+                    && !is_missing(file) => {}
             Some(file) => changed.push(FileRow {
                 identity: *identity,
                 changed_ms: sweep.now_ms,
@@ -176,7 +176,9 @@ fn last_change_ms(file: &FileRow) -> i64 {
     if is_missing(file) {
         return file.changed_ms;
     }
-    file.changed_ms.min(file.identity.ctime_ns / NS_PER_MS)
+    let [seconds, nanoseconds] = file.identity.changed;
+    let changed_ms = seconds.saturating_mul(1000) + nanoseconds / 1_000_000;
+    file.changed_ms.min(changed_ms)
 }
 
 #[cfg(test)]
@@ -186,13 +188,13 @@ mod tests {
 
     const QUIET_MS: i64 = 600_000;
 
-    fn identity(inode: i64, changed_ms: i64) -> Identity {
+    fn identity(inode: u64, changed_ms: i64) -> Identity {
         Identity {
             device: 1,
             inode,
-            size: 100,
-            mtime_ns: 5,
-            ctime_ns: changed_ms * NS_PER_MS,
+            bytes: 100,
+            modified: [5, 0],
+            changed: [changed_ms / 1000, changed_ms % 1000 * 1_000_000],
         }
     }
 
@@ -204,7 +206,7 @@ mod tests {
     }
 
     impl Folder {
-        fn new(count: i64) -> Self {
+        fn new(count: u64) -> Self {
             let root = RootRow {
                 path: "/k".to_owned(),
                 kind: RootKind::Kernels,
@@ -269,15 +271,17 @@ mod tests {
         for minute in 0..40 {
             let now_ms = begin_ms + minute * 60_000;
             if minute <= 20 && minute % 5 == 0 {
-                let size = 10 + minute;
                 let slow = Identity {
-                    size,
+                    bytes: 10 + minute.unsigned_abs(),
                     ..identity(77, now_ms)
                 };
                 folder.files.insert("/k/slow.bc".to_owned(), slow);
             }
             let (_, now_settled) = folder.sweep(now_ms, Ok(()));
-            assert!(now_settled == 0 || minute == 30, "settled in minute {minute}");
+            assert!(
+                now_settled == 0 || minute == 30,
+                "settled in minute {minute}"
+            );
             settled += now_settled;
         }
         assert_eq!(settled, 1);

@@ -1,59 +1,64 @@
-//! What the engine asks of worker processes, so that tests can do the work themselves.
+//! Those who do the work: worker processes, or in tests whoever takes their place.
 
-use std::{future::Future, path::PathBuf, time::Duration};
+use std::{
+    future::Future,
+    path::{Path, PathBuf},
+};
 
 use tokio::sync::watch;
 
-use crate::service::worker::protocol::{Answer, CancelWhy, Failure, Line, Task};
-
-/// What a worker gets besides its task.
-#[derive(Debug)]
-pub struct Effort {
-    /// A worker without a sign of life for so long is ended.
-    pub silence: Duration,
-    /// Where its log goes.
-    pub log: PathBuf,
-    /// Longest log, bytes.
-    pub log_max_bytes: u64,
-    /// Set when it is to stop.
-    pub cancel: watch::Receiver<Option<CancelWhy>>,
-}
-
-/// How a worker ended.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Ended {
-    /// With what.
-    pub how: How,
-    /// Exit code.
-    pub exit: Option<i32>,
-    /// Signal that ended it.
-    pub signal: Option<i32>,
-}
-
-/// With what a worker ended.
-#[derive(Debug, Clone, PartialEq)]
-pub enum How {
-    /// The work was done.
-    Answered(Answer),
-    /// The work failed, and the worker says why.
-    Failed(Failure),
-    /// It ended without an answer, for example by a signal; in words.
-    Lost(String),
-    /// It gave no sign of life, or never said hello, and was ended.
-    Silent,
-    /// It is of another version.
-    OtherVersion(String),
-    /// It could not be started.
-    NotStarted(String),
-}
+use crate::service::worker::{
+    parent::{Ended, Heard, How, WorkerLimits, work},
+    protocol::{CancelWhy, Task},
+};
 
 /// Those who do the work.
 pub trait Workers: Send + Sync + 'static {
-    /// Does a task to its end; `heard` is given every line of the worker at once.
+    /// Does a task to its end, as [`work`] says.
     fn work(
         &self,
         task: Task,
-        effort: Effort,
-        heard: impl FnMut(&Line) + Send,
+        limits: WorkerLimits,
+        log: &Path,
+        cancel: watch::Receiver<Option<CancelWhy>>,
+        heard: impl FnMut(Heard<'_>) + Send,
     ) -> impl Future<Output = Ended> + Send;
+}
+
+/// Worker processes of a program.
+#[derive(Debug, Clone)]
+pub struct Processes {
+    /// The program: this one.
+    pub program: PathBuf,
+}
+
+impl Workers for Processes {
+    async fn work(
+        &self,
+        task: Task,
+        limits: WorkerLimits,
+        log: &Path,
+        cancel: watch::Receiver<Option<CancelWhy>>,
+        heard: impl FnMut(Heard<'_>) + Send,
+    ) -> Ended {
+        work(&self.program, &task, &limits, log, cancel, heard).await
+    }
+}
+
+/// How a worker ended, in words.
+#[must_use]
+pub fn words(ended: &Ended) -> String {
+    match (&ended.answer, &ended.how) {
+        (Some(Ok(_)), _) => "done".to_owned(),
+        (Some(Err(failure)), _) => failure.text.clone(),
+        (None, How::Exited(code)) => format!("the worker ended with code {code} and no answer"),
+        (None, How::Signalled(signal)) => format!("the worker was ended by signal {signal}"),
+        (None, How::Silent) => "the worker gave no sign of life and was ended".to_owned(),
+        (None, How::DeadlinePassed) => "the worker took too long and was ended".to_owned(),
+        (None, How::Cancelled) => "the worker was stopped".to_owned(),
+        (None, How::NoHello) => "the worker never said hello".to_owned(),
+        (None, How::ForeignVersion(version)) => format!("the worker is areograph {version}"),
+        (None, How::Garbled(what)) => format!("the worker said what no worker says: {what}"),
+        (None, How::NotStarted(why)) => format!("the worker could not be started: {why}"),
+    }
 }
