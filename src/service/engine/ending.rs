@@ -8,7 +8,7 @@ use super::{
     core::{Core, runs, site_folder},
     fresh,
     retry::{Fruitless, after},
-    runs::{Published, current, make_current, read_run, remove_folder, row},
+    runs::{Published, current, make_current, read_run, row},
     workers::{Workers, words},
 };
 use crate::{
@@ -24,6 +24,7 @@ use crate::{
         worker::{
             parent::{Ended, How},
             protocol::{Answer, CancelWhy, Failure, RunAnswer},
+            run_folder::remove,
         },
     },
 };
@@ -186,7 +187,7 @@ fn fruit<W: Workers>(core: &Core<W>, attempt: &Attempt, ended: &Ended) -> Stored
         }
         Err(failure) => {
             // Half of it is of no use; the next attempt links it again.
-            if let Err(kept) = remove_folder(&folder) {
+            if let Err(kept) = remove(&folder) {
                 tracing::warn!("{kept}");
             }
             let mut ended = ended.clone();

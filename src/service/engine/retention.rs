@@ -11,7 +11,7 @@ use super::{
     core::{COPIES, Core, LOGS, runs},
     diffs::page,
     retry::milliseconds,
-    runs::{current, remove_folder},
+    runs::current,
     workers::Workers,
 };
 use crate::{
@@ -23,6 +23,7 @@ use crate::{
             runs::{RunRow, kept_runs, put_removed},
             sites::sites,
         },
+        worker::run_folder::remove,
     },
 };
 
@@ -97,8 +98,7 @@ pub fn remove_runs<W: Workers>(core: &Core<W>) -> Stored<bool> {
 /// First it loses its name, so that half of it is never taken for a run.
 fn remove_run(folder: &Path, run: &str) {
     let leaving = folder.join(format!("{run}.partial"));
-    let removed =
-        fs::rename(folder.join(run), &leaving).is_err() || remove_folder(&leaving).is_ok();
+    let removed = fs::rename(folder.join(run), &leaving).is_err() || remove(&leaving).is_ok();
     if !removed {
         // The next start removes what is left.
         tracing::warn!("{} could not be removed", leaving.display());

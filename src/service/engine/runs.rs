@@ -7,12 +7,14 @@ use std::{
 };
 
 use chrono::DateTime;
-use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
 use crate::{
     error::{Cause, IoError, Kind, Locate as _, Result},
-    service::database::runs::RunRow,
+    service::{
+        database::runs::RunRow,
+        worker::run_folder::{RUN_RECORD, RunRecord, remove},
+    },
     store::{
         atomic::sync_folder, manifest::Manifest, publish::MANIFEST, published::read_published,
     },
@@ -20,20 +22,6 @@ use crate::{
 
 /// Leads to the run that readers get.
 pub const CURRENT: &str = "current";
-/// Says which attempt published a run.
-pub const RUN_JSON: &str = "run.json";
-
-/// Content of [`RUN_JSON`].
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-pub struct RunJson {
-    /// The job.
-    pub job: i64,
-    /// The attempt.
-    pub attempt: i64,
-    /// The run.
-    pub run: String,
-}
-
 /// The identifier of the run that an attempt makes.
 #[must_use]
 pub fn run_id(started_ms: i64, job: i64, attempt: i64) -> String {
@@ -45,7 +33,7 @@ pub fn run_id(started_ms: i64, job: i64, attempt: i64) -> String {
 #[derive(Debug)]
 pub struct Published {
     /// Which attempt published it.
-    pub by: RunJson,
+    pub by: RunRecord,
     /// Its manifest.
     pub manifest: Manifest,
     /// BLAKE3 of the manifest.
@@ -78,13 +66,15 @@ impl Cause for Foreign {
 /// # Errors
 /// It is not whole, or is another one's; the disk's refusal.
 pub fn read_run(folder: &Path) -> Result<Published> {
-    let path = folder.join(RUN_JSON);
+    let path = folder.join(RUN_RECORD);
     let read = |path: &Path| fs::read(path).map_err(IoError::on("read")).in_file(path);
-    let by: RunJson = serde_json::from_slice(&read(&path)?)
+    let by: RunRecord = serde_json::from_slice(&read(&path)?)
         .map_err(|error| IoError::on("read")(error.into()))
         .in_file(&path)?;
     if folder.file_name() != Some(by.run.as_ref()) {
-        let RunJson { job, attempt, run } = by;
+        let RunRecord {
+            run, job, attempt, ..
+        } = by;
         return Err(Foreign { job, attempt, run }).in_file(folder);
     }
     let manifest = read_published(folder)?;
@@ -181,33 +171,11 @@ pub fn tidy(site_folder: &Path) -> Result<Vec<PathBuf>> {
         if path.join(MANIFEST).is_file() && path.extension().is_none() {
             published.push(path);
         } else if path.is_dir() {
-            remove_folder(&path)?;
+            remove(&path)?;
         }
     }
     published.sort();
     Ok(published)
-}
-
-/// Removes the folder of a run, which is read-only.
-///
-/// # Errors
-/// The disk's refusal.
-pub fn remove_folder(folder: &Path) -> Result<()> {
-    make_writable(folder);
-    fs::remove_dir_all(folder)
-        .map_err(IoError::on("remove"))
-        .in_file(folder)
-}
-
-/// What cannot be made so is met when removing.
-fn make_writable(folder: &Path) {
-    use std::os::unix::fs::PermissionsExt as _;
-    let _ = fs::set_permissions(folder, fs::Permissions::from_mode(0o755));
-    for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
-        if entry.file_type().is_ok_and(|kind| kind.is_dir()) {
-            make_writable(&entry.path());
-        }
-    }
 }
 
 #[cfg(test)]
