@@ -10,6 +10,7 @@ mod plan;
 mod report;
 mod run;
 mod scene;
+mod stop;
 mod triangulate;
 
 use std::process::ExitCode;
@@ -45,7 +46,7 @@ enum Command {
     Run(run::Arguments),
     /// Check configuration, files and kernel coverage, gaps included; writes nothing.
     Check(check::Arguments),
-    /// Show which stages would run, and why; writes nothing.
+    /// Show which stages would run, and why; writes no products.
     Plan(plan::Arguments),
     /// Inspect kernels: what is loaded, where the gaps are, how alternative sets differ.
     Kernels(kernels::Arguments),

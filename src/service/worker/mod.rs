@@ -2,4 +2,9 @@
 //!
 //! CSPICE, memory and crashes stay in there.
 
+mod fork;
+mod lines;
+mod log;
+pub mod parent;
+pub mod process;
 pub mod protocol;
