@@ -4,8 +4,12 @@
 //! start. Files are listed, not watched. A job brings one site up to date, an attempt is one worker process, a run is what
 //! one attempt published.
 
+pub mod audit;
 pub mod clock;
 pub mod database;
+pub mod http;
+pub mod instant;
+pub mod sessions;
 pub mod shared;
 pub mod state;
 pub mod tokens;

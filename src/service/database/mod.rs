@@ -3,6 +3,7 @@
 mod causes;
 mod events;
 mod jobs;
+pub mod shown;
 
 use std::{
     fs,
