@@ -35,7 +35,7 @@ use crate::{
 };
 
 /// The page of a site's products that is looked at first.
-const REPORT: &str = "report.html";
+const REPORT: &str = "report/index.html";
 
 /// One run: why, what moved, its figures, kernels, stages and files.
 pub(super) async fn one(

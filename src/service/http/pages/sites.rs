@@ -283,7 +283,7 @@ fn site_lead(site: &Site, newest: Option<&Run>, times: &Times) -> Markup {
             @if let Some(run) = &site.current_run {
                 p {
                     "Current is run " a href={ "/runs/" (run) } { (run) } " of " (times.maybe(site.current_since_utc)) ". "
-                    a href={ "/api/v1/sites/" (site.name) "/current/report.html" } { "Report" }
+                    a href={ "/api/v1/sites/" (site.name) "/current/report/index.html" } { "Report" }
                 }
             }
             @if let Some(run) = newest.filter(|run| !run.valid) {
