@@ -30,6 +30,7 @@ pub struct HashedFile {
 #[derive(Debug, Default)]
 pub struct InputFiles {
     earlier: KnownFiles,
+    roots: Vec<PathBuf>,
     seen: Mutex<Seen>,
 }
 
@@ -68,6 +69,49 @@ impl Cause for ChangedFile {
     }
 }
 
+/// A file that lies elsewhere than it may.
+#[derive(Debug, thiserror::Error)]
+#[error("a path below {}; this one leads to {}", listed(.roots), .leads_to.display())]
+pub struct Outside {
+    leads_to: PathBuf,
+    roots: Vec<PathBuf>,
+}
+
+/// An input file that a run must not read.
+#[derive(Debug, thiserror::Error)]
+#[error("is not read here; expected {0}")]
+struct NotAdmitted(Outside);
+
+impl Cause for NotAdmitted {
+    fn kind(&self) -> Kind {
+        Kind::Configuration
+    }
+
+    fn advice(&self) -> String {
+        "move the file below one of these folders, or have its folder added to them".to_owned()
+    }
+}
+
+/// Why the file must not be read, if it lies below none of the folders `roots`, links followed. Without folders there is no
+/// such rule.
+///
+/// * `roots` – without links
+#[must_use]
+pub fn outside(path: &Path, roots: &[PathBuf]) -> Option<Outside> {
+    // What is not there leads nowhere.
+    let leads_to = path.canonicalize().ok()?;
+    let within = roots.is_empty() || roots.iter().any(|root| leads_to.starts_with(root));
+    (!within).then(|| Outside {
+        leads_to,
+        roots: roots.to_vec(),
+    })
+}
+
+fn listed(folders: &[PathBuf]) -> String {
+    let folders = folders.iter().map(|folder| folder.display().to_string());
+    folders.collect::<Vec<_>>().join(", ")
+}
+
 impl InputFiles {
     /// Those of a run that does not read again what is known from earlier ones.
     #[must_use]
@@ -80,14 +124,36 @@ impl InputFiles {
                 ..Seen::default()
             }),
             earlier,
+            roots: Vec::new(),
+        }
+    }
+
+    /// The same of a run that may read only below the folders `roots`; see [`outside`].
+    #[must_use]
+    pub fn within(self, roots: &[PathBuf]) -> Self {
+        Self {
+            roots: roots.to_vec(),
+            ..self
+        }
+    }
+
+    /// Makes sure that the run may read a file.
+    ///
+    /// # Errors
+    /// The file lies elsewhere, of kind configuration.
+    pub fn admit(&self, path: &Path) -> Result<()> {
+        match outside(path, &self.roots) {
+            None => Ok(()),
+            Some(outside) => Err(NotAdmitted(outside)).in_file(path),
         }
     }
 
     /// The file with its hash; a file that was hashed before is not read again.
     ///
     /// # Errors
-    /// The file cannot be read, or is no longer what it was.
+    /// The file cannot be read, must not be, or is no longer what it was.
     pub fn hash(&self, path: &Path) -> Result<HashedFile> {
+        self.admit(path)?;
         let now = identity(path)?;
         let earlier = self.lock().files.get(path).cloned();
         if let Some(seen) = &earlier

@@ -32,6 +32,7 @@ fn options<'a>(out: &Path, until: &'a str, hashes: &'a HashCache) -> RunOptions<
         force: false,
         stop: &NEVER,
         hashes,
+        roots: &[],
         observer: &(),
     }
 }

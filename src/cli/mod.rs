@@ -12,6 +12,7 @@ mod run;
 mod scene;
 mod stop;
 mod triangulate;
+mod worker;
 
 use std::process::ExitCode;
 
@@ -63,6 +64,9 @@ enum Command {
     /// Write the manual pages.
     #[command(hide = true)]
     Manual(manual::Arguments),
+    /// Do one task of the service.
+    #[command(hide = true)]
+    Worker(worker::Arguments),
 }
 
 /// Parses the command line, runs the command, reports failures on standard error.
@@ -74,12 +78,17 @@ pub fn main() -> ExitCode {
         (_, true) => LevelFilter::DEBUG,
         _ => LevelFilter::INFO,
     };
-    tracing_subscriber::fmt()
+    let log = tracing_subscriber::fmt()
         .with_writer(std::io::stderr)
         .with_max_level(level)
-        .with_target(false)
-        .with_ansi(std::io::IsTerminal::is_terminal(&std::io::stderr()))
-        .init();
+        .with_target(false);
+    if matches!(cli.command, Command::Worker(_)) {
+        // Its log is read by the service.
+        log.json().flatten_event(true).init();
+    } else {
+        log.with_ansi(std::io::IsTerminal::is_terminal(&std::io::stderr()))
+            .init();
+    }
     match cli.command {
         Command::Run(arguments) => run::run(&arguments),
         Command::Check(arguments) => finish(check::run(&arguments)),
@@ -94,6 +103,7 @@ pub fn main() -> ExitCode {
             ExitCode::SUCCESS
         }
         Command::Manual(arguments) => finish(manual::run(&arguments)),
+        Command::Worker(arguments) => worker::run(&arguments),
     }
 }
 
@@ -117,7 +127,7 @@ fn load_sites(paths: &[std::path::PathBuf]) -> Result<Vec<SiteConfig>, Error> {
     let mut first_failure = None;
     for path in paths {
         match load(path) {
-            Ok(Loaded { site, warnings }) => {
+            Ok(Loaded { site, warnings, .. }) => {
                 for warning in warnings {
                     tracing::warn!("{warning}");
                 }

@@ -39,6 +39,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Error> {
         force: false,
         stop: &AtomicBool::new(false),
         hashes: &HashCache::in_folder(&arguments.out, arguments.rehash),
+        roots: &[],
         observer: &(),
     };
     print(&sites, &options, arguments.json)

@@ -69,6 +69,7 @@ impl Arguments {
             force: self.force,
             stop,
             hashes,
+            roots: &[],
             observer: &(),
         }
     }

@@ -43,7 +43,7 @@ pub fn plan_site(config: &SiteConfig, options: &RunOptions<'_>) -> Result<SitePl
         bounds: Bounds {
             until: options.until,
             stop: options.stop,
-            files: options.hashes.files(),
+            files: options.files(),
         },
         planned: Vec::new(),
         ledger: Ledger::new(),

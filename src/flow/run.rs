@@ -38,8 +38,17 @@ pub struct RunOptions<'a> {
     pub stop: &'a AtomicBool,
     /// Hashes of input files from earlier runs, to which those of this one are added.
     pub hashes: &'a HashCache,
+    /// Folders below which input files must lie, without links; none for no such rule.
+    pub roots: &'a [PathBuf],
     /// Hears what becomes of each stage.
     pub observer: &'a dyn Observer,
+}
+
+impl RunOptions<'_> {
+    /// The input files of a run.
+    pub(super) fn files(&self) -> InputFiles {
+        self.hashes.files().within(self.roots)
+    }
 }
 
 /// What a run did.
@@ -83,7 +92,7 @@ pub fn run_site(config: &SiteConfig, options: &RunOptions<'_>) -> Result<SiteOut
         bounds: Bounds {
             until: options.until,
             stop: options.stop,
-            files: options.hashes.files(),
+            files: options.files(),
         },
         hashes: options.hashes,
         observer: options.observer,

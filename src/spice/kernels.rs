@@ -38,8 +38,9 @@ impl Kernel {
     ///
     /// # Errors
     /// [`IoError`]; [`SpiceError::NotAKernel`]; [`SpiceError::DamagedKernel`].
-    pub(super) fn inspect(path: &Path, files: &InputFiles) -> Result<Self> {
+    pub fn inspect(path: &Path, files: &InputFiles) -> Result<Self> {
         ffi::c_path(path).in_file(path)?;
+        files.admit(path)?;
         let role = role_of(path)?;
         let file = files.hash(path)?;
         let binary = first_bytes(path)?.starts_with(b"DAF/");
@@ -92,6 +93,13 @@ impl KernelSet {
             set.add(path, "listed", run)?;
         }
         Ok(set)
+    }
+
+    /// The same kernels and behind them one that was looked into.
+    #[must_use]
+    pub fn with(mut self, kernel: Kernel) -> Self {
+        self.kernels.push(kernel);
+        self
     }
 
     /// The same kernels and behind them `files`, which therefore win.
