@@ -4,11 +4,15 @@
 //! start. Files are listed, not watched. A job brings one site up to date, an attempt is one worker process, a run is what
 //! one attempt published.
 
+pub mod audit;
 pub mod clock;
 pub mod database;
 pub mod engine;
+pub mod http;
+pub mod instant;
 pub mod lock;
 pub mod random;
+pub mod sessions;
 pub mod shared;
 pub mod state;
 pub mod tokens;

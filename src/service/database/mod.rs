@@ -10,6 +10,7 @@ mod jobs;
 pub mod nights;
 pub mod runs;
 pub mod service;
+pub mod shown;
 pub mod sites;
 
 use std::{
