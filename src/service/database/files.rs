@@ -222,6 +222,15 @@ pub fn roots(connection: &Connection) -> Stored<Vec<RootRow>> {
     Ok(found.collect::<Result<_, _>>()?)
 }
 
+/// Whether a folder of inputs has changed a short time ago.
+///
+/// # Errors
+/// SQLite's own.
+pub fn any_settling(connection: &Connection) -> Stored<bool> {
+    let all = roots(connection)?;
+    Ok(all.iter().any(|root| root.state == RootState::Settling))
+}
+
 /// Notes a folder of inputs.
 ///
 /// # Errors

@@ -92,8 +92,13 @@ pub fn begin_due<W: Workers>(core: &Core<W>) -> Stored<Option<i64>> {
 pub fn begin_asked<W: Workers>(core: &Core<W>) -> Stored<Option<i64>> {
     let zone = core.shared.config().schedule.zone.clone();
     let now_ms = core.now_ms();
-    core.shared
-        .write(|transaction| begin(transaction, now_ms, now_ms, &zone, NightHow::Asked))
+    core.shared.write(|transaction| {
+        // It makes up for those that were due before.
+        if facts::fact(transaction, facts::SCHEDULE)?.is_some() {
+            facts::note(transaction, facts::INTENDED_MS, &now_ms.to_string())?;
+        }
+        begin(transaction, now_ms, now_ms, &zone, NightHow::Asked)
+    })
 }
 
 fn begin(

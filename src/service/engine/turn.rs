@@ -37,7 +37,9 @@ use crate::{
         database::{
             DatabaseError, Moved, Stored, advance,
             alerts::due_letters,
-            due_waiting, jobs_in,
+            due_waiting,
+            files::any_settling,
+            jobs_in,
             nights::{Night, night, open_night},
             service::beat,
         },
@@ -74,13 +76,26 @@ struct Agenda {
     round_ms: Option<i64>,
     /// The night that has begun.
     night: Option<i64>,
-    /// Whether its comparisons are done.
+    /// Whether its comparisons have begun, and whether they are done.
+    comparing: bool,
     compared: bool,
+    /// Its comparisons are not done while files settle, until then.
+    settles_until_ms: Option<i64>,
     upkeep: bool,
     upkeep_ms: Option<i64>,
     trim_ms: Option<i64>,
     letters: bool,
     has_room: bool,
+}
+
+impl Agenda {
+    fn begin(&mut self, night: Option<i64>, settles_until_ms: Option<i64>) {
+        if night.is_some() {
+            self.night = night;
+            (self.comparing, self.compared) = (false, false);
+            self.settles_until_ms = settles_until_ms;
+        }
+    }
 }
 
 impl<W: Workers> Engine<W> {
@@ -162,17 +177,17 @@ impl<W: Workers> Engine<W> {
         self.tasks.is_empty()
     }
 
-    /// Begins a night now, whatever the schedule says; gives its number.
+    /// Begins a night now, whatever the schedule says, and gives its number. Files that settle are waited for: there is no later
+    /// sweep.
     ///
     /// # Errors
     /// The database cannot be written.
     pub fn begin_night(&self) -> Stored<Option<i64>> {
         let night = begin_asked(&self.core)?;
-        if night.is_some() {
-            let mut agenda = self.agenda();
-            agenda.night = night;
-            agenda.compared = false;
-        }
+        let changes = &self.core.shared.config().changes;
+        let patience_s = changes.quiet_period_s + 3.0 * changes.scan_interval_s;
+        let until_ms = self.core.now_ms().saturating_add(milliseconds(patience_s));
+        self.agenda().begin(night, Some(until_ms));
         Ok(night)
     }
 
@@ -234,11 +249,8 @@ impl<W: Workers> Engine<W> {
         };
         match night {
             None => {
-                if let Some(night) = begin_due(&self.core)? {
-                    let mut agenda = self.agenda();
-                    agenda.night = Some(night);
-                    agenda.compared = false;
-                }
+                let due = begin_due(&self.core)?;
+                self.agenda().begin(due, None);
             }
             Some(night) if compared => {
                 if end_done(&self.core, night)?.is_some() {
@@ -261,10 +273,11 @@ impl<W: Workers> Engine<W> {
             // A clock that was put back does not hold it.
             let since_ms = agenda.round_ms.map(|last_ms| now_ms - last_ms);
             let is_due = since_ms.is_none_or(|since_ms| since_ms < 0 || since_ms >= scan_ms);
-            if agenda.round || !(is_due || night.is_some()) {
+            if agenda.round || !(is_due || (night.is_some() && !agenda.comparing)) {
                 return;
             }
             agenda.round = true;
+            agenda.comparing = night.is_some();
             agenda.round_ms = Some(now_ms);
             Purpose { night }
         };
@@ -275,9 +288,15 @@ impl<W: Workers> Engine<W> {
             if let Err(error) = &done {
                 tracing::error!("a round of comparisons: {error}");
             }
+            let settles = core.shared.read(any_settling).unwrap_or(false);
+            let now_ms = core.now_ms();
             let mut agenda = agenda.lock().unwrap_or_else(PoisonError::into_inner);
             agenda.round = false;
-            if purpose.night.is_some() && done.is_ok() {
+            let waits = settles
+                && agenda
+                    .settles_until_ms
+                    .is_some_and(|until_ms| now_ms < until_ms);
+            if purpose.night.is_some() && done.is_ok() && !waits {
                 agenda.compared = true;
             }
         });
