@@ -18,11 +18,24 @@ use areograph::{
     config::{self, DeclaredKey, ValueKind},
     flow::{Ending, PUBLISH, RunOptions, StageReason, plan_site, run_site, stages},
     stage::Reason,
+    store::hashes::HashCache,
 };
 use common::case::Case;
 use toml::{Table, Value};
 
 static NEVER: AtomicBool = AtomicBool::new(false);
+
+fn options<'a>(out: &Path, until: &'a str, hashes: &'a HashCache) -> RunOptions<'a> {
+    RunOptions {
+        out: out.to_owned(),
+        until,
+        force: false,
+        stop: &NEVER,
+        hashes,
+        roots: &[],
+        observer: &(),
+    }
+}
 
 /// The pair of images with its tie points, its site file, and a folder of products.
 struct Walk {
@@ -55,12 +68,9 @@ impl Walk {
     fn run(&self, out: &str, until: &str) -> Result<(Vec<StageReason>, Ending), String> {
         let config =
             config::load(&self.case.path("site.toml")).map_err(|failure| failure.to_string())?;
-        let options = RunOptions {
-            out: self.case.path(out),
-            until,
-            force: false,
-            stop: &NEVER,
-        };
+        let out = self.case.path(out);
+        let hashes = HashCache::in_folder(&out, false);
+        let options = options(&out, until, &hashes);
         let outcome = run_site(&config.site, &options).map_err(|failure| failure.to_string())?;
         Ok((outcome.stages, outcome.ending))
     }
@@ -73,14 +83,16 @@ impl Walk {
             Err(failure) => return Some(failure.to_string()),
         };
         let before = products(&self.case.path("out"));
-        let planned = plan_site(&config, &self.case.path("out"), until, false);
+        let out = self.case.path("out");
+        let hashes = HashCache::in_folder(&out, false);
+        let planned = plan_site(&config, &options(&out, until, &hashes));
         let again = self.run("out", until);
         self.begun += 1;
         let clean = format!("clean{}", self.begun);
         let first = self.run(&clean, until);
         let failure = match (&again, &first) {
             (Ok((ran, ending)), Ok(_)) => {
-                agree(what, until, &planned.unwrap(), ran);
+                agree(what, until, &planned.unwrap().stages, ran);
                 match ending {
                     Ending::StoppedAfter(_) => {
                         assert_same(what, &before, &products(&self.case.path("out")));

@@ -219,10 +219,9 @@ fn killed_when_an_image_comes_or_goes() {
     });
 }
 
-/// Ctrl-C while forty large PEDR files are hashed and searched: the run ends soon, says where, and the
+/// A signal while forty large PEDR files are hashed and searched: the run ends soon, says where, and the
 /// next run begins where it was.
-#[test]
-fn an_interrupt_leaves_the_search_and_keeps_finished_stages() {
+fn stopped_by(signal: libc::c_int) {
     let case = Case::new();
     let large = mission().join("pedr/ap18933l.b");
     for number in 0..40 {
@@ -230,16 +229,16 @@ fn an_interrupt_leaves_the_search_and_keeps_finished_stages() {
         std::os::unix::fs::symlink(&large, link).unwrap();
     }
     let tagged = case.path("out/case/.cache/tag_times+image");
-    let mut interrupted = false;
+    let mut told = false;
     let ended = traced(&case.run(), |call| {
         let searching = call.path.ends_with("pedr/link00.b") && tagged.exists();
-        if interrupted || !searching {
+        if told || !searching {
             return Then::GoOn;
         }
-        interrupted = true;
-        Then::Interrupt
+        told = true;
+        Then::Signal(signal)
     });
-    assert!(interrupted, "never begun");
+    assert!(told, "never begun");
     assert_eq!(ended.code, Some(130), "{}", ended.stderr);
     assert!(
         ended.stderr.contains("case/search_footprints: interrupted"),
@@ -248,6 +247,16 @@ fn an_interrupt_leaves_the_search_and_keeps_finished_stages() {
     );
     assert!(tagged.exists());
     assert!(!case.path("out/case/.cache/search_footprints").exists());
+}
+
+#[test]
+fn an_interrupt_leaves_the_search_and_keeps_finished_stages() {
+    stopped_by(libc::SIGINT);
+}
+
+#[test]
+fn what_systemd_and_slurm_send_means_the_same() {
+    stopped_by(libc::SIGTERM);
 }
 
 /// The clock kernel is replaced when the images have their times and the PEDR file is about to be read: the run ends

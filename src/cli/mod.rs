@@ -4,13 +4,18 @@ mod check;
 mod completions;
 mod kernels;
 mod manual;
+mod nightly;
 mod output;
 mod pedr;
 mod plan;
 mod report;
 mod run;
 mod scene;
+mod serve;
+mod service;
+mod stop;
 mod triangulate;
+mod worker;
 
 use std::process::ExitCode;
 
@@ -45,7 +50,7 @@ enum Command {
     Run(run::Arguments),
     /// Check configuration, files and kernel coverage, gaps included; writes nothing.
     Check(check::Arguments),
-    /// Show which stages would run, and why; writes nothing.
+    /// Show which stages would run, and why; writes no products.
     Plan(plan::Arguments),
     /// Inspect kernels: what is loaded, where the gaps are, how alternative sets differ.
     Kernels(kernels::Arguments),
@@ -57,11 +62,20 @@ enum Command {
     Triangulate(triangulate::Arguments),
     /// Write a synthetic mission, or net of pictures, with known truth.
     Scene(scene::Arguments),
+    /// Run sites again when what they read changes: the service, with pages.
+    Serve(serve::Arguments),
+    /// Do one night of the service, for a timer.
+    Nightly(nightly::Arguments),
+    /// Keep a service: copies of its database, its tokens.
+    Service(service::Arguments),
     /// Print shell completions.
     Completions(completions::Arguments),
     /// Write the manual pages.
     #[command(hide = true)]
     Manual(manual::Arguments),
+    /// Do one task of the service.
+    #[command(hide = true)]
+    Worker(worker::Arguments),
 }
 
 /// Parses the command line, runs the command, reports failures on standard error.
@@ -73,12 +87,23 @@ pub fn main() -> ExitCode {
         (_, true) => LevelFilter::DEBUG,
         _ => LevelFilter::INFO,
     };
-    tracing_subscriber::fmt()
+    let log = tracing_subscriber::fmt()
         .with_writer(std::io::stderr)
         .with_max_level(level)
-        .with_target(false)
-        .with_ansi(std::io::IsTerminal::is_terminal(&std::io::stderr()))
-        .init();
+        .with_target(false);
+    let as_json = match &cli.command {
+        // Its log is read by the service.
+        Command::Worker(_) => true,
+        Command::Serve(arguments) => arguments.log_json,
+        Command::Nightly(arguments) => arguments.log_json,
+        _ => false,
+    };
+    if as_json {
+        log.json().flatten_event(true).init();
+    } else {
+        log.with_ansi(std::io::IsTerminal::is_terminal(&std::io::stderr()))
+            .init();
+    }
     match cli.command {
         Command::Run(arguments) => run::run(&arguments),
         Command::Check(arguments) => finish(check::run(&arguments)),
@@ -88,11 +113,15 @@ pub fn main() -> ExitCode {
         Command::Report(arguments) => report::run(&arguments),
         Command::Triangulate(arguments) => triangulate::run(&arguments),
         Command::Scene(arguments) => finish(scene::run(&arguments)),
+        Command::Serve(arguments) => serve::run(&arguments),
+        Command::Nightly(arguments) => nightly::run(&arguments),
+        Command::Service(arguments) => finish(service::run(&arguments)),
         Command::Completions(arguments) => {
             completions::run(&arguments);
             ExitCode::SUCCESS
         }
         Command::Manual(arguments) => finish(manual::run(&arguments)),
+        Command::Worker(arguments) => worker::run(&arguments),
     }
 }
 
@@ -116,7 +145,7 @@ fn load_sites(paths: &[std::path::PathBuf]) -> Result<Vec<SiteConfig>, Error> {
     let mut first_failure = None;
     for path in paths {
         match load(path) {
-            Ok(Loaded { site, warnings }) => {
+            Ok(Loaded { site, warnings, .. }) => {
                 for warning in warnings {
                     tracing::warn!("{warning}");
                 }

@@ -1,6 +1,6 @@
 //! `areograph plan`.
 
-use std::path::{Path, PathBuf};
+use std::{path::PathBuf, sync::atomic::AtomicBool};
 
 use clap::Args;
 use serde_json::json;
@@ -9,7 +9,8 @@ use super::{load_sites, output};
 use crate::{
     config::SiteConfig,
     error::Error,
-    flow::{PUBLISH, StageReason, check_out, plan_site},
+    flow::{PUBLISH, RunOptions, StageReason, check_out, plan_site},
+    store::hashes::HashCache,
 };
 
 /// Says which stages would run, and why.
@@ -21,6 +22,9 @@ pub(super) struct Arguments {
     /// Folder of the products.
     #[arg(long, default_value = "out")]
     out: PathBuf,
+    /// Read every input file again, whatever is known of files that did not change.
+    #[arg(long)]
+    rehash: bool,
     /// Print JSON.
     #[arg(long)]
     json: bool,
@@ -29,20 +33,27 @@ pub(super) struct Arguments {
 pub(super) fn run(arguments: &Arguments) -> Result<(), Error> {
     let sites = load_sites(&arguments.sites)?;
     check_out(&arguments.out, &sites)?;
-    print(&sites, &arguments.out, PUBLISH, false, arguments.json)
+    let options = RunOptions {
+        out: arguments.out.clone(),
+        until: PUBLISH,
+        force: false,
+        stop: &AtomicBool::new(false),
+        hashes: &HashCache::in_folder(&arguments.out, arguments.rehash),
+        roots: &[],
+        observer: &(),
+    };
+    print(&sites, &options, arguments.json)
 }
 
 /// Prints the plan of every site.
 pub(super) fn print(
     sites: &[SiteConfig],
-    out: &Path,
-    until: &str,
-    force: bool,
+    options: &RunOptions<'_>,
     as_json: bool,
 ) -> Result<(), Error> {
     let mut answers = Vec::new();
     for site in sites {
-        let stages = plan_site(site, out, until, force)?;
+        let stages = plan_site(site, options)?.stages;
         if as_json {
             let stages: Vec<_> = stages.iter().map(stage_json).collect();
             answers.push(json!({ "site": site.site, "stages": stages }));

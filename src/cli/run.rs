@@ -3,22 +3,19 @@
 use std::{
     path::PathBuf,
     process::ExitCode,
-    sync::{
-        Arc,
-        atomic::{AtomicBool, Ordering},
-    },
+    sync::{Arc, atomic::AtomicBool},
 };
 
 use clap::{Args, builder::PossibleValuesParser};
 use serde_json::json;
 use tokio::{sync::Semaphore, task::JoinHandle};
 
-use super::{load_sites, output, plan, report};
+use super::{load_sites, output, plan, report, stop::on_signals};
 use crate::{
     config::SiteConfig,
     error::{Error, Kind},
     flow::{Ending, PUBLISH, RunOptions, SiteOutcome, check_out, publish_sites, run_site, stages},
-    store::{manifest::Manifest, publish::read_manifest},
+    store::{hashes::HashCache, manifest::Manifest, publish::read_manifest},
 };
 
 /// Runs sites from kernels to validated products in `<out>/<site>`.
@@ -26,7 +23,7 @@ use crate::{
 /// A stage runs only when something that it depends on has changed; the log says what.
 ///
 /// Example: `areograph run sites/*.toml --out products`
-#[derive(Debug, Args)]
+#[derive(Debug, Clone, Args)]
 #[command(verbatim_doc_comment)]
 pub(super) struct Arguments {
     /// Site files (TOML).
@@ -53,12 +50,29 @@ pub(super) struct Arguments {
     /// Run every stage, whatever is stored.
     #[arg(long)]
     force: bool,
-    /// Show which stages would run, and why; write nothing.
+    /// Read every input file again, whatever is known of files that did not change.
+    #[arg(long)]
+    rehash: bool,
+    /// Show which stages would run, and why; write no products.
     #[arg(long)]
     dry_run: bool,
     /// Print JSON.
     #[arg(long)]
     json: bool,
+}
+
+impl Arguments {
+    fn options<'a>(&'a self, stop: &'a AtomicBool, hashes: &'a HashCache) -> RunOptions<'a> {
+        RunOptions {
+            out: self.out.clone(),
+            until: &self.until,
+            force: self.force,
+            stop,
+            hashes,
+            roots: &[],
+            observer: &(),
+        }
+    }
 }
 
 /// Runs the sites and prints how each ended, in the order given.
@@ -70,14 +84,11 @@ pub(super) fn run(arguments: &Arguments) -> ExitCode {
     if let Err(failure) = check_out(&arguments.out, &sites) {
         return report(&failure);
     }
+    let hashes = HashCache::in_folder(&arguments.out, arguments.rehash);
     if arguments.dry_run {
-        return super::finish(plan::print(
-            &sites,
-            &arguments.out,
-            &arguments.until,
-            arguments.force,
-            arguments.json,
-        ));
+        let never = AtomicBool::new(false);
+        let options = arguments.options(&never, &hashes);
+        return super::finish(plan::print(&sites, &options, arguments.json));
     }
     if let Some(threads) = arguments.threads {
         // The only failure is a pool that exists already; then its size stands.
@@ -89,7 +100,7 @@ pub(super) fn run(arguments: &Arguments) -> ExitCode {
         Ok(runtime) => runtime,
         Err(error) => return report(&crate::error::IoError::on("start threads")(error).into()),
     };
-    let outcomes = runtime.block_on(run_all(sites, arguments));
+    let outcomes = runtime.block_on(run_all(sites, arguments, &hashes));
     print(&outcomes, arguments.json);
     // A run that could not even make the folder has said so already.
     let page = arguments
@@ -121,54 +132,32 @@ pub(super) fn run(arguments: &Arguments) -> ExitCode {
 
 type Outcome = Result<SiteOutcome, Error>;
 
-/// Runs at most `jobs` sites at a time; Ctrl-C lets each finish its stage, or leave a long one, and stop.
-async fn run_all(sites: Vec<SiteConfig>, arguments: &Arguments) -> Vec<Outcome> {
+/// Runs at most `jobs` sites at a time; a signal lets each finish its stage, or leave a long one, and stop.
+async fn run_all(
+    sites: Vec<SiteConfig>,
+    arguments: &Arguments,
+    hashes: &HashCache,
+) -> Vec<Outcome> {
     let stop = Arc::new(AtomicBool::new(false));
     let places = Arc::new(Semaphore::new(usize::from(arguments.jobs)));
     let handles: Vec<JoinHandle<Outcome>> = sites
         .into_iter()
         .map(|site| {
             let (stop, places) = (Arc::clone(&stop), Arc::clone(&places));
-            let (out, until, force) = (
-                arguments.out.clone(),
-                arguments.until.clone(),
-                arguments.force,
-            );
+            let (arguments, hashes) = (arguments.clone(), hashes.clone());
             tokio::spawn(async move {
                 let _place = places.acquire_owned().await;
-                let work = move || {
-                    let options = RunOptions {
-                        out,
-                        until: &until,
-                        force,
-                        stop: &stop,
-                    };
-                    run_site(&site, &options)
-                };
+                let work = move || run_site(&site, &arguments.options(&stop, &hashes));
                 flatten(tokio::task::spawn_blocking(work).await)
             })
         })
         .collect();
-    let interrupted = tokio::spawn({
-        let stop = Arc::clone(&stop);
-        async move {
-            if tokio::signal::ctrl_c().await.is_ok() {
-                tracing::warn!(
-                    "stopping when the running stages allow it; press again to stop at once"
-                );
-                stop.store(true, Ordering::Relaxed);
-            }
-            if tokio::signal::ctrl_c().await.is_ok() {
-                // Nothing half-made stands under a final name at any moment, so this is safe.
-                std::process::exit(i32::from(Kind::Interrupted.exit_code()));
-            }
-        }
-    });
+    let told = tokio::spawn(async move { on_signals(&stop).await });
     let mut outcomes = Vec::with_capacity(handles.len());
     for handle in handles {
         outcomes.push(flatten(handle.await));
     }
-    interrupted.abort();
+    told.abort();
     outcomes
 }
 

@@ -131,6 +131,9 @@ impl<T: Clone> Form for DataFile<T> {
             found.refuse(review, expected);
             return None;
         }
+        if !review.admit(&path, found.value.span(), &found.key) {
+            return None;
+        }
         let read = super::read(&path).map_err(|failure| failure.cause.to_string());
         let read = read.and_then(|text| (self.read)(&text, &path).map_err(|all| all.to_string()));
         read.map_err(|problems| {

@@ -29,7 +29,12 @@ mod unknowns;
 mod windows;
 mod written;
 
-use std::{collections::BTreeMap, fs::File, io::Read as _, path::Path};
+use std::{
+    collections::BTreeMap,
+    fs::File,
+    io::Read as _,
+    path::{Path, PathBuf},
+};
 
 use serde::Serialize;
 use toml::de::DeTable;
@@ -65,7 +70,7 @@ pub use windows::WindowConfig;
 
 use crate::error::{Cause, Error, IoError, Kind, Locate as _};
 use declare::{Keys, Table, described};
-use problems::{Review, SITE_EXAMPLE};
+use problems::Review;
 use written::Written;
 
 /// How the example of a site begins.
@@ -89,6 +94,8 @@ pub struct Loaded {
     pub site: SiteConfig,
     /// What was accepted but is worth a word, each with its place: entries that are never used.
     pub warnings: Vec<String>,
+    /// Files, and folders of kernels, that its keys lead to.
+    pub files: Vec<PathBuf>,
 }
 
 /// Reads and checks the configuration `path`; relative paths in it count from its own folder.
@@ -96,8 +103,16 @@ pub struct Loaded {
 /// # Errors
 /// [`Problems`] with everything that is wrong, or [`IoError`] when the file cannot be read.
 pub fn load(path: &Path) -> Result<Loaded, Error> {
+    load_within(path, &[])
+}
+
+/// As [`load`], of a configuration that may lead only to what lies below `roots`, links followed.
+///
+/// # Errors
+/// Those of [`load`].
+pub fn load_within(path: &Path, roots: &[PathBuf]) -> Result<Loaded, Error> {
     let text = read(path)?;
-    Ok(parse(&text, path)?)
+    Ok(parse_within(&text, path, roots)?)
 }
 
 /// The text of the file, of bounded length.
@@ -134,15 +149,25 @@ fn read(path: &Path) -> Result<String, Error> {
 /// # Errors
 /// [`Problems`] with everything that is wrong.
 pub fn parse(text: &str, file: &Path) -> Result<Loaded, Problems> {
-    let ((site, Written { blake3, keys }), warnings) =
-        parse_file::<SiteConfig>(text, file, SITE_EXAMPLE)?;
+    parse_within(text, file, &[])
+}
+
+fn parse_within(text: &str, file: &Path, roots: &[PathBuf]) -> Result<Loaded, Problems> {
+    let mut review = Review::new(file, text).within(roots);
+    let read = read_table::<SiteConfig>(text, &mut review);
+    let files = review.take_files();
+    let ((site, Written { blake3, keys }), warnings) = review.finish(read)?;
     let site = SiteConfig {
         file: file.to_owned(),
         blake3,
         keys,
         ..site
     };
-    Ok(Loaded { site, warnings })
+    Ok(Loaded {
+        site,
+        warnings,
+        files,
+    })
 }
 
 /// What was read, with the keys as written, and warnings.

@@ -50,6 +50,8 @@ impl Form for Existing {
         if written.is_empty() || !(self.is_there)(&path) {
             let (kind, shown) = (&self.kind, path.display());
             found.refuse(review, format!("{kind}; {shown} is {}", what_is_at(&path)));
+        } else if !review.admit(&path, found.value.span(), &found.key) {
+            return None;
         }
         // Also a path that leads nowhere: a second one like it is told as well.
         Some(path)
@@ -102,7 +104,11 @@ impl Form for Globs {
             match matched {
                 Err(expected) => review.refuse(written.span(), &found.key, expected),
                 Ok(paths) => {
+                    let span = written.span();
                     for path in paths {
+                        if !review.admit(&path, span.clone(), &found.key) {
+                            break;
+                        }
                         let identity = path.canonicalize().unwrap_or_else(|_| path.clone());
                         by_identity.entry(identity).or_insert(path);
                     }

@@ -7,7 +7,10 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use crate::error::{Cause, Kind};
+use crate::{
+    error::{Cause, Kind},
+    files::outside,
+};
 
 /// Problems reported one by one; a file with more is told how many were left out.
 const LISTED_MAX: usize = 100;
@@ -86,6 +89,10 @@ pub(super) struct Review<'a> {
     warnings: Vec<(TextSpan, String)>,
     renames: BTreeSet<Rename>,
     documentation: &'static str,
+    /// Folders below which files must lie; none for no such rule.
+    roots: &'a [PathBuf],
+    /// Files that the text leads to.
+    files: Vec<PathBuf>,
 }
 
 impl<'a> Review<'a> {
@@ -98,7 +105,34 @@ impl<'a> Review<'a> {
             warnings: Vec::new(),
             renames: BTreeSet::new(),
             documentation: SITE_EXAMPLE,
+            roots: &[],
+            files: Vec::new(),
         }
+    }
+
+    /// The same of a file that may lead only below these folders.
+    pub(super) fn within(self, roots: &'a [PathBuf]) -> Self {
+        Self { roots, ..self }
+    }
+
+    /// Notes a file to which the value of `key` at `span` leads. Where it must not lead is a problem, and such a file is not
+    /// to be read.
+    pub(super) fn admit(&mut self, path: &Path, span: Range<usize>, key: &str) -> bool {
+        match outside(path, self.roots) {
+            None => {
+                self.files.push(path.to_owned());
+                true
+            }
+            Some(outside) => {
+                self.refuse(span, key, outside);
+                false
+            }
+        }
+    }
+
+    /// Files to which the text leads.
+    pub(super) fn take_files(&mut self) -> Vec<PathBuf> {
+        std::mem::take(&mut self.files)
     }
 
     /// The same of a file whose keys another example documents.

@@ -17,6 +17,7 @@ use crate::{
     spice::RequiredCoverage,
     stage::{Output, Provenance, Stage},
     stages::{group_profiles::Profile, tag_times::ImageTimes},
+    store::hashes::HashCache,
 };
 
 /// What a check found.
@@ -32,9 +33,11 @@ pub struct Checked {
 /// sets of kernels every one, since any of them may be chosen.
 ///
 /// The PEDR files are searched as a run does it: only shots in the windows tell which times are needed.
+///
+/// * `hashes` – kernels that are known there are not read again to check their words; nothing is added to them
 #[must_use]
-pub fn check_site(config: &SiteConfig) -> Checked {
-    let mut check = Check::of(config);
+pub fn check_site(config: &SiteConfig, hashes: &HashCache) -> Checked {
+    let mut check = Check::of(config, hashes.files());
     if let Err(Leave::Failed(failure)) = check.all(config) {
         check.checked.failures.push(failure.in_site(&config.site));
     }
@@ -46,7 +49,7 @@ pub fn check_site(config: &SiteConfig) -> Checked {
 /// # Errors
 /// What those stages say of labels, clocks and PEDR files.
 pub fn required_by_site(config: &SiteConfig) -> Result<RequiredCoverage> {
-    let mut check = Check::of(config);
+    let mut check = Check::of(config, InputFiles::default());
     let prepared = prepare(&mut check, config);
     if let Some(failure) = check.checked.failures.into_iter().next() {
         return Err(failure);
@@ -78,10 +81,10 @@ struct Check<'a> {
 }
 
 impl<'a> Check<'a> {
-    fn of(config: &'a SiteConfig) -> Self {
+    fn of(config: &'a SiteConfig, files: InputFiles) -> Self {
         Self {
             site: &config.site,
-            files: InputFiles::default(),
+            files,
             never: AtomicBool::new(false),
             prefix: String::new(),
             checked: Checked::default(),

@@ -13,6 +13,7 @@ mod evidence;
 mod kernels;
 mod manifest;
 mod net;
+mod observer;
 mod out;
 mod outline;
 mod outputs;
@@ -31,9 +32,10 @@ pub use compare::{
 };
 pub use driver::StageReason;
 pub use net::{NetOutcome, run_net};
+pub use observer::{Observer, StageEvent};
 pub use out::{OutError, check_out};
 pub use outline::stages;
-pub use plan::plan_site;
+pub use plan::{SitePlan, plan_site};
 pub use run::{Ending, RunOptions, SiteOutcome, run_site};
 pub use sites::publish_sites;
 

@@ -1,9 +1,6 @@
-//! The flow that looks: which stages would run, and why; nothing is written.
+//! The flow that looks: which stages would run, and why; no product is written.
 
-use std::{
-    path::{Path, PathBuf},
-    sync::atomic::AtomicBool,
-};
+use std::{path::PathBuf, sync::atomic::AtomicBool};
 
 use super::{
     PUBLISH,
@@ -11,43 +8,53 @@ use super::{
     driver::{Driver, Flow, Leave, Ledger, StageReason},
     outputs::Site,
     publish::{inputs, standing},
+    run::RunOptions,
     site::site,
 };
 use crate::{
     config::SiteConfig,
     error::Result,
-    files::InputFiles,
+    files::{HashedFile, InputFiles},
     stage::{Output, Reason, Stage},
     store::{cache::StageCache, publish::CACHE},
 };
 
-/// Says what [`run_site`](super::run_site) would do.
+/// What a run of a site would do.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct SitePlan {
+    /// Every stage with the reason why it would run, or that it would be kept.
+    pub stages: Vec<StageReason>,
+    /// The files that the stages read, as far as is known before the first one runs that would.
+    pub files: Vec<HashedFile>,
+}
+
+/// Says what [`run_site`](super::run_site) would do with these options. But for hashes nothing is written.
 ///
 /// A stage below one that would run is listed as running because that output may change; if it turns
 /// out the same, the run will keep the later stage.
 ///
 /// # Errors
 /// Input files or kernels that cannot be read.
-pub fn plan_site(
-    config: &SiteConfig,
-    out: &Path,
-    until: &str,
-    force: bool,
-) -> Result<Vec<StageReason>> {
-    let folder = out.join(&config.site);
+pub fn plan_site(config: &SiteConfig, options: &RunOptions<'_>) -> Result<SitePlan> {
+    let folder = options.out.join(&config.site);
     let mut plan = Plan {
-        cache: StageCache::new(&folder.join(CACHE), force),
+        cache: StageCache::new(&folder.join(CACHE), options.force),
         folder,
         bounds: Bounds {
-            until,
-            stop: &AtomicBool::new(false),
-            files: InputFiles::default(),
+            until: options.until,
+            stop: options.stop,
+            files: options.files(),
         },
         planned: Vec::new(),
         ledger: Ledger::new(),
     };
-    match site(&mut plan, config) {
-        Ok(()) | Err(Leave::StageReached) => Ok(plan.planned),
+    let driven = site(&mut plan, config);
+    options.hashes.keep(plan.files());
+    match driven {
+        Ok(()) | Err(Leave::StageReached) => Ok(SitePlan {
+            files: plan.files().all(),
+            stages: plan.planned,
+        }),
         Err(Leave::Failed(failure)) => Err(failure.in_site(&config.site)),
     }
 }

@@ -1,11 +1,12 @@
 //! The flow that makes products: a stage runs when something that it sees has changed.
 
-use std::{path::PathBuf, sync::atomic::AtomicBool};
+use std::{path::PathBuf, sync::atomic::AtomicBool, time::Instant};
 
 use super::{
     PUBLISH,
     bounds::Bounds,
     driver::{Driver, Flow, Leave, Ledger, StageReason},
+    observer::{Observer, StageEvent},
     outputs::Site,
     publish::{inputs, publish, standing},
     site::site,
@@ -17,6 +18,7 @@ use crate::{
     stage::{Output, Reason, Stage},
     store::{
         cache::StageCache,
+        hashes::HashCache,
         lock::SiteLock,
         manifest::Manifest,
         publish::{CACHE, note_failure},
@@ -34,6 +36,19 @@ pub struct RunOptions<'a> {
     pub force: bool,
     /// Set from outside to stop between two stages, or inside the long ones.
     pub stop: &'a AtomicBool,
+    /// Hashes of input files from earlier runs, to which those of this one are added.
+    pub hashes: &'a HashCache,
+    /// Folders below which input files must lie, without links; none for no such rule.
+    pub roots: &'a [PathBuf],
+    /// Hears what becomes of each stage.
+    pub observer: &'a dyn Observer,
+}
+
+impl RunOptions<'_> {
+    /// The input files of a run.
+    pub(super) fn files(&self) -> InputFiles {
+        self.hashes.files().within(self.roots)
+    }
 }
 
 /// What a run did.
@@ -77,8 +92,10 @@ pub fn run_site(config: &SiteConfig, options: &RunOptions<'_>) -> Result<SiteOut
         bounds: Bounds {
             until: options.until,
             stop: options.stop,
-            files: InputFiles::default(),
+            files: options.files(),
         },
+        hashes: options.hashes,
+        observer: options.observer,
         ledger: Ledger::new(),
         passed: Vec::new(),
         ending: Ending::StoppedAfter(options.until.to_owned()),
@@ -91,6 +108,7 @@ pub fn run_site(config: &SiteConfig, options: &RunOptions<'_>) -> Result<SiteOut
             Err(failure)
         }
     };
+    run.hashes.keep(run.files());
     let driven = driven.in_site(&config.site);
     note_failure(
         &run.folder,
@@ -109,6 +127,8 @@ struct Run<'a> {
     cache: StageCache,
     folder: PathBuf,
     bounds: Bounds<'a>,
+    hashes: &'a HashCache,
+    observer: &'a dyn Observer,
     ledger: Ledger,
     /// Every stage so far.
     passed: Vec<StageReason>,
@@ -120,10 +140,21 @@ impl Run<'_> {
     fn pass(&mut self, label: &str, reason: Reason) {
         let word = if reason.runs() { "running" } else { "kept" };
         tracing::info!(stage = label, "{word}: {reason}");
+        let event = if reason.runs() {
+            StageEvent::Begins(&reason)
+        } else {
+            StageEvent::Kept
+        };
+        self.observer.hear(label, &event);
         self.passed.push(StageReason {
             stage: label.to_owned(),
             reason,
         });
+    }
+
+    fn done(&self, label: &str, begun: Instant) {
+        let event = StageEvent::Done(begun.elapsed().as_secs_f64());
+        self.observer.hear(label, &event);
     }
 
     /// Makes sure that all stages have read the same files. Otherwise their outputs would stand under the hashes
@@ -162,11 +193,16 @@ impl Driver for Run<'_> {
             }
             Err(reason) => {
                 self.pass(&label, reason);
+                let begun = Instant::now();
+                // Reading a large archive is not lost when the run is.
+                self.hashes.keep(self.files());
                 let value = stage.run(self.bounds.stop).in_stage(&label)?;
                 for path in inputs.file_paths() {
                     self.bounds.files.verify(path).in_stage(&label)?;
                 }
-                self.cache.store(&label, inputs, value).in_stage(&label)?
+                let output = self.cache.store(&label, inputs, value).in_stage(&label)?;
+                self.done(&label, begun);
+                output
             }
         };
         self.ledger.push((label, output.provenance().cloned()));
@@ -184,6 +220,7 @@ impl Driver for Run<'_> {
             }
             Err(reason) => {
                 self.pass(PUBLISH, reason);
+                let begun = Instant::now();
                 self.verify_inputs().in_stage(PUBLISH)?;
                 let manifest = publish(config, site, &self.folder, &self.ledger, &inputs);
                 let manifest = manifest.in_stage(PUBLISH)?;
@@ -191,6 +228,7 @@ impl Driver for Run<'_> {
                 stored.in_stage(PUBLISH)?;
                 self.cache
                     .keep_only(manifest.stages.iter().map(|stage| &*stage.name));
+                self.done(PUBLISH, begun);
                 Ending::Published(manifest)
             }
         };

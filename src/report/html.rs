@@ -2,8 +2,8 @@
 
 use std::fmt::Write as _;
 
-/// The page has no scripts; plots take their colours from here, so that they follow light and dark.
-const STYLE: &str = include_str!("style.css");
+/// Style of all pages. Reports have no scripts; plots take their colours from here, so that they follow light and dark.
+pub const STYLE: &str = include_str!("style.css");
 
 /// Letters up to which a cell stays on one line.
 const SHORT: usize = 28;

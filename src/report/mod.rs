@@ -51,6 +51,7 @@ pub use diff::difference_page;
 pub use fidelity::{
     FIDELITY_FILE, FIDELITY_PAGE, Fidelity, FidelityPaper, FidelityRow, fidelity_page,
 };
+pub use html::STYLE;
 pub use net::net_page;
 pub use sites::{SiteLine, SiteSummary, sites_page};
 

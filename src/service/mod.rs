@@ -4,7 +4,18 @@
 //! start. Files are listed, not watched. A job brings one site up to date, an attempt is one worker process, a run is what
 //! one attempt published.
 
+pub mod audit;
 pub mod clock;
 pub mod database;
+pub mod engine;
+pub mod http;
+pub mod instant;
+pub mod lock;
+pub mod random;
+pub mod rebuild;
+pub mod sessions;
+pub mod shared;
+pub mod start;
 pub mod state;
+pub mod tokens;
 pub mod worker;

@@ -15,6 +15,8 @@ use std::{
 use super::{error::SpiceError, role::KernelRole};
 use crate::error::{IoError, Locate, Result};
 
+/// Raised when [`check_contents`] finds more than before: what passed it then is looked at again.
+pub(super) const CHECK: u32 = 1;
 /// Bytes of a DAF record.
 const RECORD_SIZE: usize = 1_024;
 /// Bytes of a DAF word.

@@ -34,18 +34,22 @@ pub struct Kernel {
 }
 
 impl Kernel {
-    /// Looks into a file, checks the words of a binary one and hashes it; what the run has hashed before was checked
-    /// then, and must still be the same.
+    /// Looks into a file, hashes it and checks the words of a binary one, unless this content passed the check before.
     ///
     /// # Errors
     /// [`IoError`]; [`SpiceError::NotAKernel`]; [`SpiceError::DamagedKernel`].
-    pub(super) fn inspect(path: &Path, files: &InputFiles) -> Result<Self> {
+    pub fn inspect(path: &Path, files: &InputFiles) -> Result<Self> {
         ffi::c_path(path).in_file(path)?;
+        files.admit(path)?;
         let role = role_of(path)?;
-        if !files.knows(path) && first_bytes(path)?.starts_with(b"DAF/") {
-            daf::check_contents(path, role)?;
-        }
         let file = files.hash(path)?;
+        let binary = first_bytes(path)?.starts_with(b"DAF/");
+        if binary && !files.has_passed(&file.blake3, daf::CHECK) {
+            daf::check_contents(path, role)?;
+            // What was checked is what was hashed.
+            files.verify(path)?;
+            files.note_passed(&file.blake3, daf::CHECK);
+        }
         Ok(Self {
             path: file.path,
             role,
@@ -89,6 +93,13 @@ impl KernelSet {
             set.add(path, "listed", run)?;
         }
         Ok(set)
+    }
+
+    /// The same kernels and behind them one that was looked into.
+    #[must_use]
+    pub fn with(mut self, kernel: Kernel) -> Self {
+        self.kernels.push(kernel);
+        self
     }
 
     /// The same kernels and behind them `files`, which therefore win.

@@ -40,6 +40,7 @@ impl KernelSet {
     /// # Errors
     /// Those of [`Self::from_metakernel`]; a file that is no longer what the run has read.
     pub fn from_metakernel_of(run: &InputFiles, metakernel: &Path) -> Result<Self> {
+        run.admit(metakernel)?;
         let role = role_of(metakernel)?;
         if role != KernelRole::Meta {
             let error = SpiceError::NotAKernel {

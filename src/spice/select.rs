@@ -67,7 +67,7 @@ impl KernelSet {
         selection: &KernelSelection,
         required: &RequiredCoverage,
     ) -> Result<Self> {
-        let found = Found::in_folder(&selection.root)?;
+        let found = Found::in_folder(&selection.root, run)?;
         let mut set = Selected {
             set: Self::default(),
             run,
@@ -96,9 +96,10 @@ impl Selected<'_> {
 }
 
 impl Found {
-    fn in_folder(root: &Path) -> Result<Self> {
+    fn in_folder(root: &Path, run: &InputFiles) -> Result<Self> {
         let mut found = Self::default();
         for path in files_below(root)? {
+            run.admit(&path)?;
             let role = match role_of(&path) {
                 Ok(role) => role,
                 Err(failure) if failure.kind() == Kind::Io => return Err(failure),

@@ -9,7 +9,7 @@ use super::{
     atomic::TEMPORARY,
     publish::{CACHE, STAGING},
 };
-use crate::error::{Cause, IoError, Kind, Locate, Result};
+use crate::error::{Cause, Error, IoError, Kind, Locate, Result};
 
 /// Held while a run works in a site's folder; the system frees it when the process ends, however it ends.
 #[derive(Debug)]
@@ -20,7 +20,16 @@ pub struct SiteLock {
 /// Another run is at work in the folder.
 #[derive(Debug, thiserror::Error)]
 #[error("another run is using this folder")]
-struct Busy;
+pub struct Busy;
+
+impl Busy {
+    /// Whether this is why something failed: nothing was tried then.
+    #[must_use]
+    pub fn is_cause_of(failure: &Error) -> bool {
+        let cause: &(dyn std::error::Error + 'static) = &*failure.cause;
+        cause.is::<Self>()
+    }
+}
 
 impl Cause for Busy {
     fn kind(&self) -> Kind {

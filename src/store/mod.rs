@@ -3,6 +3,7 @@
 
 pub mod atomic;
 pub mod cache;
+pub mod hashes;
 pub mod lock;
 pub mod manifest;
 pub mod page;

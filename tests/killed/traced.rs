@@ -30,8 +30,8 @@ pub(crate) enum Then {
     GoOn,
     /// The program is killed; the call is never made.
     Kill,
-    /// The program gets what Ctrl-C sends, and goes on.
-    Interrupt,
+    /// The program gets this signal, and goes on.
+    Signal(c_int),
 }
 
 /// How a traced program ended.
@@ -65,7 +65,7 @@ pub(crate) fn traced(command: &Command, mut at: impl FnMut(&Call) -> Then) -> En
                 match then {
                     Then::GoOn => {}
                     Then::Kill => send(program, libc::SIGKILL).unwrap(),
-                    Then::Interrupt => send(program, libc::SIGINT).unwrap(),
+                    Then::Signal(signal) => send(program, signal).unwrap(),
                 }
                 0
             }

@@ -2,4 +2,11 @@
 //!
 //! CSPICE, memory and crashes stay in there.
 
+pub mod child;
+mod fork;
+mod lines;
+mod log;
+pub mod parent;
+pub mod process;
 pub mod protocol;
+pub mod run_folder;

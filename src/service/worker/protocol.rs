@@ -1,17 +1,23 @@
 //! The lines between the service and a worker: one JSON object each, at most [`LINE_MAX`] bytes.
 //!
 //! The service writes one [`Task`], later perhaps one [`Cancel`]; the end of its output means that it is gone, and the worker
-//! stops. The worker writes [`Line`]s, `hello` first and `answer` or `failure` last. Unknown fields are ignored.
+//! stops. The worker writes [`Line`]s, `hello` first and `answer` or `failure` last; one that is too long for a line goes in
+//! pieces. Unknown fields are ignored.
 
 use std::path::PathBuf;
 
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
+use crate::files::Identity;
+
 /// Version of these lines.
 pub const PROTOCOL: u32 = 1;
 /// Longest line, bytes.
 pub const LINE_MAX: usize = 64 << 10;
+
+/// Longest answer in pieces, bytes.
+pub const ANSWER_MAX: usize = 64 << 20;
 
 /// What a worker is to do.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -82,8 +88,15 @@ pub enum What {
     List {
         /// The folders.
         roots: Vec<PathBuf>,
-        /// Where the answer goes, one JSON line a file: it is too long for a line of this protocol.
+        /// Where the answer goes, one [`Listed`] a line: it is too long for a line of this protocol.
         into: PathBuf,
+    },
+    /// Reads files and tells their hashes.
+    Hash {
+        /// The files.
+        files: Vec<PathBuf>,
+        /// Whether they are read even where the hash cache knows them.
+        rehash: bool,
     },
     /// Searches the shots of runs within a polygon.
     Shots {
@@ -148,6 +161,13 @@ pub enum Line {
         /// Memory in use, kibibytes.
         rss_kib: u64,
     },
+    /// A piece of a line that is too long for one: their texts, joined, are that line.
+    Piece {
+        /// The piece.
+        text: String,
+        /// Whether more of them follow.
+        more: bool,
+    },
     /// Last, of work that was done; its content by the kind of work.
     Answer(Answer),
     /// Last, of work that failed.
@@ -180,6 +200,11 @@ pub enum Answer {
     List {
         /// Files found.
         files: u64,
+    },
+    /// Of hashing: files in the order of the task.
+    Hash {
+        /// What was found of each.
+        files: Vec<Hashed>,
     },
     /// Of a search.
     Shots {
@@ -238,6 +263,48 @@ pub struct PlannedFile {
     pub path: PathBuf,
     /// BLAKE3 of its content.
     pub blake3: String,
+}
+
+/// What a list tells, in the order of the folders of its task and of names.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(tag = "listed", rename_all = "snake_case")]
+pub enum Listed {
+    /// A regular file, links followed.
+    File {
+        /// Its path below the folder as the task names it.
+        path: PathBuf,
+        /// What the file system says of it.
+        identity: Identity,
+    },
+    /// A file or folder that cannot be looked at.
+    Unreadable {
+        /// Its path.
+        path: PathBuf,
+        /// The system's reason.
+        problem: String,
+    },
+    /// Behind the files of a folder of the task: all of it has been listed, or it is not there.
+    Root {
+        /// The folder.
+        path: PathBuf,
+        /// Device of its file system.
+        device: Option<u64>,
+        /// Files found below it.
+        files: u64,
+        /// Why it cannot be listed.
+        problem: Option<String>,
+    },
+}
+
+/// A file that was read.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Hashed {
+    /// Its path.
+    pub path: PathBuf,
+    /// BLAKE3 of its content; none of a file that cannot be read.
+    pub blake3: Option<String>,
+    /// Why it cannot be read.
+    pub problem: Option<String>,
 }
 
 /// A kernel that was opened.

@@ -1,0 +1,19 @@
+//! `areograph worker`: one task of the service.
+
+use std::process::ExitCode;
+
+use clap::Args;
+
+use crate::service::worker::child;
+
+/// Does one task of the service, which talks to it over standard input and output.
+#[derive(Debug, Args)]
+pub(super) struct Arguments {
+    /// The process of the service; the worker ends when its parent is another one.
+    #[arg(long, value_name = "PID")]
+    parent: Option<u32>,
+}
+
+pub(super) fn run(arguments: &Arguments) -> ExitCode {
+    child::main(arguments.parent)
+}

@@ -1,0 +1,36 @@
+//! Who changed what.
+
+use rusqlite::{Transaction, params};
+
+use super::database::Stored;
+
+/// A change that somebody asked for.
+#[derive(Debug, Clone, Copy)]
+pub struct Change<'a> {
+    /// Identifier of the token.
+    pub who: &'a str,
+    /// What was asked for, as in `cancel`.
+    pub action: &'a str,
+    /// What it concerns, as in `job 7`.
+    pub target: &'a str,
+    /// Address that it came from.
+    pub remote: &'a str,
+}
+
+/// Notes a change together with the change itself.
+///
+/// # Errors
+/// SQLite's own.
+pub fn note_change(transaction: &Transaction<'_>, now_ms: i64, change: Change<'_>) -> Stored<()> {
+    let Change {
+        who,
+        action,
+        target,
+        remote,
+    } = change;
+    transaction.execute(
+        "INSERT INTO audit (at_ms, who, action, target, remote) VALUES (?1, ?2, ?3, ?4, ?5)",
+        params![now_ms, who, action, target, remote],
+    )?;
+    Ok(())
+}

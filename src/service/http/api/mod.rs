@@ -1,0 +1,86 @@
+//! The interface for programs: documents of JSON below `/api/v1`, described by `/openapi.json`.
+
+mod answer;
+mod events;
+mod files;
+mod jobs;
+mod kernels;
+mod life;
+mod logs;
+mod nights;
+mod runs;
+mod sites;
+
+use std::sync::Arc;
+
+use axum::{Json, Router, response::IntoResponse as _, routing::get};
+use utoipa::{
+    Modify, OpenApi,
+    openapi::{
+        OpenApi as Description,
+        security::{HttpAuthScheme, HttpBuilder, SecurityRequirement, SecurityScheme},
+    },
+};
+use utoipa_axum::{router::OpenApiRouter, routes};
+
+use super::{app::App, problem::ProblemDocument};
+
+#[derive(OpenApi)]
+#[openapi(
+    info(
+        title = "areograph",
+        description = "Sites, runs, jobs, kernels and shots of an areograph service. Refusals are problem documents (RFC 9457). \
+                       Lists are given in pieces: `next` of one is `after` of the next one. Instants are RFC 3339 in UTC.",
+    ),
+    components(schemas(ProblemDocument)),
+    modifiers(&Tokens),
+)]
+struct Api;
+
+/// Every operation takes a token.
+struct Tokens;
+
+impl Modify for Tokens {
+    fn modify(&self, api: &mut Description) {
+        let bearer = HttpBuilder::new()
+            .scheme(HttpAuthScheme::Bearer)
+            .description(Some("A token as `areograph service token add` gives it."))
+            .build();
+        let components = api.components.get_or_insert_default();
+        components.add_security_scheme("token", SecurityScheme::Http(bearer));
+        api.security = Some(vec![SecurityRequirement::new("token", [""; 0])]);
+    }
+}
+
+/// All routes for programs.
+pub(super) fn routes() -> Router<Arc<App>> {
+    let (router, description) = described().split_for_parts();
+    let description = Arc::new(description);
+    router.route(
+        "/openapi.json",
+        get(|_: super::caller::Reader| async move { Json(&*description).into_response() }),
+    )
+}
+
+fn described() -> OpenApiRouter<Arc<App>> {
+    OpenApiRouter::with_openapi(Api::openapi())
+        .routes(routes!(sites::list))
+        .routes(routes!(sites::one))
+        .routes(routes!(sites::current))
+        .routes(routes!(runs::of_site))
+        .routes(routes!(runs::one, runs::pin_one))
+        .routes(routes!(files::of_run))
+        .routes(routes!(jobs::list, jobs::create))
+        .routes(routes!(jobs::one))
+        .routes(routes!(jobs::cancel_one))
+        .routes(routes!(jobs::retry_one))
+        .routes(routes!(logs::of_job))
+        .routes(routes!(events::follow))
+        .routes(routes!(nights::list))
+        .routes(routes!(nights::one))
+        .routes(routes!(kernels::list))
+        .routes(routes!(kernels::one))
+        .routes(routes!(life::healthy))
+        .routes(routes!(life::ready))
+        .routes(routes!(life::metrics))
+}

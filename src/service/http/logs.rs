@@ -1,0 +1,56 @@
+//! Logs of attempts.
+
+use std::{
+    io::{Read as _, Seek as _, SeekFrom},
+    path::Path,
+};
+
+use super::{files::open_below, problem::Problem};
+
+/// Bytes of a log that are given at once.
+pub(super) const PIECE: u64 = 256 << 10;
+
+/// A piece of a log.
+#[derive(Debug, Default)]
+pub(super) struct LogPiece {
+    pub(super) text: String,
+    /// Where the next piece begins, bytes.
+    pub(super) next: u64,
+    /// Length of the whole log, bytes.
+    pub(super) bytes: u64,
+}
+
+/// At most `most` bytes of a log below `state`, from byte `after`, or its end when that is not said.
+pub(super) fn log_piece(
+    state: &Path,
+    log: &str,
+    after: Option<u64>,
+    most: u64,
+) -> Result<LogPiece, Problem> {
+    let path = Path::new(log);
+    let below = path.strip_prefix(state).unwrap_or(path);
+    let Some(mut file) = open_below(state, below)? else {
+        return Ok(LogPiece::default());
+    };
+    let bytes = file.metadata().map_err(Problem::internal)?.len();
+    let start = after
+        .unwrap_or_else(|| bytes.saturating_sub(most))
+        .min(bytes);
+    file.seek(SeekFrom::Start(start))
+        .map_err(Problem::internal)?;
+    let mut piece = Vec::new();
+    file.take(most)
+        .read_to_end(&mut piece)
+        .map_err(Problem::internal)?;
+    // A whole piece ends with a line, so that no letter is cut.
+    if piece.len() as u64 == most
+        && let Some(end) = piece.iter().rposition(|byte| *byte == b'\n')
+    {
+        piece.truncate(end + 1);
+    }
+    Ok(LogPiece {
+        next: start + piece.len() as u64,
+        text: String::from_utf8_lossy(&piece).into_owned(),
+        bytes,
+    })
+}
