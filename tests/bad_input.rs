@@ -292,12 +292,6 @@ const CASES: &[(&str, Spoil)] = &[
         });
         case.run()
     }),
-    ("check_ck_rate_overflows", |case| {
-        change_packets(case, "kernels/mgs_sc_scene.bc", 7, |attitude| {
-            attitude[5] = 1e308;
-        });
-        case.check()
-    }),
     ("check_spk_state_is_not_finite", |case| {
         change_packets(case, "kernels/mgs_nav_scene.bsp", 6, |state| {
             state[2] = f64::NAN;
@@ -548,7 +542,10 @@ fn damaged_stores_and_products_are_made_again() {
     case.write("out/case/.cache/convert_datum", b"damaged");
     case.write("out/case/footprints.csv", b"edited");
     fs::remove_file(case.path("out/case/ranges.json")).unwrap();
-    assert!(case.outcome(case.run()).contains("remarks; products in"));
+    assert!(
+        case.outcome(case.run())
+            .contains("case: valid; products in")
+    );
     assert!(common::mission::products(&case.path("out")) == before);
 }
 

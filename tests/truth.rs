@@ -10,6 +10,8 @@
 #[path = "truth/across.rs"]
 mod across;
 mod common;
+#[path = "truth/footprint_heights.rs"]
+mod footprint_heights;
 #[path = "truth/light_time.rs"]
 mod light_time;
 #[path = "truth/misregistration.rs"]

@@ -6,6 +6,7 @@ use super::outputs::Site;
 use crate::{
     config::SiteConfig,
     error::Result,
+    geom::pushbroom::CameraModel,
     instruments::Instrument,
     stages::{
         judge::{AdjustmentEvidence, Evidence, JudgedImage, Verdict, judge},
@@ -72,6 +73,9 @@ pub(super) fn warnings(config: &SiteConfig, site: &Site) -> Result<Vec<String>> 
         warnings.extend(remarks.map(|remark| format!("image {}: {remark}", times.id)));
     }
     warnings.extend(same_exposures(&site.images)?);
+    if has_angles(config) {
+        warnings.extend(gimbal_locks(&site.images)?);
+    }
     if let Some(ties) = &site.ties {
         let remarks = ties.value()?.remarks.iter();
         warnings.extend(remarks.map(|remark| format!("tie points: {remark}")));
@@ -89,6 +93,29 @@ pub(super) fn cameras(images: &[SiteImage]) -> Result<Vec<&Instrument>> {
         }
     }
     Ok(cameras)
+}
+
+/// Whether the orientation that is used has polynomials of ω, φ and κ.
+const fn has_angles(config: &SiteConfig) -> bool {
+    match config.registration.model {
+        CameraModel::FirstOrder | CameraModel::SecondOrder => true,
+        CameraModel::RotationVector | CameraModel::Samples => false,
+    }
+}
+
+/// Images whose angles ω and κ turn about nearly the same axis.
+fn gimbal_locks(images: &[SiteImage]) -> Result<Vec<String>> {
+    let mut locks = Vec::new();
+    for image in images {
+        let (times, model) = (image.times.value()?, image.model.value()?);
+        if model.near_gimbal_lock {
+            locks.push(format!(
+                "image {}: |cos φ| falls to {:.3}, where ω and κ are poorly determined; the rotation-vector form is not",
+                times.id, model.cos_phi_min
+            ));
+        }
+    }
+    Ok(locks)
 }
 
 /// Images that one camera took at one time with the same pixels: one label may stand for another.
@@ -126,7 +153,7 @@ fn judged_images(images: &[SiteImage]) -> Result<Vec<JudgedImage<'_>>> {
 }
 
 /// What a reader of the products should know, one sentence each.
-pub(super) fn notes(site: &Site) -> Result<Vec<String>> {
+pub(super) fn notes(config: &SiteConfig, site: &Site) -> Result<Vec<String>> {
     let mut notes = Vec::new();
     if let Some(choice) = &site.choice {
         notes.extend(choice.value()?.notes.iter().cloned());
@@ -140,6 +167,9 @@ pub(super) fn notes(site: &Site) -> Result<Vec<String>> {
         let times = image.times.value()?;
         let of_image = times.notes.iter();
         notes.extend(of_image.map(|note| format!("image {}: {note}", times.id)));
+    }
+    if !has_angles(config) {
+        notes.extend(gimbal_locks(&site.images)?);
     }
     if let Some(ties) = &site.ties {
         notes.extend(ties.value()?.notes());

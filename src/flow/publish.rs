@@ -91,7 +91,7 @@ pub(super) fn publish(
     let none = KernelSet::default();
     let kernels = site.kernels.as_ref().unwrap_or(&none);
     let described = site.described.value()?;
-    let (notes, complaints, rejected) = (notes(site)?, complaints(site)?, rejected(site)?);
+    let (notes, complaints, rejected) = (notes(config, site)?, complaints(site)?, rejected(site)?);
     let warnings = warnings(config, site)?;
     for warning in &warnings {
         tracing::warn!("{warning}");

@@ -146,16 +146,6 @@ impl Evidence<'_> {
             let notes = image.orientation.notes.iter();
             remarks.extend(notes.map(|note| format!("image {}: {note}", image.id)));
         }
-        let images = self
-            .images
-            .iter()
-            .filter(|image| image.model.near_gimbal_lock);
-        remarks.extend(images.map(|image| {
-            format!(
-                "image {}: |cos φ| falls to {:.3}, where ω and κ are poorly determined; use the rotation-vector form",
-                image.id, image.model.cos_phi_min
-            )
-        }));
         let configured_s = self.clock_correction_s;
         for ranges in &self.ranges.profiles {
             let doubt = ranges
