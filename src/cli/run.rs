@@ -24,6 +24,7 @@ use crate::{
 ///
 /// Example: `areograph run sites/*.toml --out products`
 #[derive(Debug, Clone, Args)]
+#[allow(clippy::struct_excessive_bools, reason = "flags of a command line")]
 #[command(verbatim_doc_comment)]
 pub(super) struct Arguments {
     /// Site files (TOML).

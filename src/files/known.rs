@@ -88,6 +88,7 @@ impl KnownFiles {
     }
 
     /// All of them.
+    #[must_use]
     pub fn iter(&self) -> impl ExactSizeIterator<Item = &KnownFile> {
         self.0.values()
     }

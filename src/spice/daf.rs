@@ -5,6 +5,7 @@
 
 mod contents;
 mod layout;
+mod neighbours;
 
 use std::{
     fs::File,

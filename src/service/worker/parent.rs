@@ -344,6 +344,6 @@ fn exited(status: Option<ExitStatus>) -> How {
 
 /// An instant so much later, or as late as there is one worth waiting for.
 fn far(from: Instant, later: Duration) -> Instant {
-    const YEAR: Duration = Duration::from_secs(366 * 86_400);
+    const YEAR: Duration = Duration::from_hours(366 * 24);
     from + later.min(YEAR)
 }

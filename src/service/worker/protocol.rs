@@ -316,7 +316,8 @@ pub struct Probed {
     pub blake3: String,
     /// Why it cannot be used.
     pub problem: Option<String>,
-    /// What it covers, as `areograph kernels coverage --json` says it of one kernel; null of one without coverage.
+    /// What it holds of the spacecraft: `position`, relative to whatever body, and `attitude`, lists of intervals as those of
+    /// `areograph kernels coverage --json`; null of a kernel that is neither SPK nor CK, or whose times no clock tells.
     pub coverage: Value,
 }
 

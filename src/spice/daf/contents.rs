@@ -2,7 +2,8 @@
 
 use super::{
     Reader, Segment,
-    layout::{DIRECTORY_STEP, Layout, List, Packet, layout},
+    layout::{DIRECTORY_STEP, Layout, List, Packet, STATE, layout},
+    neighbours::{self, States, Times},
 };
 use crate::{error::Error, spice::role::KernelRole};
 
@@ -81,7 +82,22 @@ pub(super) fn check(
         check_packet(layout.packet, index, packet)
     })?;
     first_word += packets.words as u64;
-    check_lists(reader, &layout, first_word)
+    check_lists(reader, &layout, first_word)?;
+    if role != KernelRole::Spk || layout.packet.words() != STATE {
+        return Ok(());
+    }
+    let times = if layout.lists.is_empty() {
+        // Of equal steps, the third count from the end.
+        Times::Every(tail[tail.len() - 3])
+    } else {
+        Times::Listed(first_word)
+    };
+    let states = States {
+        first_word: content.first_word,
+        count: layout.packets,
+        times,
+    };
+    neighbours::check(reader, &states)
 }
 
 /// Times rise, and directories repeat every hundredth of them.

@@ -12,7 +12,7 @@ const DIFFERENCES: usize = 15;
 /// Largest degree of interpolation that CSPICE has room for.
 const DEGREE_MAX: usize = 27;
 /// Words of a state: position and velocity.
-const STATE: usize = 6;
+pub(super) const STATE: usize = 6;
 
 /// A segment: packets, then lists of times with their directories, then counts.
 #[derive(Debug)]

@@ -11,6 +11,7 @@ use crate::{
     kernel_source::KernelSelection,
     service::worker::protocol::Probed,
     spice::{Kernel, KernelRole, KernelSet, RequiredCoverage, Session},
+    time::Intervals,
 };
 
 impl Worker {
@@ -96,7 +97,16 @@ fn open(clocks: KernelSet, kernel: Kernel) -> Result<Value> {
         return Ok(Value::Null);
     }
     let coverage = session.coverage()?;
-    Ok(json!({ "position": coverage.spk, "attitude": coverage.ck }))
+    // Of this kernel alone: behind the clocks it is the only one that holds anything.
+    let own = coverage.per_kernel.first().map(|(_, own)| own.clone());
+    let own = own.unwrap_or_default();
+    let nothing = Intervals::default();
+    let (position, attitude) = if role == KernelRole::Spk {
+        (&own, &nothing)
+    } else {
+        (&nothing, &own)
+    };
+    Ok(json!({ "position": position, "attitude": attitude }))
 }
 
 /// A failure without the name of the file, which stands beside it.

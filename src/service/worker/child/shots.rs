@@ -238,34 +238,30 @@ impl Writer {
             Form::Csv(writer) => {
                 let fields = batch.schema();
                 let columns: Vec<(&str, &ArrayRef)> = attributes(&fields, batch).collect();
-                let writer = match writer {
-                    Some(writer) => writer,
-                    None => {
-                        let mut first = csv::Writer::from_writer(again(&self.file)?);
-                        first
-                            .write_record(columns.iter().map(|(name, _)| name))
-                            .map_err(refused("written as CSV"))?;
-                        writer.insert(first)
-                    }
-                };
+                if writer.is_none() {
+                    let mut first = csv::Writer::from_writer(again(&self.file)?);
+                    first
+                        .write_record(columns.iter().map(|(name, _)| name))
+                        .map_err(refused("written as CSV"))?;
+                    *writer = Some(first);
+                }
                 for row in 0..batch.num_rows() {
                     let values = columns.iter().map(|(_, column)| match value(column, row) {
                         Value::String(text) => text,
                         Value::Null => String::new(),
                         other => other.to_string(),
                     });
-                    writer
-                        .write_record(values)
-                        .map_err(refused("written as CSV"))?;
+                    let written = writer.as_mut().map(|writer| writer.write_record(values));
+                    written.transpose().map_err(refused("written as CSV"))?;
                 }
             }
             Form::GeoJson { out, rows } => {
-                write_features(out, rows, batch).map_err(IoError::on("write"))?
+                write_features(out, rows, batch).map_err(IoError::on("write"))?;
             }
             Form::Parquet(writer) => {
                 let writer = match writer {
                     Some(writer) => writer,
-                    None => writer.insert(parquet_writer(again(&self.file)?, batch.schema())?),
+                    None => writer.insert(parquet_writer(again(&self.file)?, &batch.schema())?),
                 };
                 writer.write(batch).map_err(refused("written as Parquet"))?;
             }
@@ -298,7 +294,7 @@ impl Writer {
             }
             Form::Parquet(None) => {
                 let schema = Schema::new(vec![Field::new(SITE, DataType::Utf8, false)]);
-                let writer = parquet_writer(again(&self.file)?, Arc::new(schema)).in_file(into)?;
+                let writer = parquet_writer(again(&self.file)?, &schema).in_file(into)?;
                 writer
                     .close()
                     .map_err(refused("written as Parquet"))
@@ -319,7 +315,7 @@ fn again(file: &NamedTempFile) -> std::result::Result<File, IoError> {
 }
 
 /// With the metadata of the footprints, but for the box of those of one site.
-fn parquet_writer(file: File, schema: SchemaRef) -> Result<ArrowWriter<File>> {
+fn parquet_writer(file: File, schema: &Schema) -> Result<ArrowWriter<File>> {
     let metadata = schema.metadata().iter().map(|(key, text)| {
         let mut geo: Value = serde_json::from_str(text).unwrap_or_default();
         let boxes = geo

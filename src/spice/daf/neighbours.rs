@@ -1,0 +1,214 @@
+//! States of an ephemeris held against their neighbours: an orbit is smooth, and no force moves a body aside and back within
+//! one step of a table.
+//!
+//! Every state is predicted by cubic Hermite interpolation between the one before and the one behind. A single damaged state
+//! departs from its prediction, spoils those of its two neighbours by known parts of that, and no others. A manoeuvre, a
+//! seam or noise does otherwise: the whole pattern is asked for.
+
+use nalgebra::Vector3;
+
+use super::{Reader, contents::Problem, layout::STATE};
+
+/// Neighbours on either side that take part.
+const REACH: usize = 3;
+/// States read at a time.
+const CHUNK: usize = 4_096;
+/// By how much a damaged state departs more from its prediction than undamaged ones near it do.
+const STANDS_OUT: f64 = 100.0;
+/// Departure that rounding may explain, as a part of the distance or speed.
+const ROUNDING: f64 = 1e-9;
+/// Departure below which nobody is misled: a millimetre and a micrometre a second, in km and km/s.
+const NEGLIGIBLE: [f64; 2] = [1e-6, 1e-9];
+/// Longest of the steps around a state to the shortest, so that the parts below hold.
+const UNEVEN_MAX: f64 = 1.2;
+/// Which part of its own departure a damaged position, or velocity, adds to those of its neighbours: −1/2 and 1/4 for even
+/// steps, and how far from that rounding, uneven steps and the orbit itself may lead.
+const PARTS: [f64; 2] = [-0.5, 0.25];
+const PART_TOLERANCE: f64 = 0.15;
+
+/// Where the states of a segment stand.
+pub(super) struct States {
+    pub(super) first_word: u64,
+    pub(super) count: usize,
+    pub(super) times: Times,
+}
+
+/// Their times.
+#[derive(Clone, Copy)]
+pub(super) enum Times {
+    /// In a list that begins with this word.
+    Listed(u64),
+    /// So many seconds apart.
+    Every(f64),
+}
+
+struct State {
+    time_s: f64,
+    /// Position and velocity, km and km/s.
+    parts: [Vector3<f64>; 2],
+}
+
+/// Tells the first state that contradicts its neighbours.
+pub(super) fn check(reader: &mut Reader, states: &States) -> Result<(), Problem> {
+    let mut first = 0;
+    while first + 2 * REACH < states.count {
+        let count = (CHUNK + 2 * REACH).min(states.count - first);
+        let read = read(reader, states, first, count)?;
+        for middle in REACH..count - REACH {
+            if let Some(problem) = contradiction(&read[middle - REACH..=middle + REACH]) {
+                return Err(format!("record {} {problem}", first + middle + 1).into());
+            }
+        }
+        first += CHUNK;
+    }
+    Ok(())
+}
+
+fn read(
+    reader: &mut Reader,
+    states: &States,
+    first: usize,
+    count: usize,
+) -> Result<Vec<State>, Problem> {
+    let words = reader.words(states.first_word + (first * STATE) as u64, count * STATE)?;
+    let times_s = match states.times {
+        Times::Listed(word) => reader.words(word + first as u64, count)?,
+        Times::Every(step_s) => (0..count).map(|index| index as f64 * step_s).collect(),
+    };
+    let (words, _) = words.as_chunks::<STATE>();
+    let state = |(word, time_s): (&[f64; STATE], &f64)| State {
+        time_s: *time_s,
+        parts: [
+            Vector3::new(word[0], word[1], word[2]),
+            Vector3::new(word[3], word[4], word[5]),
+        ],
+    };
+    Ok(words.iter().zip(&times_s).map(state).collect())
+}
+
+/// How the middle one of seven states contradicts the others.
+fn contradiction(states: &[State]) -> Option<String> {
+    let steps_s = states
+        .windows(2)
+        .map(|pair| pair[1].time_s - pair[0].time_s);
+    let (shortest_s, longest_s) = steps_s.fold((f64::INFINITY, 0.0), |(low, high), step_s| {
+        (step_s.min(low), step_s.max(high))
+    });
+    if longest_s > UNEVEN_MAX * shortest_s {
+        return None;
+    }
+    let departures: Vec<[Vector3<f64>; 2]> = states.windows(3).map(departure).collect();
+    let middle = &states[REACH];
+    [0, 1].into_iter().find_map(|part| {
+        let of = |index: usize| departures[index][part];
+        let (own, size) = (of(2), of(2).norm());
+        let usual = of(0).norm().max(of(4).norm());
+        let rounding = ROUNDING * middle.parts[part].norm() + NEGLIGIBLE[part];
+        let spoils = |index: usize| (of(index) - PARTS[part] * own).norm() <= PART_TOLERANCE * size;
+        let stands_out = size > STANDS_OUT * usual && size > rounding;
+        (stands_out && spoils(1) && spoils(3)).then(|| {
+            let what = ["lies {} km beside", "has a velocity {} km/s off"][part];
+            let what = what.replace("{}", &format!("{size:.6}"));
+            format!("{what} what its neighbours say, who agree to {usual:.1e}")
+        })
+    })
+}
+
+/// How far the middle one of three states is from what the others say.
+fn departure(states: &[State]) -> [Vector3<f64>; 2] {
+    let [before, own, behind] = states else {
+        return Default::default();
+    };
+    let length_s = behind.time_s - before.time_s;
+    let u = (own.time_s - before.time_s) / length_s;
+    let ([r0, v0], [r1, v1]) = (before.parts, behind.parts);
+    // Relative to the first position, so that a distant origin costs no digits.
+    let (chord, (v0, v1)) = (r1 - r0, (v0 * length_s, v1 * length_s));
+    let square = u * u;
+    let cube = square * u;
+    let position =
+        chord * (3.0 * square - 2.0 * cube) + v0 * (cube - 2.0 * square + u) + v1 * (cube - square);
+    let velocity = chord * (6.0 * (u - square))
+        + v0 * (3.0 * square - 4.0 * u + 1.0)
+        + v1 * (3.0 * square - 2.0 * u);
+    [
+        own.parts[0] - r0 - position,
+        own.parts[1] - velocity / length_s,
+    ]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// An orbit like that of MGS, sampled every `step_s`.
+    fn orbit(step_s: f64) -> Vec<State> {
+        let (radius_km, rate) = (3_780.0, 8.9e-4);
+        let state = |index: u8| {
+            let time_s = f64::from(index) * step_s;
+            let (sine, cosine) = (rate * time_s).sin_cos();
+            State {
+                time_s,
+                parts: [
+                    Vector3::new(cosine, sine, 0.3 * sine) * radius_km,
+                    Vector3::new(-sine, cosine, 0.3 * cosine) * radius_km * rate,
+                ],
+            }
+        };
+        (0..20).map(state).collect()
+    }
+
+    fn contradicted(states: &[State]) -> Vec<usize> {
+        let found = states.windows(7).zip(REACH..);
+        found
+            .filter(|(states, _)| contradiction(states).is_some())
+            .map(|(_, index)| index)
+            .collect()
+    }
+
+    #[test]
+    fn one_state_aside_is_told_and_only_that_one() {
+        for part in [0, 1] {
+            for axis in 0..3 {
+                let mut states = orbit(60.0);
+                assert_eq!(contradicted(&states), [0; 0]);
+                states[9].parts[part][axis] += [0.5, 0.1][part];
+                assert_eq!(contradicted(&states), [9], "part {part}, axis {axis}");
+            }
+        }
+    }
+
+    #[test]
+    fn manoeuvres_seams_and_noise_are_no_damage() {
+        let mut manoeuvre = orbit(60.0);
+        let begun_s = 9.3 * 60.0;
+        for state in manoeuvre.iter_mut().skip(10) {
+            let speed = Vector3::new(0.02, -0.01, 0.03);
+            state.parts[0] += speed * (state.time_s - begun_s);
+            state.parts[1] += speed;
+        }
+        assert_eq!(contradicted(&manoeuvre), [0; 0]);
+        let mut at_a_state = orbit(60.0);
+        for state in at_a_state.iter_mut().skip(9) {
+            let speed = Vector3::new(0.02, -0.01, 0.03);
+            state.parts[0] += speed * (state.time_s - 9.0 * 60.0);
+            state.parts[1] += speed;
+        }
+        assert_eq!(contradicted(&at_a_state), [0; 0]);
+        let mut seam = orbit(60.0);
+        for state in seam.iter_mut().skip(10) {
+            state.parts[0].x += 1.0;
+        }
+        assert_eq!(contradicted(&seam), [0; 0]);
+        let mut noise = orbit(60.0);
+        for (index, state) in noise.iter_mut().enumerate() {
+            state.parts[0].y += 0.5 * ((index * 7 % 5) as f64 - 2.0);
+        }
+        assert_eq!(contradicted(&noise), [0; 0]);
+        let mut without_velocities = orbit(60.0);
+        for state in &mut without_velocities {
+            state.parts[1] = Vector3::zeros();
+        }
+        assert_eq!(contradicted(&without_velocities), [0; 0]);
+    }
+}
