@@ -132,6 +132,10 @@ fn moved(run: &Run) -> Markup {
             p { strong { (headline(run)) } }
             @if run.moved.get("beyond_limit").and_then(Value::as_bool) == Some(true) { p class="word invalid" { "Beyond a limit." } }
             (said(&more))
+            @if run.moved.get("page").and_then(Value::as_bool) == Some(true) {
+                p { a href={ "/api/v1/runs/" (run.id) "/difference" } { "Difference to the run before" } }
+            }
+            @if let Some(problem) = run.moved.get("problem").and_then(Value::as_str) { p { "The comparison failed: " (problem) } }
         }
     }
 }
