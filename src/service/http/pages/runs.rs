@@ -100,7 +100,8 @@ fn run_lead(run: &Run, causes: &[CauseRow], manifest: Option<&Manifest>, times: 
                 @if let Some(removed) = run.removed_utc { " Its products were removed " (times.at(removed)) "." }
             }
             (said(&sentences(&run.reasons)))
-            @for cause in causes { @if !cause.detail.is_empty() { p { "Because: " (cause.detail) } } }
+            @for because in sentences(&run.because) { p { "Because: " (because) } }
+        @for cause in causes { @if !cause.detail.is_empty() { p { "Because: " (cause.detail) } } }
             @if named(REPORT) { p { a href={ "/api/v1/runs/" (run.id) "/files/" (REPORT) } { "Report" } } }
         },
     )
