@@ -4,12 +4,15 @@ mod check;
 mod completions;
 mod kernels;
 mod manual;
+mod nightly;
 mod output;
 mod pedr;
 mod plan;
 mod report;
 mod run;
 mod scene;
+mod serve;
+mod service;
 mod stop;
 mod triangulate;
 mod worker;
@@ -59,6 +62,12 @@ enum Command {
     Triangulate(triangulate::Arguments),
     /// Write a synthetic mission, or net of pictures, with known truth.
     Scene(scene::Arguments),
+    /// Run sites again when what they read changes: the service, with pages.
+    Serve(serve::Arguments),
+    /// Do one night of the service, for a timer.
+    Nightly(nightly::Arguments),
+    /// Keep a service: copies of its database, its tokens.
+    Service(service::Arguments),
     /// Print shell completions.
     Completions(completions::Arguments),
     /// Write the manual pages.
@@ -82,8 +91,14 @@ pub fn main() -> ExitCode {
         .with_writer(std::io::stderr)
         .with_max_level(level)
         .with_target(false);
-    if matches!(cli.command, Command::Worker(_)) {
+    let as_json = match &cli.command {
         // Its log is read by the service.
+        Command::Worker(_) => true,
+        Command::Serve(arguments) => arguments.log_json,
+        Command::Nightly(arguments) => arguments.log_json,
+        _ => false,
+    };
+    if as_json {
         log.json().flatten_event(true).init();
     } else {
         log.with_ansi(std::io::IsTerminal::is_terminal(&std::io::stderr()))
@@ -98,6 +113,9 @@ pub fn main() -> ExitCode {
         Command::Report(arguments) => report::run(&arguments),
         Command::Triangulate(arguments) => triangulate::run(&arguments),
         Command::Scene(arguments) => finish(scene::run(&arguments)),
+        Command::Serve(arguments) => serve::run(&arguments),
+        Command::Nightly(arguments) => nightly::run(&arguments),
+        Command::Service(arguments) => finish(service::run(&arguments)),
         Command::Completions(arguments) => {
             completions::run(&arguments);
             ExitCode::SUCCESS

@@ -21,7 +21,8 @@ pub(super) async fn on_signals(stop: &AtomicBool) {
     }
 }
 
-async fn told() -> std::io::Result<()> {
+/// Waits for a signal.
+pub(super) async fn told() -> std::io::Result<()> {
     let mut interrupt = signal(SignalKind::interrupt())?;
     let mut terminate = signal(SignalKind::terminate())?;
     tokio::select! {

@@ -7,10 +7,15 @@
 pub mod audit;
 pub mod clock;
 pub mod database;
+pub mod engine;
 pub mod http;
 pub mod instant;
+pub mod lock;
+pub mod random;
+pub mod rebuild;
 pub mod sessions;
 pub mod shared;
+pub mod start;
 pub mod state;
 pub mod tokens;
 pub mod worker;

@@ -134,7 +134,7 @@ pub fn ask(transaction: &Transaction<'_>, now_ms: i64, ask: &Ask<'_>) -> Stored<
     } else {
         JobState::Held
     };
-    let pending = pending(transaction, ask.site)?;
+    let pending = pending_job(transaction, ask.site)?;
     let job = match &pending {
         Some(job) => {
             join(transaction, now_ms, job, ask, state)?;
@@ -293,7 +293,44 @@ pub fn job(connection: &Connection, id: i64) -> Stored<Option<Job>> {
     Ok(query.query_row([id], read).optional()?)
 }
 
-fn pending(connection: &Connection, site: &str) -> Stored<Option<Job>> {
+/// Jobs in one state, the oldest first.
+///
+/// # Errors
+/// SQLite's own.
+pub fn jobs_in(connection: &Connection, state: JobState) -> Stored<Vec<Job>> {
+    let mut query = connection.prepare_cached("SELECT * FROM job WHERE state = ?1 ORDER BY id")?;
+    let found = query.query_map([state.name()], read)?;
+    Ok(found.collect::<Result<_, _>>()?)
+}
+
+/// Jobs that have waited for long enough.
+///
+/// # Errors
+/// SQLite's own.
+pub fn due_waiting(connection: &Connection, now_ms: i64) -> Stored<Vec<Job>> {
+    let mut query = connection.prepare_cached(
+        "SELECT * FROM job WHERE state = 'waiting' AND not_before_ms <= ?1 ORDER BY id",
+    )?;
+    let found = query.query_map([now_ms], read)?;
+    Ok(found.collect::<Result<_, _>>()?)
+}
+
+/// The job of a site that a worker is, or may be, at.
+///
+/// # Errors
+/// SQLite's own.
+pub fn active_job(connection: &Connection, site: &str) -> Stored<Option<Job>> {
+    let mut query = connection.prepare_cached(
+        "SELECT * FROM job WHERE site = ?1 AND state IN ('starting', 'running', 'cancelling')",
+    )?;
+    Ok(query.query_row([site], read).optional()?)
+}
+
+/// The job of a site that waits for its turn.
+///
+/// # Errors
+/// SQLite's own.
+pub fn pending_job(connection: &Connection, site: &str) -> Stored<Option<Job>> {
     let mut query = connection.prepare_cached(
         "SELECT * FROM job WHERE site = ?1 AND state IN ('held', 'queued', 'waiting', 'blocked')",
     )?;

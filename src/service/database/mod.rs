@@ -1,9 +1,17 @@
 //! The database of the service: one writer, some readers, one file.
 
+pub mod alerts;
+pub mod attempts;
 mod causes;
 mod events;
+pub mod facts;
+pub mod files;
 mod jobs;
+pub mod nights;
+pub mod runs;
+pub mod service;
 pub mod shown;
+pub mod sites;
 
 use std::{
     fs,
@@ -19,8 +27,8 @@ use crate::error::{Cause, IoError, Kind, Locate as _, Result};
 pub use causes::{CauseKind, CauseRow, add_cause, causes};
 pub use events::{About, Event, append, events_after, newest_event};
 pub use jobs::{
-    Ask, Asked, Job, JobFilter, Moved, Priority, WrongTransition, advance, ask, ask_cancel, job,
-    jobs, next_queued,
+    Ask, Asked, Job, JobFilter, Moved, Priority, WrongTransition, active_job, advance, ask,
+    ask_cancel, due_waiting, job, jobs, jobs_in, next_queued, pending_job,
 };
 
 /// Name of the database in the folder of the state.
@@ -54,6 +62,9 @@ pub enum DatabaseError {
         /// Its layout.
         found: i64,
     },
+    /// A path that the database cannot hold.
+    #[error("the path {} is not UTF-8", .0.display())]
+    Path(PathBuf),
     /// The system has no random numbers.
     #[error("no random numbers: {0}")]
     NoRandom(String),
@@ -66,13 +77,14 @@ impl Cause for DatabaseError {
     fn kind(&self) -> Kind {
         match self {
             Self::Sqlite(_) | Self::NoRandom(_) => Kind::Io,
-            Self::Damaged(_) | Self::Newer { .. } => Kind::Input,
+            Self::Damaged(_) | Self::Newer { .. } | Self::Path(_) => Kind::Input,
             Self::Transition(_) => Kind::Bug,
         }
     }
 
     fn advice(&self) -> String {
         match self {
+            Self::Path(_) => "give the file another name",
             Self::NoRandom(_) => "check that the system has a source of random numbers",
             Self::Sqlite(_) => "check the disk of the state folder; the service tries again",
             Self::Damaged(_) => {
@@ -145,6 +157,16 @@ impl Database {
             readers.push(reader);
         }
         seen
+    }
+
+    /// Writes the log of the database back into it and shortens the log; readers at work may keep a part of it.
+    ///
+    /// # Errors
+    /// SQLite's own.
+    pub fn checkpoint(&self) -> Stored<()> {
+        let writer = lock(&self.writer);
+        writer.query_row("PRAGMA wal_checkpoint(TRUNCATE)", [], |_| Ok(()))?;
+        Ok(())
     }
 
     /// Copies the database, as it is at one instant, to `path`, where nothing may be.

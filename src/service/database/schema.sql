@@ -19,8 +19,12 @@ CREATE TABLE file_version (
   path TEXT PRIMARY KEY,
   device INTEGER NOT NULL, inode INTEGER NOT NULL, size INTEGER NOT NULL, mtime_ns INTEGER NOT NULL, ctime_ns INTEGER NOT NULL,
   blake3 TEXT, first_seen_ms INTEGER NOT NULL, changed_ms INTEGER NOT NULL, checked_ms INTEGER,
-  state TEXT NOT NULL CHECK (state IN ('settling', 'ready', 'bad', 'gone')), detail TEXT NOT NULL DEFAULT ''
+  state TEXT NOT NULL CHECK (state IN ('settling', 'ready', 'bad', 'gone')), detail TEXT NOT NULL DEFAULT '',
+  -- The round of comparisons that found the content it has: counted, since clocks jump.
+  round INTEGER NOT NULL DEFAULT 0
 ) STRICT;
+CREATE INDEX file_version_round ON file_version (round);
+CREATE INDEX file_version_settling ON file_version (state) WHERE state = 'settling';
 
 -- What a kernel covers, by its content; JSON as `areograph kernels coverage --json` gives it.
 CREATE TABLE kernel_coverage (blake3 TEXT PRIMARY KEY, coverage TEXT NOT NULL) STRICT;
@@ -29,6 +33,8 @@ CREATE TABLE site (
   name TEXT PRIMARY KEY, file TEXT NOT NULL, config_blake3 TEXT NOT NULL, enabled INTEGER NOT NULL, problem TEXT,
   current_run TEXT, checked_ms INTEGER, current_since_ms INTEGER, stale_since_ms INTEGER, stale_because TEXT,
   last_note TEXT,
+  -- The round in which all that it could read was last compared; 0: it is to be planned.
+  round INTEGER NOT NULL DEFAULT 0,
   west_deg REAL, south_deg REAL, east_deg REAL, north_deg REAL
 ) STRICT;
 

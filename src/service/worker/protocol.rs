@@ -91,6 +91,13 @@ pub enum What {
         /// Where the answer goes, one [`Listed`] a line: it is too long for a line of this protocol.
         into: PathBuf,
     },
+    /// Reads files and tells their hashes.
+    Hash {
+        /// The files.
+        files: Vec<PathBuf>,
+        /// Whether they are read even where the hash cache knows them.
+        rehash: bool,
+    },
     /// Searches the shots of runs within a polygon.
     Shots {
         /// Folders of the current runs.
@@ -194,6 +201,11 @@ pub enum Answer {
         /// Files found.
         files: u64,
     },
+    /// Of hashing: files in the order of the task.
+    Hash {
+        /// What was found of each.
+        files: Vec<Hashed>,
+    },
     /// Of a search.
     Shots {
         /// Rows written.
@@ -282,6 +294,17 @@ pub enum Listed {
         /// Why it cannot be listed.
         problem: Option<String>,
     },
+}
+
+/// A file that was read.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Hashed {
+    /// Its path.
+    pub path: PathBuf,
+    /// BLAKE3 of its content; none of a file that cannot be read.
+    pub blake3: Option<String>,
+    /// Why it cannot be read.
+    pub problem: Option<String>,
 }
 
 /// A kernel that was opened.

@@ -2,6 +2,7 @@
 //!
 //! What it does can be ended at any moment: nothing half-made stands under a final name.
 
+mod hash;
 mod kernels;
 mod limits;
 mod list;
@@ -186,6 +187,9 @@ impl Worker {
                 })
             }
             What::Probe { files } => self.probe(files).map(|kernels| Answer::Probe { kernels }),
+            What::Hash { files, rehash } => self
+                .hash(files, *rehash)
+                .map(|files| Answer::Hash { files }),
             What::List { roots, into } => {
                 list::list(roots, into, &self.stop).map(|files| Answer::List { files })
             }

@@ -1,0 +1,207 @@
+//! `areograph serve`.
+
+use std::{
+    net::SocketAddr,
+    path::{Path, PathBuf},
+    process::ExitCode,
+    sync::Arc,
+    time::Duration,
+};
+
+use clap::Args;
+use sd_notify::NotifyState;
+use tokio::{
+    net::TcpListener,
+    runtime::Runtime,
+    signal::unix::{SignalKind, signal},
+    time::{interval, sleep},
+};
+
+use super::{output, report};
+use crate::{
+    config::service_example,
+    error::{Cause, Error, IoError, Kind, Locate as _},
+    scene::{SceneOptions, write_scene},
+    service::{
+        clock::Clock,
+        engine::{Engine, workers::Processes},
+        http,
+        random::Random,
+        shared::Shared,
+        start::{configuration, reload, start, tell_address},
+    },
+    store::atomic,
+};
+
+/// Name of the configuration that `--init` writes.
+const FILE: &str = "areograph.toml";
+/// Longest time that a graceful end may take.
+const END_WITHIN: Duration = Duration::from_secs(25);
+
+/// Runs sites again when what they read changes, every night at the latest; pages and an interface for programs.
+///
+/// Example: `areograph serve --init demo && areograph serve demo/areograph.toml`
+#[derive(Debug, Args)]
+#[command(verbatim_doc_comment)]
+pub(super) struct Arguments {
+    /// Configuration of the service (TOML).
+    #[arg(required_unless_present = "init", conflicts_with = "init")]
+    config: Option<PathBuf>,
+    /// Write a synthetic mission and a configuration for it into this folder, and end.
+    #[arg(long, value_name = "DIR")]
+    init: Option<PathBuf>,
+    /// Listen here instead of the address of the configuration; port 0 takes a free one.
+    #[arg(long, value_name = "ADDRESS:PORT", conflicts_with = "init")]
+    listen: Option<SocketAddr>,
+    /// Log as JSON, one object a line.
+    #[arg(long)]
+    pub(super) log_json: bool,
+}
+
+pub(super) fn run(arguments: &Arguments) -> ExitCode {
+    let done = match (&arguments.init, &arguments.config) {
+        (Some(folder), _) => init(folder),
+        (None, Some(config)) => serve(config, arguments.listen),
+        (None, None) => Ok(()),
+    };
+    match done {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(failure) => report(&failure),
+    }
+}
+
+/// The folder has a configuration.
+#[derive(Debug, thiserror::Error)]
+#[error("there is a configuration already")]
+struct Exists;
+
+impl Cause for Exists {
+    fn kind(&self) -> Kind {
+        Kind::Configuration
+    }
+
+    fn advice(&self) -> String {
+        "serve that one, or name another folder".to_owned()
+    }
+}
+
+fn init(folder: &Path) -> Result<(), Error> {
+    let path = folder.join(FILE);
+    if path.exists() {
+        return Err(Exists).in_file(path);
+    }
+    write_scene(folder, &SceneOptions::default())?;
+    atomic::write(&path, demonstration().as_bytes())?;
+    output::line(format_args!(
+        "{}: a synthetic mission and a configuration; next: areograph serve {}",
+        folder.display(),
+        path.display()
+    ));
+    Ok(())
+}
+
+/// The example, with times for somebody who looks on.
+fn demonstration() -> String {
+    let mut text = service_example();
+    for (from, to) in [
+        ("name = \"areograph\"", "name = \"demonstration\""),
+        ("scan_interval_s = 60.0", "scan_interval_s = 2.0"),
+        ("quiet_period_s = 600.0", "quiet_period_s = 5.0"),
+        (
+            "schema/service.schema.json",
+            "config/schema/service.schema.json of areograph",
+        ),
+    ] {
+        text = text.replace(from, to);
+    }
+    text
+}
+
+fn serve(file: &Path, listen: Option<SocketAddr>) -> Result<(), Error> {
+    let clock = Clock::default();
+    let config = configuration(file, listen, clock.now_ms())?;
+    let address = config.http.listen;
+    let started = start(config, "serve", clock)?;
+    let shared = Arc::new(started.shared);
+    // Two pools of threads: pages answer while the engine reads products or writes the database.
+    let threads =
+        || Runtime::new().map_err(|error| Error::new(IoError::on("start threads")(error)));
+    let (pages, work) = (threads()?, threads()?);
+    let listener = pages
+        .block_on(TcpListener::bind(address))
+        .map_err(IoError::on("listen at the address"))
+        .in_file(address.to_string())?;
+    let address = listener.local_addr().unwrap_or(address).to_string();
+    tell_address(&started.lock, &started.owner, &shared, &address)?;
+    let workers = Processes {
+        program: shared.program.clone(),
+    };
+    let engine = Engine::new(Arc::clone(&shared), workers, Random::default())?;
+    let served = pages.spawn(http::serve(listener, Arc::clone(&shared)));
+    work.block_on(async {
+        let engine = Arc::new(engine);
+        tokio::spawn(obey(Arc::clone(&shared), listen));
+        tokio::spawn(tell_life(Arc::clone(&engine)));
+        output::line(format_args!("listening at http://{address}"));
+        let _ = sd_notify::notify(&[NotifyState::Ready]);
+        engine.run().await;
+    });
+    // A service whose pages cannot be served any more goes on with its work until it is ended.
+    let served = pages.block_on(served);
+    work.shutdown_background();
+    pages.shutdown_background();
+    served.unwrap_or_else(|panicked| {
+        tracing::error!("the pages: {panicked}");
+        Ok(())
+    })
+}
+
+/// Ends the service at SIGTERM or SIGINT, at the second or after a while by force; takes the configuration again at SIGHUP.
+async fn obey(shared: Arc<Shared>, listen: Option<SocketAddr>) {
+    let signals = [
+        signal(SignalKind::terminate()),
+        signal(SignalKind::interrupt()),
+        signal(SignalKind::hangup()),
+    ];
+    let [Ok(mut terminate), Ok(mut interrupt), Ok(mut hangup)] = signals else {
+        tracing::error!("signals cannot be heard");
+        return;
+    };
+    loop {
+        tokio::select! {
+            _ = terminate.recv() => break,
+            _ = interrupt.recv() => break,
+            _ = hangup.recv() => {
+                if let Err(error) = reload(&shared, listen) {
+                    tracing::error!("{error}");
+                }
+            }
+        }
+    }
+    tracing::info!("ending");
+    let _ = sd_notify::notify(&[NotifyState::Stopping]);
+    shared.ending.cancel();
+    tokio::select! {
+        _ = terminate.recv() => {}
+        _ = interrupt.recv() => {}
+        () = sleep(END_WITHIN) => {}
+    }
+    // Workers end with their pipes, and nothing half-made stands under a final name: the next service goes on from here.
+    std::process::exit(0);
+}
+
+/// Tells the service manager that the engine takes its turns.
+async fn tell_life(engine: Arc<Engine<Processes>>) {
+    let Some(patience) = sd_notify::watchdog_enabled() else {
+        return;
+    };
+    let mut ticks = interval(patience / 3);
+    let mut seen = None;
+    loop {
+        ticks.tick().await;
+        let turns = engine.turns();
+        if seen.replace(turns) != Some(turns) {
+            let _ = sd_notify::notify(&[NotifyState::Watchdog]);
+        }
+    }
+}

@@ -1,0 +1,195 @@
+//! `areograph service`: what a service's keeper does on the command line.
+
+use std::path::PathBuf;
+
+use clap::{Args, Subcommand, ValueEnum};
+
+use super::output;
+use crate::{
+    config::{ServiceConfig, load_service},
+    error::{Cause, Error, Kind, Locate as _},
+    service::{
+        clock::{Clock, utc_text},
+        database::Database,
+        lock::{Owner, ServiceLock},
+        rebuild::rebuild,
+        tokens::{Role, add_token, revoke_token, tokens},
+    },
+};
+
+const DAY_MS: i64 = 86_400_000;
+
+/// Keeps a service: copies of its database, its tokens.
+#[derive(Debug, Args)]
+pub(super) struct Arguments {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Copy the database, also while the service runs.
+    Backup {
+        /// Configuration of the service (TOML).
+        config: PathBuf,
+        /// File to write; nothing may be there.
+        file: PathBuf,
+    },
+    /// Make a new database from the products; jobs, events and tokens are lost.
+    Rebuild {
+        /// Configuration of the service (TOML).
+        config: PathBuf,
+    },
+    /// Tokens, with which people and programs may use the service.
+    #[command(subcommand)]
+    Token(TokenCommand),
+}
+
+#[derive(Debug, Subcommand)]
+enum TokenCommand {
+    /// Make a token and print it, for the only time.
+    Add {
+        /// Configuration of the service (TOML).
+        config: PathBuf,
+        /// What its bearer may do.
+        #[arg(long, value_enum)]
+        role: RoleName,
+        /// What it is for.
+        #[arg(long, default_value = "")]
+        note: String,
+        /// Days until it ends; without, it does not end.
+        #[arg(long, value_parser = clap::value_parser!(u16).range(1..))]
+        days: Option<u16>,
+    },
+    /// List tokens, without their secrets.
+    List {
+        /// Configuration of the service (TOML).
+        config: PathBuf,
+    },
+    /// End a token, and the sessions that were begun with it.
+    Revoke {
+        /// Configuration of the service (TOML).
+        config: PathBuf,
+        /// The eight digits behind `areo_`.
+        id: String,
+    },
+}
+
+/// What the bearer of a token may do, as typed.
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum RoleName {
+    /// Look.
+    Read,
+    /// Look, start and cancel jobs, pin runs.
+    Operate,
+}
+
+#[derive(Debug, thiserror::Error)]
+enum Unfit {
+    #[error("there is no token {0}")]
+    NoToken(String),
+    #[error("there is something already")]
+    FileExists,
+}
+
+impl Cause for Unfit {
+    fn kind(&self) -> Kind {
+        Kind::Configuration
+    }
+
+    fn advice(&self) -> String {
+        match self {
+            Self::NoToken(_) => "look at areograph service token list",
+            Self::FileExists => "name a file that is not there",
+        }
+        .to_owned()
+    }
+}
+
+pub(super) fn run(arguments: &Arguments) -> Result<(), Error> {
+    match &arguments.command {
+        Command::Backup { config, file } => {
+            if file.exists() {
+                return Err(Unfit::FileExists).in_file(file);
+            }
+            database(&load(config)?)?.copy_to(file).in_file(file)?;
+            output::line(format_args!("copied to {}", file.display()));
+            Ok(())
+        }
+        Command::Rebuild { config } => {
+            let config = load(config)?;
+            let now_ms = Clock::default().now_ms();
+            let owner = Owner {
+                pid: std::process::id(),
+                command: "service rebuild".to_owned(),
+                address: String::new(),
+                started_ms: now_ms,
+            };
+            let (state, products) = (&config.outputs.state, &config.outputs.products);
+            let _lock = ServiceLock::take(state, &owner)?;
+            let found = rebuild(state, products, now_ms)?;
+            output::line(format_args!("{} sites, {} runs", found.sites, found.runs));
+            Ok(())
+        }
+        Command::Token(command) => token(command),
+    }
+}
+
+fn load(path: &std::path::Path) -> Result<ServiceConfig, Error> {
+    Ok(load_service(path)?.service)
+}
+
+fn database(config: &ServiceConfig) -> Result<Database, Error> {
+    Database::open(&config.outputs.state)
+}
+
+fn token(command: &TokenCommand) -> Result<(), Error> {
+    let now_ms = Clock::default().now_ms();
+    match command {
+        TokenCommand::Add {
+            config,
+            role,
+            note,
+            days,
+        } => {
+            let role = match role {
+                RoleName::Read => Role::Read,
+                RoleName::Operate => Role::Operate,
+            };
+            let ends_ms = days.map(|days| now_ms + i64::from(days) * DAY_MS);
+            let made = database(&load(config)?)?
+                .write(|transaction| add_token(transaction, now_ms, role, note, ends_ms));
+            output::line(made.in_file(config)?);
+            Ok(())
+        }
+        TokenCommand::List { config } => {
+            let found = database(&load(config)?)?.read(tokens).in_file(config)?;
+            for token in found {
+                let ends = match (token.revoked_ms, token.expires_ms) {
+                    (Some(at_ms), _) => format!("revoked {}", utc_text(at_ms)),
+                    (None, Some(at_ms)) => format!("until {}", utc_text(at_ms)),
+                    (None, None) => "without end".to_owned(),
+                };
+                let used = token.used_ms.map_or_else(
+                    || "never used".to_owned(),
+                    |at_ms| format!("used {}", utc_text(at_ms)),
+                );
+                output::line(format_args!(
+                    "{}  {:7}  {ends}  {used}  {}",
+                    token.id, token.role, token.note
+                ));
+            }
+            Ok(())
+        }
+        TokenCommand::Revoke { config, id } => {
+            let revoked = database(&load(config)?)?
+                .write(|transaction| revoke_token(transaction, now_ms, id))
+                .in_file(config)?;
+            if revoked {
+                output::line(format_args!("{id} is revoked"));
+                return Ok(());
+            }
+            Err(Unfit::NoToken(id.clone()).into())
+        }
+    }
+}

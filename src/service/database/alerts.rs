@@ -1,0 +1,122 @@
+//! What people are told: edges, and letters to hooks that are not delivered yet.
+
+use rusqlite::{Connection, OptionalExtension as _, Transaction, params};
+
+use super::Stored;
+
+/// Notes the state of a subject, and gives the former one where it was another; none for a subject that is new.
+///
+/// # Errors
+/// SQLite's own.
+pub fn put_alert_state(
+    transaction: &Transaction<'_>,
+    now_ms: i64,
+    subject: &str,
+    state: &str,
+) -> Stored<Edge> {
+    let before: Option<String> = transaction
+        .query_row(
+            "SELECT state FROM alert_state WHERE subject = ?1",
+            [subject],
+            |row| row.get(0),
+        )
+        .optional()?;
+    if before.as_deref() == Some(state) {
+        return Ok(Edge::None);
+    }
+    transaction.execute(
+        "INSERT OR REPLACE INTO alert_state (subject, state, since_ms) VALUES (?1, ?2, ?3)",
+        params![subject, state, now_ms],
+    )?;
+    Ok(before.map_or(Edge::First, Edge::From))
+}
+
+/// How a subject came to its state.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Edge {
+    /// It was in it before.
+    None,
+    /// Nothing was known of it.
+    First,
+    /// It was in this one.
+    From(String),
+}
+
+/// A letter to a hook.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Letter {
+    /// Its number.
+    pub id: i64,
+    /// Place of the hook in the configuration.
+    pub hook: i64,
+    /// JSON.
+    pub body: String,
+    /// Times that it was tried.
+    pub tries: i64,
+}
+
+/// Notes a letter.
+///
+/// # Errors
+/// SQLite's own.
+pub fn put_letter(
+    transaction: &Transaction<'_>,
+    now_ms: i64,
+    hook: usize,
+    kind: &str,
+    body: &str,
+) -> Stored<()> {
+    transaction.execute(
+        "INSERT INTO outbox (hook, kind, body, not_before_ms, created_ms) VALUES (?1, ?2, ?3, ?4, ?4)",
+        params![i64::try_from(hook).unwrap_or_default(), kind, body, now_ms],
+    )?;
+    Ok(())
+}
+
+/// Letters that are due, oldest first.
+///
+/// # Errors
+/// SQLite's own.
+pub fn due_letters(connection: &Connection, now_ms: i64, limit: u32) -> Stored<Vec<Letter>> {
+    let mut query = connection.prepare_cached(
+        "SELECT id, hook, body, tries FROM outbox WHERE delivered_ms IS NULL AND not_before_ms <= ?1 ORDER BY id LIMIT ?2",
+    )?;
+    let found = query.query_map(params![now_ms, limit], |row| {
+        Ok(Letter {
+            id: row.get(0)?,
+            hook: row.get(1)?,
+            body: row.get(2)?,
+            tries: row.get(3)?,
+        })
+    })?;
+    Ok(found.collect::<Result<_, _>>()?)
+}
+
+/// Notes that a letter was delivered.
+///
+/// # Errors
+/// SQLite's own.
+pub fn put_delivered(transaction: &Transaction<'_>, id: i64, now_ms: i64) -> Stored<()> {
+    transaction.execute(
+        "UPDATE outbox SET tries = tries + 1, delivered_ms = ?2, error = NULL WHERE id = ?1",
+        params![id, now_ms],
+    )?;
+    Ok(())
+}
+
+/// Notes that a letter could not be delivered, and when it is tried again.
+///
+/// # Errors
+/// SQLite's own.
+pub fn put_undelivered(
+    transaction: &Transaction<'_>,
+    id: i64,
+    error: &str,
+    not_before_ms: i64,
+) -> Stored<()> {
+    transaction.execute(
+        "UPDATE outbox SET tries = tries + 1, error = ?2, not_before_ms = ?3 WHERE id = ?1",
+        params![id, error, not_before_ms],
+    )?;
+    Ok(())
+}

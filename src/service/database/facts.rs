@@ -1,0 +1,43 @@
+//! Small facts by name.
+
+use rusqlite::{Connection, OptionalExtension as _, Transaction, params};
+
+use super::Stored;
+
+/// Number of the newest round of comparisons.
+pub const ROUND: &str = "round";
+/// Version of areograph that wrote last.
+pub const TOOL_VERSION: &str = "version";
+/// Cron fields and zone that the last intended instant belongs to.
+pub const SCHEDULE: &str = "schedule";
+/// The last instant at which a night was intended, milliseconds of UTC since 1970.
+pub const INTENDED_MS: &str = "intended_ms";
+
+/// A fact.
+///
+/// # Errors
+/// SQLite's own.
+pub fn fact(connection: &Connection, name: &str) -> Stored<Option<String>> {
+    let mut query = connection.prepare_cached("SELECT value FROM fact WHERE name = ?1")?;
+    Ok(query.query_row([name], |row| row.get(0)).optional()?)
+}
+
+/// A fact that is a whole number.
+///
+/// # Errors
+/// SQLite's own.
+pub fn number(connection: &Connection, name: &str) -> Stored<Option<i64>> {
+    Ok(fact(connection, name)?.and_then(|text| text.parse().ok()))
+}
+
+/// Notes a fact.
+///
+/// # Errors
+/// SQLite's own.
+pub fn note(transaction: &Transaction<'_>, name: &str, value: &str) -> Stored<()> {
+    transaction.execute(
+        "INSERT INTO fact (name, value) VALUES (?1, ?2) ON CONFLICT (name) DO UPDATE SET value = ?2",
+        params![name, value],
+    )?;
+    Ok(())
+}

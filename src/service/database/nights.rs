@@ -1,0 +1,141 @@
+//! Nights: at which instants all sites were to be looked at, and what came of it.
+
+use rusqlite::{Connection, OptionalExtension as _, Row, Transaction, params};
+
+use super::Stored;
+
+/// How a night came about.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum NightHow {
+    /// It was due.
+    Due,
+    /// It was due while the service did not run.
+    CaughtUp,
+    /// A person, or a timer outside, asked.
+    Asked,
+    /// It was due so long ago that it was left out.
+    Missed,
+}
+
+impl NightHow {
+    /// Its name in the database.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Due => "due",
+            Self::CaughtUp => "caught_up",
+            Self::Asked => "asked",
+            Self::Missed => "missed",
+        }
+    }
+}
+
+/// A night.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Night {
+    /// Its number.
+    pub id: i64,
+    /// The instant that was intended, milliseconds of UTC since 1970.
+    pub due_ms: i64,
+    /// When it began.
+    pub started_ms: Option<i64>,
+    /// When it was over.
+    pub ended_ms: Option<i64>,
+    /// How it came about: `due`, `caught_up`, `asked` or `missed`.
+    pub how: String,
+    /// Sites whose inputs were compared.
+    pub sites_checked: i64,
+    /// Runs that were published.
+    pub runs: i64,
+    /// Jobs that failed, were blocked or gave products that are not valid.
+    pub failures: i64,
+}
+
+/// Notes a night; of two with the same instant the first stays, and then there is no number.
+///
+/// # Errors
+/// SQLite's own.
+pub fn put_night(
+    transaction: &Transaction<'_>,
+    due_ms: i64,
+    zone: &str,
+    how: NightHow,
+    started_ms: Option<i64>,
+) -> Stored<Option<i64>> {
+    let made = transaction.execute(
+        "INSERT OR IGNORE INTO night (due_ms, zone, started_ms, how) VALUES (?1, ?2, ?3, ?4)",
+        params![due_ms, zone, started_ms, how.name()],
+    )?;
+    Ok((made > 0).then(|| transaction.last_insert_rowid()))
+}
+
+/// The night that has begun and is not over.
+///
+/// # Errors
+/// SQLite's own.
+pub fn open_night(connection: &Connection) -> Stored<Option<Night>> {
+    let mut query = connection.prepare_cached(
+        "SELECT * FROM night WHERE started_ms IS NOT NULL AND ended_ms IS NULL ORDER BY id DESC LIMIT 1",
+    )?;
+    Ok(query.query_row([], night_row).optional()?)
+}
+
+/// A night by its number.
+///
+/// # Errors
+/// SQLite's own.
+pub fn night(connection: &Connection, id: i64) -> Stored<Option<Night>> {
+    let mut query = connection.prepare_cached("SELECT * FROM night WHERE id = ?1")?;
+    Ok(query.query_row([id], night_row).optional()?)
+}
+
+/// Notes how many sites were compared in a night.
+///
+/// # Errors
+/// SQLite's own.
+pub fn put_night_checked(transaction: &Transaction<'_>, id: i64, sites: usize) -> Stored<()> {
+    transaction.execute(
+        "UPDATE night SET sites_checked = ?2 WHERE id = ?1",
+        params![id, i64::try_from(sites).unwrap_or(i64::MAX)],
+    )?;
+    Ok(())
+}
+
+/// Whether jobs of a night are still to be done.
+///
+/// # Errors
+/// SQLite's own.
+pub fn night_at_work(connection: &Connection, id: i64) -> Stored<bool> {
+    let mut query = connection.prepare_cached(
+        "SELECT 1 FROM job WHERE night = ?1 AND state IN ('queued', 'starting', 'running', 'cancelling', 'waiting')",
+    )?;
+    Ok(query.exists([id])?)
+}
+
+/// Ends a night and counts what came of it.
+///
+/// # Errors
+/// SQLite's own.
+pub fn end_night(transaction: &Transaction<'_>, id: i64, now_ms: i64) -> Stored<Option<Night>> {
+    transaction.execute(
+        "UPDATE night SET ended_ms = ?2,
+         runs = (SELECT count(*) FROM run JOIN job ON job.id = run.job WHERE job.night = ?1),
+         failures = (SELECT count(*) FROM job WHERE night = ?1 AND state IN ('failed', 'invalid', 'blocked'))
+         WHERE id = ?1 AND ended_ms IS NULL",
+        params![id, now_ms],
+    )?;
+    night(transaction, id)
+}
+
+fn night_row(row: &Row<'_>) -> rusqlite::Result<Night> {
+    Ok(Night {
+        id: row.get("id")?,
+        due_ms: row.get("due_ms")?,
+        started_ms: row.get("started_ms")?,
+        ended_ms: row.get("ended_ms")?,
+        how: row.get("how")?,
+        sites_checked: row.get("sites_checked")?,
+        runs: row.get("runs")?,
+        failures: row.get("failures")?,
+    })
+}

@@ -1,0 +1,181 @@
+//! Runs: what attempts published.
+
+use rusqlite::{Connection, OptionalExtension as _, Row, Transaction, params};
+use serde_json::Value;
+
+use super::Stored;
+
+/// A run.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RunRow {
+    /// Its identifier.
+    pub id: String,
+    /// Its site.
+    pub site: String,
+    /// Its job.
+    pub job: i64,
+    /// The attempt that published it.
+    pub attempt: i64,
+    /// Version of areograph.
+    pub version: String,
+    /// BLAKE3 of its manifest.
+    pub manifest_blake3: String,
+    /// Whether the products are valid.
+    pub valid: bool,
+    /// The verdict in a word.
+    pub verdict: String,
+    /// Why the products are not valid: sentences.
+    pub reasons: Value,
+    /// Why it ran: sentences.
+    pub because: Value,
+    /// Stages that ran, with their reasons.
+    pub stages: Value,
+    /// Counts of the manifest.
+    pub counts: Value,
+    /// Figures of the manifest.
+    pub figures: Value,
+    /// Name, role and hash of every kernel.
+    pub kernels: Value,
+    /// The run that was current before.
+    pub predecessor: Option<String>,
+    /// When it was published, milliseconds of UTC since 1970.
+    pub published_ms: i64,
+    /// Whether it is kept for ever.
+    pub pinned: bool,
+    /// When its products were removed.
+    pub removed_ms: Option<i64>,
+}
+
+/// Notes a run; one that is known stays as it is.
+///
+/// # Errors
+/// SQLite's own.
+pub fn put_run(transaction: &Transaction<'_>, run: &RunRow) -> Stored<()> {
+    transaction.execute(
+        "INSERT OR IGNORE INTO run
+         (id, site, job, attempt, version, manifest_blake3, valid, verdict, reasons, because, stages, counts, figures, kernels,
+          predecessor, published_ms, pinned)
+         VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13, ?14, ?15, ?16, ?17)",
+        params![
+            run.id,
+            run.site,
+            run.job,
+            run.attempt,
+            run.version,
+            run.manifest_blake3,
+            run.valid,
+            run.verdict,
+            run.reasons.to_string(),
+            run.because.to_string(),
+            run.stages.to_string(),
+            run.counts.to_string(),
+            run.figures.to_string(),
+            run.kernels.to_string(),
+            run.predecessor,
+            run.published_ms,
+            run.pinned,
+        ],
+    )?;
+    Ok(())
+}
+
+/// Notes which run readers of a site get.
+///
+/// # Errors
+/// SQLite's own.
+pub fn put_current(
+    transaction: &Transaction<'_>,
+    site: &str,
+    run: &str,
+    since_ms: i64,
+) -> Stored<()> {
+    transaction.execute(
+        "UPDATE site SET current_run = ?2, current_since_ms = ?3 WHERE name = ?1 AND current_run IS NOT ?2",
+        params![site, run, since_ms],
+    )?;
+    Ok(())
+}
+
+/// Notes what a comparison with the predecessor found.
+///
+/// # Errors
+/// SQLite's own.
+pub fn put_moved(transaction: &Transaction<'_>, run: &str, moved: &Value) -> Stored<()> {
+    transaction.execute(
+        "UPDATE run SET moved = ?2 WHERE id = ?1",
+        params![run, moved.to_string()],
+    )?;
+    Ok(())
+}
+
+/// Notes that the products of a run were removed.
+///
+/// # Errors
+/// SQLite's own.
+pub fn put_removed(transaction: &Transaction<'_>, run: &str, now_ms: i64) -> Stored<()> {
+    transaction.execute(
+        "UPDATE run SET removed_ms = ?2 WHERE id = ?1",
+        params![run, now_ms],
+    )?;
+    Ok(())
+}
+
+/// A run by its identifier.
+///
+/// # Errors
+/// SQLite's own.
+pub fn run(connection: &Connection, id: &str) -> Stored<Option<RunRow>> {
+    let mut query = connection.prepare_cached("SELECT * FROM run WHERE id = ?1")?;
+    Ok(query.query_row([id], run_row).optional()?)
+}
+
+/// Runs of a site whose products are there, the newest first.
+///
+/// # Errors
+/// SQLite's own.
+pub fn kept_runs(connection: &Connection, site: &str) -> Stored<Vec<RunRow>> {
+    let mut query = connection.prepare_cached(
+        "SELECT * FROM run WHERE site = ?1 AND removed_ms IS NULL ORDER BY published_ms DESC, id DESC",
+    )?;
+    let found = query.query_map([site], run_row)?;
+    Ok(found.collect::<Result<_, _>>()?)
+}
+
+/// Runs that have a predecessor and were not compared with it.
+///
+/// # Errors
+/// SQLite's own.
+pub fn uncompared_runs(connection: &Connection) -> Stored<Vec<RunRow>> {
+    let mut query = connection.prepare_cached(
+        "SELECT * FROM run WHERE moved IS NULL AND valid AND removed_ms IS NULL AND predecessor IS NOT NULL ORDER BY id",
+    )?;
+    let found = query.query_map([], run_row)?;
+    Ok(found.collect::<Result<_, _>>()?)
+}
+
+fn run_row(row: &Row<'_>) -> rusqlite::Result<RunRow> {
+    let json = |column: &str| {
+        let text: String = row.get(column)?;
+        Ok::<_, rusqlite::Error>(serde_json::from_str(&text).unwrap_or_default())
+    };
+    Ok(RunRow {
+        id: row.get("id")?,
+        site: row.get("site")?,
+        job: row.get("job")?,
+        attempt: row.get("attempt")?,
+        version: row.get("version")?,
+        manifest_blake3: row.get("manifest_blake3")?,
+        valid: row.get("valid")?,
+        verdict: row.get("verdict")?,
+        reasons: json("reasons")?,
+        because: json("because")?,
+        stages: json("stages")?,
+        counts: json("counts")?,
+        figures: json("figures")?,
+        kernels: json("kernels")?,
+        predecessor: row.get("predecessor")?,
+        published_ms: row.get("published_ms")?,
+        pinned: row.get("pinned")?,
+        removed_ms: row.get("removed_ms")?,
+    })
+}

@@ -1,0 +1,266 @@
+//! Sites, and which files each reads.
+
+use std::collections::BTreeMap;
+
+use rusqlite::{Connection, OptionalExtension as _, Row, Transaction, params};
+
+use super::Stored;
+
+/// What is known of a site.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SiteRow {
+    /// Its name.
+    pub name: String,
+    /// Its file.
+    pub file: String,
+    /// BLAKE3 of its keys as last planned, empty before.
+    pub config_blake3: String,
+    /// Whether its file is there.
+    pub enabled: bool,
+    /// Why it cannot be run.
+    pub problem: Option<String>,
+    /// The run that readers get.
+    pub current_run: Option<String>,
+    /// When all that it reads was last compared, milliseconds of UTC since 1970.
+    pub checked_ms: Option<i64>,
+    /// Since when its products have not been those of its inputs.
+    pub stale_since_ms: Option<i64>,
+    /// Why.
+    pub stale_because: Option<String>,
+    /// The round of that comparison; 0: it is to be planned.
+    pub round: i64,
+}
+
+/// All sites, by name.
+///
+/// # Errors
+/// SQLite's own.
+pub fn sites(connection: &Connection) -> Stored<Vec<SiteRow>> {
+    let mut query = connection.prepare_cached("SELECT * FROM site ORDER BY name")?;
+    let found = query.query_map([], site_row)?;
+    Ok(found.collect::<Result<_, _>>()?)
+}
+
+/// A site by its name.
+///
+/// # Errors
+/// SQLite's own.
+pub fn site(connection: &Connection, name: &str) -> Stored<Option<SiteRow>> {
+    let mut query = connection.prepare_cached("SELECT * FROM site WHERE name = ?1")?;
+    Ok(query.query_row([name], site_row).optional()?)
+}
+
+/// Notes that a site has this file; a site that was switched off is planned anew.
+///
+/// # Errors
+/// SQLite's own.
+pub fn put_site(transaction: &Transaction<'_>, name: &str, file: &str) -> Stored<()> {
+    transaction.execute(
+        "INSERT INTO site (name, file, config_blake3, enabled) VALUES (?1, ?2, '', 1)
+         ON CONFLICT (name) DO UPDATE SET file = ?2, enabled = 1, round = CASE WHEN enabled AND file = ?2 THEN round ELSE 0 END
+         WHERE file <> ?2 OR NOT enabled",
+        params![name, file],
+    )?;
+    Ok(())
+}
+
+/// Notes that a site has no file any more.
+///
+/// # Errors
+/// SQLite's own.
+pub fn disable_site(transaction: &Transaction<'_>, name: &str) -> Stored<()> {
+    let note = "its site file is gone";
+    transaction.execute(
+        "UPDATE site SET enabled = 0, last_note = ?2, stale_since_ms = NULL, stale_because = NULL WHERE name = ?1",
+        params![name, note],
+    )?;
+    Ok(())
+}
+
+/// What a comparison or a plan found of a site.
+#[derive(Debug, Clone, Default)]
+pub struct Checked<'a> {
+    /// The round of the comparison.
+    pub round: i64,
+    /// When, milliseconds of UTC since 1970.
+    pub at_ms: i64,
+    /// BLAKE3 of its keys, where it was planned.
+    pub config_blake3: Option<&'a str>,
+    /// What its windows span, degrees, where it was planned.
+    pub bounds_deg: Option<[f64; 4]>,
+    /// Why it cannot be planned.
+    pub problem: Option<&'a str>,
+    /// In words.
+    pub note: &'a str,
+}
+
+/// Notes what was found of a site.
+///
+/// # Errors
+/// SQLite's own.
+pub fn put_checked(transaction: &Transaction<'_>, name: &str, checked: &Checked<'_>) -> Stored<()> {
+    let bounds = checked.bounds_deg;
+    let bound = |index: usize| bounds.map(|bounds| bounds[index]);
+    transaction.execute(
+        "UPDATE site SET round = ?2, checked_ms = ?3, config_blake3 = coalesce(?4, config_blake3), problem = ?5, last_note = ?6,
+         west_deg = coalesce(?7, west_deg), south_deg = coalesce(?8, south_deg),
+         east_deg = coalesce(?9, east_deg), north_deg = coalesce(?10, north_deg) WHERE name = ?1",
+        params![
+            name,
+            checked.round,
+            checked.at_ms,
+            checked.config_blake3,
+            checked.problem,
+            checked.note,
+            bound(0),
+            bound(1),
+            bound(2),
+            bound(3),
+        ],
+    )?;
+    Ok(())
+}
+
+/// Notes that sites were compared and need no plan.
+///
+/// # Errors
+/// SQLite's own.
+pub fn put_unchanged(
+    transaction: &Transaction<'_>,
+    names: &[&str],
+    round: i64,
+    at_ms: i64,
+) -> Stored<()> {
+    let mut put = transaction.prepare_cached(
+        "UPDATE site SET round = ?2, checked_ms = ?3 WHERE name = ?1 AND enabled AND round > 0",
+    )?;
+    for name in names {
+        put.execute(params![name, round, at_ms])?;
+    }
+    Ok(())
+}
+
+/// Notes since when and why a site's products are not those of its inputs; the first instant stays.
+///
+/// # Errors
+/// SQLite's own.
+pub fn put_stale(
+    transaction: &Transaction<'_>,
+    name: &str,
+    since_ms: i64,
+    because: &str,
+) -> Stored<()> {
+    transaction.execute(
+        "UPDATE site SET stale_since_ms = coalesce(stale_since_ms, ?2), stale_because = ?3
+         WHERE name = ?1 AND (stale_because IS NOT ?3 OR stale_since_ms IS NULL)",
+        params![name, since_ms, because],
+    )?;
+    Ok(())
+}
+
+/// Notes that a site's products are those of its inputs.
+///
+/// # Errors
+/// SQLite's own.
+pub fn put_fresh(transaction: &Transaction<'_>, name: &str) -> Stored<()> {
+    transaction.execute(
+        "UPDATE site SET stale_since_ms = NULL, stale_because = NULL, problem = NULL WHERE name = ?1",
+        [name],
+    )?;
+    Ok(())
+}
+
+/// A file that a site reads.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct SiteInput {
+    /// Its path.
+    pub path: String,
+    /// `site`, `kernel` or `data`.
+    pub role: String,
+    /// BLAKE3 of the content that was last planned with; none of a file that was not there.
+    pub blake3: Option<String>,
+}
+
+/// Files that each site reads, by site.
+///
+/// # Errors
+/// SQLite's own.
+pub fn inputs_by_site(connection: &Connection) -> Stored<BTreeMap<String, Vec<SiteInput>>> {
+    let mut query = connection.prepare_cached("SELECT * FROM site_input ORDER BY site, path")?;
+    let mut rows = query.query([])?;
+    let mut by_site: BTreeMap<String, Vec<SiteInput>> = BTreeMap::new();
+    while let Some(row) = rows.next()? {
+        by_site
+            .entry(row.get("site")?)
+            .or_default()
+            .push(input_row(row)?);
+    }
+    Ok(by_site)
+}
+
+/// Files that one site reads.
+///
+/// # Errors
+/// SQLite's own.
+pub fn inputs_of(connection: &Connection, site: &str) -> Stored<Vec<SiteInput>> {
+    let mut query =
+        connection.prepare_cached("SELECT * FROM site_input WHERE site = ?1 ORDER BY path")?;
+    let found = query.query_map([site], |row| input_row(row))?;
+    Ok(found.collect::<Result<_, _>>()?)
+}
+
+/// Notes which files a site reads.
+///
+/// # Errors
+/// SQLite's own.
+pub fn put_inputs(transaction: &Transaction<'_>, site: &str, inputs: &[SiteInput]) -> Stored<()> {
+    transaction.execute("DELETE FROM site_input WHERE site = ?1", [site])?;
+    let mut put = transaction.prepare_cached(
+        "INSERT OR REPLACE INTO site_input (site, path, role, blake3) VALUES (?1, ?2, ?3, ?4)",
+    )?;
+    for input in inputs {
+        put.execute(params![site, input.path, input.role, input.blake3])?;
+    }
+    Ok(())
+}
+
+/// Sites of which a file has another content than they were planned with, or has gone, with these files.
+///
+/// # Errors
+/// SQLite's own.
+pub fn changed_inputs(connection: &Connection) -> Stored<BTreeMap<String, Vec<String>>> {
+    let mut query = connection.prepare_cached(
+        "SELECT i.site, i.path FROM file_version f JOIN site_input i ON i.path = f.path
+         WHERE CASE f.state WHEN 'ready' THEN f.blake3 IS NOT i.blake3 WHEN 'gone' THEN i.blake3 IS NOT NULL ELSE 0 END
+         ORDER BY i.site, i.path",
+    )?;
+    let mut rows = query.query([])?;
+    let mut changed: BTreeMap<String, Vec<String>> = BTreeMap::new();
+    while let Some(row) = rows.next()? {
+        changed.entry(row.get(0)?).or_default().push(row.get(1)?);
+    }
+    Ok(changed)
+}
+
+fn input_row(row: &Row<'_>) -> rusqlite::Result<SiteInput> {
+    Ok(SiteInput {
+        path: row.get("path")?,
+        role: row.get("role")?,
+        blake3: row.get("blake3")?,
+    })
+}
+
+fn site_row(row: &Row<'_>) -> rusqlite::Result<SiteRow> {
+    Ok(SiteRow {
+        name: row.get("name")?,
+        file: row.get("file")?,
+        config_blake3: row.get("config_blake3")?,
+        enabled: row.get("enabled")?,
+        problem: row.get("problem")?,
+        current_run: row.get("current_run")?,
+        checked_ms: row.get("checked_ms")?,
+        stale_since_ms: row.get("stale_since_ms")?,
+        stale_because: row.get("stale_because")?,
+        round: row.get("round")?,
+    })
+}
