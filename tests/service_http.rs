@@ -131,7 +131,8 @@ fn products_have_tags_ranges_and_no_scripts() {
     let csv = format!("/api/v1/runs/{RUN}/files/tables/footprints.csv");
     let whole = world.get(&csv);
     let content = "orbit,shot,range_m\n10001,1,400000.25\n".repeat(500);
-    assert_eq!((whole.status, whole.text()), (200, content.clone()));
+    assert_eq!(whole.status, 200);
+    assert!(whole.text() == content);
     let tag = format!("\"{}\"", blake3::hash(content.as_bytes()).to_hex());
     assert_eq!(whole.header("etag"), Some(&*tag));
     assert_eq!(
@@ -163,7 +164,7 @@ fn products_have_tags_ranges_and_no_scripts() {
         let answer = world.request("GET", &csv, &[header], "");
         assert_eq!(answer.status, status, "{header}");
         if status < 400 {
-            assert_eq!(answer.text(), expected, "{header}");
+            assert!(answer.text() == expected, "{header}");
             assert_eq!(answer.header("etag"), Some(&*tag), "{header}");
         }
     }
@@ -307,9 +308,9 @@ fn jobs_are_asked_for_once_cancelled_and_tried_again() {
     let id = world.tokens.operate.split('_').nth(1).unwrap().to_owned();
     assert_eq!(
         world.number(&format!("SELECT count(*) FROM audit WHERE who = '{id}'")),
-        9
+        10
     );
-    assert_eq!(world.number("SELECT count(*) FROM audit"), 9);
+    assert_eq!(world.number("SELECT count(*) FROM audit"), 10);
 }
 
 #[test]
@@ -699,7 +700,7 @@ fn serve_until_ended() {
         "",
         i64::try_from(now_ms.as_millis()).unwrap(),
     );
-    println!("http://{} token {}", world.address, world.tokens.operate);
+    println!("http://{} {}", world.address, world.tokens.operate);
     loop {
         sleep(Duration::from_secs(60));
     }

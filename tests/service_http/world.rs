@@ -42,6 +42,7 @@ pub(crate) const BEFORE: &str = "20260228_010000_j1_a1";
 pub(crate) const KERNEL: &str = "00000000000000000000000000000000000000000000000000000000000000ab";
 
 /// Tokens of the test.
+#[allow(dead_code, reason = "each test program uses a part")]
 pub(crate) struct Tokens {
     pub(crate) read: String,
     pub(crate) operate: String,
@@ -437,29 +438,29 @@ fn fill(shared: &Shared, folder: &Path) {
     let (now_ms, hour_ms) = (shared.now_ms(), 3_600_000);
     let kernels = root("kernels");
     let text = format!(
-        "INSERT INTO root VALUES ('{kernels}', 'kernels', 1, 2, 'available', {since}, '');
-         INSERT INTO root VALUES ('{}', 'data', 1, 9, 'available', {since}, '');
-         INSERT INTO site VALUES ('alpha', '{sites}/alpha.toml', 'c', 1, NULL, '{RUN}', {checked}, {since}, NULL, NULL,
+        "INSERT INTO root (path, kind, device, files, state, since_ms, detail) VALUES ('{kernels}', 'kernels', 1, 2, 'available', {since}, '');
+         INSERT INTO root (path, kind, device, files, state, since_ms, detail) VALUES ('{}', 'data', 1, 9, 'available', {since}, '');
+         INSERT INTO site (name, file, config_blake3, enabled, problem, current_run, checked_ms, current_since_ms, stale_since_ms, stale_because, last_note, west_deg, south_deg, east_deg, north_deg) VALUES ('alpha', '{sites}/alpha.toml', 'c', 1, NULL, '{RUN}', {checked}, {since}, NULL, NULL,
            'checked, nothing changed', 350.5, -2.0, 2.5, 1.0);
-         INSERT INTO site VALUES ('beta', '{sites}/beta.toml', 'c', 1, NULL, '20260227_010000_j3_a1', {checked}, {since}, {checked},
+         INSERT INTO site (name, file, config_blake3, enabled, problem, current_run, checked_ms, current_since_ms, stale_since_ms, stale_because, last_note, west_deg, south_deg, east_deg, north_deg) VALUES ('beta', '{sites}/beta.toml', 'c', 1, NULL, '20260227_010000_j3_a1', {checked}, {since}, {checked},
            '{kernels}/mgs_sc_ext1.bc changed; waiting for the quiet period', NULL, 120.0, 20.0, 121.0, 22.0);
-         INSERT INTO site VALUES ('gamma', '{sites}/gamma.toml', 'c', 1, NULL, NULL, NULL, NULL, NULL, NULL, NULL, 250.0, -60.0, 252.0, -58.0);
-         INSERT INTO site VALUES ('retired', '{sites}/retired.toml', 'c', 0, NULL, NULL, NULL, NULL, NULL, NULL, NULL, NULL, NULL, NULL, NULL);
-         INSERT INTO night VALUES (1, {night}, 'Europe/Berlin', {night}, {night} + 60000, 'due', 3, 2, 1);
-         INSERT INTO job VALUES (1, 'alpha', 'succeeded', 1, 1, 0, 0, 0, 0, 1, NULL, {since}, {since}, {since}, '{{\"text\": \"published\"}}');
-         INSERT INTO job VALUES (2, 'alpha', 'succeeded', 2, 1, 0, 0, 0, 0, 1, NULL, {checked}, {checked}, {checked}, '{{\"text\": \"published\"}}');
-         INSERT INTO job VALUES (3, 'beta', 'succeeded', 1, 1, 0, 0, 0, 0, 1, NULL, {since}, {since}, {since}, NULL);
-         INSERT INTO job VALUES (4, 'beta', 'running', 2, 1, 0, 0, 0, 0, NULL, NULL, {checked}, {checked}, NULL, NULL);
-         INSERT INTO job VALUES (5, 'beta', 'queued', 2, 0, 0, 0, 0, 0, NULL, NULL, {checked}, {checked}, NULL, NULL);
-         INSERT INTO job VALUES (6, 'gamma', 'blocked', 2, 1, 1, 0, 0, 0, 1, NULL, {checked}, {checked}, NULL,
+         INSERT INTO site (name, file, config_blake3, enabled, problem, current_run, checked_ms, current_since_ms, stale_since_ms, stale_because, last_note, west_deg, south_deg, east_deg, north_deg) VALUES ('gamma', '{sites}/gamma.toml', 'c', 1, NULL, NULL, NULL, NULL, NULL, NULL, NULL, 250.0, -60.0, 252.0, -58.0);
+         INSERT INTO site (name, file, config_blake3, enabled, problem, current_run, checked_ms, current_since_ms, stale_since_ms, stale_because, last_note, west_deg, south_deg, east_deg, north_deg) VALUES ('retired', '{sites}/retired.toml', 'c', 0, NULL, NULL, NULL, NULL, NULL, NULL, NULL, NULL, NULL, NULL, NULL);
+         INSERT INTO night (id, due_ms, zone, started_ms, ended_ms, how, sites_checked, runs, failures) VALUES (1, {night}, 'Europe/Berlin', {night}, {night} + 60000, 'due', 3, 2, 1);
+         INSERT INTO job (id, site, state, priority, attempt, failures, not_before_ms, force, cancel_asked, night, asked_by, created_ms, changed_ms, ended_ms, outcome) VALUES (1, 'alpha', 'succeeded', 1, 1, 0, 0, 0, 0, 1, NULL, {since}, {since}, {since}, '{{\"text\": \"published\"}}');
+         INSERT INTO job (id, site, state, priority, attempt, failures, not_before_ms, force, cancel_asked, night, asked_by, created_ms, changed_ms, ended_ms, outcome) VALUES (2, 'alpha', 'succeeded', 2, 1, 0, 0, 0, 0, 1, NULL, {checked}, {checked}, {checked}, '{{\"text\": \"published\"}}');
+         INSERT INTO job (id, site, state, priority, attempt, failures, not_before_ms, force, cancel_asked, night, asked_by, created_ms, changed_ms, ended_ms, outcome) VALUES (3, 'beta', 'succeeded', 1, 1, 0, 0, 0, 0, 1, NULL, {since}, {since}, {since}, NULL);
+         INSERT INTO job (id, site, state, priority, attempt, failures, not_before_ms, force, cancel_asked, night, asked_by, created_ms, changed_ms, ended_ms, outcome) VALUES (4, 'beta', 'running', 2, 1, 0, 0, 0, 0, NULL, NULL, {checked}, {checked}, NULL, NULL);
+         INSERT INTO job (id, site, state, priority, attempt, failures, not_before_ms, force, cancel_asked, night, asked_by, created_ms, changed_ms, ended_ms, outcome) VALUES (5, 'beta', 'queued', 2, 0, 0, 0, 0, 0, NULL, NULL, {checked}, {checked}, NULL, NULL);
+         INSERT INTO job (id, site, state, priority, attempt, failures, not_before_ms, force, cancel_asked, night, asked_by, created_ms, changed_ms, ended_ms, outcome) VALUES (6, 'gamma', 'blocked', 2, 1, 1, 0, 0, 0, 1, NULL, {checked}, {checked}, NULL,
            '{{\"text\": \"{kernels}/mgs_sc_ext1.bc does not cover image E02-01453\"}}');
-         INSERT INTO job VALUES (7, 'gamma', 'failed', 2, 3, 3, 0, 0, 0, NULL, NULL, {checked}, {checked}, {checked}, '{{\"text\": \"crashes at stage register\"}}');
-         INSERT INTO cause VALUES (4, 'kernel_changed', '{kernels}/mgs_sc_ext1.bc', '{a}', '{b}', 'its coverage meets image E02-01453', {checked});
-         INSERT INTO attempt VALUES (4, 1, 4711, 1, 'boot', {checked}, {checked}, 58000, 'register/E02-01453', 7, 20, 'stages', NULL, NULL, NULL, NULL, 'logs/4-1.log');
-         INSERT INTO attempt VALUES (7, 3, 4712, 1, 'boot', {checked}, {checked}, 58000, 'register', NULL, NULL, NULL, {checked}, 'ended by signal 11', NULL, 11, '/etc/passwd');
-         INSERT INTO file_version VALUES ('{kernels}/ck/mgs_sc_ext1.bc', 1, 2, 1000000, 1, 1, '{KERNEL}', {since}, {checked}, {checked}, 'ready', '');
-         INSERT INTO file_version VALUES ('{kernels}/naif0012.tls', 1, 3, 5000, 1, 1, '{b}', {since}, {since}, {checked}, 'ready', '');
-         INSERT INTO file_version VALUES ('{data}/ap10001l.b', 1, 4, 5000, 1, 1, '{a}', {since}, {since}, {checked}, 'ready', '');
+         INSERT INTO job (id, site, state, priority, attempt, failures, not_before_ms, force, cancel_asked, night, asked_by, created_ms, changed_ms, ended_ms, outcome) VALUES (7, 'gamma', 'failed', 2, 3, 3, 0, 0, 0, NULL, NULL, {checked}, {checked}, {checked}, '{{\"text\": \"crashes at stage register\"}}');
+         INSERT INTO cause (job, kind, path, old_blake3, new_blake3, detail, at_ms) VALUES (4, 'kernel_changed', '{kernels}/mgs_sc_ext1.bc', '{a}', '{b}', 'its coverage meets image E02-01453', {checked});
+         INSERT INTO attempt (job, n, pid, pid_start, boot_id, started_ms, beat_ms, rss_kib, stage, done, of, unit, ended_ms, how, exit, signal, log) VALUES (4, 1, 4711, 1, 'boot', {checked}, {checked}, 58000, 'register/E02-01453', 7, 20, 'stages', NULL, NULL, NULL, NULL, 'logs/4-1.log');
+         INSERT INTO attempt (job, n, pid, pid_start, boot_id, started_ms, beat_ms, rss_kib, stage, done, of, unit, ended_ms, how, exit, signal, log) VALUES (7, 3, 4712, 1, 'boot', {checked}, {checked}, 58000, 'register', NULL, NULL, NULL, {checked}, 'ended by signal 11', NULL, 11, '/etc/passwd');
+         INSERT INTO file_version (path, device, inode, size, mtime_ns, ctime_ns, blake3, first_seen_ms, changed_ms, checked_ms, state, detail) VALUES ('{kernels}/ck/mgs_sc_ext1.bc', 1, 2, 1000000, 1, 1, '{KERNEL}', {since}, {checked}, {checked}, 'ready', '');
+         INSERT INTO file_version (path, device, inode, size, mtime_ns, ctime_ns, blake3, first_seen_ms, changed_ms, checked_ms, state, detail) VALUES ('{kernels}/naif0012.tls', 1, 3, 5000, 1, 1, '{b}', {since}, {since}, {checked}, 'ready', '');
+         INSERT INTO file_version (path, device, inode, size, mtime_ns, ctime_ns, blake3, first_seen_ms, changed_ms, checked_ms, state, detail) VALUES ('{data}/ap10001l.b', 1, 4, 5000, 1, 1, '{a}', {since}, {since}, {checked}, 'ready', '');
          INSERT INTO kernel_coverage VALUES ('{KERNEL}', '{{\"position\": [{{\"start\": -3.0e7, \"stop\": 1.0e7}}],
            \"attitude\": [{{\"start\": -3.0e7, \"stop\": -1.0e7}}, {{\"start\": -0.9e7, \"stop\": 1.0e7}}]}}');
          INSERT INTO site_input VALUES ('alpha', '{kernels}/ck/mgs_sc_ext1.bc', 'kernel', '{KERNEL}');

@@ -11,7 +11,7 @@ use std::{
 use rusqlite::{Connection, Transaction};
 use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 
-use super::{hidden::Hidden, metrics::Metrics, problem::Problem, rate::Rates};
+use super::{hidden::Hidden, metrics::Metrics, plans::Plans, problem::Problem, rate::Rates};
 use crate::{
     config::ServiceConfig,
     service::{database::Stored, shared::Shared},
@@ -22,6 +22,9 @@ const READS: usize = 8;
 /// Streams of events at the same time.
 pub(super) const STREAMS: usize = 64;
 
+/// Workers that plan or search at the same time.
+const WORKERS: usize = 2;
+
 /// What all requests share.
 pub(super) struct App {
     pub(super) shared: Arc<Shared>,
@@ -31,6 +34,9 @@ pub(super) struct App {
     pub(super) rates: Rates,
     pub(super) streams: Arc<Semaphore>,
     pub(super) connections: AtomicUsize,
+    /// Workers that plan or search.
+    pub(super) workers: Arc<Semaphore>,
+    pub(super) plans: Plans,
     reads: Arc<Semaphore>,
     /// For the configuration that they were taken from.
     hidden: Mutex<(Arc<ServiceConfig>, Arc<Hidden>)>,
@@ -48,6 +54,8 @@ impl App {
             rates: Rates::default(),
             streams: Arc::new(Semaphore::new(STREAMS)),
             connections: AtomicUsize::new(0),
+            workers: Arc::new(Semaphore::new(WORKERS)),
+            plans: Plans::default(),
             reads: Arc::new(Semaphore::new(READS)),
         }
     }

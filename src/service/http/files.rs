@@ -35,6 +35,21 @@ fn run_folder(run: &Run) -> PathBuf {
     Path::new(&run.site).join("runs").join(&run.id)
 }
 
+/// The page that compares a run with its predecessor.
+pub(super) fn difference(products: &Path, run: &Run) -> Result<Vec<u8>, Problem> {
+    let path = Path::new(&run.site)
+        .join("diffs")
+        .join(format!("{}.html", run.id));
+    let file = open_below(products, &path)?;
+    let file =
+        file.ok_or_else(|| Problem::not_found("This run was not compared with another one."))?;
+    let mut page = Vec::new();
+    file.take(MANIFEST_MAX)
+        .read_to_end(&mut page)
+        .map_err(Problem::internal)?;
+    Ok(page)
+}
+
 /// Opens the file `path` below `folder`: no part of it may be a symbolic link, nor lead out.
 pub(super) fn open_below(folder: &Path, path: &Path) -> Result<Option<File>, Problem> {
     let plain = |part: Component<'_>| matches!(part, Component::Normal(_));

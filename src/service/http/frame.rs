@@ -63,7 +63,8 @@ pub(super) async fn frame(State(app): State<Arc<App>>, request: Request, next: N
         .into_response()
     });
     let status = response.status();
-    if status.is_client_error() || status.is_server_error() {
+    let refused = status.is_client_error() || status.is_server_error();
+    if refused && !says_itself(&response) {
         response = refusal(&app, &method, &uri, response, &id);
     }
     dress(response.headers_mut(), &id);
@@ -76,6 +77,12 @@ pub(super) async fn frame(State(app): State<Arc<App>>, request: Request, next: N
         status = status.as_u16(), ms = took.as_secs_f64() * 1e3, "request"
     );
     response
+}
+
+/// Whether an answer is a document of its own, as that of readiness.
+fn says_itself(response: &Response) -> bool {
+    let form = response.headers().get(header::CONTENT_TYPE);
+    form.is_some_and(|form| form == "application/json")
 }
 
 /// A panic is a bug of ours; its text is for the log.

@@ -14,9 +14,11 @@ mod hidden;
 mod logs;
 mod metrics;
 mod pages;
+mod plans;
 mod problem;
 mod rate;
 mod stall;
+mod work;
 
 use std::sync::Arc;
 

@@ -12,7 +12,7 @@ use serde_json::Value;
 pub use inputs::{KernelFile, RootFolder, kernel_by_hash, kernels, roots, used_by};
 pub use nights::{Night, night, nights};
 pub use runs::{Run, pin_run, run, runs_of_job, runs_of_night, runs_of_site};
-pub use sites::{Site, count_sites, site, sites};
+pub use sites::{Site, count_sites, current_runs, site, site_file, sites};
 pub use work::{Attempt, Totals, attempts, jobs_of_night, last_complete_night_ms, totals};
 
 /// A column of JSON; text that is none stays text.

@@ -114,3 +114,24 @@ fn read(row: &Row<'_>) -> rusqlite::Result<Site> {
         bounds_deg,
     })
 }
+
+/// The site file of a site.
+///
+/// # Errors
+/// SQLite's own.
+pub fn site_file(connection: &Connection, name: &str) -> Stored<Option<String>> {
+    let mut query = connection.prepare_cached("SELECT file FROM site WHERE name = ?1")?;
+    Ok(query.query_row([name], |row| row.get(0)).optional()?)
+}
+
+/// Sites with the runs that are current.
+///
+/// # Errors
+/// SQLite's own.
+pub fn current_runs(connection: &Connection) -> Stored<Vec<(String, String)>> {
+    let mut query = connection.prepare_cached(
+        "SELECT name, current_run FROM site WHERE current_run IS NOT NULL ORDER BY name",
+    )?;
+    let found = query.query_map([], |row| Ok((row.get(0)?, row.get(1)?)))?;
+    Ok(found.collect::<Result<_, _>>()?)
+}

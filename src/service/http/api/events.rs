@@ -41,7 +41,7 @@ struct EventData {
     seq: i64,
     /// When.
     at_utc: Instant,
-    /// `job`, `stage`, `progress`, `run`, `root`, `night`, `alert` or `config`.
+    /// `job`, `stage`, `progress`, `run`, `root`, `night`, `alert`, `checked` or `config`.
     kind: String,
     /// The site that it concerns.
     site: Option<String>,

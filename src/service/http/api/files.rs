@@ -16,7 +16,7 @@ use crate::service::http::{
     app::{App, blocking},
     caller::Reader,
     extract::At,
-    files::{Product, product},
+    files::{Product, difference as difference_page, product},
     problem::{Problem, ProblemDocument},
 };
 
@@ -31,7 +31,7 @@ const SHOWN: [&str; 4] = [
 ];
 
 /// A product of a run: `path` as in its manifest, or `manifest.json`. The ETag is the BLAKE3 of the content; ranges are understood.
-#[utoipa::path(get, path = "/api/v1/runs/{run}/files/{path}", tag = "runs", params(
+#[utoipa::path(get, path = "/api/v1/runs/{run}/files/{*path}", tag = "runs", params(
     ("run" = String, Path, description = "Identifier of the run", pattern = "^[A-Za-z0-9_-]{1,64}$"),
     ("path" = String, Path, description = "Path of a product as in the manifest; may contain /"),
     ("Range" = Option<String>, Header, description = "One range of bytes, as in bytes=0-1023"),
@@ -51,6 +51,27 @@ pub(super) async fn of_run(
     let config = app.config();
     let found = blocking(move || product(&config.outputs.products, &run, &path)).await??;
     give(found, &headers).await
+}
+
+/// The page that compares a run with its predecessor.
+#[utoipa::path(get, path = "/api/v1/runs/{run}/difference", tag = "runs", params(
+    ("run" = String, Path, description = "Identifier of the run", pattern = "^[A-Za-z0-9_-]{1,64}$"),
+), responses(
+    (status = 200, content_type = "text/html", body = String),
+    (status = "4XX", body = ProblemDocument, content_type = "application/problem+json"),
+))]
+pub(super) async fn difference(
+    _: Reader,
+    State(app): State<Arc<App>>,
+    At(run): At<String>,
+) -> Result<Response, Problem> {
+    let run = find(&app, &run).await?;
+    let config = app.config();
+    let page = blocking(move || difference_page(&config.outputs.products, &run)).await??;
+    let mut answer = page.into_response();
+    insert(&mut answer, header::CONTENT_TYPE, SHOWN[0])?;
+    insert(&mut answer, header::CONTENT_SECURITY_POLICY, POLICY)?;
+    Ok(answer)
 }
 
 async fn give(product: Product, headers: &HeaderMap) -> Result<Response, Problem> {

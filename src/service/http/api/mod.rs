@@ -8,7 +8,9 @@ mod kernels;
 mod life;
 mod logs;
 mod nights;
+mod plans;
 mod runs;
+mod shots;
 mod sites;
 
 use std::sync::Arc;
@@ -54,7 +56,13 @@ impl Modify for Tokens {
 
 /// All routes for programs.
 pub(super) fn routes() -> Router<Arc<App>> {
-    let (router, description) = described().split_for_parts();
+    let (router, mut description) = described().split_for_parts();
+    // The router's mark of a parameter that may contain `/`.
+    let paths = std::mem::take(&mut description.paths.paths);
+    let named = paths
+        .into_iter()
+        .map(|(path, item)| (path.replace("{*", "{"), item));
+    description.paths.paths = named.collect();
     let description = Arc::new(description);
     router.route(
         "/openapi.json",
@@ -70,6 +78,10 @@ fn described() -> OpenApiRouter<Arc<App>> {
         .routes(routes!(runs::of_site))
         .routes(routes!(runs::one, runs::pin_one))
         .routes(routes!(files::of_run))
+        .routes(routes!(files::difference))
+        .routes(routes!(plans::begin))
+        .routes(routes!(plans::one))
+        .routes(routes!(shots::in_box, shots::in_polygon))
         .routes(routes!(jobs::list, jobs::create))
         .routes(routes!(jobs::one))
         .routes(routes!(jobs::cancel_one))

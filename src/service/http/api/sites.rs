@@ -52,7 +52,7 @@ pub(super) async fn one(
 }
 
 /// A product of the current run: leads to that of the run.
-#[utoipa::path(get, path = "/api/v1/sites/{site}/current/{path}", tag = "sites", params(
+#[utoipa::path(get, path = "/api/v1/sites/{site}/current/{*path}", tag = "sites", params(
     ("site" = String, Path, description = "Name of the site", pattern = "^[A-Za-z0-9_-]{1,64}$"),
     ("path" = String, Path, description = "Path of a product as in the manifest; may contain /"),
 ), responses(

@@ -31,7 +31,7 @@
   const source = new EventSource('/api/v1/events');
   source.onopen = () => { say(' Live.'); soon(); };
   source.onerror = () => say(' Not live: the connection was lost; it is tried again.');
-  for (const kind of ['job', 'stage', 'progress', 'run', 'root', 'night', 'alert', 'config', 'lost']) {
+  for (const kind of ['job', 'stage', 'progress', 'run', 'root', 'night', 'alert', 'config', 'checked', 'lost']) {
     source.addEventListener(kind, soon);
   }
   addEventListener('pagehide', () => source.close());

@@ -8,8 +8,9 @@ use crate::service::database::shown::Site;
 /// Units of the picture for a degree.
 const SCALE: f64 = 2.0;
 /// Room for the names of parallels and meridians.
-const LEFT: f64 = 52.0;
+const LEFT: f64 = 64.0;
 const TOP: f64 = 10.0;
+const RIGHT: f64 = 22.0;
 /// Windows smaller than this are drawn so large.
 const LEAST: f64 = 9.0;
 /// More names than this would lie over each other.
@@ -24,7 +25,7 @@ pub(super) fn map(sites: &[Site]) -> Markup {
     let (width, height) = (360.0 * SCALE, 180.0 * SCALE);
     html! {
         figure class="map" {
-            svg viewBox={ "0 0 " (LEFT + width + 8.0) " " (TOP + height + 28.0) } role="group" aria-label="Map of the sites" {
+            svg viewBox={ "0 0 " (LEFT + width + RIGHT) " " (TOP + height + 28.0) } role="group" aria-label="Map of the sites" {
                 @for k in 0..=12_u32 {
                     @let longitude = f64::from(30 * k);
                     @let x = LEFT + longitude * SCALE;
@@ -35,7 +36,7 @@ pub(super) fn map(sites: &[Site]) -> Markup {
                     @let latitude = 90.0 - f64::from(30 * k);
                     @let y = TOP + (90.0 - latitude) * SCALE;
                     line x1=(LEFT) y1=(y) x2=(LEFT + width) y2=(y) stroke="#E2E2E2" {}
-                    text x=(LEFT - 6.0) y=(y + 6.0) text-anchor="end" font-size="17" fill="#222222" { (latitude) "°" }
+                    text x=(LEFT - 6.0) y=(y + 6.0) text-anchor="end" font-size="17" fill="#222222" { (latitude_name(latitude)) }
                 }
                 @for (site, bounds_deg) in &placed {
                     a href={ "/sites/" (site.name) } aria-label={ (site.name) ": " (site.verdict.as_deref().unwrap_or("no run yet")) } {
@@ -57,6 +58,17 @@ pub(super) fn map(sites: &[Site]) -> Markup {
             }
         }
     }
+}
+
+fn latitude_name(latitude_deg: f64) -> String {
+    let side = if latitude_deg > 0.0 {
+        " N"
+    } else if latitude_deg < 0.0 {
+        " S"
+    } else {
+        ""
+    };
+    format!("{}°{side}", latitude_deg.abs())
 }
 
 /// A window on the map as left, top, width, height; one across the prime meridian is in two parts.

@@ -192,9 +192,10 @@ pub(super) fn figure_name(name: &str) -> String {
     let unit = UNITS
         .iter()
         .find_map(|(end, unit)| Some((name.strip_suffix(end)?, unit)));
+    let words = |name: &str| name.replace('_', " ").replace("rmse", "RMSE");
     match unit {
-        Some((name, unit)) => format!("{}, {unit}", name.replace('_', " ")),
-        None => name.replace('_', " "),
+        Some((name, unit)) => format!("{}, {unit}", words(name)),
+        None => words(name),
     }
 }
 

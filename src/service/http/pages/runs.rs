@@ -100,7 +100,8 @@ fn run_lead(run: &Run, causes: &[CauseRow], manifest: Option<&Manifest>, times: 
                 @if let Some(removed) = run.removed_utc { " Its products were removed " (times.at(removed)) "." }
             }
             (said(&sentences(&run.reasons)))
-            @for cause in causes { @if !cause.detail.is_empty() { p { "Because: " (cause.detail) } } }
+            @for because in sentences(&run.because) { p { "Because: " (because) } }
+        @for cause in causes { @if !cause.detail.is_empty() { p { "Because: " (cause.detail) } } }
             @if named(REPORT) { p { a href={ "/api/v1/runs/" (run.id) "/files/" (REPORT) } { "Report" } } }
         },
     )
@@ -132,6 +133,10 @@ fn moved(run: &Run) -> Markup {
             p { strong { (headline(run)) } }
             @if run.moved.get("beyond_limit").and_then(Value::as_bool) == Some(true) { p class="word invalid" { "Beyond a limit." } }
             (said(&more))
+            @if run.moved.get("page").and_then(Value::as_bool) == Some(true) {
+                p { a href={ "/api/v1/runs/" (run.id) "/difference" } { "Difference to the run before" } }
+            }
+            @if let Some(problem) = run.moved.get("problem").and_then(Value::as_str) { p { "The comparison failed: " (problem) } }
         }
     }
 }

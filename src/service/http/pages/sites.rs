@@ -115,10 +115,10 @@ fn standing(sites: &[Site], roots: &[RootFolder], problem: Option<&str>, times: 
             .filter(|site| tone(site.verdict.as_deref()) == wanted)
             .count()
     };
-    let stale: Vec<&Site> = sites
+    let stale = sites
         .iter()
         .filter(|site| site.stale_since_utc.is_some())
-        .collect();
+        .count();
     let away: Vec<&RootFolder> = roots
         .iter()
         .filter(|root| root.state == "unavailable")
@@ -135,12 +135,12 @@ fn standing(sites: &[Site], roots: &[RootFolder], problem: Option<&str>, times: 
         || count("invalid") > 0
     {
         "invalid"
-    } else if !stale.is_empty() || count("none") > 0 {
+    } else if stale > 0 || count("none") > 0 {
         "remarks"
     } else {
         "valid"
     };
-    let headline = match (sites.len(), stale.len()) {
+    let headline = match (sites.len(), stale) {
         (0, _) => "No site yet: put site files into the folder of sites".to_owned(),
         (all, 0) => format!("{}, none of them stale", counted(all, "site")),
         (all, stale) => format!("{}, {stale} of them stale", counted(all, "site")),
@@ -153,7 +153,7 @@ fn standing(sites: &[Site], roots: &[RootFolder], problem: Option<&str>, times: 
                 @for root in &away { li { "The folder " code { (root.path) } " is not available since " (times.at(root.since_utc)) ": " (root.detail) ". Its sites are held; nothing is lost." } }
                 @if let Some(problem) = problem { li { "The changed configuration was refused, the old one stays in force: " (problem) } }
                 @for site in &wrong { li { a href={ "/sites/" (site.name) } { (site.name) } ": " (site.problem.as_deref().unwrap_or_default()) } }
-                @if refused > 0 { li { (counted(refused, "newest run")) " not valid; the products before stay current." } }
+                @if refused > 0 { li { "The newest run of " (counted(refused, "site")) " is not valid; earlier products stay current." } }
                 @if count("remarks") > 0 { li { (count("remarks")) " valid with remarks." } }
                 @if count("none") > 0 { li { (count("none")) " without a run." } }
             }
@@ -196,7 +196,7 @@ fn freshness(site: &Site, times: &Times) -> Markup {
         @else if let Some(since) = site.stale_since_utc {
             "Stale since " (times.at(since)) ": " (site.stale_because.as_deref().unwrap_or("its inputs changed"))
         }
-        @else if site.current_run.is_some() { "Fresh. " (site.note.as_deref().unwrap_or_default()) }
+        @else if site.current_run.is_some() { "Fresh" @if let Some(note) = &site.note { ": " (note) } "." }
         @else { (site.note.as_deref().unwrap_or("No run yet.")) }
     }
 }

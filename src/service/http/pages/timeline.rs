@@ -64,7 +64,7 @@ pub(super) fn timeline(rows: &[Row]) -> Markup {
             }
             ul class="keys" { li { i class="k0" {} "positions" } li { i class="k1" {} "attitude" } }
             figcaption {
-                "Times are TDB, a minute ahead of UTC. White is a gap; gaps too narrow to be seen are in the "
+                "Times are TDB, a minute ahead of UTC. What is empty is a gap; gaps too narrow to be seen are in the "
                 a href="/api/v1/kernels" { "interface for programs" } "."
             }
         }
