@@ -300,7 +300,7 @@ mod tests {
         assert_eq!(folder.sweep(QUIET_MS + 3, Ok(())), (0, 0));
         assert!(folder.root.detail.contains("is empty"));
         folder.files = files.clone();
-        folder.files.retain(|path, _| *path >= *"/k/021.bc");
+        folder.files.retain(|path, _| path.as_str() >= "/k/021.bc");
         assert_eq!(folder.sweep(QUIET_MS + 4, Ok(())), (0, 0));
         assert!(folder.root.detail.contains("21 of 100 files are gone"));
         assert_eq!(folder.root.since_ms, QUIET_MS + 2);
