@@ -7,7 +7,11 @@
 
 mod common;
 
-use std::{fs, path::Path};
+use std::{
+    collections::BTreeMap,
+    fs,
+    path::{Path, PathBuf},
+};
 
 use areograph::{
     error::Kind,
@@ -17,6 +21,7 @@ use areograph::{
 use common::{
     case::Case,
     daf::{segment_words, set_word, word},
+    mission::products,
     real_data,
 };
 use tempfile::tempdir;
@@ -35,6 +40,10 @@ const DAMAGE: [Damage; 7] = [
     ("one more", |value| value + 1.0),
 ];
 
+/// How many damaged kernels are checked, and with how many a site is run.
+const DAMAGED: usize = 300;
+const RUN: usize = 24;
+
 /// Numbers that look drawn, the same in every run (Knuth's multiplicative hashing).
 fn drawn(index: usize, below: usize) -> usize {
     (index + 1).wrapping_mul(2_654_435_761) % 4_294_967_296 * below / 4_294_967_296
@@ -44,7 +53,7 @@ fn drawn(index: usize, below: usize) -> usize {
 fn no_damaged_word_ends_the_program_and_each_failure_names_the_kernel() {
     let case = Case::pair();
     let mut refused = 0;
-    for index in 0..70 {
+    for index in 0..DAMAGED {
         let kernel = ["mgs_nav_scene.bsp", "mgs_sc_scene.bc", "mars_sun_scene.bsp"][index % 3];
         let path = format!("kernels/{kernel}");
         let good = case.read(&path);
@@ -73,7 +82,72 @@ fn no_damaged_word_ends_the_program_and_each_failure_names_the_kernel() {
         case.write(&path, good);
     }
     // Half of the words are counts or times near them.
-    assert!(refused >= 35, "{refused} of 70 refused");
+    assert!(2 * refused >= DAMAGED, "{refused} of {DAMAGED} refused");
+}
+
+/// What the numbers of a site rest on.
+fn numbers(case: &Case) -> BTreeMap<PathBuf, Vec<u8>> {
+    let mut products = products(&case.path("out"));
+    products.retain(|path, _| path.extension().is_some_and(|of| of == "parquet"));
+    products
+}
+
+/// States and attitudes of the exposures, each with one word of another number: what is not refused with the name of the
+/// kernel gives the numbers of the sound kernel, or products that are marked invalid.
+#[test]
+fn no_damaged_word_gives_other_numbers_that_pass_for_valid() {
+    let case = Case::pair();
+    assert_eq!(case.run().output().unwrap().status.code(), Some(0));
+    let sound = numbers(&case);
+    assert!(sound.len() > 5);
+    let mut refused = 0;
+    for index in 0..RUN {
+        // Segments of the two images, which were taken in the middle of each.
+        let segment = [2, 4][index % 2];
+        let (kernel, size) = [("mgs_nav_scene.bsp", 6), ("mgs_sc_scene.bc", 7)][index / 2 % 2];
+        let path = format!("kernels/{kernel}");
+        let good = case.read(&path);
+        let (first, last) = segment_words(&good)[segment];
+        let middle = (last - first) / (size + 1) / 2;
+        let at = first + size * (middle - 3 + drawn(index, 7)) + drawn(index + 500, size.min(4));
+        let mut bytes = good.clone();
+        let (was, next) = (word(&good, at), word(&good, at + 1));
+        let what = match index / 4 % 4 {
+            0 => {
+                set_word(&mut bytes, at, -was);
+                "negative"
+            }
+            1 => {
+                set_word(&mut bytes, at, 0.0);
+                "zero"
+            }
+            2 => {
+                set_word(&mut bytes, at, next);
+                set_word(&mut bytes, at + 1, was);
+                "swapped"
+            }
+            _ => {
+                set_word(&mut bytes, at, was + 0.5);
+                "half more"
+            }
+        };
+        case.write(&path, bytes);
+        let output = case.run().output().unwrap();
+        let told = String::from_utf8_lossy(&output.stderr).into_owned();
+        let what = format!("{kernel}, word {at} of {first}..{last}, {was} {what}: {told}");
+        match output.status.code() {
+            Some(0) => assert!(numbers(&case) == sound, "{what}"),
+            // The products exist, and say that they must not be used.
+            Some(5) => {}
+            Some(_) => {
+                assert!(told.contains(kernel), "{what}");
+                refused += 1;
+            }
+            None => panic!("ended by a signal: {what}"),
+        }
+        case.write(&path, good);
+    }
+    assert!(2 * refused >= RUN, "{refused} of {RUN} refused");
 }
 
 #[test]
@@ -105,6 +179,16 @@ fn what_is_wrong_is_told_with_segment_and_number() {
         (last - 1, 1e9, "interpolation of degree 1000000000.0 over"),
         (last - 1, 28.0, "interpolation of degree 28.0 over"),
         (first + 7, f64::INFINITY, "record 2 holds inf"),
+        (
+            first + 6 * 50 + 1,
+            word(&spk, first + 6 * 50 + 1) + 1.0,
+            "record 51 lies 0.9995",
+        ),
+        (
+            first + 6 * 50 + 5,
+            word(&spk, first + 6 * 50 + 5) - 0.1,
+            "record 51 has a velocity 0.",
+        ),
         (epochs + 3, word(&spk, epochs + 2), "time 4 is "),
         (
             epochs + states,
@@ -121,6 +205,11 @@ fn what_is_wrong_is_told_with_segment_and_number() {
             first,
             3.0,
             "segment 2 (CK of -94000, type 3): quaternion 1 has a norm of 3.",
+        ),
+        (
+            first + 7 * 50 + 1,
+            word(&ck, first + 7 * 50 + 1) + 1e-5,
+            "quaternion 51 has a norm of 1.0000",
         ),
         (last - 1, 1e6, "its number of intervals is 1000000.0"),
         (last, 0.5, "its number of pointings is 0.5"),

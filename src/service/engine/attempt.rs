@@ -14,6 +14,7 @@ use tokio::{sync::watch, time::sleep};
 use super::{
     core::{Core, log_of, runs, working},
     ending::{Attempt, finish},
+    hold::{hold, not_ready},
     runs::run_id,
     workers::Workers,
 };
@@ -21,7 +22,7 @@ use crate::service::{
     database::{
         About, Job, Moved, Priority, Stored, advance, append,
         attempts::{begin_attempt, put_beat, put_process},
-        job, next_queued,
+        job, jobs_in, next_queued,
         runs::RunRow,
         sites::site,
     },
@@ -101,21 +102,27 @@ pub struct Taken {
 /// The database cannot be written.
 pub fn take<W: Workers>(core: &Core<W>, at_work: &AtWork) -> Stored<Option<Taken>> {
     let count = usize::from(core.shared.config().workers.count);
-    if at_work.count() >= count {
+    let queued = core
+        .shared
+        .read(|connection| jobs_in(connection, JobState::Queued))?;
+    if at_work.count() >= count || queued.is_empty() {
         return Ok(None);
     }
     // A backfill leaves room for what changes meanwhile.
     let backfill = at_work.backfills() < count.saturating_sub(1).max(1);
     let now_ms = core.now_ms();
-    let next = core
-        .shared
-        .read(|connection| next_queued(connection, now_ms, backfill))?;
-    let Some(next) = next else {
-        return Ok(None);
-    };
-    let taken = core
-        .shared
-        .write(|transaction| begin(transaction, now_ms, &next))?;
+    let taken = core.shared.write(|transaction| {
+        let waits = not_ready(transaction)?;
+        // Those that cannot begin now leave the queue.
+        while let Some(next) = next_queued(transaction, now_ms, backfill)? {
+            if let Some(why) = waits.of(&next.site) {
+                hold(transaction, now_ms, &next, &why)?;
+            } else if let Some(begun) = begin(transaction, now_ms, &next)? {
+                return Ok(Some(begun));
+            }
+        }
+        Ok(None)
+    })?;
     Ok(taken.map(|(job, site_file, config_blake3)| {
         let (stop, cancel) = watch::channel(None);
         let place = Place {

@@ -9,7 +9,7 @@ use crate::{
     files::file_name,
     service::{
         database::{
-            Moved, Stored, advance,
+            Job, Moved, Stored, advance,
             files::{RootKind, RootState, roots},
             jobs_in,
         },
@@ -45,7 +45,9 @@ impl NotReady {
 /// SQLite's own.
 pub fn not_ready(connection: &Connection) -> Stored<NotReady> {
     let mut found = NotReady::default();
-    let mut query = connection.prepare_cached("SELECT DISTINCT site FROM site_input")?;
+    let mut query = connection.prepare_cached(
+        "SELECT name FROM site WHERE EXISTS (SELECT 1 FROM site_input WHERE site = name)",
+    )?;
     for site in query.query_map([], |row| row.get(0))? {
         found.planned.insert(site?);
     }
@@ -95,6 +97,19 @@ fn changed_below(connection: &Connection, site: &str, root: &str) -> Stored<Opti
         .optional()?)
 }
 
+/// Holds a queued job.
+///
+/// # Errors
+/// SQLite's own.
+pub fn hold(transaction: &Transaction<'_>, now_ms: i64, job: &Job, why: &str) -> Stored<()> {
+    tracing::info!(site = job.site, job = job.id, "held: {why}");
+    let moved = Moved {
+        outcome: Some(json!({ "text": why })),
+        ..Moved::default()
+    };
+    advance(transaction, now_ms, job.id, JobState::Held, &moved)
+}
+
 /// Holds queued jobs whose inputs cannot be used, and releases those that can go on.
 ///
 /// # Errors
@@ -106,12 +121,7 @@ pub fn hold_and_release(
 ) -> Stored<()> {
     for job in jobs_in(transaction, JobState::Queued)? {
         if let Some(why) = waits.of(&job.site) {
-            tracing::info!(site = job.site, job = job.id, "held: {why}");
-            let moved = Moved {
-                outcome: Some(json!({ "text": why })),
-                ..Moved::default()
-            };
-            advance(transaction, now_ms, job.id, JobState::Held, &moved)?;
+            hold(transaction, now_ms, &job, &why)?;
         }
     }
     for job in jobs_in(transaction, JobState::Held)? {

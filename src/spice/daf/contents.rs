@@ -14,9 +14,9 @@ const TAIL_WORDS: usize = 8;
 /// How far mid-point and half length of a record may lie from those that its place gives, as a part of its length:
 /// beyond rounding, far below any damage that matters.
 const STRETCH_TOLERANCE: f64 = 1e-6;
-/// How far the square of a quaternion's norm may lie from 1. Quaternions that were stored in single precision, or
+/// How far a quaternion's norm may lie from 1. Quaternions that were stored in single precision, or
 /// counted in 16 bits on board, stay below it.
-const NORM_TOLERANCE: f64 = 1e-3;
+const NORM_TOLERANCE: f64 = 5e-4;
 
 /// Why a segment is not as it says.
 pub(super) enum Problem {
@@ -78,12 +78,17 @@ pub(super) fn check(
         first_word,
         words: layout.packets * layout.packet.words(),
     };
+    let mut norms = Vec::new();
     packets.each(reader, layout.packet.words(), |index, packet| {
+        if matches!(layout.packet, Packet::Quaternion(_)) {
+            norms.push(norm_of_quaternion(packet));
+        }
         check_packet(layout.packet, index, packet)
     })?;
+    neighbours::check_norms(&norms)?;
     first_word += packets.words as u64;
     check_lists(reader, &layout, first_word)?;
-    if role != KernelRole::Spk || layout.packet.words() != STATE {
+    if role != KernelRole::Spk || !matches!(layout.packet, Packet::Numbers(STATE)) {
         return Ok(());
     }
     let times = if layout.lists.is_empty() {
@@ -174,14 +179,19 @@ fn check_packet(packet: Packet, index: usize, words: &[f64]) -> Result<(), Strin
             ))
         }
         Packet::Quaternion(_) => {
-            let square: f64 = words[..4].iter().map(|part| part * part).sum();
-            if (square - 1.0).abs() <= NORM_TOLERANCE {
+            let norm = norm_of_quaternion(words);
+            if (norm - 1.0).abs() <= NORM_TOLERANCE {
                 return Ok(());
             }
-            let norm = square.sqrt();
             Err(format!("quaternion {} has a norm of {norm:?}", index + 1))
         }
     }
+}
+
+/// Norm of the quaternion that a packet begins with.
+fn norm_of_quaternion(words: &[f64]) -> f64 {
+    let squares = words[..4].iter().map(|part| part * part);
+    squares.sum::<f64>().sqrt()
 }
 
 /// CSPICE sums as many differences as a record says, and divides by its step sizes.

@@ -19,12 +19,41 @@ const STANDS_OUT: f64 = 100.0;
 const ROUNDING: f64 = 1e-9;
 /// Departure below which nobody is misled: a millimetre and a micrometre a second, in km and km/s.
 const NEGLIGIBLE: [f64; 2] = [1e-6, 1e-9];
+/// Nothing that has an ephemeris is a tenth of a light year away, in km, while the states next to it are so many times nearer.
+const ABSURD_KM: f64 = 1e12;
+const ABSURD_TIMES: f64 = 1e9;
 /// Longest of the steps around a state to the shortest, so that the parts below hold.
 const UNEVEN_MAX: f64 = 1.2;
 /// Which part of its own departure a damaged position, or velocity, adds to those of its neighbours: −1/2 and 1/4 for even
 /// steps, and how far from that rounding, uneven steps and the orbit itself may lead.
 const PARTS: [f64; 2] = [-0.5, 0.25];
 const PART_TOLERANCE: f64 = 0.15;
+
+/// By how much more than the rounding of single precision a norm that stands out differs from those around it.
+const NORM_STANDS_OUT: f64 = 1e-6;
+
+/// Tells the first quaternion whose norm stands out from those around it: they may all be off, as stored numbers are, but one
+/// alone is damaged.
+pub(super) fn check_norms(norms: &[f64]) -> Result<(), String> {
+    for (index, norm) in norms.iter().enumerate() {
+        let last_five = norms.len().saturating_sub(5);
+        let from = index.saturating_sub(2).min(last_five);
+        let near = norms.iter().enumerate().skip(from).take(5);
+        let others = near.filter(|(other, _)| *other != index);
+        let (mut low, mut high, mut count) = (f64::INFINITY, f64::NEG_INFINITY, 0);
+        for (_, other) in others {
+            (low, high, count) = (low.min(*other), high.max(*other), count + 1);
+        }
+        let off = (norm - 0.5 * (low + high)).abs();
+        if count >= 3 && off > NORM_STANDS_OUT && off > STANDS_OUT * (high - low) {
+            return Err(format!(
+                "quaternion {} has a norm of {norm:?}, among others of {low:?}",
+                index + 1
+            ));
+        }
+    }
+    Ok(())
+}
 
 /// Where the states of a segment stand.
 pub(super) struct States {
@@ -55,7 +84,14 @@ pub(super) fn check(reader: &mut Reader, states: &States) -> Result<(), Problem>
         let count = (CHUNK + 2 * REACH).min(states.count - first);
         let read = read(reader, states, first, count)?;
         for middle in REACH..count - REACH {
-            if let Some(problem) = contradiction(&read[middle - REACH..=middle + REACH]) {
+            let near = &read[middle - REACH..=middle + REACH];
+            if let Some((place, size)) = absurd(near) {
+                let record = first + middle - REACH + place + 1;
+                return Err(
+                    format!("record {record} holds {size:e}, unlike its neighbours").into(),
+                );
+            }
+            if let Some(problem) = contradiction(near) {
                 return Err(format!("record {} {problem}", first + middle + 1).into());
             }
         }
@@ -84,6 +120,22 @@ fn read(
         ],
     };
     Ok(words.iter().zip(&times_s).map(state).collect())
+}
+
+/// A state far beyond the others, whose number lets squares overflow: which one, and its largest number.
+fn absurd(states: &[State]) -> Option<(usize, f64)> {
+    let sizes = states
+        .iter()
+        .map(|state| state.parts[0].amax().max(state.parts[1].amax()));
+    let sizes: Vec<f64> = sizes.collect();
+    let place = (0..sizes.len()).max_by(|a, b| sizes[*a].total_cmp(&sizes[*b]))?;
+    let others = sizes
+        .iter()
+        .enumerate()
+        .filter(|(other, _)| *other != place);
+    let largest = others.map(|(_, size)| *size).fold(0.0, f64::max);
+    (sizes[place] > ABSURD_KM && sizes[place] / ABSURD_TIMES > largest)
+        .then_some((place, sizes[place]))
 }
 
 /// How the middle one of seven states contradicts the others.
@@ -176,6 +228,39 @@ mod tests {
                 assert_eq!(contradicted(&states), [9], "part {part}, axis {axis}");
             }
         }
+    }
+
+    #[test]
+    fn a_state_beyond_the_sky_is_told_at_the_ends_too() {
+        for index in 0..7 {
+            let mut states = orbit(60.0);
+            assert_eq!(absurd(&states[..7]), None);
+            states[index].parts[index % 2][index % 3] = -1e300;
+            assert_eq!(absurd(&states[..7]), Some((index, 1e300)));
+        }
+    }
+
+    #[test]
+    fn one_norm_that_stands_out_is_told() {
+        let rounded: Vec<f64> = (0..20)
+            .map(|index| 1.0 + 3e-8 * f64::from(index % 5))
+            .collect();
+        assert_eq!(check_norms(&rounded), Ok(()));
+        for index in 0..rounded.len() {
+            let mut norms = rounded.clone();
+            norms[index] += 1e-4;
+            let told = check_norms(&norms).unwrap_err();
+            assert!(
+                told.starts_with(&format!("quaternion {} has", index + 1)),
+                "{told}"
+            );
+        }
+        // Half of them stored in another precision.
+        let halves: Vec<f64> = (0..20)
+            .map(|index| if index < 10 { 1.0 } else { 1.0 + 1e-4 })
+            .collect();
+        assert_eq!(check_norms(&halves), Ok(()));
+        assert_eq!(check_norms(&[1.0, 1.0, 1.1]), Ok(()));
     }
 
     #[test]
