@@ -295,7 +295,7 @@ fn jobs_are_asked_for_once_cancelled_and_tried_again() {
     );
     assert_eq!(pinned.json()["pinned"], true);
     let all = world
-        .operate("POST", "/api/v1/jobs", &[], "{\"all\": true}")
+        .operate("POST", "/api/v1/jobs", &[], "{\"sites\": \"all\"}")
         .json();
     let sites: Vec<&Value> = all["jobs"]
         .as_array()
@@ -458,7 +458,7 @@ fn people_log_in_change_something_and_log_out() {
     let json = ["Content-Type: application/json", &session];
     assert_eq!(
         world
-            .request("POST", "/api/v1/jobs", &json, "{\"all\": true}")
+            .request("POST", "/api/v1/jobs", &json, "{\"sites\": \"all\"}")
             .status,
         401
     );
@@ -697,7 +697,7 @@ fn serve_until_ended() {
         .unwrap();
     let world = World::at(
         "127.0.0.1:8471",
-        "",
+        "open_reading = \"no\"",
         i64::try_from(now_ms.as_millis()).unwrap(),
     );
     println!("http://{} {}", world.address, world.tokens.operate);
