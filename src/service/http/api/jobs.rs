@@ -90,8 +90,8 @@ impl JobLine {
 #[serde(deny_unknown_fields)]
 pub(super) struct JobsWanted {
     /// `next` of the piece before.
-    #[param(max_length = 64)]
-    after: Option<String>,
+    #[param(minimum = 0)]
+    after: Option<i64>,
     /// Most items, 50 unless told.
     #[param(minimum = 1, maximum = 200)]
     limit: Option<u32>,
@@ -114,7 +114,7 @@ pub(super) async fn list(
     Asked(wanted): Asked<JobsWanted>,
 ) -> Result<Response, Problem> {
     let limit = limit(wanted.limit)?;
-    let before = number(wanted.after.as_deref())?;
+    let before = number(wanted.after)?;
     if let Some(site) = &wanted.site {
         name(site).map_err(|_| Problem::bad_request("site is no name of a site."))?;
     }
