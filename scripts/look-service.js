@@ -77,6 +77,7 @@ async function use(browser) {
   // Without a script the same pages are there.
   const context = await browser.newContext({ javaScriptEnabled: false });
   const plain = await context.newPage();
+  await logIn(plain);
   await plain.goto(address);
   if (!(await plain.textContent('main')).includes('alpha')) wrong(address, 'is empty without a script');
   await context.close();

@@ -295,7 +295,7 @@ fn jobs_are_asked_for_once_cancelled_and_tried_again() {
     );
     assert_eq!(pinned.json()["pinned"], true);
     let all = world
-        .operate("POST", "/api/v1/jobs", &[], "{\"all\": true}")
+        .operate("POST", "/api/v1/jobs", &[], "{\"sites\": \"all\"}")
         .json();
     let sites: Vec<&Value> = all["jobs"]
         .as_array()
@@ -458,7 +458,7 @@ fn people_log_in_change_something_and_log_out() {
     let json = ["Content-Type: application/json", &session];
     assert_eq!(
         world
-            .request("POST", "/api/v1/jobs", &json, "{\"all\": true}")
+            .request("POST", "/api/v1/jobs", &json, "{\"sites\": \"all\"}")
             .status,
         401
     );
@@ -688,6 +688,52 @@ fn a_service_that_cannot_work_says_so() {
     assert_eq!(world.get("/healthz").status, 200);
 }
 
+#[test]
+fn plans_and_shots_come_from_workers() {
+    let world = World::new();
+    let secret = world.folder.path().display().to_string();
+    let begun = world.operate("POST", "/api/v1/sites/alpha/plan", &[], "");
+    assert_eq!(
+        (begun.status, &begun.json()["state"]),
+        (202, &json!("running"))
+    );
+    let place = begun.header("location").unwrap().to_owned();
+    let (mut plan, started) = (begun.json(), Instant::now());
+    while plan["state"] == "running" && started.elapsed() < Duration::from_secs(20) {
+        sleep(Duration::from_millis(50));
+        plan = world.get(&place).json();
+    }
+    // The site file is not there, which is told without the folder that leads to it.
+    assert_eq!(plan["state"], "failed");
+    let problem = plan["problem"].as_str().unwrap();
+    assert!(
+        problem.contains("sites/alpha.toml") && !problem.contains(&secret),
+        "{problem}"
+    );
+    // The run has no footprints to search.
+    for (media, beginning) in [
+        ("application/geo+json", "{\"type\":\"FeatureCollection\""),
+        ("text/csv", ""),
+        ("application/vnd.apache.parquet", "PAR1"),
+    ] {
+        let accept = format!("Accept: {media}");
+        let found = world.request("GET", "/api/v1/shots?bbox=350,-5,10,5", &[&accept], "");
+        assert_eq!(found.status, 200, "{}", found.text());
+        assert_eq!(found.header("content-type"), Some(media));
+        assert_eq!(found.header("areograph-complete"), Some("true"));
+        assert_eq!(found.header("areograph-rows"), Some("0"));
+        assert!(
+            found.text().starts_with(beginning),
+            "{media}: {}",
+            found.text()
+        );
+    }
+    let left = std::fs::read_dir(world.path("state/requests"))
+        .unwrap()
+        .count();
+    assert_eq!(left, 0, "files of requests are removed");
+}
+
 /// Serves the filled database on a fixed port until it is ended, for looking at pages by hand and for `scripts/look`.
 #[test]
 #[ignore = "for looking at pages by hand"]
@@ -697,7 +743,7 @@ fn serve_until_ended() {
         .unwrap();
     let world = World::at(
         "127.0.0.1:8471",
-        "",
+        "open_reading = \"no\"",
         i64::try_from(now_ms.as_millis()).unwrap(),
     );
     println!("http://{} {}", world.address, world.tokens.operate);

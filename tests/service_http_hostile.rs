@@ -155,7 +155,7 @@ fn forged_origins(world: &World) -> Vec<Hostile> {
                 "POST",
                 "/api/v1/jobs",
                 &format!("{token}Sec-Fetch-Site: cross-site\r\n"),
-                "{\"all\":true}",
+                "{\"sites\":\"all\"}",
             ),
             &[403],
         ),
@@ -165,7 +165,7 @@ fn forged_origins(world: &World) -> Vec<Hostile> {
                 "POST",
                 "/api/v1/jobs",
                 &format!("{token}Sec-Fetch-Site: same-site\r\n"),
-                "{\"all\":true}",
+                "{\"sites\":\"all\"}",
             ),
             &[403],
         ),
@@ -178,7 +178,7 @@ fn forged_origins(world: &World) -> Vec<Hostile> {
                     "Authorization: Bearer {}\r\nContent-Type: text/plain\r\n",
                     world.tokens.operate
                 ),
-                "{\"all\":true}",
+                "{\"sites\":\"all\"}",
             ),
             &[415],
         ),
@@ -319,7 +319,7 @@ fn tokens(world: &World) -> Vec<Hostile> {
             "POST",
             "/api/v1/jobs",
             &format!("Content-Type: application/json\r\n{authorization}"),
-            "{\"all\":true}",
+            "{\"sites\":\"all\"}",
         )
     };
     vec![
@@ -451,13 +451,8 @@ fn documents(world: &World) -> Vec<Hostile> {
             &[422],
         ),
         hostile(
-            "sites and all",
-            send(
-                "POST",
-                "/api/v1/jobs",
-                &token,
-                "{\"sites\":[\"alpha\"],\"all\":true}",
-            ),
+            "no sites",
+            send("POST", "/api/v1/jobs", &token, "{\"sites\":[]}"),
             &[400],
         ),
         hostile(
@@ -466,7 +461,7 @@ fn documents(world: &World) -> Vec<Hostile> {
                 "POST",
                 "/api/v1/jobs",
                 &token,
-                "{\"all\":true,\"reason\":\"a\\n[ERROR] b\"}",
+                "{\"sites\":\"all\",\"reason\":\"a\\n[ERROR] b\"}",
             ),
             &[400],
         ),
@@ -476,7 +471,7 @@ fn documents(world: &World) -> Vec<Hostile> {
                 "POST",
                 "/api/v1/jobs",
                 &format!("{token}Idempotency-Key: a b\r\n"),
-                "{\"all\":true}",
+                "{\"sites\":\"all\"}",
             ),
             &[400],
         ),

@@ -7,7 +7,7 @@ use axum::{
 use serde::{Deserialize, Serialize};
 use utoipa::{IntoParams, ToSchema};
 
-use crate::service::http::{app::App, problem::Problem};
+use crate::service::http::{app::App, extract::name, problem::Problem};
 
 /// Most items of a list at once.
 const MOST: u32 = 200;
@@ -33,27 +33,53 @@ pub(super) fn answer_with<T: Serialize>(
     Ok(response)
 }
 
-/// Which piece of a list is wanted.
+/// Which piece of a list by number is wanted.
 #[derive(Debug, Deserialize, IntoParams)]
 #[into_params(parameter_in = Query)]
 #[serde(deny_unknown_fields)]
-pub(super) struct Piece {
+pub(super) struct ByNumber {
     /// `next` of the piece before.
-    #[param(max_length = 64)]
-    pub(super) after: Option<String>,
+    #[param(minimum = 0)]
+    after: Option<i64>,
     /// Most items, 50 unless told.
     #[param(minimum = 1, maximum = 200)]
-    pub(super) limit: Option<u32>,
+    limit: Option<u32>,
 }
 
-impl Piece {
+impl ByNumber {
     pub(super) fn limit(&self) -> Result<u32, Problem> {
         limit(self.limit)
     }
 
-    /// The cursor of a list that is ordered by numbers.
-    pub(super) fn number(&self) -> Result<Option<i64>, Problem> {
-        number(self.after.as_deref())
+    pub(super) fn after(&self) -> Result<Option<i64>, Problem> {
+        number(self.after)
+    }
+}
+
+/// Which piece of a list by name is wanted.
+#[derive(Debug, Deserialize, IntoParams)]
+#[into_params(parameter_in = Query)]
+#[serde(deny_unknown_fields)]
+pub(super) struct ByName {
+    /// `next` of the piece before.
+    #[param(pattern = "^[A-Za-z0-9_-]{1,64}$")]
+    after: Option<String>,
+    /// Most items, 50 unless told.
+    #[param(minimum = 1, maximum = 200)]
+    limit: Option<u32>,
+}
+
+impl ByName {
+    pub(super) fn limit(&self) -> Result<u32, Problem> {
+        limit(self.limit)
+    }
+
+    pub(super) fn after(&self) -> Result<Option<String>, Problem> {
+        let Some(after) = self.after.as_deref() else {
+            return Ok(None);
+        };
+        let known = name(after).map_err(|_| not_next(after))?;
+        Ok(Some(known.to_owned()))
     }
 }
 
@@ -66,15 +92,17 @@ pub(super) fn limit(given: Option<u32>) -> Result<u32, Problem> {
     }
 }
 
-pub(super) fn number(after: Option<&str>) -> Result<Option<i64>, Problem> {
-    let parse = |text: &str| text.parse().ok().filter(|number| *number >= 0);
-    match after.map(|text| (text, parse(text))) {
-        None => Ok(None),
-        Some((_, Some(number))) => Ok(Some(number)),
-        Some((text, None)) => Err(Problem::bad_request(format!(
-            "after is {text:?}; expected next of the piece before."
-        ))),
+pub(super) fn number(after: Option<i64>) -> Result<Option<i64>, Problem> {
+    match after {
+        Some(after @ ..0) => Err(not_next(after)),
+        after => Ok(after),
     }
+}
+
+fn not_next(after: impl std::fmt::Display) -> Problem {
+    Problem::bad_request(format!(
+        "after is {after}; expected next of the piece before."
+    ))
 }
 
 /// A piece of a list.

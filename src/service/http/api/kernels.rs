@@ -6,7 +6,7 @@ use axum::{extract::State, response::Response};
 use serde::Serialize;
 use utoipa::ToSchema;
 
-use super::answer::{List, Piece, answer};
+use super::answer::{ByNumber, List, answer};
 use crate::service::{
     database::shown::{KernelFile, kernel_by_hash, kernels, used_by},
     http::{
@@ -56,16 +56,16 @@ impl Kernel {
 }
 
 /// Files in the folders of kernels, in the order in which they were first seen.
-#[utoipa::path(get, path = "/api/v1/kernels", tag = "kernels", params(Piece), responses(
+#[utoipa::path(get, path = "/api/v1/kernels", tag = "kernels", params(ByNumber), responses(
     (status = 200, body = List<Kernel>),
     (status = "4XX", body = ProblemDocument, content_type = "application/problem+json"),
 ))]
 pub(super) async fn list(
     _: Reader,
     State(app): State<Arc<App>>,
-    Asked(piece): Asked<Piece>,
+    Asked(piece): Asked<ByNumber>,
 ) -> Result<Response, Problem> {
-    let (limit, after) = (piece.limit()?, piece.number()?);
+    let (limit, after) = (piece.limit()?, piece.after()?);
     let found = app
         .read(move |connection| kernels(connection, after.unwrap_or(0), limit + 1))
         .await?;

@@ -7,6 +7,7 @@ mod jobs;
 mod kernels;
 mod life;
 mod logs;
+mod new_jobs;
 mod nights;
 mod plans;
 mod runs;
@@ -82,7 +83,7 @@ fn described() -> OpenApiRouter<Arc<App>> {
         .routes(routes!(plans::begin))
         .routes(routes!(plans::one))
         .routes(routes!(shots::in_box, shots::in_polygon))
-        .routes(routes!(jobs::list, jobs::create))
+        .routes(routes!(jobs::list, new_jobs::create))
         .routes(routes!(jobs::one))
         .routes(routes!(jobs::cancel_one))
         .routes(routes!(jobs::retry_one))

@@ -7,7 +7,7 @@ use serde::Serialize;
 use utoipa::ToSchema;
 
 use super::{
-    answer::{List, Piece, answer},
+    answer::{ByNumber, List, answer},
     jobs::JobLine,
 };
 use crate::service::{
@@ -24,16 +24,16 @@ use crate::service::{
 const MOST: u32 = 1000;
 
 /// Nights, the newest first.
-#[utoipa::path(get, path = "/api/v1/nights", tag = "nights", params(Piece), responses(
+#[utoipa::path(get, path = "/api/v1/nights", tag = "nights", params(ByNumber), responses(
     (status = 200, body = List<Night>),
     (status = "4XX", body = ProblemDocument, content_type = "application/problem+json"),
 ))]
 pub(super) async fn list(
     _: Reader,
     State(app): State<Arc<App>>,
-    Asked(piece): Asked<Piece>,
+    Asked(piece): Asked<ByNumber>,
 ) -> Result<Response, Problem> {
-    let (limit, before) = (piece.limit()?, piece.number()?);
+    let (limit, before) = (piece.limit()?, piece.after()?);
     let found = app
         .read(move |connection| nights(connection, before, limit + 1))
         .await?;

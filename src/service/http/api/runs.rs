@@ -7,7 +7,7 @@ use serde::Deserialize;
 use utoipa::ToSchema;
 
 use super::{
-    answer::{List, Piece, answer},
+    answer::{ByName, List, answer},
     sites::find as find_site,
 };
 use crate::service::{
@@ -23,7 +23,7 @@ use crate::service::{
 
 /// Runs of a site, the newest first.
 #[utoipa::path(get, path = "/api/v1/sites/{site}/runs", tag = "runs", params(
-    ("site" = String, Path, description = "Name of the site", pattern = "^[A-Za-z0-9_-]{1,64}$"), Piece,
+    ("site" = String, Path, description = "Name of the site", pattern = "^[A-Za-z0-9_-]{1,64}$"), ByName,
 ), responses(
     (status = 200, body = List<Run>),
     (status = "4XX", body = ProblemDocument, content_type = "application/problem+json"),
@@ -32,11 +32,11 @@ pub(super) async fn of_site(
     _: Reader,
     State(app): State<Arc<App>>,
     At(site): At<String>,
-    Asked(piece): Asked<Piece>,
+    Asked(piece): Asked<ByName>,
 ) -> Result<Response, Problem> {
     let limit = piece.limit()?;
     let site = find_site(&app, &site).await?.name;
-    let after = piece.after.clone();
+    let after = piece.after()?;
     let found = app
         .read(move |connection| runs_of_site(connection, &site, after.as_deref(), limit + 1))
         .await?;

@@ -48,7 +48,10 @@ const FORMS: [(&str, &str); 3] = [
 #[serde(deny_unknown_fields)]
 pub(super) struct BoxWanted {
     /// West, south, east, north: degrees of east longitude, from -180 to 360, and areocentric latitude.
-    #[param(example = "340.0,-10.0,345.0,-5.0")]
+    #[param(
+        example = "340.0,-10.0,345.0,-5.0",
+        pattern = r"^-?[0-9]{1,3}(\.[0-9]{1,9})?(,-?[0-9]{1,3}(\.[0-9]{1,9})?){3}$"
+    )]
     bbox: String,
 }
 

@@ -7,7 +7,7 @@ use axum::{
     response::{IntoResponse as _, Redirect, Response},
 };
 
-use super::answer::{List, Piece, answer};
+use super::answer::{ByName, List, answer};
 use crate::service::{
     database::shown::{Site, site, sites},
     http::{
@@ -19,17 +19,17 @@ use crate::service::{
 };
 
 /// All sites, by name.
-#[utoipa::path(get, path = "/api/v1/sites", tag = "sites", params(Piece), responses(
+#[utoipa::path(get, path = "/api/v1/sites", tag = "sites", params(ByName), responses(
     (status = 200, body = List<Site>),
     (status = "4XX", body = ProblemDocument, content_type = "application/problem+json"),
 ))]
 pub(super) async fn list(
     _: Reader,
     State(app): State<Arc<App>>,
-    Asked(piece): Asked<Piece>,
+    Asked(piece): Asked<ByName>,
 ) -> Result<Response, Problem> {
     let limit = piece.limit()?;
-    let after = piece.after.unwrap_or_default();
+    let after = piece.after()?.unwrap_or_default();
     let found = app
         .read(move |connection| sites(connection, &after, limit + 1))
         .await?;
