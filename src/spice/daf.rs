@@ -6,6 +6,7 @@
 mod contents;
 mod layout;
 mod neighbours;
+mod problem;
 
 use std::{
     fs::File,

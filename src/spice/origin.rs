@@ -36,6 +36,20 @@ pub(super) fn of_state(set: &KernelSet, cspice: &Cspice, et: Et) -> Option<Origi
     None
 }
 
+/// The ephemeris that CSPICE reads for the spacecraft at `et`.
+pub(super) fn of_spacecraft(set: &KernelSet, et: Et) -> Option<PathBuf> {
+    let holds = |segment: &daf::Segment| {
+        let part = interval_of([segment.start, segment.stop]);
+        segment.integers[0] == SPACECRAFT.naif && part.contains(et)
+    };
+    let mut spks = set.kernels().iter().rev();
+    let found = spks.find(|kernel| {
+        let segments = (kernel.role == KernelRole::Spk).then(|| daf::segments(&kernel.path));
+        segments.is_some_and(|segments| segments.is_ok_and(|of| of.iter().any(holds)))
+    });
+    found.map(|kernel| kernel.path.clone())
+}
+
 /// The interval of attitude that CSPICE reads at `kernel_time`, or within `reach_s` seconds of it.
 pub(super) fn of_attitude(
     set: &KernelSet,

@@ -3,9 +3,9 @@
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
-use super::{error::SpiceError, session::Session};
+use super::{error::SpiceError, origin, session::Session};
 use crate::{
-    error::Result,
+    error::{Error, Result},
     frames::{J2000, Position},
     geom::chebyshev::ChebyshevVector,
     time::{Et, Interval, Intervals},
@@ -114,7 +114,11 @@ impl Session {
                 piece_s,
                 tolerance_m,
             };
-            return Err(error.into());
+            let failure = Error::from(error);
+            return Err(match origin::of_spacecraft(self.kernels(), middle) {
+                Some(kernel) => failure.in_file(kernel),
+                None => failure,
+            });
         }
         to_do.push(Interval::new(middle, interval.stop));
         to_do.push(Interval::new(interval.start, middle));

@@ -97,7 +97,9 @@ impl HashCache {
         };
         let mut known: Vec<KnownFile> = {
             let mut known = self.known();
-            learnt.iter().for_each(|file| known.add(*file));
+            for file in learnt {
+                known.add(*file);
+            }
             known.iter().copied().collect()
         };
         known.sort_by_key(|file| std::cmp::Reverse(file.read_s));

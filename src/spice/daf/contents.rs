@@ -4,8 +4,9 @@ use super::{
     Reader, Segment,
     layout::{DIRECTORY_STEP, Layout, List, Packet, STATE, layout},
     neighbours::{self, States, Times},
+    problem::Problem,
 };
-use crate::{error::Error, spice::role::KernelRole};
+use crate::spice::role::KernelRole;
 
 /// Words read at a time.
 const CHUNK_WORDS: usize = 1 << 16;
@@ -17,36 +18,6 @@ const STRETCH_TOLERANCE: f64 = 1e-6;
 /// How far a quaternion's norm may lie from 1. Quaternions that were stored in single precision, or
 /// counted in 16 bits on board, stay below it.
 const NORM_TOLERANCE: f64 = 5e-4;
-
-/// Why a segment is not as it says.
-pub(super) enum Problem {
-    /// Its words contradict each other.
-    Damaged(String),
-    /// They cannot be read.
-    Unreadable(Error),
-}
-
-impl Problem {
-    /// As an error that says which segment it is.
-    pub(super) fn of(self, segment: &str) -> Error {
-        match self {
-            Self::Damaged(problem) => super::damaged(format!("{segment}: {problem}")),
-            Self::Unreadable(error) => error,
-        }
-    }
-}
-
-impl From<String> for Problem {
-    fn from(problem: String) -> Self {
-        Self::Damaged(problem)
-    }
-}
-
-impl From<Error> for Problem {
-    fn from(error: Error) -> Self {
-        Self::Unreadable(error)
-    }
-}
 
 /// Reads a segment from its counts to its last packet.
 pub(super) fn check(

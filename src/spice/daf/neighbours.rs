@@ -7,7 +7,7 @@
 
 use nalgebra::Vector3;
 
-use super::{Reader, contents::Problem, layout::STATE};
+use super::{Reader, layout::STATE, problem::Problem};
 
 /// Neighbours on either side that take part.
 const REACH: usize = 3;

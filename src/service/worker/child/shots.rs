@@ -286,19 +286,13 @@ impl Writer {
                     .map_err(IoError::on("write"))
                     .in_file(into)?;
             }
-            Form::Parquet(Some(writer)) => {
-                writer
-                    .close()
-                    .map_err(refused("written as Parquet"))
-                    .in_file(into)?;
-            }
-            Form::Parquet(None) => {
-                let schema = Schema::new(vec![Field::new(SITE, DataType::Utf8, false)]);
-                let writer = parquet_writer(again(&self.file)?, &schema).in_file(into)?;
-                writer
-                    .close()
-                    .map_err(refused("written as Parquet"))
-                    .in_file(into)?;
+            Form::Parquet(writer) => {
+                let none = Schema::new(vec![Field::new(SITE, DataType::Utf8, false)]);
+                let empty = || parquet_writer(again(&self.file)?, &none);
+                let closed = writer
+                    .map_or_else(empty, Ok)
+                    .and_then(|writer| writer.close().map_err(refused("written as Parquet")));
+                closed.in_file(into)?;
             }
         }
         self.file
