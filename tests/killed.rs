@@ -41,11 +41,20 @@ fn run(site: &Path, out: &Path, threads: &str) -> Command {
     command
 }
 
+/// Whether a call changes a file below `out`. Hashes of input files do not count: whether a run keeps them depends on how long
+/// ago the files changed.
+fn changes_file(call: &Call, out: &Path) -> bool {
+    let name = call.path.file_name().unwrap_or_default().to_string_lossy();
+    let of_hashes = name.starts_with(".hashes") || name.starts_with(".partial-");
+    let is_hashes = call.path.parent() == Some(out) && of_hashes;
+    call.changes() && call.path.starts_with(out) && !is_hashes
+}
+
 /// Every change of a file below `out` that an undisturbed run makes, in order.
 fn changes(command: &Command, out: &Path) -> Vec<Call> {
     let mut changes = Vec::new();
     let ended = traced(command, |call| {
-        if call.changes() && call.path.starts_with(out) {
+        if changes_file(call, out) {
             changes.push(call.clone());
         }
         Then::GoOn
@@ -58,7 +67,7 @@ fn changes(command: &Command, out: &Path) -> Vec<Call> {
 fn kill_before(command: &Command, out: &Path, place: usize) {
     let mut made = 0;
     let ended = traced(command, |call| {
-        if !(call.changes() && call.path.starts_with(out)) {
+        if !changes_file(call, out) {
             return Then::GoOn;
         }
         made += 1;
