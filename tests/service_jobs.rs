@@ -10,7 +10,7 @@ use std::collections::BTreeMap;
 use areograph::service::{
     database::{
         Ask, CauseKind, CauseRow, Database, DatabaseError, Job, JobFilter, Moved, Priority,
-        advance, ask, ask_cancel, causes, job, jobs, next_queued, pending_job, wait_again,
+        advance, ask, ask_cancel, causes, job, jobs, next_queued,
     },
     state::JobState,
 };
@@ -175,7 +175,7 @@ impl Table {
     /// A way that the table has not is refused and changes nothing.
     fn send(&self, found: &Job, to: JobState, counts: bool) {
         let now_ms = self.now_ms;
-        // Two pending or two active jobs of one site are refused by the database; the engine hands over instead (`wait_again`).
+        // Two pending or two active jobs of one site: the database refuses what the engine never asks for.
         let others = self
             .all()
             .into_iter()
@@ -284,54 +284,4 @@ fn a_job_rises_by_a_class_an_hour_so_that_none_starves() {
     assert_eq!(next(&table, false).as_deref(), Some("gusev"));
     table.ask("isidis", Priority::Asked, true);
     assert_eq!(next(&table, true).as_deref(), Some("isidis"));
-}
-
-#[test]
-fn a_job_that_waits_again_gives_way_to_one_that_waits_already() {
-    let table = Table::new();
-    table.ask("eos", Priority::Asked, true);
-    let first = table.all().remove(0);
-    for state in [JobState::Starting, JobState::Running] {
-        let found = table.all().pop().unwrap();
-        table.send(&found, state, false);
-    }
-    // Its inputs change while it runs, and its worker dies.
-    table.ask("eos", Priority::Changed, false);
-    let running = table.all().pop().unwrap();
-    assert_eq!((running.id, running.state), (first.id, JobState::Running));
-    let moved = Moved {
-        counts_as_failure: true,
-        ..Moved::default()
-    };
-    for (to, ends) in [
-        (JobState::Queued, JobState::Superseded),
-        (JobState::Blocked, JobState::Superseded),
-        (JobState::Waiting, JobState::Superseded),
-    ] {
-        let undone = table.database.write(|transaction| {
-            wait_again(transaction, 1, &running, to, &moved)?;
-            let now = job(transaction, running.id)?.unwrap();
-            assert_eq!(now.state, ends, "{to}");
-            let waits = pending_job(transaction, "eos")?.unwrap();
-            assert_eq!((waits.state, waits.failures), (JobState::Held, 1));
-            assert_eq!(waits.priority, Priority::Asked);
-            assert_eq!(causes(transaction, waits.id)?.len(), 1);
-            // Undone, for the next state.
-            Err::<(), _>(DatabaseError::Damaged(String::new()))
-        });
-        assert!(matches!(undone, Err(DatabaseError::Damaged(_))));
-    }
-    // With none that waits it waits itself.
-    let gusev = {
-        table.ask("gusev", Priority::Changed, true);
-        let found = table.all().remove(0);
-        table.send(&found, JobState::Starting, false);
-        table.all().remove(0)
-    };
-    let waits = table.database.write(|transaction| {
-        wait_again(transaction, 1, &gusev, JobState::Waiting, &moved)?;
-        Ok(job(transaction, gusev.id)?.unwrap())
-    });
-    let waits = waits.unwrap();
-    assert_eq!((waits.state, waits.failures), (JobState::Waiting, 1));
 }

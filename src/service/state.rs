@@ -35,7 +35,7 @@ pub enum JobState {
     Failed,
     /// Ended: a person did not want it.
     Cancelled,
-    /// Ended: its inputs went back to what they were, or another job of the site goes on with it.
+    /// Ended: its inputs went back to what they were.
     Superseded,
 }
 
@@ -68,15 +68,13 @@ impl JobState {
             Held => &[Queued, Cancelled, Superseded],
             Queued => &[Starting, Held, Cancelled, Superseded],
             // A worker that never said hello may have published all the same: what is on the disk wins.
-            // From a worker back among those that wait, where one of the site waits already: that one goes on with it.
             Starting => &[
-                Running, Waiting, Queued, Cancelling, Succeeded, Invalid, Failed, Superseded,
+                Running, Waiting, Queued, Cancelling, Succeeded, Invalid, Failed,
             ],
             Running => &[
                 Succeeded, Unchanged, Invalid, Failed, Blocked, Waiting, Queued, Cancelling,
-                Superseded,
             ],
-            Cancelling => &[Cancelled, Succeeded, Unchanged, Invalid, Queued, Superseded],
+            Cancelling => &[Cancelled, Succeeded, Unchanged, Invalid, Queued],
             Waiting => &[Queued, Held, Cancelled, Superseded],
             Blocked => &[Queued, Held, Cancelled, Superseded],
             Succeeded | Unchanged | Invalid | Failed | Cancelled | Superseded => &[],
@@ -93,15 +91,6 @@ impl JobState {
     #[must_use]
     pub const fn is_active(self) -> bool {
         matches!(self, Self::Starting | Self::Running | Self::Cancelling)
-    }
-
-    /// Whether it waits for its turn, or for something to happen.
-    #[must_use]
-    pub const fn is_pending(self) -> bool {
-        matches!(
-            self,
-            Self::Held | Self::Queued | Self::Waiting | Self::Blocked
-        )
     }
 
     /// Its name in the database, in the interface and on pages.

@@ -6,7 +6,6 @@ mod causes;
 mod events;
 pub mod facts;
 pub mod files;
-mod handover;
 mod jobs;
 pub mod nights;
 pub mod runs;
@@ -27,7 +26,6 @@ use crate::error::{Cause, IoError, Kind, Locate as _, Result};
 
 pub use causes::{CauseKind, CauseRow, add_cause, causes};
 pub use events::{About, Event, append, events_after, newest_event};
-pub use handover::wait_again;
 pub use jobs::{
     Ask, Asked, Job, JobFilter, Moved, Priority, WrongTransition, active_job, advance, ask,
     ask_cancel, due_waiting, job, jobs, jobs_in, next_queued, pending_job,

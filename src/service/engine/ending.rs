@@ -19,7 +19,6 @@ use crate::{
             attempts::{AttemptEnd, end_attempt},
             causes, job,
             runs::{RunRow, put_current, put_run},
-            wait_again,
         },
         state::JobState,
         worker::{
@@ -145,9 +144,6 @@ fn go(
     if from_start {
         let running = Moved::default();
         advance(transaction, now_ms, job.id, JobState::Running, &running)?;
-    }
-    if state.is_pending() {
-        return wait_again(transaction, now_ms, job, state, moved);
     }
     advance(transaction, now_ms, job.id, state, moved)
 }
