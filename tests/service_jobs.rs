@@ -10,7 +10,7 @@ use std::collections::BTreeMap;
 use areograph::service::{
     database::{
         Ask, CauseKind, CauseRow, Database, DatabaseError, Job, JobFilter, Moved, Priority,
-        advance, ask, ask_cancel, causes, job, jobs, next_queued,
+        advance, ask, ask_cancel, causes, give_back, job, jobs, next_queued,
     },
     state::JobState,
 };
@@ -187,14 +187,29 @@ impl Table {
             counts_as_failure: counts,
             ..Moved::default()
         };
-        let sent = self
-            .database
-            .write(|transaction| advance(transaction, now_ms, found.id, to, &moved));
+        let back = found.state.is_active() && is_pending(to);
+        let others = self.all().into_iter();
+        let waits = others
+            .filter(|job| job.site == found.site && is_pending(job.state))
+            .next();
+        let sent = self.database.write(|transaction| {
+            if back {
+                give_back(transaction, now_ms, found.id, to, &moved)
+            } else {
+                advance(transaction, now_ms, found.id, to, &moved)
+            }
+        });
         let now = self
             .database
             .read(|connection| job(connection, found.id))
             .unwrap()
             .unwrap();
+        if let Some(waits) = waits.filter(|_| back && now != *found) {
+            sent.unwrap();
+            assert_eq!((now.state, now.failures), (JobState::Queued, 0));
+            assert!(now.priority >= waits.priority);
+            return;
+        }
         match sent {
             Ok(()) => {
                 assert!(found.state.next().contains(&to));

@@ -68,10 +68,7 @@ fn nightly(arguments: &Arguments) -> Result<u8, Error> {
     let Some(night) = night.filter(|night| night.ended_ms.is_some()) else {
         return Ok(Kind::Interrupted.exit_code());
     };
-    output::line(format_args!(
-        "{} sites compared, {} runs, {} failures",
-        night.sites_checked, night.runs, night.failures
-    ));
+    output::line(night.words());
     exit_code(&shared, night.id).in_file(&state)
 }
 

@@ -7,7 +7,7 @@ use utoipa::ToSchema;
 
 use super::{
     About, DatabaseError, Stored, append,
-    causes::{CauseRow, add_cause},
+    causes::{CauseRow, add_cause, causes},
 };
 use crate::service::state::JobState;
 
@@ -226,6 +226,48 @@ pub fn advance(
         ],
     )?;
     tell(transaction, now_ms, id, &site, to, moved.outcome.as_ref())
+}
+
+/// Moves a job from a worker back to those that wait. A job of the same site that came meanwhile is taken in: its causes, and that it is to be
+/// done at once.
+///
+/// # Errors
+/// As [`advance`].
+pub fn give_back(
+    transaction: &Transaction<'_>,
+    now_ms: i64,
+    id: i64,
+    to: JobState,
+    moved: &Moved,
+) -> Stored<()> {
+    let waiting = match job(transaction, id)? {
+        Some(job) => pending_job(transaction, &job.site)?,
+        None => None,
+    };
+    let Some(waiting) = waiting.filter(|_| !to.is_final() && !to.is_active()) else {
+        return advance(transaction, now_ms, id, to, moved);
+    };
+    let taken_in = Moved {
+        outcome: Some(json!({ "text": format!("taken in by job {id}"), "job": id })),
+        ..Moved::default()
+    };
+    advance(
+        transaction,
+        now_ms,
+        waiting.id,
+        JobState::Superseded,
+        &taken_in,
+    )?;
+    for cause in causes(transaction, waiting.id)? {
+        add_cause(transaction, id, &cause)?;
+    }
+    advance(transaction, now_ms, id, JobState::Queued, moved)?;
+    transaction.execute(
+        "UPDATE job SET priority = max(priority, ?2), force = max(force, ?3), night = coalesce(?4, night),
+         asked_by = coalesce(?5, asked_by), failures = 0, not_before_ms = 0 WHERE id = ?1",
+        params![id, waiting.priority as i64, waiting.force, waiting.night, waiting.asked_by],
+    )?;
+    Ok(())
 }
 
 fn tell(

@@ -28,7 +28,7 @@ pub use causes::{CauseKind, CauseRow, add_cause, causes};
 pub use events::{About, Event, append, events_after, newest_event};
 pub use jobs::{
     Ask, Asked, Job, JobFilter, Moved, Priority, WrongTransition, active_job, advance, ask,
-    ask_cancel, due_waiting, job, jobs, jobs_in, next_queued, pending_job,
+    ask_cancel, due_waiting, give_back, job, jobs, jobs_in, next_queued, pending_job,
 };
 
 /// Name of the database in the folder of the state.
@@ -52,7 +52,7 @@ pub struct Database {
 pub enum DatabaseError {
     /// SQLite's own reason.
     #[error("the database of the service: {0}")]
-    Sqlite(#[from] rusqlite::Error),
+    Sqlite(#[source] rusqlite::Error),
     /// The file is not sound.
     #[error("the database is damaged: {0}")]
     Damaged(String),
@@ -71,6 +71,16 @@ pub enum DatabaseError {
     /// A job cannot go where it was sent.
     #[error(transparent)]
     Transition(#[from] WrongTransition),
+}
+
+impl From<rusqlite::Error> for DatabaseError {
+    fn from(error: rusqlite::Error) -> Self {
+        use rusqlite::ErrorCode::{DatabaseCorrupt, NotADatabase};
+        match error.sqlite_error_code() {
+            Some(DatabaseCorrupt | NotADatabase) => Self::Damaged(error.to_string()),
+            _ => Self::Sqlite(error),
+        }
+    }
 }
 
 impl Cause for DatabaseError {

@@ -51,6 +51,20 @@ pub struct Night {
     pub failures: i64,
 }
 
+impl Night {
+    /// What came of it.
+    #[must_use]
+    pub fn words(&self) -> String {
+        let count = |count: i64, what: &str| {
+            let plural = if count == 1 { "" } else { "s" };
+            format!("{count} {what}{plural}")
+        };
+        let checked = count(self.sites_checked, "site");
+        let (runs, failures) = (count(self.runs, "run"), count(self.failures, "failure"));
+        format!("{checked} compared, {runs}, {failures}")
+    }
+}
+
 /// Notes a night; of two with the same instant the first stays, and then there is no number.
 ///
 /// # Errors

@@ -39,7 +39,12 @@ pub fn tell(
     alert: &Alert<'_>,
     more: &Value,
 ) -> Stored<()> {
-    tracing::warn!(kind = ?alert.kind, site = alert.site, "{}", alert.text);
+    match alert.kind {
+        AlertKind::Recovered | AlertKind::RootBack | AlertKind::NightComplete => {
+            tracing::info!(site = alert.site, "{}", alert.text);
+        }
+        _ => tracing::warn!(site = alert.site, "{}", alert.text),
+    }
     let about = About {
         site: alert.site,
         job: None,

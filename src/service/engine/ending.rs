@@ -17,7 +17,7 @@ use crate::{
         database::{
             About, DatabaseError, Job, Moved, Stored, advance, append,
             attempts::{AttemptEnd, end_attempt},
-            causes, job,
+            causes, give_back, job,
             runs::{RunRow, put_current, put_run},
         },
         state::JobState,
@@ -70,7 +70,7 @@ pub fn finish<W: Workers>(
     let now_ms = core.now_ms();
     core.shared.write(|transaction| {
         let job = job(transaction, attempt.job)?
-            .ok_or(DatabaseError::Sqlite(rusqlite::Error::QueryReturnedNoRows))?;
+            .ok_or(DatabaseError::from(rusqlite::Error::QueryReturnedNoRows))?;
         let end = AttemptEnd {
             how: &words(ended),
             exit: match ended.how {
@@ -145,7 +145,7 @@ fn go(
         let running = Moved::default();
         advance(transaction, now_ms, job.id, JobState::Running, &running)?;
     }
-    advance(transaction, now_ms, job.id, state, moved)
+    give_back(transaction, now_ms, job.id, state, moved)
 }
 
 fn standing(state: JobState) -> Option<Standing> {

@@ -135,11 +135,7 @@ pub fn end_done<W: Workers>(core: &Core<W>, night: i64) -> Stored<Option<Night>>
         let Some(night) = end_night(transaction, night, now_ms)? else {
             return Ok(None);
         };
-        let text = format!(
-            "{} sites compared, {} runs, {} failures",
-            night.sites_checked, night.runs, night.failures
-        );
-        tracing::info!(night = night.id, "the night is over: {text}");
+        let text = format!("the night is over: {}", night.words());
         let summary = json!({
             "night": night.id,
             "due": utc_text(night.due_ms),

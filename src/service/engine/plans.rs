@@ -133,15 +133,15 @@ impl Context<'_> {
         let mut causes = self.causes(transaction, &before, &inputs, answer)?;
         put_inputs(transaction, self.name(), &inputs)?;
         let runs = answer.stages.iter().any(|stage| stage.runs);
+        if runs && causes.is_empty() {
+            let (kind, text) = self.without_change(transaction)?;
+            causes.push(CauseRow::plain(kind, text, self.now_ms));
+        }
         let note = decision(&causes, answer);
         self.checked(transaction, Some(answer), None, &note)?;
         if !runs {
             self.supersede(transaction, &note)?;
             return Ok(note);
-        }
-        if causes.is_empty() {
-            let (kind, text) = self.without_change(transaction)?;
-            causes.push(CauseRow::plain(kind, text, self.now_ms));
         }
         for cause in &mut causes {
             cause.detail = change_text(cause, answer);

@@ -16,6 +16,11 @@ const NAMED_MAX: usize = 4;
 /// What a comparison decided, in one sentence.
 #[must_use]
 pub fn decision(causes: &[CauseRow], answer: &PlanAnswer) -> String {
+    if let [cause] = causes
+        && answer.stages.iter().any(|stage| stage.runs)
+    {
+        return change_text(cause, answer);
+    }
     let changed: Vec<&str> = causes.iter().map(|cause| &*cause.detail).collect();
     let runs = stages(&answer.stages);
     match (changed.is_empty(), runs.is_empty()) {
@@ -131,9 +136,10 @@ mod tests {
             change_text(&cause, &answer),
             "`mgs_sc_ext1.bc` changed; its coverage meets image E02-01453; stages sample_orientation, publish run"
         );
+        let also = CauseRow::plain(CauseKind::KernelChanged, "`mgs_clock.tsc` changed", 0);
         assert_eq!(
-            decision(&[cause], &answer),
-            "`mgs_sc_ext1.bc` changed; stages sample_orientation, publish run"
+            decision(&[cause, also], &answer),
+            "`mgs_sc_ext1.bc` changed, `mgs_clock.tsc` changed; stages sample_orientation, publish run"
         );
         assert_eq!(
             decision(&[], &self::answer(&[])),

@@ -177,7 +177,9 @@ fn note_sweep<W: Workers>(
         }
         put_root(transaction, &now)?;
         if now.state != root.state {
-            tracing::info!("{} is {}: {}", now.path, now.state.name(), now.detail);
+            let why = if now.detail.is_empty() { "" } else { ": " };
+            let state = now.state.name();
+            tracing::info!("{} is {state}{why}{}", now.path, now.detail);
             let data = json!({ "path": now.path, "state": now.state.name(), "text": now.detail });
             append(transaction, now_ms, "root", About::default(), &data)?;
         }

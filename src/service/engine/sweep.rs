@@ -75,7 +75,8 @@ pub fn compare(sweep: &Sweep<'_>) -> Swept {
         Some(from_ms) => {
             let count = waiting.len() + news.len();
             let until = utc_text(from_ms.max(sweep.now_ms));
-            let detail = format!("{count} files changed; waiting for quiet period until {until}");
+            let files = if count == 1 { "file" } else { "files" };
+            let detail = format!("{count} {files} changed; waiting for quiet period until {until}");
             (RootState::Settling, Vec::new(), detail)
         }
     };
