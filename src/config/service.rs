@@ -93,15 +93,10 @@ declare_table! {
     /// Folders that are written; they are made where they are not there.
     pub struct ServiceOutputs {
         /// Products: `<products>/<site>/current` leads to those of the newest valid run.
-        products: PathBuf = key(text()).or("products".to_owned()).then(below_the_file),
+        products: PathBuf = key(text()).or("products".to_owned()).then(|path, keys: &mut Keys<'_, '_>| keys.review().resolve(&path)),
         /// Database, logs and copies of the database; on a local disk, for one service alone.
-        state: PathBuf = key(text()).or("state".to_owned()).then(below_the_file),
+        state: PathBuf = key(text()).or("state".to_owned()).then(|path, keys: &mut Keys<'_, '_>| keys.review().resolve(&path)),
     }
-}
-
-/// Paths count from the file's folder, defaults too.
-fn below_the_file(path: String, keys: &mut Keys<'_, '_>) -> PathBuf {
-    keys.review().resolve(&path)
 }
 
 declare_table! {
@@ -109,7 +104,7 @@ declare_table! {
     pub struct ScheduleConfig {
         /// Five fields: minute, hour, day of the month, month, day of the week.
         cron: String = key(matching(
-            "five fields as in `30 2 * * *`: minute, hour, day of the month, month, day of the week",
+            "five fields as in `30 2 * * *`",
             r"^\S+( +\S+){4}$",
             |text| text.split_ascii_whitespace().count() == 5,
         )).or("30 2 * * *".to_owned()),
@@ -209,10 +204,10 @@ declare_table! {
             r"^[0-9a-fA-F.:\[\]]+:[0-9]{1,5}$",
             |text| text.parse::<SocketAddr>().is_ok(),
         )).or("127.0.0.1:8470".to_owned()).then(|text, _: &mut Keys<'_, '_>| socket_address(&text)),
-        /// The address under which a proxy shows the service, as in https://mars.example.org; requests for another host are
+        /// The address under which a proxy shows the service, as in `https://mars.example.org`; requests for another host are
         /// refused.
         public_url: String = key(matching(
-            "https:// and a host, without a path",
+            "a host with https:// before it, without a path",
             r"^(https://[A-Za-z0-9.-]+(:[0-9]{1,5})?)?$",
             |text| text.is_empty() || is_public_url(text),
         )).or(String::new()).unused(r#""https://mars.example.org""#),

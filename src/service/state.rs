@@ -75,8 +75,7 @@ impl JobState {
                 Succeeded, Unchanged, Invalid, Failed, Blocked, Waiting, Queued, Cancelling,
             ],
             Cancelling => &[Cancelled, Succeeded, Unchanged, Invalid, Queued],
-            Waiting => &[Queued, Held, Cancelled, Superseded],
-            Blocked => &[Queued, Held, Cancelled, Superseded],
+            Waiting | Blocked => &[Queued, Held, Cancelled, Superseded],
             Succeeded | Unchanged | Invalid | Failed | Cancelled | Superseded => &[],
         }
     }

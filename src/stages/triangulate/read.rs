@@ -71,16 +71,16 @@ pub fn read_net(config: &NetConfig) -> Result<NetData> {
             };
             let picture = index.picture(&row.picture, &mut data);
             let point = index.point(&row.point, &mut data);
-            if !index.measured.insert((picture, point)) {
+            if index.measured.insert((picture, point)) {
+                data.net
+                    .measurements
+                    .push(Measurement { picture, point, at });
+            } else {
                 let text = format!(
                     "point {} is measured twice in picture {}",
                     row.point, row.picture
                 );
                 data.complain(format!("{}: {text}; the first is used", file_name(path)));
-            } else {
-                data.net
-                    .measurements
-                    .push(Measurement { picture, point, at });
             }
         }
     }
