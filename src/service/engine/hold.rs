@@ -138,3 +138,75 @@ pub fn hold_and_release(
     }
     Ok(())
 }
+
+/// Queues blocked jobs of sites that read below a folder which is available again: what they failed by may have been its absence,
+/// and none of their inputs has changed. So do those whose inputs are not known.
+///
+/// # Errors
+/// SQLite's own.
+pub fn wake_blocked(transaction: &Transaction<'_>, now_ms: i64, root: &str) -> Stored<()> {
+    let mut query = transaction.prepare_cached(
+        "SELECT NOT EXISTS (SELECT 1 FROM site_input WHERE site = ?1) OR EXISTS (SELECT 1 FROM site_input
+         WHERE site = ?1 AND path > ?2 || '/' AND path < ?2 || '0')",
+    )?;
+    for job in jobs_in(transaction, JobState::Blocked)? {
+        if query.query_row(params![job.site, root], |row| row.get(0))? {
+            let text = format!("{root} is available again");
+            let moved = Moved {
+                outcome: Some(json!({ "text": text })),
+                not_before_ms: Some(0),
+                ..Moved::default()
+            };
+            advance(transaction, now_ms, job.id, JobState::Queued, &moved)?;
+        }
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::service::database::{Ask, Database, Priority, ask, job};
+
+    #[test]
+    fn what_failed_while_its_folder_was_away_is_tried_again_when_it_is_back() {
+        let folder = tempfile::tempdir().unwrap();
+        let database = Database::open(folder.path()).unwrap();
+        let states = database.write(|transaction| {
+            let mut ids = Vec::new();
+            for (site, path) in [("eos", "/k/a.bc"), ("gusev", "/other/a.bc"), ("new", "")] {
+                transaction.execute(
+                    "INSERT INTO site (name, file, config_blake3, enabled) VALUES (?1, '', '', 1)",
+                    [site],
+                )?;
+                if !path.is_empty() {
+                    transaction.execute(
+                        "INSERT INTO site_input (site, path, role) VALUES (?1, ?2, 'kernel')",
+                        [site, path],
+                    )?;
+                }
+                let asked = Ask {
+                    site,
+                    priority: Priority::Changed,
+                    force: false,
+                    night: None,
+                    asked_by: None,
+                    ready: true,
+                    causes: &[],
+                };
+                let id = ask(transaction, 0, &asked)?.job;
+                for state in [JobState::Starting, JobState::Running, JobState::Blocked] {
+                    advance(transaction, 0, id, state, &Moved::default())?;
+                }
+                ids.push(id);
+            }
+            wake_blocked(transaction, 1, "/k")?;
+            let states = ids
+                .into_iter()
+                .map(|id| Ok(job(transaction, id)?.unwrap().state));
+            states.collect::<Stored<Vec<_>>>()
+        });
+        let expected = [JobState::Queued, JobState::Blocked, JobState::Queued];
+        assert_eq!(states.unwrap(), expected);
+    }
+}

@@ -1,6 +1,11 @@
 //! One round of comparisons: folders are listed, settled files read, and the sites planned that a change may touch.
 
-use std::{collections::BTreeMap, path::Path, sync::Arc, time::Duration};
+use std::{
+    collections::BTreeMap,
+    path::Path,
+    sync::Arc,
+    time::{Duration, Instant},
+};
 
 use serde_json::json;
 use tokio::task::JoinSet;
@@ -10,7 +15,7 @@ use super::{
     core::Core,
     folders::{Folder, folders},
     fresh::refresh,
-    hold::{NotReady, hold_and_release, not_ready},
+    hold::{NotReady, hold_and_release, not_ready, wake_blocked},
     listing::read_list,
     plans::{Candidate, plan},
     settle::settle,
@@ -125,12 +130,15 @@ async fn list<W: Workers>(core: &Arc<Core<W>>, folder: &Folder) -> Listing {
         roots: vec![folder.path.clone().into()],
         into: into.clone(),
     };
-    let limit = Duration::from_secs_f64(core.shared.config().changes.sweep_limit_s);
+    let limit_s = core.shared.config().changes.sweep_limit_s;
+    let limit = Duration::from_secs_f64(limit_s);
+    let begun = Instant::now();
     let ended = core
         .ask(&format!("list {}", folder.path), what, limit)
         .await;
     let listing = match &ended.answer {
         Some(Ok(Answer::List { .. })) => read_list(&into, Path::new(&folder.path), folder.kind),
+        _ if begun.elapsed() >= limit => Err(format!("it could not be listed within {limit_s} s")),
         _ => Err(words(&ended)),
     };
     let _ = std::fs::remove_file(into);
@@ -182,6 +190,9 @@ fn note_sweep<W: Workers>(
             tracing::info!("{} is {state}{why}{}", now.path, now.detail);
             let data = json!({ "path": now.path, "state": now.state.name(), "text": now.detail });
             append(transaction, now_ms, "root", About::default(), &data)?;
+            if root.state == RootState::Unavailable {
+                wake_blocked(transaction, now_ms, &now.path)?;
+            }
         }
         let gone = format!("{} is not available: {}", now.path, now.detail);
         let back = format!("{} is available again", now.path);
