@@ -177,6 +177,8 @@ impl Worker {
         let pid = child.id();
         let (input, output, errors) =
             (child.stdin.take(), child.stdout.take(), child.stderr.take());
+        // Before somebody waits for it, its number is its own.
+        let process = ProcessIdentity::of(pid);
         let exit = tokio::task::spawn_blocking(move || child.wait().ok());
         let output = output.ok_or(std::io::ErrorKind::BrokenPipe)?;
         let errors = errors.ok_or(std::io::ErrorKind::BrokenPipe)?;
@@ -186,7 +188,7 @@ impl Worker {
         let after = |seconds: f64| Duration::try_from_secs_f64(seconds).unwrap_or(Duration::MAX);
         Ok(Self {
             pid,
-            process: ProcessIdentity::of(pid),
+            process,
             input: input.map(ChildStdin::from_std).transpose()?,
             lines: LineReader::new(BufReader::new(ChildStdout::from_std(output)?)),
             speaks: true,
