@@ -264,22 +264,25 @@ fn what_a_dead_worker_published_is_used_and_not_made_twice() {
     assert_eq!(kept, [(1, 1), (2, 1), (3, 1), (4, 2)]);
 }
 
-#[test]
-fn a_person_cancels_a_job_at_work_and_one_that_waits() {
+/// Site `a` is at work, and goes on until it is stopped.
+fn at_work() -> (Arc<World>, Life) {
     let (world, life) = two_sites("");
-    world
-        .fate_of
-        .lock()
-        .unwrap()
-        .insert("a".to_owned(), Fate::Lasts);
+    let lasts = ("a".to_owned(), Fate::Lasts);
+    world.fate_of.lock().unwrap().extend([lasts]);
     world.put("kernels/both.bc", "second");
-    for _ in 0..15 {
+    for _ in 0..12 {
         world.later(60);
-        for _ in 0..200 {
+        for _ in 0..100 {
             life.turn();
             std::thread::sleep(std::time::Duration::from_millis(1));
         }
     }
+    (world, life)
+}
+
+#[test]
+fn a_person_cancels_a_job_at_work_and_one_that_waits() {
+    let (world, life) = at_work();
     let job = life
         .jobs()
         .into_iter()
@@ -307,20 +310,7 @@ fn a_person_cancels_a_job_at_work_and_one_that_waits() {
 
 #[test]
 fn a_killed_service_leaves_no_job_at_work_and_counts_no_attempt() {
-    let (world, life) = two_sites("");
-    world
-        .fate_of
-        .lock()
-        .unwrap()
-        .insert("a".to_owned(), Fate::Lasts);
-    world.put("kernels/both.bc", "second");
-    for _ in 0..12 {
-        world.later(60);
-        for _ in 0..100 {
-            life.turn();
-            std::thread::sleep(std::time::Duration::from_millis(1));
-        }
-    }
+    let (world, life) = at_work();
     assert!(life.states().contains(&("a".to_owned(), JobState::Running)));
     life.kill();
     world.fate_of.lock().unwrap().clear();

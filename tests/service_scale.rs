@@ -88,19 +88,34 @@ fn kills(count: usize) {
     life.go_on(&world, 30, 3);
     let mut at_work = 0;
     for kill in 0..count {
-        let kernel = format!("kernels/k{}.bc", kill * 5 % 12);
+        // Every site reads the first one.
+        let kernel = format!(
+            "kernels/k{}.bc",
+            if kill % 3 == 0 { 0 } else { kill * 5 % 12 }
+        );
         world.put(&kernel, &kill.to_string());
         let fates = [Fate::DiesEarly, Fate::DiesPublished, Fate::DiesUnheard];
         world.fates.lock().unwrap().push(fates[kill % 3]);
-        // The changed kernel settles and its sites are planned; the kill comes between, before or after.
-        for turn in 0..4 + kill % 23 {
+        // Every second kill comes at any moment, the others when a worker is at work.
+        let active = "SELECT site FROM job WHERE state IN ('starting', 'running')";
+        for turn in 0..400 {
             if turn % 4 == 0 {
                 world.later(15);
             }
             life.turn();
             std::thread::sleep(Duration::from_micros(700));
+            let done = if kill % 2 == 0 {
+                turn > kill % 23
+            } else {
+                !life.ask(active).is_empty()
+            };
+            if done {
+                break;
+            }
         }
-        let active = "SELECT site FROM job WHERE state IN ('starting', 'running')";
+        std::thread::sleep(Duration::from_micros(
+            u64::try_from(kill * 37 % 1300).unwrap(),
+        ));
         at_work += life.ask(active).len();
         life.kill();
         life = Life::begin(&world);

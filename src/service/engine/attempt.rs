@@ -73,6 +73,11 @@ impl AtWork {
         true
     }
 
+    /// Nobody works for the job any more.
+    pub fn leave(&self, job: i64) {
+        self.lock().remove(&job);
+    }
+
     /// Asks all to stop.
     pub fn cancel_all(&self, why: CancelWhy) {
         let jobs: Vec<i64> = self.lock().keys().copied().collect();
@@ -94,6 +99,14 @@ pub struct Taken {
     config_blake3: String,
     attempt: Attempt,
     cancel: watch::Receiver<Option<CancelWhy>>,
+}
+
+impl Taken {
+    /// The number of the job.
+    #[must_use]
+    pub const fn job(&self) -> i64 {
+        self.job.id
+    }
 }
 
 /// Takes the next job, if one may be taken now.
@@ -183,11 +196,7 @@ fn begin(
 }
 
 /// Follows an attempt to its end; gives the run that it published.
-pub async fn follow<W: Workers>(
-    core: Arc<Core<W>>,
-    at_work: Arc<AtWork>,
-    taken: Taken,
-) -> Option<RunRow> {
+pub async fn follow<W: Workers>(core: Arc<Core<W>>, taken: Taken) -> Option<RunRow> {
     let Taken {
         job,
         site_file,
@@ -223,21 +232,18 @@ pub async fn follow<W: Workers>(
             .await
     };
     let why = *cancel.borrow();
-    let run = loop {
+    loop {
         // A full disk: what happened is not forgotten before it can be noted.
         match finish(&core, &attempt, &ended, why) {
-            Ok(run) => break run,
+            Ok(run) => return run,
             Err(error) => tracing::error!(job = job.id, "the end of an attempt: {error}"),
         }
         if core.shared.ending.is_cancelled() {
             // The next service finds the run on the disk.
-            break None;
+            return None;
         }
         sleep(NOTE_AGAIN).await;
-    };
-    at_work.lock().remove(&job.id);
-    core.shared.wake.notify_one();
-    run
+    }
 }
 
 /// Notes what a worker says; a line that cannot be noted is lost, its work is not.

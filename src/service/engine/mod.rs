@@ -4,6 +4,7 @@
 //! after the other.
 
 pub mod adopt;
+mod agenda;
 pub mod alerts;
 pub mod attempt;
 pub mod core;

@@ -3,7 +3,7 @@
 use std::{
     future::Future,
     sync::{
-        Arc, Mutex, MutexGuard, PoisonError,
+        Arc, Mutex, MutexGuard,
         atomic::{AtomicU64, Ordering},
     },
     time::Duration,
@@ -17,6 +17,7 @@ use tokio_util::task::TaskTracker;
 
 use super::{
     adopt::adopt,
+    agenda::{Agenda, lock},
     attempt::{AtWork, follow, take},
     core::Core,
     diffs::compare_all,
@@ -69,35 +70,6 @@ pub struct Engine<W> {
     turns: AtomicU64,
 }
 
-/// What is under way, and when what was done last.
-#[derive(Debug, Default)]
-struct Agenda {
-    round: bool,
-    round_ms: Option<i64>,
-    /// The night that has begun.
-    night: Option<i64>,
-    /// Whether its comparisons have begun, and whether they are done.
-    comparing: bool,
-    compared: bool,
-    /// Its comparisons are not done while files settle, until then.
-    settles_until_ms: Option<i64>,
-    upkeep: bool,
-    upkeep_ms: Option<i64>,
-    trim_ms: Option<i64>,
-    letters: bool,
-    has_room: bool,
-}
-
-impl Agenda {
-    fn begin(&mut self, night: Option<i64>, settles_until_ms: Option<i64>) {
-        if night.is_some() {
-            self.night = night;
-            (self.comparing, self.compared) = (false, false);
-            self.settles_until_ms = settles_until_ms;
-        }
-    }
-}
-
 impl<W: Workers> Engine<W> {
     /// The engine of a service, after it has taken over from an earlier one.
     ///
@@ -110,6 +82,7 @@ impl<W: Workers> Engine<W> {
         let open = core.shared.read(open_night).in_file(&state)?;
         let agenda = Agenda {
             night: open.map(|night| night.id),
+            to_compare: true,
             has_room: true,
             ..Agenda::default()
         };
@@ -126,11 +99,6 @@ impl<W: Workers> Engine<W> {
     /// Takes turns until the service ends, then stops what is under way.
     pub async fn run(&self) {
         let shared = &self.core.shared;
-        self.spawn(|core| async move {
-            if let Err(error) = compare_all(&core).await {
-                tracing::error!("comparing runs: {error}");
-            }
-        });
         while !shared.ending.is_cancelled() {
             self.try_turn();
             let scan = Duration::from_secs_f64(shared.config().changes.scan_interval_s);
@@ -210,6 +178,7 @@ impl<W: Workers> Engine<W> {
         self.see_to_round();
         self.see_to_upkeep()?;
         self.see_to_jobs()?;
+        self.see_to_comparisons();
         self.see_to_letters()
     }
 
@@ -282,21 +251,21 @@ impl<W: Workers> Engine<W> {
             Purpose { night }
         };
         let (book, agenda) = (Arc::clone(&self.book), Arc::clone(&self.agenda));
-        self.spawn(|core| async move {
-            let mut book = book.lock().await;
-            let done = round(&core, &mut book, purpose).await;
+        let compares = move |core: Arc<Core<W>>| async move {
+            let done = round(&core, &mut *book.lock().await, purpose).await;
             if let Err(error) = &done {
                 tracing::error!("a round of comparisons: {error}");
             }
             let settles = core.shared.read(any_settling).unwrap_or(false);
-            let now_ms = core.now_ms();
-            let mut agenda = agenda.lock().unwrap_or_else(PoisonError::into_inner);
+            (done.is_ok(), settles, core.now_ms())
+        };
+        self.spawn(compares, move |done| {
+            let mut agenda = lock(&agenda);
             agenda.round = false;
-            let waits = settles
-                && agenda
-                    .settles_until_ms
-                    .is_some_and(|until_ms| now_ms < until_ms);
-            if purpose.night.is_some() && done.is_ok() && !waits {
+            let (well, settles, now_ms) = done.unwrap_or_default();
+            let until_ms = agenda.settles_until_ms;
+            let waits = settles && until_ms.is_some_and(|until_ms| now_ms < until_ms);
+            if purpose.night.is_some() && well && !waits {
                 agenda.compared = true;
             }
         });
@@ -333,13 +302,12 @@ impl<W: Workers> Engine<W> {
             }
         }
         let agenda = Arc::clone(&self.agenda);
-        self.spawn(|core| async move {
+        let keeps = move |core: Arc<Core<W>>| async move {
             if let Err(error) = upkeep(&core, trims).await {
                 tracing::error!("upkeep: {error}");
             }
-            let mut agenda = agenda.lock().unwrap_or_else(PoisonError::into_inner);
-            agenda.upkeep = false;
-        });
+        };
+        self.spawn(keeps, move |_| lock(&agenda).upkeep = false);
         Ok(())
     }
 
@@ -348,17 +316,28 @@ impl<W: Workers> Engine<W> {
             return Ok(());
         }
         while let Some(taken) = take(&self.core, &self.at_work)? {
-            let at_work = Arc::clone(&self.at_work);
-            self.spawn(|core| async move {
-                let run = follow(Arc::clone(&core), at_work, taken).await;
-                if run.is_some()
-                    && let Err(error) = compare_all(&core).await
-                {
-                    tracing::error!("comparing runs: {error}");
-                }
+            let (at_work, job) = (Arc::clone(&self.at_work), taken.job());
+            let agenda = Arc::clone(&self.agenda);
+            let follows = |core: Arc<Core<W>>| follow(core, taken);
+            self.spawn(follows, move |run| {
+                at_work.leave(job);
+                lock(&agenda).to_compare |= run.flatten().is_some();
             });
         }
         Ok(())
+    }
+
+    /// New runs are compared with their predecessors, one after the other.
+    fn see_to_comparisons(&self) {
+        {
+            let mut agenda = self.agenda();
+            if !agenda.to_compare || agenda.comparison {
+                return;
+            }
+            (agenda.to_compare, agenda.comparison) = (false, true);
+        }
+        let agenda = Arc::clone(&self.agenda);
+        self.spawn(compare_runs, move |_| lock(&agenda).comparison = false);
     }
 
     fn see_to_letters(&self) -> Stored<()> {
@@ -371,30 +350,44 @@ impl<W: Workers> Engine<W> {
             return Ok(());
         }
         let agenda = Arc::clone(&self.agenda);
-        self.spawn(|core| async move {
+        let delivers = |core: Arc<Core<W>>| async move {
             if let Err(error) = deliver(&core).await {
                 tracing::error!("hooks: {error}");
             }
-            let mut agenda = agenda.lock().unwrap_or_else(PoisonError::into_inner);
-            agenda.letters = false;
-        });
+        };
+        self.spawn(delivers, move |_| lock(&agenda).letters = false);
         Ok(())
     }
 
-    /// Begins what takes long; its end leads to another turn.
-    fn spawn<F>(&self, task: impl FnOnce(Arc<Core<W>>) -> F)
-    where
-        F: Future<Output = ()> + Send + 'static,
+    /// Begins what takes long; `end` is told what came of it, even where it panicked, and another turn follows.
+    fn spawn<T, F>(
+        &self,
+        task: impl FnOnce(Arc<Core<W>>) -> F,
+        end: impl FnOnce(Option<T>) + Send + 'static,
+    ) where
+        T: Send + 'static,
+        F: Future<Output = T> + Send + 'static,
     {
-        let (core, task) = (Arc::clone(&self.core), task(Arc::clone(&self.core)));
+        let core = Arc::clone(&self.core);
+        let work = tokio::spawn(task(Arc::clone(&self.core)));
         self.tasks.spawn(async move {
-            task.await;
+            let done = work.await;
+            if let Err(panicked) = &done {
+                tracing::error!("{panicked}");
+            }
+            end(done.ok());
             core.shared.wake.notify_one();
         });
     }
 
     fn agenda(&self) -> MutexGuard<'_, Agenda> {
-        self.agenda.lock().unwrap_or_else(PoisonError::into_inner)
+        lock(&self.agenda)
+    }
+}
+
+async fn compare_runs<W: Workers>(core: Arc<Core<W>>) {
+    if let Err(error) = compare_all(&core).await {
+        tracing::error!("comparing runs: {error}");
     }
 }
 
