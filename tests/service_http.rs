@@ -229,7 +229,7 @@ fn jobs_are_asked_for_once_cancelled_and_tried_again() {
     let other = json!({ "sites": ["gamma"] }).to_string();
     assert_eq!(
         world.operate("POST", "/api/v1/jobs", &key, &other).status,
-        422
+        409
     );
     // Without a key it joins the job that waits.
     let joined = world.operate("POST", "/api/v1/jobs", &[], &body);

@@ -443,12 +443,12 @@ fn documents(world: &World) -> Vec<Hostile> {
                 &token,
                 "{\"sites\":[\"../../etc\"]}",
             ),
-            &[422],
+            &[404],
         ),
         hostile(
             "a site that is disabled",
             send("POST", "/api/v1/jobs", &token, "{\"sites\":[\"retired\"]}"),
-            &[422],
+            &[404],
         ),
         hostile(
             "no sites",

@@ -1,5 +1,7 @@
 //! Sessions of browsers: a token exchanged for a random reference, of which the database keeps the hash alone.
 
+use std::fmt::Write as _;
+
 use rusqlite::{Connection, OptionalExtension as _, Transaction, params};
 use sha2::{Digest as _, Sha256};
 use subtle::ConstantTimeEq as _;
@@ -138,7 +140,12 @@ fn hash(reference: &str) -> Vec<u8> {
 fn random() -> Stored<String> {
     let mut bytes = [0_u8; 32];
     getrandom::fill(&mut bytes).map_err(|error| DatabaseError::NoRandom(error.to_string()))?;
-    Ok(bytes.iter().map(|byte| format!("{byte:02x}")).collect())
+    let mut text = String::with_capacity(2 * bytes.len());
+    for byte in bytes {
+        // Writing to a string cannot fail.
+        let _ = write!(text, "{byte:02x}");
+    }
+    Ok(text)
 }
 
 #[cfg(test)]

@@ -151,25 +151,23 @@ pub(super) async fn pin(
     pinned: bool,
 ) -> Result<crate::service::database::shown::Run, Problem> {
     let now_ms = app.now_ms();
-    let found = app
-        .write(move |transaction| {
-            let Some(mut found) = run(transaction, &id)? else {
-                return Ok(Err(Problem::not_found("There is no such run.")));
-            };
-            if pinned && found.removed_utc.is_some() {
-                let text = "The products of this run were removed; there is nothing to keep.";
-                return Ok(Err(Problem::conflict(text)));
-            }
-            if found.pinned != pinned {
-                pin_run(transaction, &id, pinned)?;
-                let action = if pinned { "pin" } else { "unpin" };
-                note(transaction, now_ms, &caller, action, &format!("run {id}"))?;
-                found.pinned = pinned;
-            }
-            Ok(Ok(found))
-        })
-        .await?;
-    found
+    app.write(move |transaction| {
+        let Some(mut found) = run(transaction, &id)? else {
+            return Ok(Err(Problem::not_found("There is no such run.")));
+        };
+        if pinned && found.removed_utc.is_some() {
+            let text = "The products of this run were removed; there is nothing to keep.";
+            return Ok(Err(Problem::conflict(text)));
+        }
+        if found.pinned != pinned {
+            pin_run(transaction, &id, pinned)?;
+            let action = if pinned { "pin" } else { "unpin" };
+            note(transaction, now_ms, &caller, action, &format!("run {id}"))?;
+            found.pinned = pinned;
+        }
+        Ok(Ok(found))
+    })
+    .await?
 }
 
 fn note(

@@ -86,6 +86,7 @@ fn says_itself(response: &Response) -> bool {
 }
 
 /// A panic is a bug of ours; its text is for the log.
+#[allow(clippy::needless_pass_by_value, reason = "as the layer calls it")]
 pub(super) fn panicked(panic: Box<dyn Any + Send>) -> Response {
     let text = panic
         .downcast_ref::<String>()

@@ -8,7 +8,7 @@ use std::{
 
 use axum::{
     extract::{Request, State},
-    http::{HeaderMap, Method, StatusCode, Uri, header, request::Parts},
+    http::{HeaderMap, Method, StatusCode, Uri, header, request::Parts, uri::Authority},
     middleware::Next,
     response::{IntoResponse as _, Response},
 };
@@ -79,7 +79,7 @@ fn check_host(app: &App, headers: &HeaderMap, uri: &Uri) -> Result<bool, Problem
         return Err(wrong());
     };
     let host = host.to_str().map_err(|_| wrong())?;
-    let asked = uri.authority().map(|authority| authority.as_str());
+    let asked = uri.authority().map(Authority::as_str);
     if asked.is_some_and(|asked| !asked.eq_ignore_ascii_case(host)) {
         return Err(wrong());
     }
@@ -139,15 +139,13 @@ fn percent_decoded(text: &str) -> String {
         let digits = after
             .get(..2)
             .and_then(|digits| std::str::from_utf8(digits).ok());
-        match (first, digits.map(|digits| u8::from_str_radix(digits, 16))) {
-            (b'%', Some(Ok(byte))) => {
-                bytes.push(byte);
-                rest = &after[2..];
-            }
-            _ => {
-                bytes.push(*first);
-                rest = after;
-            }
+        if let (b'%', Some(Ok(byte))) = (first, digits.map(|digits| u8::from_str_radix(digits, 16)))
+        {
+            bytes.push(byte);
+            rest = &after[2..];
+        } else {
+            bytes.push(*first);
+            rest = after;
         }
     }
     String::from_utf8_lossy(&bytes).into_owned()

@@ -2,6 +2,7 @@
 
 use std::{fs, sync::Arc};
 
+use axum::http::StatusCode;
 use tokio::sync::{OwnedSemaphorePermit, watch};
 
 use super::{app::App, problem::Problem};
@@ -17,7 +18,13 @@ const LOG_KIB: u32 = 256;
 pub(super) fn place(app: &App) -> Result<OwnedSemaphorePermit, Problem> {
     Arc::clone(&app.workers)
         .try_acquire_owned()
-        .map_err(|_| Problem::busy("Other plans and searches are under way.", 5))
+        .map_err(|_| Problem {
+            retry_after_s: Some(5),
+            ..Problem::new(
+                StatusCode::TOO_MANY_REQUESTS,
+                "Other plans and searches are under way.",
+            )
+        })
 }
 
 /// Has `what` done within `deadline_s`; dropped, or when the service ends, the worker ends too.

@@ -30,7 +30,7 @@ use crate::service::{
 /// Events that are read at once.
 const BATCH: u32 = 200;
 /// A stream ends after so long; clients begin another one by themselves.
-const LONGEST: Duration = Duration::from_secs(3600);
+const LONGEST: Duration = Duration::from_hours(1);
 /// Whether the client may still read is looked at so often.
 const LOOK: Duration = Duration::from_secs(15);
 

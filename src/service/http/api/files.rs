@@ -30,7 +30,7 @@ const SHOWN: [&str; 4] = [
     "image/svg+xml",
 ];
 
-/// A product of a run: `path` as in its manifest, or `manifest.json`. The ETag is the BLAKE3 of the content; ranges are understood.
+/// A product of a run: `path` as in its manifest, or `manifest.json`. The tag is the BLAKE3 of the content; ranges are understood.
 #[utoipa::path(get, path = "/api/v1/runs/{run}/files/{*path}", tag = "runs", params(
     ("run" = String, Path, description = "Identifier of the run", pattern = "^[A-Za-z0-9_-]{1,64}$"),
     ("path" = String, Path, description = "Path of a product as in the manifest; may contain /"),

@@ -34,6 +34,10 @@ pub(super) async fn healthy() -> &'static str {
 
 /// Whether the service works.
 #[derive(Debug, Serialize, ToSchema)]
+#[allow(
+    clippy::struct_excessive_bools,
+    reason = "each is an entry of the document"
+)]
 struct Readiness {
     /// Whether everything below is well.
     ready: bool,

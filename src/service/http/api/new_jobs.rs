@@ -181,10 +181,12 @@ fn make(
         if let Some((earlier, jobs)) = known.optional()? {
             if earlier != request {
                 let text = "This Idempotency-Key was used for another request.";
-                return Ok(Err(Problem::new(StatusCode::UNPROCESSABLE_ENTITY, text)));
+                return Ok(Err(Problem::conflict(text)));
             }
             let mut jobs: Vec<JobAsked> = serde_json::from_str(&jobs).unwrap_or_default();
-            jobs.iter_mut().for_each(|job| job.joined = true);
+            for job in &mut jobs {
+                job.joined = true;
+            }
             return Ok(Ok(JobsMade { jobs }));
         }
     }
@@ -199,7 +201,7 @@ fn make(
     for name in &names {
         if site(transaction, name)?.is_none_or(|site| !site.enabled) {
             let text = format!("There is no site {name:?} that can be run.");
-            return Ok(Err(Problem::new(StatusCode::UNPROCESSABLE_ENTITY, text)));
+            return Ok(Err(Problem::not_found(text)));
         }
     }
     let wanted = Wanted {

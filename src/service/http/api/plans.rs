@@ -33,7 +33,6 @@ const DEADLINE_S: f64 = 1800.0;
     ("site" = String, Path, description = "Name of the site", pattern = "^[A-Za-z0-9_-]{1,64}$"),
 ), responses(
     (status = 202, body = Plan),
-    (status = 503, body = ProblemDocument, content_type = "application/problem+json"),
     (status = "4XX", body = ProblemDocument, content_type = "application/problem+json"),
 ))]
 pub(super) async fn begin(

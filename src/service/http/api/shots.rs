@@ -74,7 +74,6 @@ pub(super) struct Polygon {
     (status = 200, content(
         (serde_json::Value = "application/geo+json"), (String = "text/csv"), (Vec<u8> = "application/vnd.apache.parquet"),
     )),
-    (status = 503, body = ProblemDocument, content_type = "application/problem+json"),
     (status = "4XX", body = ProblemDocument, content_type = "application/problem+json"),
 ))]
 pub(super) async fn in_box(
@@ -91,7 +90,6 @@ pub(super) async fn in_box(
     (status = 200, content(
         (serde_json::Value = "application/geo+json"), (String = "text/csv"), (Vec<u8> = "application/vnd.apache.parquet"),
     )),
-    (status = 503, body = ProblemDocument, content_type = "application/problem+json"),
     (status = "4XX", body = ProblemDocument, content_type = "application/problem+json"),
 ))]
 pub(super) async fn in_polygon(

@@ -89,11 +89,11 @@ pub(super) async fn list(
         div id="jobs" data-live="" { (job_table("Jobs, the newest first", shown, &times(&app))) }
         (more(next))
     };
-    Page {
+    Ok(Page {
         title: "Jobs",
         place: "/jobs",
     }
-    .answer(&app, &caller, &body)
+    .answer(&app, &caller, &body))
 }
 
 /// Jobs as a table.
@@ -180,11 +180,11 @@ pub(super) async fn one(
         }
     };
     let title = format!("Job {} of {}", job.id, job.site);
-    Page {
+    Ok(Page {
         title: &title,
         place: "/jobs",
     }
-    .answer(&app, &caller, &body)
+    .answer(&app, &caller, &body))
 }
 
 fn job_lead(job: &Job, newest: Option<&Attempt>, times: &Times) -> Markup {

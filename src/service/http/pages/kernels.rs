@@ -94,11 +94,11 @@ pub(super) async fn list(
             (more(next.map(|next| format!("/kernels?after={next}"))))
         }
     };
-    Page {
+    Ok(Page {
         title: "Kernels",
         place: "/kernels",
     }
-    .answer(&app, &caller, &body)
+    .answer(&app, &caller, &body))
 }
 
 fn row(kernel: &KernelFile) -> Row {

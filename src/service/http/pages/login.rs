@@ -47,11 +47,11 @@ pub(super) async fn form(
         }
         p { "Tokens are made on the command line: " code { "areograph service token add" } ". A session ends after an hour without use, and after twelve hours in all." }
     };
-    Page {
+    Ok(Page {
         title: "Log in",
         place: "",
     }
-    .answer(&app, &caller, &body)
+    .answer(&app, &caller, &body))
 }
 
 /// What the form sends.

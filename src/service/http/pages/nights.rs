@@ -51,11 +51,11 @@ pub(super) async fn list(
         div id="nights" data-live="" { (night_table(shown, &times)) }
         (more(next.map(|night| format!("/nights?after={}", night.id))))
     };
-    Page {
+    Ok(Page {
         title: "Nights",
         place: "/nights",
     }
-    .answer(&app, &caller, &body)
+    .answer(&app, &caller, &body))
 }
 
 fn night_table(nights: &[Night], times: &Times) -> Markup {
@@ -104,11 +104,11 @@ pub(super) async fn one(
     };
     let day = crate::service::clock::utc_text(night.due_utc.0);
     let title = format!("Night of {}", day.get(..10).unwrap_or_default());
-    Page {
+    Ok(Page {
         title: &title,
         place: "/nights",
     }
-    .answer(&app, &caller, &body)
+    .answer(&app, &caller, &body))
 }
 
 fn night_lead(night: &Night, times: &Times) -> Markup {

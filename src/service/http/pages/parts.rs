@@ -1,5 +1,7 @@
 //! Pieces of pages: times, verdicts, tables.
 
+use std::fmt;
+
 use chrono::{DateTime, Utc};
 use chrono_tz::Tz;
 use maud::{Markup, html};
@@ -50,8 +52,8 @@ impl Times {
         let count = |unit_ms: i64, unit: &str| format!("{} {unit}", ms.abs() / unit_ms);
         let length = match ms.abs() {
             ..MINUTE_MS => count(1000, "s"),
-            ..HOUR_MS => count(MINUTE_MS, "min"),
-            ..DAY_MS => count(HOUR_MS, "h"),
+            MINUTE_MS..HOUR_MS => count(MINUTE_MS, "min"),
+            HOUR_MS..DAY_MS => count(HOUR_MS, "h"),
             _ => count(DAY_MS, "d"),
         };
         if ms < 0 {
@@ -145,8 +147,9 @@ pub(super) fn more(address: Option<String>) -> Markup {
 }
 
 /// A number of things.
-pub(super) fn counted(count: usize, what: &str) -> String {
-    let plural = if count == 1 { "" } else { "s" };
+pub(super) fn counted(count: impl fmt::Display, what: &str) -> String {
+    let count = count.to_string();
+    let plural = if count == "1" { "" } else { "s" };
     format!("{count} {what}{plural}")
 }
 
@@ -154,7 +157,7 @@ pub(super) fn counted(count: usize, what: &str) -> String {
 pub(super) fn size(bytes: u64) -> String {
     match bytes {
         ..10_000 => format!("{bytes} B"),
-        ..10_000_000 => format!("{:.0} kB", bytes as f64 / 1e3),
+        10_000..10_000_000 => format!("{:.0} kB", bytes as f64 / 1e3),
         _ => format!("{:.1} MB", bytes as f64 / 1e6),
     }
 }

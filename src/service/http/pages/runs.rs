@@ -77,11 +77,11 @@ pub(super) async fn one(
         }
     };
     let title = format!("Run {} of {}", run.id, run.site);
-    Page {
+    Ok(Page {
         title: &title,
         place: "/",
     }
-    .answer(&app, &caller, &body)
+    .answer(&app, &caller, &body))
 }
 
 fn run_lead(run: &Run, causes: &[CauseRow], manifest: Option<&Manifest>, times: &Times) -> Markup {

@@ -100,11 +100,11 @@ pub(super) async fn home(
             div id="work" data-live="" { (super::jobs::job_table("Jobs at work and queued", &work, &times)) }
         }
     };
-    Page {
+    Ok(Page {
         title: "Sites",
         place: "/",
     }
-    .answer(&app, &caller, &body)
+    .answer(&app, &caller, &body))
 }
 
 /// The box at the top: what needs attention.
@@ -208,8 +208,8 @@ fn last_night(night: Option<&Night>, times: &Times) -> Markup {
             None => p { "No night yet." }
             Some(night) => p {
                 a href={ "/nights/" (night.id) } { "Night of " (times.at(night.due_utc)) }
-                ": " (counted(night.sites_checked.unsigned_abs() as usize, "site")) " checked, "
-                (counted(night.runs.unsigned_abs() as usize, "run")) ", " (counted(night.failures.unsigned_abs() as usize, "failure")) ". "
+                ": " (counted(night.sites_checked, "site")) " checked, "
+                (counted(night.runs, "run")) ", " (counted(night.failures, "failure")) ". "
                 @match (night.started_utc, night.ended_utc) {
                     (_, Some(at)) => { "Complete " (times.age(at)) "." }
                     (Some(_), None) => "Under way.",
@@ -266,11 +266,11 @@ pub(super) async fn one(
             (more(oldest))
         }
     };
-    Page {
+    Ok(Page {
         title: &site.name,
         place: "/",
     }
-    .answer(&app, &caller, &body)
+    .answer(&app, &caller, &body))
 }
 
 fn site_lead(site: &Site, newest: Option<&Run>, times: &Times) -> Markup {

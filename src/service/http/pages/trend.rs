@@ -90,10 +90,13 @@ pub(super) fn trends(runs: &[Run], times: &Times) -> Markup {
     let all: Vec<BTreeMap<String, f64>> = oldest_first.iter().map(|run| figures(run)).collect();
     let names: BTreeSet<&String> = all.iter().flat_map(BTreeMap::keys).collect();
     html! {
-        div class="plots" {
-            @for name in names {
-                @let values: Vec<Option<f64>> = all.iter().map(|figures| figures.get(name).copied()).collect();
-                (plot(name, &oldest_first, &values, &steps))
+        @if runs.len() < 2 { p { "Plots begin with the second run." } }
+        @else {
+            div class="plots" {
+                @for name in names {
+                    @let values: Vec<Option<f64>> = all.iter().map(|figures| figures.get(name).copied()).collect();
+                    (plot(name, &oldest_first, &values, &steps))
+                }
             }
         }
         (table("Steps of the kernels and of the verdict", &["Run", "Published, UTC", "Verdict", "Kernels", "Moved"], &html! {
