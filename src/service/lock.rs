@@ -136,7 +136,7 @@ fn owner_of(path: &Path) -> Option<Owner> {
 }
 
 fn network_file_system(folder: &Path) -> Option<&'static str> {
-    let found = i64::from(rustix::fs::statfs(folder).ok()?.f_type);
+    let found = rustix::fs::statfs(folder).ok()?.f_type;
     let network = NETWORK.iter().find(|(kind, _)| *kind == found);
     network.map(|(_, name)| *name)
 }

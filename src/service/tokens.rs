@@ -169,7 +169,10 @@ fn hash(secret: &str) -> [u8; 32] {
 fn random_hex<const BYTES: usize>() -> Stored<String> {
     let mut bytes = [0_u8; BYTES];
     getrandom::fill(&mut bytes).map_err(|error| DatabaseError::NoRandom(error.to_string()))?;
-    Ok(bytes.iter().map(|byte| format!("{byte:02x}")).collect())
+    let digits = bytes.iter().flat_map(|byte| [byte >> 4, byte & 15]);
+    Ok(digits
+        .filter_map(|digit| char::from_digit(digit.into(), 16))
+        .collect())
 }
 
 fn read(row: &Row<'_>) -> rusqlite::Result<Token> {

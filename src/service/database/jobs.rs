@@ -135,23 +135,20 @@ pub fn ask(transaction: &Transaction<'_>, now_ms: i64, ask: &Ask<'_>) -> Stored<
         JobState::Held
     };
     let pending = pending_job(transaction, ask.site)?;
-    let job = match &pending {
-        Some(job) => {
-            join(transaction, now_ms, job, ask, state)?;
-            job.id
-        }
-        None => {
-            transaction.execute(
-                "INSERT INTO job (site, state, priority, force, night, asked_by, created_ms, changed_ms)
-                 VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?7)",
-                params![
-                    ask.site, state.name(), ask.priority as i64, ask.force, ask.night, ask.asked_by, now_ms
-                ],
-            )?;
-            let id = transaction.last_insert_rowid();
-            tell(transaction, now_ms, id, ask.site, state, None)?;
-            id
-        }
+    let job = if let Some(job) = &pending {
+        join(transaction, now_ms, job, ask, state)?;
+        job.id
+    } else {
+        transaction.execute(
+            "INSERT INTO job (site, state, priority, force, night, asked_by, created_ms, changed_ms)
+             VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?7)",
+            params![
+                ask.site, state.name(), ask.priority as i64, ask.force, ask.night, ask.asked_by, now_ms
+            ],
+        )?;
+        let id = transaction.last_insert_rowid();
+        tell(transaction, now_ms, id, ask.site, state, None)?;
+        id
     };
     for cause in ask.causes {
         add_cause(transaction, job, cause)?;

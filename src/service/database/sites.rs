@@ -205,7 +205,7 @@ pub fn inputs_by_site(connection: &Connection) -> Stored<BTreeMap<String, Vec<Si
 pub fn inputs_of(connection: &Connection, site: &str) -> Stored<Vec<SiteInput>> {
     let mut query =
         connection.prepare_cached("SELECT * FROM site_input WHERE site = ?1 ORDER BY path")?;
-    let found = query.query_map([site], |row| input_row(row))?;
+    let found = query.query_map([site], input_row)?;
     Ok(found.collect::<Result<_, _>>()?)
 }
 

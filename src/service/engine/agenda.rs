@@ -4,6 +4,10 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 
 /// What turns of the engine must know of each other.
 #[derive(Debug, Default)]
+#[allow(
+    clippy::struct_excessive_bools,
+    reason = "each is about a task of its own"
+)]
 pub(super) struct Agenda {
     pub(super) round: bool,
     pub(super) round_ms: Option<i64>,

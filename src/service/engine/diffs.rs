@@ -21,7 +21,7 @@ use crate::{
 };
 
 /// Longest time for a comparison.
-const LIMIT: Duration = Duration::from_secs(1800);
+const LIMIT: Duration = Duration::from_mins(30);
 /// Folder of the pages, beside that of the runs.
 const DIFFS: &str = "diffs";
 

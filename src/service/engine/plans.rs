@@ -31,7 +31,7 @@ use crate::{
 };
 
 /// Longest time for a plan.
-const LIMIT: Duration = Duration::from_secs(1800);
+const LIMIT: Duration = Duration::from_mins(30);
 
 /// A site that a change may touch.
 #[derive(Debug, Clone)]

@@ -26,7 +26,7 @@ use crate::{
 /// Files that are read in one step.
 const STEP: u32 = 16;
 /// Longest time for a step.
-const LIMIT: Duration = Duration::from_secs(1800);
+const LIMIT: Duration = Duration::from_mins(30);
 const SECONDS_PER_DAY: f64 = 86_400.0;
 
 /// Reads a few of the files again that were not read for the longest time. A file that has another content settles anew.

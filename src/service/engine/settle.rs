@@ -24,7 +24,7 @@ use crate::{
 const HASHED_TOGETHER: usize = 256;
 const PROBED_TOGETHER: usize = 16;
 /// Longest time for such a part: 256 PEDR files of an archive on a slow disk.
-const LIMIT: Duration = Duration::from_secs(1800);
+const LIMIT: Duration = Duration::from_mins(30);
 /// How names of kernels end that CSPICE opens by themselves.
 const KERNELS: [&str; 10] = [
     "bc", "bsp", "bpc", "tls", "tsc", "tpc", "tf", "ti", "bds", "tk",
