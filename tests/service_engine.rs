@@ -282,7 +282,7 @@ fn at_work() -> (Arc<World>, Life) {
 
 #[test]
 fn a_person_cancels_a_job_at_work_and_one_that_waits() {
-    let (world, life) = at_work();
+    let (_world, life) = at_work();
     let job = life
         .jobs()
         .into_iter()

@@ -414,6 +414,10 @@ fn between(text: &str, before: &str, after: char) -> String {
 }
 
 #[test]
+#[allow(
+    clippy::too_many_lines,
+    reason = "one visit, told from login to logout"
+)]
 fn people_log_in_change_something_and_log_out() {
     let world = World::with("open_reading = \"no\"");
     let form = ["Content-Type: application/x-www-form-urlencoded"];
@@ -748,6 +752,6 @@ fn serve_until_ended() {
     );
     println!("http://{} {}", world.address, world.tokens.operate);
     loop {
-        sleep(Duration::from_secs(60));
+        sleep(Duration::from_mins(1));
     }
 }

@@ -188,10 +188,8 @@ impl Table {
             ..Moved::default()
         };
         let back = found.state.is_active() && is_pending(to);
-        let others = self.all().into_iter();
-        let waits = others
-            .filter(|job| job.site == found.site && is_pending(job.state))
-            .next();
+        let mut others = self.all().into_iter();
+        let waits = others.find(|job| job.site == found.site && is_pending(job.state));
         let sent = self.database.write(|transaction| {
             if back {
                 give_back(transaction, now_ms, found.id, to, &moved)

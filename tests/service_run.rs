@@ -23,7 +23,7 @@ use rusqlite::{Connection, OpenFlags};
 use rustix::process::{Pid, Signal, kill_process};
 
 /// Longest time for anything, on a machine that does other things too.
-const PATIENCE: Duration = Duration::from_secs(240);
+const PATIENCE: Duration = Duration::from_mins(4);
 /// The kernel that only `isidis` reads.
 const OWN: &str = "kernels/mgs_sc_isidis.bc";
 
@@ -210,10 +210,10 @@ impl Drop for Service {
 }
 
 /// The same attitude under another name of the file inside: another content.
-fn other_version(kernel: &[u8], name: &[u8; 4]) -> Vec<u8> {
+fn other_version(kernel: &[u8], name: [u8; 4]) -> Vec<u8> {
     let mut other = kernel.to_vec();
     // The internal file name of a DAF begins at byte 16.
-    other[16..20].copy_from_slice(name);
+    other[16..20].copy_from_slice(&name);
     other
 }
 
@@ -240,7 +240,7 @@ fn changes_of_files_run_the_sites_that_they_touch() {
     assert_eq!(mission.states().len(), 4, "{}", mission.log());
 
     // Copied in slow pieces: used once, at the end, by the one site that reads it, and only in what it touches.
-    let other = other_version(&kernel, b"SLOW");
+    let other = other_version(&kernel, *b"SLOW");
     let mut copy = fs::File::create(mission.file(OWN)).unwrap();
     for piece in other.chunks(other.len().div_ceil(4)) {
         copy.write_all(piece).unwrap();
@@ -325,7 +325,7 @@ fn whatever_is_killed_each_job_ends_once() {
     for (kill, wait_ms) in [0, 150, 300, 450, 600, 800].into_iter().enumerate() {
         let name = [b'K', b'0' + u8::try_from(kill).unwrap(), b' ', b' '];
         let fresh = mission.path("fresh");
-        fs::write(&fresh, other_version(&kernel, &name)).unwrap();
+        fs::write(&fresh, other_version(&kernel, name)).unwrap();
         fs::rename(&fresh, mission.file(OWN)).unwrap();
         let begun = format!(
             "SELECT CAST(pid AS TEXT) FROM attempt WHERE job = {} AND pid IS NOT NULL",

@@ -298,7 +298,7 @@ pub(super) fn product(world: &World, site_file: &Path) -> Result<String, String>
     for path in inputs(world, site_file) {
         let name = path.file_name().unwrap().to_string_lossy().into_owned();
         let text = world.at(&path).ok_or(format!("there is no {name}"))?;
-        product.push_str(&format!("{name} {text}\n"));
+        product = format!("{product}{name} {text}\n");
     }
     Ok(product)
 }

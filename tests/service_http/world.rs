@@ -137,10 +137,12 @@ impl World {
             self.address
         );
         for header in headers {
-            text += &format!("{header}\r\n");
+            text.push_str(header.as_ref());
+            text.push_str("\r\n");
         }
         if !body.is_empty() || method == "POST" || method == "PATCH" {
-            text += &format!("Content-Length: {}\r\n", body.len());
+            let length = body.len().to_string();
+            text.extend(["Content-Length: ", &length, "\r\n"]);
         }
         self.raw(format!("{text}\r\n{body}").as_bytes())
     }
@@ -346,7 +348,7 @@ fn publish(products: &Path, site: &str, run: &str, valid: bool) -> String {
         configuration: ConfigurationEntry {
             file_name: format!("{site}.toml"),
             blake3: "1".repeat(64),
-            keys: Default::default(),
+            keys: std::collections::BTreeMap::default(),
         },
         biases: Vec::new(),
         kernels: vec![
@@ -356,9 +358,9 @@ fn publish(products: &Path, site: &str, run: &str, valid: bool) -> String {
         kernel_choice: Vec::new(),
         stages: Vec::new(),
         products,
-        counts: Default::default(),
-        figures: Default::default(),
-        rejected: Default::default(),
+        counts: std::collections::BTreeMap::default(),
+        figures: std::collections::BTreeMap::default(),
+        rejected: std::collections::BTreeMap::default(),
         complaints: Complaints {
             count: 0,
             texts: Vec::new(),

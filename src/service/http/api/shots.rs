@@ -257,7 +257,9 @@ mod tests {
             corners,
             [[10.0, -5.0], [20.0, -5.0], [20.0, 5.0], [10.0, 5.0]]
         );
-        assert_eq!(corners_of_box("350,-5,10,5").unwrap()[0], [-10.0, -5.0]);
+        // Ten degrees west of Greenwich, as typed.
+        let [west, south] = corners_of_box("350,-5,10,5").unwrap()[0];
+        assert!((west + 10.0).abs() + (south + 5.0).abs() < 1e-12);
         for text in [
             "",
             "1,2,3",
