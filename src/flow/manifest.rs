@@ -44,6 +44,15 @@ fn largest_along_track_parallax_m(intersection: Option<&Intersection>) -> Result
     Ok(parallaxes_m.max_by(f64::total_cmp))
 }
 
+/// How far the median height of the tie points is from the ground between MOLA's shots, metres.
+fn height_off_surface_m(intersection: Option<&Intersection>) -> Result<Option<f64>> {
+    let Some(intersection) = intersection else {
+        return Ok(None);
+    };
+    let above_m = &intersection.heights.value()?.above_m;
+    Ok((above_m.n > 0).then(|| above_m.median.abs()))
+}
+
 /// The manifest of a site whose products are made from `inputs`.
 pub(super) fn manifest(
     config: &SiteConfig,
@@ -156,6 +165,8 @@ fn figures_of(site: &Site) -> Result<BTreeMap<String, f64>> {
     let adjustment = site.adjustment.as_ref();
     let before = largest_along_track_parallax_m(site.intersection.as_ref())?;
     let after = largest_along_track_parallax_m(adjustment.map(|of| &of.intersection))?;
+    let height = height_off_surface_m(site.intersection.as_ref())?;
+    let adjusted_height = height_off_surface_m(adjustment.map(|of| &of.intersection))?;
     let adjusted = adjustment.map(|of| of.adjusted.value()).transpose()?;
     let figures = [
         (figures::RANGE_MEAN_M, means.max_by(f64::total_cmp)),
@@ -163,6 +174,8 @@ fn figures_of(site: &Site) -> Result<BTreeMap<String, f64>> {
         (figures::POINTING_RMSE_RAD, pointings.max_by(f64::total_cmp)),
         (figures::ALONG_TRACK_PARALLAX_M, before),
         (figures::ADJUSTED_ALONG_TRACK_PARALLAX_M, after),
+        (figures::HEIGHT_OFF_SURFACE_M, height),
+        (figures::ADJUSTED_HEIGHT_OFF_SURFACE_M, adjusted_height),
         (
             figures::ADJUSTMENT_SIGMA0,
             adjusted.map(|of| of.summary.sigma0),

@@ -31,7 +31,7 @@ use crate::{
 };
 
 /// Raised when products are laid out anew.
-const METHOD: u32 = 11;
+const METHOD: u32 = 12;
 
 /// The configuration as written, the outlines that it names, all kernels and where they lie from `folder`, and
 /// every stage with what it was made from.

@@ -73,6 +73,10 @@ pub mod figures {
     pub const ALONG_TRACK_PARALLAX_M: &str = "along_track_parallax_m";
     /// The same with the adjusted orientation, metres.
     pub const ADJUSTED_ALONG_TRACK_PARALLAX_M: &str = "adjusted_along_track_parallax_m";
+    /// |Median| height of tie points above the ground between MOLA's shots, metres.
+    pub const HEIGHT_OFF_SURFACE_M: &str = "height_off_surface_m";
+    /// The same with the adjusted orientation, metres.
+    pub const ADJUSTED_HEIGHT_OFF_SURFACE_M: &str = "adjusted_height_off_surface_m";
     /// A posteriori standard deviation of unit weight of the adjustment.
     pub const ADJUSTMENT_SIGMA0: &str = "adjustment_sigma0";
 
@@ -82,7 +86,7 @@ pub mod figures {
     pub const CONTROL_RESIDUAL_RMS_M: &str = "control_residual_rms_m";
 
     /// All of them, and what they are.
-    const ALL: [(&str, &str); 8] = [
+    const ALL: [(&str, &str); 10] = [
         (
             RANGE_MEAN_M,
             "Largest |mean| of range minus distance of a profile, metres.",
@@ -101,6 +105,14 @@ pub mod figures {
         ),
         (
             ADJUSTED_ALONG_TRACK_PARALLAX_M,
+            "The same with the adjusted orientation, metres.",
+        ),
+        (
+            HEIGHT_OFF_SURFACE_M,
+            "|Median| height of tie points above the ground between MOLA's shots, metres.",
+        ),
+        (
+            ADJUSTED_HEIGHT_OFF_SURFACE_M,
             "The same with the adjusted orientation, metres.",
         ),
         (

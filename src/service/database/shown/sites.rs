@@ -7,7 +7,7 @@ use utoipa::ToSchema;
 use crate::service::{database::Stored, instant::Instant, state::JobState};
 
 /// A site as it stands.
-#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, ToSchema)]
 pub struct Site {
     /// Its name.
     pub name: String,

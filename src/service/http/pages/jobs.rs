@@ -11,7 +11,7 @@ use serde::Deserialize;
 
 use super::{
     layout::{Page, form_token, operator},
-    parts::{Times, lead, more, state, table, times, verdict},
+    parts::{Times, lead, more, prose, state, table, times, verdict},
     trend::headline,
 };
 use crate::service::{
@@ -109,7 +109,7 @@ pub(super) fn job_table(caption: &str, jobs: &[Job], times: &Times) -> Markup {
                         td { (job.attempt) }
                         td { (times.age(Instant(job.changed_ms))) }
                         td { (asker(job)) }
-                        td class="long" { (outcome_text(job).unwrap_or_default()) }
+                        td class="long" { (prose(outcome_text(job).unwrap_or_default())) }
                     }
                 }
             }))
@@ -206,7 +206,7 @@ fn job_lead(job: &Job, newest: Option<&Attempt>, times: &Times) -> Markup {
                 @if job.cancel_asked && !job.state.is_final() { " It was asked to stop." }
                 @if job.state == JobState::Waiting { " Tried again " (times.age(Instant(job.not_before_ms))) "." }
             }
-            @if let Some(text) = outcome_text(job) { p { (text) } }
+            @if let Some(text) = outcome_text(job) { p { (prose(text)) } }
             @if let Some(attempt) = progress {
                 p {
                     "Attempt " (attempt.n) ", stage " (attempt.stage.as_deref().unwrap_or("not yet known"))
@@ -257,7 +257,7 @@ fn why(causes: &[CauseRow], times: &Times) -> Markup {
                 li {
                     (times.at(Instant(cause.at_ms))) " " (cause.kind.replace('_', " "))
                     @if let Some(path) = &cause.path { ": " code { (path) } }
-                    @if !cause.detail.is_empty() { ": " (cause.detail) }
+                    @if !cause.detail.is_empty() { ": " (prose(&cause.detail)) }
                     @if let (Some(old), Some(new)) = (&cause.old_blake3, &cause.new_blake3) {
                         " (" code { (short(old)) } " → " code { (short(new)) } ")"
                     }

@@ -15,6 +15,9 @@ const RIGHT: f64 = 22.0;
 const LEAST: f64 = 9.0;
 /// More names than this would lie over each other.
 const NAMES: usize = 30;
+/// Width of a letter and height of a line, as the names are written.
+const LETTER: f64 = 9.0;
+const LINE: f64 = 18.0;
 
 /// The map, and what it shows in words.
 pub(super) fn map(sites: &[Site]) -> Markup {
@@ -23,6 +26,7 @@ pub(super) fn map(sites: &[Site]) -> Markup {
         .filter_map(|site| Some((site, site.bounds_deg?)))
         .collect();
     let (width, height) = (360.0 * SCALE, 180.0 * SCALE);
+    let names = names(&placed, width);
     html! {
         figure class="map" {
             svg viewBox={ "0 0 " (LEFT + width + RIGHT) " " (TOP + height + 28.0) } role="group" aria-label="Map of the sites" {
@@ -43,13 +47,10 @@ pub(super) fn map(sites: &[Site]) -> Markup {
                         @for [x, y, wide, high] in rectangles(*bounds_deg) {
                             rect class={ "site " (tone(site.verdict.as_deref())) } x=(x) y=(y) width=(wide) height=(high) {}
                         }
-                        @if placed.len() <= NAMES {
-                            @let [x, y, wide, high] = rectangles(*bounds_deg)[0];
-                            @let east = x + wide > LEFT + width * 0.8;
-                            text x=(if east { x - 4.0 } else { x + wide + 4.0 }) y=(y + high / 2.0 + 6.0)
-                                text-anchor=(if east { "end" } else { "start" }) font-size="17" fill="#222222" { (site.name) }
-                        }
                     }
+                }
+                @for name in &names {
+                    text x=(name.x) y=(name.y) text-anchor=(name.anchor) font-size="17" fill="#222222" { (name.text) }
                 }
             }
             figcaption {
@@ -58,6 +59,48 @@ pub(super) fn map(sites: &[Site]) -> Markup {
             }
         }
     }
+}
+
+/// A name beside its window.
+struct Name<'a> {
+    text: &'a str,
+    x: f64,
+    y: f64,
+    anchor: &'static str,
+}
+
+/// Names of the sites from north to south; one that would lie over another goes below it. None where they are too many.
+fn names<'a>(placed: &[(&'a Site, [f64; 4])], width: f64) -> Vec<Name<'a>> {
+    if placed.len() > NAMES {
+        return Vec::new();
+    }
+    let beside = |(site, bounds_deg): &(&'a Site, [f64; 4])| {
+        let [x, y, wide, high] = rectangles(*bounds_deg)[0];
+        let (x, anchor) = if x + wide > LEFT + 0.8 * width {
+            (x - 4.0, "end")
+        } else {
+            (x + wide + 4.0, "start")
+        };
+        Name {
+            text: &site.name,
+            x,
+            y: y + high / 2.0 + 6.0,
+            anchor,
+        }
+    };
+    let mut names: Vec<Name> = placed.iter().map(beside).collect();
+    names.sort_by(|one, other| one.y.total_cmp(&other.y));
+    for index in 1..names.len() {
+        let (above, below) = names.split_at_mut(index);
+        let name = &mut below[0];
+        for other in above {
+            let wide = LETTER * other.text.len().max(name.text.len()) as f64;
+            if (name.x - other.x).abs() < wide && name.y - other.y < LINE {
+                name.y = other.y + LINE;
+            }
+        }
+    }
+    names
 }
 
 fn latitude_name(latitude_deg: f64) -> String {
@@ -106,5 +149,24 @@ mod tests {
             assert!((part[2] - 20.0).abs() < 1e-9);
         }
         assert_eq!(rectangles([355.0, 0.0, 360.0, 1.0]).len(), 1);
+    }
+
+    #[test]
+    fn names_of_neighbours_stand_below_each_other() {
+        let site = |name: &str| Site {
+            name: name.to_owned(),
+            ..Site::default()
+        };
+        let sites = ["gusev_context", "gusev_crater", "isidis"].map(site);
+        let bounds = [
+            [173.8, -15.6, 176.8, -13.6],
+            [175.0, -15.1, 175.6, -14.1],
+            [87.7, 4.0, 88.3, 5.0],
+        ];
+        let placed: Vec<(&Site, [f64; 4])> = sites.iter().zip(bounds).collect();
+        let names = names(&placed, 360.0 * SCALE);
+        assert_eq!(names.len(), 3);
+        let apart = names[2].y - names[1].y;
+        assert!((apart - LINE).abs() < 1e-9 || apart > LINE, "{apart}"); // rounding
     }
 }

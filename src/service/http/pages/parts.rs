@@ -130,13 +130,22 @@ pub(super) fn sentences(value: &Value) -> Vec<String> {
     }
 }
 
+/// A sentence in which names of files stand between backticks.
+pub(super) fn prose(text: &str) -> Markup {
+    html! {
+        @for (place, part) in text.split('`').enumerate() {
+            @if place % 2 == 1 { code { (part) } } @else { (part) }
+        }
+    }
+}
+
 /// A list of sentences; one alone is a paragraph.
 pub(super) fn said(sentences: &[String]) -> Markup {
     html! {
         @match sentences {
             [] => {}
-            [one] => p { (one) }
-            several => ul { @for sentence in several { li { (sentence) } } }
+            [one] => p { (prose(one)) }
+            several => ul { @for sentence in several { li { (prose(sentence)) } } }
         }
     }
 }

@@ -13,7 +13,7 @@ use serde_json::Value;
 use super::{
     jobs::short,
     layout::{Page, form_token, operator},
-    parts::{Times, figure, figure_name, lead, said, sentences, size, table, times, tone},
+    parts::{Times, figure, figure_name, lead, prose, said, sentences, size, table, times, tone},
     trend::{KernelChange, figures, headline},
 };
 use crate::{
@@ -100,8 +100,8 @@ fn run_lead(run: &Run, causes: &[CauseRow], manifest: Option<&Manifest>, times: 
                 @if let Some(removed) = run.removed_utc { " Its products were removed " (times.at(removed)) "." }
             }
             (said(&sentences(&run.reasons)))
-            @for because in sentences(&run.because) { p { "Because: " (because) } }
-        @for cause in causes { @if !cause.detail.is_empty() { p { "Because: " (cause.detail) } } }
+            @for because in sentences(&run.because) { p { "Because: " (prose(&because)) } }
+        @for cause in causes { @if !cause.detail.is_empty() { p { "Because: " (prose(&cause.detail)) } } }
             @if named(REPORT) { p { a href={ "/api/v1/runs/" (run.id) "/files/" (REPORT) } { "Report" } } }
         },
     )

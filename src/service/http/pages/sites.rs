@@ -14,7 +14,8 @@ use super::{
     layout::{Page, form_token, operator},
     map::map,
     parts::{
-        Times, counted, figure, figure_name, lead, more, said, state, table, times, tone, verdict,
+        Times, counted, figure, figure_name, lead, more, prose, said, state, table, times, tone,
+        verdict,
     },
     trend::{figures, headline, trends},
 };
@@ -194,10 +195,10 @@ fn freshness(site: &Site, times: &Times) -> Markup {
         @if !site.enabled { "Not run: its site file is gone, or says so." }
         @else if let Some(problem) = &site.problem { "Not run: " (problem) }
         @else if let Some(since) = site.stale_since_utc {
-            "Stale since " (times.at(since)) ": " (site.stale_because.as_deref().unwrap_or("its inputs changed"))
+            "Stale since " (times.at(since)) ": " (prose(site.stale_because.as_deref().unwrap_or("its inputs changed")))
         }
-        @else if site.current_run.is_some() { "Fresh" @if let Some(note) = &site.note { ": " (note) } "." }
-        @else { (site.note.as_deref().unwrap_or("No run yet.")) }
+        @else if site.current_run.is_some() { "Fresh." @if let Some(note) = &site.note { " Last decision: " (prose(note)) "." } }
+        @else { (prose(site.note.as_deref().unwrap_or("No run yet."))) }
     }
 }
 
