@@ -95,6 +95,8 @@ pub fn main(parent: Option<u32>) -> ExitCode {
     };
     match catch_unwind(AssertUnwindSafe(|| worker.work())) {
         Ok(Ok(answer)) => {
+            // Work that is done at once ends before the first sign of life.
+            worker.voice.beat();
             worker.voice.say(&Line::Answer(answer));
             ExitCode::SUCCESS
         }
