@@ -46,6 +46,17 @@ pub struct RunRow {
     pub removed_ms: Option<i64>,
 }
 
+/// Whether a run of the site has this manifest, by its BLAKE3.
+///
+/// # Errors
+/// SQLite's own.
+pub fn is_run(connection: &Connection, site: &str, manifest_blake3: &str) -> Stored<bool> {
+    let mut query = connection.prepare_cached(
+        "SELECT EXISTS (SELECT 1 FROM run WHERE site = ?1 AND manifest_blake3 = ?2)",
+    )?;
+    Ok(query.query_row([site, manifest_blake3], |row| row.get(0))?)
+}
+
 /// Notes a run; one that is known stays as it is.
 ///
 /// # Errors

@@ -1,6 +1,6 @@
 //! What a change means for a site: a worker plans it, and the decision is noted with its reason, also when nothing has to run.
 
-use std::{collections::BTreeMap, path::Path, sync::Arc, time::Duration};
+use std::{collections::BTreeMap, fs, path::Path, sync::Arc, time::Duration};
 
 use rusqlite::{Connection, Transaction};
 use serde_json::json;
@@ -19,7 +19,7 @@ use crate::{
             About, Ask, CauseKind, CauseRow, Moved, Priority, Stored, advance, append, ask,
             files::{FileState, file},
             pending_job,
-            runs::run,
+            runs::{is_run, run},
             sites::{Checked, SiteInput, SiteRow, inputs_of, put_checked, put_inputs},
         },
         state::JobState,
@@ -28,10 +28,13 @@ use crate::{
             protocol::{Answer, PlanAnswer, What},
         },
     },
+    store::publish::MANIFEST,
 };
 
 /// Longest time for a plan.
 const LIMIT: Duration = Duration::from_mins(30);
+/// Why a site is run although no stage is.
+const NOT_KEPT: &str = "its products were made, but not kept as a run";
 
 /// A site that a change may touch.
 #[derive(Debug, Clone)]
@@ -72,8 +75,15 @@ pub async fn plan<W: Workers>(
             return Ok(());
         }
     };
+    let manifest = working(products, &site.name)
+        .join(&site.name)
+        .join(MANIFEST);
+    let kept = core
+        .shared
+        .read(|connection| is_kept(connection, &site.name, &manifest))?;
     let context = Context {
         candidate: &candidate,
+        kept,
         folders,
         round,
         night,
@@ -116,6 +126,8 @@ fn is_final(code: u8) -> bool {
 
 struct Context<'a> {
     candidate: &'a Candidate,
+    /// Whether the products in the working folder are a run.
+    kept: bool,
     folders: &'a [Folder],
     round: i64,
     night: Option<i64>,
@@ -132,12 +144,22 @@ impl Context<'_> {
         let inputs = self.inputs(transaction, answer)?;
         let mut causes = self.causes(transaction, &before, &inputs, answer)?;
         put_inputs(transaction, self.name(), &inputs)?;
-        let runs = answer.stages.iter().any(|stage| stage.runs);
+        let stages_run = answer.stages.iter().any(|stage| stage.runs);
+        // A plan compares with what was published, which a worker that died has not kept.
+        let only_keeps = !stages_run && !self.kept;
+        if only_keeps {
+            causes.push(CauseRow::plain(CauseKind::RetryOf, NOT_KEPT, self.now_ms));
+        }
+        let runs = stages_run || only_keeps;
         if runs && causes.is_empty() {
             let (kind, text) = self.without_change(transaction)?;
             causes.push(CauseRow::plain(kind, text, self.now_ms));
         }
-        let note = decision(&causes, answer);
+        let note = if only_keeps {
+            NOT_KEPT.to_owned()
+        } else {
+            decision(&causes, answer)
+        };
         self.checked(transaction, Some(answer), None, &note)?;
         if !runs {
             self.supersede(transaction, &note)?;
@@ -338,6 +360,15 @@ impl Context<'_> {
             JobState::Superseded,
             &moved,
         )
+    }
+}
+
+/// Whether the products that stand under `manifest`, if any, are a run.
+fn is_kept(connection: &Connection, site: &str, manifest: &Path) -> Stored<bool> {
+    match fs::read(manifest) {
+        Ok(bytes) => is_run(connection, site, blake3::hash(&bytes).to_hex().as_str()),
+        // Without products every plan says that something runs.
+        Err(_) => Ok(true),
     }
 }
 
