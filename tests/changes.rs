@@ -239,9 +239,11 @@ fn others(kind: &ValueKind, now: Option<&Value>, names: &[&str]) -> Vec<Value> {
             }
             lists
         }
-        ValueKind::Form { .. } | ValueKind::File | ValueKind::Folder | ValueKind::Glob => {
-            names.iter().map(|name| Value::from(*name)).collect()
-        }
+        ValueKind::Form { .. }
+        | ValueKind::File
+        | ValueKind::Folder
+        | ValueKind::Mirror
+        | ValueKind::Glob => names.iter().map(|name| Value::from(*name)).collect(),
     };
     candidates
         .into_iter()

@@ -173,6 +173,17 @@ fn a_configuration_stands_and_an_address_is_refused() {
 }
 
 #[test]
+fn a_folder_that_was_never_seen_must_be_there() {
+    let keeper = Keeper::new();
+    fs::rename(keeper.file("kernels"), keeper.file("elsewhere")).unwrap();
+    let night = keeper.nightly();
+    assert_eq!(night.status.code(), Some(2));
+    for part in ["areograph.toml", "inputs.kernels", "never seen", "mount"] {
+        assert!(said(&night).contains(part), "{}", said(&night));
+    }
+}
+
+#[test]
 fn units_of_systemd_are_sound() {
     let test = "units_of_systemd_are_sound";
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("config/systemd");

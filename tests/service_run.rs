@@ -286,6 +286,10 @@ fn changes_of_files_run_the_sites_that_they_touch() {
             == 1
     });
     mission.several_sweeps();
+    // A service that begins meanwhile waits for the folder as well.
+    assert_eq!(service.end().code(), Some(0), "{}", mission.log());
+    let (service, _) = mission.start();
+    mission.several_sweeps();
     fs::rename(mission.path("away"), mission.file("kernels")).unwrap();
     mission.several_sweeps();
     assert_eq!(mission.states().len(), 5, "{}", mission.log());

@@ -11,6 +11,8 @@ mod fake;
 
 use std::{
     collections::BTreeSet,
+    fs,
+    path::Path,
     time::{Duration, Instant},
 };
 
@@ -73,6 +75,64 @@ fn nothing_changed_for_a_thousand_sites() {
     assert!(night_s < 60.0, "a night took {night_s} s");
     let size = world.path("state/areograph.db").metadata().unwrap().len();
     eprintln!("database {} KiB", size >> 10);
+}
+
+/// Memory of this process, size of the database and number of files of products and state.
+fn held(world: &World) -> (u64, u64, usize) {
+    fn files(folder: &Path) -> usize {
+        let entries = fs::read_dir(folder).into_iter().flatten().flatten();
+        entries
+            .map(|entry| {
+                if entry.file_type().is_ok_and(|kind| kind.is_dir()) {
+                    files(&entry.path())
+                } else {
+                    1
+                }
+            })
+            .sum()
+    }
+    let status = fs::read_to_string("/proc/self/status").unwrap();
+    let memory = status.lines().find(|line| line.starts_with("VmRSS"));
+    let kib = memory.unwrap().split_whitespace().nth(1).unwrap();
+    let database = world.path("state/areograph.db").metadata().unwrap().len();
+    let files = files(&world.path("state")) + files(&world.path("products"));
+    (kib.parse().unwrap(), database >> 10, files)
+}
+
+#[test]
+#[ignore = "minutes"]
+fn ten_thousand_jobs_leave_no_more_than_two_thousand() {
+    const SITES: usize = 50;
+    let more = "[changes]\nquiet_period_s = 0.0\n[workers]\nmin_free_mib = 0\ncount = 4\n\
+                [retention]\nruns = 3\nweeks = 2\nevents = 2000\nlogs_days = 10.0\nhistory_days = 10.0\ncopies = 2\n";
+    let world = World::new(NOON_MS, more);
+    world.put("kernels/all.bc", "0");
+    for site in 0..SITES {
+        world.site(&format!("s{site}"), &["all.bc"]);
+    }
+    let life = Life::begin(&world);
+    let mut early = (0, 0, 0);
+    for day in 0..200 {
+        world.put("kernels/all.bc", &day.to_string());
+        life.go_on(&world, 14_400, 6);
+        // What the played world remembers is not the service's.
+        world.started.lock().unwrap().clear();
+        world.kept.lock().unwrap().clear();
+        if day == 40 {
+            early = held(&world);
+        }
+    }
+    let late = held(&world);
+    let jobs = life.ask("SELECT CAST(max(id) AS TEXT) FROM job");
+    eprintln!(
+        "(memory KiB, database KiB, files) after 2,000 jobs {early:?}, after {jobs:?} {late:?}"
+    );
+    assert!(jobs[0].parse::<usize>().unwrap() >= 10_000);
+    assert_eq!(world.current("s7"), world.clean("s7"));
+    // A tenth is left to what the allocator and SQLite hold on to.
+    assert!(late.0 <= early.0 * 11 / 10, "memory");
+    assert!(late.1 <= early.1 * 11 / 10, "database");
+    assert!(late.2 <= early.2 * 11 / 10, "files");
 }
 
 /// Kills a service under load, so often; what must hold then.

@@ -17,7 +17,7 @@ const FILES_MAX: usize = 65_535;
 /// Folders and file name of a glob that may hold wildcards: an archive is `volume/folder/file`.
 const WILD_PARTS_MAX: usize = 3;
 
-/// A path that leads somewhere, counted from the configuration's folder.
+/// A path that leads where it should, counted from the configuration's folder.
 pub(super) struct Existing {
     kind: ValueKind,
     is_there: fn(&Path) -> bool,
@@ -32,6 +32,11 @@ pub(super) const FILE: Existing = Existing {
 pub(super) const FOLDER: Existing = Existing {
     kind: ValueKind::Folder,
     is_there: Path::is_dir,
+};
+/// The path of a folder that may be away for a while, as a mirror may that is not mounted.
+pub(super) const MIRROR: Existing = Existing {
+    kind: ValueKind::Mirror,
+    is_there: |_| true,
 };
 
 impl Form for Existing {

@@ -17,7 +17,7 @@ use super::{
     },
     forms::{any_text, from_to, list, list_or_none, matching, text, whole_from_to, words},
     parse_file,
-    paths::FOLDER,
+    paths::MIRROR,
     problems::Problems,
     read,
 };
@@ -76,14 +76,15 @@ declare_table! {
 }
 
 declare_table! {
-    /// Folders that are read. Site files may name files below these folders only.
+    /// Folders that are read. Site files may name files below these folders only. A folder must be there when the service
+    /// first sees it; later it may be away for a while, and its sites are held.
     pub struct ServiceInputs {
         /// Folders of site files (`*.toml`, without subfolders). A file that appears or changes is seen by the next sweep.
-        sites: Vec<PathBuf> = key(list(FOLDER).each_once("each folder once")).required().example(r#"["sites"]"#),
+        sites: Vec<PathBuf> = key(list(MIRROR).each_once("each folder once")).required().example(r#"["sites"]"#),
         /// Folders of kernels, with their subfolders.
-        kernels: Vec<PathBuf> = key(list(FOLDER).each_once("each folder once")).required().example(r#"["kernels"]"#),
+        kernels: Vec<PathBuf> = key(list(MIRROR).each_once("each folder once")).required().example(r#"["kernels"]"#),
         /// Folders of PEDR files, labels and tie points, with their subfolders.
-        data: Vec<PathBuf> = key(list(FOLDER).each_once("each folder once"))
+        data: Vec<PathBuf> = key(list(MIRROR).each_once("each folder once"))
             .required()
             .example(r#"["pedr", "labels", "ties"]"#),
     }
@@ -170,6 +171,8 @@ declare_table! {
         events: u32 = key(whole_from_to(1000, 100_000_000)).or(100_000),
         /// Logs of attempts whose runs are gone, days.
         logs_days: f64 = key(from_to(0.0, 36_600.0)).or(90.0),
+        /// Figures of runs that are gone, which a site's trends show, days.
+        history_days: f64 = key(from_to(0.0, 36_600.0)).or(1830.0),
         /// Nightly copies of the database.
         copies: u32 = key(whole_from_to(0, 1000)).or(7),
     }
@@ -401,8 +404,7 @@ pub fn service_example() -> String {
 pub fn service_schema() -> impl Serialize {
     schema(
         "Service configuration of areograph",
-        "The TOML file of the service as JSON. areograph checks more than a schema can: folders that are there, agreement \
-         between keys.",
+        "The TOML file of the service as JSON. areograph checks more than a schema can: agreement between keys, and folders that are there.",
         &described::<ServiceConfig>(),
     )
 }

@@ -2,13 +2,13 @@
 
 use std::{net::SocketAddr, path::Path, process};
 
-use rusqlite::Transaction;
+use rusqlite::{Connection, Transaction};
 use serde_json::json;
 
 use super::{
     clock::Clock,
-    database::{About, Database, Stored, append, service::put_service},
-    engine::schedule::Schedule,
+    database::{About, Database, Stored, append, files::roots, service::put_service},
+    engine::{folders::folders, schedule::Schedule},
     lock::{Owner, ServiceLock},
     shared::Shared,
     worker::process::ProcessIdentity,
@@ -36,6 +36,8 @@ enum Refused {
     Public(SocketAddr),
     #[error("{0} changed")]
     NeedsRestart(&'static str),
+    #[error("inputs.{0}: {1} is no folder that is there, and this service has never seen it")]
+    NeverSeen(&'static str, String),
 }
 
 impl Cause for Refused {
@@ -49,6 +51,9 @@ impl Cause for Refused {
                 "listen on 127.0.0.1, or set http.behind_tls_proxy = \"yes\" behind a proxy that encrypts"
             }
             Self::NeedsRestart(_) => "restart the service, or put the former value back",
+            Self::NeverSeen(..) => {
+                "correct the path, or mount the folder; one that was seen may be away later"
+            }
         }
         .to_owned()
     }
@@ -101,6 +106,9 @@ pub fn start(config: ServiceConfig, command: &str, clock: Clock) -> Result<Start
             .in_file(folder)?;
     }
     let database = Database::open(&state)?;
+    database
+        .read(|connection| seen(connection, &config))
+        .in_file(&state)??;
     let program = std::env::current_exe()
         .map_err(IoError::on("find"))
         .in_file("areograph")?;
@@ -109,6 +117,20 @@ pub fn start(config: ServiceConfig, command: &str, clock: Clock) -> Result<Start
         shared,
         lock,
         owner,
+    })
+}
+
+/// Every folder of inputs was seen by the service, or is there. A known one is not looked at: its mount may be dead.
+fn seen(connection: &Connection, config: &ServiceConfig) -> Stored<Result<()>> {
+    let known = roots(connection)?;
+    let unseen = folders(&config.inputs)?.into_iter().find(|folder| {
+        known.iter().all(|root| root.path != folder.path) && !Path::new(&folder.path).is_dir()
+    });
+    Ok(match unseen {
+        None => Ok(()),
+        Some(folder) => {
+            Err(Refused::NeverSeen(folder.kind.name(), folder.path)).in_file(&config.file)
+        }
     })
 }
 
@@ -145,8 +167,14 @@ pub fn tell_address(
 pub fn reload(shared: &Shared, listen: Option<SocketAddr>) -> Stored<()> {
     let before = shared.config();
     let now_ms = shared.now_ms();
-    let loaded = configuration(&before.file, listen, now_ms);
-    let text = match loaded.and_then(|after| unchangeable(&before, &after).map(|()| after)) {
+    let loaded = configuration(&before.file, listen, now_ms).and_then(|after| {
+        unchangeable(&before, &after)?;
+        shared
+            .read(|connection| seen(connection, &after))
+            .in_file(&before.file)??;
+        Ok(after)
+    });
+    let text = match loaded {
         Ok(after) => {
             shared.set_config(after);
             shared.wake.notify_one();

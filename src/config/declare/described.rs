@@ -71,6 +71,8 @@ pub enum ValueKind {
     File,
     /// The path of a folder that is there.
     Folder,
+    /// The path of a folder, which may be away.
+    Mirror,
     /// A path or glob that matches a file.
     Glob,
     /// A number.
@@ -109,6 +111,7 @@ impl fmt::Display for ValueKind {
             }
             Self::File => formatter.write_str("an existing file"),
             Self::Folder => formatter.write_str("an existing folder"),
+            Self::Mirror => formatter.write_str("a folder"),
             Self::Glob => formatter.write_str("a glob that matches a file"),
             Self::Number(accept) => accept.fmt(formatter),
             Self::Whole { low, high } => {

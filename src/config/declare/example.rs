@@ -124,7 +124,11 @@ fn values(key: &DescribedKey) -> Vec<String> {
 /// The accepted values in words, where they are not all of their kind.
 fn range(kind: &ValueKind) -> Option<String> {
     match kind {
-        ValueKind::Text { .. } | ValueKind::File | ValueKind::Folder | ValueKind::Glob => None,
+        ValueKind::Text { .. }
+        | ValueKind::File
+        | ValueKind::Folder
+        | ValueKind::Mirror
+        | ValueKind::Glob => None,
         ValueKind::Form { expected, .. } => Some(expected.clone()),
         ValueKind::Number(Accept::FromTo(low, high)) => Some(format!("{low} to {high}")),
         ValueKind::Number(Accept::AboveTo(low, high)) => {

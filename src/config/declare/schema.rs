@@ -140,7 +140,7 @@ fn of_kind(kind: &ValueKind) -> Schema {
             pattern: Some(r"\S"),
             ..of_type("string")
         },
-        ValueKind::File | ValueKind::Folder | ValueKind::Glob => Schema {
+        ValueKind::File | ValueKind::Folder | ValueKind::Mirror | ValueKind::Glob => Schema {
             pattern: Some("."),
             ..of_type("string")
         },

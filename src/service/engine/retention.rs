@@ -105,7 +105,7 @@ fn remove_run(folder: &Path, run: &str) {
     }
 }
 
-/// Removes old events, letters, requests and jobs, and writes the log of the database back.
+/// Removes old events, letters, requests, jobs and figures of removed runs, and writes the log of the database back.
 ///
 /// # Errors
 /// The database cannot be written.
@@ -114,7 +114,12 @@ pub fn trim<W: Workers>(core: &Core<W>) -> Stored<()> {
     let now_ms = core.now_ms();
     let logs_ms = milliseconds(config.retention.logs_days * SECONDS_PER_DAY);
     let before_ms = now_ms.saturating_sub(logs_ms);
+    let history_ms = milliseconds(config.retention.history_days * SECONDS_PER_DAY);
     core.shared.write(|transaction| {
+        transaction.execute(
+            "DELETE FROM run WHERE removed_ms IS NOT NULL AND published_ms < ?1",
+            [now_ms.saturating_sub(history_ms)],
+        )?;
         let oldest = newest_event(transaction)? - i64::from(config.retention.events);
         transaction.execute("DELETE FROM event WHERE seq <= ?1", [oldest])?;
         for old in [

@@ -11,6 +11,7 @@ use std::{
 
 use tokio::{
     sync::Mutex as AsyncMutex,
+    task::yield_now,
     time::{sleep, timeout},
 };
 use tokio_util::task::TaskTracker;
@@ -392,7 +393,9 @@ async fn compare_runs<W: Workers>(core: Arc<Core<W>>) {
 }
 
 async fn upkeep<W: Workers>(core: &Arc<Core<W>>, trims: bool) -> Stored<()> {
-    remove_runs(core)?;
+    while remove_runs(core)? {
+        yield_now().await;
+    }
     scrub_files(core).await?;
     scrub_products(core).await?;
     if trims {
