@@ -1,5 +1,7 @@
 //! What MOLA says of the heights of tie points, and what may be said of their accuracy.
 
+mod readings;
+
 use super::{
     html::{Cell, Column, Table, heading, paragraph},
     misregistration::BeforeAfter,
@@ -133,7 +135,7 @@ fn statements(geometric: &GeometricProducts, adjustment: &AdjustmentProducts) ->
     for cells in statements {
         table.row(true, cells.map(Cell::from));
     }
-    table.finish()
+    table.finish() + &readings::two_readings(adjustment.adjusted)
 }
 
 /// What says where a site lies before the images do.

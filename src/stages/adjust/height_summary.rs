@@ -64,12 +64,6 @@ pub(super) fn heights<M>(
         .iter()
         .map(|height| height.above_m)
         .collect();
-    let points = adjustment.heights.iter();
-    let points = points.filter_map(|height| adjustment.points[height.point].as_ref().ok());
-    let middle_m: Vector3<f64> = points.map(|point| point.ground_m).sum();
-    let to_local = local_axes(&middle_m);
-    let mean_m2 = to_local * adjustment.mean_cofactor_m2? * to_local.transpose();
-    let factor = variance_factor(assembled, adjustment);
     Some(HeightSummary {
         ties: adjustment.heights.len(),
         shots: control.surface.shots(),
@@ -79,8 +73,18 @@ pub(super) fn heights<M>(
         above_m: Summary::of(&above_m),
         compared: adjustment.compared.len(),
         beyond_limit: beyond_limit(&adjustment.compared),
-        mean_sigma_m: [0, 1, 2].map(|axis| (factor * mean_m2[(axis, axis)]).sqrt()),
+        mean_sigma_m: mean_sigma_m(adjustment, variance_factor(assembled, adjustment))?,
     })
+}
+
+/// Standard deviations of the mean of the points with an observed height towards east, north and up, metres.
+pub(super) fn mean_sigma_m(adjustment: &Adjustment, variance_factor: f64) -> Option<[f64; 3]> {
+    let points = adjustment.heights.iter();
+    let points = points.filter_map(|height| adjustment.points[height.point].as_ref().ok());
+    let middle_m: Vector3<f64> = points.map(|point| point.ground_m).sum();
+    let to_local = local_axes(&middle_m);
+    let mean_m2 = to_local * adjustment.mean_cofactor_m2? * to_local.transpose();
+    Some([0, 1, 2].map(|axis| (variance_factor * mean_m2[(axis, axis)]).sqrt()))
 }
 
 /// Heights beyond the limit of the test.

@@ -15,6 +15,7 @@ mod network;
 mod points;
 mod prepare;
 mod run;
+mod split;
 mod stage;
 mod summary;
 mod words;
@@ -30,5 +31,6 @@ pub use input::{AdjustImage, LaserShot, LaserShots, ShotRange, orientation_sigma
 pub use points::{PointKind, RejectedPoint, RejectionReason};
 pub use prepare::{Candidate, prepare_adjustment};
 pub use run::adjust;
+pub use split::OtherReading;
 pub use stage::Adjust;
 pub use summary::{AdjustmentSummary, GroundSummary, ImageSummary, ObservationType, TypeSummary};

@@ -11,8 +11,9 @@ use crate::{
     stage::{InOrder, Output, Stage},
     stage_inputs,
     stages::{
-        convert_datum::Converted, group_profiles::Profile, intersect::IntersectedTies,
-        mola_surface::MolaShots, read_ties::Ties, site_image::SiteImage,
+        compare_pairs::PairComparison, convert_datum::Converted, group_profiles::Profile,
+        intersect::IntersectedTies, mola_surface::MolaShots, read_ties::Ties,
+        site_image::SiteImage,
     },
 };
 
@@ -31,6 +32,8 @@ stage_inputs! {
         pub ties: &'a Output<Ties>,
         /// Their ground points.
         pub intersected: &'a Output<IntersectedTies>,
+        /// The pairs of images.
+        pub pairs: &'a Output<Vec<PairComparison>>,
         /// What is uncertain about the MOLA surface.
         pub mola_surface: &'a MolaSurfaceConfig,
         /// Standard deviations and options.
@@ -40,7 +43,7 @@ stage_inputs! {
 
 impl Stage for Adjust<'_> {
     const NAME: &'static str = "adjust";
-    const METHOD: u32 = 4;
+    const METHOD: u32 = 5;
     type Output = Adjusted;
     stage_inputs!(fingerprint);
 
@@ -74,6 +77,9 @@ impl Stage for Adjust<'_> {
             surface,
             self.adjustment,
         );
-        adjust(&images, &shots, ties, starts, self.adjustment)
+        let pairs = self.pairs.value()?.iter();
+        let disagreements_m = pairs.map(|pair| pair.along_track_parallax_m);
+        let largest_m = disagreements_m.fold(0.0, f64::max);
+        adjust(&images, &shots, ties, starts, largest_m, self.adjustment)
     }
 }
