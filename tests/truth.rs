@@ -18,6 +18,8 @@ mod footprint_heights;
 mod light_time;
 #[path = "truth/misregistration.rs"]
 mod misregistration;
+#[path = "truth/relief.rs"]
+mod relief;
 
 use std::{
     collections::BTreeMap,

@@ -81,6 +81,13 @@ declare_table! {
         attitude_clock_rotation_sigma_rad as "attitude_clock_rotation_sigma_arcsec": f64 = key(SIGMA)
             .or(20.6)
             .map(|sigma| sigma * RADIANS_PER_ARCSECOND),
+        /// Whether heights of tie points on slopes of the MOLA surface also tell where the images lie in plan. Of use where the
+        /// report states that relief knows the place to less than half of what is known beforehand: ground rougher than 25 m
+        /// at 300 m for measurements of a pixel, 7 m for 0.3 pixels.
+        relief_for_plan: bool = key(yes_or_no(
+            "a slope makes heights less certain and nothing else",
+            "each profile may lie elsewhere, and tie points move to where their heights fit",
+        )).or(false),
         /// What image coordinates of footprints are: "off" unless the model is the published one, where they are
         /// "weighted". They come from the orientation that is being adjusted and are no measurements of their own.
         footprint_image_coordinates: Option<FootprintImageCoordinates> = key(words_of(
@@ -138,6 +145,7 @@ fn keys_of_the_model(checked: &AdjustmentConfig, keys: &mut Keys<'_, '_>) {
         AdjustmentModel::Published => &[
             "position_sigma_m",
             "rotation_sigma_arcsec",
+            "relief_for_plan",
             "attitude_clock",
             "attitude_clock_sigma_s",
             "attitude_clock_rotation_sigma_arcsec",

@@ -1,6 +1,7 @@
 //! What MOLA says of the heights of tie points, and what may be said of their accuracy.
 
 mod readings;
+mod relief;
 
 use super::{
     html::{Cell, Column, Table, heading, paragraph},
@@ -135,7 +136,9 @@ fn statements(geometric: &GeometricProducts, adjustment: &AdjustmentProducts) ->
     for cells in statements {
         table.row(true, cells.map(Cell::from));
     }
-    table.finish() + &readings::two_readings(adjustment.adjusted)
+    table.finish()
+        + &relief::relief(adjustment.adjusted)
+        + &readings::two_readings(adjustment.adjusted)
 }
 
 /// What says where a site lies before the images do.

@@ -96,6 +96,7 @@ mod quality;
 mod quasi_newton;
 mod reduce;
 mod reduced_heights;
+mod relief;
 mod rows;
 mod solve;
 mod unknowns;
@@ -109,6 +110,7 @@ use nalgebra::{DMatrix, Matrix3, Vector2, Vector3};
 
 pub use error::BundleError;
 pub use known::KnownCoordinates;
+pub use relief::{ProfileShift, ReliefOfSite};
 pub use solve::solve;
 pub use unknowns::Unknown;
 
@@ -376,6 +378,8 @@ pub struct Adjustment {
     pub compared: Vec<HeightResidual>,
     /// Weighted sum of squares of the observed heights, with their full covariance.
     pub height_squares: f64,
+    /// What the relief under the points with an observed height says of the place, when the ground has any.
+    pub relief: Option<ReliefOfSite>,
     /// Cofactors of the mean of the points with an observed height, m²: what they share does not average out.
     pub mean_cofactor_m2: Option<Matrix3<f64>>,
     /// Scalar observations, initial values with a standard deviation included.

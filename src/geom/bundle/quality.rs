@@ -11,6 +11,7 @@ use super::{
     point_rows::PointRows,
     reduce::Settled,
     reduced_heights::ReducedHeights,
+    relief,
     unknowns::{State, Unknown},
 };
 use crate::geom::{block_equations::BlockMatrix, pushbroom::ExteriorOrientation};
@@ -70,11 +71,12 @@ impl Controls {
 /// The adjustment where it has settled; observations, unknowns and history are left to the caller.
 pub(super) fn judge<M: ExteriorOrientation>(
     layout: &Layout<'_, M>,
-    Settled { at, reduced }: &Settled,
+    settled: &Settled,
     groups: &PointGroups,
     fitness: &[Result<(), PointRejection>],
     factor: &Factor,
 ) -> Adjustment {
+    let Settled { at, reduced } = settled;
     let state = &at.state;
     let cofactors = &factor.cofactors(&reduced.matrix);
     let heights = layout.heights.as_ref().zip(reduced.heights.as_ref());
@@ -107,6 +109,7 @@ pub(super) fn judge<M: ExteriorOrientation>(
         compared: Vec::new(),
         height_squares: 0.0,
         mean_cofactor_m2: None,
+        relief: None,
         observations: 0,
         unknowns: 0,
         weighted_squares: 0.0,
@@ -135,6 +138,8 @@ pub(super) fn judge<M: ExteriorOrientation>(
         adjustment.height_squares = reduced.weighted_squares();
         adjustment.weighted_squares += adjustment.height_squares;
         adjustment.mean_cofactor_m2 = mean_cofactor_m2(layout, at, &of.points, factor, reduced);
+        let left = controls.as_ref().map(|controls| &controls.left);
+        adjustment.relief = relief::of_site(layout, settled, of, left);
     }
     adjustment
 }

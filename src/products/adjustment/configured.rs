@@ -37,6 +37,7 @@ pub(super) struct AdjustmentKeys<'a> {
     rotation_sigma_rad: Option<[f64; 3]>,
     position_unknowns: PositionUnknowns,
     rotation_unknowns: RotationUnknowns,
+    relief_for_plan: bool,
     attitude_clock: bool,
     #[schemars(extend("exclusiveMinimum" = 0))]
     attitude_clock_sigma_s: f64,
@@ -101,6 +102,7 @@ impl<'a> AdjustmentKeys<'a> {
             rotation_sigma_rad: is_of_surface.then(|| config.rotation_sigma_rad.map(number)),
             position_unknowns: config.position_unknowns,
             rotation_unknowns: config.rotation_unknowns,
+            relief_for_plan: config.relief_for_plan,
             attitude_clock: config.attitude_clock,
             attitude_clock_sigma_s: config.attitude_clock_sigma_s,
             attitude_clock_rotation_sigma_rad: config.attitude_clock_rotation_sigma_rad,

@@ -164,6 +164,7 @@ pub(super) fn collect<M: ExteriorOrientation>(
     assembled: Assembled<&M>,
     adjustment: Adjustment,
     summary: AdjustmentSummary,
+    profiles: &[String],
     other_reading: Option<std::result::Result<OtherReading, String>>,
 ) -> Adjusted {
     let contradicted_m2 = contradicted_m2(&adjustment);
@@ -185,7 +186,7 @@ pub(super) fn collect<M: ExteriorOrientation>(
     let views = assembled.network.views.par_iter().zip(&adjustment.views);
     let ranges = assembled.network.ranges.iter().zip(&adjustment.ranges);
     Adjusted {
-        heights: height_summary::heights(&assembled, &adjustment),
+        heights: height_summary::heights(&assembled, &adjustment, profiles),
         images: corrected_images(images, &assembled, &adjustment, summary.variance_factor),
         other_reading,
         views: views

@@ -25,7 +25,7 @@ pub use adjusted::{
 };
 pub use components::WORSE_THAN_CONFIGURED;
 pub use error::AdjustError;
-pub use height_summary::HeightSummary;
+pub use height_summary::{HeightSummary, ProfileOffset};
 pub use heights::HEIGHTS_MIN;
 pub use input::{AdjustImage, LaserShot, LaserShots, ShotRange, orientation_sigmas};
 pub use points::{PointKind, RejectedPoint, RejectionReason};

@@ -88,7 +88,12 @@ pub fn adjust<M: ExteriorOrientation>(
         .map_err(|error| words::in_words(error, images, &assembled, config).to_string())
     });
     Ok(adjusted::collect(
-        images, assembled, adjustment, summary, other,
+        images,
+        assembled,
+        adjustment,
+        summary,
+        &shots.profiles,
+        other,
     ))
 }
 

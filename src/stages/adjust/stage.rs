@@ -7,7 +7,7 @@ use crate::{
     config::{AdjustmentConfig, MolaSurfaceConfig},
     error::Result,
     footprints::AdjustmentModel,
-    geom::pushbroom::CameraModel,
+    geom::{pushbroom::CameraModel, surface::SurfaceOptions},
     stage::{InOrder, Output, Stage},
     stage_inputs,
     stages::{
@@ -60,13 +60,19 @@ impl Stage for Adjust<'_> {
         });
         let (footprints, profiles) = (&self.converted.value()?.footprints, self.profiles.value()?);
         let (ties, starts) = (&self.ties.value()?.points, self.intersected.value()?);
+        let relief_for_plan = self.adjustment.relief_for_plan;
         let surface = match self.adjustment.model {
             // Without enough shots heights are what the orientations say.
             AdjustmentModel::MolaSurface => {
                 let around = starts.points.iter().map(|point| point.ground.xyz_m);
                 let around: Vec<_> = around.collect();
                 let shots = MolaShots::of(footprints, profiles);
-                shots.surface(&around, &self.mola_surface.options()).ok()
+                let options = SurfaceOptions {
+                    relief_sigma_m: relief_for_plan
+                        .then_some(self.mola_surface.profile_plan_sigma_m),
+                    ..self.mola_surface.options()
+                };
+                shots.surface(&around, &options).ok()
             }
             AdjustmentModel::Published => None,
         };
