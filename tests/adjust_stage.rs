@@ -84,6 +84,7 @@ impl Site {
                 line_period_s: image.line_period_s,
                 sigmas: image.sigmas,
                 time_bias_sigma_s: 0.0,
+                turn_rad_s: Vector3::zeros(),
             })
             .collect();
         let shots = LaserShots {
@@ -151,6 +152,7 @@ impl Site {
             &self.shots,
             &self.ties,
             &self.starts(),
+            0.0,
             options,
         )
     }
@@ -520,7 +522,7 @@ fn what_does_not_fit_together_is_refused() {
                shots: &LaserShots,
                ties: &[TiePoint],
                options: &AdjustmentConfig| {
-        let failure = adjust(images, shots, ties, &starts, options).unwrap_err();
+        let failure = adjust(images, shots, ties, &starts, 0.0, options).unwrap_err();
         assert_eq!(failure.kind().exit_code(), 3);
         println!("{failure}");
         failure.to_string()
@@ -539,7 +541,7 @@ fn what_does_not_fit_together_is_refused() {
     assert!(run(&site.images, &shots, &site.ties, &plain).contains("10496:5"));
     let mut ties = site.ties.clone();
     ties[0].measures[0].image = 7;
-    let failure = adjust(&site.images, &site.shots, &ties, &starts, &plain).unwrap_err();
+    let failure = adjust(&site.images, &site.shots, &ties, &starts, 0.0, &plain).unwrap_err();
     assert_eq!(failure.kind(), Kind::Bug);
     assert!(
         failure.to_string().contains("measured in image 7"),
@@ -779,7 +781,16 @@ fn threads_do_not_change_a_bit() {
             .build()
             .unwrap();
         let adjusted = pool
-            .install(|| adjust(&site.images, &site.shots, &site.ties, &starts, &options))
+            .install(|| {
+                adjust(
+                    &site.images,
+                    &site.shots,
+                    &site.ties,
+                    &starts,
+                    0.0,
+                    &options,
+                )
+            })
             .unwrap();
         postcard::to_stdvec(&adjusted).unwrap()
     });

@@ -176,6 +176,7 @@ impl Site {
                 line_period_s: image.period_s,
                 sigmas: *sigmas,
                 time_bias_sigma_s: 0.0,
+                turn_rad_s: Vector3::zeros(),
             })
             .collect();
         let starts = self.intersect(&self.ties);
@@ -183,7 +184,7 @@ impl Site {
             surface,
             ..self.shots(with_ranges)
         };
-        adjust(&images, &shots, &self.ties, &starts, options).unwrap()
+        adjust(&images, &shots, &self.ties, &starts, 0.0, options).unwrap()
     }
 
     /// Distance of each adjusted footprint from the adjusted camera at the instant of the shot, minus its range,

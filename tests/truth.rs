@@ -9,6 +9,8 @@
 
 #[path = "truth/across.rs"]
 mod across;
+#[path = "truth/attitude_clock.rs"]
+mod attitude_clock;
 mod common;
 #[path = "truth/footprint_heights.rs"]
 mod footprint_heights;
@@ -16,6 +18,8 @@ mod footprint_heights;
 mod light_time;
 #[path = "truth/misregistration.rs"]
 mod misregistration;
+#[path = "truth/relief.rs"]
+mod relief;
 
 use std::{
     collections::BTreeMap,
@@ -54,6 +58,11 @@ struct Judged {
     surface_sigma_m: f64,
     /// Standard deviation of unit weight along the track.
     along: f64,
+    /// Estimate of the attitude's clock with its standard deviation, seconds, where it is an unknown.
+    clock_s: Option<(f64, f64)>,
+    /// By the other reading of what images disagree by: mean minus that of the adjustment, and its standard deviations,
+    /// towards east, north and up, metres.
+    other_m: Option<[Vector3<f64>; 2]>,
     lost: Vec<String>,
     kept_blunders: Vec<String>,
 }
@@ -124,6 +133,13 @@ impl Judged {
                 .as_f64()
                 .unwrap(),
             along: summary["tie_components"][0].as_f64().unwrap(),
+            clock_s: summary.get("attitude_clock_s").map(|clock| {
+                let [offset_s, sigma_s] = [0, 1].map(|at| clock[at].as_f64().unwrap());
+                (offset_s, sigma_s)
+            }),
+            other_m: document["adjustment"]
+                .get("other_reading")
+                .map(|other| [vector(&other["moved_m"]), vector(&other["mean_sigma_m"])]),
             lost: Vec::new(),
             kept_blunders: Vec::new(),
         };

@@ -8,7 +8,10 @@ use crate::{
 
 use super::{
     declare::{Declare as _, Keys, Many, declare_table, group, key, tables},
-    forms::{Number, Several, above_to, from_to, identifier, several, words, words_of, zero_or},
+    forms::{
+        Number, Several, above_to, from_to, identifier, several, words, words_of, yes_or_no,
+        zero_or,
+    },
     unknowns::{PositionUnknowns, RotationUnknowns},
 };
 
@@ -63,6 +66,28 @@ declare_table! {
             RotationUnknowns::WORDS,
             ["", "constants", "and what is linear in t", "and what is quadratic"],
         )).or(RotationUnknowns::Acceleration),
+        /// Whether what the images of a pair disagree by along the flight is put down to one offset of the time at which
+        /// attitudes were read, the same for all images: it turns those that follow nadir, and those that are held towards
+        /// a star not. Otherwise all images are as likely to be wrong. Tie points do not tell, so this is a decision and no
+        /// estimate; where a pair disagrees by more than 100 m the report and adjustment.json have both.
+        attitude_clock: bool = key(yes_or_no(
+            "all images are as likely to be wrong",
+            "the images that follow nadir are wrong, by one offset",
+        )).or(false),
+        /// Standard deviation of that offset.
+        attitude_clock_sigma_s: f64 = key(SIGMA).or(1.0),
+        /// What the constant rotations of every image have at most as standard deviation beside it: 0.1 mrad. An offset of
+        /// the clock explains nothing where the attitude may err as much without it.
+        attitude_clock_rotation_sigma_rad as "attitude_clock_rotation_sigma_arcsec": f64 = key(SIGMA)
+            .or(20.6)
+            .map(|sigma| sigma * RADIANS_PER_ARCSECOND),
+        /// Whether heights of tie points on slopes of the MOLA surface also tell where the images lie in plan. Of use where the
+        /// report states that relief knows the place to less than half of what is known beforehand: ground rougher than 25 m
+        /// at 300 m for measurements of a pixel, 7 m for 0.3 pixels.
+        relief_for_plan: bool = key(yes_or_no(
+            "a slope makes heights less certain and nothing else",
+            "each profile may lie elsewhere, and tie points move to where their heights fit",
+        )).or(false),
         /// What image coordinates of footprints are: "off" unless the model is the published one, where they are
         /// "weighted". They come from the orientation that is being adjusted and are no measurements of their own.
         footprint_image_coordinates: Option<FootprintImageCoordinates> = key(words_of(
@@ -120,6 +145,10 @@ fn keys_of_the_model(checked: &AdjustmentConfig, keys: &mut Keys<'_, '_>) {
         AdjustmentModel::Published => &[
             "position_sigma_m",
             "rotation_sigma_arcsec",
+            "relief_for_plan",
+            "attitude_clock",
+            "attitude_clock_sigma_s",
+            "attitude_clock_rotation_sigma_arcsec",
             "height_blunder_limit",
         ],
     };

@@ -111,6 +111,11 @@ pub(super) const fn words<T, const N: usize>(
     Words(words)
 }
 
+/// "no" or "yes", and what each means.
+pub(super) const fn yes_or_no(no: &'static str, yes: &'static str) -> Words<bool, 2> {
+    words([("no", false, no), ("yes", true, yes)])
+}
+
 /// The same of words that stand elsewhere.
 pub(super) fn words_of<T: Copy, const N: usize>(
     words: [(&'static str, T); N],

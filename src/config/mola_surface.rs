@@ -18,6 +18,9 @@ declare_table! {
         /// Error in plan between images and shots, shared by all tie points; on a slope it becomes one of height.
         /// The default is 110 m of the images and 70 m of MOLA.
         plan_sigma_m: f64 = key(zero_or(1e-3, 1e5)).or(SurfaceOptions::default().plan_sigma_m),
+        /// Where a profile lies in plan, on each axis (MOLA's 100 m in the horizontal, Neumann et al. 2001); only where
+        /// adjustment.relief_for_plan is "yes".
+        profile_plan_sigma_m: f64 = key(from_to(1e-3, 1e5)).or(70.0),
         /// Least roughness: root mean square difference of heights 300 m apart. More is learnt from the shots.
         roughness_min_m: f64 = key(from_to(0.01, 1e4)).or(SurfaceOptions::default().roughness_min_m),
     }
@@ -32,6 +35,7 @@ impl MolaSurfaceConfig {
             profile_sigma_m: self.profile_sigma_m,
             plan_sigma_m: self.plan_sigma_m,
             roughness_min_m: self.roughness_min_m,
+            relief_sigma_m: None,
         }
     }
 }

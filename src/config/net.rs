@@ -17,7 +17,7 @@ use crate::{
 use super::{
     declare::{Declare as _, Keys, declare_table, example, group, key, of_the_file, schema, table},
     described,
-    forms::{above_to, any_text, from_to, lower_case_identifier, whole_from_to, words},
+    forms::{above_to, any_text, from_to, lower_case_identifier, whole_from_to, words, yes_or_no},
     parse_file,
     paths::Globs,
     problems::Problems,
@@ -206,7 +206,7 @@ declare_table! {
             ("one_shot", Method::OneShot, "all pictures and controls at once, by their weights"),
         ])).or(Method::Scale),
         /// LOCAL: evens out the seams between bricks afterwards.
-        local: bool = key(words([("no", false, "seams stay as they are"), ("yes", true, "pictures of a brick give way to its neighbours")])).or(false),
+        local: bool = key(yes_or_no("seams stay as they are", "pictures of a brick give way to its neighbours")).or(false),
         /// Pictures of a brick, where the table of pictures names no bricks.
         brick_pictures: u32 = key(whole_from_to(2, 100)).or(8),
         /// Blunders in bricks: measurements flagged beyond 3.5 robust standard deviations without which a brick's root mean square falls by 30 %.

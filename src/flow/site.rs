@@ -278,6 +278,7 @@ fn adjust<D: Driver>(
         profiles,
         ties,
         intersected: &initial.intersected,
+        pairs: &initial.pairs,
         mola_surface: &config.mola_surface,
         adjustment: &config.adjustment,
     })?;

@@ -1,6 +1,6 @@
 //! Rotation of Mars by the closed formulas of the IAU reports.
 
-use nalgebra::Matrix3;
+use nalgebra::{Matrix3, Vector3};
 
 use crate::{
     constants::MarsModel,
@@ -51,6 +51,12 @@ pub fn mars_matrix(model: &MarsModel, et: Et) -> Matrix3<f64> {
         * frame_rotation_3((90.0 + ra_deg) * RADIANS_PER_DEGREE)
 }
 
+/// Spin of Mars in its own axes, radians per second (the pole's own motion is 1e-14 rad/s).
+#[must_use]
+pub fn mars_spin_rad_s(model: &MarsModel) -> Vector3<f64> {
+    Vector3::z() * (model.meridian_deg_per_day * RADIANS_PER_DEGREE / SECONDS_PER_DAY)
+}
+
 /// Rotation from J2000 to the Mars-fixed frame `F` at `et`.
 #[must_use]
 pub fn mars_rotation<F: MarsFixed>(et: Et) -> Rotation<J2000, F> {
@@ -62,7 +68,7 @@ pub fn mars_rotation<F: MarsFixed>(et: Et) -> Rotation<J2000, F> {
 /// Both instants are the same unless a clock correction is meant to turn Mars in between.
 #[must_use]
 pub fn convert_datum<F: MarsFixed>(
-    xyz_m: nalgebra::Vector3<f64>,
+    xyz_m: Vector3<f64>,
     datum: MarsDatum,
     out_at: Et,
     into_at: Et,

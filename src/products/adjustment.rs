@@ -23,7 +23,7 @@ use crate::{
     },
     schema::{DocumentSchema, all_positive, at, none_negative},
     stages::{
-        adjust::{AdjustmentSummary, CorrectedImage, HeightSummary, PointKind},
+        adjust::{AdjustmentSummary, CorrectedImage, HeightSummary, OtherReading, PointKind},
         check_heights::{HeightCheck, ProfilesApart, SurfaceFigures},
         compare_pairs::{PairComparison, ProfileByTies},
         intersect::{ImageResiduals, IntersectedTies},
@@ -32,7 +32,7 @@ use crate::{
 use configured::AdjustmentKeys;
 
 /// What the numbers are, for readers of the file.
-const DEFINITIONS: [(&str, &str); 10] = [
+const DEFINITIONS: [(&str, &str); 11] = [
     (
         "before, after",
         "with the orientation of the kernels, and with the adjusted one; ground points are intersected anew",
@@ -77,6 +77,12 @@ const DEFINITIONS: [(&str, &str); 10] = [
         "sigmas",
         "a priori variances times the variance factor. In the published model they take footprints in images as measured \
          independently, which they are not: there they say how well images agree, not how accurate heights and places are",
+    ),
+    (
+        "other_reading",
+        "where a pair disagrees by more than 100 m along the flight: the mean of the tie points by the other of two readings, \
+         all images equally likely to be wrong or one offset of the attitude's clock (attitude_clock_s), minus that of the \
+         adjustment. Which is true is not measured: standard deviations hold for the reading they belong to",
     ),
     (
         "configured",
@@ -228,6 +234,10 @@ struct AdjustmentDocument<'a> {
     summary: &'a AdjustmentSummary,
     #[serde(skip_serializing_if = "Option::is_none")]
     heights: Option<&'a HeightSummary>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    other_reading: Option<&'a OtherReading>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    no_other_reading_because: Option<&'a str>,
     /// Weighted sum of squared residuals before each step and after the last.
     #[schemars(length(min = 1), transform = none_negative)]
     weighted_squares: &'a [f64],
@@ -282,6 +292,7 @@ fn document<'a>(
 ) -> Document<'a> {
     let ties = geometric.ties;
     let adjusted = adjustment.adjusted;
+    let other = adjusted.other_reading.as_ref();
     let rejected = adjusted.rejected.iter().map(|point| RejectedPointDocument {
         kind: point.kind,
         id: &point.id,
@@ -312,6 +323,8 @@ fn document<'a>(
         adjustment: AdjustmentDocument {
             summary: &adjusted.summary,
             heights: adjusted.heights.as_ref(),
+            other_reading: other.and_then(|other| other.as_ref().ok()),
+            no_other_reading_because: other.and_then(|other| Some(other.as_ref().err()?.as_str())),
             weighted_squares: &adjusted.weighted_squares,
             images: adjusted.images.iter().map(image).collect(),
             rejected: rejected.collect(),

@@ -22,6 +22,7 @@ pub(super) fn tables(site: &SiteProducts, adjusted: &Adjusted) -> String {
         rotations(adjusted),
         ranges(site, adjusted),
         biases(adjusted),
+        attitude_clock(adjusted),
     ]
     .concat()
 }
@@ -161,6 +162,20 @@ fn checked_ranges(site: &SiteProducts) -> BTreeMap<(usize, usize), f64> {
         (shot, shots.range_minus_distance_m[index])
     };
     (0..shots.len()).map(of_shot).collect()
+}
+
+/// What the clock of the attitude is off, where it is an unknown.
+fn attitude_clock(adjusted: &Adjusted) -> String {
+    adjusted
+        .summary
+        .attitude_clock_s
+        .map_or_else(String::new, |(offset_s, sigma_s)| {
+            paragraph(&format!(
+                "Offset of the attitude's clock, of all images: {} ± {} s; the rotations above contain what it turns each image by.",
+                label(offset_s, 3),
+                label(sigma_s, 3)
+            ))
+        })
 }
 
 fn biases(adjusted: &Adjusted) -> String {

@@ -1,5 +1,8 @@
 //! What MOLA says of the heights of tie points, and what may be said of their accuracy.
 
+mod readings;
+mod relief;
+
 use super::{
     html::{Cell, Column, Table, heading, paragraph},
     misregistration::BeforeAfter,
@@ -134,6 +137,8 @@ fn statements(geometric: &GeometricProducts, adjustment: &AdjustmentProducts) ->
         table.row(true, cells.map(Cell::from));
     }
     table.finish()
+        + &relief::relief(adjustment.adjusted)
+        + &readings::two_readings(adjustment.adjusted)
 }
 
 /// What says where a site lies before the images do.

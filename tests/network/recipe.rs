@@ -139,6 +139,7 @@ impl<M: ExteriorOrientation> Simulated<M> {
             ranges: self.network.ranges.clone(),
             range_bias_sigmas_m: self.network.range_bias_sigmas_m.clone(),
             heights: None,
+            attitude_clock: None,
         }
     }
 }

@@ -4,11 +4,21 @@ use std::collections::VecDeque;
 
 use super::BlockPattern;
 
-/// The reverse Cuthill–McKee order: the block at each position. Equal candidates are taken by their index.
+/// In patterns of more blocks than this, those that meet more than half of the others come last: unknowns that all images
+/// share. Among the images they would make the envelope as wide as the matrix; at its end each is a row.
+const SHARED_LAST_ABOVE: usize = 16;
+
+/// The reverse Cuthill–McKee order: the block at each position. Equal candidates are taken by their index. Blocks that most
+/// others meet come last.
 pub(super) fn order(pattern: &BlockPattern) -> Vec<usize> {
     let neighbours = neighbours(pattern);
     let mut order = Vec::with_capacity(neighbours.len());
-    let mut is_taken = vec![false; neighbours.len()];
+    let is_shared = |block: &usize| {
+        neighbours.len() > SHARED_LAST_ABOVE && 2 * neighbours[*block].len() > neighbours.len()
+    };
+    let mut is_taken: Vec<bool> = (0..neighbours.len())
+        .map(|block| is_shared(&block))
+        .collect();
     let mut by_degree: Vec<usize> = (0..neighbours.len()).collect();
     by_degree.sort_by_key(|block| neighbours[*block].len());
     for start in by_degree {
@@ -21,6 +31,7 @@ pub(super) fn order(pattern: &BlockPattern) -> Vec<usize> {
         order.extend(breadth_first(&neighbours, end, &mut is_taken));
     }
     order.reverse();
+    order.extend((0..neighbours.len()).filter(is_shared));
     order
 }
 

@@ -26,6 +26,18 @@ pub(super) fn check<M: ExteriorOrientation>(network: &Network<M>) -> Result<(), 
             }
         }
     }
+    if let Some(clock) = &network.attitude_clock {
+        let part = Part::Images;
+        let what = "standard deviation of the offset of the attitude's clock";
+        deviation(part, what, clock.sigma_s)?;
+        if clock.turns_rad_s.len() != network.images.len() {
+            let missing = Part::Image(clock.turns_rad_s.len());
+            return Err(BundleError::Unmatched { part, missing });
+        }
+        for component in clock.turns_rad_s.iter().flatten() {
+            finite(part, "turn against the stars", *component)?;
+        }
+    }
     for (index, sigma_m) in network.range_bias_sigmas_m.iter().enumerate() {
         let part = Part::Profile(index);
         deviation(part, "standard deviation of the range bias", *sigma_m)?;

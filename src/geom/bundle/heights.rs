@@ -6,6 +6,7 @@ use super::unknowns::State;
 use crate::geom::surface::{LaserSurface, SurfaceHeights};
 
 /// Heights that are observed, as they were when the surface was last asked.
+#[derive(Clone)]
 pub(super) struct Heights {
     /// Their points.
     pub(super) points: Vec<usize>,
@@ -60,8 +61,25 @@ impl Heights {
 
     /// Height of the point at `index` above the surface, metres, and its change with the point.
     pub(super) fn difference_m(&self, state: &State, index: usize) -> (f64, Vector3<f64>) {
-        let (height_m, by_point) = LaserSurface::height_m(&state.points_m[self.points[index]]);
-        (height_m - self.surface.heights_m[index], by_point)
+        let place_m = &state.points_m[self.points[index]];
+        let (height_m, by_point) = LaserSurface::height_m(place_m);
+        let difference_m = height_m - self.surface.heights_m[index];
+        match &self.surface.relief {
+            None => (difference_m, by_point),
+            Some(relief) => {
+                let by_place = relief.by_place[index];
+                let moved_m = place_m - self.places_m[index];
+                (difference_m - by_place.dot(&moved_m), by_point - by_place)
+            }
+        }
+    }
+
+    /// The same heights as if slopes said nothing of the place, and none of it were open.
+    pub(super) fn without_plan(&self) -> Self {
+        let mut heights = self.clone();
+        heights.surface.relief = None;
+        heights.surface.covariance_m2 = heights.surface.without_plan_m2.clone();
+        heights
     }
 
     /// Weights by what the rays alone leave of each height; the largest change of a standard deviation, metres.

@@ -139,14 +139,18 @@ impl<'a, M: ExteriorOrientation> Layout<'a, M> {
     /// Columns of the images and profiles that the rows of `point` contain, in the order of these.
     fn columns_of(&self, point: usize) -> impl Iterator<Item = Range<usize>> + '_ {
         let columns = &self.columns;
-        let of_views = self.views.of_key(point).iter();
-        let of_views = of_views.map(|view| columns.images[self.network.views[*view].image].clone());
+        let views = self.views.of_key(point);
+        let of_views = views
+            .iter()
+            .map(|view| columns.images[self.network.views[*view].image].clone());
+        let clock = columns.attitude_clock.filter(|_| !views.is_empty());
+        let of_clock = clock.map(|column| column..column + 1);
         let of_ranges = self.ranges.of_key(point).iter().flat_map(|range| {
             let range = &self.network.ranges[*range];
             let bias = columns.of_profile[range.profile].map_or(0..0, |column| column..column + 1);
             [columns.images[range.image].clone(), bias]
         });
-        of_views.chain(of_ranges)
+        of_views.chain(of_ranges).chain(of_clock)
     }
 
     /// Blocks of the unknowns that the rows of `point` contain, ascending.
@@ -175,9 +179,14 @@ impl<'a, M: ExteriorOrientation> Layout<'a, M> {
             let pair = at.views[*view]?;
             let (factor, cost) = self.robust_factor(&pair);
             rows.cost += cost;
-            let of_image = &columns.of_image[self.network.views[*view].image];
+            let image = self.network.views[*view].image;
             for row in &pair {
-                rows.push_observed(row, of_image, factor);
+                rows.push_observed(row, &columns.of_image[image], factor);
+                let clock = self.network.attitude_clock.as_ref();
+                if let (Some(clock), Some(column)) = (clock, columns.attitude_clock) {
+                    let partial = row.by_rotation.dot(&clock.turns_rad_s[image]);
+                    rows.set_last(column, partial * factor.sqrt() / row.sigma);
+                }
             }
         }
         for index in ranges {

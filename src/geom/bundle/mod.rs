@@ -96,6 +96,7 @@ mod quality;
 mod quasi_newton;
 mod reduce;
 mod reduced_heights;
+mod relief;
 mod rows;
 mod solve;
 mod unknowns;
@@ -109,6 +110,7 @@ use nalgebra::{DMatrix, Matrix3, Vector2, Vector3};
 
 pub use error::BundleError;
 pub use known::KnownCoordinates;
+pub use relief::{ProfileShift, ReliefOfSite};
 pub use solve::solve;
 pub use unknowns::Unknown;
 
@@ -185,6 +187,18 @@ pub struct Range {
     pub profile: usize,
 }
 
+/// An offset of the time at which attitudes were read, the same for all images.
+///
+/// An image whose camera turns against the stars, as one that follows nadir does, was then turned by so much more or less
+/// than its attitude says; one that is held towards a star was not.
+#[derive(Debug, Clone, PartialEq)]
+pub struct AttitudeClock {
+    /// Standard deviation of the offset, seconds.
+    pub sigma_s: f64,
+    /// How each image turns against the stars, camera components, radians per second.
+    pub turns_rad_s: Vec<Vector3<f64>>,
+}
+
 /// Points whose height is that of a surface.
 #[derive(Debug, Clone)]
 pub struct HeightControl {
@@ -211,6 +225,8 @@ pub struct Network<M> {
     pub range_bias_sigmas_m: Vec<f64>,
     /// Heights of points above a surface.
     pub heights: Option<HeightControl>,
+    /// An offset of the attitude's clock, where it is an unknown.
+    pub attitude_clock: Option<AttitudeClock>,
 }
 
 impl<M> Default for Network<M> {
@@ -222,6 +238,7 @@ impl<M> Default for Network<M> {
             ranges: Vec::new(),
             range_bias_sigmas_m: Vec::new(),
             heights: None,
+            attitude_clock: None,
         }
     }
 }
@@ -319,7 +336,8 @@ pub struct AdjustedImage {
     pub correction: OrientationCorrection,
     /// Cofactors of the unknowns in the same order, rows of fixed ones zero; times σ0² the covariance.
     pub cofactors: DMatrix<f64>,
-    /// Residuals of the initial values, `None` where free or fixed.
+    /// Residuals of the initial values, `None` where free or fixed; what the attitude's clock adds to the correction is no
+    /// part of them.
     pub priors: [Option<Residual>; ORIENTATION_UNKNOWNS],
     /// Time bias, seconds, with the square root of its cofactor, when it is unknown.
     pub time_bias_s: Option<(f64, f64)>,
@@ -349,6 +367,9 @@ pub struct Adjustment {
     pub ranges: Vec<Option<Residual>>,
     /// Range bias of each profile with the square root of its cofactor, metres, when it is unknown.
     pub range_biases_m: Vec<Option<(f64, f64)>>,
+    /// Offset of the attitude's clock with the square root of its cofactor, seconds, when it is unknown: attitudes are
+    /// those that the images had so much later.
+    pub attitude_clock_s: Option<(f64, f64)>,
     /// Heights that are observations.
     pub heights: Vec<HeightResidual>,
     /// Whether surface and weights had come to rest in the last round.
@@ -357,6 +378,8 @@ pub struct Adjustment {
     pub compared: Vec<HeightResidual>,
     /// Weighted sum of squares of the observed heights, with their full covariance.
     pub height_squares: f64,
+    /// What the relief under the points with an observed height says of the place, when the ground has any.
+    pub relief: Option<ReliefOfSite>,
     /// Cofactors of the mean of the points with an observed height, m²: what they share does not average out.
     pub mean_cofactor_m2: Option<Matrix3<f64>>,
     /// Scalar observations, initial values with a standard deviation included.
@@ -413,4 +436,7 @@ pub enum Part {
     /// A profile of ranges.
     #[error("profile {0}")]
     Profile(usize),
+    /// What all images share.
+    #[error("all images")]
+    Images,
 }

@@ -11,6 +11,7 @@ use super::{
     point_rows::PointRows,
     reduce::Settled,
     reduced_heights::ReducedHeights,
+    relief,
     unknowns::{State, Unknown},
 };
 use crate::geom::{block_equations::BlockMatrix, pushbroom::ExteriorOrientation};
@@ -70,11 +71,12 @@ impl Controls {
 /// The adjustment where it has settled; observations, unknowns and history are left to the caller.
 pub(super) fn judge<M: ExteriorOrientation>(
     layout: &Layout<'_, M>,
-    Settled { at, reduced }: &Settled,
+    settled: &Settled,
     groups: &PointGroups,
     fitness: &[Result<(), PointRejection>],
     factor: &Factor,
 ) -> Adjustment {
+    let Settled { at, reduced } = settled;
     let state = &at.state;
     let cofactors = &factor.cofactors(&reduced.matrix);
     let heights = layout.heights.as_ref().zip(reduced.heights.as_ref());
@@ -94,6 +96,10 @@ pub(super) fn judge<M: ExteriorOrientation>(
             .iter()
             .map(|column| column.map(|column| estimate(state, cofactors, column)))
             .collect(),
+        attitude_clock_s: layout
+            .columns
+            .attitude_clock
+            .map(|column| estimate(state, cofactors, column)),
         heights: heights
             .zip(controls.as_ref())
             .map_or_else(Vec::new, |((of, reduced), controls)| {
@@ -103,6 +109,7 @@ pub(super) fn judge<M: ExteriorOrientation>(
         compared: Vec::new(),
         height_squares: 0.0,
         mean_cofactor_m2: None,
+        relief: None,
         observations: 0,
         unknowns: 0,
         weighted_squares: 0.0,
@@ -131,6 +138,8 @@ pub(super) fn judge<M: ExteriorOrientation>(
         adjustment.height_squares = reduced.weighted_squares();
         adjustment.weighted_squares += adjustment.height_squares;
         adjustment.mean_cofactor_m2 = mean_cofactor_m2(layout, at, &of.points, factor, reduced);
+        let left = controls.as_ref().map(|controls| &controls.left);
+        adjustment.relief = relief::of_site(layout, settled, of, left);
     }
     adjustment
 }
@@ -326,10 +335,26 @@ fn judge_image<M: ExteriorOrientation>(
     cofactors: &BlockMatrix,
 ) -> AdjustedImage {
     let columns = &layout.columns.of_image[image];
-    let between = |row: usize, column: usize| {
-        let pair = columns[row].zip(columns[column]);
-        let cofactor = pair.and_then(|(row, column)| cofactors.element(row, column));
-        cofactor.unwrap_or_default()
+    // A correction is an unknown of the image and, of rotations, what the attitude's clock turns by.
+    let shares = |coefficient: usize| {
+        let clock = layout.network.attitude_clock.as_ref();
+        let turn_rad_s = match clock {
+            Some(clock) if coefficient >= 9 && coefficient % 3 == 0 => {
+                clock.turns_rad_s[image][coefficient / 3 - 3]
+            }
+            _ => 0.0,
+        };
+        let own = columns[coefficient].map(|column| (column, 1.0));
+        let of_clock = layout.columns.attitude_clock;
+        own.into_iter()
+            .chain(of_clock.map(|column| (column, turn_rad_s)))
+    };
+    let between = |row: usize, column: usize| -> f64 {
+        let pairs = shares(row).flat_map(|row| shares(column).map(move |column| (row, column)));
+        let cofactors = pairs.filter_map(|((row, by_row), (column, by_column))| {
+            Some(by_row * by_column * cofactors.element(row, column)?)
+        });
+        cofactors.fold(0.0, |sum, cofactor| sum + cofactor)
     };
     let prior = |column: usize| {
         let sigma = layout.columns.sigmas[column];

@@ -142,6 +142,11 @@ impl ReducedHeights {
             .collect()
     }
 
+    /// Residuals of the heights, each times what it weighs beside the others: `C⁻¹ d`.
+    pub(super) fn weighted_differences(&self) -> DVector<f64> {
+        self.of_surface.solve(&self.differences_m)
+    }
+
     /// Weighted sum of squared residuals of the heights.
     pub(super) fn weighted_squares(&self) -> f64 {
         self.differences_m

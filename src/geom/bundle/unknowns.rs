@@ -28,6 +28,8 @@ pub enum Unknown {
         /// Index of the profile.
         profile: usize,
     },
+    /// Offset of the attitude's clock of all images.
+    AttitudeClock,
 }
 
 /// Names of the quantities that an orientation is corrected by.
@@ -53,6 +55,7 @@ impl Unknown {
             }
             Self::TimeBias { .. } => "time bias".to_owned(),
             Self::RangeBias { .. } => "range bias".to_owned(),
+            Self::AttitudeClock => "offset of the attitude's clock".to_owned(),
         }
     }
 
@@ -62,6 +65,7 @@ impl Unknown {
         match self {
             Self::Orientation { image, .. } | Self::TimeBias { image } => Part::Image(image),
             Self::RangeBias { profile } => Part::Profile(profile),
+            Self::AttitudeClock => Part::Images,
         }
     }
 }
@@ -83,7 +87,7 @@ impl Unknown {
         match self {
             Self::Orientation { coefficient, .. } if coefficient < 9 => METRES_PER_KM,
             Self::RangeBias { .. } => METRES_PER_KM,
-            Self::Orientation { .. } | Self::TimeBias { .. } => 1.0,
+            Self::Orientation { .. } | Self::TimeBias { .. } | Self::AttitudeClock => 1.0,
         }
     }
 }
@@ -100,6 +104,8 @@ pub(super) struct Columns {
     pub(super) blocks: Vec<Range<usize>>,
     /// Column of each profile's bias.
     pub(super) of_profile: Vec<Option<usize>>,
+    /// Column of the offset of the attitude's clock.
+    pub(super) attitude_clock: Option<usize>,
 }
 
 impl Columns {
@@ -111,6 +117,7 @@ impl Columns {
             images: Vec::new(),
             blocks: Vec::new(),
             of_profile: Vec::new(),
+            attitude_clock: None,
         };
         for (image, entry) in network.images.iter().enumerate() {
             let first = columns.len();
@@ -128,9 +135,13 @@ impl Columns {
             let column = columns.add(Unknown::RangeBias { profile }, *sigma_m);
             columns.of_profile.push(column);
         }
+        let clock = network.attitude_clock.as_ref();
+        columns.attitude_clock =
+            clock.and_then(|clock| columns.add(Unknown::AttitudeClock, clock.sigma_s));
         let of_profiles = columns.of_profile.iter().flatten();
-        let of_profiles = of_profiles.map(|column| *column..column + 1);
-        let blocks = columns.images.iter().cloned().chain(of_profiles);
+        let alone = of_profiles.chain(&columns.attitude_clock);
+        let alone = alone.map(|column| *column..column + 1);
+        let blocks = columns.images.iter().cloned().chain(alone);
         columns.blocks = blocks.filter(|block| !block.is_empty()).collect();
         columns
     }
@@ -173,15 +184,20 @@ impl State {
         points_m: Vec<Vector3<f64>>,
     ) -> Self {
         let value = |column: Option<usize>| column.map_or(0.0, |column| corrections[column]);
-        let images = network.images.iter().zip(&columns.of_image);
-        let orientations = images.map(|(image, of_image)| {
+        let images = network.images.iter().zip(&columns.of_image).enumerate();
+        let orientations = images.map(|(index, (image, of_image))| {
             let coefficients = std::array::from_fn(|coefficient| value(of_image[coefficient]));
             let time_bias_s = value(of_image[ORIENTATION_UNKNOWNS]);
-            OrientationCorrection::of(
+            let mut correction = OrientationCorrection::of(
                 &coefficients,
                 image.half_lines,
                 time_bias_s / image.line_period_s,
-            )
+            );
+            if let Some(clock) = &network.attitude_clock {
+                correction.rotation_rad[0] +=
+                    clock.turns_rad_s[index] * value(columns.attitude_clock);
+            }
+            correction
         });
         Self {
             orientations: orientations.collect(),

@@ -32,7 +32,7 @@ mod kriging;
 mod plan;
 mod variogram;
 
-use nalgebra::{DMatrix, Vector2, Vector3};
+use nalgebra::{DMatrix, Matrix3xX, Vector2, Vector3};
 
 use self::{kriging::Kriging, plan::Plan};
 use crate::constants::MARS_IAU2000;
@@ -69,6 +69,9 @@ pub struct SurfaceOptions {
     pub plan_sigma_m: f64,
     /// Roughness that is assumed at least, metres at 300 m, see [`Variogram`].
     pub roughness_min_m: f64,
+    /// Where relief is to tell the place: standard deviation on each axis of where a profile lies in plan, metres. The
+    /// error in plan between images and shots is then what heights are asked for, and no part of their own errors.
+    pub relief_sigma_m: Option<f64>,
 }
 
 impl Default for SurfaceOptions {
@@ -80,6 +83,7 @@ impl Default for SurfaceOptions {
             profile_sigma_m: 1.0,
             plan_sigma_m: 130.0,
             roughness_min_m: 4.0,
+            relief_sigma_m: None,
         }
     }
 }
@@ -117,6 +121,31 @@ pub struct SurfaceHeights {
     pub nearest_m: Vec<f64>,
     /// Covariance of the errors of the heights, m².
     pub covariance_m2: DMatrix<f64>,
+    /// The same without what comes from errors in plan on a slope.
+    pub without_plan_m2: DMatrix<f64>,
+    /// Where relief is to tell the place.
+    pub relief: Option<Relief>,
+}
+
+/// What heights over relief say of the place.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Relief {
+    /// How each height changes with its place, metres per metre, Mars-fixed.
+    pub by_place: Vec<Vector3<f64>>,
+    /// Where each profile may lie: one entry a profile of the surface.
+    pub profiles: Vec<ProfileOnRelief>,
+}
+
+/// What heights of the surface have to do with where one of its profiles lies.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ProfileOnRelief {
+    /// Index of the profile.
+    pub profile: usize,
+    /// How measured minus predicted heights change when the profile is recorded farther to the east, to the north and
+    /// higher than it lies: one row a place.
+    pub by_shift: Matrix3xX<f64>,
+    /// Standard deviations of these shifts, metres.
+    pub sigma_m: Vector3<f64>,
 }
 
 impl SurfaceHeights {
@@ -173,6 +202,12 @@ impl LaserSurface {
         profiles
     }
 
+    /// Whether heights above it are to tell the place.
+    #[must_use]
+    pub const fn uses_relief(&self) -> bool {
+        self.options.relief_sigma_m.is_some()
+    }
+
     /// Shots that the surface rests on.
     #[must_use]
     pub fn shots(&self) -> usize {
@@ -215,9 +250,29 @@ impl LaserSurface {
         let mut covariance_m2 = self.errors_m2(&at);
         let of_profiles = self.kriging.weights_of_profiles(&weights);
         covariance_m2 += of_profiles.tr_mul(&of_profiles) * self.options.profile_sigma_m.powi(2);
-        let slopes_matrix = DMatrix::from_fn(2, at.len(), |axis, place| slopes[place][axis]);
-        covariance_m2 += slopes_matrix.tr_mul(&slopes_matrix) * self.options.plan_sigma_m.powi(2);
+        let without_plan_m2 = covariance_m2.clone();
+        let relief = self.options.relief_sigma_m.map(|sigma_m| Relief {
+            by_place: places_m
+                .iter()
+                .zip(&slopes)
+                .map(|(place, slope)| self.plan.by_place(place, slope))
+                .collect(),
+            profiles: self.on_relief(&slopes, &of_profiles, sigma_m),
+        });
+        if let Some(relief) = &relief {
+            for profile in &relief.profiles {
+                let mut in_plan = profile.by_shift.clone();
+                in_plan.row_mut(2).fill(0.0);
+                covariance_m2 += in_plan.tr_mul(&in_plan) * profile.sigma_m.x.powi(2);
+            }
+        } else {
+            let slopes_matrix = DMatrix::from_fn(2, at.len(), |axis, place| slopes[place][axis]);
+            covariance_m2 +=
+                slopes_matrix.tr_mul(&slopes_matrix) * self.options.plan_sigma_m.powi(2);
+        }
         SurfaceHeights {
+            without_plan_m2,
+            relief,
             heights_m: at
                 .iter()
                 .map(|place| self.kriging.height_m(place))
@@ -229,6 +284,29 @@ impl LaserSurface {
             slopes,
             covariance_m2,
         }
+    }
+
+    /// Each profile by its share in the heights, `of_profiles`.
+    fn on_relief(
+        &self,
+        slopes: &[Vector2<f64>],
+        of_profiles: &DMatrix<f64>,
+        sigma_m: f64,
+    ) -> Vec<ProfileOnRelief> {
+        let by_shift = |profile: usize| {
+            Matrix3xX::from_fn(slopes.len(), |axis, place| {
+                let shift = if axis < 2 { slopes[place][axis] } else { -1.0 };
+                of_profiles[(profile, place)] * shift
+            })
+        };
+        let profiles = self.profiles().into_iter();
+        profiles
+            .map(|profile| ProfileOnRelief {
+                profile,
+                by_shift: by_shift(profile),
+                sigma_m: Vector3::new(sigma_m, sigma_m, self.options.profile_sigma_m),
+            })
+            .collect()
     }
 
     /// Covariance of what the surface errs by where the places may truly be: an error in plan takes them away from a

@@ -37,6 +37,12 @@ pub(super) struct AdjustmentKeys<'a> {
     rotation_sigma_rad: Option<[f64; 3]>,
     position_unknowns: PositionUnknowns,
     rotation_unknowns: RotationUnknowns,
+    relief_for_plan: bool,
+    attitude_clock: bool,
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    attitude_clock_sigma_s: f64,
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    attitude_clock_rotation_sigma_rad: f64,
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 0.0))]
     position_sigma_nadir_m: Option<f64>,
@@ -96,6 +102,10 @@ impl<'a> AdjustmentKeys<'a> {
             rotation_sigma_rad: is_of_surface.then(|| config.rotation_sigma_rad.map(number)),
             position_unknowns: config.position_unknowns,
             rotation_unknowns: config.rotation_unknowns,
+            relief_for_plan: config.relief_for_plan,
+            attitude_clock: config.attitude_clock,
+            attitude_clock_sigma_s: config.attitude_clock_sigma_s,
+            attitude_clock_rotation_sigma_rad: config.attitude_clock_rotation_sigma_rad,
             position_sigma_nadir_m: published_m.map(|[nadir_m, _]| nadir_m),
             position_sigma_off_nadir_m: published_m.map(|[_, other_m]| other_m),
             robust: config.robust.as_ref(),

@@ -9,6 +9,7 @@ use super::{
     input::AdjustImage,
     network::Assembled,
     points::{PointKind, RejectedPoint},
+    split::{self, OtherReading},
     summary::AdjustmentSummary,
 };
 use crate::{
@@ -27,6 +28,9 @@ pub struct Adjusted {
     pub summary: AdjustmentSummary,
     /// Heights of tie points by the MOLA surface; `None` where they are no observations.
     pub heights: Option<HeightSummary>,
+    /// Where the tie points lie by the other reading of what images disagree by along the flight, or why that is not
+    /// known; `None` where they hardly disagree.
+    pub other_reading: Option<std::result::Result<OtherReading, String>>,
     /// One entry for each image, in their order.
     pub images: Vec<CorrectedImage>,
     /// Points with adjusted coordinates: shots, then tie points, each in their order.
@@ -160,6 +164,8 @@ pub(super) fn collect<M: ExteriorOrientation>(
     assembled: Assembled<&M>,
     adjustment: Adjustment,
     summary: AdjustmentSummary,
+    profiles: &[String],
+    other_reading: Option<std::result::Result<OtherReading, String>>,
 ) -> Adjusted {
     let contradicted_m2 = contradicted_m2(&adjustment);
     let mut index_of = vec![None; assembled.points.len()];
@@ -180,8 +186,9 @@ pub(super) fn collect<M: ExteriorOrientation>(
     let views = assembled.network.views.par_iter().zip(&adjustment.views);
     let ranges = assembled.network.ranges.iter().zip(&adjustment.ranges);
     Adjusted {
-        heights: height_summary::heights(&assembled, &adjustment),
-        images: corrected_images(images, &adjustment, summary.variance_factor),
+        heights: height_summary::heights(&assembled, &adjustment, profiles),
+        images: corrected_images(images, &assembled, &adjustment, summary.variance_factor),
+        other_reading,
         views: views
             .filter_map(|(view, residuals)| {
                 let [along, across] = (*residuals)?;
@@ -268,20 +275,21 @@ const LAST_STEP_LINES: f64 = 1e-3;
 
 fn corrected_images<M>(
     images: &[AdjustImage<M>],
+    assembled: &Assembled<&M>,
     adjustment: &Adjustment,
     variance_factor: f64,
 ) -> Vec<CorrectedImage> {
     let root = variance_factor.sqrt();
-    let found = images.iter().zip(&adjustment.images);
+    let found = images.iter().zip(&adjustment.images).enumerate();
     found
-        .map(|(image, adjusted)| CorrectedImage {
+        .map(|(index, (image, adjusted))| CorrectedImage {
             id: image.oriented_camera.id.clone(),
             correction: adjusted.correction.coefficients(),
             sigmas: std::array::from_fn(|unknown| {
                 root * adjusted.cofactors[(unknown, unknown)].sqrt()
             }),
             covariance: &adjusted.cofactors * variance_factor,
-            prior_sigmas: image.sigmas,
+            prior_sigmas: split::prior_sigmas(&assembled.network, index),
             time_bias_s: adjusted
                 .time_bias_s
                 .map(|(bias_s, root_s)| (bias_s, root * root_s)),

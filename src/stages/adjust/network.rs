@@ -8,6 +8,7 @@ use super::{
     error::AdjustError,
     input::{AdjustImage, LaserShots},
     points::{PointKind, RejectedPoint, RejectionReason},
+    split,
 };
 use crate::{
     config::AdjustmentConfig,
@@ -65,6 +66,9 @@ pub(super) fn assemble<'a, M: ExteriorOrientation>(
         assembled.network.views.extend(&assembled.mola);
     }
     assembled.add_ties(images, ties, starts, config)?;
+    if config.attitude_clock {
+        split::by_attitude_clock(&mut assembled.network, images, config);
+    }
     if let Some(surface) = &shots.surface {
         let ties = assembled.shots..assembled.points.len();
         assembled.network.heights = Some(HeightControl {

@@ -2,17 +2,21 @@
 
 use std::collections::BTreeSet;
 
+use nalgebra::Vector3;
+
 use super::input::{
     AdjustImage, LaserShot, LaserShots, ShotRange, hold_powers, orientation_sigmas,
     sigmas_of_powers,
 };
 use crate::{
     config::AdjustmentConfig,
+    constants::MARS_IAU2000,
     footprints::{AdjustmentModel, Footprints},
     frames::{MarsIau2000, Position},
     geom::{
-        bundle::ORIENTATION_UNKNOWNS, ellipsoid::spherical_to_xyz_m,
-        oriented_camera::OrientedCamera, pushbroom::ExteriorOrientation, surface::LaserSurface,
+        attitude::rotation_vector, bundle::ORIENTATION_UNKNOWNS, ellipsoid::spherical_to_xyz_m,
+        mars_rotation::mars_spin_rad_s, oriented_camera::OrientedCamera,
+        pushbroom::ExteriorOrientation, surface::LaserSurface,
     },
     stages::{
         group_profiles::Profile, orientation::Orientation, register::ImageRegistration,
@@ -63,11 +67,23 @@ impl<M: ExteriorOrientation> Candidate<'_, M> {
         let rotation = rotation.unwrap_or(config.rotation_unknowns);
         hold_powers(&mut sigmas, position, rotation);
         AdjustImage {
+            turn_rad_s: self.turn_rad_s(),
             oriented_camera: self.oriented_camera,
             line_period_s: self.times.line_times.mean_period_s(),
             sigmas,
             time_bias_sigma_s: config.time_bias_sigma_s,
         }
+    }
+
+    /// How the camera turns against the stars over the image, its own components, radians per second.
+    fn turn_rad_s(&self) -> Vector3<f64> {
+        let half_lines = 0.5 * self.oriented_camera.lines();
+        let orientation = &self.oriented_camera.orientation;
+        let [before, middle, after] =
+            [-half_lines, 0.0, half_lines].map(|x| orientation.pose(x).mars_to_camera);
+        let duration_s = 2.0 * half_lines * self.times.line_times.mean_period_s();
+        let against_mars = rotation_vector(&(after * before.transpose())) / duration_s;
+        against_mars - middle * mars_spin_rad_s(&MARS_IAU2000)
     }
 
     /// All position unknowns get the standard deviation of nadir or of other images, and rotations what moves the

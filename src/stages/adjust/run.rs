@@ -9,7 +9,7 @@ use super::{
     input::{AdjustImage, LaserShots},
     network::{self, Assembled, Named},
     points::{PointKind, RejectedPoint, RejectionReason},
-    summary, words,
+    split, summary, words,
 };
 use crate::{
     config::AdjustmentConfig,
@@ -24,7 +24,8 @@ use crate::{
 
 /// Adjusts images, shots and tie points together.
 ///
-/// Tie points start from their intersection; those without one are rejected and listed.
+/// Tie points start from their intersection; those without one are rejected and listed. Where the images disagree by
+/// `disagreement_m` along the flight, and that is much, both readings of it are told.
 ///
 /// # Errors
 /// No tie point with a ground point, identifiers that do not match, a singular network, initial values that the rest refutes.
@@ -33,6 +34,7 @@ pub fn adjust<M: ExteriorOrientation>(
     shots: &LaserShots,
     ties: &[TiePoint],
     starts: &IntersectedTies,
+    disagreement_m: f64,
     config: &AdjustmentConfig,
 ) -> Result<Adjusted> {
     if starts.points.is_empty() {
@@ -73,7 +75,26 @@ pub fn adjust<M: ExteriorOrientation>(
     assembled.rejected.extend(dropped);
     contradictions(images, &assembled, &adjustment)?;
     let summary = summary::summarise(images, &assembled, &adjustment, config)?;
-    Ok(adjusted::collect(images, assembled, adjustment, summary))
+    let factor = summary.variance_factor;
+    let other = split::is_told(disagreement_m, config).then(|| {
+        split::other_reading(
+            images,
+            &assembled,
+            &adjustment,
+            factor,
+            &bundle_options,
+            config,
+        )
+        .map_err(|error| words::in_words(error, images, &assembled, config).to_string())
+    });
+    Ok(adjusted::collect(
+        images,
+        assembled,
+        adjustment,
+        summary,
+        &shots.profiles,
+        other,
+    ))
 }
 
 fn contradictions<M>(

@@ -7,12 +7,13 @@ use crate::{
     config::{AdjustmentConfig, MolaSurfaceConfig},
     error::Result,
     footprints::AdjustmentModel,
-    geom::pushbroom::CameraModel,
+    geom::{pushbroom::CameraModel, surface::SurfaceOptions},
     stage::{InOrder, Output, Stage},
     stage_inputs,
     stages::{
-        convert_datum::Converted, group_profiles::Profile, intersect::IntersectedTies,
-        mola_surface::MolaShots, read_ties::Ties, site_image::SiteImage,
+        compare_pairs::PairComparison, convert_datum::Converted, group_profiles::Profile,
+        intersect::IntersectedTies, mola_surface::MolaShots, read_ties::Ties,
+        site_image::SiteImage,
     },
 };
 
@@ -31,6 +32,8 @@ stage_inputs! {
         pub ties: &'a Output<Ties>,
         /// Their ground points.
         pub intersected: &'a Output<IntersectedTies>,
+        /// The pairs of images.
+        pub pairs: &'a Output<Vec<PairComparison>>,
         /// What is uncertain about the MOLA surface.
         pub mola_surface: &'a MolaSurfaceConfig,
         /// Standard deviations and options.
@@ -40,7 +43,7 @@ stage_inputs! {
 
 impl Stage for Adjust<'_> {
     const NAME: &'static str = "adjust";
-    const METHOD: u32 = 4;
+    const METHOD: u32 = 5;
     type Output = Adjusted;
     stage_inputs!(fingerprint);
 
@@ -57,13 +60,19 @@ impl Stage for Adjust<'_> {
         });
         let (footprints, profiles) = (&self.converted.value()?.footprints, self.profiles.value()?);
         let (ties, starts) = (&self.ties.value()?.points, self.intersected.value()?);
+        let relief_for_plan = self.adjustment.relief_for_plan;
         let surface = match self.adjustment.model {
             // Without enough shots heights are what the orientations say.
             AdjustmentModel::MolaSurface => {
                 let around = starts.points.iter().map(|point| point.ground.xyz_m);
                 let around: Vec<_> = around.collect();
                 let shots = MolaShots::of(footprints, profiles);
-                shots.surface(&around, &self.mola_surface.options()).ok()
+                let options = SurfaceOptions {
+                    relief_sigma_m: relief_for_plan
+                        .then_some(self.mola_surface.profile_plan_sigma_m),
+                    ..self.mola_surface.options()
+                };
+                shots.surface(&around, &options).ok()
             }
             AdjustmentModel::Published => None,
         };
@@ -74,6 +83,9 @@ impl Stage for Adjust<'_> {
             surface,
             self.adjustment,
         );
-        adjust(&images, &shots, ties, starts, self.adjustment)
+        let pairs = self.pairs.value()?.iter();
+        let disagreements_m = pairs.map(|pair| pair.along_track_parallax_m);
+        let largest_m = disagreements_m.fold(0.0, f64::max);
+        adjust(&images, &shots, ties, starts, largest_m, self.adjustment)
     }
 }

@@ -47,7 +47,7 @@ pub enum ObservationType {
     MolaGround,
     /// Coordinates of tie points that are known beforehand.
     TieGround,
-    /// Time and range biases, initially 0.
+    /// Time and range biases and the offset of the attitude's clock, initially 0.
     Bias,
 }
 
@@ -127,6 +127,11 @@ pub struct AdjustmentSummary {
     /// Range bias of each profile with its standard deviation, metres, where they are unknown.
     #[schemars(transform = at("/items/prefixItems/2", "minimum", 0))]
     pub range_biases_m: Vec<(String, f64, f64)>,
+    /// Offset of the attitude's clock with its standard deviation, seconds, where it is unknown: the attitudes are those
+    /// that the images had so much later.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(transform = at("/prefixItems/1", "minimum", 0))]
+    pub attitude_clock_s: Option<(f64, f64)>,
     /// Unknowns of one image, or of images that share points, with a correlation above 0.95: single values of them must
     /// not be interpreted.
     #[schemars(transform = at("/items/prefixItems/2", "minimum", -1.000_001))]
@@ -180,6 +185,12 @@ pub(super) fn summarise<M: ExteriorOrientation>(
                 ))
             })
             .collect(),
+        attitude_clock_s: adjustment.attitude_clock_s.map(|(offset_s, root_s)| {
+            (
+                offset_s,
+                root_s * variance_factor(assembled, adjustment).sqrt(),
+            )
+        }),
         correlated: adjustment
             .correlated
             .iter()
@@ -250,13 +261,16 @@ fn of_heights(adjustment: &Adjustment) -> Option<TypeSummary> {
     })
 }
 
-/// Residuals of time and range biases, whose initial value is 0.
+/// Residuals of time and range biases and of the attitude's clock, whose initial value is 0.
 fn biases<M>(assembled: &Assembled<M>, adjustment: &Adjustment) -> Vec<Residual> {
     let images = assembled.network.images.iter().zip(&adjustment.images);
     let times = images.map(|(image, adjusted)| (image.time_bias_sigma_s, adjusted.time_bias_s));
     let ranges = assembled.network.range_bias_sigmas_m.iter().copied();
     let ranges = ranges.zip(adjustment.range_biases_m.iter().copied());
-    let weighted = times.chain(ranges).filter(|(sigma, _)| sigma.is_finite());
+    let clock = assembled.network.attitude_clock.iter();
+    let clock = clock.map(|clock| (clock.sigma_s, adjustment.attitude_clock_s));
+    let biases = times.chain(ranges).chain(clock);
+    let weighted = biases.filter(|(sigma, _)| sigma.is_finite());
     weighted
         .filter_map(|(sigma, estimate)| {
             let (bias, root_cofactor) = estimate?;

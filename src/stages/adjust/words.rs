@@ -99,6 +99,7 @@ fn part_in_words<M>(part: Part, images: &[AdjustImage<M>], assembled: &Assembled
             format!("the range of {}", point(range.point))
         }
         Part::Profile(index) => format!("profile {}", assembled.profiles[index].name),
+        Part::Images => part.to_string(),
     }
 }
 
@@ -113,6 +114,7 @@ pub(super) fn unknown_in_words<M>(
             format!("image {}", images[image].oriented_camera.id)
         }
         Unknown::RangeBias { profile } => format!("profile {}", profiles[profile].name),
+        Unknown::AttitudeClock => unknown.part().to_string(),
     };
     format!("the {} of {owner}", unknown.quantity())
 }

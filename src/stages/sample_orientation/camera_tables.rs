@@ -6,12 +6,12 @@ use super::Reader;
 use crate::{
     constants::MARS_IAU2000,
     error::Result,
+    geom::mars_rotation::mars_spin_rad_s,
     stages::{
         orientation::{CameraTables, InterpolationCheck, RayOrigin},
         tag_times::ImageTimes,
     },
     time::Et,
-    units::{RADIANS_PER_DEGREE, SECONDS_PER_DAY},
 };
 
 /// Image lines between two nodes of the camera-model tables to begin with; ALE's spacing for long images.
@@ -106,6 +106,5 @@ fn tables(reader: &Reader, epochs: &[Et]) -> Result<CameraTables> {
 
 /// Spin of Mars in J2000: its rate along its pole (the pole's own motion is 1e-14 rad/s).
 fn mars_angular_velocity(inertial_to_mars: &Matrix3<f64>) -> Vector3<f64> {
-    let rate_rad_s = MARS_IAU2000.meridian_deg_per_day * RADIANS_PER_DEGREE / SECONDS_PER_DAY;
-    inertial_to_mars.row(2).transpose() * rate_rad_s
+    inertial_to_mars.tr_mul(&mars_spin_rad_s(&MARS_IAU2000))
 }

@@ -1,0 +1,79 @@
+//! Two readings of what images disagree by along the flight, and where each puts the tie points.
+
+use super::super::{
+    html::{Cell, Column, Table, paragraph},
+    plots::label,
+};
+use crate::stages::adjust::{Adjusted, OtherReading};
+
+/// Both readings side by side, where the images disagree by so much that it matters.
+pub(super) fn two_readings(adjusted: &Adjusted) -> String {
+    match &adjusted.other_reading {
+        None => String::new(),
+        Some(Err(reason)) => paragraph(&format!(
+            "The other reading of what the images disagree by along the flight (adjustment.attitude_clock) gave no result: {reason}."
+        )),
+        Some(Ok(other)) => table(adjusted, other) + &paragraph(WORDS),
+    }
+}
+
+const WORDS: &str = "Tie points say how far the images are apart along the flight, not which of them is where it should be. \
+    Evenly: all images are as likely to be wrong. By the clock: one offset of the time at which attitudes were read turned \
+    the images that follow nadir and left those that are held towards a star where they were. No measurement decides between \
+    them, so each standard deviation holds only if its reading does, and neither covers the other; adjustment.attitude_clock says \
+    which one the products follow. Several sites in one adjustment would be a test.";
+
+fn table(adjusted: &Adjusted, other: &OtherReading) -> String {
+    let mut table = Table::new(
+        "Two readings of what the images disagree by along the flight, metres",
+        &[
+            Column::Text("reading"),
+            Column::Text("products"),
+            Column::Number("east"),
+            Column::Number("north"),
+            Column::Number("up"),
+            Column::Number("σ east"),
+            Column::Number("σ north"),
+            Column::Number("σ up"),
+        ],
+    );
+    let heights = adjusted.heights.as_ref();
+    let own_sigma_m = heights.map(|heights| heights.mean_sigma_m);
+    let rows = [
+        (
+            adjusted.summary.attitude_clock_s,
+            [0.0; 3],
+            own_sigma_m,
+            "follow it",
+        ),
+        (
+            other.attitude_clock_s,
+            other.moved_m,
+            other.mean_sigma_m,
+            "do not",
+        ),
+    ];
+    for (clock_s, moved_m, sigma_m, products) in rows {
+        let mut cells: Vec<Cell> = vec![reading(clock_s).into(), products.into()];
+        cells.extend(moved_m.map(|metres| Cell::from(label(metres, 1))));
+        cells.extend([0, 1, 2].map(|axis| {
+            let sigma_m = sigma_m.map(|sigma_m| format!("±{}", label(sigma_m[axis], 1)));
+            Cell::from(sigma_m.unwrap_or_else(|| "–".to_owned()))
+        }));
+        table.row(true, cells);
+    }
+    table.finish()
+}
+
+fn reading(clock_s: Option<(f64, f64)>) -> String {
+    clock_s.map_or_else(
+        || "evenly: all images as likely to be wrong".to_owned(),
+        |(offset_s, sigma_s)| {
+            format!(
+                "by the attitude's clock, off by {} ± {} s",
+                label(offset_s, 2),
+                label(sigma_s, 2)
+            )
+        },
+    )
+}

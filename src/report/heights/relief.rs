@@ -1,0 +1,68 @@
+//! What relief says of the place.
+
+use super::super::{
+    html::{Cell, Column, Table, paragraph},
+    plots::label,
+};
+use crate::stages::adjust::{Adjusted, HeightSummary, ProfileOffset};
+
+/// Of use where relief knows the place to less than this share of what is known beforehand.
+const SHARE_OF_USE: f64 = 0.5;
+
+/// To what relief tells the place, whether that is worth using, and what became of it where it is used.
+pub(super) fn relief(adjusted: &Adjusted) -> String {
+    let Some(heights) = &adjusted.heights else {
+        return String::new();
+    };
+    let Some([east_m, north_m]) = heights.relief_sigma_m else {
+        return paragraph(
+            "Relief says nothing of the place: the surface has no slope at the tie points.",
+        );
+    };
+    let told = format!(
+        "Relief alone tells where the images lie against the MOLA surface to ±{} m east and ±{} m north.",
+        label(east_m, 0),
+        label(north_m, 0)
+    );
+    match &heights.profile_shifts {
+        Some(offsets) => {
+            let used = "It is used: heights of tie points on slopes move images and profiles in plan (adjustment.relief_for_plan).";
+            paragraph(&format!("{told} {used}")) + &table(offsets)
+        }
+        None => paragraph(&format!("{told} {}", advice([east_m, north_m], heights))),
+    }
+}
+
+fn advice(relief_m: [f64; 2], heights: &HeightSummary) -> String {
+    let [east_m, north_m, _] = heights.mean_sigma_m;
+    let is_of_use = |relief_m: f64, known_m: f64| relief_m < SHARE_OF_USE * known_m;
+    let use_it = is_of_use(relief_m[0], east_m) && is_of_use(relief_m[1], north_m);
+    format!(
+        "It is not used; it would be of use where that is less than half of what is known of the place without it (±{} and ±{} m): \
+         here it {} (adjustment.relief_for_plan).",
+        label(east_m, 0),
+        label(north_m, 0),
+        if use_it { "is" } else { "is not" }
+    )
+}
+
+fn table(offsets: &[ProfileOffset]) -> String {
+    let mut table = Table::new(
+        "Where profiles are recorded against where relief and images put them, metres",
+        &[
+            Column::Text("profile"),
+            Column::Number("east"),
+            Column::Number("north"),
+            Column::Number("up"),
+        ],
+    );
+    for offset in offsets {
+        let mut cells: Vec<Cell> = vec![(&offset.profile).into()];
+        let axes = offset.shift_m.iter().zip(&offset.sigma_m);
+        cells.extend(axes.map(|(shift_m, sigma_m)| {
+            Cell::from(format!("{} ± {}", label(*shift_m, 1), label(*sigma_m, 1)))
+        }));
+        table.row(true, cells);
+    }
+    table.finish()
+}

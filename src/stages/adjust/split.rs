@@ -1,0 +1,138 @@
+//! Two readings of what images disagree by along the flight.
+//!
+//! Tie points say how far two images are apart, not which of them is where it should be. Either all are as likely to be
+//! wrong, and the distance is split evenly; or attitudes were read at a time that is off by the same amount for all
+//! images: then those that follow nadir are wrong and those that are held towards a star are right. The standard
+//! deviations of either reading hold only if that reading does.
+//!
+//! # Source
+//! A choice. Shan et al. 2005, Table 5, has the nadir images of three sites off to the same side, which one offset of
+//! the attitude's clock would explain; the paper does not say so.
+
+use nalgebra::Vector3;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::{
+    height_summary::mean_sigma_m, input::AdjustImage, network::Assembled, points::PointKind,
+};
+use crate::{
+    config::AdjustmentConfig,
+    footprints::AdjustmentModel,
+    geom::{
+        bundle::{
+            Adjustment, AttitudeClock, BundleError, BundleOptions, Network, ORIENTATION_UNKNOWNS,
+            solve,
+        },
+        ellipsoid::local_axes,
+        pushbroom::ExteriorOrientation,
+    },
+    schema::{at, none_negative},
+};
+
+/// Images that disagree by less than this along the flight need no other reading, metres: both place the tie points
+/// within half of it, below what is stated of the place.
+const TOLD_ABOVE_M: f64 = 100.0;
+
+/// Where the tie points lie by the other reading.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct OtherReading {
+    /// Offset of the attitude's clock with its standard deviation, seconds, where this is the reading by it; else
+    /// all images are taken as equally likely to be wrong.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(transform = at("/prefixItems/1", "minimum", 0))]
+    pub attitude_clock_s: Option<(f64, f64)>,
+    /// Mean of the tie points by this reading minus that of the adjustment, towards east, north and up, metres.
+    pub moved_m: [f64; 3],
+    /// Standard deviations of their mean by this reading, likewise; none where no surface controls heights.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(transform = none_negative)]
+    pub mean_sigma_m: Option<[f64; 3]>,
+}
+
+/// Puts down what images disagree by to the clock of the attitude.
+pub(super) fn by_attitude_clock<M>(
+    network: &mut Network<M>,
+    images: &[AdjustImage<impl Sized>],
+    config: &AdjustmentConfig,
+) {
+    for image in &mut network.images {
+        for constant in constant_rotations() {
+            let sigma = &mut image.sigmas[constant];
+            *sigma = sigma.min(config.attitude_clock_rotation_sigma_rad);
+        }
+    }
+    network.attitude_clock = Some(AttitudeClock {
+        sigma_s: config.attitude_clock_sigma_s,
+        turns_rad_s: images.iter().map(|image| image.turn_rad_s).collect(),
+    });
+}
+
+/// Takes all images as equally likely to be wrong.
+fn evenly<M>(network: &mut Network<M>, images: &[AdjustImage<impl Sized>]) {
+    for (image, of_site) in network.images.iter_mut().zip(images) {
+        image.sigmas = of_site.sigmas;
+    }
+    network.attitude_clock = None;
+}
+
+/// Coefficients of the constant rotations about x, y and z.
+fn constant_rotations() -> impl Iterator<Item = usize> {
+    (ORIENTATION_UNKNOWNS / 2..ORIENTATION_UNKNOWNS).step_by(3)
+}
+
+/// What corrections of an image's orientation were expected to be within: its own standard deviations, and what the
+/// attitude's clock adds.
+pub(super) fn prior_sigmas<M>(network: &Network<M>, image: usize) -> [f64; ORIENTATION_UNKNOWNS] {
+    let mut sigmas = network.images[image].sigmas;
+    if let Some(clock) = &network.attitude_clock {
+        let turn_rad_s = &clock.turns_rad_s[image];
+        for (constant, turn_rad_s) in constant_rotations().zip(turn_rad_s) {
+            sigmas[constant] = sigmas[constant].hypot(turn_rad_s * clock.sigma_s);
+        }
+    }
+    sigmas
+}
+
+/// Whether images that disagree by so much along the flight need both readings.
+pub(super) fn is_told(disagreement_m: f64, config: &AdjustmentConfig) -> bool {
+    config.model == AdjustmentModel::MolaSurface && disagreement_m > TOLD_ABOVE_M
+}
+
+/// Adjusts the tie points that are left by the other reading.
+pub(super) fn other_reading<M: ExteriorOrientation>(
+    images: &[AdjustImage<M>],
+    assembled: &Assembled<&M>,
+    adjustment: &Adjustment,
+    variance_factor: f64,
+    bundle_options: &BundleOptions,
+    config: &AdjustmentConfig,
+) -> Result<OtherReading, BundleError> {
+    let mut network = assembled.network.clone();
+    if config.attitude_clock {
+        evenly(&mut network, images);
+    } else {
+        by_attitude_clock(&mut network, images, config);
+    }
+    let other = solve(&network, bundle_options)?;
+    let points = adjustment.points.iter().zip(&other.points).enumerate();
+    let both_m: Vec<[Vector3<f64>; 2]> = points
+        .filter(|(point, _)| assembled.kind(*point) == PointKind::Tie)
+        .filter_map(|(_, (here, there))| {
+            Some([here.as_ref().ok()?.ground_m, there.as_ref().ok()?.ground_m])
+        })
+        .collect();
+    let middle_m: Vector3<f64> = both_m.iter().map(|[here_m, _]| here_m).sum();
+    let moved_m: Vector3<f64> = both_m
+        .iter()
+        .map(|[here_m, there_m]| there_m - here_m)
+        .sum();
+    let root = variance_factor.sqrt();
+    Ok(OtherReading {
+        attitude_clock_s: other
+            .attitude_clock_s
+            .map(|(offset_s, root_s)| (offset_s, root_s * root)),
+        moved_m: (local_axes(&middle_m) * moved_m / both_m.len().max(1) as f64).into(),
+        mean_sigma_m: mean_sigma_m(&other, variance_factor),
+    })
+}
