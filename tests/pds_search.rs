@@ -2,6 +2,9 @@
 
 #![allow(clippy::expect_used, reason = "helpers of tests fail as tests do")]
 
+#[path = "track/mod.rs"]
+mod track;
+
 use std::{
     path::{Path, PathBuf},
     sync::atomic::AtomicBool,
@@ -10,6 +13,8 @@ use std::{
 use areograph::{
     altimetry::{DatumChoice, ShotFilter},
     config::{PedrConfig, WindowConfig},
+    error::Result,
+    files::{HashedFile, InputFiles},
     footprints::Footprint,
     frames::{MarsDatum, MarsIau2000},
     geom::{
@@ -17,86 +22,25 @@ use areograph::{
         mars_rotation::convert_datum,
         window::{Region, WindowShape},
     },
-    pds::pedr::{FieldGuard, File, FrameValues, LabelInfo, PedrWriter, Reason, Record},
-    stages::search_footprints::{SearchResult, ShotRejection, search_footprints},
+    pds::pedr::{FieldGuard, File, Reason},
+    stages::search_footprints::{self, SearchResult, ShotRejection},
     time::Et,
-    units::wrap_pi,
 };
 use proptest::prelude::*;
+use track::{DEGREE, FRAMES, write};
 
 /// Nobody stops these searches.
 static RUN_ON: AtomicBool = AtomicBool::new(false);
 
-const DEGREE: f64 = std::f64::consts::PI / 180.0;
-/// A little less than one polar revolution and a half.
-const FRAMES: u32 = 5_000;
-
-/// Ground longitude and latitude, radians, `time_s` after the start: a circular polar orbit over turning Mars.
-fn ground(time_s: f64) -> [f64; 2] {
-    let along_rad = 0.9 + time_s * 8.9e-4;
-    let inclination_rad = 92.9 * DEGREE;
-    let latitude_rad = (inclination_rad.sin() * along_rad.sin()).asin();
-    let node_rad = (inclination_rad.cos() * along_rad.sin()).atan2(along_rad.cos());
-    [node_rad - 7.088e-5 * time_s, latitude_rad]
-}
-
-fn frame(number: u32) -> FrameValues {
-    let time_s = 2.0 * f64::from(number);
-    let [before, mid, after] = [time_s - 1.0, time_s, time_s + 1.0].map(ground);
-    let mut values = FrameValues {
-        time_s: -20_000_000.0 + time_s,
-        orbit: 9_019 + number / 3_530,
-        clock_frequency_hz: 1e8,
-        ground_longitude_rad: mid[0],
-        ground_longitude_change_rad: wrap_pi(after[0] - before[0]),
-        ground_latitude_rad: mid[1],
-        ground_latitude_change_rad: after[1] - before[1],
-        spacecraft_radius_m: 3.78e6,
-        parallax_latitude_rad_per_m: 8e-9,
-        parallax_longitude_rad_per_m: -2e-9,
-        mid_radius_m: 3.39e6,
-        areoid_radius_m: 3.392e6,
-        shot_radius_m: std::array::from_fn(|shot| {
-            3.38e6 + 1e3 * ((number as usize + shot * 7) % 31) as f64
-        }),
-        range_m: [3.9e5; 20],
-        class: [1; 20],
-        channel: [1; 20],
-        frame_index: 1,
-        orbit_quality: 3,
-        off_nadir_rad: if number % 100 < 10 { 0.1 } else { 0.001 },
-        attitude_flag: if number.is_multiple_of(11) { 3 } else { 0 },
-        ..FrameValues::default()
-    };
-    for shot in 0..20 {
-        match (number as usize + shot) % 17 {
-            0 => values.range_m[shot] = 0.0,
-            1 => values.class[shot] = 0,
-            2 => values.channel[shot] = 4,
-            _ => {}
-        }
-    }
-    values
-}
-
-fn write(path: &Path, datum: MarsDatum, first: u32, spoil: impl Fn(u32, &mut Record)) {
-    let product_id = path
-        .file_name()
-        .and_then(|name| name.to_str())
-        .unwrap_or_default();
-    let label = LabelInfo {
-        product_id: product_id.to_owned(),
-        software_version: 7.25,
-        datum,
-        note: "synthetic".to_owned(),
-    };
-    let mut writer = PedrWriter::create(path, &label).expect("a writable folder");
-    for number in first..first + FRAMES / 2 {
-        let mut record = Record::from_frame(&frame(number)).expect("values within their fields");
-        spoil(number, &mut record);
-        writer.write_record(&record).expect("room on the disk");
-    }
-    writer.finish().expect("room on the disk");
+/// The search, of files that are hashed first as a run does.
+fn search_footprints(
+    pedr: &PedrConfig,
+    windows: &[WindowConfig],
+    correction_s: f64,
+    stop: &AtomicBool,
+) -> Result<SearchResult> {
+    let files = InputFiles::default().hash_all(&pedr.files, &RUN_ON)?;
+    search_footprints::search_footprints(pedr, &files, windows, correction_s, stop)
 }
 
 /// Two files, the first in IAU 1991, the second in IAU 2000.
@@ -495,12 +439,13 @@ fn a_search_that_is_stopped_ends_as_interrupted() {
 
 #[test]
 fn more_files_than_can_be_counted_are_refused() {
-    let failure = search_footprints(
-        &config(vec![PathBuf::from("AP19019L.B"); 65_536]),
-        &[],
-        0.0,
-        &RUN_ON,
-    );
+    let file = HashedFile {
+        path: PathBuf::from("AP19019L.B"),
+        bytes: 0,
+        blake3: String::new(),
+    };
+    let (pedr, files) = (config(Vec::new()), vec![file; 65_536]);
+    let failure = search_footprints::search_footprints(&pedr, &files, &[], 0.0, &RUN_ON);
     let message = failure.unwrap_err().to_string();
     assert!(
         message.contains("65536 PEDR files; expected at most 65535"),

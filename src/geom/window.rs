@@ -1,6 +1,8 @@
 //! Windows on the ground: which directions from the centre of Mars lie inside.
 
 mod bounds;
+mod extent;
+mod grid;
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
@@ -8,6 +10,8 @@ use geo::{BoundingRect, Coord, Intersects, LineString, Polygon};
 use serde::Serialize;
 
 pub use bounds::bounds_rad;
+pub use extent::Extent;
+pub use grid::WindowGrid;
 
 use crate::units::{longitude_step_rad, wrap_pi, wrap_two_pi};
 
@@ -126,13 +130,25 @@ impl Region {
         margin_rad: f64,
     ) -> bool {
         self.pieces.iter().any(|piece| {
-            let bounds = match piece {
-                Piece::Box(bounds) => bounds,
-                Piece::Polygon { outer, .. } => &outer.bounds,
-            };
+            let bounds = piece.bounds();
             bounds.reach(longitude_rad, latitude_rad, margin_rad)
         })
     }
+}
+
+impl Piece {
+    const fn bounds(&self) -> &Bounds {
+        match self {
+            Self::Box(bounds) => bounds,
+            Self::Polygon { outer, .. } => &outer.bounds,
+        }
+    }
+}
+
+/// Half the width in longitude, radians, of a cap about a direction of this latitude; none of a cap that holds a pole.
+fn half_width_rad(latitude_rad: f64, cap_rad: f64) -> Option<f64> {
+    let holds_pole = latitude_rad.abs() + cap_rad >= FRAC_PI_2;
+    (!holds_pole).then(|| (cap_rad.sin() / latitude_rad.cos()).min(1.0).asin())
 }
 
 impl Bounds {
@@ -147,18 +163,15 @@ impl Bounds {
     }
 
     /// Whether a cap of radius `margin_rad` about the direction may touch the bounds.
-    ///
-    /// Half the width in longitude of a cap that holds no pole is `asin(sin margin / cos latitude)`.
     fn reach(&self, longitude_rad: f64, latitude_rad: f64, margin_rad: f64) -> bool {
         // Rounding of the tests below, a nanoradian, is 3 mm on the ground.
         let margin_rad = margin_rad + 1e-9;
         if latitude_rad + margin_rad < self.south || latitude_rad - margin_rad > self.north {
             return false;
         }
-        if latitude_rad.abs() + margin_rad >= FRAC_PI_2 {
+        let Some(half_width_rad) = half_width_rad(latitude_rad, margin_rad) else {
             return true;
-        }
-        let half_width_rad = (margin_rad.sin() / latitude_rad.cos()).min(1.0).asin();
+        };
         let middle_rad = 0.5 * (self.west + self.east);
         let from_middle_rad = wrap_pi(longitude_rad - middle_rad).abs();
         from_middle_rad <= 0.5 * (self.east - self.west) + half_width_rad + 1e-9

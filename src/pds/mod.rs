@@ -1,5 +1,6 @@
 //! Bytes to typed records and back: MOLA PEDR files, the labels of MOC images, tie points.
 
+pub mod archive;
 pub mod label;
 pub mod moc;
 pub mod pedr;

@@ -2,7 +2,7 @@
 
 use std::f64::consts::{PI, TAU};
 
-use super::{Bounds, Piece, Region};
+use super::{Bounds, Region};
 use crate::units::wrap_pi;
 
 /// West, south, east and north edge of the smallest box that holds all regions, radians: `west` within `-π..π`, `east` not
@@ -10,11 +10,7 @@ use crate::units::wrap_pi;
 #[must_use]
 pub fn bounds_rad(regions: &[Region]) -> Option<[f64; 4]> {
     let bounds = regions.iter().flat_map(|region| &region.pieces);
-    let bounds = bounds.map(|piece| match piece {
-        Piece::Box(bounds) => *bounds,
-        Piece::Polygon { outer, .. } => outer.bounds,
-    });
-    let bounds: Vec<Bounds> = bounds.collect();
+    let bounds: Vec<Bounds> = bounds.map(|piece| *piece.bounds()).collect();
     let south = bounds.iter().map(|of| of.south).reduce(f64::min)?;
     let north = bounds.iter().map(|of| of.north).reduce(f64::max)?;
     // The box leaves out the widest stretch of longitudes that no region touches.

@@ -5,10 +5,13 @@ use std::ops::RangeInclusive;
 use serde::{Deserialize, Serialize};
 
 use super::Record;
+use crate::units::METRES_PER_CM;
 
 /// Radii of Mars that a laser return can have, centimetres: Hellas lies near 3.38e6 m, Olympus Mons
 /// near 3.42e6 m; clouds and noise stay within the range gate.
 const RADIUS_CM: RangeInclusive<i32> = 330_000_000..=345_000_000;
+/// Two possible radii differ by this at most, metres.
+pub(super) const RELIEF_MAX_M: f64 = (*RADIUS_CM.end() - *RADIUS_CM.start()) as f64 * METRES_PER_CM;
 /// Distance of the spacecraft from the centre of Mars in mapping orbit, centimetres.
 const MAPPING_ORBIT_CM: RangeInclusive<u32> = 340_000_000..=420_000_000;
 /// The same before mapping, when the orbit was still an ellipse.

@@ -2,46 +2,31 @@
 
 use std::{
     fs,
-    ops::{Deref, Range},
+    io::Read as _,
+    ops::Range,
     path::{Path, PathBuf},
 };
-
-use memmap2::Mmap;
 
 use super::{
     Complaint, FieldGuard, FileName, Frame, LABEL_BYTES, LABEL_RECORDS, PedrLabel, RECORD_BYTES,
     Reason, Record, RecordError, check::out_of_order,
 };
 use crate::{
-    error::{Cause, IoError, Kind, Locate, Result},
+    error::{Cause, Error, IoError, Kind, Locate, Result},
     files::file_name,
 };
 
-/// A PEDR file, open for reading.
+/// A PEDR file in memory: all of it, or its head and some of its records.
 #[derive(Debug)]
 pub struct File {
     path: PathBuf,
-    bytes: Bytes,
+    /// The label's bytes and then those of records.
+    bytes: Vec<u8>,
+    /// Bytes that the whole file has.
+    length: u64,
     name: Option<FileName>,
     label: PedrLabel,
     label_complaints: Vec<Complaint>,
-}
-
-#[derive(Debug)]
-enum Bytes {
-    Mapped(Mmap),
-    Owned(Vec<u8>),
-}
-
-impl Deref for Bytes {
-    type Target = [u8];
-
-    fn deref(&self) -> &[u8] {
-        match self {
-            Self::Mapped(map) => map,
-            Self::Owned(bytes) => bytes,
-        }
-    }
 }
 
 /// The path names something that cannot hold records.
@@ -76,45 +61,48 @@ impl Cause for NoGoodRecord {
     }
 }
 
+/// Opens a file that can hold records.
+pub(super) fn open_regular(path: &Path) -> Result<fs::File> {
+    // Asked before opening: opening a pipe would wait for its writer.
+    let metadata = fs::metadata(path)
+        .map_err(IoError::on("open"))
+        .in_file(path)?;
+    if !metadata.is_file() {
+        return Err(NotAFile).in_file(path);
+    }
+    fs::File::open(path)
+        .map_err(IoError::on("open"))
+        .in_file(path)
+}
+
 impl File {
-    /// Opens a file by mapping it into memory, whatever its size.
+    /// Reads a file; [`Reader`](super::Reader) reads one piece by piece.
     ///
     /// # Errors
     /// The system's refusal; not a regular file. What is wrong inside is complained of, not refused.
     pub fn open(path: &Path) -> Result<Self> {
-        // Asked before opening: opening a pipe would wait for its writer.
-        let metadata = fs::metadata(path)
-            .map_err(IoError::on("open"))
+        let mut bytes = Vec::new();
+        let mut file = open_regular(path)?;
+        file.read_to_end(&mut bytes)
+            .map_err(IoError::on("read"))
             .in_file(path)?;
-        if !metadata.is_file() {
-            return Err(NotAFile).in_file(path);
-        }
-        let file = fs::File::open(path)
-            .map_err(IoError::on("open"))
-            .in_file(path)?;
-        #[allow(
-            unsafe_code,
-            reason = "an archive is searched where it lies, without a copy"
-        )]
-        // SAFETY: the map is read only and private to this value, every bit pattern is a valid record,
-        // and archive files are not written while they are read. Whoever truncates one nevertheless
-        // ends the process with SIGBUS, the usual price of a mapping; it cannot corrupt the file.
-        let map = unsafe { Mmap::map(&file) };
-        let map = map.map_err(IoError::on("map")).in_file(path)?;
-        Ok(Self::new(Bytes::Mapped(map), path.to_owned()))
+        Ok(Self::from_bytes(bytes, path))
     }
 
     /// A file that is already in memory; `name` stands for its path.
     #[must_use]
     pub fn from_bytes(bytes: Vec<u8>, name: &Path) -> Self {
-        Self::new(Bytes::Owned(bytes), name.to_owned())
+        let length = bytes.len() as u64;
+        Self::of_length(bytes, length, name.to_owned())
     }
 
-    fn new(bytes: Bytes, path: PathBuf) -> Self {
+    /// A file of `length` bytes of which these are the first: at least those of the label, or all.
+    pub(super) fn of_length(bytes: Vec<u8>, length: u64, path: PathBuf) -> Self {
         let mut file = Self {
             name: FileName::parse(&path),
             path,
             bytes,
+            length,
             label: PedrLabel::default(),
             label_complaints: Vec::new(),
         };
@@ -122,9 +110,26 @@ impl File {
         file
     }
 
+    /// The same file with other records in memory: `bytes` holds them after as many bytes as the label has.
+    pub(super) fn with_records(&self, bytes: Vec<u8>) -> Self {
+        Self {
+            path: self.path.clone(),
+            bytes,
+            length: self.length,
+            name: self.name,
+            label: self.label.clone(),
+            label_complaints: Vec::new(),
+        }
+    }
+
+    /// The memory of the file.
+    pub(super) fn into_bytes(self) -> Vec<u8> {
+        self.bytes
+    }
+
     fn read_label(&mut self) {
-        let length = self.bytes.len();
-        if length < LABEL_BYTES {
+        let length = self.length;
+        if length < LABEL_BYTES as u64 {
             let text = format!(
                 "the file has {length} bytes; expected at least the {LABEL_BYTES} of the label"
             );
@@ -134,7 +139,7 @@ impl File {
             Ok(label) => self.label = label,
             Err(error) => self.complain_of_label(Reason::UnreadableLabel, error.to_string()),
         }
-        let records = LABEL_RECORDS as u64 + self.records().len() as u64;
+        let records = (LABEL_RECORDS + self.record_count()) as u64;
         if let Some(stated) = self.label.file_records.filter(|stated| *stated != records) {
             let text = format!("the label states {stated} records; the file holds {records}");
             self.complain_of_label(Reason::RecordCount, text);
@@ -173,16 +178,29 @@ impl File {
         &self.label_complaints
     }
 
+    /// Where the file lies.
+    #[must_use]
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Data records of the whole file, as many as its size has room for, whatever the label says.
+    #[must_use]
+    pub fn record_count(&self) -> usize {
+        let data = self.length.saturating_sub(LABEL_BYTES as u64);
+        usize::try_from(data / RECORD_BYTES as u64).unwrap_or(usize::MAX)
+    }
+
     /// The complaint of bytes after the last whole record, if there are any.
     #[must_use]
     pub fn trailing_complaint(&self) -> Option<Complaint> {
-        let data = self.bytes.get(LABEL_BYTES..)?;
-        let trailing = data.len() % RECORD_BYTES;
+        let data = self.length.checked_sub(LABEL_BYTES as u64)?;
+        let trailing = data % RECORD_BYTES as u64;
         (trailing > 0).then(|| {
             let text =
                 format!("{trailing} bytes after the last whole record of {RECORD_BYTES}; ignored");
             self.complaint(
-                Some(Self::record_number(self.records().len())),
+                Some(Self::record_number(self.record_count())),
                 Reason::TrailingBytes,
                 text,
             )
@@ -199,7 +217,7 @@ impl File {
         )
     }
 
-    /// The data records, as many as the file's size has room for, whatever the label says.
+    /// The data records in memory, as many as there is room for, whatever the label says.
     #[must_use]
     pub fn records(&self) -> &[Record] {
         Record::slice_of(self.bytes.get(LABEL_BYTES..).unwrap_or_default())
@@ -216,15 +234,21 @@ impl File {
         if matches!(first, Some((_, Ok(_)))) || frames.any(|(_, frame)| frame.is_ok()) {
             return Ok(());
         }
+        let first = first.and_then(|(row, frame)| Some((row, frame.err()?)));
+        Err(self.no_good_record(first))
+    }
+
+    /// The failure of a file without a good record, of which this is the first.
+    pub(super) fn no_good_record(&self, first: Option<(usize, RecordError)>) -> Error {
         let label = self.label_complaints.first();
         let why = match (label, first) {
             (Some(complaint), _) => complaint.text.clone(),
-            (None, Some((row, Err(error)))) => {
+            (None, Some((row, error))) => {
                 format!("record {}: {error}", Self::record_number(row))
             }
-            _ => format!("nothing of {RECORD_BYTES} bytes follows the label"),
+            (None, None) => format!("nothing of {RECORD_BYTES} bytes follows the label"),
         };
-        Err(NoGoodRecord { why }).in_file(&self.path)
+        Error::from(NoGoodRecord { why }).in_file(&self.path)
     }
 
     /// BLAKE3 of the file's bytes, hexadecimal.

@@ -141,9 +141,9 @@ impl<'a> Frame<'a> {
     }
 
     /// Height of a returned shot (counted from 0) above the radius that parallax counts from, metres;
-    /// 0 for one that did not return.
+    /// 0 for one that did not return, or has an impossible radius.
     fn relief_m(&self, shot: usize) -> f64 {
-        if self.record.returned(shot) {
+        if self.record.returned(shot) && self.record.radius_is_possible(shot) {
             metres(self.record.shot_radius_cm[shot]) - self.mid_radius_m
         } else {
             0.0

@@ -11,6 +11,8 @@ mod file;
 mod frame;
 mod frame_values;
 mod label;
+mod mid_point;
+mod reader;
 mod record;
 mod writer;
 
@@ -20,6 +22,8 @@ pub use file::File;
 pub use frame::{FieldGuard, Frame};
 pub use frame_values::{EncodeError, FrameValues};
 pub use label::{FileName, PedrLabel, decide_datum};
+pub use mid_point::MidPoint;
+pub use reader::{Reader, Stretch};
 pub use record::{RECORD_BYTES, Record};
 pub use writer::{LabelInfo, PedrWriter};
 

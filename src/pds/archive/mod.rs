@@ -1,0 +1,16 @@
+//! Many PEDR files, searched for the shots in windows: files side by side and piece by piece, all windows at once, in
+//! little memory, with the same rows in the same order whatever the number of threads.
+//!
+//! A record far from every window is passed over by a few of its fields; near one, every shot is judged by its own
+//! position in IAU 2000.
+
+mod found;
+mod query;
+mod scan;
+mod search;
+mod source;
+
+pub use found::{Found, ShotRejection, WindowLists};
+pub use query::{Judged, Query};
+pub use search::{Sink, search};
+pub use source::Source;

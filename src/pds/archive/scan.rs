@@ -1,0 +1,134 @@
+//! Some rows of a file: records near a window, and their shots in it.
+
+use std::ops::Range;
+
+use super::{Found, Judged, Query, ShotRejection, Source};
+use crate::{
+    footprints::Footprint,
+    frames::{MarsDatum, MarsIau2000},
+    geom::{
+        ellipsoid::{Spherical, spherical_to_xyz_m},
+        mars_rotation::convert_datum,
+    },
+    pds::pedr::{File, Frame, SHOTS, Stretch},
+    time::Et,
+};
+
+/// A file with what is searched for in it.
+pub(super) struct Scan<'a> {
+    pub(super) source: &'a Source,
+    /// Which file of the search it is.
+    pub(super) index: u16,
+    pub(super) query: &'a Query<'a>,
+}
+
+/// Windows near a frame and around a shot, kept so that memory is asked for once a stretch.
+#[derive(Default)]
+struct Windows {
+    near: Vec<u32>,
+    around: Vec<u32>,
+}
+
+impl Scan<'_> {
+    /// Searches some rows of the stretch.
+    pub(super) fn rows(&self, stretch: &Stretch, rows: Range<usize>, found: &mut Found) {
+        let mut windows = Windows::default();
+        let datum = self.source.datum();
+        for (row, record) in stretch.records(rows) {
+            let mid = record.mid_point();
+            let matters = self.query.may_matter(&mid, record.time_s.get(), datum);
+            if !matters && self.query.judged == Judged::Near {
+                continue;
+            }
+            match stretch.frame(row, self.source.guard()) {
+                Some(Ok(frame)) => {
+                    if let Err(error) = record.check_radii() {
+                        found.complain(stretch.complaint(row, &error));
+                    }
+                    if matters {
+                        self.frame(row, &frame, &mut windows, found);
+                    }
+                }
+                Some(Err(error)) => found.complain(stretch.complaint(row, &error)),
+                None => {}
+            }
+        }
+    }
+
+    fn frame(&self, row: usize, frame: &Frame<'_>, windows: &mut Windows, found: &mut Found) {
+        let (longitude_rad, latitude_rad) = frame.mid_point();
+        let margin_rad = frame.reach_rad() + Query::margin_rad(self.source.datum());
+        let grid = &self.query.windows;
+        grid.within(longitude_rad, latitude_rad, margin_rad, &mut windows.near);
+        if windows.near.is_empty() {
+            return;
+        }
+        for shot in (1..).take(SHOTS).filter_map(|shot| frame.shot(shot)) {
+            found.shots_read += 1;
+            let et_s = shot.et_tag_s + self.query.correction_s;
+            if (self.query.time).is_some_and(|time| !time.contains(Et::from_seconds(et_s))) {
+                continue;
+            }
+            let (longitude_rad, latitude_rad) = self.iau2000(&shot);
+            windows.around.clear();
+            let near = windows.near.iter().copied();
+            let around = near.filter(|window| grid.holds(*window, longitude_rad, latitude_rad));
+            windows.around.extend(around);
+            if windows.around.is_empty() {
+                continue;
+            }
+            if let Some(reason) = self.reject(&shot, frame) {
+                *found.rejected.entry(reason).or_default() += 1;
+                continue;
+            }
+            let shot = Footprint {
+                et_s,
+                file: self.index,
+                record: File::record_number(row),
+                ..shot
+            };
+            found.push(&shot, &windows.around);
+        }
+    }
+
+    /// East longitude and areocentric latitude in IAU 2000, radians.
+    fn iau2000(&self, shot: &Footprint) -> (f64, f64) {
+        let datum = self.source.datum();
+        if datum == MarsDatum::Iau2000 {
+            return (shot.longitude_rad, shot.latitude_rad);
+        }
+        let at = Et::from_seconds(shot.et_tag_s);
+        let direction = spherical_to_xyz_m(shot.longitude_rad, shot.latitude_rad, 1.0);
+        let direction = convert_datum::<MarsIau2000>(direction, datum, at, at);
+        let spherical = Spherical::from_xyz_m(&direction.xyz_m);
+        (spherical.longitude_rad, spherical.latitude.0)
+    }
+
+    fn reject(&self, shot: &Footprint, frame: &Frame<'_>) -> Option<ShotRejection> {
+        let filter = self.query.filter;
+        let shot_index = usize::from(shot.shot) - 1;
+        let tests = [
+            (ShotRejection::NoReturn, shot.range_m > 0.0),
+            (
+                ShotRejection::Radius,
+                frame.record().radius_is_possible(shot_index),
+            ),
+            (ShotRejection::Class, filter.classes.contains(&shot.class)),
+            (
+                ShotRejection::Channel,
+                filter.channels.contains(&shot.channel),
+            ),
+            (
+                ShotRejection::Attitude,
+                filter.attitude_flags.contains(&shot.attitude_flag),
+            ),
+            (
+                ShotRejection::OffNadir,
+                shot.off_nadir_rad.abs() <= filter.off_nadir_max_rad,
+            ),
+        ];
+        tests
+            .into_iter()
+            .find_map(|(reason, passed)| (!passed).then_some(reason))
+    }
+}

@@ -1,0 +1,305 @@
+//! The search: a load of pieces is read, then searched by all threads in waves, whose results are handed on in order.
+
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    mem,
+    ops::Range,
+    sync::atomic::AtomicBool,
+};
+
+use rayon::prelude::*;
+
+use super::{Found, Query, Source, scan::Scan};
+use crate::{
+    error::{Error, Result, Stopped},
+    pds::pedr::{Reader, Stretch},
+};
+
+/// Records in memory at once: 51 MB, more than any day of the mission takes.
+const LOAD_RECORDS: usize = 1 << 16;
+/// Records of a task: 0.4 MB, and at most 1.5 MB of shots.
+const TASK_RECORDS: usize = 512;
+/// Tasks of a wave for each thread, and the most of a wave: what they find stands in memory at once.
+const TASKS_PER_THREAD: usize = 16;
+const TASKS_MAX: usize = 64;
+
+/// Takes what a search gives, in the order of files, records and shots.
+pub trait Sink {
+    /// Takes what a stretch of file `file` gave.
+    ///
+    /// # Errors
+    /// One that ends the search.
+    fn found(&mut self, file: usize, found: Found) -> Result<()>;
+
+    /// Takes the failure of file `file`: nothing more comes of it, and what came may be incomplete.
+    ///
+    /// # Errors
+    /// One that ends the search.
+    fn failed(&mut self, file: usize, failure: Error) -> Result<()>;
+}
+
+/// Searches the files for shots that are asked for, and gives them to `sink`; `stop` is looked at before every piece.
+///
+/// What comes does not depend on the number of threads. There may be at most 65,535 files.
+///
+/// # Errors
+/// What `sink` gives; [`Stopped`].
+pub fn search(
+    sources: &[Source],
+    query: &Query<'_>,
+    stop: &AtomicBool,
+    sink: &mut dyn Sink,
+) -> Result<()> {
+    let mut search = Search {
+        sources,
+        query,
+        stop,
+        sink,
+        readers: BTreeMap::new(),
+        failed: BTreeSet::new(),
+        buffers: Vec::new(),
+    };
+    let pieces: Vec<Piece> = (0..)
+        .zip(sources)
+        .flat_map(|(file, source)| pieces_of(file, source))
+        .collect();
+    let mut rest = &pieces[..];
+    while let Some(load) = next_load(rest) {
+        rest = &rest[load.len()..];
+        search.load(load, rest.first())?;
+    }
+    Ok(())
+}
+
+/// Successive rows of a file.
+struct Piece {
+    file: usize,
+    rows: Range<usize>,
+    is_first: bool,
+    is_last: bool,
+}
+
+/// The pieces of a file: at least one, which may be empty.
+fn pieces_of(file: usize, source: &Source) -> Vec<Piece> {
+    let mut pieces: Vec<Piece> = source
+        .rows_to_read()
+        .into_iter()
+        .flat_map(|rows| {
+            let starts = rows.clone().step_by(LOAD_RECORDS);
+            starts.map(move |start| start..rows.end.min(start + LOAD_RECORDS))
+        })
+        .map(|rows| Piece {
+            file,
+            rows,
+            is_first: false,
+            is_last: false,
+        })
+        .collect();
+    if pieces.is_empty() {
+        pieces.push(Piece {
+            file,
+            rows: 0..0,
+            is_first: false,
+            is_last: false,
+        });
+    }
+    pieces[0].is_first = true;
+    if let Some(last) = pieces.last_mut() {
+        last.is_last = true;
+    }
+    pieces
+}
+
+/// The first pieces that fit into memory together.
+fn next_load(pieces: &[Piece]) -> Option<&[Piece]> {
+    let mut records = 0;
+    let fit = pieces.iter().take_while(|piece| {
+        records += piece.rows.len();
+        records <= LOAD_RECORDS
+    });
+    let fit = fit.count();
+    (fit > 0).then(|| &pieces[..fit])
+}
+
+/// A search under way.
+struct Search<'a> {
+    sources: &'a [Source],
+    query: &'a Query<'a>,
+    stop: &'a AtomicBool,
+    sink: &'a mut dyn Sink,
+    /// Files that pieces in memory are of.
+    readers: BTreeMap<usize, Reader>,
+    failed: BTreeSet<usize>,
+    buffers: Vec<Vec<u8>>,
+}
+
+/// A part of a piece in memory, for one thread.
+struct Task {
+    piece: usize,
+    rows: Range<usize>,
+    is_first: bool,
+    is_last: bool,
+}
+
+impl Search<'_> {
+    /// Reads and searches pieces that fit into memory together; `next` is the one after them.
+    fn load(&mut self, pieces: &[Piece], next: Option<&Piece>) -> Result<()> {
+        Stopped::check(self.stop)?;
+        let mut failures = self.open(pieces);
+        let stretches = self.read(pieces, &mut failures);
+        if let Some(next) = next {
+            self.announce(next);
+        }
+        let tasks: Vec<Task> = (0..)
+            .zip(pieces)
+            .flat_map(|(number, piece)| tasks_of(number, piece))
+            .collect();
+        let (sources, query) = (self.sources, self.query);
+        let wave = (TASKS_PER_THREAD * rayon::current_num_threads()).min(TASKS_MAX);
+        for tasks in tasks.chunks(wave) {
+            Stopped::check(self.stop)?;
+            let scanned: Vec<Found> = tasks
+                .par_iter()
+                .map(|task| {
+                    let (piece, stretch) = (&pieces[task.piece], &stretches[task.piece]);
+                    scan(
+                        &sources[piece.file],
+                        query,
+                        piece.file,
+                        task,
+                        stretch.as_ref(),
+                    )
+                })
+                .collect();
+            for (task, found) in tasks.iter().zip(scanned) {
+                self.hand_on(pieces[task.piece].file, task, found, &mut failures)?;
+            }
+        }
+        let free = stretches.into_iter().flatten().map(Stretch::into_buffer);
+        self.buffers.extend(free);
+        Ok(())
+    }
+
+    /// Opens the files of these pieces, but those that failed, and closes others. Gives the failures.
+    fn open(&mut self, pieces: &[Piece]) -> BTreeMap<usize, Error> {
+        let read = pieces.iter().filter(|piece| !piece.rows.is_empty());
+        let files: BTreeSet<usize> = read.map(|piece| piece.file).collect();
+        self.readers.retain(|file, _| files.contains(file));
+        let mut failures = BTreeMap::new();
+        for file in files.difference(&self.failed) {
+            if !self.readers.contains_key(file) {
+                match self.sources[*file].reopen() {
+                    Ok(reader) => drop(self.readers.insert(*file, reader)),
+                    Err(failure) => drop(failures.insert(*file, failure)),
+                }
+            }
+        }
+        failures
+    }
+
+    /// Reads the pieces; none of a file that failed.
+    fn read(
+        &mut self,
+        pieces: &[Piece],
+        failures: &mut BTreeMap<usize, Error>,
+    ) -> Vec<Option<Stretch>> {
+        let mut buffers = mem::take(&mut self.buffers);
+        buffers.resize_with(buffers.len().max(pieces.len()), Vec::new);
+        let spare = buffers.split_off(pieces.len());
+        self.buffers = spare;
+        let readers = &self.readers;
+        let stretches: Vec<Option<Result<Stretch>>> = pieces
+            .par_iter()
+            .zip(buffers)
+            .map(|(piece, buffer)| {
+                let reader = readers.get(&piece.file)?;
+                Some(reader.stretch(piece.rows.clone(), buffer))
+            })
+            .collect();
+        let read = stretches.into_iter().zip(pieces);
+        read.map(|(stretch, piece)| match stretch? {
+            Ok(stretch) => Some(stretch),
+            Err(failure) => {
+                failures.entry(piece.file).or_insert(failure);
+                None
+            }
+        })
+        .collect()
+    }
+
+    /// Has the system read the piece while others are searched.
+    fn announce(&self, piece: &Piece) {
+        if !piece.rows.is_empty() {
+            self.sources[piece.file].announce(&piece.rows);
+        }
+    }
+
+    /// Gives what was found to the sink, unless the file has failed.
+    fn hand_on(
+        &mut self,
+        file: usize,
+        task: &Task,
+        found: Found,
+        failures: &mut BTreeMap<usize, Error>,
+    ) -> Result<()> {
+        if self.failed.contains(&file) {
+            return Ok(());
+        }
+        let mut failure = failures.remove(&file);
+        if failure.is_none() && task.is_last {
+            let reader = self.readers.get(&file);
+            failure = reader.and_then(|reader| reader.unchanged().err());
+        }
+        match failure {
+            None => self.sink.found(file, found),
+            Some(failure) => {
+                self.failed.insert(file);
+                self.sink.failed(file, failure)
+            }
+        }
+    }
+}
+
+/// Searches the rows of a task.
+fn scan(
+    source: &Source,
+    query: &Query<'_>,
+    file: usize,
+    task: &Task,
+    stretch: Option<&Stretch>,
+) -> Found {
+    let mut found = Found::new();
+    if task.is_first {
+        found.frames_read = source.records() as u64;
+        source.tell_of_head(&mut found);
+    }
+    if let Some(stretch) = stretch {
+        let scan = Scan {
+            source,
+            // The number of files was checked.
+            index: u16::try_from(file).unwrap_or(u16::MAX),
+            query,
+        };
+        scan.rows(stretch, task.rows.clone(), &mut found);
+    }
+    if task.is_last {
+        source.tell_of_end(&mut found);
+    }
+    found
+}
+
+/// The parts of a piece: at least one, which may be empty.
+fn tasks_of(number: usize, piece: &Piece) -> Vec<Task> {
+    let rows = piece.rows.clone();
+    let count = rows.len().div_ceil(TASK_RECORDS).max(1);
+    let task = |part: usize| {
+        let start = rows.start + part * TASK_RECORDS;
+        Task {
+            piece: number,
+            rows: start..rows.end.min(start + TASK_RECORDS),
+            is_first: piece.is_first && part == 0,
+            is_last: piece.is_last && part + 1 == count,
+        }
+    };
+    (0..count).map(task).collect()
+}

@@ -1,0 +1,125 @@
+//! A file of the archive as a search sees it before it reads records.
+
+use std::{
+    ops::Range,
+    path::{Path, PathBuf},
+};
+
+use super::Found;
+use crate::{
+    altimetry::DatumChoice,
+    error::{Locate, Result},
+    files::Identity,
+    frames::MarsDatum,
+    pds::pedr::{Complaint, FieldGuard, PedrLabel, Reader, decide_datum},
+};
+
+/// A file, and how its records are understood.
+#[derive(Debug, Clone)]
+pub struct Source {
+    path: PathBuf,
+    version: Option<char>,
+    datum: MarsDatum,
+    label: PedrLabel,
+    records: usize,
+    identity: Identity,
+    head_complaints: Vec<Complaint>,
+    trailing_complaint: Option<Complaint>,
+}
+
+impl Source {
+    /// Looks at the label of a file, and for its first good record.
+    ///
+    /// # Errors
+    /// A file that cannot be read, holds no good record, or whose datum cannot be told.
+    pub fn open(path: &Path, choice: DatumChoice) -> Result<Self> {
+        let reader = Reader::open(path)?;
+        reader.require_records()?;
+        let head = reader.head();
+        let version = head.name().map(|name| name.version);
+        Ok(Self {
+            path: path.to_owned(),
+            version,
+            datum: decide_datum(choice, version, head.label().datum).in_file(path)?,
+            label: head.label().clone(),
+            records: head.record_count(),
+            identity: reader.identity(),
+            head_complaints: head.label_complaints().to_vec(),
+            trailing_complaint: head.trailing_complaint(),
+        })
+    }
+
+    /// Where the file lies.
+    #[must_use]
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Version letter of its name.
+    #[must_use]
+    pub const fn version(&self) -> Option<char> {
+        self.version
+    }
+
+    /// Datum of its coordinates.
+    #[must_use]
+    pub const fn datum(&self) -> MarsDatum {
+        self.datum
+    }
+
+    /// Version of the software that made it.
+    #[must_use]
+    pub const fn software_version(&self) -> Option<f64> {
+        self.label.software_version
+    }
+
+    /// Data records.
+    #[must_use]
+    pub const fn records(&self) -> usize {
+        self.records
+    }
+
+    /// What its complaints of the label say.
+    #[must_use]
+    pub fn label_complaints(&self) -> &[Complaint] {
+        &self.head_complaints
+    }
+
+    /// Opens the file for its records: still the one that was looked at before.
+    pub(super) fn reopen(&self) -> Result<Reader> {
+        let reader = Reader::open(&self.path)?;
+        reader.require_identity(&self.identity)?;
+        Ok(reader)
+    }
+
+    /// Has the system read some rows ahead.
+    pub(super) fn announce(&self, rows: &Range<usize>) {
+        // A file that cannot be opened is complained of when its turn comes.
+        if let Ok(reader) = self.reopen() {
+            reader.announce(rows);
+        }
+    }
+
+    pub(super) fn guard(&self) -> FieldGuard {
+        FieldGuard::new(self.label.software_version)
+    }
+
+    /// The rows that may have shots that are asked for.
+    pub(super) fn rows_to_read(&self) -> Vec<Range<usize>> {
+        vec![0..self.records]
+    }
+
+    /// Complains of what is wrong with the head of the file.
+    pub(super) fn tell_of_head(&self, found: &mut Found) {
+        for complaint in &self.head_complaints {
+            found.complain(complaint.clone());
+        }
+    }
+
+    /// Complains of what is wrong with the end of the file.
+    pub(super) fn tell_of_end(&self, found: &mut Found) {
+        if let Some(complaint) = &self.trailing_complaint {
+            found.complain(complaint.clone());
+        }
+    }
+}
