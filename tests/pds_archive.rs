@@ -27,7 +27,7 @@ use areograph::{
         window::{Region, WindowShape},
     },
     pds::{
-        archive::{Found, Judged, Query, Sink, Source, search},
+        archive::{Found, Indexes, Judged, Query, Sink, Source, search},
         pedr::{FieldGuard, File},
     },
     time::{Et, Interval},
@@ -86,7 +86,9 @@ impl Sink for Rows {
 }
 
 fn open(paths: &[PathBuf]) -> Vec<Source> {
-    let open = |path: &PathBuf| Source::open(path, DatumChoice::Auto).expect("a good file");
+    let open = |path: &PathBuf| {
+        Source::open(path, DatumChoice::Auto, &Indexes::default()).expect("a good file")
+    };
     paths.iter().map(open).collect()
 }
 
@@ -406,7 +408,7 @@ fn files_of_another_kind_are_refused_before_the_search() {
     let refused = |name: &str, bytes: &[u8]| {
         let path = folder.path().join(name);
         std::io::Write::write_all(&mut fs::File::create(&path).unwrap(), bytes).unwrap();
-        let failure = Source::open(&path, DatumChoice::Auto)
+        let failure = Source::open(&path, DatumChoice::Auto, &Indexes::default())
             .unwrap_err()
             .to_string();
         assert!(failure.contains(name), "{failure}");
@@ -415,6 +417,6 @@ fn files_of_another_kind_are_refused_before_the_search() {
     assert!(refused("empty.b", b"").contains("the file has 0 bytes"));
     assert!(refused("text.b", &[b'x'; 20_000]).contains("no good record"));
     assert!(refused("zeros.b", &vec![0; 900_000]).contains("no good record"));
-    let failure = Source::open(folder.path(), DatumChoice::Auto).unwrap_err();
+    let failure = Source::open(folder.path(), DatumChoice::Auto, &Indexes::default()).unwrap_err();
     assert!(failure.to_string().contains("not a regular file"));
 }

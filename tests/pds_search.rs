@@ -22,7 +22,10 @@ use areograph::{
         mars_rotation::convert_datum,
         window::{Region, WindowShape},
     },
-    pds::pedr::{FieldGuard, File, Reason},
+    pds::{
+        archive::Indexes,
+        pedr::{FieldGuard, File, Reason},
+    },
     stages::search_footprints::{self, SearchResult, ShotRejection},
     time::Et,
 };
@@ -40,7 +43,14 @@ fn search_footprints(
     stop: &AtomicBool,
 ) -> Result<SearchResult> {
     let files = InputFiles::default().hash_all(&pedr.files, &RUN_ON)?;
-    search_footprints::search_footprints(pedr, &files, windows, correction_s, stop)
+    search_footprints::search_footprints(
+        pedr,
+        &files,
+        &Indexes::default(),
+        windows,
+        correction_s,
+        stop,
+    )
 }
 
 /// Two files, the first in IAU 1991, the second in IAU 2000.
@@ -445,7 +455,8 @@ fn more_files_than_can_be_counted_are_refused() {
         blake3: String::new(),
     };
     let (pedr, files) = (config(Vec::new()), vec![file; 65_536]);
-    let failure = search_footprints::search_footprints(&pedr, &files, &[], 0.0, &RUN_ON);
+    let failure =
+        search_footprints::search_footprints(&pedr, &files, &Indexes::default(), &[], 0.0, &RUN_ON);
     let message = failure.unwrap_err().to_string();
     assert!(
         message.contains("65536 PEDR files; expected at most 65535"),

@@ -7,6 +7,7 @@ mod manual;
 mod nightly;
 mod output;
 mod pedr;
+mod pedr_index;
 mod plan;
 mod report;
 mod run;

@@ -8,7 +8,7 @@ use std::{
 use clap::{Args, Subcommand};
 use serde_json::json;
 
-use super::output;
+use super::{output, pedr_index};
 use crate::{
     error::{Error, Locate as _},
     pds::pedr::{Complaint, FieldGuard, File},
@@ -37,17 +37,22 @@ enum Command {
         #[arg(long)]
         json: bool,
     },
+    /// Makes the index of an archive, or brings it up to date.
+    Index(pedr_index::Arguments),
 }
 
 /// Complaints printed for a file; all are counted.
 const COMPLAINTS_PRINTED: usize = 20;
 
 pub(super) fn run(arguments: &Arguments) -> Result<(), Error> {
-    let Command::Info {
-        files,
-        leap_seconds,
-        json,
-    } = &arguments.command;
+    let (files, leap_seconds, json) = match &arguments.command {
+        Command::Info {
+            files,
+            leap_seconds,
+            json,
+        } => (files, leap_seconds, json),
+        Command::Index(arguments) => return pedr_index::run(arguments),
+    };
     let clock = match leap_seconds {
         Some(kernel) => Some(Session::open(&KernelSet::from_files(
             std::slice::from_ref(kernel),

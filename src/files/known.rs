@@ -42,7 +42,8 @@ impl Identity {
     }
 
     /// Whether the file had stood still for a while at `instant`, so that any later change shows in its times.
-    pub(super) fn is_steady(&self, instant: SystemTime) -> bool {
+    #[must_use]
+    pub fn is_steady(&self, instant: SystemTime) -> bool {
         let latest = instant
             .checked_sub(Duration::from_secs(STEADY_S))
             .and_then(|latest| latest.duration_since(UNIX_EPOCH).ok());

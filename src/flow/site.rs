@@ -11,6 +11,7 @@ use crate::{
     config::{ImageConfig, SiteConfig},
     error::{Error, Kind},
     kernel_source::KernelSource,
+    pds::archive::{Index, Indexes},
     spice::{KernelSet, KernelView, RequiredCoverage},
     stage::{InOrder, Output, Round, Stage},
     stages::{
@@ -28,7 +29,7 @@ use crate::{
         register::Register,
         reorient::Reorient,
         sample_orientation::SampleOrientation,
-        search_footprints::{PedrFiles, SearchFootprints},
+        search_footprints::{KnownPlaces, PedrFiles, SearchFootprints},
         site_image::SiteImage,
         tabulate_kernels::TabulateKernels,
         tag_times::{ImageTimes, TagTimes},
@@ -77,9 +78,14 @@ pub(super) fn prepare<D: Driver>(flow: &mut D, config: &SiteConfig) -> Flow<Prep
         config.images.iter().map(tag).collect::<Flow<Vec<_>>>()?
     };
     let files = flow.hash(SearchFootprints::NAME, &config.pedr.files)?;
+    let indexes = Indexes::beside(&config.pedr.files, |path| {
+        flow.files().admit(path).ok()?;
+        Index::read(path)
+    });
     let found = flow.stage(&SearchFootprints {
         pedr: &config.pedr,
         files: PedrFiles(&files),
+        index: KnownPlaces(&indexes),
         windows: &config.windows,
         clock_correction_s: &config.mola_clock.correction_s(),
     })?;

@@ -21,7 +21,7 @@ use crate::{
     footprints::{AsRead, Footprints, SourceFile},
     geom::window::Region,
     pds::{
-        archive::{Found, Judged, Query, Sink, Source, search},
+        archive::{Found, Indexes, Judged, Query, Sink, Source, search},
         pedr::{Complaint, Reason},
     },
     stage::{InOrder, Input, Inputs, Stage},
@@ -73,6 +73,8 @@ stage_inputs! {
         pub pedr: &'a PedrConfig,
         /// The same files with their hashes.
         pub files: PedrFiles<'a>,
+        /// What is known of where their records are.
+        pub index: KnownPlaces<'a>,
         /// Windows on the ground.
         pub windows: &'a [WindowConfig],
         /// Seconds to add to time tags.
@@ -90,6 +92,14 @@ impl Input for PedrFiles<'_> {
     }
 }
 
+/// Indexes beside the files: they make the search shorter, and change nothing that it finds.
+#[derive(Debug)]
+pub struct KnownPlaces<'a>(pub &'a Indexes);
+
+impl Input for KnownPlaces<'_> {
+    fn add_to(&self, _field: &str, _inputs: &mut Inputs) {}
+}
+
 impl Stage for SearchFootprints<'_> {
     const NAME: &'static str = STAGE;
     const CHECKED: bool = true;
@@ -98,7 +108,14 @@ impl Stage for SearchFootprints<'_> {
 
     fn run(&self, stop: &AtomicBool) -> Result<SearchResult> {
         let (files, correction_s) = (self.files.0, *self.clock_correction_s);
-        search_footprints(self.pedr, files, self.windows, correction_s, stop)
+        search_footprints(
+            self.pedr,
+            files,
+            self.index.0,
+            self.windows,
+            correction_s,
+            stop,
+        )
     }
 
     fn examine(&self) -> Vec<Result<String>> {
@@ -111,7 +128,7 @@ impl Stage for SearchFootprints<'_> {
 
 /// What can be said of a PEDR file without searching it.
 fn examine_file(path: &Path, choice: DatumChoice) -> Result<String> {
-    let file = Source::open(path, choice)?;
+    let file = Source::open(path, choice, &Indexes::default())?;
     let complaints = file.label_complaints().iter();
     let complaints = complaints.map(|complaint| format!("; {}", complaint.text));
     Ok(format!(
@@ -126,7 +143,7 @@ fn examine_file(path: &Path, choice: DatumChoice) -> Result<String> {
 /// Searches `files`, understood as `pedr` says, for shots in any of `windows`.
 ///
 /// Every shot is judged by its own position, in IAU 2000 at its time tag. `correction_s` is added to
-/// tags to give `et_s`. The result does not depend on the number of threads. A file with the bytes of
+/// tags to give `et_s`. The result depends neither on the number of threads nor on `indexes`. A file with the bytes of
 /// an earlier one is not read again; a note says so. `stop` is looked at before every piece of a file.
 ///
 /// # Errors
@@ -136,6 +153,7 @@ fn examine_file(path: &Path, choice: DatumChoice) -> Result<String> {
 pub fn search_footprints(
     pedr: &PedrConfig,
     files: &[HashedFile],
+    indexes: &Indexes,
     windows: &[WindowConfig],
     correction_s: f64,
     stop: &AtomicBool,
@@ -147,7 +165,7 @@ pub fn search_footprints(
         .par_iter()
         .map(|file| {
             Stopped::check(stop)?;
-            Source::open(&file.path, pedr.datum)
+            Source::open(&file.path, pedr.datum, indexes)
         })
         .collect();
     let mut gathered = Gathered::default();

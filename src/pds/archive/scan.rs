@@ -34,23 +34,19 @@ impl Scan<'_> {
     pub(super) fn rows(&self, stretch: &Stretch, rows: Range<usize>, found: &mut Found) {
         let mut windows = Windows::default();
         let datum = self.source.datum();
+        let complaints_known = self.source.complaints_known(self.query);
         for (row, record) in stretch.records(rows) {
             let mid = record.mid_point();
             let matters = self.query.may_matter(&mid, record.time_s.get(), datum);
-            if !matters && self.query.judged == Judged::Near {
+            if !matters && (self.query.judged == Judged::Near || complaints_known) {
                 continue;
             }
-            match stretch.frame(row, self.source.guard()) {
-                Some(Ok(frame)) => {
-                    if let Err(error) = record.check_radii() {
-                        found.complain(stretch.complaint(row, &error));
-                    }
-                    if matters {
-                        self.frame(row, &frame, &mut windows, found);
-                    }
-                }
-                Some(Err(error)) => found.complain(stretch.complaint(row, &error)),
-                None => {}
+            let (frame, complaint) = stretch.judged(row, self.source.guard());
+            if let Some(complaint) = complaint.filter(|_| !complaints_known) {
+                found.complain(complaint);
+            }
+            if let Some(frame) = frame.filter(|_| matters) {
+                self.frame(row, &frame, &mut windows, found);
             }
         }
     }

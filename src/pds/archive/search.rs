@@ -16,7 +16,7 @@ use crate::{
 };
 
 /// Records in memory at once: 51 MB, more than any day of the mission takes.
-const LOAD_RECORDS: usize = 1 << 16;
+pub(super) const LOAD_RECORDS: usize = 1 << 16;
 /// Records of a task: 0.4 MB, and at most 1.5 MB of shots.
 const TASK_RECORDS: usize = 512;
 /// Tasks of a wave for each thread, and the most of a wave: what they find stands in memory at once.
@@ -61,7 +61,7 @@ pub fn search(
     };
     let pieces: Vec<Piece> = (0..)
         .zip(sources)
-        .flat_map(|(file, source)| pieces_of(file, source))
+        .flat_map(|(file, source)| pieces_of(file, source, query))
         .collect();
     let mut rest = &pieces[..];
     while let Some(load) = next_load(rest) {
@@ -80,9 +80,9 @@ struct Piece {
 }
 
 /// The pieces of a file: at least one, which may be empty.
-fn pieces_of(file: usize, source: &Source) -> Vec<Piece> {
+fn pieces_of(file: usize, source: &Source, query: &Query<'_>) -> Vec<Piece> {
     let mut pieces: Vec<Piece> = source
-        .rows_to_read()
+        .rows_to_read(query)
         .into_iter()
         .flat_map(|rows| {
             let starts = rows.clone().step_by(LOAD_RECORDS);
@@ -271,7 +271,7 @@ fn scan(
     let mut found = Found::new();
     if task.is_first {
         found.frames_read = source.records() as u64;
-        source.tell_of_head(&mut found);
+        source.tell_of_head(query, &mut found);
     }
     if let Some(stretch) = stretch {
         let scan = Scan {

@@ -3,9 +3,10 @@
 use std::{
     ops::Range,
     path::{Path, PathBuf},
+    sync::Arc,
 };
 
-use super::Found;
+use super::{Found, IndexedFile, Indexes, Judged, Query};
 use crate::{
     altimetry::DatumChoice,
     error::{Locate, Result},
@@ -25,16 +26,20 @@ pub struct Source {
     identity: Identity,
     head_complaints: Vec<Complaint>,
     trailing_complaint: Option<Complaint>,
+    indexed: Option<Arc<IndexedFile>>,
 }
 
 impl Source {
-    /// Looks at the label of a file, and for its first good record.
+    /// Looks at the label of a file, and for its first good record, which a file in an index has.
     ///
     /// # Errors
     /// A file that cannot be read, holds no good record, or whose datum cannot be told.
-    pub fn open(path: &Path, choice: DatumChoice) -> Result<Self> {
+    pub fn open(path: &Path, choice: DatumChoice, indexes: &Indexes) -> Result<Self> {
         let reader = Reader::open(path)?;
-        reader.require_records()?;
+        let indexed = indexes.find(path, &reader.identity());
+        if indexed.is_none() {
+            reader.require_records()?;
+        }
         let head = reader.head();
         let version = head.name().map(|name| name.version);
         Ok(Self {
@@ -46,6 +51,7 @@ impl Source {
             identity: reader.identity(),
             head_complaints: head.label_complaints().to_vec(),
             trailing_complaint: head.trailing_complaint(),
+            indexed,
         })
     }
 
@@ -104,15 +110,30 @@ impl Source {
         FieldGuard::new(self.label.software_version)
     }
 
-    /// The rows that may have shots that are asked for.
-    pub(super) fn rows_to_read(&self) -> Vec<Range<usize>> {
-        vec![0..self.records]
+    /// The rows that may have shots that are asked for, or must be judged all the same.
+    pub(super) fn rows_to_read(&self, query: &Query<'_>) -> Vec<Range<usize>> {
+        let indexed = self.indexed.as_ref();
+        let rows = indexed.and_then(|indexed| indexed.rows(query, self.datum, self.records));
+        rows.unwrap_or_else(|| vec![0..self.records])
     }
 
-    /// Complains of what is wrong with the head of the file.
-    pub(super) fn tell_of_head(&self, found: &mut Found) {
+    /// Whether an index tells all complaints that are asked for.
+    pub(super) fn complaints_known(&self, query: &Query<'_>) -> bool {
+        let indexed = self.indexed.as_ref();
+        query.judged == Judged::All
+            && indexed.is_some_and(|indexed| indexed.has_blocks(self.records))
+    }
+
+    /// Complains of what is wrong with the head of the file, and of what an index says.
+    pub(super) fn tell_of_head(&self, query: &Query<'_>, found: &mut Found) {
         for complaint in &self.head_complaints {
             found.complain(complaint.clone());
+        }
+        let indexed = self.indexed.iter();
+        for indexed in indexed.filter(|_| self.complaints_known(query)) {
+            for complaint in &indexed.complaints {
+                found.complain(complaint.clone());
+            }
         }
     }
 

@@ -19,6 +19,14 @@ pub struct Complaint {
     pub text: String,
 }
 
+impl Complaint {
+    /// Whether it depends on more records than the few around it, so that a stretch of the file cannot tell.
+    #[must_use]
+    pub const fn is_of_many_records(&self) -> bool {
+        matches!(self.reason, Reason::TimeOrder)
+    }
+}
+
 impl fmt::Display for Complaint {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         formatter.write_str(&self.file)?;

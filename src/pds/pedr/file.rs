@@ -122,6 +122,12 @@ impl File {
         }
     }
 
+    /// The bytes of the label, as many as the file has of them.
+    #[must_use]
+    pub fn label_bytes(&self) -> &[u8] {
+        &self.bytes[..self.bytes.len().min(LABEL_BYTES)]
+    }
+
     /// The memory of the file.
     pub(super) fn into_bytes(self) -> Vec<u8> {
         self.bytes

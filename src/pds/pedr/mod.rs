@@ -29,6 +29,9 @@ pub use writer::{LabelInfo, PedrWriter};
 
 use crate::units::RADIANS_PER_DEGREE;
 
+/// Number of the rules by which records are judged and their places told: raised when a record is complained of otherwise
+/// than before, so that an index made by other rules is made anew.
+pub const RULES: u32 = 1;
 /// Shots in a frame.
 pub const SHOTS: usize = 20;
 /// Records that the attached label takes.

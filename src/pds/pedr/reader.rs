@@ -1,7 +1,7 @@
 //! A PEDR file read a stretch at a time: archives are searched where they lie, in little memory.
 //!
 //! Stretches are copied by `pread`. A mapping would save the copy, but whoever shortens a mapped file ends the process:
-//! docs/decisions/0019.
+//! docs/decisions/0020.
 
 use std::{
     fs, io,
@@ -9,10 +9,13 @@ use std::{
     ops::Range,
     os::unix::fs::{FileExt as _, MetadataExt as _},
     path::Path,
+    thread,
+    time::{Duration, SystemTime},
 };
 
 use rayon::prelude::*;
 use rustix::fs::Advice;
+use zerocopy::IntoBytes as _;
 
 use super::{Complaint, FieldGuard, File, Frame, LABEL_BYTES, RECORD_BYTES, Record, RecordError};
 use crate::{
@@ -25,6 +28,9 @@ const NEIGHBOURS: usize = 4;
 /// Records among which the first good one is looked for.
 const FIRST_RECORDS: usize = 16;
 const NEXT_RECORDS: usize = 1_024;
+/// How long a file is waited for that was written just now, and how often.
+const WAIT: Duration = Duration::from_millis(100);
+const WAITS: usize = 30;
 /// Bytes that a thread reads at once.
 const READ_BYTES: usize = 1 << 20;
 
@@ -55,6 +61,8 @@ enum Changed {
     Content,
     #[error("the file was removed while it was read")]
     Removed,
+    #[error("the file is being written")]
+    Young,
 }
 
 impl Cause for Changed {
@@ -161,6 +169,33 @@ impl Reader {
         Err(Changed::Content).in_file(self.head.path())
     }
 
+    /// Makes sure that the file was not written just now, so that any later change shows in its times; a young file is
+    /// waited for.
+    ///
+    /// # Errors
+    /// It is still being written.
+    pub fn require_steady(&self) -> Result<()> {
+        for _ in 0..WAITS {
+            if self.identity.is_steady(SystemTime::now()) {
+                return self.unchanged();
+            }
+            thread::sleep(WAIT);
+        }
+        Err(Changed::Young).in_file(self.head.path())
+    }
+
+    /// The bytes after the last whole record.
+    ///
+    /// # Errors
+    /// What the disk refuses; a file that has become shorter.
+    pub fn trailing_bytes(&self) -> Result<Vec<u8>> {
+        let from = (LABEL_BYTES + self.head.record_count() * RECORD_BYTES) as u64;
+        let length = self.identity.bytes.saturating_sub(from);
+        let mut bytes = vec![0; usize::try_from(length).unwrap_or(0)];
+        read_at(&self.handle, &mut bytes, from, self.identity.bytes).in_file(self.head.path())?;
+        Ok(bytes)
+    }
+
     /// Makes sure that the file holds at least one good record; a file of another kind holds none.
     ///
     /// # Errors
@@ -211,10 +246,24 @@ impl Stretch {
         Some(frame)
     }
 
-    /// The complaint of the record in row `row` of the file.
+    /// The frame of row `row` of the file, when it is a good one, and what there is to complain of.
     #[must_use]
-    pub fn complaint(&self, row: usize, error: &RecordError) -> Complaint {
-        self.file.record_complaint(row, error)
+    pub fn judged(&self, row: usize, guard: FieldGuard) -> (Option<Frame<'_>>, Option<Complaint>) {
+        let (frame, error) = match self.frame(row, guard) {
+            Some(Ok(frame)) => (Some(frame), frame.record().check_radii().err()),
+            Some(Err(error)) => (None, Some(error)),
+            None => (None, None),
+        };
+        (
+            frame,
+            error.map(|error| self.file.record_complaint(row, &error)),
+        )
+    }
+
+    /// The bytes of the records that the stretch is about.
+    #[must_use]
+    pub fn bytes(&self) -> &[u8] {
+        self.file.records()[self.inner.clone()].as_bytes()
     }
 
     /// The memory, for the next stretch.

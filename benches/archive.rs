@@ -1,0 +1,376 @@
+//! Searches a synthetic archive of PEDR files, side by side with what the machine can do at best.
+//!
+//! `cargo bench --bench archive -- --gb 2`: ratios go to `target/bench/archive.json`. "Warm" is with all files in the
+//! system's cache, the best of a few rounds in turns; "cold" after their pages were given up, once each.
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    clippy::print_stdout,
+    reason = "a benchmark may fail loudly and prints its figures"
+)]
+
+#[path = "../tests/track/mod.rs"]
+#[allow(dead_code, reason = "tests use more of it")]
+mod track;
+
+use std::{
+    collections::BTreeMap,
+    f64::consts::TAU,
+    fs,
+    hint::black_box,
+    io::{BufReader, Read as _},
+    path::{Path, PathBuf},
+    sync::atomic::AtomicBool,
+    time::Instant,
+};
+
+use areograph::{
+    altimetry::{DatumChoice, ShotFilter},
+    error::{Error, Result},
+    frames::MarsDatum,
+    geom::window::{Region, WindowShape},
+    pds::{
+        archive::{Found, Index, IndexedFile, Indexes, Judged, Query, Sink, Source, search},
+        pedr::{LABEL_BYTES, RECORD_BYTES},
+    },
+};
+use rayon::prelude::*;
+use serde_json::{Value, json};
+use track::{DEGREE, write_frames};
+
+static RUN_ON: AtomicBool = AtomicBool::new(false);
+const ROUNDS: usize = 5;
+/// Frames of a day without gaps, as a file of the mapping phase has them.
+const FRAMES_PER_FILE: u32 = 41_200;
+/// Where the ground latitude of the mid-point stands in a record.
+const MID_POINT: usize = 336;
+
+#[derive(Default)]
+struct Count {
+    shots: usize,
+    frames: u64,
+}
+
+impl Sink for Count {
+    fn found(&mut self, _: usize, found: Found) -> Result<()> {
+        self.shots += black_box(found.footprints).len();
+        self.frames += found.frames_read;
+        Ok(())
+    }
+
+    fn failed(&mut self, _: usize, failure: Error) -> Result<()> {
+        Err(failure)
+    }
+}
+
+struct Archive {
+    folder: PathBuf,
+    paths: Vec<PathBuf>,
+    bytes: u64,
+}
+
+impl Archive {
+    fn write(folder: &Path, gb: f64) -> Self {
+        let wanted = gb * 1e9;
+        let per_file = f64::from(FRAMES_PER_FILE) * RECORD_BYTES as f64;
+        let files = (wanted / per_file).round().max(1.0) as u32;
+        let paths: Vec<PathBuf> = (0..files)
+            .map(|day| folder.join(format!("ap{:05}l.b", 10_100 + 12 * day)))
+            .collect();
+        (0..files)
+            .into_par_iter()
+            .zip(&paths)
+            .for_each(|(day, path)| {
+                let first = day * FRAMES_PER_FILE;
+                let frames = first..first + FRAMES_PER_FILE;
+                write_frames(path, MarsDatum::Iau2000, frames, |_, _| ());
+            });
+        let sizes = paths.iter().map(|path| fs::metadata(path).unwrap().len());
+        Self {
+            folder: folder.to_owned(),
+            bytes: sizes.sum(),
+            paths,
+        }
+    }
+
+    fn sources(&self, indexes: &Indexes) -> Vec<Source> {
+        let paths = self.paths.par_iter();
+        paths
+            .map(|path| Source::open(path, DatumChoice::Auto, indexes).unwrap())
+            .collect()
+    }
+
+    fn search(&self, windows: &[Region], judged: Judged, indexes: &Indexes) -> Count {
+        let filter = ShotFilter {
+            classes: vec![1],
+            channels: vec![1, 2, 3, 4],
+            attitude_flags: vec![0, 1],
+            off_nadir_max_rad: TAU,
+        };
+        let query = Query::new(windows.to_vec(), &filter, judged);
+        let mut count = Count::default();
+        search(&self.sources(indexes), &query, &RUN_ON, &mut count).unwrap();
+        count
+    }
+
+    /// One number of one 64-byte line of every record, by all threads, of files mapped into memory.
+    fn lines_mapped(&self) -> u64 {
+        let of_file = |path: &PathBuf| {
+            let file = fs::File::open(path).unwrap();
+            #[allow(unsafe_code, reason = "nobody shortens the files of the benchmark")]
+            // SAFETY: the map is read only, and the files are of this program alone.
+            let map = unsafe { memmap2::Mmap::map(&file) }.unwrap();
+            let records = map[LABEL_BYTES..].chunks_exact(RECORD_BYTES);
+            records
+                .map(|record| u64::from(record[MID_POINT]))
+                .sum::<u64>()
+        };
+        self.paths.par_iter().map(of_file).sum()
+    }
+
+    /// The same of files copied piece by piece into the processor's cache.
+    fn lines_copied(&self) -> u64 {
+        use std::os::unix::fs::FileExt as _;
+        let of_file = |path: &PathBuf| {
+            let file = fs::File::open(path).unwrap();
+            let length = file.metadata().unwrap().len();
+            let mut buffer = vec![0; 512 * RECORD_BYTES];
+            let mut sum = 0;
+            for from in (LABEL_BYTES as u64..length).step_by(buffer.len()) {
+                let part = (length - from).min(buffer.len() as u64) as usize;
+                file.read_exact_at(&mut buffer[..part], from).unwrap();
+                let records = buffer[..part].chunks_exact(RECORD_BYTES);
+                sum += records
+                    .map(|record| u64::from(record[MID_POINT]))
+                    .sum::<u64>();
+            }
+            sum
+        };
+        self.paths.par_iter().map(of_file).sum()
+    }
+
+    /// Every mid-point, decoded by one thread through a `BufReader`.
+    fn plain_reader(&self) -> u64 {
+        let mut inside = 0;
+        for path in &self.paths {
+            let mut reader = BufReader::new(fs::File::open(path).unwrap());
+            let mut label = [0; LABEL_BYTES];
+            reader.read_exact(&mut label).unwrap();
+            let mut record = [0; RECORD_BYTES];
+            while reader.read_exact(&mut record).is_ok() {
+                let angle = |at: usize| {
+                    let bytes: [u8; 4] = record[at..at + 4].try_into().unwrap();
+                    f64::from(i32::from_be_bytes(bytes)) * 1e-6
+                };
+                let (latitude, longitude) = (angle(MID_POINT), angle(MID_POINT + 4));
+                let is_inside =
+                    (10.0..10.5).contains(&latitude) && (20.0..20.5).contains(&longitude);
+                inside += u64::from(is_inside);
+            }
+        }
+        inside
+    }
+
+    /// All bytes in order by one thread, a mebibyte at a time, as `dd bs=1M` reads them.
+    fn sequential(&self) -> u64 {
+        let (mut buffer, mut bytes) = (vec![0; 1 << 20], 0);
+        for path in &self.paths {
+            let mut file = fs::File::open(path).unwrap();
+            loop {
+                let read = file.read(&mut buffer).unwrap();
+                bytes += read as u64;
+                if read == 0 {
+                    break;
+                }
+            }
+        }
+        bytes
+    }
+
+    /// Has the system give up the pages of the files.
+    fn cool(&self) {
+        for path in &self.paths {
+            let file = fs::File::open(path).unwrap();
+            file.sync_all().unwrap();
+            rustix::fs::fadvise(&file, 0, None, rustix::fs::Advice::DontNeed).unwrap();
+        }
+    }
+
+    fn index(&self, earlier: &Index) -> Index {
+        let file = |path: &PathBuf| {
+            let below = path.strip_prefix(&self.folder).unwrap();
+            let identity = areograph::files::Identity::of(&fs::metadata(path).unwrap());
+            match earlier.find(below, &identity) {
+                Some(known) => IndexedFile::clone(&known),
+                None => IndexedFile::of(path, below, &RUN_ON).unwrap(),
+            }
+        };
+        self.paths.iter().map(file).collect()
+    }
+}
+
+fn seconds(mut work: impl FnMut()) -> f64 {
+    let start = Instant::now();
+    work();
+    start.elapsed().as_secs_f64()
+}
+
+/// The largest resident set so far, MB.
+fn peak_mb() -> f64 {
+    let status = fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let line = status.lines().find(|line| line.starts_with("VmHWM"));
+    let kib = line.and_then(|line| line.split_whitespace().nth(1)?.parse::<f64>().ok());
+    kib.map_or(f64::NAN, |kib| kib * 1024.0 / 1e6)
+}
+
+fn half_degree(west: f64, south: f64) -> Region {
+    Region::new(&WindowShape::Box {
+        west_rad: west.rem_euclid(360.0) * DEGREE,
+        east_rad: (west + 0.5).rem_euclid(360.0) * DEGREE,
+        south_rad: south * DEGREE,
+        north_rad: (south + 0.5) * DEGREE,
+    })
+}
+
+fn main() {
+    let arguments: Vec<String> = std::env::args().collect();
+    let gb = arguments.iter().position(|argument| argument == "--gb");
+    let gb = gb
+        .and_then(|at| arguments.get(at + 1)?.parse().ok())
+        .unwrap_or(2.0);
+    let folder = tempfile::tempdir_in("target").unwrap();
+    let archive = Archive::write(folder.path(), gb);
+    let one = vec![half_degree(20.0, 10.0)];
+    // Spread over the globe by the golden ratio.
+    let thousand: Vec<Region> = (0..1_000)
+        .map(|n| half_degree(f64::from(n) * 222.492_235, -87.0 + 0.173 * f64::from(n)))
+        .collect();
+    let everywhere = vec![Region::new(&WindowShape::Box {
+        west_rad: 0.0,
+        east_rad: TAU,
+        south_rad: -TAU / 4.0,
+        north_rad: TAU / 4.0,
+    })];
+    let none = Indexes::default();
+    let mut best: BTreeMap<&str, f64> = BTreeMap::new();
+    let mut note = |name: &'static str, taken_s: f64| {
+        let known = best.entry(name).or_insert(f64::INFINITY);
+        *known = known.min(taken_s);
+    };
+    archive.cool();
+    note("cold dd", seconds(|| drop(black_box(archive.sequential()))));
+    archive.cool();
+    note(
+        "cold scan",
+        seconds(|| drop(archive.search(&one, Judged::Near, &none))),
+    );
+    let before_mb = peak_mb();
+    for _ in 0..ROUNDS {
+        note(
+            "scan",
+            seconds(|| drop(black_box(archive.search(&one, Judged::Near, &none)))),
+        );
+        note(
+            "scan, all judged",
+            seconds(|| drop(black_box(archive.search(&one, Judged::All, &none)))),
+        );
+        note(
+            "1000 windows",
+            seconds(|| drop(black_box(archive.search(&thousand, Judged::Near, &none)))),
+        );
+        note(
+            "plain reader",
+            seconds(|| drop(black_box(archive.plain_reader()))),
+        );
+        note(
+            "lines, copied",
+            seconds(|| drop(black_box(archive.lines_copied()))),
+        );
+    }
+    note(
+        "every shot",
+        seconds(|| drop(black_box(archive.search(&everywhere, Judged::Near, &none)))),
+    );
+    let index = archive.index(&Index::default());
+    for _ in 0..2 {
+        note(
+            "index build",
+            seconds(|| drop(black_box(archive.index(&Index::default())))),
+        );
+        note(
+            "index update, nothing new",
+            seconds(|| drop(black_box(archive.index(&index)))),
+        );
+    }
+    let index_path = folder.path().join(areograph::pds::archive::INDEX);
+    let encoded = index.encode().unwrap();
+    std::io::Write::write_all(&mut fs::File::create(&index_path).unwrap(), &encoded).unwrap();
+    for _ in 0..ROUNDS {
+        note(
+            "indexed",
+            seconds(|| {
+                let indexes = Indexes::beside(&archive.paths, Index::read);
+                drop(black_box(archive.search(&one, Judged::Near, &indexes)));
+            }),
+        );
+    }
+    let memory_mb = peak_mb();
+    for _ in 0..ROUNDS {
+        note(
+            "lines, mapped",
+            seconds(|| drop(black_box(archive.lines_mapped()))),
+        );
+    }
+    let found = archive.search(&one, Judged::Near, &none);
+    report(&archive, &best, &encoded, [before_mb, memory_mb], &found);
+}
+
+fn report(
+    archive: &Archive,
+    best: &BTreeMap<&str, f64>,
+    index: &[u8],
+    peaks_mb: [f64; 2],
+    found: &Count,
+) {
+    let bytes = archive.bytes as f64;
+    println!(
+        "{} files, {:.3} GB, {} threads; {} shots in the window of {} frames",
+        archive.paths.len(),
+        bytes / 1e9,
+        rayon::current_num_threads(),
+        found.shots,
+        found.frames
+    );
+    for (name, taken_s) in best {
+        println!(
+            "{name:28}{:10.2} ms  {:8.2} GB/s",
+            taken_s * 1e3,
+            bytes / taken_s / 1e9
+        );
+    }
+    let of = |name: &str| best[name];
+    let ratios: Value = json!({
+        "scan_over_one_line_of_each_record_warm": of("lines, mapped") / of("scan"),
+        "scan_over_one_line_copied_warm": of("lines, copied") / of("scan"),
+        "scan_over_plain_reader_warm": of("plain reader") / of("scan"),
+        "scan_over_dd_cold": of("cold dd") / of("cold scan"),
+        "time_of_1000_windows_over_one_warm": of("1000 windows") / of("scan"),
+        "time_all_judged_over_near_warm": of("scan, all judged") / of("scan"),
+        "indexed_half_degree_window_ms_warm": of("indexed") * 1e3,
+        "index_build_gb_per_s_warm": bytes / of("index build") / 1e9,
+        "index_update_ms": of("index update, nothing new") * 1e3,
+        "index_share_of_archive": index.len() as f64 / bytes,
+        "peak_memory_after_cold_scan_mb": peaks_mb[0],
+        "peak_memory_mb": peaks_mb[1],
+    });
+    println!("{ratios:#}");
+    let document = json!({
+        "gb": bytes / 1e9,
+        "threads": rayon::current_num_threads(),
+        "seconds": best,
+        "ratios": ratios,
+    });
+    fs::create_dir_all("target/bench").unwrap();
+    let mut file = fs::File::create("target/bench/archive.json").unwrap();
+    std::io::Write::write_all(&mut file, format!("{document:#}\n").as_bytes()).unwrap();
+}

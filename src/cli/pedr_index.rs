@@ -1,0 +1,150 @@
+//! `areograph pedr index`.
+
+use std::{
+    fs,
+    path::{Path, PathBuf},
+    sync::atomic::AtomicBool,
+};
+
+use clap::Args;
+
+use super::output;
+use crate::{
+    error::{Cause, Error, IoError, Kind, Locate as _},
+    files::{Identity, hash_file, short_hash},
+    pds::archive::{INDEX, Index, IndexedFile, Listing},
+    store::atomic,
+};
+
+/// Makes the index of the PEDR files in and below a folder, or brings it up to date: only new and changed files are read.
+///
+/// `run` and `pedr search` use it by themselves, and give the same with it, without it, and when it is out of date.
+/// It is the file areograph-pedr.index in the folder. A command that is killed leaves the index as it was.
+#[derive(Debug, Args)]
+pub(super) struct Arguments {
+    /// Folder of the archive.
+    #[arg(value_name = "FOLDER")]
+    folder: PathBuf,
+    /// Read every file again, and name those whose bytes are not those that were indexed.
+    #[arg(long)]
+    verify: bool,
+}
+
+/// A file that changed without a trace in the file system.
+#[derive(Debug, thiserror::Error)]
+#[error(
+    "its bytes are not those that were indexed, though size and times are: hash {was}, now {is}"
+)]
+struct Altered {
+    was: String,
+    is: String,
+}
+
+impl Cause for Altered {
+    fn kind(&self) -> Kind {
+        Kind::Input
+    }
+
+    fn advice(&self) -> String {
+        "fetch the file again: the disk may be failing; the index now says what the file holds"
+            .to_owned()
+    }
+}
+
+/// The index could not be put into bytes.
+#[derive(Debug, thiserror::Error)]
+#[error("the index cannot be encoded")]
+struct NotEncoded;
+
+impl Cause for NotEncoded {
+    fn kind(&self) -> Kind {
+        Kind::Bug
+    }
+
+    fn advice(&self) -> String {
+        "this is a bug in areograph; please report it".to_owned()
+    }
+}
+
+/// Nobody stops an index but by killing it, which is harmless.
+static RUN_ON: AtomicBool = AtomicBool::new(false);
+
+/// What becomes of the files.
+#[derive(Default)]
+struct Outcome {
+    files: Vec<IndexedFile>,
+    bytes: u64,
+    read: usize,
+    failures: Vec<Error>,
+}
+
+pub(super) fn run(arguments: &Arguments) -> Result<(), Error> {
+    let path = arguments.folder.join(INDEX);
+    let earlier = Index::read(&path).unwrap_or_default();
+    let listing = Listing::below(&arguments.folder);
+    let mut outcome = Outcome {
+        failures: listing.failures,
+        ..Outcome::default()
+    };
+    for file in &listing.paths {
+        if let Err(failure) = outcome.add(arguments, &earlier, file) {
+            outcome.failures.push(failure);
+        }
+    }
+    let gone = earlier
+        .files()
+        .filter(|file| !listing.paths.contains(&arguments.folder.join(file.path())));
+    let gone = gone.count();
+    let (files, read, bytes) = (outcome.files.len(), outcome.read, outcome.bytes);
+    let index: Index = outcome.files.into_iter().collect();
+    let encoded = index.encode().ok_or(NotEncoded).in_file(&path)?;
+    atomic::write(&path, &encoded)?;
+    output::line(format_args!(
+        "{}: {files} files of {bytes} bytes, {read} of them read now, {gone} gone; {} bytes",
+        path.display(),
+        encoded.len()
+    ));
+    let mut failures = outcome.failures.into_iter();
+    let Some(first) = failures.next() else {
+        return Ok(());
+    };
+    failures.for_each(output::error);
+    Err(first)
+}
+
+impl Outcome {
+    /// Takes over what is known of a file, or reads it.
+    fn add(&mut self, arguments: &Arguments, earlier: &Index, path: &Path) -> Result<(), Error> {
+        let below = path.strip_prefix(&arguments.folder).unwrap_or(path);
+        let metadata = fs::metadata(path)
+            .map_err(IoError::on("open"))
+            .in_file(path)?;
+        let identity = Identity::of(&metadata);
+        self.bytes += identity.bytes;
+        if let Some(known) = earlier.find(below, &identity) {
+            let altered = if arguments.verify {
+                altered(path, &known)?
+            } else {
+                None
+            };
+            let Some(altered) = altered else {
+                self.files.push(IndexedFile::clone(&known));
+                return Ok(());
+            };
+            self.failures.push(Error::from(altered).in_file(path));
+        }
+        self.read += 1;
+        self.files.push(IndexedFile::of(path, below, &RUN_ON)?);
+        Ok(())
+    }
+}
+
+/// How the file differs from what was indexed.
+fn altered(path: &Path, known: &IndexedFile) -> Result<Option<Altered>, Error> {
+    let (is, _) = hash_file(path)?;
+    let was = known.blake3();
+    Ok((is != was).then(|| Altered {
+        was: short_hash(&was),
+        is: short_hash(&is),
+    }))
+}

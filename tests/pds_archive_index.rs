@@ -1,0 +1,325 @@
+//! An index changes nothing but the time a search takes, whatever became of it or of the files.
+
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    reason = "helpers of tests fail as tests do"
+)]
+
+#[path = "track/mod.rs"]
+mod track;
+
+use std::{
+    f64::consts::{FRAC_PI_2, TAU},
+    fs,
+    io::Write as _,
+    path::{Path, PathBuf},
+    sync::atomic::AtomicBool,
+    time::{Duration, SystemTime},
+};
+
+use areograph::{
+    altimetry::{DatumChoice, ShotFilter},
+    error::{Error, Result},
+    files::Identity,
+    frames::MarsDatum,
+    geom::window::{Region, WindowShape},
+    pds::archive::{
+        Found, INDEX, Index, IndexedFile, Indexes, Judged, Listing, Query, Sink, Source, search,
+    },
+    time::{Et, Interval},
+};
+use proptest::{prelude::*, test_runner::TestRunner};
+use track::{DEGREE, FRAMES, write};
+
+static RUN_ON: AtomicBool = AtomicBool::new(false);
+
+/// All that a search tells.
+#[derive(Debug, Default, PartialEq)]
+struct Told {
+    rows: Vec<(u16, u32, u8, Vec<u32>)>,
+    complaints: Vec<String>,
+    rejected: u64,
+    frames_read: u64,
+    shots_read: u64,
+}
+
+impl Sink for Told {
+    fn found(&mut self, _: usize, found: Found) -> Result<()> {
+        for row in 0..found.footprints.len() {
+            let shot = found.footprints.row(row);
+            let windows = found.windows.of(row).to_vec();
+            self.rows.push((shot.file, shot.record, shot.shot, windows));
+        }
+        let complaints = found.complaints.iter().map(ToString::to_string);
+        self.complaints.extend(complaints);
+        self.rejected += found.rejected.values().sum::<u64>();
+        self.frames_read += found.frames_read;
+        self.shots_read += found.shots_read;
+        Ok(())
+    }
+
+    fn failed(&mut self, _: usize, failure: Error) -> Result<()> {
+        Err(failure)
+    }
+}
+
+fn filter() -> ShotFilter {
+    ShotFilter {
+        classes: vec![1],
+        channels: vec![1, 2, 3],
+        attitude_flags: vec![0],
+        off_nadir_max_rad: 0.02,
+    }
+}
+
+fn box_deg(west: f64, width: f64, south: f64, north: f64) -> Region {
+    Region::new(&WindowShape::Box {
+        west_rad: west.rem_euclid(360.0) * DEGREE,
+        east_rad: (west + width).rem_euclid(360.0) * DEGREE,
+        south_rad: south * DEGREE,
+        north_rad: north * DEGREE,
+    })
+}
+
+fn told(
+    paths: &[PathBuf],
+    indexes: &Indexes,
+    windows: &[Region],
+    judged: Judged,
+    time: Option<Interval>,
+) -> Told {
+    let open =
+        |path: &PathBuf| Source::open(path, DatumChoice::Auto, indexes).expect("a good file");
+    let sources: Vec<Source> = paths.iter().map(open).collect();
+    let filter = filter();
+    let query = Query::new(windows.to_vec(), &filter, judged).within(time);
+    let mut told = Told::default();
+    search(&sources, &query, &RUN_ON, &mut told).expect("nobody stops it");
+    told
+}
+
+/// Files in two folders, old enough to be indexed at once: an older one, one with some bad records, one with records out
+/// of order.
+fn archive(folder: &Path) -> Vec<PathBuf> {
+    let paths = ["a/ap19019k.b", "b/AP19020L.B", "b/ap19021l.b"].map(|name| folder.join(name));
+    for path in &paths {
+        fs::create_dir_all(path.parent().expect("a folder")).expect("a writable folder");
+    }
+    write(&paths[0], MarsDatum::Iau1991, 0, |_, _| ());
+    write(
+        &paths[1],
+        MarsDatum::Iau2000,
+        FRAMES / 2,
+        |number, record| match number % 200 {
+            7 => record.clock_frequency_hz.set(7),
+            9 => record.shot_radius_cm[4].set(i32::MAX),
+            11 if number > 4_000 => record.ground_latitude_microdegrees.set(i32::MIN),
+            13 if number > 4_000 => record.ground_longitude_change_microdegrees.set(i32::MAX),
+            _ => (),
+        },
+    );
+    write(&paths[2], MarsDatum::Iau2000, FRAMES, |number, record| {
+        if number == FRAMES + 700 {
+            record.time_s.set(1e7);
+            record.time_whole_s.set(10_000_000);
+            record.time_fraction_us.set(0);
+        }
+    });
+    paths.iter().for_each(|path| age(path));
+    paths.to_vec()
+}
+
+/// The time of the last change cannot be set: files are waited for once.
+fn age(path: &Path) {
+    let file = fs::File::options()
+        .append(true)
+        .open(path)
+        .expect("a writable file");
+    file.set_modified(SystemTime::now() - Duration::from_secs(10))
+        .expect("a file system with times");
+}
+
+fn indexed(folder: &Path, paths: &[PathBuf]) -> Index {
+    let of = |path: &PathBuf| {
+        let below = path.strip_prefix(folder).expect("a file below the folder");
+        IndexedFile::of(path, below, &RUN_ON).expect("a good file")
+    };
+    paths.iter().map(of).collect()
+}
+
+fn overwrite(path: &Path, bytes: &[u8]) {
+    let mut file = fs::File::create(path).expect("a writable folder");
+    file.write_all(bytes).expect("room on the disk");
+}
+
+#[test]
+fn with_an_index_and_without_a_search_tells_the_same() {
+    let folder = tempfile::tempdir().unwrap();
+    let paths = archive(folder.path());
+    let index = indexed(folder.path(), &paths);
+    overwrite(&folder.path().join(INDEX), &index.encode().unwrap());
+    let indexes = Indexes::beside(&paths, Index::read);
+    for path in &paths {
+        let identity = Identity::of(&fs::metadata(path).unwrap());
+        assert!(indexes.find(path, &identity).is_some(), "the index is used");
+    }
+    let none = Indexes::default();
+    let window = (
+        0.0..360.0_f64,
+        0.01..60.0_f64,
+        -90.0..89.0_f64,
+        0.01..1.0_f64,
+    );
+    let time = proptest::option::of((0.0..15_000.0_f64, 0.0..5_000.0_f64));
+    let (mut rows, mut complaints) = (0, 0);
+    let counts = std::cell::RefCell::new((&mut rows, &mut complaints));
+    let mut runner = TestRunner::new(ProptestConfig::with_cases(32));
+    runner
+        .run(
+            &(proptest::collection::vec(window, 0..4), time),
+            |(windows, time)| {
+                let windows: Vec<Region> = windows
+                    .into_iter()
+                    .map(|(west, width, south, share)| {
+                        box_deg(west, width, south, south + share * (90.0 - south))
+                    })
+                    .collect();
+                let time = time.map(|(start, length)| {
+                    let start = Et::from_seconds(-20_000_000.0 + start);
+                    Interval::new(start, start.plus(length))
+                });
+                for judged in [Judged::All, Judged::Near] {
+                    let without = told(&paths, &none, &windows, judged, time);
+                    prop_assert_eq!(&told(&paths, &indexes, &windows, judged, time), &without);
+                    let mut counts = counts.borrow_mut();
+                    *counts.0 += without.rows.len();
+                    *counts.1 += without.complaints.len();
+                }
+                Ok(())
+            },
+        )
+        .unwrap();
+    assert!(
+        rows > 10_000 && complaints > 1_000,
+        "{rows} rows, {complaints} complaints"
+    );
+}
+
+#[test]
+fn an_index_that_is_damaged_or_of_another_version_is_as_good_as_none() {
+    let folder = tempfile::tempdir().unwrap();
+    let paths = archive(folder.path());
+    let bytes = indexed(folder.path(), &paths[..1]).encode().unwrap();
+    assert_eq!(Index::decode(&bytes).unwrap().files().len(), 1);
+    assert_eq!(Index::decode(&bytes).unwrap().encode().unwrap(), bytes);
+    for length in 0..bytes.len() {
+        assert!(Index::decode(&bytes[..length]).is_none(), "{length} bytes");
+    }
+    let mut flipped = bytes.clone();
+    for bit in 0..8 * bytes.len() {
+        flipped[bit / 8] ^= 1 << (bit % 8);
+        assert!(Index::decode(&flipped).is_none(), "bit {bit}");
+        flipped[bit / 8] ^= 1 << (bit % 8);
+    }
+    let other = [b"areograph pedr index 2\n", &bytes[23..]].concat();
+    assert!(Index::decode(&other).is_none());
+    for hostile in [&[0xff_u8; 40][..], &[0x80; 40], b""] {
+        let hash = blake3::hash(hostile);
+        let bytes = [b"areograph pedr index 1\n", &hash.as_bytes()[..], hostile].concat();
+        assert!(Index::decode(&bytes).is_none());
+    }
+    // A folder in its place, or a file that is no index.
+    fs::create_dir(folder.path().join(INDEX)).unwrap();
+    overwrite(&folder.path().join("a").join(INDEX), b"index");
+    let indexes = Indexes::beside(&paths, Index::read);
+    let windows = [box_deg(0.0, 170.0, -60.0, 60.0)];
+    let found = told(&paths, &indexes, &windows, Judged::All, None);
+    assert_eq!(
+        found,
+        told(&paths, &Indexes::default(), &windows, Judged::All, None)
+    );
+}
+
+#[test]
+fn a_file_that_changed_since_is_read_as_if_there_were_no_index() {
+    let folder = tempfile::tempdir().unwrap();
+    let paths = archive(folder.path());
+    let index = indexed(folder.path(), &paths);
+    overwrite(&folder.path().join(INDEX), &index.encode().unwrap());
+    // Other shots under the same name and with the same size; and one file more.
+    write(&paths[0], MarsDatum::Iau1991, 40_000, |_, _| ());
+    let mut paths = paths;
+    paths.push(folder.path().join("b/ap19022l.b"));
+    write(&paths[3], MarsDatum::Iau2000, 50_000, |_, _| ());
+    let indexes = Indexes::beside(&paths, Index::read);
+    let everywhere = [Region::new(&WindowShape::Box {
+        west_rad: 0.0,
+        east_rad: TAU,
+        south_rad: -FRAC_PI_2,
+        north_rad: FRAC_PI_2,
+    })];
+    let found = told(&paths, &indexes, &everywhere, Judged::All, None);
+    assert_eq!(
+        found,
+        told(&paths, &Indexes::default(), &everywhere, Judged::All, None)
+    );
+    assert!(found.rows.iter().any(|row| row.0 == 0) && found.rows.iter().any(|row| row.0 == 3));
+}
+
+#[test]
+fn an_index_is_small_and_knows_the_bytes_of_its_files() {
+    let folder = tempfile::tempdir().unwrap();
+    let paths = archive(folder.path());
+    let index = indexed(folder.path(), &paths);
+    let archive_bytes: u64 = paths
+        .iter()
+        .map(|path| fs::metadata(path).unwrap().len())
+        .sum();
+    let bytes = index.encode().unwrap().len() as f64;
+    assert!(
+        bytes < 0.01 * archive_bytes as f64,
+        "{bytes} bytes for {archive_bytes}"
+    );
+    for file in index.files() {
+        let path = folder.path().join(file.path());
+        assert_eq!(file.blake3(), areograph::files::hash_file(&path).unwrap().0);
+    }
+}
+
+#[test]
+fn files_that_hold_no_records_are_not_indexed() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("empty.b");
+    overwrite(&path, b"");
+    let failure = IndexedFile::of(&path, Path::new("empty.b"), &RUN_ON).unwrap_err();
+    assert!(failure.to_string().contains("no good record"), "{failure}");
+}
+
+#[test]
+fn folders_are_listed_in_order_and_what_cannot_be_looked_into_is_told() {
+    let folder = tempfile::tempdir().unwrap();
+    for name in ["b/two.B", "a/one.b", "a/label.lbl", "three.b"] {
+        let path = folder.path().join(name);
+        fs::create_dir_all(path.parent().unwrap()).unwrap();
+        overwrite(&path, b"");
+    }
+    fs::create_dir(folder.path().join("folder.b")).unwrap();
+    std::os::unix::fs::symlink("nowhere", folder.path().join("dangling.b")).unwrap();
+    std::os::unix::fs::symlink(folder.path(), folder.path().join("circle")).unwrap();
+    let listing = Listing::below(folder.path());
+    let names: Vec<_> = listing
+        .paths
+        .iter()
+        .map(|path| path.strip_prefix(folder.path()).unwrap())
+        .collect();
+    assert_eq!(names, ["a/one.b", "b/two.B", "three.b"].map(Path::new));
+    assert_eq!(listing.failures.len(), 1);
+    assert!(
+        listing.failures[0]
+            .to_string()
+            .contains("dangling.b: cannot open")
+    );
+    let gone = Listing::below(&folder.path().join("gone"));
+    assert!(gone.paths.is_empty() && gone.failures.len() == 1);
+}
