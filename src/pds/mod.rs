@@ -3,6 +3,7 @@
 pub mod label;
 pub mod moc;
 pub mod pedr;
+pub mod pedr_table;
 pub mod plane_tables;
 pub mod ties;
 

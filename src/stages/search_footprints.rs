@@ -20,7 +20,9 @@ use crate::{
         mars_rotation::convert_datum,
         window::Region,
     },
-    pds::pedr::{Complaint, FieldGuard, File, FileName, Frame, Reason, SHOTS, decide_datum},
+    pds::pedr::{
+        Complaint, FieldGuard, File, FileName, Frame, Reason, SHOTS, SpoiledShots, decide_datum,
+    },
     stage::{InOrder, Input, Inputs, Stage},
     stage_inputs,
     time::Et,
@@ -41,8 +43,8 @@ const DATUM_MARGIN_RAD: f64 = 0.3 * RADIANS_PER_DEGREE;
 pub enum ShotRejection {
     /// No laser return.
     NoReturn,
-    /// An impossible radius.
-    Radius,
+    /// A radius, range or parallax that contradicts the record's other values.
+    Spoiled,
     /// Classification not accepted.
     Class,
     /// Trigger channel not accepted.
@@ -57,7 +59,7 @@ impl fmt::Display for ShotRejection {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         formatter.write_str(match self {
             Self::NoReturn => "no return",
-            Self::Radius => "impossible radius",
+            Self::Spoiled => "spoiled values",
             Self::Class => "class",
             Self::Channel => "channel",
             Self::Attitude => "attitude flag",
@@ -126,6 +128,7 @@ impl Input for PedrFiles<'_> {
 
 impl Stage for SearchFootprints<'_> {
     const NAME: &'static str = "search_footprints";
+    const METHOD: u32 = 2;
     const CHECKED: bool = true;
     type Output = SearchResult;
     stage_inputs!(fingerprint);
@@ -134,12 +137,32 @@ impl Stage for SearchFootprints<'_> {
         search_footprints(self.pedr, self.windows, *self.clock_correction_s, stop)
     }
 
+    fn findings(&self, result: &SearchResult) -> Vec<String> {
+        left_out(result)
+    }
+
     fn examine(&self) -> Vec<Result<String>> {
         let files = self.pedr.files.iter();
         files
             .map(|path| examine_file(path, self.pedr.datum))
             .collect()
     }
+}
+
+/// The findings of a search: what was left out, in numbers and with the first example.
+fn left_out(result: &SearchResult) -> Vec<String> {
+    let bad: u64 = result.complaint_counts.values().sum();
+    let first = result.complaints.first();
+    let first = first.map(|complaint| {
+        format!(
+            "{bad} complaint{} of PEDR files, the first: {complaint}",
+            if bad == 1 { "" } else { "s" }
+        )
+    });
+    let spoiled = result.rejected.get(&ShotRejection::Spoiled);
+    let spoiled =
+        spoiled.map(|shots| format!("{shots} shots in the windows left out for spoiled values"));
+    first.into_iter().chain(spoiled).collect()
 }
 
 /// What can be said of a PEDR file without searching it.
@@ -351,12 +374,7 @@ impl Search<'_> {
         for (row, frame) in self.file.frames(rows, self.guard) {
             found.frames_read += 1;
             match frame {
-                Ok(frame) => {
-                    if let Err(error) = frame.record().check_radii() {
-                        found.complain(self.file.record_complaint(row, &error));
-                    }
-                    self.frame(row, &frame, &mut found);
-                }
+                Ok(frame) => self.frame(row, &frame, &mut found),
                 Err(error) => found.complain(self.file.record_complaint(row, &error)),
             }
         }
@@ -374,20 +392,24 @@ impl Search<'_> {
         if !self.regions.iter().any(near) {
             return;
         }
+        let spoiled = frame.spoiled_shots();
+        if let Some(error) = spoiled.error() {
+            found.complain(self.file.record_complaint(row, error));
+        }
         for shot in (1..).take(SHOTS).filter_map(|shot| frame.shot(shot)) {
             found.shots_read += 1;
             let windows = self.windows_of(&shot);
             if windows == 0 {
                 continue;
             }
-            if let Some(reason) = self.reject(&shot, frame) {
+            if let Some(reason) = self.reject(&shot, &spoiled) {
                 *found.rejected.entry(reason).or_default() += 1;
                 continue;
             }
             found.footprints.push(&Footprint {
                 et_s: shot.et_tag_s + self.correction_s,
                 file: self.index,
-                record: File::record_number(row),
+                record: self.file.record_number(row),
                 windows,
                 ..shot
             });
@@ -415,16 +437,11 @@ impl Search<'_> {
         (spherical.longitude_rad, spherical.latitude.0)
     }
 
-    fn reject(&self, shot: &Footprint, frame: &Frame<'_>) -> Option<ShotRejection> {
+    fn reject(&self, shot: &Footprint, spoiled: &SpoiledShots) -> Option<ShotRejection> {
         let filter = self.filter;
         let tests = [
             (ShotRejection::NoReturn, shot.range_m > 0.0),
-            (
-                ShotRejection::Radius,
-                frame
-                    .record()
-                    .radius_is_possible(usize::from(shot.shot) - 1),
-            ),
+            (ShotRejection::Spoiled, !spoiled.contains(shot.shot)),
             (ShotRejection::Class, filter.classes.contains(&shot.class)),
             (
                 ShotRejection::Channel,

@@ -1,16 +1,20 @@
 //! A PEDR file: its label, its records, and what is wrong with it.
 
 use std::{
+    collections::BTreeMap,
     fs,
-    ops::{Deref, Range},
+    ops::Deref,
     path::{Path, PathBuf},
+    sync::OnceLock,
 };
 
 use memmap2::Mmap;
 
 use super::{
-    Complaint, FieldGuard, FileName, Frame, LABEL_BYTES, LABEL_RECORDS, PedrLabel, RECORD_BYTES,
-    Reason, Record, RecordError, check::out_of_order,
+    Complaint, FieldGuard, FileName, LABEL_BYTES, LABEL_RECORDS, PedrLabel, RECORD_BYTES, Reason,
+    Record, RecordError,
+    chronology::Misplaced,
+    foreign::{Foreign, label_records},
 };
 use crate::{
     error::{Cause, IoError, Kind, Locate, Result},
@@ -24,7 +28,10 @@ pub struct File {
     bytes: Bytes,
     name: Option<FileName>,
     label: PedrLabel,
+    /// Records that the label takes.
+    label_records: usize,
     label_complaints: Vec<Complaint>,
+    misplaced: OnceLock<BTreeMap<usize, Misplaced>>,
 }
 
 #[derive(Debug)]
@@ -64,6 +71,7 @@ impl Cause for NotAFile {
 #[error("no good record: {why}")]
 struct NoGoodRecord {
     why: String,
+    foreign: Option<Foreign>,
 }
 
 impl Cause for NoGoodRecord {
@@ -72,7 +80,12 @@ impl Cause for NoGoodRecord {
     }
 
     fn advice(&self) -> String {
-        "fetch the file again if it is a PEDR file (AP#####v.B), else leave it out".to_owned()
+        self.foreign
+            .map_or(
+                "fetch the file again if it is a PEDR file (AP#####v.B), else leave it out",
+                Foreign::advice,
+            )
+            .to_owned()
     }
 }
 
@@ -116,7 +129,9 @@ impl File {
             path,
             bytes,
             label: PedrLabel::default(),
+            label_records: LABEL_RECORDS,
             label_complaints: Vec::new(),
+            misplaced: OnceLock::new(),
         };
         file.read_label();
         file
@@ -134,7 +149,19 @@ impl File {
             Ok(label) => self.label = label,
             Err(error) => self.complain_of_label(Reason::UnreadableLabel, error.to_string()),
         }
-        let records = LABEL_RECORDS as u64 + self.records().len() as u64;
+        let stated = self.label.label_records;
+        self.label_records = label_records(&self.bytes, stated, self.is_mapping(), self.guard());
+        if self.label_records != LABEL_RECORDS {
+            let text = format!(
+                "records begin after {} of the label; expected after {LABEL_RECORDS}",
+                self.label_records
+            );
+            self.complain_of_label(Reason::LabelKeyword, text);
+        }
+        for text in self.label.departures() {
+            self.complain_of_label(Reason::LabelKeyword, text);
+        }
+        let records = self.label_records as u64 + self.records().len() as u64;
         if let Some(stated) = self.label.file_records.filter(|stated| *stated != records) {
             let text = format!("the label states {stated} records; the file holds {records}");
             self.complain_of_label(Reason::RecordCount, text);
@@ -176,13 +203,13 @@ impl File {
     /// The complaint of bytes after the last whole record, if there are any.
     #[must_use]
     pub fn trailing_complaint(&self) -> Option<Complaint> {
-        let data = self.bytes.get(LABEL_BYTES..)?;
+        let data = self.bytes.get(self.label_bytes()..)?;
         let trailing = data.len() % RECORD_BYTES;
         (trailing > 0).then(|| {
             let text =
                 format!("{trailing} bytes after the last whole record of {RECORD_BYTES}; ignored");
             self.complaint(
-                Some(Self::record_number(self.records().len())),
+                Some(self.record_number(self.records().len())),
                 Reason::TrailingBytes,
                 text,
             )
@@ -193,7 +220,7 @@ impl File {
     #[must_use]
     pub fn record_complaint(&self, row: usize, error: &RecordError) -> Complaint {
         self.complaint(
-            Some(Self::record_number(row)),
+            Some(self.record_number(row)),
             error.reason(),
             error.to_string(),
         )
@@ -202,29 +229,37 @@ impl File {
     /// The data records, as many as the file's size has room for, whatever the label says.
     #[must_use]
     pub fn records(&self) -> &[Record] {
-        Record::slice_of(self.bytes.get(LABEL_BYTES..).unwrap_or_default())
+        Record::slice_of(self.bytes.get(self.label_bytes()..).unwrap_or_default())
     }
 
     /// Makes sure that the file holds at least one good record; a file of another kind holds none.
     ///
     /// # Errors
-    /// What is wrong with the label, else with the first record.
+    /// Of what kind the file is instead, what is wrong with the label, else with the first record.
     pub fn require_records(&self) -> Result<()> {
-        let guard = FieldGuard::new(self.label.software_version);
-        let mut frames = self.frames(0..self.records().len(), guard);
-        let first = frames.next();
-        if matches!(first, Some((_, Ok(_)))) || frames.any(|(_, frame)| frame.is_ok()) {
-            return Ok(());
-        }
-        let label = self.label_complaints.first();
-        let why = match (label, first) {
-            (Some(complaint), _) => complaint.text.clone(),
-            (None, Some((row, Err(error)))) => {
-                format!("record {}: {error}", Self::record_number(row))
+        /// Records that are judged at a time.
+        const STEP: usize = 1_024;
+        let (guard, rows) = (self.guard(), self.records().len());
+        let mut first = None;
+        for row in (0..rows).step_by(STEP) {
+            for (row, frame) in self.frames(row..row + STEP, guard) {
+                match frame {
+                    Ok(_) => return Ok(()),
+                    Err(error) => first = first.or(Some((row, error))),
+                }
             }
-            _ => format!("nothing of {RECORD_BYTES} bytes follows the label"),
+        }
+        let foreign = Foreign::of(&self.bytes, self.records().first());
+        let label = self.label_complaints.first();
+        let why = match (foreign, label, first) {
+            (Some(foreign), _, _) => foreign.to_string(),
+            (None, Some(complaint), _) => complaint.text.clone(),
+            (None, None, Some((row, error))) => {
+                format!("record {}: {error}", self.record_number(row))
+            }
+            (None, None, None) => format!("nothing of {RECORD_BYTES} bytes follows the label"),
         };
-        Err(NoGoodRecord { why }).in_file(&self.path)
+        Err(NoGoodRecord { why, foreign }).in_file(&self.path)
     }
 
     /// BLAKE3 of the file's bytes, hexadecimal.
@@ -233,68 +268,31 @@ impl File {
         blake3::hash(&self.bytes).to_hex().to_string()
     }
 
-    /// The frames of some rows, counted from 0, each with its row and decoded with its neighbours in
-    /// the file, or with the impossible value that spoils it. Rows that are not there are left out.
-    pub fn frames(
+    /// Rows that do not fit into the chronology of the file.
+    pub(super) fn misplaced(
         &self,
-        rows: Range<usize>,
-        guard: FieldGuard,
-    ) -> impl Iterator<Item = (usize, std::result::Result<Frame<'_>, RecordError>)> {
-        let end = rows.end.min(self.records().len());
-        (rows.start..end)
-            .zip(self.records().get(rows.start..end).unwrap_or_default())
-            .map(move |(row, record)| (row, self.frame(row, record, guard)))
-    }
-
-    fn frame<'a>(
-        &self,
-        row: usize,
-        record: &'a Record,
-        guard: FieldGuard,
-    ) -> std::result::Result<Frame<'a>, RecordError> {
-        record.check(self.is_mapping())?;
-        let time_s = |row: Option<usize>| Some(self.sound_record(row?)?.time_s.get());
-        let neighbours_s = [
-            time_s(row.checked_sub(2)),
-            time_s(row.checked_sub(1)),
-            time_s(Some(row)),
-            time_s(row.checked_add(1)),
-        ];
-        if out_of_order(neighbours_s) {
-            return Err(RecordError::Order(record.time_s.get()));
-        }
-        Ok(Frame::new(
-            record,
-            guard,
-            self.crossover_before_m(row, guard),
-        ))
-    }
-
-    /// Crossover residual of the frame before row `row`, metres.
-    ///
-    /// Before the first frame stands its next one mirrored, `x₁ − (x₂ − x₁)`, as in `pedr2tab`.
-    fn crossover_before_m(&self, row: usize, guard: FieldGuard) -> Option<f64> {
-        let residual_m = |row| guard.crossover_m(self.sound_record(row)?);
-        if row == 0 {
-            let first_m = residual_m(0)?;
-            return residual_m(1).map(|next_m| first_m - (next_m - first_m));
-        }
-        residual_m(row - 1)
-    }
-
-    /// The record in row `row`, when there is one without an impossible value.
-    fn sound_record(&self, row: usize) -> Option<&Record> {
-        let record = self.records().get(row)?;
-        record.check(self.is_mapping()).ok().map(|()| record)
+        find: impl FnOnce() -> BTreeMap<usize, Misplaced>,
+    ) -> &BTreeMap<usize, Misplaced> {
+        self.misplaced.get_or_init(find)
     }
 
     /// Number of the record in row `row` of the data, counted from 1 with the label records.
     #[must_use]
-    pub fn record_number(row: usize) -> u32 {
-        u32::try_from(row + LABEL_RECORDS + 1).unwrap_or(u32::MAX)
+    pub fn record_number(&self, row: usize) -> u32 {
+        u32::try_from(row + self.label_records + 1).unwrap_or(u32::MAX)
     }
 
-    fn is_mapping(&self) -> bool {
+    /// Bytes before the first data record.
+    const fn label_bytes(&self) -> usize {
+        self.label_records * RECORD_BYTES
+    }
+
+    fn guard(&self) -> FieldGuard {
+        FieldGuard::new(self.label.software_version)
+    }
+
+    /// Whether the file's name is one of the mapping phase.
+    pub(super) fn is_mapping(&self) -> bool {
         self.name.is_some_and(FileName::is_mapping)
     }
 }

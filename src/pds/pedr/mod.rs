@@ -5,22 +5,32 @@
 //! PEDR SIS 2.8 as far as its format files are public, and the MOLA team's reader `pedr2tab`.
 
 mod check;
+mod chronology;
 mod complaint;
+mod counts;
 mod encode;
+mod fault;
 mod file;
+mod foreign;
 mod frame;
 mod frame_values;
+mod judge;
 mod label;
+mod neighbours;
 mod record;
+mod shots;
 mod writer;
 
-pub use check::{Reason, RecordError};
 pub use complaint::Complaint;
+pub use counts::Counts;
+pub use fault::{Reason, RecordError};
 pub use file::File;
 pub use frame::{FieldGuard, Frame};
 pub use frame_values::{EncodeError, FrameValues};
 pub use label::{FileName, PedrLabel, decide_datum};
+pub use neighbours::Quantity;
 pub use record::{RECORD_BYTES, Record};
+pub use shots::SpoiledShots;
 pub use writer::{LabelInfo, PedrWriter};
 
 use crate::units::RADIANS_PER_DEGREE;
