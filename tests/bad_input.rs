@@ -265,6 +265,32 @@ const CASES: &[(&str, Spoil)] = &[
         case.replace("site.toml", "[87.5, 88.5]", "[10.0, 10.1]");
         case.run()
     }),
+    ("check_no_shot_in_the_window", |case| {
+        case.replace("site.toml", "[87.5, 88.5]", "[10.0, 10.1]");
+        case.check()
+    }),
+    ("check_spoiled_records", |case| {
+        let mut bytes = case.read("pedr/ap19117l.b");
+        for (record, byte) in [(100, 556), (200, 332), (300, 772)] {
+            bytes[7_760 + record * 776 + byte] ^= 0x40;
+        }
+        case.write("pedr/ap19117l.b", bytes);
+        case.check()
+    }),
+    ("a_link_of_the_glob_leads_nowhere", |case| {
+        std::os::unix::fs::symlink("gone.b", case.path("pedr/ap19999l.b")).unwrap();
+        case.run()
+    }),
+    ("pedr_is_compressed", |case| {
+        let mut bytes: Vec<u8> = case
+            .read("pedr/ap19117l.b")
+            .iter()
+            .map(|byte| byte ^ 0x5a)
+            .collect();
+        bytes[..4].copy_from_slice(&[0x1f, 0x8b, 8, 0]);
+        case.write("pedr/ap19117l.b", bytes);
+        case.run()
+    }),
     ("limit_broken", |case| {
         case.replace(
             "site.toml",

@@ -120,7 +120,7 @@ fn all_shots(paths: &[PathBuf]) -> Vec<(Row, [f64; 2], f64)> {
                 let direction = convert_datum::<MarsIau2000>(direction, datum, at, at);
                 let there = Spherical::from_xyz_m(&direction.xyz_m);
                 if shot.range_m > 0.0 {
-                    let record = File::record_number(row);
+                    let record = file.record_number(row);
                     let place = [there.longitude_rad, there.latitude.0];
                     shots.push(((index, record, shot.shot, Vec::new()), place, shot.et_tag_s));
                 }

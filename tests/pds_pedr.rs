@@ -21,8 +21,8 @@ fn values() -> FrameValues {
         time_s: -20_000_000.5,
         orbit: 9_019,
         clock_frequency_hz: 1e8,
-        spacecraft_longitude_rad: 0.5 * DEGREE,
-        spacecraft_longitude_change_rad: -2.0 * DEGREE,
+        spacecraft_longitude_rad: 0.05 * DEGREE,
+        spacecraft_longitude_change_rad: -0.2 * DEGREE,
         spacecraft_latitude_rad: 10.0 * DEGREE,
         spacecraft_latitude_change_rad: 0.2 * DEGREE,
         spacecraft_radius_m: 3_780_000.0,
@@ -126,8 +126,8 @@ fn shots_follow_the_rules_of_the_format() {
     assert_angle(last.longitude_rad, 0.009 - 2e-6);
     assert_angle(first.latitude_rad, 10.0 - 0.0475 + 5e-6);
     assert_angle(last.latitude_rad, 10.0 + 0.0475 + 5e-6);
-    assert_angle(first.spacecraft_longitude_rad, 0.5 + 0.95);
-    assert_angle(last.spacecraft_longitude_rad, 359.55);
+    assert_angle(first.spacecraft_longitude_rad, 0.05 + 0.095);
+    assert_angle(last.spacecraft_longitude_rad, 359.955);
     assert_angle(last.spacecraft_latitude_rad, 10.095);
     assert_metres(last.spacecraft_radius_m, 3_780_009.5);
     assert_metres(last.areoid_radius_m, 3_391_998.1);

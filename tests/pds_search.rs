@@ -120,7 +120,7 @@ fn brute_force(pedr: &PedrConfig, windows: &[WindowConfig]) -> Vec<(u16, u32, u8
                     }
                 }
                 if bits != 0 && keeps(&pedr.filter, &shot) {
-                    found.push((index, File::record_number(row), shot.shot, bits));
+                    found.push((index, file.record_number(row), shot.shot, bits));
                 }
             }
         }
@@ -326,7 +326,7 @@ fn damaged_records_are_complained_of_and_the_others_kept() {
     assert_eq!(result.complaint_counts[&Reason::TimeOrder], 1);
     assert_eq!(
         (
-            result.rejected[&ShotRejection::Radius],
+            result.rejected[&ShotRejection::Spoiled],
             result.rejected[&ShotRejection::Channel]
         ),
         (1, 18)

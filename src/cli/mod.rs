@@ -7,7 +7,6 @@ mod manual;
 mod nightly;
 mod output;
 mod pedr;
-mod pedr_index;
 mod plan;
 mod report;
 mod run;

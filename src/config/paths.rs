@@ -173,8 +173,22 @@ fn matches(folder: &Path, glob: &str) -> Result<Vec<PathBuf>, String> {
                 error.error()
             )
         })?;
-        if path.is_file() {
-            files.push(path);
+        match path.metadata() {
+            // A file that is passed over would be missed by nobody.
+            Ok(found) if found.is_file() => {
+                let readable = std::fs::File::open(&path);
+                let refused =
+                    |error| format!("files that can be read: {}: {error}", path.display());
+                readable.map_err(refused)?;
+                files.push(path);
+            }
+            Ok(_) => {}
+            Err(error) => {
+                return Err(format!(
+                    "files that are there: {} leads nowhere: {error}",
+                    path.display()
+                ));
+            }
         }
     }
     if files.is_empty() {

@@ -11,7 +11,7 @@ use super::{
 };
 use crate::{
     config::SiteConfig,
-    error::{Error, Locate, Result},
+    error::{Cause, Error, Kind, Locate, Result},
     files::{HashedFile, InputFiles},
     kernel_source::KernelSource,
     spice::RequiredCoverage,
@@ -69,6 +69,22 @@ pub fn rival_sets(config: &SiteConfig) -> Result<Vec<RivalSet>> {
     load_rivals(config, &InputFiles::default()).in_site(&config.site)
 }
 
+/// No shot would be found.
+#[derive(Debug, thiserror::Error)]
+#[error("no shot in any window: products would be invalid")]
+struct NoShot;
+
+impl Cause for NoShot {
+    fn kind(&self) -> Kind {
+        Kind::Validation
+    }
+
+    fn advice(&self) -> String {
+        "look at windows and pedr.filter, and whether pedr.files are of the site's orbits"
+            .to_owned()
+    }
+}
+
 struct Check<'a> {
     site: &'a str,
     files: InputFiles,
@@ -96,7 +112,9 @@ impl<'a> Check<'a> {
         let prepared = prepare(self, config)?;
         let searched = !config.pedr.files.is_empty() && self.checked.failures.is_empty();
         if searched && prepared.profiles.get().is_some_and(Vec::is_empty) {
-            self.tell("no shot in any window: products would be invalid");
+            // A run would make products and mark them invalid; a check that says ready would not be believed again.
+            let failure = Error::from(NoShot).in_site(&config.site);
+            self.checked.failures.push(failure);
         }
         if !config.ties.files.is_empty() {
             ties(self, config)?;

@@ -4,6 +4,7 @@ pub mod archive;
 pub mod label;
 pub mod moc;
 pub mod pedr;
+pub mod pedr_table;
 pub mod plane_tables;
 pub mod ties;
 

@@ -137,8 +137,12 @@ struct ProfileDocument<'a> {
     valid: bool,
     invalid_because: &'a [String],
     range_minus_distance_m: Summary,
+    /// Mean without outliers: the verdict goes by this one.
+    mean_without_outliers_m: f64,
     range_minus_distance_crossover_m: Summary,
     decoding_m: Summary,
+    /// Its mean without the same shots: the verdict goes by this one.
+    decoding_without_outliers_m: f64,
     spacecraft_radial_m: Summary,
     spacecraft_along_m: Summary,
     spacecraft_cross_m: Summary,
@@ -343,8 +347,10 @@ fn profile_document<'a>(
         valid: ranges.invalid_because.is_empty(),
         invalid_because: &ranges.invalid_because,
         range_minus_distance_m: ranges.range_minus_distance_m,
+        mean_without_outliers_m: ranges.mean_without_outliers_m,
         range_minus_distance_crossover_m: ranges.range_minus_distance_crossover_m,
         decoding_m: ranges.decoding_m,
+        decoding_without_outliers_m: ranges.decoding_without_outliers_m,
         spacecraft_radial_m: radial,
         spacecraft_along_m: along,
         spacecraft_cross_m: cross,

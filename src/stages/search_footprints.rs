@@ -102,6 +102,7 @@ impl Input for KnownPlaces<'_> {
 
 impl Stage for SearchFootprints<'_> {
     const NAME: &'static str = STAGE;
+    const METHOD: u32 = 2;
     const CHECKED: bool = true;
     type Output = SearchResult;
     stage_inputs!(fingerprint);
@@ -118,12 +119,32 @@ impl Stage for SearchFootprints<'_> {
         )
     }
 
+    fn findings(&self, result: &SearchResult) -> Vec<String> {
+        left_out(result)
+    }
+
     fn examine(&self) -> Vec<Result<String>> {
         let files = self.pedr.files.iter();
         files
             .map(|path| examine_file(path, self.pedr.datum))
             .collect()
     }
+}
+
+/// The findings of a search: what was left out, in numbers and with the first example.
+fn left_out(result: &SearchResult) -> Vec<String> {
+    let bad: u64 = result.complaint_counts.values().sum();
+    let first = result.complaints.first();
+    let first = first.map(|complaint| {
+        format!(
+            "{bad} complaint{} of PEDR files, the first: {complaint}",
+            if bad == 1 { "" } else { "s" }
+        )
+    });
+    let spoiled = result.rejected.get(&ShotRejection::Spoiled);
+    let spoiled =
+        spoiled.map(|shots| format!("{shots} shots in the windows left out for spoiled values"));
+    first.into_iter().chain(spoiled).collect()
 }
 
 /// What can be said of a PEDR file without searching it.

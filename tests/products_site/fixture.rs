@@ -472,6 +472,8 @@ fn ranges(profiles: &[Profile]) -> RangeCheck {
                 range_minus_distance_crossover_m: summary,
                 decoding_m: Summary::of(&shots.decoding_m),
                 spacecraft_m: [summary; 3],
+                mean_without_outliers_m: -2.0,
+                decoding_without_outliers_m: 0.001,
                 trend_m_s: Some(Trend {
                     slope: 0.01,
                     uncertainty: 0.002,

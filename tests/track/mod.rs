@@ -4,6 +4,7 @@ use std::{ops::Range, path::Path};
 
 use areograph::{
     frames::MarsDatum,
+    geom::ellipsoid::spherical_to_xyz_m,
     pds::pedr::{FrameValues, LabelInfo, PedrWriter, Record},
     units::wrap_pi,
 };
@@ -21,6 +22,11 @@ fn ground(time_s: f64) -> [f64; 2] {
     [node_rad - 7.088e-5 * time_s, latitude_rad]
 }
 
+/// An areoid as flat as Mars.
+fn areoid_radius_m(latitude_rad: f64) -> f64 {
+    3.396e6 - 2e4 * latitude_rad.sin().powi(2)
+}
+
 fn frame(number: u32) -> FrameValues {
     let time_s = 2.0 * f64::from(number);
     let [before, mid, after] = [time_s - 1.0, time_s, time_s + 1.0].map(ground);
@@ -36,7 +42,8 @@ fn frame(number: u32) -> FrameValues {
         parallax_latitude_rad_per_m: 8e-9,
         parallax_longitude_rad_per_m: -2e-9,
         mid_radius_m: 3.39e6,
-        areoid_radius_m: 3.392e6,
+        areoid_radius_m: areoid_radius_m(mid[1]),
+        areoid_radius_change_m: areoid_radius_m(after[1]) - areoid_radius_m(before[1]),
         shot_radius_m: std::array::from_fn(|shot| {
             3.38e6 + 1e3 * ((number as usize + shot * 7) % 31) as f64
         }),
@@ -49,6 +56,7 @@ fn frame(number: u32) -> FrameValues {
         attitude_flag: if number.is_multiple_of(11) { 3 } else { 0 },
         ..FrameValues::default()
     };
+    look_along_the_parallax(&mut values);
     for shot in 0..20 {
         match (number as usize + shot) % 17 {
             0 => values.range_m[shot] = 0.0,
@@ -58,6 +66,34 @@ fn frame(number: u32) -> FrameValues {
         }
     }
     values
+}
+
+/// Puts the spacecraft where the beam comes from that the parallax tells, and the ranges that belong to it.
+fn look_along_the_parallax(values: &mut FrameValues) {
+    let height_m = values.spacecraft_radius_m - values.mid_radius_m;
+    values.spacecraft_longitude_rad =
+        values.ground_longitude_rad + height_m * values.parallax_longitude_rad_per_m;
+    values.spacecraft_latitude_rad =
+        values.ground_latitude_rad + height_m * values.parallax_latitude_rad_per_m;
+    values.spacecraft_longitude_change_rad = values.ground_longitude_change_rad;
+    values.spacecraft_latitude_change_rad = values.ground_latitude_change_rad;
+    for shot in 0..20 {
+        let x = (shot as f64 - 9.5) / 20.0;
+        let longitude_rad = values.ground_longitude_rad + x * values.ground_longitude_change_rad;
+        let latitude_rad = values.ground_latitude_rad + x * values.ground_latitude_change_rad;
+        let relief_m = values.shot_radius_m[shot] - values.mid_radius_m;
+        let ground_m = spherical_to_xyz_m(
+            longitude_rad + relief_m * values.parallax_longitude_rad_per_m,
+            latitude_rad + relief_m * values.parallax_latitude_rad_per_m,
+            values.shot_radius_m[shot],
+        );
+        let spacecraft_m = spherical_to_xyz_m(
+            longitude_rad + height_m * values.parallax_longitude_rad_per_m,
+            latitude_rad + height_m * values.parallax_latitude_rad_per_m,
+            values.spacecraft_radius_m,
+        );
+        values.range_m[shot] = (spacecraft_m - ground_m).norm();
+    }
 }
 
 /// Half of the frames, from number `first` on.

@@ -15,8 +15,8 @@ use crate::{
 pub enum ShotRejection {
     /// No laser return.
     NoReturn,
-    /// An impossible radius.
-    Radius,
+    /// A radius, range or parallax that contradicts the record's other values.
+    Spoiled,
     /// Classification not accepted.
     Class,
     /// Trigger channel not accepted.
@@ -31,7 +31,7 @@ impl fmt::Display for ShotRejection {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         formatter.write_str(match self {
             Self::NoReturn => "no return",
-            Self::Radius => "impossible radius",
+            Self::Spoiled => "spoiled values",
             Self::Class => "class",
             Self::Channel => "channel",
             Self::Attitude => "attitude flag",

@@ -67,9 +67,9 @@ fn judge(stretch: &Stretch, rows: Range<usize>, guard: FieldGuard) -> Vec<(Block
     let starts: Vec<usize> = rows.clone().step_by(BLOCK_RECORDS).collect();
     let block = |start: usize| {
         let rows = start..rows.end.min(start + BLOCK_RECORDS);
-        let complaints = rows
-            .clone()
-            .filter_map(|row| stretch.judged(row, guard).1)
+        let complaints = stretch
+            .frames(rows.clone(), guard)
+            .filter_map(|(row, frame)| Some(stretch.complaint(row, &frame.err()?)))
             .collect();
         (
             Block::of(stretch.records(rows).map(|(_, record)| record)),

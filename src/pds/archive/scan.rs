@@ -10,7 +10,7 @@ use crate::{
         ellipsoid::{Spherical, spherical_to_xyz_m},
         mars_rotation::convert_datum,
     },
-    pds::pedr::{File, Frame, SHOTS, Stretch},
+    pds::pedr::{Frame, SHOTS, SpoiledShots, Stretch},
     time::Et,
 };
 
@@ -35,29 +35,49 @@ impl Scan<'_> {
         let mut windows = Windows::default();
         let datum = self.source.datum();
         let complaints_known = self.source.complaints_known(self.query);
-        for (row, record) in stretch.records(rows) {
-            let mid = record.mid_point();
-            let matters = self.query.may_matter(&mid, record.time_s.get(), datum);
-            if !matters && (self.query.judged == Judged::Near || complaints_known) {
-                continue;
-            }
-            let (frame, complaint) = stretch.judged(row, self.source.guard());
-            if let Some(complaint) = complaint.filter(|_| !complaints_known) {
-                found.complain(complaint);
-            }
-            if let Some(frame) = frame.filter(|_| matters) {
-                self.frame(row, &frame, &mut windows, found);
+        let judges_all = self.query.judged == Judged::All && !complaints_known;
+        let matters: Vec<bool> = stretch
+            .records(rows.clone())
+            .map(|(_, record)| {
+                let mid = record.mid_point();
+                (self.query).may_matter(&mid, record.time_s.get(), datum)
+            })
+            .collect();
+        let first = rows.start;
+        for run in runs(&matters, judges_all) {
+            let rows = first + run.start..first + run.end;
+            for (row, frame) in stretch.frames(rows, self.source.guard()) {
+                match frame {
+                    Ok(frame) if matters[row - first] => {
+                        self.frame(stretch, row, &frame, &mut windows, found);
+                    }
+                    Err(error) if !complaints_known => {
+                        found.complain(stretch.complaint(row, &error))
+                    }
+                    Ok(_) | Err(_) => {}
+                }
             }
         }
     }
 
-    fn frame(&self, row: usize, frame: &Frame<'_>, windows: &mut Windows, found: &mut Found) {
+    fn frame(
+        &self,
+        stretch: &Stretch,
+        row: usize,
+        frame: &Frame<'_>,
+        windows: &mut Windows,
+        found: &mut Found,
+    ) {
         let (longitude_rad, latitude_rad) = frame.mid_point();
         let margin_rad = frame.reach_rad() + Query::margin_rad(self.source.datum());
         let grid = &self.query.windows;
         grid.within(longitude_rad, latitude_rad, margin_rad, &mut windows.near);
         if windows.near.is_empty() {
             return;
+        }
+        let spoiled = frame.spoiled_shots();
+        if let Some(error) = spoiled.error() {
+            found.complain(stretch.complaint(row, error));
         }
         for shot in (1..).take(SHOTS).filter_map(|shot| frame.shot(shot)) {
             found.shots_read += 1;
@@ -73,14 +93,14 @@ impl Scan<'_> {
             if windows.around.is_empty() {
                 continue;
             }
-            if let Some(reason) = self.reject(&shot, frame) {
+            if let Some(reason) = self.reject(&shot, &spoiled) {
                 *found.rejected.entry(reason).or_default() += 1;
                 continue;
             }
             let shot = Footprint {
                 et_s,
                 file: self.index,
-                record: File::record_number(row),
+                record: stretch.record_number(row),
                 ..shot
             };
             found.push(&shot, &windows.around);
@@ -100,15 +120,11 @@ impl Scan<'_> {
         (spherical.longitude_rad, spherical.latitude.0)
     }
 
-    fn reject(&self, shot: &Footprint, frame: &Frame<'_>) -> Option<ShotRejection> {
+    fn reject(&self, shot: &Footprint, spoiled: &SpoiledShots) -> Option<ShotRejection> {
         let filter = self.query.filter;
-        let shot_index = usize::from(shot.shot) - 1;
         let tests = [
             (ShotRejection::NoReturn, shot.range_m > 0.0),
-            (
-                ShotRejection::Radius,
-                frame.record().radius_is_possible(shot_index),
-            ),
+            (ShotRejection::Spoiled, !spoiled.contains(shot.shot)),
             (ShotRejection::Class, filter.classes.contains(&shot.class)),
             (
                 ShotRejection::Channel,
@@ -127,4 +143,20 @@ impl Scan<'_> {
             .into_iter()
             .find_map(|(reason, passed)| (!passed).then_some(reason))
     }
+}
+
+/// Successive rows, counted from the first, that are to be judged.
+fn runs(matters: &[bool], judges_all: bool) -> Vec<Range<usize>> {
+    if judges_all {
+        return vec![0..matters.len()];
+    }
+    let mut start = 0;
+    let mut runs = Vec::new();
+    for run in matters.chunk_by(|before, after| before == after) {
+        if run[0] {
+            runs.push(start..start + run.len());
+        }
+        start += run.len();
+    }
+    runs
 }

@@ -95,6 +95,9 @@ impl Source {
     pub(super) fn reopen(&self) -> Result<Reader> {
         let reader = Reader::open(&self.path)?;
         reader.require_identity(&self.identity)?;
+        if (self.indexed.as_ref()).is_some_and(|indexed| indexed.has_blocks(self.records)) {
+            reader.set_in_order();
+        }
         Ok(reader)
     }
 

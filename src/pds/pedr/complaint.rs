@@ -23,7 +23,7 @@ impl Complaint {
     /// Whether it depends on more records than the few around it, so that a stretch of the file cannot tell.
     #[must_use]
     pub const fn is_of_many_records(&self) -> bool {
-        matches!(self.reason, Reason::TimeOrder)
+        matches!(self.reason, Reason::TimeOrder | Reason::Repeated)
     }
 }
 

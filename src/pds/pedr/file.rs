@@ -1,15 +1,19 @@
 //! A PEDR file: its label, its records, and what is wrong with it.
 
 use std::{
+    collections::BTreeMap,
     fs,
     io::Read as _,
     ops::Range,
     path::{Path, PathBuf},
+    sync::{Arc, OnceLock},
 };
 
 use super::{
-    Complaint, FieldGuard, FileName, Frame, LABEL_BYTES, LABEL_RECORDS, PedrLabel, RECORD_BYTES,
-    Reason, Record, RecordError, check::out_of_order,
+    Complaint, FieldGuard, FileName, LABEL_BYTES, LABEL_RECORDS, PedrLabel, RECORD_BYTES, Reason,
+    Record, RecordError,
+    chronology::{Misplaced, in_order, misplaced},
+    foreign::{Foreign, label_records},
 };
 use crate::{
     error::{Cause, Error, IoError, Kind, Locate, Result},
@@ -24,10 +28,30 @@ pub struct File {
     bytes: Vec<u8>,
     /// Bytes that the whole file has.
     length: u64,
+    /// Row of the file that is the first in memory.
+    first_row: usize,
     name: Option<FileName>,
     label: PedrLabel,
+    /// Records that the label takes.
+    label_records: usize,
     label_complaints: Vec<Complaint>,
+    /// Rows that do not fit into the chronology of the whole file.
+    misplaced: OnceLock<Chronology>,
 }
+
+/// A bad record, and what is wrong with it.
+#[derive(Debug)]
+pub(super) struct Bad {
+    row: usize,
+    record: Record,
+    error: RecordError,
+}
+
+/// Records that are judged at a time.
+const STEP: usize = 1_024;
+
+/// Rows of a file that do not fit into its chronology.
+pub(super) type Chronology = Arc<BTreeMap<usize, Misplaced>>;
 
 /// The path names something that cannot hold records.
 #[derive(Debug, thiserror::Error)]
@@ -49,6 +73,7 @@ impl Cause for NotAFile {
 #[error("no good record: {why}")]
 struct NoGoodRecord {
     why: String,
+    foreign: Option<Foreign>,
 }
 
 impl Cause for NoGoodRecord {
@@ -57,7 +82,12 @@ impl Cause for NoGoodRecord {
     }
 
     fn advice(&self) -> String {
-        "fetch the file again if it is a PEDR file (AP#####v.B), else leave it out".to_owned()
+        self.foreign
+            .map_or(
+                "fetch the file again if it is a PEDR file (AP#####v.B), else leave it out",
+                Foreign::advice,
+            )
+            .to_owned()
     }
 }
 
@@ -103,29 +133,41 @@ impl File {
             path,
             bytes,
             length,
+            first_row: 0,
             label: PedrLabel::default(),
+            label_records: LABEL_RECORDS,
             label_complaints: Vec::new(),
+            misplaced: OnceLock::new(),
         };
         file.read_label();
         file
     }
 
-    /// The same file with other records in memory: `bytes` holds them after as many bytes as the label has.
-    pub(super) fn with_records(&self, bytes: Vec<u8>) -> Self {
+    /// The same file with the records from row `first_row` on in memory: `bytes` holds them after as many bytes as the
+    /// label has. What does not fit into the chronology is told by the records in memory, unless `misplaced` says it.
+    pub(super) fn with_records(
+        &self,
+        first_row: usize,
+        bytes: Vec<u8>,
+        misplaced: Option<Chronology>,
+    ) -> Self {
         Self {
             path: self.path.clone(),
             bytes,
             length: self.length,
+            first_row,
             name: self.name,
             label: self.label.clone(),
+            label_records: self.label_records,
             label_complaints: Vec::new(),
+            misplaced: misplaced.map_or_else(OnceLock::new, OnceLock::from),
         }
     }
 
     /// The bytes of the label, as many as the file has of them.
     #[must_use]
     pub fn label_bytes(&self) -> &[u8] {
-        &self.bytes[..self.bytes.len().min(LABEL_BYTES)]
+        &self.bytes[..self.bytes.len().min(self.label_length())]
     }
 
     /// The memory of the file.
@@ -145,7 +187,19 @@ impl File {
             Ok(label) => self.label = label,
             Err(error) => self.complain_of_label(Reason::UnreadableLabel, error.to_string()),
         }
-        let records = (LABEL_RECORDS + self.record_count()) as u64;
+        let stated = self.label.label_records;
+        self.label_records = label_records(&self.bytes, stated, self.is_mapping(), self.guard());
+        if self.label_records != LABEL_RECORDS {
+            let text = format!(
+                "records begin after {} of the label; expected after {LABEL_RECORDS}",
+                self.label_records
+            );
+            self.complain_of_label(Reason::LabelKeyword, text);
+        }
+        for text in self.label.departures() {
+            self.complain_of_label(Reason::LabelKeyword, text);
+        }
+        let records = (self.label_records + self.record_count()) as u64;
         if let Some(stated) = self.label.file_records.filter(|stated| *stated != records) {
             let text = format!("the label states {stated} records; the file holds {records}");
             self.complain_of_label(Reason::RecordCount, text);
@@ -193,20 +247,20 @@ impl File {
     /// Data records of the whole file, as many as its size has room for, whatever the label says.
     #[must_use]
     pub fn record_count(&self) -> usize {
-        let data = self.length.saturating_sub(LABEL_BYTES as u64);
+        let data = self.length.saturating_sub(self.label_length() as u64);
         usize::try_from(data / RECORD_BYTES as u64).unwrap_or(usize::MAX)
     }
 
     /// The complaint of bytes after the last whole record, if there are any.
     #[must_use]
     pub fn trailing_complaint(&self) -> Option<Complaint> {
-        let data = self.length.checked_sub(LABEL_BYTES as u64)?;
+        let data = self.length.checked_sub(self.label_length() as u64)?;
         let trailing = data % RECORD_BYTES as u64;
         (trailing > 0).then(|| {
             let text =
                 format!("{trailing} bytes after the last whole record of {RECORD_BYTES}; ignored");
             self.complaint(
-                Some(Self::record_number(self.record_count())),
+                Some(self.record_number(self.record_count())),
                 Reason::TrailingBytes,
                 text,
             )
@@ -217,7 +271,7 @@ impl File {
     #[must_use]
     pub fn record_complaint(&self, row: usize, error: &RecordError) -> Complaint {
         self.complaint(
-            Some(Self::record_number(row)),
+            Some(self.record_number(row)),
             error.reason(),
             error.to_string(),
         )
@@ -226,35 +280,62 @@ impl File {
     /// The data records in memory, as many as there is room for, whatever the label says.
     #[must_use]
     pub fn records(&self) -> &[Record] {
-        Record::slice_of(self.bytes.get(LABEL_BYTES..).unwrap_or_default())
+        Record::slice_of(self.bytes.get(self.label_length()..).unwrap_or_default())
     }
 
-    /// Makes sure that the file holds at least one good record; a file of another kind holds none.
+    /// The rows of the file that are in memory.
+    #[must_use]
+    pub fn rows(&self) -> Range<usize> {
+        self.first_row..self.first_row + self.records().len()
+    }
+
+    /// The record in a row that is in memory.
+    pub(super) fn record(&self, row: usize) -> &Record {
+        &self.records()[row - self.first_row]
+    }
+
+    /// Makes sure that there is at least one good record in memory; a file of another kind holds none.
     ///
     /// # Errors
-    /// What is wrong with the label, else with the first record.
+    /// Of what kind the file is instead, what is wrong with the label, else with the first record.
     pub fn require_records(&self) -> Result<()> {
-        let guard = FieldGuard::new(self.label.software_version);
-        let mut frames = self.frames(0..self.records().len(), guard);
-        let first = frames.next();
-        if matches!(first, Some((_, Ok(_)))) || frames.any(|(_, frame)| frame.is_ok()) {
-            return Ok(());
+        let mut first = None;
+        for row in self.rows().step_by(STEP) {
+            if self.has_good_record(row..row + STEP, &mut first) {
+                return Ok(());
+            }
         }
-        let first = first.and_then(|(row, frame)| Some((row, frame.err()?)));
         Err(self.no_good_record(first))
     }
 
-    /// The failure of a file without a good record, of which this is the first.
-    pub(super) fn no_good_record(&self, first: Option<(usize, RecordError)>) -> Error {
-        let label = self.label_complaints.first();
-        let why = match (label, first) {
-            (Some(complaint), _) => complaint.text.clone(),
-            (None, Some((row, error))) => {
-                format!("record {}: {error}", Self::record_number(row))
+    /// Whether one of these rows is a good record; if not, `first` is the first bad one of all that were looked at.
+    pub(super) fn has_good_record(&self, rows: Range<usize>, first: &mut Option<Bad>) -> bool {
+        self.frames(rows, self.guard()).any(|(row, frame)| {
+            if let Err(error) = &frame {
+                first.get_or_insert_with(|| Bad {
+                    row,
+                    record: Record::from_bytes(&self.record(row).to_bytes()),
+                    error: *error,
+                });
             }
-            (None, None) => format!("nothing of {RECORD_BYTES} bytes follows the label"),
+            frame.is_ok()
+        })
+    }
+
+    /// The failure of a file without a good record, of which this is the first, with what is wrong with it.
+    pub(super) fn no_good_record(&self, first: Option<Bad>) -> Error {
+        let record = first.as_ref().map(|bad| &bad.record);
+        let foreign = Foreign::of(&self.bytes, record);
+        let label = self.label_complaints.first();
+        let why = match (foreign, label, first) {
+            (Some(foreign), _, _) => foreign.to_string(),
+            (None, Some(complaint), _) => complaint.text.clone(),
+            (None, None, Some(bad)) => {
+                format!("record {}: {}", self.record_number(bad.row), bad.error)
+            }
+            (None, None, None) => format!("nothing of {RECORD_BYTES} bytes follows the label"),
         };
-        Error::from(NoGoodRecord { why }).in_file(&self.path)
+        Error::from(NoGoodRecord { why, foreign }).in_file(&self.path)
     }
 
     /// BLAKE3 of the file's bytes, hexadecimal.
@@ -263,68 +344,36 @@ impl File {
         blake3::hash(&self.bytes).to_hex().to_string()
     }
 
-    /// The frames of some rows, counted from 0, each with its row and decoded with its neighbours in
-    /// the file, or with the impossible value that spoils it. Rows that are not there are left out.
-    pub fn frames(
-        &self,
-        rows: Range<usize>,
-        guard: FieldGuard,
-    ) -> impl Iterator<Item = (usize, std::result::Result<Frame<'_>, RecordError>)> {
-        let end = rows.end.min(self.records().len());
-        (rows.start..end)
-            .zip(self.records().get(rows.start..end).unwrap_or_default())
-            .map(move |(row, record)| (row, self.frame(row, record, guard)))
-    }
-
-    fn frame<'a>(
-        &self,
-        row: usize,
-        record: &'a Record,
-        guard: FieldGuard,
-    ) -> std::result::Result<Frame<'a>, RecordError> {
-        record.check(self.is_mapping())?;
-        let time_s = |row: Option<usize>| Some(self.sound_record(row?)?.time_s.get());
-        let neighbours_s = [
-            time_s(row.checked_sub(2)),
-            time_s(row.checked_sub(1)),
-            time_s(Some(row)),
-            time_s(row.checked_add(1)),
-        ];
-        if out_of_order(neighbours_s) {
-            return Err(RecordError::Order(record.time_s.get()));
-        }
-        Ok(Frame::new(
-            record,
-            guard,
-            self.crossover_before_m(row, guard),
-        ))
-    }
-
-    /// Crossover residual of the frame before row `row`, metres.
-    ///
-    /// Before the first frame stands its next one mirrored, `x₁ − (x₂ − x₁)`, as in `pedr2tab`.
-    fn crossover_before_m(&self, row: usize, guard: FieldGuard) -> Option<f64> {
-        let residual_m = |row| guard.crossover_m(self.sound_record(row)?);
-        if row == 0 {
-            let first_m = residual_m(0)?;
-            return residual_m(1).map(|next_m| first_m - (next_m - first_m));
-        }
-        residual_m(row - 1)
-    }
-
-    /// The record in row `row`, when there is one without an impossible value.
-    fn sound_record(&self, row: usize) -> Option<&Record> {
-        let record = self.records().get(row)?;
-        record.check(self.is_mapping()).ok().map(|()| record)
+    /// Rows that do not fit into the chronology of the file.
+    pub(super) fn misplaced(&self) -> &BTreeMap<usize, Misplaced> {
+        self.misplaced.get_or_init(|| {
+            // Told faster, and true of nearly every file.
+            if in_order(self.records().iter().map(|record| record.time_s.get())) {
+                return Chronology::default();
+            }
+            let times_s: Vec<Option<f64>> = self.sound_times().collect();
+            Arc::new(misplaced(&times_s))
+        })
     }
 
     /// Number of the record in row `row` of the data, counted from 1 with the label records.
     #[must_use]
-    pub fn record_number(row: usize) -> u32 {
-        u32::try_from(row + LABEL_RECORDS + 1).unwrap_or(u32::MAX)
+    pub fn record_number(&self, row: usize) -> u32 {
+        u32::try_from(row + self.label_records + 1).unwrap_or(u32::MAX)
     }
 
-    fn is_mapping(&self) -> bool {
+    /// Bytes before the first data record.
+    pub(super) const fn label_length(&self) -> usize {
+        self.label_records * RECORD_BYTES
+    }
+
+    /// Which fields the file's software wrote.
+    pub(super) fn guard(&self) -> FieldGuard {
+        FieldGuard::new(self.label.software_version)
+    }
+
+    /// Whether the file's name is one of the mapping phase.
+    pub(super) fn is_mapping(&self) -> bool {
         self.name.is_some_and(FileName::is_mapping)
     }
 }

@@ -34,7 +34,9 @@ impl FieldGuard {
         }
     }
 
-    fn parallax_holds(self, record: &Record) -> bool {
+    /// Whether the record has parallax.
+    #[must_use]
+    pub fn parallax_holds(self, record: &Record) -> bool {
         record.orbit_quality.get() >= if self.version <= 7.0 { 3 } else { 2 }
     }
 
@@ -73,6 +75,7 @@ pub struct Frame<'a> {
     longitude: Linear,
     latitude: Linear,
     mid_radius_m: f64,
+    has_parallax: bool,
     parallax_longitude_rad_per_m: f64,
     parallax_latitude_rad_per_m: f64,
     crossover: Linear,
@@ -81,8 +84,10 @@ pub struct Frame<'a> {
 impl<'a> Frame<'a> {
     /// The frame of a record that passed its checks.
     ///
-    /// * `crossover_before_m` – residual of the previous frame of the file, metres; for the first frame
-    ///   that of the mirrored next one; `None` when there is none, which takes the residual as constant
+    /// A frame without a residual is not corrected at all, whatever stands before it.
+    ///
+    /// * `crossover_before_m` – residual of the frame before, metres; for the first frame of a file that of the
+    ///   mirrored next one; `None` when there is none, which takes the residual as constant
     #[must_use]
     pub fn new(record: &'a Record, guard: FieldGuard, crossover_before_m: Option<f64>) -> Self {
         let parallax = |field: I32| {
@@ -92,7 +97,8 @@ impl<'a> Frame<'a> {
                 0.0
             }
         };
-        let crossover_m = guard.crossover_m(record).unwrap_or(0.0);
+        let crossover_m = guard.crossover_m(record);
+        let before_m = crossover_m.and(crossover_before_m).or(crossover_m);
         Self {
             record,
             time_s: record.time_s.get(),
@@ -106,11 +112,12 @@ impl<'a> Frame<'a> {
                 change: radians(record.ground_latitude_change_microdegrees),
             },
             mid_radius_m: metres(record.mid_radius_cm),
+            has_parallax: guard.parallax_holds(record),
             parallax_longitude_rad_per_m: parallax(record.parallax_longitude_nanodegrees_per_m),
             parallax_latitude_rad_per_m: parallax(record.parallax_latitude_nanodegrees_per_m),
             crossover: Linear {
-                mid: crossover_m,
-                change: crossover_m - crossover_before_m.unwrap_or(crossover_m),
+                mid: crossover_m.unwrap_or(0.0),
+                change: crossover_m.unwrap_or(0.0) - before_m.unwrap_or(0.0),
             },
         }
     }
@@ -125,6 +132,21 @@ impl<'a> Frame<'a> {
     #[must_use]
     pub const fn mid_point(&self) -> (f64, f64) {
         (self.longitude.mid, self.latitude.mid)
+    }
+
+    /// Change of the crossover residual over the frame, metres.
+    #[must_use]
+    pub const fn crossover_change_m(&self) -> f64 {
+        self.crossover.change
+    }
+
+    /// Change of longitude and latitude with radius, radians per metre; `None` in records that lack it.
+    pub(super) fn parallax_rad_per_m(&self) -> Option<[f64; 2]> {
+        let parallax = [
+            self.parallax_longitude_rad_per_m,
+            self.parallax_latitude_rad_per_m,
+        ];
+        self.has_parallax.then_some(parallax)
     }
 
     /// No shot lies farther from the mid-point than this, radians of great circle.

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::{LABEL_BYTES, RECORD_BYTES};
+use super::{LABEL_BYTES, LABEL_RECORDS, RECORD_BYTES};
 use crate::{
     altimetry::DatumChoice,
     error::{Cause, Kind},
@@ -58,7 +58,18 @@ pub struct PedrLabel {
     pub datum: Option<MarsDatum>,
     /// Records of the file with those of the label; the archive often writes `UNK`.
     pub file_records: Option<u64>,
+    /// Records that the label says it takes.
+    pub label_records: Option<usize>,
+    /// What it says of the form of records: `RECORD_TYPE` and `RECORD_BYTES`.
+    record_form: [Option<String>; 2],
+    /// Whether it begins with the marker of the archive's files.
+    has_marker: bool,
 }
+
+/// With these bytes every PEDR begins.
+const MARKER: &[u8] = b"CCSD3ZF0";
+/// So the data set of every PEDR begins.
+const DATA_SET: &str = "MGS-M-MOLA-3-PEDR-L1A";
 
 impl PedrLabel {
     /// The label at the start of a file's bytes.
@@ -75,7 +86,51 @@ impl PedrLabel {
             data_set_id: text("DATA_SET_ID"),
             datum: named_datum(&label),
             file_records: text("FILE_RECORDS").and_then(|records| records.parse().ok()),
+            label_records: text("LABEL_RECORDS").and_then(|records| records.parse().ok()),
+            record_form: [text("RECORD_TYPE"), text("RECORD_BYTES")],
+            has_marker: bytes.starts_with(MARKER),
         })
+    }
+
+    /// Whether the file begins with the marker of the archive's files.
+    #[must_use]
+    pub const fn has_marker(&self) -> bool {
+        self.has_marker
+    }
+
+    /// What the label of a PEDR would say otherwise, one sentence each; nothing of a label that says nothing at all.
+    pub(super) fn departures(&self) -> Vec<String> {
+        if *self == Self::default() {
+            return Vec::new();
+        }
+        let marker = || {
+            let expected = String::from_utf8_lossy(MARKER);
+            format!("the label does not begin with {expected}, as the archive's files do")
+        };
+        let mut found: Vec<String> = (!self.has_marker).then(marker).into_iter().collect();
+        let label_records = self.label_records.map(|records| records.to_string());
+        let [record_type, record_bytes] = &self.record_form;
+        let expected_bytes = RECORD_BYTES.to_string();
+        for (key, said, expected) in [
+            ("RECORD_TYPE", record_type, "FIXED_LENGTH"),
+            ("RECORD_BYTES", record_bytes, &expected_bytes),
+            ("LABEL_RECORDS", &label_records, &LABEL_RECORDS.to_string()),
+        ] {
+            match said {
+                Some(said) if said == expected => {}
+                Some(said) => {
+                    found.push(format!("{key} of the label is {said}; expected {expected}"))
+                }
+                None => found.push(format!("the label has no {key}; expected {expected}")),
+            }
+        }
+        let data_set = self.data_set_id.as_deref().unwrap_or("not given");
+        if !data_set.starts_with(DATA_SET) {
+            found.push(format!(
+                "DATA_SET_ID of the label is {data_set}; expected {DATA_SET}-..., as every PEDR has it"
+            ));
+        }
+        found
     }
 }
 

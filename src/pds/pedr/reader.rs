@@ -9,6 +9,7 @@ use std::{
     ops::Range,
     os::unix::fs::{FileExt as _, MetadataExt as _},
     path::Path,
+    sync::{Arc, OnceLock},
     thread,
     time::{Duration, SystemTime},
 };
@@ -17,20 +18,23 @@ use rayon::prelude::*;
 use rustix::fs::Advice;
 use zerocopy::IntoBytes as _;
 
-use super::{Complaint, FieldGuard, File, Frame, LABEL_BYTES, RECORD_BYTES, Record, RecordError};
+use super::{
+    Complaint, FieldGuard, File, Frame, LABEL_BYTES, RECORD_BYTES, Record, RecordError,
+    chronology::misplaced, file::Chronology, neighbours::NEIGHBOURS,
+};
 use crate::{
     error::{Cause, IoError, Kind, Locate, Result},
     files::Identity,
 };
 
-/// Records that are read on either side of a stretch: a record is judged with its neighbours.
-const NEIGHBOURS: usize = 4;
 /// Records among which the first good one is looked for.
 const FIRST_RECORDS: usize = 16;
 const NEXT_RECORDS: usize = 1_024;
 /// How long a file is waited for that was written just now, and how often.
 const WAIT: Duration = Duration::from_millis(100);
 const WAITS: usize = 30;
+/// Records whose times are read at once.
+const CHRONOLOGY_RECORDS: usize = 1 << 14;
 /// Bytes that a thread reads at once.
 const READ_BYTES: usize = 1 << 20;
 
@@ -40,15 +44,15 @@ pub struct Reader {
     handle: fs::File,
     identity: Identity,
     head: File,
+    /// What does not fit into the chronology of the file, once it is known.
+    misplaced: OnceLock<Chronology>,
 }
 
 /// Some successive records of a file, with neighbours to judge them by.
 #[derive(Debug)]
 pub struct Stretch {
     file: File,
-    /// Row of the file that is the first in memory.
-    first_row: usize,
-    /// Rows in memory that the stretch is about.
+    /// Rows that the stretch is about; neighbours of them are in memory as well.
     inner: Range<usize>,
 }
 
@@ -91,6 +95,7 @@ impl Reader {
             handle,
             identity,
             head: File::of_length(label, identity.bytes, path.to_owned()),
+            misplaced: OnceLock::new(),
         })
     }
 
@@ -110,31 +115,65 @@ impl Reader {
     ///
     /// # Errors
     /// What the disk refuses; a file that has become shorter.
-    pub fn stretch(&self, rows: Range<usize>, mut buffer: Vec<u8>) -> Result<Stretch> {
+    pub fn stretch(&self, rows: Range<usize>, buffer: Vec<u8>) -> Result<Stretch> {
         let end = rows.end.min(self.head.record_count());
         let start = rows.start.min(end);
         let first_row = start.saturating_sub(NEIGHBOURS);
         let last_row = (end + NEIGHBOURS).min(self.head.record_count());
-        // The label's place stays in front of the records, as in the file.
-        buffer.resize(LABEL_BYTES + (last_row - first_row) * RECORD_BYTES, 0);
-        let from = (LABEL_BYTES + first_row * RECORD_BYTES) as u64;
-        let parts = buffer[LABEL_BYTES..].par_chunks_mut(READ_BYTES);
+        let is_whole = last_row - first_row == self.head.record_count();
+        let misplaced = if is_whole {
+            None
+        } else {
+            Some(self.chronology()?)
+        };
+        let buffer = self.read(first_row..last_row, buffer)?;
+        Ok(Stretch {
+            file: self.head.with_records(first_row, buffer, misplaced),
+            inner: start..end,
+        })
+    }
+
+    /// The bytes of some rows, after as many as the label has, as in the file.
+    fn read(&self, rows: Range<usize>, mut buffer: Vec<u8>) -> Result<Vec<u8>> {
+        let label = self.head.label_length();
+        buffer.resize(label + rows.len() * RECORD_BYTES, 0);
+        let from = (label + rows.start * RECORD_BYTES) as u64;
+        let parts = buffer[label..].par_chunks_mut(READ_BYTES);
         let read = |(number, part): (usize, &mut [u8])| {
             let from = from + (number * READ_BYTES) as u64;
             read_at(&self.handle, part, from, self.identity.bytes)
         };
         let read = parts.enumerate().try_for_each(read);
         read.in_file(self.head.path())?;
-        Ok(Stretch {
-            file: self.head.with_records(buffer),
-            first_row,
-            inner: start - first_row..end - first_row,
-        })
+        Ok(buffer)
+    }
+
+    /// Takes the word of an index for it that every record fits into the chronology.
+    pub fn set_in_order(&self) {
+        let _ = self.misplaced.set(Chronology::default());
+    }
+
+    /// What does not fit into the chronology of the file, by all its records.
+    fn chronology(&self) -> Result<Chronology> {
+        if let Some(known) = self.misplaced.get() {
+            return Ok(Arc::clone(known));
+        }
+        let mut times_s = Vec::new();
+        let mut buffer = Vec::new();
+        let records = self.head.record_count();
+        for start in (0..records).step_by(CHRONOLOGY_RECORDS) {
+            buffer = self.read(start..records.min(start + CHRONOLOGY_RECORDS), buffer)?;
+            let piece = self.head.with_records(start, buffer, None);
+            times_s.extend(piece.sound_times());
+            buffer = piece.into_bytes();
+        }
+        let found = Chronology::new(misplaced(&times_s));
+        Ok(Arc::clone(self.misplaced.get_or_init(|| found)))
     }
 
     /// Has the system read some rows ahead; whether it does is its own affair.
     pub fn announce(&self, rows: &Range<usize>) {
-        let from = (LABEL_BYTES + rows.start * RECORD_BYTES) as u64;
+        let from = (self.head.label_length() + rows.start * RECORD_BYTES) as u64;
         let length = NonZeroU64::new((rows.len() * RECORD_BYTES) as u64);
         let _ = rustix::fs::fadvise(&self.handle, from, length, Advice::WillNeed);
     }
@@ -189,7 +228,7 @@ impl Reader {
     /// # Errors
     /// What the disk refuses; a file that has become shorter.
     pub fn trailing_bytes(&self) -> Result<Vec<u8>> {
-        let from = (LABEL_BYTES + self.head.record_count() * RECORD_BYTES) as u64;
+        let from = (self.head.label_length() + self.head.record_count() * RECORD_BYTES) as u64;
         let length = self.identity.bytes.saturating_sub(from);
         let mut bytes = vec![0; usize::try_from(length).unwrap_or(0)];
         read_at(&self.handle, &mut bytes, from, self.identity.bytes).in_file(self.head.path())?;
@@ -201,16 +240,14 @@ impl Reader {
     /// # Errors
     /// What is wrong with the label, else with the first record; what the disk refuses.
     pub fn require_records(&self) -> Result<()> {
-        let guard = FieldGuard::new(self.head.label().software_version);
         let (mut row, mut next, mut first) = (0, FIRST_RECORDS, None);
         while row < self.head.record_count() {
             let stretch = self.stretch(row..row + next, Vec::new())?;
-            for (row, _) in stretch.records(row..row + next) {
-                match stretch.frame(row, guard) {
-                    Some(Err(error)) => first = first.or(Some((row, error))),
-                    Some(Ok(_)) => return Ok(()),
-                    None => {}
-                }
+            if stretch
+                .file
+                .has_good_record(stretch.inner.clone(), &mut first)
+            {
+                return Ok(());
             }
             (row, next) = (row + next, NEXT_RECORDS);
         }
@@ -221,49 +258,42 @@ impl Reader {
 impl Stretch {
     /// Those of the records in rows `rows` of the file that the stretch is about, with their rows.
     pub fn records(&self, rows: Range<usize>) -> impl Iterator<Item = (usize, &Record)> {
-        let inner = &self.inner;
-        let start = rows
-            .start
-            .saturating_sub(self.first_row)
-            .clamp(inner.start, inner.end);
-        let end = rows
-            .end
-            .saturating_sub(self.first_row)
-            .clamp(start, inner.end);
-        (self.first_row + start..).zip(&self.file.records()[start..end])
+        self.about(rows).map(|row| (row, self.file.record(row)))
     }
 
-    /// The frame of row `row` of the file, when the stretch is about that row.
-    #[must_use]
-    pub fn frame(
+    /// The frames of the rows `rows` of the file that the stretch is about, with their rows: each is judged with its
+    /// neighbours, which cost less the more rows are asked for at once.
+    pub fn frames(
         &self,
-        row: usize,
+        rows: Range<usize>,
         guard: FieldGuard,
-    ) -> Option<std::result::Result<Frame<'_>, RecordError>> {
-        let row = row.checked_sub(self.first_row)?;
-        let row = Some(row).filter(|row| self.inner.contains(row))?;
-        let (_, frame) = self.file.frames(row..row + 1, guard).next()?;
-        Some(frame)
+    ) -> impl Iterator<Item = (usize, std::result::Result<Frame<'_>, RecordError>)> {
+        self.file.frames(self.about(rows), guard)
     }
 
-    /// The frame of row `row` of the file, when it is a good one, and what there is to complain of.
+    /// The complaint of the record in row `row` of the file.
     #[must_use]
-    pub fn judged(&self, row: usize, guard: FieldGuard) -> (Option<Frame<'_>>, Option<Complaint>) {
-        let (frame, error) = match self.frame(row, guard) {
-            Some(Ok(frame)) => (Some(frame), frame.record().check_radii().err()),
-            Some(Err(error)) => (None, Some(error)),
-            None => (None, None),
-        };
-        (
-            frame,
-            error.map(|error| self.file.record_complaint(row, &error)),
-        )
+    pub fn complaint(&self, row: usize, error: &RecordError) -> Complaint {
+        self.file.record_complaint(row, error)
+    }
+
+    /// Number of the record in row `row` of the file.
+    #[must_use]
+    pub fn record_number(&self, row: usize) -> u32 {
+        self.file.record_number(row)
+    }
+
+    /// Those of the rows that the stretch is about.
+    fn about(&self, rows: Range<usize>) -> Range<usize> {
+        let start = rows.start.clamp(self.inner.start, self.inner.end);
+        start..rows.end.clamp(start, self.inner.end)
     }
 
     /// The bytes of the records that the stretch is about.
     #[must_use]
     pub fn bytes(&self) -> &[u8] {
-        self.file.records()[self.inner.clone()].as_bytes()
+        let first = self.inner.start - self.file.rows().start;
+        self.file.records()[first..first + self.inner.len()].as_bytes()
     }
 
     /// The memory, for the next stretch.

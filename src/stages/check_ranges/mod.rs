@@ -64,7 +64,7 @@ stage_inputs! {
 
 impl Stage for CheckRanges<'_> {
     const NAME: &'static str = "check_ranges";
-    const METHOD: u32 = 2;
+    const METHOD: u32 = 3;
     type Output = RangeCheck;
     stage_inputs!(fingerprint);
 
@@ -138,6 +138,10 @@ pub struct ProfileRanges {
     pub decoding_m: Summary,
     /// PEDR spacecraft − SPK spacecraft along radial, along-track and cross-track axes, metres.
     pub spacecraft_m: [Summary; 3],
+    /// Mean of range − distance without outliers, metres: this one is judged.
+    pub mean_without_outliers_m: f64,
+    /// Mean of range − distance to the file's own spacecraft without the same shots, metres: this one is judged.
+    pub decoding_without_outliers_m: f64,
     /// Linear trend of range − distance over time, metres per second.
     pub trend_m_s: Option<Trend>,
     /// Shots farther from the median than the configured number of robust standard deviations.
@@ -244,7 +248,14 @@ fn judged(
         .iter()
         .map(|row| Et::from_seconds(footprints.et_s[*row as usize]).since(profile.interval.start))
         .collect();
-    let outliers = shots.outlier[first..].iter().filter(|flag| **flag).count();
+    let outlier = &shots.outlier[first..];
+    let outliers = outlier.iter().filter(|flag| **flag).count();
+    // A single wrong record must not decide the verdict on all others; how many there are has a limit of its own.
+    let mean_without = |column: &[f64]| {
+        let kept = column[first..].iter().zip(outlier);
+        let kept: Vec<f64> = kept.filter(|(_, is)| !**is).map(|(m, _)| *m).collect();
+        Summary::of(&kept).mean
+    };
     let mut ranges = ProfileRanges {
         profile: profile.id.clone(),
         range_minus_distance_m: summary(&shots.range_minus_distance_m),
@@ -255,6 +266,8 @@ fn judged(
             summary(&shots.spacecraft_along_m),
             summary(&shots.spacecraft_cross_m),
         ],
+        mean_without_outliers_m: mean_without(&shots.range_minus_distance_m),
+        decoding_without_outliers_m: mean_without(&shots.decoding_m),
         trend_m_s: Trend::of(&seconds, &shots.range_minus_distance_m[first..]),
         outliers: u32::try_from(outliers).unwrap_or(u32::MAX),
         scan,
@@ -270,20 +283,32 @@ fn broken_limits(ranges: &ProfileRanges, limits: &RangeCheckConfig) -> Vec<Strin
     if n < limits.shots_min {
         broken.push(format!("{n} shots; limit at least {}", limits.shots_min));
     }
-    // Written so that NaN breaks a limit.
-    let mean_m = ranges.range_minus_distance_m.mean;
-    if !(mean_m.abs() <= limits.mean_max_m) {
-        broken.push(format!(
-            "mean of range − distance {mean_m:.3} m; limit ±{} m",
-            limits.mean_max_m
-        ));
-    }
-    let decoding_m = ranges.decoding_m.mean;
-    if !(decoding_m.abs() <= limits.decoding_max_m) {
-        broken.push(format!(
-            "mean of range − distance to the file's own spacecraft {decoding_m:.3} m; limit ±{} m",
-            limits.decoding_max_m
-        ));
+    for (name, mean_m, with_outliers_m, limit_m) in [
+        (
+            "range − distance",
+            ranges.mean_without_outliers_m,
+            ranges.range_minus_distance_m.mean,
+            limits.mean_max_m,
+        ),
+        (
+            "range − distance to the file's own spacecraft",
+            ranges.decoding_without_outliers_m,
+            ranges.decoding_m.mean,
+            limits.decoding_max_m,
+        ),
+    ] {
+        // Written so that NaN breaks a limit.
+        if !(mean_m.abs() <= limit_m) {
+            let with = match ranges.outliers {
+                0 => String::new(),
+                outliers => {
+                    format!(" without {outliers} outliers, {with_outliers_m:.3} m with them")
+                }
+            };
+            broken.push(format!(
+                "mean of {name} {mean_m:.3} m{with}; limit ±{limit_m} m"
+            ));
+        }
     }
     let share = f64::from(ranges.outliers) / f64::from(n.max(1));
     if !(share <= limits.outlier_share_max) {

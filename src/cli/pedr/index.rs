@@ -8,7 +8,7 @@ use std::{
 
 use clap::Args;
 
-use super::output;
+use crate::cli::output;
 use crate::{
     error::{Cause, Error, IoError, Kind, Locate as _},
     files::{Identity, hash_file, short_hash},

@@ -1,0 +1,160 @@
+//! `areograph pedr info`.
+
+use std::{
+    collections::BTreeMap,
+    fmt::Display,
+    path::{Path, PathBuf},
+};
+
+use clap::Args;
+use serde_json::{Value, json};
+
+use crate::{
+    cli::output,
+    error::{Error, Locate as _},
+    geom::statistics::Summary,
+    pds::pedr::{Counts, File},
+    spice::{KernelSet, Session},
+    time::Et,
+};
+
+/// Shows label, orbits, time span, what the shots are, and everything that is wrong with each file.
+///
+/// Shots are counted by class, trigger channel, attitude flag and orbit model, without those that did not come back or
+/// contradict themselves. Ranges are held against the distance from the file's own spacecraft to the footprint: both
+/// come from one orbit, so that their difference tests the file and its reading, and needs no kernel.
+#[derive(Debug, Args)]
+pub(super) struct Arguments {
+    /// PEDR files (AP#####v.B).
+    #[arg(required = true, value_name = "FILE")]
+    files: Vec<PathBuf>,
+    /// Leap seconds (LSK, such as naif0012.tls): shows the time span in UTC as well.
+    #[arg(long, value_name = "FILE")]
+    leap_seconds: Option<PathBuf>,
+    /// Print JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+/// Complaints printed for a file; all are counted.
+const COMPLAINTS_PRINTED: usize = 20;
+
+pub(super) fn run(arguments: &Arguments) -> Result<(), Error> {
+    let clock = match &arguments.leap_seconds {
+        Some(kernel) => Some(Session::open(&KernelSet::from_files(
+            std::slice::from_ref(kernel),
+        )?)?),
+        None => None,
+    };
+    let (mut answers, mut useless) = (Vec::new(), Vec::new());
+    for path in &arguments.files {
+        let file = File::open(path)?;
+        let (counts, answer) = info(path, &file, clock.as_ref())?;
+        useless.extend(file.require_records().err());
+        if arguments.json {
+            answers.push(answer);
+        } else {
+            print(&counts, &answer);
+        }
+    }
+    if arguments.json {
+        output::json(&answers.into());
+    }
+    // Every file is shown first; the last of the useless ones is told by whoever called.
+    let last = useless.pop();
+    useless.iter().for_each(output::error);
+    last.map_or(Ok(()), Err)
+}
+
+fn info(path: &Path, file: &File, clock: Option<&Session>) -> Result<(Counts, Value), Error> {
+    let (counts, complaints) = file.count();
+    let label = file.label();
+    let mut answer = json!({
+        "file": path,
+        "version": file.name().map(|name| name.version),
+        "product_id": label.product_id,
+        "data_set_id": label.data_set_id,
+        "software_version": label.software_version,
+        "datum_in_label": label.datum,
+        "records": counts.records,
+        "good_records": counts.good_records,
+        "orbits": counts.records_by_orbit.keys().collect::<Vec<_>>(),
+        "et_first_s": counts.span_s.map(|[first_s, _]| first_s),
+        "et_last_s": counts.span_s.map(|[_, last_s]| last_s),
+        "shots": counts.shots,
+        "without_return": counts.without_return,
+        "spoiled_shots": counts.spoiled_shots,
+        "shots_by_class": counts.shots_by_class,
+        "shots_by_channel": counts.shots_by_channel,
+        "shots_by_attitude_flag": counts.shots_by_attitude_flag,
+        "shots_by_orbit_model": counts.shots_by_orbit_model,
+        "range_minus_distance_m": {
+            "ground": counts.ground_range_minus_distance_m,
+            "other": counts.other_range_minus_distance_m,
+        },
+        "blake3": file.blake3(),
+        "complaints": complaints.iter().map(ToString::to_string).collect::<Vec<_>>(),
+    });
+    if let (Some(clock), Some([first_s, last_s])) = (clock, counts.span_s) {
+        let kernel = &clock.kernels().kernels()[0].path;
+        let utc = |et_s| clock.et_to_utc(Et::from_seconds(et_s)).in_file(kernel);
+        answer["utc_first"] = utc(first_s)?.into();
+        answer["utc_last"] = utc(last_s)?.into();
+    }
+    Ok((counts, answer))
+}
+
+/// The answer as a table: counts and statistics in lines of their own.
+fn print(counts: &Counts, answer: &Value) {
+    for (key, value) in answer.as_object().into_iter().flatten() {
+        let counted = match key.as_str() {
+            "shots_by_class" => counted(&counts.shots_by_class),
+            "shots_by_channel" => counted(&counts.shots_by_channel),
+            "shots_by_attitude_flag" => counted(&counts.shots_by_attitude_flag),
+            "shots_by_orbit_model" => counted(&counts.shots_by_orbit_model),
+            "range_minus_distance_m" => {
+                statistics("ground", &counts.ground_range_minus_distance_m);
+                statistics("other", &counts.other_range_minus_distance_m);
+                continue;
+            }
+            "complaints" => {
+                let texts = value.as_array().map_or(&[][..], Vec::as_slice);
+                line(key, texts.len());
+                for text in texts.iter().take(COMPLAINTS_PRINTED) {
+                    output::line(format_args!("  {}", text.as_str().unwrap_or_default()));
+                }
+                continue;
+            }
+            _ => value.to_string(),
+        };
+        line(key, counted);
+    }
+}
+
+fn line(key: &str, value: impl Display) {
+    output::line(format_args!("{key:24}{value}"));
+}
+
+fn counted<K: Display>(counts: &BTreeMap<K, u64>) -> String {
+    let counts = counts.iter().map(|(key, count)| format!("{key}: {count}"));
+    counts.collect::<Vec<_>>().join(", ")
+}
+
+fn statistics(of: &str, residuals_m: &Summary) {
+    let Summary {
+        n,
+        mean,
+        standard_deviation,
+        median,
+        nmad,
+        min,
+        max,
+    } = residuals_m;
+    line(
+        &format!("range-distance {of}"),
+        format_args!(
+            "{n} shots, mean {mean:.3} m, sd {standard_deviation:.3} m, median {median:.3} m, NMAD {nmad:.3} m, \
+             {min:.3} to {max:.3} m"
+        ),
+    );
+}

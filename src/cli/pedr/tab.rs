@@ -1,0 +1,255 @@
+//! `areograph pedr tab`.
+
+use std::{
+    fs,
+    io::{BufWriter, Write},
+    path::{Path, PathBuf},
+};
+
+use clap::{Args, ValueEnum};
+
+use crate::{
+    cli::output,
+    error::{Cause, IoError, Kind, Locate as _, Result},
+    pds::{
+        pedr::{Complaint, File},
+        pedr_table::{Preferences, Rules, Table, Variant},
+    },
+};
+
+/// Prints shots as text tables: pedr2tab's, to the byte, from the same PEDR2TAB.PRM and the same list of files.
+///
+/// What pedr2tab does wrong is done as well, unless --per-shot is given. These are its slips, and our rules:
+///
+///   window          tests the mid-point of a frame, between two longitudes  |  tests every shot, across 0° too
+///   gate            a frame without parallax and crossover residual keeps those of the last one in the window, even of
+///                   another file                                            |  has none
+///   old files       after a file older than version 7.125 no residual is read, but the last one is still subtracted;
+///                   after one of 7.0 or older all files need orbit model 3  |  each file by its own version
+///   slope           of the residual counts from the last frame in the window, however far back
+///                                                                           |  from the adjoining frame, else constant
+///   first frames    a file with a single frame, if it has a residual, gives no line  |  gives its lines
+///   bad records     are printed                                             |  are left out and told
+///   pulse width     counts above 127 are printed as negative                |  as they are
+///   lists           end at the first file that cannot be opened             |  go on to the next; both end as an error
+///
+/// Not copied: names are not cut at 64 characters and may hold points and folders, more than 99,999 frames are read, and
+/// a trigger channel that is none does not read beyond its table.
+#[derive(Debug, Args)]
+#[command(verbatim_doc_comment)]
+pub(super) struct Arguments {
+    /// A PEDR file (its name holds .b or .B), or a text file with the name of one in each line.
+    #[arg(default_value = "FILELIST")]
+    input: PathBuf,
+    /// Preferences. Without the file those of pedr2tab hold: ground returns, group 0, headings, one table a file.
+    #[arg(long, value_name = "FILE", default_value = "PEDR2TAB.PRM")]
+    preferences: PathBuf,
+    /// Whose program the table is like: column widths, and the order of sums.
+    #[arg(long, default_value = "team")]
+    variant: Program,
+    /// Our rules in place of every slip.
+    #[arg(long)]
+    per_shot: bool,
+    /// Folder of the tables.
+    #[arg(long, value_name = "FOLDER", default_value = ".")]
+    out: PathBuf,
+}
+
+/// Whose program.
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum Program {
+    /// The MOLA team's: off-nadir angle in 7 columns, packet and orbit in 6.
+    Team,
+    /// The port of the USGS: 8, and 7 and 8 columns.
+    Usgs,
+}
+
+/// The file is none that pedr2tab takes.
+#[derive(Debug, thiserror::Error)]
+#[error("the label does not begin with CCSD3ZF0")]
+struct NoMarker;
+
+impl Cause for NoMarker {
+    fn kind(&self) -> Kind {
+        Kind::Input
+    }
+
+    fn advice(&self) -> String {
+        "name a PEDR file, or a list of them whose name has no .b; in a list, or with --per-shot, the marker is not asked for"
+            .to_owned()
+    }
+}
+
+/// Complaints printed of a file; all are counted.
+const COMPLAINTS_PRINTED: usize = 20;
+
+pub(super) fn run(arguments: &Arguments) -> Result<()> {
+    let preferences = read_preferences(&arguments.preferences)?;
+    let rules = if arguments.per_shot {
+        Rules::PerShot
+    } else {
+        Rules::Program
+    };
+    let variant = match arguments.variant {
+        Program::Team => Variant::Team,
+        Program::Usgs => Variant::Usgs,
+    };
+    let mut table = Table::new(preferences, variant, rules);
+    let mut one_table: Option<Output> = None;
+    let (files, is_list) = files(&arguments.input)?;
+    let mut failure = None;
+    for path in files {
+        let file = match File::open(&path) {
+            Ok(file) => file,
+            Err(error) => {
+                if let Some(earlier) = failure.replace(error) {
+                    output::error(earlier);
+                }
+                if rules == Rules::Program {
+                    break;
+                }
+                continue;
+            }
+        };
+        if rules == Rules::Program {
+            if !is_list && !file.label().has_marker() {
+                return Err(NoMarker).in_file(&path);
+            }
+            if is_list && file.label().software_version.is_none() {
+                output::line(format_args!(
+                    "{}: no SOFTWARE_NAME, skipped",
+                    path.display()
+                ));
+                continue;
+            }
+        }
+        let before = table.shots;
+        let headed = one_table.is_some();
+        let mut output = match one_table.take() {
+            Some(output) => output,
+            None => Output::create(&arguments.out.join(table_name(&path, table.preferences())))?,
+        };
+        if !headed {
+            output.write(|out| table.write_headings(out))?;
+        }
+        let complaints = output.write(|out| table.write(&file, out))?;
+        if table.preferences().one_table {
+            one_table = Some(output);
+        } else {
+            output.finish()?;
+        }
+        tell(&path, table.shots - before, &complaints);
+    }
+    if let Some(output) = one_table {
+        output.finish()?;
+    }
+    failure.map_or(Ok(()), Err)
+}
+
+fn read_preferences(path: &Path) -> Result<Preferences> {
+    let bytes = match fs::read(path) {
+        Ok(bytes) => bytes,
+        Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
+            output::line(format_args!(
+                "{}: not there; the preferences of pedr2tab hold",
+                path.display()
+            ));
+            return Ok(Preferences::default());
+        }
+        Err(error) => return Err(IoError::on("read")(error)).in_file(path),
+    };
+    let preferences = Preferences::parse(&String::from_utf8_lossy(&bytes));
+    if !preferences.is_whole {
+        output::line(format_args!(
+            "{}: ends early or holds something else than expected; from there on the preferences of pedr2tab hold",
+            path.display()
+        ));
+    }
+    Ok(preferences)
+}
+
+/// The files to read, and whether they come from a list. Names in a list without `.b` or `.B` are skipped with a line.
+fn files(input: &Path) -> Result<(Vec<PathBuf>, bool)> {
+    let is_pedr = |name: &str| name.contains(".b") || name.contains(".B");
+    if is_pedr(&input.to_string_lossy()) {
+        return Ok((vec![input.to_owned()], false));
+    }
+    let list = fs::read(input)
+        .map_err(IoError::on("read"))
+        .in_file(input)?;
+    let list = String::from_utf8_lossy(&list);
+    let mut files = Vec::new();
+    for name in list.lines().map(str::trim_end) {
+        if is_pedr(name) {
+            files.push(PathBuf::from(name));
+        } else {
+            output::line(format_args!(
+                "skipping {name:?}: a PEDR file has .b or .B in its name"
+            ));
+        }
+    }
+    Ok((files, true))
+}
+
+/// Name of the one table, or of a file's own: the last eight characters before its extension, and that of the template.
+fn table_name(path: &Path, preferences: &Preferences) -> String {
+    let template = preferences.table_name.as_str();
+    if preferences.one_table {
+        return template.trim_end().to_owned();
+    }
+    let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+    let from = stem.char_indices().rev().nth(7).map_or(0, |(at, _)| at);
+    let extension = template
+        .find('.')
+        .map_or(template, |dot| &template[dot + 1..]);
+    let extension: String = extension.chars().take(3).collect();
+    format!("{}.{}", &stem[from..], extension.trim_end())
+}
+
+fn tell(path: &Path, shots: u64, complaints: &[Complaint]) {
+    output::line(format_args!(
+        "{}: {shots} shots, {} complaints",
+        path.display(),
+        complaints.len()
+    ));
+    for complaint in complaints.iter().take(COMPLAINTS_PRINTED) {
+        output::line(format_args!("  {complaint}"));
+    }
+}
+
+/// A table under way: under another name until it is whole.
+struct Output {
+    path: PathBuf,
+    part: PathBuf,
+    writer: BufWriter<fs::File>,
+}
+
+impl Output {
+    fn create(path: &Path) -> Result<Self> {
+        let mut part = path.as_os_str().to_owned();
+        part.push(".part");
+        let part = PathBuf::from(part);
+        let file = fs::File::create(&part)
+            .map_err(IoError::on("create"))
+            .in_file(&part)?;
+        Ok(Self {
+            path: path.to_owned(),
+            part,
+            writer: BufWriter::new(file),
+        })
+    }
+
+    fn write<T>(&mut self, write: impl FnOnce(&mut dyn Write) -> std::io::Result<T>) -> Result<T> {
+        write(&mut self.writer)
+            .map_err(IoError::on("write"))
+            .in_file(&self.path)
+    }
+
+    fn finish(mut self) -> Result<()> {
+        self.writer
+            .flush()
+            .and_then(|()| fs::rename(&self.part, &self.path))
+            .map_err(IoError::on("write"))
+            .in_file(&self.path)
+    }
+}

@@ -1,0 +1,296 @@
+//! What can be wrong with a record, with its value and what was expected.
+
+use serde::{Deserialize, Serialize};
+
+use super::{check, neighbours::Quantity};
+
+/// Why a file or record is complained of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Reason {
+    /// The file ends within its label.
+    TruncatedLabel,
+    /// The label cannot be read.
+    UnreadableLabel,
+    /// The label lacks what every PEDR says, or says something else.
+    LabelKeyword,
+    /// The label states another number of records than the file holds.
+    RecordCount,
+    /// The file ends within a record.
+    TrailingBytes,
+    /// A time is no number, outside the mission, or the two times of the record disagree.
+    Time,
+    /// Times do not increase.
+    TimeOrder,
+    /// The shots of another record once more.
+    Repeated,
+    /// The clock frequency is far from 100 MHz.
+    Frequency,
+    /// A latitude lies beyond a pole.
+    Latitude,
+    /// A longitude is of no turn that the format has.
+    Longitude,
+    /// The ground track or the spacecraft is faster than it can be.
+    Track,
+    /// The spacecraft is inside Mars or far away.
+    SpacecraftRadius,
+    /// A return comes from deep inside or high above Mars.
+    Radius,
+    /// The range is not the distance from the spacecraft to the footprint.
+    Distance,
+    /// Parallax does not go along the beam.
+    Parallax,
+    /// The crossover residual is larger than orbits are wrong.
+    Crossover,
+    /// The areoid, or its slope, is not that of Mars.
+    Areoid,
+    /// The off-nadir angle points away from Mars.
+    OffNadir,
+    /// The orbit or its model is not that of the neighbouring records.
+    Orbit,
+    /// The record does not lie between its neighbours.
+    Neighbours,
+}
+
+/// An impossible value in a record.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+pub enum RecordError {
+    /// The double is no number.
+    #[error("time is {0}; expected seconds past J2000")]
+    NoTime(f64),
+    /// The spacecraft was not at Mars then.
+    #[error(
+        "time is ET {} s; expected {} to {} s, the mission at Mars",
+        legible(*.0), check::MISSION_S.start(), check::MISSION_S.end()
+    )]
+    OutsideMission(f64),
+    /// The double and the two integers disagree.
+    #[error("the times of the record are {} s and {integers_s} s; expected equal to 1e-6 s", legible(*.time_s))]
+    TwoTimes {
+        /// From the double, ET seconds.
+        time_s: f64,
+        /// From the two integers, ET seconds.
+        integers_s: f64,
+    },
+    /// The record is not between its neighbours.
+    #[error("time is {0} s, out of the order of the neighbouring records")]
+    Order(f64),
+    /// The same shots stand in another record of the file.
+    #[error(
+        "time is {time_s} s, the shots of record {record} once more; expected every shot once, frames {} s or more apart",
+        super::chronology::APART_S
+    )]
+    Repeated {
+        /// Mid-point, ET seconds.
+        time_s: f64,
+        /// The record that has them first, counted as in complaints.
+        record: u32,
+    },
+    /// Clock frequency, hertz.
+    #[error("clock frequency is {0} Hz; expected within 1 % of 1e8")]
+    Frequency(u32),
+    /// Ground or spacecraft latitude.
+    #[error("{whose} latitude is {microdegrees} microdegrees; expected at most 90 degrees")]
+    Latitude {
+        /// "ground" or "spacecraft".
+        whose: &'static str,
+        /// The value of the record.
+        microdegrees: i32,
+    },
+    /// Ground or spacecraft longitude.
+    #[error("{whose} longitude is {microdegrees} microdegrees; expected -360 to 360 degrees")]
+    Longitude {
+        /// "ground" or "spacecraft".
+        whose: &'static str,
+        /// The value of the record.
+        microdegrees: i32,
+    },
+    /// Way of the ground track or of the spacecraft over the frame.
+    #[error(
+        "{whose} moves by {longitude_microdegrees} microdegrees of longitude and {latitude_microdegrees} of latitude \
+         over the frame, {metres:.0} m; expected at most {limit_m} m"
+    )]
+    Track {
+        /// "the ground track" or "the spacecraft".
+        whose: &'static str,
+        /// Change of longitude.
+        longitude_microdegrees: i32,
+        /// Change of latitude.
+        latitude_microdegrees: i32,
+        /// Length of the way, metres.
+        metres: f64,
+        /// Longest possible way, metres.
+        limit_m: f64,
+    },
+    /// Distance of the spacecraft, centimetres.
+    #[error("the spacecraft is {0} cm from the centre of Mars; expected {min} to {max}",
+        min = if *.1 { check::MAPPING_ORBIT_CM.start() } else { check::EARLIER_ORBIT_CM.start() },
+        max = if *.1 { check::MAPPING_ORBIT_CM.end() } else { check::EARLIER_ORBIT_CM.end() })]
+    SpacecraftRadius(u32, bool),
+    /// Change of the distance of the spacecraft over the frame, centimetres.
+    #[error(
+        "the spacecraft rises by {0} cm over the frame; expected at most {limit} either way", limit = check::CLIMB_MAX_CM)]
+    Climb(i32),
+    /// Radius of a returned shot (0: of the mid-point), centimetres.
+    #[error("radius of {} is {centimetres} cm; expected {} to {} for a return",
+        if *.shot == 0 { "the mid-point".to_owned() } else { format!("shot {shot}") },
+        check::RADIUS_CM.start(), check::RADIUS_CM.end())]
+    Radius {
+        /// Shot, 1 to 20, or 0 for the mid-point.
+        shot: u8,
+        /// The value of the record.
+        centimetres: i32,
+    },
+    /// The radius that parallax counts from lies far from every return.
+    #[error(
+        "radius of the mid-point is {centimetres} cm, {apart_m:.0} m from that of the nearest return; expected at most \
+         {} m",
+        super::shots::MID_RADIUS_M
+    )]
+    MidRadius {
+        /// The value of the record.
+        centimetres: i32,
+        /// Distance from the nearest radius of a return, metres.
+        apart_m: f64,
+    },
+    /// Range against the record's own positions.
+    #[error(
+        "range of shot {shot} is {range_m:.2} m, but spacecraft and footprint are {distance_m:.2} m apart; expected \
+         equal to {limit_m:.1} m{}", and_more(*.shots)
+    )]
+    Distance {
+        /// The first shot, 1 to 20.
+        shot: u8,
+        /// Its range.
+        range_m: f64,
+        /// From the spacecraft to the footprint.
+        distance_m: f64,
+        /// Largest possible difference.
+        limit_m: f64,
+        /// Shots of the frame with this error.
+        shots: u8,
+    },
+    /// Parallax against the direction of the beam.
+    #[error(
+        "parallax in {whose} is {found:.4} m on the ground per metre of radius; expected {expected:.4} along the beam, \
+         to {limit:.4}"
+    )]
+    Parallax {
+        /// "latitude" or "longitude".
+        whose: &'static str,
+        /// The value of the record.
+        found: f64,
+        /// From spacecraft and footprint.
+        expected: f64,
+        /// Largest possible difference.
+        limit: f64,
+    },
+    /// Crossover residual, centimetres.
+    #[error(
+        "crossover residual is {0} cm; expected at most {limit} either way", limit = check::CROSSOVER_MAX_CM)]
+    Crossover(i32),
+    /// Areoid radius, centimetres.
+    #[error("areoid radius is {centimetres} cm; expected {} to {} at this latitude", .expected_cm[0], .expected_cm[1])]
+    AreoidRadius {
+        /// The value of the record.
+        centimetres: u32,
+        /// Smallest and largest at the latitude of the footprint.
+        expected_cm: [u32; 2],
+    },
+    /// Change of the areoid radius over the frame, centimetres.
+    #[error(
+        "the areoid rises by {0} cm over the frame; expected at most {limit} either way", limit = check::AREOID_CHANGE_MAX_CM)]
+    AreoidChange(i32),
+    /// Off-nadir angle, microdegrees.
+    #[error("off-nadir angle is {0} microdegrees; expected at most 90 degrees")]
+    OffNadir(i32),
+    /// The neighbours on both sides agree on another value.
+    #[error("{what} is {found}; expected {expected} as in the records before and after")]
+    OddOne {
+        /// Name of the field.
+        what: &'static str,
+        /// The value of the record.
+        found: u32,
+        /// That of its neighbours.
+        expected: u32,
+    },
+    /// A value that does not continue that of a neighbour.
+    #[error(
+        "{} is {value} {}, {apart:.1} {} from where record {record} leads; expected at most {limit:.1} {}",
+        .quantity.name(), .quantity.unit(), .quantity.step_unit(), .quantity.step_unit()
+    )]
+    Neighbours {
+        /// What does not continue.
+        quantity: Quantity,
+        /// The value of the record.
+        value: f64,
+        /// How far it is off.
+        apart: f64,
+        /// How far it can be off.
+        limit: f64,
+        /// The neighbour, counted as in complaints.
+        record: u32,
+    },
+}
+
+impl RecordError {
+    /// The code under which it is counted.
+    #[must_use]
+    pub const fn reason(&self) -> Reason {
+        match self {
+            Self::NoTime(_) | Self::OutsideMission(_) | Self::TwoTimes { .. } => Reason::Time,
+            Self::Order(_) => Reason::TimeOrder,
+            Self::Repeated { .. } => Reason::Repeated,
+            Self::Frequency(_) => Reason::Frequency,
+            Self::Latitude { .. } => Reason::Latitude,
+            Self::Longitude { .. } => Reason::Longitude,
+            Self::Track { .. } => Reason::Track,
+            Self::SpacecraftRadius(..) | Self::Climb(_) => Reason::SpacecraftRadius,
+            Self::Radius { .. } | Self::MidRadius { .. } => Reason::Radius,
+            Self::Distance { .. } => Reason::Distance,
+            Self::Parallax { .. } => Reason::Parallax,
+            Self::Crossover(_) => Reason::Crossover,
+            Self::AreoidRadius { .. } | Self::AreoidChange(_) => Reason::Areoid,
+            Self::OffNadir(_) => Reason::OffNadir,
+            Self::OddOne { .. } => Reason::Orbit,
+            Self::Neighbours { .. } => Reason::Neighbours,
+        }
+    }
+}
+
+/// The number, in powers of ten where no clock of ours counts so far: a spoiled double has 300 digits.
+fn legible(seconds: f64) -> String {
+    if seconds.abs() < 1e12 {
+        seconds.to_string()
+    } else {
+        format!("{seconds:e}")
+    }
+}
+
+fn and_more(shots: u8) -> String {
+    match shots {
+        0 | 1 => String::new(),
+        shots => format!(" ({shots} shots of the frame)"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn impossible_times_are_told_in_few_digits() {
+        let told = |time_s| {
+            RecordError::TwoTimes {
+                time_s,
+                integers_s: 4.5,
+            }
+            .to_string()
+        };
+        assert_eq!(
+            told(-1.25e300),
+            "the times of the record are -1.25e300 s and 4.5 s; expected equal to 1e-6 s"
+        );
+        assert!(told(38_593_125.159_874).contains("are 38593125.159874 s"));
+    }
+}

@@ -1,0 +1,14 @@
+//! Text tables of shots as `pedr2tab` prints them, to the byte.
+//!
+//! # Source
+//! The MOLA team's program `pedr2tab` (G. Neumann), version 2.71828, and the variant of the USGS: columns, edit
+//! descriptors, filters, order of arithmetic. What they do wrong is done as well, unless [`Rules::PerShot`] is asked for.
+
+mod columns;
+mod edit;
+mod preferences;
+mod rows;
+
+pub use columns::Variant;
+pub use preferences::Preferences;
+pub use rows::{Rules, Table};

@@ -1,0 +1,228 @@
+//! `PEDR2TAB.PRM`: what to print, of which shots, read as Fortran reads lists.
+
+/// Preferences of a table, with the program's defaults.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Preferences {
+    /// Two lines of headings.
+    pub headings: bool,
+    /// Groups of columns.
+    pub groups: [bool; 8],
+    /// Whether the areographic latitude is worked out; read with the groups.
+    pub areographic: bool,
+    /// All shots, whatever their class.
+    pub all_classes: bool,
+    /// Ground returns, else clouds and noise.
+    pub ground: bool,
+    /// Whether crossover residuals are subtracted.
+    pub crossover: bool,
+    /// One table of all files.
+    pub one_table: bool,
+    /// Name of that table; else its extension is that of each file's own.
+    pub table_name: String,
+    /// East longitudes of mid-points, degrees.
+    pub longitude_deg: [f64; 2],
+    /// Areocentric latitudes of mid-points, degrees.
+    pub latitude_deg: [f64; 2],
+    /// `(a/c)²` of areographic latitudes.
+    pub axes_squared: f64,
+    /// Whether everything was read.
+    pub is_whole: bool,
+}
+
+impl Default for Preferences {
+    fn default() -> Self {
+        Self {
+            headings: true,
+            groups: [true, false, false, false, false, false, false, false],
+            areographic: false,
+            all_classes: false,
+            ground: true,
+            crossover: true,
+            one_table: false,
+            table_name: "MOLA.TAB".to_owned(),
+            longitude_deg: [-360.0, 360.0],
+            latitude_deg: [-90.0, 90.0],
+            // A figure of the Viking maps.
+            axes_squared: (3393.4_f64 / 3375.73).powi(2),
+            is_whole: false,
+        }
+    }
+}
+
+/// Longest name that the program keeps.
+const NAME_MAX: usize = 64;
+
+impl Preferences {
+    /// The preferences of a text. As in the program, reading ends where a value is missing or is not of its kind: what
+    /// follows keeps its default.
+    #[must_use]
+    pub fn parse(text: &str) -> Self {
+        let mut preferences = Self::default();
+        preferences.is_whole = preferences.read(&mut Lines::of(text)).is_some();
+        preferences
+    }
+
+    fn read(&mut self, lines: &mut Lines<'_>) -> Option<()> {
+        lines.logical(&mut self.headings)?;
+        for group in &mut self.groups {
+            lines.logical(group)?;
+        }
+        self.areographic = self.groups[2];
+        lines.logical(&mut self.all_classes)?;
+        lines.logical(&mut self.ground)?;
+        lines.logical(&mut self.crossover)?;
+        lines.statement();
+        self.one_table = lines.value(logical)?.unwrap_or(self.one_table);
+        if let Some(name) = lines.value(|item| Some(item.text.chars().take(NAME_MAX).collect()))? {
+            self.table_name = name;
+        }
+        for limit in self.longitude_deg.iter_mut().chain(&mut self.latitude_deg) {
+            lines.statement();
+            *limit = lines.value(real)?.unwrap_or(*limit);
+        }
+        lines.statement();
+        let inverse_flattening = lines.value(real)?.unwrap_or(0.0);
+        let axes = 1.0 - 1.0 / inverse_flattening;
+        self.axes_squared = 1.0 / (axes * axes);
+        Some(())
+    }
+}
+
+/// One value of a list.
+struct Item {
+    text: String,
+}
+
+/// `T`, `F`, `.TRUE.`, `false` and the like: the first letter, behind a point or not, tells.
+fn logical(item: &Item) -> Option<bool> {
+    let word = item.text.strip_prefix('.').unwrap_or(&item.text);
+    match word.chars().next()? {
+        'T' | 't' => Some(true),
+        'F' | 'f' => Some(false),
+        _ => None,
+    }
+}
+
+/// A number, its exponent after `E`, `D` or `Q`.
+fn real(item: &Item) -> Option<f64> {
+    let plain = item.text.to_ascii_lowercase().replace(['d', 'q'], "e");
+    // Rust reads words as numbers too.
+    let numeric = plain
+        .chars()
+        .all(|c| c.is_ascii_digit() || "+-.e".contains(c));
+    numeric.then(|| plain.parse().ok()).flatten()
+}
+
+/// The records of the file. A read statement begins with the next one, and goes on to further ones until it has its values.
+struct Lines<'a> {
+    lines: std::str::Lines<'a>,
+    rest: &'a str,
+    /// A slash ended the statement: what is left of it keeps its values.
+    ended: bool,
+    /// How often the last value is still repeated.
+    repeated: usize,
+    last: Option<String>,
+}
+
+impl<'a> Lines<'a> {
+    fn of(text: &'a str) -> Self {
+        Self {
+            lines: text.lines(),
+            rest: "",
+            ended: false,
+            repeated: 0,
+            last: None,
+        }
+    }
+
+    /// Begins a read statement with the next record.
+    fn statement(&mut self) {
+        self.rest = "";
+        self.ended = false;
+        self.repeated = 0;
+    }
+
+    fn logical(&mut self, value: &mut bool) -> Option<()> {
+        self.statement();
+        *value = self.value(logical)?.unwrap_or(*value);
+        Some(())
+    }
+
+    /// The next value: `None` at the end of the file or for one of another kind, `Some(None)` for an empty one.
+    fn value<T>(&mut self, read: impl Fn(&Item) -> Option<T>) -> Option<Option<T>> {
+        if self.ended {
+            return Some(None);
+        }
+        if self.repeated == 0 {
+            self.next_item()?;
+        }
+        if self.ended {
+            return Some(None);
+        }
+        self.repeated -= 1;
+        match self.last.clone() {
+            None => Some(None),
+            Some(text) => read(&Item { text }).map(Some),
+        }
+    }
+
+    /// Reads `value`, `n*value`, an empty value or the slash; blanks and one comma separate.
+    fn next_item(&mut self) -> Option<()> {
+        loop {
+            self.rest = self.rest.trim_start_matches([' ', '\t', '\r']);
+            if !self.rest.is_empty() {
+                break;
+            }
+            self.rest = self.lines.next()?;
+        }
+        self.repeated = 1;
+        if self.rest.starts_with('/') {
+            self.ended = true;
+            return Some(());
+        }
+        let digits = self.rest.len()
+            - self
+                .rest
+                .trim_start_matches(|c: char| c.is_ascii_digit())
+                .len();
+        if digits > 0 && self.rest[digits..].starts_with('*') {
+            self.repeated = self.rest[..digits].parse().ok().filter(|n| *n > 0)?;
+            self.rest = &self.rest[digits + 1..];
+        }
+        self.last = match self.rest.chars().next() {
+            Some(quote @ ('\'' | '"')) => Some(self.quoted(quote)?),
+            _ => {
+                let end = self
+                    .rest
+                    .find([' ', '\t', ',', '/', '\r'])
+                    .unwrap_or(self.rest.len());
+                let (word, rest) = self.rest.split_at(end);
+                self.rest = rest;
+                (!word.is_empty()).then(|| word.to_owned())
+            }
+        };
+        self.rest = self.rest.trim_start_matches([' ', '\t', '\r']);
+        self.rest = self.rest.strip_prefix(',').unwrap_or(self.rest);
+        Some(())
+    }
+
+    /// A text in quotes, which stands for itself when it is doubled.
+    fn quoted(&mut self, quote: char) -> Option<String> {
+        let mut text = String::new();
+        let mut rest = &self.rest[1..];
+        loop {
+            let end = rest.find(quote)?;
+            text.push_str(&rest[..end]);
+            rest = &rest[end + 1..];
+            match rest.strip_prefix(quote) {
+                Some(more) => {
+                    text.push(quote);
+                    rest = more;
+                }
+                None => break,
+            }
+        }
+        self.rest = rest;
+        Some(text)
+    }
+}
