@@ -57,6 +57,55 @@ fn tables_are_those_of_the_program_to_the_byte() {
     }
 }
 
+/// Runs `pedr tab` in a folder with the files, the preferences and a list; exit code and what it said.
+fn run_tab(folder: &Path, list: &str, arguments: &[&str]) -> (Option<i32>, String) {
+    for name in FILES.iter().chain(&["PEDR2TAB.PRM"]) {
+        fs::write(folder.join(name), data(name)).unwrap();
+    }
+    fs::write(folder.join("FILELIST"), list).unwrap();
+    let mut command = common::mission::areograph();
+    command
+        .current_dir(folder)
+        .args(["--quiet", "pedr", "tab"])
+        .args(arguments);
+    let output = command.output().unwrap();
+    let said = [output.stdout, output.stderr].concat();
+    (output.status.code(), String::from_utf8(said).unwrap())
+}
+
+#[test]
+fn the_command_takes_the_places_of_the_program() {
+    let folder = tempfile::tempdir().unwrap();
+    let list = FILES.join("\n");
+    let (code, said) = run_tab(folder.path(), &list, &[]);
+    assert_eq!(code, Some(0), "{said}");
+    let table = || fs::read(folder.path().join("BIG.TAB")).unwrap();
+    assert!(table() == data("team.TAB"));
+    let (code, _) = run_tab(folder.path(), &list, &["FILELIST", "--variant", "usgs"]);
+    assert!(code == Some(0) && table() == data("usgs.TAB"));
+
+    // The list ends at a file that is not there: the table as far as it goes, and an error.
+    let broken = format!("{}\nno PEDR\nap09999l.b\n{}\n", FILES[0], FILES[1]);
+    let (code, said) = run_tab(folder.path(), &broken, &[]);
+    assert_eq!(code, Some(6), "{said}");
+    assert!(
+        said.contains("skipping \"no PEDR\"") && said.contains("ap09999l.b: cannot open"),
+        "{said}"
+    );
+    let expected = data("team.TAB");
+    assert!(table().len() < expected.len() && expected.starts_with(&table()));
+    assert!(!folder.path().join("BIG.TAB.part").exists());
+
+    // One file, one table of its own.
+    let own = "T\nT\nF\nF\nF\nF\nF\nF\nF\nF\nT\nT\nF, 'x.TXT'\n";
+    fs::write(folder.path().join("own.prm"), own).unwrap();
+    let (code, said) = run_tab(folder.path(), "", &[FILES[0], "--preferences", "own.prm"]);
+    assert_eq!(code, Some(0), "{said}");
+    assert!(said.contains("own.prm: ends early"), "{said}");
+    let table = fs::read_to_string(folder.path().join("AP00002L.TXT")).unwrap();
+    assert!(table.starts_with("long_East lat_North") && table.lines().all(|line| line.len() == 56));
+}
+
 #[test]
 fn preferences_are_read_as_fortran_reads_lists() {
     let defaults = Preferences::default();

@@ -4,6 +4,7 @@
 //! # Source
 //! PEDR SIS 2.8 as far as its format files are public, and the MOLA team's reader `pedr2tab`.
 
+mod bounds;
 mod check;
 mod chronology;
 mod complaint;

@@ -170,7 +170,7 @@ impl Comparison {
             let rate = 0.5 * (f64::from(rate_a) + f64::from(rate_b));
             f64::from(b) - f64::from(a) - rate * steps
         };
-        let latitude = |spacecraft: bool| {
+        let apart_m = |spacecraft: bool| {
             let [of_a, of_b] = [a, b].map(|record| places(record, spacecraft));
             let metres = of_a.metres_per_microdegree;
             let north = step(of_a.latitude, of_b.latitude, of_a.rates[1], of_b.rates[1]);
@@ -182,10 +182,10 @@ impl Comparison {
             let east = (east + HALF_TURN).rem_euclid(2.0 * HALF_TURN) - HALF_TURN;
             [north.abs() * metres, east.abs() * metres * middle_rad.cos()]
         };
-        let [craft_north_m, craft_east_m] = latitude(true);
+        let [craft_north_m, craft_east_m] = apart_m(true);
         let polar = |record: &Record| record.ground_latitude_microdegrees.get().abs() > POLE;
         let one_attitude = a.attitude_flag == b.attitude_flag;
-        let ground = (one_attitude && !polar(a) && !polar(b)).then(|| latitude(false));
+        let ground = (one_attitude && !polar(a) && !polar(b)).then(|| apart_m(false));
         let centimetres = |a: u32, b: u32, rate_a: i32, rate_b: i32| {
             let rate = 0.5 * (f64::from(rate_a) + f64::from(rate_b));
             (f64::from(b) - f64::from(a) - rate * steps).abs() * METRES_PER_CM
