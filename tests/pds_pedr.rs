@@ -24,7 +24,7 @@ fn values() -> FrameValues {
         spacecraft_longitude_rad: 0.05 * DEGREE,
         spacecraft_longitude_change_rad: -0.2 * DEGREE,
         spacecraft_latitude_rad: 10.0 * DEGREE,
-        spacecraft_latitude_change_rad: 0.2 * DEGREE,
+        spacecraft_latitude_change_rad: 0.1 * DEGREE,
         spacecraft_radius_m: 3_780_000.0,
         spacecraft_radius_change_m: 20.0,
         ground_longitude_rad: 359.99 * DEGREE,
@@ -128,7 +128,7 @@ fn shots_follow_the_rules_of_the_format() {
     assert_angle(last.latitude_rad, 10.0 + 0.0475 + 5e-6);
     assert_angle(first.spacecraft_longitude_rad, 0.05 + 0.095);
     assert_angle(last.spacecraft_longitude_rad, 359.955);
-    assert_angle(last.spacecraft_latitude_rad, 10.095);
+    assert_angle(last.spacecraft_latitude_rad, 10.0475);
     assert_metres(last.spacecraft_radius_m, 3_780_009.5);
     assert_metres(last.areoid_radius_m, 3_391_998.1);
     assert_metres(last.range_m, 388_000.25);

@@ -464,6 +464,47 @@ fn the_residual_is_no_ramp_at_the_first_frame_without_one() {
     }
 }
 
+#[test]
+fn counts_add_up_and_ranges_are_those_of_the_file_itself() {
+    let file = changed(|records| {
+        let index = (0..20).find(|shot| records[200].returned(*shot)).unwrap();
+        let range_cm = records[200].range_cm[index].get();
+        records[200].range_cm[index].set(range_cm + 100_000);
+        records[300].clock_frequency_hz.set(1);
+        records[301].attitude_flag.set(3);
+    });
+    let (counts, complaints) = file.count();
+    assert_eq!(complaints.len(), 2, "{complaints:?}");
+    let text = complaints[0].to_string();
+    assert!(
+        text.contains("record 211: range of shot") && text.contains("m apart; expected equal to"),
+        "{text}"
+    );
+    assert_eq!(
+        (counts.records, counts.spoiled_shots),
+        (file.records().len() as u64, 1)
+    );
+    assert_eq!(counts.shots, 20 * counts.good_records);
+    assert_eq!(counts.good_records, counts.records - 1);
+    let judged = counts.shots - counts.without_return - counts.spoiled_shots;
+    assert_eq!(counts.shots_by_class.values().sum::<u64>(), judged);
+    assert_eq!(counts.shots_by_channel.values().sum::<u64>(), judged);
+    assert_eq!(counts.shots_by_attitude_flag.values().sum::<u64>(), judged);
+    assert_eq!(counts.shots_by_orbit_model.values().sum::<u64>(), judged);
+    assert_eq!(
+        counts.records_by_orbit.values().sum::<u64>(),
+        counts.good_records
+    );
+    let unknown = counts.shots_by_attitude_flag[&3];
+    let [ground, other] = [
+        &counts.ground_range_minus_distance_m,
+        &counts.other_range_minus_distance_m,
+    ];
+    assert_eq!(u64::from(ground.n + other.n), judged - unknown);
+    // A microdegree is 0.06 m, a range is told to 0.01 m.
+    assert!(ground.mean.abs() < 0.03 && ground.nmad < 0.06, "{ground:?}");
+}
+
 /// The complaints of a label after a change of its text.
 fn label_said(from: &str, to: &str) -> Vec<String> {
     assert_eq!(from.len(), to.len());

@@ -114,6 +114,12 @@ impl Form for Globs {
                         if !review.admit(&path, span.clone(), &found.key) {
                             break;
                         }
+                        if let Err(error) = std::fs::File::open(&path) {
+                            let expected =
+                                format!("files that can be read: {}: {error}", path.display());
+                            review.refuse(span, &found.key, expected);
+                            break;
+                        }
                         let identity = path.canonicalize().unwrap_or_else(|_| path.clone());
                         by_identity.entry(identity).or_insert(path);
                     }
@@ -174,15 +180,9 @@ fn matches(folder: &Path, glob: &str) -> Result<Vec<PathBuf>, String> {
             )
         })?;
         match path.metadata() {
-            // A file that is passed over would be missed by nobody.
-            Ok(found) if found.is_file() => {
-                let readable = std::fs::File::open(&path);
-                let refused =
-                    |error| format!("files that can be read: {}: {error}", path.display());
-                readable.map_err(refused)?;
-                files.push(path);
-            }
+            Ok(found) if found.is_file() => files.push(path),
             Ok(_) => {}
+            // A file that is passed over would be missed by nobody.
             Err(error) => {
                 return Err(format!(
                     "files that are there: {} leads nowhere: {error}",

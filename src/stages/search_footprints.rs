@@ -1,5 +1,6 @@
 //! Searches PEDR files for the shots in a site's windows: one pass over every file for all windows.
 
+mod left_out;
 mod repeats;
 
 use std::{
@@ -120,7 +121,9 @@ impl Stage for SearchFootprints<'_> {
     }
 
     fn findings(&self, result: &SearchResult) -> Vec<String> {
-        left_out(result)
+        let spoiled = result.rejected.get(&ShotRejection::Spoiled);
+        let spoiled = spoiled.copied().unwrap_or_default();
+        left_out::findings(&result.complaints, &result.complaint_counts, spoiled)
     }
 
     fn examine(&self) -> Vec<Result<String>> {
@@ -129,22 +132,6 @@ impl Stage for SearchFootprints<'_> {
             .map(|path| examine_file(path, self.pedr.datum))
             .collect()
     }
-}
-
-/// The findings of a search: what was left out, in numbers and with the first example.
-fn left_out(result: &SearchResult) -> Vec<String> {
-    let bad: u64 = result.complaint_counts.values().sum();
-    let first = result.complaints.first();
-    let first = first.map(|complaint| {
-        format!(
-            "{bad} complaint{} of PEDR files, the first: {complaint}",
-            if bad == 1 { "" } else { "s" }
-        )
-    });
-    let spoiled = result.rejected.get(&ShotRejection::Spoiled);
-    let spoiled =
-        spoiled.map(|shots| format!("{shots} shots in the windows left out for spoiled values"));
-    first.into_iter().chain(spoiled).collect()
 }
 
 /// What can be said of a PEDR file without searching it.

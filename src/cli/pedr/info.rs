@@ -137,7 +137,12 @@ fn line(key: &str, value: impl Display) {
 
 fn counted<K: Display>(counts: &BTreeMap<K, u64>) -> String {
     let counts = counts.iter().map(|(key, count)| format!("{key}: {count}"));
-    counts.collect::<Vec<_>>().join(", ")
+    let counts = counts.collect::<Vec<_>>().join(", ");
+    if counts.is_empty() {
+        "none".to_owned()
+    } else {
+        counts
+    }
 }
 
 fn statistics(of: &str, residuals_m: &Summary) {
@@ -150,8 +155,12 @@ fn statistics(of: &str, residuals_m: &Summary) {
         min,
         max,
     } = residuals_m;
+    let key = format!("range-distance {of}");
+    if *n == 0 {
+        return line(&key, "0 shots");
+    }
     line(
-        &format!("range-distance {of}"),
+        &key,
         format_args!(
             "{n} shots, mean {mean:.3} m, sd {standard_deviation:.3} m, median {median:.3} m, NMAD {nmad:.3} m, \
              {min:.3} to {max:.3} m"

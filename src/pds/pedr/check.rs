@@ -1,53 +1,19 @@
 //! Impossible values: what no record of a healthy file holds, whatever stands around it.
-//!
-//! Every bound follows from the format or from physics, with its reason beside it; `docs/records.md` has them in one table.
 
-use std::ops::RangeInclusive;
+use zerocopy::byteorder::big_endian::I32;
 
-use super::{FieldGuard, Record, RecordError};
+use super::{
+    FieldGuard, Record, RecordError,
+    bounds::{
+        AREOID_CHANGE_MAX_CM, AREOID_M, CLIMB_MAX_CM, CROSSOVER_MAX_CM, EARLIER_ORBIT_CM,
+        FLIGHT_MAX_M, FREQUENCY_HZ, LATITUDE, LONGITUDE, MAPPING_ORBIT_CM, MISSION_S, OFF_NADIR,
+        RADIUS_CM, TIMES_AGREE_S, TRACK_MAX_M,
+    },
+};
 use crate::{
     constants::MARS_IAU2000,
     units::{METRES_PER_CM, RADIANS_PER_MICRODEGREE},
 };
-
-/// The mission at Mars, ET seconds: from the day of orbit insertion, 1997-09-12, to the day of the last contact, 2006-11-02.
-pub(super) const MISSION_S: RangeInclusive<f64> = -72_705_600.0..=215_784_000.0;
-/// Radii of Mars that a laser return can have, centimetres: Hellas lies near 3.38e6 m, Olympus Mons
-/// near 3.42e6 m; clouds and noise stay within the range gate.
-pub(super) const RADIUS_CM: RangeInclusive<i32> = 330_000_000..=345_000_000;
-/// Two possible radii differ by this at most, metres.
-pub(super) const RELIEF_MAX_M: f64 = (*RADIUS_CM.end() - *RADIUS_CM.start()) as f64 * METRES_PER_CM;
-/// Distance of the spacecraft from the centre of Mars in mapping orbit, centimetres.
-pub(super) const MAPPING_ORBIT_CM: RangeInclusive<u32> = 340_000_000..=420_000_000;
-/// The same before mapping, when the orbit was still an ellipse.
-pub(super) const EARLIER_ORBIT_CM: RangeInclusive<u32> = 340_000_000..=2_200_000_000;
-/// Largest change of that distance over a frame, centimetres: 3 km/s, more than the radial part of the 4.7 km/s at the
-/// periapsis of the first, longest orbits.
-pub(super) const CLIMB_MAX_CM: i32 = 600_000;
-/// Clock frequencies, hertz: one per cent about the nominal 100 MHz.
-const FREQUENCY_HZ: RangeInclusive<u32> = 99_000_000..=101_000_000;
-/// Latitudes, microdegrees.
-const LATITUDE: RangeInclusive<i32> = -90_000_000..=90_000_000;
-/// Longitudes, microdegrees: of one turn east, or one west as readers have taken them.
-const LONGITUDE: RangeInclusive<i32> = -360_000_000..=360_000_000;
-/// Largest way of the spacecraft over a frame, metres: 7.5 km/s; it was at most 4.7 km/s fast.
-const FLIGHT_MAX_M: f64 = 15_000.0;
-/// Largest way of the ground track over a frame, metres: 25 km/s. The spacecraft flies 3 km/s, the rest is a beam that
-/// turns by several degrees a second, faster than the spacecraft ever did.
-const TRACK_MAX_M: f64 = 50_000.0;
-/// The areoid is this near to the ellipsoid, metres: it rises 2 km above it at Tharsis, and the radii of older ellipsoids
-/// differ by 3 km.
-const AREOID_M: f64 = 5_000.0;
-/// Largest change of the areoid over a frame, centimetres: one per cent of the longest way; Mars' flattening makes 0.6 %.
-pub(super) const AREOID_CHANGE_MAX_CM: i32 = 50_000;
-/// Largest crossover residual, centimetres: radial errors of orbits before the adjustment were tens of metres, of the
-/// worst orbits hundreds.
-pub(super) const CROSSOVER_MAX_CM: i32 = 100_000;
-/// Off-nadir angles, microdegrees.
-const OFF_NADIR: RangeInclusive<i32> = -90_000_000..=90_000_000;
-/// Largest difference between the two times of a record, seconds: the last digit of the integers, and
-/// room for the rounding of the double.
-const TIMES_AGREE_S: f64 = 1.1e-6;
 
 impl Record {
     /// Whether shot `shot` (0 to 19) came back.
@@ -173,7 +139,7 @@ impl Record {
                 FLIGHT_MAX_M,
             ),
         ] {
-            let changes = changes.map(|change| change.get());
+            let changes = changes.map(I32::get);
             let [east_rad, north_rad] =
                 changes.map(|change| f64::from(change) * RADIANS_PER_MICRODEGREE);
             let latitude_rad = f64::from(latitude.get()) * RADIANS_PER_MICRODEGREE;
@@ -240,6 +206,8 @@ mod tests {
 
     const GUARD: Option<f64> = Some(7.25);
 
+    type Spoil = fn(&mut Record);
+
     fn good() -> Record {
         Record::from_frame(&FrameValues {
             time_s: 38_000_000.25,
@@ -267,7 +235,6 @@ mod tests {
     #[test]
     fn each_impossible_value_is_named() {
         assert_eq!(good().check(true, FieldGuard::new(GUARD)), Ok(()));
-        type Spoil = fn(&mut Record);
         let cases: [(Spoil, Reason, &str); 14] = [
             (
                 |record| record.time_s.set(f64::NAN),

@@ -2,8 +2,8 @@
 
 use std::collections::BTreeMap;
 
-/// Mid-points of two frames nearer to each other than this share a shot, seconds: a frame is 20 shots of 0.1 s, less one.
-pub(super) const APART_S: f64 = 1.9;
+use super::bounds::APART_S;
+
 /// As many successive records that go on in time are a block at the wrong place, not wild times.
 const BLOCK: usize = 4;
 

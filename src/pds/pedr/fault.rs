@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{check, neighbours::Quantity};
+use super::{bounds, quantity::Quantity};
 
 /// Why a file or record is complained of.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
@@ -61,7 +61,7 @@ pub enum RecordError {
     /// The spacecraft was not at Mars then.
     #[error(
         "time is ET {} s; expected {} to {} s, the mission at Mars",
-        legible(*.0), check::MISSION_S.start(), check::MISSION_S.end()
+        legible(*.0), bounds::MISSION_S.start(), bounds::MISSION_S.end()
     )]
     OutsideMission(f64),
     /// The double and the two integers disagree.
@@ -78,7 +78,7 @@ pub enum RecordError {
     /// The same shots stand in another record of the file.
     #[error(
         "time is {time_s} s, the shots of record {record} once more; expected every shot once, frames {} s or more apart",
-        super::chronology::APART_S
+        bounds::APART_S
     )]
     Repeated {
         /// Mid-point, ET seconds.
@@ -124,17 +124,17 @@ pub enum RecordError {
     },
     /// Distance of the spacecraft, centimetres.
     #[error("the spacecraft is {0} cm from the centre of Mars; expected {min} to {max}",
-        min = if *.1 { check::MAPPING_ORBIT_CM.start() } else { check::EARLIER_ORBIT_CM.start() },
-        max = if *.1 { check::MAPPING_ORBIT_CM.end() } else { check::EARLIER_ORBIT_CM.end() })]
+        min = if *.1 { bounds::MAPPING_ORBIT_CM.start() } else { bounds::EARLIER_ORBIT_CM.start() },
+        max = if *.1 { bounds::MAPPING_ORBIT_CM.end() } else { bounds::EARLIER_ORBIT_CM.end() })]
     SpacecraftRadius(u32, bool),
     /// Change of the distance of the spacecraft over the frame, centimetres.
     #[error(
-        "the spacecraft rises by {0} cm over the frame; expected at most {limit} either way", limit = check::CLIMB_MAX_CM)]
+        "the spacecraft rises by {0} cm over the frame; expected at most {limit} either way", limit = bounds::CLIMB_MAX_CM)]
     Climb(i32),
     /// Radius of a returned shot (0: of the mid-point), centimetres.
     #[error("radius of {} is {centimetres} cm; expected {} to {} for a return",
         if *.shot == 0 { "the mid-point".to_owned() } else { format!("shot {shot}") },
-        check::RADIUS_CM.start(), check::RADIUS_CM.end())]
+        bounds::RADIUS_CM.start(), bounds::RADIUS_CM.end())]
     Radius {
         /// Shot, 1 to 20, or 0 for the mid-point.
         shot: u8,
@@ -145,7 +145,7 @@ pub enum RecordError {
     #[error(
         "radius of the mid-point is {centimetres} cm, {apart_m:.0} m from that of the nearest return; expected at most \
          {} m",
-        super::shots::MID_RADIUS_M
+        bounds::MID_RADIUS_M
     )]
     MidRadius {
         /// The value of the record.
@@ -187,7 +187,7 @@ pub enum RecordError {
     },
     /// Crossover residual, centimetres.
     #[error(
-        "crossover residual is {0} cm; expected at most {limit} either way", limit = check::CROSSOVER_MAX_CM)]
+        "crossover residual is {0} cm; expected at most {limit} either way", limit = bounds::CROSSOVER_MAX_CM)]
     Crossover(i32),
     /// Areoid radius, centimetres.
     #[error("areoid radius is {centimetres} cm; expected {} to {} at this latitude", .expected_cm[0], .expected_cm[1])]
@@ -199,7 +199,7 @@ pub enum RecordError {
     },
     /// Change of the areoid radius over the frame, centimetres.
     #[error(
-        "the areoid rises by {0} cm over the frame; expected at most {limit} either way", limit = check::AREOID_CHANGE_MAX_CM)]
+        "the areoid rises by {0} cm over the frame; expected at most {limit} either way", limit = bounds::AREOID_CHANGE_MAX_CM)]
     AreoidChange(i32),
     /// Off-nadir angle, microdegrees.
     #[error("off-nadir angle is {0} microdegrees; expected at most 90 degrees")]

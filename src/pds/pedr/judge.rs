@@ -28,15 +28,12 @@ impl File {
         let last = (end + NEIGHBOURS).min(held.end);
         let errors = self.judge(first..last, guard);
         (start..end).map(move |row| {
-            let frame = match errors[row - first] {
-                Some(error) => Err(error),
-                None => {
-                    let good = |row: usize| errors.get(row.wrapping_sub(first)) == Some(&None);
-                    let before_m = self.crossover_before_m(row, guard, good);
-                    Ok(Frame::new(self.record(row), guard, before_m))
-                }
-            };
-            (row, frame)
+            if let Some(error) = errors[row - first] {
+                return (row, Err(error));
+            }
+            let good = |row: usize| errors.get(row.wrapping_sub(first)) == Some(&None);
+            let before_m = self.crossover_before_m(row, guard, good);
+            (row, Ok(Frame::new(self.record(row), guard, before_m)))
         })
     }
 

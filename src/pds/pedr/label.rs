@@ -119,7 +119,7 @@ impl PedrLabel {
             match said {
                 Some(said) if said == expected => {}
                 Some(said) => {
-                    found.push(format!("{key} of the label is {said}; expected {expected}"))
+                    found.push(format!("{key} of the label is {said}; expected {expected}"));
                 }
                 None => found.push(format!("the label has no {key}; expected {expected}")),
             }

@@ -2,7 +2,7 @@
 
 use zerocopy::byteorder::big_endian::I32;
 
-use super::{PARALLAX_UNIT_RAD_PER_M, Record, check::RELIEF_MAX_M};
+use super::{PARALLAX_UNIT_RAD_PER_M, Record, bounds::RELIEF_MAX_M};
 use crate::units::RADIANS_PER_MICRODEGREE;
 
 /// The ground at the mid-point of a frame, and what is around it.

@@ -4,6 +4,7 @@
 //! # Source
 //! PEDR SIS 2.8 as far as its format files are public, and the MOLA team's reader `pedr2tab`.
 
+mod bounds;
 mod check;
 mod chronology;
 mod complaint;
@@ -18,6 +19,7 @@ mod judge;
 mod label;
 mod mid_point;
 mod neighbours;
+mod quantity;
 mod reader;
 mod record;
 mod shots;
@@ -31,7 +33,7 @@ pub use frame::{FieldGuard, Frame};
 pub use frame_values::{EncodeError, FrameValues};
 pub use label::{FileName, PedrLabel, decide_datum};
 pub use mid_point::MidPoint;
-pub use neighbours::Quantity;
+pub use quantity::Quantity;
 pub use reader::{Reader, Stretch};
 pub use record::{RECORD_BYTES, Record};
 pub use shots::SpoiledShots;

@@ -1,14 +1,14 @@
 //! The shots of a frame against its own positions: range, radius, parallax. No kernel is needed.
 
-use super::{Frame, RecordError, SHOTS, check::RADIUS_CM};
+use super::{
+    Frame, RecordError, SHOTS,
+    bounds::{MID_RADIUS_M, RADIUS_CM},
+};
 use crate::{
     geom::ellipsoid::{local_axes, spherical_to_xyz_m},
     units::{METRES_PER_CM, RADIANS_PER_MICRODEGREE},
 };
 
-/// The radius of the mid-point lies this near to that of some return, metres: more than any slope of Mars over the 6 km
-/// of a frame.
-pub(super) const MID_RADIUS_M: f64 = 10_000.0;
 /// Range and distance of spacecraft and footprint come from one orbit and agree to about a metre; this much more is
 /// left to what no public document tells, metres.
 const DISTANCE_M: f64 = 10.0;

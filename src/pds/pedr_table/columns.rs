@@ -84,7 +84,7 @@ const USGS_HEADINGS: [[&str; 2]; 2] = [
 
 impl Variant {
     /// The two lines of headings.
-    pub(super) fn headings(self, groups: &[bool; 8]) -> String {
+    pub(super) fn headings(self, groups: [bool; 8]) -> String {
         let mut lines = String::new();
         for line in 0..2 {
             for (group, _) in groups.iter().enumerate().filter(|(_, printed)| **printed) {
@@ -100,7 +100,7 @@ impl Variant {
     }
 
     /// Appends the line of a shot.
-    pub(super) fn line(self, text: &mut String, groups: &[bool; 8], row: &Row) {
+    pub(super) fn line(self, text: &mut String, groups: [bool; 8], row: &Row) {
         for (group, _) in groups.iter().enumerate().filter(|(_, printed)| **printed) {
             self.group(text, group, row);
         }

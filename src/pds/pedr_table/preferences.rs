@@ -2,6 +2,10 @@
 
 /// Preferences of a table, with the program's defaults.
 #[derive(Debug, Clone, PartialEq)]
+#[allow(
+    clippy::struct_excessive_bools,
+    reason = "the switches of the program's file"
+)]
 pub struct Preferences {
     /// Two lines of headings.
     pub headings: bool,
@@ -58,11 +62,11 @@ impl Preferences {
     #[must_use]
     pub fn parse(text: &str) -> Self {
         let mut preferences = Self::default();
-        preferences.is_whole = preferences.read(&mut Lines::of(text)).is_some();
+        preferences.is_whole = preferences.read(&mut Lines::of(text)).is_ok();
         preferences
     }
 
-    fn read(&mut self, lines: &mut Lines<'_>) -> Option<()> {
+    fn read(&mut self, lines: &mut Lines<'_>) -> Result<(), Ended> {
         lines.logical(&mut self.headings)?;
         for group in &mut self.groups {
             lines.logical(group)?;
@@ -84,9 +88,12 @@ impl Preferences {
         let inverse_flattening = lines.value(real)?.unwrap_or(0.0);
         let axes = 1.0 - 1.0 / inverse_flattening;
         self.axes_squared = 1.0 / (axes * axes);
-        Some(())
+        Ok(())
     }
 }
+
+/// The file ends, or holds something else than the program reads.
+struct Ended;
 
 /// One value of a list.
 struct Item {
@@ -142,27 +149,27 @@ impl<'a> Lines<'a> {
         self.repeated = 0;
     }
 
-    fn logical(&mut self, value: &mut bool) -> Option<()> {
+    fn logical(&mut self, value: &mut bool) -> Result<(), Ended> {
         self.statement();
         *value = self.value(logical)?.unwrap_or(*value);
-        Some(())
+        Ok(())
     }
 
-    /// The next value: `None` at the end of the file or for one of another kind, `Some(None)` for an empty one.
-    fn value<T>(&mut self, read: impl Fn(&Item) -> Option<T>) -> Option<Option<T>> {
+    /// The next value, `None` for an empty one; an error at the end of the file or for one of another kind.
+    fn value<T>(&mut self, read: impl Fn(&Item) -> Option<T>) -> Result<Option<T>, Ended> {
         if self.ended {
-            return Some(None);
+            return Ok(None);
         }
         if self.repeated == 0 {
-            self.next_item()?;
+            self.next_item().ok_or(Ended)?;
         }
         if self.ended {
-            return Some(None);
+            return Ok(None);
         }
         self.repeated -= 1;
         match self.last.clone() {
-            None => Some(None),
-            Some(text) => read(&Item { text }).map(Some),
+            None => Ok(None),
+            Some(text) => read(&Item { text }).map(Some).ok_or(Ended),
         }
     }
 
@@ -189,17 +196,14 @@ impl<'a> Lines<'a> {
             self.repeated = self.rest[..digits].parse().ok().filter(|n| *n > 0)?;
             self.rest = &self.rest[digits + 1..];
         }
-        self.last = match self.rest.chars().next() {
-            Some(quote @ ('\'' | '"')) => Some(self.quoted(quote)?),
-            _ => {
-                let end = self
-                    .rest
-                    .find([' ', '\t', ',', '/', '\r'])
-                    .unwrap_or(self.rest.len());
-                let (word, rest) = self.rest.split_at(end);
-                self.rest = rest;
-                (!word.is_empty()).then(|| word.to_owned())
-            }
+        let quote = self.rest.chars().next().filter(|c| matches!(c, '\'' | '"'));
+        self.last = if let Some(quote) = quote {
+            Some(self.quoted(quote)?)
+        } else {
+            let end = self.rest.find([' ', '\t', ',', '/', '\r']);
+            let (word, rest) = self.rest.split_at(end.unwrap_or(self.rest.len()));
+            self.rest = rest;
+            (!word.is_empty()).then(|| word.to_owned())
         };
         self.rest = self.rest.trim_start_matches([' ', '\t', '\r']);
         self.rest = self.rest.strip_prefix(',').unwrap_or(self.rest);

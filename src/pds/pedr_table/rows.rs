@@ -19,6 +19,8 @@ pub enum Rules {
 
 /// Threshold gains by channel, millivolts; single precision as in the program.
 const GAINS_MV: [f32; 4] = [2.29, 1.32, 0.763, 0.440];
+/// Shots of a frame.
+const SHOTS_OF_FRAME: u8 = 20;
 /// Text that is gathered before it is written, bytes.
 const TEXT: usize = 1 << 16;
 
@@ -78,7 +80,7 @@ impl Table {
         if !self.preferences.headings {
             return Ok(());
         }
-        let headings = self.variant.headings(&self.preferences.groups);
+        let headings = self.variant.headings(self.preferences.groups);
         out.write_all(headings.as_bytes())
     }
 
@@ -116,7 +118,7 @@ impl Table {
         for record in file.records() {
             let latitude_deg = 1e-6 * f64::from(record.ground_latitude_microdegrees.get());
             let longitude_deg = 1e-6 * f64::from(record.ground_longitude_microdegrees.get());
-            let within = |value: f64, [least, most]: [f64; 2]| value >= least && value <= most;
+            let within = |value: f64, [least, most]: [f64; 2]| (least..=most).contains(&value);
             if !within(latitude_deg, self.preferences.latitude_deg)
                 || !within(longitude_deg, self.preferences.longitude_deg)
             {
@@ -125,8 +127,8 @@ impl Table {
             if model(record) >= self.gate {
                 self.correct_by_program(record);
             }
-            for shot in 0..20 {
-                if self.is_wanted(record, shot) {
+            for shot in 0..SHOTS_OF_FRAME {
+                if self.is_wanted(record, usize::from(shot)) {
                     let row = self.row(record, shot, &self.corrections);
                     self.line(&mut text, &row);
                 }
@@ -185,11 +187,11 @@ impl Table {
                     corrections.crossover_m = guard.crossover_m(record).unwrap_or(0.0);
                     corrections.crossover_change_m = frame.crossover_change_m();
                 }
-                for shot in (0_u8..20).filter(|shot| !spoiled.contains(shot + 1)) {
+                for shot in (0..SHOTS_OF_FRAME).filter(|shot| !spoiled.contains(shot + 1)) {
                     if !self.is_wanted(record, usize::from(shot)) {
                         continue;
                     }
-                    let row = self.row(record, usize::from(shot), &corrections);
+                    let row = self.row(record, shot, &corrections);
                     if self.preferences.holds(&row) {
                         self.line(&mut text, &row);
                     }
@@ -210,14 +212,16 @@ impl Table {
     }
 
     fn line(&mut self, text: &mut String, row: &Row) {
-        self.variant.line(text, &self.preferences.groups, row);
+        self.variant.line(text, self.preferences.groups, row);
         self.shots += 1;
     }
 
     /// The values of shot `shot`, counted from 0.
-    fn row(&self, record: &Record, shot: usize, corrections: &Corrections) -> Row {
-        let x = (shot as f64 + 1.0 - 10.5) / 20.0;
-        let raw_m = 0.01 * f64::from(record.shot_radius_cm[shot].get());
+    fn row(&self, record: &Record, shot: u8, corrections: &Corrections) -> Row {
+        let number = f64::from(shot) + 1.0;
+        let x = (number - 10.5) / 20.0;
+        let index = usize::from(shot);
+        let raw_m = 0.01 * f64::from(record.shot_radius_cm[index].get());
         let higher_m = raw_m - 1e-2 * f64::from(record.mid_radius_cm.get());
         let radius_m = raw_m - corrections.crossover_m - x * corrections.crossover_change_m;
         let [ground_longitude, ground_latitude] = [
@@ -237,11 +241,11 @@ impl Table {
             longitude_deg: one_turn(ground_longitude + corrections.longitude_deg_per_m * higher_m),
             latitude_deg,
             topography_m: radius_m - areoid_radius_m,
-            range_m: 0.01 * f64::from(record.range_cm[shot].get()),
+            range_m: 0.01 * f64::from(record.range_cm[index].get()),
             radius_m,
-            channel: i64::from(record.channel[shot].cast_signed()),
+            channel: i64::from(record.channel[index].cast_signed()),
             flag: i64::from(record.attitude_flag.get().cast_signed())
-                + if record.class[shot].get() == 0 { 4 } else { 0 },
+                + if record.class[index].get() == 0 { 4 } else { 0 },
             spacecraft_longitude_deg: one_turn(self.linear(
                 1e-6,
                 record.spacecraft_longitude_microdegrees.get(),
@@ -256,12 +260,14 @@ impl Table {
             ),
             spacecraft_radius_m: self.spacecraft_radius_m(record, x),
             off_nadir_deg: 1e-6 * f64::from(record.off_nadir_microdegrees.get()),
-            et_s: self.time_s(record, shot),
+            et_s: self.time_s(record, number),
             areoid_radius_m,
             orbit: i64::from(record.orbit.get().cast_signed()),
             orbit_model: i64::from(model(record)),
             packet: i64::from(record.packet.get() & 0x3FFF),
-            shot: shot as i64 + 1 + 20 * (i64::from(record.frame_index.get().cast_signed()) - 1),
+            shot: i64::from(shot)
+                + 1
+                + 20 * (i64::from(record.frame_index.get().cast_signed()) - 1),
             ..Row::default()
         };
         if self.preferences.areographic {
@@ -270,8 +276,8 @@ impl Table {
             row.areographic_latitude_deg =
                 to_degrees * (self.preferences.axes_squared * tangent).atan();
         }
-        self.illumination(record, &mut row);
-        self.pulses(record, shot, &mut row);
+        illumination(record, &mut row);
+        self.pulses(record, index, &mut row);
         row
     }
 
@@ -298,7 +304,7 @@ impl Table {
         }
     }
 
-    fn time_s(&self, record: &Record, shot: usize) -> f64 {
+    fn time_s(&self, record: &Record, number: f64) -> f64 {
         let mid_s = match self.variant {
             Variant::Team => record.time_s.get(),
             Variant::Usgs => {
@@ -307,17 +313,7 @@ impl Table {
             }
         };
         let frequency_ghz = 1e-9 * f64::from(record.clock_frequency_hz.get().cast_signed());
-        mid_s + (0.01 / frequency_ghz) * (shot as f64 + 1.0 - 10.5)
-    }
-
-    fn illumination(&self, record: &Record, row: &mut Row) {
-        let degrees = |angle: u16| f64::from(angle.cast_signed()) * 0.0180 / PI;
-        row.local_hour = 12.0 + f64::from(record.local_time.get()) * 0.0012 / PI;
-        row.phase_deg = degrees(record.phase_angle.get());
-        row.incidence_deg = degrees(record.solar_incidence.get());
-        row.emission_deg = degrees(record.emission_angle.get());
-        row.range_window_m = 1e-2 * f64::from(record.range_window_cm.get());
-        row.range_delay_m = 1e-2 * f64::from(record.range_delay_cm.get());
+        mid_s + (0.01 / frequency_ghz) * (number - 10.5)
     }
 
     fn pulses(&self, record: &Record, shot: usize, row: &mut Row) {
@@ -349,13 +345,24 @@ impl Table {
 impl Preferences {
     /// Whether the window holds a shot, whichever turn its limits are written in.
     fn holds(&self, row: &Row) -> bool {
-        let within = |value: f64, [least, most]: [f64; 2]| value >= least && value <= most;
+        let within = |value: f64, [least, most]: [f64; 2]| (least..=most).contains(&value);
         let turns = [-360.0, 0.0, 360.0].map(|turn| row.longitude_deg + turn);
         within(row.latitude_deg, self.latitude_deg)
             && turns
                 .into_iter()
                 .any(|longitude_deg| within(longitude_deg, self.longitude_deg))
     }
+}
+
+/// Angles of the Sun and the range gate.
+fn illumination(record: &Record, row: &mut Row) {
+    let degrees = |angle: u16| f64::from(angle.cast_signed()) * 0.0180 / PI;
+    row.local_hour = 12.0 + f64::from(record.local_time.get()) * 0.0012 / PI;
+    row.phase_deg = degrees(record.phase_angle.get());
+    row.incidence_deg = degrees(record.solar_incidence.get());
+    row.emission_deg = degrees(record.emission_angle.get());
+    row.range_window_m = 1e-2 * f64::from(record.range_window_cm.get());
+    row.range_delay_m = 1e-2 * f64::from(record.range_delay_cm.get());
 }
 
 fn model(record: &Record) -> i16 {
