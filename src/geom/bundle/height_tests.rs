@@ -12,7 +12,7 @@ use super::{
     reduce::Settled,
     solve,
     solve::{Stop, settle},
-    tests::{dense_rows, layout, network},
+    tests::{attitude_clock, dense_rows, layout, network},
 };
 use crate::geom::{
     pushbroom::{EulerPolynomial, ExteriorOrientation, Sighting},
@@ -41,6 +41,14 @@ fn measured(mut network: Network<EulerPolynomial>) -> Network<EulerPolynomial> {
 
 /// Two profiles east and west of the points, `above_m` over the ground that these have.
 fn surface(network: &Network<EulerPolynomial>, above_m: f64) -> LaserSurface {
+    surface_with(network, above_m, &SurfaceOptions::default())
+}
+
+fn surface_with(
+    network: &Network<EulerPolynomial>,
+    above_m: f64,
+    options: &SurfaceOptions,
+) -> LaserSurface {
     let shots = [-800.0, 500.0].into_iter().enumerate();
     let shots: Vec<SurfaceShot> = shots
         .flat_map(|(profile, east_m)| {
@@ -59,7 +67,7 @@ fn surface(network: &Network<EulerPolynomial>, above_m: f64) -> LaserSurface {
             })
         })
         .collect();
-    LaserSurface::new(&shots, &[], &SurfaceOptions::default()).unwrap()
+    LaserSurface::new(&shots, &[], options).unwrap()
 }
 
 /// Where the network settles with heights of full covariance, and all that can be said of it.
@@ -120,8 +128,25 @@ fn dense(
 
 #[test]
 fn heights_by_parts_equal_the_dense_equations() {
-    let mut network = network();
+    let network = network();
     let surface = surface(&network, 35.0);
+    are_those_of_the_dense_equations(network, &surface);
+}
+
+#[test]
+fn relief_and_the_attitudes_clock_by_parts_equal_the_dense_equations() {
+    let mut network = network();
+    network.attitude_clock = Some(attitude_clock());
+    let options = SurfaceOptions {
+        relief_sigma_m: Some(70.0),
+        ..SurfaceOptions::default()
+    };
+    let surface = surface_with(&network, 35.0, &options);
+    are_those_of_the_dense_equations(network, &surface);
+}
+
+/// The equations of `network` with heights above `surface`, solved by parts, and what is said of the solution.
+fn are_those_of_the_dense_equations(mut network: Network<EulerPolynomial>, surface: &LaserSurface) {
     network.heights = Some(HeightControl {
         surface: surface.clone(),
         compared: Vec::new(),
@@ -129,7 +154,7 @@ fn heights_by_parts_equal_the_dense_equations() {
     });
     let (mut layout, start, active) = layout(&network);
     let shared = layout.columns.len();
-    let heights = Heights::at(&surface, CONTROLLED.collect(), &start);
+    let heights = Heights::at(surface, CONTROLLED.collect(), &start);
     let start = layout.linearise(start);
     let groups = PointGroups::of(&layout, active.clone());
     let before = dense(&layout, &start, &heights, active.len());
