@@ -3,8 +3,8 @@
 use nalgebra::{DMatrix, DVector, Vector2, Vector3};
 
 use super::{
-    AttitudeClock, BundleImage, BundleOptions, BundlePoint, KnownCoordinates, Network,
-    ORIENTATION_UNKNOWNS, Range, View,
+    BundleImage, BundleOptions, BundlePoint, KnownCoordinates, Network, ORIENTATION_UNKNOWNS,
+    Range, View,
     factor::Factor,
     groups::PointGroups,
     layout::{Layout, Linearised},
@@ -99,18 +99,6 @@ pub(super) fn network() -> Network<EulerPolynomial> {
     network
 }
 
-/// A clock of the attitude: the first and the last image follow nadir, the second is held towards a star.
-pub(super) fn attitude_clock() -> AttitudeClock {
-    AttitudeClock {
-        sigma_s: 1.0,
-        turns_rad_s: vec![
-            Vector3::new(1e-5, -8.7e-4, 2e-5),
-            Vector3::new(-7e-6, 1e-6, 0.0),
-            Vector3::new(3e-5, 8.6e-4, -1e-5),
-        ],
-    }
-}
-
 pub(super) fn layout(
     network: &Network<EulerPolynomial>,
 ) -> (Layout<'_, EulerPolynomial>, State, Vec<usize>) {
@@ -123,10 +111,7 @@ pub(super) fn layout(
 
 #[test]
 fn derivatives_equal_central_differences() {
-    let network = Network {
-        attitude_clock: Some(attitude_clock()),
-        ..network()
-    };
+    let network = network();
     let (layout, start, _) = layout(&network);
     // Also away from the initial values: rotations of 1e-3 to 1e-2 rad.
     let corrections = DVector::from_fn(layout.columns.len(), |column, _| {
@@ -202,17 +187,6 @@ fn derivatives_at(
                 let numeric = (ahead[axis] - behind[axis]) / (2.0 * step);
                 close(numeric, partials[unknown], scale.max(1e-2));
             }
-        }
-        // A hundredth of a second turns by 9e-6 rad at most.
-        let clock = layout.columns.attitude_clock;
-        let ahead = view(&at(clock, 1e-2, Vector3::zeros(), entry.point), index);
-        let behind = view(&at(clock, -1e-2, Vector3::zeros(), entry.point), index);
-        let turn_rad_s = &attitude_clock().turns_rad_s[entry.image];
-        let scale = analytic.map(|row| row.by_rotation.norm() * turn_rad_s.norm());
-        for axis in 0..2 {
-            let numeric = (ahead[axis] - behind[axis]) / 2e-2;
-            let expected = analytic[axis].by_rotation.dot(turn_rad_s);
-            close(numeric, expected, scale[0].max(scale[1]));
         }
         for axis in 0..3 {
             let mut step_m = Vector3::zeros();
