@@ -85,6 +85,7 @@ impl Site {
                 sigmas: image.sigmas,
                 time_bias_sigma_s: 0.0,
                 turn_rad_s: Vector3::zeros(),
+                expected_m: Vector3::zeros(),
             })
             .collect();
         let shots = LaserShots {

@@ -4,7 +4,8 @@
 #![allow(
     clippy::unwrap_used,
     clippy::panic,
-    reason = "helpers of tests may fail loudly"
+    clippy::disallowed_methods,
+    reason = "helpers of tests may fail loudly, and write site files"
 )]
 
 #[path = "truth/across.rs"]
@@ -18,6 +19,8 @@ mod footprint_heights;
 mod light_time;
 #[path = "truth/misregistration.rs"]
 mod misregistration;
+#[path = "truth/orbit.rs"]
+mod orbit;
 #[path = "truth/relief.rs"]
 mod relief;
 

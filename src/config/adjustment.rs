@@ -81,6 +81,12 @@ declare_table! {
         attitude_clock_rotation_sigma_rad as "attitude_clock_rotation_sigma_arcsec": f64 = key(SIGMA)
             .or(20.6)
             .map(|sigma| sigma * RADIANS_PER_ARCSECOND),
+        /// Whether an image that was exposed during a profile is expected where the PEDR file has the spacecraft, and not where
+        /// the kernels have it: camera and altimeter are then on one orbit. The range check tells the distance between the two.
+        orbit_of_pedr: bool = key(yes_or_no(
+            "the orbit of the kernels",
+            "the orbit of the kernels, moved by the mean distance over the profile",
+        )).or(false),
         /// Whether heights of tie points on slopes of the MOLA surface also tell where the images lie in plan. Of use where the
         /// report states that relief knows the place to less than half of what is known beforehand: ground rougher than 25 m
         /// at 300 m for measurements of a pixel, 7 m for 0.3 pixels.
@@ -145,6 +151,7 @@ fn keys_of_the_model(checked: &AdjustmentConfig, keys: &mut Keys<'_, '_>) {
         AdjustmentModel::Published => &[
             "position_sigma_m",
             "rotation_sigma_arcsec",
+            "orbit_of_pedr",
             "relief_for_plan",
             "attitude_clock",
             "attitude_clock_sigma_s",

@@ -3,72 +3,51 @@
 use schemars::JsonSchema;
 use serde::Serialize;
 
-/// What of an image's position is unknown: each level adds a power of time (jigsaw's `spsolve`).
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum PositionUnknowns {
-    /// Nothing.
-    None,
+/// Declares the levels of a quantity; `$constant`, in the configuration `$word`, is what jigsaw calls a constant of it.
+macro_rules! levels {
+    ($(#[$about:meta])* $name:ident, $(#[$constant_about:meta])* $constant:ident $word:literal) => {
+        $(#[$about])*
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
+        #[serde(rename_all = "snake_case")]
+        pub enum $name {
+            /// Nothing.
+            None,
+            $(#[$constant_about])*
+            $constant,
+            /// And what is linear in time.
+            Velocity,
+            /// And what is quadratic.
+            Acceleration,
+        }
+
+        impl $name {
+            /// Every level, with its word in the configuration.
+            pub(super) const WORDS: [(&'static str, Self); 4] = [
+                ("none", Self::None),
+                ($word, Self::$constant),
+                ("velocity", Self::Velocity),
+                ("acceleration", Self::Acceleration),
+            ];
+
+            /// Powers of time that are unknown.
+            #[must_use]
+            pub const fn powers(self) -> usize {
+                self as usize
+            }
+        }
+    };
+}
+
+levels! {
+    /// What of an image's position is unknown: each level adds a power of time (jigsaw's `spsolve`).
+    PositionUnknowns,
     /// A constant.
-    Position,
-    /// And what is linear in time.
-    Velocity,
-    /// And what is quadratic.
-    Acceleration,
+    Position "position"
 }
 
-impl PositionUnknowns {
-    /// Every level, with its word in the configuration.
-    pub(super) const WORDS: [(&'static str, Self); 4] = [
-        ("none", Self::None),
-        ("position", Self::Position),
-        ("velocity", Self::Velocity),
-        ("acceleration", Self::Acceleration),
-    ];
-
-    /// Powers of time that are unknown.
-    #[must_use]
-    pub const fn powers(self) -> usize {
-        match self {
-            Self::None => 0,
-            Self::Position => 1,
-            Self::Velocity => 2,
-            Self::Acceleration => 3,
-        }
-    }
-}
-
-/// What of an image's rotation is unknown, likewise (jigsaw's `camsolve`).
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum RotationUnknowns {
-    /// Nothing.
-    None,
+levels! {
+    /// What of an image's rotation is unknown, likewise (jigsaw's `camsolve`).
+    RotationUnknowns,
     /// Constant angles.
-    Angles,
-    /// And what is linear in time.
-    Velocity,
-    /// And what is quadratic.
-    Acceleration,
-}
-
-impl RotationUnknowns {
-    /// Every level, with its word in the configuration.
-    pub(super) const WORDS: [(&'static str, Self); 4] = [
-        ("none", Self::None),
-        ("angles", Self::Angles),
-        ("velocity", Self::Velocity),
-        ("acceleration", Self::Acceleration),
-    ];
-
-    /// Powers of time that are unknown.
-    #[must_use]
-    pub const fn powers(self) -> usize {
-        match self {
-            Self::None => 0,
-            Self::Angles => 1,
-            Self::Velocity => 2,
-            Self::Acceleration => 3,
-        }
-    }
+    Angles "angles"
 }

@@ -17,7 +17,7 @@ use crate::{
     stages::{
         adjust::{Adjust, Adjusted},
         check_heights::{CheckHeights, CheckedPoints},
-        check_ranges::CheckRanges,
+        check_ranges::{CheckRanges, RangeCheck},
         compare_pairs::ComparePairs,
         convert_datum::{ConvertDatum, Converted},
         describe_kernels::{DescribeKernels, Required},
@@ -261,7 +261,8 @@ fn triangulate<D: Driver>(flow: &mut D, config: &SiteConfig, site: &mut Site) ->
     let initial = intersect(flow, config, None, &site.images, ties, shots)?;
     let initial = &*site.intersection.insert(initial);
     let kernels = &KernelView::all(site.kernels.as_ref());
-    let adjustment = adjust(flow, config, &site.images, ties, initial, shots, kernels)?;
+    let measured = (&site.images[..], ties, &site.ranges);
+    let adjustment = adjust(flow, config, measured, initial, shots, kernels)?;
     site.adjustment = Some(adjustment);
     Ok(())
 }
@@ -270,8 +271,7 @@ fn triangulate<D: Driver>(flow: &mut D, config: &SiteConfig, site: &mut Site) ->
 fn adjust<D: Driver>(
     flow: &mut D,
     config: &SiteConfig,
-    images: &[SiteImage],
-    ties: &Output<Ties>,
+    (images, ties, ranges): (&[SiteImage], &Output<Ties>, &Output<RangeCheck>),
     initial: &Intersection,
     shots: Shots,
     kernels: &KernelView,
@@ -284,6 +284,7 @@ fn adjust<D: Driver>(
         profiles,
         ties,
         intersected: &initial.intersected,
+        ranges,
         pairs: &initial.pairs,
         mola_surface: &config.mola_surface,
         adjustment: &config.adjustment,

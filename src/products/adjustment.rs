@@ -253,6 +253,9 @@ struct ImageDocument<'a> {
     #[schemars(extend("exclusiveMinimum" = 0))]
     line_period_s: f64,
     correction: &'a [f64; ORIENTATION_UNKNOWNS],
+    /// Where the PEDR file has the spacecraft, X, Y and Z, metres, where that is what was expected of the position.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pedr_orbit_m: Option<[f64; 3]>,
     #[schemars(transform = none_negative)]
     sigmas: &'a [f64; ORIENTATION_UNKNOWNS],
     /// With its standard deviation.
@@ -359,6 +362,7 @@ fn image(image: &CorrectedImage) -> ImageDocument<'_> {
         half_lines: image.half_lines,
         line_period_s: image.line_period_s,
         correction: &image.correction,
+        pedr_orbit_m: image.pedr_orbit_m(),
         sigmas: &image.sigmas,
         time_bias_s: image.time_bias_s,
     }

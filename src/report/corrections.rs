@@ -52,8 +52,10 @@ fn positions(site: &SiteProducts, adjusted: &Adjusted) -> String {
             Column::Number("radial"),
         ],
     );
+    let mut starts_at_pedr = false;
     for (image, corrected) in site.images.iter().zip(&adjusted.images) {
         let position_m = constants(corrected, 0);
+        starts_at_pedr |= corrected.pedr_orbit_m().is_some();
         let in_orbit = orbit_axes(image, Vector3::from(position_m.map(|(value, _)| value)));
         let mut cells: Vec<Cell> = vec![(&corrected.id).into()];
         cells.extend(position_m.map(|axis| with_sigma(axis, 1)));
@@ -63,7 +65,13 @@ fn positions(site: &SiteProducts, adjusted: &Adjusted) -> String {
         }));
         table.row(true, cells);
     }
-    table.finish()
+    let words = "Shifts are from the orbit of the kernels. They were expected to be those to the orbit of the PEDR files \
+        (adjustment.orbit_of_pedr) where a profile was flown with the image.";
+    if starts_at_pedr {
+        table.finish() + &paragraph(words)
+    } else {
+        table.finish()
+    }
 }
 
 /// Radial, along the flight over the turning planet, and across it.

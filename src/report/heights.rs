@@ -127,10 +127,7 @@ fn statements(geometric: &GeometricProducts, adjustment: &AdjustmentProducts) ->
             "absolute, place".to_owned(),
             "as after it".to_owned(),
             place,
-            format!(
-                "a priori, not measured by images: by what is known of {}",
-                known_beforehand(geometric)
-            ),
+            place_says(geometric, adjustment),
         ],
     ];
     for cells in statements {
@@ -139,6 +136,16 @@ fn statements(geometric: &GeometricProducts, adjustment: &AdjustmentProducts) ->
     table.finish()
         + &relief::relief(adjustment.adjusted)
         + &readings::two_readings(adjustment.adjusted)
+}
+
+fn place_says(geometric: &GeometricProducts, adjustment: &AdjustmentProducts) -> String {
+    let known = known_beforehand(geometric);
+    let heights = adjustment.adjusted.heights.as_ref();
+    if heights.is_some_and(|heights| heights.profile_shifts.is_some()) {
+        format!("by what is known of {known} beforehand, and by relief")
+    } else {
+        format!("a priori, not measured by images: by what is known of {known}")
+    }
 }
 
 /// What says where a site lies before the images do.

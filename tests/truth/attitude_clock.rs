@@ -61,31 +61,30 @@ fn normalised(sites: &[Judged]) -> [Vec<f64>; 2] {
     [clock.collect(), even.collect()]
 }
 
-fn print(sites: &[Judged]) {
-    for site in sites {
-        let (mean_m, sigma_m) = (site.mean_m(), site.mean_sigmas_m);
-        let other_m = site.other_m.map(|[moved_m, sigma_m]| {
-            let even_m = mean_m + moved_m;
-            format!(
-                "{:.0} {:.0} {:.1} ± {:.0} {:.0}",
-                even_m.x, even_m.y, even_m.z, sigma_m.x, sigma_m.y
-            )
-        });
-        let clock_s = site.clock_s.unwrap();
-        println!(
-            "{:28} by the clock ({:.3} ± {:.3} s): {:.0} {:.0} {:.1} ± {:.0} {:.0} {:.1} m; evenly {}",
-            site.name,
-            clock_s.0,
-            clock_s.1,
-            mean_m.x,
-            mean_m.y,
-            mean_m.z,
-            sigma_m.x,
-            sigma_m.y,
-            sigma_m.z,
-            other_m.as_deref().unwrap_or("not told")
-        );
-    }
+/// What is found at a site, by either reading.
+fn line(site: &Judged) -> String {
+    let (mean_m, sigma_m) = (site.mean_m(), site.mean_sigmas_m);
+    let other_m = site.other_m.map(|[moved_m, sigma_m]| {
+        let even_m = mean_m + moved_m;
+        format!(
+            "{:.0} {:.0} {:.1} ± {:.0} {:.0}",
+            even_m.x, even_m.y, even_m.z, sigma_m.x, sigma_m.y
+        )
+    });
+    let clock_s = site.clock_s.unwrap();
+    format!(
+        "{:28} by the clock ({:.3} ± {:.3} s): {:.0} {:.0} {:.1} ± {:.0} {:.0} {:.1} m; evenly {}",
+        site.name,
+        clock_s.0,
+        clock_s.1,
+        mean_m.x,
+        mean_m.y,
+        mean_m.z,
+        sigma_m.x,
+        sigma_m.y,
+        sigma_m.z,
+        other_m.as_deref().unwrap_or("not told")
+    )
 }
 
 #[test]
@@ -96,7 +95,9 @@ fn the_place_is_right_by_the_clock_where_the_clock_is_wrong() {
         206..=210,
         &["--realistic", "--attitude-clock"],
     );
-    print(&sites);
+    for site in &sites {
+        println!("{}", line(site));
+    }
     for (axis, name) in ["east", "north", "up"].into_iter().enumerate() {
         let z = sites
             .iter()
@@ -150,7 +151,9 @@ fn the_place_is_right_by_the_clock_where_the_clock_is_wrong() {
 fn the_place_by_the_clock_is_not_to_be_trusted_where_every_image_errs_for_itself() {
     let folder = tempfile::tempdir().unwrap();
     let sites = by_the_clock(folder.path(), 211..=215, &["--realistic"]);
-    print(&sites);
+    for site in &sites {
+        println!("{}", line(site));
+    }
     let [clock, even] = normalised(&sites);
     let clock = root_mean_square(clock.into_iter());
     println!(

@@ -120,6 +120,36 @@ fn a_chain_of_many_blocks_has_a_narrow_envelope() {
     assert_eq!(stored, 4 * (2 * count - 1));
 }
 
+#[test]
+fn a_block_that_all_others_meet_is_a_row_at_the_end_of_the_envelope() {
+    // A chain, and in its midst a single unknown that occurs with every block.
+    let (count, shared) = (101, 40);
+    let cliques: Vec<Vec<usize>> = (1..count)
+        .filter(|block| ![shared, shared + 1].contains(block))
+        .map(|block| {
+            let mut clique = vec![block - 1, block, shared];
+            clique.sort_unstable();
+            clique
+        })
+        .collect();
+    let mut columns = Vec::new();
+    let mut first = 0;
+    for block in 0..count {
+        let width = if block == shared { 1 } else { 2 };
+        columns.push(first..first + width);
+        first += width;
+    }
+    let pattern = BlockPattern::of(columns, cliques.iter().map(Vec::as_slice));
+    let mut matrix = BlockMatrix::zeros(&pattern);
+    for column in 0..pattern.unknowns() {
+        matrix.add_to_diagonal(column, 1.0);
+    }
+    let factor = BlockCholesky::new(&matrix).unwrap();
+    let stored: usize = factor.rows.iter().map(DMatrix::len).sum();
+    // Two chains of 40 and 60 blocks with pairs and diagonals of 2 × 2, and one row of all unknowns.
+    assert_eq!(stored, 4 * (2 * 40 - 1 + 2 * 60 - 1) + 2 * 100 + 1);
+}
+
 fn of_one_block(matrix: &DMatrix<f64>) -> BlockMatrix {
     let columns = 0..matrix.ncols();
     let pattern = BlockPattern::of(vec![columns], std::iter::empty());

@@ -26,6 +26,12 @@ pub(super) fn check<M: ExteriorOrientation>(network: &Network<M>) -> Result<(), 
             }
         }
     }
+    for (index, expected_m) in network.expected_m.iter().enumerate() {
+        let part = Part::Image(index);
+        for component in expected_m {
+            finite(part, "expected position", *component)?;
+        }
+    }
     if let Some(clock) = &network.attitude_clock {
         let part = Part::Images;
         let what = "standard deviation of the offset of the attitude's clock";

@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
 use super::{
-    BundleOptions, HeightControl, Network, Residual,
+    AttitudeClock, BundleOptions, HeightControl, Network, Residual,
     factor::Factor,
     groups::PointGroups,
     heights::Heights,
@@ -13,6 +13,7 @@ use super::{
     solve,
     solve::{Stop, settle},
     tests::{dense_rows, layout, network},
+    unknowns::State,
 };
 use crate::geom::{
     pushbroom::{EulerPolynomial, ExteriorOrientation, Sighting},
@@ -41,6 +42,14 @@ fn measured(mut network: Network<EulerPolynomial>) -> Network<EulerPolynomial> {
 
 /// Two profiles east and west of the points, `above_m` over the ground that these have.
 fn surface(network: &Network<EulerPolynomial>, above_m: f64) -> LaserSurface {
+    surface_with(network, above_m, &SurfaceOptions::default())
+}
+
+fn surface_with(
+    network: &Network<EulerPolynomial>,
+    above_m: f64,
+    options: &SurfaceOptions,
+) -> LaserSurface {
     let shots = [-800.0, 500.0].into_iter().enumerate();
     let shots: Vec<SurfaceShot> = shots
         .flat_map(|(profile, east_m)| {
@@ -59,7 +68,19 @@ fn surface(network: &Network<EulerPolynomial>, above_m: f64) -> LaserSurface {
             })
         })
         .collect();
-    LaserSurface::new(&shots, &[], &SurfaceOptions::default()).unwrap()
+    LaserSurface::new(&shots, &[], options).unwrap()
+}
+
+/// A clock of the attitude: the first and the last image follow nadir, the second is held towards a star.
+fn attitude_clock() -> AttitudeClock {
+    AttitudeClock {
+        sigma_s: 1.0,
+        turns_rad_s: vec![
+            Vector3::new(1e-5, -8.7e-4, 2e-5),
+            Vector3::new(-7e-6, 1e-6, 0.0),
+            Vector3::new(3e-5, 8.6e-4, -1e-5),
+        ],
+    }
 }
 
 /// Where the network settles with heights of full covariance, and all that can be said of it.
@@ -120,8 +141,64 @@ fn dense(
 
 #[test]
 fn heights_by_parts_equal_the_dense_equations() {
-    let mut network = network();
+    let network = network();
     let surface = surface(&network, 35.0);
+    are_those_of_the_dense_equations(network, &surface);
+}
+
+#[test]
+fn the_derivative_by_the_attitudes_clock_equals_central_differences() {
+    // A hundredth of a second turns by 9e-6 rad at most.
+    const STEP_S: f64 = 1e-2;
+    let network = Network {
+        attitude_clock: Some(attitude_clock()),
+        ..network()
+    };
+    let (layout, start, _) = layout(&network);
+    let clock = layout.columns.attitude_clock.unwrap();
+    let computed = |offset_s: f64, index: usize| {
+        let mut corrections = start.corrections.clone();
+        corrections[clock] = offset_s;
+        let state = State::new(
+            &network,
+            &layout.columns,
+            corrections,
+            start.points_m.clone(),
+        );
+        layout.view_rows(&state, index).unwrap()
+    };
+    for (index, view) in network.views.iter().enumerate() {
+        let rows = computed(0.7, index);
+        let [ahead, behind] = [STEP_S, -STEP_S].map(|step_s| computed(0.7 + step_s, index));
+        let turn_rad_s = attitude_clock().turns_rad_s[view.image];
+        let scale = rows.map(|row| row.by_rotation.norm() * turn_rad_s.norm());
+        for axis in 0..2 {
+            // Computed values: misclosures with the sign turned.
+            let numeric = (behind[axis].misclosure - ahead[axis].misclosure) / (2.0 * STEP_S);
+            let analytic = rows[axis].by_rotation.dot(&turn_rad_s);
+            // A share of the derivative: lines of 1e4 are rounded at 1e-12.
+            assert!(
+                (numeric - analytic).abs() < 1e-6 * scale[0].max(scale[1]),
+                "{index}"
+            );
+        }
+    }
+}
+
+#[test]
+fn relief_and_the_attitudes_clock_by_parts_equal_the_dense_equations() {
+    let mut network = network();
+    network.attitude_clock = Some(attitude_clock());
+    let options = SurfaceOptions {
+        relief_sigma_m: Some(70.0),
+        ..SurfaceOptions::default()
+    };
+    let surface = surface_with(&network, 35.0, &options);
+    are_those_of_the_dense_equations(network, &surface);
+}
+
+/// The equations of `network` with heights above `surface`, solved by parts, and what is said of the solution.
+fn are_those_of_the_dense_equations(mut network: Network<EulerPolynomial>, surface: &LaserSurface) {
     network.heights = Some(HeightControl {
         surface: surface.clone(),
         compared: Vec::new(),
@@ -129,7 +206,7 @@ fn heights_by_parts_equal_the_dense_equations() {
     });
     let (mut layout, start, active) = layout(&network);
     let shared = layout.columns.len();
-    let heights = Heights::at(&surface, CONTROLLED.collect(), &start);
+    let heights = Heights::at(surface, CONTROLLED.collect(), &start);
     let start = layout.linearise(start);
     let groups = PointGroups::of(&layout, active.clone());
     let before = dense(&layout, &start, &heights, active.len());

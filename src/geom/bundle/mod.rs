@@ -227,6 +227,9 @@ pub struct Network<M> {
     pub heights: Option<HeightControl>,
     /// An offset of the attitude's clock, where it is an unknown.
     pub attitude_clock: Option<AttitudeClock>,
+    /// Where each image is expected against its initial orientation, Mars-fixed, metres: what its constant position unknowns
+    /// are within their standard deviations of. Empty where that is nothing for all.
+    pub expected_m: Vec<Vector3<f64>>,
 }
 
 impl<M> Default for Network<M> {
@@ -239,6 +242,7 @@ impl<M> Default for Network<M> {
             range_bias_sigmas_m: Vec::new(),
             heights: None,
             attitude_clock: None,
+            expected_m: Vec::new(),
         }
     }
 }

@@ -132,7 +132,8 @@ pub(super) fn judge<M: ExteriorOrientation>(
         }));
     }
     for (column, sigma) in layout.columns.sigmas.iter().enumerate() {
-        adjustment.weighted_squares += (state.corrections[column] / sigma).powi(2);
+        let off = state.corrections[column] - layout.columns.expected[column];
+        adjustment.weighted_squares += (off / sigma).powi(2);
     }
     if let Some((of, reduced)) = heights {
         adjustment.height_squares = reduced.weighted_squares();
@@ -339,7 +340,7 @@ fn judge_image<M: ExteriorOrientation>(
     let shares = |coefficient: usize| {
         let clock = layout.network.attitude_clock.as_ref();
         let turn_rad_s = match clock {
-            Some(clock) if coefficient >= 9 && coefficient % 3 == 0 => {
+            Some(clock) if coefficient >= 9 && coefficient.is_multiple_of(3) => {
                 clock.turns_rad_s[image][coefficient / 3 - 3]
             }
             _ => 0.0,
@@ -360,7 +361,7 @@ fn judge_image<M: ExteriorOrientation>(
         let sigma = layout.columns.sigmas[column];
         let share = variance(cofactors, column) / sigma.powi(2);
         sigma.is_finite().then(|| Residual {
-            value: -state.corrections[column],
+            value: -(state.corrections[column] - layout.columns.expected[column]),
             sigma,
             redundancy: (1.0 - share).clamp(0.0, 1.0),
             weight_factor: 1.0,

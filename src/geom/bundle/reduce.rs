@@ -111,7 +111,7 @@ pub(super) fn reduce<M: ExteriorOrientation>(
     for (column, sigma) in layout.columns.sigmas.iter().enumerate() {
         // Infinite standard deviations weigh nothing.
         let weight = sigma.powi(-2);
-        let correction = at.state.corrections[column];
+        let correction = at.state.corrections[column] - layout.columns.expected[column];
         sum.matrix.add_to_diagonal(column, weight);
         sum.right[column] -= weight * correction;
         sum.cost += weight * correction * correction;

@@ -121,6 +121,7 @@ fn derivatives_equal_central_differences() {
             Unknown::Orientation { coefficient, .. } => 5e-4 * coefficient as f64,
             Unknown::TimeBias { .. } => 0.03,
             Unknown::RangeBias { .. } => 25.0,
+            Unknown::AttitudeClock => 0.7,
         };
         sign * size
     });

@@ -96,6 +96,8 @@ impl Unknown {
 pub(super) struct Columns {
     pub(super) unknowns: Vec<Unknown>,
     pub(super) sigmas: Vec<f64>,
+    /// What they are expected to be.
+    pub(super) expected: Vec<f64>,
     /// Column of each image's 18 coefficients and its time bias.
     pub(super) of_image: Vec<[Option<usize>; ORIENTATION_UNKNOWNS + 1]>,
     /// All columns of each image: they stand side by side.
@@ -113,6 +115,7 @@ impl Columns {
         let mut columns = Self {
             unknowns: Vec::new(),
             sigmas: Vec::new(),
+            expected: Vec::new(),
             of_image: Vec::new(),
             images: Vec::new(),
             blocks: Vec::new(),
@@ -125,6 +128,12 @@ impl Columns {
             for (coefficient, sigma) in entry.sigmas.iter().enumerate() {
                 of_image[coefficient] =
                     columns.add(Unknown::Orientation { image, coefficient }, *sigma);
+            }
+            let expected_m = network.expected_m.get(image).into_iter().flatten();
+            for (constant, expected_m) in of_image.iter().step_by(3).zip(expected_m) {
+                if let Some(column) = constant {
+                    columns.expected[*column] = *expected_m;
+                }
             }
             of_image[ORIENTATION_UNKNOWNS] =
                 columns.add(Unknown::TimeBias { image }, entry.time_bias_sigma_s);
@@ -151,6 +160,7 @@ impl Columns {
         (sigma > 0.0).then(|| {
             self.unknowns.push(unknown);
             self.sigmas.push(sigma);
+            self.expected.push(0.0);
             self.unknowns.len() - 1
         })
     }

@@ -37,6 +37,7 @@ pub(super) struct AdjustmentKeys<'a> {
     rotation_sigma_rad: Option<[f64; 3]>,
     position_unknowns: PositionUnknowns,
     rotation_unknowns: RotationUnknowns,
+    orbit_of_pedr: bool,
     relief_for_plan: bool,
     attitude_clock: bool,
     #[schemars(extend("exclusiveMinimum" = 0))]
@@ -102,6 +103,7 @@ impl<'a> AdjustmentKeys<'a> {
             rotation_sigma_rad: is_of_surface.then(|| config.rotation_sigma_rad.map(number)),
             position_unknowns: config.position_unknowns,
             rotation_unknowns: config.rotation_unknowns,
+            orbit_of_pedr: config.orbit_of_pedr,
             relief_for_plan: config.relief_for_plan,
             attitude_clock: config.attitude_clock,
             attitude_clock_sigma_s: config.attitude_clock_sigma_s,

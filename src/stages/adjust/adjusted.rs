@@ -5,11 +5,12 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::{
+    attitude_clock::prior_sigmas,
     height_summary::{self, HeightSummary},
     input::AdjustImage,
     network::Assembled,
     points::{PointKind, RejectedPoint},
-    split::{self, OtherReading},
+    split::OtherReading,
     summary::AdjustmentSummary,
 };
 use crate::{
@@ -57,7 +58,9 @@ pub struct CorrectedImage {
     pub sigmas: [f64; ORIENTATION_UNKNOWNS],
     /// Their covariance; rows and columns of unknowns that are held fixed are 0.
     pub covariance: DMatrix<f64>,
-    /// What they were expected to be within, standard deviations; 0 where held fixed, infinite where free.
+    /// What they were expected to be.
+    pub expected: [f64; ORIENTATION_UNKNOWNS],
+    /// What they were expected to be within of that, standard deviations; 0 where held fixed, infinite where free.
     pub prior_sigmas: [f64; ORIENTATION_UNKNOWNS],
     /// Bias of the line times with its standard deviation, seconds, where it is unknown.
     pub time_bias_s: Option<(f64, f64)>,
@@ -145,6 +148,18 @@ impl Adjusted {
             entry.half_lines,
             time_bias_s / entry.line_period_s,
         )
+    }
+}
+
+impl CorrectedImage {
+    /// Where the PEDR file has the spacecraft against the kernels, X, Y and Z, metres, where that was expected of the image.
+    #[must_use]
+    pub fn pedr_orbit_m(&self) -> Option<[f64; 3]> {
+        let position_m = [0, 3, 6].map(|constant| self.expected[constant]);
+        position_m
+            .iter()
+            .any(|metres| *metres != 0.0)
+            .then_some(position_m)
     }
 }
 
@@ -273,6 +288,15 @@ fn contradicted_m2(adjustment: &Adjustment) -> Vec<Matrix3<f64>> {
 /// A step below this many lines finds the line of a view to 1e-7 lines.
 const LAST_STEP_LINES: f64 = 1e-3;
 
+/// Coefficients of an orientation that is off by this, metres.
+fn expected(position_m: &Vector3<f64>) -> [f64; ORIENTATION_UNKNOWNS] {
+    let mut coefficients = [0.0; ORIENTATION_UNKNOWNS];
+    for (constant, metres) in coefficients.iter_mut().step_by(3).zip(position_m) {
+        *constant = *metres;
+    }
+    coefficients
+}
+
 fn corrected_images<M>(
     images: &[AdjustImage<M>],
     assembled: &Assembled<&M>,
@@ -289,7 +313,8 @@ fn corrected_images<M>(
                 root * adjusted.cofactors[(unknown, unknown)].sqrt()
             }),
             covariance: &adjusted.cofactors * variance_factor,
-            prior_sigmas: split::prior_sigmas(&assembled.network, index),
+            expected: expected(&image.expected_m),
+            prior_sigmas: prior_sigmas(&assembled.network, index),
             time_bias_s: adjusted
                 .time_bias_s
                 .map(|(bias_s, root_s)| (bias_s, root * root_s)),

@@ -20,6 +20,8 @@ pub struct AdjustImage<M> {
     pub sigmas: [f64; ORIENTATION_UNKNOWNS],
     /// Standard deviation of a bias of the line times, seconds; 0 for no such unknown.
     pub time_bias_sigma_s: f64,
+    /// Where it is expected against its initial orientation, Mars-fixed, metres.
+    pub expected_m: Vector3<f64>,
     /// How it turns against the stars, camera components, radians per second.
     pub turn_rad_s: Vector3<f64>,
 }

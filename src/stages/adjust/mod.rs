@@ -5,6 +5,7 @@
 //! adjusted; with small standard deviations they would hold the misregistration in place.
 
 mod adjusted;
+mod attitude_clock;
 mod blunders;
 mod components;
 mod error;

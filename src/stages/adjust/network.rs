@@ -5,10 +5,10 @@ use std::collections::{BTreeMap, BTreeSet};
 use nalgebra::{Vector2, Vector3};
 
 use super::{
+    attitude_clock::by_attitude_clock,
     error::AdjustError,
     input::{AdjustImage, LaserShots},
     points::{PointKind, RejectedPoint, RejectionReason},
-    split,
 };
 use crate::{
     config::AdjustmentConfig,
@@ -52,6 +52,7 @@ pub(super) fn assemble<'a, M: ExteriorOrientation>(
     let mut assembled = Assembled {
         network: Network {
             images: images.iter().map(bundle_image).collect(),
+            expected_m: images.iter().map(|image| image.expected_m).collect(),
             ..Network::default()
         },
         points: Vec::with_capacity(shots.shots.len() + ties.len()),
@@ -67,7 +68,7 @@ pub(super) fn assemble<'a, M: ExteriorOrientation>(
     }
     assembled.add_ties(images, ties, starts, config)?;
     if config.attitude_clock {
-        split::by_attitude_clock(&mut assembled.network, images, config);
+        by_attitude_clock(&mut assembled.network, images, config);
     }
     if let Some(surface) = &shots.surface {
         let ties = assembled.shots..assembled.points.len();

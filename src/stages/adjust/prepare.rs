@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Vector3};
 
 use super::input::{
     AdjustImage, LaserShot, LaserShots, ShotRange, hold_powers, orientation_sigmas,
@@ -15,8 +15,8 @@ use crate::{
     frames::{MarsIau2000, Position},
     geom::{
         attitude::rotation_vector, bundle::ORIENTATION_UNKNOWNS, ellipsoid::spherical_to_xyz_m,
-        mars_rotation::mars_spin_rad_s, oriented_camera::OrientedCamera,
-        pushbroom::ExteriorOrientation, surface::LaserSurface,
+        mars_rotation::mars_spin_rad_s, orbit_axes::radial_along_cross,
+        oriented_camera::OrientedCamera, pushbroom::ExteriorOrientation, surface::LaserSurface,
     },
     stages::{
         group_profiles::Profile, orientation::Orientation, register::ImageRegistration,
@@ -41,6 +41,9 @@ pub struct Candidate<'a, M> {
     pub oriented_camera: OrientedCamera<M>,
     /// Where the image has the footprints.
     pub registration: &'a ImageRegistration,
+    /// Radial, along the track and across it: how far the PEDR file has the spacecraft from the kernels, metres, where a
+    /// profile was flown with the image.
+    pub pedr_orbit_m: Option<Vector3<f64>>,
 }
 
 impl<M: ExteriorOrientation> Candidate<'_, M> {
@@ -68,11 +71,23 @@ impl<M: ExteriorOrientation> Candidate<'_, M> {
         hold_powers(&mut sigmas, position, rotation);
         AdjustImage {
             turn_rad_s: self.turn_rad_s(),
+            expected_m: self
+                .pedr_orbit_m
+                .filter(|_| config.orbit_of_pedr)
+                .map_or_else(Vector3::zeros, |off_m| self.orbit_axes() * off_m),
             oriented_camera: self.oriented_camera,
             line_period_s: self.times.line_times.mean_period_s(),
             sigmas,
             time_bias_sigma_s: config.time_bias_sigma_s,
         }
+    }
+
+    /// Axes of the orbit in the middle of the image, Mars-fixed: radial, along the track and across it.
+    fn orbit_axes(&self) -> Matrix3<f64> {
+        let (pose, motion) = self.oriented_camera.orientation.pose_and_rate(0.0);
+        let over_ground_m_s = motion.advance_m / self.times.line_times.mean_period_s();
+        let velocity_m_s = over_ground_m_s + mars_spin_rad_s(&MARS_IAU2000).cross(&pose.position_m);
+        radial_along_cross(&pose.position_m, &velocity_m_s)
     }
 
     /// How the camera turns against the stars over the image, its own components, radians per second.

@@ -1,6 +1,8 @@
 //! The combined adjustment as a stage.
 
-use std::sync::atomic::AtomicBool;
+use std::{collections::BTreeMap, sync::atomic::AtomicBool};
+
+use nalgebra::Vector3;
 
 use super::{Adjusted, Candidate, adjust, prepare_adjustment};
 use crate::{
@@ -11,9 +13,9 @@ use crate::{
     stage::{InOrder, Output, Stage},
     stage_inputs,
     stages::{
-        compare_pairs::PairComparison, convert_datum::Converted, group_profiles::Profile,
-        intersect::IntersectedTies, mola_surface::MolaShots, read_ties::Ties,
-        site_image::SiteImage,
+        check_ranges::RangeCheck, compare_pairs::PairComparison, convert_datum::Converted,
+        group_profiles::Profile, intersect::IntersectedTies, mola_surface::MolaShots,
+        read_ties::Ties, site_image::SiteImage,
     },
 };
 
@@ -32,6 +34,8 @@ stage_inputs! {
         pub ties: &'a Output<Ties>,
         /// Their ground points.
         pub intersected: &'a Output<IntersectedTies>,
+        /// What lies between the orbits of the PEDR files and the kernels.
+        pub ranges: &'a Output<RangeCheck>,
         /// The pairs of images.
         pub pairs: &'a Output<Vec<PairComparison>>,
         /// What is uncertain about the MOLA surface.
@@ -49,13 +53,15 @@ impl Stage for Adjust<'_> {
 
     fn run(&self, _stop: &AtomicBool) -> Result<Adjusted> {
         let oriented = SiteImage::oriented(self.images.0)?;
-        let candidates = self.images.0.iter().zip(&oriented);
-        let candidates = candidates.map(|(image, oriented)| {
+        let orbits_m = self.pedr_orbits_m()?;
+        let candidates = self.images.0.iter().zip(&oriented).enumerate();
+        let candidates = candidates.map(|(index, (image, oriented))| {
             Ok(Candidate {
                 times: image.times.value()?,
                 orientation: image.orientation.value()?,
                 oriented_camera: oriented.oriented_camera(*self.model),
                 registration: image.registration.value()?,
+                pedr_orbit_m: orbits_m.get(&index).copied(),
             })
         });
         let (footprints, profiles) = (&self.converted.value()?.footprints, self.profiles.value()?);
@@ -87,5 +93,21 @@ impl Stage for Adjust<'_> {
         let disagreements_m = pairs.map(|pair| pair.along_track_parallax_m);
         let largest_m = disagreements_m.fold(0.0, f64::max);
         adjust(&images, &shots, ties, starts, largest_m, self.adjustment)
+    }
+}
+
+impl Adjust<'_> {
+    /// How far the PEDR files have the spacecraft from the kernels, radial, along the track and across it, metres, by the
+    /// image that was exposed meanwhile; of several profiles the first.
+    fn pedr_orbits_m(&self) -> Result<BTreeMap<usize, Vector3<f64>>> {
+        let checked = self.ranges.value()?.profiles.iter();
+        let mut orbits_m = BTreeMap::new();
+        for (profile, ranges) in self.profiles.value()?.iter().zip(checked) {
+            let off_m = ranges.spacecraft_m.each_ref().map(|axis| axis.mean);
+            for image in &profile.simultaneous {
+                orbits_m.entry(image.image).or_insert_with(|| off_m.into());
+            }
+        }
+        Ok(orbits_m)
     }
 }

@@ -130,7 +130,9 @@ impl AdjustmentEvidence<'_> {
     /// Corrections of orientations that what was known of them does not allow.
     fn corrected_too_far(&self, limits: &LimitsConfig) -> Vec<String> {
         let largest = |image: &CorrectedImage| -> Option<(f64, usize)> {
-            let corrections = image.correction.iter().zip(&image.prior_sigmas).enumerate();
+            let off = image.correction.iter().zip(&image.expected);
+            let off = off.map(|(value, expected)| value - expected);
+            let corrections = off.zip(&image.prior_sigmas).enumerate();
             let known = corrections.filter(|(_, (_, sigma))| **sigma > 0.0 && sigma.is_finite());
             let sigmas = known.map(|(index, (value, sigma))| ((value / sigma).abs(), index));
             sigmas.max_by(|one, other| one.0.total_cmp(&other.0))
@@ -192,6 +194,13 @@ impl AdjustmentEvidence<'_> {
             remarks.push(
                 "the adjustment follows the published model (adjustment.model): its heights are not controlled, and its \
                  standard deviations are those of agreement between the images"
+                    .to_owned(),
+            );
+        }
+        if self.adjusted.summary.attitude_clock_s.is_some() {
+            remarks.push(
+                "the place rests on adjustment.attitude_clock, a reading of what the images disagree by that no measurement \
+                 tests; the report has the other one beside it"
                     .to_owned(),
             );
         }

@@ -1,0 +1,51 @@
+//! An offset of the attitude's clock in a network, or none.
+
+use super::input::AdjustImage;
+use crate::{
+    config::AdjustmentConfig,
+    geom::bundle::{AttitudeClock, Network, ORIENTATION_UNKNOWNS},
+};
+
+/// Puts down what images disagree by to the clock of the attitude.
+pub(super) fn by_attitude_clock<M>(
+    network: &mut Network<M>,
+    images: &[AdjustImage<impl Sized>],
+    config: &AdjustmentConfig,
+) {
+    for image in &mut network.images {
+        for constant in constant_rotations() {
+            let sigma = &mut image.sigmas[constant];
+            *sigma = sigma.min(config.attitude_clock_rotation_sigma_rad);
+        }
+    }
+    network.attitude_clock = Some(AttitudeClock {
+        sigma_s: config.attitude_clock_sigma_s,
+        turns_rad_s: images.iter().map(|image| image.turn_rad_s).collect(),
+    });
+}
+
+/// Takes all images as equally likely to be wrong.
+pub(super) fn evenly<M>(network: &mut Network<M>, images: &[AdjustImage<impl Sized>]) {
+    for (image, of_site) in network.images.iter_mut().zip(images) {
+        image.sigmas = of_site.sigmas;
+    }
+    network.attitude_clock = None;
+}
+
+/// Coefficients of the constant rotations about x, y and z.
+fn constant_rotations() -> impl Iterator<Item = usize> {
+    (ORIENTATION_UNKNOWNS / 2..ORIENTATION_UNKNOWNS).step_by(3)
+}
+
+/// What corrections of an image's orientation were expected to be within: its own standard deviations, and what the
+/// attitude's clock adds.
+pub(super) fn prior_sigmas<M>(network: &Network<M>, image: usize) -> [f64; ORIENTATION_UNKNOWNS] {
+    let mut sigmas = network.images[image].sigmas;
+    if let Some(clock) = &network.attitude_clock {
+        let turn_rad_s = &clock.turns_rad_s[image];
+        for (constant, turn_rad_s) in constant_rotations().zip(turn_rad_s) {
+            sigmas[constant] = sigmas[constant].hypot(turn_rad_s * clock.sigma_s);
+        }
+    }
+    sigmas
+}
