@@ -28,6 +28,7 @@ use std::{
     collections::BTreeMap,
     fs::{self, File},
     path::{Path, PathBuf},
+    process::Command,
 };
 
 use arrow::{
@@ -234,16 +235,22 @@ fn scene(folder: &Path, seed: u32, options: &[&str]) -> PathBuf {
     path
 }
 
+/// The command that runs every site of a mission.
+fn run(mission: &Path, out: &Path) -> Command {
+    let mut run = areograph();
+    run.args(["--quiet", "run"]);
+    for site in SITES {
+        run.arg(mission.join(format!("sites/{site}.toml")));
+    }
+    run.arg("--out").arg(out);
+    run
+}
+
 /// Every site of every mission, run into `folder`.
 fn judged(folder: &Path, missions: &[PathBuf]) -> Vec<Judged> {
     let of_mission = |mission: &PathBuf| {
         let out = folder.join("out").join(mission.file_name().unwrap());
-        let mut run = areograph();
-        run.args(["--quiet", "run"]);
-        for site in SITES {
-            run.arg(mission.join(format!("sites/{site}.toml")));
-        }
-        succeed(run.arg("--out").arg(&out));
+        succeed(&mut run(mission, &out));
         let judged = SITES.map(|site| Judged::of(mission, &out, site));
         fs::remove_dir_all(&out).unwrap();
         judged

@@ -3,11 +3,7 @@
 
 use std::{fs, path::Path};
 
-use super::{
-    Judged, SITES,
-    common::{json, mission::areograph},
-    root_mean_square, scene,
-};
+use super::{Judged, SITES, common::json, root_mean_square, run, scene};
 
 /// Missions with the option on, run.
 fn by_the_clock(
@@ -33,12 +29,7 @@ fn by_the_clock(
         .iter()
         .flat_map(|mission| {
             let out = folder.join("out").join(mission.file_name().unwrap());
-            let mut run = areograph();
-            run.args(["--quiet", "run"]);
-            for site in SITES {
-                run.arg(mission.join(format!("sites/{site}.toml")));
-            }
-            let code = run.arg("--out").arg(&out).output().unwrap().status.code();
+            let code = run(mission, &out).output().unwrap().status.code();
             // 5: a site is invalid, since corrections are beyond what this reading allows.
             assert!(matches!(code, Some(0 | 5)), "{code:?}");
             let judged = SITES.map(|site| Judged::of(mission, &out, site));

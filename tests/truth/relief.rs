@@ -7,11 +7,8 @@ use nalgebra::Vector3;
 
 use super::{
     Judged, SITES,
-    common::{
-        json,
-        mission::{areograph, succeed},
-    },
-    root_mean_square, scene, vector,
+    common::{json, mission::succeed},
+    root_mean_square, run, scene, vector,
 };
 
 /// A site run without relief and with it.
@@ -22,15 +19,6 @@ struct Both {
     relief_sigma_m: [f64; 2],
     /// Shifts of profiles: found minus drawn, over what is stated.
     shifts: Vec<Vector3<f64>>,
-}
-
-fn run(mission: &Path, out: &Path) {
-    let mut run = areograph();
-    run.args(["--quiet", "run"]);
-    for site in SITES {
-        run.arg(mission.join(format!("sites/{site}.toml")));
-    }
-    succeed(run.arg("--out").arg(out));
 }
 
 /// Shifts of the profiles against what was drawn for the day of the image they were flown with.
@@ -67,14 +55,14 @@ fn both_ways(folder: &Path, seed: u32) -> Vec<Both> {
     ];
     let mission = scene(folder, seed, &options);
     let [ignored, used] = ["ignored", "used"].map(|way| folder.join(way));
-    run(&mission, &ignored);
+    succeed(&mut run(&mission, &ignored));
     for site in SITES {
         let path = mission.join(format!("sites/{site}.toml"));
         let text = fs::read_to_string(&path).unwrap();
         let keys = "[adjustment]\nrelief_for_plan = \"yes\"\n";
         fs::write(&path, text.replacen("[adjustment]\n", keys, 1)).unwrap();
     }
-    run(&mission, &used);
+    succeed(&mut run(&mission, &used));
     let both = SITES.map(|site| {
         let document = json(&ignored.join(site).join("adjustment.json"));
         let relief = &document["adjustment"]["heights"]["relief_sigma_m"];

@@ -96,6 +96,17 @@ fn blocks_of_the_inverse_equal_those_of_the_dense_one() {
     }
 }
 
+/// Numbers that the factor of such a pattern holds.
+fn stored(columns: Vec<std::ops::Range<usize>>, cliques: &[Vec<usize>]) -> usize {
+    let pattern = BlockPattern::of(columns, cliques.iter().map(Vec::as_slice));
+    let mut matrix = BlockMatrix::zeros(&pattern);
+    for column in 0..pattern.unknowns() {
+        matrix.add_to_diagonal(column, 1.0);
+    }
+    let factor = BlockCholesky::new(&matrix).unwrap();
+    factor.rows.iter().map(DMatrix::len).sum()
+}
+
 #[test]
 fn a_chain_of_many_blocks_has_a_narrow_envelope() {
     // Blocks that meet their neighbour, numbered at random.
@@ -109,13 +120,7 @@ fn a_chain_of_many_blocks_has_a_narrow_envelope() {
         })
         .collect();
     let columns = (0..count).map(|block| 2 * block..2 * block + 2).collect();
-    let pattern = BlockPattern::of(columns, cliques.iter().map(Vec::as_slice));
-    let mut matrix = BlockMatrix::zeros(&pattern);
-    for column in 0..pattern.unknowns() {
-        matrix.add_to_diagonal(column, 1.0);
-    }
-    let factor = BlockCholesky::new(&matrix).unwrap();
-    let stored: usize = factor.rows.iter().map(DMatrix::len).sum();
+    let stored = stored(columns, &cliques);
     // The pairs of 2 × 2 and the diagonal, no more.
     assert_eq!(stored, 4 * (2 * count - 1));
 }
@@ -139,13 +144,7 @@ fn a_block_that_all_others_meet_is_a_row_at_the_end_of_the_envelope() {
         columns.push(first..first + width);
         first += width;
     }
-    let pattern = BlockPattern::of(columns, cliques.iter().map(Vec::as_slice));
-    let mut matrix = BlockMatrix::zeros(&pattern);
-    for column in 0..pattern.unknowns() {
-        matrix.add_to_diagonal(column, 1.0);
-    }
-    let factor = BlockCholesky::new(&matrix).unwrap();
-    let stored: usize = factor.rows.iter().map(DMatrix::len).sum();
+    let stored = stored(columns, &cliques);
     // Two chains of 40 and 60 blocks with pairs and diagonals of 2 × 2, and one row of all unknowns.
     assert_eq!(stored, 4 * (2 * 40 - 1 + 2 * 60 - 1) + 2 * 100 + 1);
 }
