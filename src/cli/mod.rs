@@ -8,6 +8,7 @@ mod nightly;
 mod output;
 mod pedr;
 mod pedr_index;
+mod pedr_search;
 mod plan;
 mod report;
 mod run;

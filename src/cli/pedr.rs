@@ -8,7 +8,7 @@ use std::{
 use clap::{Args, Subcommand};
 use serde_json::json;
 
-use super::{output, pedr_index};
+use super::{output, pedr_index, pedr_search};
 use crate::{
     error::{Error, Locate as _},
     pds::pedr::{Complaint, FieldGuard, File},
@@ -39,6 +39,8 @@ enum Command {
     },
     /// Makes the index of an archive, or brings it up to date.
     Index(pedr_index::Arguments),
+    /// Finds the shots of an archive that lie in windows.
+    Search(pedr_search::Arguments),
 }
 
 /// Complaints printed for a file; all are counted.
@@ -52,6 +54,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Error> {
             json,
         } => (files, leap_seconds, json),
         Command::Index(arguments) => return pedr_index::run(arguments),
+        Command::Search(arguments) => return pedr_search::run(arguments),
     };
     let clock = match leap_seconds {
         Some(kernel) => Some(Session::open(&KernelSet::from_files(

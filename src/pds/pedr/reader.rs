@@ -5,7 +5,6 @@
 
 use std::{
     fs, io,
-    num::NonZeroU64,
     ops::Range,
     os::unix::fs::{FileExt as _, MetadataExt as _},
     path::Path,
@@ -132,11 +131,9 @@ impl Reader {
         })
     }
 
-    /// Has the system read some rows ahead; whether it does is its own affair.
-    pub fn announce(&self, rows: &Range<usize>) {
-        let from = (LABEL_BYTES + rows.start * RECORD_BYTES) as u64;
-        let length = NonZeroU64::new((rows.len() * RECORD_BYTES) as u64);
-        let _ = rustix::fs::fadvise(&self.handle, from, length, Advice::WillNeed);
+    /// Has the system read the file ahead; whether it does is its own affair.
+    pub fn announce(&self) {
+        let _ = rustix::fs::fadvise(&self.handle, 0, None, Advice::WillNeed);
     }
 
     /// Makes sure that the file is what it was when it was opened, and still has a name.
@@ -196,19 +193,19 @@ impl Reader {
         Ok(bytes)
     }
 
-    /// Makes sure that the file holds at least one good record; a file of another kind holds none.
+    /// Time tag of the first good record, ET seconds; a file of another kind holds none.
     ///
     /// # Errors
     /// What is wrong with the label, else with the first record; what the disk refuses.
-    pub fn require_records(&self) -> Result<()> {
+    pub fn require_records(&self) -> Result<f64> {
         let guard = FieldGuard::new(self.head.label().software_version);
         let (mut row, mut next, mut first) = (0, FIRST_RECORDS, None);
         while row < self.head.record_count() {
             let stretch = self.stretch(row..row + next, Vec::new())?;
-            for (row, _) in stretch.records(row..row + next) {
+            for (row, record) in stretch.records(row..row + next) {
                 match stretch.frame(row, guard) {
                     Some(Err(error)) => first = first.or(Some((row, error))),
-                    Some(Ok(_)) => return Ok(()),
+                    Some(Ok(_)) => return Ok(record.time_s.get()),
                     None => {}
                 }
             }
