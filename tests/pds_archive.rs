@@ -373,7 +373,7 @@ fn meanwhile(happens: impl FnOnce(&Path) + Send + 'static) -> Rows {
         south_rad: -0.3,
         north_rad: 0.3,
     });
-    let query = Query::new(vec![window], &filter, Judged::Near);
+    let query = Query::new(vec![window], &filter, Judged::All);
     let mut rows = Rows {
         meanwhile: Some(Box::new(move || happens(&path))),
         ..Rows::default()

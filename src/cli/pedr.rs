@@ -2,6 +2,7 @@
 
 mod index;
 mod info;
+mod search;
 mod tab;
 
 use clap::{Args, Subcommand};
@@ -20,6 +21,7 @@ enum Command {
     Info(info::Arguments),
     Tab(tab::Arguments),
     Index(index::Arguments),
+    Search(search::Arguments),
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<(), Error> {
@@ -27,5 +29,6 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Error> {
         Command::Info(arguments) => info::run(arguments),
         Command::Tab(arguments) => tab::run(arguments),
         Command::Index(arguments) => index::run(arguments),
+        Command::Search(arguments) => search::run(arguments),
     }
 }

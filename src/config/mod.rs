@@ -26,6 +26,7 @@ mod service;
 mod site;
 mod ties;
 mod unknowns;
+mod window_list;
 mod windows;
 mod written;
 
@@ -66,6 +67,7 @@ pub use service::{
 pub use site::SiteConfig;
 pub use ties::{IntersectionConfig, TiesConfig};
 pub use unknowns::{PositionUnknowns, RotationUnknowns};
+pub use window_list::{load_windows, window_of_box, window_of_polygon};
 pub use windows::WindowConfig;
 
 use crate::error::{Cause, Error, IoError, Kind, Locate as _};

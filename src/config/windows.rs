@@ -146,7 +146,7 @@ fn bounds(
 /// Longitudes in `0..360`, or `[0, 360]` for all of them; `None` when the width is none or over 360°.
 ///
 /// Wrapped in degrees, where whole numbers stay exact.
-fn wrapped_longitudes([west, east]: [f64; 2]) -> Option<[f64; 2]> {
+pub(super) fn wrapped_longitudes([west, east]: [f64; 2]) -> Option<[f64; 2]> {
     let width = if west < east {
         east - west
     } else {

@@ -78,32 +78,71 @@ pub(super) static GEOJSON: Declaration = Declaration {
     }],
 };
 
-/// A footprint of a site.
+/// A footprint with what it is called.
 #[derive(Clone, Copy)]
 pub(super) struct Shot<'a> {
-    pub(super) site: &'a SiteProducts<'a>,
-    pub(super) row: usize,
+    footprints: &'a Footprints<MarsIau2000>,
+    names: &'a dyn ShotNames,
+    row: usize,
+}
+
+/// What footprints have beside numbers.
+pub(super) trait ShotNames {
+    /// Identifiers of the windows that hold the shot in this row, separated by semicolons.
+    fn windows(&self, row: usize) -> String;
+
+    /// Its UTC, where it is known.
+    fn utc(&self, row: usize) -> String;
+}
+
+impl ShotNames for SiteProducts<'_> {
+    fn windows(&self, row: usize) -> String {
+        self.window_ids(self.footprints.windows[row])
+    }
+
+    fn utc(&self, row: usize) -> String {
+        self.utc[row].clone()
+    }
 }
 
 impl<'a> Shot<'a> {
     /// All of a site.
     pub(super) fn all(site: &'a SiteProducts<'a>) -> Vec<Self> {
-        let rows = 0..site.footprints.len();
-        rows.map(|row| Self { site, row }).collect()
+        Self::all_of(site.footprints, site)
+    }
+
+    /// All of these footprints.
+    pub(super) fn all_of(
+        footprints: &'a Footprints<MarsIau2000>,
+        names: &'a dyn ShotNames,
+    ) -> Vec<Self> {
+        let shot = |row| Self {
+            footprints,
+            names,
+            row,
+        };
+        (0..footprints.len()).map(shot).collect()
+    }
+
+    /// Name of the PEDR file.
+    fn file_name(&self) -> String {
+        let file = usize::from(self.get(|of| &of.file));
+        let source = self.footprints.files.get(file);
+        source.map_or_else(String::new, |source| source.name.clone())
     }
 
     /// The column of footprints that `of` picks, in the shot's row.
     pub(super) fn get<T: Copy>(&self, of: fn(&Footprints<MarsIau2000>) -> &Vec<T>) -> T {
-        of(self.site.footprints)[self.row]
+        of(self.footprints)[self.row]
     }
 
     pub(super) fn utc(&self) -> String {
-        self.site.utc[self.row].clone()
+        self.names.utc(self.row)
     }
 
     /// Height above the areoid, after the crossover correction, metres.
     pub(super) fn topography_m(&self) -> f64 {
-        self.site.footprints.row(self.row).topography_m()
+        self.footprints.row(self.row).topography_m()
     }
 
     fn areographic_deg(&self) -> f64 {
@@ -112,11 +151,11 @@ impl<'a> Shot<'a> {
     }
 
     fn xyz_m(&self, axis: usize) -> f64 {
-        let shot = self.site.footprints.row(self.row);
+        let shot = self.footprints.row(self.row);
         spherical_to_xyz_m(shot.longitude_rad, shot.latitude_rad, shot.radius_m)[axis]
     }
 
-    fn point_deg(&self) -> [f64; 2] {
+    pub(super) fn point_deg(&self) -> [f64; 2] {
         [
             signed_longitude_deg(self.get(|of| &of.longitude_rad)),
             degrees(self.get(|of| &of.latitude_rad)),
@@ -173,7 +212,7 @@ pub(super) fn points_deg(site: &SiteProducts) -> Vec<[f64; 2]> {
     Shot::all(site).iter().map(Shot::point_deg).collect()
 }
 
-fn columns<'a>() -> Vec<Column<Shot<'a>>> {
+pub(super) fn columns<'a>() -> Vec<Column<Shot<'a>>> {
     let mut columns = identity();
     columns.extend(quality());
     columns.extend(ground());
@@ -217,7 +256,7 @@ fn identity<'a>() -> Vec<Column<Shot<'a>>> {
         .in_gis()
         .in_dbase("orbit", 10, 0),
         column("source_file", Unit::None, "PEDR file", |shot: &Shot| {
-            shot.site.file_name(shot.get(|of| &of.file))
+            shot.file_name()
         })
         .in_gis()
         .in_dbase("file", 0, 0),
@@ -269,7 +308,7 @@ fn quality<'a>() -> Vec<Column<Shot<'a>>> {
             "windows",
             Unit::None,
             "identifiers of the windows that hold the shot, separated by semicolons",
-            |shot: &Shot| shot.site.window_ids(shot.get(|of| &of.windows)),
+            |shot: &Shot| shot.names.windows(shot.row),
         )
         .last_in_gis(),
     ]
@@ -423,7 +462,7 @@ fn geo_metadata(points: &[[f64; 2]]) -> Value {
 /// PROJJSON of `IAU_2015:49900`, which stands for the sphere; [`FRAME`] says whose longitudes these are. Coordinates are (longitude, latitude) all the same, as GeoParquet says.
 ///
 /// Source: IAU coordinate systems of the OGC Planetary working group, radius of Archinal et al. 2018.
-fn mars_sphere() -> Value {
+pub(super) fn mars_sphere() -> Value {
     let axis = |name: &str, abbreviation: &str, direction: &str| json!({ "name": name, "abbreviation": abbreviation, "direction": direction, "unit": "degree" });
     json!({
         "$schema": "https://proj.org/schemas/v0.7/projjson.schema.json",

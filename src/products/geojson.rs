@@ -22,7 +22,7 @@ use crate::error::{IoError, Locate, Result};
 pub(super) const CRS_URN: &str = "urn:ogc:def:crs:IAU:2015:49900";
 
 #[derive(Serialize)]
-struct Feature<'a> {
+pub(super) struct Feature<'a> {
     r#type: &'static str,
     geometry: Point,
     properties: Properties<'a>,
@@ -160,7 +160,7 @@ pub(super) fn write(path: &Path, features: Features) -> Result<u64> {
 }
 
 /// Calls `take` with every feature and what follows it.
-fn each(
+pub(super) fn each(
     features: &Features,
     path: &Path,
     mut take: impl FnMut(usize, &Feature, &'static str) -> Result<()>,
@@ -209,7 +209,7 @@ fn write_lines(path: &Path, head: &str, features: &Features) -> Result<()> {
 }
 
 /// The lines before the first feature.
-fn head(features: &Features) -> std::result::Result<String, ProductError> {
+pub(super) fn head(features: &Features) -> std::result::Result<String, ProductError> {
     let crs = json!({ "type": "name", "properties": { "name": CRS_URN } });
     let mut members = vec![
         ("type", json!("FeatureCollection")),

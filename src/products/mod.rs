@@ -14,6 +14,7 @@ pub(crate) mod error;
 mod exchange;
 mod files;
 mod footprints;
+mod found_shots;
 mod generated;
 mod geojson;
 mod gis;
@@ -46,6 +47,7 @@ pub use exchange::{
     NetworkMeasure, NetworkPoint, isis_serial_number, write_control_network, write_gcp,
     write_lidar_data,
 };
+pub use found_shots::{FoundShots, ShotsFile, ShotsFormat};
 pub use generated::{documentation, schemas};
 pub use net::{NetProducts, write_net_products};
 pub use product::Product;

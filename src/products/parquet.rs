@@ -58,7 +58,7 @@ fn encode(file: impl Write + Send, table: &Table, metadata: Vec<(&str, String)>)
 }
 
 /// The disk's refusal, or the library's.
-fn refused(error: ParquetError) -> Error {
+pub(super) fn refused(error: ParquetError) -> Error {
     match error {
         ParquetError::External(source) => match source.downcast::<std::io::Error>() {
             Ok(source) => IoError::on("write")(*source).into(),
@@ -68,7 +68,7 @@ fn refused(error: ParquetError) -> Error {
     }
 }
 
-fn schema(table: &Table) -> SchemaRef {
+pub(super) fn schema(table: &Table) -> SchemaRef {
     let fields: Vec<Field> = table.columns().map(field).collect();
     Arc::new(Schema::new(fields))
 }
@@ -91,7 +91,7 @@ fn field(column: &Meaning) -> Field {
 }
 
 /// The given rows, which `table` must have, as arrays.
-fn record_batch(
+pub(super) fn record_batch(
     table: &Table,
     schema: &SchemaRef,
     rows: Range<usize>,

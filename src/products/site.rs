@@ -139,12 +139,6 @@ impl<'a> SiteProducts<'a> {
         Some((geometric, geometric.adjustment?))
     }
 
-    /// Name of a source file; its folder belongs to the machine, not to the product.
-    pub(super) fn file_name(&self, file: u16) -> String {
-        let source = self.footprints.files.get(usize::from(file));
-        source.map_or_else(String::new, |source| source.name.clone())
-    }
-
     /// Identifiers of the windows in `mask`, separated by semicolons.
     pub(super) fn window_ids(&self, mask: u64) -> String {
         let held = self

@@ -269,6 +269,11 @@ impl<'a> Table<'a> {
         self.keep(|column| column.dbase.is_some())
     }
 
+    /// Without the column of that name.
+    pub(super) fn without(self, name: &str) -> Self {
+        self.keep(|column| column.name != name)
+    }
+
     fn keep(mut self, required: impl Fn(&Meaning) -> bool) -> Self {
         self.columns.retain(|(_, column)| required(column));
         self

@@ -24,9 +24,20 @@ pub(super) fn write(path: &Path, table: Table) -> Result<u64> {
 
 fn encode(file: impl Write, table: &Table) -> Result<()> {
     let mut writer = csv::Writer::from_writer(file);
-    writer
-        .write_record(table.columns().map(|column| column.name))
-        .map_err(refused)?;
+    write_names(&mut writer, table)?;
+    write_rows(&mut writer, table)?;
+    writer.flush().map_err(IoError::on("write"))?;
+    Ok(())
+}
+
+/// Writes the names of the columns.
+pub(super) fn write_names(writer: &mut csv::Writer<impl Write>, table: &Table) -> Result<()> {
+    let names = table.columns().map(|column| column.name);
+    writer.write_record(names).map_err(refused)
+}
+
+/// Writes the rows.
+pub(super) fn write_rows(writer: &mut csv::Writer<impl Write>, table: &Table) -> Result<()> {
     for rows in table.pieces() {
         let values = table.values(rows.clone())?;
         for row in 0..rows.len() {
@@ -36,7 +47,6 @@ fn encode(file: impl Write, table: &Table) -> Result<()> {
                 .map_err(refused)?;
         }
     }
-    writer.flush().map_err(IoError::on("write"))?;
     Ok(())
 }
 

@@ -19,7 +19,7 @@ fn ground(time_s: f64) -> [f64; 2] {
     let inclination_rad = 92.9 * DEGREE;
     let latitude_rad = (inclination_rad.sin() * along_rad.sin()).asin();
     let node_rad = (inclination_rad.cos() * along_rad.sin()).atan2(along_rad.cos());
-    [node_rad - 7.088e-5 * time_s, latitude_rad]
+    [wrap_pi(node_rad - 7.088e-5 * time_s), latitude_rad]
 }
 
 /// An areoid as flat as Mars.

@@ -10,8 +10,10 @@ use crate::units::RADIANS_PER_DEGREE;
 const CELL_RAD: f64 = RADIANS_PER_DEGREE;
 const ROWS: usize = 180;
 const COLUMNS: usize = 360;
-/// A window in more cells than this is tested for every direction instead, so that memory stays bounded.
-const CELLS_MAX: usize = 1_024;
+/// A window in more cells than its share of so many, or than so few, is tested for every direction instead, so that
+/// memory stays bounded.
+const ENTRIES_MAX: usize = 1 << 22;
+const CELLS_MIN: usize = 1_024;
 /// Cells are taken wider by this, radians: far above the rounding of the tests, far below a cell.
 const ROUNDING_RAD: f64 = 1e-6;
 /// Caps up to this radius are answered by cells, degrees: half a frame of 2 s and the parallax of its relief. Towards
@@ -46,10 +48,11 @@ impl WindowGrid {
                 margin_rad + (CAP_DEG + CAP_ON_PARALLEL_DEG / parallel) * RADIANS_PER_DEGREE
             })
             .collect();
+        let cells_max = (ENTRIES_MAX / regions.len().max(1)).max(CELLS_MIN);
         let (mut wide, mut entries) = (Vec::new(), Vec::new());
         for (window, region) in (0_u32..).zip(&regions) {
             let cells = cells_of(region, &caps_rad);
-            if cells.len() > CELLS_MAX {
+            if cells.len() > cells_max {
                 wide.push(window);
             } else {
                 entries.extend(cells.into_iter().map(|cell| (cell, window)));
@@ -58,7 +61,7 @@ impl WindowGrid {
         entries.sort_unstable();
         let mut starts = vec![0; ROWS * COLUMNS + 1];
         for (cell, _) in &entries {
-            starts[cell + 1] += 1;
+            starts[*cell as usize + 1] += 1;
         }
         for cell in 0..ROWS * COLUMNS {
             starts[cell + 1] += starts[cell];
@@ -172,12 +175,12 @@ fn row_edges_rad(row: usize) -> [f64; 2] {
 }
 
 /// The cells with a direction that is no farther from the region than the cap of its row.
-fn cells_of(region: &Region, caps_rad: &[f64]) -> Vec<usize> {
+fn cells_of(region: &Region, caps_rad: &[f64]) -> Vec<u32> {
     let mut cells = Vec::new();
     for (row, cap_rad) in caps_rad.iter().enumerate() {
         for piece in &region.pieces {
             let columns = columns_of(piece.bounds(), row_edges_rad(row), cap_rad + ROUNDING_RAD);
-            cells.extend(columns.map(|column| row * COLUMNS + column));
+            cells.extend(columns.map(|column| u32::try_from(row * COLUMNS + column).unwrap_or(0)));
         }
     }
     cells.sort_unstable();

@@ -9,6 +9,7 @@ mod folder;
 mod found;
 mod index;
 mod indexing;
+mod look;
 mod query;
 mod scan;
 mod search;

@@ -2,7 +2,7 @@
 
 use std::{
     collections::{BTreeMap, BTreeSet},
-    mem,
+    iter, mem,
     ops::Range,
     sync::atomic::AtomicBool,
 };
@@ -11,12 +11,14 @@ use rayon::prelude::*;
 
 use super::{Found, Query, Source, scan::Scan};
 use crate::{
-    error::{Error, Result, Stopped},
+    error::{Error, Kind, Result, Stopped},
     pds::pedr::{Reader, Stretch},
 };
 
 /// Records in memory at once: 51 MB, more than any day of the mission takes.
 pub(super) const LOAD_RECORDS: usize = 1 << 16;
+/// Pieces of a load: each may be of another file, which is open meanwhile.
+const PIECES_MAX: usize = 128;
 /// Records of a task: 0.4 MB, and at most 1.5 MB of shots.
 const TASK_RECORDS: usize = 512;
 /// Tasks of a wave for each thread, and the most of a wave: what they find stands in memory at once.
@@ -57,40 +59,52 @@ pub fn search(
         sink,
         readers: BTreeMap::new(),
         failed: BTreeSet::new(),
-        buffers: Vec::new(),
+        buffer: Vec::new(),
     };
-    let pieces: Vec<Piece> = (0..)
-        .zip(sources)
-        .flat_map(|(file, source)| pieces_of(file, source, query))
-        .collect();
-    let mut rest = &pieces[..];
-    while let Some(load) = next_load(rest) {
-        rest = &rest[load.len()..];
-        search.load(load, rest.first())?;
+    let mut pieces: Vec<Piece> = Vec::new();
+    for (file, source) in sources.iter().enumerate() {
+        if let Some(next) = sources.get(file + 1) {
+            next.announce();
+        }
+        match source.rows_to_read(query, stop) {
+            Ok(rows) => pieces.extend(pieces_of(file, &rows)),
+            Err(failure) if failure.kind() == Kind::Interrupted => return Err(failure),
+            Err(failure) => {
+                search.load_all(&mut pieces, 0)?;
+                search.sink.failed(file, failure)?;
+            }
+        }
+        search.load_all(&mut pieces, LOAD_RECORDS)?;
     }
-    Ok(())
+    search.load_all(&mut pieces, 0)
 }
 
 /// Successive rows of a file.
 struct Piece {
     file: usize,
     rows: Range<usize>,
+    /// Where the piece before ends.
+    after: usize,
     is_first: bool,
     is_last: bool,
 }
 
 /// The pieces of a file: at least one, which may be empty.
-fn pieces_of(file: usize, source: &Source, query: &Query<'_>) -> Vec<Piece> {
-    let mut pieces: Vec<Piece> = source
-        .rows_to_read(query)
-        .into_iter()
+fn pieces_of(file: usize, rows: &[Range<usize>]) -> Vec<Piece> {
+    let mut pieces: Vec<Piece> = rows
+        .iter()
         .flat_map(|rows| {
             let starts = rows.clone().step_by(LOAD_RECORDS);
             starts.map(move |start| start..rows.end.min(start + LOAD_RECORDS))
         })
-        .map(|rows| Piece {
+        .scan(0, |end, rows| {
+            let after = std::mem::replace(end, rows.end);
+            Some((after, rows))
+        })
+        .map(|(after, rows)| Piece {
             file,
             rows,
+            after,
             is_first: false,
             is_last: false,
         })
@@ -99,6 +113,7 @@ fn pieces_of(file: usize, source: &Source, query: &Query<'_>) -> Vec<Piece> {
         pieces.push(Piece {
             file,
             rows: 0..0,
+            after: 0,
             is_first: false,
             is_last: false,
         });
@@ -110,15 +125,14 @@ fn pieces_of(file: usize, source: &Source, query: &Query<'_>) -> Vec<Piece> {
     pieces
 }
 
-/// The first pieces that fit into memory together.
-fn next_load(pieces: &[Piece]) -> Option<&[Piece]> {
+/// How many of the pieces, from the first on, fit into memory together; each does so by itself.
+fn next_load(pieces: &[Piece]) -> usize {
     let mut records = 0;
-    let fit = pieces.iter().take_while(|piece| {
+    let fit = pieces.iter().take(PIECES_MAX).take_while(|piece| {
         records += piece.rows.len();
         records <= LOAD_RECORDS
     });
-    let fit = fit.count();
-    (fit > 0).then(|| &pieces[..fit])
+    fit.count()
 }
 
 /// A search under way.
@@ -130,26 +144,42 @@ struct Search<'a> {
     /// Files that pieces in memory are of.
     readers: BTreeMap<usize, Reader>,
     failed: BTreeSet<usize>,
-    buffers: Vec<Vec<u8>>,
+    /// Memory of the first piece, which most loads have no other one beside.
+    buffer: Vec<u8>,
 }
 
 /// A part of a piece in memory, for one thread.
 struct Task {
     piece: usize,
     rows: Range<usize>,
+    /// Where the task before ends.
+    after: usize,
     is_first: bool,
     is_last: bool,
 }
 
 impl Search<'_> {
-    /// Reads and searches pieces that fit into memory together; `next` is the one after them.
-    fn load(&mut self, pieces: &[Piece], next: Option<&Piece>) -> Result<()> {
+    /// Reads and searches pieces, one load after the other, until few enough are left.
+    ///
+    /// * `left` – records that may be left, to be read with what comes next
+    fn load_all(&mut self, pieces: &mut Vec<Piece>, left: usize) -> Result<()> {
+        let are_few = |pieces: &[Piece]| {
+            let records: usize = pieces.iter().map(|piece| piece.rows.len()).sum();
+            pieces.is_empty() || records < left && pieces.len() < PIECES_MAX
+        };
+        while !are_few(pieces) {
+            let load = next_load(pieces);
+            self.load(&pieces[..load])?;
+            pieces.drain(..load);
+        }
+        Ok(())
+    }
+
+    /// Reads and searches pieces that fit into memory together.
+    fn load(&mut self, pieces: &[Piece]) -> Result<()> {
         Stopped::check(self.stop)?;
         let mut failures = self.open(pieces);
         let stretches = self.read(pieces, &mut failures);
-        if let Some(next) = next {
-            self.announce(next);
-        }
         let tasks: Vec<Task> = (0..)
             .zip(pieces)
             .flat_map(|(number, piece)| tasks_of(number, piece))
@@ -175,8 +205,8 @@ impl Search<'_> {
                 self.hand_on(pieces[task.piece].file, task, found, &mut failures)?;
             }
         }
-        let free = stretches.into_iter().flatten().map(Stretch::into_buffer);
-        self.buffers.extend(free);
+        let first = stretches.into_iter().next().flatten();
+        self.buffer = first.map(Stretch::into_buffer).unwrap_or_default();
         Ok(())
     }
 
@@ -203,10 +233,11 @@ impl Search<'_> {
         pieces: &[Piece],
         failures: &mut BTreeMap<usize, Error>,
     ) -> Vec<Option<Stretch>> {
-        let mut buffers = mem::take(&mut self.buffers);
-        buffers.resize_with(buffers.len().max(pieces.len()), Vec::new);
-        let spare = buffers.split_off(pieces.len());
-        self.buffers = spare;
+        let first = [mem::take(&mut self.buffer)].into_iter();
+        let buffers: Vec<Vec<u8>> = first
+            .chain(iter::repeat_with(Vec::new))
+            .take(pieces.len())
+            .collect();
         let readers = &self.readers;
         let stretches: Vec<Option<Result<Stretch>>> = pieces
             .par_iter()
@@ -225,13 +256,6 @@ impl Search<'_> {
             }
         })
         .collect()
-    }
-
-    /// Has the system read the piece while others are searched.
-    fn announce(&self, piece: &Piece) {
-        if !piece.rows.is_empty() {
-            self.sources[piece.file].announce(&piece.rows);
-        }
     }
 
     /// Gives what was found to the sink, unless the file has failed.
@@ -271,7 +295,7 @@ fn scan(
     let mut found = Found::new();
     if task.is_first {
         found.frames_read = source.records() as u64;
-        source.tell_of_head(query, &mut found);
+        source.tell_of_head(&mut found);
     }
     if let Some(stretch) = stretch {
         let scan = Scan {
@@ -282,6 +306,12 @@ fn scan(
         };
         scan.rows(stretch, task.rows.clone(), &mut found);
     }
+    let end = if task.is_last {
+        source.records()
+    } else {
+        task.rows.end
+    };
+    source.tell_known(query, task.after..end, &mut found);
     if task.is_last {
         source.tell_of_end(&mut found);
     }
@@ -297,6 +327,7 @@ fn tasks_of(number: usize, piece: &Piece) -> Vec<Task> {
         Task {
             piece: number,
             rows: start..rows.end.min(start + TASK_RECORDS),
+            after: if part == 0 { piece.after } else { start },
             is_first: piece.is_first && part == 0,
             is_last: piece.is_last && part + 1 == count,
         }

@@ -3,7 +3,7 @@
 use std::{
     ops::Range,
     path::{Path, PathBuf},
-    sync::Arc,
+    sync::{Arc, atomic::AtomicBool},
 };
 
 use super::{Found, IndexedFile, Indexes, Judged, Query};
@@ -23,6 +23,9 @@ pub struct Source {
     datum: MarsDatum,
     label: PedrLabel,
     records: usize,
+    first_s: f64,
+    /// Number of the first data record.
+    first_record: u32,
     identity: Identity,
     head_complaints: Vec<Complaint>,
     trailing_complaint: Option<Complaint>,
@@ -30,16 +33,14 @@ pub struct Source {
 }
 
 impl Source {
-    /// Looks at the label of a file, and for its first good record, which a file in an index has.
+    /// Looks at the label of a file, and for its first good record.
     ///
     /// # Errors
     /// A file that cannot be read, holds no good record, or whose datum cannot be told.
     pub fn open(path: &Path, choice: DatumChoice, indexes: &Indexes) -> Result<Self> {
         let reader = Reader::open(path)?;
         let indexed = indexes.find(path, &reader.identity());
-        if indexed.is_none() {
-            reader.require_records()?;
-        }
+        let first_s = reader.require_records()?;
         let head = reader.head();
         let version = head.name().map(|name| name.version);
         Ok(Self {
@@ -48,6 +49,8 @@ impl Source {
             datum: decide_datum(choice, version, head.label().datum).in_file(path)?,
             label: head.label().clone(),
             records: head.record_count(),
+            first_s,
+            first_record: head.record_number(0),
             identity: reader.identity(),
             head_complaints: head.label_complaints().to_vec(),
             trailing_complaint: head.trailing_complaint(),
@@ -85,6 +88,12 @@ impl Source {
         self.records
     }
 
+    /// Time tag of its first good record, ET seconds.
+    #[must_use]
+    pub const fn first_s(&self) -> f64 {
+        self.first_s
+    }
+
     /// What its complaints of the label say.
     #[must_use]
     pub fn label_complaints(&self) -> &[Complaint] {
@@ -101,11 +110,13 @@ impl Source {
         Ok(reader)
     }
 
-    /// Has the system read some rows ahead.
-    pub(super) fn announce(&self, rows: &Range<usize>) {
+    /// Has the system read the file ahead, if it will be read as a whole.
+    pub(super) fn announce(&self) {
+        let indexed = self.indexed.as_ref();
+        let is_read = !indexed.is_some_and(|indexed| indexed.has_blocks(self.records));
         // A file that cannot be opened is complained of when its turn comes.
-        if let Ok(reader) = self.reopen() {
-            reader.announce(rows);
+        if is_read && let Ok(reader) = self.reopen() {
+            reader.announce();
         }
     }
 
@@ -114,10 +125,21 @@ impl Source {
     }
 
     /// The rows that may have shots that are asked for, or must be judged all the same.
-    pub(super) fn rows_to_read(&self, query: &Query<'_>) -> Vec<Range<usize>> {
+    ///
+    /// # Errors
+    /// What the disk refuses; a file that has changed; [`Stopped`](crate::error::Stopped).
+    pub(super) fn rows_to_read(
+        &self,
+        query: &Query<'_>,
+        stop: &AtomicBool,
+    ) -> Result<Vec<Range<usize>>> {
         let indexed = self.indexed.as_ref();
-        let rows = indexed.and_then(|indexed| indexed.rows(query, self.datum, self.records));
-        rows.unwrap_or_else(|| vec![0..self.records])
+        let indexed = indexed.and_then(|indexed| indexed.rows(query, self.datum, self.records));
+        match (indexed, query.judged) {
+            (Some(rows), _) => Ok(rows),
+            (None, Judged::Near) => self.look(query, stop),
+            (None, Judged::All) => Ok(vec![0..self.records]),
+        }
     }
 
     /// Whether an index tells all complaints that are asked for.
@@ -127,17 +149,27 @@ impl Source {
             && indexed.is_some_and(|indexed| indexed.has_blocks(self.records))
     }
 
-    /// Complains of what is wrong with the head of the file, and of what an index says.
-    pub(super) fn tell_of_head(&self, query: &Query<'_>, found: &mut Found) {
+    /// Complains of what is wrong with the head of the file.
+    pub(super) fn tell_of_head(&self, found: &mut Found) {
         for complaint in &self.head_complaints {
             found.complain(complaint.clone());
         }
-        let indexed = self.indexed.iter();
-        for indexed in indexed.filter(|_| self.complaints_known(query)) {
-            for complaint in &indexed.complaints {
+    }
+
+    /// Complains of what an index knows of these rows, in order with what was found in them.
+    pub(super) fn tell_known(&self, query: &Query<'_>, rows: Range<usize>, found: &mut Found) {
+        let Some(indexed) = (self.indexed.as_ref()).filter(|_| self.complaints_known(query)) else {
+            return;
+        };
+        for complaint in &indexed.complaints {
+            let row = complaint
+                .record
+                .and_then(|record| record.checked_sub(self.first_record));
+            if row.is_some_and(|row| rows.contains(&(row as usize))) {
                 found.complain(complaint.clone());
             }
         }
+        found.complaints.sort_by_key(|complaint| complaint.record);
     }
 
     /// Complains of what is wrong with the end of the file.

@@ -301,25 +301,33 @@ impl File {
     pub fn require_records(&self) -> Result<()> {
         let mut first = None;
         for row in self.rows().step_by(STEP) {
-            if self.has_good_record(row..row + STEP, &mut first) {
+            if self.good_record(row..row + STEP, &mut first).is_some() {
                 return Ok(());
             }
         }
         Err(self.no_good_record(first))
     }
 
-    /// Whether one of these rows is a good record; if not, `first` is the first bad one of all that were looked at.
-    pub(super) fn has_good_record(&self, rows: Range<usize>, first: &mut Option<Bad>) -> bool {
-        self.frames(rows, self.guard()).any(|(row, frame)| {
-            if let Err(error) = &frame {
-                first.get_or_insert_with(|| Bad {
-                    row,
-                    record: Record::from_bytes(&self.record(row).to_bytes()),
-                    error: *error,
-                });
+    /// The first good record of these rows; without one, `first` is the first bad one of all that were looked at.
+    pub(super) fn good_record(
+        &self,
+        rows: Range<usize>,
+        first: &mut Option<Bad>,
+    ) -> Option<&Record> {
+        for (row, frame) in self.frames(rows, self.guard()) {
+            let record = self.record(row);
+            match frame {
+                Ok(_) => return Some(record),
+                Err(error) => {
+                    first.get_or_insert_with(|| Bad {
+                        row,
+                        record: Record::from_bytes(&record.to_bytes()),
+                        error,
+                    });
+                }
             }
-            frame.is_ok()
-        })
+        }
+        None
     }
 
     /// The failure of a file without a good record, of which this is the first, with what is wrong with it.

@@ -5,7 +5,6 @@
 
 use std::{
     fs, io,
-    num::NonZeroU64,
     ops::Range,
     os::unix::fs::{FileExt as _, MetadataExt as _},
     path::Path,
@@ -116,19 +115,38 @@ impl Reader {
     /// # Errors
     /// What the disk refuses; a file that has become shorter.
     pub fn stretch(&self, rows: Range<usize>, buffer: Vec<u8>) -> Result<Stretch> {
-        let end = rows.end.min(self.head.record_count());
-        let start = rows.start.min(end);
-        let first_row = start.saturating_sub(NEIGHBOURS);
-        let last_row = (end + NEIGHBOURS).min(self.head.record_count());
-        let is_whole = last_row - first_row == self.head.record_count();
-        let misplaced = if is_whole {
+        let reaches_all = rows.start <= NEIGHBOURS
+            && rows.end.saturating_add(NEIGHBOURS) >= self.head.record_count();
+        let chronology = if reaches_all {
             None
         } else {
             Some(self.chronology()?)
         };
+        self.stretch_in(rows, buffer, chronology)
+    }
+
+    /// The same for records that nobody will judge: the rest of the file is not looked at.
+    ///
+    /// # Errors
+    /// As [`stretch`](Self::stretch).
+    pub fn unjudged(&self, rows: Range<usize>, buffer: Vec<u8>) -> Result<Stretch> {
+        self.stretch_in(rows, buffer, Some(Chronology::default()))
+    }
+
+    /// The same for a chronology that is known; without, it is told by the rows in memory.
+    fn stretch_in(
+        &self,
+        rows: Range<usize>,
+        buffer: Vec<u8>,
+        chronology: Option<Chronology>,
+    ) -> Result<Stretch> {
+        let end = rows.end.min(self.head.record_count());
+        let start = rows.start.min(end);
+        let first_row = start.saturating_sub(NEIGHBOURS);
+        let last_row = (end + NEIGHBOURS).min(self.head.record_count());
         let buffer = self.read(first_row..last_row, buffer)?;
         Ok(Stretch {
-            file: self.head.with_records(first_row, buffer, misplaced),
+            file: self.head.with_records(first_row, buffer, chronology),
             inner: start..end,
         })
     }
@@ -171,11 +189,9 @@ impl Reader {
         Ok(Arc::clone(self.misplaced.get_or_init(|| found)))
     }
 
-    /// Has the system read some rows ahead; whether it does is its own affair.
-    pub fn announce(&self, rows: &Range<usize>) {
-        let from = (self.head.label_length() + rows.start * RECORD_BYTES) as u64;
-        let length = NonZeroU64::new((rows.len() * RECORD_BYTES) as u64);
-        let _ = rustix::fs::fadvise(&self.handle, from, length, Advice::WillNeed);
+    /// Has the system read the file ahead; whether it does is its own affair.
+    pub fn announce(&self) {
+        let _ = rustix::fs::fadvise(&self.handle, 0, None, Advice::WillNeed);
     }
 
     /// Makes sure that the file is what it was when it was opened, and still has a name.
@@ -235,19 +251,18 @@ impl Reader {
         Ok(bytes)
     }
 
-    /// Makes sure that the file holds at least one good record; a file of another kind holds none.
+    /// Time tag of the first good record, ET seconds; a file of another kind holds none.
     ///
     /// # Errors
     /// What is wrong with the label, else with the first record; what the disk refuses.
-    pub fn require_records(&self) -> Result<()> {
+    pub fn require_records(&self) -> Result<f64> {
         let (mut row, mut next, mut first) = (0, FIRST_RECORDS, None);
         while row < self.head.record_count() {
-            let stretch = self.stretch(row..row + next, Vec::new())?;
-            if stretch
-                .file
-                .has_good_record(stretch.inner.clone(), &mut first)
-            {
-                return Ok(());
+            // Of sound records one fits into any chronology.
+            let chronology = Chronology::default();
+            let stretch = self.stretch_in(row..row + next, Vec::new(), Some(chronology))?;
+            if let Some(good) = stretch.file.good_record(stretch.inner.clone(), &mut first) {
+                return Ok(good.time_s.get());
             }
             (row, next) = (row + next, NEXT_RECORDS);
         }

@@ -1,0 +1,375 @@
+//! Shots that a search of the archive finds, written as they come: the same columns as `footprints.parquet`.
+
+use std::{
+    fs::File,
+    io::{BufWriter, Write},
+    path::{Path, PathBuf},
+    sync::Arc,
+};
+
+use ::parquet::{
+    arrow::{ArrowWriter, arrow_reader::ParquetRecordBatchReaderBuilder},
+    basic::{Compression, ZstdLevel},
+    file::{metadata::KeyValue, properties::WriterProperties},
+};
+use arrow::{
+    array::{ArrayRef, Float64Array, StructArray},
+    compute::concat_batches,
+    datatypes::{DataType, Field, Fields, Schema, SchemaRef},
+    record_batch::RecordBatch,
+};
+use serde_json::{Value, json};
+use tempfile::NamedTempFile;
+
+use super::{
+    coordinates::FRAME,
+    error::ProductError,
+    footprints::{Shot, ShotNames, columns, mars_sphere},
+    geojson,
+    gis::Features,
+    parquet,
+    table::Table,
+    text_table,
+};
+use crate::{
+    error::{IoError, Locate, Result},
+    footprints::Footprints,
+    frames::MarsIau2000,
+    pds::archive::WindowLists,
+};
+
+/// The column of the bounding box of each point, and its parts: what readers of GeoParquet pass over rows by.
+const BBOX: &str = "bbox";
+const BBOX_PARTS: [&str; 4] = ["xmin", "ymin", "xmax", "ymax"];
+/// The key of what was asked for, and how complete the answer is.
+const SEARCH: &str = "areograph_search";
+
+/// Rows of a batch of Parquet.
+const BATCH_ROWS: usize = 16_384;
+
+/// How shots are written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ShotsFormat {
+    /// GeoParquet 1.1 with bounding boxes.
+    Parquet,
+    /// Comma-separated values; what was asked for stands in a file beside it.
+    Csv,
+    /// GeoJSON points.
+    GeoJson,
+}
+
+/// Some shots of a search, in their order.
+pub struct FoundShots<'a> {
+    /// Their columns; `files` has their PEDR files.
+    pub footprints: &'a Footprints<MarsIau2000>,
+    /// The windows that hold them.
+    pub windows: &'a WindowLists,
+    /// Identifiers of the windows.
+    pub window_ids: &'a [String],
+}
+
+impl ShotNames for FoundShots<'_> {
+    fn windows(&self, row: usize) -> String {
+        let windows = self.windows.of(row).iter();
+        let ids = windows.filter_map(|window| self.window_ids.get(*window as usize));
+        ids.map(String::as_str).collect::<Vec<_>>().join(";")
+    }
+
+    fn utc(&self, _row: usize) -> String {
+        String::new()
+    }
+}
+
+impl FoundShots<'_> {
+    fn rows(&self) -> Vec<Shot<'_>> {
+        Shot::all_of(self.footprints, self)
+    }
+
+    /// Without UTC, which a search without kernels does not know.
+    fn table(&self) -> Table<'_> {
+        Table::new(columns(), self.rows()).without("utc")
+    }
+
+    fn points_deg(&self) -> Vec<[f64; 2]> {
+        self.rows().iter().map(Shot::point_deg).collect()
+    }
+}
+
+/// A file of shots that is being written; it appears under its name when it is finished.
+pub struct ShotsFile {
+    path: PathBuf,
+    file: NamedTempFile,
+    writer: Writer,
+    rows: u64,
+    bounds: Option<[f64; 4]>,
+}
+
+/// The writer of a format.
+enum Writer {
+    Parquet(Box<ParquetShots>),
+    Csv(Box<csv::Writer<BufWriter<File>>>),
+    GeoJson(BufWriter<File>),
+}
+
+impl ShotsFile {
+    /// Begins the file `path`.
+    ///
+    /// # Errors
+    /// What the disk refuses.
+    pub fn create(path: &Path, format: ShotsFormat) -> Result<Self> {
+        let folder = match path.parent() {
+            Some(folder) if folder != Path::new("") => folder,
+            _ => Path::new("."),
+        };
+        let file = tempfile::Builder::new()
+            .prefix(".partial-")
+            .tempfile_in(folder)
+            .map_err(IoError::on("create a file"))
+            .in_file(folder)?;
+        let handle = file.as_file().try_clone();
+        let handle = handle.map_err(IoError::on("create")).in_file(path)?;
+        let empty = Table::new(columns(), Vec::new()).without("utc");
+        let writer = match format {
+            ShotsFormat::Parquet => {
+                let writer = ParquetShots::new(handle, &empty.for_parquet()).in_file(path)?;
+                Writer::Parquet(Box::new(writer))
+            }
+            ShotsFormat::Csv => {
+                let mut writer = csv::Writer::from_writer(BufWriter::new(handle));
+                text_table::write_names(&mut writer, &empty.for_text()).in_file(path)?;
+                Writer::Csv(Box::new(writer))
+            }
+            ShotsFormat::GeoJson => {
+                let features = Features::of_footprints("shots", "", Vec::new(), empty);
+                let head = geojson::head(&features).in_file(path)?;
+                let mut writer = BufWriter::new(handle);
+                let written = writer.write_all(head.as_bytes());
+                written.map_err(IoError::on("write")).in_file(path)?;
+                Writer::GeoJson(writer)
+            }
+        };
+        Ok(Self {
+            path: path.to_owned(),
+            file,
+            writer,
+            rows: 0,
+            bounds: None,
+        })
+    }
+
+    /// Appends shots.
+    ///
+    /// # Errors
+    /// Numbers that are not finite; what the disk refuses.
+    pub fn write(&mut self, shots: &FoundShots<'_>) -> Result<()> {
+        if shots.footprints.is_empty() {
+            return Ok(());
+        }
+        let points_deg = shots.points_deg();
+        let is_first = self.rows == 0;
+        self.rows += points_deg.len() as u64;
+        for [east, north] in &points_deg {
+            let [west, south, eastern, northern] =
+                self.bounds.unwrap_or([*east, *north, *east, *north]);
+            self.bounds = Some([
+                west.min(*east),
+                south.min(*north),
+                eastern.max(*east),
+                northern.max(*north),
+            ]);
+        }
+        let path = &self.path;
+        match &mut self.writer {
+            Writer::Parquet(writer) => {
+                let table = shots.table().for_parquet();
+                writer.write(&table, &points_deg).in_file(path)
+            }
+            Writer::Csv(writer) => {
+                text_table::write_rows(writer, &shots.table().for_text()).in_file(path)
+            }
+            Writer::GeoJson(writer) => {
+                let points = points_deg.iter().map(|[east, north]| [*east, *north, 0.0]);
+                let table = shots.table().for_gis();
+                let features = Features::of_footprints("shots", "", points.collect(), table);
+                write_features(writer, &features, is_first, path)
+            }
+        }
+    }
+
+    /// Ends the file with `search`, what was asked for and how complete the answer is, and gives it its name.
+    ///
+    /// # Errors
+    /// What the disk refuses; a file that comes back with another number of rows.
+    pub fn finish(self, search: &Value) -> Result<u64> {
+        let path = &self.path;
+        let refused = |error| IoError::on("write")(error);
+        match self.writer {
+            Writer::Parquet(writer) => {
+                let metadata = [
+                    ("geo", geo_metadata(self.bounds).to_string()),
+                    ("frame", FRAME.to_owned()),
+                    (SEARCH, search.to_string()),
+                ];
+                writer.finish(metadata).in_file(path)?;
+                let reader = File::open(self.file.path()).map_err(IoError::on("read"));
+                require_rows(reader.in_file(path)?, self.rows).in_file(path)?;
+            }
+            Writer::Csv(mut writer) => {
+                writer.flush().map_err(refused).in_file(path)?;
+                let mut beside = self.path.clone().into_os_string();
+                beside.push(".json");
+                let beside = PathBuf::from(beside);
+                super::files::write_json(&beside, search)?;
+            }
+            Writer::GeoJson(mut writer) => {
+                let tail = format!("\n],\n\"{SEARCH}\": {search}\n}}\n");
+                let written = writer.write_all(tail.as_bytes());
+                written
+                    .and_then(|()| writer.flush())
+                    .map_err(refused)
+                    .in_file(path)?;
+            }
+        }
+        let synced = self.file.as_file().sync_all();
+        synced.map_err(IoError::on("flush")).in_file(path)?;
+        make_readable(self.file.as_file()).in_file(path)?;
+        self.file
+            .persist(path)
+            .map_err(|error| IoError::on("rename into place")(error.error))
+            .in_file(path)?;
+        Ok(self.rows)
+    }
+}
+
+/// Temporary files are private; answers are for everyone whom the folder lets in.
+fn make_readable(file: &File) -> std::result::Result<(), IoError> {
+    use std::os::unix::fs::PermissionsExt as _;
+    let permissions = std::fs::Permissions::from_mode(0o644);
+    file.set_permissions(permissions)
+        .map_err(IoError::on("set permissions of"))
+}
+
+/// Writes shots in batches of one size, so that the bytes do not depend on the pieces in which shots were found.
+struct ParquetShots {
+    writer: ArrowWriter<File>,
+    schema: SchemaRef,
+    /// Fewer rows than a batch has.
+    pending: RecordBatch,
+}
+
+impl ParquetShots {
+    fn new(file: File, table: &Table<'_>) -> Result<Self> {
+        let properties = WriterProperties::builder()
+            .set_created_by(concat!("areograph ", env!("CARGO_PKG_VERSION")).to_owned())
+            .set_compression(Compression::ZSTD(ZstdLevel::default()))
+            .build();
+        let fields = parquet::schema(table).fields().clone();
+        let bbox = Arc::new(Field::new(BBOX, DataType::Struct(bbox_fields()), false));
+        let fields = fields.iter().cloned().chain([bbox]);
+        let schema = Arc::new(Schema::new(fields.collect::<Fields>()));
+        let writer = ArrowWriter::try_new(file, Arc::clone(&schema), Some(properties));
+        Ok(Self {
+            writer: writer.map_err(parquet::refused)?,
+            pending: RecordBatch::new_empty(Arc::clone(&schema)),
+            schema,
+        })
+    }
+
+    fn write(&mut self, table: &Table<'_>, points_deg: &[[f64; 2]]) -> Result<()> {
+        let batch = with_boxes(table, &self.schema, points_deg)?;
+        let rows = concat_batches(&self.schema, [&self.pending, &batch])
+            .map_err(ProductError::refused("assemble rows"))?;
+        let whole = rows.num_rows() - rows.num_rows() % BATCH_ROWS;
+        for start in (0..whole).step_by(BATCH_ROWS) {
+            let batch = rows.slice(start, BATCH_ROWS);
+            self.writer.write(&batch).map_err(parquet::refused)?;
+        }
+        self.pending = rows.slice(whole, rows.num_rows() - whole);
+        Ok(())
+    }
+
+    fn finish(mut self, metadata: [(&str, String); 3]) -> Result<()> {
+        self.writer.write(&self.pending).map_err(parquet::refused)?;
+        for (key, value) in metadata {
+            let entry = KeyValue::new(key.to_owned(), value);
+            self.writer.append_key_value_metadata(entry);
+        }
+        self.writer.close().map_err(parquet::refused)?;
+        Ok(())
+    }
+}
+
+fn bbox_fields() -> Fields {
+    let part = |name: &str| Field::new(name, DataType::Float64, false);
+    BBOX_PARTS.map(part).to_vec().into()
+}
+
+/// The rows of the table with the bounding box of each.
+fn with_boxes(
+    table: &Table<'_>,
+    schema: &SchemaRef,
+    points_deg: &[[f64; 2]],
+) -> std::result::Result<RecordBatch, ProductError> {
+    let bare = parquet::schema(table);
+    let batch = parquet::record_batch(table, &bare, 0..table.rows())?;
+    let axis = |axis: usize| -> ArrayRef {
+        let values = points_deg.iter().map(|point| point[axis]);
+        Arc::new(Float64Array::from_iter_values(values))
+    };
+    let (x, y) = (axis(0), axis(1));
+    let parts = vec![Arc::clone(&x), Arc::clone(&y), x, y];
+    let boxes = StructArray::try_new(bbox_fields(), parts, None);
+    let boxes: ArrayRef = Arc::new(boxes.map_err(ProductError::refused("assemble columns"))?);
+    let arrays = batch.columns().iter().cloned().chain([boxes]).collect();
+    RecordBatch::try_new(Arc::clone(schema), arrays)
+        .map_err(ProductError::refused("assemble columns"))
+}
+
+fn write_features(
+    writer: &mut BufWriter<File>,
+    features: &Features<'_>,
+    is_first: bool,
+    path: &Path,
+) -> Result<()> {
+    geojson::each(features, path, |row, feature, _| {
+        let line = serde_json::to_string(feature)
+            .map_err(ProductError::refused("encode GeoJSON"))
+            .in_file(path)?;
+        let separator = if is_first && row == 0 { "" } else { ",\n" };
+        write!(writer, "{separator}{line}")
+            .map_err(IoError::on("write"))
+            .in_file(path)
+    })
+}
+
+/// Reads back how many rows the file has.
+fn require_rows(file: File, rows: u64) -> Result<()> {
+    let reader =
+        ParquetRecordBatchReaderBuilder::try_new(file).map_err(ProductError::unreadable)?;
+    let found = reader.metadata().file_metadata().num_rows();
+    if u64::try_from(found).is_ok_and(|found| found == rows) {
+        return Ok(());
+    }
+    let what = format!("{found} rows of {rows}");
+    Err(ProductError::ReadBack { what }.into())
+}
+
+/// The `geo` key of GeoParquet 1.1.0 with bounding boxes.
+fn geo_metadata(bounds: Option<[f64; 4]>) -> Value {
+    let covering = BBOX_PARTS.map(|part| (part.to_owned(), json!([BBOX, part])));
+    let covering: serde_json::Map<String, Value> = covering.into_iter().collect();
+    let mut column = json!({
+        "encoding": "WKB",
+        "geometry_types": ["Point"],
+        "crs": mars_sphere(),
+        "covering": { "bbox": covering },
+    });
+    if let Some(bounds) = bounds {
+        column["bbox"] = json!(bounds);
+    }
+    json!({
+        "version": "1.1.0",
+        "primary_column": "geometry",
+        "columns": { "geometry": column },
+    })
+}
