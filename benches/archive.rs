@@ -241,6 +241,7 @@ fn main() {
     let gb = gb
         .and_then(|at| arguments.get(at + 1)?.parse().ok())
         .unwrap_or(2.0);
+    fs::create_dir_all("target").unwrap();
     let folder = tempfile::tempdir_in("target").unwrap();
     let archive = Archive::write(folder.path(), gb);
     let one = vec![half_degree(20.0, 10.0)];
@@ -265,21 +266,21 @@ fn main() {
     archive.cool();
     note(
         "cold scan",
-        seconds(|| drop(archive.search(&one, Judged::Near, &none))),
+        seconds(|| _ = black_box(archive.search(&one, Judged::Near, &none))),
     );
     let before_mb = peak_mb();
     for _ in 0..ROUNDS {
         note(
             "scan",
-            seconds(|| drop(black_box(archive.search(&one, Judged::Near, &none)))),
+            seconds(|| _ = black_box(archive.search(&one, Judged::Near, &none))),
         );
         note(
             "scan, all judged",
-            seconds(|| drop(black_box(archive.search(&one, Judged::All, &none)))),
+            seconds(|| _ = black_box(archive.search(&one, Judged::All, &none))),
         );
         note(
             "1000 windows",
-            seconds(|| drop(black_box(archive.search(&thousand, Judged::Near, &none)))),
+            seconds(|| _ = black_box(archive.search(&thousand, Judged::Near, &none))),
         );
         note(
             "plain reader",
@@ -292,17 +293,17 @@ fn main() {
     }
     note(
         "every shot",
-        seconds(|| drop(black_box(archive.search(&everywhere, Judged::Near, &none)))),
+        seconds(|| _ = black_box(archive.search(&everywhere, Judged::Near, &none))),
     );
     let index = archive.index(&Index::default());
     for _ in 0..2 {
         note(
             "index build",
-            seconds(|| drop(black_box(archive.index(&Index::default())))),
+            seconds(|| _ = black_box(archive.index(&Index::default()))),
         );
         note(
             "index update, nothing new",
-            seconds(|| drop(black_box(archive.index(&index)))),
+            seconds(|| _ = black_box(archive.index(&index))),
         );
     }
     let index_path = folder.path().join(areograph::pds::archive::INDEX);
@@ -313,7 +314,7 @@ fn main() {
             "indexed",
             seconds(|| {
                 let indexes = Indexes::beside(&archive.paths, Index::read);
-                drop(black_box(archive.search(&one, Judged::Near, &indexes)));
+                black_box(archive.search(&one, Judged::Near, &indexes));
             }),
         );
     }

@@ -80,11 +80,7 @@ fn batch(path: &Path) -> (RecordBatch, Value) {
         .unwrap();
     let told = serde_json::from_str(told.value.as_deref().unwrap()).unwrap();
     let schema = builder.schema().clone();
-    let batches: Vec<RecordBatch> = builder
-        .build()
-        .unwrap()
-        .map(|batch| batch.unwrap())
-        .collect();
+    let batches: Vec<RecordBatch> = builder.build().unwrap().map(Result::unwrap).collect();
     let batch = arrow::compute::concat_batches(&schema, &batches).unwrap();
     (batch, told)
 }
@@ -144,7 +140,7 @@ fn every_format_has_the_same_rows_in_the_order_of_time() {
     let names = reader.headers().unwrap().clone();
     let place = |name: &str| names.iter().position(|of| of == name).unwrap();
     let (file, record) = (place("source_file"), place("record"));
-    let lines: Vec<csv::StringRecord> = reader.records().map(|line| line.unwrap()).collect();
+    let lines: Vec<csv::StringRecord> = reader.records().map(Result::unwrap).collect();
     assert_eq!(lines.len(), rows);
     let document: Value = serde_json::from_slice(&fs::read(&geojson).unwrap()).unwrap();
     let features = document["features"].as_array().unwrap();
