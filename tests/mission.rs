@@ -25,12 +25,11 @@ use areograph::{
         convert_datum::convert_datum,
         group_profiles::{Profile, group_profiles},
         sample_orientation::{Orientation, sample_orientation},
-        search_footprints::search_footprints,
         tag_times::{ImageTimes, tag_times},
     },
     time::{Intervals, PointingBias},
 };
-use common::{mission::mission, number};
+use common::{mission::mission, number, search::search_footprints};
 use nalgebra::Vector3;
 use serde_json::Value;
 

@@ -126,7 +126,9 @@ fn archive(folder: &Path) -> Vec<PathBuf> {
             record.time_fraction_us.set(0);
         }
     });
-    paths.iter().for_each(|path| age(path));
+    for path in &paths {
+        age(path);
+    }
     paths.to_vec()
 }
 

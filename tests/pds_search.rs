@@ -2,6 +2,8 @@
 
 #![allow(clippy::expect_used, reason = "helpers of tests fail as tests do")]
 
+#[path = "common/search.rs"]
+mod search;
 #[path = "track/mod.rs"]
 mod track;
 
@@ -13,8 +15,7 @@ use std::{
 use areograph::{
     altimetry::{DatumChoice, ShotFilter},
     config::{PedrConfig, WindowConfig},
-    error::Result,
-    files::{HashedFile, InputFiles},
+    files::HashedFile,
     footprints::Footprint,
     frames::{MarsDatum, MarsIau2000},
     geom::{
@@ -30,28 +31,11 @@ use areograph::{
     time::Et,
 };
 use proptest::prelude::*;
+use search::search_footprints;
 use track::{DEGREE, FRAMES, write};
 
 /// Nobody stops these searches.
 static RUN_ON: AtomicBool = AtomicBool::new(false);
-
-/// The search, of files that are hashed first as a run does.
-fn search_footprints(
-    pedr: &PedrConfig,
-    windows: &[WindowConfig],
-    correction_s: f64,
-    stop: &AtomicBool,
-) -> Result<SearchResult> {
-    let files = InputFiles::default().hash_all(&pedr.files, &RUN_ON)?;
-    search_footprints::search_footprints(
-        pedr,
-        &files,
-        &Indexes::default(),
-        windows,
-        correction_s,
-        stop,
-    )
-}
 
 /// Two files, the first in IAU 1991, the second in IAU 2000.
 fn archive(folder: &Path) -> PedrConfig {

@@ -212,7 +212,11 @@ fn an_answer_that_is_not_whole_says_so_in_the_file_and_by_the_exit_code() {
     let (whole, _) = batch(&out);
     std::os::unix::fs::symlink("nowhere", archive.join("gone.b")).unwrap();
     let garbage = archive.join("ap00001l.b");
-    std::io::Write::write_all(&mut fs::File::create(&garbage).unwrap(), &[b'x'; 100_000]).unwrap();
+    std::io::Write::write_all(
+        &mut fs::File::create(&garbage).unwrap(),
+        &vec![b'x'; 100_000],
+    )
+    .unwrap();
     let output = search(&archive, &out);
     assert!(matches!(output.status.code(), Some(3 | 6)));
     let said = String::from_utf8_lossy(&output.stderr).into_owned();

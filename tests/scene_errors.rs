@@ -28,9 +28,9 @@ use areograph::{
         AttitudeErrors, Jitter, Misregistration, PositionErrors, Relief, Roughness, SceneErrors,
         SceneOptions, write_scene,
     },
-    stages::{convert_datum::convert_datum, search_footprints::search_footprints},
+    stages::convert_datum::convert_datum,
 };
-use common::{json, mission::areograph, number};
+use common::{json, mission::areograph, number, search::search_footprints};
 use nalgebra::Vector3;
 use serde_json::Value;
 

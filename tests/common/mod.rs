@@ -12,6 +12,7 @@ pub(crate) mod daf;
 pub(crate) mod golden;
 pub(crate) mod mission;
 pub(crate) mod outside;
+pub(crate) mod search;
 
 use std::path::{Path, PathBuf};
 

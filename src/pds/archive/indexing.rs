@@ -33,7 +33,7 @@ impl IndexedFile {
         for start in (0..records).step_by(LOAD_RECORDS) {
             Stopped::check(stop)?;
             let stretch = reader.stretch(start..start + LOAD_RECORDS, buffer)?;
-            let (_, judged) = rayon::join(
+            let ((), judged) = rayon::join(
                 || {
                     hasher.update(stretch.bytes());
                 },

@@ -52,7 +52,7 @@ impl Scan<'_> {
                         self.frame(stretch, row, &frame, &mut windows, found);
                     }
                     Err(error) if !complaints_known => {
-                        found.complain(stretch.complaint(row, &error))
+                        found.complain(stretch.complaint(row, &error));
                     }
                     Ok(_) | Err(_) => {}
                 }
@@ -147,13 +147,10 @@ impl Scan<'_> {
 
 /// Successive rows, counted from the first, that are to be judged.
 fn runs(matters: &[bool], judges_all: bool) -> Vec<Range<usize>> {
-    if judges_all {
-        return vec![0..matters.len()];
-    }
     let mut start = 0;
     let mut runs = Vec::new();
-    for run in matters.chunk_by(|before, after| before == after) {
-        if run[0] {
+    for run in matters.chunk_by(|before, after| judges_all || before == after) {
+        if judges_all || run[0] {
             runs.push(start..start + run.len());
         }
         start += run.len();

@@ -1,6 +1,7 @@
 //! A file of the archive as a search sees it before it reads records.
 
 use std::{
+    iter,
     ops::Range,
     path::{Path, PathBuf},
     sync::{Arc, atomic::AtomicBool},
@@ -138,7 +139,7 @@ impl Source {
         match (indexed, query.judged) {
             (Some(rows), _) => Ok(rows),
             (None, Judged::Near) => self.look(query, stop),
-            (None, Judged::All) => Ok(vec![0..self.records]),
+            (None, Judged::All) => Ok(iter::once(0..self.records).collect()),
         }
     }
 

@@ -223,6 +223,7 @@ mod tests {
             weeks: 4,
             events: 1000,
             logs_days: 1.0,
+            history_days: 1.0,
             copies: 1,
         };
         let gone = superfluous(&runs, Some("day20"), &config, 100 * DAY_MS);
