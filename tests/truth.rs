@@ -137,7 +137,7 @@ impl Judged {
                 .as_f64()
                 .unwrap(),
             along: summary["tie_components"][0].as_f64().unwrap(),
-            clock_s: summary.get("attitude_clock_s").map(|clock| {
+            clock_s: summary["attitude_clock_s"].as_array().map(|clock| {
                 let [offset_s, sigma_s] = [0, 1].map(|at| clock[at].as_f64().unwrap());
                 (offset_s, sigma_s)
             }),

@@ -41,11 +41,9 @@ pub struct HeightSummary {
     pub mean_sigma_m: [f64; 3],
     /// Standard deviations towards east and north to which the relief alone tells where the images lie against the MOLA
     /// surface, metres; none where the ground has no slope.
-    #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(transform = none_negative)]
     pub relief_sigma_m: Option<[f64; 2]>,
     /// Where relief is used for the place: how far each profile of the surface is recorded from where it lies.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub profile_shifts: Option<Vec<ProfileOffset>>,
 }
 

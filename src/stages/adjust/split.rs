@@ -40,13 +40,11 @@ const TOLD_ABOVE_M: f64 = 100.0;
 pub struct OtherReading {
     /// Offset of the attitude's clock with its standard deviation, seconds, where this is the reading by it; else
     /// all images are taken as equally likely to be wrong.
-    #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(transform = at("/prefixItems/1", "minimum", 0))]
     pub attitude_clock_s: Option<(f64, f64)>,
     /// Mean of the tie points by this reading minus that of the adjustment, towards east, north and up, metres.
     pub moved_m: [f64; 3],
     /// Standard deviations of their mean by this reading, likewise; none where no surface controls heights.
-    #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(transform = none_negative)]
     pub mean_sigma_m: Option<[f64; 3]>,
 }

@@ -129,7 +129,6 @@ pub struct AdjustmentSummary {
     pub range_biases_m: Vec<(String, f64, f64)>,
     /// Offset of the attitude's clock with its standard deviation, seconds, where it is unknown: the attitudes are those
     /// that the images had so much later.
-    #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(transform = at("/prefixItems/1", "minimum", 0))]
     pub attitude_clock_s: Option<(f64, f64)>,
     /// Unknowns of one image, or of images that share points, with a correlation above 0.95: single values of them must
