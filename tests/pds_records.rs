@@ -373,8 +373,8 @@ fn times_out_of_step_are_found_at_both_ends_and_in_pairs() {
         for seconds in [500_000_000, 3_600, -60, 1_800] {
             let file = changed(|records| {
                 records.truncate(900);
-                for row in rows {
-                    shift(&mut records[row], seconds);
+                for row in &rows {
+                    shift(&mut records[*row], seconds);
                 }
             });
             let found: Vec<u32> = told(&file).into_iter().map(|(record, _)| record).collect();

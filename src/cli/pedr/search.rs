@@ -46,7 +46,7 @@ pub(super) struct Arguments {
     /// GeoJSON polygons.
     #[arg(long = "polygon", value_name = "FILE")]
     polygons: Vec<PathBuf>,
-    /// TOML file with up to 10,000 [[windows]] as in a site file.
+    /// TOML file with up to 10,000 tables `windows` as in a site file.
     #[arg(long, value_name = "FILE")]
     windows: Option<PathBuf>,
     /// Time tags, both included: TDB seconds past J2000, or UTC with --leap-seconds; either end may be left out.
