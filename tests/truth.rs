@@ -137,10 +137,12 @@ impl Judged {
                 .as_f64()
                 .unwrap(),
             along: summary["tie_components"][0].as_f64().unwrap(),
-            clock_s: summary["attitude_clock_s"].as_array().map(|clock| {
-                let [offset_s, sigma_s] = [0, 1].map(|at| clock[at].as_f64().unwrap());
-                (offset_s, sigma_s)
-            }),
+            clock_s: document["adjustment"]["attitude_clock_s"]
+                .as_array()
+                .map(|clock| {
+                    let [offset_s, sigma_s] = [0, 1].map(|at| clock[at].as_f64().unwrap());
+                    (offset_s, sigma_s)
+                }),
             other_m: document["adjustment"]
                 .get("other_reading")
                 .map(|other| [vector(&other["moved_m"]), vector(&other["mean_sigma_m"])]),

@@ -23,7 +23,10 @@ use crate::{
     },
     schema::{DocumentSchema, all_positive, at, none_negative},
     stages::{
-        adjust::{AdjustmentSummary, CorrectedImage, HeightSummary, OtherReading, PointKind},
+        adjust::{
+            AdjustmentSummary, CorrectedImage, HeightSummary, OtherReading, PointKind,
+            ReliefSummary,
+        },
         check_heights::{HeightCheck, ProfilesApart, SurfaceFigures},
         compare_pairs::{PairComparison, ProfileByTies},
         intersect::{ImageResiduals, IntersectedTies},
@@ -235,7 +238,13 @@ struct AdjustmentDocument<'a> {
     #[serde(skip_serializing_if = "Option::is_none")]
     heights: Option<&'a HeightSummary>,
     #[serde(skip_serializing_if = "Option::is_none")]
-    other_reading: Option<&'a OtherReading>,
+    relief: Option<&'a ReliefSummary>,
+    /// With its standard deviation.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(transform = at("/prefixItems/1", "minimum", 0))]
+    attitude_clock_s: Option<(f64, f64)>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    other_reading: Option<OtherReadingDocument>,
     #[serde(skip_serializing_if = "Option::is_none")]
     no_other_reading_because: Option<&'a str>,
     /// Weighted sum of squared residuals before each step and after the last.
@@ -243,6 +252,30 @@ struct AdjustmentDocument<'a> {
     weighted_squares: &'a [f64],
     images: Vec<ImageDocument<'a>>,
     rejected: Vec<RejectedPointDocument<'a>>,
+}
+
+/// Where the tie points lie by the other reading of what images disagree by.
+#[derive(Serialize, JsonSchema)]
+struct OtherReadingDocument {
+    /// With its standard deviation, where this is the reading by it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(transform = at("/prefixItems/1", "minimum", 0))]
+    attitude_clock_s: Option<(f64, f64)>,
+    /// Towards east, north and up, from the mean of the adjusted tie points.
+    moved_m: [f64; 3],
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(transform = none_negative)]
+    mean_sigma_m: Option<[f64; 3]>,
+}
+
+impl From<&OtherReading> for OtherReadingDocument {
+    fn from(other: &OtherReading) -> Self {
+        Self {
+            attitude_clock_s: other.attitude_clock_s,
+            moved_m: other.moved_m,
+            mean_sigma_m: other.mean_sigma_m,
+        }
+    }
 }
 
 #[derive(Serialize, JsonSchema)]
@@ -326,7 +359,9 @@ fn document<'a>(
         adjustment: AdjustmentDocument {
             summary: &adjusted.summary,
             heights: adjusted.heights.as_ref(),
-            other_reading: other.and_then(|other| other.as_ref().ok()),
+            relief: adjusted.relief.as_ref(),
+            attitude_clock_s: adjusted.attitude_clock_s,
+            other_reading: other.and_then(|other| Some(other.as_ref().ok()?.into())),
             no_other_reading_because: other.and_then(|other| Some(other.as_ref().err()?.as_str())),
             weighted_squares: &adjusted.weighted_squares,
             images: adjusted.images.iter().map(image).collect(),

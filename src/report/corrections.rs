@@ -174,9 +174,7 @@ fn checked_ranges(site: &SiteProducts) -> BTreeMap<(usize, usize), f64> {
 
 /// What the clock of the attitude is off, where it is an unknown.
 fn attitude_clock(adjusted: &Adjusted) -> String {
-    adjusted
-        .summary
-        .attitude_clock_s
+    adjusted.attitude_clock_s
         .map_or_else(String::new, |(offset_s, sigma_s)| {
             paragraph(&format!(
                 "Offset of the attitude's clock, of all images: {} ± {} s; the rotations above contain what it turns each image by.",

@@ -140,8 +140,8 @@ fn statements(geometric: &GeometricProducts, adjustment: &AdjustmentProducts) ->
 
 fn place_says(geometric: &GeometricProducts, adjustment: &AdjustmentProducts) -> String {
     let known = known_beforehand(geometric);
-    let heights = adjustment.adjusted.heights.as_ref();
-    if heights.is_some_and(|heights| heights.profile_shifts.is_some()) {
+    let relief = adjustment.adjusted.relief.as_ref();
+    if relief.is_some_and(|relief| relief.used) {
         format!("by what is known of {known} beforehand, and by relief")
     } else {
         format!("a priori, not measured by images: by what is known of {known}")

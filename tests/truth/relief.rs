@@ -25,7 +25,7 @@ struct Both {
 fn shifts(mission: &Path, out: &Path, site: &str) -> Vec<Vector3<f64>> {
     let truth = json(&mission.join("truth.json"));
     let document = json(&out.join(site).join("adjustment.json"));
-    let offsets = document["adjustment"]["heights"]["profile_shifts"].as_array();
+    let offsets = document["adjustment"]["relief"]["profile_shifts"].as_array();
     let drawn_m = |profile: &str| {
         // `site/9019` comes from the file of orbit 19019, counted from 10,000 as files do.
         let orbit = profile.split('/').next_back().unwrap();
@@ -65,7 +65,7 @@ fn both_ways(folder: &Path, seed: u32) -> Vec<Both> {
     succeed(&mut run(&mission, &used));
     let both = SITES.map(|site| {
         let document = json(&ignored.join(site).join("adjustment.json"));
-        let relief = &document["adjustment"]["heights"]["relief_sigma_m"];
+        let relief = &document["adjustment"]["relief"]["sigma_m"];
         Both {
             ignored: Judged::of(&mission, &ignored, site),
             used: Judged::of(&mission, &used, site),

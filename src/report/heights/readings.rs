@@ -41,7 +41,7 @@ fn table(adjusted: &Adjusted, other: &OtherReading) -> String {
     let own_sigma_m = heights.map(|heights| heights.mean_sigma_m);
     let rows = [
         (
-            adjusted.summary.attitude_clock_s,
+            adjusted.attitude_clock_s,
             [0.0; 3],
             own_sigma_m,
             "follow it",

@@ -14,22 +14,22 @@ pub(super) fn relief(adjusted: &Adjusted) -> String {
     let Some(heights) = &adjusted.heights else {
         return String::new();
     };
-    let Some([east_m, north_m]) = heights.relief_sigma_m else {
+    let Some(relief) = &adjusted.relief else {
         return paragraph(
             "Relief says nothing of the place: the surface has no slope at the tie points.",
         );
     };
+    let [east_m, north_m] = relief.sigma_m;
     let told = format!(
         "Relief alone tells where the images lie against the MOLA surface to ±{} m east and ±{} m north.",
         label(east_m, 0),
         label(north_m, 0)
     );
-    match &heights.profile_shifts {
-        Some(offsets) => {
-            let used = "It is used: heights of tie points on slopes move images and profiles in plan (adjustment.relief_for_plan).";
-            paragraph(&format!("{told} {used}")) + &table(offsets)
-        }
-        None => paragraph(&format!("{told} {}", advice([east_m, north_m], heights))),
+    if relief.used {
+        let used = "It is used: heights of tie points on slopes move images and profiles in plan (adjustment.relief_for_plan).";
+        paragraph(&format!("{told} {used}")) + &table(&relief.profile_shifts)
+    } else {
+        paragraph(&format!("{told} {}", advice([east_m, north_m], heights)))
     }
 }
 

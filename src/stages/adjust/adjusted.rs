@@ -10,6 +10,7 @@ use super::{
     input::AdjustImage,
     network::Assembled,
     points::{PointKind, RejectedPoint},
+    relief::{ReliefSummary, relief},
     split::OtherReading,
     summary::AdjustmentSummary,
 };
@@ -29,6 +30,11 @@ pub struct Adjusted {
     pub summary: AdjustmentSummary,
     /// Heights of tie points by the MOLA surface; `None` where they are no observations.
     pub heights: Option<HeightSummary>,
+    /// What relief says of the place; `None` where no surface has slopes.
+    pub relief: Option<ReliefSummary>,
+    /// Offset of the attitude's clock with its standard deviation, seconds, where it is unknown: the attitudes are those
+    /// that the images had so much later.
+    pub attitude_clock_s: Option<(f64, f64)>,
     /// Where the tie points lie by the other reading of what images disagree by along the flight, or why that is not
     /// known; `None` where they hardly disagree.
     pub other_reading: Option<std::result::Result<OtherReading, String>>,
@@ -201,9 +207,13 @@ pub(super) fn collect<M: ExteriorOrientation>(
     let views = assembled.network.views.par_iter().zip(&adjustment.views);
     let ranges = assembled.network.ranges.iter().zip(&adjustment.ranges);
     Adjusted {
-        heights: height_summary::heights(&assembled, &adjustment, profiles),
+        heights: height_summary::heights(&assembled, &adjustment),
         images: corrected_images(images, &assembled, &adjustment, summary.variance_factor),
         other_reading,
+        attitude_clock_s: adjustment
+            .attitude_clock_s
+            .map(|(offset_s, root_s)| (offset_s, root_s * variance.sqrt())),
+        relief: relief(&assembled, &adjustment, variance, profiles),
         views: views
             .filter_map(|(view, residuals)| {
                 let [along, across] = (*residuals)?;

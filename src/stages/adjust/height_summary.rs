@@ -39,24 +39,6 @@ pub struct HeightSummary {
     /// Standard deviations of the mean of these points towards east, north and up, metres: what they have in common.
     #[schemars(transform = none_negative)]
     pub mean_sigma_m: [f64; 3],
-    /// Standard deviations towards east and north to which the relief alone tells where the images lie against the MOLA
-    /// surface, metres; none where the ground has no slope.
-    #[schemars(transform = none_negative)]
-    pub relief_sigma_m: Option<[f64; 2]>,
-    /// Where relief is used for the place: how far each profile of the surface is recorded from where it lies.
-    pub profile_shifts: Option<Vec<ProfileOffset>>,
-}
-
-/// How far a profile is recorded from where it lies.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-pub struct ProfileOffset {
-    /// Identifier of the profile.
-    pub profile: String,
-    /// Towards east, north and up, metres.
-    pub shift_m: [f64; 3],
-    /// Standard deviations of these, metres.
-    #[schemars(transform = none_negative)]
-    pub sigma_m: [f64; 3],
 }
 
 impl HeightSummary {
@@ -75,7 +57,6 @@ impl HeightSummary {
 pub(super) fn heights<M>(
     assembled: &Assembled<M>,
     adjustment: &Adjustment,
-    profiles: &[String],
 ) -> Option<HeightSummary> {
     let control = assembled.network.heights.as_ref()?;
     let above_m: Vec<f64> = adjustment
@@ -94,29 +75,7 @@ pub(super) fn heights<M>(
         compared: adjustment.compared.len(),
         beyond_limit: beyond_limit(&adjustment.compared),
         mean_sigma_m: mean_sigma_m(adjustment, factor)?,
-        relief_sigma_m: adjustment.relief.as_ref().map(|relief| relief.sigma_m),
-        profile_shifts: control
-            .surface
-            .uses_relief()
-            .then(|| offsets(adjustment, factor, profiles)),
     })
-}
-
-fn offsets(
-    adjustment: &Adjustment,
-    variance_factor: f64,
-    profiles: &[String],
-) -> Vec<ProfileOffset> {
-    let shifts = adjustment.relief.iter().flat_map(|relief| &relief.profiles);
-    shifts
-        .map(|shift| ProfileOffset {
-            profile: profiles[shift.profile].clone(),
-            shift_m: shift.shift_m,
-            sigma_m: shift
-                .root_cofactors_m
-                .map(|root_m| root_m * variance_factor.sqrt()),
-        })
-        .collect()
 }
 
 /// Standard deviations of the mean of the points with an observed height towards east, north and up, metres.

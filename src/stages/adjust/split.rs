@@ -10,7 +10,6 @@
 //! the attitude's clock would explain; the paper does not say so.
 
 use nalgebra::Vector3;
-use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::{
@@ -28,7 +27,6 @@ use crate::{
         ellipsoid::local_axes,
         pushbroom::ExteriorOrientation,
     },
-    schema::{at, none_negative},
 };
 
 /// Images that disagree by less than this along the flight need no other reading, metres: both place the tie points
@@ -36,16 +34,14 @@ use crate::{
 const TOLD_ABOVE_M: f64 = 100.0;
 
 /// Where the tie points lie by the other reading.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct OtherReading {
     /// Offset of the attitude's clock with its standard deviation, seconds, where this is the reading by it; else
     /// all images are taken as equally likely to be wrong.
-    #[schemars(transform = at("/prefixItems/1", "minimum", 0))]
     pub attitude_clock_s: Option<(f64, f64)>,
     /// Mean of the tie points by this reading minus that of the adjustment, towards east, north and up, metres.
     pub moved_m: [f64; 3],
     /// Standard deviations of their mean by this reading, likewise; none where no surface controls heights.
-    #[schemars(transform = none_negative)]
     pub mean_sigma_m: Option<[f64; 3]>,
 }
 

@@ -127,10 +127,6 @@ pub struct AdjustmentSummary {
     /// Range bias of each profile with its standard deviation, metres, where they are unknown.
     #[schemars(transform = at("/items/prefixItems/2", "minimum", 0))]
     pub range_biases_m: Vec<(String, f64, f64)>,
-    /// Offset of the attitude's clock with its standard deviation, seconds, where it is unknown: the attitudes are those
-    /// that the images had so much later.
-    #[schemars(transform = at("/prefixItems/1", "minimum", 0))]
-    pub attitude_clock_s: Option<(f64, f64)>,
     /// Unknowns of one image, or of images that share points, with a correlation above 0.95: single values of them must
     /// not be interpreted.
     #[schemars(transform = at("/items/prefixItems/2", "minimum", -1.000_001))]
@@ -184,12 +180,6 @@ pub(super) fn summarise<M: ExteriorOrientation>(
                 ))
             })
             .collect(),
-        attitude_clock_s: adjustment.attitude_clock_s.map(|(offset_s, root_s)| {
-            (
-                offset_s,
-                root_s * variance_factor(assembled, adjustment).sqrt(),
-            )
-        }),
         correlated: adjustment
             .correlated
             .iter()

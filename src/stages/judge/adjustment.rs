@@ -197,7 +197,7 @@ impl AdjustmentEvidence<'_> {
                     .to_owned(),
             );
         }
-        if self.adjusted.summary.attitude_clock_s.is_some() {
+        if self.adjusted.attitude_clock_s.is_some() {
             remarks.push(
                 "the place rests on adjustment.attitude_clock, a reading of what the images disagree by that no measurement \
                  tests; the report has the other one beside it"
