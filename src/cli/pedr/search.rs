@@ -1,15 +1,18 @@
 //! `areograph pedr search`.
 
+mod arguments;
+
 use std::{collections::BTreeMap, path::PathBuf, sync::atomic::AtomicBool};
 
-use clap::{ArgGroup, Args, ValueEnum};
 use rayon::prelude::*;
 use serde_json::{Value, json};
 
+pub(super) use self::arguments::Arguments;
+use self::arguments::Usage;
 use crate::cli::output;
 use crate::{
-    altimetry::{BiasScope, DatumChoice, MolaClock, ShotFilter, TagSign},
-    config::{WindowConfig, load_windows, window_of_box, window_of_polygon},
+    altimetry::{BiasScope, DatumChoice, MolaClock, TagSign},
+    config::WindowConfig,
     error::{Cause, Error, Kind, Result},
     files::file_name,
     footprints::{AsRead, Footprints, SourceFile},
@@ -18,101 +21,10 @@ use crate::{
     pds::archive::{
         Found, Index, Indexes, Judged, Listing, Query, Sink, Source, WindowLists, search,
     },
-    products::{FoundShots, ShotsFile, ShotsFormat},
-    spice::{KernelSet, Session},
+    products::{FoundShots, ShotsFile},
     stages::convert_datum::convert_datum,
     time::{Et, Interval},
-    units::RADIANS_PER_DEGREE,
 };
-
-/// Finds the shots of an archive that lie in windows, each by its own position in IAU 2000.
-///
-/// Rows come in the order of time, each with its PEDR file and record; times are the tags of the files. What was asked for
-/// and how complete the answer is stands in the file (key `areograph_search` of Parquet and GeoJSON; beside CSV in a file
-/// .json). The exit code is not 0 when a file could not be searched, or rows are not in order of time.
-///
-/// Example: areograph pedr search archive --box 137.0,138.0,-5.5,-4.0 --out gale.parquet
-#[derive(Debug, Args)]
-#[command(verbatim_doc_comment)]
-#[command(group = ArgGroup::new("where").required(true).multiple(true).args(["boxes", "polygons", "windows"]))]
-pub(super) struct Arguments {
-    /// PEDR files, and folders with .b files in and below them.
-    #[arg(required = true, value_name = "PATH")]
-    paths: Vec<PathBuf>,
-    /// West, east, south and north edge, degrees: east longitude (-180 to 360, west above east crosses 0 or 180) and
-    /// areocentric latitude.
-    #[arg(long = "box", value_name = "W,E,S,N", value_parser = numbers, allow_hyphen_values = true)]
-    boxes: Vec<[f64; 4]>,
-    /// GeoJSON polygons.
-    #[arg(long = "polygon", value_name = "FILE")]
-    polygons: Vec<PathBuf>,
-    /// TOML file with up to 10,000 tables `windows` as in a site file.
-    #[arg(long, value_name = "FILE")]
-    windows: Option<PathBuf>,
-    /// Time tags, both included: TDB seconds past J2000, or UTC with --leap-seconds; either end may be left out.
-    #[arg(long, value_name = "A..B", allow_hyphen_values = true)]
-    time: Option<String>,
-    /// Leap seconds (LSK, such as naif0012.tls), for times in UTC.
-    #[arg(long, value_name = "FILE")]
-    leap_seconds: Option<PathBuf>,
-    /// Classification codes to keep: 1 ground, 0 cloud or noise.
-    #[arg(long, value_delimiter = ',', default_values_t = [1], allow_hyphen_values = true)]
-    classes: Vec<i16>,
-    /// Trigger channels to keep.
-    #[arg(long, value_delimiter = ',', default_values_t = [1, 2, 3, 4])]
-    channels: Vec<u8>,
-    /// Attitude flags to keep.
-    #[arg(long, value_delimiter = ',', default_values_t = [0, 1])]
-    attitude_flags: Vec<u16>,
-    /// Largest off-nadir angle of the laser, degrees.
-    #[arg(long, value_name = "DEGREES", default_value_t = 90.0)]
-    off_nadir_max_deg: f64,
-    /// Complain of every bad record of the files, not only of those near the windows.
-    #[arg(long)]
-    check_all: bool,
-    /// How shots are written; without it, by the ending of --out, or only counted.
-    #[arg(long, value_enum)]
-    format: Option<Format>,
-    /// File to write.
-    #[arg(long, value_name = "FILE", required_if_eq_any = [("format", "parquet"), ("format", "csv"), ("format", "geojson")])]
-    out: Option<PathBuf>,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum Format {
-    Parquet,
-    Csv,
-    Geojson,
-    Count,
-}
-
-/// What is wrong with the command line.
-#[derive(Debug, thiserror::Error)]
-enum Usage {
-    #[error("{0:?} is no interval of time")]
-    Time(String),
-    #[error("{0}; expected an ending .parquet, .csv or .geojson")]
-    Ending(String),
-    #[error("{0} PEDR files; expected 1 to 65535")]
-    Files(usize),
-}
-
-impl Cause for Usage {
-    fn kind(&self) -> Kind {
-        Kind::Configuration
-    }
-
-    fn advice(&self) -> String {
-        match self {
-            Self::Time(_) => {
-                "write A..B with seconds past J2000 (-25000000..-24990000), or with UTC (1999-03-16T00:00:00..1999-03-17T00:00:00) and --leap-seconds"
-            }
-            Self::Ending(_) => "say --format, or give the file another ending",
-            Self::Files(_) => "name PEDR files (AP#####v.B), or folders that hold them",
-        }
-        .to_owned()
-    }
-}
 
 /// Rows that are not in the order of time.
 #[derive(Debug, thiserror::Error)]
@@ -172,93 +84,6 @@ pub(super) fn run(arguments: &Arguments) -> Result<()> {
     }
     output::json(&told);
     answer.end()
-}
-
-impl Arguments {
-    /// None only counts.
-    fn format(&self) -> Result<Option<ShotsFormat>> {
-        let of_ending = |out: &PathBuf| {
-            let ending = out.extension().unwrap_or_default().to_ascii_lowercase();
-            match ending.to_str() {
-                Some("parquet") => Ok(Format::Parquet),
-                Some("csv") => Ok(Format::Csv),
-                Some("geojson" | "json") => Ok(Format::Geojson),
-                _ => Err(Usage::Ending(out.display().to_string())),
-            }
-        };
-        let format = match (self.format, &self.out) {
-            (Some(format), _) => format,
-            (None, Some(out)) => of_ending(out)?,
-            (None, None) => Format::Count,
-        };
-        Ok(match format {
-            Format::Parquet => Some(ShotsFormat::Parquet),
-            Format::Csv => Some(ShotsFormat::Csv),
-            Format::Geojson => Some(ShotsFormat::GeoJson),
-            Format::Count => None,
-        })
-    }
-
-    fn windows(&self) -> Result<Vec<WindowConfig>> {
-        let mut windows = Vec::new();
-        for (number, edges) in (1..).zip(&self.boxes) {
-            windows.push(window_of_box(&format!("box{number}"), *edges)?);
-        }
-        for path in &self.polygons {
-            windows.push(window_of_polygon(path)?);
-        }
-        if let Some(path) = &self.windows {
-            windows.extend(load_windows(path)?);
-        }
-        Ok(windows)
-    }
-
-    fn filter(&self) -> ShotFilter {
-        ShotFilter {
-            classes: self.classes.clone(),
-            channels: self.channels.clone(),
-            attitude_flags: self.attitude_flags.clone(),
-            off_nadir_max_rad: self.off_nadir_max_deg * RADIANS_PER_DEGREE,
-        }
-    }
-
-    fn time(&self) -> Result<Option<Interval>> {
-        let Some(text) = &self.time else {
-            return Ok(None);
-        };
-        let wrong = || Usage::Time(text.clone());
-        let (start, stop) = text.split_once("..").ok_or_else(wrong)?;
-        let clock = self.leap_seconds.as_ref().map(|kernel| {
-            let kernels = KernelSet::from_files(std::slice::from_ref(kernel))?;
-            Session::open(&kernels)
-        });
-        let clock = clock.transpose()?;
-        let instant = |text: &str, open_end: f64| -> Result<Et> {
-            match (text, text.parse::<f64>(), &clock) {
-                ("", _, _) => Ok(Et::from_seconds(open_end)),
-                (_, Ok(seconds), _) if seconds.is_finite() => Ok(Et::from_seconds(seconds)),
-                (_, _, Some(clock)) => Ok(clock.utc_to_et(text)?),
-                _ => Err(wrong().into()),
-            }
-        };
-        let interval = Interval::new(
-            instant(start.trim(), f64::NEG_INFINITY)?,
-            instant(stop.trim(), f64::INFINITY)?,
-        );
-        if interval.start > interval.stop {
-            return Err(wrong().into());
-        }
-        Ok(Some(interval))
-    }
-}
-
-fn numbers(text: &str) -> std::result::Result<[f64; 4], String> {
-    let numbers: std::result::Result<Vec<f64>, _> = text
-        .split(',')
-        .map(|number| number.trim().parse())
-        .collect();
-    let numbers = numbers.ok().and_then(|numbers| numbers.try_into().ok());
-    numbers.ok_or_else(|| "expected four numbers: west,east,south,north".to_owned())
 }
 
 fn source_file(source: &Source) -> SourceFile {
