@@ -1,11 +1,10 @@
 //! Footprints: what is said of a shot, once for all formats.
 
-use serde_json::{Value, json};
-
 use super::{
     SiteProducts,
     coordinates::{FRAME, bounding_box_deg, degrees, signed_longitude_deg},
     geojson,
+    geoparquet::{geo_metadata, well_known_binary},
     gis::{Features, SPHERE_RADIUS_M},
     parquet, pds4_label,
     product::{Content, Declaration, Program, Role, Use, Write},
@@ -52,8 +51,9 @@ pub(super) static PARQUET: Declaration = Declaration {
     role: Role::Data,
     content: Content::Table(|| meanings(&columns())),
     write: Write::Site(|path, of| {
+        let bounds = bounding_box_deg(&points_deg(of.site));
         let metadata = vec![
-            ("geo", geo_metadata(&points_deg(of.site)).to_string()),
+            ("geo", geo_metadata(bounds, None).to_string()),
             ("frame", FRAME.to_owned()),
         ];
         parquet::write(path, table(of.site), metadata).map(Some)
@@ -429,59 +429,4 @@ fn spacecraft<'a>() -> Vec<Column<Shot<'a>>> {
             |shot: &Shot| degrees(shot.get(|of| &of.off_nadir_rad)),
         ),
     ]
-}
-
-/// Little-endian well-known binary of a point (OGC 06-103r4, 8.2).
-fn well_known_binary(point: [f64; 2]) -> Vec<u8> {
-    const LITTLE_ENDIAN: u8 = 1;
-    const POINT: u32 = 1;
-    let mut bytes = vec![LITTLE_ENDIAN];
-    bytes.extend(POINT.to_le_bytes());
-    bytes.extend(point[0].to_le_bytes());
-    bytes.extend(point[1].to_le_bytes());
-    bytes
-}
-
-/// The `geo` key of GeoParquet 1.1.0.
-fn geo_metadata(points: &[[f64; 2]]) -> Value {
-    let mut column = json!({
-        "encoding": "WKB",
-        "geometry_types": ["Point"],
-        "crs": mars_sphere(),
-    });
-    if let Some(bounds) = bounding_box_deg(points) {
-        column["bbox"] = json!(bounds);
-    }
-    json!({
-        "version": "1.1.0",
-        "primary_column": "geometry",
-        "columns": { "geometry": column },
-    })
-}
-
-/// PROJJSON of `IAU_2015:49900`, which stands for the sphere; [`FRAME`] says whose longitudes these are. Coordinates are (longitude, latitude) all the same, as GeoParquet says.
-///
-/// Source: IAU coordinate systems of the OGC Planetary working group, radius of Archinal et al. 2018.
-pub(super) fn mars_sphere() -> Value {
-    let axis = |name: &str, abbreviation: &str, direction: &str| json!({ "name": name, "abbreviation": abbreviation, "direction": direction, "unit": "degree" });
-    json!({
-        "$schema": "https://proj.org/schemas/v0.7/projjson.schema.json",
-        "type": "GeographicCRS",
-        "name": "Mars (2015) - Sphere / Ocentric",
-        "datum": {
-            "type": "GeodeticReferenceFrame",
-            "name": "Mars (2015) - Sphere",
-            "anchor": "Viking 1 lander: 47.95137 W",
-            "ellipsoid": { "name": "Mars (2015) - Sphere", "radius": MARS_IAU2000.equatorial_radius_m },
-            "prime_meridian": { "name": "Reference Meridian", "longitude": 0 },
-        },
-        "coordinate_system": {
-            "subtype": "ellipsoidal",
-            "axis": [
-                axis("Geodetic latitude", "Lat", "north"),
-                axis("Geodetic longitude", "Lon", "east"),
-            ],
-        },
-        "id": { "authority": "IAU", "code": 49900, "version": 2015 },
-    })
 }

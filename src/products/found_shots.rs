@@ -24,8 +24,9 @@ use tempfile::NamedTempFile;
 use super::{
     coordinates::FRAME,
     error::ProductError,
-    footprints::{Shot, ShotNames, columns, mars_sphere},
+    footprints::{Shot, ShotNames, columns},
     geojson,
+    geoparquet::geo_metadata,
     gis::Features,
     parquet,
     table::Table,
@@ -206,7 +207,10 @@ impl ShotsFile {
         match self.writer {
             Writer::Parquet(writer) => {
                 let metadata = [
-                    ("geo", geo_metadata(self.bounds).to_string()),
+                    (
+                        "geo",
+                        geo_metadata(self.bounds, Some(covering())).to_string(),
+                    ),
                     ("frame", FRAME.to_owned()),
                     (SEARCH, search.to_string()),
                 ];
@@ -354,22 +358,9 @@ fn require_rows(file: File, rows: u64) -> Result<()> {
     Err(ProductError::ReadBack { what }.into())
 }
 
-/// The `geo` key of GeoParquet 1.1.0 with bounding boxes.
-fn geo_metadata(bounds: Option<[f64; 4]>) -> Value {
+/// Where each row has its bounding box.
+fn covering() -> Value {
     let covering = BBOX_PARTS.map(|part| (part.to_owned(), json!([BBOX, part])));
     let covering: serde_json::Map<String, Value> = covering.into_iter().collect();
-    let mut column = json!({
-        "encoding": "WKB",
-        "geometry_types": ["Point"],
-        "crs": mars_sphere(),
-        "covering": { "bbox": covering },
-    });
-    if let Some(bounds) = bounds {
-        column["bbox"] = json!(bounds);
-    }
-    json!({
-        "version": "1.1.0",
-        "primary_column": "geometry",
-        "columns": { "geometry": column },
-    })
+    json!({ "bbox": covering })
 }

@@ -17,6 +17,7 @@ mod footprints;
 mod found_shots;
 mod generated;
 mod geojson;
+mod geoparquet;
 mod gis;
 mod heights;
 mod isd;
