@@ -17,7 +17,7 @@ pub(crate) fn search_footprints(
     correction_s: f64,
     stop: &AtomicBool,
 ) -> Result<SearchResult> {
-    let files = InputFiles::default().hash_all(&pedr.files, stop)?;
+    let files = InputFiles::default().hash_all(&pedr.files, &AtomicBool::new(false))?;
     let indexes = Indexes::default();
     search_footprints::search_footprints(pedr, &files, &indexes, windows, correction_s, stop)
 }
