@@ -740,7 +740,7 @@ fn plans_and_shots_come_from_workers() {
 
 /// Serves the filled database on a fixed port until it is ended, for looking at pages by hand and for `scripts/look`.
 #[test]
-#[ignore = "for looking at pages by hand"]
+#[ignore = "serves until it is ended: for scripts/look-service and scripts/hammer"]
 fn serve_until_ended() {
     let now_ms = std::time::SystemTime::now()
         .duration_since(std::time::UNIX_EPOCH)

@@ -212,16 +212,23 @@ impl Search<'_> {
 
     /// Opens the files of these pieces, but those that failed, and closes others. Gives the failures.
     fn open(&mut self, pieces: &[Piece]) -> BTreeMap<usize, Error> {
+        // By file, some rows of it.
         let read = pieces.iter().filter(|piece| !piece.rows.is_empty());
-        let files: BTreeSet<usize> = read.map(|piece| piece.file).collect();
-        self.readers.retain(|file, _| files.contains(file));
+        let files: BTreeMap<usize, &Range<usize>> =
+            read.map(|piece| (piece.file, &piece.rows)).collect();
+        self.readers.retain(|file, _| files.contains_key(file));
         let mut failures = BTreeMap::new();
-        for file in files.difference(&self.failed) {
-            if !self.readers.contains_key(file) {
-                match self.sources[*file].reopen() {
-                    Ok(reader) => drop(self.readers.insert(*file, reader)),
-                    Err(failure) => drop(failures.insert(*file, failure)),
-                }
+        for (file, rows) in files {
+            if self.failed.contains(&file) || self.readers.contains_key(&file) {
+                continue;
+            }
+            let opened = self.sources[file].reopen().and_then(|reader| {
+                reader.prepare(rows)?;
+                Ok(reader)
+            });
+            match opened {
+                Ok(reader) => drop(self.readers.insert(file, reader)),
+                Err(failure) => drop(failures.insert(file, failure)),
             }
         }
         failures

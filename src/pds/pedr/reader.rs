@@ -115,14 +115,29 @@ impl Reader {
     /// # Errors
     /// What the disk refuses; a file that has become shorter.
     pub fn stretch(&self, rows: Range<usize>, buffer: Vec<u8>) -> Result<Stretch> {
-        let reaches_all = rows.start <= NEIGHBOURS
-            && rows.end.saturating_add(NEIGHBOURS) >= self.head.record_count();
-        let chronology = if reaches_all {
+        let chronology = if self.reaches_all(&rows) {
             None
         } else {
             Some(self.chronology()?)
         };
         self.stretch_in(rows, buffer, chronology)
+    }
+
+    /// Reads the chronology of the file, unless these rows tell it by themselves: once, before several threads ask for
+    /// stretches of the file.
+    ///
+    /// # Errors
+    /// What the disk refuses; a file that has become shorter.
+    pub fn prepare(&self, rows: &Range<usize>) -> Result<()> {
+        if !self.reaches_all(rows) {
+            self.chronology()?;
+        }
+        Ok(())
+    }
+
+    /// Whether all records of the file are in memory with these rows and their neighbours.
+    fn reaches_all(&self, rows: &Range<usize>) -> bool {
+        rows.start <= NEIGHBOURS && rows.end.saturating_add(NEIGHBOURS) >= self.head.record_count()
     }
 
     /// The same for records that nobody will judge: the rest of the file is not looked at.
