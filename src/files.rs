@@ -1,6 +1,8 @@
-//! Files as several floors need them: their hash, read once as long as they do not change, and their name without folders.
+//! Files as several floors need them: their hash, read once as long as they do not change, their name without folders, and
+//! how they come under that name whole or not at all.
 
 mod known;
+mod staged;
 
 use std::{
     collections::{BTreeMap, BTreeSet},
@@ -13,6 +15,7 @@ use std::{
 use rayon::prelude::*;
 
 pub use self::known::{Identity, KnownFile, KnownFiles};
+pub use self::staged::{StagedFile, TEMPORARY};
 use crate::error::{Cause, IoError, Kind, Locate, Result, Stopped};
 
 /// A file as it was when it was first read.

@@ -25,6 +25,8 @@ pub mod scene;
 pub mod schema;
 pub mod service;
 pub mod spice;
+#[cfg(feature = "sql")]
+pub mod sql;
 pub mod stage;
 pub mod stages;
 pub mod store;

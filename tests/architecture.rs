@@ -39,14 +39,14 @@ const FLOORS: [&[&str]; 7] = [
     &["geom", "config"],
     &["spice", "pds", "scene"],
     &["stages"],
-    &["flow", "report", "difference", "products", "store"],
+    &["flow", "report", "difference", "products", "store", "sql"],
     &["service"],
     &["cli"],
 ];
 
 /// Arrows inside a floor that are meant: the configuration speaks of windows and camera models, the scene is
-/// written with the fence and the PEDR writer, the flow publishes, the difference reads what was published, and the report tells of both.
-const SAME_FLOOR: [(&str, &str); 10] = [
+/// written with the fence and the PEDR writer, the flow publishes, the difference reads what was published, the report tells of both, and columns of shots are those of products.
+const SAME_FLOOR: [(&str, &str); 11] = [
     ("config", "geom"),
     ("scene", "spice"),
     ("scene", "pds"),
@@ -57,6 +57,7 @@ const SAME_FLOOR: [(&str, &str); 10] = [
     ("difference", "store"),
     ("report", "products"),
     ("report", "difference"),
+    ("sql", "products"),
 ];
 
 fn floor(room: &str) -> usize {

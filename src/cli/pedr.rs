@@ -3,6 +3,8 @@
 mod index;
 mod info;
 mod search;
+#[cfg(feature = "sql")]
+mod sql;
 mod tab;
 
 use clap::{Args, Subcommand};
@@ -22,6 +24,8 @@ enum Command {
     Tab(tab::Arguments),
     Index(index::Arguments),
     Search(search::Arguments),
+    #[cfg(feature = "sql")]
+    Sql(sql::Arguments),
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<(), Error> {
@@ -30,5 +34,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Error> {
         Command::Tab(arguments) => tab::run(arguments),
         Command::Index(arguments) => index::run(arguments),
         Command::Search(arguments) => search::run(arguments),
+        #[cfg(feature = "sql")]
+        Command::Sql(arguments) => sql::run(arguments),
     }
 }

@@ -19,7 +19,6 @@ use arrow::{
     record_batch::RecordBatch,
 };
 use serde_json::{Value, json};
-use tempfile::NamedTempFile;
 
 use super::{
     coordinates::FRAME,
@@ -34,6 +33,7 @@ use super::{
 };
 use crate::{
     error::{IoError, Locate, Result},
+    files::StagedFile,
     footprints::Footprints,
     frames::MarsIau2000,
     pds::archive::WindowLists,
@@ -98,8 +98,7 @@ impl FoundShots<'_> {
 
 /// A file of shots that is being written; it appears under its name when it is finished.
 pub struct ShotsFile {
-    path: PathBuf,
-    file: NamedTempFile,
+    file: StagedFile,
     writer: Writer,
     rows: u64,
     bounds: Option<[f64; 4]>,
@@ -118,17 +117,8 @@ impl ShotsFile {
     /// # Errors
     /// What the disk refuses.
     pub fn create(path: &Path, format: ShotsFormat) -> Result<Self> {
-        let folder = match path.parent() {
-            Some(folder) if folder != Path::new("") => folder,
-            _ => Path::new("."),
-        };
-        let file = tempfile::Builder::new()
-            .prefix(".partial-")
-            .tempfile_in(folder)
-            .map_err(IoError::on("create a file"))
-            .in_file(folder)?;
-        let handle = file.as_file().try_clone();
-        let handle = handle.map_err(IoError::on("create")).in_file(path)?;
+        let file = StagedFile::create(path)?;
+        let handle = file.writer()?;
         let empty = Table::new(columns(), Vec::new()).without("utc");
         let writer = match format {
             ShotsFormat::Parquet => {
@@ -150,7 +140,6 @@ impl ShotsFile {
             }
         };
         Ok(Self {
-            path: path.to_owned(),
             file,
             writer,
             rows: 0,
@@ -179,7 +168,7 @@ impl ShotsFile {
                 northern.max(*north),
             ]);
         }
-        let path = &self.path;
+        let path = self.file.path();
         match &mut self.writer {
             Writer::Parquet(writer) => {
                 let table = shots.table().for_parquet();
@@ -202,7 +191,7 @@ impl ShotsFile {
     /// # Errors
     /// What the disk refuses; a file that comes back with another number of rows.
     pub fn finish(self, search: &Value) -> Result<u64> {
-        let path = &self.path;
+        let path = self.file.path();
         let refused = |error| IoError::on("write")(error);
         match self.writer {
             Writer::Parquet(writer) => {
@@ -215,12 +204,11 @@ impl ShotsFile {
                     (SEARCH, search.to_string()),
                 ];
                 writer.finish(metadata).in_file(path)?;
-                let reader = File::open(self.file.path()).map_err(IoError::on("read"));
-                require_rows(reader.in_file(path)?, self.rows).in_file(path)?;
+                require_rows(self.file.reader()?, self.rows).in_file(path)?;
             }
             Writer::Csv(mut writer) => {
                 writer.flush().map_err(refused).in_file(path)?;
-                let mut beside = self.path.clone().into_os_string();
+                let mut beside = path.as_os_str().to_owned();
                 beside.push(".json");
                 let beside = PathBuf::from(beside);
                 super::files::write_json(&beside, search)?;
@@ -234,23 +222,9 @@ impl ShotsFile {
                     .in_file(path)?;
             }
         }
-        let synced = self.file.as_file().sync_all();
-        synced.map_err(IoError::on("flush")).in_file(path)?;
-        make_readable(self.file.as_file()).in_file(path)?;
-        self.file
-            .persist(path)
-            .map_err(|error| IoError::on("rename into place")(error.error))
-            .in_file(path)?;
+        self.file.finish()?;
         Ok(self.rows)
     }
-}
-
-/// Temporary files are private; answers are for everyone whom the folder lets in.
-fn make_readable(file: &File) -> std::result::Result<(), IoError> {
-    use std::os::unix::fs::PermissionsExt as _;
-    let permissions = std::fs::Permissions::from_mode(0o644);
-    file.set_permissions(permissions)
-        .map_err(IoError::on("set permissions of"))
 }
 
 /// Writes shots in batches of one size, so that the bytes do not depend on the pieces in which shots were found.

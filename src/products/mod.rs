@@ -33,6 +33,8 @@ mod ranges;
 pub mod read;
 mod registration;
 mod registry;
+#[cfg(feature = "sql")]
+mod shot_columns;
 mod site;
 mod table;
 mod text_table;
@@ -52,6 +54,8 @@ pub use found_shots::{FoundShots, ShotsFile, ShotsFormat};
 pub use generated::{documentation, schemas};
 pub use net::{NetProducts, write_net_products};
 pub use product::Product;
+#[cfg(feature = "sql")]
+pub use shot_columns::ShotColumns;
 pub use site::{AdjustmentProducts, GeometricProducts, ImageProducts, SiteProducts};
 
 use crate::error::{Locate, Result};

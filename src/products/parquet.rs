@@ -1,6 +1,6 @@
 //! Tables as Parquet files, the same bytes for the same table.
 
-use std::{fs::File, io::Write, ops::Range, path::Path, sync::Arc};
+use std::{collections::HashMap, fs::File, io::Write, ops::Range, path::Path, sync::Arc};
 
 use ::parquet::{
     arrow::{ArrowWriter, arrow_reader::ParquetRecordBatchReaderBuilder},
@@ -12,7 +12,7 @@ use arrow::{
     array::{
         ArrayRef, BinaryArray, BooleanArray, Float64Array, Int32Array, StringArray, UInt32Array,
     },
-    datatypes::{DataType, Field, Metadata, Schema, SchemaRef},
+    datatypes::{DataType, Field, Schema, SchemaRef},
     record_batch::RecordBatch,
 };
 
@@ -86,8 +86,12 @@ fn field(column: &Meaning) -> Field {
     let description = ("description".to_owned(), column.description.to_owned());
     let unit = column.unit.symbol();
     let unit = unit.map(|symbol| ("unit".to_owned(), symbol.to_owned()));
-    Field::new(column.name, data_type, column.optional)
-        .with_metadata([description].into_iter().chain(unit).collect::<Metadata>())
+    Field::new(column.name, data_type, column.optional).with_metadata(
+        [description]
+            .into_iter()
+            .chain(unit)
+            .collect::<HashMap<_, _>>(),
+    )
 }
 
 /// The given rows, which `table` must have, as arrays.

@@ -274,6 +274,13 @@ impl<'a> Table<'a> {
         self.keep(|column| column.name != name)
     }
 
+    /// With the columns at these places alone, in this order; the table must have them.
+    #[cfg(feature = "sql")]
+    pub(super) fn pick(mut self, places: &[usize]) -> Self {
+        self.columns = places.iter().map(|place| self.columns[*place]).collect();
+        self
+    }
+
     fn keep(mut self, required: impl Fn(&Meaning) -> bool) -> Self {
         self.columns.retain(|(_, column)| required(column));
         self

@@ -7,9 +7,9 @@ use serde::{Deserialize, Serialize};
 
 use super::search_footprints::SearchResult;
 use crate::{
-    altimetry::MolaClock,
+    altimetry::{BiasScope, MolaClock, TagSign},
     error::Result,
-    footprints::{AsRead, Footprints},
+    footprints::{AsRead, Footprints, SourceFile},
     frames::{MarsDatum, MarsIau2000},
     geom::{
         ellipsoid::{Spherical, spherical_to_xyz_m},
@@ -128,6 +128,28 @@ pub fn convert_datum(footprints: Footprints<AsRead>, clock: &MolaClock) -> Conve
         footprints: converted,
         notes,
     }
+}
+
+/// The same for shots of an archive that is searched: turned at their time tags, without a clock correction.
+///
+/// * `files` – the files that the column `file` counts into
+#[must_use]
+pub fn convert_at_tags(
+    mut footprints: Footprints<AsRead>,
+    files: &[SourceFile],
+) -> Footprints<MarsIau2000> {
+    footprints.files = files.to_vec();
+    let is_iau2000 = |file: &u16| files[usize::from(*file)].datum == MarsDatum::Iau2000;
+    if footprints.file.iter().all(is_iau2000) {
+        return footprints.declare();
+    }
+    let at_tags = MolaClock {
+        bias_s: 0.0,
+        sign: TagSign::Late,
+        scope: BiasScope::None,
+        source: String::new(),
+    };
+    convert_datum(footprints, &at_tags).footprints
 }
 
 /// How far the shots of each file moved from longitudes and latitudes `before`.

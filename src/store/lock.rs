@@ -5,11 +5,11 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use super::{
-    atomic::TEMPORARY,
-    publish::{CACHE, STAGING},
+use super::publish::{CACHE, STAGING};
+use crate::{
+    error::{Cause, Error, IoError, Kind, Locate, Result},
+    files::TEMPORARY,
 };
-use crate::error::{Cause, Error, IoError, Kind, Locate, Result};
 
 /// Held while a run works in a site's folder; the system frees it when the process ends, however it ends.
 #[derive(Debug)]

@@ -4,25 +4,19 @@ mod arguments;
 
 use std::{collections::BTreeMap, path::PathBuf, sync::atomic::AtomicBool};
 
-use rayon::prelude::*;
 use serde_json::{Value, json};
 
 pub(super) use self::arguments::Arguments;
-use self::arguments::Usage;
 use crate::cli::output;
 use crate::{
-    altimetry::{BiasScope, DatumChoice, MolaClock, TagSign},
     config::WindowConfig,
     error::{Cause, Error, Kind, Result},
     files::file_name,
     footprints::{AsRead, Footprints, SourceFile},
-    frames::{MarsDatum, MarsIau2000},
     geom::window::Region,
-    pds::archive::{
-        Found, Index, Indexes, Judged, Listing, Query, Sink, Source, WindowLists, search,
-    },
+    pds::archive::{Found, Judged, Opened, Query, Sink, Source, WindowLists, search},
     products::{FoundShots, ShotsFile},
-    stages::convert_datum::convert_datum,
+    stages::convert_datum::convert_at_tags,
     time::{Et, Interval},
 };
 
@@ -59,13 +53,14 @@ pub(super) fn run(arguments: &Arguments) -> Result<()> {
     let format = arguments.format()?;
     let windows = arguments.windows()?;
     let time = arguments.time()?;
+    let Opened { sources, failures } = Opened::all(&arguments.paths)?;
     let mut answer = Answer {
         window_ids: windows.iter().map(|window| window.id.clone()).collect(),
+        files: sources.iter().map(Source::file).collect(),
+        counts: vec![0; windows.len()],
+        failures,
         ..Answer::default()
     };
-    let sources = answer.sources(&arguments.paths)?;
-    answer.files = sources.iter().map(source_file).collect();
-    answer.counts = vec![0; windows.len()];
     if let (Some(format), Some(out)) = (format, &arguments.out) {
         answer.file = Some(ShotsFile::create(out, format)?);
     }
@@ -84,15 +79,6 @@ pub(super) fn run(arguments: &Arguments) -> Result<()> {
     }
     output::json(&told);
     answer.end()
-}
-
-fn source_file(source: &Source) -> SourceFile {
-    SourceFile {
-        name: file_name(source.path()),
-        version: source.version(),
-        datum: source.datum(),
-        blake3: String::new(),
-    }
 }
 
 /// What is found, and what fails.
@@ -116,37 +102,6 @@ struct Answer {
 }
 
 impl Answer {
-    /// The files in the order of their first records; those that cannot be searched are failures.
-    fn sources(&mut self, paths: &[PathBuf]) -> Result<Vec<Source>> {
-        let mut files = Vec::new();
-        for path in paths {
-            if path.is_dir() {
-                let listing = Listing::below(path);
-                self.failures.extend(listing.failures);
-                files.extend(listing.paths);
-            } else {
-                files.push(path.clone());
-            }
-        }
-        if files.is_empty() || files.len() > usize::from(u16::MAX) {
-            return Err(Usage::Files(files.len()).into());
-        }
-        let indexes = Indexes::beside(&files, Index::read);
-        let opened: Vec<Result<Source>> = files
-            .par_iter()
-            .map(|path| Source::open(path, DatumChoice::Auto, &indexes))
-            .collect();
-        let mut sources = Vec::with_capacity(opened.len());
-        for source in opened {
-            match source {
-                Ok(source) => sources.push(source),
-                Err(failure) => self.failures.push(failure),
-            }
-        }
-        sources.sort_by(|a, b| a.first_s().total_cmp(&b.first_s()));
-        Ok(sources)
-    }
-
     /// What was asked for, and how complete the answer is.
     fn tell(
         &self,
@@ -239,29 +194,13 @@ impl Answer {
         let Some(file) = &mut self.file else {
             return Ok(());
         };
-        let footprints = in_iau2000(footprints, &self.files);
+        let footprints = convert_at_tags(footprints, &self.files);
         file.write(&FoundShots {
             footprints: &footprints,
             windows,
             window_ids: &self.window_ids,
         })
     }
-}
-
-/// The shots in IAU 2000, turned at their time tags.
-fn in_iau2000(mut footprints: Footprints<AsRead>, files: &[SourceFile]) -> Footprints<MarsIau2000> {
-    footprints.files = files.to_vec();
-    let is_iau2000 = |file: &u16| files[usize::from(*file)].datum == MarsDatum::Iau2000;
-    if footprints.file.iter().all(is_iau2000) {
-        return footprints.declare();
-    }
-    let at_tags = MolaClock {
-        bias_s: 0.0,
-        sign: TagSign::Late,
-        scope: BiasScope::None,
-        source: String::new(),
-    };
-    convert_datum(footprints, &at_tags).footprints
 }
 
 impl Sink for Answer {

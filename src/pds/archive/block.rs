@@ -170,9 +170,7 @@ mod tests {
             });
             let query = Query::new(vec![region], &filter, Judged::Near).within(time);
             let block = Block::of(&records);
-            let matters = |record: &Record| {
-                query.may_matter(&record.mid_point(), record.time_s.get(), datum)
-            };
+            let matters = |record: &Record| query.may_matter(record, datum);
             if records.iter().any(matters) {
                 prop_assert!(block.may_matter(&query, datum));
             }

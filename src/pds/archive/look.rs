@@ -54,8 +54,7 @@ impl Source {
     ) -> Option<Range<usize>> {
         let mut near = None;
         for (row, record) in stretch.records(rows) {
-            let (mid, tag_s) = (record.mid_point(), record.time_s.get());
-            if query.may_matter(&mid, tag_s, self.datum()) {
+            if query.may_matter(record, self.datum()) {
                 let first = near.map_or(row, |near: (usize, usize)| near.0);
                 near = Some((first, row + 1));
             }

@@ -6,7 +6,7 @@ use crate::{
     altimetry::ShotFilter,
     frames::MarsDatum,
     geom::window::{Region, WindowGrid},
-    pds::pedr::MidPoint,
+    pds::pedr::Record,
     time::Interval,
     units::RADIANS_PER_DEGREE,
 };
@@ -30,8 +30,8 @@ pub enum Judged {
 #[derive(Debug)]
 pub struct Query<'a> {
     pub(super) windows: WindowGrid,
-    /// Shots to keep.
-    pub(super) filter: &'a ShotFilter,
+    /// Shots to keep; none keeps all with a return.
+    pub(super) filter: Option<&'a ShotFilter>,
     /// Times of shots to keep, corrected; none keeps all.
     pub(super) time: Option<Interval>,
     /// Seconds to add to time tags.
@@ -40,12 +40,21 @@ pub struct Query<'a> {
 }
 
 impl<'a> Query<'a> {
-    /// Shots in any of the windows.
+    /// Shots in any of the windows that pass the filter.
     #[must_use]
     pub fn new(windows: Vec<Region>, filter: &'a ShotFilter, judged: Judged) -> Self {
         Self {
+            filter: Some(filter),
+            ..Self::unfiltered(windows, judged)
+        }
+    }
+
+    /// Shots in any of the windows, of every class, channel and attitude.
+    #[must_use]
+    pub fn unfiltered(windows: Vec<Region>, judged: Judged) -> Self {
+        Self {
             windows: WindowGrid::new(windows, DATUM_MARGIN_RAD),
-            filter,
+            filter: None,
             time: None,
             correction_s: 0.0,
             judged,
@@ -77,13 +86,18 @@ impl<'a> Query<'a> {
     }
 
     /// Whether a record may have a shot that is asked for; in doubt, and when its place is impossible, it may.
-    pub(super) fn may_matter(&self, mid: &MidPoint, tag_s: f64, datum: MarsDatum) -> bool {
+    pub(super) fn may_matter(&self, record: &Record, datum: MarsDatum) -> bool {
+        let mid = record.mid_point();
         let margin_rad = mid.reach_rad + Self::margin_rad(datum);
-        (mid.latitude_rad.abs() > FRAC_PI_2
+        let may_be_inside = mid.latitude_rad.abs() > FRAC_PI_2
             || self
                 .windows
-                .any_within(mid.longitude_rad, mid.latitude_rad, margin_rad))
-            && self.may_have_time(tag_s, tag_s)
+                .any_within(mid.longitude_rad, mid.latitude_rad, margin_rad);
+        may_be_inside && {
+            // Most records have been passed over without a look at their time.
+            let tag_s = record.time_s.get();
+            self.may_have_time(tag_s, tag_s)
+        }
     }
 
     /// Whether shots of frames with these tags may be of the time that is asked for; tags that are no numbers may.

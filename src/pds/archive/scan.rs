@@ -4,6 +4,7 @@ use std::ops::Range;
 
 use super::{Found, Judged, Query, ShotRejection, Source};
 use crate::{
+    altimetry::ShotFilter,
     footprints::Footprint,
     frames::{MarsDatum, MarsIau2000},
     geom::{
@@ -38,10 +39,7 @@ impl Scan<'_> {
         let judges_all = self.query.judged == Judged::All && !complaints_known;
         let matters: Vec<bool> = stretch
             .records(rows.clone())
-            .map(|(_, record)| {
-                let mid = record.mid_point();
-                (self.query).may_matter(&mid, record.time_s.get(), datum)
-            })
+            .map(|(_, record)| self.query.may_matter(record, datum))
             .collect();
         let first = rows.start;
         for run in runs(&matters, judges_all) {
@@ -121,22 +119,25 @@ impl Scan<'_> {
     }
 
     fn reject(&self, shot: &Footprint, spoiled: &SpoiledShots) -> Option<ShotRejection> {
-        let filter = self.query.filter;
+        let passes = |test: &dyn Fn(&ShotFilter) -> bool| self.query.filter.is_none_or(test);
         let tests = [
             (ShotRejection::NoReturn, shot.range_m > 0.0),
             (ShotRejection::Spoiled, !spoiled.contains(shot.shot)),
-            (ShotRejection::Class, filter.classes.contains(&shot.class)),
+            (
+                ShotRejection::Class,
+                passes(&|filter| filter.classes.contains(&shot.class)),
+            ),
             (
                 ShotRejection::Channel,
-                filter.channels.contains(&shot.channel),
+                passes(&|filter| filter.channels.contains(&shot.channel)),
             ),
             (
                 ShotRejection::Attitude,
-                filter.attitude_flags.contains(&shot.attitude_flag),
+                passes(&|filter| filter.attitude_flags.contains(&shot.attitude_flag)),
             ),
             (
                 ShotRejection::OffNadir,
-                shot.off_nadir_rad.abs() <= filter.off_nadir_max_rad,
+                passes(&|filter| shot.off_nadir_rad.abs() <= filter.off_nadir_max_rad),
             ),
         ];
         tests

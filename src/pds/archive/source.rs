@@ -11,7 +11,8 @@ use super::{Found, IndexedFile, Indexes, Judged, Query};
 use crate::{
     altimetry::DatumChoice,
     error::{Locate, Result},
-    files::Identity,
+    files::{Identity, file_name},
+    footprints::SourceFile,
     frames::MarsDatum,
     pds::pedr::{Complaint, FieldGuard, PedrLabel, Reader, decide_datum},
 };
@@ -63,6 +64,17 @@ impl Source {
     #[must_use]
     pub fn path(&self) -> &Path {
         &self.path
+    }
+
+    /// What footprints say of it; a search does not know its hash.
+    #[must_use]
+    pub fn file(&self) -> SourceFile {
+        SourceFile {
+            name: file_name(&self.path),
+            version: self.version,
+            datum: self.datum,
+            blake3: String::new(),
+        }
     }
 
     /// Version letter of its name.

@@ -82,8 +82,6 @@ pub(super) enum Usage {
     Time(String),
     #[error("{0}; expected an ending .parquet, .csv or .geojson")]
     Ending(String),
-    #[error("{0} PEDR files; expected 1 to 65535")]
-    Files(usize),
 }
 
 impl Cause for Usage {
@@ -97,7 +95,6 @@ impl Cause for Usage {
                 "write A..B with seconds past J2000 (-25000000..-24990000), or with UTC (1999-03-16T00:00:00..1999-03-17T00:00:00) and --leap-seconds"
             }
             Self::Ending(_) => "say --format, or give the file another ending",
-            Self::Files(_) => "name PEDR files (AP#####v.B), or folders that hold them",
         }
         .to_owned()
     }

@@ -1,7 +1,8 @@
 //! Searches a synthetic archive of PEDR files, side by side with what the machine can do at best.
 //!
 //! `cargo bench --bench archive -- --gb 2`: ratios go to `target/bench/archive.json`. "Warm" is with all files in the
-//! system's cache, the best of a few rounds in turns; "cold" after their pages were given up, once each.
+//! system's cache, the best of a few rounds in turns; "cold" after their pages were given up, once each. With `--scaling`
+//! archives of 0.5 to 4 GB one after the other, and `docs/archive_scaling.svg`. With `--keep FOLDER` the archive stays there.
 #![allow(
     clippy::unwrap_used,
     clippy::expect_used,
@@ -12,9 +13,11 @@
     reason = "a benchmark may fail loudly, counts little and prints its figures in one list"
 )]
 
-#[path = "../tests/track/mod.rs"]
+mod scaling;
+#[path = "../../tests/track/mod.rs"]
 #[allow(dead_code, reason = "tests use more of it")]
 mod track;
+mod writing;
 
 use std::{
     collections::BTreeMap,
@@ -235,26 +238,55 @@ fn half_degree(west: f64, south: f64) -> Region {
     })
 }
 
+/// All of Mars.
+fn everywhere() -> Region {
+    Region::new(&WindowShape::Box {
+        west_rad: 0.0,
+        east_rad: TAU,
+        south_rad: -TAU / 4.0,
+        north_rad: TAU / 4.0,
+    })
+}
+
 fn main() {
     let arguments: Vec<String> = std::env::args().collect();
-    let gb = arguments.iter().position(|argument| argument == "--gb");
-    let gb = gb
-        .and_then(|at| arguments.get(at + 1)?.parse().ok())
-        .unwrap_or(2.0);
-    fs::create_dir_all("target").unwrap();
-    let folder = tempfile::tempdir_in("target").unwrap();
-    let archive = Archive::write(folder.path(), gb);
+    let value = |name: &str| {
+        let at = arguments.iter().position(|argument| argument == name)?;
+        arguments.get(at + 1)
+    };
+    fs::create_dir_all("target/bench").unwrap();
+    if arguments.iter().any(|argument| argument == "--scaling") {
+        let measured = scaling::SIZES_GB.map(|gb| {
+            let folder = tempfile::tempdir_in("target").unwrap();
+            measure(folder.path(), gb)
+        });
+        return scaling::plot(Path::new("docs/archive_scaling.svg"), &measured);
+    }
+    let gb = value("--gb").map_or(2.0, |gb| gb.parse().unwrap());
+    let temporary = tempfile::tempdir_in("target").unwrap();
+    let folder = value("--keep").map_or(temporary.path(), Path::new);
+    fs::create_dir_all(folder).unwrap();
+    let document = measure(folder, gb);
+    write_text(
+        Path::new("target/bench/archive.json"),
+        &format!("{document:#}\n"),
+    );
+}
+
+fn write_text(path: &Path, text: &str) {
+    let mut file = fs::File::create(path).unwrap();
+    std::io::Write::write_all(&mut file, text.as_bytes()).unwrap();
+}
+
+/// Everything, of an archive of about `gb` gigabytes.
+fn measure(folder: &Path, gb: f64) -> Value {
+    let archive = Archive::write(folder, gb);
     let one = vec![half_degree(20.0, 10.0)];
     // Spread over the globe by the golden ratio.
     let thousand: Vec<Region> = (0..1_000)
         .map(|n| half_degree(f64::from(n) * 222.492_235, -87.0 + 0.173 * f64::from(n)))
         .collect();
-    let everywhere = vec![Region::new(&WindowShape::Box {
-        west_rad: 0.0,
-        east_rad: TAU,
-        south_rad: -TAU / 4.0,
-        north_rad: TAU / 4.0,
-    })];
+    let everywhere = vec![everywhere()];
     let none = Indexes::default();
     let mut best: BTreeMap<&str, f64> = BTreeMap::new();
     let mut note = |name: &'static str, taken_s: f64| {
@@ -306,7 +338,7 @@ fn main() {
             seconds(|| _ = black_box(archive.index(&index))),
         );
     }
-    let index_path = folder.path().join(areograph::pds::archive::INDEX);
+    let index_path = folder.join(areograph::pds::archive::INDEX);
     let encoded = index.encode().unwrap();
     std::io::Write::write_all(&mut fs::File::create(&index_path).unwrap(), &encoded).unwrap();
     for _ in 0..ROUNDS {
@@ -326,7 +358,15 @@ fn main() {
         );
     }
     let found = archive.search(&one, Judged::Near, &none);
-    report(&archive, &best, &encoded, [before_mb, memory_mb], &found);
+    let written = writing::rows_per_s(&archive, folder);
+    report(
+        &archive,
+        &best,
+        &encoded,
+        [before_mb, memory_mb],
+        &found,
+        &written,
+    )
 }
 
 fn report(
@@ -335,7 +375,8 @@ fn report(
     index: &[u8],
     peaks_mb: [f64; 2],
     found: &Count,
-) {
+    written: &Value,
+) -> Value {
     let bytes = archive.bytes as f64;
     println!(
         "{} files, {:.3} GB, {} threads; {} shots in the window of {} frames",
@@ -367,14 +408,12 @@ fn report(
         "peak_memory_after_cold_scan_mb": peaks_mb[0],
         "peak_memory_mb": peaks_mb[1],
     });
-    println!("{ratios:#}");
-    let document = json!({
+    println!("{ratios:#}\nrows written per second: {written:#}");
+    json!({
         "gb": bytes / 1e9,
         "threads": rayon::current_num_threads(),
         "seconds": best,
         "ratios": ratios,
-    });
-    fs::create_dir_all("target/bench").unwrap();
-    let mut file = fs::File::create("target/bench/archive.json").unwrap();
-    std::io::Write::write_all(&mut file, format!("{document:#}\n").as_bytes()).unwrap();
+        "rows_written_per_s": written,
+    })
 }

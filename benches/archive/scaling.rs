@@ -1,0 +1,79 @@
+//! How times grow with the archive, as a plot.
+
+use std::path::Path;
+
+use plotters::prelude::*;
+use serde_json::Value;
+
+/// Sizes of the archives, gigabytes.
+pub(super) const SIZES_GB: [f64; 4] = [0.5, 1.0, 2.0, 4.0];
+
+/// What is plotted, from what is nearly free to what reads everything; colours are those of Okabe and Ito.
+const SERIES: [(&str, &str, RGBColor); 6] = [
+    ("indexed", "one window, with index", RGBColor(0, 114, 178)),
+    (
+        "index update, nothing new",
+        "index, nothing new",
+        RGBColor(86, 180, 233),
+    ),
+    ("scan", "one window, without index", RGBColor(0, 158, 115)),
+    (
+        "1000 windows",
+        "1000 windows, without index",
+        RGBColor(230, 159, 0),
+    ),
+    (
+        "index build",
+        "index of a new archive",
+        RGBColor(213, 94, 0),
+    ),
+    (
+        "cold scan",
+        "one window, without index, cold",
+        RGBColor(0, 0, 0),
+    ),
+];
+
+/// Draws milliseconds over gigabytes, both on logarithmic axes.
+pub(super) fn plot(path: &Path, measured: &[Value]) {
+    let root = SVGBackend::new(path, (760, 460)).into_drawing_area();
+    root.fill(&WHITE).unwrap();
+    let mut chart = ChartBuilder::on(&root)
+        .margin(14)
+        .x_label_area_size(40)
+        .y_label_area_size(60)
+        .caption(
+            "Searching an archive of PEDR files, two threads",
+            ("sans-serif", 18),
+        )
+        .build_cartesian_2d((0.4..5.0_f64).log_scale(), (0.1..10_000.0_f64).log_scale())
+        .unwrap();
+    chart
+        .configure_mesh()
+        .x_desc("size of the archive, GB")
+        .y_desc("time, ms")
+        .x_label_formatter(&|gb| format!("{gb}"))
+        .draw()
+        .unwrap();
+    for (name, label, colour) in SERIES {
+        let points: Vec<(f64, f64)> = measured
+            .iter()
+            .map(|of| {
+                let taken_s = of["seconds"][name].as_f64().unwrap();
+                (of["gb"].as_f64().unwrap(), taken_s * 1e3)
+            })
+            .collect();
+        let line = LineSeries::new(points.iter().copied(), colour.stroke_width(2));
+        let drawn = chart.draw_series(line.point_size(3)).unwrap();
+        drawn
+            .label(label)
+            .legend(move |(x, y)| PathElement::new([(x, y), (x + 18, y)], colour.stroke_width(2)));
+    }
+    chart
+        .configure_series_labels()
+        .position(SeriesLabelPosition::UpperLeft)
+        .background_style(WHITE.mix(0.8))
+        .draw()
+        .unwrap();
+    root.present().unwrap();
+}

@@ -1,0 +1,161 @@
+//! `areograph pedr sql`.
+
+mod answer;
+
+use std::{
+    path::PathBuf,
+    sync::{Arc, PoisonError},
+};
+
+use clap::{Args, ValueEnum};
+use datafusion::{
+    common::DataFusionError,
+    execution::{
+        SendableRecordBatchStream, memory_pool::FairSpillPool, runtime_env::RuntimeEnvBuilder,
+    },
+    prelude::{SQLOptions, SessionConfig, SessionContext},
+};
+use tokio_stream::StreamExt as _;
+
+use self::answer::Answer;
+use crate::cli::output;
+use crate::{
+    error::{Cause, IoError, Kind, Result},
+    pds::archive::Opened,
+    sql::{ShotsTable, Tally},
+};
+
+/// Answers a question in SQL about the shots of an archive, the table `shots`.
+///
+/// It has the columns of footprints.parquet but `windows` ("describe shots" lists them) in IAU 2000, with a row for every shot
+/// with a return, whatever its class; times are the tags of the files, TDB seconds past J2000. Conditions on longitude_deg,
+/// latitude_deg, et_s and source_file spare reading most of the archive, an index of it (pedr index) even more. An answer is
+/// complete, or the command fails. Tables are only read.
+///
+/// Example: areograph pedr sql archive "select orbit, count(*), avg(topography_m) from shots where latitude_deg between
+/// -5.5 and -4 and longitude_deg between 137 and 138 and class = 1 group by orbit order by orbit"
+#[derive(Debug, Args)]
+#[command(verbatim_doc_comment)]
+pub(super) struct Arguments {
+    /// PEDR files, and folders with .b files in and below them.
+    #[arg(required = true, value_name = "PATH")]
+    paths: Vec<PathBuf>,
+    /// The question.
+    #[arg(required = true, value_name = "SQL")]
+    question: String,
+    /// How it is printed.
+    #[arg(long, value_enum, default_value_t = Format::Table, conflicts_with = "out")]
+    format: Format,
+    /// File to write instead, .parquet or .csv.
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Format {
+    /// A table of at most 1,000 rows.
+    Table,
+    /// Comma-separated values, all rows.
+    Csv,
+}
+
+/// Memory for sorting and grouping; more goes to temporary files.
+const MEMORY_BYTES: usize = 128 << 20;
+/// The name of the table.
+const TABLE: &str = "shots";
+
+/// A question that has no answer.
+#[derive(Debug, thiserror::Error)]
+#[error("{}", .0.strip_backtrace())]
+struct Question(DataFusionError);
+
+impl Cause for Question {
+    fn kind(&self) -> Kind {
+        match self.0.find_root() {
+            DataFusionError::IoError(_) => Kind::Io,
+            _ => Kind::Configuration,
+        }
+    }
+
+    fn advice(&self) -> String {
+        match self.0.find_root() {
+            DataFusionError::ResourcesExhausted(_) => {
+                "ask for fewer columns, or for less to be sorted and grouped at once"
+            }
+            DataFusionError::IoError(_) => "check the disk of temporary files, then ask again",
+            _ => "\"describe shots\" lists the columns; text stands in 'single quotes'",
+        }
+        .to_owned()
+    }
+}
+
+pub(super) fn run(arguments: &Arguments) -> Result<()> {
+    let Opened { sources, failures } = Opened::all(&arguments.paths)?;
+    let mut failures = failures.into_iter();
+    if let Some(first) = failures.next() {
+        failures.for_each(output::error);
+        return Err(first);
+    }
+    let table = ShotsTable::new(sources);
+    let tally = table.tally();
+    let runtime = tokio::runtime::Builder::new_current_thread().build();
+    let runtime = runtime.map_err(IoError::on("begin an asynchronous runtime"))?;
+    let answered = runtime.block_on(answer(table, arguments));
+    let mut tally = tally.lock().unwrap_or_else(PoisonError::into_inner);
+    tell(&tally);
+    tally.failure.take().map_or(answered, Err)
+}
+
+async fn answer(table: ShotsTable, arguments: &Arguments) -> Result<()> {
+    let rows = ask(table, &arguments.question).await;
+    let mut rows = rows.map_err(Question)?;
+    let mut answer = match &arguments.out {
+        Some(out) => Answer::in_file(out, rows.schema())?,
+        None => Answer::printed(arguments.format, rows.schema()),
+    };
+    while let Some(batch) = rows.next().await {
+        if !answer.take(batch.map_err(Question)?)? {
+            break;
+        }
+    }
+    answer.finish()
+}
+
+/// The rows of the answer, one thread after the search: their order is that of the search, or the one that was asked for.
+async fn ask(
+    table: ShotsTable,
+    question: &str,
+) -> std::result::Result<SendableRecordBatchStream, DataFusionError> {
+    let memory =
+        RuntimeEnvBuilder::new().with_memory_pool(Arc::new(FairSpillPool::new(MEMORY_BYTES)));
+    let config = SessionConfig::new()
+        .with_target_partitions(1)
+        .with_information_schema(true);
+    let context = SessionContext::new_with_config_rt(config, memory.build_arc()?);
+    context.register_table(TABLE, Arc::new(table))?;
+    let read_only = SQLOptions::new()
+        .with_allow_ddl(false)
+        .with_allow_dml(false)
+        .with_allow_statements(false);
+    let frame = context.sql_with_options(question, read_only).await?;
+    frame.execute_stream().await
+}
+
+/// Complaints, on standard error.
+fn tell(tally: &Tally) {
+    if tally.complaints.is_empty() {
+        return;
+    }
+    let each = tally.complaints.iter();
+    let each = each.map(|(reason, count)| {
+        format!(
+            "{count} × {}",
+            serde_json::json!(reason).as_str().unwrap_or_default()
+        )
+    });
+    let each: Vec<String> = each.collect();
+    tracing::warn!(
+        "records that were complained of, whose bad shots are no rows: {}; pedr info tells of each",
+        each.join(", ")
+    );
+}
