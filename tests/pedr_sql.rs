@@ -23,7 +23,7 @@ use datafusion::{
     prelude::{SessionConfig, SessionContext},
 };
 use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
-use proptest::{prelude::*, test_runner::TestRunner};
+use proptest::{prelude::*, strategy::ValueTree as _, test_runner::TestRunner};
 use track::{FRAMES, write};
 
 /// Time tag of the first frame of the archive, TDB seconds.

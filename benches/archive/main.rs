@@ -2,7 +2,8 @@
 //!
 //! `cargo bench --bench archive -- --gb 2`: ratios go to `target/bench/archive.json`. "Warm" is with all files in the
 //! system's cache, the best of a few rounds in turns; "cold" after their pages were given up, once each. With `--scaling`
-//! archives of 0.5 to 4 GB one after the other, and `docs/archive_scaling.svg`. With `--keep FOLDER` the archive stays there.
+//! archives of 0.5 to 4 GB one after the other, and `docs/archive_scaling.svg`. With `--only-write FOLDER` an
+//! archive to keep, and no measurements.
 #![allow(
     clippy::unwrap_used,
     clippy::expect_used,
@@ -263,10 +264,12 @@ fn main() {
         return scaling::plot(Path::new("docs/archive_scaling.svg"), &measured);
     }
     let gb = value("--gb").map_or(2.0, |gb| gb.parse().unwrap());
-    let temporary = tempfile::tempdir_in("target").unwrap();
-    let folder = value("--keep").map_or(temporary.path(), Path::new);
-    fs::create_dir_all(folder).unwrap();
-    let document = measure(folder, gb);
+    if let Some(folder) = value("--only-write") {
+        Archive::write(Path::new(folder), gb);
+        return;
+    }
+    let folder = tempfile::tempdir_in("target").unwrap();
+    let document = measure(folder.path(), gb);
     write_text(
         Path::new("target/bench/archive.json"),
         &format!("{document:#}\n"),
