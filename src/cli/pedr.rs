@@ -2,6 +2,7 @@
 
 mod index;
 mod info;
+mod qa;
 mod search;
 mod tab;
 
@@ -22,6 +23,7 @@ enum Command {
     Tab(tab::Arguments),
     Index(index::Arguments),
     Search(search::Arguments),
+    Qa(qa::Arguments),
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<(), Error> {
@@ -30,5 +32,6 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Error> {
         Command::Tab(arguments) => tab::run(arguments),
         Command::Index(arguments) => index::run(arguments),
         Command::Search(arguments) => search::run(arguments),
+        Command::Qa(arguments) => qa::run(arguments),
     }
 }

@@ -5,8 +5,9 @@ use std::{collections::BTreeMap, fmt};
 use serde::{Deserialize, Serialize};
 
 use crate::{
+    altimetry::ShotFilter,
     footprints::{AsRead, Footprint, Footprints},
-    pds::pedr::{Complaint, Reason},
+    pds::pedr::{Complaint, Reason, SpoiledShots},
 };
 
 /// Why a shot inside a window was rejected; the first that applies counts.
@@ -25,6 +26,30 @@ pub enum ShotRejection {
     Attitude,
     /// Off-nadir angle too large.
     OffNadir,
+}
+
+impl ShotRejection {
+    /// Why a shot is rejected by `filter`, or by what is spoiled in its frame.
+    #[must_use]
+    pub fn of(shot: &Footprint, spoiled: &SpoiledShots, filter: &ShotFilter) -> Option<Self> {
+        let tests = [
+            (Self::NoReturn, shot.range_m > 0.0),
+            (Self::Spoiled, !spoiled.contains(shot.shot)),
+            (Self::Class, filter.classes.contains(&shot.class)),
+            (Self::Channel, filter.channels.contains(&shot.channel)),
+            (
+                Self::Attitude,
+                filter.attitude_flags.contains(&shot.attitude_flag),
+            ),
+            (
+                Self::OffNadir,
+                shot.off_nadir_rad.abs() <= filter.off_nadir_max_rad,
+            ),
+        ];
+        tests
+            .into_iter()
+            .find_map(|(reason, passed)| (!passed).then_some(reason))
+    }
 }
 
 impl fmt::Display for ShotRejection {
