@@ -61,9 +61,9 @@ fn lead(ranges: &ArchiveRanges, judgement: &Judgement) -> String {
     );
     let words = format!(
         "{} shots were checked: measured range minus distance from the kernels’ spacecraft to the footprint, time tags corrected \
-         by {:+.3} s. A profile is what one file has of one revolution.",
+         by {} s. A profile is what one file has of one revolution.",
         grouped(ranges.sum(|file| file.shots)),
-        ranges.clock.correction_s(),
+        label(ranges.clock.correction_s(), 3),
     );
     let body = paragraph(&words) + &list(&judgement.reasons) + &list(&judgement.remarks);
     verdict(tone, &headline, &body)
@@ -236,7 +236,8 @@ fn over_time(ranges: &ArchiveRanges) -> Result<String> {
         "Clock correction over time".to_owned(),
         format!(
             "Correction of time tags by which the ranges of a profile spread least, where it is known to {KNOWN_S} s; the level \
-             line is the one that was used, {used_s:+.3} s."
+             line is the one that was used, {} s.",
+            label(used_s, 3)
         ),
         "days since the first profile",
         vec![Panel {
@@ -266,7 +267,7 @@ fn dots(label: &str, colour: usize, points: Vec<(f64, f64)>) -> Series {
 
 fn over_off_nadir(ranges: &ArchiveRanges) -> Result<String> {
     let mut table = Table::new(
-        "Range − distance by off-nadir angle, all shots but outliers of their profiles",
+        "Range − distance by off-nadir angle: profiles within the limits, without outliers",
         &[
             Column::Text("off nadir"),
             Column::Number("shots"),
@@ -290,20 +291,30 @@ fn over_off_nadir(ranges: &ArchiveRanges) -> Result<String> {
         ];
         table.row(true, cells);
     }
-    let checked = ranges.profiles().filter(|of| of.shots > 0);
-    let points: Vec<(f64, f64)> = checked
-        .map(|of| {
-            let off_nadir_deg = of.off_nadir_rad[0] / RADIANS_PER_DEGREE;
-            (off_nadir_deg, of.mean_without_outliers_m)
-        })
-        .collect();
+    let points = |beyond: bool| -> Vec<(f64, f64)> {
+        let checked = ranges.profiles().filter(|of| of.shots > 0);
+        let points: Vec<(f64, f64)> = checked
+            .filter(|of| of.invalid_because.is_empty() != beyond)
+            .map(|of| {
+                let off_nadir_deg = of.off_nadir_rad[0] / RADIANS_PER_DEGREE;
+                (off_nadir_deg, of.mean_without_outliers_m)
+            })
+            .collect();
+        thinned(&points, PROFILES_DRAWN)
+    };
     let plot = Plot::of(
         "Profiles by off-nadir angle".to_owned(),
         "Mean of range − distance without outliers against the mean off-nadir angle of each profile.".to_owned(),
         "off nadir, degrees",
         vec![Panel::of(
             "mean, m",
-            vec![dots("profiles", 0, thinned(&points, PROFILES_DRAWN))],
+            vec![
+                dots("within the limits", 0, points(false)),
+                Series {
+                    style: Style::Crosses,
+                    ..dots("beyond a limit", 0, points(true))
+                },
+            ],
         )],
     );
     Ok(format!(
@@ -428,8 +439,8 @@ fn how(ranges: &ArchiveRanges) -> String {
         ranges.trajectory_error_m()
     );
     let clock = format!(
-        "Time tags are corrected by {:+.3} s. {}",
-        ranges.clock.correction_s(),
+        "Time tags are corrected by {} s ({}).",
+        label(ranges.clock.correction_s(), 3),
         ranges.clock.source
     );
     [

@@ -219,7 +219,7 @@ impl PlannedFile {
         let mut random = Random::new(seed, &format!("archive day {day}"));
         let bad = match day % BAD_EVERY {
             0 => Some(Badness::RangeM(6.0)),
-            1 => Some(Badness::TimeS(0.4)),
+            1 => Some(Badness::TimeS(0.3)),
             2 => Some(Badness::OrbitM(30.0)),
             _ => None,
         };

@@ -53,7 +53,7 @@ struct Document<'a> {
     kernels: &'a [KernelUsed],
     /// How spacecraft positions were taken from the kernels.
     positions: Positions,
-    /// Shots by off-nadir angle, outliers left out.
+    /// Shots of profiles within the limits by off-nadir angle, outliers left out.
     off_nadir: Vec<OffNadirDocument>,
     /// Files that were checked.
     files: Vec<FileDocument<'a>>,

@@ -95,7 +95,7 @@ pub struct FileRanges {
     pub complaint_count: u64,
     /// The first of them.
     pub complaints: Vec<String>,
-    /// By off-nadir angle, the smallest first.
+    /// Shots of profiles within the limits by off-nadir angle, the smallest first.
     pub off_nadir: Vec<OffNadirBin>,
     /// Largest error of the tabulated trajectory against the kernels, metres.
     pub trajectory_error_m: f64,
@@ -293,10 +293,13 @@ impl<'a> FileCheck<'a> {
             profile.part = u32::try_from(earlier + 1).unwrap_or(u32::MAX);
             profile.file.clone_from(&self.found.file);
             self.found.shots += u64::from(profile.shots);
-            self.found.profiles.push(profile);
-            for (sum, bin) in self.found.off_nadir.iter_mut().zip(&bins) {
-                sum.add(bin);
+            // One bad orbit would decide the figures of all others.
+            if profile.invalid_because.is_empty() {
+                for (sum, bin) in self.found.off_nadir.iter_mut().zip(&bins) {
+                    sum.add(bin);
+                }
             }
+            self.found.profiles.push(profile);
         }
     }
 

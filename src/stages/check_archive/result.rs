@@ -93,7 +93,7 @@ impl ArchiveRanges {
         self.files.iter().map(|file| of(&file.found)).sum()
     }
 
-    /// All shots by off-nadir angle.
+    /// Shots of profiles within the limits by off-nadir angle.
     #[must_use]
     pub fn off_nadir(&self) -> Vec<OffNadirBin> {
         let mut sums = OffNadirBin::all();
