@@ -3,7 +3,7 @@
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use crate::frames::MarsDatum;
+use crate::{frames::MarsDatum, time::Et};
 
 /// The clock bias of MOLA: how shot tags become shot times.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
@@ -58,6 +58,16 @@ impl MolaClock {
     #[must_use]
     pub const fn moves_spacecraft(&self) -> bool {
         matches!(self.scope, BiasScope::SpkLookup | BiasScope::Both)
+    }
+
+    /// The instant at which the spacecraft's position belongs to a shot with this tag, ET seconds.
+    #[must_use]
+    pub fn spacecraft_time(&self, tag_s: f64) -> Et {
+        Et::from_seconds(if self.moves_spacecraft() {
+            tag_s + self.correction_s()
+        } else {
+            tag_s
+        })
     }
 
     /// Whether Mars turns between leaving the file's datum and entering IAU 2000.

@@ -12,7 +12,7 @@ mod lunar_pair;
 use std::fs;
 
 use areograph::{
-    frames::Position, geom::statistics::Summary, stages::check_ranges::range_residual_m,
+    frames::Position, geom::range_residuals::range_residual_m, geom::statistics::Summary,
 };
 use lunar_pair::{FOLDER, inertial_position, moon_matrix, shots, times};
 use serde_json::Value;

@@ -2,6 +2,7 @@
 
 mod index;
 mod info;
+mod qa;
 mod search;
 #[cfg(feature = "sql")]
 mod sql;
@@ -24,6 +25,7 @@ enum Command {
     Tab(tab::Arguments),
     Index(index::Arguments),
     Search(search::Arguments),
+    Qa(qa::Arguments),
     #[cfg(feature = "sql")]
     Sql(sql::Arguments),
 }
@@ -34,6 +36,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Error> {
         Command::Tab(arguments) => tab::run(arguments),
         Command::Index(arguments) => index::run(arguments),
         Command::Search(arguments) => search::run(arguments),
+        Command::Qa(arguments) => qa::run(arguments),
         #[cfg(feature = "sql")]
         Command::Sql(arguments) => sql::run(arguments),
     }

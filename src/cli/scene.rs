@@ -8,7 +8,8 @@ use super::output;
 use crate::{
     error::Error,
     scene::{
-        Roughness, SceneErrors, SceneOptions, write_plane_scene, write_scene, write_scene_along,
+        ArchiveOptions, Roughness, SceneErrors, SceneOptions, write_archive, write_plane_scene,
+        write_scene, write_scene_along,
     },
     units::SECONDS_PER_DAY,
 };
@@ -51,6 +52,13 @@ pub(super) struct Arguments {
     /// A net of rectified pictures for `areograph triangulate` instead of a mission.
     #[arg(long, conflicts_with_all = ["along", "realistic", "day_s"])]
     plane: bool,
+    /// An archive of so many PEDR files, about a day each, with its kernels, instead of a mission: what
+    /// `areograph pedr` reads.
+    #[arg(long, value_name = "FILES", conflicts_with_all = ["along", "realistic", "day_s", "plane"])]
+    days: Option<u32>,
+    /// The same, of about so many gigabytes.
+    #[arg(long, value_name = "GB", conflicts_with_all = ["along", "realistic", "day_s", "plane", "days"])]
+    gb: Option<f64>,
     /// With --along: labels of images to put into the site file.
     #[arg(long, value_name = "FILE", requires = "along")]
     label: Vec<PathBuf>,
@@ -65,6 +73,14 @@ enum Ground {
 }
 
 impl Arguments {
+    /// The archive that is asked for, if one is.
+    fn archive(&self) -> Option<ArchiveOptions> {
+        let seed = self.seed;
+        let of_size = || Some(ArchiveOptions::of_size(seed, self.gb?));
+        let of_days = self.days.map(|days| ArchiveOptions { seed, days });
+        of_days.or_else(of_size)
+    }
+
     fn errors(&self) -> SceneErrors {
         if !self.realistic {
             return SceneErrors::demo();
@@ -89,6 +105,10 @@ impl Arguments {
 pub(super) fn run(arguments: &Arguments) -> Result<(), Error> {
     if arguments.plane {
         output::line(write_plane_scene(&arguments.directory, arguments.seed)?);
+        return Ok(());
+    }
+    if let Some(archive) = arguments.archive() {
+        output::line(write_archive(&arguments.directory, &archive)?);
         return Ok(());
     }
     let options = SceneOptions {

@@ -4,6 +4,7 @@
 //! `flow/site.rs` is one description of it, read top to bottom. A driver says what becomes of each stage: a run makes or
 //! keeps its output, a plan looks whether it would be kept, a check runs what tells whether a run can succeed.
 
+mod archive;
 mod bounds;
 mod check;
 mod choice;
@@ -24,6 +25,9 @@ mod run;
 mod site;
 mod sites;
 
+pub use archive::{
+    ArchiveOutcome, ArchiveProgress, ArchiveRequest, archive_filter, archive_limits, check_archive,
+};
 pub use check::{Checked, check_site, required_by_site, rival_sets};
 pub use choice::{ChooseKernels, KernelChoice, RivalKernelSets};
 pub use compare::{

@@ -18,6 +18,7 @@ pub mod oriented_camera;
 pub mod plane;
 pub mod polynomial;
 pub mod pushbroom;
+pub mod range_residuals;
 pub mod robust;
 pub mod statistics;
 pub mod surface;

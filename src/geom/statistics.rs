@@ -94,25 +94,27 @@ pub fn largest(values: impl IntoIterator<Item = f64>) -> Option<f64> {
     values.into_iter().reduce(larger)
 }
 
-fn median(sorted: &[f64]) -> f64 {
-    let middle = sorted.len() / 2;
-    if sorted.len().is_multiple_of(2) {
-        0.5 * (sorted[middle - 1] + sorted[middle])
-    } else {
-        sorted[middle]
+/// The middle of at least one value, the mean of both middles of an even number; their order is lost.
+fn median(values: &mut [f64]) -> f64 {
+    let middle = values.len() / 2;
+    let (below, upper, _) = values.select_nth_unstable_by(middle, f64::total_cmp);
+    let upper = *upper;
+    // Below the upper one of two middles, the lower one is the largest.
+    let lower = below.iter().copied().max_by(f64::total_cmp);
+    match lower {
+        Some(lower) if values.len().is_multiple_of(2) => 0.5 * (lower + upper),
+        _ => upper,
     }
 }
 
 /// Median and normalised median absolute deviation of at least one value.
 fn median_and_nmad(values: &[f64]) -> (f64, f64) {
-    let mut sorted = values.to_vec();
-    sorted.sort_by(f64::total_cmp);
-    let middle = median(&sorted);
-    for value in &mut sorted {
+    let mut rest = values.to_vec();
+    let middle = median(&mut rest);
+    for value in &mut rest {
         *value = (*value - middle).abs();
     }
-    sorted.sort_by(f64::total_cmp);
-    (middle, NORMAL_MAD * median(&sorted))
+    (middle, NORMAL_MAD * median(&mut rest))
 }
 
 /// Marks residuals in metres farther from the median than `sigma` robust standard deviations.

@@ -3,6 +3,7 @@
 use std::fmt::Write as _;
 
 use super::{
+    archive::{ARCHIVE_PRODUCTS, SHOTS},
     net::NET_PRODUCTS,
     product::{Content, Declaration},
     registry::PRODUCTS,
@@ -14,12 +15,7 @@ use crate::schema::DocumentSchema;
 #[must_use]
 pub fn schemas() -> Vec<DocumentSchema> {
     let mut schemas: Vec<DocumentSchema> = Vec::new();
-    let of_nets = NET_PRODUCTS.iter().map(|product| &product.content);
-    for content in PRODUCTS
-        .iter()
-        .map(|product| &product.content)
-        .chain(of_nets)
-    {
+    for content in contents() {
         if let Content::Document(schema) = content {
             let schema = schema();
             if !schemas.contains(&schema) {
@@ -28,6 +24,15 @@ pub fn schemas() -> Vec<DocumentSchema> {
         }
     }
     schemas
+}
+
+/// What says how each of all files is built.
+fn contents() -> impl Iterator<Item = &'static Content> {
+    let of_nets = NET_PRODUCTS.iter().map(|product| &product.content);
+    let of_archives = ARCHIVE_PRODUCTS.iter().map(|product| &product.content);
+    let of_sites = PRODUCTS.iter().map(|product| &product.content);
+    let all = of_sites.chain(of_nets).chain(of_archives);
+    all.chain([&SHOTS.content])
 }
 
 /// `docs/products.md`: every product, and the columns of every table.
@@ -61,15 +66,7 @@ pub fn documentation() -> String {
         before their names below.\n\n\
         | file | what it is | for | rows | schema |\n|---|---|---|---|---|\n";
     for product in NET_PRODUCTS {
-        let _infallible = writeln!(
-            text,
-            "| `{}` | {} | {} | {} | {} |",
-            product.path,
-            product.what,
-            product.readers,
-            product.rows,
-            schema_link(product),
-        );
+        text += &line_of(product);
     }
     // The CSV files have the columns of the Parquet files.
     for product in NET_PRODUCTS
@@ -78,7 +75,34 @@ pub fn documentation() -> String {
     {
         text += &columns_of(product, "net: ");
     }
+    text += "\n## Archives of PEDR files\n\n\
+        Products of `areograph pedr qa`, in the folder `--out`; `manifest.json` comes last here too. `archive:` stands \
+        before their names below.\n\n\
+        | file | what it is | for | rows | schema |\n|---|---|---|---|---|\n";
+    text += &line_of(&SHOTS);
+    for product in ARCHIVE_PRODUCTS {
+        text += &line_of(product);
+    }
+    text += &columns_of(&SHOTS, "archive: ");
+    for product in ARCHIVE_PRODUCTS
+        .iter()
+        .filter(|product| product.path.contains(".parquet"))
+    {
+        text += &columns_of(product, "archive: ");
+    }
     text
+}
+
+/// A product in a list of products that there is always one of.
+fn line_of<W>(product: &Declaration<W>) -> String {
+    format!(
+        "| `{}` | {} | {} | {} | {} |\n",
+        product.path,
+        product.what,
+        product.readers,
+        product.rows,
+        schema_link(product),
+    )
 }
 
 /// The columns of a table; nothing for other files.
@@ -128,12 +152,7 @@ mod tests {
 
     #[test]
     fn names_of_our_columns_end_in_their_unit() {
-        let of_nets = NET_PRODUCTS.iter().map(|product| &product.content);
-        let contents = PRODUCTS
-            .iter()
-            .map(|product| &product.content)
-            .chain(of_nets);
-        let columns = contents.filter_map(|content| match content {
+        let columns = contents().filter_map(|content| match content {
             Content::Table(columns) => Some(columns()),
             _ => None,
         });

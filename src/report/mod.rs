@@ -16,6 +16,7 @@
 )]
 
 mod adjustment;
+mod archive;
 mod clocks_and_datum;
 mod compare;
 mod corrections;
@@ -46,6 +47,7 @@ mod uncertainty;
 
 use crate::{error::Result, products::SiteProducts};
 
+pub use archive::archive_page;
 pub use compare::{KernelComparison, comparison_page};
 pub use diff::difference_page;
 pub use fidelity::{

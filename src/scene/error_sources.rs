@@ -95,6 +95,9 @@ pub struct AltimeterErrors {
     pub range_step_m: f64,
     /// Diameter of the spot whose mean range is measured, metres.
     pub spot_m: f64,
+    /// Whether files hold what the instrument tells of its echoes: channel 4, energies, pulse widths, thresholds.
+    #[serde(skip)]
+    pub tells_echoes: bool,
 }
 
 /// The ground around the sites.
@@ -158,6 +161,7 @@ impl SceneErrors {
                 shot_noise_m: 0.0,
                 range_step_m: 0.0,
                 spot_m: 0.0,
+                tells_echoes: false,
             },
             relief: Relief::Gentle,
             tie_noise_px: 1.0,
@@ -203,6 +207,7 @@ impl SceneErrors {
                 shot_noise_m: 1.0,
                 range_step_m: 0.375,
                 spot_m: 75.0,
+                tells_echoes: true,
             },
             relief: Relief::SelfAffine(roughness),
             tie_noise_px: 1.0,

@@ -8,6 +8,7 @@ use std::{
 use super::{
     arc::Arc,
     files::put,
+    orbit::Orbit,
     plan::PlannedImage,
     sun::mars_state_from_sun,
     versions::{FAMILIES, Version},
@@ -68,6 +69,13 @@ const TEXT_KERNELS: [(&str, &str); 7] = [
 ];
 /// How many of them a metakernel loads; the other Mars models would replace the first.
 const LOADED: usize = 4;
+
+/// How many of them an archive's metakernel loads: there are no images.
+const ARCHIVE_LOADED: usize = 3;
+/// Its name.
+pub(super) const ARCHIVE_METAKERNEL: &str = "archive.tm";
+/// The orbit of an archive reaches so far beyond its files, seconds.
+const ARCHIVE_MARGIN_S: f64 = 60.0;
 
 /// File name of the orbit of one family.
 fn spk_name(family: &str) -> String {
@@ -223,7 +231,13 @@ pub(super) fn write_orbits(folder: &Path, arcs: &[Arc], seed: u64) -> Result<()>
             format!("{SYNTHETIC}\nOrbit of family {family}; the truth is that of family gsfc.");
         write_spk(&folder.join(spk_name(family)), &segments, &comment)?;
     }
-    write_planets(folder, arcs)
+    match (arcs.first(), arcs.last()) {
+        (Some(first), Some(last)) => {
+            let span = Interval::new(first.frames.start, last.frames.stop);
+            write_planets(folder, span)
+        }
+        _ => Ok(()),
+    }
 }
 
 /// The three versions of an arc's orbit, in the order of [`FAMILIES`].
@@ -233,13 +247,9 @@ pub(super) fn versions(arc: &Arc, seed: u64) -> [Version; 3] {
 }
 
 /// Mars around the Sun; the Sun stands at the barycentre, and Mars at its own, for want of moons.
-fn write_planets(folder: &Path, arcs: &[Arc]) -> Result<()> {
+fn write_planets(folder: &Path, span: Interval) -> Result<()> {
     let days = |days: f64| days * SECONDS_PER_DAY;
-    let (Some(first), Some(last)) = (arcs.first(), arcs.last()) else {
-        return Ok(());
-    };
-    let span = Interval::new(first.frames.start, last.frames.stop).padded(days(4.0));
-    let epochs = epochs(span, days(1.0));
+    let epochs = epochs(span.padded(days(4.0)), days(1.0));
     let at_rest = State {
         position: Position::new(nalgebra::Vector3::zeros()),
         velocity_m_s: nalgebra::Vector3::zeros(),
@@ -281,6 +291,51 @@ fn write_planets(folder: &Path, arcs: &[Arc]) -> Result<()> {
         "{SYNTHETIC}\nMars by Standish's approximate elements; the Sun rests at the solar system barycentre."
     );
     write_spk(&folder.join(PLANETS_NAME), &segments, &comment)
+}
+
+/// Writes the kernels of an archive: text ones, the orbit over each of `spans`, Mars and the Sun, a metakernel.
+pub(super) fn write_archive_kernels(
+    folder: &Path,
+    orbit: &Orbit,
+    spans: &[Interval],
+) -> Result<()> {
+    let texts = &TEXT_KERNELS[..ARCHIVE_LOADED];
+    for (name, text) in texts {
+        put(&folder.join(name), text)?;
+    }
+    let spk = spk_name("archive");
+    let names = texts.iter().map(|(name, _)| (*name).to_owned());
+    let names: Vec<String> = names
+        .chain([PLANETS_NAME.to_owned(), spk.clone()])
+        .collect();
+    let metakernel = metakernel("archive", &names);
+    put(&folder.join(ARCHIVE_METAKERNEL), &metakernel)?;
+    let tables: Vec<(Vec<Et>, Vec<State>)> = spans
+        .iter()
+        .map(|span| {
+            let epochs = epochs(span.padded(ARCHIVE_MARGIN_S), SPK_STEP_S);
+            let states = epochs.iter().map(|et| kernel_state(&orbit.state(*et)));
+            let states = states.collect();
+            (epochs, states)
+        })
+        .collect();
+    let segments: Vec<SpkSegment> = tables
+        .iter()
+        .map(|(epochs, states)| SpkSegment {
+            target: SPACECRAFT.naif,
+            centre: NAIF_MARS_BARYCENTRE,
+            name: "archive",
+            degree: SPK_DEGREE,
+            epochs,
+            states,
+        })
+        .collect();
+    let comment = format!("{SYNTHETIC}\nThe orbit of an invented archive of PEDR files.");
+    write_spk(&folder.join(spk), &segments, &comment)?;
+    match (spans.first(), spans.last()) {
+        (Some(first), Some(last)) => write_planets(folder, Interval::new(first.start, last.stop)),
+        _ => Ok(()),
+    }
 }
 
 fn kernel_state(state: &super::orbit::OrbitState) -> State {

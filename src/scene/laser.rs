@@ -28,14 +28,14 @@ use crate::{
 /// Seconds of a frame of 20 shots.
 pub(super) const FRAME_S: f64 = 2.0;
 /// Seconds between shots.
-const SHOT_S: f64 = 0.1;
+pub(super) const SHOT_S: f64 = 0.1;
 /// Clock of MOLA, hertz: shots lie exactly 0.1 s apart.
-const CLOCK_HZ: f64 = 1e8;
+pub(super) const CLOCK_HZ: f64 = 1e8;
 /// MOLA's orbit model number; from 3 on readers use parallax and crossover.
 const ORBIT_QUALITY: u16 = 3;
 /// Share of half-frames that see clouds, and of shots that come to nothing.
-const CLOUD_SHARE: f64 = 0.02;
-const MISSING_SHARE: f64 = 0.005;
+pub(super) const CLOUD_SHARE: f64 = 0.02;
+pub(super) const MISSING_SHARE: f64 = 0.005;
 /// Amplitude, metres, and period, seconds, of the crossover residual.
 pub(super) const CROSSOVER_AMPLITUDE_M: f64 = 0.8;
 pub(super) const CROSSOVER_PERIOD_S: f64 = 3_000.0;

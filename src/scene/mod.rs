@@ -8,9 +8,11 @@
 //! | `attitude`, `arc` | pointing, and orbit and attitude solved so that an image shows its site |
 //! | `terrain`, `roughness`, `laser` | the ground, and laser shots on it as a PEDR frame tells them |
 //! | `context` | wide-angle images around two of the six, a fourth site |
+//! | `telemetry` | what the instrument tells of its echoes besides ranges |
+//! | `archive`, `archive_frames` | PEDR files of any number of days, with kernels to check them by |
 //! | `ties` | places that two images show, in images that were truly taken elsewhere and at other times |
 //! | `kernels`, `pedr`, `sites`, `truth` | the files |
-//! | `mission`, `along` | the two entry points |
+//! | `mission`, `along` | the entry points of a mission |
 //!
 //! Injected errors: attitude stands 1.15 s early in the C-kernel, laser time tags are 0.117 s late,
 //! version K files are in IAU 1991; tie points see images that were exposed some lines off their labels,
@@ -18,6 +20,8 @@
 
 mod along;
 mod arc;
+mod archive;
+mod archive_frames;
 mod attitude;
 mod context;
 mod drawn;
@@ -36,6 +40,7 @@ mod random;
 mod roughness;
 mod sites;
 mod sun;
+mod telemetry;
 mod terrain;
 mod ties;
 mod truth;
@@ -47,6 +52,7 @@ use std::{
 };
 
 pub use along::write_scene_along;
+pub use archive::{ArchiveOptions, ArchiveSummary, write_archive};
 pub use error::SceneError;
 pub use error_sources::{
     AltimeterErrors, AttitudeErrors, Jitter, Misregistration, PositionErrors, Relief, Roughness,

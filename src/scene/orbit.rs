@@ -60,6 +60,17 @@ impl Orbit {
         (MARS_GM_M3_S2 / SEMI_MAJOR_AXIS_M.powi(3)).sqrt()
     }
 
+    /// Seconds of a revolution.
+    pub(super) fn period_s() -> f64 {
+        std::f64::consts::TAU / Self::mean_motion_rad_s()
+    }
+
+    /// Seconds since the southernmost point was last passed at `et`.
+    pub(super) fn since_southernmost_s(&self, et: Et) -> f64 {
+        let anomaly_rad = self.mean_anomaly(et).rem_euclid(std::f64::consts::TAU);
+        anomaly_rad / Self::mean_motion_rad_s()
+    }
+
     /// Mean anomaly at `et`, radians, growing without wrapping.
     fn mean_anomaly(&self, et: Et) -> f64 {
         self.mean_anomaly_rad + Self::mean_motion_rad_s() * et.since(self.epoch)

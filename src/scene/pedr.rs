@@ -7,6 +7,8 @@ use rayon::prelude::*;
 use super::{
     arc::Flight,
     laser::{Echo, FRAME_S, Frame, FrameRequest, LaserErrors, Shot, fly_frame},
+    random::mix,
+    telemetry,
     terrain::Terrain,
     truth::{FileTruth, KeptShot},
 };
@@ -25,6 +27,9 @@ const BLOCK: usize = 4_096;
 const FRAME_MODEL_LIMIT_M: f64 = 0.2;
 /// Frames below this off-nadir angle point at nadir, radians.
 const NADIR_MAX_RAD: f64 = 0.05 * RADIANS_PER_DEGREE;
+
+/// What labels say of the files.
+pub(super) const NOTE: &str = "SYNTHETIC: written by areograph scene, not from mission data";
 
 /// What a file holds.
 pub(super) struct PedrRequest<'a> {
@@ -74,7 +79,7 @@ pub(super) fn write_pedr(
         product_id: request.name.to_uppercase(),
         software_version: 7.25,
         datum: request.datum,
-        note: "SYNTHETIC: written by areograph scene, not from mission data".to_owned(),
+        note: NOTE.to_owned(),
     };
     let mut writer = PedrWriter::create(&path, &label)?;
     let mut counts = FileTruth {
@@ -102,7 +107,11 @@ pub(super) fn write_pedr(
                     errors: &request.errors,
                 };
                 let frame = fly_frame(flight, terrain, &frame_request)?;
-                let record = Record::from_frame(&frame.values).in_file(&path)?;
+                let mut record = Record::from_frame(&frame.values).in_file(&path)?;
+                if request.errors.altimeter.tells_echoes {
+                    let seed = mix(request.seed) ^ frame_request.index << 8;
+                    telemetry::enter(&mut record, seed);
+                }
                 Ok((frame, record))
             })
             .collect::<Result<_>>()?;

@@ -9,7 +9,7 @@ use super::search_footprints::SearchResult;
 use crate::{
     altimetry::{BiasScope, MolaClock, TagSign},
     error::Result,
-    footprints::{AsRead, Footprints, SourceFile},
+    footprints::{AsRead, Footprint, Footprints, SourceFile},
     frames::{MarsDatum, MarsIau2000},
     geom::{
         ellipsoid::{Spherical, spherical_to_xyz_m},
@@ -89,29 +89,17 @@ pub fn convert_datum(footprints: Footprints<AsRead>, clock: &MolaClock) -> Conve
         .iter()
         .map(|file| note(&file.name, file.datum, turns.then_some(turn_s)))
         .collect();
-    let datums: Vec<MarsDatum> = footprints.files.iter().map(|file| file.datum).collect();
+    let datums = footprints.files.iter();
+    let datums: Vec<DatumTurn> = datums
+        .map(|file| DatumTurn::new(file.datum, clock))
+        .collect();
     let mut converted = footprints.declare::<MarsIau2000>();
     let before = [&converted.longitude_rad, &converted.latitude_rad].map(Clone::clone);
     let moved: Vec<Option<[(f64, f64); 2]>> = (0..converted.len())
         .into_par_iter()
         .map(|row| {
             let shot = converted.row(row);
-            let datum = datums[usize::from(shot.file)];
-            if datum == MarsDatum::Iau2000 && !turns {
-                return None;
-            }
-            let out_at = Et::from_seconds(shot.et_tag_s);
-            let move_direction = |longitude_rad, latitude_rad| {
-                let direction = spherical_to_xyz_m(longitude_rad, latitude_rad, 1.0);
-                let there =
-                    convert_vector::<MarsIau2000>(direction, datum, out_at, out_at.plus(turn_s));
-                let there = Spherical::from_xyz_m(&there.xyz_m);
-                (there.longitude_rad, there.latitude.0)
-            };
-            Some([
-                move_direction(shot.longitude_rad, shot.latitude_rad),
-                move_direction(shot.spacecraft_longitude_rad, shot.spacecraft_latitude_rad),
-            ])
+            datums[usize::from(shot.file)].moved(&shot)
         })
         .collect();
     for (row, moved) in moved.into_iter().enumerate() {
@@ -127,6 +115,60 @@ pub fn convert_datum(footprints: Footprints<AsRead>, clock: &MolaClock) -> Conve
         files: shifts(&converted, &before),
         footprints: converted,
         notes,
+    }
+}
+
+/// How the coordinates of a file go into IAU 2000.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct DatumTurn {
+    datum: MarsDatum,
+    turn_s: f64,
+}
+
+impl DatumTurn {
+    /// For a file in `datum`, as [`convert_datum`] describes it.
+    #[must_use]
+    pub fn new(datum: MarsDatum, clock: &MolaClock) -> Self {
+        let turn_s = if clock.moves_rotation() {
+            clock.correction_s()
+        } else {
+            0.0
+        };
+        Self { datum, turn_s }
+    }
+
+    /// The shot in IAU 2000.
+    #[must_use]
+    pub fn applied(&self, shot: Footprint) -> Footprint {
+        let Some([ground, spacecraft]) = self.moved(&shot) else {
+            return shot;
+        };
+        Footprint {
+            longitude_rad: ground.0,
+            latitude_rad: ground.1,
+            spacecraft_longitude_rad: spacecraft.0,
+            spacecraft_latitude_rad: spacecraft.1,
+            ..shot
+        }
+    }
+
+    /// Longitude and latitude of footprint and spacecraft in IAU 2000; nothing where they are that already.
+    fn moved(&self, shot: &Footprint) -> Option<[(f64, f64); 2]> {
+        if self.datum == MarsDatum::Iau2000 && self.turn_s.abs() <= 0.0 {
+            return None;
+        }
+        let out_at = Et::from_seconds(shot.et_tag_s);
+        let move_direction = |longitude_rad, latitude_rad| {
+            let direction = spherical_to_xyz_m(longitude_rad, latitude_rad, 1.0);
+            let into_at = out_at.plus(self.turn_s);
+            let there = convert_vector::<MarsIau2000>(direction, self.datum, out_at, into_at);
+            let there = Spherical::from_xyz_m(&there.xyz_m);
+            (there.longitude_rad, there.latitude.0)
+        };
+        Some([
+            move_direction(shot.longitude_rad, shot.latitude_rad),
+            move_direction(shot.spacecraft_longitude_rad, shot.spacecraft_latitude_rad),
+        ])
     }
 }
 
@@ -188,7 +230,7 @@ mod tests {
     use super::*;
     use crate::{
         altimetry::{BiasScope, TagSign},
-        footprints::{Footprint, SourceFile},
+        footprints::SourceFile,
     };
 
     fn footprints(datum: MarsDatum) -> Footprints<AsRead> {

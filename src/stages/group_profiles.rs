@@ -15,12 +15,6 @@ use crate::{
     time::{Et, Interval},
 };
 
-/// A pause longer than this starts another profile of the same orbit, seconds.
-///
-/// An orbit crosses a wide window twice, on its day and its night side; between the two lie tens of
-/// minutes, while clouds and lost packets make pauses of seconds.
-const PAUSE_S: f64 = 300.0;
-
 /// Shots of one orbit inside one window, in order of time.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Profile {
@@ -45,6 +39,14 @@ pub struct SimultaneousImage {
     pub image: usize,
     /// Shots of the profile fired while the image was exposed.
     pub shots: u32,
+}
+
+impl Profile {
+    /// A pause longer than this starts another profile of the same orbit, seconds.
+    ///
+    /// An orbit crosses a wide window twice, on its day and its night side; between the two lie tens of
+    /// minutes, while clouds and lost packets make pauses of seconds.
+    pub const PAUSE_S: f64 = 300.0;
 }
 
 stage_inputs! {
@@ -94,7 +96,7 @@ pub fn group_profiles(
         let crossings = rows.chunk_by(|a, b| {
             let (a, b) = (*a as usize, *b as usize);
             footprints.orbit[a] == footprints.orbit[b]
-                && footprints.et_s[b] - footprints.et_s[a] <= PAUSE_S
+                && footprints.et_s[b] - footprints.et_s[a] <= Profile::PAUSE_S
         });
         let first_of_window = profiles.len();
         for rows in crossings {

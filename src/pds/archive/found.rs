@@ -5,8 +5,9 @@ use std::{collections::BTreeMap, fmt};
 use serde::{Deserialize, Serialize};
 
 use crate::{
+    altimetry::ShotFilter,
     footprints::{AsRead, Footprint, Footprints},
-    pds::pedr::{Complaint, Reason},
+    pds::pedr::{Complaint, Reason, SpoiledShots},
 };
 
 /// Why a shot inside a window was rejected; the first that applies counts.
@@ -25,6 +26,41 @@ pub enum ShotRejection {
     Attitude,
     /// Off-nadir angle too large.
     OffNadir,
+}
+
+impl ShotRejection {
+    /// Why a shot is rejected by what is spoiled in its frame, or by `filter`; none takes every shot with a return.
+    #[must_use]
+    pub fn of(
+        shot: &Footprint,
+        spoiled: &SpoiledShots,
+        filter: Option<&ShotFilter>,
+    ) -> Option<Self> {
+        let passes = |test: &dyn Fn(&ShotFilter) -> bool| filter.is_none_or(test);
+        let tests = [
+            (Self::NoReturn, shot.range_m > 0.0),
+            (Self::Spoiled, !spoiled.contains(shot.shot)),
+            (
+                Self::Class,
+                passes(&|filter| filter.classes.contains(&shot.class)),
+            ),
+            (
+                Self::Channel,
+                passes(&|filter| filter.channels.contains(&shot.channel)),
+            ),
+            (
+                Self::Attitude,
+                passes(&|filter| filter.attitude_flags.contains(&shot.attitude_flag)),
+            ),
+            (
+                Self::OffNadir,
+                passes(&|filter| shot.off_nadir_rad.abs() <= filter.off_nadir_max_rad),
+            ),
+        ];
+        tests
+            .into_iter()
+            .find_map(|(reason, passed)| (!passed).then_some(reason))
+    }
 }
 
 impl fmt::Display for ShotRejection {

@@ -4,14 +4,13 @@ use std::ops::Range;
 
 use super::{Found, Judged, Query, ShotRejection, Source};
 use crate::{
-    altimetry::ShotFilter,
     footprints::Footprint,
     frames::{MarsDatum, MarsIau2000},
     geom::{
         ellipsoid::{Spherical, spherical_to_xyz_m},
         mars_rotation::convert_datum,
     },
-    pds::pedr::{Frame, SHOTS, SpoiledShots, Stretch},
+    pds::pedr::{Frame, SHOTS, Stretch},
     time::Et,
 };
 
@@ -91,7 +90,7 @@ impl Scan<'_> {
             if windows.around.is_empty() {
                 continue;
             }
-            if let Some(reason) = self.reject(&shot, &spoiled) {
+            if let Some(reason) = ShotRejection::of(&shot, &spoiled, self.query.filter) {
                 *found.rejected.entry(reason).or_default() += 1;
                 continue;
             }
@@ -116,33 +115,6 @@ impl Scan<'_> {
         let direction = convert_datum::<MarsIau2000>(direction, datum, at, at);
         let spherical = Spherical::from_xyz_m(&direction.xyz_m);
         (spherical.longitude_rad, spherical.latitude.0)
-    }
-
-    fn reject(&self, shot: &Footprint, spoiled: &SpoiledShots) -> Option<ShotRejection> {
-        let passes = |test: &dyn Fn(&ShotFilter) -> bool| self.query.filter.is_none_or(test);
-        let tests = [
-            (ShotRejection::NoReturn, shot.range_m > 0.0),
-            (ShotRejection::Spoiled, !spoiled.contains(shot.shot)),
-            (
-                ShotRejection::Class,
-                passes(&|filter| filter.classes.contains(&shot.class)),
-            ),
-            (
-                ShotRejection::Channel,
-                passes(&|filter| filter.channels.contains(&shot.channel)),
-            ),
-            (
-                ShotRejection::Attitude,
-                passes(&|filter| filter.attitude_flags.contains(&shot.attitude_flag)),
-            ),
-            (
-                ShotRejection::OffNadir,
-                passes(&|filter| shot.off_nadir_rad.abs() <= filter.off_nadir_max_rad),
-            ),
-        ];
-        tests
-            .into_iter()
-            .find_map(|(reason, passed)| (!passed).then_some(reason))
     }
 }
 

@@ -9,13 +9,13 @@
 //! Geometric states only: the range is to the spacecraft's centre of mass, so there is no lever arm,
 //! and ISIS's apparent positions would be 0.14 km off.
 
+mod figures;
 mod orbit;
 mod residuals;
 mod scan;
 
 use std::sync::atomic::AtomicBool;
 
-use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
 use super::{convert_datum::Converted, group_profiles::Profile};
@@ -23,16 +23,20 @@ use crate::{
     altimetry::MolaClock,
     config::RangeCheckConfig,
     error::{Cause, Kind, Result, Stopped},
-    footprints::Footprints,
+    footprints::{Footprint, Footprints},
     frames::MarsIau2000,
-    geom::statistics::{Summary, Trend, outliers},
+    geom::{
+        range_residuals::{RangeResiduals, SpacecraftState},
+        statistics::{Summary, Trend, outliers},
+    },
     spice::{KernelView, Session, Trajectory},
     stage::{Output, Stage},
     stage_inputs,
     time::{Et, Intervals},
 };
 
-pub use residuals::{ShotResiduals, range_residual_m};
+pub use figures::RangeFigures;
+pub use residuals::ShotResiduals;
 pub use scan::BiasScan;
 
 /// Residuals of every shot, and what they say about every profile.
@@ -64,7 +68,7 @@ stage_inputs! {
 
 impl Stage for CheckRanges<'_> {
     const NAME: &'static str = "check_ranges";
-    const METHOD: u32 = 3;
+    const METHOD: u32 = 4;
     type Output = RangeCheck;
     stage_inputs!(fingerprint);
 
@@ -156,7 +160,22 @@ impl ProfileRanges {
     /// Mean distance of the file's own spacecraft from that of the kernels, metres.
     #[must_use]
     pub fn orbits_apart_m(&self) -> f64 {
-        Vector3::from(self.spacecraft_m.each_ref().map(|axis| axis.mean)).norm()
+        self.figures().orbits_apart_m()
+    }
+
+    /// The figures that are judged.
+    #[must_use]
+    pub fn figures(&self) -> RangeFigures {
+        RangeFigures {
+            n: self.range_minus_distance_m.n,
+            outliers: self.outliers,
+            mean_m: [
+                self.range_minus_distance_m.mean,
+                self.mean_without_outliers_m,
+            ],
+            decoding_m: [self.decoding_m.mean, self.decoding_without_outliers_m],
+            spacecraft_m: self.spacecraft_m.each_ref().map(|axis| axis.mean),
+        }
     }
 }
 
@@ -201,7 +220,7 @@ pub fn check_ranges(
         let first = shots.len();
         for row in &profile.rows {
             let shot = footprints.row(*row as usize);
-            let at = residuals::spacecraft_time(&shot, clock);
+            let at = clock.spacecraft_time(shot.et_tag_s);
             let (Some(position), Some(velocity_m_s)) =
                 (trajectory.position(at), trajectory.velocity_m_s(at))
             else {
@@ -211,19 +230,19 @@ pub fn check_ranges(
                 }
                 .into());
             };
-            shots.push(
-                index,
-                *row,
-                &residuals::residuals(&shot, at, &position, &velocity_m_s),
-            );
+            let spacecraft = SpacecraftState::of(at, &position, &velocity_m_s);
+            shots.push(index, *row, &RangeResiduals::of(&shot, &spacecraft));
         }
         let flags = outliers(&shots.range_minus_distance_m[first..], limits.outlier_sigma);
         shots.outlier.extend(flags);
-        let scan = scan::scan(footprints, &shots, first, trajectory, limits);
-        let mut ranges = judged(profile, &shots, first, scan, footprints, limits);
+        let kept: Vec<Footprint> = (first..shots.len())
+            .filter(|shot| !shots.outlier[*shot])
+            .map(|shot| footprints.row(shots.row[shot] as usize))
+            .collect();
+        let scan = BiasScan::of(&kept, trajectory, limits);
+        let mut ranges = statistics(profile, &shots, first, scan, footprints);
         let explain = || orbit::cause(footprints, profile, trajectory, clock, limits.orbit_max_m);
-        let apart = orbit::broken_limit(&ranges, limits.orbit_max_m, explain);
-        ranges.invalid_because.extend(apart);
+        ranges.invalid_because = ranges.figures().broken_limits(limits, explain);
         checked.push(ranges);
     }
     Ok(RangeCheck {
@@ -233,14 +252,13 @@ pub fn check_ranges(
     })
 }
 
-/// Statistics and verdict of the profile whose shots begin at `first`.
-fn judged(
+/// Statistics of the profile whose shots begin at `first`, not judged yet.
+fn statistics(
     profile: &Profile,
     shots: &ShotResiduals,
     first: usize,
     scan: Option<BiasScan>,
     footprints: &Footprints<MarsIau2000>,
-    limits: &RangeCheckConfig,
 ) -> ProfileRanges {
     let summary = |column: &[f64]| Summary::of(&column[first..]);
     let seconds: Vec<f64> = profile
@@ -256,7 +274,7 @@ fn judged(
         let kept: Vec<f64> = kept.filter(|(_, is)| !**is).map(|(m, _)| *m).collect();
         Summary::of(&kept).mean
     };
-    let mut ranges = ProfileRanges {
+    ProfileRanges {
         profile: profile.id.clone(),
         range_minus_distance_m: summary(&shots.range_minus_distance_m),
         range_minus_distance_crossover_m: summary(&shots.range_minus_distance_crossover_m),
@@ -272,51 +290,5 @@ fn judged(
         outliers: u32::try_from(outliers).unwrap_or(u32::MAX),
         scan,
         invalid_because: Vec::new(),
-    };
-    ranges.invalid_because = broken_limits(&ranges, limits);
-    ranges
-}
-
-fn broken_limits(ranges: &ProfileRanges, limits: &RangeCheckConfig) -> Vec<String> {
-    let mut broken = Vec::new();
-    let n = ranges.range_minus_distance_m.n;
-    if n < limits.shots_min {
-        broken.push(format!("{n} shots; limit at least {}", limits.shots_min));
     }
-    for (name, mean_m, with_outliers_m, limit_m) in [
-        (
-            "range − distance",
-            ranges.mean_without_outliers_m,
-            ranges.range_minus_distance_m.mean,
-            limits.mean_max_m,
-        ),
-        (
-            "range − distance to the file's own spacecraft",
-            ranges.decoding_without_outliers_m,
-            ranges.decoding_m.mean,
-            limits.decoding_max_m,
-        ),
-    ] {
-        // Written so that NaN breaks a limit.
-        if !(mean_m.abs() <= limit_m) {
-            let with = match ranges.outliers {
-                0 => String::new(),
-                outliers => {
-                    format!(" without {outliers} outliers, {with_outliers_m:.3} m with them")
-                }
-            };
-            broken.push(format!(
-                "mean of {name} {mean_m:.3} m{with}; limit ±{limit_m} m"
-            ));
-        }
-    }
-    let share = f64::from(ranges.outliers) / f64::from(n.max(1));
-    if !(share <= limits.outlier_share_max) {
-        broken.push(format!(
-            "{} outliers of {n} shots; limit {:.1} %",
-            ranges.outliers,
-            100.0 * limits.outlier_share_max
-        ));
-    }
-    broken
 }

@@ -3,10 +3,6 @@
 //! Both hold for the same shots, so what is between them is no noise: rival orbits lie tens of metres apart,
 //! another clock correction as far along the flight as the spacecraft flies in it, another datum kilometres.
 
-use super::{
-    ProfileRanges,
-    residuals::{own_spacecraft, spacecraft_time},
-};
 use crate::{
     altimetry::MolaClock,
     footprints::Footprints,
@@ -14,28 +10,11 @@ use crate::{
     geom::{
         mars_rotation::{mars_matrix, mars_rotation},
         orbit_axes::radial_along_cross,
+        range_residuals::own_spacecraft,
     },
     spice::Trajectory,
     stages::group_profiles::Profile,
 };
-
-/// Says that the two lie too far apart, and by `explain` why that may be; nothing within the limit.
-pub(super) fn broken_limit(
-    ranges: &ProfileRanges,
-    limit_m: f64,
-    explain: impl FnOnce() -> String,
-) -> Option<String> {
-    let apart_m = ranges.orbits_apart_m();
-    let [radial, along, cross] = ranges.spacecraft_m.each_ref().map(|axis| axis.mean);
-    // Written so that NaN breaks the limit.
-    (!(apart_m <= limit_m)).then(|| {
-        format!(
-            "the file's own spacecraft lies {apart_m:.0} m from that of the kernels ({radial:+.0} m up, {along:+.0} m \
-             along the flight, {cross:+.0} m across it); limit {limit_m} m: {}",
-            explain()
-        )
-    })
-}
 
 /// What would bring the two together in the middle of the profile: another datum, another clock correction, or neither.
 pub(super) fn cause(
@@ -57,7 +36,7 @@ fn together(
     limit_m: f64,
 ) -> Option<String> {
     let shot = footprints.row(*profile.rows.get(profile.rows.len() / 2)? as usize);
-    let at = spacecraft_time(&shot, clock);
+    let at = clock.spacecraft_time(shot.et_tag_s);
     let (position, velocity_m_s) = (trajectory.position(at)?, trajectory.velocity_m_s(at)?);
     let to_mars = *mars_rotation::<MarsIau2000>(at).matrix();
     let datum = footprints.files.get(usize::from(shot.file))?.datum;

@@ -8,13 +8,13 @@
 use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 
-use super::residuals::{ShotResiduals, own_spacecraft, range_residual_m, raw_footprint};
 use crate::{
     config::{RangeCheckConfig, SCAN_STEPS_MAX},
-    footprints::{Footprint, Footprints},
+    footprints::Footprint,
     frames::MarsIau2000,
     geom::{
         mars_rotation::mars_rotation,
+        range_residuals::{own_spacecraft, range_residual_m, raw_footprint},
         statistics::{Summary, Trend},
     },
     spice::Trajectory,
@@ -43,44 +43,41 @@ pub struct BiasScan {
     pub uncertainty_s: Option<f64>,
 }
 
-/// Scans the profile whose shots begin at `first`, its outliers left out.
-pub(super) fn scan(
-    footprints: &Footprints<MarsIau2000>,
-    shots: &ShotResiduals,
-    first: usize,
-    trajectory: &Trajectory,
-    limits: &RangeCheckConfig,
-) -> Option<BiasScan> {
-    let kept: Vec<Footprint> = (first..shots.len())
-        .filter(|shot| !shots.outlier[*shot])
-        .map(|shot| footprints.row(shots.row[shot] as usize))
-        .collect();
-    if kept.len() < SHOTS_MIN {
-        return None;
-    }
-    let mut scan = BiasScan {
-        correction_s: Vec::new(),
-        spread_m: Vec::new(),
-        best_s: None,
-        uncertainty_s: None,
-    };
-    for correction_s in corrections(limits) {
-        let residuals: Option<Vec<f64>> = kept
-            .iter()
-            .map(|shot| residual_m(shot, trajectory, correction_s))
-            .collect();
-        // Corrections that lead out of the kernels are left out.
-        if let Some(residuals) = residuals {
-            scan.correction_s.push(correction_s);
-            scan.spread_m
-                .push(Summary::of(&residuals).standard_deviation);
+impl BiasScan {
+    /// Scans a profile by its shots in IAU 2000, outliers left out, in the order of time; `None` for fewer than ten.
+    #[must_use]
+    pub fn of(
+        shots: &[Footprint],
+        trajectory: &Trajectory,
+        limits: &RangeCheckConfig,
+    ) -> Option<Self> {
+        if shots.len() < SHOTS_MIN {
+            return None;
         }
+        let mut scan = Self {
+            correction_s: Vec::new(),
+            spread_m: Vec::new(),
+            best_s: None,
+            uncertainty_s: None,
+        };
+        for correction_s in corrections(limits) {
+            let residuals: Option<Vec<f64>> = shots
+                .iter()
+                .map(|shot| residual_m(shot, trajectory, correction_s))
+                .collect();
+            // Corrections that lead out of the kernels are left out.
+            if let Some(residuals) = residuals {
+                scan.correction_s.push(correction_s);
+                scan.spread_m
+                    .push(Summary::of(&residuals).standard_deviation);
+            }
+        }
+        scan.best_s = best_s(&scan);
+        scan.uncertainty_s = scan
+            .best_s
+            .and_then(|best_s| uncertainty_s(shots, trajectory, best_s));
+        Some(scan)
     }
-    scan.best_s = best_s(&scan);
-    scan.uncertainty_s = scan
-        .best_s
-        .and_then(|best_s| uncertainty_s(&kept, trajectory, best_s));
-    Some(scan)
 }
 
 /// Range − distance of a shot whose tag is corrected by `correction_s`.

@@ -1,0 +1,283 @@
+//! `areograph pedr qa`.
+
+use std::{
+    io::{IsTerminal as _, Write as _},
+    path::PathBuf,
+    sync::{Arc, Mutex, PoisonError, atomic::AtomicBool},
+    time::{Duration, Instant},
+};
+
+use clap::Args;
+use serde_json::json;
+
+use crate::{
+    altimetry::{BiasScope, MolaClock, TagSign},
+    cli::{output, stop::on_signals},
+    config::usual_altimeter,
+    error::{Cause, Error, IoError, Kind},
+    flow::{ArchiveOutcome, ArchiveProgress, ArchiveRequest, check_archive},
+};
+
+/// How often progress is told where there is no terminal.
+const TOLD_EVERY: Duration = Duration::from_secs(10);
+
+/// Checks every shot of an archive against kernels: measured range minus distance, profile by profile.
+///
+/// Products go to --out: a row of statistics for every profile, shots of the worst ones, a page. A profile is what one file has
+/// of one revolution. A check that was interrupted or killed goes on where it was, with the same result.
+///
+/// Example: `areograph scene demo --days 5 && areograph pedr qa demo/pedr --kernels demo/kernels/archive.tm --out qa`
+#[derive(Debug, Args)]
+#[command(verbatim_doc_comment)]
+pub(super) struct Arguments {
+    /// Folders of PEDR files, searched below as well, and single files.
+    #[arg(required = true, value_name = "PATH")]
+    paths: Vec<PathBuf>,
+    /// Metakernel: leap seconds, clock, and the orbit of the spacecraft.
+    #[arg(long, value_name = "KERNELS.tm")]
+    kernels: PathBuf,
+    /// Folder of the products.
+    #[arg(long, default_value = "qa")]
+    out: PathBuf,
+    /// By how much time tags are late; 0 takes them as they are. The default is the bias of MOLA's clock.
+    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true, default_value_t = usual_altimeter().clock_bias_s)]
+    clock_bias_s: f64,
+    /// Threads; the default is one for every processor.
+    #[arg(long)]
+    threads: Option<std::num::NonZeroU16>,
+    /// Check every file again, whatever is stored.
+    #[arg(long)]
+    force: bool,
+    /// Print JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+/// A clock bias beyond what a clock can have.
+#[derive(Debug, thiserror::Error)]
+#[error("--clock-bias-s is {0}; expected -10 to 10")]
+struct ClockBias(f64);
+
+impl Cause for ClockBias {
+    fn kind(&self) -> Kind {
+        Kind::Configuration
+    }
+
+    fn advice(&self) -> String {
+        "give the seconds by which time tags are late, 0.117 for MOLA".to_owned()
+    }
+}
+
+/// Profiles that break limits.
+#[derive(Debug, thiserror::Error)]
+#[error("the archive is invalid against these kernels; products were written")]
+struct Invalid;
+
+impl Cause for Invalid {
+    fn kind(&self) -> Kind {
+        Kind::Validation
+    }
+
+    fn advice(&self) -> String {
+        "look at the page: the worst profiles come first".to_owned()
+    }
+}
+
+impl Arguments {
+    fn clock(&self) -> Result<MolaClock, ClockBias> {
+        let bias_s = self.clock_bias_s;
+        if !(-10.0..=10.0).contains(&bias_s) {
+            return Err(ClockBias(bias_s));
+        }
+        let usual = usual_altimeter();
+        let is_usual = (bias_s - usual.clock_bias_s).abs() <= 0.0;
+        Ok(MolaClock {
+            bias_s: bias_s.abs(),
+            sign: if bias_s < 0.0 {
+                TagSign::Early
+            } else {
+                TagSign::Late
+            },
+            scope: BiasScope::SpkLookup,
+            source: if is_usual {
+                usual.clock_source.clone()
+            } else {
+                "as given on the command line".to_owned()
+            },
+        })
+    }
+}
+
+pub(super) fn run(arguments: &Arguments) -> Result<(), Error> {
+    if let Some(threads) = arguments.threads {
+        // The only failure is a pool that exists already; then its size stands.
+        let _ = rayon::ThreadPoolBuilder::new()
+            .num_threads(usize::from(threads.get()))
+            .build_global();
+    }
+    let stop = Arc::new(AtomicBool::new(false));
+    let runtime = tokio::runtime::Runtime::new().map_err(IoError::on("start threads"))?;
+    let told = Arc::clone(&stop);
+    let signals = runtime.spawn(async move { on_signals(&told).await });
+    let telling = Telling::new();
+    let request = ArchiveRequest {
+        paths: &arguments.paths,
+        kernels: &arguments.kernels,
+        out: &arguments.out,
+        clock: arguments.clock()?,
+        force: arguments.force,
+        stop: &stop,
+    };
+    let outcome = check_archive(&request, &|progress| telling.tell(progress));
+    telling.end();
+    signals.abort();
+    print(arguments, outcome?)
+}
+
+fn print(arguments: &Arguments, outcome: ArchiveOutcome) -> Result<(), Error> {
+    let manifest = &outcome.manifest;
+    let page = arguments.out.join("report/index.html");
+    if arguments.json {
+        output::json(&json!({
+            "folder": arguments.out,
+            "page": page,
+            "unchanged": outcome.unchanged,
+            "verdict": manifest.verdict,
+            "counts": manifest.counts,
+            "figures": manifest.figures,
+        }));
+    } else {
+        let count = |name: &str| manifest.counts.get(name).copied().unwrap_or(0);
+        output::line(format_args!(
+            "{}{}: {} shots in {} profiles of {} files, {} profiles beyond limits, {} not covered by the kernels; {}",
+            manifest.verdict.word(),
+            if outcome.unchanged {
+                ", nothing changed"
+            } else {
+                ""
+            },
+            count("shots"),
+            count("profiles"),
+            count("files"),
+            count("profiles_beyond_limits"),
+            count("profiles_not_covered"),
+            page.display(),
+        ));
+        for reason in &manifest.verdict.reasons {
+            output::line(format_args!("  invalid: {reason}"));
+        }
+        for remark in &manifest.verdict.remarks {
+            output::line(format_args!("  remark: {remark}"));
+        }
+    }
+    let is_valid = manifest.verdict.valid;
+    let mut failures = outcome.failures.into_iter();
+    match failures.next() {
+        Some(first) => {
+            failures.for_each(output::error);
+            Err(first)
+        }
+        None if is_valid => Ok(()),
+        None => Err(Invalid.into()),
+    }
+}
+
+/// Tells progress on standard error: a line that is written over on a terminal, else a line now and then.
+struct Telling {
+    begun: Instant,
+    is_terminal: bool,
+    told: Mutex<Option<Instant>>,
+}
+
+impl Telling {
+    fn new() -> Self {
+        Self {
+            begun: Instant::now(),
+            is_terminal: std::io::stderr().is_terminal(),
+            told: Mutex::new(None),
+        }
+    }
+
+    fn tell(&self, progress: &ArchiveProgress) {
+        let mut told = self.told.lock().unwrap_or_else(PoisonError::into_inner);
+        let is_due = told.is_none_or(|at| at.elapsed() >= TOLD_EVERY);
+        let is_last = progress.files_done == progress.files;
+        if !self.is_terminal && !is_due && !is_last {
+            return;
+        }
+        *told = Some(Instant::now());
+        let line = words(progress, self.begun.elapsed());
+        let mut out = std::io::stderr().lock();
+        // Nobody reads it: no failure.
+        let _ = if self.is_terminal {
+            write!(out, "\r\x1b[K{line}").and_then(|()| out.flush())
+        } else {
+            writeln!(out, "{line}")
+        };
+    }
+
+    /// Leaves the line on a terminal.
+    fn end(&self) {
+        let told = self.told.lock().unwrap_or_else(PoisonError::into_inner);
+        if self.is_terminal && told.is_some() {
+            let _ = writeln!(std::io::stderr());
+        }
+    }
+}
+
+/// How far a check is after so long, and how long it may still take.
+fn words(progress: &ArchiveProgress, taken: Duration) -> String {
+    let taken_s = taken.as_secs_f64();
+    let of = format!("{} of {} files", progress.files_done, progress.files);
+    let stored = match progress.files_stored {
+        0 => String::new(),
+        stored => format!(" ({stored} from before)"),
+    };
+    if progress.bytes_done == 0 {
+        return format!("pedr qa: {of}{stored}");
+    }
+    let left_s = taken_s * progress.bytes_left as f64 / progress.bytes_done as f64;
+    format!(
+        "pedr qa: {of}{stored}, {:.1} million shots, {:.1} million a second, {} left",
+        progress.shots as f64 / 1e6,
+        progress.shots as f64 / 1e6 / taken_s,
+        duration(left_s),
+    )
+}
+
+#[allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "a positive number of seconds"
+)]
+fn duration(seconds: f64) -> String {
+    let whole = seconds.round() as u64;
+    match (whole / 3600, whole / 60 % 60, whole % 60) {
+        (0, 0, seconds) => format!("{seconds} s"),
+        (0, minutes, seconds) => format!("{minutes} min {seconds:02} s"),
+        (hours, minutes, _) => format!("{hours} h {minutes:02} min"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn progress_says_how_far_it_is_and_how_long_it_takes() {
+        let progress = ArchiveProgress {
+            files_done: 3,
+            files_stored: 1,
+            files: 9,
+            bytes_done: 2_000,
+            bytes_left: 6_000,
+            shots: 5_000_000,
+        };
+        assert_eq!(
+            words(&progress, Duration::from_secs(2)),
+            "pedr qa: 3 of 9 files (1 from before), 5.0 million shots, 2.5 million a second, 6 s left"
+        );
+        assert_eq!(duration(3_725.0), "1 h 02 min");
+        assert_eq!(duration(61.0), "1 min 01 s");
+    }
+}

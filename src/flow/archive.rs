@@ -1,0 +1,568 @@
+//! An archive of PEDR files from its folder to its products: every shot against the kernels.
+//!
+//! ```text
+//!  list files ─► per file, unless its result is stored:  load ─► check ─► store
+//!                                    one thread, with CSPICE      all threads
+//!  results in order of time ─► verdict ─► shots of the worst profiles ─► products, manifest last
+//! ```
+
+use std::{
+    collections::BTreeMap,
+    path::{Path, PathBuf},
+    sync::{
+        Arc,
+        atomic::AtomicBool,
+        mpsc::{Receiver, SyncSender, sync_channel},
+    },
+    thread,
+};
+
+use super::{PUBLISH, out::check_out_path, publish::standing};
+use crate::{
+    altimetry::{MolaClock, ShotFilter},
+    config::RangeCheckConfig,
+    error::{Cause, Error, Kind, Locate as _, Result, Stopped},
+    files::{Identity, InputFiles, file_name},
+    pds::archive::Listing,
+    products::{ArchiveProducts, WorstProfile, write_archive_products, write_profile_shots},
+    report::archive_page,
+    spice::{KernelSet, KernelView, Session},
+    stage::{Input as _, Inputs},
+    stages::check_archive::{
+        ArchiveRanges, ArchiveRules, ArchiveSource, CheckedFile, FileCheck, FileFailure,
+        FileRanges, KernelUsed, Load, METHOD, NAME, shots_of,
+    },
+    store::{
+        cache::StageCache,
+        lock::SiteLock,
+        manifest::{
+            BiasEntry, Complaints, ConfigurationEntry, KernelEntry, Manifest, StageEntry, figures,
+        },
+        publish::{CACHE, entries, publish, read_manifest, staging},
+    },
+    units::RADIANS_PER_DEGREE,
+};
+
+/// Raised when the products are laid out anew.
+const LAYOUT: u32 = 1;
+/// Profiles whose shots are written.
+const WORST: usize = 12;
+/// Complaints that the manifest quotes; all are counted.
+const COMPLAINTS_QUOTED: usize = 100;
+/// Step of the scan of clock biases, seconds: the parabola through the variances tells what lies between.
+const SCAN_STEP_S: f64 = 0.05;
+
+/// What to check.
+#[derive(Debug)]
+pub struct ArchiveRequest<'a> {
+    /// Folders of PEDR files, and single files.
+    pub paths: &'a [PathBuf],
+    /// The metakernel.
+    pub kernels: &'a Path,
+    /// Folder of the products.
+    pub out: &'a Path,
+    /// The clock of MOLA.
+    pub clock: MolaClock,
+    /// Check every file again, whatever is stored.
+    pub force: bool,
+    /// Looked at before every load.
+    pub stop: &'a AtomicBool,
+}
+
+/// How far a check is.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct ArchiveProgress {
+    /// Files that are done, those whose result was stored included.
+    pub files_done: usize,
+    /// Of them, those whose result was stored.
+    pub files_stored: usize,
+    /// All files.
+    pub files: usize,
+    /// Bytes of files that were checked now.
+    pub bytes_done: u64,
+    /// Bytes of files that are still to be checked.
+    pub bytes_left: u64,
+    /// Shots that were checked now.
+    pub shots: u64,
+}
+
+/// What a check of an archive did.
+#[derive(Debug)]
+pub struct ArchiveOutcome {
+    /// The manifest of the products.
+    pub manifest: Manifest,
+    /// Whether the products stood already.
+    pub unchanged: bool,
+    /// Why files could not be checked; all others were.
+    pub failures: Vec<Error>,
+}
+
+/// No file to check.
+#[derive(Debug, thiserror::Error)]
+#[error("no PEDR file (*.b) to check")]
+struct NoFiles;
+
+impl Cause for NoFiles {
+    fn kind(&self) -> Kind {
+        Kind::Input
+    }
+
+    fn advice(&self) -> String {
+        "name the folder of the PEDR files, or files (AP#####v.B)".to_owned()
+    }
+}
+
+/// The limits of a check: those of a site file, with a coarser scan.
+#[must_use]
+pub fn archive_limits() -> RangeCheckConfig {
+    RangeCheckConfig {
+        scan_step_s: SCAN_STEP_S,
+        ..RangeCheckConfig::default()
+    }
+}
+
+/// The shots that are checked: those that a site file keeps by default.
+#[must_use]
+pub fn archive_filter() -> ShotFilter {
+    ShotFilter {
+        classes: vec![1],
+        channels: vec![1, 2, 3, 4],
+        attitude_flags: vec![0, 1],
+        off_nadir_max_rad: 90.0 * RADIANS_PER_DEGREE,
+    }
+}
+
+/// Checks every file and publishes the products in the folder `out`.
+///
+/// The result of a file is stored once it is known: a check that was ended, however, goes on where it was.
+///
+/// # Errors
+/// Kernels that cannot be read; a disk that refuses; [`Stopped`]. Files that cannot be checked are told in the outcome.
+pub fn check_archive(
+    request: &ArchiveRequest<'_>,
+    progress: &(dyn Fn(&ArchiveProgress) + Sync),
+) -> Result<ArchiveOutcome> {
+    check_out_path(request.out)?;
+    let files = InputFiles::default();
+    let kernels = KernelSet::from_metakernel_of(&files, request.kernels)?;
+    let view = KernelView::positions(Some(&kernels))?;
+    let _lock = SiteLock::take(request.out)?;
+    let archive = Archive {
+        request,
+        limits: archive_limits(),
+        filter: archive_filter(),
+        view,
+        cache: StageCache::new(&request.out.join(CACHE), request.force),
+        progress,
+    };
+    let (ranges, failures) = archive.check_all().in_stage(NAME)?;
+    files.verify_all()?;
+    let inputs = archive.publish_inputs(&ranges);
+    let known = standing(request.out, &archive.cache, &inputs);
+    let (manifest, unchanged) = match known {
+        Ok(manifest) => (manifest, true),
+        Err(reason) => {
+            tracing::info!(stage = PUBLISH, %reason, "running");
+            let manifest = archive.publish(&ranges, &inputs).in_stage(PUBLISH)?;
+            let stored = archive.cache.store(PUBLISH, inputs, manifest.clone());
+            stored.in_stage(PUBLISH)?;
+            (manifest, false)
+        }
+    };
+    Ok(ArchiveOutcome {
+        manifest,
+        unchanged,
+        failures,
+    })
+}
+
+/// A check under way.
+struct Archive<'a> {
+    request: &'a ArchiveRequest<'a>,
+    limits: RangeCheckConfig,
+    filter: ShotFilter,
+    view: KernelView,
+    cache: StageCache,
+    progress: &'a (dyn Fn(&ArchiveProgress) + Sync),
+}
+
+/// A part of a file on its way to the threads that check it.
+struct Part {
+    /// Which of the files.
+    file: usize,
+    source: Arc<ArchiveSource>,
+    load: Result<Load>,
+}
+
+/// What the threads that check are given.
+struct Checker<'a> {
+    rules: ArchiveRules<'a>,
+    cache: &'a StageCache,
+    /// Name under which the result of each file is stored, and what it is made from.
+    todo: &'a BTreeMap<usize, (String, Inputs)>,
+    progress: &'a (dyn Fn(&ArchiveProgress) + Sync),
+}
+
+/// By file: what was found, or why nothing was.
+type Results = BTreeMap<usize, Result<FileRanges>>;
+
+impl Archive<'_> {
+    const fn rules(&self) -> ArchiveRules<'_> {
+        ArchiveRules {
+            clock: &self.request.clock,
+            limits: &self.limits,
+            filter: &self.filter,
+        }
+    }
+
+    /// What every result depends on.
+    fn inputs(&self) -> Inputs {
+        let mut inputs = Inputs::new(METHOD);
+        (&self.view).add_to("kernels", &mut inputs);
+        inputs.setting("mola_clock", &self.request.clock);
+        inputs.setting("range_check", &self.limits);
+        inputs.setting("filter", &self.filter);
+        inputs
+    }
+
+    fn check_all(&self) -> Result<(ArchiveRanges, Vec<Error>)> {
+        let mut failures = Vec::new();
+        let paths = self.paths(&mut failures);
+        if paths.is_empty() {
+            return Err(failures
+                .into_iter()
+                .next()
+                .unwrap_or_else(|| NoFiles.into()));
+        }
+        let mut sources = BTreeMap::new();
+        let mut results = Results::new();
+        for (file, path) in paths.iter().enumerate() {
+            Stopped::check(self.request.stop)?;
+            match ArchiveSource::open(path) {
+                Ok(source) => drop(sources.insert(file, source.identity())),
+                Err(failure) => drop(results.insert(file, Err(failure))),
+            }
+        }
+        let mut todo = BTreeMap::new();
+        for (file, identity) in &sources {
+            let (label, inputs) = self.stored_as(&paths[*file], identity);
+            match self.cache.load::<FileRanges>(&label, &inputs) {
+                Ok(known) => drop(results.insert(*file, Ok(known.value()?.clone()))),
+                Err(_) => drop(todo.insert(*file, (label, inputs))),
+            }
+        }
+        let start = ArchiveProgress {
+            files_done: paths.len() - todo.len(),
+            files_stored: paths.len() - todo.len(),
+            files: paths.len(),
+            bytes_left: todo.keys().map(|file| sources[file].bytes).sum(),
+            ..ArchiveProgress::default()
+        };
+        (self.progress)(&start);
+        results.extend(self.check_todo(&paths, &todo, start)?);
+        Ok(self.gather(&paths, &sources, results, failures))
+    }
+
+    /// The files, each once, in the order of their names.
+    fn paths(&self, failures: &mut Vec<Error>) -> Vec<PathBuf> {
+        let mut paths = Vec::new();
+        for path in self.request.paths {
+            if path.is_dir() {
+                let listing = Listing::below(path);
+                failures.extend(listing.failures);
+                paths.extend(listing.paths);
+            } else {
+                paths.push(path.clone());
+            }
+        }
+        paths.sort();
+        paths.dedup();
+        paths
+    }
+
+    /// Under which name the result of a file is stored, and what it depends on.
+    fn stored_as(&self, path: &Path, identity: &Identity) -> (String, Inputs) {
+        let place = blake3::hash(path.as_os_str().as_encoded_bytes()).to_hex();
+        let mut inputs = self.inputs();
+        inputs.setting("file", &file_name(path));
+        inputs.setting("identity", identity);
+        (format!("{NAME}/{}", &place[..32]), inputs)
+    }
+
+    /// Checks what is not stored: this thread loads, another one has all threads of the pool check.
+    fn check_todo(
+        &self,
+        paths: &[PathBuf],
+        todo: &BTreeMap<usize, (String, Inputs)>,
+        start: ArchiveProgress,
+    ) -> Result<Results> {
+        if todo.is_empty() {
+            return Ok(Results::new());
+        }
+        let session = self.view.session()?;
+        let checker = Checker {
+            rules: self.rules(),
+            cache: &self.cache,
+            todo,
+            progress: self.progress,
+        };
+        thread::scope(|scope| {
+            // Nothing waits in between: two loads stand in memory at most.
+            let (parts, received) = sync_channel(0);
+            let worker = scope.spawn(|| checker.run(received, start));
+            let loaded = self.load_all(paths, todo, session, &parts);
+            drop(parts);
+            let checked = worker.join();
+            loaded?;
+            checked.unwrap_or_else(|panic| std::panic::resume_unwind(panic))
+        })
+    }
+
+    fn load_all(
+        &self,
+        paths: &[PathBuf],
+        todo: &BTreeMap<usize, (String, Inputs)>,
+        session: &Session,
+        parts: &SyncSender<Part>,
+    ) -> Result<()> {
+        for file in todo.keys() {
+            let source = Arc::new(ArchiveSource::open(&paths[*file])?);
+            for rows in source.loads() {
+                Stopped::check(self.request.stop)?;
+                let load = source.load(rows, session, &self.rules());
+                let part = Part {
+                    file: *file,
+                    source: Arc::clone(&source),
+                    load,
+                };
+                let is_over = part.load.is_err();
+                if parts.send(part).is_err() {
+                    // Whoever checks has stopped, and says why.
+                    return Ok(());
+                }
+                if is_over {
+                    break;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// The results in the order of time, and the failures.
+    fn gather(
+        &self,
+        paths: &[PathBuf],
+        identities: &BTreeMap<usize, Identity>,
+        results: Results,
+        mut failures: Vec<Error>,
+    ) -> (ArchiveRanges, Vec<Error>) {
+        let mut told: Vec<FileFailure> = failures.iter().map(file_failure).collect();
+        let mut files = Vec::new();
+        for (file, result) in results {
+            match result {
+                Ok(found) => files.push(CheckedFile {
+                    path: paths[file].clone(),
+                    identity: identities[&file],
+                    found,
+                }),
+                Err(failure) => {
+                    told.push(file_failure(&failure));
+                    failures.push(failure);
+                }
+            }
+        }
+        let first_s = |file: &CheckedFile| {
+            let first = file.found.profiles.first();
+            first.map_or(f64::INFINITY, |profile| profile.start_et_s)
+        };
+        files.sort_by(|a, b| first_s(a).total_cmp(&first_s(b)));
+        let kernels = self.view.kernels().into_iter().flat_map(KernelSet::kernels);
+        let ranges = ArchiveRanges {
+            files,
+            failures: told,
+            clock: self.request.clock.clone(),
+            limits: self.limits.clone(),
+            filter: self.filter.clone(),
+            kernels: kernels
+                .map(|kernel| KernelUsed {
+                    name: kernel.file_name(),
+                    role: kernel.role.to_string(),
+                    bytes: kernel.bytes,
+                    blake3: kernel.blake3.clone(),
+                })
+                .collect(),
+        };
+        (ranges, failures)
+    }
+
+    fn publish_inputs(&self, ranges: &ArchiveRanges) -> Inputs {
+        let mut inputs = self.inputs();
+        inputs.setting("(layout)", &LAYOUT);
+        let files: Vec<_> = ranges
+            .files
+            .iter()
+            .map(|file| (file.path.to_string_lossy(), &file.found.blake3))
+            .collect();
+        inputs.setting("files", &files);
+        inputs.setting("failures", &ranges.failures);
+        inputs
+    }
+
+    fn publish(&self, ranges: &ArchiveRanges, inputs: &Inputs) -> Result<Manifest> {
+        let staging = staging(self.request.out)?;
+        let mut written = Vec::new();
+        let mut worst = Vec::new();
+        for (file, profile) in ranges.worst(WORST) {
+            Stopped::check(self.request.stop)?;
+            let session = self.view.session()?;
+            let rules = self.rules();
+            let shots = shots_of(&file.path, &file.identity, profile, session, &rules)?;
+            let product = write_profile_shots(&staging, profile, &shots)?;
+            worst.push(WorstProfile {
+                file,
+                profile,
+                shots: product.path.to_string_lossy().into_owned(),
+                // Without leap seconds there is no UTC, and nothing needs it.
+                start_utc: session
+                    .et_to_utc(crate::time::Et::from_seconds(profile.start_et_s))
+                    .ok(),
+            });
+            written.push(product);
+        }
+        let verdict = ranges.verdict();
+        let page = archive_page(ranges, &worst, &verdict)?;
+        let products = ArchiveProducts {
+            ranges,
+            verdict: &verdict,
+            page: &page,
+        };
+        written.extend(write_archive_products(&staging, &products)?);
+        let files: Vec<(PathBuf, u64)> = written
+            .into_iter()
+            .map(|product| (product.path, product.rows))
+            .collect();
+        let manifest = Manifest {
+            products: entries(&staging, &files)?,
+            ..manifest(ranges, inputs)
+        };
+        publish(self.request.out, &staging, &manifest)?;
+        Ok(read_manifest(self.request.out).unwrap_or(manifest))
+    }
+}
+
+impl Checker<'_> {
+    /// Checks what comes, and stores the result of every file.
+    fn run(&self, parts: Receiver<Part>, start: ArchiveProgress) -> Result<Results> {
+        let mut progress = start;
+        let mut results = Results::new();
+        let mut open: Option<(usize, FileCheck<'_>)> = None;
+        for part in parts {
+            let bytes = part.source.identity().bytes;
+            let under_way = open.take().filter(|(file, _)| *file == part.file);
+            let (_, mut check) =
+                under_way.unwrap_or_else(|| (part.file, FileCheck::new(part.source, self.rules)));
+            let result = match part.load.and_then(|load| check.add(&load)) {
+                Ok(None) => {
+                    open = Some((part.file, check));
+                    continue;
+                }
+                Ok(Some(found)) => Ok(self.store(part.file, found)?),
+                Err(failure) => Err(failure),
+            };
+            progress.files_done += 1;
+            progress.bytes_done += bytes;
+            progress.bytes_left = progress.bytes_left.saturating_sub(bytes);
+            progress.shots += result.as_ref().map_or(0, |found| found.shots);
+            results.insert(part.file, result);
+            (self.progress)(&progress);
+        }
+        Ok(results)
+    }
+
+    fn store(&self, file: usize, found: FileRanges) -> Result<FileRanges> {
+        if let Some((label, inputs)) = self.todo.get(&file) {
+            self.cache.store(label, inputs.clone(), found.clone())?;
+        }
+        Ok(found)
+    }
+}
+
+fn file_failure(failure: &Error) -> FileFailure {
+    FileFailure {
+        file: failure.file.as_deref().map(file_name).unwrap_or_default(),
+        why: failure.cause.to_string(),
+    }
+}
+
+/// What the manifest says of an archive but for its products.
+fn manifest(ranges: &ArchiveRanges, inputs: &Inputs) -> Manifest {
+    let [without, partly] = ranges.not_covered();
+    let beyond = ranges.profiles();
+    let beyond = beyond.filter(|profile| !profile.invalid_because.is_empty());
+    let counts = [
+        ("files", ranges.files.len() as u64),
+        ("files_failed", ranges.failures.len() as u64),
+        ("records", ranges.sum(|file| file.records)),
+        ("profiles", ranges.profiles().count() as u64),
+        ("profiles_beyond_limits", beyond.count() as u64),
+        ("profiles_not_covered", without as u64),
+        ("profiles_partly_covered", partly as u64),
+        ("shots", ranges.sum(|file| file.shots)),
+        ("shots_not_covered", ranges.sum(|file| file.not_covered)),
+    ];
+    let means = ranges.profiles().filter(|profile| profile.shots > 0);
+    let largest_m = means.map(|profile| profile.mean_without_outliers_m.abs());
+    let mut rejected: BTreeMap<String, u64> = BTreeMap::new();
+    for (reason, count) in ranges.files.iter().flat_map(|file| &file.found.rejected) {
+        *rejected.entry(reason.to_string()).or_default() += count;
+    }
+    let texts = ranges.files.iter().flat_map(|file| &file.found.complaints);
+    let kernels = ranges.kernels.iter().map(|kernel| KernelEntry {
+        name: kernel.name.clone(),
+        role: kernel.role.clone(),
+        bytes: kernel.bytes,
+        blake3: kernel.blake3.clone(),
+        coverage_used: Vec::new(),
+    });
+    let clock = &ranges.clock;
+    Manifest {
+        tool: "areograph".to_owned(),
+        version: env!("CARGO_PKG_VERSION").to_owned(),
+        site: "archive".to_owned(),
+        verdict: ranges.verdict(),
+        configuration: ConfigurationEntry {
+            file_name: String::new(),
+            blake3: blake3::hash(b"").to_hex().to_string(),
+            keys: BTreeMap::new(),
+        },
+        biases: vec![BiasEntry {
+            name: "mola_clock".to_owned(),
+            correction_s: clock.correction_s(),
+            scope: "spk_lookup".to_owned(),
+            source: clock.source.clone(),
+        }],
+        kernels: kernels.collect(),
+        kernel_choice: Vec::new(),
+        stages: vec![StageEntry {
+            name: NAME.to_owned(),
+            fingerprint: inputs.fingerprint(),
+        }],
+        products: Vec::new(),
+        counts: counts.map(|(name, count)| (name.to_owned(), count)).into(),
+        figures: crate::geom::statistics::largest(largest_m)
+            .map(|metres| (figures::RANGE_MEAN_M.to_owned(), metres))
+            .into_iter()
+            .collect(),
+        rejected,
+        complaints: Complaints {
+            count: ranges.sum(|file| file.complaint_count),
+            texts: texts.take(COMPLAINTS_QUOTED).cloned().collect(),
+        },
+        notes: ranges
+            .failures
+            .iter()
+            .map(|failure| format!("{}: not checked: {}", failure.file, failure.why))
+            .collect(),
+        finished_utc: chrono::Utc::now().format("%Y-%m-%dT%H:%M:%SZ").to_string(),
+    }
+}

@@ -1,0 +1,87 @@
+//! Products of the check of an archive: a row for every profile, shots of the worst ones, a document, the page.
+
+mod document;
+mod profiles;
+mod shots;
+
+use std::path::Path;
+
+use super::{
+    files::write_text,
+    product::{Content, Declaration, Product, Role},
+};
+use crate::{
+    error::{Locate as _, Result},
+    stages::{
+        check_archive::{ArchiveProfile, ArchiveRanges, CheckedFile},
+        judge::Verdict,
+    },
+};
+
+pub use shots::write_profile_shots;
+
+/// Everything that the products of an archive are made of.
+#[derive(Debug, Clone, Copy)]
+pub struct ArchiveProducts<'a> {
+    /// What was found.
+    pub ranges: &'a ArchiveRanges,
+    /// The verdict on it.
+    pub verdict: &'a Verdict,
+    /// The page.
+    pub page: &'a str,
+}
+
+/// One of the worst profiles.
+#[derive(Debug, Clone)]
+pub struct WorstProfile<'a> {
+    /// Its file.
+    pub file: &'a CheckedFile,
+    /// The profile.
+    pub profile: &'a ArchiveProfile,
+    /// Where its shots are, below the folder of the products.
+    pub shots: String,
+    /// UTC of its first shot; nothing without leap seconds.
+    pub start_utc: Option<String>,
+}
+
+/// How a product of an archive is written; gives its rows.
+pub(super) type WriteArchive = fn(&Path, &ArchiveProducts) -> Result<u64>;
+
+/// The products of an archive, in the order in which they are written; shots of the worst profiles come before.
+pub(super) static ARCHIVE_PRODUCTS: &[&Declaration<WriteArchive>] = &[
+    &profiles::TABLE,
+    &profiles::CSV,
+    &document::DOCUMENT,
+    &REPORT,
+];
+
+static REPORT: Declaration<WriteArchive> = Declaration {
+    path: "report/index.html",
+    what: "the page of the archive",
+    readers: "people",
+    rows: "",
+    role: Role::Overview,
+    content: Content::Foreign,
+    write: |path, of| write_text(path, of.page).map(|()| 0),
+    uses: &[],
+};
+
+/// What declares the shots of a profile.
+pub(super) use shots::SHOTS;
+
+/// Writes every product of an archive but shots below `directory`, and reads each of them back.
+///
+/// # Errors
+/// [`Kind::Io`](crate::error::Kind::Io) for what the disk refuses; [`Kind::Bug`](crate::error::Kind::Bug) for numbers that
+/// are not finite and files that read back differently.
+pub fn write_archive_products(directory: &Path, archive: &ArchiveProducts) -> Result<Vec<Product>> {
+    let products = ARCHIVE_PRODUCTS.iter().map(|declaration| {
+        let path = directory.join(declaration.path);
+        let rows = (declaration.write)(&path, archive).in_file(&path)?;
+        Ok(Product {
+            path: declaration.path.into(),
+            rows,
+        })
+    });
+    products.collect()
+}

@@ -1,0 +1,457 @@
+//! The page of an archive: the worst profiles first, then ranges over time, over off-nadir angle and on a map.
+
+use super::{
+    html::{
+        Cell, Column, Section, Table, Tone, counted, escape, link, list, page, paragraph, verdict,
+    },
+    plots::{Extent, GREY, Panel, Plot, Series, Style, figure, label, thinned},
+};
+use crate::{
+    error::Result,
+    products::WorstProfile,
+    stages::{
+        check_archive::{ArchiveProfile, ArchiveRanges, TRAJECTORY_TOLERANCE_M},
+        judge::Verdict as Judgement,
+    },
+    units::{RADIANS_PER_DEGREE, SECONDS_PER_DAY},
+};
+
+/// Profiles that are drawn over time.
+const PROFILES_DRAWN: usize = 3_000;
+/// Places that are drawn on the map.
+const PLACES_DRAWN: usize = 4_000;
+/// Files with complaints, and failures, that are listed.
+const LISTED: usize = 30;
+/// Corrections that are known worse than this are not drawn, seconds.
+const KNOWN_S: f64 = 0.05;
+
+/// The page of an archive; paths of shots count from the folder of the products, one above the page.
+///
+/// # Errors
+/// A plot that cannot be drawn, which is a bug in areograph.
+pub fn archive_page(
+    ranges: &ArchiveRanges,
+    worst: &[WorstProfile<'_>],
+    judgement: &Judgement,
+) -> Result<String> {
+    let sections = [
+        Section::new("Worst profiles", worst_profiles(ranges, worst)),
+        Section::new("Over time", over_time(ranges)?),
+        Section::new("Over off-nadir angle", over_off_nadir(ranges)?),
+        Section::new("Map", map(ranges, worst)?),
+        Section::new("Not checked", not_checked(ranges)),
+        Section::new("How it was made", how(ranges)),
+    ];
+    let lead = lead(ranges, judgement);
+    Ok(page("Ranges of the archive", &lead, &sections))
+}
+
+fn lead(ranges: &ArchiveRanges, judgement: &Judgement) -> String {
+    let (tone, word) = match (judgement.valid, judgement.remarks.is_empty()) {
+        (false, _) => (Tone::Bad, "Invalid"),
+        (true, false) => (Tone::Remarks, "Valid with remarks"),
+        (true, true) => (Tone::Good, "Valid"),
+    };
+    let beyond = ranges.profiles();
+    let beyond = beyond.filter(|of| !of.invalid_because.is_empty()).count();
+    let headline = format!(
+        "{word}: {} in {}, {beyond} beyond the limits.",
+        counted(ranges.profiles().count(), "profile"),
+        counted(ranges.files.len(), "file"),
+    );
+    let words = format!(
+        "{} shots were checked: measured range minus distance from the kernels’ spacecraft to the footprint, time tags corrected \
+         by {} s. A profile is what one file has of one revolution.",
+        grouped(ranges.sum(|file| file.shots)),
+        label(ranges.clock.correction_s(), 3),
+    );
+    let body = paragraph(&words) + &list(&judgement.reasons) + &list(&judgement.remarks);
+    verdict(tone, &headline, &body)
+}
+
+/// A count with thin spaces between thousands.
+fn grouped(count: u64) -> String {
+    let digits = count.to_string();
+    let mut grouped = String::new();
+    for (place, digit) in digits.chars().enumerate() {
+        if place > 0 && (digits.len() - place).is_multiple_of(3) {
+            grouped.push('\u{202f}');
+        }
+        grouped.push(digit);
+    }
+    grouped
+}
+
+fn worst_profiles(ranges: &ArchiveRanges, worst: &[WorstProfile<'_>]) -> String {
+    if worst.is_empty() {
+        return paragraph("No profile was checked.");
+    }
+    let mut table = Table::new(
+        "Profiles by the largest share of a limit; each links to its shots (Parquet)",
+        &[
+            Column::Text("profile"),
+            Column::Text("begins"),
+            Column::Number("shots"),
+            Column::Number("mean, m"),
+            Column::Number("NMAD, m"),
+            Column::Number("outliers"),
+            Column::Number("to own spacecraft, m"),
+            Column::Number("orbits apart, m"),
+            Column::Number("off nadir, at most °"),
+            Column::Number("best correction, s"),
+        ],
+    );
+    let limits = &ranges.limits;
+    for of in worst {
+        let profile = of.profile;
+        let [x, y, z] = profile.spacecraft_m;
+        let apart_m = x.hypot(y).hypot(z);
+        let n = f64::from(profile.shots.max(1));
+        let outlier_share = f64::from(profile.outliers) / n / limits.outlier_share_max;
+        let limited = |value: f64, limit: f64| Cell::Limited(label(value, 2), value.abs() / limit);
+        let cells = [
+            Cell::Html(link(&format!("../{}", of.shots), &profile.id())),
+            begins(of).into(),
+            profile.shots.to_string().into(),
+            limited(profile.mean_without_outliers_m, limits.mean_max_m),
+            label(profile.range_minus_distance_m.nmad, 2).into(),
+            Cell::Limited(profile.outliers.to_string(), outlier_share),
+            limited(profile.decoding_without_outliers_m, limits.decoding_max_m),
+            limited(apart_m, limits.orbit_max_m),
+            label(profile.off_nadir_rad[1] / RADIANS_PER_DEGREE, 2).into(),
+            correction(profile).into(),
+        ];
+        table.row(profile.invalid_because.is_empty(), cells);
+    }
+    let words = "Mean and distance to the file’s own spacecraft are without outliers. “Orbits apart” is the mean of the file’s own \
+        spacecraft minus that of the kernels: another orbit, clock or datum shows there. The best correction of time tags is the \
+        one by which ranges spread least. All profiles are in profiles.parquet and profiles.csv.";
+    table.finish() + &paragraph(words) + &commands(worst)
+}
+
+fn begins(of: &WorstProfile<'_>) -> String {
+    let et_s = of.profile.start_et_s;
+    match &of.start_utc {
+        Some(utc) => utc.split('.').next().unwrap_or(utc).replace('T', " "),
+        None => format!("ET {et_s:.0} s"),
+    }
+}
+
+fn correction(profile: &ArchiveProfile) -> String {
+    match (profile.best_correction_s, profile.correction_uncertainty_s) {
+        (Some(best_s), Some(sigma_s)) => format!("{} ±{sigma_s:.3}", label(best_s, 3)),
+        (Some(best_s), None) => label(best_s, 3),
+        _ => String::new(),
+    }
+}
+
+/// Command lines that give the shots of profiles.
+fn commands(worst: &[WorstProfile<'_>]) -> String {
+    let lines: Vec<String> = worst.iter().map(command).collect();
+    format!(
+        "<details><summary>Commands that find these shots in the archive</summary>\n\
+         <div class=\"wide\" tabindex=\"0\" role=\"region\" aria-label=\"Commands\"><pre>{}</pre></div></details>\n",
+        escape(&lines.join("\n"))
+    )
+}
+
+/// The command line that gives the shots of a profile, clouds left out.
+fn command(of: &WorstProfile<'_>) -> String {
+    let [start_s, stop_s] = of.profile.tags_et_s;
+    let name = of.profile.id().replace(['/', '.'], "_");
+    format!(
+        "areograph pedr search '{}' --box 0,360,-90,90 --time={:.3}..{:.3} --format parquet --out {name}.parquet",
+        of.file.path.display(),
+        start_s - 0.01,
+        stop_s + 0.01,
+    )
+}
+
+/// A figure of a profile.
+type Figure = fn(&ArchiveProfile) -> f64;
+
+fn over_time(ranges: &ArchiveRanges) -> Result<String> {
+    let checked: Vec<&ArchiveProfile> = ranges.profiles().filter(|of| of.shots > 0).collect();
+    let Some(first) = checked.first() else {
+        return Ok(paragraph("No profile was checked."));
+    };
+    let start_s = first.start_et_s;
+    let drawn = |keep: &dyn Fn(&ArchiveProfile) -> bool, figure: Figure| -> Vec<(f64, f64)> {
+        let kept = checked.iter().filter(|of| keep(of));
+        let points: Vec<(f64, f64)> = kept
+            .map(|of| ((of.start_et_s - start_s) / SECONDS_PER_DAY, figure(of)))
+            .collect();
+        thinned(&points, PROFILES_DRAWN)
+    };
+    let within = |of: &ArchiveProfile| of.invalid_because.is_empty();
+    let beyond = |of: &ArchiveProfile| !of.invalid_because.is_empty();
+    let panel = |y_label: &'static str, figure: Figure, limit: Option<f64>| {
+        let series = vec![
+            dots("within the limits", 0, drawn(&within, figure)),
+            Series {
+                style: Style::Crosses,
+                ..dots("beyond a limit", 0, drawn(&beyond, figure))
+            },
+        ];
+        Panel {
+            limits: limit.map_or_else(Vec::new, |limit| vec![-limit, limit]),
+            height: 300,
+            ..Panel::of(y_label, series)
+        }
+    };
+    let limits = &ranges.limits;
+    let ranges_plot = Plot::of(
+        "Ranges over time".to_owned(),
+        "Mean of range − distance without outliers, and its robust spread, of every profile. Level lines are limits. Of very many \
+         profiles every so many is drawn."
+            .to_owned(),
+        "days since the first profile",
+        vec![
+            panel("mean, m", |of| of.mean_without_outliers_m, Some(limits.mean_max_m)),
+            panel("NMAD, m", |of| of.range_minus_distance_m.nmad, None),
+        ],
+    );
+    let orbits_plot = Plot::of(
+        "Orbits over time".to_owned(),
+        "Mean of the file’s own spacecraft minus that of the kernels.".to_owned(),
+        "days since the first profile",
+        vec![
+            panel("up, m", |of| of.spacecraft_m[0], Some(limits.orbit_max_m)),
+            panel(
+                "along, m",
+                |of| of.spacecraft_m[1],
+                Some(limits.orbit_max_m),
+            ),
+            panel(
+                "across, m",
+                |of| of.spacecraft_m[2],
+                Some(limits.orbit_max_m),
+            ),
+        ],
+    );
+    let known = |of: &ArchiveProfile| of.correction_uncertainty_s.is_some_and(|s| s < KNOWN_S);
+    let scan = drawn(&known, |of| of.best_correction_s.unwrap_or(f64::NAN));
+    let used_s = ranges.clock.correction_s();
+    let scan_plot = Plot::of(
+        "Clock correction over time".to_owned(),
+        format!(
+            "Correction of time tags by which the ranges of a profile spread least, where it is known to {KNOWN_S} s; the level \
+             line is the one that was used, {} s.",
+            label(used_s, 3)
+        ),
+        "days since the first profile",
+        vec![Panel {
+            limits: vec![used_s],
+            ..Panel::of("correction, s", vec![dots("best correction", 2, scan)])
+        }],
+    );
+    let figures = [
+        figure(&ranges_plot)?,
+        figure(&orbits_plot)?,
+        figure(&scan_plot)?,
+    ];
+    Ok(format!(
+        "<div class=\"plots\">\n{}</div>\n",
+        figures.concat()
+    ))
+}
+
+fn dots(label: &str, colour: usize, points: Vec<(f64, f64)>) -> Series {
+    Series {
+        label: label.to_owned(),
+        style: Style::Dots,
+        colour,
+        points,
+    }
+}
+
+fn over_off_nadir(ranges: &ArchiveRanges) -> Result<String> {
+    let mut table = Table::new(
+        "Range − distance by off-nadir angle: profiles within the limits, without outliers",
+        &[
+            Column::Text("off nadir"),
+            Column::Number("shots"),
+            Column::Number("mean, m"),
+            Column::Number("std, m"),
+        ],
+    );
+    for bin in ranges.off_nadir().iter().filter(|bin| bin.shots > 0) {
+        let angles = if bin.to_deg.is_finite() {
+            format!("{}° to {}°", bin.from_deg, bin.to_deg)
+        } else {
+            format!("{}° and more", bin.from_deg)
+        };
+        let figures = bin.mean_and_deviation_m();
+        let figure = |place: usize| figures.map_or_else(String::new, |of| label(of[place], 3));
+        let cells: [Cell; 4] = [
+            angles.into(),
+            grouped(bin.shots).into(),
+            figure(0).into(),
+            figure(1).into(),
+        ];
+        table.row(true, cells);
+    }
+    let points = |beyond: bool| -> Vec<(f64, f64)> {
+        let checked = ranges.profiles().filter(|of| of.shots > 0);
+        let points: Vec<(f64, f64)> = checked
+            .filter(|of| of.invalid_because.is_empty() != beyond)
+            .map(|of| {
+                let off_nadir_deg = of.off_nadir_rad[0] / RADIANS_PER_DEGREE;
+                (off_nadir_deg, of.mean_without_outliers_m)
+            })
+            .collect();
+        thinned(&points, PROFILES_DRAWN)
+    };
+    let plot = Plot::of(
+        "Profiles by off-nadir angle".to_owned(),
+        "Mean of range − distance without outliers against the mean off-nadir angle of each profile.".to_owned(),
+        "off nadir, degrees",
+        vec![Panel::of(
+            "mean, m",
+            vec![
+                dots("within the limits", 0, points(false)),
+                Series {
+                    style: Style::Crosses,
+                    ..dots("beyond a limit", 0, points(true))
+                },
+            ],
+        )],
+    );
+    Ok(format!(
+        "{}<div class=\"plots\">\n{}</div>\n",
+        table.finish(),
+        figure(&plot)?
+    ))
+}
+
+fn map(ranges: &ArchiveRanges, worst: &[WorstProfile<'_>]) -> Result<String> {
+    let places = |of: &ArchiveProfile| {
+        of.places_deg
+            .iter()
+            .map(|[x, y]| (*x, *y))
+            .collect::<Vec<_>>()
+    };
+    let all: Vec<(f64, f64)> = ranges.profiles().flat_map(places).collect();
+    let bad: Vec<(f64, f64)> = worst
+        .iter()
+        .filter(|of| !of.profile.invalid_because.is_empty())
+        .flat_map(|of| places(of.profile))
+        .collect();
+    let mut plot = Plot::of(
+        "Where the profiles lie".to_owned(),
+        "Some shots of every profile, IAU 2000, areocentric; crosses are the worst profiles beyond a limit.".to_owned(),
+        "east longitude, degrees",
+        vec![Panel::of(
+            "latitude, degrees",
+            vec![
+                dots("profiles", GREY, thinned(&all, PLACES_DRAWN)),
+                Series {
+                    style: Style::Crosses,
+                    ..dots("worst profiles", 0, bad)
+                },
+            ],
+        )],
+    );
+    plot.x = Extent {
+        low: 0.0,
+        high: 360.0,
+    };
+    plot.panels[0].y = Extent {
+        low: -90.0,
+        high: 90.0,
+    };
+    Ok(format!("<div class=\"plots\">\n{}</div>\n", figure(&plot)?))
+}
+
+fn not_checked(ranges: &ArchiveRanges) -> String {
+    let [without, partly] = ranges.not_covered();
+    let coverage = if without + partly == 0 {
+        "The kernels have a position for every shot.".to_owned()
+    } else {
+        format!(
+            "The kernels have no position for {} shots: {without} profiles could not be checked, {partly} only in part. They have \
+             not_covered above 0 in profiles.parquet.",
+            grouped(ranges.sum(|file| file.not_covered))
+        )
+    };
+    let failures: Vec<String> = ranges
+        .failures
+        .iter()
+        .take(LISTED)
+        .map(|failure| format!("{}: {}", failure.file, failure.why))
+        .collect();
+    let mut body = paragraph(&coverage);
+    if !failures.is_empty() {
+        let count = ranges.failures.len();
+        body += &paragraph(&format!("{} could not be checked:", counted(count, "file")));
+        body += &list(&failures);
+    }
+    let complaints: Vec<String> = ranges
+        .files
+        .iter()
+        .filter(|file| file.found.complaint_count > 0)
+        .take(LISTED)
+        .map(|file| {
+            let first = file.found.complaints.first().map_or("", String::as_str);
+            format!(
+                "{} complaints, the first: {first}",
+                file.found.complaint_count
+            )
+        })
+        .collect();
+    if !complaints.is_empty() {
+        body += &paragraph("Records that contradict themselves or their neighbours were left out:");
+        body += &list(&complaints);
+    }
+    let mut rejected = std::collections::BTreeMap::new();
+    for (reason, count) in ranges.files.iter().flat_map(|file| &file.found.rejected) {
+        *rejected.entry(reason.to_string()).or_insert(0) += count;
+    }
+    let rejected: Vec<String> = rejected
+        .iter()
+        .map(|(reason, count)| format!("{reason}: {}", grouped(*count)))
+        .collect();
+    if !rejected.is_empty() {
+        body += &paragraph(&format!(
+            "Shots left out by the filter: {}.",
+            rejected.join(", ")
+        ));
+    }
+    body
+}
+
+fn how(ranges: &ArchiveRanges) -> String {
+    let kernels: Vec<String> = ranges
+        .kernels
+        .iter()
+        .map(|kernel| {
+            format!(
+                "{} ({}), BLAKE3 {}…",
+                kernel.name,
+                kernel.role,
+                short(&kernel.blake3)
+            )
+        })
+        .collect();
+    let positions = format!(
+        "Positions come from tables of Chebyshev polynomials that keep within {TRAJECTORY_TOLERANCE_M} m of CSPICE; the largest \
+         distance at instants that took no part in them is {:.1e} m. States are geometric.",
+        ranges.trajectory_error_m()
+    );
+    let clock = format!(
+        "Time tags are corrected by {} s ({}).",
+        label(ranges.clock.correction_s(), 3),
+        ranges.clock.source
+    );
+    [
+        paragraph(&positions),
+        paragraph(&clock),
+        paragraph("Kernels:"),
+        list(&kernels),
+    ]
+    .concat()
+}
+
+fn short(hash: &str) -> &str {
+    hash.get(..16).unwrap_or(hash)
+}

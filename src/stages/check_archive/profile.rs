@@ -1,0 +1,320 @@
+//! Statistics of a profile of the archive.
+
+use serde::{Deserialize, Serialize};
+
+use super::{
+    ArchiveRules, LONGEST_S,
+    rows::{CheckedShot, Task},
+};
+use crate::{
+    footprints::Footprint,
+    geom::{
+        range_residuals::RangeResiduals,
+        statistics::{Summary, outliers},
+    },
+    spice::Trajectory,
+    stages::{
+        check_ranges::{BiasScan, RangeFigures},
+        group_profiles::Profile,
+    },
+    units::RADIANS_PER_DEGREE,
+};
+
+/// Shots of a profile that are scanned.
+const SCANNED: usize = 400;
+/// Places of a profile on a map.
+const PLACES: usize = 40;
+/// Upper ends of the bins of off-nadir angles, degrees; the last one has none.
+const OFF_NADIR_DEG: [f64; 8] = [0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, f64::INFINITY];
+
+/// Statistics of what one file has of one revolution.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct ArchiveProfile {
+    /// File name without folders.
+    pub file: String,
+    /// Orbit number as the file has it.
+    pub orbit: u32,
+    /// 1, and higher after pauses of more than 300 s.
+    pub part: u32,
+    /// First and last record with a shot, counted from 1 with the label.
+    pub first_record: u32,
+    /// The last one.
+    pub last_record: u32,
+    /// Corrected time of the first shot, ET seconds.
+    pub start_et_s: f64,
+    /// That of the last one.
+    pub stop_et_s: f64,
+    /// Time tags of first and last shot, ET seconds.
+    pub tags_et_s: [f64; 2],
+    /// Shots that were checked.
+    pub shots: u32,
+    /// Shots without a position in the kernels.
+    pub not_covered: u32,
+    /// Mean and largest off-nadir angle, radians.
+    pub off_nadir_rad: [f64; 2],
+    /// Range − |SPK spacecraft − raw footprint|, metres; all 0 without a checked shot.
+    pub range_minus_distance_m: Summary,
+    /// Its mean without outliers.
+    pub mean_without_outliers_m: f64,
+    /// Shots farther from the median than the configured number of robust standard deviations.
+    pub outliers: u32,
+    /// Mean of range − distance to the crossover-corrected footprint, metres.
+    pub crossover_mean_m: f64,
+    /// Mean of range − |PEDR spacecraft − raw footprint|, metres.
+    pub decoding_mean_m: f64,
+    /// The same without outliers.
+    pub decoding_without_outliers_m: f64,
+    /// Mean of PEDR spacecraft − SPK spacecraft along radial, along-track and cross-track axes, metres.
+    pub spacecraft_m: [f64; 3],
+    /// Correction of time tags by which ranges spread least, and its standard uncertainty, seconds.
+    pub best_correction_s: Option<f64>,
+    /// The uncertainty.
+    pub correction_uncertainty_s: Option<f64>,
+    /// Largest of the judged figures as a share of its limit.
+    pub share_of_limits: f64,
+    /// Limits that are broken, in words.
+    pub invalid_because: Vec<String>,
+    /// East longitude and latitude of some of the shots, IAU 2000, degrees.
+    pub places_deg: Vec<[f64; 2]>,
+}
+
+/// Shots within a range of off-nadir angles, outliers of their profiles left out.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct OffNadirBin {
+    /// From this angle, degrees.
+    pub from_deg: f64,
+    /// To this one; infinite for the last.
+    pub to_deg: f64,
+    /// Shots.
+    pub shots: u64,
+    /// Sum of range − distance, metres.
+    pub sum_m: f64,
+    /// Sum of its squares.
+    pub squares_m2: f64,
+}
+
+impl OffNadirBin {
+    /// All bins, empty.
+    #[must_use]
+    pub fn all() -> Vec<Self> {
+        let mut from_deg = 0.0;
+        OFF_NADIR_DEG
+            .into_iter()
+            .map(|to_deg| Self {
+                from_deg: std::mem::replace(&mut from_deg, to_deg),
+                to_deg,
+                shots: 0,
+                sum_m: 0.0,
+                squares_m2: 0.0,
+            })
+            .collect()
+    }
+
+    /// Takes up the shots of another bin of the same angles.
+    pub fn add(&mut self, other: &Self) {
+        self.shots += other.shots;
+        self.sum_m += other.sum_m;
+        self.squares_m2 += other.squares_m2;
+    }
+
+    fn count(&mut self, residual_m: f64) {
+        self.shots += 1;
+        self.sum_m += residual_m;
+        self.squares_m2 += residual_m * residual_m;
+    }
+
+    /// Mean and standard deviation of range − distance, metres; nothing for fewer than two shots.
+    #[must_use]
+    pub fn mean_and_deviation_m(&self) -> Option<[f64; 2]> {
+        let n = self.shots as f64;
+        (self.shots > 1).then(|| {
+            let mean = self.sum_m / n;
+            let variance = (self.squares_m2 - n * mean * mean) / (n - 1.0);
+            [mean, variance.max(0.0).sqrt()]
+        })
+    }
+}
+
+/// The shots of a profile.
+#[derive(Debug, Default)]
+pub(super) struct Gathered {
+    shots: Vec<CheckedShot>,
+    samples: Vec<(usize, Footprint)>,
+}
+
+impl Gathered {
+    pub(super) const fn is_empty(&self) -> bool {
+        self.shots.is_empty()
+    }
+
+    /// Takes up shots that follow, and gives the profiles that have ended.
+    pub(super) fn append(&mut self, task: Task) -> Vec<Self> {
+        let mut done = Vec::new();
+        let mut samples = task.samples.into_iter().peekable();
+        for (index, shot) in task.shots.into_iter().enumerate() {
+            if self.is_ended_by(&shot) {
+                done.push(std::mem::take(self));
+            }
+            if let Some((_, whole)) = samples.next_if(|(at, _)| *at == index) {
+                self.samples.push((self.shots.len(), whole));
+            }
+            self.shots.push(shot);
+        }
+        done
+    }
+
+    fn is_ended_by(&self, next: &CheckedShot) -> bool {
+        let (Some(first), Some(last)) = (self.shots.first(), self.shots.last()) else {
+            return false;
+        };
+        next.orbit != last.orbit
+            || next.et_s - last.et_s > Profile::PAUSE_S
+            || next.et_s - first.et_s > LONGEST_S
+    }
+}
+
+/// `column` of the shots that have residuals.
+fn values(shots: &[CheckedShot], column: impl Fn(&RangeResiduals) -> f64) -> Vec<f64> {
+    let residuals = shots.iter().filter_map(|shot| shot.residuals.as_ref());
+    residuals.map(column).collect()
+}
+
+/// Mean of some values, and of those that are no outliers.
+fn means(values: &[f64], outlier: &[bool]) -> [f64; 2] {
+    let (mut sum, mut n, mut kept_sum, mut kept) = (0.0, 0.0, 0.0, 0.0);
+    for (value, is_outlier) in values.iter().zip(outlier) {
+        sum += value;
+        n += 1.0;
+        if !is_outlier {
+            kept_sum += value;
+            kept += 1.0;
+        }
+    }
+    [sum / f64::max(n, 1.0), kept_sum / f64::max(kept, 1.0)]
+}
+
+impl ArchiveProfile {
+    /// Statistics of a profile that is not empty, still without its file, and its shots by off-nadir angle.
+    pub(super) fn of(
+        gathered: &Gathered,
+        trajectory: &Trajectory,
+        rules: &ArchiveRules<'_>,
+    ) -> (Self, Vec<OffNadirBin>) {
+        let shots = &gathered.shots;
+        let range_m = values(shots, |of| of.range_minus_distance_m);
+        let decoding_m = values(shots, |of| of.decoding_m);
+        let outlier = outliers(&range_m, rules.limits.outlier_sigma);
+        let summary = Summary::of(&range_m);
+        let mean = |column: fn(&RangeResiduals) -> f64| means(&values(shots, column), &outlier)[0];
+        let [decoding_mean_m, decoding_without_outliers_m] = means(&decoding_m, &outlier);
+        let (bins, off_nadir_rad) = by_off_nadir(shots, &outlier);
+        let scan = scan(gathered, &outlier, trajectory, rules);
+        let count = |of: usize| u32::try_from(of).unwrap_or(u32::MAX);
+        let mut profile = Self {
+            shots: summary.n,
+            not_covered: count(shots.len()) - summary.n,
+            off_nadir_rad,
+            range_minus_distance_m: summary,
+            mean_without_outliers_m: means(&range_m, &outlier)[1],
+            outliers: count(outlier.iter().filter(|is| **is).count()),
+            crossover_mean_m: mean(|of| of.range_minus_distance_crossover_m),
+            decoding_mean_m,
+            decoding_without_outliers_m,
+            spacecraft_m: [
+                mean(|of| of.spacecraft_m.x),
+                mean(|of| of.spacecraft_m.y),
+                mean(|of| of.spacecraft_m.z),
+            ],
+            best_correction_s: scan.as_ref().and_then(|scan| scan.best_s),
+            correction_uncertainty_s: scan.and_then(|scan| scan.uncertainty_s),
+            places_deg: places_deg(gathered),
+            ..Self::default()
+        };
+        if let (Some(first), Some(last)) = (shots.first(), shots.last()) {
+            profile.orbit = first.orbit;
+            (profile.first_record, profile.last_record) = (first.record, last.record);
+            (profile.start_et_s, profile.stop_et_s) = (first.et_s, last.et_s);
+            profile.tags_et_s = [first.et_tag_s, last.et_tag_s];
+        }
+        profile.judge(rules);
+        (profile, bins)
+    }
+
+    fn judge(&mut self, rules: &ArchiveRules<'_>) {
+        // Without a position there is nothing to judge, which is said apart.
+        if self.shots == 0 {
+            return;
+        }
+        let figures = RangeFigures {
+            n: self.shots,
+            outliers: self.outliers,
+            mean_m: [
+                self.range_minus_distance_m.mean,
+                self.mean_without_outliers_m,
+            ],
+            decoding_m: [self.decoding_mean_m, self.decoding_without_outliers_m],
+            spacecraft_m: self.spacecraft_m,
+        };
+        self.share_of_limits = figures.share_of_limits(rules.limits);
+        let why = || "another orbit, clock or datum than that of the kernels".to_owned();
+        self.invalid_because = figures.broken_limits(rules.limits, why);
+    }
+
+    /// `<file>/<orbit>`, with `.2`, `.3` … for later parts.
+    #[must_use]
+    pub fn id(&self) -> String {
+        let part = if self.part > 1 {
+            format!(".{}", self.part)
+        } else {
+            String::new()
+        };
+        format!("{}/{}{part}", self.file, self.orbit)
+    }
+}
+
+/// The shots by off-nadir angle, and the mean and the largest angle, radians.
+fn by_off_nadir(shots: &[CheckedShot], outlier: &[bool]) -> (Vec<OffNadirBin>, [f64; 2]) {
+    let mut bins = OffNadirBin::all();
+    let (mut sum, mut largest) = (0.0, 0.0_f64);
+    for shot in shots {
+        sum += shot.off_nadir_rad.abs();
+        largest = largest.max(shot.off_nadir_rad.abs());
+    }
+    let checked = shots
+        .iter()
+        .filter_map(|shot| Some((shot.off_nadir_rad.abs(), shot.residuals?)));
+    for ((off_nadir_rad, residuals), is_outlier) in checked.zip(outlier) {
+        let off_nadir_deg = off_nadir_rad / RADIANS_PER_DEGREE;
+        let bin = bins.iter_mut().find(|bin| off_nadir_deg < bin.to_deg);
+        if let Some(bin) = bin.filter(|_| !is_outlier) {
+            bin.count(residuals.range_minus_distance_m);
+        }
+    }
+    (bins, [sum / shots.len().max(1) as f64, largest])
+}
+
+/// Scans some hundred shots that are no outliers.
+fn scan(
+    gathered: &Gathered,
+    outlier: &[bool],
+    trajectory: &Trajectory,
+    rules: &ArchiveRules<'_>,
+) -> Option<BiasScan> {
+    // Outliers are counted among shots with residuals alone.
+    if gathered.shots.len() != outlier.len() {
+        return None;
+    }
+    let kept = gathered.samples.iter().filter(|(at, _)| !outlier[*at]);
+    let kept: Vec<Footprint> = kept.map(|(_, shot)| *shot).collect();
+    let step = kept.len().div_ceil(SCANNED).max(1);
+    let thinned: Vec<Footprint> = kept.into_iter().step_by(step).collect();
+    BiasScan::of(&thinned, trajectory, rules.limits)
+}
+
+fn places_deg(gathered: &Gathered) -> Vec<[f64; 2]> {
+    let step = gathered.samples.len().div_ceil(PLACES).max(1);
+    let samples = gathered.samples.iter().step_by(step);
+    samples
+        .map(|(_, shot)| [shot.longitude_rad, shot.latitude_rad].map(|of| of / RADIANS_PER_DEGREE))
+        .collect()
+}
