@@ -49,7 +49,7 @@ use crate::{error::Result, products::SiteProducts};
 pub use compare::{KernelComparison, comparison_page};
 pub use diff::difference_page;
 pub use fidelity::{
-    FIDELITY_FILE, FIDELITY_PAGE, Fidelity, FidelityPaper, FidelityRow, fidelity_page,
+    FIDELITY_FILE, Fidelity, FidelityPaper, FidelityRow, fidelity_page, published_fidelity_page,
 };
 pub use html::STYLE;
 pub use net::net_page;
