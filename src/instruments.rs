@@ -2,6 +2,7 @@
 
 use std::fmt;
 
+use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 
 use crate::time::PointingBias;
@@ -188,4 +189,20 @@ pub struct Altimeter {
     pub clock_bias_s: f64,
     /// Where that comes from; products repeat it.
     pub clock_source: String,
+    /// Direction of its beam, components of the bus; none where its file does not tell it.
+    pub beam_in_bus: Option<[f64; 3]>,
+    /// Where that comes from.
+    pub beam_source: Option<String>,
+}
+
+impl Altimeter {
+    /// Its axes as columns, components of the bus: the directions that the two angles of its boresight turn the beam to, X of the
+    /// bus and what completes them to the right, and the beam.
+    #[must_use]
+    pub fn axes_in_bus(&self) -> Option<Matrix3<f64>> {
+        let beam = Vector3::from(self.beam_in_bus?).normalize();
+        let x = Vector3::x() - beam * beam.x;
+        let first = x.try_normalize(1e-3).unwrap_or_else(|| -Vector3::z());
+        Some(Matrix3::from_columns(&[first, beam.cross(&first), beam]))
+    }
 }

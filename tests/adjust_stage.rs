@@ -86,6 +86,7 @@ impl Site {
                 time_bias_sigma_s: 0.0,
                 turn_rad_s: Vector3::zeros(),
                 expected_m: Vector3::zeros(),
+                laser_axes: None,
             })
             .collect();
         let shots = LaserShots {
@@ -93,6 +94,7 @@ impl Site {
                 .take(network.range_bias_sigmas_m.len())
                 .map(|orbit: u32| orbit.to_string())
                 .collect(),
+            profile_sigma_m: Vector3::zeros(),
             shots: network
                 .ranges
                 .iter()

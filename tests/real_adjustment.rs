@@ -149,6 +149,7 @@ impl Site {
         };
         LaserShots {
             profiles: vec!["LOLA".to_owned()],
+            profile_sigma_m: Vector3::zeros(),
             shots: (0..).zip(&self.points).map(shot).collect(),
             surface: None,
         }
@@ -178,6 +179,7 @@ impl Site {
                 time_bias_sigma_s: 0.0,
                 turn_rad_s: Vector3::zeros(),
                 expected_m: Vector3::zeros(),
+                laser_axes: None,
             })
             .collect();
         let starts = self.intersect(&self.ties);

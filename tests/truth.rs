@@ -13,6 +13,8 @@ mod across;
 #[path = "truth/attitude_clock.rs"]
 mod attitude_clock;
 mod common;
+#[path = "truth/common_bus.rs"]
+mod common_bus;
 #[path = "truth/footprint_heights.rs"]
 mod footprint_heights;
 #[path = "truth/light_time.rs"]

@@ -29,7 +29,7 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "SECONDS", default_value_t = SECONDS_PER_DAY, conflicts_with = "along")]
     day_s: f64,
     /// Draw what the real mission may have been wrong by, instead of the errors of the worked example: line times,
-    /// attitude and jitter, orbit, MOLA profiles that are shifted, noisy shots over rough ground.
+    /// attitude and jitter, orbit, the laser's boresight, MOLA profiles that are shifted, noisy shots over rough ground.
     #[arg(long, conflicts_with = "along")]
     realistic: bool,
     /// With --realistic: how rough the ground is (heights 300 m apart differ by 5, 10 or 25 m).

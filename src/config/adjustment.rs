@@ -94,6 +94,26 @@ declare_table! {
             "a slope makes heights less certain and nothing else",
             "each profile may lie elsewhere, and tie points move to where their heights fit",
         )).or(false),
+        /// Whether the laser's place in an image that was exposed meanwhile is an observation: camera and laser are on one bus, so
+        /// that the mounting tells it, whatever the attitude was. It needs profiles that were flown with the images, whose
+        /// place is known to `mola_surface.profile_plan_sigma_m`; each profile then may lie elsewhere, and the laser may point
+        /// elsewhere than its file and the frame kernels say.
+        common_bus: bool = key(yes_or_no(
+            "footprints say nothing of the attitude",
+            "a footprint is in the simultaneous image where the mounting has the laser",
+        )).or(false),
+        /// Standard deviation of the two angles by which the laser points elsewhere, the same for all images: 0.1 mrad. No alignment
+        /// with its standard deviation is published; the narrow-angle camera was aligned in flight with the altimeter
+        /// (Kirk et al. 2001).
+        boresight_sigma_rad as "boresight_sigma_arcsec": f64 = key(SIGMA_OR_NONE)
+            .or(20.6)
+            .map(|sigma| sigma * RADIANS_PER_ARCSECOND),
+        /// Standard deviation of what the line times of each image are late by against the shots. Along the track they hide
+        /// where the laser points: inf takes nothing from there, since `rotation_sigma_arcsec` already allows for line times
+        /// and pitch together; 0 is for line times that are right.
+        boresight_line_time_sigma_s as "boresight_line_time_sigma_ms": f64 = key(SIGMA_OR_FREE)
+            .or(f64::INFINITY)
+            .map(|milliseconds| milliseconds * SECONDS_PER_MS),
         /// What image coordinates of footprints are: "off" unless the model is the published one, where they are
         /// "weighted". They come from the orientation that is being adjusted and are no measurements of their own.
         footprint_image_coordinates: Option<FootprintImageCoordinates> = key(words_of(
@@ -156,6 +176,9 @@ fn keys_of_the_model(checked: &AdjustmentConfig, keys: &mut Keys<'_, '_>) {
             "attitude_clock",
             "attitude_clock_sigma_s",
             "attitude_clock_rotation_sigma_arcsec",
+            "common_bus",
+            "boresight_sigma_arcsec",
+            "boresight_line_time_sigma_ms",
             "height_blunder_limit",
         ],
     };

@@ -176,6 +176,17 @@ impl<'i> DataTable<'i> {
         })
     }
 
+    /// The direction of `key`: three numbers, not all of them 0.
+    pub(super) fn direction(&mut self, review: &mut Review<'_>, key: &'static str) -> [f64; 3] {
+        self.required(review, key, "3 numbers, not all of them 0", |value| {
+            let items = value.as_array()?.iter();
+            let numbers: Option<Vec<f64>> = items.map(|item| number(item.get_ref())).collect();
+            let direction: [f64; 3] = numbers?.try_into().ok()?;
+            let length = direction.iter().fold(0.0_f64, |length, x| length.hypot(*x));
+            (length > 1e-6).then_some(direction)
+        })
+    }
+
     /// The whole number of `key` from `low` to `high`.
     pub(super) fn whole(
         &mut self,

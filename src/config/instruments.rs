@@ -264,12 +264,20 @@ pub fn altimeter(text: &str, file: &Path) -> Result<Altimeter, Problems> {
         let (clock_bias_s, clock_source) = top.table(review, "clock", |table, source, review| {
             (table.number(review, "bias_s", [0.0, 10.0]), source)
         });
+        let beam = top.has("beam").then(|| {
+            top.table(review, "beam", |table, source, review| {
+                (table.direction(review, "bus"), source)
+            })
+        });
+        let (beam_in_bus, beam_source) = beam.unzip();
         Altimeter {
             id,
             name,
             full_name,
             clock_bias_s,
             clock_source,
+            beam_in_bus,
+            beam_source,
         }
     })
 }

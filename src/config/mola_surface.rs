@@ -19,7 +19,7 @@ declare_table! {
         /// The default is 110 m of the images and 70 m of MOLA.
         plan_sigma_m: f64 = key(zero_or(1e-3, 1e5)).or(SurfaceOptions::default().plan_sigma_m),
         /// Where a profile lies in plan, on each axis (MOLA's 100 m in the horizontal, Neumann et al. 2001); only where
-        /// `adjustment.relief_for_plan` is "yes".
+        /// `adjustment.relief_for_plan` or `adjustment.common_bus` is "yes".
         profile_plan_sigma_m: f64 = key(from_to(1e-3, 1e5)).or(70.0),
         /// Least roughness: root mean square difference of heights 300 m apart. More is learnt from the shots.
         roughness_min_m: f64 = key(from_to(0.01, 1e4)).or(SurfaceOptions::default().roughness_min_m),

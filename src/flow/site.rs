@@ -286,6 +286,7 @@ fn adjust<D: Driver>(
         intersected: &initial.intersected,
         ranges,
         pairs: &initial.pairs,
+        altimeter: &config.altimeter,
         mola_surface: &config.mola_surface,
         adjustment: &config.adjustment,
     })?;

@@ -8,7 +8,7 @@ use std::{
 
 use crate::{
     error::{IoError, Locate, Result},
-    report::{FIDELITY_FILE, FIDELITY_PAGE, SiteLine, SiteSummary, sites_page},
+    report::{FIDELITY_FILE, SiteLine, SiteSummary, published_fidelity_page, sites_page},
     store::{
         atomic,
         manifest::{Manifest, figures},
@@ -46,7 +46,10 @@ pub fn publish_sites(out: &Path) -> Result<PathBuf> {
             failure,
         })
         .collect();
-    atomic::write(&out.join(FIDELITY_FILE), FIDELITY_PAGE.as_bytes())?;
+    atomic::write(
+        &out.join(FIDELITY_FILE),
+        published_fidelity_page().as_bytes(),
+    )?;
     let page = out.join(SITES_PAGE);
     atomic::write(&page, sites_page(&lines).as_bytes())?;
     Ok(page)

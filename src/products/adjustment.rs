@@ -24,8 +24,8 @@ use crate::{
     schema::{DocumentSchema, all_positive, at, none_negative},
     stages::{
         adjust::{
-            AdjustmentSummary, CorrectedImage, HeightSummary, OtherReading, PointKind,
-            ReliefSummary,
+            AdjustmentSummary, BoresightSummary, CorrectedImage, HeightSummary, OtherReading,
+            PointKind, ReliefSummary,
         },
         check_heights::{HeightCheck, ProfilesApart, SurfaceFigures},
         compare_pairs::{PairComparison, ProfileByTies},
@@ -35,7 +35,7 @@ use crate::{
 use configured::AdjustmentKeys;
 
 /// What the numbers are, for readers of the file.
-const DEFINITIONS: [(&str, &str); 11] = [
+const DEFINITIONS: [(&str, &str); 12] = [
     (
         "before, after",
         "with the orientation of the kernels, and with the adjusted one; ground points are intersected anew",
@@ -86,6 +86,12 @@ const DEFINITIONS: [(&str, &str); 11] = [
         "where a pair disagrees by more than 100 m along the flight: the mean of the tie points by the other of two readings, \
          all images equally likely to be wrong or one offset of the attitude's clock (attitude_clock_s), minus that of the \
          adjustment. Which is true is not measured: standard deviations hold for the reading they belong to",
+    ),
+    (
+        "boresight",
+        "where adjustment.common_bus is yes: by which angles the laser points elsewhere than mounting and altimeter file say \
+         (towards X of the bus, and at right angles to that and the beam), how far each profile is recorded from where it lies, \
+         and the farthest of these from what was known, in standard deviations of the contradiction",
     ),
     (
         "configured",
@@ -239,6 +245,11 @@ struct AdjustmentDocument<'a> {
     heights: Option<&'a HeightSummary>,
     #[serde(skip_serializing_if = "Option::is_none")]
     relief: Option<&'a ReliefSummary>,
+    /// Where the laser points in simultaneous images.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    boresight: Option<&'a BoresightSummary>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    no_boresight_because: Option<&'a str>,
     /// With its standard deviation.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(transform = at("/prefixItems/1", "minimum", 0))]
@@ -329,6 +340,7 @@ fn document<'a>(
     let ties = geometric.ties;
     let adjusted = adjustment.adjusted;
     let other = adjusted.other_reading.as_ref();
+    let boresight = adjusted.boresight.as_ref();
     let rejected = adjusted.rejected.iter().map(|point| RejectedPointDocument {
         kind: point.kind,
         id: &point.id,
@@ -360,6 +372,8 @@ fn document<'a>(
             summary: &adjusted.summary,
             heights: adjusted.heights.as_ref(),
             relief: adjusted.relief.as_ref(),
+            boresight: boresight.and_then(|of| of.as_ref().ok()),
+            no_boresight_because: boresight.and_then(|of| Some(of.as_ref().err()?.as_str())),
             attitude_clock_s: adjusted.attitude_clock_s,
             other_reading: other.and_then(|other| Some(other.as_ref().ok()?.into())),
             no_other_reading_because: other.and_then(|other| Some(other.as_ref().err()?.as_str())),

@@ -224,6 +224,7 @@ const fn kind(of: ObservationType) -> &'static str {
         ObservationType::MolaGround => "ground coordinates of MOLA",
         ObservationType::TieGround => "given coordinates of tie points",
         ObservationType::Bias => "time and range biases",
+        ObservationType::LaserSpot => "the laser in simultaneous images, by the mounting",
     }
 }
 

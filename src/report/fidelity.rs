@@ -1,9 +1,11 @@
 //! The page that sets every number of the papers beside areograph's.
 
-use super::html::{Cell, Column, Section, Table, escape, page, paragraph};
+use super::html::{Cell, Column, STYLE, Section, Table, escape, page, paragraph};
 
-/// The page of this version, which `tests/fidelity.rs` makes and checks; it lies beside the page over all sites.
-pub const FIDELITY_PAGE: &str = include_str!("../../docs/fidelity.html");
+/// The page of this version, which `tests/fidelity.rs` makes and checks; its style is that of all pages, by a link.
+const FIDELITY_PAGE: &str = include_str!("../../docs/fidelity.html");
+/// From `docs/` to the style of all pages.
+const LINKED_STYLE: &str = "<link rel=\"stylesheet\" href=\"../src/report/style.css\">\n";
 /// File of the page, in the folder that holds the sites' folders.
 pub const FIDELITY_FILE: &str = "fidelity.html";
 
@@ -48,16 +50,24 @@ pub struct FidelityRow {
     pub note: &'static str,
 }
 
-/// The page.
+/// The page as it lies beside the page over all sites: in one file.
+#[must_use]
+pub fn published_fidelity_page() -> String {
+    FIDELITY_PAGE.replacen(LINKED_STYLE, &embedded_style(), 1)
+}
+
+fn embedded_style() -> String {
+    format!("<style>\n{STYLE}</style>\n")
+}
+
+/// The page as `docs/` has it.
 #[must_use]
 pub fn fidelity_page(fidelity: &Fidelity) -> String {
     let rules: String = fidelity.rules.iter().map(|rule| paragraph(rule)).collect();
     let sections: Vec<Section> = fidelity.papers.iter().map(section).collect();
-    page(
-        "Fidelity to the papers",
-        &(rules + &verdicts(fidelity)),
-        &sections,
-    )
+    let lead = rules + &verdicts(fidelity);
+    let page = page("Fidelity to the papers", &lead, &sections);
+    page.replacen(&embedded_style(), LINKED_STYLE, 1)
 }
 
 fn verdicts(fidelity: &Fidelity) -> String {
@@ -78,7 +88,7 @@ fn verdicts(fidelity: &Fidelity) -> String {
         );
     }
     table.row(true, ["all".into(), all.to_string().into()]);
-    table.finish()
+    format!("<div class=\"stacked\">\n{}</div>\n", table.finish())
 }
 
 fn section(paper: &FidelityPaper) -> Section {
@@ -103,11 +113,25 @@ fn section(paper: &FidelityPaper) -> Section {
                 row.place.into(),
                 row.what.into(),
                 Cell::Html(numbers.join("<br>")),
-                row.verdict.into(),
-                Cell::from(&row.from),
+                labelled("verdict", row.verdict),
+                labelled("ours from", &row.from),
                 row.note.into(),
             ],
         );
     }
-    Section::new(paper.name, paragraph(paper.citation) + &table.finish())
+    // On a narrow screen the cells of a row stand one below the other.
+    let rows = format!(
+        "<div class=\"stacked columns\">\n{}</div>\n",
+        table.finish()
+    );
+    Section::new(paper.name, paragraph(paper.citation) + &rows)
+}
+
+/// A cell that says what it is where no column head does.
+fn labelled(label: &str, text: &str) -> Cell {
+    Cell::Html(if text.is_empty() {
+        String::new()
+    } else {
+        format!("<span class=\"label\">{label}: </span>{}", escape(text))
+    })
 }

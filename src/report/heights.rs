@@ -1,5 +1,6 @@
 //! What MOLA says of the heights of tie points, and what may be said of their accuracy.
 
+mod boresight;
 mod readings;
 mod relief;
 
@@ -135,6 +136,7 @@ fn statements(geometric: &GeometricProducts, adjustment: &AdjustmentProducts) ->
     }
     table.finish()
         + &relief::relief(adjustment.adjusted)
+        + &boresight::boresight(adjustment.adjusted)
         + &readings::two_readings(adjustment.adjusted)
 }
 

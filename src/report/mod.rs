@@ -51,7 +51,7 @@ pub use archive::archive_page;
 pub use compare::{KernelComparison, comparison_page};
 pub use diff::difference_page;
 pub use fidelity::{
-    FIDELITY_FILE, FIDELITY_PAGE, Fidelity, FidelityPaper, FidelityRow, fidelity_page,
+    FIDELITY_FILE, Fidelity, FidelityPaper, FidelityRow, fidelity_page, published_fidelity_page,
 };
 pub use html::STYLE;
 pub use net::net_page;

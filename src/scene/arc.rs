@@ -35,7 +35,7 @@ pub(super) struct Beam {
     pub spacecraft_m: Vector3<f64>,
     /// Where it truly is, minus that, IAU 2000, metres.
     pub position_error_m: Vector3<f64>,
-    /// Direction of the laser (bus +Z), J2000, unit length.
+    /// Direction of the laser (+Z of the bus but for its boresight's error), J2000, unit length.
     pub direction: Vector3<f64>,
     /// The same without jitter: what the altimeter's products know of it.
     pub steady_direction: Vector3<f64>,

@@ -38,6 +38,8 @@ pub(super) struct DayErrors {
     pub camera_position_m: Vector3<f64>,
     /// Turn of the bus.
     pub attitude: Option<AttitudeError>,
+    /// Angles by which the laser points from +Z of the bus towards its X and Y, radians: the same on all days.
+    pub boresight_rad: [f64; 2],
     /// Shift of the day's profile in the PEDR file.
     pub profile_shift: ProfileShift,
 }
@@ -196,11 +198,15 @@ impl DayErrors {
         let mut laser = stream("profile");
         let [east_m, north_m] = [0, 1].map(|_| errors.altimeter.plan_sigma_m * laser.normal());
         let radial_m = errors.altimeter.radial_sigma_m * laser.normal();
+        let mut boresight = Random::new(seed, "boresight");
+        let boresight_rad =
+            [0, 1].map(|_| errors.altimeter.boresight_sigma_rad * boresight.normal());
         Self {
             time_bias_lines,
             attitude_clock_s,
             bus_position_m,
             camera_position_m,
+            boresight_rad,
             attitude: is_turned.then(|| AttitudeError::draw(sizes, arc, &mut stream("attitude"))),
             profile_shift: ProfileShift::near(
                 &arc.image.site.direction(),
@@ -268,14 +274,13 @@ impl Flown {
 
 impl Flight for Flown {
     fn beam(&self, et: Et) -> Result<Beam> {
+        let [towards_x, towards_y] = self.errors.boresight_rad;
+        let beam = Vector3::new(towards_x, towards_y, 1.0).normalize();
         Ok(Beam {
             spacecraft_m: self.arc.orbit.state(et).position_m,
             position_error_m: self.errors.bus_position_m,
-            direction: self.j2000_to_bus(et).row(2).transpose(),
-            steady_direction: self
-                .turned_by(AttitudeError::steady_at, et)
-                .row(2)
-                .transpose(),
+            direction: self.j2000_to_bus(et).tr_mul(&beam),
+            steady_direction: self.turned_by(AttitudeError::steady_at, et).tr_mul(&beam),
         })
     }
 }
@@ -347,12 +352,33 @@ mod tests {
     }
 
     #[test]
+    fn the_laser_points_elsewhere_by_the_same_angles_on_all_days() {
+        let errors = SceneErrors::realistic(Roughness::Plains);
+        let flown = [0, 3].map(|image| {
+            let arc = arc(&IMAGES[image]);
+            let errors = DayErrors::draw(&errors, &arc, 5);
+            Flown { arc, errors }
+        });
+        let [first, second] = &flown;
+        assert!((first.errors.boresight_rad[0] - second.errors.boresight_rad[0]).abs() <= 0.0);
+        for flown in &flown {
+            let et = flown.arc.exposed.start;
+            let [towards_x, towards_y] = flown.errors.boresight_rad;
+            assert!(towards_x.abs().max(towards_y.abs()) < 5e-4);
+            let in_bus = flown.j2000_to_bus(et) * flown.beam(et).unwrap().direction;
+            let expected = Vector3::new(towards_x, towards_y, 1.0);
+            assert!((in_bus - expected).norm() < 1e-6); // squares of 0.5 mrad
+        }
+    }
+
+    #[test]
     fn the_demo_has_no_errors_but_those_of_its_cameras() {
         for image in &IMAGES {
             let drawn = DayErrors::draw(&SceneErrors::demo(), &arc(image), 1);
             assert!(drawn.attitude.is_none() && !drawn.has_jitter());
             assert!(drawn.bus_position_m.norm() <= 0.0 && drawn.camera_position_m.norm() > 1.0);
             assert!(drawn.attitude_clock_s.abs() <= 0.0);
+            assert!(drawn.boresight_rad.iter().all(|angle| angle.abs() <= 0.0));
             assert!((drawn.time_bias_lines - image.time_bias_lines).abs() <= 0.0);
             assert_eq!(drawn.profile_shift.rotation(), &Matrix3::identity());
         }

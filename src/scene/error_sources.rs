@@ -95,6 +95,9 @@ pub struct AltimeterErrors {
     pub range_step_m: f64,
     /// Diameter of the spot whose mean range is measured, metres.
     pub spot_m: f64,
+    /// Standard deviation of each of the two angles by which the laser points elsewhere than along +Z of the bus, radians:
+    /// the same in the whole mission.
+    pub boresight_sigma_rad: f64,
     /// Whether files hold what the instrument tells of its echoes: channel 4, energies, pulse widths, thresholds.
     #[serde(skip)]
     pub tells_echoes: bool,
@@ -161,6 +164,7 @@ impl SceneErrors {
                 shot_noise_m: 0.0,
                 range_step_m: 0.0,
                 spot_m: 0.0,
+                boresight_sigma_rad: 0.0,
                 tells_echoes: false,
             },
             relief: Relief::Gentle,
@@ -183,7 +187,9 @@ impl SceneErrors {
     /// * MOLA profiles 70 m east and north, 1 m in radius: 100 m in the horizontal and 1 m radially (Neumann et al. 2001, as
     ///   Shan et al. 2005 cite them);
     /// * shot noise 1 m: roughness within a spot on plains (Garvin et al. 1999; Neumann et al. 2003), which also
-    ///   give the 75 m of the spot; ranges in steps of 0.375 m, 2.5 ns of the clock (Shan et al. 2005, Table 1).
+    ///   give the 75 m of the spot; ranges in steps of 0.375 m, 2.5 ns of the clock (Shan et al. 2005, Table 1);
+    /// * boresight of the laser 0.1 mrad on each axis: a choice, 38 m on the ground. No alignment angles are published;
+    ///   corrections by crossovers in 1999 (Lemoine et al., AAS 99-328) were 0.05 and 0.15 mrad, if printed in degrees.
     #[must_use]
     pub const fn realistic(roughness: Roughness) -> Self {
         Self {
@@ -207,6 +213,7 @@ impl SceneErrors {
                 shot_noise_m: 1.0,
                 range_step_m: 0.375,
                 spot_m: 75.0,
+                boresight_sigma_rad: 1e-4,
                 tells_echoes: true,
             },
             relief: Relief::SelfAffine(roughness),

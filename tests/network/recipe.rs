@@ -140,6 +140,7 @@ impl<M: ExteriorOrientation> Simulated<M> {
             range_bias_sigmas_m: self.network.range_bias_sigmas_m.clone(),
             heights: None,
             attitude_clock: None,
+            common_bus: None,
             expected_m: Vec::new(),
         }
     }

@@ -4,6 +4,7 @@
 use std::{fs, path::Path};
 
 use nalgebra::Vector3;
+use serde_json::Value;
 
 use super::{
     Judged, SITES,
@@ -21,25 +22,28 @@ struct Both {
     shifts: Vec<Vector3<f64>>,
 }
 
+/// What was drawn as the shift of a profile, towards east, north and up, metres.
+pub(super) fn drawn_shift_m(truth: &Value, profile: &str) -> Vector3<f64> {
+    // `site/9019` comes from the file of orbit 19019, counted from 10,000 as files do.
+    let orbit = profile.split('/').next_back().unwrap();
+    let mut profiles = truth["profiles"].as_array().unwrap().iter();
+    let own = profiles.find(|of| of["file"].as_str().unwrap()[3..].starts_with(orbit));
+    let image = &own.unwrap()["image"];
+    let mut drawn = truth["errors_drawn"].as_array().unwrap().iter();
+    let drawn = drawn.find(|of| of["image"] == *image).unwrap();
+    vector(&drawn["profile_shift"]["east_north_radial_m"])
+}
+
 /// Shifts of the profiles against what was drawn for the day of the image they were flown with.
 fn shifts(mission: &Path, out: &Path, site: &str) -> Vec<Vector3<f64>> {
     let truth = json(&mission.join("truth.json"));
     let document = json(&out.join(site).join("adjustment.json"));
     let offsets = document["adjustment"]["relief"]["profile_shifts"].as_array();
-    let drawn_m = |profile: &str| {
-        // `site/9019` comes from the file of orbit 19019, counted from 10,000 as files do.
-        let orbit = profile.split('/').next_back().unwrap();
-        let mut profiles = truth["profiles"].as_array().unwrap().iter();
-        let own = profiles.find(|of| of["file"].as_str().unwrap()[3..].starts_with(orbit));
-        let image = &own.unwrap()["image"];
-        let mut drawn = truth["errors_drawn"].as_array().unwrap().iter();
-        let drawn = drawn.find(|of| of["image"] == *image).unwrap();
-        vector(&drawn["profile_shift"]["east_north_radial_m"])
-    };
     let offsets = offsets.unwrap().iter();
     offsets
         .map(|offset| {
-            let off_m = vector(&offset["shift_m"]) - drawn_m(offset["profile"].as_str().unwrap());
+            let off_m = vector(&offset["shift_m"])
+                - drawn_shift_m(&truth, offset["profile"].as_str().unwrap());
             off_m.component_div(&vector(&offset["sigma_m"]))
         })
         .collect()

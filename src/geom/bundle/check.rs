@@ -1,6 +1,6 @@
 //! Values and indices that a network must have before anything is computed.
 
-use super::{BundleError, Network, Part};
+use super::{BundleError, CommonBus, Network, Part, Spot};
 use crate::geom::pushbroom::ExteriorOrientation;
 
 /// # Errors
@@ -44,6 +44,9 @@ pub(super) fn check<M: ExteriorOrientation>(network: &Network<M>) -> Result<(), 
             finite(part, "turn against the stars", *component)?;
         }
     }
+    if let Some(bus) = &network.common_bus {
+        check_bus(network, bus)?;
+    }
     for (index, sigma_m) in network.range_bias_sigmas_m.iter().enumerate() {
         let part = Part::Profile(index);
         deviation(part, "standard deviation of the range bias", *sigma_m)?;
@@ -75,6 +78,41 @@ pub(super) fn check<M: ExteriorOrientation>(network: &Network<M>) -> Result<(), 
         finite(part, "line", range.x_lines)?;
         positive(part, "distance", range.range_m)?;
         positive(part, "standard deviation", range.sigma_m)?;
+    }
+    Ok(())
+}
+
+fn check_bus<M>(network: &Network<M>, bus: &CommonBus) -> Result<(), BundleError> {
+    let part = Part::Images;
+    let what = "standard deviation of the laser's boresight";
+    deviation(part, what, bus.boresight_sigma_rad)?;
+    let what = "standard deviation of line times against the laser";
+    deviation(part, what, bus.line_time_sigma_s)?;
+    if bus.profiles.len() != network.range_bias_sigmas_m.len() {
+        let missing = Part::Profile(bus.profiles.len().min(network.range_bias_sigmas_m.len()));
+        return Err(BundleError::Unmatched { part, missing });
+    }
+    for (index, profile) in bus.profiles.iter().enumerate() {
+        for sigma_m in &profile.sigma_m {
+            let what = "standard deviation of where it lies";
+            deviation(Part::Profile(index), what, *sigma_m)?;
+        }
+    }
+    for (point, profile) in &bus.recorded {
+        let part = Part::Point(*point);
+        matched(network, part, *point, 0)?;
+        if *profile >= bus.profiles.len() {
+            let missing = Part::Profile(*profile);
+            return Err(BundleError::Unmatched { part, missing });
+        }
+    }
+    for (index, Spot { view, .. }) in bus.spots.iter().enumerate() {
+        let part = Part::Spot(index);
+        matched(network, part, view.point, view.image)?;
+        finite(part, "line", view.x_lines)?;
+        finite(part, "place in the line", view.y_px)?;
+        positive(part, "standard deviation", view.sigma_px.x)?;
+        positive(part, "standard deviation", view.sigma_px.y)?;
     }
     Ok(())
 }

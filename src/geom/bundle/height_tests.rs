@@ -21,7 +21,7 @@ use crate::geom::{
 };
 
 /// Points of the network that have a height: all that carry no coordinates of their own.
-const CONTROLLED: std::ops::Range<usize> = 4..9;
+pub(super) const CONTROLLED: std::ops::Range<usize> = 4..9;
 
 /// The network with measurements that all come from its points and initial orientations.
 fn measured(mut network: Network<EulerPolynomial>) -> Network<EulerPolynomial> {
@@ -45,7 +45,7 @@ fn surface(network: &Network<EulerPolynomial>, above_m: f64) -> LaserSurface {
     surface_with(network, above_m, &SurfaceOptions::default())
 }
 
-fn surface_with(
+pub(super) fn surface_with(
     network: &Network<EulerPolynomial>,
     above_m: f64,
     options: &SurfaceOptions,
@@ -198,7 +198,10 @@ fn relief_and_the_attitudes_clock_by_parts_equal_the_dense_equations() {
 }
 
 /// The equations of `network` with heights above `surface`, solved by parts, and what is said of the solution.
-fn are_those_of_the_dense_equations(mut network: Network<EulerPolynomial>, surface: &LaserSurface) {
+pub(super) fn are_those_of_the_dense_equations(
+    mut network: Network<EulerPolynomial>,
+    surface: &LaserSurface,
+) {
     network.heights = Some(HeightControl {
         surface: surface.clone(),
         compared: Vec::new(),
@@ -206,7 +209,9 @@ fn are_those_of_the_dense_equations(mut network: Network<EulerPolynomial>, surfa
     });
     let (mut layout, start, active) = layout(&network);
     let shared = layout.columns.len();
-    let heights = Heights::at(surface, CONTROLLED.collect(), &start);
+    let bus = network.common_bus.as_ref();
+    let shifts = bus.map_or_else(Vec::new, |bus| layout.columns.shifts_on_surface(bus));
+    let heights = Heights::at(surface, CONTROLLED.collect(), shifts, &start);
     let start = layout.linearise(start);
     let groups = PointGroups::of(&layout, active.clone());
     let before = dense(&layout, &start, &heights, active.len());
@@ -278,7 +283,14 @@ fn are_those_of_the_dense_equations(mut network: Network<EulerPolynomial>, surfa
     }
     let heights = adjustment.heights.iter();
     sum += heights.map(|height| height.redundancy).sum::<f64>();
+    let spots = adjustment.common_bus.iter().flat_map(|bus| &bus.spots);
+    let spots: Vec<_> = spots.flatten().flatten().collect();
+    sum += spots
+        .iter()
+        .map(|residual| residual.redundancy)
+        .sum::<f64>();
     let observations = 2 * network.views.len()
+        + spots.len()
         + network.ranges.len()
         + 3 * (active.len() - CONTROLLED.len())
         + shared

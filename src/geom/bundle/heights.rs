@@ -13,6 +13,8 @@ pub(super) struct Heights {
     /// Where the points were then.
     places_m: Vec<Vector3<f64>>,
     pub(super) surface: SurfaceHeights,
+    /// Where heights depend on plan, profiles of the surface whose shift is an unknown of its own, and its columns.
+    pub(super) shared: Vec<(usize, [Option<usize>; 3])>,
     /// What is added to each variance because its residual is too large for it.
     pub(super) inflation_m2: DVector<f64>,
 }
@@ -25,11 +27,18 @@ const MOVED_M: f64 = 1.0;
 const STUDENT_FREEDOM: f64 = 4.0;
 
 impl Heights {
-    /// The surface under those of `points` that take part.
-    pub(super) fn at(surface: &LaserSurface, points: Vec<usize>, state: &State) -> Self {
+    /// The surface under those of `points` that take part; where heights depend on plan, `shared` profiles have unknowns of their
+    /// own.
+    pub(super) fn at(
+        surface: &LaserSurface,
+        points: Vec<usize>,
+        shared: Vec<(usize, [Option<usize>; 3])>,
+        state: &State,
+    ) -> Self {
         let places_m: Vec<Vector3<f64>> = points.iter().map(|at| state.points_m[*at]).collect();
         Self {
-            surface: surface.predict(&places_m),
+            surface: predicted(surface, &places_m, &shared),
+            shared,
             inflation_m2: DVector::zeros(points.len()),
             places_m,
             points,
@@ -45,7 +54,7 @@ impl Heights {
         if moved.fold(0.0, f64::max) < MOVED_M {
             return false;
         }
-        self.surface = surface.predict(&places_m);
+        self.surface = predicted(surface, &places_m, &self.shared);
         self.places_m = places_m;
         true
     }
@@ -69,15 +78,35 @@ impl Heights {
             Some(relief) => {
                 let by_place = relief.by_place[index];
                 let moved_m = place_m - self.places_m[index];
-                (difference_m - by_place.dot(&moved_m), by_point - by_place)
+                let shifted = self.by_shared(index);
+                let shifted_m: f64 = shifted
+                    .map(|(column, by_shift)| by_shift * state.corrections[column])
+                    .sum();
+                let difference_m = difference_m - by_place.dot(&moved_m) - shifted_m;
+                (difference_m, by_point - by_place)
             }
         }
+    }
+
+    /// How the height at `index`, as measured minus predicted, grows with shifts of profiles that are unknowns of their own, and
+    /// the columns of these.
+    pub(super) fn by_shared(&self, index: usize) -> impl Iterator<Item = (usize, f64)> + '_ {
+        let profiles = self.surface.relief.iter().flat_map(|of| &of.profiles);
+        profiles.flat_map(move |profile| {
+            let mut shared = self.shared.iter();
+            let columns = shared.find(|(surface_profile, _)| *surface_profile == profile.profile);
+            let columns = columns.map_or([None; 3], |(_, columns)| *columns);
+            let by_shift: [f64; 3] = profile.by_shift.column(index).into_owned().into();
+            let pairs = columns.into_iter().zip(by_shift);
+            pairs.filter_map(|(column, by_shift)| Some((column?, by_shift)))
+        })
     }
 
     /// The same heights as if slopes said nothing of the place, and none of it were open.
     pub(super) fn without_plan(&self) -> Self {
         let mut heights = self.clone();
         heights.surface.relief = None;
+        heights.shared.clear();
         heights.surface.covariance_m2 = heights.surface.without_plan_m2.clone();
         heights
     }
@@ -102,4 +131,23 @@ impl Heights {
         }
         changed_m
     }
+}
+
+/// The surface at some places; what comes of the shifts of `shared` profiles is no part of its errors.
+fn predicted(
+    surface: &LaserSurface,
+    places_m: &[Vector3<f64>],
+    shared: &[(usize, [Option<usize>; 3])],
+) -> SurfaceHeights {
+    let mut heights = surface.predict(places_m);
+    let profiles = heights.relief.iter().flat_map(|of| &of.profiles);
+    let is_shared = |profile: usize| shared.iter().any(|(of, _)| *of == profile);
+    for profile in profiles.filter(|of| is_shared(of.profile)) {
+        let mut by_shift = profile.by_shift.clone();
+        for (mut row, sigma_m) in by_shift.row_iter_mut().zip(&profile.sigma_m) {
+            row *= *sigma_m;
+        }
+        heights.covariance_m2 -= by_shift.tr_mul(&by_shift);
+    }
+    heights
 }

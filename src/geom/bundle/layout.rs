@@ -6,10 +6,11 @@ use nalgebra::Vector3;
 use rayon::prelude::*;
 
 use super::{
-    Network, PointRejection,
+    Network, ORIENTATION_UNKNOWNS, PointRejection, View,
     heights::Heights,
     point_rows::PointRows,
     rows::{self, Row},
+    spots::{self, Pointing, SpotRow},
     unknowns::{Columns, State},
 };
 use crate::geom::{
@@ -33,11 +34,17 @@ pub(super) struct Layout<'a, M> {
     /// Views and ranges of each point.
     pub(super) views: Lists,
     pub(super) ranges: Lists,
+    /// Spots of each point.
+    pub(super) spots: Lists,
+    /// Profile that each point is recorded with, where that may lie elsewhere.
+    profile_of_point: Vec<Option<usize>>,
     pub(super) robust: Option<RobustWeight>,
     /// Heights that are observed.
     pub(super) heights: Option<Heights>,
     /// Focal pixels per line of each view, initially: the unit of its residual along the track.
     px_per_line: Vec<f64>,
+    /// The same of each spot.
+    spot_px_per_line: Vec<f64>,
     /// Initial position at the instant of each range.
     range_bases_m: Vec<Vector3<f64>>,
 }
@@ -77,18 +84,26 @@ impl<'a, M: ExteriorOrientation> Layout<'a, M> {
         let points = network.points.len();
         let views = network.views.par_iter();
         let ranges = network.ranges.iter();
+        let bus = network.common_bus.as_ref();
+        let spots = bus.map_or(&[][..], |bus| &bus.spots);
+        let mut profile_of_point = vec![None; points];
+        for (point, profile) in bus.iter().flat_map(|bus| &bus.recorded) {
+            profile_of_point[*point] = Some(*profile);
+        }
+        let px_per_line = |view: &View| {
+            let ground_m = &network.points[view.point].ground_m;
+            rows::initial_px_per_line(&network.images[view.image], view, ground_m)
+        };
         Self {
             columns: Columns::of(network),
             views: Lists::of(points, network.views.iter().map(|view| view.point)),
             ranges: Lists::of(points, network.ranges.iter().map(|range| range.point)),
+            spots: Lists::of(points, spots.iter().map(|spot| spot.view.point)),
+            profile_of_point,
             robust: None,
             heights: None,
-            px_per_line: views
-                .map(|view| {
-                    let ground_m = &network.points[view.point].ground_m;
-                    rows::initial_px_per_line(&network.images[view.image], view, ground_m)
-                })
-                .collect(),
+            px_per_line: views.map(px_per_line).collect(),
+            spot_px_per_line: spots.iter().map(|spot| px_per_line(&spot.view)).collect(),
             range_bases_m: ranges
                 .map(|range| {
                     network.images[range.image]
@@ -143,14 +158,30 @@ impl<'a, M: ExteriorOrientation> Layout<'a, M> {
         let of_views = views
             .iter()
             .map(|view| columns.images[self.network.views[*view].image].clone());
-        let clock = columns.attitude_clock.filter(|_| !views.is_empty());
+        let spots = self.spots.of_key(point);
+        let is_seen = !(views.is_empty() && spots.is_empty());
+        let clock = columns.attitude_clock.filter(|_| is_seen);
         let of_clock = clock.map(|column| column..column + 1);
         let of_ranges = self.ranges.of_key(point).iter().flat_map(|range| {
             let range = &self.network.ranges[*range];
-            let bias = columns.of_profile[range.profile].map_or(0..0, |column| column..column + 1);
-            [columns.images[range.image].clone(), bias]
+            let of_profile = columns.profiles[range.profile].clone();
+            [columns.images[range.image].clone(), of_profile]
         });
-        of_views.chain(of_ranges).chain(of_clock)
+        let bus = self.network.common_bus.as_ref();
+        let seen_in = move |spot: &usize| Some(bus?.spots[*spot].view.image);
+        let of_spots = spots.iter().filter_map(seen_in);
+        let of_spots = of_spots.map(|image| columns.images[image].clone());
+        let [first, last] = columns.boresight;
+        let of_boresight = first.zip(last).filter(|_| !spots.is_empty());
+        let of_boresight = of_boresight.map(|(first, last)| first..last + 1);
+        let of_record = self.profile_of_point[point];
+        let of_record = of_record.map(|profile| columns.profiles[profile].clone());
+        of_views
+            .chain(of_ranges)
+            .chain(of_clock)
+            .chain(of_spots)
+            .chain(of_boresight)
+            .chain(of_record)
     }
 
     /// Blocks of the unknowns that the rows of `point` contain, ascending.
@@ -182,12 +213,11 @@ impl<'a, M: ExteriorOrientation> Layout<'a, M> {
             let image = self.network.views[*view].image;
             for row in &pair {
                 rows.push_observed(row, &columns.of_image[image], factor);
-                let clock = self.network.attitude_clock.as_ref();
-                if let (Some(clock), Some(column)) = (clock, columns.attitude_clock) {
-                    let partial = row.by_rotation.dot(&clock.turns_rad_s[image]);
-                    rows.set_last(column, partial * factor.sqrt() / row.sigma);
-                }
+                self.by_clock(rows, row, image, factor);
             }
+        }
+        for spot in self.spots.of_key(point) {
+            self.push_spot(rows, state, *spot)?;
         }
         for index in ranges {
             let range = &self.network.ranges[*index];
@@ -199,15 +229,101 @@ impl<'a, M: ExteriorOrientation> Layout<'a, M> {
             }
         }
         if let Some(known) = &self.network.points[point].known {
-            let from_initial_m = self.network.points[point].ground_m - state.points_m[point];
+            // Where it is recorded: where it lies, and how far its profile is recorded from there.
+            let recorded_m = state.points_m[point] + self.shift_m(state, point);
+            let from_initial_m = self.network.points[point].ground_m - recorded_m;
             for (axis, sigma_m) in known.axes.row_iter().zip(&known.sigma_m) {
                 let by_point: Vector3<f64> = axis.transpose() / *sigma_m;
                 let misclosure = by_point.dot(&from_initial_m);
                 rows.cost += misclosure * misclosure;
                 rows.push(by_point, misclosure, (*sigma_m, 1.0));
+                self.by_shift(rows, point, &by_point);
             }
         }
         Ok(())
+    }
+
+    fn shift_m(&self, state: &State, point: usize) -> Vector3<f64> {
+        let profile = self.profile_of_point[point];
+        profile.map_or_else(Vector3::zeros, |profile| state.profile_shifts_m[profile])
+    }
+
+    /// Sets the derivatives by the shift of the point's profile in the last row, one of its coordinates.
+    fn by_shift(&self, rows: &mut PointRows, point: usize, by_point: &Vector3<f64>) {
+        let bus = self.network.common_bus.as_ref();
+        let (Some(bus), Some(profile)) = (bus, self.profile_of_point[point]) else {
+            return;
+        };
+        let along = bus.profiles[profile].axes * by_point;
+        for (column, along) in self.columns.shift_of_profile[profile].iter().zip(&along) {
+            if let Some(column) = column {
+                rows.set_last(*column, *along);
+            }
+        }
+    }
+
+    /// The rows of the spot at `index`; `None` without spots.
+    pub(super) fn spot_rows(
+        &self,
+        state: &State,
+        index: usize,
+    ) -> Result<Option<[SpotRow; 2]>, Unseen> {
+        let bus = self.network.common_bus.as_ref();
+        let spot = bus.map(|bus| {
+            let spot = &bus.spots[index];
+            let image = spot.view.image;
+            let pointing = Pointing {
+                px_per_line: self.spot_px_per_line[index],
+                late_s: state.line_times_s[image],
+                boresight_rad: state.boresight_rad,
+            };
+            spots::of_spot(
+                &self.network.images[image],
+                &state.orientations[image],
+                spot,
+                &pointing,
+                &state.points_m[spot.view.point],
+            )
+        });
+        spot.transpose()
+    }
+
+    /// Appends the rows of the spot at `index`.
+    fn push_spot(&self, rows: &mut PointRows, state: &State, index: usize) -> Result<(), Unseen> {
+        let columns = &self.columns;
+        let bus = self.network.common_bus.as_ref();
+        let image = bus.map_or(0, |bus| bus.spots[index].view.image);
+        for spot in self.spot_rows(state, index)?.iter().flatten() {
+            let row = &spot.row;
+            rows.cost += (row.misclosure / row.sigma).powi(2);
+            rows.push_observed(row, &columns.of_image[image], 1.0);
+            self.by_clock(rows, row, image, 1.0);
+            let [first, second] = columns.boresight;
+            let [by_first, by_second] = spot.by_boresight;
+            let time_bias = columns.of_image[image][ORIENTATION_UNKNOWNS];
+            let line_time = columns.line_time_of_image[image];
+            let own = [
+                (first, by_first),
+                (second, by_second),
+                (line_time, spot.by_line_time),
+                (time_bias, spot.by_time),
+            ];
+            for (column, partial) in own {
+                if let Some(column) = column {
+                    rows.set_last(column, partial / row.sigma);
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Sets the derivative by the attitude's clock in the last row, one of `image`.
+    fn by_clock(&self, rows: &mut PointRows, row: &Row, image: usize, factor: f64) {
+        let clock = self.network.attitude_clock.as_ref();
+        if let (Some(clock), Some(column)) = (clock, self.columns.attitude_clock) {
+            let partial = row.by_rotation.dot(&clock.turns_rad_s[image]);
+            rows.set_last(column, partial * factor.sqrt() / row.sigma);
+        }
     }
 
     /// Factor of a view's weights, and its part of the sum that is made small.

@@ -84,8 +84,10 @@
 //! ```
 
 mod check;
+mod common_bus;
 mod compared_heights;
 mod error;
+mod estimates;
 mod factor;
 mod groups;
 mod heights;
@@ -99,8 +101,11 @@ mod reduced_heights;
 mod relief;
 mod rows;
 mod solve;
+mod spots;
 mod unknowns;
 
+#[cfg(test)]
+mod bus_tests;
 #[cfg(test)]
 mod height_tests;
 #[cfg(test)]
@@ -108,6 +113,7 @@ mod tests;
 
 use nalgebra::{DMatrix, Matrix3, Vector2, Vector3};
 
+pub use common_bus::{AdjustedBus, CommonBus, Estimate, RecordedProfile, Spot};
 pub use error::BundleError;
 pub use known::KnownCoordinates;
 pub use relief::{ProfileShift, ReliefOfSite};
@@ -227,6 +233,8 @@ pub struct Network<M> {
     pub heights: Option<HeightControl>,
     /// An offset of the attitude's clock, where it is an unknown.
     pub attitude_clock: Option<AttitudeClock>,
+    /// A laser on the bus of the cameras, where its spots in the images are observations.
+    pub common_bus: Option<CommonBus>,
     /// Where each image is expected against its initial orientation, Mars-fixed, metres: what its constant position unknowns
     /// are within their standard deviations of. Empty where that is nothing for all.
     pub expected_m: Vec<Vector3<f64>>,
@@ -242,6 +250,7 @@ impl<M> Default for Network<M> {
             range_bias_sigmas_m: Vec::new(),
             heights: None,
             attitude_clock: None,
+            common_bus: None,
             expected_m: Vec::new(),
         }
     }
@@ -374,6 +383,8 @@ pub struct Adjustment {
     /// Offset of the attitude's clock with the square root of its cofactor, seconds, when it is unknown: attitudes are
     /// those that the images had so much later.
     pub attitude_clock_s: Option<(f64, f64)>,
+    /// What spots of a laser on the same bus say, where they are observations.
+    pub common_bus: Option<AdjustedBus>,
     /// Heights that are observations.
     pub heights: Vec<HeightResidual>,
     /// Whether surface and weights had come to rest in the last round.
@@ -440,6 +451,9 @@ pub enum Part {
     /// A profile of ranges.
     #[error("profile {0}")]
     Profile(usize),
+    /// A spot of the laser.
+    #[error("spot {0}")]
+    Spot(usize),
     /// What all images share.
     #[error("all images")]
     Images,

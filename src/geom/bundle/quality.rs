@@ -5,6 +5,7 @@ use rayon::prelude::*;
 
 use super::{
     AdjustedImage, AdjustedPoint, Adjustment, ORIENTATION_UNKNOWNS, PointRejection, Residual,
+    estimates::{estimate, of_bus, prior},
     factor::Factor,
     groups::{Group, PointGroups},
     layout::{Layout, Linearised},
@@ -100,6 +101,7 @@ pub(super) fn judge<M: ExteriorOrientation>(
             .columns
             .attitude_clock
             .map(|column| estimate(state, cofactors, column)),
+        common_bus: of_bus(layout, state, cofactors),
         heights: heights
             .zip(controls.as_ref())
             .map_or_else(Vec::new, |((of, reduced), controls)| {
@@ -124,6 +126,12 @@ pub(super) fn judge<M: ExteriorOrientation>(
             for view in layout.views.of_key(index) {
                 adjustment.views[*view] =
                     residuals.next().zip(residuals.next()).map(<[_; 2]>::from);
+            }
+            for spot in layout.spots.of_key(index) {
+                let pair = residuals.next().zip(residuals.next()).map(<[_; 2]>::from);
+                if let Some(bus) = &mut adjustment.common_bus {
+                    bus.spots[*spot] = pair;
+                }
             }
             for range in layout.ranges.of_key(index) {
                 adjustment.ranges[*range] = residuals.next();
@@ -317,18 +325,6 @@ fn residual_of(rows: &PointRows, row: usize, leverage: f64) -> Residual {
     }
 }
 
-/// Correction and square root of the cofactor of a column.
-fn estimate(state: &State, cofactors: &BlockMatrix, column: usize) -> (f64, f64) {
-    (
-        state.corrections[column],
-        variance(cofactors, column).sqrt(),
-    )
-}
-
-fn variance(cofactors: &BlockMatrix, column: usize) -> f64 {
-    cofactors.element(column, column).unwrap_or_default()
-}
-
 fn judge_image<M: ExteriorOrientation>(
     layout: &Layout<'_, M>,
     state: &State,
@@ -357,20 +353,12 @@ fn judge_image<M: ExteriorOrientation>(
         });
         cofactors.fold(0.0, |sum, cofactor| sum + cofactor)
     };
-    let prior = |column: usize| {
-        let sigma = layout.columns.sigmas[column];
-        let share = variance(cofactors, column) / sigma.powi(2);
-        sigma.is_finite().then(|| Residual {
-            value: -(state.corrections[column] - layout.columns.expected[column]),
-            sigma,
-            redundancy: (1.0 - share).clamp(0.0, 1.0),
-            weight_factor: 1.0,
-        })
-    };
     AdjustedImage {
         correction: state.orientations[image],
         cofactors: DMatrix::from_fn(ORIENTATION_UNKNOWNS, ORIENTATION_UNKNOWNS, between),
-        priors: std::array::from_fn(|coefficient| columns[coefficient].and_then(prior)),
+        priors: std::array::from_fn(|coefficient| {
+            prior(layout, state, cofactors, columns[coefficient]?)
+        }),
         time_bias_s: columns[ORIENTATION_UNKNOWNS].map(|column| estimate(state, cofactors, column)),
     }
 }

@@ -69,6 +69,9 @@ impl ReducedHeights {
                     by_shared[(index, column)] -= share * partial;
                 }
             }
+            for (column, by_shift) in heights.by_shared(index) {
+                by_shared[(index, column)] -= by_shift;
+            }
             turned.push(u);
             moves.push(step);
         }

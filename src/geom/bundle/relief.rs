@@ -14,7 +14,7 @@ pub struct ReliefOfSite {
     /// Standard deviations towards east and north to which heights alone tell where the images lie against the surface,
     /// metres, whether they are used for it or not.
     pub sigma_m: [f64; 2],
-    /// Where the profiles lie, when heights are used for it.
+    /// Where the profiles lie, when heights are used for it; those whose shift is an unknown of its own are not among them.
     pub profiles: Vec<ProfileShift>,
 }
 
@@ -39,7 +39,9 @@ pub(super) fn of_site<M: ExteriorOrientation>(
 ) -> Option<ReliefOfSite> {
     let reduced = settled.reduced.heights.as_ref()?;
     let weighted = reduced.weighted_differences();
+    let is_shared = |profile: usize| heights.shared.iter().any(|(of, _)| *of == profile);
     let profiles = heights.surface.relief.iter().flat_map(|of| &of.profiles);
+    let profiles = profiles.filter(|of| !is_shared(of.profile));
     let shift = |of: &ProfileOnRelief| {
         let variances_m2 = Matrix3::from_diagonal(&of.sigma_m.map(|sigma_m| sigma_m.powi(2)));
         let shift_m = variances_m2 * &of.by_shift * &weighted;

@@ -118,7 +118,7 @@ fn count<M: ExteriorOrientation>(layout: &Layout<'_, M>, active: &[usize]) -> (u
     let of_points: usize = active
         .iter()
         .map(|point| {
-            2 * layout.views.of_key(*point).len()
+            2 * (layout.views.of_key(*point).len() + layout.spots.of_key(*point).len())
                 + layout.ranges.of_key(*point).len()
                 + 3 * usize::from(layout.network.points[*point].known.is_some())
         })
@@ -158,7 +158,9 @@ fn with_heights<M: ExteriorOrientation>(
     let points = points
         .filter(|point| active_points.contains(point))
         .collect();
-    let heights = Heights::at(&control.surface, points, &settled.at.state);
+    let bus = layout.network.common_bus.as_ref();
+    let shared = bus.map_or_else(Vec::new, |bus| layout.columns.shifts_on_surface(bus));
+    let heights = Heights::at(&control.surface, points, shared, &settled.at.state);
     layout.heights = Some(heights);
     let mut is_settled = false;
     for _ in 0..rounds_max {

@@ -4,7 +4,7 @@ use std::{fmt, ops::Range};
 
 use nalgebra::{DVector, Vector3};
 
-use super::{Network, ORIENTATION_UNKNOWNS, Part};
+use super::{CommonBus, Network, ORIENTATION_UNKNOWNS, Part};
 use crate::{geom::pushbroom::OrientationCorrection, units::METRES_PER_KM};
 
 /// An unknown that is shared by many observations.
@@ -30,6 +30,23 @@ pub enum Unknown {
     },
     /// Offset of the attitude's clock of all images.
     AttitudeClock,
+    /// How far a profile is recorded from where it lies, towards east, north or up.
+    ProfileShift {
+        /// Index of the profile.
+        profile: usize,
+        /// 0 east, 1 north, 2 up.
+        axis: usize,
+    },
+    /// What the line times of an image are late by against the laser's shots.
+    LineTime {
+        /// Index of the image.
+        image: usize,
+    },
+    /// An angle by which the laser points elsewhere than its mounting says.
+    Boresight {
+        /// 0 or 1.
+        axis: usize,
+    },
 }
 
 /// Names of the quantities that an orientation is corrected by.
@@ -56,6 +73,16 @@ impl Unknown {
             Self::TimeBias { .. } => "time bias".to_owned(),
             Self::RangeBias { .. } => "range bias".to_owned(),
             Self::AttitudeClock => "offset of the attitude's clock".to_owned(),
+            Self::ProfileShift { axis, .. } => {
+                format!("shift {}", ["east", "north", "up"][axis % 3])
+            }
+            Self::LineTime { .. } => "line times against the laser".to_owned(),
+            Self::Boresight { axis } => {
+                format!(
+                    "{} angle of the laser's boresight",
+                    ["first", "second"][axis % 2]
+                )
+            }
         }
     }
 
@@ -63,9 +90,13 @@ impl Unknown {
     #[must_use]
     pub const fn part(self) -> Part {
         match self {
-            Self::Orientation { image, .. } | Self::TimeBias { image } => Part::Image(image),
-            Self::RangeBias { profile } => Part::Profile(profile),
-            Self::AttitudeClock => Part::Images,
+            Self::Orientation { image, .. }
+            | Self::TimeBias { image }
+            | Self::LineTime { image } => Part::Image(image),
+            Self::RangeBias { profile } | Self::ProfileShift { profile, .. } => {
+                Part::Profile(profile)
+            }
+            Self::AttitudeClock | Self::Boresight { .. } => Part::Images,
         }
     }
 }
@@ -86,8 +117,12 @@ impl Unknown {
     pub(super) fn step_unit(self) -> f64 {
         match self {
             Self::Orientation { coefficient, .. } if coefficient < 9 => METRES_PER_KM,
-            Self::RangeBias { .. } => METRES_PER_KM,
-            Self::Orientation { .. } | Self::TimeBias { .. } | Self::AttitudeClock => 1.0,
+            Self::RangeBias { .. } | Self::ProfileShift { .. } => METRES_PER_KM,
+            Self::Orientation { .. }
+            | Self::TimeBias { .. }
+            | Self::LineTime { .. }
+            | Self::AttitudeClock
+            | Self::Boresight { .. } => 1.0,
         }
     }
 }
@@ -104,10 +139,18 @@ pub(super) struct Columns {
     pub(super) images: Vec<Range<usize>>,
     /// Columns that stand side by side because they belong to one image or profile.
     pub(super) blocks: Vec<Range<usize>>,
+    /// Column of what the line times of each image are late by.
+    pub(super) line_time_of_image: Vec<Option<usize>>,
     /// Column of each profile's bias.
     pub(super) of_profile: Vec<Option<usize>>,
+    /// Columns of each profile's shift.
+    pub(super) shift_of_profile: Vec<[Option<usize>; 3]>,
+    /// All columns of each profile.
+    pub(super) profiles: Vec<Range<usize>>,
     /// Column of the offset of the attitude's clock.
     pub(super) attitude_clock: Option<usize>,
+    /// Columns of the angles of the laser's boresight.
+    pub(super) boresight: [Option<usize>; 2],
 }
 
 impl Columns {
@@ -119,9 +162,14 @@ impl Columns {
             of_image: Vec::new(),
             images: Vec::new(),
             blocks: Vec::new(),
+            line_time_of_image: Vec::new(),
             of_profile: Vec::new(),
+            shift_of_profile: Vec::new(),
+            profiles: Vec::new(),
             attitude_clock: None,
+            boresight: [None; 2],
         };
+        let bus = network.common_bus.as_ref();
         for (image, entry) in network.images.iter().enumerate() {
             let first = columns.len();
             let mut of_image = [None; ORIENTATION_UNKNOWNS + 1];
@@ -138,19 +186,32 @@ impl Columns {
             of_image[ORIENTATION_UNKNOWNS] =
                 columns.add(Unknown::TimeBias { image }, entry.time_bias_sigma_s);
             columns.of_image.push(of_image);
+            let with_spots = bus.filter(|bus| bus.spots.iter().any(|of| of.view.image == image));
+            let line_time_s = with_spots.map_or(0.0, |bus| bus.line_time_sigma_s);
+            let line_time = columns.add(Unknown::LineTime { image }, line_time_s);
+            columns.line_time_of_image.push(line_time);
             columns.images.push(first..columns.len());
         }
         for (profile, sigma_m) in network.range_bias_sigmas_m.iter().enumerate() {
+            let first = columns.len();
             let column = columns.add(Unknown::RangeBias { profile }, *sigma_m);
             columns.of_profile.push(column);
+            let sigma_m = bus.map_or_else(Vector3::zeros, |bus| bus.profiles[profile].sigma_m);
+            let shift = |axis| Unknown::ProfileShift { profile, axis };
+            let shift = [0, 1, 2].map(|axis| columns.add(shift(axis), sigma_m[axis]));
+            columns.shift_of_profile.push(shift);
+            columns.profiles.push(first..columns.len());
         }
         let clock = network.attitude_clock.as_ref();
         columns.attitude_clock =
             clock.and_then(|clock| columns.add(Unknown::AttitudeClock, clock.sigma_s));
-        let of_profiles = columns.of_profile.iter().flatten();
-        let alone = of_profiles.chain(&columns.attitude_clock);
-        let alone = alone.map(|column| *column..column + 1);
-        let blocks = columns.images.iter().cloned().chain(alone);
+        let first = columns.len();
+        let boresight_rad = bus.map_or(0.0, |bus| bus.boresight_sigma_rad);
+        columns.boresight =
+            [0, 1].map(|axis| columns.add(Unknown::Boresight { axis }, boresight_rad));
+        let clock = columns.attitude_clock.map(|column| column..column + 1);
+        let blocks = columns.images.iter().chain(&columns.profiles).cloned();
+        let blocks = blocks.chain(clock).chain([first..columns.len()]);
         columns.blocks = blocks.filter(|block| !block.is_empty()).collect();
         columns
     }
@@ -169,6 +230,14 @@ impl Columns {
         self.unknowns.len()
     }
 
+    /// The shifts of profiles that `bus` makes unknowns: indices on the surface, and columns.
+    pub(super) fn shifts_on_surface(&self, bus: &CommonBus) -> Vec<(usize, [Option<usize>; 3])> {
+        let profiles = bus.profiles.iter().zip(&self.shift_of_profile);
+        profiles
+            .map(|(profile, columns)| (profile.surface_profile, *columns))
+            .collect()
+    }
+
     /// The block of a column.
     pub(super) fn block_of(&self, column: usize) -> usize {
         self.blocks.partition_point(|block| block.end <= column)
@@ -182,6 +251,10 @@ pub(super) struct State {
     pub(super) corrections: DVector<f64>,
     pub(super) orientations: Vec<OrientationCorrection>,
     pub(super) range_biases_m: Vec<f64>,
+    /// How far each profile is recorded from where it lies, Mars-fixed.
+    pub(super) profile_shifts_m: Vec<Vector3<f64>>,
+    pub(super) line_times_s: Vec<f64>,
+    pub(super) boresight_rad: [f64; 2],
     pub(super) points_m: Vec<Vector3<f64>>,
 }
 
@@ -211,6 +284,18 @@ impl State {
         });
         Self {
             orientations: orientations.collect(),
+            profile_shifts_m: network
+                .common_bus
+                .iter()
+                .flat_map(|bus| bus.profiles.iter().zip(&columns.shift_of_profile))
+                .map(|(profile, shift)| profile.axes.tr_mul(&Vector3::from(shift.map(value))))
+                .collect(),
+            line_times_s: columns
+                .line_time_of_image
+                .iter()
+                .map(|column| value(*column))
+                .collect(),
+            boresight_rad: columns.boresight.map(value),
             range_biases_m: columns
                 .of_profile
                 .iter()

@@ -27,7 +27,11 @@ pub(super) fn relief(adjusted: &Adjusted) -> String {
     );
     if relief.used {
         let used = "It is used: heights of tie points on slopes move images and profiles in plan (adjustment.relief_for_plan).";
-        paragraph(&format!("{told} {used}")) + &table(&relief.profile_shifts)
+        paragraph(&format!("{told} {used}"))
+            + &profiles(
+                "Where profiles are recorded against where relief and images put them, metres",
+                &relief.profile_shifts,
+            )
     } else {
         paragraph(&format!("{told} {}", advice([east_m, north_m], heights)))
     }
@@ -46,9 +50,13 @@ fn advice(relief_m: [f64; 2], heights: &HeightSummary) -> String {
     )
 }
 
-fn table(offsets: &[ProfileOffset]) -> String {
+/// Shifts of profiles; nothing where there are none.
+pub(super) fn profiles(caption: &str, offsets: &[ProfileOffset]) -> String {
+    if offsets.is_empty() {
+        return String::new();
+    }
     let mut table = Table::new(
-        "Where profiles are recorded against where relief and images put them, metres",
+        caption,
         &[
             Column::Text("profile"),
             Column::Number("east"),

@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{
     attitude_clock::prior_sigmas,
+    common_bus::{self, BoresightSummary},
     height_summary::{self, HeightSummary},
     input::AdjustImage,
     network::Assembled,
@@ -35,6 +36,8 @@ pub struct Adjusted {
     /// Offset of the attitude's clock with its standard deviation, seconds, where it is unknown: the attitudes are those
     /// that the images had so much later.
     pub attitude_clock_s: Option<(f64, f64)>,
+    /// What a laser on the bus of the cameras says, or why nothing; `None` where it is not asked.
+    pub boresight: Option<std::result::Result<BoresightSummary, String>>,
     /// Where the tie points lie by the other reading of what images disagree by along the flight, or why that is not
     /// known; `None` where they hardly disagree.
     pub other_reading: Option<std::result::Result<OtherReading, String>>,
@@ -210,6 +213,10 @@ pub(super) fn collect<M: ExteriorOrientation>(
         heights: height_summary::heights(&assembled, &adjustment),
         images: corrected_images(images, &assembled, &adjustment, summary.variance_factor),
         other_reading,
+        boresight: match &assembled.no_spots {
+            Some(reason) => Some(Err(reason.clone())),
+            None => common_bus::summarise(images, &assembled, &adjustment, variance).map(Ok),
+        },
         attitude_clock_s: adjustment
             .attitude_clock_s
             .map(|(offset_s, root_s)| (offset_s, root_s * variance.sqrt())),

@@ -1,6 +1,6 @@
 //! What an adjustment takes: images with what is known of them beforehand, and laser shots.
 
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Vector3};
 
 use crate::{
     config::{PositionUnknowns, RotationUnknowns},
@@ -24,6 +24,9 @@ pub struct AdjustImage<M> {
     pub expected_m: Vector3<f64>,
     /// How it turns against the stars, camera components, radians per second.
     pub turn_rad_s: Vector3<f64>,
+    /// Where a laser on the same bus points, camera components: as columns the two directions of the angles of its boresight,
+    /// and its beam; where the laser's file tells it.
+    pub laser_axes: Option<Matrix3<f64>>,
 }
 
 /// Standard deviations of an image's unknowns from one for positions and one for rotations.
@@ -69,6 +72,8 @@ pub(super) fn hold_powers(
 pub struct LaserShots {
     /// Identifiers of the site's profiles, in their order.
     pub profiles: Vec<String>,
+    /// Standard deviations of how far a profile may be recorded from where it lies, towards east, north and up, metres.
+    pub profile_sigma_m: Vector3<f64>,
     /// Shots, each row once.
     pub shots: Vec<LaserShot>,
     /// The ground between all shots of the site, where it controls the heights of tie points.

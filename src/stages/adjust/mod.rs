@@ -7,6 +7,7 @@
 mod adjusted;
 mod attitude_clock;
 mod blunders;
+mod common_bus;
 mod components;
 mod error;
 mod height_summary;
@@ -25,6 +26,7 @@ mod words;
 pub use adjusted::{
     Adjusted, CorrectedImage, CorrectedPoint, ImageResidual, RangeResidual, ScalarResidual,
 };
+pub use common_bus::{BoresightSummary, SpotsOfImage};
 pub use components::WORSE_THAN_CONFIGURED;
 pub use error::AdjustError;
 pub use height_summary::HeightSummary;

@@ -40,6 +40,8 @@ pub(super) struct Assembled<M> {
     pub(super) rejected: Vec<RejectedPoint>,
     /// Where the initial orientations put the footprints.
     pub(super) mola: Vec<View>,
+    /// Why the laser's place in images is no observation, where it was to be one.
+    pub(super) no_spots: Option<String>,
 }
 
 pub(super) fn assemble<'a, M: ExteriorOrientation>(
@@ -60,6 +62,7 @@ pub(super) fn assemble<'a, M: ExteriorOrientation>(
         profiles: Vec::new(),
         rejected: Vec::new(),
         mola: Vec::new(),
+        no_spots: None,
     };
     assembled.add_shots(shots, config)?;
     assembled.mola = footprints_in_images(images, shots, config)?;

@@ -18,6 +18,7 @@ use crate::{
         mars_rotation::mars_spin_rad_s, orbit_axes::radial_along_cross,
         oriented_camera::OrientedCamera, pushbroom::ExteriorOrientation, surface::LaserSurface,
     },
+    instruments::Altimeter,
     stages::{
         group_profiles::Profile, orientation::Orientation, register::ImageRegistration,
         tag_times::ImageTimes,
@@ -48,7 +49,7 @@ pub struct Candidate<'a, M> {
 
 impl<M: ExteriorOrientation> Candidate<'_, M> {
     /// The image with its standard deviations: those of the model, or what `config` says of this image.
-    fn weighed(self, config: &AdjustmentConfig) -> AdjustImage<M> {
+    fn weighed(self, laser: &Altimeter, config: &AdjustmentConfig) -> AdjustImage<M> {
         let mut sigmas = match config.model {
             AdjustmentModel::MolaSurface => {
                 sigmas_of_powers(&config.position_sigma_m, &config.rotation_sigma_rad)
@@ -71,6 +72,10 @@ impl<M: ExteriorOrientation> Candidate<'_, M> {
         hold_powers(&mut sigmas, position, rotation);
         AdjustImage {
             turn_rad_s: self.turn_rad_s(),
+            laser_axes: laser.axes_in_bus().map(|axes| {
+                let bus_to_camera = self.orientation.tables.bus_to_camera.matrix();
+                bus_to_camera * axes
+            }),
             expected_m: self
                 .pedr_orbit_m
                 .filter(|_| config.orbit_of_pedr)
@@ -144,6 +149,7 @@ pub fn prepare_adjustment<M: ExteriorOrientation>(
     footprints: &Footprints<MarsIau2000>,
     profiles: &[Profile],
     surface: Option<LaserSurface>,
+    laser: &Altimeter,
     config: &AdjustmentConfig,
 ) -> (Vec<AdjustImage<M>>, LaserShots) {
     let mut near = BTreeSet::new();
@@ -182,14 +188,15 @@ pub fn prepare_adjustment<M: ExteriorOrientation>(
     }
     let weighed = candidates
         .into_iter()
-        .map(|candidate| candidate.weighed(config));
+        .map(|candidate| candidate.weighed(laser, config));
     let profiles = profiles.iter().map(|profile| profile.id.clone()).collect();
-    let laser = LaserShots {
+    let shots = LaserShots {
         profiles,
+        profile_sigma_m: Vector3::zeros(),
         shots,
         surface,
     };
-    (weighed.collect(), laser)
+    (weighed.collect(), shots)
 }
 
 /// The range of a shot, when an image was exposed meanwhile.

@@ -5,6 +5,7 @@ use std::collections::BTreeSet;
 use super::{
     adjusted::{self, Adjusted},
     blunders,
+    common_bus::add_spots,
     error::{AdjustError, CONTRADICTION},
     input::{AdjustImage, LaserShots},
     network::{self, Assembled, Named},
@@ -49,6 +50,9 @@ pub fn adjust<M: ExteriorOrientation>(
         .into());
     }
     let mut assembled = network::assemble(images, shots, ties, starts, config)?;
+    if config.common_bus {
+        assembled.no_spots = add_spots(&mut assembled, images, shots, config)?.err();
+    }
     let bundle_options = BundleOptions {
         robust: config.robust,
         ..BundleOptions::default()

@@ -10,6 +10,7 @@ use crate::{
     error::Result,
     footprints::AdjustmentModel,
     geom::{pushbroom::CameraModel, surface::SurfaceOptions},
+    instruments::Altimeter,
     stage::{InOrder, Output, Stage},
     stage_inputs,
     stages::{
@@ -38,6 +39,8 @@ stage_inputs! {
         pub ranges: &'a Output<RangeCheck>,
         /// The pairs of images.
         pub pairs: &'a Output<Vec<PairComparison>>,
+        /// The altimeter.
+        pub altimeter: &'a Altimeter,
         /// What is uncertain about the MOLA surface.
         pub mola_surface: &'a MolaSurfaceConfig,
         /// Standard deviations and options.
@@ -47,7 +50,7 @@ stage_inputs! {
 
 impl Stage for Adjust<'_> {
     const NAME: &'static str = "adjust";
-    const METHOD: u32 = 5;
+    const METHOD: u32 = 6;
     type Output = Adjusted;
     stage_inputs!(fingerprint);
 
@@ -82,13 +85,16 @@ impl Stage for Adjust<'_> {
             }
             AdjustmentModel::Published => None,
         };
-        let (images, shots) = prepare_adjustment(
+        let (images, mut shots) = prepare_adjustment(
             candidates.collect::<Result<Vec<_>>>()?,
             footprints,
             profiles,
             surface,
+            self.altimeter,
             self.adjustment,
         );
+        let plan_m = self.mola_surface.profile_plan_sigma_m;
+        shots.profile_sigma_m = Vector3::new(plan_m, plan_m, self.mola_surface.profile_sigma_m);
         let pairs = self.pairs.value()?.iter();
         let disagreements_m = pairs.map(|pair| pair.along_track_parallax_m);
         let largest_m = disagreements_m.fold(0.0, f64::max);

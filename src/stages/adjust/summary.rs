@@ -47,8 +47,10 @@ pub enum ObservationType {
     MolaGround,
     /// Coordinates of tie points that are known beforehand.
     TieGround,
-    /// Time and range biases and the offset of the attitude's clock, initially 0.
+    /// Time and range biases, the offset of the attitude's clock, and what a laser on the same bus may be wrong by, initially 0.
     Bias,
+    /// Where the mounting has the laser in simultaneous images.
+    LaserSpot,
 }
 
 /// What the residuals of one kind of observation say.
@@ -225,6 +227,7 @@ fn types<M>(assembled: &Assembled<M>, adjustment: &Adjustment) -> Vec<TypeSummar
         (ObservationType::MolaGround, of_grounds(PointKind::Shot)),
         (ObservationType::TieGround, of_grounds(PointKind::Tie)),
         (ObservationType::Bias, biases(assembled, adjustment)),
+        (ObservationType::LaserSpot, spots(adjustment)),
     ];
     let plain = all.into_iter();
     let plain = plain.filter(|(_, residuals)| !residuals.is_empty());
@@ -250,7 +253,14 @@ fn of_heights(adjustment: &Adjustment) -> Option<TypeSummary> {
     })
 }
 
-/// Residuals of time and range biases and of the attitude's clock, whose initial value is 0.
+/// Residuals of spots of a laser on the same bus.
+fn spots(adjustment: &Adjustment) -> Vec<Residual> {
+    let spots = adjustment.common_bus.iter().flat_map(|bus| &bus.spots);
+    spots.flatten().flatten().copied().collect()
+}
+
+/// Residuals of time and range biases, of the attitude's clock, and of what a laser on the same bus may be wrong by, whose
+/// initial value is 0.
 fn biases<M>(assembled: &Assembled<M>, adjustment: &Adjustment) -> Vec<Residual> {
     let images = assembled.network.images.iter().zip(&adjustment.images);
     let times = images.map(|(image, adjusted)| (image.time_bias_sigma_s, adjusted.time_bias_s));
@@ -260,17 +270,22 @@ fn biases<M>(assembled: &Assembled<M>, adjustment: &Adjustment) -> Vec<Residual>
     let clock = clock.map(|clock| (clock.sigma_s, adjustment.attitude_clock_s));
     let biases = times.chain(ranges).chain(clock);
     let weighted = biases.filter(|(sigma, _)| sigma.is_finite());
-    weighted
-        .filter_map(|(sigma, estimate)| {
-            let (bias, root_cofactor) = estimate?;
-            Some(Residual {
-                value: -bias,
-                sigma,
-                redundancy: (1.0 - (root_cofactor / sigma).powi(2)).clamp(0.0, 1.0),
-                weight_factor: 1.0,
-            })
+    let weighted = weighted.filter_map(|(sigma, estimate)| {
+        let (bias, root_cofactor) = estimate?;
+        Some(Residual {
+            value: -bias,
+            sigma,
+            redundancy: (1.0 - (root_cofactor / sigma).powi(2)).clamp(0.0, 1.0),
+            weight_factor: 1.0,
         })
-        .collect()
+    });
+    let of_bus = adjustment.common_bus.iter().flat_map(|bus| {
+        let shifts = bus.profile_shifts_m.iter().flatten();
+        let times = bus.line_times_s.iter().flatten();
+        let unknowns = bus.boresight_rad.iter().chain(shifts).chain(times);
+        unknowns.filter_map(|unknown| unknown.prior)
+    });
+    weighted.chain(of_bus).collect()
 }
 
 fn of_type(kind: ObservationType, residuals: &[Residual]) -> TypeSummary {

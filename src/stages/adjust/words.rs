@@ -99,6 +99,11 @@ fn part_in_words<M>(part: Part, images: &[AdjustImage<M>], assembled: &Assembled
             format!("the range of {}", point(range.point))
         }
         Part::Profile(index) => format!("profile {}", assembled.profiles[index].name),
+        Part::Spot(index) => {
+            let bus = assembled.network.common_bus.as_ref();
+            let spot = bus.map(|bus| point(bus.spots[index].view.point));
+            format!("the spot of {}", spot.unwrap_or_else(|| part.to_string()))
+        }
         Part::Images => part.to_string(),
     }
 }
@@ -110,11 +115,13 @@ pub(super) fn unknown_in_words<M>(
     profiles: &[Named],
 ) -> String {
     let owner = match unknown {
-        Unknown::Orientation { image, .. } | Unknown::TimeBias { image } => {
-            format!("image {}", images[image].oriented_camera.id)
+        Unknown::Orientation { image, .. }
+        | Unknown::TimeBias { image }
+        | Unknown::LineTime { image } => format!("image {}", images[image].oriented_camera.id),
+        Unknown::RangeBias { profile } | Unknown::ProfileShift { profile, .. } => {
+            format!("profile {}", profiles[profile].name)
         }
-        Unknown::RangeBias { profile } => format!("profile {}", profiles[profile].name),
-        Unknown::AttitudeClock => unknown.part().to_string(),
+        Unknown::AttitudeClock | Unknown::Boresight { .. } => unknown.part().to_string(),
     };
     format!("the {} of {owner}", unknown.quantity())
 }

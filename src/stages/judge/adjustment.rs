@@ -55,7 +55,35 @@ impl AdjustmentEvidence<'_> {
             }
         }
         invalid.extend(self.corrected_too_far(limits));
+        invalid.extend(self.laser_elsewhere(limits));
         invalid
+    }
+
+    /// A laser that is not where its mounting and its profile have it.
+    fn laser_elsewhere(&self, limits: &LimitsConfig) -> Option<String> {
+        let boresight = self.adjusted.boresight.as_ref()?.as_ref().ok()?;
+        let (unknown, sigmas) = boresight.farthest.as_ref()?;
+        let limit = limits.correction_max_sigma;
+        // Written so that NaN counts.
+        (!(*sigmas <= limit)).then(|| {
+            format!(
+                "laser and images contradict each other: the {unknown} is off by {sigmas:.1} standard deviations, expected at \
+                 most {limit}; check beam.bus of the altimeter, mola_clock and the times of the images, or leave out \
+                 adjustment.common_bus"
+            )
+        })
+    }
+
+    /// Images that the laser says nothing of, where it was asked.
+    fn laser_missing(&self) -> Option<String> {
+        match self.adjusted.boresight.as_ref()? {
+            Err(reason) => Some(format!("adjustment.common_bus did nothing: {reason}")),
+            Ok(boresight) if !boresight.without.is_empty() => Some(format!(
+                "adjustment.common_bus says nothing of {}: no shot of a profile falls into their exposure",
+                boresight.without.join(", ")
+            )),
+            Ok(_) => None,
+        }
     }
 
     /// What MOLA says against the heights of tie points.
@@ -204,6 +232,7 @@ impl AdjustmentEvidence<'_> {
                     .to_owned(),
             );
         }
+        remarks.extend(self.laser_missing());
         let (left_out, ties) = (self.left_out(), self.ties.multi_image());
         let share = limits.rejected_share_max;
         if left_out as f64 > share * ties as f64 && 2 * left_out <= ties {

@@ -1,0 +1,83 @@
+//! What a laser on the bus of the cameras says of the place.
+
+use super::{
+    super::{
+        html::{Cell, Column, Table, paragraph},
+        plots::label,
+    },
+    relief::profiles,
+};
+use crate::{
+    stages::adjust::{Adjusted, BoresightSummary, SpotsOfImage},
+    units::SECONDS_PER_MS,
+};
+
+const MRAD_PER_RADIAN: f64 = 1e3;
+
+/// Where the laser points in simultaneous images, where that was asked.
+pub(super) fn boresight(adjusted: &Adjusted) -> String {
+    match &adjusted.boresight {
+        None => String::new(),
+        Some(Err(reason)) => paragraph(&format!("adjustment.common_bus did nothing: {reason}.")),
+        Some(Ok(found)) => {
+            let caption =
+                "Where profiles are recorded against where laser and images put them, metres";
+            words(found) + &table(&found.images) + &profiles(caption, &found.profile_shifts)
+        }
+    }
+}
+
+fn words(found: &BoresightSummary) -> String {
+    let angle = |axis: usize| {
+        let [value, sigma] = [found.angles_rad[axis], found.sigma_rad[axis]]
+            .map(|radians| label(MRAD_PER_RADIAN * radians, 3));
+        format!("{value} ± {sigma} mrad")
+    };
+    let farthest = found.farthest.as_ref().map(|(unknown, sigmas)| {
+        format!(
+            " Farthest from what was known is the {unknown}: {} standard deviations of the contradiction.",
+            label(*sigmas, 1)
+        )
+    });
+    paragraph(&format!(
+        "Camera and laser are on one bus: in an image that was exposed during a profile the mounting has each shot, whatever the \
+         attitude was (adjustment.common_bus). The laser points {} towards X of the bus and {} towards Y from where mounting and \
+         altimeter file have it.{}",
+        angle(0),
+        angle(1),
+        farthest.unwrap_or_default()
+    ))
+}
+
+fn table(images: &[SpotsOfImage]) -> String {
+    let mut table = Table::new(
+        "Shots in simultaneous images",
+        &[
+            Column::Text("image"),
+            Column::Number("shots"),
+            Column::Number("lines late, ms"),
+            Column::Number("along, px"),
+            Column::Number("across, px"),
+        ],
+    );
+    for image in images {
+        let late = image.line_time_s.map_or_else(
+            || "–".to_owned(),
+            |(late_s, sigma_s)| {
+                let [late_ms, sigma_ms] =
+                    [late_s, sigma_s].map(|seconds| label(seconds / SECONDS_PER_MS, 0));
+                format!("{late_ms} ± {sigma_ms}")
+            },
+        );
+        let mut cells: Vec<Cell> = vec![(&image.image).into()];
+        cells.push(image.spots.to_string().into());
+        cells.push(late.into());
+        let residuals = image.residuals_px.iter();
+        cells.extend(residuals.map(|axis| {
+            let [mean, spread] = [axis.mean, axis.standard_deviation].map(|px| label(px, 2));
+            Cell::from(format!("{mean} ± {spread}"))
+        }));
+        table.row(true, cells);
+    }
+    table.finish()
+}

@@ -1,0 +1,245 @@
+//! Where a laser on the bus of the cameras points in simultaneous images.
+
+use std::collections::BTreeMap;
+
+use nalgebra::{Vector2, Vector3};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::{
+    error::AdjustError,
+    input::{AdjustImage, LaserShots, ShotRange},
+    network::{Assembled, projector},
+    relief::ProfileOffset,
+    words::unknown_in_words,
+};
+use crate::{
+    config::AdjustmentConfig,
+    geom::{
+        bundle::{
+            AdjustedBus, Adjustment, CommonBus, Estimate, RecordedProfile, Residual, Spot, Unknown,
+            View,
+        },
+        ellipsoid::local_axes,
+        pushbroom::ExteriorOrientation,
+        statistics::Summary,
+    },
+    schema::{at, none_negative},
+};
+
+/// What places a single spot in its image is uncertain by, beside all that spots share, focal-plane pixels: jitter and the
+/// interpolation of attitudes. Where its footprint is recorded has an error of its own.
+const SPOT_SIGMA_PX: f64 = 0.5;
+/// What lines may be late by against the shots without wonder, seconds: 45 ms, half of what the images of a pair disagree by
+/// (Shan et al. 2005, Table 5).
+const LINE_TIME_S: f64 = 0.045;
+
+/// What a laser on the bus of the cameras says.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct BoresightSummary {
+    /// The two angles by which the laser points elsewhere than its file and the frame kernels say, the beam's ends towards X
+    /// of the bus and what completes the two to the right, radians.
+    pub angles_rad: [f64; 2],
+    /// Standard deviations of these, radians.
+    #[schemars(transform = none_negative)]
+    pub sigma_rad: [f64; 2],
+    /// Images with spots.
+    pub images: Vec<SpotsOfImage>,
+    /// How far each of their profiles is recorded from where it lies.
+    pub profile_shifts: Vec<ProfileOffset>,
+    /// Images that were exposed during no profile.
+    pub without: Vec<String>,
+    /// The unknown of laser, profiles and line times that is farthest from what was known of it, and how far, in standard
+    /// deviations of the contradiction; none where nothing tests them.
+    #[schemars(transform = at("/prefixItems/1", "minimum", 0))]
+    pub farthest: Option<(String, f64)>,
+}
+
+/// Spots in one image.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct SpotsOfImage {
+    /// Identifier.
+    pub image: String,
+    /// Spots.
+    pub spots: usize,
+    /// What its lines are late by against the shots, with its standard deviation, seconds, where that is unknown.
+    #[schemars(transform = at("/prefixItems/1", "minimum", 0))]
+    pub line_time_s: Option<(f64, f64)>,
+    /// Residuals along and across the track, focal-plane pixels.
+    pub residuals_px: [Summary; 2],
+}
+
+/// Puts the spots of all shots with a range into the network, or says why there are none.
+pub(super) fn add_spots<M: ExteriorOrientation>(
+    assembled: &mut Assembled<&M>,
+    images: &[AdjustImage<M>],
+    shots: &LaserShots,
+    config: &AdjustmentConfig,
+) -> Result<Result<(), String>, AdjustError> {
+    if images.iter().any(|image| image.laser_axes.is_none()) {
+        return Ok(Err(
+            "the file of the altimeter does not tell where its beam points (beam.bus)".to_owned(),
+        ));
+    }
+    let profile_of: BTreeMap<usize, usize> = assembled
+        .profiles
+        .iter()
+        .enumerate()
+        .map(|(place, profile)| (profile.index, place))
+        .collect();
+    let projectors = images
+        .iter()
+        .map(|image| projector(image, &image.oriented_camera.orientation));
+    let projectors = projectors.collect::<Result<Vec<_>, _>>()?;
+    let (mut spots, mut recorded) = (Vec::new(), Vec::new());
+    let mut middles_m = vec![Vector3::zeros(); assembled.profiles.len()];
+    for (point, shot) in shots.shots.iter().enumerate() {
+        let Some(profile) = profile_of.get(&shot.profile) else {
+            continue;
+        };
+        recorded.push((point, *profile));
+        middles_m[*profile] += shot.ground.xyz_m;
+        let Some(range) = &shot.range else { continue };
+        let image = &images[range.image];
+        let Some((ground_m, by_boresight_m)) = met(image, range) else {
+            continue;
+        };
+        // Near an end of the image the laser looks beyond it.
+        let Ok(seen) = projectors[range.image].project(&ground_m) else {
+            continue;
+        };
+        let Ok(focal_px) = image.oriented_camera.detector.focal_px(&seen.camera_m) else {
+            continue;
+        };
+        if seen.x.abs() <= 0.5 * image.oriented_camera.lines() {
+            spots.push(Spot {
+                view: View {
+                    point,
+                    image: range.image,
+                    x_lines: seen.x,
+                    y_px: focal_px.y,
+                    sigma_px: Vector2::repeat(SPOT_SIGMA_PX),
+                },
+                by_boresight_m,
+            });
+        }
+    }
+    if spots.is_empty() {
+        return Ok(Err(
+            "no image was exposed during a profile, so nothing was flown on the bus with it"
+                .to_owned(),
+        ));
+    }
+    let profiles = assembled.profiles.iter().zip(&middles_m);
+    let profiles = profiles.map(|(profile, middle_m)| RecordedProfile {
+        surface_profile: profile.index,
+        axes: local_axes(middle_m),
+        sigma_m: shots.profile_sigma_m,
+    });
+    assembled.network.common_bus = Some(CommonBus {
+        boresight_sigma_rad: config.boresight_sigma_rad,
+        line_time_sigma_s: config.boresight_line_time_sigma_s,
+        profiles: profiles.collect(),
+        recorded,
+        spots,
+    });
+    Ok(Ok(()))
+}
+
+/// Where the laser meets the ground by the initial orientation of `image`, and how that moves with the angles of its boresight.
+fn met<M: ExteriorOrientation>(
+    image: &AdjustImage<M>,
+    range: &ShotRange,
+) -> Option<(Vector3<f64>, [Vector3<f64>; 2])> {
+    let axes = image.laser_axes?;
+    let pose = image.oriented_camera.orientation.pose(range.x_lines);
+    let on_mars_m = pose.mars_to_camera.tr_mul(&axes) * range.range_m;
+    let laser_m = pose.position_m + range.to_laser_m;
+    let [first_m, second_m, beam_m] = [0, 1, 2].map(|axis| on_mars_m.column(axis).into_owned());
+    Some((laser_m + beam_m, [first_m, second_m]))
+}
+
+/// What the adjustment found of laser and profiles.
+pub(super) fn summarise<M>(
+    images: &[AdjustImage<M>],
+    assembled: &Assembled<&M>,
+    adjustment: &Adjustment,
+    variance_factor: f64,
+) -> Option<BoresightSummary> {
+    let network = assembled.network.common_bus.as_ref()?;
+    let bus = adjustment.common_bus.as_ref()?;
+    let root = variance_factor.sqrt();
+    let seen_in = |image: usize| -> Vec<[f64; 2]> {
+        let spots = network.spots.iter().zip(&bus.spots);
+        let spots = spots.filter(|(spot, _)| spot.view.image == image);
+        spots
+            .filter_map(|(_, residuals)| Some((*residuals)?.map(|residual| residual.value)))
+            .collect()
+    };
+    let of_image = |(index, image): (usize, &AdjustImage<M>)| {
+        let residuals_px = seen_in(index);
+        let of_axis =
+            |axis: usize| -> Vec<f64> { residuals_px.iter().map(|pair| pair[axis]).collect() };
+        SpotsOfImage {
+            image: image.oriented_camera.id.clone(),
+            spots: residuals_px.len(),
+            line_time_s: bus.line_times_s[index]
+                .map(|found| (found.value, found.root_cofactor * root)),
+            residuals_px: [0, 1].map(|axis| Summary::of(&of_axis(axis))),
+        }
+    };
+    let all = images.iter().enumerate().map(of_image);
+    let (with, without): (Vec<_>, Vec<_>) = all.partition(|of| of.spots > 0);
+    let profiles = assembled.profiles.iter().zip(&bus.profile_shifts_m);
+    Some(BoresightSummary {
+        angles_rad: bus.boresight_rad.map(|found| found.value),
+        sigma_rad: bus.boresight_rad.map(|found| found.root_cofactor * root),
+        images: with,
+        profile_shifts: profiles
+            .map(|(profile, shift)| ProfileOffset {
+                profile: profile.name.clone(),
+                shift_m: shift.map(|found| found.value),
+                sigma_m: shift.map(|found| found.root_cofactor * root),
+            })
+            .collect(),
+        without: without.into_iter().map(|image| image.image).collect(),
+        farthest: farthest(images, assembled, bus),
+    })
+}
+
+/// The unknown that is farthest from what was known of it.
+///
+/// The residual of an expected value over its own standard deviation is that of the contradiction: all that contradict each
+/// other in one direction show the same.
+fn farthest<M>(
+    images: &[AdjustImage<M>],
+    assembled: &Assembled<&M>,
+    bus: &AdjustedBus,
+) -> Option<(String, f64)> {
+    let standardised = |found: &Estimate| found.prior.as_ref().and_then(Residual::standardised);
+    let angles = bus.boresight_rad.iter().enumerate();
+    let angles = angles.map(|(axis, found)| (Unknown::Boresight { axis }, standardised(found)));
+    let shifts = bus.profile_shifts_m.iter().enumerate();
+    let shifts = shifts.flat_map(|(profile, shift)| {
+        let axes = shift.iter().enumerate();
+        axes.map(move |(axis, found)| {
+            (Unknown::ProfileShift { profile, axis }, standardised(found))
+        })
+    });
+    // What is free contradicts nothing, but lines are not late by just anything.
+    let late = |found: &Estimate| match found.prior {
+        None => Some(found.value / found.root_cofactor.hypot(LINE_TIME_S)),
+        Some(_) => standardised(found),
+    };
+    let times = bus.line_times_s.iter().enumerate();
+    let times = times
+        .filter_map(|(image, found)| Some((Unknown::LineTime { image }, late(found.as_ref()?))));
+    let all = angles.chain(shifts).chain(times);
+    let tested = all.filter_map(|(unknown, standardised)| Some((unknown, standardised?.abs())));
+    let farthest = tested.max_by(|one, other| one.1.total_cmp(&other.1));
+    farthest.map(|(unknown, sigmas)| {
+        let words = unknown_in_words(unknown, images, &assembled.profiles);
+        let words = words.trim_start_matches("the ").to_owned();
+        (words, sigmas)
+    })
+}
