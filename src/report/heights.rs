@@ -1,12 +1,13 @@
 //! What MOLA says of the heights of tie points, and what may be said of their accuracy.
 
+mod profile;
 mod readings;
 mod relief;
 
 use super::{
     html::{Cell, Column, Table, heading, paragraph},
     misregistration::BeforeAfter,
-    plots::{Panel, Plot, Series, Style, figure, label, thinned},
+    plots::{figure, label},
     section::Section,
 };
 use crate::{
@@ -14,14 +15,10 @@ use crate::{
     footprints::AdjustmentModel,
     products::{AdjustmentProducts, GeometricProducts, SiteProducts},
     stages::{
-        check_heights::{HeightCheck, SurfaceFigures, TieHeight},
+        check_heights::{HeightCheck, SurfaceFigures},
         compare_pairs::PairComparison,
     },
-    units::METRES_PER_KM,
 };
-
-/// Tie points that a plot shows.
-const POINTS_SHOWN: usize = 2_000;
 
 pub(super) const SECTION: Section = Section {
     title: "Accuracy, and agreement with MOLA",
@@ -44,43 +41,10 @@ fn write(site: &SiteProducts, geometric: &GeometricProducts) -> Result<String> {
         html += &paragraph(&apart(geometric.heights));
         html += &format!(
             "<div class=\"plots\">\n{}</div>\n",
-            figure(&profile_plot(site, geometric))?
+            figure(&profile::plot(site, geometric))?
         );
     }
     Ok(html)
-}
-
-/// What MOLA says of heights, and what is known of them and of the place.
-pub(super) fn in_a_sentence(geometric: &GeometricProducts) -> String {
-    let before = geometric.heights;
-    let after = geometric
-        .adjustment
-        .as_ref()
-        .map_or_else(String::new, |after| {
-            format!(
-                " and {} it after the adjustment",
-                off_surface(after.heights)
-            )
-        });
-    let mola = match &before.surface {
-        Ok(_) => format!(
-            "Tie points lie {} the MOLA surface before the adjustment{after} (median).",
-            off_surface(before)
-        ),
-        Err(reason) => format!("MOLA does not control heights: {reason}."),
-    };
-    let Some(adjustment) = &geometric.adjustment else {
-        return mola;
-    };
-    let [height, place] = absolute(geometric, adjustment);
-    format!("{mola} Height, absolute: {height}. Place, absolute: {place}.")
-}
-
-/// Median height above or below the surface.
-fn off_surface(check: &HeightCheck) -> String {
-    let median_m = check.above_m.median;
-    let side = if median_m < 0.0 { "below" } else { "above" };
-    format!("{} m {side}", label(median_m.abs(), 1))
 }
 
 /// The three statements that may be made, and by whose judgement.
@@ -178,7 +142,10 @@ const fn agreement_says(adjustment: &AdjustmentProducts) -> &'static str {
 }
 
 /// What is stated of height and place after the adjustment.
-fn absolute(geometric: &GeometricProducts, adjustment: &AdjustmentProducts) -> [String; 2] {
+pub(super) fn absolute(
+    geometric: &GeometricProducts,
+    adjustment: &AdjustmentProducts,
+) -> [String; 2] {
     let summary = &adjustment.adjusted.summary;
     let Some(heights) = &adjustment.adjusted.heights else {
         let statements = if summary.model == AdjustmentModel::Published {
@@ -340,39 +307,5 @@ fn apart(check: &HeightCheck) -> String {
                 label(apart.sigma_m, 1)
             )
         },
-    )
-}
-
-fn dots(label: &str, colour: usize, points: Vec<(f64, f64)>) -> Series {
-    Series {
-        style: Style::Dots,
-        ..Series::line(label, colour, points)
-    }
-}
-
-/// Heights above the surface by latitude.
-fn profile_plot(site: &SiteProducts, geometric: &GeometricProducts) -> Plot {
-    let middle_m = geometric.heights.ties.iter().map(|tie| tie.ground.xyz_m);
-    let middle_m = middle_m.fold(nalgebra::Vector3::zeros(), |sum, place| sum + place);
-    let axes = crate::geom::ellipsoid::local_axes(&middle_m);
-    let north_km = |tie: &TieHeight| axes.row(1).transpose().dot(&tie.ground.xyz_m) / METRES_PER_KM;
-    let points = |check: &HeightCheck| -> Vec<(f64, f64)> {
-        let ties = check.ties.iter();
-        let points: Vec<_> = ties.map(|tie| (north_km(tie), tie.above_m())).collect();
-        thinned(&points, POINTS_SHOWN)
-    };
-    let after = geometric.adjustment.iter();
-    let after = after.map(|of| dots("after it", 1, points(of.heights)));
-    let before = dots("before the adjustment", 0, points(geometric.heights));
-    let series = [before].into_iter().chain(after).collect();
-    let words = format!(
-        "Heights of tie points of {} above the MOLA surface, from south to north, with the orientation of the kernels and, where there is one, with the adjusted one.",
-        site.config.site
-    );
-    Plot::of(
-        "Tie points above the MOLA surface".to_owned(),
-        words,
-        "north of the middle, km",
-        vec![Panel::of("height above the surface, m", series)],
     )
 }

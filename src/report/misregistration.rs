@@ -7,6 +7,7 @@ use super::{
     moved,
     plots::label,
     section::Section,
+    sky,
 };
 use crate::{
     error::Result,
@@ -41,6 +42,7 @@ fn write(site: &SiteProducts, geometric: &GeometricProducts) -> Result<String> {
         html += &paragraph("No two images share tie points that could be intersected.");
     }
     html += &read(geometric);
+    html += &sky::figure(site)?;
     if !pairs.is_empty() {
         html += &geometry(&pairs);
         html += &reprojection(&pairs);

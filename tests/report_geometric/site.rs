@@ -195,6 +195,8 @@ impl Site {
         let evidence = Evidence {
             footprints: Some(self.converted.footprints.len()),
             limits: &self.config.limits,
+            range_limits: &self.config.range_check,
+            orientation_limits: &self.config.orientation,
             ranges: &self.ranges,
             clock_correction_s: self.config.mola_clock.correction_s(),
             images: &images,

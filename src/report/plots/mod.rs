@@ -47,6 +47,8 @@ pub(super) enum Style {
     Line,
     /// Crosses in the colour of marks, for outliers.
     Crosses,
+    /// Upright bars, thin, each from one point to the next.
+    Bars,
 }
 
 /// Points of one kind.
@@ -100,6 +102,8 @@ pub(super) struct Panel {
     pub(super) limits: Vec<f64>,
     /// Whether the dots are counted in bars at the right side.
     pub(super) histogram: bool,
+    /// Whether the points hold logarithms to base 10 of the values; axis and data have the values.
+    pub(super) log: bool,
 }
 
 impl Panel {
@@ -115,6 +119,7 @@ impl Panel {
             marks: Vec::new(),
             limits: Vec::new(),
             histogram: false,
+            log: false,
         }
     }
 }
@@ -165,8 +170,9 @@ impl Plot {
             for series in &panel.series {
                 let name = format!("{},{}", quoted(panel.y_label), quoted(&series.label));
                 for (x, y) in &series.points {
+                    let y = if panel.log { 10_f64.powf(*y) } else { *y };
                     // Writing to a string cannot fail.
-                    let _ = writeln!(csv, "{name},{},{}", rounded(*x), rounded(*y));
+                    let _ = writeln!(csv, "{name},{},{}", rounded(*x), rounded(y));
                 }
             }
             arrows::append_csv(panel, &mut csv);
