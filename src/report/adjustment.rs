@@ -175,10 +175,9 @@ fn observations(summary: &AdjustmentSummary) -> String {
         );
     }
     let words = format!(
-        "The variance component is the standard deviation of unit weight of one kind, √(vᵀPv / redundancy): near 1 where \
-         the a priori standard deviations are right, below 1 where they are too large; 99 of 100 lie \
-         within the limits of χ² by chance. Robust weights keep heights below theirs. Beyond {BAARDA_LIMIT}: \
-         observations that fail Baarda's test; one good one in a thousand does."
+        "Variance component: √(vᵀPv / redundancy), 1 where the a priori standard deviations are right, with its 99 % interval \
+         by χ²; robust weights lower that of heights. Beyond {BAARDA_LIMIT}: failed Baarda's test, as one good observation in \
+         a thousand does."
     );
     table.finish() + &paragraph(&words)
 }

@@ -105,7 +105,9 @@ fn limit(check: &Check) -> String {
 
 /// Decimals by which values near the limit can be told apart from it.
 fn decimals(check: &Check) -> usize {
+    let small = check.value.is_some_and(|value| value.abs() < 1.0);
     let least = match check.kind {
+        CheckKind::ParallaxAfter | CheckKind::PointingRmse if small => 2,
         CheckKind::ClockCorrection | CheckKind::TableError => 4,
         CheckKind::RangeMean | CheckKind::Decoding | CheckKind::PositionRmse => 2,
         _ => 1,

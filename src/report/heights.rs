@@ -7,6 +7,7 @@ mod relief;
 use super::{
     html::{Cell, Column, Table, heading, paragraph},
     misregistration::BeforeAfter,
+    numbers::whole,
     plots::{figure, label},
     section::Section,
 };
@@ -50,12 +51,12 @@ fn write(site: &SiteProducts, geometric: &GeometricProducts) -> Result<String> {
 /// The three statements that may be made, and by whose judgement.
 fn statements(geometric: &GeometricProducts, adjustment: &AdjustmentProducts) -> String {
     let mut table = Table::new(
-        "What is known of the tie points, and by whom",
+        "Accuracy of the tie points",
         &[
-            Column::Text("statement"),
+            Column::Text("accuracy"),
             Column::Text("before the adjustment"),
             Column::Text("after it"),
-            Column::Text("it says"),
+            Column::Text("meaning"),
         ],
     );
     let nothing = || "–".to_owned();
@@ -73,7 +74,7 @@ fn statements(geometric: &GeometricProducts, adjustment: &AdjustmentProducts) ->
             after.map_or_else(nothing, |after| {
                 format!("{after}; residuals {} σ", label(along, 2))
             }),
-            "how well images agree along the flight; nothing of height or place".to_owned(),
+            "how well the images agree along track; nothing about height or position".to_owned(),
         ],
         [
             "agreement with MOLA, height".to_owned(),
@@ -85,10 +86,10 @@ fn statements(geometric: &GeometricProducts, adjustment: &AdjustmentProducts) ->
             "absolute, height".to_owned(),
             format!("a priori: what is known of {}", known_beforehand(geometric)),
             height,
-            "standard deviation of what all tie points share, and of single ones".to_owned(),
+            "standard deviation common to all tie points, and of single ones".to_owned(),
         ],
         [
-            "absolute, place".to_owned(),
+            "absolute, position".to_owned(),
             "as after it".to_owned(),
             place,
             place_says(geometric, adjustment),
@@ -169,7 +170,7 @@ pub(super) fn absolute(
     // What is stated holds only if errors of both images are as likely; half of their difference is no less open.
     let half = if half_m > east_m.max(north_m) {
         format!(
-            "; half of what the images disagree by along the flight, {} m, is open: which of them is right is not known",
+            "; open: half of the along-track disagreement of the images, {} m, since neither is known to be right",
             label(half_m, 0)
         )
     } else {
@@ -204,10 +205,9 @@ fn single_sigmas_m(adjustment: &AdjustmentProducts) -> [f64; 2] {
 
 fn surface_in_words(surface: &SurfaceFigures) -> String {
     format!(
-        "The surface is kriged from {} shots of {} profiles; heights 300 m apart differ by {} m (root mean square), the \
-         slope at the tie points is {} on an axis. Its errors at neighbouring tie points are alike, so the standard deviation \
-         of a mean does not fall with the number of tie points.",
-        surface.shots,
+        "The surface is kriged from {} shots of {} profiles (heights 300 m apart differ by {} m RMS; slope {} per axis). Its \
+         errors at neighbouring tie points are correlated: the uncertainty of a mean does not fall with their number.",
+        whole(surface.shots),
         surface.profiles,
         label(surface.roughness_m, 1),
         label(surface.slope, 3)
@@ -234,8 +234,8 @@ fn compared(geometric: &GeometricProducts) -> String {
             true,
             [
                 state.into(),
-                check.above_m.n.to_string().into(),
-                check.near_shots.to_string().into(),
+                whole(check.above_m.n).into(),
+                whole(check.near_shots).into(),
                 label(check.above_m.median, 1).into(),
                 label(check.above_m.nmad, 1).into(),
                 label(check.above_m.mean, 1).into(),
@@ -284,15 +284,14 @@ fn footprints(geometric: &GeometricProducts) -> String {
     if rows == 0 {
         return String::new();
     }
-    let words = "Of a footprint only the altimeter knows the height; where the second image shows it is what a surface of second \
-         order at most through the tie points says. Relief between tie points therefore spreads single heights; their median \
-         tells what the images have in common.";
+    let words = "Footprints are located in the second image by a surface of at most second order through the tie points; relief \
+                 between these scatters single heights, not their median.";
     table.finish() + &paragraph(words)
 }
 
 fn apart(check: &HeightCheck) -> String {
     check.apart.as_ref().map_or_else(
-        || "A single profile: no other one tests the surface.".to_owned(),
+        || "There is a single profile: nothing independent tests the surface.".to_owned(),
         |apart| {
             let [first, second] = &apart.profiles;
             let (upper, lower) = if apart.mean_m < 0.0 {
@@ -301,8 +300,8 @@ fn apart(check: &HeightCheck) -> String {
                 (first, second)
             };
             format!(
-                "The surface of profile {upper} alone lies {} m above that of {lower} alone at the tie points, with an expected \
-                 standard deviation of {} m.",
+                "At the tie points the surface of profile {upper} alone lies {} m above that of {lower} alone (expected standard \
+                 deviation {} m).",
                 label(apart.mean_m.abs(), 1),
                 label(apart.sigma_m, 1)
             )

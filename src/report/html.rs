@@ -121,6 +121,14 @@ pub(super) fn heading(text: &str) -> String {
     format!("<h3>{}</h3>\n", escape(text))
 }
 
+/// HTML that is unfolded on request.
+pub(super) fn folded(title: &str, html: &str) -> String {
+    format!(
+        "<details class=\"more\"><summary>{}</summary>\n{html}</details>\n",
+        escape(title)
+    )
+}
+
 /// A paragraph of text.
 pub(super) fn paragraph(text: &str) -> String {
     if text.is_empty() {

@@ -7,6 +7,7 @@ mod sheets;
 
 use std::{collections::BTreeMap, f64::consts::FRAC_PI_2, fmt::Write as _};
 
+use geo::Simplify as _;
 use plotters::prelude::*;
 
 use self::{
@@ -37,7 +38,9 @@ const MAP_SHOTS: usize = 2_500;
 /// Tie points likewise.
 const MAP_TIES: usize = 400;
 /// Least and greatest height of the picture against its width.
-const RATIO: (f64, f64) = (0.5, 0.9);
+const RATIO: (f64, f64) = (0.5, 0.78);
+/// What rounding takes a point of a line off it at most, units of the drawing.
+const ROUNDING: f64 = 1.0;
 /// Colours of image outlines and of tie points; the ground has none like them.
 const IMAGE: usize = 3;
 const TIE: usize = 1;
@@ -247,7 +250,7 @@ impl Sheet {
         let closed = ring.iter().chain(ring.first());
         let places: Vec<Option<(i32, i32)>> = closed.map(|point| self.place(*point)).collect();
         for run in places.split(Option::is_none) {
-            let pixels: Vec<(i32, i32)> = run.iter().copied().flatten().collect();
+            let pixels = straightened(run.iter().copied().flatten());
             if pixels.len() > 1 {
                 area.draw(&PathElement::new(pixels, style))?;
             }
@@ -414,6 +417,15 @@ impl Sheet {
         }
         csv
     }
+}
+
+/// A line without the points that rounding alone takes off it: straight edges stay straight.
+fn straightened(pixels: impl Iterator<Item = (i32, i32)>) -> Vec<(i32, i32)> {
+    let line: geo::LineString = pixels.map(|(x, y)| (f64::from(x), f64::from(y))).collect();
+    let kept = line.simplify(ROUNDING);
+    kept.coords()
+        .map(|place| (place.x as i32, place.y as i32))
+        .collect()
 }
 
 /// Orbit and places of the profiles that have shots on the sheet; of two passes of an orbit the first.

@@ -46,6 +46,7 @@ mod scan;
 mod section;
 mod selection;
 mod sites;
+mod sites_map;
 mod sky;
 mod summary;
 mod timeline;

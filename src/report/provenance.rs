@@ -2,6 +2,7 @@
 
 use super::{
     html::{Cell, Column, Table, escape, paragraph},
+    numbers::whole,
     section::Section,
 };
 use crate::products::SiteProducts;
@@ -37,7 +38,7 @@ fn write(site: &SiteProducts) -> String {
             [
                 (&kernel.name).into(),
                 (&kernel.role).into(),
-                kernel.bytes.to_string().into(),
+                whole(kernel.bytes).into(),
                 hash(&kernel.blake3),
             ],
         );

@@ -2,6 +2,7 @@
 
 use super::{
     html::{Column, Table, paragraph},
+    numbers::whole,
     plots::{COLOURS, Extent, GREY, INK, Mark, Panel, Plot, Series, Style, figure, label, thinned},
     section::Section,
 };
@@ -17,7 +18,7 @@ const COLOURED: usize = COLOURS.len() - 1;
 /// Dots of one series.
 const DOTS_MAX: usize = 600;
 /// Widths of the image that are shown on either side of it.
-const WIDTHS_BESIDE: f64 = 1.0;
+const WIDTHS_BESIDE: f64 = 0.15;
 
 pub(super) const SECTION: Section = Section {
     title: "Registration",
@@ -81,7 +82,7 @@ fn profiles(site: &SiteProducts, images: &[&ImageProducts]) -> String {
                     (&image.times.id).into(),
                     (&profile.id).into(),
                     if together { "yes" } else { "no" }.into(),
-                    on_image.inside.to_string().into(),
+                    whole(on_image.inside).into(),
                     inside(&points.line).into(),
                     inside(&points.sample).into(),
                     spacing
@@ -96,9 +97,8 @@ fn profiles(site: &SiteProducts, images: &[&ImageProducts]) -> String {
         .flat_map(|image| image.registration.rejected.values())
         .sum();
     let words = format!(
-        "Every profile is projected into every image. {elsewhere} pairs of profile and image without a footprint in the \
-         image are left out here; {rejected} footprints have no place in an image at all (behind the camera, beyond \
-         the horizon)."
+        "Every profile is projected into every image; {elsewhere} combinations without a footprint in the image are not \
+         listed. {rejected} footprints cannot be projected (behind the camera or beyond the horizon)."
     );
     table.finish() + &paragraph(&words)
 }
@@ -160,10 +160,14 @@ fn plane(profiles: &[Profile], image: &ImageProducts) -> Plot {
         ..Panel::of("sample", series)
     };
     let words = format!(
-        "Footprints on the image plane, flight to the right; level and upright lines are the edges of the delivered \
-         image. {} of {} footprints lie in the image, {shown} series are near it.",
-        points.inside_count(),
-        points.len()
+        "Footprints on the image plane, flight to the right, with the edges of the delivered image (dashed across, solid \
+         at its ends). {} of {} footprints lie in the image; {} near it.",
+        whole(points.inside_count()),
+        whole(points.len()),
+        match shown {
+            1 => "one profile is".to_owned(),
+            count => format!("{count} profiles are"),
+        }
     );
     Plot {
         x: Extent::of([0.0, lines].into_iter()),

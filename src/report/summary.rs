@@ -81,9 +81,9 @@ fn about(site: &SiteProducts) -> String {
         counted(site.footprints.len(), "footprint"),
         counted(site.profiles.len(), "profile")
     ));
-    let mut words = escape(&site.config.description);
+    let mut words = escape(site.config.description.trim_end_matches('.'));
     if !words.is_empty() {
-        words += "<br>";
+        words += ". ";
     }
     words += &escape(&(parts.join("; ") + "."));
     format!("<p class=\"about\">{words}</p>\n")
@@ -155,7 +155,10 @@ fn between_images(site: &SiteProducts) -> Option<KeyNumber> {
     let (_, before_m) = checked(site, CheckKind::ParallaxBefore)?;
     Some(KeyNumber {
         what: "Between images, along track",
-        value: format!("{} m", number(after_m.abs(), 1)),
+        value: format!(
+            "{} m",
+            number(after_m.abs(), if after_m.abs() < 1.0 { 2 } else { 1 })
+        ),
         note: format!(
             "at the tie points of {}; {} m before",
             after.subject,
@@ -173,7 +176,7 @@ fn in_place(site: &SiteProducts) -> Option<KeyNumber> {
     Some(KeyNumber {
         what: "Absolute accuracy, 1 σ",
         value: format!(
-            "±{} m in plan, ±{} m in height",
+            "±{} m plan, ±{} m height",
             number(east_m.max(north_m), 0),
             number(up_m, 1)
         ),

@@ -44,6 +44,23 @@ impl Verdict {
             (true, _) => "valid with remarks",
         }
     }
+
+    /// The three checks that say most of how good the products are: heights by MOLA, images by each other, ranges; then
+    /// orbits and pointing where there are no tie points.
+    pub fn key_checks(&self) -> impl Iterator<Item = &Check> {
+        let kinds = [
+            CheckKind::HeightAfter,
+            CheckKind::ParallaxAfter,
+            CheckKind::RangeMean,
+            CheckKind::OrbitsApart,
+            CheckKind::PointingRmse,
+        ];
+        let checks = kinds.into_iter().filter_map(|kind| {
+            let mut checks = self.checks.iter();
+            checks.find(|check| check.kind == kind && check.value.is_some())
+        });
+        checks.take(3)
+    }
 }
 
 /// What is known of a site when it is judged.

@@ -1,6 +1,6 @@
 //! Heights from south to north: the MOLA surface with its uncertainty, and tie points before and after.
 
-use super::super::plots::{Panel, Plot, Series, Style, label, thinned};
+use super::super::plots::{Extent, Panel, Plot, Series, Style, label, thinned};
 use crate::{
     geom::{ellipsoid::local_axes, statistics::Summary},
     products::{GeometricProducts, SiteProducts},
@@ -10,6 +10,8 @@ use crate::{
 
 /// Tie points that are drawn.
 const POINTS_SHOWN: usize = 400;
+/// One value in so many may lie beyond each end of the axis of differences.
+const OUTERMOST: usize = 60;
 /// Colours of the surface, of what was before and after.
 const SURFACE: usize = super::super::plots::GREY;
 const BEFORE: usize = 1;
@@ -59,6 +61,7 @@ pub(super) fn plot(site: &SiteProducts, geometric: &GeometricProducts) -> Plot {
         Panel::of("height, m", heights),
         Panel {
             height: 300,
+            y: without_extremes(&differences),
             ..Panel::of("above MOLA, m", differences)
         },
     ];
@@ -69,6 +72,17 @@ pub(super) fn plot(site: &SiteProducts, geometric: &GeometricProducts) -> Plot {
         "north of the middle, km",
         panels,
     )
+}
+
+/// An axis for all but the outermost values, which are drawn at its edge.
+fn without_extremes(series: &[Series]) -> Extent {
+    let mut values: Vec<f64> = series
+        .iter()
+        .flat_map(|of| of.points.iter().map(|point| point.1))
+        .collect();
+    values.sort_unstable_by(f64::total_cmp);
+    let outermost = values.len() / OUTERMOST;
+    Extent::of(values[outermost..values.len() - outermost].iter().copied())
 }
 
 fn words(site: &SiteProducts, geometric: &GeometricProducts) -> String {

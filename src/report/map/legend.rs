@@ -69,7 +69,8 @@ impl Legend<'_> {
             let [red, green, blue] =
                 relief::colour((f64::from(place) + 0.5) / f64::from(BAR_STEPS));
             let x = left + place * step;
-            let corners = [(x, top), (x + step, bottom)];
+            // One unit into the next step, so that no paper shows between them.
+            let corners = [(x, top), (x + step + 1, bottom)];
             area.draw(&Rectangle::new(
                 corners,
                 RGBColor(red, green, blue).filled(),

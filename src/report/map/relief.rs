@@ -129,8 +129,8 @@ fn membrane(sums: &Grid, counts: &Grid) -> Grid {
     surface
 }
 
-/// Whether each cell lies within `reach` cells of a known one.
-fn within_reach(counts: &Grid, reach: f64) -> Vec<bool> {
+/// How much of each cell is seen: all near a known one, nothing beyond `reach` cells, less and less before that.
+fn within_reach(counts: &Grid, reach: f64) -> Vec<f64> {
     let (columns, rows) = (counts.columns, counts.rows);
     let known = counts.values.iter().map(|count| *count > 0.0);
     let mut far: Vec<f64> = known
@@ -160,13 +160,17 @@ fn within_reach(counts: &Grid, reach: f64) -> Vec<bool> {
             }
         }
     }
-    far.into_iter().map(|far| far <= reach).collect()
+    let fading = 0.4 * reach;
+    far.into_iter()
+        .map(|far| ((reach - far) / fading).clamp(0.0, 1.0))
+        .collect()
 }
 
 /// The ground of a sheet, shaded.
 pub(super) struct Relief {
     surface: Grid,
-    shown: Vec<bool>,
+    /// How much of each cell is seen, 0 to 1.
+    shown: Vec<f64>,
     cell_m: f64,
     /// How many times heights are exaggerated for the shading.
     pub(super) exaggeration: f64,
@@ -204,7 +208,7 @@ impl Relief {
     /// Slopes towards east and south of every cell that is shown.
     fn slopes(&self) -> impl Iterator<Item = (usize, f64, f64)> {
         let (surface, columns) = (&self.surface, self.surface.columns);
-        let cells = (0..self.shown.len()).filter(|cell| self.shown[*cell]);
+        let cells = (0..self.shown.len()).filter(|cell| self.shown[*cell] > 0.0);
         cells.map(move |cell| {
             let (column, row) = ((cell % columns) as isize, (cell / columns) as isize);
             let east = surface.at(column + 1, row) - surface.at(column - 1, row);
@@ -241,7 +245,7 @@ impl Relief {
             let light = shade(self.exaggeration * east, self.exaggeration * south);
             let lit = colour(share).map(|channel| lit(channel, light));
             pixels[4 * cell..4 * cell + 3].copy_from_slice(&lit);
-            pixels[4 * cell + 3] = u8::MAX;
+            pixels[4 * cell + 3] = (255.0 * self.shown[cell]).round() as u8;
         }
         let png = png(
             &pixels,
@@ -345,8 +349,10 @@ mod tests {
         let shots = (0..80).map(|shot| ((4_000.0, 300.0 * f64::from(shot)), f64::from(shot)));
         let relief = Relief::of(&VIEW, shots).unwrap();
         let row = 120 * relief.surface.columns;
-        assert!(relief.shown[row + 40] && relief.shown[row + 60]);
-        assert!(!relief.shown[row + 64] && !relief.shown[row + 200]);
+        let seen = [40, 50, 58, 64, 200].map(|column| relief.shown[row + column]);
+        assert!(seen[..2].iter().all(|share| *share > 0.999), "{seen:?}");
+        assert!(0.0 < seen[2] && seen[2] < 1.0, "{seen:?}");
+        assert!(seen[3..].iter().all(|share| *share <= 0.0), "{seen:?}");
         assert!(relief.exaggeration >= 50.0, "{}", relief.exaggeration);
         assert!((plane(1.0).exaggeration - 1.0).abs() < 1e-9); // rounding
         assert!(Relief::of(&VIEW, std::iter::empty()).is_none());

@@ -1,5 +1,7 @@
 //! One check of a site: what was found, what is allowed, and who says so.
 
+use std::fmt;
+
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -223,6 +225,26 @@ impl Check {
                 worst
             }
         })
+    }
+}
+
+impl fmt::Display for Check {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(formatter, "{}", self.kind.words())?;
+        if !self.subject.is_empty() {
+            write!(formatter, " of {}", self.subject)?;
+        }
+        let (Some(value), Some(limit)) = (self.value, self.limit) else {
+            return Ok(());
+        };
+        let bound = if self.kind.at_least() {
+            "at least"
+        } else {
+            "at most"
+        };
+        let unit = &self.unit;
+        let text = format!("{value:.2} {unit}; {bound} {limit} {unit}");
+        write!(formatter, ": {}", text.trim_end())
     }
 }
 
