@@ -9,7 +9,7 @@ use super::{
 };
 
 /// Height of the axis below the lowest panel, with its labels.
-pub(super) const FOOT: u32 = 110;
+pub(super) const FOOT: u32 = 96;
 /// Room between panels, for the labels at their corners.
 const GUTTER: u32 = 16;
 /// Width of the axes at the left side.

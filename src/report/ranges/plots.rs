@@ -180,7 +180,6 @@ fn words(ranges: &ProfileRanges) -> String {
 
 /// Points of one profile over seconds from its start.
 struct Shots {
-    id: String,
     kept: Vec<(f64, f64)>,
     outliers: Vec<(f64, f64)>,
     off_nadir_deg: Vec<(f64, f64)>,
@@ -194,7 +193,6 @@ impl Shots {
         let (profile, all) = (&site.profiles[index], &site.ranges.shots);
         let start_s = profile.interval.start.seconds();
         let mut shots = Self {
-            id: profile.id.clone(),
             kept: Vec::new(),
             outliers: Vec::new(),
             off_nadir_deg: Vec::new(),

@@ -243,6 +243,8 @@ impl fmt::Display for Check {
             "at most"
         };
         let unit = &self.unit;
+        // Limits that follow from uncertainties have more digits than anyone reads.
+        let limit = (100.0 * limit).round() / 100.0;
         let text = format!("{value:.2} {unit}; {bound} {limit} {unit}");
         write!(formatter, ": {}", text.trim_end())
     }
