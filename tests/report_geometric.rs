@@ -455,7 +455,9 @@ fn images_without_a_common_tie_point_are_said_to_be_so() {
     let page = site.page();
     assert!(section(&page, SECTIONS[0]).contains("No two images share tie points"));
     assert!(!page.contains(&format!("id=\"{}\"", SECTIONS[2])));
-    assert!(lead(&page).contains("<p>Tie points lie "));
+    // Heights by MOLA need no pair; how far apart images are does.
+    assert!(lead(&page).contains("<dt>Heights against MOLA</dt>"));
+    assert!(!lead(&page).contains("<dt>Between images, along track</dt>"));
 }
 
 #[test]
@@ -469,7 +471,7 @@ fn tie_points_tell_the_misregistration_where_no_footprint_is_in_both_images() {
         site.adjusted_pairs[0].along_track_parallax_m,
     );
     let page = site.page();
-    let words = lead(&page);
+    let words = section(&page, SECTIONS[0]);
     assert!(
         words.contains("before the adjustment a tie point falls")
             && words.contains(&format!("({before_m:.0} m) apart"))
@@ -481,8 +483,8 @@ fn tie_points_tell_the_misregistration_where_no_footprint_is_in_both_images() {
     before.outside = 1;
     let page = site.page();
     let text = section(&page, SECTIONS[0]);
-    assert!(text.contains("No footprint counts here: tie points alone tell"));
-    assert!(text.contains("1 footprint within the lines of both images lies outside one of them"));
+    assert!(text.contains("No footprint is shown by both images: the tie points alone tell"));
+    assert!(text.contains("between the first and last line of the tie points (1 outside)"));
 }
 
 #[test]

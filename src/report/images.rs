@@ -5,6 +5,7 @@ use super::{
     numbers::whole,
     plots::{GREY, Panel, Plot, Series, figure},
     section::Section,
+    sky,
 };
 use crate::{
     error::Result,
@@ -32,6 +33,7 @@ fn write(site: &SiteProducts) -> Result<String> {
         .map(|image| figure(&residual_plot(image)))
         .collect::<Result<String>>()?;
     Ok(taken(site)
+        + &sky::figure(site)?
         + &light_time(site)
         + &models(site)
         + &format!("<div class=\"plots\">\n{figures}</div>\n"))

@@ -2,27 +2,26 @@
 
 pub(super) mod labels;
 mod legend;
+mod names;
 mod relief;
 mod sheets;
+mod told;
 
-use std::{collections::BTreeMap, f64::consts::FRAC_PI_2, fmt::Write as _};
+use std::collections::BTreeMap;
 
 use geo::Simplify as _;
 use plotters::prelude::*;
 
 use self::{
-    labels::Labels,
     legend::{Legend, STRIP},
     relief::Relief,
     sheets::{Shown, sheets},
+    told::names,
 };
 use super::{
-    graticule::{GridLine, View, graticule},
-    html::{counted, paragraph},
-    outlines::Outline,
-    plots::{
-        COLOURS, Canvas, Drawn, GRID, INK, Key, WIDTH, drawn, figure_html, label, quoted, thinned,
-    },
+    graticule::{View, graticule},
+    html::paragraph,
+    plots::{COLOURS, Canvas, Drawn, GRID, INK, WIDTH, drawn, figure_html, thinned},
     section::Section,
 };
 use crate::{
@@ -30,7 +29,6 @@ use crate::{
     error::Result,
     geom::{ellipsoid::Spherical, map_projection::MapProjection},
     products::SiteProducts,
-    units::RADIANS_PER_DEGREE,
 };
 
 /// Shots of a map, drawn and listed; about 140 bytes each.
@@ -257,166 +255,6 @@ impl Sheet {
         }
         Ok(())
     }
-
-    /// Names of images first, then of the graticule, then of as many profiles as there is room for.
-    fn names(&self, lines: &[GridLine]) -> Labels {
-        let mut labels = Labels::new(WIDTH as i32, self.height());
-        for image in &self.shown.images {
-            let wide = labels::width(&image.name);
-            let mut corners: Vec<(i32, i32)> = image
-                .ring
-                .iter()
-                .filter_map(|point| self.place(*point))
-                .collect();
-            corners.sort_by_key(|(x, y)| (*y, *x));
-            let beside = corners
-                .iter()
-                .flat_map(|(x, y)| [(x + 10, *y), (x - wide - 10, *y), (x - wide / 2, y - 22)]);
-            labels.place(&image.name, COLOURS[IMAGE], beside);
-        }
-        for line in lines {
-            labels.place(&line.name, labels::PLAIN, self.places_of(line).into_iter());
-        }
-        for (name, places) in &self.profiles {
-            let ends = [places.first(), places.last()].into_iter().flatten();
-            let ends = ends.filter_map(|end| self.place(*end));
-            let beside = ends.flat_map(|(x, y)| {
-                let wide = labels::width(name);
-                [-20, 20]
-                    .map(|down| (x - wide / 2, y + down))
-                    .into_iter()
-                    .chain([(x + 8, y), (x - wide - 8, y)])
-            });
-            labels.place(name, labels::PLAIN, beside);
-        }
-        labels
-    }
-
-    /// Where a line of the graticule may have its name: a parallel at the left or right edge, a meridian at the lower or
-    /// upper one, and where meridians run together in a pole, where they leave the sheet.
-    fn places_of(&self, line: &GridLine) -> Vec<(i32, i32)> {
-        let (width, height) = (WIDTH as i32, self.height());
-        let wide = labels::width(&line.name);
-        let ends: Vec<(i32, i32)> = line
-            .segments
-            .iter()
-            .flatten()
-            .map(|place| self.pixel(*place))
-            .collect();
-        let held = |(x, y): (i32, i32)| (x.clamp(8, width - wide - 8), y.clamp(20, height - 20));
-        let left = ends.iter().min_by_key(|(x, _)| *x);
-        let right = ends.iter().max_by_key(|(x, _)| *x);
-        let low = ends.iter().max_by_key(|(_, y)| *y);
-        let high = ends.iter().min_by_key(|(_, y)| *y);
-        let outermost = ends
-            .iter()
-            .max_by_key(|(x, y)| (x - width / 2).pow(2) + (y - height / 2).pow(2));
-        let places: Vec<(i32, i32)> = if line.is_parallel {
-            [left, right]
-                .into_iter()
-                .flatten()
-                .map(|(x, y)| (*x, y - 18))
-                .collect()
-        } else if self.pole() {
-            outermost.into_iter().copied().collect()
-        } else {
-            [low, high]
-                .into_iter()
-                .flatten()
-                .map(|(x, y)| (x + 6, *y))
-                .collect()
-        };
-        places.into_iter().map(held).collect()
-    }
-
-    /// Whether a pole lies on the sheet.
-    fn pole(&self) -> bool {
-        [FRAC_PI_2, -FRAC_PI_2].into_iter().any(|pole| {
-            let place = self.map.project(0.0, pole);
-            place.is_some_and(|place| self.view.contains(place))
-        })
-    }
-
-    fn keys(&self) -> Vec<Key> {
-        let mut keys = Vec::new();
-        if !self.shown.images.is_empty() {
-            keys.push(Key::colour("image outlines", IMAGE));
-        }
-        if !self.ties_rad.is_empty() {
-            keys.push(Key::colour("tie points", TIE));
-        }
-        keys
-    }
-
-    fn words(&self, relief: Option<&Relief>) -> String {
-        let mut words = String::new();
-        if !self.shown.windows.is_empty() {
-            words += &format!("Windows (lines): {}. ", names(&self.shown.windows));
-        }
-        if !self.shown.rows.is_empty() {
-            words += &format!(
-                "{} (dots, profiles named by orbit), {} to {} m above the areoid. ",
-                counted(self.shown.rows.len(), "footprint"),
-                label(self.heights_m.0, 0),
-                label(self.heights_m.1, 0)
-            );
-            if self.shots.len() < self.shown.rows.len() {
-                words += &format!(
-                    "One in {} is drawn. ",
-                    self.shown.rows.len().div_ceil(MAP_SHOTS)
-                );
-            }
-        }
-        if let Some(relief) = relief {
-            words += &format!(
-                "Ground interpolated between all shots, lit from the north-west, heights exaggerated {} ×. ",
-                label(relief.exaggeration, 0)
-            );
-        }
-        let south = self.map.latitude_rad() < 0.0;
-        words
-            + &format!(
-                "IAU 2000, areocentric; equal-area projection centred on {:.2}° E {:.2}° {}.",
-                self.map.longitude_rad() / RADIANS_PER_DEGREE,
-                self.map.latitude_rad().abs() / RADIANS_PER_DEGREE,
-                if south { "S" } else { "N" }
-            )
-    }
-
-    fn csv(&self) -> String {
-        let mut csv = "what,name,longitude_deg,latitude_deg,height_m\n".to_owned();
-        let mut line = |what: &str, name: &str, place: &(f64, f64), height: &str| {
-            let [longitude, latitude] = [place.0, place.1].map(|angle| angle / RADIANS_PER_DEGREE);
-            // Writing to a string cannot fail.
-            let _ = writeln!(
-                csv,
-                "{what},{},{longitude:.6},{latitude:.6},{height}",
-                quoted(name)
-            );
-        };
-        for (what, outlines) in [
-            ("window", &self.shown.windows),
-            ("image", &self.shown.images),
-        ] {
-            for outline in outlines {
-                for place in &outline.ring {
-                    line(what, &outline.name, place, "");
-                }
-            }
-        }
-        for shot in &self.shots {
-            line(
-                "shot",
-                "",
-                &shot.place_rad,
-                &format!("{:.2}", shot.height_m),
-            );
-        }
-        for tie in &self.ties_rad {
-            line("tie point", "", tie, "");
-        }
-        csv
-    }
 }
 
 /// A line without the points that rounding alone takes off it: straight edges stay straight.
@@ -470,13 +308,6 @@ fn ties_rad(site: &SiteProducts) -> Vec<(f64, f64)> {
     places
         .map(|place| (place.longitude_rad, place.latitude.0))
         .collect()
-}
-
-/// Names of outlines, each once: holes and islands are rings of the same window.
-fn names(outlines: &[Outline]) -> String {
-    let mut names: Vec<&str> = outlines.iter().map(|outline| &*outline.name).collect();
-    names.dedup();
-    names.join(", ")
 }
 
 /// 1, 2 or 5 times a power of ten, at most `length`.

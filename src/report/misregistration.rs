@@ -8,7 +8,6 @@ use super::{
     numbers::whole,
     plots::label,
     section::Section,
-    sky,
 };
 use crate::{
     error::Result,
@@ -43,7 +42,6 @@ fn write(site: &SiteProducts, geometric: &GeometricProducts) -> Result<String> {
         html += &paragraph("No two images share tie points that could be intersected.");
     }
     html += &read(geometric);
-    html += &sky::figure(site)?;
     if !pairs.is_empty() {
         html += &geometry(&pairs);
         html += &reprojection(&pairs);
