@@ -238,6 +238,27 @@ fn entries_that_are_never_used_are_told() {
 }
 
 #[test]
+fn a_window_that_goes_more_than_half_round_mars_is_named() {
+    let folder = folder();
+    let warned = |longitudes: &str| {
+        let text = format!(
+            "site = 's'\n\
+             kernels = {{ metakernel = '../kernels/scene.tm' }}\n\
+             windows = [{{ id = 'w', longitude_deg = {longitudes}, latitude_deg = [0, 1] }}]\n\
+             images = [{{ id = 'i', label = '../labels/e0202855.lbl' }}]\n"
+        );
+        parse_in(&folder, &text).warnings.join("\n")
+    };
+    let said = "site.toml:3:39: longitude_deg goes 359° eastward, from 176.5° to 175.5°; if it should be the other 1°, \
+                write [175.5, 176.5]";
+    let swapped = warned("[176.5, 175.5]");
+    assert!(swapped.contains(said), "{swapped}");
+    for usual in ["[175.5, 176.5]", "[350, 10]", "[170, -170]", "[0, 360]"] {
+        assert!(!warned(usual).contains("eastward"), "{usual}");
+    }
+}
+
+#[test]
 fn two_files_of_one_site_are_both_named() {
     let folder = folder();
     let one = parse_in(&folder, &example_text()).site;

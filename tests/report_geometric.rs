@@ -59,14 +59,28 @@ fn the_first_lines_tell_how_far_images_disagree_before_and_after() {
     assert!(before_m > 0.5 * spacing_m && after_m < 0.05 * spacing_m);
     let words = format!(
         "before the adjustment a footprint falls {:.2} MOLA spacings ({before_m:.0} m) apart in the two images along \
-         the flight; after it {:.3} MOLA spacings ({after_m:.1} m). Tie points lie {:.1} m below the MOLA surface before \
-         the adjustment and {:.1} m below it after the adjustment (median).",
+         the flight; after it {:.3} MOLA spacings ({after_m:.1} m).",
         before_m / spacing_m,
         after_m / spacing_m,
-        -site.heights.above_m.median,
-        -site.adjusted_heights.above_m.median
     );
-    assert!(lead(&page).contains(&words), "{words}\n{}", lead(&page));
+    let told = section(&page, "tie-points-and-misregistration");
+    assert!(told.contains(&words), "{words}\n{told}");
+    let minus = |value: f64| format!("{value:+.1}").replace('-', "−");
+    let heights = format!(
+        "<b>{} m</b> median of {} tie points; {} m before the adjustment",
+        minus(site.adjusted_heights.above_m.median),
+        site.heights.above_m.n,
+        minus(site.heights.above_m.median)
+    );
+    let images = format!(
+        "<b>{:.2} m</b> at the tie points of {}; {:.0} m before",
+        site.adjusted_pairs[0].along_track_parallax_m.abs(),
+        site.pairs[0].images.join(" and "),
+        site.pairs[0].along_track_parallax_m.abs()
+    );
+    for said in [heights, images] {
+        assert!(lead(&page).contains(&said), "{said}\n{}", lead(&page));
+    }
 }
 
 #[test]
@@ -87,6 +101,40 @@ fn the_published_page_has_all_sections_and_stays_small() {
         assert!(!["NaN", "inf", "Infinity"].contains(&word), "{word}");
     }
     page::assert_complete(page);
+}
+
+#[test]
+fn every_number_of_the_checks_is_that_of_the_manifest() {
+    let site = Site::gusev();
+    let checks = site.manifest["verdict"]["checks"].as_array().unwrap();
+    let rows = table(&site.published, "Checks");
+    assert_eq!(rows.len(), checks.len());
+    assert!(checks.len() > 20, "{}", checks.len());
+    for (row, check) in rows.iter().zip(checks) {
+        let outcome = check["outcome"].as_str().unwrap();
+        assert!(row[0].ends_with(outcome), "{row:?} {check}");
+        assert!(
+            row[1].ends_with(check["subject"].as_str().unwrap()),
+            "{row:?}"
+        );
+        for (text, value) in [(&row[2], &check["value"]), (&row[3], &check["limit"])] {
+            let Some(value) = value.as_f64() else {
+                assert_eq!(text, "–");
+                continue;
+            };
+            let text = text.trim_start_matches(['±', '≤', '≥', ' ', '+']);
+            let (digits, unit) = text.split_once(' ').unwrap_or((text, ""));
+            assert_eq!(unit, check["unit"].as_str().unwrap(), "{row:?}");
+            let decimals = digits.split_once('.').map_or(0, |(_, rest)| rest.len());
+            // Some values are told without their sign.
+            let found = number(digits);
+            let value = if found < 0.0 { value } else { value.abs() };
+            agree(digits, value, i32::try_from(decimals).unwrap());
+        }
+    }
+    // A site is invalid when, and only when, a check fails.
+    let fails = checks.iter().any(|check| check["outcome"] == "fail");
+    assert_eq!(site.manifest["verdict"]["valid"], !fails);
 }
 
 #[test]
@@ -247,7 +295,8 @@ fn the_tables_of_the_adjustment_are_its_summary() {
     let steps = csv(&page, "convergence-of-the-adjustment");
     assert_eq!(steps.len(), 1 + site.adjusted.weighted_squares.len());
     for (row, squares) in steps[1..].iter().zip(&site.adjusted.weighted_squares) {
-        agree(&row[3], squares.log10(), 6);
+        // The data have eight digits.
+        assert!((number(&row[3]) / squares - 1.0).abs() < 1e-6, "{row:?}");
     }
 }
 
@@ -406,7 +455,9 @@ fn images_without_a_common_tie_point_are_said_to_be_so() {
     let page = site.page();
     assert!(section(&page, SECTIONS[0]).contains("No two images share tie points"));
     assert!(!page.contains(&format!("id=\"{}\"", SECTIONS[2])));
-    assert!(lead(&page).contains("<p>Tie points lie "));
+    // Heights by MOLA need no pair; how far apart images are does.
+    assert!(lead(&page).contains("<dt>Heights against MOLA</dt>"));
+    assert!(!lead(&page).contains("<dt>Between images, along track</dt>"));
 }
 
 #[test]
@@ -420,7 +471,7 @@ fn tie_points_tell_the_misregistration_where_no_footprint_is_in_both_images() {
         site.adjusted_pairs[0].along_track_parallax_m,
     );
     let page = site.page();
-    let words = lead(&page);
+    let words = section(&page, SECTIONS[0]);
     assert!(
         words.contains("before the adjustment a tie point falls")
             && words.contains(&format!("({before_m:.0} m) apart"))
@@ -432,8 +483,8 @@ fn tie_points_tell_the_misregistration_where_no_footprint_is_in_both_images() {
     before.outside = 1;
     let page = site.page();
     let text = section(&page, SECTIONS[0]);
-    assert!(text.contains("No footprint counts here: tie points alone tell"));
-    assert!(text.contains("1 footprint within the lines of both images lies outside one of them"));
+    assert!(text.contains("No footprint is shown by both images: the tie points alone tell"));
+    assert!(text.contains("between the first and last line of the tie points (1 outside)"));
 }
 
 #[test]

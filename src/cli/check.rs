@@ -3,12 +3,22 @@
 use std::path::PathBuf;
 
 use clap::Args;
+use serde_json::json;
 
 use super::{load_sites, output};
-use crate::{error::Error, flow::check_site, store::hashes::HashCache};
+use crate::{
+    error::Error,
+    flow::{Checked, check_site},
+    store::hashes::HashCache,
+};
 
 /// Checks configuration, files and kernel coverage; reports everything that a run would stumble over.
+///
+/// Examples:
+///   areograph check sites/gusev.toml
+///   areograph check sites/*.toml --json
 #[derive(Debug, Args)]
+#[command(verbatim_doc_comment)]
 pub(super) struct Arguments {
     /// Site files (TOML).
     #[arg(required = true, value_name = "SITE.toml")]
@@ -19,21 +29,21 @@ pub(super) struct Arguments {
     /// Read every input file again, whatever is known of files that did not change.
     #[arg(long)]
     rehash: bool,
+    /// Print JSON.
+    #[arg(long)]
+    json: bool,
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<(), Error> {
     let hashes = HashCache::in_folder(&arguments.out, arguments.rehash);
     let mut last = None;
+    let mut answers = Vec::new();
     for site in load_sites(&arguments.sites)? {
         let checked = check_site(&site, &hashes);
-        let word = if checked.failures.is_empty() {
-            "ready"
+        if arguments.json {
+            answers.push(answer(&site.site, &checked));
         } else {
-            "NOT READY"
-        };
-        output::line(format_args!("{}: {word}", site.site));
-        for finding in checked.findings {
-            output::line(format_args!("  {finding}"));
+            print(&site.site, &checked);
         }
         for failure in checked.failures {
             if let Some(earlier) = last.replace(failure) {
@@ -41,5 +51,30 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Error> {
             }
         }
     }
+    if arguments.json {
+        output::json(&answers.into());
+    }
     last.map_or(Ok(()), Err)
+}
+
+fn print(site: &str, checked: &Checked) {
+    let word = if checked.failures.is_empty() {
+        "ready"
+    } else {
+        "NOT READY"
+    };
+    output::line(format_args!("{site}: {word}"));
+    for finding in &checked.findings {
+        output::line(format_args!("  {finding}"));
+    }
+}
+
+fn answer(site: &str, checked: &Checked) -> serde_json::Value {
+    let failures = checked.failures.iter().map(ToString::to_string);
+    json!({
+        "site": site,
+        "ready": checked.failures.is_empty(),
+        "findings": checked.findings,
+        "failures": failures.collect::<Vec<_>>(),
+    })
 }

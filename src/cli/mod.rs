@@ -5,9 +5,11 @@ mod completions;
 mod kernels;
 mod manual;
 mod nightly;
+mod open;
 mod output;
 mod pedr;
 mod plan;
+mod progress;
 mod report;
 mod run;
 mod scene;
@@ -19,7 +21,7 @@ mod worker;
 
 use std::process::ExitCode;
 
-use clap::{Parser, Subcommand};
+use clap::{ArgAction, Parser, Subcommand, ValueEnum};
 use tracing::level_filters::LevelFilter;
 
 use crate::{
@@ -37,11 +39,23 @@ struct Cli {
     /// Print errors only.
     #[arg(short, long, global = true, conflicts_with = "verbose")]
     quiet: bool,
-    /// Print more detail.
-    #[arg(short, long, global = true)]
-    verbose: bool,
+    /// Print the log; given twice, in detail.
+    #[arg(short, long, global = true, action = ArgAction::Count)]
+    verbose: u8,
+    /// Print the log in this form.
+    #[arg(long, global = true, value_name = "FORM", conflicts_with = "quiet")]
+    log: Option<LogForm>,
     #[command(subcommand)]
     command: Command,
+}
+
+/// How the log is written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum LogForm {
+    /// Lines of text.
+    Text,
+    /// A JSON object a line.
+    Json,
 }
 
 #[derive(Debug, Subcommand)]
@@ -82,13 +96,19 @@ enum Command {
 #[must_use]
 pub fn main() -> ExitCode {
     let cli = Cli::parse();
-    let level = match (cli.quiet, cli.verbose) {
-        (true, _) => LevelFilter::ERROR,
-        (_, true) => LevelFilter::DEBUG,
-        _ => LevelFilter::INFO,
+    // Of what runs unattended the log is all there is to see.
+    let unattended = matches!(
+        cli.command,
+        Command::Worker(_) | Command::Serve(_) | Command::Nightly(_)
+    );
+    let level = match (unattended, cli.verbose, cli.log.is_some()) {
+        _ if cli.quiet => LevelFilter::ERROR,
+        (false, 0, false) => LevelFilter::WARN,
+        (false, 0, true) | (false, 1, _) | (true, 0, _) => LevelFilter::INFO,
+        _ => LevelFilter::DEBUG,
     };
     let log = tracing_subscriber::fmt()
-        .with_writer(std::io::stderr)
+        .with_writer(progress::Log)
         .with_max_level(level)
         .with_target(false);
     let as_json = match &cli.command {
@@ -97,12 +117,13 @@ pub fn main() -> ExitCode {
         Command::Serve(arguments) => arguments.log_json,
         Command::Nightly(arguments) => arguments.log_json,
         _ => false,
-    };
+    } || cli.log == Some(LogForm::Json);
     if as_json {
         log.json().flatten_event(true).init();
     } else {
-        log.with_ansi(std::io::IsTerminal::is_terminal(&std::io::stderr()))
-            .init();
+        let terminal = std::io::IsTerminal::is_terminal(&std::io::stderr());
+        let colour = std::env::var_os("NO_COLOR").is_none_or(|value| value.is_empty());
+        log.with_ansi(terminal && colour).init();
     }
     match cli.command {
         Command::Run(arguments) => run::run(&arguments),

@@ -14,7 +14,12 @@ use crate::{
 };
 
 /// Says which stages would run, and why.
+///
+/// Examples:
+///   areograph plan sites/gusev.toml --out products
+///   areograph plan sites/*.toml --out products --json
 #[derive(Debug, Args)]
+#[command(verbatim_doc_comment)]
 pub(super) struct Arguments {
     /// Site files (TOML).
     #[arg(required = true, value_name = "SITE.toml")]

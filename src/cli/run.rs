@@ -10,19 +10,25 @@ use clap::{Args, builder::PossibleValuesParser};
 use serde_json::json;
 use tokio::{sync::Semaphore, task::JoinHandle};
 
-use super::{load_sites, output, plan, report, stop::on_signals};
+use super::{load_sites, open, output, plan, progress::Progress, report, stop::on_signals};
 use crate::{
     config::SiteConfig,
     error::{Error, Kind},
-    flow::{Ending, PUBLISH, RunOptions, SiteOutcome, check_out, publish_sites, run_site, stages},
+    flow::{
+        Ending, Observer, PUBLISH, RunOptions, SiteOutcome, check_out, publish_sites, run_site,
+        stages,
+    },
     store::{hashes::HashCache, manifest::Manifest, publish::read_manifest},
 };
 
 /// Runs sites from kernels to validated products in `<out>/<site>`.
 ///
-/// A stage runs only when something that it depends on has changed; the log says what.
+/// A stage runs only when something that it depends on has changed; the log (-v) says what.
 ///
-/// Example: `areograph run sites/*.toml --out products`
+/// Examples:
+///   areograph run sites/*.toml --out products
+///   areograph run sites/gusev.toml --out products --open
+///   areograph run sites/gusev.toml --out products --until register -v
 #[derive(Debug, Clone, Args)]
 #[allow(clippy::struct_excessive_bools, reason = "flags of a command line")]
 #[command(verbatim_doc_comment)]
@@ -60,10 +66,18 @@ pub(super) struct Arguments {
     /// Print JSON.
     #[arg(long)]
     json: bool,
+    /// Open the page in the browser: of one site its report, of several the one over all.
+    #[arg(long)]
+    open: bool,
 }
 
 impl Arguments {
-    fn options<'a>(&'a self, stop: &'a AtomicBool, hashes: &'a HashCache) -> RunOptions<'a> {
+    fn options<'a>(
+        &'a self,
+        stop: &'a AtomicBool,
+        hashes: &'a HashCache,
+        observer: &'a dyn Observer,
+    ) -> RunOptions<'a> {
         RunOptions {
             out: self.out.clone(),
             until: &self.until,
@@ -71,7 +85,7 @@ impl Arguments {
             stop,
             hashes,
             roots: &[],
-            observer: &(),
+            observer,
         }
     }
 }
@@ -88,7 +102,7 @@ pub(super) fn run(arguments: &Arguments) -> ExitCode {
     let hashes = HashCache::in_folder(&arguments.out, arguments.rehash);
     if arguments.dry_run {
         let never = AtomicBool::new(false);
-        let options = arguments.options(&never, &hashes);
+        let options = arguments.options(&never, &hashes, &());
         return super::finish(plan::print(&sites, &options, arguments.json));
     }
     if let Some(threads) = arguments.threads {
@@ -114,6 +128,9 @@ pub(super) fn run(arguments: &Arguments) -> ExitCode {
         }
         Some(Err(failure)) => output::error(failure),
         _ => {}
+    }
+    if arguments.open {
+        open_page(&outcomes, page.as_ref().and_then(|page| page.as_ref().ok()));
     }
     // A failure says more than an invalid site, and of several the first one counts.
     let codes: Vec<u8> = outcomes
@@ -148,7 +165,10 @@ async fn run_all(
             let (arguments, hashes) = (arguments.clone(), hashes.clone());
             tokio::spawn(async move {
                 let _place = places.acquire_owned().await;
-                let work = move || run_site(&site, &arguments.options(&stop, &hashes));
+                let work = move || {
+                    let progress = Progress::of(&site);
+                    run_site(&site, &arguments.options(&stop, &hashes, &progress))
+                };
                 flatten(tokio::task::spawn_blocking(work).await)
             })
         })
@@ -232,6 +252,24 @@ fn print_outcome(outcome: &SiteOutcome) {
     ));
     for reason in verdict.reasons.iter().chain(&verdict.remarks) {
         output::line(format_args!("  {reason}"));
+    }
+    for check in verdict.key_checks() {
+        output::line(format_args!("  {check}"));
+    }
+}
+
+/// The report of the only site that has products, or the page over all of them.
+fn open_page(outcomes: &[Outcome], over_all: Option<&PathBuf>) {
+    let mut reports = outcomes.iter().flatten().filter_map(|outcome| {
+        let report = outcome.folder.join("report/index.html");
+        report.is_file().then_some(report)
+    });
+    let page = match (reports.next(), reports.next()) {
+        (Some(report), None) => Some(report),
+        _ => over_all.cloned(),
+    };
+    if let Some(Err(failure)) = page.as_deref().map(open::page) {
+        output::error(failure);
     }
 }
 

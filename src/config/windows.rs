@@ -125,6 +125,9 @@ fn bounds(
                 "[west, east], above 0 and at most 360 degrees wide going east",
             );
         }
+        if wrapped.is_some() {
+            name_wide(pair, keys);
+        }
         wrapped
     });
     let latitudes = latitude.filter(|[south, north]| {
@@ -141,6 +144,23 @@ fn bounds(
         south_rad: south * RADIANS_PER_DEGREE,
         north_rad: north * RADIANS_PER_DEGREE,
     })
+}
+
+/// Names a window that goes more than half round Mars, but not all round: its edges may have been swapped.
+fn name_wide([west, east]: [f64; 2], keys: &mut Keys<'_, '_>) {
+    let width = (east - west).rem_euclid(360.0);
+    if width > 180.0
+        && let Some(span) = keys.span_of("longitude_deg")
+    {
+        keys.review().warn(
+            span,
+            format!(
+                "longitude_deg goes {width}° eastward, from {west}° to {east}°; if it should be the other {}°, write \
+                 [{east}, {west}]",
+                360.0 - width
+            ),
+        );
+    }
 }
 
 /// Longitudes in `0..360`, or `[0, 360]` for all of them; `None` when the width is none or over 360°.

@@ -91,6 +91,11 @@ impl RunDifference {
     #[must_use]
     pub fn sentences(&self) -> Vec<String> {
         let mut told = Vec::new();
+        // A verdict that changed is what a reader must know before anything else.
+        let verdict_changed = self.a.verdict.word() != self.b.verdict.word();
+        if verdict_changed {
+            told.push(self.verdict_sentence());
+        }
         if self.a.version != self.b.version {
             told.push(format!(
                 "areograph: {} → {}",
@@ -113,7 +118,9 @@ impl RunDifference {
             told.extend(self.profiles_sentence());
             told.extend(self.images.iter().map(image_sentence));
         }
-        told.push(self.verdict_sentence());
+        if !verdict_changed {
+            told.push(self.verdict_sentence());
+        }
         told
     }
 
@@ -187,7 +194,7 @@ impl RunDifference {
 
     fn verdict_sentence(&self) -> String {
         let (a, b) = (&self.a.verdict, &self.b.verdict);
-        if a == b {
+        if (a.word(), &a.reasons, &a.remarks) == (b.word(), &b.reasons, &b.remarks) {
             return format!("verdict: {} in both", a.word());
         }
         let all = |verdict: &Verdict| [&verdict.reasons[..], &verdict.remarks].concat();

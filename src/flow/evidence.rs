@@ -45,6 +45,8 @@ pub(super) fn judged(
     let verdict = judge(&Evidence {
         footprints: searched.then_some(site.converted.value()?.footprints.len()),
         limits: &config.limits,
+        range_limits: &config.range_check,
+        orientation_limits: &config.orientation,
         ranges: site.ranges.value()?,
         clock_correction_s: config.mola_clock.correction_s(),
         images: &images,

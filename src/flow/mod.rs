@@ -38,7 +38,7 @@ pub use driver::StageReason;
 pub use net::{NetOutcome, run_net};
 pub use observer::{Observer, StageEvent};
 pub use out::{OutError, check_out};
-pub use outline::stages;
+pub use outline::{stage_count, stages};
 pub use plan::{SitePlan, plan_site};
 pub use run::{Ending, RunOptions, SiteOutcome, run_site};
 pub use sites::publish_sites;

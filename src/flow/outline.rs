@@ -22,11 +22,7 @@ use crate::{
 #[must_use]
 pub fn stages() -> &'static [&'static str] {
     static NAMES: LazyLock<Vec<&str>> = LazyLock::new(|| {
-        let mut outline = Outline {
-            files: InputFiles::default(),
-            never: AtomicBool::new(false),
-            names: Vec::new(),
-        };
+        let mut outline = Outline::default();
         // Of no kernels; with an image and tie points, so that no stage is passed over.
         let mut config = SiteConfig::default();
         config.images.push(ImageConfig::default());
@@ -38,10 +34,26 @@ pub fn stages() -> &'static [&'static str] {
     &NAMES
 }
 
+/// Stages, those of every image and round each, that a run passes of a site with so many images, with tie points or without.
+#[must_use]
+pub fn stage_count(images: usize, ties: bool) -> usize {
+    let mut outline = Outline::default();
+    let mut config = SiteConfig::default();
+    config.images.resize_with(images, ImageConfig::default);
+    if ties {
+        config.ties.files.push(PathBuf::new());
+    }
+    let _ = site(&mut outline, &config);
+    outline.passed
+}
+
+#[derive(Default)]
 struct Outline {
     files: InputFiles,
     never: AtomicBool,
     names: Vec<&'static str>,
+    /// Stages passed, each of every image.
+    passed: usize,
 }
 
 impl Driver for Outline {
@@ -62,6 +74,7 @@ impl Driver for Outline {
 
     fn stage<S: Stage>(&mut self, stage: &S) -> Flow<Output<S::Output>> {
         self.enter(S::NAME)?;
+        self.passed += 1;
         Ok(Output::pending(stage.label()))
     }
 
@@ -75,6 +88,7 @@ impl Driver for Outline {
     }
 
     fn publish(&mut self, _config: &SiteConfig, _site: &Site) -> Flow<()> {
+        self.passed += 1;
         self.enter(PUBLISH)
     }
 }
@@ -83,6 +97,13 @@ impl Driver for Outline {
 mod tests {
     use super::*;
     use crate::flow::LOAD_KERNELS;
+
+    #[test]
+    fn every_image_has_stages_of_its_own() {
+        let [none, one, two] = [0, 1, 2].map(|images| stage_count(images, false));
+        assert!(none < one && two - one == one - none);
+        assert!(stage_count(2, true) > two);
+    }
 
     #[test]
     fn the_flow_begins_with_kernels_passes_the_adjustment_and_ends_with_products() {

@@ -51,8 +51,27 @@ pub fn publish_sites(out: &Path) -> Result<PathBuf> {
         published_fidelity_page().as_bytes(),
     )?;
     let page = out.join(SITES_PAGE);
-    atomic::write(&page, sites_page(&lines).as_bytes())?;
+    atomic::write(&page, sites_page(&lines)?.as_bytes())?;
     Ok(page)
+}
+
+/// The middle of the first window that is a box.
+fn place_deg(keys: &BTreeMap<String, String>) -> Option<(f64, f64)> {
+    let ends = |key: &str| -> Option<[f64; 2]> { serde_json::from_str(keys.get(key)?).ok() };
+    let mut boxes = keys.keys().filter_map(|key| {
+        let window = key
+            .strip_prefix("windows.")?
+            .strip_suffix(".longitude_deg")?;
+        let [west, east] = ends(key)?;
+        let [south, north] = ends(&format!("windows.{window}.latitude_deg"))?;
+        // Across the prime meridian a box runs eastward all the same.
+        let width = (east - west).rem_euclid(360.0);
+        Some((
+            (west + 0.5 * width).rem_euclid(360.0),
+            f64::midpoint(south, north),
+        ))
+    });
+    boxes.next()
 }
 
 fn summary(manifest: &Manifest) -> SiteSummary {
@@ -64,10 +83,17 @@ fn summary(manifest: &Manifest) -> SiteSummary {
         remarks: manifest.verdict.remarks.clone(),
         counts: ["footprints", "profiles", "images"].map(count),
         range_mean_m: figure(figures::RANGE_MEAN_M),
-        position_rmse_m: figure(figures::POSITION_RMSE_M),
-        pointing_rmse_rad: figure(figures::POINTING_RMSE_RAD),
-        along_track_parallax_m: figure(figures::ALONG_TRACK_PARALLAX_M),
-        adjusted_along_track_parallax_m: figure(figures::ADJUSTED_ALONG_TRACK_PARALLAX_M),
+        images_apart_m: [
+            figures::ALONG_TRACK_PARALLAX_M,
+            figures::ADJUSTED_ALONG_TRACK_PARALLAX_M,
+        ]
+        .map(figure),
+        height_off_m: [
+            figures::HEIGHT_OFF_SURFACE_M,
+            figures::ADJUSTED_HEIGHT_OFF_SURFACE_M,
+        ]
+        .map(figure),
+        place_deg: place_deg(&manifest.configuration.keys),
         finished_utc: manifest.finished_utc.clone(),
         version: manifest.version.clone(),
     }

@@ -1,19 +1,18 @@
-//! The combined adjustment: tables 2, 3 and 4 of Yoon & Shan 2004 for this site, and what the observations say.
+//! The combined adjustment: how it converged, what the observations say, corrections, reliability.
 
 use super::{
-    corrections,
-    html::{Cell, Column, Table, counted, heading, paragraph},
+    corrections, correlation,
+    html::{Column, Table, counted, heading, paragraph},
+    numbers::whole,
     plots::{Extent, Panel, Plot, Series, figure, label},
-    reliability,
+    reliability, residuals,
     section::Section,
 };
 use crate::{
     error::Result,
-    geom::statistics::{BAARDA_LIMIT, Summary},
+    geom::statistics::BAARDA_LIMIT,
     products::{AdjustmentProducts, GeometricProducts, SiteProducts},
-    stages::adjust::{
-        Adjusted, AdjustmentSummary, GroundSummary, ObservationType, WORSE_THAN_CONFIGURED,
-    },
+    stages::adjust::{Adjusted, AdjustmentSummary, ObservationType, WORSE_THAN_CONFIGURED},
 };
 
 /// Steps that the axis of the convergence has room for at least, so that its labels are whole numbers.
@@ -40,18 +39,17 @@ fn write(
     let mut html = paragraph(&overview(adjusted));
     html += &paragraph(&reliability::absolute(geometric, adjustment));
     html += &format!(
-        "<div class=\"plots\">\n{}</div>\n",
+        "<div class=\"plots\">\n{}{}</div>\n",
+        residuals::distribution(adjusted)?,
         figure(&convergence(adjusted))?
     );
-    html += &ground_corrections(summary);
-    html += &image_coordinates(summary);
-    html += &ground_sigmas(summary);
     html += &observations(summary);
     html += &heading("Corrections to the orientation");
     html += &corrections::tables(site, adjusted);
     html += &heading("Reliability");
     html += &reliability::redundancy(site, adjusted);
     html += &reliability::correlations(summary);
+    html += &correlation::figures(adjusted)?;
     html += &reliability::rejected(adjusted);
     Ok(html)
 }
@@ -95,14 +93,16 @@ fn convergence(adjusted: &Adjusted) -> Plot {
     );
     let words = match ends {
         (Some(first), Some(last)) => format!(
-            "Weighted sum of squared residuals before each step and after the last, as a power of ten: from {first:.4e} \
-             to {last:.4e}."
+            "Weighted sum of squared residuals before each step and after the last: from {} to {}.",
+            label(*first, 1),
+            label(*last, 1)
         ),
         _ => "No step was taken.".to_owned(),
     };
     let panel = Panel {
         height: 260,
-        ..Panel::of("log10 of vᵀPv", vec![series])
+        log: true,
+        ..Panel::of("vᵀPv", vec![series])
     };
     Plot {
         x: Extent {
@@ -116,100 +116,6 @@ fn convergence(adjusted: &Adjusted) -> Plot {
             vec![panel],
         )
     }
-}
-
-/// Mean and standard deviation, or a dash each where there is nothing.
-fn moments(of: &Summary, decimals: usize) -> [Cell; 2] {
-    if of.n == 0 {
-        return ["–".into(), "–".into()];
-    }
-    [of.mean, of.standard_deviation].map(|value| label(value, decimals).into())
-}
-
-const fn kinds(summary: &AdjustmentSummary) -> [(&'static str, &GroundSummary); 2] {
-    [("MOLA", &summary.shots), ("tie points", &summary.ties)]
-}
-
-fn ground_corrections(summary: &AdjustmentSummary) -> String {
-    let mut table = Table::new(
-        "Corrections of ground points (Table 2 of Yoon & Shan 2004), metres",
-        &[
-            Column::Text("points"),
-            Column::Number("n"),
-            Column::Number("X, mean"),
-            Column::Number("std"),
-            Column::Number("Y, mean"),
-            Column::Number("std"),
-            Column::Number("Z, mean"),
-            Column::Number("std"),
-        ],
-    );
-    for (name, of) in kinds(summary) {
-        let mut cells: Vec<Cell> = vec![name.into(), of.corrections_m[0].n.to_string().into()];
-        cells.extend(of.corrections_m.iter().flat_map(|axis| moments(axis, 3)));
-        table.row(true, cells);
-    }
-    table.finish()
-        + &paragraph(
-            "Adjusted minus initial, Mars-fixed axes. The initial tie points are intersections with the orientation of \
-             the kernels. The paper's “RMS” is the standard deviation about the mean, as here.",
-        )
-}
-
-fn image_coordinates(summary: &AdjustmentSummary) -> String {
-    let mut table = Table::new(
-        "Image coordinates (Table 3 of Yoon & Shan 2004): corrections of MOLA, residuals of tie points",
-        &[
-            Column::Text("image"),
-            Column::Text("points"),
-            Column::Number("n"),
-            Column::Number("along, mean"),
-            Column::Number("std"),
-            Column::Number("across, mean"),
-            Column::Number("std"),
-        ],
-    );
-    for image in &summary.images {
-        for (name, of) in [
-            ("MOLA, lines and px", &image.mola_corrections),
-            ("tie points, focal-plane px", &image.tie_residuals_px),
-        ] {
-            let mut cells: Vec<Cell> = vec![
-                (&image.image).into(),
-                name.into(),
-                of[0].n.to_string().into(),
-            ];
-            cells.extend(of.iter().flat_map(|axis| moments(axis, 3)));
-            table.row(true, cells);
-        }
-    }
-    table.finish()
-}
-
-fn ground_sigmas(summary: &AdjustmentSummary) -> String {
-    let mut table = Table::new(
-        "A posteriori standard deviations of ground points (Table 4 of Yoon & Shan 2004), metres, means",
-        &[
-            Column::Text("points"),
-            Column::Number("σ X"),
-            Column::Number("σ Y"),
-            Column::Number("σ Z"),
-            Column::Number("largest σ"),
-            Column::Number("σ0"),
-        ],
-    );
-    for (name, of) in kinds(summary) {
-        let largest = of.sigmas_m.iter().map(|axis| axis.max).fold(0.0, f64::max);
-        let mut cells: Vec<Cell> = vec![name.into()];
-        for axis in &of.sigmas_m {
-            let [mean, _] = moments(axis, 3);
-            cells.push(mean);
-        }
-        cells.push(label(largest, 3).into());
-        cells.push(label(summary.sigma0, 3).into());
-        table.row(true, cells);
-    }
-    table.finish()
 }
 
 /// A kind of observation in words.
@@ -259,7 +165,7 @@ fn observations(summary: &AdjustmentSummary) -> String {
             true,
             [
                 kind(of.kind).into(),
-                of.observations.to_string().into(),
+                whole(of.observations).into(),
                 label(of.redundancy, 1).into(),
                 format!("{} %", label(each, 1)).into(),
                 label(of.weighted_squares, 2).into(),
@@ -270,10 +176,9 @@ fn observations(summary: &AdjustmentSummary) -> String {
         );
     }
     let words = format!(
-        "The variance component is the standard deviation of unit weight of one kind, √(vᵀPv / redundancy): near 1 where \
-         the a priori standard deviations are right, below 1 where they are too large; 99 of 100 lie \
-         within the limits of χ² by chance. Robust weights keep heights below theirs. Beyond {BAARDA_LIMIT}: \
-         observations that fail Baarda's test; one good one in a thousand does."
+        "Variance component: √(vᵀPv / redundancy), 1 where the a priori standard deviations are right, with its 99 % interval \
+         by χ²; robust weights lower that of heights. Beyond {BAARDA_LIMIT}: failed Baarda's test, as one good observation in \
+         a thousand does."
     );
     table.finish() + &paragraph(&words)
 }

@@ -2,6 +2,7 @@
 
 use super::{
     html::{Column, Table, paragraph},
+    numbers::{number as label, signed, whole},
     section::Section,
 };
 use crate::{
@@ -48,7 +49,7 @@ fn biases(site: &SiteProducts) -> String {
             true,
             [
                 name.into(),
-                format!("{:+.3}", of.bias.seconds()).into(),
+                signed(of.bias.seconds(), 3).into(),
                 "the time at which attitude is read; position and Mars stay at the exposure".into(),
                 of.source.into(),
             ],
@@ -58,7 +59,7 @@ fn biases(site: &SiteProducts) -> String {
         true,
         [
             "MOLA clock".into(),
-            format!("{:+.3}", clock.correction_s()).into(),
+            signed(clock.correction_s(), 3).into(),
             format!("{scope}; {:.3} s, {sign}", clock.bias_s).into(),
             (&clock.source).into(),
         ],
@@ -105,9 +106,9 @@ fn datum(site: &SiteProducts) -> String {
                     "left alone"
                 }
                 .into(),
-                conversion.shots.to_string().into(),
-                number(format!("{:.1}", conversion.shift_m.mean)).into(),
-                number(format!("{:+.5}", conversion.longitude_shift_deg.mean)).into(),
+                whole(conversion.shots).into(),
+                number(label(conversion.shift_m.mean, 1)).into(),
+                number(signed(conversion.longitude_shift_deg.mean, 5)).into(),
             ],
         );
     }

@@ -2,7 +2,8 @@
 
 use super::{
     html::{Cell, Column, Section, Table, Tone, list, page, paragraph, verdict},
-    plots::{Panel, Plot, Series, Style, figure, thinned},
+    numbers::{signed, whole},
+    plots::{Panel, Plot, Series, Style, figure, label, thinned},
 };
 use crate::{
     constants::SPACECRAFT,
@@ -59,7 +60,19 @@ fn lead(comparison: &KernelComparison) -> String {
     let orbit = comparison.orbit;
     let closest = orbit.closest();
     let distance = format!("root mean square distance {:.3} m", closest.size.rms);
-    let (tone, headline) = if orbit.tied.is_empty() {
+    let close: Vec<String> = orbit
+        .nearly_as_close()
+        .map(|of| format!("{} ({} m)", of.set, label(of.size.rms, 3)))
+        .collect();
+    let (tone, headline) = if !close.is_empty() {
+        let headline = format!(
+            "Too close to call: {} ({} m) and {} are about equally far from the mean orbit.",
+            closest.set,
+            label(closest.size.rms, 3),
+            close.join(" and ")
+        );
+        (Tone::Remarks, headline)
+    } else if orbit.tied.is_empty() {
         let headline = format!(
             "Of {} kernel sets {} is closest to the mean orbit: {distance}.",
             orbit.deviations.len(),
@@ -75,11 +88,18 @@ fn lead(comparison: &KernelComparison) -> String {
         );
         (Tone::Remarks, headline)
     };
+    let pulls = orbit.pulls_the_mean().map_or_else(String::new, |far| {
+        format!(
+            "{} lies {} m from the mean, farther than all others, and pulls it towards itself. ",
+            far.set,
+            label(far.size.rms, 3)
+        )
+    });
     let words = format!(
-        "{} epochs from {} to {} UTC, equally spaced over the time that all sets hold. Positions of {} from \
-         Mars, geometric; each set minus the mean of all, along the axes of the mean orbit. Closest is the least \
-         root mean square distance, the rule by which Shan et al. 2005 chose the orbit of the navigation team.",
-        orbit.epochs.len(),
+        "{pulls}{} epochs from {} to {} UTC, equally spaced over the time that all sets cover. Geometric positions of {} \
+         relative to Mars, each set minus the mean of all, in the axes of the mean orbit. The rule is that of Shan et al. \
+         2005: least root mean square distance.",
+        whole(orbit.epochs.len()),
         comparison.utc[0],
         comparison.utc[1],
         SPACECRAFT.name,
@@ -150,9 +170,9 @@ fn cells(name: &str, size: &Size, unit: f64) -> Vec<Cell> {
     let mut cells: Vec<Cell> = vec![name.into()];
     cells.extend(size.components.map(|one| {
         let (mean, spread) = (one.mean / unit, one.standard_deviation / unit);
-        Cell::from(format!("{mean:+.3} ± {spread:.3}"))
+        Cell::from(format!("{} ± {}", signed(mean, 3), label(spread, 3)))
     }));
-    cells.extend([size.rms, size.max].map(|value| Cell::from(format!("{:.3}", value / unit))));
+    cells.extend([size.rms, size.max].map(|value| Cell::from(label(value / unit, 3))));
     cells
 }
 
@@ -211,8 +231,8 @@ fn figures(
         };
         let begins_h = stretch.start.since(stretches[0].start) / SECONDS_PER_HOUR;
         let caption = format!(
-            "Each set minus the mean of all; the stretch begins {begins_h:.3} h after the first epoch. Of many \
-             epochs every so many is drawn; `areograph kernels compare --json` gives all."
+            "Each set minus the mean of all; the stretch begins {begins_h:.3} h after the first epoch. `areograph kernels compare \
+             --json` gives every epoch."
         );
         html += &figure(&Plot::of(title, caption, over.x_label(), panels))?;
     }

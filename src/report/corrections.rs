@@ -47,8 +47,8 @@ fn positions(site: &SiteProducts, adjusted: &Adjusted) -> String {
             Column::Number("X"),
             Column::Number("Y"),
             Column::Number("Z"),
-            Column::Number("along the flight"),
-            Column::Number("across it"),
+            Column::Number("along track, Mars-fixed"),
+            Column::Number("cross track"),
             Column::Number("radial"),
         ],
     );
@@ -65,8 +65,8 @@ fn positions(site: &SiteProducts, adjusted: &Adjusted) -> String {
         }));
         table.row(true, cells);
     }
-    let words = "Shifts are from the orbit of the kernels. They were expected to be those to the orbit of the PEDR files \
-        (adjustment.orbit_of_pedr) where a profile was flown with the image.";
+    let words = "Shifts from the orbit of the kernels; where a profile was measured with the image, the orbit of the PEDR file \
+                 was expected (adjustment.orbit_of_pedr).";
     if starts_at_pedr {
         table.finish() + &paragraph(words)
     } else {
@@ -111,8 +111,8 @@ fn rotations(adjusted: &Adjusted) -> String {
     }
     table.finish()
         + &paragraph(
-            "± is the a posteriori standard deviation. Position and rotation are nearly the same to a narrow camera: see \
-             the correlations below before reading any of these alone.",
+            "± is the a posteriori standard deviation. Position and rotation are strongly correlated in a narrow field of \
+             view: see the correlations below.",
         )
 }
 

@@ -1,13 +1,15 @@
 //! What MOLA says of the heights of tie points, and what may be said of their accuracy.
 
 mod boresight;
+mod profile;
 mod readings;
 mod relief;
 
 use super::{
     html::{Cell, Column, Table, heading, paragraph},
     misregistration::BeforeAfter,
-    plots::{Panel, Plot, Series, Style, figure, label, thinned},
+    numbers::whole,
+    plots::{figure, label},
     section::Section,
 };
 use crate::{
@@ -15,14 +17,10 @@ use crate::{
     footprints::AdjustmentModel,
     products::{AdjustmentProducts, GeometricProducts, SiteProducts},
     stages::{
-        check_heights::{HeightCheck, SurfaceFigures, TieHeight},
+        check_heights::{HeightCheck, SurfaceFigures},
         compare_pairs::PairComparison,
     },
-    units::METRES_PER_KM,
 };
-
-/// Tie points that a plot shows.
-const POINTS_SHOWN: usize = 2_000;
 
 pub(super) const SECTION: Section = Section {
     title: "Accuracy, and agreement with MOLA",
@@ -45,54 +43,21 @@ fn write(site: &SiteProducts, geometric: &GeometricProducts) -> Result<String> {
         html += &paragraph(&apart(geometric.heights));
         html += &format!(
             "<div class=\"plots\">\n{}</div>\n",
-            figure(&profile_plot(site, geometric))?
+            figure(&profile::plot(site, geometric))?
         );
     }
     Ok(html)
 }
 
-/// What MOLA says of heights, and what is known of them and of the place.
-pub(super) fn in_a_sentence(geometric: &GeometricProducts) -> String {
-    let before = geometric.heights;
-    let after = geometric
-        .adjustment
-        .as_ref()
-        .map_or_else(String::new, |after| {
-            format!(
-                " and {} it after the adjustment",
-                off_surface(after.heights)
-            )
-        });
-    let mola = match &before.surface {
-        Ok(_) => format!(
-            "Tie points lie {} the MOLA surface before the adjustment{after} (median).",
-            off_surface(before)
-        ),
-        Err(reason) => format!("MOLA does not control heights: {reason}."),
-    };
-    let Some(adjustment) = &geometric.adjustment else {
-        return mola;
-    };
-    let [height, place] = absolute(geometric, adjustment);
-    format!("{mola} Height, absolute: {height}. Place, absolute: {place}.")
-}
-
-/// Median height above or below the surface.
-fn off_surface(check: &HeightCheck) -> String {
-    let median_m = check.above_m.median;
-    let side = if median_m < 0.0 { "below" } else { "above" };
-    format!("{} m {side}", label(median_m.abs(), 1))
-}
-
 /// The three statements that may be made, and by whose judgement.
 fn statements(geometric: &GeometricProducts, adjustment: &AdjustmentProducts) -> String {
     let mut table = Table::new(
-        "What is known of the tie points, and by whom",
+        "Accuracy of the tie points",
         &[
-            Column::Text("statement"),
+            Column::Text("accuracy"),
             Column::Text("before the adjustment"),
             Column::Text("after it"),
-            Column::Text("it says"),
+            Column::Text("meaning"),
         ],
     );
     let nothing = || "–".to_owned();
@@ -110,7 +75,7 @@ fn statements(geometric: &GeometricProducts, adjustment: &AdjustmentProducts) ->
             after.map_or_else(nothing, |after| {
                 format!("{after}; residuals {} σ", label(along, 2))
             }),
-            "how well images agree along the flight; nothing of height or place".to_owned(),
+            "how well the images agree along track; nothing about height or position".to_owned(),
         ],
         [
             "agreement with MOLA, height".to_owned(),
@@ -122,10 +87,10 @@ fn statements(geometric: &GeometricProducts, adjustment: &AdjustmentProducts) ->
             "absolute, height".to_owned(),
             format!("a priori: what is known of {}", known_beforehand(geometric)),
             height,
-            "standard deviation of what all tie points share, and of single ones".to_owned(),
+            "standard deviation common to all tie points, and of single ones".to_owned(),
         ],
         [
-            "absolute, place".to_owned(),
+            "absolute, position".to_owned(),
             "as after it".to_owned(),
             place,
             place_says(geometric, adjustment),
@@ -180,7 +145,10 @@ const fn agreement_says(adjustment: &AdjustmentProducts) -> &'static str {
 }
 
 /// What is stated of height and place after the adjustment.
-fn absolute(geometric: &GeometricProducts, adjustment: &AdjustmentProducts) -> [String; 2] {
+pub(super) fn absolute(
+    geometric: &GeometricProducts,
+    adjustment: &AdjustmentProducts,
+) -> [String; 2] {
     let summary = &adjustment.adjusted.summary;
     let Some(heights) = &adjustment.adjusted.heights else {
         let statements = if summary.model == AdjustmentModel::Published {
@@ -204,7 +172,7 @@ fn absolute(geometric: &GeometricProducts, adjustment: &AdjustmentProducts) -> [
     // What is stated holds only if errors of both images are as likely; half of their difference is no less open.
     let half = if half_m > east_m.max(north_m) {
         format!(
-            "; half of what the images disagree by along the flight, {} m, is open: which of them is right is not known",
+            "; open: half of the along-track disagreement of the images, {} m, since neither is known to be right",
             label(half_m, 0)
         )
     } else {
@@ -239,10 +207,9 @@ fn single_sigmas_m(adjustment: &AdjustmentProducts) -> [f64; 2] {
 
 fn surface_in_words(surface: &SurfaceFigures) -> String {
     format!(
-        "The surface is kriged from {} shots of {} profiles; heights 300 m apart differ by {} m (root mean square), the \
-         slope at the tie points is {} on an axis. Its errors at neighbouring tie points are alike, so the standard deviation \
-         of a mean does not fall with the number of tie points.",
-        surface.shots,
+        "The surface is kriged from {} shots of {} profiles (heights 300 m apart differ by {} m RMS; slope {} per axis). Its \
+         errors at neighbouring tie points are correlated: the uncertainty of a mean does not fall with their number.",
+        whole(surface.shots),
         surface.profiles,
         label(surface.roughness_m, 1),
         label(surface.slope, 3)
@@ -269,8 +236,8 @@ fn compared(geometric: &GeometricProducts) -> String {
             true,
             [
                 state.into(),
-                check.above_m.n.to_string().into(),
-                check.near_shots.to_string().into(),
+                whole(check.above_m.n).into(),
+                whole(check.near_shots).into(),
                 label(check.above_m.median, 1).into(),
                 label(check.above_m.nmad, 1).into(),
                 label(check.above_m.mean, 1).into(),
@@ -319,15 +286,14 @@ fn footprints(geometric: &GeometricProducts) -> String {
     if rows == 0 {
         return String::new();
     }
-    let words = "Of a footprint only the altimeter knows the height; where the second image shows it is what a surface of second \
-         order at most through the tie points says. Relief between tie points therefore spreads single heights; their median \
-         tells what the images have in common.";
+    let words = "Footprints are located in the second image by a surface of at most second order through the tie points; relief \
+                 between these scatters single heights, not their median.";
     table.finish() + &paragraph(words)
 }
 
 fn apart(check: &HeightCheck) -> String {
     check.apart.as_ref().map_or_else(
-        || "A single profile: no other one tests the surface.".to_owned(),
+        || "There is a single profile: nothing independent tests the surface.".to_owned(),
         |apart| {
             let [first, second] = &apart.profiles;
             let (upper, lower) = if apart.mean_m < 0.0 {
@@ -336,45 +302,11 @@ fn apart(check: &HeightCheck) -> String {
                 (first, second)
             };
             format!(
-                "The surface of profile {upper} alone lies {} m above that of {lower} alone at the tie points, with an expected \
-                 standard deviation of {} m.",
+                "At the tie points the surface of profile {upper} alone lies {} m above that of {lower} alone (expected standard \
+                 deviation {} m).",
                 label(apart.mean_m.abs(), 1),
                 label(apart.sigma_m, 1)
             )
         },
-    )
-}
-
-fn dots(label: &str, colour: usize, points: Vec<(f64, f64)>) -> Series {
-    Series {
-        style: Style::Dots,
-        ..Series::line(label, colour, points)
-    }
-}
-
-/// Heights above the surface by latitude.
-fn profile_plot(site: &SiteProducts, geometric: &GeometricProducts) -> Plot {
-    let middle_m = geometric.heights.ties.iter().map(|tie| tie.ground.xyz_m);
-    let middle_m = middle_m.fold(nalgebra::Vector3::zeros(), |sum, place| sum + place);
-    let axes = crate::geom::ellipsoid::local_axes(&middle_m);
-    let north_km = |tie: &TieHeight| axes.row(1).transpose().dot(&tie.ground.xyz_m) / METRES_PER_KM;
-    let points = |check: &HeightCheck| -> Vec<(f64, f64)> {
-        let ties = check.ties.iter();
-        let points: Vec<_> = ties.map(|tie| (north_km(tie), tie.above_m())).collect();
-        thinned(&points, POINTS_SHOWN)
-    };
-    let after = geometric.adjustment.iter();
-    let after = after.map(|of| dots("after it", 1, points(of.heights)));
-    let before = dots("before the adjustment", 0, points(geometric.heights));
-    let series = [before].into_iter().chain(after).collect();
-    let words = format!(
-        "Heights of tie points of {} above the MOLA surface, from south to north, with the orientation of the kernels and, where there is one, with the adjusted one.",
-        site.config.site
-    );
-    Plot::of(
-        "Tie points above the MOLA surface".to_owned(),
-        words,
-        "north of the middle, km",
-        vec![Panel::of("height above the surface, m", series)],
     )
 }

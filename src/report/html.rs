@@ -2,6 +2,8 @@
 
 use std::fmt::Write as _;
 
+use super::numbers::whole;
+
 /// Style of all pages. Reports have no scripts; plots take their colours from here, so that they follow light and dark.
 pub const STYLE: &str = include_str!("style.css");
 
@@ -33,7 +35,7 @@ pub(super) enum Tone {
 }
 
 impl Tone {
-    const fn class(self) -> &'static str {
+    pub(super) const fn class(self) -> &'static str {
         match self {
             Self::Good => "valid",
             Self::Remarks => "remarks",
@@ -117,6 +119,14 @@ pub(super) fn verdict(tone: Tone, headline: &str, body: &str) -> String {
 /// A heading inside a section.
 pub(super) fn heading(text: &str) -> String {
     format!("<h3>{}</h3>\n", escape(text))
+}
+
+/// HTML that is unfolded on request.
+pub(super) fn folded(title: &str, html: &str) -> String {
+    format!(
+        "<details class=\"more\"><summary>{}</summary>\n{html}</details>\n",
+        escape(title)
+    )
 }
 
 /// A paragraph of text.
@@ -281,7 +291,7 @@ fn limited(class: &str, text: &str, share: f64) -> String {
 /// A number of things, in the plural where there are several.
 pub(super) fn counted(count: usize, what: &str) -> String {
     let plural = if count == 1 { "" } else { "s" };
-    format!("{count} {what}{plural}")
+    format!("{} {what}{plural}", whole(count))
 }
 
 #[cfg(test)]

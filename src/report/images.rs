@@ -2,8 +2,10 @@
 
 use super::{
     html::{Cell, Column, Table, paragraph},
+    numbers::whole,
     plots::{GREY, Panel, Plot, Series, figure},
     section::Section,
+    sky,
 };
 use crate::{
     error::Result,
@@ -31,6 +33,7 @@ fn write(site: &SiteProducts) -> Result<String> {
         .map(|image| figure(&residual_plot(image)))
         .collect::<Result<String>>()?;
     Ok(taken(site)
+        + &sky::figure(site)?
         + &light_time(site)
         + &models(site)
         + &format!("<div class=\"plots\">\n{figures}</div>\n"))
@@ -70,8 +73,8 @@ fn taken(site: &SiteProducts) -> String {
             [
                 (&times.id).into(),
                 (&times.utc_start).into(),
-                times.line_times.lines().to_string().into(),
-                times.lines_delivered.to_string().into(),
+                whole(times.line_times.lines()).into(),
+                whole(times.lines_delivered).into(),
                 times.samples.to_string().into(),
                 format!("{} × {}", times.downtrack_summing, times.crosstrack_summing).into(),
                 periods_ms(times).into(),
@@ -174,9 +177,8 @@ fn models(site: &SiteProducts) -> String {
         table.row(valid, row(id, "2", &model.second_order, judged));
     }
     let words = format!(
-        "Judged: the second order, position within {} m and pointing within {:.1}″ (largest component of the rotation \
-         vector, which means the same at every latitude). On the ground: how far the residuals of the angles move the \
-         boresight on the ellipsoid, root mean square.",
+        "Limits apply to the second order: position {} m, pointing {:.1}″ (largest component of the rotation vector, which \
+         means the same at every latitude). On the ground: root mean square displacement of the boresight on the ellipsoid.",
         limits.position_rmse_max_m,
         limits.pointing_rmse_max_rad / RADIANS_PER_ARCSECOND
     );
@@ -258,7 +260,7 @@ fn residual_plot(image: &ImageProducts) -> Plot {
     Plot::of(
         format!("Residuals of {}", image.times.id),
         words(image),
-        "lines from the middle of the header image",
+        "lines from the middle of the image",
         panels,
     )
 }

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use super::{
     html::{Cell, Column, Table, counted, heading, paragraph},
     moved,
+    numbers::whole,
     plots::label,
     section::Section,
 };
@@ -241,7 +242,7 @@ fn rejected(geometric: &GeometricProducts) -> String {
     ];
     let mut table = Table::new("Rejected tie points", columns);
     for ((of, reason), count) in reasons {
-        table.row(true, [of.into(), count.to_string().into(), reason.into()]);
+        table.row(true, [of.into(), whole(count).into(), reason.into()]);
     }
     table.finish()
 }
@@ -288,11 +289,8 @@ fn geometry(pairs: &[BeforeAfter]) -> String {
                 (found.line_spacing_m[1], 3),
                 (found.along_track_parallax_m, 2),
             ];
-            let mut cells: Vec<Cell> = vec![
-                pair.name().into(),
-                state.into(),
-                found.ties.to_string().into(),
-            ];
+            let mut cells: Vec<Cell> =
+                vec![pair.name().into(), state.into(), whole(found.ties).into()];
             cells.extend(numbers.map(|(value, decimals)| label(value, decimals).into()));
             table.row(true, cells);
         }
@@ -319,11 +317,8 @@ fn reprojection(pairs: &[BeforeAfter]) -> String {
     );
     for pair in pairs {
         for (state, found) in pair.states() {
-            let mut cells: Vec<Cell> = vec![
-                pair.name().into(),
-                state.into(),
-                found.ties.to_string().into(),
-            ];
+            let mut cells: Vec<Cell> =
+                vec![pair.name().into(), state.into(), whole(found.ties).into()];
             for of in &found.residuals {
                 let moments = [of.mean_x, of.deviation_x, of.mean_y, of.deviation_y];
                 cells.extend(moments.map(|value| label(value, 2).into()));
@@ -331,15 +326,14 @@ fn reprojection(pairs: &[BeforeAfter]) -> String {
             table.row(true, cells);
         }
     }
-    let words = "Measured minus projected: every tie point is intersected from both images and projected back. M is the \
-                 mean, σ the standard deviation; x along the flight, y across it and against the samples; 1 and 2 are the images in the order of \
-                 the pair's name.";
+    let words = "Measured minus projected back from the intersection of both rays: M mean, σ standard deviation; x along \
+                 track, y across track and against the samples; 1 and 2 in the order of the pair's name.";
     table.finish() + &paragraph(words)
 }
 
 fn footprints(pairs: &[BeforeAfter]) -> String {
     let mut table = Table::new(
-        "Footprints between the images, by tie points; positive along the flight",
+        "Footprints between the images, by tie points; positive along track",
         &[
             Column::Text("profile"),
             Column::Text("pair"),
@@ -372,8 +366,8 @@ fn footprints(pairs: &[BeforeAfter]) -> String {
             table.row(true, profile_cells(&pair.name(), profile, after));
         }
         notes += &paragraph(&format!(
-            "{}: a polynomial of order {} through {} tie points ({} rejected) takes the first image to the second; it \
-             leaves {} lines and {} samples of them (standard deviations).",
+            "{}: the first image is transformed to the second by a polynomial of order {} through {} tie points ({} rejected); \
+             residual standard deviation {} lines and {} samples.",
             pair.name(),
             found.order,
             found.ties,
@@ -389,24 +383,20 @@ fn footprints(pairs: &[BeforeAfter]) -> String {
             ));
         }
     }
-    notes += &paragraph(
-        "Samples also hold the parallax of relief, which no transformation of the images takes away.",
-    );
+    notes += &paragraph("Samples also contain the parallax of relief.");
     table.finish() + &notes
 }
 
 /// Which footprints are not in the table.
 fn not_counted(found: &FootprintsByTies) -> String {
     let none = if found.profiles.is_empty() {
-        "No footprint counts here: tie points alone tell how far apart the images are. "
+        "No footprint is shown by both images: the tie points alone tell how far apart they are. "
     } else {
         ""
     };
     format!(
-        "{none}A footprint counts where both images show it, between the first and the last line of the tie points; {} \
-         within the lines of both images {} outside one of them before the adjustment.",
-        counted(found.outside as usize, "footprint"),
-        if found.outside == 1 { "lies" } else { "lie" }
+        "{none}Footprints count where both images show them, between the first and last line of the tie points ({} outside).",
+        whole(found.outside)
     )
 }
 
@@ -415,7 +405,7 @@ fn profile_cells(pair: &str, before: &ProfileByTies, after: Option<&ProfileByTie
     let mut cells = vec![
         (&before.profile).into(),
         pair.into(),
-        before.lines.n.to_string().into(),
+        whole(before.lines.n).into(),
     ];
     let quantities: [fn(&ProfileByTies) -> Option<String>; 4] = [
         |of| Some(label(of.lines.mean, 2)),

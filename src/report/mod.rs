@@ -17,9 +17,12 @@
 
 mod adjustment;
 mod archive;
+mod checks;
 mod clocks_and_datum;
 mod compare;
+mod convergence;
 mod corrections;
+mod correlation;
 mod diff;
 mod fidelity;
 mod graticule;
@@ -31,16 +34,21 @@ mod misregistration;
 mod moved;
 mod net;
 mod notes;
+mod numbers;
 mod outlines;
 mod plots;
 mod provenance;
+mod published;
 mod ranges;
 mod registration;
 mod reliability;
+mod residuals;
 mod scan;
 mod section;
 mod selection;
 mod sites;
+mod sites_map;
+mod sky;
 mod summary;
 mod timeline;
 mod uncertainty;
@@ -61,19 +69,21 @@ use section::Section;
 
 /// Every section of a site's page, in its order.
 const SECTIONS: &[Section] = &[
+    heights::SECTION,
+    misregistration::SECTION,
+    adjustment::SECTION,
     ranges::SECTION,
     scan::SECTION,
     images::SECTION,
     registration::SECTION,
-    misregistration::SECTION,
-    heights::SECTION,
-    adjustment::SECTION,
     map::SECTION,
+    timeline::SECTION,
     selection::SECTION,
     clocks_and_datum::SECTION,
-    timeline::SECTION,
     notes::SECTION,
     provenance::SECTION,
+    convergence::SECTION,
+    published::SECTION,
     uncertainty::SECTION,
 ];
 
@@ -88,7 +98,7 @@ pub fn page(site: &SiteProducts) -> Result<String> {
         .collect::<Result<_>>()?;
     Ok(html::page(
         &site.config.site,
-        &summary::lead(site),
+        &summary::lead(site)?,
         &sections,
     ))
 }

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use super::numbers::whole;
 use super::plots::{
     Arrow, Arrows, Extent, GREY, INK, Mark, Panel, Plot, Series, Style, figure, label,
     magnification, thinned,
@@ -99,9 +100,9 @@ fn footprints(before: &ImageProducts, after: &ImageProducts) -> Option<Plot> {
         each: shown,
     });
     let words = format!(
-        "Footprints around the middle one, with the orientation of the kernels and with the adjusted one, flight to the \
-         right. Of {} that are seen with both, {} lines and {} samples are the medians of what they move by.",
-        all.len(),
+        "Footprints around the middle one before and after the adjustment, flight to the right. Median shift of all {}: {} \
+         lines, {} samples.",
+        whole(all.len()),
         label(lines, 2),
         label(across, 2)
     );
@@ -154,9 +155,9 @@ fn vectors(
         high: samples + LONGEST * samples,
     };
     let mut panels = Vec::new();
-    let mut words = "Reprojection residuals of tie points, measured minus projected, from where they were measured; \
-                     flight to the right."
-        .to_owned();
+    let mut words =
+        "Reprojection residuals of tie points, measured minus projected; flight to the right."
+            .to_owned();
     let after = geometric.adjustment.map(|of| of.intersected);
     for (state, title, colour, ties) in [
         ("before", "Before", BEFORE, Some(geometric.intersected)),
@@ -173,8 +174,8 @@ fn vectors(
             each,
         };
         words += &format!(
-            " {title}: {} vectors, drawn {} times as long as on the axes, {} on average.",
-            all.len(),
+            " {title}: {} vectors, {} × magnified, mean {}.",
+            whole(all.len()),
             arrows.times(),
             mean_in_words(&all),
         );

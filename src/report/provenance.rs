@@ -1,7 +1,8 @@
 //! Program, configuration, and the files that were read.
 
 use super::{
-    html::{Cell, Column, Table, escape, paragraph},
+    html::{Cell, Column, Table, escape, folded, paragraph},
+    numbers::whole,
     section::Section,
 };
 use crate::products::SiteProducts;
@@ -16,9 +17,9 @@ pub(super) const SECTION: Section = Section {
 fn write(site: &SiteProducts) -> String {
     let config = site.config;
     let words = format!(
-        "areograph {}; configuration {}, BLAKE3 of its keys {}. ../manifest.json lists every product with its hash, and \
-         every stage with its fingerprint; ../kernels.tm loads the same kernels in the same order.",
+        "Cite as: areograph {}, site {}, configuration {} (BLAKE3 of its keys {}).",
         env!("CARGO_PKG_VERSION"),
+        config.site,
         crate::files::file_name(&config.file),
         config.blake3
     );
@@ -37,7 +38,7 @@ fn write(site: &SiteProducts) -> String {
             [
                 (&kernel.name).into(),
                 (&kernel.role).into(),
-                kernel.bytes.to_string().into(),
+                whole(kernel.bytes).into(),
                 hash(&kernel.blake3),
             ],
         );
@@ -53,7 +54,25 @@ fn write(site: &SiteProducts) -> String {
             ],
         );
     }
-    paragraph(&words) + &files.finish()
+    paragraph(&words) + LINKS + &files.finish() + &settings(site)
+}
+
+/// Where the rest is, from the folder of the page.
+const LINKS: &str = "<p><a href=\"../manifest.json\">manifest.json</a>: every product with its hash, every stage with its \
+    fingerprint, all checks, and when the run ended. <a href=\"../kernels.tm\">kernels.tm</a> loads the same kernels in the \
+    same order. <a href=\"../../index.html\">All sites</a>.</p>\n";
+
+/// The keys of the configuration that were written; all others have their defaults.
+fn settings(site: &SiteProducts) -> String {
+    if site.config.keys.is_empty() {
+        return String::new();
+    }
+    let columns = &[Column::Text("key"), Column::Text("value")];
+    let mut table = Table::new("Settings as written; all others are the defaults", columns);
+    for (key, value) in &site.config.keys {
+        table.row(true, [key.into(), value.into()]);
+    }
+    folded("Settings", &table.finish())
 }
 
 /// A hash in letters of one width.

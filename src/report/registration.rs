@@ -1,7 +1,8 @@
-//! Registration: profiles on the image plane, and figure 4 of Shan et al. 2005 for this site.
+//! Registration: profiles on the image plane.
 
 use super::{
-    html::{Column, Table, heading, paragraph},
+    html::{Column, Table, paragraph},
+    numbers::whole,
     plots::{COLOURS, Extent, GREY, INK, Mark, Panel, Plot, Series, Style, figure, label, thinned},
     section::Section,
 };
@@ -9,10 +10,7 @@ use crate::{
     error::Result,
     geom::pushbroom::CameraModel,
     products::{ImageProducts, SiteProducts},
-    stages::{
-        group_profiles::Profile,
-        register::{Method, MethodRun},
-    },
+    stages::group_profiles::Profile,
 };
 
 /// Profiles that have a colour of their own; the others share the last, grey one.
@@ -20,7 +18,7 @@ const COLOURED: usize = COLOURS.len() - 1;
 /// Dots of one series.
 const DOTS_MAX: usize = 600;
 /// Widths of the image that are shown on either side of it.
-const WIDTHS_BESIDE: f64 = 1.0;
+const WIDTHS_BESIDE: f64 = 0.15;
 
 pub(super) const SECTION: Section = Section {
     title: "Registration",
@@ -40,17 +38,8 @@ fn write(site: &SiteProducts) -> Result<String> {
     for image in &images {
         planes += &figure(&plane(site.profiles, image))?;
     }
-    let mut convergence = String::new();
-    for image in images.iter().filter(|image| converges(image)) {
-        convergence += &figure(&convergence_plot(image))?;
-    }
-    let mut html = profiles(site, &images) + &format!("<div class=\"plots\">\n{planes}</div>\n");
-    html += &heading("From the ground to the image");
-    html += &methods(site, &images);
-    if !convergence.is_empty() {
-        html += &format!("<div class=\"plots\">\n{convergence}</div>\n");
-    }
-    Ok(html + &models(&images))
+    let planes = format!("<div class=\"plots\">\n{planes}</div>\n");
+    Ok(profiles(site, &images) + &planes + &models(&images))
 }
 
 /// Which profile the images show, and where.
@@ -93,7 +82,7 @@ fn profiles(site: &SiteProducts, images: &[&ImageProducts]) -> String {
                     (&image.times.id).into(),
                     (&profile.id).into(),
                     if together { "yes" } else { "no" }.into(),
-                    on_image.inside.to_string().into(),
+                    whole(on_image.inside).into(),
                     inside(&points.line).into(),
                     inside(&points.sample).into(),
                     spacing
@@ -108,9 +97,8 @@ fn profiles(site: &SiteProducts, images: &[&ImageProducts]) -> String {
         .flat_map(|image| image.registration.rejected.values())
         .sum();
     let words = format!(
-        "Every profile is projected into every image. {elsewhere} pairs of profile and image without a footprint in the \
-         image are left out here; {rejected} footprints have no place in an image at all (behind the camera, beyond \
-         the horizon)."
+        "Every profile is projected into every image; {elsewhere} combinations without a footprint in the image are not \
+         listed. {rejected} footprints cannot be projected (behind the camera or beyond the horizon)."
     );
     table.finish() + &paragraph(&words)
 }
@@ -172,10 +160,14 @@ fn plane(profiles: &[Profile], image: &ImageProducts) -> Plot {
         ..Panel::of("sample", series)
     };
     let words = format!(
-        "Footprints on the image plane, flight to the right; level and upright lines are the edges of the delivered \
-         image. {} of {} footprints lie in the image, {shown} series are near it.",
-        points.inside_count(),
-        points.len()
+        "Footprints on the image plane, flight to the right, with the edges of the delivered image (dashed across, solid \
+         at its ends). {} of {} footprints lie in the image; {} near it.",
+        whole(points.inside_count()),
+        whole(points.len()),
+        match shown {
+            1 => "one profile is".to_owned(),
+            count => format!("{count} profiles are"),
+        }
     );
     Plot {
         x: Extent::of([0.0, lines].into_iter()),
@@ -186,91 +178,6 @@ fn plane(profiles: &[Profile], image: &ImageProducts) -> Plot {
             vec![panel],
         )
     }
-}
-
-fn name(run: &MethodRun) -> String {
-    let method = match run.method {
-        Method::FrameFirst => "frame first",
-        Method::FixedPoint => "fixed point, eq. 4",
-    };
-    format!("{method}, order {}", order(run.model))
-}
-
-const fn order(model: CameraModel) -> &'static str {
-    match model {
-        CameraModel::FirstOrder => "1",
-        _ => "2",
-    }
-}
-
-/// What the published iterations cost on this site's footprints.
-fn methods(site: &SiteProducts, images: &[&ImageProducts]) -> String {
-    let mut table = Table::new(
-        "Iterations per footprint within the image's lines",
-        &[
-            Column::Text("image"),
-            Column::Text("method"),
-            Column::Number("footprints"),
-            Column::Number("converged"),
-            Column::Number("iterations, mean"),
-            Column::Number("most"),
-            Column::Number("line − Newton's, mean"),
-            Column::Number("standard deviation"),
-        ],
-    );
-    for image in images {
-        for run in &image.registration.methods {
-            let difference = &run.difference_lines;
-            table.row(
-                u64::from(run.evaluations.n) == run.points,
-                [
-                    (&image.times.id).into(),
-                    name(run).into(),
-                    run.points.to_string().into(),
-                    run.evaluations.n.to_string().into(),
-                    format!("{:.2}", run.evaluations.mean).into(),
-                    format!("{:.0}", run.evaluations.max).into(),
-                    label(difference.mean, 4).into(),
-                    label(difference.standard_deviation, 4).into(),
-                ],
-            );
-        }
-    }
-    let words = format!(
-        "Tolerance {} lines, at most {} steps. Frame first converges by the aspect ratio of the pixels and diverges where a line is \
-         more than twice as long as a pixel; eq. 4 by what the camera turns from line to line.",
-        site.config.registration.tolerance_lines, site.config.registration.steps_max
-    );
-    table.finish() + &paragraph(&words)
-}
-
-/// Whether an iteration has steps to be drawn.
-fn converges(image: &ImageProducts) -> bool {
-    let mut runs = image.registration.methods.iter();
-    runs.any(|run| !run.mean_step_lines.is_empty())
-}
-
-/// Figure 4: the mean step of every iteration.
-fn convergence_plot(image: &ImageProducts) -> Plot {
-    // The curves of first order lie on those of second.
-    let runs = image.registration.methods.iter();
-    let second_order = runs.filter(|run| run.model == CameraModel::SecondOrder);
-    let series = second_order.enumerate().map(|(colour, run)| {
-        let steps = (1_u32..).zip(&run.mean_step_lines);
-        let logarithms = steps
-            .filter(|(_, step)| **step > 0.0)
-            .map(|(iteration, step)| (f64::from(iteration), step.log10()));
-        Series::line(name(run), colour, logarithms.collect())
-    });
-    let words = "Mean size of each step over the footprints within the image's lines, as a power of ten in lines; a \
-         footprint that has ended counts as no step."
-        .to_owned();
-    Plot::of(
-        format!("Convergence on {}", image.times.id),
-        words,
-        "iteration",
-        vec![Panel::of("log10 of mean |step|", series.collect())],
-    )
 }
 
 /// What the choice of the model moves.

@@ -4,7 +4,7 @@
 use super::{
     heights::known_beforehand,
     html::{Cell, Column, Table, counted, paragraph},
-    misregistration::BeforeAfter,
+    numbers::whole,
     plots::label,
 };
 use crate::{
@@ -30,13 +30,10 @@ const BLUNDERS_SHOWN: usize = 20;
 
 /// What the adjustment determines and what it does not, with numbers.
 pub(super) fn absolute(geometric: &GeometricProducts, adjustment: &AdjustmentProducts) -> String {
-    let pairs = BeforeAfter::all(geometric);
-    let relative = BeforeAfter::worst(&pairs);
-    let relative = relative.map_or_else(String::new, |pair| pair.sentence() + " ");
     let summary = &adjustment.adjusted.summary;
     let ties = &summary.ties;
     if ties.corrections_m[0].n == 0 {
-        return format!("{relative}No tie point took part: nothing was adjusted to anything.");
+        return format!("No tie point took part: nothing was adjusted to anything.");
     }
     let registration = if adjustment.images_agree {
         "The relative registration is corrected"
@@ -71,7 +68,7 @@ pub(super) fn absolute(geometric: &GeometricProducts, adjustment: &AdjustmentPro
         ),
     };
     format!(
-        "{relative}The tie points moved by {moved} m in X, Y, Z on average. {registration}; {determined}."
+        "The tie points moved by {moved} m in X, Y, Z on average. {registration}; {determined}."
     )
 }
 
@@ -186,7 +183,7 @@ pub(super) fn redundancy(site: &SiteProducts, adjusted: &Adjusted) -> String {
             !hidden,
             [
                 of.name.into(),
-                found.n.to_string().into(),
+                whole(found.n).into(),
                 mean.into(),
                 least.into(),
                 most.into(),
@@ -194,9 +191,8 @@ pub(super) fn redundancy(site: &SiteProducts, adjusted: &Adjusted) -> String {
             ],
         );
     }
-    let words = "The redundancy number of an observation is the share of an error in it that its residual shows; the rest \
-                 moves the unknowns. The smallest error that Baarda's test finds (at 3.29, in eight cases of ten) is \
-                 4.13 σ/√r for the mean redundancy number r.";
+    let words = "The share is the redundancy number r. The smallest error that Baarda's test detects (3.29, power 80 %) is \
+                 4.13 σ/√r.";
     sentences + &table.finish() + &paragraph(words)
 }
 

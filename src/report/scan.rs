@@ -1,9 +1,10 @@
 //! What the ranges say of the MOLA clock: spread of the residuals against the assumed correction.
 
 use super::{
-    html::{Column, Table, paragraph},
+    html::{Column, Table, folded, paragraph},
+    numbers::{number, signed},
     plots::{COLOURS, MARK, Mark, Panel, Plot, Series, figure},
-    ranges::{group_title, groups},
+    ranges::{many, plotted},
     section::Section,
 };
 use crate::{error::Result, products::SiteProducts, stages::check_ranges::BiasScan};
@@ -20,21 +21,19 @@ pub(super) const SECTION: Section = Section {
 
 fn write(site: &SiteProducts) -> Result<String> {
     let mut figures = String::new();
-    for group in groups(site) {
-        if let Some(plot) = scan_plot(site, group) {
+    for index in plotted(site) {
+        if let Some(plot) = scan_plot(site, index) {
             figures += &figure(&plot)?;
         }
     }
     let words = paragraph(
-        "The correction added to the time tags at which the residuals of a profile spread least. Profiles at nadir \
-         hardly tell, whatever the true bias: their uncertainty is large.",
+        "The correction of the time tags that minimises the spread of the residuals. Nadir profiles constrain it poorly.",
     );
-    Ok([
-        words,
-        table(site),
-        format!("<div class=\"plots\">\n{figures}</div>\n"),
-    ]
-    .concat())
+    let figures = format!("<div class=\"plots\">\n{figures}</div>\n");
+    if many(site) {
+        return Ok(words + &figures + &folded("Table of all profiles", &table(site)));
+    }
+    Ok(words + &table(site) + &figures)
 }
 
 fn table(site: &SiteProducts) -> String {
@@ -47,26 +46,24 @@ fn table(site: &SiteProducts) -> String {
             Column::Number("uncertainty"),
             Column::Number("configured"),
             Column::Number("best − configured"),
-            Column::Number("smallest spread, m"),
+            Column::Number("least spread scanned, m"),
         ],
     );
     for ranges in &site.ranges.profiles {
         let Some(scan) = &ranges.scan else { continue };
-        let number = |value: Option<f64>| {
-            value.map_or_else(|| "–".to_owned(), |seconds| format!("{seconds:.4}"))
-        };
-        let signed = |value: Option<f64>| {
-            value.map_or_else(|| "–".to_owned(), |seconds| format!("{seconds:+.4}"))
-        };
+        let plain =
+            |value: Option<f64>| value.map_or_else(|| "–".to_owned(), |seconds| number(seconds, 4));
+        let with_sign =
+            |value: Option<f64>| value.map_or_else(|| "–".to_owned(), |seconds| signed(seconds, 4));
         let least_m = scan.spread_m.iter().copied().fold(f64::INFINITY, f64::min);
         table.row(
             true,
             [
                 (&ranges.profile).into(),
-                signed(scan.best_s).into(),
-                number(scan.uncertainty_s).into(),
-                signed(Some(configured_s)).into(),
-                signed(scan.best_s.map(|best_s| best_s - configured_s)).into(),
+                with_sign(scan.best_s).into(),
+                plain(scan.uncertainty_s).into(),
+                with_sign(Some(configured_s)).into(),
+                with_sign(scan.best_s.map(|best_s| best_s - configured_s)).into(),
                 format!("{least_m:.4}").into(),
             ],
         );
@@ -74,48 +71,48 @@ fn table(site: &SiteProducts) -> String {
     table.finish()
 }
 
-fn scan_plot(site: &SiteProducts, group: std::ops::Range<usize>) -> Option<Plot> {
+fn scan_plot(site: &SiteProducts, index: usize) -> Option<Plot> {
     let configured_s = site.config.mola_clock.correction_s();
-    let title = format!("Clock bias scan of {}", group_title(site, &group));
-    let profiles = &site.ranges.profiles[group];
-    let (mut series, mut marks, mut said) = (Vec::new(), Vec::new(), Vec::new());
-    for (colour, ranges) in profiles.iter().enumerate() {
-        let Some(scan) = &ranges.scan else { continue };
-        let points = scan.correction_s.iter().zip(&scan.spread_m);
-        let points = points.map(|(correction, spread)| (*correction, *spread));
-        series.push(Series::line(&*ranges.profile, colour, points.collect()));
-        if let (Some(best_s), Some(uncertainty_s)) = (scan.best_s, scan.uncertainty_s) {
-            marks.push(Mark {
-                x: best_s,
-                half_width: uncertainty_s,
-                colour: COLOURS[colour % COLOURS.len()],
-            });
-        }
-        said.push(format!("{}: {}", ranges.profile, best(scan)));
+    let ranges = &site.ranges.profiles[index];
+    let scan = ranges.scan.as_ref()?;
+    let points = scan.correction_s.iter().zip(&scan.spread_m);
+    let points = points.map(|(correction, spread)| (*correction, *spread));
+    let mut panel = Panel::of(
+        "standard deviation, m",
+        vec![Series::line("spread of the residuals", 0, points.collect())],
+    );
+    if let (Some(best_s), Some(uncertainty_s)) = (scan.best_s, scan.uncertainty_s) {
+        panel.marks.push(Mark {
+            x: best_s,
+            half_width: uncertainty_s,
+            colour: COLOURS[0],
+        });
     }
-    if series.is_empty() {
-        return None;
-    }
-    marks.push(Mark {
+    panel.marks.push(Mark {
         x: configured_s,
         half_width: 0.0,
         colour: MARK,
     });
-    let mut panel = Panel::of("standard deviation, m", series);
-    panel.marks = marks;
     let caption = format!(
-        "{}. Red: the configured {configured_s:+.3} s; upright lines in the curve's colour: the best correction, \
-         with a band as wide as its uncertainty.",
-        said.join("; ")
+        "{}. Red: the configured {} s. Blue: the best correction with its uncertainty.",
+        best(scan),
+        signed(configured_s, 3)
     );
+    let title = format!("Clock bias scan of {}", ranges.profile);
     let x = "assumed correction of the tags, s";
     Some(Plot::of(title, caption, x, vec![panel]))
 }
 
 fn best(scan: &BiasScan) -> String {
     match (scan.best_s, scan.uncertainty_s) {
-        (Some(best_s), Some(uncertainty_s)) => format!("best {best_s:+.4} ± {uncertainty_s:.4} s"),
-        (Some(best_s), None) => format!("best {best_s:+.4} s"),
-        _ => "no minimum inside the scan".to_owned(),
+        (Some(best_s), Some(uncertainty_s)) => {
+            format!(
+                "Best {} ± {} s",
+                signed(best_s, 4),
+                number(uncertainty_s, 4)
+            )
+        }
+        (Some(best_s), None) => format!("Best {} s", signed(best_s, 4)),
+        _ => "No minimum inside the scan".to_owned(),
     }
 }

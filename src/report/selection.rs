@@ -2,6 +2,7 @@
 
 use super::{
     html::{Column, Table, paragraph},
+    numbers::whole,
     section::Section,
 };
 use crate::{
@@ -33,7 +34,7 @@ fn write(site: &SiteProducts) -> String {
             [
                 (&window.id).into(),
                 outline(window).into(),
-                shots.to_string().into(),
+                whole(shots).into(),
             ],
         );
     }
@@ -42,10 +43,9 @@ fn write(site: &SiteProducts) -> String {
 
 fn filter(site: &SiteProducts) -> String {
     let filter = &site.config.pedr.filter;
-    let join = |values: Vec<String>| values.join(", ");
+    let join = |values: Vec<String>| values.join(" or ");
     format!(
-        "A shot is kept when its class is one of {}, its trigger channel one of {}, its attitude flag one of {} and \
-         its off-nadir angle at most {:.1}°.",
+        "Shots are kept with class {}, trigger channel {}, attitude flag {} and an off-nadir angle of at most {:.1}°.",
         join(filter.classes.iter().map(ToString::to_string).collect()),
         join(filter.channels.iter().map(ToString::to_string).collect()),
         join(
@@ -79,7 +79,7 @@ fn rejects(site: &SiteProducts) -> String {
             true,
             [
                 reason.into(),
-                shots.to_string().into(),
+                whole(*shots).into(),
                 format!("{share:.1} %").into(),
             ],
         );

@@ -2,9 +2,11 @@
 
 use super::{
     fidelity::FIDELITY_FILE,
-    html::{Cell, Column, Table, Tone, link, page, paragraph, verdict},
+    html::{Cell, Column, Table, Tone, escape, link, page, paragraph, verdict},
+    numbers::{number, whole},
+    sites_map::{self, Place},
 };
-use crate::units::RADIANS_PER_ARCSECOND;
+use crate::error::Result;
 
 /// What the page says of one site.
 #[derive(Debug, Clone, PartialEq)]
@@ -30,14 +32,13 @@ pub struct SiteSummary {
     pub counts: [u64; 3],
     /// Largest |mean| of range − distance of a profile, metres.
     pub range_mean_m: Option<f64>,
-    /// Largest second-order position RMSE of an image, metres.
-    pub position_rmse_m: Option<f64>,
-    /// Largest second-order pointing RMSE of an image, radians.
-    pub pointing_rmse_rad: Option<f64>,
-    /// Largest along-track parallax of two images at their tie points, metres.
-    pub along_track_parallax_m: Option<f64>,
-    /// The same with the adjusted orientation, metres.
-    pub adjusted_along_track_parallax_m: Option<f64>,
+    /// Largest along-track parallax of two images at their tie points, with the orientation of the kernels and the
+    /// adjusted one, metres.
+    pub images_apart_m: [Option<f64>; 2],
+    /// Median height of tie points above or below the MOLA surface, likewise, metres.
+    pub height_off_m: [Option<f64>; 2],
+    /// East longitude and areocentric latitude of the middle of the first window that is a box, degrees.
+    pub place_deg: Option<(f64, f64)>,
     /// When the products were published.
     pub finished_utc: String,
     /// Version of the program that made them.
@@ -45,8 +46,10 @@ pub struct SiteSummary {
 }
 
 /// The page over `sites`, which stand in the order given.
-#[must_use]
-pub fn sites_page(sites: &[SiteLine]) -> String {
+///
+/// # Errors
+/// A map that cannot be drawn, which is a bug in areograph.
+pub fn sites_page(sites: &[SiteLine]) -> Result<String> {
     let with = |required: Tone| sites.iter().filter(|site| tone(site) == required).count();
     let unfinished = sites.iter().filter(|site| site.products.is_none()).count();
     let (valid, remarks) = (with(Tone::Good), with(Tone::Remarks));
@@ -67,14 +70,29 @@ pub fn sites_page(sites: &[SiteLine]) -> String {
         link(FIDELITY_FILE, "Fidelity to the papers")
     );
     let words = paragraph(
-        "Each name leads to the site's report. Figures are the largest of the site: |mean| of range − distance over \
-         its profiles, RMSE of the second-order models over its images.",
+        "Names link to the reports. Off MOLA: median height of the tie points against the MOLA surface; images apart: along \
+         track, the worst pair; range − distance: the largest mean of a profile.",
     );
-    page(
-        "Sites",
-        &(verdict(overall, &headline, "") + &table(sites) + &words + &fidelity),
-        &[],
-    )
+    let lead = [
+        verdict(overall, &headline, ""),
+        sites_map::figure(&places(sites))?,
+        table(sites),
+        words,
+        fidelity,
+    ];
+    Ok(page("Sites", &lead.concat(), &[]))
+}
+
+/// The sites of which it is known where they are.
+fn places(sites: &[SiteLine]) -> Vec<Place<'_>> {
+    let placed = sites.iter().filter_map(|site| {
+        Some(Place {
+            name: &site.folder,
+            tone: tone(site),
+            place_deg: site.products.as_ref()?.place_deg?,
+        })
+    });
+    placed.collect()
 }
 
 fn tone(site: &SiteLine) -> Tone {
@@ -93,17 +111,13 @@ fn table(sites: &[SiteLine]) -> String {
         &[
             Column::Text("site"),
             Column::Text("verdict"),
-            Column::Text("because"),
             Column::Number("shots"),
             Column::Number("profiles"),
             Column::Number("images"),
-            Column::Number("range, m"),
-            Column::Number("position, m"),
-            Column::Number("pointing, ″"),
-            Column::Number("images apart, m"),
-            Column::Number("adjusted, m"),
+            Column::Number("off MOLA, m: before → adjusted"),
+            Column::Number("images apart, m: before → adjusted"),
+            Column::Number("range − distance, m"),
             Column::Text("published (UTC)"),
-            Column::Text("version"),
         ],
     );
     for site in sites {
@@ -113,12 +127,20 @@ fn table(sites: &[SiteLine]) -> String {
 }
 
 fn cells(site: &SiteLine) -> Vec<Cell> {
+    let told = |word: &str, why: &str| {
+        let why = if why.is_empty() {
+            String::new()
+        } else {
+            format!("<br><small>{}</small>", escape(why))
+        };
+        Cell::Html(format!("{}{why}", escape(word)))
+    };
     let Some(summary) = &site.products else {
         let because = site
             .failure
             .as_deref()
             .map_or("the last run did not finish; see its log", first_line);
-        return vec![(&site.folder).into(), "no products".into(), because.into()];
+        return vec![(&site.folder).into(), told("no products", because)];
     };
     let (word, why) = match &site.failure {
         Some(failure) => (
@@ -127,31 +149,37 @@ fn cells(site: &SiteLine) -> Vec<Cell> {
         ),
         None => (summary.verdict, because(summary)),
     };
-    let figure = |value: Option<f64>, scale: f64| -> Cell {
-        value
-            .map_or_else(|| "–".to_owned(), |value| format!("{:.3}", value * scale))
-            .into()
-    };
     let mut cells = vec![
         Cell::Html(link(
             &format!("{}/report/index.html", site.folder),
             &site.folder,
         )),
-        word.into(),
-        why.into(),
+        told(word, &why),
     ];
-    cells.extend(summary.counts.map(|count| count.to_string().into()));
-    cells.push(figure(summary.range_mean_m, 1.0));
-    cells.push(figure(summary.position_rmse_m, 1.0));
-    cells.push(figure(
-        summary.pointing_rmse_rad,
-        RADIANS_PER_ARCSECOND.recip(),
-    ));
-    cells.push(figure(summary.along_track_parallax_m, 1.0));
-    cells.push(figure(summary.adjusted_along_track_parallax_m, 1.0));
-    cells.push((&summary.finished_utc).into());
-    cells.push((&summary.version).into());
+    cells.extend(summary.counts.map(|count| whole(count).into()));
+    cells.push(moved(summary.height_off_m));
+    cells.push(moved(summary.images_apart_m));
+    let range_mean_m = summary.range_mean_m.map(|mean_m| number(mean_m, 2));
+    cells.push(range_mean_m.unwrap_or_else(dash).into());
+    cells.push(Cell::Html(format!(
+        "{}<br><small>areograph {}</small>",
+        escape(&summary.finished_utc.replace('T', " ").replace('Z', "")),
+        escape(&summary.version)
+    )));
     cells
+}
+
+/// A figure before and after the adjustment, with a dash where there is none.
+fn moved([before, after]: [Option<f64>; 2]) -> Cell {
+    let text = |value: Option<f64>| value.map_or_else(dash, |value| number(value, 1));
+    match (before, after) {
+        (None, None) => dash().into(),
+        _ => format!("{} → {}", text(before), text(after)).into(),
+    }
+}
+
+fn dash() -> String {
+    "–".to_owned()
 }
 
 fn first_line(text: &str) -> &str {
@@ -182,10 +210,9 @@ mod tests {
             remarks: Vec::new(),
             counts: [10, 1, 0],
             range_mean_m: Some(1.25),
-            position_rmse_m: None,
-            pointing_rmse_rad: None,
-            along_track_parallax_m: None,
-            adjusted_along_track_parallax_m: None,
+            images_apart_m: [Some(261.2), Some(0.04)],
+            height_off_m: [None, None],
+            place_deg: Some((175.3, -14.6)),
             finished_utc: "2026-01-01T00:00:00Z".to_owned(),
             version: "1".to_owned(),
         };
@@ -202,13 +229,28 @@ mod tests {
                 failure: Some("a <kernel> is gone\n  what to do: look".to_owned()),
                 ..line("stale", Some(summary("valid", &[])))
             },
-        ]);
+        ])
+        .unwrap();
         assert!(page.contains(
             "4 sites: 2 invalid or failed, 1 without products, 0 valid with remarks, 1 valid."
         ));
         assert!(page.contains("mean of &lt;x&gt;; and 1 more"));
         assert!(page.contains("href=\"good/report/index.html\""));
-        assert!(page.contains("a &lt;kernel&gt; is gone</td>"));
+        assert!(page.contains("<small>a &lt;kernel&gt; is gone</small>"));
+        assert!(page.contains("261.2 → 0.0"));
+        // Of the three with products, on the map too.
+        let map = page
+            .split("<svg")
+            .nth(1)
+            .unwrap()
+            .split("</svg>")
+            .next()
+            .unwrap();
+        assert!(
+            ["good", "bad", "stale"]
+                .iter()
+                .all(|name| map.contains(name))
+        );
         assert_eq!(page.matches("<tr class=\"invalid\">").count(), 3);
     }
 }

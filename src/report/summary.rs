@@ -1,71 +1,207 @@
-//! The lead of a site's page: valid or not, why, and what to weigh.
+//! The first screen of a site's page: verdict, the numbers that matter, every check, the map.
 
 use super::{
-    html::{Tone, counted, list, paragraph, verdict},
-    misregistration::BeforeAfter,
+    checks,
+    heights::{absolute, known_beforehand},
+    html::{Tone, counted, escape, list, paragraph, verdict},
+    map,
+    numbers::{number, signed},
 };
-use crate::products::SiteProducts;
+use crate::{
+    error::Result,
+    products::SiteProducts,
+    stages::judge::{Check, CheckKind},
+};
 
-/// Reasons, and remarks, in the verdict; the rest is counted.
+/// Reasons, and remarks, that are listed; the rest is counted.
 const REASONS_SHOWN: usize = 12;
 
-/// Valid or not, why, and what to weigh: the first lines of the page.
-pub(super) fn lead(site: &SiteProducts) -> String {
+/// Valid or not and why, how good by whose judgement, and where: the first lines of the page.
+///
+/// # Errors
+/// A map that cannot be drawn.
+pub(super) fn lead(site: &SiteProducts) -> Result<String> {
     let (reasons, remarks) = (&site.verdict.reasons, &site.verdict.remarks);
-    let (tone, headline) = match (reasons.len(), remarks.len()) {
-        (0, 0) => (
-            Tone::Good,
-            "Valid: every profile and image is within the limits of the configuration.".to_owned(),
-        ),
-        (0, 1) => (Tone::Remarks, "Valid, with one remark:".to_owned()),
-        (0, count) => (Tone::Remarks, format!("Valid, with {count} remarks:")),
-        (1, _) => (Tone::Bad, "Invalid, for one reason:".to_owned()),
-        (count, _) => (Tone::Bad, format!("Invalid, for {count} reasons:")),
+    let tone = match (reasons.len(), remarks.len()) {
+        (0, 0) => Tone::Good,
+        (0, _) => Tone::Remarks,
+        _ => Tone::Bad,
     };
-    let mut body = first_of(reasons);
-    if !reasons.is_empty() && !remarks.is_empty() {
-        body += &paragraph("Also:");
-    }
-    body += &first_of(remarks);
-    body += &paragraph(&counts(site));
-    body += &paragraph(&together(site));
-    paragraph(&site.config.description) + &verdict(tone, &headline, &body)
+    let remarks = if remarks.is_empty() {
+        String::new()
+    } else {
+        format!(
+            "<details class=\"more\"{}><summary>{}</summary>\n{}</details>\n",
+            if reasons.is_empty() { " open" } else { "" },
+            counted(remarks.len(), "remark"),
+            first_of(remarks)
+        )
+    };
+    Ok(format!(
+        "{}{}{}<div class=\"first\">\n<div>{}</div>\n<div>{}</div>\n</div>\n{remarks}",
+        about(site),
+        verdict(tone, &headline(site), &first_of(reasons)),
+        numbers(site),
+        checks::table(site),
+        map::first(site)?,
+    ))
 }
 
-fn counts(site: &SiteProducts) -> String {
-    let mut text = format!(
-        "{} in {}; {}.",
+fn headline(site: &SiteProducts) -> String {
+    match (site.verdict.reasons.len(), site.verdict.remarks.len()) {
+        (0, 0) => "Valid: every check is within its limit.".to_owned(),
+        (0, 1) => "Valid, with one remark.".to_owned(),
+        (0, count) => format!("Valid, with {count} remarks."),
+        (1, _) => "Invalid, for one reason:".to_owned(),
+        (count, _) => format!("Invalid, for {count} reasons:"),
+    }
+}
+
+/// What the page is about: description, dates of the data, how much there is.
+fn about(site: &SiteProducts) -> String {
+    let mut parts = Vec::new();
+    let days = |dates: &mut dyn Iterator<Item = &str>| {
+        let mut days: Vec<String> = dates
+            .filter_map(|utc| Some(utc.get(..10)?.to_owned()))
+            .collect();
+        days.sort_unstable();
+        match (days.first(), days.last()) {
+            (Some(first), Some(last)) if first == last => format!(" of {first}"),
+            (Some(first), Some(last)) => format!(" of {first} to {last}"),
+            _ => String::new(),
+        }
+    };
+    if !site.images.is_empty() {
+        let taken = days(&mut site.images.iter().map(|image| &*image.times.utc_start));
+        parts.push(counted(site.images.len(), "image") + &taken);
+    }
+    let shot = days(&mut site.utc.iter().map(String::as_str));
+    parts.push(format!(
+        "{} in {}{shot}",
         counted(site.footprints.len(), "footprint"),
-        counted(site.profiles.len(), "profile"),
-        counted(site.images.len(), "image")
-    );
-    // Of an invalid site the reasons say what is beyond its limit, and by how much.
-    let nearest = nearest_limit(site).filter(|_| site.verdict.valid);
-    if let Some((share, what)) = nearest {
-        text += &format!(
-            " Nearest to its limit: {what}, at {:.0} % of it.",
-            100.0 * share
-        );
+        counted(site.profiles.len(), "profile")
+    ));
+    let mut words = escape(site.config.description.trim_end_matches('.'));
+    if !words.is_empty() {
+        words += ". ";
     }
-    text
+    words += &escape(&(parts.join("; ") + "."));
+    format!("<p class=\"about\">{words}</p>\n")
 }
 
-/// How far apart the images see the same ground, before and after the adjustment; nothing without tie points.
-fn together(site: &SiteProducts) -> String {
-    let Some(geometric) = &site.geometric else {
+/// A number that matters: what it is, its value, and what to know of it.
+struct KeyNumber {
+    what: &'static str,
+    value: String,
+    note: String,
+}
+
+/// The numbers that say how good the products are: by MOLA, between the images, absolutely; without tie points by
+/// the ranges.
+fn numbers(site: &SiteProducts) -> String {
+    let numbers: Vec<KeyNumber> = [
+        by_mola(site),
+        between_images(site),
+        in_place(site),
+        by_ranges(site),
+    ]
+    .into_iter()
+    .flatten()
+    .collect();
+    if numbers.is_empty() {
         return String::new();
-    };
-    let pairs = BeforeAfter::all(geometric);
-    let words = BeforeAfter::worst(&pairs).map_or_else(String::new, |pair| {
-        let others = match pairs.len() {
-            1 => String::new(),
-            count => format!(" It is the worst of {}.", counted(count, "pair")),
-        };
-        pair.sentence() + &others
-    });
-    format!("{words} {}", super::heights::in_a_sentence(geometric))
-        .trim_start()
-        .to_owned()
+    }
+    let items: String = numbers
+        .iter()
+        .map(|number| {
+            format!(
+                "<div><dt>{}</dt><dd><b>{}</b> {}</dd></div>\n",
+                escape(number.what),
+                escape(&number.value),
+                escape(&number.note)
+            )
+        })
+        .collect();
+    format!("<dl class=\"numbers\">\n{items}</dl>\n")
+}
+
+/// The number of a check, if it has one.
+fn checked<'a>(site: &SiteProducts<'a>, kind: CheckKind) -> Option<(&'a Check, f64)> {
+    let check = site
+        .verdict
+        .checks
+        .iter()
+        .find(|check| check.kind == kind)?;
+    Some((check, check.value?))
+}
+
+fn by_mola(site: &SiteProducts) -> Option<KeyNumber> {
+    let (_, after_m) = checked(site, CheckKind::HeightAfter)?;
+    let (_, before_m) = checked(site, CheckKind::HeightBefore)?;
+    let (geometric, _) = site.adjustment()?;
+    let ties = counted(geometric.heights.above_m.n as usize, "tie point");
+    Some(KeyNumber {
+        what: "Heights against MOLA",
+        value: format!("{} m", signed(after_m, 1)),
+        note: format!(
+            "median of {ties}; {} m before the adjustment",
+            signed(before_m, 1)
+        ),
+    })
+}
+
+fn between_images(site: &SiteProducts) -> Option<KeyNumber> {
+    let (after, after_m) = checked(site, CheckKind::ParallaxAfter)?;
+    let (_, before_m) = checked(site, CheckKind::ParallaxBefore)?;
+    Some(KeyNumber {
+        what: "Between images, along track",
+        value: format!(
+            "{} m",
+            number(after_m.abs(), if after_m.abs() < 1.0 { 2 } else { 1 })
+        ),
+        note: format!(
+            "at the tie points of {}; {} m before",
+            after.subject,
+            number(before_m.abs(), 0)
+        ),
+    })
+}
+
+/// What is known of the absolute place and height.
+fn in_place(site: &SiteProducts) -> Option<KeyNumber> {
+    let (geometric, adjustment) = site.adjustment()?;
+    let heights = adjustment.adjusted.heights.as_ref()?;
+    let [east_m, north_m, up_m] = heights.mean_sigma_m;
+    let [_, place] = absolute(&geometric, &adjustment);
+    Some(KeyNumber {
+        what: "Absolute accuracy, 1 σ",
+        value: format!(
+            "±{} m plan, ±{} m height",
+            number(east_m.max(north_m), 0),
+            number(up_m, 1)
+        ),
+        note: if place.contains(';') {
+            format!(
+                "by {}; see accuracy for what is open",
+                known_beforehand(&geometric)
+            )
+        } else {
+            format!("plan by {}, height by MOLA", known_beforehand(&geometric))
+        },
+    })
+}
+
+/// Ranges, where there are profiles.
+fn by_ranges(site: &SiteProducts) -> Option<KeyNumber> {
+    let (check, mean_m) = checked(site, CheckKind::RangeMean)?;
+    Some(KeyNumber {
+        what: "Range − distance",
+        value: format!("{} m", signed(mean_m, 2)),
+        note: match site.profiles.len() {
+            1 => format!("mean of profile {}", check.subject),
+            count => format!("largest mean of {count} profiles, {}", check.subject),
+        },
+    })
 }
 
 /// As many sentences as leave the verdict on one screen; the manifest has all.
@@ -79,47 +215,4 @@ fn first_of(sentences: &[String]) -> String {
         ));
     }
     html
-}
-
-/// The valid figure that uses most of its limit.
-fn nearest_limit(site: &SiteProducts) -> Option<(f64, String)> {
-    let limits = &site.config.range_check;
-    let means = site.ranges.profiles.iter().flat_map(|ranges| {
-        let share = |mean_m: f64, limit_m: f64| mean_m.abs() / limit_m;
-        [
-            (
-                share(ranges.range_minus_distance_m.mean, limits.mean_max_m),
-                format!("the mean range residual of profile {}", ranges.profile),
-            ),
-            (
-                share(ranges.decoding_m.mean, limits.decoding_max_m),
-                format!("the decoding residual of profile {}", ranges.profile),
-            ),
-            (
-                share(ranges.orbits_apart_m(), limits.orbit_max_m),
-                format!(
-                    "the distance of the two orbits in profile {}",
-                    ranges.profile
-                ),
-            ),
-        ]
-    });
-    let limits = &site.config.orientation;
-    let images = site.images.iter().flat_map(|image| {
-        let id = &image.times.id;
-        [
-            (
-                image.model.second_order.position_rmse_m() / limits.position_rmse_max_m,
-                format!("the position RMSE of image {id}"),
-            ),
-            (
-                image.model.rotation_vector.rmse_rad() / limits.pointing_rmse_max_rad,
-                format!("the pointing RMSE of image {id}"),
-            ),
-        ]
-    });
-    means
-        .chain(images)
-        .filter(|(share, _)| *share <= 1.0)
-        .max_by(|a, b| a.0.total_cmp(&b.0))
 }

@@ -12,7 +12,7 @@ use crate::{
 };
 
 pub(super) const SECTION: Section = Section {
-    title: "Gap between the footprints of one point",
+    title: "Appendix: uncertainty budget of Shan et al. 2005",
     anchor: "gap-of-footprints",
     appears: |site| {
         let pairs = site.geometric.as_ref().map(|geometric| geometric.pairs);
@@ -23,11 +23,9 @@ pub(super) const SECTION: Section = Section {
 
 fn write(geometric: &GeometricProducts) -> String {
     let pairs = BeforeAfter::all(geometric);
-    let explained = "Reprojection residuals of tie points give D = √(M² + σ²) per image; both images together are what \
-                     orientation explains along the track, and one MOLA spacing is taken for the whole. After the adjustment \
-                     footprints no longer lie a spacing apart. Across the track the paper averages the images, though its \
-                     eq. 7 says the root of the sum of squares: both heights are given. All of it tells how well the two \
-                     images agree, never how accurate heights or places are.";
+    let explained = "D = √(M² + σ²) of the reprojection residuals of each image; the whole is taken as one MOLA spacing, before the \
+                     adjustment only. Across track the paper averages the images where its eq. 7 has the root of the sum of \
+                     squares: both heights are given. This is agreement between two images, not accuracy.";
     budgets(&pairs) + &pairs.iter().map(without_budget).collect::<String>() + &paragraph(explained)
 }
 

@@ -35,6 +35,12 @@ pub struct Comparison {
     pub tied: Vec<usize>,
 }
 
+/// Root mean square distances of two sets within this ratio do not tell which is better: they change as much with the
+/// epochs that are compared.
+const TOO_CLOSE: f64 = 1.1;
+/// A set this many times as far from the mean as any other is what moves the mean.
+const FAR_BEYOND: f64 = 1.5;
+
 /// Set minus mean.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Deviation {
@@ -119,6 +125,28 @@ impl Comparison {
     #[must_use]
     pub fn closest(&self) -> &Deviation {
         &self.deviations[self.closest]
+    }
+
+    /// Sets so little farther from the mean than the closest that the rule cannot tell them apart.
+    pub fn nearly_as_close(&self) -> impl Iterator<Item = &Deviation> {
+        let limit = TOO_CLOSE * self.closest().size.rms;
+        let others = self.deviations.iter().enumerate();
+        let others =
+            others.filter(|(index, _)| *index != self.closest && !self.tied.contains(index));
+        others
+            .map(|(_, of)| of)
+            .filter(move |of| of.size.rms <= limit)
+    }
+
+    /// The set that pulls the mean towards itself: of three or more the one far beyond all others.
+    #[must_use]
+    pub fn pulls_the_mean(&self) -> Option<&Deviation> {
+        let mut sets: Vec<&Deviation> = self.deviations.iter().collect();
+        sets.sort_by(|one, other| other.size.rms.total_cmp(&one.size.rms));
+        match sets.as_slice() {
+            [far, next, _, ..] if far.size.rms > FAR_BEYOND * next.size.rms => Some(far),
+            _ => None,
+        }
     }
 
     /// Each two sets once, by index, the earlier first.
@@ -301,6 +329,31 @@ mod tests {
         let difference = found.difference(0, 1);
         assert!((difference.rms - 409_f64.sqrt()).abs() < 1e-4); // 3² + 20²
         assert!((difference.components[2].mean - 20.0).abs() < 1e-4);
+    }
+
+    #[test]
+    fn a_set_may_be_too_close_to_call_and_another_pull_the_mean() {
+        let found = compare_orbits(
+            &epochs(),
+            &[
+                orbit("nav", [0.0, 0.0, 0.0]),
+                orbit("ipng", [0.0, 1.5, 0.0]),
+                orbit("gsfc", [0.0, 0.2, 30.0]),
+            ],
+        );
+        // The mean lies 10 m from two of them and 20 m from the third.
+        let close: Vec<&str> = found.nearly_as_close().map(|of| &*of.set).collect();
+        assert_eq!(close.len(), 1, "{close:?}");
+        assert_eq!(found.pulls_the_mean().map(|of| &*of.set), Some("gsfc"));
+        let alone = compare_orbits(
+            &epochs(),
+            &[
+                orbit("a", [0.0; 3]),
+                orbit("b", [1.0, 0.0, 0.0]),
+                orbit("c", [8.0, 0.0, 0.0]),
+            ],
+        );
+        assert_eq!(alone.nearly_as_close().count(), 0);
     }
 
     #[test]

@@ -1,6 +1,10 @@
 //! The verdict on a site: the one place where it is made.
 
 mod adjustment;
+mod check;
+mod checks;
+
+pub use check::{Check, CheckKind, CheckOutcome};
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -14,10 +18,10 @@ use super::{
     orientation::Orientation,
     read_ties::Ties,
 };
-use crate::config::LimitsConfig;
+use crate::config::{LimitsConfig, OrientationConfig, RangeCheckConfig};
 
 /// Whether the products keep the limits of the configuration.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Verdict {
     /// No limit is broken.
     pub valid: bool,
@@ -25,6 +29,9 @@ pub struct Verdict {
     pub reasons: Vec<String>,
     /// What a reader must weigh although no limit is broken.
     pub remarks: Vec<String>,
+    /// Every limit with what uses most of it, the worst first; of a net of pictures none.
+    #[serde(default)]
+    pub checks: Vec<Check>,
 }
 
 impl Verdict {
@@ -37,6 +44,23 @@ impl Verdict {
             (true, _) => "valid with remarks",
         }
     }
+
+    /// The three checks that say most of how good the products are: heights by MOLA, images by each other, ranges; then
+    /// orbits and pointing where there are no tie points.
+    pub fn key_checks(&self) -> impl Iterator<Item = &Check> {
+        let kinds = [
+            CheckKind::HeightAfter,
+            CheckKind::ParallaxAfter,
+            CheckKind::RangeMean,
+            CheckKind::OrbitsApart,
+            CheckKind::PointingRmse,
+        ];
+        let checks = kinds.into_iter().filter_map(|kind| {
+            let mut checks = self.checks.iter();
+            checks.find(|check| check.kind == kind && check.value.is_some())
+        });
+        checks.take(3)
+    }
 }
 
 /// What is known of a site when it is judged.
@@ -46,6 +70,10 @@ pub struct Evidence<'a> {
     pub footprints: Option<usize>,
     /// The limits of the configuration.
     pub limits: &'a LimitsConfig,
+    /// Those on ranges.
+    pub range_limits: &'a RangeCheckConfig,
+    /// Those on sensor models.
+    pub orientation_limits: &'a OrientationConfig,
     /// Ranges of every profile.
     pub ranges: &'a RangeCheck,
     /// The configured correction of the clock of MOLA, seconds.
@@ -100,6 +128,7 @@ pub fn judge(evidence: &Evidence<'_>) -> Verdict {
         valid: reasons.is_empty(),
         reasons,
         remarks: evidence.remarks(),
+        checks: checks::checks(evidence),
     }
 }
 

@@ -107,7 +107,7 @@ impl Case {
     /// Runs into `out`, and gives the stages that the log says ran.
     pub(crate) fn stages_run(&self) -> Vec<String> {
         let mut command = self.areograph();
-        command.args(["run", "site.toml", "--out", "out"]);
+        command.args(["--verbose", "run", "site.toml", "--out", "out"]);
         let log = String::from_utf8(succeed(&mut command).stderr).unwrap();
         log.lines()
             .filter(|line| line.contains(": running: "))

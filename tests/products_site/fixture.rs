@@ -176,6 +176,8 @@ impl Site {
             footprints: searched.then_some(self.footprints.len()),
             ranges: &self.ranges,
             limits: &self.config.limits,
+            range_limits: &self.config.range_check,
+            orientation_limits: &self.config.orientation,
             clock_correction_s: self.config.mola_clock.correction_s(),
             images: if image { &judged } else { &[] },
             warnings: &self.warnings,

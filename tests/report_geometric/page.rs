@@ -38,7 +38,10 @@ fn text(html: &str) -> String {
 
 /// A number of a page, whose minus is a proper one.
 pub(crate) fn number(text: &str) -> f64 {
-    text.replace('−', "-").parse().unwrap()
+    text.replace('−', "-")
+        .replace('\u{202f}', "")
+        .parse()
+        .unwrap()
 }
 
 /// The data of the plot called `id`, row by row.

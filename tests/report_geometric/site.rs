@@ -30,6 +30,7 @@ use super::common::mission::{areograph, mission, succeed};
 /// Outputs of the stages, and the page that was published.
 pub(crate) struct Site {
     pub(crate) published: String,
+    pub(crate) manifest: serde_json::Value,
     config: SiteConfig,
     kernels: KernelSet,
     pub(crate) times: Vec<ImageTimes>,
@@ -83,6 +84,8 @@ impl Site {
             .map(|((orientation, model), registration)| (orientation, model, registration));
         Self {
             published: fs::read_to_string(folder.join("report/index.html")).unwrap(),
+            manifest: serde_json::from_slice(&fs::read(folder.join("manifest.json")).unwrap())
+                .unwrap(),
             kernels: KernelSet::from_metakernel(&mission().join("kernels/nav.tm")).unwrap(),
             converted: stored(&folder, "convert_datum"),
             profiles: stored(&folder, "group_profiles"),
@@ -195,6 +198,8 @@ impl Site {
         let evidence = Evidence {
             footprints: Some(self.converted.footprints.len()),
             limits: &self.config.limits,
+            range_limits: &self.config.range_check,
+            orientation_limits: &self.config.orientation,
             ranges: &self.ranges,
             clock_correction_s: self.config.mola_clock.correction_s(),
             images: &images,

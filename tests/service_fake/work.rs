@@ -329,6 +329,7 @@ fn publish(working: &Path, site: &str, product: &str, now_ms: i64) {
             valid: true,
             reasons: Vec::new(),
             remarks: Vec::new(),
+            checks: Vec::new(),
         },
         configuration: ConfigurationEntry {
             file_name: format!("{site}.toml"),

@@ -1,5 +1,6 @@
 //! The page of a comparison: what moved and how far, first; then what it may come from.
 
+mod checks;
 mod inputs;
 mod movement;
 
@@ -20,6 +21,7 @@ pub fn difference_page(sites: &[&RunDifference], not_compared: &[String]) -> Res
     };
     let lead: String = sites.iter().map(|site| verdict(site)).collect();
     let sections = [
+        of_each("Checks", sites, |site| Ok(checks::changed(site)))?,
         of_each("Movement", sites, |site| Ok(movement::tables(site)))?,
         of_each("Movement along the images", sites, movement::plots)?,
         of_each("Range residuals", sites, |site| Ok(inputs::profiles(site)))?,
@@ -51,7 +53,26 @@ fn of_each(
     Ok(Section::new(name, body))
 }
 
+/// A verdict that changed, alone and first; then what moved.
 fn verdict(site: &RunDifference) -> String {
+    changed_verdict(site) + &moved(site)
+}
+
+fn changed_verdict(site: &RunDifference) -> String {
+    let (a, b) = (&site.a.verdict, &site.b.verdict);
+    if a.word() == b.word() {
+        return String::new();
+    }
+    let tone = match (b.valid, b.remarks.is_empty()) {
+        (false, _) => Tone::Bad,
+        (true, false) => Tone::Remarks,
+        (true, true) => Tone::Good,
+    };
+    let headline = format!("{}: {} → {}", site.site, a.word(), b.word());
+    html::verdict(tone, &headline, &(list(&b.reasons) + &list(&b.remarks)))
+}
+
+fn moved(site: &RunDifference) -> String {
     let tone = match site.outcome {
         Outcome::NothingChanged | Outcome::NothingMoved => Tone::Good,
         Outcome::Moved => Tone::Remarks,

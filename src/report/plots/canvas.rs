@@ -6,7 +6,7 @@ use plotters::{
     style::text_anchor::{HPos, Pos, VPos},
 };
 
-use super::{INK, LETTERS, WIDTH};
+use super::{super::numbers::number, INK, LETTERS, WIDTH};
 use crate::{error::Result, products::error::ProductError};
 
 /// A drawing in progress.
@@ -48,23 +48,7 @@ pub(in crate::report) fn draw_text<'a>(
     area.draw_text(text, &style, at)
 }
 
-/// A number of an axis; what rounds to zero has no sign.
+/// A number of an axis or a table, see [`number`].
 pub(in crate::report) fn label(value: f64, decimals: usize) -> String {
-    let text = format!("{value:.decimals$}");
-    match text.strip_prefix('-') {
-        Some(digits) if !digits.contains(|digit| matches!(digit, '1'..='9')) => digits.to_owned(),
-        _ => text.replace('-', "\u{2212}"),
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn zero_has_no_sign() {
-        assert_eq!(label(-0.004, 2), "0.00");
-        assert_eq!(label(-0.006, 2), "−0.01");
-        assert_eq!(label(-20.0, 0), "−20");
-    }
+    number(value, decimals)
 }

@@ -9,7 +9,7 @@ use super::{
 };
 
 /// Height of the axis below the lowest panel, with its labels.
-pub(super) const FOOT: u32 = 110;
+pub(super) const FOOT: u32 = 96;
 /// Room between panels, for the labels at their corners.
 const GUTTER: u32 = 16;
 /// Width of the axes at the left side.
@@ -57,7 +57,10 @@ fn draw_panel<'a>(plot: &Plot, panel: &Panel, lowest: bool, area: &Canvas<'a>) -
         .label_style(("sans-serif", LETTERS).into_font().color(&INK))
         .axis_desc_style(("sans-serif", LETTERS).into_font().color(&INK))
         .x_label_formatter(&move |x| label(*x, x_decimals))
-        .y_label_formatter(&move |y| label(*y, y_decimals))
+        .y_label_formatter(&move |y| match panel.log {
+            true => power(*y),
+            false => label(*y, y_decimals),
+        })
         .draw()?;
     draw_marks(plot, panel, &mut chart)?;
     for series in &panel.series {
@@ -70,6 +73,17 @@ fn draw_panel<'a>(plot: &Plot, panel: &Panel, lowest: bool, area: &Canvas<'a>) -
         draw_histogram(panel, foot, &right)?;
     }
     Ok(())
+}
+
+/// The value of a logarithm, to a digit between the powers of ten.
+fn power(logarithm: f64) -> String {
+    let decimals = (1.0 - logarithm.floor()).clamp(0.0, 9.0) as usize;
+    let text = label(10_f64.powf(logarithm), decimals);
+    if text.contains('.') {
+        text.trim_end_matches('0').trim_end_matches('.').to_owned()
+    } else {
+        text
+    }
 }
 
 /// Upright marks with their bands, and level limits.
@@ -106,6 +120,13 @@ fn draw_series<'a>(x: Extent, y: Extent, series: &Series, chart: &mut Chart<'a, 
         }
         Style::Line => {
             chart.draw_series(LineSeries::new(points, colour.stroke_width(3)))?;
+        }
+        Style::Bars => {
+            let points: Vec<(f64, f64)> = points.collect();
+            let bars = points.chunks_exact(2).map(<[(f64, f64)]>::to_vec);
+            chart.draw_series(
+                bars.map(|bar| PathElement::new(bar, colour.mix(0.5).stroke_width(3))),
+            )?;
         }
         Style::Crosses => {
             chart.draw_series(points.map(|point| Cross::new(point, 8, colour.stroke_width(4))))?;
@@ -168,6 +189,12 @@ fn histogram(panel: &Panel) -> Vec<u32> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn logarithmic_axes_have_values() {
+        let names = [-3.0, -0.5, 0.0, 1.5, 4.0].map(power);
+        assert_eq!(names, ["0.001", "0.32", "1", "32", "10\u{202f}000"]);
+    }
 
     #[test]
     fn every_dot_inside_the_range_is_counted() {

@@ -4,10 +4,12 @@ mod arrows;
 mod canvas;
 mod draw;
 mod figure;
+mod palette;
 
 pub(super) use arrows::{Arrow, Arrows, magnification};
 pub(super) use canvas::{Canvas, Drawn, draw_text, drawn, label};
 pub(super) use figure::{Key, figure_html};
+pub(super) use palette::{COLOURS, GREY, GRID, INK, MARK};
 
 use std::fmt::Write as _;
 
@@ -20,26 +22,6 @@ pub(super) const WIDTH: u32 = 1040;
 /// Size of letters in the same units.
 pub(super) const LETTERS: u32 = 34;
 
-/// Colours that stay apart for most colour-blind readers, after Okabe and Ito 2008, dark enough for
-/// white paper; the page's style maps them, and the three below, for dark screens.
-pub(super) const COLOURS: [RGBColor; 7] = [
-    RGBColor(0x00, 0x72, 0xb2),
-    RGBColor(0xc2, 0x50, 0x00),
-    RGBColor(0x00, 0x80, 0x5d),
-    RGBColor(0xb0, 0x51, 0x8a),
-    RGBColor(0xa8, 0x6f, 0x00),
-    RGBColor(0x3b, 0x8f, 0xc0),
-    RGBColor(0x5a, 0x5a, 0x5a),
-];
-/// Index of the grey among the colours.
-pub(super) const GREY: usize = 6;
-/// Marks, limits and outliers.
-pub(super) const MARK: RGBColor = RGBColor(0xb3, 0x26, 0x1e);
-/// Letters and axes.
-pub(super) const INK: RGBColor = RGBColor(0x22, 0x22, 0x22);
-/// Grid lines.
-pub(super) const GRID: RGBColor = RGBColor(0xe2, 0xe2, 0xe2);
-
 /// How a series is drawn.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Style {
@@ -47,6 +29,8 @@ pub(super) enum Style {
     Line,
     /// Crosses in the colour of marks, for outliers.
     Crosses,
+    /// Upright bars, thin, each from one point to the next.
+    Bars,
 }
 
 /// Points of one kind.
@@ -100,6 +84,8 @@ pub(super) struct Panel {
     pub(super) limits: Vec<f64>,
     /// Whether the dots are counted in bars at the right side.
     pub(super) histogram: bool,
+    /// Whether the points hold logarithms to base 10 of the values; axis and data have the values.
+    pub(super) log: bool,
 }
 
 impl Panel {
@@ -115,6 +101,7 @@ impl Panel {
             marks: Vec::new(),
             limits: Vec::new(),
             histogram: false,
+            log: false,
         }
     }
 }
@@ -165,8 +152,9 @@ impl Plot {
             for series in &panel.series {
                 let name = format!("{},{}", quoted(panel.y_label), quoted(&series.label));
                 for (x, y) in &series.points {
+                    let y = if panel.log { 10_f64.powf(*y) } else { *y };
                     // Writing to a string cannot fail.
-                    let _ = writeln!(csv, "{name},{},{}", rounded(*x), rounded(*y));
+                    let _ = writeln!(csv, "{name},{},{}", rounded(*x), rounded(y));
                 }
             }
             arrows::append_csv(panel, &mut csv);

@@ -12,9 +12,9 @@ use crate::{
 };
 
 /// Mean heights that are stated worse than this, metres, are hardly controlled.
-const HEIGHT_LOOSE_M: f64 = 20.0;
+pub(super) const HEIGHT_LOOSE_M: f64 = 20.0;
 /// Craters between the profiles make a smaller share than this of the tie points stand out.
-const HEIGHT_OUTLIERS_FEW: f64 = 0.03;
+pub(super) const HEIGHT_OUTLIERS_FEW: f64 = 0.03;
 /// A mean height within this many of its standard deviations is no contradiction.
 const HEIGHT_SIGMAS: f64 = 3.0;
 
@@ -86,11 +86,15 @@ impl AdjustmentEvidence<'_> {
         }
     }
 
+    /// The limit on heights after the adjustment: within so many of its standard deviations nothing is contradicted.
+    pub(super) fn height_after_max_m(&self, limits: &LimitsConfig) -> f64 {
+        let by_chance_m = HEIGHT_SIGMAS * self.adjusted_heights.mean_sigma_m;
+        limits.height_after_max_m.max(by_chance_m)
+    }
+
     /// What MOLA says against the heights of tie points.
     fn heights_off(&self, limits: &LimitsConfig) -> Vec<String> {
-        let after_max_m = limits
-            .height_after_max_m
-            .max(HEIGHT_SIGMAS * self.adjusted_heights.mean_sigma_m);
+        let after_max_m = self.height_after_max_m(limits);
         let rounds = [
             ("before", self.heights, limits.height_before_max_m),
             ("after", self.adjusted_heights, after_max_m),
@@ -155,8 +159,8 @@ impl AdjustmentEvidence<'_> {
         remarks
     }
 
-    /// Corrections of orientations that what was known of them does not allow.
-    fn corrected_too_far(&self, limits: &LimitsConfig) -> Vec<String> {
+    /// The largest correction of each image in its standard deviations: image, unknown, correction.
+    pub(super) fn largest_corrections(&self) -> impl Iterator<Item = (&str, Unknown, f64)> {
         let largest = |image: &CorrectedImage| -> Option<(f64, usize)> {
             let off = image.correction.iter().zip(&image.expected);
             let off = off.map(|(value, expected)| value - expected);
@@ -165,17 +169,23 @@ impl AdjustmentEvidence<'_> {
             let sigmas = known.map(|(index, (value, sigma))| ((value / sigma).abs(), index));
             sigmas.max_by(|one, other| one.0.total_cmp(&other.0))
         };
-        let far = self.adjusted.images.iter().filter_map(|image| {
+        self.adjusted.images.iter().filter_map(move |image| {
             let (sigmas, coefficient) = largest(image)?;
             let unknown = Unknown::Orientation {
                 image: 0,
                 coefficient,
             };
+            Some((&*image.id, unknown, sigmas))
+        })
+    }
+
+    /// Corrections of orientations that what was known of them does not allow.
+    fn corrected_too_far(&self, limits: &LimitsConfig) -> Vec<String> {
+        let far = self.largest_corrections().filter_map(|(image, unknown, sigmas)| {
             (!(sigmas <= limits.correction_max_sigma)).then(|| {
                 format!(
-                    "image {}: the adjustment corrects its {} by {sigmas:.1} standard deviations, expected at most {}; check \
+                    "image {image}: the adjustment corrects its {} by {sigmas:.1} standard deviations, expected at most {}; check \
                      its time, its kernels and pointing.ck_bias_s",
-                    image.id,
                     unknown.quantity(),
                     limits.correction_max_sigma
                 )
@@ -185,13 +195,13 @@ impl AdjustmentEvidence<'_> {
     }
 
     /// Tie points that took part in the adjustment.
-    fn taken(&self) -> usize {
+    pub(super) fn taken(&self) -> usize {
         let points = self.adjusted.points.iter();
         points.filter(|point| point.kind == PointKind::Tie).count()
     }
 
     /// Tie points that join images and yet took no part.
-    fn left_out(&self) -> usize {
+    pub(super) fn left_out(&self) -> usize {
         self.ties.multi_image().saturating_sub(self.taken())
     }
 

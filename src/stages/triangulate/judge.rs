@@ -40,6 +40,7 @@ pub(super) fn judge(of: &Evidence) -> Verdict {
         valid: reasons.is_empty(),
         reasons,
         remarks: remarks(of),
+        checks: Vec::new(),
     }
 }
 

@@ -62,7 +62,7 @@ impl Input for NetFiles<'_> {
 
 impl Stage for Triangulate<'_> {
     const NAME: &'static str = "triangulate";
-    const METHOD: u32 = 2;
+    const METHOD: u32 = 3;
     type Output = Triangulation;
     stage_inputs!(fingerprint);
 

@@ -1,0 +1,121 @@
+//! Appendix: what the published iterations from ground to image cost, figure 4 of Shan et al. 2005 for this site.
+
+use super::{
+    html::{Column, Table, paragraph},
+    numbers::whole,
+    plots::{Panel, Plot, Series, figure, label},
+    section::Section,
+};
+use crate::{
+    error::Result,
+    geom::pushbroom::CameraModel,
+    products::{ImageProducts, SiteProducts},
+    stages::register::{Method, MethodRun},
+};
+
+pub(super) const SECTION: Section = Section {
+    title: "Appendix: iterations from ground to image",
+    anchor: "iterations",
+    appears: |site| {
+        let mut images = site.images.iter();
+        images.any(|image| !image.registration.points.is_empty())
+    },
+    write,
+};
+
+fn write(site: &SiteProducts) -> Result<String> {
+    let mut figures = String::new();
+    for image in site.images.iter().filter(|image| converges(image)) {
+        figures += &figure(&convergence_plot(image))?;
+    }
+    Ok(methods(site) + &format!("<div class=\"plots\">\n{figures}</div>\n"))
+}
+
+fn name(run: &MethodRun) -> String {
+    let method = match run.method {
+        Method::FrameFirst => "frame first",
+        Method::FixedPoint => "fixed point, eq. 4",
+    };
+    format!("{method}, order {}", order(run.model))
+}
+
+const fn order(model: CameraModel) -> &'static str {
+    match model {
+        CameraModel::FirstOrder => "1",
+        _ => "2",
+    }
+}
+
+/// What the published iterations cost on this site's footprints.
+fn methods(site: &SiteProducts) -> String {
+    let mut table = Table::new(
+        "Iterations per footprint within the image's lines",
+        &[
+            Column::Text("image"),
+            Column::Text("method"),
+            Column::Number("footprints"),
+            Column::Number("converged"),
+            Column::Number("iterations, mean"),
+            Column::Number("most"),
+            Column::Number("line − Newton's, mean"),
+            Column::Number("standard deviation"),
+        ],
+    );
+    for image in site.images {
+        for run in &image.registration.methods {
+            let difference = &run.difference_lines;
+            table.row(
+                u64::from(run.evaluations.n) == run.points,
+                [
+                    (&image.times.id).into(),
+                    name(run).into(),
+                    whole(run.points).into(),
+                    whole(run.evaluations.n).into(),
+                    format!("{:.2}", run.evaluations.mean).into(),
+                    format!("{:.0}", run.evaluations.max).into(),
+                    label(difference.mean, 4).into(),
+                    label(difference.standard_deviation, 4).into(),
+                ],
+            );
+        }
+    }
+    let words = format!(
+        "Tolerance {} lines, at most {} steps. The frame-first iteration converges with the aspect ratio of the pixels and \
+         diverges where a line is more than twice as long as a pixel; that of eq. 4 with the rotation of the camera from \
+         line to line.",
+        site.config.registration.tolerance_lines, site.config.registration.steps_max
+    );
+    table.finish() + &paragraph(&words)
+}
+
+/// Whether an iteration has steps to be drawn.
+fn converges(image: &ImageProducts) -> bool {
+    let mut runs = image.registration.methods.iter();
+    runs.any(|run| !run.mean_step_lines.is_empty())
+}
+
+/// Figure 4: the mean step of every iteration.
+fn convergence_plot(image: &ImageProducts) -> Plot {
+    // The curves of first order lie on those of second.
+    let runs = image.registration.methods.iter();
+    let second_order = runs.filter(|run| run.model == CameraModel::SecondOrder);
+    let series = second_order.enumerate().map(|(colour, run)| {
+        let steps = (1_u32..).zip(&run.mean_step_lines);
+        let logarithms = steps
+            .filter(|(_, step)| **step > 0.0)
+            .map(|(iteration, step)| (f64::from(iteration), step.log10()));
+        Series::line(name(run), colour, logarithms.collect())
+    });
+    let words = "Mean length of each step over the footprints within the image's lines; a footprint that has converged \
+                 counts as zero."
+        .to_owned();
+    Plot::of(
+        format!("Convergence on {}", image.times.id),
+        words,
+        "iteration",
+        vec![Panel {
+            log: true,
+            ..Panel::of("mean step, lines", series.collect())
+        }],
+    )
+}

@@ -1,0 +1,50 @@
+//! The checks of both runs, those whose value or outcome changed.
+
+use super::super::{
+    checks::value,
+    html::{Column, Table},
+};
+use crate::{
+    difference::RunDifference,
+    stages::judge::{Check, CheckOutcome},
+};
+
+/// The table; nothing where every check came out the same.
+pub(super) fn changed(site: &RunDifference) -> String {
+    let (a, b) = (&site.a.verdict.checks, &site.b.verdict.checks);
+    let mut rows = Vec::new();
+    for after in b {
+        let before = a.iter().find(|before| before.kind == after.kind);
+        if before.is_none_or(|before| told(before) != told(after)) {
+            rows.push((after.kind.words(), before, Some(after)));
+        }
+    }
+    let gone = a
+        .iter()
+        .filter(|before| b.iter().all(|after| after.kind != before.kind));
+    rows.extend(gone.map(|before| (before.kind.words(), Some(before), None)));
+    if rows.is_empty() {
+        return String::new();
+    }
+    let columns = &[Column::Text("check"), Column::Text("A"), Column::Text("B")];
+    let mut table = Table::new("Checks that came out otherwise", columns);
+    for (words, before, after) in rows {
+        let fails = after.is_some_and(|check| check.outcome == CheckOutcome::Fail);
+        let [before, after] = [before, after].map(|check| check.map_or("–".to_owned(), told));
+        table.row(!fails, [words.into(), before.into(), after.into()]);
+    }
+    table.finish()
+}
+
+/// Outcome and value of a check as pages write them.
+fn told(check: &Check) -> String {
+    let word = match check.outcome {
+        CheckOutcome::Fail => "fail",
+        CheckOutcome::Warning => "warning",
+        CheckOutcome::Pass => "pass",
+    };
+    match check.value {
+        Some(_) => format!("{word}, {}", value(check)),
+        None => word.to_owned(),
+    }
+}

@@ -1,0 +1,294 @@
+//! One check of a site: what was found, what is allowed, and who says so.
+
+use std::fmt;
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// What is checked, data that took no part in the result first.
+#[derive(
+    Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema,
+)]
+#[serde(rename_all = "snake_case")]
+pub enum CheckKind {
+    /// Footprints in the windows.
+    Footprints,
+    /// An adjustment that was asked for.
+    AdjustmentMade,
+    /// Median height of tie points above the MOLA surface, adjusted.
+    HeightAfter,
+    /// The same with the orientation of the kernels.
+    HeightBefore,
+    /// Share of adjusted tie points farther from the MOLA surface than 3.29 of their standard deviations.
+    HeightOutliers,
+    /// Mean difference of the surfaces of two profiles, in its standard deviations.
+    ProfilesApart,
+    /// Standard deviation of the mean height of the adjusted tie points.
+    HeightSigma,
+    /// Mean of range minus distance of a profile, its outliers left out.
+    RangeMean,
+    /// Mean distance of the spacecraft of the PEDR file from that of the kernels.
+    OrbitsApart,
+    /// Mean of range minus distance to the spacecraft of the PEDR file itself.
+    Decoding,
+    /// Share of outliers among the ranges of a profile.
+    RangeOutliers,
+    /// Shots of a profile.
+    Shots,
+    /// Clock correction of least spread minus the configured one.
+    ClockCorrection,
+    /// Distance along the flight between two images at their tie points, adjusted.
+    ParallaxAfter,
+    /// The same with the orientation of the kernels.
+    ParallaxBefore,
+    /// Standard deviation of unit weight of tie points along the track.
+    TieResidualsAlong,
+    /// The same across the track.
+    TieResidualsAcross,
+    /// Share of the tie points that took no part in the adjustment.
+    TiesRejected,
+    /// Tie points that took part in the adjustment.
+    TiesUsed,
+    /// Largest correction of an image, in standard deviations of what was known of it.
+    Correction,
+    /// Boresight of the laser or place of a profile, by the images of a common bus, in standard deviations.
+    Boresight,
+    /// Time that attitudes of an image are extrapolated by beyond what is trusted: as a sentence among the reasons.
+    Attitude,
+    /// RMSE of the second-order polynomials of position.
+    PositionRmse,
+    /// RMSE of the second-order rotation vector.
+    PointingRmse,
+    /// Error of the camera tables between their nodes.
+    TableError,
+    /// Records that could not be read.
+    SkippedRecords,
+}
+
+impl CheckKind {
+    /// What is checked, in words.
+    #[must_use]
+    pub const fn words(self) -> &'static str {
+        match self {
+            Self::Footprints => "Footprints in the windows",
+            Self::AdjustmentMade => "Adjustment converged",
+            Self::HeightAfter => "Tie points above MOLA, adjusted (median)",
+            Self::HeightBefore => "Tie points above MOLA, before (median)",
+            Self::HeightOutliers => "Tie points beyond 3.29 σ of MOLA",
+            Self::ProfilesApart => "MOLA profiles against each other",
+            Self::HeightSigma => "Uncertainty of the mean height",
+            Self::RangeMean => "Range − distance (mean)",
+            Self::OrbitsApart => "Orbit of the PEDR against kernels",
+            Self::Decoding => "Range − distance, orbit of the PEDR",
+            Self::RangeOutliers => "Outliers among ranges",
+            Self::Shots => "Shots in a profile",
+            Self::ClockCorrection => "Clock correction, best − configured",
+            Self::ParallaxAfter => "Images apart along track, adjusted",
+            Self::ParallaxBefore => "Images apart along track, before",
+            Self::TieResidualsAlong => "Tie residuals along track",
+            Self::TieResidualsAcross => "Tie residuals across track",
+            Self::TiesRejected => "Tie points rejected",
+            Self::TiesUsed => "Tie points used",
+            Self::Correction => "Largest orientation correction",
+            Self::Boresight => "Laser against its mounting",
+            Self::Attitude => "Attitude covered",
+            Self::PositionRmse => "Position model, RMSE",
+            Self::PointingRmse => "Pointing model, RMSE",
+            Self::TableError => "Camera table, interpolation error",
+            Self::SkippedRecords => "Records skipped",
+        }
+    }
+
+    /// Unit of value and limit; empty for a count or where there is neither.
+    #[must_use]
+    pub const fn unit(self) -> &'static str {
+        match self {
+            Self::HeightAfter
+            | Self::HeightBefore
+            | Self::HeightSigma
+            | Self::RangeMean
+            | Self::OrbitsApart
+            | Self::Decoding
+            | Self::ParallaxAfter
+            | Self::ParallaxBefore
+            | Self::PositionRmse => "m",
+            Self::HeightOutliers | Self::RangeOutliers | Self::TiesRejected => "%",
+            Self::ProfilesApart
+            | Self::TieResidualsAlong
+            | Self::TieResidualsAcross
+            | Self::Correction
+            | Self::Boresight => "σ",
+            Self::ClockCorrection => "s",
+            Self::PointingRmse => "″",
+            Self::TableError => "px",
+            Self::Footprints
+            | Self::AdjustmentMade
+            | Self::Shots
+            | Self::TiesUsed
+            | Self::Attitude
+            | Self::SkippedRecords => "",
+        }
+    }
+
+    /// Whether the limit is the least that is allowed.
+    #[must_use]
+    pub const fn at_least(self) -> bool {
+        matches!(self, Self::Footprints | Self::Shots | Self::TiesUsed)
+    }
+}
+
+/// How a check came out.
+#[derive(
+    Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema,
+)]
+#[serde(rename_all = "snake_case")]
+pub enum CheckOutcome {
+    /// Beyond a limit: the site is invalid.
+    Fail,
+    /// To be weighed by the reader.
+    Warning,
+    /// Within the limit.
+    Pass,
+}
+
+/// A check of a site: of many profiles, images or pairs the one that uses most of the limit.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Check {
+    /// What is checked.
+    pub kind: CheckKind,
+    /// How it came out.
+    pub outcome: CheckOutcome,
+    /// Profile, image or pair that is told; empty where the whole site is.
+    pub subject: String,
+    /// What was found, in `unit`; nothing where it is no finite number.
+    pub value: Option<f64>,
+    /// The largest magnitude that is allowed, for counts of what is wanted the least.
+    pub limit: Option<f64>,
+    /// Unit of both.
+    pub unit: String,
+}
+
+impl Check {
+    /// A check of `value` against `limit`; when broken, it came out as `broken`. What is no number breaks every limit.
+    pub(super) fn new(
+        kind: CheckKind,
+        subject: impl Into<String>,
+        value: f64,
+        limit: f64,
+        broken: CheckOutcome,
+    ) -> Self {
+        let kept = if kind.at_least() {
+            value >= limit
+        } else {
+            value.abs() <= limit
+        };
+        Self {
+            kind,
+            outcome: if kept { CheckOutcome::Pass } else { broken },
+            subject: subject.into(),
+            value: Some(value).filter(|value| value.is_finite()),
+            limit: Some(limit).filter(|limit| limit.is_finite()),
+            unit: kind.unit().to_owned(),
+        }
+    }
+
+    /// A check that has no number.
+    pub(super) fn told(kind: CheckKind, subject: impl Into<String>, outcome: CheckOutcome) -> Self {
+        Self {
+            kind,
+            outcome,
+            subject: subject.into(),
+            value: None,
+            limit: None,
+            unit: kind.unit().to_owned(),
+        }
+    }
+
+    /// Share of the limit that is used, infinite where it cannot be said.
+    fn used(&self) -> f64 {
+        let (Some(value), Some(limit)) = (self.value, self.limit) else {
+            return f64::INFINITY;
+        };
+        if self.kind.at_least() {
+            limit / value.max(f64::MIN_POSITIVE)
+        } else if value.abs() > 0.0 {
+            value.abs() / limit
+        } else {
+            0.0
+        }
+    }
+
+    /// The worst of several checks of one kind; nothing of none.
+    pub(super) fn worst(checks: impl Iterator<Item = Self>) -> Option<Self> {
+        // The first of equals: `max_by` would take the last.
+        checks.reduce(|worst, check| {
+            let worse = check.outcome.cmp(&worst.outcome).reverse();
+            if worse.then(check.used().total_cmp(&worst.used())).is_gt() {
+                check
+            } else {
+                worst
+            }
+        })
+    }
+}
+
+impl fmt::Display for Check {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(formatter, "{}", self.kind.words())?;
+        if !self.subject.is_empty() {
+            write!(formatter, " of {}", self.subject)?;
+        }
+        let (Some(value), Some(limit)) = (self.value, self.limit) else {
+            return Ok(());
+        };
+        let bound = if self.kind.at_least() {
+            "at least"
+        } else {
+            "at most"
+        };
+        let unit = &self.unit;
+        // Limits that follow from uncertainties have more digits than anyone reads.
+        let limit = (100.0 * limit).round() / 100.0;
+        let text = format!("{value:.2} {unit}; {bound} {limit} {unit}");
+        write!(formatter, ": {}", text.trim_end())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn mean(subject: &str, value: f64) -> Check {
+        Check::new(
+            CheckKind::RangeMean,
+            subject,
+            value,
+            10.0,
+            CheckOutcome::Fail,
+        )
+    }
+
+    #[test]
+    fn what_is_no_number_breaks_every_limit() {
+        assert_eq!(mean("a", -10.0).outcome, CheckOutcome::Pass);
+        assert_eq!(mean("a", -10.1).outcome, CheckOutcome::Fail);
+        let check = mean("a", f64::NAN);
+        assert_eq!((check.outcome, check.value), (CheckOutcome::Fail, None));
+        let shots = |n| Check::new(CheckKind::Shots, "", n, 20.0, CheckOutcome::Fail).outcome;
+        assert_eq!(
+            (shots(20.0), shots(19.0)),
+            (CheckOutcome::Pass, CheckOutcome::Fail)
+        );
+    }
+
+    #[test]
+    fn the_worst_is_told_and_of_equals_the_first() {
+        let of = |values: &[(&str, f64)]| {
+            let checks = values.iter().map(|(subject, value)| mean(subject, *value));
+            Check::worst(checks).unwrap().subject
+        };
+        assert_eq!(of(&[("a", 1.0), ("b", -9.0), ("c", 9.0)]), "b");
+        assert_eq!(of(&[("a", 11.0), ("b", f64::NAN), ("c", 12.0)]), "b");
+        assert!(Check::worst(std::iter::empty()).is_none());
+    }
+}

@@ -1,0 +1,258 @@
+//! Every limit of a site with what uses most of it: what the verdict rests on, as a table.
+
+use super::{
+    AdjustmentEvidence, CLOCK_DOUBT_S, CLOCK_DOUBT_SIGMA, Evidence, JudgedImage,
+    adjustment::{HEIGHT_LOOSE_M, HEIGHT_OUTLIERS_FEW},
+    check::{
+        Check,
+        CheckKind::{self, *},
+        CheckOutcome::{self, Fail, Pass, Warning},
+    },
+};
+use crate::{
+    config::LimitsConfig,
+    stages::{
+        check_heights::HeightCheck, check_ranges::ProfileRanges, compare_pairs::PairComparison,
+        orientation::InterpolationCheck,
+    },
+    units::RADIANS_PER_ARCSECOND,
+};
+
+/// More than this share of rejected tie points makes a site invalid.
+const REJECTED_SHARE_FAIL: f64 = 0.5;
+
+/// All checks, the worst first and of equals the most independent first.
+pub(super) fn checks(evidence: &Evidence<'_>) -> Vec<Check> {
+    let mut checks = Vec::new();
+    if let Some(footprints) = evidence.footprints {
+        checks.push(Check::new(Footprints, "", footprints as f64, 1.0, Fail));
+    }
+    if evidence.adjustment_failure.is_some() {
+        checks.push(Check::told(AdjustmentMade, "", Fail));
+    }
+    checks.extend(of_ranges(evidence));
+    checks.extend(clock(evidence));
+    let adjusted = evidence.adjustment.iter().flat_map(|of| of.images);
+    checks.extend(of_images(evidence, adjusted));
+    if let Some(adjustment) = &evidence.adjustment {
+        checks.extend(of_heights(adjustment, evidence.limits));
+        checks.extend(of_ties(adjustment, evidence.limits));
+    }
+    let skipped = evidence.complaints.len();
+    if skipped > 0 {
+        checks.push(Check::new(SkippedRecords, "", skipped as f64, 0.0, Warning));
+    }
+    checks.sort_by_key(|check| (check.outcome, check.kind));
+    checks
+}
+
+fn of_ranges(evidence: &Evidence<'_>) -> Vec<Check> {
+    let limits = evidence.range_limits;
+    let shots = |of: &ProfileRanges| f64::from(of.range_minus_distance_m.n);
+    let quantities: [(CheckKind, fn(&ProfileRanges) -> f64, f64); 3] = [
+        (
+            RangeMean,
+            |of| of.mean_without_outliers_m,
+            limits.mean_max_m,
+        ),
+        (
+            OrbitsApart,
+            ProfileRanges::orbits_apart_m,
+            limits.orbit_max_m,
+        ),
+        (
+            Decoding,
+            |of| of.decoding_without_outliers_m,
+            limits.decoding_max_m,
+        ),
+    ];
+    let worst = |kind: CheckKind, value: &dyn Fn(&ProfileRanges) -> f64, limit: f64| {
+        let profiles = evidence.ranges.profiles.iter();
+        Check::worst(profiles.map(|of| Check::new(kind, &*of.profile, value(of), limit, Fail)))
+    };
+    let mut checks: Vec<Option<Check>> = quantities
+        .into_iter()
+        .map(|(kind, value, limit)| worst(kind, &value, limit))
+        .collect();
+    let outliers = |of: &ProfileRanges| 100.0 * f64::from(of.outliers) / shots(of).max(1.0);
+    checks.push(worst(
+        RangeOutliers,
+        &outliers,
+        100.0 * limits.outlier_share_max,
+    ));
+    checks.push(worst(Shots, &shots, f64::from(limits.shots_min)));
+    checks.into_iter().flatten().collect()
+}
+
+/// What the ranges say against the configured clock correction.
+fn clock(evidence: &Evidence<'_>) -> Option<Check> {
+    let scans = evidence.ranges.profiles.iter().filter_map(|of| {
+        let scan = of.scan.as_ref()?;
+        let (best_s, uncertainty_s) = (scan.best_s?, scan.uncertainty_s?);
+        let limit_s = CLOCK_DOUBT_S.max(CLOCK_DOUBT_SIGMA * uncertainty_s);
+        let apart_s = best_s - evidence.clock_correction_s;
+        Some(Check::new(
+            ClockCorrection,
+            &*of.profile,
+            apart_s,
+            limit_s,
+            Warning,
+        ))
+    });
+    Check::worst(scans)
+}
+
+fn of_images<'a>(
+    evidence: &'a Evidence<'_>,
+    adjusted: impl Iterator<Item = &'a JudgedImage<'a>>,
+) -> Vec<Check> {
+    let images: Vec<(String, &JudgedImage)> = evidence
+        .images
+        .iter()
+        .map(|image| (image.id.to_owned(), image))
+        .chain(adjusted.map(|image| (format!("{}, adjusted", image.id), image)))
+        .collect();
+    let limits = evidence.orientation_limits;
+    let quantities: [(CheckKind, fn(&JudgedImage) -> f64, f64); 3] = [
+        (
+            PositionRmse,
+            |image| image.model.second_order.position_rmse_m(),
+            limits.position_rmse_max_m,
+        ),
+        (
+            PointingRmse,
+            |image| image.model.rotation_vector.rmse_rad() / RADIANS_PER_ARCSECOND,
+            limits.pointing_rmse_max_rad / RADIANS_PER_ARCSECOND,
+        ),
+        (
+            TableError,
+            |image| image.orientation.tables.interpolation.error_max_px,
+            InterpolationCheck::LIMIT_PX,
+        ),
+    ];
+    let mut checks: Vec<Check> = quantities
+        .into_iter()
+        .filter_map(|(kind, value, limit)| {
+            let each = images.iter();
+            Check::worst(each.map(|(id, of)| Check::new(kind, &**id, value(of), limit, Fail)))
+        })
+        .collect();
+    let attitudes = evidence.images.iter().map(|image| {
+        let outcome = if !image.orientation.invalid_because.is_empty() {
+            Fail
+        } else if image.orientation.notes.is_empty() {
+            Pass
+        } else {
+            Warning
+        };
+        Check::told(Attitude, image.id, outcome)
+    });
+    checks.extend(Check::worst(attitudes));
+    checks
+}
+
+fn of_heights(of: &AdjustmentEvidence<'_>, limits: &LimitsConfig) -> Vec<Check> {
+    let median = |kind: CheckKind, check: &HeightCheck, limit_m: f64| match &check.surface {
+        Ok(_) => Check::new(kind, "", check.above_m.median, limit_m, Fail),
+        Err(_) => Check::told(kind, "not controlled by MOLA", Warning),
+    };
+    let mut checks = vec![
+        median(HeightBefore, of.heights, limits.height_before_max_m),
+        median(
+            HeightAfter,
+            of.adjusted_heights,
+            of.height_after_max_m(limits),
+        ),
+    ];
+    if let Some(apart) = &of.heights.apart {
+        checks.push(Check::new(
+            ProfilesApart,
+            apart.profiles.join(" and "),
+            apart.mean_m / apart.sigma_m,
+            limits.profiles_apart_max_sigma,
+            Fail,
+        ));
+    }
+    if let Some(heights) = &of.adjusted.heights {
+        let share = heights.beyond_share();
+        let limit = limits.height_outliers_max;
+        let mut outliers = Check::new(HeightOutliers, "", 100.0 * share, 100.0 * limit, Fail);
+        if outliers.outcome == Pass && share > HEIGHT_OUTLIERS_FEW {
+            outliers.outcome = Warning;
+        }
+        checks.push(outliers);
+        let [_, _, up_m] = heights.mean_sigma_m;
+        checks.push(Check::new(HeightSigma, "", up_m, HEIGHT_LOOSE_M, Warning));
+    }
+    checks
+}
+
+fn of_ties(of: &AdjustmentEvidence<'_>, limits: &LimitsConfig) -> Vec<Check> {
+    let apart = |kind: CheckKind, pairs: &[PairComparison], limit_m: f64| {
+        Check::worst(pairs.iter().map(|pair| {
+            let name = pair.images.join(" and ");
+            Check::new(kind, name, pair.along_track_parallax_m, limit_m, Fail)
+        }))
+    };
+    let mut checks: Vec<Check> = [
+        apart(ParallaxBefore, of.pairs, limits.parallax_before_max_m),
+        apart(
+            ParallaxAfter,
+            of.adjusted_pairs,
+            limits.parallax_after_max_m,
+        ),
+    ]
+    .into_iter()
+    .flatten()
+    .collect();
+    let components = of.adjusted.summary.tie_components.into_iter();
+    let axes = [TieResidualsAlong, TieResidualsAcross];
+    checks.extend(
+        components
+            .zip(axes)
+            .map(|(found, kind)| Check::new(kind, "", found, limits.sigma0_max, Warning)),
+    );
+    let share = of.left_out() as f64 / of.ties.multi_image().max(1) as f64;
+    let broken = if share > REJECTED_SHARE_FAIL {
+        Fail
+    } else {
+        Warning
+    };
+    checks.push(rejected(share, limits.rejected_share_max, broken));
+    checks.push(Check::new(
+        TiesUsed,
+        "",
+        of.taken() as f64,
+        f64::from(limits.ties_min),
+        Warning,
+    ));
+    let corrections = of.largest_corrections().map(|(image, _, sigmas)| {
+        Check::new(Correction, image, sigmas, limits.correction_max_sigma, Fail)
+    });
+    checks.extend(Check::worst(corrections));
+    checks.extend(boresight(of, limits));
+    checks
+}
+
+/// What the laser says, where it was asked.
+fn boresight(of: &AdjustmentEvidence<'_>, limits: &LimitsConfig) -> Option<Check> {
+    let Ok(found) = of.adjusted.boresight.as_ref()? else {
+        return Some(Check::told(Boresight, "", Warning));
+    };
+    let limit = limits.correction_max_sigma;
+    let (unknown, sigmas) = found.farthest.as_ref()?;
+    let mut check = Check::new(Boresight, unknown, *sigmas, limit, Fail);
+    if check.outcome == Pass && !found.without.is_empty() {
+        check.outcome = Warning;
+    }
+    Some(check)
+}
+
+/// Rejected tie points: a share beyond the limit of a sound adjustment warns, more than half fails whatever that is.
+fn rejected(share: f64, limit: f64, broken: CheckOutcome) -> Check {
+    let mut check = Check::new(TiesRejected, "", 100.0 * share, 100.0 * limit, broken);
+    if broken == Fail {
+        check.outcome = Fail;
+    }
+    check
+}
