@@ -144,7 +144,8 @@ const fn section(kind: CheckKind) -> Option<&'static Section> {
         | CheckKind::HeightBefore
         | CheckKind::HeightOutliers
         | CheckKind::ProfilesApart
-        | CheckKind::HeightSigma => &heights::SECTION,
+        | CheckKind::HeightSigma
+        | CheckKind::Boresight => &heights::SECTION,
         CheckKind::RangeMean
         | CheckKind::OrbitsApart
         | CheckKind::Decoding

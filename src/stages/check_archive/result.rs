@@ -166,6 +166,7 @@ impl ArchiveRanges {
             valid: reasons.is_empty(),
             reasons,
             remarks,
+            checks: Vec::new(),
         }
     }
 }
