@@ -12,10 +12,6 @@
     reason = "a benchmark may fail loudly, counts little and prints its figures in one list"
 )]
 
-#[path = "../tests/track/mod.rs"]
-#[allow(dead_code, reason = "tests use more of it")]
-mod track;
-
 use std::{
     collections::BTreeMap,
     f64::consts::TAU,
@@ -28,23 +24,30 @@ use std::{
 };
 
 use areograph::{
-    altimetry::{DatumChoice, ShotFilter},
+    altimetry::{BiasScope, DatumChoice, MolaClock, ShotFilter, TagSign},
     error::{Error, Result},
-    frames::MarsDatum,
-    geom::window::{Region, WindowShape},
-    pds::{
-        archive::{Found, Index, IndexedFile, Indexes, Judged, Query, Sink, Source, search},
-        pedr::{LABEL_BYTES, RECORD_BYTES},
+    flow::{ArchiveRequest, check_archive},
+    geom::{
+        range_residuals::{RangeResiduals, SpacecraftState},
+        window::{Region, WindowShape},
     },
+    pds::{
+        archive::{
+            Found, Index, IndexedFile, Indexes, Judged, Listing, Query, Sink, Source, search,
+        },
+        pedr::{FieldGuard, LABEL_BYTES, RECORD_BYTES, Reader},
+    },
+    scene::{ArchiveOptions, write_archive},
+    spice::{KernelSet, Session},
 };
 use rayon::prelude::*;
 use serde_json::{Value, json};
-use track::{DEGREE, write_frames};
 
 static RUN_ON: AtomicBool = AtomicBool::new(false);
 const ROUNDS: usize = 5;
-/// Frames of a day without gaps, as a file of the mapping phase has them.
-const FRAMES_PER_FILE: u32 = 41_200;
+const DEGREE: f64 = std::f64::consts::PI / 180.0;
+/// Frames whose shots get a CSPICE state each.
+const SLOW_FRAMES: usize = 10_000;
 /// Where the ground latitude of the mid-point stands in a record.
 const MID_POINT: usize = 336;
 
@@ -73,27 +76,60 @@ struct Archive {
 }
 
 impl Archive {
+    /// An invented archive, with the kernels that go with it.
     fn write(folder: &Path, gb: f64) -> Self {
-        let wanted = gb * 1e9;
-        let per_file = f64::from(FRAMES_PER_FILE) * RECORD_BYTES as f64;
-        let files = (wanted / per_file).round().max(1.0) as u32;
-        let paths: Vec<PathBuf> = (0..files)
-            .map(|day| folder.join(format!("ap{:05}l.b", 10_100 + 12 * day)))
-            .collect();
-        (0..files)
-            .into_par_iter()
-            .zip(&paths)
-            .for_each(|(day, path)| {
-                let first = day * FRAMES_PER_FILE;
-                let frames = first..first + FRAMES_PER_FILE;
-                write_frames(path, MarsDatum::Iau2000, frames, |_, _| ());
-            });
+        write_archive(folder, &ArchiveOptions::of_size(1, gb)).unwrap();
+        let folder = folder.join("pedr");
+        let paths = Listing::below(&folder).paths;
         let sizes = paths.iter().map(|path| fs::metadata(path).unwrap().len());
         Self {
-            folder: folder.to_owned(),
             bytes: sizes.sum(),
             paths,
+            folder,
         }
+    }
+
+    fn kernels(&self) -> PathBuf {
+        self.folder.with_file_name("kernels").join("archive.tm")
+    }
+
+    /// The range check of all shots with its products; shots that were checked.
+    fn check_ranges(&self, out: &Path) -> u64 {
+        let request = ArchiveRequest {
+            paths: std::slice::from_ref(&self.folder),
+            kernels: &self.kernels(),
+            out,
+            clock: clock(),
+            force: true,
+            stop: &RUN_ON,
+        };
+        let outcome = check_archive(&request, &|_| ()).unwrap();
+        assert!(outcome.failures.is_empty());
+        outcome.manifest.counts["shots"]
+    }
+
+    /// The same residuals, one after the other with a CSPICE state each, of some frames; shots a second.
+    fn one_state_a_shot(&self) -> f64 {
+        let session = Session::open(&KernelSet::from_metakernel(&self.kernels()).unwrap()).unwrap();
+        let reader = Reader::open(&self.paths[0]).unwrap();
+        let start = Instant::now();
+        let stretch = reader.stretch(0..SLOW_FRAMES, Vec::new()).unwrap();
+        let (mut shots, mut sum_m) = (0_u32, 0.0);
+        for (_, frame) in stretch.frames(0..SLOW_FRAMES, FieldGuard::new(None)) {
+            let frame = frame.unwrap();
+            for shot in (1..=20).filter_map(|shot| frame.shot(shot)) {
+                if shot.range_m <= 0.0 || shot.class != 1 {
+                    continue;
+                }
+                let at = clock().spacecraft_time(shot.et_tag_s);
+                let state = session.state(at).unwrap();
+                let craft = SpacecraftState::of(at, &state.position, &state.velocity_m_s);
+                sum_m += RangeResiduals::of(&shot, &craft).range_minus_distance_m;
+                shots += 1;
+            }
+        }
+        black_box(sum_m);
+        f64::from(shots) / start.elapsed().as_secs_f64()
     }
 
     fn sources(&self, indexes: &Indexes) -> Vec<Source> {
@@ -212,6 +248,22 @@ impl Archive {
     }
 }
 
+fn clock() -> MolaClock {
+    MolaClock {
+        bias_s: 0.117,
+        sign: TagSign::Late,
+        scope: BiasScope::SpkLookup,
+        source: String::new(),
+    }
+}
+
+/// Largest distance of tabulated positions from CSPICE, as the products of a check have it, metres.
+fn position_error_m(out: &Path) -> f64 {
+    let document = fs::read_to_string(out.join("archive.json")).unwrap();
+    let document: Value = serde_json::from_str(&document).unwrap();
+    document["positions"]["largest_error_m"].as_f64().unwrap()
+}
+
 fn seconds(mut work: impl FnMut()) -> f64 {
     let start = Instant::now();
     work();
@@ -243,7 +295,12 @@ fn main() {
         .unwrap_or(2.0);
     fs::create_dir_all("target").unwrap();
     let folder = tempfile::tempdir_in("target").unwrap();
-    let archive = Archive::write(folder.path(), gb);
+    let writing = Instant::now();
+    let archive = Archive::write(&folder.path().join("archive"), gb);
+    println!(
+        "written at {:.2} GB/s",
+        archive.bytes as f64 / writing.elapsed().as_secs_f64() / 1e9
+    );
     let one = vec![half_degree(20.0, 10.0)];
     // Spread over the globe by the golden ratio.
     let thousand: Vec<Region> = (0..1_000)
@@ -306,7 +363,7 @@ fn main() {
             seconds(|| _ = black_box(archive.index(&index))),
         );
     }
-    let index_path = folder.path().join(areograph::pds::archive::INDEX);
+    let index_path = archive.folder.join(areograph::pds::archive::INDEX);
     let encoded = index.encode().unwrap();
     std::io::Write::write_all(&mut fs::File::create(&index_path).unwrap(), &encoded).unwrap();
     for _ in 0..ROUNDS {
@@ -318,6 +375,20 @@ fn main() {
             }),
         );
     }
+    let out = folder.path().join("qa");
+    let (mut checked, mut slow_per_s) = (0, 0.0_f64);
+    for _ in 0..2 {
+        note(
+            "range check",
+            seconds(|| checked = archive.check_ranges(&out)),
+        );
+        slow_per_s = slow_per_s.max(archive.one_state_a_shot());
+    }
+    let range_check = RangeCheck {
+        shots: checked,
+        slow_per_s,
+        position_error_m: position_error_m(&out),
+    };
     let memory_mb = peak_mb();
     for _ in 0..ROUNDS {
         note(
@@ -326,7 +397,21 @@ fn main() {
         );
     }
     let found = archive.search(&one, Judged::Near, &none);
-    report(&archive, &best, &encoded, [before_mb, memory_mb], &found);
+    report(
+        &archive,
+        &best,
+        &encoded,
+        [before_mb, memory_mb],
+        &found,
+        &range_check,
+    );
+}
+
+/// What the range check did, and how fast one CSPICE state a shot is.
+struct RangeCheck {
+    shots: u64,
+    slow_per_s: f64,
+    position_error_m: f64,
 }
 
 fn report(
@@ -335,6 +420,7 @@ fn report(
     index: &[u8],
     peaks_mb: [f64; 2],
     found: &Count,
+    range_check: &RangeCheck,
 ) {
     let bytes = archive.bytes as f64;
     println!(
@@ -353,6 +439,7 @@ fn report(
         );
     }
     let of = |name: &str| best[name];
+    let checked_per_s = range_check.shots as f64 / of("range check");
     let ratios: Value = json!({
         "scan_over_one_line_of_each_record_warm": of("lines, mapped") / of("scan"),
         "scan_over_one_line_copied_warm": of("lines, copied") / of("scan"),
@@ -364,6 +451,9 @@ fn report(
         "index_build_gb_per_s_warm": bytes / of("index build") / 1e9,
         "index_update_ms": of("index update, nothing new") * 1e3,
         "index_share_of_archive": index.len() as f64 / bytes,
+        "range_check_million_shots_per_s_warm": checked_per_s / 1e6,
+        "range_check_over_one_cspice_state_a_shot_warm": checked_per_s / range_check.slow_per_s,
+        "range_check_position_error_m": range_check.position_error_m,
         "peak_memory_after_cold_scan_mb": peaks_mb[0],
         "peak_memory_mb": peaks_mb[1],
     });
