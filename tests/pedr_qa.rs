@@ -414,6 +414,32 @@ fn damaged_files_are_told_and_the_rest_is_checked() {
     assert!(agree(&found["ap10001l.b/2"], &whole["ap10001l.b/2"]));
 }
 
+/// A file of two days takes two loads; a revolution lies across their border.
+#[test]
+fn a_file_that_is_longer_than_a_load_says_the_same() {
+    let folder = tempfile::tempdir().unwrap();
+    let files = folder.path().join("pedr");
+    fs::create_dir(&files).unwrap();
+    let [mut bytes, next] =
+        ["ap10001l.b", "ap10013l.b"].map(|name| fs::read(pedr().join(name)).unwrap());
+    bytes.extend_from_slice(&next[7_760..]); // without its label
+    assert!(bytes.len() > 7_760 + 776 * 65_536);
+    fs::write(files.join("ap10001l.b"), bytes).unwrap();
+    let out = folder.path().join("out");
+    assert_eq!(ended(&mut qa(&files, &kernels(), &out)).0, 5);
+    let (found, whole) = (rows(&out), rows(CHECKED.path()));
+    assert_eq!(found.len(), 24);
+    for row in found.values() {
+        let other = whole.values().find(|of| of["orbit"] == row["orbit"]);
+        let (mut row, mut other) = (row.clone(), other.unwrap().clone());
+        for column in ["file", "first_record", "last_record"] {
+            row.remove(column);
+            other.remove(column);
+        }
+        assert!(agree(&row, &other), "{row:?} {other:?}");
+    }
+}
+
 #[test]
 fn what_kernels_do_not_cover_is_told() {
     let folder = tempfile::tempdir().unwrap();

@@ -294,26 +294,48 @@ impl Archive<'_> {
         parts: &SyncSender<Part>,
     ) -> Result<()> {
         for file in todo.keys() {
-            let source = Arc::new(ArchiveSource::open(&paths[*file])?);
-            for rows in source.loads() {
-                Stopped::check(self.request.stop)?;
-                let load = source.load(rows, session, &self.rules());
-                let part = Part {
-                    file: *file,
-                    source: Arc::clone(&source),
-                    load,
-                };
-                let is_over = part.load.is_err();
-                if parts.send(part).is_err() {
-                    // Whoever checks has stopped, and says why.
-                    return Ok(());
-                }
-                if is_over {
-                    break;
-                }
+            if !self.load_file(*file, &paths[*file], session, parts)? {
+                // Whoever checks has stopped, and says why.
+                return Ok(());
             }
         }
         Ok(())
+    }
+
+    /// Loads a file part by part; gives whether anybody still takes them.
+    fn load_file(
+        &self,
+        file: usize,
+        path: &Path,
+        session: &Session,
+        parts: &SyncSender<Part>,
+    ) -> Result<bool> {
+        let send = |bytes, loaded| {
+            parts
+                .send(Part {
+                    file,
+                    bytes,
+                    loaded,
+                })
+                .is_ok()
+        };
+        let source = match ArchiveSource::open(path) {
+            Ok(source) => Arc::new(source),
+            Err(failure) => return Ok(send(0, Err(failure))),
+        };
+        let bytes = source.identity().bytes;
+        for rows in source.loads() {
+            Stopped::check(self.request.stop)?;
+            let load = source.load(rows, session, &self.rules());
+            let is_over = load.is_err();
+            if !send(bytes, load.map(|load| (Arc::clone(&source), load))) {
+                return Ok(false);
+            }
+            if is_over {
+                break;
+            }
+        }
+        Ok(true)
     }
 
     /// The results in the order of time, and the failures.

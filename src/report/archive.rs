@@ -48,11 +48,7 @@ pub fn archive_page(
 }
 
 fn lead(ranges: &ArchiveRanges, judgement: &Judgement) -> String {
-    let (tone, word) = match (judgement.valid, judgement.remarks.is_empty()) {
-        (false, _) => (Tone::Bad, "Invalid"),
-        (true, false) => (Tone::Remarks, "Valid with remarks"),
-        (true, true) => (Tone::Good, "Valid"),
-    };
+    let (tone, word) = Tone::of(judgement.valid, !judgement.remarks.is_empty());
     let beyond = ranges.profiles();
     let beyond = beyond.filter(|of| !of.invalid_because.is_empty()).count();
     let headline = format!(
@@ -103,7 +99,7 @@ fn over_time(ranges: &ArchiveRanges) -> Result<String> {
     let beyond = |of: &ArchiveProfile| !of.invalid_because.is_empty();
     let panel = |y_label: &'static str, figure: Figure, limit: Option<f64>| {
         let series = vec![
-            dots("within the limits", 0, drawn(&within, figure)),
+            Series::dots("within the limits", 0, drawn(&within, figure)),
             Series {
                 style: Style::Crosses,
                 ..dots("beyond a limit", 0, drawn(&beyond, figure))
@@ -158,7 +154,10 @@ fn over_time(ranges: &ArchiveRanges) -> Result<String> {
         "days since the first profile",
         vec![Panel {
             limits: vec![used_s],
-            ..Panel::of("correction, s", vec![dots("best correction", 2, scan)])
+            ..Panel::of(
+                "correction, s",
+                vec![Series::dots("best correction", 2, scan)],
+            )
         }],
     );
     let figures = [
@@ -170,15 +169,6 @@ fn over_time(ranges: &ArchiveRanges) -> Result<String> {
         "<div class=\"plots\">\n{}</div>\n",
         figures.concat()
     ))
-}
-
-fn dots(label: &str, colour: usize, points: Vec<(f64, f64)>) -> Series {
-    Series {
-        label: label.to_owned(),
-        style: Style::Dots,
-        colour,
-        points,
-    }
 }
 
 fn over_off_nadir(ranges: &ArchiveRanges) -> Result<String> {
@@ -225,7 +215,7 @@ fn over_off_nadir(ranges: &ArchiveRanges) -> Result<String> {
         vec![Panel::of(
             "mean, m",
             vec![
-                dots("within the limits", 0, points(false)),
+                Series::dots("within the limits", 0, points(false)),
                 Series {
                     style: Style::Crosses,
                     ..dots("beyond a limit", 0, points(true))
@@ -260,7 +250,7 @@ fn map(ranges: &ArchiveRanges, worst: &[WorstProfile<'_>]) -> Result<String> {
         vec![Panel::of(
             "latitude, degrees",
             vec![
-                dots("profiles", GREY, thinned(&all, PLACES_DRAWN)),
+                Series::dots("profiles", GREY, thinned(&all, PLACES_DRAWN)),
                 Series {
                     style: Style::Crosses,
                     ..dots("worst profiles", 0, bad)

@@ -33,8 +33,10 @@ pub struct ArchiveProgress {
 pub(super) struct Part {
     /// Which of the files.
     pub(super) file: usize,
-    pub(super) source: Arc<ArchiveSource>,
-    pub(super) load: Result<Load>,
+    /// Its size.
+    pub(super) bytes: u64,
+    /// The part, or why there is none, nor any after it.
+    pub(super) loaded: Result<(Arc<ArchiveSource>, Load)>,
 }
 
 /// What the threads that check are given.
@@ -56,21 +58,24 @@ impl Checker<'_> {
         let mut results = Results::new();
         let mut open: Option<(usize, FileCheck<'_>)> = None;
         for part in parts {
-            let bytes = part.source.identity().bytes;
             let under_way = open.take().filter(|(file, _)| *file == part.file);
-            let (_, mut check) =
-                under_way.unwrap_or_else(|| (part.file, FileCheck::new(part.source, self.rules)));
-            let result = match part.load.and_then(|load| check.add(&load)) {
-                Ok(None) => {
+            let checked = part.loaded.and_then(|(source, load)| {
+                let begin = || (part.file, FileCheck::new(source, self.rules));
+                let (_, mut check) = under_way.unwrap_or_else(begin);
+                let found = check.add(&load)?;
+                if found.is_none() {
                     open = Some((part.file, check));
-                    continue;
                 }
+                Ok(found)
+            });
+            let result = match checked {
+                Ok(None) => continue,
                 Ok(Some(found)) => Ok(self.store(part.file, found)?),
                 Err(failure) => Err(failure),
             };
             progress.files_done += 1;
-            progress.bytes_done += bytes;
-            progress.bytes_left = progress.bytes_left.saturating_sub(bytes);
+            progress.bytes_done += part.bytes;
+            progress.bytes_left = progress.bytes_left.saturating_sub(part.bytes);
             progress.shots += result.as_ref().map_or(0, |found| found.shots);
             results.insert(part.file, result);
             (self.progress)(&progress);
