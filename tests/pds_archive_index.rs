@@ -325,3 +325,75 @@ fn folders_are_listed_in_order_and_what_cannot_be_looked_into_is_told() {
     let gone = Listing::below(&folder.path().join("gone"));
     assert!(gone.paths.is_empty() && gone.failures.len() == 1);
 }
+
+/// A small archive, and the bytes of its index.
+fn encoded() -> (tempfile::TempDir, Vec<u8>) {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("ap19019l.b");
+    write(&path, MarsDatum::Iau2000, 0, |_, _| ());
+    age(&path);
+    let file = IndexedFile::of(&path, Path::new("ap19019l.b"), &RUN_ON).unwrap();
+    let index: Index = [file].into_iter().collect();
+    let encoded = index.encode().unwrap();
+    (folder, encoded)
+}
+
+/// What is cut off or has a bit turned over is not believed, wherever; what is random bytes under a true hash does not end
+/// the program.
+#[test]
+fn bytes_that_are_no_index_are_never_believed() {
+    let (_folder, encoded) = encoded();
+    assert!(Index::decode(&encoded).is_some());
+    let header = encoded.iter().position(|byte| *byte == b'\n').unwrap() + 1;
+    let strategy = (
+        0..encoded.len(),
+        0..8_u32,
+        proptest::collection::vec(any::<u8>(), 0..300),
+    );
+    let ran = TestRunner::default().run(&strategy, |(at, bit, bytes)| {
+        prop_assert!(Index::decode(&encoded[..at]).is_none());
+        let mut turned = encoded.clone();
+        turned[at] ^= 1 << bit;
+        prop_assert!(Index::decode(&turned).is_none());
+        prop_assert!(Index::decode(&bytes).is_none());
+        // With a hash that is right the entries themselves are read: random ones, and good ones that end early.
+        let rest = &encoded[header + 32..];
+        let early = &rest[..at.saturating_sub(header + 32).min(rest.len() - 1)];
+        for entries in [&bytes[..], early] {
+            let hash = blake3::hash(entries);
+            let whole = [&encoded[..header], hash.as_bytes(), entries].concat();
+            prop_assert!(Index::decode(&whole).is_none_or(|index| index.files().len() == 0));
+        }
+        Ok(())
+    });
+    ran.unwrap();
+}
+
+/// Whenever an index is killed, there is none, or the whole of it.
+#[test]
+fn a_killed_index_leaves_nothing_half_written() {
+    let folder = tempfile::tempdir().unwrap();
+    for number in 0..6 {
+        let path = folder.path().join(format!("ap{}l.b", 19_019 + number));
+        write(&path, MarsDatum::Iau2000, FRAMES / 2 * number, |_, _| ());
+        age(&path);
+    }
+    let index = folder.path().join(INDEX);
+    let mut killed = 0;
+    for wait_ms in [0, 2, 5, 10, 15, 20, 30, 40, 60, 90] {
+        let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_areograph"));
+        let command = command
+            .args(["--quiet", "pedr", "index"])
+            .arg(folder.path());
+        let mut child = command.stdout(std::process::Stdio::null()).spawn().unwrap();
+        std::thread::sleep(Duration::from_millis(wait_ms));
+        killed += usize::from(child.try_wait().unwrap().is_none());
+        child.kill().unwrap();
+        child.wait().unwrap();
+        if index.exists() {
+            assert_eq!(Index::read(&index).unwrap().files().len(), 6);
+            fs::remove_file(&index).unwrap();
+        }
+    }
+    assert!(killed > 0);
+}

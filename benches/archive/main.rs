@@ -2,8 +2,7 @@
 //!
 //! `cargo bench --bench archive -- --gb 2`: ratios go to `target/bench/archive.json`. "Warm" is with all files in the
 //! system's cache, the best of a few rounds in turns; "cold" after their pages were given up, once each. With `--scaling`
-//! archives of 0.5 to 4 GB one after the other, and `docs/archive_scaling.svg`. With `--only-write FOLDER` an
-//! archive to keep, and no measurements.
+//! archives of 0.5 to 4 GB one after the other, and `docs/archive_scaling.svg`.
 #![allow(
     clippy::unwrap_used,
     clippy::expect_used,
@@ -15,9 +14,6 @@
 )]
 
 mod scaling;
-#[path = "../../tests/track/mod.rs"]
-#[allow(dead_code, reason = "tests use more of it")]
-mod track;
 mod writing;
 
 use std::{
@@ -32,23 +28,30 @@ use std::{
 };
 
 use areograph::{
-    altimetry::{DatumChoice, ShotFilter},
+    altimetry::{BiasScope, DatumChoice, MolaClock, ShotFilter, TagSign},
     error::{Error, Result},
-    frames::MarsDatum,
-    geom::window::{Region, WindowShape},
-    pds::{
-        archive::{Found, Index, IndexedFile, Indexes, Judged, Query, Sink, Source, search},
-        pedr::{LABEL_BYTES, RECORD_BYTES},
+    flow::{ArchiveRequest, check_archive},
+    geom::{
+        range_residuals::{RangeResiduals, SpacecraftState},
+        window::{Region, WindowShape},
     },
+    pds::{
+        archive::{
+            Found, Index, IndexedFile, Indexes, Judged, Listing, Query, Sink, Source, search,
+        },
+        pedr::{FieldGuard, LABEL_BYTES, RECORD_BYTES, Reader},
+    },
+    scene::{ArchiveOptions, write_archive},
+    spice::{KernelSet, Session},
 };
 use rayon::prelude::*;
 use serde_json::{Value, json};
-use track::{DEGREE, write_frames};
 
 static RUN_ON: AtomicBool = AtomicBool::new(false);
 const ROUNDS: usize = 5;
-/// Frames of a day without gaps, as a file of the mapping phase has them.
-const FRAMES_PER_FILE: u32 = 41_200;
+const DEGREE: f64 = std::f64::consts::PI / 180.0;
+/// Frames whose shots get a CSPICE state each.
+const SLOW_FRAMES: usize = 10_000;
 /// Where the ground latitude of the mid-point stands in a record.
 const MID_POINT: usize = 336;
 
@@ -77,27 +80,60 @@ struct Archive {
 }
 
 impl Archive {
+    /// An invented archive, with the kernels that go with it.
     fn write(folder: &Path, gb: f64) -> Self {
-        let wanted = gb * 1e9;
-        let per_file = f64::from(FRAMES_PER_FILE) * RECORD_BYTES as f64;
-        let files = (wanted / per_file).round().max(1.0) as u32;
-        let paths: Vec<PathBuf> = (0..files)
-            .map(|day| folder.join(format!("ap{:05}l.b", 10_100 + 12 * day)))
-            .collect();
-        (0..files)
-            .into_par_iter()
-            .zip(&paths)
-            .for_each(|(day, path)| {
-                let first = day * FRAMES_PER_FILE;
-                let frames = first..first + FRAMES_PER_FILE;
-                write_frames(path, MarsDatum::Iau2000, frames, |_, _| ());
-            });
+        write_archive(folder, &ArchiveOptions::of_size(1, gb)).unwrap();
+        let folder = folder.join("pedr");
+        let paths = Listing::below(&folder).paths;
         let sizes = paths.iter().map(|path| fs::metadata(path).unwrap().len());
         Self {
-            folder: folder.to_owned(),
             bytes: sizes.sum(),
             paths,
+            folder,
         }
+    }
+
+    fn kernels(&self) -> PathBuf {
+        self.folder.with_file_name("kernels").join("archive.tm")
+    }
+
+    /// The range check of all shots with its products; shots that were checked.
+    fn check_ranges(&self, out: &Path) -> u64 {
+        let request = ArchiveRequest {
+            paths: std::slice::from_ref(&self.folder),
+            kernels: &self.kernels(),
+            out,
+            clock: clock(),
+            force: true,
+            stop: &RUN_ON,
+        };
+        let outcome = check_archive(&request, &|_| ()).unwrap();
+        assert!(outcome.failures.is_empty());
+        outcome.manifest.counts["shots"]
+    }
+
+    /// The same residuals, one after the other with a CSPICE state each, of some frames; shots a second.
+    fn one_state_a_shot(&self) -> f64 {
+        let session = Session::open(&KernelSet::from_metakernel(&self.kernels()).unwrap()).unwrap();
+        let reader = Reader::open(&self.paths[0]).unwrap();
+        let start = Instant::now();
+        let stretch = reader.stretch(0..SLOW_FRAMES, Vec::new()).unwrap();
+        let (mut shots, mut sum_m) = (0_u32, 0.0);
+        for (_, frame) in stretch.frames(0..SLOW_FRAMES, FieldGuard::new(None)) {
+            let frame = frame.unwrap();
+            for shot in (1..=20).filter_map(|shot| frame.shot(shot)) {
+                if shot.range_m <= 0.0 || shot.class != 1 {
+                    continue;
+                }
+                let at = clock().spacecraft_time(shot.et_tag_s);
+                let state = session.state(at).unwrap();
+                let craft = SpacecraftState::of(at, &state.position, &state.velocity_m_s);
+                sum_m += RangeResiduals::of(&shot, &craft).range_minus_distance_m;
+                shots += 1;
+            }
+        }
+        black_box(sum_m);
+        f64::from(shots) / start.elapsed().as_secs_f64()
     }
 
     fn sources(&self, indexes: &Indexes) -> Vec<Source> {
@@ -216,6 +252,22 @@ impl Archive {
     }
 }
 
+fn clock() -> MolaClock {
+    MolaClock {
+        bias_s: 0.117,
+        sign: TagSign::Late,
+        scope: BiasScope::SpkLookup,
+        source: String::new(),
+    }
+}
+
+/// Largest distance of tabulated positions from CSPICE, as the products of a check have it, metres.
+fn position_error_m(out: &Path) -> f64 {
+    let document = fs::read_to_string(out.join("archive.json")).unwrap();
+    let document: Value = serde_json::from_str(&document).unwrap();
+    document["positions"]["largest_error_m"].as_f64().unwrap()
+}
+
 fn seconds(mut work: impl FnMut()) -> f64 {
     let start = Instant::now();
     work();
@@ -251,39 +303,30 @@ fn everywhere() -> Region {
 
 fn main() {
     let arguments: Vec<String> = std::env::args().collect();
-    let value = |name: &str| {
-        let at = arguments.iter().position(|argument| argument == name)?;
-        arguments.get(at + 1)
-    };
+    let gb = arguments.iter().position(|argument| argument == "--gb");
+    let gb = gb.map_or(2.0, |at| arguments[at + 1].parse().unwrap());
     fs::create_dir_all("target/bench").unwrap();
+    let measured = |gb: f64| {
+        let folder = tempfile::tempdir_in("target").unwrap();
+        measure(folder.path(), gb)
+    };
     if arguments.iter().any(|argument| argument == "--scaling") {
-        let measured = scaling::SIZES_GB.map(|gb| {
-            let folder = tempfile::tempdir_in("target").unwrap();
-            measure(folder.path(), gb)
-        });
-        return scaling::plot(Path::new("docs/archive_scaling.svg"), &measured);
+        let path = Path::new("docs/archive_scaling.svg");
+        return scaling::plot(path, &scaling::SIZES_GB.map(measured));
     }
-    let gb = value("--gb").map_or(2.0, |gb| gb.parse().unwrap());
-    if let Some(folder) = value("--only-write") {
-        Archive::write(Path::new(folder), gb);
-        return;
-    }
-    let folder = tempfile::tempdir_in("target").unwrap();
-    let document = measure(folder.path(), gb);
-    write_text(
-        Path::new("target/bench/archive.json"),
-        &format!("{document:#}\n"),
-    );
-}
-
-fn write_text(path: &Path, text: &str) {
-    let mut file = fs::File::create(path).unwrap();
+    let text = format!("{:#}\n", measured(gb));
+    let mut file = fs::File::create("target/bench/archive.json").unwrap();
     std::io::Write::write_all(&mut file, text.as_bytes()).unwrap();
 }
 
 /// Everything, of an archive of about `gb` gigabytes.
 fn measure(folder: &Path, gb: f64) -> Value {
-    let archive = Archive::write(folder, gb);
+    let writing = Instant::now();
+    let archive = Archive::write(&folder.join("archive"), gb);
+    println!(
+        "written at {:.2} GB/s",
+        archive.bytes as f64 / writing.elapsed().as_secs_f64() / 1e9
+    );
     let one = vec![half_degree(20.0, 10.0)];
     // Spread over the globe by the golden ratio.
     let thousand: Vec<Region> = (0..1_000)
@@ -341,7 +384,7 @@ fn measure(folder: &Path, gb: f64) -> Value {
             seconds(|| _ = black_box(archive.index(&index))),
         );
     }
-    let index_path = folder.join(areograph::pds::archive::INDEX);
+    let index_path = archive.folder.join(areograph::pds::archive::INDEX);
     let encoded = index.encode().unwrap();
     std::io::Write::write_all(&mut fs::File::create(&index_path).unwrap(), &encoded).unwrap();
     for _ in 0..ROUNDS {
@@ -353,6 +396,20 @@ fn measure(folder: &Path, gb: f64) -> Value {
             }),
         );
     }
+    let out = folder.join("qa");
+    let (mut checked, mut slow_per_s) = (0, 0.0_f64);
+    for _ in 0..2 {
+        note(
+            "range check",
+            seconds(|| checked = archive.check_ranges(&out)),
+        );
+        slow_per_s = slow_per_s.max(archive.one_state_a_shot());
+    }
+    let range_check = RangeCheck {
+        shots: checked,
+        slow_per_s,
+        position_error_m: position_error_m(&out),
+    };
     let memory_mb = peak_mb();
     for _ in 0..ROUNDS {
         note(
@@ -362,14 +419,23 @@ fn measure(folder: &Path, gb: f64) -> Value {
     }
     let found = archive.search(&one, Judged::Near, &none);
     let written = writing::rows_per_s(&archive, folder);
-    report(
+    let document = report(
         &archive,
         &best,
         &encoded,
         [before_mb, memory_mb],
         &found,
-        &written,
-    )
+        &range_check,
+    );
+    println!("rows written per second: {written:#}");
+    json!({ "rows_written_per_s": written, "searches_and_checks": document })
+}
+
+/// What the range check did, and how fast one CSPICE state a shot is.
+struct RangeCheck {
+    shots: u64,
+    slow_per_s: f64,
+    position_error_m: f64,
 }
 
 fn report(
@@ -378,7 +444,7 @@ fn report(
     index: &[u8],
     peaks_mb: [f64; 2],
     found: &Count,
-    written: &Value,
+    range_check: &RangeCheck,
 ) -> Value {
     let bytes = archive.bytes as f64;
     println!(
@@ -397,6 +463,7 @@ fn report(
         );
     }
     let of = |name: &str| best[name];
+    let checked_per_s = range_check.shots as f64 / of("range check");
     let ratios: Value = json!({
         "scan_over_one_line_of_each_record_warm": of("lines, mapped") / of("scan"),
         "scan_over_one_line_copied_warm": of("lines, copied") / of("scan"),
@@ -408,15 +475,17 @@ fn report(
         "index_build_gb_per_s_warm": bytes / of("index build") / 1e9,
         "index_update_ms": of("index update, nothing new") * 1e3,
         "index_share_of_archive": index.len() as f64 / bytes,
+        "range_check_million_shots_per_s_warm": checked_per_s / 1e6,
+        "range_check_over_one_cspice_state_a_shot_warm": checked_per_s / range_check.slow_per_s,
+        "range_check_position_error_m": range_check.position_error_m,
         "peak_memory_after_cold_scan_mb": peaks_mb[0],
         "peak_memory_mb": peaks_mb[1],
     });
-    println!("{ratios:#}\nrows written per second: {written:#}");
+    println!("{ratios:#}");
     json!({
         "gb": bytes / 1e9,
         "threads": rayon::current_num_threads(),
         "seconds": best,
         "ratios": ratios,
-        "rows_written_per_s": written,
     })
 }

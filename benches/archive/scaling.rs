@@ -9,7 +9,7 @@ use serde_json::Value;
 pub(super) const SIZES_GB: [f64; 4] = [0.5, 1.0, 2.0, 4.0];
 
 /// What is plotted, from what is nearly free to what reads everything; colours are those of Okabe and Ito.
-const SERIES: [(&str, &str, RGBColor); 6] = [
+const SERIES: [(&str, &str, RGBColor); 7] = [
     ("indexed", "one window, with index", RGBColor(0, 114, 178)),
     (
         "index update, nothing new",
@@ -46,7 +46,7 @@ pub(super) fn plot(path: &Path, measured: &[Value]) {
             "Searching an archive of PEDR files, two threads",
             ("sans-serif", 18),
         )
-        .build_cartesian_2d((0.4..5.0_f64).log_scale(), (0.1..10_000.0_f64).log_scale())
+        .build_cartesian_2d((0.4..5.0_f64).log_scale(), (0.1..100_000.0_f64).log_scale())
         .unwrap();
     chart
         .configure_mesh()
@@ -59,6 +59,7 @@ pub(super) fn plot(path: &Path, measured: &[Value]) {
         let points: Vec<(f64, f64)> = measured
             .iter()
             .map(|of| {
+                let of = &of["searches_and_checks"];
                 let taken_s = of["seconds"][name].as_f64().unwrap();
                 (of["gb"].as_f64().unwrap(), taken_s * 1e3)
             })

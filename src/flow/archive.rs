@@ -6,17 +6,25 @@
 //!  results in order of time ─► verdict ─► shots of the worst profiles ─► products, manifest last
 //! ```
 
+mod checker;
+mod manifest;
+
 use std::{
     collections::BTreeMap,
     path::{Path, PathBuf},
     sync::{
         Arc,
         atomic::AtomicBool,
-        mpsc::{Receiver, SyncSender, sync_channel},
+        mpsc::{SyncSender, sync_channel},
     },
     thread,
 };
 
+pub use self::checker::ArchiveProgress;
+use self::{
+    checker::{Checker, Part, Results},
+    manifest::manifest,
+};
 use super::{PUBLISH, out::check_out_path, publish::standing};
 use crate::{
     altimetry::{MolaClock, ShotFilter},
@@ -29,17 +37,16 @@ use crate::{
     spice::{KernelSet, KernelView, Session},
     stage::{Input as _, Inputs},
     stages::check_archive::{
-        ArchiveRanges, ArchiveRules, ArchiveSource, CheckedFile, FileCheck, FileFailure,
-        FileRanges, KernelUsed, Load, METHOD, NAME, shots_of,
+        ArchiveRanges, ArchiveRules, ArchiveSource, CheckedFile, FileFailure, FileRanges,
+        KernelUsed, METHOD, NAME, shots_of,
     },
     store::{
         cache::StageCache,
         lock::SiteLock,
-        manifest::{
-            BiasEntry, Complaints, ConfigurationEntry, KernelEntry, Manifest, StageEntry, figures,
-        },
+        manifest::Manifest,
         publish::{CACHE, entries, publish, read_manifest, staging},
     },
+    time::Et,
     units::RADIANS_PER_DEGREE,
 };
 
@@ -47,8 +54,6 @@ use crate::{
 const LAYOUT: u32 = 1;
 /// Profiles whose shots are written.
 const WORST: usize = 12;
-/// Complaints that the manifest quotes; all are counted.
-const COMPLAINTS_QUOTED: usize = 100;
 /// Step of the scan of clock biases, seconds: the parabola through the variances tells what lies between.
 const SCAN_STEP_S: f64 = 0.05;
 
@@ -67,23 +72,6 @@ pub struct ArchiveRequest<'a> {
     pub force: bool,
     /// Looked at before every load.
     pub stop: &'a AtomicBool,
-}
-
-/// How far a check is.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub struct ArchiveProgress {
-    /// Files that are done, those whose result was stored included.
-    pub files_done: usize,
-    /// Of them, those whose result was stored.
-    pub files_stored: usize,
-    /// All files.
-    pub files: usize,
-    /// Bytes of files that were checked now.
-    pub bytes_done: u64,
-    /// Bytes of files that are still to be checked.
-    pub bytes_left: u64,
-    /// Shots that were checked now.
-    pub shots: u64,
 }
 
 /// What a check of an archive did.
@@ -185,26 +173,6 @@ struct Archive<'a> {
     cache: StageCache,
     progress: &'a (dyn Fn(&ArchiveProgress) + Sync),
 }
-
-/// A part of a file on its way to the threads that check it.
-struct Part {
-    /// Which of the files.
-    file: usize,
-    source: Arc<ArchiveSource>,
-    load: Result<Load>,
-}
-
-/// What the threads that check are given.
-struct Checker<'a> {
-    rules: ArchiveRules<'a>,
-    cache: &'a StageCache,
-    /// Name under which the result of each file is stored, and what it is made from.
-    todo: &'a BTreeMap<usize, (String, Inputs)>,
-    progress: &'a (dyn Fn(&ArchiveProgress) + Sync),
-}
-
-/// By file: what was found, or why nothing was.
-type Results = BTreeMap<usize, Result<FileRanges>>;
 
 impl Archive<'_> {
     const fn rules(&self) -> ArchiveRules<'_> {
@@ -326,26 +294,48 @@ impl Archive<'_> {
         parts: &SyncSender<Part>,
     ) -> Result<()> {
         for file in todo.keys() {
-            let source = Arc::new(ArchiveSource::open(&paths[*file])?);
-            for rows in source.loads() {
-                Stopped::check(self.request.stop)?;
-                let load = source.load(rows, session, &self.rules());
-                let part = Part {
-                    file: *file,
-                    source: Arc::clone(&source),
-                    load,
-                };
-                let is_over = part.load.is_err();
-                if parts.send(part).is_err() {
-                    // Whoever checks has stopped, and says why.
-                    return Ok(());
-                }
-                if is_over {
-                    break;
-                }
+            if !self.load_file(*file, &paths[*file], session, parts)? {
+                // Whoever checks has stopped, and says why.
+                return Ok(());
             }
         }
         Ok(())
+    }
+
+    /// Loads a file part by part; gives whether anybody still takes them.
+    fn load_file(
+        &self,
+        file: usize,
+        path: &Path,
+        session: &Session,
+        parts: &SyncSender<Part>,
+    ) -> Result<bool> {
+        let send = |bytes, loaded| {
+            parts
+                .send(Part {
+                    file,
+                    bytes,
+                    loaded,
+                })
+                .is_ok()
+        };
+        let source = match ArchiveSource::open(path) {
+            Ok(source) => Arc::new(source),
+            Err(failure) => return Ok(send(0, Err(failure))),
+        };
+        let bytes = source.identity().bytes;
+        for rows in source.loads() {
+            Stopped::check(self.request.stop)?;
+            let load = source.load(rows, session, &self.rules());
+            let is_over = load.is_err();
+            if !send(bytes, load.map(|load| (Arc::clone(&source), load))) {
+                return Ok(false);
+            }
+            if is_over {
+                break;
+            }
+        }
+        Ok(true)
     }
 
     /// The results in the order of time, and the failures.
@@ -423,9 +413,7 @@ impl Archive<'_> {
                 profile,
                 shots: product.path.to_string_lossy().into_owned(),
                 // Without leap seconds there is no UTC, and nothing needs it.
-                start_utc: session
-                    .et_to_utc(crate::time::Et::from_seconds(profile.start_et_s))
-                    .ok(),
+                start_utc: session.et_to_utc(Et::from_seconds(profile.start_et_s)).ok(),
             });
             written.push(product);
         }
@@ -450,119 +438,9 @@ impl Archive<'_> {
     }
 }
 
-impl Checker<'_> {
-    /// Checks what comes, and stores the result of every file.
-    fn run(&self, parts: Receiver<Part>, start: ArchiveProgress) -> Result<Results> {
-        let mut progress = start;
-        let mut results = Results::new();
-        let mut open: Option<(usize, FileCheck<'_>)> = None;
-        for part in parts {
-            let bytes = part.source.identity().bytes;
-            let under_way = open.take().filter(|(file, _)| *file == part.file);
-            let (_, mut check) =
-                under_way.unwrap_or_else(|| (part.file, FileCheck::new(part.source, self.rules)));
-            let result = match part.load.and_then(|load| check.add(&load)) {
-                Ok(None) => {
-                    open = Some((part.file, check));
-                    continue;
-                }
-                Ok(Some(found)) => Ok(self.store(part.file, found)?),
-                Err(failure) => Err(failure),
-            };
-            progress.files_done += 1;
-            progress.bytes_done += bytes;
-            progress.bytes_left = progress.bytes_left.saturating_sub(bytes);
-            progress.shots += result.as_ref().map_or(0, |found| found.shots);
-            results.insert(part.file, result);
-            (self.progress)(&progress);
-        }
-        Ok(results)
-    }
-
-    fn store(&self, file: usize, found: FileRanges) -> Result<FileRanges> {
-        if let Some((label, inputs)) = self.todo.get(&file) {
-            self.cache.store(label, inputs.clone(), found.clone())?;
-        }
-        Ok(found)
-    }
-}
-
 fn file_failure(failure: &Error) -> FileFailure {
     FileFailure {
         file: failure.file.as_deref().map(file_name).unwrap_or_default(),
         why: failure.cause.to_string(),
-    }
-}
-
-/// What the manifest says of an archive but for its products.
-fn manifest(ranges: &ArchiveRanges, inputs: &Inputs) -> Manifest {
-    let [without, partly] = ranges.not_covered();
-    let beyond = ranges.profiles();
-    let beyond = beyond.filter(|profile| !profile.invalid_because.is_empty());
-    let counts = [
-        ("files", ranges.files.len() as u64),
-        ("files_failed", ranges.failures.len() as u64),
-        ("records", ranges.sum(|file| file.records)),
-        ("profiles", ranges.profiles().count() as u64),
-        ("profiles_beyond_limits", beyond.count() as u64),
-        ("profiles_not_covered", without as u64),
-        ("profiles_partly_covered", partly as u64),
-        ("shots", ranges.sum(|file| file.shots)),
-        ("shots_not_covered", ranges.sum(|file| file.not_covered)),
-    ];
-    let means = ranges.profiles().filter(|profile| profile.shots > 0);
-    let largest_m = means.map(|profile| profile.mean_without_outliers_m.abs());
-    let mut rejected: BTreeMap<String, u64> = BTreeMap::new();
-    for (reason, count) in ranges.files.iter().flat_map(|file| &file.found.rejected) {
-        *rejected.entry(reason.to_string()).or_default() += count;
-    }
-    let texts = ranges.files.iter().flat_map(|file| &file.found.complaints);
-    let kernels = ranges.kernels.iter().map(|kernel| KernelEntry {
-        name: kernel.name.clone(),
-        role: kernel.role.clone(),
-        bytes: kernel.bytes,
-        blake3: kernel.blake3.clone(),
-        coverage_used: Vec::new(),
-    });
-    let clock = &ranges.clock;
-    Manifest {
-        tool: "areograph".to_owned(),
-        version: env!("CARGO_PKG_VERSION").to_owned(),
-        site: "archive".to_owned(),
-        verdict: ranges.verdict(),
-        configuration: ConfigurationEntry {
-            file_name: String::new(),
-            blake3: blake3::hash(b"").to_hex().to_string(),
-            keys: BTreeMap::new(),
-        },
-        biases: vec![BiasEntry {
-            name: "mola_clock".to_owned(),
-            correction_s: clock.correction_s(),
-            scope: "spk_lookup".to_owned(),
-            source: clock.source.clone(),
-        }],
-        kernels: kernels.collect(),
-        kernel_choice: Vec::new(),
-        stages: vec![StageEntry {
-            name: NAME.to_owned(),
-            fingerprint: inputs.fingerprint(),
-        }],
-        products: Vec::new(),
-        counts: counts.map(|(name, count)| (name.to_owned(), count)).into(),
-        figures: crate::geom::statistics::largest(largest_m)
-            .map(|metres| (figures::RANGE_MEAN_M.to_owned(), metres))
-            .into_iter()
-            .collect(),
-        rejected,
-        complaints: Complaints {
-            count: ranges.sum(|file| file.complaint_count),
-            texts: texts.take(COMPLAINTS_QUOTED).cloned().collect(),
-        },
-        notes: ranges
-            .failures
-            .iter()
-            .map(|failure| format!("{}: not checked: {}", failure.file, failure.why))
-            .collect(),
-        finished_utc: chrono::Utc::now().format("%Y-%m-%dT%H:%M:%SZ").to_string(),
     }
 }

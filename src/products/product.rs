@@ -6,7 +6,10 @@ use super::{
     site::{AdjustmentProducts, GeometricProducts, ImageProducts, SiteProducts},
     table::Meaning,
 };
-use crate::{error::Result, schema::DocumentSchema};
+use crate::{
+    error::{Locate as _, Result},
+    schema::DocumentSchema,
+};
 
 /// A file that was written.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -15,6 +18,23 @@ pub struct Product {
     pub path: PathBuf,
     /// What the file has of what it is about: shots, samples, profiles, table nodes; 0 for plain text.
     pub rows: u64,
+}
+
+/// Writes every product below `directory` by `write`, which gives its rows.
+pub(super) fn write_each<W>(
+    directory: &Path,
+    declarations: &[&Declaration<W>],
+    write: impl Fn(&W, &Path) -> Result<u64>,
+) -> Result<Vec<Product>> {
+    let products = declarations.iter().map(|declaration| {
+        let path = directory.join(declaration.path);
+        let rows = write(&declaration.write, &path).in_file(&path)?;
+        Ok(Product {
+            path: declaration.path.into(),
+            rows,
+        })
+    });
+    products.collect()
 }
 
 /// A product, declared once: the files, the STAC item, `exchange/README.txt` and `docs/products.md` follow. `W` is how it is

@@ -1,9 +1,10 @@
 //! The page of an archive: the worst profiles first, then ranges over time, over off-nadir angle and on a map.
 
+mod worst;
+
+use self::worst::worst_profiles;
 use super::{
-    html::{
-        Cell, Column, Section, Table, Tone, counted, escape, link, list, page, paragraph, verdict,
-    },
+    html::{Cell, Column, Section, Table, Tone, counted, list, page, paragraph, verdict},
     plots::{Extent, GREY, Panel, Plot, Series, Style, figure, label, thinned},
 };
 use crate::{
@@ -47,11 +48,7 @@ pub fn archive_page(
 }
 
 fn lead(ranges: &ArchiveRanges, judgement: &Judgement) -> String {
-    let (tone, word) = match (judgement.valid, judgement.remarks.is_empty()) {
-        (false, _) => (Tone::Bad, "Invalid"),
-        (true, false) => (Tone::Remarks, "Valid with remarks"),
-        (true, true) => (Tone::Good, "Valid"),
-    };
+    let (tone, word) = Tone::of(judgement.valid, !judgement.remarks.is_empty());
     let beyond = ranges.profiles();
     let beyond = beyond.filter(|of| !of.invalid_because.is_empty()).count();
     let headline = format!(
@@ -82,91 +79,6 @@ fn grouped(count: u64) -> String {
     grouped
 }
 
-fn worst_profiles(ranges: &ArchiveRanges, worst: &[WorstProfile<'_>]) -> String {
-    if worst.is_empty() {
-        return paragraph("No profile was checked.");
-    }
-    let mut table = Table::new(
-        "Profiles by the largest share of a limit; each links to its shots (Parquet)",
-        &[
-            Column::Text("profile"),
-            Column::Text("begins"),
-            Column::Number("shots"),
-            Column::Number("mean, m"),
-            Column::Number("NMAD, m"),
-            Column::Number("outliers"),
-            Column::Number("to own spacecraft, m"),
-            Column::Number("orbits apart, m"),
-            Column::Number("off nadir, at most °"),
-            Column::Number("best correction, s"),
-        ],
-    );
-    let limits = &ranges.limits;
-    for of in worst {
-        let profile = of.profile;
-        let [x, y, z] = profile.spacecraft_m;
-        let apart_m = x.hypot(y).hypot(z);
-        let n = f64::from(profile.shots.max(1));
-        let outlier_share = f64::from(profile.outliers) / n / limits.outlier_share_max;
-        let limited = |value: f64, limit: f64| Cell::Limited(label(value, 2), value.abs() / limit);
-        let cells = [
-            Cell::Html(link(&format!("../{}", of.shots), &profile.id())),
-            begins(of).into(),
-            profile.shots.to_string().into(),
-            limited(profile.mean_without_outliers_m, limits.mean_max_m),
-            label(profile.range_minus_distance_m.nmad, 2).into(),
-            Cell::Limited(profile.outliers.to_string(), outlier_share),
-            limited(profile.decoding_without_outliers_m, limits.decoding_max_m),
-            limited(apart_m, limits.orbit_max_m),
-            label(profile.off_nadir_rad[1] / RADIANS_PER_DEGREE, 2).into(),
-            correction(profile).into(),
-        ];
-        table.row(profile.invalid_because.is_empty(), cells);
-    }
-    let words = "Mean and distance to the file’s own spacecraft are without outliers. “Orbits apart” is the mean of the file’s own \
-        spacecraft minus that of the kernels: another orbit, clock or datum shows there. The best correction of time tags is the \
-        one by which ranges spread least. All profiles are in profiles.parquet and profiles.csv.";
-    table.finish() + &paragraph(words) + &commands(worst)
-}
-
-fn begins(of: &WorstProfile<'_>) -> String {
-    let et_s = of.profile.start_et_s;
-    match &of.start_utc {
-        Some(utc) => utc.split('.').next().unwrap_or(utc).replace('T', " "),
-        None => format!("ET {et_s:.0} s"),
-    }
-}
-
-fn correction(profile: &ArchiveProfile) -> String {
-    match (profile.best_correction_s, profile.correction_uncertainty_s) {
-        (Some(best_s), Some(sigma_s)) => format!("{} ±{sigma_s:.3}", label(best_s, 3)),
-        (Some(best_s), None) => label(best_s, 3),
-        _ => String::new(),
-    }
-}
-
-/// Command lines that give the shots of profiles.
-fn commands(worst: &[WorstProfile<'_>]) -> String {
-    let lines: Vec<String> = worst.iter().map(command).collect();
-    format!(
-        "<details><summary>Commands that find these shots in the archive</summary>\n\
-         <div class=\"wide\" tabindex=\"0\" role=\"region\" aria-label=\"Commands\"><pre>{}</pre></div></details>\n",
-        escape(&lines.join("\n"))
-    )
-}
-
-/// The command line that gives the shots of a profile, clouds left out.
-fn command(of: &WorstProfile<'_>) -> String {
-    let [start_s, stop_s] = of.profile.tags_et_s;
-    let name = of.profile.id().replace(['/', '.'], "_");
-    format!(
-        "areograph pedr search '{}' --box 0,360,-90,90 --time={:.3}..{:.3} --format parquet --out {name}.parquet",
-        of.file.path.display(),
-        start_s - 0.01,
-        stop_s + 0.01,
-    )
-}
-
 /// A figure of a profile.
 type Figure = fn(&ArchiveProfile) -> f64;
 
@@ -187,7 +99,7 @@ fn over_time(ranges: &ArchiveRanges) -> Result<String> {
     let beyond = |of: &ArchiveProfile| !of.invalid_because.is_empty();
     let panel = |y_label: &'static str, figure: Figure, limit: Option<f64>| {
         let series = vec![
-            dots("within the limits", 0, drawn(&within, figure)),
+            Series::dots("within the limits", 0, drawn(&within, figure)),
             Series {
                 style: Style::Crosses,
                 ..dots("beyond a limit", 0, drawn(&beyond, figure))
@@ -242,7 +154,10 @@ fn over_time(ranges: &ArchiveRanges) -> Result<String> {
         "days since the first profile",
         vec![Panel {
             limits: vec![used_s],
-            ..Panel::of("correction, s", vec![dots("best correction", 2, scan)])
+            ..Panel::of(
+                "correction, s",
+                vec![Series::dots("best correction", 2, scan)],
+            )
         }],
     );
     let figures = [
@@ -254,15 +169,6 @@ fn over_time(ranges: &ArchiveRanges) -> Result<String> {
         "<div class=\"plots\">\n{}</div>\n",
         figures.concat()
     ))
-}
-
-fn dots(label: &str, colour: usize, points: Vec<(f64, f64)>) -> Series {
-    Series {
-        label: label.to_owned(),
-        style: Style::Dots,
-        colour,
-        points,
-    }
 }
 
 fn over_off_nadir(ranges: &ArchiveRanges) -> Result<String> {
@@ -309,7 +215,7 @@ fn over_off_nadir(ranges: &ArchiveRanges) -> Result<String> {
         vec![Panel::of(
             "mean, m",
             vec![
-                dots("within the limits", 0, points(false)),
+                Series::dots("within the limits", 0, points(false)),
                 Series {
                     style: Style::Crosses,
                     ..dots("beyond a limit", 0, points(true))
@@ -344,7 +250,7 @@ fn map(ranges: &ArchiveRanges, worst: &[WorstProfile<'_>]) -> Result<String> {
         vec![Panel::of(
             "latitude, degrees",
             vec![
-                dots("profiles", GREY, thinned(&all, PLACES_DRAWN)),
+                Series::dots("profiles", GREY, thinned(&all, PLACES_DRAWN)),
                 Series {
                     style: Style::Crosses,
                     ..dots("worst profiles", 0, bad)

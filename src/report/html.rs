@@ -35,6 +35,15 @@ pub(super) enum Tone {
 }
 
 impl Tone {
+    /// That of a verdict, and the word for it.
+    pub(super) const fn of(is_valid: bool, has_remarks: bool) -> (Self, &'static str) {
+        match (is_valid, has_remarks) {
+            (false, _) => (Self::Bad, "Invalid"),
+            (true, true) => (Self::Remarks, "Valid with remarks"),
+            (true, false) => (Self::Good, "Valid"),
+        }
+    }
+
     pub(super) const fn class(self) -> &'static str {
         match self {
             Self::Good => "valid",

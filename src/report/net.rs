@@ -3,8 +3,7 @@
 use super::{
     html::{Cell, Column, Section, Table, Tone, counted, list, page, paragraph, verdict},
     plots::{
-        Arrow, Arrows, Extent, GREY, Panel, Plot, Series, Style, figure, label, magnification,
-        thinned,
+        Arrow, Arrows, Extent, GREY, Panel, Plot, Series, figure, label, magnification, thinned,
     },
 };
 use crate::{
@@ -42,11 +41,7 @@ pub fn net_page(config: &NetConfig, net: &Triangulation) -> Result<String> {
 }
 
 fn lead(config: &NetConfig, net: &Triangulation) -> String {
-    let (tone, word) = match (net.verdict.valid, net.verdict.remarks.is_empty()) {
-        (false, _) => (Tone::Bad, "Invalid"),
-        (true, false) => (Tone::Remarks, "Valid with remarks"),
-        (true, true) => (Tone::Good, "Valid"),
-    };
+    let (tone, word) = Tone::of(net.verdict.valid, !net.verdict.remarks.is_empty());
     let totals = &net.totals;
     let headline = format!(
         "{word}: {}, {}, {} kept.",
@@ -146,8 +141,8 @@ fn deviations(net: &Triangulation) -> Result<String> {
             arrows("left out as a blunder", 1, removed),
         ],
         vec![
-            dots("points", GREY, thinned(&places, DRAWN)),
-            dots("middles of pictures", 2, centres),
+            Series::dots("points", GREY, thinned(&places, DRAWN)),
+            Series::dots("middles of pictures", 2, centres),
         ],
     )
 }
@@ -163,15 +158,6 @@ fn arrows(label: &str, colour: usize, each: Vec<Arrow>) -> Arrows {
         colour,
         magnification: 1.0,
         each,
-    }
-}
-
-fn dots(label: &str, colour: usize, points: Vec<(f64, f64)>) -> Series {
-    Series {
-        label: label.to_owned(),
-        style: Style::Dots,
-        colour,
-        points,
     }
 }
 
@@ -340,7 +326,7 @@ fn controls(net: &Triangulation) -> Result<String> {
             arrows("kept", 0, vectors(true)),
             arrows("left out", 1, vectors(false)),
         ],
-        vec![dots("controls", GREY, places)],
+        vec![Series::dots("controls", GREY, places)],
     )?;
     Ok(table.finish() + &figure)
 }

@@ -44,6 +44,13 @@ impl Trajectory {
         self.piece(et).map(|piece| piece.derivative(et))
     }
 
+    /// Geometric position, and velocity in metres per second, at `et` in J2000; `None` outside the intervals.
+    #[must_use]
+    pub fn state(&self, et: Et) -> Option<(Position<J2000>, Vector3<f64>)> {
+        let piece = self.piece(et)?;
+        Some((Position::new(piece.value(et)), piece.derivative(et)))
+    }
+
     fn piece(&self, et: Et) -> Option<&ChebyshevVector> {
         let index = self
             .pieces

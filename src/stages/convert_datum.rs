@@ -137,6 +137,12 @@ impl DatumTurn {
         Self { datum, turn_s }
     }
 
+    /// Whether coordinates stay as they are.
+    #[must_use]
+    pub fn is_none(&self) -> bool {
+        self.datum == MarsDatum::Iau2000 && self.turn_s.abs() <= 0.0
+    }
+
     /// The shot in IAU 2000.
     #[must_use]
     pub fn applied(&self, shot: Footprint) -> Footprint {
@@ -154,7 +160,7 @@ impl DatumTurn {
 
     /// Longitude and latitude of footprint and spacecraft in IAU 2000; nothing where they are that already.
     fn moved(&self, shot: &Footprint) -> Option<[(f64, f64); 2]> {
-        if self.datum == MarsDatum::Iau2000 && self.turn_s.abs() <= 0.0 {
+        if self.is_none() {
             return None;
         }
         let out_at = Et::from_seconds(shot.et_tag_s);

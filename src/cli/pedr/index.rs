@@ -1,6 +1,7 @@
 //! `areograph pedr index`.
 
 use std::{
+    collections::BTreeSet,
     fs,
     path::{Path, PathBuf},
     sync::atomic::AtomicBool,
@@ -91,9 +92,10 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Error> {
             outcome.failures.push(failure);
         }
     }
+    let listed: BTreeSet<&PathBuf> = listing.paths.iter().collect();
     let gone = earlier
         .files()
-        .filter(|file| !listing.paths.contains(&arguments.folder.join(file.path())));
+        .filter(|file| !listed.contains(&arguments.folder.join(file.path())));
     let gone = gone.count();
     let (files, read, bytes) = (outcome.files.len(), outcome.read, outcome.bytes);
     let index: Index = outcome.files.into_iter().collect();

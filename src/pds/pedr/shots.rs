@@ -77,6 +77,12 @@ impl Frame<'_> {
     /// The returned shots whose values contradict each other.
     #[must_use]
     pub fn spoiled_shots(&self) -> SpoiledShots {
+        self.spoiled_by(|shot| self.range_minus_distance_m(shot))
+    }
+
+    /// The same for those who know [`range_minus_distance_m`](Self::range_minus_distance_m) of each shot already.
+    #[must_use]
+    pub fn spoiled_by(&self, range_minus_distance_m: impl Fn(u8) -> Option<f64>) -> SpoiledShots {
         let record = self.record();
         let returned = (0..SHOTS)
             .filter(|shot| record.returned(*shot))
@@ -91,7 +97,7 @@ impl Frame<'_> {
             if let Some(error) = beam.parallax_error(self) {
                 spoiled.add(returned, error);
             }
-            self.check_distances(&beam, &mut spoiled);
+            self.check_distances(&beam, range_minus_distance_m, &mut spoiled);
         }
         spoiled
     }
@@ -133,11 +139,16 @@ impl Frame<'_> {
         }
     }
 
-    fn check_distances(&self, beam: &Beam, spoiled: &mut SpoiledShots) {
+    fn check_distances(
+        &self,
+        beam: &Beam,
+        range_minus_distance_m: impl Fn(u8) -> Option<f64>,
+        spoiled: &mut SpoiledShots,
+    ) {
         let record = self.record();
         let (mut bits, mut first) = (0_u32, None);
         for (index, shot) in (1_u8..).take(SHOTS).enumerate() {
-            let Some(difference_m) = self.range_minus_distance_m(shot) else {
+            let Some(difference_m) = range_minus_distance_m(shot) else {
                 continue;
             };
             // Not published whether the range has its walk correction already.

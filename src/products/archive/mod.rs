@@ -8,10 +8,10 @@ use std::path::Path;
 
 use super::{
     files::write_text,
-    product::{Content, Declaration, Product, Role},
+    product::{Content, Declaration, Product, Role, write_each},
 };
 use crate::{
-    error::{Locate as _, Result},
+    error::Result,
     stages::{
         check_archive::{ArchiveProfile, ArchiveRanges, CheckedFile},
         judge::Verdict,
@@ -75,13 +75,7 @@ pub(super) use shots::SHOTS;
 /// [`Kind::Io`](crate::error::Kind::Io) for what the disk refuses; [`Kind::Bug`](crate::error::Kind::Bug) for numbers that
 /// are not finite and files that read back differently.
 pub fn write_archive_products(directory: &Path, archive: &ArchiveProducts) -> Result<Vec<Product>> {
-    let products = ARCHIVE_PRODUCTS.iter().map(|declaration| {
-        let path = directory.join(declaration.path);
-        let rows = (declaration.write)(&path, archive).in_file(&path)?;
-        Ok(Product {
-            path: declaration.path.into(),
-            rows,
-        })
-    });
-    products.collect()
+    write_each(directory, ARCHIVE_PRODUCTS, |write, path| {
+        write(path, archive)
+    })
 }

@@ -14,15 +14,12 @@ use serde::Serialize;
 use super::{
     files::{write_json, write_text},
     parquet,
-    product::{Content, Declaration, Product, Role},
+    product::{Content, Declaration, Product, Role, write_each},
     table::{Meaning, Table},
     text_table,
 };
 use crate::{
-    config::NetConfig,
-    error::{Locate, Result},
-    schema::DocumentSchema,
-    stages::triangulate::Triangulation,
+    config::NetConfig, error::Result, schema::DocumentSchema, stages::triangulate::Triangulation,
 };
 
 /// Everything that the products of a net are made of.
@@ -84,15 +81,7 @@ static COLUMNS: Declaration<WriteNet> = Declaration {
 /// [`Kind::Io`](crate::error::Kind::Io) for what the disk refuses; [`Kind::Bug`](crate::error::Kind::Bug) for numbers that are
 /// not finite and files that read back differently.
 pub fn write_net_products(directory: &Path, net: &NetProducts) -> Result<Vec<Product>> {
-    let products = NET_PRODUCTS.iter().map(|declaration| {
-        let path = directory.join(declaration.path);
-        let rows = (declaration.write)(&path, net).in_file(&path)?;
-        Ok(Product {
-            path: declaration.path.into(),
-            rows,
-        })
-    });
-    products.collect()
+    write_each(directory, NET_PRODUCTS, |write, path| write(path, net))
 }
 
 /// Writes a table as Parquet with what it is about.

@@ -54,6 +54,15 @@ impl Series {
         }
     }
 
+    pub(super) fn dots(label: &str, colour: usize, points: Vec<(f64, f64)>) -> Self {
+        Self {
+            label: label.to_owned(),
+            style: Style::Dots,
+            colour,
+            points,
+        }
+    }
+
     fn rgb(&self) -> RGBColor {
         match self.style {
             Style::Crosses => MARK,

@@ -49,9 +49,9 @@ pub const METHOD: u32 = 1;
 
 /// Records of a load: 51 MB, more than any day of the mission takes.
 const LOAD_RECORDS: usize = 1 << 16;
-/// Records of a task, and tasks of a wave: what they give stands in memory at once, 36 MB.
+/// Records of a task, and tasks of a wave: what they give stands in memory at once, 14 MB.
 const TASK_RECORDS: usize = 256;
-const WAVE_TASKS: usize = 64;
+const WAVE_TASKS: usize = 24;
 /// The tabulated trajectory stays this close to the kernels, metres: a tenth of a PEDR centimetre.
 pub const TRAJECTORY_TOLERANCE_M: f64 = 0.001;
 /// Longest profile, seconds: a revolution is half as long. A longer one is cut, so that memory has a bound.

@@ -20,6 +20,8 @@ use crate::{
     units::RADIANS_PER_DEGREE,
 };
 
+/// Shots of a revolution, for which room is made at once.
+const REVOLUTION_SHOTS: usize = 71_000;
 /// Shots of a profile that are scanned.
 const SCANNED: usize = 400;
 /// Places of a profile on a map.
@@ -155,6 +157,9 @@ impl Gathered {
             if self.is_ended_by(&shot) {
                 done.push(std::mem::take(self));
             }
+            if self.shots.is_empty() {
+                self.shots.reserve_exact(REVOLUTION_SHOTS);
+            }
             if let Some((_, whole)) = samples.next_if(|(at, _)| *at == index) {
                 self.samples.push((self.shots.len(), whole));
             }
@@ -204,11 +209,13 @@ impl ArchiveProfile {
         let range_m = values(shots, |of| of.range_minus_distance_m);
         let decoding_m = values(shots, |of| of.decoding_m);
         let outlier = outliers(&range_m, rules.limits.outlier_sigma);
-        let summary = Summary::of(&range_m);
+        let (summary, scan) = rayon::join(
+            || Summary::of(&range_m),
+            || scan(gathered, &outlier, trajectory, rules),
+        );
         let mean = |column: fn(&RangeResiduals) -> f64| means(&values(shots, column), &outlier)[0];
         let [decoding_mean_m, decoding_without_outliers_m] = means(&decoding_m, &outlier);
         let (bins, off_nadir_rad) = by_off_nadir(shots, &outlier);
-        let scan = scan(gathered, &outlier, trajectory, rules);
         let count = |of: usize| u32::try_from(of).unwrap_or(u32::MAX);
         let mut profile = Self {
             shots: summary.n,

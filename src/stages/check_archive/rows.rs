@@ -11,7 +11,7 @@ use crate::{
     geom::range_residuals::RangeResiduals,
     pds::{
         archive::ShotRejection,
-        pedr::{Complaint, FieldGuard, Frame, SHOTS, Stretch},
+        pedr::{Complaint, FieldGuard, Frame, SHOTS, SpoiledShots, Stretch},
     },
     spice::Trajectory,
     stages::convert_datum::DatumTurn,
@@ -20,6 +20,9 @@ use crate::{
 
 /// Every so many shots one is kept whole, for the scan of clock biases and for the map.
 const SAMPLE_STEP: usize = 48;
+
+/// A shot in IAU 2000, and its residuals where the kernels have a position.
+type Shot = (Footprint, Option<RangeResiduals>);
 
 /// A shot and its residuals.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -79,30 +82,37 @@ impl Rows<'_> {
     }
 
     fn frame(&self, row: usize, frame: &Frame<'_>, task: &mut Task) {
-        let spoiled = frame.spoiled_shots();
-        if let Some(error) = spoiled.error() {
-            task.complaints.push(self.stretch.complaint(row, error));
-        }
         let record = self.stretch.record_number(row);
         let clock = self.rules.clock;
         let middle = clock.spacecraft_time(frame.record().time_s.get());
         let spacecraft = FrameSpacecraft::around(middle, self.trajectory);
-        for shot in (1..).take(SHOTS).filter_map(|shot| frame.shot(shot)) {
+        let mut shots = [None; SHOTS];
+        for (slot, number) in shots.iter_mut().zip(1..) {
+            *slot = frame.shot(number).map(|shot| {
+                let shot = self.turn.applied(Footprint {
+                    et_s: shot.et_tag_s + clock.correction_s(),
+                    record,
+                    ..shot
+                });
+                let at: Et = clock.spacecraft_time(shot.et_tag_s);
+                let spacecraft = match &spacecraft {
+                    Some(spacecraft) => Some(spacecraft.at(at.since(middle))),
+                    None => state(at, self.trajectory),
+                };
+                let residuals = spacecraft.map(|craft| RangeResiduals::of(&shot, &craft));
+                (shot, residuals)
+            });
+        }
+        let spoiled = self.spoiled(frame, &shots);
+        if let Some(error) = spoiled.error() {
+            task.complaints.push(self.stretch.complaint(row, error));
+        }
+        for (shot, residuals) in shots.into_iter().flatten() {
             if let Some(reason) = ShotRejection::of(&shot, &spoiled, Some(self.rules.filter)) {
                 *task.rejected.entry(reason).or_default() += 1;
                 continue;
             }
-            let shot = self.turn.applied(Footprint {
-                et_s: shot.et_tag_s + clock.correction_s(),
-                record,
-                ..shot
-            });
-            let at: Et = clock.spacecraft_time(shot.et_tag_s);
-            let spacecraft = match &spacecraft {
-                Some(spacecraft) => Some(spacecraft.at(at.since(middle))),
-                None => state(at, self.trajectory),
-            };
-            task.not_covered += u64::from(spacecraft.is_none());
+            task.not_covered += u64::from(residuals.is_none());
             if task.shots.len().is_multiple_of(SAMPLE_STEP) {
                 task.samples.push((task.shots.len(), shot));
             }
@@ -114,8 +124,26 @@ impl Rows<'_> {
                 shot: shot.shot,
                 off_nadir_rad: shot.off_nadir_rad,
                 place_rad: [shot.longitude_rad, shot.latitude_rad],
-                residuals: spacecraft.map(|spacecraft| RangeResiduals::of(&shot, &spacecraft)),
+                residuals,
             });
         }
+    }
+
+    /// The shots that contradict themselves. Where coordinates stay as they are, the distance to the file's own spacecraft is
+    /// a residual already.
+    fn spoiled(&self, frame: &Frame<'_>, shots: &[Option<Shot>; SHOTS]) -> SpoiledShots {
+        let is_known = shots
+            .iter()
+            .flatten()
+            .all(|(_, residuals)| residuals.is_some());
+        if !self.turn.is_none() || !is_known {
+            return frame.spoiled_shots();
+        }
+        frame.spoiled_by(|number| {
+            let (shot, residuals) = shots.get(usize::from(number).checked_sub(1)?)?.as_ref()?;
+            residuals
+                .filter(|_| shot.range_m > 0.0)
+                .map(|residuals| residuals.decoding_m)
+        })
     }
 }

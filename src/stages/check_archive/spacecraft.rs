@@ -43,12 +43,8 @@ impl FrameSpacecraft {
 
 /// The state at one instant.
 pub(super) fn state(at: Et, trajectory: &Trajectory) -> Option<SpacecraftState> {
-    let position = trajectory.position(at)?;
-    Some(SpacecraftState::of(
-        at,
-        &position,
-        &trajectory.velocity_m_s(at)?,
-    ))
+    let (position, velocity_m_s) = trajectory.state(at)?;
+    Some(SpacecraftState::of(at, &position, &velocity_m_s))
 }
 
 /// Weights of the states in the cubic through them.

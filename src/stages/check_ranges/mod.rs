@@ -221,9 +221,7 @@ pub fn check_ranges(
         for row in &profile.rows {
             let shot = footprints.row(*row as usize);
             let at = clock.spacecraft_time(shot.et_tag_s);
-            let (Some(position), Some(velocity_m_s)) =
-                (trajectory.position(at), trajectory.velocity_m_s(at))
-            else {
+            let Some((position, velocity_m_s)) = trajectory.state(at) else {
                 return Err(OutsideTrajectory {
                     profile: profile.id.clone(),
                     at,
