@@ -293,15 +293,11 @@ fn ties_rad(site: &SiteProducts) -> Vec<(f64, f64)> {
     let Some(geometric) = &site.geometric else {
         return Vec::new();
     };
-    let points_m: Vec<nalgebra::Vector3<f64>> = match &geometric.adjustment {
-        Some(adjustment) => adjustment
-            .adjusted_ties()
-            .map(|tie| tie.ground.xyz_m)
-            .collect(),
-        None => {
-            let points = geometric.intersected.points.iter();
-            points.map(|point| point.ground.xyz_m).collect()
-        }
+    let points_m: Vec<nalgebra::Vector3<f64>> = if let Some(of) = &geometric.adjustment {
+        of.adjusted_ties().map(|tie| tie.ground.xyz_m).collect()
+    } else {
+        let points = geometric.intersected.points.iter();
+        points.map(|point| point.ground.xyz_m).collect()
     };
     let shown = thinned(&points_m, MAP_TIES);
     let places = shown.iter().map(Spherical::from_xyz_m);
