@@ -38,7 +38,7 @@ const MAP_TIES: usize = 400;
 /// Least and greatest height of the picture against its width.
 const RATIO: (f64, f64) = (0.5, 0.78);
 /// What rounding takes a point of a line off it at most, units of the drawing.
-const ROUNDING: f64 = 1.0;
+const ROUNDING: f64 = 0.75;
 /// Colours of image outlines and of tie points; the ground has none like them.
 const IMAGE: usize = 3;
 const TIE: usize = 1;
