@@ -285,6 +285,20 @@ fn the_tables_of_the_adjustment_are_its_summary() {
         agree(&row[3], of[0].mean, 3);
         agree(&row[6], of[1].standard_deviation, 3);
     }
+    let images = table(&page, "Images, one row each");
+    assert_eq!(images.len(), site.adjusted.images.len());
+    for (index, (row, image)) in images.iter().zip(&site.adjusted.images).enumerate() {
+        let views = site.adjusted.views.iter();
+        let ties: Vec<f64> = views
+            .filter(|view| view.kind == PointKind::Tie && view.image == index)
+            .map(|view| view.along_px.value)
+            .collect();
+        assert_eq!(row[1], ties.len().to_string());
+        let squares: f64 = ties.iter().map(|value| value * value).sum();
+        agree(&row[2], (squares / ties.len() as f64).sqrt(), 2);
+        let shift_m = [0, 3, 6].map(|at| image.correction[at].powi(2));
+        agree(&row[5], shift_m.iter().sum::<f64>().sqrt(), 1);
+    }
     let observations = table(&page, "Observations by kind");
     assert_eq!(observations.len(), summary.types.len());
     for (row, of) in observations.iter().zip(&summary.types) {

@@ -43,6 +43,7 @@ fn write(
         residuals::distribution(adjusted)?,
         figure(&convergence(adjusted))?
     );
+    html += &residuals::images(adjusted);
     html += &observations(summary);
     html += &heading("Corrections to the orientation");
     html += &corrections::tables(site, adjusted);

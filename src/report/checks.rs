@@ -96,9 +96,10 @@ fn limit(check: &Check) -> String {
     }
     // Limits are written by people: their digits end where zeros begin.
     let text = number(limit, decimals(check));
-    let text = match text.contains('.') {
-        true => text.trim_end_matches('0').trim_end_matches('.'),
-        false => &text,
+    let text = if text.contains('.') {
+        text.trim_end_matches('0').trim_end_matches('.')
+    } else {
+        &text
     };
     format!("{bound}{text} {unit}")
 }

@@ -38,7 +38,7 @@ const MAP_TIES: usize = 400;
 /// Least and greatest height of the picture against its width.
 const RATIO: (f64, f64) = (0.5, 0.78);
 /// What rounding takes a point of a line off it at most, units of the drawing.
-const ROUNDING: f64 = 1.0;
+const ROUNDING: f64 = 0.75;
 /// Colours of image outlines and of tie points; the ground has none like them.
 const IMAGE: usize = 3;
 const TIE: usize = 1;
@@ -293,15 +293,11 @@ fn ties_rad(site: &SiteProducts) -> Vec<(f64, f64)> {
     let Some(geometric) = &site.geometric else {
         return Vec::new();
     };
-    let points_m: Vec<nalgebra::Vector3<f64>> = match &geometric.adjustment {
-        Some(adjustment) => adjustment
-            .adjusted_ties()
-            .map(|tie| tie.ground.xyz_m)
-            .collect(),
-        None => {
-            let points = geometric.intersected.points.iter();
-            points.map(|point| point.ground.xyz_m).collect()
-        }
+    let points_m: Vec<nalgebra::Vector3<f64>> = if let Some(of) = &geometric.adjustment {
+        of.adjusted_ties().map(|tie| tie.ground.xyz_m).collect()
+    } else {
+        let points = geometric.intersected.points.iter();
+        points.map(|point| point.ground.xyz_m).collect()
     };
     let shown = thinned(&points_m, MAP_TIES);
     let places = shown.iter().map(Spherical::from_xyz_m);

@@ -33,7 +33,7 @@ pub(super) fn absolute(geometric: &GeometricProducts, adjustment: &AdjustmentPro
     let summary = &adjustment.adjusted.summary;
     let ties = &summary.ties;
     if ties.corrections_m[0].n == 0 {
-        return format!("No tie point took part: nothing was adjusted to anything.");
+        return "No tie point took part: nothing was adjusted to anything.".to_owned();
     }
     let registration = if adjustment.images_agree {
         "The relative registration is corrected"

@@ -1,6 +1,7 @@
 //! How residuals of tie points are distributed: by their own standard deviations, against the normal distribution.
 
 use super::{
+    html::{Column, Table},
     numbers::whole,
     plots::{Extent, GREY, Panel, Plot, Series, figure, label},
 };
@@ -8,12 +9,65 @@ use crate::{
     error::Result,
     geom::statistics::BAARDA_LIMIT,
     stages::adjust::{Adjusted, ImageResidual, PointKind, ScalarResidual},
+    units::RADIANS_PER_ARCSECOND,
 };
 
 /// Points of a curve.
 const POINTS: usize = 240;
 /// Standard deviations that the axis shows to both sides.
 const SHOWN: f64 = 5.0;
+
+/// One row an image: its tie points, what is left of them, and what the adjustment adds at its middle.
+pub(super) fn images(adjusted: &Adjusted) -> String {
+    let mut table = Table::new(
+        "Images, one row each",
+        &[
+            Column::Text("image"),
+            Column::Number("tie points"),
+            Column::Number("RMS along, px"),
+            Column::Number("RMS across, px"),
+            Column::Number("largest standardised residual"),
+            Column::Number("shift, m"),
+            Column::Number("rotation, ″"),
+        ],
+    );
+    for (index, image) in adjusted.images.iter().enumerate() {
+        let ties = || {
+            let views = adjusted.views.iter();
+            views.filter(|view| view.kind == PointKind::Tie && view.image == index)
+        };
+        let count = ties().count();
+        let rms = |of: fn(&ImageResidual) -> ScalarResidual| {
+            let squares: f64 = ties().map(|view| of(view).value.powi(2)).sum();
+            (squares / count.max(1) as f64).sqrt()
+        };
+        let standardised = ties().flat_map(|view| [view.along_px, view.across_px]);
+        let standardised = standardised.filter_map(|residual| residual.standardised);
+        let largest = standardised.map(f64::abs).fold(0.0, f64::max);
+        // Coefficients of power 0 of the position, then of the rotation.
+        let size = |first: usize| {
+            let constants = [0, 3, 6].map(|at| image.correction[first + at]);
+            constants
+                .iter()
+                .map(|value| value.powi(2))
+                .sum::<f64>()
+                .sqrt()
+        };
+        table.row(
+            true,
+            [
+                (&image.id).into(),
+                whole(count).into(),
+                label(rms(|view| view.along_px), 2).into(),
+                label(rms(|view| view.across_px), 2).into(),
+                label(largest, 1).into(),
+                label(size(0), 1).into(),
+                label(size(9) / RADIANS_PER_ARCSECOND, 1).into(),
+            ],
+        );
+    }
+    table.finish()
+}
 
 /// The distribution along and across the track; nothing without residuals that another observation controls.
 ///

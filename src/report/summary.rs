@@ -14,7 +14,7 @@ use crate::{
 };
 
 /// Reasons, and remarks, that are listed; the rest is counted.
-const REASONS_SHOWN: usize = 12;
+const REASONS_SHOWN: usize = 4;
 
 /// Valid or not and why, how good by whose judgement, and where: the first lines of the page.
 ///

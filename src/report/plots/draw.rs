@@ -57,9 +57,12 @@ fn draw_panel<'a>(plot: &Plot, panel: &Panel, lowest: bool, area: &Canvas<'a>) -
         .label_style(("sans-serif", LETTERS).into_font().color(&INK))
         .axis_desc_style(("sans-serif", LETTERS).into_font().color(&INK))
         .x_label_formatter(&move |x| label(*x, x_decimals))
-        .y_label_formatter(&move |y| match panel.log {
-            true => power(*y),
-            false => label(*y, y_decimals),
+        .y_label_formatter(&move |y| {
+            if panel.log {
+                power(*y)
+            } else {
+                label(*y, y_decimals)
+            }
         })
         .draw()?;
     draw_marks(plot, panel, &mut chart)?;

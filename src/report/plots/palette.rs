@@ -11,7 +11,7 @@ pub(in crate::report) const COLOURS: [RGBColor; 7] = [
     RGBColor(0xb0, 0x51, 0x8a),
     RGBColor(0x69, 0x4b, 0x00),
     RGBColor(0x69, 0x96, 0xc3),
-    RGBColor(0x5a, 0x5a, 0x5a),
+    RGBColor(0x44, 0x44, 0x44),
 ];
 /// Index of the grey among the colours.
 pub(in crate::report) const GREY: usize = 6;

@@ -181,15 +181,16 @@ impl AdjustmentEvidence<'_> {
 
     /// Corrections of orientations that what was known of them does not allow.
     fn corrected_too_far(&self, limits: &LimitsConfig) -> Vec<String> {
-        let far = self.largest_corrections().filter_map(|(image, unknown, sigmas)| {
-            (!(sigmas <= limits.correction_max_sigma)).then(|| {
-                format!(
-                    "image {image}: the adjustment corrects its {} by {sigmas:.1} standard deviations, expected at most {}; check \
-                     its time, its kernels and pointing.ck_bias_s",
-                    unknown.quantity(),
-                    limits.correction_max_sigma
-                )
-            })
+        let far = self
+            .largest_corrections()
+            .filter(|(_, _, sigmas)| !(*sigmas <= limits.correction_max_sigma));
+        let far = far.map(|(image, unknown, sigmas)| {
+            format!(
+                "image {image}: the adjustment corrects its {} by {sigmas:.1} standard deviations, expected at most {}; check \
+                 its time, its kernels and pointing.ck_bias_s",
+                unknown.quantity(),
+                limits.correction_max_sigma
+            )
         });
         far.collect()
     }

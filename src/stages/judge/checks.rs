@@ -4,8 +4,7 @@ use super::{
     AdjustmentEvidence, CLOCK_DOUBT_S, CLOCK_DOUBT_SIGMA, Evidence, JudgedImage,
     adjustment::{HEIGHT_LOOSE_M, HEIGHT_OUTLIERS_FEW},
     check::{
-        Check,
-        CheckKind::{self, *},
+        Check, CheckKind,
         CheckOutcome::{self, Fail, Pass, Warning},
     },
 };
@@ -21,14 +20,23 @@ use crate::{
 /// More than this share of rejected tie points makes a site invalid.
 const REJECTED_SHARE_FAIL: f64 = 0.5;
 
+/// What is checked of each profile or image, how it is found, and its limit.
+type Quantity<T> = (CheckKind, fn(&T) -> f64, f64);
+
 /// All checks, the worst first and of equals the most independent first.
 pub(super) fn checks(evidence: &Evidence<'_>) -> Vec<Check> {
     let mut checks = Vec::new();
     if let Some(footprints) = evidence.footprints {
-        checks.push(Check::new(Footprints, "", footprints as f64, 1.0, Fail));
+        checks.push(Check::new(
+            CheckKind::Footprints,
+            "",
+            footprints as f64,
+            1.0,
+            Fail,
+        ));
     }
     if evidence.adjustment_failure.is_some() {
-        checks.push(Check::told(AdjustmentMade, "", Fail));
+        checks.push(Check::told(CheckKind::AdjustmentMade, "", Fail));
     }
     checks.extend(of_ranges(evidence));
     checks.extend(clock(evidence));
@@ -40,7 +48,13 @@ pub(super) fn checks(evidence: &Evidence<'_>) -> Vec<Check> {
     }
     let skipped = evidence.complaints.len();
     if skipped > 0 {
-        checks.push(Check::new(SkippedRecords, "", skipped as f64, 0.0, Warning));
+        checks.push(Check::new(
+            CheckKind::SkippedRecords,
+            "",
+            skipped as f64,
+            0.0,
+            Warning,
+        ));
     }
     checks.sort_by_key(|check| (check.outcome, check.kind));
     checks
@@ -49,19 +63,19 @@ pub(super) fn checks(evidence: &Evidence<'_>) -> Vec<Check> {
 fn of_ranges(evidence: &Evidence<'_>) -> Vec<Check> {
     let limits = evidence.range_limits;
     let shots = |of: &ProfileRanges| f64::from(of.range_minus_distance_m.n);
-    let quantities: [(CheckKind, fn(&ProfileRanges) -> f64, f64); 3] = [
+    let quantities: [Quantity<ProfileRanges>; 3] = [
         (
-            RangeMean,
+            CheckKind::RangeMean,
             |of| of.mean_without_outliers_m,
             limits.mean_max_m,
         ),
         (
-            OrbitsApart,
+            CheckKind::OrbitsApart,
             ProfileRanges::orbits_apart_m,
             limits.orbit_max_m,
         ),
         (
-            Decoding,
+            CheckKind::Decoding,
             |of| of.decoding_without_outliers_m,
             limits.decoding_max_m,
         ),
@@ -76,11 +90,11 @@ fn of_ranges(evidence: &Evidence<'_>) -> Vec<Check> {
         .collect();
     let outliers = |of: &ProfileRanges| 100.0 * f64::from(of.outliers) / shots(of).max(1.0);
     checks.push(worst(
-        RangeOutliers,
+        CheckKind::RangeOutliers,
         &outliers,
         100.0 * limits.outlier_share_max,
     ));
-    checks.push(worst(Shots, &shots, f64::from(limits.shots_min)));
+    checks.push(worst(CheckKind::Shots, &shots, f64::from(limits.shots_min)));
     checks.into_iter().flatten().collect()
 }
 
@@ -92,7 +106,7 @@ fn clock(evidence: &Evidence<'_>) -> Option<Check> {
         let limit_s = CLOCK_DOUBT_S.max(CLOCK_DOUBT_SIGMA * uncertainty_s);
         let apart_s = best_s - evidence.clock_correction_s;
         Some(Check::new(
-            ClockCorrection,
+            CheckKind::ClockCorrection,
             &*of.profile,
             apart_s,
             limit_s,
@@ -113,19 +127,19 @@ fn of_images<'a>(
         .chain(adjusted.map(|image| (format!("{}, adjusted", image.id), image)))
         .collect();
     let limits = evidence.orientation_limits;
-    let quantities: [(CheckKind, fn(&JudgedImage) -> f64, f64); 3] = [
+    let quantities: [Quantity<JudgedImage>; 3] = [
         (
-            PositionRmse,
+            CheckKind::PositionRmse,
             |image| image.model.second_order.position_rmse_m(),
             limits.position_rmse_max_m,
         ),
         (
-            PointingRmse,
+            CheckKind::PointingRmse,
             |image| image.model.rotation_vector.rmse_rad() / RADIANS_PER_ARCSECOND,
             limits.pointing_rmse_max_rad / RADIANS_PER_ARCSECOND,
         ),
         (
-            TableError,
+            CheckKind::TableError,
             |image| image.orientation.tables.interpolation.error_max_px,
             InterpolationCheck::LIMIT_PX,
         ),
@@ -145,7 +159,7 @@ fn of_images<'a>(
         } else {
             Warning
         };
-        Check::told(Attitude, image.id, outcome)
+        Check::told(CheckKind::Attitude, image.id, outcome)
     });
     checks.extend(Check::worst(attitudes));
     checks
@@ -157,16 +171,20 @@ fn of_heights(of: &AdjustmentEvidence<'_>, limits: &LimitsConfig) -> Vec<Check> 
         Err(_) => Check::told(kind, "not controlled by MOLA", Warning),
     };
     let mut checks = vec![
-        median(HeightBefore, of.heights, limits.height_before_max_m),
         median(
-            HeightAfter,
+            CheckKind::HeightBefore,
+            of.heights,
+            limits.height_before_max_m,
+        ),
+        median(
+            CheckKind::HeightAfter,
             of.adjusted_heights,
             of.height_after_max_m(limits),
         ),
     ];
     if let Some(apart) = &of.heights.apart {
         checks.push(Check::new(
-            ProfilesApart,
+            CheckKind::ProfilesApart,
             apart.profiles.join(" and "),
             apart.mean_m / apart.sigma_m,
             limits.profiles_apart_max_sigma,
@@ -176,13 +194,25 @@ fn of_heights(of: &AdjustmentEvidence<'_>, limits: &LimitsConfig) -> Vec<Check> 
     if let Some(heights) = &of.adjusted.heights {
         let share = heights.beyond_share();
         let limit = limits.height_outliers_max;
-        let mut outliers = Check::new(HeightOutliers, "", 100.0 * share, 100.0 * limit, Fail);
+        let mut outliers = Check::new(
+            CheckKind::HeightOutliers,
+            "",
+            100.0 * share,
+            100.0 * limit,
+            Fail,
+        );
         if outliers.outcome == Pass && share > HEIGHT_OUTLIERS_FEW {
             outliers.outcome = Warning;
         }
         checks.push(outliers);
         let [_, _, up_m] = heights.mean_sigma_m;
-        checks.push(Check::new(HeightSigma, "", up_m, HEIGHT_LOOSE_M, Warning));
+        checks.push(Check::new(
+            CheckKind::HeightSigma,
+            "",
+            up_m,
+            HEIGHT_LOOSE_M,
+            Warning,
+        ));
     }
     checks
 }
@@ -195,9 +225,13 @@ fn of_ties(of: &AdjustmentEvidence<'_>, limits: &LimitsConfig) -> Vec<Check> {
         }))
     };
     let mut checks: Vec<Check> = [
-        apart(ParallaxBefore, of.pairs, limits.parallax_before_max_m),
         apart(
-            ParallaxAfter,
+            CheckKind::ParallaxBefore,
+            of.pairs,
+            limits.parallax_before_max_m,
+        ),
+        apart(
+            CheckKind::ParallaxAfter,
             of.adjusted_pairs,
             limits.parallax_after_max_m,
         ),
@@ -206,7 +240,7 @@ fn of_ties(of: &AdjustmentEvidence<'_>, limits: &LimitsConfig) -> Vec<Check> {
     .flatten()
     .collect();
     let components = of.adjusted.summary.tie_components.into_iter();
-    let axes = [TieResidualsAlong, TieResidualsAcross];
+    let axes = [CheckKind::TieResidualsAlong, CheckKind::TieResidualsAcross];
     checks.extend(
         components
             .zip(axes)
@@ -220,14 +254,20 @@ fn of_ties(of: &AdjustmentEvidence<'_>, limits: &LimitsConfig) -> Vec<Check> {
     };
     checks.push(rejected(share, limits.rejected_share_max, broken));
     checks.push(Check::new(
-        TiesUsed,
+        CheckKind::TiesUsed,
         "",
         of.taken() as f64,
         f64::from(limits.ties_min),
         Warning,
     ));
     let corrections = of.largest_corrections().map(|(image, _, sigmas)| {
-        Check::new(Correction, image, sigmas, limits.correction_max_sigma, Fail)
+        Check::new(
+            CheckKind::Correction,
+            image,
+            sigmas,
+            limits.correction_max_sigma,
+            Fail,
+        )
     });
     checks.extend(Check::worst(corrections));
     checks.extend(boresight(of, limits));
@@ -250,7 +290,13 @@ fn boresight(of: &AdjustmentEvidence<'_>, limits: &LimitsConfig) -> Option<Check
 
 /// Rejected tie points: a share beyond the limit of a sound adjustment warns, more than half fails whatever that is.
 fn rejected(share: f64, limit: f64, broken: CheckOutcome) -> Check {
-    let mut check = Check::new(TiesRejected, "", 100.0 * share, 100.0 * limit, broken);
+    let mut check = Check::new(
+        CheckKind::TiesRejected,
+        "",
+        100.0 * share,
+        100.0 * limit,
+        broken,
+    );
     if broken == Fail {
         check.outcome = Fail;
     }
