@@ -237,3 +237,40 @@ fn shots_lie_on_the_lines_of_their_times() {
         apart.mean
     );
 }
+
+/// The shots that the site's registration lists, and how many of them lie inside the image.
+fn listed(case: &Case) -> [usize; 2] {
+    let table = table(&case.path("out/case/registration.parquet"));
+    let inside = table.column_by_name("inside").unwrap().as_boolean().clone();
+    [table.num_rows(), inside.true_count()]
+}
+
+/// Outlines come from the edges of the image on the ellipsoid, lines and samples of shots from the camera model.
+#[test]
+fn a_window_of_an_image_holds_the_shots_that_the_image_sees() {
+    let case = Case::new();
+    case.stages_run();
+    let [listed_of_box, inside_of_box] = listed(&case);
+    let edges = "longitude_deg = [87.5, 88.5]\nlatitude_deg = [4.0, 5.0]\n";
+    case.replace("site.toml", edges, "image = \"image\"\n");
+    assert!(case.stages_run().contains(&"outline_windows".to_owned()));
+    assert_eq!(case.stages_run(), [""; 0]);
+    let [listed_of_image, inside_of_image] = listed(&case);
+    // Shots are 300 m apart along the track: terrain of some kilometres, seen 20° off nadir, moves either end of the image
+    // by four of them.
+    assert!(inside_of_box > 50 && inside_of_image.abs_diff(inside_of_box) <= 8);
+    assert!(
+        listed_of_image < inside_of_image + 8,
+        "{listed_of_image} for {inside_of_image}"
+    );
+    case.replace(
+        "site.toml",
+        "image = \"image\"\n",
+        "image = \"image\"\nmargin_km = 6.0\n",
+    );
+    case.stages_run();
+    let [listed_of_margin, inside_of_margin] = listed(&case);
+    assert!(listed_of_margin > listed_of_image + 20 && listed_of_margin < listed_of_box);
+    // With a margin nothing is lost at the ends.
+    assert_eq!(inside_of_margin, inside_of_box);
+}

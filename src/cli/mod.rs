@@ -2,6 +2,8 @@
 
 mod check;
 mod completions;
+mod edges;
+mod image;
 mod kernels;
 mod manual;
 mod nightly;
@@ -68,6 +70,8 @@ enum Command {
     Plan(plan::Arguments),
     /// Inspect kernels: what is loaded, where the gaps are, how alternative sets differ.
     Kernels(kernels::Arguments),
+    /// Read images of the camera, find them in the mission's index.
+    Image(image::Arguments),
     /// Inspect PEDR files.
     Pedr(pedr::Arguments),
     /// Report what differs between two runs.
@@ -130,6 +134,7 @@ pub fn main() -> ExitCode {
         Command::Check(arguments) => finish(check::run(&arguments)),
         Command::Plan(arguments) => finish(plan::run(&arguments)),
         Command::Kernels(arguments) => finish(kernels::run(&arguments)),
+        Command::Image(arguments) => finish(image::run(&arguments)),
         Command::Pedr(arguments) => finish(pedr::run(&arguments)),
         Command::Report(arguments) => report::run(&arguments),
         Command::Triangulate(arguments) => triangulate::run(&arguments),

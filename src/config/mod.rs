@@ -67,7 +67,7 @@ pub use service::{
 pub use site::SiteConfig;
 pub use ties::{IntersectionConfig, TiesConfig};
 pub use unknowns::{PositionUnknowns, RotationUnknowns};
-pub use window_list::{load_windows, window_of_box, window_of_polygon};
+pub use window_list::{load_windows, require_outlines, window_of_box, window_of_polygon};
 pub use windows::WindowConfig;
 
 use crate::error::{Cause, Error, IoError, Kind, Locate as _};

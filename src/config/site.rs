@@ -112,6 +112,7 @@ fn across_tables(site: &SiteConfig, keys: &mut Keys<'_, '_>) {
         keys.refuse("ties", "at least two images that tie points can join");
     }
     priors_of_images(site, keys);
+    images_of_windows(site, keys);
 }
 
 /// Footprints need windows; a site needs footprints or images.
@@ -185,6 +186,21 @@ fn serial_numbers(keys: &mut Keys<'_, '_>) {
             .iter()
             .filter_map(|image| image.get("serial_number").or_else(|| image.get("id")));
         no_repeats("images.serial_number", names, keys.review());
+    }
+}
+
+/// Windows are what images of the site see.
+fn images_of_windows(site: &SiteConfig, keys: &mut Keys<'_, '_>) {
+    let known: BTreeSet<&str> = site.images.iter().map(|image| &*image.id).collect();
+    for window in keys.entries(&["windows"]) {
+        let Some(id) = window.get("image") else {
+            continue;
+        };
+        if id.get_ref().as_str().is_some_and(|id| !known.contains(id)) {
+            let images: Vec<&str> = known.iter().copied().collect();
+            let expected = format!("one of the site's images: {}", images.join(", "));
+            keys.review().refuse(id.span(), "windows.image", expected);
+        }
     }
 }
 

@@ -52,6 +52,10 @@ enum WindowError {
     },
     #[error("{0}")]
     Polygon(String),
+    #[error(
+        "window {0} is what an image sees; expected longitude_deg and latitude_deg, or polygon"
+    )]
+    Image(String),
 }
 
 impl Cause for WindowError {
@@ -64,6 +68,7 @@ impl Cause for WindowError {
             Self::Box { .. } => {
                 "write west,east,south,north in degrees, such as 137.0,138.0,-5.5,-4.0"
             }
+            Self::Image(_) => "write a box or polygon: only a run knows what an image sees",
             Self::Polygon(_) => {
                 "correct the file: GeoJSON polygons of east longitude and areocentric latitude"
             }
@@ -79,7 +84,20 @@ impl Cause for WindowError {
 pub fn load_windows(path: &Path) -> Result<Vec<WindowConfig>, Error> {
     let text = read(path)?;
     let ((list, _), _) = parse_file::<WindowList>(&text, path, DOCUMENTATION)?;
+    require_outlines(&list.windows).in_file(path)?;
     Ok(list.windows)
+}
+
+/// Makes sure that the outlines of windows are known without a run.
+///
+/// # Errors
+/// A window that is what an image sees.
+pub fn require_outlines(windows: &[WindowConfig]) -> Result<(), Error> {
+    let is_of_image = |window: &&WindowConfig| matches!(window.shape, WindowShape::Image { .. });
+    match windows.iter().find(is_of_image) {
+        Some(window) => Err(WindowError::Image(window.id.clone()).into()),
+        None => Ok(()),
+    }
 }
 
 /// The window of a box: west, east, south and north edge, degrees, as a site file has them.

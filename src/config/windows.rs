@@ -2,10 +2,13 @@
 
 use std::path::{Path, PathBuf};
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use serde_json::json;
 
-use crate::{geom::window::WindowShape, units::RADIANS_PER_DEGREE};
+use crate::{
+    geom::window::WindowShape,
+    units::{METRES_PER_KM, RADIANS_PER_DEGREE},
+};
 
 use super::{
     declare::{Declare as _, Keys, Many, declare_table, group, key},
@@ -18,7 +21,7 @@ use super::{
 pub(super) const WINDOWS_MAX: usize = 64;
 
 /// Keys that give the outline.
-const SHAPES: [&str; 3] = ["longitude_deg", "latitude_deg", "polygon"];
+const SHAPES: [&str; 4] = ["longitude_deg", "latitude_deg", "polygon", "image"];
 
 /// Windows of a site.
 pub(super) const WINDOWS: Many = Many {
@@ -32,7 +35,7 @@ pub(super) const WINDOWS: Many = Many {
 };
 
 /// A window on the ground.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct WindowConfig {
     /// Identifier, unique in the site.
     pub id: String,
@@ -44,7 +47,7 @@ declare_table! {
     /// 1 to 64 windows; a footprint belongs to every window that its own position lies in.
     fill WindowConfig {
         /// Identifier, unique in the site.
-        id = key(identifier()).required().example(r#""site""#).example_in(1, r#""outline""#),
+        id = key(identifier()).required().example(r#""site""#).example_in(1, r#""outline""#).example_in(2, r#""image""#),
         /// Outline.
         shape = group::<ShapeKeys>().then(shape),
     }
@@ -63,29 +66,53 @@ declare_table! {
             key(several(from_to(-90.0, 90.0), "two numbers [south, north]")).example("[-14.0, -12.9]"),
         /// GeoJSON file.
         polygon: Option<PathBuf> = key(FILE).example_in(1, r#""outline.geojson""#),
+        /// Identifier of an image of the site: the window is what it sees, by its times and the kernels (of rival
+        /// sets, the first).
+        image: Option<String> = key(identifier()).example_in(2, r#""E02-02855""#),
+        /// How far the window reaches beyond the outline of the image, at least.
+        margin_km: Option<f64> = key(from_to(0.0, 1_000.0)).example_in(2, "5.0"),
     }
 }
 
 fn shape(written: ShapeKeys, keys: &mut Keys<'_, '_>) -> WindowShape {
     keys.rule(|| {
         json!({"oneOf": [
-            {"required": ["longitude_deg", "latitude_deg"], "not": {"required": ["polygon"]}},
+            {"required": ["longitude_deg", "latitude_deg"], "not": {"anyOf": [
+                {"required": ["polygon"]},
+                {"required": ["image"]},
+            ]}},
             {"required": ["polygon"], "not": {"anyOf": [
                 {"required": ["longitude_deg"]},
                 {"required": ["latitude_deg"]},
+                {"required": ["image"]},
+            ]}},
+            {"required": ["image"], "not": {"anyOf": [
+                {"required": ["longitude_deg"]},
+                {"required": ["latitude_deg"]},
+                {"required": ["polygon"]},
             ]}},
         ]})
     });
     let there = SHAPES.map(|key| keys.span_of(key).is_some());
-    if !matches!(there, [true, true, false] | [false, false, true]) {
+    if !matches!(
+        there,
+        [true, true, false, false] | [false, false, true, false] | [false, false, false, true]
+    ) {
         if !keys.is_no_table() && !keys.misspelt(&SHAPES) {
             keys.problem(
-                "windows has no clear shape; expected either longitude_deg and latitude_deg, or polygon"
+                "windows has no clear shape; expected longitude_deg and latitude_deg, polygon, or image"
                     .to_owned(),
             );
         }
         return nowhere();
     }
+    if let Some(image) = written.image {
+        return WindowShape::Image {
+            image,
+            margin_m: written.margin_km.unwrap_or_default() * METRES_PER_KM,
+        };
+    }
+    keys.unused("margin_km", "only the outline of an image has a margin");
     let bounds = bounds(written.longitude_deg, written.latitude_deg, keys);
     let outline = written.polygon.and_then(|path| outline(&path, keys));
     bounds.or(outline).unwrap_or_else(nowhere)

@@ -12,9 +12,10 @@ use super::{
     site::site,
 };
 use crate::{
-    config::{ImageConfig, SiteConfig},
+    config::{ImageConfig, SiteConfig, WindowConfig},
     error::Result,
     files::{HashedFile, InputFiles},
+    geom::window::WindowShape,
     stage::{Output, Stage},
 };
 
@@ -23,9 +24,16 @@ use crate::{
 pub fn stages() -> &'static [&'static str] {
     static NAMES: LazyLock<Vec<&str>> = LazyLock::new(|| {
         let mut outline = Outline::default();
-        // Of no kernels; with an image and tie points, so that no stage is passed over.
+        // Of no kernels; with an image, its window and tie points, so that no stage is passed over.
         let mut config = SiteConfig::default();
         config.images.push(ImageConfig::default());
+        config.windows.push(WindowConfig {
+            id: String::new(),
+            shape: WindowShape::Image {
+                image: String::new(),
+                margin_m: 0.0,
+            },
+        });
         config.ties.files.push(PathBuf::new());
         // Nothing is read and nothing runs, so nothing fails.
         let _ = site(&mut outline, &config);

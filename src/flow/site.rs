@@ -4,12 +4,13 @@ use super::{
     LOAD_KERNELS,
     choice::{ChooseKernels, KernelChoice, RivalKernelSets, rival_positions},
     driver::{Driver, Flow, Leave},
-    kernels::load_kernels,
+    kernels::{load_kernels, required_coverage},
     outputs::{Adjustment, Intersection, Prepared, Site},
 };
 use crate::{
-    config::{ImageConfig, SiteConfig},
+    config::{ImageConfig, SiteConfig, WindowConfig},
     error::{Error, Kind},
+    geom::window::WindowShape,
     kernel_source::KernelSource,
     pds::archive::{Index, Indexes},
     spice::{KernelSet, KernelView, RequiredCoverage},
@@ -25,6 +26,7 @@ use crate::{
         group_profiles::{GroupProfiles, Profile},
         intersect::Intersect,
         orientation::Orientation,
+        outline_windows::{OutlineWindows, Windows},
         read_ties::{ImageNames, ReadTies, TieFiles, Ties},
         register::Register,
         reorient::Reorient,
@@ -82,11 +84,15 @@ pub(super) fn prepare<D: Driver>(flow: &mut D, config: &SiteConfig) -> Flow<Prep
         flow.files().admit(path).ok()?;
         Index::read(path)
     });
+    let outlined = outlined(flow, config, &images)?;
     let found = flow.stage(&SearchFootprints {
         pedr: &config.pedr,
         files: PedrFiles(&files),
         index: KnownPlaces(&indexes),
-        windows: &config.windows,
+        windows: Windows {
+            written: &config.windows,
+            outlined: outlined.as_ref(),
+        },
         clock_correction_s: &config.mola_clock.correction_s(),
     })?;
     let converted = flow.stage(&ConvertDatum {
@@ -110,6 +116,30 @@ pub(super) fn prepare<D: Driver>(flow: &mut D, config: &SiteConfig) -> Flow<Prep
         profiles,
         images,
     })
+}
+
+/// Windows with the outlines of images, of the first of rival kernel sets; none where no window is what an image sees.
+fn outlined<D: Driver>(
+    flow: &mut D,
+    config: &SiteConfig,
+    images: &[Output<ImageTimes>],
+) -> Flow<Option<Output<Vec<WindowConfig>>>> {
+    let is_of_image = |window: &WindowConfig| matches!(window.shape, WindowShape::Image { .. });
+    if !config.windows.iter().any(is_of_image) {
+        return Ok(None);
+    }
+    let times: Option<Vec<&ImageTimes>> = images.iter().map(Output::get).collect();
+    let required = times.map(|times| required_coverage(config, &times, &[]));
+    let kernels = kernels(flow, config, required.as_ref(), 0)?;
+    let outlined = flow.stage(&OutlineWindows {
+        windows: &config.windows,
+        images: InOrder(images),
+        kernels: &KernelView::all(kernels.as_ref()),
+        coverage: &config.kernels,
+        pointing: &config.pointing,
+        orientation: &config.orientation,
+    })?;
+    Ok(Some(outlined))
 }
 
 /// Of rival kernel sets the one to use, by its index; the first where there is one source. The index is `None`

@@ -7,6 +7,7 @@ pub mod chebyshev;
 pub mod collinearity;
 pub mod conformal_map;
 pub mod ellipsoid;
+pub mod image_outline;
 pub mod intersection;
 pub mod lagrange;
 pub mod light_time;

@@ -3,11 +3,12 @@
 mod bounds;
 mod extent;
 mod grid;
+mod overlap;
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use geo::{BoundingRect, Coord, Intersects, LineString, Polygon};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 pub use bounds::bounds_rad;
 pub use extent::Extent;
@@ -16,7 +17,7 @@ pub use grid::WindowGrid;
 use crate::units::{longitude_step_rad, wrap_pi, wrap_two_pi};
 
 /// Outline of a window, radians.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum WindowShape {
     /// From `west_rad` eastwards to `east_rad`, both `0..2π`; `west > east` crosses 0°.
@@ -35,6 +36,13 @@ pub enum WindowShape {
     Polygons {
         /// Polygons, rings, vertices: radians.
         polygons: Vec<Vec<Vec<[f64; 2]>>>,
+    },
+    /// What an image sees, which its times and the kernels tell; until then it holds nothing.
+    Image {
+        /// Identifier of the image.
+        image: String,
+        /// How far beyond its outline the window reaches, metres.
+        margin_m: f64,
     },
 }
 
@@ -99,6 +107,7 @@ impl Region {
                     Some(Piece::Polygon { outer, holes })
                 })
                 .collect(),
+            WindowShape::Image { .. } => Vec::new(),
         };
         Self { pieces }
     }

@@ -1,6 +1,8 @@
-//! Bytes to typed records and back: MOLA PEDR files, the labels of MOC images, tie points.
+//! Bytes to typed records and back: MOLA PEDR files, MOC images and their labels, tie points.
 
 pub mod archive;
+pub mod image_file;
+pub mod image_index;
 pub mod label;
 pub mod moc;
 pub mod pedr;

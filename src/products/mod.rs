@@ -29,6 +29,7 @@ mod orientation;
 mod page;
 mod parquet;
 mod pds4_label;
+mod picture;
 mod product;
 mod ranges;
 pub mod read;
@@ -55,6 +56,7 @@ pub use exchange::{
 pub use found_shots::{FoundShots, ShotsFile, ShotsFormat};
 pub use generated::{documentation, schemas};
 pub use net::{NetProducts, write_net_products};
+pub use picture::{PictureFile, PictureFormat, PictureHead};
 pub use product::Product;
 #[cfg(feature = "sql")]
 pub use shot_columns::ShotColumns;

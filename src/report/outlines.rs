@@ -49,6 +49,8 @@ pub(super) fn windows(site: &SiteProducts) -> Vec<Outline> {
                         .collect()
                 })
                 .collect(),
+            // The image itself is drawn.
+            WindowShape::Image { .. } => Vec::new(),
         };
         rings.into_iter().map(|ring| Outline {
             name: window.id.clone(),

@@ -6,8 +6,10 @@ use super::{
     section::Section,
 };
 use crate::{
-    config::WindowConfig, geom::window::WindowShape, products::SiteProducts,
-    units::RADIANS_PER_DEGREE,
+    config::WindowConfig,
+    geom::window::WindowShape,
+    products::SiteProducts,
+    units::{METRES_PER_KM, RADIANS_PER_DEGREE},
 };
 
 pub(super) const SECTION: Section = Section {
@@ -102,6 +104,12 @@ fn outline(window: &WindowConfig) -> String {
         WindowShape::Polygons { polygons } => {
             let vertices: usize = polygons.iter().flatten().map(Vec::len).sum();
             format!("{} polygons with {vertices} vertices", polygons.len())
+        }
+        WindowShape::Image { image, margin_m } => {
+            format!(
+                "what image {image} sees, and {:.1} km beyond",
+                margin_m / METRES_PER_KM
+            )
         }
     }
 }

@@ -5,10 +5,7 @@ mod conventions;
 
 use std::{fmt, sync::atomic::AtomicBool};
 
-use super::{
-    orientation::{Camera, RayOrigin},
-    tag_times::ImageTimes,
-};
+use super::{orientation::CameraReader, tag_times::ImageTimes};
 use crate::{
     config::{KernelsConfig, OrientationConfig, PointingConfig},
     error::Result,
@@ -119,7 +116,7 @@ pub fn sample_orientation(
     pointing: &PointingConfig,
     sampling: &OrientationConfig,
 ) -> Result<Orientation> {
-    let reader = Reader {
+    let reader = CameraReader {
         session,
         instrument: &image.instrument,
         bias: pointing.bias_of(&image.instrument),
@@ -134,7 +131,7 @@ pub fn sample_orientation(
     }
     let tables = camera_tables::camera_tables(&reader, image, kernels.padding_s)?;
     let nodes: Vec<Et> = tables.et_s.iter().copied().map(Et::from_seconds).collect();
-    let held = reader.held_attitudes(epochs.iter().chain(&nodes))?;
+    let held = held_attitudes(&reader, epochs.iter().chain(&nodes))?;
     let far = held.as_ref().filter(|held| held.is_unexplained());
     Ok(Orientation {
         image: image.id.clone(),
@@ -164,7 +161,7 @@ fn require_orientation(
         let sampled = sample_orientation(session, image, kernels, pointing, sampling)?;
         return Ok(sampled.invalid_because);
     }
-    let reader = Reader {
+    let reader = CameraReader {
         session,
         instrument: &image.instrument,
         bias: pointing.bias_of(&image.instrument),
@@ -223,69 +220,18 @@ impl fmt::Display for HeldAttitudes {
     }
 }
 
-#[derive(Clone, Copy)]
-struct Reader<'a> {
-    session: &'a Session,
-    instrument: &'a Instrument,
-    bias: PointingBias,
-    tolerance_s: f64,
-    light_time: LightTime,
-}
-
-impl Reader<'_> {
-    /// Checks that position and attitude are covered over the image with its padding.
-    ///
-    /// What is asked is what will be read: attitude at the exposures shifted by the pointing bias, positions as much
-    /// earlier as light may take.
-    ///
-    /// # Errors
-    /// A gap, named with its ends and the kernels beside it.
-    fn require_coverage(&self, image: &ImageTimes, padding_s: f64) -> Result<()> {
-        let (session, exposures) = (self.session, image.exposures());
-        session.require_position(self.light_time.read_over(exposures.padded(padding_s)))?;
-        session.require_attitude(exposures, self.bias, padding_s, self.tolerance_s)
-    }
-
-    fn attitude(&self, exposure: Et) -> Result<Attitude> {
-        let lookup = self.bias.lookup(exposure);
-        self.session.attitude(lookup, exposure, self.tolerance_s)
-    }
-
-    /// How many of the attitudes at `exposures` lie outside the C-kernels' intervals, if any do.
-    fn held_attitudes<'e>(
-        &self,
-        exposures: impl Iterator<Item = &'e Et>,
-    ) -> Result<Option<HeldAttitudes>> {
-        let distances_s = exposures
-            .map(|exposure| Ok(self.attitude(*exposure)?.distance_s))
-            .collect::<Result<Vec<f64>>>()?;
-        let lookups = distances_s.iter().filter(|s| !(**s <= 0.0)).count();
-        Ok((lookups > 0).then(|| HeldAttitudes {
-            lookups,
-            of: distances_s.len(),
-            distance_max_s: largest(distances_s.iter().copied()).unwrap_or_default(),
-        }))
-    }
-
-    fn inertial_to_camera(&self, exposure: Et) -> Result<Rotation<J2000, CameraFrame>> {
-        let attitude = self.attitude(exposure)?;
-        let mounting = self.session.mounting(self.instrument, exposure)?;
-        Ok(mounting * attitude.inertial_to_bus)
-    }
-
-    /// Where MGS is.
-    fn geometric(&self, et: Et) -> Result<Position<MarsIau2000>> {
-        Ok(mars_rotation(et).apply(&self.session.state(et)?.position))
-    }
-
-    /// Where rays start in IAU 2000, and the rotation from the camera to it.
-    fn camera(&self, et: Et) -> Result<Camera> {
-        let to_camera = self.inertial_to_camera(et)?;
-        let boresight = to_camera.matrix().row(2).transpose();
-        let origin = RayOrigin::at(self.session, self.light_time, et, &boresight)?;
-        Ok(Camera {
-            position: origin.position(),
-            to_mars: origin.to_mars * to_camera.inverse(),
-        })
-    }
+/// How many of the attitudes at `exposures` lie outside the C-kernels' intervals, if any do.
+fn held_attitudes<'e>(
+    reader: &CameraReader<'_>,
+    exposures: impl Iterator<Item = &'e Et>,
+) -> Result<Option<HeldAttitudes>> {
+    let distances_s = exposures
+        .map(|exposure| Ok(reader.attitude(*exposure)?.distance_s))
+        .collect::<Result<Vec<f64>>>()?;
+    let lookups = distances_s.iter().filter(|s| !(**s <= 0.0)).count();
+    Ok((lookups > 0).then(|| HeldAttitudes {
+        lookups,
+        of: distances_s.len(),
+        distance_max_s: largest(distances_s.iter().copied()).unwrap_or_default(),
+    }))
 }

@@ -13,6 +13,7 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use self::repeats::{Copies, require_distinct};
+use super::outline_windows::Windows;
 pub use crate::pds::archive::ShotRejection;
 use crate::{
     altimetry::DatumChoice,
@@ -77,7 +78,7 @@ stage_inputs! {
         /// What is known of where their records are.
         pub index: KnownPlaces<'a>,
         /// Windows on the ground.
-        pub windows: &'a [WindowConfig],
+        pub windows: Windows<'a>,
         /// Seconds to add to time tags.
         pub clock_correction_s: &'a f64,
     }
@@ -114,7 +115,7 @@ impl Stage for SearchFootprints<'_> {
             self.pedr,
             files,
             self.index.0,
-            self.windows,
+            self.windows.value()?,
             correction_s,
             stop,
         )

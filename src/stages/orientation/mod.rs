@@ -1,6 +1,7 @@
 //! The exterior orientation of an image, whether sampled from kernels or corrected.
 
 mod light_time;
+mod reader;
 mod tables;
 
 use nalgebra::Vector3;
@@ -8,6 +9,7 @@ use serde::{Deserialize, Serialize};
 
 pub(super) use light_time::RayOrigin;
 pub use light_time::{LightTimeEffect, OtherConvention};
+pub(super) use reader::CameraReader;
 pub(super) use tables::{Camera, Nodes};
 pub use tables::{CameraTables, InterpolationCheck};
 

@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::Reader;
+use crate::stages::orientation::CameraReader;
 use crate::{
     constants::MARS_IAU2000,
     error::Result,
@@ -23,7 +23,7 @@ const TABLE_NODES_BEYOND: u32 = 8;
 
 /// Tables whose interpolation keeps [`InterpolationCheck::LIMIT_PX`], or the densest ones: a node per line.
 pub(super) fn camera_tables(
-    reader: &Reader,
+    reader: &CameraReader<'_>,
     image: &ImageTimes,
     padding_s: f64,
 ) -> Result<CameraTables> {
@@ -39,7 +39,11 @@ pub(super) fn camera_tables(
 }
 
 /// Makes sure that the tables can be read at both of their ends, the Sun included.
-pub(super) fn require_ends(reader: &Reader, image: &ImageTimes, padding_s: f64) -> Result<()> {
+pub(super) fn require_ends(
+    reader: &CameraReader<'_>,
+    image: &ImageTimes,
+    padding_s: f64,
+) -> Result<()> {
     let epochs = table_epochs(image, first_steps(image), padding_s);
     tables(reader, &[epochs[0], epochs[epochs.len() - 1]]).map(|_| ())
 }
@@ -66,7 +70,7 @@ fn table_epochs(image: &ImageTimes, steps: u32, padding_s: f64) -> Vec<Et> {
 }
 
 /// Tables at two or more epochs.
-fn tables(reader: &Reader, epochs: &[Et]) -> Result<CameraTables> {
+fn tables(reader: &CameraReader<'_>, epochs: &[Et]) -> Result<CameraTables> {
     let session = reader.session;
     let [first, last] = [epochs[0], epochs[epochs.len() - 1]];
     let suns = [session.sun_state(first)?, session.sun_state(last)?];

@@ -2,7 +2,7 @@
 
 use nalgebra::{Vector2, Vector3};
 
-use super::Reader;
+use crate::stages::orientation::CameraReader;
 use crate::{
     error::Result,
     frames::{MarsIau2000, Position},
@@ -16,7 +16,7 @@ use crate::{
     },
 };
 
-impl Reader<'_> {
+impl CameraReader<'_> {
     /// What the convention means in the middle of `image`.
     pub(super) fn effect(&self, image: &ImageTimes) -> Result<LightTimeEffect> {
         let own = self.camera(image.middle())?;

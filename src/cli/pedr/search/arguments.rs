@@ -6,6 +6,7 @@ use clap::{ArgGroup, Args, ValueEnum};
 
 use crate::{
     altimetry::ShotFilter,
+    cli::edges::edges,
     config::{WindowConfig, load_windows, window_of_box, window_of_polygon},
     error::{Cause, Kind, Result},
     products::ShotsFormat,
@@ -30,7 +31,7 @@ pub(in crate::cli::pedr) struct Arguments {
     pub(super) paths: Vec<PathBuf>,
     /// West, east, south and north edge, degrees: east longitude (-180 to 360, west above east crosses 0 or 180) and
     /// areocentric latitude.
-    #[arg(long = "box", value_name = "W,E,S,N", value_parser = numbers, allow_hyphen_values = true)]
+    #[arg(long = "box", value_name = "W,E,S,N", value_parser = edges, allow_hyphen_values = true)]
     pub(super) boxes: Vec<[f64; 4]>,
     /// GeoJSON polygons.
     #[arg(long = "polygon", value_name = "FILE")]
@@ -176,13 +177,4 @@ impl Arguments {
         }
         Ok(Some(interval))
     }
-}
-
-fn numbers(text: &str) -> std::result::Result<[f64; 4], String> {
-    let numbers: std::result::Result<Vec<f64>, _> = text
-        .split(',')
-        .map(|number| number.trim().parse())
-        .collect();
-    let numbers = numbers.ok().and_then(|numbers| numbers.try_into().ok());
-    numbers.ok_or_else(|| "expected four numbers: west,east,south,north".to_owned())
 }

@@ -1,0 +1,133 @@
+//! Decodes images of the camera on one core: pixels a second, and the most memory that this takes.
+//!
+//! `cargo bench --bench image [FILE…]`: without files, a synthetic image in every coding, written to the temporary folder.
+#![allow(
+    clippy::unwrap_used,
+    clippy::print_stdout,
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    clippy::disallowed_methods,
+    reason = "a benchmark may fail loudly, and makes pixels of sines"
+)]
+
+use std::{
+    fs,
+    hint::black_box,
+    path::{Path, PathBuf},
+    time::Instant,
+};
+
+use areograph::{
+    config::built_in_instruments,
+    pds::image_file::{Coding, ImageFile, NewImage, Predictor, Transform, encode},
+};
+
+const SAMPLES: usize = 1024;
+const LINES: usize = 10_240;
+const ROUNDS: usize = 5;
+
+/// Decodes an image; its pixels.
+fn decode(path: &Path) -> usize {
+    let image = ImageFile::open(path, built_in_instruments()).unwrap();
+    let mut strips = image.strips().unwrap();
+    let mut pixels = 0;
+    while let Some(strip) = strips.next_strip().unwrap() {
+        pixels += black_box(strip).pixels.len();
+    }
+    pixels
+}
+
+fn measure(name: &str, path: &Path) {
+    let best_s = (0..ROUNDS)
+        .map(|_| {
+            let began = Instant::now();
+            let pixels = decode(path);
+            began.elapsed().as_secs_f64() / pixels as f64
+        })
+        .fold(f64::INFINITY, f64::min);
+    println!(
+        "{name}: {:.0} MB/s of pixels, {} KiB at most",
+        1e-6 / best_s,
+        peak_kib()
+    );
+}
+
+/// Peak memory of this process.
+fn peak_kib() -> u64 {
+    let status = fs::read_to_string("/proc/self/status").unwrap();
+    let line = status
+        .lines()
+        .find_map(|line| line.strip_prefix("VmHWM:"))
+        .unwrap();
+    line.split_whitespace().next().unwrap().parse().unwrap()
+}
+
+fn write_synthetic(folder: &Path, coding: Coding) -> PathBuf {
+    let pixel = |place: usize| {
+        let (line, sample) = ((place / SAMPLES) as f64, (place % SAMPLES) as f64);
+        // Relief of several sizes, and three bits of noise.
+        let relief = (line / 41.0).sin() * 40.0 + (sample / 17.0 + line / 29.0).cos() * 30.0;
+        let noise = (place as u64).wrapping_mul(0x9E37_79B9_7F4A_7C15) >> 61;
+        (120.0 + relief) as u8 + noise as u8
+    };
+    let pixels: Vec<u8> = (0..LINES * SAMPLES).map(pixel).collect();
+    let image = NewImage {
+        product_id: "M01/00123",
+        instrument: ["MOC-NA", ""],
+        clock: (610_472_061, 131),
+        utc: ["1999-05-06T15:33:58.13", "1999-05-06T15:34:05.16"],
+        exposure_s: 0.000_482_1,
+        summing: 2,
+        first_detector: 0,
+        samples: SAMPLES as u32,
+        pixels: &pixels,
+        coding,
+    };
+    let path = folder.join("synthetic.imq");
+    fs::write(&path, encode(&image).unwrap()).unwrap();
+    path
+}
+
+fn main() {
+    let files: Vec<PathBuf> = std::env::args_os()
+        .skip(1)
+        .map(PathBuf::from)
+        .filter(|path| path.is_file())
+        .collect();
+    for path in &files {
+        measure(&path.display().to_string(), path);
+    }
+    if files.is_empty() {
+        let folder = std::env::temp_dir().join(format!("areograph-bench-{}", std::process::id()));
+        fs::create_dir(&folder).unwrap();
+        let predictor = Predictor::X;
+        for (name, coding) in [
+            ("raw", Coding::Raw),
+            (
+                "predictive, table 3",
+                Coding::Predictive {
+                    predictor,
+                    table: 3,
+                },
+            ),
+            (
+                "predictive, table 5",
+                Coding::Predictive {
+                    predictor,
+                    table: 5,
+                },
+            ),
+            (
+                "cosines",
+                Coding::Transform {
+                    transform: Transform::Cosine,
+                    groups: 4,
+                    spacing: 64,
+                },
+            ),
+        ] {
+            measure(name, &write_synthetic(&folder, coding));
+        }
+        fs::remove_dir_all(&folder).unwrap();
+    }
+}

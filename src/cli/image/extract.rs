@@ -1,0 +1,246 @@
+//! `areograph image extract`.
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+
+use crate::{
+    cli::output,
+    config::built_in_instruments,
+    error::{Cause, IoError, Kind, Locate as _, Result},
+    pds::image_file::{ImageFile, LineState, OddEven, Radiometry, Strip},
+    products::{PictureFile, PictureFormat, PictureHead},
+};
+
+/// Writes the pixels of an image as PNG, or as TIFF with tiles and overviews.
+///
+/// Pixels are those of the file, line 0 first and at the top: on the day side south is up and east left. Lines that are
+/// missing are black; --mask tells them from dark ones.
+///
+/// Example: areograph image extract m0100115.imq --out m0100115.png
+#[derive(Debug, Args)]
+#[command(verbatim_doc_comment)]
+pub(super) struct Arguments {
+    /// Image file of the archive (.imq, .img).
+    #[arg(value_name = "FILE")]
+    file: PathBuf,
+    /// File to write; its ending (.png, .tif, .tiff) is its format.
+    #[arg(long, value_name = "FILE")]
+    out: PathBuf,
+    /// 16 bits: relative radiance by gain, offset and exposure, and the offset between odd and even detectors removed
+    /// (narrow angle without summing). Not for geometry, and no reflectance: its constants are not public.
+    #[arg(long)]
+    calibrate: bool,
+    /// Also write which lines are good (255), suspect (128) or missing (0), in one of the same formats.
+    #[arg(long, value_name = "FILE")]
+    mask: Option<PathBuf>,
+}
+
+/// An ending of another format.
+#[derive(Debug, thiserror::Error)]
+#[error("{}; expected an ending .png, .tif or .tiff", .0.display())]
+struct Ending(PathBuf);
+
+impl Cause for Ending {
+    fn kind(&self) -> Kind {
+        Kind::Configuration
+    }
+
+    fn advice(&self) -> String {
+        "give the file another ending".to_owned()
+    }
+}
+
+/// An image of which not a line can be read.
+#[derive(Debug, thiserror::Error)]
+#[error("not one line of the image can be read")]
+struct NoLines;
+
+impl Cause for NoLines {
+    fn kind(&self) -> Kind {
+        Kind::Input
+    }
+
+    fn advice(&self) -> String {
+        "fetch the file again; `areograph image info` says what is wrong with it".to_owned()
+    }
+}
+
+/// Numbers beyond those of the pixels that the correction of odd and even samples may reach.
+const ROOM_DN: f64 = 16.0;
+
+/// From a number to a value of 16 bits.
+struct Calibration {
+    radiometry: Radiometry,
+    odd_even_dn: f64,
+    /// Radiance of the value 0, and of a step.
+    least: f64,
+    step: f64,
+}
+
+pub(super) fn run(arguments: &Arguments) -> Result<()> {
+    let format = format(&arguments.out)?;
+    let mask_format = arguments.mask.as_deref().map(self::format).transpose()?;
+    let image = ImageFile::open(&arguments.file, built_in_instruments())?;
+    let (mut lines, mut odd_even, mut complaints) =
+        (0, OddEven::default(), image.complaints().count());
+    complaints += each(&image, |strip| {
+        lines += strip.states.len();
+        odd_even.add(strip);
+        Ok(())
+    })?;
+    let height = u32::try_from(lines).ok().filter(|height| *height > 0);
+    let height = height.ok_or(NoLines).in_file(&arguments.file)?;
+    let calibration = arguments
+        .calibrate
+        .then(|| Calibration::new(&image, &odd_even))
+        .transpose()
+        .in_file(&arguments.file)?;
+    let head = PictureHead {
+        width: image.layout().samples,
+        height,
+        is_deep: calibration.is_some(),
+        notes: notes(&image, calibration.as_ref()),
+    };
+    let mut mask = match (&arguments.mask, mask_format) {
+        (Some(path), Some(format)) => {
+            let head = PictureHead {
+                is_deep: false,
+                notes: vec![("Description", "255 good, 128 suspect, 0 missing".to_owned())],
+                ..head.clone()
+            };
+            Some(PictureFile::create(path, format, head)?)
+        }
+        _ => None,
+    };
+    let mut picture = PictureFile::create(&arguments.out, format, head)?;
+    each(&image, |strip| {
+        if let Some(mask) = &mut mask {
+            mask.write(&mask_pixels(strip))?;
+        }
+        picture.write(&pixels(strip, calibration.as_ref()))
+    })?;
+    picture.finish()?;
+    if let Some(mask) = mask {
+        mask.finish()?;
+    }
+    if complaints > 0 {
+        tracing::warn!(
+            "{complaints} complaints of {}; `areograph image info` has them",
+            arguments.file.display()
+        );
+    }
+    output::line(format_args!(
+        "{}: {} × {height} pixels",
+        arguments.out.display(),
+        image.layout().samples
+    ));
+    Ok(())
+}
+
+fn format(path: &Path) -> Result<PictureFormat> {
+    let ending = path.extension().unwrap_or_default().to_ascii_lowercase();
+    match ending.to_str() {
+        Some("png") => Ok(PictureFormat::Png),
+        Some("tif" | "tiff") => Ok(PictureFormat::Tiff),
+        _ => Err(Ending(path.to_owned()).into()),
+    }
+}
+
+/// Shows all strips of an image; how many complaints that gave.
+fn each(image: &ImageFile, mut show: impl FnMut(&Strip) -> Result<()>) -> Result<u64> {
+    let mut strips = image.strips()?;
+    while let Some(strip) = strips
+        .next_strip()
+        .map_err(IoError::on("read"))
+        .in_file(image.path())?
+    {
+        show(&strip)?;
+    }
+    Ok(strips.complaints().count())
+}
+
+fn notes(image: &ImageFile, calibration: Option<&Calibration>) -> Vec<(&'static str, String)> {
+    let label = image.label();
+    let mut notes = vec![(
+        "Software",
+        format!("areograph {}", env!("CARGO_PKG_VERSION")),
+    )];
+    notes.extend(label.product_id.clone().map(|product| ("Title", product)));
+    if let Some(calibration) = calibration {
+        let zero = if calibration.radiometry.knows_zero {
+            ""
+        } else {
+            ", less a constant that is not known"
+        };
+        notes.push((
+            "Description",
+            format!(
+                "radiance in DN/ms at gain 1{zero} = {:e} + {:e} * value; {:.3} DN added to odd samples, taken from even ones",
+                calibration.least, calibration.step, calibration.odd_even_dn
+            ),
+        ));
+    }
+    notes
+}
+
+fn pixels(strip: &Strip, calibration: Option<&Calibration>) -> Vec<u16> {
+    let Some(calibration) = calibration else {
+        return strip.pixels.iter().map(|pixel| u16::from(*pixel)).collect();
+    };
+    let lines = strip.lines().flat_map(|(line, state)| {
+        let is_there = *state != LineState::Missing;
+        let values = line.iter().enumerate();
+        values.map(move |(sample, pixel)| {
+            if is_there {
+                calibration.value(sample, *pixel)
+            } else {
+                0
+            }
+        })
+    });
+    lines.collect()
+}
+
+fn mask_pixels(strip: &Strip) -> Vec<u16> {
+    let value = |state: &LineState| match state {
+        LineState::Good => 255,
+        LineState::Suspect => 128,
+        LineState::Missing => 0,
+    };
+    let lines = strip.states.iter();
+    lines
+        .flat_map(|state| std::iter::repeat_n(value(state), strip.samples as usize))
+        .collect()
+}
+
+impl Calibration {
+    fn new(image: &ImageFile, odd_even: &OddEven) -> Result<Self> {
+        let radiometry = Radiometry::of(image)?;
+        let is_unsummed = image.label().fields.crosstrack_summing == Some(1);
+        let is_narrow = image.label().instrument.label.filter.is_none();
+        let odd_even_dn = odd_even
+            .correction_dn()
+            .filter(|_| is_unsummed && is_narrow);
+        let least = radiometry.dn_per_ms(-ROOM_DN);
+        let largest = radiometry.dn_per_ms(255.0 + ROOM_DN);
+        Ok(Self {
+            radiometry,
+            odd_even_dn: odd_even_dn.unwrap_or_default(),
+            least,
+            step: (largest - least) / f64::from(u16::MAX),
+        })
+    }
+
+    #[allow(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "clamped to 16 bits just before"
+    )]
+    fn value(&self, sample: usize, pixel: u8) -> u16 {
+        let sign = if sample.is_multiple_of(2) { 1.0 } else { -1.0 };
+        let dn = f64::from(pixel) + sign * self.odd_even_dn;
+        let value = (self.radiometry.dn_per_ms(dn) - self.least) / self.step;
+        value.round().clamp(0.0, f64::from(u16::MAX)) as u16
+    }
+}

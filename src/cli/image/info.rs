@@ -1,0 +1,133 @@
+//! `areograph image info`.
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use serde_json::{Value, json};
+
+use crate::{
+    cli::output,
+    config::built_in_instruments,
+    error::{Error, IoError, Locate as _},
+    pds::image_file::{Coding, Complaint, ImageFile, Statistics},
+    units::SECONDS_PER_MS,
+};
+
+/// Shows label, size, coding, statistics, and everything that is wrong with each image file.
+///
+/// Statistics and the hash are those of the decoded 8-bit pixels in the order of the file; lines that are missing do not
+/// count. A line is suspect when it comes from damaged data, or when its place in the image is not known. A damaged
+/// file is no failure as long as some of it can be read.
+#[derive(Debug, Args)]
+pub(super) struct Arguments {
+    /// Image files of the archive (.imq, .img).
+    #[arg(required = true, value_name = "FILE")]
+    files: Vec<PathBuf>,
+    /// Print JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+/// Complaints printed for a file; all are counted.
+const COMPLAINTS_PRINTED: usize = 20;
+
+pub(super) fn run(arguments: &Arguments) -> Result<(), Error> {
+    let (mut answers, mut failures) = (Vec::new(), Vec::new());
+    for path in &arguments.files {
+        match info(path) {
+            Ok(answer) if arguments.json => answers.push(answer),
+            Ok(answer) => print(&answer),
+            Err(failure) => failures.push(failure),
+        }
+    }
+    if arguments.json {
+        output::json(&answers.into());
+    }
+    // Every file is shown first; the last failure is told by whoever called.
+    let last = failures.pop();
+    failures.iter().for_each(output::error);
+    last.map_or(Ok(()), Err)
+}
+
+fn info(path: &Path) -> Result<Value, Error> {
+    let image = ImageFile::open(path, built_in_instruments())?;
+    let mut strips = image.strips()?;
+    let (mut statistics, mut lines) = (Statistics::default(), 0);
+    while let Some(strip) = strips
+        .next_strip()
+        .map_err(IoError::on("read"))
+        .in_file(path)?
+    {
+        lines += strip.states.len();
+        statistics.add(&strip);
+    }
+    let pixels = statistics.finish();
+    let (layout, label) = (image.layout(), image.label());
+    let complaints = [image.complaints(), strips.complaints()];
+    let texts = complaints.iter().flat_map(|complaints| complaints.kept());
+    let milliseconds = |seconds: Option<f64>| seconds.map(|seconds| seconds / SECONDS_PER_MS);
+    Ok(json!({
+        "file": path,
+        "product_id": label.product_id,
+        "instrument": label.instrument.id,
+        "sclk_start": label.fields.sclk_start,
+        "utc_start": label.fields.utc_start,
+        "exposure_ms": milliseconds(label.fields.exposure_s),
+        "downtrack_summing": label.fields.downtrack_summing,
+        "crosstrack_summing": label.fields.crosstrack_summing,
+        "first_detector": label.fields.first_detector,
+        "gain_mode_id": image.value("GAIN_MODE_ID"),
+        "offset_mode_id": image.value("OFFSET_MODE_ID"),
+        "rationale": image.value("RATIONALE_DESC"),
+        "coding": coding(layout.coding),
+        "fragments": layout.fragments,
+        "lines": lines,
+        "samples": layout.samples,
+        "lines_in_header": layout.lines,
+        "lines_in_label": label.fields.lines_header,
+        "lines_good": pixels.lines_good,
+        "lines_suspect": pixels.lines_suspect,
+        "lines_missing": pixels.lines_missing,
+        "minimum": pixels.minimum,
+        "maximum": pixels.maximum,
+        "mean": pixels.mean,
+        "standard_deviation": pixels.standard_deviation,
+        "median": pixels.median,
+        "distinct_values": pixels.distinct,
+        "zeros": pixels.zeros,
+        "pixels_blake3": pixels.blake3,
+        "complaint_count": complaints.iter().map(|complaints| complaints.count()).sum::<u64>(),
+        "complaints": texts.map(Complaint::to_string).collect::<Vec<_>>(),
+    }))
+}
+
+fn coding(coding: Option<Coding>) -> String {
+    match coding {
+        None => "raster".to_owned(),
+        Some(Coding::Raw) => "raw".to_owned(),
+        Some(Coding::Predictive { predictor, table }) => {
+            format!("predictive, {predictor:?}, table {table}")
+        }
+        Some(Coding::Transform {
+            transform,
+            groups,
+            spacing,
+        }) => format!("{transform:?} transform, {groups} groups, step {spacing}").to_lowercase(),
+    }
+}
+
+/// The answer as a table.
+fn print(answer: &Value) {
+    for (key, value) in answer.as_object().into_iter().flatten() {
+        match value {
+            Value::Array(texts) => {
+                for text in texts.iter().take(COMPLAINTS_PRINTED) {
+                    output::line(format_args!("  {}", text.as_str().unwrap_or_default()));
+                }
+            }
+            Value::Null => {}
+            Value::String(text) => output::line(format_args!("{key:24}{text}")),
+            value => output::line(format_args!("{key:24}{value}")),
+        }
+    }
+}

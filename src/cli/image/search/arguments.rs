@@ -1,0 +1,161 @@
+//! What `areograph image search` is asked for.
+
+use std::path::PathBuf;
+
+use clap::{ArgGroup, Args, ValueEnum};
+
+use crate::{
+    cli::edges::edges,
+    config::{
+        WindowConfig, built_in_instruments, load, load_windows, require_outlines, window_of_box,
+        window_of_polygon,
+    },
+    error::{Cause, Kind, Locate as _, Result},
+    instruments::Instrument,
+    pds::image_index::IndexedImage,
+    units::RADIANS_PER_DEGREE,
+};
+
+/// Finds the images of the mission's cumulative index that may show ground of a window, and pairs of them.
+///
+/// An image counts when its outline meets a window after both are allowed to be off by what the index leaves open: 0.35
+/// degrees of latitude (areographic or areocentric), 0.3 degrees of longitude over cos(latitude) (prime meridian). So
+/// nothing is lost, and images just beside a window are found too; `areograph run` tells what an image shows.
+///
+/// Pairs are images of different orbits with common ground. Best first: overlap × min(convergence / 20°, 1) ×
+/// cos²(difference of the Sun / 2) / ratio of the pixels.
+///
+/// Example: areograph image search cumindex.tab --box 137.0,138.0,-5.5,-4.0
+#[derive(Debug, Args)]
+#[command(verbatim_doc_comment)]
+#[command(group = ArgGroup::new("where").required(true).multiple(true).args(["boxes", "polygons", "windows", "sites"]))]
+pub(in crate::cli::image) struct Arguments {
+    /// Indexes of the archive (cumindex.tab, imgindex.tab), their labels (.lbl) beside them.
+    #[arg(required = true, value_name = "INDEX")]
+    pub(super) indexes: Vec<PathBuf>,
+    /// West, east, south and north edge, degrees: east longitude (-180 to 360, west above east crosses 0 or 180) and
+    /// areocentric latitude.
+    #[arg(long = "box", visible_alias = "window", value_name = "W,E,S,N", value_parser = edges, allow_hyphen_values = true)]
+    boxes: Vec<[f64; 4]>,
+    /// GeoJSON polygons.
+    #[arg(long = "polygon", value_name = "FILE")]
+    polygons: Vec<PathBuf>,
+    /// TOML file with up to 10,000 tables `windows` as in a site file.
+    #[arg(long, value_name = "FILE")]
+    windows: Option<PathBuf>,
+    /// Site file: its windows.
+    #[arg(long = "site", value_name = "SITE")]
+    sites: Vec<PathBuf>,
+    /// Identifiers of cameras, as `images.instrument` of a site file has them; without it, all.
+    #[arg(long = "camera", value_name = "ID", value_delimiter = ',')]
+    cameras: Vec<String>,
+    /// Largest emission angle, degrees.
+    #[arg(long, value_name = "DEGREES")]
+    emission_max_deg: Option<f64>,
+    /// Largest incidence angle, degrees.
+    #[arg(long, value_name = "DEGREES")]
+    incidence_max_deg: Option<f64>,
+    /// Largest width of a pixel on the ground, metres.
+    #[arg(long, value_name = "METRES")]
+    pixel_max_m: Option<f64>,
+    /// How the answer is printed.
+    #[arg(long, value_enum, default_value = "table")]
+    pub(super) format: Format,
+}
+
+/// A camera that is none.
+#[derive(Debug, thiserror::Error)]
+#[error("{0:?} is no camera; expected {known}", known = known_cameras())]
+struct NoCamera(String);
+
+impl Cause for NoCamera {
+    fn kind(&self) -> Kind {
+        Kind::Configuration
+    }
+
+    fn advice(&self) -> String {
+        "name one of them with --camera, or leave it out for all".to_owned()
+    }
+}
+
+fn known_cameras() -> String {
+    let ids: Vec<&str> = built_in_instruments()
+        .iter()
+        .map(|camera| &*camera.id)
+        .collect();
+    ids.join(", ")
+}
+
+/// The camera of an image by its names in the index.
+pub(super) fn camera_of(image: &IndexedImage) -> Option<&'static Instrument> {
+    let [instrument, filter] = &image.instrument;
+    built_in_instruments().iter().find(|camera| {
+        let own_filter = camera.label.filter.as_deref();
+        camera.label.instrument == *instrument && own_filter.is_none_or(|own| own == filter)
+    })
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(super) enum Format {
+    /// Images and the best pairs, to be read.
+    Table,
+    /// A line for each image.
+    Csv,
+    /// A line for each pair.
+    Pairs,
+    /// Outlines with all that is known of them.
+    Geojson,
+    /// Tables `images` of a site file.
+    Toml,
+}
+
+impl Arguments {
+    pub(super) fn windows(&self) -> Result<Vec<WindowConfig>> {
+        let mut windows = Vec::new();
+        for (number, edges) in (1..).zip(&self.boxes) {
+            windows.push(window_of_box(&format!("box{number}"), *edges)?);
+        }
+        for path in &self.polygons {
+            windows.push(window_of_polygon(path)?);
+        }
+        if let Some(path) = &self.windows {
+            windows.extend(load_windows(path)?);
+        }
+        for path in &self.sites {
+            let site = load(path)?.site;
+            require_outlines(&site.windows).in_file(path)?;
+            windows.extend(site.windows);
+        }
+        Ok(windows)
+    }
+
+    /// # Errors
+    /// A camera that is none.
+    pub(super) fn check_cameras(&self) -> Result<()> {
+        let is_known = |id: &&String| {
+            built_in_instruments()
+                .iter()
+                .any(|camera| camera.id == **id)
+        };
+        match self.cameras.iter().find(|id| !is_known(id)) {
+            Some(id) => Err(NoCamera(id.clone()).into()),
+            None => Ok(()),
+        }
+    }
+
+    /// Whether camera, angles and pixels of an image are as wanted; what the index does not say is no reason to leave it out.
+    pub(super) fn wants(&self, image: &IndexedImage) -> bool {
+        let Some(camera) = camera_of(image) else {
+            return false;
+        };
+        let within = |value: Option<f64>, most: Option<f64>| {
+            value.zip(most).is_none_or(|(value, most)| value <= most)
+        };
+        let radians = |degrees: Option<f64>| degrees.map(|degrees| degrees * RADIANS_PER_DEGREE);
+        let [emission_rad, incidence_rad, _] = image.angles_rad;
+        (self.cameras.is_empty() || self.cameras.contains(&camera.id))
+            && within(emission_rad, radians(self.emission_max_deg))
+            && within(incidence_rad, radians(self.incidence_max_deg))
+            && within(image.pixel_m, self.pixel_max_m)
+    }
+}

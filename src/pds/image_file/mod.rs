@@ -1,0 +1,32 @@
+//! Images of the Mars Orbiter Camera as the archive has them: `.imq` files with the fragments that the spacecraft
+//! sent, coded by prediction or by a transform of blocks, and `.img` files with one byte a pixel.
+//!
+//! An image is read strip by strip; what is damaged or lost is marked by line, with a complaint that names fragment and byte.
+//! Memory is bounded by a strip, whatever a file says of itself.
+
+mod bits;
+mod codes;
+mod complaint;
+mod encode;
+mod encode_transform;
+mod fragment;
+mod opened;
+mod placed;
+mod predictive;
+mod radiometry;
+mod statistics;
+mod stream;
+mod strip;
+mod strips;
+mod transform;
+
+pub use self::{
+    complaint::{Complaint, Complaints, Fault},
+    encode::{EncodeError, Encoded, NewImage, encode},
+    fragment::{Coding, Layout, Predictor, Transform},
+    opened::{ImageFile, ImageFileError},
+    radiometry::{OddEven, Radiometry},
+    statistics::{PixelStatistics, Statistics},
+    strip::{LineState, Strip},
+    strips::Strips,
+};

@@ -1,0 +1,169 @@
+//! Columns of the index, and the fields of a row.
+
+use std::collections::BTreeMap;
+
+use crate::pds::label::Label;
+
+/// Columns of the cumulative index of the mapping mission, in their order.
+pub(super) const COLUMNS: [&str; 53] = [
+    "VOLUME_ID",
+    "FILE_SPECIFICATION_NAME",
+    "PRODUCT_ID",
+    "IMAGE_TIME",
+    "INSTRUMENT_NAME",
+    "FILTER_NAME",
+    "LINE_SAMPLES",
+    "LINES",
+    "CROSSTRACK_SUMMING",
+    "DOWNTRACK_SUMMING",
+    "SCALED_PIXEL_WIDTH",
+    "PIXEL_ASPECT_RATIO",
+    "EMISSION_ANGLE",
+    "INCIDENCE_ANGLE",
+    "PHASE_ANGLE",
+    "CENTER_LONGITUDE",
+    "CENTER_LATITUDE",
+    "UPPER_LEFT_LONGITUDE",
+    "UPPER_LEFT_LATITUDE",
+    "UPPER_RIGHT_LONGITUDE",
+    "UPPER_RIGHT_LATITUDE",
+    "LOWER_LEFT_LONGITUDE",
+    "LOWER_LEFT_LATITUDE",
+    "LOWER_RIGHT_LONGITUDE",
+    "LOWER_RIGHT_LATITUDE",
+    "MISSION_PHASE_NAME",
+    "TARGET_NAME",
+    "SPACECRAFT_CLOCK_START_COUNT",
+    "FOCAL_PLANE_TEMPERATURE",
+    "LINE_EXPOSURE_DURATION",
+    "GAIN_MODE_ID",
+    "OFFSET_MODE_ID",
+    "EDIT_MODE_ID",
+    "ENCODING_TYPE",
+    "SCALED_IMAGE_WIDTH",
+    "SCALED_IMAGE_HEIGHT",
+    "SPACECRAFT_ALTITUDE",
+    "TARGET_CENTER_DISTANCE",
+    "SLANT_DISTANCE",
+    "USAGE_NOTE",
+    "NORTH_AZIMUTH",
+    "SUB_SOLAR_AZIMUTH",
+    "SUB_SOLAR_LONGITUDE",
+    "SUB_SOLAR_LATITUDE",
+    "SUB_SPACECRAFT_LONGITUDE",
+    "SUB_SPACECRAFT_LATITUDE",
+    "SOLAR_DISTANCE",
+    "SOLAR_LONGITUDE",
+    "LOCAL_TIME",
+    "IMAGE_SKEW_ANGLE",
+    "RATIONALE_DESC",
+    "DATA_QUALITY_DESC",
+    "ORBIT_NUMBER",
+];
+
+/// A column: its name, and where its bytes stand in a row, where the label tells.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct Column {
+    pub(super) name: String,
+    /// First byte, counted from 0, and the number of bytes.
+    bytes: Option<(usize, usize)>,
+}
+
+impl Column {
+    pub(super) fn named(name: &str) -> Self {
+        Self {
+            name: name.to_owned(),
+            bytes: None,
+        }
+    }
+}
+
+/// The columns that a label describes, in its order.
+pub(super) fn of_label(label: &Label) -> Vec<Column> {
+    let in_columns = label.entries.iter().filter(|entry| entry.group == "COLUMN");
+    let mut columns: BTreeMap<usize, BTreeMap<&str, &str>> = BTreeMap::new();
+    for entry in in_columns {
+        columns
+            .entry(entry.block)
+            .or_default()
+            .insert(&entry.key, &entry.value);
+    }
+    let named = columns.values().filter_map(|entries| {
+        let number = |key| {
+            entries
+                .get(key)
+                .and_then(|value| value.parse::<usize>().ok())
+        };
+        let start = number("START_BYTE").and_then(|start| start.checked_sub(1));
+        Some(Column {
+            name: entries.get("NAME")?.to_ascii_uppercase(),
+            bytes: start.zip(number("BYTES")),
+        })
+    });
+    named.collect()
+}
+
+/// The fields of a row by the names of its columns, without quotes and blanks around them.
+pub(super) fn fields<'a>(
+    row: &'a [u8],
+    columns: &'a [Column],
+) -> Result<BTreeMap<&'a str, &'a str>, String> {
+    let row = std::str::from_utf8(row).map_err(|_| "no text of ASCII".to_owned())?;
+    let separated = separated(row);
+    if separated.len() == columns.len() {
+        let names = columns.iter().map(|column| &*column.name);
+        return Ok(names.zip(separated).collect());
+    }
+    // A quote within a text: the places of the label still hold.
+    let by_place = columns.iter().map(|column| {
+        let (start, length) = column.bytes?;
+        Some((
+            &*column.name,
+            row.get(start..start + length)?.trim_matches([' ', '"']),
+        ))
+    });
+    by_place
+        .collect::<Option<_>>()
+        .ok_or_else(|| format!("{} fields; expected {}", separated.len(), columns.len()))
+}
+
+/// Fields between commas that stand outside of quotes.
+fn separated(row: &str) -> Vec<&str> {
+    let mut is_quoted = false;
+    let fields = row.split(|character| {
+        is_quoted ^= character == '"';
+        character == ',' && !is_quoted
+    });
+    fields
+        .map(|field| field.trim().trim_matches('"').trim())
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::pds::label::parse;
+
+    #[test]
+    fn commas_within_quotes_separate_nothing() {
+        assert_eq!(
+            separated(r#""a, b  ", 1.5 ,"","c""#),
+            ["a, b", "1.5", "", "c"]
+        );
+    }
+
+    #[test]
+    fn places_of_the_label_help_where_a_text_holds_a_quote() {
+        let label = parse(
+            b"OBJECT = TABLE\nOBJECT = COLUMN\nNAME = PRODUCT_ID\nSTART_BYTE = 2\nBYTES = 4\nEND_OBJECT = COLUMN\n\
+              OBJECT = COLUMN\nNAME = LINES\nSTART_BYTE = 8\nBYTES = 3\nEND_OBJECT = COLUMN\nEND_OBJECT = TABLE\nEND\n",
+        );
+        let columns = of_label(&label.unwrap());
+        let expected = BTreeMap::from([("PRODUCT_ID", "a\",b"), ("LINES", "12")]);
+        assert_eq!(fields(br#""a",b",12 "#, &columns), Ok(expected));
+        assert_eq!(
+            fields(b"1,2,3", &columns[..1]),
+            Err("3 fields; expected 1".to_owned())
+        );
+    }
+}

@@ -1,0 +1,175 @@
+//! Pictures of one band, 8 or 16 bits, written as their lines come: PNG, and TIFF with tiles and overviews.
+
+mod png_lines;
+mod tiff_tiles;
+
+use std::path::{Path, PathBuf};
+
+use tempfile::NamedTempFile;
+
+use self::{png_lines::PngLines, tiff_tiles::TiffTiles};
+use crate::error::{Cause, IoError, Kind, Locate as _, Result};
+
+/// How a picture is written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum PictureFormat {
+    /// PNG, lines compressed.
+    Png,
+    /// TIFF in tiles of 256 × 256 pixels without compression, with overviews of half, a quarter … of the size.
+    Tiff,
+}
+
+/// What a picture is.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct PictureHead {
+    /// Samples of a line.
+    pub width: u32,
+    /// Lines.
+    pub height: u32,
+    /// Whether a pixel has 16 bits, not 8.
+    pub is_deep: bool,
+    /// What it shows, one `name: text` each.
+    pub notes: Vec<(&'static str, String)>,
+}
+
+impl PictureHead {
+    const fn bytes_of_pixel(&self) -> usize {
+        if self.is_deep { 2 } else { 1 }
+    }
+}
+
+/// A picture that cannot be written.
+#[derive(Debug, thiserror::Error)]
+#[error("the {format} cannot be written: {reason}")]
+struct PictureError {
+    format: &'static str,
+    reason: String,
+    is_io: bool,
+}
+
+impl Cause for PictureError {
+    fn kind(&self) -> Kind {
+        if self.is_io { Kind::Io } else { Kind::Bug }
+    }
+
+    fn advice(&self) -> String {
+        "check the disk, then run again".to_owned()
+    }
+}
+
+impl From<png::EncodingError> for PictureError {
+    fn from(error: png::EncodingError) -> Self {
+        Self {
+            format: "PNG",
+            is_io: matches!(error, png::EncodingError::IoError(_)),
+            reason: error.to_string(),
+        }
+    }
+}
+
+impl From<tiff::TiffError> for PictureError {
+    fn from(error: tiff::TiffError) -> Self {
+        Self {
+            format: "TIFF",
+            is_io: matches!(error, tiff::TiffError::IoError(_)),
+            reason: error.to_string(),
+        }
+    }
+}
+
+/// A picture that is being written; it has its name when it is whole.
+#[derive(Debug)]
+pub struct PictureFile {
+    path: PathBuf,
+    file: NamedTempFile,
+    head: PictureHead,
+    writer: Writer,
+}
+
+#[derive(Debug)]
+enum Writer {
+    Png(PngLines),
+    Tiff(TiffTiles),
+}
+
+impl PictureFile {
+    /// Begins a picture beside `path`.
+    ///
+    /// # Errors
+    /// The folder cannot be written.
+    pub fn create(path: &Path, format: PictureFormat, head: PictureHead) -> Result<Self> {
+        let folder = match path.parent() {
+            Some(folder) if folder != Path::new("") => folder,
+            _ => Path::new("."),
+        };
+        let file = tempfile::Builder::new()
+            .prefix(".partial-")
+            .tempfile_in(folder)
+            .map_err(IoError::on("create a file"))
+            .in_file(folder)?;
+        let handle = file.as_file().try_clone();
+        let handle = handle.map_err(IoError::on("create")).in_file(path)?;
+        let writer = match format {
+            PictureFormat::Png => Writer::Png(PngLines::new(handle, &head).in_file(path)?),
+            PictureFormat::Tiff => {
+                let tiles = TiffTiles::new(handle, &head);
+                Writer::Tiff(
+                    tiles
+                        .map_err(IoError::on("create a file"))
+                        .in_file(folder)?,
+                )
+            }
+        };
+        Ok(Self {
+            path: path.to_owned(),
+            file,
+            head,
+            writer,
+        })
+    }
+
+    /// Adds whole lines.
+    ///
+    /// # Errors
+    /// The system's refusal to write.
+    pub fn write(&mut self, pixels: &[u16]) -> Result<()> {
+        let bytes: Vec<u8> = match (&self.writer, self.head.is_deep) {
+            (_, false) => pixels.iter().map(|pixel| pixel.to_le_bytes()[0]).collect(),
+            (Writer::Png(_), true) => pixels
+                .iter()
+                .flat_map(|pixel| pixel.to_be_bytes())
+                .collect(),
+            (Writer::Tiff(_), true) => pixels
+                .iter()
+                .flat_map(|pixel| pixel.to_le_bytes())
+                .collect(),
+        };
+        let written = match &mut self.writer {
+            Writer::Png(lines) => lines.write(&bytes),
+            Writer::Tiff(tiles) => tiles.write(&bytes),
+        };
+        written.map_err(IoError::on("write")).in_file(&self.path)
+    }
+
+    /// Ends the picture and gives it its name.
+    ///
+    /// # Errors
+    /// The system's refusal to write, flush or rename; fewer lines than were promised.
+    pub fn finish(self) -> Result<()> {
+        match self.writer {
+            Writer::Png(lines) => lines.finish().in_file(&self.path)?,
+            Writer::Tiff(tiles) => tiles.finish(&self.head).in_file(&self.path)?,
+        }
+        let flushed = self.file.as_file().sync_all();
+        flushed.map_err(IoError::on("flush")).in_file(&self.path)?;
+        let permissions = std::os::unix::fs::PermissionsExt::from_mode(0o644);
+        let set = self.file.as_file().set_permissions(permissions);
+        set.map_err(IoError::on("set permissions of"))
+            .in_file(&self.path)?;
+        let persisted = self.file.persist(&self.path).map_err(|error| error.error);
+        persisted
+            .map_err(IoError::on("rename into place"))
+            .in_file(&self.path)?;
+        Ok(())
+    }
+}

@@ -1,0 +1,71 @@
+//! The camera of an image as the kernels have it, at any instant.
+
+use super::{Camera, RayOrigin};
+use crate::{
+    error::Result,
+    frames::{CameraFrame, J2000, MarsIau2000, Position, Rotation},
+    geom::{light_time::LightTime, mars_rotation::mars_rotation},
+    instruments::Instrument,
+    spice::{Attitude, Session},
+    stages::tag_times::ImageTimes,
+    time::{Et, PointingBias},
+};
+
+/// Reads where the camera of an image was and looked.
+#[derive(Clone, Copy)]
+pub(in crate::stages) struct CameraReader<'a> {
+    pub(in crate::stages) session: &'a Session,
+    pub(in crate::stages) instrument: &'a Instrument,
+    pub(in crate::stages) bias: PointingBias,
+    pub(in crate::stages) tolerance_s: f64,
+    pub(in crate::stages) light_time: LightTime,
+}
+
+impl CameraReader<'_> {
+    /// Checks that position and attitude are covered over the image with its padding.
+    ///
+    /// What is asked is what will be read: attitude at the exposures shifted by the pointing bias, positions as much
+    /// earlier as light may take.
+    ///
+    /// # Errors
+    /// A gap, named with its ends and the kernels beside it.
+    pub(in crate::stages) fn require_coverage(
+        &self,
+        image: &ImageTimes,
+        padding_s: f64,
+    ) -> Result<()> {
+        let (session, exposures) = (self.session, image.exposures());
+        session.require_position(self.light_time.read_over(exposures.padded(padding_s)))?;
+        session.require_attitude(exposures, self.bias, padding_s, self.tolerance_s)
+    }
+
+    pub(in crate::stages) fn attitude(&self, exposure: Et) -> Result<Attitude> {
+        let lookup = self.bias.lookup(exposure);
+        self.session.attitude(lookup, exposure, self.tolerance_s)
+    }
+
+    pub(in crate::stages) fn inertial_to_camera(
+        &self,
+        exposure: Et,
+    ) -> Result<Rotation<J2000, CameraFrame>> {
+        let attitude = self.attitude(exposure)?;
+        let mounting = self.session.mounting(self.instrument, exposure)?;
+        Ok(mounting * attitude.inertial_to_bus)
+    }
+
+    /// Where MGS is.
+    pub(in crate::stages) fn geometric(&self, et: Et) -> Result<Position<MarsIau2000>> {
+        Ok(mars_rotation(et).apply(&self.session.state(et)?.position))
+    }
+
+    /// Where rays start in IAU 2000, and the rotation from the camera to it.
+    pub(in crate::stages) fn camera(&self, et: Et) -> Result<Camera> {
+        let to_camera = self.inertial_to_camera(et)?;
+        let boresight = to_camera.matrix().row(2).transpose();
+        let origin = RayOrigin::at(self.session, self.light_time, et, &boresight)?;
+        Ok(Camera {
+            position: origin.position(),
+            to_mars: origin.to_mars * to_camera.inverse(),
+        })
+    }
+}

@@ -1,0 +1,132 @@
+//! Windows that are what an image sees: their outlines by the image's times and the kernels, before shots are searched.
+
+use std::sync::atomic::AtomicBool;
+
+use super::{
+    orientation::{CameraReader, GroundPoint},
+    tag_times::ImageTimes,
+};
+use crate::{
+    config::{KernelsConfig, OrientationConfig, PointingConfig, WindowConfig},
+    constants::MARS_IAU2000,
+    error::{Cause, Kind, Result},
+    geom::{image_outline::widened, window::WindowShape},
+    spice::KernelView,
+    stage::{InOrder, Input, Inputs, Output, Stage},
+    stage_inputs,
+    units::longitude_step_rad,
+};
+
+/// An image whose edges do not all see Mars.
+#[derive(Debug, thiserror::Error)]
+#[error("window {window}: a corner of image {image} sees no ground")]
+struct NoGround {
+    window: String,
+    image: String,
+}
+
+impl Cause for NoGround {
+    fn kind(&self) -> Kind {
+        Kind::Input
+    }
+
+    fn advice(&self) -> String {
+        "give this window edges or a polygon of its own".to_owned()
+    }
+}
+
+stage_inputs! {
+    /// The windows, and what tells where the images look.
+    pub struct OutlineWindows<'a> {
+        /// Windows as they are written.
+        pub windows: &'a [WindowConfig],
+        /// Line times of the images.
+        pub images: InOrder<'a, Output<ImageTimes>>,
+        /// All kernels: attitude may pass through any frame.
+        pub kernels: &'a KernelView,
+        /// Tolerance and padding.
+        pub coverage: &'a KernelsConfig,
+        /// A pointing bias that is not that of the camera.
+        pub pointing: &'a PointingConfig,
+        /// The convention for light time.
+        pub orientation: &'a OrientationConfig,
+    }
+}
+
+impl Stage for OutlineWindows<'_> {
+    const NAME: &'static str = "outline_windows";
+    const CHECKED: bool = true;
+    type Output = Vec<WindowConfig>;
+    stage_inputs!(fingerprint);
+
+    fn run(&self, _stop: &AtomicBool) -> Result<Vec<WindowConfig>> {
+        let windows = self.windows.iter().map(|window| match &window.shape {
+            WindowShape::Image { image, margin_m } => Ok(WindowConfig {
+                id: window.id.clone(),
+                shape: self.outline(&window.id, image, *margin_m)?,
+            }),
+            _ => Ok(window.clone()),
+        });
+        windows.collect()
+    }
+}
+
+impl OutlineWindows<'_> {
+    fn outline(&self, window: &str, image: &str, margin_m: f64) -> Result<WindowShape> {
+        let lacking = || NoGround {
+            window: window.to_owned(),
+            image: image.to_owned(),
+        };
+        let mut images = self.images.0.iter().filter_map(Output::get);
+        let times = images.find(|times| times.id == image).ok_or_else(lacking)?;
+        let reader = CameraReader {
+            session: self.kernels.session()?,
+            instrument: &times.instrument,
+            bias: self.pointing.bias_of(&times.instrument),
+            tolerance_s: self.coverage.ck_tolerance_s,
+            light_time: self.orientation.light_time,
+        };
+        reader.require_coverage(times, self.coverage.padding_s)?;
+        let seen = GroundPoint::outline(times, |et| reader.camera(et))?.ok_or_else(lacking)?;
+        let first_rad = seen.first().ok_or_else(lacking)?.longitude_rad;
+        let places = seen.iter().map(|point| {
+            let step_rad = longitude_step_rad(point.longitude_rad - first_rad);
+            [first_rad + step_rad, point.latitude_rad]
+        });
+        let places: Vec<[f64; 2]> = places.collect();
+        // At the poles a metre is the largest angle.
+        let margin_rad = margin_m / MARS_IAU2000.polar_radius_m;
+        Ok(widened(&places, margin_rad, margin_rad))
+    }
+}
+
+/// The windows of a site, those of images by their outlines.
+#[derive(Debug, Clone, Copy)]
+pub struct Windows<'a> {
+    /// As they are written.
+    pub written: &'a [WindowConfig],
+    /// With outlines; none where no window is what an image sees.
+    pub outlined: Option<&'a Output<Vec<WindowConfig>>>,
+}
+
+impl<'a> Windows<'a> {
+    /// The windows in their order.
+    ///
+    /// # Errors
+    /// A bug in areograph that no stage meets; see [`Output::value`].
+    pub fn value(&self) -> Result<&'a [WindowConfig]> {
+        match self.outlined {
+            Some(outlined) => Ok(outlined.value()?),
+            None => Ok(self.written),
+        }
+    }
+}
+
+impl Input for Windows<'_> {
+    fn add_to(&self, field: &str, inputs: &mut Inputs) {
+        match &self.outlined {
+            Some(outlined) => outlined.add_to(field, inputs),
+            None => inputs.setting(field, self.written),
+        }
+    }
+}
