@@ -28,6 +28,11 @@ const SERIES: [(&str, &str, RGBColor); 7] = [
         RGBColor(213, 94, 0),
     ),
     (
+        "range check",
+        "range of every shot against kernels",
+        RGBColor(204, 121, 167),
+    ),
+    (
         "cold scan",
         "one window, without index, cold",
         RGBColor(0, 0, 0),

@@ -68,7 +68,7 @@ fn all_profiles(site: &SiteProducts) -> Plot {
             style: Style::Bars,
             ..Series::line("mean ± NMAD", 0, spreads.collect())
         },
-        dots("mean without outliers", 0, means.collect()),
+        Series::dots("mean without outliers", 0, means.collect()),
     ];
     let mean_max_m = site.config.range_check.mean_max_m;
     let panel = Panel {
@@ -104,7 +104,7 @@ fn profile_plot(site: &SiteProducts, index: usize, limit: usize) -> Plot {
     let shots = Shots::of(site, index, before.map(|profile| profile.rows.len()).sum());
     let mut panel = Panel::of(
         "range − distance, m",
-        vec![dots("shots", 0, thinned(&shots.kept, limit))],
+        vec![Series::dots("shots", 0, thinned(&shots.kept, limit))],
     );
     panel.histogram = true;
     let mean_max_m = site.config.range_check.mean_max_m;
@@ -124,7 +124,7 @@ fn profile_plot(site: &SiteProducts, index: usize, limit: usize) -> Plot {
         .limits
         .iter()
         .any(|limit| panel.y.low < *limit && *limit < panel.y.high);
-    let angles = dots("shots", 0, thinned(&shots.off_nadir_deg, limit));
+    let angles = Series::dots("shots", 0, thinned(&shots.off_nadir_deg, limit));
     let mut angle_panel = Panel::of("off nadir, °", vec![angles]);
     angle_panel.height = 190;
     angle_panel.y = Extent {
@@ -149,15 +149,6 @@ fn profile_plot(site: &SiteProducts, index: usize, limit: usize) -> Plot {
 
 /// The axis of off-nadir angles reaches this at least: below, nothing is worth an axis.
 const OFF_NADIR_LEAST_DEG: f64 = 1.0;
-
-fn dots(label: &str, colour: usize, points: Vec<(f64, f64)>) -> Series {
-    Series {
-        label: label.to_owned(),
-        style: Style::Dots,
-        colour,
-        points,
-    }
-}
 
 /// What the plot of one profile shows.
 fn words(ranges: &ProfileRanges) -> String {

@@ -277,11 +277,11 @@ fn of_ties(of: &AdjustmentEvidence<'_>, limits: &LimitsConfig) -> Vec<Check> {
 /// What the laser says, where it was asked.
 fn boresight(of: &AdjustmentEvidence<'_>, limits: &LimitsConfig) -> Option<Check> {
     let Ok(found) = of.adjusted.boresight.as_ref()? else {
-        return Some(Check::told(Boresight, "", Warning));
+        return Some(Check::told(CheckKind::Boresight, "", Warning));
     };
     let limit = limits.correction_max_sigma;
     let (unknown, sigmas) = found.farthest.as_ref()?;
-    let mut check = Check::new(Boresight, unknown, *sigmas, limit, Fail);
+    let mut check = Check::new(CheckKind::Boresight, unknown, *sigmas, limit, Fail);
     if check.outcome == Pass && !found.without.is_empty() {
         check.outcome = Warning;
     }
