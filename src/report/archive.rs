@@ -102,7 +102,7 @@ fn over_time(ranges: &ArchiveRanges) -> Result<String> {
             Series::dots("within the limits", 0, drawn(&within, figure)),
             Series {
                 style: Style::Crosses,
-                ..dots("beyond a limit", 0, drawn(&beyond, figure))
+                ..Series::dots("beyond a limit", 0, drawn(&beyond, figure))
             },
         ];
         Panel {
@@ -218,7 +218,7 @@ fn over_off_nadir(ranges: &ArchiveRanges) -> Result<String> {
                 Series::dots("within the limits", 0, points(false)),
                 Series {
                     style: Style::Crosses,
-                    ..dots("beyond a limit", 0, points(true))
+                    ..Series::dots("beyond a limit", 0, points(true))
                 },
             ],
         )],
@@ -253,7 +253,7 @@ fn map(ranges: &ArchiveRanges, worst: &[WorstProfile<'_>]) -> Result<String> {
                 Series::dots("profiles", GREY, thinned(&all, PLACES_DRAWN)),
                 Series {
                     style: Style::Crosses,
-                    ..dots("worst profiles", 0, bad)
+                    ..Series::dots("worst profiles", 0, bad)
                 },
             ],
         )],
