@@ -249,7 +249,7 @@ fn a_window_that_goes_more_than_half_round_mars_is_named() {
         );
         parse_in(&folder, &text).warnings.join("\n")
     };
-    let said = "site.toml:3:39: longitude_deg goes 359° eastward, from 176.5° to 175.5°; if it should be the other 1°, \
+    let said = "site.toml:3:40: longitude_deg goes 359° eastward, from 176.5° to 175.5°; if it should be the other 1°, \
                 write [175.5, 176.5]";
     let swapped = warned("[176.5, 175.5]");
     assert!(swapped.contains(said), "{swapped}");

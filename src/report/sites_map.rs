@@ -78,7 +78,12 @@ fn draw<'a>(places: &[Place], area: &Canvas<'a>) -> Drawn<'a> {
     let frame = [(0, 0), (width - 1, HEIGHT - 1)];
     area.draw(&Rectangle::new(frame, INK.stroke_width(2)))?;
     let mut names = Labels::new(width, HEIGHT);
-    for place in places {
+    // The worst over the others, where sites lie close together.
+    let order = [Tone::Good, Tone::Remarks, Tone::Bad];
+    let sorted = order
+        .into_iter()
+        .flat_map(|tone| places.iter().filter(move |of| of.tone == tone));
+    for place in sorted {
         let (x, y) = pixel(place.place_deg);
         match place.tone {
             Tone::Good => area.draw(&Circle::new((x, y), 9, COLOURS[VALID].filled()))?,

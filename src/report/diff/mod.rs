@@ -22,7 +22,14 @@ pub fn difference_page(sites: &[&RunDifference], not_compared: &[String]) -> Res
     let lead: String = sites.iter().map(|site| verdict(site)).collect();
     let sections = [
         of_each("Checks", sites, |site| Ok(checks::changed(site)))?,
-        of_each("Movement", sites, |site| Ok(movement::tables(site)))?,
+        of_each("Movement", sites, |site| {
+            let moved = matches!(site.outcome, Outcome::Moved | Outcome::BeyondLimit);
+            Ok(if moved {
+                movement::tables(site)
+            } else {
+                String::new()
+            })
+        })?,
         of_each("Movement along the images", sites, movement::plots)?,
         of_each("Range residuals", sites, |site| Ok(inputs::profiles(site)))?,
         of_each("Values", sites, |site| Ok(inputs::values(site)))?,
@@ -83,7 +90,12 @@ fn moved(site: &RunDifference) -> String {
         "A was published at {}, B at {}; a movement is B − A.",
         site.a.finished_utc, site.b.finished_utc
     );
-    let body = list(&site.sentences()) + &paragraph(&limits(site)) + &paragraph(&runs);
+    let mut sentences = site.sentences();
+    // A verdict that changed stands above.
+    if site.a.verdict.word() != site.b.verdict.word() {
+        sentences.remove(0);
+    }
+    let body = list(&sentences) + &paragraph(&limits(site)) + &paragraph(&runs);
     html::verdict(tone, &headline, &body)
 }
 
