@@ -9,13 +9,11 @@ use super::{orientation::CameraReader, tag_times::ImageTimes};
 use crate::{
     config::{KernelsConfig, OrientationConfig, PointingConfig},
     error::Result,
-    frames::{CameraFrame, J2000, MarsIau2000, Position, Rotation},
-    geom::{light_time::LightTime, mars_rotation::mars_rotation, statistics::largest},
-    instruments::Instrument,
-    spice::{Attitude, KernelView, Session},
+    geom::statistics::largest,
+    spice::{KernelView, Session},
     stage::{Output, Stage},
     stage_inputs,
-    time::{Et, PointingBias},
+    time::Et,
 };
 
 pub use super::orientation::{
