@@ -198,7 +198,11 @@ fn images_of_windows(site: &SiteConfig, keys: &mut Keys<'_, '_>) {
         };
         if id.get_ref().as_str().is_some_and(|id| !known.contains(id)) {
             let images: Vec<&str> = known.iter().copied().collect();
-            let expected = format!("one of the site's images: {}", images.join(", "));
+            let expected = if images.is_empty() {
+                "an image of the site, which has none".to_owned()
+            } else {
+                format!("one of the site's images: {}", images.join(", "))
+            };
             keys.review().refuse(id.span(), "windows.image", expected);
         }
     }

@@ -43,7 +43,11 @@ impl ImageOutline {
             is_near.then_some([centre_rad[0] + step, latitude])
         };
         let corners: Option<Vec<[f64; 2]>> = corners_rad.into_iter().map(near).collect();
-        let distinct = corners.filter(|corners| corners.iter().any(|corner| *corner != corners[0]));
+        let distinct = corners.filter(|corners| {
+            corners
+                .iter()
+                .any(|corner| angle_rad(*corner, corners[0]) > 0.0)
+        });
         let corners_rad = distinct.unwrap_or_else(|| {
             let height = half_diagonal_rad;
             let width = (height / centre_rad[1].cos().max(1e-3)).min(std::f64::consts::PI);

@@ -112,7 +112,7 @@ impl PictureFile {
         let writer = match format {
             PictureFormat::Png => Writer::Png(PngLines::new(handle, &head).in_file(path)?),
             PictureFormat::Tiff => {
-                let tiles = TiffTiles::new(handle, &head);
+                let tiles = TiffTiles::new(handle);
                 Writer::Tiff(
                     tiles
                         .map_err(IoError::on("create a file"))

@@ -348,8 +348,8 @@ fn damaged_files_never_panic_and_lines_called_good_are_good() {
         "{refused} files refused; {good} good lines, {wrong} of them wrong; {grown} bytes more memory"
     );
     assert!(refused < 50);
-    // More than half of all lines survive.
-    assert!(good > 500 * LINES / 2);
+    // Two or three damages to a file of four fragments: more than a third of all lines is still certain.
+    assert!(good > 500 * LINES / 3, "{good}");
     // Damage is seen by sums of bytes only: what two changes do to them may add up to nothing.
     assert!(
         wrong * 1000 <= good,

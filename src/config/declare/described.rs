@@ -171,8 +171,9 @@ pub(in crate::config) struct DescribedKey {
 impl DescribedKey {
     /// The unit that the name of the key ends in.
     pub(in crate::config) fn unit(&self) -> Option<&'static str> {
-        const UNITS: [(&str, &str); 7] = [
+        const UNITS: [(&str, &str); 8] = [
             ("_m", "metres"),
+            ("_km", "kilometres"),
             ("_s", "seconds"),
             ("_ms", "milliseconds"),
             ("_deg", "degrees"),

@@ -34,7 +34,7 @@ struct Level {
 }
 
 impl TiffTiles {
-    pub(super) fn new(out: File, _head: &PictureHead) -> io::Result<Self> {
+    pub(super) fn new(out: File) -> io::Result<Self> {
         let lines = BufWriter::new(tempfile::tempfile()?);
         Ok(Self { out, lines })
     }
