@@ -9,7 +9,7 @@ use crate::{
     error::Error,
     scene::{
         ArchiveOptions, Roughness, SceneErrors, SceneOptions, write_archive, write_plane_scene,
-        write_scene, write_scene_along,
+        write_scene, write_scene_along, write_scene_with_images,
     },
     units::SECONDS_PER_DAY,
 };
@@ -46,6 +46,9 @@ pub(super) struct Arguments {
     /// With --realistic: one offset of the attitude's clock for all images instead of line times of each.
     #[arg(long, requires = "realistic")]
     attitude_clock: bool,
+    /// Also render the narrow-angle images, `images/*.imq`, which takes minutes.
+    #[arg(long, conflicts_with_all = ["along", "plane"])]
+    images: bool,
     /// Fly these kernels instead of the invented orbit.
     #[arg(long, value_name = "KERNELS.tm")]
     along: Option<PathBuf>,
@@ -117,6 +120,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Error> {
         errors: arguments.errors(),
     };
     let summary = match &arguments.along {
+        None if arguments.images => write_scene_with_images(&arguments.directory, &options)?,
         None => write_scene(&arguments.directory, &options)?,
         Some(kernels) => {
             write_scene_along(&arguments.directory, kernels, &arguments.label, &options)?

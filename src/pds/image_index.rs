@@ -140,11 +140,13 @@ pub fn read_index(path: &Path) -> Result<ImageIndex> {
         if length == 0 {
             break;
         }
-        let text = bytes.trim_ascii_end();
-        if text.is_empty() {
+        while matches!(bytes.last(), Some(b'\r' | b'\n')) {
+            bytes.pop();
+        }
+        if bytes.trim_ascii().is_empty() {
             continue;
         }
-        match columns::fields(text, &columns).and_then(|fields| image(&fields)) {
+        match columns::fields(&bytes, &columns).and_then(|fields| image(&fields)) {
             Ok(image) => index.images.push(image),
             Err(text) => index.bad_rows.push(BadRow { line, text }),
         }

@@ -45,6 +45,14 @@ pub enum SceneError {
         /// What is wrong with it.
         error: String,
     },
+    /// An image that cannot be rendered or coded.
+    #[error("image {image}: {error}")]
+    Image {
+        /// Image id.
+        image: String,
+        /// What is wrong with it.
+        error: String,
+    },
     /// The beam leaves Mars.
     #[error("the laser beam misses Mars at ET {et_s:.3}")]
     BeamMisses {
@@ -87,7 +95,10 @@ impl Cause for SceneError {
             | Self::Foreign { .. }
             | Self::Changed { .. }
             | Self::Option { .. } => Kind::Configuration,
-            Self::NoOrbit { .. } | Self::NoCamera { .. } | Self::NotTabulated { .. } => Kind::Bug,
+            Self::NoOrbit { .. }
+            | Self::NoCamera { .. }
+            | Self::Image { .. }
+            | Self::NotTabulated { .. } => Kind::Bug,
             Self::BeamMisses { .. } => Kind::Input,
             Self::NothingToFly { .. } => Kind::Coverage,
         }
@@ -99,7 +110,10 @@ impl Cause for SceneError {
             Self::Foreign { .. } | Self::Changed { .. } => {
                 "a new scene would remove it: move it elsewhere, or choose another folder"
             }
-            Self::NoOrbit { .. } | Self::NoCamera { .. } | Self::NotTabulated { .. } => {
+            Self::NoOrbit { .. }
+            | Self::NoCamera { .. }
+            | Self::Image { .. }
+            | Self::NotTabulated { .. } => {
                 "report this with the seed and the kernels that were used"
             }
             Self::BeamMisses { .. } => "the attitude kernels do not point +Z at Mars there; leave them out",

@@ -9,6 +9,7 @@ use super::{
     drawn::{DayErrors, Flown},
     error::SceneError,
     files::{Draft, put},
+    images::write_images,
     kernels::{
         clock_session, image_start, versions, write_attitude, write_orbits, write_text_kernels,
     },
@@ -44,6 +45,18 @@ const TIE_NOISE_PX: [f64; 2] = [0.0, 5.0];
 /// [`SceneError::NotAScene`], [`SceneError::Foreign`] and [`SceneError::Changed`] when the folder holds
 /// something else, [`SceneError::Option`], the system's refusal to write.
 pub fn write_scene(directory: &Path, options: &SceneOptions) -> Result<SceneSummary> {
+    write(directory, options, false)
+}
+
+/// The same with the pixels of the narrow-angle images (`images/*.imq`), which takes minutes.
+///
+/// # Errors
+/// Those of [`write_scene`].
+pub fn write_scene_with_images(directory: &Path, options: &SceneOptions) -> Result<SceneSummary> {
+    write(directory, options, true)
+}
+
+fn write(directory: &Path, options: &SceneOptions, with_images: bool) -> Result<SceneSummary> {
     check(options)?;
     let draft = Draft::begin(directory, README)?;
     let fly = |arc: Arc| {
@@ -87,6 +100,11 @@ pub fn write_scene(directory: &Path, options: &SceneOptions) -> Result<SceneSumm
         }
     }
     truth.wide_angle = write_context(&draft, &days, &kept, &terrain, options)?;
+    if with_images {
+        let session = clock_session(&draft.folder("kernels")?)?;
+        let folder = draft.folder("images")?;
+        write_images(&folder, &days, &terrain, options.seed, &session)?;
+    }
     write_truth(&draft, &truth)?;
     draft.finish()?;
     Ok(SceneSummary::of(directory, &truth, SITES.len() + 1))

@@ -28,6 +28,7 @@ mod drawn;
 mod error;
 mod error_sources;
 mod files;
+mod images;
 mod kernels;
 mod laser;
 mod mission;
@@ -58,7 +59,7 @@ pub use error_sources::{
     AltimeterErrors, AttitudeErrors, Jitter, Misregistration, PositionErrors, Relief, Roughness,
     SceneErrors,
 };
-pub use mission::write_scene;
+pub use mission::{write_scene, write_scene_with_images};
 pub use plane::write_plane_scene;
 pub use plane_net::{PlaneRecipe, PlaneScene};
 

@@ -46,9 +46,9 @@ const INTERVALS_OF_JITTER: u32 = 3_600;
 const TOLD_POSES: u32 = 31;
 
 /// An image as it was truly taken.
-struct TrueImage<'a> {
-    flown: &'a Flown,
-    oriented_camera: OrientedCamera<SampledOrientation>,
+pub(super) struct TrueImage<'a> {
+    pub(super) flown: &'a Flown,
+    pub(super) oriented_camera: OrientedCamera<SampledOrientation>,
 }
 
 /// A point on the ground and where both images see it.
@@ -59,7 +59,7 @@ struct Tie {
 
 impl<'a> TrueImage<'a> {
     /// The image of the day `flown`.
-    fn new(flown: &'a Flown, terrain: &Terrain) -> Result<Self> {
+    pub(super) fn new(flown: &'a Flown, terrain: &Terrain) -> Result<Self> {
         let image = flown.arc.image;
         let intervals = if flown.errors.has_jitter() {
             INTERVALS_OF_JITTER
@@ -84,7 +84,7 @@ impl<'a> TrueImage<'a> {
         })
     }
 
-    fn projector(&self) -> Result<Projector<'_, SampledOrientation>> {
+    pub(super) fn projector(&self) -> Result<Projector<'_, SampledOrientation>> {
         let projector = Projector::new(
             &self.oriented_camera.orientation,
             self.oriented_camera.lines(),
@@ -107,7 +107,12 @@ impl<'a> TrueImage<'a> {
     }
 
     /// The ground that a place of the image shows.
-    fn ground_m(&self, terrain: &Terrain, line: f64, sample: f64) -> Option<Vector3<f64>> {
+    pub(super) fn ground_m(
+        &self,
+        terrain: &Terrain,
+        line: f64,
+        sample: f64,
+    ) -> Option<Vector3<f64>> {
         let (x_lines, _) = self.oriented_camera.focal_plane_coordinates(line, sample);
         let pose = self.oriented_camera.orientation.pose(x_lines);
         let camera = self.oriented_camera.detector.look(sample);
@@ -117,7 +122,7 @@ impl<'a> TrueImage<'a> {
     }
 
     /// Where the image shows a point, unless that is outside or too near to an edge.
-    fn measure(
+    pub(super) fn measure(
         &self,
         projector: &Projector<'_, SampledOrientation>,
         ground_m: &Vector3<f64>,

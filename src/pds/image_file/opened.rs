@@ -208,16 +208,15 @@ fn start_of_image(label: &Label, end: u64) -> std::result::Result<u64, ImageFile
         bytes: end,
     };
     let number: u64 = pointer.value.parse().map_err(|_| wrong())?;
-    let record_bytes = match pointer.unit.as_deref() {
-        Some("bytes") => 1,
-        _ => {
-            let entry = label.find("RECORD_BYTES").ok_or(lacking("RECORD_BYTES"))?;
-            entry.value.parse().map_err(|_| ImageFileError::Raster {
-                key: "RECORD_BYTES",
-                value: entry.written(),
-                expected: "a number of bytes",
-            })?
-        }
+    let record_bytes = if pointer.unit.as_deref() == Some("bytes") {
+        1
+    } else {
+        let entry = label.find("RECORD_BYTES").ok_or(lacking("RECORD_BYTES"))?;
+        entry.value.parse().map_err(|_| ImageFileError::Raster {
+            key: "RECORD_BYTES",
+            value: entry.written(),
+            expected: "a number of bytes",
+        })?
     };
     let start = number
         .checked_sub(1)
