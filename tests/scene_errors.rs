@@ -308,8 +308,12 @@ fn shots_have_noise_steps_and_a_spot() {
     }
 }
 
-/// Beam of the laser, +Z of the bus, in the axes of the camera: the third column of its mounting (`moc.ti`).
-const BEAM: [f64; 3] = [0.001_256_281_1, 0.001_996_732_7, 0.999_997_217_4];
+/// Axes of the bus in those of the camera: the columns of its mounting (`moc.ti`).
+const BUS_IN_CAMERA: [[f64; 3]; 3] = [
+    [0.999_994_283_9, -0.003_141_585_0, -0.001_250_004_5],
+    [0.003_139_080_4, 0.999_993_071_7, -0.002_000_668_0],
+    [0.001_256_281_1, 0.001_996_732_7, 0.999_997_217_4],
+];
 
 #[test]
 fn camera_and_laser_share_the_errors_of_their_bus() {
@@ -321,8 +325,14 @@ fn camera_and_laser_share_the_errors_of_their_bus() {
         ..REALISTIC
     };
     let mission = Mission::of(12, errors);
+    let [x, y, z] = BUS_IN_CAMERA.map(Vector3::from);
     for (_, camera, taken) in mission.cameras() {
         let image = camera["image"].as_str().unwrap();
+        // +Z of the bus but for the boresight's error, the same on all days.
+        let boresight_rad = &mission.drawn(image)["boresight_rad"];
+        let [towards_x, towards_y] = [0, 1].map(|axis| number(&boresight_rad[axis]));
+        assert!(towards_x.abs().min(towards_y.abs()) > 1e-6);
+        let beam = (x * towards_x + y * towards_y + z).normalize();
         let mut profiles = list(&mission.truth["profiles"]).iter();
         let profile = profiles.find(|profile| profile["image"] == image).unwrap();
         let times = list(&camera["epochs_et_s"]);
@@ -342,7 +352,7 @@ fn camera_and_laser_share_the_errors_of_their_bus() {
             let off_rad = |orientation: &SampledOrientation, x_lines: f64| {
                 let pose = orientation.pose(x_lines);
                 let seen = pose.mars_to_camera * (vector(ground) - pose.position_m).normalize();
-                (seen - Vector3::from(BEAM)).norm()
+                (seen - beam).norm()
             };
             // 1e-7 rad is 4 cm on the ground; the mounting is printed to 1e-10.
             let off = off_rad(&taken, (share - 0.5) * lines);

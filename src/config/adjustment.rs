@@ -109,11 +109,11 @@ declare_table! {
             .or(20.6)
             .map(|sigma| sigma * RADIANS_PER_ARCSECOND),
         /// Standard deviation of what the line times of each image are late by against the shots. Along the track they hide
-        /// where the laser points: inf takes nothing from there, since `rotation_sigma_arcsec` already allows for line times
-        /// and pitch together; 0 is for line times that are right.
-        boresight_line_time_sigma_s as "boresight_line_time_sigma_ms": f64 = key(SIGMA_OR_FREE)
-            .or(f64::INFINITY)
-            .map(|milliseconds| milliseconds * SECONDS_PER_MS),
+        /// where the laser points: without this key nothing is taken from there, since `rotation_sigma_arcsec` already allows
+        /// for line times and pitch together; 0 is for line times that are right.
+        boresight_line_time_sigma_s as "boresight_line_time_sigma_ms": Option<f64> = key(SIGMA_OR_NONE)
+            .unused("0.0")
+            .map(|milliseconds| milliseconds.map(|milliseconds| milliseconds * SECONDS_PER_MS)),
         /// What image coordinates of footprints are: "off" unless the model is the published one, where they are
         /// "weighted". They come from the orientation that is being adjusted and are no measurements of their own.
         footprint_image_coordinates: Option<FootprintImageCoordinates> = key(words_of(

@@ -1,6 +1,7 @@
 //! What tie points, intersection and adjustment say of a site, as JSON.
 
 mod configured;
+mod readings;
 
 use std::collections::BTreeMap;
 
@@ -24,8 +25,8 @@ use crate::{
     schema::{DocumentSchema, all_positive, at, none_negative},
     stages::{
         adjust::{
-            AdjustmentSummary, BoresightSummary, CorrectedImage, HeightSummary, OtherReading,
-            PointKind, ReliefSummary,
+            AdjustmentSummary, BoresightSummary, CorrectedImage, HeightSummary, PointKind,
+            ReliefSummary,
         },
         check_heights::{HeightCheck, ProfilesApart, SurfaceFigures},
         compare_pairs::{PairComparison, ProfileByTies},
@@ -33,6 +34,7 @@ use crate::{
     },
 };
 use configured::AdjustmentKeys;
+use readings::OtherReadingDocument;
 
 /// What the numbers are, for readers of the file.
 const DEFINITIONS: [(&str, &str); 12] = [
@@ -263,30 +265,6 @@ struct AdjustmentDocument<'a> {
     weighted_squares: &'a [f64],
     images: Vec<ImageDocument<'a>>,
     rejected: Vec<RejectedPointDocument<'a>>,
-}
-
-/// Where the tie points lie by the other reading of what images disagree by.
-#[derive(Serialize, JsonSchema)]
-struct OtherReadingDocument {
-    /// With its standard deviation, where this is the reading by it.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schemars(transform = at("/prefixItems/1", "minimum", 0))]
-    attitude_clock_s: Option<(f64, f64)>,
-    /// Towards east, north and up, from the mean of the adjusted tie points.
-    moved_m: [f64; 3],
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schemars(transform = none_negative)]
-    mean_sigma_m: Option<[f64; 3]>,
-}
-
-impl From<&OtherReading> for OtherReadingDocument {
-    fn from(other: &OtherReading) -> Self {
-        Self {
-            attitude_clock_s: other.attitude_clock_s,
-            moved_m: other.moved_m,
-            mean_sigma_m: other.mean_sigma_m,
-        }
-    }
 }
 
 #[derive(Serialize, JsonSchema)]

@@ -146,10 +146,9 @@ fn derivatives_of_spots_equal_central_differences() {
                 let change = behind[axis].row.misclosure - ahead[axis].row.misclosure;
                 let numeric = change / (2.0 * step);
                 let expected = of_row(&analytic[axis], unknown);
-                // A share of the derivative. What orientations do to how the boresight moves a spot is left out: a share of its
-                // angle, 3e-4.
+                // A share of the derivative: steps whose truncation and rounding are far below it.
                 assert!(
-                    (numeric - expected).abs() < 1e-3 * scale[0].max(scale[1]),
+                    (numeric - expected).abs() < 1e-5 * scale[0].max(scale[1]),
                     "{unknown}, {axis}: {numeric} {expected}"
                 );
             }
@@ -205,7 +204,7 @@ fn a_profile_on_relief_lies_in_one_place() {
     };
     let solved = |with_bus: bool| {
         let mut network = with_spots();
-        let surface = surface_with(&network, 35.0, &options);
+        let surface = surface_with(&network, 0.0, &options);
         network.heights = Some(HeightControl {
             surface,
             compared: Vec::new(),
@@ -226,17 +225,27 @@ fn a_profile_on_relief_lies_in_one_place() {
     assert_eq!(shift.profile, 1);
     let found = own.common_bus.as_ref().unwrap().profile_shifts_m[0];
     for axis in 0..3 {
-        // Metres: where both iterations settle, to 1e-8 of the sum of squares.
+        // Shares of its standard deviation: robust weights judge a height by its variance, of which the shift is a part in
+        // one way and not in the other.
+        let sigma_m = shift.root_cofactors_m[axis];
+        let apart_m = found[axis].value - shift.shift_m[axis];
         assert!(
-            (found[axis].value - shift.shift_m[axis]).abs() < 0.02,
-            "{axis}"
+            apart_m.abs() < 0.2 * sigma_m,
+            "{axis}: {apart_m} of {sigma_m} m"
         );
-        let apart_m = found[axis].root_cofactor - shift.root_cofactors_m[axis];
-        assert!(apart_m.abs() < 1e-3, "{axis}");
+        let apart_m = found[axis].root_cofactor - sigma_m;
+        assert!(
+            apart_m.abs() < 0.05 * sigma_m,
+            "{axis}: {apart_m} of {sigma_m} m"
+        );
     }
     for point in CONTROLLED {
         let [one, other] = [&implicit, &own].map(|of| *of.points[point].as_ref().unwrap());
-        assert!((one.ground_m - other.ground_m).norm() < 0.02, "{point}");
+        let sigma_m = one.cofactor_m2.trace().sqrt();
+        assert!(
+            (one.ground_m - other.ground_m).norm() < 0.2 * sigma_m,
+            "{point}"
+        );
     }
 }
 
@@ -255,6 +264,12 @@ fn spots_tell_a_roll_that_ties_do_not_know() {
             .y;
     }
     network.ranges.clear();
+    // Only constant rotations are unknown: nothing else takes a share of the roll.
+    for image in &mut network.images {
+        let held = |index: usize| index < 9 || !index.is_multiple_of(3);
+        image.sigmas = std::array::from_fn(|index| if held(index) { 0.0 } else { 1e-3 });
+        image.time_bias_sigma_s = 0.0;
+    }
     // In truth every image was rolled, so the ground lies to one side of where it is taken to be: footprints are recorded
     // there, points of ties begin where they are not.
     let moved_m = |point: usize| {
@@ -272,11 +287,11 @@ fn spots_tell_a_roll_that_ties_do_not_know() {
     bus.profiles[0].axes = Matrix3::identity();
     bus.boresight_sigma_rad = 1e-6;
     let adjusted = solve(&network, &BundleOptions::default()).unwrap();
-    // The camera sees what lies further along its y axis when it is turned about x against it.
+    // Rolled by that, the camera has what lies farther along its y axis where the spots are.
     for image in 0..2 {
         let roll_rad = adjusted.images[image].correction.rotation_rad[0].x;
         assert!(
-            (roll_rad + ROLL_RAD).abs() < 0.25 * ROLL_RAD,
+            (roll_rad - ROLL_RAD).abs() < 0.25 * ROLL_RAD,
             "{image}: {roll_rad}"
         );
     }

@@ -1,6 +1,6 @@
 //! Values and indices that a network must have before anything is computed.
 
-use super::{BundleError, CommonBus, Network, Part, Spot};
+use super::{BundleError, CommonBus, Network, Part, Spot, View};
 use crate::geom::pushbroom::ExteriorOrientation;
 
 /// # Errors
@@ -61,12 +61,7 @@ pub(super) fn check<M: ExteriorOrientation>(network: &Network<M>) -> Result<(), 
         }
     }
     for (index, view) in network.views.iter().enumerate() {
-        let part = Part::View(index);
-        matched(network, part, view.point, view.image)?;
-        finite(part, "line", view.x_lines)?;
-        finite(part, "place in the line", view.y_px)?;
-        positive(part, "standard deviation", view.sigma_px.x)?;
-        positive(part, "standard deviation", view.sigma_px.y)?;
+        check_view(network, Part::View(index), view)?;
     }
     for (index, range) in network.ranges.iter().enumerate() {
         let part = Part::Range(index);
@@ -80,6 +75,14 @@ pub(super) fn check<M: ExteriorOrientation>(network: &Network<M>) -> Result<(), 
         positive(part, "standard deviation", range.sigma_m)?;
     }
     Ok(())
+}
+
+fn check_view<M>(network: &Network<M>, part: Part, view: &View) -> Result<(), BundleError> {
+    matched(network, part, view.point, view.image)?;
+    finite(part, "line", view.x_lines)?;
+    finite(part, "place in the line", view.y_px)?;
+    positive(part, "standard deviation", view.sigma_px.x)?;
+    positive(part, "standard deviation", view.sigma_px.y)
 }
 
 fn check_bus<M>(network: &Network<M>, bus: &CommonBus) -> Result<(), BundleError> {
@@ -107,12 +110,7 @@ fn check_bus<M>(network: &Network<M>, bus: &CommonBus) -> Result<(), BundleError
         }
     }
     for (index, Spot { view, .. }) in bus.spots.iter().enumerate() {
-        let part = Part::Spot(index);
-        matched(network, part, view.point, view.image)?;
-        finite(part, "line", view.x_lines)?;
-        finite(part, "place in the line", view.y_px)?;
-        positive(part, "standard deviation", view.sigma_px.x)?;
-        positive(part, "standard deviation", view.sigma_px.y)?;
+        check_view(network, Part::Spot(index), view)?;
     }
     Ok(())
 }

@@ -232,13 +232,13 @@ pub(super) fn are_those_of_the_dense_equations(
     let mut history = Vec::new();
     let stop = Stop {
         steps_max: 100,
-        change: 1e-8,
+        change: 1e-10,
     };
     let settled = settle(&layout, start, &groups, stop, &mut history).unwrap();
     let heights = layout.heights.as_ref().unwrap();
     let dense = dense(&layout, &settled.at, heights, active.len());
     for step in dense.step.iter().skip(shared) {
-        // Metres: where the parts have settled, to 1e-8 of the sum of squares, the whole has little left to move.
+        // Metres: where the parts have settled, to 1e-10 of the sum of squares, the whole has little left to move.
         assert!(step.abs() < 1e-3, "{step}");
     }
     let Settled { reduced, .. } = &settled;

@@ -2,11 +2,11 @@
 
 use std::ops::Range;
 
-use nalgebra::Vector3;
+use nalgebra::{Vector2, Vector3};
 use rayon::prelude::*;
 
 use super::{
-    Network, ORIENTATION_UNKNOWNS, PointRejection, View,
+    Network, ORIENTATION_UNKNOWNS, PointRejection, Spot, View,
     heights::Heights,
     point_rows::PointRows,
     rows::{self, Row},
@@ -45,6 +45,8 @@ pub(super) struct Layout<'a, M> {
     px_per_line: Vec<f64>,
     /// The same of each spot.
     spot_px_per_line: Vec<f64>,
+    /// How each spot moves with the angles of the boresight; where its point is not seen it takes no part.
+    spot_by_boresight: Vec<[Vector2<f64>; 2]>,
     /// Initial position at the instant of each range.
     range_bases_m: Vec<Vector3<f64>>,
 }
@@ -94,6 +96,12 @@ impl<'a, M: ExteriorOrientation> Layout<'a, M> {
             let ground_m = &network.points[view.point].ground_m;
             rows::initial_px_per_line(&network.images[view.image], view, ground_m)
         };
+        let by_boresight = |spot: &Spot| {
+            let image = &network.images[spot.view.image];
+            let ground_m = &network.points[spot.view.point].ground_m;
+            let moved = spots::by_boresight(image, spot, px_per_line(&spot.view), ground_m);
+            moved.unwrap_or_default()
+        };
         Self {
             columns: Columns::of(network),
             views: Lists::of(points, network.views.iter().map(|view| view.point)),
@@ -103,6 +111,7 @@ impl<'a, M: ExteriorOrientation> Layout<'a, M> {
             robust: None,
             heights: None,
             px_per_line: views.map(px_per_line).collect(),
+            spot_by_boresight: spots.iter().map(by_boresight).collect(),
             spot_px_per_line: spots.iter().map(|spot| px_per_line(&spot.view)).collect(),
             range_bases_m: ranges
                 .map(|range| {
@@ -276,6 +285,7 @@ impl<'a, M: ExteriorOrientation> Layout<'a, M> {
                 px_per_line: self.spot_px_per_line[index],
                 late_s: state.line_times_s[image],
                 boresight_rad: state.boresight_rad,
+                by_boresight: self.spot_by_boresight[index],
             };
             spots::of_spot(
                 &self.network.images[image],

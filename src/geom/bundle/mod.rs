@@ -93,6 +93,7 @@ mod groups;
 mod heights;
 mod known;
 mod layout;
+mod part;
 mod point_rows;
 mod quality;
 mod quasi_newton;
@@ -116,6 +117,7 @@ use nalgebra::{DMatrix, Matrix3, Vector2, Vector3};
 pub use common_bus::{AdjustedBus, CommonBus, Estimate, RecordedProfile, Spot};
 pub use error::BundleError;
 pub use known::KnownCoordinates;
+pub use part::Part;
 pub use relief::{ProfileShift, ReliefOfSite};
 pub use solve::solve;
 pub use unknowns::Unknown;
@@ -431,30 +433,4 @@ impl Adjustment {
     pub fn steps(&self) -> usize {
         self.history.len() - 1
     }
-}
-
-/// A part of a network, by its index.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-pub enum Part {
-    /// An image.
-    #[error("image {0}")]
-    Image(usize),
-    /// A ground point.
-    #[error("point {0}")]
-    Point(usize),
-    /// Image coordinates of a point.
-    #[error("view {0}")]
-    View(usize),
-    /// A range.
-    #[error("range {0}")]
-    Range(usize),
-    /// A profile of ranges.
-    #[error("profile {0}")]
-    Profile(usize),
-    /// A spot of the laser.
-    #[error("spot {0}")]
-    Spot(usize),
-    /// What all images share.
-    #[error("all images")]
-    Images,
 }

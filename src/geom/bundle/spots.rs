@@ -1,9 +1,9 @@
 //! Observation equations of spots: where the mounting has a shot in an image, against where its footprint is seen.
 
-use nalgebra::Vector3;
+use nalgebra::{Vector2, Vector3};
 
 use super::{
-    BundleImage, Spot,
+    BundleImage, ORIENTATION_UNKNOWNS, Spot,
     rows::{self, Row},
 };
 use crate::geom::pushbroom::{ExteriorOrientation, OrientationCorrection, Unseen};
@@ -17,6 +17,8 @@ pub(super) struct Pointing {
     pub(super) late_s: f64,
     /// Angles of the boresight.
     pub(super) boresight_rad: [f64; 2],
+    /// How the spot moves with each of these, see [`by_boresight`].
+    pub(super) by_boresight: [Vector2<f64>; 2],
 }
 
 /// One row of a spot.
@@ -30,6 +32,21 @@ pub(super) struct SpotRow {
     pub(super) by_line_time: f64,
     /// By the time bias of the image.
     pub(super) by_time: f64,
+}
+
+/// How a spot moves along the track and across it with each angle of the boresight, pixels per radian: in the initial
+/// orientation, as its place does.
+pub(super) fn by_boresight<M: ExteriorOrientation>(
+    image: &BundleImage<M>,
+    spot: &Spot,
+    px_per_line: f64,
+    ground_m: &Vector3<f64>,
+) -> Result<[Vector2<f64>; 2], Unseen> {
+    let none = OrientationCorrection::of(&[0.0; ORIENTATION_UNKNOWNS], image.half_lines, 0.0);
+    let [along, across] = rows::of_view(image, &none, px_per_line, &spot.view, ground_m)?;
+    Ok(spot
+        .by_boresight_m
+        .map(|moved_m| Vector2::new(along.by_point.dot(&moved_m), across.by_point.dot(&moved_m))))
 }
 
 /// The rows of a spot whose footprint is at `ground_m`, along the track and across it.
@@ -47,20 +64,17 @@ pub(super) fn of_spot<M: ExteriorOrientation>(
     let [along, across] = rows::of_view(image, correction, px_per_line, &spot.view, ground_m)?;
     let px_per_s = px_per_line / image.line_period_s;
     let late_px = px_per_line * correction.time_shift_lines + px_per_s * pointing.late_s;
-    Ok(
-        [(along, px_per_s, late_px), (across, 0.0, 0.0)].map(|(mut row, px_per_s, late_px)| {
-            let moved = spot
-                .by_boresight_m
-                .map(|moved_m| row.by_point.dot(&moved_m));
-            let turned = moved.iter().zip(&pointing.boresight_rad);
-            row.misclosure += late_px + turned.map(|(by, angle)| by * angle).sum::<f64>();
-            SpotRow {
-                by_boresight: moved.map(|by| -by),
-                by_line_time: -px_per_s,
-                // The image moves with its times, and the line of the shot as well.
-                by_time: row.by_time - px_per_s,
-                row,
-            }
-        }),
-    )
+    let axes = [(0, along, px_per_s, late_px), (1, across, 0.0, 0.0)];
+    Ok(axes.map(|(axis, mut row, px_per_s, late_px)| {
+        let moved = pointing.by_boresight.map(|moved_px| moved_px[axis]);
+        let turned = moved.iter().zip(&pointing.boresight_rad);
+        row.misclosure += late_px + turned.map(|(by, angle)| by * angle).sum::<f64>();
+        SpotRow {
+            by_boresight: moved.map(|by| -by),
+            by_line_time: -px_per_s,
+            // The image moves with its times, and the line of the shot as well.
+            by_time: row.by_time - px_per_s,
+            row,
+        }
+    }))
 }

@@ -47,8 +47,9 @@ pub(super) struct AdjustmentKeys<'a> {
     common_bus: bool,
     #[schemars(range(min = 0.0))]
     boresight_sigma_rad: f64,
+    #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 0.0))]
-    boresight_line_time_sigma_s: f64,
+    boresight_line_time_sigma_s: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 0.0))]
     position_sigma_nadir_m: Option<f64>,
@@ -115,7 +116,7 @@ impl<'a> AdjustmentKeys<'a> {
             attitude_clock_rotation_sigma_rad: config.attitude_clock_rotation_sigma_rad,
             common_bus: config.common_bus,
             boresight_sigma_rad: config.boresight_sigma_rad,
-            boresight_line_time_sigma_s: number(config.boresight_line_time_sigma_s),
+            boresight_line_time_sigma_s: config.boresight_line_time_sigma_s,
             position_sigma_nadir_m: published_m.map(|[nadir_m, _]| nadir_m),
             position_sigma_off_nadir_m: published_m.map(|[_, other_m]| other_m),
             robust: config.robust.as_ref(),

@@ -51,12 +51,12 @@ fn words(found: &BoresightSummary) -> String {
 
 fn table(images: &[SpotsOfImage]) -> String {
     let mut table = Table::new(
-        "Shots in simultaneous images",
+        "Shots in simultaneous images: where the kernels have the footprints, minus where the mounting has the laser",
         &[
             Column::Text("image"),
             Column::Number("shots"),
             Column::Number("lines late, ms"),
-            Column::Number("along, px"),
+            Column::Number("footprints along, lines"),
             Column::Number("across, px"),
         ],
     );
@@ -72,11 +72,8 @@ fn table(images: &[SpotsOfImage]) -> String {
         let mut cells: Vec<Cell> = vec![(&image.image).into()];
         cells.push(image.spots.to_string().into());
         cells.push(late.into());
-        let residuals = image.residuals_px.iter();
-        cells.extend(residuals.map(|axis| {
-            let [mean, spread] = [axis.mean, axis.standard_deviation].map(|px| label(px, 2));
-            Cell::from(format!("{mean} ± {spread}"))
-        }));
+        let off = image.footprints_off.iter();
+        cells.extend(off.map(|axis| Cell::from(label(axis.mean, 1))));
         table.row(true, cells);
     }
     table.finish()

@@ -65,8 +65,9 @@ pub struct SpotsOfImage {
     /// What its lines are late by against the shots, with its standard deviation, seconds, where that is unknown.
     #[schemars(transform = at("/prefixItems/1", "minimum", 0))]
     pub line_time_s: Option<(f64, f64)>,
-    /// Residuals along and across the track, focal-plane pixels.
-    pub residuals_px: [Summary; 2],
+    /// Where the initial orientation sees the footprints minus where the mounting has the laser: along the track in lines,
+    /// across it in focal-plane pixels.
+    pub footprints_off: [Summary; 2],
 }
 
 /// Puts the spots of all shots with a range into the network, or says why there are none.
@@ -138,7 +139,7 @@ pub(super) fn add_spots<M: ExteriorOrientation>(
     });
     assembled.network.common_bus = Some(CommonBus {
         boresight_sigma_rad: config.boresight_sigma_rad,
-        line_time_sigma_s: config.boresight_line_time_sigma_s,
+        line_time_sigma_s: config.boresight_line_time_sigma_s.unwrap_or(f64::INFINITY),
         profiles: profiles.collect(),
         recorded,
         spots,
@@ -160,32 +161,23 @@ fn met<M: ExteriorOrientation>(
 }
 
 /// What the adjustment found of laser and profiles.
-pub(super) fn summarise<M>(
+pub(super) fn summarise<M: ExteriorOrientation>(
     images: &[AdjustImage<M>],
     assembled: &Assembled<&M>,
     adjustment: &Adjustment,
     variance_factor: f64,
 ) -> Option<BoresightSummary> {
-    let network = assembled.network.common_bus.as_ref()?;
     let bus = adjustment.common_bus.as_ref()?;
     let root = variance_factor.sqrt();
-    let seen_in = |image: usize| -> Vec<[f64; 2]> {
-        let spots = network.spots.iter().zip(&bus.spots);
-        let spots = spots.filter(|(spot, _)| spot.view.image == image);
-        spots
-            .filter_map(|(_, residuals)| Some((*residuals)?.map(|residual| residual.value)))
-            .collect()
-    };
     let of_image = |(index, image): (usize, &AdjustImage<M>)| {
-        let residuals_px = seen_in(index);
-        let of_axis =
-            |axis: usize| -> Vec<f64> { residuals_px.iter().map(|pair| pair[axis]).collect() };
+        let off = footprints_off(image, index, assembled);
+        let of_axis = |axis: usize| -> Vec<f64> { off.iter().map(|pair| pair[axis]).collect() };
         SpotsOfImage {
             image: image.oriented_camera.id.clone(),
-            spots: residuals_px.len(),
+            spots: off.len(),
             line_time_s: bus.line_times_s[index]
                 .map(|found| (found.value, found.root_cofactor * root)),
-            residuals_px: [0, 1].map(|axis| Summary::of(&of_axis(axis))),
+            footprints_off: [0, 1].map(|axis| Summary::of(&of_axis(axis))),
         }
     };
     let all = images.iter().enumerate().map(of_image);
@@ -205,6 +197,30 @@ pub(super) fn summarise<M>(
         without: without.into_iter().map(|image| image.image).collect(),
         farthest: farthest(images, assembled, bus),
     })
+}
+
+/// Where the initial orientation of an image sees the footprints of its spots, minus these.
+fn footprints_off<M: ExteriorOrientation>(
+    image: &AdjustImage<M>,
+    index: usize,
+    assembled: &Assembled<&M>,
+) -> Vec<[f64; 2]> {
+    let Ok(projector) = projector(image, &image.oriented_camera.orientation) else {
+        return Vec::new();
+    };
+    let spots = assembled.network.common_bus.iter();
+    let spots = spots.flat_map(|bus| &bus.spots).map(|spot| &spot.view);
+    let off = spots.filter(|view| view.image == index).filter_map(|view| {
+        let recorded_m = &assembled.network.points[view.point].ground_m;
+        let seen = projector.project(recorded_m).ok()?;
+        let focal_px = image
+            .oriented_camera
+            .detector
+            .focal_px(&seen.camera_m)
+            .ok()?;
+        Some([seen.x - view.x_lines, focal_px.y - view.y_px])
+    });
+    off.collect()
 }
 
 /// The unknown that is farthest from what was known of it.

@@ -1,0 +1,33 @@
+//! The other reading of what images disagree by, as the document of an adjustment tells it.
+
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use crate::{
+    schema::{at, none_negative},
+    stages::adjust::OtherReading,
+};
+
+/// Where the tie points lie by the other reading of what images disagree by.
+#[derive(Serialize, JsonSchema)]
+pub(super) struct OtherReadingDocument {
+    /// With its standard deviation, where this is the reading by it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(transform = at("/prefixItems/1", "minimum", 0))]
+    attitude_clock_s: Option<(f64, f64)>,
+    /// Towards east, north and up, from the mean of the adjusted tie points.
+    moved_m: [f64; 3],
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(transform = none_negative)]
+    mean_sigma_m: Option<[f64; 3]>,
+}
+
+impl From<&OtherReading> for OtherReadingDocument {
+    fn from(other: &OtherReading) -> Self {
+        Self {
+            attitude_clock_s: other.attitude_clock_s,
+            moved_m: other.moved_m,
+            mean_sigma_m: other.mean_sigma_m,
+        }
+    }
+}
