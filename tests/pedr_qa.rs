@@ -2,7 +2,11 @@
 #![allow(
     clippy::unwrap_used,
     clippy::panic,
-    reason = "helpers of tests may fail loudly"
+    clippy::disallowed_methods,
+    clippy::float_cmp,
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "helpers of tests work in temporary folders and may fail loudly; numbers that are compared are counts"
 )]
 
 mod common;

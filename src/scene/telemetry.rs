@@ -74,10 +74,10 @@ fn enter_receiver(record: &mut Record, chance: &impl Fn(u64, usize) -> f64) {
         .cos()
         .max(0.0);
     for half in 0..2 {
-        for channel in 0..4 {
+        for (channel, mv_per_count) in MV_PER_COUNT.iter().enumerate() {
             let noise = chance(15, 4 * half + channel);
             let threshold_mv = 35.0 + 90.0 * sun.sqrt() + 8.0 * noise;
-            record.threshold_counts[half][channel] = counts(threshold_mv / MV_PER_COUNT[channel]);
+            record.threshold_counts[half][channel] = counts(threshold_mv / mv_per_count);
             let background = (2.0 + 60.0 * sun) * (0.9 + 0.2 * noise);
             record.background_counts[half][channel] = I32::from(counts(background));
         }

@@ -201,6 +201,7 @@ impl<'a> FileCheck<'a> {
         let head = source.reader.head();
         let mut hasher = blake3::Hasher::new();
         hasher.update(head.label_bytes());
+        let complaints = head.label_complaints().to_vec();
         let mut check = Self {
             turn: DatumTurn::new(source.datum, rules.clock),
             guard: FieldGuard::new(head.label().software_version),
@@ -210,12 +211,12 @@ impl<'a> FileCheck<'a> {
                 off_nadir: OffNadirBin::all(),
                 ..FileRanges::default()
             },
-            source: Arc::clone(&source),
+            source,
             rules,
             hasher,
             open: Gathered::default(),
         };
-        check.complain(head.label_complaints());
+        check.complain(&complaints);
         check
     }
 
