@@ -47,7 +47,8 @@ fn read(path: &Path) -> (Vec<u8>, PixelStatistics, Vec<String>) {
 
 fn sha256(bytes: &[u8]) -> String {
     let hash = Sha256::digest(bytes);
-    hash.iter().map(|byte| format!("{byte:02x}")).collect()
+    let digits: Vec<String> = hash.iter().map(|byte| format!("{byte:02x}")).collect();
+    digits.concat()
 }
 
 /// Pixels of M01/00115 at samples 0, 167, 335, 503 and 671, by line.

@@ -18,6 +18,10 @@ use crate::{
 ///
 /// Example: `areograph scene demo && areograph run demo/sites/*.toml --out products`
 #[derive(Debug, Args)]
+#[allow(
+    clippy::struct_excessive_bools,
+    reason = "each is a flag of the command line"
+)]
 #[command(verbatim_doc_comment)]
 pub(super) struct Arguments {
     /// Folder to write; an earlier scene in it is replaced, if nothing was added or changed.

@@ -88,7 +88,7 @@ pub struct PictureFile {
 
 #[derive(Debug)]
 enum Writer {
-    Png(PngLines),
+    Png(Box<PngLines>),
     Tiff(TiffTiles),
 }
 
@@ -110,7 +110,9 @@ impl PictureFile {
         let handle = file.as_file().try_clone();
         let handle = handle.map_err(IoError::on("create")).in_file(path)?;
         let writer = match format {
-            PictureFormat::Png => Writer::Png(PngLines::new(handle, &head).in_file(path)?),
+            PictureFormat::Png => {
+                Writer::Png(Box::new(PngLines::new(handle, &head).in_file(path)?))
+            }
             PictureFormat::Tiff => {
                 let tiles = TiffTiles::new(handle);
                 Writer::Tiff(

@@ -65,7 +65,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<()> {
             }
             match place(&image) {
                 Some((centre_rad, outline)) => {
-                    found.extend(meeting(image, centre_rad, outline, &regions))
+                    found.extend(meeting(image, centre_rad, outline, &regions));
                 }
                 None => without_place += 1,
             }

@@ -65,7 +65,7 @@ fn written(table: &str) -> Vec<Code> {
             let number = token.trim_matches(['[', ']']).parse::<i16>().ok();
             match (token, number) {
                 (_, Some(number)) if token.starts_with('[') => {
-                    length = u32::from(number.unsigned_abs())
+                    length = u32::from(number.unsigned_abs());
                 }
                 ("N" | "P", _) | (_, Some(_)) => {
                     let value = match token {

@@ -128,7 +128,7 @@ impl Placed {
             });
         }
         let mut states = states(&block, stream);
-        let has_gap = states.iter().any(|state| *state == LineState::Suspect);
+        let has_gap = states.contains(&LineState::Suspect);
         if is_broken && !has_gap {
             states[1..].fill(LineState::Suspect);
         }

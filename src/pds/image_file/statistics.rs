@@ -93,7 +93,7 @@ impl Statistics {
             lines_suspect,
             lines_missing,
             minimum: values().next().map(|(value, _)| value),
-            maximum: values().last().map(|(value, _)| value),
+            maximum: values().next_back().map(|(value, _)| value),
             mean,
             standard_deviation: variance.map(f64::sqrt),
             median: median.map(|(value, _)| value),

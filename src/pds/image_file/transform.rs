@@ -154,7 +154,7 @@ impl Group {
         let [least, largest] = self.means;
         let range = f64::from(largest.wrapping_sub(least));
         let mean = f64::from(coded) * range / 255.0 + f64::from(least);
-        (mean as u32 & 0xFFFF) as i32
+        i32::from((mean as u32 & 0xFFFF) as u16)
     }
 }
 

@@ -36,7 +36,7 @@ pub(super) fn pairs(found: &[Found]) -> Vec<Pair<'_>> {
     pairs
 }
 
-fn pair<'a>(images: [&'a Found; 2]) -> Option<Pair<'a>> {
+fn pair(images: [&Found; 2]) -> Option<Pair<'_>> {
     let [one, other] = images;
     let overlap = one.outline.overlap(&other.outline);
     // Context images are taken in the same seconds as those of the narrow angle: no base between them.
