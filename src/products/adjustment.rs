@@ -1,5 +1,6 @@
 //! What tie points, intersection and adjustment say of a site, as JSON.
 
+mod boresight;
 mod configured;
 mod readings;
 
@@ -24,15 +25,13 @@ use crate::{
     },
     schema::{DocumentSchema, all_positive, at, none_negative},
     stages::{
-        adjust::{
-            AdjustmentSummary, BoresightSummary, CorrectedImage, HeightSummary, PointKind,
-            ReliefSummary,
-        },
+        adjust::{AdjustmentSummary, CorrectedImage, HeightSummary, PointKind, ReliefSummary},
         check_heights::{HeightCheck, ProfilesApart, SurfaceFigures},
         compare_pairs::{PairComparison, ProfileByTies},
         intersect::{ImageResiduals, IntersectedTies},
     },
 };
+use boresight::BoresightDocument;
 use configured::AdjustmentKeys;
 use readings::OtherReadingDocument;
 
@@ -249,7 +248,7 @@ struct AdjustmentDocument<'a> {
     relief: Option<&'a ReliefSummary>,
     /// Where the laser points in simultaneous images.
     #[serde(skip_serializing_if = "Option::is_none")]
-    boresight: Option<&'a BoresightSummary>,
+    boresight: Option<BoresightDocument<'a>>,
     #[serde(skip_serializing_if = "Option::is_none")]
     no_boresight_because: Option<&'a str>,
     /// With its standard deviation.
@@ -350,7 +349,7 @@ fn document<'a>(
             summary: &adjusted.summary,
             heights: adjusted.heights.as_ref(),
             relief: adjusted.relief.as_ref(),
-            boresight: boresight.and_then(|of| of.as_ref().ok()),
+            boresight: boresight.and_then(|of| Some(BoresightDocument::of(of.as_ref().ok()?))),
             no_boresight_because: boresight.and_then(|of| Some(of.as_ref().err()?.as_str())),
             attitude_clock_s: adjusted.attitude_clock_s,
             other_reading: other.and_then(|other| Some(other.as_ref().ok()?.into())),

@@ -95,6 +95,7 @@ const ACROSS: Trial<'_> = Trial {
 };
 
 /// Runs both ways, and holds what is stated against truth.
+#[allow(clippy::print_stdout, reason = "what was measured is worth reading")]
 fn holds(trial: Trial<'_>) {
     let folder = tempfile::tempdir().unwrap();
     let limits = trial.limits;

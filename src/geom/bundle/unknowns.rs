@@ -211,7 +211,9 @@ impl Columns {
             [0, 1].map(|axis| columns.add(Unknown::Boresight { axis }, boresight_rad));
         let clock = columns.attitude_clock.map(|column| column..column + 1);
         let blocks = columns.images.iter().chain(&columns.profiles).cloned();
-        let blocks = blocks.chain(clock).chain([first..columns.len()]);
+        let blocks = blocks
+            .chain(clock)
+            .chain(std::iter::once(first..columns.len()));
         columns.blocks = blocks.filter(|block| !block.is_empty()).collect();
         columns
     }

@@ -12,6 +12,10 @@ use crate::{
 
 /// [`AdjustmentConfig`] without what is not set.
 #[derive(Serialize, JsonSchema)]
+#[allow(
+    clippy::struct_excessive_bools,
+    reason = "each is a key of the site file of its own"
+)]
 pub(super) struct AdjustmentKeys<'a> {
     #[schemars(transform = all_positive)]
     tie_sigma_px: [f64; 2],

@@ -3,7 +3,6 @@
 use std::collections::BTreeMap;
 
 use nalgebra::{Vector2, Vector3};
-use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::{
@@ -24,7 +23,6 @@ use crate::{
         pushbroom::ExteriorOrientation,
         statistics::Summary,
     },
-    schema::{at, none_negative},
 };
 
 /// What places a single spot in its image is uncertain by, beside all that spots share, focal-plane pixels: jitter and the
@@ -35,13 +33,12 @@ const SPOT_SIGMA_PX: f64 = 0.5;
 const LINE_TIME_S: f64 = 0.045;
 
 /// What a laser on the bus of the cameras says.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct BoresightSummary {
     /// The two angles by which the laser points elsewhere than its file and the frame kernels say, the beam's ends towards X
     /// of the bus and what completes the two to the right, radians.
     pub angles_rad: [f64; 2],
     /// Standard deviations of these, radians.
-    #[schemars(transform = none_negative)]
     pub sigma_rad: [f64; 2],
     /// Images with spots.
     pub images: Vec<SpotsOfImage>,
@@ -51,19 +48,17 @@ pub struct BoresightSummary {
     pub without: Vec<String>,
     /// The unknown of laser, profiles and line times that is farthest from what was known of it, and how far, in standard
     /// deviations of the contradiction; none where nothing tests them.
-    #[schemars(transform = at("/prefixItems/1", "minimum", 0))]
     pub farthest: Option<(String, f64)>,
 }
 
 /// Spots in one image.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct SpotsOfImage {
     /// Identifier.
     pub image: String,
     /// Spots.
     pub spots: usize,
     /// What its lines are late by against the shots, with its standard deviation, seconds, where that is unknown.
-    #[schemars(transform = at("/prefixItems/1", "minimum", 0))]
     pub line_time_s: Option<(f64, f64)>,
     /// Where the initial orientation sees the footprints minus where the mounting has the laser: along the track in lines,
     /// across it in focal-plane pixels.

@@ -1,0 +1,60 @@
+//! Where a laser on the bus of the cameras points, as the document of an adjustment tells it.
+
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use crate::{
+    geom::statistics::Summary,
+    schema::{at, none_negative},
+    stages::adjust::{BoresightSummary, ProfileOffset, SpotsOfImage},
+};
+
+/// [`BoresightSummary`] without what is unknown.
+#[derive(Serialize, JsonSchema)]
+pub(super) struct BoresightDocument<'a> {
+    /// Towards X of the bus, and at right angles to that and the beam.
+    angles_rad: [f64; 2],
+    #[schemars(transform = none_negative)]
+    sigma_rad: [f64; 2],
+    images: Vec<SpotsDocument<'a>>,
+    /// How far each profile is recorded from where it lies.
+    profile_shifts: &'a [ProfileOffset],
+    /// Images that were exposed during no profile.
+    without: &'a [String],
+    /// The unknown that is farthest from what was known of it, and how far, in standard deviations of the contradiction.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(transform = at("/prefixItems/1", "minimum", 0))]
+    farthest: Option<&'a (String, f64)>,
+}
+
+#[derive(Serialize, JsonSchema)]
+struct SpotsDocument<'a> {
+    image: &'a str,
+    spots: usize,
+    /// What its lines are late by against the shots, with its standard deviation, where that is unknown.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(transform = at("/prefixItems/1", "minimum", 0))]
+    line_time_s: Option<(f64, f64)>,
+    /// Where the initial orientation sees the footprints minus where the mounting has the laser: along the track in lines,
+    /// across it in focal-plane pixels.
+    footprints_off: &'a [Summary; 2],
+}
+
+impl<'a> BoresightDocument<'a> {
+    pub(super) fn of(found: &'a BoresightSummary) -> Self {
+        let spots = |of: &'a SpotsOfImage| SpotsDocument {
+            image: &of.image,
+            spots: of.spots,
+            line_time_s: of.line_time_s,
+            footprints_off: &of.footprints_off,
+        };
+        Self {
+            angles_rad: found.angles_rad,
+            sigma_rad: found.sigma_rad,
+            images: found.images.iter().map(spots).collect(),
+            profile_shifts: &found.profile_shifts,
+            without: &found.without,
+            farthest: found.farthest.as_ref(),
+        }
+    }
+}
