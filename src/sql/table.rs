@@ -97,9 +97,12 @@ impl TableProvider for ShotsTable {
         &self,
         filters: &[&Expr],
     ) -> Answer<Vec<TableProviderFilterPushDown>> {
-        let use_of = |filter: &&Expr| match Conditions::can_use(filter) {
-            true => TableProviderFilterPushDown::Inexact,
-            false => TableProviderFilterPushDown::Unsupported,
+        let use_of = |filter: &&Expr| {
+            if Conditions::can_use(filter) {
+                TableProviderFilterPushDown::Inexact
+            } else {
+                TableProviderFilterPushDown::Unsupported
+            }
         };
         Ok(filters.iter().map(use_of).collect())
     }

@@ -27,13 +27,13 @@ use crate::{
 
 /// Answers a question in SQL about the shots of an archive, the table `shots`.
 ///
-/// It has the columns of footprints.parquet but `windows` ("describe shots" lists them) in IAU 2000, with a row for every shot
-/// with a return, whatever its class; times are the tags of the files, TDB seconds past J2000. Conditions on longitude_deg,
-/// latitude_deg, et_s and source_file spare reading most of the archive, an index of it (pedr index) even more. An answer is
+/// It has the columns of `footprints.parquet` but `windows` ("describe shots" lists them) in IAU 2000, with a row for every shot
+/// with a return, whatever its class; times are the tags of the files, TDB seconds past J2000. Conditions on `longitude_deg`,
+/// `latitude_deg`, `et_s` and `source_file` spare reading most of the archive, an index of it (`pedr index`) even more. An answer is
 /// complete, or the command fails. Tables are only read.
 ///
-/// Example: areograph pedr sql archive "select orbit, count(*), avg(topography_m) from shots where latitude_deg between
-/// -5.5 and -4 and longitude_deg between 137 and 138 and class = 1 group by orbit order by orbit"
+/// Example: `areograph pedr sql archive "select orbit, count(*), avg(topography_m) from shots where latitude_deg between
+/// -5.5 and -4 and longitude_deg between 137 and 138 and class = 1 group by orbit order by orbit"`
 #[derive(Debug, Args)]
 #[command(verbatim_doc_comment)]
 pub(super) struct Arguments {

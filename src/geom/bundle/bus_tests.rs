@@ -224,16 +224,16 @@ fn a_profile_on_relief_lies_in_one_place() {
     let shift = implicit.relief.as_ref().unwrap().profiles[1];
     assert_eq!(shift.profile, 1);
     let found = own.common_bus.as_ref().unwrap().profile_shifts_m[0];
-    for axis in 0..3 {
+    for (axis, found) in found.iter().enumerate() {
         // Shares of its standard deviation: robust weights judge a height by its variance, of which the shift is a part in
         // one way and not in the other.
         let sigma_m = shift.root_cofactors_m[axis];
-        let apart_m = found[axis].value - shift.shift_m[axis];
+        let apart_m = found.value - shift.shift_m[axis];
         assert!(
             apart_m.abs() < 0.2 * sigma_m,
             "{axis}: {apart_m} of {sigma_m} m"
         );
-        let apart_m = found[axis].root_cofactor - sigma_m;
+        let apart_m = found.root_cofactor - sigma_m;
         assert!(
             apart_m.abs() < 0.05 * sigma_m,
             "{axis}: {apart_m} of {sigma_m} m"
