@@ -384,7 +384,13 @@ fn no_mistake_passes_as_valid() {
         );
         if matches!(end, End::Error(_)) {
             golden.compare(mistake, &said);
+            continue;
         }
+        // The table of checks says the same as the reasons.
+        let verdict = &json(&case.path("out/isidis/manifest.json"))["verdict"];
+        let checks = verdict["checks"].as_array().unwrap();
+        let fails = checks.iter().any(|check| check["outcome"] == "fail");
+        assert_eq!(verdict["valid"], !fails, "{mistake}: {checks:?}");
     }
     golden.finish();
 }

@@ -140,7 +140,7 @@ const fn is_signed(kind: CheckKind) -> bool {
 const fn section(kind: CheckKind) -> Option<&'static Section> {
     Some(match kind {
         CheckKind::Footprints => &selection::SECTION,
-        CheckKind::AdjustmentMade => return None,
+        CheckKind::AdjustmentMade | CheckKind::Contradiction => return None,
         CheckKind::HeightAfter
         | CheckKind::HeightBefore
         | CheckKind::HeightOutliers

@@ -11,6 +11,8 @@ use serde::{Deserialize, Serialize};
 )]
 #[serde(rename_all = "snake_case")]
 pub enum CheckKind {
+    /// What contradicts itself and has no number: told in the reasons.
+    Contradiction,
     /// Footprints in the windows.
     Footprints,
     /// An adjustment that was asked for.
@@ -70,6 +72,7 @@ impl CheckKind {
     #[must_use]
     pub const fn words(self) -> &'static str {
         match self {
+            Self::Contradiction => "Inputs do not contradict each other",
             Self::Footprints => "Footprints in the windows",
             Self::AdjustmentMade => "Adjustment converged",
             Self::HeightAfter => "Tie points above MOLA, adjusted (median)",
@@ -121,7 +124,8 @@ impl CheckKind {
             Self::ClockCorrection => "s",
             Self::PointingRmse => "″",
             Self::TableError => "px",
-            Self::Footprints
+            Self::Contradiction
+            | Self::Footprints
             | Self::AdjustmentMade
             | Self::Shots
             | Self::TiesUsed
@@ -247,8 +251,12 @@ impl fmt::Display for Check {
             "at most"
         };
         let unit = &self.unit;
-        // Limits that follow from uncertainties have more digits than anyone reads.
-        let limit = (100.0 * limit).round() / 100.0;
+        // Limits that follow from uncertainties have more digits than anyone reads; small ones are configured.
+        let limit = if limit.abs() < 0.1 {
+            limit
+        } else {
+            (100.0 * limit).round() / 100.0
+        };
         let text = format!("{value:.2} {unit}; {bound} {limit} {unit}");
         write!(formatter, ": {}", text.trim_end())
     }
