@@ -126,12 +126,17 @@ pub fn judge(evidence: &Evidence<'_>) -> Verdict {
     let mut reasons = evidence.invalid_because();
     let mut checks = checks::checks(evidence);
     // Reasons and checks are two accounts of the same evidence: what either finds wrong is wrong.
-    let failed = checks.iter().filter(|check| check.outcome == CheckOutcome::Fail);
+    let failed = checks
+        .iter()
+        .filter(|check| check.outcome == CheckOutcome::Fail);
     let failed: Vec<String> = failed.map(ToString::to_string).collect();
     if reasons.is_empty() {
         reasons = failed;
     } else if failed.is_empty() {
-        checks.insert(0, Check::told(CheckKind::Contradiction, "", CheckOutcome::Fail));
+        checks.insert(
+            0,
+            Check::told(CheckKind::Contradiction, "", CheckOutcome::Fail),
+        );
     }
     Verdict {
         valid: reasons.is_empty(),

@@ -118,6 +118,9 @@ fn dense(
         for axis in 0..3 {
             rows[(index, shared + 3 * point + axis)] = by_point[axis];
         }
+        for (column, by_shift) in heights.by_shared(index) {
+            rows[(index, column)] -= by_shift;
+        }
     }
     let weights = heights.covariance_m2().cholesky().unwrap().inverse();
     normal += rows.tr_mul(&(&weights * &rows));
@@ -225,7 +228,9 @@ pub(super) fn are_those_of_the_dense_equations(
         // As shares of the standard deviations; steps are of their order.
         assert!(
             (step[column] - before.step[column]).abs() < 1e-8 * sigma,
-            "{column}"
+            "{column}: {} {} of {sigma}",
+            step[column],
+            before.step[column]
         );
     }
 
