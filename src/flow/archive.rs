@@ -25,7 +25,11 @@ use self::{
     checker::{Checker, Part, Results},
     manifest::manifest,
 };
-use super::{PUBLISH, out::check_out_path, publish::standing};
+use super::{
+    PUBLISH,
+    out::check_out_path,
+    publish::{keep, standing},
+};
 use crate::{
     altimetry::{MolaClock, ShotFilter},
     config::RangeCheckConfig,
@@ -152,8 +156,7 @@ pub fn check_archive(
         Err(reason) => {
             tracing::info!(stage = PUBLISH, %reason, "running");
             let manifest = archive.publish(&ranges, &inputs).in_stage(PUBLISH)?;
-            let stored = archive.cache.store(PUBLISH, inputs, manifest.clone());
-            stored.in_stage(PUBLISH)?;
+            keep(&archive.cache, inputs, &manifest).in_stage(PUBLISH)?;
             (manifest, false)
         }
     };

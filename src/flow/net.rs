@@ -5,7 +5,11 @@ use std::{
     sync::atomic::AtomicBool,
 };
 
-use super::{PUBLISH, out::check_out_path, publish::standing};
+use super::{
+    PUBLISH,
+    out::check_out_path,
+    publish::{keep, standing},
+};
 use crate::{
     config::NetConfig,
     error::{Locate, Result},
@@ -77,8 +81,7 @@ fn run(config: &NetConfig, folder: &Path, force: bool) -> Result<(Manifest, bool
     }
     let manifest = publish_net(config, folder, output.value()?, &output, &inputs);
     let manifest = manifest.in_stage(PUBLISH)?;
-    let stored = cache.store(PUBLISH, inputs, manifest.clone());
-    stored.in_stage(PUBLISH)?;
+    keep(&cache, inputs, &manifest).in_stage(PUBLISH)?;
     Ok((manifest, false))
 }
 

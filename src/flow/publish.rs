@@ -15,7 +15,8 @@ use crate::{
     error::{Error, Result},
     files::file_name,
     products::{
-        AdjustmentProducts, GeometricProducts, ImageProducts, SiteProducts, write_products,
+        AdjustmentProducts, GeometricProducts, ImageProducts, SiteProducts, error::ProductError,
+        write_products,
     },
     report,
     spice::{KernelSet, KernelView},
@@ -65,16 +66,29 @@ pub(super) fn standing(
     cache: &StageCache,
     inputs: &Inputs,
 ) -> std::result::Result<Manifest, Reason> {
-    let stored: Output<Manifest> = cache.load(PUBLISH, inputs)?;
+    let stored: Output<String> = cache.load(PUBLISH, inputs)?;
     let changed = |what: &str| Reason::Changed(vec![format!("{what} is missing or was changed")]);
-    let manifest = stored.get().ok_or(Reason::Damaged)?;
-    if read_manifest(folder).as_ref() != Some(manifest) {
+    let manifest = stored
+        .get()
+        .and_then(|text| serde_json::from_str(text).ok());
+    let manifest: Manifest = manifest.ok_or(Reason::Damaged)?;
+    if read_manifest(folder).as_ref() != Some(&manifest) {
         return Err(changed(MANIFEST));
     }
-    match damaged_product(folder, manifest) {
+    match damaged_product(folder, &manifest) {
         Some(path) => Err(changed(&path)),
-        None => Ok(manifest.clone()),
+        None => Ok(manifest),
     }
+}
+
+/// Keeps what was published for the next run, as the text that a manifest is: the form of stage outputs cannot leave out
+/// what is unknown.
+///
+/// # Errors
+/// A disk that refuses.
+pub(super) fn keep(cache: &StageCache, inputs: Inputs, manifest: &Manifest) -> Result<()> {
+    let text = serde_json::to_string(manifest).map_err(ProductError::refused("encode JSON"))?;
+    cache.store(PUBLISH, inputs, text).map(|_| ())
 }
 
 /// Makes the products and puts them under their final names.

@@ -8,7 +8,7 @@ use super::{
     driver::{Driver, Flow, Leave, Ledger, StageReason},
     observer::{Observer, StageEvent},
     outputs::Site,
-    publish::{inputs, publish, standing},
+    publish::{inputs, keep, publish, standing},
     site::site,
 };
 use crate::{
@@ -224,8 +224,7 @@ impl Driver for Run<'_> {
                 self.verify_inputs().in_stage(PUBLISH)?;
                 let manifest = publish(config, site, &self.folder, &self.ledger, &inputs);
                 let manifest = manifest.in_stage(PUBLISH)?;
-                let stored = self.cache.store(PUBLISH, inputs, manifest.clone());
-                stored.in_stage(PUBLISH)?;
+                keep(&self.cache, inputs, &manifest).in_stage(PUBLISH)?;
                 self.cache
                     .keep_only(manifest.stages.iter().map(|stage| &*stage.name));
                 self.done(PUBLISH, begun);
