@@ -392,6 +392,7 @@ fn sites(site: &Table) -> Vec<Table> {
              'kernels/mgs_sc_scene.bc'] }, { id = 'ipng', metakernel = 'kernels/ipng.tm' }]",
         ),
         with("windows = [{ id = 'isidis', polygon = 'outline.geojson' }]"),
+        with("windows = [{ id = 'isidis', image = 'E02-01301', margin_km = 5.0 }]"),
         with("altimeter = 'laser.toml'\nimages = [{ instrument = 'camera.toml' }]"),
         with(
             "adjustment.images = [{ id = 'E02-01301', position_m = [30, 0.3, 0, 30, 0.3, 0, 30, 0.3, 0], \
