@@ -391,6 +391,9 @@ fn no_mistake_passes_as_valid() {
         let checks = verdict["checks"].as_array().unwrap();
         let fails = checks.iter().any(|check| check["outcome"] == "fail");
         assert_eq!(verdict["valid"], !fails, "{mistake}: {checks:?}");
+        let warns = checks.iter().any(|check| check["outcome"] == "warning");
+        let remarks = verdict["remarks"].as_array().unwrap();
+        assert!(!warns || !remarks.is_empty(), "{mistake}: {checks:?}");
     }
     golden.finish();
 }

@@ -316,6 +316,28 @@ fn what_is_in_one_run_only_is_counted_and_keeps_no_limit() {
 }
 
 #[test]
+fn another_adjustment_moves_what_it_adjusts() {
+    let case = Case::pair();
+    case.stages_run();
+    copy_products(&case.path("out/isidis"), &case.path("before/isidis"));
+    case.replace("site.toml", "[1.6, 1.0]", "[1.6, 5.0]");
+    case.stages_run();
+    let found = difference(&case);
+    assert_eq!(found["outcome"], "moved");
+    let images = found["images"].as_array().unwrap();
+    let moved = |image: &Value| number(&image["movement"]["turn_arcsec"]["max"]) > 1e-3;
+    let of = |name: &str| images.iter().find(|image| image["image"] == name).unwrap();
+    assert!(!moved(of(IMAGE)) && moved(of("E02-02016, adjusted")));
+    let printed = diff(&case, &["before", "out", "--limit-arcsec", "0.001"]);
+    assert!(
+        printed.starts_with(
+            "exit 5\nisidis: BEYOND THE LIMIT: image E02-01301, adjusted: the camera turned"
+        ),
+        "{printed}"
+    );
+}
+
+#[test]
 fn the_page_opens_with_the_outcome_and_needs_nothing_from_outside() {
     let case = after_a_first_run();
     turn_attitudes(&case);

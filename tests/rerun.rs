@@ -202,6 +202,24 @@ fn products_do_not_depend_on_how_the_site_is_named() {
 }
 
 #[test]
+fn an_index_of_the_archive_changes_nothing() {
+    let case = fresh();
+    // The index leaves out what may still be written.
+    let file = File::open(case.path("pedr/ap19117l.b")).unwrap();
+    file.set_modified(SystemTime::UNIX_EPOCH).unwrap();
+    let mut command = case.areograph();
+    command.args(["pedr", "index", "pedr"]);
+    let printed = String::from_utf8(common::mission::succeed(&mut command).stdout).unwrap();
+    assert!(printed.contains("1 of them read now"), "{printed}");
+    assert_plan(&case, &[]);
+    let mut command = case.areograph();
+    command.args(["--quiet", "run", "site.toml", "--out", "indexed"]);
+    common::mission::succeed(&mut command);
+    let products = |out: &str| common::mission::products(&case.path(out));
+    assert!(products("indexed") == products("out"));
+}
+
+#[test]
 fn kernels_that_move_give_another_metakernel_and_nothing_else() {
     let case = fresh();
     std::fs::rename(case.path("kernels"), case.path("moved")).unwrap();

@@ -7,7 +7,7 @@ use serde_json::json;
 
 use super::{load_sites, output};
 use crate::{
-    error::Error,
+    error::{Error, Kind},
     flow::{Checked, check_site},
     store::hashes::HashCache,
 };
@@ -36,7 +36,7 @@ pub(super) struct Arguments {
 
 pub(super) fn run(arguments: &Arguments) -> Result<(), Error> {
     let hashes = HashCache::in_folder(&arguments.out, arguments.rehash);
-    let mut last = None;
+    let mut failures = Vec::new();
     let mut answers = Vec::new();
     for site in load_sites(&arguments.sites)? {
         let checked = check_site(&site, &hashes);
@@ -45,16 +45,18 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Error> {
         } else {
             print(&site.site, &checked);
         }
-        for failure in checked.failures {
-            if let Some(earlier) = last.replace(failure) {
-                output::error(earlier);
-            }
-        }
+        failures.extend(checked.failures);
     }
     if arguments.json {
         output::json(&answers.into());
     }
-    last.map_or(Ok(()), Err)
+    // The one that is given back decides on the exit code: a failure says more than an invalid site.
+    let failed = failures
+        .iter()
+        .position(|failure| failure.kind() != Kind::Validation);
+    let decides = (!failures.is_empty()).then(|| failures.remove(failed.unwrap_or(0)));
+    failures.iter().for_each(output::error);
+    decides.map_or(Ok(()), Err)
 }
 
 fn print(site: &str, checked: &Checked) {

@@ -2,7 +2,6 @@
 
 mod check;
 mod completions;
-mod edges;
 mod image;
 mod kernels;
 mod manual;
@@ -19,6 +18,7 @@ mod serve;
 mod service;
 mod stop;
 mod triangulate;
+mod windows;
 mod worker;
 
 use std::process::ExitCode;
@@ -100,6 +100,17 @@ enum Command {
 #[must_use]
 pub fn main() -> ExitCode {
     let cli = Cli::parse();
+    log(&cli);
+    let code = run(cli.command);
+    // Success with half an answer is none.
+    match output::complete() {
+        Err(lost) if code == ExitCode::SUCCESS => report(&lost.into()),
+        _ => code,
+    }
+}
+
+/// Starts the log.
+fn log(cli: &Cli) {
     // Of what runs unattended the log is all there is to see.
     let unattended = matches!(
         cli.command,
@@ -129,7 +140,10 @@ pub fn main() -> ExitCode {
         let colour = std::env::var_os("NO_COLOR").is_none_or(|value| value.is_empty());
         log.with_ansi(terminal && colour).init();
     }
-    match cli.command {
+}
+
+fn run(command: Command) -> ExitCode {
+    match command {
         Command::Run(arguments) => run::run(&arguments),
         Command::Check(arguments) => finish(check::run(&arguments)),
         Command::Plan(arguments) => finish(plan::run(&arguments)),

@@ -1,7 +1,7 @@
 //! `areograph run`.
 
 use std::{
-    path::PathBuf,
+    path::{Path, PathBuf},
     process::ExitCode,
     sync::{Arc, atomic::AtomicBool},
 };
@@ -274,12 +274,16 @@ fn open_page(outcomes: &[Outcome], over_all: Option<&PathBuf>) {
 }
 
 fn outcome_json(outcome: &Outcome) -> serde_json::Value {
-    let products = |published: bool, manifest: &Manifest| {
+    let products = |folder: &Path, published: bool, manifest: &Manifest| {
         json!({
             "published": published,
+            "page": folder.join("report/index.html"),
+            "verdict": manifest.verdict.word(),
             "valid": manifest.verdict.valid,
             "reasons": manifest.verdict.reasons,
             "remarks": manifest.verdict.remarks,
+            "checks": manifest.verdict.checks,
+            "figures": manifest.figures,
             "counts": manifest.counts,
             "complaints": manifest.complaints.count,
         })
@@ -297,8 +301,8 @@ fn outcome_json(outcome: &Outcome) -> serde_json::Value {
             ending,
         }) => {
             let ending = match ending {
-                Ending::Published(manifest) => products(true, manifest),
-                Ending::Unchanged(manifest) => products(false, manifest),
+                Ending::Published(manifest) => products(folder, true, manifest),
+                Ending::Unchanged(manifest) => products(folder, false, manifest),
                 Ending::StoppedAfter(stage) => json!({
                     "stopped_after": stage,
                     "earlier_products_utc": read_manifest(folder).map(|earlier| earlier.finished_utc),

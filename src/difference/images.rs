@@ -29,7 +29,7 @@ const SAME_LINE: f64 = 1e-3;
 /// An image in both runs or in one.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct ImageDifference {
-    /// Image identifier.
+    /// Image identifier, with `, adjusted` where it is the adjusted orientation.
     pub image: String,
     /// Whether its model is within the limits in the first run; missing when the image is not there.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -146,14 +146,19 @@ impl ImageMovement {
     }
 }
 
+/// Orientations of an image: the name of their files, and what follows the identifier.
+pub(super) const ORIENTATIONS: [(&str, &str); 2] =
+    [("orientation", ""), ("adjusted_orientation", ", adjusted")];
+
 /// Compares one image; a document is missing where its folder does not have the image.
 pub(super) fn between(
     image: &str,
+    (orientation, which): (&str, &str),
     folders: [&Path; 2],
     documents: &[Option<ImageDocument>; 2],
 ) -> Result<ImageDifference> {
     let rows = |there: bool, folder: &Path| -> Result<Vec<SampleRow>> {
-        let file = folder.join(format!("images/{image}/orientation.parquet"));
+        let file = folder.join(format!("images/{image}/{orientation}.parquet"));
         if there {
             read_samples(&file)
         } else {
@@ -172,7 +177,7 @@ pub(super) fn between(
         _ => (Vec::new(), Vec::new()),
     };
     Ok(ImageDifference {
-        image: image.to_owned(),
+        image: format!("{image}{which}"),
         valid_in_a: a.as_ref().map(|document| document.valid),
         valid_in_b: b.as_ref().map(|document| document.valid),
         times,

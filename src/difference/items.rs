@@ -133,11 +133,16 @@ pub(super) fn products(manifest: &Manifest) -> Vec<Item> {
     items(products.map(|product| (&*product.path, None, &*product.blake3)))
 }
 
-/// Identifiers of images with orientation.
-pub(super) fn images(manifest: &Manifest) -> Vec<String> {
+/// Identifiers of images with that orientation.
+pub(super) fn images(manifest: &Manifest, orientation: &str) -> Vec<String> {
     let image = |path: &str| {
-        let inner = path.strip_prefix("images/")?;
-        Some(inner.strip_suffix("/orientation.parquet")?.to_owned())
+        let inner = path.strip_prefix("images/")?.strip_suffix(".parquet")?;
+        Some(
+            inner
+                .strip_suffix(orientation)?
+                .strip_suffix('/')?
+                .to_owned(),
+        )
     };
     let products = manifest.products.iter();
     products

@@ -85,7 +85,7 @@ pub struct RunDifference {
     pub profiles: Vec<ProfileDifference>,
     /// Where shots hit the ground.
     pub footprints: FootprintsDifference,
-    /// Orientation of every image.
+    /// Orientation of every image by the kernels, then the adjusted ones.
     pub images: Vec<ImageDifference>,
 }
 
@@ -215,16 +215,19 @@ fn read_movements(
     let [first, second] = ranges.map(|document| document.profiles);
     difference.profiles = profiles(first, second);
     difference.footprints = footprints::between(a, b)?;
-    let images = |manifest: &Manifest| items::images(manifest);
-    for name in items::united(&images(runs[0].1), &images(runs[1].1)) {
-        let document = |(folder, manifest): (&Path, &Manifest)| -> Result<Option<ImageDocument>> {
-            let file = folder.join(format!("images/{name}/orientation.json"));
-            let there = images(manifest).contains(&name);
-            there.then(|| read_image(&file)).transpose()
-        };
-        let documents = [document(runs[0])?, document(runs[1])?];
-        let image = images::between(&name, [a, b], &documents)?;
-        difference.images.push(image);
+    for which in images::ORIENTATIONS {
+        let (orientation, _) = which;
+        let images = |manifest: &Manifest| items::images(manifest, orientation);
+        for name in items::united(&images(runs[0].1), &images(runs[1].1)) {
+            let document = |(folder, manifest): (&Path, &Manifest)| {
+                let file = folder.join(format!("images/{name}/{orientation}.json"));
+                let there = images(manifest).contains(&name);
+                there.then(|| read_image(&file)).transpose()
+            };
+            let documents: [Option<ImageDocument>; 2] = [document(runs[0])?, document(runs[1])?];
+            let image = images::between(&name, which, [a, b], &documents)?;
+            difference.images.push(image);
+        }
     }
     Ok(difference)
 }

@@ -85,6 +85,28 @@ impl Cause for NoShot {
     }
 }
 
+/// A profile would make the products invalid.
+#[derive(Debug, thiserror::Error)]
+#[error(
+    "profile {profile} has {shots} shots; expected at least {least}: products would be invalid"
+)]
+struct FewShots {
+    profile: String,
+    shots: usize,
+    least: u32,
+}
+
+impl Cause for FewShots {
+    fn kind(&self) -> Kind {
+        Kind::Validation
+    }
+
+    fn advice(&self) -> String {
+        "move the window so that it does not clip the profile, or lower range_check.shots_min"
+            .to_owned()
+    }
+}
+
 struct Check<'a> {
     site: &'a str,
     files: InputFiles,
@@ -116,6 +138,9 @@ impl<'a> Check<'a> {
             let failure = Error::from(NoShot).in_site(&config.site);
             self.checked.failures.push(failure);
         }
+        if searched {
+            self.few_shots(config, prepared.profiles.get().map_or(&[], Vec::as_slice));
+        }
         if !config.ties.files.is_empty() {
             ties(self, config)?;
         }
@@ -127,6 +152,23 @@ impl<'a> Check<'a> {
             self.check_kernels(config, prepared.clone(), index)?;
         }
         Ok(())
+    }
+
+    /// Profiles of too few shots, as the range check of a run judges them.
+    fn few_shots(&mut self, config: &SiteConfig, profiles: &[Profile]) {
+        let least = config.range_check.shots_min;
+        for profile in profiles {
+            let shots = profile.rows.len();
+            if shots < least as usize {
+                let few = FewShots {
+                    profile: profile.id.clone(),
+                    shots,
+                    least,
+                };
+                let failure = Error::from(few).in_site(&config.site);
+                self.checked.failures.push(failure);
+            }
+        }
     }
 
     /// Orbit and orientation with one set of kernels.

@@ -155,7 +155,7 @@ fn counts(site: &Site) -> Result<BTreeMap<String, u64>> {
 /// The largest figures of the site.
 fn figures_of(site: &Site) -> Result<BTreeMap<String, f64>> {
     let profiles = site.ranges.value()?.profiles.iter();
-    let means = profiles.map(|ranges| ranges.range_minus_distance_m.mean.abs());
+    let means = profiles.map(|ranges| ranges.mean_without_outliers_m.abs());
     let models = site.images.iter().map(|image| image.model.value());
     let models = models.collect::<Result<Vec<_>>>()?;
     let positions = models

@@ -3,12 +3,13 @@
 mod png_lines;
 mod tiff_tiles;
 
-use std::path::{Path, PathBuf};
-
-use tempfile::NamedTempFile;
+use std::path::Path;
 
 use self::{png_lines::PngLines, tiff_tiles::TiffTiles};
-use crate::error::{Cause, IoError, Kind, Locate as _, Result};
+use crate::{
+    error::{Cause, IoError, Kind, Locate as _, Result},
+    files::StagedFile,
+};
 
 /// How a picture is written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -80,8 +81,7 @@ impl From<tiff::TiffError> for PictureError {
 /// A picture that is being written; it has its name when it is whole.
 #[derive(Debug)]
 pub struct PictureFile {
-    path: PathBuf,
-    file: NamedTempFile,
+    file: StagedFile,
     head: PictureHead,
     writer: Writer,
 }
@@ -98,36 +98,18 @@ impl PictureFile {
     /// # Errors
     /// The folder cannot be written.
     pub fn create(path: &Path, format: PictureFormat, head: PictureHead) -> Result<Self> {
-        let folder = match path.parent() {
-            Some(folder) if folder != Path::new("") => folder,
-            _ => Path::new("."),
-        };
-        let file = tempfile::Builder::new()
-            .prefix(".partial-")
-            .tempfile_in(folder)
-            .map_err(IoError::on("create a file"))
-            .in_file(folder)?;
-        let handle = file.as_file().try_clone();
-        let handle = handle.map_err(IoError::on("create")).in_file(path)?;
+        let file = StagedFile::create(path)?;
+        let handle = file.writer()?;
         let writer = match format {
             PictureFormat::Png => {
                 Writer::Png(Box::new(PngLines::new(handle, &head).in_file(path)?))
             }
             PictureFormat::Tiff => {
                 let tiles = TiffTiles::new(handle);
-                Writer::Tiff(
-                    tiles
-                        .map_err(IoError::on("create a file"))
-                        .in_file(folder)?,
-                )
+                Writer::Tiff(tiles.map_err(IoError::on("create a file")).in_file(path)?)
             }
         };
-        Ok(Self {
-            path: path.to_owned(),
-            file,
-            head,
-            writer,
-        })
+        Ok(Self { file, head, writer })
     }
 
     /// Adds whole lines.
@@ -150,7 +132,9 @@ impl PictureFile {
             Writer::Png(lines) => lines.write(&bytes),
             Writer::Tiff(tiles) => tiles.write(&bytes),
         };
-        written.map_err(IoError::on("write")).in_file(&self.path)
+        written
+            .map_err(IoError::on("write"))
+            .in_file(self.file.path())
     }
 
     /// Ends the picture and gives it its name.
@@ -158,20 +142,11 @@ impl PictureFile {
     /// # Errors
     /// The system's refusal to write, flush or rename; fewer lines than were promised.
     pub fn finish(self) -> Result<()> {
+        let path = self.file.path();
         match self.writer {
-            Writer::Png(lines) => lines.finish().in_file(&self.path)?,
-            Writer::Tiff(tiles) => tiles.finish(&self.head).in_file(&self.path)?,
+            Writer::Png(lines) => lines.finish().in_file(path)?,
+            Writer::Tiff(tiles) => tiles.finish(&self.head).in_file(path)?,
         }
-        let flushed = self.file.as_file().sync_all();
-        flushed.map_err(IoError::on("flush")).in_file(&self.path)?;
-        let permissions = std::os::unix::fs::PermissionsExt::from_mode(0o644);
-        let set = self.file.as_file().set_permissions(permissions);
-        set.map_err(IoError::on("set permissions of"))
-            .in_file(&self.path)?;
-        let persisted = self.file.persist(&self.path).map_err(|error| error.error);
-        persisted
-            .map_err(IoError::on("rename into place"))
-            .in_file(&self.path)?;
-        Ok(())
+        self.file.finish()
     }
 }

@@ -69,71 +69,32 @@ pub(super) fn value(check: &Check) -> String {
     if check.unit.is_empty() {
         return whole(value.max(0.0) as u64);
     }
-    let text = if is_signed(check.kind) {
-        signed(value, decimals(check))
+    let [decimals, _] = check.decimals();
+    let text = if check.kind.is_signed() {
+        signed(value, decimals)
     } else {
-        number(value.abs(), decimals(check))
+        number(value.abs(), decimals)
     };
     format!("{text} {}", check.unit)
 }
 
-fn limit(check: &Check) -> String {
+/// What is allowed, with its unit; a dash where there is no number.
+pub(super) fn limit(check: &Check) -> String {
     let Some(limit) = check.limit else {
         return "–".to_owned();
     };
-    let (bound, unit) = (
-        if check.kind.at_least() {
-            "≥ "
-        } else if is_signed(check.kind) {
-            "± "
-        } else {
-            "≤ "
-        },
-        &check.unit,
-    );
-    if unit.is_empty() {
-        return format!("{bound}{}", whole(limit as u64));
-    }
-    // Limits are written by people: their digits end where zeros begin.
-    let text = number(limit, decimals(check));
-    let text = if text.contains('.') {
-        text.trim_end_matches('0').trim_end_matches('.')
+    let bound = if check.kind.at_least() {
+        "≥"
+    } else if check.kind.is_signed() {
+        "±"
     } else {
-        &text
+        "≤"
     };
-    format!("{bound}{text} {unit}")
-}
-
-/// Decimals by which values near the limit can be told apart from it.
-fn decimals(check: &Check) -> usize {
-    let small = check.value.is_some_and(|value| value.abs() < 1.0);
-    let least = match check.kind {
-        CheckKind::ParallaxAfter | CheckKind::PointingRmse if small => 2,
-        CheckKind::ClockCorrection | CheckKind::TableError => 4,
-        CheckKind::RangeMean | CheckKind::Decoding | CheckKind::PositionRmse => 2,
-        _ => 1,
-    };
-    let (Some(value), Some(limit)) = (check.value, check.limit) else {
-        return least;
-    };
-    // A value beyond its limit is never written like it.
-    let apart = |decimals: &usize| number(value.abs(), *decimals) != number(limit, *decimals);
-    (least..8).find(apart).unwrap_or(least)
-}
-
-/// Whether both signs happen.
-const fn is_signed(kind: CheckKind) -> bool {
-    matches!(
-        kind,
-        CheckKind::HeightAfter
-            | CheckKind::HeightBefore
-            | CheckKind::RangeMean
-            | CheckKind::Decoding
-            | CheckKind::ClockCorrection
-            | CheckKind::ParallaxAfter
-            | CheckKind::ParallaxBefore
-            | CheckKind::ProfilesApart
-    )
+    if check.unit.is_empty() {
+        return format!("{bound} {}", whole(limit as u64));
+    }
+    let [_, decimals] = check.decimals();
+    format!("{bound} {} {}", number(limit, decimals), check.unit)
 }
 
 /// The section that tells more.
@@ -158,6 +119,8 @@ const fn section(kind: CheckKind) -> Option<&'static Section> {
         | CheckKind::TieResidualsAcross
         | CheckKind::TiesRejected
         | CheckKind::TiesUsed
+        | CheckKind::ImagesJoined
+        | CheckKind::PairsJoined
         | CheckKind::Correction => &adjustment::SECTION,
         CheckKind::PositionRmse | CheckKind::PointingRmse | CheckKind::TableError => {
             &images::SECTION
@@ -190,5 +153,10 @@ mod tests {
         assert_eq!((&*value(&count), &*limit(&count)), ("19", "≥ 20"));
         let share = check(CheckKind::TiesRejected, 12.34, 10.0);
         assert_eq!((&*value(&share), &*limit(&share)), ("12.3 %", "≤ 10 %"));
+        // The digits of a limit are its own.
+        let sigma = check(CheckKind::TieResidualsAlong, 0.9, 1.25);
+        assert_eq!((&*value(&sigma), &*limit(&sigma)), ("0.9 σ", "≤ 1.25 σ"));
+        let pointing = check(CheckKind::PointingRmse, 2.0, 0.04);
+        assert_eq!(&*limit(&pointing), "≤ 0.04 ″");
     }
 }

@@ -6,6 +6,7 @@
 use std::sync::atomic::AtomicBool;
 
 use nalgebra::{DMatrix, Vector3};
+use rayon::prelude::*;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -49,7 +50,8 @@ pub struct HeightCheck {
     pub mean_sigma_m: f64,
     /// Tie points within a kilometre of a shot.
     pub near_shots: usize,
-    /// What the two profiles with most shots say of the same tie points, each alone; `None` for a single profile.
+    /// What two profiles say of the same tie points, each alone: those that contradict each other most; `None` for a
+    /// single profile.
     pub apart: Option<ProfilesApart>,
 }
 
@@ -100,6 +102,24 @@ pub struct ProfilesApart {
     pub mean_m: f64,
     /// Standard deviation of that, metres.
     pub sigma_m: f64,
+    /// Pairs of profiles that were compared.
+    pub pairs: usize,
+}
+
+impl ProfilesApart {
+    /// The difference in its standard deviations, without its sign.
+    #[must_use]
+    pub fn sigmas(&self) -> f64 {
+        self.mean_m.abs() / self.sigma_m
+    }
+
+    /// The limit that the worst of so many pairs exceeds by chance as often as one pair exceeds `one_pair`, both in
+    /// standard deviations: the tail of the normal distribution falls like exp(−z²/2).
+    #[must_use]
+    pub fn limit(&self, one_pair: f64) -> f64 {
+        let pairs = self.pairs.max(1) as f64;
+        one_pair.hypot((2.0 * pairs.ln()).sqrt())
+    }
 }
 
 /// The points whose heights are checked.
@@ -155,6 +175,7 @@ stage_inputs! {
 
 impl Stage for CheckHeights<'_> {
     const NAME: &'static str = "check_heights";
+    const METHOD: u32 = 2;
     type Output = HeightCheck;
     stage_inputs!(fingerprint);
 
@@ -252,28 +273,49 @@ fn mean_variance_m2(covariance_m2: &DMatrix<f64>) -> f64 {
     covariance_m2.sum() / (covariance_m2.nrows().max(1) as f64).powi(2)
 }
 
-/// The surfaces of the two profiles with most shots, each alone.
+/// The surface of one profile at the tie points: its mean height, and the variance of that.
+struct OneProfile<'a> {
+    id: &'a str,
+    mean_m: f64,
+    variance_m2: f64,
+}
+
+/// Of the surfaces of all profiles, each alone, the two that contradict each other most.
 fn apart(
     shots: &MolaShots,
     places_m: &[Vector3<f64>],
     profiles: &[Profile],
     options: &SurfaceOptions,
 ) -> Option<ProfilesApart> {
-    let largest = shots.largest_profiles()?;
-    let names = largest
-        .each_ref()
-        .map(|(index, _)| profiles[*index].id.clone());
-    let [one, other] = largest.map(|(_, shots)| {
-        let surface = shots.surface(places_m, options).ok()?;
-        Some(surface.predict(places_m))
+    let alone = shots.by_profile();
+    let found: Vec<OneProfile> = alone
+        .par_iter()
+        .filter_map(|(index, shots)| {
+            let surface = shots.surface(places_m, options).ok()?;
+            let found = surface.predict(places_m);
+            Some(OneProfile {
+                id: &profiles[*index].id,
+                mean_m: found.heights_m.iter().sum::<f64>() / places_m.len() as f64,
+                variance_m2: mean_variance_m2(&found.covariance_m2),
+            })
+        })
+        .collect();
+    let count = found.len() * found.len().saturating_sub(1) / 2;
+    let pairs = found.iter().enumerate().flat_map(|(index, one)| {
+        let others = found[index + 1..].iter();
+        others.map(move |other| ProfilesApart {
+            profiles: [one, other].map(|profile| profile.id.to_owned()),
+            mean_m: one.mean_m - other.mean_m,
+            sigma_m: (one.variance_m2 + other.variance_m2).sqrt(),
+            pairs: count,
+        })
     });
-    let (one, other) = (one?, other?);
-    let differences = one.heights_m.iter().zip(&other.heights_m);
-    let differences_m: f64 = differences.map(|(one, other)| one - other).sum();
-    let variance_m2 = mean_variance_m2(&one.covariance_m2) + mean_variance_m2(&other.covariance_m2);
-    Some(ProfilesApart {
-        profiles: names,
-        mean_m: differences_m / places_m.len() as f64,
-        sigma_m: variance_m2.sqrt(),
+    // The first of equals: profiles with most shots.
+    pairs.reduce(|worst, pair| {
+        if pair.sigmas().total_cmp(&worst.sigmas()).is_gt() {
+            pair
+        } else {
+            worst
+        }
     })
 }

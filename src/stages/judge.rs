@@ -45,8 +45,8 @@ impl Verdict {
         }
     }
 
-    /// The three checks that say most of how good the products are: heights by MOLA, images by each other, ranges; then
-    /// orbits and pointing where there are no tie points.
+    /// The three checks that say most of how good the products are: heights of tie points and MOLA, images by each
+    /// other, ranges; then orbits and pointing where there are no tie points.
     pub fn key_checks(&self) -> impl Iterator<Item = &Check> {
         let kinds = [
             CheckKind::HeightAfter,
@@ -125,11 +125,9 @@ pub struct AdjustmentEvidence<'a> {
 pub fn judge(evidence: &Evidence<'_>) -> Verdict {
     let mut reasons = evidence.invalid_because();
     let mut checks = checks::checks(evidence);
-    // Reasons and checks are two accounts of the same evidence: what either finds wrong is wrong.
-    let failed = checks
-        .iter()
-        .filter(|check| check.outcome == CheckOutcome::Fail);
-    let failed: Vec<String> = failed.map(ToString::to_string).collect();
+    let mut remarks = evidence.remarks();
+    // Sentences and checks are two accounts of the same evidence: what either finds is told.
+    let failed = in_words(&checks, CheckOutcome::Fail);
     if reasons.is_empty() {
         reasons = failed;
     } else if failed.is_empty() {
@@ -138,12 +136,21 @@ pub fn judge(evidence: &Evidence<'_>) -> Verdict {
             Check::told(CheckKind::Contradiction, "", CheckOutcome::Fail),
         );
     }
+    if remarks.is_empty() {
+        remarks = in_words(&checks, CheckOutcome::Warning);
+    }
     Verdict {
         valid: reasons.is_empty(),
         reasons,
-        remarks: evidence.remarks(),
+        remarks,
         checks,
     }
+}
+
+/// The checks that came out so, a sentence each.
+fn in_words(checks: &[Check], outcome: CheckOutcome) -> Vec<String> {
+    let such = checks.iter().filter(|check| check.outcome == outcome);
+    such.map(ToString::to_string).collect()
 }
 
 impl Evidence<'_> {
@@ -212,11 +219,17 @@ const CLOCK_DOUBT_S: f64 = 0.02;
 /// Nor are those below so many standard uncertainties.
 const CLOCK_DOUBT_SIGMA: f64 = 5.0;
 
+/// How far a scan with this uncertainty may be from the configured correction, seconds.
+const fn clock_limit_s(uncertainty_s: f64) -> f64 {
+    CLOCK_DOUBT_S.max(CLOCK_DOUBT_SIGMA * uncertainty_s)
+}
+
 /// What a scan says against the configured correction.
 fn doubt(scan: &BiasScan, configured_s: f64) -> Option<String> {
     let (best_s, uncertainty_s) = (scan.best_s?, scan.uncertainty_s?);
     let apart_s = (best_s - configured_s).abs();
-    (apart_s > CLOCK_DOUBT_S && apart_s > CLOCK_DOUBT_SIGMA * uncertainty_s).then(|| {
+    // Written so that NaN counts.
+    (!(apart_s <= clock_limit_s(uncertainty_s))).then(|| {
         format!(
             "its ranges fit a clock correction of {best_s:+.4} ± {uncertainty_s:.4} s, not the configured \
              {configured_s:+.3} s"

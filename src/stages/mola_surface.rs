@@ -53,9 +53,9 @@ impl MolaShots {
         LaserSurface::new(&self.0, around, options)
     }
 
-    /// The two profiles with most shots, by their indices, each alone.
+    /// Every profile alone, by its index, those with most shots first.
     #[must_use]
-    pub fn largest_profiles(&self) -> Option<[(usize, Self); 2]> {
+    pub fn by_profile(&self) -> Vec<(usize, Self)> {
         let mut profiles: Vec<(usize, Self)> = Vec::new();
         for shot in &self.0 {
             match profiles
@@ -67,7 +67,6 @@ impl MolaShots {
             }
         }
         profiles.sort_by_key(|(_, shots)| std::cmp::Reverse(shots.0.len()));
-        let mut profiles = profiles.into_iter();
-        Some([profiles.next()?, profiles.next()?])
+        profiles
     }
 }

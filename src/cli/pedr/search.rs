@@ -51,7 +51,7 @@ static RUN_ON: AtomicBool = AtomicBool::new(false);
 
 pub(super) fn run(arguments: &Arguments) -> Result<()> {
     let format = arguments.format()?;
-    let windows = arguments.windows()?;
+    let windows = arguments.windows.windows()?;
     let time = arguments.time()?;
     let Opened { sources, failures } = Opened::all(&arguments.paths)?;
     let mut answer = Answer {

@@ -1,7 +1,7 @@
 //! The checks of both runs, those whose value or outcome changed.
 
 use super::super::{
-    checks::value,
+    checks::{limit, value},
     html::{Column, Table},
 };
 use crate::{
@@ -12,6 +12,10 @@ use crate::{
 /// The table; nothing where every check came out the same.
 pub(super) fn changed(site: &RunDifference) -> String {
     let (a, b) = (&site.a.verdict.checks, &site.b.verdict.checks);
+    // Products of versions without checks say nothing of them.
+    if a.is_empty() || b.is_empty() {
+        return String::new();
+    }
     let mut rows = Vec::new();
     for after in b {
         let before = a.iter().find(|before| before.kind == after.kind);
@@ -36,15 +40,20 @@ pub(super) fn changed(site: &RunDifference) -> String {
     table.finish()
 }
 
-/// Outcome and value of a check as pages write them.
+/// Outcome, value and limit of a check as pages write them, and what it is told of.
 fn told(check: &Check) -> String {
     let word = match check.outcome {
         CheckOutcome::Fail => "fail",
         CheckOutcome::Warning => "warning",
         CheckOutcome::Pass => "pass",
     };
+    let of = if check.subject.is_empty() {
+        String::new()
+    } else {
+        format!(" ({})", check.subject)
+    };
     match check.value {
-        Some(_) => format!("{word}, {}", value(check)),
-        None => word.to_owned(),
+        Some(_) => format!("{word}, {}{of}; limit {}", value(check), limit(check)),
+        None => format!("{word}{of}"),
     }
 }

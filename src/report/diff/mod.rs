@@ -81,6 +81,7 @@ fn changed_verdict(site: &RunDifference) -> String {
 
 fn moved(site: &RunDifference) -> String {
     let tone = match site.outcome {
+        _ if !site.b.verdict.valid => Tone::Bad,
         Outcome::NothingChanged | Outcome::NothingMoved => Tone::Good,
         Outcome::Moved => Tone::Remarks,
         Outcome::BeyondLimit => Tone::Bad,

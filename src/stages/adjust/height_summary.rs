@@ -4,7 +4,11 @@ use nalgebra::Vector3;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::{components::variance_factor, network::Assembled};
+use super::{
+    components::variance_factor,
+    network::Assembled,
+    points::{RejectedPoint, RejectionReason},
+};
 use crate::{
     geom::{
         bundle::{Adjustment, HeightResidual},
@@ -13,6 +17,10 @@ use crate::{
     },
     schema::none_negative,
 };
+
+/// So many tie points beyond the limit are chance, kept alone and together with the rejected ones.
+const CHANCE_KEPT: usize = 1;
+const CHANCE_ALL: usize = 2;
 
 /// Heights of tie points against the MOLA surface, as observations.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -36,20 +44,33 @@ pub struct HeightSummary {
     pub compared: usize,
     /// See `compared`.
     pub beyond_limit: usize,
-    /// Standard deviations of the mean of these points towards east, north and up, metres: what they have in common.
+    /// Tie points that were rejected for their height; they are not among the compared ones.
+    pub rejected: usize,
+    /// Standard deviations of the mean of these points towards east, north and up, metres: what they have in common,
+    /// and upwards what those beyond the limit move it by, for some of them may err.
     #[schemars(transform = none_negative)]
     pub mean_sigma_m: [f64; 3],
 }
 
 impl HeightSummary {
-    /// Share of the compared tie points that lie beyond the limit; a single one is no share.
+    /// Share of the tie points that lie beyond the limit, those rejected for it included: who errs across the track is
+    /// found only where no neighbour errs alike. One that was kept, or two with those that were rejected, are no share.
     #[must_use]
     pub fn beyond_share(&self) -> f64 {
-        if self.beyond_limit > 1 {
-            self.beyond_limit as f64 / self.compared as f64
-        } else {
-            0.0
-        }
+        let share = |beyond: usize, of: usize, chance: usize| {
+            if beyond > chance {
+                beyond as f64 / of as f64
+            } else {
+                0.0
+            }
+        };
+        let kept = share(self.beyond_limit, self.compared, CHANCE_KEPT);
+        let all = share(
+            self.beyond_limit + self.rejected,
+            self.compared + self.rejected,
+            CHANCE_ALL,
+        );
+        kept.max(all)
     }
 }
 
@@ -65,6 +86,11 @@ pub(super) fn heights<M>(
         .map(|height| height.above_m)
         .collect();
     let factor = variance_factor(assembled, adjustment);
+    let [east_m, north_m, up_m] = mean_sigma_m(adjustment, factor)?;
+    let compared = &adjustment.compared;
+    let moved_m = compared.iter().filter(is_beyond).map(|of| of.above_m);
+    let moved_m = moved_m.sum::<f64>() / compared.len().max(1) as f64;
+    let for_height = |of: &&RejectedPoint| matches!(of.reason, RejectionReason::Height { .. });
     Some(HeightSummary {
         ties: adjustment.heights.len(),
         shots: control.surface.shots(),
@@ -72,9 +98,10 @@ pub(super) fn heights<M>(
         roughness_m: control.surface.variogram().roughness_m,
         settled: adjustment.heights_settled,
         above_m: Summary::of(&above_m),
-        compared: adjustment.compared.len(),
-        beyond_limit: beyond_limit(&adjustment.compared),
-        mean_sigma_m: mean_sigma_m(adjustment, factor)?,
+        compared: compared.len(),
+        beyond_limit: beyond_limit(compared),
+        rejected: assembled.rejected.iter().filter(for_height).count(),
+        mean_sigma_m: [east_m, north_m, up_m.hypot(moved_m)],
     })
 }
 
@@ -90,8 +117,10 @@ pub(super) fn mean_sigma_m(adjustment: &Adjustment, variance_factor: f64) -> Opt
 
 /// Heights beyond the limit of the test.
 pub(super) fn beyond_limit(heights: &[HeightResidual]) -> usize {
+    heights.iter().filter(is_beyond).count()
+}
+
+fn is_beyond(height: &&HeightResidual) -> bool {
     // Written so that NaN counts.
-    let beyond =
-        |height: &&HeightResidual| !(height.above_m.abs() <= BAARDA_LIMIT * height.sigma_m());
-    heights.iter().filter(beyond).count()
+    !(height.above_m.abs() <= BAARDA_LIMIT * height.sigma_m())
 }

@@ -111,7 +111,7 @@ pub struct AdjustmentSummary {
     pub sigma0: f64,
     /// What controls the adjustment.
     pub model: AdjustmentModel,
-    /// Standard deviation of unit weight of tie points along and across the track.
+    /// Standard deviation of unit weight of tie points along and across the track; 0 where nothing controls them.
     #[schemars(transform = none_negative)]
     pub tie_components: [f64; 2],
     /// What the a priori variances are multiplied with in covariances: 1, or the square of the larger of these where it

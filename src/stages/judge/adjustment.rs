@@ -1,12 +1,14 @@
 //! What is judged of an adjustment: by MOLA first, then by what images say of each other, then by what was known.
 
+use std::collections::BTreeSet;
+
 use super::{AdjustmentEvidence, JudgedImage};
 use crate::{
     config::LimitsConfig,
     footprints::AdjustmentModel,
     geom::bundle::Unknown,
     stages::{
-        adjust::{CorrectedImage, HEIGHTS_MIN, HeightSummary, PointKind},
+        adjust::{CorrectedImage, HEIGHTS_MIN, HeightSummary, ObservationType, PointKind},
         compare_pairs::PairComparison,
     },
 };
@@ -42,6 +44,13 @@ impl AdjustmentEvidence<'_> {
             ("before", self.pairs, limits.parallax_before_max_m),
             ("after", self.adjusted_pairs, limits.parallax_after_max_m),
         ];
+        let parted = self.parted();
+        if !parted.is_empty() {
+            invalid.push(format!(
+                "no tie point of {} took part in the adjustment: look at their labels, and at the tie points in ties.parquet",
+                parted.join("; ")
+            ));
+        }
         let heights = self.adjusted.heights.iter();
         let spread = heights.filter(|of| !(of.beyond_share() <= limits.height_outliers_max));
         invalid.extend(spread.map(heights_beyond));
@@ -111,15 +120,14 @@ impl AdjustmentEvidence<'_> {
             }
         }
         if let Some(apart) = &self.heights.apart {
-            let sigmas = apart.mean_m.abs() / apart.sigma_m;
-            if !(sigmas <= limits.profiles_apart_max_sigma) {
+            let (sigmas, limit) = (apart.sigmas(), apart.limit(limits.profiles_apart_max_sigma));
+            if !(sigmas <= limit) {
                 reasons.push(format!(
                     "profiles {} and {} contradict each other: at the tie points their surfaces lie {:.1} m apart on \
-                     average, {sigmas:.1} standard deviations, expected at most {}",
+                     average, {sigmas:.1} standard deviations, expected at most {limit:.1}",
                     apart.profiles[0],
                     apart.profiles[1],
                     apart.mean_m.abs(),
-                    limits.profiles_apart_max_sigma
                 ));
             }
         }
@@ -206,6 +214,44 @@ impl AdjustmentEvidence<'_> {
         self.ties.multi_image().saturating_sub(self.taken())
     }
 
+    /// Standard deviation of unit weight of tie points along and across the track; nothing where they fit, but hardly any
+    /// is tested by another observation.
+    pub(super) fn axes(&self) -> impl Iterator<Item = Option<f64>> {
+        let summary = &self.adjusted.summary;
+        let kinds = [ObservationType::TieAlong, ObservationType::TieAcross];
+        kinds
+            .into_iter()
+            .zip(summary.tie_components)
+            .map(|(kind, found)| {
+                let of_kind = summary.types.iter().find(|of| of.kind == kind);
+                    let is_untested = found <= 1.0 && of_kind.is_none_or(|of| of.redundancy < 1.0);
+                (!is_untested).then_some(found)
+            })
+    }
+
+    /// Images without a tie point in the adjustment.
+    pub(super) fn untied(&self) -> Vec<String> {
+        let views = self.adjusted.views.iter();
+        let ties = views.filter(|view| view.kind == PointKind::Tie);
+        let tied: BTreeSet<usize> = ties.map(|view| view.image).collect();
+        let images = self.adjusted.images.iter().enumerate();
+        images
+            .filter(|(index, _)| !tied.contains(index))
+            .map(|(_, image)| image.id.clone())
+            .collect()
+    }
+
+    /// Pairs of images none of whose tie points took part, though they have some.
+    pub(super) fn parted(&self) -> Vec<String> {
+        let is_adjusted = |pair: &PairComparison| {
+            self.adjusted_pairs
+                .iter()
+                .any(|of| of.images == pair.images)
+        };
+        let pairs = self.pairs.iter().filter(|pair| !is_adjusted(pair));
+        pairs.map(|pair| pair.images.join(" and ")).collect()
+    }
+
     /// Whether the images of every pair place tie points together after the adjustment, and most of these took
     /// part in it.
     #[must_use]
@@ -222,7 +268,8 @@ impl AdjustmentEvidence<'_> {
     /// What a reader must weigh, one sentence each.
     pub(super) fn remarks(&self, limits: &LimitsConfig) -> Vec<String> {
         let mut remarks = Vec::new();
-        match &self.heights.surface {
+        let both = self.heights.surface.as_ref();
+        match both.and(self.adjusted_heights.surface.as_ref()) {
             Err(reason) => remarks.push(format!(
                 "heights of tie points are not controlled by MOLA ({reason}): they are known as well as orbit and attitude \
                  beforehand"
@@ -243,6 +290,14 @@ impl AdjustmentEvidence<'_> {
                     .to_owned(),
             );
         }
+        if matches!(self.adjusted.boresight, Some(Ok(_))) {
+            remarks.push(
+                "the place across the flight rests on adjustment.common_bus, which takes it that footprints do not carry the \
+                 attitude error of these kernels: PEDR files made with the same attitude would agree with them whatever it \
+                 errs"
+                    .to_owned(),
+            );
+        }
         remarks.extend(self.laser_missing());
         let (left_out, ties) = (self.left_out(), self.ties.multi_image());
         let share = limits.rejected_share_max;
@@ -258,14 +313,23 @@ impl AdjustmentEvidence<'_> {
                 limits.ties_min
             ));
         }
-        let components = self.adjusted.summary.tie_components.into_iter();
-        for (found, axis) in components.zip(["along", "across"]) {
-            if !(found <= limits.sigma0_max) {
-                remarks.push(format!(
+        for (found, axis) in self.axes().zip(["along", "across"]) {
+            match found {
+                // Written so that NaN counts.
+                Some(found) if !(found <= limits.sigma0_max) => remarks.push(format!(
                     "residuals of the tie points {axis} the track are {found:.2} times what adjustment.tie_sigma_px expects: \
                      measurements are worse than configured, or a model does not hold"
-                ));
+                )),
+                Some(_) => {}
+                None => remarks.push(format!(
+                    "nothing tests the tie points {axis} the track: blunders there go unnoticed"
+                )),
             }
+        }
+        for image in self.untied() {
+            remarks.push(format!(
+                "image {image} has no tie point in the adjustment: its adjusted orientation is that of the kernels"
+            ));
         }
         remarks
     }
@@ -277,9 +341,13 @@ fn is_together(pair: &PairComparison, limit_m: f64) -> bool {
 }
 
 fn heights_beyond(heights: &HeightSummary) -> String {
+    let rejected = match heights.rejected {
+        0 => String::new(),
+        count => format!(", {count} more were rejected for it"),
+    };
     format!(
-        "{} of {} tie points lie farther from the MOLA surface than their standard deviations allow: measurements that err \
-         across the track move heights by more than is stated; height_check.parquet has them",
+        "{} of {} tie points lie farther from the MOLA surface than their standard deviations allow{rejected}: \
+         measurements that err across the track move heights by more than is stated; height_check.parquet has them",
         heights.beyond_limit, heights.compared
     )
 }

@@ -5,7 +5,8 @@ use std::fmt;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// What is checked, data that took no part in the result first.
+/// What is checked, data that took no part in the result first, then what took part in it, then what images say of
+/// each other.
 #[derive(
     Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema,
 )]
@@ -17,16 +18,10 @@ pub enum CheckKind {
     Footprints,
     /// An adjustment that was asked for.
     AdjustmentMade,
-    /// Median height of tie points above the MOLA surface, adjusted.
-    HeightAfter,
-    /// The same with the orientation of the kernels.
+    /// Median height of tie points above the MOLA surface, with the orientation of the kernels.
     HeightBefore,
-    /// Share of adjusted tie points farther from the MOLA surface than 3.29 of their standard deviations.
-    HeightOutliers,
     /// Mean difference of the surfaces of two profiles, in its standard deviations.
     ProfilesApart,
-    /// Standard deviation of the mean height of the adjusted tie points.
-    HeightSigma,
     /// Mean of range minus distance of a profile, its outliers left out.
     RangeMean,
     /// Mean distance of the spacecraft of the PEDR file from that of the kernels.
@@ -39,6 +34,17 @@ pub enum CheckKind {
     Shots,
     /// Clock correction of least spread minus the configured one.
     ClockCorrection,
+    /// Median height of tie points above the MOLA surface, adjusted: of a default adjustment MOLA is part.
+    HeightAfter,
+    /// Share of tie points that lie farther from the MOLA surface than 3.29 of their standard deviations, or were
+    /// rejected for it.
+    HeightOutliers,
+    /// Standard deviation of the mean height of the adjusted tie points.
+    HeightSigma,
+    /// Images with a tie point in the adjustment.
+    ImagesJoined,
+    /// Pairs of images whose tie points took part in the adjustment.
+    PairsJoined,
     /// Distance along the flight between two images at their tie points, adjusted.
     ParallaxAfter,
     /// The same with the orientation of the kernels.
@@ -79,6 +85,8 @@ impl CheckKind {
             Self::HeightBefore => "Tie points above MOLA, before (median)",
             Self::HeightOutliers => "Tie points beyond 3.29 σ of MOLA",
             Self::ProfilesApart => "MOLA profiles against each other",
+            Self::ImagesJoined => "Images joined by tie points",
+            Self::PairsJoined => "Pairs joined by tie points",
             Self::HeightSigma => "Uncertainty of the mean height",
             Self::RangeMean => "Range − distance (mean)",
             Self::OrbitsApart => "Orbit of the PEDR against kernels",
@@ -127,6 +135,8 @@ impl CheckKind {
             Self::Contradiction
             | Self::Footprints
             | Self::AdjustmentMade
+            | Self::ImagesJoined
+            | Self::PairsJoined
             | Self::Shots
             | Self::TiesUsed
             | Self::Attitude
@@ -137,9 +147,47 @@ impl CheckKind {
     /// Whether the limit is the least that is allowed.
     #[must_use]
     pub const fn at_least(self) -> bool {
-        matches!(self, Self::Footprints | Self::Shots | Self::TiesUsed)
+        matches!(
+            self,
+            Self::Footprints
+                | Self::ImagesJoined
+                | Self::PairsJoined
+                | Self::Shots
+                | Self::TiesUsed
+        )
+    }
+
+    /// Whether values have a sign, and the limit holds for both.
+    #[must_use]
+    pub const fn is_signed(self) -> bool {
+        matches!(
+            self,
+            Self::HeightAfter
+                | Self::HeightBefore
+                | Self::RangeMean
+                | Self::Decoding
+                | Self::ClockCorrection
+                | Self::ParallaxAfter
+                | Self::ParallaxBefore
+                | Self::ProfilesApart
+        )
+    }
+
+    /// Decimals of a value that is not near its limit.
+    const fn least_decimals(self, is_small: bool) -> usize {
+        match self {
+            Self::ParallaxAfter | Self::PointingRmse if is_small => 2,
+            Self::ClockCorrection | Self::TableError => 4,
+            Self::RangeMean | Self::Decoding | Self::PositionRmse => 2,
+            _ => 1,
+        }
     }
 }
+
+/// Most decimals that a number is written with.
+const DECIMALS_MAX: usize = 9;
+/// A limit is told to three significant digits.
+const LIMIT_ACCURACY: f64 = 5e-4;
 
 /// How a check came out.
 #[derive(
@@ -198,6 +246,22 @@ impl Check {
         }
     }
 
+    /// A check of shares, which pages show in percent. They are compared as they are: 29 % are not 28.999 999 999 999 996.
+    pub(super) fn of_share(
+        kind: CheckKind,
+        subject: impl Into<String>,
+        share: f64,
+        limit: f64,
+        broken: CheckOutcome,
+    ) -> Self {
+        let check = Self::new(kind, subject, share, limit, broken);
+        Self {
+            value: check.value.map(|share| 100.0 * share),
+            limit: check.limit.map(|share| 100.0 * share),
+            ..check
+        }
+    }
+
     /// A check that has no number.
     pub(super) fn told(kind: CheckKind, subject: impl Into<String>, outcome: CheckOutcome) -> Self {
         Self {
@@ -208,6 +272,30 @@ impl Check {
             limit: None,
             unit: kind.unit().to_owned(),
         }
+    }
+
+    /// Decimals of value and limit: those that tell the limit, and those by which a value beyond it is never written like
+    /// it.
+    #[must_use]
+    pub fn decimals(&self) -> [usize; 2] {
+        if self.unit.is_empty() {
+            return [0, 0];
+        }
+        let value = self.value.map_or(0.0, f64::abs);
+        let least = self.kind.least_decimals(value < 1.0);
+        let Some(limit) = self.limit else {
+            return [least, least];
+        };
+        let written = |number: f64, decimals: usize| format!("{number:.decimals$}").parse::<f64>();
+        let tells = |decimals: &usize| {
+            let text = written(limit, *decimals);
+            text.is_ok_and(|text| (text - limit).abs() <= LIMIT_ACCURACY * limit.abs())
+        };
+        let of_limit = (0..DECIMALS_MAX).find(tells).unwrap_or(DECIMALS_MAX);
+        let told = written(limit, of_limit);
+        let is_apart = |decimals: &usize| value <= limit || written(value, *decimals) != told;
+        let of_value = (least..DECIMALS_MAX).find(is_apart).unwrap_or(least);
+        [of_value, of_limit]
     }
 
     /// Share of the limit that is used, infinite where it cannot be said.
@@ -240,27 +328,36 @@ impl Check {
 
 impl fmt::Display for Check {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(formatter, "{}", self.kind.words())?;
-        if !self.subject.is_empty() {
-            write!(formatter, " of {}", self.subject)?;
-        }
+        let (words, subject) = (self.kind.words(), &*self.subject);
         let (Some(value), Some(limit)) = (self.value, self.limit) else {
-            return Ok(());
+            let what = match (subject, self.limit.is_some()) {
+                ("", true) => "no number",
+                ("", false) => "no",
+                _ => subject,
+            };
+            return write!(formatter, "{words}: {what}");
         };
-        let bound = if self.kind.at_least() {
-            "at least"
-        } else {
-            "at most"
+        formatter.write_str(words)?;
+        if !subject.is_empty() {
+            write!(formatter, ", {subject}")?;
+        }
+        let [of_value, of_limit] = self.decimals();
+        // What rounds to zero has no sign.
+        let is_zero = value.abs() < 0.5 * 0.1_f64.powi(i32::try_from(of_value).unwrap_or(0));
+        let (sign, bound) = match (self.kind.at_least(), self.kind.is_signed()) {
+            (true, _) => ("", "at least "),
+            (false, true) if is_zero => ("", "within ±"),
+            (false, true) if value < 0.0 => ("−", "within ±"),
+            (false, true) => ("+", "within ±"),
+            (false, false) => ("", "at most "),
         };
+        let value = value.abs();
+        let blank = if self.unit.is_empty() { "" } else { " " };
         let unit = &self.unit;
-        // Limits that follow from uncertainties have more digits than anyone reads; small ones are configured.
-        let limit = if limit.abs() < 0.1 {
-            limit
-        } else {
-            (100.0 * limit).round() / 100.0
-        };
-        let text = format!("{value:.2} {unit}; {bound} {limit} {unit}");
-        write!(formatter, ": {}", text.trim_end())
+        write!(
+            formatter,
+            ": {sign}{value:.of_value$}{blank}{unit}; {bound}{limit:.of_limit$}{blank}{unit}"
+        )
     }
 }
 

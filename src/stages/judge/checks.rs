@@ -1,12 +1,13 @@
 //! Every limit of a site with what uses most of it: what the verdict rests on, as a table.
 
 use super::{
-    AdjustmentEvidence, CLOCK_DOUBT_S, CLOCK_DOUBT_SIGMA, Evidence, JudgedImage,
+    AdjustmentEvidence, Evidence, JudgedImage,
     adjustment::{HEIGHT_LOOSE_M, HEIGHT_OUTLIERS_FEW},
     check::{
         Check, CheckKind,
         CheckOutcome::{self, Fail, Pass, Warning},
     },
+    clock_limit_s,
 };
 use crate::{
     config::LimitsConfig,
@@ -88,32 +89,31 @@ fn of_ranges(evidence: &Evidence<'_>) -> Vec<Check> {
         .into_iter()
         .map(|(kind, value, limit)| worst(kind, &value, limit))
         .collect();
-    let outliers = |of: &ProfileRanges| 100.0 * f64::from(of.outliers) / shots(of).max(1.0);
-    checks.push(worst(
-        CheckKind::RangeOutliers,
-        &outliers,
-        100.0 * limits.outlier_share_max,
-    ));
+    let outliers = evidence.ranges.profiles.iter().map(|of| {
+        let share = f64::from(of.outliers) / shots(of).max(1.0);
+        let limit = limits.outlier_share_max;
+        Check::of_share(CheckKind::RangeOutliers, &*of.profile, share, limit, Fail)
+    });
+    checks.push(Check::worst(outliers));
     checks.push(worst(CheckKind::Shots, &shots, f64::from(limits.shots_min)));
     checks.into_iter().flatten().collect()
 }
 
 /// What the ranges say against the configured clock correction.
 fn clock(evidence: &Evidence<'_>) -> Option<Check> {
-    let scans = evidence.ranges.profiles.iter().filter_map(|of| {
+    let kind = CheckKind::ClockCorrection;
+    let profiles = || evidence.ranges.profiles.iter();
+    let scans = profiles().filter_map(|of| {
         let scan = of.scan.as_ref()?;
         let (best_s, uncertainty_s) = (scan.best_s?, scan.uncertainty_s?);
-        let limit_s = CLOCK_DOUBT_S.max(CLOCK_DOUBT_SIGMA * uncertainty_s);
+        let limit_s = clock_limit_s(uncertainty_s);
         let apart_s = best_s - evidence.clock_correction_s;
-        Some(Check::new(
-            CheckKind::ClockCorrection,
-            &*of.profile,
-            apart_s,
-            limit_s,
-            Warning,
-        ))
+        Some(Check::new(kind, &*of.profile, apart_s, limit_s, Warning))
     });
-    Check::worst(scans)
+    let is_scanned = profiles().any(|of| of.scan.is_some());
+    // Shots of one direction of sight say nothing of the clock: that is told, and nothing to weigh.
+    let silent = is_scanned.then(|| Check::told(kind, "not told by these ranges", Pass));
+    Check::worst(scans).or(silent)
 }
 
 fn of_images<'a>(
@@ -167,8 +167,12 @@ fn of_images<'a>(
 
 fn of_heights(of: &AdjustmentEvidence<'_>, limits: &LimitsConfig) -> Vec<Check> {
     let median = |kind: CheckKind, check: &HeightCheck, limit_m: f64| match &check.surface {
-        Ok(_) => Check::new(kind, "", check.above_m.median, limit_m, Fail),
-        Err(_) => Check::told(kind, "not controlled by MOLA", Warning),
+        Ok(_) => {
+            let takes_part = kind == CheckKind::HeightAfter && of.adjusted.heights.is_some();
+            let subject = if takes_part { "MOLA takes part" } else { "" };
+            Check::new(kind, subject, check.above_m.median, limit_m, Fail)
+        }
+        Err(_) => Check::told(kind, "no MOLA surface", Warning),
     };
     let mut checks = vec![
         median(
@@ -187,20 +191,14 @@ fn of_heights(of: &AdjustmentEvidence<'_>, limits: &LimitsConfig) -> Vec<Check> 
             CheckKind::ProfilesApart,
             apart.profiles.join(" and "),
             apart.mean_m / apart.sigma_m,
-            limits.profiles_apart_max_sigma,
+            apart.limit(limits.profiles_apart_max_sigma),
             Fail,
         ));
     }
     if let Some(heights) = &of.adjusted.heights {
         let share = heights.beyond_share();
         let limit = limits.height_outliers_max;
-        let mut outliers = Check::new(
-            CheckKind::HeightOutliers,
-            "",
-            100.0 * share,
-            100.0 * limit,
-            Fail,
-        );
+        let mut outliers = Check::of_share(CheckKind::HeightOutliers, "", share, limit, Fail);
         if outliers.outcome == Pass && share > HEIGHT_OUTLIERS_FEW {
             outliers.outcome = Warning;
         }
@@ -239,13 +237,12 @@ fn of_ties(of: &AdjustmentEvidence<'_>, limits: &LimitsConfig) -> Vec<Check> {
     .into_iter()
     .flatten()
     .collect();
-    let components = of.adjusted.summary.tie_components.into_iter();
     let axes = [CheckKind::TieResidualsAlong, CheckKind::TieResidualsAcross];
-    checks.extend(
-        components
-            .zip(axes)
-            .map(|(found, kind)| Check::new(kind, "", found, limits.sigma0_max, Warning)),
-    );
+    checks.extend(of.axes().zip(axes).map(|(axis, kind)| match axis {
+        Some(found) => Check::new(kind, "", found, limits.sigma0_max, Warning),
+        None => Check::told(kind, "nothing tests them", Warning),
+    }));
+    checks.extend(joined(of));
     let share = of.left_out() as f64 / of.ties.multi_image().max(1) as f64;
     let broken = if share > REJECTED_SHARE_FAIL {
         Fail
@@ -274,13 +271,32 @@ fn of_ties(of: &AdjustmentEvidence<'_>, limits: &LimitsConfig) -> Vec<Check> {
     checks
 }
 
+/// Images and pairs that the adjustment says nothing of.
+fn joined(of: &AdjustmentEvidence<'_>) -> [Check; 2] {
+    let check = |kind: CheckKind, all: usize, without: &[String], broken: CheckOutcome| {
+        let subject = match without {
+            [] => String::new(),
+            without => format!("not {}", without.join(", ")),
+        };
+        let joined = (all - without.len()) as f64;
+        Check::new(kind, subject, joined, all as f64, broken)
+    };
+    let (images, pairs) = (of.adjusted.images.len(), of.pairs.len());
+    [
+        check(CheckKind::ImagesJoined, images, &of.untied(), Warning),
+        check(CheckKind::PairsJoined, pairs, &of.parted(), Fail),
+    ]
+}
+
 /// What the laser says, where it was asked.
 fn boresight(of: &AdjustmentEvidence<'_>, limits: &LimitsConfig) -> Option<Check> {
     let Ok(found) = of.adjusted.boresight.as_ref()? else {
         return Some(Check::told(CheckKind::Boresight, "", Warning));
     };
     let limit = limits.correction_max_sigma;
-    let (unknown, sigmas) = found.farthest.as_ref()?;
+    let Some((unknown, sigmas)) = found.farthest.as_ref() else {
+        return Some(Check::told(CheckKind::Boresight, "", Warning));
+    };
     let mut check = Check::new(CheckKind::Boresight, unknown, *sigmas, limit, Fail);
     if check.outcome == Pass && !found.without.is_empty() {
         check.outcome = Warning;
@@ -290,13 +306,7 @@ fn boresight(of: &AdjustmentEvidence<'_>, limits: &LimitsConfig) -> Option<Check
 
 /// Rejected tie points: a share beyond the limit of a sound adjustment warns, more than half fails whatever that is.
 fn rejected(share: f64, limit: f64, broken: CheckOutcome) -> Check {
-    let mut check = Check::new(
-        CheckKind::TiesRejected,
-        "",
-        100.0 * share,
-        100.0 * limit,
-        broken,
-    );
+    let mut check = Check::of_share(CheckKind::TiesRejected, "", share, limit, broken);
     if broken == Fail {
         check.outcome = Fail;
     }

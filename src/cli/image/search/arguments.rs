@@ -5,11 +5,8 @@ use std::path::PathBuf;
 use clap::{ArgGroup, Args, ValueEnum};
 
 use crate::{
-    cli::edges::edges,
-    config::{
-        WindowConfig, built_in_instruments, load, load_windows, require_outlines, window_of_box,
-        window_of_polygon,
-    },
+    cli::windows::WindowArguments,
+    config::{WindowConfig, built_in_instruments, load, require_outlines},
     error::{Cause, Kind, Locate as _, Result},
     instruments::Instrument,
     pds::image_index::IndexedImage,
@@ -33,16 +30,8 @@ pub(in crate::cli::image) struct Arguments {
     /// Indexes of the archive (cumindex.tab, imgindex.tab), their labels (.lbl) beside them.
     #[arg(required = true, value_name = "INDEX")]
     pub(super) indexes: Vec<PathBuf>,
-    /// West, east, south and north edge, degrees: east longitude (-180 to 360, west above east crosses 0 or 180) and
-    /// areocentric latitude.
-    #[arg(long = "box", visible_alias = "window", value_name = "W,E,S,N", value_parser = edges, allow_hyphen_values = true)]
-    boxes: Vec<[f64; 4]>,
-    /// GeoJSON polygons.
-    #[arg(long = "polygon", value_name = "FILE")]
-    polygons: Vec<PathBuf>,
-    /// TOML file with up to 10,000 tables `windows` as in a site file.
-    #[arg(long, value_name = "FILE")]
-    windows: Option<PathBuf>,
+    #[command(flatten)]
+    windows: WindowArguments,
     /// Site file: its windows.
     #[arg(long = "site", value_name = "SITE")]
     sites: Vec<PathBuf>,
@@ -111,16 +100,7 @@ pub(super) enum Format {
 
 impl Arguments {
     pub(super) fn windows(&self) -> Result<Vec<WindowConfig>> {
-        let mut windows = Vec::new();
-        for (number, edges) in (1..).zip(&self.boxes) {
-            windows.push(window_of_box(&format!("box{number}"), *edges)?);
-        }
-        for path in &self.polygons {
-            windows.push(window_of_polygon(path)?);
-        }
-        if let Some(path) = &self.windows {
-            windows.extend(load_windows(path)?);
-        }
+        let mut windows = self.windows.windows()?;
         for path in &self.sites {
             let site = load(path)?.site;
             require_outlines(&site.windows).in_file(path)?;

@@ -6,8 +6,7 @@ use clap::{ArgGroup, Args, ValueEnum};
 
 use crate::{
     altimetry::ShotFilter,
-    cli::edges::edges,
-    config::{WindowConfig, load_windows, window_of_box, window_of_polygon},
+    cli::windows::WindowArguments,
     error::{Cause, Kind, Result},
     products::ShotsFormat,
     spice::{KernelSet, Session},
@@ -29,16 +28,8 @@ pub(in crate::cli::pedr) struct Arguments {
     /// PEDR files, and folders with .b files in and below them.
     #[arg(required = true, value_name = "PATH")]
     pub(super) paths: Vec<PathBuf>,
-    /// West, east, south and north edge, degrees: east longitude (-180 to 360, west above east crosses 0 or 180) and
-    /// areocentric latitude.
-    #[arg(long = "box", value_name = "W,E,S,N", value_parser = edges, allow_hyphen_values = true)]
-    pub(super) boxes: Vec<[f64; 4]>,
-    /// GeoJSON polygons.
-    #[arg(long = "polygon", value_name = "FILE")]
-    pub(super) polygons: Vec<PathBuf>,
-    /// TOML file with up to 10,000 tables `windows` as in a site file.
-    #[arg(long, value_name = "FILE")]
-    pub(super) windows: Option<PathBuf>,
+    #[command(flatten)]
+    pub(super) windows: WindowArguments,
     /// Time tags, both included: TDB seconds past J2000, or UTC with --leap-seconds; either end may be left out.
     #[arg(long, value_name = "A..B", allow_hyphen_values = true)]
     pub(super) time: Option<String>,
@@ -124,20 +115,6 @@ impl Arguments {
             Format::Geojson => Some(ShotsFormat::GeoJson),
             Format::Count => None,
         })
-    }
-
-    pub(super) fn windows(&self) -> Result<Vec<WindowConfig>> {
-        let mut windows = Vec::new();
-        for (number, edges) in (1..).zip(&self.boxes) {
-            windows.push(window_of_box(&format!("box{number}"), *edges)?);
-        }
-        for path in &self.polygons {
-            windows.push(window_of_polygon(path)?);
-        }
-        if let Some(path) = &self.windows {
-            windows.extend(load_windows(path)?);
-        }
-        Ok(windows)
     }
 
     pub(super) fn filter(&self) -> ShotFilter {
