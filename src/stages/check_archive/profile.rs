@@ -14,9 +14,10 @@ use crate::{
     },
     spice::Trajectory,
     stages::{
-        check_ranges::{BiasScan, RangeFigures},
+        check_ranges::{BiasScan, RangeFigures, ScannedRadius},
         group_profiles::Profile,
     },
+    time::Et,
     units::RADIANS_PER_DEGREE,
 };
 
@@ -72,8 +73,10 @@ pub struct ArchiveProfile {
     pub best_correction_s: Option<f64>,
     /// The uncertainty.
     pub correction_uncertainty_s: Option<f64>,
-    /// Largest of the judged figures as a share of its limit.
-    pub share_of_limits: f64,
+    /// Radius of the footprints with which ranges spread least.
+    pub correction_radius: ScannedRadius,
+    /// Largest of the judged figures as a share of its limit; nothing of a profile with too few shots to be judged.
+    pub share_of_limits: Option<f64>,
     /// Limits that are broken, in words.
     pub invalid_because: Vec<String>,
     /// East longitude and latitude of some of the shots, IAU 2000, degrees.
@@ -168,11 +171,13 @@ impl Gathered {
         done
     }
 
+    /// Whether a shot is of another profile: also one that steps back in time, as those of a block at the wrong place do.
     fn is_ended_by(&self, next: &CheckedShot) -> bool {
         let (Some(first), Some(last)) = (self.shots.first(), self.shots.last()) else {
             return false;
         };
         next.orbit != last.orbit
+            || next.et_s < last.et_s
             || next.et_s - last.et_s > Profile::PAUSE_S
             || next.et_s - first.et_s > LONGEST_S
     }
@@ -233,7 +238,8 @@ impl ArchiveProfile {
                 mean(|of| of.spacecraft_m.z),
             ],
             best_correction_s: scan.as_ref().and_then(|scan| scan.best_s),
-            correction_uncertainty_s: scan.and_then(|scan| scan.uncertainty_s),
+            correction_uncertainty_s: scan.as_ref().and_then(|scan| scan.uncertainty_s),
+            correction_radius: scan.map_or_else(ScannedRadius::default, |scan| scan.radius),
             places_deg: places_deg(gathered),
             ..Self::default()
         };
@@ -248,8 +254,8 @@ impl ArchiveProfile {
     }
 
     fn judge(&mut self, rules: &ArchiveRules<'_>) {
-        // Without a position there is nothing to judge, which is said apart.
-        if self.shots == 0 {
+        // What is left of a profile at the edge of a file or of the kernels says nothing; how many there are is said apart.
+        if self.shots < rules.limits.shots_min.max(1) {
             return;
         }
         let figures = RangeFigures {
@@ -262,20 +268,32 @@ impl ArchiveProfile {
             decoding_m: [self.decoding_mean_m, self.decoding_without_outliers_m],
             spacecraft_m: self.spacecraft_m,
         };
-        self.share_of_limits = figures.share_of_limits(rules.limits);
+        self.share_of_limits = Some(figures.share_of_limits(rules.limits));
         let why = || "another orbit, clock or datum than that of the kernels".to_owned();
         self.invalid_because = figures.broken_limits(rules.limits, why);
+    }
+
+    /// Whether it has enough shots to be held against the limits.
+    #[must_use]
+    pub const fn is_judged(&self) -> bool {
+        self.share_of_limits.is_some()
     }
 
     /// `<file>/<orbit>`, with `.2`, `.3` … for later parts.
     #[must_use]
     pub fn id(&self) -> String {
+        self.id_in(&self.file)
+    }
+
+    /// The same with another name for the file.
+    #[must_use]
+    pub fn id_in(&self, file: &str) -> String {
         let part = if self.part > 1 {
             format!(".{}", self.part)
         } else {
             String::new()
         };
-        format!("{}/{}{part}", self.file, self.orbit)
+        format!("{file}/{}{part}", self.orbit)
     }
 }
 
@@ -300,19 +318,29 @@ fn by_off_nadir(shots: &[CheckedShot], outlier: &[bool]) -> (Vec<OffNadirBin>, [
     (bins, [sum / shots.len().max(1) as f64, largest])
 }
 
-/// Scans some hundred shots that are no outliers.
+/// Scans some hundred shots that are no outliers, and for which the kernels have all positions that the scan asks for.
+///
+/// * `outlier` – of the shots that have residuals
 fn scan(
     gathered: &Gathered,
     outlier: &[bool],
     trajectory: &Trajectory,
     rules: &ArchiveRules<'_>,
 ) -> Option<BiasScan> {
-    // Outliers are counted among shots with residuals alone.
-    if gathered.shots.len() != outlier.len() {
-        return None;
-    }
-    let kept = gathered.samples.iter().filter(|(at, _)| !outlier[*at]);
-    let kept: Vec<Footprint> = kept.map(|(_, shot)| *shot).collect();
+    let mut flags = outlier.iter().copied();
+    let is_left_out = |shot: &CheckedShot| match shot.residuals {
+        Some(_) => flags.next().unwrap_or(true),
+        None => true,
+    };
+    let left_out: Vec<bool> = gathered.shots.iter().map(is_left_out).collect();
+    let reach_s = rules.limits.scan_half_width_s;
+    let is_reached = |shot: &Footprint| {
+        let at = Et::from_seconds(shot.et_tag_s);
+        let ends = [-reach_s, 0.0, reach_s].map(|late_s| trajectory.position(at.plus(late_s)));
+        ends.iter().all(Option::is_some)
+    };
+    let kept = gathered.samples.iter().filter(|(at, _)| !left_out[*at]);
+    let kept: Vec<Footprint> = kept.map(|(_, shot)| *shot).filter(is_reached).collect();
     let step = kept.len().div_ceil(SCANNED).max(1);
     let thinned: Vec<Footprint> = kept.into_iter().step_by(step).collect();
     BiasScan::of(&thinned, trajectory, rules.limits)
