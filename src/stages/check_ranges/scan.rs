@@ -15,11 +15,11 @@ use serde::{Deserialize, Serialize};
 use crate::{
     config::{RangeCheckConfig, SCAN_STEPS_MAX},
     footprints::Footprint,
-    frames::MarsIau2000,
+    frames::{MarsFixed as _, MarsIau2000, Position},
     geom::{
-        mars_rotation::mars_rotation,
+        mars_rotation::{frame_rotation_3, mars_rotation, mars_spin_rad_s},
         range_residuals::{footprint, own_spacecraft, range_residual_m},
-        statistics::{Summary, Trend},
+        statistics::{Trend, mean_and_deviation},
     },
     spice::Trajectory,
     time::Et,
@@ -86,49 +86,83 @@ impl BiasScan {
         if shots.len() < SHOTS_MIN {
             return None;
         }
-        let raw = Self::with(ScannedRadius::Raw, shots, trajectory, limits);
-        let crossover = Self::with(ScannedRadius::Crossover, shots, trajectory, limits);
+        let sighted: Vec<Sighted> = shots.iter().map(Sighted::of).collect();
+        let [mut raw, mut crossover] =
+            [ScannedRadius::Raw, ScannedRadius::Crossover].map(Self::empty);
+        let spin_rad_s = mars_spin_rad_s(MarsIau2000::model()).z;
+        for correction_s in corrections(limits) {
+            let turn = frame_rotation_3(spin_rad_s * correction_s);
+            let residual = |shot: &Sighted| shot.residuals_m(trajectory, correction_s, &turn);
+            let residuals: Option<Vec<[f64; 2]>> = sighted.iter().map(residual).collect();
+            // Corrections that lead out of the kernels are left out.
+            if let Some(residuals) = residuals {
+                for (scan, which) in [(&mut raw, 0), (&mut crossover, 1)] {
+                    let residuals: Vec<f64> = residuals.iter().map(|of| of[which]).collect();
+                    scan.correction_s.push(correction_s);
+                    scan.spread_m.push(mean_and_deviation(&residuals)[1]);
+                }
+            }
+        }
         let is_calmer = crossover.least_spread_m() < CALMER * raw.least_spread_m();
         let mut scan = if is_calmer { crossover } else { raw };
+        scan.best_s = best_s(&scan);
         scan.uncertainty_s = scan
             .best_s
             .and_then(|best_s| uncertainty_s(shots, scan.radius, trajectory, best_s));
         Some(scan)
     }
 
-    /// The scan with one of the radii, still without its uncertainty.
-    fn with(
-        radius: ScannedRadius,
-        shots: &[Footprint],
-        trajectory: &Trajectory,
-        limits: &RangeCheckConfig,
-    ) -> Self {
-        let mut scan = Self {
+    const fn empty(radius: ScannedRadius) -> Self {
+        Self {
             radius,
             correction_s: Vec::new(),
             spread_m: Vec::new(),
             best_s: None,
             uncertainty_s: None,
-        };
-        for correction_s in corrections(limits) {
-            let residuals: Option<Vec<f64>> = shots
-                .iter()
-                .map(|shot| residual_m(shot, radius, trajectory, correction_s))
-                .collect();
-            // Corrections that lead out of the kernels are left out.
-            if let Some(residuals) = residuals {
-                scan.correction_s.push(correction_s);
-                scan.spread_m
-                    .push(Summary::of(&residuals).standard_deviation);
-            }
         }
-        scan.best_s = best_s(&scan);
-        scan
     }
 
     /// The least of its spreads, metres.
     fn least_spread_m(&self) -> f64 {
         self.spread_m.iter().copied().fold(f64::INFINITY, f64::min)
+    }
+}
+
+/// What of a shot stays the same for all corrections.
+struct Sighted {
+    tag: Et,
+    range_m: f64,
+    /// With the raw and the corrected radius.
+    footprints: [Position<MarsIau2000>; 2],
+    /// From J2000 to Mars at the tag.
+    to_mars: Matrix3<f64>,
+}
+
+impl Sighted {
+    fn of(shot: &Footprint) -> Self {
+        let tag = Et::from_seconds(shot.et_tag_s);
+        Self {
+            tag,
+            range_m: shot.range_m,
+            footprints: [shot.radius_m, shot.radius_crossover_m]
+                .map(|radius_m| footprint(shot, radius_m)),
+            to_mars: *mars_rotation::<MarsIau2000>(tag).matrix(),
+        }
+    }
+
+    /// Range − distance to both footprints.
+    ///
+    /// * `turn` – of Mars in the time of the correction: in seconds its axis moves by less than 1e-6 m on the ground
+    fn residuals_m(
+        &self,
+        trajectory: &Trajectory,
+        correction_s: f64,
+        turn: &Matrix3<f64>,
+    ) -> Option<[f64; 2]> {
+        let position = trajectory.position(self.tag.plus(correction_s))?;
+        let spacecraft = Position::new(turn * (self.to_mars * position.xyz_m));
+        let footprints = self.footprints.each_ref();
+        Some(footprints.map(|of| range_residual_m(self.range_m, &spacecraft, of)))
     }
 }
 
