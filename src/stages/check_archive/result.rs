@@ -163,13 +163,13 @@ impl ArchiveRanges {
         if short > 0 {
             let least = self.limits.shots_min;
             remarks.push(format!(
-                "{short} profiles have fewer than {least} shots: not judged"
+                "profiles of fewer than {least} shots, which are not judged: {short}"
             ));
         }
         if !self.copies.is_empty() {
             let count = self.copies.len();
             remarks.push(format!(
-                "{count} files are copies of others: their shots count once"
+                "copies of other files, whose shots count once: {count}"
             ));
         }
         let complaints = self.sum(|file| file.complaint_count);
@@ -301,7 +301,7 @@ mod tests {
         let good = ranges(vec![profile(1, 900, Some(0.4)), remnant()]);
         let verdict = good.verdict();
         assert!(verdict.valid, "{:?}", verdict.reasons);
-        assert!(verdict.remarks[0].starts_with("1 profiles have fewer than 20 shots"));
+        assert!(verdict.remarks[0].starts_with("profiles of fewer than 20 shots"));
         assert!(!ranges(vec![remnant()]).verdict().valid);
         let bad = ranges(vec![
             remnant(),
