@@ -87,3 +87,22 @@ fn files_that_are_no_text_are_refused_before_they_are_parsed() {
     assert_eq!(kinds[3], Kind::Io);
     assert_messages("config_no_text", &told);
 }
+
+#[test]
+fn a_folder_of_the_service_is_one_or_is_away() {
+    let folder = folder();
+    let told = |sites: &str| {
+        let text = format!("[inputs]\nsites = [{sites:?}]\nkernels = [\"not_mounted\"]\n");
+        let found = config::parse_service(&text, &folder.path().join("areograph.toml"));
+        found.err().map(|problems| problems.to_string())
+    };
+    assert_eq!(told("."), None);
+    assert_eq!(told("away"), None);
+    for (sites, expected) in [
+        ("there.txt", "there.txt is a file"),
+        ("", "a folder; an empty text names none"),
+    ] {
+        let message = told(sites).unwrap();
+        assert!(message.contains(expected), "{message}");
+    }
+}

@@ -6,6 +6,8 @@
     reason = "helpers of tests fail as tests do"
 )]
 
+#[path = "common/brute_force.rs"]
+mod brute_force;
 #[path = "track/mod.rs"]
 mod track;
 
@@ -20,18 +22,12 @@ use std::{
 use areograph::{
     altimetry::{DatumChoice, ShotFilter},
     error::{Error, Result},
-    frames::{MarsDatum, MarsIau2000},
-    geom::{
-        ellipsoid::{Spherical, spherical_to_xyz_m},
-        mars_rotation::convert_datum,
-        window::{Region, WindowShape},
-    },
-    pds::{
-        archive::{Found, Indexes, Judged, Query, Sink, Source, search},
-        pedr::{FieldGuard, File},
-    },
+    frames::MarsDatum,
+    geom::window::{Region, WindowShape},
+    pds::archive::{Found, Indexes, Judged, Query, Sink, Source, search},
     time::{Et, Interval},
 };
+use brute_force::{TrueShot, every_shot};
 use proptest::{prelude::*, test_runner::TestRunner};
 use track::{DEGREE, FRAMES, write, write_frames};
 
@@ -106,44 +102,19 @@ fn archive(folder: &Path) -> Vec<PathBuf> {
     files.to_vec()
 }
 
-/// Every shot of the files with its position in IAU 2000 and its time.
-fn all_shots(paths: &[PathBuf]) -> Vec<(Row, [f64; 2], f64)> {
-    let mut shots = Vec::new();
-    for (index, path) in paths.iter().enumerate() {
-        let file = File::open(path).expect("a readable file");
-        let datum = file.label().datum.expect("a label with its datum");
-        for (row, frame) in file.frames(0..file.records().len(), FieldGuard::new(Some(7.25))) {
-            let frame = frame.expect("a good frame");
-            for shot in (1..=20).filter_map(|shot| frame.shot(shot)) {
-                let at = Et::from_seconds(shot.et_tag_s);
-                let direction = spherical_to_xyz_m(shot.longitude_rad, shot.latitude_rad, 1.0);
-                let direction = convert_datum::<MarsIau2000>(direction, datum, at, at);
-                let there = Spherical::from_xyz_m(&direction.xyz_m);
-                if shot.range_m > 0.0 {
-                    let record = file.record_number(row);
-                    let place = [there.longitude_rad, there.latitude.0];
-                    shots.push(((index, record, shot.shot, Vec::new()), place, shot.et_tag_s));
-                }
-            }
-        }
-    }
-    shots
-}
-
-fn brute_force(
-    shots: &[(Row, [f64; 2], f64)],
-    regions: &[Region],
-    time: Option<Interval>,
-) -> Vec<Row> {
-    let in_time = |tag_s: &f64| time.is_none_or(|time| time.contains(Et::from_seconds(*tag_s)));
-    let shots = shots.iter().filter(|(_, _, tag_s)| in_time(tag_s));
-    let rows = shots.map(|((file, record, shot, _), [longitude, latitude], _)| {
+fn brute_force(shots: &[TrueShot], regions: &[Region], time: Option<Interval>) -> Vec<Row> {
+    let in_time = |of: &&TrueShot| {
+        let at = Et::from_seconds(of.shot.et_tag_s);
+        time.is_none_or(|time| time.contains(at))
+    };
+    let rows = shots.iter().filter(in_time).map(|of| {
+        let [longitude, latitude] = of.place_rad;
         let held = (0..).zip(regions);
-        let held = held.filter(|(_, region)| region.contains(*longitude, *latitude));
+        let held = held.filter(|(_, region)| region.contains(longitude, latitude));
         (
-            *file,
-            *record,
-            *shot,
+            usize::from(of.shot.file),
+            of.shot.record,
+            of.shot.shot,
             held.map(|(window, _)| window).collect(),
         )
     });
@@ -215,7 +186,7 @@ fn shape() -> impl Strategy<Value = WindowShape> {
 fn any_windows_and_times_hold_the_shots_that_brute_force_finds() {
     let folder = tempfile::tempdir().unwrap();
     let paths = archive(folder.path());
-    let (sources, shots, filter) = (open(&paths), all_shots(&paths), filter());
+    let (sources, shots, filter) = (open(&paths), every_shot(&paths), filter());
     let mut rows_found = 0;
     let count = std::cell::RefCell::new(&mut rows_found);
     let time = proptest::option::of((-100.0..9_000.0_f64, 0.0..5_000.0_f64));

@@ -301,29 +301,95 @@ fn files_that_hold_no_records_are_not_indexed() {
 #[test]
 fn folders_are_listed_in_order_and_what_cannot_be_looked_into_is_told() {
     let folder = tempfile::tempdir().unwrap();
-    for name in ["b/two.B", "a/one.b", "a/label.lbl", "three.b"] {
-        let path = folder.path().join(name);
+    let elsewhere = tempfile::tempdir().unwrap();
+    let file = |folder: &Path, name: &str| {
+        let path = folder.join(name);
         fs::create_dir_all(path.parent().unwrap()).unwrap();
         overwrite(&path, b"");
+    };
+    for name in [
+        "b/two.B",
+        "a/one.b",
+        "a/label.lbl",
+        "a/notes.gz",
+        "three.b",
+        "three.b.Z",
+        "four.B.gz",
+    ] {
+        file(folder.path(), name);
     }
+    file(elsewhere.path(), "disc/five.b");
     fs::create_dir(folder.path().join("folder.b")).unwrap();
-    std::os::unix::fs::symlink("nowhere", folder.path().join("dangling.b")).unwrap();
-    std::os::unix::fs::symlink(folder.path(), folder.path().join("circle")).unwrap();
+    let link = |to: &Path, name: &str| {
+        std::os::unix::fs::symlink(to, folder.path().join(name)).unwrap();
+    };
+    link(Path::new("nowhere"), "dangling.b");
+    link(Path::new("not_mounted"), "volume_9");
+    link(elsewhere.path(), "volume_1");
+    // Circles: to the folder itself, to one beside the link, and from a volume back.
+    link(folder.path(), "circle");
+    link(Path::new("b"), "a_again");
+    std::os::unix::fs::symlink(folder.path(), elsewhere.path().join("back")).unwrap();
     let listing = Listing::below(folder.path());
     let names: Vec<_> = listing
         .paths
         .iter()
         .map(|path| path.strip_prefix(folder.path()).unwrap())
         .collect();
-    assert_eq!(names, ["a/one.b", "b/two.B", "three.b"].map(Path::new));
-    assert_eq!(listing.failures.len(), 1);
-    assert!(
-        listing.failures[0]
-            .to_string()
-            .contains("dangling.b: cannot open")
-    );
+    let expected = ["a/one.b", "b/two.B", "three.b", "volume_1/disc/five.b"];
+    assert_eq!(names, expected.map(Path::new));
+    let told: Vec<String> = listing.failures.iter().map(ToString::to_string).collect();
+    assert_eq!(told.len(), 3, "{told:#?}");
+    for (failure, expected) in told.iter().zip([
+        "dangling.b: cannot open",
+        "four.B.gz: a compressed PEDR file; expected four.B beside it",
+        "volume_9: cannot open",
+    ]) {
+        assert!(failure.contains(expected), "{failure}");
+    }
+    // The same files named twice, and by another name, are taken once.
+    let again = [
+        folder.path().join("a"),
+        folder.path().join("a/one.b"),
+        folder.path().join("circle/a/one.b"),
+        folder.path().join("gone.b"),
+    ];
+    let paths = Listing::of(&again).paths;
+    assert_eq!(paths, [again[1].clone(), again[3].clone()]);
     let gone = Listing::below(&folder.path().join("gone"));
     assert!(gone.paths.is_empty() && gone.failures.len() == 1);
+}
+
+#[test]
+fn a_folder_that_is_away_for_a_while_keeps_its_entries() {
+    let folder = tempfile::tempdir().unwrap();
+    let elsewhere = tempfile::tempdir().unwrap();
+    let (volume, away) = (
+        elsewhere.path().join("volume"),
+        elsewhere.path().join("away"),
+    );
+    fs::create_dir(&volume).unwrap();
+    for (place, name) in [(folder.path(), "ap19019l.b"), (&volume, "ap19020l.b")] {
+        write(&place.join(name), MarsDatum::Iau2000, 0, |_, _| ());
+        age(&place.join(name));
+    }
+    std::os::unix::fs::symlink(&volume, folder.path().join("volume")).unwrap();
+    let index = || {
+        let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_areograph"));
+        let command = command.args(["--quiet", "pedr", "index"]);
+        let output = command.arg(folder.path()).output().unwrap();
+        let said = String::from_utf8(output.stdout).unwrap();
+        (output.status.success(), said)
+    };
+    let (is_well, said) = index();
+    assert!(is_well && said.contains("2 of them read now"), "{said}");
+    fs::rename(&volume, &away).unwrap();
+    let (is_well, said) = index();
+    assert!(!is_well && said.contains("0 gone"), "{said}");
+    fs::rename(&away, &volume).unwrap();
+    let (is_well, said) = index();
+    assert!(is_well && said.contains("2 files"), "{said}");
+    assert!(said.contains("0 of them read now"), "{said}");
 }
 
 /// A small archive, and the bytes of its index.

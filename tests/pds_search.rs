@@ -2,6 +2,8 @@
 
 #![allow(clippy::expect_used, reason = "helpers of tests fail as tests do")]
 
+#[path = "common/brute_force.rs"]
+mod brute_force;
 #[path = "common/search.rs"]
 mod search;
 #[path = "track/mod.rs"]
@@ -17,19 +19,12 @@ use areograph::{
     config::{PedrConfig, WindowConfig},
     files::HashedFile,
     footprints::Footprint,
-    frames::{MarsDatum, MarsIau2000},
-    geom::{
-        ellipsoid::{Spherical, spherical_to_xyz_m},
-        mars_rotation::convert_datum,
-        window::{Region, WindowShape},
-    },
-    pds::{
-        archive::Indexes,
-        pedr::{FieldGuard, File, Reason},
-    },
+    frames::MarsDatum,
+    geom::window::{Region, WindowShape},
+    pds::{archive::Indexes, pedr::Reason},
     stages::search_footprints::{self, SearchResult, ShotRejection},
-    time::Et,
 };
+use brute_force::every_shot;
 use proptest::prelude::*;
 use search::search_footprints;
 use track::{DEGREE, FRAMES, write};
@@ -83,38 +78,23 @@ fn box_deg(west: f64, width: f64, south: f64, north: f64) -> WindowShape {
     }
 }
 
-/// Every shot of every file, judged by its own position in IAU 2000, without filters.
+/// Every shot of every file that the filter keeps, judged by its own position in IAU 2000.
 fn brute_force(pedr: &PedrConfig, windows: &[WindowConfig]) -> Vec<(u16, u32, u8, u64)> {
     let regions: Vec<Region> = windows.iter().map(|w| Region::new(&w.shape)).collect();
-    let mut found = Vec::new();
-    for (index, path) in (0..).zip(&pedr.files) {
-        let file = File::open(path).expect("a readable file");
-        let datum = file.label().datum.expect("a label with its datum");
-        for (row, frame) in file.frames(0..file.records().len(), FieldGuard::new(Some(7.25))) {
-            let frame = frame.expect("a good frame");
-            for shot in (1..=20).filter_map(|shot| frame.shot(shot)) {
-                let at = Et::from_seconds(shot.et_tag_s);
-                let direction = spherical_to_xyz_m(shot.longitude_rad, shot.latitude_rad, 1.0);
-                let direction = convert_datum::<MarsIau2000>(direction, datum, at, at);
-                let there = Spherical::from_xyz_m(&direction.xyz_m);
-                let mut bits = 0;
-                for (bit, region) in regions.iter().enumerate() {
-                    if region.contains(there.longitude_rad, there.latitude.0) {
-                        bits |= 1 << bit;
-                    }
-                }
-                if bits != 0 && keeps(&pedr.filter, &shot) {
-                    found.push((index, file.record_number(row), shot.shot, bits));
-                }
-            }
-        }
-    }
-    found
+    let kept = every_shot(&pedr.files).into_iter();
+    let kept = kept.filter(|of| keeps(&pedr.filter, &of.shot));
+    let rows = kept.map(|of| {
+        let [longitude_rad, latitude_rad] = of.place_rad;
+        let holds = |region: &Region| region.contains(longitude_rad, latitude_rad);
+        let held = regions.iter().enumerate().filter(|(_, of)| holds(of));
+        let bits = held.fold(0, |bits, (bit, _)| bits | 1 << bit);
+        (of.shot.file, of.shot.record, of.shot.shot, bits)
+    });
+    rows.filter(|(.., bits)| *bits != 0).collect()
 }
 
 fn keeps(filter: &ShotFilter, shot: &Footprint) -> bool {
-    shot.range_m > 0.0
-        && filter.classes.contains(&shot.class)
+    filter.classes.contains(&shot.class)
         && filter.channels.contains(&shot.channel)
         && filter.attitude_flags.contains(&shot.attitude_flag)
         && shot.off_nadir_rad <= filter.off_nadir_max_rad

@@ -104,6 +104,7 @@ impl Archive {
             kernels: &self.kernels(),
             out,
             clock: clock(),
+            allow_uncovered: false,
             force: true,
             stop: &RUN_ON,
         };

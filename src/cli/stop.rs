@@ -2,12 +2,45 @@
 
 use std::{
     process,
-    sync::atomic::{AtomicBool, Ordering},
+    sync::{
+        Arc,
+        atomic::{AtomicBool, Ordering},
+    },
 };
 
-use tokio::signal::unix::{SignalKind, signal};
+use tokio::{
+    runtime::{Builder, Runtime},
+    signal::unix::{SignalKind, signal},
+};
 
-use crate::error::Kind;
+use crate::error::{IoError, Kind, Result};
+
+/// A thread that waits for signals on behalf of a command that is not asynchronous.
+pub(super) struct Signals {
+    stop: Arc<AtomicBool>,
+    _waiting: Runtime,
+}
+
+impl Signals {
+    /// Begins to wait.
+    pub(super) fn heard() -> Result<Self> {
+        let mut builder = Builder::new_multi_thread();
+        let runtime = builder.worker_threads(1).enable_all().build();
+        let runtime = runtime.map_err(IoError::on("start threads"))?;
+        let stop = Arc::new(AtomicBool::new(false));
+        let told = Arc::clone(&stop);
+        runtime.spawn(async move { on_signals(&told).await });
+        Ok(Self {
+            stop,
+            _waiting: runtime,
+        })
+    }
+
+    /// Set once there was one.
+    pub(super) const fn stop(&self) -> &Arc<AtomicBool> {
+        &self.stop
+    }
+}
 
 /// Sets `stop` at the first signal and ends the program at the second.
 pub(super) async fn on_signals(stop: &AtomicBool) {

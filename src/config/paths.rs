@@ -20,28 +20,28 @@ const FILES_MAX: usize = 65_535;
 const WILD_PARTS_MAX: usize = 3;
 
 /// A path that leads where it should, counted from the configuration's folder.
-pub(super) struct Existing {
+pub(super) struct Place {
     kind: ValueKind,
-    is_there: fn(&Path) -> bool,
+    suits: fn(&Path) -> bool,
 }
 
 /// The path of a file that is there.
-pub(super) const FILE: Existing = Existing {
+pub(super) const FILE: Place = Place {
     kind: ValueKind::File,
-    is_there: Path::is_file,
+    suits: Path::is_file,
 };
 /// The path of a folder that is there.
-pub(super) const FOLDER: Existing = Existing {
+pub(super) const FOLDER: Place = Place {
     kind: ValueKind::Folder,
-    is_there: Path::is_dir,
+    suits: Path::is_dir,
 };
 /// The path of a folder that may be away for a while, as a mirror may that is not mounted.
-pub(super) const MIRROR: Existing = Existing {
+pub(super) const MIRROR: Place = Place {
     kind: ValueKind::Mirror,
-    is_there: |_| true,
+    suits: |path| path.metadata().map_or(true, |found| found.is_dir()),
 };
 
-impl Form for Existing {
+impl Form for Place {
     type Value = PathBuf;
 
     fn kind(&self) -> ValueKind {
@@ -54,7 +54,9 @@ impl Form for Existing {
             return None;
         };
         let path = review.resolve(written);
-        if written.is_empty() || !(self.is_there)(&path) {
+        if written.is_empty() {
+            found.refuse(review, format!("{}; an empty text names none", self.kind));
+        } else if !(self.suits)(&path) {
             let (kind, shown) = (&self.kind, path.display());
             found.refuse(review, format!("{kind}; {shown} is {}", what_is_at(&path)));
         } else if !review.admit(&path, found.value.span(), &found.key) {

@@ -3,10 +3,11 @@
 //! ```text
 //!  list files ─► per file, unless its result is stored:  load ─► check ─► store
 //!                                    one thread, with CSPICE      all threads
-//!  results in order of time ─► verdict ─► shots of the worst profiles ─► products, manifest last
+//!  results in order of time, every shot once ─► shots of the worst profiles ─► verdict ─► products, manifest last
 //! ```
 
 mod checker;
+mod gather;
 mod manifest;
 
 use std::{
@@ -23,6 +24,7 @@ use std::{
 pub use self::checker::ArchiveProgress;
 use self::{
     checker::{Checker, Part, Results},
+    gather::{Gathered, file_failure, gather},
     manifest::manifest,
 };
 use super::{
@@ -35,14 +37,16 @@ use crate::{
     config::RangeCheckConfig,
     error::{Cause, Error, Kind, Locate as _, Result, Stopped},
     files::{Identity, InputFiles, file_name},
-    pds::archive::Listing,
-    products::{ArchiveProducts, WorstProfile, write_archive_products, write_profile_shots},
+    pds::{archive::Listing, pedr::RULES},
+    products::{
+        ArchiveProducts, Product, WorstProfile, write_archive_products, write_profile_shots,
+    },
     report::archive_page,
     spice::{KernelSet, KernelView, Session},
     stage::{Input as _, Inputs},
     stages::check_archive::{
-        ArchiveRanges, ArchiveRules, ArchiveSource, CheckedFile, FileFailure, FileRanges,
-        KernelUsed, METHOD, NAME, shots_of,
+        ArchiveProfile, ArchiveRanges, ArchiveRules, ArchiveSource, CheckedFile, FileRanges,
+        KernelUsed, METHOD, NAME, TRAJECTORY_TOLERANCE_M, shots_of,
     },
     store::{
         cache::StageCache,
@@ -55,7 +59,7 @@ use crate::{
 };
 
 /// Raised when the products are laid out anew.
-const LAYOUT: u32 = 1;
+const LAYOUT: u32 = 2;
 /// Profiles whose shots are written.
 const WORST: usize = 12;
 /// Step of the scan of clock biases, seconds: the parabola through the variances tells what lies between.
@@ -72,6 +76,8 @@ pub struct ArchiveRequest<'a> {
     pub out: &'a Path,
     /// The clock of MOLA.
     pub clock: MolaClock,
+    /// Whether shots without a position in the kernels leave the archive valid.
+    pub allow_uncovered: bool,
     /// Check every file again, whatever is stored.
     pub force: bool,
     /// Looked at before every load.
@@ -144,10 +150,11 @@ pub fn check_archive(
         limits: archive_limits(),
         filter: archive_filter(),
         view,
+        kernels: &files,
         cache: StageCache::new(&request.out.join(CACHE), request.force),
         progress,
     };
-    let (ranges, failures) = archive.check_all().in_stage(NAME)?;
+    let (mut ranges, mut failures) = archive.check_all().in_stage(NAME)?;
     files.verify_all()?;
     let inputs = archive.publish_inputs(&ranges);
     let known = standing(request.out, &archive.cache, &inputs);
@@ -155,9 +162,8 @@ pub fn check_archive(
         Ok(manifest) => (manifest, true),
         Err(reason) => {
             tracing::info!(stage = PUBLISH, %reason, "running");
-            let manifest = archive.publish(&ranges, &inputs).in_stage(PUBLISH)?;
-            keep(&archive.cache, inputs, &manifest).in_stage(PUBLISH)?;
-            (manifest, false)
+            let published = archive.publish(&mut ranges, &mut failures);
+            (published.in_stage(PUBLISH)?, false)
         }
     };
     Ok(ArchiveOutcome {
@@ -173,6 +179,8 @@ struct Archive<'a> {
     limits: RangeCheckConfig,
     filter: ShotFilter,
     view: KernelView,
+    /// The kernels, which must stay what they are.
+    kernels: &'a InputFiles,
     cache: StageCache,
     progress: &'a (dyn Fn(&ArchiveProgress) + Sync),
 }
@@ -193,12 +201,13 @@ impl Archive<'_> {
         inputs.setting("mola_clock", &self.request.clock);
         inputs.setting("range_check", &self.limits);
         inputs.setting("filter", &self.filter);
+        inputs.setting("pedr_rules", &RULES);
+        inputs.setting("trajectory_tolerance_m", &TRAJECTORY_TOLERANCE_M);
         inputs
     }
 
     fn check_all(&self) -> Result<(ArchiveRanges, Vec<Error>)> {
-        let mut failures = Vec::new();
-        let paths = self.paths(&mut failures);
+        let Listing { paths, failures } = Listing::of(self.request.paths);
         if paths.is_empty() {
             return Err(failures
                 .into_iter()
@@ -230,25 +239,8 @@ impl Archive<'_> {
             ..ArchiveProgress::default()
         };
         (self.progress)(&start);
-        results.extend(self.check_todo(&paths, &todo, start)?);
-        Ok(self.gather(&paths, &sources, results, failures))
-    }
-
-    /// The files, each once, in the order of their names.
-    fn paths(&self, failures: &mut Vec<Error>) -> Vec<PathBuf> {
-        let mut paths = Vec::new();
-        for path in self.request.paths {
-            if path.is_dir() {
-                let listing = Listing::below(path);
-                failures.extend(listing.failures);
-                paths.extend(listing.paths);
-            } else {
-                paths.push(path.clone());
-            }
-        }
-        paths.sort();
-        paths.dedup();
-        paths
+        results.extend(self.check_todo(&paths, &sources, &todo, start)?);
+        Ok(self.ranges(gather(&paths, &sources, results, failures)))
     }
 
     /// Under which name the result of a file is stored, and what it depends on.
@@ -264,6 +256,7 @@ impl Archive<'_> {
     fn check_todo(
         &self,
         paths: &[PathBuf],
+        sources: &BTreeMap<usize, Identity>,
         todo: &BTreeMap<usize, (String, Inputs)>,
         start: ArchiveProgress,
     ) -> Result<Results> {
@@ -273,6 +266,7 @@ impl Archive<'_> {
         let session = self.view.session()?;
         let checker = Checker {
             rules: self.rules(),
+            kernels: self.kernels,
             cache: &self.cache,
             todo,
             progress: self.progress,
@@ -281,7 +275,10 @@ impl Archive<'_> {
             // Nothing waits in between: two loads stand in memory at most.
             let (parts, received) = sync_channel(0);
             let worker = scope.spawn(|| checker.run(received, start));
-            let loaded = self.load_all(paths, todo, session, &parts);
+            let files = todo
+                .keys()
+                .map(|file| (*file, &*paths[*file], &sources[file]));
+            let loaded = self.load_all(files, session, &parts);
             drop(parts);
             let checked = worker.join();
             loaded?;
@@ -289,15 +286,16 @@ impl Archive<'_> {
         })
     }
 
-    fn load_all(
+    /// Loads files, each as it was when it was first looked at.
+    fn load_all<'f>(
         &self,
-        paths: &[PathBuf],
-        todo: &BTreeMap<usize, (String, Inputs)>,
+        files: impl Iterator<Item = (usize, &'f Path, &'f Identity)>,
         session: &Session,
         parts: &SyncSender<Part>,
     ) -> Result<()> {
-        for file in todo.keys() {
-            if !self.load_file(*file, &paths[*file], session, parts)? {
+        for (file, path, identity) in files {
+            let source = ArchiveSource::reopen(path, identity);
+            if !self.load_file(file, source, session, parts)? {
                 // Whoever checks has stopped, and says why.
                 return Ok(());
             }
@@ -309,7 +307,7 @@ impl Archive<'_> {
     fn load_file(
         &self,
         file: usize,
-        path: &Path,
+        source: Result<ArchiveSource>,
         session: &Session,
         parts: &SyncSender<Part>,
     ) -> Result<bool> {
@@ -322,7 +320,7 @@ impl Archive<'_> {
                 })
                 .is_ok()
         };
-        let source = match ArchiveSource::open(path) {
+        let source = match source {
             Ok(source) => Arc::new(source),
             Err(failure) => return Ok(send(0, Err(failure))),
         };
@@ -341,38 +339,14 @@ impl Archive<'_> {
         Ok(true)
     }
 
-    /// The results in the order of time, and the failures.
-    fn gather(
-        &self,
-        paths: &[PathBuf],
-        identities: &BTreeMap<usize, Identity>,
-        results: Results,
-        mut failures: Vec<Error>,
-    ) -> (ArchiveRanges, Vec<Error>) {
-        let mut told: Vec<FileFailure> = failures.iter().map(file_failure).collect();
-        let mut files = Vec::new();
-        for (file, result) in results {
-            match result {
-                Ok(found) => files.push(CheckedFile {
-                    path: paths[file].clone(),
-                    identity: identities[&file],
-                    found,
-                }),
-                Err(failure) => {
-                    told.push(file_failure(&failure));
-                    failures.push(failure);
-                }
-            }
-        }
-        let first_s = |file: &CheckedFile| {
-            let first = file.found.profiles.first();
-            first.map_or(f64::INFINITY, |profile| profile.start_et_s)
-        };
-        files.sort_by(|a, b| first_s(a).total_cmp(&first_s(b)));
+    /// What was found, and why files are not in it.
+    fn ranges(&self, gathered: Gathered) -> (ArchiveRanges, Vec<Error>) {
         let kernels = self.view.kernels().into_iter().flat_map(KernelSet::kernels);
         let ranges = ArchiveRanges {
-            files,
-            failures: told,
+            files: gathered.files,
+            copies: gathered.copies,
+            failures: gathered.failures.iter().map(file_failure).collect(),
+            allow_uncovered: self.request.allow_uncovered,
             clock: self.request.clock.clone(),
             limits: self.limits.clone(),
             filter: self.filter.clone(),
@@ -385,7 +359,7 @@ impl Archive<'_> {
                 })
                 .collect(),
         };
-        (ranges, failures)
+        (ranges, gathered.failures)
     }
 
     fn publish_inputs(&self, ranges: &ArchiveRanges) -> Inputs {
@@ -397,29 +371,47 @@ impl Archive<'_> {
             .map(|file| (file.path.to_string_lossy(), &file.found.blake3))
             .collect();
         inputs.setting("files", &files);
+        inputs.setting("copies", &ranges.copies);
         inputs.setting("failures", &ranges.failures);
+        inputs.setting("allow_uncovered", &ranges.allow_uncovered);
         inputs
     }
 
-    fn publish(&self, ranges: &ArchiveRanges, inputs: &Inputs) -> Result<Manifest> {
+    /// Publishes, and notes what could not be read again for it.
+    fn publish(&self, ranges: &mut ArchiveRanges, failures: &mut Vec<Error>) -> Result<Manifest> {
         let staging = staging(self.request.out)?;
-        let mut written = Vec::new();
-        let mut worst = Vec::new();
+        let (mut written, mut shots) = (Vec::new(), Vec::new());
         for (file, profile) in ranges.worst(WORST) {
             Stopped::check(self.request.stop)?;
-            let session = self.view.session()?;
-            let rules = self.rules();
-            let shots = shots_of(&file.path, &file.identity, profile, session, &rules)?;
-            let product = write_profile_shots(&staging, profile, &shots)?;
-            worst.push(WorstProfile {
-                file,
-                profile,
-                shots: product.path.to_string_lossy().into_owned(),
-                // Without leap seconds there is no UTC, and nothing needs it.
-                start_utc: session.et_to_utc(Et::from_seconds(profile.start_et_s)).ok(),
-            });
-            written.push(product);
+            match self.shots_of(file, profile, &staging)? {
+                Ok(product) => {
+                    shots.push(Some(product.path.to_string_lossy().into_owned()));
+                    written.push(product);
+                }
+                Err(failure) => {
+                    shots.push(None);
+                    failures.push(failure);
+                }
+            }
         }
+        let lost = shots.iter().filter(|shots| shots.is_none()).count();
+        let lost = &failures[failures.len() - lost..];
+        ranges.failures.extend(lost.iter().map(file_failure));
+        let ranges = &*ranges;
+        let worst = ranges.worst(WORST).into_iter().zip(shots);
+        let worst: Vec<WorstProfile<'_>> = worst
+            .map(|((file, profile), shots)| {
+                let start = Et::from_seconds(profile.start_et_s);
+                let session = self.view.session()?;
+                Ok(WorstProfile {
+                    file,
+                    profile,
+                    shots,
+                    // Without leap seconds there is no UTC, and nothing needs it.
+                    start_utc: session.et_to_utc(start).ok(),
+                })
+            })
+            .collect::<Result<_>>()?;
         let verdict = ranges.verdict();
         let page = archive_page(ranges, &worst, &verdict)?;
         let products = ArchiveProducts {
@@ -432,18 +424,29 @@ impl Archive<'_> {
             .into_iter()
             .map(|product| (product.path, product.rows))
             .collect();
+        let inputs = self.publish_inputs(ranges);
         let manifest = Manifest {
             products: entries(&staging, &files)?,
-            ..manifest(ranges, inputs)
+            ..manifest(ranges, &inputs)
         };
         publish(self.request.out, &staging, &manifest)?;
-        Ok(read_manifest(self.request.out).unwrap_or(manifest))
+        let manifest = read_manifest(self.request.out).unwrap_or(manifest);
+        keep(&self.cache, inputs, &manifest)?;
+        Ok(manifest)
     }
-}
 
-fn file_failure(failure: &Error) -> FileFailure {
-    FileFailure {
-        file: failure.file.as_deref().map(file_name).unwrap_or_default(),
-        why: failure.cause.to_string(),
+    /// Writes the shots of a profile, or says why its file does not give them any more.
+    fn shots_of(
+        &self,
+        file: &CheckedFile,
+        profile: &ArchiveProfile,
+        staging: &Path,
+    ) -> Result<Result<Product>> {
+        let (session, rules) = (self.view.session()?, self.rules());
+        match shots_of(&file.path, &file.identity, profile, session, &rules) {
+            Ok(shots) => write_profile_shots(staging, file, profile, &shots).map(Ok),
+            Err(failure) if failure.kind() == Kind::Bug => Err(failure),
+            Err(failure) => Ok(Err(failure)),
+        }
     }
 }

@@ -78,13 +78,13 @@ pub fn range_residual_m<F: Frame>(
     range_m - spacecraft.distance_m(footprint)
 }
 
-/// The footprint with its raw radius.
+/// The footprint with this radius, metres.
 #[must_use]
-pub fn raw_footprint(shot: &Footprint) -> Position<MarsIau2000> {
+pub fn footprint(shot: &Footprint, radius_m: f64) -> Position<MarsIau2000> {
     Position::new(spherical_to_xyz_m(
         shot.longitude_rad,
         shot.latitude_rad,
-        shot.radius_m,
+        radius_m,
     ))
 }
 

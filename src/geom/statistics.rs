@@ -64,20 +64,42 @@ impl Summary {
         if values.is_empty() {
             return Self::default();
         }
-        let n = values.len() as f64;
-        let mean = values.iter().sum::<f64>() / n;
-        let squares: f64 = values.iter().map(|value| (value - mean).powi(2)).sum();
+        let [mean, standard_deviation] = mean_and_deviation(values);
         let (median, nmad) = median_and_nmad(values);
         Self {
             n: u32::try_from(values.len()).unwrap_or(u32::MAX),
             mean,
-            standard_deviation: (squares / (n - 1.0).max(1.0)).sqrt(),
+            standard_deviation,
             median,
             nmad,
             min: values.iter().copied().fold(f64::INFINITY, f64::min),
             max: values.iter().copied().fold(f64::NEG_INFINITY, f64::max),
         }
     }
+
+    /// Largest distance from the median that is no outlier's, for `sigma` robust standard deviations, of values in metres.
+    ///
+    /// The robust standard deviation is the NMAD, at least 1 cm.
+    #[must_use]
+    pub fn outlier_limit_m(&self, sigma: f64) -> f64 {
+        sigma * self.nmad.max(SPREAD_FLOOR_M)
+    }
+
+    /// Whether a value in metres lies farther from the median than this limit; NaN does.
+    #[must_use]
+    pub fn is_outlier(&self, value_m: f64, limit_m: f64) -> bool {
+        // Written so that NaN counts as an outlier.
+        !((value_m - self.median).abs() <= limit_m)
+    }
+}
+
+/// Mean of at least one value, and their standard deviation with divisor n − 1.
+#[must_use]
+pub fn mean_and_deviation(values: &[f64]) -> [f64; 2] {
+    let n = values.len() as f64;
+    let mean = values.iter().sum::<f64>() / n;
+    let squares: f64 = values.iter().map(|value| (value - mean).powi(2)).sum();
+    [mean, (squares / (n - 1.0).max(1.0)).sqrt()]
 }
 
 /// The largest of `values`, `None` of none; NaN if one of them is NaN, so that no limit is kept by chance.
@@ -125,13 +147,10 @@ pub fn outliers(residuals_m: &[f64], sigma: f64) -> Vec<bool> {
     if residuals_m.is_empty() {
         return Vec::new();
     }
-    let (median, nmad) = median_and_nmad(residuals_m);
-    let limit_m = sigma * nmad.max(SPREAD_FLOOR_M);
-    residuals_m
-        .iter()
-        // Written so that NaN counts as an outlier.
-        .map(|value| !((value - median).abs() <= limit_m))
-        .collect()
+    let summary = Summary::of(residuals_m);
+    let limit_m = summary.outlier_limit_m(sigma);
+    let is_outlier = |value: &f64| summary.is_outlier(*value, limit_m);
+    residuals_m.iter().map(is_outlier).collect()
 }
 
 /// Blocks of residuals that count as independent of each other.

@@ -47,7 +47,9 @@ use std::path::Path;
 pub use adjusted_kernels::{
     AdjustedImage, AdjustedKernels, attitude_kernel, position_kernel, write_adjusted_kernels,
 };
-pub use archive::{ArchiveProducts, WorstProfile, write_archive_products, write_profile_shots};
+pub use archive::{
+    ArchiveProducts, WorstProfile, profile_name, write_archive_products, write_profile_shots,
+};
 pub use exchange::{
     ControlMeasure, ControlNetwork, ControlPoint, GroundEstimate, ImageMeasure, LidarPoint,
     NetworkMeasure, NetworkPoint, isis_serial_number, write_control_network, write_gcp,

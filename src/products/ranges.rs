@@ -19,7 +19,7 @@ use crate::{
     geom::statistics::{Summary, Trend},
     schema::DocumentSchema,
     stages::{
-        check_ranges::{BiasScan, ProfileRanges, ShotResiduals},
+        check_ranges::{BiasScan, ProfileRanges, ScannedRadius, ShotResiduals},
         group_profiles::Profile,
     },
 };
@@ -156,6 +156,8 @@ struct ProfileDocument<'a> {
 /// A scan without the members that are not known.
 #[derive(Serialize, JsonSchema)]
 struct Scan<'a> {
+    /// Radius of the footprints: the one with which ranges spread less.
+    radius: ScannedRadius,
     correction_s: &'a [f64],
     spread_m: &'a [f64],
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -362,6 +364,7 @@ fn profile_document<'a>(
 
 fn scan_document(scan: &BiasScan) -> Scan<'_> {
     Scan {
+        radius: scan.radius,
         correction_s: &scan.correction_s,
         spread_m: &scan.spread_m,
         best_s: scan.best_s,

@@ -83,9 +83,9 @@ fn grouped(count: u64) -> String {
 type Figure = fn(&ArchiveProfile) -> f64;
 
 fn over_time(ranges: &ArchiveRanges) -> Result<String> {
-    let checked: Vec<&ArchiveProfile> = ranges.profiles().filter(|of| of.shots > 0).collect();
+    let checked: Vec<&ArchiveProfile> = ranges.profiles().filter(|of| of.is_judged()).collect();
     let Some(first) = checked.first() else {
-        return Ok(paragraph("No profile was checked."));
+        return Ok(paragraph("No profile was judged."));
     };
     let start_s = first.start_et_s;
     let drawn = |keep: &dyn Fn(&ArchiveProfile) -> bool, figure: Figure| -> Vec<(f64, f64)> {
@@ -147,8 +147,8 @@ fn over_time(ranges: &ArchiveRanges) -> Result<String> {
     let scan_plot = Plot::of(
         "Clock correction over time".to_owned(),
         format!(
-            "Correction of time tags by which the ranges of a profile spread least, where it is known to {KNOWN_S} s; the level \
-             line is the one that was used, {} s.",
+            "Correction of time tags by which the ranges of a profile spread least, with raw radii or with those corrected by \
+             crossovers, where it is known to {KNOWN_S} s; the level line is the one that was used, {} s.",
             label(used_s, 3)
         ),
         "days since the first profile",
@@ -198,7 +198,7 @@ fn over_off_nadir(ranges: &ArchiveRanges) -> Result<String> {
         table.row(true, cells);
     }
     let points = |beyond: bool| -> Vec<(f64, f64)> {
-        let checked = ranges.profiles().filter(|of| of.shots > 0);
+        let checked = ranges.profiles().filter(|of| of.is_judged());
         let points: Vec<(f64, f64)> = checked
             .filter(|of| of.invalid_because.is_empty() != beyond)
             .map(|of| {
@@ -289,7 +289,7 @@ fn not_checked(ranges: &ArchiveRanges) -> String {
     let mut body = paragraph(&coverage);
     if !failures.is_empty() {
         let count = ranges.failures.len();
-        body += &paragraph(&format!("{} could not be checked:", counted(count, "file")));
+        body += &paragraph(&format!("Not read, or not read again, {count} in all:"));
         body += &list(&failures);
     }
     let complaints: Vec<String> = ranges

@@ -27,7 +27,7 @@ fn write(site: &SiteProducts) -> Result<String> {
         }
     }
     let words = paragraph(
-        "The correction of the time tags that minimises the spread of the residuals. Nadir profiles constrain it poorly.",
+        "The correction of the time tags that minimises the spread of the residuals, with raw radii, or with those corrected by crossovers where that calms them. Nadir profiles constrain it poorly.",
     );
     let figures = format!("<div class=\"plots\">\n{figures}</div>\n");
     if many(site) {
@@ -42,6 +42,7 @@ fn table(site: &SiteProducts) -> String {
         "Correction of least spread, seconds",
         &[
             Column::Text("profile"),
+            Column::Text("radius"),
             Column::Number("best"),
             Column::Number("uncertainty"),
             Column::Number("configured"),
@@ -60,6 +61,7 @@ fn table(site: &SiteProducts) -> String {
             true,
             [
                 (&ranges.profile).into(),
+                scan.radius.word().into(),
                 with_sign(scan.best_s).into(),
                 plain(scan.uncertainty_s).into(),
                 with_sign(Some(configured_s)).into(),

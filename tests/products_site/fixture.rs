@@ -23,7 +23,7 @@ use areograph::{
     products::{ImageProducts, SiteProducts},
     spice::RequiredCoverage,
     stages::{
-        check_ranges::{BiasScan, ProfileRanges, RangeCheck, ShotResiduals},
+        check_ranges::{BiasScan, ProfileRanges, RangeCheck, ScannedRadius, ShotResiduals},
         convert_datum::FileConversion,
         describe_kernels::KernelLine,
         fit_sensor_model::{SensorModel, fit_sensor_model},
@@ -482,6 +482,7 @@ fn ranges(profiles: &[Profile]) -> RangeCheck {
                 }),
                 outliers: 1,
                 scan: Some(BiasScan {
+                    radius: ScannedRadius::Raw,
                     correction_s: vec![-0.2, -0.1, 0.0, 0.1, 0.2],
                     spread_m: vec![0.2, 0.1, 0.3, 0.5, 0.7],
                     best_s: Some(-0.12),

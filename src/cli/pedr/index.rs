@@ -83,6 +83,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Error> {
     let path = arguments.folder.join(INDEX);
     let earlier = Index::read(&path).unwrap_or_default();
     let listing = Listing::below(&arguments.folder);
+    let unseen = unseen(&earlier, &arguments.folder, &listing.failures);
     let mut outcome = Outcome {
         failures: listing.failures,
         ..Outcome::default()
@@ -92,13 +93,14 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Error> {
             outcome.failures.push(failure);
         }
     }
-    let listed: BTreeSet<&PathBuf> = listing.paths.iter().collect();
+    let unseen_paths = unseen.iter().map(|file| arguments.folder.join(file.path()));
+    let still: BTreeSet<PathBuf> = listing.paths.iter().cloned().chain(unseen_paths).collect();
     let gone = earlier
         .files()
-        .filter(|file| !listed.contains(&arguments.folder.join(file.path())));
+        .filter(|file| !still.contains(&arguments.folder.join(file.path())));
     let gone = gone.count();
     let (files, read, bytes) = (outcome.files.len(), outcome.read, outcome.bytes);
-    let index: Index = outcome.files.into_iter().collect();
+    let index: Index = unseen.into_iter().chain(outcome.files).collect();
     let encoded = index.encode().ok_or(NotEncoded).in_file(&path)?;
     atomic::write(&path, &encoded)?;
     output::line(format_args!(
@@ -112,6 +114,16 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Error> {
     };
     failures.for_each(output::error);
     Err(first)
+}
+
+/// The entries of files below folders that cannot be listed, such as one that is not mounted: they count again when it is.
+fn unseen(earlier: &Index, folder: &Path, failures: &[Error]) -> Vec<IndexedFile> {
+    let closed: Vec<&PathBuf> = failures.iter().filter_map(|of| of.file.as_ref()).collect();
+    let is_unseen = |file: &&IndexedFile| {
+        let path = folder.join(file.path());
+        closed.iter().any(|closed| path.starts_with(closed))
+    };
+    earlier.files().filter(is_unseen).cloned().collect()
 }
 
 impl Outcome {

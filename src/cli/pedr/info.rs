@@ -48,7 +48,13 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Error> {
     };
     let (mut answers, mut useless) = (Vec::new(), Vec::new());
     for path in &arguments.files {
-        let file = File::open(path)?;
+        let file = match File::open(path) {
+            Ok(file) => file,
+            Err(failure) => {
+                useless.push(failure);
+                continue;
+            }
+        };
         let (counts, answer) = info(path, &file, clock.as_ref())?;
         useless.extend(file.require_records().err());
         if arguments.json {

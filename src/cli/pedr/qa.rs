@@ -3,7 +3,7 @@
 use std::{
     io::{IsTerminal as _, Write as _},
     path::PathBuf,
-    sync::{Arc, Mutex, PoisonError, atomic::AtomicBool},
+    sync::{Mutex, PoisonError},
     time::{Duration, Instant},
 };
 
@@ -12,9 +12,9 @@ use serde_json::json;
 
 use crate::{
     altimetry::{BiasScope, MolaClock, TagSign},
-    cli::{output, stop::on_signals},
+    cli::{output, stop::Signals},
     config::usual_altimeter,
-    error::{Cause, Error, IoError, Kind},
+    error::{Cause, Error, Kind},
     flow::{ArchiveOutcome, ArchiveProgress, ArchiveRequest, check_archive},
 };
 
@@ -24,7 +24,8 @@ const TOLD_EVERY: Duration = Duration::from_secs(10);
 /// Checks every shot of an archive against kernels: measured range minus distance, profile by profile.
 ///
 /// Products go to --out: a row of statistics for every profile, shots of the worst ones, a page. A profile is what one file has
-/// of one revolution. A check that was interrupted or killed goes on where it was, with the same result.
+/// of one revolution. A check that was interrupted or killed goes on where it was, with the same result. The exit code is 5
+/// when a profile breaks a limit, a file could not be checked, or kernels do not cover a profile (--allow-uncovered).
 ///
 /// Example: `areograph scene demo --days 5 && areograph pedr qa demo/pedr --kernels demo/kernels/archive.tm --out qa`
 #[derive(Debug, Args)]
@@ -45,6 +46,9 @@ pub(super) struct Arguments {
     /// Threads; the default is one for every processor.
     #[arg(long)]
     threads: Option<std::num::NonZeroU16>,
+    /// Do not count against the archive that the kernels have no position for some of its shots.
+    #[arg(long)]
+    allow_uncovered: bool,
     /// Check every file again, whatever is stored.
     #[arg(long)]
     force: bool,
@@ -68,9 +72,11 @@ impl Cause for ClockBias {
     }
 }
 
-/// Profiles that break limits.
+/// Profiles that break limits, or that could not be checked.
 #[derive(Debug, thiserror::Error)]
-#[error("the archive is invalid against these kernels; products were written")]
+#[error(
+    "the archive is invalid against these kernels, or was not checked as a whole; products were written"
+)]
 struct Invalid;
 
 impl Cause for Invalid {
@@ -79,7 +85,7 @@ impl Cause for Invalid {
     }
 
     fn advice(&self) -> String {
-        "look at the page: the worst profiles come first".to_owned()
+        "look at the page: reasons stand on top, then come the worst profiles".to_owned()
     }
 }
 
@@ -115,10 +121,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Error> {
             .num_threads(usize::from(threads.get()))
             .build_global();
     }
-    let stop = Arc::new(AtomicBool::new(false));
-    let runtime = tokio::runtime::Runtime::new().map_err(IoError::on("start threads"))?;
-    let told = Arc::clone(&stop);
-    let signals = runtime.spawn(async move { on_signals(&told).await });
+    let signals = Signals::heard()?;
     let telling = Telling::new();
     let request = ArchiveRequest {
         paths: &arguments.paths,
@@ -126,15 +129,15 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Error> {
         out: &arguments.out,
         clock: arguments.clock()?,
         force: arguments.force,
-        stop: &stop,
+        allow_uncovered: arguments.allow_uncovered,
+        stop: signals.stop(),
     };
     let outcome = check_archive(&request, &|progress| telling.tell(progress));
     telling.end();
-    signals.abort();
-    print(arguments, outcome?)
+    print(arguments, &outcome?)
 }
 
-fn print(arguments: &Arguments, outcome: ArchiveOutcome) -> Result<(), Error> {
+fn print(arguments: &Arguments, outcome: &ArchiveOutcome) -> Result<(), Error> {
     let manifest = &outcome.manifest;
     let page = arguments.out.join("report/index.html");
     if arguments.json {
@@ -170,15 +173,11 @@ fn print(arguments: &Arguments, outcome: ArchiveOutcome) -> Result<(), Error> {
             output::line(format_args!("  remark: {remark}"));
         }
     }
-    let is_valid = manifest.verdict.valid;
-    let mut failures = outcome.failures.into_iter();
-    match failures.next() {
-        Some(first) => {
-            failures.for_each(output::error);
-            Err(first)
-        }
-        None if is_valid => Ok(()),
-        None => Err(Invalid.into()),
+    outcome.failures.iter().for_each(output::error);
+    if manifest.verdict.valid {
+        Ok(())
+    } else {
+        Err(Invalid.into())
     }
 }
 

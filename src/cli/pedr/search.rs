@@ -2,12 +2,12 @@
 
 mod arguments;
 
-use std::{collections::BTreeMap, path::PathBuf, sync::atomic::AtomicBool};
+use std::{collections::BTreeMap, path::PathBuf};
 
 use serde_json::{Value, json};
 
 pub(super) use self::arguments::Arguments;
-use crate::cli::output;
+use crate::cli::{output, stop::Signals};
 use crate::{
     config::WindowConfig,
     error::{Cause, Error, Kind, Result},
@@ -46,13 +46,12 @@ impl Cause for NotInOrder {
 const SAME_SHOT_S: f64 = 0.05;
 /// Complaints that are printed and kept with their text; all are counted.
 const COMPLAINTS_MAX: usize = 20;
-/// Nobody stops a search but by killing it, which leaves nothing behind under the name of the answer.
-static RUN_ON: AtomicBool = AtomicBool::new(false);
 
 pub(super) fn run(arguments: &Arguments) -> Result<()> {
     let format = arguments.format()?;
     let windows = arguments.windows.windows()?;
     let time = arguments.time()?;
+    let signals = Signals::heard()?;
     let Opened { sources, failures } = Opened::all(&arguments.paths)?;
     let mut answer = Answer {
         window_ids: windows.iter().map(|window| window.id.clone()).collect(),
@@ -72,7 +71,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<()> {
         Judged::Near
     };
     let query = Query::new(regions.collect(), &filter, judged).within(time);
-    search(&sources, &query, &RUN_ON, &mut answer)?;
+    search(&sources, &query, signals.stop(), &mut answer)?;
     let told = answer.tell(arguments, &windows, &sources, time);
     if let Some(file) = answer.file.take() {
         file.finish(&told)?;

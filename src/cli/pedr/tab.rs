@@ -9,8 +9,9 @@ use std::{
 use clap::{Args, ValueEnum};
 
 use crate::{
-    cli::output,
-    error::{Cause, IoError, Kind, Locate as _, Result},
+    cli::{output, stop::Signals},
+    error::{Cause, IoError, Kind, Locate as _, Result, Stopped},
+    files::StagedFile,
     pds::{
         pedr::{Complaint, File},
         pedr_table::{Preferences, Rules, Table, Variant},
@@ -98,7 +99,9 @@ pub(super) fn run(arguments: &Arguments) -> Result<()> {
     let mut one_table: Option<Output> = None;
     let (files, is_list) = files(&arguments.input)?;
     let mut failure = None;
+    let signals = Signals::heard()?;
     for path in files {
+        Stopped::check(signals.stop())?;
         let file = match File::open(&path) {
             Ok(file) => file,
             Err(error) => {
@@ -217,39 +220,27 @@ fn tell(path: &Path, shots: u64, complaints: &[Complaint]) {
     }
 }
 
-/// A table under way: under another name until it is whole.
+/// A table under way: it gets its name when it is whole.
 struct Output {
-    path: PathBuf,
-    part: PathBuf,
+    file: StagedFile,
     writer: BufWriter<fs::File>,
 }
 
 impl Output {
     fn create(path: &Path) -> Result<Self> {
-        let mut part = path.as_os_str().to_owned();
-        part.push(".part");
-        let part = PathBuf::from(part);
-        let file = fs::File::create(&part)
-            .map_err(IoError::on("create"))
-            .in_file(&part)?;
-        Ok(Self {
-            path: path.to_owned(),
-            part,
-            writer: BufWriter::new(file),
-        })
+        let file = StagedFile::create(path)?;
+        let writer = BufWriter::new(file.writer()?);
+        Ok(Self { file, writer })
     }
 
     fn write<T>(&mut self, write: impl FnOnce(&mut dyn Write) -> std::io::Result<T>) -> Result<T> {
         write(&mut self.writer)
             .map_err(IoError::on("write"))
-            .in_file(&self.path)
+            .in_file(self.file.path())
     }
 
     fn finish(mut self) -> Result<()> {
-        self.writer
-            .flush()
-            .and_then(|()| fs::rename(&self.part, &self.path))
-            .map_err(IoError::on("write"))
-            .in_file(&self.path)
+        self.write(|writer| writer.flush())?;
+        self.file.finish()
     }
 }

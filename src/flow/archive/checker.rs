@@ -7,6 +7,7 @@ use std::{
 
 use crate::{
     error::Result,
+    files::InputFiles,
     stage::Inputs,
     stages::check_archive::{ArchiveRules, ArchiveSource, FileCheck, FileRanges, Load},
     store::cache::StageCache,
@@ -42,6 +43,8 @@ pub(super) struct Part {
 /// What the threads that check are given.
 pub(super) struct Checker<'a> {
     pub(super) rules: ArchiveRules<'a>,
+    /// The kernels: what was checked with others is not stored.
+    pub(super) kernels: &'a InputFiles,
     pub(super) cache: &'a StageCache,
     /// Name under which the result of each file is stored, and what it is made from.
     pub(super) todo: &'a BTreeMap<usize, (String, Inputs)>,
@@ -84,6 +87,7 @@ impl Checker<'_> {
     }
 
     fn store(&self, file: usize, found: FileRanges) -> Result<FileRanges> {
+        self.kernels.verify_all()?;
         if let Some((label, inputs)) = self.todo.get(&file) {
             self.cache.store(label, inputs.clone(), found.clone())?;
         }

@@ -21,16 +21,18 @@ pub(super) fn manifest(ranges: &ArchiveRanges, inputs: &Inputs) -> Manifest {
     let beyond = beyond.filter(|profile| !profile.invalid_because.is_empty());
     let counts = [
         ("files", ranges.files.len() as u64),
+        ("files_copied", ranges.copies.len() as u64),
         ("files_failed", ranges.failures.len() as u64),
         ("records", ranges.sum(|file| file.records)),
         ("profiles", ranges.profiles().count() as u64),
+        ("profiles_not_judged", ranges.too_short() as u64),
         ("profiles_beyond_limits", beyond.count() as u64),
         ("profiles_not_covered", without as u64),
         ("profiles_partly_covered", partly as u64),
         ("shots", ranges.sum(|file| file.shots)),
         ("shots_not_covered", ranges.sum(|file| file.not_covered)),
     ];
-    let means = ranges.profiles().filter(|profile| profile.shots > 0);
+    let means = ranges.profiles().filter(|profile| profile.is_judged());
     let largest_m = means.map(|profile| profile.mean_without_outliers_m.abs());
     let mut rejected: BTreeMap<String, u64> = BTreeMap::new();
     for (reason, count) in ranges.files.iter().flat_map(|file| &file.found.rejected) {
@@ -78,11 +80,15 @@ pub(super) fn manifest(ranges: &ArchiveRanges, inputs: &Inputs) -> Manifest {
             count: ranges.sum(|file| file.complaint_count),
             texts: texts.take(COMPLAINTS_QUOTED).cloned().collect(),
         },
-        notes: ranges
-            .failures
-            .iter()
-            .map(|failure| format!("{}: not checked: {}", failure.file, failure.why))
-            .collect(),
+        notes: notes(ranges),
         finished_utc: chrono::Utc::now().format("%Y-%m-%dT%H:%M:%SZ").to_string(),
     }
+}
+
+fn notes(ranges: &ArchiveRanges) -> Vec<String> {
+    let failures = ranges.failures.iter();
+    let failures = failures.map(|failure| format!("{}: not read: {}", failure.file, failure.why));
+    let copies = ranges.copies.iter();
+    let copies = copies.map(|copy| format!("{} is a copy of {}: taken once", copy.file, copy.of));
+    failures.chain(copies).collect()
 }

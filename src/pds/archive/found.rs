@@ -36,30 +36,25 @@ impl ShotRejection {
         spoiled: &SpoiledShots,
         filter: Option<&ShotFilter>,
     ) -> Option<Self> {
-        let passes = |test: &dyn Fn(&ShotFilter) -> bool| filter.is_none_or(test);
-        let tests = [
-            (Self::NoReturn, shot.range_m > 0.0),
-            (Self::Spoiled, !spoiled.contains(shot.shot)),
-            (
-                Self::Class,
-                passes(&|filter| filter.classes.contains(&shot.class)),
-            ),
-            (
-                Self::Channel,
-                passes(&|filter| filter.channels.contains(&shot.channel)),
-            ),
-            (
-                Self::Attitude,
-                passes(&|filter| filter.attitude_flags.contains(&shot.attitude_flag)),
-            ),
-            (
-                Self::OffNadir,
-                passes(&|filter| shot.off_nadir_rad.abs() <= filter.off_nadir_max_rad),
-            ),
-        ];
-        tests
-            .into_iter()
-            .find_map(|(reason, passed)| (!passed).then_some(reason))
+        // Written so that a range that is no number counts as none.
+        if !(shot.range_m > 0.0) {
+            return Some(Self::NoReturn);
+        }
+        if spoiled.contains(shot.shot) {
+            return Some(Self::Spoiled);
+        }
+        let filter = filter?;
+        if !filter.classes.contains(&shot.class) {
+            Some(Self::Class)
+        } else if !filter.channels.contains(&shot.channel) {
+            Some(Self::Channel)
+        } else if !filter.attitude_flags.contains(&shot.attitude_flag) {
+            Some(Self::Attitude)
+        } else if !(shot.off_nadir_rad.abs() <= filter.off_nadir_max_rad) {
+            Some(Self::OffNadir)
+        } else {
+            None
+        }
     }
 }
 

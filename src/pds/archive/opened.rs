@@ -35,22 +35,23 @@ pub struct Opened {
 }
 
 impl Opened {
-    /// Opens these files, and those with the ending `.b` in and below these folders, with the indexes that lie beside them.
+    /// Opens these files, and those with the ending `.b` in and below these folders, each once, with the indexes that lie
+    /// beside them.
     ///
     /// # Errors
-    /// No file, or more than 65,535.
+    /// No file, and why if something in its place cannot be read; more than 65,535.
     pub fn all(paths: &[PathBuf]) -> Result<Self> {
-        let mut opened = Self::default();
-        let mut files = Vec::new();
-        for path in paths {
-            if path.is_dir() {
-                let listing = Listing::below(path);
-                opened.failures.extend(listing.failures);
-                files.extend(listing.paths);
-            } else {
-                files.push(path.clone());
-            }
+        let Listing {
+            paths: files,
+            mut failures,
+        } = Listing::of(paths);
+        if files.is_empty() && !failures.is_empty() {
+            return Err(failures.swap_remove(0));
         }
+        let mut opened = Self {
+            sources: Vec::new(),
+            failures,
+        };
         if files.is_empty() || files.len() > usize::from(u16::MAX) {
             return Err(FileCount(files.len()).into());
         }

@@ -14,7 +14,7 @@ use crate::{
     },
     schema::DocumentSchema,
     stages::{
-        check_archive::{FileFailure, FileRanges, KernelUsed, TRAJECTORY_TOLERANCE_M},
+        check_archive::{FileCopy, FileFailure, FileRanges, KernelUsed, TRAJECTORY_TOLERANCE_M},
         judge::Verdict,
     },
 };
@@ -43,7 +43,7 @@ struct Document<'a> {
     /// Always `areograph archive ranges 1`.
     #[schemars(extend("const" = "areograph archive ranges 1"))]
     format: &'static str,
-    /// Whether every checked profile keeps the limits.
+    /// Whether every file could be read, and every profile is covered by the kernels and keeps the limits.
     verdict: &'a Verdict,
     /// Limits and the scan of clock biases.
     limits: &'a RangeCheckConfig,
@@ -57,7 +57,9 @@ struct Document<'a> {
     off_nadir: Vec<OffNadirDocument>,
     /// Files that were checked.
     files: Vec<FileDocument<'a>>,
-    /// Files that could not be checked.
+    /// Copies of these files, which do not count.
+    copies: &'a [FileCopy],
+    /// Files that could not be checked, or not read again for the products.
     failures: &'a [FileFailure],
 }
 
@@ -92,7 +94,7 @@ struct OffNadirDocument {
 /// A file.
 #[derive(Serialize, JsonSchema)]
 struct FileDocument<'a> {
-    /// Name without folders.
+    /// Name without folders; the path where files in several folders have the same name.
     file: &'a str,
     /// BLAKE3 of its bytes.
     #[schemars(regex(pattern = "^[0-9a-f]{64}$"))]
@@ -136,6 +138,7 @@ impl<'a> Document<'a> {
             },
             off_nadir: off_nadir.collect(),
             files: ranges.files.iter().map(|of| file(&of.found)).collect(),
+            copies: &ranges.copies,
             failures: &ranges.failures,
         }
     }

@@ -18,7 +18,7 @@ use crate::{
     },
 };
 
-pub use shots::write_profile_shots;
+pub use shots::{profile_name, write_profile_shots};
 
 /// Everything that the products of an archive are made of.
 #[derive(Debug, Clone, Copy)]
@@ -38,8 +38,8 @@ pub struct WorstProfile<'a> {
     pub file: &'a CheckedFile,
     /// The profile.
     pub profile: &'a ArchiveProfile,
-    /// Where its shots are, below the folder of the products.
-    pub shots: String,
+    /// Where its shots are, below the folder of the products; nothing of a file that could not be read again.
+    pub shots: Option<String>,
     /// UTC of its first shot; nothing without leap seconds.
     pub start_utc: Option<String>,
 }

@@ -64,9 +64,12 @@ fn times<'a>() -> Vec<Column<&'a ArchiveProfile>> {
     type Row<'a> = &'a ArchiveProfile;
     let degrees = |radians: f64| radians / RADIANS_PER_DEGREE;
     vec![
-        column("file", Unit::None, "PEDR file", |row: &Row| {
-            row.file.clone()
-        }),
+        column(
+            "file",
+            Unit::None,
+            "PEDR file; its path where files in several folders have the same name",
+            |row: &Row| row.file.clone(),
+        ),
         column(
             "orbit",
             Unit::None,
@@ -223,11 +226,20 @@ fn orbits<'a>() -> Vec<Column<&'a ArchiveProfile>> {
             "its standard uncertainty",
             |row: &Row| row.correction_uncertainty_s,
         ),
-        checked(
+        column(
+            "best_correction_radius",
+            Unit::None,
+            "radius of the footprints with which ranges spread least: raw, or corrected by crossovers",
+            |row: &Row| {
+                let word = row.best_correction_s.map(|_| row.correction_radius.word());
+                word.unwrap_or_default().to_owned()
+            },
+        ),
+        column(
             "share_of_limits",
             Unit::None,
-            "largest of the judged figures as a share of its limit: above 1 a limit is broken",
-            |row| row.share_of_limits,
+            "largest of the judged figures as a share of its limit: above 1 a limit is broken; missing where too few shots were checked",
+            |row: &Row| row.share_of_limits,
         ),
         column(
             "invalid_because",

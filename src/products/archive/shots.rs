@@ -4,12 +4,13 @@ use std::path::Path;
 
 use crate::{
     error::{Locate as _, Result},
+    files::file_name,
     products::{
         parquet,
         product::{Content, Declaration, Product, Role},
         table::{Column, Table, Unit, column, meanings},
     },
-    stages::check_archive::{ArchiveProfile, CheckedShot},
+    stages::check_archive::{ArchiveProfile, CheckedFile, CheckedShot},
     units::RADIANS_PER_DEGREE,
 };
 
@@ -33,17 +34,33 @@ pub(in crate::products) static SHOTS: Declaration<WriteShots> = Declaration {
     uses: &[],
 };
 
+/// Digits of the hash of a path that tell files of the same name apart.
+const HASH_DIGITS: usize = 8;
+
+/// The name of a profile as part of the name of a file.
+#[must_use]
+pub fn profile_name(file: &CheckedFile, profile: &ArchiveProfile) -> String {
+    let own = file_name(&file.path);
+    let mut name = profile.id_in(&own).replace(['/', '.'], "_");
+    if file.found.file != own {
+        let hash = blake3::hash(file.path.as_os_str().as_encoded_bytes());
+        name.push('_');
+        name.extend(hash.to_hex().chars().take(HASH_DIGITS));
+    }
+    name
+}
+
 /// Writes the shots of a profile below `directory`, and reads them back.
 ///
 /// # Errors
 /// What the disk refuses; numbers that are not finite; a file that reads back differently.
 pub fn write_profile_shots(
     directory: &Path,
+    file: &CheckedFile,
     profile: &ArchiveProfile,
     shots: &[CheckedShot],
 ) -> Result<Product> {
-    let name = profile.id().replace(['/', '.'], "_");
-    let relative = SHOTS.path.replace(PROFILE, &name);
+    let relative = SHOTS.path.replace(PROFILE, &profile_name(file, profile));
     let path = directory.join(&relative);
     let rows = (SHOTS.write)(&path, profile, shots).in_file(&path)?;
     Ok(Product {

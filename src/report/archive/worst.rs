@@ -1,7 +1,7 @@
 //! The worst profiles, and how to find their shots.
 
 use crate::{
-    products::WorstProfile,
+    products::{WorstProfile, profile_name},
     report::{
         html::{Cell, Column, Table, escape, link, paragraph},
         plots::label,
@@ -13,7 +13,7 @@ use crate::{
 /// The worst profiles in a table, each with a link to its shots.
 pub(super) fn worst_profiles(ranges: &ArchiveRanges, worst: &[WorstProfile<'_>]) -> String {
     if worst.is_empty() {
-        return paragraph("No profile was checked.");
+        return paragraph("No profile was judged.");
     }
     let mut table = Table::new(
         "Profiles by the largest share of a limit; each links to its shots (Parquet)",
@@ -39,7 +39,7 @@ pub(super) fn worst_profiles(ranges: &ArchiveRanges, worst: &[WorstProfile<'_>])
         let outlier_share = f64::from(profile.outliers) / n / limits.outlier_share_max;
         let limited = |value: f64, limit: f64| Cell::Limited(label(value, 2), value.abs() / limit);
         let cells = [
-            Cell::Html(link(&format!("../{}", of.shots), &profile.id())),
+            named(of),
             begins(of).into(),
             profile.shots.to_string().into(),
             limited(profile.mean_without_outliers_m, limits.mean_max_m),
@@ -54,8 +54,17 @@ pub(super) fn worst_profiles(ranges: &ArchiveRanges, worst: &[WorstProfile<'_>])
     }
     let words = "Mean and distance to the file’s own spacecraft are without outliers. “Orbits apart” is the mean of the file’s own \
         spacecraft minus that of the kernels: another orbit, clock or datum shows there. The best correction of time tags is the \
-        one by which ranges spread least. All profiles are in profiles.parquet and profiles.csv.";
+        one by which ranges spread least, be it with raw radii or with those corrected by crossovers. All profiles are in profiles.parquet and profiles.csv.";
     table.finish() + &paragraph(words) + &commands(worst)
+}
+
+/// The profile, with a link where its shots could be written.
+fn named(of: &WorstProfile<'_>) -> Cell {
+    let id = of.profile.id();
+    match &of.shots {
+        Some(shots) => Cell::Html(link(&format!("../{shots}"), &id)),
+        None => id.into(),
+    }
 }
 
 fn begins(of: &WorstProfile<'_>) -> String {
@@ -87,7 +96,7 @@ fn commands(worst: &[WorstProfile<'_>]) -> String {
 /// The command line that gives the shots of a profile, clouds left out.
 fn command(of: &WorstProfile<'_>) -> String {
     let [start_s, stop_s] = of.profile.tags_et_s;
-    let name = of.profile.id().replace(['/', '.'], "_");
+    let name = profile_name(of.file, of.profile);
     format!(
         "areograph pedr search '{}' --box 0,360,-90,90 --time={:.3}..{:.3} --format parquet --out {name}.parquet",
         of.file.path.display(),

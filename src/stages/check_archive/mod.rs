@@ -1,6 +1,6 @@
 //! Range check of a whole archive, file by file: every shot against the kernels, statistics of every profile.
 //!
-//! A profile is here what one file has of one revolution, without a pause of more than 300 s. Residuals, limits and the
+//! A profile is here what one file has of one revolution, in the order of time and without a pause of more than 300 s. Residuals, limits and the
 //! scan of clock biases are those of [`check_ranges`](super::check_ranges). What they cost is kept down: the trajectory
 //! of a load of records is tabulated once, the spacecraft of a frame is four states with cubics through them, and the
 //! scan takes some hundred shots of a profile.
@@ -36,7 +36,7 @@ use crate::{
 };
 
 pub use profile::{ArchiveProfile, OffNadirBin};
-pub use result::{ArchiveRanges, CheckedFile, FileFailure, KernelUsed};
+pub use result::{ArchiveRanges, CheckedFile, FileCopy, FileFailure, KernelUsed};
 pub use rows::CheckedShot;
 
 use profile::Gathered;
@@ -45,7 +45,7 @@ use rows::{Rows, Task};
 /// Name of the step in messages, and of its outputs.
 pub const NAME: &str = "check_archive";
 /// Raised when what the step computes changes.
-pub const METHOD: u32 = 1;
+pub const METHOD: u32 = 2;
 
 /// Records of a load: 51 MB, more than any day of the mission takes.
 const LOAD_RECORDS: usize = 1 << 16;
@@ -81,6 +81,8 @@ pub struct FileRanges {
     pub file: String,
     /// BLAKE3 of its bytes, hexadecimal.
     pub blake3: String,
+    /// Datum of its coordinates.
+    pub datum: Option<MarsDatum>,
     /// Its profiles, in the order of records.
     pub profiles: Vec<ArchiveProfile>,
     /// Data records.
@@ -132,6 +134,16 @@ impl ArchiveSource {
         Ok(Self { reader, datum })
     }
 
+    /// Opens the file that was looked at before.
+    ///
+    /// # Errors
+    /// As [`open`](Self::open); a file that has changed meanwhile, or another one in its place.
+    pub fn reopen(path: &Path, identity: &Identity) -> Result<Self> {
+        let source = Self::open(path)?;
+        source.reader.require_identity(identity)?;
+        Ok(source)
+    }
+
     /// What the file system said of the file when it was opened.
     #[must_use]
     pub const fn identity(&self) -> Identity {
@@ -171,12 +183,15 @@ impl ArchiveSource {
             let [start, stop] = [span[0], span[span.len() - 1]].map(Et::from_seconds);
             Interval::new(start.plus(-before_s), stop).padded(reach_s)
         });
-        let covered = Intervals::union_of(spans).intersection(&session.coverage()?.spk);
+        let path = self.reader.head().path();
+        let covered = &session.coverage().in_file(path)?.spk;
+        let covered = Intervals::union_of(spans).intersection(covered);
+        let trajectory = session.trajectory(&covered, TRAJECTORY_TOLERANCE_M);
         Ok(Load {
             is_last: rows.end >= self.reader.head().record_count(),
             rows,
             stretch,
-            trajectory: session.trajectory(&covered, TRAJECTORY_TOLERANCE_M)?,
+            trajectory: trajectory.in_file(path)?,
         })
     }
 }
@@ -207,6 +222,7 @@ impl<'a> FileCheck<'a> {
             guard: FieldGuard::new(head.label().software_version),
             found: FileRanges {
                 file: file_name(head.path()),
+                datum: Some(source.datum),
                 records: head.record_count() as u64,
                 off_nadir: OffNadirBin::all(),
                 ..FileRanges::default()
@@ -325,8 +341,7 @@ pub fn shots_of(
     session: &Session,
     rules: &ArchiveRules<'_>,
 ) -> Result<Vec<CheckedShot>> {
-    let source = Arc::new(ArchiveSource::open(path)?);
-    source.reader.require_identity(identity)?;
+    let source = Arc::new(ArchiveSource::reopen(path, identity)?);
     let first = source.reader.head().record_number(0);
     let row = |record: u32| record.saturating_sub(first) as usize;
     let rows = row(profile.first_record)..row(profile.last_record) + 1;

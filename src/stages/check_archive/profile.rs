@@ -1,5 +1,6 @@
 //! Statistics of a profile of the archive.
 
+use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
 use super::{
@@ -8,15 +9,13 @@ use super::{
 };
 use crate::{
     footprints::Footprint,
-    geom::{
-        range_residuals::RangeResiduals,
-        statistics::{Summary, outliers},
-    },
+    geom::{range_residuals::RangeResiduals, statistics::Summary},
     spice::Trajectory,
     stages::{
-        check_ranges::{BiasScan, RangeFigures},
+        check_ranges::{BiasScan, RangeFigures, ScannedRadius},
         group_profiles::Profile,
     },
+    time::Et,
     units::RADIANS_PER_DEGREE,
 };
 
@@ -72,8 +71,10 @@ pub struct ArchiveProfile {
     pub best_correction_s: Option<f64>,
     /// The uncertainty.
     pub correction_uncertainty_s: Option<f64>,
-    /// Largest of the judged figures as a share of its limit.
-    pub share_of_limits: f64,
+    /// Radius of the footprints with which ranges spread least.
+    pub correction_radius: ScannedRadius,
+    /// Largest of the judged figures as a share of its limit; nothing of a profile with too few shots to be judged.
+    pub share_of_limits: Option<f64>,
     /// Limits that are broken, in words.
     pub invalid_because: Vec<String>,
     /// East longitude and latitude of some of the shots, IAU 2000, degrees.
@@ -168,34 +169,44 @@ impl Gathered {
         done
     }
 
+    /// Whether a shot is of another profile: also one that steps back in time, as those of a block at the wrong place do.
     fn is_ended_by(&self, next: &CheckedShot) -> bool {
         let (Some(first), Some(last)) = (self.shots.first(), self.shots.last()) else {
             return false;
         };
         next.orbit != last.orbit
+            || next.et_s < last.et_s
             || next.et_s - last.et_s > Profile::PAUSE_S
             || next.et_s - first.et_s > LONGEST_S
     }
 }
 
-/// `column` of the shots that have residuals.
-fn values(shots: &[CheckedShot], column: impl Fn(&RangeResiduals) -> f64) -> Vec<f64> {
-    let residuals = shots.iter().filter_map(|shot| shot.residuals.as_ref());
-    residuals.map(column).collect()
+/// Sums over the shots of a profile that have residuals.
+#[derive(Default)]
+struct Sums {
+    n: u32,
+    /// Those that are no outliers.
+    kept: u32,
+    crossover_m: f64,
+    decoding_m: f64,
+    spacecraft_m: Vector3<f64>,
+    /// Without outliers.
+    kept_range_m: f64,
+    kept_decoding_m: f64,
 }
 
-/// Mean of some values, and of those that are no outliers.
-fn means(values: &[f64], outlier: &[bool]) -> [f64; 2] {
-    let (mut sum, mut n, mut kept_sum, mut kept) = (0.0, 0.0, 0.0, 0.0);
-    for (value, is_outlier) in values.iter().zip(outlier) {
-        sum += value;
-        n += 1.0;
+impl Sums {
+    fn add(&mut self, residuals: &RangeResiduals, is_outlier: bool) {
+        self.n += 1;
+        self.crossover_m += residuals.range_minus_distance_crossover_m;
+        self.decoding_m += residuals.decoding_m;
+        self.spacecraft_m += residuals.spacecraft_m;
         if !is_outlier {
-            kept_sum += value;
-            kept += 1.0;
+            self.kept += 1;
+            self.kept_range_m += residuals.range_minus_distance_m;
+            self.kept_decoding_m += residuals.decoding_m;
         }
     }
-    [sum / f64::max(n, 1.0), kept_sum / f64::max(kept, 1.0)]
 }
 
 impl ArchiveProfile {
@@ -206,34 +217,32 @@ impl ArchiveProfile {
         rules: &ArchiveRules<'_>,
     ) -> (Self, Vec<OffNadirBin>) {
         let shots = &gathered.shots;
-        let range_m = values(shots, |of| of.range_minus_distance_m);
-        let decoding_m = values(shots, |of| of.decoding_m);
-        let outlier = outliers(&range_m, rules.limits.outlier_sigma);
-        let (summary, scan) = rayon::join(
-            || Summary::of(&range_m),
-            || scan(gathered, &outlier, trajectory, rules),
+        let residuals = shots.iter().filter_map(|shot| shot.residuals.as_ref());
+        let range_m: Vec<f64> = residuals.map(|of| of.range_minus_distance_m).collect();
+        let summary = Summary::of(&range_m);
+        let limit_m = summary.outlier_limit_m(rules.limits.outlier_sigma);
+        let is_outlier =
+            |of: &RangeResiduals| summary.is_outlier(of.range_minus_distance_m, limit_m);
+        let (scan, (sums, bins, off_nadir_rad)) = rayon::join(
+            || scan(gathered, is_outlier, trajectory, rules),
+            || sums(shots, is_outlier),
         );
-        let mean = |column: fn(&RangeResiduals) -> f64| means(&values(shots, column), &outlier)[0];
-        let [decoding_mean_m, decoding_without_outliers_m] = means(&decoding_m, &outlier);
-        let (bins, off_nadir_rad) = by_off_nadir(shots, &outlier);
+        let [n, kept] = [sums.n, sums.kept].map(|count| f64::from(count.max(1)));
         let count = |of: usize| u32::try_from(of).unwrap_or(u32::MAX);
         let mut profile = Self {
             shots: summary.n,
             not_covered: count(shots.len()) - summary.n,
             off_nadir_rad,
             range_minus_distance_m: summary,
-            mean_without_outliers_m: means(&range_m, &outlier)[1],
-            outliers: count(outlier.iter().filter(|is| **is).count()),
-            crossover_mean_m: mean(|of| of.range_minus_distance_crossover_m),
-            decoding_mean_m,
-            decoding_without_outliers_m,
-            spacecraft_m: [
-                mean(|of| of.spacecraft_m.x),
-                mean(|of| of.spacecraft_m.y),
-                mean(|of| of.spacecraft_m.z),
-            ],
+            mean_without_outliers_m: sums.kept_range_m / kept,
+            outliers: sums.n - sums.kept,
+            crossover_mean_m: sums.crossover_m / n,
+            decoding_mean_m: sums.decoding_m / n,
+            decoding_without_outliers_m: sums.kept_decoding_m / kept,
+            spacecraft_m: (sums.spacecraft_m / n).into(),
             best_correction_s: scan.as_ref().and_then(|scan| scan.best_s),
-            correction_uncertainty_s: scan.and_then(|scan| scan.uncertainty_s),
+            correction_uncertainty_s: scan.as_ref().and_then(|scan| scan.uncertainty_s),
+            correction_radius: scan.map_or_else(ScannedRadius::default, |scan| scan.radius),
             places_deg: places_deg(gathered),
             ..Self::default()
         };
@@ -248,8 +257,8 @@ impl ArchiveProfile {
     }
 
     fn judge(&mut self, rules: &ArchiveRules<'_>) {
-        // Without a position there is nothing to judge, which is said apart.
-        if self.shots == 0 {
+        // What is left of a profile at the edge of a file or of the kernels says nothing; how many there are is said apart.
+        if self.shots < rules.limits.shots_min.max(1) {
             return;
         }
         let figures = RangeFigures {
@@ -262,56 +271,79 @@ impl ArchiveProfile {
             decoding_m: [self.decoding_mean_m, self.decoding_without_outliers_m],
             spacecraft_m: self.spacecraft_m,
         };
-        self.share_of_limits = figures.share_of_limits(rules.limits);
+        self.share_of_limits = Some(figures.share_of_limits(rules.limits));
         let why = || "another orbit, clock or datum than that of the kernels".to_owned();
         self.invalid_because = figures.broken_limits(rules.limits, why);
+    }
+
+    /// Whether it has enough shots to be held against the limits.
+    #[must_use]
+    pub const fn is_judged(&self) -> bool {
+        self.share_of_limits.is_some()
     }
 
     /// `<file>/<orbit>`, with `.2`, `.3` … for later parts.
     #[must_use]
     pub fn id(&self) -> String {
+        self.id_in(&self.file)
+    }
+
+    /// The same with another name for the file.
+    #[must_use]
+    pub fn id_in(&self, file: &str) -> String {
         let part = if self.part > 1 {
             format!(".{}", self.part)
         } else {
             String::new()
         };
-        format!("{}/{}{part}", self.file, self.orbit)
+        format!("{file}/{}{part}", self.orbit)
     }
 }
 
-/// The shots by off-nadir angle, and the mean and the largest angle, radians.
-fn by_off_nadir(shots: &[CheckedShot], outlier: &[bool]) -> (Vec<OffNadirBin>, [f64; 2]) {
+/// Sums of all shots, the shots by off-nadir angle, and the mean and the largest angle, radians.
+fn sums(
+    shots: &[CheckedShot],
+    is_outlier: impl Fn(&RangeResiduals) -> bool,
+) -> (Sums, Vec<OffNadirBin>, [f64; 2]) {
     let mut bins = OffNadirBin::all();
-    let (mut sum, mut largest) = (0.0, 0.0_f64);
+    let mut sums = Sums::default();
+    let (mut off_nadir_sum, mut largest) = (0.0, 0.0_f64);
     for shot in shots {
-        sum += shot.off_nadir_rad.abs();
-        largest = largest.max(shot.off_nadir_rad.abs());
-    }
-    let checked = shots
-        .iter()
-        .filter_map(|shot| Some((shot.off_nadir_rad.abs(), shot.residuals?)));
-    for ((off_nadir_rad, residuals), is_outlier) in checked.zip(outlier) {
+        let off_nadir_rad = shot.off_nadir_rad.abs();
+        off_nadir_sum += off_nadir_rad;
+        largest = largest.max(off_nadir_rad);
+        let Some(residuals) = &shot.residuals else {
+            continue;
+        };
+        let is_outlier = is_outlier(residuals);
+        sums.add(residuals, is_outlier);
         let off_nadir_deg = off_nadir_rad / RADIANS_PER_DEGREE;
         let bin = bins.iter_mut().find(|bin| off_nadir_deg < bin.to_deg);
         if let Some(bin) = bin.filter(|_| !is_outlier) {
             bin.count(residuals.range_minus_distance_m);
         }
     }
-    (bins, [sum / shots.len().max(1) as f64, largest])
+    let mean = off_nadir_sum / shots.len().max(1) as f64;
+    (sums, bins, [mean, largest])
 }
 
-/// Scans some hundred shots that are no outliers.
+/// Scans some hundred shots that are no outliers, and for which the kernels have all positions that the scan asks for.
 fn scan(
     gathered: &Gathered,
-    outlier: &[bool],
+    is_outlier: impl Fn(&RangeResiduals) -> bool,
     trajectory: &Trajectory,
     rules: &ArchiveRules<'_>,
 ) -> Option<BiasScan> {
-    // Outliers are counted among shots with residuals alone.
-    if gathered.shots.len() != outlier.len() {
-        return None;
-    }
-    let kept = gathered.samples.iter().filter(|(at, _)| !outlier[*at]);
+    let reach_s = rules.limits.scan_half_width_s;
+    let is_reached = |shot: &Footprint| {
+        let at = Et::from_seconds(shot.et_tag_s);
+        let mut ends = [-reach_s, reach_s].into_iter();
+        ends.all(|late_s| trajectory.position(at.plus(late_s)).is_some())
+    };
+    let kept = gathered.samples.iter().filter(|(at, shot)| {
+        let residuals = gathered.shots[*at].residuals.as_ref();
+        residuals.is_some_and(|residuals| !is_outlier(residuals)) && is_reached(shot)
+    });
     let kept: Vec<Footprint> = kept.map(|(_, shot)| *shot).collect();
     let step = kept.len().div_ceil(SCANNED).max(1);
     let thinned: Vec<Footprint> = kept.into_iter().step_by(step).collect();
@@ -324,4 +356,49 @@ fn places_deg(gathered: &Gathered) -> Vec<[f64; 2]> {
     samples
         .map(|(_, shot)| [shot.longitude_rad, shot.latitude_rad].map(|of| of / RADIANS_PER_DEGREE))
         .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{
+        altimetry::{BiasScope, MolaClock, ShotFilter, TagSign},
+        config::RangeCheckConfig,
+    };
+
+    #[test]
+    fn too_few_shots_are_not_judged_whatever_they_say() {
+        let (limits, filter) = (
+            RangeCheckConfig::default(),
+            ShotFilter {
+                classes: Vec::new(),
+                channels: Vec::new(),
+                attitude_flags: Vec::new(),
+                off_nadir_max_rad: 0.0,
+            },
+        );
+        let clock = MolaClock {
+            bias_s: 0.0,
+            sign: TagSign::Late,
+            scope: BiasScope::SpkLookup,
+            source: String::new(),
+        };
+        let rules = ArchiveRules {
+            clock: &clock,
+            limits: &limits,
+            filter: &filter,
+        };
+        let judged = |shots: u32| {
+            let mut profile = ArchiveProfile {
+                shots,
+                mean_without_outliers_m: -500.0,
+                ..ArchiveProfile::default()
+            };
+            profile.judge(&rules);
+            (profile.is_judged(), profile.invalid_because.len())
+        };
+        assert_eq!(judged(limits.shots_min - 1), (false, 0));
+        assert_eq!(judged(limits.shots_min), (true, 1));
+        assert_eq!(judged(0), (false, 0));
+    }
 }

@@ -37,7 +37,7 @@ use crate::{
 
 pub use figures::RangeFigures;
 pub use residuals::ShotResiduals;
-pub use scan::BiasScan;
+pub use scan::{BiasScan, ScannedRadius};
 
 /// Residuals of every shot, and what they say about every profile.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -68,7 +68,7 @@ stage_inputs! {
 
 impl Stage for CheckRanges<'_> {
     const NAME: &'static str = "check_ranges";
-    const METHOD: u32 = 4;
+    const METHOD: u32 = 5;
     type Output = RangeCheck;
     stage_inputs!(fingerprint);
 

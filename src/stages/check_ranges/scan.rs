@@ -4,18 +4,22 @@
 //! of its line of sight. A common change leaves the spread alone, so a profile tells the bias only
 //! when that rate varies along it: strongly when the spacecraft holds still in inertial space while
 //! it looks off nadir (about 3 m/s²), hardly at nadir (below 0.03 m/s²). The uncertainty says which.
+//!
+//! Over a revolution the error of the file's orbit is a wave in the residuals that hides a bias. Crossovers have found most
+//! of it: radii corrected by them are scanned as well, and taken where that calms the residuals.
 
 use nalgebra::{Matrix3, Vector3};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::{
     config::{RangeCheckConfig, SCAN_STEPS_MAX},
     footprints::Footprint,
-    frames::MarsIau2000,
+    frames::{MarsFixed as _, MarsIau2000, Position},
     geom::{
-        mars_rotation::mars_rotation,
-        range_residuals::{own_spacecraft, range_residual_m, raw_footprint},
-        statistics::{Summary, Trend},
+        mars_rotation::{frame_rotation_3, mars_rotation, mars_spin_rad_s},
+        range_residuals::{footprint, own_spacecraft, range_residual_m},
+        statistics::{Trend, mean_and_deviation},
     },
     spice::Trajectory,
     time::Et,
@@ -27,9 +31,37 @@ const SHOTS_MIN: usize = 10;
 /// Half the time over which the rate of a line of sight is measured, seconds.
 const RATE_STEP_S: f64 = 0.01;
 
+/// Corrected radii are taken when their least spread is below this share of that of raw ones: what is spared by chance, or
+/// where crossovers say nothing, is less.
+const CALMER: f64 = 0.98;
+
+/// Radius of footprints.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum ScannedRadius {
+    /// As ranges give it.
+    #[default]
+    Raw,
+    /// Corrected by crossovers.
+    Crossover,
+}
+
+impl ScannedRadius {
+    /// The word for it.
+    #[must_use]
+    pub const fn word(self) -> &'static str {
+        match self {
+            Self::Raw => "raw",
+            Self::Crossover => "crossover",
+        }
+    }
+}
+
 /// Spread of range − distance against the assumed clock correction.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct BiasScan {
+    /// Radius of the footprints.
+    pub radius: ScannedRadius,
     /// Assumed corrections, seconds added to the tags.
     pub correction_s: Vec<f64>,
     /// Standard deviation of range − distance at each, metres.
@@ -54,41 +86,107 @@ impl BiasScan {
         if shots.len() < SHOTS_MIN {
             return None;
         }
-        let mut scan = Self {
+        let sighted: Vec<Sighted> = shots.iter().map(Sighted::of).collect();
+        let [mut raw, mut crossover] =
+            [ScannedRadius::Raw, ScannedRadius::Crossover].map(Self::empty);
+        let spin_rad_s = mars_spin_rad_s(MarsIau2000::model()).z;
+        for correction_s in corrections(limits) {
+            let turn = frame_rotation_3(spin_rad_s * correction_s);
+            let residual = |shot: &Sighted| shot.residuals_m(trajectory, correction_s, &turn);
+            let residuals: Option<Vec<[f64; 2]>> = sighted.iter().map(residual).collect();
+            // Corrections that lead out of the kernels are left out.
+            if let Some(residuals) = residuals {
+                for (scan, which) in [(&mut raw, 0), (&mut crossover, 1)] {
+                    let residuals: Vec<f64> = residuals.iter().map(|of| of[which]).collect();
+                    scan.correction_s.push(correction_s);
+                    scan.spread_m.push(mean_and_deviation(&residuals)[1]);
+                }
+            }
+        }
+        let is_calmer = crossover.least_spread_m() < CALMER * raw.least_spread_m();
+        let mut scan = if is_calmer { crossover } else { raw };
+        scan.best_s = best_s(&scan);
+        scan.uncertainty_s = scan
+            .best_s
+            .and_then(|best_s| uncertainty_s(shots, scan.radius, trajectory, best_s));
+        Some(scan)
+    }
+
+    const fn empty(radius: ScannedRadius) -> Self {
+        Self {
+            radius,
             correction_s: Vec::new(),
             spread_m: Vec::new(),
             best_s: None,
             uncertainty_s: None,
-        };
-        for correction_s in corrections(limits) {
-            let residuals: Option<Vec<f64>> = shots
-                .iter()
-                .map(|shot| residual_m(shot, trajectory, correction_s))
-                .collect();
-            // Corrections that lead out of the kernels are left out.
-            if let Some(residuals) = residuals {
-                scan.correction_s.push(correction_s);
-                scan.spread_m
-                    .push(Summary::of(&residuals).standard_deviation);
-            }
         }
-        scan.best_s = best_s(&scan);
-        scan.uncertainty_s = scan
-            .best_s
-            .and_then(|best_s| uncertainty_s(shots, trajectory, best_s));
-        Some(scan)
+    }
+
+    /// The least of its spreads, metres.
+    fn least_spread_m(&self) -> f64 {
+        self.spread_m.iter().copied().fold(f64::INFINITY, f64::min)
+    }
+}
+
+/// What of a shot stays the same for all corrections.
+struct Sighted {
+    tag: Et,
+    range_m: f64,
+    /// With the raw and the corrected radius.
+    footprints: [Position<MarsIau2000>; 2],
+    /// From J2000 to Mars at the tag.
+    to_mars: Matrix3<f64>,
+}
+
+impl Sighted {
+    fn of(shot: &Footprint) -> Self {
+        let tag = Et::from_seconds(shot.et_tag_s);
+        Self {
+            tag,
+            range_m: shot.range_m,
+            footprints: [shot.radius_m, shot.radius_crossover_m]
+                .map(|radius_m| footprint(shot, radius_m)),
+            to_mars: *mars_rotation::<MarsIau2000>(tag).matrix(),
+        }
+    }
+
+    /// Range − distance to both footprints.
+    ///
+    /// * `turn` – of Mars in the time of the correction: in seconds its axis moves by less than 1e-6 m on the ground
+    fn residuals_m(
+        &self,
+        trajectory: &Trajectory,
+        correction_s: f64,
+        turn: &Matrix3<f64>,
+    ) -> Option<[f64; 2]> {
+        let position = trajectory.position(self.tag.plus(correction_s))?;
+        let spacecraft = Position::new(turn * (self.to_mars * position.xyz_m));
+        let footprints = self.footprints.each_ref();
+        Some(footprints.map(|of| range_residual_m(self.range_m, &spacecraft, of)))
     }
 }
 
 /// Range − distance of a shot whose tag is corrected by `correction_s`.
-fn residual_m(shot: &Footprint, trajectory: &Trajectory, correction_s: f64) -> Option<f64> {
+fn residual_m(
+    shot: &Footprint,
+    radius: ScannedRadius,
+    trajectory: &Trajectory,
+    correction_s: f64,
+) -> Option<f64> {
     let at = Et::from_seconds(shot.et_tag_s + correction_s);
     let spacecraft = mars_rotation::<MarsIau2000>(at).apply(&trajectory.position(at)?);
     Some(range_residual_m(
         shot.range_m,
         &spacecraft,
-        &raw_footprint(shot),
+        &footprint(shot, radius_m(shot, radius)),
     ))
+}
+
+fn radius_m(shot: &Footprint, radius: ScannedRadius) -> f64 {
+    match radius {
+        ScannedRadius::Raw => shot.radius_m,
+        ScannedRadius::Crossover => shot.radius_crossover_m,
+    }
 }
 
 /// Corrections from `-half_width` to `+half_width`, symmetric about zero.
@@ -133,14 +231,20 @@ fn track_axes(position: &Vector3<f64>, velocity: &Vector3<f64>) -> Matrix3<f64> 
 /// uncertain by the scatter about that line, and by the orbit: moved by a constant vector it changes
 /// the residuals by the vector's part along each line of sight, and a metre along the track cannot be
 /// told from 0.3 ms. How well the orbit is known is taken from its difference to the orbit of the PEDR
-/// file, as likely in any direction.
-fn uncertainty_s(shots: &[Footprint], trajectory: &Trajectory, best_s: f64) -> Option<f64> {
+/// file across the flight, as likely in any direction: along it the two also lie apart by the very error of the correction,
+/// which would bound itself.
+fn uncertainty_s(
+    shots: &[Footprint],
+    radius: ScannedRadius,
+    trajectory: &Trajectory,
+    best_s: f64,
+) -> Option<f64> {
     let mut residuals_m = Vec::with_capacity(shots.len());
     let mut rates_m_s = Vec::with_capacity(shots.len());
     let mut directions: [Vec<f64>; 3] = std::array::from_fn(|_| Vec::with_capacity(shots.len()));
     let mut orbit_difference_m = Vector3::zeros();
     for shot in shots {
-        let residual = |correction_s| residual_m(shot, trajectory, correction_s);
+        let residual = |correction_s| residual_m(shot, radius, trajectory, correction_s);
         let change_m = residual(best_s + RATE_STEP_S)? - residual(best_s - RATE_STEP_S)?;
         residuals_m.push(residual(best_s)?);
         rates_m_s.push(change_m / (2.0 * RATE_STEP_S));
@@ -150,7 +254,7 @@ fn uncertainty_s(shots: &[Footprint], trajectory: &Trajectory, best_s: f64) -> O
         let to_track = track_axes(&position.xyz_m, &trajectory.velocity_m_s(at)?).transpose()
             * to_mars.matrix().transpose();
         let spacecraft = to_mars.apply(&position);
-        let sight_m = spacecraft.xyz_m - raw_footprint(shot).xyz_m;
+        let sight_m = spacecraft.xyz_m - footprint(shot, radius_m(shot, radius)).xyz_m;
         let sight = sight_m.normalize();
         let direction = to_track * sight;
         for (axis, component) in directions.iter_mut().zip(&direction) {
@@ -164,7 +268,8 @@ fn uncertainty_s(shots: &[Footprint], trajectory: &Trajectory, best_s: f64) -> O
     for (sensitivity, axis) in seconds_per_metre.iter_mut().zip(&directions) {
         *sensitivity = Trend::of(&rates_m_s, axis)?.slope;
     }
-    let difference_m = orbit_difference_m.norm() / shots.len() as f64;
-    let orbit_s = seconds_per_metre.norm() * difference_m / f64::sqrt(3.0);
+    let difference_m = orbit_difference_m / shots.len() as f64;
+    let across_m = difference_m.y.hypot(difference_m.z) / f64::sqrt(2.0);
+    let orbit_s = seconds_per_metre.norm() * across_m;
     Some(noise_s.hypot(orbit_s))
 }

@@ -1,0 +1,52 @@
+//! Every shot of PEDR files, one after the other, with its position in IAU 2000: what a search is held against.
+
+use std::path::PathBuf;
+
+use areograph::{
+    footprints::Footprint,
+    frames::MarsIau2000,
+    geom::{
+        ellipsoid::{Spherical, spherical_to_xyz_m},
+        mars_rotation::convert_datum,
+    },
+    pds::pedr::{FieldGuard, File},
+    time::Et,
+};
+
+/// A shot as its file has it, with file and record.
+pub(super) struct TrueShot {
+    /// The shot; `file` and `record` say where it is from.
+    pub(super) shot: Footprint,
+    /// East longitude and areocentric latitude in IAU 2000, radians.
+    pub(super) place_rad: [f64; 2],
+}
+
+/// Every shot with a return of files whose records are all good, in their order.
+pub(super) fn every_shot(paths: &[PathBuf]) -> Vec<TrueShot> {
+    let mut shots = Vec::new();
+    for (index, path) in (0..).zip(paths) {
+        let file = File::open(path).expect("a readable file");
+        let datum = file.label().datum.expect("a label with its datum");
+        for (row, frame) in file.frames(0..file.records().len(), FieldGuard::new(Some(7.25))) {
+            let frame = frame.expect("a good frame");
+            for shot in (1..=20).filter_map(|shot| frame.shot(shot)) {
+                if shot.range_m <= 0.0 {
+                    continue;
+                }
+                let at = Et::from_seconds(shot.et_tag_s);
+                let direction = spherical_to_xyz_m(shot.longitude_rad, shot.latitude_rad, 1.0);
+                let direction = convert_datum::<MarsIau2000>(direction, datum, at, at);
+                let there = Spherical::from_xyz_m(&direction.xyz_m);
+                shots.push(TrueShot {
+                    shot: Footprint {
+                        file: index,
+                        record: file.record_number(row),
+                        ..shot
+                    },
+                    place_rad: [there.longitude_rad, there.latitude.0],
+                });
+            }
+        }
+    }
+    shots
+}
