@@ -154,6 +154,7 @@ fn of_kind(kind: &ValueKind) -> Schema {
             maximum: Some(json!(high)),
             ..of_type("integer")
         },
+        ValueKind::Switch => of_type("boolean"),
         ValueKind::Word(words) => Schema {
             words: words.iter().map(|word| word.word).collect(),
             ..Schema::default()
