@@ -88,7 +88,10 @@ fn products(patch: &Patch, size: [usize; 2]) -> Vec<[f64; 3]> {
             let down = 0.5 * f64::from(patch.at(line + 2, sample + 1) - patch.at(line, sample + 1));
             let right =
                 0.5 * f64::from(patch.at(line + 1, sample + 2) - patch.at(line + 1, sample));
-            for (sum, product) in row.iter_mut().zip([down * down, down * right, right * right]) {
+            for (sum, product) in row
+                .iter_mut()
+                .zip([down * down, down * right, right * right])
+            {
                 *sum += product;
             }
             let above = sums[line * width + sample + 1];

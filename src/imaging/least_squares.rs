@@ -115,8 +115,8 @@ fn finish(
     let squares: f64 = equations.left.iter().map(|left| left * left).sum();
     let freedom = (equations.left.len().saturating_sub(UNKNOWNS)).max(1) as f64;
     let independent = inverse.fixed_view::<2, 2>(0, 0) * (squares / freedom);
-    let joined = joined(&equations, &inverse, template.size)
-        * (equations.left.len() as f64 / freedom);
+    let joined =
+        joined(&equations, &inverse, template.size) * (equations.left.len() as f64 / freedom);
     let is_larger = joined.trace() > independent.trace() && joined.determinant() > 0.0;
     Ok(LeastSquaresMatch {
         affine,
@@ -242,8 +242,8 @@ fn joined(equations: &Equations, inverse: &Normals, size: [usize; 2]) -> Matrix2
                 else {
                     continue;
                 };
-                let [one, other] = [line * size[1] + sample, (line + down) * size[1] + other]
-                    .map(|at| &moves[at]);
+                let [one, other] =
+                    [line * size[1] + sample, (line + down) * size[1] + other].map(|at| &moves[at]);
                 sum += one * other.transpose();
             }
         }

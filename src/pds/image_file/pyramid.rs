@@ -1,11 +1,7 @@
 //! An image at full size and halved again and again, of which windows are read. It stands in a temporary file, so that
 //! memory holds a strip and some lines of each level, whatever the size of the image.
 
-use std::{
-    fs::File,
-    io,
-    os::unix::fs::FileExt as _,
-};
+use std::{fs::File, io, ops::Range, os::unix::fs::FileExt as _};
 
 use super::{opened::ImageFile, strip::LineState};
 use crate::{
@@ -114,17 +110,28 @@ impl Pyramid {
         self.levels[level.min(self.halvings())].size
     }
 
+    /// Of these lines of the image the most that follow each other without one that is missing.
+    #[must_use]
+    pub fn longest_good(&self, lines: Range<usize>) -> Range<usize> {
+        let is_good = &self.levels[0].is_good;
+        let end = lines.end.min(is_good.len());
+        let (mut longest, mut start) = (lines.start..lines.start, lines.start);
+        for line in lines.start..end {
+            if !is_good[line] {
+                start = line + 1;
+            } else if line + 1 - start > longest.len() {
+                longest = start..line + 1;
+            }
+        }
+        longest
+    }
+
     /// The rectangle of a level with this first line and sample; what lies beyond the image is left out. `None` where
     /// nothing is left, or where lines of it are missing.
     ///
     /// # Errors
     /// The system's refusal to read the temporary file.
-    pub fn window(
-        &self,
-        level: usize,
-        first: [i64; 2],
-        size: [usize; 2],
-    ) -> Result<Option<Patch>> {
+    pub fn window(&self, level: usize, first: [i64; 2], size: [usize; 2]) -> Result<Option<Patch>> {
         let level = &self.levels[level.min(self.halvings())];
         let span = |axis: usize| -> Option<(usize, usize)> {
             let end = first[axis].checked_add_unsigned(size[axis] as u64)?;
