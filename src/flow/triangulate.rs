@@ -101,9 +101,8 @@ pub(super) fn match_ties<D: Driver>(
     (converted, profiles): Shots,
     read: Option<&Output<Ties>>,
 ) -> Flow<Output<Ties>> {
-    let hash = |image: &ImageConfig| {
-        let file = flow.hash(MatchTies::NAME, image.pixels.as_slice())?.pop();
-        Ok(file)
+    let hash = |image: &ImageConfig| -> Flow<Option<HashedFile>> {
+        Ok(flow.hash(MatchTies::NAME, image.pixels.as_slice())?.pop())
     };
     let pixels: Vec<Option<HashedFile>> = config.images.iter().map(hash).collect::<Flow<_>>()?;
     flow.stage(&MatchTies {

@@ -225,15 +225,14 @@ fn inverse(equations: &Equations) -> Result<Normals, LeastSquaresFailure> {
 
 /// What residuals that go together within [`JOINED_PX`] leave of the place.
 fn joined(equations: &Equations, inverse: &Normals, size: [usize; 2]) -> Matrix2<f64> {
-    let influence = inverse.fixed_rows::<2>(0);
+    let influence = inverse.fixed_rows::<2>(0).into_owned();
     let moves: Vec<Vector2<f64>> = equations
         .rows
         .iter()
         .zip(&equations.left)
-        .map(|(row, left)| influence * row * *left)
+        .map(|(row, left)| &influence * row * *left)
         .collect();
     let weight = |lag: usize| 1.0 - lag as f64 / (JOINED_PX + 1) as f64;
-    // The sum over both axes' lags is that of a window over lines and one over samples.
     let lagged = |down: usize, right: isize| -> Matrix2<f64> {
         let mut sum = Matrix2::zeros();
         for line in 0..size[0].saturating_sub(down) {

@@ -11,7 +11,7 @@ pub use affine::Affine;
 pub use correlation::{Peak, search};
 pub use interest::{Texture, noise_dn, texture};
 pub use least_squares::{LeastSquaresFailure, LeastSquaresMatch, match_least_squares};
-pub use patch::Patch;
+pub use patch::{Between, Patch};
 
 #[cfg(test)]
 mod tests;

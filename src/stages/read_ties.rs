@@ -44,6 +44,8 @@ pub struct Ties {
     pub copies: Vec<String>,
     /// What does not agree, and must be weighed, one sentence each.
     pub remarks: Vec<String>,
+    /// How many of the points are those of files.
+    pub read: usize,
     /// Pairs of images in which areograph measured tie points itself; these stand behind those of files.
     pub matched: Vec<MatchedPair>,
 }
@@ -199,6 +201,7 @@ pub fn read_ties(ties: &TiesConfig, images: &[ImageConfig]) -> Result<Ties> {
         }
         read.remarks.push(shared.to_string());
     }
+    read.read = read.points.len();
     Ok(read)
 }
 
@@ -264,6 +267,12 @@ impl Ties {
             ));
         }
         notes
+    }
+
+    /// How many of the points, the last ones, areograph measured itself.
+    #[must_use]
+    pub const fn matched_points(&self) -> usize {
+        self.points.len() - self.read
     }
 
     /// Tie points measured in at least two images.

@@ -2,22 +2,11 @@
 
 use std::collections::BTreeMap;
 
-use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Why a place of one image has no tie point in another.
 #[derive(
-    Debug,
-    Clone,
-    Copy,
-    PartialEq,
-    Eq,
-    PartialOrd,
-    Ord,
-    Serialize,
-    Deserialize,
-    JsonSchema,
-    thiserror::Error,
+    Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, thiserror::Error,
 )]
 #[serde(rename_all = "snake_case")]
 pub enum Unmatched {
@@ -68,6 +57,23 @@ pub struct MatchedPair {
     pub correlation: f64,
     /// Whether so few places were found that none of them is believed.
     pub is_refused: bool,
+}
+
+impl Unmatched {
+    /// The reason as one word of documents.
+    #[must_use]
+    pub const fn word(self) -> &'static str {
+        match self {
+            Self::Flat => "flat",
+            Self::Missing => "missing",
+            Self::Edge => "edge",
+            Self::Unlike => "unlike",
+            Self::Ambiguous => "ambiguous",
+            Self::Unsettled => "unsettled",
+            Self::OneWay => "one_way",
+            Self::Uncertain => "uncertain",
+        }
+    }
 }
 
 impl MatchedPair {

@@ -46,17 +46,12 @@ impl Pyramid {
             file,
             levels: levels(size),
         };
-        let next = || {
-            strips
-                .next_strip()
-                .map_err(IoError::on("read"))
-                .in_file(image.path())
-        };
-        for strip in std::iter::from_fn({
-            let mut next = next;
-            move || next().transpose()
-        }) {
-            for (pixels, state) in strip?.lines() {
+        while let Some(strip) = strips
+            .next_strip()
+            .map_err(IoError::on("read"))
+            .in_file(image.path())?
+        {
+            for (pixels, state) in strip.lines() {
                 let is_good = *state == LineState::Good;
                 pyramid
                     .add(0, pixels, is_good)

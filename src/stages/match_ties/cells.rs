@@ -33,6 +33,9 @@ pub(super) struct Cell {
     samples: Range<usize>,
 }
 
+/// A place of a cell, or why it has none.
+pub(super) type Place = std::result::Result<Vector2<f64>, Unmatched>;
+
 /// What is common to two images, in pixels of the first.
 pub(super) struct Common {
     /// First and last line and sample that the other shows too.
@@ -171,13 +174,9 @@ impl Cell {
 ///
 /// # Errors
 /// The system's refusal to read.
-pub(super) fn places(
-    cells: &[Cell],
-    pixels: &Pyramid,
-    level: usize,
-) -> Result<Vec<std::result::Result<Vector2<f64>, Unmatched>>> {
+pub(super) fn places(cells: &[Cell], pixels: &Pyramid, level: usize) -> Result<Vec<Place>> {
     let half = usize::try_from(HALF_LEAST_SQUARES).unwrap_or_default();
-    let noise = cells.par_iter().map(|cell| {
+    let noise = cells.par_iter().map(|cell| -> Result<Option<f64>> {
         let patch = cell.pixels(pixels, level)?;
         Ok(patch.and_then(|patch| noise_dn(&patch)))
     });
@@ -191,7 +190,7 @@ pub(super) fn places(
     )]
     let quiet = noise.get((QUIET_SHARE * noise.len() as f64) as usize);
     let quiet = quiet.copied().unwrap_or_default();
-    let places = cells.par_iter().map(|cell| {
+    let places = cells.par_iter().map(|cell| -> Result<Place> {
         let Some(patch) = cell.pixels(pixels, level)? else {
             return Ok(Err(Unmatched::Missing));
         };

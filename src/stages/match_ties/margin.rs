@@ -65,10 +65,10 @@ fn sigmas(config: &AdjustmentConfig, image: &str) -> [f64; 2] {
             norm(&config.rotation_sigma_rad),
         ],
         // Rotations get what moves the ground as far.
-        AdjustmentModel::Published => [
-            std::f64::consts::SQRT_2 * norm(&config.published_sigmas_m()),
-            0.0,
-        ],
+        AdjustmentModel::Published => {
+            let [nadir_m, off_nadir_m] = config.published_sigmas_m();
+            [std::f64::consts::SQRT_2 * nadir_m.max(off_nadir_m), 0.0]
+        }
     };
     let own = config.images.iter().find(|own| own.id == image);
     // Of nine numbers three are those of an axis.

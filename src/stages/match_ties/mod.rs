@@ -26,7 +26,7 @@ use super::{
     site_image::SiteImage, tag_times::ImageTimes,
 };
 use crate::{
-    error::{Cause, Kind, Locate as _, Result},
+    error::{Cause, Kind, Result},
     geom::pushbroom::{CameraModel, Unseen},
     stage::{InOrder, Input, Inputs, Output, Round, Stage},
     stage_inputs,
@@ -146,7 +146,7 @@ impl Stage for MatchTies<'_> {
         let images = self.images.0.iter().zip(self.pixels.0);
         let with_pixels =
             images.filter_map(|(image, file)| Some((image.times.get()?, file.as_ref()?)));
-        let opened = with_pixels.map(|(times, file)| {
+        let opened = with_pixels.map(|(times, file)| -> Result<String> {
             let layout = pixels::open(&file.path, times)?.layout();
             Ok(format!(
                 "image {}: {} lines of {} samples to be matched",
@@ -169,6 +169,7 @@ fn joined(mut ties: Ties, matched: Vec<Matched>, images: &[OrientedImage<'_>]) -
     if ties.points.is_empty() && matched.iter().all(|of_pair| of_pair.ties.is_empty()) {
         return Err(MatchError::NothingMatched(ties.remarks.join("; ")).into());
     }
+    ties.read = ties.points.len();
     ties.points.extend(points(&matched));
     ties.matched = matched.into_iter().map(|of_pair| of_pair.account).collect();
     Ok(ties)

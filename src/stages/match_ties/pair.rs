@@ -45,6 +45,9 @@ struct Placed {
     part: [usize; 2],
 }
 
+/// The part of the common ground that a cell lies in, and what became of its place.
+type Tried = ([usize; 2], std::result::Result<Placed, Unmatched>);
+
 /// Tie points of the images with these indices; `None` where they have no ground in common.
 ///
 /// # Errors
@@ -67,25 +70,28 @@ pub(super) fn match_pair(
     let cells = common.cells();
     let reach_m = margin.reach_m(indices, common.ranges_m);
     let places = places(&cells, views[0].pixels, search.levels[0])?;
-    let tried = cells.par_iter().zip(places).map(|(cell, place)| {
-        Stopped::check(stop)?;
-        let at = place.unwrap_or_else(|_| cell.middle());
-        let Some(prediction) = views[0].predict(views[1], &at, heights) else {
-            return Ok(None);
-        };
-        if !views[1].holds(&prediction.affine.to) {
-            return Ok(None);
-        }
-        let part = common.part(&at, PARTS);
-        let found = match place {
-            Err(why) => Err(why),
-            Ok(_) => both_ways(&search, &at, heights, reach_m)?,
-        };
-        Ok(Some((
-            part,
-            found.map(|found| placed(&found, indices, part)),
-        )))
-    });
+    let tried = cells
+        .par_iter()
+        .zip(places)
+        .map(|(cell, place)| -> Result<Option<Tried>> {
+            Stopped::check(stop)?;
+            let at = place.unwrap_or_else(|_| cell.middle());
+            let Some(prediction) = views[0].predict(views[1], &at, heights) else {
+                return Ok(None);
+            };
+            if !views[1].holds(&prediction.affine.to) {
+                return Ok(None);
+            }
+            let part = common.part(&at, PARTS);
+            let found = match place {
+                Err(why) => Err(why),
+                Ok(_) => both_ways(&search, &at, heights, reach_m)?,
+            };
+            Ok(Some((
+                part,
+                found.map(|found| placed(&found, indices, part)),
+            )))
+        });
     let tried: Vec<_> = tried.collect::<Result<_>>()?;
     Ok(Some(account(
         tried.into_iter().flatten().collect(),
@@ -177,11 +183,7 @@ fn placed(found: &Found, indices: [usize; 2], part: [usize; 2]) -> Placed {
 }
 
 /// The tie points of a pair, and what is told of all of its cells.
-fn account(
-    tried: Vec<([usize; 2], std::result::Result<Placed, Unmatched>)>,
-    images: [usize; 2],
-    reach_m: f64,
-) -> Matched {
+fn account(tried: Vec<Tried>, images: [usize; 2], reach_m: f64) -> Matched {
     let cells = u32::try_from(tried.len()).unwrap_or(u32::MAX);
     let parts: BTreeSet<[usize; 2]> = tried.iter().map(|(part, _)| *part).collect();
     let mut unmatched = BTreeMap::new();
