@@ -27,6 +27,11 @@ pub(super) struct Height {
 }
 
 impl Heights {
+    /// Of shots at these places, Mars-fixed, metres.
+    pub(super) const fn at(shots_m: Vec<Vector3<f64>>) -> Self {
+        Self(shots_m)
+    }
+
     pub(super) fn of(footprints: &Footprints<MarsIau2000>, profiles: &[Profile]) -> Self {
         let rows = profiles.iter().flat_map(|profile| &profile.rows);
         let shots = rows.map(|row| {
@@ -34,7 +39,7 @@ impl Heights {
             let (longitude, latitude) = (footprints.longitude_rad[at], footprints.latitude_rad[at]);
             spherical_to_xyz_m(longitude, latitude, footprints.radius_m[at])
         });
-        Self(shots.collect())
+        Self::at(shots.collect())
     }
 
     /// The height at a place, metres Mars-fixed, whose own radius does not count: the mean of the nearest shots, the nearer

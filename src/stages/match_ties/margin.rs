@@ -39,6 +39,15 @@ impl Margin {
         }
     }
 
+    /// A margin that is the same for all of so many images, metres.
+    #[cfg(test)]
+    pub(super) fn within(images: usize, most_m: f64) -> Self {
+        Self {
+            images: vec![[most_m, 0.0]; images],
+            most_m,
+        }
+    }
+
     /// How far two images at these distances from the ground may have a place from where they are expected to, metres.
     pub(super) fn reach_m(&self, images: [usize; 2], ranges_m: [f64; 2]) -> f64 {
         let squares = images.iter().zip(ranges_m).map(|(image, range_m)| {

@@ -14,6 +14,9 @@ mod pixels;
 mod search;
 mod view;
 
+#[cfg(test)]
+mod tests;
+
 use std::{collections::BTreeMap, sync::atomic::AtomicBool};
 
 use self::{
@@ -160,7 +163,10 @@ impl Stage for MatchTies<'_> {
 /// The tie points of files, and behind them those that were matched.
 fn joined(mut ties: Ties, matched: Vec<Matched>, images: &[OrientedImage<'_>]) -> Result<Ties> {
     if matched.is_empty() {
-        return Err(MatchError::NothingInCommon.into());
+        if ties.points.is_empty() {
+            return Err(MatchError::NothingInCommon.into());
+        }
+        ties.remarks.push(MatchError::NothingInCommon.to_string());
     }
     let name = |index: usize| images.get(index).map_or("", |image| &*image.image.id);
     for of_pair in &matched {

@@ -44,10 +44,18 @@ impl<'a> View<'a> {
         image: &'a OrientedImage<'a>,
         model: CameraModel,
         pixels: &'a Pyramid,
-    ) -> std::result::Result<Self, Unseen> {
+    ) -> Result<Self, Unseen> {
+        Self::through(image.oriented_camera(model), pixels)
+    }
+
+    pub(super) fn through(
+        camera: OrientedCamera<&'a (dyn ExteriorOrientation + 'static)>,
+        pixels: &'a Pyramid,
+    ) -> Result<Self, Unseen> {
+        let projector = Projector::new(camera.orientation, camera.lines())?;
         Ok(Self {
-            camera: image.oriented_camera(model),
-            projector: image.projector(model)?,
+            projector: projector.through(camera.detector.distortion),
+            camera,
             pixels,
         })
     }
@@ -89,7 +97,7 @@ impl<'a> View<'a> {
     }
 
     /// Line and sample of a point, in the image or beyond it.
-    fn place(&self, ground_m: &Vector3<f64>) -> Option<Vector2<f64>> {
+    pub(super) fn place(&self, ground_m: &Vector3<f64>) -> Option<Vector2<f64>> {
         let seen = self.projector.project(ground_m).ok()?;
         let focal_px = self.camera.detector.focal_px(&seen.camera_m).ok()?;
         Some(Vector2::new(
