@@ -43,8 +43,6 @@ pub(super) struct Common {
     high: Vector2<f64>,
     /// Metres of a pixel of each image in the middle.
     pub(super) spacing_m: [Vector2<f64>; 2],
-    /// Lines and samples of the second image for a standard deviation of the height, in the middle.
-    pub(super) height_px: Vector2<f64>,
     /// Distance from the first camera to the ground and from the second, in the middle, metres.
     pub(super) ranges_m: [f64; 2],
 }
@@ -85,7 +83,6 @@ impl Common {
             low: fold(f64::INFINITY, f64::min),
             high: fold(f64::NEG_INFINITY, f64::max),
             spacing_m: middle.spacing_m,
-            height_px: middle.height_px,
             ranges_m: [
                 range_m(here, &middle.affine.from),
                 range_m(there, &middle.affine.to),
