@@ -104,7 +104,7 @@ impl Patch {
         let last = self.size[axis] as f64 - 3.0;
         (1.0..=last)
             .contains(&pixel)
-            .then_some((pixel as usize - 1, behind - pixel))
+            .then(|| (pixel as usize - 1, behind - pixel))
     }
 
     /// The rectangle of another image with this `first` pixel and `size`, as this image shows it; `None` where the patch

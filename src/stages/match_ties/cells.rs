@@ -149,21 +149,20 @@ impl Cell {
         Vector2::new(middle(&self.lines), middle(&self.samples))
     }
 
-    /// The pixels at `level` in which places are looked for; those around them that templates need are there too.
+    /// The pixels at `level` in which places are looked for, with those around them that templates need; of missing lines
+    /// the longest stretch between them. `None` where that is too short for a template.
     fn pixels(&self, pixels: &Pyramid, level: usize) -> Result<Option<Patch>> {
-        let lines = pixels.longest_good(self.lines.clone());
         let size = 1_usize << level;
-        let margin = HALF_LEAST_SQUARES + 1;
-        let margin_px = usize::try_from(margin).unwrap_or_default();
-        let spans = [lines, self.samples.clone()].map(|span| {
-            let first = i64::try_from(span.start / size).unwrap_or_default() - margin;
-            (first, span.len() / size + 2 * margin_px)
-        });
-        pixels.window(
-            level,
-            spans.map(|(first, _)| first),
-            spans.map(|(_, size)| size),
-        )
+        let margin = usize::try_from(HALF_LEAST_SQUARES + 1).unwrap_or_default();
+        let [lines, samples] = [&self.lines, &self.samples]
+            .map(|span| span.start.saturating_sub(margin * size)..span.end + margin * size);
+        let spans = [pixels.longest_good(lines), samples]
+            .map(|span| span.start.div_ceil(size)..span.end / size);
+        let first = spans
+            .each_ref()
+            .map(|span| i64::try_from(span.start).unwrap_or_default());
+        let patch = pixels.window(level, first, spans.map(|span| span.len()))?;
+        Ok(patch.filter(|patch| patch.size.iter().all(|length| *length > 2 * margin)))
     }
 }
 
