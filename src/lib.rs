@@ -15,6 +15,7 @@ pub mod footprints;
 pub mod frames;
 pub mod geom;
 pub mod image;
+pub mod imaging;
 pub mod instruments;
 pub mod kernel_source;
 pub mod line_times;

@@ -1,5 +1,7 @@
 //! Tie points: places on the ground that were measured in several images.
 
+mod matching;
+
 use nalgebra::Matrix3;
 use serde::{Deserialize, Serialize};
 
@@ -7,6 +9,8 @@ use crate::{
     error::{Cause, Kind},
     frames::{MarsIau2000, Position},
 };
+
+pub use matching::{MatchedPair, Unmatched};
 
 /// A point measured in images.
 ///

@@ -313,6 +313,7 @@ fn a_control_network_is_read_again_as_it_was_written() {
         known,
         initial_m: Some(gusev().position.xyz_m),
         adjusted: Some(gusev()),
+        is_rejected: false,
         measures: measures.clone(),
     };
     let points = vec![
@@ -322,6 +323,7 @@ fn a_control_network_is_read_again_as_it_was_written() {
         NetworkPoint {
             adjusted: None,
             initial_m: None,
+            is_rejected: true,
             ..point("rejected", None)
         },
     ];

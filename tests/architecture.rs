@@ -36,7 +36,7 @@ const FLOORS: [&[&str]; 7] = [
         "kernel_source",
         "line_times",
     ],
-    &["geom", "config"],
+    &["geom", "config", "imaging"],
     &["spice", "pds", "scene"],
     &["stages"],
     &["flow", "report", "difference", "products", "store", "sql"],

@@ -129,7 +129,7 @@ fn agree(what: &str, until: &str, planned: &[StageReason], ran: &[StageReason]) 
             assert_eq!(ran_names.pop().as_deref(), Some(PUBLISH), "{what}");
         }
         let failed = ran_names.last().map_or("", |stage| stage.as_str());
-        let mut of_adjustment = ["intersect", "adjust", "reorient"].iter();
+        let mut of_adjustment = ["match_ties", "intersect", "adjust", "reorient"].iter();
         let failed_there = of_adjustment.any(|stage| failed.starts_with(stage));
         assert!(
             failed_there || failed.ends_with("adjusted"),
@@ -213,6 +213,7 @@ fn others(kind: &ValueKind, now: Option<&Value>, names: &[&str]) -> Vec<Value> {
                 .map(Value::Integer)
                 .collect()
         }
+        ValueKind::Switch => vec![Value::from(false), Value::from(true)],
         ValueKind::Word(words) => words.iter().map(|word| Value::from(word.word)).collect(),
         ValueKind::Text { .. } => ["another text"]
             .iter()
@@ -276,7 +277,7 @@ fn changed(site: &Table, key: &DeclaredKey, names: &[&str]) -> Vec<Table> {
 
 /// What keys that name something may be changed to: files beside those of the site, orbit solutions, images, a clock and
 /// a time a little off those of the labels. A key takes what its form and its use accept.
-const NAMES: [&str; 18] = [
+const NAMES: [&str; 19] = [
     "kernels/gsfc.tm",
     "kernels/mgs_gsfc_scene.bsp",
     "kernels/mars_iau1991.tpc",
@@ -285,6 +286,7 @@ const NAMES: [&str; 18] = [
     "ties/other.csv",
     "pedr/other/ap19019k.b",
     "pedr/*.b",
+    "images/other.img",
     "other.geojson",
     "other_laser.toml",
     "other_camera.toml",
@@ -326,6 +328,15 @@ fn write_others(case: &Case) {
         ]
         .concat(),
     );
+    fs::create_dir(case.path("images")).unwrap();
+    for (level, name) in [(80, "one"), (90, "two"), (100, "other")] {
+        let mut raster = b"PDS_VERSION_ID = PDS3\r\nRECORD_BYTES = 1024\r\n^IMAGE = 2\r\nINSTRUMENT_ID = \"MOC-NA\"\r\n\
+            OBJECT = IMAGE\r\nLINES = 1600\r\nLINE_SAMPLES = 1024\r\nSAMPLE_BITS = 8\r\nEND_OBJECT = IMAGE\r\nEND\r\n"
+            .to_vec();
+        raster.resize(1024, b' ');
+        raster.extend(vec![level; 1600 * 1024]);
+        case.write(&format!("images/{name}.img"), raster);
+    }
     let ties = text("ties/isidis.csv");
     let fewer: Vec<&str> = ties.lines().take(200).collect();
     case.write("ties/other.csv", fewer.join("\n") + "\n");
@@ -398,9 +409,26 @@ fn sites(site: &Table) -> Vec<Table> {
             "adjustment.images = [{ id = 'E02-01301', position_m = [30, 0.3, 0, 30, 0.3, 0, 30, 0.3, 0], \
              rotation_arcsec = [10, 1, 0, 10, 1, 0, 10, 1, 0] }]",
         ),
+        matched(site),
         with("adjustment.model = 'published'"),
         with("adjustment.robust = 'huber'"),
     ]
+}
+
+/// The site with the pixels of its images, in which tie points are matched beside those of its file.
+fn matched(site: &Table) -> Table {
+    let mut site = site.clone();
+    let images = site["images"].as_array_mut().unwrap();
+    for (image, name) in images.iter_mut().zip(["one", "two"]) {
+        let pixels = Value::from(format!("images/{name}.img"));
+        image
+            .as_table_mut()
+            .unwrap()
+            .insert("pixels".to_owned(), pixels);
+    }
+    let ties = site["ties"].as_table_mut().unwrap();
+    ties.insert("match".to_owned(), Value::from(true));
+    site
 }
 
 /// Keys whose change is no change of a site, and why.

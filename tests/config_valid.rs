@@ -350,6 +350,7 @@ fn takes(kind: &ValueKind, value: &toml::Value) -> bool {
         (ValueKind::Whole { low, high }, toml::Value::Integer(number)) => {
             (low..=high).contains(&number)
         }
+        (ValueKind::Switch, toml::Value::Boolean(_)) => true,
         (ValueKind::Word(words), toml::Value::String(text)) => {
             words.iter().any(|word| word.word == text)
         }

@@ -111,6 +111,29 @@ pub(super) const fn words<T, const N: usize>(
     Words(words)
 }
 
+/// `true` or `false`.
+pub(super) struct Switch;
+
+impl Form for Switch {
+    type Value = bool;
+
+    fn kind(&self) -> ValueKind {
+        ValueKind::Switch
+    }
+
+    fn read(&self, found: &Found<'_>, review: &mut Review<'_>) -> Option<bool> {
+        let value = found.value.get_ref().as_bool();
+        if value.is_none() {
+            found.refuse(review, self.kind());
+        }
+        value
+    }
+
+    fn written(&self, value: &bool) -> Value {
+        Value::Boolean(*value)
+    }
+}
+
 /// "no" or "yes", and what each means.
 pub(super) const fn yes_or_no(no: &'static str, yes: &'static str) -> Words<bool, 2> {
     words([("no", false, no), ("yes", true, yes)])

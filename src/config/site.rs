@@ -111,8 +111,21 @@ fn across_tables(site: &SiteConfig, keys: &mut Keys<'_, '_>) {
     if site.images.len() < 2 {
         keys.refuse("ties", "at least two images that tie points can join");
     }
+    matched_images(site, keys);
     priors_of_images(site, keys);
     images_of_windows(site, keys);
+}
+
+/// Matching needs two images at least whose pixels are there.
+fn matched_images(site: &SiteConfig, keys: &mut Keys<'_, '_>) {
+    let with_pixels = site.images.iter().filter(|image| image.pixels.is_some());
+    if site.ties.matched && site.images.len() > 1 && with_pixels.count() < 2 {
+        keys.refuse_below(
+            "ties",
+            "match",
+            "at least two images with images.pixels, or false",
+        );
+    }
 }
 
 /// Footprints need windows; a site needs footprints or images.

@@ -3,13 +3,14 @@
 use std::path::PathBuf;
 
 use schemars::JsonSchema;
+use serde_json::json;
 
 use crate::{geom::intersection::Weighting, units::RADIANS_PER_DEGREE};
 
 use super::{
     adjustment::SIGMA,
     declare::{Declare as _, Keys, declare_table, group, key},
-    forms::{above_to, words},
+    forms::{Switch, above_to, words},
     paths::Globs,
 };
 
@@ -23,8 +24,37 @@ declare_table! {
         /// `serial_number` above, or its `id`; measurements in other images are counted and left out.
         #[serde(skip)]
         files: Vec<PathBuf> = key(Globs)
-            .required_as("paths or globs of tie point files (or no table ties at all)")
+            .or(Vec::new())
             .example(r#"["../ties/*.csv"]"#),
+        /// Whether areograph measures tie points itself, beside those of files: every pair of images that have `pixels` is
+        /// matched where both show the same ground with enough texture, and once more with the orientation that these tie
+        /// points adjust. Each measurement has the standard deviations of its own match.
+        matched as "match": bool = key(Switch).or(false),
+    }
+    check something_measures
+}
+
+/// Without files and without matching there is no tie point.
+fn something_measures(ties: &TiesConfig, keys: &mut Keys<'_, '_>) {
+    keys.rule(|| {
+        json!({"anyOf": [
+            {"required": ["files"]},
+            {"required": ["match"], "properties": {"match": {"const": true}}},
+        ]})
+    });
+    if !ties.matched && keys.span_of("files").is_none() {
+        keys.missing(
+            "files",
+            "paths or globs of tie point files, or match = true (or no table ties at all)",
+        );
+    }
+}
+
+impl TiesConfig {
+    /// Whether the site has tie points, of files or matched.
+    #[must_use]
+    pub fn are_there(&self) -> bool {
+        self.matched || !self.files.is_empty()
     }
 }
 

@@ -7,7 +7,8 @@ use super::{
     driver::{Driver, Flow, Leave},
     kernels::{load_rivals, required_coverage},
     outputs::{Prepared, Site},
-    site::{kernels, orient, prepare, ties},
+    site::{kernels, orient, prepare},
+    triangulate::{match_ties, ties_of_files},
 };
 use crate::{
     config::SiteConfig,
@@ -15,7 +16,7 @@ use crate::{
     files::{HashedFile, InputFiles},
     kernel_source::KernelSource,
     spice::RequiredCoverage,
-    stage::{Output, Provenance, Stage},
+    stage::{Output, Provenance, Round, Stage},
     stages::{group_profiles::Profile, tag_times::ImageTimes},
     store::hashes::HashCache,
 };
@@ -142,7 +143,7 @@ impl<'a> Check<'a> {
             self.few_shots(config, prepared.profiles.get().map_or(&[], Vec::as_slice));
         }
         if !config.ties.files.is_empty() {
-            ties(self, config)?;
+            ties_of_files(self, config)?;
         }
         let KernelSource::Sets(sets) = &config.kernels.source else {
             return self.check_kernels(config, prepared, 0);
@@ -180,7 +181,12 @@ impl<'a> Check<'a> {
         for line in kernels.explanation() {
             self.tell(line);
         }
-        orient(self, config, prepared, Some(kernels)).map(|_| ())
+        let site = orient(self, config, prepared, Some(kernels))?;
+        if config.ties.matched {
+            let shots = (&site.converted, &site.profiles);
+            match_ties(self, config, Round::Initial, &site.images, shots, None)?;
+        }
+        Ok(())
     }
 
     fn tell(&mut self, finding: &str) {

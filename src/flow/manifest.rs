@@ -15,7 +15,7 @@ use crate::{
     files::file_name,
     instruments::Instrument,
     stage::Inputs,
-    stages::{describe_kernels::KernelLine, judge::Verdict},
+    stages::{describe_kernels::KernelLine, judge::Verdict, read_ties::Ties},
     store::manifest::{
         BiasEntry, Complaints, ConfigurationEntry, KernelEntry, Manifest, ProductEntry, StageEntry,
         figures,
@@ -149,7 +149,28 @@ fn counts(site: &Site) -> Result<BTreeMap<String, u64>> {
         ("registered_inside", inside),
         ("registration_rejected", rejected),
     ];
-    Ok(counts.map(|(name, count)| (name.to_owned(), count)).into())
+    let mut counts: BTreeMap<String, u64> =
+        counts.map(|(name, count)| (name.to_owned(), count)).into();
+    if let Some(ties) = &site.ties {
+        counts.extend(matched(ties.value()?));
+    }
+    Ok(counts)
+}
+
+/// Cells of common ground in which a tie point was searched, and what became of them; nothing where none was.
+fn matched(ties: &Ties) -> BTreeMap<String, u64> {
+    let mut counts = BTreeMap::new();
+    for pair in &ties.matched {
+        let mut add = |name: String, count: u32| {
+            *counts.entry(name).or_insert(0) += u64::from(count);
+        };
+        add("match_cells".to_owned(), pair.cells);
+        add("match_ties".to_owned(), pair.ties);
+        for (why, count) in &pair.unmatched {
+            add(format!("match_{}", why.word()), *count);
+        }
+    }
+    counts
 }
 
 /// The largest figures of the site.

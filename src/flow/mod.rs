@@ -21,9 +21,11 @@ mod outputs;
 mod plan;
 mod publish;
 mod read_back;
+mod registered;
 mod run;
 mod site;
 mod sites;
+mod triangulate;
 
 pub use archive::{
     ArchiveOutcome, ArchiveProgress, ArchiveRequest, archive_filter, archive_limits, check_archive,

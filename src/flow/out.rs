@@ -65,7 +65,7 @@ impl Cause for OutError {
 /// [`OutError`], of kind configuration.
 pub fn check_out(out: &Path, sites: &[SiteConfig]) -> Result<()> {
     check_out_path(out)?;
-    for site in sites.iter().filter(|site| !site.ties.files.is_empty()) {
+    for site in sites.iter().filter(|site| site.ties.are_there()) {
         let staging = staging_path(&out.join(&site.site));
         let ids = site.images.iter().map(|image| &*image.id);
         let products = ids.map(|id| staging.join(position_kernel(id)));

@@ -35,6 +35,7 @@ pub fn stages() -> &'static [&'static str] {
             },
         });
         config.ties.files.push(PathBuf::new());
+        config.ties.matched = true;
         // Nothing is read and nothing runs, so nothing fails.
         let _ = site(&mut outline, &config);
         outline.names
@@ -42,12 +43,14 @@ pub fn stages() -> &'static [&'static str] {
     &NAMES
 }
 
-/// Stages, those of every image and round each, that a run passes of a site with so many images, with tie points or without.
+/// Stages, those of every image and round each, that a run passes of a site with so many images, with tie points of files or without,
+/// and with such as are matched or without.
 #[must_use]
-pub fn stage_count(images: usize, ties: bool) -> usize {
+pub fn stage_count(images: usize, ties: bool, matched: bool) -> usize {
     let mut outline = Outline::default();
     let mut config = SiteConfig::default();
     config.images.resize_with(images, ImageConfig::default);
+    config.ties.matched = matched;
     if ties {
         config.ties.files.push(PathBuf::new());
     }
@@ -108,9 +111,11 @@ mod tests {
 
     #[test]
     fn every_image_has_stages_of_its_own() {
-        let [none, one, two] = [0, 1, 2].map(|images| stage_count(images, false));
+        let [none, one, two] = [0, 1, 2].map(|images| stage_count(images, false, false));
         assert!(none < one && two - one == one - none);
-        assert!(stage_count(2, true) > two);
+        let read = stage_count(2, true, false);
+        assert!(read > two);
+        assert!(stage_count(2, true, true) > read);
     }
 
     #[test]
@@ -119,7 +124,7 @@ mod tests {
         assert_eq!(stages.first(), Some(&LOAD_KERNELS));
         assert_eq!(stages.last(), Some(&PUBLISH));
         let place = |name| stages.iter().position(|stage| *stage == name).unwrap();
-        let adjustment = ["register", "read_ties", "adjust", "reorient"].map(place);
+        let adjustment = ["register", "read_ties", "match_ties", "adjust", "reorient"].map(place);
         assert!(adjustment.is_sorted(), "{stages:?}");
     }
 }

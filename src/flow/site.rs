@@ -5,42 +5,30 @@ use super::{
     choice::{ChooseKernels, KernelChoice, RivalKernelSets, rival_positions},
     driver::{Driver, Flow, Leave},
     kernels::{load_kernels, required_coverage},
-    outputs::{Adjustment, Intersection, Prepared, Site},
+    outputs::{Prepared, Site},
+    registered::registered,
+    triangulate::{is_of_adjustment, triangulate},
 };
 use crate::{
     config::{ImageConfig, SiteConfig, WindowConfig},
-    error::{Error, Kind},
     geom::window::WindowShape,
     kernel_source::KernelSource,
     pds::archive::{Index, Indexes},
     spice::{KernelSet, KernelView, RequiredCoverage},
     stage::{InOrder, Output, Round, Stage},
     stages::{
-        adjust::{Adjust, Adjusted},
-        check_heights::{CheckHeights, CheckedPoints},
-        check_ranges::{CheckRanges, RangeCheck},
-        compare_pairs::ComparePairs,
-        convert_datum::{ConvertDatum, Converted},
+        check_ranges::CheckRanges,
+        convert_datum::ConvertDatum,
         describe_kernels::{DescribeKernels, Required},
-        fit_sensor_model::FitSensorModel,
-        group_profiles::{GroupProfiles, Profile},
-        intersect::Intersect,
+        group_profiles::GroupProfiles,
         orientation::Orientation,
         outline_windows::{OutlineWindows, Windows},
-        read_ties::{ImageNames, ReadTies, TieFiles, Ties},
-        register::Register,
-        reorient::Reorient,
         sample_orientation::SampleOrientation,
         search_footprints::{KnownPlaces, PedrFiles, SearchFootprints},
-        site_image::SiteImage,
-        tabulate_kernels::TabulateKernels,
         tag_times::{ImageTimes, TagTimes},
         tag_utc::TagUtc,
     },
 };
-
-/// Footprints and their profiles.
-type Shots<'a> = (&'a Output<Converted>, &'a Output<Vec<Profile>>);
 
 /// The flow of one site, from its configuration to its products.
 pub(super) fn site<D: Driver>(flow: &mut D, config: &SiteConfig) -> Flow<()> {
@@ -241,182 +229,6 @@ fn orientations<D: Driver>(
         })
     };
     images.map(sample).collect()
-}
-
-/// Every image with its orientation, sensor models and footprints.
-fn registered<D: Driver>(
-    flow: &mut D,
-    config: &SiteConfig,
-    round: Round,
-    times: &[Output<ImageTimes>],
-    orientations: Vec<Output<Orientation>>,
-    (converted, profiles): Shots,
-) -> Flow<Vec<SiteImage>> {
-    let oriented = config.images.iter().zip(times).zip(orientations);
-    let register = |((image, times), orientation): ((&ImageConfig, &Output<_>), _)| {
-        let image = &*image.id;
-        let model = flow.stage(&FitSensorModel {
-            image,
-            round,
-            samples: &orientation,
-            orientation: &config.orientation,
-        })?;
-        let registration = flow.stage(&Register {
-            image,
-            round,
-            times,
-            orientation: &orientation,
-            model: &model,
-            converted,
-            profiles,
-            registration: &config.registration,
-        })?;
-        Ok(SiteImage {
-            times: times.clone(),
-            orientation,
-            model,
-            registration,
-        })
-    };
-    oriented.map(register).collect()
-}
-
-/// Tie points, their ground points, and the adjustment, as far as it goes; nothing for a site without tie points.
-fn triangulate<D: Driver>(flow: &mut D, config: &SiteConfig, site: &mut Site) -> Flow<()> {
-    if config.ties.files.is_empty() {
-        return Ok(());
-    }
-    let ties = &*site.ties.insert(ties(flow, config)?);
-    let shots = (&site.converted, &site.profiles);
-    let initial = intersect(flow, config, None, &site.images, ties, shots)?;
-    let initial = &*site.intersection.insert(initial);
-    let kernels = &KernelView::all(site.kernels.as_ref());
-    let measured = (&site.images[..], ties, &site.ranges);
-    let adjustment = adjust(flow, config, measured, initial, shots, kernels)?;
-    site.adjustment = Some(adjustment);
-    Ok(())
-}
-
-/// The combined adjustment, and the images and tie points once more with the adjusted orientation.
-fn adjust<D: Driver>(
-    flow: &mut D,
-    config: &SiteConfig,
-    (images, ties, ranges): (&[SiteImage], &Output<Ties>, &Output<RangeCheck>),
-    initial: &Intersection,
-    shots: Shots,
-    kernels: &KernelView,
-) -> Flow<Adjustment> {
-    let (converted, profiles) = shots;
-    let adjusted = flow.stage(&Adjust {
-        images: InOrder(images),
-        model: &config.registration.model,
-        converted,
-        profiles,
-        ties,
-        intersected: &initial.intersected,
-        ranges,
-        pairs: &initial.pairs,
-        altimeter: &config.altimeter,
-        mola_surface: &config.mola_surface,
-        adjustment: &config.adjustment,
-    })?;
-    let reorient = |(index, image): (usize, &SiteImage)| {
-        flow.stage(&Reorient {
-            image: &config.images[index].id,
-            index: &index,
-            times: &image.times,
-            orientation: &image.orientation,
-            adjusted: &adjusted,
-        })
-    };
-    let orientations = images.iter().enumerate().map(reorient);
-    let orientations = orientations.collect::<Flow<Vec<_>>>()?;
-    let times: Vec<_> = images.iter().map(|image| image.times.clone()).collect();
-    let images = registered(flow, config, Round::Adjusted, &times, orientations, shots)?;
-    let intersection = intersect(flow, config, Some(&adjusted), &images, ties, shots)?;
-    let tabulate = |(index, image): (usize, &SiteImage)| {
-        flow.stage(&TabulateKernels {
-            image: &config.images[index].id,
-            index: &index,
-            times: InOrder(&times),
-            orientation: &image.orientation,
-            kernels,
-            coverage: &config.kernels,
-            pointing: &config.pointing,
-        })
-    };
-    let tables = images.iter().enumerate().map(tabulate);
-    let tables = tables.collect::<Flow<Vec<_>>>()?;
-    Ok(Adjustment {
-        adjusted,
-        images,
-        tables,
-        intersection,
-    })
-}
-
-/// Whether a failure lies in what the tie points and the orientation determine, not in a file that cannot be read.
-fn is_of_adjustment(failure: &Error) -> bool {
-    let stage = failure.stage.as_deref().unwrap_or_default();
-    let name = stage.split('/').next().unwrap_or_default();
-    let of_adjustment = [Intersect::NAME, Adjust::NAME, Reorient::NAME].contains(&name);
-    failure.kind() == Kind::Input && (of_adjustment || stage.ends_with("/adjusted"))
-}
-
-/// The tie points of the site's files.
-pub(super) fn ties<D: Driver>(flow: &mut D, config: &SiteConfig) -> Flow<Output<Ties>> {
-    let files = flow.hash(ReadTies::NAME, &config.ties.files)?;
-    flow.stage(&ReadTies {
-        ties: &config.ties,
-        files: TieFiles(&files),
-        images: ImageNames(&config.images),
-    })
-}
-
-/// Ground points of the tie points, what every pair of images says of itself, and what MOLA says of heights: with the
-/// orientation of the kernels, or with the adjusted one.
-fn intersect<D: Driver>(
-    flow: &mut D,
-    config: &SiteConfig,
-    adjusted: Option<&Output<Adjusted>>,
-    images: &[SiteImage],
-    ties: &Output<Ties>,
-    (converted, profiles): Shots,
-) -> Flow<Intersection> {
-    let round = adjusted.map_or(Round::Initial, |_| Round::Adjusted);
-    let (images, model) = (InOrder(images), &config.registration.model);
-    let intersected = flow.stage(&Intersect {
-        round,
-        images,
-        model,
-        ties,
-        intersection: &config.intersection,
-    })?;
-    let pairs = flow.stage(&ComparePairs {
-        round,
-        images,
-        model,
-        ties,
-        intersected: &intersected,
-        converted,
-        profiles,
-    })?;
-    let points = adjusted.map_or(
-        CheckedPoints::Intersected(&intersected),
-        CheckedPoints::Adjusted,
-    );
-    let heights = flow.stage(&CheckHeights {
-        round,
-        points,
-        converted,
-        profiles,
-        mola_surface: &config.mola_surface,
-    })?;
-    Ok(Intersection {
-        intersected,
-        pairs,
-        heights,
-    })
 }
 
 /// The kernels of the configuration for the `required` times; `None` while it is not known which these are.

@@ -108,17 +108,28 @@ fn readable(file: TieFile) -> std::result::Result<TieFile, TieError> {
     }
 }
 
-/// The table of some tie points, as [`read_ties`] reads it; places to a ten-thousandth of a pixel.
+/// The table of some tie points, as [`read_ties`] reads it; places to a ten-thousandth of a pixel. It has columns for
+/// standard deviations where a measurement has its own.
 #[must_use]
 pub fn ties_table(ties: &[TiePoint<String>]) -> String {
     let mut table = csv::Writer::from_writer(Vec::new());
+    let mut measures = ties.iter().flat_map(|tie| &tie.measures);
+    let has_sigmas = measures.any(|measure| measure.sigma_px.is_some());
+    let sigma_columns = SIGMA_COLUMNS.iter().filter(|_| has_sigmas);
     // Writing into memory cannot fail.
-    let _infallible = table.write_record(COLUMNS);
+    let _infallible = table.write_record(COLUMNS.iter().chain(sigma_columns));
     for tie in ties {
         for measure in &tie.measures {
             let [sample, line] =
                 [measure.sample, measure.line].map(|edge| format!("{:.4}", edge - ISIS_TO_EDGE));
-            let _infallible = table.write_record([&*tie.id, &*measure.image, &*sample, &*line]);
+            let mut record = vec![tie.id.clone(), measure.image.clone(), sample, line];
+            if has_sigmas {
+                let sigmas = measure
+                    .sigma_px
+                    .map(|sigmas| sigmas.map(|sigma| format!("{sigma:.5}")));
+                record.extend(sigmas.unwrap_or_default());
+            }
+            let _infallible = table.write_record(&record);
         }
     }
     let bytes = table.into_inner().unwrap_or_default();
@@ -361,6 +372,10 @@ mod tests {
         });
         let file = parse_table(ties_table(&ties).as_bytes()).unwrap();
         assert_eq!(file.ties, ties);
+        let mut with_sigmas = ties;
+        with_sigmas[1].measures[0].sigma_px = Some([0.05, 0.125]);
+        let file = parse_table(ties_table(&with_sigmas).as_bytes()).unwrap();
+        assert_eq!(file.ties, with_sigmas);
         assert_eq!((file.ignored, file.complaints.len()), (0, 0));
     }
 

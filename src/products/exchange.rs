@@ -7,6 +7,7 @@ mod gcp;
 pub(super) mod geopackage;
 pub(super) mod jigsaw;
 mod lidar_data;
+pub(super) mod matched;
 mod points;
 pub(super) mod readme;
 pub(super) mod shapefile;

@@ -334,7 +334,7 @@ fn provenance<'a>(
                 "instrument_position: {}, the convention of the whole run; reading programs must add none{}",
                 image.orientation.light_time.convention.positions(),
                 match round {
-                    Round::Initial => "",
+                    Round::Initial | Round::Matching => "",
                     Round::Adjusted => "; with the correction and the shift of line times in ../../adjustment.json",
                 },
             ),
@@ -342,7 +342,7 @@ fn provenance<'a>(
                 "instrument_pointing: attitude of each epoch read from the C-kernel at epoch + INS{}_CK_TIME_BIAS{}",
                 times.instrument.naif.instrument,
                 match round {
-                    Round::Initial => "",
+                    Round::Initial | Round::Matching => "",
                     Round::Adjusted => ", turned by the correction and shifted as the lines are",
                 },
             ),

@@ -123,6 +123,9 @@ fn write(
             write(&path, of, image).map(Some)
         }
         (Write::Ties(write), _, Some(geometric)) => write(&path, of, geometric).map(Some),
+        (Write::Matched(write), _, Some(geometric)) if !geometric.ties.matched.is_empty() => {
+            write(&path, of, geometric).map(Some)
+        }
         (Write::Adjustment(write), _, Some(geometric)) => match &geometric.adjustment {
             Some(adjustment) => write(&path, of, geometric, adjustment),
             None => Ok(None),

@@ -99,6 +99,8 @@ pub(super) enum Write {
     Image(fn(&Path, &Context, &ImageProducts) -> Result<u64>),
     /// For a site with tie points.
     Ties(fn(&Path, &Context, &GeometricProducts) -> Result<u64>),
+    /// For a site with tie points that were matched.
+    Matched(fn(&Path, &Context, &GeometricProducts) -> Result<u64>),
     /// For a site with an adjustment.
     Adjustment(fn(&Path, &Context, &GeometricProducts, &AdjustmentProducts) -> Result<Option<u64>>),
     /// For every image of a site with an adjustment.
@@ -166,6 +168,7 @@ impl Declaration {
             Write::Footprints(_) => "a site with footprints",
             Write::Image(_) => "every image",
             Write::Ties(_) => "a site with tie points",
+            Write::Matched(_) => "a site with matched tie points",
             Write::Adjustment(_) | Write::Several(_) => "a site with an adjustment",
             Write::AdjustedImage(_) | Write::WithAnother => {
                 "every image of a site with an adjustment"

@@ -2,7 +2,7 @@
 
 use super::{
     adjusted_footprints, adjusted_kernels, adjustment, correlations,
-    exchange::{adjusted, geopackage, jigsaw, readme, shapefile, stac, tables},
+    exchange::{adjusted, geopackage, jigsaw, matched, readme, shapefile, stac, tables},
     footprints, heights, isd, kernel_report, orientation, page,
     product::Declaration,
     ranges, registration, ties,
@@ -46,6 +46,8 @@ pub(super) static PRODUCTS: &[&Declaration] = &[
     &shapefile::ATTRIBUTES,
     &shapefile::PROJECTION,
     &shapefile::ENCODING,
+    &matched::TABLE,
+    &matched::NETWORK,
     &adjusted::LIDAR,
     &adjusted::CONTROL,
     &jigsaw::NETWORK,

@@ -30,6 +30,7 @@ mod heights;
 mod html;
 mod images;
 mod map;
+mod matching;
 mod misregistration;
 mod moved;
 mod net;
@@ -71,6 +72,7 @@ use section::Section;
 const SECTIONS: &[Section] = &[
     heights::SECTION,
     misregistration::SECTION,
+    matching::SECTION,
     adjustment::SECTION,
     ranges::SECTION,
     scan::SECTION,

@@ -1,7 +1,12 @@
 //! Images of the synthetic mission as the camera takes them: every pixel shows the ground that ties and shots are measured on,
 //! by its albedo and its slope towards the Sun, with the noise of detectors.
 
-use std::{fs::File, io::Write as _, ops::Range, path::Path};
+use std::{
+    fs::File,
+    io::Write as _,
+    ops::{Range, RangeInclusive},
+    path::Path,
+};
 
 use nalgebra::Vector3;
 use rayon::prelude::*;
@@ -131,11 +136,7 @@ impl<'a> Rendering<'a> {
     /// Pixels of some lines and samples.
     fn pixels(&self, lines: Range<u32>, samples: Range<u32>) -> Result<Vec<u8>> {
         // Centres of the pixels, and of one more line and sample: slopes lie between neighbours.
-        let row = |line: u32| {
-            let places = samples.start..=samples.end;
-            let ground = places.map(|sample| self.ground_m(line, sample));
-            ground.collect::<Result<Vec<_>>>()
-        };
+        let row = |line: u32| self.ground_m(line, samples.start..=samples.end);
         let mut pixels = Vec::with_capacity(lines.len() * samples.len());
         let mut here = row(lines.start)?;
         for line in lines {
@@ -150,14 +151,18 @@ impl<'a> Rendering<'a> {
         Ok(pixels)
     }
 
-    fn ground_m(&self, line: u32, sample: u32) -> Result<Vector3<f64>> {
-        let centre = [line, sample].map(|count| f64::from(count) + 0.5);
-        let ground_m = self.image.ground_m(self.terrain, centre[0], centre[1]);
+    /// Ground at the middles of some pixels of a line.
+    fn ground_m(&self, line: u32, samples: RangeInclusive<u32>) -> Result<Vec<Vector3<f64>>> {
+        let middle = |count: u32| f64::from(count) + 0.5;
+        let seen = self
+            .image
+            .ground_of_line_m(self.terrain, middle(line), samples.map(middle));
         let nothing = || SceneError::Image {
             image: self.image.flown.arc.image.id.to_owned(),
-            error: format!("line {line}, sample {sample} sees no ground"),
+            error: format!("line {line} sees no ground"),
         };
-        Ok(ground_m.ok_or_else(nothing)?)
+        let seen: Option<Vec<Vector3<f64>>> = seen.into_iter().collect();
+        Ok(seen.ok_or_else(nothing)?)
     }
 
     /// The number of a pixel: albedo and slope of its ground, noise, offset of its detector.
@@ -190,23 +195,15 @@ impl<'a> Rendering<'a> {
 fn noise(place: &Vector3<f64>, key: u64) -> f64 {
     let corner = place.map(f64::floor);
     let share = (place - corner).map(|share| share * share * (3.0 - 2.0 * share));
-    let at = |offset: [f64; 3]| {
-        let node = corner + Vector3::from(offset);
-        let hashed = node
-            .iter()
-            .fold(key, |hash, axis| mix(hash ^ axis.to_bits()));
-        2.0 * unit_of(hashed) - 1.0
+    // Each node has a number by x, then y, then z: what two nodes have in common is mixed once.
+    let between = |axis: usize, hash: u64, value: &dyn Fn(u64) -> f64| {
+        let [near, far] = [0.0, 1.0].map(|step| value(mix(hash ^ (corner[axis] + step).to_bits())));
+        near + share[axis] * (far - near)
     };
-    let along = |y: f64, z: f64| {
-        let [near, far] = [0.0, 1.0].map(|x| at([x, y, z]));
-        near + share.x * (far - near)
-    };
-    let across = |z: f64| {
-        let [near, far] = [0.0, 1.0].map(|y| along(y, z));
-        near + share.y * (far - near)
-    };
-    let [near, far] = [0.0, 1.0].map(across);
-    near + share.z * (far - near)
+    let number = |hash: u64| 2.0 * unit_of(hash) - 1.0;
+    let along_z = |hash: u64| between(2, hash, &number);
+    let along_y = |hash: u64| between(1, hash, &along_z);
+    between(0, key, &along_y)
 }
 
 #[cfg(test)]

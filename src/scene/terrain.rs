@@ -175,14 +175,25 @@ impl Terrain {
         if !(discriminant > 0.0 && sphere_b < 0.0) {
             return None;
         }
-        let mut range_m = -sphere_b - discriminant.sqrt();
+        let start_m = -sphere_b - discriminant.sqrt();
+        self.range_near_m(origin_m, direction, start_m, 1e-5)
+    }
+
+    /// The same by steps from `range_m`, the last of which corrects a height error below `tolerance_m`.
+    pub(super) fn range_near_m(
+        &self,
+        origin_m: &Vector3<f64>,
+        direction: &Vector3<f64>,
+        mut range_m: f64,
+        tolerance_m: f64,
+    ) -> Option<f64> {
         for _ in 0..60 {
             let place_m = origin_m + range_m * direction;
             let radius_m = place_m.norm();
             let up = place_m / radius_m;
             let height_m = radius_m - self.radius_m(&up);
             range_m += height_m / -up.dot(direction);
-            if height_m.abs() < 1e-5 {
+            if height_m.abs() < tolerance_m {
                 return Some(range_m);
             }
         }

@@ -42,6 +42,8 @@ const BLUNDER_PX: [f64; 2] = [20.0, 100.0];
 const INTERVALS: u32 = 160;
 /// The same of an image with jitter, 2 to 5 ms each: a twentieth of the shortest period, for 2 mm on the ground.
 const INTERVALS_OF_JITTER: u32 = 3_600;
+/// Height errors that ranges of neighbouring pixels end at, metres: a thousandth of a pixel.
+const NEIGHBOUR_M: f64 = 1e-3;
 /// Lines at which the truth tells the pose: the ends of 30 equal intervals.
 const TOLD_POSES: u32 = 31;
 
@@ -119,6 +121,32 @@ impl<'a> TrueImage<'a> {
         let direction = pose.mars_to_camera.tr_mul(&camera).normalize();
         let range_m = terrain.range_m(&pose.position_m, &direction)?;
         Some(pose.position_m + range_m * direction)
+    }
+
+    /// The ground that some neighbouring samples of a line show, to a millimetre: each range starts from those before it.
+    pub(super) fn ground_of_line_m(
+        &self,
+        terrain: &Terrain,
+        line: f64,
+        samples: impl Iterator<Item = f64>,
+    ) -> Vec<Option<Vector3<f64>>> {
+        let (x_lines, _) = self.oriented_camera.focal_plane_coordinates(line, 0.0);
+        let pose = self.oriented_camera.orientation.pose(x_lines);
+        let mut before: [Option<f64>; 2] = [None; 2];
+        let ground = samples.map(|sample| {
+            let camera = self.oriented_camera.detector.look(sample);
+            let direction = pose.mars_to_camera.tr_mul(&camera).normalize();
+            let range_m = match before {
+                [Some(last_m), Some(earlier_m)] => {
+                    let start_m = 2.0 * last_m - earlier_m;
+                    terrain.range_near_m(&pose.position_m, &direction, start_m, NEIGHBOUR_M)
+                }
+                _ => terrain.range_m(&pose.position_m, &direction),
+            };
+            before = [range_m, before[0]];
+            range_m.map(|range_m| pose.position_m + range_m * direction)
+        });
+        ground.collect()
     }
 
     /// Where the image shows a point, unless that is outside or too near to an edge.

@@ -22,6 +22,8 @@ use crate::error::Result;
 pub enum Round {
     /// The orientation of the kernels.
     Initial,
+    /// An adjustment by tie points that were matched with the orientation of the kernels, made to match them again.
+    Matching,
     /// The adjusted orientation.
     Adjusted,
 }
@@ -30,16 +32,33 @@ impl Round {
     /// Part of a stage that runs once a site in each round.
     #[must_use]
     pub fn part(self) -> Option<String> {
-        (self == Self::Adjusted).then(|| "adjusted".to_owned())
+        self.name().map(str::to_owned)
     }
 
     /// Part of a stage that runs for `image` in each round.
     #[must_use]
     pub fn part_of(self, image: &str) -> Option<String> {
-        Some(match self {
-            Self::Initial => image.to_owned(),
-            Self::Adjusted => format!("{image}/adjusted"),
+        Some(match self.name() {
+            None => image.to_owned(),
+            Some(round) => format!("{image}/{round}"),
         })
+    }
+
+    /// What a stage that makes the orientation of this round is marked by: the last adjustment of a site is the adjustment.
+    #[must_use]
+    pub const fn of_adjustment(self) -> Self {
+        match self {
+            Self::Matching => Self::Matching,
+            Self::Initial | Self::Adjusted => Self::Initial,
+        }
+    }
+
+    const fn name(self) -> Option<&'static str> {
+        match self {
+            Self::Initial => None,
+            Self::Matching => Some("matching"),
+            Self::Adjusted => Some("adjusted"),
+        }
     }
 }
 

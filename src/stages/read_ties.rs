@@ -17,7 +17,7 @@ use crate::{
     pds,
     stage::{InOrder, Input, Inputs, Stage},
     stage_inputs,
-    ties::TiePoint,
+    ties::{MatchedPair, TiePoint},
 };
 
 use repeats::SharedPlaces;
@@ -44,6 +44,10 @@ pub struct Ties {
     pub copies: Vec<String>,
     /// What does not agree, and must be weighed, one sentence each.
     pub remarks: Vec<String>,
+    /// How many of the points are those of files.
+    pub read: usize,
+    /// Pairs of images in which areograph measured tie points itself; these stand behind those of files.
+    pub matched: Vec<MatchedPair>,
 }
 
 /// Tie points that belong to other images.
@@ -119,7 +123,7 @@ impl Input for ImageNames<'_> {
 
 impl Stage for ReadTies<'_> {
     const NAME: &'static str = "read_ties";
-    const METHOD: u32 = 3;
+    const METHOD: u32 = 4;
     const CHECKED: bool = true;
     type Output = Ties;
     stage_inputs!(fingerprint);
@@ -197,6 +201,7 @@ pub fn read_ties(ties: &TiesConfig, images: &[ImageConfig]) -> Result<Ties> {
         }
         read.remarks.push(shared.to_string());
     }
+    read.read = read.points.len();
     Ok(read)
 }
 
@@ -264,6 +269,12 @@ impl Ties {
         notes
     }
 
+    /// How many of the points, the last ones, areograph measured itself.
+    #[must_use]
+    pub const fn matched_points(&self) -> usize {
+        self.points.len() - self.read
+    }
+
     /// Tie points measured in at least two images.
     #[must_use]
     pub fn multi_image(&self) -> usize {
@@ -307,6 +318,7 @@ mod tests {
         ImageConfig {
             id: id.to_owned(),
             label: None,
+            pixels: None,
             instrument: None,
             serial_number: serial_number.map(str::to_owned),
             fields: ImageFields::default(),
@@ -320,7 +332,13 @@ mod tests {
     }
 
     fn read_files(files: Vec<PathBuf>, images: &[ImageConfig]) -> Result<Ties> {
-        read_ties(&TiesConfig { files }, images)
+        read_ties(
+            &TiesConfig {
+                files,
+                matched: false,
+            },
+            images,
+        )
     }
 
     fn read(text: &str, images: &[ImageConfig]) -> Result<Ties> {

@@ -21,7 +21,7 @@ use crate::{
         mars_rotation::mars_rotation,
         pushbroom::{ExteriorOrientation, Pose, SampledOrientation, SamplesError},
     },
-    stage::{Output, Stage},
+    stage::{Output, Round, Stage},
     stage_inputs,
     time::{Et, Interval},
 };
@@ -87,6 +87,8 @@ impl Cause for ReorientError {
 stage_inputs! {
     /// The orientation of one image, and what the adjustment adds to it.
     pub struct Reorient<'a> {
+        /// What the adjustment is for.
+        pub round: Round,
         /// Identifier of the image.
         pub image: &'a str,
         /// Its place among the images of the adjustment.
@@ -107,7 +109,7 @@ impl Stage for Reorient<'_> {
     stage_inputs!(fingerprint);
 
     fn part(&self) -> Option<String> {
-        Some(self.image.to_owned())
+        self.round.of_adjustment().part_of(self.image)
     }
 
     fn run(&self, _stop: &AtomicBool) -> Result<Orientation> {

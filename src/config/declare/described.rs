@@ -86,6 +86,8 @@ pub enum ValueKind {
     },
     /// One of several words.
     Word(Vec<Word>),
+    /// `true` or `false`.
+    Switch,
     /// A list.
     List {
         /// In words.
@@ -117,6 +119,7 @@ impl fmt::Display for ValueKind {
             Self::Whole { low, high } => {
                 write!(formatter, "a whole number from {low} to {high}")
             }
+            Self::Switch => formatter.write_str("true or false"),
             Self::Word(words) => {
                 let words: Vec<&str> = words.iter().map(|word| word.word).collect();
                 write!(formatter, "one of {}", words.join(", "))

@@ -139,6 +139,7 @@ fn range(kind: &ValueKind) -> Option<String> {
         }
         ValueKind::Number(Accept::ZeroOr(low, high)) => Some(format!("0 or {low} to {high}")),
         ValueKind::Whole { low, high } => Some(format!("{low} to {high}")),
+        ValueKind::Switch => Some("true or false".to_owned()),
         ValueKind::Word(words) => {
             let words: Vec<String> = words
                 .iter()

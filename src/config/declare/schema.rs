@@ -154,6 +154,7 @@ fn of_kind(kind: &ValueKind) -> Schema {
             maximum: Some(json!(high)),
             ..of_type("integer")
         },
+        ValueKind::Switch => of_type("boolean"),
         ValueKind::Word(words) => Schema {
             words: words.iter().map(|word| word.word).collect(),
             ..Schema::default()
@@ -214,6 +215,7 @@ fn json_of(value: &Value) -> Json {
     match value {
         Value::Float(number) => json!(number),
         Value::Integer(number) => json!(number),
+        Value::Boolean(is_true) => json!(is_true),
         Value::Array(entries) => entries.iter().map(json_of).collect(),
         Value::String(text) => json!(text),
         other => json!(other.to_string()),

@@ -13,6 +13,7 @@ mod fragment;
 mod opened;
 mod placed;
 mod predictive;
+mod pyramid;
 mod radiometry;
 mod statistics;
 mod stream;
@@ -25,6 +26,7 @@ pub use self::{
     encode::{EncodeError, Encoded, NewImage, encode},
     fragment::{Coding, Layout, Predictor, Transform},
     opened::{ImageFile, ImageFileError},
+    pyramid::Pyramid,
     radiometry::{OddEven, Radiometry},
     statistics::{PixelStatistics, Statistics},
     strip::{LineState, Strip},

@@ -43,8 +43,10 @@ pub struct NetworkPoint<'a> {
     pub known: Option<KnownGround>,
     /// Where the adjustment started, where nothing was known.
     pub initial_m: Option<Vector3<f64>>,
-    /// Where it is adjusted; none of a rejected point.
+    /// Where it is adjusted; none of a rejected point, and before an adjustment.
     pub adjusted: Option<GroundEstimate>,
+    /// Whether an adjustment rejected it.
+    pub is_rejected: bool,
     /// Its measurements; images by serial numbers.
     pub measures: Vec<NetworkMeasure<'a>>,
 }
@@ -171,7 +173,7 @@ fn text(network: &ControlNetwork) -> std::result::Result<String, ProductError> {
         add_point(&mut lines, point)?;
         for measure in &point.measures {
             lines.open("Group", "ControlMeasure");
-            add_measure(&mut lines, measure, point.adjusted.is_none())?;
+            add_measure(&mut lines, measure, point.is_rejected)?;
             lines.close("End_Group");
         }
         lines.close("End_Object");
@@ -189,7 +191,7 @@ fn add_point(lines: &mut Lines, point: &NetworkPoint) -> std::result::Result<(),
     };
     lines.key("PointType", kind);
     lines.key("PointId", &quoted(point.id)?);
-    if point.adjusted.is_none() {
+    if point.is_rejected {
         lines.key("Ignore", "True");
     }
     let source = if point.known.is_some() {

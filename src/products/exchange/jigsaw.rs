@@ -88,7 +88,7 @@ pub(in crate::products) static IMAGES: Declaration = Declaration {
 };
 
 /// UTC of the newest shot, or of the first image where there is none: a clock would give other bytes each time.
-fn newest_utc<'a>(site: &SiteProducts<'a>) -> &'a str {
+pub(super) fn newest_utc<'a>(site: &SiteProducts<'a>) -> &'a str {
     let newest = site.utc.iter().max().map(String::as_str);
     let first = site.images.first();
     newest
@@ -200,6 +200,7 @@ impl<'a> Joined<'a> {
                 known: tie.known,
                 initial_m: found.map(|point| point.initial.xyz_m),
                 adjusted: found.map(|point| adjusted(point)),
+                is_rejected: found.is_none(),
                 measures: measures.collect(),
             }
         };

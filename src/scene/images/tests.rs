@@ -6,6 +6,8 @@
     reason = "places within an image of some thousand lines"
 )]
 
+mod matching;
+
 use super::*;
 use crate::{
     geom::statistics::Summary,

@@ -11,7 +11,7 @@ use crate::{
     footprints::AdjustmentModel,
     geom::{pushbroom::CameraModel, surface::SurfaceOptions},
     instruments::Altimeter,
-    stage::{InOrder, Output, Stage},
+    stage::{InOrder, Output, Round, Stage},
     stage_inputs,
     stages::{
         check_ranges::RangeCheck, compare_pairs::PairComparison, convert_datum::Converted,
@@ -23,6 +23,8 @@ use crate::{
 stage_inputs! {
     /// Images, footprints, tie points with their ground points, and the standard deviations.
     pub struct Adjust<'a> {
+        /// What the adjustment is for.
+        pub round: Round,
         /// The images with the orientation of the kernels.
         pub images: InOrder<'a, SiteImage>,
         /// The form of the orientation.
@@ -53,6 +55,10 @@ impl Stage for Adjust<'_> {
     const METHOD: u32 = 6;
     type Output = Adjusted;
     stage_inputs!(fingerprint);
+
+    fn part(&self) -> Option<String> {
+        self.round.of_adjustment().part()
+    }
 
     fn run(&self, _stop: &AtomicBool) -> Result<Adjusted> {
         let oriented = SiteImage::oriented(self.images.0)?;

@@ -1,0 +1,52 @@
+//! The images of a site with one orientation: sensor models and footprints of each.
+
+use super::driver::{Driver, Flow};
+use crate::{
+    config::{ImageConfig, SiteConfig},
+    stage::{Output, Round},
+    stages::{
+        convert_datum::Converted, fit_sensor_model::FitSensorModel, group_profiles::Profile,
+        orientation::Orientation, register::Register, site_image::SiteImage, tag_times::ImageTimes,
+    },
+};
+
+/// Footprints and their profiles.
+pub(super) type Shots<'a> = (&'a Output<Converted>, &'a Output<Vec<Profile>>);
+
+/// Every image with its orientation, sensor models and footprints.
+pub(super) fn registered<D: Driver>(
+    flow: &mut D,
+    config: &SiteConfig,
+    round: Round,
+    times: &[Output<ImageTimes>],
+    orientations: Vec<Output<Orientation>>,
+    (converted, profiles): Shots,
+) -> Flow<Vec<SiteImage>> {
+    let oriented = config.images.iter().zip(times).zip(orientations);
+    let register = |((image, times), orientation): ((&ImageConfig, &Output<_>), _)| {
+        let image = &*image.id;
+        let model = flow.stage(&FitSensorModel {
+            image,
+            round,
+            samples: &orientation,
+            orientation: &config.orientation,
+        })?;
+        let registration = flow.stage(&Register {
+            image,
+            round,
+            times,
+            orientation: &orientation,
+            model: &model,
+            converted,
+            profiles,
+            registration: &config.registration,
+        })?;
+        Ok(SiteImage {
+            times: times.clone(),
+            orientation,
+            model,
+            registration,
+        })
+    };
+    oriented.map(register).collect()
+}

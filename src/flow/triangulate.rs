@@ -1,0 +1,269 @@
+//! What tie points make of a site: those of files, those that are matched, their ground points, and the adjustment.
+
+use super::{
+    driver::{Driver, Flow},
+    outputs::{Adjustment, Intersection, Site},
+    registered::{Shots, registered},
+};
+use crate::{
+    config::{ImageConfig, SiteConfig},
+    error::{Error, Kind},
+    files::HashedFile,
+    spice::KernelView,
+    stage::{InOrder, Output, Round, Stage},
+    stages::{
+        adjust::{Adjust, Adjusted},
+        check_heights::{CheckHeights, CheckedPoints},
+        check_ranges::RangeCheck,
+        compare_pairs::{ComparePairs, PairComparison},
+        intersect::{Intersect, IntersectedTies},
+        match_ties::{Margin, MatchTies, PixelFiles, TiesOfFiles},
+        read_ties::{ImageNames, ReadTies, TieFiles, Ties},
+        reorient::Reorient,
+        site_image::SiteImage,
+        tabulate_kernels::TabulateKernels,
+    },
+};
+
+/// Images and tie points, and what lies between the orbits of shots and kernels.
+type Measured<'a> = (&'a [SiteImage], &'a Output<Ties>, &'a Output<RangeCheck>);
+/// Ground points of tie points, and what pairs of images say of each other.
+type Ground<'a> = (&'a Output<IntersectedTies>, &'a Output<Vec<PairComparison>>);
+
+/// Tie points, their ground points, and the adjustment, as far as it goes; nothing for a site without tie points.
+pub(super) fn triangulate<D: Driver>(
+    flow: &mut D,
+    config: &SiteConfig,
+    site: &mut Site,
+) -> Flow<()> {
+    let Some(ties) = ties(flow, config, site)? else {
+        return Ok(());
+    };
+    let ties = &*site.ties.insert(ties);
+    let shots = (&site.converted, &site.profiles);
+    let initial = intersect(flow, config, None, &site.images, ties, shots)?;
+    let initial = &*site.intersection.insert(initial);
+    let kernels = &KernelView::all(site.kernels.as_ref());
+    let measured = (&site.images[..], ties, &site.ranges);
+    let adjustment = adjust(flow, config, measured, initial, shots, kernels)?;
+    site.adjustment = Some(adjustment);
+    Ok(())
+}
+
+/// The tie points of the site's files, and behind them those that are matched; none for a site without either.
+fn ties<D: Driver>(flow: &mut D, config: &SiteConfig, site: &Site) -> Flow<Option<Output<Ties>>> {
+    let read = if config.ties.files.is_empty() {
+        None
+    } else {
+        Some(ties_of_files(flow, config)?)
+    };
+    if config.ties.matched {
+        matched(flow, config, site, read.as_ref()).map(Some)
+    } else {
+        Ok(read)
+    }
+}
+
+/// The tie points of the site's files.
+pub(super) fn ties_of_files<D: Driver>(flow: &mut D, config: &SiteConfig) -> Flow<Output<Ties>> {
+    let files = flow.hash(ReadTies::NAME, &config.ties.files)?;
+    flow.stage(&ReadTies {
+        ties: &config.ties,
+        files: TieFiles(&files),
+        images: ImageNames(&config.images),
+    })
+}
+
+/// Tie points by the orientation of the kernels, and by the one that these adjust once more: it expects places nearer to
+/// where they are.
+fn matched<D: Driver>(
+    flow: &mut D,
+    config: &SiteConfig,
+    site: &Site,
+    read: Option<&Output<Ties>>,
+) -> Flow<Output<Ties>> {
+    let (images, round) = (&site.images[..], Round::Matching);
+    let shots = (&site.converted, &site.profiles);
+    let ties = &match_ties(flow, config, Round::Initial, images, shots, read)?;
+    let (intersected, pairs) = &ground(flow, config, round, images, ties, shots)?;
+    let measured = (images, ties, &site.ranges);
+    let ground = (intersected, pairs);
+    let (_, images) = corrected(flow, config, round, measured, ground, shots)?;
+    match_ties(flow, config, Round::Adjusted, &images, shots, read)
+}
+
+/// Tie points that are matched with one orientation, behind those of files.
+pub(super) fn match_ties<D: Driver>(
+    flow: &mut D,
+    config: &SiteConfig,
+    round: Round,
+    images: &[SiteImage],
+    (converted, profiles): Shots,
+    read: Option<&Output<Ties>>,
+) -> Flow<Output<Ties>> {
+    let hash = |image: &ImageConfig| -> Flow<Option<HashedFile>> {
+        Ok(flow.hash(MatchTies::NAME, image.pixels.as_slice())?.pop())
+    };
+    let pixels: Vec<Option<HashedFile>> = config.images.iter().map(hash).collect::<Flow<_>>()?;
+    flow.stage(&MatchTies {
+        round,
+        images: InOrder(images),
+        model: &config.registration.model,
+        pixels: PixelFiles(&pixels),
+        converted,
+        profiles,
+        margin: &Margin::of(config, round),
+        read: TiesOfFiles(read),
+    })
+}
+
+/// The combined adjustment, and the images and tie points once more with the adjusted orientation.
+fn adjust<D: Driver>(
+    flow: &mut D,
+    config: &SiteConfig,
+    measured: Measured,
+    initial: &Intersection,
+    shots: Shots,
+    kernels: &KernelView,
+) -> Flow<Adjustment> {
+    let ground = (&initial.intersected, &initial.pairs);
+    let (adjusted, images) = corrected(flow, config, Round::Adjusted, measured, ground, shots)?;
+    let (_, ties, _) = measured;
+    let intersection = intersect(flow, config, Some(&adjusted), &images, ties, shots)?;
+    let times: Vec<_> = images.iter().map(|image| image.times.clone()).collect();
+    let tabulate = |(index, image): (usize, &SiteImage)| {
+        flow.stage(&TabulateKernels {
+            image: &config.images[index].id,
+            index: &index,
+            times: InOrder(&times),
+            orientation: &image.orientation,
+            kernels,
+            coverage: &config.kernels,
+            pointing: &config.pointing,
+        })
+    };
+    let tables = images.iter().enumerate().map(tabulate);
+    let tables = tables.collect::<Flow<Vec<_>>>()?;
+    Ok(Adjustment {
+        adjusted,
+        images,
+        tables,
+        intersection,
+    })
+}
+
+/// An adjustment, and the images with the orientation that it gives.
+fn corrected<D: Driver>(
+    flow: &mut D,
+    config: &SiteConfig,
+    round: Round,
+    (images, ties, ranges): Measured,
+    (intersected, pairs): Ground,
+    shots: Shots,
+) -> Flow<(Output<Adjusted>, Vec<SiteImage>)> {
+    let (converted, profiles) = shots;
+    let adjusted = flow.stage(&Adjust {
+        round,
+        images: InOrder(images),
+        model: &config.registration.model,
+        converted,
+        profiles,
+        ties,
+        intersected,
+        ranges,
+        pairs,
+        altimeter: &config.altimeter,
+        mola_surface: &config.mola_surface,
+        adjustment: &config.adjustment,
+    })?;
+    let reorient = |(index, image): (usize, &SiteImage)| {
+        flow.stage(&Reorient {
+            round,
+            image: &config.images[index].id,
+            index: &index,
+            times: &image.times,
+            orientation: &image.orientation,
+            adjusted: &adjusted,
+        })
+    };
+    let orientations = images.iter().enumerate().map(reorient);
+    let orientations = orientations.collect::<Flow<Vec<_>>>()?;
+    let times: Vec<_> = images.iter().map(|image| image.times.clone()).collect();
+    let images = registered(flow, config, round, &times, orientations, shots)?;
+    Ok((adjusted, images))
+}
+
+/// Whether a failure lies in what the tie points and the orientation determine, not in a file that cannot be read.
+pub(super) fn is_of_adjustment(failure: &Error) -> bool {
+    let stage = failure.stage.as_deref().unwrap_or_default();
+    let name = stage.split('/').next().unwrap_or_default();
+    let names = [
+        MatchTies::NAME,
+        Intersect::NAME,
+        Adjust::NAME,
+        Reorient::NAME,
+    ];
+    let of_adjustment =
+        names.contains(&name) || stage.ends_with("/adjusted") || stage.ends_with("/matching");
+    failure.kind() == Kind::Input && failure.file.is_none() && of_adjustment
+}
+
+/// Ground points of the tie points, what every pair of images says of itself, and what MOLA says of heights: with the
+/// orientation of the kernels, or with the adjusted one.
+fn intersect<D: Driver>(
+    flow: &mut D,
+    config: &SiteConfig,
+    adjusted: Option<&Output<Adjusted>>,
+    images: &[SiteImage],
+    ties: &Output<Ties>,
+    shots: Shots,
+) -> Flow<Intersection> {
+    let round = adjusted.map_or(Round::Initial, |_| Round::Adjusted);
+    let (intersected, pairs) = ground(flow, config, round, images, ties, shots)?;
+    let (converted, profiles) = shots;
+    let points = adjusted.map_or(
+        CheckedPoints::Intersected(&intersected),
+        CheckedPoints::Adjusted,
+    );
+    let heights = flow.stage(&CheckHeights {
+        round,
+        points,
+        converted,
+        profiles,
+        mola_surface: &config.mola_surface,
+    })?;
+    Ok(Intersection {
+        intersected,
+        pairs,
+        heights,
+    })
+}
+
+/// Ground points of the tie points, and what every pair of images says of itself.
+fn ground<D: Driver>(
+    flow: &mut D,
+    config: &SiteConfig,
+    round: Round,
+    images: &[SiteImage],
+    ties: &Output<Ties>,
+    (converted, profiles): Shots,
+) -> Flow<(Output<IntersectedTies>, Output<Vec<PairComparison>>)> {
+    let (images, model) = (InOrder(images), &config.registration.model);
+    let intersected = flow.stage(&Intersect {
+        round,
+        images,
+        model,
+        ties,
+        intersection: &config.intersection,
+    })?;
+    let pairs = flow.stage(&ComparePairs {
+        round,
+        images,
+        model,
+        ties,
+        intersected: &intersected,
+        converted,
+        profiles,
+    })?;
+    Ok((intersected, pairs))
+}

@@ -1,0 +1,65 @@
+//! Tie points that areograph measured itself: how many places were tried, and what became of them.
+
+use super::{
+    html::{Column, Table, paragraph},
+    numbers::whole,
+    plots::label,
+    section::Section,
+};
+use crate::{products::SiteProducts, stages::read_ties::Ties};
+
+pub(super) const SECTION: Section = Section {
+    title: "Matching of tie points",
+    anchor: "matching-of-tie-points",
+    appears: |site| matched(site).is_some(),
+    write: |site| {
+        Ok(matched(site)
+            .map(|ties| write(site, ties))
+            .unwrap_or_default())
+    },
+};
+
+fn matched<'a>(site: &SiteProducts<'a>) -> Option<&'a Ties> {
+    let ties = site.geometric?.ties;
+    (!ties.matched.is_empty()).then_some(ties)
+}
+
+fn write(site: &SiteProducts, ties: &Ties) -> String {
+    let mut table = Table::new(
+        "Matched pairs",
+        &[
+            Column::Text("images"),
+            Column::Number("cells of common ground"),
+            Column::Number("tie points"),
+            Column::Number("parts with tie points"),
+            Column::Number("searched within (m)"),
+            Column::Number("σ line (lines)"),
+            Column::Number("σ sample (px)"),
+            Column::Number("correlation"),
+            Column::Text("cells without a tie point"),
+        ],
+    );
+    for pair in &ties.matched {
+        let [first, second] = pair.images.map(|image| &site.images[image].times.id);
+        let [parts, with_ties] = pair.parts;
+        table.row(
+            !pair.is_refused,
+            [
+                format!("{first}, {second}").into(),
+                whole(pair.cells).into(),
+                whole(if pair.is_refused { 0 } else { pair.ties }).into(),
+                format!("{with_ties} of {parts}").into(),
+                label(pair.reach_m, 0).into(),
+                label(pair.sigma_px[0], 3).into(),
+                label(pair.sigma_px[1], 3).into(),
+                label(pair.correlation, 2).into(),
+                pair.reasons().into(),
+            ],
+        );
+    }
+    paragraph(
+        "In every cell of the ground that two images both show, the place with the most texture was searched in the other image, \
+         and from there in the first again. Standard deviations are medians of those that each match has by itself, in the second \
+         image; the table is of the second pass, which expects places where the adjustment by the first one has them.",
+    ) + &table.finish()
+}

@@ -1,0 +1,243 @@
+//! Tie points that areograph measures itself.
+//!
+//! Of every pair of images with pixels the common ground is cut into cells. In each the place with the most texture is
+//! searched in the other image: where orientations and MOLA's heights expect it, distorted as they say, within the margin of
+//! what they are stated to be uncertain by, which is long along the epipolar curve where the height is uncertain. Correlation
+//! goes from coarse to fine, least squares ends it, and the same is done from the other image. What is ambiguous, flat or
+//! different in the two directions is counted and left out; blunders are left to the adjustment.
+
+mod cells;
+mod heights;
+mod margin;
+mod pair;
+mod pixels;
+mod search;
+mod view;
+
+#[cfg(test)]
+mod tests;
+
+use std::{collections::BTreeMap, sync::atomic::AtomicBool};
+
+use self::{
+    heights::Heights,
+    pair::{Matched, match_pair},
+    view::View,
+};
+use super::{
+    convert_datum::Converted, group_profiles::Profile, oriented::OrientedImage, read_ties::Ties,
+    site_image::SiteImage, tag_times::ImageTimes,
+};
+use crate::{
+    error::{Cause, Kind, Result},
+    geom::pushbroom::{CameraModel, Unseen},
+    stage::{InOrder, Input, Inputs, Output, Round, Stage},
+    stage_inputs,
+    ties::{MatchedPair, TieMeasure, TiePoint},
+};
+
+pub use margin::Margin;
+pub use pixels::PixelFiles;
+
+/// A pair with fewer tie points is remarked on.
+const FEW_TIES: u32 = 60;
+/// Of the parts of the common ground, the share without a tie point above which that is remarked on.
+const EMPTY_PARTS_MAX: f64 = 0.25;
+
+stage_inputs! {
+    /// Images with one orientation and their pixels, what is known of heights, and the tie points of files.
+    pub struct MatchTies<'a> {
+        /// Which orientation.
+        pub round: Round,
+        /// The images.
+        pub images: InOrder<'a, SiteImage>,
+        /// The form of the orientation.
+        pub model: &'a CameraModel,
+        /// Their pixels.
+        pub pixels: PixelFiles<'a>,
+        /// Footprints in IAU 2000.
+        pub converted: &'a Output<Converted>,
+        /// Profiles.
+        pub profiles: &'a Output<Vec<Profile>>,
+        /// How far the orientations may be off.
+        pub margin: &'a Margin,
+        /// What was read.
+        pub read: TiesOfFiles<'a>,
+    }
+}
+
+/// The tie points of files, where there are some.
+#[derive(Debug)]
+pub struct TiesOfFiles<'a>(pub Option<&'a Output<Ties>>);
+
+impl Input for TiesOfFiles<'_> {
+    fn add_to(&self, field: &str, inputs: &mut Inputs) {
+        if let Some(ties) = self.0 {
+            ties.add_to(field, inputs);
+        }
+    }
+}
+
+/// Nothing was matched.
+#[derive(Debug, thiserror::Error)]
+enum MatchError {
+    #[error("image {image}: its orientation sees no ground: {unseen}")]
+    Unseen { image: String, unseen: Unseen },
+    #[error("no two images with pixels show the same ground by their orientation")]
+    NothingInCommon,
+    #[error("no tie point was found: {0}")]
+    NothingMatched(String),
+}
+
+impl Cause for MatchError {
+    fn kind(&self) -> Kind {
+        Kind::Input
+    }
+
+    fn advice(&self) -> String {
+        match self {
+            Self::Unseen { .. } | Self::NothingInCommon => {
+                "check that the site's images show the same ground, and their kernels and times"
+            }
+            Self::NothingMatched(_) => {
+                "look at the images: are images.pixels those of these images, and is the same ground to be seen in both? If the \
+                 orientations are farther off than the margin, check start times, or give larger standard deviations in \
+                 [adjustment]"
+            }
+        }
+        .to_owned()
+    }
+}
+
+impl Stage for MatchTies<'_> {
+    const NAME: &'static str = "match_ties";
+    type Output = Ties;
+    stage_inputs!(fingerprint);
+
+    fn part(&self) -> Option<String> {
+        self.round.part()
+    }
+
+    fn run(&self, stop: &AtomicBool) -> Result<Ties> {
+        let oriented = SiteImage::oriented(self.images.0)?;
+        let times = self.images.0.iter().map(|image| image.times.value());
+        let times: Vec<&ImageTimes> = times.collect::<Result<_>>()?;
+        let pixels = pixels::decode(&self.pixels, &times)?;
+        let mut views = Vec::new();
+        for (index, (image, pixels)) in oriented.iter().zip(&pixels).enumerate() {
+            if let Some(pixels) = pixels {
+                let view = View::of(image, *self.model, pixels).map_err(|unseen| {
+                    let image = image.image.id.clone();
+                    MatchError::Unseen { image, unseen }
+                })?;
+                views.push((index, view));
+            }
+        }
+        let heights = Heights::of(&self.converted.value()?.footprints, self.profiles.value()?);
+        let mut matched = Vec::new();
+        for (at, first) in views.iter().enumerate() {
+            for second in &views[at + 1..] {
+                matched.extend(match_pair([first, second], &heights, self.margin, stop)?);
+            }
+        }
+        let read = self.read.0.map(|read| read.value()).transpose()?;
+        joined(read.cloned().unwrap_or_default(), matched, &oriented)
+    }
+
+    /// The pixels are opened, not decoded.
+    fn examine(&self) -> Vec<Result<String>> {
+        let images = self.images.0.iter().zip(self.pixels.0);
+        let with_pixels =
+            images.filter_map(|(image, file)| Some((image.times.get()?, file.as_ref()?)));
+        let opened = with_pixels.map(|(times, file)| -> Result<String> {
+            let layout = pixels::open(&file.path, times)?.layout();
+            Ok(format!(
+                "image {}: {} lines of {} samples to be matched",
+                times.id, layout.lines, layout.samples
+            ))
+        });
+        opened.collect()
+    }
+}
+
+/// The tie points of files, and behind them those that were matched.
+fn joined(mut ties: Ties, matched: Vec<Matched>, images: &[OrientedImage<'_>]) -> Result<Ties> {
+    if matched.is_empty() {
+        if ties.points.is_empty() {
+            return Err(MatchError::NothingInCommon.into());
+        }
+        ties.remarks.push(MatchError::NothingInCommon.to_string());
+    }
+    let name = |index: usize| images.get(index).map_or("", |image| &*image.image.id);
+    for of_pair in &matched {
+        ties.remarks.extend(remarks(&of_pair.account, name));
+    }
+    if ties.points.is_empty() && matched.iter().all(|of_pair| of_pair.ties.is_empty()) {
+        return Err(MatchError::NothingMatched(ties.remarks.join("; ")).into());
+    }
+    ties.read = ties.points.len();
+    ties.points.extend(points(&matched));
+    ties.matched = matched.into_iter().map(|of_pair| of_pair.account).collect();
+    Ok(ties)
+}
+
+/// One point for every place of an image that was found in others; where several pairs measured a place of their first image,
+/// it is as uncertain as in the worst of them.
+fn points(matched: &[Matched]) -> Vec<TiePoint> {
+    let mut known: BTreeMap<(usize, u64, u64), usize> = BTreeMap::new();
+    let mut points: Vec<TiePoint> = Vec::new();
+    for [first, second] in matched.iter().flat_map(|of_pair| &of_pair.ties) {
+        let place = (first.image, first.line.to_bits(), first.sample.to_bits());
+        let at = *known.entry(place).or_insert(points.len());
+        if let Some(point) = points.get_mut(at) {
+            let earlier = &mut point.measures[0];
+            earlier.sigma_px = larger(earlier, first);
+            point.measures.push(second.clone());
+        } else {
+            points.push(TiePoint {
+                id: format!("matched-{:04}", at + 1),
+                known: None,
+                measures: vec![first.clone(), second.clone()],
+            });
+        }
+    }
+    points
+}
+
+fn larger(one: &TieMeasure, other: &TieMeasure) -> Option<[f64; 2]> {
+    let (one, other) = (one.sigma_px?, other.sigma_px?);
+    Some([one[0].max(other[0]), one[1].max(other[1])])
+}
+
+/// What must be weighed of a pair, one sentence each.
+fn remarks<'a>(pair: &MatchedPair, name: impl Fn(usize) -> &'a str) -> Vec<String> {
+    let [first, second] = pair.images.map(name);
+    let mut remarks = Vec::new();
+    if pair.is_refused {
+        remarks.push(format!(
+            "images {first} and {second}: {} of {} places are found within {:.0} m of where they are expected, which may be by \
+             chance, so that none is taken ({})",
+            pair.ties,
+            pair.cells,
+            pair.reach_m,
+            pair.reasons()
+        ));
+        return remarks;
+    }
+    if pair.ties < FEW_TIES {
+        remarks.push(format!(
+            "images {first} and {second}: {} of {} places are found ({})",
+            pair.ties,
+            pair.cells,
+            pair.reasons()
+        ));
+    }
+    let [parts, with_ties] = pair.parts;
+    if f64::from(parts - with_ties) > EMPTY_PARTS_MAX * f64::from(parts) {
+        remarks.push(format!(
+            "images {first} and {second}: no tie point in {} of the {parts} parts of their common ground",
+            parts - with_ties
+        ));
+    }
+    remarks
+}

@@ -1,0 +1,98 @@
+//! What matching says of the places that it tried.
+
+use std::collections::BTreeMap;
+
+use serde::{Deserialize, Serialize};
+
+/// Why a place of one image has no tie point in another.
+#[derive(
+    Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, thiserror::Error,
+)]
+#[serde(rename_all = "snake_case")]
+pub enum Unmatched {
+    /// Noise alone would make such slopes.
+    #[error("no texture beyond the noise")]
+    Flat,
+    /// Pixels that were never received, or may be wrong.
+    #[error("lines are missing or damaged")]
+    Missing,
+    /// A template or what it is searched in reaches over an edge.
+    #[error("too near to the edge of an image")]
+    Edge,
+    /// Nothing within the margin is like it.
+    #[error("no place within the margin correlates")]
+    Unlike,
+    /// Which of two is it?
+    #[error("another place correlates nearly as well")]
+    Ambiguous,
+    /// Least squares leads away, or does not end.
+    #[error("least squares does not settle")]
+    Unsettled,
+    /// Searched from the other image, it is not found, or elsewhere.
+    #[error("not the same place when searched from the other image")]
+    OneWay,
+    /// Found, but not well enough.
+    #[error("its standard deviation is too large")]
+    Uncertain,
+}
+
+/// A pair of images, and what became of the places that both show.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct MatchedPair {
+    /// Indices of the images; templates come from the first.
+    pub images: [usize; 2],
+    /// Cells of the ground that both show; in each a place was tried.
+    pub cells: u32,
+    /// Tie points.
+    pub ties: u32,
+    /// The other cells by reason.
+    pub unmatched: BTreeMap<Unmatched, u32>,
+    /// Of the parts into which the common ground is cut: those that have cells, and of these those with a tie point.
+    pub parts: [u32; 2],
+    /// How far from where it was predicted a place was searched, metres on the ground.
+    pub reach_m: f64,
+    /// Median standard deviation of a tie point in the second image, lines and samples.
+    pub sigma_px: [f64; 2],
+    /// Median correlation.
+    pub correlation: f64,
+    /// Whether so few places were found that none of them is believed.
+    pub is_refused: bool,
+}
+
+impl Unmatched {
+    /// The reason as one word of documents.
+    #[must_use]
+    pub const fn word(self) -> &'static str {
+        match self {
+            Self::Flat => "flat",
+            Self::Missing => "missing",
+            Self::Edge => "edge",
+            Self::Unlike => "unlike",
+            Self::Ambiguous => "ambiguous",
+            Self::Unsettled => "unsettled",
+            Self::OneWay => "one_way",
+            Self::Uncertain => "uncertain",
+        }
+    }
+}
+
+impl MatchedPair {
+    /// Places with texture that were searched in the other image.
+    #[must_use]
+    pub fn searched(&self) -> u32 {
+        let not_searched = [Unmatched::Flat, Unmatched::Missing, Unmatched::Edge];
+        let not_searched = not_searched
+            .iter()
+            .filter_map(|why| self.unmatched.get(why));
+        self.cells - not_searched.sum::<u32>()
+    }
+
+    /// Why cells have no tie point, the most frequent reason first.
+    #[must_use]
+    pub fn reasons(&self) -> String {
+        let mut reasons: Vec<(&Unmatched, &u32)> = self.unmatched.iter().collect();
+        reasons.sort_by_key(|(_, count)| std::cmp::Reverse(**count));
+        let reasons = reasons.iter().map(|(why, count)| format!("{count}: {why}"));
+        reasons.collect::<Vec<_>>().join("; ")
+    }
+}
