@@ -50,6 +50,10 @@ declare_table! {
         /// PDS3 or ISIS label, attached or detached.
         #[serde(skip)]
         label: Option<PathBuf> = key(FILE).example(r#""../labels/e0202855.lbl""#),
+        /// The image itself as the archive has it (.imq, .img), which may be the label's file. The report then shows
+        /// footprints and tie points on it.
+        #[serde(skip)]
+        pixels: Option<PathBuf> = key(FILE).unused(r#""../images/e0202855.imq""#),
         /// The camera: `moc_na`, `moc_wa_red`, `moc_wa_blue`, or the path of an instrument file like those in
         /// `config/instruments`. Without it, the camera that the label names, and without a label `moc_na`.
         instrument: Option<Instrument> = key(CAMERA).example(r#""moc_na""#),
