@@ -61,7 +61,8 @@ impl Progress {
         let told = level >= LevelFilter::WARN && level < LevelFilter::INFO;
         let terminal = io::stderr().is_terminal();
         let line = if told && terminal {
-            let stages = stage_count(site.images.len(), !site.ties.files.is_empty());
+            let pixels = site.images.iter().any(|image| image.pixels.is_some());
+            let stages = stage_count(site.images.len(), !site.ties.files.is_empty(), pixels);
             let line = LINES.add(ProgressBar::new(stages as u64));
             // A template that the library refuses leaves its own in place.
             if let Ok(style) = ProgressStyle::with_template(LINE) {

@@ -7,6 +7,7 @@ use super::{
     driver::{Driver, Flow, Leave},
     kernels::{load_rivals, required_coverage},
     outputs::{Prepared, Site},
+    overlays::overlays,
     site::{kernels, orient, prepare, ties},
 };
 use crate::{
@@ -138,7 +139,8 @@ impl<'a> Check<'a> {
         for line in kernels.explanation() {
             self.tell(line);
         }
-        orient(self, config, prepared, Some(kernels)).map(|_| ())
+        let site = orient(self, config, prepared, Some(kernels))?;
+        overlays(self, config, &site).map(|_| ())
     }
 
     fn tell(&mut self, finding: &str) {

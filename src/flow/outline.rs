@@ -24,9 +24,12 @@ use crate::{
 pub fn stages() -> &'static [&'static str] {
     static NAMES: LazyLock<Vec<&str>> = LazyLock::new(|| {
         let mut outline = Outline::default();
-        // Of no kernels; with an image, its window and tie points, so that no stage is passed over.
+        // Of no kernels; with an image, its pixels, its window and tie points, so that no stage is passed over.
         let mut config = SiteConfig::default();
-        config.images.push(ImageConfig::default());
+        config.images.push(ImageConfig {
+            pixels: Some(PathBuf::new()),
+            ..ImageConfig::default()
+        });
         config.windows.push(WindowConfig {
             id: String::new(),
             shape: WindowShape::Image {
@@ -42,12 +45,16 @@ pub fn stages() -> &'static [&'static str] {
     &NAMES
 }
 
-/// Stages, those of every image and round each, that a run passes of a site with so many images, with tie points or without.
+/// Stages, those of every image and round each, that a run passes of a site with so many images, with tie points or without,
+/// with pixels of an image or without.
 #[must_use]
-pub fn stage_count(images: usize, ties: bool) -> usize {
+pub fn stage_count(images: usize, ties: bool, pixels: bool) -> usize {
     let mut outline = Outline::default();
     let mut config = SiteConfig::default();
-    config.images.resize_with(images, ImageConfig::default);
+    config.images.resize_with(images, || ImageConfig {
+        pixels: pixels.then(PathBuf::new),
+        ..ImageConfig::default()
+    });
     if ties {
         config.ties.files.push(PathBuf::new());
     }
@@ -108,9 +115,10 @@ mod tests {
 
     #[test]
     fn every_image_has_stages_of_its_own() {
-        let [none, one, two] = [0, 1, 2].map(|images| stage_count(images, false));
+        let [none, one, two] = [0, 1, 2].map(|images| stage_count(images, false, false));
         assert!(none < one && two - one == one - none);
-        assert!(stage_count(2, true) > two);
+        assert!(stage_count(2, true, false) > two);
+        assert_eq!(stage_count(2, false, true), two + 1);
     }
 
     #[test]

@@ -6,6 +6,7 @@ use super::{
     driver::{Driver, Flow, Leave},
     kernels::{load_kernels, required_coverage},
     outputs::{Adjustment, Intersection, Prepared, Site},
+    overlays::overlays,
 };
 use crate::{
     config::{ImageConfig, SiteConfig, WindowConfig},
@@ -61,6 +62,7 @@ pub(super) fn site<D: Driver>(flow: &mut D, config: &SiteConfig) -> Flow<()> {
         }
         Err(leave) => return Err(leave),
     }
+    site.overlays = overlays(flow, config, &site)?;
     flow.publish(config, &site)
 }
 
@@ -218,6 +220,7 @@ pub(super) fn orient<D: Driver>(
         ties: None,
         intersection: None,
         adjustment: None,
+        overlays: None,
         adjustment_failure: None,
     })
 }

@@ -36,6 +36,7 @@ mod net;
 mod notes;
 mod numbers;
 mod outlines;
+mod overlays;
 mod plots;
 mod provenance;
 mod published;
@@ -63,6 +64,7 @@ pub use fidelity::{
 };
 pub use html::STYLE;
 pub use net::net_page;
+pub use overlays::overlays_page;
 pub use sites::{SiteLine, SiteSummary, sites_page};
 
 use section::Section;
@@ -76,6 +78,7 @@ const SECTIONS: &[Section] = &[
     scan::SECTION,
     images::SECTION,
     registration::SECTION,
+    overlays::SECTION,
     map::SECTION,
     timeline::SECTION,
     selection::SECTION,

@@ -307,6 +307,7 @@ mod tests {
         ImageConfig {
             id: id.to_owned(),
             label: None,
+            pixels: None,
             instrument: None,
             serial_number: serial_number.map(str::to_owned),
             fields: ImageFields::default(),
