@@ -11,6 +11,10 @@
 mod common;
 #[path = "image_commands/index.rs"]
 mod index;
+#[path = "image_commands/kernels.rs"]
+mod kernels;
+#[path = "image_commands/readers.rs"]
+mod readers;
 
 use std::{
     fs::{self, File},

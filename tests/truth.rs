@@ -23,6 +23,8 @@ mod light_time;
 mod misregistration;
 #[path = "truth/orbit.rs"]
 mod orbit;
+#[path = "truth/overlays.rs"]
+mod overlays;
 #[path = "truth/relief.rs"]
 mod relief;
 

@@ -61,11 +61,7 @@ impl Progress {
         let told = level >= LevelFilter::WARN && level < LevelFilter::INFO;
         let terminal = io::stderr().is_terminal();
         let line = if told && terminal {
-            let stages = stage_count(
-                site.images.len(),
-                !site.ties.files.is_empty(),
-                site.ties.matched,
-            );
+            let stages = stage_count(site);
             let line = LINES.add(ProgressBar::new(stages as u64));
             // A template that the library refuses leaves its own in place.
             if let Ok(style) = ProgressStyle::with_template(LINE) {

@@ -50,8 +50,8 @@ declare_table! {
         /// PDS3 or ISIS label, attached or detached.
         #[serde(skip)]
         label: Option<PathBuf> = key(FILE).example(r#""../labels/e0202855.lbl""#),
-        /// The image itself as the archive has it (.imq, .img), which may be the label's file. Tie points are matched in it
-        /// where `ties.match` says so.
+        /// The image itself (.imq, .img, .cub, TIFF, PNG), which may be the label's file. Tie points are matched in it where
+        /// `ties.match` says so, and the report shows footprints and tie points on it.
         #[serde(skip)]
         pixels: Option<PathBuf> = key(FILE).unused(r#""../images/e0202855.imq""#),
         /// The camera: `moc_na`, `moc_wa_red`, `moc_wa_blue`, or the path of an instrument file like those in

@@ -7,6 +7,7 @@ use super::{
     driver::{Driver, Flow, Leave},
     kernels::{load_rivals, required_coverage},
     outputs::{Prepared, Site},
+    overlays::overlays,
     site::{kernels, orient, prepare},
     triangulate::{match_ties, ties_of_files},
 };
@@ -186,7 +187,7 @@ impl<'a> Check<'a> {
             let shots = (&site.converted, &site.profiles);
             match_ties(self, config, Round::Initial, &site.images, shots, None)?;
         }
-        Ok(())
+        overlays(self, config, &site).map(|_| ())
     }
 
     fn tell(&mut self, finding: &str) {

@@ -18,6 +18,7 @@ mod observer;
 mod out;
 mod outline;
 mod outputs;
+mod overlays;
 mod plan;
 mod publish;
 mod read_back;

@@ -24,9 +24,12 @@ use crate::{
 pub fn stages() -> &'static [&'static str] {
     static NAMES: LazyLock<Vec<&str>> = LazyLock::new(|| {
         let mut outline = Outline::default();
-        // Of no kernels; with an image, its window and tie points, so that no stage is passed over.
+        // Of no kernels; with an image, its pixels, its window and tie points, so that no stage is passed over.
         let mut config = SiteConfig::default();
-        config.images.push(ImageConfig::default());
+        config.images.push(ImageConfig {
+            pixels: Some(PathBuf::new()),
+            ..ImageConfig::default()
+        });
         config.windows.push(WindowConfig {
             id: String::new(),
             shape: WindowShape::Image {
@@ -43,17 +46,19 @@ pub fn stages() -> &'static [&'static str] {
     &NAMES
 }
 
-/// Stages, those of every image and round each, that a run passes of a site with so many images, with tie points of files or without,
-/// and with such as are matched or without.
+/// Stages, those of every image and round each, that a run of the site passes.
 #[must_use]
-pub fn stage_count(images: usize, ties: bool, matched: bool) -> usize {
+pub fn stage_count(of: &SiteConfig) -> usize {
     let mut outline = Outline::default();
+    // Of what is configured only what stages are passed for: nothing is read.
     let mut config = SiteConfig::default();
-    config.images.resize_with(images, ImageConfig::default);
-    config.ties.matched = matched;
-    if ties {
-        config.ties.files.push(PathBuf::new());
-    }
+    let image = |image: &ImageConfig| ImageConfig {
+        pixels: image.pixels.clone(),
+        ..ImageConfig::default()
+    };
+    config.images = of.images.iter().map(image).collect();
+    config.ties.files.clone_from(&of.ties.files);
+    config.ties.matched = of.ties.matched;
     let _ = site(&mut outline, &config);
     outline.passed
 }
@@ -111,11 +116,19 @@ mod tests {
 
     #[test]
     fn every_image_has_stages_of_its_own() {
-        let [none, one, two] = [0, 1, 2].map(|images| stage_count(images, false, false));
+        let count = |images: usize, change: &dyn Fn(&mut SiteConfig)| {
+            let mut config = SiteConfig::default();
+            config.images.resize_with(images, ImageConfig::default);
+            change(&mut config);
+            stage_count(&config)
+        };
+        let [none, one, two] = [0, 1, 2].map(|images| count(images, &|_| ()));
         assert!(none < one && two - one == one - none);
-        let read = stage_count(2, true, false);
+        let read = count(2, &|config| config.ties.files.push(PathBuf::new()));
         assert!(read > two);
-        assert!(stage_count(2, true, true) > read);
+        assert!(count(2, &|config| config.ties.matched = true) > two);
+        let pixels = |config: &mut SiteConfig| config.images[0].pixels = Some(PathBuf::new());
+        assert_eq!(count(2, &pixels), two + 1);
     }
 
     #[test]

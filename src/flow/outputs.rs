@@ -9,8 +9,8 @@ use crate::{
         adjust::Adjusted, check_heights::HeightCheck, check_ranges::RangeCheck,
         compare_pairs::PairComparison, convert_datum::Converted,
         describe_kernels::KernelDescription, group_profiles::Profile, intersect::IntersectedTies,
-        read_ties::Ties, search_footprints::SearchResult, site_image::SiteImage,
-        tabulate_kernels::KernelTables, tag_times::ImageTimes,
+        lay_overlays::Overlays, read_ties::Ties, search_footprints::SearchResult,
+        site_image::SiteImage, tabulate_kernels::KernelTables, tag_times::ImageTimes,
     },
 };
 
@@ -46,6 +46,8 @@ pub(super) struct Site {
     pub(super) intersection: Option<Intersection>,
     /// None when it failed.
     pub(super) adjustment: Option<Adjustment>,
+    /// What the images show; nothing for a site without pixels.
+    pub(super) overlays: Option<Output<Overlays>>,
     /// Why there is no adjustment although there are tie points.
     pub(super) adjustment_failure: Option<Error>,
 }

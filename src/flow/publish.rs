@@ -15,8 +15,8 @@ use crate::{
     error::{Error, Result},
     files::file_name,
     products::{
-        AdjustmentProducts, GeometricProducts, ImageProducts, SiteProducts, error::ProductError,
-        write_products,
+        AdjustmentProducts, GeometricProducts, ImageProducts, Pages, SiteProducts,
+        error::ProductError, write_products,
     },
     report,
     spice::{KernelSet, KernelView},
@@ -32,7 +32,7 @@ use crate::{
 };
 
 /// Raised when products are laid out anew.
-const METHOD: u32 = 13;
+const METHOD: u32 = 14;
 
 /// The configuration as written, the outlines that it names, all kernels and where they lie from `folder`, and
 /// every stage with what it was made from.
@@ -149,13 +149,18 @@ pub(super) fn publish(
         notes: &notes,
         verdict: &verdict,
         geometric: geometric_products(site, adjustment.transpose()?)?,
+        overlays: site.overlays.as_ref().map(Output::value).transpose()?,
+    };
+    let (report, overlays) = (report::page(&products)?, report::overlays_page(&products)?);
+    let pages = Pages {
+        report: &report,
+        overlays: overlays.as_deref(),
     };
     let staging = staging(folder)?;
-    let files: Vec<(PathBuf, u64)> =
-        write_products(&staging, &products, &report::page(&products)?)?
-            .into_iter()
-            .map(|product| (product.path, product.rows))
-            .collect();
+    let files: Vec<(PathBuf, u64)> = write_products(&staging, &products, pages)?
+        .into_iter()
+        .map(|product| (product.path, product.rows))
+        .collect();
     read_back(config, site, kernels, &staging)?;
     let account = Account {
         verdict,

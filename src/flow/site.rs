@@ -6,6 +6,7 @@ use super::{
     driver::{Driver, Flow, Leave},
     kernels::{load_kernels, required_coverage},
     outputs::{Prepared, Site},
+    overlays::overlays,
     registered::registered,
     triangulate::{is_of_adjustment, triangulate},
 };
@@ -49,6 +50,7 @@ pub(super) fn site<D: Driver>(flow: &mut D, config: &SiteConfig) -> Flow<()> {
         }
         Err(leave) => return Err(leave),
     }
+    site.overlays = overlays(flow, config, &site)?;
     flow.publish(config, &site)
 }
 
@@ -206,6 +208,7 @@ pub(super) fn orient<D: Driver>(
         ties: None,
         intersection: None,
         adjustment: None,
+        overlays: None,
         adjustment_failure: None,
     })
 }

@@ -7,6 +7,7 @@ pub mod label;
 pub mod moc;
 pub mod pedr;
 pub mod pedr_table;
+pub mod pixel_file;
 pub mod plane_tables;
 pub mod ties;
 

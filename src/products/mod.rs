@@ -26,6 +26,7 @@ mod kernel_report;
 mod light_time;
 mod net;
 mod orientation;
+mod overlays;
 mod page;
 mod parquet;
 mod pds4_label;
@@ -58,8 +59,9 @@ pub use exchange::{
 pub use found_shots::{FoundShots, ShotsFile, ShotsFormat};
 pub use generated::{documentation, schemas};
 pub use net::{NetProducts, write_net_products};
+pub(crate) use overlays::{Picture, anaglyph, piece, strip};
 pub use picture::{PictureFile, PictureFormat, PictureHead};
-pub use product::Product;
+pub use product::{Pages, Product};
 #[cfg(feature = "sql")]
 pub use shot_columns::ShotColumns;
 pub use site::{AdjustmentProducts, GeometricProducts, ImageProducts, SiteProducts};
@@ -68,14 +70,19 @@ use crate::error::{Locate, Result};
 use product::{Context, Declaration, Scope, Write, Written};
 use registry::PRODUCTS;
 
-/// Writes every product of `site` below `directory`, with `page` as its report, and reads each of them back.
+/// Writes every product of `site` below `directory`, with `pages` (or one page as its report), and reads each of them back.
 ///
 /// # Errors
 /// [`Kind::Io`](crate::error::Kind::Io) for what the disk refuses; [`Kind::Bug`](crate::error::Kind::Bug)
 /// for numbers that are not finite, inputs that do not belong together and files that read back
 /// differently.
-pub fn write_products(directory: &Path, site: &SiteProducts, page: &str) -> Result<Vec<Product>> {
+pub fn write_products<'a>(
+    directory: &Path,
+    site: &SiteProducts,
+    pages: impl Into<Pages<'a>>,
+) -> Result<Vec<Product>> {
     site.check()?;
+    let pages = pages.into();
     let mut written: Vec<Written> = Vec::new();
     for group in PRODUCTS.chunk_by(|one, next| one.scope() == next.scope()) {
         let images: Vec<Option<&ImageProducts>> = match group[0].scope() {
@@ -90,7 +97,7 @@ pub fn write_products(directory: &Path, site: &SiteProducts, page: &str) -> Resu
             for declaration in group {
                 let context = Context {
                     site,
-                    page,
+                    pages,
                     directory,
                     products: PRODUCTS,
                     written: &written,
@@ -121,6 +128,11 @@ fn write(
         }
         (Write::Image(write) | Write::AdjustedImage(write), Some(image), _) => {
             write(&path, of, image).map(Some)
+        }
+        (Write::Overlay(write), Some(image), _) => {
+            let mut all = of.site.images.iter();
+            let index = all.position(|of| of.times.id == image.times.id);
+            index.map_or(Ok(None), |index| write(&path, of, index))
         }
         (Write::Ties(write), _, Some(geometric)) => write(&path, of, geometric).map(Some),
         (Write::Matched(write), _, Some(geometric)) if !geometric.ties.matched.is_empty() => {

@@ -12,7 +12,22 @@ pub(super) static REPORT: Declaration = Declaration {
     rows: "",
     role: Role::Overview,
     content: Content::Foreign,
-    write: Write::Site(|path, of| write_text(path, of.page).map(|()| Some(0))),
+    write: Write::Site(|path, of| write_text(path, of.pages.report).map(|()| Some(0))),
+    uses: &[],
+};
+
+pub(super) static OVERLAYS: Declaration = Declaration {
+    path: "report/overlays.html",
+    what: "images with footprints and tie points on them, before and after the adjustment, and pairs of images at the same ground (of a site whose images have pixels)",
+    readers: "people",
+    rows: "",
+    role: Role::Overview,
+    content: Content::Foreign,
+    write: Write::Site(|path, of| {
+        let page = of.pages.overlays;
+        page.map(|page| write_text(path, page).map(|()| 0))
+            .transpose()
+    }),
     uses: &[],
 };
 

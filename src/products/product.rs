@@ -97,6 +97,8 @@ pub(super) enum Write {
     Footprints(fn(&Path, &Context) -> Result<u64>),
     /// For every image.
     Image(fn(&Path, &Context, &ImageProducts) -> Result<u64>),
+    /// For every image with pixels, by its index.
+    Overlay(fn(&Path, &Context, usize) -> Result<Option<u64>>),
     /// For a site with tie points.
     Ties(fn(&Path, &Context, &GeometricProducts) -> Result<u64>),
     /// For a site with tie points that were matched.
@@ -119,14 +121,31 @@ pub(super) enum Scope {
     AdjustedImage,
 }
 
+/// Pages that are made elsewhere.
+#[derive(Debug, Clone, Copy)]
+pub struct Pages<'a> {
+    /// The report.
+    pub report: &'a str,
+    /// The images with footprints on them, where there are pixels.
+    pub overlays: Option<&'a str>,
+}
+
+impl<'a, T: AsRef<str> + ?Sized> From<&'a T> for Pages<'a> {
+    fn from(report: &'a T) -> Self {
+        Self {
+            report: report.as_ref(),
+            overlays: None,
+        }
+    }
+}
+
 /// A file that was written, and its declaration.
 pub(super) type Written = (Product, &'static Declaration);
 
 /// What products are made of.
 pub(super) struct Context<'a> {
     pub(super) site: &'a SiteProducts<'a>,
-    /// The report.
-    pub(super) page: &'a str,
+    pub(super) pages: Pages<'a>,
     /// Where products are written.
     pub(super) directory: &'a Path,
     /// All declarations, in order.
@@ -155,7 +174,7 @@ pub(super) struct Use {
 impl Declaration {
     pub(super) const fn scope(&self) -> Scope {
         match self.write {
-            Write::Image(_) => Scope::Image,
+            Write::Image(_) | Write::Overlay(_) => Scope::Image,
             Write::AdjustedImage(_) => Scope::AdjustedImage,
             _ => Scope::Site,
         }
@@ -167,6 +186,7 @@ impl Declaration {
             Write::Site(_) => "every site",
             Write::Footprints(_) => "a site with footprints",
             Write::Image(_) => "every image",
+            Write::Overlay(_) => "every image with pixels",
             Write::Ties(_) => "a site with tie points",
             Write::Matched(_) => "a site with matched tie points",
             Write::Adjustment(_) | Write::Several(_) => "a site with an adjustment",
@@ -195,6 +215,7 @@ impl<W> Declaration<W> {
             "shx" => "application/vnd.shx",
             "dbf" => "application/vnd.dbf",
             "html" => "text/html",
+            "png" => "image/png",
             "xml" => "application/xml",
             "txt" | "prj" | "cpg" | "tm" => "text/plain",
             _ => return None,

@@ -3,7 +3,7 @@
 use super::{
     adjusted_footprints, adjusted_kernels, adjustment, correlations,
     exchange::{adjusted, geopackage, jigsaw, matched, readme, shapefile, stac, tables},
-    footprints, heights, isd, kernel_report, orientation, page,
+    footprints, heights, isd, kernel_report, orientation, overlays, page,
     product::Declaration,
     ranges, registration, ties,
 };
@@ -22,6 +22,8 @@ pub(super) static PRODUCTS: &[&Declaration] = &[
     &orientation::TABLE,
     &orientation::DOCUMENT,
     &isd::ISD,
+    &overlays::PICTURE,
+    &overlays::MARKS,
     &ties::TABLE,
     &adjusted_footprints::TABLE,
     &heights::TABLE,
@@ -35,6 +37,7 @@ pub(super) static PRODUCTS: &[&Declaration] = &[
     &adjusted_kernels::POSITION,
     &adjusted_kernels::METAKERNEL,
     &page::REPORT,
+    &page::OVERLAYS,
     &page::METAKERNEL,
     &tables::LOLA_LIKE,
     &tables::LOLA_LIKE_SIDECAR,

@@ -20,6 +20,7 @@ use crate::{
         group_profiles::Profile,
         intersect::IntersectedTies,
         judge::Verdict,
+        lay_overlays::Overlays,
         read_ties::Ties,
         register::ImageRegistration,
         sample_orientation::Orientation,
@@ -61,6 +62,8 @@ pub struct SiteProducts<'a> {
     pub verdict: &'a Verdict,
     /// Tie points and the adjustment; nothing for a site without tie points that could be intersected.
     pub geometric: Option<GeometricProducts<'a>>,
+    /// What images show; nothing for a site without pixels.
+    pub overlays: Option<&'a Overlays>,
 }
 
 /// What tie points make of a site.

@@ -37,6 +37,7 @@ mod net;
 mod notes;
 mod numbers;
 mod outlines;
+mod overlays;
 mod plots;
 mod provenance;
 mod published;
@@ -64,6 +65,7 @@ pub use fidelity::{
 };
 pub use html::STYLE;
 pub use net::net_page;
+pub use overlays::overlays_page;
 pub use sites::{SiteLine, SiteSummary, sites_page};
 
 use section::Section;
@@ -78,6 +80,7 @@ const SECTIONS: &[Section] = &[
     scan::SECTION,
     images::SECTION,
     registration::SECTION,
+    overlays::SECTION,
     map::SECTION,
     timeline::SECTION,
     selection::SECTION,

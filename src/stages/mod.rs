@@ -14,6 +14,7 @@ pub mod fit_sensor_model;
 pub mod group_profiles;
 pub mod intersect;
 pub mod judge;
+pub mod lay_overlays;
 pub mod match_ties;
 pub mod mola_surface;
 pub mod orientation;

@@ -1,5 +1,7 @@
 //! An image with its orientation in every form: what the geometric stages see through.
 
+use nalgebra::{Vector2, Vector3};
+
 use super::{fit_sensor_model::SensorModel, orientation::Orientation, tag_times::ImageTimes};
 use crate::{
     error::{Cause, Kind, Result},
@@ -100,6 +102,24 @@ impl<'a> OrientedImage<'a> {
     ) -> std::result::Result<Projector<'_, dyn ExteriorOrientation>, Unseen> {
         let projector = Projector::new(self.orientation(required), self.lines())?;
         Ok(projector.through(self.detector.distortion))
+    }
+
+    /// Line and sample at which `projector` sees a point, in the image or outside it.
+    ///
+    /// # Errors
+    /// A point that the image has no line for.
+    pub fn line_and_sample(
+        &self,
+        projector: &Projector<'_, dyn ExteriorOrientation>,
+        point_m: &Vector3<f64>,
+    ) -> std::result::Result<Vector2<f64>, Unseen> {
+        let seen = projector.project(point_m)?;
+        let focal_px = self.detector.focal_px(&seen.camera_m);
+        let focal_px = focal_px.map_err(|_| Unseen::BehindCamera)?;
+        Ok(Vector2::new(
+            self.image.line_times.line_of_offset(seen.x),
+            self.detector.sample(focal_px.y),
+        ))
     }
 
     /// The image for intersection and adjustment, with the form `required`.

@@ -200,6 +200,7 @@ impl Site {
             notes: &self.notes,
             verdict: &verdict,
             geometric: None,
+            overlays: None,
             conversions: &self.conversions,
         })
     }

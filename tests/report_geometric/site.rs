@@ -144,6 +144,7 @@ impl Site {
             complaints: &[],
             notes: &[],
             verdict: &verdict,
+            overlays: None,
             geometric: Some(GeometricProducts {
                 ties: &self.ties,
                 intersected: &self.intersected,

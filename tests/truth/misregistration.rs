@@ -23,7 +23,7 @@ use super::{
 };
 
 /// A camera as it truly saw, and how many lines its image has: from where it was when the light left the ground.
-fn true_camera(truth: &Value) -> (SampledOrientation, f64) {
+pub(super) fn true_camera(truth: &Value) -> (SampledOrientation, f64) {
     let of = |name: &str| truth[name].as_array().unwrap();
     let at_lines: Vec<f64> = of("line").iter().map(|at| at.as_f64().unwrap()).collect();
     let lines = at_lines[at_lines.len() - 1];
@@ -65,7 +65,10 @@ fn true_camera(truth: &Value) -> (SampledOrientation, f64) {
 }
 
 /// True places of a site's footprints, metres, by row of its footprints.
-fn true_footprints_m(truth: &Value, footprints: &RecordBatch) -> BTreeMap<u32, Vector3<f64>> {
+pub(super) fn true_footprints_m(
+    truth: &Value,
+    footprints: &RecordBatch,
+) -> BTreeMap<u32, Vector3<f64>> {
     let mut shots = BTreeMap::new();
     for profile in truth["profiles"].as_array().unwrap() {
         let file = profile["file"].as_str().unwrap();
@@ -123,7 +126,7 @@ fn lines_late(
 /// A transformation of second order through 146 tie points with a line's noise in each image puts a profile between them
 /// to 0.6 to 1.1 m along the flight (standard deviation), and to 2.4 m one at the edge of theirs, as isidis/9118 is: three
 /// times 1.1 m.
-const TRANSFORMED_M: f64 = 3.4;
+pub(super) const TRANSFORMED_M: f64 = 3.4;
 
 #[test]
 fn footprints_fall_as_far_apart_in_two_images_as_is_stated() {

@@ -7,8 +7,11 @@ use clap::Args;
 use crate::{
     cli::output,
     config::built_in_instruments,
-    error::{Cause, IoError, Kind, Locate as _, Result},
-    pds::image_file::{ImageFile, LineState, OddEven, Radiometry, Strip},
+    error::{Cause, Kind, Locate as _, Result},
+    pds::{
+        image_file::{ImageFile, LineState, OddEven, Radiometry, Strip},
+        pixel_file::PixelFile,
+    },
     products::{PictureFile, PictureFormat, PictureHead},
 };
 
@@ -21,7 +24,7 @@ use crate::{
 #[derive(Debug, Args)]
 #[command(verbatim_doc_comment)]
 pub(super) struct Arguments {
-    /// Image file of the archive (.imq, .img).
+    /// Image file of the archive (.imq, .img), ISIS cube, TIFF or PNG of one band of grey.
     #[arg(value_name = "FILE")]
     file: PathBuf,
     /// File to write; its ending (.png, .tif, .tiff) is its format.
@@ -66,6 +69,21 @@ impl Cause for NoLines {
     }
 }
 
+/// A radiometric correction of what has no label with gain and offset.
+#[derive(Debug, thiserror::Error)]
+#[error("--calibrate needs an image as the archive has it, whose label tells gain and offset")]
+struct NotOfTheArchive;
+
+impl Cause for NotOfTheArchive {
+    fn kind(&self) -> Kind {
+        Kind::Configuration
+    }
+
+    fn advice(&self) -> String {
+        "give the .imq or .img file, or leave out --calibrate".to_owned()
+    }
+}
+
 /// Numbers beyond those of the pixels that the correction of odd and even samples may reach.
 const ROOM_DN: f64 = 16.0;
 
@@ -81,9 +99,14 @@ struct Calibration {
 pub(super) fn run(arguments: &Arguments) -> Result<()> {
     let format = format(&arguments.out)?;
     let mask_format = arguments.mask.as_deref().map(self::format).transpose()?;
-    let image = ImageFile::open(&arguments.file, built_in_instruments())?;
-    let (mut lines, mut odd_even, mut complaints) =
-        (0, OddEven::default(), image.complaints().count());
+    let image = PixelFile::open(&arguments.file, built_in_instruments())?;
+    let (mut lines, mut odd_even, mut complaints) = (
+        0,
+        OddEven::default(),
+        image
+            .archive()
+            .map_or(0, |image| image.complaints().count()),
+    );
     complaints += each(&image, |strip| {
         lines += strip.states.len();
         odd_even.add(strip);
@@ -93,11 +116,11 @@ pub(super) fn run(arguments: &Arguments) -> Result<()> {
     let height = height.ok_or(NoLines).in_file(&arguments.file)?;
     let calibration = arguments
         .calibrate
-        .then(|| Calibration::new(&image, &odd_even))
+        .then(|| Calibration::new(image.archive().ok_or(NotOfTheArchive)?, &odd_even))
         .transpose()
         .in_file(&arguments.file)?;
     let head = PictureHead {
-        width: image.layout().samples,
+        width: image.samples(),
         height,
         is_deep: calibration.is_some(),
         notes: notes(&image, calibration.as_ref()),
@@ -133,7 +156,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<()> {
     output::line(format_args!(
         "{}: {} × {height} pixels",
         arguments.out.display(),
-        image.layout().samples
+        image.samples()
     ));
     Ok(())
 }
@@ -148,25 +171,23 @@ fn format(path: &Path) -> Result<PictureFormat> {
 }
 
 /// Shows all strips of an image; how many complaints that gave.
-fn each(image: &ImageFile, mut show: impl FnMut(&Strip) -> Result<()>) -> Result<u64> {
+fn each(image: &PixelFile, mut show: impl FnMut(&Strip) -> Result<()>) -> Result<u64> {
     let mut strips = image.strips()?;
-    while let Some(strip) = strips
-        .next_strip()
-        .map_err(IoError::on("read"))
-        .in_file(image.path())?
-    {
+    while let Some(strip) = strips.next_strip()? {
         show(&strip)?;
     }
-    Ok(strips.complaints().count())
+    let (_, count) = strips.complaints();
+    Ok(count)
 }
 
-fn notes(image: &ImageFile, calibration: Option<&Calibration>) -> Vec<(&'static str, String)> {
+fn notes(image: &PixelFile, calibration: Option<&Calibration>) -> Vec<(&'static str, String)> {
     let label = image.label();
     let mut notes = vec![(
         "Software",
         format!("areograph {}", env!("CARGO_PKG_VERSION")),
     )];
-    notes.extend(label.product_id.clone().map(|product| ("Title", product)));
+    let product = label.and_then(|label| label.product_id.clone());
+    notes.extend(product.map(|product| ("Title", product)));
     if let Some(calibration) = calibration {
         let zero = if calibration.radiometry.knows_zero {
             ""

@@ -8,19 +8,25 @@ use serde_json::{Value, json};
 use crate::{
     cli::output,
     config::built_in_instruments,
-    error::{Error, IoError, Locate as _},
-    pds::image_file::{Coding, Complaint, ImageFile, Statistics},
+    error::Error,
+    pds::{
+        image_file::{Coding, Complaint, ImageFile, Statistics},
+        pixel_file::PixelFile,
+    },
     units::SECONDS_PER_MS,
 };
 
 /// Shows label, size, coding, statistics, and everything that is wrong with each image file.
+///
+/// Cubes and pictures may stand in for images of the archive. Where their numbers are not bytes, the least is shown as 1 and the
+/// largest as 255, and statistics are those of what is shown.
 ///
 /// Statistics and the hash are those of the decoded 8-bit pixels in the order of the file; lines that are missing do not
 /// count. A line is suspect when it comes from damaged data, or when its place in the image is not known. A damaged
 /// file is no failure as long as some of it can be read.
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
-    /// Image files of the archive (.imq, .img).
+    /// Image files of the archive (.imq, .img), ISIS cubes, TIFF or PNG of one band of grey.
     #[arg(required = true, value_name = "FILE")]
     files: Vec<PathBuf>,
     /// Print JSON.
@@ -50,44 +56,48 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Error> {
 }
 
 fn info(path: &Path) -> Result<Value, Error> {
-    let image = ImageFile::open(path, built_in_instruments())?;
+    let image = PixelFile::open(path, built_in_instruments())?;
     let mut strips = image.strips()?;
     let (mut statistics, mut lines) = (Statistics::default(), 0);
-    while let Some(strip) = strips
-        .next_strip()
-        .map_err(IoError::on("read"))
-        .in_file(path)?
-    {
+    while let Some(strip) = strips.next_strip()? {
         lines += strip.states.len();
         statistics.add(&strip);
     }
     let pixels = statistics.finish();
-    let (layout, label) = (image.layout(), image.label());
-    let complaints = [image.complaints(), strips.complaints()];
-    let texts = complaints.iter().flat_map(|complaints| complaints.kept());
+    let archive = image.archive();
+    let label = image.label();
+    let fields = label.map(|label| label.fields.clone()).unwrap_or_default();
+    let value = |key: &str| archive.and_then(|image| image.value(key));
+    let opened = archive.map(ImageFile::complaints);
+    let (decoded, decoded_count) = strips.complaints();
+    let texts = opened
+        .into_iter()
+        .flat_map(|opened| opened.kept())
+        .chain(decoded);
     let milliseconds = |seconds: Option<f64>| seconds.map(|seconds| seconds / SECONDS_PER_MS);
     Ok(json!({
         "file": path,
-        "product_id": label.product_id,
-        "instrument": label.instrument.id,
-        "sclk_start": label.fields.sclk_start,
-        "utc_start": label.fields.utc_start,
-        "exposure_ms": milliseconds(label.fields.exposure_s),
-        "downtrack_summing": label.fields.downtrack_summing,
-        "crosstrack_summing": label.fields.crosstrack_summing,
-        "first_detector": label.fields.first_detector,
-        "gain_mode_id": image.value("GAIN_MODE_ID"),
-        "offset_mode_id": image.value("OFFSET_MODE_ID"),
-        "rationale": image.value("RATIONALE_DESC"),
-        "coding": coding(layout.coding),
-        "fragments": layout.fragments,
+        "product_id": label.and_then(|label| label.product_id.clone()),
+        "instrument": label.map(|label| &label.instrument.id),
+        "sclk_start": fields.sclk_start,
+        "utc_start": fields.utc_start,
+        "exposure_ms": milliseconds(fields.exposure_s),
+        "downtrack_summing": fields.downtrack_summing,
+        "crosstrack_summing": fields.crosstrack_summing,
+        "first_detector": fields.first_detector,
+        "gain_mode_id": value("GAIN_MODE_ID"),
+        "offset_mode_id": value("OFFSET_MODE_ID"),
+        "rationale": value("RATIONALE_DESC"),
+        "coding": image.other_kind().unwrap_or_else(|| coding(archive.and_then(|image| image.layout().coding))),
+        "fragments": archive.map(|image| image.layout().fragments),
         "lines": lines,
-        "samples": layout.samples,
-        "lines_in_header": layout.lines,
-        "lines_in_label": label.fields.lines_header,
+        "samples": image.samples(),
+        "lines_in_header": image.lines(),
+        "lines_in_label": fields.lines_header,
         "lines_good": pixels.lines_good,
         "lines_suspect": pixels.lines_suspect,
         "lines_missing": pixels.lines_missing,
+        "numbers_of_1_and_255": strips.range(),
         "minimum": pixels.minimum,
         "maximum": pixels.maximum,
         "mean": pixels.mean,
@@ -96,7 +106,7 @@ fn info(path: &Path) -> Result<Value, Error> {
         "distinct_values": pixels.distinct,
         "zeros": pixels.zeros,
         "pixels_blake3": pixels.blake3,
-        "complaint_count": complaints.iter().map(|complaints| complaints.count()).sum::<u64>(),
+        "complaint_count": opened.map_or(0, |opened| opened.count()) + decoded_count,
         "complaints": texts.map(Complaint::to_string).collect::<Vec<_>>(),
     }))
 }

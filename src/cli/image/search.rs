@@ -1,6 +1,7 @@
 //! `areograph image search`.
 
 mod arguments;
+mod by_kernels;
 mod pairs;
 mod show;
 
@@ -28,6 +29,8 @@ struct Found {
     outline: ImageOutline,
     /// Identifiers of the windows that it meets.
     windows: Vec<String>,
+    /// How far its worst corner lies from where kernels have it, metres; `None` where nothing tells.
+    off_kernels_m: Option<f64>,
 }
 
 /// Mean radius of Mars, metres: what turns kilometres into angles where an image has no corners.
@@ -81,6 +84,9 @@ pub(super) fn run(arguments: &Arguments) -> Result<()> {
     // Volumes have all images up to theirs: an image of two indexes is one.
     found.sort_by(|a, b| a.image.product_id.cmp(&b.image.product_id));
     found.dedup_by(|a, b| a.image.product_id == b.image.product_id);
+    if let Some(metakernel) = &arguments.kernels {
+        by_kernels::compare(&mut found, metakernel)?;
+    }
     let pairs = pairs(&found);
     match arguments.format {
         Format::Table => show::table(&found, &pairs),
@@ -120,5 +126,6 @@ fn meeting(
         centre_rad,
         outline,
         windows,
+        off_kernels_m: None,
     })
 }

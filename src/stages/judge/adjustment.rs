@@ -224,7 +224,7 @@ impl AdjustmentEvidence<'_> {
             .zip(summary.tie_components)
             .map(|(kind, found)| {
                 let of_kind = summary.types.iter().find(|of| of.kind == kind);
-                    let is_untested = found <= 1.0 && of_kind.is_none_or(|of| of.redundancy < 1.0);
+                let is_untested = found <= 1.0 && of_kind.is_none_or(|of| of.redundancy < 1.0);
                 (!is_untested).then_some(found)
             })
     }

@@ -47,6 +47,10 @@ pub(in crate::cli::image) struct Arguments {
     /// Largest width of a pixel on the ground, metres.
     #[arg(long, value_name = "METRES")]
     pixel_max_m: Option<f64>,
+    /// Metakernel: holds the corners of the images that were found against those by these kernels, where they cover them, and warns
+    /// of images whose corners are off by more than the search allows.
+    #[arg(long, value_name = "FILE")]
+    pub(super) kernels: Option<PathBuf>,
     /// How the answer is printed.
     #[arg(long, value_enum, default_value = "table")]
     pub(super) format: Format,

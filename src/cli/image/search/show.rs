@@ -5,7 +5,7 @@ use serde_json::{Value, json};
 use super::{Found, Pair, arguments::camera_of};
 use crate::{
     cli::output,
-    units::{RADIANS_PER_DEGREE, SECONDS_PER_MS},
+    units::{METRES_PER_KM, RADIANS_PER_DEGREE, SECONDS_PER_MS},
 };
 
 /// Pairs that are printed for reading; all are counted.
@@ -30,7 +30,7 @@ fn id(found: &Found) -> String {
 /// Heading and value of a column.
 type ImageColumn = (&'static str, fn(&Found) -> String);
 
-const IMAGES: [ImageColumn; 18] = [
+const IMAGES: [ImageColumn; 19] = [
     ("product_id", |found| found.image.product_id.clone()),
     ("camera", |found| {
         found.image.instrument.join(" ").trim().to_owned()
@@ -47,6 +47,9 @@ const IMAGES: [ImageColumn; 18] = [
     }),
     ("longitude_deg", |found| degrees(Some(found.centre_rad[0]))),
     ("latitude_deg", |found| degrees(Some(found.centre_rad[1]))),
+    ("off_kernels_km", |found| {
+        decimals(found.off_kernels_m.map(|metres| metres / METRES_PER_KM))
+    }),
     ("quality", |found| found.image.quality.clone()),
     ("windows", |found| found.windows.join(";")),
     ("crosstrack_summing", |found| {
@@ -60,7 +63,7 @@ const IMAGES: [ImageColumn; 18] = [
 ];
 
 /// Columns of [`IMAGES`] that are shown for reading.
-const SHOWN: usize = 13;
+const SHOWN: usize = 14;
 
 type PairColumn = (&'static str, fn(&Pair<'_>) -> String);
 

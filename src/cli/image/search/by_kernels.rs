@@ -1,0 +1,117 @@
+//! Corners of the index against those that kernels tell.
+
+use std::path::Path;
+
+use super::{Found, RADIUS_M, arguments::camera_of};
+use crate::{
+    config::{ImageConfig, KernelsConfig, OrientationConfig, PointingConfig},
+    error::{Kind, Result},
+    geom::{
+        ellipsoid::spherical_to_xyz_m,
+        image_outline::{INDEX_LATITUDE_RAD, INDEX_LONGITUDE_RAD},
+    },
+    image::ImageFields,
+    pds::image_index::IndexedImage,
+    spice::{KernelSet, Session},
+    stages::{sample_orientation::sample_orientation, tag_times::tag_times},
+    units::METRES_PER_KM,
+};
+
+/// Notes of each image how far that corner lies from where the kernels have it that is worst, and warns of images that the
+/// search may have missed by that. Images that the kernels do not cover stay as they are.
+///
+/// # Errors
+/// Kernels that cannot be read; an image that no camera can have taken.
+pub(super) fn compare(found: &mut [Found], metakernel: &Path) -> Result<()> {
+    let session = Session::open(&KernelSet::from_metakernel(metakernel)?)?;
+    // What the search lets the index be off by.
+    let allowed_m = RADIUS_M * INDEX_LATITUDE_RAD.hypot(INDEX_LONGITUDE_RAD);
+    let kilometres = |metres: f64| metres / METRES_PER_KM;
+    let mut distances_m = Vec::new();
+    for found in found.iter_mut() {
+        found.off_kernels_m = off_kernels_m(&found.image, &session)?;
+        distances_m.extend(found.off_kernels_m);
+        if let Some(off_m) = found.off_kernels_m.filter(|off_m| !(*off_m <= allowed_m)) {
+            tracing::warn!(
+                "{}: its corners lie up to {:.1} km from where the kernels have them; the search allows {:.1} km, so others like it \
+                 may have been missed",
+                found.image.product_id,
+                kilometres(off_m),
+                kilometres(allowed_m)
+            );
+        }
+    }
+    distances_m.sort_by(f64::total_cmp);
+    match distances_m.last() {
+        Some(largest_m) => tracing::info!(
+            "corners of {} images against the kernels: median {:.1} km, largest {:.1} km",
+            distances_m.len(),
+            kilometres(distances_m[distances_m.len() / 2]),
+            kilometres(*largest_m)
+        ),
+        None => tracing::warn!("the kernels cover none of the images with corners"),
+    }
+    Ok(())
+}
+
+/// How far the worst corner is off; `None` where index or kernels have none.
+fn off_kernels_m(image: &IndexedImage, session: &Session) -> Result<Option<f64>> {
+    let [Some(a), Some(b), Some(c), Some(d)] = image.corners_rad else {
+        return Ok(None);
+    };
+    let outline = tag_times(&[entry(image)], session).and_then(|times| {
+        let sampled = times.iter().map(|times| {
+            sample_orientation(
+                session,
+                times,
+                &KernelsConfig::default(),
+                &PointingConfig::default(),
+                &OrientationConfig::default(),
+            )
+        });
+        sampled.collect::<Result<Vec<_>>>()
+    });
+    let outline = match outline {
+        Ok(sampled) => sampled
+            .into_iter()
+            .next()
+            .and_then(|sampled| sampled.outline),
+        Err(failure) if failure.kind() == Kind::Coverage => None,
+        Err(failure) => return Err(failure),
+    };
+    let Some(outline) = outline.filter(|outline| !outline.is_empty()) else {
+        return Ok(None);
+    };
+    // Along the first samples, and back along the last ones.
+    let last = outline.len() / 2 - 1;
+    let corners = [0, outline.len() - 1, last + 1, last].map(|corner| &outline[corner]);
+    let on_sphere_m =
+        |longitude_rad, latitude_rad| spherical_to_xyz_m(longitude_rad, latitude_rad, RADIUS_M);
+    let distances_m = [a, b, c, d].into_iter().zip(corners).map(|(index, seen)| {
+        let seen_m = on_sphere_m(seen.longitude_rad, seen.latitude_rad);
+        (on_sphere_m(index[0], index[1]) - seen_m).norm()
+    });
+    Ok(distances_m.max_by(f64::total_cmp))
+}
+
+/// The image as a site file would have it.
+fn entry(image: &IndexedImage) -> ImageConfig {
+    let [crosstrack_summing, downtrack_summing] = image.summing;
+    let [samples, lines] = image.size;
+    ImageConfig {
+        id: image.product_id.replace('/', "-"),
+        instrument: camera_of(image).cloned(),
+        fields: ImageFields {
+            sclk_start: image.sclk_start.clone(),
+            utc_start: image.sclk_start.is_none().then(|| image.utc_start.clone()),
+            exposure_s: image.exposure_s,
+            downtrack_summing: Some(downtrack_summing),
+            crosstrack_summing: Some(crosstrack_summing),
+            lines_header: Some(lines),
+            samples: Some(samples),
+            first_detector: image.first_detector,
+            ..ImageFields::default()
+        },
+        ..ImageConfig::default()
+    }
+}

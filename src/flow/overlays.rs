@@ -1,0 +1,43 @@
+//! The part of the flow that looks at pixels.
+
+use super::{
+    driver::{Driver, Flow},
+    outputs::Site,
+};
+use crate::{
+    config::{ImageConfig, SiteConfig},
+    stage::{InOrder, Output, Stage as _},
+    stages::lay_overlays::{LayOverlays, MeasuredTies, Overlays, PixelFiles},
+};
+
+/// What images with pixels show of footprints and tie points; nothing for a site without pixels.
+pub(super) fn overlays<D: Driver>(
+    flow: &mut D,
+    config: &SiteConfig,
+    site: &Site,
+) -> Flow<Option<Output<Overlays>>> {
+    if config.images.iter().all(|image| image.pixels.is_none()) {
+        return Ok(None);
+    }
+    let hash = |image: &ImageConfig| {
+        let hashed = flow.hash(LayOverlays::NAME, image.pixels.as_slice())?;
+        Ok(hashed.into_iter().next())
+    };
+    let pixels = config.images.iter().map(hash).collect::<Flow<Vec<_>>>()?;
+    let adjustment = site.adjustment.as_ref();
+    let measured = site.ties.as_ref().zip(site.intersection.as_ref());
+    let overlays = flow.stage(&LayOverlays {
+        images: InOrder(&site.images),
+        adjusted_images: InOrder(adjustment.map_or(&[], |of| &of.images)),
+        model: &config.registration.model,
+        pixels: PixelFiles(&pixels),
+        converted: &site.converted,
+        profiles: &site.profiles,
+        ties: measured.map(|(ties, initial)| MeasuredTies {
+            ties,
+            intersected: &initial.intersected,
+            adjusted: adjustment.map(|of| (&of.adjusted, &of.intersection.intersected)),
+        }),
+    })?;
+    Ok(Some(overlays))
+}

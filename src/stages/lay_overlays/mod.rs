@@ -1,0 +1,193 @@
+//! What images show where footprints and tie points are: a quick look of every image whose pixels are known, and pieces of
+//! the images around some footprints, around the tie points with the largest residuals and around rejected ones.
+//!
+//! Pieces of all images have the same ground in the same place: north up, one scale. They are cut around where an orientation
+//! sees a point, so that two images agree where the orientation is right.
+
+mod chips;
+mod pixels;
+mod places;
+mod views;
+
+use std::sync::atomic::AtomicBool;
+
+use serde::{Deserialize, Serialize};
+
+use super::{
+    adjust::Adjusted, convert_datum::Converted, group_profiles::Profile,
+    intersect::IntersectedTies, read_ties::Ties, site_image::SiteImage, tag_times::ImageTimes,
+};
+use crate::{
+    error::Result,
+    files::HashedFile,
+    geom::pushbroom::CameraModel,
+    stage::{InOrder, Input, Inputs, Output, Stage},
+    stage_inputs,
+};
+
+pub use chips::{CHIP_EDGE, Chip, Mark};
+pub use pixels::QuickLook;
+pub use places::Subject;
+
+/// What the images of a site show.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Overlays {
+    /// Images with pixels, in the order of the site's.
+    pub images: Vec<ShownImage>,
+    /// Pieces of them: those of footprints, then those of tie points.
+    pub places: Vec<Place>,
+}
+
+/// An image with pixels.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ShownImage {
+    /// Index of the image.
+    pub image: usize,
+    /// The whole of it.
+    pub quick_look: QuickLook,
+}
+
+/// A place on the ground in one image or two.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Place {
+    /// What is there.
+    pub subject: Subject,
+    /// Edge of a pixel of its pieces on the ground, metres.
+    pub pixel_m: f64,
+    /// What pieces are cut around, in the order of [`PlaceView::chips`].
+    pub centres: Vec<Mark>,
+    /// The images that show it.
+    pub views: Vec<PlaceView>,
+}
+
+/// A place in an image.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct PlaceView {
+    /// Index of the image.
+    pub image: usize,
+    /// How far the adjustment moves it on the ground, metres; `None` where there is no adjustment.
+    pub moved_m: Option<f64>,
+    /// One piece for each of [`Place::centres`].
+    pub chips: Vec<Chip>,
+}
+
+impl Overlays {
+    /// The quick look of the image with this index.
+    #[must_use]
+    pub fn quick_look(&self, image: usize) -> Option<&QuickLook> {
+        let shown = self.images.iter().find(|shown| shown.image == image);
+        shown.map(|shown| &shown.quick_look)
+    }
+}
+
+stage_inputs! {
+    /// Images with pixels, and what is shown in them.
+    pub struct LayOverlays<'a> {
+        /// Images with the orientation of the kernels.
+        pub images: InOrder<'a, SiteImage>,
+        /// The same with the adjusted one; none where there is no adjustment.
+        pub adjusted_images: InOrder<'a, SiteImage>,
+        /// The form of the orientation.
+        pub model: &'a CameraModel,
+        /// Files of pixels.
+        pub pixels: PixelFiles<'a>,
+        /// Footprints in IAU 2000.
+        pub converted: &'a Output<Converted>,
+        /// Profiles.
+        pub profiles: &'a Output<Vec<Profile>>,
+        /// Tie points.
+        pub ties: Option<MeasuredTies<'a>>,
+    }
+}
+
+/// Files of pixels by image.
+#[derive(Debug, Clone, Copy)]
+pub struct PixelFiles<'a>(pub &'a [Option<HashedFile>]);
+
+impl Input for PixelFiles<'_> {
+    fn add_to(&self, field: &str, inputs: &mut Inputs) {
+        for (place, file) in self.0.iter().enumerate() {
+            if let Some(file) = file {
+                inputs.file(field, &file.path, Some(place), &file.blake3);
+            }
+        }
+    }
+}
+
+/// Tie points and what became of them.
+#[derive(Debug, Clone, Copy)]
+pub struct MeasuredTies<'a> {
+    /// The tie points.
+    pub ties: &'a Output<Ties>,
+    /// Their ground points with the orientation of the kernels.
+    pub intersected: &'a Output<IntersectedTies>,
+    /// The adjustment, and their ground points with its orientation.
+    pub adjusted: Option<(&'a Output<Adjusted>, &'a Output<IntersectedTies>)>,
+}
+
+impl Input for Option<MeasuredTies<'_>> {
+    fn add_to(&self, field: &str, inputs: &mut Inputs) {
+        let Some(measured) = self else { return };
+        measured.ties.add_to(field, inputs);
+        measured.intersected.add_to(field, inputs);
+        if let Some((adjusted, intersected)) = measured.adjusted {
+            adjusted.add_to(field, inputs);
+            intersected.add_to(field, inputs);
+        }
+    }
+}
+
+impl Stage for LayOverlays<'_> {
+    const NAME: &'static str = "lay_overlays";
+    type Output = Overlays;
+    stage_inputs!(fingerprint);
+
+    /// Whether every file of pixels is of its image.
+    fn examine(&self) -> Vec<Result<String>> {
+        let files = self.pixels.0.iter().zip(self.images.0);
+        let known = files.filter_map(|(file, image)| Some((file.as_ref()?, image.times.get()?)));
+        let opened = known.map(|(file, times)| {
+            pixels::open(&file.path, times)
+                .map(|_| format!("image {}: its pixels are there", times.id))
+        });
+        opened.collect()
+    }
+
+    fn run(&self, stop: &AtomicBool) -> Result<Overlays> {
+        let times: Vec<&ImageTimes> = (self.images.0.iter())
+            .map(|image| image.times.value())
+            .collect::<Result<_>>()?;
+        let files: Vec<_> = self
+            .pixels
+            .0
+            .iter()
+            .zip(&times)
+            .map(|(file, times)| {
+                let opened = file.as_ref().map(|file| pixels::open(&file.path, times));
+                opened.transpose()
+            })
+            .collect::<Result<_>>()?;
+        let has_pixels: Vec<bool> = files.iter().map(Option::is_some).collect();
+        let before = views::cameras(self.images.0, *self.model)?;
+        let after = views::cameras(self.adjusted_images.0, *self.model)?;
+        let wanted = places::wanted(self, &has_pixels)?;
+        let mut planned: Vec<views::PlannedPlace> = (wanted.into_iter())
+            .filter_map(|wanted| views::plan(wanted, &before, &after, &times))
+            .collect();
+        let mut images = Vec::new();
+        for (image, file) in files.iter().enumerate() {
+            let Some(file) = file else { continue };
+            let patches = planned.iter_mut().flat_map(|place| place.patches_of(image));
+            let quick_look = pixels::read(file, times[image], patches.collect(), stop);
+            images.push(ShownImage {
+                image,
+                quick_look: quick_look?,
+            });
+        }
+        let places = planned.into_iter().map(views::PlannedPlace::cut);
+        Ok(Overlays {
+            images,
+            places: places.collect(),
+        })
+    }
+}

@@ -1,0 +1,311 @@
+//! Footprints and tie points as they are drawn on images, against images in which their true ground is painted: what is painted
+//! comes from the truth's cameras alone.
+
+use std::{collections::BTreeMap, fs, path::Path};
+
+use areograph::{
+    config::usual_instrument,
+    geom::pushbroom::{Detector, ExteriorOrientation as _, Projector},
+    pds::image_file::{Coding, NewImage, encode},
+};
+use base64::{Engine as _, engine::general_purpose::STANDARD};
+use nalgebra::{Vector2, Vector3};
+use serde_json::Value;
+
+use super::{
+    common::{
+        case::Case,
+        json,
+        mission::{mission, succeed},
+    },
+    misregistration::{TRANSFORMED_M, true_camera, true_footprints_m},
+    table, vector,
+};
+
+const SITE: &str = "isidis";
+/// Samples of both images.
+const SAMPLES: usize = 1024;
+/// Radius of a painted crater, pixels: more than marks reach.
+const CRATER: f64 = 10.0;
+/// Numbers of the ground and of a crater.
+const DN: [u8; 2] = [90, 250];
+/// Colours of marks.
+const BEFORE: [u8; 3] = [0x56, 0xB4, 0xE9];
+const AFTER: [u8; 3] = [0xFF, 0x9F, 0x1C];
+const MEASURED: [u8; 3] = [0xF7, 0xF7, 0x3B];
+
+/// Line and sample where a camera of the truth shows points.
+fn true_places(camera: &Value, ground_m: impl Iterator<Item = Vector3<f64>>) -> Vec<[f64; 2]> {
+    let (orientation, lines) = true_camera(camera);
+    let projector = Projector::new(&orientation, lines).unwrap();
+    let detector = Detector::new(usual_instrument(), 2, 0, u32::try_from(SAMPLES).unwrap());
+    let place = |ground_m: Vector3<f64>| {
+        let x = projector.project(&ground_m).unwrap().x;
+        let camera_m = orientation.pose(x).camera_vector_m(&ground_m);
+        let focal_px = detector.focal_px(&camera_m).unwrap();
+        [x + 0.5 * lines, detector.sample(focal_px.y)]
+    };
+    ground_m.map(place).collect()
+}
+
+/// An image of even ground with a crater at every place, as the archive has images.
+fn painted(id: &str, lines: usize, places: &[[f64; 2]]) -> Vec<u8> {
+    let mut pixels = vec![DN[0]; lines * SAMPLES];
+    for [line, sample] in places {
+        let rows = ((line - CRATER).max(0.0) as usize)
+            ..((line + CRATER + 1.0).max(0.0) as usize).min(lines);
+        for row in rows {
+            let columns = ((sample - CRATER).max(0.0) as usize)
+                ..((sample + CRATER + 1.0).max(0.0) as usize).min(SAMPLES);
+            for column in columns {
+                let off = [row as f64 + 0.5 - line, column as f64 + 0.5 - sample];
+                if off[0].hypot(off[1]) <= CRATER {
+                    pixels[row * SAMPLES + column] = DN[1];
+                }
+            }
+        }
+    }
+    let image = NewImage {
+        product_id: &id.replace('-', "/"),
+        instrument: ["MOC-NA", ""],
+        clock: (669_166_528, 118),
+        utc: ["2001-03-15T23:34:57.72", "2001-03-15T23:35:05.00"],
+        exposure_s: 0.000_482_1,
+        summing: 2,
+        first_detector: 0,
+        samples: u32::try_from(SAMPLES).unwrap(),
+        pixels: &pixels,
+        coding: Coding::Raw,
+    };
+    encode(&image).unwrap()
+}
+
+/// Red, green and blue of a picture.
+struct Picture {
+    width: usize,
+    pixels: Vec<[u8; 3]>,
+}
+
+impl Picture {
+    fn of(png: &[u8]) -> Self {
+        let mut decoder = png::Decoder::new(std::io::Cursor::new(png));
+        decoder.set_transformations(png::Transformations::EXPAND);
+        let mut reader = decoder.read_info().unwrap();
+        let mut bytes = vec![0; reader.output_buffer_size().unwrap()];
+        reader.next_frame(&mut bytes).unwrap();
+        let pixels = bytes
+            .chunks_exact(3)
+            .map(|pixel| [pixel[0], pixel[1], pixel[2]]);
+        Self {
+            width: reader.info().width as usize,
+            pixels: pixels.collect(),
+        }
+    }
+
+    /// Middles of the pixels of a colour, columns and rows.
+    fn places(&self, colour: [u8; 3]) -> impl Iterator<Item = Vector2<f64>> {
+        let found = self.pixels.iter().enumerate();
+        let found = found.filter(move |(_, pixel)| **pixel == colour);
+        found.map(|(at, _)| {
+            Vector2::new(
+                (at % self.width) as f64 + 0.5,
+                (at / self.width) as f64 + 0.5,
+            )
+        })
+    }
+
+    /// Mean place of the pixels of a colour within `reach` of a place, columns and rows.
+    fn middle(&self, colour: [u8; 3], around: Vector2<f64>, reach: f64) -> Option<Vector2<f64>> {
+        let places = self.pixels.iter().enumerate();
+        let places = places
+            .filter(|(_, pixel)| **pixel == colour)
+            .map(|(at, _)| {
+                Vector2::new(
+                    (at % self.width) as f64 + 0.5,
+                    (at / self.width) as f64 + 0.5,
+                )
+            });
+        let near: Vec<_> = places
+            .filter(|place| (place - around).norm() <= reach)
+            .collect();
+        (!near.is_empty()).then(|| near.iter().sum::<Vector2<f64>>() / near.len() as f64)
+    }
+
+    /// The middle of the crater nearest to a place, by its edges, which marks do not reach.
+    fn crater(&self, around: Vector2<f64>) -> Option<Vector2<f64>> {
+        let white = [255; 3];
+        let mut reaches = (1..100).map(f64::from);
+        let nearest = reaches.find_map(|reach| self.middle(white, around, reach))?;
+        // From its rim to its middle.
+        let middle = (0..6).fold(nearest, |place, _| self.extent(white, place, 1.5 * CRATER));
+        Some(middle)
+    }
+
+    /// The middle between the outermost pixels of a colour around a place.
+    fn extent(&self, colour: [u8; 3], around: Vector2<f64>, reach: f64) -> Vector2<f64> {
+        let places = self
+            .places(colour)
+            .filter(|place| (place - around).norm() <= reach);
+        let (low, high) = places.fold((around, around), |(low, high), place| {
+            (low.inf(&place), high.sup(&place))
+        });
+        0.5 * (low + high)
+    }
+}
+
+/// Pieces of the page by the text that describes them, and the metres of their pixels.
+fn pieces(page: &str) -> BTreeMap<String, (Picture, f64)> {
+    let figures = page.split("<figure class=\"place\"").skip(1);
+    let mut pieces = BTreeMap::new();
+    for figure in figures {
+        let caption = figure.split("<figcaption>").nth(1).unwrap();
+        let pixel_m = caption.split(" m a pixel").next().unwrap();
+        let pixel_m: f64 = pixel_m.rsplit(' ').next().unwrap().parse().unwrap();
+        for image in figure.split("src=\"data:image/png;base64,").skip(1) {
+            let (data, rest) = image.split_once('"').unwrap();
+            let alt = rest.split("alt=\"").nth(1).unwrap();
+            let alt = alt.split('"').next().unwrap();
+            let picture = Picture::of(&STANDARD.decode(data).unwrap());
+            pieces.insert(alt.to_owned(), (picture, pixel_m));
+        }
+    }
+    pieces
+}
+
+/// The site of a pair with painted images: every true footprint and every true tie point is a crater.
+fn painted_case(truth: &Value) -> (Case, Vec<Vec<[f64; 2]>>) {
+    let case = Case::pair();
+    let mut sites = truth["ties"].as_array().unwrap().iter();
+    let own = sites.find(|of| of["site"] == SITE).unwrap();
+    let ties_m = own["ties"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|tie| vector(&tie["ground_iau2000_m"]));
+    // The run before tells which shots are footprints of the site.
+    succeed(&mut case.run());
+    let footprints = table(&case.path("out/isidis/footprints.parquet"));
+    let shots_m = true_footprints_m(truth, &footprints).into_values();
+    let ground_m: Vec<Vector3<f64>> = shots_m.chain(ties_m).collect();
+    let mut places = Vec::new();
+    for (camera, lines) in own["cameras"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .zip([7_680, 7_680])
+    {
+        let id = camera["image"].as_str().unwrap();
+        let own = true_places(camera, ground_m.iter().copied());
+        case.write(&format!("{id}.imq"), painted(id, lines, &own));
+        let label = format!("label = \"labels/{id}.lbl\"\n");
+        case.replace(
+            "site.toml",
+            &label,
+            &format!("{label}pixels = \"{id}.imq\"\n"),
+        );
+        places.push(own);
+    }
+    (case, places)
+}
+
+/// How far a mark is from the crater next to it, metres towards east and south.
+fn off_m((picture, pixel_m): &(Picture, f64), mark: [u8; 3]) -> Option<Vector2<f64>> {
+    let middle = Vector2::repeat(0.5 * picture.width as f64);
+    let mark = picture.middle(mark, middle, f64::INFINITY)?;
+    let crater = picture.crater(mark)?;
+    Some((mark - crater) * *pixel_m)
+}
+
+#[test]
+fn drawn_footprints_lie_on_the_same_true_ground_in_both_images_after_the_adjustment() {
+    let truth = json(&mission().join("truth.json"));
+    let (case, places) = painted_case(&truth);
+    succeed(&mut case.run());
+    let folder = case.path("out/isidis");
+    let page = fs::read_to_string(folder.join("report/overlays.html")).unwrap();
+    assert!(page.len() < 5_000_000, "{} bytes", page.len());
+    let pieces = pieces(&page);
+    let ids = ["E02-01301", "E02-02016"];
+    let footprints = pieces.keys().filter_map(|alt| {
+        alt.strip_suffix(&format!(" in {}", ids[0]))
+            .filter(|of| of.starts_with("Footprint"))
+    });
+    let mut count = 0;
+    for name in footprints {
+        let [one, other] = ids.map(|id| &pieces[&format!("{name} in {id}")]);
+        let after_m = off_m(one, AFTER).unwrap() - off_m(other, AFTER).unwrap();
+        let before_m = off_m(one, BEFORE).unwrap() - off_m(other, BEFORE).unwrap();
+        println!(
+            "{name}: {:.1} m apart before, {:.1} m after",
+            before_m.norm(),
+            after_m.norm()
+        );
+        // Both marks and both craters are placed to half a pixel at worst, and footprints fall as far apart as tie points allow.
+        assert!(
+            after_m.norm() < TRANSFORMED_M + 2.0 * one.1,
+            "{name}: {after_m}"
+        );
+        // The labels are off by 60 lines against each other, 230 m; craters are 300 m apart.
+        assert!(before_m.norm() > 60.0, "{name}: {before_m}");
+        count += 1;
+    }
+    assert_eq!(count, 4);
+    ties_of_the_page(&truth, &pieces, ids);
+    strips(&folder, ids, &places);
+}
+
+/// A tie point that truth calls a blunder is measured beside its crater in the image that truth names, and on it in the other.
+fn ties_of_the_page(truth: &Value, pieces: &BTreeMap<String, (Picture, f64)>, ids: [&str; 2]) {
+    let mut sites = truth["ties"].as_array().unwrap().iter();
+    let own = sites.find(|of| of["site"] == SITE).unwrap();
+    let mut count = 0;
+    for tie in own["ties"].as_array().unwrap() {
+        let blunder = &tie["blunder"];
+        let (name, is_blunder) = (tie["id"].as_str().unwrap(), !blunder.is_null());
+        let rejected = if is_blunder { ", rejected" } else { "" };
+        for id in ids {
+            let Some(piece) = pieces.get(&format!("Tie point {name}{rejected} in {id}")) else {
+                continue;
+            };
+            // Measured with a noise of a pixel; the largest of some hundred is below five of these, and a half is rounding.
+            let off_px = off_m(piece, MEASURED).map_or(f64::INFINITY, |off| off.norm() / piece.1);
+            let is_off = off_px > 5.5;
+            assert_eq!(
+                is_off,
+                is_blunder && blunder["image"] == id,
+                "{name} in {id}: {off_px} px"
+            );
+            count += 1;
+        }
+    }
+    assert!(count >= 12, "{count} pieces");
+}
+
+/// In the whole images, too, adjusted marks are as far from their true places in one image as in the other.
+fn strips(folder: &Path, ids: [&str; 2], places: &[Vec<[f64; 2]>]) {
+    let mut means_m = Vec::new();
+    // Metres of a line: nominal, 3.3 m and 4.4 m in table 2 of Shan et al. 2005.
+    for ((id, places), line_m) in ids.iter().zip(places).zip([3.3, 4.4]) {
+        let picture =
+            Picture::of(&fs::read(folder.join(format!("images/{id}/overlay.png"))).unwrap());
+        let reduction = (SAMPLES as f64 / picture.width as f64).round();
+        let mut rows = Vec::new();
+        for [line, sample] in places {
+            let place = Vector2::new(*sample, *line) / reduction;
+            rows.extend(
+                picture
+                    .middle(AFTER, place, 7.0)
+                    .map(|mark| (mark - place).y),
+            );
+        }
+        assert!(rows.len() > 20, "{id}: {} marks", rows.len());
+        let mean = rows.iter().sum::<f64>() / rows.len() as f64;
+        println!("{id}: {} marks, {mean:.2} rows from truth", rows.len());
+        means_m.push(mean * reduction * line_m);
+    }
+    // Rounding to a pixel of three lines averages out over twenty marks to a tenth of it.
+    assert!(
+        (means_m[0] - means_m[1]).abs() < TRANSFORMED_M + 6.0,
+        "{means_m:?} m"
+    );
+}
