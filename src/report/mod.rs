@@ -50,6 +50,7 @@ mod sites;
 mod sites_map;
 mod sky;
 mod summary;
+mod support_data;
 mod timeline;
 mod uncertainty;
 
@@ -75,6 +76,7 @@ const SECTIONS: &[Section] = &[
     ranges::SECTION,
     scan::SECTION,
     images::SECTION,
+    support_data::SECTION,
     registration::SECTION,
     map::SECTION,
     timeline::SECTION,

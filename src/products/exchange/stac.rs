@@ -73,7 +73,7 @@ fn item(of: &Context) -> Result<Option<Value>> {
             "title": site.config.site,
             "description": description(site),
             "areograph:frame": FRAME,
-            "areograph:light_time": convention(site.config.orientation.light_time),
+            "areograph:light_time": convention(site),
             "datetime": start,
             "start_datetime": start,
             "end_datetime": end,

@@ -6,7 +6,6 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::{
-    constants::SPACECRAFT,
     products::kernel_report::KernelsByType,
     schema::{DocumentSchema, at},
     stages::{
@@ -35,7 +34,6 @@ pub(super) struct Isd<'a> {
     pub(super) image_lines: u32,
     #[schemars(range(min = 1))]
     pub(super) image_samples: u32,
-    #[schemars(extend("const" = SPACECRAFT.label_name))]
     pub(super) name_platform: &'a str,
     /// The camera's frame.
     pub(super) name_sensor: &'a str,
