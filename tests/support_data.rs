@@ -105,7 +105,7 @@ fn a_site_of_its_own_support_data_comes_out_as_by_kernels() {
     );
     let page = fs::read_to_string(by_support.join("report/index.html")).unwrap();
     assert!(page.contains("Nothing is applied to them"));
-    assert!(page.contains("isd/") || page.contains("E02-01301.json"));
+    assert!(page.contains("E02-01301.json"), "by name, with its hash");
     assert!(
         by_support
             .join("images/E02-01301/adjusted_isd.json")
@@ -168,7 +168,7 @@ const DAMAGES: [Damage; 16] = [
     (
         "metres for kilometres",
         |isd| isd["radii"]["unit"] = json!("m"),
-        "radii.semimajor is 3396.19; expected ",
+        "radii are 3.40 and 3.38 km; expected 3396.19",
     ),
     (
         "an unknown unit",
@@ -178,7 +178,7 @@ const DAMAGES: [Damage; 16] = [
     (
         "the Moon",
         |isd| isd["radii"] = json!({"semimajor": 1737.4, "semiminor": 1737.4, "unit": "km"}),
-        "radii are 1737.4 and 1737.4 km; expected 3396.19 and 3376.2 km, those of Mars",
+        "radii are 1737.40 and 1737.40 km; expected 3396.19 and 3376.20 km, those of Mars",
     ),
     (
         "another body",
@@ -319,6 +319,14 @@ fn support_data_without_any_one_key_never_end_in_a_panic() {
             refused += usize::from(read_isd(&path).is_err());
         }
     }
+    // Single bits: most hit a digit of some number, which no check can tell.
+    let bytes = good.to_string().into_bytes();
+    for flip in 0..80_usize {
+        let mut damaged = bytes.clone();
+        damaged[(flip * 7919 * 31) % bytes.len()] ^= 1 << (flip % 8);
+        fs::write(&path, damaged).unwrap();
+        let _either = read_isd(&path);
+    }
     // Names may be any text, and much of the file is for other readers.
     assert!(refused > 40, "{refused} of {}", 2 * pointers.len());
 }
@@ -377,6 +385,11 @@ fn hrsc_is_seen_as_usgscsm_sees_it() {
     let out = run_alone(folder.path(), &isd, &leap_seconds);
     let own = out.join("images/image/isd.json");
     let written = json(&own);
+    // usgscsm wants an identifier, which ALE leaves to its callers.
+    let mut named = json(&isd);
+    named["image_identifier"] = json!("h5270_0000_ir2");
+    let isd = folder.path().join("named.json");
+    fs::write(&isd, named.to_string()).unwrap();
     let rows = written["line_scan_rate"].as_array().unwrap();
     assert_eq!(rows.len(), 3, "exposure changes twice: {rows:?}");
     // Lines over all pieces, samples over the line.
@@ -460,10 +473,11 @@ fn the_lunar_pair_is_read_as_its_numbers_stand() {
         assert!((velocity_m_s - ahead_m).norm() < 0.01); // metres per second: bend of a second
         let turned = tables.pointing.at(et_s).0;
         let expected = lunar_pair::attitude(&raw["instrument_pointing"], et_s);
-        assert!((turned - expected).abs().max() < 1e-12); // elements: rounding
+        // Elements: the helper's arcs come from arc cosines of nearly 1; 1e-9 is 0.06 mm on the ground.
+        assert!((turned - expected).abs().max() < 1e-9);
         let body = &tables.body_rotation;
         let expected = lunar_pair::moon_matrix(&raw["body_rotation"], et_s);
-        assert!((body.constant * body.at(et_s).0 - expected).abs().max() < 1e-12);
+        assert!((body.constant * body.at(et_s).0 - expected).abs().max() < 1e-9);
     }
     let detector = Detector::new(&support.instrument, 1, 0, support.samples);
     let focal_length_px = detector.focal_length_px;

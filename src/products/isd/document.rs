@@ -186,7 +186,7 @@ pub(super) struct Provenance<'a> {
 /// How well the tables are interpolated, measured against the kernels.
 #[derive(Serialize, JsonSchema)]
 pub(super) struct Interpolation {
-    #[schemars(range(min = 1))]
+    /// 0 where the nodes come from support data, and are all that is known.
     pub(super) epochs_compared_with_kernels: usize,
     #[schemars(range(min = 0.0))]
     pub(super) error_max_px: f64,

@@ -1,10 +1,7 @@
 //! Orientation by support data: the tables of the file on a uniform grid, interpolated as camera models do it.
 
-use super::tables::{CameraTables, InterpolationCheck, Nodes};
-use crate::{
-    error::Result, frames::Rotation, pds::isd::SupportTables, stages::tag_times::ImageTimes,
-    time::Et,
-};
+use super::tables::{CameraTables, InterpolationCheck};
+use crate::{frames::Rotation, pds::isd::SupportTables, time::Et};
 
 /// Fewest intervals of the grid; usgscsm resamples tables with fewer than 25 nodes.
 const INTERVALS_MIN: usize = 30;
@@ -12,14 +9,9 @@ const INTERVALS_MIN: usize = 30;
 /// The uniform tables of `support`, a node for every row of its attitudes.
 ///
 /// Attitudes between rows lie on arcs, as usgscsm brings tables onto its own grid; positions are cubics. Rows that are
-/// uniform stay what they are. From then on the grid is the orientation: nothing else is known of it.
-///
-/// # Errors
-/// What [`InterpolationCheck::of`] says.
-pub(in crate::stages) fn support_tables(
-    image: &ImageTimes,
-    support: &SupportTables,
-) -> Result<CameraTables> {
+/// uniform stay what they are. From then on the grid is the orientation: nothing else is known of it, with which its
+/// interpolation could be compared.
+pub(in crate::stages) fn support_tables(support: &SupportTables) -> CameraTables {
     let span = support.span();
     let intervals = (support.pointing.et_s.len() - 1).max(INTERVALS_MIN);
     let step_s = span.duration_s() / intervals as f64;
@@ -52,7 +44,5 @@ pub(in crate::stages) fn support_tables(
         tables.inertial_to_mars.push(Rotation::new(to_mars, epoch));
         tables.mars_angular_velocity_rad_s.push(body_rad_s);
     }
-    let nodes = Nodes::new(&tables);
-    tables.interpolation = InterpolationCheck::of(image, &tables, |et| Ok(nodes.camera(et)))?;
-    Ok(tables)
+    tables
 }

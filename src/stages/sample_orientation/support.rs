@@ -27,7 +27,7 @@ pub(super) fn support_orientation(
     support: &SupportTables,
     epochs: &[Et],
 ) -> Result<Orientation> {
-    let tables = support_tables(image, support)?;
+    let tables = support_tables(support);
     let nodes = Nodes::new(&tables);
     let middle = nodes.camera(image.middle());
     let boresight = middle.to_mars.matrix() * Vector3::z();

@@ -42,7 +42,7 @@ enum ForeignBody {
     #[error("image {image}: naif_keywords.BODY_CODE is {code}; expected {NAIF_MARS}, Mars")]
     Code { image: String, code: i64 },
     #[error(
-        "image {image}: radii are {} and {} km; expected {} and {} km, those of Mars in IAU 2000",
+        "image {image}: radii are {:.2} and {:.2} km; expected {:.2} and {:.2} km, those of Mars in IAU 2000",
         .radii_m[0] / METRES_PER_KM,
         .radii_m[1] / METRES_PER_KM,
         MARS_IAU2000.equatorial_radius_m / METRES_PER_KM,
