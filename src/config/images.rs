@@ -32,8 +32,8 @@ const DETECTORS_MAX: u32 = 4_096;
 /// Images of a site.
 pub(super) const IMAGES: Many = Many {
     further: &[&[
-        " Without a label or support data these are required: `sclk_start` or `utc_start`, `exposure_ms` or `line_period_ms`,",
-        " `downtrack_summing`, `lines_header`, `samples`.",
+        " Without a label or support data these are required: `sclk_start` or `utc_start`, `exposure_ms` or",
+        " `line_period_ms`, `downtrack_summing`, `lines_header`, `samples`.",
     ]],
     ..Many::ANY
 };
