@@ -139,6 +139,12 @@ pub enum DistortionModel {
         /// `k₀`, `k₁` …, powers of 1/mm².
         coefficients: Vec<f64>,
     },
+    /// Across the track the ideal focal-plane coordinate is the distorted one over `1 + k y²`, `y` the distorted one in
+    /// millimetres; along the track both are the same: the form of usgscsm and ISIS for LROC's narrow angles.
+    AcrossQuotient {
+        /// `k`, 1/mm².
+        coefficient_per_mm2: f64,
+    },
     /// The angle off the boresight is `c₁ r + c₃ r³ + …`, `r` the distance of the detector place from the
     /// boresight in thousands of pixels, across the track after multiplication by a scale: the form of the
     /// MOC instrument kernel.

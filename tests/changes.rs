@@ -290,6 +290,7 @@ const NAMES: [&str; 19] = [
     "other.geojson",
     "other_laser.toml",
     "other_camera.toml",
+    "other_image.json",
     "gsfc",
     "mgs_nav_scene.bsp",
     "E02-02016",
@@ -347,6 +348,12 @@ fn write_others(case: &Case) {
     };
     case.write("outline.geojson", outline(87.75));
     case.write("other.geojson", outline(87.8));
+    let isd = text("out/isidis/images/E02-01301/isd.json");
+    case.write("image.json", &isd);
+    case.write(
+        "other_image.json",
+        isd.replace("\"focal_length\": 3500.0", "\"focal_length\": 3500.1"),
+    );
     let laser = include_str!("../config/altimeters/mola.toml");
     case.write(
         "laser.toml",
@@ -404,6 +411,7 @@ fn sites(site: &Table) -> Vec<Table> {
         ),
         with("windows = [{ id = 'isidis', polygon = 'outline.geojson' }]"),
         with("windows = [{ id = 'isidis', image = 'E02-01301', margin_km = 5.0 }]"),
+        with("images = [{ isd = 'image.json' }]"),
         with("altimeter = 'laser.toml'\nimages = [{ instrument = 'camera.toml' }]"),
         with(
             "adjustment.images = [{ id = 'E02-01301', position_m = [30, 0.3, 0, 30, 0.3, 0, 30, 0.3, 0], \

@@ -32,14 +32,14 @@ const DETECTORS_MAX: u32 = 4_096;
 /// Images of a site.
 pub(super) const IMAGES: Many = Many {
     further: &[&[
-        " Without a label these are required: `sclk_start` or `utc_start`, `exposure_ms` or `line_period_ms`,",
-        " `downtrack_summing`, `lines_header`, `samples`.",
+        " Without a label or support data these are required: `sclk_start` or `utc_start`, `exposure_ms` or",
+        " `line_period_ms`, `downtrack_summing`, `lines_header`, `samples`.",
     ]],
     ..Many::ANY
 };
 
 declare_table! {
-    /// Images, none to many: a label, the keys below, or both; keys written here win over the label.
+    /// Images, none to many: a label, the keys below, or both; keys written here win over the label. Or support data.
     pub struct ImageConfig {
         /// Identifier, unique in the site; also the name of a folder. One that begins with a MOC product, such
         /// as `E02-02855` or `m0402852_part`, is for the label of that product only.
@@ -54,6 +54,11 @@ declare_table! {
         /// `ties.match` says so, and the report shows footprints and tie points on it.
         #[serde(skip)]
         pixels: Option<PathBuf> = key(FILE).unused(r#""../images/e0202855.imq""#),
+        /// Or image support data (ISD) of the Community Sensor Model, as ALE writes them: camera, line times and
+        /// orientation of a line scanner, and then neither label nor the keys below. The orientation is taken as it
+        /// stands there: pointing bias, `light_time` and the kernels of orbit and attitude are not for such an image.
+        #[serde(skip)]
+        isd: Option<PathBuf> = key(FILE).unused(r#""../isd/m0402852.json""#),
         /// The camera: `moc_na`, `moc_wa_red`, `moc_wa_blue`, or the path of an instrument file like those in
         /// `config/instruments`. Without it, the camera that the label names, and without a label `moc_na`.
         instrument: Option<Instrument> = key(CAMERA).example(r#""moc_na""#),
@@ -69,6 +74,12 @@ declare_table! {
 }
 
 impl ImageConfig {
+    /// The file that says when and how its lines were exposed: support data, or a label.
+    #[must_use]
+    pub fn source(&self) -> Option<&PathBuf> {
+        self.isd.as_ref().or(self.label.as_ref())
+    }
+
     /// The name that tie points give the image.
     #[must_use]
     pub fn name_in_ties(&self) -> &str {
@@ -122,6 +133,20 @@ fn milliseconds(example: &'static str) -> impl Declare<Value = Option<f64>> {
         .map(|value_ms| value_ms.map(|value_ms| value_ms * SECONDS_PER_MS))
 }
 
+/// Keys that stand in for a label.
+const OF_FIELDS: [&str; 10] = [
+    "sclk_start",
+    "utc_start",
+    "exposure_ms",
+    "line_period_ms",
+    "downtrack_summing",
+    "crosstrack_summing",
+    "lines_header",
+    "lines_delivered",
+    "samples",
+    "first_detector",
+];
+
 /// Without a label the keys must give what times and sensor model need: start, line period, summing, size.
 fn is_complete(_: &ImageConfig, keys: &mut Keys<'_, '_>) {
     const NEEDS: [&[&str]; 5] = [
@@ -136,15 +161,26 @@ fn is_complete(_: &ImageConfig, keys: &mut Keys<'_, '_>) {
             let ways: Vec<_> = ways.iter().map(|way| json!({"required": [way]})).collect();
             json!({"anyOf": ways})
         });
-        json!({"anyOf": [{"required": ["label"]}, {"allOf": needs}]})
+        json!({"anyOf": [{"required": ["label"]}, {"required": ["isd"]}, {"allOf": needs}]})
     });
+    if keys.span_of("isd").is_some() {
+        let of_label = ["label", "instrument"].into_iter();
+        for key in of_label.chain(OF_FIELDS) {
+            keys.unused(key, "the support data of images.isd say it all");
+        }
+        return;
+    }
     let lacking: Vec<String> = NEEDS
         .into_iter()
         .filter(|ways| !ways.iter().any(|way| keys.span_of(way).is_some()))
         .map(|ways| ways.join(" or "))
         .collect();
     if keys.span_of("label").is_none() && !lacking.is_empty() {
-        keys.missing("label", &format!("a label, or also {}", lacking.join(", ")));
+        let expected = format!(
+            "a label, support data (isd), or also {}",
+            lacking.join(", ")
+        );
+        keys.missing("label", &expected);
     }
 }
 

@@ -179,10 +179,11 @@ fn pointing_of_instruments(site: &SiteConfig, keys: &mut Keys<'_, '_>) {
     }
 }
 
-/// The cameras that images name; the usual one where an image, or no image, names none.
+/// The cameras that images of kernels name; the usual one where such an image, or no image, names none.
 fn cameras(images: &[ImageConfig]) -> Vec<&Instrument> {
     let named = images
         .iter()
+        .filter(|image| image.isd.is_none())
         .map(|image| image.instrument.as_ref().unwrap_or(usual_instrument()));
     let usual = images.is_empty().then(usual_instrument);
     named.chain(usual).collect()

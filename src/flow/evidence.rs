@@ -85,12 +85,13 @@ pub(super) fn warnings(config: &SiteConfig, site: &Site) -> Result<Vec<String>> 
     Ok(warnings)
 }
 
-/// The cameras of the images, each once.
-pub(super) fn cameras(images: &[SiteImage]) -> Result<Vec<&Instrument>> {
+/// The cameras of the images that kernels orient, each once.
+fn cameras(images: &[SiteImage]) -> Result<Vec<&Instrument>> {
     let mut cameras: Vec<&Instrument> = Vec::new();
     for image in images {
-        let camera = &image.times.value()?.instrument;
-        if !cameras.contains(&camera) {
+        let times = image.times.value()?;
+        let camera = &times.instrument;
+        if times.support.is_none() && !cameras.contains(&camera) {
             cameras.push(camera);
         }
     }

@@ -61,7 +61,9 @@ pub(super) fn required_coverage(
         &config.kernels,
         trajectory_reach_s(&config.range_check, &config.mola_clock),
     );
-    let exposures = images.iter().map(|image| image.exposures());
+    // Those of support data read no kernels.
+    let images = || images.iter().filter(|image| image.support.is_none());
+    let exposures = images().map(|image| image.exposures());
     let flights = profiles
         .iter()
         .map(|profile| profile.interval.padded(reach_s));
@@ -70,7 +72,7 @@ pub(super) fn required_coverage(
         exposures.map(|exposures| light_time.read_over(exposures.padded(kernels.padding_s)));
     // Within the tolerance a look-up reaches kernels that end before it or begin after it.
     let padding_s = kernels.padding_s + kernels.ck_tolerance_s;
-    let attitudes = images.iter().map(|image| {
+    let attitudes = images().map(|image| {
         let bias_s = config.pointing.bias_of(&image.instrument).seconds();
         image.exposures().shifted(bias_s).padded(padding_s)
     });

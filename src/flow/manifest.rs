@@ -5,7 +5,6 @@ use std::collections::BTreeMap;
 use super::{
     PUBLISH,
     driver::Ledger,
-    evidence::cameras,
     outputs::{Intersection, Site},
 };
 use crate::{
@@ -13,9 +12,10 @@ use crate::{
     config::SiteConfig,
     error::Result,
     files::file_name,
-    instruments::Instrument,
     stage::Inputs,
-    stages::{describe_kernels::KernelLine, judge::Verdict, read_ties::Ties},
+    stages::{
+        describe_kernels::KernelLine, judge::Verdict, read_ties::Ties, tag_times::used_biases,
+    },
     store::manifest::{
         BiasEntry, Complaints, ConfigurationEntry, KernelEntry, Manifest, ProductEntry, StageEntry,
         figures,
@@ -77,7 +77,7 @@ pub(super) fn manifest(
             blake3: config.blake3.clone(),
             keys: config.keys.clone(),
         },
-        biases: biases(config, &cameras(&site.images)?),
+        biases: biases(config, site)?,
         kernels: site
             .described
             .value()?
@@ -208,7 +208,7 @@ fn figures_of(site: &Site) -> Result<BTreeMap<String, f64>> {
         .collect())
 }
 
-fn biases(config: &SiteConfig, cameras: &[&Instrument]) -> Vec<BiasEntry> {
+fn biases(config: &SiteConfig, site: &Site) -> Result<Vec<BiasEntry>> {
     let scope = match config.mola_clock.scope {
         BiasScope::SpkLookup => "spacecraft position in the range check",
         BiasScope::Rotation => "rotation of Mars into IAU 2000",
@@ -223,7 +223,9 @@ fn biases(config: &SiteConfig, cameras: &[&Instrument]) -> Vec<BiasEntry> {
         scope: scope.to_owned(),
         source: config.mola_clock.source.clone(),
     };
-    let pointing = config.pointing.used(cameras.iter().copied());
+    let images = site.images.iter().map(|image| image.times.value());
+    let images = images.collect::<Result<Vec<_>>>()?;
+    let pointing = used_biases(&config.pointing, images);
     let several = pointing.len() > 1;
     let pointing = pointing.into_iter().map(|of| BiasEntry {
         name: "ck_bias".to_owned(),
@@ -235,5 +237,5 @@ fn biases(config: &SiteConfig, cameras: &[&Instrument]) -> Vec<BiasEntry> {
         },
         source: of.source.to_owned(),
     });
-    pointing.chain([clock]).collect()
+    Ok(pointing.chain([clock]).collect())
 }

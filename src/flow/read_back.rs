@@ -24,6 +24,9 @@ pub(super) fn read_back(
     let images = site.adjustment.iter().flat_map(|of| &of.images);
     for image in images {
         let (times, orientation) = (image.times.value()?, image.orientation.value()?);
+        if times.support.is_some() {
+            continue;
+        }
         let position = position_kernel(&times.id);
         let own = [&position, &attitude_kernel(&times.id)].map(|name| staging.join(name));
         let session = Session::open(&kernels.followed_by(&own)?)?;

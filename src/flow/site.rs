@@ -60,10 +60,16 @@ pub(super) fn prepare<D: Driver>(flow: &mut D, config: &SiteConfig) -> Flow<Prep
     let images = {
         let kernels = &KernelView::text(clocks.as_ref());
         let tag = |image: &ImageConfig| {
-            let label = flow.hash(TagTimes::NAME, image.label.as_slice())?.pop();
+            let source = image.source().map_or(&[][..], std::slice::from_ref);
+            let source = flow.hash(TagTimes::NAME, source)?.pop();
+            let (label, support) = match &image.isd {
+                Some(_) => (None, source),
+                None => (source, None),
+            };
             flow.stage(&TagTimes {
                 image,
                 label,
+                support,
                 kernels,
             })
         };
@@ -213,7 +219,7 @@ pub(super) fn orient<D: Driver>(
     })
 }
 
-/// Orientation of every image by the kernels.
+/// Orientation of every image by the kernels, or by its support data.
 fn orientations<D: Driver>(
     flow: &mut D,
     config: &SiteConfig,
@@ -221,11 +227,13 @@ fn orientations<D: Driver>(
     kernels: &KernelView,
 ) -> Flow<Vec<Output<Orientation>>> {
     let images = config.images.iter().zip(images);
+    let none = &KernelView::all(Some(&KernelSet::default()));
     let sample = |(image, times): (&ImageConfig, _)| {
         flow.stage(&SampleOrientation {
             image: &image.id,
             times,
-            kernels,
+            // Support data are read instead of kernels.
+            kernels: if image.isd.is_some() { none } else { kernels },
             coverage: &config.kernels,
             pointing: &config.pointing,
             orientation: &config.orientation,

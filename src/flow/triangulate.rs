@@ -9,7 +9,7 @@ use crate::{
     config::{ImageConfig, SiteConfig},
     error::{Error, Kind},
     files::HashedFile,
-    spice::KernelView,
+    spice::{KernelSet, KernelView},
     stage::{InOrder, Output, Round, Stage},
     stages::{
         adjust::{Adjust, Adjusted},
@@ -131,13 +131,19 @@ fn adjust<D: Driver>(
     let (_, ties, _) = measured;
     let intersection = intersect(flow, config, Some(&adjusted), &images, ties, shots)?;
     let times: Vec<_> = images.iter().map(|image| image.times.clone()).collect();
+    // Images with support data have no orbit and attitude of kernels.
+    let none = &KernelView::all(Some(&KernelSet::default()));
     let tabulate = |(index, image): (usize, &SiteImage)| {
         flow.stage(&TabulateKernels {
             image: &config.images[index].id,
             index: &index,
             times: InOrder(&times),
             orientation: &image.orientation,
-            kernels,
+            kernels: if config.images[index].isd.is_some() {
+                none
+            } else {
+                kernels
+            },
             coverage: &config.kernels,
             pointing: &config.pointing,
         })

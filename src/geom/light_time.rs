@@ -29,10 +29,12 @@ pub enum LightTime {
     None,
     /// Where it seems to be from the centre of Mars, with light time and aberration, as ISIS and ALE have it.
     Centre,
+    /// Where the support data of an image have it; no convention of a run.
+    Support,
 }
 
 impl LightTime {
-    /// Every convention, with its word in configuration and products.
+    /// Every convention of a run, with its word in configuration and products.
     pub const WORDS: [(&'static str, Self); 3] = [
         ("surface", Self::Surface),
         ("none", Self::None),
@@ -50,6 +52,7 @@ impl LightTime {
             Self::Surface => "surface",
             Self::None => "none",
             Self::Centre => "centre",
+            Self::Support => "support",
         }
     }
 
@@ -65,6 +68,9 @@ impl LightTime {
             Self::Centre => {
                 "as seen from the centre of Mars with light time and aberration (LT+S), as ISIS and ALE have them"
             }
+            Self::Support => {
+                "as the support data of the image have them (neither light time nor aberration is added or taken away)"
+            }
         }
     }
 
@@ -72,7 +78,7 @@ impl LightTime {
     #[must_use]
     pub fn read_over(self, exposures: Interval) -> Interval {
         match self {
-            Self::None => exposures,
+            Self::None | Self::Support => exposures,
             Self::Surface | Self::Centre => {
                 Interval::new(exposures.start.plus(-Self::REACH_S), exposures.stop)
             }

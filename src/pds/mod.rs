@@ -1,8 +1,9 @@
-//! Bytes to typed records and back: MOLA PEDR files, MOC images and their labels, tie points.
+//! Bytes to typed records and back: MOLA PEDR files, MOC images and their labels, image support data, tie points.
 
 pub mod archive;
 pub mod image_file;
 pub mod image_index;
+pub mod isd;
 pub mod label;
 pub mod moc;
 pub mod pedr;

@@ -95,6 +95,7 @@ fn of_site(of: &Context, adjustment: &AdjustmentProducts) -> Result<Vec<Written>
         pointing: &of.site.config.pointing,
     };
     let images = adjustment.images.iter().zip(adjustment.tables);
+    let images = images.filter(|(image, _)| image.times.support.is_none());
     let images = images.map(|(image, tables)| AdjustedImage {
         times: image.times,
         tables,
@@ -236,7 +237,7 @@ const fn positions(light_time: LightTime) -> &'static str {
              the ground. Programs that see the spacecraft from the centre of Mars (LT+S: ISIS, ALE) place it\n\
              elsewhere."
         }
-        LightTime::None => {
+        LightTime::None | LightTime::Support => {
             "They were adjusted without light time:\n\
              the position of an exposure is that of its instant. Programs that see the spacecraft from the centre\n\
              of Mars (LT+S: ISIS, ALE) place it elsewhere."

@@ -104,7 +104,10 @@ fn isd<'a>(site: &SiteProducts<'a>, image: &ImageProducts<'a>, round: Round) -> 
         image_identifier: &times.id,
         image_lines: times.lines_delivered,
         image_samples: times.samples,
-        name_platform: &SPACECRAFT.label_name,
+        name_platform: times
+            .support
+            .as_ref()
+            .map_or(&SPACECRAFT.label_name, |support| &support.platform),
         name_sensor: &naif.frame,
         reference_height: ReferenceHeight {
             maxheight: REFERENCE_HEIGHT_M,
@@ -123,7 +126,7 @@ fn isd<'a>(site: &SiteProducts<'a>, image: &ImageProducts<'a>, round: Round) -> 
         },
         body_rotation: body_rotation(tables),
         instrument_pointing: instrument_pointing(tables, naif),
-        naif_keywords: naif_keywords(site, &times.instrument),
+        naif_keywords: naif_keywords(site, times),
         detector_sample_summing: times.crosstrack_summing,
         detector_line_summing: times.downtrack_summing,
         focal_length_model: FocalLength {
@@ -251,7 +254,8 @@ fn ends(et_s: &[f64]) -> (f64, f64) {
 }
 
 /// The keywords that the numbers above come from, under NAIF's names.
-fn naif_keywords(site: &SiteProducts, instrument: &Instrument) -> BTreeMap<String, Keyword> {
+fn naif_keywords(site: &SiteProducts, times: &ImageTimes) -> BTreeMap<String, Keyword> {
+    let instrument = &times.instrument;
     let mars = &MARS_IAU2000;
     let [a_km, c_km] =
         [mars.equatorial_radius_m, mars.polar_radius_m].map(|radius_m| radius_m / METRES_PER_KM);
@@ -267,18 +271,32 @@ fn naif_keywords(site: &SiteProducts, instrument: &Instrument) -> BTreeMap<Strin
         ("BODY499_PM", Keyword::Numbers(meridian)),
     ];
     let optics = &instrument.optics;
-    let bias = site.config.pointing.bias_of(instrument);
+    let bias_s = match times.support {
+        Some(_) => instrument.pointing.ck_bias_s,
+        None => site.config.pointing.bias_of(instrument).seconds(),
+    };
     let of_camera = [
         ("FOCAL_LENGTH", Keyword::Number(optics.focal_length_mm)),
         ("PIXEL_PITCH", Keyword::Number(optics.pixel_pitch_mm)),
         ("PIXEL_SAMPLES", Keyword::Pixels(instrument.detector.pixels)),
-        ("CK_TIME_BIAS", Keyword::Number(bias.seconds())),
+        ("CK_TIME_BIAS", Keyword::Number(bias_s)),
         ("SPK_TIME_BIAS", Keyword::Number(0.0)),
     ];
     let id = instrument.naif.instrument;
     let of_camera = of_camera.map(|(key, value)| (format!("INS{id}_{key}"), value));
     let of_mars = of_mars.map(|(key, value)| (key.to_owned(), value));
     of_mars.into_iter().chain(of_camera).collect()
+}
+
+/// Where attitudes come from, a clause for people.
+fn attitude_source(times: &ImageTimes) -> String {
+    match &times.support {
+        Some(support) => format!("that of the support data {}", support.name),
+        None => format!(
+            "read from the C-kernel at epoch + INS{}_CK_TIME_BIAS",
+            times.instrument.naif.instrument
+        ),
+    }
 }
 
 /// What the reader of this file should know; camera models ignore it.
@@ -291,7 +309,9 @@ fn provenance<'a>(
     let interpolation = &image.orientation.tables.interpolation;
     let detector = times.detector();
     let distortion = if detector.distortion == Distortion::NONE {
-        "optical_distortion: none, as the instrument kernel says".to_owned()
+        let source = times.support.as_ref();
+        let source = source.map_or("the instrument kernel says", |_| "the support data say");
+        format!("optical_distortion: none, as {source}")
     } else {
         let fit = detector.radial_fit(&times.instrument);
         format!(
@@ -331,16 +351,17 @@ fn provenance<'a>(
             ),
             distortion,
             format!(
-                "instrument_position: {}, the convention of the whole run; reading programs must add none{}",
+                "instrument_position: {}{}; reading programs must add none{}",
                 image.orientation.light_time.convention.positions(),
+                if times.support.is_some() { "" } else { ", the convention of the whole run" },
                 match round {
                     Round::Initial | Round::Matching => "",
                     Round::Adjusted => "; with the correction and the shift of line times in ../../adjustment.json",
                 },
             ),
             format!(
-                "instrument_pointing: attitude of each epoch read from the C-kernel at epoch + INS{}_CK_TIME_BIAS{}",
-                times.instrument.naif.instrument,
+                "instrument_pointing: attitude of each epoch {}{}",
+                attitude_source(times),
                 match round {
                     Round::Initial | Round::Matching => "",
                     Round::Adjusted => ", turned by the correction and shifted as the lines are",

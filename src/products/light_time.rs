@@ -1,18 +1,37 @@
 //! Which positions of cameras the products follow, for their readers.
 
-use super::site::SiteProducts;
+use super::site::{ImageProducts, SiteProducts};
 use crate::geom::light_time::LightTime;
 
-/// The convention as a sentence.
-pub(super) fn convention(light_time: LightTime) -> String {
-    format!(
-        "light time {}: positions of cameras are {}; ranges of shots are geometric",
+/// The convention of the site as a sentence; images of support data have positions of their own.
+pub(super) fn convention(site: &SiteProducts) -> String {
+    let light_time = site.config.orientation.light_time;
+    let (supported, others): (Vec<&ImageProducts>, Vec<&ImageProducts>) = site
+        .images
+        .iter()
+        .partition(|image| image.times.support.is_some());
+    let of_run = format!(
+        "light time {}: positions of cameras are {}",
         light_time.word(),
         light_time.positions()
-    )
+    );
+    let ids: Vec<&str> = supported.iter().map(|image| &*image.times.id).collect();
+    let positions = match (ids.is_empty(), others.is_empty()) {
+        (true, _) => of_run,
+        (false, true) => format!(
+            "positions of cameras are {}",
+            LightTime::Support.positions()
+        ),
+        (false, false) => format!(
+            "{of_run}; of {} {}",
+            ids.join(", "),
+            LightTime::Support.positions()
+        ),
+    };
+    format!("{positions}; ranges of shots are geometric")
 }
 
 /// What Parquet files say of it beside their columns.
 pub(super) fn metadata(site: &SiteProducts) -> Vec<(&'static str, String)> {
-    vec![("light_time", convention(site.config.orientation.light_time))]
+    vec![("light_time", convention(site))]
 }

@@ -4,7 +4,7 @@ use std::{collections::BTreeMap, path::Path};
 
 use super::error::ProductError;
 use crate::{
-    config::SiteConfig,
+    config::{SiteConfig, UsedBias},
     error::Result,
     footprints::Footprints,
     frames::MarsIau2000,
@@ -25,7 +25,7 @@ use crate::{
         register::ImageRegistration,
         sample_orientation::Orientation,
         tabulate_kernels::KernelTables,
-        tag_times::ImageTimes,
+        tag_times::{ImageTimes, used_biases},
     },
 };
 
@@ -136,6 +136,13 @@ impl<'a> ImageProducts<'a> {
 }
 
 impl<'a> SiteProducts<'a> {
+    /// The pointing biases with which kernels were read; none where support data orient all images.
+    #[must_use]
+    pub fn pointing_biases(&self) -> Vec<UsedBias<'a>> {
+        let cameras = self.images.iter().map(|image| image.times);
+        used_biases(&self.config.pointing, cameras)
+    }
+
     /// The tie points and their adjustment; nothing where there is none.
     pub(crate) fn adjustment(&self) -> Option<(GeometricProducts<'a>, AdjustmentProducts<'a>)> {
         let geometric = self.geometric?;

@@ -38,8 +38,7 @@ fn biases(site: &SiteProducts) -> String {
             Column::Text("source"),
         ],
     );
-    let cameras = site.images.iter().map(|image| &image.times.instrument);
-    let pointing = site.config.pointing.used(cameras);
+    let pointing = site.pointing_biases();
     for of in &pointing {
         let name = match pointing.len() {
             1 => "attitude (CK)".to_owned(),
@@ -52,6 +51,20 @@ fn biases(site: &SiteProducts) -> String {
                 signed(of.bias.seconds(), 3).into(),
                 "the time at which attitude is read; position and Mars stay at the exposure".into(),
                 of.source.into(),
+            ],
+        );
+    }
+    let supported = site.images.iter();
+    let supported = supported.filter(|image| image.times.support.is_some());
+    let ids: Vec<&str> = supported.map(|image| &*image.times.id).collect();
+    if !ids.is_empty() {
+        table.row(
+            true,
+            [
+                format!("attitude and line times of {}", ids.join(", ")).into(),
+                "–".into(),
+                "nothing is applied to support data".into(),
+                "the files under Support data".into(),
             ],
         );
     }

@@ -90,6 +90,13 @@ fn taken(site: &SiteProducts) -> String {
 /// Which positions of cameras the site follows, and how far the others are from them.
 fn light_time(site: &SiteProducts) -> String {
     let convention = site.config.orientation.light_time;
+    if site
+        .images
+        .iter()
+        .all(|image| image.times.support.is_some())
+    {
+        return String::new();
+    }
     let effects = site
         .images
         .iter()

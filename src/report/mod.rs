@@ -52,6 +52,7 @@ mod sites;
 mod sites_map;
 mod sky;
 mod summary;
+mod support_data;
 mod timeline;
 mod uncertainty;
 
@@ -79,6 +80,7 @@ const SECTIONS: &[Section] = &[
     ranges::SECTION,
     scan::SECTION,
     images::SECTION,
+    support_data::SECTION,
     registration::SECTION,
     overlays::SECTION,
     map::SECTION,

@@ -43,6 +43,21 @@ fn write(site: &SiteProducts) -> String {
             ],
         );
     }
+    for support in site
+        .images
+        .iter()
+        .filter_map(|image| image.times.support.as_ref())
+    {
+        files.row(
+            true,
+            [
+                (&support.name).into(),
+                "ISD".into(),
+                whole(support.bytes).into(),
+                hash(&support.blake3),
+            ],
+        );
+    }
     for file in &site.footprints.files {
         files.row(
             true,

@@ -3,7 +3,7 @@
 use std::sync::atomic::AtomicBool;
 
 use super::{
-    orientation::{CameraReader, GroundPoint},
+    orientation::{CameraReader, GroundPoint, Nodes, support_tables},
     tag_times::ImageTimes,
 };
 use crate::{
@@ -72,13 +72,12 @@ impl Stage for OutlineWindows<'_> {
 }
 
 impl OutlineWindows<'_> {
-    fn outline(&self, window: &str, image: &str, margin_m: f64) -> Result<WindowShape> {
-        let lacking = || NoGround {
-            window: window.to_owned(),
-            image: image.to_owned(),
-        };
-        let mut images = self.images.0.iter().filter_map(Output::get);
-        let times = images.find(|times| times.id == image).ok_or_else(lacking)?;
+    /// Outline of what an image sees, by its support data or by the kernels.
+    fn seen(&self, times: &ImageTimes) -> Result<Option<Vec<GroundPoint>>> {
+        if let Some(support) = &times.support {
+            let nodes = Nodes::new(&support_tables(&support.tables));
+            return GroundPoint::outline(times, |et| Ok(nodes.camera(et)));
+        }
         let reader = CameraReader {
             session: self.kernels.session()?,
             instrument: &times.instrument,
@@ -87,7 +86,17 @@ impl OutlineWindows<'_> {
             light_time: self.orientation.light_time,
         };
         reader.require_coverage(times, self.coverage.padding_s)?;
-        let seen = GroundPoint::outline(times, |et| reader.camera(et))?.ok_or_else(lacking)?;
+        GroundPoint::outline(times, |et| reader.camera(et))
+    }
+
+    fn outline(&self, window: &str, image: &str, margin_m: f64) -> Result<WindowShape> {
+        let lacking = || NoGround {
+            window: window.to_owned(),
+            image: image.to_owned(),
+        };
+        let mut images = self.images.0.iter().filter_map(Output::get);
+        let times = images.find(|times| times.id == image).ok_or_else(lacking)?;
+        let seen = self.seen(times)?.ok_or_else(lacking)?;
         let first_rad = seen.first().ok_or_else(lacking)?.longitude_rad;
         let places = seen.iter().map(|point| {
             let step_rad = longitude_step_rad(point.longitude_rad - first_rad);

@@ -1,10 +1,13 @@
-//! Exterior orientation of an image: position and rotation of the camera at equally spaced epochs.
+//! Exterior orientation of an image: position and rotation of the camera at equally spaced epochs, by kernels or by
+//! support data.
 
 mod camera_tables;
 mod conventions;
+mod support;
 
 use std::{fmt, sync::atomic::AtomicBool};
 
+use self::support::support_orientation;
 use super::{orientation::CameraReader, tag_times::ImageTimes};
 use crate::{
     config::{KernelsConfig, OrientationConfig, PointingConfig},
@@ -54,9 +57,14 @@ impl Stage for SampleOrientation<'_> {
     }
 
     fn run(&self, _stop: &AtomicBool) -> Result<Orientation> {
+        let times = self.times.value()?;
+        if let Some(support) = &times.support {
+            let epochs = epochs(times, self.orientation.intervals);
+            return support_orientation(times, &support.tables, &epochs);
+        }
         sample_orientation(
             self.kernels.session()?,
-            self.times.value()?,
+            times,
             self.coverage,
             self.pointing,
             self.orientation,
@@ -69,6 +77,11 @@ impl Stage for SampleOrientation<'_> {
         let (Some(times), Some(_)) = (self.times.get(), self.kernels.kernels()) else {
             return Vec::new();
         };
+        if let Some(support) = &times.support {
+            let epochs = epochs(times, self.orientation.intervals);
+            let sampled = support_orientation(times, &support.tables, &epochs);
+            return vec![sampled.map(|_| finding(times, &[]))];
+        }
         let session = self.kernels.session();
         let invalid = session.and_then(|session| {
             require_orientation(

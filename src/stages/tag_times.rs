@@ -1,10 +1,12 @@
-//! Image labels become line times: spacecraft clock or UTC to ET, line period, header and delivered lines.
+//! Image labels become line times: spacecraft clock or UTC to ET, line period, header and delivered lines; or support
+//! data, which have them.
 
 mod agreement;
 mod detector;
 mod error;
+mod support;
 
-use std::sync::atomic::AtomicBool;
+use std::{path::Path, sync::atomic::AtomicBool};
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -12,9 +14,10 @@ use serde::{Deserialize, Serialize};
 use agreement::{mounting_agrees, of_one_clock, of_one_product, start_agrees, stop_agrees};
 use detector::fits_detector;
 use error::ImageError;
+pub use support::SupportFile;
 
 use crate::{
-    config::{ImageConfig, built_in_instruments, usual_instrument},
+    config::{ImageConfig, PointingConfig, UsedBias, built_in_instruments, usual_instrument},
     error::{Error, Locate, Result},
     files::HashedFile,
     geom::pushbroom::Detector,
@@ -38,7 +41,7 @@ pub struct ImageTimes {
     pub instrument: Instrument,
     /// When its lines were exposed: all of the header image.
     pub line_times: LineTimes,
-    /// Whether their start comes from the spacecraft clock or from UTC.
+    /// Where their start comes from.
     pub start_from: StartFrom,
     /// Clock string of the start, where the label has one.
     pub sclk_start: Option<String>,
@@ -60,6 +63,8 @@ pub struct ImageTimes {
     pub notes: Vec<String>,
     /// What does not agree, and must be weighed, one sentence each.
     pub remarks: Vec<String>,
+    /// Support data that its orientation comes from; none of an image that kernels orient.
+    pub support: Option<SupportFile>,
 }
 
 /// Source of an image's start time.
@@ -70,6 +75,8 @@ pub enum StartFrom {
     Sclk,
     /// Coordinated universal time.
     Utc,
+    /// Ephemeris time of support data.
+    Support,
 }
 
 impl ImageTimes {
@@ -115,6 +122,21 @@ impl ImageTimes {
     }
 }
 
+/// The pointing biases with which kernels are read for `images`: for no image that of the usual camera, for images of
+/// support data alone none.
+pub fn used_biases<'a>(
+    pointing: &'a PointingConfig,
+    images: impl IntoIterator<Item = &'a ImageTimes>,
+) -> Vec<UsedBias<'a>> {
+    let (supported, others): (Vec<_>, Vec<_>) = images
+        .into_iter()
+        .partition(|image| image.support.is_some());
+    if others.is_empty() && !supported.is_empty() {
+        return Vec::new();
+    }
+    pointing.used(others.into_iter().map(|image| &image.instrument))
+}
+
 stage_inputs! {
     /// Label and keys of one image, and the clocks.
     pub struct TagTimes<'a> {
@@ -122,6 +144,8 @@ stage_inputs! {
         pub image: &'a ImageConfig,
         /// The label that the configuration names.
         pub label: Option<HashedFile>,
+        /// The support data that it names instead.
+        pub support: Option<HashedFile>,
         /// Text kernels.
         pub kernels: &'a KernelView,
     }
@@ -129,7 +153,7 @@ stage_inputs! {
 
 impl Stage for TagTimes<'_> {
     const NAME: &'static str = "tag_times";
-    const METHOD: u32 = 3;
+    const METHOD: u32 = 4;
     const CHECKED: bool = true;
     type Output = ImageTimes;
     stage_inputs!(fingerprint);
@@ -139,7 +163,7 @@ impl Stage for TagTimes<'_> {
     }
 
     fn run(&self, _stop: &AtomicBool) -> Result<ImageTimes> {
-        tag_image(self.image, self.kernels.session()?)
+        tag_image(self.image, self.support.as_ref(), self.kernels.session()?)
     }
 
     fn findings(&self, times: &ImageTimes) -> Vec<String> {
@@ -157,13 +181,20 @@ impl Stage for TagTimes<'_> {
 pub fn tag_times(images: &[ImageConfig], session: &Session) -> Result<Vec<ImageTimes>> {
     images
         .iter()
-        .map(|image| tag_image(image, session))
+        .map(|image| tag_image(image, None, session))
         .collect()
 }
 
-fn tag_image(image: &ImageConfig, session: &Session) -> Result<ImageTimes> {
-    let times = image_times(image, session);
-    match &image.label {
+fn tag_image(
+    image: &ImageConfig,
+    hashed: Option<&HashedFile>,
+    session: &Session,
+) -> Result<ImageTimes> {
+    let times = match &image.isd {
+        Some(path) => supported(image, path, hashed, session),
+        None => image_times(image, session),
+    };
+    match image.source() {
         Some(path) => times.in_file(path),
         None => times,
     }
@@ -244,6 +275,36 @@ fn image_times(image: &ImageConfig, session: &Session) -> Result<ImageTimes> {
         first_detector,
         notes,
         remarks,
+        support: None,
+    })
+}
+
+/// Times and camera of an image by its support data.
+fn supported(
+    image: &ImageConfig,
+    path: &Path,
+    hashed: Option<&HashedFile>,
+    session: &Session,
+) -> Result<ImageTimes> {
+    let (said, file) = SupportFile::read(&image.id, path, hashed)?;
+    let start = said.line_times.start();
+    let period_s = said.line_times.mean_period_s();
+    Ok(ImageTimes {
+        id: image.id.clone(),
+        start_from: StartFrom::Support,
+        sclk_start: None,
+        utc_start: session.et_to_utc(start)?,
+        exposure_s: period_s / f64::from(said.downtrack_summing),
+        downtrack_summing: said.downtrack_summing,
+        crosstrack_summing: said.crosstrack_summing,
+        lines_delivered: said.line_times.lines(),
+        samples: said.samples,
+        first_detector: said.first_detector,
+        notes: vec![file.note()],
+        remarks: file.remarks(start),
+        instrument: said.instrument,
+        line_times: said.line_times,
+        support: Some(file),
     })
 }
 

@@ -313,6 +313,7 @@ fn image_times() -> ImageTimes {
         first_detector: 0,
         notes: vec!["256 of 1536 header lines are not in the delivered file".to_owned()],
         remarks: Vec::new(),
+        support: None,
     }
 }
 

@@ -41,6 +41,8 @@ enum Law {
     Angle,
     /// Ideal places are `1 − Σ kᵢ r²ⁱ` times the distorted ones, millimetres, in front of a focal length.
     Radial { focal_length_mm: f64 },
+    /// Across the track ideal places are the distorted ones over `1 + k c²`, millimetres, in front of a focal length.
+    AcrossQuotient { focal_length_mm: f64 },
 }
 
 /// A place of the line and how it changes with the coordinate `c` across the track.
@@ -87,6 +89,15 @@ impl Distortion {
             DistortionModel::RadialPolynomial { coefficients } => (
                 radial,
                 coefficients,
+                [pitch_mm, pitch_mm * detector.along_track_px],
+            ),
+            DistortionModel::AcrossQuotient {
+                coefficient_per_mm2,
+            } => (
+                Law::AcrossQuotient {
+                    focal_length_mm: instrument.optics.focal_length_mm,
+                },
+                std::slice::from_ref(coefficient_per_mm2),
                 [pitch_mm, pitch_mm * detector.along_track_px],
             ),
             DistortionModel::AnglePolynomial {
@@ -194,6 +205,14 @@ impl DistortedLine {
                 (1.0 - value) / focal_length_mm,
                 -2.0 * rate / focal_length_mm,
             ],
+            Law::AcrossQuotient { focal_length_mm } => {
+                let coefficient = self.coefficients[0];
+                let by = 1.0 + coefficient * square;
+                [
+                    1.0 / (by * focal_length_mm),
+                    -2.0 * coefficient / (by * by * focal_length_mm),
+                ]
+            }
             Law::Angle if r < DISTANCE_MIN => [value, 2.0 * (rate + value * value * value / 3.0)],
             Law::Angle => {
                 let tangent = (r * value).tan();
@@ -207,6 +226,16 @@ impl DistortedLine {
 
     /// The place with coordinate `c`, by the law.
     fn within(&self, c: f64) -> CurvePoint {
+        if let Law::AcrossQuotient { focal_length_mm } = self.law {
+            let [scale, rate] = self.scale(c);
+            return CurvePoint {
+                c,
+                along: self.along / focal_length_mm,
+                across: c * scale,
+                along_by_c: 0.0,
+                across_by_c: scale + c * c * rate,
+            };
+        }
         let [scale, rate] = self.scale(c.hypot(self.along));
         CurvePoint {
             c,

@@ -10,6 +10,7 @@ use crate::{
         gis::POINT_Z_HEIGHT,
         light_time::convention,
         product::{Content, Context, Declaration, IMAGE, Program, Role, Write},
+        site::SiteProducts,
     },
 };
 
@@ -45,7 +46,7 @@ fn text(of: &Context) -> String {
         site.config.site
     );
     if !site.images.is_empty() {
-        text += &light_time(site.config.orientation.light_time);
+        text += &light_time(site);
     }
     if site.footprints.is_empty() {
         text += "The site has no footprints, so there are no tables of footprints here.\n\n";
@@ -76,9 +77,16 @@ fn text(of: &Context) -> String {
 }
 
 /// Which positions of cameras all files follow, and whom that suits.
-fn light_time(light_time: LightTime) -> String {
-    let others = match light_time {
-        LightTime::Surface | LightTime::None => {
+fn light_time(site: &SiteProducts) -> String {
+    if site
+        .images
+        .iter()
+        .all(|image| image.times.support.is_some())
+    {
+        return format!("{}.\n\n", convention(site));
+    }
+    let others = match site.config.orientation.light_time {
+        LightTime::Surface | LightTime::None | LightTime::Support => {
             "ISIS and ALE see the spacecraft from the centre of Mars instead (LT+S), some 10 lines away: what they are given here, lidar\n\
              data, ground control and adjusted kernels, fits them after a run with light_time = \"centre\"."
         }
@@ -91,7 +99,7 @@ fn light_time(light_time: LightTime) -> String {
          {others}\n../registration.json has the difference of the others for each image.\n\
          Ranges of lidar data are geometric in every convention: jigsaw, which measures them from where ISIS sees the spacecraft, finds\n\
          them up to 330 m off.\n\n",
-        convention(light_time)
+        convention(site)
     )
 }
 

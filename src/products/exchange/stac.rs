@@ -62,6 +62,7 @@ fn item(of: &Context) -> Result<Option<Value>> {
     let Some([start, end]) = period(site)? else {
         return Ok(None);
     };
+    let spacecraft = spacecraft(site);
     Ok(Some(json!({
         "type": "Feature",
         "stac_version": "1.1.0",
@@ -73,12 +74,12 @@ fn item(of: &Context) -> Result<Option<Value>> {
             "title": site.config.site,
             "description": description(site),
             "areograph:frame": FRAME,
-            "areograph:light_time": convention(site.config.orientation.light_time),
+            "areograph:light_time": convention(site),
             "datetime": start,
             "start_datetime": start,
             "end_datetime": end,
-            "mission": SPACECRAFT.full_name,
-            "platform": SPACECRAFT.full_name.to_lowercase().replace(' ', "-"),
+            "mission": spacecraft,
+            "platform": spacecraft.to_lowercase().replace(' ', "-"),
             "instruments": instruments(site),
             "proj:code": "IAU_2015:49900",
             "ssys:targets": ["Mars"],
@@ -94,6 +95,21 @@ fn description(site: &SiteProducts) -> String {
         "" => format!("MOLA footprints and images of {}", site.config.site),
         text => text.to_owned(),
     }
+}
+
+/// The spacecraft of footprints and images: that of the program, and those that support data name.
+fn spacecraft(site: &SiteProducts) -> String {
+    let supports = || site.images.iter().map(|image| &image.times.support);
+    let own = !site.footprints.is_empty() || supports().any(Option::is_none);
+    let mut names: Vec<&str> = Vec::new();
+    names.extend(own.then_some(&*SPACECRAFT.full_name));
+    for support in supports().flatten() {
+        let is_it = |name: &&str| name.eq_ignore_ascii_case(&support.platform);
+        if !names.iter().any(is_it) {
+            names.push(&support.platform);
+        }
+    }
+    names.join(", ")
 }
 
 /// The altimeter, and the cameras in the order of their images.

@@ -6,7 +6,6 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::{
-    constants::SPACECRAFT,
     products::kernel_report::KernelsByType,
     schema::{DocumentSchema, at},
     stages::{
@@ -35,7 +34,6 @@ pub(super) struct Isd<'a> {
     pub(super) image_lines: u32,
     #[schemars(range(min = 1))]
     pub(super) image_samples: u32,
-    #[schemars(extend("const" = SPACECRAFT.label_name))]
     pub(super) name_platform: &'a str,
     /// The camera's frame.
     pub(super) name_sensor: &'a str,
@@ -188,7 +186,7 @@ pub(super) struct Provenance<'a> {
 /// How well the tables are interpolated, measured against the kernels.
 #[derive(Serialize, JsonSchema)]
 pub(super) struct Interpolation {
-    #[schemars(range(min = 1))]
+    /// 0 where the nodes come from support data, and are all that is known.
     pub(super) epochs_compared_with_kernels: usize,
     #[schemars(range(min = 0.0))]
     pub(super) error_max_px: f64,

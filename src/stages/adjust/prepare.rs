@@ -72,19 +72,28 @@ impl<M: ExteriorOrientation> Candidate<'_, M> {
         hold_powers(&mut sigmas, position, rotation);
         AdjustImage {
             turn_rad_s: self.turn_rad_s(),
-            laser_axes: laser.axes_in_bus().map(|axes| {
-                let bus_to_camera = self.orientation.tables.bus_to_camera.matrix();
-                bus_to_camera * axes
-            }),
+            laser_axes: laser
+                .axes_in_bus()
+                .filter(|_| self.knows_bus())
+                .map(|axes| {
+                    let bus_to_camera = self.orientation.tables.bus_to_camera.matrix();
+                    bus_to_camera * axes
+                }),
             expected_m: self
                 .pedr_orbit_m
-                .filter(|_| config.orbit_of_pedr)
+                .filter(|_| config.orbit_of_pedr && self.knows_bus())
                 .map_or_else(Vector3::zeros, |off_m| self.orbit_axes() * off_m),
             oriented_camera: self.oriented_camera,
             line_period_s: self.times.line_times.mean_period_s(),
             sigmas,
             time_bias_sigma_s: config.time_bias_sigma_s,
         }
+    }
+
+    /// Whether position and bus are those of the spacecraft with the laser: support data do not tell whether theirs are
+    /// geometric, and apparent ones lie up to 330 m off.
+    const fn knows_bus(&self) -> bool {
+        self.times.support.is_none()
     }
 
     /// Axes of the orbit in the middle of the image, Mars-fixed: radial, along the track and across it.
@@ -199,7 +208,7 @@ pub fn prepare_adjustment<M: ExteriorOrientation>(
     (weighed.collect(), shots)
 }
 
-/// The range of a shot, when an image was exposed meanwhile.
+/// The range of a shot, when an image was exposed meanwhile whose positions are those of the spacecraft with the laser.
 fn range_of(
     footprints: &Footprints<MarsIau2000>,
     row: u32,
@@ -208,7 +217,7 @@ fn range_of(
     let instant = Et::from_seconds(footprints.et_s[row as usize]);
     let image = images
         .iter()
-        .position(|(times, _)| times.exposures().contains(instant))?;
+        .position(|(times, _)| times.support.is_none() && times.exposures().contains(instant))?;
     let (times, orientation) = images[image];
     let x_lines = times.line_offset(instant);
     Some(ShotRange {

@@ -47,7 +47,7 @@ impl RayOrigin {
     ) -> Result<Self> {
         let to_mars = mars_rotation::<MarsIau2000>(exposure);
         match light_time {
-            LightTime::None => Ok(Self {
+            LightTime::None | LightTime::Support => Ok(Self {
                 state: session.state(exposure)?,
                 to_mars,
             }),
@@ -86,7 +86,7 @@ impl OrientationSample {
     ) -> Result<(Et, Position<J2000>)> {
         let seen = self.mars_seen(light_time).inverse().apply(&self.position);
         match light_time {
-            LightTime::None => Ok((self.et, seen)),
+            LightTime::None | LightTime::Support => Ok((self.et, seen)),
             LightTime::Surface => Ok((left(self.et, &self.position, &self.boresight()), seen)),
             LightTime::Centre => {
                 let mars = session.mars_state(self.et)?;
@@ -110,7 +110,7 @@ impl OrientationSample {
         light_time: LightTime,
     ) -> Rotation<J2000, MarsIau2000> {
         match light_time {
-            LightTime::None | LightTime::Centre => mars_rotation(self.et),
+            LightTime::None | LightTime::Centre | LightTime::Support => mars_rotation(self.et),
             LightTime::Surface => {
                 mars_at(left(self.et, &self.position, &self.boresight()), self.et)
             }

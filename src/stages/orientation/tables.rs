@@ -53,7 +53,7 @@ pub struct CameraTables {
 pub struct InterpolationCheck {
     /// Largest distance between what both see of the same ground, image pixels.
     pub error_max_px: f64,
-    /// Epochs that were compared.
+    /// Epochs that were compared; none of tables that are all that is known, those of support data.
     pub epochs: usize,
 }
 

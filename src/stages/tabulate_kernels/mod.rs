@@ -33,8 +33,8 @@ use crate::{
 pub use read_back::require_same;
 use tables::Source;
 
-/// What an SPK and a CK hold of one image.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+/// What an SPK and a CK hold of one image; nothing of an image of support data, which has no kernels to follow.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct KernelTables {
     /// Instants of the states, increasing.
     pub epochs: Vec<Et>,
@@ -85,9 +85,13 @@ impl Stage for TabulateKernels<'_> {
 
     fn run(&self, _stop: &AtomicBool) -> Result<KernelTables> {
         let times = self.times.0.iter().map(Output::value);
+        let times = times.collect::<Result<Vec<_>>>()?;
+        if times[*self.index].support.is_some() {
+            return Ok(KernelTables::default());
+        }
         tabulate_kernels(
             self.kernels.session()?,
-            &times.collect::<Result<Vec<_>>>()?,
+            &times,
             *self.index,
             self.orientation.value()?,
             self.coverage,

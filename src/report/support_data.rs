@@ -1,0 +1,103 @@
+//! Images by support data: what their files hold, and that nothing is applied to it.
+
+use super::{
+    html::{Column, Table, paragraph},
+    numbers::whole,
+    section::Section,
+};
+use crate::{
+    instruments::{DistortionModel, Instrument},
+    products::SiteProducts,
+    stages::tag_times::{ImageTimes, SupportFile},
+};
+
+pub(super) const SECTION: Section = Section {
+    title: "Support data",
+    anchor: "support-data",
+    appears: |site| supported(site).next().is_some(),
+    write: |site| Ok(write(site)),
+};
+
+/// The images of support data, with the files.
+fn supported<'a>(
+    site: &SiteProducts<'a>,
+) -> impl Iterator<Item = (&'a ImageTimes, &'a SupportFile)> {
+    let images = site.images.iter();
+    images.filter_map(|image| Some((image.times, image.times.support.as_ref()?)))
+}
+
+fn write(site: &SiteProducts) -> String {
+    let ids: Vec<&str> = supported(site).map(|(times, _)| &*times.id).collect();
+    let words = format!(
+        "Camera, line times and orientation of {} are those of image support data (Community Sensor Model), as ALE writes \
+         them. Nothing is applied to them: neither pointing (CK) bias nor clock correction nor light time, and no kernel of \
+         orbit or attitude is read. Positions are what the program that wrote the file made them; ALE's are mostly seen from \
+         the centre of the body with light time and aberration, hundreds of metres off. Ranges of shots are therefore not used with \
+         these images, nor is the mounting of the laser. Adjusted, these \
+         images have adjusted_isd.json and no adjusted SPICE kernels, since there are none that these could follow.",
+        ids.join(", ")
+    );
+    let mut table = Table::new(
+        "What the support data hold",
+        &[
+            Column::Text("image"),
+            Column::Text("file"),
+            Column::Text("camera"),
+            Column::Text("spacecraft"),
+            Column::Number("focal length, mm"),
+            Column::Number("pixel, µm"),
+            Column::Number("line off the boresight, px"),
+            Column::Text("distortion"),
+            Column::Number("positions"),
+            Column::Number("s apart"),
+            Column::Number("attitudes"),
+            Column::Number("s apart"),
+            Column::Number("s before the first line"),
+            Column::Number("s after the last"),
+        ],
+    );
+    for (times, file) in supported(site) {
+        let Instrument {
+            optics, detector, ..
+        } = &times.instrument;
+        let tables = &file.tables;
+        let (held, exposed) = (tables.span(), times.exposures());
+        table.row(
+            true,
+            [
+                (&times.id).into(),
+                (&file.name).into(),
+                (&times.instrument.name).into(),
+                (&file.platform).into(),
+                format!("{:.3}", optics.focal_length_mm).into(),
+                format!("{:.3}", 1e3 * optics.pixel_pitch_mm).into(),
+                format!("{:.1}", detector.along_track_px).into(),
+                distortion(&times.instrument.distortion).into(),
+                whole(tables.position.et_s.len()).into(),
+                spacing(&tables.position.et_s).into(),
+                whole(tables.pointing.et_s.len()).into(),
+                spacing(&tables.pointing.et_s).into(),
+                format!("{:.3}", exposed.start.since(held.start).max(0.0)).into(),
+                format!("{:.3}", held.stop.since(exposed.stop).max(0.0)).into(),
+            ],
+        );
+    }
+    paragraph(&words) + &table.finish()
+}
+
+const fn distortion(model: &DistortionModel) -> &'static str {
+    match model {
+        DistortionModel::None => "none",
+        DistortionModel::RadialPolynomial { .. } => "radial",
+        DistortionModel::AcrossQuotient { .. } => "across the track (lrolrocnac)",
+        DistortionModel::AnglePolynomial { .. } => "angle off the boresight",
+    }
+}
+
+/// Mean time between rows.
+fn spacing(et_s: &[f64]) -> String {
+    let (Some(first), Some(last)) = (et_s.first(), et_s.last()) else {
+        return "–".to_owned();
+    };
+    format!("{:.3}", (last - first) / (et_s.len() - 1).max(1) as f64)
+}

@@ -1,0 +1,47 @@
+//! Orientation of an image by its support data: what their tables say, sampled as that of kernels is.
+
+use nalgebra::Vector3;
+
+use crate::{
+    error::Result,
+    geom::{
+        ellipsoid::range_to_ellipsoid_m,
+        light_time::{LightTime, light_time_s},
+    },
+    pds::isd::SupportTables,
+    stages::{
+        orientation::{
+            GroundPoint, LightTimeEffect, Nodes, Orientation, OrientationSample, support_tables,
+        },
+        tag_times::ImageTimes,
+    },
+    time::Et,
+};
+
+/// The orientation of `image` by its support data at `epochs`.
+///
+/// No other positions are known than those of the tables: what they are off the spacecraft is left at zero, and no range is
+/// measured from them.
+pub(super) fn support_orientation(
+    image: &ImageTimes,
+    support: &SupportTables,
+    epochs: &[Et],
+) -> Result<Orientation> {
+    let tables = support_tables(support);
+    let nodes = Nodes::new(&tables);
+    let middle = nodes.camera(image.middle());
+    let boresight = middle.to_mars.matrix() * Vector3::z();
+    Ok(Orientation {
+        image: image.id.clone(),
+        samples: OrientationSample::at_epochs(image, epochs, |et| Ok(nodes.camera(et)))?,
+        outline: GroundPoint::outline(image, |et| Ok(nodes.camera(et)))?,
+        light_time: LightTimeEffect {
+            convention: LightTime::Support,
+            light_time_s: light_time_s(range_to_ellipsoid_m(&middle.position, &boresight)),
+            others: Vec::new(),
+        },
+        tables,
+        invalid_because: Vec::new(),
+        notes: Vec::new(),
+    })
+}
