@@ -27,6 +27,7 @@ mod light_time;
 mod net;
 mod orientation;
 mod page;
+mod page_data;
 mod parquet;
 mod pds4_label;
 mod picture;
@@ -56,6 +57,8 @@ pub use exchange::{
 pub use found_shots::{FoundShots, ShotsFile, ShotsFormat};
 pub use generated::{documentation, schemas};
 pub use net::{NetProducts, write_net_products};
+pub use page::REPORT;
+pub use page_data::{PAGE_DATA, PageData};
 pub use picture::{PictureFile, PictureFormat, PictureHead};
 pub use product::Product;
 #[cfg(feature = "sql")]

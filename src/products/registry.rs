@@ -3,7 +3,7 @@
 use super::{
     adjusted_footprints, adjusted_kernels, adjustment, correlations,
     exchange::{adjusted, geopackage, jigsaw, readme, shapefile, stac, tables},
-    footprints, heights, isd, kernel_report, orientation, page,
+    footprints, heights, isd, kernel_report, orientation, page, page_data,
     product::Declaration,
     ranges, registration, ties,
 };
@@ -34,7 +34,8 @@ pub(super) static PRODUCTS: &[&Declaration] = &[
     &adjusted_kernels::ATTITUDE,
     &adjusted_kernels::POSITION,
     &adjusted_kernels::METAKERNEL,
-    &page::REPORT,
+    &page::PAGE,
+    &page_data::DATA,
     &page::METAKERNEL,
     &tables::LOLA_LIKE,
     &tables::LOLA_LIKE_SIDECAR,
