@@ -1,12 +1,12 @@
 //! Vocabulary of the altimeter: its clock bias, the datum of its files, the shots that are kept.
 
 use schemars::JsonSchema;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use crate::{frames::MarsDatum, time::Et};
 
 /// The clock bias of MOLA: how shot tags become shot times.
-#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct MolaClock {
     /// Size, seconds, not negative.
     #[schemars(range(min = 0.0))]
@@ -20,7 +20,7 @@ pub struct MolaClock {
 }
 
 /// On which side of the true time a tag lies.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum TagSign {
     /// Tags are late: true time = tag − bias.
@@ -30,7 +30,7 @@ pub enum TagSign {
 }
 
 /// What the corrected shot time is used for.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum BiasScope {
     /// The spacecraft's position in the range check: the default, one of three readings of Shan et al. 2005.
@@ -78,7 +78,7 @@ impl MolaClock {
 }
 
 /// How the datum of a PEDR file is decided.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum DatumChoice {
     /// By version letter and label: L is IAU 2000, older ones IAU 1991.
@@ -88,7 +88,7 @@ pub enum DatumChoice {
 }
 
 /// Shots to keep; a shot must pass every test.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ShotFilter {
     /// Classification codes (1 ground, 0 cloud or noise).
     pub classes: Vec<i16>,

@@ -1,9 +1,9 @@
 //! What labels and configuration say of an image, and the limits of what an image can be.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// What a label or the configuration says of an image; anything may be missing from either.
-#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct ImageFields {
     /// Spacecraft clock at the start of the first line, for example `619971158:28`.
     pub sclk_start: Option<String>,

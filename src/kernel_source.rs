@@ -16,6 +16,13 @@ pub enum KernelSource {
     Sets(Vec<RivalKernels>),
 }
 
+impl Default for KernelSource {
+    /// No kernels.
+    fn default() -> Self {
+        Self::Listed(KernelList::Files(Vec::new()))
+    }
+}
+
 /// Kernels named one by one.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(rename_all = "snake_case")]

@@ -74,7 +74,7 @@ enum Command {
     Image(image::Arguments),
     /// Inspect PEDR files.
     Pedr(pedr::Arguments),
-    /// Report what differs between two runs.
+    /// Make a site's report again from its products, or report what differs between two runs.
     Report(report::Arguments),
     /// Triangulate rectified pictures in the plane, by their ties and controls alone.
     Triangulate(triangulate::Arguments),

@@ -1,23 +1,49 @@
 //! `areograph report`.
 
-use std::{path::PathBuf, process::ExitCode};
+use std::{
+    path::{Path, PathBuf},
+    process::ExitCode,
+};
 
 use clap::{Args, Subcommand};
 use serde_json::json;
 
-use super::output;
+use super::{open, output};
 use crate::{
     difference::{Answer, Limits, Outcome, Pairs, RunDifference, SiteAnswer, compare, pairs},
     error::{Error, Kind},
+    flow::page_again,
     report::difference_page,
     store::page::PagePath,
 };
 
-/// Reports on products.
+/// Makes the report of a site again, from its products alone, or says what differs between two runs.
+///
+/// No site file, kernel or stored stage is read; the page is byte for byte the one that `areograph run` wrote.
+/// Products that are missing, damaged or of another version are refused.
+///
+/// Examples:
+///   areograph report products/gusev_crater
+///   areograph report products/gusev_crater --page gusev.html
+///   areograph report diff out.yesterday out --limit-m 5
 #[derive(Debug, Args)]
+#[command(
+    verbatim_doc_comment,
+    args_conflicts_with_subcommands = true,
+    arg_required_else_help = true
+)]
 pub(super) struct Arguments {
+    /// Products of a site.
+    #[arg(value_name = "OUT/SITE", required = true)]
+    folder: Option<PathBuf>,
+    /// Write the page to this file, and leave the products as they are; its folder must exist.
+    #[arg(long, value_name = "FILE.html")]
+    page: Option<PathBuf>,
+    /// Open the page in the browser.
+    #[arg(long)]
+    open: bool,
     #[command(subcommand)]
-    command: Command,
+    command: Option<Command>,
 }
 
 #[derive(Debug, Subcommand)]
@@ -64,11 +90,32 @@ fn limit(text: &str) -> Result<f64, String> {
 }
 
 pub(super) fn run(arguments: &Arguments) -> ExitCode {
-    let Command::Diff(arguments) = &arguments.command;
-    match diff(arguments) {
+    let done = match (&arguments.command, &arguments.folder) {
+        (Some(Command::Diff(arguments)), _) => diff(arguments),
+        (None, folder) => again(folder.as_deref().unwrap_or(Path::new(".")), arguments),
+    };
+    match done {
         Ok(code) => ExitCode::from(code),
         Err(failure) => super::report(&failure),
     }
+}
+
+/// Makes the page of the products in `folder` again.
+fn again(folder: &Path, arguments: &Arguments) -> Result<u8, Error> {
+    let elsewhere = arguments.page.as_deref().map(PagePath::new).transpose()?;
+    let again = page_again(folder)?;
+    let path = match (&elsewhere, &arguments.page) {
+        (Some(place), Some(path)) => {
+            place.write(&again.page)?;
+            path.clone()
+        }
+        _ => again.put_back()?,
+    };
+    output::line(format_args!("{}: {}", again.site, path.display()));
+    if arguments.open {
+        open::page(&path)?;
+    }
+    Ok(0)
 }
 
 /// A site and what came of its comparison.

@@ -18,6 +18,7 @@ use crate::{
         Ending, Observer, PUBLISH, RunOptions, SiteOutcome, check_out, publish_sites, run_site,
         stages,
     },
+    products::REPORT,
     store::{hashes::HashCache, manifest::Manifest, publish::read_manifest},
 };
 
@@ -261,7 +262,7 @@ fn print_outcome(outcome: &SiteOutcome) {
 /// The report of the only site that has products, or the page over all of them.
 fn open_page(outcomes: &[Outcome], over_all: Option<&PathBuf>) {
     let mut reports = outcomes.iter().flatten().filter_map(|outcome| {
-        let report = outcome.folder.join("report/index.html");
+        let report = outcome.folder.join(REPORT);
         report.is_file().then_some(report)
     });
     let page = match (reports.next(), reports.next()) {

@@ -1,5 +1,7 @@
 //! `[adjustment]`.
 
+use serde::Deserialize;
+
 use crate::{
     footprints::{AdjustmentModel, FootprintImageCoordinates},
     geom::{robust::RobustWeight, statistics::BAARDA_LIMIT},
@@ -33,7 +35,7 @@ const SIGMAS_OF_TIME: Several<Number, 3> = several(SIGMA_OR_FREE, "3 numbers");
 declare_table! {
     /// Combined adjustment of images, laser shots and tie points. Standard deviations are those of Yoon & Shan 2004 where
     /// the paper gives one.
-    pub struct AdjustmentConfig {
+    pub struct AdjustmentConfig: Deserialize {
         /// What controls it. In the published model the image coordinates of footprints come from the orientations
         /// that are adjusted and hold them where they were; it is there for comparison.
         model: AdjustmentModel = key(words_of(
@@ -254,7 +256,7 @@ declare_table! {
     /// Images whose unknowns have their own standard deviations; of each image X, Y, Z, or rotations about the
     /// camera's x, y, z, each with the powers 0, 1, 2 of t, which is 0 in the middle of the image and 1 at its
     /// end.
-    pub struct OrientationPrior {
+    pub struct OrientationPrior: Deserialize {
         /// Identifier of the image.
         id: String = key(identifier()).required().unused(r#""E02-02855""#),
         /// X, Y, Z; inf leaves free, 0 holds fixed.

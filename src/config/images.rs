@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use serde::Deserialize;
 use serde_json::json;
 
 use crate::{
@@ -40,7 +41,7 @@ pub(super) const IMAGES: Many = Many {
 
 declare_table! {
     /// Images, none to many: a label, the keys below, or both; keys written here win over the label. Or support data.
-    pub struct ImageConfig {
+    pub struct ImageConfig: Deserialize {
         /// Identifier, unique in the site; also the name of a folder. One that begins with a MOC product, such
         /// as `E02-02855` or `m0402852_part`, is for the label of that product only.
         id: String = key(identifier())

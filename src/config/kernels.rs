@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use serde::Deserialize;
 use serde_json::json;
 
 use crate::kernel_source::{CkQuality, KernelList, KernelSelection, KernelSource, RivalKernels};
@@ -27,7 +28,7 @@ const SETS: Many = Many {
 declare_table! {
     /// Where kernels come from, and how coverage is judged: exactly one of `metakernel`, `files`, `root`,
     /// `sets`.
-    pub struct KernelsConfig {
+    pub struct KernelsConfig: Deserialize {
         /// The source of the kernel list.
         #[serde(skip)]
         source: KernelSource = group::<SourceKeys>().map(SourceKeys::source),

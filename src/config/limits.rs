@@ -1,5 +1,7 @@
 //! `[limits]`.
 
+use serde::Deserialize;
+
 use super::{
     declare::{declare_table, key},
     forms::{above_to, from_to, whole_from_to},
@@ -8,7 +10,7 @@ use super::{
 declare_table! {
     /// Limits on tie points and their adjustment that make a site valid or invalid. What took no part in a result
     /// judges it first: heights by MOLA, then what images say of each other.
-    pub struct LimitsConfig {
+    pub struct LimitsConfig: Deserialize {
         /// Largest |median| height of tie points above the MOLA surface before the adjustment. A priori the height of a
         /// pair is known to some 500 m; the default is five times that.
         height_before_max_m: f64 = key(above_to(0.0, 1e6)).or(2500.0),

@@ -1,5 +1,7 @@
 //! `[mola_surface]`.
 
+use serde::Deserialize;
+
 use crate::geom::surface::SurfaceOptions;
 
 use super::{
@@ -10,7 +12,7 @@ use super::{
 declare_table! {
     /// The ground between the shots of all profiles, with which heights of tie points are compared and, in the
     /// default adjustment, controlled.
-    pub struct MolaSurfaceConfig {
+    pub struct MolaSurfaceConfig: Deserialize {
         /// Standard deviation of the height of a shot.
         shot_sigma_m: f64 = key(from_to(0.01, 1e4)).or(SurfaceOptions::default().shot_sigma_m),
         /// Radial error that all shots of a profile share (1 m after crossovers, Neumann et al. 2001).

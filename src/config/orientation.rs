@@ -1,6 +1,7 @@
 //! `[orientation]` and `[registration]`: the sensor model and its use.
 
 use schemars::JsonSchema;
+use serde::Deserialize;
 
 use crate::{
     geom::{light_time::LightTime, pushbroom::CameraModel},
@@ -14,7 +15,7 @@ use super::{
 
 declare_table! {
     /// Sampling of exterior orientation and limits of the sensor model.
-    pub struct OrientationConfig {
+    pub struct OrientationConfig: Deserialize {
         /// Equal intervals over the image; one epoch more than intervals. The default is that of Shan et
         /// al. 2005; a second-order polynomial through four epochs is the least that leaves residuals.
         intervals: u32 = key(whole_from_to(3, 10_000)).or(30),
@@ -36,7 +37,7 @@ declare_table! {
 
 declare_table! {
     /// Projection of the footprints into the images.
-    pub struct RegistrationConfig: JsonSchema {
+    pub struct RegistrationConfig: Deserialize, JsonSchema {
         /// The orientation that points are projected with. How far the others are from the one chosen is
         /// told in `registration.json` and in the report.
         model: CameraModel = key(words_of(CameraModel::WORDS, [

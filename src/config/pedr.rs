@@ -2,6 +2,8 @@
 
 use std::path::PathBuf;
 
+use serde::Deserialize;
+
 use crate::{
     altimetry::{DatumChoice, ShotFilter},
     frames::MarsDatum,
@@ -16,7 +18,7 @@ use super::{
 
 declare_table! {
     /// PEDR files. Without this table images are oriented, but there are no footprints and no range check.
-    pub struct PedrConfig {
+    pub struct PedrConfig: Deserialize {
         /// PEDR files: paths or globs with `*`, `?`, `[..]`, in at most three parts of the path, `**` not
         /// taken; letter case counts. A glob that matches no file is a problem. Every shot counts once: a copy
         /// of a file is read once, two versions of one orbit are refused.

@@ -1,5 +1,7 @@
 //! `[pointing]` and `[mola_clock]`: the two time biases.
 
+use serde::Deserialize;
+
 use crate::{
     altimetry::{BiasScope, MolaClock, TagSign},
     instruments::Instrument,
@@ -22,7 +24,7 @@ const NADIR_TURN_M_S: f64 = 330.0;
 declare_table! {
     /// Pointing bias, where it is not to be that of the cameras. Every instrument file holds the bias of its camera and
     /// where that is known from; what is written here holds for all images of the site instead.
-    pub struct PointingConfig {
+    pub struct PointingConfig: Deserialize {
         /// Time correction of attitude kernels: the attitude of an exposure at t is read at t + `ck_bias_s`.
         /// Position, Mars rotation and mounting stay at t. Without it, that of the instrument file.
         /// Known: value and sign for MOC, from ISIS and ALE (`INS-94031_CK_TIME_BIAS`) and Shan et al. 2005.

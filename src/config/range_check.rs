@@ -1,6 +1,7 @@
 //! `[range_check]`.
 
 use schemars::JsonSchema;
+use serde::Deserialize;
 
 use super::{
     declare::{Keys, declare_table, key},
@@ -12,7 +13,7 @@ pub const SCAN_STEPS_MAX: u32 = 10_000;
 
 declare_table! {
     /// Limits that make a profile valid or invalid.
-    pub struct RangeCheckConfig: JsonSchema {
+    pub struct RangeCheckConfig: Deserialize, JsonSchema {
         /// Largest |mean| of range minus distance. The default is our choice: Shan et al. 2005 state no limit; the profiles
         /// of their Table 3 reach 2 m at nadir and 25.4 m off nadir.
         mean_max_m: f64 = key(above_to(0.0, 1e6)).or(10.0),

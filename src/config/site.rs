@@ -5,6 +5,7 @@ use std::{
     path::PathBuf,
 };
 
+use serde::Deserialize;
 use serde_json::json;
 
 use crate::{
@@ -33,7 +34,7 @@ use super::{
 declare_table! {
     /// Everything that `areograph run` needs to know about a site: every value checked, metres, radians and
     /// seconds inside.
-    pub struct SiteConfig {
+    pub struct SiteConfig: Deserialize {
         /// Identifier, and the name of the folder of its products.
         site: String = key(lower_case_identifier()).required().example(r#""eos_chasma""#),
         /// Free text for the report.

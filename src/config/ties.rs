@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use schemars::JsonSchema;
+use serde::Deserialize;
 use serde_json::json;
 
 use crate::{geom::intersection::Weighting, units::RADIANS_PER_DEGREE};
@@ -16,7 +17,7 @@ use super::{
 
 declare_table! {
     /// Tie points between the images. Without this table nothing is intersected or adjusted.
-    pub struct TiesConfig {
+    pub struct TiesConfig: Deserialize {
         /// Paths or globs as in `[pedr]`: tables (.csv) with the columns `point_id`, `serial_number`, `sample`,
         /// `line`, one row a measurement, and where known `line_sigma_px` and `sample_sigma_px`, its standard deviations;
         /// or ISIS control networks in PVL (a binary one: cnetbin2pvl), of which points that are fixed or constrained
@@ -60,7 +61,7 @@ impl TiesConfig {
 
 declare_table! {
     /// Ground points of the tie points, with the orientation held fixed.
-    pub struct IntersectionConfig: Copy, JsonSchema {
+    pub struct IntersectionConfig: Copy, Deserialize, JsonSchema {
         /// Weights of the measurements.
         weighting: Weighting = group::<WeightingKeys>().map(WeightingKeys::weighting),
         /// Smallest angle between the two rays of a point that differ most.

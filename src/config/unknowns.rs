@@ -1,13 +1,13 @@
 //! Levels of the unknowns of an orientation, in jigsaw's words.
 
 use schemars::JsonSchema;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// Declares the levels of a quantity; `$constant`, in the configuration `$word`, is what jigsaw calls a constant of it.
 macro_rules! levels {
     ($(#[$about:meta])* $name:ident, $(#[$constant_about:meta])* $constant:ident $word:literal) => {
         $(#[$about])*
-        #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
         #[serde(rename_all = "snake_case")]
         pub enum $name {
             /// Nothing.

@@ -1,10 +1,10 @@
 //! Weight functions of robust estimation.
 
 use schemars::JsonSchema;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// How the weight of an observation falls with its normalised residual `z = v/σ`.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(tag = "function", rename_all = "snake_case")]
 pub enum RobustWeight {
     /// `1` up to the limit, then `limit/|z|`.

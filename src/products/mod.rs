@@ -28,6 +28,7 @@ mod net;
 mod orientation;
 mod overlays;
 mod page;
+mod page_data;
 mod parquet;
 mod pds4_label;
 mod picture;
@@ -60,6 +61,8 @@ pub use found_shots::{FoundShots, ShotsFile, ShotsFormat};
 pub use generated::{documentation, schemas};
 pub use net::{NetProducts, write_net_products};
 pub(crate) use overlays::{Picture, anaglyph, piece, strip};
+pub use page::REPORT;
+pub use page_data::{PAGE_DATA, PageData};
 pub use picture::{PictureFile, PictureFormat, PictureHead};
 pub use product::{Pages, Product};
 #[cfg(feature = "sql")]

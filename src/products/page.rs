@@ -5,8 +5,11 @@ use super::{
     product::{Content, Declaration, Role, Write},
 };
 
-pub(super) static REPORT: Declaration = Declaration {
-    path: "report/index.html",
+/// Where the report lies below a site's folder.
+pub const REPORT: &str = "report/index.html";
+
+pub(super) static PAGE: Declaration = Declaration {
+    path: REPORT,
     what: "the report of the site",
     readers: "people",
     rows: "",

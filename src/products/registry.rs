@@ -3,7 +3,7 @@
 use super::{
     adjusted_footprints, adjusted_kernels, adjustment, correlations,
     exchange::{adjusted, geopackage, jigsaw, matched, readme, shapefile, stac, tables},
-    footprints, heights, isd, kernel_report, orientation, overlays, page,
+    footprints, heights, isd, kernel_report, orientation, overlays, page, page_data,
     product::Declaration,
     ranges, registration, ties,
 };
@@ -36,8 +36,9 @@ pub(super) static PRODUCTS: &[&Declaration] = &[
     &adjusted_kernels::ATTITUDE,
     &adjusted_kernels::POSITION,
     &adjusted_kernels::METAKERNEL,
-    &page::REPORT,
+    &page::PAGE,
     &page::OVERLAYS,
+    &page_data::DATA,
     &page::METAKERNEL,
     &tables::LOLA_LIKE,
     &tables::LOLA_LIKE_SIDECAR,

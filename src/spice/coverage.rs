@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::{
     daf,
@@ -98,7 +98,7 @@ impl Coverage {
 }
 
 /// Times for which kernels are needed.
-#[derive(Debug, Clone, Default, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct RequiredCoverage {
     /// Instants that ephemerides must touch.
     pub positions: Intervals,

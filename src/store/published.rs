@@ -26,6 +26,12 @@ pub enum PublishedError {
         /// The parser's reason, with line and column.
         reason: String,
     },
+    /// Products of a version that may have computed or kept other things.
+    #[error("these are products of areograph {found}; expected {}, which this is", env!("CARGO_PKG_VERSION"))]
+    OtherVersion {
+        /// That version.
+        found: String,
+    },
     /// A product is not the one that was published.
     #[error(
         "{found}; expected {expected_bytes} bytes with the BLAKE3 hash {expected} of {MANIFEST}"
@@ -58,6 +64,7 @@ impl Cause for PublishedError {
             Self::Unreadable { .. } | Self::Contradicts { .. } => {
                 "run the site again, which writes damaged products again"
             }
+            Self::OtherVersion { .. } => "run the site again with this version, or use that one",
             Self::Replaced => "try again when the run has finished",
         }
         .to_owned()
@@ -75,6 +82,28 @@ pub fn is_site_folder(folder: &Path) -> bool {
 /// # Errors
 /// [`PublishedError`], of kind input; the disk's refusal.
 pub fn read_published(folder: &Path) -> Result<Manifest> {
+    read_published_but(folder, |_| false)
+}
+
+/// The same without those products, by their path, that will be made again; of this version of areograph.
+///
+/// # Errors
+/// As [`read_published`], and [`PublishedError::OtherVersion`].
+pub fn read_published_by_this_version(
+    folder: &Path,
+    made_again: impl Fn(&str) -> bool,
+) -> Result<Manifest> {
+    let manifest = read_published_but(folder, made_again)?;
+    if manifest.version == env!("CARGO_PKG_VERSION") {
+        return Ok(manifest);
+    }
+    Err(PublishedError::OtherVersion {
+        found: manifest.version,
+    })
+    .in_file(folder)
+}
+
+fn read_published_but(folder: &Path, made_again: impl Fn(&str) -> bool) -> Result<Manifest> {
     if folder.join(JOURNAL).exists() {
         return Err(PublishedError::Unfinished).in_file(folder);
     }
@@ -90,7 +119,8 @@ pub fn read_published(folder: &Path) -> Result<Manifest> {
             reason: error.to_string(),
         })
         .in_file(&path)?;
-    if let Some((product, found)) = damaged(folder, &manifest).next() {
+    let mut damaged = damaged(folder, &manifest).filter(|(product, _)| !made_again(&product.path));
+    if let Some((product, found)) = damaged.next() {
         return Err(PublishedError::Contradicts {
             found: found?,
             expected_bytes: product.bytes,
@@ -98,6 +128,7 @@ pub fn read_published(folder: &Path) -> Result<Manifest> {
         })
         .in_file(folder.join(&product.path));
     }
+    drop(damaged);
     Ok(manifest)
 }
 

@@ -36,7 +36,7 @@ pub(super) enum ReadError {
 
 impl ReadError {
     /// For `map_err` on errors of decoding libraries.
-    fn unreadable<E: std::fmt::Display>(what: &'static str) -> impl Fn(E) -> Self {
+    pub(super) fn unreadable<E: std::fmt::Display>(what: &'static str) -> impl Fn(E) -> Self {
         move |error| Self::Unreadable {
             what,
             reason: error.to_string(),

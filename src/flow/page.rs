@@ -1,0 +1,78 @@
+//! The page of a published site, made again from its products.
+
+use std::path::{Path, PathBuf};
+
+use crate::{
+    error::{Cause, Kind, Locate, Result},
+    products::{PAGE_DATA, PageData, REPORT},
+    report,
+    store::{
+        atomic,
+        lock::SiteLock,
+        manifest::Manifest,
+        published::{read_published_by_this_version, still_published},
+    },
+};
+
+/// The page is not the one that was published, although everything that it shows is.
+#[derive(Debug, thiserror::Error)]
+#[error("the page made from these products is not the one that was published")]
+struct OtherPage;
+
+impl Cause for OtherPage {
+    fn kind(&self) -> Kind {
+        Kind::Input
+    }
+
+    fn advice(&self) -> String {
+        "another build of this version made it: run the site again, or write the page elsewhere with --page".to_owned()
+    }
+}
+
+/// A page that was made again.
+#[derive(Debug)]
+pub struct PageAgain {
+    /// The site.
+    pub site: String,
+    /// The page.
+    pub page: String,
+    folder: PathBuf,
+    manifest: Manifest,
+}
+
+/// Makes the page of the site whose products lie in `folder` again: no site file, kernel or stored stage is read.
+///
+/// # Errors
+/// Products of another version, missing or damaged ones; the page itself may be.
+pub fn page_again(folder: &Path) -> Result<PageAgain> {
+    let manifest = read_published_by_this_version(folder, |path| path == REPORT)?;
+    let data = PageData::read(folder)?;
+    still_published(folder, &manifest)?;
+    let page = data.with(report::page).in_file(folder.join(PAGE_DATA))?;
+    Ok(PageAgain {
+        site: manifest.site.clone(),
+        page,
+        folder: folder.to_owned(),
+        manifest,
+    })
+}
+
+impl PageAgain {
+    /// Puts the page in its place among the products, and says where that is.
+    ///
+    /// # Errors
+    /// A page that is not the one of the manifest; another run at work; the disk's refusal.
+    pub fn put_back(&self) -> Result<PathBuf> {
+        let path = self.folder.join(REPORT);
+        let mut products = self.manifest.products.iter();
+        let published = products.find(|product| product.path == REPORT);
+        let hash = blake3::hash(self.page.as_bytes()).to_hex();
+        if published.is_none_or(|product| product.blake3 != *hash) {
+            return Err(OtherPage).in_file(path);
+        }
+        let _lock = SiteLock::take(&self.folder)?;
+        still_published(&self.folder, &self.manifest)?;
+        atomic::write(&path, self.page.as_bytes())?;
+        Ok(path)
+    }
+}

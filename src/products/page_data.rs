@@ -1,0 +1,258 @@
+//! All that the page of a site shows, unrounded, as a product: from it alone the page can be made again.
+//!
+//! Tables and documents are written for their readers, with the digits and the selection that these need. The page
+//! shows more: surfaces, histograms, spans of kernels. What it is made from is therefore kept whole.
+
+use std::{
+    borrow::Cow,
+    collections::BTreeMap,
+    path::{Path, PathBuf},
+};
+
+use serde::{Deserialize, Serialize, de::DeserializeOwned};
+
+use super::{
+    error::ProductError,
+    files::{read, write_bytes},
+    product::{Content, Declaration, Role, Write},
+    read::ReadError,
+    site::{AdjustmentProducts, GeometricProducts, ImageProducts, SiteProducts},
+};
+use crate::{
+    config::SiteConfig,
+    error::{Locate, Result},
+    files::file_name,
+    footprints::Footprints,
+    frames::MarsIau2000,
+    spice::{KernelSet, RequiredCoverage},
+    stages::{
+        adjust::Adjusted, check_heights::HeightCheck, check_ranges::RangeCheck,
+        compare_pairs::PairComparison, convert_datum::FileConversion, describe_kernels::KernelLine,
+        fit_sensor_model::SensorModel, group_profiles::Profile, intersect::IntersectedTies,
+        judge::Verdict, lay_overlays::Overlays, read_ties::Ties, register::ImageRegistration,
+        sample_orientation::Orientation, tag_times::ImageTimes,
+    },
+};
+
+/// Where it lies below a site's folder.
+pub const PAGE_DATA: &str = "report/page.postcard";
+
+pub(super) static DATA: Declaration = Declaration {
+    path: PAGE_DATA,
+    what: "all that the report shows, unrounded; BLAKE3 in the manifest, layout of this version of areograph",
+    readers: "`areograph report`",
+    rows: "",
+    role: Role::Metadata,
+    content: Content::Foreign,
+    write: Write::Site(|path, of| write(path, of.site).map(|()| Some(0))),
+    uses: &[],
+};
+
+/// What a page is made from, borrowed from a run or read from its product. The file is this struct in postcard.
+#[derive(Debug, Serialize, Deserialize)]
+pub struct PageData<'a> {
+    /// The configuration in TOML: postcard has no words for infinite or absent values.
+    config: String,
+    /// Names of the PEDR files, which the configuration leaves out when it is written.
+    pedr_files: Vec<String>,
+    /// In JSON, as in the manifest.
+    verdict: String,
+    kernels: Cow<'a, [KernelLine]>,
+    required: Cow<'a, RequiredCoverage>,
+    images: Vec<Image<'a>>,
+    conversions: Cow<'a, [FileConversion]>,
+    footprints: Cow<'a, Footprints<MarsIau2000>>,
+    utc: Cow<'a, [String]>,
+    profiles: Cow<'a, [Profile]>,
+    ranges: Cow<'a, RangeCheck>,
+    rejected: Cow<'a, BTreeMap<String, u64>>,
+    complaints: Cow<'a, [String]>,
+    notes: Cow<'a, [String]>,
+    geometric: Option<Geometric<'a>>,
+    overlays: Option<Cow<'a, Overlays>>,
+}
+
+/// See [`ImageProducts`].
+#[derive(Debug, Serialize, Deserialize)]
+struct Image<'a> {
+    times: Cow<'a, ImageTimes>,
+    orientation: Cow<'a, Orientation>,
+    model: Cow<'a, SensorModel>,
+    registration: Cow<'a, ImageRegistration>,
+}
+
+/// See [`GeometricProducts`].
+#[derive(Debug, Serialize, Deserialize)]
+struct Geometric<'a> {
+    ties: Cow<'a, Ties>,
+    intersected: Cow<'a, IntersectedTies>,
+    pairs: Cow<'a, [PairComparison]>,
+    heights: Cow<'a, HeightCheck>,
+    adjustment: Option<Adjustment<'a>>,
+}
+
+/// See [`AdjustmentProducts`], of which kernels are no part: the page shows none of them.
+#[derive(Debug, Serialize, Deserialize)]
+struct Adjustment<'a> {
+    adjusted: Cow<'a, Adjusted>,
+    heights: Cow<'a, HeightCheck>,
+    images: Vec<Image<'a>>,
+    intersected: Cow<'a, IntersectedTies>,
+    pairs: Cow<'a, [PairComparison]>,
+    images_agree: bool,
+}
+
+impl<'a> PageData<'a> {
+    /// What the page of `site` is made from; of paths only file names.
+    fn of(site: &SiteProducts<'a>) -> std::result::Result<Self, ProductError> {
+        let mut config = site.config.clone();
+        config.file = PathBuf::from(file_name(&config.file));
+        let config =
+            toml::Table::try_from(&config).map_err(ProductError::refused("encode TOML"))?;
+        let verdict =
+            serde_json::to_string(site.verdict).map_err(ProductError::refused("encode JSON"))?;
+        let pedr_files = site.config.pedr.files.iter();
+        Ok(Self {
+            config: config.to_string(),
+            pedr_files: pedr_files.map(|path| file_name(path)).collect(),
+            verdict,
+            kernels: site.kernels.into(),
+            required: Cow::Borrowed(site.required),
+            images: images(site.images),
+            conversions: site.conversions.into(),
+            footprints: Cow::Borrowed(site.footprints),
+            utc: site.utc.into(),
+            profiles: site.profiles.into(),
+            ranges: Cow::Borrowed(site.ranges),
+            rejected: Cow::Borrowed(site.rejected),
+            complaints: site.complaints.into(),
+            notes: site.notes.into(),
+            geometric: site.geometric.map(geometric),
+            overlays: site.overlays.map(Cow::Borrowed),
+        })
+    }
+
+    /// Reads it from its product in the folder of a site.
+    ///
+    /// # Errors
+    /// A file of kind input that this version did not write; the disk's refusal.
+    pub fn read(site_folder: &Path) -> Result<PageData<'static>> {
+        let path = site_folder.join(PAGE_DATA);
+        decoded(&read(&path)?).in_file(path)
+    }
+
+    /// Calls `with` on the site as the page wants it.
+    ///
+    /// # Errors
+    /// A configuration or verdict that this version did not write; what `with` returns.
+    pub fn with<T>(&self, with: impl FnOnce(&SiteProducts) -> Result<T>) -> Result<T> {
+        let mut config: SiteConfig =
+            toml::from_str(&self.config).map_err(ReadError::unreadable("a configuration"))?;
+        config.pedr.files = self.pedr_files.iter().map(PathBuf::from).collect();
+        let verdict: Verdict =
+            serde_json::from_str(&self.verdict).map_err(ReadError::unreadable("a verdict"))?;
+        let adjustment = self
+            .geometric
+            .as_ref()
+            .and_then(|of| of.adjustment.as_ref());
+        let adjusted_images = adjustment.map_or(&[][..], |of| &of.images);
+        let (images, adjusted_images) = (borrowed(&self.images), borrowed(adjusted_images));
+        let kernels = KernelSet::default();
+        let adjustment = adjustment.map(|of| AdjustmentProducts {
+            kernels: &kernels,
+            folder: Path::new(""),
+            adjusted: &of.adjusted,
+            heights: &of.heights,
+            images: &adjusted_images,
+            tables: &[],
+            intersected: &of.intersected,
+            pairs: &of.pairs,
+            images_agree: of.images_agree,
+        });
+        with(&SiteProducts {
+            config: &config,
+            kernels: &self.kernels,
+            metakernel: "",
+            required: &self.required,
+            images: &images,
+            conversions: &self.conversions,
+            footprints: &self.footprints,
+            utc: &self.utc,
+            profiles: &self.profiles,
+            ranges: &self.ranges,
+            rejected: &self.rejected,
+            complaints: &self.complaints,
+            notes: &self.notes,
+            verdict: &verdict,
+            geometric: self.geometric.as_ref().map(|of| GeometricProducts {
+                ties: &of.ties,
+                intersected: &of.intersected,
+                pairs: &of.pairs,
+                heights: &of.heights,
+                adjustment,
+            }),
+            overlays: self.overlays.as_deref(),
+        })
+    }
+}
+
+fn images<'a>(images: &[ImageProducts<'a>]) -> Vec<Image<'a>> {
+    let images = images.iter().map(|image| Image {
+        times: Cow::Borrowed(image.times),
+        orientation: Cow::Borrowed(image.orientation),
+        model: Cow::Borrowed(image.model),
+        registration: Cow::Borrowed(image.registration),
+    });
+    images.collect()
+}
+
+fn borrowed<'a>(images: &'a [Image]) -> Vec<ImageProducts<'a>> {
+    let images = images.iter().map(|image| ImageProducts {
+        times: &image.times,
+        orientation: &image.orientation,
+        model: &image.model,
+        registration: &image.registration,
+    });
+    images.collect()
+}
+
+fn geometric<'a>(of: GeometricProducts<'a>) -> Geometric<'a> {
+    Geometric {
+        ties: Cow::Borrowed(of.ties),
+        intersected: Cow::Borrowed(of.intersected),
+        pairs: of.pairs.into(),
+        heights: Cow::Borrowed(of.heights),
+        adjustment: of.adjustment.map(|of| Adjustment {
+            adjusted: Cow::Borrowed(of.adjusted),
+            heights: Cow::Borrowed(of.heights),
+            images: images(of.images),
+            intersected: Cow::Borrowed(of.intersected),
+            pairs: of.pairs.into(),
+            images_agree: of.images_agree,
+        }),
+    }
+}
+
+/// Writes what the page of `site` is made from, and checks that it comes back.
+fn write(path: &Path, site: &SiteProducts) -> Result<()> {
+    let bytes = encoded(site).in_file(path)?;
+    write_bytes(path, &bytes)?;
+    let found: PageData = decoded(&read(path)?).in_file(path)?;
+    let again = found.with(|site| Ok(encoded(site)?));
+    if again.in_file(path)? == bytes {
+        return Ok(());
+    }
+    Err(ProductError::ReadBack {
+        what: "what the report shows".to_owned(),
+    })
+    .in_file(path)
+}
+
+fn encoded(site: &SiteProducts) -> std::result::Result<Vec<u8>, ProductError> {
+    let data = PageData::of(site)?;
+    postcard::to_stdvec(&data).map_err(ProductError::refused("encode postcard"))
+}
+
+fn decoded<T: DeserializeOwned>(bytes: &[u8]) -> std::result::Result<T, ReadError> {
+    postcard::from_bytes(bytes).map_err(ReadError::unreadable("what a report is made from"))
+}
