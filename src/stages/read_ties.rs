@@ -312,16 +312,12 @@ mod tests {
     use std::path::Path;
 
     use super::*;
-    use crate::image::ImageFields;
 
     fn image(id: &str, serial_number: Option<&str>) -> ImageConfig {
         ImageConfig {
             id: id.to_owned(),
-            label: None,
-            pixels: None,
-            instrument: None,
             serial_number: serial_number.map(str::to_owned),
-            fields: ImageFields::default(),
+            ..ImageConfig::default()
         }
     }
 
