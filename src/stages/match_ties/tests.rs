@@ -283,6 +283,21 @@ fn matched_places_are_within_what_they_state_and_other_images_give_none() {
         found.account.unmatched[&Unmatched::Flat],
         found.account.cells
     );
+    // What never came down is counted, and the rest is matched.
+    let lines = LINES * 6 / 10;
+    let found = matched([&one, &two[..(lines * SAMPLES) as usize]], [0.0; 2], 250.0);
+    assert!(found.account.ties >= 80, "{:?}", found.account);
+    assert!(
+        found.account.unmatched[&Unmatched::Missing] > 50,
+        "{:?}",
+        found.account
+    );
+    let last = found
+        .ties
+        .iter()
+        .map(|[_, second]| second.line)
+        .fold(0.0, f64::max);
+    assert!(last < f64::from(lines), "{last}");
     // Two seconds of flight: no ground is where it is expected.
     let late = matched([&one, &two], [2_800.0, 0.0], 250.0);
     assert!(late.ties.is_empty(), "{:?}", late.account);
