@@ -338,7 +338,7 @@ fn what_cannot_be_printed_is_a_failure_and_a_reader_who_went_away_is_none() {
     let nested = sql(
         &archive,
         &[
-            "select array_agg(shot) as all from shots where et_s < -19999990.0",
+            "select array_agg(shot) as every from shots where et_s < -19999990.0",
             "--format",
             "csv",
         ],
