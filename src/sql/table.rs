@@ -241,12 +241,15 @@ struct HandOn {
 impl HandOn {
     /// Keeps a failure for those who asked, and has it follow the rows: a query that wants no more of them does not meet it.
     fn end(&self, failure: Error) {
+        if self.rows.is_closed() {
+            return;
+        }
         let told = DataFusionError::Execution(failure.to_string());
         {
             let mut tally = self.tally.lock().unwrap_or_else(PoisonError::into_inner);
             tally.failure.get_or_insert(failure);
         }
-        // Nobody asks any more: nobody misses it.
+        // Nobody asks any more by now: nobody misses it.
         let _ = self.rows.blocking_send(Err(told));
     }
 
