@@ -92,7 +92,9 @@ fn files_that_are_no_text_are_refused_before_they_are_parsed() {
 fn a_folder_of_the_service_is_one_or_is_away() {
     let folder = folder();
     let told = |sites: &str| {
-        let text = format!("[inputs]\nsites = [{sites:?}]\nkernels = [\"not_mounted\"]\n");
+        let text = format!(
+            "[inputs]\nsites = [{sites:?}]\nkernels = [\"not_mounted\"]\ndata = [\"not_there\"]\n"
+        );
         let found = config::parse_service(&text, &folder.path().join("areograph.toml"));
         found.err().map(|problems| problems.to_string())
     };

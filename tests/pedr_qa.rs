@@ -174,7 +174,7 @@ fn the_clock_is_found_within_its_uncertainty() {
     let truth = json(&archive().join("truth.json"));
     let bias_s = truth["mola_clock_bias_s"].as_f64().unwrap();
     let bad = bad_profiles();
-    let mut squares = Vec::new();
+    let (mut squares, mut sigmas_s) = (Vec::new(), Vec::new());
     for (id, row) in rows(CHECKED.path()) {
         let late_s = bad.get(&id).and_then(|what| what["time_s"].as_f64());
         let error_s = number(&row, "best_correction_s") + bias_s + late_s.unwrap_or(0.0);
@@ -183,12 +183,17 @@ fn the_clock_is_found_within_its_uncertainty() {
         assert_eq!(row["best_correction_radius"], "crossover", "{id}");
         // Informative: a revolution tells the clock to some hundredths of a second.
         assert!(sigma_s < 0.05, "{id}: {sigma_s}");
+        sigmas_s.push(sigma_s);
         assert!(error_s.abs() < 4.0 * sigma_s, "{id}: {error_s} ±{sigma_s}");
         squares.push((error_s / sigma_s).powi(2));
     }
-    // Of 36 normal numbers the root mean square lies within 0.7 to 1.4 in all but 0.3 % of cases.
+    // Most of them to some milliseconds: the wave of the crossover residual does not count in them.
+    sigmas_s.sort_by(f64::total_cmp);
+    assert!(sigmas_s[18] < 0.005, "{}", sigmas_s[18]);
+    // Of 36 normal numbers the root mean square lies within 0.7 to 1.4 in all but 0.3 % of cases. The uncertainty is the
+    // larger of two estimates, and so a little too large: over the 180 profiles of 15 days the root mean square is 0.87.
     let rms = (squares.iter().sum::<f64>() / squares.len() as f64).sqrt();
-    assert!((0.7..1.4).contains(&rms), "{rms}");
+    assert!((0.6..1.4).contains(&rms), "{rms}");
 }
 
 /// The rules of the command.
@@ -606,9 +611,11 @@ fn a_displaced_block_is_checked_and_the_times_of_profiles_are_true() {
     let lost = shots(&whole) - shots(&found);
     assert!((1..=20).contains(&lost), "{lost}");
     assert_eq!(whole.len(), 1);
-    assert_eq!(found.len(), 2);
+    // What the block follows, the block, and what comes 800 s after it, more than a pause.
+    assert_eq!(found.len(), 3);
     assert_eq!(found[0].start_et_s, whole[0].start_et_s);
-    assert_eq!(found[1].stop_et_s, whole[0].stop_et_s);
+    assert_eq!(found[2].stop_et_s, whole[0].stop_et_s);
+    assert!(found[1].stop_et_s < found[0].stop_et_s);
     let identity = ArchiveSource::open(&moved).unwrap().identity();
     for profile in &found {
         assert!(profile.start_et_s < profile.stop_et_s);

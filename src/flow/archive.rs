@@ -8,23 +8,21 @@
 
 mod checker;
 mod gather;
+mod loader;
 mod manifest;
 
 use std::{
     collections::BTreeMap,
     path::{Path, PathBuf},
-    sync::{
-        Arc,
-        atomic::AtomicBool,
-        mpsc::{SyncSender, sync_channel},
-    },
+    sync::{atomic::AtomicBool, mpsc::sync_channel},
     thread,
 };
 
 pub use self::checker::ArchiveProgress;
 use self::{
-    checker::{Checker, Part, Results},
+    checker::{Checker, Results},
     gather::{Gathered, file_failure, gather},
+    loader::Loader,
     manifest::manifest,
 };
 use super::{
@@ -42,7 +40,7 @@ use crate::{
         ArchiveProducts, Product, WorstProfile, write_archive_products, write_profile_shots,
     },
     report::archive_page,
-    spice::{KernelSet, KernelView, Session},
+    spice::{KernelSet, KernelView},
     stage::{Input as _, Inputs},
     stages::check_archive::{
         ArchiveProfile, ArchiveRanges, ArchiveRules, ArchiveSource, CheckedFile, FileRanges,
@@ -275,68 +273,18 @@ impl Archive<'_> {
             // Nothing waits in between: two loads stand in memory at most.
             let (parts, received) = sync_channel(0);
             let worker = scope.spawn(|| checker.run(received, start));
-            let files = todo
-                .keys()
-                .map(|file| (*file, &*paths[*file], &sources[file]));
-            let loaded = self.load_all(files, session, &parts);
-            drop(parts);
+            let loader = Loader {
+                rules: self.rules(),
+                session,
+                stop: self.request.stop,
+                parts,
+            };
+            let files = todo.keys();
+            let loaded = loader.run(files.map(|file| (*file, &*paths[*file], &sources[file])));
             let checked = worker.join();
             loaded?;
             checked.unwrap_or_else(|panic| std::panic::resume_unwind(panic))
         })
-    }
-
-    /// Loads files, each as it was when it was first looked at.
-    fn load_all<'f>(
-        &self,
-        files: impl Iterator<Item = (usize, &'f Path, &'f Identity)>,
-        session: &Session,
-        parts: &SyncSender<Part>,
-    ) -> Result<()> {
-        for (file, path, identity) in files {
-            let source = ArchiveSource::reopen(path, identity);
-            if !self.load_file(file, source, session, parts)? {
-                // Whoever checks has stopped, and says why.
-                return Ok(());
-            }
-        }
-        Ok(())
-    }
-
-    /// Loads a file part by part; gives whether anybody still takes them.
-    fn load_file(
-        &self,
-        file: usize,
-        source: Result<ArchiveSource>,
-        session: &Session,
-        parts: &SyncSender<Part>,
-    ) -> Result<bool> {
-        let send = |bytes, loaded| {
-            parts
-                .send(Part {
-                    file,
-                    bytes,
-                    loaded,
-                })
-                .is_ok()
-        };
-        let source = match source {
-            Ok(source) => Arc::new(source),
-            Err(failure) => return Ok(send(0, Err(failure))),
-        };
-        let bytes = source.identity().bytes;
-        for rows in source.loads() {
-            Stopped::check(self.request.stop)?;
-            let load = source.load(rows, session, &self.rules());
-            let is_over = load.is_err();
-            if !send(bytes, load.map(|load| (Arc::clone(&source), load))) {
-                return Ok(false);
-            }
-            if is_over {
-                break;
-            }
-        }
-        Ok(true)
     }
 
     /// What was found, and why files are not in it.

@@ -80,7 +80,7 @@ pub(super) fn gather(
 
 /// Takes out files with the bytes of an earlier one, understood alike.
 fn without_copies(files: &mut Vec<CheckedFile>) -> Vec<FileCopy> {
-    let mut by_content = BTreeMap::new();
+    let mut by_content: BTreeMap<_, PathBuf> = BTreeMap::new();
     let mut copies = Vec::new();
     files.retain(|file| {
         let content = (file.found.blake3.clone(), file.found.datum);
@@ -90,7 +90,6 @@ fn without_copies(files: &mut Vec<CheckedFile>) -> Vec<FileCopy> {
                 true
             }
             Some(original) => {
-                let original: &PathBuf = original;
                 copies.push(FileCopy {
                     file: file.path.display().to_string(),
                     of: original.display().to_string(),

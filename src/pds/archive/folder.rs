@@ -70,12 +70,15 @@ impl Listing {
                 all.paths.push(path.clone());
             }
         }
-        all.paths.sort();
+        // A file's own name comes before links to it.
+        all.paths
+            .sort_by_cached_key(|path| (path.is_symlink(), path.clone()));
         all.paths.dedup();
         let mut seen = BTreeSet::new();
         // Whoever opens a file that cannot be looked at says why.
         let is_first = |path: &PathBuf| fs::metadata(path).map_or(true, |of| seen.insert(id(&of)));
         all.paths.retain(is_first);
+        all.paths.sort();
         all
     }
 }

@@ -255,7 +255,7 @@ impl<'a> FileCheck<'a> {
             return Ok(None);
         }
         let last = mem::take(&mut self.open);
-        self.finish(&[last], &load.trajectory);
+        self.take(statistics(&[last], &load.trajectory, &self.rules));
         let source = Arc::clone(&self.source);
         hasher.update(&source.reader.trailing_bytes()?);
         source.reader.unchanged()?;
@@ -265,22 +265,28 @@ impl<'a> FileCheck<'a> {
     }
 
     fn check(&mut self, load: &Load) {
-        let rows = self.rows(load);
+        let (rows, rules) = (self.rows(load), self.rules);
         let starts: Vec<usize> = load.rows.clone().step_by(TASK_RECORDS).collect();
+        let mut ended: Vec<Gathered> = Vec::new();
         for wave in starts.chunks(WAVE_TASKS) {
             let task = |start: &usize| rows.check(*start..load.rows.end.min(start + TASK_RECORDS));
-            let tasks: Vec<Task> = wave.par_iter().map(task).collect();
-            let mut done = Vec::new();
+            // Statistics of a profile are much work for one thread: the others go on meanwhile.
+            let (tasks, finished) = rayon::join(
+                || wave.par_iter().map(task).collect::<Vec<Task>>(),
+                || statistics(&ended, &load.trajectory, &rules),
+            );
+            self.take(finished);
+            ended.clear();
             for mut task in tasks {
                 self.found.not_covered += task.not_covered;
                 for (reason, count) in mem::take(&mut task.rejected) {
                     *self.found.rejected.entry(reason).or_default() += count;
                 }
                 self.complain(&task.complaints);
-                done.extend(self.open.append(task));
+                ended.extend(self.open.append(task));
             }
-            self.finish(&done, &load.trajectory);
         }
+        self.take(statistics(&ended, &load.trajectory, &rules));
     }
 
     fn rows<'l>(&self, load: &'l Load) -> Rows<'l>
@@ -296,14 +302,8 @@ impl<'a> FileCheck<'a> {
         }
     }
 
-    /// Statistics of profiles that have ended.
-    fn finish(&mut self, done: &[Gathered], trajectory: &Trajectory) {
-        let rules = &self.rules;
-        let finished: Vec<_> = done
-            .par_iter()
-            .filter(|profile| !profile.is_empty())
-            .map(|profile| ArchiveProfile::of(profile, trajectory, rules))
-            .collect();
+    /// Takes up profiles that have ended.
+    fn take(&mut self, finished: Vec<Finished>) {
         for (mut profile, bins) in finished {
             let same = |earlier: &&ArchiveProfile| earlier.orbit == profile.orbit;
             let earlier = self.found.profiles.iter().filter(same).count();
@@ -311,7 +311,7 @@ impl<'a> FileCheck<'a> {
             profile.file.clone_from(&self.found.file);
             self.found.shots += u64::from(profile.shots);
             // One bad orbit would decide the figures of all others.
-            if profile.invalid_because.is_empty() {
+            if profile.is_judged() && profile.invalid_because.is_empty() {
                 for (sum, bin) in self.found.off_nadir.iter_mut().zip(&bins) {
                     sum.add(bin);
                 }
@@ -326,6 +326,21 @@ impl<'a> FileCheck<'a> {
         let texts = complaints.iter().take(room).map(ToString::to_string);
         self.found.complaints.extend(texts);
     }
+}
+
+/// Statistics of a profile, and its shots by off-nadir angle.
+type Finished = (ArchiveProfile, Vec<OffNadirBin>);
+
+/// Statistics of profiles that have ended.
+fn statistics(
+    ended: &[Gathered],
+    trajectory: &Trajectory,
+    rules: &ArchiveRules<'_>,
+) -> Vec<Finished> {
+    let profiles = ended.par_iter().filter(|profile| !profile.is_empty());
+    profiles
+        .map(|profile| ArchiveProfile::of(profile, trajectory, rules))
+        .collect()
 }
 
 /// The shots of one profile with their residuals, for those who want to look at them.

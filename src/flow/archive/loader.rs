@@ -1,0 +1,69 @@
+//! The thread that loads what others check: the only one that asks CSPICE.
+
+use std::{
+    path::Path,
+    sync::{Arc, atomic::AtomicBool, mpsc::SyncSender},
+};
+
+use super::checker::Part;
+use crate::{
+    error::{Result, Stopped},
+    files::Identity,
+    spice::Session,
+    stages::check_archive::{ArchiveRules, ArchiveSource},
+};
+
+/// What the thread that loads is given.
+pub(super) struct Loader<'a> {
+    pub(super) rules: ArchiveRules<'a>,
+    pub(super) session: &'a Session,
+    /// Looked at before every load.
+    pub(super) stop: &'a AtomicBool,
+    /// Where loads go.
+    pub(super) parts: SyncSender<Part>,
+}
+
+impl Loader<'_> {
+    /// Loads files one after the other, each as it was when it was first looked at.
+    pub(super) fn run<'f>(
+        self,
+        files: impl Iterator<Item = (usize, &'f Path, &'f Identity)>,
+    ) -> Result<()> {
+        for (file, path, identity) in files {
+            if !self.load(file, ArchiveSource::reopen(path, identity))? {
+                // Whoever checks has stopped, and says why.
+                return Ok(());
+            }
+        }
+        Ok(())
+    }
+
+    /// Loads a file part by part; gives whether anybody still takes them.
+    fn load(&self, file: usize, source: Result<ArchiveSource>) -> Result<bool> {
+        let send = |bytes, loaded| {
+            let part = Part {
+                file,
+                bytes,
+                loaded,
+            };
+            self.parts.send(part).is_ok()
+        };
+        let source = match source {
+            Ok(source) => Arc::new(source),
+            Err(failure) => return Ok(send(0, Err(failure))),
+        };
+        let bytes = source.identity().bytes;
+        for rows in source.loads() {
+            Stopped::check(self.stop)?;
+            let load = source.load(rows, self.session, &self.rules);
+            let is_over = load.is_err();
+            if !send(bytes, load.map(|load| (Arc::clone(&source), load))) {
+                return Ok(false);
+            }
+            if is_over {
+                break;
+            }
+        }
+        Ok(true)
+    }
+}
