@@ -14,7 +14,6 @@ use crate::{
     spice::KernelView,
     stage::{InOrder, Input, Inputs, Output, Stage},
     stage_inputs,
-    units::longitude_step_rad,
 };
 
 /// An image whose edges do not all see Mars.
@@ -55,6 +54,7 @@ stage_inputs! {
 
 impl Stage for OutlineWindows<'_> {
     const NAME: &'static str = "outline_windows";
+    const METHOD: u32 = 2;
     const CHECKED: bool = true;
     type Output = Vec<WindowConfig>;
     stage_inputs!(fingerprint);
@@ -88,15 +88,12 @@ impl OutlineWindows<'_> {
         };
         reader.require_coverage(times, self.coverage.padding_s)?;
         let seen = GroundPoint::outline(times, |et| reader.camera(et))?.ok_or_else(lacking)?;
-        let first_rad = seen.first().ok_or_else(lacking)?.longitude_rad;
-        let places = seen.iter().map(|point| {
-            let step_rad = longitude_step_rad(point.longitude_rad - first_rad);
-            [first_rad + step_rad, point.latitude_rad]
-        });
-        let places: Vec<[f64; 2]> = places.collect();
+        let places = seen.iter();
+        let ring = places.map(|point| [point.longitude_rad, point.latitude_rad]);
+        let ring: Vec<[f64; 2]> = ring.collect();
         // At the poles a metre is the largest angle.
         let margin_rad = margin_m / MARS_IAU2000.polar_radius_m;
-        Ok(widened(&places, margin_rad, margin_rad))
+        Ok(widened(&ring, margin_rad, margin_rad))
     }
 }
 
