@@ -78,6 +78,7 @@ fn info(path: &Path) -> Result<Value, Error> {
         "first_detector": label.fields.first_detector,
         "gain_mode_id": image.value("GAIN_MODE_ID"),
         "offset_mode_id": image.value("OFFSET_MODE_ID"),
+        "gain_changes": layout.gain_changes,
         "rationale": image.value("RATIONALE_DESC"),
         "coding": coding(layout.coding),
         "fragments": layout.fragments,
