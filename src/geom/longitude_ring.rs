@@ -73,7 +73,9 @@ pub fn cut_at_antimeridian(ring_rad: &[[f64; 2]]) -> Vec<Vec<[f64; 2]>> {
             [west, FRAC_PI_2],
         ];
         let mut piece = clipped(ring.clone(), &strip);
-        piece.iter_mut().for_each(|place| place[0] -= turns_rad);
+        for place in &mut piece {
+            place[0] -= turns_rad;
+        }
         piece.extend(piece.first().copied());
         piece
     });
