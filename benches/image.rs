@@ -10,6 +10,10 @@
     reason = "a benchmark may fail loudly, and makes pixels of sines"
 )]
 
+#[path = "../tests/common/moc_file.rs"]
+#[allow(dead_code, reason = "the tests use more of it")]
+mod moc_file;
+
 use std::{
     fs,
     hint::black_box,
@@ -19,8 +23,10 @@ use std::{
 
 use areograph::{
     config::built_in_instruments,
-    pds::image_file::{Coding, ImageFile, NewImage, Predictor, Transform, encode},
+    pds::image_file::{Coding, ImageFile, Predictor, Transform, encode},
 };
+
+use moc_file::{new_image, peak_memory};
 
 const SAMPLES: usize = 1024;
 const LINES: usize = 10_240;
@@ -48,18 +54,8 @@ fn measure(name: &str, path: &Path) {
     println!(
         "{name}: {:.0} MB/s of pixels, {} KiB at most",
         1e-6 / best_s,
-        peak_kib()
+        peak_memory() >> 10
     );
-}
-
-/// Peak memory of this process.
-fn peak_kib() -> u64 {
-    let status = fs::read_to_string("/proc/self/status").unwrap();
-    let line = status
-        .lines()
-        .find_map(|line| line.strip_prefix("VmHWM:"))
-        .unwrap();
-    line.split_whitespace().next().unwrap().parse().unwrap()
 }
 
 fn write_synthetic(folder: &Path, coding: Coding) -> PathBuf {
@@ -71,18 +67,7 @@ fn write_synthetic(folder: &Path, coding: Coding) -> PathBuf {
         (120.0 + relief) as u8 + noise as u8
     };
     let pixels: Vec<u8> = (0..LINES * SAMPLES).map(pixel).collect();
-    let image = NewImage {
-        product_id: "M01/00123",
-        instrument: ["MOC-NA", ""],
-        clock: (610_472_061, 131),
-        utc: ["1999-05-06T15:33:58.13", "1999-05-06T15:34:05.16"],
-        exposure_s: 0.000_482_1,
-        summing: 2,
-        first_detector: 0,
-        samples: SAMPLES as u32,
-        pixels: &pixels,
-        coding,
-    };
+    let image = new_image(SAMPLES as u32, 2, &pixels, coding);
     let path = folder.join("synthetic.imq");
     fs::write(&path, encode(&image).unwrap()).unwrap();
     path

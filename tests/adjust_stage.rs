@@ -108,6 +108,7 @@ impl Site {
                         x_lines: range.x_lines,
                         range_m: range.range_m,
                     }),
+                    also: Vec::new(),
                 })
                 .collect(),
             surface: None,

@@ -22,11 +22,11 @@ use std::{
     process::{Command, Output},
 };
 
-use areograph::pds::image_file::{Coding, NewImage, Predictor, encode};
+use areograph::pds::image_file::{Coding, Predictor, encode};
 use serde_json::Value;
 use tiff::{decoder::Decoder, tags::Tag};
 
-use common::real_data;
+use common::{moc_file::new_image, real_data};
 
 fn areograph(arguments: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_areograph"))
@@ -56,21 +56,11 @@ fn write_image(folder: &Path) -> (PathBuf, Vec<u8>) {
     let pixels: Vec<u8> = (0..320)
         .flat_map(|line| (0..640).map(move |sample| pixel(line, sample)))
         .collect();
-    let image = NewImage {
-        product_id: "M01/00123",
-        instrument: ["MOC-NA", ""],
-        clock: (610_472_061, 131),
-        utc: ["1999-05-06T15:33:58.13", "1999-05-06T15:34:05.16"],
-        exposure_s: 0.000_482_1,
-        summing: 1,
-        first_detector: 0,
-        samples: 640,
-        pixels: &pixels,
-        coding: Coding::Predictive {
-            predictor: Predictor::X,
-            table: 3,
-        },
+    let coding = Coding::Predictive {
+        predictor: Predictor::X,
+        table: 3,
     };
+    let image = new_image(640, 1, &pixels, coding);
     let path = folder.join("m0100123.imq");
     fs::write(&path, encode(&image).unwrap()).unwrap();
     (path, pixels)
@@ -236,6 +226,25 @@ fn calibrated_pictures_have_no_offset_between_odd_and_even_samples() {
             .any(|note| note.contains("a constant that is not known") && note.contains(" 3.00")),
         "{notes:?}"
     );
+}
+
+#[test]
+fn an_image_whose_gain_changes_is_not_calibrated() {
+    let folder = tempfile::tempdir().unwrap();
+    let (path, _) = write_image(folder.path());
+    let mut bytes = fs::read(&path).unwrap();
+    // Bytes 38 and 39 of the header: further pairs of gain and offset. The checksum byte is damage of its own.
+    bytes[2048 + 38] = 3;
+    fs::write(&path, bytes).unwrap();
+    let told = stdout(&areograph(&["info", "--json", text(&path)]));
+    let answer: Value = serde_json::from_str(&told).unwrap();
+    assert_eq!(answer[0]["gain_changes"], 3);
+    let out = folder.path().join("out.png");
+    let output = areograph(&["extract", text(&path), "--out", text(&out), "--calibrate"]);
+    assert_eq!(output.status.code(), Some(3));
+    let told = String::from_utf8_lossy(&output.stderr);
+    assert!(told.contains("gain and offset change 3 times"), "{told}");
+    stdout(&areograph(&["extract", text(&path), "--out", text(&out)]));
 }
 
 #[test]

@@ -146,6 +146,7 @@ impl Site {
                 x_lines: self.images[0].x_lines(point.et_s),
                 range_m: point.range_m,
             }),
+            also: Vec::new(),
         };
         LaserShots {
             profiles: vec!["LOLA".to_owned()],

@@ -22,6 +22,7 @@ use areograph::{
     geom::{
         attitude::matrix_of_spice_quaternion,
         ellipsoid::{ray_meets_ellipsoid, spherical_to_xyz_m},
+        image_outline::{Sight, convergence_rad},
         mars_rotation::{convert_datum, mars_matrix},
     },
     pds::pedr::{LABEL_BYTES, LABEL_RECORDS, RECORD_BYTES, Record},
@@ -269,6 +270,67 @@ fn the_images_are_flown_as_table_2_prints_them() {
             .fields
             .lines_delivered;
         assert_eq!(delivered.unwrap_or(header_lines), file_lines, "{id}");
+    }
+}
+
+#[test]
+fn convergence_by_centres_is_that_of_the_rays_to_common_ground() {
+    const RADIUS_M: f64 = 3_389_500.0;
+    let images = MISSION.truth["images"].as_array().unwrap();
+    // Where the spacecraft was and what it looked at, in the middle of the swath.
+    let seen = |id: &str| -> Vec<[Vector3<f64>; 2]> {
+        let truth = images.iter().find(|image| image["id"] == id).unwrap();
+        let cameras = vectors(&truth["position_iau2000_m"]);
+        let quaternions = truth["camera_to_mars_quaternion_wxyz"].as_array().unwrap();
+        let rays = cameras.into_iter().zip(quaternions);
+        rays.map(|(camera_m, quaternion)| {
+            let to_mars = matrix_of_spice_quaternion(numbers(quaternion).try_into().unwrap());
+            let camera = Position::<MarsIau2000>::new(camera_m);
+            let ground = ray_meets_ellipsoid(&camera, &to_mars.column(2).into_owned());
+            [camera_m, ground.unwrap().xyz_m]
+        })
+        .collect()
+    };
+    // As an index has it: hundredths of a degree.
+    let place = |towards: &Vector3<f64>| {
+        let angles = [
+            towards.y.atan2(towards.x),
+            (towards.z / towards.norm()).asin(),
+        ];
+        angles
+            .map(|angle| (angle / RADIANS_PER_DEGREE * 100.0).round() / 100.0 * RADIANS_PER_DEGREE)
+    };
+    let sight = |seen: &[[Vector3<f64>; 2]]| {
+        let [camera_m, ground_m] = seen[seen.len() / 2];
+        Sight {
+            centre_rad: place(&ground_m),
+            below_rad: place(&camera_m),
+            altitude_m: camera_m.norm() - RADIUS_M,
+        }
+    };
+    for (one, other, least_deg) in [
+        ("E02-02855", "E04-01275", 15.0),
+        ("E02-00665", "E02-01453", 19.0),
+        ("E02-01301", "E02-02016", 10.0),
+    ] {
+        let (one, other) = (seen(one), seen(other));
+        let all = one
+            .iter()
+            .flat_map(|one| other.iter().map(move |other| (one, other)));
+        let apart_m =
+            |pair: &(&[Vector3<f64>; 2], &[Vector3<f64>; 2])| (pair.0[1] - pair.1[1]).norm();
+        let nearest = all
+            .min_by(|a, b| apart_m(a).total_cmp(&apart_m(b)))
+            .unwrap();
+        let ground_m = (nearest.0[1] + nearest.1[1]) / 2.0;
+        let flown_rad = (nearest.0[0] - ground_m).angle(&(nearest.1[0] - ground_m));
+        let found_rad = convergence_rad(&sight(&one), &sight(&other), RADIUS_M);
+        let [flown, found] = [flown_rad, found_rad].map(|angle| angle / RADIANS_PER_DEGREE);
+        // Degrees: places to 0.6 km of 380, Mars a sphere, and images held inertially turn by 0.4 from end to end.
+        assert!(
+            flown > least_deg && (flown - found).abs() < 0.6,
+            "{found} {flown}"
+        );
     }
 }
 

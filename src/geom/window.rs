@@ -155,7 +155,7 @@ impl Piece {
 }
 
 /// Half the width in longitude, radians, of a cap about a direction of this latitude; none of a cap that holds a pole.
-fn half_width_rad(latitude_rad: f64, cap_rad: f64) -> Option<f64> {
+pub(super) fn half_width_rad(latitude_rad: f64, cap_rad: f64) -> Option<f64> {
     let holds_pole = latitude_rad.abs() + cap_rad >= FRAC_PI_2;
     (!holds_pole).then(|| (cap_rad.sin() / latitude_rad.cos()).min(1.0).asin())
 }

@@ -12,6 +12,8 @@ use std::{
     path::Path,
 };
 
+use chrono::NaiveDateTime;
+
 use self::columns::{COLUMNS, Column};
 use super::label::{LABEL_BYTES_MAX, parse};
 use crate::{
@@ -28,16 +30,18 @@ pub struct IndexedImage {
     pub file: String,
     /// UTC of the start of the first line.
     pub utc_start: String,
-    /// Instrument and filter, as labels name them; no filter of the narrow-angle camera.
+    /// Mission phase, and number of the orbit in it.
+    pub orbit: Option<(String, u32)>,
+    /// Instrument and filter, as labels name them; empty where the index does not say. The narrow-angle camera has no filter.
     pub instrument: [String; 2],
-    /// Object that it shows.
-    pub target: String,
+    /// Object that it shows, where the index says.
+    pub target: Option<String>,
     /// Spacecraft clock at the start of the first line.
     pub sclk_start: Option<String>,
     /// Samples of a line, and lines.
     pub size: [u32; 2],
-    /// Pixels summed across and along the track.
-    pub summing: [u32; 2],
+    /// Pixels summed across and along the track, where the index says.
+    pub summing: [Option<u32>; 2],
     /// Exposure of one detector line, seconds.
     pub exposure_s: Option<f64>,
     /// First detector pixel, counted from 0.
@@ -50,7 +54,8 @@ pub struct IndexedImage {
     pub centre_rad: Option<[f64; 2]>,
     /// Corners in their order round the image: first line, first and last sample; last line, last and first sample.
     pub corners_rad: [Option<[f64; 2]>; 4],
-    /// Width and height on the ground, metres.
+    /// Width and height on the ground, metres: where the index does not say, by the pixels, which are square if it does not
+    /// say that either.
     pub extent_m: [Option<f64>; 2],
     /// Height of the spacecraft, metres.
     pub altitude_m: Option<f64>,
@@ -64,6 +69,18 @@ pub struct IndexedImage {
     pub rationale: String,
     /// `OK` or `ERRORS`; empty where the index does not say.
     pub quality: String,
+}
+
+impl IndexedImage {
+    /// The start of the first line, if that is a time.
+    #[must_use]
+    pub fn utc(&self) -> Option<NaiveDateTime> {
+        let text = self.utc_start.trim_end_matches('Z');
+        let formats = ["%Y-%m-%dT%H:%M:%S%.f", "%Y-%jT%H:%M:%S%.f"];
+        formats
+            .iter()
+            .find_map(|format| NaiveDateTime::parse_from_str(text, format).ok())
+    }
 }
 
 /// A row that is no image.
@@ -185,6 +202,7 @@ fn read_columns(path: &Path) -> Result<Vec<Column>> {
         "IMAGE_TIME",
         "LINES",
         "LINE_SAMPLES",
+        "CENTER_LONGITUDE",
         "CENTER_LATITUDE",
     ] {
         if !columns.iter().any(|column| column.name == needed) {
@@ -197,8 +215,10 @@ fn read_columns(path: &Path) -> Result<Vec<Column>> {
 /// The image of a row, by the names of its columns.
 fn image(fields: &BTreeMap<&str, &str>) -> std::result::Result<IndexedImage, String> {
     let text = |key: &str| fields.get(key).copied().unwrap_or_default();
-    let known =
-        |key: &str| Some(text(key)).filter(|value| !matches!(*value, "" | "N/A" | "UNK" | "NULL"));
+    let known = |key: &str| {
+        let value = Some(text(key));
+        value.filter(|value| !matches!(*value, "" | "N/A" | "UNK" | "NULL" | "UNKNOWN"))
+    };
     let number = |key: &str| {
         known(key)
             .and_then(|value| value.parse().ok())
@@ -215,34 +235,45 @@ fn image(fields: &BTreeMap<&str, &str>) -> std::result::Result<IndexedImage, Str
                 .map(|degrees| degrees * RADIANS_PER_DEGREE)
         })
     };
+    let natural = |key: &str| known(key).and_then(|value| value.parse::<u32>().ok());
     let count = |key: &str| {
-        let value = text(key).parse::<u32>().ok().filter(|count| *count > 0);
+        let value = natural(key).filter(|count| *count > 0);
         value.ok_or_else(|| format!("{key} is {:?}; expected a count from 1", text(key)))
     };
+    let positive = |key: &str| number(key).filter(|value| *value > 0.0);
     let product_id = known("PRODUCT_ID").ok_or("PRODUCT_ID is empty; expected a product")?;
+    let size = [count("LINE_SAMPLES")?, count("LINES")?];
+    let pixel_m = positive("SCALED_PIXEL_WIDTH");
+    let line_m = pixel_m.map(|width_m| width_m * positive("PIXEL_ASPECT_RATIO").unwrap_or(1.0));
+    let extent_m = |key: &str, step_m: Option<f64>, steps: u32| {
+        let stated = positive(key).map(|extent_km| extent_km * METRES_PER_KM);
+        stated.or_else(|| Some(step_m? * f64::from(steps)))
+    };
+    let phase = known("MISSION_PHASE_NAME").map(str::to_owned);
     Ok(IndexedImage {
         product_id: product_id.to_owned(),
         file: text("FILE_SPECIFICATION_NAME").to_owned(),
         utc_start: text("IMAGE_TIME").to_owned(),
-        instrument: [
-            text("INSTRUMENT_NAME"),
-            known("FILTER_NAME").unwrap_or_default(),
-        ]
-        .map(str::to_owned),
-        target: text("TARGET_NAME").to_owned(),
+        orbit: phase.zip(natural("ORBIT_NUMBER")),
+        instrument: ["INSTRUMENT_NAME", "FILTER_NAME"]
+            .map(|key| known(key).unwrap_or_default().to_owned()),
+        target: known("TARGET_NAME").map(str::to_owned),
         sclk_start: known("SPACECRAFT_CLOCK_START_COUNT").map(str::to_owned),
-        size: [count("LINE_SAMPLES")?, count("LINES")?],
-        summing: [count("CROSSTRACK_SUMMING")?, count("DOWNTRACK_SUMMING")?],
+        size,
+        summing: ["CROSSTRACK_SUMMING", "DOWNTRACK_SUMMING"]
+            .map(|key| natural(key).filter(|summing| *summing > 0)),
         exposure_s: number("LINE_EXPOSURE_DURATION")
             .map(|milliseconds| milliseconds * SECONDS_PER_MS),
-        first_detector: known("EDIT_MODE_ID").and_then(|value| value.parse().ok()),
-        pixel_m: number("SCALED_PIXEL_WIDTH").filter(|width| *width > 0.0),
+        first_detector: natural("EDIT_MODE_ID"),
+        pixel_m,
         angles_rad: ["EMISSION_ANGLE", "INCIDENCE_ANGLE", "PHASE_ANGLE"].map(angle),
         centre_rad: place("CENTER"),
         corners_rad: ["UPPER_LEFT", "UPPER_RIGHT", "LOWER_RIGHT", "LOWER_LEFT"].map(place),
-        extent_m: ["SCALED_IMAGE_WIDTH", "SCALED_IMAGE_HEIGHT"]
-            .map(|key| number(key).map(|km| km * METRES_PER_KM)),
-        altitude_m: number("SPACECRAFT_ALTITUDE").map(|km| km * METRES_PER_KM),
+        extent_m: [
+            extent_m("SCALED_IMAGE_WIDTH", pixel_m, size[0]),
+            extent_m("SCALED_IMAGE_HEIGHT", line_m, size[1]),
+        ],
+        altitude_m: positive("SPACECRAFT_ALTITUDE").map(|km| km * METRES_PER_KM),
         sub_solar_rad: place("SUB_SOLAR"),
         sub_spacecraft_rad: place("SUB_SPACECRAFT"),
         solar_longitude_rad: angle("SOLAR_LONGITUDE"),

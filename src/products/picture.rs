@@ -58,6 +58,26 @@ impl Cause for PictureError {
     }
 }
 
+/// A picture that its format cannot hold.
+#[derive(Debug, thiserror::Error)]
+#[error("{width} × {height} pixels make a TIFF of {bytes} bytes; expected at most 4294967295")]
+struct TooLarge {
+    width: u32,
+    height: u32,
+    bytes: u64,
+}
+
+impl Cause for TooLarge {
+    fn kind(&self) -> Kind {
+        Kind::Input
+    }
+
+    fn advice(&self) -> String {
+        "write a PNG; if the image is not so large, `areograph image info` says what is wrong with it"
+            .to_owned()
+    }
+}
+
 impl From<png::EncodingError> for PictureError {
     fn from(error: png::EncodingError) -> Self {
         Self {
@@ -96,8 +116,19 @@ impl PictureFile {
     /// Begins a picture beside `path`.
     ///
     /// # Errors
-    /// The folder cannot be written.
+    /// The folder cannot be written; a TIFF of more than 4 GiB.
     pub fn create(path: &Path, format: PictureFormat, head: PictureHead) -> Result<Self> {
+        if format == PictureFormat::Tiff {
+            let (width, height, bytes) = (head.width, head.height, tiff_tiles::bytes_of(&head));
+            if u32::try_from(bytes).is_err() {
+                let too_large = TooLarge {
+                    width,
+                    height,
+                    bytes,
+                };
+                return Err(too_large).in_file(path);
+            }
+        }
         let file = StagedFile::create(path)?;
         let handle = file.writer()?;
         let writer = match format {

@@ -14,7 +14,6 @@ use crate::{
     spice::KernelView,
     stage::{InOrder, Input, Inputs, Output, Stage},
     stage_inputs,
-    units::longitude_step_rad,
 };
 
 /// An image whose edges do not all see Mars.
@@ -55,6 +54,7 @@ stage_inputs! {
 
 impl Stage for OutlineWindows<'_> {
     const NAME: &'static str = "outline_windows";
+    const METHOD: u32 = 2;
     const CHECKED: bool = true;
     type Output = Vec<WindowConfig>;
     stage_inputs!(fingerprint);
@@ -97,15 +97,12 @@ impl OutlineWindows<'_> {
         let mut images = self.images.0.iter().filter_map(Output::get);
         let times = images.find(|times| times.id == image).ok_or_else(lacking)?;
         let seen = self.seen(times)?.ok_or_else(lacking)?;
-        let first_rad = seen.first().ok_or_else(lacking)?.longitude_rad;
-        let places = seen.iter().map(|point| {
-            let step_rad = longitude_step_rad(point.longitude_rad - first_rad);
-            [first_rad + step_rad, point.latitude_rad]
-        });
-        let places: Vec<[f64; 2]> = places.collect();
+        let places = seen.iter();
+        let ring = places.map(|point| [point.longitude_rad, point.latitude_rad]);
+        let ring: Vec<[f64; 2]> = ring.collect();
         // At the poles a metre is the largest angle.
         let margin_rad = margin_m / MARS_IAU2000.polar_radius_m;
-        Ok(widened(&places, margin_rad, margin_rad))
+        Ok(widened(&ring, margin_rad, margin_rad))
     }
 }
 

@@ -11,6 +11,7 @@ pub(crate) mod case;
 pub(crate) mod daf;
 pub(crate) mod golden;
 pub(crate) mod mission;
+pub(crate) mod moc_file;
 pub(crate) mod outside;
 pub(crate) mod search;
 

@@ -30,9 +30,10 @@ fn table(rows: &[Row]) -> String {
             table,
             "\"MGSC_1001\",\"X/X.IMQ\",\"{product}\",\"1999-0{}-06T15:33:58.13\",\"MOC-NA\",\"N/A \",512,4096,4,4,6.0,1.0,10.0,40.0,\
              45.0,{:.2},{:.2},{:.2},{:.2},{:.2},{:.2},{:.2},{:.2},{:.2},{:.2},\"MAPPING\",\"MARS\",\"610472061:131\",245.0,0.4821,\
-             \"6A\",\"30\",0,\"MOC-PRED-X-5\",3.0,24.0,380.0,3770.0,380.0,\"\",90.0,40.0,100.0,5.0,{:.2},{:.2},2e8,150.0,14.0,90.0,\"\",\"OK\",717",
+             \"6A\",\"30\",0,\"MOC-PRED-X-5\",3.0,24.0,380.0,3770.0,380.0,\"\",90.0,40.0,100.0,5.0,{:.2},{:.2},2e8,150.0,14.0,90.0,\"\",\"OK\",{}",
             1 + product.len() % 9,
-            centre[0], centre[1], ul[0], ul[1], ur[0], ur[1], ll[0], ll[1], lr[0], lr[1], centre[0], centre[1]
+            centre[0], centre[1], ul[0], ul[1], ur[0], ur[1], ll[0], ll[1], lr[0], lr[1], centre[0], centre[1],
+            700 + product.len()
         )
         .unwrap();
     }
@@ -204,9 +205,12 @@ fn the_quoted_row_is_found_where_it_lies_and_makes_an_image_of_a_site() {
     assert!(!found(&path, "9,11,41,43", "table").contains("M19/00850"));
     let geojson: Value = serde_json::from_str(&found(&path, "349,351,41,43", "geojson")).unwrap();
     let feature = &geojson["features"][0];
-    assert_eq!(
-        feature["geometry"]["coordinates"][0][0],
-        serde_json::json!([349.99, 41.28])
+    let ring = feature["geometry"]["coordinates"][0].as_array().unwrap();
+    // Four corners, the first one again at the end, 10.01° west as a longitude within ±180°.
+    assert_eq!(ring.len(), 5);
+    assert!(
+        ring.contains(&serde_json::json!([-10.01, 41.28])),
+        "{ring:?}"
     );
     assert_eq!(feature["properties"]["emission_deg"], 0.23);
     let site = folder.path().join("site.toml");
@@ -230,20 +234,8 @@ fn the_quoted_row_is_found_where_it_lies_and_makes_an_image_of_a_site() {
 fn pairs_are_told_best_first() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("cumindex.tab");
-    let row = |product: &str, west: f64| {
-        let corner = |across: f64, along: f64| [west + 0.3 * across, 10.0 + 0.5 * along];
-        Row {
-            product: product.to_owned(),
-            centre: [west, 10.0],
-            corners: [
-                corner(-1.0, -1.0),
-                corner(1.0, -1.0),
-                corner(-1.0, 1.0),
-                corner(1.0, 1.0),
-            ],
-        }
-    };
-    // Times differ by the lengths of the names.
+    let row = |product: &str, west: f64| upright(product, [west, 10.0]);
+    // Times and orbits differ by the lengths of the names.
     let rows = [
         row("M01/00001", 50.0),
         row("M01/000002", 50.3),
@@ -278,6 +270,186 @@ fn pairs_are_told_best_first() {
     }
     let scores: Vec<f64> = told.iter().map(|pair| pair[6].parse().unwrap()).collect();
     assert!(scores.is_sorted_by(|a, b| a >= b), "{pairs}");
+}
+
+/// An upright image one degree high.
+fn upright(product: &str, [west, latitude]: [f64; 2]) -> Row {
+    let corner = |across: f64, along: f64| [west + 0.3 * across, latitude + 0.5 * along];
+    Row {
+        product: product.to_owned(),
+        centre: [west, latitude],
+        corners: [
+            corner(-1.0, -1.0),
+            corner(1.0, -1.0),
+            corner(-1.0, 1.0),
+            corner(1.0, 1.0),
+        ],
+    }
+}
+
+#[test]
+fn nadir_images_shifted_along_the_track_do_not_converge() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("cumindex.tab");
+    let rows = [
+        upright("M01/00001", [50.0, 10.0]),
+        upright("M01/000002", [50.1, 10.6]),
+    ];
+    fs::write(&path, table(&rows)).unwrap();
+    let pairs = found(&path, "308,312,9,12", "pairs");
+    let convergence: f64 = pairs
+        .lines()
+        .nth(1)
+        .unwrap()
+        .split(',')
+        .nth(3)
+        .unwrap()
+        .parse()
+        .unwrap();
+    // Seen from above the middle between them they would be 6° apart.
+    assert!(convergence < 0.5, "{pairs}");
+}
+
+#[test]
+fn pairs_are_of_different_orbits() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("cumindex.tab");
+    let rows =
+        ["M01/00001", "M01/00002", "M01/00003"].map(|product| upright(product, [50.0, 10.0]));
+    // All in one minute; the second on another orbit, the third without any.
+    let lines = table(&rows);
+    let lines: Vec<&str> = lines.lines().collect();
+    let write = |second: &str, third: &str| {
+        let rows = [lines[0], second, third].join("\n");
+        fs::write(&path, rows).unwrap();
+    };
+    let orbit = |row: &str, number: &str| row.replace(",709", &format!(",{number}"));
+    let start = |row: &str, time: &str| row.replace("15:33:58.13", time);
+    let pairs = |second: &str, third: &str| {
+        write(second, third);
+        let told = found(&path, "308,312,9,12", "pairs");
+        let pairs = told.lines().skip(1).map(|line| {
+            let names: Vec<&str> = line.split(',').take(2).map(|name| &name[8..]).collect();
+            names.concat()
+        });
+        pairs.collect::<BTreeSet<String>>()
+    };
+    let set = |names: &[&str]| names.iter().map(|name| (*name).to_owned()).collect();
+    let (second, third) = (orbit(lines[1], "710"), orbit(lines[2], ""));
+    assert_eq!(pairs(&second, &third), set(&["12"]));
+    // The minute changes between two images of one orbit; half an hour without an orbit is another one.
+    let second = start(lines[1], "15:34:01.00");
+    assert_eq!(pairs(&second, &start(&third, "16:04:00.00")), set(&["13"]));
+    // Of what has neither, nothing is known.
+    assert_eq!(pairs(&second, &start(&third, "UNK")), set(&["13", "23"]));
+    let output = std::process::Command::new(env!("CARGO_BIN_EXE_areograph"))
+        .args(["image", "search", text(&path), "--box=308,312,9,12"])
+        .output()
+        .unwrap();
+    let told = String::from_utf8_lossy(&output.stderr);
+    assert!(told.contains("2 pairs may be of one orbit"), "{told}");
+}
+
+#[test]
+fn what_the_index_does_not_say_loses_no_image() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("cumindex.tab");
+    let whole = table(&[upright("M01/00001", [50.0, 10.0])]);
+    let changes: [(&str, &str); 8] = [
+        ("\"MARS\"", "\"    \""),
+        ("\"MARS\"", "\"UNK\""),
+        ("\"MOC-NA\"", "\"UNK\""),
+        ("\"MOC-NA\",\"N/A \"", "\"MOC-WA\",\"    \""),
+        (",4096,4,4,", ",4096,,4,"),
+        (",4096,4,4,", ",4096,4,N/A,"),
+        // No corners, and no size but that of the pixels: 4096 of 6 m reach 0.2° to either side.
+        (",49.70,9.50,", ",,,"),
+        (",3.0,24.0,380.0", ",,,380.0"),
+    ];
+    for (number, (from, to)) in changes.iter().enumerate() {
+        assert!(whole.contains(from), "{from}");
+        let mut row = whole.replace(from, to);
+        if number >= 6 {
+            row = row
+                .replace(",49.70,9.50,", ",,,")
+                .replace(",3.0,24.0,380.0", ",,,380.0");
+        }
+        fs::write(&path, &row).unwrap();
+        // A window 0.15° north of the centre and beyond the margin of the index.
+        let told = found(&path, "309,311,10.45,10.54", "csv");
+        assert!(told.contains("M01/00001"), "{to}: {told}");
+        stdout(&areograph(&[
+            "search",
+            text(&path),
+            "--box=309,311,9,11",
+            "--format=toml",
+        ]));
+    }
+    let warning = |row: &str, expected: &str| {
+        fs::write(&path, row).unwrap();
+        let output = std::process::Command::new(env!("CARGO_BIN_EXE_areograph"))
+            .args(["image", "search", text(&path), "--box=309,311,9,11"])
+            .output()
+            .unwrap();
+        let told = String::from_utf8_lossy(&output.stderr);
+        assert!(told.contains(expected), "{told}");
+    };
+    warning(
+        &whole.replace("\"MARS\"", "\"\""),
+        "1 images have no TARGET_NAME",
+    );
+    warning(
+        &whole.replace("MOC-NA", "CTX"),
+        "1 images (the first is M01/00001) are of no camera",
+    );
+    let nowhere = whole
+        .replace(",49.70,9.50,", ",,,")
+        .replace(",3.0,24.0,380.0", ",,,380.0");
+    let nowhere = nowhere.replace(",6.0,1.0,10.0,", ",,,10.0,");
+    warning(
+        &nowhere,
+        "1 images (the first is M01/00001) could not be tested",
+    );
+}
+
+#[test]
+fn outlines_as_geojson_stay_on_the_map_and_are_read_back() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("cumindex.tab");
+    let pole = Row {
+        product: "M01/00003".to_owned(),
+        centre: [10.0, 89.0],
+        corners: [[0.0, 83.0], [80.0, 84.0], [280.0, 82.0], [170.0, 84.0]],
+    };
+    let rows = [
+        upright("M01/00001", [180.1, 10.0]),
+        upright("M01/00002", [200.0, 30.0]),
+        pole,
+    ];
+    fs::write(&path, table(&rows)).unwrap();
+    let geojson = found(&path, "0,360,-90,90", "geojson");
+    let value: Value = serde_json::from_str(&geojson).unwrap();
+    let kinds = value["features"].as_array().unwrap().iter();
+    let kinds: Vec<&str> = kinds
+        .map(|feature| feature["geometry"]["type"].as_str().unwrap())
+        .collect();
+    assert_eq!(kinds, ["MultiPolygon", "Polygon", "MultiPolygon"]);
+    let polygons = folder.path().join("found.geojson");
+    fs::write(&polygons, &geojson).unwrap();
+    let again = stdout(&areograph(&[
+        "search",
+        text(&path),
+        "--polygon",
+        text(&polygons),
+        "--format=geojson",
+    ]));
+    let again: Value = serde_json::from_str(&again).unwrap();
+    assert_eq!(again["features"].as_array().unwrap().len(), 3);
+    // The pole is found by its image alone, wherever it is looked for.
+    for edges in ["100,110,88,90", "250,260,86,87", "0,360,89.5,90"] {
+        let csv = found(&path, edges, "csv");
+        assert!(csv.contains("M01/00003"), "{edges}: {csv}");
+    }
 }
 
 #[test]

@@ -1,11 +1,16 @@
 //! Images written here, whole and damaged.
 
-use std::{fs, path::Path};
+use std::{
+    fs,
+    path::{Path, PathBuf},
+};
 
 use areograph::{
     config::built_in_instruments,
-    pds::image_file::{Coding, ImageFile, LineState, NewImage, Predictor, Transform, encode},
+    pds::image_file::{Coding, ImageFile, LineState, Predictor, Transform, encode},
 };
+
+use crate::common::moc_file::{bytes_read, new_image, peak_memory};
 
 /// Size of the image: three fragments and more.
 const SAMPLES: usize = 640;
@@ -36,19 +41,8 @@ fn picture() -> Vec<u8> {
 }
 
 fn encoded(pixels: &[u8], coding: Coding) -> Vec<u8> {
-    let image = NewImage {
-        product_id: "M01/00123",
-        instrument: ["MOC-NA", ""],
-        clock: (610_472_061, 131),
-        utc: ["1999-05-06T15:33:58.13", "1999-05-06T15:34:05.16"],
-        exposure_s: 0.000_482_1,
-        summing: 3,
-        first_detector: 0,
-        samples: u32::try_from(SAMPLES).unwrap(),
-        pixels,
-        coding,
-    };
-    encode(&image).unwrap()
+    let samples = u32::try_from(SAMPLES).unwrap();
+    encode(&new_image(samples, 3, pixels, coding)).unwrap()
 }
 
 const PREDICTED: Coding = Coding::Predictive {
@@ -269,17 +263,6 @@ fn a_cut_file_gives_the_lines_that_are_there() {
     }
 }
 
-/// Peak memory of this process, bytes.
-fn peak_memory() -> u64 {
-    let status = fs::read_to_string("/proc/self/status").unwrap();
-    let line = status
-        .lines()
-        .find(|line| line.starts_with("VmHWM:"))
-        .unwrap();
-    let kib: u64 = line.split_whitespace().nth(1).unwrap().parse().unwrap();
-    kib << 10
-}
-
 /// Does damage: bits, bytes, stretches that are cut out, zeroed or repeated, fragments that are lost, a shorter file.
 fn damage(bytes: &mut Vec<u8>, random: &mut Random) {
     let from = if random.below(8) == 0 { 0 } else { 2048 };
@@ -357,4 +340,62 @@ fn damaged_files_never_panic_and_lines_called_good_are_good() {
     );
     // The pixels that this test keeps, and a strip.
     assert!(grown < 64 << 20, "{grown} bytes");
+}
+
+/// A `.imq` file of 4 MB with a header every 62 bytes, each with a length that ends a byte beyond another one.
+fn headers_only(folder: &Path) -> (PathBuf, u64) {
+    let picture = vec![7; 16 * SAMPLES];
+    let whole = encoded(&picture, Coding::Raw);
+    let mut bytes = whole[..2048].to_vec();
+    let header = &whole[2048..2110];
+    for number in 0..65_000_u32 {
+        let mut header = header.to_vec();
+        header[13] = 0;
+        header[2..4].copy_from_slice(&number.to_le_bytes()[..2]);
+        let after = 62 * (32_000 + number % 97) - 62;
+        header[58..62].copy_from_slice(&after.to_le_bytes());
+        bytes.extend(header);
+    }
+    let path = folder.join("headers.imq");
+    fs::write(&path, &bytes).unwrap();
+    (path, bytes.len() as u64)
+}
+
+#[test]
+fn a_file_of_nothing_but_headers_is_read_a_few_times_only() {
+    let folder = tempfile::tempdir().unwrap();
+    let (path, size) = headers_only(folder.path());
+    let before = bytes_read();
+    let image = ImageFile::open(&path, built_in_instruments()).unwrap();
+    let read = bytes_read() - before;
+    // The label's CHECKSUM, the windows of the search, the header of each and the one where it ends, and sums.
+    assert!(read < 6 * size, "{read} bytes of {size}");
+    assert!(image.complaints().count() > 0);
+}
+
+#[test]
+fn a_small_file_cannot_claim_gigabytes_of_lines() {
+    let folder = tempfile::tempdir().unwrap();
+    let picture = vec![7; 16 * SAMPLES];
+    for coding in [PREDICTED, COSINES, Coding::Raw] {
+        let mut bytes = encoded(&picture, coding);
+        let at = 2048;
+        // 65535 × 16 lines of 4080 samples, the only fragment the last of very many.
+        bytes[at + 2..at + 4].copy_from_slice(&65_000_u16.to_le_bytes());
+        bytes[at + 4..at + 6].copy_from_slice(&65_000_u16.to_le_bytes());
+        bytes[at + 40..at + 42].copy_from_slice(&65_535_u16.to_le_bytes());
+        bytes[at + 43] = 255;
+        let end = fragments(&bytes)[1];
+        let sum: u64 = bytes[at..end - 1].iter().map(|byte| u64::from(*byte)).sum();
+        bytes[end - 1] = 255 - u8::try_from((sum + 254) % 255 + 1).unwrap();
+        let (_, states, complaints) = read(folder.path(), &bytes).unwrap();
+        // 64 times what a byte can hold: 8 pixels, or 107 of the transform coder.
+        let most = bytes.len() * 64 * 108 / 4080;
+        assert!(states.len() <= most + 16, "{coding:?}: {}", states.len());
+        let mut told = complaints.iter();
+        assert!(
+            told.any(|text| text.contains("1048560 lines in the header")),
+            "{complaints:?}"
+        );
+    }
 }

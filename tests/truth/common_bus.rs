@@ -6,6 +6,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
+use areograph::pds::pedr::{LABEL_BYTES, RECORD_BYTES, Record};
 use nalgebra::Vector3;
 
 use super::{
@@ -285,4 +286,32 @@ fn mistakes_of_laser_and_bus_are_told() {
         told.contains("adjustment.common_bus did nothing: the file of the altimeter does not tell"),
         "{told}"
     );
+    // Every fourth frame is recorded 440 m to either side in turn: together they say nothing wrong of laser and profile.
+    let remark = "coordinates of the laser in the images lie beyond 3.29";
+    let (_, told, _) = ending(&mission, "sound", |text| text);
+    assert!(!told.contains(remark), "{told}");
+    spoil_shots(&mission);
+    let (_, told, _) = ending(&mission, "spoiled", |text| text);
+    assert!(told.contains(remark), "{told}");
+}
+
+/// Records every fourth frame of all PEDR files 7.5 thousandths of a degree east or west of its place, in turn.
+fn spoil_shots(mission: &Path) {
+    const LONGITUDE: usize = std::mem::offset_of!(Record, ground_longitude_microdegrees);
+    for entry in fs::read_dir(mission.join("pedr")).unwrap() {
+        let path = entry.unwrap().path();
+        let mut bytes = fs::read(&path).unwrap();
+        for (number, record) in bytes[LABEL_BYTES..]
+            .chunks_exact_mut(RECORD_BYTES)
+            .enumerate()
+        {
+            if number % 4 == 0 {
+                let field = &mut record[LONGITUDE..LONGITUDE + 4];
+                let step = if number % 8 == 0 { 7_500 } else { -7_500 };
+                let longitude = i32::from_be_bytes(field.try_into().unwrap()) + step;
+                field.copy_from_slice(&longitude.to_be_bytes());
+            }
+        }
+        fs::write(&path, bytes).unwrap();
+    }
 }

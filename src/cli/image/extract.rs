@@ -31,7 +31,8 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
     /// 16 bits: relative radiance by gain, offset and exposure, and the offset between odd and even detectors removed
-    /// (narrow angle without summing). Not for geometry, and no reflectance: its constants are not public.
+    /// (narrow angle without summing). Not for geometry, and no reflectance: its constants are not public. Images whose gain
+    /// changes from line to line are refused.
     #[arg(long)]
     calibrate: bool,
     /// Also write which lines are good (255), suspect (128) or missing (0), in one of the same formats.

@@ -87,6 +87,7 @@ fn info(path: &Path) -> Result<Value, Error> {
         "first_detector": fields.first_detector,
         "gain_mode_id": value("GAIN_MODE_ID"),
         "offset_mode_id": value("OFFSET_MODE_ID"),
+        "gain_changes": archive.map(|image| image.layout().gain_changes),
         "rationale": value("RATIONALE_DESC"),
         "coding": image.other_kind().unwrap_or_else(|| coding(archive.and_then(|image| image.layout().coding))),
         "fragments": archive.map(|image| image.layout().fragments),

@@ -5,9 +5,11 @@ mod by_kernels;
 mod pairs;
 mod show;
 
+use std::path::Path;
+
 pub(super) use self::arguments::Arguments;
 use self::{
-    arguments::Format,
+    arguments::{Format, cameras_of},
     pairs::{Pair, pairs},
 };
 use crate::{
@@ -18,7 +20,7 @@ use crate::{
         image_outline::{INDEX_LATITUDE_RAD, INDEX_LONGITUDE_RAD, ImageOutline},
         window::Region,
     },
-    pds::image_index::{IndexedImage, read_index},
+    pds::image_index::{ImageIndex, IndexedImage, read_index},
 };
 
 /// An image that was found.
@@ -46,40 +48,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<()> {
     let mut found = Vec::new();
     for path in &arguments.indexes {
         let index = read_index(path)?;
-        if !index.has_label {
-            tracing::warn!(
-                "{}: no .lbl beside it; its columns are taken to be those of the mapping mission",
-                path.display()
-            );
-        }
-        if let Some(row) = index.bad_rows.first() {
-            tracing::warn!(
-                "{}: {} rows are left out, the first in line {}: {}",
-                path.display(),
-                index.bad_rows.len(),
-                row.line,
-                row.text
-            );
-        }
-        let (mut without_place, before) = (0, found.len());
-        for image in index.images {
-            if image.target != MARS_NAME || !arguments.wants(&image) {
-                continue;
-            }
-            match place(&image) {
-                Some((centre_rad, outline)) => {
-                    found.extend(meeting(image, centre_rad, outline, &regions));
-                }
-                None => without_place += 1,
-            }
-        }
-        if without_place > 0 {
-            tracing::warn!(
-                "{}: {without_place} images have no centre and could not be tested",
-                path.display()
-            );
-        }
-        tracing::info!("{}: {} images", path.display(), found.len() - before);
+        tell_index(path, &index);
+        found.extend(found_in(path, index, arguments, &regions));
     }
     // Volumes have all images up to theirs: an image of two indexes is one.
     found.sort_by(|a, b| a.image.product_id.cmp(&b.image.product_id));
@@ -88,6 +58,12 @@ pub(super) fn run(arguments: &Arguments) -> Result<()> {
         by_kernels::compare(&mut found, metakernel)?;
     }
     let pairs = pairs(&found);
+    let undecided = pairs.iter().filter(|pair| !pair.is_known_apart).count();
+    if undecided > 0 {
+        tracing::warn!(
+            "{undecided} pairs may be of one orbit: the index has neither orbits nor times of both images"
+        );
+    }
     match arguments.format {
         Format::Table => show::table(&found, &pairs),
         Format::Csv => show::csv(&found),
@@ -98,15 +74,82 @@ pub(super) fn run(arguments: &Arguments) -> Result<()> {
     Ok(())
 }
 
-/// Centre and outline of an image; none of one without a centre.
+fn tell_index(path: &Path, index: &ImageIndex) {
+    if !index.has_label {
+        tracing::warn!(
+            "{}: no .lbl beside it; its columns are taken to be those of the mapping mission",
+            path.display()
+        );
+    }
+    if let Some(row) = index.bad_rows.first() {
+        tracing::warn!(
+            "{}: {} rows are left out, the first in line {}: {}",
+            path.display(),
+            index.bad_rows.len(),
+            row.line,
+            row.text
+        );
+    }
+}
+
+/// The images of an index that are wanted and meet a window; what the index does not say is told.
+fn found_in(
+    path: &Path,
+    index: ImageIndex,
+    arguments: &Arguments,
+    regions: &[(String, Region)],
+) -> Vec<Found> {
+    let (mut found, mut without_target) = (Vec::new(), 0_usize);
+    let (mut without_place, mut of_no_camera) = (Vec::new(), Vec::new());
+    for image in index.images {
+        match image.target.as_deref() {
+            Some(target) if !target.eq_ignore_ascii_case(MARS_NAME) => continue,
+            Some(_) => {}
+            None => without_target += 1,
+        }
+        if cameras_of(&image).next().is_none() {
+            of_no_camera.push(image.product_id);
+        } else if arguments.wants(&image) {
+            match place(&image) {
+                Some((centre_rad, outline)) => {
+                    found.extend(meeting(image, centre_rad, outline, regions));
+                }
+                None => without_place.push(image.product_id),
+            }
+        }
+    }
+    if without_target > 0 {
+        tracing::warn!(
+            "{}: {without_target} images have no TARGET_NAME; they are taken to show {MARS_NAME}",
+            path.display()
+        );
+    }
+    for (left_out, what) in [
+        (of_no_camera, "are of no camera that is known; left out"),
+        (
+            without_place,
+            "could not be tested: no centre, or neither corners nor size on the ground",
+        ),
+    ] {
+        if let Some(first) = left_out.first() {
+            let (file, count) = (path.display(), left_out.len());
+            tracing::warn!("{file}: {count} images (the first is {first}) {what}");
+        }
+    }
+    tracing::info!("{}: {} images", path.display(), found.len());
+    found
+}
+
+/// Centre and outline of an image; none of one without a centre, or without corners and size.
 fn place(image: &IndexedImage) -> Option<([f64; 2], ImageOutline)> {
     let centre_rad = image.centre_rad?;
-    let [width_m, height_m] = image.extent_m.map(Option::unwrap_or_default);
-    let half_diagonal_rad = 0.5 * width_m.hypot(height_m) / RADIUS_M;
-    Some((
-        centre_rad,
-        ImageOutline::new(image.corners_rad, centre_rad, half_diagonal_rad),
-    ))
+    let [width_m, height_m] = image.extent_m;
+    let diagonal_m = width_m
+        .zip(height_m)
+        .map(|(width, height)| width.hypot(height));
+    let half_diagonal_rad = diagonal_m.map(|diagonal_m| 0.5 * diagonal_m / RADIUS_M);
+    let outline = ImageOutline::new(image.corners_rad, centre_rad, half_diagonal_rad)?;
+    Some((centre_rad, outline))
 }
 
 /// The image, if it may show ground of a window.

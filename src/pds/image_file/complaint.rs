@@ -54,6 +54,13 @@ pub enum Fault {
     },
     /// More fragments than their numbers can count.
     TooMany,
+    /// More lines than what is there can be a part of.
+    TooManyLines {
+        /// Lines of the header.
+        header: u32,
+        /// Lines that are believed.
+        possible: u32,
+    },
     /// The header of a fragment tells of more pixels than its data can hold.
     TooLarge,
     /// A block of the transform coder of a group that there is not.
@@ -115,6 +122,10 @@ impl fmt::Display for Fault {
             Self::LostSync { next: None } => formatter
                 .write_str("no uncompressed line where one is due, nor later; the image ends here"),
             Self::TooMany => formatter.write_str("more than 65536 fragments; the rest is ignored"),
+            Self::TooManyLines { header, possible } => write!(
+                formatter,
+                "{header} lines in the header, of which the data can be no part; {possible} are believed"
+            ),
             Self::TooLarge => {
                 formatter.write_str("more pixels than the data can hold; the fragment is ignored")
             }

@@ -6,9 +6,10 @@ use super::{
     bits::BitWriter,
     codes::RESIDUALS,
     encode_transform::encode_blocks,
-    fragment::{Coding, FULL, HEADER, Predictor, Transform},
+    fragment::{Coding, FULL, Predictor, Transform},
     predictive::{BLOCK_LINES, MARK},
     transform::EDGE,
+    walk::HEADER,
 };
 use crate::units::SECONDS_PER_MS;
 

@@ -1,17 +1,21 @@
 //! On-board fragments of a `.imq` file: their headers, and what is left of them in a damaged file.
 
-use std::{fs::File, io, os::unix::fs::FileExt as _};
+use std::{fs::File, io};
 
-use super::complaint::{Complaint, Complaints, Fault};
+use super::{
+    complaint::{Complaint, Complaints, Fault},
+    walk::{HEADER, Walk},
+};
 
-/// Bytes of a header.
-pub(super) const HEADER: usize = 62;
 /// Data bytes of a full fragment: the on-board buffer is cut so.
 pub(super) const FULL: u64 = 245_760;
+/// An image is believed to be this many times larger than what is left of it can be: one of the archive has some 50 fragments
+/// at most.
+const LOST_MAX: u64 = 64;
 /// Fragments that their 16-bit numbers can count.
 const MOST: usize = 1 << 16;
-/// Bytes read at a time.
-const CHUNK: usize = 1 << 16;
+/// Most data bytes of a fragment that are believed: those of the archive have 245,760.
+const DATA_BYTES_MAX: u64 = 1 << 22;
 
 /// How the first header says that pixels are coded.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -59,7 +63,8 @@ pub enum Transform {
 /// Size and coding of an image.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Layout {
-    /// Lines that were exposed, as the first header says; of a plain raster those of the label.
+    /// Lines that were exposed, as the first header says if its data can be a part of so many; of a plain raster those of the
+    /// label.
     pub lines: u32,
     /// Samples of a line.
     pub samples: u32,
@@ -67,6 +72,21 @@ pub struct Layout {
     pub coding: Option<Coding>,
     /// Fragments in the file.
     pub fragments: u32,
+    /// Changes of gain and offset within the image, as the first header says; 0 of a plain raster, which does not say.
+    pub gain_changes: u16,
+}
+
+impl Coding {
+    /// Most pixels that a byte of data can hold.
+    const fn pixels_of_byte(self) -> u64 {
+        match self {
+            Self::Raw => 1,
+            // A bit a pixel.
+            Self::Predictive { .. } => 8,
+            // A block of 256 pixels in 3 bits of its group and 8 for its mean and for the length of the rest each.
+            Self::Transform { .. } => 256 * 8 / 19,
+        }
+    }
 }
 
 /// What a header says.
@@ -91,6 +111,11 @@ impl Header {
     /// Lines of the whole image.
     pub(super) fn total_lines(&self) -> u32 {
         u32::from(self.two(40)) * 16
+    }
+
+    /// Changes of gain and offset within the image.
+    pub(super) const fn gain_changes(&self) -> u16 {
+        self.two(38)
     }
 
     /// Samples of a line.
@@ -197,81 +222,6 @@ pub(super) struct Fragments {
     pub(super) has_last: bool,
 }
 
-/// A file that is walked through.
-struct Walk<'a> {
-    file: &'a File,
-    end: u64,
-}
-
-impl Walk<'_> {
-    fn header(&self, at: u64) -> io::Result<Option<Header>> {
-        let mut bytes = [0; HEADER];
-        if at + HEADER as u64 > self.end {
-            return Ok(None);
-        }
-        self.file.read_exact_at(&mut bytes, at)?;
-        Ok(Some(Header::new(bytes)))
-    }
-
-    /// The first header from `from` on that is as wanted.
-    fn find(&self, from: u64, wanted: &dyn Fn(&Header) -> bool) -> io::Result<Option<u64>> {
-        let mut bytes = vec![0; CHUNK + HEADER];
-        let mut at = from;
-        while at + (HEADER as u64) <= self.end {
-            let length = usize::try_from(self.end - at).unwrap_or(usize::MAX);
-            let length = length.min(bytes.len());
-            self.file.read_exact_at(&mut bytes[..length], at)?;
-            let mut places = bytes[..length].windows(HEADER);
-            let is_wanted = |window: &[u8]| {
-                // No image has clock seconds of zero: padding is passed over quickly.
-                window[9..13] != [0; 4]
-                    && window
-                        .try_into()
-                        .is_ok_and(|bytes| wanted(&Header::new(bytes)))
-            };
-            if let Some(place) = places.position(is_wanted) {
-                return Ok(Some(at + place as u64));
-            }
-            at += (length - HEADER + 1) as u64;
-        }
-        Ok(None)
-    }
-
-    /// Whether `bytes` from `at` on add up to all ones, carries added at the low end.
-    fn adds_up(&self, at: u64, bytes: u64) -> io::Result<bool> {
-        let (sum, _) = byte_sum(self.file, at, bytes)?;
-        Ok(sum > 0 && sum % 255 == 0)
-    }
-
-    /// Whether a fragment that ends at `at` may end there.
-    fn may_end(&self, at: u64, first: &Header) -> io::Result<bool> {
-        Ok(match self.header(at)? {
-            Some(next) => next.is_of_image(first) || next.bytes == [0; HEADER],
-            None => at <= self.end,
-        })
-    }
-}
-
-/// The sum of bytes, each unsigned, and how many are 128 or more.
-pub(super) fn byte_sum(file: &File, at: u64, bytes: u64) -> io::Result<(u64, u64)> {
-    let mut chunk = vec![0; CHUNK];
-    let (mut sum, mut high, mut done) = (0, 0, 0);
-    while done < bytes {
-        let length = usize::try_from(bytes - done).map_or(CHUNK, |rest| rest.min(CHUNK));
-        file.read_exact_at(&mut chunk[..length], at + done)?;
-        // A chunk of 2^16 bytes stays below 2^24.
-        let of_chunk: u32 = chunk[..length].iter().map(|byte| u32::from(*byte)).sum();
-        let high_of_chunk: u32 = chunk[..length]
-            .iter()
-            .map(|byte| u32::from(byte >> 7))
-            .sum();
-        sum += u64::from(of_chunk);
-        high += u64::from(high_of_chunk);
-        done += length as u64;
-    }
-    Ok((sum, high))
-}
-
 impl Fragments {
     /// Walks through the fragments between bytes `start` and `end`; `None` when there is not even one.
     pub(super) fn find(
@@ -280,11 +230,11 @@ impl Fragments {
         expected: Expected,
         complaints: &mut Complaints,
     ) -> io::Result<Option<Self>> {
-        let walk = Walk { file, end };
-        let Some(at) = first(&walk, start, expected)? else {
+        let mut walk = Walk::new(file, end);
+        let Some(at) = first(&mut walk, start, expected)? else {
             return Ok(None);
         };
-        let Some(first) = walk.header(at)? else {
+        let Some(first) = header(&walk, at)? else {
             return Ok(None);
         };
         if at > start {
@@ -301,18 +251,24 @@ impl Fragments {
             all: Vec::new(),
             has_last: false,
         };
-        fragments.walk(&walk, at, complaints)?;
+        fragments.walk(&mut walk, at, complaints)?;
         Ok(Some(fragments))
     }
 
-    fn walk(&mut self, walk: &Walk<'_>, start: u64, complaints: &mut Complaints) -> io::Result<()> {
+    fn walk(
+        &mut self,
+        walk: &mut Walk<'_>,
+        start: u64,
+        complaints: &mut Complaints,
+    ) -> io::Result<()> {
         let mut at = start;
-        while let Some(header) = walk.header(at)? {
+        while let Some(header) = header(walk, at)? {
             let after = at + (HEADER as u64) + u64::from(header.data_bytes()) + 1;
             if !header.is_of_image(&self.first)
-                && (header.data_bytes() == 0 || !walk.may_end(after, &self.first)?)
+                && (header.data_bytes() == 0 || !may_end(walk, after, &self.first)?)
             {
-                let next = walk.find(at, &|header| header.is_of_image(&self.first))?;
+                let first = self.first;
+                let next = walk.find(at, &|bytes| Header::new(*bytes).is_of_image(&first))?;
                 let Some(next) = next else {
                     break;
                 };
@@ -339,7 +295,7 @@ impl Fragments {
     /// Takes the fragment at `at`; where the next one begins, and whether this is the last.
     fn take(
         &mut self,
-        walk: &Walk<'_>,
+        walk: &mut Walk<'_>,
         at: u64,
         header: &Header,
         complaints: &mut Complaints,
@@ -350,21 +306,21 @@ impl Fragments {
             .all
             .last()
             .map_or(0, |before| before.number.wrapping_add(1));
-        let is_whole = data + stated < walk.end;
-        // A sum alone is right by chance once in 255 times.
-        let is_sound = is_whole
-            && walk.adds_up(at, HEADER as u64 + stated + 1)?
-            && walk.may_end(data + stated + 1, &self.first)?;
-        let mut number = header.number();
+        let is_whole = data + stated < walk.end();
         let mut next = data + stated + 1;
+        // A sum alone is right by chance once in 255 times. It comes last: nothing that was added up is read again.
+        let ends_well = stated <= DATA_BYTES_MAX && may_end(walk, next, &self.first)?;
+        let is_sound = is_whole && ends_well && walk.adds_up(at, HEADER as u64 + stated + 1)?;
+        let mut number = header.number();
         if !is_sound {
             number = expected;
-            if !walk.may_end(next, &self.first)? {
+            if !ends_well {
                 // Its length is wrong, or the file ends here.
-                let found = walk.find(data, &|header| header.is_of_image(&self.first))?;
-                next = found.unwrap_or(walk.end.min(next));
+                let first = self.first;
+                let found = walk.find(data, &|bytes| Header::new(*bytes).is_of_image(&first))?;
+                next = found.unwrap_or(walk.end().min(next));
                 if found.is_none() && !is_whole {
-                    let lacking = data + stated + 1 - walk.end;
+                    let lacking = data + stated + 1 - walk.end();
                     complaints.push(complaint(Some(number), at, Fault::CutOff { lacking }));
                 }
             }
@@ -374,9 +330,7 @@ impl Fragments {
         }
         let is_last = header.bytes[13] & 2 != 0
             && (is_sound
-                || !walk
-                    .header(next)?
-                    .is_some_and(|next| next.is_of_image(&self.first)));
+                || !self::header(walk, next)?.is_some_and(|next| next.is_of_image(&self.first)));
         if number < expected {
             complaints.push(complaint(Some(number), at, Fault::Repeated));
             return Ok((next, false));
@@ -403,6 +357,18 @@ impl Fragments {
         Ok((next, is_last && is_whole))
     }
 
+    /// Lines that these fragments can be a part of, when all but one in [`LOST_MAX`] were lost; none if it has as many as its
+    /// header says.
+    pub(super) fn lines_possible(&self) -> Option<u32> {
+        let bytes: u64 = self.all.iter().map(|fragment| fragment.data_bytes).sum();
+        let of_byte = self.first.coding().map_or(1, Coding::pixels_of_byte);
+        let pixels = bytes.saturating_mul(of_byte * LOST_MAX);
+        // Whole blocks of the transform coder.
+        let lines = 16 * (pixels / u64::from(self.first.width())).div_ceil(16).max(1);
+        let lines = u32::try_from(lines).ok();
+        lines.filter(|lines| *lines < self.first.total_lines())
+    }
+
     /// Whether anything is wrong with them.
     pub(super) fn are_sound(&self) -> bool {
         self.has_last
@@ -413,17 +379,30 @@ impl Fragments {
     }
 }
 
+/// Whether a fragment that ends at `at` may end there.
+fn may_end(walk: &Walk<'_>, at: u64, first: &Header) -> io::Result<bool> {
+    Ok(match header(walk, at)? {
+        Some(next) => next.is_of_image(first) || next.bytes == [0; HEADER],
+        None => at <= walk.end(),
+    })
+}
+
+fn header(walk: &Walk<'_>, at: u64) -> io::Result<Option<Header>> {
+    Ok(walk.header(at)?.map(Header::new))
+}
+
 /// Where the first header stands that can be believed.
-fn first(walk: &Walk<'_>, start: u64, expected: Expected) -> io::Result<Option<u64>> {
-    if let Some(header) = walk.header(start)?
+fn first(walk: &mut Walk<'_>, start: u64, expected: Expected) -> io::Result<Option<u64>> {
+    if let Some(header) = header(walk, start)?
         && header.is_possible()
     {
         let bytes = HEADER as u64 + u64::from(header.data_bytes()) + 1;
-        if expected.holds(&header) || (start + bytes <= walk.end && walk.adds_up(start, bytes)?) {
+        let is_there = bytes <= DATA_BYTES_MAX && start + bytes <= walk.end();
+        if expected.holds(&header) || (is_there && walk.adds_up(start, bytes)?) {
             return Ok(Some(start));
         }
     }
-    walk.find(start, &|header| expected.holds(header))
+    walk.find(start, &|bytes| expected.holds(&Header::new(*bytes)))
 }
 
 fn complaint(fragment: Option<u16>, offset: u64, what: Fault) -> Complaint {

@@ -20,6 +20,7 @@ mod stream;
 mod strip;
 mod strips;
 mod transform;
+mod walk;
 
 pub use self::{
     complaint::{Complaint, Complaints, Fault},

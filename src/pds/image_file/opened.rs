@@ -8,8 +8,9 @@ use std::{
 
 use super::{
     complaint::{Complaint, Complaints, Fault},
-    fragment::{Expected, Fragments, Layout, byte_sum},
+    fragment::{Expected, Fragments, Layout},
     strips::Strips,
+    walk::byte_sum,
 };
 use crate::{
     error::{Cause, IoError, Kind, Locate as _, Result},
@@ -145,11 +146,22 @@ impl ImageFile {
         let fragments = found.map_err(IoError::on("read"))?;
         let offset = self.span[0];
         let fragments = fragments.ok_or(ImageFileError::NoFragment { offset })?;
+        let header = fragments.first.total_lines();
+        let possible = fragments.lines_possible();
+        if let Some(possible) = possible {
+            self.complaints.push(Complaint {
+                fragment: None,
+                offset,
+                line: None,
+                what: Fault::TooManyLines { header, possible },
+            });
+        }
         self.layout = Layout {
-            lines: fragments.first.total_lines(),
+            lines: possible.unwrap_or(header),
             samples: fragments.first.width(),
             coding: fragments.first.coding(),
             fragments: u32::try_from(fragments.all.len()).unwrap_or(u32::MAX),
+            gain_changes: fragments.first.gain_changes(),
         };
         self.fragments = Some(fragments);
         Ok(())
@@ -250,6 +262,7 @@ fn plain_layout(label: &Label, image: &ImageLabel) -> std::result::Result<Layout
         samples: image.fields.samples.ok_or(lacking("LINE_SAMPLES"))?,
         coding: None,
         fragments: 0,
+        gain_changes: 0,
     })
 }
 

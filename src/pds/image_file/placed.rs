@@ -75,6 +75,7 @@ impl Placed {
         // Lines are counted only where the image ends as it was sent: its last fragment is there, and nothing is left over.
         let last = fragments.all.last().filter(|_| fragments.has_last);
         let is_counted = last.is_some_and(|last| last.is_sound)
+            && lines == fragments.first.total_lines()
             && missing.is_multiple_of(BLOCK_LINES)
             && self.blocks.due() + END_BYTES >= stream.len();
         match *breaks {

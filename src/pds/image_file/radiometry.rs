@@ -64,13 +64,19 @@ const RED: [f64; 3] = [27.676_58, 0.001_336_91, 0.123_262];
 /// Until then summed pixels of the narrow-angle camera were added up, not averaged (UTC).
 const MAPPING_BEGAN: &str = "1999-04-03T01:00:40.441";
 
-/// A label that does not tell how numbers came of radiance.
+/// An image that does not tell how its numbers came of radiance.
 #[derive(Debug, thiserror::Error)]
-#[error("{key} is {value:?}; expected {expected}")]
-struct NotCalibrated {
-    key: &'static str,
-    value: String,
-    expected: &'static str,
+enum NotCalibrated {
+    #[error("{key} is {value:?}; expected {expected}")]
+    Label {
+        key: &'static str,
+        value: String,
+        expected: &'static str,
+    },
+    #[error(
+        "gain and offset change {changes} times within the image; the label has only those of its first line"
+    )]
+    Changes { changes: u16 },
 }
 
 impl Cause for NotCalibrated {
@@ -100,13 +106,17 @@ impl Radiometry {
     /// By the gain, offset and exposure in an image's label.
     ///
     /// # Errors
-    /// A value that is lacking or not of the camera.
+    /// A value that is lacking or not of the camera; gain and offset that change within the image.
     pub fn of(image: &ImageFile) -> Result<Self> {
+        let changes = image.layout().gain_changes;
+        if changes > 0 {
+            return Err(NotCalibrated::Changes { changes }.into());
+        }
         let fields = &image.label().fields;
         let names = &image.label().instrument.label;
         let is_narrow = names.instrument.ends_with("-NA");
         let is_red = names.filter.as_deref() == Some("RED");
-        let wrong = |key, expected| NotCalibrated {
+        let wrong = |key, expected| NotCalibrated::Label {
             key,
             value: image.value(key).unwrap_or_default().to_owned(),
             expected,

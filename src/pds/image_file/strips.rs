@@ -4,12 +4,13 @@ use std::{collections::VecDeque, fs::File, io};
 
 use super::{
     complaint::{Complaint, Complaints, Fault},
-    fragment::{Coding, FULL, Fragment, Fragments, HEADER, Layout},
+    fragment::{Coding, FULL, Fragment, Fragments, Layout},
     placed::Placed,
     predictive::BLOCK_LINES,
     stream::{Piece, Stream},
     strip::{LineState, Strip},
     transform::{AREA, EDGE, Fragment as Decoded, TransformCoder},
+    walk::HEADER,
 };
 
 /// Most blocks of a transform fragment that are believed: on board there were at most 1024.

@@ -109,25 +109,35 @@ pub(super) fn fields<'a>(
     columns: &'a [Column],
 ) -> Result<BTreeMap<&'a str, &'a str>, String> {
     let row = std::str::from_utf8(row).map_err(|_| "no text of ASCII".to_owned())?;
-    // Where the label tells places, a quote within a text does no harm.
-    let by_place = columns.iter().map(|column| {
-        let (start, length) = column.bytes?;
-        let field = row.get(start..start + length)?;
-        Some((&*column.name, field.trim_matches([' ', '"'])))
-    });
-    if let Some(fields) = by_place.collect::<Option<_>>() {
-        return Ok(fields);
-    }
     let separated = separated(row);
-    if separated.len() != columns.len() {
-        return Err(format!(
-            "{} fields; expected {}",
-            separated.len(),
-            columns.len()
-        ));
+    if separated.len() == columns.len() && separated.iter().all(|field| is_whole(field)) {
+        let separated = separated
+            .into_iter()
+            .map(|field| field.trim_matches('"').trim());
+        let names = columns.iter().map(|column| &*column.name);
+        return Ok(names.zip(separated).collect());
     }
-    let names = columns.iter().map(|column| &*column.name);
-    Ok(names.zip(separated).collect())
+    // A quote within a text hides separators: where the label tells places, they help.
+    let by_place = columns
+        .iter()
+        .map(|column| Some((&*column.name, at_place(row, column.bytes?)?)));
+    by_place
+        .collect::<Option<_>>()
+        .ok_or_else(|| match (separated.len(), columns.len()) {
+            (found, expected) if found == expected => "a quote within a field".to_owned(),
+            (found, expected) => format!("{found} fields; expected {expected}"),
+        })
+}
+
+/// The field at a place of the row, if it stands between separators there.
+fn at_place(row: &str, (start, length): (usize, usize)) -> Option<&str> {
+    let end = start.checked_add(length)?;
+    let field = row.get(start..end)?;
+    let before = row[..start].trim_end_matches([' ', '"']);
+    let after = row[end..].trim_start_matches([' ', '"']);
+    let is_separated = (before.is_empty() || before.ends_with(','))
+        && (after.is_empty() || after.starts_with(','));
+    is_separated.then(|| field.trim_matches([' ', '"']))
 }
 
 /// Fields between commas that stand outside of quotes.
@@ -137,9 +147,12 @@ fn separated(row: &str) -> Vec<&str> {
         is_quoted ^= character == '"';
         character == ',' && !is_quoted
     });
-    fields
-        .map(|field| field.trim().trim_matches('"').trim())
-        .collect()
+    fields.map(str::trim).collect()
+}
+
+/// Whether a field is within quotes or has none.
+fn is_whole(field: &str) -> bool {
+    !field.contains('"') || (field.len() > 1 && field.starts_with('"') && field.ends_with('"'))
 }
 
 #[cfg(test)]
@@ -151,22 +164,41 @@ mod tests {
     fn commas_within_quotes_separate_nothing() {
         assert_eq!(
             separated(r#""a, b  ", 1.5 ,"","c""#),
-            ["a, b", "1.5", "", "c"]
+            [r#""a, b  ""#, "1.5", r#""""#, r#""c""#]
         );
+    }
+
+    fn label_of(places: [(usize, usize); 2]) -> Vec<Column> {
+        let [(first, first_bytes), (second, second_bytes)] = places;
+        let text = format!(
+            "OBJECT = TABLE\nOBJECT = COLUMN\nNAME = PRODUCT_ID\nSTART_BYTE = {first}\nBYTES = {first_bytes}\nEND_OBJECT = COLUMN\n\
+             OBJECT = COLUMN\nNAME = LINES\nSTART_BYTE = {second}\nBYTES = {second_bytes}\nEND_OBJECT = COLUMN\nEND_OBJECT = TABLE\nEND\n"
+        );
+        of_label(&parse(text.as_bytes()).unwrap())
     }
 
     #[test]
     fn places_of_the_label_help_where_a_text_holds_a_quote() {
-        let label = parse(
-            b"OBJECT = TABLE\nOBJECT = COLUMN\nNAME = PRODUCT_ID\nSTART_BYTE = 2\nBYTES = 4\nEND_OBJECT = COLUMN\n\
-              OBJECT = COLUMN\nNAME = LINES\nSTART_BYTE = 8\nBYTES = 3\nEND_OBJECT = COLUMN\nEND_OBJECT = TABLE\nEND\n",
-        );
-        let columns = of_label(&label.unwrap());
+        let columns = label_of([(2, 4), (8, 3)]);
         let expected = BTreeMap::from([("PRODUCT_ID", "a\",b"), ("LINES", "12")]);
         assert_eq!(fields(br#""a",b",12 "#, &columns), Ok(expected));
         assert_eq!(
             fields(b"1,2,3", &columns),
             Err("3 fields; expected 2".to_owned())
         );
+    }
+
+    #[test]
+    fn places_without_separators_are_not_believed() {
+        // A row one byte off the places of its label is read by its separators.
+        let columns = label_of([(2, 4), (8, 3)]);
+        let expected = BTreeMap::from([("PRODUCT_ID", "abc"), ("LINES", "127")]);
+        assert_eq!(fields(br#""abc",127"#, &columns), Ok(expected));
+        // And with a quote too many there is nothing to read it by.
+        let refused = Err("1 fields; expected 2".to_owned());
+        assert_eq!(fields(br#""abx"c",127"#, &columns), refused);
+        let endless = label_of([(2, usize::MAX), (8, 3)]);
+        let refused = Err("a quote within a field".to_owned());
+        assert_eq!(fields(br#""a",b",12 "#, &endless), refused);
     }
 }

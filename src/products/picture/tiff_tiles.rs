@@ -71,6 +71,24 @@ impl TiffTiles {
     }
 }
 
+/// Room for what stands in a file beside its pixels: notes and tables of tiles, 8 bytes each of these.
+const TABLES_BYTES: u64 = 1 << 16;
+
+/// Bytes of the file, a little more than it will have.
+pub(super) fn bytes_of(head: &PictureHead) -> u64 {
+    let tile = TILE as u64;
+    let of_tile = tile * tile * head.bytes_of_pixel() as u64 + 8;
+    let (mut width, mut height) = (u64::from(head.width), u64::from(head.height));
+    let mut bytes = TABLES_BYTES;
+    loop {
+        bytes += width.div_ceil(tile) * height.div_ceil(tile) * of_tile;
+        if width <= tile && height <= tile {
+            return bytes;
+        }
+        (width, height) = (width.div_ceil(2), height.div_ceil(2));
+    }
+}
+
 /// Writes one size of the picture; the next smaller one. Only the largest has a description.
 fn write_level(
     encoder: &mut TiffEncoder<BufWriter<File>, TiffKindStandard>,
@@ -174,6 +192,24 @@ fn halved(band: &[u8], width: usize, bytes_of_pixel: usize) -> Vec<u8> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn sizes_are_those_of_all_tiles() {
+        let head = |width, height, is_deep| PictureHead {
+            width,
+            height,
+            is_deep,
+            notes: Vec::new(),
+        };
+        // 3 × 2, 2 × 1 and 1 tiles.
+        assert_eq!(
+            bytes_of(&head(640, 320, false)),
+            TABLES_BYTES + 9 * (65_536 + 8)
+        );
+        assert_eq!(bytes_of(&head(1, 1, true)), TABLES_BYTES + 131_072 + 8);
+        // The largest that headers can tell of.
+        assert!(bytes_of(&head(4080, 65_535 * 16, false)) > u64::from(u32::MAX));
+    }
 
     #[test]
     fn halves_are_means_and_odd_edges_stand_for_themselves() {

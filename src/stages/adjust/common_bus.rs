@@ -20,7 +20,7 @@ use crate::{
             View,
         },
         ellipsoid::local_axes,
-        pushbroom::ExteriorOrientation,
+        pushbroom::{ExteriorOrientation, Projector},
         statistics::Summary,
     },
 };
@@ -95,30 +95,11 @@ pub(super) fn add_spots<M: ExteriorOrientation>(
         };
         recorded.push((point, *profile));
         middles_m[*profile] += shot.ground.xyz_m;
-        let Some(range) = &shot.range else { continue };
-        let image = &images[range.image];
-        let Some((ground_m, by_boresight_m)) = met(image, range) else {
-            continue;
-        };
-        // Near an end of the image the laser looks beyond it.
-        let Ok(seen) = projectors[range.image].project(&ground_m) else {
-            continue;
-        };
-        let Ok(focal_px) = image.oriented_camera.detector.focal_px(&seen.camera_m) else {
-            continue;
-        };
-        if seen.x.abs() <= 0.5 * image.oriented_camera.lines() {
-            spots.push(Spot {
-                view: View {
-                    point,
-                    image: range.image,
-                    x_lines: seen.x,
-                    y_px: focal_px.y,
-                    sigma_px: Vector2::repeat(SPOT_SIGMA_PX),
-                },
-                by_boresight_m,
-            });
-        }
+        let ranges = shot.range.iter().chain(&shot.also);
+        spots.extend(ranges.filter_map(|range| {
+            let projector = &projectors[range.image];
+            spot_of(&images[range.image], projector, point, range)
+        }));
     }
     if spots.is_empty() {
         return Ok(Err(
@@ -140,6 +121,32 @@ pub(super) fn add_spots<M: ExteriorOrientation>(
         spots,
     });
     Ok(Ok(()))
+}
+
+/// The spot of a shot in an image; none where the laser looks beyond it, as near an end of the image.
+fn spot_of<M: ExteriorOrientation>(
+    image: &AdjustImage<M>,
+    projector: &Projector<'_, M>,
+    point: usize,
+    range: &ShotRange,
+) -> Option<Spot> {
+    let (ground_m, by_boresight_m) = met(image, range)?;
+    let seen = projector.project(&ground_m).ok()?;
+    let focal_px = image
+        .oriented_camera
+        .detector
+        .focal_px(&seen.camera_m)
+        .ok()?;
+    (seen.x.abs() <= 0.5 * image.oriented_camera.lines()).then(|| Spot {
+        view: View {
+            point,
+            image: range.image,
+            x_lines: seen.x,
+            y_px: focal_px.y,
+            sigma_px: Vector2::repeat(SPOT_SIGMA_PX),
+        },
+        by_boresight_m,
+    })
 }
 
 /// Where the laser meets the ground by the initial orientation of `image`, and how that moves with the angles of its boresight.

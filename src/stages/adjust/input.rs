@@ -91,6 +91,8 @@ pub struct LaserShot {
     pub ground: Position<MarsIau2000>,
     /// Its range, when an image was exposed from the same orbit meanwhile.
     pub range: Option<ShotRange>,
+    /// The same range from other images that were exposed at that instant: it is observed once, but seen in all of them.
+    pub also: Vec<ShotRange>,
 }
 
 /// Range of a shot that was fired while an image was exposed.

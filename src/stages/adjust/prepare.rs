@@ -179,7 +179,8 @@ pub fn prepare_adjustment<M: ExteriorOrientation>(
     let mut shots = Vec::new();
     for (index, profile) in profiles.iter().enumerate() {
         for row in &profile.rows {
-            let range = range_of(footprints, *row, &images);
+            let mut ranges = ranges_of(footprints, *row, &images).into_iter();
+            let range = ranges.next();
             if (range.is_some() || near.contains(row)) && taken.insert(*row) {
                 let at = *row as usize;
                 shots.push(LaserShot {
@@ -191,6 +192,7 @@ pub fn prepare_adjustment<M: ExteriorOrientation>(
                         footprints.radius_m[at],
                     )),
                     range,
+                    also: ranges.collect(),
                 });
             }
         }
@@ -208,22 +210,88 @@ pub fn prepare_adjustment<M: ExteriorOrientation>(
     (weighed.collect(), shots)
 }
 
-/// The range of a shot, when an image was exposed meanwhile whose positions are those of the spacecraft with the laser.
-fn range_of(
+/// The range of a shot from every image that was exposed meanwhile; see [`exposed`].
+fn ranges_of(
     footprints: &Footprints<MarsIau2000>,
     row: u32,
     images: &[(&ImageTimes, &Orientation)],
-) -> Option<ShotRange> {
+) -> Vec<ShotRange> {
     let instant = Et::from_seconds(footprints.et_s[row as usize]);
-    let image = images
-        .iter()
-        .position(|(times, _)| times.support.is_none() && times.exposures().contains(instant))?;
-    let (times, orientation) = images[image];
-    let x_lines = times.line_offset(instant);
-    Some(ShotRange {
-        image,
-        x_lines,
-        to_laser_m: orientation.to_spacecraft_m(x_lines),
-        range_m: footprints.range_m[row as usize],
-    })
+    let times: Vec<&ImageTimes> = images.iter().map(|(times, _)| *times).collect();
+    let ranges = exposed(&times, instant).into_iter().map(|image| {
+        let (times, orientation) = images[image];
+        let x_lines = times.line_offset(instant);
+        ShotRange {
+            image,
+            x_lines,
+            to_laser_m: orientation.to_spacecraft_m(x_lines),
+            range_m: footprints.range_m[row as usize],
+        }
+    });
+    ranges.collect()
+}
+
+/// The images that were exposed at an instant, the one with the shortest lines first, whatever their order in the site file:
+/// it places a shot most finely.
+fn exposed(images: &[&ImageTimes], instant: Et) -> Vec<usize> {
+    let meanwhile = images.iter().enumerate();
+    // Positions of support data are not those of the spacecraft with the laser.
+    let meanwhile = meanwhile
+        .filter(|(_, times)| times.support.is_none() && times.exposures().contains(instant));
+    let mut meanwhile: Vec<(usize, &&ImageTimes)> = meanwhile.collect();
+    meanwhile.sort_by(|(_, one), (_, other)| {
+        let [period_s, other_s] = [one, other].map(|times| times.line_times.mean_period_s());
+        period_s
+            .total_cmp(&other_s)
+            .then_with(|| one.id.cmp(&other.id))
+    });
+    meanwhile.into_iter().map(|(image, _)| image).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{config::usual_instrument, line_times::LineTimes, stages::tag_times::StartFrom};
+
+    fn image(id: &str, start_s: f64, lines: u32, period_s: f64) -> ImageTimes {
+        ImageTimes {
+            id: id.to_owned(),
+            instrument: usual_instrument().clone(),
+            line_times: LineTimes::even(Et::from_seconds(start_s), lines, period_s).unwrap(),
+            start_from: StartFrom::Sclk,
+            sclk_start: None,
+            utc_start: String::new(),
+            exposure_s: period_s,
+            downtrack_summing: 1,
+            crosstrack_summing: 1,
+            lines_delivered: lines,
+            samples: 512,
+            first_detector: 0,
+            support: None,
+            notes: Vec::new(),
+            remarks: Vec::new(),
+        }
+    }
+
+    #[test]
+    fn a_shot_belongs_to_every_image_of_its_instant_and_its_range_to_the_finest() {
+        let context = image("context", 0.0, 400, 0.1);
+        let narrow = image("narrow", 10.0, 10_000, 1e-3);
+        let twin = image("another", 10.0, 10_000, 1e-3);
+        let later = image("later", 60.0, 10_000, 1e-3);
+        let ids = |images: &[&ImageTimes], instant_s: f64| {
+            let found = exposed(images, Et::from_seconds(instant_s)).into_iter();
+            found
+                .map(|image| images[image].id.clone())
+                .collect::<Vec<_>>()
+        };
+        for images in [
+            [&context, &narrow, &twin, &later],
+            [&later, &twin, &narrow, &context],
+        ] {
+            assert_eq!(ids(&images, 15.0), ["another", "narrow", "context"]);
+            assert_eq!(ids(&images, 5.0), ["context"]);
+            assert!(ids(&images, 50.0).is_empty());
+        }
+    }
 }

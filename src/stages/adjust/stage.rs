@@ -52,7 +52,7 @@ stage_inputs! {
 
 impl Stage for Adjust<'_> {
     const NAME: &'static str = "adjust";
-    const METHOD: u32 = 6;
+    const METHOD: u32 = 7;
     type Output = Adjusted;
     stage_inputs!(fingerprint);
 

@@ -8,7 +8,9 @@ use crate::{
     footprints::AdjustmentModel,
     geom::bundle::Unknown,
     stages::{
-        adjust::{CorrectedImage, HEIGHTS_MIN, HeightSummary, ObservationType, PointKind},
+        adjust::{
+            CorrectedImage, HEIGHTS_MIN, HeightSummary, ObservationType, PointKind, TypeSummary,
+        },
         compare_pairs::PairComparison,
     },
 };
@@ -17,6 +19,8 @@ use crate::{
 pub(super) const HEIGHT_LOOSE_M: f64 = 20.0;
 /// Craters between the profiles make a smaller share than this of the tie points stand out.
 pub(super) const HEIGHT_OUTLIERS_FEW: f64 = 0.03;
+/// Among spots of the laser a larger share beyond their limit is no chance: it leaves one in a thousand there.
+const SPOTS_BEYOND_FEW: f64 = 0.05;
 /// A mean height within this many of its standard deviations is no contradiction.
 const HEIGHT_SIGMAS: f64 = 3.0;
 
@@ -93,6 +97,25 @@ impl AdjustmentEvidence<'_> {
             )),
             Ok(_) => None,
         }
+    }
+
+    /// Where the laser has spots in the images, if so many do not fit that some shots must be wrong.
+    pub(super) fn spots_beyond(&self) -> Option<&TypeSummary> {
+        let mut types = self.adjusted.summary.types.iter();
+        let spots = types.find(|of| of.kind == ObservationType::LaserSpot)?;
+        let few = SPOTS_BEYOND_FEW * spots.observations as f64;
+        (spots.beyond_limit as f64 > few).then_some(spots)
+    }
+
+    /// Spots that do not fit.
+    fn spots_spoiled(&self) -> Option<String> {
+        self.spots_beyond().map(|spots| {
+            format!(
+                "{} of {} coordinates of the laser in the images lie beyond 3.29 of their standard deviations: some shots are \
+                 recorded elsewhere than they were, or profiles and line times are worse than configured",
+                spots.beyond_limit, spots.observations
+            )
+        })
     }
 
     /// The limit on heights after the adjustment: within so many of its standard deviations nothing is contradicted.
@@ -299,6 +322,7 @@ impl AdjustmentEvidence<'_> {
             );
         }
         remarks.extend(self.laser_missing());
+        remarks.extend(self.spots_spoiled());
         let (left_out, ties) = (self.left_out(), self.ties.multi_image());
         let share = limits.rejected_share_max;
         if left_out as f64 > share * ties as f64 && 2 * left_out <= ties {

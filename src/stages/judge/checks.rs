@@ -297,12 +297,13 @@ fn boresight(of: &AdjustmentEvidence<'_>, limits: &LimitsConfig) -> Option<Check
     let Ok(found) = of.adjusted.boresight.as_ref()? else {
         return Some(Check::told(CheckKind::Boresight, "", Warning));
     };
-    let limit = limits.correction_max_sigma;
+    let is_clear = found.without.is_empty() && of.spots_beyond().is_none();
     let Some((unknown, sigmas)) = found.farthest.as_ref() else {
-        return Some(Check::told(CheckKind::Boresight, "", Warning));
+        return (!is_clear).then(|| Check::told(CheckKind::Boresight, "", Warning));
     };
+    let limit = limits.correction_max_sigma;
     let mut check = Check::new(CheckKind::Boresight, unknown, *sigmas, limit, Fail);
-    if check.outcome == Pass && !found.without.is_empty() {
+    if check.outcome == Pass && !is_clear {
         check.outcome = Warning;
     }
     Some(check)

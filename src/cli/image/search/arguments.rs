@@ -19,8 +19,9 @@ use crate::{
 /// degrees of latitude (areographic or areocentric), 0.3 degrees of longitude over cos(latitude) (prime meridian). So
 /// nothing is lost, and images just beside a window are found too; `areograph run` tells what an image shows.
 ///
-/// Pairs are images of different orbits with common ground. Best first: overlap × min(convergence / 20°, 1) ×
-/// cos²(difference of the Sun / 2) / ratio of the pixels.
+/// Pairs are images of different orbits (by the index, else by times more than 30 minutes apart) with common ground. Best
+/// first: overlap × min(convergence / 20°, 1) × cos²(difference of the Sun / 2) / ratio of the pixels. Convergence is the
+/// angle between the rays to the spacecraft, each at the centre of its own image: lines are seen one by one.
 ///
 /// Example: areograph image search cumindex.tab --box 137.0,138.0,-5.5,-4.0
 #[derive(Debug, Args)]
@@ -79,13 +80,21 @@ fn known_cameras() -> String {
     ids.join(", ")
 }
 
-/// The camera of an image by its names in the index.
-pub(super) fn camera_of(image: &IndexedImage) -> Option<&'static Instrument> {
+/// The cameras that an image may be of by its names in the index: several where these are lacking.
+pub(super) fn cameras_of(image: &IndexedImage) -> impl Iterator<Item = &'static Instrument> + '_ {
     let [instrument, filter] = &image.instrument;
-    built_in_instruments().iter().find(|camera| {
+    let may_be = |own: &str, found: &str| found.is_empty() || own == found;
+    built_in_instruments().iter().filter(move |camera| {
         let own_filter = camera.label.filter.as_deref();
-        camera.label.instrument == *instrument && own_filter.is_none_or(|own| own == filter)
+        may_be(&camera.label.instrument, instrument)
+            && own_filter.is_none_or(|own| may_be(own, filter))
     })
+}
+
+/// The camera of an image, where the index tells it.
+pub(super) fn camera_of(image: &IndexedImage) -> Option<&'static Instrument> {
+    let mut cameras = cameras_of(image);
+    cameras.next().filter(|_| cameras.next().is_none())
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -129,15 +138,13 @@ impl Arguments {
 
     /// Whether camera, angles and pixels of an image are as wanted; what the index does not say is no reason to leave it out.
     pub(super) fn wants(&self, image: &IndexedImage) -> bool {
-        let Some(camera) = camera_of(image) else {
-            return false;
-        };
         let within = |value: Option<f64>, most: Option<f64>| {
             value.zip(most).is_none_or(|(value, most)| value <= most)
         };
         let radians = |degrees: Option<f64>| degrees.map(|degrees| degrees * RADIANS_PER_DEGREE);
         let [emission_rad, incidence_rad, _] = image.angles_rad;
-        (self.cameras.is_empty() || self.cameras.contains(&camera.id))
+        let mut cameras = cameras_of(image);
+        (self.cameras.is_empty() || cameras.any(|camera| self.cameras.contains(&camera.id)))
             && within(emission_rad, radians(self.emission_max_deg))
             && within(incidence_rad, radians(self.incidence_max_deg))
             && within(image.pixel_m, self.pixel_max_m)

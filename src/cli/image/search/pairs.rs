@@ -2,7 +2,8 @@
 
 use super::{Found, RADIUS_M};
 use crate::{
-    geom::image_outline::{angle_rad, view},
+    geom::image_outline::{Sight, angle_rad, convergence_rad},
+    pds::image_index::IndexedImage,
     units::RADIANS_PER_DEGREE,
 };
 
@@ -12,7 +13,9 @@ pub(super) struct Pair<'a> {
     pub(super) images: [&'a Found; 2],
     /// Share of the smaller outline.
     pub(super) overlap: f64,
-    /// Angle between the rays to the spacecraft at one place; where the index tells where it was.
+    /// Whether index or times say that they are of different orbits.
+    pub(super) is_known_apart: bool,
+    /// Angle between the rays to the spacecraft, see [`convergence_rad`]; where the index tells where it was.
     pub(super) convergence_rad: Option<f64>,
     /// Larger pixel over smaller one.
     pub(super) pixel_ratio: Option<f64>,
@@ -24,6 +27,9 @@ pub(super) struct Pair<'a> {
 
 /// Convergence from which on more is not better, radians.
 const CONVERGENCE_RAD: f64 = 20.0 * RADIANS_PER_DEGREE;
+
+/// Images that are this close in time are of one orbit, seconds; an orbit of the mapping mission takes 118 minutes.
+const ONE_ORBIT_S: i64 = 1_800;
 
 /// All pairs, the best first.
 pub(super) fn pairs(found: &[Found]) -> Vec<Pair<'_>> {
@@ -39,25 +45,13 @@ pub(super) fn pairs(found: &[Found]) -> Vec<Pair<'_>> {
 fn pair(images: [&Found; 2]) -> Option<Pair<'_>> {
     let [one, other] = images;
     let overlap = one.outline.overlap(&other.outline);
-    // Context images are taken in the same seconds as those of the narrow angle: no base between them.
-    let is_same_time = one.image.utc_start.get(..16) == other.image.utc_start.get(..16);
-    if overlap <= 0.0 || is_same_time {
+    let is_one_orbit = is_one_orbit(&one.image, &other.image);
+    // Context images are taken together with those of the narrow angle: no base between them.
+    if overlap <= 0.0 || is_one_orbit == Some(true) {
         return None;
     }
-    // Both look at the middle between their centres.
-    let middle_rad = middle([one.centre_rad, other.centre_rad]);
-    let ray = |found: &Found| {
-        let image = &found.image;
-        Some(view(
-            middle_rad,
-            image.sub_spacecraft_rad?,
-            RADIUS_M,
-            image.altitude_m?,
-        ))
-    };
-    let convergence_rad = ray(one)
-        .zip(ray(other))
-        .map(|(one, other)| one.angle(&other));
+    let sights = sight(one).zip(sight(other));
+    let convergence_rad = sights.map(|(one, other)| convergence_rad(&one, &other, RADIUS_M));
     let suns = one.image.sub_solar_rad.zip(other.image.sub_solar_rad);
     let sun_rad = suns.map(|(one, other)| angle_rad(one, other));
     let pixels = one.image.pixel_m.zip(other.image.pixel_m);
@@ -67,6 +61,7 @@ fn pair(images: [&Found; 2]) -> Option<Pair<'_>> {
     Some(Pair {
         images,
         overlap,
+        is_known_apart: is_one_orbit.is_some(),
         convergence_rad,
         pixel_ratio,
         sun_rad,
@@ -74,7 +69,21 @@ fn pair(images: [&Found; 2]) -> Option<Pair<'_>> {
     })
 }
 
-fn middle([one, other]: [[f64; 2]; 2]) -> [f64; 2] {
-    let step = crate::units::longitude_step_rad(other[0] - one[0]);
-    [one[0] + 0.5 * step, 0.5 * (one[1] + other[1])]
+fn sight(found: &Found) -> Option<Sight> {
+    Some(Sight {
+        centre_rad: found.centre_rad,
+        below_rad: found.image.sub_spacecraft_rad?,
+        altitude_m: found.image.altitude_m?,
+    })
+}
+
+/// Whether two images are of one orbit: by its number in their mission phase, else by their times; none where neither is
+/// known.
+fn is_one_orbit(one: &IndexedImage, other: &IndexedImage) -> Option<bool> {
+    let orbits = one.orbit.as_ref().zip(other.orbit.as_ref());
+    let by_number = orbits.map(|(one, other)| one == other);
+    by_number.or_else(|| {
+        let apart = one.utc()? - other.utc()?;
+        Some(apart.num_seconds().abs() <= ONE_ORBIT_S)
+    })
 }

@@ -22,6 +22,10 @@ fn decimals(value: Option<f64>) -> String {
     value.map_or_else(String::new, |value| format!("{value:.2}"))
 }
 
+fn count(value: Option<u32>) -> String {
+    value.map_or_else(String::new, |value| value.to_string())
+}
+
 /// Identifier as site files have it.
 fn id(found: &Found) -> String {
     found.image.product_id.replace('/', "-")
@@ -52,12 +56,8 @@ const IMAGES: [ImageColumn; 19] = [
     }),
     ("quality", |found| found.image.quality.clone()),
     ("windows", |found| found.windows.join(";")),
-    ("crosstrack_summing", |found| {
-        found.image.summing[0].to_string()
-    }),
-    ("downtrack_summing", |found| {
-        found.image.summing[1].to_string()
-    }),
+    ("crosstrack_summing", |found| count(found.image.summing[0])),
+    ("downtrack_summing", |found| count(found.image.summing[1])),
     ("file", |found| found.image.file.clone()),
     ("rationale", |found| found.image.rationale.clone()),
 ];
@@ -159,9 +159,6 @@ fn lines<const N: usize>(rows: impl Iterator<Item = [String; N]>) {
 /// Outlines with what is known of each image.
 pub(super) fn geojson(found: &[Found], pairs: &[Pair<'_>]) -> Value {
     let features = found.iter().map(|found| {
-        let corners = found.outline.corners_rad();
-        let ring = corners.iter().chain(corners.first());
-        let ring: Vec<[f64; 2]> = ring.map(|corner| corner.map(rounded_degrees)).collect();
         let partners = pairs.iter().filter_map(|pair| match pair.images {
             [one, other] if std::ptr::eq(one, found) => Some(id(other)),
             [one, other] if std::ptr::eq(other, found) => Some(id(one)),
@@ -180,11 +177,28 @@ pub(super) fn geojson(found: &[Found], pairs: &[Pair<'_>]) -> Value {
         json!({
             "type": "Feature",
             "id": id(found),
-            "geometry": {"type": "Polygon", "coordinates": [ring]},
+            "geometry": geometry(found),
             "properties": properties,
         })
     });
     json!({"type": "FeatureCollection", "features": features.collect::<Vec<_>>()})
+}
+
+/// The outline, in several polygons where it crosses the antimeridian or holds a pole.
+fn geometry(found: &Found) -> Value {
+    let rings = found.outline.rings_rad().into_iter();
+    let polygons: Vec<[Vec<[f64; 2]>; 1]> = rings
+        .map(|ring| {
+            [ring
+                .into_iter()
+                .map(|place| place.map(rounded_degrees))
+                .collect()]
+        })
+        .collect();
+    match &polygons[..] {
+        [polygon] => json!({"type": "Polygon", "coordinates": polygon}),
+        _ => json!({"type": "MultiPolygon", "coordinates": polygons}),
+    }
 }
 
 /// To 0.0001°, finer than the index.
@@ -198,8 +212,9 @@ pub(super) fn toml(found: &[Found]) {
         let image = &found.image;
         output::line("[[images]]");
         output::line(format_args!("id = {:?}", id(found)));
-        if let Some(camera) = camera_of(image) {
-            output::line(format_args!("instrument = {:?}", camera.id));
+        match camera_of(image) {
+            Some(camera) => output::line(format_args!("instrument = {:?}", camera.id)),
+            None => output::line("# instrument: the index does not say which camera this is of"),
         }
         match &image.sclk_start {
             Some(clock) => output::line(format_args!("sclk_start = {clock:?}")),
@@ -211,8 +226,12 @@ pub(super) fn toml(found: &[Found]) {
                 exposure_s / SECONDS_PER_MS
             ));
         }
-        output::line(format_args!("downtrack_summing = {}", image.summing[1]));
-        output::line(format_args!("crosstrack_summing = {}", image.summing[0]));
+        let [across, along] = image.summing;
+        for (key, summing) in [("downtrack_summing", along), ("crosstrack_summing", across)] {
+            if let Some(summing) = summing {
+                output::line(format_args!("{key} = {summing}"));
+            }
+        }
         output::line(format_args!("lines_header = {}", image.size[1]));
         output::line(format_args!("samples = {}", image.size[0]));
         if let Some(first_detector) = image.first_detector {
