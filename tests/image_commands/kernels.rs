@@ -10,7 +10,6 @@ use nalgebra::Vector3;
 use serde_json::Value;
 
 use super::{
-    areograph,
     common::{json, mission::mission},
     stdout, text,
 };
