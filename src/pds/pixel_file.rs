@@ -96,7 +96,7 @@ impl Cause for PixelFileError {
             }
             Self::Short { .. } => "fetch or write the cube again: it is cut off",
             Self::Picture { .. } => {
-                "give a whole picture of one band of grey, with 8, 16 or 32 bits a pixel"
+                "give a whole picture of one band of grey with 8, 16 or 32 bits a pixel, a TIFF without compression"
             }
         }
         .to_owned()

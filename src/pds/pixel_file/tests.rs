@@ -1,6 +1,6 @@
 //! Damaged files of every kind: no panic, and memory that does not follow what they claim.
 
-use std::{fs, sync::LazyLock};
+use std::{io::Write as _, sync::LazyLock};
 
 use proptest::{collection::vec, prelude::*, sample::Index};
 
@@ -69,8 +69,8 @@ static WHOLE: LazyLock<Vec<Vec<u8>>> = LazyLock::new(|| {
 
 /// Lines and largest strip of a file, pixels; `None` of one that is refused.
 fn read(bytes: &[u8]) -> Option<(usize, usize)> {
-    let file = tempfile::NamedTempFile::new().unwrap();
-    fs::write(file.path(), bytes).unwrap();
+    let mut file = tempfile::NamedTempFile::new().unwrap();
+    file.write_all(bytes).unwrap();
     let image = PixelFile::open(file.path(), built_in_instruments()).ok()?;
     let mut strips = image.strips().ok()?;
     let (mut lines, mut largest) = (0, 0);
