@@ -33,7 +33,7 @@ pub enum PixelFile {
     /// An image as the archive has it.
     Archive(Box<ImageFile>),
     /// Anything else.
-    Other(OtherFile),
+    Other(Box<OtherFile>),
 }
 
 /// A cube or a picture.
@@ -96,7 +96,7 @@ impl Cause for PixelFileError {
             }
             Self::Short { .. } => "fetch or write the cube again: it is cut off",
             Self::Picture { .. } => {
-                "give a whole picture of one band of grey, with 8, 16 or 32 bits a pixel"
+                "give a whole picture of one band of grey with 8, 16 or 32 bits a pixel, a TIFF without compression"
             }
         }
         .to_owned()
@@ -115,30 +115,28 @@ impl PixelFile {
             .in_file(path)?;
         let read = file.take(LABEL_BYTES_MAX as u64).read_to_end(&mut start);
         read.map_err(IoError::on("read")).in_file(path)?;
-        let kind = if let Some(picture) = Picture::recognise(&start) {
-            OtherKind::Picture(picture)
-        } else {
-            let label = parse(&start).in_file(path)?;
-            if !is_cube(&label) {
-                return Ok(Self::Archive(Box::new(ImageFile::open(path, cameras)?)));
-            }
-            let cube = Cube::of(&label, path).in_file(path)?;
-            return Ok(Self::Other(OtherFile {
-                path: path.to_owned(),
-                size: cube.size(),
-                kind: OtherKind::Cube(cube),
-                // A cube need not be of a camera that is known.
-                label: image_label(&label, cameras).ok(),
-            }));
-        };
-        let mut other = OtherFile {
+        if let Some(picture) = Picture::recognise(&start) {
+            let size = picture.rows(path).in_file(path)?.size();
+            return Ok(Self::other(path, OtherKind::Picture(picture), size, None));
+        }
+        let label = parse(&start).in_file(path)?;
+        if !is_cube(&label) {
+            return Ok(Self::Archive(Box::new(ImageFile::open(path, cameras)?)));
+        }
+        let cube = Cube::of(&label, path).in_file(path)?;
+        let size = cube.size();
+        // A cube need not be of a camera that is known.
+        let label = image_label(&label, cameras).ok();
+        Ok(Self::other(path, OtherKind::Cube(cube), size, label))
+    }
+
+    fn other(path: &Path, kind: OtherKind, size: [u32; 2], label: Option<ImageLabel>) -> Self {
+        Self::Other(Box::new(OtherFile {
             path: path.to_owned(),
             kind,
-            size: [0; 2],
-            label: None,
-        };
-        other.size = other.rows()?.size();
-        Ok(Self::Other(other))
+            size,
+            label,
+        }))
     }
 
     /// Where the file is.
@@ -204,7 +202,7 @@ impl PixelFile {
     /// The system's refusal to read; pictures that their libraries refuse.
     pub fn strips(&self) -> Result<PixelStrips> {
         let source = match self {
-            Self::Archive(image) => Source::Archive(image.strips()?),
+            Self::Archive(image) => Source::Archive(Box::new(image.strips()?)),
             Self::Other(other) => {
                 let scale = other.scale()?;
                 Source::Rows {
@@ -260,7 +258,7 @@ pub struct PixelStrips {
 
 #[derive(Debug)]
 enum Source {
-    Archive(Strips),
+    Archive(Box<Strips>),
     Rows {
         rows: Box<dyn Rows>,
         scale: Scale,
@@ -329,3 +327,6 @@ fn strip(numbers: &[f64], scale: Scale, first_line: u32, samples: u32) -> Strip 
         states: numbers.chunks_exact(samples as usize).map(state).collect(),
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -13,11 +13,11 @@ use super::{
 use crate::{
     error::Result,
     products::{Picture, SiteProducts, anaglyph, piece, strip},
-    stages::lay_overlays::{Mark, Overlays, Place, PlaceView, ShownImage, Subject},
+    stages::lay_overlays::{CHIP_EDGE, Mark, Overlays, Place, PlaceView, ShownImage, Subject},
 };
 
 /// Pixels of all whole images on the page: with the pieces it stays below 5 MB, whatever they show.
-const STRIP_PIXELS: u64 = 1_500_000;
+const STRIP_PIXELS: u64 = 2_300_000;
 
 pub(super) const SECTION: Section = Section {
     title: "Images and footprints",
@@ -207,10 +207,10 @@ fn title(site: &SiteProducts, subject: &Subject) -> String {
 }
 
 fn caption(site: &SiteProducts, place: &Place) -> String {
-    let edge_m = place.pixel_m * crate::stages::lay_overlays::CHIP_EDGE as f64;
+    let edge_m = place.pixel_m * CHIP_EDGE as f64;
     let mut words = match &place.subject {
         Subject::Footprint { row, .. } => format!("Row {row} of footprints.parquet. "),
-        Subject::Tie { why, .. } => format!("{why}. "),
+        Subject::Tie { why, .. } => format!("Reason: {why}. "),
     };
     let _infallible = write!(
         words,
@@ -218,15 +218,13 @@ fn caption(site: &SiteProducts, place: &Place) -> String {
         label(place.pixel_m, 1),
         label(edge_m, 0)
     );
-    for view in &place.views {
-        if let Some(moved_m) = view.moved_m {
-            let id = &site.images[view.image].times.id;
-            let _infallible = write!(
-                words,
-                " The adjustment moves it by {} m in {id}.",
-                label(moved_m, 1)
-            );
-        }
+    let moved = place.views.iter().filter_map(|view| {
+        let id = &site.images[view.image].times.id;
+        Some(format!("by {} m in {id}", label(view.moved_m?, 1)))
+    });
+    let moved: Vec<String> = moved.collect();
+    if !moved.is_empty() {
+        let _infallible = write!(words, " The adjustment moves it {}.", moved.join(", "));
     }
     words
 }

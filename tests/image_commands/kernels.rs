@@ -1,6 +1,6 @@
 //! Corners of an index held against kernels.
 
-use std::{fs, path::Path};
+use std::{fs, path::Path, process::Command};
 
 use areograph::{
     config::usual_instrument,
@@ -10,7 +10,6 @@ use nalgebra::Vector3;
 use serde_json::Value;
 
 use super::{
-    areograph,
     common::{json, mission::mission},
     stdout, text,
 };
@@ -65,16 +64,11 @@ fn searched(folder: &Path, rows: &str) -> (Vec<Value>, String) {
     let index = folder.join("cumindex.tab");
     fs::write(&index, rows).unwrap();
     let metakernel = mission().join("kernels/gsfc.tm");
-    let output = areograph(&[
-        "search",
-        text(&index),
-        "--box",
-        "80,100,-10,20",
-        "--kernels",
-        text(&metakernel),
-        "--format",
-        "geojson",
-    ]);
+    // Not quiet: warnings count.
+    let mut search = Command::new(env!("CARGO_BIN_EXE_areograph"));
+    search.args(["image", "search", text(&index), "--box", "80,100,-10,20"]);
+    search.args(["--kernels", text(&metakernel), "--format", "geojson"]);
+    let output = search.output().unwrap();
     let told = String::from_utf8(output.stderr.clone()).unwrap();
     let answer: Value = serde_json::from_str(&stdout(&output)).unwrap();
     (answer["features"].as_array().unwrap().clone(), told)

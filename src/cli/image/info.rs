@@ -10,7 +10,7 @@ use crate::{
     config::built_in_instruments,
     error::Error,
     pds::{
-        image_file::{Coding, Complaint, ImageFile, Statistics},
+        image_file::{Coding, Complaint, Complaints, ImageFile, Statistics},
         pixel_file::PixelFile,
     },
     units::SECONDS_PER_MS,
@@ -70,10 +70,7 @@ fn info(path: &Path) -> Result<Value, Error> {
     let value = |key: &str| archive.and_then(|image| image.value(key));
     let opened = archive.map(ImageFile::complaints);
     let (decoded, decoded_count) = strips.complaints();
-    let texts = opened
-        .into_iter()
-        .flat_map(|opened| opened.kept())
-        .chain(decoded);
+    let texts = opened.into_iter().flat_map(Complaints::kept).chain(decoded);
     let milliseconds = |seconds: Option<f64>| seconds.map(|seconds| seconds / SECONDS_PER_MS);
     Ok(json!({
         "file": path,
@@ -107,7 +104,7 @@ fn info(path: &Path) -> Result<Value, Error> {
         "distinct_values": pixels.distinct,
         "zeros": pixels.zeros,
         "pixels_blake3": pixels.blake3,
-        "complaint_count": opened.map_or(0, |opened| opened.count()) + decoded_count,
+        "complaint_count": opened.map_or(0, Complaints::count) + decoded_count,
         "complaints": texts.map(Complaint::to_string).collect::<Vec<_>>(),
     }))
 }
@@ -131,7 +128,7 @@ fn coding(coding: Option<Coding>) -> String {
 fn print(answer: &Value) {
     for (key, value) in answer.as_object().into_iter().flatten() {
         match value {
-            Value::Array(texts) => {
+            Value::Array(texts) if texts.iter().all(Value::is_string) => {
                 for text in texts.iter().take(COMPLAINTS_PRINTED) {
                     output::line(format_args!("  {}", text.as_str().unwrap_or_default()));
                 }

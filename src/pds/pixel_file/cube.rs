@@ -7,7 +7,7 @@ use std::{fmt, fs::File, io, os::unix::fs::FileExt as _, path::Path};
 
 use super::{
     PixelFileError,
-    rows::{LINES_MAX, Rows, SAMPLES_MAX},
+    rows::{LINES_MAX, Rows, SAMPLES_MAX, fits},
 };
 use crate::{
     error::{IoError, Result},
@@ -155,6 +155,15 @@ impl Cube {
             samples: core.count("DIMENSIONS", "SAMPLES", SAMPLES_MAX)?,
             tile,
         };
+        if let Some([lines, _]) = cube.tile
+            && !fits(lines, cube.samples)
+        {
+            Err(refused(
+                "TILELINES",
+                &lines.to_string(),
+                "tiles of which a row across the image has at most 16 million pixels",
+            ))?;
+        }
         let found = path.metadata().map_err(IoError::on("read"))?.len();
         let expected = cube.start.saturating_add(cube.pixel_bytes());
         if found < expected {

@@ -7,7 +7,7 @@ use tiff::decoder::{ChunkType, Decoder, DecodingResult};
 
 use super::{
     PixelFileError,
-    rows::{LINES_MAX, Rows, SAMPLES_MAX},
+    rows::{LINES_MAX, Rows, SAMPLES_MAX, fits},
 };
 use crate::error::{IoError, Result};
 
@@ -115,6 +115,11 @@ impl TiffRows {
         if across == 0 || down == 0 {
             return Err(Picture::Tiff.refused("strips or tiles without pixels"));
         }
+        if !fits(down.min(lines), samples) {
+            return Err(Picture::Tiff.refused(format!(
+                "strips or tiles of {down} lines; expected at most 16 million pixels in a row of them"
+            )));
+        }
         Ok(Self {
             decoder,
             size,
@@ -126,9 +131,6 @@ impl TiffRows {
 
     fn numbers(&mut self, chunk: u32) -> std::result::Result<Vec<f64>, PixelFileError> {
         let refused = |error: tiff::TiffError| Picture::Tiff.refused(error);
-        fn all<T: Into<f64>>(numbers: Vec<T>) -> Vec<f64> {
-            numbers.into_iter().map(Into::into).collect()
-        }
         Ok(match self.decoder.read_chunk(chunk).map_err(refused)? {
             DecodingResult::U8(numbers) => all(numbers),
             DecodingResult::U16(numbers) => all(numbers),
@@ -143,6 +145,10 @@ impl TiffRows {
             }
         })
     }
+}
+
+fn all<T: Into<f64>>(numbers: Vec<T>) -> Vec<f64> {
+    numbers.into_iter().map(Into::into).collect()
 }
 
 impl Rows for TiffRows {

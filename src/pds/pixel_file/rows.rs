@@ -7,6 +7,14 @@ pub(super) const SAMPLES_MAX: u32 = 65_536;
 /// The same of an image, lines.
 pub(super) const LINES_MAX: u32 = 10_000_000;
 
+/// Most numbers that are read at a time: those of a row of tiles.
+const NUMBERS_MAX: u64 = 1 << 24;
+
+/// Whether so many lines can be read at a time.
+pub(super) fn fits(lines: u32, samples: u32) -> bool {
+    u64::from(lines) * u64::from(samples) <= NUMBERS_MAX
+}
+
 /// Reads an image from its first line to its last.
 pub(super) trait Rows: std::fmt::Debug {
     /// Lines and samples.

@@ -68,8 +68,8 @@ impl Canvas {
         self.stamp(&shape(mark), [column, row].map(whole), ink);
     }
 
-    /// Writes a number to the right of a place, or to its left where there is no room.
-    pub(super) fn number(&mut self, number: usize, [column, row]: [f64; 2]) {
+    /// Writes a number beside a place: to its right, or to its left if that is wanted or there is no room.
+    pub(super) fn number(&mut self, number: usize, [column, row]: [f64; 2], to_left: bool) {
         let text = number.to_string();
         let digits = text.bytes().map(|digit| usize::from(digit - b'0'));
         let length = ADVANCE * i64::try_from(text.len()).unwrap_or(i64::MAX);
@@ -77,7 +77,8 @@ impl Canvas {
         let beside = 4 * DOT;
         let right = column + beside;
         let has_room = right + length <= i64::from(self.width);
-        let left = if has_room {
+        let has_room_left = column - beside >= length;
+        let left = if has_room && !(to_left && has_room_left) {
             right
         } else {
             column - beside - length
@@ -199,7 +200,10 @@ mod tests {
         ] {
             let mut canvas = Canvas::new(&[100; 1600], [40, 40], [50, 150]);
             canvas.mark(mark, [20.3, 11.8]);
-            assert_eq!(middle(&canvas, ink), [20.5, 11.5], "{mark:?}");
+            // Means of whole and half numbers.
+            let [column, row] = middle(&canvas, ink);
+            let off = (column - 20.5).hypot(row - 11.5);
+            assert!(off < 1e-9, "{mark:?}: {column} {row}");
             let untouched = canvas.pixels[11 * 40 + 20];
             assert_eq!(untouched, 124, "{mark:?}");
             // Beyond the edge only a part of it is drawn.
@@ -211,15 +215,18 @@ mod tests {
     #[test]
     fn numbers_stand_beside_their_place_inside_the_picture() {
         let mut canvas = Canvas::new(&[100; 4000], [100, 40], [50, 150]);
-        canvas.number(10, [20.0, 20.0]);
+        canvas.number(10, [20.0, 20.0], true);
         let [column, row] = middle(&canvas, TEXT);
         assert!(
             (28.0..44.0).contains(&column) && (19.0..21.5).contains(&row),
             "{column} {row}"
         );
         let mut canvas = Canvas::new(&[100; 4000], [100, 40], [50, 150]);
-        canvas.number(10, [90.0, 20.0]);
+        canvas.number(10, [90.0, 20.0], false);
         assert!(middle(&canvas, TEXT)[0] < 82.0);
+        let mut canvas = Canvas::new(&[100; 4000], [100, 40], [50, 150]);
+        canvas.number(10, [50.0, 20.0], true);
+        assert!(middle(&canvas, TEXT)[0] < 42.0);
     }
 
     #[test]

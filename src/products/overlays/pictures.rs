@@ -13,7 +13,7 @@ use crate::{
 };
 
 /// Least distance of two marks, pixels: of footprints that lie closer only some are drawn.
-const MARKS_APART: f64 = 9.0;
+const MARKS_APART: f64 = 18.0;
 /// Least distance of two numbers, pixels.
 const NUMBERS_APART: f64 = 60.0;
 /// Share of the darkest and of the brightest pixels of a piece that are shown as black and as white.
@@ -67,7 +67,9 @@ pub(crate) fn strip(site: &SiteProducts, image: usize, pixels_max: u64) -> Resul
     }
     for footprint in shown().filter(|of| of.number % number_step == 0) {
         if let Some(at) = footprint.after.or(footprint.before) {
-            canvas.number(footprint.number, place(at));
+            // Profiles lie side by side.
+            let to_left = footprint.profile % 2 == 1;
+            canvas.number(footprint.number, place(at), to_left);
         }
     }
     Ok(Some(Picture {
@@ -113,6 +115,7 @@ pub(crate) fn anaglyph(first: &Chip, second: &Chip) -> Result<Picture> {
     of_piece(&pixels.collect::<Vec<_>>(), palette.collect())
 }
 
+#[allow(clippy::cast_possible_truncation, reason = "a small number")]
 const EDGES: [u32; 2] = [CHIP_EDGE as u32; 2];
 
 fn of_piece(pixels: &[u8], palette: Vec<u8>) -> Result<Picture> {
@@ -220,7 +223,7 @@ mod tests {
     fn two_pieces_that_agree_are_grey() {
         let chip = Chip {
             pixels: (0..CHIP_EDGE * CHIP_EDGE)
-                .map(|place| (place % 251) as u8)
+                .map(|place| u8::try_from(place % 251).unwrap())
                 .collect(),
             marks: Vec::new(),
         };

@@ -241,8 +241,8 @@ fn lines_of(strip: &Strip) -> impl Iterator<Item = (u32, &[u8], LineState)> {
 fn reduction(width: u32, height: u32, pixels_max: u64) -> u32 {
     let pixels =
         |factor: u32| u64::from(width.div_ceil(factor)) * u64::from(height.div_ceil(factor));
-    let least = (1..).find(|factor| pixels(*factor) <= pixels_max.max(1));
-    least.unwrap_or(u32::MAX)
+    let least = (1..=width.max(height)).find(|factor| pixels(*factor) <= pixels_max.max(1));
+    least.unwrap_or(width.max(height).max(1))
 }
 
 /// Numbers below and above which a small share of the pixels lies.
@@ -308,10 +308,8 @@ impl Reduced {
         let from = self.row as usize * self.width as usize;
         let row = self.pixels.iter_mut().skip(from).zip(&mut self.sums);
         for (pixel, (sum, count)) in row {
-            if *count > 0 {
-                *pixel = u8::try_from((*sum + *count / 2) / *count)
-                    .unwrap_or(u8::MAX)
-                    .max(1);
+            if let Some(mean) = (*sum + *count / 2).checked_div(*count) {
+                *pixel = u8::try_from(mean).unwrap_or(u8::MAX).max(1);
             }
             (*sum, *count) = (0, 0);
         }

@@ -42,14 +42,15 @@ pub(super) fn compare(found: &mut [Found], metakernel: &Path) -> Result<()> {
         }
     }
     distances_m.sort_by(f64::total_cmp);
-    match distances_m.last() {
-        Some(largest_m) => tracing::info!(
+    if let Some(largest_m) = distances_m.last() {
+        tracing::info!(
             "corners of {} images against the kernels: median {:.1} km, largest {:.1} km",
             distances_m.len(),
             kilometres(distances_m[distances_m.len() / 2]),
             kilometres(*largest_m)
-        ),
-        None => tracing::warn!("the kernels cover none of the images with corners"),
+        );
+    } else {
+        tracing::warn!("the kernels cover none of the images with corners");
     }
     Ok(())
 }
