@@ -3,7 +3,7 @@
 use std::sync::atomic::AtomicBool;
 
 use super::{
-    orientation::{CameraReader, GroundPoint, Nodes, support_tables},
+    orientation::{CameraReader, CameraTables, GroundPoint, Nodes},
     tag_times::ImageTimes,
 };
 use crate::{
@@ -75,7 +75,7 @@ impl OutlineWindows<'_> {
     /// Outline of what an image sees, by its support data or by the kernels.
     fn seen(&self, times: &ImageTimes) -> Result<Option<Vec<GroundPoint>>> {
         if let Some(support) = &times.support {
-            let nodes = Nodes::new(&support_tables(&support.tables));
+            let nodes = Nodes::new(&CameraTables::of_support(&support.tables));
             return GroundPoint::outline(times, |et| Ok(nodes.camera(et)));
         }
         let reader = CameraReader {

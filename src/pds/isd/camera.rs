@@ -67,40 +67,46 @@ impl FocalLine {
     }
 }
 
+/// The same line along Y of the camera's own axes.
+struct PlacedLine {
+    /// About the boresight, from the sensor's axes to the camera's.
+    turn_rad: f64,
+    pitch_mm: f64,
+    boresight_px: f64,
+    along_track_px: f64,
+    samples_along: Sense,
+}
+
+impl PlacedLine {
+    /// Of the two ways to turn a line into the Y axis the shorter one.
+    fn of(line: &FocalLine) -> Self {
+        let pitch_mm = line.step_mm.norm();
+        let (samples_along, up_mm) = if line.step_mm.y < 0.0 {
+            (Sense::MinusY, -line.step_mm)
+        } else {
+            (Sense::PlusY, line.step_mm)
+        };
+        let turn_rad = (-up_mm.x).atan2(up_mm.y);
+        let edge_mm = frame_rotation_3(turn_rad).fixed_view::<2, 2>(0, 0) * line.edge_mm;
+        Self {
+            turn_rad,
+            pitch_mm,
+            boresight_px: -samples_along.sign() * edge_mm.y / pitch_mm,
+            along_track_px: edge_mm.x / pitch_mm,
+            samples_along,
+        }
+    }
+}
+
 /// The camera, and the turn from the sensor's axes to its own.
 pub(super) fn camera(
     document: &Object<'_>,
     image: Samples,
     sensor_mounting: &Matrix3<f64>,
 ) -> Result<(Instrument, Matrix3<f64>), IsdError> {
-    let line = FocalLine::of(document)?;
-    let focal_length_mm = document
-        .object("focal_length_model")?
-        .number("focal_length", FOCAL_LENGTH_MM)?;
-    let pitch_mm = line.step_mm.norm();
-    // Of the two ways to turn the line into the Y axis the shorter one.
-    let (samples_along, up_mm) = if line.step_mm.y < 0.0 {
-        (Sense::MinusY, -line.step_mm)
-    } else {
-        (Sense::PlusY, line.step_mm)
-    };
-    let angle_rad = (-up_mm.x).atan2(up_mm.y);
-    let turn = frame_rotation_3(angle_rad);
-    let edge_mm = turn.fixed_view::<2, 2>(0, 0) * line.edge_mm;
-    let mounted = turn * sensor_mounting;
+    let line = PlacedLine::of(&FocalLine::of(document)?);
+    let turn = frame_rotation_3(line.turn_rad);
     let sensor = document.text("name_sensor")?;
-    let platform = document.text("name_platform")?;
-    let pointing = document.object("instrument_pointing")?;
-    let code = |codes: Vec<i64>, last: bool| {
-        let code = if last { codes.last() } else { codes.first() };
-        code.and_then(|code| i32::try_from(*code).ok())
-            .unwrap_or_default()
-    };
-    let turning = code(pointing.codes("time_dependent_frames")?, false);
-    let fixed = match pointing.has("constant_frames") {
-        true => code(pointing.codes("constant_frames")?, false),
-        false => turning,
-    };
     let instrument = Instrument {
         id: identifier(sensor),
         name: sensor.to_owned(),
@@ -109,25 +115,21 @@ pub(super) fn camera(
             filter: None,
             serial: identifier(sensor),
         },
-        naif: NaifNames {
-            instrument: fixed,
-            frame: frame_name(sensor, angle_rad),
-            bus: turning,
-            bus_frame: format!("frame {turning} of {platform}"),
-            kernel: String::new(),
-        },
-        mounting: mounting(&mounted),
+        naif: naif_names(document, frame_name(sensor, line.turn_rad))?,
+        mounting: mounting(&(turn * sensor_mounting)),
         optics: Optics {
-            focal_length_mm,
-            pixel_pitch_mm: pitch_mm,
+            focal_length_mm: document
+                .object("focal_length_model")?
+                .number("focal_length", FOCAL_LENGTH_MM)?,
+            pixel_pitch_mm: line.pitch_mm,
         },
         detector: DetectorLine {
             pixels: image.first_detector + image.samples * image.crosstrack_summing,
-            boresight_px: -samples_along.sign() * edge_mm.y / pitch_mm,
-            along_track_px: edge_mm.x / pitch_mm,
-            samples_along,
+            boresight_px: line.boresight_px,
+            along_track_px: line.along_track_px,
+            samples_along: line.samples_along,
         },
-        distortion: distortion(document, angle_rad)?,
+        distortion: distortion(document, line.turn_rad)?,
         summing: SummingLimits {
             max: image.crosstrack_summing.max(image.downtrack_summing),
             variable_codes: Vec::new(),
@@ -144,6 +146,31 @@ pub(super) fn camera(
             format!("coefficients with which samples follow each other; with these {folded}"),
         )),
     }
+}
+
+/// Numbers of the camera and of the bus, from the chain of frames between J2000 and the camera.
+fn naif_names(document: &Object<'_>, frame: String) -> Result<NaifNames, IsdError> {
+    let platform = document.text("name_platform")?;
+    let pointing = document.object("instrument_pointing")?;
+    let first = |key: &str| -> Result<i32, IsdError> {
+        let code = pointing.codes(key)?.first().copied();
+        Ok(code
+            .and_then(|code| i32::try_from(code).ok())
+            .unwrap_or_default())
+    };
+    let bus = first("time_dependent_frames")?;
+    let instrument = if pointing.has("constant_frames") {
+        first("constant_frames")?
+    } else {
+        bus
+    };
+    Ok(NaifNames {
+        instrument,
+        frame,
+        bus,
+        bus_frame: format!("frame {bus} of {platform}"),
+        kernel: String::new(),
+    })
 }
 
 /// Angles of a rotation `[yaw]₃ [pitch]₂ [roll]₁`.

@@ -1,5 +1,7 @@
 //! Values of a JSON document, with messages that name their keys.
 
+use std::fmt;
+
 use serde_json::Value;
 
 use crate::error::{Cause, Kind};
@@ -50,7 +52,7 @@ struct Found<'a> {
 }
 
 impl Found<'_> {
-    fn refused(&self, expected: impl ToString) -> IsdError {
+    fn refused(&self, expected: impl fmt::Display) -> IsdError {
         let value = self.value.to_string();
         let mut shown: String = value.chars().take(SHOWN).collect();
         if shown.len() < value.len() {
@@ -96,7 +98,7 @@ impl Found<'_> {
     fn row<const N: usize>(&self) -> Result<[f64; N], IsdError> {
         let expected = format!("{N} finite numbers");
         let entries = self.entries(&expected)?;
-        let numbers = entries.iter().map(|entry| entry.finite());
+        let numbers = entries.iter().map(Found::finite);
         let numbers: Vec<f64> = numbers.collect::<Result<_, _>>()?;
         numbers.try_into().map_err(|_| self.refused(expected))
     }
@@ -114,7 +116,7 @@ impl<'a> Object<'a> {
         })
     }
 
-    fn find(&self, key: &str, expected: impl ToString) -> Result<Found<'a>, IsdError> {
+    fn find(&self, key: &str, expected: impl fmt::Display) -> Result<Found<'a>, IsdError> {
         let path = match &*self.path {
             "" => key.to_owned(),
             path => format!("{path}.{key}"),
@@ -129,8 +131,8 @@ impl<'a> Object<'a> {
     }
 
     /// That `key` is not what was expected.
-    pub(super) fn refused(&self, key: &str, expected: impl ToString) -> IsdError {
-        match self.find(key, expected.to_string()) {
+    pub(super) fn refused(&self, key: &str, expected: impl fmt::Display) -> IsdError {
+        match self.find(key, &expected) {
             Ok(found) => found.refused(expected),
             Err(missing) => missing,
         }
@@ -205,14 +207,14 @@ impl<'a> Object<'a> {
         if !(1..=max).contains(&entries.len()) {
             return Err(found.refused(expected));
         }
-        entries.iter().map(|entry| entry.finite()).collect()
+        entries.iter().map(Found::finite).collect()
     }
 
     /// Codes of NAIF.
     pub(super) fn codes(&self, key: &str) -> Result<Vec<i64>, IsdError> {
         let found = self.find(key, "whole numbers")?;
         let entries = found.entries("whole numbers")?;
-        entries.iter().map(|entry| entry.code()).collect()
+        entries.iter().map(Found::code).collect()
     }
 
     /// Rows of `N` numbers, one or more.
@@ -223,7 +225,7 @@ impl<'a> Object<'a> {
         if entries.is_empty() {
             return Err(found.refused(expected));
         }
-        entries.iter().map(|entry| entry.row()).collect()
+        entries.iter().map(Found::row).collect()
     }
 
     /// Epochs, increasing, two or more.
@@ -233,7 +235,7 @@ impl<'a> Object<'a> {
         let entries = found.entries(EXPECTED)?;
         let epochs: Vec<f64> = entries
             .iter()
-            .map(|entry| entry.finite())
+            .map(Found::finite)
             .collect::<Result<_, _>>()?;
         if epochs.len() < 2 {
             return Err(found.refused(EXPECTED));

@@ -11,7 +11,6 @@ use serde::{Deserialize, Serialize};
 pub(super) use light_time::RayOrigin;
 pub use light_time::{LightTimeEffect, OtherConvention};
 pub(super) use reader::CameraReader;
-pub(super) use support::support_tables;
 pub(super) use tables::{Camera, Nodes};
 pub use tables::{CameraTables, InterpolationCheck};
 

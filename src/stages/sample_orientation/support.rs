@@ -11,7 +11,7 @@ use crate::{
     pds::isd::SupportTables,
     stages::{
         orientation::{
-            GroundPoint, LightTimeEffect, Nodes, Orientation, OrientationSample, support_tables,
+            CameraTables, GroundPoint, LightTimeEffect, Nodes, Orientation, OrientationSample,
         },
         tag_times::ImageTimes,
     },
@@ -27,7 +27,7 @@ pub(super) fn support_orientation(
     support: &SupportTables,
     epochs: &[Et],
 ) -> Result<Orientation> {
-    let tables = support_tables(support);
+    let tables = CameraTables::of_support(support);
     let nodes = Nodes::new(&tables);
     let middle = nodes.camera(image.middle());
     let boresight = middle.to_mars.matrix() * Vector3::z();
