@@ -31,6 +31,10 @@ async function look(browser, file, view) {
   if (wide > view.width) problems.push(`scrolls sideways: ${wide} of ${view.width} pixels`);
   const name = path.resolve(file).split(path.sep).slice(-3).filter(Boolean).join('-').replace(/\.html$/, '');
   await page.screenshot({ path: path.join(pictures, `${name}-${view.name}.png`), fullPage: true });
+  // Paper, once a page.
+  if (view.scheme === 'light' && view.width > 1000) {
+    await page.pdf({ path: path.join(pictures, `${name}.pdf`), format: 'A4', preferCSSPageSize: true });
+  }
   await page.addScriptTag({ content: axe });
   const { violations } = await page.evaluate(() => axe.run());
   for (const { impact, id, help, nodes } of violations) {

@@ -1,0 +1,181 @@
+//! The report and the products beside it: it is made again from them, and a notebook reads them.
+
+#![allow(
+    clippy::unwrap_used,
+    clippy::disallowed_methods,
+    reason = "helpers of tests work in temporary folders and may fail loudly"
+)]
+
+mod common;
+#[path = "exchange/readers.rs"]
+#[allow(dead_code, reason = "the readers serve several tests")]
+mod readers;
+
+use std::{
+    fs,
+    path::{Path, PathBuf},
+    process::Command,
+    sync::LazyLock,
+};
+
+use common::{
+    golden::assert_messages,
+    mission::{areograph, mission, succeed},
+};
+use serde_json::Value;
+use tempfile::TempDir;
+
+/// Products of Gusev crater, run once for all tests of this file.
+static GUSEV: LazyLock<PathBuf> = LazyLock::new(|| {
+    let out = Path::new(env!("CARGO_TARGET_TMPDIR")).join("report_products");
+    let _ = fs::remove_dir_all(&out);
+    let mut run = areograph();
+    run.args(["--quiet", "run"])
+        .arg(mission().join("sites/gusev_crater.toml"));
+    succeed(run.arg("--out").arg(&out));
+    out
+});
+
+fn gusev() -> PathBuf {
+    GUSEV.join("gusev_crater")
+}
+
+/// A copy of the products alone, without stage outputs, in a folder of another name.
+fn copy() -> TempDir {
+    let copy = tempfile::tempdir().unwrap();
+    let folder = copy.path().join("elsewhere");
+    for relative in common::mission::products(&gusev()).keys() {
+        let target = folder.join(relative);
+        fs::create_dir_all(target.parent().unwrap()).unwrap();
+        fs::copy(gusev().join(relative), target).unwrap();
+    }
+    copy
+}
+
+fn report(folder: &TempDir) -> Command {
+    let mut report = areograph();
+    report
+        .current_dir(folder.path())
+        .args(["--quiet", "report"]);
+    report
+}
+
+#[test]
+fn the_page_is_made_again_from_products_alone() {
+    let copy = copy();
+    let written = fs::read(gusev().join("report/index.html")).unwrap();
+    let page = copy.path().join("elsewhere/report/index.html");
+    // Missing and spoiled pages come back as they were; a page elsewhere leaves the products alone.
+    fs::remove_file(&page).unwrap();
+    succeed(report(&copy).arg("elsewhere"));
+    assert!(fs::read(&page).unwrap() == written);
+    fs::write(&page, "spoiled").unwrap();
+    succeed(report(&copy).args(["elsewhere", "--page", "again.html"]));
+    assert!(fs::read(copy.path().join("again.html")).unwrap() == written);
+    assert_eq!(fs::read(&page).unwrap(), b"spoiled");
+    succeed(report(&copy).arg("elsewhere"));
+    assert!(fs::read(&page).unwrap() == written);
+    // What it was made from tells nothing of the machine.
+    let data = fs::read(gusev().join("report/page.postcard")).unwrap();
+    for folder in [mission(), gusev()] {
+        let folder = folder.to_string_lossy().into_owned();
+        let told = data
+            .windows(folder.len())
+            .any(|bytes| bytes == folder.as_bytes());
+        assert!(!told, "{folder}");
+    }
+}
+
+/// Sets the manifest's entry of a product to what is there.
+fn vouch_for(folder: &Path, path: &str) {
+    let manifest = folder.join("manifest.json");
+    let mut entries: Value = serde_json::from_slice(&fs::read(&manifest).unwrap()).unwrap();
+    let bytes = fs::read(folder.join(path)).unwrap();
+    let mut products = entries["products"].as_array_mut().unwrap().iter_mut();
+    let product = products.find(|product| product["path"] == path).unwrap();
+    product["bytes"] = bytes.len().into();
+    product["blake3"] = blake3::hash(&bytes).to_hex().to_string().into();
+    fs::write(manifest, serde_json::to_vec(&entries).unwrap()).unwrap();
+}
+
+type Spoil = fn(&Path);
+
+#[test]
+fn products_that_the_page_cannot_be_made_from_are_refused() {
+    let spoiled: [(&str, Spoil); 7] = [
+        ("no folder", |folder| fs::remove_dir_all(folder).unwrap()),
+        ("no manifest", |folder| {
+            fs::remove_file(folder.join("manifest.json")).unwrap()
+        }),
+        ("a product is missing", |folder| {
+            fs::remove_file(folder.join("report/page.postcard")).unwrap();
+        }),
+        ("another product was changed", |folder| {
+            fs::write(folder.join("kernels.tm"), "mine").unwrap();
+        }),
+        (
+            "what the page is made from is cut, and the manifest says so too",
+            |folder| {
+                let path = folder.join("report/page.postcard");
+                let bytes = fs::read(&path).unwrap();
+                fs::write(&path, &bytes[..bytes.len() / 2]).unwrap();
+                vouch_for(folder, "report/page.postcard");
+            },
+        ),
+        ("another version", |folder| {
+            let path = folder.join("manifest.json");
+            let manifest = fs::read_to_string(&path).unwrap();
+            let version = format!("\"version\": \"{}\"", env!("CARGO_PKG_VERSION"));
+            assert!(manifest.contains(&version));
+            fs::write(path, manifest.replace(&version, "\"version\": \"0.0.9\"")).unwrap();
+        }),
+        ("another page was published", |folder| {
+            fs::write(folder.join("report/index.html"), "another").unwrap();
+            vouch_for(folder, "report/index.html");
+        }),
+    ];
+    let mut told = Vec::new();
+    for (what, spoil) in spoiled {
+        let copy = copy();
+        spoil(&copy.path().join("elsewhere"));
+        let output = report(&copy).arg("elsewhere").output().unwrap();
+        assert!(output.stdout.is_empty());
+        let text = String::from_utf8(output.stderr).unwrap();
+        // Sizes and hashes are those of this run.
+        let text = text.replace(&copy.path().display().to_string(), "");
+        let text: Vec<&str> = text.split("; expected").collect();
+        let first = text[0].split(" with the hash").next().unwrap();
+        told.push((
+            what,
+            format!("exit {}\n{first}", output.status.code().unwrap()),
+        ));
+        let left = copy.path().join("elsewhere/report/index.html");
+        let published = fs::read(gusev().join("report/index.html")).unwrap();
+        let changed = what == "another page was published" || what == "no folder";
+        assert!(changed || fs::read(left).unwrap() == published, "{what}");
+    }
+    assert_messages("report_again_refused", &told);
+}
+
+#[test]
+fn the_notebook_reads_the_products_and_finds_their_numbers() {
+    let Some(mut run) = readers::python("notebook.py", "the_notebook_reads_the_products") else {
+        return;
+    };
+    let notebook = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/notebooks/first_site.ipynb");
+    let printed = readers::output(run.arg(notebook).arg(gusev()));
+    let document = common::json(&gusev().join("adjustment.json"));
+    for (column, round) in [
+        ("above_surface_m", "before"),
+        ("adjusted_above_surface_m", "after"),
+    ] {
+        let heights = &document[round]["heights"]["above_surface_m"];
+        let median_m = heights["median"].as_f64().unwrap();
+        let told = format!(
+            "median of {column}: {median_m:.3} m of {} tie points",
+            heights["n"]
+        );
+        assert!(printed.contains(&told), "{told}\n{printed}");
+    }
+    assert!(printed.contains("gusev_crater valid") && printed.contains("figures: 3"));
+}
