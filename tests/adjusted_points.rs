@@ -14,7 +14,6 @@ use areograph::{
     error::Kind,
     frames::Position,
     geom::ellipsoid::{Spherical, spherical_to_xyz_m},
-    image::ImageFields,
     pds::ties::read_ties,
     products::{
         ControlMeasure, ControlNetwork, ControlPoint, GroundEstimate, ImageMeasure, LidarPoint,
@@ -245,9 +244,7 @@ fn serial_numbers_are_those_of_a_real_network() {
     let image = ImageConfig {
         id: "m01-00115".to_owned(),
         label: Some(label),
-        instrument: None,
-        serial_number: None,
-        fields: ImageFields::default(),
+        ..ImageConfig::default()
     };
     let mut times = tag_times(&[image], &session).unwrap().remove(0);
     let serial = isis_serial_number(&times).unwrap();

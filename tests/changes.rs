@@ -277,7 +277,7 @@ fn changed(site: &Table, key: &DeclaredKey, names: &[&str]) -> Vec<Table> {
 
 /// What keys that name something may be changed to: files beside those of the site, orbit solutions, images, a clock and
 /// a time a little off those of the labels. A key takes what its form and its use accept.
-const NAMES: [&str; 19] = [
+const NAMES: [&str; 20] = [
     "kernels/gsfc.tm",
     "kernels/mgs_gsfc_scene.bsp",
     "kernels/mars_iau1991.tpc",

@@ -345,12 +345,12 @@ fn example_and_schema_are_made_from_the_declarations() {
 fn takes(kind: &ValueKind, value: &toml::Value) -> bool {
     match (kind, value) {
         (ValueKind::Text { empty }, toml::Value::String(text)) => *empty || !text.is_empty(),
-        (ValueKind::Form { .. }, toml::Value::String(_)) => true,
+        (ValueKind::Form { .. }, toml::Value::String(_))
+        | (ValueKind::Switch, toml::Value::Boolean(_)) => true,
         (ValueKind::Number(accept), toml::Value::Float(number)) => accept.takes(*number),
         (ValueKind::Whole { low, high }, toml::Value::Integer(number)) => {
             (low..=high).contains(&number)
         }
-        (ValueKind::Switch, toml::Value::Boolean(_)) => true,
         (ValueKind::Word(words), toml::Value::String(text)) => {
             words.iter().any(|word| word.word == text)
         }

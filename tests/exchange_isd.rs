@@ -13,7 +13,6 @@ use std::fs;
 use areograph::{
     config::{ImageConfig, KernelsConfig, OrientationConfig, PointingConfig, usual_instrument},
     geom::light_time::LightTime,
-    image::ImageFields,
     kernel_source::{KernelList, KernelSource},
     products::write_products,
     spice::{KernelSet, Session},
@@ -58,9 +57,7 @@ fn real_with(test: &str, summing: u32, light_time: LightTime) -> Option<Real> {
     let image = ImageConfig {
         id: "m04-02852".to_owned(),
         label: Some(folder.join("m0402852_isis.lbl")),
-        instrument: None,
-        serial_number: None,
-        fields: ImageFields::default(),
+        ..ImageConfig::default()
     };
     let kernels = KernelsConfig {
         source: KernelSource::Listed(KernelList::Files(files)),

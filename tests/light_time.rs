@@ -203,7 +203,7 @@ fn from_spacecraft_m(
     let mgs = session.state(et).unwrap();
     let position_m = to_mars * mgs.position.xyz_m;
     match light_time {
-        LightTime::None => Vector3::zeros(),
+        LightTime::None | LightTime::Support => Vector3::zeros(),
         LightTime::Centre => {
             to_mars * session.apparent_state(et).unwrap().position.xyz_m - position_m
         }

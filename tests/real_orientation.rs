@@ -12,7 +12,6 @@ use std::{fs, path::PathBuf};
 use areograph::{
     config::{ImageConfig, KernelsConfig, OrientationConfig, PointingConfig, usual_instrument},
     geom::light_time::LightTime,
-    image::ImageFields,
     kernel_source::{KernelList, KernelSource},
     spice::{KernelSet, Session},
     stages::{
@@ -29,9 +28,7 @@ fn image(id: &str, label: PathBuf) -> ImageConfig {
     ImageConfig {
         id: id.to_owned(),
         label: Some(label),
-        instrument: None,
-        serial_number: None,
-        fields: ImageFields::default(),
+        ..ImageConfig::default()
     }
 }
 

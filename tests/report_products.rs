@@ -105,7 +105,7 @@ fn products_that_the_page_cannot_be_made_from_are_refused() {
     let spoiled: [(&str, Spoil); 7] = [
         ("no folder", |folder| fs::remove_dir_all(folder).unwrap()),
         ("no manifest", |folder| {
-            fs::remove_file(folder.join("manifest.json")).unwrap()
+            fs::remove_file(folder.join("manifest.json")).unwrap();
         }),
         ("a product is missing", |folder| {
             fs::remove_file(folder.join("report/page.postcard")).unwrap();

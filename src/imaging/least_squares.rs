@@ -230,7 +230,7 @@ fn joined(equations: &Equations, inverse: &Normals, size: [usize; 2]) -> Matrix2
         .rows
         .iter()
         .zip(&equations.left)
-        .map(|(row, left)| &influence * row * *left)
+        .map(|(row, left)| influence * row * *left)
         .collect();
     let weight = |lag: usize| 1.0 - lag as f64 / (JOINED_PX + 1) as f64;
     let lagged = |down: usize, right: isize| -> Matrix2<f64> {

@@ -216,7 +216,7 @@ fn borrowed<'a>(images: &'a [Image]) -> Vec<ImageProducts<'a>> {
     images.collect()
 }
 
-fn geometric<'a>(of: GeometricProducts<'a>) -> Geometric<'a> {
+fn geometric(of: GeometricProducts<'_>) -> Geometric<'_> {
     Geometric {
         ties: Cow::Borrowed(of.ties),
         intersected: Cow::Borrowed(of.intersected),

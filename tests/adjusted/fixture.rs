@@ -7,7 +7,6 @@ use areograph::{
     constants::MARS_IAU2000,
     frames::{MarsIau2000, Position},
     geom::{ellipsoid::ray_meets_ellipsoid, light_time::LightTime, mars_rotation::mars_matrix},
-    image::ImageFields,
     kernel_source::{KernelList, KernelSource},
     scene::{SceneErrors, SceneOptions, write_scene},
     spice::{KernelSet, Session},
@@ -65,9 +64,7 @@ impl Image {
         let config = ImageConfig {
             id: id.to_owned(),
             label: Some(label),
-            instrument: None,
-            serial_number: None,
-            fields: ImageFields::default(),
+            ..ImageConfig::default()
         };
         let times = tag_times(&[config], &session).unwrap().remove(0);
         let orientation =
@@ -141,6 +138,7 @@ pub(crate) fn kernel_camera(
     let to_inertial = to_camera.matrix().transpose();
     let geometric_m = session.state(et).unwrap().position.xyz_m;
     match image.light_time {
+        LightTime::Support => unreachable!("kernels have no support data"),
         LightTime::None => (to_mars * geometric_m, to_mars * to_inertial),
         LightTime::Centre => {
             let seen_m = session.apparent_state(et).unwrap().position.xyz_m;

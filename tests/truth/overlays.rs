@@ -343,7 +343,6 @@ fn strips(folder: &Path, ids: [&str; 2], places: &[BTreeMap<u32, [f64; 2]>]) {
         }
         assert!(rows.len() > 20, "{id}: {} marks", rows.len());
         let mean = rows.iter().sum::<f64>() / rows.len() as f64;
-        println!("{id}: {} marks, {mean:.2} rows from truth", rows.len());
         means_m.push(mean * reduction * line_m);
     }
     // Rounding to a pixel of three lines averages out over twenty marks to a tenth of it.

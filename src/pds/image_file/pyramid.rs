@@ -111,8 +111,9 @@ impl Pyramid {
         let is_good = &self.levels[0].is_good;
         let end = lines.end.min(is_good.len());
         let (mut longest, mut start) = (lines.start..lines.start, lines.start);
-        for line in lines.start..end {
-            if !is_good[line] {
+        let known = is_good.iter().enumerate().take(end).skip(lines.start);
+        for (line, is_good) in known {
+            if !is_good {
                 start = line + 1;
             } else if line + 1 - start > longest.len() {
                 longest = start..line + 1;

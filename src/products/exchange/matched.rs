@@ -7,6 +7,7 @@ use super::{
     points::ImageMeasure,
 };
 use crate::{
+    config::ImageConfig,
     pds::ties::ties_table,
     products::{
         GeometricProducts, SiteProducts,
@@ -30,7 +31,7 @@ pub(in crate::products) static TABLE: Declaration = Declaration {
             .config
             .images
             .iter()
-            .map(|image| image.name_in_ties())
+            .map(ImageConfig::name_in_ties)
             .collect();
         let ties: Vec<TiePoint<String>> = matched(geometric.ties)
             .map(|tie| named(tie, &names))

@@ -88,7 +88,10 @@ pub(super) fn heights<M>(
     let factor = variance_factor(assembled, adjustment);
     let [east_m, north_m, up_m] = mean_sigma_m(adjustment, factor)?;
     let compared = &adjustment.compared;
-    let moved_m = compared.iter().filter(is_beyond).map(|of| of.above_m);
+    let moved_m = compared
+        .iter()
+        .filter(|of| is_beyond(of))
+        .map(|of| of.above_m);
     let moved_m = moved_m.sum::<f64>() / compared.len().max(1) as f64;
     let for_height = |of: &&RejectedPoint| matches!(of.reason, RejectionReason::Height { .. });
     Some(HeightSummary {
@@ -117,10 +120,10 @@ pub(super) fn mean_sigma_m(adjustment: &Adjustment, variance_factor: f64) -> Opt
 
 /// Heights beyond the limit of the test.
 pub(super) fn beyond_limit(heights: &[HeightResidual]) -> usize {
-    heights.iter().filter(is_beyond).count()
+    heights.iter().filter(|of| is_beyond(of)).count()
 }
 
-fn is_beyond(height: &&HeightResidual) -> bool {
+fn is_beyond(height: &HeightResidual) -> bool {
     // Written so that NaN counts.
     !(height.above_m.abs() <= BAARDA_LIMIT * height.sigma_m())
 }

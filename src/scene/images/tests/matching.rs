@@ -9,7 +9,6 @@ use std::{
     collections::BTreeMap,
     fs,
     path::{Path, PathBuf},
-    process::Command,
     time::Instant,
 };
 
@@ -79,13 +78,13 @@ impl Mission {
                 Some(_) => "match = true",
                 None => line,
             };
-            with_pixels += &format!("{line}\n");
+            with_pixels.extend([line, "\n"]);
             if let Some(id) = line
                 .strip_prefix("id = \"E")
                 .and_then(|id| id.strip_suffix('"'))
             {
-                let name = format!("e{}", id.replace('-', ""));
-                with_pixels += &format!("pixels = \"../images/{name}.imq\"\n");
+                let name = id.replace('-', "");
+                with_pixels.extend(["pixels = \"../images/e", &name, ".imq\"\n"]);
             }
         }
         let path = self.folder.join(format!("sites/matched_{site}.toml"));
