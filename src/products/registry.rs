@@ -3,7 +3,7 @@
 use super::{
     adjusted_footprints, adjusted_kernels, adjustment, correlations,
     exchange::{adjusted, geopackage, jigsaw, readme, shapefile, stac, tables},
-    footprints, heights, isd, kernel_report, orientation, page, page_data,
+    figures, footprints, heights, isd, kernel_report, orientation, page, page_data,
     product::Declaration,
     ranges, registration, ties,
 };
@@ -35,6 +35,7 @@ pub(super) static PRODUCTS: &[&Declaration] = &[
     &adjusted_kernels::POSITION,
     &adjusted_kernels::METAKERNEL,
     &page::PAGE,
+    &figures::FIGURE,
     &page_data::DATA,
     &page::METAKERNEL,
     &tables::LOLA_LIKE,
