@@ -67,10 +67,11 @@ fn the_first_lines_tell_how_far_images_disagree_before_and_after() {
     assert!(told.contains(&words), "{words}\n{told}");
     let minus = |value: f64| format!("{value:+.1}").replace('-', "−");
     let heights = format!(
-        "<b>{} m</b> median of {} tie points; {} m before the adjustment",
+        "<b>{} m</b> median of {} tie points, controlled by MOLA; {} m of {} before, independent of it",
         minus(site.adjusted_heights.above_m.median),
-        site.heights.above_m.n,
-        minus(site.heights.above_m.median)
+        site.adjusted_heights.above_m.n,
+        minus(site.heights.above_m.median),
+        site.heights.above_m.n
     );
     let images = format!(
         "<b>{:.2} m</b> at the tie points of {}; {:.0} m before",

@@ -1,12 +1,18 @@
-//! The report and the products beside it: it is made again from them, and a notebook reads them.
+//! The report and the products beside it: it is made again from them, its links lead to them, its numbers are theirs.
 
 #![allow(
     clippy::unwrap_used,
+    clippy::panic,
     clippy::disallowed_methods,
     reason = "helpers of tests work in temporary folders and may fail loudly"
 )]
 
 mod common;
+#[path = "report_products/numbers.rs"]
+mod numbers;
+#[path = "report_geometric/page.rs"]
+#[allow(dead_code, reason = "the reader of pages serves several tests")]
+mod page;
 #[path = "exchange/readers.rs"]
 #[allow(dead_code, reason = "the readers serve several tests")]
 mod readers;
@@ -155,6 +161,65 @@ fn products_that_the_page_cannot_be_made_from_are_refused() {
         assert!(changed || fs::read(left).unwrap() == published, "{what}");
     }
     assert_messages("report_again_refused", &told);
+}
+
+#[test]
+fn every_link_leads_to_a_product_and_every_product_has_one() {
+    let folder = gusev();
+    let page = fs::read_to_string(folder.join("report/index.html")).unwrap();
+    let targets = page
+        .split("href=\"")
+        .skip(1)
+        .map(|rest| rest.split('"').next().unwrap());
+    let files: Vec<&str> = targets
+        .filter(|target| !target.starts_with('#') && !target.starts_with("data:"))
+        .collect();
+    for target in &files {
+        // The page over all sites is written after the last of them.
+        let path = folder.join("report").join(target);
+        assert!(path.exists(), "{target}");
+    }
+    let manifest = common::json(&folder.join("manifest.json"));
+    for product in manifest["products"].as_array().unwrap() {
+        let path = product["path"].as_str().unwrap();
+        let link = path.strip_prefix("report/figures/").map_or_else(
+            || format!("../{path}"),
+            |figure| format!("figures/{figure}"),
+        );
+        assert!(files.contains(&link.as_str()), "{link}");
+    }
+}
+
+#[test]
+fn every_figure_is_a_file_with_number_legend_and_caption() {
+    let folder = gusev();
+    let page = fs::read_to_string(folder.join("report/index.html")).unwrap();
+    let figures: Vec<&str> = page.split("<figure id=\"").skip(1).collect();
+    assert!(figures.len() > 15, "{}", figures.len());
+    for (place, figure) in figures.iter().enumerate() {
+        let id = figure.split('"').next().unwrap();
+        let svg = fs::read_to_string(folder.join(format!("report/figures/{id}.svg"))).unwrap();
+        assert!(svg.contains(&format!(">Figure {}. ", place + 1)), "{id}");
+        assert_eq!(svg.matches("<svg").count(), svg.matches("</svg>").count());
+        // All words of legend and caption, however the lines break.
+        let words = |html: &str| -> String {
+            let text = html.split('<').filter_map(|part| part.split_once('>'));
+            let text: Vec<&str> = text.map(|(_, text)| text.trim()).collect();
+            text.join(" ")
+                .split_whitespace()
+                .collect::<Vec<_>>()
+                .join(" ")
+        };
+        let caption = figure.split("-words\">").nth(1).unwrap();
+        let caption = words(&format!("<>{}", caption.split("</span>").next().unwrap()));
+        assert!(words(&svg).contains(&caption), "{id}: {caption}");
+        for key in figure.split("<i ").skip(1) {
+            let label = key.split("</i>").nth(1).unwrap().split('<').next().unwrap();
+            assert!(svg.contains(&format!(">{label}</text>")), "{id}: {label}");
+        }
+    }
+    let files = fs::read_dir(folder.join("report/figures")).unwrap().count();
+    assert_eq!(files, figures.len());
 }
 
 #[test]

@@ -24,8 +24,10 @@ pub(super) struct Arguments {
 #[derive(Debug, Subcommand)]
 enum Command {
     /// Lists kernels in load order: role by content, size, hash, and why each is there.
+    #[command(after_help = "Example: areograph kernels list kernels/nav.tm")]
     List(Files),
     /// Shows position and attitude coverage of Mars Global Surveyor, with the gaps inside.
+    #[command(after_help = "Example: areograph kernels coverage kernels/nav.tm")]
     Coverage(Files),
     Compare(compare::Arguments),
 }

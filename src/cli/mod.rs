@@ -3,6 +3,7 @@
 mod check;
 mod completions;
 mod image;
+mod init;
 mod kernels;
 mod manual;
 mod nightly;
@@ -62,11 +63,9 @@ enum LogForm {
 
 #[derive(Debug, Subcommand)]
 enum Command {
-    /// Run sites from kernels to validated products.
+    Init(init::Arguments),
     Run(run::Arguments),
-    /// Check configuration, files and kernel coverage, gaps included; writes nothing.
     Check(check::Arguments),
-    /// Show which stages would run, and why; writes no products.
     Plan(plan::Arguments),
     /// Inspect kernels: what is loaded, where the gaps are, how alternative sets differ.
     Kernels(kernels::Arguments),
@@ -74,24 +73,16 @@ enum Command {
     Image(image::Arguments),
     /// Inspect PEDR files.
     Pedr(pedr::Arguments),
-    /// Make a site's report again from its products, or report what differs between two runs.
     Report(report::Arguments),
-    /// Triangulate rectified pictures in the plane, by their ties and controls alone.
     Triangulate(triangulate::Arguments),
-    /// Write a synthetic mission, or net of pictures, with known truth.
     Scene(scene::Arguments),
-    /// Run sites again when what they read changes: the service, with pages.
     Serve(serve::Arguments),
-    /// Do one night of the service, for a timer.
     Nightly(nightly::Arguments),
     /// Keep a service: copies of its database, its tokens.
     Service(service::Arguments),
-    /// Print shell completions.
     Completions(completions::Arguments),
-    /// Write the manual pages.
     #[command(hide = true)]
     Manual(manual::Arguments),
-    /// Do one task of the service.
     #[command(hide = true)]
     Worker(worker::Arguments),
 }
@@ -144,6 +135,7 @@ fn log(cli: &Cli) {
 
 fn run(command: Command) -> ExitCode {
     match command {
+        Command::Init(arguments) => finish(init::run(&arguments)),
         Command::Run(arguments) => run::run(&arguments),
         Command::Check(arguments) => finish(check::run(&arguments)),
         Command::Plan(arguments) => finish(plan::run(&arguments)),
@@ -203,4 +195,31 @@ fn load_sites(paths: &[std::path::PathBuf]) -> Result<Vec<SiteConfig>, Error> {
     }
     check_sites(&sites)?;
     Ok(sites)
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::CommandFactory as _;
+
+    use super::Cli;
+
+    /// Commands that do something and have no example in their help.
+    fn without_example(command: &mut clap::Command, named: &str, found: &mut Vec<String>) {
+        let help = command.render_long_help().to_string();
+        let mut below = command.get_subcommands_mut().peekable();
+        if below.peek().is_none() && !help.contains("Example") {
+            found.push(named.to_owned());
+        }
+        for command in below.filter(|command| command.get_name() != "worker") {
+            let named = format!("{named} {}", command.get_name());
+            without_example(command, &named, found);
+        }
+    }
+
+    #[test]
+    fn every_help_has_an_example() {
+        let mut found = Vec::new();
+        without_example(&mut Cli::command(), "areograph", &mut found);
+        assert!(found.is_empty(), "{found:?}");
+    }
 }

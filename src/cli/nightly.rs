@@ -28,6 +28,7 @@ const JOBS_MAX: u32 = 100_000;
 ///
 /// Refused while a service runs on the same folder of state. Exit codes as for run.
 #[derive(Debug, Args)]
+#[command(after_help = "Example: areograph nightly areograph.toml")]
 pub(super) struct Arguments {
     /// Configuration of the service (TOML).
     config: PathBuf,

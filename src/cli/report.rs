@@ -31,6 +31,7 @@ use crate::{
 #[command(
     verbatim_doc_comment,
     args_conflicts_with_subcommands = true,
+    subcommand_negates_reqs = true,
     arg_required_else_help = true
 )]
 pub(super) struct Arguments {

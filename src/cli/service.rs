@@ -29,6 +29,7 @@ pub(super) struct Arguments {
 #[derive(Debug, Subcommand)]
 enum Command {
     /// Copy the database, also while the service runs.
+    #[command(after_help = "Example: areograph service backup areograph.toml copy.sqlite")]
     Backup {
         /// Configuration of the service (TOML).
         config: PathBuf,
@@ -36,6 +37,7 @@ enum Command {
         file: PathBuf,
     },
     /// Make a new database from the products; jobs, events and tokens are lost.
+    #[command(after_help = "Example: areograph service rebuild areograph.toml")]
     Rebuild {
         /// Configuration of the service (TOML).
         config: PathBuf,
@@ -48,6 +50,9 @@ enum Command {
 #[derive(Debug, Subcommand)]
 enum TokenCommand {
     /// Make a token and print it, for the only time.
+    #[command(
+        after_help = "Example: areograph service token add areograph.toml --role read --days 30"
+    )]
     Add {
         /// Configuration of the service (TOML).
         config: PathBuf,
@@ -62,11 +67,13 @@ enum TokenCommand {
         days: Option<u16>,
     },
     /// List tokens, without their secrets.
+    #[command(after_help = "Example: areograph service token list areograph.toml")]
     List {
         /// Configuration of the service (TOML).
         config: PathBuf,
     },
     /// End a token, and the sessions that were begun with it.
+    #[command(after_help = "Example: areograph service token revoke areograph.toml 01234567")]
     Revoke {
         /// Configuration of the service (TOML).
         config: PathBuf,

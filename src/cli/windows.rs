@@ -45,7 +45,7 @@ impl WindowArguments {
 }
 
 /// West, east, south and north edge, as they are written.
-fn edges(text: &str) -> std::result::Result<[f64; 4], String> {
+pub(super) fn edges(text: &str) -> std::result::Result<[f64; 4], String> {
     let numbers: std::result::Result<Vec<f64>, _> = text
         .split(',')
         .map(|number| number.trim().parse())

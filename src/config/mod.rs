@@ -16,6 +16,7 @@ mod kernels;
 mod limits;
 mod mola_surface;
 mod net;
+mod new_site;
 mod orientation;
 mod paths;
 mod pedr;
@@ -54,6 +55,7 @@ pub use net::{
     Blunders, LoadedNet, Method, NetConfig, TriangulationConfig, YAxis, load_net, net_example,
     net_schema, parse_net,
 };
+pub use new_site::NewSite;
 pub use orientation::{OrientationConfig, RegistrationConfig};
 pub use pedr::PedrConfig;
 pub use pointing::{PointingConfig, UsedBias};

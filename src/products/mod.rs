@@ -13,6 +13,7 @@ mod coordinates;
 mod correlations;
 pub(crate) mod error;
 mod exchange;
+mod figures;
 mod files;
 mod footprints;
 mod found_shots;
@@ -24,6 +25,7 @@ mod heights;
 mod isd;
 mod kernel_report;
 mod light_time;
+mod listed;
 mod net;
 mod orientation;
 mod overlays;
@@ -59,6 +61,7 @@ pub use exchange::{
 };
 pub use found_shots::{FoundShots, ShotsFile, ShotsFormat};
 pub use generated::{documentation, schemas};
+pub use listed::{Listed, listed};
 pub use net::{NetProducts, write_net_products};
 pub(crate) use overlays::{Picture, anaglyph, piece, strip};
 pub use page::REPORT;
@@ -126,6 +129,7 @@ fn write(
     let path = of.directory.join(&relative);
     let rows = match (&declaration.write, image, &of.site.geometric) {
         (Write::Site(write), ..) => write(&path, of),
+        (Write::OfPage(write), ..) => return write(of),
         (Write::Footprints(write), ..) if !of.site.footprints.is_empty() => {
             write(&path, of).map(Some)
         }

@@ -109,6 +109,8 @@ pub(super) enum Write {
     AdjustedImage(fn(&Path, &Context, &ImageProducts) -> Result<u64>),
     /// For every image of a site with an adjustment, by the product that writes several.
     WithAnother,
+    /// For every site, as many as its report has.
+    OfPage(fn(&Context) -> Result<Vec<Written>>),
     /// For a site with an adjustment, others with it.
     Several(fn(&Context, &AdjustmentProducts) -> Result<Vec<Written>>),
 }
@@ -184,6 +186,7 @@ impl Declaration {
     pub(super) const fn when(&self) -> &'static str {
         match self.write {
             Write::Site(_) => "every site",
+            Write::OfPage(_) => "every figure of the report",
             Write::Footprints(_) => "a site with footprints",
             Write::Image(_) => "every image",
             Write::Overlay(_) => "every image with pixels",
@@ -216,6 +219,7 @@ impl<W> Declaration<W> {
             "dbf" => "application/vnd.dbf",
             "html" => "text/html",
             "png" => "image/png",
+            "svg" => "image/svg+xml",
             "xml" => "application/xml",
             "txt" | "prj" | "cpg" | "tm" => "text/plain",
             _ => return None,

@@ -3,7 +3,7 @@
 use super::{
     adjusted_footprints, adjusted_kernels, adjustment, correlations,
     exchange::{adjusted, geopackage, jigsaw, matched, readme, shapefile, stac, tables},
-    footprints, heights, isd, kernel_report, orientation, overlays, page, page_data,
+    figures, footprints, heights, isd, kernel_report, orientation, overlays, page, page_data,
     product::Declaration,
     ranges, registration, ties,
 };
@@ -38,6 +38,7 @@ pub(super) static PRODUCTS: &[&Declaration] = &[
     &adjusted_kernels::METAKERNEL,
     &page::PAGE,
     &page::OVERLAYS,
+    &figures::FIGURE,
     &page_data::DATA,
     &page::METAKERNEL,
     &tables::LOLA_LIKE,

@@ -177,9 +177,8 @@ fn observations(summary: &AdjustmentSummary) -> String {
         );
     }
     let words = format!(
-        "Variance component: √(vᵀPv / redundancy), 1 where the a priori standard deviations are right, with its 99 % interval \
-         by χ²; robust weights lower that of heights. Beyond {BAARDA_LIMIT}: failed Baarda's test, as one good observation in \
-         a thousand does."
+        "Variance component: √(vᵀPv / redundancy), 1 for right a priori standard deviations, with its 99 % interval; robust \
+         weights lower that of heights. Beyond {BAARDA_LIMIT}: failed Baarda's test, by chance one in a thousand."
     );
     table.finish() + &paragraph(&words)
 }

@@ -80,9 +80,8 @@ fn methods(site: &SiteProducts) -> String {
         }
     }
     let words = format!(
-        "Tolerance {} lines, at most {} steps. The frame-first iteration converges with the aspect ratio of the pixels and \
-         diverges where a line is more than twice as long as a pixel; that of eq. 4 with the rotation of the camera from \
-         line to line.",
+        "Tolerance {} lines, at most {} steps. Frame first converges with the aspect ratio of the pixels and diverges where it \
+         exceeds two; eq. 4 with the rotation of the camera from line to line.",
         site.config.registration.tolerance_lines, site.config.registration.steps_max
     );
     table.finish() + &paragraph(&words)
@@ -106,9 +105,9 @@ fn convergence_plot(image: &ImageProducts) -> Plot {
             .map(|(iteration, step)| (f64::from(iteration), step.log10()));
         Series::line(name(run), colour, logarithms.collect())
     });
-    let words = "Mean length of each step over the footprints within the image's lines; a footprint that has converged \
-                 counts as zero."
-        .to_owned();
+    let words =
+        "Mean step over the footprints within the image's lines; converged ones count as zero."
+            .to_owned();
     Plot::of(
         format!("Convergence on {}", image.times.id),
         words,

@@ -111,8 +111,7 @@ fn rotations(adjusted: &Adjusted) -> String {
     }
     table.finish()
         + &paragraph(
-            "± is the a posteriori standard deviation. Position and rotation are strongly correlated in a narrow field of \
-             view: see the correlations below.",
+            "±: a posteriori standard deviation. Position and rotation are strongly correlated in a narrow field of view.",
         )
 }
 

@@ -207,8 +207,8 @@ fn single_sigmas_m(adjustment: &AdjustmentProducts) -> [f64; 2] {
 
 fn surface_in_words(surface: &SurfaceFigures) -> String {
     format!(
-        "The surface is kriged from {} shots of {} profiles (heights 300 m apart differ by {} m RMS; slope {} per axis). Its \
-         errors at neighbouring tie points are correlated: the uncertainty of a mean does not fall with their number.",
+        "Surface: kriged from {} shots of {} profiles; {} m RMS over 300 m, slope {} per axis. Its errors at neighbouring tie \
+         points are correlated: means are no better for their number.",
         whole(surface.shots),
         surface.profiles,
         label(surface.roughness_m, 1),
@@ -286,8 +286,7 @@ fn footprints(geometric: &GeometricProducts) -> String {
     if rows == 0 {
         return String::new();
     }
-    let words = "Footprints are located in the second image by a surface of at most second order through the tie points; relief \
-                 between these scatters single heights, not their median.";
+    let words = "Relief between the tie points scatters single heights, not their median.";
     table.finish() + &paragraph(words)
 }
 

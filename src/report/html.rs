@@ -10,6 +10,9 @@ pub const STYLE: &str = include_str!("style.css");
 /// Letters up to which a cell stays on one line.
 const SHORT: usize = 28;
 
+/// Rows up to which a table is not broken between two sheets of paper.
+const ROWS_TOGETHER: usize = 10;
+
 /// `text` with the five characters that HTML reads as markup replaced.
 pub(super) fn escape(text: &str) -> String {
     let mut escaped = String::with_capacity(text.len());
@@ -215,6 +218,7 @@ impl From<String> for Cell {
 pub(super) struct Table {
     html: String,
     columns: &'static [Column],
+    rows: usize,
 }
 
 impl Table {
@@ -235,11 +239,16 @@ impl Table {
             "<div class=\"wide\" tabindex=\"0\" role=\"region\" aria-label=\"{caption}\"><table>\n\
              <caption>{caption}</caption>\n<thead><tr>{heads}</tr></thead>\n<tbody>\n"
         );
-        Self { html, columns }
+        Self {
+            html,
+            columns,
+            rows: 0,
+        }
     }
 
     /// Adds a row, tinted when it is not `valid`.
     pub(super) fn row(&mut self, valid: bool, cells: impl IntoIterator<Item = Cell>) {
+        self.rows += 1;
         let class = if valid { "" } else { " class=\"invalid\"" };
         let cells: String = cells
             .into_iter()
@@ -280,7 +289,11 @@ impl Table {
 
     /// The finished table.
     pub(super) fn finish(self) -> String {
-        self.html + "</tbody>\n</table></div>\n"
+        let html = self.html + "</tbody>\n</table></div>\n";
+        if self.rows > ROWS_TOGETHER {
+            return html;
+        }
+        html.replacen("class=\"wide\"", "class=\"wide brief\"", 1)
     }
 }
 

@@ -3,7 +3,7 @@
 use super::{
     html::{Cell, Column, Table, paragraph},
     numbers::whole,
-    plots::{GREY, Panel, Plot, Series, figure},
+    plots::{GREY, Panel, Plot, Series, figure, label},
     section::Section,
     sky,
 };
@@ -103,7 +103,7 @@ fn light_time(site: &SiteProducts) -> String {
         .map(|image| &image.orientation.light_time);
     let others: Vec<OtherConvention> = effects.flat_map(|of| of.others.iter().copied()).collect();
     let mut words = format!(
-        "Light time: positions of cameras are {} (convention {}).",
+        "Light time: camera positions are {} (convention {}).",
         convention.positions(),
         convention.word()
     );
@@ -112,7 +112,7 @@ fn light_time(site: &SiteProducts) -> String {
         let span = |value: fn(&OtherConvention) -> f64, decimals: usize| {
             let low = of_images().map(value).fold(f64::INFINITY, f64::min);
             let high = of_images().map(value).fold(f64::NEG_INFINITY, f64::max);
-            let [low, high] = [low, high].map(|end| format!("{end:.decimals$}"));
+            let [low, high] = [low, high].map(|end| label(end, decimals));
             if low == high {
                 low
             } else {
@@ -121,7 +121,7 @@ fn light_time(site: &SiteProducts) -> String {
         };
         if of_images().next().is_some() {
             words += &format!(
-                " With {word} images would see ground {} m away, and the same ground {} lines later.",
+                " With {word}, images see ground {} m away, and the same ground {} lines later.",
                 span(|of| of.ground_m, 1),
                 span(|of| of.lines, 2)
             );
@@ -184,8 +184,8 @@ fn models(site: &SiteProducts) -> String {
         table.row(valid, row(id, "2", &model.second_order, judged));
     }
     let words = format!(
-        "Limits apply to the second order: position {} m, pointing {:.1}″ (largest component of the rotation vector, which \
-         means the same at every latitude). On the ground: root mean square displacement of the boresight on the ellipsoid.",
+        "Limits of the second order: position {} m, pointing {:.1}″ (largest component of the rotation vector). On the ground: \
+         RMS displacement of the boresight.",
         limits.position_rmse_max_m,
         limits.pointing_rmse_max_rad / RADIANS_PER_ARCSECOND
     );

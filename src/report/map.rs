@@ -1,5 +1,6 @@
 //! Map of the site: shaded ground by its own shots, profiles by name, windows, image outlines, tie points.
 
+mod ellipses;
 pub(super) mod labels;
 mod legend;
 mod names;
@@ -13,6 +14,7 @@ use geo::Simplify as _;
 use plotters::prelude::*;
 
 use self::{
+    ellipses::Ellipses,
     legend::{Legend, STRIP},
     relief::Relief,
     sheets::{Shown, sheets},
@@ -125,6 +127,7 @@ struct Sheet {
     /// Name and places of every profile on the sheet, its first and last shot among them.
     profiles: Vec<(String, Vec<(f64, f64)>)>,
     ties_rad: Vec<(f64, f64)>,
+    ellipses: Ellipses,
     /// Lowest and highest shot, those that are not drawn included.
     heights_m: (f64, f64),
 }
@@ -159,9 +162,13 @@ impl Sheet {
             (f64::INFINITY, f64::NEG_INFINITY),
             |(low, high), height_m| (low.min(height_m), high.max(height_m)),
         );
+        let view = view.with_ratio(ratio);
+        let adjustment = site.adjustment();
+        let ties = adjustment.iter().flat_map(|(_, of)| of.adjusted_ties());
         Self {
             map,
-            view: view.with_ratio(ratio),
+            ellipses: Ellipses::of(ties, view.width_m()),
+            view,
             profiles: profiles(site, &shown, place_rad),
             ties_rad: ties_rad(site),
             shown,
@@ -225,6 +232,13 @@ impl Sheet {
         }
         for place in self.ties_rad.iter().filter_map(|tie| self.place(*tie)) {
             area.draw(&Cross::new(place, 5, COLOURS[TIE].stroke_width(2)))?;
+        }
+        for ring_m in &self.ellipses.rings_m {
+            let places = ring_m.iter().map(Spherical::from_xyz_m);
+            let ring: Vec<(f64, f64)> = places
+                .map(|place| (place.longitude_rad, place.latitude.0))
+                .collect();
+            self.draw_ring(&ring, COLOURS[TIE].stroke_width(2), area)?;
         }
         let frame = [(0, 0), (WIDTH as i32 - 1, self.height() - 1)];
         area.draw(&Rectangle::new(frame, INK.stroke_width(2)))?;

@@ -203,8 +203,7 @@ fn read(geometric: &GeometricProducts) -> String {
     }
     if outliers > 0 {
         words += &format!(
-            " {outliers} of the ground points are marked as outliers by their reprojection residuals and do not count \
-             in the pairs' statistics."
+            " {outliers} are outliers by their reprojection residuals and do not count in the statistics of pairs."
         );
     }
     paragraph(&words) + &rejected(geometric)
@@ -326,8 +325,8 @@ fn reprojection(pairs: &[BeforeAfter]) -> String {
             table.row(true, cells);
         }
     }
-    let words = "Measured minus projected back from the intersection of both rays: M mean, σ standard deviation; x along \
-                 track, y across track and against the samples; 1 and 2 in the order of the pair's name.";
+    let words = "Measured minus projected: M mean, σ standard deviation; x along track, y across it and against the samples; 1 and \
+                 2 as in the pair's name.";
     table.finish() + &paragraph(words)
 }
 
@@ -366,8 +365,8 @@ fn footprints(pairs: &[BeforeAfter]) -> String {
             table.row(true, profile_cells(&pair.name(), profile, after));
         }
         notes += &paragraph(&format!(
-            "{}: the first image is transformed to the second by a polynomial of order {} through {} tie points ({} rejected); \
-             residual standard deviation {} lines and {} samples.",
+            "{}: from the first image to the second by a polynomial of order {} through {} tie points ({} rejected); standard \
+             deviation {} lines, {} samples.",
             pair.name(),
             found.order,
             found.ties,
@@ -377,10 +376,7 @@ fn footprints(pairs: &[BeforeAfter]) -> String {
         ));
         notes += &paragraph(&not_counted(found));
         if let Some(spacing_m) = pair.before.mola_spacing_m {
-            notes += &paragraph(&format!(
-                "One MOLA spacing is {} m here.",
-                label(spacing_m, 1)
-            ));
+            notes += &paragraph(&format!("One MOLA spacing: {} m.", label(spacing_m, 1)));
         }
     }
     notes += &paragraph("Samples also contain the parallax of relief.");

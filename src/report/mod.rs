@@ -103,11 +103,8 @@ pub fn page(site: &SiteProducts) -> Result<String> {
     let sections: Vec<html::Section> = sections
         .filter_map(Result::transpose)
         .collect::<Result<_>>()?;
-    Ok(html::page(
-        &site.config.site,
-        &summary::lead(site)?,
-        &sections,
-    ))
+    let page = html::page(&site.config.site, &summary::lead(site)?, &sections);
+    Ok(plots::with_files(&page))
 }
 
 #[cfg(test)]

@@ -1,11 +1,14 @@
 //! Program, configuration, and the files that were read.
 
 use super::{
-    html::{Cell, Column, Table, escape, folded, paragraph},
+    html::{Cell, Column, Table, escape, folded, link, paragraph},
     numbers::whole,
     section::Section,
 };
-use crate::products::SiteProducts;
+use crate::{
+    config,
+    products::{SiteProducts, listed},
+};
 
 pub(super) const SECTION: Section = Section {
     title: "Provenance",
@@ -16,11 +19,11 @@ pub(super) const SECTION: Section = Section {
 
 fn write(site: &SiteProducts) -> String {
     let config = site.config;
+    let file = crate::files::file_name(&config.file);
     let words = format!(
-        "Cite as: areograph {}, site {}, configuration {} (BLAKE3 of its keys {}).",
+        "Cite as: areograph {}, site {}, configuration {file} (BLAKE3 of its keys {}).",
         env!("CARGO_PKG_VERSION"),
         config.site,
-        crate::files::file_name(&config.file),
         config.blake3
     );
     let mut files = Table::new(
@@ -69,28 +72,90 @@ fn write(site: &SiteProducts) -> String {
             ],
         );
     }
-    paragraph(&words) + LINKS + &files.finish() + &settings(site)
+    let made = format!(
+        "<p>Made by <code>areograph run {0}</code>; <code>areograph report {1}</code> makes this page again from the \
+         products.</p>\n",
+        escape(&file),
+        escape(&config.site)
+    );
+    paragraph(&words) + &made + LINKS + &files.finish() + &settings(site) + &products(site)
 }
 
 /// Where the rest is, from the folder of the page.
-const LINKS: &str = "<p><a href=\"../manifest.json\">manifest.json</a>: every product with its hash, every stage with its \
-    fingerprint, all checks, and when the run ended. <a href=\"../kernels.tm\">kernels.tm</a> loads the same kernels in the \
-    same order. <a href=\"../../index.html\">All sites</a>.</p>\n";
+const LINKS: &str = "<p><a href=\"../manifest.json\">manifest.json</a>, for programs: verdict, checks, key figures, every \
+    product with its hash, every stage with its fingerprint, and when the run ended. \
+    <a href=\"../kernels.tm\">kernels.tm</a> loads the same kernels in the same order. \
+    <a href=\"../../index.html\">All sites</a>.</p>\n";
 
-/// The keys of the configuration that were written; all others have their defaults.
+/// Every file beside the page.
+fn products(site: &SiteProducts) -> String {
+    let columns = &[
+        Column::Text("file"),
+        Column::Text("content"),
+        Column::Text("readers"),
+    ];
+    let mut table = Table::new("Products", columns);
+    for product in listed(site) {
+        let place = format!("../{}", product.path);
+        table.row(
+            true,
+            [
+                Cell::Html(link(&place, &product.path)),
+                product.what.into(),
+                product.readers.into(),
+            ],
+        );
+    }
+    folded("Products", &table.finish())
+}
+
+/// The keys of the configuration that were written, with what they are when left out; all others have their defaults.
 fn settings(site: &SiteProducts) -> String {
     if site.config.keys.is_empty() {
         return String::new();
     }
-    let columns = &[Column::Text("key"), Column::Text("value")];
+    let columns = &[
+        Column::Text("key"),
+        Column::Text("value"),
+        Column::Text("default"),
+    ];
     let mut table = Table::new("Settings as written; all others are the defaults", columns);
+    let declared = config::keys();
     for (key, value) in &site.config.keys {
-        table.row(true, [key.into(), value.into()]);
+        let default = declared.iter().find(|declared| is_of(key, &declared.path));
+        let default = default.and_then(|declared| declared.default.as_ref());
+        let default = default.map_or_else(|| "–".to_owned(), ToString::to_string);
+        table.row(true, [key.into(), value.into(), default.into()]);
     }
     folded("Settings", &table.finish())
+}
+
+/// Whether a key as written is the declared one: behind the name of a list of tables stands which entry it is of.
+fn is_of(key: &str, declared: &str) -> bool {
+    let Some((table, name)) = declared.rsplit_once('.') else {
+        return key == declared;
+    };
+    let rest = key
+        .strip_prefix(table)
+        .and_then(|rest| rest.strip_suffix(name));
+    rest.is_some_and(|entry| entry.starts_with('.') && entry.ends_with('.'))
 }
 
 /// A hash in letters of one width.
 fn hash(blake3: &str) -> Cell {
     Cell::Html(format!("<span class=\"hash\">{}</span>", escape(blake3)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn written_keys_find_their_declaration() {
+        assert!(is_of("site", "site") && !is_of("sites", "site"));
+        assert!(is_of("adjustment.model", "adjustment.model"));
+        assert!(is_of("images.E02-02855.label", "images.label"));
+        assert!(!is_of("adjustment.images.a.id", "images.id"));
+        assert!(!is_of("pedr.files", "ties.files"));
+    }
 }

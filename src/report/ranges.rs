@@ -221,16 +221,15 @@ fn three_ways(site: &SiteProducts) -> String {
     }
     let words = [
         "Limits apply to the means without outliers.".to_owned(),
-        "Crossover radius: after the MOLA team's crossover adjustment, which moves the footprint but not the range."
+        "Crossover radius: after the MOLA team's adjustment, which moves the footprint, not the range."
             .to_owned(),
         format!(
-            "PEDR's own orbit: no kernel is involved; beyond ±{} m the file was read wrongly.",
+            "PEDR's own orbit: without kernels; beyond ±{} m the file was read wrongly.",
             limits.decoding_max_m
         ),
         format!(
-            "PEDR − kernels: the spacecraft of the file minus that of the kernels in inertial radial, along-track and \
-             cross-track components; beyond {} m orbit, clock or datum differ. The tabulated trajectory follows the kernels \
-             within {:.1e} m.",
+            "PEDR − kernels: the spacecraft of the file minus that of the kernels, inertial axes; beyond {} m orbit, clock or \
+             datum differ. The tabulated trajectory follows the kernels within {:.1e} m.",
             limits.orbit_max_m, site.ranges.trajectory_error_m
         ),
     ];

@@ -96,11 +96,18 @@ fn profiles(site: &SiteProducts, images: &[&ImageProducts]) -> String {
         .iter()
         .flat_map(|image| image.registration.rejected.values())
         .sum();
-    let words = format!(
-        "Every profile is projected into every image; {elsewhere} combinations without a footprint in the image are not \
-         listed. {rejected} footprints cannot be projected (behind the camera or beyond the horizon)."
-    );
-    table.finish() + &paragraph(&words)
+    let mut words = Vec::new();
+    if elsewhere > 0 {
+        words.push(format!(
+            "Not listed: {elsewhere} combinations of profile and image without a footprint in the image."
+        ));
+    }
+    if rejected > 0 {
+        words.push(format!(
+            "{rejected} footprints cannot be projected (behind the camera or beyond the horizon)."
+        ));
+    }
+    table.finish() + &paragraph(&words.join(" "))
 }
 
 /// Footprints near the image, over its lines.
@@ -160,8 +167,8 @@ fn plane(profiles: &[Profile], image: &ImageProducts) -> Plot {
         ..Panel::of("sample", series)
     };
     let words = format!(
-        "Footprints on the image plane, flight to the right, with the edges of the delivered image (dashed across, solid \
-         at its ends). {} of {} footprints lie in the image; {} near it.",
+        "Flight to the right; edges of the delivered image dashed across, solid at its ends. {} of {} footprints lie in the \
+         image; {} near it.",
         whole(points.inside_count()),
         whole(points.len()),
         match shown {

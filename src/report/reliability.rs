@@ -191,8 +191,8 @@ pub(super) fn redundancy(site: &SiteProducts, adjusted: &Adjusted) -> String {
             ],
         );
     }
-    let words = "The share is the redundancy number r. The smallest error that Baarda's test detects (3.29, power 80 %) is \
-                 4.13 σ/√r.";
+    let words =
+        "Shown: the redundancy number r; found by Baarda's test (3.29, power 80 %): 4.13 σ/√r.";
     sentences + &table.finish() + &paragraph(words)
 }
 

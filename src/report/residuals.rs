@@ -92,7 +92,7 @@ pub(super) fn distribution(adjusted: &Adjusted) -> Result<String> {
     };
     let words = format!(
         "Share of the residuals of tie points below each value, in their own standard deviations. Of {} along and {} across \
-         the track {} and {} lie beyond {}; at the ends of the axis, those beyond it.",
+         the track {} and {} lie beyond {}.",
         whole(along.len()),
         whole(across.len()),
         whole(beyond(&along)),

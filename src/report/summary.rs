@@ -5,10 +5,11 @@ use super::{
     heights::{absolute, known_beforehand},
     html::{Tone, counted, escape, list, paragraph, verdict},
     map,
-    numbers::{number, signed},
+    numbers::{number, signed, whole},
 };
 use crate::{
     error::Result,
+    footprints::AdjustmentModel,
     products::SiteProducts,
     stages::judge::{Check, CheckKind},
 };
@@ -138,15 +139,22 @@ fn checked<'a>(site: &SiteProducts<'a>, kind: CheckKind) -> Option<(&'a Check, f
 fn by_mola(site: &SiteProducts) -> Option<KeyNumber> {
     let (_, after_m) = checked(site, CheckKind::HeightAfter)?;
     let (_, before_m) = checked(site, CheckKind::HeightBefore)?;
-    let (geometric, _) = site.adjustment()?;
-    let ties = counted(geometric.heights.above_m.n as usize, "tie point");
+    let (geometric, adjustment) = site.adjustment()?;
+    let ties = counted(adjustment.heights.above_m.n as usize, "tie point");
+    let all = whole(geometric.heights.above_m.n);
+    let before_m = signed(before_m, 1);
     Some(KeyNumber {
         what: "Heights against MOLA",
         value: format!("{} m", signed(after_m, 1)),
-        note: format!(
-            "median of {ties}; {} m before the adjustment",
-            signed(before_m, 1)
-        ),
+        // What controls a result cannot judge it: then only the number before does.
+        note: match site.config.adjustment.model {
+            AdjustmentModel::MolaSurface => format!(
+                "median of {ties}, controlled by MOLA; {before_m} m of {all} before, independent of it"
+            ),
+            AdjustmentModel::Published => {
+                format!("median of {ties}; {before_m} m of {all} before the adjustment")
+            }
+        },
     })
 }
 

@@ -23,9 +23,9 @@ pub(super) const SECTION: Section = Section {
 
 fn write(geometric: &GeometricProducts) -> String {
     let pairs = BeforeAfter::all(geometric);
-    let explained = "D = √(M² + σ²) of the reprojection residuals of each image; the whole is taken as one MOLA spacing, before the \
-                     adjustment only. Across track the paper averages the images where its eq. 7 has the root of the sum of \
-                     squares: both heights are given. This is agreement between two images, not accuracy.";
+    let explained = "D = √(M² + σ²) of the reprojection residuals; the whole taken as one MOLA spacing, before the adjustment only. \
+                     Across track the paper averages where its eq. 7 has the root of the sum of squares: both are given. Agreement \
+                     of two images, not accuracy.";
     budgets(&pairs) + &pairs.iter().map(without_budget).collect::<String>() + &paragraph(explained)
 }
 

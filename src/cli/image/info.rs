@@ -25,6 +25,7 @@ use crate::{
 /// count. A line is suspect when it comes from damaged data, or when its place in the image is not known. A damaged
 /// file is no failure as long as some of it can be read.
 #[derive(Debug, Args)]
+#[command(after_help = "Example: areograph image info e0202855.imq --json")]
 pub(super) struct Arguments {
     /// Image files of the archive (.imq, .img), ISIS cubes, TIFF or PNG of one band of grey.
     #[arg(required = true, value_name = "FILE")]

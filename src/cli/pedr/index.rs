@@ -22,6 +22,7 @@ use crate::{
 /// `run` and `pedr search` use it by themselves, and give the same with it, without it, and when it is out of date.
 /// It is the file areograph-pedr.index in the folder. A command that is killed leaves the index as it was.
 #[derive(Debug, Args)]
+#[command(after_help = "Example: areograph pedr index /data/mola")]
 pub(super) struct Arguments {
     /// Folder of the archive.
     #[arg(value_name = "FOLDER")]

@@ -24,6 +24,7 @@ use crate::{
 /// contradict themselves. Ranges are held against the distance from the file's own spacecraft to the footprint: both
 /// come from one orbit, so that their difference tests the file and its reading, and needs no kernel.
 #[derive(Debug, Args)]
+#[command(after_help = "Example: areograph pedr info pedr/*.b")]
 pub(super) struct Arguments {
     /// PEDR files (AP#####v.B).
     #[arg(required = true, value_name = "FILE")]

@@ -37,7 +37,10 @@ use crate::{
 /// Not copied: names are not cut at 64 characters and may hold points and folders, more than 99,999 frames are read, and
 /// a trigger channel that is none does not read beyond its table.
 #[derive(Debug, Args)]
-#[command(verbatim_doc_comment)]
+#[command(
+    verbatim_doc_comment,
+    after_help = "Example: areograph pedr tab ap19019l.b --per-shot"
+)]
 pub(super) struct Arguments {
     /// A PEDR file (its name holds .b or .B), or a text file with the name of one in each line.
     #[arg(default_value = "FILELIST")]

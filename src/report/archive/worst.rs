@@ -4,6 +4,7 @@ use crate::{
     products::{WorstProfile, profile_name},
     report::{
         html::{Cell, Column, Table, escape, link, paragraph},
+        numbers::whole,
         plots::label,
     },
     stages::check_archive::{ArchiveProfile, ArchiveRanges},
@@ -41,10 +42,10 @@ pub(super) fn worst_profiles(ranges: &ArchiveRanges, worst: &[WorstProfile<'_>])
         let cells = [
             named(of),
             begins(of).into(),
-            profile.shots.to_string().into(),
+            whole(profile.shots).into(),
             limited(profile.mean_without_outliers_m, limits.mean_max_m),
             label(profile.range_minus_distance_m.nmad, 2).into(),
-            Cell::Limited(profile.outliers.to_string(), outlier_share),
+            Cell::Limited(whole(profile.outliers), outlier_share),
             limited(profile.decoding_without_outliers_m, limits.decoding_max_m),
             limited(apart_m, limits.orbit_max_m),
             label(profile.off_nadir_rad[1] / RADIANS_PER_DEGREE, 2).into(),

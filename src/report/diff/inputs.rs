@@ -1,15 +1,19 @@
 //! Statistics, values, kernels, stages and products that differ.
 
 use crate::{
-    difference::{Change, Item, Items, RunDifference, Texts, quantity, text},
+    difference::{Change, Item, Items, RunDifference, Texts, text},
     files::short_hash,
     products::read::ProfileDocument,
-    report::html::{Cell, Column, Table, list, paragraph},
+    report::{
+        html::{Cell, Column, Table, list, paragraph},
+        numbers::{self, number, whole},
+    },
 };
 
-/// Range residuals per profile in both runs.
+/// Range residuals of the profiles that differ.
 pub(super) fn profiles(site: &RunDifference) -> String {
-    if site.profiles.is_empty() {
+    let changed = || site.profiles.iter().filter(|profile| profile.changed);
+    if changed().next().is_none() {
         return String::new();
     }
     let mut table = Table::new(
@@ -28,7 +32,7 @@ pub(super) fn profiles(site: &RunDifference) -> String {
             Column::Text("verdict"),
         ],
     );
-    for profile in &site.profiles {
+    for profile in changed() {
         let [a, b] = [profile.a.as_ref(), profile.b.as_ref()];
         let cell = |profile: Option<&ProfileDocument>, value: fn(&ProfileDocument) -> String| {
             profile.map_or_else(|| "–".to_owned(), value)
@@ -37,13 +41,13 @@ pub(super) fn profiles(site: &RunDifference) -> String {
         let mut pair = |value: fn(&ProfileDocument) -> String| {
             cells.extend([cell(a, value), cell(b, value)]);
         };
-        pair(|p| p.range_minus_distance_m.n.to_string());
-        pair(|p| quantity(p.range_minus_distance_m.mean));
-        pair(|p| quantity(p.range_minus_distance_m.standard_deviation));
-        pair(|p| p.outliers.to_string());
+        pair(|p| whole(p.range_minus_distance_m.n));
+        pair(|p| number(p.range_minus_distance_m.mean, 3));
+        pair(|p| number(p.range_minus_distance_m.standard_deviation, 3));
+        pair(|p| whole(p.outliers));
         let change_m = a.zip(b).map(|(a, b)| {
             let mean_m = |profile: &ProfileDocument| profile.range_minus_distance_m.mean;
-            format!("{:+.3}", mean_m(b) - mean_m(a))
+            numbers::signed(mean_m(b) - mean_m(a), 3)
         });
         cells.insert(5, change_m.unwrap_or_else(|| "–".to_owned()));
         let word = |valid: Option<bool>| match valid {
@@ -59,15 +63,16 @@ pub(super) fn profiles(site: &RunDifference) -> String {
         });
         table.row(valid[1] != Some(false), cells.into_iter().map(Cell::from));
     }
-    table.finish()
+    let same = site.profiles.len() - changed().count();
+    table.finish() + &paragraph(&format!("The same in both: {same}."))
 }
 
 /// A difference in as few digits as tell it.
 fn signed(difference: f64) -> String {
     if difference.abs() < 1e-3 {
-        format!("{difference:+.1e}")
+        format!("{difference:+.1e}").replace('-', "−")
     } else {
-        format!("{difference:+.3}")
+        numbers::signed(difference, 3)
     }
 }
 
@@ -140,23 +145,36 @@ pub(super) fn items(site: &RunDifference) -> String {
     body
 }
 
+/// Columns of things that differ.
+const NO_ROLES: &[Column] = &[
+    Column::Text("name"),
+    Column::Text("what happened"),
+    Column::Text("A"),
+    Column::Text("B"),
+];
+const ROLES: &[Column] = &[
+    Column::Text("name"),
+    Column::Text("role"),
+    Column::Text("what happened"),
+    Column::Text("A"),
+    Column::Text("B"),
+];
+
 fn item_table(what: &str, items: &Items) -> String {
-    let mut table = Table::new(
-        what,
-        &[
-            Column::Text("name"),
-            Column::Text("role"),
-            Column::Text("what happened"),
-            Column::Text("A"),
-            Column::Text("B"),
-        ],
-    );
+    let changed = items.changed.iter().map(|item| &item.role);
+    let others = items.removed.iter().chain(&items.added);
+    // Only kernels have roles.
+    let have_roles = changed
+        .chain(others.map(|item| &item.role))
+        .any(Option::is_some);
+    let mut table = Table::new(what, if have_roles { ROLES } else { NO_ROLES });
     let mut row = |name: &str, role: &Option<String>, happened: &str, [a, b]: [Option<&str>; 2]| {
         let hash = |hash: Option<&str>| Cell::from(hash.map(short_hash).unwrap_or_default());
-        let role = role.clone().unwrap_or_default();
+        let role = have_roles.then(|| Cell::from(role.clone().unwrap_or_default()));
+        let hashes = [happened.into(), hash(a), hash(b)];
         table.row(
             true,
-            [name.into(), role.into(), happened.into(), hash(a), hash(b)],
+            [Cell::from(name)].into_iter().chain(role).chain(hashes),
         );
     };
     for item in &items.changed {

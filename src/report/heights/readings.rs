@@ -17,11 +17,9 @@ pub(super) fn two_readings(adjusted: &Adjusted) -> String {
     }
 }
 
-const WORDS: &str = "Tie points say how far the images are apart along the flight, not which of them is where it should be. \
-    Evenly: all images are as likely to be wrong. By the clock: one offset of the time at which attitudes were read turned \
-    the images that follow nadir and left those that are held towards a star where they were. No measurement decides between \
-    them, so each standard deviation holds only if its reading does, and neither covers the other; adjustment.attitude_clock says \
-    which one the products follow. Several sites in one adjustment would be a test.";
+const WORDS: &str = "Tie points tell how far the images are apart along the flight, not which of them is right. Evenly: all are as \
+    likely to be wrong. By the clock: one offset of the time of attitudes turned the images that follow nadir, and not those held \
+    towards a star. Each standard deviation holds only for its reading; adjustment.attitude_clock chooses.";
 
 fn table(adjusted: &Adjusted, other: &OtherReading) -> String {
     let mut table = Table::new(

@@ -21,7 +21,7 @@ pub(super) fn relief(adjusted: &Adjusted) -> String {
     };
     let [east_m, north_m] = relief.sigma_m;
     let told = format!(
-        "Relief alone tells where the images lie against the MOLA surface to ±{} m east and ±{} m north.",
+        "Relief alone places the images against the MOLA surface to ±{} m east and ±{} m north.",
         label(east_m, 0),
         label(north_m, 0)
     );
@@ -42,8 +42,8 @@ fn advice(relief_m: [f64; 2], heights: &HeightSummary) -> String {
     let is_of_use = |relief_m: f64, known_m: f64| relief_m < SHARE_OF_USE * known_m;
     let use_it = is_of_use(relief_m[0], east_m) && is_of_use(relief_m[1], north_m);
     format!(
-        "It is not used; it would be of use where that is less than half of what is known of the place without it (±{} and ±{} m): \
-         here it {} (adjustment.relief_for_plan).",
+        "It is not used: below half of what is known without it (±{} and ±{} m) it would be of use, here it {} \
+         (adjustment.relief_for_plan).",
         label(east_m, 0),
         label(north_m, 0),
         if use_it { "is" } else { "is not" }

@@ -22,6 +22,7 @@ impl Sheet {
         if !self.ties_rad.is_empty() {
             keys.push(Key::colour("tie points", TIE));
         }
+        keys.extend(self.ellipses.key().map(|words| Key::colour(&words, TIE)));
         keys
     }
 
@@ -50,6 +51,7 @@ impl Sheet {
                 label(relief.exaggeration, 0)
             );
         }
+        words += &self.ellipses.words();
         let south = self.map.latitude_rad() < 0.0;
         words
             + &format!(

@@ -1,27 +1,27 @@
 //! A figure of a page: heading, picture, legend, caption, and its numbers to take away.
 
+use plotters::style::RGBColor;
+
 use super::super::html::{escape, slug};
 
 /// An entry of a legend.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(in crate::report) struct Key {
     label: String,
-    /// The swatch: a class of the page's style, or a colour written out.
-    swatch: Swatch,
-}
-
-#[derive(Debug, Clone, PartialEq, Eq)]
-enum Swatch {
-    Class(String),
-    Colour(String),
+    /// A class of the page's style that follows light and dark; empty for a colour that does not.
+    class: String,
+    /// The colour on light pages.
+    colour: String,
 }
 
 impl Key {
     /// An entry in colour `index` of the palette.
     pub(in crate::report) fn colour(label: &str, index: usize) -> Self {
+        let index = index % super::COLOURS.len();
         Self {
             label: label.to_owned(),
-            swatch: Swatch::Class(format!("k{}", index % super::COLOURS.len())),
+            class: format!("k{index}"),
+            colour: written(super::COLOURS[index]),
         }
     }
 
@@ -29,28 +29,33 @@ impl Key {
     pub(in crate::report) fn mark(label: &str) -> Self {
         Self {
             label: label.to_owned(),
-            swatch: Swatch::Class("km".to_owned()),
+            class: "km".to_owned(),
+            colour: written(super::MARK),
         }
     }
 
     /// An entry in a colour that is the same on light and dark pages.
-    pub(in crate::report) fn fixed(label: &str, colour: plotters::style::RGBColor) -> Self {
-        let plotters::style::RGBColor(red, green, blue) = colour;
+    pub(in crate::report) fn fixed(label: &str, colour: RGBColor) -> Self {
         Self {
             label: label.to_owned(),
-            swatch: Swatch::Colour(format!("#{red:02x}{green:02x}{blue:02x}")),
+            class: String::new(),
+            colour: written(colour),
         }
     }
 
     fn html(&self) -> String {
-        let label = escape(&self.label);
-        match &self.swatch {
-            Swatch::Class(class) => format!("<li><i class=\"{class}\"></i>{label}</li>"),
-            Swatch::Colour(colour) => {
-                format!("<li><i style=\"background:{colour}\"></i>{label}</li>")
-            }
-        }
+        let (label, colour) = (escape(&self.label), &self.colour);
+        let look = match self.class.as_str() {
+            "" => format!("style=\"background:{colour}\""),
+            class => format!("class=\"{class}\""),
+        };
+        // What is read from the page to draw the figure alone.
+        format!("<li><i {look} data-colour=\"{colour}\"></i>{label}</li>")
     }
+}
+
+fn written(RGBColor(red, green, blue): RGBColor) -> String {
+    format!("#{red:02x}{green:02x}{blue:02x}")
 }
 
 /// The figure; `title` is unique on its page, `csv` holds the numbers that are drawn.
@@ -80,12 +85,25 @@ pub(in crate::report) fn figure_html(
         },
     );
     format!(
-        "<figure id=\"{id}\">\n<h3 id=\"{id}-title\">{}</h3>\n{svg}{keys}\
+        "<figure id=\"{id}\">\n<p class=\"title\" id=\"{id}-title\">{}</p>\n{svg}{keys}\
          <figcaption><span id=\"{id}-words\">{}</span> {}</figcaption>\n</figure>\n",
         escape(title),
         escape(caption),
         data_link(&id, csv)
     )
+}
+
+/// The page with a link to the file of every figure, which the products have beside it.
+pub(in crate::report) fn with_files(page: &str) -> String {
+    let mut figures = page.split("<figure id=\"");
+    let mut linked = figures.next().unwrap_or_default().to_owned();
+    for figure in figures {
+        let id = figure.split('"').next().unwrap_or_default();
+        let link = format!(" <a class=\"data\" href=\"figures/{id}.svg\">SVG</a></figcaption>");
+        linked += "<figure id=\"";
+        linked += &figure.replacen("</figcaption>", &link, 1);
+    }
+    linked
 }
 
 /// A link that hands out `csv` as `<name>.csv` from inside the page.

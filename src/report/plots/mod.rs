@@ -8,7 +8,7 @@ mod palette;
 
 pub(super) use arrows::{Arrow, Arrows, magnification};
 pub(super) use canvas::{Canvas, Drawn, draw_text, drawn, label};
-pub(super) use figure::{Key, figure_html};
+pub(super) use figure::{Key, figure_html, with_files};
 pub(super) use palette::{COLOURS, GREY, GRID, INK, MARK};
 
 use std::fmt::Write as _;

@@ -1,0 +1,307 @@
+//! `areograph init`.
+
+use std::{
+    fs,
+    io::{self, IsTerminal as _, Write as _},
+    path::{Component, Path, PathBuf},
+};
+
+use clap::Args;
+
+use super::{output, windows::edges};
+use crate::{
+    config::{NewSite, built_in_instruments, parse},
+    error::{Cause, Error, IoError, Kind, Locate as _},
+    files::file_name,
+    pds::moc::{product_named, read_label},
+    store::atomic,
+};
+
+/// Writes a commented site file for a window and images.
+///
+/// On a terminal, what no option gives is asked for. The file is DIR/<site>.toml; paths are given as seen from here, and
+/// written as seen from there. Without --box the window is what the images see, and 5 km around it.
+///
+/// Examples:
+///   areograph init gale
+///   areograph init gale --box 137.0,138.0,-5.5,-4.0 --kernels kernels/nav.tm --pedr 'pedr/*.b'
+///   areograph init gale --label labels/e0202855.lbl --label labels/m0402852.lbl --kernels kernels --ties gale.csv
+#[derive(Debug, Args)]
+#[command(verbatim_doc_comment)]
+pub(super) struct Arguments {
+    /// Folder of the site file, made if need be.
+    #[arg(value_name = "DIR")]
+    folder: PathBuf,
+    /// Identifier of the site; without it the name of the folder.
+    #[arg(long, value_name = "NAME")]
+    site: Option<String>,
+    /// Free text for the report.
+    #[arg(long, value_name = "TEXT")]
+    description: Option<String>,
+    /// West, east, south and north edge of the window, degrees: east longitude and areocentric latitude.
+    #[arg(long = "box", value_name = "W,E,S,N", value_parser = edges, allow_hyphen_values = true)]
+    edges_deg: Option<[f64; 4]>,
+    /// A metakernel (.tm), a folder of kernels to choose from, or kernels in load order.
+    #[arg(long, value_name = "PATH")]
+    kernels: Vec<PathBuf>,
+    /// PEDR files, or globs of them.
+    #[arg(long, value_name = "GLOB")]
+    pedr: Vec<PathBuf>,
+    /// Label of an image.
+    #[arg(long = "label", value_name = "FILE")]
+    labels: Vec<PathBuf>,
+    /// Tie point files, or globs of them.
+    #[arg(long, value_name = "GLOB")]
+    ties: Vec<PathBuf>,
+}
+
+/// Why there is no new site file.
+#[derive(Debug, thiserror::Error)]
+enum Refused {
+    #[error("is there already")]
+    Exists,
+    #[error("nothing says {0}")]
+    Missing(&'static str),
+}
+
+impl Cause for Refused {
+    fn kind(&self) -> Kind {
+        Kind::Configuration
+    }
+
+    fn advice(&self) -> String {
+        match self {
+            Self::Exists => "name another folder, another --site, or remove the file",
+            Self::Missing(_) => {
+                "give the options of `areograph init --help`, or answer on a terminal"
+            }
+        }
+        .to_owned()
+    }
+}
+
+pub(super) fn run(arguments: &Arguments) -> Result<(), Error> {
+    let folder = absolute(&arguments.folder)?;
+    let asked = Asked::of(arguments, &file_name(&folder))?;
+    asked.complete()?;
+    let file = arguments.folder.join(format!("{}.toml", asked.site));
+    if file.exists() {
+        return Err(Refused::Exists).in_file(file);
+    }
+    let text = asked.new_site(&folder)?.text();
+    // Judged as the file that it will be, so that paths count from its folder.
+    fs::create_dir_all(&folder)
+        .map_err(IoError::on("create the folder"))
+        .in_file(&folder)?;
+    let loaded = parse(&text, &file)?;
+    for warning in loaded.warnings {
+        tracing::warn!("{warning}");
+    }
+    atomic::write(&file, text.as_bytes())?;
+    output::line(format_args!(
+        "{}: written; next: areograph check {}",
+        file.display(),
+        file.display()
+    ));
+    Ok(())
+}
+
+/// What was given or answered, paths as seen from here.
+struct Asked {
+    site: String,
+    description: String,
+    edges_deg: Option<[f64; 4]>,
+    kernels: Vec<PathBuf>,
+    pedr: Vec<PathBuf>,
+    labels: Vec<PathBuf>,
+    ties: Vec<PathBuf>,
+}
+
+impl Asked {
+    /// Options, and answers to what they leave out where somebody can answer.
+    fn of(arguments: &Arguments, name: &str) -> Result<Self, Error> {
+        let mut asked = Self {
+            site: arguments.site.clone().unwrap_or_else(|| identifier(name)),
+            description: arguments.description.clone().unwrap_or_default(),
+            edges_deg: arguments.edges_deg,
+            kernels: arguments.kernels.clone(),
+            pedr: arguments.pedr.clone(),
+            labels: arguments.labels.clone(),
+            ties: arguments.ties.clone(),
+        };
+        if !(io::stdin().is_terminal() && io::stderr().is_terminal()) {
+            return Ok(asked);
+        }
+        if arguments.site.is_none() {
+            let answer = answer(&format!("Identifier of the site [{}]", asked.site))?;
+            if !answer.is_empty() {
+                asked.site = answer;
+            }
+        }
+        let questions = [
+            (
+                "Kernels: a metakernel, a folder, or files in load order",
+                &mut asked.kernels,
+            ),
+            ("PEDR files or globs [none: images alone]", &mut asked.pedr),
+            ("Labels of images [none]", &mut asked.labels),
+            ("Tie point files [none]", &mut asked.ties),
+        ];
+        for (question, paths) in questions {
+            if paths.is_empty() {
+                let answer = answer(question)?;
+                paths.extend(answer.split_whitespace().map(PathBuf::from));
+            }
+        }
+        while asked.edges_deg.is_none() && !asked.pedr.is_empty() {
+            let answer = answer("Window west,east,south,north in degrees [what the images see]")?;
+            if answer.is_empty() {
+                break;
+            }
+            match edges(&answer) {
+                Ok(edges_deg) => asked.edges_deg = Some(edges_deg),
+                Err(problem) => tell(&format!("{problem}\n"))?,
+            }
+        }
+        Ok(asked)
+    }
+
+    /// Whether there is enough for a site.
+    fn complete(&self) -> Result<(), Refused> {
+        if self.kernels.is_empty() {
+            return Err(Refused::Missing("where kernels are (--kernels)"));
+        }
+        if self.pedr.is_empty() && self.labels.is_empty() {
+            return Err(Refused::Missing(
+                "what the site is made of (--pedr, --label)",
+            ));
+        }
+        if !self.pedr.is_empty() && self.edges_deg.is_none() && self.labels.is_empty() {
+            return Err(Refused::Missing(
+                "where the site is (--box, or images by --label)",
+            ));
+        }
+        Ok(())
+    }
+
+    /// The same with paths as seen from `folder`.
+    fn new_site(&self, folder: &Path) -> Result<NewSite, Error> {
+        let seen = |paths: &[PathBuf]| -> Result<Vec<PathBuf>, Error> {
+            let paths = paths
+                .iter()
+                .map(|path| Ok(seen_from(folder, &absolute(path)?)));
+            paths.collect()
+        };
+        let mut images = Vec::with_capacity(self.labels.len());
+        for (label, seen) in self.labels.iter().zip(seen(&self.labels)?) {
+            images.push((image_of(label)?, seen));
+        }
+        Ok(NewSite {
+            site: self.site.clone(),
+            description: self.description.clone(),
+            kernels: seen(&self.kernels)?,
+            kernels_are_a_folder: matches!(&self.kernels[..], [one] if one.is_dir()),
+            pedr: seen(&self.pedr)?,
+            edges_deg: self.edges_deg,
+            images,
+            ties: seen(&self.ties)?,
+        })
+    }
+}
+
+/// The identifier of an image: the product of its label, such as `E02-02855`, else the name of the file.
+fn image_of(label: &Path) -> Result<String, Error> {
+    let product = read_label(label, built_in_instruments())?.product_id;
+    let product = product.and_then(|product| product_named(&product));
+    Ok(product.map_or_else(
+        || identifier(&label.file_stem().unwrap_or_default().to_string_lossy()),
+        |product| format!("{}-{}", &product[..3], &product[3..]),
+    ))
+}
+
+/// A name with what identifiers cannot hold replaced.
+fn identifier(name: &str) -> String {
+    let letters = name.chars().map(|letter| match letter {
+        '-' | '_' => letter,
+        _ if letter.is_ascii_alphanumeric() => letter.to_ascii_lowercase(),
+        _ => '_',
+    });
+    letters.collect()
+}
+
+fn absolute(path: &Path) -> Result<PathBuf, Error> {
+    let path = std::path::absolute(path)
+        .map_err(IoError::on("find"))
+        .in_file(path)?;
+    // Steps back are taken here: behind a wildcard or a folder yet to be made they lead nowhere.
+    let mut steps = PathBuf::new();
+    for step in path.components() {
+        match step {
+            Component::ParentDir => {
+                steps.pop();
+            }
+            step => steps.push(step),
+        }
+    }
+    Ok(steps)
+}
+
+/// `path` as seen from `folder`, both absolute; as it is where they have nothing but the root in common.
+fn seen_from(folder: &Path, path: &Path) -> PathBuf {
+    let (here, there): (Vec<Component>, Vec<Component>) =
+        (folder.components().collect(), path.components().collect());
+    let common = here
+        .iter()
+        .zip(&there)
+        .take_while(|(one, other)| one == other)
+        .count();
+    if common <= 1 {
+        return path.to_owned();
+    }
+    let back = here[common..].iter().map(|_| Component::ParentDir);
+    back.chain(there[common..].iter().copied()).collect()
+}
+
+fn tell(text: &str) -> Result<(), Error> {
+    let mut terminal = io::stderr().lock();
+    let told = terminal
+        .write_all(text.as_bytes())
+        .and_then(|()| terminal.flush());
+    Ok(told.map_err(IoError::on("write to the terminal"))?)
+}
+
+/// The answer to a question, without spaces around it; empty at the end of the input.
+fn answer(question: &str) -> Result<String, Error> {
+    tell(&format!("{question}: "))?;
+    let mut line = String::new();
+    io::stdin()
+        .read_line(&mut line)
+        .map_err(IoError::on("read from the terminal"))?;
+    Ok(line.trim().to_owned())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn paths_are_seen_from_the_folder_of_the_file() {
+        let seen = |folder: &str, path: &str| seen_from(Path::new(folder), Path::new(path));
+        assert_eq!(
+            seen("/home/a/sites", "/home/a/pedr/*.b"),
+            Path::new("../pedr/*.b")
+        );
+        assert_eq!(seen("/home/a", "/home/a/k.tm"), Path::new("k.tm"));
+        assert_eq!(seen("/home/a/b/c", "/home/d"), Path::new("../../../d"));
+        assert_eq!(seen("/home/a", "/data/mola"), Path::new("/data/mola"));
+        assert_eq!(
+            absolute(Path::new("/a/b/../c/./d")).unwrap(),
+            Path::new("/a/c/d")
+        );
+    }
+
+    #[test]
+    fn names_become_identifiers() {
+        assert_eq!(identifier("Gale Crater-2"), "gale_crater-2");
+    }
+}
