@@ -106,12 +106,34 @@ fn statements(geometric: &GeometricProducts, adjustment: &AdjustmentProducts) ->
 }
 
 fn place_says(geometric: &GeometricProducts, adjustment: &AdjustmentProducts) -> String {
-    let known = known_beforehand(geometric);
-    let relief = adjustment.adjusted.relief.as_ref();
-    if relief.is_some_and(|relief| relief.used) {
-        format!("by what is known of {known} beforehand, and by relief")
-    } else {
+    let (known, by) = (known_beforehand(geometric), place_by(geometric, adjustment));
+    if known == by {
         format!("a priori, not measured by images: by what is known of {known}")
+    } else {
+        format!("by {by}, not measured by images")
+    }
+}
+
+/// All that says where a site lies.
+pub(super) fn place_by(geometric: &GeometricProducts, adjustment: &AdjustmentProducts) -> String {
+    let adjusted = adjustment.adjusted;
+    let by_relief = adjusted.relief.as_ref().is_some_and(|relief| relief.used);
+    let by_laser = matches!(adjusted.boresight, Some(Ok(_)));
+    let also = [
+        (by_relief, "relief"),
+        (by_laser, "the laser's mounting"),
+        (
+            adjusted.attitude_clock_s.is_some(),
+            "one offset of the attitude's clock",
+        ),
+    ];
+    let also: Vec<&str> = also
+        .into_iter()
+        .filter_map(|(used, what)| used.then_some(what))
+        .collect();
+    match also.as_slice() {
+        [] => known_beforehand(geometric).to_owned(),
+        also => format!("{}; {}", known_beforehand(geometric), also.join(", ")),
     }
 }
 

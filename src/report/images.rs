@@ -184,10 +184,11 @@ fn models(site: &SiteProducts) -> String {
         table.row(valid, row(id, "2", &model.second_order, judged));
     }
     let words = format!(
-        "Limits of the second order: position {} m, pointing {:.1}″ (largest component of the rotation vector). On the ground: \
+        "Limits of the second order: position {} m, pointing {}″ (largest component of the rotation vector). On the ground: \
          RMS displacement of the boresight.",
         limits.position_rmse_max_m,
-        limits.pointing_rmse_max_rad / RADIANS_PER_ARCSECOND
+        // As it was written: conversion to radians and back leaves digits of its own.
+        (1e6 * limits.pointing_rmse_max_rad / RADIANS_PER_ARCSECOND).round() / 1e6
     );
     table.finish() + &paragraph(&words)
 }

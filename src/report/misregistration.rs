@@ -74,9 +74,9 @@ impl<'a> BeforeAfter<'a> {
         geometric.pairs.iter().map(of).collect()
     }
 
-    /// The pair whose images disagree most before the adjustment.
+    /// The pair whose images place their tie points farthest apart along the flight before the adjustment.
     pub(super) fn worst(pairs: &[Self]) -> Option<&Self> {
-        let size = |pair: &&Self| pair.apart(pair.before).metres;
+        let size = |pair: &&Self| pair.before.along_track_parallax_m.abs();
         pairs.iter().max_by(|a, b| size(a).total_cmp(&size(b)))
     }
 

@@ -130,7 +130,7 @@ fn statistics(site: &SiteProducts) -> String {
             [
                 (&profile.id).into(),
                 Cell::Limited(whole(main.n), shots_share),
-                Cell::Limited(metres(main.mean), main.mean.abs() / limits.mean_max_m),
+                metres(main.mean).into(),
                 metres(main.standard_deviation).into(),
                 metres(main.median).into(),
                 metres(main.nmad).into(),
@@ -147,10 +147,9 @@ fn statistics(site: &SiteProducts) -> String {
         );
     }
     let words = format!(
-        "Limits: at least {} shots, mean within ±{} m, at most {} % outliers (beyond {} robust standard deviations of \
-         the median). The bar under a value shows how much of its limit is used.",
+        "Limits: at least {} shots, at most {} % outliers (beyond {} robust standard deviations of the median). The bar \
+         under a value shows how much of its limit is used.",
         limits.shots_min,
-        limits.mean_max_m,
         100.0 * limits.outlier_share_max,
         limits.outlier_sigma
     );

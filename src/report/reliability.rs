@@ -2,7 +2,7 @@
 //! residual shows, unknowns that cannot be separated, and rejected points.
 
 use super::{
-    heights::known_beforehand,
+    heights::{known_beforehand, place_by},
     html::{Cell, Column, Table, counted, paragraph},
     numbers::whole,
     plots::label,
@@ -49,12 +49,11 @@ pub(super) fn absolute(geometric: &GeometricProducts, adjustment: &AdjustmentPro
         Some(heights) => {
             let [east_m, north_m, up_m] = heights.mean_sigma_m;
             format!(
-                "heights are those of MOLA, to {} m on average; the place is what was known of {} beforehand, \
-                 to {} m east and {} m north",
+                "heights are those of MOLA, to {} m on average; the place is known to {} m east and {} m north by {}",
                 label(up_m, 1),
-                known_beforehand(geometric),
                 label(east_m, 0),
-                label(north_m, 0)
+                label(north_m, 0),
+                place_by(geometric, adjustment)
             )
         }
         None if summary.model == AdjustmentModel::Published => {

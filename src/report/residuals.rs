@@ -53,14 +53,18 @@ pub(super) fn images(adjusted: &Adjusted) -> String {
                 .sum::<f64>()
                 .sqrt()
         };
+        let of_ties = |value: f64, decimals: usize| match count {
+            0 => "–".to_owned(),
+            _ => label(value, decimals),
+        };
         table.row(
             true,
             [
                 (&image.id).into(),
                 whole(count).into(),
-                label(rms(|view| view.along_px), 2).into(),
-                label(rms(|view| view.across_px), 2).into(),
-                label(largest, 1).into(),
+                of_ties(rms(|view| view.along_px), 2).into(),
+                of_ties(rms(|view| view.across_px), 2).into(),
+                of_ties(largest, 1).into(),
                 label(size(0), 1).into(),
                 label(size(9) / RADIANS_PER_ARCSECOND, 1).into(),
             ],

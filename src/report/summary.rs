@@ -2,7 +2,7 @@
 
 use super::{
     checks,
-    heights::{absolute, known_beforehand},
+    heights::{absolute, place_by},
     html::{Tone, counted, escape, list, paragraph, verdict},
     map,
     numbers::{number, signed, whole},
@@ -160,7 +160,9 @@ fn by_mola(site: &SiteProducts) -> Option<KeyNumber> {
 
 fn between_images(site: &SiteProducts) -> Option<KeyNumber> {
     let (after, after_m) = checked(site, CheckKind::ParallaxAfter)?;
-    let (_, before_m) = checked(site, CheckKind::ParallaxBefore)?;
+    let (geometric, _) = site.adjustment()?;
+    let mut pairs = geometric.pairs.iter();
+    let before = pairs.find(|pair| pair.images.join(" and ") == after.subject)?;
     Some(KeyNumber {
         what: "Between images, along track",
         value: format!(
@@ -170,7 +172,7 @@ fn between_images(site: &SiteProducts) -> Option<KeyNumber> {
         note: format!(
             "at the tie points of {}; {} m before",
             after.subject,
-            number(before_m.abs(), 0)
+            number(before.along_track_parallax_m.abs(), 0)
         ),
     })
 }
@@ -191,10 +193,13 @@ fn in_place(site: &SiteProducts) -> Option<KeyNumber> {
         note: if place.contains(';') {
             format!(
                 "by {}; see accuracy for what is open",
-                known_beforehand(&geometric)
+                place_by(&geometric, &adjustment)
             )
         } else {
-            format!("plan by {}, height by MOLA", known_beforehand(&geometric))
+            format!(
+                "plan by {}, height by MOLA",
+                place_by(&geometric, &adjustment)
+            )
         },
     })
 }
