@@ -13,7 +13,7 @@ use crate::{
     config::{NewSite, built_in_instruments, parse},
     error::{Cause, Error, IoError, Kind, Locate as _},
     files::file_name,
-    pds::moc::{product_named, read_label},
+    pds::{product_named, read_label},
     store::atomic,
 };
 

@@ -139,9 +139,10 @@ fn least_squares_finds_places_within_what_it_states() {
         let error = matched.affine.to - truth.apply(&matched.affine.from);
         tried += 2;
         for axis in 0..2 {
-            let sigma = matched.covariance_px2[(axis, axis)].sqrt();
+            // Interpolation leaves two hundredths of a pixel, as the test below shows.
+            let sigma = matched.covariance_px2[(axis, axis)].sqrt().hypot(0.02);
             squares[axis] += (error[axis] / sigma).powi(2);
-            within += i32::from(error[axis].abs() <= 3.0 * sigma.hypot(0.02));
+            within += i32::from(error[axis].abs() <= 3.0 * sigma);
         }
         assert!(error.norm() < 0.3, "{error}"); // pixels
         assert!(matched.correlation > 0.9);
@@ -205,7 +206,8 @@ fn a_search_finds_the_pixel_and_tells_of_a_second_place() {
     let template = ground.image([17, 42], [21, 21], |place| *place, light, &mut random);
     let peak = search(&template, &area).unwrap();
     assert_eq!(peak.at, [17, 42]);
-    assert!(peak.correlation > 0.9 && peak.second < 0.7, "{peak:?}");
+    // Ground of waves is like itself elsewhere too, and yet not nearly as much.
+    assert!(peak.correlation > 0.9 && peak.second < 0.8, "{peak:?}");
     // The same ground twice, 30 samples apart.
     let twice = ground.image(
         [0, 0],
