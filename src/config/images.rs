@@ -51,8 +51,8 @@ declare_table! {
         /// PDS3 or ISIS label, attached or detached.
         #[serde(skip)]
         label: Option<PathBuf> = key(FILE).example(r#""../labels/e0202855.lbl""#),
-        /// The image itself (.imq, .img, .cub, TIFF, PNG), which may be the label's file. Tie points are matched in it where
-        /// `ties.match` says so, and the report shows footprints and tie points on it.
+        /// The image itself (.imq, .img, .cub, TIFF, PNG), which may be the label's file. The report shows footprints and tie
+        /// points on it; in one as the archive has it (.imq, .img) tie points are matched where `ties.match` says so.
         #[serde(skip)]
         pixels: Option<PathBuf> = key(FILE).unused(r#""../images/e0202855.imq""#),
         /// Or image support data (ISD) of the Community Sensor Model, as ALE writes them: camera, line times and

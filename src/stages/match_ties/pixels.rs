@@ -9,6 +9,7 @@ use crate::{
     files::HashedFile,
     pds::{
         image_file::{ImageFile, Pyramid},
+        pixel_file::PixelFile,
         product_named,
     },
     stage::{Input, Inputs},
@@ -35,6 +36,11 @@ impl Input for PixelFiles<'_> {
 /// Pixels that belong to another image.
 #[derive(Debug, thiserror::Error)]
 enum PixelsError {
+    #[error(
+        "image {image}: its pixels are {kind}, without a label; expected an image as the archive has it, whose label says which \
+         one it is"
+    )]
+    Kind { image: String, kind: String },
     #[error(
         "image {image}: its pixels are those of product {product}; expected {expected}, which its identifier names"
     )]
@@ -67,6 +73,7 @@ impl Cause for PixelsError {
 
     fn advice(&self) -> String {
         match self {
+            Self::Kind { .. } => "give images.pixels the file of the archive (.imq, .img), or leave out ties.match",
             Self::Product { .. } | Self::Size { .. } => {
                 "check that images.pixels are not exchanged, and are all of the image"
             }
@@ -83,9 +90,17 @@ impl Cause for PixelsError {
 /// # Errors
 /// The system's refusal to read; a file that is no image, or another one.
 pub(super) fn open(path: &Path, times: &ImageTimes) -> Result<ImageFile> {
-    let file = ImageFile::open(path, std::slice::from_ref(&times.instrument))?;
+    let pixels = PixelFile::open(path, std::slice::from_ref(&times.instrument))?;
+    let other = pixels.other_kind();
+    let PixelFile::Archive(file) = pixels else {
+        return Err(PixelsError::Kind {
+            image: times.id.clone(),
+            kind: other.unwrap_or_default(),
+        })
+        .in_file(path);
+    };
     belongs(&file, times).in_file(path)?;
-    Ok(file)
+    Ok(*file)
 }
 
 /// Whether what a file says of its image agrees with what is known of it.

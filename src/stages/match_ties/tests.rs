@@ -264,8 +264,8 @@ fn matched_places_are_within_what_they_state_and_other_images_give_none() {
         .map(|_| (100.0 + 20.0 * random.unit()) as u8)
         .collect();
     let elsewhere = rendered(&camera(1, [0.0; 2]), &waves(6), 2);
+    // Exchanged pixels are refused by their labels: nothing else could tell them from orientations that err.
     for (what, first, second) in [
-        ("exchanged", &two, &one),
         ("mirrored", &one, &mirrored),
         ("of another place", &one, &elsewhere),
         ("noise", &one, &noise),
