@@ -30,8 +30,10 @@ const CORRELATION_AT_LAST_MIN: f64 = 0.7;
 const SECOND_MAX: f64 = 0.85;
 /// What shifts a place besides noise, pixels: interpolation and whole grey values (below 0.02 by the tests of `imaging`),
 /// and relief within the template, which no affine distortion follows: together 0.038 along the samples of the synthetic
-/// mission's roughest pair, whose pixels are 1.5 times as large in one image as in the other.
-const SYSTEMATIC_PX: f64 = 0.04;
+/// mission's roughest pair, whose pixels are 1.5 times as large in one image as in the other. Larger by half, since rims
+/// make some of these errors larger than a normal distribution has them: of three standard deviations 99 in 100 must be
+/// within.
+const SYSTEMATIC_PX: f64 = 0.06;
 
 /// A place that was found.
 pub(super) struct Found {
