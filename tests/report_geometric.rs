@@ -368,8 +368,8 @@ fn what_cannot_be_trusted_is_said() {
     let text = section(&page, SECTIONS[1]);
     let [east_m, north_m, up_m] = site.adjusted.heights.unwrap().mean_sigma_m;
     assert!(text.contains(&format!(
-        "The relative registration is corrected; heights are those of MOLA, to {up_m:.1} m on average; the place is what was \
-         known of orbit and attitude beforehand, to {east_m:.0} m east and {north_m:.0} m north."
+        "The relative registration is corrected; heights are those of MOLA, to {up_m:.1} m on average; the place is known to \
+         {east_m:.0} m east and {north_m:.0} m north by orbit and attitude."
     )));
     // The surface controls tie points across the track in part: with its spacing of shots not all of them.
     let shown = table(&page, "Share of a gross error that its own residual shows");

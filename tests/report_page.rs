@@ -34,6 +34,7 @@ fn between<'a>(text: &'a str, start: &'a str, end: char) -> impl Iterator<Item =
 fn a_failed_range_check_is_said_in_the_first_lines() {
     let mut site = Site::small();
     site.ranges.profiles[0].range_minus_distance_m.mean = 11.0;
+    site.ranges.profiles[0].mean_without_outliers_m = 11.0;
     let page = page("small", &site, true);
     let lead = page.split("<nav").next().unwrap();
     assert!(lead.contains("class=\"verdict invalid\""));

@@ -292,7 +292,9 @@ fn mistakes_of_laser_and_bus_are_told() {
     assert!(!told.contains(remark), "{told}");
     spoil_shots(&mission);
     let (_, told, _) = ending(&mission, "spoiled", |text| text);
-    assert!(told.contains(remark), "{told}");
+    // So many that the network falls apart over them, or as a remark.
+    let refused = "contradicts the rest of the network";
+    assert!(told.contains(remark) || told.contains(refused), "{told}");
 }
 
 /// Records every fourth frame of all PEDR files 7.5 thousandths of a degree east or west of its place, in turn.
