@@ -19,7 +19,7 @@ use crate::{
 
 /// Writes a commented site file for a window and images.
 ///
-/// On a terminal, what no option gives is asked for. The file is DIR/<site>.toml; paths are given as seen from here, and
+/// On a terminal, what no option gives is asked for. The file is DIR/SITE.toml; paths are given as seen from here, and
 /// written as seen from there. Without --box the window is what the images see, and 5 km around it.
 ///
 /// Examples:
