@@ -212,7 +212,6 @@ fn judged(
 }
 
 #[test]
-#[ignore = "renders six images of some 10 000 lines and matches three pairs: some minutes"]
 fn matched_ties_are_within_what_they_state_and_adjust_as_well_as_given_ones() {
     let folder = tempfile::tempdir().unwrap();
     let mission = Mission::new(&folder.path().join("mission"));
