@@ -14,7 +14,7 @@ mod track;
 use std::{
     fs,
     path::{Path, PathBuf},
-    process::{Command, Output},
+    process::{Command, Output, Stdio},
     sync::Arc,
 };
 
@@ -44,7 +44,7 @@ fn archive(folder: &Path) -> PathBuf {
 fn shots(archive: &Path) -> ShotsTable {
     let Opened { sources, failures } = Opened::all(&[archive.to_owned()]).unwrap();
     assert!(failures.is_empty());
-    ShotsTable::new(sources)
+    ShotsTable::new(sources, Arc::default())
 }
 
 fn context() -> SessionContext {
@@ -311,6 +311,97 @@ fn questions_without_an_answer_are_refused() {
     assert!(!out.exists());
     let left = fs::read_dir(folder.path()).unwrap().count();
     assert_eq!(left, 1, "only the archive");
+}
+
+#[test]
+fn an_answer_without_rows_has_its_columns() {
+    let folder = tempfile::tempdir().unwrap();
+    let archive = archive(folder.path());
+    let question = "select orbit, shot from shots where latitude_deg > 89.9";
+    let printed = sql(&archive, &[question, "--format", "csv"]);
+    assert!(printed.status.success());
+    assert_eq!(printed.stdout, b"orbit,shot\n");
+    let [csv, rows] = ["none.csv", "none.parquet"].map(|name| folder.path().join(name));
+    for out in [&csv, &rows] {
+        let output = sql(&archive, &[question, "--out", out.to_str().unwrap()]);
+        assert!(output.status.success());
+    }
+    assert_eq!(fs::read(&csv).unwrap(), b"orbit,shot\n");
+    let rows = parquet(&rows);
+    assert_eq!((rows.num_rows(), rows.num_columns()), (0, 2));
+}
+
+#[test]
+fn what_cannot_be_printed_is_a_failure_and_a_reader_who_went_away_is_none() {
+    let folder = tempfile::tempdir().unwrap();
+    let archive = archive(folder.path());
+    let nested = sql(
+        &archive,
+        &[
+            "select array_agg(shot) as every from shots where et_s < -19999990.0",
+            "--format",
+            "csv",
+        ],
+    );
+    assert!(error_of(&nested).contains("list"), "{}", error_of(&nested));
+    let ask = |stdout: Stdio| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_areograph"));
+        let command = command.args(["pedr", "sql"]).arg(&archive);
+        let command = command.args(["select orbit, shot from shots", "--format", "csv"]);
+        command
+            .stdout(stdout)
+            .stderr(Stdio::piped())
+            .spawn()
+            .unwrap()
+    };
+    let full = fs::File::options().write(true).open("/dev/full").unwrap();
+    let full = ask(full.into()).wait_with_output().unwrap();
+    assert_eq!(full.status.code(), Some(6), "{full:?}");
+    let mut gone = ask(Stdio::piped());
+    drop(gone.stdout.take());
+    assert!(gone.wait().unwrap().success());
+}
+
+#[test]
+fn two_versions_of_one_orbit_have_no_answer_but_one_by_one() {
+    let folder = tempfile::tempdir().unwrap();
+    let archive = archive(folder.path());
+    write(
+        &archive.join("ap19030k.b"),
+        MarsDatum::Iau1991,
+        10,
+        |_, _| (),
+    );
+    let told = error_of(&sql(&archive, &["select count(*) from shots"]));
+    for part in ["ap19030k.b", "ap19030l.b", "would count twice"] {
+        assert!(told.contains(part), "{part}: {told}");
+    }
+    let one = "select count(*) from shots where source_file = 'ap19030l.b'";
+    assert!(sql(&archive, &[one]).status.success());
+    // A second name of a file is the same file.
+    std::os::unix::fs::symlink("ap19030l.b", archive.join("again.b")).unwrap();
+    fs::remove_file(archive.join("ap19030k.b")).unwrap();
+    assert!(
+        sql(&archive, &["select count(*) from shots"])
+            .status
+            .success()
+    );
+}
+
+/// What fails beyond the last row of a limit does not count, however far the search is ahead.
+#[test]
+fn a_limit_does_not_ask_for_what_comes_after() {
+    let folder = tempfile::tempdir().unwrap();
+    let archive = archive(folder.path());
+    let table = shots(&archive);
+    let second = archive.join("ap19020k.b");
+    let bytes = fs::read(&second).unwrap();
+    fs::write(&second, &bytes[..bytes.len() / 2]).unwrap();
+    let context = context();
+    context.register_table("shots", Arc::new(table)).unwrap();
+    for _ in 0..10 {
+        assert_eq!(ask(&context, "select * from shots limit 5").num_rows(), 5);
+    }
 }
 
 #[test]

@@ -4,7 +4,7 @@ mod answer;
 
 use std::{
     path::PathBuf,
-    sync::{Arc, PoisonError},
+    sync::{Arc, PoisonError, atomic::AtomicBool},
 };
 
 use clap::{Args, ValueEnum};
@@ -18,9 +18,9 @@ use datafusion::{
 use tokio_stream::StreamExt as _;
 
 use self::answer::Answer;
-use crate::cli::output;
+use crate::cli::{output, stop::Signals};
 use crate::{
-    error::{Cause, IoError, Kind, Result},
+    error::{Cause, IoError, Kind, Result, Stopped},
     pds::archive::Opened,
     sql::{ShotsTable, Tally},
 };
@@ -96,24 +96,27 @@ pub(super) fn run(arguments: &Arguments) -> Result<()> {
         failures.for_each(output::error);
         return Err(first);
     }
-    let table = ShotsTable::new(sources);
+    let signals = Signals::heard()?;
+    let table = ShotsTable::new(sources, Arc::clone(signals.stop()));
     let tally = table.tally();
     let runtime = tokio::runtime::Builder::new_current_thread().build();
     let runtime = runtime.map_err(IoError::on("begin an asynchronous runtime"))?;
-    let answered = runtime.block_on(answer(table, arguments));
+    let answered = runtime.block_on(answer(table, arguments, signals.stop()));
     let mut tally = tally.lock().unwrap_or_else(PoisonError::into_inner);
     tell(&tally);
-    tally.failure.take().map_or(answered, Err)
+    // What failed beyond the last row that was asked for does not count.
+    answered.map_err(|told| tally.failure.take().unwrap_or(told))
 }
 
-async fn answer(table: ShotsTable, arguments: &Arguments) -> Result<()> {
+async fn answer(table: ShotsTable, arguments: &Arguments, stop: &AtomicBool) -> Result<()> {
     let rows = ask(table, &arguments.question).await;
     let mut rows = rows.map_err(Question)?;
     let mut answer = match &arguments.out {
         Some(out) => Answer::in_file(out, rows.schema())?,
-        None => Answer::printed(arguments.format, rows.schema()),
+        None => Answer::printed(arguments.format, rows.schema())?,
     };
     while let Some(batch) = rows.next().await {
+        Stopped::check(stop)?;
         if !answer.take(batch.map_err(Question)?)? {
             break;
         }

@@ -2,8 +2,12 @@
 
 use std::{
     fs::File,
-    io::{BufWriter, Stdout, Write as _},
+    io::{self, BufWriter, Stdout, Write},
     path::Path,
+    sync::{
+        Arc,
+        atomic::{AtomicBool, Ordering},
+    },
 };
 
 use ::parquet::{
@@ -65,24 +69,70 @@ pub(super) enum Answer {
         schema: SchemaRef,
         batches: Vec<RecordBatch>,
     },
-    /// Comma-separated values on standard output.
-    Csv(csv::Writer<Stdout>),
+    /// Comma-separated values on standard output, and whether its reader is gone.
+    Csv(csv::Writer<Reader>, Arc<AtomicBool>),
     /// Comma-separated values in a file.
     CsvFile(StagedFile, csv::Writer<BufWriter<File>>),
     /// Parquet.
     Parquet(StagedFile, Box<ArrowWriter<File>>),
 }
 
+/// Whoever reads standard output: one who went away (`| head`) is no failure, a disk that refuses is one.
+pub(super) struct Reader {
+    out: Stdout,
+    is_gone: Arc<AtomicBool>,
+}
+
+impl Reader {
+    /// What was done of something of which nothing is left to do once the reader is gone.
+    fn or_gone<T>(&self, done: io::Result<T>, gone: T) -> io::Result<T> {
+        match done {
+            Err(error) if error.kind() == io::ErrorKind::BrokenPipe => {
+                self.is_gone.store(true, Ordering::Relaxed);
+                Ok(gone)
+            }
+            done => done,
+        }
+    }
+}
+
+impl Write for Reader {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        let written = self.out.write(bytes);
+        self.or_gone(written, bytes.len())
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        let flushed = self.out.flush();
+        self.or_gone(flushed, ())
+    }
+}
+
+/// A writer of comma-separated values that has written their names, also of an answer without rows.
+fn begun<W: Write>(out: W, schema: SchemaRef) -> std::result::Result<csv::Writer<W>, NotWritten> {
+    let mut writer = csv::Writer::new(out);
+    let names = writer.write(&RecordBatch::new_empty(schema));
+    names.map_err(NotWritten::refused)?;
+    Ok(writer)
+}
+
 impl Answer {
     /// An answer on standard output.
-    pub(super) fn printed(format: Format, schema: SchemaRef) -> Self {
-        match format {
+    pub(super) fn printed(format: Format, schema: SchemaRef) -> Result<Self> {
+        Ok(match format {
             Format::Table => Self::Table {
                 schema,
                 batches: Vec::new(),
             },
-            Format::Csv => Self::Csv(csv::Writer::new(std::io::stdout())),
-        }
+            Format::Csv => {
+                let is_gone = Arc::new(AtomicBool::new(false));
+                let reader = Reader {
+                    out: io::stdout(),
+                    is_gone: Arc::clone(&is_gone),
+                };
+                Self::Csv(begun(reader, schema)?, is_gone)
+            }
+        })
     }
 
     /// An answer in a file, which appears when it is whole.
@@ -91,7 +141,7 @@ impl Answer {
         match ending.to_str() {
             Some("csv") => {
                 let file = StagedFile::create(path)?;
-                let writer = csv::Writer::new(BufWriter::new(file.writer()?));
+                let writer = begun(BufWriter::new(file.writer()?), schema).in_file(path)?;
                 Ok(Self::CsvFile(file, writer))
             }
             Some("parquet") => {
@@ -118,8 +168,10 @@ impl Answer {
                 batches.push(batch);
                 Ok(rows(batches) <= TABLE_ROWS_MAX)
             }
-            // A reader that went away (`| head`) is no failure.
-            Self::Csv(writer) => Ok(writer.write(&batch).is_ok()),
+            Self::Csv(writer, is_gone) => {
+                writer.write(&batch).map_err(NotWritten::refused)?;
+                Ok(!is_gone.load(Ordering::Relaxed))
+            }
             Self::CsvFile(file, writer) => {
                 let written = writer.write(&batch).map_err(NotWritten::refused);
                 written.in_file(file.path()).map(|()| true)
@@ -135,7 +187,10 @@ impl Answer {
     pub(super) fn finish(self) -> Result<()> {
         match self {
             Self::Table { schema, batches } => print_table(schema, &batches),
-            Self::Csv(_) => Ok(()),
+            Self::Csv(writer, _) => {
+                let flushed = writer.into_inner().flush();
+                Ok(flushed.map_err(IoError::on("write standard output"))?)
+            }
             Self::CsvFile(file, writer) => {
                 let flushed = writer.into_inner().flush().map_err(IoError::on("write"));
                 flushed.in_file(file.path())?;
