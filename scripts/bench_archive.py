@@ -13,7 +13,7 @@ import time
 import duckdb
 
 ROUNDS = 9
-WEST, EAST, SOUTH, NORTH = 20.0, 20.5, 10.0, 10.5
+HALF_WINDOW_DEG = 0.25
 
 
 def best_s(work):
@@ -35,11 +35,18 @@ def main(areograph, archive):
     # Each shot of class 1 with a return; rows come in the order of time, as a user would sort them.
     rows = search("--box=0,360,-90,90", "--out", str(everything))
     size_gb = everything.stat().st_size / 1e9
-    box = f"--box={WEST},{EAST},{SOUTH},{NORTH}"
+    def first(question):
+        return duckdb.sql(question).fetchall()[0]
+
+    # About a shot far from poles and from the prime meridian.
+    lon, lat = first(f"""select longitude_deg, latitude_deg from '{everything}'
+                         where abs(latitude_deg) < 45 and longitude_deg between 10 and 350 limit 1 offset {rows // 3}""")
+    west, east, south, north = lon - HALF_WINDOW_DEG, lon + HALF_WINDOW_DEG, lat - HALF_WINDOW_DEG, lat + HALF_WINDOW_DEG
+    box = f"--box={west!r},{east!r},{south!r},{north!r}"
     ours_s, ours = best_s(lambda: search(box))
-    count = f"""select count(*) from '{everything}' where longitude_deg between {WEST} and {EAST}
-                and latitude_deg between {SOUTH} and {NORTH}"""
-    theirs_s, theirs = best_s(lambda: duckdb.sql(count).fetchone()[0])
+    count = f"""select count(*) from '{everything}' where longitude_deg between {west!r} and {east!r}
+                and latitude_deg between {south!r} and {north!r}"""
+    theirs_s, theirs = best_s(lambda: first(count)[0])
     if ours != theirs:
         sys.exit(f"areograph finds {ours} shots, DuckDB {theirs}")
     print(f"{rows} shots, {size_gb:.2f} GB of Parquet; {ours} in the window")

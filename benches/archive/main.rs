@@ -93,6 +93,19 @@ impl Archive {
         }
     }
 
+    /// A window of half a degree about a shot in the middle of the archive.
+    fn around_a_shot(&self) -> Region {
+        let reader = Reader::open(&self.paths[self.paths.len() / 2]).unwrap();
+        let row = reader.head().record_count() / 3;
+        let stretch = reader.stretch(row..row + 1, Vec::new()).unwrap();
+        let (_, frame) = stretch
+            .frames(row..row + 1, FieldGuard::new(None))
+            .next()
+            .unwrap();
+        let (longitude_rad, latitude_rad) = frame.unwrap().mid_point();
+        half_degree(longitude_rad / DEGREE - 0.25, latitude_rad / DEGREE - 0.25)
+    }
+
     fn kernels(&self) -> PathBuf {
         self.folder.with_file_name("kernels").join("archive.tm")
     }
@@ -328,7 +341,7 @@ fn measure(folder: &Path, gb: f64) -> Value {
         "written at {:.2} GB/s",
         archive.bytes as f64 / writing.elapsed().as_secs_f64() / 1e9
     );
-    let one = vec![half_degree(20.0, 10.0)];
+    let one = vec![archive.around_a_shot()];
     // Spread over the globe by the golden ratio.
     let thousand: Vec<Region> = (0..1_000)
         .map(|n| half_degree(f64::from(n) * 222.492_235, -87.0 + 0.173 * f64::from(n)))

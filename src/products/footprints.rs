@@ -87,7 +87,7 @@ pub(super) struct Shot<'a> {
 }
 
 /// What footprints have beside numbers.
-pub(super) trait ShotNames {
+pub(super) trait ShotNames: Sync {
     /// Identifiers of the windows that hold the shot in this row, separated by semicolons.
     fn windows(&self, row: usize) -> String;
 

@@ -7,11 +7,7 @@ use std::{
     sync::Arc,
 };
 
-use ::parquet::{
-    arrow::{ArrowWriter, arrow_reader::ParquetRecordBatchReaderBuilder},
-    basic::{Compression, ZstdLevel},
-    file::{metadata::KeyValue, properties::WriterProperties},
-};
+use ::parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 use arrow::{
     array::{ArrayRef, Float64Array, StructArray},
     compute::concat_batches,
@@ -28,6 +24,7 @@ use super::{
     geoparquet::geo_metadata,
     gis::Features,
     parquet,
+    parquet_file::ParquetFile,
     table::Table,
     text_table,
 };
@@ -107,7 +104,7 @@ pub struct ShotsFile {
 /// The writer of a format.
 enum Writer {
     Parquet(Box<ParquetShots>),
-    Csv(Box<csv::Writer<BufWriter<File>>>),
+    Csv(BufWriter<File>),
     GeoJson(BufWriter<File>),
 }
 
@@ -126,9 +123,9 @@ impl ShotsFile {
                 Writer::Parquet(Box::new(writer))
             }
             ShotsFormat::Csv => {
-                let mut writer = csv::Writer::from_writer(BufWriter::new(handle));
+                let mut writer = BufWriter::new(handle);
                 text_table::write_names(&mut writer, &empty.for_text()).in_file(path)?;
-                Writer::Csv(Box::new(writer))
+                Writer::Csv(writer)
             }
             ShotsFormat::GeoJson => {
                 let features = Features::of_footprints("shots", "", Vec::new(), empty);
@@ -181,7 +178,10 @@ impl ShotsFile {
                 let points = points_deg.iter().map(|[east, north]| [*east, *north, 0.0]);
                 let table = shots.table().for_gis();
                 let features = Features::of_footprints("shots", "", points.collect(), table);
-                write_features(writer, &features, is_first, path)
+                let separator = if is_first { "" } else { geojson::SEPARATOR };
+                let separated = writer.write_all(separator.as_bytes());
+                separated.map_err(IoError::on("write")).in_file(path)?;
+                geojson::write_features(writer, &features).in_file(path)
             }
         }
     }
@@ -195,7 +195,7 @@ impl ShotsFile {
         let refused = |error| IoError::on("write")(error);
         match self.writer {
             Writer::Parquet(writer) => {
-                let metadata = [
+                let metadata = vec![
                     (
                         "geo",
                         geo_metadata(self.bounds, Some(covering())).to_string(),
@@ -229,7 +229,7 @@ impl ShotsFile {
 
 /// Writes shots in batches of one size, so that the bytes do not depend on the pieces in which shots were found.
 struct ParquetShots {
-    writer: ArrowWriter<File>,
+    writer: ParquetFile<File>,
     schema: SchemaRef,
     /// Fewer rows than a batch has.
     pending: RecordBatch,
@@ -237,15 +237,11 @@ struct ParquetShots {
 
 impl ParquetShots {
     fn new(file: File, table: &Table<'_>) -> Result<Self> {
-        let properties = WriterProperties::builder()
-            .set_created_by(concat!("areograph ", env!("CARGO_PKG_VERSION")).to_owned())
-            .set_compression(Compression::ZSTD(ZstdLevel::default()))
-            .build();
         let fields = parquet::schema(table).fields().clone();
         let bbox = Arc::new(Field::new(BBOX, DataType::Struct(bbox_fields()), false));
         let fields = fields.iter().cloned().chain([bbox]);
         let schema = Arc::new(Schema::new(fields.collect::<Fields>()));
-        let writer = ArrowWriter::try_new(file, Arc::clone(&schema), Some(properties));
+        let writer = ParquetFile::new(file, Arc::clone(&schema));
         Ok(Self {
             writer: writer.map_err(parquet::refused)?,
             pending: RecordBatch::new_empty(Arc::clone(&schema)),
@@ -266,14 +262,9 @@ impl ParquetShots {
         Ok(())
     }
 
-    fn finish(mut self, metadata: [(&str, String); 3]) -> Result<()> {
+    fn finish(mut self, metadata: Vec<(&str, String)>) -> Result<()> {
         self.writer.write(&self.pending).map_err(parquet::refused)?;
-        for (key, value) in metadata {
-            let entry = KeyValue::new(key.to_owned(), value);
-            self.writer.append_key_value_metadata(entry);
-        }
-        self.writer.close().map_err(parquet::refused)?;
-        Ok(())
+        self.writer.finish(metadata).map_err(parquet::refused)
     }
 }
 
@@ -301,23 +292,6 @@ fn with_boxes(
     let arrays = batch.columns().iter().cloned().chain([boxes]).collect();
     RecordBatch::try_new(Arc::clone(schema), arrays)
         .map_err(ProductError::refused("assemble columns"))
-}
-
-fn write_features(
-    writer: &mut BufWriter<File>,
-    features: &Features<'_>,
-    is_first: bool,
-    path: &Path,
-) -> Result<()> {
-    geojson::each(features, path, |row, feature, _| {
-        let line = serde_json::to_string(feature)
-            .map_err(ProductError::refused("encode GeoJSON"))
-            .in_file(path)?;
-        let separator = if is_first && row == 0 { "" } else { ",\n" };
-        write!(writer, "{separator}{line}")
-            .map_err(IoError::on("write"))
-            .in_file(path)
-    })
 }
 
 /// Reads back how many rows the file has.

@@ -2,10 +2,13 @@
 
 use std::{
     fmt::Write as _,
-    io::{BufRead as _, BufReader, Write as _},
+    fs::File,
+    io::{BufRead as _, BufReader, BufWriter, Write},
+    ops::Range,
     path::Path,
 };
 
+use rayon::prelude::*;
 use serde::{Serialize, Serializer, ser::SerializeMap as _};
 use serde_json::{Map, Value, json};
 
@@ -159,31 +162,56 @@ pub(super) fn write(path: &Path, features: Features) -> Result<u64> {
     Ok(features.points.len() as u64)
 }
 
-/// Calls `take` with every feature and what follows it.
-pub(super) fn each(
+/// What stands between two features.
+pub(super) const SEPARATOR: &str = ",\n";
+
+/// Calls `take` with each of these rows.
+fn each(
     features: &Features,
-    path: &Path,
-    mut take: impl FnMut(usize, &Feature, &'static str) -> Result<()>,
-) -> Result<()> {
+    rows: Range<usize>,
+    mut take: impl FnMut(usize, &Feature) -> std::result::Result<(), ProductError>,
+) -> std::result::Result<(), ProductError> {
     let columns: Vec<Meaning> = features.attributes.columns().copied().collect();
-    for rows in features.attributes.pieces() {
-        let values = features.attributes.values(rows.clone()).in_file(path)?;
-        for (row, index) in rows.enumerate() {
-            let [longitude_deg, latitude_deg, _] = features.points[index];
-            let feature = Feature {
-                r#type: "Feature",
-                geometry: Point {
-                    r#type: "Point",
-                    coordinates: [longitude_deg, latitude_deg],
-                },
-                properties: Properties {
-                    columns: &columns,
-                    values: &values,
-                    row,
-                },
-            };
-            let is_last = index + 1 == features.points.len();
-            take(index, &feature, if is_last { "\n" } else { ",\n" })?;
+    let values = features.attributes.values(rows.clone())?;
+    for (row, index) in rows.enumerate() {
+        let [longitude_deg, latitude_deg, _] = features.points[index];
+        let feature = Feature {
+            r#type: "Feature",
+            geometry: Point {
+                r#type: "Point",
+                coordinates: [longitude_deg, latitude_deg],
+            },
+            properties: Properties {
+                columns: &columns,
+                values: &values,
+                row,
+            },
+        };
+        take(index, &feature)?;
+    }
+    Ok(())
+}
+
+/// Writes all features, a line each but for the end of the last one.
+///
+/// # Errors
+/// Numbers that are not finite; what the disk refuses.
+pub(super) fn write_features(file: &mut impl Write, features: &Features) -> Result<()> {
+    let text_of = |rows: Range<usize>| {
+        let mut text = Vec::new();
+        each(features, rows, |index, feature| {
+            if index > 0 {
+                text.extend_from_slice(SEPARATOR.as_bytes());
+            }
+            serde_json::to_writer(&mut text, feature)
+                .map_err(ProductError::refused("encode GeoJSON"))
+        })?;
+        Ok(text)
+    };
+    for wave in features.attributes.waves() {
+        let texts: Vec<Result<Vec<u8>>> = wave.into_par_iter().map(text_of).collect();
+        for text in texts {
+            file.write_all(&text?).map_err(IoError::on("write"))?;
         }
     }
     Ok(())
@@ -191,20 +219,17 @@ pub(super) fn each(
 
 fn write_lines(path: &Path, head: &str, features: &Features) -> Result<()> {
     let mut file = create(path)?;
-    let mut put = |text: &str| {
+    let put = |file: &mut BufWriter<File>, text: &str| {
         file.write_all(text.as_bytes())
             .map_err(IoError::on("write"))
             .in_file(path)
     };
-    put(head)?;
-    each(features, path, |_, feature, separator| {
-        let line = serde_json::to_string(feature)
-            .map_err(ProductError::refused("encode GeoJSON"))
-            .in_file(path)?;
-        put(&line)?;
-        put(separator)
-    })?;
-    put(TAIL)?;
+    put(&mut file, head)?;
+    write_features(&mut file, features).in_file(path)?;
+    if !features.points.is_empty() {
+        put(&mut file, "\n")?;
+    }
+    put(&mut file, TAIL)?;
     finish(path, file)
 }
 
@@ -248,17 +273,23 @@ fn read_back(path: &Path, head: &str, features: &Features) -> Result<()> {
             return differs(format!("{line:?} before the features"));
         }
     }
-    each(features, path, |row, feature, separator| {
-        next(&mut line)?;
-        let expected = to_value(feature).in_file(path)?;
-        let found = line
-            .strip_suffix(separator)
-            .and_then(|text| serde_json::from_str::<Value>(text).ok());
-        if found != Some(expected) {
-            return differs(format!("feature {}", row + 1));
+    for wave in features.attributes.waves() {
+        let mut read = Vec::with_capacity(wave.len());
+        for rows in wave {
+            let mut lines = Vec::with_capacity(rows.len());
+            for _ in rows.clone() {
+                next(&mut line)?;
+                lines.push(line.clone());
+            }
+            read.push((rows, lines));
         }
-        Ok(())
-    })?;
+        let compared: Vec<_> = read
+            .into_par_iter()
+            .map(|(rows, lines)| compare(features, rows, &lines))
+            .collect();
+        let compared: std::result::Result<(), _> = compared.into_iter().collect();
+        compared.in_file(path)?;
+    }
     for expected in TAIL.split_inclusive('\n').chain([""]) {
         next(&mut line)?;
         if line != expected {
@@ -266,6 +297,26 @@ fn read_back(path: &Path, head: &str, features: &Features) -> Result<()> {
         }
     }
     Ok(())
+}
+
+/// Makes sure that the lines of these rows hold their features.
+fn compare(
+    features: &Features,
+    rows: Range<usize>,
+    lines: &[String],
+) -> std::result::Result<(), ProductError> {
+    let mut lines = lines.iter();
+    each(features, rows, |index, feature| {
+        let is_last = index + 1 == features.points.len();
+        let end = if is_last { "\n" } else { SEPARATOR };
+        let line = lines.next().and_then(|line| line.strip_suffix(end));
+        let found = line.and_then(|text| serde_json::from_str::<Value>(text).ok());
+        if found == Some(to_value(feature)?) {
+            return Ok(());
+        }
+        let what = format!("feature {}", index + 1);
+        Err(ProductError::ReadBack { what })
+    })
 }
 
 #[cfg(test)]

@@ -32,6 +32,7 @@ mod overlays;
 mod page;
 mod page_data;
 mod parquet;
+mod parquet_file;
 mod pds4_label;
 mod picture;
 mod product;
@@ -72,6 +73,8 @@ pub use product::{Pages, Product};
 pub use shot_columns::ShotColumns;
 pub use site::{AdjustmentProducts, GeometricProducts, ImageProducts, SiteProducts};
 
+use rayon::prelude::*;
+
 use crate::error::{Locate, Result};
 use product::{Context, Declaration, Scope, Write, Written};
 use registry::PRODUCTS;
@@ -100,7 +103,7 @@ pub fn write_products<'a>(
             }
         };
         for image in images {
-            for declaration in group {
+            for together in group.chunk_by(|one, next| one.is_apart() && next.is_apart()) {
                 let context = Context {
                     site,
                     pages,
@@ -108,8 +111,13 @@ pub fn write_products<'a>(
                     products: PRODUCTS,
                     written: &written,
                 };
-                let files = write(declaration, &context, image)?;
-                written.extend(files);
+                let files: Vec<Result<Vec<Written>>> = together
+                    .par_iter()
+                    .map(|declaration| write(declaration, &context, image))
+                    .collect();
+                for files in files {
+                    written.extend(files?);
+                }
             }
         }
     }

@@ -2,12 +2,7 @@
 
 use std::{collections::HashMap, fs::File, io::Write, ops::Range, path::Path, sync::Arc};
 
-use ::parquet::{
-    arrow::{ArrowWriter, arrow_reader::ParquetRecordBatchReaderBuilder},
-    basic::Compression,
-    errors::ParquetError,
-    file::{metadata::KeyValue, properties::WriterProperties},
-};
+use ::parquet::{arrow::arrow_reader::ParquetRecordBatchReaderBuilder, errors::ParquetError};
 use arrow::{
     array::{
         ArrayRef, BinaryArray, BooleanArray, Float64Array, Int32Array, StringArray, UInt32Array,
@@ -19,6 +14,7 @@ use arrow::{
 use super::{
     error::ProductError,
     files::{create, finish, open},
+    parquet_file::ParquetFile,
     table::{Kind, Meaning, Table, Values},
 };
 use crate::error::{Error, IoError, Locate, Result};
@@ -37,24 +33,13 @@ pub(super) fn write(path: &Path, table: Table, metadata: Vec<(&str, String)>) ->
 }
 
 fn encode(file: impl Write + Send, table: &Table, metadata: Vec<(&str, String)>) -> Result<()> {
-    let metadata = metadata
-        .into_iter()
-        .map(|(key, value)| KeyValue::new(key.to_owned(), value))
-        .collect();
-    let properties = WriterProperties::builder()
-        .set_created_by(concat!("areograph ", env!("CARGO_PKG_VERSION")).to_owned())
-        .set_compression(Compression::ZSTD(::parquet::basic::ZstdLevel::default()))
-        .set_key_value_metadata(Some(metadata))
-        .build();
     let schema = schema(table);
-    let mut writer =
-        ArrowWriter::try_new(file, Arc::clone(&schema), Some(properties)).map_err(refused)?;
+    let mut file = ParquetFile::new(file, Arc::clone(&schema)).map_err(refused)?;
     for rows in table.pieces() {
         let batch = record_batch(table, &schema, rows)?;
-        writer.write(&batch).map_err(refused)?;
+        file.write(&batch).map_err(refused)?;
     }
-    writer.close().map_err(refused)?;
-    Ok(())
+    file.finish(metadata).map_err(refused)
 }
 
 /// The disk's refusal, or the library's.

@@ -182,6 +182,11 @@ impl Declaration {
         }
     }
 
+    /// Whether it is written from the footprints alone, whatever other products there are.
+    pub(super) const fn is_apart(&self) -> bool {
+        matches!(self.write, Write::Footprints(_))
+    }
+
     /// When there is such a file, in words.
     pub(super) const fn when(&self) -> &'static str {
         match self.write {

@@ -7,10 +7,15 @@
 
 use std::ops::Range;
 
+use rayon::prelude::*;
+
 use super::error::ProductError;
 
 /// Rows whose values stand in memory at once.
 const ROWS_AT_ONCE: usize = 65_536;
+/// Rows that a thread turns into text at once, and how often in a wave: text of a wave, 3 MB a thread, stands in memory.
+const ROWS_OF_A_TASK: usize = 2_048;
+const TASKS_OF_A_THREAD: usize = 4;
 
 /// What a column counts in; names of our own columns end in it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -95,7 +100,7 @@ pub(super) struct Meaning {
 }
 
 /// Gives the values of rows.
-type Gather<R> = dyn Fn(&[R]) -> Values;
+type Gather<R> = dyn Fn(&[R]) -> Values + Send + Sync;
 
 /// A column of a table whose rows are `R`.
 pub(super) struct Column<R> {
@@ -108,7 +113,7 @@ pub(super) fn column<R, T: Cell>(
     name: &'static str,
     unit: Unit,
     description: &'static str,
-    of: impl Fn(&R) -> T + 'static,
+    of: impl Fn(&R) -> T + Send + Sync + 'static,
 ) -> Column<R> {
     Column {
         meaning: Meaning {
@@ -232,12 +237,12 @@ impl Values {
 pub(super) struct Table<'a> {
     columns: Vec<(usize, Meaning)>,
     rows: usize,
-    values: Box<dyn Fn(usize, Range<usize>) -> Values + 'a>,
+    values: Box<dyn Fn(usize, Range<usize>) -> Values + Sync + 'a>,
 }
 
 impl<'a> Table<'a> {
     /// The table of these rows.
-    pub(super) fn new<R: 'a>(columns: Vec<Column<R>>, rows: Vec<R>) -> Self {
+    pub(super) fn new<R: Sync + 'a>(columns: Vec<Column<R>>, rows: Vec<R>) -> Self {
         Self {
             columns: meanings(&columns).into_iter().enumerate().collect(),
             rows: rows.len(),
@@ -299,7 +304,10 @@ impl<'a> Table<'a> {
     ///
     /// # Errors
     /// A number that is not finite, which no reader could use.
-    pub(super) fn values(&self, rows: Range<usize>) -> Result<Vec<Values>, ProductError> {
+    pub(super) fn values(
+        &self,
+        rows: Range<usize>,
+    ) -> std::result::Result<Vec<Values>, ProductError> {
         let of_column = |(index, column): &(usize, Meaning)| {
             let values = (self.values)(*index, rows.clone());
             match values.not_finite() {
@@ -314,16 +322,29 @@ impl<'a> Table<'a> {
                 }),
             }
         };
-        self.columns.iter().map(of_column).collect()
+        self.columns.par_iter().map(of_column).collect()
     }
 
     /// All rows in pieces that fit into memory.
     pub(super) fn pieces(&self) -> impl Iterator<Item = Range<usize>> + use<> {
-        let rows = self.rows;
-        (0..rows)
-            .step_by(ROWS_AT_ONCE)
-            .map(move |start| start..rows.min(start + ROWS_AT_ONCE))
+        pieces(self.rows, ROWS_AT_ONCE)
     }
+
+    /// All rows in waves of small pieces, each of which is for one thread.
+    pub(super) fn waves(&self) -> impl Iterator<Item = Vec<Range<usize>>> + use<> {
+        let tasks = TASKS_OF_A_THREAD * rayon::current_num_threads();
+        let mut small = pieces(self.rows, ROWS_OF_A_TASK).peekable();
+        std::iter::from_fn(move || {
+            small.peek()?;
+            Some(small.by_ref().take(tasks).collect())
+        })
+    }
+}
+
+fn pieces(rows: usize, size: usize) -> impl Iterator<Item = Range<usize>> {
+    (0..rows)
+        .step_by(size)
+        .map(move |start| start..rows.min(start + size))
 }
 
 /// What columns are, whatever the rows.

@@ -1,6 +1,9 @@
 //! Tables as CSV files: shortest digits that give the same number back, or fixed decimals.
 
-use std::{io::Write, path::Path};
+use std::{fmt, io::Write, ops::Range, path::Path};
+
+use csv::StringRecord;
+use rayon::prelude::*;
 
 use super::{
     error::ProductError,
@@ -22,29 +25,42 @@ pub(super) fn write(path: &Path, table: Table) -> Result<u64> {
     Ok(table.rows() as u64)
 }
 
-fn encode(file: impl Write, table: &Table) -> Result<()> {
+fn encode(file: &mut impl Write, table: &Table) -> Result<()> {
+    write_names(file, table)?;
+    write_rows(file, table)
+}
+
+/// Writes the names of the columns.
+pub(super) fn write_names(file: &mut impl Write, table: &Table) -> Result<()> {
     let mut writer = csv::Writer::from_writer(file);
-    write_names(&mut writer, table)?;
-    write_rows(&mut writer, table)?;
+    let names = table.columns().map(|column| column.name);
+    writer.write_record(names).map_err(refused)?;
     writer.flush().map_err(IoError::on("write"))?;
     Ok(())
 }
 
-/// Writes the names of the columns.
-pub(super) fn write_names(writer: &mut csv::Writer<impl Write>, table: &Table) -> Result<()> {
-    let names = table.columns().map(|column| column.name);
-    writer.write_record(names).map_err(refused)
-}
-
 /// Writes the rows.
-pub(super) fn write_rows(writer: &mut csv::Writer<impl Write>, table: &Table) -> Result<()> {
-    for rows in table.pieces() {
+pub(super) fn write_rows(file: &mut impl Write, table: &Table) -> Result<()> {
+    let text_of = |rows: Range<usize>| {
         let values = table.values(rows.clone())?;
+        let mut writer = csv::Writer::from_writer(Vec::new());
+        let mut cell = Vec::new();
         for row in 0..rows.len() {
-            let columns = table.columns().zip(&values);
-            writer
-                .write_record(columns.map(|(column, values)| cell(column, values, row)))
-                .map_err(refused)?;
+            for (column, values) in table.columns().zip(&values) {
+                cell.clear();
+                put_cell(&mut cell, column, values, row);
+                writer.write_field(&cell).map_err(refused)?;
+            }
+            let end = writer.write_record(None::<&[u8]>);
+            end.map_err(refused)?;
+        }
+        let text = writer.into_inner();
+        Ok(text.map_err(ProductError::refused("encode CSV"))?)
+    };
+    for wave in table.waves() {
+        let texts: Vec<Result<Vec<u8>>> = wave.into_par_iter().map(text_of).collect();
+        for text in texts {
+            file.write_all(&text?).map_err(IoError::on("write"))?;
         }
     }
     Ok(())
@@ -59,24 +75,44 @@ fn refused(error: csv::Error) -> Error {
     }
 }
 
-fn cell(column: &Meaning, values: &Values, row: usize) -> String {
-    let number = |value: f64| match column.decimals {
-        Some(decimals) => format!("{value:.decimals$}"),
-        None => value.to_string(),
+/// Appends the text of a value.
+fn put_cell(text: &mut Vec<u8>, column: &Meaning, values: &Values, row: usize) {
+    let put = |text: &mut Vec<u8>, value: fmt::Arguments<'_>| {
+        // A vector refuses nothing.
+        let _infallible = text.write_fmt(value);
+    };
+    let number = |text: &mut Vec<u8>, value: f64| match column.decimals {
+        Some(decimals) => put(text, format_args!("{value:.decimals$}")),
+        None => put_shortest(text, value),
     };
     match values {
-        Values::Real(values) => number(values[row]),
-        Values::OptionalReal(values) => values[row].map_or_else(String::new, number),
-        Values::Natural(values) => values[row].to_string(),
-        Values::Integer(values) => values[row].to_string(),
-        Values::Flag(values) => values[row].to_string(),
-        Values::Text(values) => values[row].clone(),
-        Values::Bytes(_) => String::new(),
+        Values::Real(values) => number(text, values[row]),
+        Values::OptionalReal(values) => {
+            if let Some(value) = values[row] {
+                number(text, value);
+            }
+        }
+        Values::Natural(values) => put(text, format_args!("{}", values[row])),
+        Values::Integer(values) => put(text, format_args!("{}", values[row])),
+        Values::Flag(values) => put(text, format_args!("{}", values[row])),
+        Values::Text(values) => text.extend_from_slice(values[row].as_bytes()),
+        Values::Bytes(_) => {}
+    }
+}
+
+/// Appends the fewest digits that give a finite number back, without an exponent: the same as in JSON.
+fn put_shortest(text: &mut Vec<u8>, value: f64) {
+    let mut buffer = zmij::Buffer::new();
+    let digits = buffer.format_finite(value);
+    if digits.contains('e') {
+        let _infallible = write!(text, "{value}");
+    } else {
+        text.extend_from_slice(digits.strip_suffix(".0").unwrap_or(digits).as_bytes());
     }
 }
 
 /// Whether `text` gives the value of `row` back.
-fn holds(column: &Meaning, values: &Values, row: usize, text: &str) -> bool {
+fn holds(column: &Meaning, values: &Values, row: usize, text: &str, cell: &mut Vec<u8>) -> bool {
     let same = |value: f64| {
         let Ok(found) = text.parse::<f64>() else {
             return false;
@@ -91,7 +127,11 @@ fn holds(column: &Meaning, values: &Values, row: usize, text: &str) -> bool {
     match values {
         Values::Real(values) => same(values[row]),
         Values::OptionalReal(values) => values[row].map_or(text.is_empty(), same),
-        _ => text == cell(column, values, row),
+        _ => {
+            cell.clear();
+            put_cell(cell, column, values, row);
+            text.as_bytes() == cell
+        }
     }
 }
 
@@ -102,29 +142,41 @@ fn read_back(path: &Path, table: &Table) -> Result<()> {
     if !names.iter().eq(table.columns().map(|column| column.name)) {
         return differs("names of columns".to_owned());
     }
-    let mut records = reader.records();
-    for rows in table.pieces() {
-        let values = table.values(rows.clone())?;
-        for row in 0..rows.len() {
-            let number = rows.start + row;
-            let Some(record) = records.next() else {
-                return differs(format!("{number} rows of {}", table.rows()));
-            };
-            let record = record.map_err(ProductError::unreadable)?;
-            for (index, (column, values)) in table.columns().zip(&values).enumerate() {
-                let text = record.get(index).unwrap_or_default();
-                if !holds(column, values, row, text) {
-                    return differs(format!(
-                        "column {}, row {}: {text}",
-                        column.name,
-                        number + 1
-                    ));
-                }
-            }
+    let mut records = reader.into_records();
+    for wave in table.waves() {
+        let mut read = Vec::with_capacity(wave.len());
+        for rows in wave {
+            let found: std::result::Result<Vec<_>, _> = records.by_ref().take(rows.len()).collect();
+            read.push((rows, found.map_err(ProductError::unreadable)?));
         }
+        let compared: Vec<Result<()>> = read
+            .into_par_iter()
+            .map(|(rows, found)| compare(table, rows, &found))
+            .collect();
+        compared.into_iter().collect::<Result<()>>()?;
     }
     if records.next().is_some() {
         return differs(format!("more than {} rows", table.rows()));
+    }
+    Ok(())
+}
+
+/// Makes sure that the rows were found as they are.
+fn compare(table: &Table, rows: Range<usize>, found: &[StringRecord]) -> Result<()> {
+    let differs = |what: String| Err(ProductError::ReadBack { what }.into());
+    let values = table.values(rows.clone())?;
+    let mut cell = Vec::new();
+    for (row, number) in rows.enumerate() {
+        let Some(record) = found.get(row) else {
+            return differs(format!("{number} rows of {}", table.rows()));
+        };
+        for (index, (column, values)) in table.columns().zip(&values).enumerate() {
+            let text = record.get(index).unwrap_or_default();
+            if !holds(column, values, row, text, &mut cell) {
+                let (name, number) = (column.name, number + 1);
+                return differs(format!("column {name}, row {number}: {text}"));
+            }
+        }
     }
     Ok(())
 }
@@ -157,6 +209,25 @@ mod tests {
         assert_eq!(write(&path, Table::new(columns, rows)).unwrap(), 2);
         let text = std::fs::read_to_string(&path).unwrap();
         assert!(text.starts_with("a_m,b,c_km,d\n0.30000000000000004,\"x, \"\"y\"\"\",3394.12345"));
+    }
+
+    #[test]
+    fn the_fewest_digits_give_the_number_back_without_an_exponent() {
+        let bits = (0..20_000_u64).map(|n| n.wrapping_mul(0x9E37_79B9_7F4A_7C15));
+        let any = bits.map(f64::from_bits).filter(|value| value.is_finite());
+        let plain = [
+            0.0, -0.0, 1.0, -2.5, 1e15, 1e16, 1e17, 1e22, 1e-4, 1e-5, 1e-6,
+        ];
+        for value in any.chain(plain) {
+            let mut text = Vec::new();
+            put_shortest(&mut text, value);
+            let text = String::from_utf8(text).unwrap();
+            assert_eq!(text.parse::<f64>().unwrap().to_bits(), value.to_bits());
+            // Of two that are as short and as near, either will do.
+            let display = value.to_string();
+            assert_eq!(text.len(), display.len(), "{text} {display}");
+            assert!(!text.contains('e'));
+        }
     }
 
     #[test]

@@ -23,42 +23,53 @@ impl Source {
     pub(super) fn look(&self, query: &Query<'_>, stop: &AtomicBool) -> Result<Vec<Range<usize>>> {
         let reader = self.reopen()?;
         let starts: Vec<usize> = (0..self.records()).step_by(LOOK_RECORDS).collect();
-        let found: Result<Vec<Option<Range<usize>>>> = starts
+        let found: Result<Vec<Looked>> = starts
             .into_par_iter()
             .map_init(Vec::new, |buffer, start| {
                 Stopped::check(stop)?;
                 let rows = start..self.records().min(start + LOOK_RECORDS);
                 let stretch = reader.unjudged(rows.clone(), mem::take(buffer))?;
-                let near = self.near(&stretch, rows, query);
+                let looked = Looked {
+                    near: self.near(&stretch, rows, query),
+                    is_in_order: stretch.is_in_order(),
+                };
                 *buffer = stretch.into_buffer();
-                Ok(near)
+                Ok(looked)
             })
             .collect();
-        let mut rows: Vec<Range<usize>> = Vec::new();
-        for near in found?.into_iter().flatten() {
-            match rows.last_mut() {
-                Some(last) if near.start - last.end <= GAP_RECORDS => last.end = near.end,
-                _ => rows.push(near),
-            }
-        }
+        let found = found?;
         reader.unchanged()?;
+        if found.iter().all(|looked| looked.is_in_order) {
+            self.set_in_order();
+        }
+        let mut rows: Vec<Range<usize>> = Vec::new();
+        let near = found.into_iter().flat_map(|looked| looked.near);
+        near.for_each(|near| join(&mut rows, near));
         Ok(rows)
     }
 
-    /// From the first to the last of those rows that may matter.
-    fn near(
-        &self,
-        stretch: &Stretch,
-        rows: Range<usize>,
-        query: &Query<'_>,
-    ) -> Option<Range<usize>> {
-        let mut near = None;
+    /// Those rows that may matter.
+    fn near(&self, stretch: &Stretch, rows: Range<usize>, query: &Query<'_>) -> Vec<Range<usize>> {
+        let mut near = Vec::new();
         for (row, record) in stretch.records(rows) {
             if query.may_matter(record, self.datum()) {
-                let first = near.map_or(row, |near: (usize, usize)| near.0);
-                near = Some((first, row + 1));
+                join(&mut near, row..row + 1);
             }
         }
-        near.map(|(first, end)| first..end)
+        near
+    }
+}
+
+/// What a piece of a file tells.
+struct Looked {
+    near: Vec<Range<usize>>,
+    is_in_order: bool,
+}
+
+/// Puts rows behind others, together with those that are not far before.
+fn join(rows: &mut Vec<Range<usize>>, next: Range<usize>) {
+    match rows.last_mut() {
+        Some(last) if next.start - last.end <= GAP_RECORDS => last.end = next.end,
+        _ => rows.push(next),
     }
 }

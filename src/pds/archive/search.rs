@@ -12,13 +12,13 @@ use rayon::prelude::*;
 use super::{Found, Query, Source, scan::Scan};
 use crate::{
     error::{Error, Kind, Result, Stopped},
-    pds::pedr::{Reader, Stretch},
+    pds::pedr::{RECORD_BYTES, Reader, Stretch},
 };
 
 /// Records in memory at once: 51 MB, more than any day of the mission takes.
 pub(super) const LOAD_RECORDS: usize = 1 << 16;
 /// Pieces of a load: each may be of another file, which is open meanwhile.
-const PIECES_MAX: usize = 128;
+const PIECES_MAX: usize = 256;
 /// Records of a task: 0.4 MB, and at most 1.5 MB of shots.
 const TASK_RECORDS: usize = 512;
 /// Tasks of a wave for each thread, and the most of a wave: what they find stands in memory at once.
@@ -59,7 +59,7 @@ pub fn search(
         sink,
         readers: BTreeMap::new(),
         failed: BTreeSet::new(),
-        buffer: Vec::new(),
+        buffers: Vec::new(),
     };
     let mut pieces: Vec<Piece> = Vec::new();
     for (file, source) in sources.iter().enumerate() {
@@ -144,8 +144,8 @@ struct Search<'a> {
     /// Files that pieces in memory are of.
     readers: BTreeMap<usize, Reader>,
     failed: BTreeSet<usize>,
-    /// Memory of the first piece, which most loads have no other one beside.
-    buffer: Vec<u8>,
+    /// Memory of earlier pieces, for the next ones: fresh memory costs as much as reading.
+    buffers: Vec<Vec<u8>>,
 }
 
 /// A part of a piece in memory, for one thread.
@@ -205,8 +205,14 @@ impl Search<'_> {
                 self.hand_on(pieces[task.piece].file, task, found, &mut failures)?;
             }
         }
-        let first = stretches.into_iter().next().flatten();
-        self.buffer = first.map(Stretch::into_buffer).unwrap_or_default();
+        let buffers = stretches.into_iter().flatten().map(Stretch::into_buffer);
+        let mut kept_bytes = 0;
+        self.buffers = buffers
+            .take_while(|buffer| {
+                kept_bytes += buffer.capacity();
+                kept_bytes <= 2 * LOAD_RECORDS * RECORD_BYTES
+            })
+            .collect();
         Ok(())
     }
 
@@ -240,8 +246,8 @@ impl Search<'_> {
         pieces: &[Piece],
         failures: &mut BTreeMap<usize, Error>,
     ) -> Vec<Option<Stretch>> {
-        let first = [mem::take(&mut self.buffer)].into_iter();
-        let buffers: Vec<Vec<u8>> = first
+        let earlier = mem::take(&mut self.buffers).into_iter();
+        let buffers: Vec<Vec<u8>> = earlier
             .chain(iter::repeat_with(Vec::new))
             .take(pieces.len())
             .collect();

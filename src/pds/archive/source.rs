@@ -4,7 +4,7 @@ use std::{
     iter,
     ops::Range,
     path::{Path, PathBuf},
-    sync::{Arc, atomic::AtomicBool},
+    sync::{Arc, OnceLock, atomic::AtomicBool},
 };
 
 use super::{Found, IndexedFile, Indexes, Judged, Query};
@@ -32,6 +32,8 @@ pub struct Source {
     head_complaints: Vec<Complaint>,
     trailing_complaint: Option<Complaint>,
     indexed: Option<Arc<IndexedFile>>,
+    /// Set once all records were seen to follow each other in time.
+    in_order: OnceLock<()>,
 }
 
 impl Source {
@@ -57,6 +59,7 @@ impl Source {
             head_complaints: head.label_complaints().to_vec(),
             trailing_complaint: head.trailing_complaint(),
             indexed,
+            in_order: OnceLock::new(),
         })
     }
 
@@ -117,10 +120,17 @@ impl Source {
     pub(super) fn reopen(&self) -> Result<Reader> {
         let reader = Reader::open(&self.path)?;
         reader.require_identity(&self.identity)?;
-        if (self.indexed.as_ref()).is_some_and(|indexed| indexed.has_blocks(self.records)) {
+        let indexed = self.indexed.as_ref();
+        let is_indexed = indexed.is_some_and(|indexed| indexed.has_blocks(self.records));
+        if is_indexed || self.in_order.get().is_some() {
             reader.set_in_order();
         }
         Ok(reader)
+    }
+
+    /// Has later readers of the file know that its records follow each other in time.
+    pub(super) fn set_in_order(&self) {
+        let _known_before = self.in_order.set(());
     }
 
     /// Has the system read the file ahead, if it will be read as a whole.

@@ -19,7 +19,9 @@ use zerocopy::IntoBytes as _;
 
 use super::{
     Complaint, FieldGuard, File, Frame, LABEL_BYTES, RECORD_BYTES, Record, RecordError,
-    chronology::misplaced, file::Chronology, neighbours::NEIGHBOURS,
+    chronology::{in_order, misplaced},
+    file::Chronology,
+    neighbours::NEIGHBOURS,
 };
 use crate::{
     error::{Cause, IoError, Kind, Locate, Result},
@@ -311,6 +313,12 @@ impl Stretch {
     #[must_use]
     pub fn record_number(&self, row: usize) -> u32 {
         self.file.record_number(row)
+    }
+
+    /// Whether the records, and their neighbours in memory, follow each other in time without sharing a shot.
+    #[must_use]
+    pub fn is_in_order(&self) -> bool {
+        in_order(self.file.records().iter().map(|record| record.time_s.get()))
     }
 
     /// Those of the rows that the stretch is about.

@@ -46,7 +46,7 @@ fn checked<'a>(
     name: &'static str,
     unit: Unit,
     description: &'static str,
-    of: impl Fn(&ArchiveProfile) -> f64 + 'static,
+    of: impl Fn(&ArchiveProfile) -> f64 + Send + Sync + 'static,
 ) -> Column<&'a ArchiveProfile> {
     column(name, unit, description, move |row: &&ArchiveProfile| {
         (row.shots > 0).then(|| of(row))

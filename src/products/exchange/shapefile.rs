@@ -38,6 +38,8 @@ pub(in crate::products) static POINTS: Declaration = Declaration {
         let points = points(&features(of.site));
         write_points(path, points.iter().copied())?;
         read_points(path, points.iter().copied()).in_file(path)?;
+        let index = path.with_extension("shx");
+        check_index(&index, points.len()).in_file(&index)?;
         Ok(points.len() as u64)
     }),
     uses: &[Use {
@@ -68,10 +70,8 @@ macro_rules! part {
 pub(in crate::products) static INDEX: Declaration = part!(
     "exchange/footprints.shx",
     "index of footprints.shp",
-    |path, of| {
-        // Written with the points.
-        check_index(path, of.site.footprints.len()).in_file(path)
-    }
+    // Written with the points.
+    |_, _| Ok(())
 );
 
 pub(in crate::products) static ATTRIBUTES: Declaration = part!(

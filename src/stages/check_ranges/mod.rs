@@ -16,6 +16,7 @@ mod scan;
 
 use std::sync::atomic::AtomicBool;
 
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::{convert_datum::Converted, group_profiles::Profile};
@@ -218,18 +219,21 @@ pub fn check_ranges(
     for (index, profile) in (0_u32..).zip(profiles) {
         Stopped::check(stop)?;
         let first = shots.len();
-        for row in &profile.rows {
+        let residuals = |row: &u32| {
             let shot = footprints.row(*row as usize);
             let at = clock.spacecraft_time(shot.et_tag_s);
-            let Some((position, velocity_m_s)) = trajectory.state(at) else {
-                return Err(OutsideTrajectory {
-                    profile: profile.id.clone(),
-                    at,
-                }
-                .into());
-            };
+            let (position, velocity_m_s) = trajectory.state(at).ok_or(at)?;
             let spacecraft = SpacecraftState::of(at, &position, &velocity_m_s);
-            shots.push(index, *row, &RangeResiduals::of(&shot, &spacecraft));
+            Ok(RangeResiduals::of(&shot, &spacecraft))
+        };
+        let of_shots: Vec<std::result::Result<RangeResiduals, Et>> =
+            profile.rows.par_iter().map(residuals).collect();
+        for (row, residuals) in profile.rows.iter().zip(of_shots) {
+            let residuals = residuals.map_err(|at| OutsideTrajectory {
+                profile: profile.id.clone(),
+                at,
+            })?;
+            shots.push(index, *row, &residuals);
         }
         let flags = outliers(&shots.range_minus_distance_m[first..], limits.outlier_sigma);
         shots.outlier.extend(flags);

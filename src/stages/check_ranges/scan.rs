@@ -9,6 +9,7 @@
 //! of it: radii corrected by them are scanned as well, and taken where that calms the residuals.
 
 use nalgebra::{Matrix3, Vector3};
+use rayon::prelude::*;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -90,17 +91,27 @@ impl BiasScan {
         let [mut raw, mut crossover] =
             [ScannedRadius::Raw, ScannedRadius::Crossover].map(Self::empty);
         let spin_rad_s = mars_spin_rad_s(MarsIau2000::model()).z;
-        for correction_s in corrections(limits) {
+        let spreads_m = |correction_s: &f64| {
             let turn = frame_rotation_3(spin_rad_s * correction_s);
-            let residual = |shot: &Sighted| shot.residuals_m(trajectory, correction_s, &turn);
+            let residual = |shot: &Sighted| shot.residuals_m(trajectory, *correction_s, &turn);
             let residuals: Option<Vec<[f64; 2]>> = sighted.iter().map(residual).collect();
-            // Corrections that lead out of the kernels are left out.
-            if let Some(residuals) = residuals {
-                for (scan, which) in [(&mut raw, 0), (&mut crossover, 1)] {
+            residuals.map(|residuals| {
+                [0, 1].map(|which| {
                     let residuals: Vec<f64> = residuals.iter().map(|of| of[which]).collect();
-                    scan.correction_s.push(correction_s);
-                    scan.spread_m.push(mean_and_deviation(&residuals)[1]);
-                }
+                    mean_and_deviation(&residuals)[1]
+                })
+            })
+        };
+        let corrections: Vec<f64> = corrections(limits).collect();
+        let spreads_m: Vec<Option<[f64; 2]>> = corrections.par_iter().map(spreads_m).collect();
+        for (correction_s, spreads_m) in corrections.into_iter().zip(spreads_m) {
+            // Corrections that lead out of the kernels are left out.
+            for (scan, spread_m) in [&mut raw, &mut crossover]
+                .into_iter()
+                .zip(spreads_m.into_iter().flatten())
+            {
+                scan.correction_s.push(correction_s);
+                scan.spread_m.push(spread_m);
             }
         }
         let is_calmer = crossover.least_spread_m() < CALMER * raw.least_spread_m();
