@@ -3,7 +3,8 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::{frames::MarsDatum, time::Et};
+use crate::body::Datum;
+use crate::time::Et;
 
 /// The clock bias of MOLA: how shot tags become shot times.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -49,7 +50,8 @@ impl MolaClock {
     pub fn correction_s(&self) -> f64 {
         match (self.scope, self.sign) {
             (BiasScope::None, _) => 0.0,
-            (_, TagSign::Late) => -self.bias_s,
+            // Not −bias: no correction has no sign.
+            (_, TagSign::Late) => 0.0 - self.bias_s,
             (_, TagSign::Early) => self.bias_s,
         }
     }
@@ -84,7 +86,7 @@ pub enum DatumChoice {
     /// By version letter and label: L is IAU 2000, older ones IAU 1991.
     Auto,
     /// As stated; a contradiction with letter or label is an error.
-    Stated(MarsDatum),
+    Stated(Datum),
 }
 
 /// Shots to keep; a shot must pass every test.

@@ -8,15 +8,15 @@
 //! assert!(footprints.topography_m().is_empty());
 //! ```
 //!
-//! Footprints as their files have them are not taken for footprints in IAU 2000:
+//! Footprints as their files have them are not taken for footprints in the frame of the products:
 //!
 //! ```compile_fail,E0308
 //! use areograph::{
 //!     footprints::{AsRead, Footprints},
-//!     frames::MarsIau2000,
+//!     frames::BodyFixed,
 //! };
 //!
-//! fn mean_radius_m(footprints: &Footprints<MarsIau2000>) -> f64 {
+//! fn mean_radius_m(footprints: &Footprints<BodyFixed>) -> f64 {
 //!     footprints.radius_m.iter().sum::<f64>() / footprints.len() as f64
 //! }
 //!
@@ -28,7 +28,7 @@ use std::marker::PhantomData;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::frames::MarsDatum;
+use crate::body::{Body, Datum};
 
 /// State of footprint coordinates as their files have them; each file says its own datum.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -42,7 +42,7 @@ pub struct SourceFile {
     /// Version letter of the file name in upper case, `None` when the name has none.
     pub version: Option<char>,
     /// Datum of the file's longitudes and latitudes.
-    pub datum: MarsDatum,
+    pub datum: Datum,
     /// BLAKE3 of the file's bytes, hexadecimal.
     pub blake3: String,
 }
@@ -106,21 +106,29 @@ macro_rules! columns {
         /// Footprints of a site, one entry per shot in every column, ordered by file, record and shot.
         ///
         /// `D` tells whose coordinates they are: [`AsRead`] or a frame such as
-        /// [`MarsIau2000`](crate::frames::MarsIau2000). Only `stages::convert_datum` changes it, so
+        /// [`BodyFixed`](crate::body::BodyFixed). Only `stages::convert_datum` changes it, so
         /// converting twice does not compile.
         #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
         pub struct Footprints<D> {
             /// The files that `file` counts into.
             pub files: Vec<SourceFile>,
+            /// The body whose ground they are.
+            pub body: Body,
             $($(#[$doc])* pub $column: Vec<$kind>,)*
             datum: PhantomData<D>,
         }
 
         impl<D> Footprints<D> {
-            /// No footprints yet, of these files.
+            /// No footprints on Mars yet, of these files.
             #[must_use]
             pub const fn new(files: Vec<SourceFile>) -> Self {
-                Self { files, $($column: Vec::new(),)* datum: PhantomData }
+                Self::on(Body::Mars, files)
+            }
+
+            /// No footprints on `body` yet, of these files.
+            #[must_use]
+            pub const fn on(body: Body, files: Vec<SourceFile>) -> Self {
+                Self { files, body, $($column: Vec::new(),)* datum: PhantomData }
             }
 
             /// Appends one shot.
@@ -147,7 +155,7 @@ macro_rules! columns {
             /// For the stage that converts the coordinates, and for the reader of its product.
             #[must_use]
             pub fn declare<E>(self) -> Footprints<E> {
-                Footprints { files: self.files, $($column: self.$column,)* datum: PhantomData }
+                Footprints { files: self.files, body: self.body, $($column: self.$column,)* datum: PhantomData }
             }
         }
     };

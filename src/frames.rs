@@ -5,46 +5,41 @@
 //!
 //! ```
 //! use areograph::{
-//!     frames::{MarsIau1991, MarsIau2000, Position, Rotation},
-//!     geom::mars_rotation::mars_rotation,
+//!     body::Body,
+//!     frames::{BodyFixed, J2000, Position, Rotation},
+//!     geom::body_rotation::body_rotation,
 //!     time::Et,
 //! };
 //! use nalgebra::Vector3;
 //!
-//! // The same point of the ground in the frames of two IAU reports, through J2000.
+//! // A place of the ground a second later, seen from the stars: Mars turns to the east.
 //! let et = Et::from_seconds(-20_723_097.688);
-//! let old_to_new: Rotation<MarsIau1991, MarsIau2000> =
-//!     mars_rotation::<MarsIau2000>(et) * mars_rotation::<MarsIau1991>(et).inverse();
-//! let old: Position<MarsIau1991> = Position::new(Vector3::new(3_396_190.0, 0.0, 0.0));
-//! let new: Position<MarsIau2000> = old_to_new.apply(&old);
+//! let ground: Position<BodyFixed> = Position::new(Vector3::new(3_396_190.0, 0.0, 0.0));
+//! let [now, then]: [Position<J2000>; 2] = [et, et.plus(1.0)]
+//!     .map(|et| body_rotation(Body::Mars, et).inverse().apply(&ground));
 //!
-//! // The reports' meridians are 0.238° apart, which is 14 km on the equator.
-//! let longitude_deg = new.xyz_m.y.atan2(new.xyz_m.x).to_degrees();
-//! assert!((longitude_deg - 0.238).abs() < 1e-3); // the poles differ too
+//! // 241 m/s at the equator.
+//! assert!((now.distance_m(&then) - 240.7).abs() < 0.1);
 //! ```
 //!
 //! Two frames do not mix, neither in a distance
 //!
 //! ```compile_fail,E0308
-//! use areograph::frames::{MarsIau1991, MarsIau2000, Position};
+//! use areograph::frames::{BodyFixed, J2000, Position};
 //! use nalgebra::Vector3;
 //!
-//! let old: Position<MarsIau1991> = Position::new(Vector3::zeros());
-//! let new: Position<MarsIau2000> = Position::new(Vector3::zeros());
-//! old.distance_m(&new);
+//! let ground: Position<BodyFixed> = Position::new(Vector3::zeros());
+//! let spacecraft: Position<J2000> = Position::new(Vector3::zeros());
+//! ground.distance_m(&spacecraft);
 //! ```
 //!
 //! nor in a product of rotations:
 //!
 //! ```compile_fail,E0277
-//! use areograph::{
-//!     frames::{MarsIau1991, MarsIau2000},
-//!     geom::mars_rotation::mars_rotation,
-//!     time::Et,
-//! };
+//! use areograph::{body::Body, geom::body_rotation::body_rotation, time::Et};
 //!
 //! let et = Et::from_seconds(0.0);
-//! let old_to_new = mars_rotation::<MarsIau2000>(et) * mars_rotation::<MarsIau1991>(et);
+//! let twice = body_rotation(Body::Mars, et) * body_rotation(Body::Mars, et);
 //! ```
 
 use std::{fmt, marker::PhantomData, ops::Mul};
@@ -52,10 +47,7 @@ use std::{fmt, marker::PhantomData, ops::Mul};
 use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 
-use crate::{
-    constants::{MARS_IAU1991, MARS_IAU1994, MARS_IAU2000, MarsModel},
-    time::Et,
-};
+use crate::time::Et;
 
 /// A reference frame with right-handed axes.
 pub trait Frame: Copy + fmt::Debug + Send + Sync + 'static {
@@ -63,68 +55,28 @@ pub trait Frame: Copy + fmt::Debug + Send + Sync + 'static {
     const NAME: &'static str;
 }
 
-/// A frame fixed to the body of Mars by one IAU report.
-pub trait MarsFixed: Frame {
-    /// Rotation and shape of that report.
-    fn model() -> &'static MarsModel;
-}
-
 macro_rules! frames {
-    ($($(#[$doc:meta])* $frame:ident = $name:literal $(: $model:expr)?;)*) => {$(
+    ($($(#[$doc:meta])* $frame:ident = $name:literal;)*) => {$(
         $(#[$doc])*
         #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
         pub struct $frame;
         impl Frame for $frame { const NAME: &'static str = $name; }
-        $(impl MarsFixed for $frame { fn model() -> &'static MarsModel { &$model } })?
     )*};
 }
 
 frames! {
     /// Inertial, Earth mean equator and equinox of J2000.
     J2000 = "J2000";
-    /// Mars body-fixed, IAU 1991 report (W₀ = 176.868°).
-    MarsIau1991 = "IAU_MARS (1991)": MARS_IAU1991;
-    /// Mars body-fixed, IAU 1994 report (W₀ = 176.901°).
-    MarsIau1994 = "IAU_MARS (1994)": MARS_IAU1994;
-    /// Mars body-fixed, IAU 2000 report (W₀ = 176.630°); the frame of every product.
-    MarsIau2000 = "IAU_MARS (2000)": MARS_IAU2000;
+    /// Fixed to the body of the site, in the frame of its products: for Mars that of the IAU 2000 report
+    /// (W₀ = 176.630°), for the Moon mean Earth/polar axis. Which body that is says [`crate::body::Body`] beside it.
+    BodyFixed = "body-fixed";
     /// Bus of the spacecraft: +Z towards nadir, flight along −X.
     SpacecraftBus = "bus";
     /// A camera: +Z boresight, +Y along the detector.
     CameraFrame = "camera";
 }
 
-/// Which IAU report a file's Mars-fixed coordinates follow, known only when the file is read.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum MarsDatum {
-    /// W₀ = 176.868°.
-    Iau1991,
-    /// W₀ = 176.901°.
-    Iau1994,
-    /// W₀ = 176.630°.
-    Iau2000,
-}
-
-impl MarsDatum {
-    /// Rotation and shape of the report.
-    #[must_use]
-    pub fn model(self) -> &'static MarsModel {
-        match self {
-            Self::Iau1991 => &MARS_IAU1991,
-            Self::Iau1994 => &MARS_IAU1994,
-            Self::Iau2000 => &MARS_IAU2000,
-        }
-    }
-}
-
-impl fmt::Display for MarsDatum {
-    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        formatter.write_str(self.model().name)
-    }
-}
-
-/// A position in frame `F`, metres from the centre of Mars.
+/// A position in frame `F`, metres from the centre of the body.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(transparent, bound = "")]
 pub struct Position<F> {

@@ -4,6 +4,7 @@
 //! [`flow::run_site`] runs a site; `flow/site.rs` tells how, read top to bottom; `ARCHITECTURE.md` is the map.
 
 pub mod altimetry;
+pub mod body;
 pub mod cli;
 pub mod config;
 pub mod constants;

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::{
     error::{Cause, Kind},
-    frames::{MarsIau2000, Position},
+    frames::{BodyFixed, Position},
 };
 
 pub use matching::{MatchedPair, Unmatched};
@@ -29,7 +29,7 @@ pub struct TiePoint<I = usize> {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct KnownGround {
     /// Where it lies.
-    pub ground: Position<MarsIau2000>,
+    pub ground: Position<BodyFixed>,
     /// Covariance of its coordinates, m²; none where they are held fixed.
     pub covariance_m2: Option<Matrix3<f64>>,
 }

@@ -10,6 +10,7 @@ mod common;
 use std::{fs, path::PathBuf};
 
 use areograph::{
+    body::Body,
     config::ImageConfig,
     error::Kind,
     frames::Position,
@@ -326,7 +327,8 @@ fn a_control_network_is_read_again_as_it_was_written() {
     ];
     let network = ControlNetwork {
         id: "gusev",
-        description: "made for a test",
+        body: Body::Mars,
+        description: "made for a test".to_owned(),
         created_utc: "1999-05-06T15:33:58.130",
         points,
     };
@@ -397,7 +399,7 @@ fn ground_control_is_read_as_ames_stereo_pipeline_reads_it() {
         unmeasured,
         control("ap19215-41-7", west),
     ];
-    assert_eq!(write_gcp(&path, &points).unwrap(), 2);
+    assert_eq!(write_gcp(&path, Body::Mars, &points).unwrap(), 2);
     let text = fs::read_to_string(path).unwrap();
     // Commas are blanks, lines that begin with # are comments, everything else is a point.
     let lines: Vec<Vec<String>> = text
@@ -446,7 +448,7 @@ fn ground_control_that_would_be_misread_is_refused() {
     let refused = |change: fn(&mut ControlPoint)| {
         let mut point = control("tie", gusev());
         change(&mut point);
-        let failure = write_gcp(&folder.path().join("a.gcp"), &[point]).unwrap_err();
+        let failure = write_gcp(&folder.path().join("a.gcp"), Body::Mars, &[point]).unwrap_err();
         assert_eq!(failure.kind(), Kind::Bug);
         failure.cause.to_string()
     };

@@ -23,6 +23,7 @@ const FLOORS: [&[&str]; 7] = [
         "units",
         "time",
         "frames",
+        "body",
         "constants",
         "error",
         "footprints",

@@ -348,6 +348,9 @@ fn write_others(case: &Case) {
     };
     case.write("outline.geojson", outline(87.75));
     case.write("other.geojson", outline(87.8));
+    let shots = text("out/isidis/footprints.csv");
+    let times = text("out/isidis/exchange/lola_like.csv");
+    case.write("shots.csv", with_more_columns(&shots, &times));
     let isd = text("out/isidis/images/E02-01301/isd.json");
     case.write("image.json", &isd);
     case.write(
@@ -372,6 +375,29 @@ fn write_others(case: &Case) {
         "other_camera.toml",
         camera.replace("focal_length_mm = 3500.0", "focal_length_mm = 3500.1"),
     );
+}
+
+/// A table of shots with its lengths in kilometres as well, and times in UTC, the first column of `times`.
+fn with_more_columns(shots: &str, times: &str) -> String {
+    let mut lines = shots.lines();
+    let header: Vec<&str> = lines.next().unwrap().split(',').collect();
+    let lengths = ["radius", "range", "spacecraft_radius"];
+    let columns = lengths.map(|name| {
+        let metres = format!("{name}_m");
+        header.iter().position(|column| *column == metres).unwrap()
+    });
+    let mut text = header.join(",") + ",radius_km,range_km,spacecraft_radius_km,utc\n";
+    for (line, times) in lines.zip(times.lines().skip(1)) {
+        let fields: Vec<&str> = line.split(',').collect();
+        text += line;
+        for column in columns {
+            let metres: f64 = fields[column].parse().unwrap();
+            text += &format!(",{}", metres / 1_000.0);
+        }
+        let utc = times.split(',').next().unwrap();
+        text += &format!(",{utc}\n");
+    }
+    text
 }
 
 /// The site, and others that have the tables and keys which it has not.
@@ -420,7 +446,45 @@ fn sites(site: &Table) -> Vec<Table> {
         matched(site),
         with("adjustment.model = 'published'"),
         with("adjustment.robust = 'huber'"),
+        of_any_body(site),
+        by_table(site, "layout = 'areograph'"),
+        by_table(
+            site,
+            "columns = { utc = 'utc', longitude_deg = 'longitude_deg', latitude_deg = 'latitude_deg', radius_m = 'radius_m', \
+             range_m = 'range_m', spacecraft_longitude_deg = 'spacecraft_longitude_deg', spacecraft_latitude_deg = \
+             'spacecraft_latitude_deg', spacecraft_radius_m = 'spacecraft_radius_m', orbit = 'orbit' }",
+        ),
+        by_table(
+            site,
+            "columns = { et_s = 'et_tag_s', longitude_deg = 'longitude_deg', latitude_deg = 'latitude_deg', \
+             height_m = 'topography_m', range_m = 'range_m', spacecraft_longitude_deg = 'spacecraft_longitude_deg', \
+             spacecraft_latitude_deg = 'spacecraft_latitude_deg', spacecraft_radius_m = 'spacecraft_radius_m' }",
+        ),
+        by_table(
+            site,
+            "columns = { et_s = 'et_s', longitude_deg = 'longitude_deg', latitude_deg = 'latitude_deg', \
+             radius_km = 'radius_km', range_km = 'range_km', spacecraft_longitude_deg = 'spacecraft_longitude_deg', \
+             spacecraft_latitude_deg = 'spacecraft_latitude_deg', spacecraft_radius_km = 'spacecraft_radius_km' }",
+        ),
     ]
+}
+
+/// The site with nothing that belongs to Mars but the support data of an image, which say so.
+fn of_any_body(site: &Table) -> Table {
+    let mut site = site.clone();
+    site.retain(|key, _| ["site", "kernels"].contains(&key.as_str()));
+    let image: Table = "id = 'E02-01301'\nisd = 'image.json'".parse().unwrap();
+    site.insert("images".to_owned(), Value::Array(vec![Value::Table(image)]));
+    site
+}
+
+/// The site with its shots from a table, in place of PEDR files.
+fn by_table(site: &Table, columns: &str) -> Table {
+    let mut site = site.clone();
+    site.remove("pedr");
+    let table: Table = format!("files = ['shots.csv']\n{columns}").parse().unwrap();
+    site.insert("shots".to_owned(), Value::Array(vec![Value::Table(table)]));
+    site
 }
 
 /// The site with the pixels of its images, in which tie points are matched beside those of its file.

@@ -11,12 +11,13 @@ mod common;
 use std::{fs, path::Path, process::Command};
 
 use areograph::{
+    body::Body,
     config::usual_instrument,
-    frames::{MarsIau2000, Position},
+    frames::{BodyFixed, Position},
     geom::{
         attitude::{matrix_of_rotation_vector, spice_quaternion},
+        body_rotation::body_rotation,
         ellipsoid::ray_meets_ellipsoid,
-        mars_rotation::mars_rotation,
         orbit_axes::radial_along_cross,
     },
     spice::{CkSegment, KernelSet, Session, write_ck},
@@ -375,10 +376,10 @@ fn write_turned(case: &Case, exposed: [Et; 2], turn_rad: f64) -> f64 {
         quaternions.push(spice_quaternion(&(bus * turn.transpose())));
         rates_rad_s.push(attitude.angular_velocity_rad_s.into());
         if index == exposures.len() / 2 {
-            let to_mars = mars_rotation::<MarsIau2000>(*et);
-            let origin: Position<MarsIau2000> = to_mars.apply(&state.position);
+            let to_mars = body_rotation(Body::Mars, *et);
+            let origin: Position<BodyFixed> = to_mars.apply(&state.position);
             let direction = to_mars.matrix() * bus.row(2).transpose();
-            range_m = ray_meets_ellipsoid(&origin, &direction)
+            range_m = ray_meets_ellipsoid(Body::Mars.model(), &origin, &direction)
                 .unwrap()
                 .distance_m(&origin);
         }

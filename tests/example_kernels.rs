@@ -3,9 +3,10 @@
 use std::path::{Path, PathBuf};
 
 use areograph::{
+    body::Body,
+    body::Datum,
     config::usual_instrument,
-    frames::MarsDatum,
-    geom::mars_rotation::mars_matrix,
+    geom::body_rotation::body_matrix,
     spice::{KernelSet, Session},
     time::Et,
 };
@@ -57,14 +58,14 @@ fn the_metakernel_loads_clock_leap_seconds_and_camera() {
 #[test]
 fn each_mars_model_is_the_one_its_name_says() {
     for (name, datum) in [
-        ("mars_iau1991.tpc", MarsDatum::Iau1991),
-        ("mars_iau1994.tpc", MarsDatum::Iau1994),
-        ("mars_iau2000.tpc", MarsDatum::Iau2000),
+        ("mars_iau1991.tpc", Datum::Iau1991),
+        ("mars_iau1994.tpc", Datum::Iau1994),
+        ("mars_iau2000.tpc", Datum::Iau2000),
     ] {
         let session = Session::open(&KernelSet::from_files(&[example(name)]).unwrap()).unwrap();
         for seconds in [-7.0e7, 0.0, 3.9e7] {
             let et = Et::from_seconds(seconds);
-            let off = session.mars_matrix(et).unwrap() - mars_matrix(datum.model(), et);
+            let off = session.body_matrix(Body::Mars, et).unwrap() - body_matrix(datum.model(), et);
             assert!(off.abs().max() < 1e-12, "{name}"); // rounding of the meridian angle
         }
     }

@@ -12,13 +12,15 @@ mod common;
 mod fixture;
 
 use areograph::{
+    body::Body,
+    body::MARS_IAU2000,
     config::usual_instrument,
-    constants::{MARS_IAU2000, SPEED_OF_LIGHT_M_S},
-    frames::{MarsIau2000, Position},
+    constants::SPEED_OF_LIGHT_M_S,
+    frames::{BodyFixed, Position},
     geom::{
+        body_rotation::body_matrix,
         ellipsoid::ray_meets_ellipsoid,
         light_time::{LightTime, aberrated_m, light_time_s},
-        mars_rotation::mars_matrix,
         pushbroom::{ExteriorOrientation, Pose, Projector, SampledOrientation},
     },
     spice::Session,
@@ -57,7 +59,9 @@ fn lines(image: &Image) -> f64 {
 /// Where a sample of the detector looks onto the ellipsoid.
 fn ground_m(image: &Image, at: &OrientationSample, sample: f64) -> Vector3<f64> {
     let direction = at.camera_to_mars.matrix() * image.times.detector().look(sample);
-    ray_meets_ellipsoid(&at.position, &direction).unwrap().xyz_m
+    ray_meets_ellipsoid(Body::Mars.model(), &at.position, &direction)
+        .unwrap()
+        .xyz_m
 }
 
 /// `stelab` and `LT` put together give what CSPICE gives as `LT+S`: what the next test takes is proved here.
@@ -90,7 +94,7 @@ fn seen_from_the_spacecraft(session: &Session, et: Et, ground_m: &Vector3<f64>) 
     let target_m = |late_s: f64| {
         let turned_rad = MARS_IAU2000.meridian_deg_per_day.to_radians() / 86_400.0 * -late_s;
         let turn = nalgebra::Rotation3::from_axis_angle(&Vector3::z_axis(), turned_rad);
-        let there_m = mars_matrix(&MARS_IAU2000, et).tr_mul(&(turn * ground_m));
+        let there_m = body_matrix(&MARS_IAU2000, et).tr_mul(&(turn * ground_m));
         mars.position.xyz_m - mars.velocity_m_s * late_s + there_m
     };
     let mut late_s = 0.0;
@@ -199,7 +203,7 @@ fn from_spacecraft_m(
     light_time: LightTime,
     late_s: f64,
 ) -> Vector3<f64> {
-    let to_mars = mars_matrix(&MARS_IAU2000, et);
+    let to_mars = body_matrix(&MARS_IAU2000, et);
     let mgs = session.state(et).unwrap();
     let position_m = to_mars * mgs.position.xyz_m;
     match light_time {
@@ -228,8 +232,8 @@ fn what_is_said_of_other_conventions_is_what_they_do() {
             assert_eq!(effect.others.len(), 2);
             let middle = &image.orientation.samples[15];
             let boresight = middle.camera_to_mars.matrix() * Vector3::z();
-            let ground: Position<MarsIau2000> =
-                ray_meets_ellipsoid(&middle.position, &boresight).unwrap();
+            let ground: Position<BodyFixed> =
+                ray_meets_ellipsoid(Body::Mars.model(), &middle.position, &boresight).unwrap();
             for told in &effect.others {
                 let of = |images: &&Vec<Image>| images[index].light_time == told.convention;
                 let other = &all.iter().find(of).unwrap()[index];
@@ -278,7 +282,7 @@ fn ranges_start_where_the_kernels_have_mgs() {
                 let start_m = orientation.pose(x).position_m;
                 let found_m = start_m + image.orientation.to_spacecraft_m(x);
                 let mgs_m = session.state(et).unwrap().position.xyz_m;
-                let off_m = (found_m - mars_matrix(&MARS_IAU2000, et) * mgs_m).norm();
+                let off_m = (found_m - body_matrix(&MARS_IAU2000, et) * mgs_m).norm();
                 // Instants are rounded to 7e-9 s, 3e-5 m, each.
                 assert!(off_m < 2e-4, "{} {light_time:?}: {off_m} m", image.times.id);
             }

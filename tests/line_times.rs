@@ -20,7 +20,8 @@ mod pushbroom;
 use std::{fs, sync::atomic::AtomicBool};
 
 use areograph::{
-    frames::{MarsIau2000, Position},
+    body::Body,
+    frames::{BodyFixed, Position},
     geom::{
         ellipsoid::{Spherical, ray_meets_ellipsoid},
         pushbroom::CameraModel,
@@ -237,8 +238,10 @@ fn image_to_ground_to_image_closes_where_the_exposure_changes() {
         let pose = camera.orientation.pose(x);
         let look = oriented.detector.look(sample);
         let ground = |position_m: Vector3<f64>, direction: Vector3<f64>| {
-            let position = Position::<MarsIau2000>::new(position_m);
-            ray_meets_ellipsoid(&position, &direction).unwrap().xyz_m
+            let position = Position::<BodyFixed>::new(position_m);
+            ray_meets_ellipsoid(Body::Mars.model(), &position, &direction)
+                .unwrap()
+                .xyz_m
         };
         let seen = |ground_m: &Vector3<f64>| {
             let seen = projector.project(ground_m).unwrap();
@@ -327,8 +330,10 @@ fn camera_models_see_every_line_when_it_is_exposed() {
         worst_s = worst_s.max((camera.time(line) - et.seconds()).abs());
         let (position_m, camera_to_mars) = kernel_camera(&session, &image, et);
         let look = camera_to_mars * image.times.detector().look(sample);
-        let position = Position::<MarsIau2000>::new(position_m);
-        let ground_m = ray_meets_ellipsoid(&position, &look).unwrap().xyz_m;
+        let position = Position::<BodyFixed>::new(position_m);
+        let ground_m = ray_meets_ellipsoid(Body::Mars.model(), &position, &look)
+            .unwrap()
+            .xyz_m;
         let (found_line, found_sample) = camera.image(&(ground_m / METRES_PER_KM));
         worst_px = worst_px.max((found_line - line).hypot(found_sample - sample));
     }

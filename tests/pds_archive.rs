@@ -21,8 +21,8 @@ use std::{
 
 use areograph::{
     altimetry::{DatumChoice, ShotFilter},
+    body::Datum,
     error::{Error, Result},
-    frames::MarsDatum,
     geom::window::{Region, WindowShape},
     pds::archive::{Found, Indexes, Judged, Query, Sink, Source, search},
     time::{Et, Interval},
@@ -97,8 +97,8 @@ fn searched(sources: &[Source], query: &Query<'_>) -> Rows {
 /// An older file and a newer one that goes on.
 fn archive(folder: &Path) -> Vec<PathBuf> {
     let files = [folder.join("ap19019k.b"), folder.join("AP19020L.B")];
-    write(&files[0], MarsDatum::Iau1991, 0, |_, _| ());
-    write(&files[1], MarsDatum::Iau2000, FRAMES / 2, |_, _| ());
+    write(&files[0], Datum::Iau1991, 0, |_, _| ());
+    write(&files[1], Datum::Iau2000, FRAMES / 2, |_, _| ());
     files.to_vec()
 }
 
@@ -248,7 +248,7 @@ fn any_number_of_threads_gives_the_same_rows_and_counts() {
 fn a_record_far_from_every_window_is_judged_only_when_all_are() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("AP19019L.B");
-    write(&path, MarsDatum::Iau2000, 0, |number, record| {
+    write(&path, Datum::Iau2000, 0, |number, record| {
         if number.is_multiple_of(100) {
             record.clock_frequency_hz.set(7);
         }
@@ -336,7 +336,7 @@ fn a_file_that_is_not_what_it_was_fails_and_the_others_are_searched() {
 fn meanwhile(happens: impl FnOnce(&Path) + Send + 'static) -> Rows {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("AP19019L.B");
-    write_frames(&path, MarsDatum::Iau2000, 0..66_000, |_, _| ());
+    write_frames(&path, Datum::Iau2000, 0..66_000, |_, _| ());
     let (sources, filter) = (open(std::slice::from_ref(&path)), filter());
     let window = Region::new(&WindowShape::Box {
         west_rad: 0.0,

@@ -20,9 +20,9 @@ use std::{
 
 use areograph::{
     altimetry::{DatumChoice, ShotFilter},
+    body::Datum,
     error::{Error, Result},
     files::Identity,
-    frames::MarsDatum,
     geom::window::{Region, WindowShape},
     pds::archive::{
         Found, INDEX, Index, IndexedFile, Indexes, Judged, Listing, Query, Sink, Source, search,
@@ -106,10 +106,10 @@ fn archive(folder: &Path) -> Vec<PathBuf> {
     for path in &paths {
         fs::create_dir_all(path.parent().expect("a folder")).expect("a writable folder");
     }
-    write(&paths[0], MarsDatum::Iau1991, 0, |_, _| ());
+    write(&paths[0], Datum::Iau1991, 0, |_, _| ());
     write(
         &paths[1],
-        MarsDatum::Iau2000,
+        Datum::Iau2000,
         FRAMES / 2,
         |number, record| match number % 200 {
             7 => record.clock_frequency_hz.set(7),
@@ -119,7 +119,7 @@ fn archive(folder: &Path) -> Vec<PathBuf> {
             _ => (),
         },
     );
-    write(&paths[2], MarsDatum::Iau2000, FRAMES, |number, record| {
+    write(&paths[2], Datum::Iau2000, FRAMES, |number, record| {
         if number == FRAMES + 700 {
             record.time_s.set(1e7);
             record.time_whole_s.set(10_000_000);
@@ -250,10 +250,10 @@ fn a_file_that_changed_since_is_read_as_if_there_were_no_index() {
     let index = indexed(folder.path(), &paths);
     overwrite(&folder.path().join(INDEX), &index.encode().unwrap());
     // Other shots under the same name and with the same size; and one file more.
-    write(&paths[0], MarsDatum::Iau1991, 40_000, |_, _| ());
+    write(&paths[0], Datum::Iau1991, 40_000, |_, _| ());
     let mut paths = paths;
     paths.push(folder.path().join("b/ap19022l.b"));
-    write(&paths[3], MarsDatum::Iau2000, 50_000, |_, _| ());
+    write(&paths[3], Datum::Iau2000, 50_000, |_, _| ());
     let indexes = Indexes::beside(&paths, Index::read);
     let everywhere = [Region::new(&WindowShape::Box {
         west_rad: 0.0,
@@ -370,7 +370,7 @@ fn a_folder_that_is_away_for_a_while_keeps_its_entries() {
     );
     fs::create_dir(&volume).unwrap();
     for (place, name) in [(folder.path(), "ap19019l.b"), (&volume, "ap19020l.b")] {
-        write(&place.join(name), MarsDatum::Iau2000, 0, |_, _| ());
+        write(&place.join(name), Datum::Iau2000, 0, |_, _| ());
         age(&place.join(name));
     }
     std::os::unix::fs::symlink(&volume, folder.path().join("volume")).unwrap();
@@ -396,7 +396,7 @@ fn a_folder_that_is_away_for_a_while_keeps_its_entries() {
 fn encoded() -> (tempfile::TempDir, Vec<u8>) {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("ap19019l.b");
-    write(&path, MarsDatum::Iau2000, 0, |_, _| ());
+    write(&path, Datum::Iau2000, 0, |_, _| ());
     age(&path);
     let file = IndexedFile::of(&path, Path::new("ap19019l.b"), &RUN_ON).unwrap();
     let index: Index = [file].into_iter().collect();
@@ -441,7 +441,7 @@ fn a_killed_index_leaves_nothing_half_written() {
     let folder = tempfile::tempdir().unwrap();
     for number in 0..6 {
         let path = folder.path().join(format!("ap{}l.b", 19_019 + number));
-        write(&path, MarsDatum::Iau2000, FRAMES / 2 * number, |_, _| ());
+        write(&path, Datum::Iau2000, FRAMES / 2 * number, |_, _| ());
         age(&path);
     }
     let index = folder.path().join(INDEX);

@@ -5,8 +5,8 @@
 use std::path::Path;
 
 use areograph::{
+    body::Datum,
     footprints::Footprint,
-    frames::MarsDatum,
     pds::pedr::{
         FieldGuard, File, Frame, FrameValues, LABEL_BYTES, LabelInfo, PedrWriter, Reason, Record,
     },
@@ -62,7 +62,7 @@ fn label() -> LabelInfo {
     LabelInfo {
         product_id: "AP19019L.B".to_owned(),
         software_version: 7.25,
-        datum: MarsDatum::Iau2000,
+        datum: Datum::Iau2000,
         note: "synthetic".to_owned(),
     }
 }
@@ -297,7 +297,7 @@ fn a_healthy_file_is_read_without_complaint() {
         (vec![], None)
     );
     assert_eq!(file.label().product_id.as_deref(), Some("AP19019L.B"));
-    assert_eq!(file.label().datum, Some(MarsDatum::Iau2000));
+    assert_eq!(file.label().datum, Some(Datum::Iau2000));
     assert_eq!(
         file.label().data_set_id.as_deref(),
         Some("MGS-M-MOLA-3-PEDR-L1A-V1.0")

@@ -5,7 +5,7 @@
 use std::path::Path;
 
 use areograph::{
-    frames::MarsDatum,
+    body::Datum,
     pds::pedr::{
         FieldGuard, File, FrameValues, LABEL_BYTES, LabelInfo, PedrWriter, RECORD_BYTES, Record,
     },
@@ -21,7 +21,7 @@ fn file_bytes() -> Vec<u8> {
     let label = LabelInfo {
         product_id: "AP19019L.B".to_owned(),
         software_version: 7.25,
-        datum: MarsDatum::Iau2000,
+        datum: Datum::Iau2000,
         note: "synthetic".to_owned(),
     };
     let mut writer = PedrWriter::create(&path, &label).expect("a writable folder");

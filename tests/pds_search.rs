@@ -16,10 +16,10 @@ use std::{
 
 use areograph::{
     altimetry::{DatumChoice, ShotFilter},
+    body::Datum,
     config::{PedrConfig, WindowConfig},
     files::HashedFile,
     footprints::Footprint,
-    frames::MarsDatum,
     geom::window::{Region, WindowShape},
     pds::{archive::Indexes, pedr::Reason},
     stages::search_footprints::{self, SearchResult, ShotRejection},
@@ -35,8 +35,8 @@ static RUN_ON: AtomicBool = AtomicBool::new(false);
 /// Two files, the first in IAU 1991, the second in IAU 2000.
 fn archive(folder: &Path) -> PedrConfig {
     let files = [folder.join("ap19019k.b"), folder.join("AP19020L.B")];
-    write(&files[0], MarsDatum::Iau1991, 0, |_, _| ());
-    write(&files[1], MarsDatum::Iau2000, FRAMES / 2, |_, _| ());
+    write(&files[0], Datum::Iau1991, 0, |_, _| ());
+    write(&files[1], Datum::Iau2000, FRAMES / 2, |_, _| ());
     config(files.to_vec())
 }
 
@@ -183,10 +183,7 @@ fn a_window_across_zero_and_one_over_the_pole_in_one_pass() {
         .collect();
     assert_eq!(
         datums,
-        [
-            (Some('K'), MarsDatum::Iau1991),
-            (Some('L'), MarsDatum::Iau2000)
-        ]
+        [(Some('K'), Datum::Iau1991), (Some('L'), Datum::Iau2000)]
     );
     let rejects: Vec<_> = result.rejected.keys().copied().collect();
     let expected = [
@@ -237,26 +234,21 @@ fn the_result_is_the_same_on_one_and_four_threads_and_survives_the_cache() {
 fn damaged_records_are_complained_of_and_the_others_kept() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("AP19019L.B");
-    write(
-        &path,
-        MarsDatum::Iau2000,
-        0,
-        |number, record| match number {
-            3 => record.clock_frequency_hz.set(7),
-            5 => record.time_s.set(f64::INFINITY),
-            8 => {
-                record.time_s.set(1e7);
-                record.time_whole_s.set(10_000_000);
-                record.time_fraction_us.set(0);
-            }
-            9 => record.shot_radius_cm[4].set(i32::MAX),
-            12 => record.channel = [200; 20],
-            number if number >= 100 && number.is_multiple_of(2) => {
-                record.spacecraft_radius_cm.set(1);
-            }
-            _ => (),
-        },
-    );
+    write(&path, Datum::Iau2000, 0, |number, record| match number {
+        3 => record.clock_frequency_hz.set(7),
+        5 => record.time_s.set(f64::INFINITY),
+        8 => {
+            record.time_s.set(1e7);
+            record.time_whole_s.set(10_000_000);
+            record.time_fraction_us.set(0);
+        }
+        9 => record.shot_radius_cm[4].set(i32::MAX),
+        12 => record.channel = [200; 20],
+        number if number >= 100 && number.is_multiple_of(2) => {
+            record.spacecraft_radius_cm.set(1);
+        }
+        _ => (),
+    });
     let mut pedr = config(vec![path.clone()]);
     pedr.filter.channels = vec![1, 2, 3, 4];
     pedr.filter.off_nadir_max_rad = 0.2;
@@ -302,7 +294,7 @@ fn damaged_records_are_complained_of_and_the_others_kept() {
 fn a_file_without_a_datum_stops_the_search() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("renamed.dat");
-    write(&path, MarsDatum::Iau2000, 0, |_, _| ());
+    write(&path, Datum::Iau2000, 0, |_, _| ());
     let mut bytes = std::fs::read(&path).unwrap();
     let label = String::from_utf8_lossy(&bytes[..7_760]).replace("2000", "XXXX");
     bytes[..7_760].copy_from_slice(label.as_bytes());
@@ -325,7 +317,7 @@ fn a_file_without_a_good_record_stops_the_search_before_its_datum_is_asked_for()
         .flat_map(|n| n.wrapping_mul(2_654_435_761).to_le_bytes())
         .collect();
     let good = {
-        write(&path, MarsDatum::Iau2000, 0, |_, _| ());
+        write(&path, Datum::Iau2000, 0, |_, _| ());
         std::fs::read(&path).unwrap()
     };
     for (bytes, why) in [
@@ -375,9 +367,9 @@ fn two_versions_of_one_orbit_are_refused() {
         folder.path().join("ap19019k.b"),
         folder.path().join("ap19019l.b"),
     ];
-    write(&files[0], MarsDatum::Iau1991, 0, |_, _| ());
+    write(&files[0], Datum::Iau1991, 0, |_, _| ());
     // The later version moves its time tags by 20 ms.
-    write(&files[1], MarsDatum::Iau2000, 0, |_, record| {
+    write(&files[1], Datum::Iau2000, 0, |_, record| {
         record.time_s.set(record.time_s.get() + 0.02);
         record.time_fraction_us.set(20_000);
     });

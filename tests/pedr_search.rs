@@ -15,7 +15,8 @@ use std::{
     process::{Command, Output},
 };
 
-use areograph::frames::MarsDatum;
+use areograph::body::Datum;
+use areograph::frames::Datum;
 use arrow::{
     array::AsArray as _,
     datatypes::{Float64Type, UInt32Type},
@@ -47,15 +48,10 @@ fn json(output: &Output) -> Value {
 fn archive(folder: &Path) -> PathBuf {
     let archive = folder.join("archive");
     fs::create_dir(&archive).expect("a writable folder");
-    write(
-        &archive.join("AP19030L.B"),
-        MarsDatum::Iau2000,
-        0,
-        |_, _| (),
-    );
+    write(&archive.join("AP19030L.B"), Datum::Iau2000, 0, |_, _| ());
     write(
         &archive.join("ap19020k.b"),
-        MarsDatum::Iau1991,
+        Datum::Iau1991,
         FRAMES / 2,
         |_, _| (),
     );
@@ -189,7 +185,7 @@ fn an_index_changes_no_byte_and_is_brought_up_to_date() {
     // One file more, and one that is none.
     write(
         &archive.join("ap19040l.b"),
-        MarsDatum::Iau2000,
+        Datum::Iau2000,
         FRAMES,
         |_, _| (),
     );

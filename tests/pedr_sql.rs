@@ -18,7 +18,8 @@ use std::{
     sync::Arc,
 };
 
-use areograph::{frames::MarsDatum, pds::archive::Opened, sql::ShotsTable};
+use areograph::body::Datum;
+use areograph::{pds::archive::Opened, sql::ShotsTable};
 use arrow::{compute::concat_batches, record_batch::RecordBatch};
 use datafusion::{
     datasource::MemTable,
@@ -36,8 +37,8 @@ fn archive(folder: &Path) -> PathBuf {
     let archive = folder.join("archive");
     fs::create_dir(&archive).unwrap();
     let (first, second) = (archive.join("ap19030l.b"), archive.join("ap19020k.b"));
-    write(&first, MarsDatum::Iau2000, 0, |_, _| ());
-    write(&second, MarsDatum::Iau1991, FRAMES / 2, |_, _| ());
+    write(&first, Datum::Iau2000, 0, |_, _| ());
+    write(&second, Datum::Iau1991, FRAMES / 2, |_, _| ());
     archive
 }
 

@@ -12,10 +12,11 @@ use std::{
 };
 
 use areograph::{
-    constants::MARS_IAU2000,
+    body::Body,
+    body::MARS_IAU2000,
     error::Kind,
     footprints::Footprint,
-    geom::mars_rotation::mars_matrix,
+    geom::body_rotation::body_matrix,
     products::write_products,
     report,
     spice::{KernelSet, Session},
@@ -108,7 +109,8 @@ fn the_frame_of_the_crs_code_is_as_far_away_as_products_say() {
     let (mut least, mut most, mut pole) = (f64::INFINITY, f64::NEG_INFINITY, 0.0_f64);
     for day in -366..=730 {
         let et = Et::from_seconds(f64::from(day) * SECONDS_PER_DAY);
-        let turn = session.mars_matrix(et).unwrap() * mars_matrix(&MARS_IAU2000, et).transpose();
+        let turn = session.body_matrix(Body::Mars, et).unwrap()
+            * body_matrix(&MARS_IAU2000, et).transpose();
         let smaller_deg = -turn[(1, 0)].atan2(turn[(0, 0)]) / RADIANS_PER_DEGREE;
         (least, most) = (least.min(smaller_deg), most.max(smaller_deg));
         pole = pole.max(turn[(2, 0)].hypot(turn[(2, 1)]) / RADIANS_PER_DEGREE);

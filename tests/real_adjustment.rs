@@ -23,10 +23,12 @@ use std::{
 };
 
 use areograph::{
+    body::Body,
     config::AdjustmentConfig,
     footprints::{AdjustmentModel, FootprintImageCoordinates},
     frames::Position,
     geom::{
+        ellipsoid::height_m as height_above_m,
         intersection::{IntersectionLimits, Unintersected},
         oriented_camera::OrientedCamera,
         pushbroom::{CorrectedOrientation, ExteriorOrientation, SampledOrientation},
@@ -498,14 +500,17 @@ fn above_lola_m(judging: &LaserSurface, ties: impl Iterator<Item = Vector3<f64>>
         .iter()
         .enumerate()
         .filter(|(index, _)| found.sigma_m(*index) < SURFACE_KNOWN_M);
-    summary(known.map(|(index, tie_m)| LaserSurface::height_m(tie_m).0 - found.heights_m[index]))
+    summary(
+        known.map(|(index, tie_m)| {
+            height_above_m(Body::Moon.model(), tie_m).0 - found.heights_m[index]
+        }),
+    )
 }
 
 /// Ties count where the ground between footprints is known to this, metres.
 const SURFACE_KNOWN_M: f64 = 25.0;
 
-/// A surface of some of the footprints. It counts heights from the ellipsoid of Mars, 1650 km below: what that adds is
-/// smooth, and the same for ties.
+/// A surface of some of the footprints.
 fn lola(site: &Site, taken: impl Fn(usize) -> bool) -> LaserSurface {
     let points = site
         .points
@@ -521,6 +526,7 @@ fn lola(site: &Site, taken: impl Fn(usize) -> bool) -> LaserSurface {
     // Lines of half a metre, of which the network was off by some tens.
     let options = SurfaceOptions {
         plan_sigma_m: 10.0,
+        body: Body::Moon,
         ..SurfaceOptions::default()
     };
     LaserSurface::new(&shots, &[], &options).unwrap()

@@ -16,14 +16,15 @@ use std::{
 };
 
 use areograph::{
+    body::Body,
+    body::{Datum, MARS_IAU2000},
     config::{self, built_in_instruments, usual_altimeter, usual_instrument},
-    constants::MARS_IAU2000,
-    frames::{MarsDatum, MarsIau2000, Position},
+    frames::{BodyFixed, Position},
     geom::{
         attitude::matrix_of_spice_quaternion,
+        body_rotation::{body_matrix, convert_datum},
         ellipsoid::{ray_meets_ellipsoid, spherical_to_xyz_m},
         image_outline::{Sight, convergence_rad},
-        mars_rotation::{convert_datum, mars_matrix},
     },
     pds::pedr::{LABEL_BYTES, LABEL_RECORDS, RECORD_BYTES, Record},
     scene::{SceneErrors, SceneOptions, write_scene, write_scene_along},
@@ -141,11 +142,11 @@ fn records(path: &Path) -> Vec<Record> {
         .collect()
 }
 
-fn datum(file: &str) -> MarsDatum {
+fn datum(file: &str) -> Datum {
     if file.ends_with("l.b") {
-        MarsDatum::Iau2000
+        Datum::Iau2000
     } else {
-        MarsDatum::Iau1991
+        Datum::Iau1991
     }
 }
 
@@ -174,7 +175,7 @@ fn the_gsfc_orbit_and_the_biased_attitude_are_the_truth() {
         assert_eq!(epochs.len(), 31);
         for (index, seconds) in epochs.iter().enumerate() {
             let et = Et::from_seconds(*seconds);
-            let mars = mars_matrix(&MARS_IAU2000, et);
+            let mars = body_matrix(&MARS_IAU2000, et);
             let position = mars * session.state(et).unwrap().position.xyz_m;
             let off_m = (position - positions[index]).norm();
             assert!(off_m < 1e-4, "{} {off_m} m", image["id"]); // 0.1 mm; kernels round to 1e-9 km
@@ -252,8 +253,10 @@ fn the_images_are_flown_as_table_2_prints_them() {
         let boresight = matrix_of_spice_quaternion(middle.try_into().unwrap())
             .column(2)
             .into_owned();
-        let camera = Position::<MarsIau2000>::new(vectors(&truth["position_iau2000_m"])[15]);
-        let ground_m = ray_meets_ellipsoid(&camera, &boresight).unwrap().xyz_m;
+        let camera = Position::<BodyFixed>::new(vectors(&truth["position_iau2000_m"])[15]);
+        let ground_m = ray_meets_ellipsoid(Body::Mars.model(), &camera, &boresight)
+            .unwrap()
+            .xyz_m;
         let flown_deg = ground_m.angle(&-boresight) / RADIANS_PER_DEGREE;
         // Degrees: two of the nadir images are printed to a tenth, and one mounting serves all.
         assert!((flown_deg - emission_deg).abs() < 0.06, "{id}: {flown_deg}");
@@ -285,8 +288,9 @@ fn convergence_by_centres_is_that_of_the_rays_to_common_ground() {
         let rays = cameras.into_iter().zip(quaternions);
         rays.map(|(camera_m, quaternion)| {
             let to_mars = matrix_of_spice_quaternion(numbers(quaternion).try_into().unwrap());
-            let camera = Position::<MarsIau2000>::new(camera_m);
-            let ground = ray_meets_ellipsoid(&camera, &to_mars.column(2).into_owned());
+            let camera = Position::<BodyFixed>::new(camera_m);
+            let ground =
+                ray_meets_ellipsoid(Body::Mars.model(), &camera, &to_mars.column(2).into_owned());
             [camera_m, ground.unwrap().xyz_m]
         })
         .collect()
@@ -360,7 +364,7 @@ fn footprints_come_back_within_0_2_m_and_times_within_2_us() {
             assert_eq!(decoded.class, 1);
             let et = Et::from_seconds(decoded.tag_s - usual_altimeter().clock_bias_s);
             assert!((et.seconds() - time_s).abs() < 2e-6);
-            let ground = convert_datum::<MarsIau2000>(decoded.ground_file_m, datum(file), et, et);
+            let ground = convert_datum::<BodyFixed>(decoded.ground_file_m, datum(file), et, et);
             let off_m = (ground.xyz_m - truth_m).norm();
             let held = worst.entry(file.to_owned()).or_default();
             *held = held.max(off_m);
@@ -383,9 +387,9 @@ fn range_minus_distance_has_the_expected_mean_for_every_orbit() {
                     let decoded = decode(&records[record], shot);
                     let et = Et::from_seconds(decoded.tag_s - usual_altimeter().clock_bias_s);
                     let ground =
-                        convert_datum::<MarsIau2000>(decoded.ground_file_m, datum(file), et, et);
+                        convert_datum::<BodyFixed>(decoded.ground_file_m, datum(file), et, et);
                     let spacecraft =
-                        mars_matrix(&MARS_IAU2000, et) * session.state(et).unwrap().position.xyz_m;
+                        body_matrix(&MARS_IAU2000, et) * session.state(et).unwrap().position.xyz_m;
                     let own_m = (decoded.spacecraft_file_m - decoded.ground_file_m).norm();
                     // The frame's own spacecraft track is linear: a metre would be a field read wrongly.
                     assert!(
@@ -526,7 +530,7 @@ fn a_flight_along_real_kernels_gives_shots_that_fit_them() {
             let decoded = decode(&records[record], shot);
             let et = Et::from_seconds(decoded.tag_s - usual_altimeter().clock_bias_s);
             let spacecraft =
-                mars_matrix(&MARS_IAU2000, et) * session.state(et).unwrap().position.xyz_m;
+                body_matrix(&MARS_IAU2000, et) * session.state(et).unwrap().position.xyz_m;
             let residual_m = decoded.range_m - (spacecraft - decoded.ground_file_m).norm();
             assert!(residual_m.abs() < 0.5, "{residual_m}");
             sum_m += residual_m;

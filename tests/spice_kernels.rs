@@ -14,6 +14,7 @@ use std::{
 };
 
 use areograph::{
+    body::Body,
     config::usual_instrument,
     error::{Error, Kind},
     spice::{KernelRole, KernelSet, Session},
@@ -137,7 +138,9 @@ fn faults_of_cspice_carry_both_messages_of_naif() {
     assert!(
         session.state(et(0.0)).is_err() && session.mounting(usual_instrument(), et(0.0)).is_err()
     );
-    assert!(session.mars_matrix(et(0.0)).is_err() && session.sun_state(et(0.0)).is_err());
+    assert!(
+        session.body_matrix(Body::Mars, et(0.0)).is_err() && session.sun_state(et(0.0)).is_err()
+    );
     drop(session);
     let empty = Session::open(&KernelSet::default()).unwrap();
     let failure = empty.utc_to_et("1999-08-24").unwrap_err();

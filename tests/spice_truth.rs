@@ -10,13 +10,12 @@ mod common;
 use std::path::Path;
 
 use areograph::{
+    body::{Body, BodyModel, Datum, MARS_IAU1991, MARS_IAU1994, MARS_IAU2000, MOON_ME},
     config::usual_instrument,
-    constants::{MARS_IAU1991, MARS_IAU1994, MARS_IAU2000, MarsModel},
     error::Kind,
-    frames::{MarsDatum, MarsIau2000},
     geom::{
+        body_rotation::{body_matrix, body_rotation, convert_datum},
         ellipsoid::{AreocentricLatitude, AreographicLatitude, Spherical, spherical_to_xyz_m},
-        mars_rotation::{convert_datum, mars_matrix, mars_rotation},
     },
     spice::{KernelSet, Session},
     time::{Et, Interval, Intervals, PointingBias},
@@ -96,18 +95,18 @@ fn orientation_samples_of_a_real_image_are_met() {
         let et = Et::from_seconds(number(&sample["et"]));
         let position = session.state(et).unwrap().position;
         let apparent = session.apparent_state(et).unwrap().position;
-        let to_mars = mars_rotation::<MarsIau2000>(et);
+        let to_mars = body_rotation(Body::Mars, et);
         let mars = to_mars.apply(&position);
         for (ours, key) in [
             (position.xyz_m, "mgs_j2000_pos_geometric"),
             (apparent.xyz_m, "mgs_j2000_pos_lt_s"),
             (mars.xyz_m, "mgs_iau_mars_pos"),
             (
-                mars_matrix(&MARS_IAU1991, et) * position.xyz_m,
+                body_matrix(&MARS_IAU1991, et) * position.xyz_m,
                 "mgs_pos_iau1991_w176.868",
             ),
             (
-                mars_matrix(&MARS_IAU1994, et) * position.xyz_m,
+                body_matrix(&MARS_IAU1994, et) * position.xyz_m,
                 "mgs_pos_pck00006_w176.901",
             ),
         ] {
@@ -166,18 +165,28 @@ fn apparent_positions_and_the_sun_are_those_of_the_support_data() {
 }
 
 #[test]
-fn closed_rotation_of_mars_equals_the_kernels() {
-    let cases: [(&str, MarsModel); 7] = [
-        ("derived/mars_iau1991_w176868.tpc", *MARS_IAU1991),
-        ("derived/mars_iau1994_pck00006.tpc", *MARS_IAU1994),
-        ("mgs_text/mars_iau2000_v0.tpc", *MARS_IAU2000),
-        ("mgs_text/pck00008.tpc", *MARS_IAU2000),
-        ("mgs_text/pck00009.tpc", *MARS_IAU2000),
-        ("mgs_text/pck00010.tpc", *MARS_IAU2000),
-        ("ale_mgs/m0402852/pck00009.tpc", *MARS_IAU2000),
+fn closed_rotations_equal_the_kernels() {
+    let cases: [(&str, Body, &BodyModel); 8] = [
+        (
+            "derived/mars_iau1991_w176868.tpc",
+            Body::Mars,
+            &MARS_IAU1991,
+        ),
+        (
+            "derived/mars_iau1994_pck00006.tpc",
+            Body::Mars,
+            &MARS_IAU1994,
+        ),
+        ("mgs_text/mars_iau2000_v0.tpc", Body::Mars, &MARS_IAU2000),
+        ("mgs_text/pck00008.tpc", Body::Mars, &MARS_IAU2000),
+        ("mgs_text/pck00009.tpc", Body::Mars, &MARS_IAU2000),
+        ("mgs_text/pck00010.tpc", Body::Mars, &MARS_IAU2000),
+        ("ale_mgs/m0402852/pck00009.tpc", Body::Mars, &MARS_IAU2000),
+        // The Moon with its periodic terms.
+        ("mgs_text/pck00010.tpc", Body::Moon, &MOON_ME),
     ];
-    for (file, model) in cases {
-        let Some(path) = real_data(file, "rotation of Mars") else {
+    for (file, body, model) in cases {
+        let Some(path) = real_data(file, "rotation of bodies") else {
             continue;
         };
         let session = Session::open(&KernelSet::from_files(&[path]).unwrap()).unwrap();
@@ -187,7 +196,12 @@ fn closed_rotation_of_mars_equals_the_kernels() {
         for (days, tolerance) in [(-900..=600, 1e-12), (601..=2_600, 3e-12)] {
             let largest = days
                 .map(|day| Et::from_seconds(f64::from(day) * 86_400.0 + 12_345.678))
-                .map(|et| worst(&session.mars_matrix(et).unwrap(), &mars_matrix(&model, et)))
+                .map(|et| {
+                    worst(
+                        &session.body_matrix(body, et).unwrap(),
+                        &body_matrix(model, et),
+                    )
+                })
                 .fold(0.0, f64::max);
             println!("{file}: {largest:.1e}");
             assert!(largest < tolerance, "{file}: {largest:.1e}");
@@ -202,8 +216,8 @@ fn datum_vectors_are_met() {
     };
     for case in rows(&json(&path)["datum_conversion"]) {
         let datum = match case["from"].as_str().unwrap() {
-            "iau1991_w176.868" => MarsDatum::Iau1991,
-            _ => MarsDatum::Iau1994,
+            "iau1991_w176.868" => Datum::Iau1991,
+            _ => Datum::Iau1994,
         };
         let et = Et::from_seconds(number(&case["et"]));
         let old_m = spherical_to_xyz_m(
@@ -211,7 +225,7 @@ fn datum_vectors_are_met() {
             number(&case["lat_centric"]) * RADIANS_PER_DEGREE,
             number(&case["radius"]) * 1_000.0,
         );
-        let new = convert_datum::<MarsIau2000>(old_m, datum, et, et);
+        let new = convert_datum(Body::Mars, old_m, datum, et, et);
         let spherical = Spherical::from_xyz_m(&new.xyz_m);
         let longitude_rad = number(&case["iau2000_lon_east"]) * RADIANS_PER_DEGREE;
         let latitude_rad = number(&case["iau2000_lat_centric"]) * RADIANS_PER_DEGREE;
@@ -231,14 +245,14 @@ fn areographic_latitudes_are_met() {
         return;
     };
     for case in rows(&json(&path)["areographic_to_areocentric"]) {
-        let model = match case["ellipsoid"].as_str().unwrap() {
-            "iau1991" => *MARS_IAU1991,
-            _ => *MARS_IAU2000,
+        let model: &BodyModel = match case["ellipsoid"].as_str().unwrap() {
+            "iau1991" => &MARS_IAU1991,
+            _ => &MARS_IAU2000,
         };
         let graphic = AreographicLatitude(number(&case["lat_graphic"]) * RADIANS_PER_DEGREE);
         let expected_rad = number(&case["lat_centric"]) * RADIANS_PER_DEGREE;
         // Above the ellipsoid the point moves along the normal, so its areocentric latitude moves too.
-        let foot = graphic.to_areocentric(&model);
+        let foot = graphic.to_areocentric(model);
         let (a, c) = (model.equatorial_radius_m, model.polar_radius_m);
         let radius_m = (foot.0.cos() / a).hypot(foot.0.sin() / c).recip();
         let height_m = number(&case["alt"]) * 1_000.0;
@@ -249,7 +263,7 @@ fn areographic_latitudes_are_met() {
             "{case}"
         ); // rounding
         if height_m.abs() < 1e-9 {
-            let back = AreocentricLatitude(expected_rad).to_areographic(&model);
+            let back = AreocentricLatitude(expected_rad).to_areographic(model);
             assert!((back.0 - graphic.0).abs() < 1e-12, "{case}");
         }
     }

@@ -16,7 +16,7 @@ use crate::{
 
 use super::{
     declare::{Declare, Keys, Many, declare_table, group, key},
-    forms::{Whole, above_to, identifier, matching, text, whole_from_to},
+    forms::{Switch, Whole, above_to, identifier, matching, text, whole_from_to},
     instruments::CAMERA,
     paths::FILE,
 };
@@ -60,6 +60,9 @@ declare_table! {
         /// stands there: pointing bias, `light_time` and the kernels of orbit and attitude are not for such an image.
         #[serde(skip)]
         isd: Option<PathBuf> = key(FILE).unused(r#""../isd/m0402852.json""#),
+        /// Whether the laser flew on the spacecraft of these support data, and their positions are geometric: then ranges of
+        /// shots that were fired while the image was exposed are measured from them. With support data alone.
+        has_laser: bool = key(Switch).or(false).unused("true"),
         /// The camera: `moc_na`, `moc_wa_red`, `moc_wa_blue`, or the path of an instrument file like those in
         /// `config/instruments`. Without it, the camera that the label names, and without a label `moc_na`.
         instrument: Option<Instrument> = key(CAMERA).example(r#""moc_na""#),
@@ -171,6 +174,10 @@ fn is_complete(_: &ImageConfig, keys: &mut Keys<'_, '_>) {
         }
         return;
     }
+    keys.unused(
+        "has_laser",
+        "positions of kernels are those of the spacecraft with the laser",
+    );
     let lacking: Vec<String> = NEEDS
         .into_iter()
         .filter(|ways| !ways.iter().any(|way| keys.span_of(way).is_some()))

@@ -32,7 +32,7 @@ const INSTRUMENTS: &[(&str, &str)] = &built_in![
     "instruments/moc_wa_blue.toml",
 ];
 /// Files of altimeters that the program knows; the first is that of sites which name none.
-const ALTIMETERS: &[(&str, &str)] = &built_in!["altimeters/mola.toml"];
+const ALTIMETERS: &[(&str, &str)] = &built_in!["altimeters/mola.toml", "altimeters/lola.toml"];
 /// Numbers of NAIF for spacecraft, instruments and frames.
 const NAIF_IDS: [i32; 2] = [-999_999_999, -1];
 

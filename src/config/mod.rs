@@ -24,6 +24,7 @@ mod pointing;
 mod problems;
 mod range_check;
 mod service;
+mod shots;
 mod site;
 mod ties;
 mod unknowns;
@@ -66,6 +67,7 @@ pub use service::{
     RetentionConfig, ScheduleConfig, ServiceConfig, ServiceInputs, ServiceOutputs, WorkersConfig,
     load_service, parse_service, service_example, service_schema,
 };
+pub use shots::{ShotColumns, ShotLayout, ShotTableConfig};
 pub use site::SiteConfig;
 pub use ties::{IntersectionConfig, TiesConfig};
 pub use unknowns::{PositionUnknowns, RotationUnknowns};
@@ -81,10 +83,10 @@ use written::Written;
 const HEADER: &str = "\
 # Site configuration of areograph, every key with its unit, range and default.
 #
-# Only `site`, one source of kernels, and either [pedr] with [[windows]] or [[images]] are required;
+# Only `site`, one source of kernels, and either [pedr] (or [[shots]]) with [[windows]] or [[images]] are required;
 # a key that is left out has the default written here. Relative paths count from this file's folder.
 # Angles are degrees, exposures milliseconds, times seconds; longitudes are east, latitudes
-# areocentric, both in the IAU 2000 frame of Mars. Schema: ../schema/site.schema.json
+# areocentric, both in the frame of the body: IAU 2000 of Mars. Schema: ../schema/site.schema.json
 
 ";
 

@@ -2,7 +2,7 @@
 
 use serde::Deserialize;
 
-use crate::geom::surface::SurfaceOptions;
+use crate::{body::Body, geom::surface::SurfaceOptions};
 
 use super::{
     declare::{declare_table, key},
@@ -29,15 +29,16 @@ declare_table! {
 }
 
 impl MolaSurfaceConfig {
-    /// What is uncertain about the surface.
+    /// What is uncertain about the surface of `body`.
     #[must_use]
-    pub const fn options(&self) -> SurfaceOptions {
+    pub const fn options(&self, body: Body) -> SurfaceOptions {
         SurfaceOptions {
             shot_sigma_m: self.shot_sigma_m,
             profile_sigma_m: self.profile_sigma_m,
             plan_sigma_m: self.plan_sigma_m,
             roughness_min_m: self.roughness_min_m,
             relief_sigma_m: None,
+            body,
         }
     }
 }

@@ -8,7 +8,7 @@ use std::{
 use serde::Serialize;
 
 use crate::{
-    constants::MARS_IAU2000,
+    body::MARS_IAU2000,
     error::Error,
     geom::conformal_map::{ConformalMap, Projection},
     units::RADIANS_PER_DEGREE,

@@ -6,7 +6,7 @@ use serde::Deserialize;
 
 use crate::{
     altimetry::{DatumChoice, ShotFilter},
-    frames::MarsDatum,
+    body::Datum,
     units::RADIANS_PER_DEGREE,
 };
 
@@ -31,9 +31,9 @@ declare_table! {
         /// calls IAU 1991, holds the 1994 constants.
         datum: DatumChoice = key(words([
             ("auto", DatumChoice::Auto, "by version letter and label: L is IAU 2000, older versions IAU 1991"),
-            ("iau1991", DatumChoice::Stated(MarsDatum::Iau1991), ""),
-            ("iau1994", DatumChoice::Stated(MarsDatum::Iau1994), ""),
-            ("iau2000", DatumChoice::Stated(MarsDatum::Iau2000), ""),
+            ("iau1991", DatumChoice::Stated(Datum::Iau1991), ""),
+            ("iau1994", DatumChoice::Stated(Datum::Iau1994), ""),
+            ("iau2000", DatumChoice::Stated(Datum::Iau2000), ""),
         ])).or(DatumChoice::Auto),
         /// Shots to keep.
         filter: ShotFilter = table(),

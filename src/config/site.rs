@@ -10,6 +10,7 @@ use serde_json::json;
 
 use crate::{
     altimetry::MolaClock,
+    body::Body,
     instruments::{Altimeter, Instrument},
     time::PointingBias,
 };
@@ -17,7 +18,7 @@ use crate::{
 use super::{
     adjustment::AdjustmentConfig,
     declare::{Keys, declare_table, key, no_repeats, of_the_file, table, tables},
-    forms::{any_text, lower_case_identifier},
+    forms::{any_text, lower_case_identifier, words},
     images::{IMAGES, ImageConfig},
     instruments::{ALTIMETER, usual_altimeter, usual_instrument},
     kernels::KernelsConfig,
@@ -27,6 +28,7 @@ use super::{
     pedr::PedrConfig,
     pointing::{PointingConfig, has_turned_sign},
     range_check::RangeCheckConfig,
+    shots::{SHOTS, ShotTableConfig},
     ties::{IntersectionConfig, TiesConfig},
     windows::{WINDOWS, WINDOWS_MAX, WindowConfig},
 };
@@ -41,8 +43,14 @@ declare_table! {
         description: String = key(any_text())
             .or(String::new())
             .example(r#""Eos Chasma, one of the three study sites of Shan et al. 2005""#),
-        /// The altimeter of the PEDR files: `mola`, or the path of an altimeter file like that in
-        /// `config/altimeters`.
+        /// The body: its rotation and shape are those of `config/bodies`, and so are frame, heights and maps of all products.
+        /// At another body than Mars, images come with support data and shots from tables.
+        body: Body = key(words([
+            ("mars", Body::Mars, "in IAU 2000"),
+            ("moon", Body::Moon, "in the mean Earth/polar axis frame, radius 1737.4 km"),
+        ])).or(Body::Mars),
+        /// The altimeter of the PEDR files, or of the tables of shots: `mola`, `lola`, or the path of an altimeter file like
+        /// those in `config/altimeters`.
         altimeter: Altimeter = key(ALTIMETER).or(usual_altimeter().clone()),
         /// The file it was read from.
         file: PathBuf = of_the_file(),
@@ -60,6 +68,8 @@ declare_table! {
         mola_clock: MolaClock = table(),
         /// PEDR files and filters; no files when only images are oriented.
         pedr: PedrConfig = table(),
+        /// Tables of laser shots, in place of PEDR files.
+        shots: Vec<ShotTableConfig> = tables(SHOTS),
         /// Windows on the ground, 1 to 64, or none when there are no PEDR files; bit `i` of
         /// `Footprints::windows` is entry `i`.
         windows: Vec<WindowConfig> = tables(WINDOWS),
@@ -86,6 +96,14 @@ declare_table! {
     check across_tables
 }
 
+impl SiteConfig {
+    /// Whether the site has laser shots, of PEDR files or of tables.
+    #[must_use]
+    pub fn has_shots(&self) -> bool {
+        !(self.pedr.files.is_empty() && self.shots.is_empty())
+    }
+}
+
 /// The clock bias is that of the altimeter where the site gives no other.
 fn clock_of_altimeter(mut site: SiteConfig, keys: &Keys<'_, '_>) -> SiteConfig {
     let (clock, altimeter) = (&mut site.mola_clock, &site.altimeter);
@@ -102,11 +120,13 @@ fn across_tables(site: &SiteConfig, keys: &mut Keys<'_, '_>) {
     keys.rule(|| json!({"required": ["kernels"]}));
     keys.rule(|| {
         json!({"anyOf": [
-            {"required": ["pedr", "windows"]},
-            {"required": ["images"], "not": {"required": ["pedr"]}},
+            {"required": ["pedr", "windows"], "not": {"required": ["shots"]}},
+            {"required": ["shots", "windows"], "not": {"required": ["pedr"]}},
+            {"required": ["images"], "not": {"anyOf": [{"required": ["pedr"]}, {"required": ["shots"]}]}},
         ]})
     });
     something_to_do(site, keys);
+    other_bodies(site, keys);
     serial_numbers(keys);
     pointing_of_instruments(site, keys);
     if site.images.len() < 2 {
@@ -132,7 +152,10 @@ fn matched_images(site: &SiteConfig, keys: &mut Keys<'_, '_>) {
 /// Footprints need windows; a site needs footprints or images.
 fn something_to_do(site: &SiteConfig, keys: &mut Keys<'_, '_>) {
     let windows = keys.span_of("windows");
-    if keys.span_of("pedr").is_some() {
+    if keys.span_of("shots").is_some() {
+        keys.refuse("pedr", "PEDR files or tables [[shots]], not both");
+    }
+    if keys.span_of("pedr").is_some() || keys.span_of("shots").is_some() {
         if windows.is_none() {
             keys.missing("windows", &format!("1 to {WINDOWS_MAX} tables [[windows]]"));
         }
@@ -150,8 +173,40 @@ fn something_to_do(site: &SiteConfig, keys: &mut Keys<'_, '_>) {
         ),
         _ => keys.missing(
             "pedr",
-            "a table pedr, tables [[images]], or both: a site without either has nothing to do",
+            "a table pedr (or tables [[shots]]), tables [[images]], or both: a site without either has nothing to do",
         ),
+    }
+}
+
+/// What kernels, labels and PEDR files are of is at Mars; a datum is of one body.
+fn other_bodies(site: &SiteConfig, keys: &mut Keys<'_, '_>) {
+    let body = site.body;
+    for table in keys.entries(&["shots"]) {
+        let Some(datum) = table.get("datum") else {
+            continue;
+        };
+        let of_body = site.shots.iter().filter_map(|of| of.datum);
+        if of_body.clone().any(|of| of.body() != body) {
+            let expected = format!("a datum of {body}, the body of the site");
+            keys.review().refuse(datum.span(), "shots.datum", expected);
+        }
+    }
+    if body == Body::Mars {
+        return;
+    }
+    let only_at_mars = format!("none on {body}: it belongs to Mars Global Surveyor");
+    for table in ["pedr", "mola_clock", "pointing"] {
+        keys.refuse(table, &only_at_mars);
+    }
+    if site.images.iter().any(|image| image.isd.is_none()) {
+        let text = format!(
+            "images on {body} need support data (images.isd): labels and kernels are read of Mars Global Surveyor alone"
+        );
+        let span = keys.span_of("images");
+        keys.review().problem(span, text);
+    }
+    if !site.shots.is_empty() && keys.span_of("altimeter").is_none() {
+        keys.missing("altimeter", "the altimeter of the tables, such as lola");
     }
 }
 

@@ -11,11 +11,11 @@ use super::{
     movement::{Component, Size},
 };
 use crate::{
+    body::Body,
     error::Result,
-    frames::MarsIau2000,
     geom::{
         attitude::{matrix_of_spice_quaternion, rotation_vector},
-        mars_rotation::mars_rotation,
+        body_rotation::body_rotation,
         orbit_axes::radial_along_cross,
     },
     products::read::{ImageDocument, SampleRow, read_samples},
@@ -150,12 +150,13 @@ impl ImageMovement {
 pub(super) const ORIENTATIONS: [(&str, &str); 2] =
     [("orientation", ""), ("adjusted_orientation", ", adjusted")];
 
-/// Compares one image; a document is missing where its folder does not have the image.
+/// Compares one image of `body`; a document is missing where its folder does not have the image.
 pub(super) fn between(
     image: &str,
     (orientation, which): (&str, &str),
     folders: [&Path; 2],
     documents: &[Option<ImageDocument>; 2],
+    body: Body,
 ) -> Result<ImageDifference> {
     let rows = |there: bool, folder: &Path| -> Result<Vec<SampleRow>> {
         let file = folder.join(format!("images/{image}/{orientation}.parquet"));
@@ -184,7 +185,7 @@ pub(super) fn between(
         models,
         samples_only_in_a: rows_a.len() - pairs.len(),
         samples_only_in_b: rows_b.len() - pairs.len(),
-        movement: movement(&rows_a, &rows_b, &pairs),
+        movement: movement(body, &rows_a, &rows_b, &pairs),
     })
 }
 
@@ -207,13 +208,18 @@ fn matched(a: &[SampleRow], b: &[SampleRow]) -> Vec<(usize, usize)> {
     pairs
 }
 
-fn movement(a: &[SampleRow], b: &[SampleRow], pairs: &[(usize, usize)]) -> Option<ImageMovement> {
+fn movement(
+    body: Body,
+    a: &[SampleRow],
+    b: &[SampleRow],
+    pairs: &[(usize, usize)],
+) -> Option<ImageMovement> {
     if pairs.is_empty() {
         return None;
     }
     let samples: Vec<SampleMovement> = pairs
         .iter()
-        .map(|(first, second)| of_sample(&a[*first], &b[*second], &orbit_axes(a, *first)))
+        .map(|(first, second)| of_sample(&a[*first], &b[*second], &orbit_axes(body, a, *first)))
         .collect();
     let all = |value: fn(&SampleMovement) -> f64| samples.iter().map(value);
     Some(ImageMovement {
@@ -271,18 +277,17 @@ fn boresight(from_camera: &Matrix3<f64>) -> Vector3<f64> {
 
 /// The three axes of the orbit at row `index`, as columns in Mars-fixed components; there are two rows at least.
 ///
-/// The flight is seen in inertial space: in Mars' own frame it would lean by up to 4 degrees.
-fn orbit_axes(rows: &[SampleRow], index: usize) -> Matrix3<f64> {
+/// The flight is seen in inertial space: in the frame of Mars itself it would lean by up to 4 degrees.
+fn orbit_axes(body: Body, rows: &[SampleRow], index: usize) -> Matrix3<f64> {
     let inertial = |index: usize| {
         let row = &rows[index];
-        mars_rotation::<MarsIau2000>(row.et)
+        body_rotation(body, row.et)
             .inverse()
             .apply(&row.position)
             .xyz_m
     };
     let flight = inertial((index + 1).min(rows.len() - 1)) - inertial(index.saturating_sub(1));
-    mars_rotation::<MarsIau2000>(rows[index].et).matrix()
-        * radial_along_cross(&inertial(index), &flight)
+    body_rotation(body, rows[index].et).matrix() * radial_along_cross(&inertial(index), &flight)
 }
 
 #[cfg(test)]
@@ -301,7 +306,7 @@ mod tests {
             let et = Et::from_seconds(4e7 + 1e-3 * line);
             let angle_rad = 3_400.0 / 3.77e6 * 1e-3 * line;
             let inertial = 3.77e6 * Vector3::new(angle_rad.cos(), 0.0, angle_rad.sin());
-            let to_mars = mars_rotation::<MarsIau2000>(et);
+            let to_mars = body_rotation(Body::Mars, et);
             SampleRow {
                 et,
                 line_offset: *line,
@@ -320,7 +325,7 @@ mod tests {
             rows(&[-10.0, -5.0, 0.000_01, 5.0, 12.0]),
         );
         assert_eq!(matched(&coarse, &fine), [(0, 0), (1, 2)]);
-        assert!(movement(&coarse, &rows(&[1.0, 2.0]), &[]).is_none());
+        assert!(movement(Body::Mars, &coarse, &rows(&[1.0, 2.0]), &[]).is_none());
     }
 
     #[test]
@@ -330,13 +335,13 @@ mod tests {
         // North is along the flight, up is radial; radial × along is west of a polar orbit flown north.
         let turn = 10.0 * RADIANS_PER_ARCSECOND * Vector3::new(2.0, -1.0, 5.0);
         for row in &mut b {
-            let to_mars = *mars_rotation::<MarsIau2000>(row.et).matrix();
+            let to_mars = *body_rotation(Body::Mars, row.et).matrix();
             row.position.xyz_m += to_mars * Vector3::new(3.0, 2.0, 1.0);
             let turned =
                 matrix_of_spice_quaternion(row.camera_to_mars) * matrix_of_rotation_vector(&turn);
             row.camera_to_mars = spice_quaternion(&turned);
         }
-        let movement = movement(&a, &b, &[(0, 0), (1, 1), (2, 2)]).unwrap();
+        let movement = movement(Body::Mars, &a, &b, &[(0, 0), (1, 1), (2, 2)]).unwrap();
         let middle = movement.samples[1];
         // Coordinates are good to 1e-9 m; the chord over two neighbours is parallel to the flight.
         for (found, expected_m) in [

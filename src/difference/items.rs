@@ -3,7 +3,7 @@
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use crate::store::manifest::Manifest;
+use crate::{body::Body, store::manifest::Manifest};
 
 /// A named thing.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, JsonSchema)]
@@ -154,6 +154,14 @@ pub(super) fn images(manifest: &Manifest, orientation: &str) -> Vec<String> {
 pub(super) fn united(a: &[String], b: &[String]) -> Vec<String> {
     let unmatched = b.iter().filter(|name| !a.contains(name));
     a.iter().chain(unmatched).cloned().collect()
+}
+
+/// The body of a run, by its configuration.
+pub(super) fn body(of: &Manifest) -> Body {
+    let written = of.configuration.keys.get("body");
+    let is_it = |word: &str| written.is_some_and(|text| text.trim_matches('"') == word);
+    let known = Body::WORDS.into_iter().find(|(word, _)| is_it(word));
+    known.map_or_else(Body::default, |(_, body)| body)
 }
 
 #[cfg(test)]

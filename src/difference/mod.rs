@@ -215,6 +215,7 @@ fn read_movements(
     let [first, second] = ranges.map(|document| document.profiles);
     difference.profiles = profiles(first, second);
     difference.footprints = footprints::between(a, b)?;
+    let body = items::body(runs[0].1);
     for which in images::ORIENTATIONS {
         let (orientation, _) = which;
         let images = |manifest: &Manifest| items::images(manifest, orientation);
@@ -225,7 +226,7 @@ fn read_movements(
                 there.then(|| read_image(&file)).transpose()
             };
             let documents: [Option<ImageDocument>; 2] = [document(runs[0])?, document(runs[1])?];
-            let image = images::between(&name, which, [a, b], &documents)?;
+            let image = images::between(&name, which, [a, b], &documents, body)?;
             difference.images.push(image);
         }
     }

@@ -134,7 +134,7 @@ impl<'a> Check<'a> {
 
     fn all(&mut self, config: &SiteConfig) -> Flow<()> {
         let prepared = prepare(self, config)?;
-        let searched = !config.pedr.files.is_empty() && self.checked.failures.is_empty();
+        let searched = config.has_shots() && self.checked.failures.is_empty();
         if searched && prepared.profiles.get().is_some_and(Vec::is_empty) {
             // A run would make products and mark them invalid; a check that says ready would not be believed again.
             let failure = Error::from(NoShot).in_site(&config.site);

@@ -41,7 +41,7 @@ pub(super) fn judged(
         .adjustment_failure
         .as_ref()
         .map(|failure| format!("{}; {}", failure.cause, failure.cause.advice()));
-    let searched = !config.pedr.files.is_empty();
+    let searched = config.has_shots();
     let verdict = judge(&Evidence {
         footprints: searched.then_some(site.converted.value()?.footprints.len()),
         limits: &config.limits,

@@ -64,9 +64,13 @@ pub(super) fn required_coverage(
     // Those of support data read no kernels.
     let images = || images.iter().filter(|image| image.support.is_none());
     let exposures = images().map(|image| image.exposures());
-    let flights = profiles
-        .iter()
-        .map(|profile| profile.interval.padded(reach_s));
+    // No kernels have the spacecraft of tables.
+    let flown = if config.shots.is_empty() {
+        profiles
+    } else {
+        &[]
+    };
+    let flights = flown.iter().map(|profile| profile.interval.padded(reach_s));
     let light_time = config.orientation.light_time;
     let positions =
         exposures.map(|exposures| light_time.read_over(exposures.padded(kernels.padding_s)));

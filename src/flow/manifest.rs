@@ -9,6 +9,7 @@ use super::{
 };
 use crate::{
     altimetry::BiasScope,
+    body::Body,
     config::SiteConfig,
     error::Result,
     files::file_name,
@@ -237,5 +238,7 @@ fn biases(config: &SiteConfig, site: &Site) -> Result<Vec<BiasEntry>> {
         },
         source: of.source.to_owned(),
     });
-    Ok(pointing.chain([clock]).collect())
+    // Nothing at another body is corrected for MOLA.
+    let clock = (config.body == Body::Mars).then_some(clock);
+    Ok(pointing.chain(clock).collect())
 }

@@ -18,14 +18,15 @@ use crate::{
     spice::{KernelSet, KernelView, RequiredCoverage},
     stage::{InOrder, Output, Round, Stage},
     stages::{
-        check_ranges::CheckRanges,
+        check_ranges::{CheckRanges, CheckTableRanges},
         convert_datum::ConvertDatum,
         describe_kernels::{DescribeKernels, Required},
         group_profiles::GroupProfiles,
         orientation::Orientation,
         outline_windows::{OutlineWindows, Windows},
+        read_shots::{ReadShots, ShotFiles},
         sample_orientation::SampleOrientation,
-        search_footprints::{KnownPlaces, PedrFiles, SearchFootprints},
+        search_footprints::{KnownPlaces, PedrFiles, SearchFootprints, SearchResult},
         tag_times::{ImageTimes, TagTimes},
         tag_utc::TagUtc,
     },
@@ -67,6 +68,7 @@ pub(super) fn prepare<D: Driver>(flow: &mut D, config: &SiteConfig) -> Flow<Prep
                 None => (source, None),
             };
             flow.stage(&TagTimes {
+                body: &config.body,
                 image,
                 label,
                 support,
@@ -75,22 +77,7 @@ pub(super) fn prepare<D: Driver>(flow: &mut D, config: &SiteConfig) -> Flow<Prep
         };
         config.images.iter().map(tag).collect::<Flow<Vec<_>>>()?
     };
-    let files = flow.hash(SearchFootprints::NAME, &config.pedr.files)?;
-    let indexes = Indexes::beside(&config.pedr.files, |path| {
-        flow.files().admit(path).ok()?;
-        Index::read(path)
-    });
-    let outlined = outlined(flow, config, &images)?;
-    let found = flow.stage(&SearchFootprints {
-        pedr: &config.pedr,
-        files: PedrFiles(&files),
-        index: KnownPlaces(&indexes),
-        windows: Windows {
-            written: &config.windows,
-            outlined: outlined.as_ref(),
-        },
-        clock_correction_s: &config.mola_clock.correction_s(),
-    })?;
+    let found = found(flow, config, &images, clocks.as_ref())?;
     let converted = flow.stage(&ConvertDatum {
         found: &found,
         mola_clock: &config.mola_clock,
@@ -111,6 +98,46 @@ pub(super) fn prepare<D: Driver>(flow: &mut D, config: &SiteConfig) -> Flow<Prep
         utc,
         profiles,
         images,
+    })
+}
+
+/// The shots in the windows, of PEDR files or of tables.
+fn found<D: Driver>(
+    flow: &mut D,
+    config: &SiteConfig,
+    images: &[Output<ImageTimes>],
+    clocks: Option<&KernelSet>,
+) -> Flow<Output<SearchResult>> {
+    let files = flow.hash(SearchFootprints::NAME, &config.pedr.files)?;
+    let tables = config.shots.iter();
+    let tables = tables.map(|table| flow.hash(ReadShots::NAME, &table.files));
+    let tables = tables.collect::<Flow<Vec<_>>>()?;
+    let outlined = outlined(flow, config, images)?;
+    let windows = Windows {
+        written: &config.windows,
+        outlined: outlined.as_ref(),
+    };
+    let clock_correction_s = &config.mola_clock.correction_s();
+    if !tables.is_empty() {
+        return flow.stage(&ReadShots {
+            body: &config.body,
+            shots: &config.shots,
+            files: ShotFiles(&tables),
+            windows,
+            clock_correction_s,
+            kernels: &KernelView::text(clocks),
+        });
+    }
+    let indexes = Indexes::beside(&config.pedr.files, |path| {
+        flow.files().admit(path).ok()?;
+        Index::read(path)
+    });
+    flow.stage(&SearchFootprints {
+        pedr: &config.pedr,
+        files: PedrFiles(&files),
+        index: KnownPlaces(&indexes),
+        windows,
+        clock_correction_s,
     })
 }
 
@@ -177,7 +204,7 @@ pub(super) fn orient<D: Driver>(
         images,
         required,
     } = prepared;
-    let ranges = {
+    let ranges = if config.shots.is_empty() {
         let view = KernelView::positions(kernels.as_ref());
         let view = flow.attempt(CheckRanges::NAME, view)?;
         flow.stage(&CheckRanges {
@@ -187,11 +214,20 @@ pub(super) fn orient<D: Driver>(
             mola_clock: &config.mola_clock,
             range_check: &config.range_check,
         })?
+    } else {
+        flow.stage(&CheckTableRanges {
+            converted: &converted,
+            profiles: &profiles,
+            images: InOrder(&images),
+            mola_clock: &config.mola_clock,
+            range_check: &config.range_check,
+        })?
     };
     let (orientations, described) = {
         let view = &KernelView::all(kernels.as_ref());
         let orientations = orientations(flow, config, &images, view)?;
         let described = flow.stage(&DescribeKernels {
+            body: &config.body,
             kernels: view,
             required: Required(required.as_ref()),
             ck_tolerance_s: &config.kernels.ck_tolerance_s,

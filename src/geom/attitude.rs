@@ -3,7 +3,7 @@
 use nalgebra::{Matrix3, Quaternion, Rotation3, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
 
-use super::mars_rotation::{frame_rotation_1, frame_rotation_2, frame_rotation_3};
+use super::body_rotation::{frame_rotation_1, frame_rotation_2, frame_rotation_3};
 use crate::{instruments::Mounting, units::wrap_pi};
 
 /// Pointing angles of a camera, radians.

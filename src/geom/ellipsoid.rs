@@ -4,8 +4,8 @@ use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    constants::MarsModel,
-    frames::{MarsFixed, Position},
+    body::BodyModel,
+    frames::{Frame, Position},
     units::wrap_two_pi,
 };
 
@@ -24,7 +24,7 @@ impl AreocentricLatitude {
     ///
     /// `tan(areographic) = (a/c)² tan(areocentric)`.
     #[must_use]
-    pub fn to_areographic(self, model: &MarsModel) -> AreographicLatitude {
+    pub fn to_areographic(self, model: &BodyModel) -> AreographicLatitude {
         let (sin, cos) = self.0.sin_cos();
         let ratio = model.equatorial_radius_m / model.polar_radius_m;
         AreographicLatitude((ratio * ratio * sin).atan2(cos))
@@ -34,7 +34,7 @@ impl AreocentricLatitude {
 impl AreographicLatitude {
     /// The areocentric latitude of the ellipsoid point with this normal, with the radii of `model`.
     #[must_use]
-    pub fn to_areocentric(self, model: &MarsModel) -> AreocentricLatitude {
+    pub fn to_areocentric(self, model: &BodyModel) -> AreocentricLatitude {
         let (sin, cos) = self.0.sin_cos();
         let ratio = model.polar_radius_m / model.equatorial_radius_m;
         AreocentricLatitude((ratio * ratio * sin).atan2(cos))
@@ -77,9 +77,9 @@ impl Spherical {
         }
     }
 
-    /// The position in Mars-fixed frame `F`.
+    /// The position in body-fixed frame `F`.
     #[must_use]
-    pub fn position<F: MarsFixed>(&self) -> Position<F> {
+    pub fn position<F: Frame>(&self) -> Position<F> {
         Position::new(spherical_to_xyz_m(
             self.longitude_rad,
             self.latitude.0,
@@ -101,18 +101,19 @@ pub fn local_axes(place_m: &Vector3<f64>) -> Matrix3<f64> {
     ])
 }
 
-/// Where the ray from `origin` along `direction` first meets the ellipsoid of frame `F`, metres.
+/// Where the ray from `origin` along `direction` first meets the ellipsoid of `model`, metres.
 ///
 /// `direction` need not have unit length. `None` when the ray misses or the ellipsoid lies behind.
 #[must_use]
-pub fn ray_meets_ellipsoid<F: MarsFixed>(
+pub fn ray_meets_ellipsoid<F: Frame>(
+    model: &BodyModel,
     origin: &Position<F>,
     direction: &Vector3<f64>,
 ) -> Option<Position<F>> {
     let scale = Vector3::new(
-        1.0 / F::model().equatorial_radius_m,
-        1.0 / F::model().equatorial_radius_m,
-        1.0 / F::model().polar_radius_m,
+        1.0 / model.equatorial_radius_m,
+        1.0 / model.equatorial_radius_m,
+        1.0 / model.polar_radius_m,
     );
     let start = origin.xyz_m.component_mul(&scale);
     let step = direction.component_mul(&scale);
@@ -127,23 +128,51 @@ pub fn ray_meets_ellipsoid<F: MarsFixed>(
     (along > 0.0).then(|| Position::new(origin.xyz_m + along * direction))
 }
 
-/// Distance from `origin` along `direction` to the ellipsoid of frame `F`, metres; for a direction that misses it, to
+/// Distance from `origin` along `direction` to the ellipsoid of `model`, metres; for a direction that misses it, to
 /// the horizon of a sphere with its equatorial radius.
 #[must_use]
-pub fn range_to_ellipsoid_m<F: MarsFixed>(origin: &Position<F>, direction: &Vector3<f64>) -> f64 {
-    let radius_m = F::model().equatorial_radius_m;
+pub fn range_to_ellipsoid_m<F: Frame>(
+    model: &BodyModel,
+    origin: &Position<F>,
+    direction: &Vector3<f64>,
+) -> f64 {
+    let radius_m = model.equatorial_radius_m;
     let horizon_m = || {
         let square_m2 = origin.xyz_m.norm_squared() - radius_m * radius_m;
         square_m2.max(0.0).sqrt()
     };
-    let ground = ray_meets_ellipsoid(origin, direction);
+    let ground = ray_meets_ellipsoid(model, origin, direction);
     ground.map_or_else(horizon_m, |ground| origin.distance_m(&ground))
+}
+
+/// The point of the ellipsoid of `model` in the direction of `place_m`, metres.
+#[must_use]
+pub fn on_ellipsoid_m(model: &BodyModel, place_m: &Vector3<f64>) -> Vector3<f64> {
+    let up = place_m.normalize();
+    let (a, c) = (model.equatorial_radius_m, model.polar_radius_m);
+    up / ((up.x / a).powi(2) + (up.y / a).powi(2) + (up.z / c).powi(2)).sqrt()
+}
+
+/// Height of a place above the ellipsoid of `model` along the radius, metres, and how it changes with the place.
+#[must_use]
+pub fn height_m(model: &BodyModel, place_m: &Vector3<f64>) -> (f64, Vector3<f64>) {
+    let up = place_m.normalize();
+    let below_m = on_ellipsoid_m(model, place_m);
+    let (a, c) = (model.equatorial_radius_m, model.polar_radius_m);
+    // The radius is q^(-1/2) of the direction; what changes the direction is across `up`.
+    let by_up =
+        -below_m.norm().powi(3) * Vector3::new(up.x / (a * a), up.y / (a * a), up.z / (c * c));
+    let across = (by_up - up * by_up.dot(&up)) / place_m.norm();
+    (place_m.norm() - below_m.norm(), up - across)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{constants::MARS_IAU2000, frames::MarsIau2000};
+    use crate::{
+        body::{Body, MARS_IAU2000},
+        frames::BodyFixed,
+    };
     use proptest::prelude::*;
 
     proptest! {
@@ -171,14 +200,21 @@ mod tests {
 
     #[test]
     fn a_nadir_ray_from_above_the_pole_meets_the_polar_radius() {
-        let origin = Position::<MarsIau2000>::new(Vector3::new(0.0, 0.0, 3.76e6));
-        let hit = ray_meets_ellipsoid(&origin, &Vector3::new(0.0, 0.0, -2.0)).unwrap();
+        let origin = Position::<BodyFixed>::new(Vector3::new(0.0, 0.0, 3.76e6));
+        let hit = ray_meets_ellipsoid(Body::Mars.model(), &origin, &Vector3::new(0.0, 0.0, -2.0))
+            .unwrap();
         assert!((hit.xyz_m.z - 3_376_200.0).abs() < 1e-6); // micrometre
-        assert!(ray_meets_ellipsoid(&origin, &Vector3::new(0.0, 0.0, 1.0)).is_none());
-        assert!(ray_meets_ellipsoid(&origin, &Vector3::new(1.0, 0.0, 0.0)).is_none());
-        let range_m = range_to_ellipsoid_m(&origin, &-Vector3::z());
+        assert!(
+            ray_meets_ellipsoid(Body::Mars.model(), &origin, &Vector3::new(0.0, 0.0, 1.0))
+                .is_none()
+        );
+        assert!(
+            ray_meets_ellipsoid(Body::Mars.model(), &origin, &Vector3::new(1.0, 0.0, 0.0))
+                .is_none()
+        );
+        let range_m = range_to_ellipsoid_m(Body::Mars.model(), &origin, &-Vector3::z());
         assert!((range_m - (3.76e6 - 3_376_200.0)).abs() < 1e-6); // micrometre
-        let horizon_m = range_to_ellipsoid_m(&origin, &Vector3::x());
+        let horizon_m = range_to_ellipsoid_m(Body::Mars.model(), &origin, &Vector3::x());
         assert!((horizon_m - 1_613_534.5).abs() < 1.0); // √(3.76² − 3.39619²) Mm
     }
 }

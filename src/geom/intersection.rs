@@ -5,7 +5,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::collinearity::{BehindCamera, by_camera_point, project};
-use crate::constants::MARS_IAU2000;
+use crate::body::Body;
 
 /// Newton steps that are tried.
 const STEPS_MAX: u32 = 20;
@@ -80,18 +80,25 @@ pub struct IntersectionLimits {
 }
 
 impl Default for IntersectionLimits {
-    /// Half a degree, and 30 km about the ellipsoid of IAU 2000.
+    /// Those on Mars.
     fn default() -> Self {
-        Self {
-            convergence_min_rad: 0.5_f64.to_radians(),
-            equatorial_radius_m: MARS_IAU2000.equatorial_radius_m,
-            polar_radius_m: MARS_IAU2000.polar_radius_m,
-            height_max_m: 30_000.0,
-        }
+        Self::on(Body::Mars)
     }
 }
 
 impl IntersectionLimits {
+    /// Half a degree, and 30 km about the ellipsoid of `body`.
+    #[must_use]
+    pub fn on(body: Body) -> Self {
+        let model = body.model();
+        Self {
+            convergence_min_rad: 0.5_f64.to_radians(),
+            equatorial_radius_m: model.equatorial_radius_m,
+            polar_radius_m: model.polar_radius_m,
+            height_max_m: 30_000.0,
+        }
+    }
+
     /// Height of `ground_m` above the ellipsoid along the radius, metres.
     fn height_m(&self, ground_m: &Vector3<f64>) -> f64 {
         let unit = ground_m.normalize();

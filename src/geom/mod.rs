@@ -2,6 +2,7 @@
 
 pub mod attitude;
 pub mod block_equations;
+pub mod body_rotation;
 pub mod bundle;
 pub mod chebyshev;
 pub mod collinearity;
@@ -14,7 +15,6 @@ pub mod lagrange;
 pub mod light_time;
 pub mod longitude_ring;
 pub mod map_projection;
-pub mod mars_rotation;
 pub mod misregistration;
 pub mod orbit_axes;
 pub mod oriented_camera;

@@ -5,11 +5,12 @@
 use nalgebra::{Matrix3, Vector3};
 
 use super::{
-    ellipsoid::spherical_to_xyz_m, mars_rotation::mars_rotation, orbit_axes::radial_along_cross,
+    body_rotation::body_rotation, ellipsoid::spherical_to_xyz_m, orbit_axes::radial_along_cross,
 };
 use crate::{
+    body::Body,
     footprints::Footprint,
-    frames::{Frame, J2000, MarsIau2000, Position},
+    frames::{BodyFixed, Frame, J2000, Position},
     time::Et,
 };
 
@@ -17,7 +18,7 @@ use crate::{
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SpacecraftState {
     /// Position.
-    pub position: Position<MarsIau2000>,
+    pub position: Position<BodyFixed>,
     /// Radial, along-track and cross-track unit vectors as columns, in IAU 2000.
     pub axes: Matrix3<f64>,
 }
@@ -26,7 +27,7 @@ impl SpacecraftState {
     /// The state of position and velocity (metres per second) in J2000 at `at`.
     #[must_use]
     pub fn of(at: Et, position: &Position<J2000>, velocity_m_s: &Vector3<f64>) -> Self {
-        let to_mars = mars_rotation::<MarsIau2000>(at);
+        let to_mars = body_rotation(Body::Mars, at);
         Self {
             position: to_mars.apply(position),
             axes: to_mars.matrix() * radial_along_cross(&position.xyz_m, velocity_m_s),
@@ -80,7 +81,7 @@ pub fn range_residual_m<F: Frame>(
 
 /// The footprint with this radius, metres.
 #[must_use]
-pub fn footprint(shot: &Footprint, radius_m: f64) -> Position<MarsIau2000> {
+pub fn footprint(shot: &Footprint, radius_m: f64) -> Position<BodyFixed> {
     Position::new(spherical_to_xyz_m(
         shot.longitude_rad,
         shot.latitude_rad,
@@ -90,7 +91,7 @@ pub fn footprint(shot: &Footprint, radius_m: f64) -> Position<MarsIau2000> {
 
 /// The spacecraft where the PEDR file has it.
 #[must_use]
-pub fn own_spacecraft(shot: &Footprint) -> Position<MarsIau2000> {
+pub fn own_spacecraft(shot: &Footprint) -> Position<BodyFixed> {
     Position::new(spherical_to_xyz_m(
         shot.spacecraft_longitude_rad,
         shot.spacecraft_latitude_rad,

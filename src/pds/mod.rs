@@ -10,6 +10,7 @@ pub mod pedr;
 pub mod pedr_table;
 pub mod pixel_file;
 pub mod plane_tables;
+pub mod shot_table;
 pub mod ties;
 
 pub use moc::{ImageLabel, product_named, read_label};

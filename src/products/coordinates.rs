@@ -1,16 +1,15 @@
 //! Degrees of people's maps.
 
-use crate::units::RADIANS_PER_DEGREE;
+use crate::{body::Body, units::RADIANS_PER_DEGREE};
 
-/// What products say beside the CRS code, since none stands for the IAU 2000 frame.
+/// What products say beside the CRS code, since none stands for the frame of the products.
 ///
-/// The differences are those of `pck00011.tpc` (IAU 2015, CSPICE N0067) from [`MARS_IAU2000`], sampled
-/// daily over 1999 to 2001: −0.00184° to −0.00136° on the equator, 0.00048° at most between the poles.
-///
-/// [`MARS_IAU2000`]: crate::constants::MARS_IAU2000
-pub(super) const FRAME: &str = "Mars body-fixed, IAU 2000 (W0 = 176.630 deg), areocentric latitude, east longitude; \
-    the CRS code IAU_2015:49900 names the sphere of 3396190 m: east longitudes in IAU 2015 (pck00011) are \
-    0.0014 to 0.0018 deg smaller on the equator in 1999 to 2001 (80 to 110 m), its pole is up to 0.0005 deg away";
+/// For Mars the differences are those of `pck00011.tpc` (IAU 2015, CSPICE N0067) from
+/// [`MARS_IAU2000`](crate::body::MARS_IAU2000), sampled daily over 1999 to 2001: −0.00184° to −0.00136° on the equator,
+/// 0.00048° at most between the poles.
+pub(super) fn frame(body: Body) -> &'static str {
+    &body.names().frame
+}
 
 /// Degrees of an angle in radians.
 pub(super) fn degrees(angle_rad: f64) -> f64 {

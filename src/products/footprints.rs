@@ -2,19 +2,18 @@
 
 use super::{
     SiteProducts,
-    coordinates::{FRAME, bounding_box_deg, degrees, signed_longitude_deg},
+    coordinates::{bounding_box_deg, degrees, frame, signed_longitude_deg},
     geojson,
     geoparquet::{geo_metadata, well_known_binary},
-    gis::{Features, SPHERE_RADIUS_M},
+    gis::Features,
     parquet, pds4_label,
     product::{Content, Declaration, Program, Role, Use, Write},
     table::{Column, Meaning, Table, Unit, column, meanings},
     text_table,
 };
 use crate::{
-    constants::MARS_IAU2000,
     footprints::Footprints,
-    frames::MarsIau2000,
+    frames::BodyFixed,
     geom::ellipsoid::{AreocentricLatitude, spherical_to_xyz_m},
     schema::DocumentSchema,
 };
@@ -53,8 +52,11 @@ pub(super) static PARQUET: Declaration = Declaration {
     write: Write::Site(|path, of| {
         let bounds = bounding_box_deg(&points_deg(of.site));
         let metadata = vec![
-            ("geo", geo_metadata(bounds, None).to_string()),
-            ("frame", FRAME.to_owned()),
+            (
+                "geo",
+                geo_metadata(of.site.config.body, bounds, None).to_string(),
+            ),
+            ("frame", frame(of.site.config.body).to_owned()),
         ];
         parquet::write(path, table(of.site), metadata).map(Some)
     }),
@@ -81,7 +83,7 @@ pub(super) static GEOJSON: Declaration = Declaration {
 /// A footprint with what it is called.
 #[derive(Clone, Copy)]
 pub(super) struct Shot<'a> {
-    footprints: &'a Footprints<MarsIau2000>,
+    footprints: &'a Footprints<BodyFixed>,
     names: &'a dyn ShotNames,
     row: usize,
 }
@@ -113,7 +115,7 @@ impl<'a> Shot<'a> {
 
     /// All of these footprints.
     pub(super) fn all_of(
-        footprints: &'a Footprints<MarsIau2000>,
+        footprints: &'a Footprints<BodyFixed>,
         names: &'a dyn ShotNames,
     ) -> Vec<Self> {
         let shot = |row| Self {
@@ -132,7 +134,7 @@ impl<'a> Shot<'a> {
     }
 
     /// The column of footprints that `of` picks, in the shot's row.
-    pub(super) fn get<T: Copy>(&self, of: fn(&Footprints<MarsIau2000>) -> &Vec<T>) -> T {
+    pub(super) fn get<T: Copy>(&self, of: fn(&Footprints<BodyFixed>) -> &Vec<T>) -> T {
         of(self.footprints)[self.row]
     }
 
@@ -147,7 +149,7 @@ impl<'a> Shot<'a> {
 
     fn areographic_deg(&self) -> f64 {
         let latitude = AreocentricLatitude(self.get(|of| &of.latitude_rad));
-        degrees(latitude.to_areographic(&MARS_IAU2000).0)
+        degrees(latitude.to_areographic(self.footprints.body.model()).0)
     }
 
     fn xyz_m(&self, axis: usize) -> f64 {
@@ -170,12 +172,14 @@ pub(super) fn table<'a>(site: &'a SiteProducts<'a>) -> Table<'a> {
 
 /// The footprints of a site as GIS has them.
 pub(super) fn features<'a>(site: &'a SiteProducts<'a>) -> Features<'a> {
+    let body = site.config.body;
     let point = |shot: &Shot| {
         let [east_deg, north_deg] = shot.point_deg();
-        let height_m = shot.get(|of| &of.radius_crossover_m) - SPHERE_RADIUS_M;
+        let height_m = shot.get(|of| &of.radius_crossover_m) - body.map().radius_m;
         [east_deg, north_deg, height_m]
     };
     Features::of_footprints(
+        body,
         &site.config.site,
         site.utc.iter().max().map_or("", String::as_str),
         Shot::all(site).iter().map(point).collect(),

@@ -17,7 +17,7 @@ use arrow::{
 use serde_json::{Value, json};
 
 use super::{
-    coordinates::FRAME,
+    coordinates::frame,
     error::ProductError,
     footprints::{Shot, ShotNames, columns},
     geojson,
@@ -29,10 +29,11 @@ use super::{
     text_table,
 };
 use crate::{
+    body::Body,
     error::{IoError, Locate, Result},
     files::StagedFile,
     footprints::Footprints,
-    frames::MarsIau2000,
+    frames::BodyFixed,
     pds::archive::WindowLists,
 };
 
@@ -59,7 +60,7 @@ pub enum ShotsFormat {
 /// Some shots of a search, in their order.
 pub struct FoundShots<'a> {
     /// Their columns; `files` has their PEDR files.
-    pub footprints: &'a Footprints<MarsIau2000>,
+    pub footprints: &'a Footprints<BodyFixed>,
     /// The windows that hold them.
     pub windows: &'a WindowLists,
     /// Identifiers of the windows.
@@ -128,7 +129,7 @@ impl ShotsFile {
                 Writer::Csv(writer)
             }
             ShotsFormat::GeoJson => {
-                let features = Features::of_footprints("shots", "", Vec::new(), empty);
+                let features = Features::of_footprints(Body::Mars, "shots", "", Vec::new(), empty);
                 let head = geojson::head(&features).in_file(path)?;
                 let mut writer = BufWriter::new(handle);
                 let written = writer.write_all(head.as_bytes());
@@ -177,7 +178,8 @@ impl ShotsFile {
             Writer::GeoJson(writer) => {
                 let points = points_deg.iter().map(|[east, north]| [*east, *north, 0.0]);
                 let table = shots.table().for_gis();
-                let features = Features::of_footprints("shots", "", points.collect(), table);
+                let features =
+                    Features::of_footprints(Body::Mars, "shots", "", points.collect(), table);
                 let separator = if is_first { "" } else { geojson::SEPARATOR };
                 let separated = writer.write_all(separator.as_bytes());
                 separated.map_err(IoError::on("write")).in_file(path)?;
@@ -198,9 +200,9 @@ impl ShotsFile {
                 let metadata = vec![
                     (
                         "geo",
-                        geo_metadata(self.bounds, Some(covering())).to_string(),
+                        geo_metadata(Body::Mars, self.bounds, Some(covering())).to_string(),
                     ),
-                    ("frame", FRAME.to_owned()),
+                    ("frame", frame(Body::Mars).to_owned()),
                     (SEARCH, search.to_string()),
                 ];
                 writer.finish(metadata).in_file(path)?;

@@ -19,10 +19,13 @@ use super::{
     gis::Features,
     table::{Kind, Meaning, Values},
 };
+use crate::body::Body;
 use crate::error::{IoError, Locate, Result};
 
-/// Name of the CRS in the `crs` member of GeoJSON 2008, which GIS still reads: RFC 7946 knows the Earth only.
-pub(super) const CRS_URN: &str = "urn:ogc:def:crs:IAU:2015:49900";
+/// Name of the CRS of `body` in the `crs` member of GeoJSON 2008, which GIS still reads: RFC 7946 knows the Earth only.
+pub(super) fn crs_urn(body: Body) -> String {
+    format!("urn:ogc:def:crs:IAU:2015:{}", body.map().code)
+}
 
 #[derive(Serialize)]
 pub(super) struct Feature<'a> {
@@ -106,7 +109,10 @@ pub(super) fn schema(title: &str, description: &str, attributes: &[Meaning]) -> 
         }),
         &[],
     );
-    let crs_name = closed(json!({ "name": { "const": CRS_URN } }), &[]);
+    let crs_name = closed(
+        json!({ "name": { "enum": Body::WORDS.map(|(_, body)| crs_urn(body)) } }),
+        &[],
+    );
     let crs = json!({ "type": { "const": "name" }, "properties": crs_name });
     let mut schema = closed(
         json!({
@@ -235,7 +241,7 @@ fn write_lines(path: &Path, head: &str, features: &Features) -> Result<()> {
 
 /// The lines before the first feature.
 pub(super) fn head(features: &Features) -> std::result::Result<String, ProductError> {
-    let crs = json!({ "type": "name", "properties": { "name": CRS_URN } });
+    let crs = json!({ "type": "name", "properties": { "name": crs_urn(features.body) } });
     let mut members = vec![
         ("type", json!("FeatureCollection")),
         ("name", json!(features.name)),

@@ -2,7 +2,7 @@
 
 use serde_json::{Value, json};
 
-use crate::constants::MARS_IAU2000;
+use crate::body::Body;
 
 /// Little-endian well-known binary of a point (OGC 06-103r4, 8.2).
 pub(super) fn well_known_binary(point: [f64; 2]) -> Vec<u8> {
@@ -15,14 +15,18 @@ pub(super) fn well_known_binary(point: [f64; 2]) -> Vec<u8> {
     bytes
 }
 
-/// The `geo` key of a table of points within a box (west, south, east, north, degrees).
+/// The `geo` key of a table of points on `body` within a box (west, south, east, north, degrees).
 ///
 /// * `covering` – where each row has its own box, if it has one
-pub(super) fn geo_metadata(bounds_deg: Option<[f64; 4]>, covering: Option<Value>) -> Value {
+pub(super) fn geo_metadata(
+    body: Body,
+    bounds_deg: Option<[f64; 4]>,
+    covering: Option<Value>,
+) -> Value {
     let mut column = json!({
         "encoding": "WKB",
         "geometry_types": ["Point"],
-        "crs": mars_sphere(),
+        "crs": sphere(body),
     });
     if let Some(covering) = covering {
         column["covering"] = covering;
@@ -37,22 +41,27 @@ pub(super) fn geo_metadata(bounds_deg: Option<[f64; 4]>, covering: Option<Value>
     })
 }
 
-/// PROJJSON of `IAU_2015:49900`, which stands for the sphere; [`FRAME`](super::coordinates::FRAME) says whose longitudes these are. Coordinates are (longitude, latitude) all the same, as GeoParquet says.
+/// PROJJSON of the sphere of `body` in `IAU_2015`; [`frame`](super::coordinates::frame) says whose longitudes these are.
+/// Coordinates are (longitude, latitude) all the same, as GeoParquet says.
 ///
 /// Source: IAU coordinate systems of the OGC Planetary working group, radius of Archinal et al. 2018.
-fn mars_sphere() -> Value {
+fn sphere(body: Body) -> Value {
+    let map = body.map();
     let axis = |name: &str, abbreviation: &str, direction: &str| json!({ "name": name, "abbreviation": abbreviation, "direction": direction, "unit": "degree" });
+    let mut datum = json!({
+        "type": "GeodeticReferenceFrame",
+        "name": map.datum,
+        "ellipsoid": { "name": map.datum, "radius": map.radius_m },
+        "prime_meridian": { "name": "Reference Meridian", "longitude": 0 },
+    });
+    if let Some(anchor) = &map.anchor {
+        datum["anchor"] = json!(anchor);
+    }
     json!({
         "$schema": "https://proj.org/schemas/v0.7/projjson.schema.json",
         "type": "GeographicCRS",
-        "name": "Mars (2015) - Sphere / Ocentric",
-        "datum": {
-            "type": "GeodeticReferenceFrame",
-            "name": "Mars (2015) - Sphere",
-            "anchor": "Viking 1 lander: 47.95137 W",
-            "ellipsoid": { "name": "Mars (2015) - Sphere", "radius": MARS_IAU2000.equatorial_radius_m },
-            "prime_meridian": { "name": "Reference Meridian", "longitude": 0 },
-        },
+        "name": map.crs,
+        "datum": datum,
         "coordinate_system": {
             "subtype": "ellipsoidal",
             "axis": [
@@ -60,6 +69,6 @@ fn mars_sphere() -> Value {
                 axis("Geodetic longitude", "Lon", "east"),
             ],
         },
-        "id": { "authority": "IAU", "code": 49900, "version": 2015 },
+        "id": { "authority": "IAU", "code": map.code, "version": 2015 },
     })
 }

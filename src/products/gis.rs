@@ -1,18 +1,33 @@
 //! Points with attributes, as formats for GIS take them.
 
-use super::{coordinates::FRAME, table::Table};
+use super::{coordinates::frame, table::Table};
+use crate::body::Body;
 
-/// The sphere of the CRS, and of `D_MARS` in Ames Stereo Pipeline, metres.
-pub(super) const SPHERE_RADIUS_M: f64 = 3_396_190.0;
-/// `IAU_2015:49900`; [`FRAME`] says whose longitudes the coordinates are.
-pub(super) const CRS_NAME: &str = "Mars (2015) - Sphere / Ocentric";
-/// The same as text for GIS.
-pub(super) const CRS_WKT: &str = "GEOGCS[\"Mars (2015) - Sphere / Ocentric\",DATUM[\"Mars (2015) - Sphere\",\
-    SPHEROID[\"Mars (2015) - Sphere\",3396190,0]],PRIMEM[\"Reference Meridian\",0],\
-    UNIT[\"degree\",0.0174532925199433],AUTHORITY[\"IAU_2015\",\"49900\"]]";
-/// What the third coordinate is.
-pub(super) const POINT_Z_HEIGHT: &str =
-    "z: radius after the crossover correction minus 3396190 m, metres";
+/// The coordinate system of maps of `body` as text for GIS; [`frame`] says whose longitudes the coordinates are.
+pub(super) fn crs_wkt(body: Body) -> String {
+    let map = body.map();
+    format!(
+        "GEOGCS[\"{}\",DATUM[\"{datum}\",SPHEROID[\"{datum}\",{},0]],PRIMEM[\"Reference Meridian\",0],\
+         UNIT[\"degree\",0.0174532925199433],AUTHORITY[\"IAU_2015\",\"{}\"]]",
+        map.crs,
+        map.radius_m,
+        map.code,
+        datum = map.datum
+    )
+}
+
+/// The coordinate system of maps of `body` as catalogues name it.
+pub(super) fn crs_code(body: Body) -> String {
+    format!("IAU_2015:{}", body.map().code)
+}
+
+/// What the third coordinate of footprints on `body` is.
+pub(super) fn point_z_height(body: Body) -> String {
+    format!(
+        "z: radius after the crossover correction minus {} m, metres",
+        body.map().radius_m
+    )
+}
 
 /// Points with attributes.
 pub(super) struct Features<'a> {
@@ -22,10 +37,12 @@ pub(super) struct Features<'a> {
     pub(super) table: &'static str,
     /// UTC of the newest, for formats that hold a date: a clock would give other bytes each time.
     pub(super) newest_utc: &'a str,
+    /// The body that they lie on.
+    pub(super) body: Body,
     /// Whose longitudes and latitudes these are.
     pub(super) frame: &'static str,
     /// What the third coordinate is.
-    pub(super) z: &'static str,
+    pub(super) z: String,
     /// Longitude (-180..180), areocentric latitude, degrees, and what `z` says.
     pub(super) points: Vec<[f64; 3]>,
     /// A row per point.
@@ -33,8 +50,9 @@ pub(super) struct Features<'a> {
 }
 
 impl<'a> Features<'a> {
-    /// Footprints by longitude, latitude and height.
-    pub(super) const fn of_footprints(
+    /// Footprints on `body` by longitude, latitude and height.
+    pub(super) fn of_footprints(
+        body: Body,
         name: &'a str,
         newest_utc: &'a str,
         points: Vec<[f64; 3]>,
@@ -44,8 +62,9 @@ impl<'a> Features<'a> {
             name,
             table: "footprints",
             newest_utc,
-            frame: FRAME,
-            z: POINT_Z_HEIGHT,
+            body,
+            frame: frame(body),
+            z: point_z_height(body),
             points,
             attributes,
         }
@@ -90,8 +109,9 @@ pub(super) mod tests {
         Features {
             name: "a",
             table: "footprints",
+            body: Body::Mars,
             frame: "a frame",
-            z: POINT_Z_HEIGHT,
+            z: point_z_height(Body::Mars),
             newest_utc: "1999-08-24T14:12:13.000",
             points: vec![[0.1 + 0.2, -0.0, -1950.25], [2.0, -0.0, -1950.25]],
             attributes: Table::new(columns, vec![1.0, 2.0]),

@@ -10,7 +10,7 @@ use super::{
     table::{Column, Table, Unit, column, meanings},
 };
 use crate::{
-    frames::{MarsIau2000, Position},
+    frames::{BodyFixed, Position},
     geom::ellipsoid::Spherical,
     stages::{
         adjust::PointKind,
@@ -37,7 +37,7 @@ pub(super) static TABLE: Declaration = Declaration {
 /// Heights of one point by the images and by the altimeter.
 #[derive(Clone, Copy)]
 struct Heights {
-    ground: Position<MarsIau2000>,
+    ground: Position<BodyFixed>,
     height_m: f64,
     above_m: f64,
     surface_sigma_m: Option<f64>,

@@ -33,7 +33,8 @@ use super::{
     site::{ImageProducts, SiteProducts},
 };
 use crate::{
-    constants::{MARS_IAU2000, NAIF_IAU_MARS, NAIF_MARS, SPACECRAFT},
+    body::Body,
+    constants::SPACECRAFT,
     error::Result,
     frames::{self, Frame, J2000},
     geom::{attitude::continuous_quaternions, pushbroom::Distortion},
@@ -120,11 +121,11 @@ fn isd<'a>(site: &SiteProducts<'a>, image: &ImageProducts<'a>, round: Round) -> 
         starting_ephemeris_time: start_s,
         center_ephemeris_time: start_s + half_s,
         radii: Radii {
-            semimajor: MARS_IAU2000.equatorial_radius_m / METRES_PER_KM,
-            semiminor: MARS_IAU2000.polar_radius_m / METRES_PER_KM,
+            semimajor: times.body.model().equatorial_radius_m / METRES_PER_KM,
+            semiminor: times.body.model().polar_radius_m / METRES_PER_KM,
             unit: "km",
         },
-        body_rotation: body_rotation(tables),
+        body_rotation: body_rotation(times.body, tables),
         instrument_pointing: instrument_pointing(tables, naif),
         naif_keywords: naif_keywords(site, times),
         detector_sample_summing: times.crosstrack_summing,
@@ -190,10 +191,10 @@ fn rotation<To: Frame>(
     }
 }
 
-fn body_rotation(tables: &CameraTables) -> Rotation {
+fn body_rotation(body: Body, tables: &CameraTables) -> Rotation {
     rotation(
         tables,
-        NAIF_IAU_MARS,
+        body.naif().frame,
         &tables.inertial_to_mars,
         &tables.mars_angular_velocity_rad_s,
     )
@@ -256,19 +257,24 @@ fn ends(et_s: &[f64]) -> (f64, f64) {
 /// The keywords that the numbers above come from, under NAIF's names.
 fn naif_keywords(site: &SiteProducts, times: &ImageTimes) -> BTreeMap<String, Keyword> {
     let instrument = &times.instrument;
-    let mars = &MARS_IAU2000;
+    let (model, naif) = (times.body.model(), times.body.naif());
     let [a_km, c_km] =
-        [mars.equatorial_radius_m, mars.polar_radius_m].map(|radius_m| radius_m / METRES_PER_KM);
-    let ra = [mars.pole_ra_deg, mars.pole_ra_deg_per_century, 0.0];
-    let dec = [mars.pole_dec_deg, mars.pole_dec_deg_per_century, 0.0];
-    let meridian = [mars.meridian_deg, mars.meridian_deg_per_day, 0.0];
-    let of_mars = [
-        ("BODY_CODE", Keyword::Code(NAIF_MARS)),
-        ("BODY_FRAME_CODE", Keyword::Code(NAIF_IAU_MARS)),
-        ("BODY499_RADII", Keyword::Numbers([a_km, a_km, c_km])),
-        ("BODY499_POLE_RA", Keyword::Numbers(ra)),
-        ("BODY499_POLE_DEC", Keyword::Numbers(dec)),
-        ("BODY499_PM", Keyword::Numbers(meridian)),
+        [model.equatorial_radius_m, model.polar_radius_m].map(|radius_m| radius_m / METRES_PER_KM);
+    let ra = [model.pole_ra_deg, model.pole_ra_deg_per_century, 0.0];
+    let dec = [model.pole_dec_deg, model.pole_dec_deg_per_century, 0.0];
+    let meridian = [
+        model.meridian_deg,
+        model.meridian_deg_per_day,
+        model.meridian_deg_per_day2,
+    ];
+    let of_body = |key: &str| format!("BODY{}_{key}", naif.body);
+    let of_body = [
+        ("BODY_CODE".to_owned(), Keyword::Code(naif.body)),
+        ("BODY_FRAME_CODE".to_owned(), Keyword::Code(naif.frame)),
+        (of_body("RADII"), Keyword::Numbers([a_km, a_km, c_km])),
+        (of_body("POLE_RA"), Keyword::Numbers(ra)),
+        (of_body("POLE_DEC"), Keyword::Numbers(dec)),
+        (of_body("PM"), Keyword::Numbers(meridian)),
     ];
     let optics = &instrument.optics;
     let bias_s = match times.support {
@@ -284,8 +290,7 @@ fn naif_keywords(site: &SiteProducts, times: &ImageTimes) -> BTreeMap<String, Ke
     ];
     let id = instrument.naif.instrument;
     let of_camera = of_camera.map(|(key, value)| (format!("INS{id}_{key}"), value));
-    let of_mars = of_mars.map(|(key, value)| (key.to_owned(), value));
-    of_mars.into_iter().chain(of_camera).collect()
+    of_body.into_iter().chain(of_camera).collect()
 }
 
 /// Where attitudes come from, a clause for people.

@@ -23,7 +23,7 @@ use crate::{
     error::{Locate, Result},
     files::file_name,
     footprints::Footprints,
-    frames::MarsIau2000,
+    frames::BodyFixed,
     spice::{KernelSet, RequiredCoverage},
     stages::{
         adjust::Adjusted, check_heights::HeightCheck, check_ranges::RangeCheck,
@@ -61,7 +61,7 @@ pub struct PageData<'a> {
     required: Cow<'a, RequiredCoverage>,
     images: Vec<Image<'a>>,
     conversions: Cow<'a, [FileConversion]>,
-    footprints: Cow<'a, Footprints<MarsIau2000>>,
+    footprints: Cow<'a, Footprints<BodyFixed>>,
     utc: Cow<'a, [String]>,
     profiles: Cow<'a, [Profile]>,
     ranges: Cow<'a, RangeCheck>,

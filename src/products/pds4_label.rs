@@ -11,7 +11,7 @@ use std::{
 use md5::{Digest as _, Md5};
 
 use super::{
-    coordinates::FRAME,
+    coordinates::frame,
     files::{open, write_text},
     site::SiteProducts,
     table::{Kind, Meaning, Table},
@@ -161,7 +161,7 @@ fn label(file: &Described, table: &Table, site: &SiteProducts) -> String {
         header_bytes = file.header_bytes,
         md5 = file.md5,
         lines = rows + 1,
-        frame = escaped(FRAME),
+        frame = escaped(frame(site.config.body)),
     )
 }
 
@@ -171,21 +171,33 @@ fn identification(site: &SiteProducts) -> String {
         "  <Identification_Area>
     <logical_identifier>urn:areograph:{spacecraft}:footprints:{}</logical_identifier>
     <version_id>1.0</version_id>
-    <title>MOLA footprints of the site {} in IAU 2000</title>
+    <title>{altimeter} footprints of the site {} in {frame}</title>
     <information_model_version>1.21.0.0</information_model_version>
     <product_class>Product_Observational</product_class>
   </Identification_Area>
 ",
         escaped(&identifier),
         escaped(&site.config.site),
-        spacecraft = SPACECRAFT.id,
+        altimeter = escaped(&site.config.altimeter.name),
+        frame = site.config.body.names().short_frame,
+        spacecraft = if site.config.shots.is_empty() {
+            &SPACECRAFT.id
+        } else {
+            &site.config.altimeter.id
+        },
     )
 }
 
 /// When, with what, and of what the shots are.
 fn observation(site: &SiteProducts) -> String {
     let utc = |text: Option<&String>| text.map_or(String::new(), |utc| format!("{utc}Z"));
-    let mission = &SPACECRAFT.full_name;
+    let mission = if site.config.shots.is_empty() {
+        SPACECRAFT.full_name.clone()
+    } else {
+        site.spacecraft()
+    };
+    let mission_id = mission.to_lowercase().replace(' ', "_");
+    let body = site.config.body.names();
     let altimeter = escaped(&site.config.altimeter.full_name);
     format!(
         "  <Observation_Area>
@@ -201,7 +213,7 @@ fn observation(site: &SiteProducts) -> String {
       <name>{mission}</name>
       <type>Mission</type>
       <Internal_Reference>
-        <lid_reference>urn:nasa:pds:context:investigation:mission.mars_global_surveyor</lid_reference>
+        <lid_reference>urn:nasa:pds:context:investigation:mission.{mission_id}</lid_reference>
         <reference_type>data_to_investigation</reference_type>
       </Internal_Reference>
     </Investigation_Area>
@@ -216,12 +228,14 @@ fn observation(site: &SiteProducts) -> String {
       </Observing_System_Component>
     </Observing_System>
     <Target_Identification>
-      <name>Mars</name>
-      <type>Planet</type>
+      <name>{target}</name>
+      <type>{class}</type>
     </Target_Identification>
   </Observation_Area>
 ",
         utc(site.utc.iter().min()),
         utc(site.utc.iter().max()),
+        target = body.name,
+        class = body.class,
     )
 }

@@ -12,7 +12,7 @@ use super::{
     parquet,
     table::Table,
 };
-use crate::{error::Result, footprints::Footprints, frames::MarsIau2000};
+use crate::{error::Result, footprints::Footprints, frames::BodyFixed};
 
 /// What is asked of a shot, in the order of the answer.
 #[derive(Debug, Clone)]
@@ -72,7 +72,7 @@ impl ShotColumns {
     ///
     /// # Errors
     /// A number that is not finite.
-    pub fn batch(&self, footprints: &Footprints<MarsIau2000>) -> Result<RecordBatch> {
+    pub fn batch(&self, footprints: &Footprints<BodyFixed>) -> Result<RecordBatch> {
         let rows = footprints.len();
         if self.places.is_empty() {
             let rows = RecordBatchOptions::new().with_row_count(Some(rows));

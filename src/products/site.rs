@@ -5,14 +5,15 @@ use std::{collections::BTreeMap, path::Path};
 use super::error::ProductError;
 use crate::{
     config::{SiteConfig, UsedBias},
+    constants::SPACECRAFT,
     error::Result,
     footprints::Footprints,
-    frames::MarsIau2000,
+    frames::BodyFixed,
     spice::{KernelSet, RequiredCoverage},
     stages::{
         adjust::{Adjusted, CorrectedPoint, PointKind},
         check_heights::HeightCheck,
-        check_ranges::RangeCheck,
+        check_ranges::{ProfileRanges, RangeCheck},
         compare_pairs::PairComparison,
         convert_datum::FileConversion,
         describe_kernels::KernelLine,
@@ -45,7 +46,7 @@ pub struct SiteProducts<'a> {
     /// What the conversion of the datum did, in the order of the footprints' files.
     pub conversions: &'a [FileConversion],
     /// Footprints in IAU 2000.
-    pub footprints: &'a Footprints<MarsIau2000>,
+    pub footprints: &'a Footprints<BodyFixed>,
     /// UTC of every footprint's corrected time, ISO 8601, without a zone letter.
     pub utc: &'a [String],
     /// Profiles in order.
@@ -161,9 +162,36 @@ impl<'a> SiteProducts<'a> {
         ids.join(";")
     }
 
+    /// The spacecraft of footprints and images: that of the program, and those that support data name; where nothing names
+    /// any, the altimeter.
+    pub(super) fn spacecraft(&self) -> String {
+        let supports = || self.images.iter().map(|image| &image.times.support);
+        // Tables of shots do not name theirs.
+        let searched = self.config.shots.is_empty() && !self.footprints.is_empty();
+        let own = searched || supports().any(Option::is_none);
+        let mut names: Vec<&str> = Vec::new();
+        names.extend(own.then_some(&*SPACECRAFT.full_name));
+        for support in supports().flatten() {
+            let is_it = |name: &&str| name.eq_ignore_ascii_case(&support.platform);
+            if !names.iter().any(is_it) {
+                names.push(&support.platform);
+            }
+        }
+        if names.is_empty() {
+            names.push(&self.config.altimeter.full_name);
+        }
+        names.join(", ")
+    }
+
     /// Lengths that must agree.
     pub(super) fn check(&self) -> Result<()> {
-        let shots = self.profiles.iter().map(|profile| profile.rows.len()).sum();
+        // All, or of tables those that have a spacecraft besides their own.
+        let shots = self
+            .ranges
+            .profiles
+            .iter()
+            .map(ProfileRanges::measured)
+            .sum();
         let lengths = [
             (
                 "datum decisions of PEDR files",

@@ -71,7 +71,7 @@ fn biases(site: &SiteProducts) -> String {
     table.row(
         true,
         [
-            "MOLA clock".into(),
+            format!("{} clock", site.config.altimeter.name).into(),
             signed(clock.correction_s(), 3).into(),
             format!("{scope}; {:.3} s, {sign}", clock.bias_s).into(),
             (&clock.source).into(),
@@ -80,27 +80,37 @@ fn biases(site: &SiteProducts) -> String {
     table.finish()
 }
 
+const OF_PEDR: [Column; 8] = datum_columns("PEDR file");
+const OF_TABLES: [Column; 8] = datum_columns("table");
+
+const fn datum_columns(file: &'static str) -> [Column; 8] {
+    [
+        Column::Text(file),
+        Column::Text("version"),
+        Column::Text("datum of the file"),
+        Column::Number("W0, degrees"),
+        Column::Text("done"),
+        Column::Number("shots"),
+        Column::Number("mean shift, m"),
+        Column::Number("mean change of longitude, degrees"),
+    ]
+}
+
 fn datum(site: &SiteProducts) -> String {
     if site.footprints.files.is_empty() {
         return String::new();
     }
     let decided = match site.config.pedr.datum {
+        _ if !site.config.shots.is_empty() => "by the configuration of the tables".to_owned(),
         DatumChoice::Auto => "by version letter and label".to_owned(),
         DatumChoice::Stated(datum) => format!("stated in the configuration: {datum}"),
     };
-    let mut table = Table::new(
-        "Datum of the PEDR coordinates",
-        &[
-            Column::Text("PEDR file"),
-            Column::Text("version"),
-            Column::Text("datum of the file"),
-            Column::Number("W0, degrees"),
-            Column::Text("done"),
-            Column::Number("shots"),
-            Column::Number("mean shift, m"),
-            Column::Number("mean change of longitude, degrees"),
-        ],
-    );
+    let (sort, columns) = if site.config.shots.is_empty() {
+        ("PEDR", &OF_PEDR)
+    } else {
+        (&*site.config.altimeter.name, &OF_TABLES)
+    };
+    let mut table = Table::new(&format!("Datum of the {sort} coordinates"), columns);
     for (file, conversion) in site.footprints.files.iter().zip(site.conversions) {
         let moved = conversion.shift_m.max > 0.0;
         let number = |text: String| if moved { text } else { "–".to_owned() };
@@ -114,9 +124,9 @@ fn datum(site: &SiteProducts) -> String {
                 file.datum.to_string().into(),
                 format!("{:.3}", file.datum.model().meridian_deg).into(),
                 if moved {
-                    "through J2000 to IAU 2000"
+                    format!("through J2000 to {}", site.config.body.names().short_frame)
                 } else {
-                    "left alone"
+                    "left alone".to_owned()
                 }
                 .into(),
                 whole(conversion.shots).into(),
@@ -126,8 +136,9 @@ fn datum(site: &SiteProducts) -> String {
         );
     }
     let words = format!(
-        "Decided {decided}. Products are in IAU 2000, W0 = {:.3}°.",
-        crate::constants::MARS_IAU2000.meridian_deg
+        "Decided {decided}. Products are in {}, W0 = {:.3}°.",
+        site.config.body.names().short_frame,
+        site.config.body.model().meridian_deg
     );
     table.finish() + &paragraph(&words)
 }

@@ -27,7 +27,6 @@ use super::{
     section::Section,
 };
 use crate::{
-    constants::MARS_IAU2000,
     error::Result,
     geom::{ellipsoid::Spherical, map_projection::MapProjection},
     products::SiteProducts,
@@ -151,8 +150,10 @@ impl Sheet {
             .flat_map(|outline| outline.ring.iter().copied())
             .chain(shots.iter().map(|shot| shot.place_rad))
             .collect();
-        let map =
-            MapProjection::of_points(points.iter().copied(), MARS_IAU2000.equatorial_radius_m);
+        let map = MapProjection::of_points(
+            points.iter().copied(),
+            site.config.body.model().equatorial_radius_m,
+        );
         let places = points
             .iter()
             .filter_map(|point| map.project(point.0, point.1));

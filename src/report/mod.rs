@@ -55,6 +55,7 @@ mod summary;
 mod support_data;
 mod timeline;
 mod uncertainty;
+mod words;
 
 use crate::{error::Result, products::SiteProducts};
 

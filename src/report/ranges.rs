@@ -18,7 +18,7 @@ pub(super) use plots::{many, plotted};
 pub(super) const SECTION: Section = Section {
     title: "Range check",
     anchor: "range-check",
-    appears: |site| !site.config.pedr.files.is_empty(),
+    appears: |site| site.config.has_shots(),
     write,
 };
 

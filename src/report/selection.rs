@@ -6,6 +6,7 @@ use super::{
     section::Section,
 };
 use crate::{
+    body::Body,
     config::WindowConfig,
     geom::window::WindowShape,
     products::SiteProducts,
@@ -15,19 +16,27 @@ use crate::{
 pub(super) const SECTION: Section = Section {
     title: "Selection of shots",
     anchor: "selection-of-shots",
-    appears: |site| !site.config.pedr.files.is_empty(),
+    appears: |site| site.config.has_shots(),
     write: |site| Ok(write(site)),
 };
 
+const AT_MARS: [Column; 3] = columns("outline (IAU 2000, areocentric, east)");
+const AT_THE_MOON: [Column; 3] = columns("outline (mean Earth/polar axis, east)");
+
+const fn columns(outline: &'static str) -> [Column; 3] {
+    [
+        Column::Text("window"),
+        Column::Text(outline),
+        Column::Number("shots"),
+    ]
+}
+
 fn write(site: &SiteProducts) -> String {
-    let mut windows = Table::new(
-        "Windows",
-        &[
-            Column::Text("window"),
-            Column::Text("outline (IAU 2000, areocentric, east)"),
-            Column::Number("shots"),
-        ],
-    );
+    let columns = match site.config.body {
+        Body::Mars => &AT_MARS,
+        Body::Moon => &AT_THE_MOON,
+    };
+    let mut windows = Table::new("Windows", columns);
     for (bit, window) in site.config.windows.iter().enumerate() {
         let masks = site.footprints.windows.iter();
         let shots = masks.filter(|mask| **mask >> bit & 1 == 1).count();
@@ -44,6 +53,9 @@ fn write(site: &SiteProducts) -> String {
 }
 
 fn filter(site: &SiteProducts) -> String {
+    if !site.config.shots.is_empty() {
+        return "Shots of tables are kept where they lie in a window; rows that repeat one count once.".to_owned();
+    }
     let filter = &site.config.pedr.filter;
     let join = |values: Vec<String>| values.join(" or ");
     format!(

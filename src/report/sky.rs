@@ -13,10 +13,7 @@ use super::{
 };
 use crate::{
     error::Result,
-    geom::{
-        ellipsoid::{local_axes, spherical_to_xyz_m},
-        surface::LaserSurface,
-    },
+    geom::ellipsoid::{local_axes, on_ellipsoid_m, spherical_to_xyz_m},
     products::{ImageProducts, SiteProducts},
     units::RADIANS_PER_DEGREE,
 };
@@ -75,7 +72,7 @@ fn seen<'a>(image: &ImageProducts<'a>) -> Option<Seen<'a>> {
     let sample = samples.get(samples.len() / 2)?;
     let ground = sample.boresight.as_ref()?;
     let up = spherical_to_xyz_m(ground.longitude_rad, ground.latitude_rad, 1.0);
-    let ground_m = LaserSurface::on_ellipsoid_m(&up);
+    let ground_m = on_ellipsoid_m(image.times.body.model(), &up);
     Some(Seen {
         image: &image.times.id,
         azimuth_rad: azimuth_rad(&ground_m, &sample.position.xyz_m),

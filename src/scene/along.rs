@@ -22,9 +22,9 @@ use super::{
     truth::{KeptShot, ProfileTruth, Truth},
 };
 use crate::{
+    body::Datum,
     config::{built_in_instruments, usual_altimeter, usual_instrument},
     error::{IoError, Locate, Result},
-    frames::MarsDatum,
     geom::ellipsoid::Spherical,
     pds::moc::read_label,
     spice::{KernelSet, Session},
@@ -83,7 +83,7 @@ pub fn write_scene_along(
     let request = PedrRequest {
         name: PEDR_NAME,
         tags: &tags,
-        datum: MarsDatum::Iau2000,
+        datum: Datum::Iau2000,
         orbit: &|_| ORBIT,
         seed: options.seed,
         errors: LaserErrors {

@@ -9,13 +9,14 @@ use super::{
     plan::{Look, PlannedImage},
 };
 use crate::{
+    body::Body,
+    body::MARS_IAU2000,
     config::usual_instrument,
-    constants::MARS_IAU2000,
     error::Result,
-    frames::{MarsIau2000, Position},
+    frames::{BodyFixed, Position},
     geom::{
+        body_rotation::body_matrix,
         ellipsoid::{Spherical, ray_meets_ellipsoid},
-        mars_rotation::mars_matrix,
     },
     time::{Et, Interval},
     units::{RADIANS_PER_DEGREE, wrap_pi},
@@ -96,7 +97,7 @@ impl Arc {
     /// Matrix from the camera to Mars (IAU 2000) at `et`, as the kernels tell it.
     pub(super) fn camera_to_mars(&self, et: Et) -> Matrix3<f64> {
         let j2000_to_camera = bus_to_camera(usual_instrument()) * self.attitude.j2000_to_bus(et);
-        mars_matrix(&MARS_IAU2000, et) * j2000_to_camera.transpose()
+        body_matrix(&MARS_IAU2000, et) * j2000_to_camera.transpose()
     }
 
     /// The times that the kernels cover.
@@ -125,11 +126,11 @@ impl Geometry {
     /// What is left to reach: longitude, latitude and emission (or roll, for nadir), radians.
     fn miss(self, image: &PlannedImage, middle: Et) -> Option<Vector3<f64>> {
         let state: OrbitState = self.orbit(middle).state(middle);
-        let mars = mars_matrix(&MARS_IAU2000, middle);
+        let mars = body_matrix(&MARS_IAU2000, middle);
         let camera = bus_to_camera(usual_instrument()) * rolled_attitude(&state, self.0.z);
-        let spacecraft = Position::<MarsIau2000>::new(mars * state.position_m);
+        let spacecraft = Position::<BodyFixed>::new(mars * state.position_m);
         let boresight = mars * camera.row(2).transpose();
-        let hit = ray_meets_ellipsoid(&spacecraft, &boresight)?;
+        let hit = ray_meets_ellipsoid(Body::Mars.model(), &spacecraft, &boresight)?;
         let ground = Spherical::from_xyz_m(&hit.xyz_m);
         let angle_missed = match image.look {
             Look::Nadir => self.0.z,
@@ -195,10 +196,11 @@ mod tests {
             let arc = Arc::new(image, Et::from_seconds(3.9e7), 1_200.0).unwrap();
             let middle = arc.exposed.start.plus(arc.exposed.duration_s() / 2.0);
             let spacecraft =
-                mars_matrix(&MARS_IAU2000, middle) * arc.orbit.state(middle).position_m;
+                body_matrix(&MARS_IAU2000, middle) * arc.orbit.state(middle).position_m;
             let boresight = arc.camera_to_mars(middle) * Vector3::z();
             let hit =
-                ray_meets_ellipsoid::<MarsIau2000>(&Position::new(spacecraft), &boresight).unwrap();
+                ray_meets_ellipsoid(Body::Mars.model(), &Position::new(spacecraft), &boresight)
+                    .unwrap();
             // 1e-9 of the radius is 3 mm on the ground; the attitude turns evenly between its samples.
             assert!(
                 (hit.xyz_m.normalize() - image.site.direction()).norm() < 3e-8,
@@ -216,7 +218,7 @@ mod tests {
                 image.id
             );
             let velocity =
-                mars_matrix(&MARS_IAU2000, middle) * arc.orbit.state(middle).velocity_m_s;
+                body_matrix(&MARS_IAU2000, middle) * arc.orbit.state(middle).velocity_m_s;
             assert!(velocity.z > 3e3, "{} flies north", image.id);
             if let Look::Roll { east, .. } = image.look {
                 let west_of_site = spacecraft.cross(&hit.xyz_m).z > 0.0;

@@ -21,9 +21,9 @@ use super::{
     terrain::Terrain,
 };
 use crate::{
+    body::Datum,
     config::usual_altimeter,
     error::{IoError, Locate, Result},
-    frames::MarsDatum,
     pds::pedr::{LabelInfo, PedrWriter, RECORD_BYTES},
     time::{Et, Interval},
 };
@@ -257,7 +257,7 @@ impl PlannedFile {
         let label = LabelInfo {
             product_id: self.name.to_uppercase(),
             software_version: 7.25,
-            datum: MarsDatum::Iau2000,
+            datum: Datum::Iau2000,
             note: NOTE.to_owned(),
         };
         let mut writer = PedrWriter::create(&path, &label)?;

@@ -19,12 +19,12 @@ use super::{
     terrain::Terrain,
 };
 use crate::{
+    body::MARS_IAU2000,
     config::usual_altimeter,
-    constants::MARS_IAU2000,
     error::{Error, Result},
     geom::{
+        body_rotation::body_matrix,
         ellipsoid::{Spherical, spherical_to_xyz_m},
-        mars_rotation::mars_matrix,
         orbit_axes::radial_along_cross,
     },
     pds::pedr::{FrameValues, Record, SHOTS},
@@ -117,7 +117,7 @@ impl Look {
     /// The look at `et`; of a frame without attitude straight down.
     fn at(orbit: &Orbit, et: Et, revolution: u32, has_attitude: bool) -> Self {
         let state = orbit.state(et);
-        let mars = mars_matrix(&MARS_IAU2000, et);
+        let mars = body_matrix(&MARS_IAU2000, et);
         let axes = radial_along_cross(&state.position_m, &state.velocity_m_s);
         let look = if has_attitude {
             let roll = roll_rad(orbit, et, revolution).tan();
@@ -219,7 +219,7 @@ fn frame_values(
         let direction = look.at_radius_m(mid_radius_m).normalize();
         terrain.areoid_radius_m(&direction)
     };
-    let sun = mars_matrix(&MARS_IAU2000, et) * -mars_from_sun_m(et);
+    let sun = body_matrix(&MARS_IAU2000, et) * -mars_from_sun_m(et);
     let distance_m = (middle.spacecraft_m - middle.at_radius_m(mid_radius_m)).norm();
     if !distance_m.is_finite() {
         let et_s = et.seconds();

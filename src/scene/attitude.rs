@@ -6,7 +6,7 @@ use super::orbit::{Orbit, OrbitState};
 use crate::{
     geom::{
         attitude::{self, matrix_of_rotation_vector, rotation_vector},
-        mars_rotation::frame_rotation_1,
+        body_rotation::frame_rotation_1,
     },
     instruments::Instrument,
     time::{Et, Interval},

@@ -11,10 +11,10 @@ use super::{
     terrain::REFERENCE_RADIUS_M,
 };
 use crate::{
-    constants::MARS_IAU2000,
+    body::MARS_IAU2000,
     error::Result,
     geom::{
-        attitude::matrix_of_rotation_vector, mars_rotation::mars_matrix,
+        attitude::matrix_of_rotation_vector, body_rotation::body_matrix,
         orbit_axes::radial_along_cross, pushbroom::Pose,
     },
     instruments::Instrument,
@@ -226,7 +226,7 @@ impl DayErrors {
 fn orbit_axes(arc: &Arc) -> Matrix3<f64> {
     let middle = arc.exposed.start.plus(0.5 * arc.exposed.duration_s());
     let state = arc.orbit.state(middle);
-    mars_matrix(&MARS_IAU2000, middle) * radial_along_cross(&state.position_m, &state.velocity_m_s)
+    body_matrix(&MARS_IAU2000, middle) * radial_along_cross(&state.position_m, &state.velocity_m_s)
 }
 
 /// The day of an image as it was flown. The kernels tell the arc, the truth is the arc with the errors.
@@ -241,7 +241,7 @@ pub(super) struct Flown {
 impl Flown {
     /// True place of the bus, IAU 2000, metres.
     pub(super) fn bus_position_m(&self, et: Et) -> Vector3<f64> {
-        mars_matrix(&MARS_IAU2000, et) * self.arc.orbit.state(et).position_m
+        body_matrix(&MARS_IAU2000, et) * self.arc.orbit.state(et).position_m
             + self.errors.bus_position_m
     }
 
@@ -267,7 +267,7 @@ impl Flown {
         let j2000_to_camera = bus_to_camera(camera) * self.j2000_to_bus(exposure);
         Pose {
             position_m: self.bus_position_m(left),
-            mars_to_camera: j2000_to_camera * mars_matrix(&MARS_IAU2000, left).transpose(),
+            mars_to_camera: j2000_to_camera * body_matrix(&MARS_IAU2000, left).transpose(),
         }
     }
 }
@@ -421,7 +421,7 @@ mod tests {
                 // Of the true orbit alone: the demo has no errors of the bus.
                 let there_m = |light_time_s: f64| {
                     let left = exposure.plus(-light_time_s);
-                    mars_matrix(&MARS_IAU2000, left).tr_mul(&ground_m)
+                    body_matrix(&MARS_IAU2000, left).tr_mul(&ground_m)
                 };
                 let here = orbit(exposure);
                 let mut late_s = 0.0;

@@ -12,13 +12,12 @@ use super::{
     terrain::Terrain,
 };
 use crate::{
+    body::{Datum, MARS_IAU2000},
     config::usual_altimeter,
-    constants::MARS_IAU2000,
     error::Result,
-    frames::MarsDatum,
     geom::{
+        body_rotation::body_matrix,
         ellipsoid::{Spherical, spherical_to_xyz_m},
-        mars_rotation::mars_matrix,
     },
     pds::pedr::{FrameValues, SHOTS},
     time::Et,
@@ -102,7 +101,7 @@ pub(super) struct FrameRequest<'a> {
     /// Orbit number.
     pub orbit: u32,
     /// Datum of the file's coordinates.
-    pub datum: MarsDatum,
+    pub datum: Datum,
     /// Seed of clouds, missing returns and noise.
     pub seed: u64,
     /// Errors of the shots.
@@ -142,10 +141,10 @@ struct Look {
 
 impl Look {
     fn new(beam: &Beam, direction: &Vector3<f64>, et: Et, request: &FrameRequest<'_>) -> Self {
-        let mars = mars_matrix(&MARS_IAU2000, et);
+        let mars = body_matrix(&MARS_IAU2000, et);
         let to_file = match request.datum {
-            MarsDatum::Iau2000 => Matrix3::identity(),
-            older => mars_matrix(older.model(), et) * mars.transpose(),
+            Datum::Iau2000 => Matrix3::identity(),
+            older => body_matrix(older.model(), et) * mars.transpose(),
         };
         let orbit_m = mars * beam.spacecraft_m;
         Self {
@@ -260,7 +259,7 @@ fn frame_values(
         let direction = spherical_to_xyz_m(place.longitude_rad, place.latitude_rad, 1.0);
         terrain.areoid_radius_m(&look.ground_to_file.tr_mul(&direction))
     });
-    let sun = mars_matrix(&MARS_IAU2000, middle.et) * -mars_from_sun_m(middle.et);
+    let sun = body_matrix(&MARS_IAU2000, middle.et) * -mars_from_sun_m(middle.et);
     let frame_number = request.index;
     Ok(FrameValues {
         time_s: request.tag.seconds(),

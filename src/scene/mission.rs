@@ -25,9 +25,9 @@ use super::{
     },
 };
 use crate::{
-    constants::MARS_IAU2000,
+    body::MARS_IAU2000,
     error::{IoError, Locate, Result},
-    geom::{ellipsoid::Spherical, mars_rotation::mars_matrix},
+    geom::{body_rotation::body_matrix, ellipsoid::Spherical},
     pds::ties::ties_table,
 };
 
@@ -261,7 +261,7 @@ fn write_day(
         let mean_m = mean(kept.iter().map(|kept| {
             let KeptShot { truth, .. } = kept;
             let rival_m =
-                mars_matrix(&MARS_IAU2000, truth.et) * version.position_m(&arc.orbit, truth.et);
+                body_matrix(&MARS_IAU2000, truth.et) * version.position_m(&arc.orbit, truth.et);
             truth.range_m - (rival_m - truth.told_ground_m).norm()
         }));
         let difference = OrbitDifference {

@@ -3,8 +3,8 @@
 use nalgebra::{Matrix3, Vector3};
 
 use crate::{
-    constants::MARS_IAU2000,
-    geom::mars_rotation::{frame_rotation_1, frame_rotation_3, mars_matrix},
+    body::MARS_IAU2000,
+    geom::body_rotation::{body_matrix, frame_rotation_1, frame_rotation_3},
     time::Et,
     units::RADIANS_PER_DEGREE,
 };
@@ -44,7 +44,7 @@ impl Orbit {
     /// The mapping orbit whose ascending node lies at the east longitude `node_rad` (IAU 2000) at
     /// `epoch`, with the spacecraft at `mean_anomaly_rad` from its southernmost point.
     pub(super) fn new(epoch: Et, node_rad: f64, mean_anomaly_rad: f64) -> Self {
-        let equator_to_j2000 = mars_matrix(&MARS_IAU2000, epoch).transpose();
+        let equator_to_j2000 = body_matrix(&MARS_IAU2000, epoch).transpose();
         let perifocal_to_equator = frame_rotation_3(-node_rad)
             * frame_rotation_1(-INCLINATION_RAD)
             * frame_rotation_3(-ARGUMENT_OF_PERIAPSIS_RAD);
@@ -142,7 +142,7 @@ mod tests {
         // A quarter turn past the southernmost point, and slightly more for the eccentricity.
         let epoch = Et::from_seconds(3.7e7);
         let orbit = Orbit::new(epoch, 0.5, 90.0 * RADIANS_PER_DEGREE - 2.0 * 0.0080);
-        let fixed = mars_matrix(&MARS_IAU2000, epoch);
+        let fixed = body_matrix(&MARS_IAU2000, epoch);
         let state = orbit.state(epoch);
         let position = fixed * state.position_m;
         let velocity = fixed * state.velocity_m_s;

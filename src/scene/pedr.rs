@@ -13,9 +13,9 @@ use super::{
     truth::{FileTruth, KeptShot},
 };
 use crate::{
+    body::Datum,
     config::usual_altimeter,
     error::{Locate, Result},
-    frames::MarsDatum,
     pds::pedr::{LABEL_RECORDS, LabelInfo, PedrWriter, Record},
     time::{Et, Interval},
     units::RADIANS_PER_DEGREE,
@@ -38,7 +38,7 @@ pub(super) struct PedrRequest<'a> {
     /// Mid-points of the frames as the file tags them.
     pub tags: &'a [Et],
     /// Datum of the coordinates.
-    pub datum: MarsDatum,
+    pub datum: Datum,
     /// Orbit number at a true time.
     pub orbit: &'a (dyn Fn(Et) -> u32 + Sync),
     /// Seed of clouds, missing returns and noise.

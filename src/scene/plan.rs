@@ -1,8 +1,8 @@
 //! What the invented mission does: the six images of Shan et al. 2005 and the days around them.
 
 use crate::{
+    body::Datum,
     config::usual_instrument,
-    frames::MarsDatum,
     time::{Et, Interval},
     units::{RADIANS_PER_DEGREE, SECONDS_PER_MS},
 };
@@ -130,11 +130,11 @@ impl PlannedImage {
 
     /// Datum of the day's PEDR file: version L is IAU 2000, older ones IAU 1991.
     #[must_use]
-    pub fn datum(&self) -> MarsDatum {
+    pub fn datum(&self) -> Datum {
         if self.pedr_version == 'L' {
-            MarsDatum::Iau2000
+            Datum::Iau2000
         } else {
-            MarsDatum::Iau1991
+            Datum::Iau1991
         }
     }
 

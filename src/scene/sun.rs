@@ -4,7 +4,7 @@ use nalgebra::Vector3;
 
 use super::orbit::{OrbitState, eccentric_anomaly};
 use crate::{
-    geom::mars_rotation::{frame_rotation_1, frame_rotation_3},
+    geom::body_rotation::{frame_rotation_1, frame_rotation_3},
     time::Et,
     units::{RADIANS_PER_DEGREE, SECONDS_PER_DAY},
 };

@@ -9,12 +9,13 @@ use std::collections::HashMap;
 
 use nalgebra::Vector3;
 
+use crate::body::MARS_IAU2000;
+
 use super::{
     error_sources::Relief,
     random::Random,
     roughness::{Bowl, RoughPatch},
 };
-use crate::constants::MARS_IAU2000;
 
 /// Radius of the sphere on which lengths along the ground are counted, metres.
 pub(super) const REFERENCE_RADIUS_M: f64 = 3_390_000.0;

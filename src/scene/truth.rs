@@ -13,11 +13,11 @@ use super::{
     versions::Version,
 };
 use crate::{
+    body::MARS_IAU2000,
     config::{usual_altimeter, usual_instrument},
-    constants::MARS_IAU2000,
     geom::{
         attitude::{make_continuous, spice_quaternion},
-        mars_rotation::mars_matrix,
+        body_rotation::body_matrix,
         pushbroom::Pose,
     },
     time::Et,
@@ -293,7 +293,7 @@ impl ImageTruth {
             .map(|index| arc.exposed.start.plus(step_s * f64::from(index)))
             .collect();
         let pose = |et: Et| Pose {
-            position_m: mars_matrix(&MARS_IAU2000, et) * arc.orbit.state(et).position_m,
+            position_m: body_matrix(&MARS_IAU2000, et) * arc.orbit.state(et).position_m,
             mars_to_camera: arc.camera_to_mars(et).transpose(),
         };
         let poses: Vec<(Et, Pose)> = epochs.iter().map(|et| (*et, pose(*et))).collect();

@@ -17,8 +17,9 @@ use super::{
     text_kernel::{self, Assignment, values_of},
 };
 use crate::{
+    body::MARS_IAU2000,
     config::built_in_instruments,
-    constants::{MARS_IAU2000, SPACECRAFT},
+    constants::SPACECRAFT,
     error::{Error, IoError, Kind, Locate, Result},
     files::{InputFiles, file_name},
     kernel_source::{CkQuality, KernelSelection},

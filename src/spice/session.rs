@@ -14,6 +14,7 @@ use super::{
     origin::{self, Origin, all_finite},
 };
 use crate::{
+    body::Body,
     constants::{NAIF_MARS, NAIF_SOLAR_SYSTEM_BARYCENTRE, NAIF_SUN, SPACECRAFT},
     error::{Error, Locate, Result},
     frames::{CameraFrame, J2000, Position, Rotation, SpacecraftBus},
@@ -310,14 +311,14 @@ impl Session {
         Ok(Rotation::new(matrix(&rows), et))
     }
 
-    /// Matrix from J2000 to the `IAU_MARS` of the loaded planetary constants, to tell which report they follow.
+    /// Matrix from J2000 to the frame of `body` in the loaded planetary constants, to tell which report they follow.
     ///
     /// # Errors
-    /// [`SpiceError::Spice`] when no planetary constants are loaded.
-    pub fn mars_matrix(&self, et: Et) -> Result<Matrix3<f64>> {
-        let rows = self
-            .cspice
-            .frame_matrix(c"J2000", c"IAU_MARS", et.seconds())?;
+    /// [`SpiceError::Spice`] when no planetary constants of the body are loaded.
+    pub fn body_matrix(&self, body: Body, et: Et) -> Result<Matrix3<f64>> {
+        // The name is one of the program's own.
+        let frame = CString::new(&*body.naif().pck_frame).unwrap_or_default();
+        let rows = self.cspice.frame_matrix(c"J2000", &frame, et.seconds())?;
         Ok(matrix(&rows))
     }
 }

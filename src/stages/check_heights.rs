@@ -21,7 +21,7 @@ use crate::{
     config::MolaSurfaceConfig,
     error::Result,
     footprints::Footprints,
-    frames::{MarsIau2000, Position},
+    frames::{BodyFixed, Position},
     geom::{
         statistics::Summary,
         surface::{LaserSurface, SurfaceHeights, SurfaceOptions},
@@ -74,8 +74,8 @@ pub struct TieHeight {
     /// Index of the tie point.
     pub tie: usize,
     /// Where it lies.
-    pub ground: Position<MarsIau2000>,
-    /// Its height above the ellipsoid of IAU 2000 along the radius, metres.
+    pub ground: Position<BodyFixed>,
+    /// Its height above the ellipsoid along the radius, metres.
     pub height_m: f64,
     /// Height of the surface there, metres.
     pub surface_m: f64,
@@ -142,7 +142,7 @@ impl Input for CheckedPoints<'_> {
 
 impl CheckedPoints<'_> {
     /// Every point with the index of its tie point.
-    fn all(&self) -> Result<Vec<(usize, Position<MarsIau2000>)>> {
+    fn all(&self) -> Result<Vec<(usize, Position<BodyFixed>)>> {
         Ok(match self {
             Self::Intersected(points) => {
                 let points = points.value()?.points.iter();
@@ -184,11 +184,12 @@ impl Stage for CheckHeights<'_> {
     }
 
     fn run(&self, _stop: &AtomicBool) -> Result<HeightCheck> {
+        let footprints = &self.converted.value()?.footprints;
         Ok(check_heights(
             &self.points.all()?,
-            &self.converted.value()?.footprints,
+            footprints,
             self.profiles.value()?,
-            &self.mola_surface.options(),
+            &self.mola_surface.options(footprints.body),
         ))
     }
 }
@@ -196,8 +197,8 @@ impl Stage for CheckHeights<'_> {
 /// Compares tie points, each with its index, with the surface of all shots.
 #[must_use]
 pub fn check_heights(
-    points: &[(usize, Position<MarsIau2000>)],
-    footprints: &Footprints<MarsIau2000>,
+    points: &[(usize, Position<BodyFixed>)],
+    footprints: &Footprints<BodyFixed>,
     profiles: &[Profile],
     options: &SurfaceOptions,
 ) -> HeightCheck {
@@ -235,13 +236,13 @@ pub fn check_heights(
 }
 
 /// Each of `points` beside the surface.
-fn heights(surface: &LaserSurface, points: &[(usize, Position<MarsIau2000>)]) -> Vec<TieHeight> {
+fn heights(surface: &LaserSurface, points: &[(usize, Position<BodyFixed>)]) -> Vec<TieHeight> {
     let places_m: Vec<Vector3<f64>> = points.iter().map(|(_, ground)| ground.xyz_m).collect();
     let found = surface.predict(&places_m);
-    let height = |(index, (tie, ground)): (usize, &(usize, Position<MarsIau2000>))| TieHeight {
+    let height = |(index, (tie, ground)): (usize, &(usize, Position<BodyFixed>))| TieHeight {
         tie: *tie,
         ground: *ground,
-        height_m: LaserSurface::height_m(&ground.xyz_m).0,
+        height_m: surface.height_m(&ground.xyz_m).0,
         surface_m: found.heights_m[index],
         surface_sigma_m: found.sigma_m(index),
         nearest_shot_m: found.nearest_m[index],

@@ -3,11 +3,12 @@
 use nalgebra::{Matrix3, Vector3};
 
 use crate::{
-    frames::{J2000, MarsIau2000, Position},
+    body::Body,
+    frames::{J2000, Position},
     geom::{
         attitude::{mean_rotation, rotation_vector},
+        body_rotation::body_rotation,
         ellipsoid::ray_meets_ellipsoid,
-        mars_rotation::mars_rotation,
         orbit_axes::radial_along_cross,
         polynomial::root_mean_square,
         statistics::Summary,
@@ -278,9 +279,9 @@ fn angle_rad(a: &Vector3<f64>, b: &Vector3<f64>) -> f64 {
 
 /// Distance from `position` along a unit vector to the ellipsoid of IAU 2000, metres.
 fn ground_range_m(et: Et, position: &Position<J2000>, direction: &Vector3<f64>) -> Option<f64> {
-    let to_mars = mars_rotation::<MarsIau2000>(et);
+    let to_mars = body_rotation(Body::Mars, et);
     let origin = to_mars.apply(position);
-    let hit = ray_meets_ellipsoid(&origin, &(to_mars.matrix() * direction))?;
+    let hit = ray_meets_ellipsoid(Body::Mars.model(), &origin, &(to_mars.matrix() * direction))?;
     Some(hit.distance_m(&origin))
 }
 

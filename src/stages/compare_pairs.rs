@@ -18,7 +18,7 @@ use super::{
 use crate::{
     error::Result,
     footprints::Footprints,
-    frames::MarsIau2000,
+    frames::BodyFixed,
     geom::{
         ellipsoid::spherical_to_xyz_m,
         misregistration::{ImageToImage, Pair},
@@ -166,7 +166,7 @@ pub fn compare_pairs<M: ExteriorOrientation>(
     registrations: &[&ImageRegistration],
     ties: &[TiePoint],
     intersected: &IntersectedTies,
-    footprints: &Footprints<MarsIau2000>,
+    footprints: &Footprints<BodyFixed>,
     profiles: &[Profile],
 ) -> Vec<PairComparison> {
     let spacings: Vec<Option<f64>> = profiles
@@ -303,7 +303,7 @@ fn footprints_by_ties<M: ExteriorOrientation>(
     images: [(&OrientedCamera<M>, &ImageRegistration); 2],
     pair: [usize; 2],
     ties: &[TiePoint],
-    footprints: &Footprints<MarsIau2000>,
+    footprints: &Footprints<BodyFixed>,
     (profiles, spacings): (&[Profile], &[Option<f64>]),
     line_spacing_m: f64,
 ) -> Option<FootprintsByTies> {
@@ -396,7 +396,7 @@ fn places(registration: &ImageRegistration) -> BTreeMap<(u32, u32), Place> {
 }
 
 /// Median distance of successive footprints of a profile, metres.
-fn shot_spacing_m(footprints: &Footprints<MarsIau2000>, profile: &Profile) -> Option<f64> {
+fn shot_spacing_m(footprints: &Footprints<BodyFixed>, profile: &Profile) -> Option<f64> {
     let ground_m = |row: &u32| {
         let row = *row as usize;
         spherical_to_xyz_m(

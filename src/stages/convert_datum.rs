@@ -1,4 +1,4 @@
-//! Footprints and the file's own spacecraft positions go from the file's datum to IAU 2000.
+//! Footprints and the file's own spacecraft positions go from the file's datum to the frame of the products.
 
 use std::sync::atomic::AtomicBool;
 
@@ -8,12 +8,13 @@ use serde::{Deserialize, Serialize};
 use super::search_footprints::SearchResult;
 use crate::{
     altimetry::{BiasScope, MolaClock, TagSign},
+    body::{Body, Datum},
     error::Result,
     footprints::{AsRead, Footprint, Footprints, SourceFile},
-    frames::{MarsDatum, MarsIau2000},
+    frames::BodyFixed,
     geom::{
+        body_rotation::convert_datum as convert_vector,
         ellipsoid::{Spherical, spherical_to_xyz_m},
-        mars_rotation::convert_datum as convert_vector,
         statistics::Summary,
     },
     stage::{Output, Stage},
@@ -26,7 +27,7 @@ use crate::{
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Converted {
     /// The footprints.
-    pub footprints: Footprints<MarsIau2000>,
+    pub footprints: Footprints<BodyFixed>,
     /// What was done to each file, in the order of [`Footprints::files`].
     pub files: Vec<FileConversion>,
     /// One sentence per file, for log, manifest and report.
@@ -87,13 +88,20 @@ pub fn convert_datum(footprints: Footprints<AsRead>, clock: &MolaClock) -> Conve
     let notes = footprints
         .files
         .iter()
-        .map(|file| note(&file.name, file.datum, turns.then_some(turn_s)))
+        .map(|file| {
+            note(
+                footprints.body,
+                &file.name,
+                file.datum,
+                turns.then_some(turn_s),
+            )
+        })
         .collect();
     let datums = footprints.files.iter();
     let datums: Vec<DatumTurn> = datums
         .map(|file| DatumTurn::new(file.datum, clock))
         .collect();
-    let mut converted = footprints.declare::<MarsIau2000>();
+    let mut converted = footprints.declare::<BodyFixed>();
     let before = [&converted.longitude_rad, &converted.latitude_rad].map(Clone::clone);
     let moved: Vec<Option<[(f64, f64); 2]>> = (0..converted.len())
         .into_par_iter()
@@ -121,26 +129,31 @@ pub fn convert_datum(footprints: Footprints<AsRead>, clock: &MolaClock) -> Conve
 /// How the coordinates of a file go into IAU 2000.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DatumTurn {
-    datum: MarsDatum,
+    body: Body,
+    datum: Datum,
     turn_s: f64,
 }
 
 impl DatumTurn {
     /// For a file in `datum`, as [`convert_datum`] describes it.
     #[must_use]
-    pub fn new(datum: MarsDatum, clock: &MolaClock) -> Self {
+    pub fn new(datum: Datum, clock: &MolaClock) -> Self {
         let turn_s = if clock.moves_rotation() {
             clock.correction_s()
         } else {
             0.0
         };
-        Self { datum, turn_s }
+        Self {
+            body: datum.body(),
+            datum,
+            turn_s,
+        }
     }
 
     /// Whether coordinates stay as they are.
     #[must_use]
     pub fn is_none(&self) -> bool {
-        self.datum == MarsDatum::Iau2000 && self.turn_s.abs() <= 0.0
+        self.datum == self.body.datum() && self.turn_s.abs() <= 0.0
     }
 
     /// The shot in IAU 2000.
@@ -167,7 +180,7 @@ impl DatumTurn {
         let move_direction = |longitude_rad, latitude_rad| {
             let direction = spherical_to_xyz_m(longitude_rad, latitude_rad, 1.0);
             let into_at = out_at.plus(self.turn_s);
-            let there = convert_vector::<MarsIau2000>(direction, self.datum, out_at, into_at);
+            let there = convert_vector(self.body, direction, self.datum, out_at, into_at);
             let there = Spherical::from_xyz_m(&there.xyz_m);
             (there.longitude_rad, there.latitude.0)
         };
@@ -185,9 +198,9 @@ impl DatumTurn {
 pub fn convert_at_tags(
     mut footprints: Footprints<AsRead>,
     files: &[SourceFile],
-) -> Footprints<MarsIau2000> {
+) -> Footprints<BodyFixed> {
     footprints.files = files.to_vec();
-    let is_iau2000 = |file: &u16| files[usize::from(*file)].datum == MarsDatum::Iau2000;
+    let is_iau2000 = |file: &u16| files[usize::from(*file)].datum == Datum::Iau2000;
     if footprints.file.iter().all(is_iau2000) {
         return footprints.declare();
     }
@@ -201,7 +214,7 @@ pub fn convert_at_tags(
 }
 
 /// How far the shots of each file moved from longitudes and latitudes `before`.
-fn shifts(after: &Footprints<MarsIau2000>, before: &[Vec<f64>; 2]) -> Vec<FileConversion> {
+fn shifts(after: &Footprints<BodyFixed>, before: &[Vec<f64>; 2]) -> Vec<FileConversion> {
     let mut moved = vec![(Vec::new(), Vec::new()); after.files.len()];
     let [longitude_rad, latitude_rad] = before;
     for row in 0..after.len() {
@@ -221,12 +234,13 @@ fn shifts(after: &Footprints<MarsIau2000>, before: &[Vec<f64>; 2]) -> Vec<FileCo
     summaries.collect()
 }
 
-fn note(name: &str, datum: MarsDatum, turn_s: Option<f64>) -> String {
-    match (datum, turn_s) {
-        (MarsDatum::Iau2000, None) => format!("{name}: in IAU 2000 already, not converted"),
-        (datum, None) => format!("{name}: {datum} to IAU 2000 at each shot's time tag"),
-        (datum, Some(turn_s)) => {
-            format!("{name}: out of {datum} at the time tag, into IAU 2000 {turn_s:+.3} s later")
+fn note(body: Body, name: &str, datum: Datum, turn_s: Option<f64>) -> String {
+    let frame = &body.names().short_frame;
+    match turn_s {
+        None if datum == body.datum() => format!("{name}: in {frame} already, not converted"),
+        None => format!("{name}: {datum} to {frame} at each shot's time tag"),
+        Some(turn_s) => {
+            format!("{name}: out of {datum} at the time tag, into {frame} {turn_s:+.3} s later")
         }
     }
 }
@@ -239,7 +253,7 @@ mod tests {
         footprints::SourceFile,
     };
 
-    fn footprints(datum: MarsDatum) -> Footprints<AsRead> {
+    fn footprints(datum: Datum) -> Footprints<AsRead> {
         let mut footprints = Footprints::new(vec![SourceFile {
             name: "ap18933k.b".to_owned(),
             version: Some('K'),
@@ -284,7 +298,7 @@ mod tests {
     #[test]
     fn eos_chasma_moves_as_cspice_says() {
         let converted =
-            convert_datum(footprints(MarsDatum::Iau1991), &clock(BiasScope::SpkLookup)).footprints;
+            convert_datum(footprints(Datum::Iau1991), &clock(BiasScope::SpkLookup)).footprints;
         // CSPICE N0067 with a PCK of the 1991 and one of the 2000 constants; 1e-9 rad is 3 mm.
         assert!(
             (converted.longitude_rad[0] - 318.237_630_071_608_63 * RADIANS_PER_DEGREE).abs() < 1e-9
@@ -297,7 +311,7 @@ mod tests {
 
     #[test]
     fn iau_2000_is_left_alone_bit_for_bit() {
-        let before = footprints(MarsDatum::Iau2000);
+        let before = footprints(Datum::Iau2000);
         let after = convert_datum(before.clone(), &clock(BiasScope::SpkLookup));
         assert_eq!(after.footprints, before.declare());
         assert_eq!(
@@ -308,7 +322,7 @@ mod tests {
 
     #[test]
     fn the_rotation_scope_turns_mars_by_the_bias() {
-        let after = convert_datum(footprints(MarsDatum::Iau2000), &clock(BiasScope::Both));
+        let after = convert_datum(footprints(Datum::Iau2000), &clock(BiasScope::Both));
         let turned_rad = wrap_pi(after.footprints.longitude_rad[0] - 318.0 * RADIANS_PER_DEGREE);
         // 350.89198 deg/day x 0.117 s = 4.7517e-4 deg; entering at an earlier time, longitudes grow.
         assert!(

@@ -5,9 +5,9 @@ use std::sync::atomic::AtomicBool;
 use serde::{Deserialize, Serialize};
 
 use crate::{
+    body::Body,
     error::Result,
-    frames::MarsIau2000,
-    geom::{attitude::rotation_vector, mars_rotation::mars_rotation},
+    geom::{attitude::rotation_vector, body_rotation::body_rotation},
     spice::{KernelView, RequiredCoverage, Session},
     stage::{Input, Inputs, Stage},
     stage_inputs,
@@ -15,7 +15,7 @@ use crate::{
     units::RADIANS_PER_DEGREE,
 };
 
-/// A PCK that turns Mars by more than this against the IAU 2000 formula holds another model, radians
+/// A PCK that turns the body by more than this against the formula of the products holds another model, radians
 /// (1e-7 rad is 0.3 m on the ground; the models differ by 4e-3 rad).
 const PCK_TOLERANCE_RAD: f64 = 1e-7;
 
@@ -24,7 +24,7 @@ const PCK_TOLERANCE_RAD: f64 = 1e-7;
 pub struct KernelDescription {
     /// One entry per kernel, in load order.
     pub kernels: Vec<KernelLine>,
-    /// A planetary constants kernel that does not follow IAU 2000, in a sentence.
+    /// A planetary constants kernel that does not follow the frame of the products, in a sentence.
     pub pck_note: Option<String>,
     /// C-kernels whose attitudes have no angular rates and are not read, in a sentence.
     pub rates_note: Option<String>,
@@ -50,6 +50,8 @@ pub struct KernelLine {
 stage_inputs! {
     /// The kernels, and the times at which the site reads them.
     pub struct DescribeKernels<'a> {
+        /// The body of the site.
+        pub body: &'a Body,
         /// All kernels.
         pub kernels: &'a KernelView,
         /// Times at which they are read.
@@ -84,7 +86,12 @@ impl Stage for DescribeKernels<'_> {
     fn run(&self, _stop: &AtomicBool) -> Result<KernelDescription> {
         let nothing = RequiredCoverage::default();
         let required = self.required.0.unwrap_or(&nothing);
-        describe_kernels(self.kernels.session()?, required, *self.ck_tolerance_s)
+        describe_kernels(
+            *self.body,
+            self.kernels.session()?,
+            required,
+            *self.ck_tolerance_s,
+        )
     }
 }
 
@@ -95,6 +102,7 @@ impl Stage for DescribeKernels<'_> {
 /// # Errors
 /// As [`Session::coverage`].
 pub fn describe_kernels(
+    body: Body,
     session: &Session,
     required: &RequiredCoverage,
     ck_tolerance_s: f64,
@@ -117,7 +125,7 @@ pub fn describe_kernels(
     });
     Ok(KernelDescription {
         kernels: kernels.collect(),
-        pck_note: pck_note(session, &required.positions),
+        pck_note: pck_note(body, session, &required.positions),
         rates_note: rates_note(session)?,
     })
 }
@@ -136,20 +144,22 @@ fn rates_note(session: &Session) -> Result<Option<String>> {
     }))
 }
 
-/// Products use the IAU 2000 formula whatever the PCK says; whoever loads `kernels.tm` should know.
-fn pck_note(session: &Session, positions: &Intervals) -> Option<String> {
+/// Products use their own formula whatever the PCK says; whoever loads `kernels.tm` should know.
+fn pck_note(body: Body, session: &Session, positions: &Intervals) -> Option<String> {
     let at = positions
         .as_slice()
         .first()
         .map_or(Et::from_seconds(0.0), |interval| interval.start);
-    let ours = *mars_rotation::<MarsIau2000>(at).matrix();
+    let ours = *body_rotation(body, at).matrix();
     // Without a PCK there is nothing to compare, and nothing that could mislead.
-    let theirs = session.mars_matrix(at).ok()?;
+    let theirs = session.body_matrix(body, at).ok()?;
     let turn_rad = rotation_vector(&(theirs * ours.transpose())).norm();
     (turn_rad > PCK_TOLERANCE_RAD).then(|| {
         format!(
-            "the PCK turns IAU_MARS by {:.5}° against IAU 2000; products use the IAU 2000 constants",
-            turn_rad / RADIANS_PER_DEGREE
+            "the PCK turns {} by {:.5}° against {frame}; products use the {frame} constants",
+            body.naif().pck_frame,
+            turn_rad / RADIANS_PER_DEGREE,
+            frame = body.names().short_frame
         )
     })
 }

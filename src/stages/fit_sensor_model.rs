@@ -254,7 +254,8 @@ fn pointing_ground_m(orientation: &Orientation, angles_rad: &[Fit; 3]) -> Option
             kappa_rad,
         };
         let ground = |camera_to_mars: &Matrix3<f64>| {
-            ray_meets_ellipsoid(&sample.position, &(camera_to_mars * Vector3::z()))
+            let boresight = camera_to_mars * Vector3::z();
+            ray_meets_ellipsoid(orientation.body.model(), &sample.position, &boresight)
         };
         let sampled = ground(sample.camera_to_mars.matrix())?;
         Some(ground(&model.camera_to_mars())?.distance_m(&sampled))

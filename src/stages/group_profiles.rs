@@ -9,7 +9,7 @@ use crate::{
     config::WindowConfig,
     error::Result,
     footprints::Footprints,
-    frames::MarsIau2000,
+    frames::BodyFixed,
     stage::{InOrder, Output, Stage},
     stage_inputs,
     time::{Et, Interval},
@@ -80,7 +80,7 @@ impl Stage for GroupProfiles<'_> {
 /// Profiles come in the order of the windows and, within one, of time.
 #[must_use]
 pub fn group_profiles(
-    footprints: &Footprints<MarsIau2000>,
+    footprints: &Footprints<BodyFixed>,
     windows: &[WindowConfig],
     images: &[ImageTimes],
 ) -> Vec<Profile> {
@@ -112,7 +112,7 @@ pub fn group_profiles(
 }
 
 fn profile(
-    footprints: &Footprints<MarsIau2000>,
+    footprints: &Footprints<BodyFixed>,
     window: &str,
     earlier: usize,
     rows: &[u32],

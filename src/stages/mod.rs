@@ -20,6 +20,7 @@ pub mod mola_surface;
 pub mod orientation;
 pub mod oriented;
 pub mod outline_windows;
+pub mod read_shots;
 pub mod read_ties;
 pub mod register;
 pub mod reorient;

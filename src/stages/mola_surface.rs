@@ -8,7 +8,7 @@ use nalgebra::Vector3;
 use super::group_profiles::Profile;
 use crate::{
     footprints::Footprints,
-    frames::MarsIau2000,
+    frames::BodyFixed,
     geom::{
         ellipsoid::spherical_to_xyz_m,
         surface::{LaserSurface, SurfaceError, SurfaceOptions, SurfaceShot},
@@ -22,7 +22,7 @@ pub struct MolaShots(Vec<SurfaceShot>);
 impl MolaShots {
     /// The shots of `profiles`; one in two windows counts for the first.
     #[must_use]
-    pub fn of(footprints: &Footprints<MarsIau2000>, profiles: &[Profile]) -> Self {
+    pub fn of(footprints: &Footprints<BodyFixed>, profiles: &[Profile]) -> Self {
         let mut used = BTreeSet::new();
         let mut shots = Vec::new();
         for (index, profile) in profiles.iter().enumerate() {

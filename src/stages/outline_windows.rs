@@ -8,7 +8,6 @@ use super::{
 };
 use crate::{
     config::{KernelsConfig, OrientationConfig, PointingConfig, WindowConfig},
-    constants::MARS_IAU2000,
     error::{Cause, Kind, Result},
     geom::{image_outline::widened, window::WindowShape},
     spice::KernelView,
@@ -101,7 +100,7 @@ impl OutlineWindows<'_> {
         let ring = places.map(|point| [point.longitude_rad, point.latitude_rad]);
         let ring: Vec<[f64; 2]> = ring.collect();
         // At the poles a metre is the largest angle.
-        let margin_rad = margin_m / MARS_IAU2000.polar_radius_m;
+        let margin_rad = margin_m / times.body.model().polar_radius_m;
         Ok(widened(&ring, margin_rad, margin_rad))
     }
 }

@@ -14,11 +14,11 @@ use super::{
 };
 use crate::{
     error::{Cause, Kind, Result},
-    frames::{MarsIau2000, Position, Rotation},
+    frames::{Position, Rotation},
     geom::{
         attitude::matrix_of_rotation_vector,
+        body_rotation::body_rotation,
         lagrange::lagrange,
-        mars_rotation::mars_rotation,
         pushbroom::{ExteriorOrientation, Pose, SampledOrientation, SamplesError},
     },
     stage::{Output, Round, Stage},
@@ -166,6 +166,7 @@ pub fn reorient(
         sample.to_spacecraft_m = before.to_spacecraft_m;
     }
     Ok(Orientation {
+        body: image.body,
         image: orientation.image.clone(),
         samples,
         outline: GroundPoint::outline(image, camera)?,
@@ -338,7 +339,7 @@ impl<F: Fn(f64) -> LineCorrection> Corrected<'_, F> {
         let et = tag.plus(self.shift_s());
         let camera = self.tabulated(tag)?;
         let to_mars = *original.inertial_to_mars[row].matrix();
-        let [mars, mars_then] = [tag, et].map(|et| *mars_rotation::<MarsIau2000>(et).matrix());
+        let [mars, mars_then] = [tag, et].map(|et| *body_rotation(self.image.body, et).matrix());
         let to_mars_then = mars_then * mars.transpose() * to_mars;
         let to_camera = camera.to_mars.matrix().transpose() * to_mars;
         let to_bus = tables.bus_to_camera.matrix().transpose() * to_camera;

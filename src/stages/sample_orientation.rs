@@ -146,6 +146,7 @@ pub fn sample_orientation(
     let far = held.as_ref().filter(|held| held.is_unexplained());
     Ok(Orientation {
         image: image.id.clone(),
+        body: image.body,
         samples,
         outline: GroundPoint::outline(image, |et| reader.camera(et))?,
         tables,

@@ -6,7 +6,7 @@ mod detector;
 mod error;
 mod support;
 
-use std::{path::Path, sync::atomic::AtomicBool};
+use std::sync::atomic::AtomicBool;
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -15,8 +15,10 @@ use agreement::{mounting_agrees, of_one_clock, of_one_product, start_agrees, sto
 use detector::fits_detector;
 use error::ImageError;
 pub use support::SupportFile;
+use support::supported;
 
 use crate::{
+    body::Body,
     config::{ImageConfig, PointingConfig, UsedBias, built_in_instruments, usual_instrument},
     error::{Error, Locate, Result},
     files::HashedFile,
@@ -37,6 +39,8 @@ use crate::{
 pub struct ImageTimes {
     /// Image identifier.
     pub id: String,
+    /// The body that it sees.
+    pub body: Body,
     /// The camera.
     pub instrument: Instrument,
     /// When its lines were exposed: all of the header image.
@@ -80,6 +84,14 @@ pub enum StartFrom {
 }
 
 impl ImageTimes {
+    /// Whether its positions are those of the spacecraft with the laser, so that ranges are measured from them.
+    #[must_use]
+    pub fn has_laser(&self) -> bool {
+        self.support
+            .as_ref()
+            .is_none_or(|support| support.has_laser)
+    }
+
     /// Where the samples of a line look.
     #[must_use]
     pub fn detector(&self) -> Detector {
@@ -140,6 +152,8 @@ pub fn used_biases<'a>(
 stage_inputs! {
     /// Label and keys of one image, and the clocks.
     pub struct TagTimes<'a> {
+        /// The body of the site.
+        pub body: &'a Body,
         /// Identifier and keys written in the configuration.
         pub image: &'a ImageConfig,
         /// The label that the configuration names.
@@ -153,7 +167,7 @@ stage_inputs! {
 
 impl Stage for TagTimes<'_> {
     const NAME: &'static str = "tag_times";
-    const METHOD: u32 = 4;
+    const METHOD: u32 = 5;
     const CHECKED: bool = true;
     type Output = ImageTimes;
     stage_inputs!(fingerprint);
@@ -163,7 +177,12 @@ impl Stage for TagTimes<'_> {
     }
 
     fn run(&self, _stop: &AtomicBool) -> Result<ImageTimes> {
-        tag_image(self.image, self.support.as_ref(), self.kernels.session()?)
+        tag_image(
+            *self.body,
+            self.image,
+            self.support.as_ref(),
+            self.kernels.session()?,
+        )
     }
 
     fn findings(&self, times: &ImageTimes) -> Vec<String> {
@@ -174,24 +193,25 @@ impl Stage for TagTimes<'_> {
     }
 }
 
-/// Times of every image, in the order of the configuration.
+/// Times of every image of Mars, in the order of the configuration.
 ///
 /// # Errors
 /// An unreadable label, a missing key, values that contradict each other, a time no kernel can convert.
 pub fn tag_times(images: &[ImageConfig], session: &Session) -> Result<Vec<ImageTimes>> {
     images
         .iter()
-        .map(|image| tag_image(image, None, session))
+        .map(|image| tag_image(Body::Mars, image, None, session))
         .collect()
 }
 
 fn tag_image(
+    body: Body,
     image: &ImageConfig,
     hashed: Option<&HashedFile>,
     session: &Session,
 ) -> Result<ImageTimes> {
     let times = match &image.isd {
-        Some(path) => supported(image, path, hashed, session),
+        Some(path) => supported(body, image, path, hashed, session),
         None => image_times(image, session),
     };
     match image.source() {
@@ -262,6 +282,8 @@ fn image_times(image: &ImageConfig, session: &Session) -> Result<ImageTimes> {
     }
     Ok(ImageTimes {
         id: image.id.clone(),
+        // Labels, clocks and kernels are those of a spacecraft at Mars.
+        body: Body::Mars,
         instrument,
         line_times: LineTimes::even(start, lines_header, line_period_s)?,
         start_from,
@@ -276,35 +298,6 @@ fn image_times(image: &ImageConfig, session: &Session) -> Result<ImageTimes> {
         notes,
         remarks,
         support: None,
-    })
-}
-
-/// Times and camera of an image by its support data.
-fn supported(
-    image: &ImageConfig,
-    path: &Path,
-    hashed: Option<&HashedFile>,
-    session: &Session,
-) -> Result<ImageTimes> {
-    let (said, file) = SupportFile::read(&image.id, path, hashed)?;
-    let start = said.line_times.start();
-    let period_s = said.line_times.mean_period_s();
-    Ok(ImageTimes {
-        id: image.id.clone(),
-        start_from: StartFrom::Support,
-        sclk_start: None,
-        utc_start: session.et_to_utc(start)?,
-        exposure_s: period_s / f64::from(said.downtrack_summing),
-        downtrack_summing: said.downtrack_summing,
-        crosstrack_summing: said.crosstrack_summing,
-        lines_delivered: said.line_times.lines(),
-        samples: said.samples,
-        first_detector: said.first_detector,
-        notes: vec![file.note()],
-        remarks: file.remarks(start),
-        instrument: said.instrument,
-        line_times: said.line_times,
-        support: Some(file),
     })
 }
 

@@ -3,10 +3,11 @@
 use std::{path::PathBuf, sync::LazyLock};
 
 use areograph::{
+    body::Body,
+    body::MARS_IAU2000,
     config::{ImageConfig, KernelsConfig, OrientationConfig, PointingConfig, usual_instrument},
-    constants::MARS_IAU2000,
-    frames::{MarsIau2000, Position},
-    geom::{ellipsoid::ray_meets_ellipsoid, light_time::LightTime, mars_rotation::mars_matrix},
+    frames::{BodyFixed, Position},
+    geom::{body_rotation::body_matrix, ellipsoid::ray_meets_ellipsoid, light_time::LightTime},
     kernel_source::{KernelList, KernelSource},
     scene::{SceneErrors, SceneOptions, write_scene},
     spice::{KernelSet, Session},
@@ -131,7 +132,7 @@ pub(crate) fn kernel_camera(
     image: &Image,
     et: Et,
 ) -> (Vector3<f64>, Matrix3<f64>) {
-    let to_mars = mars_matrix(&MARS_IAU2000, et);
+    let to_mars = body_matrix(&MARS_IAU2000, et);
     let lookup = image.pointing.bias_of(usual_instrument()).lookup(et);
     let attitude = session.attitude(lookup, et, 0.0).unwrap();
     let to_camera = session.mounting(usual_instrument(), et).unwrap() * attitude.inertial_to_bus;
@@ -145,11 +146,11 @@ pub(crate) fn kernel_camera(
             (to_mars * seen_m, to_mars * to_inertial)
         }
         LightTime::Surface => {
-            let position = Position::<MarsIau2000>::new(to_mars * geometric_m);
+            let position = Position::<BodyFixed>::new(to_mars * geometric_m);
             let boresight = to_mars * to_inertial.column(2);
-            let ground = ray_meets_ellipsoid(&position, &boresight).unwrap();
+            let ground = ray_meets_ellipsoid(Body::Mars.model(), &position, &boresight).unwrap();
             let left = et.plus(-position.distance_m(&ground) / 299_792_458.0);
-            let to_mars = mars_matrix(&MARS_IAU2000, left);
+            let to_mars = body_matrix(&MARS_IAU2000, left);
             let position_m = session.state(left).unwrap().position.xyz_m;
             (to_mars * position_m, to_mars * to_inertial)
         }

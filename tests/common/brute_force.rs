@@ -4,10 +4,10 @@ use std::path::PathBuf;
 
 use areograph::{
     footprints::Footprint,
-    frames::MarsIau2000,
+    frames::BodyFixed,
     geom::{
+        body_rotation::convert_datum,
         ellipsoid::{Spherical, spherical_to_xyz_m},
-        mars_rotation::convert_datum,
     },
     pds::pedr::{FieldGuard, File},
     time::Et,
@@ -35,7 +35,7 @@ pub(super) fn every_shot(paths: &[PathBuf]) -> Vec<TrueShot> {
                 }
                 let at = Et::from_seconds(shot.et_tag_s);
                 let direction = spherical_to_xyz_m(shot.longitude_rad, shot.latitude_rad, 1.0);
-                let direction = convert_datum::<MarsIau2000>(direction, datum, at, at);
+                let direction = convert_datum::<BodyFixed>(direction, datum, at, at);
                 let there = Spherical::from_xyz_m(&direction.xyz_m);
                 shots.push(TrueShot {
                     shot: Footprint {

@@ -24,11 +24,16 @@ pub(crate) struct Case {
 }
 
 impl Case {
+    /// An empty folder.
+    pub(crate) fn empty() -> Self {
+        Self {
+            folder: tempfile::tempdir().unwrap(),
+        }
+    }
+
     /// A folder with the kernels of the mission, and an empty one for PEDR files.
     fn with_kernels() -> Self {
-        let case = Self {
-            folder: tempfile::tempdir().unwrap(),
-        };
+        let case = Self::empty();
         let mission = mission();
         for folder in ["kernels", "pedr"] {
             fs::create_dir(case.path(folder)).unwrap();

@@ -1,7 +1,7 @@
 //! Shan, Lee & Yoon 2002: orientation and points of the Eos pair.
 
 use areograph::{
-    constants::MARS_IAU2000,
+    body::MARS_IAU2000,
     geom::pushbroom::{EulerPolynomial, ExteriorOrientation, Projector},
     units::RADIANS_PER_DEGREE,
 };

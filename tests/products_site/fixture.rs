@@ -4,12 +4,14 @@ use std::{collections::BTreeMap, sync::atomic::AtomicBool};
 
 use areograph::{
     altimetry::{BiasScope, DatumChoice, MolaClock, ShotFilter, TagSign},
+    body::Body,
+    body::Datum,
     config::{
         KernelsConfig, OrientationConfig, PedrConfig, PointingConfig, RangeCheckConfig, SiteConfig,
         WindowConfig, usual_instrument,
     },
     footprints::{Footprint, Footprints, SourceFile},
-    frames::{Frame, MarsDatum, MarsIau2000, Position, Rotation},
+    frames::{BodyFixed, Frame, Position, Rotation},
     geom::{
         attitude::{OmegaPhiKappa, matrix_of_spice_quaternion},
         ellipsoid::Spherical,
@@ -53,7 +55,7 @@ pub(crate) struct Site {
     pub(crate) times: ImageTimes,
     pub(crate) orientation: Orientation,
     pub(crate) model: SensorModel,
-    pub(crate) footprints: Footprints<MarsIau2000>,
+    pub(crate) footprints: Footprints<BodyFixed>,
     pub(crate) utc: Vec<String>,
     pub(crate) profiles: Vec<Profile>,
     pub(crate) ranges: RangeCheck,
@@ -280,7 +282,7 @@ fn config() -> SiteConfig {
 }
 
 /// Moves every footprint to where the camera looks, 40 lines apart; the last third lies beyond the image.
-pub(crate) fn move_under_the_camera(footprints: &mut Footprints<MarsIau2000>, model: &SensorModel) {
+pub(crate) fn move_under_the_camera(footprints: &mut Footprints<BodyFixed>, model: &SensorModel) {
     let camera = model.rotation_vector_orientation();
     for row in 0..footprints.len() {
         let pose = camera.pose(line_offset(row));
@@ -300,6 +302,7 @@ pub(crate) fn line_offset(row: usize) -> f64 {
 fn image_times() -> ImageTimes {
     ImageTimes {
         id: "m04-02852".to_owned(),
+        body: Body::Mars,
         instrument: usual_instrument().clone(),
         line_times: LineTimes::even(Et::from_seconds(START_S), 1536, 8.0 * 0.000_482_1).unwrap(),
         start_from: StartFrom::Sclk,
@@ -354,6 +357,7 @@ fn orientation(times: &ImageTimes) -> Orientation {
     let et_s: Vec<f64> = (0..40).map(|k| START_S + 0.16 * f64::from(k)).collect();
     let nodes = et_s.len();
     Orientation {
+        body: Body::Mars,
         image: times.id.clone(),
         samples,
         outline: Some(
@@ -406,11 +410,11 @@ fn turned<A: Frame, B: Frame>(et_s: &[f64], quaternion: [f64; 4]) -> Vec<Rotatio
         .collect()
 }
 
-fn footprints() -> Footprints<MarsIau2000> {
+fn footprints() -> Footprints<BodyFixed> {
     let mut footprints = Footprints::new(vec![SourceFile {
         name: "ap19019l.b".to_owned(),
         version: Some('L'),
-        datum: MarsDatum::Iau2000,
+        datum: Datum::Iau2000,
         blake3: "cd".repeat(32),
     }]);
     for k in 0..SHOTS {
@@ -471,8 +475,12 @@ fn ranges(profiles: &[Profile]) -> RangeCheck {
         profiles: profiles
             .iter()
             .map(|profile| ProfileRanges {
+                shots: u32::try_from(profile.rows.len()).unwrap(),
                 profile: profile.id.clone(),
-                range_minus_distance_m: summary,
+                range_minus_distance_m: Summary {
+                    n: u32::try_from(profile.rows.len()).unwrap(),
+                    ..summary
+                },
                 range_minus_distance_crossover_m: summary,
                 decoding_m: Summary::of(&shots.decoding_m),
                 spacecraft_m: [summary; 3],

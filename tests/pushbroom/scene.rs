@@ -8,7 +8,7 @@
 use areograph::{
     geom::{
         attitude::{OmegaPhiKappa, rotation_vector, unwrap_angles},
-        mars_rotation::frame_rotation_3,
+        body_rotation::frame_rotation_3,
         polynomial::Polynomial,
         pushbroom::{
             EulerPolynomial, FixedPoint, FrameFirst, Limits, Pose, RotationVectorPolynomial,

@@ -7,7 +7,7 @@ use areograph::{
     frames::{J2000, Rotation, SpacecraftBus},
     geom::{
         attitude::{make_continuous, spice_quaternion},
-        mars_rotation::frame_rotation_1,
+        body_rotation::frame_rotation_1,
     },
     spice::{CkSegment, KernelSet, Session, write_ck},
     time::{Et, Interval, PointingBias},

@@ -3,7 +3,7 @@
 use std::{ops::Range, path::Path};
 
 use areograph::{
-    frames::MarsDatum,
+    body::Datum,
     geom::ellipsoid::spherical_to_xyz_m,
     pds::pedr::{FrameValues, LabelInfo, PedrWriter, Record},
     units::wrap_pi,
@@ -97,13 +97,13 @@ fn look_along_the_parallax(values: &mut FrameValues) {
 }
 
 /// Half of the frames, from number `first` on.
-pub(super) fn write(path: &Path, datum: MarsDatum, first: u32, spoil: impl Fn(u32, &mut Record)) {
+pub(super) fn write(path: &Path, datum: Datum, first: u32, spoil: impl Fn(u32, &mut Record)) {
     write_frames(path, datum, first..first + FRAMES / 2, spoil);
 }
 
 pub(super) fn write_frames(
     path: &Path,
-    datum: MarsDatum,
+    datum: Datum,
     numbers: Range<u32>,
     spoil: impl Fn(u32, &mut Record),
 ) {

@@ -8,7 +8,7 @@ use super::{
     layout::{Layout, Linearised},
     point_rows::PointRows,
 };
-use crate::geom::{pushbroom::ExteriorOrientation, surface::LaserSurface};
+use crate::geom::pushbroom::ExteriorOrientation;
 
 /// Points whose surface is predicted together; the covariance between them is not used.
 const TOGETHER: usize = 64;
@@ -43,7 +43,7 @@ pub(super) fn compared<M: ExteriorOrientation>(
             let residual = |(index, point): (usize, &usize)| {
                 layout.fill(rows, at, *point).ok()?;
                 let triangle = rows.eliminate();
-                let (height_m, by_point) = LaserSurface::height_m(&places_m[index]);
+                let (height_m, by_point) = control.surface.height_m(&places_m[index]);
                 let turned = triangle.tr_solve_upper_triangular(&by_point)?;
                 Some(HeightResidual {
                     point: *point,

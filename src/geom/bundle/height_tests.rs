@@ -15,7 +15,9 @@ use super::{
     tests::{dense_rows, layout, network},
     unknowns::State,
 };
+use crate::body::Body;
 use crate::geom::{
+    ellipsoid::height_m,
     pushbroom::{EulerPolynomial, ExteriorOrientation, Sighting},
     surface::{LaserSurface, SurfaceOptions, SurfaceShot},
 };
@@ -315,8 +317,13 @@ fn ground_that_stands_higher_lifts_the_points_and_moves_them_little_in_plan() {
             observed: CONTROLLED.collect(),
         });
         let adjusted = solve(&network, &BundleOptions::default()).unwrap();
-        let heights = CONTROLLED
-            .map(|point| LaserSurface::height_m(&adjusted.points[point].unwrap().ground_m).0);
+        let heights = CONTROLLED.map(|point| {
+            height_m(
+                Body::Mars.model(),
+                &adjusted.points[point].unwrap().ground_m,
+            )
+            .0
+        });
         heights.sum::<f64>() / CONTROLLED.len() as f64
     };
     let lifted_m = mean_height_m(50.0) - mean_height_m(0.0);

@@ -3,7 +3,10 @@
 use nalgebra::{DMatrix, DVector, Vector3};
 
 use super::unknowns::State;
-use crate::geom::surface::{LaserSurface, SurfaceHeights};
+use crate::geom::{
+    ellipsoid::height_m,
+    surface::{LaserSurface, SurfaceHeights},
+};
 
 /// Heights that are observed, as they were when the surface was last asked.
 #[derive(Clone)]
@@ -71,7 +74,7 @@ impl Heights {
     /// Height of the point at `index` above the surface, metres, and its change with the point.
     pub(super) fn difference_m(&self, state: &State, index: usize) -> (f64, Vector3<f64>) {
         let place_m = &state.points_m[self.points[index]];
-        let (height_m, by_point) = LaserSurface::height_m(place_m);
+        let (height_m, by_point) = height_m(self.surface.body.model(), place_m);
         let difference_m = height_m - self.surface.heights_m[index];
         match &self.surface.relief {
             None => (difference_m, by_point),

@@ -8,7 +8,13 @@
 //! Ordinary kriging: Cressie 1993, Statistics for spatial data, section 3.2.
 //!
 //! ```
-//! use areograph::geom::surface::{LaserSurface, SurfaceOptions, SurfaceShot};
+//! use areograph::{
+//!     body::Body,
+//!     geom::{
+//!         ellipsoid::on_ellipsoid_m,
+//!         surface::{LaserSurface, SurfaceOptions, SurfaceShot},
+//!     },
+//! };
 //! use nalgebra::Vector3;
 //!
 //! // A profile along a meridian, 300 m from shot to shot, 50 m above the ellipsoid.
@@ -16,7 +22,7 @@
 //!     .map(|shot| {
 //!         let north_rad = f64::from(shot) * 300.0 / 3_396_190.0;
 //!         let up = Vector3::new(north_rad.cos(), 0.0, north_rad.sin());
-//!         let ground_m = LaserSurface::on_ellipsoid_m(&up) + 50.0 * up;
+//!         let ground_m = on_ellipsoid_m(Body::Mars.model(), &up) + 50.0 * up;
 //!         SurfaceShot { ground_m, profile: 0 }
 //!     })
 //!     .collect();
@@ -35,7 +41,10 @@ mod variogram;
 use nalgebra::{DMatrix, Matrix3xX, Vector2, Vector3};
 
 use self::{kriging::Kriging, plan::Plan};
-use crate::constants::MARS_IAU2000;
+use crate::{
+    body::{Body, BodyModel},
+    geom::ellipsoid::height_m,
+};
 
 pub use variogram::Variogram;
 
@@ -72,6 +81,8 @@ pub struct SurfaceOptions {
     /// Where relief is to tell the place: standard deviation on each axis of where a profile lies in plan, metres. The
     /// error in plan between images and shots is then what heights are asked for, and no part of their own errors.
     pub relief_sigma_m: Option<f64>,
+    /// The body, above whose ellipsoid heights are.
+    pub body: Body,
 }
 
 impl Default for SurfaceOptions {
@@ -84,6 +95,7 @@ impl Default for SurfaceOptions {
             plan_sigma_m: 130.0,
             roughness_min_m: 4.0,
             relief_sigma_m: None,
+            body: Body::Mars,
         }
     }
 }
@@ -123,6 +135,8 @@ pub struct SurfaceHeights {
     pub covariance_m2: DMatrix<f64>,
     /// The same without what comes from errors in plan on a slope.
     pub without_plan_m2: DMatrix<f64>,
+    /// The body, above whose ellipsoid they are.
+    pub body: Body,
     /// Where relief is to tell the place.
     pub relief: Option<Relief>,
 }
@@ -170,8 +184,12 @@ impl LaserSurface {
         if shots.len() < SHOTS_MIN {
             return Err(SurfaceError::TooFew { shots: shots.len() });
         }
-        let plan = Plan::around(shots.iter().map(|shot| shot.ground_m));
-        let placed: Vec<Placed> = shots.iter().map(|shot| Placed::new(&plan, shot)).collect();
+        let model = options.body.model();
+        let plan = Plan::around(model, shots.iter().map(|shot| shot.ground_m));
+        let placed: Vec<Placed> = shots
+            .iter()
+            .map(|shot| Placed::new(model, &plan, shot))
+            .collect();
         let variogram = Variogram::learn(&placed, options);
         let around: Vec<Vector2<f64>> = around.iter().map(|place| plan.of(place)).collect();
         let taken = thinned(near(placed, &around));
@@ -214,31 +232,11 @@ impl LaserSurface {
         self.kriging.shots.len()
     }
 
-    /// The point of the ellipsoid in the direction of `place_m`, metres.
+    /// Height of a place above the ellipsoid of the surface's body along the radius, metres, and how it changes with the
+    /// place.
     #[must_use]
-    pub fn on_ellipsoid_m(place_m: &Vector3<f64>) -> Vector3<f64> {
-        let up = place_m.normalize();
-        let (a, c) = (
-            MARS_IAU2000.equatorial_radius_m,
-            MARS_IAU2000.polar_radius_m,
-        );
-        up / ((up.x / a).powi(2) + (up.y / a).powi(2) + (up.z / c).powi(2)).sqrt()
-    }
-
-    /// Height of a place above the ellipsoid along the radius, metres, and how it changes with the place.
-    #[must_use]
-    pub fn height_m(place_m: &Vector3<f64>) -> (f64, Vector3<f64>) {
-        let up = place_m.normalize();
-        let below_m = Self::on_ellipsoid_m(place_m);
-        let (a, c) = (
-            MARS_IAU2000.equatorial_radius_m,
-            MARS_IAU2000.polar_radius_m,
-        );
-        // The radius is q^(-1/2) of the direction; what changes the direction is across `up`.
-        let by_up =
-            -below_m.norm().powi(3) * Vector3::new(up.x / (a * a), up.y / (a * a), up.z / (c * c));
-        let across = (by_up - up * by_up.dot(&up)) / place_m.norm();
-        (place_m.norm() - below_m.norm(), up - across)
+    pub fn height_m(&self, place_m: &Vector3<f64>) -> (f64, Vector3<f64>) {
+        height_m(self.options.body.model(), place_m)
     }
 
     /// Heights of the surface at `places_m`, with the covariance of their errors.
@@ -271,6 +269,7 @@ impl LaserSurface {
                 slopes_matrix.tr_mul(&slopes_matrix) * self.options.plan_sigma_m.powi(2);
         }
         SurfaceHeights {
+            body: self.options.body,
             without_plan_m2,
             relief,
             heights_m: at
@@ -355,10 +354,10 @@ struct Placed {
 }
 
 impl Placed {
-    fn new(plan: &Plan, shot: &SurfaceShot) -> Self {
+    fn new(model: &BodyModel, plan: &Plan, shot: &SurfaceShot) -> Self {
         Self {
             plan_m: plan.of(&shot.ground_m),
-            height_m: LaserSurface::height_m(&shot.ground_m).0,
+            height_m: height_m(model, &shot.ground_m).0,
             profile: shot.profile,
         }
     }

@@ -2,8 +2,10 @@
 
 use nalgebra::{Vector2, Vector3};
 
-use super::LaserSurface;
-use crate::geom::ellipsoid::local_axes;
+use crate::{
+    body::BodyModel,
+    geom::ellipsoid::{local_axes, on_ellipsoid_m},
+};
 
 /// An azimuthal equidistant map on the sphere through the middle of a site: distances of a few kilometres are true to
 /// 1e-4 within 80 km of it, at the poles too.
@@ -17,7 +19,7 @@ pub(super) struct Plan {
 
 impl Plan {
     /// The map around the middle of the directions to `places_m`, at the height of the ellipsoid there.
-    pub(super) fn around(places_m: impl Iterator<Item = Vector3<f64>>) -> Self {
+    pub(super) fn around(model: &BodyModel, places_m: impl Iterator<Item = Vector3<f64>>) -> Self {
         let sum: Vector3<f64> = places_m.map(|place| place.normalize()).sum();
         let up = sum.try_normalize(0.0).unwrap_or_else(Vector3::z);
         let axes = local_axes(&up);
@@ -25,7 +27,7 @@ impl Plan {
             up,
             east: axes.row(0).transpose(),
             north: axes.row(1).transpose(),
-            radius_m: LaserSurface::on_ellipsoid_m(&up).norm(),
+            radius_m: on_ellipsoid_m(model, &up).norm(),
         }
     }
 

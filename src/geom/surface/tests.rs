@@ -1,6 +1,8 @@
 //! Against closed forms and against the full expression of the covariance.
 
 use super::*;
+use crate::body::Body;
+use crate::{body::MARS_IAU2000, geom::ellipsoid::on_ellipsoid_m};
 
 /// Shots along a meridian from the equator northwards, `spacing_m` apart, with these heights.
 fn profile(heights_m: &[f64], spacing_m: f64, east_m: f64, profile: usize) -> Vec<SurfaceShot> {
@@ -15,7 +17,7 @@ fn place(east_m: f64, north_m: f64, height_m: f64) -> Vector3<f64> {
     let radius_m = MARS_IAU2000.equatorial_radius_m;
     let (east_rad, north_rad) = (east_m / radius_m, north_m / radius_m);
     let up = crate::geom::ellipsoid::spherical_to_xyz_m(east_rad, north_rad, 1.0);
-    LaserSurface::on_ellipsoid_m(&up) + height_m * up
+    on_ellipsoid_m(Body::Mars.model(), &up) + height_m * up
 }
 
 /// Heights whose root mean square difference over one spacing is known.
@@ -137,12 +139,12 @@ fn roughness_is_learnt_without_the_noise_of_the_shots() {
 #[test]
 fn heights_change_with_the_place_as_differences_say() {
     let ground_m = place(1_234_567.0, 2_345_678.0, -4_321.0);
-    let (_, by_place) = LaserSurface::height_m(&ground_m);
+    let (_, by_place) = height_m(Body::Mars.model(), &ground_m);
     for axis in 0..3 {
         let mut step = Vector3::zeros();
         step[axis] = 10.0;
         let [after_m, before_m] =
-            [ground_m + step, ground_m - step].map(|place| LaserSurface::height_m(&place).0);
+            [ground_m + step, ground_m - step].map(|place| height_m(Body::Mars.model(), &place).0);
         // Central differences over 20 m; curvature of a globe: 1e-9.
         assert!(((after_m - before_m) / 20.0 - by_place[axis]).abs() < 1e-8);
     }

@@ -3,9 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::Query;
-use crate::{
-    frames::MarsDatum, geom::window::Extent, pds::pedr::Record, units::RADIANS_PER_MICRODEGREE,
-};
+use crate::{body::Datum, geom::window::Extent, pds::pedr::Record, units::RADIANS_PER_MICRODEGREE};
 
 /// Records of a block: 0.1 MB, 13° of latitude.
 pub(super) const BLOCK_RECORDS: usize = 128;
@@ -89,7 +87,7 @@ impl Block {
     }
 
     /// Whether a record of the block may have a shot that is asked for; see [`Query::may_matter`].
-    pub(super) fn may_matter(&self, query: &Query<'_>, datum: MarsDatum) -> bool {
+    pub(super) fn may_matter(&self, query: &Query<'_>, datum: Datum) -> bool {
         let radians = |microdegrees: i32| f64::from(microdegrees) * RADIANS_PER_MICRODEGREE;
         let whole = |microdegrees: u32| f64::from(microdegrees) * RADIANS_PER_MICRODEGREE;
         let extent = Extent {
@@ -156,7 +154,7 @@ mod tests {
             [west, width] in [0.0..2.0 * PI, 0.001..PI],
             [south, height] in [-0.5 * PI..0.5 * PI, 0.0..0.3_f64],
             time in proptest::option::of((-1e4..1e4_f64, 0.0..1e3_f64)),
-            datum in prop_oneof![Just(MarsDatum::Iau2000), Just(MarsDatum::Iau1991)],
+            datum in prop_oneof![Just(Datum::Iau2000), Just(Datum::Iau1991)],
         ) {
             let region = Region::new(&WindowShape::Box {
                 west_rad: west,

@@ -18,8 +18,8 @@ use super::{
     block::{BLOCK_RECORDS, Block},
 };
 use crate::{
+    body::Datum,
     files::Identity,
-    frames::MarsDatum,
     pds::pedr::{Complaint, RULES},
 };
 
@@ -90,7 +90,7 @@ impl IndexedFile {
     pub(super) fn rows(
         &self,
         query: &Query<'_>,
-        datum: MarsDatum,
+        datum: Datum,
         records: usize,
     ) -> Option<Vec<Range<usize>>> {
         let blocks = self.blocks_of(records)?;

@@ -4,7 +4,7 @@ use std::f64::consts::FRAC_PI_2;
 
 use crate::{
     altimetry::ShotFilter,
-    frames::MarsDatum,
+    body::Datum,
     geom::window::{Region, WindowGrid},
     pds::pedr::Record,
     time::Interval,
@@ -77,8 +77,8 @@ impl<'a> Query<'a> {
     }
 
     /// How much farther than in the coordinates of its file a direction may be from a window, radians.
-    pub(super) fn margin_rad(datum: MarsDatum) -> f64 {
-        if datum == MarsDatum::Iau2000 {
+    pub(super) fn margin_rad(datum: Datum) -> f64 {
+        if datum == Datum::Iau2000 {
             0.0
         } else {
             DATUM_MARGIN_RAD
@@ -86,7 +86,7 @@ impl<'a> Query<'a> {
     }
 
     /// Whether a record may have a shot that is asked for; in doubt, and when its place is impossible, it may.
-    pub(super) fn may_matter(&self, record: &Record, datum: MarsDatum) -> bool {
+    pub(super) fn may_matter(&self, record: &Record, datum: Datum) -> bool {
         let mid = record.mid_point();
         let margin_rad = mid.reach_rad + Self::margin_rad(datum);
         let may_be_inside = mid.latitude_rad.abs() > FRAC_PI_2

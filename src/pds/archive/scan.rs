@@ -4,11 +4,11 @@ use std::ops::Range;
 
 use super::{Found, Judged, Query, ShotRejection, Source};
 use crate::{
+    body::{Body, Datum},
     footprints::Footprint,
-    frames::{MarsDatum, MarsIau2000},
     geom::{
+        body_rotation::convert_datum,
         ellipsoid::{Spherical, spherical_to_xyz_m},
-        mars_rotation::convert_datum,
     },
     pds::pedr::{Frame, SHOTS, Stretch},
     time::Et,
@@ -107,12 +107,12 @@ impl Scan<'_> {
     /// East longitude and areocentric latitude in IAU 2000, radians.
     fn iau2000(&self, shot: &Footprint) -> (f64, f64) {
         let datum = self.source.datum();
-        if datum == MarsDatum::Iau2000 {
+        if datum == Datum::Iau2000 {
             return (shot.longitude_rad, shot.latitude_rad);
         }
         let at = Et::from_seconds(shot.et_tag_s);
         let direction = spherical_to_xyz_m(shot.longitude_rad, shot.latitude_rad, 1.0);
-        let direction = convert_datum::<MarsIau2000>(direction, datum, at, at);
+        let direction = convert_datum(Body::Mars, direction, datum, at, at);
         let spherical = Spherical::from_xyz_m(&direction.xyz_m);
         (spherical.longitude_rad, spherical.latitude.0)
     }

@@ -10,10 +10,10 @@ use std::{
 use super::{Found, IndexedFile, Indexes, Judged, Query};
 use crate::{
     altimetry::DatumChoice,
+    body::Datum,
     error::{Locate, Result},
     files::{Identity, file_name},
     footprints::SourceFile,
-    frames::MarsDatum,
     pds::pedr::{Complaint, FieldGuard, PedrLabel, Reader, decide_datum},
 };
 
@@ -22,7 +22,7 @@ use crate::{
 pub struct Source {
     path: PathBuf,
     version: Option<char>,
-    datum: MarsDatum,
+    datum: Datum,
     label: PedrLabel,
     records: usize,
     first_s: f64,
@@ -88,7 +88,7 @@ impl Source {
 
     /// Datum of its coordinates.
     #[must_use]
-    pub const fn datum(&self) -> MarsDatum {
+    pub const fn datum(&self) -> Datum {
         self.datum
     }
 

@@ -8,7 +8,7 @@ use nalgebra::{Matrix2, Matrix3, Vector2};
 
 use super::document::{IsdError, Object};
 use crate::{
-    geom::{attitude::OmegaPhiKappa, mars_rotation::frame_rotation_3, pushbroom::Distortion},
+    geom::{attitude::OmegaPhiKappa, body_rotation::frame_rotation_3, pushbroom::Distortion},
     instruments::{
         DetectorLine, DistortionModel, Instrument, LabelNames, Mounting, NaifNames, Optics,
         PointingTime, Sense, SummingLimits,

@@ -11,7 +11,7 @@ use super::{
     },
 };
 use crate::{
-    constants::MARS_IAU2000,
+    body::MARS_IAU2000,
     units::{METRES_PER_CM, RADIANS_PER_MICRODEGREE},
 };
 

@@ -11,7 +11,7 @@ use super::Reason;
 pub struct Complaint {
     /// Name of the file, without folders.
     pub file: String,
-    /// Record, counted from 1 with the label records; `None` when it concerns the whole file.
+    /// Record, counted from 1 with the label records, or line of a table; `None` when it concerns the whole file.
     pub record: Option<u32>,
     /// Reason code, for counts.
     pub reason: Reason,
@@ -31,7 +31,9 @@ impl fmt::Display for Complaint {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         formatter.write_str(&self.file)?;
         if let Some(record) = self.record {
-            write!(formatter, " record {record}")?;
+            let line = self.reason == Reason::Row;
+            let counted = if line { "line" } else { "record" };
+            write!(formatter, " {counted} {record}")?;
         }
         write!(formatter, ": {}", self.text)
     }

@@ -50,6 +50,8 @@ pub enum Reason {
     Orbit,
     /// The record does not lie between its neighbours.
     Neighbours,
+    /// The row of a table is no shot.
+    Row,
 }
 
 /// An impossible value in a record.

@@ -5,8 +5,8 @@ use std::path::Path;
 use super::{LABEL_BYTES, LABEL_RECORDS, RECORD_BYTES};
 use crate::{
     altimetry::DatumChoice,
+    body::Datum,
     error::{Cause, Kind},
-    frames::MarsDatum,
     pds::label::{Label, LabelError, parse},
 };
 
@@ -55,7 +55,7 @@ pub struct PedrLabel {
     /// Data set.
     pub data_set_id: Option<String>,
     /// The datum that the label names, when it names one and no other.
-    pub datum: Option<MarsDatum>,
+    pub datum: Option<Datum>,
     /// Records of the file with those of the label; the archive often writes `UNK`.
     pub file_records: Option<u64>,
     /// Records that the label says it takes.
@@ -153,9 +153,9 @@ fn software_version(bytes: &[u8], label: &Label) -> Option<f64> {
 }
 
 /// The datum in the entries about coordinates, or else anywhere in the label.
-fn named_datum(label: &Label) -> Option<MarsDatum> {
+fn named_datum(label: &Label) -> Option<Datum> {
     let only = |required: &str| {
-        let mut named: Vec<MarsDatum> = label
+        let mut named: Vec<Datum> = label
             .entries
             .iter()
             .filter(|entry| entry.key.contains(required))
@@ -171,10 +171,10 @@ fn named_datum(label: &Label) -> Option<MarsDatum> {
 }
 
 /// The datums that a text names, written as `IAU1991`, `IAU 1991`, `IAU_1991` or the like.
-fn datums_in(text: &str) -> Vec<MarsDatum> {
+fn datums_in(text: &str) -> Vec<Datum> {
     let letters: String = text.chars().filter(char::is_ascii_alphanumeric).collect();
     let letters = letters.to_ascii_uppercase();
-    [MarsDatum::Iau1991, MarsDatum::Iau1994, MarsDatum::Iau2000]
+    [Datum::Iau1991, Datum::Iau1994, Datum::Iau2000]
         .into_iter()
         .filter(|datum| letters.contains(&datum.to_string().to_ascii_uppercase()))
         .collect()
@@ -194,11 +194,11 @@ pub enum DatumError {
         /// One source.
         first: DatumSource,
         /// What it says.
-        first_datum: MarsDatum,
+        first_datum: Datum,
         /// The other source.
         second: DatumSource,
         /// What it says.
-        second_datum: MarsDatum,
+        second_datum: Datum,
     },
 }
 
@@ -251,8 +251,8 @@ impl Cause for DatumError {
 pub fn decide_datum(
     choice: DatumChoice,
     version: Option<char>,
-    label: Option<MarsDatum>,
-) -> Result<MarsDatum, DatumError> {
+    label: Option<Datum>,
+) -> Result<Datum, DatumError> {
     let stated = match choice {
         DatumChoice::Stated(datum) => Some((DatumSource::Configuration, datum)),
         DatumChoice::Auto => None,
@@ -260,8 +260,8 @@ pub fn decide_datum(
     let label = label.map(|datum| (DatumSource::Label, datum));
     let letter = version.and_then(|letter| {
         let datum = match letter {
-            'L' => MarsDatum::Iau2000,
-            'A'..'L' => MarsDatum::Iau1991,
+            'L' => Datum::Iau2000,
+            'A'..'L' => Datum::Iau1991,
             _ => return None,
         };
         Some((DatumSource::Letter(letter), datum))
@@ -270,7 +270,7 @@ pub fn decide_datum(
     for (index, (first, first_datum)) in said.iter().enumerate() {
         for (second, second_datum) in &said[index + 1..] {
             let refined = matches!(first, DatumSource::Letter(_))
-                && (*first_datum, *second_datum) == (MarsDatum::Iau1991, MarsDatum::Iau1994);
+                && (*first_datum, *second_datum) == (Datum::Iau1991, Datum::Iau1994);
             if first_datum != second_datum && !refined {
                 return Err(DatumError::Contradiction {
                     first: *first,
@@ -290,7 +290,7 @@ pub fn decide_datum(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use MarsDatum::{Iau1991, Iau1994, Iau2000};
+    use Datum::{Iau1991, Iau1994, Iau2000};
 
     #[test]
     fn names_give_orbit_and_letter_in_either_case() {

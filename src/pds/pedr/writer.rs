@@ -8,8 +8,8 @@ use std::{
 
 use super::{LABEL_BYTES, LABEL_RECORDS, RECORD_BYTES, Record};
 use crate::{
+    body::Datum,
     error::{Cause, IoError, Kind, Locate, Result},
-    frames::MarsDatum,
 };
 
 /// Data set of every PEDR.
@@ -23,7 +23,7 @@ pub struct LabelInfo {
     /// Software version, 0 to 9.99; two decimals are written.
     pub software_version: f64,
     /// Datum of longitudes and latitudes.
-    pub datum: MarsDatum,
+    pub datum: Datum,
     /// What the file is and that it is synthetic, in one line of ASCII without quotes.
     pub note: String,
 }
@@ -166,7 +166,7 @@ mod tests {
         LabelInfo {
             product_id: "AP19215L.B".to_owned(),
             software_version: 7.25,
-            datum: MarsDatum::Iau2000,
+            datum: Datum::Iau2000,
             note: "synthetic".to_owned(),
         }
     }

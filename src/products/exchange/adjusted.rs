@@ -10,7 +10,7 @@ use super::{
     points::{GroundEstimate, ImageMeasure},
 };
 use crate::{
-    frames::{MarsIau2000, Position},
+    frames::{BodyFixed, Position},
     products::{
         AdjustmentProducts, ImageProducts, SiteProducts,
         product::{Content, Declaration, Program, Role, Use, Write},
@@ -54,7 +54,8 @@ pub(in crate::products) static CONTROL: Declaration = Declaration {
             .collect();
         let points = control_points(of.site, geometric.ties, adjustment, &files);
         let some = !points.is_empty();
-        some.then(|| write_gcp(path, &points)).transpose()
+        some.then(|| write_gcp(path, of.site.config.body, &points))
+            .transpose()
     }),
     uses: &[Use {
         program: Program::StereoPipeline,
@@ -73,7 +74,7 @@ pub(super) fn isis_name(site: &SiteProducts, image: &ImageProducts) -> String {
         .unwrap_or_else(|| id.clone())
 }
 
-fn estimate(position: Position<MarsIau2000>, covariance_m2: Matrix3<f64>) -> GroundEstimate {
+fn estimate(position: Position<BodyFixed>, covariance_m2: Matrix3<f64>) -> GroundEstimate {
     GroundEstimate {
         position,
         covariance_m2,

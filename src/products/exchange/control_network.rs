@@ -13,6 +13,7 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::points::{GroundEstimate, ImageMeasure};
 use crate::{
+    body::Body,
     error::{Locate, Result},
     products::{error::ProductError, files::write_text},
     ties::KnownGround,
@@ -26,8 +27,10 @@ const EDGE_TO_ISIS: f64 = 0.5;
 pub struct ControlNetwork<'a> {
     /// Identifier.
     pub id: &'a str,
+    /// The body that its points lie on.
+    pub body: Body,
     /// What it is.
-    pub description: &'a str,
+    pub description: String,
     /// UTC that stands for its creation, ISO 8601.
     pub created_utc: &'a str,
     /// Its points.
@@ -162,11 +165,11 @@ fn text(network: &ControlNetwork) -> std::result::Result<String, ProductError> {
     let mut lines = Lines::default();
     lines.open("Object", "ControlNetwork");
     lines.key("NetworkId", &quoted(network.id)?);
-    lines.key("TargetName", "Mars");
+    lines.key("TargetName", &network.body.names().name);
     lines.key("UserName", "areograph");
     lines.key("Created", network.created_utc);
     lines.key("LastModified", network.created_utc);
-    lines.key("Description", &quoted(network.description)?);
+    lines.key("Description", &quoted(&network.description)?);
     lines.key("Version", "5");
     for point in &network.points {
         lines.open("Object", "ControlPoint");

@@ -16,8 +16,9 @@ use super::{
     points::{GroundEstimate, ImageMeasure, above_zero},
 };
 use crate::{
+    body::Body,
     error::{Locate, Result},
-    products::{error::ProductError, files::write_text, gis::SPHERE_RADIUS_M},
+    products::{error::ProductError, files::write_text},
     units::RADIANS_PER_DEGREE,
 };
 
@@ -52,17 +53,22 @@ pub struct ControlMeasure<'a> {
 /// [`Kind::Bug`](crate::error::Kind::Bug) for what the reader would refuse or read as something else:
 /// standard deviations that are not above 0, numbers that are not finite, names of files with spaces or
 /// commas; [`Kind::Io`](crate::error::Kind::Io).
-pub fn write_gcp(path: &Path, points: &[ControlPoint]) -> Result<u64> {
+pub fn write_gcp(path: &Path, body: Body, points: &[ControlPoint]) -> Result<u64> {
+    let map = body.map();
     let mut text = format!(
-        "# bundle_adjust --datum D_MARS (sphere of {SPHERE_RADIUS_M} m, Mars IAU 2000); pixels from 0\n\
+        "# bundle_adjust --datum {} (sphere of {} m, {} {}); pixels from 0\n\
          # number latitude longitude height_m sigma_x_m sigma_y_m sigma_z_m, and for each image: \
-         file column row sigma_column sigma_row\n"
+         file column row sigma_column sigma_row\n",
+        map.asp_datum,
+        map.radius_m,
+        body.names().name,
+        body.names().short_frame
     );
     let measured = points.iter().filter(|point| !point.measures.is_empty());
     let mut number = 0;
     for point in measured {
         number += 1;
-        let line = line(number, point).in_file(path)?;
+        let line = line(number, map.radius_m, point).in_file(path)?;
         let _infallible = writeln!(text, "# {number} is {}\n{line}", comment(point.id));
     }
     write_text(path, &text)?;
@@ -74,7 +80,11 @@ fn comment(id: &str) -> String {
     id.replace(char::is_control, " ")
 }
 
-fn line(number: u64, point: &ControlPoint) -> std::result::Result<String, ProductError> {
+fn line(
+    number: u64,
+    datum_m: f64,
+    point: &ControlPoint,
+) -> std::result::Result<String, ProductError> {
     let id = point.id;
     let spherical = point.ground.spherical();
     let sigmas_m = point.ground.covariance_m2.diagonal().map(f64::sqrt);
@@ -82,7 +92,7 @@ fn line(number: u64, point: &ControlPoint) -> std::result::Result<String, Produc
         "{number} {:.DEGREE_DECIMALS$} {:.DEGREE_DECIMALS$} {:.METRE_DECIMALS$}",
         spherical.latitude.0 / RADIANS_PER_DEGREE,
         spherical.longitude_rad / RADIANS_PER_DEGREE,
-        spherical.radius_m - SPHERE_RADIUS_M,
+        spherical.radius_m - datum_m,
     );
     above_zero(&format!("radius of {id}, metres,"), spherical.radius_m)?;
     for sigma_m in sigmas_m.iter() {

@@ -7,12 +7,13 @@ use std::path::Path;
 use rusqlite::{Connection, OpenFlags, params, params_from_iter, types::Value};
 
 use crate::{
+    body::Body,
     error::{Error, IoError, Locate, Result},
     products::{
         error::ProductError,
         files::{create, finish, open},
         footprints::features,
-        gis::{CRS_NAME, CRS_WKT, Features},
+        gis::{Features, crs_wkt},
         product::{Content, Declaration, Program, Role, Use, Write},
         table::{Kind, Meaning, Table, Values},
     },
@@ -31,9 +32,6 @@ pub(in crate::products) static GEOPACKAGE: Declaration = Declaration {
         lines: "ogrinfo -al -so footprints.gpkg                  GeoPackage, all columns",
     }],
 };
-
-/// Identifies the coordinate system inside the file, and with the organization `IAU_2015`.
-const SRS_ID: i32 = 49_900;
 
 /// What the standard asks for; `application_id` spells "GPKG".
 const LAYOUT: &str = "
@@ -129,7 +127,7 @@ fn each(features: &Features, mut take: impl FnMut(Vec<Value>) -> Result<()>) -> 
     for rows in features.attributes.pieces() {
         let values = features.attributes.values(rows.clone())?;
         for (row, point) in features.points[rows].iter().enumerate() {
-            let geometry = Value::Blob(geometry(point));
+            let geometry = Value::Blob(geometry(features.body, point));
             let attributes = values.iter().map(|of| value(of, row));
             take([geometry].into_iter().chain(attributes).collect())?;
         }
@@ -177,12 +175,20 @@ fn fill(path: &Path, features: &Features) -> Result<()> {
 
 /// Fills the tables of contents.
 fn describe(database: &Connection, features: &Features) -> rusqlite::Result<()> {
+    let (map, wkt) = (features.body.map(), crs_wkt(features.body));
     let systems = "INSERT INTO gpkg_spatial_ref_sys VALUES (?, ?, ?, ?, ?, ?)";
     for (name, id, organization, definition, description) in [
         ("Undefined Cartesian SRS", -1, "NONE", "undefined", ""),
         ("Undefined geographic SRS", 0, "NONE", "undefined", ""),
         ("WGS 84 geodetic", 4326, "EPSG", WGS84_WKT, "the Earth"),
-        (CRS_NAME, SRS_ID, "IAU_2015", CRS_WKT, features.frame),
+        // Its code identifies it inside the file, and with the organization.
+        (
+            &*map.crs,
+            i64::from(map.code),
+            "IAU_2015",
+            &*wkt,
+            features.frame,
+        ),
     ] {
         let row = params![name, id, organization, id, definition, description];
         database.execute(systems, row)?;
@@ -200,12 +206,12 @@ fn describe(database: &Connection, features: &Features) -> rusqlite::Result<()> 
             south,
             east,
             north,
-            SRS_ID
+            map.code
         ],
     )?;
     database.execute(
         "INSERT INTO gpkg_geometry_columns VALUES (?, 'geom', 'POINT', ?, 1, 0)",
-        params![features.table, SRS_ID],
+        params![features.table, map.code],
     )?;
     Ok(())
 }
@@ -219,12 +225,12 @@ fn ends(values: impl Iterator<Item = f64>) -> [f64; 2] {
 }
 
 /// `GeoPackageBinary` without an envelope (2.1.3), around the well-known binary of a point with a height.
-fn geometry(point: &[f64; 3]) -> Vec<u8> {
+fn geometry(body: Body, point: &[f64; 3]) -> Vec<u8> {
     const VERSION: u8 = 0;
     const LITTLE_ENDIAN: u8 = 1;
     const POINT_Z: u32 = 1001;
     let mut bytes = vec![b'G', b'P', VERSION, LITTLE_ENDIAN];
-    bytes.extend(SRS_ID.to_le_bytes());
+    bytes.extend(body.map().code.to_le_bytes());
     bytes.push(LITTLE_ENDIAN);
     bytes.extend(POINT_Z.to_le_bytes());
     for coordinate in point {

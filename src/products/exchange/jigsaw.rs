@@ -204,9 +204,14 @@ impl<'a> Joined<'a> {
                 measures: measures.collect(),
             }
         };
+        let description = format!(
+            "tie points of areograph, adjusted; {}",
+            self.site.config.body.names().short_frame
+        );
         ControlNetwork {
             id: &self.site.config.site,
-            description: "tie points of areograph, adjusted; IAU 2000",
+            body: self.site.config.body,
+            description,
             created_utc,
             points: self.ties.iter().enumerate().map(point).collect(),
         }

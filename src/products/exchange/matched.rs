@@ -113,7 +113,8 @@ fn network<'a>(
     });
     ControlNetwork {
         id: &site.config.site,
-        description: "tie points matched by areograph",
+        body: site.config.body,
+        description: "tie points matched by areograph".to_owned(),
         created_utc: newest_utc(site),
         points: points.collect(),
     }

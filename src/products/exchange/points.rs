@@ -3,7 +3,7 @@
 use nalgebra::{Matrix3, RowVector3};
 
 use crate::{
-    frames::{MarsIau2000, Position},
+    frames::{BodyFixed, Position},
     geom::ellipsoid::Spherical,
     products::error::ProductError,
 };
@@ -12,7 +12,7 @@ use crate::{
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct GroundEstimate {
     /// Position, IAU 2000.
-    pub position: Position<MarsIau2000>,
+    pub position: Position<BodyFixed>,
     /// Covariance of its components, square metres.
     pub covariance_m2: Matrix3<f64>,
 }

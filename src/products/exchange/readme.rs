@@ -3,11 +3,12 @@
 use std::fmt::Write as _;
 
 use crate::{
+    body::Body,
     geom::light_time::LightTime,
     products::{
-        coordinates::FRAME,
+        coordinates::frame,
         files::write_text,
-        gis::POINT_Z_HEIGHT,
+        gis::{crs_code, point_z_height},
         light_time::convention,
         product::{Content, Context, Declaration, IMAGE, Program, Role, Write},
         site::SiteProducts,
@@ -42,8 +43,9 @@ fn text(of: &Context) -> String {
     let site = of.site;
     let mut text = format!(
         "Products of the site {} for other programs. Commands are given for this folder.\n\n\
-         Frame: {FRAME}.\n\n",
-        site.config.site
+         Frame: {}.\n\n",
+        site.config.site,
+        frame(site.config.body)
     );
     if !site.images.is_empty() {
         text += &light_time(site);
@@ -66,7 +68,7 @@ fn text(of: &Context) -> String {
         if lines.is_empty() {
             continue;
         }
-        let _infallible = write!(text, "\n{}\n", about(program));
+        let _infallible = write!(text, "\n{}\n", about(program, site.config.body));
         for line in lines {
             for line in for_images(line, of) {
                 let _infallible = writeln!(text, "  {line}");
@@ -126,8 +128,13 @@ fn files(of: &Context) -> Vec<&'static Declaration> {
 
 /// The line, for every image if it is of images.
 fn for_images(line: &str, of: &Context) -> Vec<String> {
+    // Commands are declared for Mars.
+    let line = line.replace(
+        &*Body::Mars.map().asp_datum,
+        &of.site.config.body.map().asp_datum,
+    );
     if !line.contains(IMAGE) {
-        return vec![line.to_owned()];
+        return vec![line];
     }
     let images = of.site.images.iter();
     images
@@ -136,18 +143,23 @@ fn for_images(line: &str, of: &Context) -> Vec<String> {
 }
 
 /// What users of a program must know before they see its commands.
-fn about(program: Program) -> String {
+fn about(program: Program, body: Body) -> String {
     match program {
-        Program::StereoPipeline => "\
-            Ames Stereo Pipeline (D_MARS is a sphere of 3396190 m). Tables have radii instead of heights, so that the\n\
+        Program::StereoPipeline => format!(
+            "\
+            Ames Stereo Pipeline ({} is a sphere of {} m). Tables have radii instead of heights, so that the\n\
             choice of a datum does not matter; the .json beside each names its columns, its --csv-format and what its\n\
-            radii are. The first line names the columns."
-            .to_owned(),
+            radii are. The first line names the columns.",
+            body.map().asp_datum,
+            body.map().radius_m
+        ),
         Program::Isis => "ISIS (cubes need spiceinit first)".to_owned(),
         Program::Gis => format!(
-            "GIS: IAU_2015:49900, longitudes -180..180, areocentric latitudes; {POINT_Z_HEIGHT}.\n\
+            "GIS: {}, longitudes -180..180, areocentric latitudes; {}.\n\
              The dates inside the GeoPackage and the shapefile are those of the newest shot.\n\
-             QGIS: Layer > Add Layer > Add Vector Layer, any of these."
+             QGIS: Layer > Add Layer > Add Vector Layer, any of these.",
+            crs_code(body),
+            point_z_height(body)
         ),
         Program::CameraModel => "\
             Community Sensor Model (usgscsm): image support data of the cameras. They differ from the\n\

@@ -21,7 +21,7 @@ use crate::{
         error::ProductError,
         files::{create, finish, open, write_bytes, write_text},
         footprints::features,
-        gis::{CRS_WKT, Features},
+        gis::{Features, crs_wkt},
         product::{Content, Context, Declaration, Program, Role, Use, Write},
         table::{DbaseField, Kind, Table, Values},
     },
@@ -86,7 +86,7 @@ pub(in crate::products) static ATTRIBUTES: Declaration = part!(
 pub(in crate::products) static PROJECTION: Declaration = part!(
     "exchange/footprints.prj",
     "coordinate system of footprints.shp",
-    |path, _| write_text(path, CRS_WKT)
+    |path, of| write_text(path, &crs_wkt(of.site.config.body))
 );
 
 pub(in crate::products) static ENCODING: Declaration = part!(

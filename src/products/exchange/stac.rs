@@ -6,14 +6,14 @@ use chrono::{NaiveDateTime, TimeDelta};
 use serde_json::{Map, Value, json};
 
 use crate::{
-    constants::SPACECRAFT,
     error::{Locate, Result},
     files::hash_file,
     products::{
-        coordinates::{FRAME, bounding_box_deg, degrees, signed_longitude_deg},
+        coordinates::{bounding_box_deg, degrees, frame, signed_longitude_deg},
         error::ProductError,
         files::write_json,
         footprints::points_deg,
+        gis::crs_code,
         light_time::convention,
         product::{Content, Context, Declaration, Program, Role, Use, Write},
         site::SiteProducts,
@@ -62,7 +62,7 @@ fn item(of: &Context) -> Result<Option<Value>> {
     let Some([start, end]) = period(site)? else {
         return Ok(None);
     };
-    let spacecraft = spacecraft(site);
+    let spacecraft = site.spacecraft();
     Ok(Some(json!({
         "type": "Feature",
         "stac_version": "1.1.0",
@@ -73,7 +73,7 @@ fn item(of: &Context) -> Result<Option<Value>> {
         "properties": {
             "title": site.config.site,
             "description": description(site),
-            "areograph:frame": FRAME,
+            "areograph:frame": frame(site.config.body),
             "areograph:light_time": convention(site),
             "datetime": start,
             "start_datetime": start,
@@ -81,9 +81,9 @@ fn item(of: &Context) -> Result<Option<Value>> {
             "mission": spacecraft,
             "platform": spacecraft.to_lowercase().replace(' ', "-"),
             "instruments": instruments(site),
-            "proj:code": "IAU_2015:49900",
-            "ssys:targets": ["Mars"],
-            "ssys:target_class": "planet",
+            "proj:code": crs_code(site.config.body),
+            "ssys:targets": [site.config.body.names().name],
+            "ssys:target_class": site.config.body.names().class.to_lowercase(),
         },
         "links": [],
         "assets": assets(of)?,
@@ -92,24 +92,12 @@ fn item(of: &Context) -> Result<Option<Value>> {
 
 fn description(site: &SiteProducts) -> String {
     match site.config.description.as_str() {
-        "" => format!("MOLA footprints and images of {}", site.config.site),
+        "" => format!(
+            "{} footprints and images of {}",
+            site.config.altimeter.name, site.config.site
+        ),
         text => text.to_owned(),
     }
-}
-
-/// The spacecraft of footprints and images: that of the program, and those that support data name.
-fn spacecraft(site: &SiteProducts) -> String {
-    let supports = || site.images.iter().map(|image| &image.times.support);
-    let own = !site.footprints.is_empty() || supports().any(Option::is_none);
-    let mut names: Vec<&str> = Vec::new();
-    names.extend(own.then_some(&*SPACECRAFT.full_name));
-    for support in supports().flatten() {
-        let is_it = |name: &&str| name.eq_ignore_ascii_case(&support.platform);
-        if !names.iter().any(is_it) {
-            names.push(&support.platform);
-        }
-    }
-    names.join(", ")
 }
 
 /// The altimeter, and the cameras in the order of their images.

@@ -5,12 +5,12 @@ use serde::Serialize;
 
 use super::{DEGREE_DECIMALS, KM_DECIMALS, METRE_DECIMALS, SECOND_DECIMALS};
 use crate::{
+    body::Body,
     products::{
         SiteProducts,
-        coordinates::{FRAME, degrees},
+        coordinates::{degrees, frame},
         files::write_json,
         footprints::Shot,
-        gis::SPHERE_RADIUS_M,
         product::{Content, Declaration, Program, Role, Use, Write},
         table::{Column, Table, Unit, column, meanings},
         text_table,
@@ -52,8 +52,9 @@ pub(in crate::products) static LOLA_LIKE_SIDECAR: Declaration = Declaration {
     rows: "",
     role: Role::Metadata,
     content: Content::Document(schema),
-    write: Write::Footprints(|path, _| {
+    write: Write::Footprints(|path, of| {
         let sidecar = Sidecar::new(
+            of.site.config.body,
             "lola_like.csv",
             "2:lon 3:lat 4:radius_km",
             LOLA_LIKE_RADIUS,
@@ -86,8 +87,9 @@ pub(in crate::products) static ODE_SIDECAR: Declaration = Declaration {
     rows: "",
     role: Role::Metadata,
     content: Content::Document(schema),
-    write: Write::Footprints(|path, _| {
+    write: Write::Footprints(|path, of| {
         let sidecar = Sidecar::new(
+            of.site.config.body,
             "ode_pts.csv",
             "1:lon 2:lat 5:radius_m",
             ODE_RADIUS,
@@ -112,7 +114,7 @@ struct Sidecar {
     file: &'static str,
     /// What `pc_align` of Ames Stereo Pipeline must be told.
     csv_format: &'static str,
-    #[schemars(extend("const" = "D_MARS"))]
+    #[schemars(extend("enum" = ["D_MARS", "D_MOON"]))]
     datum: &'static str,
     #[schemars(extend("exclusiveMinimum" = 0))]
     datum_radius_m: f64,
@@ -139,6 +141,7 @@ struct SidecarColumn {
 
 impl Sidecar {
     fn new(
+        body: Body,
         file: &'static str,
         csv_format: &'static str,
         radius: &'static str,
@@ -152,10 +155,10 @@ impl Sidecar {
         Self {
             file,
             csv_format,
-            datum: "D_MARS",
-            datum_radius_m: SPHERE_RADIUS_M,
+            datum: &body.map().asp_datum,
+            datum_radius_m: body.map().radius_m,
             radius,
-            frame: FRAME,
+            frame: frame(body),
             longitudes: "east, 0..360",
             header_lines: 1,
             columns: columns.collect(),

@@ -2,6 +2,7 @@
 
 use super::{NetProducts, WriteNet, write_csv, write_parquet};
 use crate::{
+    body::Body,
     products::{
         coordinates::degrees,
         exchange::geopackage,
@@ -72,8 +73,9 @@ fn features<'a>(of: &NetProducts<'a>) -> Features<'a> {
         table: "points",
         // A net has no date; the clock of the machine would give other bytes each time.
         newest_utc: "1970-01-01T00:00:00.000",
+        body: Body::Mars,
         frame: "Mars body-fixed, areocentric latitude, east longitude, in the frame in which the controls are given",
-        z: "z: 0, a plane triangulation has no heights",
+        z: "z: 0, a plane triangulation has no heights".to_owned(),
         points: points.collect(),
         attributes: table(of),
     }

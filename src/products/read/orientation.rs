@@ -7,7 +7,7 @@ use arrow::array::Array as _;
 use super::{ReadError, columns};
 use crate::{
     error::{Locate, Result},
-    frames::{MarsIau2000, Position},
+    frames::{BodyFixed, Position},
     time::Et,
 };
 
@@ -19,7 +19,7 @@ pub struct SampleRow {
     /// Lines from the middle of the header image.
     pub line_offset: f64,
     /// Perspective centre.
-    pub position: Position<MarsIau2000>,
+    pub position: Position<BodyFixed>,
     /// Rotation camera → IAU 2000, SPICE quaternion (w, x, y, z).
     pub camera_to_mars: [f64; 4],
     /// Distance of the boresight's ground point, metres, if the boresight meets the ellipsoid.

@@ -28,7 +28,8 @@ pub(in crate::report) fn many(site: &SiteProducts) -> bool {
 
 /// Profiles that have plots of their own, by index, in their order.
 pub(in crate::report) fn plotted(site: &SiteProducts) -> Vec<usize> {
-    let mut indices: Vec<usize> = (0..site.profiles.len()).collect();
+    let measured = |index: &usize| site.ranges.profiles[*index].measured() > 0;
+    let mut indices: Vec<usize> = (0..site.profiles.len()).filter(measured).collect();
     if many(site) {
         let mean_m = |index: &usize| site.ranges.profiles[*index].mean_without_outliers_m.abs();
         indices.sort_by(|one, other| mean_m(other).total_cmp(&mean_m(one)));
@@ -100,8 +101,8 @@ fn extreme(site: &SiteProducts, of: fn(f64, f64) -> f64) -> f64 {
 fn profile_plot(site: &SiteProducts, index: usize, limit: usize) -> Plot {
     let ranges = &site.ranges.profiles[index];
     let title = format!("Range − distance along {}", ranges.profile);
-    let before = site.profiles[..index].iter();
-    let shots = Shots::of(site, index, before.map(|profile| profile.rows.len()).sum());
+    let before = site.ranges.profiles[..index].iter();
+    let shots = Shots::of(site, index, before.map(ProfileRanges::measured).sum());
     let mut panel = Panel::of(
         "range − distance, m",
         vec![Series::dots("shots", 0, thinned(&shots.kept, limit))],
@@ -189,7 +190,7 @@ impl Shots {
             off_nadir_deg: Vec::new(),
             trend: Vec::new(),
         };
-        for shot in first..first + profile.rows.len() {
+        for shot in first..first + site.ranges.profiles[index].measured() {
             let row = all.row[shot] as usize;
             let seconds = site.footprints.et_s[row] - start_s;
             let residual = (seconds, all.range_minus_distance_m[shot]);

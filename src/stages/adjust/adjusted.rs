@@ -16,7 +16,7 @@ use super::{
     summary::AdjustmentSummary,
 };
 use crate::{
-    frames::{MarsIau2000, Position},
+    frames::{BodyFixed, Position},
     geom::{
         bundle::{Adjustment, ORIENTATION_UNKNOWNS, Residual, View},
         pushbroom::{CorrectedOrientation, ExteriorOrientation, OrientationCorrection, Sighting},
@@ -89,9 +89,9 @@ pub struct CorrectedPoint {
     /// Identifier.
     pub id: String,
     /// Where it was initially.
-    pub initial: Position<MarsIau2000>,
+    pub initial: Position<BodyFixed>,
     /// Where it is adjusted.
-    pub ground: Position<MarsIau2000>,
+    pub ground: Position<BodyFixed>,
     /// Covariance of the adjusted coordinates, m²: a priori variances times the summary's variance factor; of a tie point
     /// that fails the test against the surface and yet was kept, its distance from that too.
     pub covariance_m2: Matrix3<f64>,

@@ -4,7 +4,7 @@ use nalgebra::{Matrix3, Vector3};
 
 use crate::{
     config::{PositionUnknowns, RotationUnknowns},
-    frames::{MarsIau2000, Position},
+    frames::{BodyFixed, Position},
     geom::{bundle::ORIENTATION_UNKNOWNS, oriented_camera::OrientedCamera, surface::LaserSurface},
 };
 
@@ -88,7 +88,7 @@ pub struct LaserShot {
     /// Row of its footprint.
     pub row: u32,
     /// Footprint.
-    pub ground: Position<MarsIau2000>,
+    pub ground: Position<BodyFixed>,
     /// Its range, when an image was exposed from the same orbit meanwhile.
     pub range: Option<ShotRange>,
     /// The same range from other images that were exposed at that instant: it is observed once, but seen in all of them.

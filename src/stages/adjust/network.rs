@@ -14,7 +14,7 @@ use crate::{
     config::AdjustmentConfig,
     error::Result,
     footprints::FootprintImageCoordinates,
-    frames::{MarsIau2000, Position},
+    frames::{BodyFixed, Position},
     geom::{
         bundle::{BundleImage, BundlePoint, HeightControl, KnownCoordinates, Network, Range, View},
         pushbroom::{ExteriorOrientation, Projector},
@@ -256,7 +256,7 @@ impl<'a, M: ExteriorOrientation> Assembled<&'a M> {
         config: &AdjustmentConfig,
     ) -> Result<()> {
         require_images(ties, images.len())?;
-        let starts: BTreeMap<usize, &Position<MarsIau2000>> = starts
+        let starts: BTreeMap<usize, &Position<BodyFixed>> = starts
             .points
             .iter()
             .map(|point| (point.tie, &point.ground))

@@ -10,12 +10,11 @@ use super::input::{
 };
 use crate::{
     config::AdjustmentConfig,
-    constants::MARS_IAU2000,
     footprints::{AdjustmentModel, Footprints},
-    frames::{MarsIau2000, Position},
+    frames::{BodyFixed, Position},
     geom::{
-        attitude::rotation_vector, bundle::ORIENTATION_UNKNOWNS, ellipsoid::spherical_to_xyz_m,
-        mars_rotation::mars_spin_rad_s, orbit_axes::radial_along_cross,
+        attitude::rotation_vector, body_rotation::spin_rad_s, bundle::ORIENTATION_UNKNOWNS,
+        ellipsoid::spherical_to_xyz_m, orbit_axes::radial_along_cross,
         oriented_camera::OrientedCamera, pushbroom::ExteriorOrientation, surface::LaserSurface,
     },
     instruments::Altimeter,
@@ -100,7 +99,8 @@ impl<M: ExteriorOrientation> Candidate<'_, M> {
     fn orbit_axes(&self) -> Matrix3<f64> {
         let (pose, motion) = self.oriented_camera.orientation.pose_and_rate(0.0);
         let over_ground_m_s = motion.advance_m / self.times.line_times.mean_period_s();
-        let velocity_m_s = over_ground_m_s + mars_spin_rad_s(&MARS_IAU2000).cross(&pose.position_m);
+        let velocity_m_s =
+            over_ground_m_s + spin_rad_s(self.times.body.model()).cross(&pose.position_m);
         radial_along_cross(&pose.position_m, &velocity_m_s)
     }
 
@@ -112,7 +112,7 @@ impl<M: ExteriorOrientation> Candidate<'_, M> {
             [-half_lines, 0.0, half_lines].map(|x| orientation.pose(x).mars_to_camera);
         let duration_s = 2.0 * half_lines * self.times.line_times.mean_period_s();
         let against_mars = rotation_vector(&(after * before.transpose())) / duration_s;
-        against_mars - middle * mars_spin_rad_s(&MARS_IAU2000)
+        against_mars - middle * spin_rad_s(self.times.body.model())
     }
 
     /// All position unknowns get the standard deviation of nadir or of other images, and rotations what moves the
@@ -155,7 +155,7 @@ impl<M: ExteriorOrientation> Candidate<'_, M> {
 #[must_use]
 pub fn prepare_adjustment<M: ExteriorOrientation>(
     candidates: Vec<Candidate<'_, M>>,
-    footprints: &Footprints<MarsIau2000>,
+    footprints: &Footprints<BodyFixed>,
     profiles: &[Profile],
     surface: Option<LaserSurface>,
     laser: &Altimeter,
@@ -212,7 +212,7 @@ pub fn prepare_adjustment<M: ExteriorOrientation>(
 
 /// The range of a shot from every image that was exposed meanwhile; see [`exposed`].
 fn ranges_of(
-    footprints: &Footprints<MarsIau2000>,
+    footprints: &Footprints<BodyFixed>,
     row: u32,
     images: &[(&ImageTimes, &Orientation)],
 ) -> Vec<ShotRange> {
@@ -235,9 +235,8 @@ fn ranges_of(
 /// it places a shot most finely.
 fn exposed(images: &[&ImageTimes], instant: Et) -> Vec<usize> {
     let meanwhile = images.iter().enumerate();
-    // Positions of support data are not those of the spacecraft with the laser.
-    let meanwhile = meanwhile
-        .filter(|(_, times)| times.support.is_none() && times.exposures().contains(instant));
+    let meanwhile =
+        meanwhile.filter(|(_, times)| times.has_laser() && times.exposures().contains(instant));
     let mut meanwhile: Vec<(usize, &&ImageTimes)> = meanwhile.collect();
     meanwhile.sort_by(|(_, one), (_, other)| {
         let [period_s, other_s] = [one, other].map(|times| times.line_times.mean_period_s());
@@ -251,11 +250,14 @@ fn exposed(images: &[&ImageTimes], instant: Et) -> Vec<usize> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{config::usual_instrument, line_times::LineTimes, stages::tag_times::StartFrom};
+    use crate::{
+        body::Body, config::usual_instrument, line_times::LineTimes, stages::tag_times::StartFrom,
+    };
 
     fn image(id: &str, start_s: f64, lines: u32, period_s: f64) -> ImageTimes {
         ImageTimes {
             id: id.to_owned(),
+            body: Body::Mars,
             instrument: usual_instrument().clone(),
             line_times: LineTimes::even(Et::from_seconds(start_s), lines, period_s).unwrap(),
             start_from: StartFrom::Sclk,

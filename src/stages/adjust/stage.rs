@@ -85,7 +85,7 @@ impl Stage for Adjust<'_> {
                 let options = SurfaceOptions {
                     relief_sigma_m: relief_for_plan
                         .then_some(self.mola_surface.profile_plan_sigma_m),
-                    ..self.mola_surface.options()
+                    ..self.mola_surface.options(footprints.body)
                 };
                 shots.surface(&around, &options).ok()
             }

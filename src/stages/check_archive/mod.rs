@@ -22,10 +22,10 @@ use serde::{Deserialize, Serialize};
 
 use crate::{
     altimetry::{DatumChoice, MolaClock, ShotFilter},
+    body::Datum,
     config::RangeCheckConfig,
     error::{Locate as _, Result},
     files::{Identity, file_name},
-    frames::MarsDatum,
     pds::{
         archive::ShotRejection,
         pedr::{Complaint, FieldGuard, Reader, Stretch, decide_datum},
@@ -82,7 +82,7 @@ pub struct FileRanges {
     /// BLAKE3 of its bytes, hexadecimal.
     pub blake3: String,
     /// Datum of its coordinates.
-    pub datum: Option<MarsDatum>,
+    pub datum: Option<Datum>,
     /// Its profiles, in the order of records.
     pub profiles: Vec<ArchiveProfile>,
     /// Data records.
@@ -107,7 +107,7 @@ pub struct FileRanges {
 #[derive(Debug)]
 pub struct ArchiveSource {
     reader: Reader,
-    datum: MarsDatum,
+    datum: Datum,
 }
 
 /// Records of a file with the trajectory over their time.

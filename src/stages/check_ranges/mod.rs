@@ -13,6 +13,7 @@ mod figures;
 mod orbit;
 mod residuals;
 mod scan;
+mod tables;
 
 use std::sync::atomic::AtomicBool;
 
@@ -25,7 +26,7 @@ use crate::{
     config::RangeCheckConfig,
     error::{Cause, Kind, Result, Stopped},
     footprints::{Footprint, Footprints},
-    frames::MarsIau2000,
+    frames::BodyFixed,
     geom::{
         range_residuals::{RangeResiduals, SpacecraftState},
         statistics::{Summary, Trend, outliers},
@@ -39,6 +40,7 @@ use crate::{
 pub use figures::RangeFigures;
 pub use residuals::ShotResiduals;
 pub use scan::{BiasScan, ScannedRadius};
+pub use tables::{CheckTableRanges, check_table_ranges};
 
 /// Residuals of every shot, and what they say about every profile.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -54,7 +56,7 @@ pub struct RangeCheck {
 stage_inputs! {
     /// Footprints, profiles, limits, the clock of MOLA, and what the trajectory comes from.
     pub struct CheckRanges<'a> {
-        /// Footprints in IAU 2000.
+        /// Footprints in the frame of the products.
         pub converted: &'a Output<Converted>,
         /// Profiles.
         pub profiles: &'a Output<Vec<Profile>>,
@@ -69,7 +71,7 @@ stage_inputs! {
 
 impl Stage for CheckRanges<'_> {
     const NAME: &'static str = "check_ranges";
-    const METHOD: u32 = 5;
+    const METHOD: u32 = 6;
     type Output = RangeCheck;
     stage_inputs!(fingerprint);
 
@@ -135,6 +137,8 @@ fn trajectory(session: &Session, profiles: &[Profile], reach_s: f64) -> Result<T
 pub struct ProfileRanges {
     /// Profile identifier.
     pub profile: String,
+    /// Its shots: of those of tables not all have a spacecraft besides their own.
+    pub shots: u32,
     /// Range − distance (SPK spacecraft, footprint with raw radius), metres.
     pub range_minus_distance_m: Summary,
     /// The same with the crossover-corrected radius, metres: crossover moves the footprint, not the range.
@@ -158,6 +162,12 @@ pub struct ProfileRanges {
 }
 
 impl ProfileRanges {
+    /// Shots whose residuals are known.
+    #[must_use]
+    pub const fn measured(&self) -> usize {
+        self.range_minus_distance_m.n as usize
+    }
+
     /// Mean distance of the file's own spacecraft from that of the kernels, metres.
     #[must_use]
     pub fn orbits_apart_m(&self) -> f64 {
@@ -168,7 +178,7 @@ impl ProfileRanges {
     #[must_use]
     pub fn figures(&self) -> RangeFigures {
         RangeFigures {
-            n: self.range_minus_distance_m.n,
+            n: self.shots,
             outliers: self.outliers,
             mean_m: [
                 self.range_minus_distance_m.mean,
@@ -207,7 +217,7 @@ impl Cause for OutsideTrajectory {
 /// # Source
 /// Shan et al. 2005, Table 3; the limits are ours, the paper has none.
 pub fn check_ranges(
-    footprints: &Footprints<MarsIau2000>,
+    footprints: &Footprints<BodyFixed>,
     profiles: &[Profile],
     trajectory: &Trajectory,
     clock: &MolaClock,
@@ -260,11 +270,10 @@ fn statistics(
     shots: &ShotResiduals,
     first: usize,
     scan: Option<BiasScan>,
-    footprints: &Footprints<MarsIau2000>,
+    footprints: &Footprints<BodyFixed>,
 ) -> ProfileRanges {
     let summary = |column: &[f64]| Summary::of(&column[first..]);
-    let seconds: Vec<f64> = profile
-        .rows
+    let seconds: Vec<f64> = shots.row[first..]
         .iter()
         .map(|row| Et::from_seconds(footprints.et_s[*row as usize]).since(profile.interval.start))
         .collect();
@@ -278,6 +287,7 @@ fn statistics(
     };
     ProfileRanges {
         profile: profile.id.clone(),
+        shots: u32::try_from(profile.rows.len()).unwrap_or(u32::MAX),
         range_minus_distance_m: summary(&shots.range_minus_distance_m),
         range_minus_distance_crossover_m: summary(&shots.range_minus_distance_crossover_m),
         decoding_m: summary(&shots.decoding_m),

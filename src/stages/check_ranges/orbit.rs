@@ -5,10 +5,11 @@
 
 use crate::{
     altimetry::MolaClock,
+    body::{Body, Datum},
     footprints::Footprints,
-    frames::{MarsDatum, MarsIau2000},
+    frames::BodyFixed,
     geom::{
-        mars_rotation::{mars_matrix, mars_rotation},
+        body_rotation::{body_matrix, body_rotation},
         orbit_axes::radial_along_cross,
         range_residuals::own_spacecraft,
     },
@@ -18,7 +19,7 @@ use crate::{
 
 /// What would bring the two together in the middle of the profile: another datum, another clock correction, or neither.
 pub(super) fn cause(
-    footprints: &Footprints<MarsIau2000>,
+    footprints: &Footprints<BodyFixed>,
     profile: &Profile,
     trajectory: &Trajectory,
     clock: &MolaClock,
@@ -29,7 +30,7 @@ pub(super) fn cause(
 }
 
 fn together(
-    footprints: &Footprints<MarsIau2000>,
+    footprints: &Footprints<BodyFixed>,
     profile: &Profile,
     trajectory: &Trajectory,
     clock: &MolaClock,
@@ -38,13 +39,13 @@ fn together(
     let shot = footprints.row(*profile.rows.get(profile.rows.len() / 2)? as usize);
     let at = clock.spacecraft_time(shot.et_tag_s);
     let (position, velocity_m_s) = (trajectory.position(at)?, trajectory.velocity_m_s(at)?);
-    let to_mars = *mars_rotation::<MarsIau2000>(at).matrix();
+    let to_mars = *body_rotation(Body::Mars, at).matrix();
     let datum = footprints.files.get(usize::from(shot.file))?.datum;
     let own_m = to_mars.tr_mul(&own_spacecraft(&shot).xyz_m);
-    for other in [MarsDatum::Iau1991, MarsDatum::Iau1994, MarsDatum::Iau2000] {
+    for other in [Datum::Iau1991, Datum::Iau1994, Datum::Iau2000] {
         // Back into the file's coordinates, and out of them as if they were of the other datum.
-        let coordinates_m = mars_matrix(datum.model(), at) * own_m;
-        let moved_m = mars_matrix(other.model(), at).tr_mul(&coordinates_m);
+        let coordinates_m = body_matrix(datum.model(), at) * own_m;
+        let moved_m = body_matrix(other.model(), at).tr_mul(&coordinates_m);
         if other != datum && (moved_m - position.xyz_m).norm() <= limit_m {
             return Some(format!(
                 "they agree when its coordinates are of {other}, not of {datum} (pedr.datum)"

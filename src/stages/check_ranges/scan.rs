@@ -14,11 +14,12 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::{
+    body::Body,
     config::{RangeCheckConfig, SCAN_STEPS_MAX},
     footprints::Footprint,
-    frames::{MarsFixed as _, MarsIau2000, Position},
+    frames::{BodyFixed, Position},
     geom::{
-        mars_rotation::{frame_rotation_3, mars_rotation, mars_spin_rad_s},
+        body_rotation::{body_rotation, frame_rotation_3, spin_rad_s},
         range_residuals::{footprint, own_spacecraft, range_residual_m},
         statistics::{Trend, mean_and_deviation},
     },
@@ -90,7 +91,7 @@ impl BiasScan {
         let sighted: Vec<Sighted> = shots.iter().map(Sighted::of).collect();
         let [mut raw, mut crossover] =
             [ScannedRadius::Raw, ScannedRadius::Crossover].map(Self::empty);
-        let spin_rad_s = mars_spin_rad_s(MarsIau2000::model()).z;
+        let spin_rad_s = spin_rad_s(Body::Mars.model()).z;
         let spreads_m = |correction_s: &f64| {
             let turn = frame_rotation_3(spin_rad_s * correction_s);
             let residual = |shot: &Sighted| shot.residuals_m(trajectory, *correction_s, &turn);
@@ -144,7 +145,7 @@ struct Sighted {
     tag: Et,
     range_m: f64,
     /// With the raw and the corrected radius.
-    footprints: [Position<MarsIau2000>; 2],
+    footprints: [Position<BodyFixed>; 2],
     /// From J2000 to Mars at the tag.
     to_mars: Matrix3<f64>,
 }
@@ -157,7 +158,7 @@ impl Sighted {
             range_m: shot.range_m,
             footprints: [shot.radius_m, shot.radius_crossover_m]
                 .map(|radius_m| footprint(shot, radius_m)),
-            to_mars: *mars_rotation::<MarsIau2000>(tag).matrix(),
+            to_mars: *body_rotation(Body::Mars, tag).matrix(),
         }
     }
 
@@ -185,7 +186,7 @@ fn residual_m(
     correction_s: f64,
 ) -> Option<f64> {
     let at = Et::from_seconds(shot.et_tag_s + correction_s);
-    let spacecraft = mars_rotation::<MarsIau2000>(at).apply(&trajectory.position(at)?);
+    let spacecraft = body_rotation(Body::Mars, at).apply(&trajectory.position(at)?);
     Some(range_residual_m(
         shot.range_m,
         &spacecraft,
@@ -261,7 +262,7 @@ fn uncertainty_s(
         rates_m_s.push(change_m / (2.0 * RATE_STEP_S));
         let at = Et::from_seconds(shot.et_tag_s + best_s);
         let position = trajectory.position(at)?;
-        let to_mars = mars_rotation::<MarsIau2000>(at);
+        let to_mars = body_rotation(Body::Mars, at);
         let to_track = track_axes(&position.xyz_m, &trajectory.velocity_m_s(at)?).transpose()
             * to_mars.matrix().transpose();
         let spacecraft = to_mars.apply(&position);

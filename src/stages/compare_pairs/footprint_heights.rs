@@ -5,14 +5,13 @@ use serde::{Deserialize, Serialize};
 
 use crate::{
     footprints::Footprints,
-    frames::{MarsIau2000, Position},
+    frames::{BodyFixed, Position},
     geom::{
-        ellipsoid::spherical_to_xyz_m,
+        ellipsoid::{height_m, spherical_to_xyz_m},
         intersection::{IntersectionLimits, intersect},
         misregistration::ImageToImage,
         oriented_camera::OrientedCamera,
         pushbroom::ExteriorOrientation,
-        surface::LaserSurface,
     },
 };
 
@@ -22,7 +21,7 @@ pub struct FootprintHeight {
     /// Row of the footprint.
     pub row: u32,
     /// Where the rays meet.
-    pub ground: Position<MarsIau2000>,
+    pub ground: Position<BodyFixed>,
     /// Height of that above the ellipsoid along the radius, metres.
     pub height_m: f64,
     /// Height of the footprint, likewise.
@@ -46,9 +45,12 @@ pub(super) fn footprint_heights<M: ExteriorOrientation>(
     images: [&OrientedCamera<M>; 2],
     fit: &ImageToImage,
     rows: &[(u32, [f64; 2])],
-    footprints: &Footprints<MarsIau2000>,
+    footprints: &Footprints<BodyFixed>,
 ) -> Vec<FootprintHeight> {
-    let limits = IntersectionLimits::default();
+    let (limits, model) = (
+        IntersectionLimits::on(footprints.body),
+        footprints.body.model(),
+    );
     let height = |(row, first): &(u32, [f64; 2])| {
         let second = fit.second(*first)?;
         let rays = [(images[0], *first), (images[1], second)];
@@ -63,8 +65,8 @@ pub(super) fn footprint_heights<M: ExteriorOrientation>(
         Some(FootprintHeight {
             row: *row,
             ground: Position::new(ground_m),
-            height_m: LaserSurface::height_m(&ground_m).0,
-            mola_m: LaserSurface::height_m(&footprint_m).0,
+            height_m: height_m(model, &ground_m).0,
+            mola_m: height_m(model, &footprint_m).0,
         })
     };
     rows.iter().filter_map(height).collect()

@@ -14,9 +14,10 @@ use serde::{Deserialize, Serialize};
 
 use super::{read_ties::Ties, site_image::SiteImage};
 use crate::{
+    body::Body,
     config::IntersectionConfig,
     error::{Cause, Kind, Result},
-    frames::{MarsIau2000, Position},
+    frames::{BodyFixed, Position},
     geom::{
         intersection::{
             Intersection, IntersectionLimits, Ray, Unintersected, Weighting, intersect,
@@ -40,13 +41,15 @@ pub struct IntersectOptions {
     pub limits: IntersectionLimits,
 }
 
-impl From<&IntersectionConfig> for IntersectOptions {
-    fn from(config: &IntersectionConfig) -> Self {
+impl IntersectOptions {
+    /// As configured, on `body`.
+    #[must_use]
+    pub fn on(body: Body, config: &IntersectionConfig) -> Self {
         Self {
             weighting: config.weighting,
             limits: IntersectionLimits {
                 convergence_min_rad: config.convergence_min_rad,
-                ..IntersectionLimits::default()
+                ..IntersectionLimits::on(body)
             },
         }
     }
@@ -54,7 +57,7 @@ impl From<&IntersectionConfig> for IntersectOptions {
 
 impl Default for IntersectOptions {
     fn default() -> Self {
-        Self::from(&IntersectionConfig::default())
+        Self::on(Body::Mars, &IntersectionConfig::default())
     }
 }
 
@@ -79,7 +82,7 @@ pub struct IntersectedPoint {
     /// Its identifier.
     pub id: String,
     /// Where it lies.
-    pub ground: Position<MarsIau2000>,
+    pub ground: Position<BodyFixed>,
     /// Covariance of its coordinates with the common standard deviation of unit weight, m².
     pub covariance_m2: Matrix3<f64>,
     /// Angle between the two rays that differ most, radians.
@@ -202,10 +205,13 @@ impl Stage for Intersect<'_> {
             .iter()
             .map(|image| image.oriented_camera(*self.model))
             .collect();
+        let body = oriented
+            .first()
+            .map_or(Body::Mars, |image| image.image.body);
         intersect_ties(
             &images,
             &self.ties.value()?.points,
-            &self.intersection.into(),
+            &IntersectOptions::on(body, self.intersection),
         )
     }
 }

@@ -63,7 +63,7 @@ pub(super) fn checks(evidence: &Evidence<'_>) -> Vec<Check> {
 
 fn of_ranges(evidence: &Evidence<'_>) -> Vec<Check> {
     let limits = evidence.range_limits;
-    let shots = |of: &ProfileRanges| f64::from(of.range_minus_distance_m.n);
+    let shots = |of: &ProfileRanges| f64::from(of.shots);
     let quantities: [Quantity<ProfileRanges>; 3] = [
         (
             CheckKind::RangeMean,
@@ -81,8 +81,14 @@ fn of_ranges(evidence: &Evidence<'_>) -> Vec<Check> {
             limits.decoding_max_m,
         ),
     ];
+    // Shots of tables may have no spacecraft but their own.
+    let measured = |kind: CheckKind, of: &ProfileRanges| {
+        let of_two = matches!(kind, CheckKind::RangeMean | CheckKind::OrbitsApart);
+        !of_two || of.range_minus_distance_m.n > 0
+    };
     let worst = |kind: CheckKind, value: &dyn Fn(&ProfileRanges) -> f64, limit: f64| {
         let profiles = evidence.ranges.profiles.iter();
+        let profiles = profiles.filter(|of| measured(kind, of));
         Check::worst(profiles.map(|of| Check::new(kind, &*of.profile, value(of), limit, Fail)))
     };
     let mut checks: Vec<Option<Check>> = quantities

@@ -10,7 +10,7 @@ use super::{LayOverlays, MeasuredTies};
 use crate::{
     error::Result,
     footprints::Footprints,
-    frames::MarsIau2000,
+    frames::BodyFixed,
     geom::ellipsoid::spherical_to_xyz_m,
     stages::{
         adjust::{Adjusted, PointKind, RejectionReason},
@@ -92,7 +92,7 @@ pub(super) fn wanted(site: &LayOverlays, has_pixels: &[bool]) -> Result<Vec<Want
 fn of_footprints(
     registrations: &[&ImageRegistration],
     profiles: &[Profile],
-    footprints: &Footprints<MarsIau2000>,
+    footprints: &Footprints<BodyFixed>,
     has_pixels: &[bool],
 ) -> Vec<Wanted> {
     let with_pixels = || (0..registrations.len()).filter(|image| has_pixels[*image]);
@@ -171,7 +171,7 @@ fn spread(rows: &Inside) -> Vec<(u32, u32)> {
 }
 
 /// Position of a footprint, metres.
-fn ground_m(footprints: &Footprints<MarsIau2000>, row: u32) -> Vector3<f64> {
+fn ground_m(footprints: &Footprints<BodyFixed>, row: u32) -> Vector3<f64> {
     let row = row as usize;
     spherical_to_xyz_m(
         footprints.longitude_rad[row],

@@ -3,8 +3,8 @@
 use nalgebra::Vector3;
 
 use crate::{
-    constants::MARS_IAU2000, footprints::Footprints, frames::MarsIau2000,
-    geom::ellipsoid::spherical_to_xyz_m, stages::group_profiles::Profile,
+    body::Body, footprints::Footprints, frames::BodyFixed, geom::ellipsoid::spherical_to_xyz_m,
+    stages::group_profiles::Profile,
 };
 
 /// Shots that tell a height.
@@ -18,7 +18,10 @@ const SIGMA_MIN_M: f64 = 10.0;
 const SIGMA_WITHOUT_SHOTS_M: f64 = 2_000.0;
 
 /// What is known of the ground's height.
-pub(super) struct Heights(Vec<Vector3<f64>>);
+pub(super) struct Heights {
+    body: Body,
+    shots_m: Vec<Vector3<f64>>,
+}
 
 /// A radius with its standard deviation, metres.
 pub(super) struct Height {
@@ -27,27 +30,27 @@ pub(super) struct Height {
 }
 
 impl Heights {
-    /// Of shots at these places, Mars-fixed, metres.
-    pub(super) const fn at(shots_m: Vec<Vector3<f64>>) -> Self {
-        Self(shots_m)
+    /// Of shots at these places, body-fixed, metres.
+    pub(super) const fn at(body: Body, shots_m: Vec<Vector3<f64>>) -> Self {
+        Self { body, shots_m }
     }
 
-    pub(super) fn of(footprints: &Footprints<MarsIau2000>, profiles: &[Profile]) -> Self {
+    pub(super) fn of(footprints: &Footprints<BodyFixed>, profiles: &[Profile]) -> Self {
         let rows = profiles.iter().flat_map(|profile| &profile.rows);
         let shots = rows.map(|row| {
             let at = *row as usize;
             let (longitude, latitude) = (footprints.longitude_rad[at], footprints.latitude_rad[at]);
             spherical_to_xyz_m(longitude, latitude, footprints.radius_m[at])
         });
-        Self::at(shots.collect())
+        Self::at(footprints.body, shots.collect())
     }
 
-    /// The height at a place, metres Mars-fixed, whose own radius does not count: the mean of the nearest shots, the nearer
+    /// The height at a place, metres body-fixed, whose own radius does not count: the mean of the nearest shots, the nearer
     /// the more. Farther away it is less certain.
     pub(super) fn near(&self, place_m: &Vector3<f64>) -> Height {
         let direction = place_m.normalize();
         let mut nearest: Vec<(f64, f64)> = Vec::with_capacity(SHOTS + 1);
-        for shot_m in &self.0 {
+        for shot_m in &self.shots_m {
             let radius_m = shot_m.norm();
             let apart_m = (shot_m - radius_m * direction).norm();
             if nearest.len() == SHOTS && nearest.last().is_some_and(|(far_m, _)| apart_m >= *far_m)
@@ -59,7 +62,7 @@ impl Heights {
             nearest.truncate(SHOTS);
         }
         let Some((closest_m, _)) = nearest.first().copied() else {
-            let ellipsoid = &*MARS_IAU2000;
+            let ellipsoid = self.body.model();
             let equatorial = direction.x.hypot(direction.y) / ellipsoid.equatorial_radius_m;
             return Height {
                 radius_m: 1.0 / equatorial.hypot(direction.z / ellipsoid.polar_radius_m),

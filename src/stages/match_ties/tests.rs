@@ -13,6 +13,7 @@ use nalgebra::{Matrix3, Vector2, Vector3};
 
 use super::*;
 use crate::{
+    body::Body,
     config::usual_instrument,
     geom::{
         oriented_camera::OrientedCamera,
@@ -174,7 +175,7 @@ fn matched(pixels: [&[u8]; 2], off_m: [f64; 2], most_m: f64) -> Matched {
         let place_m = Vector3::new(RADIUS_M, 0.0, 300.0 * f64::from(shot));
         RADIUS_M * place_m.normalize()
     });
-    let heights = Heights::at(shots.collect());
+    let heights = Heights::at(Body::Mars, shots.collect());
     let margin = Margin::within(2, most_m);
     let never = AtomicBool::new(false);
     let matched = match_pair([&first, &second], &heights, &margin, &never);

@@ -7,12 +7,13 @@ use serde::{Deserialize, Serialize};
 
 use super::OrientationSample;
 use crate::{
+    body::Body,
     error::Result,
-    frames::{J2000, MarsIau2000, Position, Rotation},
+    frames::{BodyFixed, J2000, Position, Rotation},
     geom::{
+        body_rotation::body_rotation,
         ellipsoid::range_to_ellipsoid_m,
         light_time::{LightTime, light_time_s, without_aberration_m},
-        mars_rotation::mars_rotation,
     },
     spice::{Session, State},
     time::Et,
@@ -27,7 +28,7 @@ pub(in crate::stages) struct RayOrigin {
     /// MGS relative to the centre of Mars.
     pub(in crate::stages) state: State,
     /// Mars as it stands for the ground that is seen; stamped with the exposure's instant.
-    pub(in crate::stages) to_mars: Rotation<J2000, MarsIau2000>,
+    pub(in crate::stages) to_mars: Rotation<J2000, BodyFixed>,
 }
 
 impl RayOrigin {
@@ -45,7 +46,7 @@ impl RayOrigin {
         exposure: Et,
         boresight: &Vector3<f64>,
     ) -> Result<Self> {
-        let to_mars = mars_rotation::<MarsIau2000>(exposure);
+        let to_mars = body_rotation(Body::Mars, exposure);
         match light_time {
             LightTime::None | LightTime::Support => Ok(Self {
                 state: session.state(exposure)?,
@@ -67,7 +68,7 @@ impl RayOrigin {
     }
 
     /// The position, IAU 2000.
-    pub(in crate::stages) fn position(&self) -> Position<MarsIau2000> {
+    pub(in crate::stages) fn position(&self) -> Position<BodyFixed> {
         self.to_mars.apply(&self.state.position)
     }
 }
@@ -105,12 +106,11 @@ impl OrientationSample {
     }
 
     /// Mars as it stands for the ground that is seen, stamped with the exposure's instant.
-    pub(in crate::stages) fn mars_seen(
-        &self,
-        light_time: LightTime,
-    ) -> Rotation<J2000, MarsIau2000> {
+    pub(in crate::stages) fn mars_seen(&self, light_time: LightTime) -> Rotation<J2000, BodyFixed> {
         match light_time {
-            LightTime::None | LightTime::Centre | LightTime::Support => mars_rotation(self.et),
+            LightTime::None | LightTime::Centre | LightTime::Support => {
+                body_rotation(Body::Mars, self.et)
+            }
             LightTime::Surface => {
                 mars_at(left(self.et, &self.position, &self.boresight()), self.et)
             }
@@ -123,13 +123,17 @@ impl OrientationSample {
 }
 
 /// When the light that `exposure` sees left the ground.
-fn left(exposure: Et, origin: &Position<MarsIau2000>, boresight: &Vector3<f64>) -> Et {
-    exposure.plus(-light_time_s(range_to_ellipsoid_m(origin, boresight)))
+fn left(exposure: Et, origin: &Position<BodyFixed>, boresight: &Vector3<f64>) -> Et {
+    exposure.plus(-light_time_s(range_to_ellipsoid_m(
+        Body::Mars.model(),
+        origin,
+        boresight,
+    )))
 }
 
 /// Mars at the instant `left`, stamped with that of the exposure.
-fn mars_at(left: Et, exposure: Et) -> Rotation<J2000, MarsIau2000> {
-    Rotation::new(*mars_rotation::<MarsIau2000>(left).matrix(), exposure)
+fn mars_at(left: Et, exposure: Et) -> Rotation<J2000, BodyFixed> {
+    Rotation::new(*body_rotation(Body::Mars, left).matrix(), exposure)
 }
 
 /// What the convention of a run means for an image.

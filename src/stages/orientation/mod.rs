@@ -16,9 +16,9 @@ pub use tables::{CameraTables, InterpolationCheck};
 
 use super::tag_times::ImageTimes;
 use crate::{
-    constants::MARS_IAU2000,
+    body::{Body, BodyModel},
     error::Result,
-    frames::{CameraFrame, MarsIau2000, Position, Rotation},
+    frames::{BodyFixed, CameraFrame, Position, Rotation},
     geom::{
         attitude::OmegaPhiKappa,
         ellipsoid::{Spherical, ray_meets_ellipsoid},
@@ -35,9 +35,11 @@ const OUTLINE_INTERVALS: u32 = 10;
 pub struct Orientation {
     /// Image identifier.
     pub image: String,
+    /// The body that it sees.
+    pub body: Body,
     /// Samples over the whole header image, both ends included.
     pub samples: Vec<OrientationSample>,
-    /// Outline of the delivered image on the IAU 2000 ellipsoid: along the first pixel's outer edge,
+    /// Outline of the delivered image on the ellipsoid: along the first pixel's outer edge,
     /// back along the last one's, not closed. `None` when a corner sees no ground.
     pub outline: Option<Vec<GroundPoint>>,
     /// Tables for camera models, in J2000.
@@ -58,14 +60,14 @@ pub struct OrientationSample {
     /// Lines from the middle of the header image, see [`LineTimes::offset`](crate::line_times::LineTimes::offset).
     pub line_offset: f64,
     /// Perspective centre, where straight rays start: see [`LightTimeEffect`].
-    pub position: Position<MarsIau2000>,
+    pub position: Position<BodyFixed>,
     /// How the camera looks.
-    pub camera_to_mars: Rotation<CameraFrame, MarsIau2000>,
+    pub camera_to_mars: Rotation<CameraFrame, BodyFixed>,
     /// The same rotation as ω, φ, κ.
     pub angles: OmegaPhiKappa,
-    /// Where the boresight meets the IAU 2000 ellipsoid, if it does.
+    /// Where the boresight meets the ellipsoid, if it does.
     pub boresight: Option<BoresightGround>,
-    /// From the perspective centre to where the kernels have MGS at the epoch, geometrically, IAU 2000, metres: what
+    /// From the perspective centre to where the kernels have MGS at the epoch, geometrically, body-fixed, metres: what
     /// ranges are measured from.
     pub to_spacecraft_m: Vector3<f64>,
 }
@@ -126,7 +128,7 @@ impl OrientationSample {
             position: camera.position,
             camera_to_mars: camera.to_mars,
             angles: OmegaPhiKappa::from_camera_to_mars(camera.to_mars.matrix()),
-            boresight: boresight_ground(camera),
+            boresight: boresight_ground(image.body.model(), camera),
             to_spacecraft_m: Vector3::zeros(),
         }
     }
@@ -152,7 +154,7 @@ impl OrientationSample {
 }
 
 impl GroundPoint {
-    fn of(ground: &Position<MarsIau2000>) -> Self {
+    fn of(ground: &Position<BodyFixed>) -> Self {
         let coordinates = Spherical::from_xyz_m(&ground.xyz_m);
         Self {
             longitude_rad: coordinates.longitude_rad,
@@ -173,7 +175,8 @@ impl GroundPoint {
             let Camera { position, to_mars } =
                 camera(line_times.start().plus(f64::from(k) * step_s))?;
             let [first, last] = swath_directions(image).map(|direction| {
-                let ground = ray_meets_ellipsoid(&position, &(to_mars.matrix() * direction));
+                let direction = to_mars.matrix() * direction;
+                let ground = ray_meets_ellipsoid(image.body.model(), &position, &direction);
                 ground.map(|ground| Self::of(&ground))
             });
             let (Some(first), Some(last)) = (first, last) else {
@@ -193,13 +196,13 @@ fn swath_directions(image: &ImageTimes) -> [Vector3<f64>; 2] {
     [0.0, detector.samples].map(|sample| detector.look(sample))
 }
 
-fn boresight_ground(camera: &Camera) -> Option<BoresightGround> {
+fn boresight_ground(model: &BodyModel, camera: &Camera) -> Option<BoresightGround> {
     let boresight = camera.to_mars.matrix() * Vector3::z();
-    let ground = ray_meets_ellipsoid(&camera.position, &boresight)?;
+    let ground = ray_meets_ellipsoid(model, &camera.position, &boresight)?;
     let scale = Vector3::new(
-        MARS_IAU2000.equatorial_radius_m.powi(-2),
-        MARS_IAU2000.equatorial_radius_m.powi(-2),
-        MARS_IAU2000.polar_radius_m.powi(-2),
+        model.equatorial_radius_m.powi(-2),
+        model.equatorial_radius_m.powi(-2),
+        model.polar_radius_m.powi(-2),
     );
     let normal = ground.xyz_m.component_mul(&scale);
     let point = GroundPoint::of(&ground);

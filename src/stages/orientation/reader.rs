@@ -2,9 +2,10 @@
 
 use super::{Camera, RayOrigin};
 use crate::{
+    body::Body,
     error::Result,
-    frames::{CameraFrame, J2000, MarsIau2000, Position, Rotation},
-    geom::{light_time::LightTime, mars_rotation::mars_rotation},
+    frames::{BodyFixed, CameraFrame, J2000, Position, Rotation},
+    geom::{body_rotation::body_rotation, light_time::LightTime},
     instruments::Instrument,
     spice::{Attitude, Session},
     stages::tag_times::ImageTimes,
@@ -54,8 +55,8 @@ impl CameraReader<'_> {
     }
 
     /// Where MGS is.
-    pub(in crate::stages) fn geometric(&self, et: Et) -> Result<Position<MarsIau2000>> {
-        Ok(mars_rotation(et).apply(&self.session.state(et)?.position))
+    pub(in crate::stages) fn geometric(&self, et: Et) -> Result<Position<BodyFixed>> {
+        Ok(body_rotation(Body::Mars, et).apply(&self.session.state(et)?.position))
     }
 
     /// Where rays start in IAU 2000, and the rotation from the camera to it.

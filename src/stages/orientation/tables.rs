@@ -4,9 +4,8 @@ use nalgebra::{Matrix3, Vector3, Vector4};
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    constants::MARS_IAU2000,
     error::Result,
-    frames::{CameraFrame, J2000, MarsIau2000, Position, Rotation, SpacecraftBus},
+    frames::{BodyFixed, CameraFrame, J2000, Position, Rotation, SpacecraftBus},
     geom::{
         attitude::{continuous_quaternions, matrix_of_spice_quaternion},
         lagrange::lagrange,
@@ -38,8 +37,8 @@ pub struct CameraTables {
     pub inertial_to_bus: Vec<Rotation<J2000, SpacecraftBus>>,
     /// Angular velocity of the bus in J2000, radians per second.
     pub bus_angular_velocity_rad_s: Vec<Vector3<f64>>,
-    /// J2000 → IAU 2000, for the ground that is seen.
-    pub inertial_to_mars: Vec<Rotation<J2000, MarsIau2000>>,
+    /// J2000 → body-fixed, for the ground that is seen.
+    pub inertial_to_mars: Vec<Rotation<J2000, BodyFixed>>,
     /// Angular velocity of Mars in J2000, radians per second.
     pub mars_angular_velocity_rad_s: Vec<Vector3<f64>>,
     /// Bus → camera, at the first epoch.
@@ -94,9 +93,9 @@ impl InterpolationCheck {
 #[derive(Debug, Clone, Copy)]
 pub(in crate::stages) struct Camera {
     /// Perspective centre.
-    pub(in crate::stages) position: Position<MarsIau2000>,
+    pub(in crate::stages) position: Position<BodyFixed>,
     /// Rotation to the axes of Mars.
-    pub(in crate::stages) to_mars: Rotation<CameraFrame, MarsIau2000>,
+    pub(in crate::stages) to_mars: Rotation<CameraFrame, BodyFixed>,
 }
 
 /// What a camera model makes of the nodes: rotated to Mars first, then interpolated.
@@ -145,7 +144,7 @@ impl Nodes {
 /// of a line; the ground is taken as near as it can be, straight below.
 fn error_px(image: &ImageTimes, kernels: &Camera, interpolated: &Camera) -> f64 {
     let position_m = kernels.position.xyz_m;
-    let distance_m = position_m.norm() - MARS_IAU2000.equatorial_radius_m;
+    let distance_m = position_m.norm() - image.body.model().equatorial_radius_m;
     let detector = image.detector();
     let pixel_rad =
         image.instrument.optics.pixel_pitch_mm / image.instrument.optics.focal_length_mm;

@@ -22,7 +22,7 @@ use crate::{
     config::RegistrationConfig,
     error::{Result, Stopped},
     footprints::Footprints,
-    frames::MarsIau2000,
+    frames::BodyFixed,
     geom::{
         ellipsoid::spherical_to_xyz_m,
         pushbroom::{CameraModel, ExteriorOrientation, Projector, Unseen},
@@ -135,7 +135,7 @@ pub fn register(
     image: &ImageTimes,
     orientation: &Orientation,
     model: &SensorModel,
-    footprints: &Footprints<MarsIau2000>,
+    footprints: &Footprints<BodyFixed>,
     profiles: &[Profile],
     config: &RegistrationConfig,
     stop: &AtomicBool,
@@ -184,7 +184,7 @@ pub fn register(
 }
 
 /// Position of a footprint, metres.
-fn ground_m(footprints: &Footprints<MarsIau2000>, row: u32) -> Vector3<f64> {
+fn ground_m(footprints: &Footprints<BodyFixed>, row: u32) -> Vector3<f64> {
     let row = row as usize;
     spherical_to_xyz_m(
         footprints.longitude_rad[row],

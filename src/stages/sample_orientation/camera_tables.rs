@@ -4,9 +4,9 @@ use nalgebra::{Matrix3, Vector3};
 
 use crate::stages::orientation::CameraReader;
 use crate::{
-    constants::MARS_IAU2000,
+    body::Body,
     error::Result,
-    geom::mars_rotation::mars_spin_rad_s,
+    geom::body_rotation::spin_rad_s,
     stages::{
         orientation::{CameraTables, InterpolationCheck, RayOrigin},
         tag_times::ImageTimes,
@@ -110,5 +110,5 @@ fn tables(reader: &CameraReader<'_>, epochs: &[Et]) -> Result<CameraTables> {
 
 /// Spin of Mars in J2000: its rate along its pole (the pole's own motion is 1e-14 rad/s).
 fn mars_angular_velocity(inertial_to_mars: &Matrix3<f64>) -> Vector3<f64> {
-    inertial_to_mars.tr_mul(&mars_spin_rad_s(&MARS_IAU2000))
+    inertial_to_mars.tr_mul(&spin_rad_s(Body::Mars.model()))
 }

@@ -5,7 +5,7 @@ use nalgebra::{Vector2, Vector3};
 use crate::stages::orientation::CameraReader;
 use crate::{
     error::Result,
-    frames::{MarsIau2000, Position},
+    frames::{BodyFixed, Position},
     geom::{
         ellipsoid::{range_to_ellipsoid_m, ray_meets_ellipsoid},
         light_time::{LightTime, light_time_s},
@@ -19,9 +19,9 @@ use crate::{
 impl CameraReader<'_> {
     /// What the convention means in the middle of `image`.
     pub(super) fn effect(&self, image: &ImageTimes) -> Result<LightTimeEffect> {
-        let own = self.camera(image.middle())?;
+        let (own, model) = (self.camera(image.middle())?, image.body.model());
         let boresight = own.to_mars.matrix() * Vector3::z();
-        let ground = ray_meets_ellipsoid(&own.position, &boresight);
+        let ground = ray_meets_ellipsoid(model, &own.position, &boresight);
         let mut others = Vec::new();
         for (_, convention) in LightTime::WORDS {
             if let Some(ground) = ground.filter(|_| convention != self.light_time) {
@@ -30,7 +30,7 @@ impl CameraReader<'_> {
         }
         Ok(LightTimeEffect {
             convention: self.light_time,
-            light_time_s: light_time_s(range_to_ellipsoid_m(&own.position, &boresight)),
+            light_time_s: light_time_s(range_to_ellipsoid_m(model, &own.position, &boresight)),
             others,
         })
     }
@@ -41,7 +41,7 @@ impl CameraReader<'_> {
         &self,
         convention: LightTime,
         image: &ImageTimes,
-        ground: &Position<MarsIau2000>,
+        ground: &Position<BodyFixed>,
     ) -> Result<Option<OtherConvention>> {
         let reader = Self {
             light_time: convention,
@@ -56,7 +56,8 @@ impl CameraReader<'_> {
         };
         let middle = camera(0.0)?;
         let boresight = middle.to_mars.matrix() * Vector3::z();
-        let Some(met) = ray_meets_ellipsoid(&middle.position, &boresight) else {
+        let Some(met) = ray_meets_ellipsoid(image.body.model(), &middle.position, &boresight)
+        else {
             return Ok(None);
         };
         // One secant over a line: over ten lines the track bends by 1e-4 of a line.
@@ -74,7 +75,7 @@ impl CameraReader<'_> {
 }
 
 /// How far off the boresight a camera sees a point, along its x and y, in focal lengths.
-fn off_boresight(camera: &Camera, point: &Position<MarsIau2000>) -> Vector2<f64> {
+fn off_boresight(camera: &Camera, point: &Position<BodyFixed>) -> Vector2<f64> {
     let away_m = point.xyz_m - camera.position.xyz_m;
     let seen_m = camera.to_mars.matrix().tr_mul(&away_m);
     seen_m.xy() / seen_m.z

@@ -20,8 +20,8 @@ use crate::{
 
 /// The orientation of `image` by its support data at `epochs`.
 ///
-/// No other positions are known than those of the tables: what they are off the spacecraft is left at zero, and no range is
-/// measured from them.
+/// No other positions are known than those of the tables: what they are off the spacecraft is left at zero. Ranges are
+/// measured from them where the site says that they are those of the spacecraft with the laser.
 pub(super) fn support_orientation(
     image: &ImageTimes,
     support: &SupportTables,
@@ -33,11 +33,16 @@ pub(super) fn support_orientation(
     let boresight = middle.to_mars.matrix() * Vector3::z();
     Ok(Orientation {
         image: image.id.clone(),
+        body: image.body,
         samples: OrientationSample::at_epochs(image, epochs, |et| Ok(nodes.camera(et)))?,
         outline: GroundPoint::outline(image, |et| Ok(nodes.camera(et)))?,
         light_time: LightTimeEffect {
             convention: LightTime::Support,
-            light_time_s: light_time_s(range_to_ellipsoid_m(&middle.position, &boresight)),
+            light_time_s: light_time_s(range_to_ellipsoid_m(
+                image.body.model(),
+                &middle.position,
+                &boresight,
+            )),
             others: Vec::new(),
         },
         tables,

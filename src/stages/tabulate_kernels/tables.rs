@@ -4,12 +4,13 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::{KernelTables, TabulateError, earlier, later};
 use crate::{
+    body::Body,
     error::Result,
-    frames::{J2000, MarsIau2000, Position},
+    frames::{J2000, Position},
     geom::{
         attitude::continuous_quaternions,
+        body_rotation::body_rotation,
         lagrange::lagrange,
-        mars_rotation::mars_rotation,
         pushbroom::{ExteriorOrientation, Pose, SampledOrientation},
     },
     spice::{Attitude, Session, State},
@@ -82,7 +83,7 @@ impl Source<'_> {
         let mut samples = Vec::new();
         for (et, position) in flown {
             let original = self.session.state(*et)?.position;
-            let to_mars = mars_rotation::<MarsIau2000>(*et);
+            let to_mars = body_rotation(Body::Mars, *et);
             let pose = Pose {
                 position_m: to_mars.matrix() * (position.xyz_m - original.xyz_m),
                 mars_to_camera: Matrix3::identity(),
@@ -103,7 +104,7 @@ impl Source<'_> {
         for et in epochs {
             let original = self.session.state(*et)?;
             let (pose, motion) = difference.pose_and_rate(et.seconds());
-            let from_mars = |et: Et| mars_rotation::<MarsIau2000>(et).matrix().transpose();
+            let from_mars = |et: Et| body_rotation(Body::Mars, et).matrix().transpose();
             let [before, after] =
                 [-HALF_DIFFERENCE_S, HALF_DIFFERENCE_S].map(|s| from_mars(et.plus(s)));
             let turning_per_s = (after - before) / (2.0 * HALF_DIFFERENCE_S);

@@ -4,22 +4,21 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
+use super::{ImageTimes, StartFrom};
 use crate::{
-    constants::{MARS_IAU2000, NAIF_MARS},
+    body::Body,
+    config::ImageConfig,
     error::{Cause, Kind, Result},
     files::{HashedFile, file_name},
-    frames::MarsIau2000,
-    geom::{attitude::rotation_vector, mars_rotation::mars_rotation},
+    geom::{attitude::rotation_vector, body_rotation::body_rotation},
     pds::isd::{ImageSupport, SupportTables, read_isd},
+    spice::Session,
     time::Et,
     units::METRES_PER_KM,
 };
 
-/// Radii within this are those of IAU 2000, metres: files are written to ten metres.
+/// Radii within this are those of the products' frame, metres: files are written to ten metres.
 const RADIUS_TOLERANCE_M: f64 = 10.0;
-/// A body rotation within this is that of IAU 2000, radians: light time to the ground turns Mars by 1e-7, the models of
-/// other reports by 1e-4 and more. On the ground it is three metres.
-const ROTATION_TOLERANCE_RAD: f64 = 1e-6;
 
 /// Support data of an image, and the file that they stand in.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -32,6 +31,8 @@ pub struct SupportFile {
     pub blake3: String,
     /// Name of the spacecraft.
     pub platform: String,
+    /// Whether positions are those of the spacecraft with the laser, geometric.
+    pub has_laser: bool,
     /// Positions and rotations.
     pub tables: SupportTables,
 }
@@ -39,16 +40,29 @@ pub struct SupportFile {
 /// Support data of another body.
 #[derive(Debug, thiserror::Error)]
 enum ForeignBody {
-    #[error("image {image}: naif_keywords.BODY_CODE is {code}; expected {NAIF_MARS}, Mars")]
-    Code { image: String, code: i64 },
     #[error(
-        "image {image}: radii are {:.2} and {:.2} km; expected {:.2} and {:.2} km, those of Mars in IAU 2000",
+        "image {image}: naif_keywords.BODY_CODE is {code}; expected {}, {}",
+        .body.naif().body,
+        .body.names().name
+    )]
+    Code {
+        image: String,
+        body: Body,
+        code: i64,
+    },
+    #[error(
+        "image {image}: radii are {:.2} and {:.2} km; expected {:.2} and {:.2} km, those of {body} in {}",
         .radii_m[0] / METRES_PER_KM,
         .radii_m[1] / METRES_PER_KM,
-        MARS_IAU2000.equatorial_radius_m / METRES_PER_KM,
-        MARS_IAU2000.polar_radius_m / METRES_PER_KM
+        .body.model().equatorial_radius_m / METRES_PER_KM,
+        .body.model().polar_radius_m / METRES_PER_KM,
+        .body.names().short_frame
     )]
-    Radii { image: String, radii_m: [f64; 2] },
+    Radii {
+        image: String,
+        body: Body,
+        radii_m: [f64; 2],
+    },
 }
 
 impl Cause for ForeignBody {
@@ -57,50 +71,60 @@ impl Cause for ForeignBody {
     }
 
     fn advice(&self) -> String {
-        "leave the image out: areograph knows images of Mars alone".to_owned()
+        let (Self::Code { body, .. } | Self::Radii { body, .. }) = self;
+        format!(
+            "leave the image out, or write the body that its support data are of: the site is on {body} (body = \"{}\")",
+            body.word()
+        )
     }
 }
 
 impl SupportFile {
-    /// What the file at `path` says of `image`.
+    /// What the file at `path` says of `image`, which sees `body`.
     ///
     /// # Errors
-    /// As [`read_isd`]; support data of another body than Mars.
-    pub(super) fn read(
-        image: &str,
+    /// As [`read_isd`]; support data of another body.
+    fn read(
+        body: Body,
+        image: &ImageConfig,
         path: &Path,
         hashed: Option<&HashedFile>,
     ) -> Result<(ImageSupport, Self)> {
         let said = read_isd(path)?;
-        if let Some(code) = said.target.filter(|code| *code != i64::from(NAIF_MARS)) {
-            let image = image.to_owned();
-            return Err(ForeignBody::Code { image, code }.into());
+        let of_body = i64::from(body.naif().body);
+        if let Some(code) = said.target.filter(|code| *code != of_body) {
+            let image = image.id.clone();
+            return Err(ForeignBody::Code { image, body, code }.into());
         }
-        let expected_m = [
-            MARS_IAU2000.equatorial_radius_m,
-            MARS_IAU2000.polar_radius_m,
-        ];
+        let model = body.model();
+        let expected_m = [model.equatorial_radius_m, model.polar_radius_m];
         let mut apart_m = said
             .radii_m
             .iter()
             .zip(expected_m)
             .map(|(a, b)| (a - b).abs());
         if apart_m.any(|apart_m| apart_m > RADIUS_TOLERANCE_M) {
-            let (image, radii_m) = (image.to_owned(), said.radii_m);
-            return Err(ForeignBody::Radii { image, radii_m }.into());
+            let (image, radii_m) = (image.id.clone(), said.radii_m);
+            return Err(ForeignBody::Radii {
+                image,
+                body,
+                radii_m,
+            }
+            .into());
         }
         let file = Self {
             name: file_name(path),
             bytes: hashed.map_or(0, |file| file.bytes),
             blake3: hashed.map_or_else(String::new, |file| file.blake3.clone()),
             platform: said.platform.clone(),
+            has_laser: image.has_laser,
             tables: said.tables.clone(),
         };
         Ok((said, file))
     }
 
     /// What is taken from the file.
-    pub(super) fn note(&self) -> String {
+    fn note(&self) -> String {
         format!(
             "camera, line times and orientation are those of the support data {}; nothing is applied to them, neither a \
              pointing bias nor a clock correction nor light time",
@@ -109,19 +133,51 @@ impl SupportFile {
     }
 
     /// What does not agree with the frame of the products at the instant `at`.
-    pub(super) fn remarks(&self, at: Et) -> Vec<String> {
+    fn remarks(&self, body: Body, at: Et) -> Vec<String> {
         let rotation = &self.tables.body_rotation;
         let theirs = rotation.constant * rotation.at(at.seconds()).0;
-        let ours = *mars_rotation::<MarsIau2000>(at).matrix();
+        let ours = *body_rotation(body, at).matrix();
         let turn_rad = rotation_vector(&(theirs * ours.transpose())).norm();
         // Written so that NaN is remarked on too.
-        if turn_rad <= ROTATION_TOLERANCE_RAD {
+        if turn_rad <= body.rotation_tolerance_rad() {
             return Vec::new();
         }
         vec![format!(
-            "the support data {} turn Mars by {:.1} m on the equator against IAU 2000; positions are taken in their frame",
+            "the support data {} turn {body} by {:.1} m on the equator against {}; positions are taken in their frame",
             self.name,
-            turn_rad * MARS_IAU2000.equatorial_radius_m
+            turn_rad * body.model().equatorial_radius_m,
+            body.names().short_frame
         )]
     }
+}
+
+/// Times and camera of an image by its support data.
+pub(super) fn supported(
+    body: Body,
+    image: &ImageConfig,
+    path: &Path,
+    hashed: Option<&HashedFile>,
+    session: &Session,
+) -> Result<ImageTimes> {
+    let (said, file) = SupportFile::read(body, image, path, hashed)?;
+    let start = said.line_times.start();
+    let period_s = said.line_times.mean_period_s();
+    Ok(ImageTimes {
+        id: image.id.clone(),
+        body,
+        start_from: StartFrom::Support,
+        sclk_start: None,
+        utc_start: session.et_to_utc(start)?,
+        exposure_s: period_s / f64::from(said.downtrack_summing),
+        downtrack_summing: said.downtrack_summing,
+        crosstrack_summing: said.crosstrack_summing,
+        lines_delivered: said.line_times.lines(),
+        samples: said.samples,
+        first_detector: said.first_detector,
+        notes: vec![file.note()],
+        remarks: file.remarks(body, start),
+        instrument: said.instrument,
+        line_times: said.line_times,
+        support: Some(file),
+    })
 }

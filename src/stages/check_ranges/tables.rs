@@ -1,0 +1,136 @@
+//! The range check of shots of tables, whose spacecraft no kernels have: measured range against the table's own spacecraft,
+//! and against that of images with its laser, where one was exposed meanwhile.
+
+use std::sync::atomic::AtomicBool;
+
+use super::{ProfileRanges, RangeCheck, ShotResiduals, statistics};
+use crate::{
+    altimetry::MolaClock,
+    config::RangeCheckConfig,
+    error::{Result, Stopped},
+    footprints::Footprints,
+    frames::{BodyFixed, Position},
+    geom::{
+        orbit_axes::radial_along_cross,
+        range_residuals::{
+            RangeResiduals, SpacecraftState, footprint, own_spacecraft, range_residual_m,
+        },
+        statistics::{Summary, outliers},
+    },
+    stage::{InOrder, Output, Stage},
+    stage_inputs,
+    stages::{convert_datum::Converted, group_profiles::Profile, tag_times::ImageTimes},
+    time::Et,
+};
+
+stage_inputs! {
+    /// Footprints of tables, profiles, limits, and the images whose spacecraft has the laser.
+    pub struct CheckTableRanges<'a> {
+        /// Footprints in the frame of the products.
+        pub converted: &'a Output<Converted>,
+        /// Profiles.
+        pub profiles: &'a Output<Vec<Profile>>,
+        /// The images.
+        pub images: InOrder<'a, Output<ImageTimes>>,
+        /// The clock of the altimeter.
+        pub mola_clock: &'a MolaClock,
+        /// Limits.
+        pub range_check: &'a RangeCheckConfig,
+    }
+}
+
+impl Stage for CheckTableRanges<'_> {
+    const NAME: &'static str = "check_ranges";
+    type Output = RangeCheck;
+    stage_inputs!(fingerprint);
+
+    fn run(&self, stop: &AtomicBool) -> Result<RangeCheck> {
+        let images = self.images.0.iter().map(Output::value);
+        let images = images.collect::<Result<Vec<_>>>()?;
+        check_table_ranges(
+            &self.converted.value()?.footprints,
+            self.profiles.value()?,
+            &images,
+            self.mola_clock,
+            self.range_check,
+            stop,
+        )
+    }
+}
+
+/// Checks the ranges of every profile against the spacecraft of the table, and against that of support data.
+///
+/// Residuals are those of shots that both tell; the table's own spacecraft is judged by all shots.
+///
+/// # Errors
+/// [`Stopped`].
+pub fn check_table_ranges(
+    footprints: &Footprints<BodyFixed>,
+    profiles: &[Profile],
+    images: &[&ImageTimes],
+    clock: &MolaClock,
+    limits: &RangeCheckConfig,
+    stop: &AtomicBool,
+) -> Result<RangeCheck> {
+    let mut shots = ShotResiduals::default();
+    let mut checked = Vec::with_capacity(profiles.len());
+    for (index, profile) in (0_u32..).zip(profiles) {
+        Stopped::check(stop)?;
+        let first = shots.len();
+        for row in &profile.rows {
+            let shot = footprints.row(*row as usize);
+            let at = clock.spacecraft_time(shot.et_tag_s);
+            if let Some(spacecraft) = images.iter().find_map(|image| spacecraft(image, at)) {
+                shots.push(index, *row, &RangeResiduals::of(&shot, &spacecraft));
+            }
+        }
+        let flags = outliers(&shots.range_minus_distance_m[first..], limits.outlier_sigma);
+        shots.outlier.extend(flags);
+        let mut ranges = statistics(profile, &shots, first, None, footprints);
+        by_own_spacecraft(&mut ranges, footprints, profile, limits);
+        let explain = || "the support data hold another orbit than the table".to_owned();
+        ranges.invalid_because = ranges.figures().broken_limits(limits, explain);
+        checked.push(ranges);
+    }
+    Ok(RangeCheck {
+        shots,
+        profiles: checked,
+        trajectory_error_m: 0.0,
+    })
+}
+
+/// Where an image with the laser has its spacecraft at an instant, as far as its support data reach.
+fn spacecraft(image: &ImageTimes, at: Et) -> Option<SpacecraftState> {
+    let support = image.support.as_ref().filter(|support| support.has_laser)?;
+    let tables = &support.tables;
+    if !tables.span().contains(at) {
+        return None;
+    }
+    let (position_m, velocity_m_s) = tables.position.at(at.seconds());
+    let rotation = &tables.body_rotation;
+    let to_body = rotation.constant * rotation.at(at.seconds()).0;
+    Some(SpacecraftState {
+        position: Position::new(to_body * position_m),
+        axes: to_body * radial_along_cross(&position_m, &velocity_m_s),
+    })
+}
+
+/// Puts the table's own spacecraft into the statistics of a profile, by all of its shots.
+fn by_own_spacecraft(
+    ranges: &mut ProfileRanges,
+    footprints: &Footprints<BodyFixed>,
+    profile: &Profile,
+    limits: &RangeCheckConfig,
+) {
+    let residuals = profile.rows.iter().map(|row| {
+        let shot = footprints.row(*row as usize);
+        let ground = footprint(&shot, shot.radius_m);
+        range_residual_m(shot.range_m, &own_spacecraft(&shot), &ground)
+    });
+    let residuals_m: Vec<f64> = residuals.collect();
+    let flags = outliers(&residuals_m, limits.outlier_sigma);
+    let kept = residuals_m.iter().zip(flags).filter(|(_, is)| !is);
+    let kept: Vec<f64> = kept.map(|(residual_m, _)| *residual_m).collect();
+    ranges.decoding_m = Summary::of(&residuals_m);
+    ranges.decoding_without_outliers_m = Summary::of(&kept).mean;
+}

@@ -1,0 +1,299 @@
+//! Reads tables of laser shots for those in a site's windows: what the search of PEDR files gives, from other altimeters.
+
+use std::{
+    collections::{BTreeMap, HashSet},
+    path::Path,
+    sync::atomic::AtomicBool,
+};
+
+use super::{outline_windows::Windows, search_footprints::SearchResult};
+use crate::{
+    body::{Body, Datum},
+    config::{ShotTableConfig, WindowConfig},
+    error::{Cause, Kind, Result, Stopped},
+    files::{HashedFile, file_name},
+    footprints::{Footprint, Footprints, SourceFile},
+    geom::{
+        body_rotation::convert_datum,
+        ellipsoid::{Spherical, on_ellipsoid_m, spherical_to_xyz_m},
+        window::Region,
+    },
+    pds::{
+        pedr::{Complaint, Reason},
+        shot_table::{RowComplaint, ShotRow, read_shot_table},
+    },
+    spice::KernelView,
+    stage::{InOrder, Input, Inputs, Stage},
+    stage_inputs,
+    time::Et,
+    units::wrap_two_pi,
+};
+
+/// Complaints kept with their text; all are counted.
+const COMPLAINTS_MAX: usize = 1_000;
+/// Classification of ground returns, as the PEDR has it: a table holds nothing else.
+const GROUND: i16 = 1;
+
+stage_inputs! {
+    /// Tables of shots, and the windows.
+    pub struct ReadShots<'a> {
+        /// The body of the site.
+        pub body: &'a Body,
+        /// Columns and datum of each list of tables.
+        pub shots: &'a [ShotTableConfig],
+        /// The tables of each with their hashes.
+        pub files: ShotFiles<'a>,
+        /// Windows on the ground.
+        pub windows: Windows<'a>,
+        /// Seconds to add to times.
+        pub clock_correction_s: &'a f64,
+        /// Text kernels, for times in UTC.
+        pub kernels: &'a KernelView,
+    }
+}
+
+/// The tables of shots of a site, in order.
+#[derive(Debug)]
+pub struct ShotFiles<'a>(pub &'a [Vec<HashedFile>]);
+
+impl Input for ShotFiles<'_> {
+    fn add_to(&self, _field: &str, inputs: &mut Inputs) {
+        for files in self.0 {
+            InOrder(files).add_to("shots", inputs);
+        }
+    }
+}
+
+impl Stage for ReadShots<'_> {
+    const NAME: &'static str = "search_footprints";
+    const CHECKED: bool = true;
+    type Output = SearchResult;
+    stage_inputs!(fingerprint);
+
+    fn run(&self, stop: &AtomicBool) -> Result<SearchResult> {
+        let session = self.kernels.session()?;
+        let utc = |text: &str| session.utc_to_et(text);
+        let tables = self.shots.iter().zip(self.files.0);
+        let tables = tables.flat_map(|(table, files)| files.iter().map(move |file| (table, file)));
+        let tables: Vec<(&ShotTableConfig, &HashedFile)> = tables.collect();
+        read_shots(
+            *self.body,
+            &tables,
+            self.windows.value()?,
+            *self.clock_correction_s,
+            &utc,
+            stop,
+        )
+    }
+
+    fn findings(&self, result: &SearchResult) -> Vec<String> {
+        let said = result.complaint_counts.values().sum::<u64>();
+        let first = result.complaints.first();
+        let first = first
+            .map(|complaint| format!("rows that are no shots: {said}, the first: {complaint}"));
+        first.into_iter().collect()
+    }
+}
+
+/// More tables than footprints can count.
+#[derive(Debug, thiserror::Error)]
+#[error("{0} tables of shots; expected at most {max}", max = u16::MAX)]
+struct TooManyTables(usize);
+
+impl Cause for TooManyTables {
+    fn kind(&self) -> Kind {
+        Kind::Configuration
+    }
+
+    fn advice(&self) -> String {
+        "name only the tables of the site in shots.files".to_owned()
+    }
+}
+
+/// Reads `tables`, each with what its columns are, for shots of `body` in any of `windows`.
+///
+/// Every shot is judged by its own position, in the frame of the products at its time. `correction_s` is added to times to
+/// give `et_s`. Rows that say the same of the same instant, in one table or in several, count once.
+///
+/// # Errors
+/// A table that cannot be read, has not the columns, or holds no shot; [`Stopped`]. Any other row that is no shot is a
+/// complaint.
+pub fn read_shots(
+    body: Body,
+    tables: &[(&ShotTableConfig, &HashedFile)],
+    windows: &[WindowConfig],
+    correction_s: f64,
+    utc: &dyn Fn(&str) -> Result<Et>,
+    stop: &AtomicBool,
+) -> Result<SearchResult> {
+    if tables.len() > usize::from(u16::MAX) {
+        return Err(TooManyTables(tables.len()).into());
+    }
+    let regions: Vec<Region> = windows.iter().map(|of| Region::new(&of.shape)).collect();
+    let mut gathered = Gathered {
+        body,
+        regions: &regions,
+        correction_s,
+        seen: HashSet::new(),
+        repeated: 0,
+        result: empty(body),
+    };
+    for (index, (table, file)) in (0_u16..).zip(tables) {
+        let datum = table.datum.unwrap_or(body.datum());
+        gathered.result.footprints.files.push(SourceFile {
+            name: file_name(&file.path),
+            version: None,
+            datum,
+            blake3: file.blake3.clone(),
+        });
+        let (path, columns) = (&file.path, table.columns());
+        read_shot_table(path, &columns, body, utc, |row| {
+            Stopped::check(stop)?;
+            gathered.take(index, datum, path, row);
+            Ok(())
+        })?;
+    }
+    Ok(gathered.finish(tables.len()))
+}
+
+fn empty(body: Body) -> SearchResult {
+    SearchResult {
+        footprints: Footprints::on(body, Vec::new()),
+        complaints: Vec::new(),
+        complaint_counts: BTreeMap::new(),
+        rejected: BTreeMap::new(),
+        frames_read: 0,
+        shots_read: 0,
+        notes: Vec::new(),
+    }
+}
+
+/// What reading of all tables gives.
+struct Gathered<'a> {
+    body: Body,
+    regions: &'a [Region],
+    correction_s: f64,
+    /// Instant and place of every shot in a window.
+    seen: HashSet<[u64; 4]>,
+    /// Rows that repeat one.
+    repeated: u64,
+    result: SearchResult,
+}
+
+impl Gathered<'_> {
+    fn take(
+        &mut self,
+        file: u16,
+        datum: Datum,
+        path: &Path,
+        row: std::result::Result<ShotRow, RowComplaint>,
+    ) {
+        self.result.frames_read += 1;
+        match row {
+            Ok(row) => self.shot(file, datum, &row),
+            Err(complaint) => self.complain(path, complaint),
+        }
+    }
+
+    fn complain(&mut self, path: &Path, complaint: RowComplaint) {
+        let counts = &mut self.result.complaint_counts;
+        *counts.entry(Reason::Row).or_default() += 1;
+        if self.result.complaints.len() < COMPLAINTS_MAX {
+            self.result.complaints.push(Complaint {
+                file: file_name(path),
+                record: Some(complaint.line),
+                reason: Reason::Row,
+                text: complaint.text,
+            });
+        }
+    }
+
+    fn shot(&mut self, file: u16, datum: Datum, row: &ShotRow) {
+        self.result.shots_read += 1;
+        let windows = self.windows(datum, row);
+        if windows == 0 {
+            return;
+        }
+        let what = [row.et_s, row.longitude_rad, row.latitude_rad, row.radius_m];
+        if !self.seen.insert(what.map(f64::to_bits)) {
+            self.repeated += 1;
+            return;
+        }
+        let shot = self.footprint(file, windows, row);
+        self.result.footprints.push(&shot);
+    }
+
+    /// The windows that hold the shot, as bits.
+    fn windows(&self, datum: Datum, row: &ShotRow) -> u64 {
+        let (longitude_rad, latitude_rad) = if datum == self.body.datum() {
+            (wrap_two_pi(row.longitude_rad), row.latitude_rad)
+        } else {
+            let at = Et::from_seconds(row.et_s);
+            let direction = spherical_to_xyz_m(row.longitude_rad, row.latitude_rad, 1.0);
+            let direction = convert_datum(self.body, direction, datum, at, at);
+            let spherical = Spherical::from_xyz_m(&direction.xyz_m);
+            (spherical.longitude_rad, spherical.latitude.0)
+        };
+        let regions = self.regions.iter().enumerate();
+        let holding = regions.filter(|(_, region)| region.contains(longitude_rad, latitude_rad));
+        holding.fold(0, |windows, (bit, _)| windows | 1 << bit)
+    }
+
+    /// The columns of a shot; what a table does not say is that of a ground return of one laser.
+    fn footprint(&self, file: u16, windows: u64, row: &ShotRow) -> Footprint {
+        let direction = spherical_to_xyz_m(row.longitude_rad, row.latitude_rad, 1.0);
+        let [
+            spacecraft_longitude_rad,
+            spacecraft_latitude_rad,
+            spacecraft_radius_m,
+        ] = row.spacecraft;
+        let spacecraft_m = spherical_to_xyz_m(
+            spacecraft_longitude_rad,
+            spacecraft_latitude_rad,
+            spacecraft_radius_m,
+        );
+        let away_m = spacecraft_m - row.radius_m * direction;
+        Footprint {
+            et_tag_s: row.et_s,
+            et_s: row.et_s + self.correction_s,
+            orbit: row.orbit,
+            file,
+            record: row.line,
+            shot: 1,
+            longitude_rad: wrap_two_pi(row.longitude_rad),
+            latitude_rad: row.latitude_rad,
+            radius_m: row.radius_m,
+            // No table says what crossovers corrected.
+            radius_crossover_m: row.radius_m,
+            areoid_radius_m: on_ellipsoid_m(self.body.model(), &direction).norm(),
+            range_m: row.range_m,
+            spacecraft_longitude_rad: wrap_two_pi(spacecraft_longitude_rad),
+            spacecraft_latitude_rad,
+            spacecraft_radius_m,
+            off_nadir_rad: away_m.angle(&spacecraft_m),
+            channel: 1,
+            class: GROUND,
+            attitude_flag: 0,
+            orbit_quality: 0,
+            windows,
+        }
+    }
+
+    fn finish(self, tables: usize) -> SearchResult {
+        let mut result = self.result;
+        let plural = if tables == 1 { "" } else { "s" };
+        let mut notes = vec![format!(
+            "{tables} table{plural} of laser shots: {} rows; heights above the ellipsoid stand for topography, and radii are \
+             not corrected by crossovers",
+            result.frames_read
+        )];
+        if self.repeated > 0 {
+            notes.push(format!(
+                "{} rows in the windows repeat another one: counted once",
+                self.repeated
+            ));
+        }
+        result.notes = notes;
+        result
+    }
+}
