@@ -8,8 +8,8 @@ use super::output;
 use crate::{
     error::Error,
     scene::{
-        ArchiveOptions, Roughness, SceneErrors, SceneOptions, write_archive, write_plane_scene,
-        write_scene, write_scene_along, write_scene_with_images,
+        ArchiveOptions, Coder, Roughness, SceneErrors, SceneOptions, write_archive,
+        write_plane_scene, write_scene, write_scene_along, write_scene_with_images,
     },
     units::SECONDS_PER_DAY,
 };
@@ -53,6 +53,9 @@ pub(super) struct Arguments {
     /// Also render the narrow-angle images, `images/*.imq`, which takes minutes.
     #[arg(long, conflicts_with_all = ["along", "plane"])]
     images: bool,
+    /// With --images: the code of the images; that by a transform loses something, as it did on board.
+    #[arg(long, value_enum, default_value_t = Code::Predictive, requires = "images")]
+    coder: Code,
     /// Fly these kernels instead of the invented orbit.
     #[arg(long, value_name = "KERNELS.tm")]
     along: Option<PathBuf>,
@@ -77,6 +80,22 @@ enum Ground {
     Plains,
     Medium,
     Rough,
+}
+
+/// How images are coded, as typed.
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum Code {
+    Predictive,
+    Transform,
+}
+
+impl Code {
+    const fn coder(self) -> Coder {
+        match self {
+            Self::Predictive => Coder::Predictive,
+            Self::Transform => Coder::Transform,
+        }
+    }
 }
 
 impl Arguments {
@@ -124,7 +143,10 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Error> {
         errors: arguments.errors(),
     };
     let summary = match &arguments.along {
-        None if arguments.images => write_scene_with_images(&arguments.directory, &options)?,
+        None if arguments.images => {
+            let coder = arguments.coder.coder();
+            write_scene_with_images(&arguments.directory, &options, coder)?
+        }
         None => write_scene(&arguments.directory, &options)?,
         Some(kernels) => {
             write_scene_along(&arguments.directory, kernels, &arguments.label, &options)?

@@ -52,7 +52,8 @@ declare_table! {
         #[serde(skip)]
         label: Option<PathBuf> = key(FILE).example(r#""../labels/e0202855.lbl""#),
         /// The image itself (.imq, .img, .cub, TIFF, PNG), which may be the label's file. The report shows footprints and tie
-        /// points on it; in one as the archive has it (.imq, .img) tie points are matched where `ties.match` says so.
+        /// points on it, and tie points are matched in it where `ties.match` says so. A file without a label must have all
+        /// lines, and of two such files that are matched each must have a size of its own: nothing else tells them apart.
         #[serde(skip)]
         pixels: Option<PathBuf> = key(FILE).unused(r#""../images/e0202855.imq""#),
         /// Or image support data (ISD) of the Community Sensor Model, as ALE writes them: camera, line times and

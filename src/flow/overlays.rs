@@ -6,9 +6,23 @@ use super::{
 };
 use crate::{
     config::{ImageConfig, SiteConfig},
+    files::HashedFile,
     stage::{InOrder, Output, Stage as _},
-    stages::lay_overlays::{LayOverlays, MeasuredTies, Overlays, PixelFiles},
+    stages::{
+        image_pixels::PixelFiles,
+        lay_overlays::{LayOverlays, MeasuredTies, Overlays},
+    },
 };
+
+/// For every image the file of its pixels, which a stage is about to read.
+pub(super) fn pixel_files<D: Driver>(
+    flow: &mut D,
+    stage: &'static str,
+    config: &SiteConfig,
+) -> Flow<Vec<Option<HashedFile>>> {
+    let hash = |image: &ImageConfig| Ok(flow.hash(stage, image.pixels.as_slice())?.pop());
+    config.images.iter().map(hash).collect()
+}
 
 /// What images with pixels show of footprints and tie points; nothing for a site without pixels.
 pub(super) fn overlays<D: Driver>(
@@ -19,11 +33,7 @@ pub(super) fn overlays<D: Driver>(
     if config.images.iter().all(|image| image.pixels.is_none()) {
         return Ok(None);
     }
-    let hash = |image: &ImageConfig| {
-        let hashed = flow.hash(LayOverlays::NAME, image.pixels.as_slice())?;
-        Ok(hashed.into_iter().next())
-    };
-    let pixels = config.images.iter().map(hash).collect::<Flow<Vec<_>>>()?;
+    let pixels = pixel_files(flow, LayOverlays::NAME, config)?;
     let adjustment = site.adjustment.as_ref();
     let measured = site.ties.as_ref().zip(site.intersection.as_ref());
     let overlays = flow.stage(&LayOverlays {

@@ -3,12 +3,12 @@
 use super::{
     driver::{Driver, Flow},
     outputs::{Adjustment, Intersection, Site},
+    overlays::pixel_files,
     registered::{Shots, registered},
 };
 use crate::{
-    config::{ImageConfig, SiteConfig},
+    config::SiteConfig,
     error::{Error, Kind},
-    files::HashedFile,
     spice::{KernelSet, KernelView},
     stage::{InOrder, Output, Round, Stage},
     stages::{
@@ -16,8 +16,9 @@ use crate::{
         check_heights::{CheckHeights, CheckedPoints},
         check_ranges::RangeCheck,
         compare_pairs::{ComparePairs, PairComparison},
+        image_pixels::PixelFiles,
         intersect::{Intersect, IntersectedTies},
-        match_ties::{Margin, MatchTies, PixelFiles, TiesOfFiles},
+        match_ties::{Margin, MatchTies, TiesOfFiles},
         read_ties::{ImageNames, ReadTies, TieFiles, Ties},
         reorient::Reorient,
         site_image::SiteImage,
@@ -101,10 +102,7 @@ pub(super) fn match_ties<D: Driver>(
     (converted, profiles): Shots,
     read: Option<&Output<Ties>>,
 ) -> Flow<Output<Ties>> {
-    let hash = |image: &ImageConfig| -> Flow<Option<HashedFile>> {
-        Ok(flow.hash(MatchTies::NAME, image.pixels.as_slice())?.pop())
-    };
-    let pixels: Vec<Option<HashedFile>> = config.images.iter().map(hash).collect::<Flow<_>>()?;
+    let pixels = pixel_files(flow, MatchTies::NAME, config)?;
     flow.stage(&MatchTies {
         round,
         images: InOrder(images),

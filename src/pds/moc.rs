@@ -141,10 +141,7 @@ fn of_mars_by_mgs(label: &Label) -> std::result::Result<(), LabelError> {
 
 /// Lines and samples of a map are no places on a detector.
 fn as_taken(label: &Label) -> std::result::Result<(), LabelError> {
-    let mut entries = label.entries.iter();
-    let projected =
-        entries.find(|entry| ["IMAGE_MAP_PROJECTION", "MAPPING"].contains(&&*entry.group));
-    match projected {
+    match projection(label) {
         Some(entry) => Err(other_image(
             "OBJECT",
             &entry.group,
@@ -152,6 +149,12 @@ fn as_taken(label: &Label) -> std::result::Result<(), LabelError> {
         )),
         None => Ok(()),
     }
+}
+
+/// Something of the map projection of an image that has one.
+pub(super) fn projection(label: &Label) -> Option<&Entry> {
+    let mut entries = label.entries.iter();
+    entries.find(|entry| ["IMAGE_MAP_PROJECTION", "MAPPING"].contains(&&*entry.group))
 }
 
 fn other_image(key: &str, value: &str, expected: &'static str) -> LabelError {

@@ -4,6 +4,7 @@
 
 mod cube;
 mod pictures;
+mod pyramid;
 mod rows;
 
 use std::{
@@ -12,6 +13,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
+pub use self::pyramid::Pyramid;
 use self::{
     cube::Cube,
     pictures::Picture,
@@ -20,7 +22,7 @@ use self::{
 use super::{
     image_file::{Complaint, ImageFile, LineState, Strip, Strips},
     label::{LABEL_BYTES_MAX, Label, parse},
-    moc::{ImageLabel, image_label},
+    moc::{ImageLabel, image_label, projection},
 };
 use crate::{
     error::{Cause, IoError, Kind, Locate as _, Result},
@@ -44,6 +46,7 @@ pub struct OtherFile {
     /// Lines and samples.
     size: [u32; 2],
     label: Option<ImageLabel>,
+    is_projected: bool,
 }
 
 #[derive(Debug)]
@@ -117,26 +120,27 @@ impl PixelFile {
         read.map_err(IoError::on("read")).in_file(path)?;
         if let Some(picture) = Picture::recognise(&start) {
             let size = picture.rows(path).in_file(path)?.size();
-            return Ok(Self::other(path, OtherKind::Picture(picture), size, None));
+            return Ok(Self::Other(Box::new(OtherFile {
+                path: path.to_owned(),
+                kind: OtherKind::Picture(picture),
+                size,
+                label: None,
+                is_projected: false,
+            })));
         }
         let label = parse(&start).in_file(path)?;
         if !is_cube(&label) {
             return Ok(Self::Archive(Box::new(ImageFile::open(path, cameras)?)));
         }
         let cube = Cube::of(&label, path).in_file(path)?;
-        let size = cube.size();
-        // A cube need not be of a camera that is known.
-        let label = image_label(&label, cameras).ok();
-        Ok(Self::other(path, OtherKind::Cube(cube), size, label))
-    }
-
-    fn other(path: &Path, kind: OtherKind, size: [u32; 2], label: Option<ImageLabel>) -> Self {
-        Self::Other(Box::new(OtherFile {
+        Ok(Self::Other(Box::new(OtherFile {
             path: path.to_owned(),
-            kind,
-            size,
-            label,
-        }))
+            size: cube.size(),
+            kind: OtherKind::Cube(cube),
+            is_projected: projection(&label).is_some(),
+            // A cube need not be of a camera that is known.
+            label: image_label(&label, cameras).ok(),
+        })))
     }
 
     /// Where the file is.
@@ -172,6 +176,15 @@ impl PixelFile {
         match self {
             Self::Archive(image) => Some(image.label()),
             Self::Other(other) => other.label.as_ref(),
+        }
+    }
+
+    /// Whether these are no pixels as the camera took them, but those of a map.
+    #[must_use]
+    pub fn is_projected(&self) -> bool {
+        match self {
+            Self::Archive(_) => false,
+            Self::Other(other) => other.is_projected,
         }
     }
 

@@ -288,6 +288,7 @@ fn site_image(label: &Path) -> Result<SiteImage> {
         id,
         label: label.display().to_string(),
         lines_delivered: None,
+        pixels: None,
     })
 }
 

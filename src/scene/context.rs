@@ -385,6 +385,7 @@ pub(super) fn context_site(images: &[ContextImage<'_>], errors: &SceneErrors) ->
                 id: image.plan.id.to_owned(),
                 label: format!("../labels/{}.lbl", image.plan.id),
                 lines_delivered: None,
+                pixels: None,
             })
             .collect(),
     }

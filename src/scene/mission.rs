@@ -9,7 +9,7 @@ use super::{
     drawn::{DayErrors, Flown},
     error::SceneError,
     files::{Draft, put},
-    images::write_images,
+    images::{Coder, write_images},
     kernels::{
         clock_session, image_start, versions, write_attitude, write_orbits, write_text_kernels,
     },
@@ -45,18 +45,22 @@ const TIE_NOISE_PX: [f64; 2] = [0.0, 5.0];
 /// [`SceneError::NotAScene`], [`SceneError::Foreign`] and [`SceneError::Changed`] when the folder holds
 /// something else, [`SceneError::Option`], the system's refusal to write.
 pub fn write_scene(directory: &Path, options: &SceneOptions) -> Result<SceneSummary> {
-    write(directory, options, false)
+    write(directory, options, None)
 }
 
-/// The same with the pixels of the narrow-angle images (`images/*.imq`), which takes minutes.
+/// The same with the pixels of the narrow-angle images (`images/*.imq`, named in the site files), which takes minutes.
 ///
 /// # Errors
 /// Those of [`write_scene`].
-pub fn write_scene_with_images(directory: &Path, options: &SceneOptions) -> Result<SceneSummary> {
-    write(directory, options, true)
+pub fn write_scene_with_images(
+    directory: &Path,
+    options: &SceneOptions,
+    coder: Coder,
+) -> Result<SceneSummary> {
+    write(directory, options, Some(coder))
 }
 
-fn write(directory: &Path, options: &SceneOptions, with_images: bool) -> Result<SceneSummary> {
+fn write(directory: &Path, options: &SceneOptions, images: Option<Coder>) -> Result<SceneSummary> {
     check(options)?;
     let draft = Draft::begin(directory, README)?;
     let fly = |arc: Arc| {
@@ -94,16 +98,18 @@ fn write(directory: &Path, options: &SceneOptions, with_images: bool) -> Result<
         if let [first, second] = own[..] {
             let noise_px = options.errors.tie_noise_px;
             let pair = write_ties(&ties, [first, second], &terrain, noise_px, options.seed)?;
-            let file = planned_site(site, [&first.arc, &second.arc], &options.errors, &pair);
+            let arcs = [&first.arc, &second.arc];
+            let file = planned_site(site, arcs, &options.errors, &pair, images.is_some());
             put(&sites.join(format!("{}.toml", site.id)), &file.to_toml())?;
             truth.ties.push(pair);
         }
     }
     truth.wide_angle = write_context(&draft, &days, &kept, &terrain, options)?;
-    if with_images {
+    if let Some(coder) = images {
         let session = clock_session(&draft.folder("kernels")?)?;
         let folder = draft.folder("images")?;
-        write_images(&folder, &days, &terrain, options.seed, &session)?;
+        let how = (options.seed, coder);
+        truth.rendered = write_images(&folder, &days, &terrain, how, &session)?;
     }
     write_truth(&draft, &truth)?;
     draft.finish()?;

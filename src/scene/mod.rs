@@ -7,6 +7,7 @@
 //! | `orbit`, `versions` | the true orbit of a day, and two rivals that are metres off |
 //! | `attitude`, `arc` | pointing, and orbit and attitude solved so that an image shows its site |
 //! | `terrain`, `roughness`, `laser` | the ground, and laser shots on it as a PEDR frame tells them |
+//! | `images` | what the six images show, pixel by pixel |
 //! | `context` | wide-angle images around two of the six, a fourth site |
 //! | `telemetry` | what the instrument tells of its echoes besides ranges |
 //! | `archive`, `archive_frames` | PEDR files of any number of days, with kernels to check them by |
@@ -59,6 +60,7 @@ pub use error_sources::{
     AltimeterErrors, AttitudeErrors, Jitter, Misregistration, PositionErrors, Relief, Roughness,
     SceneErrors,
 };
+pub use images::Coder;
 pub use mission::{write_scene, write_scene_with_images};
 pub use plane::write_plane_scene;
 pub use plane_net::{PlaneRecipe, PlaneScene};

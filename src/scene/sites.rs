@@ -5,6 +5,7 @@ use std::fmt::Write as _;
 use super::{
     arc::Arc,
     error_sources::SceneErrors,
+    images::image_name,
     plan::{Look, Site},
     ties::ties_name,
     truth::TiesTruth,
@@ -17,6 +18,9 @@ use crate::{
 
 /// Sources that products repeat.
 const INJECTED: &str = "injected by areograph scene";
+
+/// What measures tie points in pixels, ready to be switched on.
+const MATCH: &str = "# match = true  # also measures tie points in the pixels of the images, with or without files\n";
 
 /// A window of a site file, degrees.
 pub(super) struct Window {
@@ -36,6 +40,8 @@ pub(super) struct SiteImage {
     pub label: String,
     /// Lines delivered, when fewer than the label's.
     pub lines_delivered: Option<u32>,
+    /// Path of its pixels, where there are some.
+    pub pixels: Option<String>,
 }
 
 /// Tie points of a site file.
@@ -120,10 +126,12 @@ impl SiteFile<'_> {
             files.join(", "),
         );
         if let Some(ties) = &self.ties {
+            let has_pixels = self.images.iter().any(|image| image.pixels.is_some());
             let _infallible = write!(
                 text,
-                "\n[ties]\nfiles = [{}]\n\n[adjustment]\n# {}\ntie_sigma_px = {:?}\n",
+                "\n[ties]\nfiles = [{}]\n{}\n[adjustment]\n# {}\ntie_sigma_px = {:?}\n",
                 quoted(&ties.file),
+                if has_pixels { MATCH } else { "" },
                 ties.note,
                 ties.sigma_px,
             );
@@ -153,6 +161,9 @@ impl SiteFile<'_> {
             if let Some(lines) = image.lines_delivered {
                 let _infallible = writeln!(text, "lines_delivered = {lines}");
             }
+            if let Some(pixels) = &image.pixels {
+                let _infallible = writeln!(text, "pixels = {}", quoted(pixels));
+            }
         }
         text
     }
@@ -180,12 +191,14 @@ pub(super) fn range_mean_max_m(errors: &SceneErrors) -> Option<f64> {
     (*errors != SceneErrors::demo()).then_some(RANGE_MEAN_MAX_M)
 }
 
-/// The site file of `site`, whose images and PEDR files are those of its arcs and whose tie points are those of `ties`.
+/// The site file of `site`, whose images and PEDR files are those of its arcs and whose tie points are those of `ties`; the
+/// images may have pixels.
 pub(super) fn planned_site<'a>(
     site: &'a Site,
     arcs: [&Arc; 2],
     errors: &SceneErrors,
     ties: &TiesTruth,
+    has_pixels: bool,
 ) -> SiteFile<'a> {
     let is_demo = *errors == SceneErrors::demo();
     let ties_of_demo = || {
@@ -238,6 +251,7 @@ pub(super) fn planned_site<'a>(
                     label: format!("../labels/{}.lbl", image.id),
                     lines_delivered: (image.lines_delivered < image.lines_header)
                         .then_some(image.lines_delivered),
+                    pixels: has_pixels.then(|| format!("../images/{}", image_name(image.id))),
                 }
             })
             .collect(),
@@ -349,6 +363,7 @@ kernels/     text kernels; orbit (three rival versions), attitude, Mars and Sun 
              nav.tm, gsfc.tm, ipng.tm load them with one version of the orbit each, and nav_wa.tm, gsfc_wa.tm
              and ipng_wa.tm with the frames of the wide-angle cameras as well
 pedr/        MOLA PEDR files: two whole days, five single revolutions; version K is in IAU 1991, L in IAU 2000
+images/      with --images alone: the six narrow-angle images, as the archive has them
 labels/      labels of six narrow-angle images and three wide-angle ones
 ties/        places that both images of a site show, as measured in them; some are blunders
 sites/       configurations for `areograph run`; gusev_context chooses among the three orbits, and has a profile

@@ -9,7 +9,7 @@ use super::{
     drawn::{DayErrors, Flown},
     error_sources::SceneErrors,
     laser::{CROSSOVER_AMPLITUDE_M, CROSSOVER_PERIOD_S, Shot},
-    plan::Look,
+    plan::{Look, PlannedImage},
     versions::Version,
 };
 use crate::{
@@ -48,6 +48,35 @@ pub(super) struct Truth {
     pub ties: Vec<TiesTruth>,
     pub wide_angle_rule: &'static str,
     pub wide_angle: Vec<ContextTruth>,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub rendered: Vec<RenderedTruth>,
+}
+
+/// How the pixels of an image were made.
+#[derive(Debug, Serialize)]
+pub(super) struct RenderedTruth {
+    image: &'static str,
+    coder: &'static str,
+    /// Zenith angle of the Sun over the site.
+    sun_incidence_deg: f64,
+    /// Where the Sun stands, from north to east.
+    sun_azimuth_deg: f64,
+}
+
+impl RenderedTruth {
+    /// An image in the light of a Sun at this zenith angle and azimuth, degrees.
+    pub(super) const fn new(
+        image: &PlannedImage,
+        coder: &'static str,
+        [sun_incidence_deg, sun_azimuth_deg]: [f64; 2],
+    ) -> Self {
+        Self {
+            image: image.id,
+            coder,
+            sun_incidence_deg,
+            sun_azimuth_deg,
+        }
+    }
 }
 
 /// The errors of the day of one image.
@@ -280,6 +309,7 @@ impl Truth {
             ties: Vec::new(),
             wide_angle_rule: "wide-angle images are taken when their labels say, from the true place of the bus with its true attitude, by light that left the ground as much earlier as it takes from each point; lines and samples of shots follow the formula of the instrument kernel moc20.ti",
             wide_angle: Vec::new(),
+            rendered: Vec::new(),
         }
     }
 }

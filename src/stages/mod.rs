@@ -12,6 +12,7 @@ pub mod convert_datum;
 pub mod describe_kernels;
 pub mod fit_sensor_model;
 pub mod group_profiles;
+pub mod image_pixels;
 pub mod intersect;
 pub mod judge;
 pub mod lay_overlays;

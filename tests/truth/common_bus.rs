@@ -286,19 +286,24 @@ fn mistakes_of_laser_and_bus_are_told() {
         told.contains("adjustment.common_bus did nothing: the file of the altimeter does not tell"),
         "{told}"
     );
-    // Every fourth frame is recorded 440 m to either side in turn: together they say nothing wrong of laser and profile.
+    // Every frame is recorded 59 m to either side in turn: together they say nothing wrong of laser and profile, and every
+    // one contradicts them.
     let remark = "coordinates of the laser in the images lie beyond 3.29";
+    let refused = "contradicts the rest of the network";
     let (_, told, _) = ending(&mission, "sound", |text| text);
     assert!(!told.contains(remark), "{told}");
-    spoil_shots(&mission);
+    spoil_shots(&mission, 1, 1_000);
     let (_, told, _) = ending(&mission, "spoiled", |text| text);
-    // So many that the network falls apart over them, or as a remark.
-    let refused = "contradicts the rest of the network";
-    assert!(told.contains(remark) || told.contains(refused), "{told}");
+    assert!(told.contains(remark) && !told.contains(refused), "{told}");
+    // Every fourth 440 m: the images would have to bend, and the network falls apart.
+    spoil_shots(&mission, 1, -1_000);
+    spoil_shots(&mission, 4, 7_500);
+    let (_, told, _) = ending(&mission, "torn", |text| text);
+    assert!(told.contains(refused), "{told}");
 }
 
-/// Records every fourth frame of all PEDR files 7.5 thousandths of a degree east or west of its place, in turn.
-fn spoil_shots(mission: &Path) {
+/// Records one of `every` so many frames of all PEDR files `step` microdegrees east or west of its place, in turn.
+fn spoil_shots(mission: &Path, every: usize, step: i32) {
     const LONGITUDE: usize = std::mem::offset_of!(Record, ground_longitude_microdegrees);
     for entry in fs::read_dir(mission.join("pedr")).unwrap() {
         let path = entry.unwrap().path();
@@ -307,9 +312,13 @@ fn spoil_shots(mission: &Path) {
             .chunks_exact_mut(RECORD_BYTES)
             .enumerate()
         {
-            if number % 4 == 0 {
+            if number % every == 0 {
                 let field = &mut record[LONGITUDE..LONGITUDE + 4];
-                let step = if number % 8 == 0 { 7_500 } else { -7_500 };
+                let step = if number % (2 * every) == 0 {
+                    step
+                } else {
+                    -step
+                };
                 let longitude = i32::from_be_bytes(field.try_into().unwrap()) + step;
                 field.copy_from_slice(&longitude.to_be_bytes());
             }

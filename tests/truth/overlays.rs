@@ -71,10 +71,15 @@ fn painted(id: &str, places: &[[f64; 2]]) -> Vec<u8> {
             }
         }
     }
+    let clock = if id == "E02-01301" {
+        (669_166_528, 118)
+    } else {
+        (669_788_295, 103)
+    };
     let image = NewImage {
         product_id: &id.replace('-', "/"),
         instrument: ["MOC-NA", ""],
-        clock: (669_166_528, 118),
+        clock,
         utc: ["2001-03-15T23:34:57.72", "2001-03-15T23:35:05.00"],
         exposure_s: 0.000_482_1,
         summing: 2,

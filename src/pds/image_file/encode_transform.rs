@@ -1,5 +1,7 @@
 //! The transform coder the other way: blocks of pixels to quantised coefficients of cosines.
 
+use std::collections::BTreeMap;
+
 use super::{
     bits::BitWriter,
     codes::{COEFFICIENTS, Code, LARGE_NEGATIVE, LARGE_POSITIVE},
@@ -92,16 +94,16 @@ fn encode_group(blocks: &[&Block], out: &mut BitWriter) {
 
 /// The code that takes the fewest bits for a coefficient of these blocks.
 fn shortest(blocks: &[&Block], number: usize) -> usize {
+    let mut counts: BTreeMap<i32, u32> = BTreeMap::new();
+    for block in blocks {
+        *counts.entry(block.steps[number]).or_default() += 1;
+    }
     let bits = |table: &usize| {
-        let code = &COEFFICIENTS[*table];
-        let of_block = |block: &&Block| -> u32 {
-            words(code, block.steps[number])
-                .into_iter()
-                .flatten()
-                .map(|(_, length)| length)
-                .sum()
+        let of_step = |(step, count): (&i32, &u32)| -> u32 {
+            let words = words(&COEFFICIENTS[*table], *step).into_iter().flatten();
+            count * words.map(|(_, length)| length).sum::<u32>()
         };
-        blocks.iter().map(of_block).sum::<u32>()
+        counts.iter().map(of_step).sum::<u32>()
     };
     (0..COEFFICIENTS.len()).min_by_key(bits).unwrap_or_default()
 }

@@ -13,7 +13,6 @@ mod fragment;
 mod opened;
 mod placed;
 mod predictive;
-mod pyramid;
 mod radiometry;
 mod statistics;
 mod stream;
@@ -27,7 +26,6 @@ pub use self::{
     encode::{EncodeError, Encoded, NewImage, encode},
     fragment::{Coding, Layout, Predictor, Transform},
     opened::{ImageFile, ImageFileError},
-    pyramid::Pyramid,
     radiometry::{OddEven, Radiometry},
     statistics::{PixelStatistics, Statistics},
     strip::{LineState, Strip},

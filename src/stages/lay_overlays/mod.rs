@@ -14,12 +14,11 @@ use std::sync::atomic::AtomicBool;
 use serde::{Deserialize, Serialize};
 
 use super::{
-    adjust::Adjusted, convert_datum::Converted, group_profiles::Profile,
+    adjust::Adjusted, convert_datum::Converted, group_profiles::Profile, image_pixels::PixelFiles,
     intersect::IntersectedTies, read_ties::Ties, site_image::SiteImage, tag_times::ImageTimes,
 };
 use crate::{
     error::Result,
-    files::HashedFile,
     geom::pushbroom::CameraModel,
     stage::{InOrder, Input, Inputs, Output, Stage},
     stage_inputs,
@@ -100,20 +99,6 @@ stage_inputs! {
     }
 }
 
-/// Files of pixels by image.
-#[derive(Debug, Clone, Copy)]
-pub struct PixelFiles<'a>(pub &'a [Option<HashedFile>]);
-
-impl Input for PixelFiles<'_> {
-    fn add_to(&self, field: &str, inputs: &mut Inputs) {
-        for (place, file) in self.0.iter().enumerate() {
-            if let Some(file) = file {
-                inputs.file(field, &file.path, Some(place), &file.blake3);
-            }
-        }
-    }
-}
-
 /// Tie points and what became of them.
 #[derive(Debug, Clone, Copy)]
 pub struct MeasuredTies<'a> {
@@ -144,12 +129,9 @@ impl Stage for LayOverlays<'_> {
 
     /// Whether every file of pixels is of its image.
     fn examine(&self) -> Vec<Result<String>> {
-        let files = self.pixels.0.iter().zip(self.images.0);
-        let known = files.filter_map(|(file, image)| Some((file.as_ref()?, image.times.get()?)));
-        let opened = known.map(|(file, times)| {
-            pixels::open(&file.path, times)
-                .map(|_| format!("image {}: its pixels are there", times.id))
-        });
+        let opened = self.pixels.examined(self.images.0);
+        let opened = opened
+            .map(|(times, file)| file.map(|_| format!("image {}: its pixels are there", times.id)));
         opened.collect()
     }
 
@@ -157,16 +139,7 @@ impl Stage for LayOverlays<'_> {
         let times: Vec<&ImageTimes> = (self.images.0.iter())
             .map(|image| image.times.value())
             .collect::<Result<_>>()?;
-        let files: Vec<_> = self
-            .pixels
-            .0
-            .iter()
-            .zip(&times)
-            .map(|(file, times)| {
-                let opened = file.as_ref().map(|file| pixels::open(&file.path, times));
-                opened.transpose()
-            })
-            .collect::<Result<_>>()?;
+        let files = self.pixels.opened(&times)?;
         let has_pixels: Vec<bool> = files.iter().map(Option::is_some).collect();
         let before = views::cameras(self.images.0, *self.model)?;
         let after = views::cameras(self.adjusted_images.0, *self.model)?;

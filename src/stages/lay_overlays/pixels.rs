@@ -1,17 +1,15 @@
 //! The pixels of an image, read once from its first line to its last: a quick look of the whole and full resolution where it
 //! is asked for.
 
-use std::{ops::Range, path::Path, sync::atomic::AtomicBool};
+use std::{ops::Range, sync::atomic::AtomicBool};
 
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    config::built_in_instruments,
-    error::{Cause, Kind, Locate as _, Result, Stopped},
+    error::{Result, Stopped},
     pds::{
         image_file::{LineState, Strip},
         pixel_file::PixelFile,
-        product_named,
     },
     stages::tag_times::ImageTimes,
 };
@@ -118,79 +116,6 @@ impl Patch {
         let lower = lower_left + right * (lower_right - lower_left);
         (upper + down * (lower - upper)).round() as u8
     }
-}
-
-/// Pixels that are not those of the image.
-#[derive(Debug, thiserror::Error)]
-enum PixelsError {
-    #[error("these are pixels of {found}; expected those of image {image}")]
-    Product { image: String, found: String },
-    #[error(
-        "the file has {found} samples a line; image {image} has {samples}: expected the same number"
-    )]
-    Samples {
-        image: String,
-        found: u32,
-        samples: u32,
-    },
-    #[error("the file has {found} lines; image {image} has {lines}: expected no more")]
-    Lines {
-        image: String,
-        found: u32,
-        lines: u32,
-    },
-}
-
-impl Cause for PixelsError {
-    fn kind(&self) -> Kind {
-        Kind::Input
-    }
-
-    fn advice(&self) -> String {
-        "check that pixels of two images are not exchanged, and that the label is that of this file"
-            .to_owned()
-    }
-}
-
-/// Opens the pixels of an image.
-///
-/// # Errors
-/// A file that cannot be read; pixels of another image.
-pub(super) fn open(path: &Path, times: &ImageTimes) -> Result<PixelFile> {
-    let file = PixelFile::open(path, built_in_instruments())?;
-    fits(&file, times).in_file(path)?;
-    Ok(file)
-}
-
-fn fits(file: &PixelFile, times: &ImageTimes) -> std::result::Result<(), PixelsError> {
-    let image = || times.id.clone();
-    let lines = times.line_times.lines();
-    let found = file.label().and_then(|label| label.product_id.as_deref());
-    let found = found.unwrap_or_default();
-    if let (Some(own), Some(other)) = (product_named(&times.id), product_named(found))
-        && own != other
-    {
-        let found = found.to_owned();
-        return Err(PixelsError::Product {
-            image: image(),
-            found,
-        });
-    }
-    if file.samples() != times.samples {
-        return Err(PixelsError::Samples {
-            image: image(),
-            found: file.samples(),
-            samples: times.samples,
-        });
-    }
-    if file.lines() > lines {
-        return Err(PixelsError::Lines {
-            image: image(),
-            found: file.lines(),
-            lines,
-        });
-    }
-    Ok(())
 }
 
 /// Reads all strips of an image.

@@ -13,7 +13,7 @@ use super::{
 use crate::{
     error::Result,
     imaging::{Patch, noise_dn, texture},
-    pds::image_file::Pyramid,
+    pds::pixel_file::Pyramid,
     ties::Unmatched,
 };
 

@@ -25,8 +25,8 @@ use self::{
     view::View,
 };
 use super::{
-    convert_datum::Converted, group_profiles::Profile, oriented::OrientedImage, read_ties::Ties,
-    site_image::SiteImage, tag_times::ImageTimes,
+    convert_datum::Converted, group_profiles::Profile, image_pixels::PixelFiles,
+    oriented::OrientedImage, read_ties::Ties, site_image::SiteImage, tag_times::ImageTimes,
 };
 use crate::{
     error::{Cause, Kind, Result},
@@ -37,7 +37,6 @@ use crate::{
 };
 
 pub use margin::Margin;
-pub use pixels::PixelFiles;
 
 /// A pair with fewer tie points is remarked on.
 const FEW_TIES: u32 = 60;
@@ -146,17 +145,30 @@ impl Stage for MatchTies<'_> {
 
     /// The pixels are opened, not decoded.
     fn examine(&self) -> Vec<Result<String>> {
-        let images = self.images.0.iter().zip(self.pixels.0);
-        let with_pixels =
-            images.filter_map(|(image, file)| Some((image.times.get()?, file.as_ref()?)));
-        let opened = with_pixels.map(|(times, file)| -> Result<String> {
-            let layout = pixels::open(&file.path, times)?.layout();
+        let opened = self.pixels.examined(self.images.0);
+        let opened = opened.map(|(times, file)| {
+            let file = file?;
             Ok(format!(
                 "image {}: {} lines of {} samples to be matched",
-                times.id, layout.lines, layout.samples
+                times.id,
+                file.lines(),
+                file.samples()
             ))
         });
-        opened.collect()
+        let mut examined: Vec<_> = opened.collect();
+        let times: Option<Vec<_>> = self
+            .images
+            .0
+            .iter()
+            .map(|image| image.times.get())
+            .collect();
+        if let Some(times) = times
+            && examined.iter().all(Result::is_ok)
+            && let Err(failure) = self.pixels.told_apart(&times)
+        {
+            examined.push(Err(failure));
+        }
+        examined
     }
 }
 

@@ -6,7 +6,7 @@ use super::view::View;
 use crate::{
     error::Result,
     imaging::{Affine, LeastSquaresFailure, Patch, match_least_squares, search},
-    pds::image_file::Pyramid,
+    pds::pixel_file::Pyramid,
     ties::Unmatched,
 };
 

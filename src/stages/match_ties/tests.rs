@@ -20,7 +20,7 @@ use crate::{
         pushbroom::{Detector, ExteriorOrientation, Pose, SampledOrientation},
     },
     line_times::LineTimes,
-    pds::image_file::{ImageFile, Pyramid},
+    pds::pixel_file::{PixelFile, Pyramid},
     ties::Unmatched,
     time::Et,
 };
@@ -146,7 +146,7 @@ fn pyramid(folder: &Path, pixels: &[u8]) -> Pyramid {
     bytes.extend_from_slice(pixels);
     let path = folder.join("pixels.img");
     File::create(&path).unwrap().write_all(&bytes).unwrap();
-    let file = ImageFile::open(&path, std::slice::from_ref(usual_instrument())).unwrap();
+    let file = PixelFile::open(&path, std::slice::from_ref(usual_instrument())).unwrap();
     Pyramid::of(&file).unwrap()
 }
 

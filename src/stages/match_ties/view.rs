@@ -9,7 +9,7 @@ use crate::{
         pushbroom::{CameraModel, ExteriorOrientation, Projector, Unseen},
     },
     imaging::Affine,
-    pds::image_file::Pyramid,
+    pds::pixel_file::Pyramid,
     stages::oriented::OrientedImage,
 };
 

@@ -3,10 +3,11 @@
 
 use std::{fs::File, io, ops::Range, os::unix::fs::FileExt as _};
 
-use super::{opened::ImageFile, strip::LineState};
+use super::PixelFile;
 use crate::{
-    error::{IoError, Locate as _, Result},
+    error::{IoError, Result},
     imaging::Patch,
+    pds::image_file::LineState,
 };
 
 /// Halvings of an image: a pixel of the last level is 64 of the first along each axis.
@@ -17,6 +18,8 @@ const LEVELS: usize = 7;
 pub struct Pyramid {
     file: File,
     levels: Vec<Level>,
+    /// Whether a pixel of 0 stands for none.
+    zero_is_none: bool,
 }
 
 /// The image at one size.
@@ -33,24 +36,21 @@ struct Level {
 }
 
 impl Pyramid {
-    /// Decodes all of an image. Lines that are missing or suspect are none.
+    /// Decodes all of an image. Lines that are missing or suspect are none, and 0 is no number but in files as the archive has
+    /// them.
     ///
     /// # Errors
     /// The system's refusal to read the image, or to write a temporary file.
-    pub fn of(image: &ImageFile) -> Result<Self> {
+    pub fn of(image: &PixelFile) -> Result<Self> {
         let mut strips = image.strips()?;
-        let layout = image.layout();
-        let size = [layout.lines as usize, layout.samples as usize];
+        let size = [image.lines() as usize, image.samples() as usize];
         let file = tempfile::tempfile().map_err(IoError::on("make a temporary file"))?;
         let mut pyramid = Self {
             file,
             levels: levels(size),
+            zero_is_none: image.archive().is_none(),
         };
-        while let Some(strip) = strips
-            .next_strip()
-            .map_err(IoError::on("read"))
-            .in_file(image.path())?
-        {
+        while let Some(strip) = strips.next_strip()? {
             for (pixels, state) in strip.lines() {
                 let is_good = *state == LineState::Good;
                 pyramid
@@ -80,11 +80,16 @@ impl Pyramid {
                 Ok(())
             }
             Some((above, above_is_good)) => {
+                let zero_is_none = self.zero_is_none;
                 let halved: Vec<u8> = above
                     .chunks_exact(2)
                     .zip(pixels.chunks_exact(2))
                     .map(|(above, below)| {
-                        let sum: u16 = above.iter().chain(below).copied().map(u16::from).sum();
+                        let four = || above.iter().chain(below).copied();
+                        if zero_is_none && four().any(|pixel| pixel == 0) {
+                            return 0;
+                        }
+                        let sum: u16 = four().map(u16::from).sum();
                         u8::try_from((sum + 2) / 4).unwrap_or(u8::MAX)
                     })
                     .collect();
@@ -123,7 +128,7 @@ impl Pyramid {
     }
 
     /// The rectangle of a level with this first line and sample; what lies beyond the image is left out. `None` where
-    /// nothing is left, or where lines of it are missing.
+    /// nothing is left, or where lines or pixels of it are missing.
     ///
     /// # Errors
     /// The system's refusal to read the temporary file.
@@ -148,6 +153,9 @@ impl Pyramid {
             self.file
                 .read_exact_at(row, at)
                 .map_err(IoError::on("read a temporary file"))?;
+        }
+        if self.zero_is_none && bytes.contains(&0) {
+            return Ok(None);
         }
         Ok(Some(Patch {
             first: [top, left].map(|first| i64::try_from(first).unwrap_or(i64::MAX)),

@@ -1,0 +1,227 @@
+//! The pixels of the images: files that must be those of the images they are given for.
+
+use std::path::Path;
+
+use super::{site_image::SiteImage, tag_times::ImageTimes};
+use crate::{
+    config::built_in_instruments,
+    error::{Cause, Kind, Locate as _, Result},
+    files::HashedFile,
+    instruments::Instrument,
+    pds::{ImageLabel, pixel_file::PixelFile, product_named},
+    stage::{Input, Inputs},
+};
+
+/// Clocks of an image and of its pixels that lie farther apart are those of two images, seconds; labels round them.
+const CLOCKS_APART_MAX_S: u32 = 1;
+
+/// For every image of the site the file with its pixels, where there is one.
+#[derive(Debug, Clone, Copy)]
+pub struct PixelFiles<'a>(pub &'a [Option<HashedFile>]);
+
+impl Input for PixelFiles<'_> {
+    fn add_to(&self, field: &str, inputs: &mut Inputs) {
+        for (place, file) in self.0.iter().enumerate() {
+            if let Some(file) = file {
+                inputs.file(field, &file.path, Some(place), &file.blake3);
+            }
+        }
+    }
+}
+
+impl PixelFiles<'_> {
+    /// The files, opened, of the images with these times.
+    ///
+    /// # Errors
+    /// The system's refusal to read; a file whose pixels cannot be read, or are those of another image.
+    pub fn opened(&self, times: &[&ImageTimes]) -> Result<Vec<Option<PixelFile>>> {
+        let files = self.0.iter().zip(times);
+        let opened = files.map(|(file, times)| {
+            let file = file.as_ref().map(|file| open_pixels(&file.path, times));
+            file.transpose()
+        });
+        opened.collect()
+    }
+
+    /// The same where exchanged files would not be noticed otherwise: two without a label must not be of one size.
+    ///
+    /// # Errors
+    /// Those of [`Self::opened`]; two such files.
+    pub fn told_apart(&self, times: &[&ImageTimes]) -> Result<Vec<Option<PixelFile>>> {
+        let opened = self.opened(times)?;
+        let without_label = || {
+            let files = opened.iter().zip(times);
+            let files = files.filter_map(|(file, times)| Some((file.as_ref()?, &times.id)));
+            files.filter(|(file, _)| file.label().is_none())
+        };
+        for (at, (file, image)) in without_label().enumerate() {
+            let size = [file.lines(), file.samples()];
+            let mut others = without_label().take(at);
+            if let Some((_, other)) =
+                others.find(|(other, _)| [other.lines(), other.samples()] == size)
+            {
+                let images = [other, image].map(String::clone);
+                return Err(PixelsError::Alike { images, size }).in_file(file.path());
+            }
+        }
+        Ok(opened)
+    }
+
+    /// Every file whose image has its times, and what opening it gives.
+    pub fn examined<'i>(
+        &self,
+        images: &'i [SiteImage],
+    ) -> impl Iterator<Item = (&'i ImageTimes, Result<PixelFile>)> {
+        let files = self.0.iter().zip(images);
+        let known = files.filter_map(|(file, image)| Some((file.as_ref()?, image.times.get()?)));
+        known.map(|(file, times)| (times, open_pixels(&file.path, times)))
+    }
+}
+
+/// Pixels that belong to another image.
+#[derive(Debug, thiserror::Error)]
+enum PixelsError {
+    #[error(
+        "image {image}: its pixels are those of product {product}; expected {expected}, which its identifier names"
+    )]
+    Product {
+        image: String,
+        product: String,
+        expected: String,
+    },
+    #[error(
+        "image {image}: its pixels were exposed from clock {clock} on; expected {expected}, as the image itself is"
+    )]
+    Clock {
+        image: String,
+        clock: String,
+        expected: String,
+    },
+    #[error(
+        "image {image}: its pixels are those of a map; expected the image as its camera took it"
+    )]
+    Map { image: String },
+    #[error(
+        "images {} and {}: their pixels are both {} lines of {} samples, without a label that says whose they are; expected a label in \
+         one of them",
+        images[0], images[1], size[0], size[1]
+    )]
+    Alike { images: [String; 2], size: [u32; 2] },
+    #[error("image {image}: its pixels have {found} {what}; expected {expected}")]
+    Size {
+        image: String,
+        what: &'static str,
+        found: u32,
+        expected: String,
+    },
+}
+
+impl Cause for PixelsError {
+    fn kind(&self) -> Kind {
+        Kind::Input
+    }
+
+    fn advice(&self) -> String {
+        match self {
+            Self::Product { .. } | Self::Size { .. } => {
+                "check that images.pixels are not exchanged, and are all of the image"
+            }
+            Self::Map { .. } => {
+                "give the cube before its projection, or the file of the archive (.imq, .img)"
+            }
+            Self::Alike { .. } => {
+                "give the file of the archive (.imq, .img) or the cube of ISIS for one of the images: exchanged pictures could not be \
+                 told from orientations that err"
+            }
+            Self::Clock { .. } => {
+                "check that images.pixels are not exchanged, and the clock of the image's label or keys"
+            }
+        }
+        .to_owned()
+    }
+}
+
+fn open_pixels(path: &Path, times: &ImageTimes) -> Result<PixelFile> {
+    // The image's own camera before others that labels name alike.
+    let cameras: Vec<Instrument> = std::iter::once(&times.instrument)
+        .chain(built_in_instruments())
+        .cloned()
+        .collect();
+    let file = PixelFile::open(path, &cameras)?;
+    belongs(&file, times).in_file(path)?;
+    Ok(file)
+}
+
+/// Whether what a file says of its image agrees with what is known of it. The lines of an image that came down in part may be fewer;
+/// without a label, nothing says which ones.
+fn belongs(file: &PixelFile, times: &ImageTimes) -> std::result::Result<(), PixelsError> {
+    let image = || times.id.clone();
+    if file.is_projected() {
+        return Err(PixelsError::Map { image: image() });
+    }
+    let size = |what, found, expected| PixelsError::Size {
+        image: image(),
+        what,
+        found,
+        expected,
+    };
+    let (lines, samples) = (file.lines(), file.samples());
+    let [delivered, header] = [times.lines_delivered, times.line_times.lines()];
+    if let Some(label) = file.label() {
+        of_the_image(label, times)?;
+    } else if ![delivered, header].contains(&lines) {
+        let expected = if delivered == header {
+            format!("{header}, as there is no label")
+        } else {
+            format!("{delivered} or {header}, as there is no label")
+        };
+        return Err(size("lines", lines, expected));
+    }
+    if samples != times.samples {
+        return Err(size(
+            "samples in a line",
+            samples,
+            times.samples.to_string(),
+        ));
+    }
+    if lines > header {
+        return Err(size("lines", lines, format!("at most {header}")));
+    }
+    Ok(())
+}
+
+/// Whether a label names the product and the clock of the image.
+fn of_the_image(label: &ImageLabel, times: &ImageTimes) -> std::result::Result<(), PixelsError> {
+    let image = || times.id.clone();
+    let product = label.product_id.as_deref();
+    if let (Some(product), Some(expected)) = (product, product_named(&times.id))
+        && product_named(product).is_some_and(|found| found != expected)
+    {
+        return Err(PixelsError::Product {
+            image: image(),
+            product: product.to_owned(),
+            expected,
+        });
+    }
+    let clocks = [&label.fields.sclk_start, &times.sclk_start];
+    if let [Some(clock), Some(expected)] = clocks
+        && let [Some(found), Some(known)] = [clock, expected].map(|clock| whole_seconds(clock))
+        && found.abs_diff(known) > CLOCKS_APART_MAX_S
+    {
+        return Err(PixelsError::Clock {
+            image: image(),
+            clock: clock.clone(),
+            expected: expected.clone(),
+        });
+    }
+    Ok(())
+}
+
+/// Seconds of a spacecraft clock.
+fn whole_seconds(clock: &str) -> Option<u32> {
+    let count = clock.split_once('/').map_or(clock, |(_, count)| count);
+    count.split([':', '.']).next()?.trim().parse().ok()
+}
+
+#[cfg(test)]
+mod tests;
