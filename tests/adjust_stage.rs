@@ -12,6 +12,8 @@ mod recipe;
 #[path = "pushbroom/scene.rs"]
 mod scene;
 
+use std::sync::atomic::AtomicBool;
+
 use areograph::{
     config::AdjustmentConfig,
     error::Kind,
@@ -158,6 +160,7 @@ impl Site {
             &self.starts(),
             0.0,
             options,
+            &AtomicBool::new(false),
         )
     }
 }

@@ -70,7 +70,7 @@ pub use picture::{PictureFile, PictureFormat, PictureHead};
 pub use product::{Pages, Product};
 #[cfg(feature = "sql")]
 pub use shot_columns::ShotColumns;
-pub use site::{AdjustmentProducts, GeometricProducts, ImageProducts, SiteProducts};
+pub use site::{AdjustmentProducts, GeometricProducts, ImageProducts, Program, SiteProducts};
 
 use crate::error::{Locate, Result};
 use product::{Context, Declaration, Scope, Write, Written};

@@ -126,7 +126,7 @@ fn datum(site: &SiteProducts) -> String {
         );
     }
     let words = format!(
-        "Decided {decided}. Products are in IAU 2000, W0 = {:.3}°.",
+        "Datum {decided}; products are in IAU 2000, W0 = {:.3}°.",
         crate::constants::MARS_IAU2000.meridian_deg
     );
     table.finish() + &paragraph(&words)

@@ -29,7 +29,7 @@ pub(crate) fn table(page: &str, caption: &str) -> Vec<Vec<String>> {
 }
 
 /// What stands between the tags.
-fn text(html: &str) -> String {
+pub(crate) fn text(html: &str) -> String {
     let outside = html.split('<').map(|part| part.split_once('>'));
     outside
         .map(|part| part.map_or("", |(_, text)| text))

@@ -11,19 +11,19 @@ pub(super) fn two_readings(adjusted: &Adjusted) -> String {
     match &adjusted.other_reading {
         None => String::new(),
         Some(Err(reason)) => paragraph(&format!(
-            "The other reading of what the images disagree by along the flight (adjustment.attitude_clock) gave no result: {reason}."
+            "The other reading of the along-track disagreement (adjustment.attitude_clock) gave no result: {reason}."
         )),
         Some(Ok(other)) => table(adjusted, other) + &paragraph(WORDS),
     }
 }
 
-const WORDS: &str = "Tie points tell how far the images are apart along the flight, not which of them is right. Evenly: all are as \
-    likely to be wrong. By the clock: one offset of the time of attitudes turned the images that follow nadir, and not those held \
-    towards a star. Each standard deviation holds only for its reading; adjustment.attitude_clock chooses.";
+const WORDS: &str = "Tie points show how far apart the images are along track, not which is right. Evenly: each is as likely to be wrong. \
+    By the clock: one clock offset turned the images that follow nadir, but not those held towards a star. Each σ holds for its \
+    own reading; adjustment.attitude_clock chooses.";
 
 fn table(adjusted: &Adjusted, other: &OtherReading) -> String {
     let mut table = Table::new(
-        "Two readings of what the images disagree by along the flight, metres",
+        "Two readings of the along-track disagreement, metres",
         &[
             Column::Text("reading"),
             Column::Text("products"),

@@ -22,7 +22,7 @@ use super::{convert_datum::Converted, group_profiles::Profile};
 use crate::{
     altimetry::MolaClock,
     config::RangeCheckConfig,
-    error::{Cause, Kind, Result, Stopped},
+    error::{Cause, Kind, Result},
     footprints::{Footprint, Footprints},
     frames::MarsIau2000,
     geom::{
@@ -33,6 +33,7 @@ use crate::{
     stage::{Output, Stage},
     stage_inputs,
     time::{Et, Intervals},
+    watch::Watch,
 };
 
 pub use figures::RangeFigures;
@@ -73,6 +74,10 @@ impl Stage for CheckRanges<'_> {
     stage_inputs!(fingerprint);
 
     fn run(&self, stop: &AtomicBool) -> Result<RangeCheck> {
+        self.run_watched(stop.into())
+    }
+
+    fn run_watched(&self, watch: Watch<'_>) -> Result<RangeCheck> {
         let profiles = self.profiles.value()?;
         let reach_s = trajectory_reach_s(self.range_check, self.mola_clock);
         check_ranges(
@@ -81,7 +86,7 @@ impl Stage for CheckRanges<'_> {
             &trajectory(self.kernels.session()?, profiles, reach_s)?,
             self.mola_clock,
             self.range_check,
-            stop,
+            watch,
         )
     }
 
@@ -199,24 +204,26 @@ impl Cause for OutsideTrajectory {
 
 /// Checks the ranges of every profile against `trajectory`.
 ///
-/// `stop` is looked at before every profile.
+/// `watch` is looked at before every profile, and counts shots.
 ///
 /// # Errors
-/// A shot whose time the trajectory does not cover; [`Stopped`].
+/// A shot whose time the trajectory does not cover; [`Stopped`](crate::error::Stopped).
 /// # Source
 /// Shan et al. 2005, Table 3; the limits are ours, the paper has none.
-pub fn check_ranges(
+pub fn check_ranges<'a>(
     footprints: &Footprints<MarsIau2000>,
     profiles: &[Profile],
     trajectory: &Trajectory,
     clock: &MolaClock,
     limits: &RangeCheckConfig,
-    stop: &AtomicBool,
+    watch: impl Into<Watch<'a>>,
 ) -> Result<RangeCheck> {
+    let watch = watch.into();
+    watch.expect(profiles.iter().map(|profile| profile.rows.len()).sum());
     let mut shots = ShotResiduals::default();
     let mut checked = Vec::with_capacity(profiles.len());
     for (index, profile) in (0_u32..).zip(profiles) {
-        Stopped::check(stop)?;
+        watch.check()?;
         let first = shots.len();
         for row in &profile.rows {
             let shot = footprints.row(*row as usize);
@@ -242,6 +249,7 @@ pub fn check_ranges(
         let explain = || orbit::cause(footprints, profile, trajectory, clock, limits.orbit_max_m);
         ranges.invalid_because = ranges.figures().broken_limits(limits, explain);
         checked.push(ranges);
+        watch.step(profile.rows.len(), "shots");
     }
     Ok(RangeCheck {
         shots,
