@@ -36,6 +36,7 @@ impl fmt::Debug for Counter<'_> {
 
 impl<'a> Counter<'a> {
     /// One that begins.
+    #[must_use]
     pub const fn new(tell: &'a (dyn Fn(Count) + Sync)) -> Self {
         Self {
             done: AtomicU64::new(0),
@@ -95,9 +96,8 @@ impl<'a> Watch<'a> {
     }
 
     /// So many things are done; `of` says what they are, in the plural.
-    pub fn step(&self, by: usize, of: &'static str) {
+    pub fn step(&self, by: u64, of: &'static str) {
         if let Some(counter) = self.counter {
-            let by = by as u64;
             (counter.tell)(Count {
                 done: counter.done.fetch_add(by, Ordering::Relaxed) + by,
                 all: counter.all.load(Ordering::Relaxed),

@@ -107,6 +107,7 @@ impl Observer for Progress {
 #[derive(Debug)]
 struct Counted {
     stage: String,
+    of: &'static str,
     begun: Instant,
     told: Instant,
 }
@@ -116,10 +117,12 @@ impl Progress {
     fn count(&self, stage: &str, count: Count) {
         let mut counted = self.counted.lock().unwrap_or_else(PoisonError::into_inner);
         let now = Instant::now();
-        let is_other = counted.as_ref().is_none_or(|of| of.stage != stage);
-        if is_other || count.done <= 1 {
+        // Files are hashed for a stage before it counts what it does.
+        let same = |before: &Counted| before.stage == stage && before.of == count.of;
+        if !counted.as_ref().is_some_and(same) {
             *counted = Some(Counted {
                 stage: stage.to_owned(),
+                of: count.of,
                 begun: now,
                 told: now,
             });

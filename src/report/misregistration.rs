@@ -285,6 +285,9 @@ fn not_counted(found: &FootprintsByTies) -> String {
     )
 }
 
+/// Where the products have a number of a profile, and how a page writes it.
+type Quantity = (&'static str, fn(&ProfileByTies) -> Option<String>);
+
 /// A profile by its place among those of the pair, before and after.
 fn profile_cells(
     pair: &BeforeAfter,
@@ -296,7 +299,6 @@ fn profile_cells(
         pair.name().into(),
         pair.told("before", before.0, "lines/n", whole(before.1.lines.n)),
     ];
-    type Quantity = (&'static str, fn(&ProfileByTies) -> Option<String>);
     let quantities: [Quantity; 4] = [
         ("lines/mean", |of| Some(label(of.lines.mean, 2))),
         ("along_m", |of| Some(label(of.along_m, 1))),

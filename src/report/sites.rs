@@ -143,7 +143,7 @@ impl SiteSummary {
             .map(|(newest, own)| newest - own);
         older.map_or_else(String::new, |older| {
             match (older.num_days(), older.num_hours(), older.num_minutes()) {
-                (0, 0, 0) => "with the newest".to_owned(),
+                (0, 0, 0) => "newest".to_owned(),
                 (0, 0, minutes) => format!("{minutes} min before the newest"),
                 (0, hours, _) => format!("{hours} h before the newest"),
                 (days, ..) => format!("{} before the newest", counted(days as usize, "day")),
@@ -282,7 +282,7 @@ mod tests {
         assert!(page.contains("<small>a &lt;kernel&gt; is gone</small>"));
         assert!(page.contains("261.2 → 0.0"));
         // All of the three ran at the same time; an older one says so.
-        assert_eq!(page.matches("with the newest, areograph 1").count(), 3);
+        assert_eq!(page.matches("newest, areograph 1").count(), 3);
         let mut older = summary("valid", &[]);
         older.finished_utc = "2025-12-29T21:00:00Z".to_owned();
         let newest = summary("valid", &[]).finished();

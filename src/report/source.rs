@@ -24,7 +24,10 @@ pub(super) fn told(text: &str, places: &str) -> String {
     format!("<span{}>{}</span>", from(places), escape(text))
 }
 
-/// A member's name as a part of a JSON pointer.
+/// A member's name as a part of a JSON pointer; a space, which stands between places, as in addresses.
 pub(super) fn member(name: &str) -> String {
-    name.replace('~', "~0").replace('/', "~1")
+    name.replace('~', "~0")
+        .replace('/', "~1")
+        .replace('%', "%25")
+        .replace(' ', "%20")
 }

@@ -6,7 +6,7 @@ use super::{
     html::{Tone, counted, escape, list, paragraph, verdict},
     map,
     misregistration::BeforeAfter,
-    numbers::{number, signed, whole},
+    numbers::{number, signed, whole, with_minus},
     source::told,
 };
 use crate::{
@@ -245,7 +245,7 @@ fn by_ranges(site: &SiteProducts) -> Option<KeyNumber> {
 /// As many sentences as leave the verdict on one screen; the manifest has all.
 fn first_of(sentences: &[String]) -> String {
     let shown = &sentences[..sentences.len().min(REASONS_SHOWN)];
-    let mut html = list(shown);
+    let mut html = list(&shown.iter().map(|of| with_minus(of)).collect::<Vec<_>>());
     if shown.len() < sentences.len() {
         let more = sentences.len() - shown.len();
         html += &paragraph(&format!(

@@ -292,7 +292,7 @@ impl Sink for Gathered<'_> {
             *result.rejected.entry(reason).or_default() += count;
         }
         result.frames_read += found.frames_read;
-        self.watch.step(found.frames_read as usize, "records");
+        self.watch.step(found.frames_read, "records");
         result.shots_read += found.shots_read;
         Ok(())
     }

@@ -13,10 +13,10 @@ use super::{
 };
 
 /// Tables of numbers that stand in no document, with what holds them instead.
-const ELSEWHERE: [(&str, &str); 9] = [
+const ELSEWHERE: [(&str, &str); 10] = [
     (
         "Images, one row each",
-        "sums over residuals.parquet-like tables; tests/report_geometric",
+        "sums over single residuals; tests/report_geometric",
     ),
     ("Share of a gross error", "means over single observations"),
     ("Blunders", "words of a reason"),
@@ -26,10 +26,11 @@ const ELSEWHERE: [(&str, &str); 9] = [
     ("Datum of the PEDR coordinates", "means over footprints"),
     ("Clock corrections", "the configuration"),
     ("Kernels with data of", "exchange/kernels.json, summed"),
+    ("Stages; the number rises", "the program itself"),
 ];
 
 /// Columns of numbers that follow from others of their row or from Parquet, by the table that they are in.
-const DERIVED: [(&str, &str); 12] = [
+const DERIVED: [(&str, &str); 14] = [
     ("Correction of least spread", "best − configured"),
     ("Correction of least spread", "least spread scanned, m"),
     ("Images (Table 2", "duration, s"),
@@ -45,6 +46,8 @@ const DERIVED: [(&str, &str); 12] = [
         "share of the shots in windows",
     ),
     ("Shift of the camera", "along track, Mars-fixed"),
+    ("Shift of the camera", "cross track"),
+    ("Shift of the camera", "radial"),
 ];
 
 /// A marked element: its text and its places, whole ones.
@@ -63,7 +66,8 @@ fn attribute<'a>(tag: &'a str, name: &str) -> Option<&'a str> {
 fn marked(page: &str) -> Vec<Marked> {
     let mut found = Vec::new();
     let mut row = String::new();
-    for piece in page.split('<').skip(1) {
+    for (at, _) in page.match_indices('<') {
+        let piece = page[at + 1..].split('<').next().unwrap();
         if piece.starts_with("tr") || piece.starts_with("/tr") {
             attribute(piece, "data-in")
                 .unwrap_or_default()
@@ -74,8 +78,7 @@ fn marked(page: &str) -> Vec<Marked> {
         };
         // Up to the end of the same element; marked ones hold no others of their name.
         let name = piece.split(' ').next().unwrap();
-        let at = piece.as_ptr() as usize - page.as_ptr() as usize;
-        let html = page[at - 1..].split(&format!("</{name}>")).next().unwrap();
+        let html = page[at..].split(&format!("</{name}>")).next().unwrap();
         let whole = |place: &str| {
             let (size, place) = place
                 .strip_prefix('|')
@@ -106,10 +109,11 @@ fn told(documents: &mut BTreeMap<String, Value>, folder: &Path, place: &str) -> 
         .map_or((false, place), |rest| (true, rest));
     let (file, pointer) = place.split_once('#').unwrap();
     let (pointer, factor) = pointer.split_once('*').unwrap_or((pointer, "1"));
+    let pointer = pointer.replace("%20", " ").replace("%25", "%");
     let document = documents
         .entry(file.to_owned())
         .or_insert_with(|| json(&folder.join(file)));
-    let value = document.pointer(pointer)?.as_f64()?;
+    let value = document.pointer(&pointer)?.as_f64()?;
     let value = value * factor.parse::<f64>().unwrap();
     Some(if size { value.abs() } else { value })
 }
@@ -254,4 +258,14 @@ fn column(html: &str) -> String {
 
 fn column_text(html: &str) -> String {
     text(&format!("<t{}", html.split("</t").next().unwrap()))
+}
+
+#[test]
+fn the_page_over_all_sites_says_what_the_manifests_hold() {
+    let out = gusev().parent().unwrap().to_owned();
+    let page = fs::read_to_string(out.join("index.html")).unwrap();
+    let wrong = disagreements(&page, &out);
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+    // Shots, profiles, images, heights, images apart, ranges.
+    assert_eq!(marked(&page).len(), 6);
 }

@@ -39,26 +39,34 @@ fn table(adjusted: &Adjusted, other: &OtherReading) -> String {
     let own_sigma_m = heights.map(|heights| heights.mean_sigma_m);
     let rows = [
         (
+            "heights",
             adjusted.attitude_clock_s,
-            [0.0; 3],
+            None,
             own_sigma_m,
             "follow it",
         ),
         (
+            "other_reading",
             other.attitude_clock_s,
-            other.moved_m,
+            Some(other.moved_m),
             other.mean_sigma_m,
             "do not",
         ),
     ];
-    for (clock_s, moved_m, sigma_m, products) in rows {
+    for (place, clock_s, moved_m, sigma_m, products) in rows {
         let mut cells: Vec<Cell> = vec![reading(clock_s).into(), products.into()];
-        cells.extend(moved_m.map(|metres| Cell::from(label(metres, 1))));
-        cells.extend([0, 1, 2].map(|axis| {
-            let sigma_m = sigma_m.map(|sigma_m| format!("±{}", label(sigma_m[axis], 1)));
-            Cell::from(sigma_m.unwrap_or_else(|| "–".to_owned()))
+        let axes = [0, 1, 2];
+        cells.extend(axes.map(|axis| {
+            // What the products follow is where the others are counted from.
+            let metres = moved_m.map_or_else(|| "–".to_owned(), |of| label(of[axis], 1));
+            Cell::from(metres).told(format!("/moved_m/{axis}"))
         }));
-        table.row(true, cells);
+        cells.extend(axes.map(|axis| {
+            let sigma_m = sigma_m.map(|sigma_m| format!("±{}", label(sigma_m[axis], 1)));
+            let sigma_m = Cell::from(sigma_m.unwrap_or_else(|| "–".to_owned()));
+            sigma_m.told(format!("/mean_sigma_m/{axis}"))
+        }));
+        table.row_of(&format!("adjustment.json#/adjustment/{place}"), true, cells);
     }
     table.finish()
 }

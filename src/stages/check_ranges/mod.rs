@@ -249,7 +249,7 @@ pub fn check_ranges<'a>(
         let explain = || orbit::cause(footprints, profile, trajectory, clock, limits.orbit_max_m);
         ranges.invalid_because = ranges.figures().broken_limits(limits, explain);
         checked.push(ranges);
-        watch.step(profile.rows.len(), "shots");
+        watch.step(profile.rows.len() as u64, "shots");
     }
     Ok(RangeCheck {
         shots,

@@ -81,7 +81,7 @@ pub(super) fn run(
                 .solve(point_m, &limits, on_step)
         });
         runs.push(summed(camera, (Method::FrameFirst, model), ground, &ways));
-        watch.step(ground.len(), "points");
+        watch.step(ground.len() as u64, "points");
         watch.check()?;
         let fixed_point = FixedPoint::new(euler, focal_length_px);
         let ways = all_ways(ground, |point_m, on_step| {
@@ -90,7 +90,7 @@ pub(super) fn run(
                 .solve(point_m, &limits, on_step)
         });
         runs.push(summed(camera, (Method::FixedPoint, model), ground, &ways));
-        watch.step(ground.len(), "points");
+        watch.step(ground.len() as u64, "points");
     }
     Ok(runs)
 }

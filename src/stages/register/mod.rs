@@ -170,7 +170,7 @@ pub fn register<'a>(
                 Err(reject) => *rejected.entry(reject.to_string()).or_insert(0) += 1,
             }
         }
-        watch.step(block.len(), "points");
+        watch.step(block.len() as u64, "points");
     }
     let on_lines = points.on_lines();
     let ground: Vec<Vector3<f64>> = on_lines
