@@ -108,9 +108,9 @@ fn light_time(site: &SiteProducts) -> String {
         .map(|image| &image.orientation.light_time);
     let others: Vec<OtherConvention> = effects.flat_map(|of| of.others.iter().copied()).collect();
     let mut words = format!(
-        "Light time: camera positions are {} (convention {}).",
-        convention.positions(),
-        convention.word()
+        "Light time ({}): camera positions are {}.",
+        convention.word(),
+        convention.positions()
     );
     for (word, other) in LightTime::WORDS {
         let of_images = || others.iter().filter(|of| of.convention == other);
@@ -126,7 +126,7 @@ fn light_time(site: &SiteProducts) -> String {
         };
         if of_images().next().is_some() {
             words += &format!(
-                " With {word}, images see ground {} m away, the same ground {} lines later.",
+                " With {word} the view moves by {} m, the same ground by {} lines.",
                 span(|of| of.ground_m, 1),
                 span(|of| of.lines, 2)
             );
