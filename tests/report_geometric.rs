@@ -21,7 +21,7 @@ use areograph::{
     },
     units::RADIANS_PER_ARCSECOND,
 };
-use page::{csv, lead, number, section, table};
+use page::{csv, lead, number, section, table, text};
 use site::Site;
 
 const SECTIONS: [&str; 4] = [

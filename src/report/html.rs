@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use super::{numbers::whole, source};
+use super::numbers::whole;
 
 /// Style of all pages. Reports have no scripts; plots take their colours from here, so that they follow light and dark.
 pub const STYLE: &str = include_str!("style.css");
@@ -269,12 +269,12 @@ impl Table {
     ) {
         self.rows += 1;
         let class = if valid { "" } else { " class=\"invalid\"" };
-        let class = class.to_owned() + &source::within(place);
+        let class = class.to_owned() + &within(place);
         let cells: String = cells
             .into_iter()
             .enumerate()
             .map(|(place, cell)| match cell {
-                Cell::Told(cell, places) => self.cell(place, *cell, &source::from(&places)),
+                Cell::Told(cell, places) => self.cell(place, *cell, &from_places(&places)),
                 cell => self.cell(place, cell, ""),
             })
             .collect();
@@ -334,6 +334,19 @@ fn limited(class: &str, from: &str, text: &str, share: f64) -> String {
             "<td class=\"{class} beyond\"{from}><span class=\"hidden\">beyond the limit: </span>✗ {text}</td>"
         )
     }
+}
+
+/// The attribute of an element whose numbers are those at `places` of the products; see [`super::source`].
+pub(super) fn from_places(places: &str) -> String {
+    format!(" data-from=\"{}\"", escape(places))
+}
+
+/// The attribute of a row whose cells are told by what lies at `place`; nothing for no place.
+fn within(place: &str) -> String {
+    if place.is_empty() {
+        return String::new();
+    }
+    format!(" data-in=\"{}\"", escape(place))
 }
 
 /// A number of things, in the plural where there are several.

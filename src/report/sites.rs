@@ -300,6 +300,6 @@ mod tests {
                 .iter()
                 .all(|name| map.contains(name))
         );
-        assert_eq!(page.matches("<tr class=\"invalid\">").count(), 3);
+        assert_eq!(page.matches("<tr class=\"invalid\"").count(), 3);
     }
 }

@@ -4,24 +4,11 @@
 //! page: `<document>#<JSON pointer>`, or the pointer alone, below the `data-in` of the table's row. A leading `|` stands
 //! for the size of the value, a trailing `*<factor>` for another unit. Nothing at that place is a dash.
 
-use super::html::escape;
-
-/// The attribute of an element whose numbers are those at `places`.
-pub(super) fn from(places: &str) -> String {
-    format!(" data-from=\"{}\"", escape(places))
-}
-
-/// The attribute of a row whose cells are told by what lies at `place`; nothing for no place.
-pub(super) fn within(place: &str) -> String {
-    if place.is_empty() {
-        return String::new();
-    }
-    format!(" data-in=\"{}\"", escape(place))
-}
+use super::html::{escape, from_places};
 
 /// `text`, whose numbers are those at `places`, as HTML.
 pub(super) fn told(text: &str, places: &str) -> String {
-    format!("<span{}>{}</span>", from(places), escape(text))
+    format!("<span{}>{}</span>", from_places(places), escape(text))
 }
 
 /// A member's name as a part of a JSON pointer; a space, which stands between places, as in addresses.
