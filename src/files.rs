@@ -8,7 +8,7 @@ use std::{
     collections::{BTreeMap, BTreeSet},
     fs::File,
     path::{Path, PathBuf},
-    sync::{Mutex, PoisonError, atomic::AtomicBool},
+    sync::{Mutex, PoisonError},
     time::{SystemTime, UNIX_EPOCH},
 };
 
@@ -16,7 +16,10 @@ use rayon::prelude::*;
 
 pub use self::known::{Identity, KnownFile, KnownFiles};
 pub use self::staged::{StagedFile, TEMPORARY};
-use crate::error::{Cause, IoError, Kind, Locate, Result, Stopped};
+use crate::{
+    error::{Cause, IoError, Kind, Locate, Result},
+    watch::Watch,
+};
 
 /// A file as it was when it was first read.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -221,14 +224,26 @@ impl InputFiles {
         new.collect()
     }
 
-    /// Several files in their order; `stop` is looked at before each.
+    /// Several files in their order; `watch` is looked at before each, and counts those that were not known before.
     ///
     /// # Errors
-    /// As [`Self::hash`]; [`Stopped`].
-    pub fn hash_all(&self, paths: &[PathBuf], stop: &AtomicBool) -> Result<Vec<HashedFile>> {
+    /// As [`Self::hash`]; [`Stopped`](crate::error::Stopped).
+    pub fn hash_all<'a>(
+        &self,
+        paths: &[PathBuf],
+        watch: impl Into<Watch<'a>>,
+    ) -> Result<Vec<HashedFile>> {
+        let watch = watch.into();
+        let unknown = paths.iter().filter(|path| !self.knows(path)).count();
+        watch.expect(unknown);
         let hash = |path: &PathBuf| {
-            Stopped::check(stop)?;
-            self.hash(path)
+            watch.check()?;
+            let is_known = self.knows(path);
+            let hashed = self.hash(path)?;
+            if !is_known {
+                watch.step(1, "files hashed");
+            }
+            Ok(hashed)
         };
         paths.par_iter().map(hash).collect()
     }

@@ -35,3 +35,4 @@ pub mod store;
 pub mod ties;
 pub mod time;
 pub mod units;
+pub mod watch;

@@ -12,6 +12,8 @@ mod recipe;
 #[path = "pushbroom/scene.rs"]
 mod scene;
 
+use std::sync::atomic::AtomicBool;
+
 use areograph::{
     config::AdjustmentConfig,
     error::Kind,
@@ -38,6 +40,9 @@ use areograph::{
 };
 use nalgebra::{Matrix3, Vector2, Vector3};
 use recipe::{HALF_SWATH_PX, Normals, Recipe, Simulated, project};
+
+/// Nobody stops the tests.
+static RUN_ON: AtomicBool = AtomicBool::new(false);
 
 const NAMES: [&str; 2] = ["E02-00665", "E02-01453"];
 
@@ -158,6 +163,7 @@ impl Site {
             &self.starts(),
             0.0,
             options,
+            &RUN_ON,
         )
     }
 }
@@ -526,7 +532,7 @@ fn what_does_not_fit_together_is_refused() {
                shots: &LaserShots,
                ties: &[TiePoint],
                options: &AdjustmentConfig| {
-        let failure = adjust(images, shots, ties, &starts, 0.0, options).unwrap_err();
+        let failure = adjust(images, shots, ties, &starts, 0.0, options, &RUN_ON).unwrap_err();
         assert_eq!(failure.kind().exit_code(), 3);
         println!("{failure}");
         failure.to_string()
@@ -545,7 +551,16 @@ fn what_does_not_fit_together_is_refused() {
     assert!(run(&site.images, &shots, &site.ties, &plain).contains("10496:5"));
     let mut ties = site.ties.clone();
     ties[0].measures[0].image = 7;
-    let failure = adjust(&site.images, &site.shots, &ties, &starts, 0.0, &plain).unwrap_err();
+    let failure = adjust(
+        &site.images,
+        &site.shots,
+        &ties,
+        &starts,
+        0.0,
+        &plain,
+        &RUN_ON,
+    )
+    .unwrap_err();
     assert_eq!(failure.kind(), Kind::Bug);
     assert!(
         failure.to_string().contains("measured in image 7"),
@@ -793,6 +808,7 @@ fn threads_do_not_change_a_bit() {
                     &starts,
                     0.0,
                     &options,
+                    &RUN_ON,
                 )
             })
             .unwrap();

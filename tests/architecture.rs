@@ -36,6 +36,7 @@ const FLOORS: [&[&str]; 7] = [
         "instruments",
         "kernel_source",
         "line_times",
+        "watch",
     ],
     &["geom", "config", "imaging"],
     &["spice", "pds", "scene"],

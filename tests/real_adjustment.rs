@@ -20,6 +20,7 @@ mod lunar_pair;
 use std::{
     fs,
     path::{Path, PathBuf},
+    sync::atomic::AtomicBool,
 };
 
 use areograph::{
@@ -190,7 +191,8 @@ impl Site {
             surface,
             ..self.shots(with_ranges)
         };
-        adjust(&images, &shots, &self.ties, &starts, 0.0, options).unwrap()
+        let run_on = AtomicBool::new(false);
+        adjust(&images, &shots, &self.ties, &starts, 0.0, options, &run_on).unwrap()
     }
 
     /// Distance of each adjusted footprint from the adjusted camera at the instant of the shot, minus its range,

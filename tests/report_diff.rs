@@ -9,6 +9,9 @@
 mod common;
 #[path = "report_diff/fixture.rs"]
 mod fixture;
+#[path = "report_geometric/page.rs"]
+#[allow(dead_code, reason = "the reader of pages serves several tests")]
+mod page;
 
 use std::fs;
 
@@ -356,7 +359,27 @@ fn the_page_opens_with_the_outcome_and_needs_nothing_from_outside() {
         page.find("case: BEYOND THE LIMIT: image image: the camera turned by up to 20.000 arcsec");
     assert!(outcome.unwrap() < page.find("<table").unwrap());
     assert!(page.contains("mgs_sc_scene.bc (CK) changed; 6 unchanged"));
-    assert_eq!(page.matches("<svg").count(), 1); // the camera turned and did not move
+    assert_eq!(page.matches("<svg").count(), 2); // the camera turned and did not move; a map of the ground
+    // On the map only the boresight has moved, by turn times range, in kilometres.
+    let map = page::csv(&page, "case-what-moved-on-the-ground");
+    let moved_m: Vec<f64> = map
+        .iter()
+        .filter(|row| row.join(",").contains("boresights of images, B − A"))
+        .map(|row| {
+            let [east, north] = [2, 1].map(|from_end| page::number(&row[row.len() - from_end]));
+            1e3 * east.hypot(north)
+        })
+        .collect();
+    assert_eq!(moved_m.len(), 31);
+    let expected_m = TURN_ARCSEC * RADIANS_PER_ARCSECOND * boresight_range_m(&case);
+    for metres in moved_m {
+        // As much as the table of movements is held to: heights of the spacecraft change along the image.
+        assert_near(&metres.into(), expected_m, 0.01 * expected_m);
+    }
+    let still = |row: &&Vec<String>| row.join(",").contains("footprints, B − A");
+    for row in map.iter().filter(still) {
+        assert_eq!(row[row.len() - 2..], ["0", "0"]);
+    }
     assert!(page.contains("camera%20turned,%20arcsec") && !page.contains("camera%20moved"));
     for outside in ["<script", "src=", "@import", "url("] {
         assert!(!page.contains(outside), "{outside}");

@@ -16,6 +16,8 @@ mod page;
 #[path = "exchange/readers.rs"]
 #[allow(dead_code, reason = "the readers serve several tests")]
 mod readers;
+#[path = "report_products/sources.rs"]
+mod sources;
 
 use std::{
     fs,

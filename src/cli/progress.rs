@@ -1,9 +1,10 @@
-//! What a run tells while it goes on: on a terminal a live line for each site, elsewhere a line for each stage.
+//! What a run tells while it goes on: on a terminal a live line for each site, elsewhere a line for each stage, and of one
+//! that takes long now and then how far it is.
 
 use std::{
     io::{self, IsTerminal as _, Write},
-    sync::LazyLock,
-    time::Duration,
+    sync::{LazyLock, Mutex, PoisonError},
+    time::{Duration, Instant},
 };
 
 use indicatif::{MultiProgress, ProgressBar, ProgressStyle};
@@ -13,6 +14,7 @@ use tracing_subscriber::fmt::MakeWriter;
 use crate::{
     config::SiteConfig,
     flow::{Observer, StageEvent, stage_count},
+    watch::Count,
 };
 
 /// The live lines of the program, on standard error; nothing is drawn where that is no terminal.
@@ -20,6 +22,8 @@ static LINES: LazyLock<MultiProgress> = LazyLock::new(MultiProgress::new);
 /// What a live line shows: site, stages done of all, time since the start and expected until the end, stage.
 const LINE: &str =
     "{prefix:.bold}  {bar:16} {pos}/{len} stages  {elapsed}, about {eta} left  {msg}";
+/// A stage that takes longer tells how far it is, that often where there is no live line.
+const TOLD_EVERY: Duration = Duration::from_secs(10);
 /// How often the time on a live line is drawn anew.
 const TICK: Duration = Duration::from_millis(200);
 
@@ -50,6 +54,7 @@ impl Write for Log {
 pub(super) struct Progress {
     site: String,
     line: ProgressBar,
+    counted: Mutex<Option<Counted>>,
     /// Whether each stage has a line of its own.
     plain: bool,
 }
@@ -76,6 +81,7 @@ impl Progress {
         Self {
             site: site.site.clone(),
             line,
+            counted: Mutex::new(None),
             plain: told && !terminal,
         }
     }
@@ -91,13 +97,103 @@ impl Observer for Progress {
                     let _ = writeln!(io::stderr().lock(), "{}: {stage}", self.site);
                 }
             }
+            StageEvent::Counts(count) => self.count(stage, *count),
             StageEvent::Kept | StageEvent::Done(_) => self.line.inc(1),
         }
+    }
+}
+
+/// The stage that counts.
+#[derive(Debug)]
+struct Counted {
+    stage: String,
+    of: &'static str,
+    begun: Instant,
+    told: Instant,
+}
+
+impl Progress {
+    /// How far a stage is, which counts on any thread.
+    fn count(&self, stage: &str, count: Count) {
+        let mut counted = self.counted.lock().unwrap_or_else(PoisonError::into_inner);
+        let now = Instant::now();
+        // Files are hashed for a stage before it counts what it does.
+        let same = |before: &Counted| before.stage == stage && before.of == count.of;
+        if !counted.as_ref().is_some_and(same) {
+            *counted = Some(Counted {
+                stage: stage.to_owned(),
+                of: count.of,
+                begun: now,
+                told: now,
+            });
+        }
+        let Some(counted) = counted.as_mut() else {
+            return;
+        };
+        let words = words(stage, count, counted.begun.elapsed());
+        if self.plain && counted.told.elapsed() >= TOLD_EVERY {
+            counted.told = now;
+            let _ = writeln!(io::stderr().lock(), "{}: {words}", self.site);
+        }
+        self.line.set_message(words);
+    }
+}
+
+/// How far a stage is after so long, and how long it may still take.
+fn words(stage: &str, count: Count, taken: Duration) -> String {
+    let Count { done, all, of } = count;
+    if all == 0 {
+        return format!("{stage}: {done} {of}");
+    }
+    let left_s = taken.as_secs_f64() * all.saturating_sub(done) as f64 / done.max(1) as f64;
+    format!("{stage}: {done} of {all} {of}, {} left", duration(left_s))
+}
+
+/// Seconds as people say them.
+#[allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "a positive number of seconds"
+)]
+pub(super) fn duration(seconds: f64) -> String {
+    let whole = seconds.round() as u64;
+    match (whole / 3600, whole / 60 % 60, whole % 60) {
+        (0, 0, seconds) => format!("{seconds} s"),
+        (0, minutes, seconds) => format!("{minutes} min {seconds:02} s"),
+        (hours, minutes, _) => format!("{hours} h {minutes:02} min"),
     }
 }
 
 impl Drop for Progress {
     fn drop(&mut self) {
         self.line.finish_and_clear();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_long_stage_says_how_far_it_is_and_how_long_it_takes() {
+        let at = |done, all| {
+            let of = "shots";
+            words(
+                "check_ranges",
+                Count { done, all, of },
+                Duration::from_secs(30),
+            )
+        };
+        assert_eq!(
+            at(1_000, 4_000),
+            "check_ranges: 1000 of 4000 shots, 1 min 30 s left"
+        );
+        assert_eq!(
+            at(4_000, 4_000),
+            "check_ranges: 4000 of 4000 shots, 0 s left"
+        );
+        // Nobody knows how many it takes.
+        assert_eq!(at(3, 0), "check_ranges: 3 shots");
+        assert_eq!(duration(3_725.0), "1 h 02 min");
     }
 }

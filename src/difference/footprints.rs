@@ -6,7 +6,10 @@ use nalgebra::Vector3;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::movement::{Component, ROUNDING, Size};
+use super::{
+    movement::{Component, ROUNDING, Size},
+    places::{Moved, some_of},
+};
 use crate::{
     error::Result,
     products::read::{FootprintRows, read_footprints},
@@ -40,6 +43,9 @@ pub struct FootprintsMovement {
     /// The shot that moved farthest, if one moved.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub farthest: Option<ShotName>,
+    /// Some of the shots.
+    #[serde(skip)]
+    pub places: Vec<Moved>,
 }
 
 /// Which shot.
@@ -115,6 +121,12 @@ fn movement(a: &FootprintRows, b: &FootprintRows, pairs: &[Pair]) -> Option<Foot
         topography_m: change(&a.topography_m, &b.topography_m),
         time_s: change(&a.et_s, &b.et_s),
         farthest: farthest.map(|row| shot_name(a, row)),
+        places: some_of(pairs.iter().map(|(first, second)| {
+            [
+                Vector3::from(a.xyz_m[*first]),
+                Vector3::from(b.xyz_m[*second]),
+            ]
+        })),
     })
 }
 

@@ -9,6 +9,7 @@ use serde::Serialize;
 use super::{
     changes::{self, Change},
     movement::{Component, Size},
+    places::Moved,
 };
 use crate::{
     body::Body,
@@ -119,6 +120,9 @@ pub struct SampleMovement {
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 0.0))]
     pub boresight_ground_m: Option<f64>,
+    /// The boresight's ground points.
+    #[serde(skip)]
+    pub grounds: Option<Moved>,
 }
 
 impl ImageDifference {
@@ -267,6 +271,7 @@ fn of_sample(a: &SampleRow, b: &SampleRow, axes: &Matrix3<f64>) -> SampleMovemen
             .boresight_range_m
             .map(|range_m| range_m * boresight_turn_rad),
         boresight_ground_m: grounds.map(|(ground_a, ground_b)| (ground_b - ground_a).norm()),
+        grounds: grounds.map(<[_; 2]>::from),
     }
 }
 

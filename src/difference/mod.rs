@@ -13,6 +13,7 @@ mod items;
 mod limits;
 mod movement;
 mod outputs;
+mod places;
 mod words;
 
 use std::path::Path;
@@ -37,6 +38,7 @@ pub use items::{ChangedItem, Item, Items};
 pub use limits::Limits;
 pub use movement::{Component, Size};
 pub use outputs::{Pairs, pairs};
+pub use places::Moved;
 pub use words::quantity;
 
 use error::DifferenceError;
@@ -87,6 +89,9 @@ pub struct RunDifference {
     pub footprints: FootprintsDifference,
     /// Orientation of every image by the kernels, then the adjusted ones.
     pub images: Vec<ImageDifference>,
+    /// Some of the adjusted tie points that both runs have.
+    #[serde(skip)]
+    pub ties: Vec<Moved>,
 }
 
 /// What came of a comparison.
@@ -199,6 +204,7 @@ fn of_manifests(a: &Manifest, b: &Manifest, limits: &Limits) -> RunDifference {
         profiles: Vec::new(),
         footprints: FootprintsDifference::default(),
         images: Vec::new(),
+        ties: Vec::new(),
     }
 }
 
@@ -216,6 +222,7 @@ fn read_movements(
     difference.profiles = profiles(first, second);
     difference.footprints = footprints::between(a, b)?;
     let body = items::body(runs[0].1);
+    difference.ties = places::ties(a, b)?;
     for which in images::ORIENTATIONS {
         let (orientation, _) = which;
         let images = |manifest: &Manifest| items::images(manifest, orientation);

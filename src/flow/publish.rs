@@ -15,11 +15,11 @@ use crate::{
     error::{Error, Result},
     files::file_name,
     products::{
-        AdjustmentProducts, GeometricProducts, ImageProducts, Pages, SiteProducts,
+        AdjustmentProducts, GeometricProducts, ImageProducts, Pages, Program, SiteProducts,
         error::ProductError, write_products,
     },
     report,
-    spice::{KernelSet, KernelView},
+    spice::{KernelSet, KernelView, Session},
     stage::{Input, Inputs, Output, Reason},
     stages::site_image::SiteImage,
     store::{
@@ -32,7 +32,7 @@ use crate::{
 };
 
 /// Raised when products are laid out anew.
-const METHOD: u32 = 14;
+const METHOD: u32 = 15;
 
 /// The configuration as written, the outlines that it names, all kernels and where they lie from `folder`, and
 /// every stage with what it was made from.
@@ -100,6 +100,7 @@ pub(super) fn publish(
     site: &Site,
     folder: &Path,
     ledger: &Ledger,
+    methods: &[(String, u32)],
     inputs: &Inputs,
 ) -> Result<Manifest> {
     let none = KernelSet::default();
@@ -150,6 +151,10 @@ pub(super) fn publish(
         verdict: &verdict,
         geometric: geometric_products(site, adjustment.transpose()?)?,
         overlays: site.overlays.as_ref().map(Output::value).transpose()?,
+        program: &Program {
+            cspice: Session::version_of_cspice()?,
+            methods: methods.to_vec(),
+        },
     };
     let (report, overlays) = (report::page(&products)?, report::overlays_page(&products)?);
     let pages = Pages {

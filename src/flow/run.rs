@@ -14,7 +14,7 @@ use super::{
 use crate::{
     config::SiteConfig,
     error::{Locate, Result},
-    files::InputFiles,
+    files::{HashedFile, InputFiles},
     stage::{Output, Reason, Stage},
     store::{
         cache::StageCache,
@@ -23,6 +23,7 @@ use crate::{
         manifest::Manifest,
         publish::{CACHE, note_failure},
     },
+    watch::{Counter, Watch},
 };
 
 /// How a site is run.
@@ -97,6 +98,7 @@ pub fn run_site(config: &SiteConfig, options: &RunOptions<'_>) -> Result<SiteOut
         hashes: options.hashes,
         observer: options.observer,
         ledger: Ledger::new(),
+        methods: Vec::new(),
         passed: Vec::new(),
         ending: Ending::StoppedAfter(options.until.to_owned()),
     };
@@ -130,6 +132,8 @@ struct Run<'a> {
     hashes: &'a HashCache,
     observer: &'a dyn Observer,
     ledger: Ledger,
+    /// The number of the method of each stage so far, whatever it ran for.
+    methods: Vec<(String, u32)>,
     /// Every stage so far.
     passed: Vec<StageReason>,
     ending: Ending,
@@ -196,7 +200,10 @@ impl Driver for Run<'_> {
                 let begun = Instant::now();
                 // Reading a large archive is not lost when the run is.
                 self.hashes.keep(self.files());
-                let value = stage.run(self.bounds.stop).in_stage(&label)?;
+                let tell = |count| self.observer.hear(&label, &StageEvent::Counts(count));
+                let counter = Counter::new(&tell);
+                let watch = Watch::counted(self.bounds.stop, &counter);
+                let value = stage.run_watched(watch).in_stage(&label)?;
                 for path in inputs.file_paths() {
                     self.bounds.files.verify(path).in_stage(&label)?;
                 }
@@ -206,7 +213,18 @@ impl Driver for Run<'_> {
             }
         };
         self.ledger.push((label, output.provenance().cloned()));
+        if self.methods.iter().all(|(name, _)| name != S::NAME) {
+            self.methods.push((S::NAME.to_owned(), S::METHOD));
+        }
         Ok(output)
+    }
+
+    fn hash(&mut self, stage: &'static str, paths: &[PathBuf]) -> Flow<Vec<HashedFile>> {
+        self.enter(stage)?;
+        let tell = |count| self.observer.hear(stage, &StageEvent::Counts(count));
+        let counter = Counter::new(&tell);
+        let watch = Watch::counted(self.bounds.stop, &counter);
+        Ok(self.files().hash_all(paths, watch).in_stage(stage)?)
     }
 
     /// Publishes the products unless those of an earlier run stand.
@@ -222,7 +240,14 @@ impl Driver for Run<'_> {
                 self.pass(PUBLISH, reason);
                 let begun = Instant::now();
                 self.verify_inputs().in_stage(PUBLISH)?;
-                let manifest = publish(config, site, &self.folder, &self.ledger, &inputs);
+                let manifest = publish(
+                    config,
+                    site,
+                    &self.folder,
+                    &self.ledger,
+                    &self.methods,
+                    &inputs,
+                );
                 let manifest = manifest.in_stage(PUBLISH)?;
                 keep(&self.cache, inputs, &manifest).in_stage(PUBLISH)?;
                 self.cache

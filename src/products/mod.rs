@@ -71,7 +71,7 @@ pub use picture::{PictureFile, PictureFormat, PictureHead};
 pub use product::{Pages, Product};
 #[cfg(feature = "sql")]
 pub use shot_columns::ShotColumns;
-pub use site::{AdjustmentProducts, GeometricProducts, ImageProducts, SiteProducts};
+pub use site::{AdjustmentProducts, GeometricProducts, ImageProducts, Program, SiteProducts};
 
 use rayon::prelude::*;
 

@@ -16,7 +16,7 @@ use super::{
     files::{read, write_bytes},
     product::{Content, Declaration, Role, Write},
     read::ReadError,
-    site::{AdjustmentProducts, GeometricProducts, ImageProducts, SiteProducts},
+    site::{AdjustmentProducts, GeometricProducts, ImageProducts, Program, SiteProducts},
 };
 use crate::{
     config::SiteConfig,
@@ -70,6 +70,7 @@ pub struct PageData<'a> {
     notes: Cow<'a, [String]>,
     geometric: Option<Geometric<'a>>,
     overlays: Option<Cow<'a, Overlays>>,
+    program: Cow<'a, Program>,
 }
 
 /// See [`ImageProducts`].
@@ -129,6 +130,7 @@ impl<'a> PageData<'a> {
             notes: site.notes.into(),
             geometric: site.geometric.map(geometric),
             overlays: site.overlays.map(Cow::Borrowed),
+            program: Cow::Borrowed(site.program),
         })
     }
 
@@ -192,6 +194,7 @@ impl<'a> PageData<'a> {
                 adjustment,
             }),
             overlays: self.overlays.as_deref(),
+            program: &self.program,
         })
     }
 }

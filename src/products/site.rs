@@ -2,6 +2,8 @@
 
 use std::{collections::BTreeMap, path::Path};
 
+use serde::{Deserialize, Serialize};
+
 use super::error::ProductError;
 use crate::{
     config::{SiteConfig, UsedBias},
@@ -65,6 +67,17 @@ pub struct SiteProducts<'a> {
     pub geometric: Option<GeometricProducts<'a>>,
     /// What images show; nothing for a site without pixels.
     pub overlays: Option<&'a Overlays>,
+    /// What the products were computed by.
+    pub program: &'a Program,
+}
+
+/// What products are computed by, besides this version of areograph.
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Program {
+    /// Version of CSPICE as that says it, for example `CSPICE_N0067`.
+    pub cspice: String,
+    /// Stages that the run passed, with the number of their method: it is raised when a stage computes something else.
+    pub methods: Vec<(String, u32)>,
 }
 
 /// What tie points make of a site.

@@ -2,7 +2,7 @@
 
 use super::{
     corrections, correlation,
-    html::{Column, Table, counted, heading, paragraph},
+    html::{Cell, Column, Table, counted, heading, paragraph},
     numbers::whole,
     plots::{Extent, Panel, Plot, Series, figure, label},
     reliability, residuals,
@@ -59,17 +59,17 @@ fn overview(adjusted: &Adjusted) -> String {
     let summary = &adjusted.summary;
     let [along, across] = summary.tie_components;
     let verdict = if summary.degrees_of_freedom == 0 {
-        "nothing is redundant, so nothing can be said about the observations"
+        "nothing is redundant"
     } else if along < WORSE_THAN_CONFIGURED.recip() {
-        "they agree better along the track than their standard deviations suggest"
+        "along track better than configured"
     } else if along <= WORSE_THAN_CONFIGURED {
-        "they agree along the track as their standard deviations suggest"
+        "along track as configured"
     } else {
-        "they agree worse along the track than their standard deviations suggest"
+        "along track worse than configured"
     };
     format!(
-        "{}, {} and {} were adjusted together in {}; {} degrees of freedom. The standard deviation of unit weight of tie \
-         points is {} along the track and {} across it (a priori 1): {verdict}. Over all observations σ0 is {}.",
+        "{}, {} and {} adjusted together in {}; {} degrees of freedom. Unit-weight σ of tie points {} along track, {} across \
+         (a priori 1): {verdict}. σ0 of all observations: {}.",
         counted(adjusted.images.len(), "image"),
         counted(summary.shots.corrections_m[0].n as usize, "footprint"),
         counted(summary.ties.corrections_m[0].n as usize, "tie point"),
@@ -94,7 +94,7 @@ fn convergence(adjusted: &Adjusted) -> Plot {
     );
     let words = match ends {
         (Some(first), Some(last)) => format!(
-            "Weighted sum of squared residuals before each step and after the last: from {} to {}.",
+            "Weighted sum of squares, from {} to {}.",
             label(*first, 1),
             label(*last, 1)
         ),
@@ -149,7 +149,7 @@ fn observations(summary: &AdjustmentSummary) -> String {
             Column::Number("beyond 3.29"),
         ],
     );
-    for of in &summary.types {
+    for (index, of) in summary.types.iter().enumerate() {
         let each = 100.0 * of.redundancy / of.observations.max(1) as f64;
         let component = if of.redundancy > 0.0 {
             label(of.variance_component, 3)
@@ -162,23 +162,33 @@ fn observations(summary: &AdjustmentSummary) -> String {
         } else {
             "–".to_owned()
         };
-        table.row(
+        // Where there is no redundancy, the document has zeros for what is not known.
+        let known = |text: String, is_known: bool, places: &str| {
+            let cell = Cell::from(text);
+            if is_known { cell.told(places) } else { cell }
+        };
+        table.row_of(
+            &format!("adjustment.json#/adjustment/summary/types/{index}"),
             true,
             [
                 kind(of.kind).into(),
-                whole(of.observations).into(),
-                label(of.redundancy, 1).into(),
+                Cell::from(whole(of.observations)).told("/observations"),
+                Cell::from(label(of.redundancy, 1)).told("/redundancy"),
                 format!("{} %", label(each, 1)).into(),
-                label(of.weighted_squares, 2).into(),
-                component.into(),
-                by_chance.into(),
-                of.beyond_limit.to_string().into(),
+                Cell::from(label(of.weighted_squares, 2)).told("/weighted_squares"),
+                known(component, of.redundancy > 0.0, "/variance_component"),
+                known(
+                    by_chance,
+                    limits[1] > 0.0,
+                    "/variance_component_limits/0 /variance_component_limits/1",
+                ),
+                Cell::from(of.beyond_limit.to_string()).told("/beyond_limit"),
             ],
         );
     }
     let words = format!(
-        "Variance component: √(vᵀPv / redundancy), 1 for right a priori standard deviations, with its 99 % interval; robust \
-         weights lower that of heights. Beyond {BAARDA_LIMIT}: failed Baarda's test, by chance one in a thousand."
+        "Variance component: √(vᵀPv / redundancy), 1 where the a priori σ is right; by chance: its 99 % interval, lower for \
+         heights with robust weights. Beyond {BAARDA_LIMIT}: failed Baarda's test, by chance 1 in 1000."
     );
     table.finish() + &paragraph(&words)
 }

@@ -25,7 +25,7 @@ pub(super) fn table(site: &SiteProducts) -> String {
             Column::Number("limit"),
         ],
     );
-    for check in &site.verdict.checks {
+    for (index, check) in site.verdict.checks.iter().enumerate() {
         let words = check.kind.words();
         let more = section(check.kind).filter(|section| (section.appears)(site));
         let mut what = more.map_or_else(
@@ -35,17 +35,32 @@ pub(super) fn table(site: &SiteProducts) -> String {
         if !check.subject.is_empty() {
             what += &format!(" <small>{}</small>", escape(&check.subject));
         }
-        table.row(
+        table.row_of(
+            &place(index),
             check.outcome != CheckOutcome::Fail,
             [
                 result(check.outcome),
                 Cell::Html(what),
-                value(check).into(),
-                limit(check).into(),
+                Cell::from(value(check)).told(value_place(check)),
+                Cell::from(limit(check)).told("/limit"),
             ],
         );
     }
     table.finish()
+}
+
+/// Where the products tell of a check.
+pub(super) fn place(index: usize) -> String {
+    format!("manifest.json#/verdict/checks/{index}")
+}
+
+/// Where they have its value, below that: with the sign that is shown.
+const fn value_place(check: &Check) -> &'static str {
+    if check.kind.is_signed() {
+        "/value"
+    } else {
+        "|/value"
+    }
 }
 
 /// Mark and word of an outcome.

@@ -136,7 +136,7 @@ fn datum(site: &SiteProducts) -> String {
         );
     }
     let words = format!(
-        "Decided {decided}. Products are in {}, W0 = {:.3}°.",
+        "Datum {decided}; products are in {}, W0 = {:.3}°.",
         site.config.body.names().short_frame,
         site.config.body.model().meridian_deg
     );

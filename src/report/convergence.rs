@@ -1,9 +1,10 @@
 //! Appendix: what the published iterations from ground to image cost, figure 4 of Shan et al. 2005 for this site.
 
 use super::{
-    html::{Column, Table, paragraph},
+    html::{Cell, Column, Table, paragraph},
     numbers::whole,
     plots::{Panel, Plot, Series, figure, label},
+    registration::place,
     section::Section,
 };
 use crate::{
@@ -62,26 +63,27 @@ fn methods(site: &SiteProducts) -> String {
         ],
     );
     for image in site.images {
-        for run in &image.registration.methods {
+        for (index, run) in image.registration.methods.iter().enumerate() {
             let difference = &run.difference_lines;
-            table.row(
+            table.row_of(
+                &format!("{}/methods/{index}", place(site, image)),
                 u64::from(run.evaluations.n) == run.points,
                 [
                     (&image.times.id).into(),
                     name(run).into(),
-                    whole(run.points).into(),
-                    whole(run.evaluations.n).into(),
-                    format!("{:.2}", run.evaluations.mean).into(),
-                    format!("{:.0}", run.evaluations.max).into(),
-                    label(difference.mean, 4).into(),
-                    label(difference.standard_deviation, 4).into(),
+                    Cell::from(whole(run.points)).told("/points"),
+                    Cell::from(whole(run.evaluations.n)).told("/evaluations/n"),
+                    Cell::from(format!("{:.2}", run.evaluations.mean)).told("/evaluations/mean"),
+                    Cell::from(format!("{:.0}", run.evaluations.max)).told("/evaluations/max"),
+                    Cell::from(label(difference.mean, 4)).told("/difference_lines/mean"),
+                    Cell::from(label(difference.standard_deviation, 4))
+                        .told("/difference_lines/standard_deviation"),
                 ],
             );
         }
     }
     let words = format!(
-        "Tolerance {} lines, at most {} steps. Frame first converges with the aspect ratio of the pixels and diverges where it \
-         exceeds two; eq. 4 with the rotation of the camera from line to line.",
+        "Tolerance {} lines, at most {} steps. Frame first diverges where pixels are more than twice as long as wide.",
         site.config.registration.tolerance_lines, site.config.registration.steps_max
     );
     table.finish() + &paragraph(&words)
@@ -106,8 +108,7 @@ fn convergence_plot(image: &ImageProducts) -> Plot {
         Series::line(name(run), colour, logarithms.collect())
     });
     let words =
-        "Mean step over the footprints within the image's lines; converged ones count as zero."
-            .to_owned();
+        "Mean step of the footprints within the image's lines, 0 once converged.".to_owned();
     Plot::of(
         format!("Convergence on {}", image.times.id),
         words,

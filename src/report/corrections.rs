@@ -39,6 +39,17 @@ fn with_sigma((value, sigma): (f64, f64), decimals: usize) -> Cell {
     format!("{} ± {}", label(value, decimals), label(sigma, decimals)).into()
 }
 
+/// Where the products have the coefficient of power 0 of a quantity, and its standard deviation, in another unit.
+fn place(quantity: usize, unit: &str) -> String {
+    let index = 3 * quantity;
+    format!("/correction/{index}{unit} /sigmas/{index}{unit}")
+}
+
+/// Where the products tell of an image.
+fn of_image(index: usize) -> String {
+    format!("adjustment.json#/adjustment/images/{index}")
+}
+
 fn positions(site: &SiteProducts, adjusted: &Adjusted) -> String {
     let mut table = Table::new(
         "Shift of the camera at the middle of the image, metres",
@@ -53,20 +64,20 @@ fn positions(site: &SiteProducts, adjusted: &Adjusted) -> String {
         ],
     );
     let mut starts_at_pedr = false;
-    for (image, corrected) in site.images.iter().zip(&adjusted.images) {
+    for (index, (image, corrected)) in site.images.iter().zip(&adjusted.images).enumerate() {
         let position_m = constants(corrected, 0);
         starts_at_pedr |= corrected.pedr_orbit_m().is_some();
         let in_orbit = orbit_axes(image, Vector3::from(position_m.map(|(value, _)| value)));
         let mut cells: Vec<Cell> = vec![(&corrected.id).into()];
-        cells.extend(position_m.map(|axis| with_sigma(axis, 1)));
+        let axes = position_m.into_iter().enumerate();
+        cells.extend(axes.map(|(axis, value)| with_sigma(value, 1).told(place(axis, ""))));
         cells.extend([1, 2, 0].map(|axis| {
             let component = in_orbit.map(|shift_m| label(shift_m[axis], 1));
             Cell::from(component.unwrap_or_else(|| "–".to_owned()))
         }));
-        table.row(true, cells);
+        table.row_of(&of_image(index), true, cells);
     }
-    let words = "Shifts from the orbit of the kernels; where a profile was measured with the image, the orbit of the PEDR file \
-                 was expected (adjustment.orbit_of_pedr).";
+    let words = "From the orbit of the kernels; expected with a simultaneous profile: that of the PEDR (adjustment.orbit_of_pedr).";
     if starts_at_pedr {
         table.finish() + &paragraph(words)
     } else {
@@ -96,29 +107,35 @@ fn rotations(adjusted: &Adjusted) -> String {
             Column::Number("time bias, ms"),
         ],
     );
-    for image in &adjusted.images {
+    let per_arcsecond = format!("*{}", RADIANS_PER_ARCSECOND.recip());
+    for (index, image) in adjusted.images.iter().enumerate() {
         let arcseconds = |(value, sigma): (f64, f64)| {
             (value / RADIANS_PER_ARCSECOND, sigma / RADIANS_PER_ARCSECOND)
         };
         let mut cells: Vec<Cell> = vec![(&image.id).into()];
         let rotation = constants(image, 3);
-        cells.extend(rotation.map(|axis| with_sigma(arcseconds(axis), 1)));
+        cells.extend(rotation.into_iter().zip(3..).map(|(axis, quantity)| {
+            with_sigma(arcseconds(axis), 1).told(place(quantity, &per_arcsecond))
+        }));
         cells.push(image.time_bias_s.map_or_else(
             || "no unknown".into(),
-            |(bias_s, sigma_s)| with_sigma((bias_s / SECONDS_PER_MS, sigma_s / SECONDS_PER_MS), 2),
+            |(bias_s, sigma_s)| {
+                with_sigma((bias_s / SECONDS_PER_MS, sigma_s / SECONDS_PER_MS), 2)
+                    .told("/time_bias_s/0*1000 /time_bias_s/1*1000")
+            },
         ));
-        table.row(true, cells);
+        table.row_of(&of_image(index), true, cells);
     }
     table.finish()
         + &paragraph(
-            "±: a posteriori standard deviation. Position and rotation are strongly correlated in a narrow field of view.",
+            "±: a posteriori σ. A narrow field of view hardly separates position from rotation.",
         )
 }
 
 /// Range residuals of the same shots with the orbit of the kernels and after the adjustment.
 fn ranges(site: &SiteProducts, adjusted: &Adjusted) -> String {
     if adjusted.ranges.is_empty() {
-        return paragraph("No shot was fired while an image was exposed: no range takes part.");
+        return paragraph("No shot was fired during an exposure: no range takes part.");
     }
     let before_m = checked_ranges(site);
     let mut groups: BTreeMap<(&str, usize), [Vec<f64>; 2]> = BTreeMap::new();
@@ -130,7 +147,7 @@ fn ranges(site: &SiteProducts, adjusted: &Adjusted) -> String {
         after.push(range.residual_m.value);
     }
     let mut table = Table::new(
-        "Ranges of shots that were fired while an image was exposed, residuals in metres",
+        "Ranges of shots fired during an exposure, residuals in metres",
         &[
             Column::Text("profile"),
             Column::Text("image"),
@@ -157,8 +174,7 @@ fn ranges(site: &SiteProducts, adjusted: &Adjusted) -> String {
         }
         table.row(true, cells);
     }
-    table.finish()
-        + &paragraph("Before: range − distance of the same shots, as in the range check.")
+    table.finish() + &paragraph("Before: as in the range check.")
 }
 
 /// Range − distance of the shots by profile and row.
@@ -176,7 +192,7 @@ fn attitude_clock(adjusted: &Adjusted) -> String {
     adjusted.attitude_clock_s
         .map_or_else(String::new, |(offset_s, sigma_s)| {
             paragraph(&format!(
-                "Offset of the attitude's clock, of all images: {} ± {} s; the rotations above contain what it turns each image by.",
+                "Offset of the attitude's clock, all images: {} ± {} s; the rotations above include it.",
                 label(offset_s, 3),
                 label(sigma_s, 3)
             ))
@@ -190,8 +206,15 @@ fn biases(adjusted: &Adjusted) -> String {
     }
     let columns = &[Column::Text("profile"), Column::Number("range bias, m")];
     let mut table = Table::new("Range biases", columns);
-    for (profile, value_m, sigma_m) in biases {
-        table.row(true, [profile.into(), with_sigma((*value_m, *sigma_m), 3)]);
+    for (index, (profile, value_m, sigma_m)) in biases.iter().enumerate() {
+        table.row_of(
+            &format!("adjustment.json#/adjustment/summary/range_biases_m/{index}"),
+            true,
+            [
+                profile.into(),
+                with_sigma((*value_m, *sigma_m), 3).told("/1 /2"),
+            ],
+        );
     }
     table.finish()
 }

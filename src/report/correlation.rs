@@ -144,9 +144,7 @@ impl<'a> Matrix<'a> {
                 self.names[place % count]
             )
         });
-        format!(
-            "Correlations of the adjusted orientation unknowns; columns in the order of the rows.{most}"
-        )
+        format!("Adjusted orientation unknowns; columns in the order of rows.{most}")
     }
 
     fn csv(&self) -> String {

@@ -15,7 +15,7 @@ use super::{
 use crate::{
     error::Result,
     footprints::AdjustmentModel,
-    products::{AdjustmentProducts, GeometricProducts, SiteProducts},
+    products::{AdjustmentProducts, GeometricProducts},
     stages::{
         check_heights::{HeightCheck, SurfaceFigures},
         compare_pairs::PairComparison,
@@ -28,11 +28,11 @@ pub(super) const SECTION: Section = Section {
     appears: |site| site.geometric.is_some(),
     write: |site| {
         let geometric = site.geometric.iter();
-        geometric.map(|geometric| write(site, geometric)).collect()
+        geometric.map(write).collect()
     },
 };
 
-fn write(site: &SiteProducts, geometric: &GeometricProducts) -> Result<String> {
+fn write(geometric: &GeometricProducts) -> Result<String> {
     let adjustment = geometric.adjustment.as_ref();
     let mut html = adjustment.map_or_else(String::new, |of| statements(geometric, of));
     if let Ok(surface) = &geometric.heights.surface {
@@ -43,7 +43,7 @@ fn write(site: &SiteProducts, geometric: &GeometricProducts) -> Result<String> {
         html += &paragraph(&apart(geometric.heights));
         html += &format!(
             "<div class=\"plots\">\n{}</div>\n",
-            figure(&profile::plot(site, geometric))?
+            figure(&profile::plot(geometric))?
         );
     }
     Ok(html)
@@ -194,7 +194,7 @@ pub(super) fn absolute(
     // What is stated holds only if errors of both images are as likely; half of their difference is no less open.
     let half = if half_m > east_m.max(north_m) {
         format!(
-            "; open: half of the along-track disagreement of the images, {} m, since neither is known to be right",
+            "; open: half of the images' along-track disagreement, {} m, as neither is known to be right",
             label(half_m, 0)
         )
     } else {
@@ -229,8 +229,8 @@ fn single_sigmas_m(adjustment: &AdjustmentProducts) -> [f64; 2] {
 
 fn surface_in_words(surface: &SurfaceFigures) -> String {
     format!(
-        "Surface: kriged from {} shots of {} profiles; {} m RMS over 300 m, slope {} per axis. Its errors at neighbouring tie \
-         points are correlated: means are no better for their number.",
+        "Surface: kriged from {} shots of {} profiles; {} m RMS over 300 m, slope {} per axis. Errors \
+         at neighbouring tie points are correlated, so averaging does not reduce them.",
         whole(surface.shots),
         surface.profiles,
         label(surface.roughness_m, 1),
@@ -254,17 +254,25 @@ fn compared(geometric: &GeometricProducts) -> String {
     );
     let after = geometric.adjustment.iter().map(|of| ("after", of.heights));
     for (state, check) in [("before", geometric.heights)].into_iter().chain(after) {
-        table.row(
+        let of = |value: f64, name: &str| {
+            Cell::from(label(value, 1)).told(format!("/above_surface_m/{name}"))
+        };
+        let place = match geometric.adjustment {
+            Some(_) => format!("adjustment.json#/{state}/heights"),
+            None => String::new(),
+        };
+        table.row_of(
+            &place,
             true,
             [
                 state.into(),
-                whole(check.above_m.n).into(),
-                whole(check.near_shots).into(),
-                label(check.above_m.median, 1).into(),
-                label(check.above_m.nmad, 1).into(),
-                label(check.above_m.mean, 1).into(),
-                label(check.above_m.standard_deviation, 1).into(),
-                label(check.mean_sigma_m, 1).into(),
+                Cell::from(whole(check.above_m.n)).told("/above_surface_m/n"),
+                Cell::from(whole(check.near_shots)).told("/near_shots"),
+                of(check.above_m.median, "median"),
+                of(check.above_m.nmad, "nmad"),
+                of(check.above_m.mean, "mean"),
+                of(check.above_m.standard_deviation, "standard_deviation"),
+                Cell::from(label(check.mean_sigma_m, 1)).told("/mean_sigma_m"),
             ],
         );
     }
@@ -287,19 +295,25 @@ fn footprints(geometric: &GeometricProducts) -> String {
     let after = geometric.adjustment.iter().map(|of| ("after", of.pairs));
     let mut rows = 0;
     for (state, pairs) in [("before", geometric.pairs)].into_iter().chain(after) {
-        for pair in pairs {
-            for profile in pair.footprints.iter().flat_map(|of| &of.profiles) {
+        for (index, pair) in pairs.iter().enumerate() {
+            let profiles = pair.footprints.iter().flat_map(|of| &of.profiles);
+            for (at, profile) in profiles.enumerate() {
                 let above_m = &profile.above_m;
                 rows += 1;
-                table.row(
+                let place = format!(
+                    "adjustment.json#/{state}/pairs/{index}/footprints/profiles/{at}/above_mola_m"
+                );
+                let place = geometric.adjustment.map_or_else(String::new, |_| place);
+                table.row_of(
+                    &place,
                     true,
                     [
                         state.into(),
                         pair.images.join(" and ").into(),
                         profile.profile.clone().into(),
-                        above_m.n.to_string().into(),
-                        label(above_m.median, 1).into(),
-                        label(above_m.nmad, 1).into(),
+                        Cell::from(above_m.n.to_string()).told("/n"),
+                        Cell::from(label(above_m.median, 1)).told("/median"),
+                        Cell::from(label(above_m.nmad, 1)).told("/nmad"),
                     ],
                 );
             }
@@ -308,13 +322,13 @@ fn footprints(geometric: &GeometricProducts) -> String {
     if rows == 0 {
         return String::new();
     }
-    let words = "Relief between the tie points scatters single heights, not their median.";
+    let words = "Relief between tie points scatters single heights, not the median.";
     table.finish() + &paragraph(words)
 }
 
 fn apart(check: &HeightCheck) -> String {
     check.apart.as_ref().map_or_else(
-        || "There is a single profile: nothing independent tests the surface.".to_owned(),
+        || "With a single profile nothing independent tests the surface.".to_owned(),
         |apart| {
             let [first, second] = &apart.profiles;
             let (upper, lower) = if apart.mean_m < 0.0 {
@@ -323,8 +337,7 @@ fn apart(check: &HeightCheck) -> String {
                 (first, second)
             };
             format!(
-                "At the tie points the surface of profile {upper} alone lies {} m above that of {lower} alone (expected standard \
-                 deviation {} m).",
+                "At the tie points the surface from profile {upper} alone is {} m above that from {lower} alone (expected σ {} m).",
                 label(apart.mean_m.abs(), 1),
                 label(apart.sigma_m, 1)
             )

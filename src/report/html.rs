@@ -194,6 +194,15 @@ pub(super) enum Cell {
     Limited(String, f64),
     /// HTML.
     Html(String),
+    /// A cell whose numbers are told by products, see [`super::source`].
+    Told(Box<Self>, String),
+}
+
+impl Cell {
+    /// The cell with the places in the products that its numbers are from, below that of its row.
+    pub(super) fn told(self, places: impl Into<String>) -> Self {
+        Self::Told(Box::new(self), places.into())
+    }
 }
 
 impl From<&str> for Cell {
@@ -248,18 +257,33 @@ impl Table {
 
     /// Adds a row, tinted when it is not `valid`.
     pub(super) fn row(&mut self, valid: bool, cells: impl IntoIterator<Item = Cell>) {
+        self.row_of("", valid, cells);
+    }
+
+    /// Adds a row whose cells are told by what lies at `place` of the products.
+    pub(super) fn row_of(
+        &mut self,
+        place: &str,
+        valid: bool,
+        cells: impl IntoIterator<Item = Cell>,
+    ) {
         self.rows += 1;
         let class = if valid { "" } else { " class=\"invalid\"" };
+        let class = class.to_owned() + &within(place);
         let cells: String = cells
             .into_iter()
             .enumerate()
-            .map(|(place, cell)| self.cell(place, cell))
+            .map(|(place, cell)| match cell {
+                Cell::Told(cell, places) => self.cell(place, *cell, &from_places(&places)),
+                cell => self.cell(place, cell, ""),
+            })
             .collect();
         // Writing to a string cannot fail.
         let _ = writeln!(self.html, "<tr{class}>{cells}</tr>");
     }
 
-    fn cell(&self, place: usize, cell: Cell) -> String {
+    /// A cell, with the attribute that says where its numbers are from.
+    fn cell(&self, place: usize, cell: Cell, from: &str) -> String {
         let class = match self.columns.get(place) {
             Some(Column::Number(_)) => "number",
             _ => "",
@@ -270,8 +294,8 @@ impl Table {
             ("td", "")
         };
         match cell {
-            Cell::Limited(text, share) => limited(class, &text, share),
-            Cell::Html(html) => format!("<{tag}{scope} class=\"{class}\">{html}</{tag}>"),
+            Cell::Limited(text, share) => limited(class, from, &text, share),
+            Cell::Html(html) => format!("<{tag}{scope} class=\"{class}\"{from}>{html}</{tag}>"),
             Cell::Plain(text) => {
                 // Times and names read badly when they break; sentences must.
                 let short = if text.chars().count() <= SHORT {
@@ -280,10 +304,12 @@ impl Table {
                     ""
                 };
                 format!(
-                    "<{tag}{scope} class=\"{class}{short}\">{}</{tag}>",
+                    "<{tag}{scope} class=\"{class}{short}\"{from}>{}</{tag}>",
                     escape(&text)
                 )
             }
+            // Told once is told.
+            Cell::Told(cell, _) => self.cell(place, *cell, from),
         }
     }
 
@@ -297,17 +323,30 @@ impl Table {
     }
 }
 
-fn limited(class: &str, text: &str, share: f64) -> String {
+fn limited(class: &str, from: &str, text: &str, share: f64) -> String {
     let text = escape(text);
     // Written so that NaN is beyond.
     if share <= 1.0 {
         let per_cent = (100.0 * share.max(0.0)).round();
-        format!("<td class=\"{class} limited\" style=\"--share:{per_cent}%\">{text}</td>")
+        format!("<td class=\"{class} limited\"{from} style=\"--share:{per_cent}%\">{text}</td>")
     } else {
         format!(
-            "<td class=\"{class} beyond\"><span class=\"hidden\">beyond the limit: </span>✗ {text}</td>"
+            "<td class=\"{class} beyond\"{from}><span class=\"hidden\">beyond the limit: </span>✗ {text}</td>"
         )
     }
+}
+
+/// The attribute of an element whose numbers are those at `places` of the products; see [`super::source`].
+pub(super) fn from_places(places: &str) -> String {
+    format!(" data-from=\"{}\"", escape(places))
+}
+
+/// The attribute of a row whose cells are told by what lies at `place`; nothing for no place.
+fn within(place: &str) -> String {
+    if place.is_empty() {
+        return String::new();
+    }
+    format!(" data-in=\"{}\"", escape(place))
 }
 
 /// A number of things, in the plural where there are several.

@@ -68,16 +68,21 @@ fn taken(site: &SiteProducts) -> String {
                 .map_or_else(|| "–".to_owned(), number)
                 .into()
         };
-        table.row(
+        table.row_of(
+            &format!("{}/times", place(&times.id)),
             true,
             [
                 (&times.id).into(),
                 (&times.utc_start).into(),
-                whole(times.line_times.lines()).into(),
-                whole(times.lines_delivered).into(),
-                times.samples.to_string().into(),
-                format!("{} × {}", times.downtrack_summing, times.crosstrack_summing).into(),
-                periods_ms(times).into(),
+                Cell::from(whole(times.line_times.lines())).told("/lines_header"),
+                Cell::from(whole(times.lines_delivered)).told("/lines_delivered"),
+                Cell::from(times.samples.to_string()).told("/samples_per_line"),
+                Cell::from(format!(
+                    "{} × {}",
+                    times.downtrack_summing, times.crosstrack_summing
+                ))
+                .told("/downtrack_summing /crosstrack_summing"),
+                periods_ms(times),
                 format!("{:.2}", times.duration_s()).into(),
                 seen(|ground| format!("{:.1}", ground.range_m / METRES_PER_KM)),
                 seen(|ground| format!("{:.2}", ground.emission_rad / RADIANS_PER_DEGREE)),
@@ -103,9 +108,9 @@ fn light_time(site: &SiteProducts) -> String {
         .map(|image| &image.orientation.light_time);
     let others: Vec<OtherConvention> = effects.flat_map(|of| of.others.iter().copied()).collect();
     let mut words = format!(
-        "Light time: camera positions are {} (convention {}).",
-        convention.positions(),
-        convention.word()
+        "Light time ({}): camera positions are {}.",
+        convention.word(),
+        convention.positions()
     );
     for (word, other) in LightTime::WORDS {
         let of_images = || others.iter().filter(|of| of.convention == other);
@@ -121,7 +126,7 @@ fn light_time(site: &SiteProducts) -> String {
         };
         if of_images().next().is_some() {
             words += &format!(
-                " With {word}, images see ground {} m away, and the same ground {} lines later.",
+                " With {word} the view moves by {} m, the same ground by {} lines.",
                 span(|of| of.ground_m, 1),
                 span(|of| of.lines, 2)
             );
@@ -131,12 +136,23 @@ fn light_time(site: &SiteProducts) -> String {
 }
 
 /// The line period; where it changes inside the image every one.
-fn periods_ms(times: &ImageTimes) -> String {
+fn periods_ms(times: &ImageTimes) -> Cell {
     let periods = times
         .line_times
         .pieces()
         .map(|piece| format!("{:.4}", 1e3 * piece.period_s));
-    periods.collect::<Vec<_>>().join(", ")
+    let periods: Vec<String> = periods.collect();
+    let pieces = (0..periods.len()).map(|piece| format!("/line_pieces/{piece}/line_period_s*1000"));
+    let places: Vec<String> = match periods.len() {
+        1 => vec!["/line_period_s*1000".to_owned()],
+        _ => pieces.collect(),
+    };
+    Cell::from(periods.join(", ")).told(places.join(" "))
+}
+
+/// Where the products tell of an image.
+fn place(image: &str) -> String {
+    format!("images/{image}/orientation.json#")
 }
 
 /// RMSE per image: Table 4.
@@ -163,29 +179,33 @@ fn models(site: &SiteProducts) -> String {
         let (model, id) = (image.model, &image.times.id);
         let valid = image.invalid_because().is_empty();
         let judged = [
-            Cell::Plain(format!("{:.4}", model.first_order.position_rmse_m())),
+            Cell::Plain(format!("{:.4}", model.first_order.position_rmse_m()))
+                .told("/position_rmse_m"),
             "–".into(),
             "".into(),
         ];
-        table.row(valid, row(id, "1", &model.first_order, judged));
+        let [first, second] =
+            ["first_order", "second_order"].map(|order| format!("{}/{order}", place(id)));
+        table.row_of(&first, valid, row(id, "1", &model.first_order, judged));
         let rmse_rad = model.rotation_vector.rmse_rad();
         let position_m = model.second_order.position_rmse_m();
         let judged = [
             Cell::Limited(
                 format!("{position_m:.4}"),
                 position_m / limits.position_rmse_max_m,
-            ),
+            )
+            .told("/position_rmse_m"),
             Cell::Limited(
                 format!("{:.3}", rmse_rad / RADIANS_PER_ARCSECOND),
                 rmse_rad / limits.pointing_rmse_max_rad,
             ),
             if valid { "valid" } else { "invalid" }.into(),
         ];
-        table.row(valid, row(id, "2", &model.second_order, judged));
+        table.row_of(&second, valid, row(id, "2", &model.second_order, judged));
     }
     let words = format!(
-        "Limits of the second order: position {} m, pointing {}″ (largest component of the rotation vector). On the ground: \
-         RMS displacement of the boresight.",
+        "Limits for order 2: position {} m, pointing {}″ (largest component of the rotation vector). On the ground: RMS \
+         shift of the boresight.",
         limits.position_rmse_max_m,
         // As it was written: conversion to radians and back leaves digits of its own.
         (1e6 * limits.pointing_rmse_max_rad / RADIANS_PER_ARCSECOND).round() / 1e6
@@ -201,26 +221,22 @@ fn row(
     [position, pointing, verdict]: [Cell; 3],
 ) -> Vec<Cell> {
     let mut cells: Vec<Cell> = vec![image.into(), order.into()];
+    let axes = model.position_m.iter().zip(["x", "y", "z"]);
     cells.extend(
-        model
-            .position_m
-            .iter()
-            .map(|fit| format!("{:.4}", fit.rmse).into()),
+        axes.map(|(fit, axis)| {
+            Cell::from(format!("{:.4}", fit.rmse)).told(format!("/{axis}_m/rmse"))
+        }),
     );
     cells.push(position);
-    cells.extend(
-        model
-            .angles_rad
-            .iter()
-            .map(|fit| format!("{:.3}", fit.rmse / RADIANS_PER_ARCSECOND).into()),
-    );
+    let angles = model.angles_rad.iter().zip(["omega", "phi", "kappa"]);
+    cells.extend(angles.map(|(fit, angle)| {
+        let arcseconds = format!("{:.3}", fit.rmse / RADIANS_PER_ARCSECOND);
+        Cell::from(arcseconds).told(format!("/{angle}_rad/rmse_arcsec"))
+    }));
     cells.push(pointing);
     let ground = model.pointing_ground_rmse_m();
-    cells.push(
-        ground
-            .map_or_else(|| "–".to_owned(), |metres| format!("{metres:.3}"))
-            .into(),
-    );
+    let ground = ground.map_or_else(|| "–".to_owned(), |metres| format!("{metres:.3}"));
+    cells.push(Cell::from(ground).told("/pointing_ground_rmse_m"));
     cells.push(verdict);
     cells
 }
@@ -286,13 +302,13 @@ fn words(image: &ImageProducts) -> String {
         .copied()
         .fold(0.0, f64::max);
     let mut text = format!(
-        "{} epochs; largest residual {:.2} mm in position, {:.3}″ in pointing",
+        "{} epochs; largest residuals {:.2} mm and {:.3}″",
         image.orientation.samples.len(),
         1e3 * largest(&model.position_m),
         largest(&model.angles_rad) / RADIANS_PER_ARCSECOND
     );
     text += &if model.pointing_ground_m.is_some() {
-        format!(", which is {ground:.3} m on the ground.")
+        format!(", {ground:.3} m on the ground.")
     } else {
         "; the boresight leaves the ground.".to_owned()
     };

@@ -58,8 +58,7 @@ fn write(site: &SiteProducts, ties: &Ties) -> String {
         );
     }
     paragraph(
-        "In every cell of the ground that two images both show, the place with the most texture was searched in the other image, \
-         and from there in the first again. Standard deviations are medians of those that each match has by itself, in the second \
-         image; the table is of the second pass, which expects places where the adjustment by the first one has them.",
+        "In each cell of common ground the place with the most texture was matched to the other image and back. σ: medians of \
+         single matches, in the second image. The table is of the second pass, which starts from the adjusted orientation.",
     ) + &table.finish()
 }

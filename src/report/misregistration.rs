@@ -1,5 +1,7 @@
 //! Tie points, and how far footprints and tie points disagree between images: before and after the adjustment.
 
+mod pair;
+
 use std::collections::BTreeMap;
 
 use super::{
@@ -15,7 +17,7 @@ use crate::{
     products::{GeometricProducts, SiteProducts},
     stages::{
         adjust::{PointKind, RejectionReason},
-        compare_pairs::{FootprintsByTies, PairComparison, ProfileByTies},
+        compare_pairs::{FootprintsByTies, ProfileByTies},
         intersect::TieRejection,
     },
     units::RADIANS_PER_DEGREE,
@@ -23,6 +25,8 @@ use crate::{
 
 /// Pairs that have a sentence of their own; tables have all.
 const PAIRS_TOLD: usize = 6;
+
+pub(super) use pair::BeforeAfter;
 
 pub(super) const SECTION: Section = Section {
     title: "Tie points and misregistration",
@@ -55,120 +59,6 @@ fn write(site: &SiteProducts, geometric: &GeometricProducts) -> Result<String> {
     Ok(html)
 }
 
-/// A pair of images before the adjustment and, where tie points still join it, after.
-pub(super) struct BeforeAfter<'a> {
-    pub(super) before: &'a PairComparison,
-    pub(super) after: Option<&'a PairComparison>,
-    /// Whether there is an adjustment.
-    adjusted: bool,
-}
-
-impl<'a> BeforeAfter<'a> {
-    pub(super) fn all(geometric: &GeometricProducts<'a>) -> Vec<Self> {
-        let adjusted = geometric.adjustment.map_or(&[][..], |of| of.pairs);
-        let of = |before: &'a PairComparison| Self {
-            before,
-            after: adjusted.iter().find(|pair| pair.images == before.images),
-            adjusted: geometric.adjustment.is_some(),
-        };
-        geometric.pairs.iter().map(of).collect()
-    }
-
-    /// The pair whose images place their tie points farthest apart along the flight before the adjustment.
-    pub(super) fn worst(pairs: &[Self]) -> Option<&Self> {
-        let size = |pair: &&Self| pair.before.along_track_parallax_m.abs();
-        pairs.iter().max_by(|a, b| size(a).total_cmp(&size(b)))
-    }
-
-    /// Both images by name.
-    pub(super) fn name(&self) -> String {
-        self.before.images.join(" and ")
-    }
-
-    /// Each state with its name.
-    pub(super) fn states(&self) -> impl Iterator<Item = (&'static str, &'a PairComparison)> {
-        let after = self.after.map(|pair| ("after", pair));
-        [("before", self.before)].into_iter().chain(after)
-    }
-
-    /// How far apart the two images place the same thing, before and after.
-    pub(super) fn sentence(&self) -> String {
-        let (before, after) = (
-            self.apart(self.before),
-            self.after.map(|after| self.apart(after)),
-        );
-        let what = if self.by_footprints() {
-            "a footprint falls"
-        } else {
-            "a tie point falls"
-        };
-        if !self.adjusted {
-            return format!(
-                "{}: {what} {} apart in the two images along the flight.",
-                self.name(),
-                before.in_words()
-            );
-        }
-        let after = after.map_or_else(
-            || "after it no tie point joins them".to_owned(),
-            |after| format!("after it {}", after.in_words()),
-        );
-        format!(
-            "{}: before the adjustment {what} {} apart in the two images along the flight; {after}.",
-            self.name(),
-            before.in_words()
-        )
-    }
-
-    /// Whether footprints tell how far apart the images are, before and after alike; otherwise tie points do.
-    fn by_footprints(&self) -> bool {
-        self.states()
-            .all(|(_, pair)| footprints_apart_m(pair).is_some())
-    }
-
-    /// How far apart the images of `pair`, one of the states, place the same thing.
-    fn apart(&self, pair: &PairComparison) -> Apart {
-        let by_footprints_m = footprints_apart_m(pair).filter(|_| self.by_footprints());
-        let metres = by_footprints_m.unwrap_or(pair.along_track_parallax_m);
-        Apart {
-            metres,
-            spacings: pair.mola_spacing_m.map(|spacing_m| metres / spacing_m),
-        }
-    }
-}
-
-/// How far apart along the flight two images place the same thing.
-struct Apart {
-    /// Metres on the ground, without sign.
-    metres: f64,
-    /// The same in distances of successive footprints.
-    spacings: Option<f64>,
-}
-
-impl Apart {
-    fn in_words(&self) -> String {
-        let metres = label(self.metres, usize::from(self.metres < 10.0));
-        self.spacings.map_or_else(
-            || format!("{metres} m"),
-            |spacings| {
-                let decimals = if spacings < 0.1 { 3 } else { 2 };
-                format!("{} MOLA spacings ({metres} m)", label(spacings, decimals))
-            },
-        )
-    }
-}
-
-/// Mean size over all footprints that both images of `pair` show, metres; `None` where there are none.
-fn footprints_apart_m(pair: &PairComparison) -> Option<f64> {
-    let profiles = pair.footprints.iter().flat_map(|found| &found.profiles);
-    let (mut shots, mut metres) = (0.0, 0.0);
-    for profile in profiles {
-        shots += f64::from(profile.lines.n);
-        metres += f64::from(profile.lines.n) * profile.along_m.abs();
-    }
-    (shots > 0.0).then(|| metres / shots)
-}
-
 /// How many tie points there are, and which say nothing.
 fn read(geometric: &GeometricProducts) -> String {
     let ties = geometric.ties;
@@ -180,21 +70,14 @@ fn read(geometric: &GeometricProducts) -> String {
         |of| format!(", {} with the adjusted one", of.intersected.points.len()),
     );
     let mut words = format!(
-        "{} read, {} of them measured in at least two images; {} have a ground point with the orientation of the \
-         kernels{adjusted}.",
+        "{} read, {} in two or more images; {} intersect with the kernels' orientation{adjusted}.",
         counted(ties.points.len(), "tie point"),
         ties.multi_image(),
         points.len(),
     );
     for (count, what) in [
-        (
-            elsewhere,
-            "measurements are in images that the site does not have.",
-        ),
-        (
-            ties.ignored,
-            "measurements or points are marked to be ignored.",
-        ),
+        (elsewhere, "measurements are in other images."),
+        (ties.ignored, "are marked to be ignored."),
         (ties.complaint_count, "records could not be read."),
     ] {
         if count > 0 {
@@ -202,9 +85,7 @@ fn read(geometric: &GeometricProducts) -> String {
         }
     }
     if outliers > 0 {
-        words += &format!(
-            " {outliers} are outliers by their reprojection residuals and do not count in the statistics of pairs."
-        );
+        words += &format!(" {outliers} are reprojection outliers and do not count in the pairs.");
     }
     paragraph(&words) + &rejected(geometric)
 }
@@ -281,17 +162,20 @@ fn geometry(pairs: &[BeforeAfter]) -> String {
     );
     for pair in pairs {
         for (state, found) in pair.states() {
+            let degrees = format!("/convergence_rad*{}", RADIANS_PER_DEGREE.recip());
             let numbers = [
-                (found.convergence_rad / RADIANS_PER_DEGREE, 2),
-                (found.height_over_base, 2),
-                (found.line_spacing_m[0], 3),
-                (found.line_spacing_m[1], 3),
-                (found.along_track_parallax_m, 2),
+                (found.convergence_rad / RADIANS_PER_DEGREE, 2, &*degrees),
+                (found.height_over_base, 2, "/height_over_base"),
+                (found.line_spacing_m[0], 3, "/line_spacing_m/0"),
+                (found.line_spacing_m[1], 3, "/line_spacing_m/1"),
+                (found.along_track_parallax_m, 2, "/along_track_parallax_m"),
             ];
-            let mut cells: Vec<Cell> =
-                vec![pair.name().into(), state.into(), whole(found.ties).into()];
-            cells.extend(numbers.map(|(value, decimals)| label(value, decimals).into()));
-            table.row(true, cells);
+            let mut cells = pair.head(state, found);
+            cells
+                .extend(numbers.map(|(value, decimals, place)| {
+                    Cell::from(label(value, decimals)).told(place)
+                }));
+            table.row_of(&pair.place(state), true, cells);
         }
     }
     table.finish()
@@ -316,23 +200,28 @@ fn reprojection(pairs: &[BeforeAfter]) -> String {
     );
     for pair in pairs {
         for (state, found) in pair.states() {
-            let mut cells: Vec<Cell> =
-                vec![pair.name().into(), state.into(), whole(found.ties).into()];
-            for of in &found.residuals {
-                let moments = [of.mean_x, of.deviation_x, of.mean_y, of.deviation_y];
-                cells.extend(moments.map(|value| label(value, 2).into()));
+            let mut cells = pair.head(state, found);
+            for (image, of) in found.residuals.iter().enumerate() {
+                let moments = [
+                    (of.mean_x, "mean_x"),
+                    (of.deviation_x, "deviation_x"),
+                    (of.mean_y, "mean_y"),
+                    (of.deviation_y, "deviation_y"),
+                ];
+                cells.extend(moments.map(|(value, name)| {
+                    Cell::from(label(value, 2)).told(format!("/residuals/{image}/{name}"))
+                }));
             }
-            table.row(true, cells);
+            table.row_of(&pair.place(state), true, cells);
         }
     }
-    let words = "Measured minus projected: M mean, σ standard deviation; x along track, y across it and against the samples; 1 and \
-                 2 as in the pair's name.";
+    let words = "Measured minus projected: M mean, σ standard deviation; x along track, y across (against the samples).";
     table.finish() + &paragraph(words)
 }
 
 fn footprints(pairs: &[BeforeAfter]) -> String {
     let mut table = Table::new(
-        "Footprints between the images, by tie points; positive along track",
+        "Footprints between the images, by tie points; positive along track, samples with the parallax of relief",
         &[
             Column::Text("profile"),
             Column::Text("pair"),
@@ -357,61 +246,73 @@ fn footprints(pairs: &[BeforeAfter]) -> String {
             continue;
         };
         let after = pair.after.and_then(|after| after.footprints.as_ref());
-        for profile in &found.profiles {
+        for (index, profile) in found.profiles.iter().enumerate() {
             let after = after.and_then(|after| {
-                let mut profiles = after.profiles.iter();
-                profiles.find(|other| other.profile == profile.profile)
+                let same = |other: &ProfileByTies| other.profile == profile.profile;
+                let index = after.profiles.iter().position(same)?;
+                Some((index, &after.profiles[index]))
             });
-            table.row(true, profile_cells(&pair.name(), profile, after));
+            let cells = profile_cells(pair, (index, profile), after);
+            table.row(true, cells);
         }
+        let spacing = pair.before.mola_spacing_m;
+        let spacing = spacing.map(|metres| format!(" One MOLA spacing: {} m.", label(metres, 1)));
         notes += &paragraph(&format!(
-            "{}: from the first image to the second by a polynomial of order {} through {} tie points ({} rejected); standard \
-             deviation {} lines, {} samples.",
+            "{}: by a polynomial of order {} through {} tie points ({} rejected), σ {} lines and {} samples. {}{}",
             pair.name(),
             found.order,
             found.ties,
             found.ties_rejected,
             label(found.tie_lines.standard_deviation, 2),
-            label(found.tie_samples.standard_deviation, 2)
+            label(found.tie_samples.standard_deviation, 2),
+            not_counted(found),
+            spacing.unwrap_or_default()
         ));
-        notes += &paragraph(&not_counted(found));
-        if let Some(spacing_m) = pair.before.mola_spacing_m {
-            notes += &paragraph(&format!("One MOLA spacing: {} m.", label(spacing_m, 1)));
-        }
     }
-    notes += &paragraph("Samples also contain the parallax of relief.");
     table.finish() + &notes
 }
 
 /// Which footprints are not in the table.
 fn not_counted(found: &FootprintsByTies) -> String {
     let none = if found.profiles.is_empty() {
-        "No footprint is shown by both images: the tie points alone tell how far apart they are. "
+        "No footprint is in both images. "
     } else {
         ""
     };
     format!(
-        "{none}Footprints count where both images show them, between the first and last line of the tie points ({} outside).",
+        "{none}Not counted: {} footprints outside an image or the tie points.",
         whole(found.outside)
     )
 }
 
-fn profile_cells(pair: &str, before: &ProfileByTies, after: Option<&ProfileByTies>) -> Vec<Cell> {
-    let dash = || Cell::from("–");
+/// Where the products have a number of a profile, and how a page writes it.
+type Quantity = (&'static str, fn(&ProfileByTies) -> Option<String>);
+
+/// A profile by its place among those of the pair, before and after.
+fn profile_cells(
+    pair: &BeforeAfter,
+    before: (usize, &ProfileByTies),
+    after: Option<(usize, &ProfileByTies)>,
+) -> Vec<Cell> {
     let mut cells = vec![
-        (&before.profile).into(),
-        pair.into(),
-        whole(before.lines.n).into(),
+        (&before.1.profile).into(),
+        pair.name().into(),
+        pair.told("before", before.0, "lines/n", whole(before.1.lines.n)),
     ];
-    let quantities: [fn(&ProfileByTies) -> Option<String>; 4] = [
-        |of| Some(label(of.lines.mean, 2)),
-        |of| Some(label(of.along_m, 1)),
-        |of| Some(label(of.along_spacings?, 3)),
-        |of| Some(label(of.samples.mean, 2)),
+    let quantities: [Quantity; 4] = [
+        ("lines/mean", |of| Some(label(of.lines.mean, 2))),
+        ("along_m", |of| Some(label(of.along_m, 1))),
+        ("along_spacings", |of| Some(label(of.along_spacings?, 3))),
+        ("samples/mean", |of| Some(label(of.samples.mean, 2))),
     ];
-    for quantity in quantities {
-        cells.push(quantity(before).map_or_else(dash, Cell::from));
-        cells.push(after.and_then(quantity).map_or_else(dash, Cell::from));
+    for (name, quantity) in quantities {
+        for (state, of) in [("before", Some(before)), ("after", after)] {
+            let cell = of.map(|(index, of)| {
+                let text = quantity(of).unwrap_or_else(|| "–".to_owned());
+                pair.told(state, index, name, text)
+            });
+            cells.push(cell.unwrap_or_else(|| "–".into()));
+        }
     }
     cells
 }

@@ -51,6 +51,7 @@ mod selection;
 mod sites;
 mod sites_map;
 mod sky;
+mod source;
 mod summary;
 mod support_data;
 mod timeline;

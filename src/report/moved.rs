@@ -100,8 +100,7 @@ fn footprints(before: &ImageProducts, after: &ImageProducts) -> Option<Plot> {
         each: shown,
     });
     let words = format!(
-        "Footprints around the middle one before and after the adjustment, flight to the right. Median shift of all {}: {} \
-         lines, {} samples.",
+        "Footprints near the middle, flight to the right. Median shift of all {}: {} lines, {} samples.",
         whole(all.len()),
         label(lines, 2),
         label(across, 2)
@@ -155,9 +154,7 @@ fn vectors(
         high: samples + LONGEST * samples,
     };
     let mut panels = Vec::new();
-    let mut words =
-        "Reprojection residuals of tie points, measured minus projected; flight to the right."
-            .to_owned();
+    let mut words = "Tie points, measured minus projected; flight to the right.".to_owned();
     let after = geometric.adjustment.map(|of| of.intersected);
     for (state, title, colour, ties) in [
         ("before", "Before", BEFORE, Some(geometric.intersected)),
@@ -174,17 +171,18 @@ fn vectors(
             each,
         };
         words += &format!(
-            " {title}: {} vectors, {} × magnified, mean {}.",
+            " {title}: {} vectors, × {}, mean {}",
             whole(all.len()),
             arrows.times(),
             mean_in_words(&all),
         );
         if all.len() > limit {
-            words += &format!(" At most {limit} are drawn.");
+            words += &format!(", at most {limit} drawn");
         }
         if outliers > 0 {
-            words += &format!(" {outliers} outliers are not drawn.");
+            words += &format!(", {outliers} outliers not drawn");
         }
+        words.push('.');
         panels.push(Panel {
             y,
             height: 330,
@@ -232,5 +230,5 @@ fn mean_in_words(arrows: &[Arrow]) -> String {
     let count = arrows.len().max(1) as f64;
     let mean = |of: fn(&Arrow) -> f64| label(arrows.iter().map(of).sum::<f64>() / count, 2);
     let (lines, samples) = (mean(|arrow| arrow.by.0), mean(|arrow| arrow.by.1));
-    format!("{lines} lines and {samples} samples")
+    format!("{lines} lines, {samples} samples")
 }

@@ -30,6 +30,21 @@ pub(super) fn signed(value: f64, decimals: usize) -> String {
     }
 }
 
+/// A sentence of the program with the minus sign of pages before its numbers; hyphens in names stay.
+pub(super) fn with_minus(sentence: &str) -> String {
+    let mut written = String::with_capacity(sentence.len());
+    let mut letters = sentence.chars().peekable();
+    let mut before = ' ';
+    while let Some(letter) = letters.next() {
+        let is_sign = letter == '-'
+            && matches!(before, ' ' | '(')
+            && letters.peek().is_some_and(char::is_ascii_digit);
+        written.push(if is_sign { MINUS } else { letter });
+        before = letter;
+    }
+    written
+}
+
 /// A count.
 pub(super) fn whole(count: impl TryInto<u64>) -> String {
     spaced(&count.try_into().unwrap_or(u64::MAX).to_string())
@@ -63,6 +78,14 @@ mod tests {
         assert_eq!(signed(0.0004, 3), "0.000");
         assert_eq!(signed(0.117, 3), "+0.117");
         assert_eq!(signed(-1.15, 2), "−1.15");
+    }
+
+    #[test]
+    fn sentences_have_the_same_minus_and_names_keep_their_hyphens() {
+        assert_eq!(
+            with_minus("E02-00665: 4 m off (-33 m up, -0.5 m across) - see"),
+            "E02-00665: 4 m off (−33 m up, −0.5 m across) - see"
+        );
     }
 
     #[test]

@@ -21,10 +21,11 @@ fn write(site: &SiteProducts) -> String {
     let config = site.config;
     let file = crate::files::file_name(&config.file);
     let words = format!(
-        "Cite as: areograph {}, site {}, configuration {file} (BLAKE3 of its keys {}).",
+        "Cite as: areograph {}, site {}, configuration {file} (BLAKE3 of its keys {}). Computed with {}.",
         env!("CARGO_PKG_VERSION"),
         config.site,
-        config.blake3
+        config.blake3,
+        site.program.cspice.replace('_', " ")
     );
     let mut files = Table::new(
         "Files that were read",
@@ -35,13 +36,14 @@ fn write(site: &SiteProducts) -> String {
             Column::Text("BLAKE3"),
         ],
     );
-    for kernel in site.kernels {
-        files.row(
+    for (index, kernel) in site.kernels.iter().enumerate() {
+        files.row_of(
+            &format!("manifest.json#/kernels/{index}"),
             true,
             [
                 (&kernel.name).into(),
                 (&kernel.role).into(),
-                whole(kernel.bytes).into(),
+                Cell::from(whole(kernel.bytes)).told("/bytes"),
                 hash(&kernel.blake3),
             ],
         );
@@ -73,18 +75,35 @@ fn write(site: &SiteProducts) -> String {
         );
     }
     let made = format!(
-        "<p>Made by <code>areograph run {0}</code>; <code>areograph report {1}</code> makes this page again from the \
-         products.</p>\n",
+        "<p>Made by <code>areograph run {0}</code>; <code>areograph report {1}</code> makes this page again.</p>\n",
         escape(&file),
         escape(&config.site)
     );
-    paragraph(&words) + &made + LINKS + &files.finish() + &settings(site) + &products(site)
+    paragraph(&words)
+        + &made
+        + LINKS
+        + &files.finish()
+        + &settings(site)
+        + &methods(site)
+        + &products(site)
+}
+
+/// The number of each stage's method.
+fn methods(site: &SiteProducts) -> String {
+    let columns = &[Column::Text("stage"), Column::Number("method")];
+    let mut table = Table::new(
+        "Stages; the number rises when a stage computes something else",
+        columns,
+    );
+    for (stage, method) in &site.program.methods {
+        table.row(true, [stage.into(), method.to_string().into()]);
+    }
+    folded("Methods", &table.finish())
 }
 
 /// Where the rest is, from the folder of the page.
-const LINKS: &str = "<p><a href=\"../manifest.json\">manifest.json</a>, for programs: verdict, checks, key figures, every \
-    product with its hash, every stage with its fingerprint, and when the run ended. \
-    <a href=\"../kernels.tm\">kernels.tm</a> loads the same kernels in the same order. \
+const LINKS: &str = "<p><a href=\"../manifest.json\">manifest.json</a>: verdict, checks, figures and hashes for programs. \
+    <a href=\"../kernels.tm\">kernels.tm</a> loads the same kernels. \
     <a href=\"../../index.html\">All sites</a>.</p>\n";
 
 /// Every file beside the page.

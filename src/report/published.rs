@@ -25,16 +25,27 @@ fn write(summary: &AdjustmentSummary) -> String {
     ground_corrections(summary) + &image_coordinates(summary) + &ground_sigmas(summary)
 }
 
-/// Mean and standard deviation, or a dash each where there is nothing.
-fn moments(of: &Summary, decimals: usize) -> [Cell; 2] {
+/// Where the products have the summary.
+const PLACE: &str = "adjustment.json#/adjustment/summary";
+
+/// Mean and standard deviation of what lies at `place` below the row's, or a dash each where there is nothing.
+fn moments(of: &Summary, place: &str) -> [Cell; 2] {
     if of.n == 0 {
         return ["–".into(), "–".into()];
     }
-    [of.mean, of.standard_deviation].map(|value| label(value, decimals).into())
+    let values = [
+        (of.mean, "mean"),
+        (of.standard_deviation, "standard_deviation"),
+    ];
+    values.map(|(value, name)| Cell::from(label(value, 3)).told(format!("{place}/{name}")))
 }
 
-const fn kinds(summary: &AdjustmentSummary) -> [(&'static str, &GroundSummary); 2] {
-    [("MOLA", &summary.shots), ("tie points", &summary.ties)]
+/// Footprints and tie points, each with its place below the summary.
+const fn kinds(summary: &AdjustmentSummary) -> [(&'static str, &'static str, &GroundSummary); 2] {
+    [
+        ("MOLA", "shots", &summary.shots),
+        ("tie points", "ties", &summary.ties),
+    ]
 }
 
 fn ground_corrections(summary: &AdjustmentSummary) -> String {
@@ -51,15 +62,16 @@ fn ground_corrections(summary: &AdjustmentSummary) -> String {
             Column::Number("std"),
         ],
     );
-    for (name, of) in kinds(summary) {
-        let mut cells: Vec<Cell> = vec![name.into(), whole(of.corrections_m[0].n).into()];
-        cells.extend(of.corrections_m.iter().flat_map(|axis| moments(axis, 3)));
-        table.row(true, cells);
+    for (name, place, of) in kinds(summary) {
+        let count = Cell::from(whole(of.corrections_m[0].n)).told("/corrections_m/0/n");
+        let mut cells: Vec<Cell> = vec![name.into(), count];
+        let axes = of.corrections_m.iter().enumerate();
+        cells.extend(axes.flat_map(|(at, axis)| moments(axis, &format!("/corrections_m/{at}"))));
+        table.row_of(&format!("{PLACE}/{place}"), true, cells);
     }
     table.finish()
         + &paragraph(
-            "Adjusted minus initial, Mars-fixed axes; initial tie points are intersected with the orientation of the \
-             kernels. What the paper calls RMS is the standard deviation about the mean.",
+            "Adjusted minus initial, Mars-fixed axes. The paper's RMS is the standard deviation about the mean.",
         )
 }
 
@@ -76,15 +88,17 @@ fn image_coordinates(summary: &AdjustmentSummary) -> String {
             Column::Number("std"),
         ],
     );
-    for image in &summary.images {
-        for (name, of) in [
-            ("MOLA, lines and px", &image.mola_corrections),
-            ("tie points, focal-plane px", &image.tie_residuals_px),
+    for (index, image) in summary.images.iter().enumerate() {
+        let [shots, ties] = ["mola_corrections", "tie_residuals_px"];
+        for (name, place, of) in [
+            ("MOLA, lines and px", shots, &image.mola_corrections),
+            ("tie points, focal-plane px", ties, &image.tie_residuals_px),
         ] {
-            let mut cells: Vec<Cell> =
-                vec![(&image.image).into(), name.into(), whole(of[0].n).into()];
-            cells.extend(of.iter().flat_map(|axis| moments(axis, 3)));
-            table.row(true, cells);
+            let count = Cell::from(whole(of[0].n)).told("/0/n");
+            let mut cells: Vec<Cell> = vec![(&image.image).into(), name.into(), count];
+            let axes = of.iter().enumerate();
+            cells.extend(axes.flat_map(|(at, axis)| moments(axis, &format!("/{at}"))));
+            table.row_of(&format!("{PLACE}/images/{index}/{place}"), true, cells);
         }
     }
     table.finish()
@@ -102,16 +116,21 @@ fn ground_sigmas(summary: &AdjustmentSummary) -> String {
             Column::Number("σ0"),
         ],
     );
-    for (name, of) in kinds(summary) {
-        let largest = of.sigmas_m.iter().map(|axis| axis.max).fold(0.0, f64::max);
+    for (name, place, of) in kinds(summary) {
+        let axes = of.sigmas_m.iter().enumerate();
+        let largest = axes
+            .clone()
+            .max_by(|(_, a), (_, b)| a.max.total_cmp(&b.max));
         let mut cells: Vec<Cell> = vec![name.into()];
-        for axis in &of.sigmas_m {
-            let [mean, _] = moments(axis, 3);
+        for (at, axis) in axes {
+            let [mean, _] = moments(axis, &format!("/sigmas_m/{at}"));
             cells.push(mean);
         }
-        cells.push(label(largest, 3).into());
-        cells.push(label(summary.sigma0, 3).into());
-        table.row(true, cells);
+        let largest = largest
+            .map(|(at, axis)| Cell::from(label(axis.max, 3)).told(format!("/sigmas_m/{at}/max")));
+        cells.extend(largest);
+        cells.push(Cell::from(label(summary.sigma0, 3)).told(format!("{PLACE}/sigma0")));
+        table.row_of(&format!("{PLACE}/{place}"), true, cells);
     }
     table.finish()
 }

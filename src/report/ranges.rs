@@ -112,7 +112,7 @@ fn statistics(site: &SiteProducts) -> String {
             Column::Text("verdict"),
         ],
     );
-    for (profile, ranges) in site.profiles.iter().zip(&site.ranges.profiles) {
+    for (index, (profile, ranges)) in site.profiles.iter().zip(&site.ranges.profiles).enumerate() {
         let main = &ranges.range_minus_distance_m;
         let shots_share = f64::from(limits.shots_min) / f64::from(main.n.max(1));
         let outlier_share = f64::from(ranges.outliers) / f64::from(main.n.max(1));
@@ -125,30 +125,35 @@ fn statistics(site: &SiteProducts) -> String {
             })
             .collect();
         let valid = ranges.invalid_because.is_empty();
-        table.row(
+        let of_main = |value: f64, name: &str| {
+            Cell::from(metres(value)).told(format!("/range_minus_distance_m/{name}"))
+        };
+        table.row_of(
+            &place(index),
             valid,
             [
                 (&profile.id).into(),
-                Cell::Limited(whole(main.n), shots_share),
-                metres(main.mean).into(),
-                metres(main.standard_deviation).into(),
-                metres(main.median).into(),
-                metres(main.nmad).into(),
-                metres(main.min).into(),
-                metres(main.max).into(),
+                Cell::Limited(whole(main.n), shots_share).told("/range_minus_distance_m/n"),
+                of_main(main.mean, "mean"),
+                of_main(main.standard_deviation, "standard_deviation"),
+                of_main(main.median, "median"),
+                of_main(main.nmad, "nmad"),
+                of_main(main.min, "min"),
+                of_main(main.max, "max"),
                 Cell::Limited(
                     whole(ranges.outliers),
                     used_share(outlier_share, limits.outlier_share_max),
-                ),
-                trend(ranges).into(),
+                )
+                .told("/outliers"),
+                trend(ranges),
                 dash_for_none(images.join(", ")).into(),
                 if valid { "valid" } else { "invalid" }.into(),
             ],
         );
     }
     let words = format!(
-        "Limits: at least {} shots, at most {} % outliers (beyond {} robust standard deviations of the median). The bar \
-         under a value shows how much of its limit is used.",
+        "Limits: at least {} shots, at most {} % outliers (beyond {} robust σ of the median). Bars under values: share of the \
+         limit that is used.",
         limits.shots_min,
         100.0 * limits.outlier_share_max,
         limits.outlier_sigma
@@ -169,8 +174,8 @@ fn dash_for_none(text: String) -> String {
     }
 }
 
-fn trend(ranges: &ProfileRanges) -> String {
-    ranges.trend_m_s.map_or_else(
+fn trend(ranges: &ProfileRanges) -> Cell {
+    let text = ranges.trend_m_s.map_or_else(
         || "–".to_owned(),
         |trend| {
             format!(
@@ -179,7 +184,13 @@ fn trend(ranges: &ProfileRanges) -> String {
                 label(1e3 * trend.uncertainty, 2)
             )
         },
-    )
+    );
+    Cell::from(text).told("/trend_m_s/slope*1000 /trend_m_s/uncertainty*1000")
+}
+
+/// Where the products tell of a profile.
+pub(super) fn place(profile: usize) -> String {
+    format!("ranges.json#/profiles/{profile}")
 }
 
 fn three_ways(site: &SiteProducts) -> String {
@@ -198,20 +209,31 @@ fn three_ways(site: &SiteProducts) -> String {
             Column::Number("cross-track"),
         ],
     );
-    for ranges in &site.ranges.profiles {
+    for (index, ranges) in site.ranges.profiles.iter().enumerate() {
         let mean_m = ranges.mean_without_outliers_m;
         let decoding_m = ranges.decoding_without_outliers_m;
         let [radial, along, cross] =
-            [0, 1, 2].map(|axis| metres(ranges.spacecraft_m[axis].mean).into());
-        table.row(
+            [(0, "radial"), (1, "along"), (2, "cross")].map(|(at, axis)| {
+                Cell::from(metres(ranges.spacecraft_m[at].mean))
+                    .told(format!("/spacecraft_{axis}_m/mean"))
+            });
+        let mean =
+            |of: &Summary, name: &str| Cell::from(metres(of.mean)).told(format!("/{name}/mean"));
+        table.row_of(
+            &place(index),
             true,
             [
                 (&ranges.profile).into(),
-                metres(ranges.range_minus_distance_m.mean).into(),
-                Cell::Limited(metres(mean_m), mean_m.abs() / limits.mean_max_m),
-                metres(ranges.range_minus_distance_crossover_m.mean).into(),
-                metres(ranges.decoding_m.mean).into(),
-                Cell::Limited(metres(decoding_m), decoding_m.abs() / limits.decoding_max_m),
+                mean(&ranges.range_minus_distance_m, "range_minus_distance_m"),
+                Cell::Limited(metres(mean_m), mean_m.abs() / limits.mean_max_m)
+                    .told("/mean_without_outliers_m"),
+                mean(
+                    &ranges.range_minus_distance_crossover_m,
+                    "range_minus_distance_crossover_m",
+                ),
+                mean(&ranges.decoding_m, "decoding_m"),
+                Cell::Limited(metres(decoding_m), decoding_m.abs() / limits.decoding_max_m)
+                    .told("/decoding_without_outliers_m"),
                 radial,
                 along,
                 cross,
@@ -219,16 +241,16 @@ fn three_ways(site: &SiteProducts) -> String {
         );
     }
     let words = [
-        "Limits apply to the means without outliers.".to_owned(),
-        "Crossover radius: after the MOLA team's adjustment, which moves the footprint, not the range."
+        "Limits apply to means without outliers.".to_owned(),
+        "Crossover radius: the MOLA team's adjustment, which moves footprints, not ranges."
             .to_owned(),
         format!(
             "PEDR's own orbit: without kernels; beyond ±{} m the file was read wrongly.",
             limits.decoding_max_m
         ),
         format!(
-            "PEDR − kernels: the spacecraft of the file minus that of the kernels, inertial axes; beyond {} m orbit, clock or \
-             datum differ. The tabulated trajectory follows the kernels within {:.1e} m.",
+            "PEDR − kernels: spacecraft positions, inertial axes; beyond {} m orbit, clock or datum differ. Trajectory \
+             tabulated to {:.1e} m.",
             limits.orbit_max_m, site.ranges.trajectory_error_m
         ),
     ];

@@ -1,7 +1,7 @@
 //! Registration: profiles on the image plane.
 
 use super::{
-    html::{Column, Table, paragraph},
+    html::{Cell, Column, Table, paragraph},
     numbers::whole,
     plots::{COLOURS, Extent, GREY, INK, Mark, Panel, Plot, Series, Style, figure, label, thinned},
     section::Section,
@@ -39,7 +39,14 @@ fn write(site: &SiteProducts) -> Result<String> {
         planes += &figure(&plane(site.profiles, image))?;
     }
     let planes = format!("<div class=\"plots\">\n{planes}</div>\n");
-    Ok(profiles(site, &images) + &planes + &models(&images))
+    Ok(profiles(site, &images) + &planes + &models(site, &images))
+}
+
+/// Where the products tell of an image.
+pub(super) fn place(site: &SiteProducts, image: &ImageProducts) -> String {
+    let mut images = site.images.iter();
+    let index = images.position(|other| other.times.id == image.times.id);
+    format!("registration.json#/images/{}", index.unwrap_or_default())
 }
 
 /// Which profile the images show, and where.
@@ -59,6 +66,7 @@ fn profiles(site: &SiteProducts, images: &[&ImageProducts]) -> String {
     let mut elsewhere = 0;
     for image in images {
         let points = &image.registration.points;
+        let of_image = place(site, image);
         let each = site.profiles.iter().zip(&image.registration.profiles);
         for (index, (profile, on_image)) in (0_u32..).zip(each) {
             if on_image.inside == 0 {
@@ -76,18 +84,20 @@ fn profiles(site: &SiteProducts, images: &[&ImageProducts]) -> String {
             let with = |at: usize| site.images[at].times.id == image.times.id;
             let together = profile.simultaneous.iter().any(|of| with(of.image));
             let spacing = on_image.shot_spacing_lines;
-            table.row(
+            table.row_of(
+                &format!("{of_image}/profiles/{index}"),
                 true,
                 [
                     (&image.times.id).into(),
                     (&profile.id).into(),
                     if together { "yes" } else { "no" }.into(),
-                    whole(on_image.inside).into(),
+                    Cell::from(whole(on_image.inside)).told("/inside"),
                     inside(&points.line).into(),
                     inside(&points.sample).into(),
-                    spacing
-                        .map_or_else(|| "–".to_owned(), |lines| format!("{lines:.1}"))
-                        .into(),
+                    Cell::from(
+                        spacing.map_or_else(|| "–".to_owned(), |lines| format!("{lines:.1}")),
+                    )
+                    .told("/shot_spacing_lines"),
                 ],
             );
         }
@@ -99,7 +109,7 @@ fn profiles(site: &SiteProducts, images: &[&ImageProducts]) -> String {
     let mut words = Vec::new();
     if elsewhere > 0 {
         words.push(format!(
-            "Not listed: {elsewhere} combinations of profile and image without a footprint in the image."
+            "Not listed: {elsewhere} profiles without a footprint in an image."
         ));
     }
     if rejected > 0 {
@@ -167,8 +177,7 @@ fn plane(profiles: &[Profile], image: &ImageProducts) -> Plot {
         ..Panel::of("sample", series)
     };
     let words = format!(
-        "Flight to the right; edges of the delivered image dashed across, solid at its ends. {} of {} footprints lie in the \
-         image; {} near it.",
+        "Flight to the right; image dashed at its sides, solid at its ends. {} of {} footprints are inside; {} near it.",
         whole(points.inside_count()),
         whole(points.len()),
         match shown {
@@ -188,7 +197,7 @@ fn plane(profiles: &[Profile], image: &ImageProducts) -> Plot {
 }
 
 /// What the choice of the model moves.
-fn models(images: &[&ImageProducts]) -> String {
+fn models(site: &SiteProducts, images: &[&ImageProducts]) -> String {
     let mut table = Table::new(
         "Other models against the one used, footprints within the image's lines",
         &[
@@ -209,17 +218,23 @@ fn models(images: &[&ImageProducts]) -> String {
             .collect::<String>()
     };
     for image in images {
-        for other in &image.registration.models {
-            let mut cells = vec![
+        for (index, other) in image.registration.models.iter().enumerate() {
+            let mut cells: Vec<Cell> = vec![
                 (&image.times.id).into(),
                 word(image.registration.model).into(),
                 word(other.model).into(),
             ];
-            for summary in [&other.lines, &other.samples] {
-                cells.push(label(summary.mean, 4).into());
-                cells.push(label(summary.standard_deviation, 4).into());
+            for (summary, name) in [(&other.lines, "lines"), (&other.samples, "samples")] {
+                let mean = Cell::from(label(summary.mean, 4));
+                let deviation = Cell::from(label(summary.standard_deviation, 4));
+                cells.push(mean.told(format!("/{name}/mean")));
+                cells.push(deviation.told(format!("/{name}/standard_deviation")));
             }
-            table.row(true, cells);
+            table.row_of(
+                &format!("{}/models/{index}", place(site, image)),
+                true,
+                cells,
+            );
         }
     }
     table.finish()

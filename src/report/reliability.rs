@@ -33,12 +33,12 @@ pub(super) fn absolute(geometric: &GeometricProducts, adjustment: &AdjustmentPro
     let summary = &adjustment.adjusted.summary;
     let ties = &summary.ties;
     if ties.corrections_m[0].n == 0 {
-        return "No tie point took part: nothing was adjusted to anything.".to_owned();
+        return "No tie point took part.".to_owned();
     }
     let registration = if adjustment.images_agree {
-        "The relative registration is corrected"
+        "Relative registration is corrected"
     } else {
-        "The relative registration is not corrected"
+        "Relative registration is not corrected"
     };
     let means = ties
         .corrections_m
@@ -49,7 +49,7 @@ pub(super) fn absolute(geometric: &GeometricProducts, adjustment: &AdjustmentPro
         Some(heights) => {
             let [east_m, north_m, up_m] = heights.mean_sigma_m;
             format!(
-                "heights are those of MOLA, to {} m on average; the place is known to {} m east and {} m north by {}",
+                "heights follow MOLA to {} m on average; position is known to {} m east and {} m north, by {}",
                 label(up_m, 1),
                 label(east_m, 0),
                 label(north_m, 0),
@@ -57,18 +57,16 @@ pub(super) fn absolute(geometric: &GeometricProducts, adjustment: &AdjustmentPro
             )
         }
         None if summary.model == AdjustmentModel::Published => {
-            "neither heights nor place are determined: the image coordinates of footprints were computed from the very \
-             orientation that is adjusted"
+            "heights and position are not determined: image coordinates of footprints come from the orientation that is \
+             adjusted"
                 .to_owned()
         }
         None => format!(
-            "heights and place are what was known of {} beforehand",
+            "heights and position are what was known of {} beforehand",
             known_beforehand(geometric)
         ),
     };
-    format!(
-        "The tie points moved by {moved} m in X, Y, Z on average. {registration}; {determined}."
-    )
+    format!("Tie points moved by {moved} m in X, Y, Z on average. {registration}; {determined}.")
 }
 
 /// Observations of one kind along one axis.
@@ -206,15 +204,15 @@ fn per_cent(share: f64) -> String {
 
 /// Unknowns that cannot be separated.
 pub(super) fn correlations(summary: &AdjustmentSummary) -> String {
-    let mut all: Vec<_> = summary.correlated.iter().collect();
-    all.sort_by(|a, b| b.2.abs().total_cmp(&a.2.abs()));
-    let Some((first, second, largest)) = all.first() else {
+    let mut all: Vec<_> = summary.correlated.iter().enumerate().collect();
+    all.sort_by(|(_, a), (_, b)| b.2.abs().total_cmp(&a.2.abs()));
+    let Some((_, (first, second, largest))) = all.first() else {
         return paragraph("No two unknowns of the orientation correlate by more than 0.95.");
     };
     let sum = if *largest < 0.0 { "sum" } else { "difference" };
     let mut html = paragraph(&format!(
-        "{} correlate by more than 0.95, most of all {first} and {second}, by {}: only their {sum}, each over its standard deviation, \
-         is determined. Do not interpret single values of such unknowns.",
+        "{} correlate by more than 0.95, most of all {first} and {second} ({}): only their {sum}, each over its σ, is determined. \
+         Do not interpret them singly.",
         counted(all.len(), "pair") + " of unknowns",
         label(*largest, 4)
     ));
@@ -224,9 +222,13 @@ pub(super) fn correlations(summary: &AdjustmentSummary) -> String {
         Column::Text("and"),
     ];
     let mut table = Table::new("Largest correlations", columns);
-    for (first, second, coefficient) in all.iter().take(CORRELATED_SHOWN) {
-        let cells: [Cell; 3] = [label(*coefficient, 4).into(), first.into(), second.into()];
-        table.row(true, cells);
+    for (index, (first, second, coefficient)) in all.iter().take(CORRELATED_SHOWN) {
+        let coefficient = Cell::from(label(*coefficient, 4)).told("/2");
+        table.row_of(
+            &format!("adjustment.json#/adjustment/summary/correlated/{index}"),
+            true,
+            [coefficient, first.into(), second.into()],
+        );
     }
     html += &table.finish();
     html + &rest(all.len(), CORRELATED_SHOWN)

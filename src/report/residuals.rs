@@ -95,13 +95,12 @@ pub(super) fn distribution(adjusted: &Adjusted) -> Result<String> {
             .count()
     };
     let words = format!(
-        "Share of the residuals of tie points below each value, in their own standard deviations. Of {} along and {} across \
-         the track {} and {} lie beyond {}.",
-        whole(along.len()),
-        whole(across.len()),
+        "Share of tie point residuals below each value, in their own σ. Beyond {}: {} of {} along track, {} of {} across.",
+        label(BAARDA_LIMIT, 2),
         whole(beyond(&along)),
+        whole(along.len()),
         whole(beyond(&across)),
-        label(BAARDA_LIMIT, 2)
+        whole(across.len())
     );
     let panel = Panel {
         y: Extent {

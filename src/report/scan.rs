@@ -1,10 +1,10 @@
 //! What the ranges say of the MOLA clock: spread of the residuals against the assumed correction.
 
 use super::{
-    html::{Column, Table, folded, paragraph},
+    html::{Cell, Column, Table, folded, paragraph},
     numbers::{number, signed},
     plots::{COLOURS, MARK, Mark, Panel, Plot, Series, figure},
-    ranges::{many, plotted},
+    ranges::{many, place, plotted},
     section::Section,
 };
 use crate::{error::Result, products::SiteProducts, stages::check_ranges::BiasScan};
@@ -27,7 +27,7 @@ fn write(site: &SiteProducts) -> Result<String> {
         }
     }
     let words = paragraph(
-        "The correction of the time tags that minimises the spread of the residuals, with raw radii, or with those corrected by crossovers where that calms them. Nadir profiles constrain it poorly.",
+        "The time-tag correction that minimises the spread of the residuals, with raw or crossover-corrected radii, whichever spread less. Nadir profiles constrain it poorly.",
     );
     let figures = format!("<div class=\"plots\">\n{figures}</div>\n");
     if many(site) {
@@ -50,21 +50,23 @@ fn table(site: &SiteProducts) -> String {
             Column::Number("least spread scanned, m"),
         ],
     );
-    for ranges in &site.ranges.profiles {
+    for (index, ranges) in site.ranges.profiles.iter().enumerate() {
         let Some(scan) = &ranges.scan else { continue };
         let plain =
             |value: Option<f64>| value.map_or_else(|| "–".to_owned(), |seconds| number(seconds, 4));
         let with_sign =
             |value: Option<f64>| value.map_or_else(|| "–".to_owned(), |seconds| signed(seconds, 4));
         let least_m = scan.spread_m.iter().copied().fold(f64::INFINITY, f64::min);
-        table.row(
+        table.row_of(
+            &place(index),
             true,
             [
                 (&ranges.profile).into(),
                 scan.radius.word().into(),
-                with_sign(scan.best_s).into(),
-                plain(scan.uncertainty_s).into(),
-                with_sign(Some(configured_s)).into(),
+                Cell::from(with_sign(scan.best_s)).told("/bias_scan/best_s"),
+                Cell::from(plain(scan.uncertainty_s)).told("/bias_scan/uncertainty_s"),
+                Cell::from(with_sign(Some(configured_s)))
+                    .told("ranges.json#/mola_clock/correction_s"),
                 with_sign(scan.best_s.map(|best_s| best_s - configured_s)).into(),
                 format!("{least_m:.4}").into(),
             ],
@@ -96,7 +98,7 @@ fn scan_plot(site: &SiteProducts, index: usize) -> Option<Plot> {
         colour: MARK,
     });
     let caption = format!(
-        "{}. Red: the configured {} s. Blue: the best correction with its uncertainty.",
+        "{} (blue); configured: {} s (red).",
         best(scan),
         signed(configured_s, 3)
     );

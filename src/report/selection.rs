@@ -1,9 +1,10 @@
 //! Windows and filters, and what they rejected.
 
 use super::{
-    html::{Column, Table, paragraph},
+    html::{Cell, Column, Table, paragraph},
     numbers::whole,
     section::Section,
+    source::member,
 };
 use crate::{
     body::Body,
@@ -59,7 +60,7 @@ fn filter(site: &SiteProducts) -> String {
     let filter = &site.config.pedr.filter;
     let join = |values: Vec<String>| values.join(" or ");
     format!(
-        "Shots are kept with class {}, trigger channel {}, attitude flag {} and an off-nadir angle of at most {:.1}°.",
+        "Kept: class {}, trigger channel {}, attitude flag {}, at most {:.1}° off nadir.",
         join(filter.classes.iter().map(ToString::to_string).collect()),
         join(filter.channels.iter().map(ToString::to_string).collect()),
         join(
@@ -93,7 +94,8 @@ fn rejects(site: &SiteProducts) -> String {
             true,
             [
                 reason.into(),
-                whole(*shots).into(),
+                Cell::from(whole(*shots))
+                    .told(format!("manifest.json#/rejected/{}", member(reason))),
                 format!("{share:.1} %").into(),
             ],
         );

@@ -1,8 +1,10 @@
 //! The page over all sites of an output folder.
 
+use chrono::{DateTime, FixedOffset};
+
 use super::{
     fidelity::FIDELITY_FILE,
-    html::{Cell, Column, Table, Tone, escape, link, page, paragraph, verdict},
+    html::{Cell, Column, Table, Tone, counted, escape, link, page, paragraph, verdict},
     numbers::{number, whole},
     sites_map::{self, Place},
 };
@@ -120,13 +122,37 @@ fn table(sites: &[SiteLine]) -> String {
             Column::Text("published (UTC)"),
         ],
     );
+    let published = sites.iter().filter_map(|site| site.products.as_ref());
+    let newest = published.filter_map(SiteSummary::finished).max();
     for site in sites {
-        table.row(tone(site) != Tone::Bad, cells(site));
+        let place = format!("{}/manifest.json#", site.folder);
+        table.row_of(&place, tone(site) != Tone::Bad, cells(site, newest));
     }
     table.finish()
 }
 
-fn cells(site: &SiteLine) -> Vec<Cell> {
+impl SiteSummary {
+    fn finished(&self) -> Option<DateTime<FixedOffset>> {
+        DateTime::parse_from_rfc3339(&self.finished_utc).ok()
+    }
+
+    /// How much older the products are than the newest ones of all sites.
+    fn age(&self, newest: Option<DateTime<FixedOffset>>) -> String {
+        let older = newest
+            .zip(self.finished())
+            .map(|(newest, own)| newest - own);
+        older.map_or_else(String::new, |older| {
+            match (older.num_days(), older.num_hours(), older.num_minutes()) {
+                (0, 0, 0) => "newest".to_owned(),
+                (0, 0, minutes) => format!("{minutes} min before the newest"),
+                (0, hours, _) => format!("{hours} h before the newest"),
+                (days, ..) => format!("{} before the newest", counted(days as usize, "day")),
+            }
+        })
+    }
+}
+
+fn cells(site: &SiteLine, newest: Option<DateTime<FixedOffset>>) -> Vec<Cell> {
     let told = |word: &str, why: &str| {
         let why = if why.is_empty() {
             String::new()
@@ -156,25 +182,42 @@ fn cells(site: &SiteLine) -> Vec<Cell> {
         )),
         told(word, &why),
     ];
-    cells.extend(summary.counts.map(|count| whole(count).into()));
-    cells.push(moved(summary.height_off_m));
-    cells.push(moved(summary.images_apart_m));
+    let counts = summary
+        .counts
+        .into_iter()
+        .zip(["footprints", "profiles", "images"]);
+    cells.extend(
+        counts.map(|(count, name)| Cell::from(whole(count)).told(format!("/counts/{name}"))),
+    );
+    cells.push(moved(summary.height_off_m, "height_off_surface_m"));
+    cells.push(moved(summary.images_apart_m, "along_track_parallax_m"));
     let range_mean_m = summary.range_mean_m.map(|mean_m| number(mean_m, 2));
-    cells.push(range_mean_m.unwrap_or_else(dash).into());
+    let range_mean_m = Cell::from(range_mean_m.unwrap_or_else(dash));
+    cells.push(range_mean_m.told("/figures/range_mean_m"));
     cells.push(Cell::Html(format!(
-        "{}<br><small>areograph {}</small>",
+        "{}<br><small>{}, areograph {}</small>",
         escape(&summary.finished_utc.replace('T', " ").replace('Z', "")),
+        summary.age(newest),
         escape(&summary.version)
     )));
     cells
 }
 
 /// A figure before and after the adjustment, with a dash where there is none.
-fn moved([before, after]: [Option<f64>; 2]) -> Cell {
+fn moved([before, after]: [Option<f64>; 2], name: &str) -> Cell {
     let text = |value: Option<f64>| value.map_or_else(dash, |value| number(value, 1));
+    let both = Cell::from(match (before, after) {
+        (None, None) => dash(),
+        _ => format!("{} → {}", text(before), text(after)),
+    });
+    let [before_place, after_place] = [
+        format!("/figures/{name}"),
+        format!("/figures/adjusted_{name}"),
+    ];
     match (before, after) {
-        (None, None) => dash().into(),
-        _ => format!("{} → {}", text(before), text(after)).into(),
+        (Some(_), Some(_)) => both.told(format!("{before_place} {after_place}")),
+        (Some(_), None) => both.told(before_place),
+        (None, _) => both.told(after_place),
     }
 }
 
@@ -238,6 +281,12 @@ mod tests {
         assert!(page.contains("href=\"good/report/index.html\""));
         assert!(page.contains("<small>a &lt;kernel&gt; is gone</small>"));
         assert!(page.contains("261.2 → 0.0"));
+        // All of the three ran at the same time; an older one says so.
+        assert_eq!(page.matches("newest, areograph 1").count(), 3);
+        let mut older = summary("valid", &[]);
+        older.finished_utc = "2025-12-29T21:00:00Z".to_owned();
+        let newest = summary("valid", &[]).finished();
+        assert_eq!(older.age(newest), "2 days before the newest");
         // Of the three with products, on the map too.
         let map = page
             .split("<svg")
@@ -251,6 +300,6 @@ mod tests {
                 .iter()
                 .all(|name| map.contains(name))
         );
-        assert_eq!(page.matches("<tr class=\"invalid\">").count(), 3);
+        assert_eq!(page.matches("<tr class=\"invalid\"").count(), 3);
     }
 }

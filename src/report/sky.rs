@@ -88,7 +88,7 @@ fn azimuth_rad(ground_m: &Vector3<f64>, camera_m: &Vector3<f64>) -> f64 {
 
 fn words(site: &SiteProducts, images: usize) -> String {
     let mut words = format!(
-        "{} as seen from the ground at their middle, north up, zenith at the centre.",
+        "{} seen from the ground at their middle; zenith at the centre.",
         counted(images, "image")
     );
     let Some(geometric) = &site.geometric else {

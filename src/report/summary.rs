@@ -5,7 +5,9 @@ use super::{
     heights::{absolute, place_by},
     html::{Tone, counted, escape, list, paragraph, verdict},
     map,
-    numbers::{number, signed, whole},
+    misregistration::BeforeAfter,
+    numbers::{number, signed, whole, with_minus},
+    source::told,
 };
 use crate::{
     error::Result,
@@ -74,25 +76,30 @@ fn about(site: &SiteProducts) -> String {
     };
     if !site.images.is_empty() {
         let taken = days(&mut site.images.iter().map(|image| &*image.times.utc_start));
-        parts.push(counted(site.images.len(), "image") + &taken);
+        let images = counted(site.images.len(), "image");
+        parts.push(told(&images, "manifest.json#/counts/images") + &escape(&taken));
     }
     let shot = days(&mut site.utc.iter().map(String::as_str));
+    let footprints = counted(site.footprints.len(), "footprint");
+    let profiles = counted(site.profiles.len(), "profile");
     parts.push(format!(
-        "{} in {}{shot}",
-        counted(site.footprints.len(), "footprint"),
-        counted(site.profiles.len(), "profile")
+        "{} in {}{}",
+        told(&footprints, "manifest.json#/counts/footprints"),
+        told(&profiles, "manifest.json#/counts/profiles"),
+        escape(&shot)
     ));
     let mut words = escape(site.config.description.trim_end_matches('.'));
     if !words.is_empty() {
         words += ". ";
     }
-    words += &escape(&(parts.join("; ") + "."));
+    words += &(parts.join("; ") + ".");
     format!("<p class=\"about\">{words}</p>\n")
 }
 
 /// A number that matters: what it is, its value, and what to know of it.
 struct KeyNumber {
     what: &'static str,
+    /// As HTML, like the note.
     value: String,
     note: String,
 }
@@ -118,34 +125,37 @@ fn numbers(site: &SiteProducts) -> String {
             format!(
                 "<div><dt>{}</dt><dd><b>{}</b> {}</dd></div>\n",
                 escape(number.what),
-                escape(&number.value),
-                escape(&number.note)
+                number.value,
+                number.note
             )
         })
         .collect();
     format!("<dl class=\"numbers\">\n{items}</dl>\n")
 }
 
-/// The number of a check, if it has one.
-fn checked<'a>(site: &SiteProducts<'a>, kind: CheckKind) -> Option<(&'a Check, f64)> {
-    let check = site
-        .verdict
-        .checks
-        .iter()
-        .find(|check| check.kind == kind)?;
-    Some((check, check.value?))
+/// A check with its number, if it has one, and where the products have that.
+fn checked<'a>(site: &SiteProducts<'a>, kind: CheckKind) -> Option<(&'a Check, f64, String)> {
+    let mut checks = site.verdict.checks.iter().enumerate();
+    let (index, check) = checks.find(|(_, check)| check.kind == kind)?;
+    Some((
+        check,
+        check.value?,
+        format!("{}/value", checks::place(index)),
+    ))
 }
 
 fn by_mola(site: &SiteProducts) -> Option<KeyNumber> {
-    let (_, after_m) = checked(site, CheckKind::HeightAfter)?;
-    let (_, before_m) = checked(site, CheckKind::HeightBefore)?;
+    let (_, after_m, after_place) = checked(site, CheckKind::HeightAfter)?;
+    let (_, before_m, before_place) = checked(site, CheckKind::HeightBefore)?;
     let (geometric, adjustment) = site.adjustment()?;
+    let of = |state| format!("adjustment.json#/{state}/heights/above_surface_m/n");
     let ties = counted(adjustment.heights.above_m.n as usize, "tie point");
-    let all = whole(geometric.heights.above_m.n);
-    let before_m = signed(before_m, 1);
+    let ties = told(&ties, &of("after"));
+    let all = told(&whole(geometric.heights.above_m.n), &of("before"));
+    let before_m = told(&signed(before_m, 1), &before_place);
     Some(KeyNumber {
         what: "Heights against MOLA",
-        value: format!("{} m", signed(after_m, 1)),
+        value: told(&format!("{} m", signed(after_m, 1)), &after_place),
         // What controls a result cannot judge it: then only the number before does.
         note: match site.config.adjustment.model {
             AdjustmentModel::MolaSurface => format!(
@@ -159,23 +169,31 @@ fn by_mola(site: &SiteProducts) -> Option<KeyNumber> {
 }
 
 fn between_images(site: &SiteProducts) -> Option<KeyNumber> {
-    let (after, after_m) = checked(site, CheckKind::ParallaxAfter)?;
+    let (after, after_m, place) = checked(site, CheckKind::ParallaxAfter)?;
     let (geometric, _) = site.adjustment()?;
-    let mut pairs = geometric.pairs.iter();
-    let before = pairs.find(|pair| pair.images.join(" and ") == after.subject)?;
+    let pairs = BeforeAfter::all(&geometric);
+    let pair = pairs.iter().find(|pair| pair.name() == after.subject)?;
+    let before_m = pair.before.along_track_parallax_m.abs();
+    let before_place = format!("|{}/along_track_parallax_m", pair.place("before"));
     Some(KeyNumber {
         what: "Between images, along track",
-        value: format!(
-            "{} m",
-            number(after_m.abs(), if after_m.abs() < 1.0 { 2 } else { 1 })
+        value: told(
+            &format!(
+                "{} m",
+                number(after_m.abs(), if after_m.abs() < 1.0 { 2 } else { 1 })
+            ),
+            &format!("|{place}"),
         ),
         note: format!(
             "at the tie points of {}; {} m before",
-            after.subject,
-            number(before.along_track_parallax_m.abs(), 0)
+            escape(&after.subject),
+            told(&number(before_m, 0), &before_place)
         ),
     })
 }
+
+/// Where the products tell of heights.
+const HEIGHTS: &str = "adjustment.json#/adjustment/heights";
 
 /// What is known of the absolute place and height.
 fn in_place(site: &SiteProducts) -> Option<KeyNumber> {
@@ -185,34 +203,41 @@ fn in_place(site: &SiteProducts) -> Option<KeyNumber> {
     let [_, place] = absolute(&geometric, &adjustment);
     Some(KeyNumber {
         what: "Absolute accuracy, 1 σ",
-        value: format!(
-            "±{} m plan, ±{} m height",
-            number(east_m.max(north_m), 0),
-            number(up_m, 1)
+        value: told(
+            &format!(
+                "±{} m plan, ±{} m height",
+                number(east_m.max(north_m), 0),
+                number(up_m, 1)
+            ),
+            &format!(
+                "{HEIGHTS}/mean_sigma_m/{} {HEIGHTS}/mean_sigma_m/2",
+                usize::from(north_m > east_m)
+            ),
         ),
         note: if place.contains(';') {
-            format!(
+            escape(&format!(
                 "by {}; see accuracy for what is open",
                 place_by(&geometric, &adjustment)
-            )
+            ))
         } else {
-            format!(
+            escape(&format!(
                 "plan by {}, height by MOLA",
                 place_by(&geometric, &adjustment)
-            )
+            ))
         },
     })
 }
 
 /// Ranges, where there are profiles.
 fn by_ranges(site: &SiteProducts) -> Option<KeyNumber> {
-    let (check, mean_m) = checked(site, CheckKind::RangeMean)?;
+    let (check, mean_m, place) = checked(site, CheckKind::RangeMean)?;
+    let profile = escape(&check.subject);
     Some(KeyNumber {
         what: "Range − distance",
-        value: format!("{} m", signed(mean_m, 2)),
+        value: told(&format!("{} m", signed(mean_m, 2)), &place),
         note: match site.profiles.len() {
-            1 => format!("mean of profile {}", check.subject),
-            count => format!("largest mean of {count} profiles, {}", check.subject),
+            1 => format!("mean of profile {profile}"),
+            count => format!("largest mean of {count} profiles, {profile}"),
         },
     })
 }
@@ -220,7 +245,7 @@ fn by_ranges(site: &SiteProducts) -> Option<KeyNumber> {
 /// As many sentences as leave the verdict on one screen; the manifest has all.
 fn first_of(sentences: &[String]) -> String {
     let shown = &sentences[..sentences.len().min(REASONS_SHOWN)];
-    let mut html = list(shown);
+    let mut html = list(&shown.iter().map(|of| with_minus(of)).collect::<Vec<_>>());
     if shown.len() < sentences.len() {
         let more = sentences.len() - shown.len();
         html += &paragraph(&format!(

@@ -29,12 +29,10 @@ fn supported<'a>(
 fn write(site: &SiteProducts) -> String {
     let ids: Vec<&str> = supported(site).map(|(times, _)| &*times.id).collect();
     let words = format!(
-        "Camera, line times and orientation of {} are those of image support data (Community Sensor Model), as ALE writes \
-         them. Nothing is applied to them: neither pointing (CK) bias nor clock correction nor light time, and no kernel of \
-         orbit or attitude is read. Positions are what the program that wrote the file made them; ALE's are mostly seen from \
-         the centre of the body with light time and aberration, hundreds of metres off. Ranges of shots are therefore not used with \
-         these images, nor is the mounting of the laser. Adjusted, these \
-         images have adjusted_isd.json and no adjusted SPICE kernels, since there are none that these could follow.",
+        "Camera, line times and orientation of {} come from image support data (CSM, as ALE writes them). Nothing is applied \
+         to them: no pointing (CK) bias, clock correction or light time, no kernel of orbit or attitude. Positions by ALE mostly \
+         contain light time and aberration and are hundreds of metres off, so neither ranges of shots nor the laser's mounting are \
+         used with these images. Adjusted, they have adjusted_isd.json and no SPICE kernels.",
         ids.join(", ")
     );
     let mut table = Table::new(
@@ -49,9 +47,9 @@ fn write(site: &SiteProducts) -> String {
             Column::Number("line off the boresight, px"),
             Column::Text("distortion"),
             Column::Number("positions"),
-            Column::Number("s apart"),
+            Column::Number("every, s"),
             Column::Number("attitudes"),
-            Column::Number("s apart"),
+            Column::Number("every, s"),
             Column::Number("s before the first line"),
             Column::Number("s after the last"),
         ],

@@ -127,7 +127,7 @@ fn picture(site: &SiteProducts, stretch: Interval) -> Result<String> {
     let svg = drawn(height, |area| draw(&rows, stretch, area))?;
     let gaps: Vec<Interval> = rows.iter().filter(|row| row.sum).flat_map(gaps).collect();
     let mut words = format!(
-        "{:.1} s from {} (ephemeris time {:.3} s).",
+        "{:.1} s from {} (ET {:.3} s).",
         stretch.duration_s(),
         calendar(stretch.start),
         stretch.start.seconds()
@@ -143,7 +143,7 @@ fn picture(site: &SiteProducts, stretch: Interval) -> Result<String> {
     };
     let keys = [
         Key::colour("covered", HELD),
-        Key::colour("requested by the site, with its margin", ASKED),
+        Key::colour("requested, with margin", ASKED),
         Key::mark("requested but not covered"),
     ];
     let title = format!("Kernels at {}", calendar(stretch.start));

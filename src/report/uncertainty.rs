@@ -23,9 +23,8 @@ pub(super) const SECTION: Section = Section {
 
 fn write(geometric: &GeometricProducts) -> String {
     let pairs = BeforeAfter::all(geometric);
-    let explained = "D = √(M² + σ²) of the reprojection residuals; the whole taken as one MOLA spacing, before the adjustment only. \
-                     Across track the paper averages where its eq. 7 has the root of the sum of squares: both are given. Agreement \
-                     of two images, not accuracy.";
+    let explained = "D = √(M² + σ²) of the reprojection residuals; the whole is one MOLA spacing. Across track the paper averages where \
+                     its eq. 7 adds squares: both are given. Agreement of two images, not accuracy.";
     budgets(&pairs) + &pairs.iter().map(without_budget).collect::<String>() + &paragraph(explained)
 }
 
@@ -48,7 +47,8 @@ fn budgets(pairs: &[BeforeAfter]) -> String {
         for (state, found) in pair.states() {
             if let Ok(budget) = &found.budget {
                 let head = [Cell::from(pair.name()), state.into()];
-                table.row(true, head.into_iter().chain(cells(budget, before)));
+                let cells = head.into_iter().chain(cells(budget, before));
+                table.row_of(&pair.place(state), true, cells);
             }
             before = false;
         }
@@ -60,23 +60,29 @@ fn budgets(pairs: &[BeforeAfter]) -> String {
 fn cells(budget: &UncertaintyBudget, before: bool) -> [Cell; 6] {
     let footprints = match budget.ground {
         _ if !before => "–".into(),
-        GroundPart::Resolved { along_px } => label(along_px, 2).into(),
+        GroundPart::Resolved { along_px } => {
+            Cell::from(label(along_px, 2)).told("/budget/ground/resolved/along_px")
+        }
         GroundPart::NotResolvable => {
             "not resolvable: orientation explains more than a spacing".into()
         }
     };
+    let of = |value: f64, name: &str| Cell::from(label(value, 2)).told(format!("/budget/{name}"));
     let spacing = if before {
-        label(budget.total_along_px, 2)
+        of(budget.total_along_px, "total_along_px")
     } else {
-        "–".to_owned()
+        "–".into()
     };
     [
-        spacing.into(),
-        label(budget.along_px, 2).into(),
+        spacing,
+        of(budget.along_px, "along_px"),
         footprints,
-        label(budget.paper_average.planimetric_m, 2).into(),
-        label(budget.paper_average.height_m, 2).into(),
-        label(budget.equation_7.height_m, 2).into(),
+        of(
+            budget.paper_average.planimetric_m,
+            "paper_average/planimetric_m",
+        ),
+        of(budget.paper_average.height_m, "paper_average/height_m"),
+        of(budget.equation_7.height_m, "equation_7/height_m"),
     ]
 }
 

@@ -116,6 +116,17 @@ impl Cspice {
         Err(error)
     }
 
+    /// `tkvrsn_c`: the version of the toolkit, for example `CSPICE_N0067`.
+    pub(super) fn version(&self) -> Called<String> {
+        // SAFETY: the lock is held; the argument is static and only read, the answer a static, zero-ended text.
+        let version = unsafe {
+            let text = naif::tkvrsn_c(c"TOOLKIT".as_ptr().cast_mut());
+            (!text.is_null()).then(|| CStr::from_ptr(text).to_string_lossy().into_owned())
+        };
+        self.check("tkvrsn_c")?;
+        Ok(version.unwrap_or_default())
+    }
+
     /// `furnsh_c`: loads one kernel.
     pub(super) fn furnish(&self, path: &Path) -> Called<()> {
         let path = c_path(path)?;

@@ -98,6 +98,14 @@ impl Session {
         })
     }
 
+    /// The version of CSPICE, for example `CSPICE_N0067`.
+    ///
+    /// # Errors
+    /// [`SpiceError::SessionOpen`] on a thread that holds a session.
+    pub fn version_of_cspice() -> Result<String> {
+        Ok(Cspice::lock()?.version()?)
+    }
+
     /// The kernels of this session.
     #[must_use]
     pub const fn kernels(&self) -> &KernelSet {

@@ -15,7 +15,7 @@ pub use inputs::{InOrder, Input, Inputs};
 pub use output::{Output, Provenance};
 pub use reason::Reason;
 
-use crate::error::Result;
+use crate::{error::Result, watch::Watch};
 
 /// Whether a stage works on the orientation of the kernels or on the adjusted one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -91,6 +91,14 @@ pub trait Stage {
     /// # Errors
     /// What the stage's own documentation says; [`Stopped`](crate::error::Stopped).
     fn run(&self, stop: &AtomicBool) -> Result<Self::Output>;
+
+    /// The same, with the steps of long loops counted; of a stage that counts none as without.
+    ///
+    /// # Errors
+    /// As [`Stage::run`].
+    fn run_watched(&self, watch: Watch<'_>) -> Result<Self::Output> {
+        self.run(watch.stop())
+    }
 
     /// What `check` finds in the inputs without running the stage: every finding and every failure.
     fn examine(&self) -> Vec<Result<String>> {

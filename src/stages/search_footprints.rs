@@ -18,7 +18,7 @@ pub use crate::pds::archive::ShotRejection;
 use crate::{
     altimetry::DatumChoice,
     config::{PedrConfig, WindowConfig},
-    error::{Cause, Error, Kind, Locate, Result, Stopped},
+    error::{Cause, Error, Kind, Locate, Result},
     files::{HashedFile, file_name},
     footprints::{AsRead, Footprints, SourceFile},
     geom::window::Region,
@@ -28,6 +28,7 @@ use crate::{
     },
     stage::{InOrder, Input, Inputs, Stage},
     stage_inputs,
+    watch::Watch,
 };
 
 /// Complaints kept with their text; all are counted.
@@ -110,6 +111,10 @@ impl Stage for SearchFootprints<'_> {
     stage_inputs!(fingerprint);
 
     fn run(&self, stop: &AtomicBool) -> Result<SearchResult> {
+        self.run_watched(stop.into())
+    }
+
+    fn run_watched(&self, watch: Watch<'_>) -> Result<SearchResult> {
         let (files, correction_s) = (self.files.0, *self.clock_correction_s);
         search_footprints(
             self.pedr,
@@ -117,7 +122,7 @@ impl Stage for SearchFootprints<'_> {
             self.index.0,
             self.windows.value()?,
             correction_s,
-            stop,
+            watch,
         )
     }
 
@@ -153,31 +158,33 @@ fn examine_file(path: &Path, choice: DatumChoice) -> Result<String> {
 ///
 /// Every shot is judged by its own position, in IAU 2000 at its time tag. `correction_s` is added to
 /// tags to give `et_s`. The result depends neither on the number of threads nor on `indexes`. A file with the bytes of
-/// an earlier one is not read again; a note says so. `stop` is looked at before every piece of a file.
+/// an earlier one is not read again; a note says so. `watch` is looked at before every piece of a file, and counts
+/// records.
 ///
 /// # Errors
 /// A file that cannot be opened, holds no good record, changes while it is read, or whose datum cannot be told;
-/// two files that hold the same shot in a window; [`Stopped`]. Anything else wrong inside a file is a complaint; its
+/// two files that hold the same shot in a window; [`Stopped`](crate::error::Stopped). Anything else wrong inside a file is a complaint; its
 /// good records are kept.
-pub fn search_footprints(
+pub fn search_footprints<'a>(
     pedr: &PedrConfig,
     files: &[HashedFile],
     indexes: &Indexes,
     windows: &[WindowConfig],
     correction_s: f64,
-    stop: &AtomicBool,
+    watch: impl Into<Watch<'a>>,
 ) -> Result<SearchResult> {
+    let watch = watch.into();
     if files.len() > usize::from(u16::MAX) {
         return Err(TooManyFiles(files.len())).in_stage(STAGE);
     }
     let opened: Vec<Result<Source>> = files
         .par_iter()
         .map(|file| {
-            Stopped::check(stop)?;
+            watch.check()?;
             Source::open(&file.path, pedr.datum, indexes)
         })
         .collect();
-    let mut gathered = Gathered::default();
+    let mut gathered = Gathered::new(watch);
     let mut sources = Vec::with_capacity(files.len());
     // In the order of the files, so that of several failures it is always the same one that is told.
     for (opened, file) in opened.into_iter().zip(files) {
@@ -188,14 +195,16 @@ pub fn search_footprints(
     }
     let regions = windows.iter().map(|window| Region::new(&window.shape));
     let query = Query::new(regions.collect(), &pedr.filter, Judged::All).corrected(correction_s);
-    search(&sources, &query, stop, &mut gathered).in_stage(STAGE)?;
+    watch.expect(sources.iter().map(Source::records).sum());
+    search(&sources, &query, watch.stop(), &mut gathered).in_stage(STAGE)?;
     let paths: Vec<PathBuf> = files.iter().map(|file| file.path.clone()).collect();
     require_distinct(&gathered.result.footprints, &paths).in_stage(STAGE)?;
     Ok(gathered.finish())
 }
 
 /// What the search of all files gives.
-struct Gathered {
+struct Gathered<'a> {
+    watch: Watch<'a>,
     result: SearchResult,
     files: Vec<SourceFile>,
     /// Which files are searched: others are copies.
@@ -205,9 +214,10 @@ struct Gathered {
     copy_notes: Vec<String>,
 }
 
-impl Default for Gathered {
-    fn default() -> Self {
+impl<'a> Gathered<'a> {
+    fn new(watch: Watch<'a>) -> Self {
         Self {
+            watch,
             result: SearchResult {
                 footprints: Footprints::new(Vec::new()),
                 complaints: Vec::new(),
@@ -226,7 +236,7 @@ impl Default for Gathered {
     }
 }
 
-impl Gathered {
+impl Gathered<'_> {
     /// Notes the next file; whether it is to be searched, being no copy of an earlier one.
     fn enlist(&mut self, source: &Source, file: &HashedFile) -> bool {
         let index = self.files.len();
@@ -266,7 +276,7 @@ impl Gathered {
     }
 }
 
-impl Sink for Gathered {
+impl Sink for Gathered<'_> {
     fn found(&mut self, file: usize, mut found: Found) -> Result<()> {
         let result = &mut self.result;
         found.footprints.file.fill(self.searched[file]);
@@ -282,6 +292,7 @@ impl Sink for Gathered {
             *result.rejected.entry(reason).or_default() += count;
         }
         result.frames_read += found.frames_read;
+        self.watch.step(found.frames_read, "records");
         result.shots_read += found.shots_read;
         Ok(())
     }

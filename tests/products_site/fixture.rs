@@ -22,7 +22,7 @@ use areograph::{
     },
     kernel_source::{KernelList, KernelSource},
     line_times::LineTimes,
-    products::{ImageProducts, SiteProducts},
+    products::{ImageProducts, Program, SiteProducts},
     spice::RequiredCoverage,
     stages::{
         check_ranges::{BiasScan, ProfileRanges, RangeCheck, ScannedRadius, ShotResiduals},
@@ -204,6 +204,10 @@ impl Site {
             geometric: None,
             overlays: None,
             conversions: &self.conversions,
+            program: &Program {
+                cspice: "CSPICE_N0067".to_owned(),
+                methods: vec![("search_footprints".to_owned(), 2)],
+            },
         })
     }
 }

@@ -29,11 +29,11 @@ pub(crate) fn table(page: &str, caption: &str) -> Vec<Vec<String>> {
 }
 
 /// What stands between the tags.
-fn text(html: &str) -> String {
-    let outside = html.split('<').map(|part| part.split_once('>'));
-    outside
-        .map(|part| part.map_or("", |(_, text)| text))
-        .collect()
+pub(crate) fn text(html: &str) -> String {
+    let (before, tags) = html.split_at(html.find('<').unwrap_or(html.len()));
+    let outside = tags.split('<').map(|part| part.split_once('>'));
+    let outside = outside.map(|part| part.map_or("", |(_, text)| text));
+    [before].into_iter().chain(outside).collect()
 }
 
 /// A number of a page, whose minus is a proper one.

@@ -4,7 +4,7 @@ use std::{collections::BTreeMap, fs, path::Path};
 
 use areograph::{
     config::{SiteConfig, load},
-    products::{AdjustmentProducts, GeometricProducts, ImageProducts, SiteProducts},
+    products::{AdjustmentProducts, GeometricProducts, ImageProducts, Program, SiteProducts},
     report,
     spice::{KernelSet, RequiredCoverage},
     stages::{
@@ -145,6 +145,7 @@ impl Site {
             notes: &[],
             verdict: &verdict,
             overlays: None,
+            program: &Program::default(),
             geometric: Some(GeometricProducts {
                 ties: &self.ties,
                 intersected: &self.intersected,

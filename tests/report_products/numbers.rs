@@ -12,7 +12,7 @@ use serde_json::Value;
 use super::{
     common::json,
     gusev,
-    page::{lead, table},
+    page::{lead, table, text},
 };
 
 /// The page of the site.
@@ -65,7 +65,7 @@ fn median(values: &[f64]) -> f64 {
 }
 
 /// The numbers of a text with their decimals; those that are part of a word are none.
-fn numbers(text: &str) -> Vec<(f64, i32)> {
+pub(crate) fn numbers(text: &str) -> Vec<(f64, i32)> {
     let text = text.replace('\u{202f}', "").replace('−', "-");
     let words = text.split(|letter: char| letter.is_whitespace() || "±()/;,".contains(letter));
     let numbers = words.filter_map(|word| {
@@ -106,10 +106,7 @@ fn key_number(page: &str, what: &str) -> (String, String) {
         .nth(1)
         .unwrap();
     let (value, rest) = start.split_once("</b>").unwrap();
-    (
-        value.to_owned(),
-        rest.split("</dd>").next().unwrap().to_owned(),
-    )
+    (text(value), text(rest.split("</dd>").next().unwrap()))
 }
 
 #[test]
@@ -117,7 +114,7 @@ fn the_first_screen_says_what_the_products_hold() {
     let page = page();
     let (manifest, adjustment) = (document("manifest.json"), document("adjustment.json"));
     let about = lead(&page).split("<p class=\"about\">").nth(1).unwrap();
-    let about = about.split("</p>").next().unwrap();
+    let about = text(about.split("</p>").next().unwrap());
     for (words, count) in [
         ("images", "images"),
         ("footprints in", "footprints"),

@@ -12,7 +12,7 @@ use serde_json::json;
 
 use crate::{
     altimetry::{BiasScope, MolaClock, TagSign},
-    cli::{output, stop::Signals},
+    cli::{output, progress::duration, stop::Signals},
     config::usual_altimeter,
     error::{Cause, Error, Kind},
     flow::{ArchiveOutcome, ArchiveProgress, ArchiveRequest, check_archive},
@@ -244,20 +244,6 @@ fn words(progress: &ArchiveProgress, taken: Duration) -> String {
     )
 }
 
-#[allow(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "a positive number of seconds"
-)]
-fn duration(seconds: f64) -> String {
-    let whole = seconds.round() as u64;
-    match (whole / 3600, whole / 60 % 60, whole % 60) {
-        (0, 0, seconds) => format!("{seconds} s"),
-        (0, minutes, seconds) => format!("{minutes} min {seconds:02} s"),
-        (hours, minutes, _) => format!("{hours} h {minutes:02} min"),
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -276,7 +262,5 @@ mod tests {
             words(&progress, Duration::from_secs(2)),
             "pedr qa: 3 of 9 files (1 from before), 5.0 million shots, 2.5 million a second, 6 s left"
         );
-        assert_eq!(duration(3_725.0), "1 h 02 min");
-        assert_eq!(duration(61.0), "1 min 01 s");
     }
 }

@@ -6,6 +6,7 @@ mod columns;
 mod documents;
 mod footprints;
 mod orientation;
+mod ties;
 
 pub use documents::{
     AngleModel, ImageDocument, LengthModel, OrientationModel, ProfileDocument, RangesDocument,
@@ -13,6 +14,7 @@ pub use documents::{
 };
 pub use footprints::{FootprintRows, read_footprints};
 pub use orientation::{SampleRow, read_samples};
+pub use ties::read_adjusted_ties;
 
 use crate::error::{Cause, Kind};
 

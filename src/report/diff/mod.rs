@@ -2,6 +2,7 @@
 
 mod checks;
 mod inputs;
+mod map;
 mod movement;
 
 use super::html::{self, Section, Tone, heading, list, paragraph};
@@ -25,7 +26,7 @@ pub fn difference_page(sites: &[&RunDifference], not_compared: &[String]) -> Res
         of_each("Movement", sites, |site| {
             let moved = matches!(site.outcome, Outcome::Moved | Outcome::BeyondLimit);
             Ok(if moved {
-                movement::tables(site)
+                movement::tables(site) + &map::figure_of(site)?
             } else {
                 String::new()
             })

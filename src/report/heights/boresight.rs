@@ -35,14 +35,13 @@ fn words(found: &BoresightSummary) -> String {
     };
     let farthest = found.farthest.as_ref().map(|(unknown, sigmas)| {
         format!(
-            " Farthest from what was known is the {unknown}: {} standard deviations of the contradiction.",
+            " Largest contradiction: the {unknown}, {} σ.",
             label(*sigmas, 1)
         )
     });
     paragraph(&format!(
-        "Camera and laser are on one bus: in an image that was exposed during a profile the mounting has each shot, whatever the \
-         attitude was (adjustment.common_bus). The laser points {} towards X of the bus and {} towards Y from where mounting and \
-         altimeter file have it.{}",
+        "Camera and laser share a bus: in a simultaneous image the mounting places each shot, whatever the attitude \
+         (adjustment.common_bus). The laser points {} towards X and {} towards Y of the bus from its nominal direction.{}",
         angle(0),
         angle(1),
         farthest.unwrap_or_default()

@@ -3,7 +3,7 @@
 use super::super::plots::{Extent, Panel, Plot, Series, Style, label, thinned};
 use crate::{
     geom::{ellipsoid::local_axes, statistics::Summary},
-    products::{GeometricProducts, SiteProducts},
+    products::GeometricProducts,
     stages::check_heights::{HeightCheck, TieHeight},
     units::METRES_PER_KM,
 };
@@ -18,7 +18,7 @@ const BEFORE: usize = 1;
 const AFTER: usize = 0;
 
 /// Heights above the ellipsoid, and below them above the surface.
-pub(super) fn plot(site: &SiteProducts, geometric: &GeometricProducts) -> Plot {
+pub(super) fn plot(geometric: &GeometricProducts) -> Plot {
     let after = geometric.adjustment.map(|of| of.heights);
     // What is drawn of the surface stands under the points that are controlled by it.
     let latest = after.unwrap_or(geometric.heights);
@@ -66,12 +66,7 @@ pub(super) fn plot(site: &SiteProducts, geometric: &GeometricProducts) -> Plot {
         },
     ];
     let title = "Heights of tie points and of the MOLA surface".to_owned();
-    Plot::of(
-        title,
-        words(site, geometric),
-        "north of the middle, km",
-        panels,
-    )
+    Plot::of(title, words(geometric), "north of the middle, km", panels)
 }
 
 /// An axis for all but the outermost values, which are drawn at its edge.
@@ -85,7 +80,7 @@ fn without_extremes(series: &[Series]) -> Extent {
     Extent::of(values[outermost..values.len() - outermost].iter().copied())
 }
 
-fn words(site: &SiteProducts, geometric: &GeometricProducts) -> String {
+fn words(geometric: &GeometricProducts) -> String {
     let after = geometric.adjustment.map(|of| of.heights);
     let median = |check: &HeightCheck| label(check.above_m.median, 1);
     let sigmas: Vec<f64> = geometric
@@ -106,14 +101,13 @@ fn words(site: &SiteProducts, geometric: &GeometricProducts) -> String {
     );
     let all = geometric.heights.ties.len();
     let thinned = if all > POINTS_SHOWN {
-        format!(" One in {} is drawn.", all.div_ceil(POINTS_SHOWN))
+        format!(" 1 in {} is drawn.", all.div_ceil(POINTS_SHOWN))
     } else {
         String::new()
     };
     format!(
-        "Tie points of {} from south to north, above the ellipsoid along the radius; below, above the MOLA surface: {medians}. \
-         Grey: the surface under them with its own standard deviation, {} m in the median.{thinned}",
-        site.config.site,
+        "Top: tie points above the ellipsoid, south to north. Bottom: above the MOLA surface, {medians}. Grey: that surface \
+         ± 1 σ, {} m in the median.{thinned}",
         label(Summary::of(&sigmas).median, 1)
     )
 }

@@ -11,19 +11,19 @@ pub(super) fn two_readings(adjusted: &Adjusted) -> String {
     match &adjusted.other_reading {
         None => String::new(),
         Some(Err(reason)) => paragraph(&format!(
-            "The other reading of what the images disagree by along the flight (adjustment.attitude_clock) gave no result: {reason}."
+            "The other reading of the along-track disagreement (adjustment.attitude_clock) gave no result: {reason}."
         )),
         Some(Ok(other)) => table(adjusted, other) + &paragraph(WORDS),
     }
 }
 
-const WORDS: &str = "Tie points tell how far the images are apart along the flight, not which of them is right. Evenly: all are as \
-    likely to be wrong. By the clock: one offset of the time of attitudes turned the images that follow nadir, and not those held \
-    towards a star. Each standard deviation holds only for its reading; adjustment.attitude_clock chooses.";
+const WORDS: &str = "Tie points show how far apart the images are along track, not which is right. Evenly: each is as likely to be wrong. \
+    By the clock: one clock offset turned the images that follow nadir, but not those held towards a star. Each σ holds for its \
+    own reading; adjustment.attitude_clock chooses.";
 
 fn table(adjusted: &Adjusted, other: &OtherReading) -> String {
     let mut table = Table::new(
-        "Two readings of what the images disagree by along the flight, metres",
+        "Two readings of the along-track disagreement, metres",
         &[
             Column::Text("reading"),
             Column::Text("products"),
@@ -39,26 +39,34 @@ fn table(adjusted: &Adjusted, other: &OtherReading) -> String {
     let own_sigma_m = heights.map(|heights| heights.mean_sigma_m);
     let rows = [
         (
+            "heights",
             adjusted.attitude_clock_s,
-            [0.0; 3],
+            None,
             own_sigma_m,
             "follow it",
         ),
         (
+            "other_reading",
             other.attitude_clock_s,
-            other.moved_m,
+            Some(other.moved_m),
             other.mean_sigma_m,
             "do not",
         ),
     ];
-    for (clock_s, moved_m, sigma_m, products) in rows {
+    for (place, clock_s, moved_m, sigma_m, products) in rows {
         let mut cells: Vec<Cell> = vec![reading(clock_s).into(), products.into()];
-        cells.extend(moved_m.map(|metres| Cell::from(label(metres, 1))));
-        cells.extend([0, 1, 2].map(|axis| {
-            let sigma_m = sigma_m.map(|sigma_m| format!("±{}", label(sigma_m[axis], 1)));
-            Cell::from(sigma_m.unwrap_or_else(|| "–".to_owned()))
+        let axes = [0, 1, 2];
+        cells.extend(axes.map(|axis| {
+            // What the products follow is where the others are counted from.
+            let metres = moved_m.map_or_else(|| "–".to_owned(), |of| label(of[axis], 1));
+            Cell::from(metres).told(format!("/moved_m/{axis}"))
         }));
-        table.row(true, cells);
+        cells.extend(axes.map(|axis| {
+            let sigma_m = sigma_m.map(|sigma_m| format!("±{}", label(sigma_m[axis], 1)));
+            let sigma_m = Cell::from(sigma_m.unwrap_or_else(|| "–".to_owned()));
+            sigma_m.told(format!("/mean_sigma_m/{axis}"))
+        }));
+        table.row_of(&format!("adjustment.json#/adjustment/{place}"), true, cells);
     }
     table.finish()
 }

@@ -16,17 +16,17 @@ pub(super) fn relief(adjusted: &Adjusted) -> String {
     };
     let Some(relief) = &adjusted.relief else {
         return paragraph(
-            "Relief says nothing of the place: the surface has no slope at the tie points.",
+            "Relief does not help to place the images: the surface has no slope at the tie points.",
         );
     };
     let [east_m, north_m] = relief.sigma_m;
     let told = format!(
-        "Relief alone places the images against the MOLA surface to ±{} m east and ±{} m north.",
+        "Relief alone places the images to ±{} m east and ±{} m north;",
         label(east_m, 0),
         label(north_m, 0)
     );
     if relief.used {
-        let used = "It is used: heights of tie points on slopes move images and profiles in plan (adjustment.relief_for_plan).";
+        let used = "it is used (adjustment.relief_for_plan).";
         paragraph(&format!("{told} {used}"))
             + &profiles(
                 "Where profiles are recorded against where relief and images put them, metres",
@@ -42,11 +42,14 @@ fn advice(relief_m: [f64; 2], heights: &HeightSummary) -> String {
     let is_of_use = |relief_m: f64, known_m: f64| relief_m < SHARE_OF_USE * known_m;
     let use_it = is_of_use(relief_m[0], east_m) && is_of_use(relief_m[1], north_m);
     format!(
-        "It is not used: below half of what is known without it (±{} and ±{} m) it would be of use, here it {} \
-         (adjustment.relief_for_plan).",
+        "it is not used, and {} (±{} m and ±{} m without it; adjustment.relief_for_plan).",
+        if use_it {
+            "would help"
+        } else {
+            "would not help"
+        },
         label(east_m, 0),
-        label(north_m, 0),
-        if use_it { "is" } else { "is not" }
+        label(north_m, 0)
     )
 }
 

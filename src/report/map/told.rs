@@ -40,14 +40,14 @@ impl Sheet {
             );
             if self.shots.len() < self.shown.rows.len() {
                 words += &format!(
-                    "One in {} is drawn. ",
+                    "1 in {} is drawn. ",
                     self.shown.rows.len().div_ceil(MAP_SHOTS)
                 );
             }
         }
         if let Some(relief) = relief {
             words += &format!(
-                "Ground interpolated between all shots, lit from the north-west, heights exaggerated {} ×. ",
+                "Relief from all shots, lit from the north-west, {} × exaggerated. ",
                 label(relief.exaggeration, 0)
             );
         }
@@ -55,7 +55,7 @@ impl Sheet {
         let south = self.map.latitude_rad() < 0.0;
         words
             + &format!(
-                "IAU 2000, areocentric; equal-area projection centred on {:.2}° E {:.2}° {}.",
+                "IAU 2000, areocentric; equal-area projection about {:.2}° E {:.2}° {}.",
                 self.map.longitude_rad() / RADIANS_PER_DEGREE,
                 self.map.latitude_rad().abs() / RADIANS_PER_DEGREE,
                 if south { "S" } else { "N" }

@@ -77,8 +77,7 @@ fn all_profiles(site: &SiteProducts) -> Plot {
         ..Panel::of("range − distance, m", series)
     };
     let caption = format!(
-        "{} profiles in their order in the tables, means from {} to {} m. The {WORST} with the largest means are shown alone; \
-         ranges.parquet has every shot.",
+        "{} profiles in their order in the tables, means from {} to {} m. The {WORST} largest are shown alone.",
         whole(site.profiles.len()),
         metres(extreme(site, f64::min)),
         metres(extreme(site, f64::max))
@@ -132,17 +131,14 @@ fn profile_plot(site: &SiteProducts, index: usize, limit: usize) -> Plot {
         low: 0.0,
         high: angle_panel.y.high.max(OFF_NADIR_LEAST_DEG),
     };
-    let mut caption = words(ranges) + " Bars: number of shots per residual bin.";
+    let mut caption = words(ranges) + " Bars: shots per bin.";
     caption += &if limits_seen {
         format!(" Dashed: the limit of the mean, ±{mean_max_m} m.")
     } else {
-        format!(" The limit of the mean, ±{mean_max_m} m, is outside the plot.")
+        format!(" Limit of the mean, not reached: ±{mean_max_m} m.")
     };
     if shots.kept.len() > limit {
-        caption += &format!(
-            " One shot in {} is drawn.",
-            shots.kept.len().div_ceil(limit)
-        );
+        caption += &format!(" 1 shot in {} is drawn.", shots.kept.len().div_ceil(limit));
     }
     let x = "seconds from the start of the profile";
     Plot::of(title, caption, x, vec![panel, angle_panel])
@@ -162,7 +158,7 @@ fn words(ranges: &ProfileRanges) -> String {
         )
     });
     format!(
-        "{} shots: mean {} m, standard deviation {} m{trend}; {} outliers.",
+        "{} shots: mean {} m, σ {} m{trend}; {} outliers.",
         main.n,
         metres(main.mean),
         metres(main.standard_deviation),

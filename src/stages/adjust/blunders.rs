@@ -12,6 +12,7 @@ use crate::{
         pushbroom::ExteriorOrientation,
         robust::RobustWeight,
     },
+    watch::Watch,
 };
 
 /// Rounds after which no more tie points are rejected.
@@ -32,16 +33,29 @@ pub(super) fn solve_without_blunders<M: ExteriorOrientation>(
     assembled: &mut Assembled<M>,
     bundle_options: &BundleOptions,
     config: &AdjustmentConfig,
+    watch: Watch<'_>,
 ) -> Result<Adjustment, BundleError> {
-    let adjustment = by_residuals(assembled, bundle_options, config.blunder_limit)?;
+    let limit = config.blunder_limit;
+    let adjustment = by_residuals(assembled, bundle_options, limit, watch)?;
     if assembled.network.heights.is_none() {
         return Ok(adjustment);
     }
-    by_heights(assembled, bundle_options, config, adjustment)?;
+    by_heights(assembled, bundle_options, config, adjustment, watch)?;
     assembled.observe_heights();
-    let adjustment = solve(&assembled.network, bundle_options)?;
+    let adjustment = solved(assembled, bundle_options, watch)?;
     // Once the heights bend as the ground does, others stand out.
-    by_heights(assembled, bundle_options, config, adjustment)
+    by_heights(assembled, bundle_options, config, adjustment, watch)
+}
+
+/// One solution of the network, counted.
+fn solved<M: ExteriorOrientation>(
+    assembled: &Assembled<M>,
+    bundle_options: &BundleOptions,
+    watch: Watch<'_>,
+) -> Result<Adjustment, BundleError> {
+    let adjustment = solve(&assembled.network, bundle_options);
+    watch.step(1, "solutions");
+    adjustment
 }
 
 /// Adjusts, rejects the worst tie points and repeats until no standardised residual exceeds `limit`; without one all
@@ -50,8 +64,9 @@ fn by_residuals<M: ExteriorOrientation>(
     assembled: &mut Assembled<M>,
     bundle_options: &BundleOptions,
     limit: Option<f64>,
+    watch: Watch<'_>,
 ) -> Result<Adjustment, BundleError> {
-    let adjustment = solve(&assembled.network, bundle_options);
+    let adjustment = solved(assembled, bundle_options, watch);
     let Some(limit) = limit else {
         return adjustment;
     };
@@ -62,13 +77,13 @@ fn by_residuals<M: ExteriorOrientation>(
                 robust: Some(WHERE_MANY),
                 ..*bundle_options
             };
-            let adjustment = solve(&assembled.network, &robust)?;
-            reject_worst(assembled, &robust, limit, adjustment)?;
-            solve(&assembled.network, bundle_options)?
+            let adjustment = solved(assembled, &robust, watch)?;
+            reject_worst(assembled, &robust, limit, adjustment, watch)?;
+            solved(assembled, bundle_options, watch)?
         }
         other => other?,
     };
-    reject_worst(assembled, bundle_options, limit, adjustment)
+    reject_worst(assembled, bundle_options, limit, adjustment, watch)
 }
 
 /// Rejects the worst tie points of `adjustment`, adjusts again and repeats until none is beyond `limit`.
@@ -77,6 +92,7 @@ fn reject_worst<M: ExteriorOrientation>(
     bundle_options: &BundleOptions,
     limit: f64,
     mut adjustment: Adjustment,
+    watch: Watch<'_>,
 ) -> Result<Adjustment, BundleError> {
     for _ in 0..ROUNDS_MAX {
         let worst = worst_standardised(&assembled.network, &adjustment, assembled.shots);
@@ -92,7 +108,7 @@ fn reject_worst<M: ExteriorOrientation>(
             (point, RejectionReason::Blunder { standardised })
         });
         assembled.reject(rejected.collect());
-        adjustment = solve(&assembled.network, bundle_options)?;
+        adjustment = solved(assembled, bundle_options, watch)?;
     }
     Ok(adjustment)
 }
@@ -103,6 +119,7 @@ fn by_heights<M: ExteriorOrientation>(
     bundle_options: &BundleOptions,
     config: &AdjustmentConfig,
     mut adjustment: Adjustment,
+    watch: Watch<'_>,
 ) -> Result<Adjustment, BundleError> {
     let Some(limit) = config.height_blunder_limit else {
         return Ok(adjustment);
@@ -120,7 +137,7 @@ fn by_heights<M: ExteriorOrientation>(
             (blunder.point, reason)
         });
         assembled.reject(rejected.collect());
-        adjustment = solve(&assembled.network, bundle_options)?;
+        adjustment = solved(assembled, bundle_options, watch)?;
     }
     Ok(adjustment)
 }

@@ -21,23 +21,27 @@ use crate::{
     },
     stages::intersect::IntersectedTies,
     ties::TiePoint,
+    watch::Watch,
 };
 
 /// Adjusts images, shots and tie points together.
 ///
 /// Tie points start from their intersection; those without one are rejected and listed. Where the images disagree by
-/// `disagreement_m` along the flight, and that is much, both readings of it are told.
+/// `disagreement_m` along the flight, and that is much, both readings of it are told. `watch` counts solutions: nobody knows
+/// how many it takes until no blunder is left.
 ///
 /// # Errors
 /// No tie point with a ground point, identifiers that do not match, a singular network, initial values that the rest refutes.
-pub fn adjust<M: ExteriorOrientation>(
+pub fn adjust<'a, M: ExteriorOrientation>(
     images: &[AdjustImage<M>],
     shots: &LaserShots,
     ties: &[TiePoint],
     starts: &IntersectedTies,
     disagreement_m: f64,
     config: &AdjustmentConfig,
+    watch: impl Into<Watch<'a>>,
 ) -> Result<Adjusted> {
+    let watch = watch.into();
     if starts.points.is_empty() {
         let first = starts.rejected.first();
         return Err(AdjustError::NoTies {
@@ -57,8 +61,9 @@ pub fn adjust<M: ExteriorOrientation>(
         robust: config.robust,
         ..BundleOptions::default()
     };
-    let adjustment = blunders::solve_without_blunders(&mut assembled, &bundle_options, config)
-        .map_err(|error| words::in_words(error, images, &assembled, config))?;
+    let adjustment =
+        blunders::solve_without_blunders(&mut assembled, &bundle_options, config, watch)
+            .map_err(|error| words::in_words(error, images, &assembled, config))?;
     // Blunders have lost their measurements and are listed already.
     let listed: BTreeSet<usize> = assembled.rejected.iter().map(|tie| tie.index).collect();
     let dropped = adjustment

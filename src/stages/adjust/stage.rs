@@ -18,6 +18,7 @@ use crate::{
         group_profiles::Profile, intersect::IntersectedTies, mola_surface::MolaShots,
         read_ties::Ties, site_image::SiteImage,
     },
+    watch::Watch,
 };
 
 stage_inputs! {
@@ -60,7 +61,11 @@ impl Stage for Adjust<'_> {
         self.round.of_adjustment().part()
     }
 
-    fn run(&self, _stop: &AtomicBool) -> Result<Adjusted> {
+    fn run(&self, stop: &AtomicBool) -> Result<Adjusted> {
+        self.run_watched(stop.into())
+    }
+
+    fn run_watched(&self, watch: Watch<'_>) -> Result<Adjusted> {
         let oriented = SiteImage::oriented(self.images.0)?;
         let orbits_m = self.pedr_orbits_m()?;
         let candidates = self.images.0.iter().zip(&oriented).enumerate();
@@ -104,7 +109,15 @@ impl Stage for Adjust<'_> {
         let pairs = self.pairs.value()?.iter();
         let disagreements_m = pairs.map(|pair| pair.along_track_parallax_m);
         let largest_m = disagreements_m.fold(0.0, f64::max);
-        adjust(&images, &shots, ties, starts, largest_m, self.adjustment)
+        adjust(
+            &images,
+            &shots,
+            ties,
+            starts,
+            largest_m,
+            self.adjustment,
+            watch,
+        )
     }
 }
 

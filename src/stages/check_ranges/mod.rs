@@ -24,7 +24,7 @@ use super::{convert_datum::Converted, group_profiles::Profile};
 use crate::{
     altimetry::MolaClock,
     config::RangeCheckConfig,
-    error::{Cause, Kind, Result, Stopped},
+    error::{Cause, Kind, Result},
     footprints::{Footprint, Footprints},
     frames::BodyFixed,
     geom::{
@@ -35,6 +35,7 @@ use crate::{
     stage::{Output, Stage},
     stage_inputs,
     time::{Et, Intervals},
+    watch::Watch,
 };
 
 pub use figures::RangeFigures;
@@ -76,6 +77,10 @@ impl Stage for CheckRanges<'_> {
     stage_inputs!(fingerprint);
 
     fn run(&self, stop: &AtomicBool) -> Result<RangeCheck> {
+        self.run_watched(stop.into())
+    }
+
+    fn run_watched(&self, watch: Watch<'_>) -> Result<RangeCheck> {
         let profiles = self.profiles.value()?;
         let reach_s = trajectory_reach_s(self.range_check, self.mola_clock);
         check_ranges(
@@ -84,7 +89,7 @@ impl Stage for CheckRanges<'_> {
             &trajectory(self.kernels.session()?, profiles, reach_s)?,
             self.mola_clock,
             self.range_check,
-            stop,
+            watch,
         )
     }
 
@@ -210,24 +215,26 @@ impl Cause for OutsideTrajectory {
 
 /// Checks the ranges of every profile against `trajectory`.
 ///
-/// `stop` is looked at before every profile.
+/// `watch` is looked at before every profile, and counts shots.
 ///
 /// # Errors
-/// A shot whose time the trajectory does not cover; [`Stopped`].
+/// A shot whose time the trajectory does not cover; [`Stopped`](crate::error::Stopped).
 /// # Source
 /// Shan et al. 2005, Table 3; the limits are ours, the paper has none.
-pub fn check_ranges(
+pub fn check_ranges<'a>(
     footprints: &Footprints<BodyFixed>,
     profiles: &[Profile],
     trajectory: &Trajectory,
     clock: &MolaClock,
     limits: &RangeCheckConfig,
-    stop: &AtomicBool,
+    watch: impl Into<Watch<'a>>,
 ) -> Result<RangeCheck> {
+    let watch = watch.into();
+    watch.expect(profiles.iter().map(|profile| profile.rows.len()).sum());
     let mut shots = ShotResiduals::default();
     let mut checked = Vec::with_capacity(profiles.len());
     for (index, profile) in (0_u32..).zip(profiles) {
-        Stopped::check(stop)?;
+        watch.check()?;
         let first = shots.len();
         let residuals = |row: &u32| {
             let shot = footprints.row(*row as usize);
@@ -256,6 +263,7 @@ pub fn check_ranges(
         let explain = || orbit::cause(footprints, profile, trajectory, clock, limits.orbit_max_m);
         ranges.invalid_because = ranges.figures().broken_limits(limits, explain);
         checked.push(ranges);
+        watch.step(profile.rows.len() as u64, "shots");
     }
     Ok(RangeCheck {
         shots,

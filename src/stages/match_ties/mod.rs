@@ -34,6 +34,7 @@ use crate::{
     stage::{InOrder, Input, Inputs, Output, Round, Stage},
     stage_inputs,
     ties::{MatchedPair, TieMeasure, TiePoint},
+    watch::Watch,
 };
 
 pub use margin::Margin;
@@ -118,6 +119,10 @@ impl Stage for MatchTies<'_> {
     }
 
     fn run(&self, stop: &AtomicBool) -> Result<Ties> {
+        self.run_watched(stop.into())
+    }
+
+    fn run_watched(&self, watch: Watch<'_>) -> Result<Ties> {
         let oriented = SiteImage::oriented(self.images.0)?;
         let times = self.images.0.iter().map(|image| image.times.value());
         let times: Vec<&ImageTimes> = times.collect::<Result<_>>()?;
@@ -136,7 +141,7 @@ impl Stage for MatchTies<'_> {
         let mut matched = Vec::new();
         for (at, first) in views.iter().enumerate() {
             for second in &views[at + 1..] {
-                matched.extend(match_pair([first, second], &heights, self.margin, stop)?);
+                matched.extend(match_pair([first, second], &heights, self.margin, watch)?);
             }
         }
         let read = self.read.0.map(|read| read.value()).transpose()?;

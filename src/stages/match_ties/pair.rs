@@ -1,9 +1,6 @@
 //! A pair of images: every cell of their common ground is tried in both directions.
 
-use std::{
-    collections::{BTreeMap, BTreeSet},
-    sync::atomic::AtomicBool,
-};
+use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::{Matrix2, Vector2};
 use rayon::prelude::*;
@@ -16,8 +13,9 @@ use super::{
     view::View,
 };
 use crate::{
-    error::{Result, Stopped},
+    error::Result,
     ties::{MatchedPair, TieMeasure, Unmatched},
+    watch::Watch,
 };
 
 /// How far apart the two directions may have a place, pixels.
@@ -51,12 +49,12 @@ type Tried = ([usize; 2], std::result::Result<Placed, Unmatched>);
 /// Tie points of the images with these indices; `None` where they have no ground in common.
 ///
 /// # Errors
-/// The system's refusal to read; [`Stopped`].
+/// The system's refusal to read; [`Stopped`](crate::error::Stopped).
 pub(super) fn match_pair(
     [first, second]: [&(usize, View<'_>); 2],
     heights: &Heights,
     margin: &Margin,
-    stop: &AtomicBool,
+    watch: Watch<'_>,
 ) -> Result<Option<Matched>> {
     let views = [&first.1, &second.1];
     let indices = [first.0, second.0];
@@ -68,13 +66,15 @@ pub(super) fn match_pair(
         levels: common.levels(),
     };
     let cells = common.cells();
+    watch.expect(cells.len());
     let reach_m = margin.reach_m(indices, common.ranges_m);
     let places = places(&cells, views[0].pixels, search.levels[0])?;
     let tried = cells
         .par_iter()
         .zip(places)
         .map(|(cell, place)| -> Result<Option<Tried>> {
-            Stopped::check(stop)?;
+            watch.check()?;
+            watch.step(1, "cells");
             let at = place.unwrap_or_else(|_| cell.middle());
             let Some(prediction) = views[0].predict(views[1], &at, heights) else {
                 return Ok(None);

@@ -178,7 +178,7 @@ fn matched(pixels: [&[u8]; 2], off_m: [f64; 2], most_m: f64) -> Matched {
     let heights = Heights::at(Body::Mars, shots.collect());
     let margin = Margin::within(2, most_m);
     let never = AtomicBool::new(false);
-    let matched = match_pair([&first, &second], &heights, &margin, &never);
+    let matched = match_pair([&first, &second], &heights, &margin, (&never).into());
     matched.unwrap().unwrap()
 }
 

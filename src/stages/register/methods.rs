@@ -1,6 +1,6 @@
 //! The published iterations on the points of one image.
 
-use std::{collections::BTreeMap, sync::atomic::AtomicBool};
+use std::collections::BTreeMap;
 
 use nalgebra::Vector3;
 use rayon::prelude::*;
@@ -10,12 +10,13 @@ use serde::{Deserialize, Serialize};
 use super::super::oriented::OrientedImage;
 use crate::{
     config::RegistrationConfig,
-    error::{Result, Stopped},
+    error::Result,
     geom::{
         pushbroom::{CameraModel, FixedPoint, FrameFirst, Limits, Solution, Unseen},
         statistics::Summary,
     },
     schema::none_negative,
+    watch::Watch,
 };
 
 /// A published iteration.
@@ -57,7 +58,7 @@ pub(super) fn run(
     camera: &OrientedImage<'_>,
     ground: &[Vector3<f64>],
     config: &RegistrationConfig,
-    stop: &AtomicBool,
+    watch: Watch<'_>,
 ) -> Result<Vec<(MethodRun, Vec<u32>)>> {
     let limits = Limits {
         tolerance_lines: config.tolerance_lines,
@@ -66,11 +67,13 @@ pub(super) fn run(
     let (focal_length_px, distortion) =
         (camera.detector.focal_length_px, camera.detector.distortion);
     let mut runs = Vec::new();
+    // Two methods with two models.
+    watch.expect(4 * ground.len());
     for (model, euler) in [
         (CameraModel::FirstOrder, &camera.first_order),
         (CameraModel::SecondOrder, &camera.second_order),
     ] {
-        Stopped::check(stop)?;
+        watch.check()?;
         let frame_first = FrameFirst::new(euler, focal_length_px);
         let ways = all_ways(ground, |point_m, on_step| {
             frame_first?
@@ -78,7 +81,8 @@ pub(super) fn run(
                 .solve(point_m, &limits, on_step)
         });
         runs.push(summed(camera, (Method::FrameFirst, model), ground, &ways));
-        Stopped::check(stop)?;
+        watch.step(ground.len() as u64, "points");
+        watch.check()?;
         let fixed_point = FixedPoint::new(euler, focal_length_px);
         let ways = all_ways(ground, |point_m, on_step| {
             fixed_point?
@@ -86,6 +90,7 @@ pub(super) fn run(
                 .solve(point_m, &limits, on_step)
         });
         runs.push(summed(camera, (Method::FixedPoint, model), ground, &ways));
+        watch.step(ground.len() as u64, "points");
     }
     Ok(runs)
 }

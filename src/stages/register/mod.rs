@@ -20,7 +20,7 @@ use super::{
 };
 use crate::{
     config::RegistrationConfig,
-    error::{Result, Stopped},
+    error::Result,
     footprints::Footprints,
     frames::BodyFixed,
     geom::{
@@ -30,6 +30,7 @@ use crate::{
     },
     stage::{Output, Round, Stage},
     stage_inputs,
+    watch::Watch,
 };
 
 pub use methods::{Method, MethodRun};
@@ -110,6 +111,10 @@ impl Stage for Register<'_> {
     }
 
     fn run(&self, stop: &AtomicBool) -> Result<ImageRegistration> {
+        self.run_watched(stop.into())
+    }
+
+    fn run_watched(&self, watch: Watch<'_>) -> Result<ImageRegistration> {
         register(
             self.times.value()?,
             self.orientation.value()?,
@@ -117,7 +122,7 @@ impl Stage for Register<'_> {
             &self.converted.value()?.footprints,
             self.profiles.value()?,
             self.registration,
-            stop,
+            watch,
         )
     }
 }
@@ -125,21 +130,22 @@ impl Stage for Register<'_> {
 /// Projects all profiles into `image`.
 ///
 /// Footprints are taken with the radius before the crossover correction, as in the products' x, y and z.
-/// `stop` is looked at between blocks of points. With an orientation that sees nothing all points are rejected.
+/// `watch` is looked at between blocks of points, and counts them. With an orientation that sees nothing all points are rejected.
 ///
 /// # Errors
-/// Samples that are no orientation; [`Stopped`].
+/// Samples that are no orientation; [`Stopped`](crate::error::Stopped).
 /// # Source
 /// Shan et al. 2005, eq. 3 and 4; Shan, Lee & Yoon 2002.
-pub fn register(
+pub fn register<'a>(
     image: &ImageTimes,
     orientation: &Orientation,
     model: &SensorModel,
     footprints: &Footprints<BodyFixed>,
     profiles: &[Profile],
     config: &RegistrationConfig,
-    stop: &AtomicBool,
+    watch: impl Into<Watch<'a>>,
 ) -> Result<ImageRegistration> {
+    let watch = watch.into();
     let camera = OrientedImage::of(image, orientation, model)?;
     let shots: Vec<(u32, u32)> = (0_u32..)
         .zip(profiles)
@@ -148,8 +154,9 @@ pub fn register(
     let projector = camera.projector(config.model);
     let mut points = RegisteredPoints::default();
     let mut rejected = BTreeMap::new();
+    watch.expect(shots.len());
     for block in shots.chunks(POINTS_AT_ONCE) {
-        Stopped::check(stop)?;
+        watch.check()?;
         let placed: Vec<_> = block
             .par_iter()
             .map(|(_, row)| {
@@ -163,13 +170,14 @@ pub fn register(
                 Err(reject) => *rejected.entry(reject.to_string()).or_insert(0) += 1,
             }
         }
+        watch.step(block.len() as u64, "points");
     }
     let on_lines = points.on_lines();
     let ground: Vec<Vector3<f64>> = on_lines
         .iter()
         .map(|index| ground_m(footprints, points.row[*index]))
         .collect();
-    let methods = methods::run(&camera, &ground, config, stop)?;
+    let methods = methods::run(&camera, &ground, config, watch)?;
     points.count(Method::FrameFirst, &on_lines, &methods);
     points.count(Method::FixedPoint, &on_lines, &methods);
     Ok(ImageRegistration {

@@ -154,7 +154,7 @@ impl Worker {
         let others = files.iter().filter(|path| path.is_file() && !known(path));
         let others: Vec<PathBuf> = others.cloned().collect();
         let files = self.hashes.files();
-        let hashed = files.hash_all(&others, &self.stop)?;
+        let hashed = files.hash_all(&others, &*self.stop)?;
         self.hashes.keep(&files);
         Ok(hashed)
     }

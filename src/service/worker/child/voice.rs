@@ -83,6 +83,8 @@ impl Observer for Voice {
     fn hear(&self, stage: &str, event: &StageEvent<'_>) {
         match event {
             StageEvent::Begins(reason) => self.stage(stage, "running", &reason.to_string(), 0.0),
+            // Signs of life are given by the clock.
+            StageEvent::Counts(_) => {}
             StageEvent::Kept => self.stage(stage, "kept", "unchanged", 0.0),
             StageEvent::Done(seconds) => {
                 self.stage(stage, "done", "", *seconds);

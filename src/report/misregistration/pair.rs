@@ -1,0 +1,154 @@
+//! A pair of images, before and after the adjustment.
+
+use super::super::{html::Cell, numbers::whole, plots::label};
+use crate::{products::GeometricProducts, stages::compare_pairs::PairComparison};
+
+/// A pair of images before the adjustment and, where tie points still join it, after.
+pub(in crate::report) struct BeforeAfter<'a> {
+    pub(in crate::report) before: &'a PairComparison,
+    pub(in crate::report) after: Option<&'a PairComparison>,
+    /// Places of both among the pairs of their state.
+    places: [usize; 2],
+    /// Whether there is an adjustment.
+    adjusted: bool,
+}
+
+impl<'a> BeforeAfter<'a> {
+    pub(in crate::report) fn all(geometric: &GeometricProducts<'a>) -> Vec<Self> {
+        let adjusted = geometric.adjustment.map_or(&[][..], |of| of.pairs);
+        let of = |(index, before): (usize, &'a PairComparison)| {
+            let after = adjusted
+                .iter()
+                .position(|pair| pair.images == before.images);
+            Self {
+                before,
+                after: after.map(|at| &adjusted[at]),
+                places: [index, after.unwrap_or_default()],
+                adjusted: geometric.adjustment.is_some(),
+            }
+        };
+        geometric.pairs.iter().enumerate().map(of).collect()
+    }
+
+    /// The pair whose images place their tie points farthest apart along the flight before the adjustment.
+    pub(in crate::report) fn worst(pairs: &[Self]) -> Option<&Self> {
+        let size = |pair: &&Self| pair.before.along_track_parallax_m.abs();
+        pairs.iter().max_by(|a, b| size(a).total_cmp(&size(b)))
+    }
+
+    /// Both images by name.
+    pub(in crate::report) fn name(&self) -> String {
+        self.before.images.join(" and ")
+    }
+
+    /// Where the products tell of a state; they do where there is an adjustment.
+    pub(in crate::report) fn place(&self, state: &str) -> String {
+        let [before, after] = self.places;
+        let index = if state == "after" { after } else { before };
+        if self.adjusted {
+            format!("adjustment.json#/{state}/pairs/{index}")
+        } else {
+            String::new()
+        }
+    }
+
+    /// Each state with its name.
+    pub(in crate::report) fn states(
+        &self,
+    ) -> impl Iterator<Item = (&'static str, &'a PairComparison)> {
+        let after = self.after.map(|pair| ("after", pair));
+        [("before", self.before)].into_iter().chain(after)
+    }
+
+    /// A cell on one of its profiles.
+    pub(super) fn told(&self, state: &str, profile: usize, name: &str, text: String) -> Cell {
+        let place = self.place(state);
+        if place.is_empty() {
+            return text.into();
+        }
+        Cell::from(text).told(format!("{place}/footprints/profiles/{profile}/{name}"))
+    }
+
+    /// The cells that begin a row.
+    pub(super) fn head(&self, state: &'static str, found: &PairComparison) -> Vec<Cell> {
+        let ties = Cell::from(whole(found.ties)).told("/ties");
+        vec![self.name().into(), state.into(), ties]
+    }
+
+    /// How far apart the two images place the same thing, before and after.
+    pub(in crate::report) fn sentence(&self) -> String {
+        let (before, after) = (
+            self.apart(self.before),
+            self.after.map(|after| self.apart(after)),
+        );
+        let what = if self.by_footprints() {
+            "a footprint falls"
+        } else {
+            "a tie point falls"
+        };
+        if !self.adjusted {
+            return format!(
+                "{}, along track: {what} {} apart.",
+                self.name(),
+                before.in_words()
+            );
+        }
+        let after = after.map_or_else(
+            || "after it no tie point joins them".to_owned(),
+            |after| format!("{} after it", after.in_words()),
+        );
+        format!(
+            "{}, along track: {what} {} apart before the adjustment; {after}.",
+            self.name(),
+            before.in_words()
+        )
+    }
+
+    /// Whether footprints tell how far apart the images are, before and after alike; otherwise tie points do.
+    fn by_footprints(&self) -> bool {
+        self.states()
+            .all(|(_, pair)| footprints_apart_m(pair).is_some())
+    }
+
+    /// How far apart the images of `pair`, one of the states, place the same thing.
+    fn apart(&self, pair: &PairComparison) -> Apart {
+        let by_footprints_m = footprints_apart_m(pair).filter(|_| self.by_footprints());
+        let metres = by_footprints_m.unwrap_or(pair.along_track_parallax_m);
+        Apart {
+            metres,
+            spacings: pair.mola_spacing_m.map(|spacing_m| metres / spacing_m),
+        }
+    }
+}
+
+/// How far apart along the flight two images place the same thing.
+struct Apart {
+    /// Metres on the ground, without sign.
+    metres: f64,
+    /// The same in distances of successive footprints.
+    spacings: Option<f64>,
+}
+
+impl Apart {
+    fn in_words(&self) -> String {
+        let metres = label(self.metres, usize::from(self.metres < 10.0));
+        self.spacings.map_or_else(
+            || format!("{metres} m"),
+            |spacings| {
+                let decimals = if spacings < 0.1 { 3 } else { 2 };
+                format!("{} MOLA spacings ({metres} m)", label(spacings, decimals))
+            },
+        )
+    }
+}
+
+/// Mean size over all footprints that both images of `pair` show, metres; `None` where there are none.
+fn footprints_apart_m(pair: &PairComparison) -> Option<f64> {
+    let profiles = pair.footprints.iter().flat_map(|found| &found.profiles);
+    let (mut shots, mut metres) = (0.0, 0.0);
+    for profile in profiles {
+        shots += f64::from(profile.lines.n);
+        metres += f64::from(profile.lines.n) * profile.along_m.abs();
+    }
+    (shots > 0.0).then(|| metres / shots)
+}
