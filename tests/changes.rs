@@ -472,7 +472,7 @@ fn sites(site: &Table) -> Vec<Table> {
 /// The site with nothing that belongs to Mars but the support data of an image, which say so.
 fn of_any_body(site: &Table) -> Table {
     let mut site = site.clone();
-    site.retain(|key, _| ["site", "kernels"].contains(&key.as_str()));
+    site.retain(|key, _| ["site", "kernels"].contains(&key));
     let image: Table = "id = 'E02-01301'\nisd = 'image.json'".parse().unwrap();
     site.insert("images".to_owned(), Value::Array(vec![Value::Table(image)]));
     site

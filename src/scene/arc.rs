@@ -198,9 +198,12 @@ mod tests {
             let spacecraft =
                 body_matrix(&MARS_IAU2000, middle) * arc.orbit.state(middle).position_m;
             let boresight = arc.camera_to_mars(middle) * Vector3::z();
-            let hit =
-                ray_meets_ellipsoid(Body::Mars.model(), &Position::new(spacecraft), &boresight)
-                    .unwrap();
+            let hit = ray_meets_ellipsoid(
+                Body::Mars.model(),
+                &Position::<BodyFixed>::new(spacecraft),
+                &boresight,
+            )
+            .unwrap();
             // 1e-9 of the radius is 3 mm on the ground; the attitude turns evenly between its samples.
             assert!(
                 (hit.xyz_m.normalize() - image.site.direction()).norm() < 3e-8,

@@ -4,8 +4,8 @@ use nalgebra::Vector3;
 
 use super::super::{drawn::Flown, plan::PlannedImage, sun::mars_from_sun_m};
 use crate::{
-    constants::MARS_IAU2000,
-    geom::{ellipsoid::local_axes, mars_rotation::mars_matrix},
+    body::MARS_IAU2000,
+    geom::{body_rotation::body_matrix, ellipsoid::local_axes},
     time::Et,
     units::{RADIANS_PER_DEGREE, SECONDS_PER_DAY},
 };
@@ -20,7 +20,7 @@ const HALF_YEAR_S: f64 = 343.49 * SECONDS_PER_DAY;
 pub(super) fn sun(flown: &Flown) -> Vector3<f64> {
     let exposed = flown.arc.exposed;
     let middle = exposed.start.plus(0.5 * exposed.duration_s());
-    let towards = |et: Et| (mars_matrix(&MARS_IAU2000, et) * -mars_from_sun_m(et)).normalize();
+    let towards = |et: Et| (body_matrix(&MARS_IAU2000, et) * -mars_from_sun_m(et)).normalize();
     let sun = towards(middle);
     if flown.arc.image.id != OF_OTHER_SEASON {
         return sun;

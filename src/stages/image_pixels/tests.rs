@@ -4,6 +4,7 @@ use std::{fs::File, io::Write as _, path::PathBuf};
 
 use super::*;
 use crate::{
+    body::Body,
     config::usual_instrument,
     line_times::LineTimes,
     pds::{
@@ -21,6 +22,7 @@ const LINES: [u32; 2] = [160, 176];
 fn times(id: &str) -> ImageTimes {
     ImageTimes {
         id: id.to_owned(),
+        body: Body::Mars,
         instrument: usual_instrument().clone(),
         line_times: LineTimes::even(Et::from_seconds(0.0), LINES[1], 1e-3).unwrap(),
         start_from: StartFrom::Sclk,
