@@ -7,6 +7,7 @@
 
 mod camera;
 mod document;
+mod rewrite;
 mod tables;
 
 use std::{fs, path::Path};
@@ -14,11 +15,14 @@ use std::{fs, path::Path};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-pub use self::tables::{Rotations, States};
 use self::{
     camera::{Samples, camera},
     document::{IsdError, Object},
     tables::span,
+};
+pub use self::{
+    rewrite::{StraightCamera, rewrite_isd},
+    tables::{Rotations, States},
 };
 use crate::{
     error::{IoError, Locate, Result},
