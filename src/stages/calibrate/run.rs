@@ -305,7 +305,9 @@ impl Work<'_> {
         let freedom = each(self, layout, is_look);
         let steps = self.adjust("internal", &points, &freedom)?;
         self.tell("internal", "the look angles", steps);
-        let freedom = each(self, layout, |_| true);
+        // A constant error of the orbit is the camera's to take up: freed beside it, the two are told apart by noise, and
+        // only the camera's part goes into other orbits.
+        let freedom = each(self, layout, |of| !matches!(of, Parameter::Bias { .. }));
         let mut steps = self.adjust("joint", &points, &freedom)?;
         for _ in 0..ROUNDS {
             if !self.leave_out(complaints) {
@@ -317,7 +319,7 @@ impl Work<'_> {
         }
         self.tell(
             "joint",
-            "offset angles, look angles and orbit together, with their standard deviations beforehand",
+            "offset angles, look angles and drift of the orbit together, with their standard deviations beforehand",
             steps,
         );
         Ok(())
