@@ -417,8 +417,7 @@ fn the_three_readings_of_the_clock_bias_differ_as_told() {
 fn a_stated_datum_against_the_version_letter_is_refused() {
     let mut config = site("eos_chasma");
     config.pedr.files = vec![mission().join("pedr/ap19802l.b") as PathBuf];
-    config.pedr.datum =
-        areograph::altimetry::DatumChoice::Stated(areograph::frames::Datum::Iau1991);
+    config.pedr.datum = areograph::altimetry::DatumChoice::Stated(areograph::body::Datum::Iau1991);
     let failure = search_footprints(&config.pedr, &config.windows, 0.0, &RUN_ON).unwrap_err();
     assert!(failure.to_string().contains("iau1991"), "{failure}");
     assert_eq!(failure.kind(), areograph::error::Kind::Input);

@@ -16,7 +16,6 @@ use std::{
 };
 
 use areograph::body::Datum;
-use areograph::frames::Datum;
 use arrow::{
     array::AsArray as _,
     datatypes::{Float64Type, UInt32Type},

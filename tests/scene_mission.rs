@@ -364,7 +364,13 @@ fn footprints_come_back_within_0_2_m_and_times_within_2_us() {
             assert_eq!(decoded.class, 1);
             let et = Et::from_seconds(decoded.tag_s - usual_altimeter().clock_bias_s);
             assert!((et.seconds() - time_s).abs() < 2e-6);
-            let ground = convert_datum::<BodyFixed>(decoded.ground_file_m, datum(file), et, et);
+            let ground = convert_datum(
+                areograph::body::Body::Mars,
+                decoded.ground_file_m,
+                datum(file),
+                et,
+                et,
+            );
             let off_m = (ground.xyz_m - truth_m).norm();
             let held = worst.entry(file.to_owned()).or_default();
             *held = held.max(off_m);
@@ -386,8 +392,13 @@ fn range_minus_distance_has_the_expected_mean_for_every_orbit() {
                 .map(|(record, shot)| {
                     let decoded = decode(&records[record], shot);
                     let et = Et::from_seconds(decoded.tag_s - usual_altimeter().clock_bias_s);
-                    let ground =
-                        convert_datum::<BodyFixed>(decoded.ground_file_m, datum(file), et, et);
+                    let ground = convert_datum(
+                        areograph::body::Body::Mars,
+                        decoded.ground_file_m,
+                        datum(file),
+                        et,
+                        et,
+                    );
                     let spacecraft =
                         body_matrix(&MARS_IAU2000, et) * session.state(et).unwrap().position.xyz_m;
                     let own_m = (decoded.spacecraft_file_m - decoded.ground_file_m).norm();

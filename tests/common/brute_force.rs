@@ -4,7 +4,6 @@ use std::path::PathBuf;
 
 use areograph::{
     footprints::Footprint,
-    frames::BodyFixed,
     geom::{
         body_rotation::convert_datum,
         ellipsoid::{Spherical, spherical_to_xyz_m},
@@ -35,7 +34,8 @@ pub(super) fn every_shot(paths: &[PathBuf]) -> Vec<TrueShot> {
                 }
                 let at = Et::from_seconds(shot.et_tag_s);
                 let direction = spherical_to_xyz_m(shot.longitude_rad, shot.latitude_rad, 1.0);
-                let direction = convert_datum::<BodyFixed>(direction, datum, at, at);
+                let direction =
+                    convert_datum(areograph::body::Body::Mars, direction, datum, at, at);
                 let there = Spherical::from_xyz_m(&direction.xyz_m);
                 shots.push(TrueShot {
                     shot: Footprint {
