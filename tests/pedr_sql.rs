@@ -369,7 +369,7 @@ fn two_versions_of_one_orbit_have_no_answer_but_one_by_one() {
     let archive = archive(folder.path());
     write(
         &archive.join("ap19030k.b"),
-        MarsDatum::Iau1991,
+        Datum::Iau1991,
         10,
         |_, _| (),
     );
