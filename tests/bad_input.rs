@@ -190,7 +190,7 @@ const CASES: &[(&str, Spoil)] = &[
         case.run()
     }),
     ("altimeter_is_unknown", |case| {
-        case.replace("site.toml", "site = ", "altimeter = \"lola\"\nsite = ");
+        case.replace("site.toml", "site = ", "altimeter = \"moly\"\nsite = ");
         case.run()
     }),
     ("instrument_is_unknown", |case| {
