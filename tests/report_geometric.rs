@@ -489,8 +489,8 @@ fn tie_points_tell_the_misregistration_where_no_footprint_is_in_both_images() {
     let page = site.page();
     let words = section(&page, SECTIONS[0]);
     assert!(
-        words.contains("before the adjustment a tie point falls")
-            && words.contains(&format!("({before_m:.0} m) apart"))
+        words.contains("along track: a tie point falls")
+            && words.contains(&format!("({before_m:.0} m) apart before the adjustment"))
             && words.contains(&format!("({after_m:.1} m)")),
         "{words}"
     );
