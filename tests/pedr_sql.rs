@@ -367,12 +367,7 @@ fn what_cannot_be_printed_is_a_failure_and_a_reader_who_went_away_is_none() {
 fn two_versions_of_one_orbit_have_no_answer_but_one_by_one() {
     let folder = tempfile::tempdir().unwrap();
     let archive = archive(folder.path());
-    write(
-        &archive.join("ap19030k.b"),
-        Datum::Iau1991,
-        10,
-        |_, _| (),
-    );
+    write(&archive.join("ap19030k.b"), Datum::Iau1991, 10, |_, _| ());
     let told = error_of(&sql(&archive, &["select count(*) from shots"]));
     for part in ["ap19030k.b", "ap19030l.b", "would count twice"] {
         assert!(told.contains(part), "{part}: {told}");
