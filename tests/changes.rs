@@ -392,10 +392,10 @@ fn with_more_columns(shots: &str, times: &str) -> String {
         text += line;
         for column in columns {
             let metres: f64 = fields[column].parse().unwrap();
-            text += &format!(",{}", metres / 1_000.0);
+            text.extend([",", &(metres / 1_000.0).to_string()]);
         }
         let utc = times.split(',').next().unwrap();
-        text += &format!(",{utc}\n");
+        text.extend([",", utc, "\n"]);
     }
     text
 }

@@ -124,17 +124,16 @@ pub fn read_shot_table(
             Ok(false) => break,
             Err(error) => return Err(error).in_file(path),
         }
-        let known = match &fields {
-            Some(fields) => fields,
-            None => {
-                let (found, names) = Fields::of(columns, &record).in_file(path)?;
-                let header = names || is_header(&found, &record);
-                let found = fields.insert(found);
-                if header {
-                    continue;
-                }
-                found
+        let known = if let Some(fields) = &fields {
+            fields
+        } else {
+            let (found, names) = Fields::of(columns, &record).in_file(path)?;
+            let header = names || is_header(&found, &record);
+            let found = fields.insert(found);
+            if header {
+                continue;
             }
+            found
         };
         rows += 1;
         let line = record.position().map_or(0, csv::Position::line);

@@ -1,6 +1,6 @@
 //! Rows that are shots, and every way in which one is none.
 
-use std::fs;
+use std::{fs::File, io::Write as _};
 
 use super::*;
 use crate::units::RADIANS_PER_DEGREE;
@@ -29,7 +29,10 @@ type Rows = Vec<std::result::Result<ShotRow, RowComplaint>>;
 fn read(text: impl AsRef<[u8]>, columns: &ShotColumns) -> Result<Rows> {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("shots.csv");
-    fs::write(&path, text).unwrap();
+    File::create(&path)
+        .unwrap()
+        .write_all(text.as_ref())
+        .unwrap();
     let mut rows = Vec::new();
     let utc = |text: &str| match text {
         "2010-01-27" => Ok(Et::from_seconds(1.0)),
@@ -44,7 +47,7 @@ fn read(text: impl AsRef<[u8]>, columns: &ShotColumns) -> Result<Rows> {
 
 #[test]
 fn columns_are_found_by_name_and_by_number() {
-    let rows = read(&format!("{HEADER}\n{ROW}\n"), &named()).unwrap();
+    let rows = read(format!("{HEADER}\n{ROW}\n"), &named()).unwrap();
     let [Ok(row)] = &rows[..] else {
         panic!("{rows:?}")
     };
@@ -65,9 +68,9 @@ fn columns_are_found_by_name_and_by_number() {
         ..ShotColumns::default()
     };
     // With a header and without one.
-    let same = read(&format!("{HEADER}\n{ROW}\n"), &numbered).unwrap();
+    let same = read(format!("{HEADER}\n{ROW}\n"), &numbered).unwrap();
     assert_eq!(same, rows);
-    let first = read(&format!("{ROW}\n"), &numbered).unwrap();
+    let first = read(format!("{ROW}\n"), &numbered).unwrap();
     assert_eq!(first[0].as_ref().unwrap().line, 1);
 }
 
@@ -86,7 +89,7 @@ fn other_units_times_and_heights_give_the_same_shot() {
         ..named()
     };
     let row = "2010-01-27,-261.0,60.0,-2400.0,57000.0,99.0,60.0,1792000.0";
-    let rows = read(&format!("{HEADER}\n{row}\n"), &columns).unwrap();
+    let rows = read(format!("{HEADER}\n{row}\n"), &columns).unwrap();
     let row = rows[0].as_ref().unwrap();
     assert!((row.et_s - 1.0).abs() < 1e-12); // as the closure says
     // Above 1737.4 km.
@@ -94,7 +97,7 @@ fn other_units_times_and_heights_give_the_same_shot() {
     assert!((row.range_m - 57_000.0).abs() < 1e-6);
     let late = "yesterday,99.0,60.0,-2400.0,57000.0,99.0,60.0,1792000.0";
     let rows = read(
-        &format!("{HEADER}\n{late}\n2010-01-27,99,60,-2400,57000,99,60,1792000\n"),
+        format!("{HEADER}\n{late}\n2010-01-27,99,60,-2400,57000,99,60,1792000\n"),
         &columns,
     );
     let rows = rows.unwrap();
@@ -145,7 +148,7 @@ fn every_bad_row_is_told_with_its_line_and_the_good_ones_are_kept() {
     ];
     let mut text = format!("{HEADER}\n{ROW}\n");
     for (row, _) in bad {
-        text += &format!("{row}\n");
+        text.extend([row, "\n"]);
     }
     let rows = read(&text, &named()).unwrap();
     assert_eq!(rows.len(), bad.len() + 1);
