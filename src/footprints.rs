@@ -106,7 +106,7 @@ macro_rules! columns {
         /// Footprints of a site, one entry per shot in every column, ordered by file, record and shot.
         ///
         /// `D` tells whose coordinates they are: [`AsRead`] or a frame such as
-        /// [`BodyFixed`](crate::body::BodyFixed). Only `stages::convert_datum` changes it, so
+        /// [`BodyFixed`](crate::frames::BodyFixed). Only `stages::convert_datum` changes it, so
         /// converting twice does not compile.
         #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
         pub struct Footprints<D> {
