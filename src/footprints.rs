@@ -141,6 +141,20 @@ macro_rules! columns {
                 $(self.$column.append(&mut other.$column);)*
             }
 
+            /// Takes the shots from row `row` on, counted from 0, away.
+            ///
+            /// # Panics
+            /// When there are fewer rows.
+            #[must_use]
+            pub fn split_off(&mut self, row: usize) -> Self {
+                Self {
+                    files: self.files.clone(),
+                    body: self.body,
+                    $($column: self.$column.split_off(row),)*
+                    datum: PhantomData,
+                }
+            }
+
             /// The shot in row `row`, counted from 0.
             ///
             /// # Panics

@@ -6,8 +6,7 @@ use areograph::{
     error::{Error, Result},
     footprints::SourceFile,
     pds::archive::{Found, Indexes, Judged, Query, Sink, Source, search},
-    products::{FoundShots, ShotsFile, ShotsFormat},
-    stages::convert_datum::convert_at_tags,
+    products::{ShotsFile, ShotsFormat},
 };
 use serde_json::{Value, json};
 
@@ -44,16 +43,11 @@ pub(super) fn rows_per_s(archive: &Archive, folder: &Path) -> Value {
         let query = Query::unfiltered(vec![everywhere()], Judged::Near);
         search(&sources, &query, &RUN_ON, &mut kept).unwrap();
         let path = folder.join(name);
-        let mut file = ShotsFile::create(&path, format).unwrap();
+        let windows = vec!["mars".to_owned()];
+        let mut file = ShotsFile::create(&path, format, files.clone(), windows).unwrap();
         let start = Instant::now();
         for found in kept.0 {
-            let footprints = convert_at_tags(found.footprints, &files);
-            let shots = FoundShots {
-                footprints: &footprints,
-                windows: &found.windows,
-                window_ids: &["mars".to_owned()],
-            };
-            file.write(&shots).unwrap();
+            file.write(found.footprints, &found.windows).unwrap();
         }
         let rows = file.finish(&json!({})).unwrap();
         let taken_s = start.elapsed().as_secs_f64();

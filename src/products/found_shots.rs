@@ -3,6 +3,7 @@
 use std::{
     fs::File,
     io::{BufWriter, Write},
+    mem,
     path::{Path, PathBuf},
     sync::Arc,
 };
@@ -10,7 +11,6 @@ use std::{
 use ::parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 use arrow::{
     array::{ArrayRef, Float64Array, StructArray},
-    compute::concat_batches,
     datatypes::{DataType, Field, Fields, Schema, SchemaRef},
     record_batch::RecordBatch,
 };
@@ -32,9 +32,10 @@ use crate::{
     body::Body,
     error::{IoError, Locate, Result},
     files::StagedFile,
-    footprints::Footprints,
+    footprints::{AsRead, Footprints, SourceFile},
     frames::BodyFixed,
     pds::archive::WindowLists,
+    stages::convert_datum::convert_at_tags,
 };
 
 /// The column of the bounding box of each point, and its parts: what readers of GeoParquet pass over rows by.
@@ -43,8 +44,8 @@ const BBOX_PARTS: [&str; 4] = ["xmin", "ymin", "xmax", "ymax"];
 /// The key of what was asked for, and how complete the answer is.
 const SEARCH: &str = "areograph_search";
 
-/// Rows of a batch of Parquet.
-const BATCH_ROWS: usize = 16_384;
+/// Shots that are written together: enough for all threads, little beside what a search has in memory.
+const ROWS_AT_ONCE: usize = 32_768;
 
 /// How shots are written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -58,13 +59,10 @@ pub enum ShotsFormat {
 }
 
 /// Some shots of a search, in their order.
-pub struct FoundShots<'a> {
-    /// Their columns; `files` has their PEDR files.
-    pub footprints: &'a Footprints<BodyFixed>,
-    /// The windows that hold them.
-    pub windows: &'a WindowLists,
-    /// Identifiers of the windows.
-    pub window_ids: &'a [String],
+struct FoundShots<'a> {
+    footprints: &'a Footprints<BodyFixed>,
+    windows: &'a WindowLists,
+    window_ids: &'a [String],
 }
 
 impl ShotNames for FoundShots<'_> {
@@ -98,6 +96,11 @@ impl FoundShots<'_> {
 pub struct ShotsFile {
     file: StagedFile,
     writer: Writer,
+    /// The files that shots are counted into.
+    sources: Vec<SourceFile>,
+    window_ids: Vec<String>,
+    /// Shots that are not written yet, with their windows.
+    pending: (Footprints<AsRead>, WindowLists),
     rows: u64,
     bounds: Option<[f64; 4]>,
 }
@@ -112,9 +115,17 @@ enum Writer {
 impl ShotsFile {
     /// Begins the file `path`.
     ///
+    /// * `sources` – the files that shots are counted into
+    /// * `window_ids` – identifiers of the windows
+    ///
     /// # Errors
     /// What the disk refuses.
-    pub fn create(path: &Path, format: ShotsFormat) -> Result<Self> {
+    pub fn create(
+        path: &Path,
+        format: ShotsFormat,
+        sources: Vec<SourceFile>,
+        window_ids: Vec<String>,
+    ) -> Result<Self> {
         let file = StagedFile::create(path)?;
         let handle = file.writer()?;
         let empty = Table::new(columns(), Vec::new()).without("utc");
@@ -140,19 +151,46 @@ impl ShotsFile {
         Ok(Self {
             file,
             writer,
+            sources,
+            window_ids,
+            pending: (Footprints::new(Vec::new()), WindowLists::default()),
             rows: 0,
             bounds: None,
         })
     }
 
-    /// Appends shots.
+    /// Appends shots with their windows.
     ///
     /// # Errors
     /// Numbers that are not finite; what the disk refuses.
-    pub fn write(&mut self, shots: &FoundShots<'_>) -> Result<()> {
-        if shots.footprints.is_empty() {
+    pub fn write(&mut self, footprints: Footprints<AsRead>, windows: &WindowLists) -> Result<()> {
+        self.pending.0.append(footprints);
+        self.pending.1.append(windows);
+        while self.pending.0.len() >= ROWS_AT_ONCE {
+            let (footprints, windows) = &mut self.pending;
+            let left = (
+                footprints.split_off(ROWS_AT_ONCE),
+                windows.split_off(ROWS_AT_ONCE),
+            );
+            self.write_pending()?;
+            self.pending = left;
+        }
+        Ok(())
+    }
+
+    /// Writes the shots that are not written yet, and leaves none.
+    fn write_pending(&mut self) -> Result<()> {
+        let empty = (Footprints::new(Vec::new()), WindowLists::default());
+        let (footprints, windows) = mem::replace(&mut self.pending, empty);
+        if footprints.is_empty() {
             return Ok(());
         }
+        let footprints = convert_at_tags(footprints, &self.sources);
+        let shots = FoundShots {
+            footprints: &footprints,
+            windows: &windows,
+            window_ids: &self.window_ids,
+        };
         let points_deg = shots.points_deg();
         let is_first = self.rows == 0;
         self.rows += points_deg.len() as u64;
@@ -192,7 +230,8 @@ impl ShotsFile {
     ///
     /// # Errors
     /// What the disk refuses; a file that comes back with another number of rows.
-    pub fn finish(self, search: &Value) -> Result<u64> {
+    pub fn finish(mut self, search: &Value) -> Result<u64> {
+        self.write_pending()?;
         let path = self.file.path();
         let refused = |error| IoError::on("write")(error);
         match self.writer {
@@ -229,12 +268,10 @@ impl ShotsFile {
     }
 }
 
-/// Writes shots in batches of one size, so that the bytes do not depend on the pieces in which shots were found.
+/// Parquet with a bounding box for each shot.
 struct ParquetShots {
     writer: ParquetFile<File>,
     schema: SchemaRef,
-    /// Fewer rows than a batch has.
-    pending: RecordBatch,
 }
 
 impl ParquetShots {
@@ -246,26 +283,16 @@ impl ParquetShots {
         let writer = ParquetFile::new(file, Arc::clone(&schema));
         Ok(Self {
             writer: writer.map_err(parquet::refused)?,
-            pending: RecordBatch::new_empty(Arc::clone(&schema)),
             schema,
         })
     }
 
     fn write(&mut self, table: &Table<'_>, points_deg: &[[f64; 2]]) -> Result<()> {
         let batch = with_boxes(table, &self.schema, points_deg)?;
-        let rows = concat_batches(&self.schema, [&self.pending, &batch])
-            .map_err(ProductError::refused("assemble rows"))?;
-        let whole = rows.num_rows() - rows.num_rows() % BATCH_ROWS;
-        for start in (0..whole).step_by(BATCH_ROWS) {
-            let batch = rows.slice(start, BATCH_ROWS);
-            self.writer.write(&batch).map_err(parquet::refused)?;
-        }
-        self.pending = rows.slice(whole, rows.num_rows() - whole);
-        Ok(())
+        self.writer.write(&batch).map_err(parquet::refused)
     }
 
-    fn finish(mut self, metadata: Vec<(&str, String)>) -> Result<()> {
-        self.writer.write(&self.pending).map_err(parquet::refused)?;
+    fn finish(self, metadata: Vec<(&str, String)>) -> Result<()> {
         self.writer.finish(metadata).map_err(parquet::refused)
     }
 }

@@ -60,7 +60,7 @@ pub use exchange::{
     NetworkMeasure, NetworkPoint, isis_serial_number, write_control_network, write_gcp,
     write_lidar_data,
 };
-pub use found_shots::{FoundShots, ShotsFile, ShotsFormat};
+pub use found_shots::{ShotsFile, ShotsFormat};
 pub use generated::{documentation, schemas};
 pub use listed::{Listed, listed};
 pub use net::{NetProducts, write_net_products};

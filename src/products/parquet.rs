@@ -10,6 +10,7 @@ use arrow::{
     datatypes::{DataType, Field, Schema, SchemaRef},
     record_batch::RecordBatch,
 };
+use rayon::prelude::*;
 
 use super::{
     error::ProductError,
@@ -85,7 +86,8 @@ pub(super) fn record_batch(
     schema: &SchemaRef,
     rows: Range<usize>,
 ) -> std::result::Result<RecordBatch, ProductError> {
-    let arrays = table.values(rows)?.into_iter().map(array).collect();
+    let values = table.values(rows)?.into_par_iter();
+    let arrays = values.map(array).collect();
     RecordBatch::try_new(Arc::clone(schema), arrays)
         .map_err(ProductError::refused("assemble columns"))
 }

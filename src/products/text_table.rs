@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use super::{
     error::ProductError,
     files::{create, finish, open},
-    table::{Meaning, Table, Values},
+    table::{Kind, Meaning, Table, Values},
 };
 use crate::error::{Error, IoError, Locate, Result};
 
@@ -25,7 +25,7 @@ pub(super) fn write(path: &Path, table: Table) -> Result<u64> {
     Ok(table.rows() as u64)
 }
 
-fn encode(file: &mut impl Write, table: &Table) -> Result<()> {
+fn encode(file: &mut (impl Write + Send), table: &Table) -> Result<()> {
     write_names(file, table)?;
     write_rows(file, table)
 }
@@ -40,30 +40,68 @@ pub(super) fn write_names(file: &mut impl Write, table: &Table) -> Result<()> {
 }
 
 /// Writes the rows.
-pub(super) fn write_rows(file: &mut impl Write, table: &Table) -> Result<()> {
-    let text_of = |rows: Range<usize>| {
-        let values = table.values(rows.clone())?;
-        let mut writer = csv::Writer::from_writer(Vec::new());
-        let mut cell = Vec::new();
-        for row in 0..rows.len() {
-            for (column, values) in table.columns().zip(&values) {
-                cell.clear();
-                put_cell(&mut cell, column, values, row);
-                writer.write_field(&cell).map_err(refused)?;
-            }
-            let end = writer.write_record(None::<&[u8]>);
-            end.map_err(refused)?;
-        }
-        let text = writer.into_inner();
-        Ok(text.map_err(ProductError::refused("encode CSV"))?)
+pub(super) fn write_rows(file: &mut (impl Write + Send), table: &Table) -> Result<()> {
+    let encoded = |wave: Vec<Range<usize>>| -> Vec<Result<Vec<u8>>> {
+        let rows = wave.into_par_iter();
+        rows.map(|rows| rows_as_text(table, rows)).collect()
     };
-    for wave in table.waves() {
-        let texts: Vec<Result<Vec<u8>>> = wave.into_par_iter().map(text_of).collect();
-        for text in texts {
-            file.write_all(&text?).map_err(IoError::on("write"))?;
-        }
+    let mut waves = table.waves();
+    let mut texts = waves.next().map(encoded);
+    while let Some(written) = texts {
+        // While one wave is written, the next one becomes text.
+        let wave = waves.next();
+        let (result, next) = rayon::join(
+            || written.into_iter().try_for_each(|text| put(file, &text?)),
+            || wave.map(encoded),
+        );
+        result?;
+        texts = next;
     }
     Ok(())
+}
+
+fn put(file: &mut impl Write, text: &[u8]) -> Result<()> {
+    Ok(file.write_all(text).map_err(IoError::on("write"))?)
+}
+
+/// Some rows of the table, which it must have.
+fn rows_as_text(table: &Table, rows: Range<usize>) -> Result<Vec<u8>> {
+    let values = table.values(rows.clone())?;
+    let columns: Vec<(&Meaning, &Values)> = table.columns().zip(&values).collect();
+    let (mut text, mut cell) = (Vec::new(), Vec::new());
+    for row in 0..rows.len() {
+        for (place, (column, values)) in columns.iter().enumerate() {
+            if place > 0 {
+                text.push(b',');
+            }
+            if column.kind == Kind::Text {
+                cell.clear();
+                put_cell(&mut cell, column, values, row);
+                put_quoted(&mut text, &cell, columns.len());
+            } else {
+                put_cell(&mut text, column, values, row);
+            }
+        }
+        text.push(b'\n');
+    }
+    Ok(text)
+}
+
+/// Appends the field of a row of `columns` columns, in quotes where RFC 4180 asks for them, and where a row would be an
+/// empty line.
+fn put_quoted(text: &mut Vec<u8>, field: &[u8], columns: usize) {
+    let is_empty_row = columns == 1 && field.is_empty();
+    if !is_empty_row && !field.iter().any(|byte| b",\"\r\n".contains(byte)) {
+        return text.extend_from_slice(field);
+    }
+    text.push(b'"');
+    for byte in field {
+        if *byte == b'"' {
+            text.push(b'"');
+        }
+        text.push(*byte);
+    }
+    text.push(b'"');
 }
 
 /// The disk's refusal, or the library's.
@@ -92,12 +130,17 @@ fn put_cell(text: &mut Vec<u8>, column: &Meaning, values: &Values, row: usize) {
                 number(text, value);
             }
         }
-        Values::Natural(values) => put(text, format_args!("{}", values[row])),
-        Values::Integer(values) => put(text, format_args!("{}", values[row])),
+        Values::Natural(values) => put_whole(text, values[row]),
+        Values::Integer(values) => put_whole(text, values[row]),
         Values::Flag(values) => put(text, format_args!("{}", values[row])),
         Values::Text(values) => text.extend_from_slice(values[row].as_bytes()),
         Values::Bytes(_) => {}
     }
+}
+
+/// Appends a whole number.
+fn put_whole(text: &mut Vec<u8>, value: impl itoa::Integer) {
+    text.extend_from_slice(itoa::Buffer::new().format(value).as_bytes());
 }
 
 /// Appends the fewest digits that give a finite number back, without an exponent: the same as in JSON.
@@ -205,8 +248,9 @@ mod tests {
         let rows = vec![
             (0.1 + 0.2, "x, \"y\"", 3_394.123_456_5, None),
             (-0.0, "", -1e-9, Some(1e300)),
+            (1.0, "two\r\nlines", 1.0, None),
         ];
-        assert_eq!(write(&path, Table::new(columns, rows)).unwrap(), 2);
+        assert_eq!(write(&path, Table::new(columns, rows)).unwrap(), 3);
         let text = std::fs::read_to_string(&path).unwrap();
         assert!(text.starts_with("a_m,b,c_km,d\n0.30000000000000004,\"x, \"\"y\"\"\",3394.12345"));
     }

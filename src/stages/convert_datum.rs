@@ -97,12 +97,25 @@ pub fn convert_datum(footprints: Footprints<AsRead>, clock: &MolaClock) -> Conve
             )
         })
         .collect();
+    let before = [&footprints.longitude_rad, &footprints.latitude_rad].map(Clone::clone);
+    let converted = turned(footprints, clock);
+    Converted {
+        files: shifts(&converted, &before),
+        footprints: converted,
+        notes,
+    }
+}
+
+/// The footprints, every shot out of its file's datum.
+fn turned(footprints: Footprints<AsRead>, clock: &MolaClock) -> Footprints<BodyFixed> {
     let datums = footprints.files.iter();
     let datums: Vec<DatumTurn> = datums
         .map(|file| DatumTurn::new(file.datum, clock))
         .collect();
     let mut converted = footprints.declare::<BodyFixed>();
-    let before = [&converted.longitude_rad, &converted.latitude_rad].map(Clone::clone);
+    if datums.iter().all(DatumTurn::is_none) {
+        return converted;
+    }
     let moved: Vec<Option<[(f64, f64); 2]>> = (0..converted.len())
         .into_par_iter()
         .map(|row| {
@@ -119,11 +132,7 @@ pub fn convert_datum(footprints: Footprints<AsRead>, clock: &MolaClock) -> Conve
             ) = spacecraft;
         }
     }
-    Converted {
-        files: shifts(&converted, &before),
-        footprints: converted,
-        notes,
-    }
+    converted
 }
 
 /// How the coordinates of a file go into IAU 2000.
@@ -200,17 +209,13 @@ pub fn convert_at_tags(
     files: &[SourceFile],
 ) -> Footprints<BodyFixed> {
     footprints.files = files.to_vec();
-    let is_iau2000 = |file: &u16| files[usize::from(*file)].datum == Datum::Iau2000;
-    if footprints.file.iter().all(is_iau2000) {
-        return footprints.declare();
-    }
     let at_tags = MolaClock {
         bias_s: 0.0,
         sign: TagSign::Late,
         scope: BiasScope::None,
         source: String::new(),
     };
-    convert_datum(footprints, &at_tags).footprints
+    turned(footprints, &at_tags)
 }
 
 /// How far the shots of each file moved from longitudes and latitudes `before`.

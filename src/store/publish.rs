@@ -11,6 +11,8 @@ use std::{
     path::{Component, Path, PathBuf},
 };
 
+use rayon::prelude::*;
+
 use super::{
     atomic,
     manifest::{Manifest, ProductEntry},
@@ -106,7 +108,7 @@ pub fn has_work(site_folder: &Path) -> bool {
 /// A file cannot be read or flushed.
 pub fn entries(staging: &Path, files: &[(PathBuf, u64)]) -> Result<Vec<ProductEntry>> {
     files
-        .iter()
+        .par_iter()
         .map(|(relative, rows)| {
             let path = staging.join(relative);
             atomic::sync_file(&path)?;

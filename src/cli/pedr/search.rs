@@ -14,9 +14,8 @@ use crate::{
     files::file_name,
     footprints::{AsRead, Footprints, SourceFile},
     geom::window::Region,
-    pds::archive::{Found, Judged, Opened, Query, Sink, Source, WindowLists, search},
-    products::{FoundShots, ShotsFile},
-    stages::convert_datum::convert_at_tags,
+    pds::archive::{Found, Judged, Opened, Query, Sink, Source, search},
+    products::ShotsFile,
     time::{Et, Interval},
 };
 
@@ -61,7 +60,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<()> {
         ..Answer::default()
     };
     if let (Some(format), Some(out)) = (format, &arguments.out) {
-        answer.file = Some(ShotsFile::create(out, format)?);
+        let (sources, window_ids) = (answer.files.clone(), answer.window_ids.clone());
+        answer.file = Some(ShotsFile::create(out, format, sources, window_ids)?);
     }
     let filter = arguments.filter();
     let regions = windows.iter().map(|window| Region::new(&window.shape));
@@ -188,18 +188,6 @@ impl Answer {
             self.last = Some((file, tag_s));
         }
     }
-
-    fn write(&mut self, footprints: Footprints<AsRead>, windows: &WindowLists) -> Result<()> {
-        let Some(file) = &mut self.file else {
-            return Ok(());
-        };
-        let footprints = convert_at_tags(footprints, &self.files);
-        file.write(&FoundShots {
-            footprints: &footprints,
-            windows,
-            window_ids: &self.window_ids,
-        })
-    }
 }
 
 impl Sink for Answer {
@@ -225,7 +213,10 @@ impl Sink for Answer {
             }
         }
         self.follow(&found.footprints);
-        self.write(found.footprints, &found.windows)
+        match &mut self.file {
+            Some(file) => file.write(found.footprints, &found.windows),
+            None => Ok(()),
+        }
     }
 
     fn failed(&mut self, _file: usize, failure: Error) -> Result<()> {

@@ -75,7 +75,7 @@ impl fmt::Display for ShotRejection {
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct WindowLists {
     /// Where the list of each shot ends in `windows`.
-    ends: Vec<u32>,
+    ends: Vec<usize>,
     windows: Vec<u32>,
 }
 
@@ -83,16 +83,32 @@ impl WindowLists {
     /// The windows of the shot in row `row`, in ascending order; none of a row that is not there.
     #[must_use]
     pub fn of(&self, row: usize) -> &[u32] {
-        let end = |row: usize| self.ends.get(row).map_or(0, |end| *end as usize);
+        let end = |row: usize| self.ends.get(row).map_or(0, |end| *end);
         let start = row.checked_sub(1).map_or(0, end);
         self.windows.get(start..end(row)).unwrap_or_default()
     }
 
     fn push(&mut self, windows: &[u32]) {
         self.windows.extend(windows);
-        // A stretch of a file has far fewer shots than this counts.
-        self.ends
-            .push(u32::try_from(self.windows.len()).unwrap_or(u32::MAX));
+        self.ends.push(self.windows.len());
+    }
+
+    /// Appends the lists of other shots.
+    pub fn append(&mut self, other: &Self) {
+        let before = self.windows.len();
+        self.windows.extend(&other.windows);
+        self.ends.extend(other.ends.iter().map(|end| before + end));
+    }
+
+    /// Takes the lists from row `row` on away.
+    #[must_use]
+    pub fn split_off(&mut self, row: usize) -> Self {
+        let ends = self.ends.split_off(row.min(self.ends.len()));
+        let start = self.ends.last().copied().unwrap_or(0);
+        Self {
+            windows: self.windows.split_off(start),
+            ends: ends.into_iter().map(|end| end - start).collect(),
+        }
     }
 }
 

@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use chrono::{NaiveDateTime, TimeDelta};
+use rayon::prelude::*;
 use serde_json::{Map, Value, json};
 
 use crate::{
@@ -188,10 +189,15 @@ fn instant(utc: &str) -> Result<NaiveDateTime> {
 
 /// The products by their paths, with what a reader needs to fetch and check them.
 fn assets(of: &Context) -> Result<Value> {
+    let files = of.written.par_iter();
+    let hashes: Vec<(String, u64)> = files
+        .map(|(product, _)| {
+            let path = of.directory.join(&product.path);
+            hash_file(&path).in_file(&path)
+        })
+        .collect::<Result<_>>()?;
     let mut assets = Map::new();
-    for (product, declaration) in of.written {
-        let path = of.directory.join(&product.path);
-        let (blake3, bytes) = hash_file(&path).in_file(&path)?;
+    for ((product, declaration), (blake3, bytes)) in of.written.iter().zip(hashes) {
         let relative = slashes(&product.path);
         let mut asset = json!({
             "href": format!("../{relative}"),
