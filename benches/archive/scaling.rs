@@ -8,6 +8,9 @@ use serde_json::Value;
 /// Sizes of the archives, gigabytes.
 pub(super) const SIZES_GB: [f64; 4] = [0.5, 1.0, 2.0, 4.0];
 
+/// Room for the names of lines, right of them.
+const LABELS_PX: u32 = 200;
+
 /// What is plotted, from what is nearly free to what reads everything; colours are those of Okabe and Ito.
 const SERIES: [(&str, &str, RGBColor); 7] = [
     ("indexed", "one window, with index", RGBColor(0, 114, 178)),
@@ -19,7 +22,7 @@ const SERIES: [(&str, &str, RGBColor); 7] = [
     ("scan", "one window, without index", RGBColor(0, 158, 115)),
     (
         "1000 windows",
-        "1000 windows, without index",
+        "1,000 windows, without index",
         RGBColor(230, 159, 0),
     ),
     (
@@ -41,17 +44,18 @@ const SERIES: [(&str, &str, RGBColor); 7] = [
 
 /// Draws milliseconds over gigabytes, both on logarithmic axes.
 pub(super) fn plot(path: &Path, measured: &[Value]) {
-    let root = SVGBackend::new(path, (760, 460)).into_drawing_area();
+    let root = SVGBackend::new(path, (860, 460)).into_drawing_area();
     root.fill(&WHITE).unwrap();
     let mut chart = ChartBuilder::on(&root)
         .margin(14)
+        .margin_right(LABELS_PX)
         .x_label_area_size(40)
         .y_label_area_size(60)
         .caption(
             "Searching an archive of PEDR files, two threads",
             ("sans-serif", 18),
         )
-        .build_cartesian_2d((0.4..5.0_f64).log_scale(), (0.1..100_000.0_f64).log_scale())
+        .build_cartesian_2d((0.4..5.0_f64).log_scale(), (0.05..50_000.0_f64).log_scale())
         .unwrap();
     chart
         .configure_mesh()
@@ -70,16 +74,12 @@ pub(super) fn plot(path: &Path, measured: &[Value]) {
             })
             .collect();
         let line = LineSeries::new(points.iter().copied(), colour.stroke_width(2));
-        let drawn = chart.draw_series(line.point_size(3)).unwrap();
-        drawn
-            .label(label)
-            .legend(move |(x, y)| PathElement::new([(x, y), (x + 18, y)], colour.stroke_width(2)));
+        chart.draw_series(line.point_size(3)).unwrap();
+        // Beside the end of the line, where no other line is.
+        let (x, y) = chart.backend_coord(&points[points.len() - 1]);
+        let style = ("sans-serif", 12).into_font().color(&colour);
+        root.draw(&Text::new(label, (x + 10, y - 6), style))
+            .unwrap();
     }
-    chart
-        .configure_series_labels()
-        .position(SeriesLabelPosition::UpperLeft)
-        .background_style(WHITE.mix(0.8))
-        .draw()
-        .unwrap();
     root.present().unwrap();
 }

@@ -12,8 +12,17 @@ use crate::{
 /// # Errors
 /// The folder cannot be made or written, or the disk is full; `path` is then as it was.
 pub fn write(path: &Path, bytes: &[u8]) -> Result<()> {
+    write_parts(path, &[bytes])
+}
+
+/// The same for bytes in several parts, one behind the other.
+///
+/// # Errors
+/// Those of [`write()`].
+pub fn write_parts(path: &Path, parts: &[&[u8]]) -> Result<()> {
     let staged = StagedFile::create(path)?;
-    let written = staged.writer()?.write_all(bytes);
+    let mut writer = staged.writer()?;
+    let written = parts.iter().try_for_each(|part| writer.write_all(part));
     written.map_err(IoError::on("write")).in_file(path)?;
     staged.finish()?;
     sync_folder(path.parent().unwrap_or(Path::new(".")));

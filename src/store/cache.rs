@@ -21,12 +21,12 @@ pub struct StageCache {
     forced: bool,
 }
 
-/// A stage output with its origin; the file is this struct in postcard.
+/// What stands before a stage output in its file, both in postcard: outputs are large, so they are not copied.
 #[derive(Serialize, Deserialize)]
-struct Stored {
+struct Head {
     inputs: Inputs,
     blake3: String,
-    payload: Vec<u8>,
+    payload_bytes: u64,
 }
 
 /// A stage output that cannot be stored.
@@ -70,15 +70,18 @@ impl StageCache {
             return Err(Reason::Forced);
         }
         let bytes = fs::read(self.path(label)).map_err(|_| Reason::First)?;
-        let stored: Stored = postcard::from_bytes(&bytes).map_err(|_| Reason::Damaged)?;
+        let (stored, payload): (Head, &[u8]) =
+            postcard::take_from_bytes(&bytes).map_err(|_| Reason::Damaged)?;
         let changes = inputs.changed_since(&stored.inputs);
         if !changes.is_empty() {
             return Err(Reason::Changed(changes));
         }
-        if *blake3::hash(&stored.payload).to_hex() != *stored.blake3 {
+        let is_whole =
+            u64::try_from(payload.len()).is_ok_and(|bytes| bytes == stored.payload_bytes);
+        if !is_whole || *blake3::hash(payload).to_hex() != *stored.blake3 {
             return Err(Reason::Damaged);
         }
-        let value = postcard::from_bytes(&stored.payload).map_err(|_| Reason::Damaged)?;
+        let value = postcard::from_bytes(payload).map_err(|_| Reason::Damaged)?;
         let provenance = Provenance {
             blake3: stored.blake3,
             fingerprint: inputs.fingerprint(),
@@ -100,14 +103,14 @@ impl StageCache {
             blake3: blake3::hash(&payload).to_hex().to_string(),
             fingerprint: inputs.fingerprint(),
         };
-        let stored = Stored {
+        let head = Head {
             inputs,
             blake3: provenance.blake3.clone(),
-            payload,
+            payload_bytes: payload.len() as u64,
         };
-        let bytes = postcard::to_stdvec(&stored).map_err(unstorable)?;
+        let head = postcard::to_stdvec(&head).map_err(unstorable)?;
         let path = self.path(label);
-        atomic::write(&path, &bytes).in_file(path)?;
+        atomic::write_parts(&path, &[&head, &payload]).in_file(path)?;
         Ok(Output::known(label.to_owned(), value, provenance))
     }
 
