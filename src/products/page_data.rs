@@ -6,6 +6,7 @@
 use std::{
     borrow::Cow,
     collections::BTreeMap,
+    io::{self, Write},
     path::{Path, PathBuf},
 };
 
@@ -13,14 +14,14 @@ use serde::{Deserialize, Serialize, de::DeserializeOwned};
 
 use super::{
     error::ProductError,
-    files::{read, write_bytes},
-    product::{Content, Declaration, Role, Write},
+    files::{create, finish, read},
+    product::{self, Content, Declaration, Role},
     read::ReadError,
     site::{AdjustmentProducts, GeometricProducts, ImageProducts, Program, SiteProducts},
 };
 use crate::{
     config::SiteConfig,
-    error::{Locate, Result},
+    error::{IoError, Locate, Result},
     files::file_name,
     footprints::Footprints,
     frames::BodyFixed,
@@ -44,7 +45,7 @@ pub(super) static DATA: Declaration = Declaration {
     rows: "",
     role: Role::Metadata,
     content: Content::Foreign,
-    write: Write::Site(|path, of| write(path, of.site).map(|()| Some(0))),
+    write: product::Write::Site(|path, of| write(path, of.site).map(|()| Some(0))),
     uses: &[],
 };
 
@@ -238,11 +239,17 @@ fn geometric(of: GeometricProducts<'_>) -> Geometric<'_> {
 
 /// Writes what the page of `site` is made from, and checks that it comes back.
 fn write(path: &Path, site: &SiteProducts) -> Result<()> {
-    let bytes = encoded(site).in_file(path)?;
-    write_bytes(path, &bytes)?;
+    let mut written = Hashed::new(create(path)?);
+    encode(site, &mut written).in_file(path)?;
+    let (file, hash) = written.end();
+    finish(path, file)?;
     let found: PageData = decoded(&read(path)?).in_file(path)?;
-    let again = found.with(|site| Ok(encoded(site)?));
-    if again.in_file(path)? == bytes {
+    let again = found.with(|site| {
+        let mut again = Hashed::new(io::sink());
+        encode(site, &mut again)?;
+        Ok(again.end().1)
+    });
+    if again.in_file(path)? == hash {
         return Ok(());
     }
     Err(ProductError::ReadBack {
@@ -251,9 +258,57 @@ fn write(path: &Path, site: &SiteProducts) -> Result<()> {
     .in_file(path)
 }
 
-fn encoded(site: &SiteProducts) -> std::result::Result<Vec<u8>, ProductError> {
+/// Writes what is encoded as it comes: a site with a million shots has half a gigabyte of it.
+fn encode(site: &SiteProducts, to: &mut Hashed<impl Write>) -> Result<()> {
     let data = PageData::of(site)?;
-    postcard::to_stdvec(&data).map_err(ProductError::refused("encode postcard"))
+    let encoded = postcard::to_io(&data, &mut *to).map(|_| ());
+    match to.refusal.take() {
+        Some(refusal) => Err(IoError::on("write")(refusal).into()),
+        None => Ok(encoded.map_err(ProductError::refused("encode postcard"))?),
+    }
+}
+
+/// A writer that takes the hash of what passes, and remembers why it was refused, which postcard forgets.
+struct Hashed<W> {
+    to: W,
+    hash: blake3::Hasher,
+    refusal: Option<io::Error>,
+}
+
+impl<W: Write> Hashed<W> {
+    fn new(to: W) -> Self {
+        Self {
+            to,
+            hash: blake3::Hasher::new(),
+            refusal: None,
+        }
+    }
+
+    fn end(self) -> (W, blake3::Hash) {
+        (self.to, self.hash.finalize())
+    }
+}
+
+impl<W: Write> Write for Hashed<W> {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        match self.to.write(bytes) {
+            Ok(count) => {
+                self.hash.update(&bytes[..count]);
+                Ok(count)
+            }
+            // Is tried again.
+            Err(refusal) if refusal.kind() == io::ErrorKind::Interrupted => Err(refusal),
+            Err(refusal) => {
+                let kind = refusal.kind();
+                self.refusal = Some(refusal);
+                Err(kind.into())
+            }
+        }
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.to.flush()
+    }
 }
 
 fn decoded<T: DeserializeOwned>(bytes: &[u8]) -> std::result::Result<T, ReadError> {

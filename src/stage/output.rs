@@ -47,6 +47,15 @@ impl<T> Output<T> {
         Self { label, known: None }
     }
 
+    /// The same output, by its origin, without what `lighten` takes away; as it is where others have a part in it.
+    #[must_use]
+    pub fn lightened(mut self, lighten: impl FnOnce(&mut T)) -> Self {
+        if let Some((value, _)) = self.known.as_mut().and_then(Arc::get_mut) {
+            lighten(value);
+        }
+        self
+    }
+
     /// Label of the stage, for example `register/E02-00665`.
     #[must_use]
     pub fn label(&self) -> &str {
