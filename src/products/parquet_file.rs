@@ -39,11 +39,17 @@ pub(super) struct ParquetFile<W: Write + Send> {
     columns: Vec<ArrowColumnWriter>,
     /// Rows of the group so far.
     rows: usize,
+    /// Rows of a whole one.
+    group_rows: usize,
 }
 
 impl<W: Write + Send> ParquetFile<W> {
     /// Begins a file with these columns.
     pub(super) fn new(file: W, schema: SchemaRef) -> Result<Self> {
+        Self::in_groups(file, schema, GROUP_ROWS)
+    }
+
+    fn in_groups(file: W, schema: SchemaRef, group_rows: usize) -> Result<Self> {
         let properties = schema.fields().iter().fold(
             WriterProperties::builder()
                 .set_created_by(concat!("areograph ", env!("CARGO_PKG_VERSION")).to_owned())
@@ -58,6 +64,7 @@ impl<W: Write + Send> ParquetFile<W> {
             factory,
             columns: Vec::new(),
             rows: 0,
+            group_rows,
         })
     }
 
@@ -65,10 +72,10 @@ impl<W: Write + Send> ParquetFile<W> {
     pub(super) fn write(&mut self, batch: &RecordBatch) -> Result<()> {
         let mut start = 0;
         while start < batch.num_rows() {
-            let rows = (GROUP_ROWS - self.rows).min(batch.num_rows() - start);
+            let rows = (self.group_rows - self.rows).min(batch.num_rows() - start);
             self.write_in_group(&batch.slice(start, rows))?;
             start += rows;
-            if self.rows == GROUP_ROWS {
+            if self.rows == self.group_rows {
                 self.end_group()?;
             }
         }
@@ -136,5 +143,64 @@ fn encoded(
                 .set_column_encoding(path, Encoding::BYTE_STREAM_SPLIT)
         }
         _ => properties,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use ::parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
+    use arrow::{
+        array::{Float64Array, StringArray, UInt32Array},
+        compute::concat_batches,
+        datatypes::Schema,
+    };
+
+    use super::*;
+
+    /// Rows `from` to `to`: a real, a count that is missing in every third row, a name of many rows.
+    fn rows(schema: &SchemaRef, from: u32, to: u32) -> RecordBatch {
+        let reals = Float64Array::from_iter_values((from..to).map(|row| f64::from(row).sqrt()));
+        let counts = UInt32Array::from_iter((from..to).map(|row| (row % 3 != 0).then_some(row)));
+        let names = (from..to).map(|row| format!("profile {}", row / 4));
+        let names = StringArray::from_iter_values(names);
+        let columns = vec![Arc::new(reals) as _, Arc::new(counts) as _, Arc::new(names) as _];
+        RecordBatch::try_new(Arc::clone(schema), columns).unwrap()
+    }
+
+    fn written(schema: &SchemaRef, batches: &[RecordBatch], group_rows: usize) -> Vec<u8> {
+        let mut bytes = Vec::new();
+        let mut file =
+            ParquetFile::in_groups(&mut bytes, Arc::clone(schema), group_rows).unwrap();
+        for batch in batches {
+            file.write(batch).unwrap();
+        }
+        file.finish(vec![("site", "gusev".to_owned())]).unwrap();
+        bytes
+    }
+
+    #[test]
+    fn rows_of_several_groups_come_back_in_their_order() {
+        let schema = Arc::new(Schema::new(vec![
+            Field::new("a_m", DataType::Float64, false),
+            Field::new("count", DataType::UInt32, true),
+            Field::new("profile", DataType::Utf8, false),
+        ]));
+        let all = rows(&schema, 0, 23);
+        // Batches that end inside a group, at its end, and behind several.
+        let batches = [(0, 3), (3, 5), (5, 6), (6, 6), (6, 19), (19, 23)];
+        let batches = batches.map(|(from, to)| rows(&schema, from, to));
+        let bytes = written(&schema, &batches, 5);
+        let mut file = tempfile::tempfile().unwrap();
+        file.write_all(&bytes).unwrap();
+        let reader = ParquetRecordBatchReaderBuilder::try_new(file).unwrap();
+        let groups = reader.metadata().row_groups().iter();
+        let sizes: Vec<i64> = groups.map(|group| group.num_rows()).collect();
+        assert_eq!(sizes, [5, 5, 5, 5, 3]);
+        let keys = reader.metadata().file_metadata().key_value_metadata();
+        assert!(keys.unwrap().iter().any(|entry| entry.key == "site"));
+        let read: Vec<RecordBatch> = reader.build().unwrap().map(|of| of.unwrap()).collect();
+        assert_eq!(concat_batches(&schema, &read).unwrap(), all);
+        // Groups, and so bytes, do not depend on the batches that rows come in.
+        assert_eq!(written(&schema, &[all], 5), bytes);
     }
 }

@@ -176,7 +176,7 @@ pub(super) static TABLE: Declaration = Declaration {
     write: Write::Site(|path, of| {
         let site = of.site;
         let shots = (0..site.ranges.shots.len()).map(|at| RangedShot { site, at });
-        let table = Table::new(columns(), shots.collect());
+        let table = Table::new(columns(), shots.collect()).in_words(&of.site.config.wording());
         parquet::write(path, table, Vec::new()).map(Some)
     }),
     uses: &[],

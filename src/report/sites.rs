@@ -7,8 +7,9 @@ use super::{
     html::{Cell, Column, Table, Tone, counted, escape, link, page, paragraph, verdict},
     numbers::{number, whole},
     sites_map::{self, Place},
+    source::told,
 };
-use crate::error::Result;
+use crate::{body::Body, error::Result, store::publish::PREVIOUS};
 
 /// What the page says of one site.
 #[derive(Debug, Clone, PartialEq)]
@@ -39,12 +40,27 @@ pub struct SiteSummary {
     pub images_apart_m: [Option<f64>; 2],
     /// Median height of tie points above or below the MOLA surface, likewise, metres.
     pub height_off_m: [Option<f64>; 2],
+    /// The body that it lies on.
+    pub body: Body,
     /// East longitude and areocentric latitude of the middle of the first window that is a box, degrees.
     pub place_deg: Option<(f64, f64)>,
+    /// What the products said that stood here before.
+    pub earlier: Option<Earlier>,
     /// When the products were published.
     pub finished_utc: String,
     /// Version of the program that made them.
     pub version: String,
+}
+
+/// What the products before those of today said.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Earlier {
+    /// The verdict in words.
+    pub verdict: &'static str,
+    /// Heights off the laser surface, images apart, both adjusted, and range − distance, as in [`SiteSummary`].
+    pub figures_m: [Option<f64>; 3],
+    /// When they were published.
+    pub finished_utc: String,
 }
 
 /// The page over `sites`, which stand in the order given.
@@ -72,12 +88,14 @@ pub fn sites_page(sites: &[SiteLine]) -> Result<String> {
         link(FIDELITY_FILE, "Fidelity to the papers")
     );
     let words = paragraph(
-        "Names link to the reports. Off MOLA: median height of the tie points against the MOLA surface; images apart: along \
-         track, the worst pair; range − distance: the largest mean of a profile.",
+        "Heights off: median height of the tie points against the laser surface. Images apart: along track, the worst pair. \
+         Range − distance: the largest mean of a profile.",
     );
+    let maps = Body::WORDS.map(|(_, body)| sites_map::figure(body, &places(sites, body)));
+    let maps: String = maps.into_iter().collect::<Result<_>>()?;
     let lead = [
         verdict(overall, &headline, ""),
-        sites_map::figure(&places(sites))?,
+        maps,
         table(sites),
         words,
         fidelity,
@@ -85,13 +103,14 @@ pub fn sites_page(sites: &[SiteLine]) -> Result<String> {
     Ok(page("Sites", &lead.concat(), &[]))
 }
 
-/// The sites of which it is known where they are.
-fn places(sites: &[SiteLine]) -> Vec<Place<'_>> {
+/// The sites on a body of which it is known where they are.
+fn places(sites: &[SiteLine], body: Body) -> Vec<Place<'_>> {
     let placed = sites.iter().filter_map(|site| {
+        let products = site.products.as_ref().filter(|of| of.body == body)?;
         Some(Place {
             name: &site.folder,
             tone: tone(site),
-            place_deg: site.products.as_ref()?.place_deg?,
+            place_deg: products.place_deg?,
         })
     });
     placed.collect()
@@ -116,9 +135,10 @@ fn table(sites: &[SiteLine]) -> String {
             Column::Number("shots"),
             Column::Number("profiles"),
             Column::Number("images"),
-            Column::Number("off MOLA, m: before → adjusted"),
+            Column::Number("heights off, m: before → adjusted"),
             Column::Number("images apart, m: before → adjusted"),
             Column::Number("range − distance, m"),
+            Column::Text("against the products before"),
             Column::Text("published (UTC)"),
         ],
     );
@@ -149,6 +169,40 @@ impl SiteSummary {
                 (days, ..) => format!("{} before the newest", counted(days as usize, "day")),
             }
         })
+    }
+}
+
+/// What the headline number may be, and its name among the figures of a manifest.
+const HEADLINES: [(&str, &str); 3] = [
+    ("heights off", "adjusted_height_off_surface_m"),
+    ("images apart", "adjusted_along_track_parallax_m"),
+    ("range − distance", "range_mean_m"),
+];
+
+impl SiteSummary {
+    /// How verdict and headline number moved since the products before.
+    fn trend(&self, folder: &str) -> Cell {
+        let Some(before) = &self.earlier else {
+            return dash().into();
+        };
+        let verdict = if before.verdict == self.verdict {
+            format!("{} as before", self.verdict)
+        } else {
+            format!("{} → {}", before.verdict, self.verdict)
+        };
+        let now_m = [
+            self.height_off_m[1],
+            self.images_apart_m[1],
+            self.range_mean_m,
+        ];
+        let pairs = before.figures_m.into_iter().zip(now_m).zip(HEADLINES);
+        let mut moves = pairs.filter_map(|((before_m, now_m), of)| Some((before_m?, now_m?, of)));
+        let number = moves.next().map_or_else(String::new, |(before_m, now_m, (what, name))| {
+            let text = format!("{what} {} → {} m", number(before_m, 2), number(now_m, 2));
+            let places = format!("{folder}/{PREVIOUS}#/figures/{name} /figures/{name}");
+            format!("<br><small>{}</small>", told(&text, &places))
+        });
+        Cell::Html(escape(&verdict) + &number)
     }
 }
 
@@ -194,6 +248,7 @@ fn cells(site: &SiteLine, newest: Option<DateTime<FixedOffset>>) -> Vec<Cell> {
     let range_mean_m = summary.range_mean_m.map(|mean_m| number(mean_m, 2));
     let range_mean_m = Cell::from(range_mean_m.unwrap_or_else(dash));
     cells.push(range_mean_m.told("/figures/range_mean_m"));
+    cells.push(summary.trend(&site.folder));
     cells.push(Cell::Html(format!(
         "{}<br><small>{}, areograph {}</small>",
         escape(&summary.finished_utc.replace('T', " ").replace('Z', "")),
@@ -255,7 +310,9 @@ mod tests {
             range_mean_m: Some(1.25),
             images_apart_m: [Some(261.2), Some(0.04)],
             height_off_m: [None, None],
+            body: Body::Mars,
             place_deg: Some((175.3, -14.6)),
+            earlier: None,
             finished_utc: "2026-01-01T00:00:00Z".to_owned(),
             version: "1".to_owned(),
         };

@@ -1,4 +1,4 @@
-//! Mars with all sites of an output folder, by verdict.
+//! A body with all its sites of an output folder, by verdict.
 
 use std::fmt::Write as _;
 
@@ -9,7 +9,7 @@ use super::{
     map::labels::{self, Labels},
     plots::{COLOURS, Canvas, Drawn, GRID, INK, Key, MARK, WIDTH, drawn, figure_html, quoted},
 };
-use crate::error::Result;
+use crate::{body::Body, error::Result};
 
 /// Height of the map: a degree of latitude is as long as one of longitude.
 const HEIGHT: i32 = WIDTH as i32 / 2;
@@ -31,7 +31,7 @@ pub(super) struct Place<'a> {
 ///
 /// # Errors
 /// A drawing that cannot be made.
-pub(super) fn figure(places: &[Place]) -> Result<String> {
+pub(super) fn figure(body: Body, places: &[Place]) -> Result<String> {
     if places.is_empty() {
         return Ok(String::new());
     }
@@ -49,7 +49,7 @@ pub(super) fn figure(places: &[Place]) -> Result<String> {
     ];
     let words = "Middles of the sites' first windows, 0° E at the left edge, lines every 30°; sites whose window is an outline \
                  are in the table only.";
-    Ok(figure_html("Sites on Mars", &svg, &keys, words, &csv))
+    Ok(figure_html(&format!("Sites on {body}"), &svg, &keys, words, &csv))
 }
 
 fn draw<'a>(places: &[Place], area: &Canvas<'a>) -> Drawn<'a> {

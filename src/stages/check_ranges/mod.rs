@@ -230,7 +230,7 @@ pub fn check_ranges<'a>(
     watch: impl Into<Watch<'a>>,
 ) -> Result<RangeCheck> {
     let watch = watch.into();
-    watch.expect(profiles.iter().map(|profile| profile.rows.len()).sum());
+    watch.announce(profiles.iter().map(|profile| profile.rows.len()).sum());
     let mut shots = ShotResiduals::default();
     let mut checked = Vec::with_capacity(profiles.len());
     for (index, profile) in (0_u32..).zip(profiles) {
