@@ -91,6 +91,18 @@ pub fn with_minus(sentence: &str) -> String {
     written
 }
 
+/// A number with its sign and so many decimals, for sentences; what rounds to zero has no sign.
+#[must_use]
+pub fn signed(value: f64, decimals: usize) -> String {
+    let size = format!("{:.decimals$}", value.abs());
+    let is_zero = !size.contains(|digit| matches!(digit, '1'..='9'));
+    match value {
+        _ if is_zero => size,
+        value if value < 0.0 => format!("{MINUS}{size}"),
+        _ => format!("+{size}"),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -140,6 +152,13 @@ mod tests {
             table.of("MOLA, areocentric, IAU 2000"),
             "ALT, areocentric, IAU 2000"
         );
+    }
+
+    #[test]
+    fn what_rounds_to_zero_has_no_sign() {
+        let texts = [-0.4, 0.4, -1.15, 1.15].map(|value| signed(value, 0));
+        assert_eq!(texts, ["0", "0", "−1", "+1"]);
+        assert_eq!(signed(-0.117, 3), "−0.117");
     }
 
     #[test]

@@ -85,7 +85,10 @@ fn read(geometric: &GeometricProducts) -> String {
         }
     }
     if outliers > 0 {
-        words += &format!(" {outliers} are reprojection outliers and do not count in the pairs.");
+        words += &format!(
+            " {}, left out of the pairs.",
+            counted(outliers, "reprojection outlier")
+        );
     }
     paragraph(&words) + &rejected(geometric)
 }

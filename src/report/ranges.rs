@@ -4,7 +4,7 @@ mod plots;
 
 use super::{
     html::{Cell, Column, Table, folded, heading, list, paragraph},
-    numbers::whole,
+    numbers::{number, whole},
     plots::label,
     section::Section,
 };
@@ -240,19 +240,26 @@ fn three_ways(site: &SiteProducts) -> String {
             ],
         );
     }
-    let words = [
-        "Limits apply to means without outliers.".to_owned(),
-        "Crossover radius: the MOLA team's adjustment, which moves footprints, not ranges."
-            .to_owned(),
-        format!(
-            "PEDR's own orbit: without kernels; beyond ±{} m the file was read wrongly.",
-            limits.decoding_max_m
-        ),
-        format!(
-            "PEDR − kernels: spacecraft positions, inertial axes; beyond {} m orbit, clock or datum differ. Trajectory \
-             tabulated to {:.1e} m.",
-            limits.orbit_max_m, site.ranges.trajectory_error_m
-        ),
-    ];
+    let mut words = vec!["Limits apply to means without outliers.".to_owned()];
+    if site.config.shots.is_empty() {
+        words.push(
+            "Crossover radius: the MOLA team's adjustment, which moves footprints, not ranges."
+                .to_owned(),
+        );
+    }
+    words.push(format!(
+        "PEDR's own orbit: without kernels; beyond ±{} m the file was read wrongly.",
+        limits.decoding_max_m
+    ));
+    let mut orbits = format!(
+        "PEDR − kernels: spacecraft positions, inertial axes; beyond {} m orbit, clock or datum differ.",
+        limits.orbit_max_m
+    );
+    // A table's own spacecraft and that of support data are not tabulated.
+    if site.ranges.trajectory_error_m > 0.0 {
+        let error_mm = 1e3 * site.ranges.trajectory_error_m;
+        orbits += &format!(" Trajectory tabulated to {} mm.", number(error_mm, 3));
+    }
+    words.push(orbits);
     table.finish() + &list(&words)
 }

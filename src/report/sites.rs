@@ -72,10 +72,15 @@ pub fn sites_page(sites: &[SiteLine]) -> Result<String> {
     let unfinished = sites.iter().filter(|site| site.products.is_none()).count();
     let (valid, remarks) = (with(Tone::Good), with(Tone::Remarks));
     let invalid = with(Tone::Bad) - unfinished;
-    let headline = format!(
-        "{} sites: {invalid} invalid or failed, {unfinished} without products, {remarks} valid with remarks, {valid} valid.",
-        sites.len()
-    );
+    let parts = [
+        (invalid, "invalid or failed"),
+        (unfinished, "without products"),
+        (remarks, "valid with remarks"),
+        (valid, "valid"),
+    ];
+    let parts = parts.into_iter().filter(|(count, _)| *count > 0);
+    let parts: Vec<String> = parts.map(|(count, of)| format!("{count} {of}")).collect();
+    let headline = format!("{}: {}.", counted(sites.len(), "site"), parts.join(", "));
     let overall = if invalid + unfinished > 0 {
         Tone::Bad
     } else if remarks > 0 {
@@ -250,12 +255,17 @@ fn cells(site: &SiteLine, newest: Option<DateTime<FixedOffset>>) -> Vec<Cell> {
     cells.push(range_mean_m.told("/figures/range_mean_m"));
     cells.push(summary.trend(&site.folder));
     cells.push(Cell::Html(format!(
-        "{}<br><small>{}, areograph {}</small>",
-        escape(&summary.finished_utc.replace('T', " ").replace('Z', "")),
+        "<span class=\"short\">{}</span><br><small>{}, areograph {}</small>",
+        escape(&minute(&summary.finished_utc)),
         summary.age(newest),
         escape(&summary.version)
     )));
     cells
+}
+
+/// Day and minute of an instant.
+fn minute(utc: &str) -> String {
+    utc.get(..16).unwrap_or(utc).replace('T', " ")
 }
 
 /// A figure before and after the adjustment, with a dash where there is none.
@@ -332,7 +342,7 @@ mod tests {
         ])
         .unwrap();
         assert!(page.contains(
-            "4 sites: 2 invalid or failed, 1 without products, 0 valid with remarks, 1 valid."
+            "4 sites: 2 invalid or failed, 1 without products, 1 valid."
         ));
         assert!(page.contains("mean of &lt;x&gt;; and 1 more"));
         assert!(page.contains("href=\"good/report/index.html\""));

@@ -20,7 +20,7 @@ use super::{
 };
 use crate::{
     config::{LimitsConfig, OrientationConfig, RangeCheckConfig},
-    wording::{Wording, with_minus},
+    wording::{Wording, signed, with_minus},
 };
 
 /// Whether the products keep the limits of the configuration.
@@ -240,8 +240,9 @@ fn doubt(scan: &BiasScan, configured_s: f64) -> Option<String> {
     // Written so that NaN counts.
     (!(apart_s <= clock_limit_s(uncertainty_s))).then(|| {
         format!(
-            "its ranges fit a clock correction of {best_s:+.4} ± {uncertainty_s:.4} s, not the configured \
-             {configured_s:+.3} s"
+            "its ranges fit a clock correction of {} ± {uncertainty_s:.4} s, not the configured {} s",
+            signed(best_s, 4),
+            signed(configured_s, 3)
         )
     })
 }
