@@ -98,6 +98,7 @@ pub fn sites_page(sites: &[SiteLine]) -> Result<String> {
     );
     let maps = Body::WORDS.map(|(_, body)| sites_map::figure(body, &places(sites, body)));
     let maps: String = maps.into_iter().collect::<Result<_>>()?;
+    let maps = format!("<div class=\"plots\">\n{maps}</div>\n");
     let lead = [
         verdict(overall, &headline, ""),
         maps,
@@ -143,7 +144,7 @@ fn table(sites: &[SiteLine]) -> String {
             Column::Number("heights off, m: before → adjusted"),
             Column::Number("images apart, m: before → adjusted"),
             Column::Number("range − distance, m"),
-            Column::Text("against the products before"),
+            Column::Text("against the run before"),
             Column::Text("published (UTC)"),
         ],
     );
@@ -203,11 +204,17 @@ impl SiteSummary {
         let pairs = before.figures_m.into_iter().zip(now_m).zip(HEADLINES);
         let mut moves = pairs.filter_map(|((before_m, now_m), of)| Some((before_m?, now_m?, of)));
         let number = moves.next().map_or_else(String::new, |(before_m, now_m, (what, name))| {
-            let text = format!("{what} {} → {} m", number(before_m, 2), number(now_m, 2));
-            let places = format!("{folder}/{PREVIOUS}#/figures/{name} /figures/{name}");
-            format!("<br><small>{}</small>", told(&text, &places))
+            let [before, now] = [before_m, now_m].map(|metres| number(metres, 2));
+            let moved = if before == now {
+                told(&format!("{what} {now} m"), &format!("/figures/{name}"))
+            } else {
+                let places = format!("{folder}/{PREVIOUS}#/figures/{name} /figures/{name}");
+                told(&format!("{what} {before} → {now} m"), &places)
+            };
+            format!("<br><small>{moved}</small>")
         });
-        Cell::Html(escape(&verdict) + &number)
+        let since = format!("<br><small>since {}</small>", escape(&minute(&before.finished_utc)));
+        Cell::Html(escape(&verdict) + &number + &since)
     }
 }
 
@@ -348,6 +355,21 @@ mod tests {
         assert!(page.contains("href=\"good/report/index.html\""));
         assert!(page.contains("<small>a &lt;kernel&gt; is gone</small>"));
         assert!(page.contains("261.2 → 0.0"));
+        // What changed since the products before; their own verdict stays where it is the same.
+        let mut moved = summary("valid", &[]);
+        moved.earlier = Some(Earlier {
+            verdict: "INVALID",
+            figures_m: [None, Some(31.5), Some(1.25)],
+            finished_utc: String::new(),
+        });
+        let trend = sites_page(&[line("moved", Some(moved.clone()))]).unwrap();
+        assert!(trend.contains("INVALID → valid<br>"));
+        assert!(trend.contains("images apart 31.50 → 0.04 m"));
+        moved.verdict = "INVALID";
+        moved.images_apart_m = [None, None];
+        let trend = sites_page(&[line("moved", Some(moved))]).unwrap();
+        assert!(trend.contains("INVALID as before<br>"));
+        assert!(trend.contains("range − distance 1.25 m"));
         // All of the three ran at the same time; an older one says so.
         assert_eq!(page.matches("newest, areograph 1").count(), 3);
         let mut older = summary("valid", &[]);

@@ -18,6 +18,8 @@ const HEIGHT: i32 = WIDTH as i32 / 2;
 /// Degrees between lines, and between named ones.
 const STEP_DEG: i32 = 30;
 const NAMED_DEG: i32 = 90;
+/// Half the size of a mark.
+const MARK_SIZE: i32 = 12;
 /// Around the map, for marks on its edge and names of lines.
 const MARGIN: i32 = 40;
 /// Colours of valid sites and of those with remarks.
@@ -82,6 +84,9 @@ fn draw<'a>(places: &[Place], area: &Canvas<'a>) -> Drawn<'a> {
     let frame = [(MARGIN, MARGIN), (right, bottom)];
     area.draw(&Rectangle::new(frame, INK.stroke_width(2)))?;
     let mut names = Labels::new(WIDTH as i32, HEIGHT);
+    for place in places {
+        names.keep_off(pixel(place.place_deg), MARK_SIZE);
+    }
     // The worst over the others, where sites lie close together.
     let order = [Tone::Good, Tone::Remarks, Tone::Bad];
     let sorted = order
