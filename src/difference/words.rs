@@ -41,7 +41,11 @@ pub fn quantity(value: f64) -> String {
 /// A power of ten behind its base.
 fn raised(power: &str) -> String {
     const DIGITS: [char; 10] = ['⁰', '¹', '²', '³', '⁴', '⁵', '⁶', '⁷', '⁸', '⁹'];
-    let digit = |letter: char| letter.to_digit(10).map_or('⁻', |digit| DIGITS[digit as usize]);
+    let digit = |letter: char| {
+        letter
+            .to_digit(10)
+            .map_or('⁻', |digit| DIGITS[digit as usize])
+    };
     power.chars().map(digit).collect()
 }
 
@@ -233,7 +237,11 @@ impl RunDifference {
             .map(|profile| match (&profile.a, &profile.b) {
                 (Some(a), Some(b)) => {
                     let change_m = b.range_minus_distance_m.mean - a.range_minus_distance_m.mean;
-                    format!("{} mean {} m", profile.profile, wording::signed(change_m, 3))
+                    format!(
+                        "{} mean {} m",
+                        profile.profile,
+                        wording::signed(change_m, 3)
+                    )
                 }
                 (Some(_), None) => format!("{} only in A", profile.profile),
                 _ => format!("{} only in B", profile.profile),

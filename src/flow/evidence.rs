@@ -179,7 +179,9 @@ pub(super) fn notes(config: &SiteConfig, site: &Site) -> Result<Vec<String>> {
     if let Some(ties) = &site.ties {
         notes.extend(ties.value()?.notes());
     }
-    let said = notes.iter().map(|note| with_minus(&config.wording().of(&**note)));
+    let said = notes
+        .iter()
+        .map(|note| with_minus(&config.wording().of(&**note)));
     Ok(said.collect())
 }
 

@@ -163,14 +163,17 @@ mod tests {
         let counts = UInt32Array::from_iter((from..to).map(|row| (row % 3 != 0).then_some(row)));
         let names = (from..to).map(|row| format!("profile {}", row / 4));
         let names = StringArray::from_iter_values(names);
-        let columns = vec![Arc::new(reals) as _, Arc::new(counts) as _, Arc::new(names) as _];
+        let columns = vec![
+            Arc::new(reals) as _,
+            Arc::new(counts) as _,
+            Arc::new(names) as _,
+        ];
         RecordBatch::try_new(Arc::clone(schema), columns).unwrap()
     }
 
     fn written(schema: &SchemaRef, batches: &[RecordBatch], group_rows: usize) -> Vec<u8> {
         let mut bytes = Vec::new();
-        let mut file =
-            ParquetFile::in_groups(&mut bytes, Arc::clone(schema), group_rows).unwrap();
+        let mut file = ParquetFile::in_groups(&mut bytes, Arc::clone(schema), group_rows).unwrap();
         for batch in batches {
             file.write(batch).unwrap();
         }

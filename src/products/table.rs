@@ -298,7 +298,10 @@ impl<'a> Table<'a> {
     /// With the columns at these places alone, in this order; the table must have them.
     #[cfg(feature = "sql")]
     pub(super) fn pick(mut self, places: &[usize]) -> Self {
-        self.columns = places.iter().map(|place| self.columns[*place].clone()).collect();
+        self.columns = places
+            .iter()
+            .map(|place| self.columns[*place].clone())
+            .collect();
         self
     }
 
@@ -365,7 +368,10 @@ fn pieces(rows: usize, size: usize) -> impl Iterator<Item = Range<usize>> {
 
 /// What columns are, whatever the rows.
 pub(super) fn meanings<R>(columns: &[Column<R>]) -> Vec<Meaning> {
-    columns.iter().map(|column| column.meaning.clone()).collect()
+    columns
+        .iter()
+        .map(|column| column.meaning.clone())
+        .collect()
 }
 
 #[cfg(test)]

@@ -96,7 +96,9 @@ fn overview(adjusted: &Adjusted) -> String {
     sentence(
         "{}, {} and {} adjusted together in {}; {} degrees of freedom. Unit-weight σ of tie points {} along track, {} across: \
          {}. σ0 of all observations: {}.",
-        &numbers.each_ref().map(|(number, place)| (number.clone(), &**place)),
+        &numbers
+            .each_ref()
+            .map(|(number, place)| (number.clone(), &**place)),
     )
 }
 

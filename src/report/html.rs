@@ -71,11 +71,7 @@ impl Section {
     }
 
     /// A section with a name of its own in links.
-    pub(super) fn named(
-        anchor: &str,
-        heading: impl Into<Cow<'static, str>>,
-        body: String,
-    ) -> Self {
+    pub(super) fn named(anchor: &str, heading: impl Into<Cow<'static, str>>, body: String) -> Self {
         Self {
             anchor: anchor.to_owned(),
             heading: heading.into(),

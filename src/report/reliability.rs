@@ -52,8 +52,9 @@ pub(super) fn absolute(geometric: &GeometricProducts, adjustment: &AdjustmentPro
         "adjustment.json#/adjustment/heights/mean_sigma_m/2",
     ];
     let axes = ties.corrections_m.iter().zip(MOVED);
-    let mut numbers: Vec<(String, &str)> =
-        axes.map(|(axis, place)| (label(axis.mean, 1), place)).collect();
+    let mut numbers: Vec<(String, &str)> = axes
+        .map(|(axis, place)| (label(axis.mean, 1), place))
+        .collect();
     numbers.push((registration.to_owned(), ""));
     let determined = match &adjustment.adjusted.heights {
         Some(heights) => {
@@ -74,7 +75,9 @@ pub(super) fn absolute(geometric: &GeometricProducts, adjustment: &AdjustmentPro
         }
     };
     sentence(
-        &format!("Tie points moved by {{}}, {{}}, {{}} m in X, Y, Z on average. {{}}; {determined}."),
+        &format!(
+            "Tie points moved by {{}}, {{}}, {{}} m in X, Y, Z on average. {{}}; {determined}."
+        ),
         &numbers,
     )
 }

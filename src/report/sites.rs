@@ -203,17 +203,22 @@ impl SiteSummary {
         ];
         let pairs = before.figures_m.into_iter().zip(now_m).zip(HEADLINES);
         let mut moves = pairs.filter_map(|((before_m, now_m), of)| Some((before_m?, now_m?, of)));
-        let number = moves.next().map_or_else(String::new, |(before_m, now_m, (what, name))| {
-            let [before, now] = [before_m, now_m].map(|metres| number(metres, 2));
-            let moved = if before == now {
-                told(&format!("{what} {now} m"), &format!("/figures/{name}"))
-            } else {
-                let places = format!("{folder}/{PREVIOUS}#/figures/{name} /figures/{name}");
-                told(&format!("{what} {before} → {now} m"), &places)
-            };
-            format!("<br><small>{moved}</small>")
-        });
-        let since = format!("<br><small>since {}</small>", escape(&minute(&before.finished_utc)));
+        let number = moves
+            .next()
+            .map_or_else(String::new, |(before_m, now_m, (what, name))| {
+                let [before, now] = [before_m, now_m].map(|metres| number(metres, 2));
+                let moved = if before == now {
+                    told(&format!("{what} {now} m"), &format!("/figures/{name}"))
+                } else {
+                    let places = format!("{folder}/{PREVIOUS}#/figures/{name} /figures/{name}");
+                    told(&format!("{what} {before} → {now} m"), &places)
+                };
+                format!("<br><small>{moved}</small>")
+            });
+        let since = format!(
+            "<br><small>since {}</small>",
+            escape(&minute(&before.finished_utc))
+        );
         Cell::Html(escape(&verdict) + &number + &since)
     }
 }
@@ -348,9 +353,7 @@ mod tests {
             },
         ])
         .unwrap();
-        assert!(page.contains(
-            "4 sites: 2 invalid or failed, 1 without products, 1 valid."
-        ));
+        assert!(page.contains("4 sites: 2 invalid or failed, 1 without products, 1 valid."));
         assert!(page.contains("mean of &lt;x&gt;; and 1 more"));
         assert!(page.contains("href=\"good/report/index.html\""));
         assert!(page.contains("<small>a &lt;kernel&gt; is gone</small>"));

@@ -56,7 +56,13 @@ pub(super) fn figure(body: Body, places: &[Place]) -> Result<String> {
     ];
     let words = "Middles of the sites' first windows, 0° E at the left edge, lines every 30°. Sites with an outline for a \
                  window are in the table only.";
-    Ok(figure_html(&format!("Sites on {body}"), &svg, &keys, words, &csv))
+    Ok(figure_html(
+        &format!("Sites on {body}"),
+        &svg,
+        &keys,
+        words,
+        &csv,
+    ))
 }
 
 fn draw<'a>(places: &[Place], area: &Canvas<'a>) -> Drawn<'a> {

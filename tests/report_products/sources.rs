@@ -289,7 +289,9 @@ fn hardly_a_number_of_the_text_is_without_its_place() {
             let piece = format!("{start}{}", piece.split(end).next().unwrap());
             marked += piece.matches(" data-from=").count();
             let rest = text(&without(&piece, "<span data-from", "</span>"));
-            let is_known = TEXTS.iter().any(|(words, _)| text(&piece).starts_with(words));
+            let is_known = TEXTS
+                .iter()
+                .any(|(words, _)| text(&piece).starts_with(words));
             let is_command = piece.contains("<code>") || piece.contains("BLAKE3");
             if !numbers(&rest).is_empty() && !is_known && !is_command {
                 unmarked.push(text(&piece));

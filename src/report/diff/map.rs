@@ -66,9 +66,7 @@ pub(super) fn figure_of(site: &RunDifference) -> Result<String> {
         told.push(format!("{} {name}", whole(arrows.len())));
         let places = arrows.iter().map(|arrow| arrow.from).collect();
         panel.series.push(Series::dots(name, colour, places));
-        let drawn = |arrow: &Arrow| {
-            METRES_PER_KM * arrow.by.0.hypot(arrow.by.1) > DRAWN_FROM_M
-        };
+        let drawn = |arrow: &Arrow| METRES_PER_KM * arrow.by.0.hypot(arrow.by.1) > DRAWN_FROM_M;
         if arrows.iter().any(drawn) {
             panel.arrows.push(Arrows {
                 label: format!("{name}, B − A"),
