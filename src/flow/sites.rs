@@ -14,7 +14,7 @@ use crate::{
         atomic,
         manifest::{Manifest, figures},
         page::SITES_PAGE,
-        publish::{has_work, last_failure, read_manifest, read_previous},
+        publish::{PREVIOUS, has_work, last_failure, read_manifest, read_previous},
     },
 };
 
@@ -36,7 +36,9 @@ pub fn publish_sites(out: &Path) -> Result<PathBuf> {
         // Folders that no run ever worked in are none of our business.
         if manifest.is_some() || has_work(&folder) {
             let products = manifest.as_ref().map(|manifest| SiteSummary {
-                earlier: read_previous(&folder).as_ref().map(earlier),
+                earlier: read_previous(&folder)
+                    .as_ref()
+                    .map(|manifest| earlier(manifest, &name)),
                 ..summary(manifest)
             });
             lines.insert(name.into_owned(), (products, failure));
@@ -86,7 +88,7 @@ fn place_deg(keys: &BTreeMap<String, String>) -> Option<(f64, f64)> {
 }
 
 /// What the products said that stood there before.
-fn earlier(manifest: &Manifest) -> Earlier {
+fn earlier(manifest: &Manifest, folder: &str) -> Earlier {
     let SiteSummary {
         verdict,
         range_mean_m,
@@ -99,6 +101,7 @@ fn earlier(manifest: &Manifest) -> Earlier {
         verdict,
         figures_m: [off_m, apart_m, range_mean_m],
         finished_utc,
+        manifest: format!("{folder}/{PREVIOUS}"),
     }
 }
 

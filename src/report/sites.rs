@@ -9,7 +9,7 @@ use super::{
     sites_map::{self, Place},
     source::told,
 };
-use crate::{body::Body, error::Result, store::publish::PREVIOUS};
+use crate::{body::Body, error::Result};
 
 /// What the page says of one site.
 #[derive(Debug, Clone, PartialEq)]
@@ -61,6 +61,8 @@ pub struct Earlier {
     pub figures_m: [Option<f64>; 3],
     /// When they were published.
     pub finished_utc: String,
+    /// Where their manifest is, from the page.
+    pub manifest: String,
 }
 
 /// The page over `sites`, which stand in the order given.
@@ -187,7 +189,7 @@ const HEADLINES: [(&str, &str); 3] = [
 
 impl SiteSummary {
     /// How verdict and headline number moved since the products before.
-    fn trend(&self, folder: &str) -> Cell {
+    fn trend(&self) -> Cell {
         let Some(before) = &self.earlier else {
             return dash().into();
         };
@@ -206,12 +208,12 @@ impl SiteSummary {
         let number = moves
             .next()
             .map_or_else(String::new, |(before_m, now_m, (what, name))| {
-                let [before, now] = [before_m, now_m].map(|metres| number(metres, 2));
-                let moved = if before == now {
-                    told(&format!("{what} {now} m"), &format!("/figures/{name}"))
+                let [was, is] = [before_m, now_m].map(|metres| number(metres, 2));
+                let moved = if was == is {
+                    told(&format!("{what} {is} m"), &format!("/figures/{name}"))
                 } else {
-                    let places = format!("{folder}/{PREVIOUS}#/figures/{name} /figures/{name}");
-                    told(&format!("{what} {before} → {now} m"), &places)
+                    let places = format!("{}#/figures/{name} /figures/{name}", before.manifest);
+                    told(&format!("{what} {was} → {is} m"), &places)
                 };
                 format!("<br><small>{moved}</small>")
             });
@@ -265,7 +267,7 @@ fn cells(site: &SiteLine, newest: Option<DateTime<FixedOffset>>) -> Vec<Cell> {
     let range_mean_m = summary.range_mean_m.map(|mean_m| number(mean_m, 2));
     let range_mean_m = Cell::from(range_mean_m.unwrap_or_else(dash));
     cells.push(range_mean_m.told("/figures/range_mean_m"));
-    cells.push(summary.trend(&site.folder));
+    cells.push(summary.trend());
     cells.push(Cell::Html(format!(
         "<span class=\"short\">{}</span><br><small>{}, areograph {}</small>",
         escape(&minute(&summary.finished_utc)),
@@ -364,6 +366,7 @@ mod tests {
             verdict: "INVALID",
             figures_m: [None, Some(31.5), Some(1.25)],
             finished_utc: String::new(),
+            manifest: "moved/before.json".to_owned(),
         });
         let trend = sites_page(&[line("moved", Some(moved.clone()))]).unwrap();
         assert!(trend.contains("INVALID → valid<br>"));

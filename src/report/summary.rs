@@ -238,7 +238,11 @@ fn by_ranges(site: &SiteProducts) -> Option<KeyNumber> {
         value: told(&format!("{} m", signed(mean_m, 2)), &place),
         note: match site.profiles.len() {
             1 => format!("mean of profile {profile}"),
-            count => format!("largest mean of {count} profiles, {profile}"),
+            count => {
+                let profiles = counted(count, "profile");
+                let profiles = told(&profiles, "manifest.json#/counts/profiles");
+                format!("largest mean of {profiles}, {profile}")
+            }
         },
     })
 }
