@@ -148,7 +148,9 @@ fn encoded(
 
 #[cfg(test)]
 mod tests {
-    use ::parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
+    use ::parquet::{
+        arrow::arrow_reader::ParquetRecordBatchReaderBuilder, file::metadata::RowGroupMetaData,
+    };
     use arrow::{
         array::{Float64Array, StringArray, UInt32Array},
         compute::concat_batches,
@@ -160,7 +162,9 @@ mod tests {
     /// Rows `from` to `to`: a real, a count that is missing in every third row, a name of many rows.
     fn rows(schema: &SchemaRef, from: u32, to: u32) -> RecordBatch {
         let reals = Float64Array::from_iter_values((from..to).map(|row| f64::from(row).sqrt()));
-        let counts = UInt32Array::from_iter((from..to).map(|row| (row % 3 != 0).then_some(row)));
+        let counts: UInt32Array = (from..to)
+            .map(|row| (row % 3 != 0).then_some(row))
+            .collect();
         let names = (from..to).map(|row| format!("profile {}", row / 4));
         let names = StringArray::from_iter_values(names);
         let columns = vec![
@@ -197,11 +201,15 @@ mod tests {
         file.write_all(&bytes).unwrap();
         let reader = ParquetRecordBatchReaderBuilder::try_new(file).unwrap();
         let groups = reader.metadata().row_groups().iter();
-        let sizes: Vec<i64> = groups.map(|group| group.num_rows()).collect();
+        let sizes: Vec<i64> = groups.map(RowGroupMetaData::num_rows).collect();
         assert_eq!(sizes, [5, 5, 5, 5, 3]);
         let keys = reader.metadata().file_metadata().key_value_metadata();
         assert!(keys.unwrap().iter().any(|entry| entry.key == "site"));
-        let read: Vec<RecordBatch> = reader.build().unwrap().map(|of| of.unwrap()).collect();
+        let read: Vec<RecordBatch> = reader
+            .build()
+            .unwrap()
+            .map(std::result::Result::unwrap)
+            .collect();
         assert_eq!(concat_batches(&schema, &read).unwrap(), all);
         // Groups, and so bytes, do not depend on the batches that rows come in.
         assert_eq!(written(&schema, &[all], 5), bytes);

@@ -68,8 +68,7 @@ fn overview(adjusted: &Adjusted) -> String {
     } else {
         "along track worse than configured"
     };
-    const OF: &str = "adjustment.json#/adjustment/summary";
-    let at = |pointer: &str| format!("{OF}{pointer}");
+    let at = |pointer: &str| format!("adjustment.json#/adjustment/summary{pointer}");
     let numbers = [
         (
             counted(adjusted.images.len(), "image"),

@@ -336,13 +336,13 @@ fn footprints(geometric: &GeometricProducts) -> String {
 }
 
 fn apart(check: &HeightCheck) -> String {
-    let Some(apart) = &check.apart else {
-        return paragraph("With a single profile nothing independent tests the surface.");
-    };
     const OF: [&str; 2] = [
         "|adjustment.json#/before/heights/profiles_apart/mean_m",
         "adjustment.json#/before/heights/profiles_apart/sigma_m",
     ];
+    let Some(apart) = &check.apart else {
+        return paragraph("With a single profile nothing independent tests the surface.");
+    };
     let [first, second] = &apart.profiles;
     let (upper, lower) = if apart.mean_m < 0.0 {
         (second, first)

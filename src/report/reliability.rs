@@ -31,16 +31,6 @@ const BLUNDERS_SHOWN: usize = 20;
 
 /// What the adjustment determines and what it does not, with numbers.
 pub(super) fn absolute(geometric: &GeometricProducts, adjustment: &AdjustmentProducts) -> String {
-    let summary = &adjustment.adjusted.summary;
-    let ties = &summary.ties;
-    if ties.corrections_m[0].n == 0 {
-        return paragraph("No tie point took part.");
-    }
-    let registration = if adjustment.images_agree {
-        "Relative registration is corrected"
-    } else {
-        "Relative registration is not corrected"
-    };
     const MOVED: [&str; 3] = [
         "adjustment.json#/adjustment/summary/ties/corrections_m/0/mean",
         "adjustment.json#/adjustment/summary/ties/corrections_m/1/mean",
@@ -51,6 +41,16 @@ pub(super) fn absolute(geometric: &GeometricProducts, adjustment: &AdjustmentPro
         "adjustment.json#/adjustment/heights/mean_sigma_m/1",
         "adjustment.json#/adjustment/heights/mean_sigma_m/2",
     ];
+    let summary = &adjustment.adjusted.summary;
+    let ties = &summary.ties;
+    if ties.corrections_m[0].n == 0 {
+        return paragraph("No tie point took part.");
+    }
+    let registration = if adjustment.images_agree {
+        "Relative registration is corrected"
+    } else {
+        "Relative registration is not corrected"
+    };
     let axes = ties.corrections_m.iter().zip(MOVED);
     let mut numbers: Vec<(String, &str)> = axes
         .map(|(axis, place)| (label(axis.mean, 1), place))

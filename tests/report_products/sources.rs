@@ -252,7 +252,7 @@ fn hardly_a_number_of_a_table_is_without_its_place() {
 }
 
 /// Paragraphs and lists with numbers that no document tells, by their first words, with what holds them instead.
-const TEXTS: [(&str, &str); 17] = [
+const TEXTS: [(&str, &str); 18] = [
     ("Relief alone", "tests/report_geometric"),
     ("Surface kriged", "300 m is part of what roughness means"),
     ("At the tie points the surface", "names of profiles"),
@@ -267,6 +267,7 @@ const TEXTS: [(&str, &str); 17] = [
     ("Tolerance", "the method"),
     ("D = √", "a formula"),
     ("1 PEDR file", "a note of the manifest"),
+    ("−6.00 m largest mean", "the number of a profile"),
     ("ap18933l.b:", "a note of the manifest"),
     ("ap19043k.b:", "a note of the manifest"),
     ("image E02-", "a note of the manifest"),
