@@ -235,7 +235,7 @@ impl InputFiles {
     ) -> Result<Vec<HashedFile>> {
         let watch = watch.into();
         let unknown = paths.iter().filter(|path| !self.knows(path)).count();
-        watch.expect(unknown);
+        watch.announce(unknown);
         let hash = |path: &PathBuf| {
             watch.check()?;
             let is_known = self.knows(path);

@@ -36,3 +36,4 @@ pub mod ties;
 pub mod time;
 pub mod units;
 pub mod watch;
+pub mod wording;

@@ -89,7 +89,7 @@ impl<'a> Watch<'a> {
     }
 
     /// So many more things are to be done.
-    pub fn expect(&self, more: usize) {
+    pub fn announce(&self, more: usize) {
         if let Some(counter) = self.counter {
             counter.all.fetch_add(more as u64, Ordering::Relaxed);
         }
@@ -119,9 +119,9 @@ mod tests {
         let tell = |count: Count| told.lock().unwrap().push((count.done, count.all));
         let (stop, counter) = (AtomicBool::new(false), Counter::new(&tell));
         let watch = Watch::counted(&stop, &counter);
-        watch.expect(3);
+        watch.announce(3);
         watch.step(1, "shots");
-        watch.expect(2);
+        watch.announce(2);
         watch.step(4, "shots");
         assert_eq!(*told.lock().unwrap(), [(1, 3), (5, 5)]);
         assert!(watch.check().is_ok());

@@ -37,6 +37,7 @@ const FLOORS: [&[&str]; 7] = [
         "kernel_source",
         "line_times",
         "watch",
+        "wording",
     ],
     &["geom", "config", "imaging"],
     &["spice", "pds", "scene"],

@@ -313,7 +313,7 @@ const MISTAKES: &[Mistake] = &[
         "clock_bias_with_the_wrong_sign",
         |case| site(case, "sign = \"late\"", "sign = \"early\""),
         End::Invalid,
-        "they agree when time tags are corrected by -0.11",
+        "they agree when time tags are corrected by −0.11",
     ),
     (
         "orbit_300_m_ahead",

@@ -366,9 +366,9 @@ fn corrections_of_images_and_their_ranges_are_told() {
 fn what_cannot_be_trusted_is_said() {
     let site = Site::gusev();
     let page = site.page();
-    let text = section(&page, SECTIONS[1]);
+    let words = text(section(&page, SECTIONS[1]));
     let [east_m, north_m, up_m] = site.adjusted.heights.unwrap().mean_sigma_m;
-    assert!(text.contains(&format!(
+    assert!(words.contains(&format!(
         "Relative registration is corrected; heights follow MOLA to {up_m:.1} m on average; position is known to \
          {east_m:.0} m east and {north_m:.0} m north, by orbit and attitude."
     )));
@@ -383,7 +383,7 @@ fn what_cannot_be_trusted_is_said() {
     let correlated = &site.adjusted.summary.correlated;
     let most = correlated.iter().map(|of| of.2.abs()).fold(0.0, f64::max);
     if correlated.is_empty() {
-        assert!(text.contains("No two unknowns of the orientation correlate by more than 0.95."));
+        assert!(words.contains("No two unknowns of the orientation correlate by more than 0.95."));
     } else {
         let rows = table(&page, "Largest correlations");
         assert_eq!(rows.len(), correlated.len().min(12));

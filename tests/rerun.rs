@@ -70,6 +70,31 @@ fn a_limit_of_the_range_check_touches_the_range_check() {
 }
 
 #[test]
+fn the_page_over_all_sites_tells_what_moved_since_the_run_before() {
+    let case = fresh();
+    let page = || String::from_utf8(case.read("out/index.html")).unwrap();
+    let products = |name: &str| {
+        let manifest: serde_json::Value = serde_json::from_slice(&case.read(name)).unwrap();
+        manifest["products"].clone()
+    };
+    let first = products("out/case/manifest.json");
+    assert!(!page().contains("<small>since "));
+    case.replace(
+        "site.toml",
+        "[[images]]",
+        "[range_check]\nmean_max_m = 1e-6\n[[images]]",
+    );
+    let told = case.outcome(case.run());
+    assert!(told.starts_with("exit 5"), "{told}");
+    assert!(page().contains(" → INVALID<br><small><span data-from="));
+    assert_eq!(products("out/case/.previous.json"), first);
+    // A run that finds nothing changed leaves what it is compared with.
+    let told = case.outcome(case.run());
+    assert!(told.starts_with("exit 5"), "{told}");
+    assert_eq!(products("out/case/.previous.json"), first);
+}
+
+#[test]
 fn a_comment_touches_nothing() {
     let case = fresh();
     case.replace("site.toml", "[pedr]", "# the archive\n[pedr]");

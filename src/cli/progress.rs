@@ -2,12 +2,13 @@
 //! that takes long now and then how far it is.
 
 use std::{
+    fmt,
     io::{self, IsTerminal as _, Write},
     sync::{LazyLock, Mutex, PoisonError},
     time::{Duration, Instant},
 };
 
-use indicatif::{MultiProgress, ProgressBar, ProgressStyle};
+use indicatif::{MultiProgress, ProgressBar, ProgressState, ProgressStyle};
 use tracing::level_filters::LevelFilter;
 use tracing_subscriber::fmt::MakeWriter;
 
@@ -19,9 +20,9 @@ use crate::{
 
 /// The live lines of the program, on standard error; nothing is drawn where that is no terminal.
 static LINES: LazyLock<MultiProgress> = LazyLock::new(MultiProgress::new);
-/// What a live line shows: site, stages done of all, time since the start and expected until the end, stage.
-const LINE: &str =
-    "{prefix:.bold}  {bar:16} {pos}/{len} stages  {elapsed}, about {eta} left  {msg}";
+/// What a live line shows: site, stages done of all, time since the start and expected until the end, and of the stage as
+/// much as there is room for. No bar: with one the line would break on a terminal of 40 columns.
+const LINE: &str = "{prefix:.bold}  {pos}/{len}  {elapsed}{left}  {wide_msg}";
 /// A stage that takes longer tells how far it is, that often where there is no live line.
 const TOLD_EVERY: Duration = Duration::from_secs(10);
 /// How often the time on a live line is drawn anew.
@@ -70,7 +71,7 @@ impl Progress {
             let line = LINES.add(ProgressBar::new(stages as u64));
             // A template that the library refuses leaves its own in place.
             if let Ok(style) = ProgressStyle::with_template(LINE) {
-                line.set_style(style);
+                line.set_style(style.with_key("left", left));
             }
             line.set_prefix(site.site.clone());
             line.enable_steady_tick(TICK);
@@ -84,6 +85,15 @@ impl Progress {
             counted: Mutex::new(None),
             plain: told && !terminal,
         }
+    }
+}
+
+/// The time until the end, once a stage tells how long one takes.
+fn left(state: &ProgressState, out: &mut dyn fmt::Write) {
+    let left_s = state.eta().as_secs_f64();
+    if state.pos() > 0 && left_s >= 1.0 {
+        // Whoever draws the line need not draw this.
+        let _ = write!(out, ", {} left", duration(left_s));
     }
 }
 

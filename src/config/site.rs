@@ -13,6 +13,7 @@ use crate::{
     body::Body,
     instruments::{Altimeter, Instrument},
     time::PointingBias,
+    wording::Wording,
 };
 
 use super::{
@@ -97,6 +98,16 @@ declare_table! {
 }
 
 impl SiteConfig {
+    /// The words of its texts.
+    #[must_use]
+    pub fn wording(&self) -> Wording<'_> {
+        Wording {
+            body: self.body,
+            altimeter: &self.altimeter.name,
+            has_tables: !self.shots.is_empty(),
+        }
+    }
+
     /// Whether the site has laser shots, of PEDR files or of tables.
     #[must_use]
     pub fn has_shots(&self) -> bool {

@@ -51,6 +51,18 @@ pub struct ImageDifference {
     pub movement: Option<ImageMovement>,
 }
 
+impl ImageDifference {
+    /// Whether it moved or turned by more than rounding, or is not the same samples.
+    #[must_use]
+    pub fn differs(&self) -> bool {
+        let moved = |of: &ImageMovement| {
+            of.distance_m.moved() || of.turn_arcsec.moved() || of.time_s.moved()
+        };
+        self.movement.as_ref().is_none_or(moved)
+            || self.samples_only_in_a + self.samples_only_in_b > 0
+    }
+}
+
 /// Movement of the camera over the samples that both runs have, matched by image line.
 ///
 /// Radial, along and cross are the axes of the first run: away from Mars, along the flight in inertial

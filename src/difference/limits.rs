@@ -124,7 +124,7 @@ mod tests {
             assert!(Limits::share(0.5e-6, limit) <= 1.0, "{limit} m");
             let told = verdict(2e-3, limit);
             assert!(
-                told.is_some_and(|told| told.starts_with("it moved by up to 2.0e-3 m, beyond"))
+                told.is_some_and(|told| told.starts_with("it moved by up to 0.0020 m, beyond"))
             );
             assert!(Limits::share(2e-3, limit) > 1.0, "{limit} m");
             assert!(verdict(f64::NAN, limit).is_some());

@@ -7,7 +7,11 @@ use super::{
     items::{Item, Items},
     movement::{Component, ROUNDING, Size},
 };
-use crate::{geom::statistics::largest, store::manifest::Verdict};
+use crate::{
+    geom::statistics::largest,
+    store::manifest::Verdict,
+    wording::{self, MINUS},
+};
 
 /// Texts of one kind that a sentence quotes; the JSON answer has all.
 const FEW: usize = 3;
@@ -16,12 +20,33 @@ const FEW: usize = 3;
 #[must_use]
 pub fn quantity(value: f64) -> String {
     if value.abs() <= ROUNDING {
-        "0".to_owned()
-    } else if value.abs() < 0.01 {
-        format!("{value:.1e}")
-    } else {
-        format!("{value:.3}")
+        return "0".to_owned();
     }
+    // Two digits, in decimals as far as they can be read.
+    let text = match value.abs() {
+        0.01.. => format!("{value:.3}"),
+        0.001.. => format!("{value:.4}"),
+        0.000_1.. => format!("{value:.5}"),
+        _ => {
+            let text = format!("{value:.1e}");
+            match text.split_once('e') {
+                Some((digits, power)) => format!("{digits} × 10{}", raised(power)),
+                None => text,
+            }
+        }
+    };
+    text.replace('-', &MINUS.to_string())
+}
+
+/// A power of ten behind its base.
+fn raised(power: &str) -> String {
+    const DIGITS: [char; 10] = ['⁰', '¹', '²', '³', '⁴', '⁵', '⁶', '⁷', '⁸', '⁹'];
+    let digit = |letter: char| {
+        letter
+            .to_digit(10)
+            .map_or('⁻', |digit| DIGITS[digit as usize])
+    };
+    power.chars().map(digit).collect()
 }
 
 impl RunDifference {
@@ -96,6 +121,41 @@ impl RunDifference {
         if verdict_changed {
             told.push(self.verdict_sentence());
         }
+        told.extend(self.of_inputs());
+        told.extend(values("biases", &self.biases));
+        told.extend(values("counts", &self.counts));
+        told.extend(values("figures", &self.figures));
+        told.extend(values("rejected shots", &self.rejected));
+        told.extend(texts("complaints", &self.complaints));
+        told.extend(texts("notes", &self.notes));
+        if self.outcome != Outcome::NothingChanged {
+            told.push(self.stages_sentence());
+            told.extend(self.of_movements(|_| true));
+        }
+        if !verdict_changed {
+            told.push(self.verdict_sentence());
+        }
+        told
+    }
+
+    /// The same without what tables below tell, and without images that stayed where they were.
+    #[must_use]
+    pub fn first_sentences(&self) -> Vec<String> {
+        let mut told = self.of_inputs();
+        told.extend(texts("complaints", &self.complaints));
+        told.extend(texts("notes", &self.notes));
+        if self.outcome != Outcome::NothingChanged {
+            told.extend(self.of_movements(ImageDifference::differs));
+        }
+        if self.a.verdict.word() == self.b.verdict.word() {
+            told.push(self.verdict_sentence());
+        }
+        told
+    }
+
+    /// Program, kernels and configuration.
+    fn of_inputs(&self) -> Vec<String> {
+        let mut told = Vec::new();
         if self.a.version != self.b.version {
             told.push(format!(
                 "areograph: {} → {}",
@@ -106,21 +166,15 @@ impl RunDifference {
         if self.configuration_changed {
             told.push(self.configuration_sentence());
         }
-        told.extend(values("biases", &self.biases));
-        told.extend(values("counts", &self.counts));
-        told.extend(values("figures", &self.figures));
-        told.extend(values("rejected shots", &self.rejected));
-        told.extend(texts("complaints", &self.complaints));
-        told.extend(texts("notes", &self.notes));
-        if self.outcome != Outcome::NothingChanged {
-            told.push(self.stages_sentence());
-            told.push(format!("footprints: {}", self.footprints_sentence()));
-            told.extend(self.profiles_sentence());
-            told.extend(self.images.iter().map(image_sentence));
-        }
-        if !verdict_changed {
-            told.push(self.verdict_sentence());
-        }
+        told
+    }
+
+    /// Footprints, profiles and of images those that are `wanted`.
+    fn of_movements(&self, wanted: fn(&ImageDifference) -> bool) -> Vec<String> {
+        let mut told = vec![format!("footprints: {}", self.footprints_sentence())];
+        told.extend(self.profiles_sentence());
+        let images = self.images.iter().filter(|image| wanted(image));
+        told.extend(images.map(image_sentence));
         told
     }
 
@@ -183,7 +237,11 @@ impl RunDifference {
             .map(|profile| match (&profile.a, &profile.b) {
                 (Some(a), Some(b)) => {
                     let change_m = b.range_minus_distance_m.mean - a.range_minus_distance_m.mean;
-                    format!("{} mean {:+.3} m", profile.profile, change_m)
+                    format!(
+                        "{} mean {} m",
+                        profile.profile,
+                        wording::signed(change_m, 3)
+                    )
                 }
                 (Some(_), None) => format!("{} only in A", profile.profile),
                 _ => format!("{} only in B", profile.profile),

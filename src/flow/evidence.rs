@@ -12,6 +12,7 @@ use crate::{
         judge::{AdjustmentEvidence, Evidence, JudgedImage, Verdict, judge},
         site_image::SiteImage,
     },
+    wording::with_minus,
 };
 
 /// The verdict, and whether the images of every pair place their tie points together after the adjustment.
@@ -43,6 +44,7 @@ pub(super) fn judged(
         .map(|failure| format!("{}; {}", failure.cause, failure.cause.advice()));
     let searched = config.has_shots();
     let verdict = judge(&Evidence {
+        wording: config.wording(),
         footprints: searched.then_some(site.converted.value()?.footprints.len()),
         limits: &config.limits,
         range_limits: &config.range_check,
@@ -177,7 +179,10 @@ pub(super) fn notes(config: &SiteConfig, site: &Site) -> Result<Vec<String>> {
     if let Some(ties) = &site.ties {
         notes.extend(ties.value()?.notes());
     }
-    Ok(notes)
+    let said = notes
+        .iter()
+        .map(|note| with_minus(&config.wording().of(&**note)));
+    Ok(said.collect())
 }
 
 /// What was wrong with input records, one sentence each.
@@ -187,7 +192,7 @@ pub(super) fn complaints(site: &Site) -> Result<Vec<String>> {
     if let Some(ties) = &site.ties {
         complaints.extend(ties.value()?.complaints.iter().cloned());
     }
-    Ok(complaints)
+    Ok(complaints.iter().map(|of| with_minus(of)).collect())
 }
 
 /// Rejected shots inside a window, by reason.

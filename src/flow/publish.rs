@@ -32,7 +32,7 @@ use crate::{
 };
 
 /// Raised when products are laid out anew.
-const METHOD: u32 = 15;
+const METHOD: u32 = 16;
 
 /// The configuration as written, the outlines that it names, all kernels and where they lie from `folder`, and
 /// every stage with what it was made from.

@@ -7,13 +7,14 @@ use std::{
 };
 
 use crate::{
+    body::Body,
     error::{IoError, Locate, Result},
-    report::{FIDELITY_FILE, SiteLine, SiteSummary, published_fidelity_page, sites_page},
+    report::{Earlier, FIDELITY_FILE, SiteLine, SiteSummary, published_fidelity_page, sites_page},
     store::{
         atomic,
         manifest::{Manifest, figures},
         page::SITES_PAGE,
-        publish::{has_work, last_failure, read_manifest},
+        publish::{PREVIOUS, has_work, last_failure, read_manifest, read_previous},
     },
 };
 
@@ -34,7 +35,12 @@ pub fn publish_sites(out: &Path) -> Result<PathBuf> {
         let failure = last_failure(&folder);
         // Folders that no run ever worked in are none of our business.
         if manifest.is_some() || has_work(&folder) {
-            let products = manifest.as_ref().map(summary);
+            let products = manifest.as_ref().map(|manifest| SiteSummary {
+                earlier: read_previous(&folder)
+                    .as_ref()
+                    .map(|manifest| earlier(manifest, &name)),
+                ..summary(manifest)
+            });
             lines.insert(name.into_owned(), (products, failure));
         }
     }
@@ -53,6 +59,13 @@ pub fn publish_sites(out: &Path) -> Result<PathBuf> {
     let page = out.join(SITES_PAGE);
     atomic::write(&page, sites_page(&lines)?.as_bytes())?;
     Ok(page)
+}
+
+/// The body of the site, Mars where its file names none.
+fn body(keys: &BTreeMap<String, String>) -> Body {
+    let word = keys.get("body");
+    word.and_then(|word| serde_json::from_str(word).ok())
+        .unwrap_or_default()
 }
 
 /// The middle of the first window that is a box.
@@ -74,6 +87,24 @@ fn place_deg(keys: &BTreeMap<String, String>) -> Option<(f64, f64)> {
     boxes.next()
 }
 
+/// What the products said that stood there before.
+fn earlier(manifest: &Manifest, folder: &str) -> Earlier {
+    let SiteSummary {
+        verdict,
+        range_mean_m,
+        images_apart_m: [_, apart_m],
+        height_off_m: [_, off_m],
+        finished_utc,
+        ..
+    } = summary(manifest);
+    Earlier {
+        verdict,
+        figures_m: [off_m, apart_m, range_mean_m],
+        finished_utc,
+        manifest: format!("{folder}/{PREVIOUS}"),
+    }
+}
+
 fn summary(manifest: &Manifest) -> SiteSummary {
     let count = |name: &str| manifest.counts.get(name).copied().unwrap_or(0);
     let figure = |name: &str| manifest.figures.get(name).copied();
@@ -93,7 +124,9 @@ fn summary(manifest: &Manifest) -> SiteSummary {
             figures::ADJUSTED_HEIGHT_OFF_SURFACE_M,
         ]
         .map(figure),
+        body: body(&manifest.configuration.keys),
         place_deg: place_deg(&manifest.configuration.keys),
+        earlier: None,
         finished_utc: manifest.finished_utc.clone(),
         version: manifest.version.clone(),
     }

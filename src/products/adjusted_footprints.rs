@@ -17,7 +17,8 @@ pub(super) static TABLE: Declaration = Declaration {
     role: Role::Data,
     content: Content::Table(|| meanings(&shot_columns())),
     write: Write::Adjustment(|path, of, _, adjustment| {
-        let table = Table::new(shot_columns(), shots(adjustment.adjusted));
+        let table = Table::new(shot_columns(), shots(adjustment.adjusted))
+            .in_words(&of.site.config.wording());
         parquet::write(path, table, light_time::metadata(of.site)).map(Some)
     }),
     uses: &[],

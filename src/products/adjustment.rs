@@ -4,7 +4,7 @@ mod boresight;
 mod configured;
 mod readings;
 
-use std::collections::BTreeMap;
+use std::{borrow::Cow, collections::BTreeMap};
 
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -122,7 +122,7 @@ struct Document<'a> {
 #[derive(Serialize, JsonSchema)]
 struct Definition {
     of: &'static str,
-    is: &'static str,
+    is: Cow<'static, str>,
 }
 
 #[derive(Serialize, JsonSchema)]
@@ -328,7 +328,10 @@ fn document<'a>(
         site: &site.config.site,
         definitions: DEFINITIONS
             .iter()
-            .map(|(of, is)| Definition { of, is })
+            .map(|(of, is)| Definition {
+                of,
+                is: site.config.wording().of(*is),
+            })
             .collect(),
         configured: Configured {
             model: site.config.registration.model,

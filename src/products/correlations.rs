@@ -17,8 +17,8 @@ pub(super) static TABLE: Declaration = Declaration {
     rows: "pairs of unknowns",
     role: Role::Data,
     content: Content::Table(|| meanings(&columns())),
-    write: Write::Adjustment(|path, _, _, adjustment| {
-        let table = Table::new(columns(), rows(adjustment));
+    write: Write::Adjustment(|path, of, _, adjustment| {
+        let table = Table::new(columns(), rows(adjustment)).in_words(&of.site.config.wording());
         parquet::write(path, table, Vec::new()).map(Some)
     }),
     uses: &[],

@@ -167,7 +167,7 @@ impl<'a> Shot<'a> {
 
 /// All footprints of a site.
 pub(super) fn table<'a>(site: &'a SiteProducts<'a>) -> Table<'a> {
-    Table::new(columns(), Shot::all(site))
+    Table::new(columns(), Shot::all(site)).in_words(&site.config.wording())
 }
 
 /// The footprints of a site as GIS has them.
@@ -192,7 +192,7 @@ fn text_columns() -> Vec<Meaning> {
     Table::new(columns(), Vec::new())
         .for_text()
         .columns()
-        .copied()
+        .cloned()
         .collect()
 }
 
@@ -203,7 +203,7 @@ pub(super) fn schema() -> DocumentSchema {
         "Footprints as GeoJSON",
         "footprints.geojson of areograph: laser shots inside the windows, Mars sphere, areocentric; west > east in \
          bbox when it crosses the antimeridian.",
-        &table.columns().copied().collect::<Vec<_>>(),
+        &table.columns().cloned().collect::<Vec<_>>(),
     );
     DocumentSchema {
         name: "footprints",

@@ -177,7 +177,7 @@ fn each(
     rows: Range<usize>,
     mut take: impl FnMut(usize, &Feature) -> std::result::Result<(), ProductError>,
 ) -> std::result::Result<(), ProductError> {
-    let columns: Vec<Meaning> = features.attributes.columns().copied().collect();
+    let columns: Vec<Meaning> = features.attributes.columns().cloned().collect();
     let values = features.attributes.values(rows.clone())?;
     for (row, index) in rows.enumerate() {
         let [longitude_deg, latitude_deg, _] = features.points[index];

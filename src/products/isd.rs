@@ -339,7 +339,7 @@ fn provenance<'a>(
             error_max_px: interpolation.error_max_px,
             limit_px: InterpolationCheck::LIMIT_PX,
             method: "Lagrange over uniform nodes, eighth order inside, lower towards the ends, of the positions \
-                     and the camera's quaternions turned to Mars, as usgscsm does",
+                     and the camera's quaternions turned to the body, as usgscsm does",
             within_limit: interpolation.keeps_limit(),
         },
         kernels: kernels.collect(),

@@ -1,6 +1,6 @@
 //! Orientation of an image: samples as Parquet, times and polynomials as JSON.
 
-use std::path::Path;
+use std::{borrow::Cow, path::Path};
 
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -26,6 +26,7 @@ use crate::{
         tag_times::{ImageTimes, StartFrom},
     },
     units::RADIANS_PER_ARCSECOND,
+    wording::Wording,
 };
 
 const CONVENTIONS: [&str; 6] = [
@@ -52,7 +53,7 @@ struct Document<'a> {
     valid: bool,
     invalid_because: Vec<&'a str>,
     times: Times<'a>,
-    conventions: [&'static str; 6],
+    conventions: [Cow<'static, str>; 6],
     /// Of the kernels' orientation: others find ground that the boresight meets in the middle of the image so many
     /// lines later, and at so many samples more.
     light_time: &'a LightTimeEffect,
@@ -197,12 +198,12 @@ fn write_table(path: &Path, of: &Context, image: &ImageProducts) -> Result<u64> 
     let rotations = samples.iter().map(|sample| sample.camera_to_mars.matrix());
     let quaternions = continuous_quaternions(rotations);
     let rows = samples.iter().zip(quaternions);
-    let table = Table::new(columns(), rows.collect());
+    let table = Table::new(columns(), rows.collect()).in_words(&of.site.config.wording());
     parquet::write(path, table, light_time::metadata(of.site))
 }
 
-fn write_document(path: &Path, _: &Context, image: &ImageProducts) -> Result<u64> {
-    write_json(path, &document(image))?;
+fn write_document(path: &Path, of: &Context, image: &ImageProducts) -> Result<u64> {
+    write_json(path, &document(image, &of.site.config.wording()))?;
     Ok(image.orientation.samples.len() as u64)
 }
 
@@ -316,7 +317,7 @@ fn columns<'a>() -> Vec<Column<Sample<'a>>> {
     ]
 }
 
-fn document<'a>(image: &ImageProducts<'a>) -> Document<'a> {
+fn document<'a>(image: &ImageProducts<'a>, wording: &Wording) -> Document<'a> {
     let model: &SensorModel = image.model;
     Document {
         format: "areograph orientation 1",
@@ -324,7 +325,7 @@ fn document<'a>(image: &ImageProducts<'a>) -> Document<'a> {
         valid: image.invalid_because().is_empty(),
         invalid_because: image.invalid_because(),
         times: times(image.times),
-        conventions: CONVENTIONS,
+        conventions: CONVENTIONS.map(|convention| wording.of(convention)),
         light_time: &image.orientation.light_time,
         samples: image.orientation.samples.len(),
         outline_deg: outline_deg(image.orientation),

@@ -69,7 +69,10 @@ fn field(column: &Meaning) -> Field {
         Kind::Text => DataType::Utf8,
         Kind::Bytes => DataType::Binary,
     };
-    let description = ("description".to_owned(), column.description.to_owned());
+    let description = (
+        "description".to_owned(),
+        column.description.clone().into_owned(),
+    );
     let unit = column.unit.symbol();
     let unit = unit.map(|symbol| ("unit".to_owned(), symbol.to_owned()));
     Field::new(column.name, data_type, column.optional).with_metadata(

@@ -37,8 +37,9 @@ pub(super) struct ParquetFile<W: Write + Send> {
     factory: ArrowRowGroupWriterFactory,
     /// Those of the group under way, leaf by leaf.
     columns: Vec<ArrowColumnWriter>,
-    /// Rows of the group so far, and of a whole one.
+    /// Rows of the group so far.
     rows: usize,
+    /// Rows of a whole one.
     group_rows: usize,
 }
 
@@ -147,70 +148,70 @@ fn encoded(
 
 #[cfg(test)]
 mod tests {
-    use super::*;
-    use ::parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
+    use ::parquet::{
+        arrow::arrow_reader::ParquetRecordBatchReaderBuilder, file::metadata::RowGroupMetaData,
+    };
     use arrow::{
-        array::{ArrayRef, Float64Array, StringArray, StructArray},
+        array::{Float64Array, StringArray, UInt32Array},
         compute::concat_batches,
         datatypes::Schema,
     };
 
-    fn field(name: &str, kind: DataType) -> Field {
-        Field::new(name, kind, false)
-    }
+    use super::*;
 
-    /// Rows with a number, a text that repeats, and a number in a struct.
-    fn rows(range: std::ops::Range<u32>) -> RecordBatch {
-        let part = field("x_m", DataType::Float64);
-        let numbers = || -> ArrayRef {
-            let values = range.clone().map(|row| f64::from(row).sqrt());
-            Arc::new(Float64Array::from_iter_values(values))
-        };
-        let texts = range.clone().map(|row| format!("file {}", row / 3));
-        let schema = Schema::new(vec![
-            field("range_m", DataType::Float64),
-            field("source_file", DataType::Utf8),
-            field("place", DataType::Struct(vec![part.clone()].into())),
-        ]);
-        let place = StructArray::try_new(vec![part].into(), vec![numbers()], None).unwrap();
-        let columns: Vec<ArrayRef> = vec![
-            numbers(),
-            Arc::new(StringArray::from_iter_values(texts)),
-            Arc::new(place),
+    /// Rows `from` to `to`: a real, a count that is missing in every third row, a name of many rows.
+    fn rows(schema: &SchemaRef, from: u32, to: u32) -> RecordBatch {
+        let reals = Float64Array::from_iter_values((from..to).map(|row| f64::from(row).sqrt()));
+        let counts: UInt32Array = (from..to)
+            .map(|row| (row % 3 != 0).then_some(row))
+            .collect();
+        let names = (from..to).map(|row| format!("profile {}", row / 4));
+        let names = StringArray::from_iter_values(names);
+        let columns = vec![
+            Arc::new(reals) as _,
+            Arc::new(counts) as _,
+            Arc::new(names) as _,
         ];
-        RecordBatch::try_new(Arc::new(schema), columns).unwrap()
+        RecordBatch::try_new(Arc::clone(schema), columns).unwrap()
     }
 
-    fn written(batches: &[RecordBatch]) -> Vec<u8> {
+    fn written(schema: &SchemaRef, batches: &[RecordBatch], group_rows: usize) -> Vec<u8> {
         let mut bytes = Vec::new();
-        let mut file = ParquetFile::in_groups(&mut bytes, batches[0].schema(), 4).unwrap();
+        let mut file = ParquetFile::in_groups(&mut bytes, Arc::clone(schema), group_rows).unwrap();
         for batch in batches {
             file.write(batch).unwrap();
         }
-        file.finish(vec![("frame", "IAU 2000".to_owned())]).unwrap();
+        file.finish(vec![("site", "gusev".to_owned())]).unwrap();
         bytes
     }
 
     #[test]
-    fn rows_of_several_groups_come_back_whatever_the_batches() {
-        let all = rows(0..11);
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("groups.parquet");
-        for ends in [vec![11], vec![3, 6, 11], vec![4, 8, 11], vec![9, 10, 11]] {
-            let starts = std::iter::once(0).chain(ends.iter().copied());
-            let batches: Vec<RecordBatch> = starts
-                .zip(&ends)
-                .map(|(start, end)| rows(start..*end))
-                .collect();
-            std::fs::write(&path, written(&batches)).unwrap();
-            let file = std::fs::File::open(&path).unwrap();
-            let reader = ParquetRecordBatchReaderBuilder::try_new(file).unwrap();
-            let groups = reader.metadata().row_groups().iter();
-            let groups: Vec<i64> = groups.map(|group| group.num_rows()).collect();
-            assert_eq!(groups, [4, 4, 3], "{ends:?}");
-            let found: std::result::Result<Vec<_>, _> = reader.build().unwrap().collect();
-            let found = found.unwrap();
-            assert_eq!(concat_batches(&all.schema(), &found).unwrap(), all);
-        }
+    fn rows_of_several_groups_come_back_in_their_order() {
+        let schema = Arc::new(Schema::new(vec![
+            Field::new("a_m", DataType::Float64, false),
+            Field::new("count", DataType::UInt32, true),
+            Field::new("profile", DataType::Utf8, false),
+        ]));
+        let all = rows(&schema, 0, 23);
+        // Batches that end inside a group, at its end, and behind several.
+        let batches = [(0, 3), (3, 5), (5, 6), (6, 6), (6, 19), (19, 23)];
+        let batches = batches.map(|(from, to)| rows(&schema, from, to));
+        let bytes = written(&schema, &batches, 5);
+        let mut file = tempfile::tempfile().unwrap();
+        file.write_all(&bytes).unwrap();
+        let reader = ParquetRecordBatchReaderBuilder::try_new(file).unwrap();
+        let groups = reader.metadata().row_groups().iter();
+        let sizes: Vec<i64> = groups.map(RowGroupMetaData::num_rows).collect();
+        assert_eq!(sizes, [5, 5, 5, 5, 3]);
+        let keys = reader.metadata().file_metadata().key_value_metadata();
+        assert!(keys.unwrap().iter().any(|entry| entry.key == "site"));
+        let read: Vec<RecordBatch> = reader
+            .build()
+            .unwrap()
+            .map(std::result::Result::unwrap)
+            .collect();
+        assert_eq!(concat_batches(&schema, &read).unwrap(), all);
+        // Groups, and so bytes, do not depend on the batches that rows come in.
+        assert_eq!(written(&schema, &[all], 5), bytes);
     }
 }

@@ -110,7 +110,7 @@ fn field(number: usize, column: &Meaning) -> Option<String> {
          \x20       </Field_Delimited>\n",
         escaped(column.name),
         data_type(column.kind)?,
-        escaped(column.description),
+        escaped(&column.description),
     ))
 }
 

@@ -1,6 +1,6 @@
 //! The range check: residuals per shot as Parquet, statistics and verdicts as JSON.
 
-use std::collections::HashSet;
+use std::{borrow::Cow, collections::HashSet};
 
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -98,7 +98,7 @@ struct Document<'a> {
 #[derive(Serialize, JsonSchema)]
 struct Definition {
     residual: &'static str,
-    is: &'static str,
+    is: Cow<'static, str>,
 }
 
 #[derive(Serialize, JsonSchema)]
@@ -176,7 +176,7 @@ pub(super) static TABLE: Declaration = Declaration {
     write: Write::Site(|path, of| {
         let site = of.site;
         let shots = (0..site.ranges.shots.len()).map(|at| RangedShot { site, at });
-        let table = Table::new(columns(), shots.collect());
+        let table = Table::new(columns(), shots.collect()).in_words(&of.site.config.wording());
         parquet::write(path, table, Vec::new()).map(Some)
     }),
     uses: &[],
@@ -297,7 +297,10 @@ fn document<'a>(site: &SiteProducts<'a>) -> Document<'a> {
         units: "metres, seconds, metres per second; angles in limits in radians",
         definitions: DEFINITIONS
             .iter()
-            .map(|(residual, is)| Definition { residual, is })
+            .map(|(residual, is)| Definition {
+                residual,
+                is: site.config.wording().of(*is),
+            })
             .collect(),
         mola_clock: Clock {
             configured: &site.config.mola_clock,

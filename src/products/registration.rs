@@ -177,6 +177,7 @@ fn table<'a>(site: &'a SiteProducts<'a>, images: &'a [ImageProducts<'a>]) -> Tab
         points.map(move |at| Registered { site, image, at })
     };
     Table::new(columns(), images.iter().flat_map(of_image).collect())
+        .in_words(&site.config.wording())
 }
 
 fn columns<'a>() -> Vec<Column<Registered<'a>>> {

@@ -5,11 +5,12 @@
 //! column("range_m", Unit::Metre, "one-way range", |shot: &Shot| shot.range_m).in_gis().in_dbase("range_m", 12, 3)
 //! ```
 
-use std::ops::Range;
+use std::{borrow::Cow, ops::Range};
 
 use rayon::prelude::*;
 
 use super::error::ProductError;
+use crate::wording::Wording;
 
 /// Rows whose values stand in memory at once.
 const ROWS_AT_ONCE: usize = 65_536;
@@ -83,11 +84,11 @@ pub(super) struct DbaseField {
 }
 
 /// What a column is.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub(super) struct Meaning {
     pub(super) name: &'static str,
     pub(super) unit: Unit,
-    pub(super) description: &'static str,
+    pub(super) description: Cow<'static, str>,
     pub(super) kind: Kind,
     /// Whether rows may lack a value.
     pub(super) optional: bool,
@@ -97,6 +98,13 @@ pub(super) struct Meaning {
     pub(super) limits: Option<[u32; 2]>,
     pub(super) dbase: Option<DbaseField>,
     gis: Gis,
+}
+
+impl Meaning {
+    /// Describes the column in the words of a site.
+    pub(super) fn say(&mut self, wording: &Wording<'_>) {
+        self.description = wording.of(std::mem::take(&mut self.description));
+    }
 }
 
 /// Gives the values of rows.
@@ -119,7 +127,7 @@ pub(super) fn column<R, T: Cell>(
         meaning: Meaning {
             name,
             unit,
-            description,
+            description: Cow::Borrowed(description),
             kind: T::KIND,
             optional: T::OPTIONAL,
             decimals: None,
@@ -250,6 +258,14 @@ impl<'a> Table<'a> {
         }
     }
 
+    /// With descriptions in the words of a site.
+    pub(super) fn in_words(mut self, wording: &Wording<'_>) -> Self {
+        for (_, column) in &mut self.columns {
+            column.say(wording);
+        }
+        self
+    }
+
     /// With the columns of Parquet alone.
     pub(super) fn for_parquet(self) -> Self {
         self.keep(|column| column.gis != Gis::Only)
@@ -282,7 +298,10 @@ impl<'a> Table<'a> {
     /// With the columns at these places alone, in this order; the table must have them.
     #[cfg(feature = "sql")]
     pub(super) fn pick(mut self, places: &[usize]) -> Self {
-        self.columns = places.iter().map(|place| self.columns[*place]).collect();
+        self.columns = places
+            .iter()
+            .map(|place| self.columns[*place].clone())
+            .collect();
         self
     }
 
@@ -349,7 +368,10 @@ fn pieces(rows: usize, size: usize) -> impl Iterator<Item = Range<usize>> {
 
 /// What columns are, whatever the rows.
 pub(super) fn meanings<R>(columns: &[Column<R>]) -> Vec<Meaning> {
-    columns.iter().map(|column| column.meaning).collect()
+    columns
+        .iter()
+        .map(|column| column.meaning.clone())
+        .collect()
 }
 
 #[cfg(test)]

@@ -7,6 +7,7 @@ use super::{
     plots::{Extent, Panel, Plot, Series, figure, label},
     reliability, residuals,
     section::Section,
+    source::sentence,
 };
 use crate::{
     error::Result,
@@ -36,8 +37,8 @@ fn write(
 ) -> Result<String> {
     let adjusted = adjustment.adjusted;
     let summary = &adjusted.summary;
-    let mut html = paragraph(&overview(adjusted));
-    html += &paragraph(&reliability::absolute(geometric, adjustment));
+    let mut html = overview(adjusted);
+    html += &reliability::absolute(geometric, adjustment);
     html += &format!(
         "<div class=\"plots\">\n{}{}</div>\n",
         residuals::distribution(adjusted)?,
@@ -67,17 +68,36 @@ fn overview(adjusted: &Adjusted) -> String {
     } else {
         "along track worse than configured"
     };
-    format!(
-        "{}, {} and {} adjusted together in {}; {} degrees of freedom. Unit-weight σ of tie points {} along track, {} across \
-         (a priori 1): {verdict}. σ0 of all observations: {}.",
-        counted(adjusted.images.len(), "image"),
-        counted(summary.shots.corrections_m[0].n as usize, "footprint"),
-        counted(summary.ties.corrections_m[0].n as usize, "tie point"),
-        counted(summary.steps, "step"),
-        summary.degrees_of_freedom,
-        label(along, 3),
-        label(across, 3),
-        label(summary.sigma0, 3)
+    let at = |pointer: &str| format!("adjustment.json#/adjustment/summary{pointer}");
+    let numbers = [
+        (
+            counted(adjusted.images.len(), "image"),
+            "manifest.json#/counts/images".to_owned(),
+        ),
+        (
+            counted(summary.shots.corrections_m[0].n as usize, "footprint"),
+            at("/shots/corrections_m/0/n"),
+        ),
+        (
+            counted(summary.ties.corrections_m[0].n as usize, "tie point"),
+            at("/ties/corrections_m/0/n"),
+        ),
+        (counted(summary.steps, "step"), at("/steps")),
+        (
+            summary.degrees_of_freedom.to_string(),
+            at("/degrees_of_freedom"),
+        ),
+        (label(along, 3), at("/tie_components/0")),
+        (label(across, 3), at("/tie_components/1")),
+        (verdict.to_owned(), String::new()),
+        (label(summary.sigma0, 3), at("/sigma0")),
+    ];
+    sentence(
+        "{}, {} and {} adjusted together in {}; {} degrees of freedom. Unit-weight σ of tie points {} along track, {} across: \
+         {}. σ0 of all observations: {}.",
+        &numbers
+            .each_ref()
+            .map(|(number, place)| (number.clone(), &**place)),
     )
 }
 

@@ -57,7 +57,7 @@ fn lead(ranges: &ArchiveRanges, judgement: &Judgement) -> String {
         counted(ranges.files.len(), "file"),
     );
     let words = format!(
-        "{} shots were checked: measured range minus distance from the kernels’ spacecraft to the footprint, time tags corrected \
+        "{} shots were checked: measured range minus distance from the kernels' spacecraft to the footprint, time tags corrected \
          by {} s. A profile is what one file has of one revolution.",
         grouped(ranges.sum(|file| file.shots)),
         label(ranges.clock.correction_s(), 3),
@@ -112,11 +112,15 @@ fn over_time(ranges: &ArchiveRanges) -> Result<String> {
         }
     };
     let limits = &ranges.limits;
+    let thinning = match checked.len().div_ceil(PROFILES_DRAWN) {
+        0 | 1 => String::new(),
+        every => format!(" 1 profile in {every} is drawn."),
+    };
     let ranges_plot = Plot::of(
         "Ranges over time".to_owned(),
-        "Mean of range − distance without outliers, and its robust spread, of every profile. Level lines are limits. Of very many \
-         profiles every so many is drawn."
-            .to_owned(),
+        "Mean of range − distance without outliers, and its robust spread, of every profile. Dashed: limits."
+            .to_owned()
+            + &thinning,
         "days since the first profile",
         vec![
             panel("mean, m", |of| of.mean_without_outliers_m, Some(limits.mean_max_m)),
@@ -125,7 +129,7 @@ fn over_time(ranges: &ArchiveRanges) -> Result<String> {
     );
     let orbits_plot = Plot::of(
         "Orbits over time".to_owned(),
-        "Mean of the file’s own spacecraft minus that of the kernels.".to_owned(),
+        "Mean of the file's own spacecraft minus that of the kernels.".to_owned(),
         "days since the first profile",
         vec![
             panel("up, m", |of| of.spacecraft_m[0], Some(limits.orbit_max_m)),

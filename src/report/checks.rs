@@ -26,7 +26,7 @@ pub(super) fn table(site: &SiteProducts) -> String {
         ],
     );
     for (index, check) in site.verdict.checks.iter().enumerate() {
-        let words = check.kind.words();
+        let words = check.words();
         let more = section(check.kind).filter(|section| (section.appears)(site));
         let mut what = more.map_or_else(
             || escape(words),
@@ -152,6 +152,7 @@ mod tests {
     fn check(kind: CheckKind, value: f64, limit: f64) -> Check {
         Check {
             kind,
+            what: String::new(),
             outcome: CheckOutcome::Fail,
             subject: String::new(),
             value: Some(value),

@@ -6,11 +6,12 @@ mod readings;
 mod relief;
 
 use super::{
-    html::{Cell, Column, Table, heading, paragraph},
+    html::{Cell, Column, Table, counted, heading, paragraph},
     misregistration::BeforeAfter,
     numbers::whole,
     plots::{figure, label},
     section::Section,
+    source::sentence,
 };
 use crate::{
     error::Result,
@@ -37,10 +38,10 @@ fn write(geometric: &GeometricProducts) -> Result<String> {
     let mut html = adjustment.map_or_else(String::new, |of| statements(geometric, of));
     if let Ok(surface) = &geometric.heights.surface {
         html += &heading("Heights against the MOLA surface");
-        html += &paragraph(&surface_in_words(surface));
+        html += &surface_in_words(surface);
         html += &compared(geometric);
         html += &footprints(geometric);
-        html += &paragraph(&apart(geometric.heights));
+        html += &apart(geometric.heights);
         html += &format!(
             "<div class=\"plots\">\n{}</div>\n",
             figure(&profile::plot(geometric))?
@@ -228,13 +229,21 @@ fn single_sigmas_m(adjustment: &AdjustmentProducts) -> [f64; 2] {
 }
 
 fn surface_in_words(surface: &SurfaceFigures) -> String {
-    format!(
-        "Surface: kriged from {} shots of {} profiles; {} m RMS over 300 m, slope {} per axis. Errors \
-         at neighbouring tie points are correlated, so averaging does not reduce them.",
-        whole(surface.shots),
-        surface.profiles,
-        label(surface.roughness_m, 1),
-        label(surface.slope, 3)
+    const OF: [&str; 4] = [
+        "adjustment.json#/before/heights/surface/shots",
+        "adjustment.json#/before/heights/surface/profiles",
+        "adjustment.json#/before/heights/surface/roughness_m",
+        "adjustment.json#/before/heights/surface/slope",
+    ];
+    sentence(
+        "Surface kriged from {} shots of {}; {} m RMS over 300 m, slope {} per axis. Errors at \
+         neighbouring tie points are correlated, so averaging does not reduce them.",
+        &[
+            (whole(surface.shots), OF[0]),
+            (counted(surface.profiles, "profile"), OF[1]),
+            (label(surface.roughness_m, 1), OF[2]),
+            (label(surface.slope, 3), OF[3]),
+        ],
     )
 }
 
@@ -327,20 +336,26 @@ fn footprints(geometric: &GeometricProducts) -> String {
 }
 
 fn apart(check: &HeightCheck) -> String {
-    check.apart.as_ref().map_or_else(
-        || "With a single profile nothing independent tests the surface.".to_owned(),
-        |apart| {
-            let [first, second] = &apart.profiles;
-            let (upper, lower) = if apart.mean_m < 0.0 {
-                (second, first)
-            } else {
-                (first, second)
-            };
-            format!(
-                "At the tie points the surface from profile {upper} alone is {} m above that from {lower} alone (expected σ {} m).",
-                label(apart.mean_m.abs(), 1),
-                label(apart.sigma_m, 1)
-            )
-        },
+    const OF: [&str; 2] = [
+        "|adjustment.json#/before/heights/profiles_apart/mean_m",
+        "adjustment.json#/before/heights/profiles_apart/sigma_m",
+    ];
+    let Some(apart) = &check.apart else {
+        return paragraph("With a single profile nothing independent tests the surface.");
+    };
+    let [first, second] = &apart.profiles;
+    let (upper, lower) = if apart.mean_m < 0.0 {
+        (second, first)
+    } else {
+        (first, second)
+    };
+    sentence(
+        "At the tie points the surface from profile {} alone is {} m above that from {} alone (expected σ {} m).",
+        &[
+            (upper.clone(), ""),
+            (label(apart.mean_m.abs(), 1), OF[0]),
+            (lower.clone(), ""),
+            (label(apart.sigma_m, 1), OF[1]),
+        ],
     )
 }

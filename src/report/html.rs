@@ -1,6 +1,6 @@
 //! Pieces of HTML: every text passes through [`escape`].
 
-use std::fmt::Write as _;
+use std::{borrow::Cow, fmt::Write as _};
 
 use super::numbers::whole;
 
@@ -60,7 +60,7 @@ impl Tone {
 pub(super) struct Section {
     /// Name in links.
     anchor: String,
-    heading: &'static str,
+    heading: Cow<'static, str>,
     body: String,
 }
 
@@ -71,10 +71,10 @@ impl Section {
     }
 
     /// A section with a name of its own in links.
-    pub(super) fn named(anchor: &str, heading: &'static str, body: String) -> Self {
+    pub(super) fn named(anchor: &str, heading: impl Into<Cow<'static, str>>, body: String) -> Self {
         Self {
             anchor: anchor.to_owned(),
-            heading,
+            heading: heading.into(),
             body,
         }
     }
@@ -90,7 +90,7 @@ pub(super) fn page(title: &str, lead: &str, sections: &[Section]) -> String {
             format!(
                 "<li><a href=\"#{}\">{}</a></li>\n",
                 section.anchor,
-                escape(section.heading)
+                escape(&section.heading)
             )
         })
         .collect();
@@ -99,7 +99,7 @@ pub(super) fn page(title: &str, lead: &str, sections: &[Section]) -> String {
             format!(
                 "<section id=\"{}\">\n<h2>{}</h2>\n{}</section>\n",
                 section.anchor,
-                escape(section.heading),
+                escape(&section.heading),
                 section.body
             )
         })

@@ -10,6 +10,7 @@ use super::{
     numbers::whole,
     plots::label,
     section::Section,
+    source::filled,
 };
 use crate::{
     error::Result,
@@ -67,14 +68,32 @@ fn read(geometric: &GeometricProducts) -> String {
     let outliers = points.iter().filter(|point| point.outlier).count();
     let adjusted = geometric.adjustment.map_or_else(
         || "; the adjustment failed".to_owned(),
-        |of| format!(", {} with the adjusted one", of.intersected.points.len()),
+        |of| {
+            let number = of.intersected.points.len().to_string();
+            filled(
+                ", {} with the adjusted one",
+                &[(number, "adjustment.json#/after/intersected")],
+            )
+        },
     );
-    let mut words = format!(
-        "{} read, {} in two or more images; {} intersect with the kernels' orientation{adjusted}.",
-        counted(ties.points.len(), "tie point"),
-        ties.multi_image(),
-        points.len(),
-    );
+    let mut words = filled(
+        "{} read, {} in two or more images; {} intersect with the kernels' orientation",
+        &[
+            (
+                counted(ties.points.len(), "tie point"),
+                "adjustment.json#/ties/points",
+            ),
+            (
+                ties.multi_image().to_string(),
+                "adjustment.json#/ties/multi_image",
+            ),
+            (
+                points.len().to_string(),
+                "adjustment.json#/before/intersected",
+            ),
+        ],
+    ) + &adjusted
+        + ".";
     for (count, what) in [
         (elsewhere, "measurements are in other images."),
         (ties.ignored, "are marked to be ignored."),
@@ -85,9 +104,15 @@ fn read(geometric: &GeometricProducts) -> String {
         }
     }
     if outliers > 0 {
-        words += &format!(" {outliers} are reprojection outliers and do not count in the pairs.");
+        words += &filled(
+            " {}, left out of the pairs.",
+            &[(
+                counted(outliers, "reprojection outlier"),
+                "adjustment.json#/before/outliers",
+            )],
+        );
     }
-    paragraph(&words) + &rejected(geometric)
+    format!("<p>{words}</p>\n") + &rejected(geometric)
 }
 
 /// Tie points by the reason that they were left out for.

@@ -56,7 +56,6 @@ mod summary;
 mod support_data;
 mod timeline;
 mod uncertainty;
-mod words;
 
 use crate::{error::Result, products::SiteProducts};
 
@@ -69,7 +68,7 @@ pub use fidelity::{
 pub use html::STYLE;
 pub use net::net_page;
 pub use overlays::overlays_page;
-pub use sites::{SiteLine, SiteSummary, sites_page};
+pub use sites::{Earlier, SiteLine, SiteSummary, sites_page};
 
 use section::Section;
 

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use super::html::counted;
 use super::numbers::whole;
 use super::plots::{
     Arrow, Arrows, Extent, GREY, INK, Mark, Panel, Plot, Series, Style, figure, label,
@@ -25,6 +26,8 @@ const WIDTHS_BESIDE: f64 = 0.5;
 /// Lines that are shown to either side, in lengths of what footprints move by, and at least.
 const MOVES_BESIDE: f64 = 12.0;
 const LINES_BESIDE_MIN: f64 = 200.0;
+/// Fewer footprints there make no picture: shots of some altimeters lie a thousand lines apart.
+const NEAR_MIN: usize = 3;
 /// Share of the image's lines, and of its samples, that the longest vector takes.
 const LONGEST: f64 = 0.1;
 /// Colours of what was before and after.
@@ -77,7 +80,7 @@ fn footprints(before: &ImageProducts, after: &ImageProducts) -> Option<Plot> {
         .filter(|moved| x.contains(moved.from.0))
         .collect();
     let shown = thinned(&shown, DOTS_MAX);
-    if shown.is_empty() {
+    if shown.len() < NEAR_MIN {
         return None;
     }
     let dots = |label: &str, colour: usize, at: fn(&Arrow) -> (f64, f64)| Series {
@@ -177,10 +180,10 @@ fn vectors(
             mean_in_words(&all),
         );
         if all.len() > limit {
-            words += &format!(", at most {limit} drawn");
+            words += &format!(", 1 in {} drawn", all.len().div_ceil(limit));
         }
         if outliers > 0 {
-            words += &format!(", {outliers} outliers not drawn");
+            words += &format!(", without {}", counted(outliers, "outlier"));
         }
         words.push('.');
         panels.push(Panel {

@@ -1,7 +1,7 @@
 //! Numbers as pages write them: one minus sign, thousands apart, no sign on zero.
 
-/// The minus sign of all pages.
-const MINUS: char = '\u{2212}';
+use crate::wording::MINUS;
+
 /// What stands between thousands: narrow, and no place to break a line.
 const APART: char = '\u{202f}';
 /// From so many digits on thousands are set apart, as the SI brochure has it.
@@ -28,21 +28,6 @@ pub(super) fn signed(value: f64, decimals: usize) -> String {
     } else {
         text
     }
-}
-
-/// A sentence of the program with the minus sign of pages before its numbers; hyphens in names stay.
-pub(super) fn with_minus(sentence: &str) -> String {
-    let mut written = String::with_capacity(sentence.len());
-    let mut letters = sentence.chars().peekable();
-    let mut before = ' ';
-    while let Some(letter) = letters.next() {
-        let is_sign = letter == '-'
-            && matches!(before, ' ' | '(')
-            && letters.peek().is_some_and(char::is_ascii_digit);
-        written.push(if is_sign { MINUS } else { letter });
-        before = letter;
-    }
-    written
 }
 
 /// A count.
@@ -78,14 +63,6 @@ mod tests {
         assert_eq!(signed(0.0004, 3), "0.000");
         assert_eq!(signed(0.117, 3), "+0.117");
         assert_eq!(signed(-1.15, 2), "−1.15");
-    }
-
-    #[test]
-    fn sentences_have_the_same_minus_and_names_keep_their_hyphens() {
-        assert_eq!(
-            with_minus("E02-00665: 4 m off (-33 m up, -0.5 m across) - see"),
-            "E02-00665: 4 m off (−33 m up, −0.5 m across) - see"
-        );
     }
 
     #[test]

@@ -128,7 +128,7 @@ fn strip_figure(site: &SiteProducts, shown: &ShownImage, picture: &Picture) -> S
         html::counted(inside, "footprint"),
     );
     if picture.step > 1 {
-        let _infallible = write!(words, ", of which every {}th is marked", picture.step);
+        let _infallible = write!(words, "; 1 in {} is marked", picture.step);
     }
     words.push('.');
     let look = &shown.quick_look;

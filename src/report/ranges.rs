@@ -3,10 +3,11 @@
 mod plots;
 
 use super::{
-    html::{Cell, Column, Table, folded, heading, list, paragraph},
-    numbers::whole,
+    html::{Cell, Column, Table, escape, folded, heading, paragraph},
+    numbers::{number, whole},
     plots::label,
     section::Section,
+    source::{filled, sentence},
 };
 use crate::{
     error::Result, geom::statistics::Summary, products::SiteProducts,
@@ -151,14 +152,24 @@ fn statistics(site: &SiteProducts) -> String {
             ],
         );
     }
-    let words = format!(
-        "Limits: at least {} shots, at most {} % outliers (beyond {} robust σ of the median). Bars under values: share of the \
-         limit that is used.",
-        limits.shots_min,
-        100.0 * limits.outlier_share_max,
-        limits.outlier_sigma
+    let words = sentence(
+        "Limits: at least {} shots, at most {} % outliers (beyond {} robust σ of the median). Bars: share of a limit that is used.",
+        &[
+            (
+                limits.shots_min.to_string(),
+                "ranges.json#/limits/shots_min",
+            ),
+            (
+                number(100.0 * limits.outlier_share_max, 1),
+                "ranges.json#/limits/outlier_share_max*100",
+            ),
+            (
+                limits.outlier_sigma.to_string(),
+                "ranges.json#/limits/outlier_sigma",
+            ),
+        ],
     );
-    table.finish() + &paragraph(&words)
+    table.finish() + &words
 }
 
 /// Share of a limit that may be 0: then nothing of it is used by 0, and all is beyond otherwise.
@@ -240,19 +251,37 @@ fn three_ways(site: &SiteProducts) -> String {
             ],
         );
     }
-    let words = [
-        "Limits apply to means without outliers.".to_owned(),
-        "Crossover radius: the MOLA team's adjustment, which moves footprints, not ranges."
-            .to_owned(),
-        format!(
-            "PEDR's own orbit: without kernels; beyond ±{} m the file was read wrongly.",
-            limits.decoding_max_m
-        ),
-        format!(
-            "PEDR − kernels: spacecraft positions, inertial axes; beyond {} m orbit, clock or datum differ. Trajectory \
-             tabulated to {:.1e} m.",
-            limits.orbit_max_m, site.ranges.trajectory_error_m
-        ),
-    ];
-    table.finish() + &list(&words)
+    let mut words = vec!["Limits apply to means without outliers.".to_owned()];
+    if site.config.shots.is_empty() {
+        words.push(escape(
+            "Crossover radius: the MOLA team's adjustment, which moves footprints, not ranges.",
+        ));
+    }
+    words.push(filled(
+        "PEDR's own orbit: without kernels; beyond ±{} m the file was read wrongly.",
+        &[(
+            limits.decoding_max_m.to_string(),
+            "ranges.json#/limits/decoding_max_m",
+        )],
+    ));
+    let mut orbits = filled(
+        "PEDR − kernels: spacecraft positions, inertial axes; beyond {} m orbit, clock or datum differ.",
+        &[(
+            limits.orbit_max_m.to_string(),
+            "ranges.json#/limits/orbit_max_m",
+        )],
+    );
+    // A table's own spacecraft and that of support data are not tabulated.
+    if site.ranges.trajectory_error_m > 0.0 {
+        orbits += &filled(
+            " Trajectory tabulated to {} mm.",
+            &[(
+                number(1e3 * site.ranges.trajectory_error_m, 3),
+                "ranges.json#/trajectory_error_m*1000",
+            )],
+        );
+    }
+    words.push(orbits);
+    let words: Vec<String> = words.iter().map(|of| format!("<li>{of}</li>\n")).collect();
+    table.finish() + &format!("<ul>\n{}</ul>\n", words.concat())
 }

@@ -1,7 +1,7 @@
 //! Registration: profiles on the image plane.
 
 use super::{
-    html::{Cell, Column, Table, paragraph},
+    html::{Cell, Column, Table, counted, paragraph},
     numbers::whole,
     plots::{COLOURS, Extent, GREY, INK, Mark, Panel, Plot, Series, Style, figure, label, thinned},
     section::Section,
@@ -177,13 +177,10 @@ fn plane(profiles: &[Profile], image: &ImageProducts) -> Plot {
         ..Panel::of("sample", series)
     };
     let words = format!(
-        "Flight to the right; image dashed at its sides, solid at its ends. {} of {} footprints are inside; {} near it.",
+        "{} of {} footprints inside, of {}. Flight to the right; dashed: sides of the image, solid: its ends.",
         whole(points.inside_count()),
         whole(points.len()),
-        match shown {
-            1 => "one profile is".to_owned(),
-            count => format!("{count} profiles are"),
-        }
+        counted(shown, "profile")
     );
     Plot {
         x: Extent::of([0.0, lines].into_iter()),

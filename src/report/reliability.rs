@@ -6,6 +6,7 @@ use super::{
     html::{Cell, Column, Table, counted, paragraph},
     numbers::whole,
     plots::label,
+    source::sentence,
 };
 use crate::{
     footprints::AdjustmentModel,
@@ -30,43 +31,55 @@ const BLUNDERS_SHOWN: usize = 20;
 
 /// What the adjustment determines and what it does not, with numbers.
 pub(super) fn absolute(geometric: &GeometricProducts, adjustment: &AdjustmentProducts) -> String {
+    const MOVED: [&str; 3] = [
+        "adjustment.json#/adjustment/summary/ties/corrections_m/0/mean",
+        "adjustment.json#/adjustment/summary/ties/corrections_m/1/mean",
+        "adjustment.json#/adjustment/summary/ties/corrections_m/2/mean",
+    ];
+    const SIGMA: [&str; 3] = [
+        "adjustment.json#/adjustment/heights/mean_sigma_m/0",
+        "adjustment.json#/adjustment/heights/mean_sigma_m/1",
+        "adjustment.json#/adjustment/heights/mean_sigma_m/2",
+    ];
     let summary = &adjustment.adjusted.summary;
     let ties = &summary.ties;
     if ties.corrections_m[0].n == 0 {
-        return "No tie point took part.".to_owned();
+        return paragraph("No tie point took part.");
     }
     let registration = if adjustment.images_agree {
         "Relative registration is corrected"
     } else {
         "Relative registration is not corrected"
     };
-    let means = ties
-        .corrections_m
-        .each_ref()
-        .map(|axis| label(axis.mean, 1));
-    let moved = means.join(", ");
+    let axes = ties.corrections_m.iter().zip(MOVED);
+    let mut numbers: Vec<(String, &str)> = axes
+        .map(|(axis, place)| (label(axis.mean, 1), place))
+        .collect();
+    numbers.push((registration.to_owned(), ""));
     let determined = match &adjustment.adjusted.heights {
         Some(heights) => {
             let [east_m, north_m, up_m] = heights.mean_sigma_m;
-            format!(
-                "heights follow MOLA to {} m on average; position is known to {} m east and {} m north, by {}",
-                label(up_m, 1),
-                label(east_m, 0),
-                label(north_m, 0),
-                place_by(geometric, adjustment)
-            )
+            numbers.push((label(up_m, 1), SIGMA[2]));
+            numbers.push((label(east_m, 0), SIGMA[0]));
+            numbers.push((label(north_m, 0), SIGMA[1]));
+            numbers.push((place_by(geometric, adjustment), ""));
+            "heights follow MOLA to {} m on average; position is known to {} m east and {} m north, by {}"
         }
         None if summary.model == AdjustmentModel::Published => {
             "heights and position are not determined: image coordinates of footprints come from the orientation that is \
              adjusted"
-                .to_owned()
         }
-        None => format!(
-            "heights and position are what was known of {} beforehand",
-            known_beforehand(geometric)
-        ),
+        None => {
+            numbers.push((known_beforehand(geometric).to_owned(), ""));
+            "heights and position are what was known of {} beforehand"
+        }
     };
-    format!("Tie points moved by {moved} m in X, Y, Z on average. {registration}; {determined}.")
+    sentence(
+        &format!(
+            "Tie points moved by {{}}, {{}}, {{}} m in X, Y, Z on average. {{}}; {determined}."
+        ),
+        &numbers,
+    )
 }
 
 /// Observations of one kind along one axis.

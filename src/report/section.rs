@@ -1,6 +1,6 @@
 //! What a section of a site's page declares.
 
-use super::{html, words};
+use super::html;
 use crate::{error::Result, products::SiteProducts};
 
 /// A section of the page of one site. Its file declares it as `SECTION`; [`super::SECTIONS`] lists it once, and order
@@ -25,7 +25,9 @@ impl Section {
         if !(self.appears)(site) {
             return Ok(None);
         }
-        let body = words::of_the_site(site, (self.write)(site)?);
-        Ok(Some(html::Section::named(self.anchor, self.title, body)))
+        let wording = site.config.wording();
+        let body = wording.of((self.write)(site)?).into_owned();
+        let title = wording.of(self.title);
+        Ok(Some(html::Section::named(self.anchor, title, body)))
     }
 }

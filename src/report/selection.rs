@@ -58,7 +58,7 @@ fn filter(site: &SiteProducts) -> String {
         return "Shots of tables are kept where they lie in a window; rows that repeat one count once.".to_owned();
     }
     let filter = &site.config.pedr.filter;
-    let join = |values: Vec<String>| values.join(" or ");
+    let join = |values: Vec<String>| values.join(", ");
     format!(
         "Kept: class {}, trigger channel {}, attitude flag {}, at most {:.1}° off nadir.",
         join(filter.classes.iter().map(ToString::to_string).collect()),

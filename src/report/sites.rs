@@ -7,8 +7,9 @@ use super::{
     html::{Cell, Column, Table, Tone, counted, escape, link, page, paragraph, verdict},
     numbers::{number, whole},
     sites_map::{self, Place},
+    source::told,
 };
-use crate::error::Result;
+use crate::{body::Body, error::Result};
 
 /// What the page says of one site.
 #[derive(Debug, Clone, PartialEq)]
@@ -39,12 +40,29 @@ pub struct SiteSummary {
     pub images_apart_m: [Option<f64>; 2],
     /// Median height of tie points above or below the MOLA surface, likewise, metres.
     pub height_off_m: [Option<f64>; 2],
+    /// The body that it lies on.
+    pub body: Body,
     /// East longitude and areocentric latitude of the middle of the first window that is a box, degrees.
     pub place_deg: Option<(f64, f64)>,
+    /// What the products said that stood here before.
+    pub earlier: Option<Earlier>,
     /// When the products were published.
     pub finished_utc: String,
     /// Version of the program that made them.
     pub version: String,
+}
+
+/// What the products before those of today said.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Earlier {
+    /// The verdict in words.
+    pub verdict: &'static str,
+    /// Heights off the laser surface, images apart, both adjusted, and range − distance, as in [`SiteSummary`].
+    pub figures_m: [Option<f64>; 3],
+    /// When they were published.
+    pub finished_utc: String,
+    /// Where their manifest is, from the page.
+    pub manifest: String,
 }
 
 /// The page over `sites`, which stand in the order given.
@@ -56,10 +74,15 @@ pub fn sites_page(sites: &[SiteLine]) -> Result<String> {
     let unfinished = sites.iter().filter(|site| site.products.is_none()).count();
     let (valid, remarks) = (with(Tone::Good), with(Tone::Remarks));
     let invalid = with(Tone::Bad) - unfinished;
-    let headline = format!(
-        "{} sites: {invalid} invalid or failed, {unfinished} without products, {remarks} valid with remarks, {valid} valid.",
-        sites.len()
-    );
+    let parts = [
+        (invalid, "invalid or failed"),
+        (unfinished, "without products"),
+        (remarks, "valid with remarks"),
+        (valid, "valid"),
+    ];
+    let parts = parts.into_iter().filter(|(count, _)| *count > 0);
+    let parts: Vec<String> = parts.map(|(count, of)| format!("{count} {of}")).collect();
+    let headline = format!("{}: {}.", counted(sites.len(), "site"), parts.join(", "));
     let overall = if invalid + unfinished > 0 {
         Tone::Bad
     } else if remarks > 0 {
@@ -72,12 +95,15 @@ pub fn sites_page(sites: &[SiteLine]) -> Result<String> {
         link(FIDELITY_FILE, "Fidelity to the papers")
     );
     let words = paragraph(
-        "Names link to the reports. Off MOLA: median height of the tie points against the MOLA surface; images apart: along \
-         track, the worst pair; range − distance: the largest mean of a profile.",
+        "Heights off: median height of the tie points against the laser surface. Images apart: along track, the worst pair. \
+         Range − distance: the largest mean of a profile.",
     );
+    let maps = Body::WORDS.map(|(_, body)| sites_map::figure(body, &places(sites, body)));
+    let maps: String = maps.into_iter().collect::<Result<_>>()?;
+    let maps = format!("<div class=\"plots\">\n{maps}</div>\n");
     let lead = [
         verdict(overall, &headline, ""),
-        sites_map::figure(&places(sites))?,
+        maps,
         table(sites),
         words,
         fidelity,
@@ -85,13 +111,14 @@ pub fn sites_page(sites: &[SiteLine]) -> Result<String> {
     Ok(page("Sites", &lead.concat(), &[]))
 }
 
-/// The sites of which it is known where they are.
-fn places(sites: &[SiteLine]) -> Vec<Place<'_>> {
+/// The sites on a body of which it is known where they are.
+fn places(sites: &[SiteLine], body: Body) -> Vec<Place<'_>> {
     let placed = sites.iter().filter_map(|site| {
+        let products = site.products.as_ref().filter(|of| of.body == body)?;
         Some(Place {
             name: &site.folder,
             tone: tone(site),
-            place_deg: site.products.as_ref()?.place_deg?,
+            place_deg: products.place_deg?,
         })
     });
     placed.collect()
@@ -116,9 +143,10 @@ fn table(sites: &[SiteLine]) -> String {
             Column::Number("shots"),
             Column::Number("profiles"),
             Column::Number("images"),
-            Column::Number("off MOLA, m: before → adjusted"),
+            Column::Number("heights off, m: before → adjusted"),
             Column::Number("images apart, m: before → adjusted"),
             Column::Number("range − distance, m"),
+            Column::Text("against the run before"),
             Column::Text("published (UTC)"),
         ],
     );
@@ -149,6 +177,51 @@ impl SiteSummary {
                 (days, ..) => format!("{} before the newest", counted(days as usize, "day")),
             }
         })
+    }
+}
+
+/// What the headline number may be, and its name among the figures of a manifest.
+const HEADLINES: [(&str, &str); 3] = [
+    ("heights off", "adjusted_height_off_surface_m"),
+    ("images apart", "adjusted_along_track_parallax_m"),
+    ("range − distance", "range_mean_m"),
+];
+
+impl SiteSummary {
+    /// How verdict and headline number moved since the products before.
+    fn trend(&self) -> Cell {
+        let Some(before) = &self.earlier else {
+            return dash().into();
+        };
+        let verdict = if before.verdict == self.verdict {
+            format!("{} as before", self.verdict)
+        } else {
+            format!("{} → {}", before.verdict, self.verdict)
+        };
+        let now_m = [
+            self.height_off_m[1],
+            self.images_apart_m[1],
+            self.range_mean_m,
+        ];
+        let pairs = before.figures_m.into_iter().zip(now_m).zip(HEADLINES);
+        let mut moves = pairs.filter_map(|((before_m, now_m), of)| Some((before_m?, now_m?, of)));
+        let number = moves
+            .next()
+            .map_or_else(String::new, |(before_m, now_m, (what, name))| {
+                let [was, is] = [before_m, now_m].map(|metres| number(metres, 2));
+                let moved = if was == is {
+                    told(&format!("{what} {is} m"), &format!("/figures/{name}"))
+                } else {
+                    let places = format!("{}#/figures/{name} /figures/{name}", before.manifest);
+                    told(&format!("{what} {was} → {is} m"), &places)
+                };
+                format!("<br><small>{moved}</small>")
+            });
+        let since = format!(
+            "<br><small>since {}</small>",
+            escape(&minute(&before.finished_utc))
+        );
+        Cell::Html(escape(&verdict) + &number + &since)
     }
 }
 
@@ -194,13 +267,19 @@ fn cells(site: &SiteLine, newest: Option<DateTime<FixedOffset>>) -> Vec<Cell> {
     let range_mean_m = summary.range_mean_m.map(|mean_m| number(mean_m, 2));
     let range_mean_m = Cell::from(range_mean_m.unwrap_or_else(dash));
     cells.push(range_mean_m.told("/figures/range_mean_m"));
+    cells.push(summary.trend());
     cells.push(Cell::Html(format!(
-        "{}<br><small>{}, areograph {}</small>",
-        escape(&summary.finished_utc.replace('T', " ").replace('Z', "")),
+        "<span class=\"short\">{}</span><br><small>{}, areograph {}</small>",
+        escape(&minute(&summary.finished_utc)),
         summary.age(newest),
         escape(&summary.version)
     )));
     cells
+}
+
+/// Day and minute of an instant.
+fn minute(utc: &str) -> String {
+    utc.get(..16).unwrap_or(utc).replace('T', " ")
 }
 
 /// A figure before and after the adjustment, with a dash where there is none.
@@ -255,7 +334,9 @@ mod tests {
             range_mean_m: Some(1.25),
             images_apart_m: [Some(261.2), Some(0.04)],
             height_off_m: [None, None],
+            body: Body::Mars,
             place_deg: Some((175.3, -14.6)),
+            earlier: None,
             finished_utc: "2026-01-01T00:00:00Z".to_owned(),
             version: "1".to_owned(),
         };
@@ -274,13 +355,27 @@ mod tests {
             },
         ])
         .unwrap();
-        assert!(page.contains(
-            "4 sites: 2 invalid or failed, 1 without products, 0 valid with remarks, 1 valid."
-        ));
+        assert!(page.contains("4 sites: 2 invalid or failed, 1 without products, 1 valid."));
         assert!(page.contains("mean of &lt;x&gt;; and 1 more"));
         assert!(page.contains("href=\"good/report/index.html\""));
         assert!(page.contains("<small>a &lt;kernel&gt; is gone</small>"));
         assert!(page.contains("261.2 → 0.0"));
+        // What changed since the products before; their own verdict stays where it is the same.
+        let mut moved = summary("valid", &[]);
+        moved.earlier = Some(Earlier {
+            verdict: "INVALID",
+            figures_m: [None, Some(31.5), Some(1.25)],
+            finished_utc: String::new(),
+            manifest: "moved/before.json".to_owned(),
+        });
+        let trend = sites_page(&[line("moved", Some(moved.clone()))]).unwrap();
+        assert!(trend.contains("INVALID → valid<br>"));
+        assert!(trend.contains("images apart 31.50 → 0.04 m"));
+        moved.verdict = "INVALID";
+        moved.images_apart_m = [None, None];
+        let trend = sites_page(&[line("moved", Some(moved))]).unwrap();
+        assert!(trend.contains("INVALID as before<br>"));
+        assert!(trend.contains("range − distance 1.25 m"));
         // All of the three ran at the same time; an older one says so.
         assert_eq!(page.matches("newest, areograph 1").count(), 3);
         let mut older = summary("valid", &[]);

@@ -1,20 +1,27 @@
-//! Mars with all sites of an output folder, by verdict.
+//! A body with all its sites of an output folder, by verdict.
 
 use std::fmt::Write as _;
 
-use plotters::prelude::*;
+use plotters::{prelude::*, style::text_anchor::HPos};
 
 use super::{
     html::Tone,
     map::labels::{self, Labels},
-    plots::{COLOURS, Canvas, Drawn, GRID, INK, Key, MARK, WIDTH, drawn, figure_html, quoted},
+    plots::{
+        COLOURS, Canvas, Drawn, GRID, INK, Key, MARK, WIDTH, draw_text, drawn, figure_html, quoted,
+    },
 };
-use crate::error::Result;
+use crate::{body::Body, error::Result};
 
 /// Height of the map: a degree of latitude is as long as one of longitude.
 const HEIGHT: i32 = WIDTH as i32 / 2;
-/// Degrees between lines.
+/// Degrees between lines, and between named ones.
 const STEP_DEG: i32 = 30;
+const NAMED_DEG: i32 = 90;
+/// Half the size of a mark.
+const MARK_SIZE: i32 = 12;
+/// Around the map, for marks on its edge and names of lines.
+const MARGIN: i32 = 40;
 /// Colours of valid sites and of those with remarks.
 const VALID: usize = 2;
 const REMARKS: usize = 4;
@@ -31,7 +38,7 @@ pub(super) struct Place<'a> {
 ///
 /// # Errors
 /// A drawing that cannot be made.
-pub(super) fn figure(places: &[Place]) -> Result<String> {
+pub(super) fn figure(body: Body, places: &[Place]) -> Result<String> {
     if places.is_empty() {
         return Ok(String::new());
     }
@@ -47,37 +54,45 @@ pub(super) fn figure(places: &[Place]) -> Result<String> {
         Key::colour("valid with remarks (triangle)", REMARKS),
         Key::mark("invalid or failed (cross)"),
     ];
-    let words = "Middles of the sites' first windows, 0° E at the left edge, lines every 30°; sites whose window is an outline \
-                 are in the table only.";
-    Ok(figure_html("Sites on Mars", &svg, &keys, words, &csv))
+    let words = "Middles of the sites' first windows, 0° E at the left edge, lines every 30°. Sites with an outline for a \
+                 window are in the table only.";
+    Ok(figure_html(
+        &format!("Sites on {body}"),
+        &svg,
+        &keys,
+        words,
+        &csv,
+    ))
 }
 
 fn draw<'a>(places: &[Place], area: &Canvas<'a>) -> Drawn<'a> {
-    let width = WIDTH as i32;
+    let (width, height) = (WIDTH as i32 - 2 * MARGIN, HEIGHT - 2 * MARGIN);
     let pixel = |(longitude, latitude): (f64, f64)| {
-        let scale = f64::from(WIDTH) / 360.0;
-        (
-            (scale * longitude.rem_euclid(360.0)).round() as i32,
-            (scale * (90.0 - latitude)).round() as i32,
-        )
+        let x = f64::from(width) / 360.0 * longitude.rem_euclid(360.0);
+        let y = f64::from(height) / 180.0 * (90.0 - latitude);
+        (MARGIN + x.round() as i32, MARGIN + y.round() as i32)
     };
-    for line in 1..360 / STEP_DEG {
-        let x = line * STEP_DEG * width / 360;
-        area.draw(&PathElement::new(
-            vec![(x, 0), (x, HEIGHT)],
-            GRID.stroke_width(2),
-        ))?;
+    let (right, bottom) = (MARGIN + width, MARGIN + height);
+    for longitude in (STEP_DEG..360).step_by(STEP_DEG as usize) {
+        let (x, _) = pixel((f64::from(longitude), 0.0));
+        let line = vec![(x, MARGIN), (x, bottom)];
+        area.draw(&PathElement::new(line, GRID.stroke_width(2)))?;
+        if longitude % NAMED_DEG == 0 {
+            let name = format!("{longitude}° E");
+            draw_text(area, &name, (x, bottom + MARGIN / 2), HPos::Center)?;
+        }
     }
-    for line in 1..180 / STEP_DEG {
-        let y = line * STEP_DEG * HEIGHT / 180;
-        area.draw(&PathElement::new(
-            vec![(0, y), (width, y)],
-            GRID.stroke_width(2),
-        ))?;
+    for latitude in (STEP_DEG - 90..90).step_by(STEP_DEG as usize) {
+        let (_, y) = pixel((0.0, f64::from(latitude)));
+        let line = vec![(MARGIN, y), (right, y)];
+        area.draw(&PathElement::new(line, GRID.stroke_width(2)))?;
     }
-    let frame = [(0, 0), (width - 1, HEIGHT - 1)];
+    let frame = [(MARGIN, MARGIN), (right, bottom)];
     area.draw(&Rectangle::new(frame, INK.stroke_width(2)))?;
-    let mut names = Labels::new(width, HEIGHT);
+    let mut names = Labels::new(WIDTH as i32, HEIGHT);
+    for place in places {
+        names.keep_off(pixel(place.place_deg), MARK_SIZE);
+    }
     // The worst over the others, where sites lie close together.
     let order = [Tone::Good, Tone::Remarks, Tone::Bad];
     let sorted = order

@@ -11,6 +11,26 @@ pub(super) fn told(text: &str, places: &str) -> String {
     format!("<span{}>{}</span>", from_places(places), escape(text))
 }
 
+/// A paragraph of `words` with a number at each `{}`, told by its place in the products; a number without a place is
+/// a word.
+pub(super) fn sentence(words: &str, numbers: &[(String, &str)]) -> String {
+    format!("<p>{}</p>\n", filled(words, numbers))
+}
+
+/// The same as a part of a text, in HTML.
+pub(super) fn filled(words: &str, numbers: &[(String, &str)]) -> String {
+    let mut pieces = words.split("{}");
+    let mut html = escape(pieces.next().unwrap_or_default());
+    for (piece, (number, place)) in pieces.zip(numbers) {
+        html += &match *place {
+            "" => escape(number),
+            place => told(number, place),
+        };
+        html += &escape(piece);
+    }
+    html
+}
+
 /// A member's name as a part of a JSON pointer; a space, which stands between places, as in addresses.
 pub(super) fn member(name: &str) -> String {
     name.replace('~', "~0")

@@ -6,7 +6,7 @@ use super::{
     html::{Tone, counted, escape, list, paragraph, verdict},
     map,
     misregistration::BeforeAfter,
-    numbers::{number, signed, whole, with_minus},
+    numbers::{number, signed, whole},
     source::told,
 };
 use crate::{
@@ -40,14 +40,15 @@ pub(super) fn lead(site: &SiteProducts) -> Result<String> {
             first_of(remarks)
         )
     };
-    Ok(format!(
-        "{}{}{}<div class=\"first\">\n<div>{}</div>\n<div>{}</div>\n</div>\n{remarks}",
-        about(site),
+    let found = format!(
+        "{}{}<div class=\"first\">\n<div>{}</div>\n<div>{}</div>\n</div>\n{remarks}",
         verdict(tone, &headline(site), &first_of(reasons)),
         numbers(site),
         checks::table(site),
         map::first(site)?,
-    ))
+    );
+    // What the user wrote stays as it is.
+    Ok(about(site) + &site.config.wording().of(found))
 }
 
 fn headline(site: &SiteProducts) -> String {
@@ -237,7 +238,11 @@ fn by_ranges(site: &SiteProducts) -> Option<KeyNumber> {
         value: told(&format!("{} m", signed(mean_m, 2)), &place),
         note: match site.profiles.len() {
             1 => format!("mean of profile {profile}"),
-            count => format!("largest mean of {count} profiles, {profile}"),
+            count => {
+                let profiles = counted(count, "profile");
+                let profiles = told(&profiles, "manifest.json#/counts/profiles");
+                format!("largest mean of {profiles}, {profile}")
+            }
         },
     })
 }
@@ -245,7 +250,7 @@ fn by_ranges(site: &SiteProducts) -> Option<KeyNumber> {
 /// As many sentences as leave the verdict on one screen; the manifest has all.
 fn first_of(sentences: &[String]) -> String {
     let shown = &sentences[..sentences.len().min(REASONS_SHOWN)];
-    let mut html = list(&shown.iter().map(|of| with_minus(of)).collect::<Vec<_>>());
+    let mut html = list(shown);
     if shown.len() < sentences.len() {
         let more = sentences.len() - shown.len();
         html += &paragraph(&format!(

@@ -28,13 +28,21 @@ fn supported<'a>(
 
 fn write(site: &SiteProducts) -> String {
     let ids: Vec<&str> = supported(site).map(|(times, _)| &*times.id).collect();
-    let words = format!(
+    let mut words = format!(
         "Camera, line times and orientation of {} come from image support data (CSM, as ALE writes them). Nothing is applied \
-         to them: no pointing (CK) bias, clock correction or light time, no kernel of orbit or attitude. Positions by ALE mostly \
-         contain light time and aberration and are hundreds of metres off, so neither ranges of shots nor the laser's mounting are \
-         used with these images. Adjusted, they have adjusted_isd.json and no SPICE kernels.",
+         to them: no pointing (CK) bias, clock correction or light time, no kernel. Their adjusted orientation is in \
+         adjusted_isd.json, not in SPICE kernels.",
         ids.join(", ")
     );
+    let apart = supported(site).filter(|(_, support)| !support.has_laser);
+    let apart: Vec<&str> = apart.map(|(times, _)| &*times.id).collect();
+    if !apart.is_empty() {
+        words += &format!(
+            " ALE's positions mostly contain light time and aberration, hundreds of metres: neither ranges nor the laser's \
+             mounting are used with {}.",
+            apart.join(", ")
+        );
+    }
     let mut table = Table::new(
         "What the support data hold",
         &[

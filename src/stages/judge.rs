@@ -18,7 +18,10 @@ use super::{
     orientation::Orientation,
     read_ties::Ties,
 };
-use crate::config::{LimitsConfig, OrientationConfig, RangeCheckConfig};
+use crate::{
+    config::{LimitsConfig, OrientationConfig, RangeCheckConfig},
+    wording::{Wording, signed, with_minus},
+};
 
 /// Whether the products keep the limits of the configuration.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -66,6 +69,8 @@ impl Verdict {
 /// What is known of a site when it is judged.
 #[derive(Debug, Clone, Copy)]
 pub struct Evidence<'a> {
+    /// The words of sentences and checks.
+    pub wording: Wording<'a>,
     /// Footprints in the windows; `None` for a site without PEDR files.
     pub footprints: Option<usize>,
     /// The limits of the configuration.
@@ -125,6 +130,9 @@ pub struct AdjustmentEvidence<'a> {
 pub fn judge(evidence: &Evidence<'_>) -> Verdict {
     let mut reasons = evidence.invalid_because();
     let mut checks = checks::checks(evidence);
+    for check in &mut checks {
+        check.say(&evidence.wording);
+    }
     let mut remarks = evidence.remarks();
     // Sentences and checks are two accounts of the same evidence: what either finds is told.
     let failed = in_words(&checks, CheckOutcome::Fail);
@@ -139,10 +147,11 @@ pub fn judge(evidence: &Evidence<'_>) -> Verdict {
     if remarks.is_empty() {
         remarks = in_words(&checks, CheckOutcome::Warning);
     }
+    let said = |sentence: String| with_minus(&evidence.wording.of(sentence));
     Verdict {
         valid: reasons.is_empty(),
-        reasons,
-        remarks,
+        reasons: reasons.into_iter().map(said).collect(),
+        remarks: remarks.into_iter().map(said).collect(),
         checks,
     }
 }
@@ -231,8 +240,9 @@ fn doubt(scan: &BiasScan, configured_s: f64) -> Option<String> {
     // Written so that NaN counts.
     (!(apart_s <= clock_limit_s(uncertainty_s))).then(|| {
         format!(
-            "its ranges fit a clock correction of {best_s:+.4} ± {uncertainty_s:.4} s, not the configured \
-             {configured_s:+.3} s"
+            "its ranges fit a clock correction of {} ± {uncertainty_s:.4} s, not the configured {} s",
+            signed(best_s, 4),
+            signed(configured_s, 3)
         )
     })
 }

@@ -195,7 +195,7 @@ pub fn search_footprints<'a>(
     }
     let regions = windows.iter().map(|window| Region::new(&window.shape));
     let query = Query::new(regions.collect(), &pedr.filter, Judged::All).corrected(correction_s);
-    watch.expect(sources.iter().map(Source::records).sum());
+    watch.announce(sources.iter().map(Source::records).sum());
     search(&sources, &query, watch.stop(), &mut gathered).in_stage(STAGE)?;
     let paths: Vec<PathBuf> = files.iter().map(|file| file.path.clone()).collect();
     require_distinct(&gathered.result.footprints, &paths).in_stage(STAGE)?;

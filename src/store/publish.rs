@@ -34,6 +34,9 @@ pub(super) const STAGING: &str = ".staging";
 /// Paths below the site's folder that a publication under way may have made or will remove.
 pub(super) const JOURNAL: &str = ".publishing";
 
+/// The manifest of the products that stood in the folder before those that stand there.
+pub const PREVIOUS: &str = ".previous.json";
+
 /// Why the last run of the site failed; there is none after a run that did not.
 const FAILED: &str = ".failed";
 
@@ -139,6 +142,7 @@ pub fn publish(site_folder: &Path, staging: &Path, manifest: &Manifest) -> Resul
         .copied()
         .chain(earlier.iter().map(|path| &**path))
         .collect();
+    keep_previous(site_folder, manifest)?;
     let journal = site_folder.join(JOURNAL);
     atomic::write(&journal, concerned.join("\n").as_bytes())?;
     remove_if_there(&site_folder.join(MANIFEST))?;
@@ -169,6 +173,23 @@ pub fn publish(site_folder: &Path, staging: &Path, manifest: &Manifest) -> Resul
     fs::remove_dir_all(staging)
         .map_err(IoError::on("remove the folder"))
         .in_file(staging)
+}
+
+/// Keeps the manifest that stands in the folder, if its products are others than those of `next`.
+fn keep_previous(site_folder: &Path, next: &Manifest) -> Result<()> {
+    match read_manifest(site_folder) {
+        Some(standing) if standing.products != next.products => {
+            atomic::write(&site_folder.join(PREVIOUS), &manifest_bytes(&standing)?)
+        }
+        _ => Ok(()),
+    }
+}
+
+/// The manifest of the products before those that stand in the folder; none of the first ones.
+#[must_use]
+pub fn read_previous(site_folder: &Path) -> Option<Manifest> {
+    let text = fs::read_to_string(site_folder.join(PREVIOUS)).ok()?;
+    serde_json::from_str(&text).ok()
 }
 
 /// Products that earlier runs may have left: those of the manifest and of an unfinished journal.

@@ -175,6 +175,7 @@ impl Site {
         }];
         let searched = !self.config.pedr.files.is_empty();
         let verdict = judge(&Evidence {
+            wording: self.config.wording(),
             footprints: searched.then_some(self.footprints.len()),
             ranges: &self.ranges,
             limits: &self.config.limits,

@@ -198,6 +198,7 @@ impl Site {
             adjusted_heights: &self.adjusted_heights,
         };
         let evidence = Evidence {
+            wording: self.config.wording(),
             footprints: Some(self.converted.footprints.len()),
             limits: &self.config.limits,
             range_limits: &self.config.range_check,

@@ -201,7 +201,7 @@ fn assets(of: &Context) -> Result<Value> {
         let relative = slashes(&product.path);
         let mut asset = json!({
             "href": format!("../{relative}"),
-            "description": declaration.what,
+            "description": of.site.config.wording().of(declaration.what),
             "roles": [declaration.role.name()],
             "file:size": bytes,
             "file:checksum": format!("{BLAKE3_MULTIHASH}{blake3}"),

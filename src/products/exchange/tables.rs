@@ -1,11 +1,12 @@
 //! Footprints as CSV files that ISIS and Ames Stereo Pipeline read, each with a document of its columns.
 
+use std::borrow::Cow;
+
 use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::{DEGREE_DECIMALS, KM_DECIMALS, METRE_DECIMALS, SECOND_DECIMALS};
 use crate::{
-    body::Body,
     products::{
         SiteProducts,
         coordinates::{degrees, frame},
@@ -54,7 +55,7 @@ pub(in crate::products) static LOLA_LIKE_SIDECAR: Declaration = Declaration {
     content: Content::Document(schema),
     write: Write::Footprints(|path, of| {
         let sidecar = Sidecar::new(
-            of.site.config.body,
+            of.site,
             "lola_like.csv",
             "2:lon 3:lat 4:radius_km",
             LOLA_LIKE_RADIUS,
@@ -89,7 +90,7 @@ pub(in crate::products) static ODE_SIDECAR: Declaration = Declaration {
     content: Content::Document(schema),
     write: Write::Footprints(|path, of| {
         let sidecar = Sidecar::new(
-            of.site.config.body,
+            of.site,
             "ode_pts.csv",
             "1:lon 2:lat 5:radius_m",
             ODE_RADIUS,
@@ -119,7 +120,7 @@ struct Sidecar {
     #[schemars(extend("exclusiveMinimum" = 0))]
     datum_radius_m: f64,
     /// What its radii are.
-    radius: &'static str,
+    radius: Cow<'static, str>,
     /// Whose longitudes and latitudes these are.
     frame: &'static str,
     #[schemars(extend("const" = "east, 0..360"))]
@@ -136,28 +137,29 @@ struct SidecarColumn {
     name: &'static str,
     #[serde(skip_serializing_if = "Option::is_none")]
     unit: Option<&'static str>,
-    meaning: &'static str,
+    meaning: Cow<'static, str>,
 }
 
 impl Sidecar {
     fn new(
-        body: Body,
+        site: &SiteProducts,
         file: &'static str,
         csv_format: &'static str,
         radius: &'static str,
         columns: &[Column<Shot>],
     ) -> Self {
+        let (body, wording) = (site.config.body, site.config.wording());
         let columns = meanings(columns).into_iter().map(|column| SidecarColumn {
             name: column.name,
             unit: column.unit.symbol(),
-            meaning: column.description,
+            meaning: wording.of(column.description),
         });
         Self {
             file,
             csv_format,
             datum: &body.map().asp_datum,
             datum_radius_m: body.map().radius_m,
-            radius,
+            radius: wording.of(radius),
             frame: frame(body),
             longitudes: "east, 0..360",
             header_lines: 1,
@@ -172,7 +174,7 @@ pub(in crate::products) fn schema() -> DocumentSchema {
 }
 
 fn table<'a>(site: &'a SiteProducts<'a>, columns: Vec<Column<Shot<'a>>>) -> Table<'a> {
-    Table::new(columns, Shot::all(site))
+    Table::new(columns, Shot::all(site)).in_words(&site.config.wording())
 }
 
 /// Columns 1 to 5 as ISIS `lrolola2isis` reads them.

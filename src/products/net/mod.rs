@@ -6,7 +6,7 @@ mod document;
 mod pictures;
 mod points;
 
-use std::path::Path;
+use std::{borrow::Cow, path::Path};
 
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -121,7 +121,7 @@ struct ColumnOfTable {
     #[serde(skip_serializing_if = "Option::is_none")]
     unit: Option<&'static str>,
     /// What its values are.
-    meaning: &'static str,
+    meaning: Cow<'static, str>,
     /// Whether a row may lack it.
     optional: bool,
 }
@@ -151,7 +151,7 @@ impl ColumnOfTable {
         Self {
             name: column.name,
             unit: column.unit.symbol(),
-            meaning: column.description,
+            meaning: column.description.clone(),
             optional: column.optional,
         }
     }

@@ -87,7 +87,7 @@ fn schema() -> DocumentSchema {
         "Points of a net as GeoJSON",
         "points.geojson of areograph: adjusted points of a plane triangulation, Mars sphere, areocentric; west > east \
          in bbox when it crosses the antimeridian.",
-        &table.columns().copied().collect::<Vec<_>>(),
+        &table.columns().cloned().collect::<Vec<_>>(),
     );
     DocumentSchema {
         name: "net_points",

@@ -53,7 +53,7 @@ pub(super) fn worst_profiles(ranges: &ArchiveRanges, worst: &[WorstProfile<'_>])
         ];
         table.row(profile.invalid_because.is_empty(), cells);
     }
-    let words = "Mean and distance to the file’s own spacecraft are without outliers. “Orbits apart” is the mean of the file’s own \
+    let words = "Mean and distance to the file's own spacecraft are without outliers. Orbits apart is the mean of the file's own \
         spacecraft minus that of the kernels: another orbit, clock or datum shows there. The best correction of time tags is the \
         one by which ranges spread least, be it with raw radii or with those corrected by crossovers. All profiles are in profiles.parquet and profiles.csv.";
     table.finish() + &paragraph(words) + &commands(worst)
@@ -78,7 +78,7 @@ fn begins(of: &WorstProfile<'_>) -> String {
 
 fn correction(profile: &ArchiveProfile) -> String {
     match (profile.best_correction_s, profile.correction_uncertainty_s) {
-        (Some(best_s), Some(sigma_s)) => format!("{} ±{sigma_s:.3}", label(best_s, 3)),
+        (Some(best_s), Some(sigma_s)) => format!("{} ± {sigma_s:.3}", label(best_s, 3)),
         (Some(best_s), None) => label(best_s, 3),
         _ => String::new(),
     }

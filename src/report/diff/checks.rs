@@ -20,13 +20,13 @@ pub(super) fn changed(site: &RunDifference) -> String {
     for after in b {
         let before = a.iter().find(|before| before.kind == after.kind);
         if before.is_none_or(|before| told(before) != told(after)) {
-            rows.push((after.kind.words(), before, Some(after)));
+            rows.push((after.words(), before, Some(after)));
         }
     }
     let gone = a
         .iter()
         .filter(|before| b.iter().all(|after| after.kind != before.kind));
-    rows.extend(gone.map(|before| (before.kind.words(), Some(before), None)));
+    rows.extend(gone.map(|before| (before.words(), Some(before), None)));
     if rows.is_empty() {
         return String::new();
     }

@@ -66,12 +66,15 @@ pub(super) fn figure_of(site: &RunDifference) -> Result<String> {
         told.push(format!("{} {name}", whole(arrows.len())));
         let places = arrows.iter().map(|arrow| arrow.from).collect();
         panel.series.push(Series::dots(name, colour, places));
-        panel.arrows.push(Arrows {
-            label: format!("{name}, B − A"),
-            colour,
-            magnification: times,
-            each: arrows,
-        });
+        let drawn = |arrow: &Arrow| METRES_PER_KM * arrow.by.0.hypot(arrow.by.1) > DRAWN_FROM_M;
+        if arrows.iter().any(drawn) {
+            panel.arrows.push(Arrows {
+                label: format!("{name}, B − A"),
+                colour,
+                magnification: times,
+                each: arrows,
+            });
+        }
     }
     let words = format!(
         "Places in A, and what moved there to B, {times} × magnified: {}. Kilometres east and north of their mean.",

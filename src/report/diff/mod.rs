@@ -92,12 +92,7 @@ fn moved(site: &RunDifference) -> String {
         "A was published at {}, B at {}; a movement is B − A.",
         site.a.finished_utc, site.b.finished_utc
     );
-    let mut sentences = site.sentences();
-    // A verdict that changed stands above.
-    if site.a.verdict.word() != site.b.verdict.word() {
-        sentences.remove(0);
-    }
-    let body = list(&sentences) + &paragraph(&limits(site)) + &paragraph(&runs);
+    let body = list(&site.first_sentences()) + &paragraph(&limits(site)) + &paragraph(&runs);
     html::verdict(tone, &headline, &body)
 }
 

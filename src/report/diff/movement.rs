@@ -14,16 +14,18 @@ use crate::{
 
 /// Footprints, then cameras.
 pub(super) fn tables(site: &RunDifference) -> String {
-    let mut body = footprints(site);
-    if !site.images.is_empty() {
-        body += &positions(&site.images, &site.limits);
-        body += &pointing(&site.images, &site.limits);
+    let mut body = String::new();
+    if site.footprints.differ() {
+        body += &footprints(site);
+    }
+    let images: Vec<&ImageDifference> = site.images.iter().filter(|of| of.differs()).collect();
+    if !images.is_empty() {
+        body += &positions(&images, &site.limits);
+        body += &pointing(&images, &site.limits);
         body += &paragraph(
-            "Samples are matched by image line. Radial, along and cross are the axes of A's orbit: away from Mars, \
-             along the flight, along the angular momentum; their columns are means with sign. Turns are about the \
-             camera's own axes; one about z, the boresight, does not move the ground point. On the ground, pointing \
-             alone is turn × range across the line of sight; the ground point of the boresight on the ellipsoid feels \
-             position and turn together.",
+            "Samples are matched by image line. Radial (up), along the flight and cross (angular momentum) are axes of A's \
+             orbit; signed columns are means. Turns are about the camera's axes; z is the boresight. Pointing alone: turn × \
+             range. Ground point: where the boresight meets the ellipsoid.",
         );
     }
     body
@@ -77,7 +79,7 @@ fn footprints(site: &RunDifference) -> String {
     table.finish()
 }
 
-fn positions(images: &[ImageDifference], limits: &Limits) -> String {
+fn positions(images: &[&ImageDifference], limits: &Limits) -> String {
     let mut table = Table::new(
         "Camera positions",
         &[
@@ -117,7 +119,7 @@ fn positions(images: &[ImageDifference], limits: &Limits) -> String {
     table.finish()
 }
 
-fn pointing(images: &[ImageDifference], limits: &Limits) -> String {
+fn pointing(images: &[&ImageDifference], limits: &Limits) -> String {
     let mut table = Table::new(
         "Camera pointing",
         &[

@@ -106,8 +106,8 @@ fn words(geometric: &GeometricProducts) -> String {
         String::new()
     };
     format!(
-        "Top: tie points above the ellipsoid, south to north. Bottom: above the MOLA surface, {medians}. Grey: that surface \
-         ± 1 σ, {} m in the median.{thinned}",
+        "Tie points above the ellipsoid, south to north; below, above the MOLA surface: {medians}. Grey: surface ± 1 σ \
+         (median {} m).{thinned}",
         label(Summary::of(&sigmas).median, 1)
     )
 }

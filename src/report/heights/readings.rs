@@ -17,9 +17,8 @@ pub(super) fn two_readings(adjusted: &Adjusted) -> String {
     }
 }
 
-const WORDS: &str = "Tie points show how far apart the images are along track, not which is right. Evenly: each is as likely to be wrong. \
-    By the clock: one clock offset turned the images that follow nadir, but not those held towards a star. Each σ holds for its \
-    own reading; adjustment.attitude_clock chooses.";
+const WORDS: &str = "Tie points tell how far apart images lie along track, not which is right. One offset of the attitude clock turns images \
+    that follow nadir, not those held towards a star. Each σ holds for its own reading (adjustment.attitude_clock).";
 
 fn table(adjusted: &Adjusted, other: &OtherReading) -> String {
     let mut table = Table::new(

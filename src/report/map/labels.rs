@@ -74,6 +74,11 @@ impl Labels {
         }
     }
 
+    /// Keeps names off what is drawn at most so far from a place.
+    pub(in crate::report) fn keep_off(&mut self, (x, y): (i32, i32), by: i32) {
+        self.taken.push([x - by, y - by, x + by, y + by]);
+    }
+
     /// Draws all of them.
     pub(in crate::report) fn draw<'a>(&self, area: &Canvas<'a>) -> Drawn<'a> {
         let mut names = self.placed.iter();

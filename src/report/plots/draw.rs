@@ -12,6 +12,8 @@ use super::{
 pub(super) const FOOT: u32 = 96;
 /// Room between panels, for the labels at their corners.
 const GUTTER: u32 = 16;
+/// Labels of the lowest axis, about.
+const X_LABELS: usize = 6;
 /// Width of the axes at the left side.
 const SIDE: u32 = 176;
 /// Width of the bars at the right side.
@@ -44,13 +46,14 @@ fn draw_panel<'a>(plot: &Plot, panel: &Panel, lowest: bool, area: &Canvas<'a>) -
         .x_label_area_size(foot)
         .y_label_area_size(SIDE)
         .build_cartesian_2d(plot.x.range(), panel.y.range())?;
-    let (x_decimals, y_decimals) = (plot.x.decimals(), panel.y.decimals());
+    let y_labels = if panel.height < 300 { 5 } else { 8 };
+    let (x_decimals, y_decimals) = (plot.x.decimals(X_LABELS), panel.y.decimals(y_labels));
     chart
         .configure_mesh()
         .x_desc(if lowest { plot.x_label } else { "" })
         .y_desc(panel.y_label)
-        .x_labels(6)
-        .y_labels(if panel.height < 300 { 5 } else { 8 })
+        .x_labels(X_LABELS)
+        .y_labels(y_labels)
         .max_light_lines(0)
         .bold_line_style(GRID.stroke_width(2))
         .axis_style(INK.stroke_width(2))

@@ -13,7 +13,10 @@ pub(super) use palette::{COLOURS, GREY, GRID, INK, MARK};
 
 use std::fmt::Write as _;
 
-use plotters::style::RGBColor;
+use plotters::{
+    coord::{ranged1d::Ranged as _, types::RangedCoordf64},
+    style::RGBColor,
+};
 
 use crate::error::Result;
 
@@ -267,12 +270,17 @@ impl Extent {
         self.low..self.high
     }
 
-    /// Decimals that tell the labels of about eight steps apart.
-    pub(super) fn decimals(self) -> usize {
-        let step = (self.high - self.low) / 8.0;
-        (0..9_u8)
-            .find(|decimals| 10_f64.powi(-i32::from(*decimals)) <= step)
-            .map_or(9, usize::from)
+    /// Decimals that write the labels of an axis with about so many in full.
+    pub(super) fn decimals(self, labels: usize) -> usize {
+        let places = RangedCoordf64::from(self.range()).key_points(labels);
+        let step = (self.high - self.low) / labels as f64;
+        let is_whole = |decimals: &usize| {
+            let unit = 10_f64.powi(-(*decimals as i32));
+            let off = |place: &f64| (place / unit - (place / unit).round()).abs() * unit;
+            // What a double cannot hold of a label.
+            places.iter().all(|place| off(place) < 1e-3 * step)
+        };
+        (0..9).find(is_whole).unwrap_or(9)
     }
 }
 

@@ -2,6 +2,7 @@
 
 use super::{
     super::{
+        html::counted,
         numbers::whole,
         plots::{Extent, Panel, Plot, Series, Style, figure, label, thinned},
     },
@@ -131,11 +132,12 @@ fn profile_plot(site: &SiteProducts, index: usize, limit: usize) -> Plot {
         low: 0.0,
         high: angle_panel.y.high.max(OFF_NADIR_LEAST_DEG),
     };
-    let mut caption = words(ranges) + " Bars: shots per bin.";
-    caption += &if limits_seen {
-        format!(" Dashed: the limit of the mean, ±{mean_max_m} m.")
-    } else {
-        format!(" Limit of the mean, not reached: ±{mean_max_m} m.")
+    let mut caption = words(ranges);
+    let within = ranges.mean_without_outliers_m.abs() <= mean_max_m;
+    caption += &match (limits_seen, within) {
+        (true, _) => format!(" Dashed: the limit of the mean, ±{mean_max_m} m."),
+        (false, true) => format!(" The mean is within its limit, ±{mean_max_m} m."),
+        (false, false) => format!(" The mean is beyond its limit, ±{mean_max_m} m."),
     };
     if shots.kept.len() > limit {
         caption += &format!(" 1 shot in {} is drawn.", shots.kept.len().div_ceil(limit));
@@ -158,11 +160,11 @@ fn words(ranges: &ProfileRanges) -> String {
         )
     });
     format!(
-        "{} shots: mean {} m, σ {} m{trend}; {} outliers.",
-        main.n,
+        "{}: mean {} m, σ {} m{trend}; {}.",
+        counted(main.n as usize, "shot"),
         metres(main.mean),
         metres(main.standard_deviation),
-        ranges.outliers
+        counted(ranges.outliers as usize, "outlier")
     )
 }
 

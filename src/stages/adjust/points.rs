@@ -3,6 +3,8 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::wording::signed;
+
 /// The kinds of point.
 #[derive(
     Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema,
@@ -45,7 +47,7 @@ pub enum RejectionReason {
         standardised: f64,
     },
     /// No ground explains its height.
-    #[error("{above_m:+.0} m from the MOLA surface, standardised {standardised:.1}")]
+    #[error("{} m from the MOLA surface, standardised {standardised:.1}", signed(*above_m, 0))]
     Height {
         /// Height above the surface beyond what tie points share, metres.
         above_m: f64,

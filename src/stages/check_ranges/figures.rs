@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 
-use crate::{config::RangeCheckConfig, geom::statistics::largest};
+use crate::{config::RangeCheckConfig, geom::statistics::largest, wording::signed};
 
 /// What is judged of the ranges of a profile.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -95,8 +95,11 @@ impl RangeFigures {
         // Written so that NaN breaks the limit.
         (!(apart_m <= limit_m)).then(|| {
             format!(
-                "the file's own spacecraft lies {apart_m:.0} m from that of the kernels ({radial:+.0} m up, {along:+.0} m \
-                 along the flight, {cross:+.0} m across it); limit {limit_m} m: {}",
+                "the file's own spacecraft lies {apart_m:.0} m from that of the kernels ({} m up, {} m along \
+                 the flight, {} m across it); limit {limit_m} m: {}",
+                signed(radial, 0),
+                signed(along, 0),
+                signed(cross, 0),
                 explain()
             )
         })

@@ -72,7 +72,7 @@ stage_inputs! {
 
 impl Stage for CheckRanges<'_> {
     const NAME: &'static str = "check_ranges";
-    const METHOD: u32 = 6;
+    const METHOD: u32 = 7;
     type Output = RangeCheck;
     stage_inputs!(fingerprint);
 
@@ -230,7 +230,7 @@ pub fn check_ranges<'a>(
     watch: impl Into<Watch<'a>>,
 ) -> Result<RangeCheck> {
     let watch = watch.into();
-    watch.expect(profiles.iter().map(|profile| profile.rows.len()).sum());
+    watch.announce(profiles.iter().map(|profile| profile.rows.len()).sum());
     let mut shots = ShotResiduals::default();
     let mut checked = Vec::with_capacity(profiles.len());
     for (index, profile) in (0_u32..).zip(profiles) {

@@ -15,6 +15,7 @@ use crate::{
     },
     spice::Trajectory,
     stages::group_profiles::Profile,
+    wording::signed,
 };
 
 /// What would bring the two together in the middle of the profile: another datum, another clock correction, or neither.
@@ -64,8 +65,9 @@ fn together(
         0.0
     };
     Some(format!(
-        "they agree when time tags are corrected by {:+.3} s, not by {used_s:+.3} s (mola_clock), or the kernels hold \
+        "they agree when time tags are corrected by {} s, not by {} s (mola_clock), or the kernels hold \
          another orbit",
-        used_s + along / velocity_m_s.norm()
+        signed(used_s + along / velocity_m_s.norm(), 3),
+        signed(used_s, 3)
     ))
 }

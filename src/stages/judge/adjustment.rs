@@ -13,6 +13,7 @@ use crate::{
         },
         compare_pairs::PairComparison,
     },
+    wording::signed,
 };
 
 /// Mean heights that are stated worse than this, metres, are hardly controlled.
@@ -136,9 +137,10 @@ impl AdjustmentEvidence<'_> {
             // Written so that NaN counts.
             if check.surface.is_ok() && !(check.above_m.median.abs() <= limit_m) {
                 reasons.push(format!(
-                    "tie points lie {:+.1} m from the MOLA surface {round} the adjustment (median of {}), expected at most \
+                    "tie points lie {} m from the MOLA surface {round} the adjustment (median of {}), expected at most \
                      {limit_m:.1} m",
-                    check.above_m.median, check.above_m.n
+                    signed(check.above_m.median, 1),
+                    check.above_m.n
                 ));
             }
         }

@@ -5,6 +5,8 @@ use std::fmt;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::wording::Wording;
+
 /// What is checked, data that took no part in the result first, then what took part in it, then what images say of
 /// each other.
 #[derive(
@@ -75,8 +77,7 @@ pub enum CheckKind {
 
 impl CheckKind {
     /// What is checked, in words.
-    #[must_use]
-    pub const fn words(self) -> &'static str {
+    const fn words(self) -> &'static str {
         match self {
             Self::Contradiction => "Inputs do not contradict each other",
             Self::Footprints => "Footprints in the windows",
@@ -208,6 +209,9 @@ pub enum CheckOutcome {
 pub struct Check {
     /// What is checked.
     pub kind: CheckKind,
+    /// The same in the words of the site.
+    #[serde(default)]
+    pub what: String,
     /// How it came out.
     pub outcome: CheckOutcome,
     /// Profile, image or pair that is told; empty where the whole site is.
@@ -238,6 +242,7 @@ impl Check {
         };
         Self {
             kind,
+            what: kind.words().to_owned(),
             outcome: if kept { CheckOutcome::Pass } else { broken },
             subject: subject.into(),
             value: Some(value).filter(|value| value.is_finite()),
@@ -266,11 +271,28 @@ impl Check {
     pub(super) fn told(kind: CheckKind, subject: impl Into<String>, outcome: CheckOutcome) -> Self {
         Self {
             kind,
+            what: kind.words().to_owned(),
             outcome,
             subject: subject.into(),
             value: None,
             limit: None,
             unit: kind.unit().to_owned(),
+        }
+    }
+
+    /// Says what is checked in the words of a site.
+    pub(super) fn say(&mut self, wording: &Wording<'_>) {
+        self.what = wording.of(self.kind.words()).into_owned();
+        self.subject = wording.of(&*self.subject).into_owned();
+    }
+
+    /// What is checked, in words; manifests of earlier versions say only its kind.
+    #[must_use]
+    pub fn words(&self) -> &str {
+        if self.what.is_empty() {
+            self.kind.words()
+        } else {
+            &self.what
         }
     }
 
@@ -328,7 +350,7 @@ impl Check {
 
 impl fmt::Display for Check {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let (words, subject) = (self.kind.words(), &*self.subject);
+        let (words, subject) = (self.words(), &*self.subject);
         let (Some(value), Some(limit)) = (self.value, self.limit) else {
             let what = match (subject, self.limit.is_some()) {
                 ("", true) => "no number",

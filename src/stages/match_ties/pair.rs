@@ -66,7 +66,7 @@ pub(super) fn match_pair(
         levels: common.levels(),
     };
     let cells = common.cells();
-    watch.expect(cells.len());
+    watch.announce(cells.len());
     let reach_m = margin.reach_m(indices, common.ranges_m);
     let places = places(&cells, views[0].pixels, search.levels[0])?;
     let tried = cells

@@ -68,7 +68,7 @@ pub(super) fn run(
         (camera.detector.focal_length_px, camera.detector.distortion);
     let mut runs = Vec::new();
     // Two methods with two models.
-    watch.expect(4 * ground.len());
+    watch.announce(4 * ground.len());
     for (model, euler) in [
         (CameraModel::FirstOrder, &camera.first_order),
         (CameraModel::SecondOrder, &camera.second_order),

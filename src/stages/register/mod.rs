@@ -154,7 +154,7 @@ pub fn register<'a>(
     let projector = camera.projector(config.model);
     let mut points = RegisteredPoints::default();
     let mut rejected = BTreeMap::new();
-    watch.expect(shots.len());
+    watch.announce(shots.len());
     for block in shots.chunks(POINTS_AT_ONCE) {
         watch.check()?;
         let placed: Vec<_> = block

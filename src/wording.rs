@@ -1,0 +1,171 @@
+//! Texts that people read: the words of another body and altimeter, and the minus sign of their numbers.
+//!
+//! Texts are written for MOLA at Mars; [`Wording`] says them for the site. Numbers that programs read keep their hyphen.
+//!
+//! ```
+//! use areograph::{body::Body, wording::{Wording, with_minus}};
+//!
+//! let lunar = Wording { body: Body::Moon, altimeter: "LOLA", has_tables: true };
+//! assert_eq!(lunar.of("tie points above the MOLA surface"), "tie points above the LOLA surface");
+//! assert_eq!(with_minus("-1.2 m along E02-00665"), "−1.2 m along E02-00665");
+//! ```
+
+use std::borrow::Cow;
+
+use crate::body::Body;
+
+/// The minus sign of all texts.
+pub const MINUS: char = '\u{2212}';
+
+/// The altimeter for which texts are written.
+const ALTIMETER: &str = "MOLA";
+
+/// What texts say where shots come from tables: these hold no areoid, and are no PEDR files.
+const TABLES: [(&str, &str); 6] = [
+    ("PEDR files", "tables of shots"),
+    ("PEDR file", "table of shots"),
+    ("the PEDR", "the table of shots"),
+    ("PEDR", "table of shots"),
+    ("the areoid", "the ellipsoid"),
+    ("areoid radius", "radius of the ellipsoid"),
+];
+
+/// Whose words texts have.
+#[derive(Debug, Clone, Copy)]
+pub struct Wording<'a> {
+    /// The body that they are about.
+    pub body: Body,
+    /// Name of the altimeter.
+    pub altimeter: &'a str,
+    /// Whether shots come from tables.
+    pub has_tables: bool,
+}
+
+impl Wording<'_> {
+    /// `text` in these words.
+    #[must_use]
+    pub fn of<'a>(&self, text: impl Into<Cow<'a, str>>) -> Cow<'a, str> {
+        let mut text = text.into();
+        let mut say = |at_mars: &str, here: &str| {
+            if text.contains(at_mars) {
+                text = Cow::Owned(text.replace(at_mars, here));
+            }
+        };
+        if self.has_tables {
+            for (at_mars, here) in TABLES {
+                say(at_mars, here);
+            }
+        }
+        if self.altimeter != ALTIMETER {
+            say(ALTIMETER, self.altimeter);
+        }
+        if self.body != Body::Mars {
+            let names = self.body.names();
+            say("areocentric", "planetocentric");
+            say("areographic", "planetographic");
+            say("IAU 2000", &names.short_frame);
+            say("Mars-fixed", &format!("{}-fixed", names.name));
+            say("Mars body-fixed", &format!("{} body-fixed", names.name));
+            for before in ["of", "from", "to", "on", "around"] {
+                let here = format!("{before} {}", names.in_text);
+                say(&format!("{before} Mars"), &here);
+            }
+        }
+        text
+    }
+}
+
+/// A sentence with the minus sign before its numbers; hyphens in names, dates and exponents stay.
+#[must_use]
+pub fn with_minus(sentence: &str) -> String {
+    let mut written = String::with_capacity(sentence.len());
+    let mut letters = sentence.chars().peekable();
+    let mut before = ' ';
+    while let Some(letter) = letters.next() {
+        let is_sign = letter == '-'
+            && matches!(before, ' ' | '(' | '[')
+            && letters.peek().is_some_and(char::is_ascii_digit);
+        written.push(if is_sign { MINUS } else { letter });
+        before = letter;
+    }
+    written
+}
+
+/// A number with its sign and so many decimals, for sentences; what rounds to zero has no sign.
+#[must_use]
+pub fn signed(value: f64, decimals: usize) -> String {
+    let size = format!("{:.decimals$}", value.abs());
+    let is_zero = !size.contains(|digit| matches!(digit, '1'..='9'));
+    match value {
+        _ if is_zero => size,
+        value if value < 0.0 => format!("{MINUS}{size}"),
+        _ => format!("+{size}"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const LUNAR: Wording = Wording {
+        body: Body::Moon,
+        altimeter: "LOLA",
+        has_tables: true,
+    };
+
+    #[test]
+    fn a_text_says_the_body_the_altimeter_and_where_shots_are_from() {
+        for (at_mars, here) in [
+            (
+                "distance of the spacecraft from the centre of Mars, the file's orbit",
+                "distance of the spacecraft from the centre of the Moon, the file's orbit",
+            ),
+            (
+                "areocentric latitude, degrees, IAU 2000",
+                "planetocentric latitude, degrees, mean Earth/polar axis",
+            ),
+            (
+                "Orbit of the PEDR against kernels",
+                "Orbit of the table of shots against kernels",
+            ),
+            (
+                "radius minus areoid radius, metres",
+                "radius minus radius of the ellipsoid, metres",
+            ),
+            ("areoid_radius_m", "areoid_radius_m"),
+        ] {
+            assert_eq!(LUNAR.of(at_mars), here);
+            let at_mars_too = Wording {
+                body: Body::Mars,
+                altimeter: "MOLA",
+                has_tables: false,
+            };
+            assert!(matches!(at_mars_too.of(at_mars), Cow::Borrowed(_)));
+        }
+        // A table of another altimeter at Mars.
+        let table = Wording {
+            body: Body::Mars,
+            altimeter: "ALT",
+            has_tables: true,
+        };
+        assert_eq!(
+            table.of("MOLA, areocentric, IAU 2000"),
+            "ALT, areocentric, IAU 2000"
+        );
+    }
+
+    #[test]
+    fn what_rounds_to_zero_has_no_sign() {
+        let texts = [-0.4, 0.4, -1.15, 1.15].map(|value| signed(value, 0));
+        assert_eq!(texts, ["0", "0", "−1", "+1"]);
+        assert_eq!(signed(-0.117, 3), "−0.117");
+    }
+
+    #[test]
+    fn sentences_have_one_minus_and_names_keep_their_hyphens() {
+        assert_eq!(
+            with_minus("E02-00665: 4 m off (-33 m up, -0.5 m across) - see 1999-05-04, 2e-9"),
+            "E02-00665: 4 m off (−33 m up, −0.5 m across) - see 1999-05-04, 2e-9"
+        );
+    }
+}
