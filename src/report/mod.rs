@@ -17,6 +17,7 @@
 
 mod adjustment;
 mod archive;
+mod calibration;
 mod checks;
 mod clocks_and_datum;
 mod compare;
@@ -61,6 +62,7 @@ mod words;
 use crate::{error::Result, products::SiteProducts};
 
 pub use archive::archive_page;
+pub use calibration::calibration_page;
 pub use compare::{KernelComparison, comparison_page};
 pub use diff::difference_page;
 pub use fidelity::{
