@@ -325,12 +325,19 @@ fn the_schema_takes_the_example_and_refuses_what_the_loader_refuses() {
 fn example_and_schema_are_made_from_the_declarations() {
     let schema = serde_json::to_string_pretty(&config::schema()).unwrap() + "\n";
     let net_schema = serde_json::to_string_pretty(&config::net_schema()).unwrap() + "\n";
+    let calibration_schema =
+        serde_json::to_string_pretty(&config::calibration_schema()).unwrap() + "\n";
     let service_schema = serde_json::to_string_pretty(&config::service_schema()).unwrap() + "\n";
     for (path, made) in [
         ("config/sites/example.toml", config::example()),
         ("config/schema/site.schema.json", schema),
         ("config/nets/example.toml", config::net_example()),
         ("config/schema/net.schema.json", net_schema),
+        (
+            "config/calibrations/example.toml",
+            config::calibration_example(),
+        ),
+        ("config/schema/calibration.schema.json", calibration_schema),
         ("config/areograph.toml", config::service_example()),
         ("config/schema/service.schema.json", service_schema),
     ] {

@@ -22,7 +22,7 @@ use std::{
 use areograph::{
     config::{load_net, parse_net},
     error::Error,
-    flow::{NetOutcome, run_net},
+    flow::{SingleOutcome, run_net},
     geom::plane::{CornerZero, Place},
     scene::write_plane_scene,
     stage::Stage,
@@ -47,7 +47,7 @@ fn scene(replaced: &[(&str, &str)]) -> tempfile::TempDir {
     folder
 }
 
-fn run(folder: &Path, force: bool) -> Result<NetOutcome, Error> {
+fn run(folder: &Path, force: bool) -> Result<SingleOutcome, Error> {
     let net = load_net(&folder.join("net/net.toml"))?.net;
     run_net(&net, &folder.join("out"), force)
 }

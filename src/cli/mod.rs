@@ -1,5 +1,6 @@
 //! The command line: one file per command, no geometry.
 
+mod calibrate;
 mod check;
 mod completions;
 mod image;
@@ -17,6 +18,7 @@ mod run;
 mod scene;
 mod serve;
 mod service;
+mod single;
 mod stop;
 mod triangulate;
 mod windows;
@@ -75,6 +77,7 @@ enum Command {
     Pedr(pedr::Arguments),
     Report(report::Arguments),
     Triangulate(triangulate::Arguments),
+    Calibrate(calibrate::Arguments),
     Scene(scene::Arguments),
     Serve(serve::Arguments),
     Nightly(nightly::Arguments),
@@ -144,6 +147,7 @@ fn run(command: Command) -> ExitCode {
         Command::Pedr(arguments) => finish(pedr::run(&arguments)),
         Command::Report(arguments) => report::run(&arguments),
         Command::Triangulate(arguments) => triangulate::run(&arguments),
+        Command::Calibrate(arguments) => calibrate::run(&arguments),
         Command::Scene(arguments) => finish(scene::run(&arguments)),
         Command::Serve(arguments) => serve::run(&arguments),
         Command::Nightly(arguments) => nightly::run(&arguments),

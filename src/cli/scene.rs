@@ -9,7 +9,8 @@ use crate::{
     error::Error,
     scene::{
         ArchiveOptions, Coder, Roughness, SceneErrors, SceneOptions, write_archive,
-        write_plane_scene, write_scene, write_scene_along, write_scene_with_images,
+        write_calibration_scene, write_plane_scene, write_scene, write_scene_along,
+        write_scene_with_images,
     },
     units::SECONDS_PER_DAY,
 };
@@ -62,12 +63,15 @@ pub(super) struct Arguments {
     /// A net of rectified pictures for `areograph triangulate` instead of a mission.
     #[arg(long, conflicts_with_all = ["along", "realistic", "day_s"])]
     plane: bool,
+    /// Two stereo lines of a camera for `areograph calibrate` instead of a mission.
+    #[arg(long, conflicts_with_all = ["along", "realistic", "day_s", "images", "plane"])]
+    calibration: bool,
     /// An archive of so many PEDR files, about a day each, with its kernels, instead of a mission: what
     /// `areograph pedr` reads.
-    #[arg(long, value_name = "FILES", conflicts_with_all = ["along", "realistic", "day_s", "plane"])]
+    #[arg(long, value_name = "FILES", conflicts_with_all = ["along", "realistic", "day_s", "plane", "calibration"])]
     days: Option<u32>,
     /// The same, of about so many gigabytes.
-    #[arg(long, value_name = "GB", conflicts_with_all = ["along", "realistic", "day_s", "plane", "days"])]
+    #[arg(long, value_name = "GB", conflicts_with_all = ["along", "realistic", "day_s", "plane", "calibration", "days"])]
     gb: Option<f64>,
     /// With --along: labels of images to put into the site file.
     #[arg(long, value_name = "FILE", requires = "along")]
@@ -131,6 +135,13 @@ impl Arguments {
 pub(super) fn run(arguments: &Arguments) -> Result<(), Error> {
     if arguments.plane {
         output::line(write_plane_scene(&arguments.directory, arguments.seed)?);
+        return Ok(());
+    }
+    if arguments.calibration {
+        output::line(write_calibration_scene(
+            &arguments.directory,
+            arguments.seed,
+        )?);
         return Ok(());
     }
     if let Some(archive) = arguments.archive() {

@@ -3,12 +3,13 @@
 use std::{path::PathBuf, process::ExitCode};
 
 use clap::Args;
-use serde_json::json;
 
-use super::{output, report};
+use super::{
+    report,
+    single::{Asked, answer},
+};
 use crate::{
     config::{LoadedNet, load_net},
-    error::Kind,
     flow::run_net,
 };
 
@@ -44,48 +45,20 @@ pub(super) fn run(arguments: &Arguments) -> ExitCode {
     for warning in warnings {
         tracing::warn!("{warning}");
     }
-    let outcome = match run_net(&net, &arguments.out, arguments.force) {
-        Ok(outcome) => outcome,
-        Err(failure) => return report(&failure),
+    let asked = Asked {
+        what: "net",
+        name: &net.net,
+        json: arguments.json,
     };
-    let manifest = &outcome.manifest;
-    if arguments.json {
-        output::json(&json!({
-            "net": net.net,
-            "folder": outcome.folder,
-            "unchanged": outcome.unchanged,
-            "verdict": manifest.verdict,
-            "counts": manifest.counts,
-            "figures": manifest.figures,
-        }));
-    } else {
-        let count = |name: &str| manifest.counts.get(name).copied().unwrap_or(0);
-        let unchanged = if outcome.unchanged {
-            ", nothing changed"
-        } else {
-            ""
-        };
-        output::line(format_args!(
-            "{}: {}{unchanged}; {} pictures, {} points, {} blunders, {} controls left out of {}; {}",
-            net.net,
-            manifest.verdict.word(),
+    let ran = run_net(&net, &arguments.out, arguments.force);
+    answer(&asked, ran, |count| {
+        format!(
+            "{} pictures, {} points, {} blunders, {} controls left out of {}",
             count("pictures"),
             count("points"),
             count("blunders"),
             count("rejected_controls"),
             count("controls"),
-            outcome.folder.join("report/index.html").display(),
-        ));
-        for reason in &manifest.verdict.reasons {
-            output::line(format_args!("  invalid: {reason}"));
-        }
-        for remark in &manifest.verdict.remarks {
-            output::line(format_args!("  remark: {remark}"));
-        }
-    }
-    if manifest.verdict.valid {
-        ExitCode::SUCCESS
-    } else {
-        ExitCode::from(Kind::Validation.exit_code())
-    }
+        )
+    })
 }

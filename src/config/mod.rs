@@ -6,6 +6,7 @@
 //! documents every key, and `config/schema/site.schema.json` are made from the declarations.
 
 mod adjustment;
+mod calibration;
 mod data_file;
 mod declare;
 mod forms;
@@ -43,6 +44,11 @@ use serde::Serialize;
 use toml::de::DeTable;
 
 pub use adjustment::{AdjustmentConfig, OrientationPrior};
+pub use calibration::{
+    APrioriConfig, CONTROL_SIGMA_MAX_M, CalibrationConfig, CalibrationMode, CameraConfig,
+    LoadedCalibration, SolutionConfig, ValidationConfig, calibration_example, calibration_schema,
+    load_calibration, parse_calibration,
+};
 pub use declare::{Accept, DeclaredKey, ValueKind, Word};
 pub use images::ImageConfig;
 pub use instruments::{

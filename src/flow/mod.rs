@@ -6,6 +6,7 @@
 
 mod archive;
 mod bounds;
+mod calibration;
 mod check;
 mod choice;
 mod compare;
@@ -25,6 +26,7 @@ mod publish;
 mod read_back;
 mod registered;
 mod run;
+mod single;
 mod site;
 mod sites;
 mod triangulate;
@@ -32,6 +34,7 @@ mod triangulate;
 pub use archive::{
     ArchiveOutcome, ArchiveProgress, ArchiveRequest, archive_filter, archive_limits, check_archive,
 };
+pub use calibration::run_calibration;
 pub use check::{Checked, check_site, required_by_site, rival_sets};
 pub use choice::{ChooseKernels, KernelChoice, RivalKernelSets};
 pub use compare::{
@@ -39,13 +42,14 @@ pub use compare::{
     require_different,
 };
 pub use driver::StageReason;
-pub use net::{NetOutcome, run_net};
+pub use net::run_net;
 pub use observer::{Observer, StageEvent};
 pub use out::{OutError, check_out};
 pub use outline::{stage_count, stages};
 pub use page::{PageAgain, page_again};
 pub use plan::{SitePlan, plan_site};
 pub use run::{Ending, RunOptions, SiteOutcome, run_site};
+pub use single::SingleOutcome;
 pub use sites::publish_sites;
 
 /// Name of the step that chooses, reads and hashes kernels.

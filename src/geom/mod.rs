@@ -4,6 +4,7 @@ pub mod attitude;
 pub mod block_equations;
 pub mod body_rotation;
 pub mod bundle;
+pub mod calibration;
 pub mod chebyshev;
 pub mod collinearity;
 pub mod conformal_map;

@@ -1,12 +1,18 @@
 //! Tables of a net of rectified pictures: measurements, controls, pictures, ticks of the film.
 
-use std::{fs, path::Path};
+use std::path::Path;
 
+use super::table_rows::{Rows, TableError, columns, name, numbers, read_rows};
 use crate::{
-    error::{Cause, IoError, Kind, Locate, Result},
+    error::Result,
     geom::plane::{Place, box_centre},
     units::METRES_PER_KM,
 };
+
+/// Where the columns are told.
+const EXAMPLE: &str = "config/nets/example.toml";
+/// What every row names.
+const NAMED: &str = "a picture and a point must have names";
 
 /// Ticks at the corners of a picture, in the order in which [`TickRow::tick`] counts them.
 pub const CORNER_TICKS: [&str; 4] = ["lower_left", "lower_right", "upper_right", "upper_left"];
@@ -73,52 +79,6 @@ pub struct TickRow {
     pub known: Place,
 }
 
-/// Rows of a file, and what was not taken.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Rows<T> {
-    /// Rows in order.
-    pub rows: Vec<T>,
-    /// Rows that are not what they should be: line of the file from 1, and what was expected.
-    pub complaints: Vec<(u64, String)>,
-}
-
-/// A file that is no such table.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-enum TableError {
-    #[error("column {column} is missing; expected the columns {expected}")]
-    Column {
-        column: &'static str,
-        expected: &'static str,
-    },
-    #[error("the unit of column {column} is not known; expected the columns {expected}")]
-    Unit {
-        column: String,
-        expected: &'static str,
-    },
-    #[error("the table cannot be read: {0}")]
-    Table(String),
-    #[error("not one of its rows can be read ({rows} in all); line {line}: {text}")]
-    Unreadable {
-        rows: usize,
-        line: u64,
-        text: String,
-    },
-}
-
-impl Cause for TableError {
-    fn kind(&self) -> Kind {
-        Kind::Input
-    }
-
-    fn advice(&self) -> String {
-        match self {
-            Self::Unit { .. } => "give the coordinates in one of these units, which the names of the columns tell",
-            _ => "give a comma-separated table with a header line; config/nets/example.toml tells its columns",
-        }
-        .to_owned()
-    }
-}
-
 /// Reads a table of measurements.
 ///
 /// # Errors
@@ -126,7 +86,7 @@ impl Cause for TableError {
 pub fn read_measurements(path: &Path) -> Result<Rows<MeasurementRow>> {
     const COLUMNS: &str =
         "picture, point, x, y or x_upper_right, y_upper_right, x_lower_left, y_lower_left";
-    read(path, |header| {
+    read_rows(path, EXAMPLE, |header| {
         let [picture, point] = columns(header, ["picture", "point"], COLUMNS)?;
         let boxed = columns(
             header,
@@ -152,8 +112,8 @@ pub fn read_measurements(path: &Path) -> Result<Rows<MeasurementRow>> {
                 _ => return Err("two or four coordinates".to_owned()),
             };
             Ok(MeasurementRow {
-                picture: name(row, picture)?,
-                point: name(row, point)?,
+                picture: name(row, picture, NAMED)?,
+                point: name(row, point, NAMED)?,
                 at,
             })
         })
@@ -166,7 +126,7 @@ pub fn read_measurements(path: &Path) -> Result<Rows<MeasurementRow>> {
 /// As [`read_measurements`]; coordinates in an unknown unit.
 pub fn read_controls(path: &Path) -> Result<Rows<ControlRow>> {
     const COLUMNS: &str = "point and x_m, y_m or x_km, y_km or longitude_deg, latitude_deg";
-    read(path, |header| {
+    read_rows(path, EXAMPLE, |header| {
         let [point] = columns(header, ["point"], COLUMNS)?;
         let pair = |names: [&'static str; 2]| columns(header, names, COLUMNS);
         let (places, unit_m) = if let Ok(places) = pair(["longitude_deg", "latitude_deg"]) {
@@ -216,7 +176,7 @@ pub fn read_controls(path: &Path) -> Result<Rows<ControlRow>> {
                 _ => None,
             };
             Ok(ControlRow {
-                point: name(row, point)?,
+                point: name(row, point, NAMED)?,
                 at,
                 sigma_m,
             })
@@ -230,7 +190,7 @@ pub fn read_controls(path: &Path) -> Result<Rows<ControlRow>> {
 /// As [`read_measurements`].
 pub fn read_pictures(path: &Path) -> Result<Rows<PictureRow>> {
     const COLUMNS: &str = "picture, and where known brick and metres_per_unit";
-    read(path, |header| {
+    read_rows(path, EXAMPLE, |header| {
         let [picture] = columns(header, ["picture"], COLUMNS)?;
         let place = |name: &str| header.iter().position(|of| of == name);
         let (brick, size) = (place("brick"), place("metres_per_unit"));
@@ -248,7 +208,7 @@ pub fn read_pictures(path: &Path) -> Result<Rows<PictureRow>> {
                 _ => None,
             };
             Ok(PictureRow {
-                picture: name(row, picture)?,
+                picture: name(row, picture, NAMED)?,
                 brick: text(brick).to_owned(),
                 metres_per_unit,
             })
@@ -262,7 +222,7 @@ pub fn read_pictures(path: &Path) -> Result<Rows<PictureRow>> {
 /// As [`read_measurements`].
 pub fn read_ticks(path: &Path) -> Result<Rows<TickRow>> {
     const COLUMNS: &str = "picture, tick, x, y, known_x, known_y";
-    read(path, |header| {
+    read_rows(path, EXAMPLE, |header| {
         let [picture, tick] = columns(header, ["picture", "tick"], COLUMNS)?;
         let places = columns(header, ["x", "y", "known_x", "known_y"], COLUMNS)?;
         Ok(move |row: &csv::StringRecord| {
@@ -274,89 +234,11 @@ pub fn read_ticks(path: &Path) -> Result<Rows<TickRow>> {
                 format!("tick {written:?}: expected one of {all}")
             })?;
             Ok(TickRow {
-                picture: name(row, picture)?,
+                picture: name(row, picture, NAMED)?,
                 tick: index,
                 measured: Place::new(of[0], of[1]),
                 known: Place::new(of[2], of[3]),
             })
         })
     })
-}
-
-/// Reads a table whose rows `take`, made from the header, turns into values.
-fn read<T, F>(
-    path: &Path,
-    take: impl Fn(&csv::StringRecord) -> std::result::Result<F, TableError>,
-) -> Result<Rows<T>>
-where
-    F: Fn(&csv::StringRecord) -> std::result::Result<T, String>,
-{
-    let bytes = fs::read(path).map_err(IoError::on("read")).in_file(path)?;
-    parse(&bytes, take).in_file(path)
-}
-
-fn parse<T, F>(
-    bytes: &[u8],
-    take: impl Fn(&csv::StringRecord) -> std::result::Result<F, TableError>,
-) -> std::result::Result<Rows<T>, TableError>
-where
-    F: Fn(&csv::StringRecord) -> std::result::Result<T, String>,
-{
-    let mut reader = csv::ReaderBuilder::new()
-        .trim(csv::Trim::All)
-        .comment(Some(b'#'))
-        .from_reader(bytes);
-    let header = reader
-        .headers()
-        .map_err(|error| TableError::Table(error.to_string()))?;
-    let take = take(&header.clone())?;
-    let (mut rows, mut complaints) = (Vec::new(), Vec::new());
-    for record in reader.into_records() {
-        let (line, taken) = match &record {
-            Ok(record) => (record.position(), take(record)),
-            Err(error) => (error.position(), Err(error.to_string())),
-        };
-        match taken {
-            Ok(row) => rows.push(row),
-            Err(text) => complaints.push((line.map_or(0, csv::Position::line), text)),
-        }
-    }
-    match complaints.first() {
-        Some((line, text)) if rows.is_empty() => Err(TableError::Unreadable {
-            rows: complaints.len(),
-            line: *line,
-            text: text.clone(),
-        }),
-        _ => Ok(Rows { rows, complaints }),
-    }
-}
-
-/// Where the header has these columns.
-fn columns<const N: usize>(
-    header: &csv::StringRecord,
-    names: [&'static str; N],
-    expected: &'static str,
-) -> std::result::Result<[usize; N], TableError> {
-    let mut places = [0; N];
-    for (place, column) in places.iter_mut().zip(names) {
-        let found = header.iter().position(|of| of == column);
-        *place = found.ok_or(TableError::Column { column, expected })?;
-    }
-    Ok(places)
-}
-
-fn name(row: &csv::StringRecord, column: usize) -> std::result::Result<String, String> {
-    match row.get(column) {
-        Some(name) if !name.is_empty() => Ok(name.to_owned()),
-        _ => Err("a picture and a point must have names".to_owned()),
-    }
-}
-
-fn numbers(row: &csv::StringRecord, columns: &[usize]) -> std::result::Result<Vec<f64>, String> {
-    let number = |column: &usize| {
-        let text = row.get(*column).unwrap_or_default();
-        let number = text.parse().ok().filter(|number: &f64| number.is_finite());
-        number.ok_or_else(|| format!("{text:?} is no number"))
-    };
-    columns.iter().map(number).collect()
 }

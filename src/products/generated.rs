@@ -4,6 +4,7 @@ use std::fmt::Write as _;
 
 use super::{
     archive::{ARCHIVE_PRODUCTS, SHOTS},
+    calibration::{CALIBRATION_PRODUCTS, CAMERA_SUPPORT},
     net::NET_PRODUCTS,
     product::{Content, Declaration},
     registry::PRODUCTS,
@@ -30,9 +31,10 @@ pub fn schemas() -> Vec<DocumentSchema> {
 fn contents() -> impl Iterator<Item = &'static Content> {
     let of_nets = NET_PRODUCTS.iter().map(|product| &product.content);
     let of_archives = ARCHIVE_PRODUCTS.iter().map(|product| &product.content);
+    let of_calibrations = CALIBRATION_PRODUCTS.iter().map(|product| &product.content);
     let of_sites = PRODUCTS.iter().map(|product| &product.content);
     let all = of_sites.chain(of_nets).chain(of_archives);
-    all.chain([&SHOTS.content])
+    all.chain(of_calibrations).chain([&SHOTS.content])
 }
 
 /// `docs/products.md`: every product, and the columns of every table.
@@ -74,6 +76,20 @@ pub fn documentation() -> String {
         .filter(|product| product.path.contains(".parquet"))
     {
         text += &columns_of(product, "net: ");
+    }
+    text += "\n## Calibrations of the lines of a camera\n\n\
+        Products of `areograph calibrate`, in the folder of the calibration; `manifest.json` comes last here too. \
+        `calibration:` stands before their names below, `<camera>` for a line of the camera.\n\n\
+        | file | what it is | for | rows | schema |\n|---|---|---|---|---|\n";
+    text += &line_of(&CAMERA_SUPPORT);
+    for product in CALIBRATION_PRODUCTS {
+        text += &line_of(product);
+    }
+    for product in CALIBRATION_PRODUCTS
+        .iter()
+        .filter(|product| product.path.contains(".parquet"))
+    {
+        text += &columns_of(product, "calibration: ");
     }
     text += "\n## Archives of PEDR files\n\n\
         Products of `areograph pedr qa`, in the folder `--out`; `manifest.json` comes last here too. `archive:` stands \

@@ -9,6 +9,7 @@ mod adjusted_footprints;
 mod adjusted_kernels;
 mod adjustment;
 mod archive;
+mod calibration;
 mod coordinates;
 mod correlations;
 pub(crate) mod error;
@@ -55,6 +56,7 @@ pub use adjusted_kernels::{
 pub use archive::{
     ArchiveProducts, WorstProfile, profile_name, write_archive_products, write_profile_shots,
 };
+pub use calibration::{CalibrationProducts, write_calibration_products};
 pub use exchange::{
     ControlMeasure, ControlNetwork, ControlPoint, GroundEstimate, ImageMeasure, LidarPoint,
     NetworkMeasure, NetworkPoint, isis_serial_number, write_control_network, write_gcp,

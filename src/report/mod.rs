@@ -17,6 +17,7 @@
 
 mod adjustment;
 mod archive;
+mod calibration;
 mod checks;
 mod clocks_and_datum;
 mod compare;
@@ -60,6 +61,7 @@ mod uncertainty;
 use crate::{error::Result, products::SiteProducts};
 
 pub use archive::archive_page;
+pub use calibration::calibration_page;
 pub use compare::{KernelComparison, comparison_page};
 pub use diff::difference_page;
 pub use fidelity::{

@@ -12,6 +12,7 @@
 //! | `telemetry` | what the instrument tells of its echoes besides ranges |
 //! | `archive`, `archive_frames` | PEDR files of any number of days, with kernels to check them by |
 //! | `ties` | places that two images show, in images that were truly taken elsewhere and at other times |
+//! | `calibration`, `pushbroom_pair` | two stereo lines of a camera for its calibration |
 //! | `kernels`, `pedr`, `sites`, `truth` | the files |
 //! | `mission`, `along` | the entry points of a mission |
 //!
@@ -24,6 +25,7 @@ mod arc;
 mod archive;
 mod archive_frames;
 mod attitude;
+mod calibration;
 mod context;
 mod drawn;
 mod error;
@@ -38,6 +40,7 @@ mod pedr;
 pub mod plan;
 mod plane;
 mod plane_net;
+mod pushbroom_pair;
 mod random;
 mod roughness;
 mod sites;
@@ -55,6 +58,7 @@ use std::{
 
 pub use along::write_scene_along;
 pub use archive::{ArchiveOptions, ArchiveSummary, write_archive};
+pub use calibration::write_calibration_scene;
 pub use error::SceneError;
 pub use error_sources::{
     AltimeterErrors, AttitudeErrors, Jitter, Misregistration, PositionErrors, Relief, Roughness,

@@ -3,6 +3,7 @@
 //! No stage calls another, prints, or knows of another's files. [`crate::flow`] puts them in order.
 
 pub mod adjust;
+pub mod calibrate;
 pub mod check_archive;
 pub mod check_heights;
 pub mod check_ranges;

@@ -85,8 +85,13 @@ pub mod figures {
     /// Root mean square residual of the kept controls of a net, the larger coordinate, metres.
     pub const CONTROL_RESIDUAL_RMS_M: &str = "control_residual_rms_m";
 
+    /// Root mean square residual of tie points in a calibrated camera, the largest of all lines and axes, pixels.
+    pub const TIE_RESIDUAL_RMS_PX: &str = "tie_residual_rms_px";
+    /// Root mean square height of held-back control of a calibration, intersected minus the laser's, metres.
+    pub const HELD_BACK_HEIGHT_RMS_M: &str = "held_back_height_rms_m";
+
     /// All of them, and what they are.
-    const ALL: [(&str, &str); 10] = [
+    const ALL: [(&str, &str); 12] = [
         (
             RANGE_MEAN_M,
             "Largest |mean| of range minus distance of a profile, metres.",
@@ -126,6 +131,14 @@ pub mod figures {
         (
             CONTROL_RESIDUAL_RMS_M,
             "Root mean square residual of the kept controls of a net, the larger coordinate, metres.",
+        ),
+        (
+            TIE_RESIDUAL_RMS_PX,
+            "Root mean square residual of tie points in a calibrated camera, the largest of all lines and axes, pixels.",
+        ),
+        (
+            HELD_BACK_HEIGHT_RMS_M,
+            "Root mean square height of held-back control of a calibration, intersected minus the laser's, metres.",
         ),
     ];
 

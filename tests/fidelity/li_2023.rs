@@ -1,6 +1,17 @@
 //! Li et al. 2023: in-orbit calibration of HRSC with laser control.
 
-use areograph::units::RADIANS_PER_ARCSECOND;
+use std::sync::{LazyLock, atomic::AtomicBool};
+
+use areograph::{
+    config::{CalibrationConfig, load_calibration},
+    scene::write_calibration_scene,
+    stage::Stage as _,
+    stages::calibrate::{
+        Calibrate, Calibration, CalibrationFiles, CalibrationKeys, ControlFigures, Figures,
+        PixelsAndMetres, PointKind,
+    },
+    units::{RADIANS_PER_ARCSECOND, RADIANS_PER_DEGREE},
+};
 
 use super::row::{Account, Comparison, Paper, Row, number};
 
@@ -86,6 +97,144 @@ const CALIBRATED: [[Line; 2]; 3] = [
 const HEIGHTS_M: [[f64; 2]; 3] = [[477.180, 66.032], [471.415, 80.013], [682.407, 256.643]];
 /// What the text takes for a pixel, metres.
 const TEXT_PIXEL_M: f64 = 30.0;
+
+/// The synthetic lines of `areograph scene --calibration`, and what `areograph calibrate` makes of them.
+static SCENE: LazyLock<(CalibrationConfig, Calibration)> = LazyLock::new(|| {
+    let folder = tempfile::tempdir().unwrap();
+    let lines = folder.path().join("lines");
+    write_calibration_scene(&lines, 1).unwrap();
+    let config = load_calibration(&lines.join("calibration.toml"))
+        .unwrap()
+        .calibration;
+    let stage = Calibrate {
+        calibration: CalibrationKeys(&config),
+        files: CalibrationFiles(&[]),
+    };
+    let calibration = stage.run(&AtomicBool::new(false)).unwrap();
+    (config, calibration)
+});
+
+/// Of the scene's ties, the larger of the lines across the flight, pixels.
+fn across_px(figures: &Figures) -> f64 {
+    let lines = figures.ties.cameras_px.iter().map(|of| of[0]);
+    lines.fold(0.0, f64::max)
+}
+
+/// Of its control points in plan, the larger of the lines.
+fn plan(control: &ControlFigures, value: fn(&PixelsAndMetres) -> f64) -> f64 {
+    control.cameras.iter().map(value).fold(0.0, f64::max)
+}
+
+fn expected_errors() -> Vec<Comparison> {
+    let known = &SCENE.0.a_priori;
+    let millidegrees = 1e3 * known.angle_rad / RADIANS_PER_DEGREE;
+    vec![
+        number("orbit, m", "1000", known.orbit_bias_m, 0).exact(),
+        number("drift, m a line", "0.01", known.orbit_drift_m_per_line, 2).exact(),
+        number("angle, millidegrees", "25", millidegrees, 0).exact(),
+    ]
+}
+
+fn points() -> Vec<Comparison> {
+    let of = |kinds: &[PointKind]| {
+        let points = SCENE.1.points.iter();
+        points.filter(|of| kinds.contains(&of.kind)).count() as f64
+    };
+    let control = [PointKind::Control, PointKind::HeldBack];
+    vec![
+        number("tie points", "206", of(&[PointKind::Tie]), 0).exact(),
+        number("laser control points", "476", of(&control), 0).exact(),
+    ]
+}
+
+/// The scene's control points of a step.
+fn of_step(step: &str) -> (&'static Figures, &'static ControlFigures) {
+    let step = SCENE.1.steps.iter().find(|of| of.step == step).unwrap();
+    let control = step.figures.of(PointKind::HeldBack).unwrap();
+    (&step.figures, control)
+}
+
+fn before() -> Vec<Comparison> {
+    let (figures, control) = of_step("before");
+    let mut rows = focal(&I864_BEFORE);
+    rows.extend([
+        number("scene: ties across, px", "12.081", across_px(figures), 1).share(0.5),
+        number(
+            "scene: control in plan, px",
+            "36.195",
+            plan(control, |of| of.plane_px),
+            1,
+        )
+        .share(0.5),
+        number(
+            "scene: control in plan, m",
+            "1049.461",
+            plan(control, |of| of.plane_m),
+            0,
+        )
+        .share(0.5),
+        number("scene: height, m", "507.214", control.height_m, 0).share(0.5),
+    ]);
+    rows
+}
+
+fn after() -> Vec<Comparison> {
+    let (figures, control) = of_step("joint");
+    let mut rows = focal(&I864_AFTER);
+    rows.extend([
+        number("scene: ties across, px", "0.298", across_px(figures), 3).between(0.0, 0.3),
+        number(
+            "scene: control in plan, px",
+            "5.650",
+            plan(control, |of| of.plane_px),
+            2,
+        )
+        .between(0.0, 8.0),
+        number(
+            "scene: control in plan, m",
+            "145.314",
+            plan(control, |of| of.plane_m),
+            0,
+        )
+        .between(0.0, 216.0),
+        number("scene: height, m", "63.978", control.height_m, 1).between(0.0, 100.0),
+    ]);
+    rows
+}
+
+fn elsewhere() -> Vec<Comparison> {
+    let orbit = &SCENE.1.validation[0];
+    let [before, after] =
+        [&orbit.before, &orbit.after].map(|of| of.of(PointKind::Control).unwrap());
+    let [i818_before, i818_after] = [&DIRECT[0][1], &CALIBRATED[0][1]].map(|line| line.plane_m);
+    let times = |of: f64| format!("{of:.1}");
+    let plan_times = plan(before, |of| of.plane_m) / plan(after, |of| of.plane_m);
+    let mut rows = focal(&CALIBRATED[0]);
+    rows.extend([
+        number(
+            "scene, another orbit: ties across, px",
+            "0.333",
+            across_px(&orbit.after),
+            3,
+        )
+        .between(0.0, 1.0),
+        number(
+            "scene: plan, so many times less",
+            times(i818_before / i818_after),
+            plan_times,
+            1,
+        )
+        .between(2.0, 100.0),
+        number(
+            "scene: height, so many times less",
+            times(HEIGHTS_M[0][0] / HEIGHTS_M[0][1]),
+            before.height_m / after.height_m,
+            1,
+        )
+        .between(2.0, 100.0),
+    ]);
+    rows
+}
 
 /// Across and along give the residual in the focal plane.
 fn focal(lines: &[Line]) -> Vec<Comparison> {
@@ -241,8 +390,10 @@ static ROWS: [Row; 20] = [
         id: "L23-03",
         place: "table 2",
         what: "expected errors",
-        account: Account::NotYetComputed {
-            printed: "1000 m on each axis of the orbit, 0.01 m a line of drift, 25 millidegrees an angle",
+        account: Account::Input {
+            from: "defaults of `[a_priori]`, `config/calibrations/example.toml`",
+            ours: expected_errors,
+            test: "tests/calibrate.rs::every_step_has_the_size_of_the_paper",
         },
         note: "",
     },
@@ -282,8 +433,10 @@ static ROWS: [Row; 20] = [
         id: "L23-07",
         place: "section 3.3",
         what: "tie points and laser control points",
-        account: Account::NotYetComputed {
-            printed: "206, 476",
+        account: Account::Input {
+            from: "`areograph scene --calibration`",
+            ours: points,
+            test: "tests/calibrate.rs::every_step_has_the_size_of_the_paper",
         },
         note: "",
     },
@@ -302,8 +455,8 @@ static ROWS: [Row; 20] = [
         place: "table 5",
         what: "I864 before",
         account: Account::MetInPart {
-            from: "root of the squares across and along",
-            ours: || focal(&I864_BEFORE),
+            from: "root of the squares across and along; synthetic lines with errors of the paper's size, points held back",
+            ours: before,
         },
         note: "Errors lie across the flight, as the table's heads say; the sentence “mainly along the flight” is \
                wrong. Control points in plan 25.077 and 36.195 px (682.675 and 1049.461 m), height 507.214 m: \
@@ -314,8 +467,8 @@ static ROWS: [Row; 20] = [
         place: "table 5",
         what: "I864 after",
         account: Account::MetInPart {
-            from: "root of the squares across and along",
-            ours: || focal(&I864_AFTER),
+            from: "root of the squares across and along; the same lines calibrated, points held back",
+            ours: after,
         },
         note: "Control points in plan 5.650 and 5.254 px (145.314 and 144.605 m), height 63.978 m: data.",
     },
@@ -354,8 +507,8 @@ static ROWS: [Row; 20] = [
         place: "table 7",
         what: "I818 with the parameters of I864",
         account: Account::MetInPart {
-            from: "root of the squares across and along",
-            ours: || focal(&CALIBRATED[0]),
+            from: "root of the squares across and along; the synthetic lines in another orbit with the first one's parameters",
+            ours: elsewhere,
         },
         note: "Plan 7.894 and 8.349 px (217.017 and 235.313 m), height 66.032 m: data.",
     },

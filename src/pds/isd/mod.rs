@@ -7,18 +7,24 @@
 
 mod camera;
 mod document;
+mod rewrite;
 mod tables;
+mod target;
 
 use std::{fs, path::Path};
 
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-pub use self::tables::{Rotations, States};
 use self::{
     camera::{Samples, camera},
     document::{IsdError, Object},
     tables::span,
+};
+pub use self::{
+    rewrite::{StraightCamera, rewrite_isd},
+    tables::{Rotations, States},
+    target::ForeignBody,
 };
 use crate::{
     error::{IoError, Locate, Result},

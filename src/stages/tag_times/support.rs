@@ -8,17 +8,11 @@ use super::{ImageTimes, StartFrom};
 use crate::{
     body::Body,
     config::ImageConfig,
-    error::{Cause, Kind, Result},
+    error::Result,
     files::{HashedFile, file_name},
-    geom::{attitude::rotation_vector, body_rotation::body_rotation},
     pds::isd::{ImageSupport, SupportTables, read_isd},
     spice::Session,
-    time::Et,
-    units::METRES_PER_KM,
 };
-
-/// Radii within this are those of the products' frame, metres: files are written to ten metres.
-const RADIUS_TOLERANCE_M: f64 = 10.0;
 
 /// Support data of an image, and the file that they stand in.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -37,48 +31,6 @@ pub struct SupportFile {
     pub tables: SupportTables,
 }
 
-/// Support data of another body.
-#[derive(Debug, thiserror::Error)]
-enum ForeignBody {
-    #[error(
-        "image {image}: naif_keywords.BODY_CODE is {code}; expected {}, {}",
-        .body.naif().body,
-        .body.names().name
-    )]
-    Code {
-        image: String,
-        body: Body,
-        code: i64,
-    },
-    #[error(
-        "image {image}: radii are {:.2} and {:.2} km; expected {:.2} and {:.2} km, those of {body} in {}",
-        .radii_m[0] / METRES_PER_KM,
-        .radii_m[1] / METRES_PER_KM,
-        .body.model().equatorial_radius_m / METRES_PER_KM,
-        .body.model().polar_radius_m / METRES_PER_KM,
-        .body.names().short_frame
-    )]
-    Radii {
-        image: String,
-        body: Body,
-        radii_m: [f64; 2],
-    },
-}
-
-impl Cause for ForeignBody {
-    fn kind(&self) -> Kind {
-        Kind::Input
-    }
-
-    fn advice(&self) -> String {
-        let (Self::Code { body, .. } | Self::Radii { body, .. }) = self;
-        format!(
-            "leave the image out, or write the body that its support data are of: the site is on {body} (body = \"{}\")",
-            body.word()
-        )
-    }
-}
-
 impl SupportFile {
     /// What the file at `path` says of `image`, which sees `body`.
     ///
@@ -91,27 +43,7 @@ impl SupportFile {
         hashed: Option<&HashedFile>,
     ) -> Result<(ImageSupport, Self)> {
         let said = read_isd(path)?;
-        let of_body = i64::from(body.naif().body);
-        if let Some(code) = said.target.filter(|code| *code != of_body) {
-            let image = image.id.clone();
-            return Err(ForeignBody::Code { image, body, code }.into());
-        }
-        let model = body.model();
-        let expected_m = [model.equatorial_radius_m, model.polar_radius_m];
-        let mut apart_m = said
-            .radii_m
-            .iter()
-            .zip(expected_m)
-            .map(|(a, b)| (a - b).abs());
-        if apart_m.any(|apart_m| apart_m > RADIUS_TOLERANCE_M) {
-            let (image, radii_m) = (image.id.clone(), said.radii_m);
-            return Err(ForeignBody::Radii {
-                image,
-                body,
-                radii_m,
-            }
-            .into());
-        }
+        said.sees(body, &image.id)?;
         let file = Self {
             name: file_name(path),
             bytes: hashed.map_or(0, |file| file.bytes),
@@ -131,24 +63,6 @@ impl SupportFile {
             self.name
         )
     }
-
-    /// What does not agree with the frame of the products at the instant `at`.
-    fn remarks(&self, body: Body, at: Et) -> Vec<String> {
-        let rotation = &self.tables.body_rotation;
-        let theirs = rotation.constant * rotation.at(at.seconds()).0;
-        let ours = *body_rotation(body, at).matrix();
-        let turn_rad = rotation_vector(&(theirs * ours.transpose())).norm();
-        // Written so that NaN is remarked on too.
-        if turn_rad <= body.rotation_tolerance_rad() {
-            return Vec::new();
-        }
-        vec![format!(
-            "the support data {} turn {body} by {:.1} m on the equator against {}; positions are taken in their frame",
-            self.name,
-            turn_rad * body.model().equatorial_radius_m,
-            body.names().short_frame
-        )]
-    }
 }
 
 /// Times and camera of an image by its support data.
@@ -162,6 +76,7 @@ pub(super) fn supported(
     let (said, file) = SupportFile::read(body, image, path, hashed)?;
     let start = said.line_times.start();
     let period_s = said.line_times.mean_period_s();
+    let remark = file.tables.frame_remark(body, &file.name, start);
     Ok(ImageTimes {
         id: image.id.clone(),
         body,
@@ -175,7 +90,7 @@ pub(super) fn supported(
         samples: said.samples,
         first_detector: said.first_detector,
         notes: vec![file.note()],
-        remarks: file.remarks(body, start),
+        remarks: remark.into_iter().collect(),
         instrument: said.instrument,
         line_times: said.line_times,
         support: Some(file),

@@ -11,9 +11,12 @@ use crate::{
     error::Result,
     files::file_name,
     geom::plane::{Control, CornerZero, FourCorners, Measurement, Net, Place},
-    pds::plane_tables::{
-        ControlPlace, PictureRow, Rows, TickRow, read_controls, read_measurements, read_pictures,
-        read_ticks,
+    pds::{
+        plane_tables::{
+            ControlPlace, PictureRow, TickRow, read_controls, read_measurements, read_pictures,
+            read_ticks,
+        },
+        table_rows::Rows,
     },
     units::RADIANS_PER_DEGREE,
 };

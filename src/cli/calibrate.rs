@@ -1,0 +1,68 @@
+//! `areograph calibrate`.
+
+use std::{path::PathBuf, process::ExitCode};
+
+use clap::Args;
+
+use super::{
+    report,
+    single::{Asked, answer},
+};
+use crate::{
+    config::{LoadedCalibration, load_calibration},
+    flow::run_calibration,
+};
+
+/// Calibrates the lines of a camera in orbit: ties between them, then laser points, part of which only judges.
+///
+/// Products go to `<out>/<calibration>`, with calibrated support data (ISD) of every line. Which angles ties cannot see is
+/// found and told.
+///
+/// Example: `areograph scene hrsc --calibration && areograph calibrate hrsc/calibration.toml --out products`
+#[derive(Debug, Args)]
+#[command(verbatim_doc_comment)]
+pub(super) struct Arguments {
+    /// Calibration file (TOML); config/calibrations/example.toml documents every key.
+    #[arg(value_name = "CALIBRATION.toml")]
+    calibration: PathBuf,
+    /// Folder of the products; the calibration gets a folder of its own in it.
+    #[arg(long, default_value = "out")]
+    out: PathBuf,
+    /// Calibrate again, whatever is stored.
+    #[arg(long)]
+    force: bool,
+    /// Print JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+/// Runs the calibration and prints how it ended.
+pub(super) fn run(arguments: &Arguments) -> ExitCode {
+    let loaded = match load_calibration(&arguments.calibration) {
+        Ok(loaded) => loaded,
+        Err(failure) => return report(&failure),
+    };
+    let LoadedCalibration {
+        calibration,
+        warnings,
+    } = loaded;
+    for warning in warnings {
+        tracing::warn!("{warning}");
+    }
+    let asked = Asked {
+        what: "calibration",
+        name: &calibration.calibration,
+        json: arguments.json,
+    };
+    let ran = run_calibration(&calibration, &arguments.out, arguments.force);
+    answer(&asked, ran, |count| {
+        format!(
+            "{} lines, {} ties, {} laser points, {} more held back, {} left out",
+            count("cameras"),
+            count("ties"),
+            count("controls"),
+            count("held_back_controls"),
+            count("left_out"),
+        )
+    })
+}

@@ -1,0 +1,75 @@
+//! How a flow of one stage is answered: a line or JSON, the verdict, the exit code.
+
+use std::process::ExitCode;
+
+use serde_json::json;
+
+use super::{output, report};
+use crate::{
+    error::{Kind, Result},
+    flow::SingleOutcome,
+    store::manifest::Manifest,
+};
+
+/// What such a flow is called in its answer.
+pub(super) struct Asked<'a> {
+    /// The key of its name in JSON.
+    pub(super) what: &'static str,
+    /// Its name.
+    pub(super) name: &'a str,
+    /// Whether JSON was asked for.
+    pub(super) json: bool,
+}
+
+/// Prints how a run ended, with its counts in words.
+pub(super) fn answer(
+    asked: &Asked<'_>,
+    ran: Result<SingleOutcome>,
+    words: impl Fn(&dyn Fn(&str) -> u64) -> String,
+) -> ExitCode {
+    let outcome = match ran {
+        Ok(outcome) => outcome,
+        Err(failure) => return report(&failure),
+    };
+    let manifest = &outcome.manifest;
+    if asked.json {
+        output::json(&json!({
+            asked.what: asked.name,
+            "folder": outcome.folder,
+            "unchanged": outcome.unchanged,
+            "verdict": manifest.verdict,
+            "counts": manifest.counts,
+            "figures": manifest.figures,
+        }));
+    } else {
+        let count = |name: &str| manifest.counts.get(name).copied().unwrap_or(0);
+        let unchanged = if outcome.unchanged {
+            ", nothing changed"
+        } else {
+            ""
+        };
+        output::line(format_args!(
+            "{}: {}{unchanged}; {}; {}",
+            asked.name,
+            manifest.verdict.word(),
+            words(&count),
+            outcome.folder.join("report/index.html").display(),
+        ));
+        tell(manifest);
+    }
+    if manifest.verdict.valid {
+        ExitCode::SUCCESS
+    } else {
+        ExitCode::from(Kind::Validation.exit_code())
+    }
+}
+
+/// Prints reasons and remarks.
+fn tell(manifest: &Manifest) {
+    for reason in &manifest.verdict.reasons {
+        output::line(format_args!("  invalid: {reason}"));
+    }
+    for remark in &manifest.verdict.remarks {
+        output::line(format_args!("  remark: {remark}"));
+    }
+}

@@ -1,0 +1,94 @@
+//! A calibration of the lines of a camera, from support data and tables to its products.
+
+use std::path::Path;
+
+use super::{
+    out::check_out_path,
+    single::{Single, SingleOutcome, Told, made},
+};
+use crate::{
+    config::CalibrationConfig,
+    error::Result,
+    products::{CalibrationProducts, write_calibration_products},
+    report::calibration_page,
+    stages::calibrate::{
+        Calibrate, Calibration, CalibrationFiles, CalibrationKeys, PointKind, calibration_files,
+    },
+    store::manifest::figures,
+};
+
+/// Raised when the products of a calibration are laid out anew.
+const METHOD: u32 = 1;
+
+/// Calibrates the lines of a camera and publishes the products in `<out>/<calibration>`, when something has changed since the
+/// last time.
+///
+/// # Errors
+/// Files that cannot be read, points that do not fit the support data, a disk that refuses; what stood before stands then.
+pub fn run_calibration(
+    config: &CalibrationConfig,
+    out: &Path,
+    force: bool,
+) -> Result<SingleOutcome> {
+    check_out_path(out)?;
+    let single = Single {
+        name: &config.calibration,
+        file: &config.file,
+        blake3: &config.blake3,
+        keys: &config.keys,
+        method: METHOD,
+        folder: out.join(&config.calibration),
+        force,
+    };
+    single.run(
+        &calibration_files(config),
+        |hashed, cache, stop| {
+            let stage = Calibrate {
+                calibration: CalibrationKeys(config),
+                files: CalibrationFiles(hashed),
+            };
+            made(&stage, cache, stop)
+        },
+        |staging, result| {
+            let page = calibration_page(config, result)?;
+            let products = CalibrationProducts {
+                config,
+                result,
+                page: &page,
+            };
+            write_calibration_products(staging, &products)
+        },
+        told,
+    )
+}
+
+/// What the manifest says of a calibration.
+fn told(result: &Calibration) -> Told<'_> {
+    let count = |kind: PointKind| {
+        let of = result.points.iter().filter(|of| of.kind == kind);
+        of.count() as u64
+    };
+    let left_out = result.points.iter().filter(|of| of.left_out);
+    let mut stated = Vec::new();
+    if let Some(last) = result.steps.last() {
+        let ties = last.figures.ties.cameras_px.iter().flatten();
+        let worst_px = ties.copied().fold(0.0, f64::max);
+        stated.push((figures::TIE_RESIDUAL_RMS_PX, worst_px));
+    }
+    if let Some(held_back) = &result.held_back {
+        stated.push((figures::HELD_BACK_HEIGHT_RMS_M, held_back.height_m));
+    }
+    Told {
+        verdict: &result.verdict,
+        counts: vec![
+            ("cameras", result.cameras.len() as u64),
+            ("ties", count(PointKind::Tie)),
+            ("controls", count(PointKind::Control)),
+            ("held_back_controls", count(PointKind::HeldBack)),
+            ("left_out", left_out.count() as u64),
+            ("unseen_directions", u64::from(result.tie_sight.unseen)),
+        ],
+        figures: stated,
+        complaints: (&result.complaints, result.complaint_count),
+    }
+}

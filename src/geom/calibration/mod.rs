@@ -1,0 +1,25 @@
+//! Offset angles and look angles of the lines of one camera, from points that several lines see and from points whose place
+//! is known.
+//!
+//! The model is that of Li et al. 2023, its misprints mended: `P = S + m · R · R_u · (tan ψx, tan ψy, 1)ᵀ`, with the position
+//! `S` of the spacecraft, the rotation `R` from its axes to body-fixed ones, an offset rotation `R_u = R_φ R_ω R_κ` and
+//! polynomials `tan ψx(s)`, `tan ψy(s)` of every line. Axes of the spacecraft: x across the flight, y along it, z down.
+//! Residuals are tangents, `V = (XX/ZZ − tan ψx, YY/ZZ − tan ψy)` with `(XX, YY, ZZ)ᵀ = R_uᵀ Rᵀ (P − S)`.
+//!
+//! Ground points are eliminated one by one by reflections of their rows, so that what the points cannot see stays to be seen:
+//! normal equations lose it in their rounding.
+
+mod camera;
+mod elimination;
+mod freedom;
+mod null_space;
+mod sight;
+mod solve;
+#[cfg(test)]
+mod tests;
+
+pub use camera::{CalibrationState, LineCamera, LinePose, Offset};
+pub use freedom::{Freedom, Layout, Parameter};
+pub use null_space::{AngleCombination, Axis, Combination, TieDirection, TieSight, tie_sight};
+pub use sight::{GroundPoint, KnownPlace, Misfit, Sight, SightError};
+pub use solve::{CalibrationError, Solved, Start, solve};

@@ -1,0 +1,117 @@
+//! Gauss–Newton over the free combinations of parameters, with what was known of them beforehand.
+
+use nalgebra::{DMatrix, DVector, Vector3};
+
+use super::{
+    camera::CalibrationState,
+    elimination::{Triangle, reduced_rows},
+    freedom::Freedom,
+    sight::{GroundPoint, SightError},
+};
+
+/// Steps that are tried.
+const STEPS_MAX: u32 = 40;
+/// Length of the last step, in standard deviations of what is estimated.
+const STEP: f64 = 1e-3;
+
+/// Why there is no calibration.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub enum CalibrationError {
+    /// A point has no place.
+    #[error("point {point}: {why}")]
+    Point {
+        /// Its index.
+        point: usize,
+        /// Why.
+        why: SightError,
+    },
+    /// The steps did not end.
+    #[error("the adjustment does not converge in {STEPS_MAX} steps")]
+    NotConverged,
+    /// A free combination has no standard deviation beforehand and is seen by nothing.
+    #[error("the points do not determine what is free")]
+    Singular,
+}
+
+/// Where an adjustment begins.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Start<'a> {
+    /// What was known beforehand: the geometry of the laboratory.
+    pub known: &'a CalibrationState,
+    /// Where the steps begin.
+    pub from: &'a CalibrationState,
+}
+
+/// An adjusted calibration.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Solved {
+    /// The parameters.
+    pub state: CalibrationState,
+    /// Their covariance, in their order; zero for what was not free.
+    pub covariance: DMatrix<f64>,
+    /// Places of the points.
+    pub places_m: Vec<Vector3<f64>>,
+    /// Steps.
+    pub steps: u32,
+}
+
+/// Adjusts the free combinations to `points` and to what was known beforehand.
+///
+/// # Errors
+/// [`CalibrationError`].
+pub fn solve(
+    points: &[GroundPoint],
+    start: Start<'_>,
+    freedom: &Freedom,
+) -> Result<Solved, CalibrationError> {
+    let mut state = start.from.clone();
+    for steps in 1..=STEPS_MAX {
+        let (triangle, right, places_m) = linearised(points, &state, start.known, freedom)?;
+        let step = triangle
+            .solve_upper_triangular(&right)
+            .filter(|step| step.iter().all(|component| component.is_finite()))
+            .ok_or(CalibrationError::Singular)?;
+        state = state.moved(&freedom.change(&step));
+        if (&triangle * &step).norm() > STEP {
+            continue;
+        }
+        let unit = DMatrix::identity(freedom.len(), freedom.len());
+        let inverse = triangle
+            .solve_upper_triangular(&unit)
+            .ok_or(CalibrationError::Singular)?;
+        return Ok(Solved {
+            covariance: freedom.covariance(&(&inverse * inverse.transpose())),
+            state,
+            places_m,
+            steps,
+        });
+    }
+    Err(CalibrationError::NotConverged)
+}
+
+/// Triangle and right side over the free combinations at a state, and the places of the points there.
+type Linearised = (DMatrix<f64>, DVector<f64>, Vec<Vector3<f64>>);
+
+fn linearised(
+    points: &[GroundPoint],
+    state: &CalibrationState,
+    known: &CalibrationState,
+    freedom: &Freedom,
+) -> Result<Linearised, CalibrationError> {
+    let unknowns = freedom.len();
+    let mut triangle = Triangle::new(unknowns);
+    // Beforehand every free combination is what is known of it, with a standard deviation of one.
+    let off = freedom.components(&(known.vector() - state.vector()));
+    let mut beforehand = DMatrix::identity(unknowns, unknowns + 1);
+    beforehand.column_mut(unknowns).copy_from(&off);
+    triangle.add(beforehand);
+    let mut places_m = Vec::with_capacity(points.len());
+    for (index, point) in points.iter().enumerate() {
+        let at = |why| CalibrationError::Point { point: index, why };
+        let place_m = point.place(state).map_err(at)?;
+        triangle.add(reduced_rows(point, state, freedom, &place_m).map_err(at)?);
+        places_m.push(place_m);
+    }
+    let (triangle, right) = triangle.finish();
+    Ok((triangle, right, places_m))
+}

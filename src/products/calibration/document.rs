@@ -1,0 +1,196 @@
+//! What a calibration says of itself, as JSON.
+
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use super::{CalibrationProducts, WriteCalibration};
+use crate::{
+    config::CalibrationMode,
+    geom::calibration::{AngleCombination, TieSight},
+    products::{
+        coordinates::degrees,
+        files::write_json,
+        product::{Content, Declaration, Role},
+    },
+    schema::DocumentSchema,
+    stages::{
+        calibrate::{CalibrationStep, CameraResult, HeldBack, ValidationResult, Value},
+        judge::Verdict,
+    },
+};
+
+pub(super) static DOCUMENT: Declaration<WriteCalibration> = Declaration {
+    path: "calibration.json",
+    what: "parameters with standard deviations, what ties cannot see, figures after every step, of held-back control and of \
+           other orbits, verdict",
+    readers: "scripts",
+    rows: "cameras",
+    role: Role::Metadata,
+    content: Content::Document(schema),
+    write: |path, of| {
+        write_json(path, &Document::of(of))?;
+        Ok(of.result.cameras.len() as u64)
+    },
+    uses: &[],
+};
+
+/// The document.
+#[derive(Serialize, JsonSchema)]
+#[schemars(
+    title = "Calibration of the lines of a camera",
+    description = "calibration.json of areograph: offset angles and look angles after Li et al. 2023."
+)]
+struct Document<'a> {
+    /// Always `areograph calibration 1`.
+    #[schemars(extend("const" = "areograph calibration 1"))]
+    format: &'static str,
+    /// Identifier of the calibration.
+    calibration: &'a str,
+    /// The body that it sees, as in `config/bodies`.
+    body: &'static str,
+    /// What ties estimate before there is control.
+    mode: CalibrationMode,
+    /// Whether the result is to be used.
+    verdict: &'a Verdict,
+    /// The lines of the camera.
+    #[schemars(length(min = 2))]
+    cameras: Vec<CameraDocument<'a>>,
+    /// Drift of the orbit from line to line, body-fixed, metres: true minus the support data that were given. What stays the same
+    /// of the orbit's error is in the offset angles.
+    drift_m_per_line: [Value; 3],
+    /// What ties alone see of the offset angles.
+    tie_sight: TieSightDocument,
+    /// Figures before, and after every step.
+    steps: &'a [CalibrationStep],
+    /// What held-back control says; absent without control.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    held_back: Option<&'a HeldBack>,
+    /// Other orbits.
+    validation: &'a [ValidationResult],
+}
+
+/// A line of the camera.
+#[derive(Serialize, JsonSchema)]
+struct CameraDocument<'a> {
+    /// Its name.
+    camera: &'a str,
+    /// φ, about the flight (roll), degrees.
+    phi_deg: Value,
+    /// ω, about the axis across the flight (pitch), degrees.
+    omega_deg: Value,
+    /// κ, about the axis that looks down (yaw), degrees.
+    kappa_deg: Value,
+    /// Tangent across the flight: coefficients of the powers of s′, which is −1 at the first edge of the image and 1 at the last.
+    m: &'a [Value],
+    /// Tangent along the flight, likewise.
+    n: &'a [Value],
+    /// The same of the support data that were given, across and along.
+    laboratory: &'a [Vec<f64>; 2],
+    /// What these leave of the look directions of the support data that were given, at most, pixels.
+    #[schemars(range(min = 0.0))]
+    laboratory_left_px: f64,
+    /// Tangent of a pixel.
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pixel_tangent: f64,
+    /// Samples.
+    samples: u32,
+    /// Largest change of a look direction, pixels.
+    #[schemars(range(min = 0.0))]
+    moved_px: f64,
+    /// What the calibrated support data leave of the calibrated look directions, at most, pixels.
+    #[schemars(range(min = 0.0))]
+    isd_left_px: f64,
+}
+
+/// What ties alone see of the offset angles.
+#[derive(Serialize, JsonSchema)]
+struct TieSightDocument {
+    /// Directions that ties do not see: they know them worse than to a degree.
+    unseen: u32,
+    /// Which these are.
+    unseen_directions: Vec<String>,
+    /// All directions, orthonormal, the least known first.
+    directions: Vec<DirectionDocument>,
+}
+
+/// A combination of all offset angles.
+#[derive(Serialize, JsonSchema)]
+struct DirectionDocument {
+    /// Standard deviation by ties alone, degrees; absent where they say nothing at all.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(range(min = 0.0))]
+    sigma_deg: Option<f64>,
+    /// Its larger components.
+    components: Vec<Component>,
+}
+
+/// A component along a named combination of unit length.
+#[derive(Serialize, JsonSchema)]
+struct Component {
+    /// Its name, for example `common roll`.
+    combination: String,
+    /// The component.
+    share: f64,
+}
+
+impl<'a> Document<'a> {
+    fn of(of: &CalibrationProducts<'a>) -> Self {
+        let result = of.result;
+        Self {
+            format: "areograph calibration 1",
+            calibration: &of.config.calibration,
+            body: of.config.body.word(),
+            mode: of.config.solution.mode,
+            verdict: &result.verdict,
+            cameras: result.cameras.iter().map(camera).collect(),
+            drift_m_per_line: result.drift_m_per_line,
+            tie_sight: tie_sight(&result.tie_sight),
+            steps: &result.steps,
+            held_back: result.held_back.as_ref(),
+            validation: &result.validation,
+        }
+    }
+}
+
+fn camera(of: &CameraResult) -> CameraDocument<'_> {
+    let [phi_deg, omega_deg, kappa_deg] = of.angles_rad.map(|angle| Value {
+        value: degrees(angle.value),
+        sigma: degrees(angle.sigma),
+    });
+    CameraDocument {
+        camera: &of.camera,
+        phi_deg,
+        omega_deg,
+        kappa_deg,
+        m: &of.m,
+        n: &of.n,
+        laboratory: &of.laboratory,
+        laboratory_left_px: of.laboratory_left_px,
+        pixel_tangent: of.pixel,
+        samples: of.samples,
+        moved_px: of.moved_px,
+        isd_left_px: of.isd_left_px,
+    }
+}
+
+fn tie_sight(of: &TieSight) -> TieSightDocument {
+    let words = |combination: &AngleCombination| combination.words();
+    let directions = of.directions.iter().map(|direction| DirectionDocument {
+        sigma_deg: direction.sigma_rad.map(degrees),
+        components: (direction.shares.iter())
+            .map(|(combination, share)| Component {
+                combination: words(combination),
+                share: *share,
+            })
+            .collect(),
+    });
+    TieSightDocument {
+        unseen: of.unseen,
+        unseen_directions: of.unseen_names.iter().map(words).collect(),
+        directions: directions.collect(),
+    }
+}
+
+fn schema() -> DocumentSchema {
+    DocumentSchema::of::<Document>("calibration_result")
+}

@@ -1,0 +1,281 @@
+//! The page of a calibration: verdict, figures of every step, what ties cannot see, cameras, other orbits.
+
+use super::{
+    html::{Cell, Column, Section, Table, Tone, counted, list, page, paragraph, verdict},
+    plots::{Panel, Plot, Series, figure, label, thinned},
+};
+use crate::{
+    config::{CalibrationConfig, CalibrationMode},
+    error::Result,
+    stages::calibrate::{Calibration, ControlFigures, Figures, HeldBack, PointKind, Value},
+};
+
+/// Points that are drawn.
+const DRAWN: usize = 3_000;
+
+/// The page of a calibration.
+///
+/// # Errors
+/// A plot that cannot be drawn, which is a bug in areograph.
+pub fn calibration_page(config: &CalibrationConfig, of: &Calibration) -> Result<String> {
+    let sections = [
+        Section::new("From step to step", steps(of)),
+        Section::new("Residuals", residuals(of)?),
+        Section::new("What ties cannot see", sight(of)),
+        Section::new("The lines of the camera", cameras(of)),
+        Section::new("Other orbits", validation(of)),
+    ];
+    Ok(page(&config.calibration, &lead(config, of), &sections))
+}
+
+fn lead(config: &CalibrationConfig, of: &Calibration) -> String {
+    let (tone, word) = Tone::of(of.verdict.valid, !of.verdict.remarks.is_empty());
+    let headline = format!(
+        "{word}: {}, {}.",
+        counted(of.cameras.len(), "line"),
+        counted(of.points.len(), "point")
+    );
+    let accuracy = of.held_back.as_ref().map_or_else(
+        || "Nothing tells where the camera looks: there is no laser control.".to_owned(),
+        stated,
+    );
+    let mode = match config.solution.mode {
+        CalibrationMode::Differential => "",
+        CalibrationMode::AsPublished => {
+            " Ties alone estimated all angles, as published, which can drive the camera far away: see the figures after the \
+             ties."
+        }
+    };
+    let mut words = accuracy + mode;
+    if !config.description.is_empty() {
+        words = format!("{}. {words}", config.description);
+    }
+    let body = paragraph(&words) + &list(&of.verdict.reasons) + &list(&of.verdict.remarks);
+    verdict(tone, &headline, &body)
+}
+
+fn stated(of: &HeldBack) -> String {
+    format!(
+        "A tie point is known to {:.1} m in the plane and {:.1} m in height (root mean square). {} that were never used judge \
+         this: they lie {:.2} standard deviations off, {:.1} m in the plane and {:.1} m in height with the laser's own errors.",
+        of.accuracy_plane_m,
+        of.accuracy_height_m,
+        counted(
+            usize::try_from(of.points).unwrap_or(usize::MAX),
+            "laser point"
+        ),
+        of.normalised,
+        of.plane_m,
+        of.height_m
+    )
+}
+
+fn number(value: f64, decimals: usize) -> Cell {
+    label(value, decimals).into()
+}
+
+/// Largest of the cameras across and along, then pixels, metres, height of control.
+fn figure_cells(figures: &Figures, kind: PointKind) -> Vec<Cell> {
+    let worst = |axis: usize| {
+        let of = figures.ties.cameras_px.iter().map(|of| of[axis]);
+        of.fold(0.0, f64::max)
+    };
+    let mut cells = vec![number(worst(0), 3), number(worst(1), 3)];
+    match figures.of(kind) {
+        Some(control) => cells.extend(control_cells(control)),
+        None => cells.extend(["", "", ""].map(Cell::from)),
+    }
+    cells
+}
+
+fn control_cells(of: &ControlFigures) -> [Cell; 3] {
+    let each = |value: fn(&crate::stages::calibrate::PixelsAndMetres) -> f64, decimals: usize| {
+        let values = of
+            .cameras
+            .iter()
+            .map(|camera| label(value(camera), decimals));
+        Cell::from(values.collect::<Vec<_>>().join(" / "))
+    };
+    [
+        each(|of| of.plane_px, 2),
+        each(|of| of.plane_m, 0),
+        number(of.height_m, 1),
+    ]
+}
+
+fn steps(of: &Calibration) -> String {
+    let mut table = Table::new(
+        "Root mean squares, as in table 5 of Li et al. 2023; of ties the worst line, of control line by line",
+        &[
+            Column::Text("after"),
+            Column::Text("control"),
+            Column::Number("ties across, px"),
+            Column::Number("ties along, px"),
+            Column::Number("control, px"),
+            Column::Number("control, m"),
+            Column::Number("height, m"),
+        ],
+    );
+    for step in &of.steps {
+        for (kind, what) in [
+            (PointKind::Control, "used"),
+            (PointKind::HeldBack, "held back"),
+        ] {
+            if kind == PointKind::HeldBack && step.figures.of(kind).is_none() {
+                continue;
+            }
+            let mut cells: Vec<Cell> = vec![(&step.step).into(), what.into()];
+            cells.extend(figure_cells(&step.figures, kind));
+            table.row(true, cells);
+        }
+    }
+    let free: Vec<String> = of
+        .steps
+        .iter()
+        .map(|step| format!("{}: free was {}", step.step, step.free))
+        .collect();
+    table.finish() + &list(&free)
+}
+
+fn residuals(of: &Calibration) -> Result<String> {
+    let dots = |kind: PointKind, after: bool| -> Vec<(f64, f64)> {
+        let images = of
+            .images
+            .iter()
+            .filter(|image| image.kind == kind && !image.left_out);
+        let all: Vec<(f64, f64)> = images
+            .filter_map(|image| {
+                let px = if after {
+                    image.after_px
+                } else {
+                    image.before_px
+                };
+                px.map(|px| (image.place[0], px[0]))
+            })
+            .collect();
+        thinned(&all, DRAWN)
+    };
+    let panel = |label: &'static str, kind: PointKind| {
+        let of = |name: &str, colour, after| Series::dots(name, colour, dots(kind, after));
+        let panel = Panel::of(
+            label,
+            vec![of("before", 1, false), of("after the calibration", 0, true)],
+        );
+        (!panel.series.iter().all(|series| series.points.is_empty())).then_some(panel)
+    };
+    let panels = [
+        panel("ties, px", PointKind::Tie),
+        panel("held-back control, px", PointKind::HeldBack),
+    ];
+    let plot = Plot::of(
+        "Residuals across the flight".to_owned(),
+        "Where a line sees a point minus where it is measured, over the image's lines. Ties show what the lines differ by, \
+         laser points that were held back what the calibration is worth."
+            .to_owned(),
+        "line",
+        panels.into_iter().flatten().collect(),
+    );
+    Ok(format!("<div class=\"plots\">\n{}</div>\n", figure(&plot)?))
+}
+
+fn sight(of: &Calibration) -> String {
+    let unseen = usize::try_from(of.tie_sight.unseen).unwrap_or(usize::MAX);
+    let words = format!(
+        "Of {} angles of the lines ties leave {} unseen: {}. What is not seen is held by what is known from elsewhere; an \
+         adjustment that frees it moves along it at no cost.",
+        3 * of.cameras.len(),
+        counted(unseen, "combination"),
+        of.tie_sight.unseen_words()
+    );
+    let mut table = Table::new(
+        "Combinations of the offset angles by ties alone, the least known first",
+        &[
+            Column::Text("combination, with components"),
+            Column::Number("standard deviation, °"),
+        ],
+    );
+    for direction in &of.tie_sight.directions {
+        let shares = direction.shares.iter();
+        let shares: Vec<String> = shares
+            .map(|(name, share)| format!("{share:+.2} {}", name.words()))
+            .collect();
+        let sigma = match direction.sigma_rad {
+            Some(sigma_rad) => significant(sigma_rad.to_degrees()),
+            None => "unbounded".to_owned(),
+        };
+        table.row(true, [shares.join(" ").into(), sigma.into()]);
+    }
+    paragraph(&words) + &table.finish()
+}
+
+/// Three digits that count.
+fn significant(value: f64) -> String {
+    let decimals = (0..12).find(|decimals| value * 10_f64.powi(*decimals) >= 100.0);
+    label(value, decimals.map_or(12, |of| of.unsigned_abs() as usize))
+}
+
+fn cameras(of: &Calibration) -> String {
+    let mut table = Table::new(
+        "Offset angles with standard deviations, and what the calibration changes",
+        &[
+            Column::Text("line"),
+            Column::Number("φ (roll), °"),
+            Column::Number("ω (pitch), °"),
+            Column::Number("κ (yaw), °"),
+            Column::Number("moves the image by, px"),
+            Column::Number("support data leave, px"),
+        ],
+    );
+    for camera in &of.cameras {
+        let angle = |of: Value| -> Cell {
+            format!(
+                "{:+.4} ± {:.4}",
+                of.value.to_degrees(),
+                of.sigma.to_degrees()
+            )
+            .into()
+        };
+        let mut cells: Vec<Cell> = vec![(&camera.camera).into()];
+        cells.extend(camera.angles_rad.map(angle));
+        cells.extend([number(camera.moved_px, 2), number(camera.isd_left_px, 3)]);
+        table.row(true, cells);
+    }
+    let drift = of.drift_m_per_line.map(|of| {
+        let Value { value, sigma } = of;
+        format!("{value:+.4} ± {sigma:.4}")
+    });
+    let words = format!(
+        "Angles and the constant of the look angles say the same of an image, and so does what stays the same of an orbit's error: \
+         how much each has of a shift is by what was known beforehand, and their standard deviations are wide. Where the camera \
+         looks is known far better. The orbit drifts by {} m a line. Support data hold a straight line of equal samples; what they \
+         leave is in the last column.",
+        drift.join(", ")
+    );
+    table.finish() + &paragraph(&words)
+}
+
+fn validation(of: &Calibration) -> String {
+    if of.validation.is_empty() {
+        return paragraph("No other orbit was given ([[validation]]).");
+    }
+    let mut table = Table::new(
+        "Other orbits without and with the calibration, as in tables 6 and 7 of Li et al. 2023",
+        &[
+            Column::Text("orbit"),
+            Column::Text("calibration"),
+            Column::Number("ties across, px"),
+            Column::Number("ties along, px"),
+            Column::Number("control, px"),
+            Column::Number("control, m"),
+            Column::Number("height, m"),
+        ],
+    );
+    for orbit in &of.validation {
+        for (what, figures) in [("before", &orbit.before), ("after", &orbit.after)] {
+            let mut cells: Vec<Cell> = vec![(&orbit.orbit).into(), what.into()];
+            cells.extend(figure_cells(figures, PointKind::Control));
+            table.row(true, cells);
+        }
+    }
+    table.finish()
+}

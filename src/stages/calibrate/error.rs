@@ -1,0 +1,169 @@
+//! Why there is no calibration, with the names of cameras and points.
+
+use crate::error::{Cause, Kind};
+
+/// No calibration.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum CalibrateError {
+    /// Two images hang on different frames.
+    #[error(
+        "camera {camera} hangs on frame {found} (instrument_pointing.time_dependent_frames), camera {first} on {expected}; \
+         expected one frame, that of the spacecraft"
+    )]
+    OtherFrame {
+        /// The camera.
+        camera: String,
+        /// Its frame.
+        found: i32,
+        /// The first camera.
+        first: String,
+        /// And its frame.
+        expected: i32,
+    },
+    /// Two cameras have one sensor.
+    #[error(
+        "cameras {first} and {second} have the same sensor, {sensor}; expected support data of different lines"
+    )]
+    SameSensor {
+        /// A camera.
+        first: String,
+        /// Another.
+        second: String,
+        /// The sensor of both.
+        sensor: String,
+    },
+    /// No axis of the spacecraft looks down, or none flies.
+    #[error("no axis of the spacecraft lies within {limit_deg} degrees of {what}")]
+    NoAxis {
+        /// What it was looked for.
+        what: &'static str,
+        /// How near it should be, degrees.
+        limit_deg: f64,
+    },
+    /// A camera does not look down.
+    #[error(
+        "camera {camera} looks up or across: its look directions are no tangents of the axis that looks down"
+    )]
+    LooksUp {
+        /// The camera.
+        camera: String,
+    },
+    /// A table names a camera that there is none of.
+    #[error("point {point} is in camera {camera:?}; expected one of {expected}")]
+    UnknownCamera {
+        /// The point.
+        point: String,
+        /// What it names.
+        camera: String,
+        /// The cameras.
+        expected: String,
+    },
+    /// Too few tie points.
+    #[error("{found} tie points are in two cameras or more; expected at least {expected}")]
+    TooFewTies {
+        /// How many there are.
+        found: usize,
+        /// How many are needed.
+        expected: usize,
+    },
+    /// Too few control points.
+    #[error(
+        "{found} control points can be used, {held_back} are held back; expected at least {expected} of each"
+    )]
+    TooFewControls {
+        /// How many there are.
+        found: usize,
+        /// How many are held back.
+        held_back: usize,
+        /// How many are needed.
+        expected: usize,
+    },
+    /// Most points do not fit.
+    #[error("{misfits} of {all} {what} do not fit the support data, for example {point}: {why}")]
+    Misfit {
+        /// `tie points` or `control points`.
+        what: &'static str,
+        /// How many do not fit.
+        misfits: usize,
+        /// How many there are.
+        all: usize,
+        /// One of them.
+        point: String,
+        /// Why it does not.
+        why: String,
+    },
+    /// A control point has two places.
+    #[error(
+        "control point {point} has two places; expected one longitude, latitude and radius in all its rows"
+    )]
+    TwoPlaces {
+        /// The point.
+        point: String,
+    },
+    /// An orbit of the validation has another number of files, or another sensor.
+    #[error("validation {orbit}: no support data of sensor {sensor}, that of camera {camera}")]
+    NoSupport {
+        /// The orbit.
+        orbit: String,
+        /// The sensor.
+        sensor: String,
+        /// Its camera.
+        camera: String,
+    },
+    /// The camera of another orbit is mounted in another way.
+    #[error(
+        "validation {orbit}: camera {camera} looks {off_px:.2} px off where it does in the orbit of the calibration; expected \
+         one mounting and one focal plane within {limit_px} px"
+    )]
+    OtherMounting {
+        /// The orbit.
+        orbit: String,
+        /// The camera.
+        camera: String,
+        /// By how much.
+        off_px: f64,
+        /// What may be.
+        limit_px: f64,
+    },
+    /// The adjustment fails.
+    #[error("step {step}: {problem}")]
+    Adjustment {
+        /// Which step.
+        step: &'static str,
+        /// What is wrong.
+        problem: String,
+    },
+}
+
+impl Cause for CalibrateError {
+    fn kind(&self) -> Kind {
+        Kind::Input
+    }
+
+    fn advice(&self) -> String {
+        match self {
+            Self::OtherFrame { .. } | Self::NoAxis { .. } | Self::LooksUp { .. } => {
+                "write the support data so that instrument_pointing ends in the spacecraft's frame and constant_rotation leads \
+                 from there to the camera"
+            }
+            Self::SameSensor { .. } | Self::NoSupport { .. } => {
+                "name_sensor tells the lines of the camera apart: check the files behind cameras.isd and validation.isd"
+            }
+            Self::UnknownCamera { .. } => "write the cameras' identifiers of the configuration into the table",
+            Self::TooFewTies { .. } => "measure more points that several lines see",
+            Self::TooFewControls { .. } => {
+                "give more laser points, or leave the table control out: without it only what the cameras differ by is told"
+            }
+            Self::Misfit { .. } => {
+                "check that every camera has the support data of its own image and is not exchanged with another, that samples \
+                 count from the edge from which the support data count them, and that places are of the same epoch and body"
+            }
+            Self::TwoPlaces { .. } => "give every laser point a name of its own",
+            Self::OtherMounting { .. } => {
+                "give support data that have the same mounting, focal length and focal plane: the calibration is an offset from them"
+            }
+            Self::Adjustment { .. } => "check that ties and laser points were measured in these images, that they are spread over them, and their standard deviations",
+        }
+        .to_owned()
+    }
+}

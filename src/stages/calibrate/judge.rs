@@ -1,0 +1,161 @@
+//! The verdict on a calibration.
+
+use super::result::{CalibrationStep, CameraResult, HeldBack, PointKind, ValidationResult};
+use crate::{config::CalibrationMode, geom::calibration::TieSight, stages::judge::Verdict};
+
+/// Residuals of held-back control over their standard deviations: beyond, these are not true.
+const NORMALISED_MAX: f64 = 1.5;
+/// Below, they are larger than they need be.
+const NORMALISED_MIN: f64 = 0.6;
+/// Residuals of ties, pixels, beyond which the lines do not see one ground.
+const TIES_MAX_PX: f64 = 1.0;
+/// Share of points that may be left out.
+const LEFT_OUT_MAX: f64 = 0.1;
+/// A calibration moves the image by at most so many standard deviations of what was known beforehand.
+const MOVED_MAX: f64 = 3.0;
+/// What the support data may leave of the look directions, pixels, without a word.
+const ISD_LEFT_PX: f64 = 0.5;
+
+/// What is known of a calibration when it is judged.
+pub(super) struct Evidence<'a> {
+    pub(super) mode: CalibrationMode,
+    pub(super) steps: &'a [CalibrationStep],
+    pub(super) held_back: Option<&'a HeldBack>,
+    pub(super) cameras: &'a [CameraResult],
+    pub(super) sight: &'a TieSight,
+    pub(super) validation: &'a [ValidationResult],
+    /// Points, and those that were left out: ties, then control.
+    pub(super) left_out: [[usize; 2]; 2],
+    /// What was known beforehand.
+    pub(super) known: Known,
+    /// What support data say of the body's frame.
+    pub(super) of_frames: Vec<String>,
+    pub(super) complaints: u64,
+}
+
+/// By how much orbit and attitude as known beforehand let things move, one standard deviation.
+#[derive(Clone, Copy)]
+pub(super) struct Known {
+    /// The image, pixels.
+    pub(super) image_px: f64,
+    /// The ground, metres along an axis.
+    pub(super) ground_m: f64,
+}
+
+pub(super) fn judge(of: &Evidence<'_>) -> Verdict {
+    let mut reasons = Vec::new();
+    match of.held_back {
+        None => reasons.push(format!(
+            "no laser control: nothing tells where the camera looks, nor how well ties tell the rest; not seen by ties: {}",
+            of.sight.unseen_words()
+        )),
+        Some(held_back) if !(held_back.normalised <= NORMALISED_MAX) => reasons.push(format!(
+            "control that was held back lies {:.2} standard deviations from where it should (root mean square); expected \
+             at most {NORMALISED_MAX}: standard deviations are too small, or something else than the camera is wrong",
+            held_back.normalised
+        )),
+        Some(held_back) if !known_better(held_back, of.known) => reasons.push(format!(
+            "a tie point is known to {:.0} m in the plane and {:.0} m in height, where orbit and attitude beforehand leave \
+             {:.0} m an axis: the laser control is too coarse, too little or too far away to tell where the camera looks",
+            held_back.accuracy_plane_m, held_back.accuracy_height_m, of.known.ground_m
+        )),
+        Some(_) => {}
+    }
+    if let Some(last) = of.steps.last() {
+        let worst = last.figures.ties.cameras_px.iter().flatten();
+        let worst_px = worst.copied().fold(0.0, f64::max);
+        if !(worst_px <= TIES_MAX_PX) {
+            reasons.push(format!(
+                "tie points miss each other by {worst_px:.2} px (root mean square); expected at most {TIES_MAX_PX} px"
+            ));
+        }
+    }
+    for (what, [all, left_out]) in ["tie", "control"].iter().zip(of.left_out) {
+        if left_out as f64 > LEFT_OUT_MAX * all as f64 {
+            reasons.push(format!(
+                "{left_out} of {all} {what} points were left out; expected a tenth at most"
+            ));
+        }
+    }
+    for camera in of.cameras {
+        if !(camera.moved_px <= MOVED_MAX * of.known.image_px) {
+            reasons.push(format!(
+                "camera {} is moved by {:.0} px; expected at most {:.0} px, {MOVED_MAX} standard deviations of orbit and \
+                 attitude beforehand",
+                camera.camera,
+                camera.moved_px,
+                MOVED_MAX * of.known.image_px
+            ));
+        }
+    }
+    Verdict {
+        valid: reasons.is_empty(),
+        reasons,
+        remarks: remarks(of),
+        checks: Vec::new(),
+    }
+}
+
+/// Whether the ground is known better than beforehand.
+fn known_better(held_back: &HeldBack, known: Known) -> bool {
+    held_back.accuracy_plane_m < std::f64::consts::SQRT_2 * known.ground_m
+        && held_back.accuracy_height_m < known.ground_m
+}
+
+fn remarks(of: &Evidence<'_>) -> Vec<String> {
+    let mut remarks = of.of_frames.clone();
+    let mut say = |when: bool, text: String| {
+        if when {
+            remarks.push(text);
+        }
+    };
+    say(
+        of.mode == CalibrationMode::AsPublished,
+        format!(
+            "all angles were freed by ties alone, as published: {} combinations of them are not seen ({}), and a difference \
+             of scale is taken for a common pitch; the step after the ties may lie far off",
+            of.sight.unseen,
+            of.sight.unseen_words()
+        ),
+    );
+    for [all, left_out] in of.left_out {
+        say(
+            left_out > 0,
+            format!("points left out: {left_out} of {all}"),
+        );
+    }
+    say(
+        of.held_back
+            .is_some_and(|held_back| held_back.normalised < NORMALISED_MIN),
+        "control that was held back fits better than its standard deviations say: they may be smaller".to_owned(),
+    );
+    for camera in of.cameras {
+        say(
+            camera.isd_left_px > ISD_LEFT_PX,
+            format!(
+                "the calibrated support data of camera {} leave {:.2} px of its look directions, which bend: a straight line \
+                 of equal samples is all that they hold",
+                camera.camera, camera.isd_left_px
+            ),
+        );
+    }
+    for orbit in of.validation {
+        let height =
+            |figures: &super::result::Figures| figures.of(PointKind::Control).map(|of| of.height_m);
+        let (before, after) = (height(&orbit.before), height(&orbit.after));
+        say(
+            before
+                .zip(after)
+                .is_some_and(|(before, after)| after > before),
+            format!(
+                "heights of orbit {} are worse with the calibration than without",
+                orbit.orbit
+            ),
+        );
+    }
+    say(
+        of.complaints > 0,
+        format!("rows and points left out, with reasons: {}", of.complaints),
+    );
+    remarks
+}

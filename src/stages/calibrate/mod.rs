@@ -1,0 +1,88 @@
+//! Calibration of the lines of a camera: ties alone, then with laser control, judged by control that was held back.
+
+mod error;
+mod geometry;
+mod judge;
+mod measure;
+mod outcome;
+mod read;
+mod result;
+mod run;
+mod support;
+mod tables;
+mod validate;
+
+use std::{path::PathBuf, sync::atomic::AtomicBool};
+
+use crate::{
+    config::CalibrationConfig,
+    error::Result,
+    files::HashedFile,
+    stage::{InOrder, Input, Inputs, Stage},
+    stage_inputs,
+};
+
+pub use error::CalibrateError;
+pub use result::{
+    Calibration, CalibrationStep, CameraResult, ControlFigures, Figures, HeldBack, ImageResult,
+    PixelsAndMetres, PointKind, PointResult, TieFigures, ValidationResult, Value,
+};
+
+stage_inputs! {
+    /// A calibration and its files.
+    pub struct Calibrate<'a> {
+        /// The configuration.
+        pub calibration: CalibrationKeys<'a>,
+        /// Its files with their hashes.
+        pub files: CalibrationFiles<'a>,
+    }
+}
+
+/// What of a calibration's configuration enters the result.
+#[derive(Debug)]
+pub struct CalibrationKeys<'a>(pub &'a CalibrationConfig);
+
+impl Input for CalibrationKeys<'_> {
+    fn add_to(&self, _field: &str, inputs: &mut Inputs) {
+        inputs.setting("body", &self.0.body);
+        inputs.setting("cameras", &self.0.cameras);
+        inputs.setting("ties", &self.0.ties);
+        inputs.setting("control", &self.0.control);
+        inputs.setting("a_priori", &self.0.a_priori);
+        inputs.setting("solution", &self.0.solution);
+        inputs.setting("validation", &self.0.validation);
+    }
+}
+
+/// The files of a calibration, in order.
+#[derive(Debug)]
+pub struct CalibrationFiles<'a>(pub &'a [HashedFile]);
+
+impl Input for CalibrationFiles<'_> {
+    fn add_to(&self, _field: &str, inputs: &mut Inputs) {
+        InOrder(self.0).add_to("file", inputs);
+    }
+}
+
+impl Stage for Calibrate<'_> {
+    const NAME: &'static str = "calibrate";
+    const METHOD: u32 = 1;
+    type Output = Calibration;
+    stage_inputs!(fingerprint);
+
+    fn run(&self, _stop: &AtomicBool) -> Result<Calibration> {
+        run::calibrate(self.calibration.0)
+    }
+}
+
+/// Every file that a calibration names, in a fixed order.
+#[must_use]
+pub fn calibration_files(of: &CalibrationConfig) -> Vec<PathBuf> {
+    let cameras = of.cameras.iter().map(|camera| &camera.isd);
+    let tables = of.ties.files.iter().chain(&of.control.files);
+    let elsewhere = of
+        .validation
+        .iter()
+        .flat_map(|orbit| orbit.isd.iter().chain(&orbit.ties).chain(&orbit.control));
+    cameras.chain(tables).chain(elsewhere).cloned().collect()
+}

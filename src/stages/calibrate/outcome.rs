@@ -1,0 +1,194 @@
+//! The result of a calibration, put together for those who read it.
+
+use nalgebra::{DMatrix, Vector3};
+
+use super::{
+    geometry::{Laboratory, Orbit},
+    measure::Squares,
+    read::OrbitPoint,
+    result::{CameraResult, HeldBack, ImageResult, PointKind, PointResult, Value},
+    support::calibrated,
+};
+use crate::{
+    config::CalibrationConfig,
+    error::Result,
+    geom::{
+        calibration::{CalibrationState, GroundPoint},
+        ellipsoid::local_axes,
+    },
+};
+
+/// Places at which look directions are compared, `s′`.
+const COMPARED_AT: [f64; 3] = [-1.0, 0.0, 1.0];
+
+/// A calibration that is done.
+pub(super) struct Outcome<'a> {
+    pub(super) config: &'a CalibrationConfig,
+    pub(super) names: &'a [String],
+    pub(super) orbit: &'a Orbit,
+    pub(super) laboratory: &'a Laboratory,
+    pub(super) points: &'a [OrbitPoint],
+    pub(super) pixels: &'a [f64],
+    pub(super) state: &'a CalibrationState,
+    pub(super) covariance: &'a DMatrix<f64>,
+}
+
+/// The drift of the orbit with standard deviations.
+pub(super) fn drift(state: &CalibrationState, covariance: &DMatrix<f64>) -> [Value; 3] {
+    let first = state.layout().len() - 3;
+    [0, 1, 2].map(|axis| Value {
+        value: state.drift_m_per_line[axis],
+        sigma: covariance[(first + axis, first + axis)].max(0.0).sqrt(),
+    })
+}
+
+impl Outcome<'_> {
+    /// The cameras with their support data.
+    pub(super) fn cameras(&self) -> Result<Vec<CameraResult>> {
+        let layout = self.state.layout();
+        let vector = self.state.vector();
+        let value = |index: usize| Value {
+            value: vector[index],
+            sigma: self.covariance[(index, index)].max(0.0).sqrt(),
+        };
+        let mut cameras = Vec::new();
+        for (camera, name) in self.names.iter().enumerate() {
+            let image = &self.orbit.images[camera];
+            let first = camera * layout.of_camera();
+            let path = &self.config.cameras[camera].isd;
+            let (isd, isd_left_px) = calibrated(path, self.orbit, camera, self.state)?;
+            let powers = |from: usize| (from..=from + layout.order).map(value).collect();
+            let laboratory = &self.laboratory.state.cameras[camera];
+            let moved = COMPARED_AT.map(|s| {
+                let look = self.state.cameras[camera].look(s);
+                (look.xy() / look.z - laboratory.tangents(s)).norm()
+            });
+            cameras.push(CameraResult {
+                camera: name.clone(),
+                angles_rad: [0, 1, 2].map(|axis| value(first + axis)),
+                m: powers(first + 3),
+                n: powers(first + 4 + layout.order),
+                laboratory: [laboratory.m.clone(), laboratory.n.clone()],
+                laboratory_left_px: self.laboratory.left_px[camera],
+                pixel: image.pixel(),
+                samples: image.support.samples,
+                moved_px: moved.into_iter().fold(0.0, f64::max) / image.pixel(),
+                isd,
+                isd_left_px,
+            });
+        }
+        Ok(cameras)
+    }
+
+    /// What the control that was held back says.
+    pub(super) fn held_back(&self) -> Option<HeldBack> {
+        let mut normalised = 0.0;
+        let (mut plane, mut height) = (Squares::default(), Squares::default());
+        let (mut sum_m, mut intersected, mut points) = (Vector3::zeros(), 0_u32, 0_u32);
+        for of in self.points.iter().filter(|of| of.is(PointKind::HeldBack)) {
+            let misfit = of.point.misfit(self.state, self.covariance);
+            let Ok(Some(misfit)) = misfit else { continue };
+            normalised += misfit.normalised_square;
+            points += 1;
+            if let Some(off_m) = self.off_m(of) {
+                plane.add(off_m.xy().norm());
+                height.add(off_m.z);
+                sum_m += off_m;
+                intersected += 1;
+            }
+        }
+        if points == 0 {
+            return None;
+        }
+        let normalised = (normalised / f64::from(points)).sqrt();
+        let wider = normalised.max(1.0);
+        let (mut stated_plane, mut stated_height) = (Squares::default(), Squares::default());
+        for of in self.points.iter().filter(|of| of.is(PointKind::Tie)) {
+            if let Some([east, north, up]) = self.placed(of).and_then(|of| of.1) {
+                stated_plane.add(east.hypot(north) * wider);
+                stated_height.add(up * wider);
+            }
+        }
+        Some(HeldBack {
+            points: points.into(),
+            normalised,
+            plane_m: plane.rms().unwrap_or(0.0),
+            height_m: height.rms().unwrap_or(0.0),
+            mean_m: (sum_m / f64::from(intersected.max(1))).into(),
+            accuracy_plane_m: stated_plane.rms().unwrap_or(0.0),
+            accuracy_height_m: stated_height.rms().unwrap_or(0.0),
+        })
+    }
+
+    /// A point's place by its images alone, and its standard deviations east, north and up, metres.
+    fn placed(&self, of: &OrbitPoint) -> Option<(Vector3<f64>, Option<[f64; 3]>)> {
+        let unaided: GroundPoint = of.unaided();
+        let place_m = unaided.place(self.state).ok()?;
+        let covariance = unaided.covariance_m2(self.state, self.covariance, &place_m);
+        let sigma_m = covariance.ok().map(|covariance| {
+            let axes = local_axes(&place_m);
+            let local = axes * covariance * axes.transpose();
+            [0, 1, 2].map(|axis| local[(axis, axis)].max(0.0).sqrt())
+        });
+        Some((place_m, sigma_m))
+    }
+
+    /// Intersected minus the laser's place, east, north and up, metres.
+    fn off_m(&self, of: &OrbitPoint) -> Option<Vector3<f64>> {
+        let known = of.point.known?;
+        let place_m = of.unaided().place(self.state).ok()?;
+        let off_m = local_axes(&known.place_m) * (place_m - known.place_m);
+        Some(off_m)
+    }
+
+    pub(super) fn points(&self) -> Vec<PointResult> {
+        let result = |of: &OrbitPoint| {
+            let placed = self.placed(of);
+            let place = placed.map(|(place_m, _)| {
+                let radius_m = place_m.norm();
+                let latitude = (place_m.z / radius_m).clamp(-1.0, 1.0).asin();
+                [place_m.y.atan2(place_m.x), latitude, radius_m]
+            });
+            PointResult {
+                point: of.name.clone(),
+                kind: of.kind,
+                left_out: of.left_out,
+                place,
+                sigma_m: placed.and_then(|(_, sigma_m)| sigma_m),
+                off_m: self.off_m(of).map(Into::into),
+            }
+        };
+        self.points.iter().map(result).collect()
+    }
+
+    pub(super) fn images(&self) -> Vec<ImageResult> {
+        let of_point = |of: &OrbitPoint| {
+            let [before, after] =
+                [&self.laboratory.state, self.state].map(|state| self.residuals_px(of, state));
+            let of_image = |(index, measured): (usize, &super::tables::Measured)| ImageResult {
+                point: of.name.clone(),
+                kind: of.kind,
+                camera: self.names[measured.camera].clone(),
+                place: measured.place,
+                left_out: of.left_out,
+                before_px: before.as_ref().map(|of| of[index]),
+                after_px: after.as_ref().map(|of| of[index]),
+            };
+            let images = of.measured.iter().enumerate().map(of_image);
+            images.collect::<Vec<_>>()
+        };
+        self.points.iter().flat_map(of_point).collect()
+    }
+
+    /// Residuals of a point's images: at the laser's place where there is one, else where they intersect.
+    fn residuals_px(&self, of: &OrbitPoint, state: &CalibrationState) -> Option<Vec<[f64; 2]>> {
+        let place_m = match &of.point.known {
+            Some(known) => known.place_m,
+            None => of.point.place(state).ok()?,
+        };
+        let residuals = of.point.residuals(state, &place_m).ok()?;
+        let sights = of.point.sights.iter().zip(residuals);
+        let px = sights.map(|(sight, residual)| (residual / self.pixels[sight.camera]).into());
+        Some(px.collect())
+    }
+}

@@ -1,0 +1,207 @@
+//! Images and points of an orbit; those that the uncalibrated cameras cannot have seen are left out.
+
+use std::path::PathBuf;
+
+use super::{
+    error::CalibrateError,
+    geometry::{CameraImage, Laboratory, Orbit},
+    result::PointKind,
+    tables::{Cameras, Complaints, ControlSigma, Measured, MeasuredPoint, control, ties},
+};
+use crate::{
+    config::CalibrationConfig,
+    error::Result,
+    geom::calibration::{CalibrationState, GroundPoint},
+};
+
+/// Share of points that may not fit before the whole is refused.
+const MISFITS_MAX: f64 = 0.5;
+/// Heights of the ground about the equatorial radius, metres: the poles lie 20 km lower, mountains 22 km higher.
+const HEIGHT_MAX_M: f64 = 50_000.0;
+
+/// A point of an orbit.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct OrbitPoint {
+    pub(super) name: String,
+    pub(super) kind: PointKind,
+    pub(super) measured: Vec<Measured>,
+    pub(super) point: GroundPoint,
+    pub(super) left_out: bool,
+}
+
+impl OrbitPoint {
+    /// Whether it takes part.
+    pub(super) fn is(&self, kind: PointKind) -> bool {
+        self.kind == kind && !self.left_out
+    }
+
+    /// The point by its images alone.
+    pub(super) fn unaided(&self) -> GroundPoint {
+        GroundPoint {
+            sights: self.point.sights.clone(),
+            known: None,
+        }
+    }
+}
+
+/// Where the tables of an orbit are.
+pub(super) struct OrbitTables<'a> {
+    pub(super) ties: &'a [PathBuf],
+    pub(super) control: &'a [PathBuf],
+    /// Every so manieth control point is held back; none in other orbits.
+    pub(super) held_back_every: Option<u32>,
+}
+
+/// The points of an orbit.
+pub(super) fn points_of(
+    config: &CalibrationConfig,
+    names: &[String],
+    orbit: &Orbit,
+    laboratory: &Laboratory,
+    tables: &OrbitTables<'_>,
+    complaints: &mut Complaints,
+) -> Result<Vec<OrbitPoint>> {
+    let sizes: Vec<[f64; 2]> = orbit.images.iter().map(CameraImage::size).collect();
+    let cameras = Cameras {
+        names,
+        sizes: &sizes,
+    };
+    let tied = ties(tables.ties, config.ties.sigma_px, &cameras, complaints)?;
+    let sigma = ControlSigma {
+        image_px: config.control.sigma_px,
+        horizontal_m: config.control.sigma_horizontal_m,
+        vertical_m: config.control.sigma_vertical_m,
+    };
+    let controlled = control(tables.control, sigma, &cameras, complaints)?;
+    let state = &laboratory.state;
+    let make = |kind: PointKind, of: MeasuredPoint| {
+        let sights = of
+            .measured
+            .iter()
+            .map(|measured| orbit.sight(state, measured.camera, measured.place, measured.sigma_px));
+        OrbitPoint {
+            point: GroundPoint {
+                sights: sights.collect(),
+                known: of.known,
+            },
+            name: of.name,
+            kind,
+            measured: of.measured,
+            left_out: false,
+        }
+    };
+    let mut tied: Vec<OrbitPoint> = tied
+        .into_iter()
+        .map(|of| make(PointKind::Tie, of))
+        .collect();
+    let mut controlled: Vec<OrbitPoint> = controlled
+        .into_iter()
+        .map(|of| make(PointKind::Control, of))
+        .collect();
+    let pixels: Vec<f64> = orbit.images.iter().map(CameraImage::pixel).collect();
+    let limits = [
+        (&mut tied, "tie points", config.ties.limit_px),
+        (&mut controlled, "control points", config.control.limit_px),
+    ];
+    for (points, what, limit_px) in limits {
+        let expected = Expected {
+            state,
+            pixels: &pixels,
+            radius_m: orbit.radius_m,
+            limit_px,
+        };
+        leave_out(points, what, &expected, complaints)?;
+    }
+    if let Some(every) = tables.held_back_every {
+        hold_back(&mut controlled, every as usize);
+    }
+    tied.append(&mut controlled);
+    Ok(tied)
+}
+
+/// Holds back every so manieth point along the flight.
+fn hold_back(points: &mut [OrbitPoint], every: usize) {
+    let mut order: Vec<usize> = (0..points.len())
+        .filter(|index| !points[*index].left_out)
+        .collect();
+    let line = |index: &usize| points[*index].measured[0].place[0];
+    order.sort_by(|a, b| line(a).total_cmp(&line(b)));
+    for index in order.into_iter().skip(every / 2).step_by(every) {
+        points[index].kind = PointKind::HeldBack;
+    }
+}
+
+/// What points are held against before there is a calibration.
+struct Expected<'a> {
+    state: &'a CalibrationState,
+    /// Tangent of a pixel of every camera.
+    pixels: &'a [f64],
+    /// Radius of the ground, metres.
+    radius_m: f64,
+    limit_px: f64,
+}
+
+/// Marks points that do not fit; when most of them do not, it is not the points.
+fn leave_out(
+    points: &mut [OrbitPoint],
+    what: &'static str,
+    expected: &Expected<'_>,
+    complaints: &mut Complaints,
+) -> std::result::Result<(), CalibrateError> {
+    let (mut misfits, mut example) = (0, None);
+    for of in points.iter_mut() {
+        let Err(why) = fits(&of.point, expected) else {
+            continue;
+        };
+        of.left_out = true;
+        misfits += 1;
+        complaints.tell(format!("{}: {why}; left out", of.name));
+        example.get_or_insert((of.name.clone(), why));
+    }
+    let all = points.len();
+    match example {
+        Some((point, why)) if misfits as f64 > MISFITS_MAX * all as f64 => {
+            Err(CalibrateError::Misfit {
+                what,
+                misfits,
+                all,
+                point,
+                why,
+            })
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Whether the uncalibrated cameras can have seen a point, or why they cannot.
+fn fits(point: &GroundPoint, expected: &Expected<'_>) -> std::result::Result<(), String> {
+    let Expected {
+        state,
+        pixels,
+        radius_m,
+        limit_px,
+    } = *expected;
+    let place_m = match &point.known {
+        Some(known) => known.place_m,
+        None => point.place(state).map_err(|why| why.to_string())?,
+    };
+    let height_m = place_m.norm() - radius_m;
+    if !(height_m.abs() <= HEIGHT_MAX_M) {
+        return Err(format!(
+            "it lies {:.1} km above the equatorial radius",
+            height_m / 1e3
+        ));
+    }
+    let residuals = point
+        .residuals(state, &place_m)
+        .map_err(|why| why.to_string())?;
+    for (sight, residual) in point.sights.iter().zip(residuals) {
+        let off_px = residual.norm() / pixels[sight.camera];
+        if !(off_px <= limit_px) {
+            return Err(format!(
+                "it is {off_px:.0} px from where the support data see it, beyond {limit_px} px"
+            ));
+        }
+    }
+    Ok(())
+}

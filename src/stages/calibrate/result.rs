@@ -1,0 +1,227 @@
+//! What a calibration gives, with names, in metres, radians and pixels.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::{geom::calibration::TieSight, stages::judge::Verdict};
+
+/// A calibration.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Calibration {
+    /// The lines of the camera.
+    pub cameras: Vec<CameraResult>,
+    /// Drift of the orbit from line to line, body-fixed, metres: the calibrated support data hold it.
+    pub drift_m_per_line: [Value; 3],
+    /// What ties alone see of the offset angles.
+    pub tie_sight: TieSight,
+    /// The figures after every step, the first before any.
+    pub steps: Vec<CalibrationStep>,
+    /// What the control that was held back says; none without control.
+    pub held_back: Option<HeldBack>,
+    /// Other orbits.
+    pub validation: Vec<ValidationResult>,
+    /// Every point.
+    pub points: Vec<PointResult>,
+    /// Every image of a point.
+    pub images: Vec<ImageResult>,
+    /// Whether the result is to be used.
+    pub verdict: Verdict,
+    /// Rows and points that were left out, one sentence each.
+    pub complaints: Vec<String>,
+    /// All of them.
+    pub complaint_count: u64,
+}
+
+/// A number and its standard deviation.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Value {
+    /// The number.
+    pub value: f64,
+    /// Its standard deviation; 0 for one that was not free.
+    #[schemars(range(min = 0.0))]
+    pub sigma: f64,
+}
+
+/// A line of the camera.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct CameraResult {
+    /// Its name.
+    pub camera: String,
+    /// φ, ω and κ, radians.
+    pub angles_rad: [Value; 3],
+    /// Coefficients of the tangent across the flight, powers of s′.
+    pub m: Vec<Value>,
+    /// Coefficients of the tangent along the flight.
+    pub n: Vec<Value>,
+    /// The same of the laboratory.
+    pub laboratory: [Vec<f64>; 2],
+    /// What those leave of the laboratory's look directions at most, pixels.
+    pub laboratory_left_px: f64,
+    /// Tangent of a pixel.
+    pub pixel: f64,
+    /// Samples.
+    pub samples: u32,
+    /// Largest change of a look direction by the calibration, pixels.
+    pub moved_px: f64,
+    /// The calibrated support data.
+    pub isd: String,
+    /// What they leave of the calibrated look directions at most, pixels: support data hold a straight line of equal samples.
+    pub isd_left_px: f64,
+}
+
+/// Figures of points after a step.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct CalibrationStep {
+    /// `before`, `ties`, `external`, `internal` or `joint`.
+    pub step: String,
+    /// What was free, in words.
+    pub free: String,
+    /// Steps of the adjustment; 0 before any.
+    pub steps: u32,
+    /// The figures.
+    pub figures: Figures,
+}
+
+/// Root mean squares, as tables 5 to 7 of Li et al. 2023 have them.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Figures {
+    /// Tie points after intersection.
+    pub ties: TieFigures,
+    /// Control points that the calibration uses, and those that were held back; none without control, and in other orbits
+    /// none that were held back.
+    pub control: Vec<ControlFigures>,
+}
+
+impl Figures {
+    /// Those of control points of a kind.
+    #[must_use]
+    pub fn of(&self, kind: PointKind) -> Option<&ControlFigures> {
+        self.control.iter().find(|of| of.kind == kind)
+    }
+}
+
+/// Tie points.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct TieFigures {
+    /// Points.
+    pub points: u64,
+    /// Of every camera: root mean square across and along the flight, pixels.
+    pub cameras_px: Vec<[f64; 2]>,
+}
+
+/// Control points.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct ControlFigures {
+    /// What they are for.
+    pub kind: PointKind,
+    /// Points.
+    pub points: u64,
+    /// Of every camera: where it sees the laser's place against where the place is measured.
+    pub cameras: Vec<PixelsAndMetres>,
+    /// Points in two cameras or more.
+    pub heights: u64,
+    /// Root mean square of their intersected height minus the laser's, metres; 0 of none.
+    pub height_m: f64,
+}
+
+/// In the focal plane, and on the ground.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct PixelsAndMetres {
+    /// Root mean square distance, pixels.
+    pub plane_px: f64,
+    /// Root mean square distance of the ray at the laser's radius from the laser's place, metres.
+    pub plane_m: f64,
+}
+
+/// What the control that was held back says of the result.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct HeldBack {
+    /// Points.
+    pub points: u64,
+    /// Root mean square residual over its standard deviation, which has measurement, laser and calibration in it.
+    pub normalised: f64,
+    /// Root mean square of intersected minus laser's place, horizontally, and of the height, metres: errors of the laser and
+    /// of the measurement are in them.
+    pub plane_m: f64,
+    /// Likewise of the height, metres.
+    pub height_m: f64,
+    /// Mean of the same east, north and up, metres.
+    pub mean_m: [f64; 3],
+    /// Stated accuracy of a tie point in the plane, metres: root mean square of the standard deviations, larger by
+    /// `normalised` where that is above 1.
+    pub accuracy_plane_m: f64,
+    /// Likewise of its height, metres.
+    pub accuracy_height_m: f64,
+}
+
+/// Another orbit.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct ValidationResult {
+    /// Its name.
+    pub orbit: String,
+    /// With the laboratory's geometry.
+    pub before: Figures,
+    /// With the calibration, unchanged.
+    pub after: Figures,
+}
+
+/// What a point is for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum PointKind {
+    /// Its place is unknown.
+    Tie,
+    /// The laser knows it.
+    Control,
+    /// Likewise, and it was not used.
+    HeldBack,
+}
+
+impl PointKind {
+    /// The word of tables.
+    #[must_use]
+    pub const fn word(self) -> &'static str {
+        match self {
+            Self::Tie => "tie",
+            Self::Control => "control",
+            Self::HeldBack => "held_back",
+        }
+    }
+}
+
+/// A point on the ground, by the calibrated cameras.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct PointResult {
+    /// Its name.
+    pub point: String,
+    /// What it is for.
+    pub kind: PointKind,
+    /// Whether it was left out.
+    pub left_out: bool,
+    /// East longitude, latitude, radians, and radius, metres, intersected from its images; none where they are too few.
+    pub place: Option<[f64; 3]>,
+    /// Standard deviations east, north and up, metres.
+    pub sigma_m: Option<[f64; 3]>,
+    /// Of a laser point: intersected minus the laser's, east, north and up, metres.
+    pub off_m: Option<[f64; 3]>,
+}
+
+/// An image of a point.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ImageResult {
+    /// The point.
+    pub point: String,
+    /// What it is for.
+    pub kind: PointKind,
+    /// The camera.
+    pub camera: String,
+    /// Line and sample.
+    pub place: [f64; 2],
+    /// Whether it was left out.
+    pub left_out: bool,
+    /// Residual across and along the flight with the laboratory's geometry, pixels: at the intersected place, of a laser point
+    /// at the laser's.
+    pub before_px: Option<[f64; 2]>,
+    /// The same with the calibration.
+    pub after_px: Option<[f64; 2]>,
+}

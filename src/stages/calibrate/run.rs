@@ -1,0 +1,378 @@
+//! The steps of a calibration: ties alone; with control the angles, then the look angles, then all of it with the orbit.
+
+use nalgebra::DMatrix;
+
+use super::{
+    error::CalibrateError,
+    geometry::{CameraImage, Laboratory, Orbit},
+    judge::{Evidence, Known, judge},
+    measure::figures,
+    outcome::{self, Outcome},
+    read::{OrbitPoint, OrbitTables, points_of},
+    result::{Calibration, CalibrationStep, PointKind},
+    tables::Complaints,
+    validate::{Calibrated, validate},
+};
+use crate::{
+    config::{CalibrationConfig, CalibrationMode},
+    error::{Locate as _, Result},
+    geom::{
+        calibration::{
+            CalibrationState, Freedom, GroundPoint, Layout, Parameter, Start, solve, tie_sight,
+        },
+        statistics::outliers,
+    },
+};
+
+/// Fewest ties, and fewest control points of each kind, that a calibration makes sense with.
+const TIES_MIN: usize = 10;
+const CONTROLS_MIN: usize = 5;
+/// A point is left out when it misses by so many robust standard deviations more than the middle one of its kind: of a million
+/// good ones not one does.
+const LEFT_OUT: f64 = 8.0;
+/// Rounds of leaving out.
+const ROUNDS: usize = 3;
+
+/// A calibration under way.
+struct Work<'a> {
+    config: &'a CalibrationConfig,
+    laboratory: &'a Laboratory,
+    pixels: Vec<f64>,
+    points: Vec<OrbitPoint>,
+    steps: Vec<CalibrationStep>,
+    state: CalibrationState,
+    covariance: DMatrix<f64>,
+}
+
+/// Calibrates the lines of a camera.
+pub(super) fn calibrate(config: &CalibrationConfig) -> Result<Calibration> {
+    let names: Vec<String> = config.cameras.iter().map(|of| of.id.clone()).collect();
+    let images = config
+        .cameras
+        .iter()
+        .map(|of| CameraImage::read(&of.isd, &of.id, config.body));
+    let images = images.collect::<Result<Vec<_>>>()?;
+    belong_together(&images, &names)?;
+    let orbit = Orbit::of(images, config.body, None)?;
+    let laboratory = orbit.laboratory(&names, config.solution.order as usize)?;
+    let mut complaints = Complaints::default();
+    let tables = OrbitTables {
+        ties: &config.ties.files,
+        control: &config.control.files,
+        held_back_every: Some(config.control.held_back_every),
+    };
+    let points = points_of(
+        config,
+        &names,
+        &orbit,
+        &laboratory,
+        &tables,
+        &mut complaints,
+    )?;
+    enough(&points)?;
+    let state = laboratory.state.clone();
+    let parameters = state.layout().len();
+    let mut work = Work {
+        config,
+        laboratory: &laboratory,
+        pixels: orbit.images.iter().map(CameraImage::pixel).collect(),
+        points,
+        steps: Vec::new(),
+        state,
+        covariance: DMatrix::zeros(parameters, parameters),
+    };
+    work.tell("before", "nothing", 0);
+    let sight = tie_sight(&work.of(&[PointKind::Tie]), &work.state)
+        .map_err(|why| failed("ties", why.to_string()))?;
+    work.ties()?;
+    if work.points.iter().any(|of| of.is(PointKind::Control)) {
+        work.with_control(&mut complaints)?;
+    }
+    let calibrated = Calibrated {
+        names: &names,
+        orbit: &orbit,
+        laboratory: &laboratory,
+        state: &work.state,
+    };
+    let mut validation = Vec::new();
+    for of in &config.validation {
+        validation.push(
+            validate(config, of, &calibrated, &mut complaints)
+                .in_stage(&format!("calibrate/{}", of.id))?,
+        );
+    }
+    let outcome = Outcome {
+        config,
+        names: &names,
+        orbit: &orbit,
+        laboratory: &laboratory,
+        points: &work.points,
+        pixels: &work.pixels,
+        state: &work.state,
+        covariance: &work.covariance,
+    };
+    let cameras = outcome.cameras()?;
+    let held_back = outcome.held_back();
+    let verdict = judge(&Evidence {
+        mode: config.solution.mode,
+        steps: &work.steps,
+        held_back: held_back.as_ref(),
+        cameras: &cameras,
+        sight: &sight,
+        validation: &validation,
+        left_out: left_out(&work.points),
+        known: known(config, &orbit),
+        of_frames: (orbit.images.iter().zip(&names))
+            .filter_map(|(image, name)| image.frame_remark(config.body, name))
+            .collect(),
+        complaints: complaints.count,
+    });
+    Ok(Calibration {
+        drift_m_per_line: outcome::drift(&work.state, &work.covariance),
+        tie_sight: sight,
+        points: outcome.points(),
+        images: outcome.images(),
+        cameras,
+        held_back,
+        validation,
+        verdict,
+        steps: work.steps,
+        complaints: complaints.texts,
+        complaint_count: complaints.count,
+    })
+}
+
+/// Whether the images are of different lines on one spacecraft.
+fn belong_together(
+    images: &[CameraImage],
+    names: &[String],
+) -> std::result::Result<(), CalibrateError> {
+    for (index, image) in images.iter().enumerate() {
+        let [first, this] = [&images[0], image].map(|of| &of.support.instrument);
+        if this.naif.bus != first.naif.bus {
+            return Err(CalibrateError::OtherFrame {
+                camera: names[index].clone(),
+                found: this.naif.bus,
+                first: names[0].clone(),
+                expected: first.naif.bus,
+            });
+        }
+        let same = |other: &CameraImage| other.support.instrument.name == this.name;
+        if let Some(other) = images[..index].iter().position(same) {
+            return Err(CalibrateError::SameSensor {
+                first: names[other].clone(),
+                second: names[index].clone(),
+                sensor: this.name.clone(),
+            });
+        }
+    }
+    Ok(())
+}
+
+fn enough(points: &[OrbitPoint]) -> std::result::Result<(), CalibrateError> {
+    let count = |kind| points.iter().filter(|of| of.is(kind)).count();
+    let [ties, controls, held_back] =
+        [PointKind::Tie, PointKind::Control, PointKind::HeldBack].map(count);
+    if ties < TIES_MIN {
+        return Err(CalibrateError::TooFewTies {
+            found: ties,
+            expected: TIES_MIN,
+        });
+    }
+    let controlled = points.iter().any(|of| of.kind != PointKind::Tie);
+    if controlled && controls.min(held_back) < CONTROLS_MIN {
+        return Err(CalibrateError::TooFewControls {
+            found: controls,
+            held_back,
+            expected: CONTROLS_MIN,
+        });
+    }
+    Ok(())
+}
+
+fn failed(step: &'static str, problem: String) -> CalibrateError {
+    CalibrateError::Adjustment { step, problem }
+}
+
+/// Points in all and those that were left out, ties before control.
+fn left_out(points: &[OrbitPoint]) -> [[usize; 2]; 2] {
+    [true, false].map(|tie| {
+        let of = points
+            .iter()
+            .filter(|of| (of.kind == PointKind::Tie) == tie);
+        [of.clone().count(), of.filter(|of| of.left_out).count()]
+    })
+}
+
+fn known(config: &CalibrationConfig, orbit: &Orbit) -> Known {
+    let [lines, _] = orbit.images[0].size();
+    let position_m = orbit.pose(0, 0.5 * lines).position_m;
+    let height_m = (position_m.norm() - orbit.radius_m).max(1.0);
+    let beforehand = &config.a_priori;
+    let ground_m = (beforehand.angle_rad * height_m).hypot(beforehand.orbit_bias_m);
+    Known {
+        // Across and along.
+        image_px: std::f64::consts::SQRT_2 * ground_m / height_m / orbit.images[0].pixel(),
+        ground_m,
+    }
+}
+
+impl Work<'_> {
+    fn of(&self, kinds: &[PointKind]) -> Vec<GroundPoint> {
+        let of = self
+            .points
+            .iter()
+            .filter(|of| kinds.iter().any(|kind| of.is(*kind)));
+        of.map(|of| of.point.clone()).collect()
+    }
+
+    /// Notes the figures after a step.
+    fn tell(&mut self, step: &str, free: &str, steps: u32) {
+        self.steps.push(CalibrationStep {
+            step: step.to_owned(),
+            free: free.to_owned(),
+            steps,
+            figures: figures(&self.points, &self.state, &self.pixels),
+        });
+    }
+
+    /// Standard deviations beforehand, with that of an angle.
+    fn sigma(&self, angle_rad: f64) -> impl Fn(Parameter) -> f64 {
+        let known = &self.config.a_priori;
+        move |parameter| match parameter {
+            Parameter::Angle { .. } => angle_rad,
+            Parameter::Across { camera, power } | Parameter::Along { camera, power } => {
+                let at_edge_px = if power < 2 {
+                    known.look_px
+                } else {
+                    known.bend_px
+                };
+                at_edge_px * self.pixels[camera]
+            }
+            Parameter::Drift { .. } => known.orbit_drift_m_per_line,
+        }
+    }
+
+    /// An adjustment of some of the parameters.
+    fn adjust(
+        &mut self,
+        step: &'static str,
+        points: &[GroundPoint],
+        freedom: &Freedom,
+    ) -> std::result::Result<u32, CalibrateError> {
+        let start = Start {
+            known: &self.laboratory.state,
+            from: &self.state,
+        };
+        let solved =
+            solve(points, start, freedom).map_err(|error| failed(step, error.to_string()))?;
+        self.state = solved.state;
+        self.covariance = solved.covariance;
+        Ok(solved.steps)
+    }
+
+    /// Ties alone.
+    fn ties(&mut self) -> std::result::Result<(), CalibrateError> {
+        let layout = self.state.layout();
+        let known = &self.config.a_priori;
+        let (freedom, free) = match self.config.solution.mode {
+            CalibrationMode::Differential => (
+                Freedom::differential(layout, self.sigma(known.control_angle_rad)),
+                "what roll and scale of the cameras differ by",
+            ),
+            CalibrationMode::AsPublished => (
+                Freedom::each(layout, self.sigma(known.angle_rad), is_angle),
+                "all offset angles, with their standard deviations beforehand",
+            ),
+        };
+        let ties = self.of(&[PointKind::Tie]);
+        let steps = self.adjust("ties", &ties, &freedom)?;
+        self.tell("ties", free, steps);
+        Ok(())
+    }
+
+    /// Ties and control: the angles, the look angles, then all of it; points that do not fit are left out.
+    fn with_control(
+        &mut self,
+        complaints: &mut Complaints,
+    ) -> std::result::Result<(), CalibrateError> {
+        let layout = self.state.layout();
+        let angle_rad = self.config.a_priori.control_angle_rad;
+        let each = |work: &Self, layout: Layout, frees: fn(Parameter) -> bool| {
+            Freedom::each(layout, work.sigma(angle_rad), frees)
+        };
+        let points = self.of(&[PointKind::Tie, PointKind::Control]);
+        let freedom = each(self, layout, is_angle);
+        let steps = self.adjust("external", &points, &freedom)?;
+        self.tell("external", "all offset angles", steps);
+        let freedom = each(self, layout, is_look);
+        let steps = self.adjust("internal", &points, &freedom)?;
+        self.tell("internal", "the look angles", steps);
+        let freedom = each(self, layout, |_| true);
+        let mut steps = self.adjust("joint", &points, &freedom)?;
+        for _ in 0..ROUNDS {
+            if !self.leave_out(complaints) {
+                break;
+            }
+            enough(&self.points)?;
+            let points = self.of(&[PointKind::Tie, PointKind::Control]);
+            steps = self.adjust("joint", &points, &freedom)?;
+        }
+        self.tell(
+            "joint",
+            "offset angles, look angles and drift of the orbit together, with their standard deviations beforehand",
+            steps,
+        );
+        Ok(())
+    }
+
+    /// Leaves out points that miss by far more than others of their kind; whether there were any.
+    fn leave_out(&mut self, complaints: &mut Complaints) -> bool {
+        let mut any = false;
+        for kind in [PointKind::Tie, PointKind::Control] {
+            let missed: Vec<(usize, f64)> = (self.points.iter().enumerate())
+                .filter(|(_, of)| of.is(kind))
+                .map(|(index, of)| (index, missed(&of.point, &self.state)))
+                .collect();
+            let all: Vec<f64> = missed.iter().map(|of| of.1).collect();
+            for ((index, missed), far) in missed.into_iter().zip(outliers(&all, LEFT_OUT)) {
+                if far {
+                    let of = &mut self.points[index];
+                    of.left_out = true;
+                    any = true;
+                    complaints.tell(format!(
+                        "{} misses by {missed:.1} standard deviations, far more than others; left out",
+                        of.name
+                    ));
+                }
+            }
+        }
+        any
+    }
+}
+
+fn is_angle(of: Parameter) -> bool {
+    matches!(of, Parameter::Angle { .. })
+}
+
+fn is_look(of: Parameter) -> bool {
+    matches!(of, Parameter::Across { .. } | Parameter::Along { .. })
+}
+
+/// The largest residual of a point over its standard deviation; infinite for one without a place.
+fn missed(point: &GroundPoint, state: &CalibrationState) -> f64 {
+    let Ok(place_m) = point.place(state) else {
+        return f64::INFINITY;
+    };
+    let Ok(residuals) = point.residuals(state, &place_m) else {
+        return f64::INFINITY;
+    };
+    let seen = point.sights.iter().zip(residuals).map(|(sight, residual)| {
+        let [across, along] = sight.sigma;
+        (residual.x / across).abs().max((residual.y / along).abs())
+    });
+    let known = point
+        .known
+        .map_or(0.0, |of| (of.whitening * (of.place_m - place_m)).amax());
+    seen.fold(known, f64::max)
+}

@@ -1,0 +1,230 @@
+//! Tables of points, put together by point and named cameras.
+
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    path::{Path, PathBuf},
+};
+
+use nalgebra::{Matrix3, Vector3};
+
+use super::error::CalibrateError;
+use crate::{
+    error::{Locate as _, Result},
+    files::file_name,
+    geom::{
+        calibration::KnownPlace,
+        ellipsoid::{local_axes, spherical_to_xyz_m},
+    },
+    pds::{
+        calibration_tables::{ControlRow, ImageRow, read_control, read_ties},
+        table_rows::Rows,
+    },
+    units::RADIANS_PER_DEGREE,
+};
+
+/// Complaints kept with their text; all are counted.
+const COMPLAINTS_MAX: usize = 1_000;
+
+/// What was left out, in words.
+#[derive(Default)]
+pub(super) struct Complaints {
+    pub(super) texts: Vec<String>,
+    pub(super) count: u64,
+}
+
+impl Complaints {
+    pub(super) fn tell(&mut self, text: String) {
+        self.count += 1;
+        if self.texts.len() < COMPLAINTS_MAX {
+            self.texts.push(text);
+        }
+    }
+
+    fn take<T>(&mut self, path: &Path, table: Rows<T>) -> Vec<T> {
+        for (line, text) in table.complaints {
+            self.tell(format!("{} line {line}: {text}", file_name(path)));
+        }
+        table.rows
+    }
+}
+
+/// A place in an image.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Measured {
+    pub(super) camera: usize,
+    /// Line and sample.
+    pub(super) place: [f64; 2],
+    /// Their standard deviations, pixels.
+    pub(super) sigma_px: [f64; 2],
+}
+
+/// A point with its places in images, in the order of the cameras.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct MeasuredPoint {
+    pub(super) name: String,
+    pub(super) measured: Vec<Measured>,
+    pub(super) known: Option<KnownPlace>,
+}
+
+/// The cameras of an orbit for its tables.
+pub(super) struct Cameras<'a> {
+    pub(super) names: &'a [String],
+    /// Lines and samples of their images.
+    pub(super) sizes: &'a [[f64; 2]],
+}
+
+impl Cameras<'_> {
+    /// A row of a table; nothing for a place outside of the image.
+    fn measured(
+        &self,
+        row: &ImageRow,
+        sigma_px: f64,
+    ) -> std::result::Result<std::result::Result<Measured, String>, CalibrateError> {
+        let camera = self.names.iter().position(|name| *name == row.camera);
+        let camera = camera.ok_or_else(|| CalibrateError::UnknownCamera {
+            point: row.point.clone(),
+            camera: row.camera.clone(),
+            expected: self.names.join(", "),
+        })?;
+        let place = [row.line, row.sample];
+        let inside = place
+            .iter()
+            .zip(self.sizes[camera])
+            .all(|(at, size)| (0.0..=size).contains(at));
+        Ok(if inside {
+            Ok(Measured {
+                camera,
+                place,
+                sigma_px: row.sigma_px.map(|sigma| sigma.unwrap_or(sigma_px)),
+            })
+        } else {
+            let [lines, samples] = self.sizes[camera];
+            Err(format!(
+                "point {} is at line {}, sample {} of camera {}; expected a place within its {lines} lines and {samples} samples",
+                row.point, row.line, row.sample, row.camera
+            ))
+        })
+    }
+}
+
+/// Points in the order of their first row.
+#[derive(Default)]
+struct Points {
+    points: Vec<MeasuredPoint>,
+    index: BTreeMap<String, usize>,
+    seen: BTreeSet<(usize, usize)>,
+}
+
+impl Points {
+    fn add(&mut self, name: &str, measured: Measured) -> (usize, bool) {
+        let next = self.points.len();
+        let at = *self.index.entry(name.to_owned()).or_insert(next);
+        if at == next {
+            self.points.push(MeasuredPoint {
+                name: name.to_owned(),
+                measured: Vec::new(),
+                known: None,
+            });
+        }
+        let new = self.seen.insert((at, measured.camera));
+        if new {
+            self.points[at].measured.push(measured);
+            self.points[at].measured.sort_by_key(|of| of.camera);
+        }
+        (at, new)
+    }
+}
+
+fn twice(row: &ImageRow) -> String {
+    format!(
+        "point {} is twice in camera {}; the first is used",
+        row.point, row.camera
+    )
+}
+
+/// The tie points of tables that are in two cameras or more.
+pub(super) fn ties(
+    files: &[PathBuf],
+    sigma_px: f64,
+    cameras: &Cameras<'_>,
+    complaints: &mut Complaints,
+) -> Result<Vec<MeasuredPoint>> {
+    let mut points = Points::default();
+    for path in files {
+        for row in complaints.take(path, read_ties(path)?) {
+            match cameras.measured(&row, sigma_px).in_file(path)? {
+                Err(outside) => complaints.tell(format!("{}: {outside}", file_name(path))),
+                Ok(measured) => {
+                    if !points.add(&row.point, measured).1 {
+                        complaints.tell(format!("{}: {}", file_name(path), twice(&row)));
+                    }
+                }
+            }
+        }
+    }
+    let alone = |point: &MeasuredPoint| point.measured.len() < 2;
+    for point in points.points.iter().filter(|point| alone(point)) {
+        complaints.tell(format!("tie point {} is in one camera only", point.name));
+    }
+    points.points.retain(|point| !alone(point));
+    Ok(points.points)
+}
+
+/// Standard deviations that a table leaves out.
+#[derive(Clone, Copy)]
+pub(super) struct ControlSigma {
+    pub(super) image_px: f64,
+    pub(super) horizontal_m: f64,
+    pub(super) vertical_m: f64,
+}
+
+/// The control points of tables.
+pub(super) fn control(
+    files: &[PathBuf],
+    sigma: ControlSigma,
+    cameras: &Cameras<'_>,
+    complaints: &mut Complaints,
+) -> Result<Vec<MeasuredPoint>> {
+    let mut points = Points::default();
+    for path in files {
+        for row in complaints.take(path, read_control(path)?) {
+            let measured = cameras.measured(&row.image, sigma.image_px).in_file(path)?;
+            let measured = match measured {
+                Ok(measured) => measured,
+                Err(outside) => {
+                    complaints.tell(format!("{}: {outside}", file_name(path)));
+                    continue;
+                }
+            };
+            let (at, new) = points.add(&row.image.point, measured);
+            if !new {
+                complaints.tell(format!("{}: {}", file_name(path), twice(&row.image)));
+            }
+            let known = known(&row, sigma);
+            let point = &mut points.points[at];
+            if point.known.is_some_and(|of| of.place_m != known.place_m) {
+                return Err(CalibrateError::TwoPlaces {
+                    point: row.image.point,
+                })
+                .in_file(path);
+            }
+            point.known = Some(known);
+        }
+    }
+    Ok(points.points)
+}
+
+fn known(row: &ControlRow, sigma: ControlSigma) -> KnownPlace {
+    let place_m = spherical_to_xyz_m(
+        row.longitude_deg * RADIANS_PER_DEGREE,
+        row.latitude_deg * RADIANS_PER_DEGREE,
+        row.radius_m,
+    );
+    let horizontal_m = row.sigma_m[0].unwrap_or(sigma.horizontal_m);
+    let vertical_m = row.sigma_m[1].unwrap_or(sigma.vertical_m);
+    let over = Vector3::new(horizontal_m, horizontal_m, vertical_m).map(f64::recip);
+    KnownPlace {
+        place_m,
+        whitening: Matrix3::from_diagonal(&over) * local_axes(&place_m),
+    }
+}
