@@ -2,6 +2,7 @@
 
 use super::{
     html::{Cell, Column, Section, Table, Tone, counted, list, page, paragraph, verdict},
+    numbers::signed,
     plots::{Panel, Plot, Series, figure, label, thinned},
 };
 use crate::{
@@ -197,7 +198,7 @@ fn sight(of: &Calibration) -> String {
     for direction in &of.tie_sight.directions {
         let shares = direction.shares.iter();
         let shares: Vec<String> = shares
-            .map(|(name, share)| format!("{share:+.2} {}", name.words()))
+            .map(|(name, share)| format!("{} {}", signed(*share, 2), name.words()))
             .collect();
         let sigma = match direction.sigma_rad {
             Some(sigma_rad) => significant(sigma_rad.to_degrees()),
@@ -228,10 +229,11 @@ fn cameras(of: &Calibration) -> String {
     );
     for camera in &of.cameras {
         let angle = |of: Value| -> Cell {
+            let Value { value, sigma } = of;
             format!(
-                "{:+.4} ± {:.4}",
-                of.value.to_degrees(),
-                of.sigma.to_degrees()
+                "{} ± {:.4}",
+                signed(value.to_degrees(), 4),
+                sigma.to_degrees()
             )
             .into()
         };
@@ -242,7 +244,7 @@ fn cameras(of: &Calibration) -> String {
     }
     let drift = of.drift_m_per_line.map(|of| {
         let Value { value, sigma } = of;
-        format!("{value:+.4} ± {sigma:.4}")
+        format!("{} ± {sigma:.4}", signed(value, 4))
     });
     let words = format!(
         "Angles and the constant of the look angles say the same of an image, and so does what stays the same of an orbit's error: \
