@@ -568,3 +568,53 @@ fn rows_that_cannot_be_read_are_told_and_the_others_are_used() {
         .collect();
     assert_eq!(pictures.len(), 25);
 }
+
+#[test]
+fn a_file_under_another_key_is_another_net() {
+    let folder = scene(&[]);
+    let outcome = run(folder.path(), false).unwrap();
+    assert!(outcome.manifest.counts["controls"] > 0);
+    let toml = folder.path().join("net/net.toml");
+    let text = fs::read_to_string(&toml).unwrap();
+    let net = load_net(&toml).unwrap().net;
+    let moved = net.controls.files[0]
+        .file_name()
+        .unwrap()
+        .to_str()
+        .unwrap()
+        .to_owned();
+    // The same files in the same order, the last table of measurements now one of controls.
+    let tables = |text: &str, section: &str| {
+        let at = text.find(section).unwrap();
+        let start = at + text[at..].find("files = [").unwrap() + "files = [".len();
+        (start, start + text[start..].find(']').unwrap())
+    };
+    let (from, to) = tables(&text, "[controls]");
+    let mut changed = format!("{}{}", &text[..from], &text[to..]);
+    let (_, end) = tables(&changed, "[measurements]");
+    changed.insert_str(end, &format!(", \"{moved}\""));
+    fs::write(&toml, changed).unwrap();
+    if let Ok(again) = run(folder.path(), false) {
+        assert!(!again.unchanged);
+        assert_ne!(
+            again.manifest.counts["controls"],
+            outcome.manifest.counts["controls"]
+        );
+    }
+}
+
+#[test]
+fn products_of_something_else_are_left_alone() {
+    let folder = scene(&[]);
+    let outcome = run(folder.path(), false).unwrap();
+    // As if a site of the same name had been published there.
+    let path = outcome.folder.join("manifest.json");
+    let text = fs::read_to_string(&path).unwrap();
+    fs::write(&path, text.replace("\"triangulate\"", "\"convert_datum\"")).unwrap();
+    let before = fs::read_to_string(&path).unwrap();
+    let refused = run(folder.path(), true).unwrap_err().to_string();
+    assert!(refused.contains("products of something else"), "{refused}");
+    assert!(refused.contains("made by convert_datum"), "{refused}");
+    assert_eq!(fs::read_to_string(&path).unwrap(), before);
+    assert!(outcome.folder.join("report/index.html").is_file());
+}

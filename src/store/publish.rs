@@ -25,6 +25,9 @@ use crate::{
 /// Name of the manifest in a site's folder.
 pub const MANIFEST: &str = "manifest.json";
 
+/// Name of the last stage of every flow.
+const PUBLISH: &str = "publish";
+
 /// Name of the folder of stored stages.
 pub const CACHE: &str = ".cache";
 
@@ -126,11 +129,50 @@ pub fn entries(staging: &Path, files: &[(PathBuf, u64)]) -> Result<Vec<ProductEn
         .collect()
 }
 
+/// Products of another kind in the folder, which a publication would remove.
+#[derive(Debug, thiserror::Error)]
+#[error("there are products of something else: {name}, made by {stage}")]
+struct OtherKind {
+    name: String,
+    stage: String,
+}
+
+impl Cause for OtherKind {
+    fn kind(&self) -> Kind {
+        Kind::Configuration
+    }
+
+    fn advice(&self) -> String {
+        "give it another name, or its products another folder (--out)".to_owned()
+    }
+}
+
+/// Makes sure that what stands in the folder was made by the same flow, if it was made: by one of the same stages.
+fn require_same_kind(site_folder: &Path, next: &Manifest) -> Result<()> {
+    let Some(standing) = read_manifest(site_folder) else {
+        return Ok(());
+    };
+    let own = standing.stages.iter().filter(|stage| stage.name != PUBLISH);
+    let is_shared = |name: &str| next.stages.iter().any(|stage| stage.name == name);
+    if own.clone().any(|stage| is_shared(&stage.name)) {
+        return Ok(());
+    }
+    match own.into_iter().next() {
+        Some(stage) => Err(OtherKind {
+            name: standing.site.clone(),
+            stage: stage.name.clone(),
+        })
+        .in_file(site_folder),
+        None => Ok(()),
+    }
+}
+
 /// Renames staged products into place, removes earlier ones that are no longer made, writes the manifest last.
 ///
 /// # Errors
-/// A file cannot be renamed or removed; publishing again repairs the folder.
+/// Products of another kind; a file that cannot be renamed or removed: publishing again repairs the folder.
 pub fn publish(site_folder: &Path, staging: &Path, manifest: &Manifest) -> Result<()> {
+    require_same_kind(site_folder, manifest)?;
     let made: BTreeSet<&str> = manifest
         .products
         .iter()

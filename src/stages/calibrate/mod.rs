@@ -51,6 +51,9 @@ impl Input for CalibrationKeys<'_> {
         inputs.setting("a_priori", &self.0.a_priori);
         inputs.setting("solution", &self.0.solution);
         inputs.setting("validation", &self.0.validation);
+        // Which key a file belongs to: hashes alone do not tell.
+        let counts: Vec<usize> = kinds(self.0).iter().map(Vec::len).collect();
+        inputs.setting("files", &counts);
     }
 }
 
@@ -66,7 +69,7 @@ impl Input for CalibrationFiles<'_> {
 
 impl Stage for Calibrate<'_> {
     const NAME: &'static str = "calibrate";
-    const METHOD: u32 = 1;
+    const METHOD: u32 = 2;
     type Output = Calibration;
     stage_inputs!(fingerprint);
 
@@ -78,11 +81,19 @@ impl Stage for Calibrate<'_> {
 /// Every file that a calibration names, in a fixed order.
 #[must_use]
 pub fn calibration_files(of: &CalibrationConfig) -> Vec<PathBuf> {
-    let cameras = of.cameras.iter().map(|camera| &camera.isd);
-    let tables = of.ties.files.iter().chain(&of.control.files);
-    let elsewhere = of
-        .validation
-        .iter()
-        .flat_map(|orbit| orbit.isd.iter().chain(&orbit.ties).chain(&orbit.control));
-    cameras.chain(tables).chain(elsewhere).cloned().collect()
+    kinds(of).into_iter().flatten().cloned().collect()
+}
+
+/// The files of each key: of cameras, ties and control, and of each other orbit.
+fn kinds(of: &CalibrationConfig) -> Vec<Vec<&PathBuf>> {
+    let cameras = of.cameras.iter().map(|camera| &camera.isd).collect();
+    let mut kinds: Vec<Vec<&PathBuf>> = vec![
+        cameras,
+        of.ties.files.iter().collect(),
+        of.control.files.iter().collect(),
+    ];
+    for orbit in &of.validation {
+        kinds.extend([&orbit.isd, &orbit.ties, &orbit.control].map(|files| files.iter().collect()));
+    }
+    kinds
 }

@@ -47,6 +47,8 @@ impl Input for NetKeys<'_> {
         inputs.setting("controls", &self.0.controls);
         inputs.setting("map", &self.0.map);
         inputs.setting("triangulation", &self.0.triangulation);
+        // Which key a file belongs to: hashes alone do not tell.
+        inputs.setting("files", &kinds(self.0).map(Vec::len));
     }
 }
 
@@ -62,7 +64,7 @@ impl Input for NetFiles<'_> {
 
 impl Stage for Triangulate<'_> {
     const NAME: &'static str = "triangulate";
-    const METHOD: u32 = 3;
+    const METHOD: u32 = 4;
     type Output = Triangulation;
     stage_inputs!(fingerprint);
 
@@ -75,11 +77,15 @@ impl Stage for Triangulate<'_> {
 /// Every file that a net names, tables of one kind after those of another.
 #[must_use]
 pub fn net_files(net: &NetConfig) -> Vec<PathBuf> {
-    let kinds = [
+    kinds(net).into_iter().flatten().cloned().collect()
+}
+
+/// The tables of a net, those of each kind.
+const fn kinds(net: &NetConfig) -> [&Vec<PathBuf>; 4] {
+    [
         &net.measurements.files,
         &net.controls.files,
         &net.pictures.files,
         &net.film.files,
-    ];
-    kinds.into_iter().flatten().cloned().collect()
+    ]
 }
