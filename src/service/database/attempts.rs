@@ -87,7 +87,7 @@ pub struct AttemptEnd<'a> {
     pub signal: Option<i32>,
 }
 
-/// Notes how an attempt ended; the first note stays.
+/// Notes how an attempt ended; the first note stays. Says whether this is the first.
 ///
 /// # Errors
 /// SQLite's own.
@@ -96,12 +96,12 @@ pub fn end_attempt(
     now_ms: i64,
     (job, n): (i64, i64),
     end: AttemptEnd<'_>,
-) -> Stored<()> {
-    transaction.execute(
+) -> Stored<bool> {
+    let noted = transaction.execute(
         "UPDATE attempt SET ended_ms = ?3, how = ?4, exit = ?5, signal = ?6 WHERE job = ?1 AND n = ?2 AND ended_ms IS NULL",
         params![job, n, now_ms, end.how, end.exit, end.signal],
     )?;
-    Ok(())
+    Ok(noted > 0)
 }
 
 /// Attempts of a job, in their order.

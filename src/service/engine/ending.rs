@@ -55,7 +55,7 @@ enum Fruit {
     None(Ended),
 }
 
-/// Ends an attempt; gives the run that it published.
+/// Ends an attempt, once; gives the run that it published.
 ///
 /// # Errors
 /// The database cannot be written; then nothing of it is noted, and it can be done again.
@@ -68,7 +68,7 @@ pub fn finish<W: Workers>(
     let fruit = fruit(core, attempt, ended)?;
     let config = core.shared.config();
     let now_ms = core.now_ms();
-    core.shared.write(|transaction| {
+    let is_first = core.shared.write(|transaction| {
         let job = job(transaction, attempt.job)?
             .ok_or(DatabaseError::from(rusqlite::Error::QueryReturnedNoRows))?;
         let end = AttemptEnd {
@@ -82,7 +82,10 @@ pub fn finish<W: Workers>(
                 _ => None,
             },
         };
-        end_attempt(transaction, now_ms, (attempt.job, attempt.n), end)?;
+        // Whoever noted the end has moved the job too.
+        if !end_attempt(transaction, now_ms, (attempt.job, attempt.n), end)? {
+            return Ok(false);
+        }
         let (state, moved) = match &fruit {
             Fruit::Run(run) => after_run(transaction, now_ms, run)?,
             Fruit::Unchanged => (JobState::Unchanged, text("nothing had to be made")),
@@ -110,10 +113,11 @@ pub fn finish<W: Workers>(
         if let Some(standing) = standing(state) {
             tell_standing(transaction, &config, now_ms, &attempt.site, standing, &said)?;
         }
-        fresh::refresh(transaction, now_ms, Some(&attempt.site))
+        fresh::refresh(transaction, now_ms, Some(&attempt.site))?;
+        Ok(true)
     })?;
     Ok(match fruit {
-        Fruit::Run(run) => Some(*run),
+        Fruit::Run(run) if is_first => Some(*run),
         _ => None,
     })
 }
