@@ -42,13 +42,13 @@ pub struct Wording<'a> {
 }
 
 impl Wording<'_> {
-    /// `text` in these words.
+    /// `text` in these words; what is part of a longer name (a file, an identifier, a picture in a page) stays.
     #[must_use]
     pub fn of<'a>(&self, text: impl Into<Cow<'a, str>>) -> Cow<'a, str> {
         let mut text = text.into();
         let mut say = |at_mars: &str, here: &str| {
-            if text.contains(at_mars) {
-                text = Cow::Owned(text.replace(at_mars, here));
+            if let Some(said) = replaced(&text, at_mars, here) {
+                text = Cow::Owned(said);
             }
         };
         if self.has_tables {
@@ -73,6 +73,28 @@ impl Wording<'_> {
         }
         text
     }
+}
+
+/// `text` with `words` replaced wherever they stand by themselves; none where they do not.
+fn replaced(text: &str, words: &str, by: &str) -> Option<String> {
+    let of_name = |letter: char| letter.is_ascii_alphanumeric() || "_/+=".contains(letter);
+    let (mut said, mut told) = (String::new(), 0);
+    for (start, _) in text.match_indices(words) {
+        let end = start + words.len();
+        let before = text[..start].chars().next_back();
+        let mut after = text[end..].chars();
+        let joined_before = before.is_some_and(|letter| of_name(letter) || "-.".contains(letter));
+        let joined_after = after.next().is_some_and(|letter| {
+            let joins = "-.".contains(letter) && after.next().is_some_and(of_name);
+            of_name(letter) || joins
+        });
+        if !joined_before && !joined_after {
+            said.push_str(&text[told..start]);
+            said.push_str(by);
+            told = end;
+        }
+    }
+    (told > 0).then(|| said + &text[told..])
 }
 
 /// A sentence with the minus sign before its numbers; hyphens in names, dates and exponents stay.
@@ -133,6 +155,10 @@ mod tests {
                 "radius minus radius of the ellipsoid, metres",
             ),
             ("areoid_radius_m", "areoid_radius_m"),
+            (
+                "PEDR_7.csv: 3 PEDR files of MOLA, image MOLA-7, <img src=\"data:a+MOLA/PEDR=\">, to Mars.",
+                "PEDR_7.csv: 3 tables of shots of LOLA, image MOLA-7, <img src=\"data:a+MOLA/PEDR=\">, to the Moon.",
+            ),
         ] {
             assert_eq!(LUNAR.of(at_mars), here);
             let at_mars_too = Wording {
