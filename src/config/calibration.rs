@@ -195,10 +195,10 @@ declare_table! {
         /// Paths or globs of its image support data, one file a camera; `name_sensor` tells which.
         #[serde(skip)]
         isd: Vec<PathBuf> = key(Globs).required_as("paths or globs of image support data").example(r#"["isd/i818_*.json"]"#),
-        /// Its tie points, tables like those of [ties].
+        /// Tables of its tie points.
         #[serde(skip)]
         ties: Vec<PathBuf> = key(Globs).required_as("paths or globs of tables of tie points").example(r#"["i818_ties.csv"]"#),
-        /// Its laser points, tables like those of [control].
+        /// Tables of its laser points.
         #[serde(skip)]
         control: Vec<PathBuf> = key(Globs).required_as("paths or globs of tables of laser points")
             .example(r#"["i818_control.csv"]"#),
