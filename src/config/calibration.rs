@@ -15,7 +15,7 @@ use super::{
         Declare as _, Keys, Many, declare_table, example, key, of_the_file, schema, table, tables,
     },
     described,
-    forms::{above_to, any_text, from_to, identifier, lower_case_identifier, whole_from_to, words},
+    forms::{any_text, from_to, identifier, lower_case_identifier, whole_from_to, words},
     parse_file,
     paths::{FILE, Globs},
     problems::Problems,
@@ -33,6 +33,9 @@ const HEADER: &str = "\
 # from this file's folder. Schema: ../schema/calibration.schema.json
 
 ";
+
+/// Smallest standard deviation of a point, pixels or metres: no measurement is better, and squares stay numbers.
+pub const SIGMA_MIN: f64 = 1e-3;
 
 /// Largest standard deviation of a laser point, metres: so far away the ground lies 3 m below a plane (of the Moon), which laser
 /// heights do not notice; three times as far 23 m.
@@ -121,7 +124,7 @@ declare_table! {
             .required_as("paths or globs of tables of tie points")
             .example(r#"["ties.csv"]"#),
         /// Standard deviation of lines and samples, where the table has none.
-        sigma_px: f64 = key(from_to(1e-3, 100.0)).or(0.2),
+        sigma_px: f64 = key(from_to(SIGMA_MIN, 100.0)).or(0.2),
         /// Distance of a tie point's images from where the uncalibrated cameras see one point, beyond which it is left out.
         limit_px: f64 = key(from_to(1.0, 1e4)).or(100.0),
     }
@@ -136,12 +139,12 @@ declare_table! {
         #[serde(skip)]
         files: Vec<PathBuf> = key(Globs).or(Vec::new()).example(r#"["control.csv"]"#),
         /// Standard deviation of lines and samples, where the table has none.
-        sigma_px: f64 = key(from_to(1e-3, 100.0)).or(1.0),
+        sigma_px: f64 = key(from_to(SIGMA_MIN, 100.0)).or(1.0),
         /// Standard deviation of a horizontal coordinate of a laser point, where the table has none: the profiles of MOLA. Beyond
         /// the range the ground bends away from the plane in which errors are taken.
-        sigma_horizontal_m: f64 = key(above_to(0.0, CONTROL_SIGMA_MAX_M)).or(100.0),
+        sigma_horizontal_m: f64 = key(from_to(SIGMA_MIN, CONTROL_SIGMA_MAX_M)).or(100.0),
         /// Standard deviation of its radius, where the table has none.
-        sigma_vertical_m: f64 = key(above_to(0.0, CONTROL_SIGMA_MAX_M)).or(10.0),
+        sigma_vertical_m: f64 = key(from_to(SIGMA_MIN, CONTROL_SIGMA_MAX_M)).or(10.0),
         /// Every so manieth control point along the flight judges the result and is never used for it.
         held_back_every: u32 = key(whole_from_to(2, 100)).or(4),
         /// Distance of a control point from where the uncalibrated cameras see it, beyond which it is left out.

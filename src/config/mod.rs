@@ -46,8 +46,8 @@ use toml::de::DeTable;
 pub use adjustment::{AdjustmentConfig, OrientationPrior};
 pub use calibration::{
     APrioriConfig, CONTROL_SIGMA_MAX_M, CalibrationConfig, CalibrationMode, CameraConfig,
-    LoadedCalibration, SolutionConfig, ValidationConfig, calibration_example, calibration_schema,
-    load_calibration, parse_calibration,
+    LoadedCalibration, SIGMA_MIN, SolutionConfig, ValidationConfig, calibration_example,
+    calibration_schema, load_calibration, parse_calibration,
 };
 pub use declare::{Accept, DeclaredKey, ValueKind, Word};
 pub use images::ImageConfig;

@@ -29,16 +29,6 @@ pub struct FootprintsDifference {
     pub movement: Option<FootprintsMovement>,
 }
 
-impl FootprintsDifference {
-    /// Whether any moved by more than rounding, or is in one run only.
-    #[must_use]
-    pub fn differ(&self) -> bool {
-        let moved =
-            |of: &FootprintsMovement| of.moved > 0 || of.topography_m.moved() || of.time_s.moved();
-        self.movement.as_ref().is_some_and(moved) || self.only_in_a + self.only_in_b > 0
-    }
-}
-
 /// Movement of the footprints that are in both runs.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct FootprintsMovement {

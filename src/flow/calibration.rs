@@ -71,13 +71,11 @@ fn told(result: &Calibration) -> Told<'_> {
     let left_out = result.points.iter().filter(|of| of.left_out);
     let mut stated = Vec::new();
     if let Some(last) = result.steps.last() {
-        let ties = last.figures.ties.cameras_px.iter().flatten();
-        let worst_px = ties.copied().fold(0.0, f64::max);
-        stated.push((figures::TIE_RESIDUAL_RMS_PX, worst_px));
+        let worst_px = last.figures.ties.worst_px();
+        stated.extend(worst_px.map(|of| (figures::TIE_RESIDUAL_RMS_PX, of)));
     }
-    if let Some(held_back) = &result.held_back {
-        stated.push((figures::HELD_BACK_HEIGHT_RMS_M, held_back.height_m));
-    }
+    let height_m = result.held_back.as_ref().and_then(|of| of.height_m);
+    stated.extend(height_m.map(|of| (figures::HELD_BACK_HEIGHT_RMS_M, of)));
     Told {
         verdict: &result.verdict,
         counts: vec![

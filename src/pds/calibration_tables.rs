@@ -3,7 +3,10 @@
 use std::path::Path;
 
 use super::table_rows::{Rows, TableError, columns, name, numbers, read_rows};
-use crate::{config::CONTROL_SIGMA_MAX_M, error::Result};
+use crate::{
+    config::{CONTROL_SIGMA_MAX_M, SIGMA_MIN},
+    error::Result,
+};
 
 /// Where the columns are told.
 const EXAMPLE: &str = "config/calibrations/example.toml";
@@ -141,9 +144,9 @@ fn deviations(
         let written = column.filter(|at| row.get(*at).is_some_and(|text| !text.is_empty()));
         if let Some(column) = written {
             let sigma = numbers(row, &[column])?[0];
-            if !(sigma > 0.0 && sigma <= largest) {
+            if !(sigma >= SIGMA_MIN && sigma <= largest) {
                 return Err(format!(
-                    "standard deviation {sigma}: expected one above 0 and up to {largest}"
+                    "standard deviation {sigma}: expected one from {SIGMA_MIN} to {largest}"
                 ));
             }
             *deviation = Some(sigma);

@@ -56,32 +56,35 @@ fn lead(config: &CalibrationConfig, of: &Calibration) -> String {
 }
 
 fn stated(of: &HeldBack) -> String {
+    let metres = |of: Option<f64>| of.map_or_else(|| "–".to_owned(), |of| format!("{of:.1} m"));
     format!(
-        "A tie point is known to {:.1} m in the plane and {:.1} m in height (root mean square). {} that were never used judge \
-         this: they lie {:.2} standard deviations off, {:.1} m in the plane and {:.1} m in height with the laser's own errors.",
-        of.accuracy_plane_m,
-        of.accuracy_height_m,
+        "A tie point is known to {} in the plane and {} in height (root mean square). {} that were never used judge this: they \
+         lie {:.2} standard deviations off, and the {} of them in two lines or more {} in the plane and {} in height with the \
+         laser's own errors.",
+        metres(of.accuracy_plane_m),
+        metres(of.accuracy_height_m),
         counted(
             usize::try_from(of.points).unwrap_or(usize::MAX),
             "laser point"
         ),
         of.normalised,
-        of.plane_m,
-        of.height_m
+        of.intersected,
+        metres(of.plane_m),
+        metres(of.height_m)
     )
 }
 
-fn number(value: f64, decimals: usize) -> Cell {
-    label(value, decimals).into()
+fn text(value: Option<f64>, decimals: usize) -> String {
+    value.map_or_else(|| "–".to_owned(), |value| label(value, decimals))
 }
 
 /// Largest of the cameras across and along, then pixels, metres, height of control.
 fn figure_cells(figures: &Figures, kind: PointKind) -> Vec<Cell> {
     let worst = |axis: usize| {
-        let of = figures.ties.cameras_px.iter().map(|of| of[axis]);
-        of.fold(0.0, f64::max)
+        let of = figures.ties.cameras_px.iter().filter_map(|of| of[axis]);
+        text(of.reduce(f64::max), 3).into()
     };
-    let mut cells = vec![number(worst(0), 3), number(worst(1), 3)];
+    let mut cells = vec![worst(0), worst(1)];
     match figures.of(kind) {
         Some(control) => cells.extend(control_cells(control)),
         None => cells.extend(["", "", ""].map(Cell::from)),
@@ -90,17 +93,18 @@ fn figure_cells(figures: &Figures, kind: PointKind) -> Vec<Cell> {
 }
 
 fn control_cells(of: &ControlFigures) -> [Cell; 3] {
-    let each = |value: fn(&crate::stages::calibrate::PixelsAndMetres) -> f64, decimals: usize| {
+    let each = |value: fn(&crate::stages::calibrate::PixelsAndMetres) -> Option<f64>,
+                decimals: usize| {
         let values = of
             .cameras
             .iter()
-            .map(|camera| label(value(camera), decimals));
+            .map(|camera| text(value(camera), decimals));
         Cell::from(values.collect::<Vec<_>>().join(" / "))
     };
     [
         each(|of| of.plane_px, 2),
         each(|of| of.plane_m, 0),
-        number(of.height_m, 1),
+        text(of.height_m, 1).into(),
     ]
 }
 
@@ -239,7 +243,10 @@ fn cameras(of: &Calibration) -> String {
         };
         let mut cells: Vec<Cell> = vec![(&camera.camera).into()];
         cells.extend(camera.angles_rad.map(angle));
-        cells.extend([number(camera.moved_px, 2), number(camera.isd_left_px, 3)]);
+        cells.extend(
+            [(camera.moved_px, 2), (camera.isd_left_px, 3)]
+                .map(|(px, decimals)| label(px, decimals).into()),
+        );
         table.row(true, cells);
     }
     let drift = of.drift_m_per_line.map(|of| {

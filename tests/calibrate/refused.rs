@@ -137,7 +137,8 @@ fn damaged_support_data_are_refused() {
             refused(&[], |folder| {
                 let path = folder.join("lines/isd/i864_s2.json");
                 let text = fs::read_to_string(&path).unwrap();
-                fs::write(&path, &text[..text.len() / 2]).unwrap();
+                let some = text.find(',').unwrap();
+                fs::write(&path, &text[..some]).unwrap();
             }),
         ),
         ("of the Moon", isd("\"BODY_CODE\":499", "\"BODY_CODE\":301")),
@@ -266,11 +267,81 @@ fn control_and_ties_that_cannot_tell_are_refused_or_marked() {
             refused(&[], |folder| scatter(folder, 2_000.0)),
         ),
         (
+            "a second camera without ties",
+            refused_rows(&[TIES], |cells| {
+                if cells[1] == "s2" && !cells[0].ends_with("00") {
+                    "x".clone_into(&mut cells[2]);
+                }
+            }),
+        ),
+        (
+            "control in the first line alone",
+            refused_rows(&[CONTROL], |cells| {
+                if cells[1] == "s2" {
+                    "x".clone_into(&mut cells[2]);
+                }
+            }),
+        ),
+        (
             "six points of control",
             refused(&[], |folder| keep(folder, |point, _| point < 6)),
         ),
     ];
     assert_messages("calibration_refused", &told);
+}
+
+/// What is wrong in all laser points alike, another orbit tells.
+#[test]
+fn control_that_is_shifted_is_told_by_another_orbit() {
+    let told = refused(&[], |folder| {
+        edited(folder, CONTROL, |_, cells| {
+            number(cells, 4, |longitude| longitude + 0.05);
+        });
+    });
+    println!("{told}");
+    assert!(
+        told.contains("orbit i818: control in the plane of camera s1")
+            && told.contains("worse by more"),
+        "{told}"
+    );
+}
+
+/// What a calibration was made from cannot judge it, nor can an orbit without points.
+#[test]
+fn another_orbit_must_be_another_and_have_points() {
+    let same = refused(&[("[\"i818_ties.csv\"]", "[\"i864_ties.csv\"]")], |_| {});
+    assert!(same.contains("i864_ties.csv has the same bytes"), "{same}");
+    for (file, expected) in [
+        ("i818_control.csv", "control points can be used"),
+        ("i818_ties.csv", "tie points that fit are in camera s1"),
+    ] {
+        let told = refused(&[], |folder| {
+            let path = folder.join("lines").join(file);
+            let text = fs::read_to_string(&path).unwrap();
+            fs::write(&path, text.lines().next().unwrap().to_owned() + "\n").unwrap();
+        });
+        assert!(told.contains("i818") && told.contains(expected), "{told}");
+    }
+}
+
+/// Under two names a shot would make the calibration and judge it.
+#[test]
+fn shots_under_another_name_count_once() {
+    let folder = scene(&[]);
+    let once = calibrated(folder.path()).unwrap();
+    let path = folder.path().join("lines").join(CONTROL);
+    let text = fs::read_to_string(&path).unwrap();
+    let again = text.lines().skip(1).map(|row| format!("again_{row}\n"));
+    fs::write(&path, text.clone() + &again.collect::<String>()).unwrap();
+    let twice = calibrated(folder.path()).unwrap();
+    assert_eq!(twice.held_back, once.held_back);
+    let names = twice.points.iter().filter(|of| of.kind != PointKind::Tie);
+    assert_eq!(
+        twice.complaint_count,
+        once.complaint_count + names.count() as u64
+    );
+    let told = &twice.complaints[once.complaints.len()];
+    assert!(told.contains("of which it is another name"), "{told}");
 }
 
 /// Control scattered by so many metres, the same on every machine.
@@ -338,13 +409,14 @@ fn what_is_valid_is_as_good_as_it_says() {
         let found = calibrated(folder.path()).unwrap();
         let errors = errors_m(&found, &truth(folder.path()), PointKind::Tie);
         let of = found.held_back.as_ref().unwrap();
+        let [plane_m, height_m] = [of.accuracy_plane_m, of.accuracy_height_m].map(Option::unwrap);
         let ratio = [
-            rms(errors.iter().map(|of| of[0].xy().norm())) / of.accuracy_plane_m,
-            rms(errors.iter().map(|of| of[0].z)) / of.accuracy_height_m,
+            rms(errors.iter().map(|of| of[0].xy().norm())) / plane_m,
+            rms(errors.iter().map(|of| of[0].z)) / height_m,
         ];
         println!(
-            "{what}: valid {}, {:.0} m and {:.0} m stated, errors over that {ratio:.2?} {:?}",
-            found.verdict.valid, of.accuracy_plane_m, of.accuracy_height_m, found.verdict.reasons
+            "{what}: valid {}, {plane_m:.0} m and {height_m:.0} m stated, errors over that {ratio:.2?} {:?}",
+            found.verdict.valid, found.verdict.reasons
         );
         if found.verdict.valid {
             valid += 1;

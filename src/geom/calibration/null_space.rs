@@ -8,7 +8,8 @@ use super::{
     camera::CalibrationState,
     elimination::{Triangle, reduced_rows},
     freedom::{Freedom, Parameter, contrasts},
-    sight::{GroundPoint, SightError},
+    sight::GroundPoint,
+    solve::CalibrationError,
 };
 use crate::units::RADIANS_PER_DEGREE;
 
@@ -106,20 +107,25 @@ impl TieSight {
 ///
 /// # Errors
 /// A point without a place.
-pub fn tie_sight(ties: &[GroundPoint], state: &CalibrationState) -> Result<TieSight, SightError> {
+pub fn tie_sight(
+    ties: &[GroundPoint],
+    state: &CalibrationState,
+) -> Result<TieSight, CalibrationError> {
     let layout = state.layout();
     let angles = Freedom::each(layout, |_| 1.0, |of| matches!(of, Parameter::Angle { .. }));
     let mut triangle = Triangle::new(angles.len());
-    for tie in ties {
-        let place_m = tie.place(state)?;
-        triangle.add(reduced_rows(tie, state, &angles, &place_m)?);
+    for (point, tie) in ties.iter().enumerate() {
+        let rows = tie
+            .place(state)
+            .and_then(|place_m| reduced_rows(tie, state, &angles, &place_m));
+        triangle.add(rows.map_err(|why| CalibrationError::Point { point, why })?);
     }
     let (triangle, _) = triangle.finish();
     let svd = triangle.svd(false, true);
     let largest = svd.singular_values.max();
     let names = names(layout.cameras);
     let Some(vectors) = svd.v_t else {
-        return Err(SightError::NotConverged);
+        return Err(CalibrationError::Singular);
     };
     let mut order: Vec<usize> = (0..angles.len()).collect();
     order.sort_by(|a, b| svd.singular_values[*a].total_cmp(&svd.singular_values[*b]));

@@ -15,7 +15,7 @@ use crate::{
 /// Footprints, then cameras.
 pub(super) fn tables(site: &RunDifference) -> String {
     let mut body = String::new();
-    if site.footprints.differ() {
+    if site.footprints.moved() {
         body += &footprints(site);
     }
     let images: Vec<&ImageDifference> = site.images.iter().filter(|of| of.differs()).collect();

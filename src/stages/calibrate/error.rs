@@ -59,8 +59,12 @@ pub enum CalibrateError {
         expected: String,
     },
     /// Too few tie points.
-    #[error("{found} tie points are in two cameras or more; expected at least {expected}")]
+    #[error(
+        "{found} tie points that fit are in camera {camera} and another; expected at least {expected} of every camera"
+    )]
     TooFewTies {
+        /// The camera that has fewest.
+        camera: String,
         /// How many there are.
         found: usize,
         /// How many are needed.
@@ -110,6 +114,34 @@ pub enum CalibrateError {
         /// Its camera.
         camera: String,
     },
+    /// The calibrated cameras cannot see a point that was held back.
+    #[error("control point {point}, which was held back, cannot judge the calibration: {problem}")]
+    HeldBack {
+        /// The point.
+        point: String,
+        /// Why.
+        problem: String,
+    },
+    /// Another orbit has too little laser control.
+    #[error("validation {orbit}: {found} control points can be used; expected at least {expected}")]
+    ThinValidation {
+        /// The orbit.
+        orbit: String,
+        /// How many there are.
+        found: usize,
+        /// How many are needed.
+        expected: usize,
+    },
+    /// Another orbit has a file of the calibration.
+    #[error(
+        "validation {orbit}: {file} has the same bytes as a file of the calibration itself; expected files of another orbit"
+    )]
+    SameFile {
+        /// The orbit.
+        orbit: String,
+        /// The file.
+        file: String,
+    },
     /// The camera of another orbit is mounted in another way.
     #[error(
         "validation {orbit}: camera {camera} looks {off_px:.2} px off where it does in the orbit of the calibration; expected \
@@ -158,7 +190,14 @@ impl Cause for CalibrateError {
                 "check that every camera has the support data of its own image and is not exchanged with another, that samples \
                  count from the edge from which the support data count them, and that places are of the same epoch and body"
             }
+            Self::ThinValidation { .. } => {
+                "give this orbit more laser points, or leave it out of [[validation]]"
+            }
+            Self::SameFile { .. } => {
+                "what a calibration was made from cannot judge it: give files of another orbit, or leave this one out"
+            }
             Self::TwoPlaces { .. } => "give every laser point a name of its own",
+            Self::HeldBack { .. } => "look at the place of this point and at its lines and samples",
             Self::OtherMounting { .. } => {
                 "give support data that have the same mounting, focal length and focal plane: the calibration is an offset from them"
             }

@@ -1,6 +1,9 @@
 //! The verdict on a calibration.
 
-use super::result::{CalibrationStep, CameraResult, HeldBack, PointKind, ValidationResult};
+use super::{
+    elsewhere::{Noise, elsewhere},
+    result::{CalibrationStep, CameraResult, HeldBack, PointKind, ValidationResult},
+};
 use crate::{config::CalibrationMode, geom::calibration::TieSight, stages::judge::Verdict};
 
 /// Residuals of held-back control over their standard deviations: beyond, these are not true.
@@ -24,6 +27,8 @@ pub(super) struct Evidence<'a> {
     pub(super) cameras: &'a [CameraResult],
     pub(super) sight: &'a TieSight,
     pub(super) validation: &'a [ValidationResult],
+    /// What measurement and laser alone make of each.
+    pub(super) validation_noise: &'a [Noise],
     /// Points, and those that were left out: ties, then control.
     pub(super) left_out: [[usize; 2]; 2],
     /// What was known beforehand.
@@ -54,20 +59,15 @@ pub(super) fn judge(of: &Evidence<'_>) -> Verdict {
              at most {NORMALISED_MAX}: standard deviations are too small, or something else than the camera is wrong",
             held_back.normalised
         )),
-        Some(held_back) if !known_better(held_back, of.known) => reasons.push(format!(
-            "a tie point is known to {:.0} m in the plane and {:.0} m in height, where orbit and attitude beforehand leave \
-             {:.0} m an axis: the laser control is too coarse, too little or too far away to tell where the camera looks",
-            held_back.accuracy_plane_m, held_back.accuracy_height_m, of.known.ground_m
-        )),
-        Some(_) => {}
+        Some(held_back) => reasons.extend(coarse(held_back, of.known)),
     }
     if let Some(last) = of.steps.last() {
-        let worst = last.figures.ties.cameras_px.iter().flatten();
-        let worst_px = worst.copied().fold(0.0, f64::max);
-        if !(worst_px <= TIES_MAX_PX) {
-            reasons.push(format!(
+        match last.figures.ties.worst_px() {
+            Some(worst_px) if worst_px <= TIES_MAX_PX => {}
+            Some(worst_px) => reasons.push(format!(
                 "tie points miss each other by {worst_px:.2} px (root mean square); expected at most {TIES_MAX_PX} px"
-            ));
+            )),
+            None => reasons.push("no tie point is left in a camera".to_owned()),
         }
     }
     for (what, [all, left_out]) in ["tie", "control"].iter().zip(of.left_out) {
@@ -88,18 +88,40 @@ pub(super) fn judge(of: &Evidence<'_>) -> Verdict {
             ));
         }
     }
+    let (worse, doubts) = elsewhere(of);
+    reasons.extend(worse);
+    let mut remarks = remarks(of);
+    remarks.extend(doubts);
     Verdict {
         valid: reasons.is_empty(),
         reasons,
-        remarks: remarks(of),
+        remarks,
         checks: Vec::new(),
     }
 }
 
-/// Whether the ground is known better than beforehand.
-fn known_better(held_back: &HeldBack, known: Known) -> bool {
-    held_back.accuracy_plane_m < std::f64::consts::SQRT_2 * known.ground_m
-        && held_back.accuracy_height_m < known.ground_m
+/// Why the ground is not known better than beforehand, if it is not.
+fn coarse(held_back: &HeldBack, known: Known) -> Option<String> {
+    let Some((plane_m, height_m)) = held_back.accuracy_plane_m.zip(held_back.accuracy_height_m)
+    else {
+        return Some("no tie point has a place with a standard deviation".to_owned());
+    };
+    if held_back.intersected == 0 {
+        return Some(
+            "no laser point that was held back is in two cameras: nothing judges places and heights; expected laser points in \
+             two cameras or more"
+                .to_owned(),
+        );
+    }
+    let better = plane_m < std::f64::consts::SQRT_2 * known.ground_m && height_m < known.ground_m;
+    (!better).then(|| {
+        format!(
+            "a tie point is known to {plane_m:.0} m in the plane and {height_m:.0} m in height, where orbit and attitude \
+             beforehand leave {:.0} m an axis: the laser control is too coarse, too little or too far away to tell where the \
+             camera looks",
+            known.ground_m
+        )
+    })
 }
 
 fn remarks(of: &Evidence<'_>) -> Vec<String> {
@@ -139,19 +161,20 @@ fn remarks(of: &Evidence<'_>) -> Vec<String> {
             ),
         );
     }
-    for orbit in of.validation {
-        let height =
-            |figures: &super::result::Figures| figures.of(PointKind::Control).map(|of| of.height_m);
-        let (before, after) = (height(&orbit.before), height(&orbit.after));
-        say(
-            before
-                .zip(after)
-                .is_some_and(|(before, after)| after > before),
-            format!(
-                "heights of orbit {} are worse with the calibration than without",
-                orbit.orbit
-            ),
-        );
+    if let Some(judged) = of
+        .steps
+        .last()
+        .and_then(|last| last.figures.of(PointKind::HeldBack))
+    {
+        for (camera, figures) in of.cameras.iter().zip(&judged.cameras) {
+            say(
+                figures.plane_px.is_none(),
+                format!(
+                    "no laser point that was held back is in camera {}: tie points alone judge where it looks",
+                    camera.camera
+                ),
+            );
+        }
     }
     say(
         of.complaints > 0,

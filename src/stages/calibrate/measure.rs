@@ -55,10 +55,7 @@ fn ties(points: &[OrbitPoint], state: &CalibrationState, pixels: &[f64]) -> TieF
     }
     TieFigures {
         points: count,
-        cameras_px: squares
-            .into_iter()
-            .map(|of| of.map(|squares| squares.rms().unwrap_or(0.0)))
-            .collect(),
+        cameras_px: squares.into_iter().map(|of| of.map(Squares::rms)).collect(),
     }
 }
 
@@ -98,11 +95,11 @@ fn control(
         cameras: squares
             .into_iter()
             .map(|[px, m]| PixelsAndMetres {
-                plane_px: px.rms().unwrap_or(0.0),
-                plane_m: m.rms().unwrap_or(0.0),
+                plane_px: px.rms(),
+                plane_m: m.rms(),
             })
             .collect(),
         heights: heights.count,
-        height_m: heights.rms().unwrap_or(0.0),
+        height_m: heights.rms(),
     })
 }

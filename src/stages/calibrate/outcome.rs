@@ -3,6 +3,7 @@
 use nalgebra::{DMatrix, Vector3};
 
 use super::{
+    error::CalibrateError,
     geometry::{Laboratory, Orbit},
     measure::Squares,
     read::OrbitPoint,
@@ -80,14 +81,21 @@ impl Outcome<'_> {
         Ok(cameras)
     }
 
-    /// What the control that was held back says.
-    pub(super) fn held_back(&self) -> Option<HeldBack> {
+    /// What the control that was held back says; none without such points.
+    ///
+    /// # Errors
+    /// A point that the calibrated cameras cannot see.
+    pub(super) fn held_back(&self) -> std::result::Result<Option<HeldBack>, CalibrateError> {
         let mut normalised = 0.0;
         let (mut plane, mut height) = (Squares::default(), Squares::default());
         let (mut sum_m, mut intersected, mut points) = (Vector3::zeros(), 0_u32, 0_u32);
         for of in self.points.iter().filter(|of| of.is(PointKind::HeldBack)) {
             let misfit = of.point.misfit(self.state, self.covariance);
-            let Ok(Some(misfit)) = misfit else { continue };
+            let misfit = misfit.map_err(|why| CalibrateError::HeldBack {
+                point: of.name.clone(),
+                problem: why.to_string(),
+            })?;
+            let Some(misfit) = misfit else { continue };
             normalised += misfit.normalised_square;
             points += 1;
             if let Some(off_m) = self.off_m(of) {
@@ -98,7 +106,7 @@ impl Outcome<'_> {
             }
         }
         if points == 0 {
-            return None;
+            return Ok(None);
         }
         let normalised = (normalised / f64::from(points)).sqrt();
         let wider = normalised.max(1.0);
@@ -109,15 +117,16 @@ impl Outcome<'_> {
                 stated_height.add(up * wider);
             }
         }
-        Some(HeldBack {
+        Ok(Some(HeldBack {
             points: points.into(),
             normalised,
-            plane_m: plane.rms().unwrap_or(0.0),
-            height_m: height.rms().unwrap_or(0.0),
-            mean_m: (sum_m / f64::from(intersected.max(1))).into(),
-            accuracy_plane_m: stated_plane.rms().unwrap_or(0.0),
-            accuracy_height_m: stated_height.rms().unwrap_or(0.0),
-        })
+            intersected: intersected.into(),
+            plane_m: plane.rms(),
+            height_m: height.rms(),
+            mean_m: (intersected > 0).then(|| (sum_m / f64::from(intersected)).into()),
+            accuracy_plane_m: stated_plane.rms(),
+            accuracy_height_m: stated_height.rms(),
+        }))
     }
 
     /// A point's place by its images alone, and its standard deviations east, north and up, metres.

@@ -105,8 +105,18 @@ impl Figures {
 pub struct TieFigures {
     /// Points.
     pub points: u64,
-    /// Of every camera: root mean square across and along the flight, pixels.
-    pub cameras_px: Vec<[f64; 2]>,
+    /// Of every camera: root mean square across and along the flight, pixels; none of a camera without tie points.
+    pub cameras_px: Vec<[Option<f64>; 2]>,
+}
+
+impl TieFigures {
+    /// The largest of the cameras, across or along, pixels; none where a camera has none.
+    #[must_use]
+    pub fn worst_px(&self) -> Option<f64> {
+        let all = self.cameras_px.iter().flatten();
+        all.copied()
+            .try_fold(0.0, |worst: f64, of| of.map(|of| worst.max(of)))
+    }
 }
 
 /// Control points.
@@ -120,17 +130,20 @@ pub struct ControlFigures {
     pub cameras: Vec<PixelsAndMetres>,
     /// Points in two cameras or more.
     pub heights: u64,
-    /// Root mean square of their intersected height minus the laser's, metres; 0 of none.
-    pub height_m: f64,
+    /// Root mean square of their intersected height minus the laser's, metres; none where there is no such point.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub height_m: Option<f64>,
 }
 
-/// In the focal plane, and on the ground.
+/// In the focal plane, and on the ground; none of a camera without points.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct PixelsAndMetres {
     /// Root mean square distance, pixels.
-    pub plane_px: f64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub plane_px: Option<f64>,
     /// Root mean square distance of the ray at the laser's radius from the laser's place, metres.
-    pub plane_m: f64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub plane_m: Option<f64>,
 }
 
 /// What the control that was held back says of the result.
@@ -140,18 +153,25 @@ pub struct HeldBack {
     pub points: u64,
     /// Root mean square residual over its standard deviation, which has measurement, laser and calibration in it.
     pub normalised: f64,
-    /// Root mean square of intersected minus laser's place, horizontally, and of the height, metres: errors of the laser and
-    /// of the measurement are in them.
-    pub plane_m: f64,
+    /// How many of them are in two cameras or more, whose places are intersected.
+    pub intersected: u64,
+    /// Root mean square of intersected minus laser's place, horizontally, metres: errors of the laser and of the measurement
+    /// are in it. None where nothing is intersected, as of the next two.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub plane_m: Option<f64>,
     /// Likewise of the height, metres.
-    pub height_m: f64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub height_m: Option<f64>,
     /// Mean of the same east, north and up, metres.
-    pub mean_m: [f64; 3],
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub mean_m: Option<[f64; 3]>,
     /// Stated accuracy of a tie point in the plane, metres: root mean square of the standard deviations, larger by
     /// `normalised` where that is above 1.
-    pub accuracy_plane_m: f64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub accuracy_plane_m: Option<f64>,
     /// Likewise of its height, metres.
-    pub accuracy_height_m: f64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub accuracy_height_m: Option<f64>,
 }
 
 /// Another orbit.

@@ -18,7 +18,8 @@ use crate::{
     error::{Locate as _, Result},
     geom::{
         calibration::{
-            CalibrationState, Freedom, GroundPoint, Layout, Parameter, Start, solve, tie_sight,
+            CalibrationError, CalibrationState, Freedom, GroundPoint, Layout, Parameter, Start,
+            solve, tie_sight,
         },
         statistics::outliers,
     },
@@ -26,12 +27,16 @@ use crate::{
 
 /// Fewest ties, and fewest control points of each kind, that a calibration makes sense with.
 const TIES_MIN: usize = 10;
-const CONTROLS_MIN: usize = 5;
+pub(super) const CONTROLS_MIN: usize = 5;
 /// A point is left out when it misses by so many robust standard deviations more than the middle one of its kind: of a million
 /// good ones not one does.
 const LEFT_OUT: f64 = 8.0;
 /// Rounds of leaving out.
 const ROUNDS: usize = 3;
+
+/// What ties alone estimate, and what is estimated once there is control.
+const TIES: &[PointKind] = &[PointKind::Tie];
+const ALL: &[PointKind] = &[PointKind::Tie, PointKind::Control];
 
 /// A calibration under way.
 struct Work<'a> {
@@ -69,7 +74,7 @@ pub(super) fn calibrate(config: &CalibrationConfig) -> Result<Calibration> {
         &tables,
         &mut complaints,
     )?;
-    enough(&points)?;
+    enough(&points, &names, config)?;
     let state = laboratory.state.clone();
     let parameters = state.layout().len();
     let mut work = Work {
@@ -82,11 +87,11 @@ pub(super) fn calibrate(config: &CalibrationConfig) -> Result<Calibration> {
         covariance: DMatrix::zeros(parameters, parameters),
     };
     work.tell("before", "nothing", 0);
-    let sight = tie_sight(&work.of(&[PointKind::Tie]), &work.state)
-        .map_err(|why| failed("ties", why.to_string()))?;
+    let sight =
+        tie_sight(&work.of(TIES), &work.state).map_err(|why| work.failed("ties", TIES, &why))?;
     work.ties()?;
     if work.points.iter().any(|of| of.is(PointKind::Control)) {
-        work.with_control(&mut complaints)?;
+        work.with_control(&names, &mut complaints)?;
     }
     let calibrated = Calibrated {
         names: &names,
@@ -94,12 +99,12 @@ pub(super) fn calibrate(config: &CalibrationConfig) -> Result<Calibration> {
         laboratory: &laboratory,
         state: &work.state,
     };
-    let mut validation = Vec::new();
+    let (mut validation, mut validation_noise) = (Vec::new(), Vec::new());
     for of in &config.validation {
-        validation.push(
-            validate(config, of, &calibrated, &mut complaints)
-                .in_stage(&format!("calibrate/{}", of.id))?,
-        );
+        let (result, allowed) = validate(config, of, &calibrated, &mut complaints)
+            .in_stage(&format!("calibrate/{}", of.id))?;
+        validation.push(result);
+        validation_noise.push(allowed);
     }
     let outcome = Outcome {
         config,
@@ -112,7 +117,7 @@ pub(super) fn calibrate(config: &CalibrationConfig) -> Result<Calibration> {
         covariance: &work.covariance,
     };
     let cameras = outcome.cameras()?;
-    let held_back = outcome.held_back();
+    let held_back = outcome.held_back()?;
     let verdict = judge(&Evidence {
         mode: config.solution.mode,
         steps: &work.steps,
@@ -120,6 +125,7 @@ pub(super) fn calibrate(config: &CalibrationConfig) -> Result<Calibration> {
         cameras: &cameras,
         sight: &sight,
         validation: &validation,
+        validation_noise: &validation_noise,
         left_out: left_out(&work.points),
         known: known(config, &orbit),
         of_frames: (orbit.images.iter().zip(&names))
@@ -143,7 +149,7 @@ pub(super) fn calibrate(config: &CalibrationConfig) -> Result<Calibration> {
 }
 
 /// Whether the images are of different lines on one spacecraft.
-fn belong_together(
+pub(super) fn belong_together(
     images: &[CameraImage],
     names: &[String],
 ) -> std::result::Result<(), CalibrateError> {
@@ -169,17 +175,35 @@ fn belong_together(
     Ok(())
 }
 
-fn enough(points: &[OrbitPoint]) -> std::result::Result<(), CalibrateError> {
-    let count = |kind| points.iter().filter(|of| of.is(kind)).count();
-    let [ties, controls, held_back] =
-        [PointKind::Tie, PointKind::Control, PointKind::HeldBack].map(count);
-    if ties < TIES_MIN {
-        return Err(CalibrateError::TooFewTies {
-            found: ties,
-            expected: TIES_MIN,
-        });
+/// Whether every camera has ties.
+pub(super) fn enough_ties(
+    points: &[OrbitPoint],
+    names: &[String],
+) -> std::result::Result<(), CalibrateError> {
+    for (camera, name) in names.iter().enumerate() {
+        let sees = |of: &&OrbitPoint| of.point.sights.iter().any(|sight| sight.camera == camera);
+        let ties = points.iter().filter(|of| of.is(PointKind::Tie));
+        let found = ties.filter(sees).count();
+        if found < TIES_MIN {
+            return Err(CalibrateError::TooFewTies {
+                camera: name.clone(),
+                found,
+                expected: TIES_MIN,
+            });
+        }
     }
-    let controlled = points.iter().any(|of| of.kind != PointKind::Tie);
+    Ok(())
+}
+
+fn enough(
+    points: &[OrbitPoint],
+    names: &[String],
+    config: &CalibrationConfig,
+) -> std::result::Result<(), CalibrateError> {
+    enough_ties(points, names)?;
+    let count = |kind| points.iter().filter(|of| of.is(kind)).count();
+    let [controls, held_back] = [PointKind::Control, PointKind::HeldBack].map(count);
+    let controlled = !config.control.files.is_empty();
     if controlled && controls.min(held_back) < CONTROLS_MIN {
         return Err(CalibrateError::TooFewControls {
             found: controls,
@@ -188,10 +212,6 @@ fn enough(points: &[OrbitPoint]) -> std::result::Result<(), CalibrateError> {
         });
     }
     Ok(())
-}
-
-fn failed(step: &'static str, problem: String) -> CalibrateError {
-    CalibrateError::Adjustment { step, problem }
 }
 
 /// Points in all and those that were left out, ties before control.
@@ -218,12 +238,30 @@ fn known(config: &CalibrationConfig, orbit: &Orbit) -> Known {
 }
 
 impl Work<'_> {
+    fn all<'a>(&'a self, kinds: &'a [PointKind]) -> impl Iterator<Item = &'a OrbitPoint> {
+        let points = self.points.iter();
+        points.filter(|of| kinds.iter().any(|kind| of.is(*kind)))
+    }
+
     fn of(&self, kinds: &[PointKind]) -> Vec<GroundPoint> {
-        let of = self
-            .points
-            .iter()
-            .filter(|of| kinds.iter().any(|kind| of.is(*kind)));
-        of.map(|of| of.point.clone()).collect()
+        self.all(kinds).map(|of| of.point.clone()).collect()
+    }
+
+    /// Why a step with these points failed, with the name of the point.
+    fn failed(
+        &self,
+        step: &'static str,
+        kinds: &[PointKind],
+        why: &CalibrationError,
+    ) -> CalibrateError {
+        let problem = match why {
+            CalibrationError::Point { point, why } => {
+                let name = self.all(kinds).nth(*point).map(|of| of.name.as_str());
+                format!("point {}: {why}", name.unwrap_or_default())
+            }
+            CalibrationError::NotConverged | CalibrationError::Singular => why.to_string(),
+        };
+        CalibrateError::Adjustment { step, problem }
     }
 
     /// Notes the figures after a step.
@@ -257,7 +295,7 @@ impl Work<'_> {
     fn adjust(
         &mut self,
         step: &'static str,
-        points: &[GroundPoint],
+        kinds: &[PointKind],
         freedom: &Freedom,
     ) -> std::result::Result<u32, CalibrateError> {
         let start = Start {
@@ -265,7 +303,7 @@ impl Work<'_> {
             from: &self.state,
         };
         let solved =
-            solve(points, start, freedom).map_err(|error| failed(step, error.to_string()))?;
+            solve(&self.of(kinds), start, freedom).map_err(|why| self.failed(step, kinds, &why))?;
         self.state = solved.state;
         self.covariance = solved.covariance;
         Ok(solved.steps)
@@ -285,8 +323,7 @@ impl Work<'_> {
                 "all offset angles, with their standard deviations beforehand",
             ),
         };
-        let ties = self.of(&[PointKind::Tie]);
-        let steps = self.adjust("ties", &ties, &freedom)?;
+        let steps = self.adjust("ties", TIES, &freedom)?;
         self.tell("ties", free, steps);
         Ok(())
     }
@@ -294,6 +331,7 @@ impl Work<'_> {
     /// Ties and control: the angles, the look angles, then all of it; points that do not fit are left out.
     fn with_control(
         &mut self,
+        names: &[String],
         complaints: &mut Complaints,
     ) -> std::result::Result<(), CalibrateError> {
         let layout = self.state.layout();
@@ -301,22 +339,20 @@ impl Work<'_> {
         let each = |work: &Self, layout: Layout, frees: fn(Parameter) -> bool| {
             Freedom::each(layout, work.sigma(angle_rad), frees)
         };
-        let points = self.of(&[PointKind::Tie, PointKind::Control]);
         let freedom = each(self, layout, is_angle);
-        let steps = self.adjust("external", &points, &freedom)?;
+        let steps = self.adjust("external", ALL, &freedom)?;
         self.tell("external", "all offset angles", steps);
         let freedom = each(self, layout, is_look);
-        let steps = self.adjust("internal", &points, &freedom)?;
+        let steps = self.adjust("internal", ALL, &freedom)?;
         self.tell("internal", "the look angles", steps);
         let freedom = each(self, layout, |_| true);
-        let mut steps = self.adjust("joint", &points, &freedom)?;
+        let mut steps = self.adjust("joint", ALL, &freedom)?;
         for _ in 0..ROUNDS {
             if !self.leave_out(complaints) {
                 break;
             }
-            enough(&self.points)?;
-            let points = self.of(&[PointKind::Tie, PointKind::Control]);
-            steps = self.adjust("joint", &points, &freedom)?;
+            enough(&self.points, names, self.config)?;
+            steps = self.adjust("joint", ALL, &freedom)?;
         }
         self.tell(
             "joint",

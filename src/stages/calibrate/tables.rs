@@ -25,6 +25,9 @@ use crate::{
 /// Complaints kept with their text; all are counted.
 const COMPLAINTS_MAX: usize = 1_000;
 
+/// Shots of a laser are not nearer to each other, metres: they lie hundreds of metres apart.
+const SAME_PLACE_M: f64 = 1.0;
+
 /// What was left out, in words.
 #[derive(Default)]
 pub(super) struct Complaints {
@@ -211,7 +214,41 @@ pub(super) fn control(
             point.known = Some(known);
         }
     }
-    Ok(points.points)
+    let mut points = points.points;
+    let repeated = repeated(&points);
+    for (point, first) in &repeated {
+        complaints.tell(format!(
+            "control point {} lies less than {SAME_PLACE_M} m from control point {}, of which it is another name; left out",
+            points[*point].name, points[*first].name
+        ));
+    }
+    let mut index = 0..;
+    points.retain(|_| {
+        index
+            .next()
+            .is_none_or(|index| !repeated.contains_key(&index))
+    });
+    Ok(points)
+}
+
+/// Points that lie where an earlier one lies, with that one: held back, the one would judge what the other has made.
+fn repeated(points: &[MeasuredPoint]) -> BTreeMap<usize, usize> {
+    let places = points.iter().enumerate();
+    let mut places: Vec<(usize, Vector3<f64>)> = places
+        .filter_map(|(index, point)| point.known.map(|known| (index, known.place_m)))
+        .collect();
+    places.sort_by(|(_, a), (_, b)| a.z.total_cmp(&b.z));
+    let mut repeated = BTreeMap::new();
+    for (at, (one, one_m)) in places.iter().enumerate() {
+        let near = places[at + 1..].iter();
+        for (other, other_m) in near.take_while(|(_, of)| of.z - one_m.z < SAME_PLACE_M) {
+            if (other_m - one_m).norm() < SAME_PLACE_M {
+                let first = repeated.entry(*one.max(other)).or_insert(usize::MAX);
+                *first = (*first).min(*one.min(other));
+            }
+        }
+    }
+    repeated
 }
 
 fn known(row: &ControlRow, sigma: ControlSigma) -> KnownPlace {

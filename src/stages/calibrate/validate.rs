@@ -1,17 +1,22 @@
 //! Other orbits, into which the calibration goes unchanged.
 
+use nalgebra::DMatrix;
+
 use super::{
+    elsewhere::Noise,
     error::CalibrateError,
     geometry::{CameraImage, Laboratory, Orbit},
-    measure::figures,
-    read::{OrbitTables, points_of},
-    result::ValidationResult,
+    measure::{Squares, figures},
+    read::{OrbitPoint, OrbitTables, points_of},
+    result::{PointKind, ValidationResult},
+    run::{CONTROLS_MIN, belong_together, enough_ties},
     tables::Complaints,
 };
 use crate::{
     body::Body,
     config::{CalibrationConfig, ValidationConfig},
     error::Result,
+    files::{file_name, hash_file},
     geom::calibration::CalibrationState,
 };
 
@@ -34,8 +39,9 @@ pub(super) fn validate(
     of: &ValidationConfig,
     calibrated: &Calibrated<'_>,
     complaints: &mut Complaints,
-) -> Result<ValidationResult> {
-    let orbit = orbit(config.body, of, calibrated)?;
+) -> Result<(ValidationResult, Noise)> {
+    of_its_own(config, of)?;
+    let orbit = orbit(config.body, of, calibrated, complaints)?;
     let order = config.solution.order as usize;
     let laboratory = orbit.laboratory(calibrated.names, order)?;
     same_mounting(&of.id, calibrated, &laboratory, &orbit)?;
@@ -46,20 +52,85 @@ pub(super) fn validate(
     };
     let names = calibrated.names;
     let points = points_of(config, names, &orbit, &laboratory, &tables, complaints)?;
+    enough_ties(&points, names)?;
+    let controls = points.iter().filter(|of| of.is(PointKind::Control)).count();
+    if controls < CONTROLS_MIN {
+        return Err(CalibrateError::ThinValidation {
+            orbit: of.id.clone(),
+            found: controls,
+            expected: CONTROLS_MIN,
+        }
+        .into());
+    }
     let pixels: Vec<f64> = orbit.images.iter().map(CameraImage::pixel).collect();
     let unchanged = CalibrationState {
         cameras: calibrated.state.cameras.clone(),
         ..CalibrationState::default()
     };
-    Ok(ValidationResult {
+    let result = ValidationResult {
         orbit: of.id.clone(),
         before: figures(&points, &laboratory.state, &pixels),
         after: figures(&points, &unchanged, &pixels),
-    })
+    };
+    Ok((result, noise(&points, &unchanged)))
+}
+
+/// Whether an orbit has no file of the calibration, by their bytes.
+fn of_its_own(config: &CalibrationConfig, of: &ValidationConfig) -> Result<()> {
+    let cameras = config.cameras.iter().map(|camera| &camera.isd);
+    let own = cameras
+        .chain(&config.ties.files)
+        .chain(&config.control.files);
+    let own = own
+        .map(|path| Ok(hash_file(path)?.0))
+        .collect::<Result<Vec<String>>>()?;
+    for path in of.isd.iter().chain(&of.ties).chain(&of.control) {
+        if own.contains(&hash_file(path)?.0) {
+            return Err(CalibrateError::SameFile {
+                orbit: of.id.clone(),
+                file: file_name(path),
+            }
+            .into());
+        }
+    }
+    Ok(())
+}
+
+/// What measurement and laser alone make of the figures of control.
+fn noise(points: &[OrbitPoint], state: &CalibrationState) -> Noise {
+    let (mut plane, mut height) = (Squares::default(), Squares::default());
+    let parameters = state.layout().len();
+    let exact = DMatrix::zeros(parameters, parameters);
+    for of in points.iter().filter(|of| of.is(PointKind::Control)) {
+        let Some(known) = &of.point.known else {
+            continue;
+        };
+        // Rows are axes over their standard deviations.
+        let [east_m, north_m, up_m] =
+            [0, 1, 2].map(|axis| known.whitening.row(axis).norm().recip());
+        for sight in &of.point.sights {
+            let range_m = (known.place_m - sight.pose.position_m).norm();
+            let [across, along] = sight.sigma.map(|sigma| sigma * range_m);
+            plane.add(east_m.hypot(north_m).hypot(across.hypot(along)));
+        }
+        if let Ok(covariance) = of.unaided().covariance_m2(state, &exact, &known.place_m) {
+            let up = known.place_m.normalize();
+            height.add((up.dot(&(covariance * up))).max(0.0).sqrt().hypot(up_m));
+        }
+    }
+    Noise {
+        plane_m: plane.rms(),
+        height_m: height.rms(),
+    }
 }
 
 /// The images of another orbit, each with the camera whose sensor it names.
-fn orbit(body: Body, of: &ValidationConfig, calibrated: &Calibrated<'_>) -> Result<Orbit> {
+fn orbit(
+    body: Body,
+    of: &ValidationConfig,
+    calibrated: &Calibrated<'_>,
+    complaints: &mut Complaints,
+) -> Result<Orbit> {
     let mut found: Vec<CameraImage> = Vec::new();
     for path in &of.isd {
         found.push(CameraImage::read(path, &of.id, body)?);
@@ -77,6 +148,13 @@ fn orbit(body: Body, of: &ValidationConfig, calibrated: &Calibrated<'_>) -> Resu
         })?;
         images.push(found.swap_remove(at));
     }
+    for other in found {
+        complaints.tell(format!(
+            "validation {}: support data of {} are of no camera of the calibration, or of one that has some already; not used",
+            of.id, other.support.instrument.name
+        ));
+    }
+    belong_together(&images, calibrated.names)?;
     Ok(Orbit::of(images, body, Some(calibrated.orbit.axes))?)
 }
 

@@ -1,0 +1,129 @@
+//! What other orbits have against a calibration that they took no part in.
+
+use super::{
+    judge::Evidence,
+    result::{PointKind, ValidationResult},
+};
+
+/// A figure of control may become worse by so many standard deviations of measurement and laser.
+const WORSE_MAX: f64 = 3.0;
+/// Ties that grow by so much are told.
+const TIES_WORSE: f64 = 1.05;
+/// Control that keeps so much of its error is told.
+const CONTROL_KEPT: f64 = 0.9;
+
+/// What measurement and laser alone make of the figures of control in another orbit, metres: root mean squares.
+#[derive(Clone, Copy)]
+pub(super) struct Noise {
+    /// In the plane.
+    pub(super) plane_m: Option<f64>,
+    /// In height; none where no point is in two cameras.
+    pub(super) height_m: Option<f64>,
+}
+
+/// A figure of control without and with the calibration, and what measurement and laser make of it, metres.
+struct Compared {
+    what: String,
+    before_m: f64,
+    after_m: f64,
+    noise_m: f64,
+}
+
+/// Reasons, then remarks.
+pub(super) fn elsewhere(of: &Evidence<'_>) -> (Vec<String>, Vec<String>) {
+    let (mut reasons, mut remarks) = (Vec::new(), Vec::new());
+    for (orbit, noise) in of.validation.iter().zip(of.validation_noise) {
+        remarks.extend(ties(orbit, of));
+        for compared in control(orbit, *noise, of, &mut remarks) {
+            match compared.reason() {
+                Some(reason) => reasons.push(format!("orbit {}: {reason}", orbit.orbit)),
+                None if compared.is_kept() => remarks.push(format!(
+                    "orbit {}: {}, which is hardly better",
+                    orbit.orbit,
+                    compared.words()
+                )),
+                None => {}
+            }
+        }
+    }
+    (reasons, remarks)
+}
+
+/// Ties that the calibration makes worse.
+fn ties(orbit: &ValidationResult, of: &Evidence<'_>) -> Vec<String> {
+    let mut worse = Vec::new();
+    let [before, after] = [&orbit.before, &orbit.after].map(|of| &of.ties.cameras_px);
+    for (camera, (before, after)) in of.cameras.iter().zip(before.iter().zip(after)) {
+        for (what, axis) in [("across", 0), ("along", 1)] {
+            if let Some((before, after)) = before[axis].zip(after[axis])
+                && after > TIES_WORSE * before
+            {
+                worse.push(format!(
+                    "orbit {}: tie points miss each other {what} the flight in camera {} by {before:.2} px without the calibration \
+                     and {after:.2} px with it",
+                    orbit.orbit, camera.camera
+                ));
+            }
+        }
+    }
+    worse
+}
+
+/// The figures of control; what has none is a remark.
+fn control(
+    orbit: &ValidationResult,
+    noise: Noise,
+    of: &Evidence<'_>,
+    remarks: &mut Vec<String>,
+) -> Vec<Compared> {
+    let [before, after] = [&orbit.before, &orbit.after].map(|of| of.of(PointKind::Control));
+    let Some((before, after)) = before.zip(after) else {
+        remarks.push(format!("orbit {}: no control judges it", orbit.orbit));
+        return Vec::new();
+    };
+    let mut all = Vec::new();
+    let cameras = before.cameras.iter().zip(&after.cameras);
+    let figures = cameras.zip(of.cameras).map(|((before, after), camera)| {
+        let what = format!("control in the plane of camera {}", camera.camera);
+        (what, [before.plane_m, after.plane_m, noise.plane_m])
+    });
+    let height = [before.height_m, after.height_m, noise.height_m];
+    let height = ("control in height".to_owned(), height);
+    for (what, [before_m, after_m, noise_m]) in figures.chain([height]) {
+        let (Some(before_m), Some(after_m), Some(noise_m)) = (before_m, after_m, noise_m) else {
+            remarks.push(format!("orbit {}: nothing judges {what}", orbit.orbit));
+            continue;
+        };
+        all.push(Compared {
+            what,
+            before_m,
+            after_m,
+            noise_m,
+        });
+    }
+    all
+}
+
+impl Compared {
+    fn words(&self) -> String {
+        format!(
+            "{} is off by {:.0} m without the calibration and {:.0} m with it",
+            self.what, self.before_m, self.after_m
+        )
+    }
+
+    fn is_kept(&self) -> bool {
+        self.after_m > CONTROL_KEPT * self.before_m && self.after_m > WORSE_MAX * self.noise_m
+    }
+
+    fn reason(&self) -> Option<String> {
+        let squares = self.after_m * self.after_m - self.before_m * self.before_m;
+        (squares.max(0.0).sqrt() > WORSE_MAX * self.noise_m).then(|| {
+            format!(
+                "{}, worse by more than {WORSE_MAX} standard deviations of measurement and laser: check datum, epoch, lines and \
+                 samples of the laser points of both orbits, and that the orbits are known as well as [a_priori] says",
+                self.words()
+            )
+        })
+    }
+}
