@@ -144,7 +144,7 @@ fn run(command: Command) -> ExitCode {
         Command::Plan(arguments) => finish(plan::run(&arguments)),
         Command::Kernels(arguments) => finish(kernels::run(&arguments)),
         Command::Image(arguments) => finish(image::run(&arguments)),
-        Command::Pedr(arguments) => finish(pedr::run(&arguments)),
+        Command::Pedr(arguments) => pedr::run(&arguments),
         Command::Report(arguments) => report::run(&arguments),
         Command::Triangulate(arguments) => triangulate::run(&arguments),
         Command::Calibrate(arguments) => calibrate::run(&arguments),

@@ -1,16 +1,20 @@
 //! `areograph pedr`.
 
+mod filter;
 mod index;
 mod info;
+mod matching;
 mod qa;
 mod search;
 #[cfg(feature = "sql")]
 mod sql;
 mod tab;
 
+use std::process::ExitCode;
+
 use clap::{Args, Subcommand};
 
-use crate::error::Error;
+use super::finish;
 
 /// Looks into PEDR files.
 #[derive(Debug, Args)]
@@ -26,18 +30,21 @@ enum Command {
     Index(index::Arguments),
     Search(search::Arguments),
     Qa(qa::Arguments),
+    Match(matching::Arguments),
     #[cfg(feature = "sql")]
     Sql(sql::Arguments),
 }
 
-pub(super) fn run(arguments: &Arguments) -> Result<(), Error> {
-    match &arguments.command {
+pub(super) fn run(arguments: &Arguments) -> ExitCode {
+    let ran = match &arguments.command {
         Command::Info(arguments) => info::run(arguments),
         Command::Tab(arguments) => tab::run(arguments),
         Command::Index(arguments) => index::run(arguments),
         Command::Search(arguments) => search::run(arguments),
         Command::Qa(arguments) => qa::run(arguments),
+        Command::Match(arguments) => return matching::run(arguments),
         #[cfg(feature = "sql")]
         Command::Sql(arguments) => sql::run(arguments),
-    }
+    };
+    finish(ran)
 }

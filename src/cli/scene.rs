@@ -10,7 +10,7 @@ use crate::{
     scene::{
         ArchiveOptions, Coder, Roughness, SceneErrors, SceneOptions, write_archive,
         write_calibration_scene, write_plane_scene, write_scene, write_scene_along,
-        write_scene_with_images,
+        write_scene_with_images, write_terrain_model_scene,
     },
     units::SECONDS_PER_DAY,
 };
@@ -66,12 +66,15 @@ pub(super) struct Arguments {
     /// Two stereo lines of a camera for `areograph calibrate` instead of a mission.
     #[arg(long, conflicts_with_all = ["along", "realistic", "day_s", "images", "plane"])]
     calibration: bool,
+    /// A terrain model and laser passes over it for `areograph pedr match` instead of a mission.
+    #[arg(long, conflicts_with_all = ["along", "realistic", "day_s", "images", "plane", "calibration"])]
+    terrain_model: bool,
     /// An archive of so many PEDR files, about a day each, with its kernels, instead of a mission: what
     /// `areograph pedr` reads.
-    #[arg(long, value_name = "FILES", conflicts_with_all = ["along", "realistic", "day_s", "plane", "calibration"])]
+    #[arg(long, value_name = "FILES", conflicts_with_all = ["along", "realistic", "day_s", "plane", "calibration", "terrain_model"])]
     days: Option<u32>,
     /// The same, of about so many gigabytes.
-    #[arg(long, value_name = "GB", conflicts_with_all = ["along", "realistic", "day_s", "plane", "calibration", "days"])]
+    #[arg(long, value_name = "GB", conflicts_with_all = ["along", "realistic", "day_s", "plane", "calibration", "terrain_model", "days"])]
     gb: Option<f64>,
     /// With --along: labels of images to put into the site file.
     #[arg(long, value_name = "FILE", requires = "along")]
@@ -139,6 +142,13 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Error> {
     }
     if arguments.calibration {
         output::line(write_calibration_scene(
+            &arguments.directory,
+            arguments.seed,
+        )?);
+        return Ok(());
+    }
+    if arguments.terrain_model {
+        output::line(write_terrain_model_scene(
             &arguments.directory,
             arguments.seed,
         )?);

@@ -13,6 +13,7 @@ mod compare;
 mod driver;
 mod evidence;
 mod kernels;
+mod laser_match;
 mod manifest;
 mod net;
 mod observer;
@@ -42,6 +43,7 @@ pub use compare::{
     require_different,
 };
 pub use driver::StageReason;
+pub use laser_match::run_match;
 pub use net::run_net;
 pub use observer::{Observer, StageEvent};
 pub use out::{OutError, check_out};

@@ -232,6 +232,14 @@ impl PixelFile {
     }
 }
 
+/// The lines of a TIFF as numbers, from the first one on.
+///
+/// # Errors
+/// The system's refusal to read; a picture that is not of one band of grey, or that its library refuses.
+pub(super) fn tiff_rows(path: &Path) -> Result<Box<dyn Rows>> {
+    Picture::Tiff.rows(path)
+}
+
 /// Whether the label describes pixels as ISIS has them.
 fn is_cube(label: &Label) -> bool {
     label.entries.iter().any(|entry| entry.group == "CORE")

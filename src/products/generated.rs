@@ -5,6 +5,7 @@ use std::fmt::Write as _;
 use super::{
     archive::{ARCHIVE_PRODUCTS, SHOTS},
     calibration::{CALIBRATION_PRODUCTS, CAMERA_SUPPORT},
+    laser_match::{CONTROL, MATCH_PRODUCTS},
     net::NET_PRODUCTS,
     product::{Content, Declaration},
     registry::PRODUCTS,
@@ -32,9 +33,12 @@ fn contents() -> impl Iterator<Item = &'static Content> {
     let of_nets = NET_PRODUCTS.iter().map(|product| &product.content);
     let of_archives = ARCHIVE_PRODUCTS.iter().map(|product| &product.content);
     let of_calibrations = CALIBRATION_PRODUCTS.iter().map(|product| &product.content);
+    let of_matches = MATCH_PRODUCTS.iter().map(|product| &product.content);
     let of_sites = PRODUCTS.iter().map(|product| &product.content);
     let all = of_sites.chain(of_nets).chain(of_archives);
-    all.chain(of_calibrations).chain([&SHOTS.content])
+    all.chain(of_calibrations)
+        .chain(of_matches)
+        .chain([&SHOTS.content])
 }
 
 /// `docs/products.md`: every product, and the columns of every table.
@@ -90,6 +94,21 @@ pub fn documentation() -> String {
         .filter(|product| product.path.contains(".parquet"))
     {
         text += &columns_of(product, "calibration: ");
+    }
+    text += "\n## Laser control points from terrain models\n\n\
+        Products of `areograph pedr match`, in the folder `--out`; `manifest.json` comes last here too. `match:` stands before \
+        their names below.\n\n\
+        | file | what it is | for | rows | schema |\n|---|---|---|---|---|\n";
+    text += &line_of(&CONTROL);
+    for product in MATCH_PRODUCTS {
+        text += &line_of(product);
+    }
+    text += &columns_of(&CONTROL, "match: ");
+    for product in MATCH_PRODUCTS
+        .iter()
+        .filter(|product| product.path.contains(".parquet"))
+    {
+        text += &columns_of(product, "match: ");
     }
     text += "\n## Archives of PEDR files\n\n\
         Products of `areograph pedr qa`, in the folder `--out`; `manifest.json` comes last here too. `archive:` stands \

@@ -25,6 +25,7 @@ mod gis;
 mod heights;
 mod isd;
 mod kernel_report;
+mod laser_match;
 mod light_time;
 mod listed;
 mod net;
@@ -64,6 +65,7 @@ pub use exchange::{
 };
 pub use found_shots::{ShotsFile, ShotsFormat};
 pub use generated::{documentation, schemas};
+pub use laser_match::{MatchProducts, write_match_products};
 pub use listed::{Listed, listed};
 pub use net::{NetProducts, write_net_products};
 pub(crate) use overlays::{Picture, anaglyph, piece, strip};

@@ -30,6 +30,7 @@ mod graticule;
 mod heights;
 mod html;
 mod images;
+mod laser_match;
 mod map;
 mod matching;
 mod misregistration;
@@ -68,6 +69,7 @@ pub use fidelity::{
     FIDELITY_FILE, Fidelity, FidelityPaper, FidelityRow, fidelity_page, published_fidelity_page,
 };
 pub use html::STYLE;
+pub use laser_match::match_page;
 pub use net::net_page;
 pub use overlays::overlays_page;
 pub use sites::{Earlier, SiteLine, SiteSummary, sites_page};

@@ -13,6 +13,7 @@
 //! | `archive`, `archive_frames` | PEDR files of any number of days, with kernels to check them by |
 //! | `ties` | places that two images show, in images that were truly taken elsewhere and at other times |
 //! | `calibration`, `pushbroom_pair` | two stereo lines of a camera for its calibration |
+//! | `terrain_model` | a terrain model that lies aside, laser passes over it |
 //! | `kernels`, `pedr`, `sites`, `truth` | the files |
 //! | `mission`, `along` | the entry points of a mission |
 //!
@@ -41,12 +42,12 @@ pub mod plan;
 mod plane;
 mod plane_net;
 mod pushbroom_pair;
-mod random;
 mod roughness;
 mod sites;
 mod sun;
 mod telemetry;
 mod terrain;
+mod terrain_model;
 mod ties;
 mod truth;
 mod versions;
@@ -55,6 +56,8 @@ use std::{
     fmt,
     path::{Path, PathBuf},
 };
+
+use crate::geom::random;
 
 pub use along::write_scene_along;
 pub use archive::{ArchiveOptions, ArchiveSummary, write_archive};
@@ -68,6 +71,7 @@ pub use images::Coder;
 pub use mission::{write_scene, write_scene_with_images};
 pub use plane::write_plane_scene;
 pub use plane_net::{PlaneRecipe, PlaneScene};
+pub use terrain_model::write_terrain_model_scene;
 
 /// How a mission is invented.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -159,6 +159,16 @@ impl DatumTurn {
         }
     }
 
+    /// For a file in `datum` whose shots are turned at their time tags.
+    #[must_use]
+    pub fn at_tags(datum: Datum) -> Self {
+        Self {
+            body: datum.body(),
+            datum,
+            turn_s: 0.0,
+        }
+    }
+
     /// Whether coordinates stay as they are.
     #[must_use]
     pub fn is_none(&self) -> bool {

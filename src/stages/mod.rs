@@ -17,6 +17,7 @@ pub mod image_pixels;
 pub mod intersect;
 pub mod judge;
 pub mod lay_overlays;
+pub mod match_laser;
 pub mod match_ties;
 pub mod mola_surface;
 pub mod orientation;

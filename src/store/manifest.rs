@@ -90,8 +90,15 @@ pub mod figures {
     /// Root mean square height of held-back control of a calibration, intersected minus the laser's, metres.
     pub const HELD_BACK_HEIGHT_RMS_M: &str = "held_back_height_rms_m";
 
+    /// Root mean square of terrain model minus laser at shots that were held out of a match, bias removed, metres.
+    pub const HELD_OUT_RMS_M: &str = "held_out_rms_m";
+
     /// All of them, and what they are.
-    const ALL: [(&str, &str); 12] = [
+    const ALL: [(&str, &str); 13] = [
+        (
+            HELD_OUT_RMS_M,
+            "Root mean square of terrain model minus laser at shots that were held out of a match, bias removed, metres.",
+        ),
         (
             RANGE_MEAN_M,
             "Largest |mean| of range minus distance of a profile, metres.",

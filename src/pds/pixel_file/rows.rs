@@ -16,7 +16,7 @@ pub(super) fn fits(lines: u32, samples: u32) -> bool {
 }
 
 /// Reads an image from its first line to its last.
-pub(super) trait Rows: std::fmt::Debug {
+pub(in crate::pds) trait Rows: std::fmt::Debug {
     /// Lines and samples.
     fn size(&self) -> [u32; 2];
 

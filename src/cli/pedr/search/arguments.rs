@@ -6,12 +6,11 @@ use clap::{ArgGroup, Args, ValueEnum};
 
 use crate::{
     altimetry::ShotFilter,
-    cli::windows::WindowArguments,
+    cli::{pedr::filter::FilterArguments, windows::WindowArguments},
     error::{Cause, Kind, Result},
     products::ShotsFormat,
     spice::{KernelSet, Session},
     time::{Et, Interval},
-    units::RADIANS_PER_DEGREE,
 };
 
 /// Finds the shots of an archive that lie in windows, each by its own position in IAU 2000.
@@ -36,18 +35,8 @@ pub(in crate::cli::pedr) struct Arguments {
     /// Leap seconds (LSK, such as naif0012.tls), for times in UTC.
     #[arg(long, value_name = "FILE")]
     pub(super) leap_seconds: Option<PathBuf>,
-    /// Classification codes to keep: 1 ground, 0 cloud or noise.
-    #[arg(long, value_delimiter = ',', default_values_t = [1], allow_hyphen_values = true)]
-    pub(super) classes: Vec<i16>,
-    /// Trigger channels to keep.
-    #[arg(long, value_delimiter = ',', default_values_t = [1, 2, 3, 4])]
-    pub(super) channels: Vec<u8>,
-    /// Attitude flags to keep.
-    #[arg(long, value_delimiter = ',', default_values_t = [0, 1])]
-    pub(super) attitude_flags: Vec<u16>,
-    /// Largest off-nadir angle of the laser, degrees.
-    #[arg(long, value_name = "DEGREES", default_value_t = 90.0)]
-    pub(super) off_nadir_max_deg: f64,
+    #[command(flatten)]
+    pub(super) shots: FilterArguments,
     /// Complain of every bad record of the files, not only of those near the windows.
     #[arg(long)]
     pub(super) check_all: bool,
@@ -118,12 +107,7 @@ impl Arguments {
     }
 
     pub(super) fn filter(&self) -> ShotFilter {
-        ShotFilter {
-            classes: self.classes.clone(),
-            channels: self.channels.clone(),
-            attitude_flags: self.attitude_flags.clone(),
-            off_nadir_max_rad: self.off_nadir_max_deg * RADIANS_PER_DEGREE,
-        }
+        self.shots.filter()
     }
 
     pub(super) fn time(&self) -> Result<Option<Interval>> {

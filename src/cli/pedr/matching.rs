@@ -1,0 +1,182 @@
+//! `areograph pedr match`.
+
+use std::{path::PathBuf, process::ExitCode};
+
+use clap::{Args, ValueEnum};
+
+use super::filter::FilterArguments;
+use crate::{
+    body::Body,
+    cli::{
+        report,
+        single::{Asked, answer},
+    },
+    error::{Cause, Kind},
+    flow::run_match,
+    stages::match_laser::{MatchImage, MatchOptions, MatchRequest, Similarity},
+};
+
+/// Finds laser control points: shots of PEDR files over a stereo terrain model, shifted until their heights fit.
+///
+/// Shots become segments with relief, these units of several passes, and each unit is searched for the shift at which the model
+/// has its heights (Li et al. 2023). Every fourth shot of a unit takes no part and judges. Products go to --out: units with
+/// shift and reason, a control point of every unit that is kept, a page; with --isd also control.csv for `areograph calibrate`.
+/// The exit code is 5 when too few units are kept, or shots that were held out do not bear them out.
+///
+/// Example: areograph scene demo --terrain-model && areograph pedr match demo/model.tif demo/pedr --isd s1=demo/isd/s1.json --isd s2=demo/isd/s2.json --out control
+#[derive(Debug, Args)]
+#[command(verbatim_doc_comment)]
+pub(super) struct Arguments {
+    /// `GeoTIFF` of one band: heights above a sphere in metres, over longitude and latitude or in an equirectangular map.
+    #[arg(value_name = "MODEL.tif")]
+    model: PathBuf,
+    /// PEDR files, and folders with .b files in and below them.
+    #[arg(required = true, value_name = "PATH")]
+    paths: Vec<PathBuf>,
+    /// Folder of the products.
+    #[arg(long, default_value = "match")]
+    out: PathBuf,
+    /// An image that the model was made from, by its support data; two or more, named as the cameras of the calibration.
+    #[arg(long, value_name = "NAME=FILE", value_parser = image)]
+    isd: Vec<(String, PathBuf)>,
+    /// Radius of the sphere that heights of the model count from; the default is that of the file's map.
+    #[arg(long, value_name = "METRES")]
+    radius_m: Option<f64>,
+    /// Heights count from another sphere than the file's map is of: that of --radius-m.
+    #[arg(long, requires = "radius_m")]
+    heights_apart: bool,
+    /// Most shots of a segment.
+    #[arg(long, default_value_t = 15, value_parser = clap::value_parser!(u16).range(3..=1_000))]
+    segment_points: u16,
+    /// Variance of heights that a segment must exceed, square metres.
+    #[arg(long, value_name = "M2", default_value_t = 1_000.0, value_parser = above_zero)]
+    least_variance: f64,
+    /// How alike heights are; auto takes pearson while the model lies off by more than a tenth of the relief, or 100 m, else ccc.
+    #[arg(long, value_enum, default_value_t = Measure::Auto)]
+    similarity: Measure,
+    /// Shifts are tried within so many cells to all sides.
+    #[arg(long, value_name = "CELLS", default_value_t = 70, value_parser = clap::value_parser!(u16).range(1..=500))]
+    search: u16,
+    /// Similarity that a unit must exceed, below 1.
+    #[arg(long, default_value_t = 0.9, value_parser = share)]
+    least_score: f64,
+    /// What the best similarity over the mean of those above 0 must exceed.
+    #[arg(long, default_value_t = 1.0, value_parser = above_zero)]
+    least_contrast: f64,
+    /// Largest root mean square of model minus laser at all shots that were held out, bias removed, metres.
+    #[arg(long, value_name = "METRES", default_value_t = 60.0, value_parser = above_zero)]
+    limit_m: f64,
+    /// Seed of the clusters.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    #[command(flatten)]
+    shots: FilterArguments,
+    /// Match again, whatever is stored.
+    #[arg(long)]
+    force: bool,
+    /// Print JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+/// A measure, as typed.
+#[derive(Debug, Clone, Copy, ValueEnum)]
+#[value(rename_all = "snake_case")]
+enum Measure {
+    Auto,
+    Ccc,
+    Pearson,
+    CccBiasRemoved,
+}
+
+/// One image is given.
+#[derive(Debug, thiserror::Error)]
+#[error("--isd names the images {0:?}; expected two or more, each with a name of its own")]
+struct Images(Vec<String>);
+
+impl Cause for Images {
+    fn kind(&self) -> Kind {
+        Kind::Configuration
+    }
+
+    fn advice(&self) -> String {
+        "give --isd NAME=FILE for every image that the model was made from, or for none".to_owned()
+    }
+}
+
+fn image(text: &str) -> Result<(String, PathBuf), String> {
+    let parts = text.split_once('=');
+    let parts = parts.filter(|(name, file)| !name.is_empty() && !file.is_empty());
+    let (name, file) = parts.ok_or("expected a name and a file: s1=isd/s1.json")?;
+    Ok((name.to_owned(), file.into()))
+}
+
+fn above_zero(text: &str) -> Result<f64, String> {
+    let number: Option<f64> = text.parse().ok();
+    let number = number.filter(|number| *number > 0.0 && number.is_finite());
+    number.ok_or_else(|| "expected a number above 0".to_owned())
+}
+
+fn share(text: &str) -> Result<f64, String> {
+    let number = above_zero(text).ok().filter(|number| *number < 1.0);
+    number.ok_or_else(|| "expected a number between 0 and 1".to_owned())
+}
+
+impl Arguments {
+    fn request(&self) -> Result<MatchRequest, Images> {
+        let names: std::collections::BTreeSet<&String> =
+            self.isd.iter().map(|(name, _)| name).collect();
+        if self.isd.len() == 1 || names.len() < self.isd.len() {
+            return Err(Images(self.isd.iter().map(|of| of.0.clone()).collect()));
+        }
+        let images = self.isd.iter().cloned();
+        Ok(MatchRequest {
+            options: MatchOptions {
+                segment_points: usize::from(self.segment_points),
+                least_variance_m2: self.least_variance,
+                similarity: match self.similarity {
+                    Measure::Auto => None,
+                    Measure::Ccc => Some(Similarity::Ccc),
+                    Measure::Pearson => Some(Similarity::Pearson),
+                    Measure::CccBiasRemoved => Some(Similarity::CccBiasRemoved),
+                },
+                search_cells: u32::from(self.search),
+                least_score: self.least_score,
+                least_contrast: self.least_contrast,
+                limit_m: self.limit_m,
+                seed: self.seed,
+                filter: self.shots.filter(),
+            },
+            body: Body::Mars,
+            radius_m: self.radius_m,
+            heights_apart: self.heights_apart,
+            model: self.model.clone(),
+            pedr: self.paths.clone(),
+            images: images.map(|(name, isd)| MatchImage { name, isd }).collect(),
+        })
+    }
+}
+
+/// Matches and prints how it ended.
+pub(super) fn run(arguments: &Arguments) -> ExitCode {
+    let request = match arguments.request() {
+        Ok(request) => request,
+        Err(failure) => return report(&failure.into()),
+    };
+    let asked = Asked {
+        what: "model",
+        name: &crate::files::file_name(&arguments.model),
+        json: arguments.json,
+    };
+    let ran = run_match(&request, &arguments.out, arguments.force);
+    answer(&asked, ran, |count| {
+        format!(
+            "{} of {} units kept, {} shots in {} passes, {} held out",
+            count("units_kept"),
+            count("units"),
+            count("shots"),
+            count("tracks"),
+            count("held_out_shots"),
+        )
+    })
+}

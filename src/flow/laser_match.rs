@@ -1,0 +1,137 @@
+//! Laser profiles matched with a terrain model, from files to products.
+
+use std::{collections::BTreeMap, path::Path};
+
+use super::{
+    out::check_out_path,
+    single::{Single, SingleOutcome, Told, made},
+};
+use crate::{
+    error::{Cause, Kind, Locate as _, Result},
+    pds::archive::Listing,
+    products::{MatchProducts, write_match_products},
+    report::match_page,
+    stage::InOrder,
+    stages::match_laser::{LaserMatch, MatchLaser, MatchRequest, match_files},
+    store::manifest::figures,
+};
+
+/// Raised when the products of a match are laid out anew.
+const METHOD: u32 = 1;
+/// What stands for the name of a site in messages and in the manifest.
+const NAME: &str = "pedr_match";
+
+/// No file to search.
+#[derive(Debug, thiserror::Error)]
+#[error("no PEDR file (*.b) to search")]
+struct NoFiles;
+
+impl Cause for NoFiles {
+    fn kind(&self) -> Kind {
+        Kind::Input
+    }
+
+    fn advice(&self) -> String {
+        "name PEDR files (AP#####v.B), or folders that hold them".to_owned()
+    }
+}
+
+/// Matches laser profiles with a terrain model and publishes the products in the folder `out`, when something has changed since
+/// the last time. `request.pedr` may name folders too.
+///
+/// # Errors
+/// Files that cannot be read, no shot on the model, a disk that refuses; what stood before stands then.
+pub fn run_match(request: &MatchRequest, out: &Path, force: bool) -> Result<SingleOutcome> {
+    check_out_path(out)?;
+    let listing = Listing::of(&request.pedr);
+    if let Some(failure) = listing.failures.into_iter().next() {
+        return Err(failure.in_site(NAME));
+    }
+    if listing.paths.is_empty() {
+        return Err(NoFiles).in_site(NAME);
+    }
+    let request = MatchRequest {
+        pedr: listing.paths,
+        ..request.clone()
+    };
+    let keys = keys(&request);
+    let hash = blake3::hash(format!("{keys:?}").as_bytes()).to_hex();
+    let single = Single {
+        name: NAME,
+        file: Path::new(""),
+        blake3: &hash,
+        keys: &keys,
+        method: METHOD,
+        folder: out.to_owned(),
+        force,
+    };
+    single.run(
+        &match_files(&request),
+        |hashed, cache, stop| {
+            let stage = MatchLaser {
+                request: &request,
+                files: InOrder(hashed),
+            };
+            made(&stage, cache, stop)
+        },
+        |staging, result| {
+            let page = match_page(result)?;
+            let products = MatchProducts {
+                result,
+                page: &page,
+            };
+            write_match_products(staging, &products)
+        },
+        told,
+    )
+}
+
+/// What was asked for, as the manifest has it.
+fn keys(request: &MatchRequest) -> BTreeMap<String, String> {
+    let options = &request.options;
+    let name = |path: &Path| crate::files::file_name(path);
+    let images = request.images.iter();
+    let images: Vec<String> = images
+        .map(|image| format!("{}={}", image.name, name(&image.isd)))
+        .collect();
+    let radius = request.radius_m.map(|of| of.to_string());
+    let similarity = options.similarity.map_or("auto", |of| of.word());
+    let keys = [
+        ("model", name(&request.model)),
+        ("isd", images.join(" ")),
+        ("radius_m", radius.unwrap_or_default()),
+        ("heights_apart", request.heights_apart.to_string()),
+        ("segment_points", options.segment_points.to_string()),
+        ("least_variance_m2", options.least_variance_m2.to_string()),
+        ("similarity", similarity.to_owned()),
+        ("search_cells", options.search_cells.to_string()),
+        ("least_score", options.least_score.to_string()),
+        ("least_contrast", options.least_contrast.to_string()),
+        ("limit_m", options.limit_m.to_string()),
+        ("seed", options.seed.to_string()),
+    ];
+    keys.map(|(key, value)| (key.to_owned(), value)).into()
+}
+
+/// What the manifest says of a match.
+fn told(result: &LaserMatch) -> Told<'_> {
+    let kept = result.units.iter().filter(|unit| unit.is_kept());
+    let held_out = result.held_out.as_ref();
+    Told {
+        verdict: &result.verdict,
+        counts: vec![
+            ("shots", result.shots as u64),
+            ("tracks", result.tracks as u64),
+            ("segments", result.segments as u64),
+            ("segments_kept", result.segments_kept as u64),
+            ("units", result.units.len() as u64),
+            ("units_kept", kept.count() as u64),
+            ("held_out_shots", held_out.map_or(0, |of| of.shots as u64)),
+        ],
+        figures: held_out
+            .map(|of| (figures::HELD_OUT_RMS_M, of.after_m))
+            .into_iter()
+            .collect(),
+        complaints: (&result.complaints, result.complaint_count),
+    }
+}

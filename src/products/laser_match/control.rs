@@ -1,0 +1,83 @@
+//! The table of laser control that `areograph calibrate` reads: where images show what the laser knows the place of.
+
+use super::WriteMatch;
+use crate::{
+    products::{
+        coordinates::{degrees, signed_longitude_deg},
+        product::{Content, Declaration, Role},
+        table::{Column, Table, Unit, column, meanings},
+        text_table,
+    },
+    stages::match_laser::{LaserMatch, MatchedPoint},
+    units::wrap_two_pi,
+};
+
+pub(in crate::products) static CONTROL: Declaration<WriteMatch> = Declaration {
+    path: "control.csv",
+    what: "the control points in the images given with `--isd`, for `[control] files` of a calibration",
+    readers: "areograph calibrate",
+    rows: "places in images",
+    role: Role::Data,
+    content: Content::Table(|| meanings(&columns())),
+    write: |path, of| text_table::write(path, Table::new(columns(), rows(of.result))),
+    uses: &[],
+};
+
+/// A point in an image.
+struct Row<'a> {
+    point: &'a MatchedPoint,
+    image: &'a str,
+    place: [f64; 2],
+}
+
+fn rows(of: &LaserMatch) -> Vec<Row<'_>> {
+    let mut rows = Vec::new();
+    for point in &of.points {
+        for (image, place) in of.images.iter().zip(&point.in_images) {
+            rows.extend(place.map(|place| Row {
+                point,
+                image,
+                place,
+            }));
+        }
+    }
+    rows
+}
+
+fn columns<'a>() -> Vec<Column<Row<'a>>> {
+    vec![
+        column("point", Unit::None, "name of the point", |row: &Row| {
+            row.point.name.clone()
+        }),
+        column("camera", Unit::None, "name of the image", |row: &Row| {
+            row.image.to_owned()
+        }),
+        column(
+            "line",
+            Unit::Line,
+            "line at which the image has the model's place, 0 at the outer edge of the first",
+            |row: &Row| row.place[0],
+        ),
+        column("sample", Unit::Pixel, "sample, likewise", |row: &Row| {
+            row.place[1]
+        }),
+        column(
+            "longitude_deg",
+            Unit::Degree,
+            "east longitude by the laser, -180 to 180 degrees",
+            |row: &Row| signed_longitude_deg(wrap_two_pi(row.point.laser[0])),
+        ),
+        column(
+            "latitude_deg",
+            Unit::Degree,
+            "areocentric latitude by the laser, degrees",
+            |row: &Row| degrees(row.point.laser[1]),
+        ),
+        column(
+            "radius_m",
+            Unit::Metre,
+            "distance from the centre of Mars by the laser, metres",
+            |row: &Row| row.point.laser[2],
+        ),
+    ]
+}

@@ -1,0 +1,91 @@
+//! Control points: where the laser has a place, and where the model has it.
+
+use super::{MatchProducts, WriteMatch, natural, write_parquet};
+use crate::{
+    products::{
+        coordinates::{degrees, signed_longitude_deg},
+        product::{Content, Declaration, Role},
+        table::{Column, Table, Unit, column, meanings},
+        text_table,
+    },
+    stages::match_laser::MatchedPoint,
+    units::wrap_two_pi,
+};
+
+pub(super) static TABLE: Declaration<WriteMatch> = Declaration {
+    path: "control_points.parquet",
+    what: "a laser control point of every unit that is kept: its place by the laser and in the model",
+    readers: "scripts",
+    rows: "points",
+    role: Role::Data,
+    content: Content::Table(|| meanings(&columns())),
+    write: |path, of| write_parquet(path, of, table(of)),
+    uses: &[],
+};
+
+pub(super) static CSV: Declaration<WriteMatch> = Declaration {
+    path: "control_points.csv",
+    what: "the same as CSV",
+    readers: "spreadsheets, scripts",
+    rows: "points",
+    role: Role::Data,
+    content: Content::Table(|| meanings(&columns())),
+    write: |path, of| text_table::write(path, table(of)),
+    uses: &[],
+};
+
+fn table<'a>(of: &MatchProducts<'a>) -> Table<'a> {
+    Table::new(columns(), of.result.points.iter().collect())
+}
+
+type Row<'a> = &'a MatchedPoint;
+
+fn columns<'a>() -> Vec<Column<Row<'a>>> {
+    vec![
+        column(
+            "point",
+            Unit::None,
+            "PEDR file, record and shot: of the shots of a unit that were used the one nearest to their bias",
+            |row: &Row| row.name.clone(),
+        ),
+        column("unit", Unit::None, "number of its unit", |row: &Row| {
+            natural(row.unit)
+        }),
+        column(
+            "longitude_deg",
+            Unit::Degree,
+            "east longitude by the laser, IAU 2000, -180 to 180 degrees",
+            |row: &Row| signed_longitude_deg(wrap_two_pi(row.laser[0])),
+        ),
+        column(
+            "latitude_deg",
+            Unit::Degree,
+            "areocentric latitude by the laser, degrees",
+            |row: &Row| degrees(row.laser[1]),
+        ),
+        column(
+            "radius_m",
+            Unit::Metre,
+            "distance from the centre of Mars by the laser, metres",
+            |row: &Row| row.laser[2],
+        ),
+        column(
+            "model_longitude_deg",
+            Unit::Degree,
+            "east longitude of the same ground in the model: the laser's place and the shift of the unit",
+            |row: &Row| signed_longitude_deg(wrap_two_pi(row.model[0])),
+        ),
+        column(
+            "model_latitude_deg",
+            Unit::Degree,
+            "likewise the latitude",
+            |row: &Row| degrees(row.model[1]),
+        ),
+        column(
+            "model_radius_m",
+            Unit::Metre,
+            "height of the model there, from the centre of Mars, metres",
+            |row: &Row| row.model[2],
+        ),
+    ]
+}

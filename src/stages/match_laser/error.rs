@@ -1,0 +1,55 @@
+//! Why there is no match at all.
+
+use crate::error::{Cause, Kind};
+
+/// No match.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum MatchError {
+    /// Two files hold the same shots.
+    #[error(
+        "holds shots that {other} holds as well; every shot counts once, or held-out shots would be shots that took part"
+    )]
+    SharedShots {
+        /// The other file.
+        other: String,
+    },
+    /// No shot lies on the model.
+    #[error(
+        "no shot lies on the model, which reaches from {west:.3} to {east:.3} degrees east and from {south:.3} to {north:.3} degrees of latitude"
+    )]
+    NoShots {
+        /// Its edges, degrees.
+        west: f64,
+        /// East.
+        east: f64,
+        /// South.
+        south: f64,
+        /// North.
+        north: f64,
+    },
+    /// An image has no lines for ground points.
+    #[error("image {image}: {problem}")]
+    Image {
+        /// The image.
+        image: String,
+        /// What is wrong.
+        problem: String,
+    },
+}
+
+impl Cause for MatchError {
+    fn kind(&self) -> Kind {
+        Kind::Input
+    }
+
+    fn advice(&self) -> String {
+        match self {
+            Self::SharedShots { .. } => "name only one of the two files",
+            Self::NoShots { .. } => {
+                "name PEDR files of passes over the model, and look at its place: longitudes are east, latitudes areocentric"
+            }
+            Self::Image { .. } => "check the support data: they must be those of an image that sees the ground",
+        }
+        .to_owned()
+    }
+}

@@ -1,0 +1,238 @@
+//! Laser profiles against a terrain model: units of shots with relief, each searched for where the model has its heights, judged by
+//! shots that were held out; a control point of every unit that is kept.
+//!
+//! # Source
+//! Li et al. 2023, section 3.2: segments, relief filter, clusters, similarity (eq. 16–18). What the paper leaves open, and where we
+//! depart from it, stands at the constants.
+
+mod clusters;
+mod error;
+mod images;
+mod judge;
+mod result;
+mod search;
+mod shots;
+mod similarity;
+mod units;
+
+use std::{collections::BTreeMap, path::PathBuf, sync::atomic::AtomicBool};
+
+use rayon::prelude::*;
+
+use self::{
+    clusters::clusters,
+    images::{camera, enter},
+    judge::{Evidence, bias_limit_m, judge, pooled},
+    shots::{Shot, is_kept, shots_over},
+    units::{Unit, refuse_lonely},
+};
+pub use self::{
+    error::MatchError,
+    result::{
+        HeldOut, LaserMatch, MatchImage, MatchOptions, MatchRequest, MatchedPoint, UnitMatch,
+        UnitResult,
+    },
+    similarity::{Moments, Similarity},
+};
+use crate::{
+    error::{Result, Stopped},
+    files::HashedFile,
+    geom::{height_grid::HeightGrid, statistics::Summary},
+    pds::terrain_model::{HeightsAbove, read_terrain_model},
+    stage::{InOrder, Stage},
+    stage_inputs,
+};
+
+stage_inputs! {
+    /// What to match and how, and the files.
+    pub struct MatchLaser<'a> {
+        /// The request.
+        pub request: &'a MatchRequest,
+        /// Its files with their hashes: the model, support data of images, PEDR files.
+        pub files: InOrder<'a, HashedFile>,
+    }
+}
+
+impl Stage for MatchLaser<'_> {
+    const NAME: &'static str = "match_laser";
+    type Output = LaserMatch;
+    stage_inputs!(fingerprint);
+
+    fn run(&self, stop: &AtomicBool) -> Result<LaserMatch> {
+        match_laser(self.request, stop)
+    }
+}
+
+/// Every file of a request, in order.
+#[must_use]
+pub fn match_files(of: &MatchRequest) -> Vec<PathBuf> {
+    let images = of.images.iter().map(|image| image.isd.clone());
+    let model = std::iter::once(of.model.clone());
+    model.chain(images).chain(of.pedr.clone()).collect()
+}
+
+/// Matches laser profiles with a terrain model.
+///
+/// # Errors
+/// Files that cannot be read; no shot on the model; shots that two files hold; [`Stopped`].
+pub fn match_laser(request: &MatchRequest, stop: &AtomicBool) -> Result<LaserMatch> {
+    let options = &request.options;
+    let above = HeightsAbove {
+        radius_m: request.radius_m,
+        apart: request.heights_apart,
+    };
+    let cameras = request
+        .images
+        .iter()
+        .map(|image| camera(image, request.body));
+    let cameras = cameras.collect::<Result<Vec<_>>>()?;
+    let grid = read_terrain_model(&request.model, request.body, above)?;
+    let shots = shots_over(&grid, &request.pedr, &options.filter, stop)?;
+    if shots.shots.is_empty() {
+        let [west, south, east, north] = grid.edges_rad().map(f64::to_degrees);
+        return Err(MatchError::NoShots {
+            west,
+            south,
+            east,
+            north,
+        }
+        .into());
+    }
+    let segments = shots.segments(options.segment_points);
+    let kept: Vec<&[Shot]> = segments
+        .iter()
+        .copied()
+        .filter(|segment| is_kept(&grid, segment, options))
+        .collect();
+    let units = units_of(&grid, &kept, options.seed);
+    Stopped::check(stop)?;
+    let mut search = searched(&grid, &units, options);
+    let matching = refuse_lonely(&mut search.units, options.search_cells);
+    let points = units.iter().zip(&search.units);
+    let points = points.filter(|(_, told)| told.is_kept());
+    let mut points: Vec<MatchedPoint> = points
+        .filter_map(|(unit, told)| unit.point(&grid, told))
+        .collect();
+    enter(&cameras, &mut points)?;
+    let images: Vec<String> = request.images.iter().map(|of| of.name.clone()).collect();
+    let mut complaints = shots.complaints.clone();
+    let unseen = unseen(&images, &points);
+    let complaint_count = shots.complaint_count + unseen.len() as u64;
+    complaints.extend(unseen);
+    let (bias_m, held_out) = (median_bias_m(&search.units), pooled(&search.units));
+    let verdict = judge(&Evidence {
+        units: &search.units,
+        matching,
+        similarity: search.measure,
+        located_m: search.located_m,
+        is_auto: options.similarity.is_none(),
+        held_out,
+        limit_m: options.limit_m,
+        radius_is_stated: request.radius_m.is_some(),
+        complaints: complaint_count,
+    });
+    Ok(LaserMatch {
+        radius_m: grid.radius_m,
+        cell_m: grid.cell_m(),
+        shots: shots.shots.len(),
+        tracks: shots.tracks,
+        segments: segments.len(),
+        segments_kept: kept.len(),
+        similarity: search.measure,
+        located_bias_m: search.located_m.map(|[bias_m, _]| bias_m),
+        bias_m,
+        held_out,
+        units: search.units,
+        points,
+        images,
+        verdict,
+        complaints,
+        complaint_count,
+    })
+}
+
+/// Units of the points of segments, in the order of their first points.
+fn units_of<'a>(grid: &HeightGrid, segments: &[&'a [Shot]], seed: u64) -> Vec<Unit<'a>> {
+    let points: Vec<&Shot> = segments.iter().copied().flatten().collect();
+    let places_m: Vec<[f64; 2]> = points.iter().map(|shot| shot.plan_m).collect();
+    let mut members: BTreeMap<usize, Vec<&Shot>> = BTreeMap::new();
+    let mut order = Vec::new();
+    for (shot, cluster) in points.into_iter().zip(clusters(&places_m, seed)) {
+        let of_cluster = members.entry(cluster).or_default();
+        if of_cluster.is_empty() {
+            order.push(cluster);
+        }
+        of_cluster.push(shot);
+    }
+    let units = (1..).zip(&order);
+    units
+        .map(|(number, cluster)| Unit::of(grid, number, &members[cluster]))
+        .collect()
+}
+
+/// What a search of all units gave.
+struct Searched {
+    units: Vec<UnitResult>,
+    measure: Similarity,
+    /// Median of model minus laser by correlation, and the largest at which concordance sees something, metres.
+    located_m: Option<[f64; 2]>,
+}
+
+/// Searches all units by the measure that was asked for. Correlation, which sees no bias, says how far the model lies off; without a
+/// measure that was asked for it stays where the bias is too large for concordance.
+fn searched(grid: &HeightGrid, units: &[Unit<'_>], options: &MatchOptions) -> Searched {
+    let by = |measure: Similarity| -> Vec<UnitResult> {
+        units
+            .par_iter()
+            .map(|unit| unit.matched(grid, measure, options))
+            .collect()
+    };
+    let located = by(Similarity::Pearson);
+    let located_m = median_bias_m(&located).map(|bias_m| {
+        let kept = located.iter().filter(|unit| unit.is_kept());
+        let reliefs_m: Vec<f64> = kept.map(|unit| unit.relief_m).collect();
+        [bias_m, bias_limit_m(Summary::of(&reliefs_m).median)]
+    });
+    let is_off = located_m.is_some_and(|[bias_m, limit_m]| bias_m.abs() > limit_m);
+    let measure = match options.similarity {
+        Some(measure) => measure,
+        None if is_off => Similarity::Pearson,
+        None => Similarity::Ccc,
+    };
+    let units = if measure == Similarity::Pearson {
+        located
+    } else {
+        by(measure)
+    };
+    Searched {
+        units,
+        measure,
+        located_m,
+    }
+}
+
+/// Median of model minus laser over the units that are kept, metres.
+fn median_bias_m(units: &[UnitResult]) -> Option<f64> {
+    let kept = units.iter().filter(|unit| unit.is_kept());
+    let biases_m: Vec<f64> = kept.filter_map(|unit| Some(unit.found?.bias_m)).collect();
+    (!biases_m.is_empty()).then(|| Summary::of(&biases_m).median)
+}
+
+/// Points that an image does not show, in words.
+fn unseen(images: &[String], points: &[MatchedPoint]) -> Vec<String> {
+    let pairs = points.iter().flat_map(|point| {
+        images
+            .iter()
+            .zip(&point.in_images)
+            .map(move |of| (point, of))
+    });
+    let unseen = pairs.filter(|(_, (_, seen))| seen.is_none());
+    unseen
+        .map(|(point, (image, _))| {
+            format!(
+                "point {} of unit {} is not in image {image}",
+                point.name, point.unit
+            )
+        })
+        .collect()
+}

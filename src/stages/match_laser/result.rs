@@ -1,0 +1,174 @@
+//! What is asked of a match, and what it gives.
+
+use std::path::PathBuf;
+
+use serde::{Deserialize, Serialize};
+
+use super::similarity::Similarity;
+use crate::{altimetry::ShotFilter, body::Body, stages::judge::Verdict};
+
+/// How laser profiles are matched with a terrain model. Li et al. 2023 and its published program have 15 points, 1000 m², 70 cells,
+/// similarities above 0.9 and contrasts above 1.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct MatchOptions {
+    /// Most points of a segment.
+    pub segment_points: usize,
+    /// Population variance of laser heights that a segment must exceed, m².
+    pub least_variance_m2: f64,
+    /// The measure; none takes `pearson` while the median bias exceeds a tenth of the relief, or 100 m, else `ccc`.
+    pub similarity: Option<Similarity>,
+    /// Shifts are tried within so many cells.
+    pub search_cells: u32,
+    /// Similarity that a unit must exceed.
+    pub least_score: f64,
+    /// What the best similarity over the mean of those above 0 must exceed.
+    pub least_contrast: f64,
+    /// Largest root mean square of model minus laser, bias removed, over all shots that were held out, metres.
+    pub limit_m: f64,
+    /// Of the clusters.
+    pub seed: u64,
+    /// Shots that are taken.
+    pub filter: ShotFilter,
+}
+
+/// What to match.
+#[derive(Debug, Clone, Serialize)]
+pub struct MatchRequest {
+    /// How.
+    pub options: MatchOptions,
+    /// The body.
+    pub body: Body,
+    /// Radius of the sphere that heights of the model count from, metres, where it is stated.
+    pub radius_m: Option<f64>,
+    /// Whether that is meant to be another sphere than that of the model's map.
+    pub heights_apart: bool,
+    /// The terrain model.
+    #[serde(skip)]
+    pub model: PathBuf,
+    /// PEDR files.
+    #[serde(skip)]
+    pub pedr: Vec<PathBuf>,
+    /// Images that the model was made from.
+    pub images: Vec<MatchImage>,
+}
+
+/// An image by its support data.
+#[derive(Debug, Clone, Serialize)]
+pub struct MatchImage {
+    /// Name in the table of control: that of a camera of `areograph calibrate`.
+    pub name: String,
+    /// The support data.
+    #[serde(skip)]
+    pub isd: PathBuf,
+}
+
+/// What a match gives.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct LaserMatch {
+    /// Radius of the sphere that heights of the model count from, metres.
+    pub radius_m: f64,
+    /// Size of a cell towards the east and the north, metres.
+    pub cell_m: [f64; 2],
+    /// Shots on the model, passes that they are of, and segments.
+    pub shots: usize,
+    /// Passes.
+    pub tracks: usize,
+    /// Segments.
+    pub segments: usize,
+    /// Segments with relief.
+    pub segments_kept: usize,
+    /// The measure that ran.
+    pub similarity: Similarity,
+    /// Median of model minus laser over the units that correlation keeps, metres, which decides on the measure.
+    pub located_bias_m: Option<f64>,
+    /// Median of model minus laser over the units that are kept, metres.
+    pub bias_m: Option<f64>,
+    /// Of the kept units all shots that were held out.
+    pub held_out: Option<HeldOut>,
+    /// Every unit, kept or not.
+    pub units: Vec<UnitResult>,
+    /// A control point of every kept unit.
+    pub points: Vec<MatchedPoint>,
+    /// Names of the images.
+    pub images: Vec<String>,
+    /// The verdict.
+    pub verdict: Verdict,
+    /// What was left out.
+    pub complaints: Vec<String>,
+    /// How much that is.
+    pub complaint_count: u64,
+}
+
+/// Model minus laser at shots that were held out: root mean squares about the bias of the shots that were used, metres.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct HeldOut {
+    /// Shots.
+    pub shots: usize,
+    /// Without the shift.
+    pub before_m: f64,
+    /// With it.
+    pub after_m: f64,
+}
+
+/// A unit of segments that lie together.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct UnitResult {
+    /// Its number, from 1.
+    pub unit: usize,
+    /// East longitude and latitude of its middle, radians.
+    pub place_rad: [f64; 2],
+    /// Shots.
+    pub shots: usize,
+    /// Passes that they are of.
+    pub strips: usize,
+    /// Largest distance of a shot from the middle, metres.
+    pub radius_m: f64,
+    /// Standard deviation of its laser heights, metres.
+    pub relief_m: f64,
+    /// What the search found; absent where there was none.
+    pub found: Option<UnitMatch>,
+    /// Shots that were held out, where the model has heights with and without the shift.
+    pub held_out: Option<HeldOut>,
+    /// Why it is not kept; empty for one that is.
+    pub refused_because: String,
+}
+
+impl UnitResult {
+    /// Whether it is kept.
+    #[must_use]
+    pub const fn is_kept(&self) -> bool {
+        self.refused_because.is_empty()
+    }
+}
+
+/// What the search of a unit found: where the model has the ground, seen from where the laser has it.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct UnitMatch {
+    /// Shift to the east and the north, cells.
+    pub shift_cells: [f64; 2],
+    /// The same, metres.
+    pub shift_m: [f64; 2],
+    /// The same in longitude and latitude, radians.
+    pub shift_rad: [f64; 2],
+    /// Similarity.
+    pub score: f64,
+    /// That over the mean of similarities above 0.
+    pub contrast: f64,
+    /// Mean of model minus laser over the shots that were used, metres.
+    pub bias_m: f64,
+}
+
+/// A laser control point: the shot of a unit that lies nearest to its bias.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct MatchedPoint {
+    /// Number of its unit.
+    pub unit: usize,
+    /// File, record and shot.
+    pub name: String,
+    /// East longitude, latitude, radians, and radius, metres, by the laser.
+    pub laser: [f64; 3],
+    /// The same where the model has it.
+    pub model: [f64; 3],
+    /// Line and sample in each image, where the image shows it.
+    pub in_images: Vec<Option<[f64; 2]>>,
+}

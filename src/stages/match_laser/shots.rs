@@ -1,0 +1,207 @@
+//! Shots inside the box of the model: found, in one frame and in the order of time, each once; then tracks and segments.
+
+use std::sync::atomic::AtomicBool;
+
+use super::{error::MatchError, result::MatchOptions};
+use crate::{
+    altimetry::ShotFilter,
+    error::{Error, Locate as _, Result},
+    files::file_name,
+    footprints::{AsRead, Footprints},
+    geom::{
+        height_grid::{HeightGrid, Probe},
+        window::{Region, WindowShape},
+    },
+    pds::archive::{Found, Judged, Opened, Query, Sink, search},
+    stages::convert_datum::DatumTurn,
+    units::wrap_two_pi,
+};
+
+/// A track ends where latitude jumps so far from one shot to the next, radians (0.1°, as in the program of Li et al. 2023), or
+/// after so long without a shot, seconds: 100 km of flight.
+const JUMP_RAD: f64 = 0.1 * std::f64::consts::PI / 180.0;
+const PAUSE_S: f64 = 30.0;
+/// A segment ends at a gap of three spacings of shots, which come every 0.1 s.
+const GAP_S: f64 = 0.3;
+/// Shots of two files nearer to each other are one shot, seconds.
+const SAME_SHOT_S: f64 = 0.05;
+/// Of the points of a segment so many must have a height in the model.
+const COVERED: f64 = 13.0 / 15.0;
+/// Complaints kept with their text; all are counted.
+const COMPLAINTS_MAX: usize = 1_000;
+
+/// A shot over the model.
+#[derive(Debug, Clone)]
+pub(super) struct Shot {
+    /// File, record and shot: its name.
+    pub(super) name: String,
+    pub(super) tag_s: f64,
+    pub(super) longitude_rad: f64,
+    pub(super) latitude_rad: f64,
+    pub(super) radius_m: f64,
+    /// Above the sphere of the model.
+    pub(super) height_m: f64,
+    /// Row and column of the model.
+    pub(super) cell: [f64; 2],
+    pub(super) probe: Probe,
+    /// Towards the east and the north from the middle of the model, metres.
+    pub(super) plan_m: [f64; 2],
+    /// Which pass over the box.
+    pub(super) track: usize,
+}
+
+/// What a search gave.
+#[derive(Default)]
+pub(super) struct Shots {
+    pub(super) shots: Vec<Shot>,
+    pub(super) tracks: usize,
+    pub(super) complaints: Vec<String>,
+    pub(super) complaint_count: u64,
+}
+
+/// Finds the shots inside the box of a model.
+pub(super) fn shots_over(
+    grid: &HeightGrid,
+    paths: &[std::path::PathBuf],
+    filter: &ShotFilter,
+    stop: &AtomicBool,
+) -> Result<Shots> {
+    let Opened {
+        mut sources,
+        failures,
+    } = Opened::all(paths)?;
+    if let Some(failure) = failures.into_iter().next() {
+        return Err(failure);
+    }
+    // Order and numbers of files do not depend on how they were named.
+    sources.sort_by_cached_key(|source| file_name(source.path()));
+    let [west, south, east, north] = grid.edges_rad();
+    let is_whole = east - west >= std::f64::consts::TAU;
+    let region = Region::new(&WindowShape::Box {
+        west_rad: if is_whole { 0.0 } else { wrap_two_pi(west) },
+        east_rad: if is_whole {
+            std::f64::consts::TAU
+        } else {
+            wrap_two_pi(east)
+        },
+        south_rad: south,
+        north_rad: north,
+    });
+    let query = Query::new(vec![region], filter, Judged::Near);
+    let mut gathered = Gathered {
+        grid,
+        names: sources.iter().map(|of| file_name(of.path())).collect(),
+        turns: (sources.iter())
+            .map(|source| DatumTurn::at_tags(source.datum()))
+            .collect(),
+        found: Vec::new(),
+        shots: Shots::default(),
+    };
+    search(&sources, &query, stop, &mut gathered)?;
+    let Gathered {
+        mut found,
+        mut shots,
+        names,
+        ..
+    } = gathered;
+    found.sort_by(|(_, a), (_, b)| a.tag_s.total_cmp(&b.tag_s));
+    if let Some(pair) = found
+        .windows(2)
+        .find(|pair| pair[0].0 != pair[1].0 && pair[1].1.tag_s - pair[0].1.tag_s < SAME_SHOT_S)
+    {
+        let (file, other) = (names[pair[1].0].clone(), names[pair[0].0].clone());
+        return Err(MatchError::SharedShots { other }).in_file(file);
+    }
+    shots.shots = found.into_iter().map(|(_, shot)| shot).collect();
+    shots.number_tracks();
+    Ok(shots)
+}
+
+/// Takes shots as they are found, with the number of their file.
+struct Gathered<'a> {
+    grid: &'a HeightGrid,
+    names: Vec<String>,
+    turns: Vec<DatumTurn>,
+    found: Vec<(usize, Shot)>,
+    shots: Shots,
+}
+
+impl Gathered<'_> {
+    fn take(&mut self, file: usize, footprints: &Footprints<AsRead>) {
+        let [longitude_rad, latitude_rad] = self.grid.middle_rad();
+        let middle = self.grid.cell_of(longitude_rad, latitude_rad);
+        let [east_m, north_m] = self.grid.cell_m();
+        for row in 0..footprints.len() {
+            let shot = self.turns[file].applied(footprints.row(row));
+            let cell = self.grid.cell_of(shot.longitude_rad, shot.latitude_rad);
+            let found = Shot {
+                name: format!("{}_{}_{}", self.names[file], shot.record, shot.shot),
+                tag_s: shot.et_tag_s,
+                longitude_rad: shot.longitude_rad,
+                latitude_rad: shot.latitude_rad,
+                radius_m: shot.radius_m,
+                height_m: shot.radius_m - self.grid.radius_m,
+                cell,
+                probe: Probe::at(cell),
+                plan_m: [
+                    (cell[1] - middle[1]) * east_m,
+                    (middle[0] - cell[0]) * north_m,
+                ],
+                track: 0,
+            };
+            self.found.push((file, found));
+        }
+    }
+}
+
+impl Sink for Gathered<'_> {
+    fn found(&mut self, file: usize, found: Found) -> Result<()> {
+        self.shots.complaint_count += found.complaints.len() as u64;
+        for complaint in &found.complaints {
+            if self.shots.complaints.len() < COMPLAINTS_MAX {
+                self.shots.complaints.push(complaint.to_string());
+            }
+        }
+        self.take(file, &found.footprints);
+        Ok(())
+    }
+
+    fn failed(&mut self, _file: usize, failure: Error) -> Result<()> {
+        Err(failure)
+    }
+}
+
+impl Shots {
+    fn number_tracks(&mut self) {
+        let mut track = 0;
+        for index in 1..self.shots.len() {
+            let [before, this] = [index - 1, index].map(|of| &self.shots[of]);
+            let jump_rad = (this.latitude_rad - before.latitude_rad).abs();
+            if jump_rad >= JUMP_RAD || this.tag_s - before.tag_s > PAUSE_S {
+                track += 1;
+            }
+            self.shots[index].track = track;
+        }
+        self.tracks = self.shots.last().map_or(0, |last| last.track + 1);
+    }
+
+    /// Segments: shots of one track without a gap, at most so many.
+    pub(super) fn segments(&self, points: usize) -> Vec<&[Shot]> {
+        let runs = self
+            .shots
+            .chunk_by(|a, b| a.track == b.track && b.tag_s - a.tag_s < GAP_S);
+        runs.flat_map(|run| run.chunks(points)).collect()
+    }
+}
+
+/// Whether a segment has relief, and enough of it lies on the model.
+pub(super) fn is_kept(grid: &HeightGrid, segment: &[Shot], options: &MatchOptions) -> bool {
+    let needed = (COVERED * options.segment_points as f64).ceil();
+    let covered = segment
+        .iter()
+        .filter(|shot| grid.probed_m(&shot.probe, [0, 0]).is_some());
+    let count = segment.len() as f64;
+    let mean_m = segment.iter().map(|shot| shot.height_m).sum::<f64>() / count;
+    let squares = segment.iter().map(|shot| (shot.height_m - mean_m).powi(2));
+    covered.count() as f64 >= needed && squares.sum::<f64>() / count > options.least_variance_m2
+}
