@@ -223,7 +223,27 @@ fn an_answer_that_is_not_whole_says_so_in_the_file_and_by_the_exit_code() {
     assert!(rows.columns() == whole.columns() && told["complete"] == false);
     assert_eq!(told["failures"].as_array().unwrap().len(), 2);
     fs::remove_file(archive.join("gone.b")).unwrap();
+    // Records that cannot be read may have been in the window; a file that lost more than some is no archive file.
+    let file = archive.join("AP19030L.B");
+    let good = fs::read(&file).unwrap();
     fs::remove_file(&garbage).unwrap();
+    for (records, code) in [(1, 0), (40, 3)] {
+        let mut bytes = good.clone();
+        let end = bytes.len();
+        bytes[end - records * 776..].fill(0x5a);
+        fs::write(&file, bytes).unwrap();
+        let everywhere = "--box=0,360,-90,90";
+        let output = areograph(&["search", text(&archive), everywhere, "--out", text(&out)]);
+        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(code), "{said}");
+        let (_, told) = batch(&out);
+        assert!(
+            told["complete"] == false && told["records_left_out"] == records,
+            "{told}"
+        );
+        assert_eq!(said.contains("AP19030L.B: 40 of"), records == 40, "{said}");
+    }
+    fs::write(&file, good).unwrap();
     // The same shots under another name.
     fs::copy(archive.join("AP19030L.B"), archive.join("AP19031L.B")).unwrap();
     let output = search(&archive, &out);

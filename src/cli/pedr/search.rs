@@ -92,6 +92,8 @@ struct Answer {
     failures: Vec<Error>,
     complaints: Vec<String>,
     complaint_counts: BTreeMap<String, u64>,
+    /// Records with shots that are left out for a complaint: some may have been in a window.
+    records_left_out: u64,
     rejected: BTreeMap<String, u64>,
     frames_read: u64,
     shots_read: u64,
@@ -125,7 +127,8 @@ impl Answer {
             })
             .collect();
         let mut told = json!({
-            "complete": self.failures.is_empty(),
+            "complete": self.failures.is_empty() && self.records_left_out == 0,
+            "records_left_out": self.records_left_out,
             "in_order_of_time": self.disorder.is_none(),
             "rows": self.rows,
             "windows": windows,
@@ -193,6 +196,7 @@ impl Answer {
 impl Sink for Answer {
     fn found(&mut self, _file: usize, found: Found) -> Result<()> {
         for complaint in &found.complaints {
+            self.records_left_out += u64::from(complaint.leaves_out());
             if self.complaints.len() < COMPLAINTS_MAX {
                 self.complaints.push(complaint.to_string());
             }
