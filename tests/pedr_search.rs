@@ -1,6 +1,7 @@
 //! `areograph pedr index` and `areograph pedr search` as their users call them.
 
 #![allow(
+    clippy::disallowed_methods,
     clippy::unwrap_used,
     clippy::expect_used,
     reason = "helpers of tests fail as tests do"
