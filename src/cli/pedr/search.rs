@@ -51,7 +51,9 @@ pub(super) fn run(arguments: &Arguments) -> Result<()> {
     let windows = arguments.windows.windows()?;
     let time = arguments.time()?;
     let signals = Signals::heard()?;
+    arguments.check_paths()?;
     let Opened { sources, failures } = Opened::all(&arguments.paths)?;
+    arguments.require_apart(&sources, &failures)?;
     let mut answer = Answer {
         window_ids: windows.iter().map(|window| window.id.clone()).collect(),
         files: sources.iter().map(Source::file).collect(),
@@ -77,6 +79,13 @@ pub(super) fn run(arguments: &Arguments) -> Result<()> {
         file.finish(&told)?;
     }
     output::json(&told);
+    let complaints: u64 = answer.complaint_counts.values().sum();
+    if complaints > 0 {
+        tracing::warn!(
+            "{complaints} complaints: bad records are left out; `complaints` of the answer counts them by reason, \
+             `first_complaints` has the first {COMPLAINTS_MAX}"
+        );
+    }
     answer.end()
 }
 
