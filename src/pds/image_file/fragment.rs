@@ -4,6 +4,8 @@ use std::{fs::File, io};
 
 use super::{
     complaint::{Complaint, Complaints, Fault},
+    contradiction::Witness,
+    header::Header,
     walk::{HEADER, Walk},
 };
 
@@ -89,95 +91,6 @@ impl Coding {
     }
 }
 
-/// What a header says.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Header {
-    bytes: [u8; HEADER],
-}
-
-impl Header {
-    pub(super) const fn new(bytes: [u8; HEADER]) -> Self {
-        Self { bytes }
-    }
-
-    const fn two(&self, at: usize) -> u16 {
-        u16::from_le_bytes([self.bytes[at], self.bytes[at + 1]])
-    }
-
-    const fn number(&self) -> u16 {
-        self.two(2)
-    }
-
-    /// Lines of the whole image.
-    pub(super) fn total_lines(&self) -> u32 {
-        u32::from(self.two(40)) * 16
-    }
-
-    /// Changes of gain and offset within the image.
-    pub(super) const fn gain_changes(&self) -> u16 {
-        self.two(38)
-    }
-
-    /// Samples of a line.
-    pub(super) fn width(&self) -> u32 {
-        u32::from(self.bytes[43]) * 16
-    }
-
-    const fn data_bytes(&self) -> u32 {
-        u32::from_le_bytes([
-            self.bytes[58],
-            self.bytes[59],
-            self.bytes[60],
-            self.bytes[61],
-        ])
-    }
-
-    /// `None` for a predictor and a transform at once, or a transform that there is not.
-    pub(super) const fn coding(&self) -> Option<Coding> {
-        let (kind, table) = (self.bytes[44], self.bytes[45]);
-        let predictor = match kind & 3 {
-            0 => None,
-            1 => Some(Predictor::X),
-            2 => Some(Predictor::Y),
-            _ => Some(Predictor::Xy),
-        };
-        let transform = match kind >> 2 & 3 {
-            0 => None,
-            1 => Some(Transform::Walsh),
-            2 => Some(Transform::Cosine),
-            _ => return None,
-        };
-        match (predictor, transform) {
-            (None, None) => Some(Coding::Raw),
-            (Some(predictor), None) if table & 15 < 8 => Some(Coding::Predictive {
-                predictor,
-                table: table & 15,
-            }),
-            (None, Some(transform)) => Some(Coding::Transform {
-                transform,
-                groups: (table >> 5) + 1,
-                spacing: self.two(48),
-            }),
-            _ => None,
-        }
-    }
-
-    fn is_possible(&self) -> bool {
-        self.width() > 0
-            && self.total_lines() > 0
-            && self.data_bytes() > 0
-            && self.coding().is_some()
-    }
-
-    /// What all fragments of an image have in common: identifier, clock, size and coding.
-    fn is_of_image(&self, first: &Self) -> bool {
-        [0..2, 8..13, 40..50]
-            .into_iter()
-            .all(|range| self.bytes[range.clone()] == first.bytes[range])
-            && self.data_bytes() > 0
-    }
-}
-
 /// What the label tells of the headers.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Expected {
@@ -190,7 +103,7 @@ pub(super) struct Expected {
 impl Expected {
     fn holds(&self, header: &Header) -> bool {
         header.is_possible()
-            && self.clock.is_none_or(|clock| header.bytes[8..13] == clock)
+            && self.clock.is_none_or(|clock| header.clock() == clock)
             && self.width.is_none_or(|width| header.width() == width)
             && (self.clock.is_some() || self.width.is_some())
     }
@@ -220,6 +133,8 @@ pub(super) struct Fragments {
     pub(super) all: Vec<Fragment>,
     /// Whether the last one is there.
     pub(super) has_last: bool,
+    /// The first one that is sound.
+    pub(super) witness: Option<Witness>,
 }
 
 impl Fragments {
@@ -250,6 +165,7 @@ impl Fragments {
             first,
             all: Vec::new(),
             has_last: false,
+            witness: None,
         };
         fragments.walk(&mut walk, at, complaints)?;
         Ok(Some(fragments))
@@ -269,12 +185,12 @@ impl Fragments {
             {
                 let first = self.first;
                 let next = walk.find(at, &|bytes| Header::new(*bytes).is_of_image(&first))?;
-                let Some(next) = next else {
+                if next.is_none() && header.bytes == [0; HEADER] {
                     break;
-                };
-                let skipped = next - at;
+                }
+                let skipped = next.unwrap_or(walk.end()) - at;
                 complaints.push(complaint(None, at, Fault::Header { skipped }));
-                at = next;
+                at += skipped;
                 continue;
             }
             if self.all.len() == MOST {
@@ -335,6 +251,10 @@ impl Fragments {
             complaints.push(complaint(Some(number), at, Fault::Repeated));
             return Ok((next, false));
         }
+        if is_sound && self.witness.is_none() && header.is_of_image(&self.first) {
+            let header = *header;
+            self.witness = Some(Witness { number, at, header });
+        }
         let lost_before = number - expected;
         if lost_before > 0 {
             let fragments = lost_before;
@@ -369,13 +289,14 @@ impl Fragments {
         lines.filter(|lines| *lines < self.first.total_lines())
     }
 
+    /// Whether each of them is there.
+    pub(super) fn are_complete(&self) -> bool {
+        self.has_last && self.all.iter().all(|fragment| fragment.lost_before == 0)
+    }
+
     /// Whether anything is wrong with them.
     pub(super) fn are_sound(&self) -> bool {
-        self.has_last
-            && self
-                .all
-                .iter()
-                .all(|fragment| fragment.is_sound && fragment.lost_before == 0)
+        self.are_complete() && self.all.iter().all(|fragment| fragment.is_sound)
     }
 }
 

@@ -7,9 +7,11 @@
 mod bits;
 mod codes;
 mod complaint;
+mod contradiction;
 mod encode;
 mod encode_transform;
 mod fragment;
+mod header;
 mod opened;
 mod placed;
 mod predictive;
