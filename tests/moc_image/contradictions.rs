@@ -102,7 +102,8 @@ fn a_label_of_the_real_image_that_is_changed_contradicts_its_fragments() {
 fn fragments_behind_the_label_of_another_image_are_noticed() {
     let own = image(1344, 80);
     assert_eq!(told(&own), (Vec::new(), Vec::new()));
-    let mut other = new_image(SAMPLES, 3, &vec![90; 1360 * SAMPLES as usize], Coding::Raw);
+    let pixels = vec![90; 1360 * SAMPLES as usize];
+    let mut other = new_image(SAMPLES, 3, &pixels, Coding::Raw);
     other.product_id = "M01/00200";
     other.clock = (610_480_000, 7);
     other.first_detector = 16;
@@ -143,7 +144,8 @@ fn a_header_that_is_damaged_itself_is_no_witness() {
 #[test]
 fn fragments_of_another_image_behind_a_cut_one_are_told_as_such() {
     let own = image(1344, 80);
-    let mut other = new_image(SAMPLES, 3, &vec![90; 640 * SAMPLES as usize], Coding::Raw);
+    let pixels = vec![90; 640 * SAMPLES as usize];
+    let mut other = new_image(SAMPLES, 3, &pixels, Coding::Raw);
     other.product_id = "M01/00200";
     other.clock = (610_480_000, 7);
     let other = encode(&other).unwrap();
