@@ -306,7 +306,7 @@ fn a_file_that_lost_more_than_some_records_stops_the_search() {
         told.contains("AP19019L.B: 50 of 2500 records cannot be used; expected at most 10 and one in a hundred"),
         "{told}"
     );
-    assert!(error.advice().contains("fetch it again"));
+    assert!(error.cause.advice().contains("fetch it again"));
 }
 
 #[test]
