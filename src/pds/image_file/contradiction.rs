@@ -14,14 +14,6 @@ const LINE_CLOCK_S: f64 = 1e-7;
 /// Line clock and label may differ so much, units: labels print exposures to a unit, and either may be rounded or cut off.
 const LINE_CLOCKS_APART_MAX: f64 = 1.0;
 
-/// A sound header of the image, and where it stands.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Witness {
-    pub(super) number: u16,
-    pub(super) at: u64,
-    pub(super) header: Header,
-}
-
 /// Every contradiction, with the fragment that was asked; nothing when no fragment is sound.
 ///
 /// Gain and offset are left to the label: they may change within an image.

@@ -3,9 +3,9 @@
 use std::{fs::File, io};
 
 use super::{
+    coding::Coding,
     complaint::{Complaint, Complaints, Fault},
-    contradiction::Witness,
-    header::Header,
+    header::{Header, Witness},
     walk::{HEADER, Walk},
 };
 
@@ -18,49 +18,6 @@ const LOST_MAX: u64 = 64;
 const MOST: usize = 1 << 16;
 /// Most data bytes of a fragment that are believed: those of the archive have 245,760.
 const DATA_BYTES_MAX: u64 = 1 << 22;
-
-/// How the first header says that pixels are coded.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Coding {
-    /// One byte a pixel.
-    Raw,
-    /// Residuals from a predicted pixel, in a prefix code.
-    Predictive {
-        /// What predicts a pixel.
-        predictor: Predictor,
-        /// Code of the residuals, 0 to 7.
-        table: u8,
-    },
-    /// Quantised coefficients of blocks of 16 × 16 pixels.
-    Transform {
-        /// Which transform.
-        transform: Transform,
-        /// Groups of blocks with tables of their own, 1 to 8.
-        groups: u8,
-        /// Step of the quantiser.
-        spacing: u16,
-    },
-}
-
-/// What predicts a pixel.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Predictor {
-    /// The pixel to its left.
-    X,
-    /// The pixel above.
-    Y,
-    /// The pixel above, and the difference of those to the left.
-    Xy,
-}
-
-/// A transform of blocks.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Transform {
-    /// Walsh–Hadamard.
-    Walsh,
-    /// Cosines.
-    Cosine,
-}
 
 /// Size and coding of an image.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -76,19 +33,6 @@ pub struct Layout {
     pub fragments: u32,
     /// Changes of gain and offset within the image, as the first header says; 0 of a plain raster, which does not say.
     pub gain_changes: u16,
-}
-
-impl Coding {
-    /// Most pixels that a byte of data can hold.
-    const fn pixels_of_byte(self) -> u64 {
-        match self {
-            Self::Raw => 1,
-            // A bit a pixel.
-            Self::Predictive { .. } => 8,
-            // A block of 256 pixels in 3 bits of its group and 8 for its mean and for the length of the rest each.
-            Self::Transform { .. } => 256 * 8 / 19,
-        }
-    }
 }
 
 /// What the label tells of the headers.

@@ -1,7 +1,7 @@
 //! The header of a fragment.
 
 use super::{
-    fragment::{Coding, Predictor, Transform},
+    coding::{Coding, Predictor, Transform},
     walk::HEADER,
 };
 
@@ -9,6 +9,14 @@ use super::{
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Header {
     pub(super) bytes: [u8; HEADER],
+}
+
+/// A sound header of the image, and where it stands.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Witness {
+    pub(super) number: u16,
+    pub(super) at: u64,
+    pub(super) header: Header,
 }
 
 impl Header {

@@ -6,6 +6,7 @@
 
 mod bits;
 mod codes;
+mod coding;
 mod complaint;
 mod contradiction;
 mod encode;
@@ -24,9 +25,10 @@ mod transform;
 mod walk;
 
 pub use self::{
+    coding::{Coding, Predictor, Transform},
     complaint::{Complaint, Complaints, Fault},
     encode::{EncodeError, Encoded, NewImage, encode},
-    fragment::{Coding, Layout, Predictor, Transform},
+    fragment::Layout,
     opened::{ImageFile, ImageFileError},
     radiometry::{OddEven, Radiometry},
     statistics::{PixelStatistics, Statistics},
