@@ -101,3 +101,10 @@ pub struct ShotFilter {
     /// Largest off-nadir angle, radians.
     pub off_nadir_max_rad: f64,
 }
+
+impl ShotFilter {
+    /// First and last trigger channel.
+    pub const CHANNELS: [u8; 2] = [1, 4];
+    /// The largest angle that a largest off-nadir angle may be, degrees; it is above 0.
+    pub const OFF_NADIR_LIMIT_DEG: f64 = 90.0;
+}

@@ -43,6 +43,11 @@ pub trait Cause: std::error::Error + Send + Sync + 'static {
     fn kind(&self) -> Kind;
     /// What the user can do about it, one sentence.
     fn advice(&self) -> String;
+
+    /// The same where a configuration named what the failure concerns.
+    fn advice_on_configured(&self) -> String {
+        self.advice()
+    }
 }
 
 /// A cause together with the place where it happened.
@@ -116,7 +121,12 @@ impl fmt::Display for Error {
             write!(formatter, "{}: ", file.display())?;
         }
         write!(formatter, "{}", self.cause)?;
-        let advice = self.cause.advice();
+        // Stages read what a configuration names.
+        let advice = if self.stage.is_some() {
+            self.cause.advice_on_configured()
+        } else {
+            self.cause.advice()
+        };
         if !advice.is_empty() {
             write!(formatter, "\n  what to do: {advice}")?;
         }
@@ -185,9 +195,7 @@ impl Cause for IoError {
     fn advice(&self) -> String {
         use std::io::ErrorKind;
         match self.source.kind() {
-            ErrorKind::NotFound => {
-                "check the path; relative paths in a configuration count from that file's folder"
-            }
+            ErrorKind::NotFound => "check the path",
             ErrorKind::PermissionDenied => "check the permissions of the file and its folder",
             ErrorKind::StorageFull | ErrorKind::QuotaExceeded => {
                 "free some space or choose another --out, then run again: finished stages are kept"
@@ -198,6 +206,14 @@ impl Cause for IoError {
             _ => "check the file and the disk, then run again",
         }
         .to_owned()
+    }
+
+    fn advice_on_configured(&self) -> String {
+        let advice = self.advice();
+        if self.source.kind() == std::io::ErrorKind::NotFound {
+            return advice + "; relative paths in a configuration count from that file's folder";
+        }
+        advice
     }
 }
 

@@ -2,6 +2,7 @@
 //! how they come under that name whole or not at all.
 
 mod known;
+mod outputs;
 mod staged;
 
 use std::{
@@ -15,6 +16,7 @@ use std::{
 use rayon::prelude::*;
 
 pub use self::known::{Identity, KnownFile, KnownFiles};
+pub use self::outputs::require_apart;
 pub use self::staged::{StagedFile, TEMPORARY};
 use crate::{
     error::{Cause, IoError, Kind, Locate, Result},

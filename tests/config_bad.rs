@@ -17,6 +17,8 @@ use areograph::{config, error::Kind};
 use common::golden::{Golden, assert_messages};
 
 const OPEN_RING: &str = r#"{"type": "Polygon", "coordinates": [[[0, 0], [1, 0], [1, 1], [0, 1]]]}"#;
+const WIDE_RING: &str =
+    r#"{"type": "Polygon", "coordinates": [[[0, -5], [200, -5], [200, 5], [0, 5], [0, -5]]]}"#;
 
 /// The files that the bad configurations point to.
 fn folder() -> tempfile::TempDir {
@@ -24,6 +26,7 @@ fn folder() -> tempfile::TempDir {
     fs::write(folder.path().join("there.txt"), "some text\n").unwrap();
     fs::write(folder.path().join("a.b"), "").unwrap();
     fs::write(folder.path().join("open.geojson"), OPEN_RING).unwrap();
+    fs::write(folder.path().join("wide.geojson"), WIDE_RING).unwrap();
     folder
 }
 

@@ -422,3 +422,39 @@ fn a_copy_of_a_tie_file_is_read_once_and_noted() {
     // Two measurements of each of the 154 points.
     assert_eq!(ties.unwrap()["rows"], 308);
 }
+
+#[test]
+fn damaged_pixels_are_told_in_verdict_manifest_and_log() {
+    let case = Case::pair();
+    let mut raster = b"PDS_VERSION_ID = PDS3\r\nRECORD_BYTES = 1024\r\n^IMAGE = 2\r\nINSTRUMENT_ID = \"MOC-NA\"\r\n\
+        OBJECT = IMAGE\r\nLINES = 160\r\nLINE_SAMPLES = 1024\r\nSAMPLE_BITS = 8\r\nCHECKSUM = 16#00000007#\r\n\
+        END_OBJECT = IMAGE\r\nEND\r\n"
+        .to_vec();
+    raster.resize(1024, b' ');
+    // The last 32 lines are not there.
+    raster.extend(vec![80; 128 * 1024]);
+    case.write("damaged.img", raster);
+    let label = format!("label = \"{LABEL}\"\n");
+    site(&case, &label, &format!("{label}pixels = \"damaged.img\"\n"));
+    let mut command = case.areograph();
+    command.args(["--verbose", "run", "site.toml", "--out", "out"]);
+    let log = String::from_utf8(common::mission::succeed(&mut command).stderr).unwrap();
+    let manifest = json(&case.path("out/isidis/manifest.json"));
+    let remarks = manifest["verdict"]["remarks"].as_array().unwrap();
+    let mut remarks = remarks.iter().map(|remark| remark.as_str().unwrap());
+    let remark = remarks.find(|remark| remark.starts_with("pixels of E02-02016: "));
+    let remark = remark.unwrap();
+    let expected = "32 of 160 lines are missing, 0 may be damaged, 2 complaints, first: byte 1024: the label's CHECKSUM";
+    assert!(remark.contains(expected), "{remark}");
+    let warned = log.lines().find(|line| line.contains(expected)).unwrap();
+    assert!(warned.contains("WARN"), "{warned}");
+    let complaints = &manifest["complaints"];
+    let texts = complaints["texts"].as_array().unwrap().iter();
+    let texts = texts.filter(|text| {
+        text.as_str()
+            .unwrap()
+            .starts_with("pixels of E02-02016: byte ")
+    });
+    assert_eq!(texts.count(), 2, "{complaints}");
+    assert_eq!(complaints["count"], 2);
+}

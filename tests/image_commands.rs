@@ -257,3 +257,24 @@ fn pictures_of_other_formats_are_refused_before_anything_is_read() {
         "error: image.jpg; expected an ending .png, .tif or .tiff\n  what to do: give the file another ending\n"
     );
 }
+
+#[test]
+fn a_picture_takes_the_place_of_nothing_that_is_read_or_written() {
+    let folder = tempfile::tempdir().unwrap();
+    let (path, _) = write_image(folder.path());
+    let place = |name: &str| folder.path().join(name);
+    let image = place("image.png");
+    stdout(&areograph(&["extract", text(&path), "--out", text(&image)]));
+    let before = fs::read(&image).unwrap();
+    let other = place("other.png");
+    fs::create_dir(place("in")).unwrap();
+    let around = place("in/../other.png");
+    for [out, mask] in [[&image, &other], [&other, &image], [&other, &around]] {
+        let pictures = ["--out", text(out), "--mask", text(mask)];
+        let output = areograph(&[&["extract", text(&image)], &pictures[..]].concat());
+        let said = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{said}");
+        assert!(said.contains("would be written "), "{said}");
+        assert!(fs::read(&image).unwrap() == before && !other.exists());
+    }
+}

@@ -10,6 +10,8 @@
 )]
 
 mod common;
+#[path = "moc_image/contradictions.rs"]
+mod contradictions;
 #[path = "moc_image/damage.rs"]
 mod damage;
 #[path = "moc_image/files.rs"]

@@ -1,6 +1,7 @@
 //! `areograph pedr index` and `areograph pedr search` as their users call them.
 
 #![allow(
+    clippy::disallowed_methods,
     clippy::unwrap_used,
     clippy::expect_used,
     reason = "helpers of tests fail as tests do"
@@ -223,7 +224,27 @@ fn an_answer_that_is_not_whole_says_so_in_the_file_and_by_the_exit_code() {
     assert!(rows.columns() == whole.columns() && told["complete"] == false);
     assert_eq!(told["failures"].as_array().unwrap().len(), 2);
     fs::remove_file(archive.join("gone.b")).unwrap();
+    // Records that cannot be read may have been in the window; a file that lost more than some is no archive file.
+    let file = archive.join("AP19030L.B");
+    let good = fs::read(&file).unwrap();
     fs::remove_file(&garbage).unwrap();
+    for (records, code) in [(1, 0), (40, 3)] {
+        let mut bytes = good.clone();
+        let end = bytes.len();
+        bytes[end - records * 776..].fill(0x5a);
+        fs::write(&file, bytes).unwrap();
+        let everywhere = "--box=0,360,-90,90";
+        let output = areograph(&["search", text(&archive), everywhere, "--out", text(&out)]);
+        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(code), "{said}");
+        let (_, told) = batch(&out);
+        assert!(
+            told["complete"] == false && told["records_left_out"] == records,
+            "{told}"
+        );
+        assert_eq!(said.contains("AP19030L.B: 40 of"), records == 40, "{said}");
+    }
+    fs::write(&file, good).unwrap();
     // The same shots under another name.
     fs::copy(archive.join("AP19030L.B"), archive.join("AP19031L.B")).unwrap();
     let output = search(&archive, &out);
@@ -268,4 +289,164 @@ fn what_cannot_be_asked_is_refused_with_a_way_out() {
         "..-19999000",
     ]));
     assert!(all["rows"].as_u64() > some["rows"].as_u64() && some["rows"].as_u64() > Some(0));
+}
+
+/// What the program says of a search that it must refuse, of the command line.
+fn refused(archive: &Path, arguments: &[&str]) -> String {
+    let output = areograph(&[&["search", text(archive), BOX], arguments].concat());
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(2), "{arguments:?}: {said}");
+    said
+}
+
+#[test]
+fn nothing_that_is_read_is_written_over() {
+    let folder = tempfile::tempdir().unwrap();
+    let archive = archive(folder.path());
+    let file = archive.join("AP19030L.B");
+    let before = fs::read(&file).unwrap();
+    for name in ["AP19030L.B", "../archive/AP19030L.B", "linked.b"] {
+        let out = archive.join(name);
+        if name == "linked.b" {
+            fs::hard_link(&file, &out).unwrap();
+        }
+        let said = refused(&archive, &["--format", "csv", "--out", text(&out)]);
+        assert!(
+            said.contains("would be written over") && said.contains("AP19030L.B"),
+            "{said}"
+        );
+    }
+    fs::remove_file(archive.join("linked.b")).unwrap();
+    assert!(fs::read(&file).unwrap() == before);
+    // Files that say what to search for; the answer to CSV has a second file.
+    let polygon = folder.path().join("found.csv.json");
+    let ring = r#"{"type":"Polygon","coordinates":[[[0,0],[10,0],[10,10],[0,0]]]}"#;
+    fs::write(&polygon, ring).unwrap();
+    for out in ["found.csv.json", "found.csv"] {
+        let out = folder.path().join(out);
+        let said = refused(
+            &archive,
+            &["--polygon", text(&polygon), "--out", text(&out)],
+        );
+        assert!(said.contains("would be written over"), "{said}");
+    }
+    assert_eq!(fs::read_to_string(&polygon).unwrap(), ring);
+    assert!(!folder.path().join("found.csv").exists());
+}
+
+#[test]
+fn only_a_file_takes_the_place_of_a_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let archive = archive(folder.path());
+    let place = |name: &str| folder.path().join(name);
+    let made = Command::new("mkfifo").arg(place("pipe.csv")).status();
+    assert!(made.unwrap().success());
+    let _socket = std::os::unix::net::UnixListener::bind(place("socket.csv")).unwrap();
+    fs::write(place("old.csv"), "old").unwrap();
+    std::os::unix::fs::symlink("old.csv", place("link.csv")).unwrap();
+    fs::create_dir(place("folder.csv")).unwrap();
+    for what in ["pipe", "socket", "link", "folder"] {
+        let out = place(&format!("{what}.csv"));
+        let before = fs::symlink_metadata(&out).unwrap().file_type();
+        let said = refused(&archive, &["--out", text(&out)]);
+        assert!(
+            said.contains(&format!("{what}.csv: is a {what}; expected a file")),
+            "{said}"
+        );
+        assert_eq!(fs::symlink_metadata(&out).unwrap().file_type(), before);
+    }
+    assert_eq!(fs::read_to_string(place("old.csv")).unwrap(), "old");
+    assert!(
+        search(&archive, &place("old.csv")).status.success(),
+        "a file is replaced"
+    );
+    assert!(fs::read_to_string(place("old.csv")).unwrap().len() > 3);
+}
+
+#[test]
+fn filters_that_keep_nothing_and_formats_at_odds_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let archive = archive(folder.path());
+    for value in ["0", "5", "1,2,5"] {
+        assert!(refused(&archive, &["--channels", value]).contains("1..=4"));
+    }
+    for value in ["nan", "-1", "0", "90.1", "inf"] {
+        let said = refused(&archive, &["--off-nadir-max-deg", value]);
+        assert!(
+            said.contains("expected a number above 0, up to 90"),
+            "{said}"
+        );
+    }
+    let said = refused(&archive, &["--classes", "0", "1"]);
+    assert!(
+        said.contains("\"1\" is no file") && said.contains("--classes 0,1"),
+        "{said}"
+    );
+    let rows = |classes: &str| {
+        let found = areograph(&["search", text(&archive), BOX, "--classes", classes]);
+        json(&found)["rows"].as_u64().unwrap()
+    };
+    assert!(rows("0,1") > rows("1"));
+    let out = folder.path().join("shots.parquet");
+    let said = refused(&archive, &["--format", "csv", "--out", text(&out)]);
+    assert!(said.contains("another format than --format csv"), "{said}");
+    let said = refused(&archive, &["--format", "count", "--out", text(&out)]);
+    assert!(said.contains("leave out --out"), "{said}");
+    assert!(!out.exists());
+}
+
+#[test]
+fn geojson_has_what_shots_are_chosen_by() {
+    let folder = tempfile::tempdir().unwrap();
+    let archive = archive(folder.path());
+    let out = folder.path().join("found.geojson");
+    let all = ["--classes", "0,1", "--channels", "1,2,3,4"];
+    let output = areograph(
+        &[
+            &["search", text(&archive), BOX, "--out", text(&out)],
+            &all[..],
+        ]
+        .concat(),
+    );
+    assert!(output.status.success());
+    let document: Value = serde_json::from_slice(&fs::read(&out).unwrap()).unwrap();
+    let features = document["features"].as_array().unwrap();
+    let count = |key: &str, value: u64| {
+        let with = features.iter().filter(|of| of["properties"][key] == value);
+        with.count()
+    };
+    let (ground, other) = (count("class", 1), count("class", 0));
+    assert!(ground > 0 && other > 0 && ground + other == features.len());
+    let channels: usize = (1..=4).map(|channel| count("channel", channel)).sum();
+    let flags: usize = (0..=1).map(|flag| count("attitude_flag", flag)).sum();
+    assert_eq!([channels, flags], [features.len(); 2]);
+}
+
+#[test]
+fn complaints_are_told_in_a_line() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("ap19030l.b");
+    let said = |spoilt: u32| {
+        write(&file, Datum::Iau2000, 0, |number, record| {
+            if (100..100 + spoilt).contains(&number) {
+                record.clock_frequency_hz.set(7);
+            }
+        });
+        let output = Command::new(env!("CARGO_BIN_EXE_areograph"))
+            .args(["pedr", "search", text(&file), BOX, "--check-all"])
+            .output()
+            .unwrap();
+        let told = json(&output);
+        assert_eq!(
+            told["complaints"]["frequency"].as_u64().unwrap_or(0),
+            u64::from(spoilt)
+        );
+        String::from_utf8(output.stderr).unwrap()
+    };
+    let bad = said(3);
+    assert!(
+        bad.contains(" 3 complaints") && bad.contains("`first_complaints`"),
+        "{bad}"
+    );
+    assert!(!said(0).contains("complaints"));
 }

@@ -101,7 +101,10 @@ fn the_command_takes_the_places_of_the_program() {
     fs::write(folder.path().join("own.prm"), own).unwrap();
     let (code, said) = run_tab(folder.path(), "", &[FILES[0], "--preferences", "own.prm"]);
     assert_eq!(code, Some(0), "{said}");
-    assert!(said.contains("own.prm: ends early"), "{said}");
+    assert!(
+        said.contains("own.prm: ends after line 13; expected a number of degrees"),
+        "{said}"
+    );
     let table = fs::read_to_string(folder.path().join("AP00002L.TXT")).unwrap();
     assert!(table.starts_with("long_East lat_North") && table.lines().all(|line| line.len() == 56));
 }
@@ -111,11 +114,11 @@ fn preferences_are_read_as_fortran_reads_lists() {
     let defaults = Preferences::default();
     let whole = "T\n.false. group 0\n2*T\nnot read\n\n\nF\n";
     let read = preferences(whole);
-    assert!(!read.is_whole && read.headings && !read.groups[0] && read.groups[1]);
+    assert!(read.ended.is_some() && read.headings && !read.groups[0] && read.groups[1]);
     assert_eq!(read.groups[2], defaults.groups[2]);
     let text = "T\n T\nF\nF\nF\nF\nF\nF\nF\nF\nT\nT\nT , 'it''s.DAT' rest\n-1.5d1\n,\n/\n 9e1\n169.8944472\n";
     let read = preferences(text);
-    assert!(read.is_whole && read.one_table);
+    assert!(read.ended.is_none() && read.one_table);
     assert_eq!(read.table_name, "it's.DAT");
     // An empty value and a slash leave what was there.
     assert_eq!(
@@ -202,4 +205,112 @@ fn rules_differ_where_the_program_slips_and_nowhere_else() {
     let [program, per_shot] = both(&bad, &all);
     let lost = program.lines().count() - per_shot.lines().count();
     assert!((1..=20).contains(&lost), "{lost} lines");
+}
+
+#[test]
+fn tables_take_neither_the_place_of_each_other_nor_of_an_input() {
+    let folder = tempfile::tempdir().unwrap();
+    let place = |name: &str| folder.path().join(name);
+    fs::create_dir(place("other")).unwrap();
+    fs::write(place("other/AP00002L.B"), data(FILES[1])).unwrap();
+    let one_each = "T\nT\nF\nF\nF\nF\nF\nF\nF\nF\nT\nT\nF, 'x.TAB'\n";
+    fs::write(place("own.prm"), one_each).unwrap();
+    let own = ["--preferences", "own.prm"];
+    let (code, said) = run_tab(folder.path(), "AP00002L.B\nother/AP00002L.B\n", &own);
+    assert_eq!(code, Some(2), "{said}");
+    assert!(
+        said.contains("AP00002L.TAB: would be the table of AP00002L.B and of other/AP00002L.B"),
+        "{said}"
+    );
+    assert!(!place("AP00002L.TAB").exists());
+
+    // The extension of each table, the name of the one table, and the list itself.
+    fs::write(place("b.prm"), one_each.replace("x.TAB", "x.B")).unwrap();
+    let one = one_each.replace("F, 'x.TAB'", "T, 'AP00005J.B'");
+    fs::write(place("one.prm"), &one).unwrap();
+    fs::write(place("list.prm"), one.replace("AP00005J.B", "FILELIST")).unwrap();
+    fs::write(place("self.prm"), one.replace("AP00005J.B", "self.prm")).unwrap();
+    for preferences in ["b.prm", "one.prm", "list.prm", "self.prm"] {
+        let before = fs::read(place(preferences)).unwrap();
+        let list = FILES.join("\n");
+        let (code, said) = run_tab(folder.path(), &list, &["--preferences", preferences]);
+        assert_eq!(code, Some(2), "{said}");
+        assert!(said.contains("would be written over"), "{said}");
+        for name in FILES {
+            assert!(
+                fs::read(place(name)).unwrap() == data(name),
+                "{preferences}"
+            );
+        }
+        assert_eq!(fs::read_to_string(place("FILELIST")).unwrap(), list);
+        assert!(fs::read(place(preferences)).unwrap() == before);
+    }
+}
+
+#[test]
+fn preferences_that_are_named_are_there_and_their_faults_have_a_line() {
+    let folder = tempfile::tempdir().unwrap();
+    let (code, said) = run_tab(folder.path(), "", &[FILES[0], "--preferences", "typo.prm"]);
+    assert_eq!(code, Some(6), "{said}");
+    assert!(said.contains("typo.prm: cannot read"), "{said}");
+    assert!(!folder.path().join("AP00002L.TAB").exists());
+    // The usual ones may be absent.
+    fs::create_dir(folder.path().join("bare")).unwrap();
+    fs::write(folder.path().join("bare/AP00002L.B"), data(FILES[0])).unwrap();
+    let mut command = common::mission::areograph();
+    command.current_dir(folder.path().join("bare"));
+    let output = command.args(["pedr", "tab", FILES[0]]).output().unwrap();
+    assert!(output.status.success());
+    assert!(folder.path().join("bare/AP00002L.TAB").exists());
+
+    let told = |text: &str| {
+        let ended = preferences(text).ended;
+        ended.map_or_else(String::new, |ended| ended.to_string())
+    };
+    assert_eq!(
+        told("T\nT\nmaybe\n"),
+        "line 3 holds \"maybe\"; expected T or F"
+    );
+    assert_eq!(told("T\nT"), "ends after line 2; expected T or F");
+    let limits = "T\n12*T\n".to_owned() + &"T\n".repeat(10) + "T 'x.TAB'\n-360.\nnan\n";
+    assert_eq!(
+        told(&limits.replacen("12*T", "T", 1)),
+        "line 15 holds \"nan\"; expected a number of degrees"
+    );
+}
+
+#[test]
+fn a_window_whose_west_is_above_its_east_crosses_the_end_of_the_turn() {
+    let whole = preferences("T\n");
+    let file = file(|_| ());
+    let lines = |longitude_deg: [f64; 2]| -> Vec<String> {
+        let window = Preferences {
+            longitude_deg,
+            ..whole.clone()
+        };
+        let table = table(
+            std::slice::from_ref(&file),
+            &window,
+            Variant::Team,
+            Rules::PerShot,
+        );
+        table.lines().skip(2).map(str::to_owned).collect()
+    };
+    let longitude_deg = |line: &String| line[..9].trim().parse::<f64>().unwrap();
+    let all = lines([0.0, 360.0]);
+    let (west_deg, east_deg) = (
+        all.iter().map(longitude_deg).fold(360.0, f64::min),
+        all.iter().map(longitude_deg).fold(0.0, f64::max),
+    );
+    let middle_deg = 0.5 * (west_deg + east_deg);
+    // From the middle of the track across 0° to just west of it: what lies east of the middle.
+    let across = lines([middle_deg, west_deg - 1.0]);
+    let east: Vec<String> = all
+        .iter()
+        .filter(|line| longitude_deg(line) > middle_deg)
+        .cloned()
+        .collect();
+    assert!(!east.is_empty() && east.len() < all.len());
+    assert_eq!(across, east);
+    assert_eq!(lines([350.0, 349.0]).len(), all.len());
 }

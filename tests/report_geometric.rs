@@ -373,7 +373,10 @@ fn what_cannot_be_trusted_is_said() {
          {east_m:.0} m east and {north_m:.0} m north, by orbit and attitude."
     )));
     // The surface controls tie points across the track in part: with its spacing of shots not all of them.
-    let shown = table(&page, "Share of a gross error that its own residual shows");
+    let shown = table(
+        &page,
+        "Redundancy: fraction of a gross error visible in its own residual",
+    );
     let across = shown
         .iter()
         .find(|row| row[0] == "tie point across the track")
@@ -500,7 +503,7 @@ fn tie_points_tell_the_misregistration_where_no_footprint_is_in_both_images() {
     let page = site.page();
     let text = section(&page, SECTIONS[0]);
     assert!(text.contains("No footprint is in both images."));
-    assert!(text.contains("Not counted: 1 footprints outside an image or the tie points."));
+    assert!(text.contains("1 footprint omitted: outside an image or the tie-point area."));
 }
 
 #[test]

@@ -21,6 +21,7 @@ mod sources;
 
 use std::{
     fs,
+    os::unix::fs::PermissionsExt,
     path::{Path, PathBuf},
     process::Command,
     sync::LazyLock,
@@ -66,6 +67,38 @@ fn report(folder: &TempDir) -> Command {
         .current_dir(folder.path())
         .args(["--quiet", "report"]);
     report
+}
+
+#[test]
+fn a_page_that_no_browser_shows_is_named_in_a_warning() {
+    let copy = copy();
+    let programs = copy.path().join("programs");
+    fs::create_dir(&programs).unwrap();
+    let open = || {
+        let mut report = report(&copy);
+        let output = report.args(["elsewhere", "--open"]).env("PATH", &programs);
+        let output = output.output().unwrap();
+        assert_eq!(output.status.code(), Some(0));
+        String::from_utf8(output.stderr).unwrap()
+    };
+    let place = "report/index.html\n";
+    let told = open();
+    assert!(told.starts_with("warning: cannot start "), "{told}");
+    assert!(told.ends_with(place), "{told}");
+    // What xdg-open says without a browser.
+    for name in ["xdg-open", "open"] {
+        let program = programs.join(name);
+        fs::write(&program, "#!/bin/sh\nexit 3\n").unwrap();
+        fs::set_permissions(&program, fs::Permissions::from_mode(0o755)).unwrap();
+    }
+    let told = open();
+    assert!(told.contains("found no browser (exit status: 3)"), "{told}");
+    assert!(told.ends_with(place), "{told}");
+    // One that shows the page says nothing.
+    for name in ["xdg-open", "open"] {
+        fs::write(programs.join(name), "#!/bin/sh\n").unwrap();
+    }
+    assert_eq!(open(), "");
 }
 
 #[test]

@@ -218,6 +218,8 @@ fn products_are_of_the_moon(out: &Path) {
     );
     let item = json(&out.join("exchange/stac_item.json"));
     assert_eq!(item["properties"]["ssys:targets"][0], "Moon");
+    let readme = text("exchange/README.txt");
+    assert!(readme.contains("planetocentric") && !readme.contains("areocentric"));
     let isd = json(&out.join("images/one/adjusted_isd.json"));
     assert_eq!(isd["naif_keywords"]["BODY_CODE"], 301);
     assert!((number(&isd["radii"]["semimajor"]) - 1737.4).abs() < 1e-9);

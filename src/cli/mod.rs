@@ -8,6 +8,7 @@ mod init;
 mod kernels;
 mod manual;
 mod nightly;
+mod numbers;
 mod open;
 mod output;
 mod pedr;

@@ -1,11 +1,14 @@
 //! Pages in the browser.
 
 use std::{
+    io::Result,
     path::Path,
-    process::{Command, Stdio},
+    process::{Command, ExitStatus, Stdio},
+    thread::sleep,
+    time::Duration,
 };
 
-use crate::error::{IoError, Locate, Result};
+use super::output;
 
 /// What opens a file with the program of the user's choice.
 const OPENER: &str = if cfg!(target_os = "macos") {
@@ -13,17 +16,30 @@ const OPENER: &str = if cfg!(target_os = "macos") {
 } else {
     "xdg-open"
 };
+/// How often, and how far apart, the opener is asked whether it has failed: one that has not by then is showing the page.
+const LOOKS: u32 = 40;
+const BETWEEN_LOOKS: Duration = Duration::from_millis(50);
 
-/// Opens `page` in the browser, and does not wait for it.
-///
-/// # Errors
-/// [`IoError`] where the system has nothing that opens pages.
-pub(super) fn page(page: &Path) -> Result<()> {
+/// Opens `page` in the browser, and does not wait until it is closed; where that fails, a warning says where the page is.
+pub(super) fn page(page: &Path) {
+    let why = match failure(page) {
+        Ok(None) => return,
+        Ok(Some(status)) => format!("{OPENER} found no browser ({status})"),
+        Err(error) => format!("cannot start {OPENER}: {error}"),
+    };
+    output::warning(format_args!("{why}; the page is {}", page.display()));
+}
+
+/// How the opener failed, if it did.
+fn failure(page: &Path) -> Result<Option<ExitStatus>> {
     let mut opener = Command::new(OPENER);
     opener.arg(page).stdin(Stdio::null()).stdout(Stdio::null());
-    let opened = opener.stderr(Stdio::null()).spawn();
-    opened
-        .map(drop)
-        .map_err(IoError::on("find a program that opens pages"))
-        .in_file(page)
+    let mut opener = opener.stderr(Stdio::null()).spawn()?;
+    for _ in 0..LOOKS {
+        if let Some(status) = opener.try_wait()? {
+            return Ok((!status.success()).then_some(status));
+        }
+        sleep(BETWEEN_LOOKS);
+    }
+    Ok(None)
 }

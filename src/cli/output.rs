@@ -27,6 +27,12 @@ pub(super) fn error(failure: impl Display) {
     let _ = writeln!(stderr().lock(), "error: {failure}");
 }
 
+/// Prints what a user should know of a command that succeeded.
+pub(super) fn warning(text: impl Display) {
+    // As for failures.
+    let _ = writeln!(stderr().lock(), "warning: {text}");
+}
+
 /// Prints an answer for scripts.
 pub(super) fn json(value: &serde_json::Value) {
     line(format_args!("{value:#}"));

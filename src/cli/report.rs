@@ -1,6 +1,7 @@
 //! `areograph report`.
 
 use std::{
+    cmp::Reverse,
     path::{Path, PathBuf},
     process::ExitCode,
 };
@@ -115,7 +116,7 @@ fn again(folder: &Path, arguments: &Arguments) -> Result<u8, Error> {
     };
     output::line(format_args!("{}: {}", again.site, path.display()));
     if arguments.open {
-        open::page(&path)?;
+        open::page(&path);
     }
     Ok(0)
 }
@@ -175,9 +176,22 @@ fn unmatched(pairs: &Pairs, limits: &Limits) -> Vec<String> {
     sentences.collect()
 }
 
+/// The sites by severity; of several, those in which nothing changed in one line.
 fn print(sites: &[Compared], unmatched: &[String]) {
-    for (_, compared) in sites {
-        let Ok(difference) = compared else { continue };
+    let compared = sites
+        .iter()
+        .filter_map(|(_, compared)| compared.as_ref().ok());
+    let mut compared: Vec<&RunDifference> = compared.collect();
+    compared.sort_by_key(|difference| Reverse(difference.severity()));
+    let fold = compared.len() > 1;
+    let (unchanged, told): (Vec<&RunDifference>, Vec<&RunDifference>) = compared
+        .into_iter()
+        .partition(|difference| fold && difference.is_unchanged());
+    for difference in told {
+        if difference.verdict_changed() {
+            let [a, b] = [&difference.a, &difference.b].map(|run| run.verdict.word());
+            output::line(format_args!("{}: {a} → {b}", difference.site));
+        }
         output::line(format_args!(
             "{}: {}",
             difference.site,
@@ -188,6 +202,10 @@ fn print(sites: &[Compared], unmatched: &[String]) {
         for sentence in difference.sentences() {
             output::line(format_args!("  {sentence}"));
         }
+    }
+    if !unchanged.is_empty() {
+        let names: Vec<&str> = unchanged.iter().map(|site| &*site.site).collect();
+        output::line(format_args!("unchanged: {}", names.join(", ")));
     }
     unmatched.iter().for_each(output::line);
 }

@@ -269,8 +269,8 @@ fn open_page(outcomes: &[Outcome], over_all: Option<&PathBuf>) {
         (Some(report), None) => Some(report),
         _ => over_all.cloned(),
     };
-    if let Some(Err(failure)) = page.as_deref().map(open::page) {
-        output::error(failure);
+    if let Some(page) = page {
+        open::page(&page);
     }
 }
 

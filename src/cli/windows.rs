@@ -1,6 +1,6 @@
 //! Windows on the command line.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 
@@ -41,6 +41,14 @@ impl WindowArguments {
             windows.extend(load_windows(path)?);
         }
         Ok(windows)
+    }
+
+    /// The files that windows are read from.
+    pub(super) fn files(&self) -> impl Iterator<Item = &Path> {
+        self.polygons
+            .iter()
+            .chain(&self.windows)
+            .map(PathBuf::as_path)
     }
 }
 

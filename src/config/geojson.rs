@@ -50,6 +50,11 @@ pub(super) enum RingError {
     Crossed(usize, usize),
     #[error("spans {0} degrees of longitude; a ring spans less than 360")]
     Wide(f64),
+    #[error(
+        "position {0}: longitude goes from {1} to {2} in one edge, more than 180 degrees: put positions between, or cross 180 degrees \
+         with a ring narrower than 90 degrees whose longitudes are within -180 to 180, and 0 degrees with negative longitudes"
+    )]
+    WideEdge(usize, f64, f64),
 }
 
 #[derive(Deserialize)]
@@ -153,10 +158,39 @@ fn ring(positions: &[Vec<f64>]) -> Result<Vec<[f64; 2]>, RingError> {
     if east - west >= 360.0 {
         return Err(RingError::Wide(east - west));
     }
+    if let Some((number, from, to)) = ambiguous_edge(positions) {
+        return Err(RingError::WideEdge(number, from, to));
+    }
     match crossing(&vertices) {
         Some((one, other)) => Err(RingError::Crossed(one, other)),
         None => Ok(vertices),
     }
+}
+
+/// A ring that crosses the antimeridian is believed to be narrower than this, degrees: one as written with such an edge would be
+/// wider than three quarters of Mars. So is the last edge of a ring round a pole.
+const CROSSING_MAX_DEG: f64 = 90.0;
+
+/// The first edge of more than half a turn as written that may be meant either way round: the position at its end, counted from
+/// 1, and the longitudes of its ends, degrees.
+fn ambiguous_edge(positions: &[Vec<f64>]) -> Option<(usize, f64, f64)> {
+    let (mut path, mut west, mut east) = (0.0_f64, 0.0_f64, 0.0_f64);
+    let (mut wide, mut longest) = (None, 0.0_f64);
+    for (number, pair) in (2..).zip(positions.windows(2)) {
+        let written = pair[1][0] - pair[0][0];
+        let step = longitude_step_rad(written * RADIANS_PER_DEGREE) / RADIANS_PER_DEGREE;
+        // Less than a degree: the other way round is 360 degrees longer.
+        if (step - written).abs() > 1.0 {
+            wide = wide.or(Some((number, pair[0][0], pair[1][0])));
+            longest = longest.max(step.abs());
+        }
+        path += step;
+        (west, east) = (west.min(path), east.max(path));
+    }
+    let is_round_pole = path.abs() > 180.0 && longest <= CROSSING_MAX_DEG + 1e-9;
+    let is_within_180 = positions.iter().all(|position| position[0] <= 180.0);
+    let is_crossing = path.abs() < 180.0 && is_within_180 && east - west < CROSSING_MAX_DEG;
+    wide.filter(|_| !is_round_pole && !is_crossing)
 }
 
 /// Positions, counted from 1, at which two edges of a closed ring begin that cross each other.
@@ -262,6 +296,12 @@ mod tests {
                 "polygon 1 ring 1 crosses itself: the edge after position 1 and the edge after position 3 meet",
             ),
             (
+                "[[0,-5],[200,-5],[200,5],[0,5],[0,-5]]",
+                "polygon 1 ring 1 position 2: longitude goes from 0 to 200 in one edge, more than 180 degrees: put positions between, or \
+                 cross 180 degrees with a ring narrower than 90 degrees whose longitudes are within -180 to 180, and 0 degrees with \
+                 negative longitudes",
+            ),
+            (
                 "[[-180,0],[180,0],[1,1],[-180,0]]",
                 "polygon 1 ring 1 spans 360 degrees of longitude; a ring spans less than 360",
             ),
@@ -287,6 +327,21 @@ mod tests {
     }
 
     #[test]
+    fn edges_that_may_be_meant_either_way_round_are_refused() {
+        for (ring, position) in [
+            ("[[-100,-5],[100,-5],[100,5],[-100,5],[-100,-5]]", 2),
+            ("[[0,-5],[300,-5],[300,5],[0,5],[0,-5]]", 2),
+            ("[[350,-5],[10,-5],[10,5],[350,5],[350,-5]]", 2),
+            ("[[-60,0],[0,10],[130,0],[-60,0]]", 4),
+            ("[[0,0],[120,10],[240,0],[0,0]]", 4),
+        ] {
+            let told = message(&format!(r#"{{"type":"Polygon","coordinates":[{ring}]}}"#));
+            let expected = format!("polygon 1 ring 1 position {position}: longitude goes from");
+            assert!(told.starts_with(&expected), "{ring}: {told}");
+        }
+    }
+
+    #[test]
     fn a_byte_order_mark_and_rings_that_only_touch_themselves_are_taken() {
         let polygon = |ring: &str| format!(r#"{{"type":"Polygon","coordinates":[{ring}]}}"#);
         let square = polygon("[[0,0],[1,0],[1,1],[0,1],[0,0]]");
@@ -295,6 +350,13 @@ mod tests {
             parse(square.as_bytes()).unwrap()
         );
         for ring in [
+            // Across 180 degrees either way round; wide with positions between; round a pole in either counting.
+            "[[170,-5],[-170,-5],[-170,5],[170,5],[170,-5]]",
+            "[[170,-5],[170,5],[-170,5],[-170,-5],[170,-5]]",
+            "[[0,-5],[100,-5],[200,-5],[200,5],[100,5],[0,5],[0,-5]]",
+            "[[170,-5],[190,-5],[190,5],[170,5],[170,-5]]",
+            "[[0,80],[90,80],[180,80],[270,80],[0,80]]",
+            "[[-150,80],[-30,80],[150,80],[-150,80]]",
             // Two triangles that share a corner; a spike; a cap with edges along a meridian and the pole.
             "[[0,0],[1,1],[2,0],[2,2],[1,1],[0,2],[0,0]]",
             "[[0,0],[1,0],[1,5],[1,0],[1,1],[0,1],[0,0]]",

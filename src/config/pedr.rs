@@ -46,7 +46,7 @@ declare_table! {
         /// Classification codes: 1 ground, 0 cloud or noise. The default is that of pedr2tab.
         classes = key(list(whole_from_to(i16::MIN, i16::MAX))).or(vec![1]).map(sorted),
         /// Trigger channels. (The MOLA team's grids leave out channel 4.)
-        channels = key(list(whole_from_to(1, 4))).or(vec![1, 2, 3, 4]).map(sorted),
+        channels = key(list(whole_from_to(ShotFilter::CHANNELS[0], ShotFilter::CHANNELS[1]))).or(vec![1, 2, 3, 4]).map(sorted),
         /// Attitude flags. With 2 (attitude missing for part of the frame) and 3 (for all of it) the footprint
         /// assumes nadir pointing, which off nadir can be 100 km wrong. 1 has no published meaning; in files
         /// before 1998-10 the field is undefined: there, list the values found.
@@ -54,7 +54,7 @@ declare_table! {
         /// Largest off-nadir angle of the laser. The default keeps all, because images are taken off nadir too: Shan
         /// et al. 2005, Table 2, has emission angles of up to 22.1 degrees. (The MOLA team's grids stop at 1.0 or 1.2.)
         off_nadir_max_rad as "off_nadir_max_deg" =
-            key(above_to(0.0, 90.0)).or(90.0).map(|degrees| degrees * RADIANS_PER_DEGREE),
+            key(above_to(0.0, ShotFilter::OFF_NADIR_LIMIT_DEG)).or(90.0).map(|degrees| degrees * RADIANS_PER_DEGREE),
     }
 }
 

@@ -30,7 +30,8 @@ pub(super) const WINDOWS: Many = Many {
     further: &[&[
         " Instead of a box: polygons of a GeoJSON file (Polygon, MultiPolygon, Feature, FeatureCollection),",
         " coordinates [longitude, latitude] as above, rings closed and less than 360 degrees wide, at most",
-        " 100000 vertices and 16 MiB. Cut polygons that cross 180 degrees in two, or let longitudes run on to 360.",
+        " 100000 vertices and 16 MiB. Cut polygons that cross 180 degrees in two, or let longitudes run on to 360. An",
+        " edge from 170 to -170 crosses 180 degrees in a ring narrower than 90; every other edge spans at most 180 as written.",
     ]],
 };
 

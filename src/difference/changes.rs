@@ -8,6 +8,9 @@ use serde_json::{Value, json};
 
 use crate::store::manifest::Manifest;
 
+/// Numbers that differ by less than this share of the larger one are the same but for rounding.
+const ROUNDING_SHARE: f64 = 1e-6;
+
 /// A value that differs; missing where a run does not have it.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Change {
@@ -36,6 +39,18 @@ impl Change {
     pub fn difference(&self) -> Option<f64> {
         let number = |value: &Option<Value>| value.as_ref().and_then(Value::as_f64);
         Some(number(&self.b)? - number(&self.a)?)
+    }
+}
+
+impl Change {
+    /// Whether both are numbers that are the same but for rounding.
+    #[must_use]
+    pub fn is_rounding(&self) -> bool {
+        let size = |value: &Option<Value>| value.as_ref().and_then(Value::as_f64).map(f64::abs);
+        match (self.difference(), size(&self.a), size(&self.b)) {
+            (Some(difference), Some(a), Some(b)) => difference.abs() < ROUNDING_SHARE * a.max(b),
+            _ => false,
+        }
     }
 }
 
@@ -152,6 +167,14 @@ mod tests {
             ]
         );
         assert!(between(&a, &a).is_empty());
+        let rounding = |a: Value, b: Value| {
+            let (a, b) = (Some(a), Some(b));
+            let what = String::new();
+            Change { what, a, b }.is_rounding()
+        };
+        assert!(rounding(json!(71.2), json!(71.200_02)) && rounding(json!(-5e-9), json!(-5e-9)));
+        assert!(!rounding(json!(71.2), json!(71.200_1)) && !rounding(json!(0.0), json!(1e-12)));
+        assert!(!rounding(json!("a"), json!("b")));
         let fractions =
             [-1.15, 37_000_000.25, 0.104_943_9, 7.4e-9, 0.0].map(|value| text(Some(&json!(value))));
         assert_eq!(

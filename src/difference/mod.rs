@@ -269,4 +269,27 @@ impl RunDifference {
     pub fn moved(&self) -> bool {
         self.footprints.moved() || self.images.iter().any(ImageDifference::moved)
     }
+
+    /// Whether the word of the verdict differs.
+    #[must_use]
+    pub fn verdict_changed(&self) -> bool {
+        self.a.verdict.word() != self.b.verdict.word()
+    }
+
+    /// Whether both runs published the same.
+    #[must_use]
+    pub fn is_unchanged(&self) -> bool {
+        self.outcome == Outcome::NothingChanged
+    }
+
+    /// How soon a reader must know of it: a verdict that changed before all else, the worse the sooner; then what moved.
+    #[must_use]
+    pub fn severity(&self) -> (bool, bool, bool, Outcome) {
+        let (changed, after) = (self.verdict_changed(), &self.b.verdict);
+        let worse = (
+            changed && !after.valid,
+            changed && !after.remarks.is_empty(),
+        );
+        (changed, worse.0, worse.1, self.outcome)
+    }
 }

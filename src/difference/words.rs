@@ -56,17 +56,21 @@ impl RunDifference {
         match self.outcome {
             Outcome::NothingChanged => "nothing changed".to_owned(),
             Outcome::NothingMoved => "nothing moved".to_owned(),
-            Outcome::Moved => format!("moved: {}", self.farthest().join("; ")),
+            Outcome::Moved => {
+                let moved = match self.farthest() {
+                    none if none.is_empty() => "nothing in both moved".to_owned(),
+                    moved => format!("moved: {}", moved.join("; ")),
+                };
+                let all = [vec![moved], self.not_compared()].concat();
+                all.join("; ")
+            }
             Outcome::BeyondLimit => format!("BEYOND THE LIMIT: {}", few(&self.beyond_limits)),
         }
     }
 
     /// The largest movements of each kind.
     fn farthest(&self) -> Vec<String> {
-        let mut told = Vec::new();
-        if self.footprints.moved() {
-            told.push(self.footprints_sentence());
-        }
+        let mut told = self.footprints_moved();
         let images = || {
             self.images
                 .iter()
@@ -95,20 +99,6 @@ impl RunDifference {
         if images().any(|movement| movement.time_s.moved()) {
             told.push(format!("lines in time by up to {} s", quantity(time_s)));
         }
-        let not_compared = |only_in_one: bool| {
-            let images = self.images.iter().filter(|image| image.movement.is_none());
-            images
-                .filter(|image| image.only_in_one() == only_in_one)
-                .count()
-        };
-        for (count, why) in [
-            (not_compared(true), "in one run only"),
-            (not_compared(false), "without a line in common"),
-        ] {
-            if count > 0 {
-                told.push(format!("{count} image(s) {why}"));
-            }
-        }
         told
     }
 
@@ -117,7 +107,7 @@ impl RunDifference {
     pub fn sentences(&self) -> Vec<String> {
         let mut told = Vec::new();
         // A verdict that changed is what a reader must know before anything else.
-        let verdict_changed = self.a.verdict.word() != self.b.verdict.word();
+        let verdict_changed = self.verdict_changed();
         if verdict_changed {
             told.push(self.verdict_sentence());
         }
@@ -147,7 +137,7 @@ impl RunDifference {
         if self.outcome != Outcome::NothingChanged {
             told.extend(self.of_movements(ImageDifference::differs));
         }
-        if self.a.verdict.word() == self.b.verdict.word() {
+        if !self.verdict_changed() {
             told.push(self.verdict_sentence());
         }
         told
@@ -201,6 +191,53 @@ impl RunDifference {
         }
         told.push(format!("the same: {}", stages.unchanged));
         told.join("; ")
+    }
+
+    /// What of footprints moved.
+    fn footprints_moved(&self) -> Vec<String> {
+        let Some(movement) = &self.footprints.movement else {
+            return Vec::new();
+        };
+        let mut told = Vec::new();
+        if movement.moved > 0 {
+            told.push(format!(
+                "{} of {} footprints by up to {} m",
+                movement.moved,
+                self.footprints.matched,
+                quantity(movement.distance_m.max)
+            ));
+        }
+        if movement.topography_m.moved() {
+            let heights = signed(movement.topography_m, "m");
+            told.push(format!("heights of footprints by {heights}"));
+        }
+        if movement.time_s.moved() {
+            let times = signed(movement.time_s, "s");
+            told.push(format!("times of footprints by {times}"));
+        }
+        told
+    }
+
+    /// What is there in one run only, or cannot be compared.
+    fn not_compared(&self) -> Vec<String> {
+        let footprints = &self.footprints;
+        let unmatched = unmatched(footprints.only_in_a, footprints.only_in_b, " footprints");
+        let mut told: Vec<String> = unmatched.collect();
+        let without = |only_in_one: bool| {
+            let images = self.images.iter().filter(|image| image.movement.is_none());
+            images
+                .filter(|image| image.only_in_one() == only_in_one)
+                .count()
+        };
+        for (count, why) in [
+            (without(true), "in one run only"),
+            (without(false), "without a line in common"),
+        ] {
+            if count > 0 {
+                told.push(format!("{count} image(s) {why}"));
+            }
+        }
+        told
     }
 
     /// Footprints, without the word.

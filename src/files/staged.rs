@@ -7,6 +7,7 @@ use std::{
 
 use tempfile::NamedTempFile;
 
+use super::outputs::require_replaceable;
 use crate::error::{IoError, Locate, Result};
 
 /// How names of half-written files begin.
@@ -23,8 +24,9 @@ impl StagedFile {
     /// Begins the file `path`, its folder made where missing.
     ///
     /// # Errors
-    /// The folder cannot be made or written.
+    /// The folder cannot be made or written; something else than a file is there under this name.
     pub fn create(path: &Path) -> Result<Self> {
+        require_replaceable(path)?;
         let folder = match path.parent() {
             Some(folder) if folder != Path::new("") => folder,
             _ => Path::new("."),

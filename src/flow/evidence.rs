@@ -10,6 +10,7 @@ use crate::{
     instruments::Instrument,
     stages::{
         judge::{AdjustmentEvidence, Evidence, JudgedImage, Verdict, judge},
+        lay_overlays::ShownImage,
         site_image::SiteImage,
     },
     wording::with_minus,
@@ -84,7 +85,21 @@ pub(super) fn warnings(config: &SiteConfig, site: &Site) -> Result<Vec<String>> 
         let remarks = ties.value()?.remarks.iter();
         warnings.extend(remarks.map(|remark| format!("tie points: {remark}")));
     }
+    for (id, image) in shown(site)? {
+        let damage = image.damage();
+        warnings.extend(damage.map(|damage| format!("pixels of {id}: {damage}")));
+    }
     Ok(warnings)
+}
+
+/// Images whose pixels were read, and their identifiers.
+fn shown(site: &Site) -> Result<Vec<(&str, &ShownImage)>> {
+    let Some(overlays) = &site.overlays else {
+        return Ok(Vec::new());
+    };
+    let shown = overlays.value()?.images.iter();
+    let named = shown.map(|shown| Ok((&*site.images[shown.image].times.value()?.id, shown)));
+    named.collect()
 }
 
 /// The cameras of the images that kernels orient, each once.
@@ -183,6 +198,17 @@ pub(super) fn notes(config: &SiteConfig, site: &Site) -> Result<Vec<String>> {
         .iter()
         .map(|note| with_minus(&config.wording().of(&**note)));
     Ok(said.collect())
+}
+
+/// What was wrong with the files of pixels, one sentence each, and how much that is in all.
+pub(super) fn complaints_of_pixels(site: &Site) -> Result<(Vec<String>, u64)> {
+    let (mut texts, mut count) = (Vec::new(), 0);
+    for (id, image) in shown(site)? {
+        let complaints = image.complaints.iter();
+        texts.extend(complaints.map(|of| with_minus(&format!("pixels of {id}: {of}"))));
+        count += image.complaint_count;
+    }
+    Ok((texts, count))
 }
 
 /// What was wrong with input records, one sentence each.

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use super::{
     PUBLISH,
     driver::Ledger,
+    evidence::complaints_of_pixels,
     outputs::{Intersection, Site},
 };
 use crate::{
@@ -67,6 +68,7 @@ pub(super) fn manifest(
         Some(ties) => ties.value()?.complaint_count,
         None => 0,
     };
+    let (_, of_pixels) = complaints_of_pixels(site)?;
     let choice = site.choice.as_ref().map(|choice| choice.value());
     Ok(Manifest {
         tool: "areograph".to_owned(),
@@ -95,7 +97,7 @@ pub(super) fn manifest(
         figures: figures_of(site)?,
         rejected: account.rejected,
         complaints: Complaints {
-            count: found.complaint_counts.values().sum::<u64>() + of_ties,
+            count: found.complaint_counts.values().sum::<u64>() + of_ties + of_pixels,
             texts: complaints.into_iter().take(COMPLAINTS_QUOTED).collect(),
         },
         notes: account.notes,

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use super::{
     PUBLISH,
     driver::Ledger,
-    evidence::{complaints, judged, notes, rejected, warnings},
+    evidence::{complaints, complaints_of_pixels, judged, notes, rejected, warnings},
     manifest::{Account, manifest},
     outputs::Site,
     read_back::read_back,
@@ -106,12 +106,15 @@ pub(super) fn publish(
     let none = KernelSet::default();
     let kernels = site.kernels.as_ref().unwrap_or(&none);
     let described = site.described.value()?;
-    let (notes, complaints, rejected) = (notes(config, site)?, complaints(site)?, rejected(site)?);
+    let (notes, mut complaints, rejected) =
+        (notes(config, site)?, complaints(site)?, rejected(site)?);
     let warnings = warnings(config, site)?;
     for warning in &warnings {
         tracing::warn!("{warning}");
     }
     let (verdict, images_agree) = judged(config, site, &warnings, &complaints)?;
+    // Those of pixels are no skipped records; the verdict has them from the warnings.
+    complaints.extend(complaints_of_pixels(site)?.0);
     let images = image_products(&site.images)?;
     let adjusted_images = site
         .adjustment

@@ -10,6 +10,7 @@ use crate::{
     body::Body,
     error::{IoError, Locate, Result},
     report::{Earlier, FIDELITY_FILE, SiteLine, SiteSummary, published_fidelity_page, sites_page},
+    stages::judge::CheckKind,
     store::{
         atomic,
         manifest::{Manifest, figures},
@@ -108,22 +109,31 @@ fn earlier(manifest: &Manifest, folder: &str) -> Earlier {
 fn summary(manifest: &Manifest) -> SiteSummary {
     let count = |name: &str| manifest.counts.get(name).copied().unwrap_or(0);
     let figure = |name: &str| manifest.figures.get(name).copied();
+    // Figures are sizes; the checks of the same numbers have their signs.
+    let signed = |name: &str, kind: CheckKind| {
+        let mut checks = manifest.verdict.checks.iter();
+        let value = checks.find(|check| check.kind == kind)?.value?;
+        Some(figure(name)?.copysign(value))
+    };
+    let either = |name: &str, kind: CheckKind| signed(name, kind).or_else(|| figure(name));
     SiteSummary {
         verdict: manifest.verdict.word(),
         reasons: manifest.verdict.reasons.clone(),
         remarks: manifest.verdict.remarks.clone(),
         counts: ["footprints", "profiles", "images"].map(count),
-        range_mean_m: figure(figures::RANGE_MEAN_M),
+        range_mean_m: either(figures::RANGE_MEAN_M, CheckKind::RangeMean),
         images_apart_m: [
             figures::ALONG_TRACK_PARALLAX_M,
             figures::ADJUSTED_ALONG_TRACK_PARALLAX_M,
         ]
         .map(figure),
         height_off_m: [
-            figures::HEIGHT_OFF_SURFACE_M,
-            figures::ADJUSTED_HEIGHT_OFF_SURFACE_M,
-        ]
-        .map(figure),
+            either(figures::HEIGHT_OFF_SURFACE_M, CheckKind::HeightBefore),
+            either(
+                figures::ADJUSTED_HEIGHT_OFF_SURFACE_M,
+                CheckKind::HeightAfter,
+            ),
+        ],
         body: body(&manifest.configuration.keys),
         place_deg: place_deg(&manifest.configuration.keys),
         earlier: None,

@@ -6,7 +6,6 @@
 mod columns;
 
 use std::{
-    collections::BTreeMap,
     fs::File,
     io::{BufRead as _, BufReader, Read as _},
     path::Path,
@@ -14,7 +13,7 @@ use std::{
 
 use chrono::NaiveDateTime;
 
-use self::columns::{COLUMNS, Column};
+use self::columns::{COLUMNS, Column, Fields};
 use super::label::{LABEL_BYTES_MAX, parse};
 use crate::{
     error::{Cause, IoError, Kind, Locate as _, Result},
@@ -213,8 +212,8 @@ fn read_columns(path: &Path) -> Result<Vec<Column>> {
 }
 
 /// The image of a row, by the names of its columns.
-fn image(fields: &BTreeMap<&str, &str>) -> std::result::Result<IndexedImage, String> {
-    let text = |key: &str| fields.get(key).copied().unwrap_or_default();
+fn image(fields: &Fields<'_>) -> std::result::Result<IndexedImage, String> {
+    let text = |key: &str| fields.get(key).map(|text| &**text).unwrap_or_default();
     let known = |key: &str| {
         let value = Some(text(key));
         value.filter(|value| !matches!(*value, "" | "N/A" | "UNK" | "NULL" | "UNKNOWN"))

@@ -41,6 +41,8 @@ use crate::{
 /// The column of the bounding box of each point, and its parts: what readers of GeoParquet pass over rows by.
 const BBOX: &str = "bbox";
 const BBOX_PARTS: [&str; 4] = ["xmin", "ymin", "xmax", "ymax"];
+/// What shots are chosen by: a search may keep several values of each, so that GIS has them too.
+const FILTERED: [&str; 3] = ["channel", "class", "attitude_flag"];
 /// The key of what was asked for, and how complete the answer is.
 const SEARCH: &str = "areograph_search";
 
@@ -215,7 +217,7 @@ impl ShotsFile {
             }
             Writer::GeoJson(writer) => {
                 let points = points_deg.iter().map(|[east, north]| [*east, *north, 0.0]);
-                let table = shots.table().for_gis();
+                let table = shots.table().also_in_gis(&FILTERED).for_gis();
                 let features =
                     Features::of_footprints(Body::Mars, "shots", "", points.collect(), table);
                 let separator = if is_first { "" } else { geojson::SEPARATOR };

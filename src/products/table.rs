@@ -283,6 +283,16 @@ impl<'a> Table<'a> {
         self.keep(|column| column.gis != Gis::No)
     }
 
+    /// With these columns among the attributes of GeoJSON too.
+    pub(super) fn also_in_gis(mut self, names: &[&str]) -> Self {
+        for (_, column) in &mut self.columns {
+            if column.gis == Gis::No && names.contains(&column.name) {
+                column.gis = Gis::Yes;
+            }
+        }
+        self
+    }
+
     /// With the fields of dBASE alone, numbers first.
     pub(super) fn for_dbase(mut self) -> Self {
         self.columns

@@ -2,7 +2,7 @@
 
 use super::{
     corrections, correlation,
-    html::{Cell, Column, Table, counted, heading, paragraph},
+    html::{Cell, Column, Table, counted, folded, heading, paragraph},
     numbers::whole,
     plots::{Extent, Panel, Plot, Series, figure, label},
     reliability, residuals,
@@ -16,7 +16,7 @@ use crate::{
     stages::adjust::{Adjusted, AdjustmentSummary, ObservationType, WORSE_THAN_CONFIGURED},
 };
 
-/// Steps that the axis of the convergence has room for at least, so that its labels are whole numbers.
+/// Iterations that the axis of the convergence has room for at least, so that its labels are whole numbers.
 const STEPS_SHOWN_MIN: f64 = 8.0;
 
 pub(super) const SECTION: Section = Section {
@@ -40,14 +40,22 @@ fn write(
     let mut html = overview(adjusted);
     html += &reliability::absolute(geometric, adjustment);
     html += &format!(
-        "<div class=\"plots\">\n{}{}</div>\n",
-        residuals::distribution(adjusted)?,
-        figure(&convergence(adjusted))?
+        "<div class=\"plots\">\n{}</div>\n",
+        residuals::distribution(adjusted)?
     );
     html += &residuals::images(adjusted);
-    html += &observations(summary);
-    html += &heading("Corrections to the orientation");
-    html += &corrections::tables(site, adjusted);
+    html += &folded(
+        "Observations by kind, and convergence",
+        &format!(
+            "{}<div class=\"plots\">\n{}</div>\n",
+            observations(summary),
+            figure(&convergence(adjusted))?
+        ),
+    );
+    html += &folded(
+        "Corrections to the orientation, ranges and biases",
+        &corrections::tables(site, adjusted),
+    );
     html += &heading("Reliability");
     html += &reliability::redundancy(site, adjusted);
     html += &reliability::correlations(summary);
@@ -82,7 +90,7 @@ fn overview(adjusted: &Adjusted) -> String {
             counted(summary.ties.corrections_m[0].n as usize, "tie point"),
             at("/ties/corrections_m/0/n"),
         ),
-        (counted(summary.steps, "step"), at("/steps")),
+        (counted(summary.steps, "iteration"), at("/steps")),
         (
             summary.degrees_of_freedom.to_string(),
             at("/degrees_of_freedom"),
@@ -101,7 +109,7 @@ fn overview(adjusted: &Adjusted) -> String {
     )
 }
 
-/// The weighted sum of squares from step to step.
+/// The weighted sum of squares from iteration to iteration.
 fn convergence(adjusted: &Adjusted) -> Plot {
     let squares = (0_u32..).zip(&adjusted.weighted_squares);
     let logarithms = squares
@@ -118,7 +126,7 @@ fn convergence(adjusted: &Adjusted) -> Plot {
             label(*first, 1),
             label(*last, 1)
         ),
-        _ => "No step was taken.".to_owned(),
+        _ => "No iteration was made.".to_owned(),
     };
     let panel = Panel {
         height: 260,
@@ -133,7 +141,7 @@ fn convergence(adjusted: &Adjusted) -> Plot {
         ..Plot::of(
             "Convergence of the adjustment".to_owned(),
             words,
-            "step",
+            "iteration",
             vec![panel],
         )
     }

@@ -137,7 +137,7 @@ fn steps(of: &Calibration) -> String {
     let free: Vec<String> = of
         .steps
         .iter()
-        .map(|step| format!("{}: free was {}", step.step, step.free))
+        .map(|step| format!("{}: adjusted {}", step.step, step.free))
         .collect();
     table.finish() + &list(&free)
 }
@@ -174,8 +174,7 @@ fn residuals(of: &Calibration) -> Result<String> {
     ];
     let plot = Plot::of(
         "Residuals across the flight".to_owned(),
-        "Where a line sees a point minus where it is measured, over the image's lines. Ties show what the lines differ by, \
-         laser points that were held back what the calibration is worth."
+        "Projected minus measured position. Ties show inter-line error; laser points that were held back show absolute error."
             .to_owned(),
         "line",
         panels.into_iter().flatten().collect(),
@@ -254,10 +253,9 @@ fn cameras(of: &Calibration) -> String {
         format!("{} ± {sigma:.4}", signed(value, 4))
     });
     let words = format!(
-        "Angles and the constant of the look angles say the same of an image, and so does what stays the same of an orbit's error: \
-         how much each has of a shift is by what was known beforehand, and their standard deviations are wide. Where the camera \
-         looks is known far better. The orbit drifts by {} m a line. Support data hold a straight line of equal samples; what they \
-         leave is in the last column.",
+        "Offset angles, constant look-angle terms and constant orbit errors are nearly indistinguishable, so their individual σ \
+         are large; their combined effect is far better known. The orbit drifts by {} m a line along the body-fixed X, Y, Z. \
+         Support data hold a straight line of equal samples; what they leave is in the last column.",
         drift.join(", ")
     );
     table.finish() + &paragraph(&words)

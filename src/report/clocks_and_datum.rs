@@ -1,7 +1,7 @@
 //! The clock corrections and the datum as used, with their sources.
 
 use super::{
-    html::{Column, Table, paragraph},
+    html::{Column, Table, folded, paragraph},
     numbers::{number as label, signed, whole},
     section::Section,
 };
@@ -140,5 +140,5 @@ fn datum(site: &SiteProducts) -> String {
         site.config.body.names().short_frame,
         site.config.body.model().meridian_deg
     );
-    table.finish() + &paragraph(&words)
+    paragraph(&words) + &folded("Datum, file by file", &table.finish())
 }

@@ -64,7 +64,15 @@ fn lead(comparison: &KernelComparison) -> String {
         .nearly_as_close()
         .map(|of| format!("{} ({} m)", of.set, label(of.size.rms, 3)))
         .collect();
-    let (tone, headline) = if !close.is_empty() {
+    let pulled = orbit.decided_by();
+    let (tone, headline) = if let [_, _] = &*orbit.deviations {
+        // By the rule two sets are equally close, whatever they are.
+        let headline = format!(
+            "Two kernel sets, {} m apart (root mean square): which is better takes a third.",
+            label(orbit.difference(0, 1).rms, 3)
+        );
+        (Tone::Remarks, headline)
+    } else if !close.is_empty() {
         let headline = format!(
             "Too close to call: {} ({} m) and {} are about equally far from the mean orbit.",
             closest.set,
@@ -74,11 +82,16 @@ fn lead(comparison: &KernelComparison) -> String {
         (Tone::Remarks, headline)
     } else if orbit.tied.is_empty() {
         let headline = format!(
-            "Of {} kernel sets {} is closest to the mean orbit: {distance}.",
+            "Of {} kernel sets {} is closest to the mean orbit: {distance}{}.",
             orbit.deviations.len(),
-            closest.set
+            closest.set,
+            pulled.map_or_else(String::new, |far| format!(
+                "; this rests on {}, which pulls the mean",
+                far.set
+            ))
         );
-        (Tone::Good, headline)
+        let tone = pulled.map_or(Tone::Good, |_| Tone::Remarks);
+        (tone, headline)
     } else {
         let first = std::iter::once(&*closest.set);
         let names: Vec<&str> = first.chain(orbit.tied_sets()).collect();
@@ -104,11 +117,34 @@ fn lead(comparison: &KernelComparison) -> String {
         comparison.utc[1],
         SPACECRAFT.name,
     );
+    let words = words + &elsewhere(orbit);
     verdict(
         tone,
         &headline,
         &(paragraph(&words) + &list(comparison.remarks)),
     )
+}
+
+/// Stretches in which another set is closer than the one that is closest over all.
+fn elsewhere(orbit: &Comparison) -> String {
+    let stretches = stretches(&orbit.epochs);
+    // Two sets are equally close to their mean everywhere.
+    if stretches.len() < 2 || orbit.deviations.len() < 3 {
+        return String::new();
+    }
+    let others = stretches.iter().enumerate().filter_map(|(index, stretch)| {
+        let (of, [least_m, own_m]) = orbit.closer_within(*stretch)?;
+        Some(format!(
+            " In stretch {} of {} {} is closer ({} m, {} {} m).",
+            index + 1,
+            stretches.len(),
+            of.set,
+            label(least_m, 3),
+            orbit.closest().set,
+            label(own_m, 3)
+        ))
+    });
+    others.collect()
 }
 
 fn orbit(orbit: &Comparison) -> Result<String> {
@@ -336,6 +372,7 @@ mod tests {
         let page = page_of(&found, &["<i>left out</i>".to_owned()]);
         assert!(page.contains("Of 3 kernel sets &lt;nav&gt; is closest to the mean orbit"));
         assert!(page.contains("2.000 m")); // 1 − (1 + 0 + 8) / 3
+        assert!(page.contains("this rests on ipng") && page.contains("verdict remarks"));
         assert!(page.contains("id=\"orbits-minus-their-mean\""));
         assert!(!page.contains("<nav>") && !page.contains("<i>left"));
         assert!(!page.contains("id=\"attitude\""));
@@ -361,8 +398,9 @@ mod tests {
     }
 
     #[test]
-    fn equally_close_sets_are_both_named() {
+    fn of_two_sets_none_is_called_closer() {
         let page = page_of(&comparison(&[("nav", 1.0), ("gsfc", 0.0)]), &[]);
-        assert!(page.contains("nav and gsfc are equally close to the mean orbit"));
+        assert!(page.contains("Two kernel sets, 1.000 m apart"));
+        assert!(page.contains("verdict remarks") && !page.contains("close to the mean"));
     }
 }

@@ -1,7 +1,7 @@
 //! Appendix: what the published iterations from ground to image cost, figure 4 of Shan et al. 2005 for this site.
 
 use super::{
-    html::{Cell, Column, Table, paragraph},
+    html::{Cell, Column, Table, folded, paragraph},
     numbers::whole,
     plots::{Panel, Plot, Series, figure, label},
     registration::place,
@@ -29,7 +29,8 @@ fn write(site: &SiteProducts) -> Result<String> {
     for image in site.images.iter().filter(|image| converges(image)) {
         figures += &figure(&convergence_plot(image))?;
     }
-    Ok(methods(site) + &format!("<div class=\"plots\">\n{figures}</div>\n"))
+    let html = format!("{}<div class=\"plots\">\n{figures}</div>\n", methods(site));
+    Ok(folded("What the published iterations cost", &html))
 }
 
 fn name(run: &MethodRun) -> String {

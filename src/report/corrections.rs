@@ -118,7 +118,7 @@ fn rotations(adjusted: &Adjusted) -> String {
             with_sigma(arcseconds(axis), 1).told(place(quantity, &per_arcsecond))
         }));
         cells.push(image.time_bias_s.map_or_else(
-            || "no unknown".into(),
+            || "not estimated".into(),
             |(bias_s, sigma_s)| {
                 with_sigma((bias_s / SECONDS_PER_MS, sigma_s / SECONDS_PER_MS), 2)
                     .told("/time_bias_s/0*1000 /time_bias_s/1*1000")
@@ -126,10 +126,12 @@ fn rotations(adjusted: &Adjusted) -> String {
         ));
         table.row_of(&of_image(index), true, cells);
     }
-    table.finish()
-        + &paragraph(
-            "±: a posteriori σ. A narrow field of view hardly separates position from rotation.",
-        )
+    let inseparable = if adjusted.summary.correlated.is_empty() {
+        ""
+    } else {
+        " A narrow field of view hardly separates position from rotation."
+    };
+    table.finish() + &paragraph(&format!("±: a posteriori σ.{inseparable}"))
 }
 
 /// Range residuals of the same shots with the orbit of the kernels and after the adjustment.

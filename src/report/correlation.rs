@@ -5,6 +5,7 @@ use std::fmt::Write as _;
 use plotters::{prelude::*, style::text_anchor::HPos};
 
 use super::{
+    html::folded_unless,
     map::labels::{LETTERS, write},
     plots::{Canvas, Drawn, INK, Key, WIDTH, drawn, figure_html, label, quoted},
 };
@@ -16,6 +17,8 @@ use crate::{
 
 /// Images whose matrix is drawn; `correlations.parquet` has all.
 const IMAGES_SHOWN: usize = 4;
+/// Correlation from which the matrices are shown without being asked for.
+const OF_INTEREST: f64 = 0.95;
 /// Where the matrix begins, after the names of its rows.
 const LEFT: i32 = 520;
 /// Colours of −1, 0 and 1: apart for every colour vision, and the signs unlike in grey too.
@@ -31,11 +34,26 @@ const COLOURS: [[f64; 3]; 3] = [
 /// A drawing that cannot be made.
 pub(super) fn figures(adjusted: &Adjusted) -> Result<String> {
     let images = adjusted.images.iter().enumerate().take(IMAGES_SHOWN);
-    let figures = images
+    let matrices: Vec<Matrix> = images
         .filter_map(|(index, image)| Matrix::of(index, image))
-        .map(|matrix| matrix.figure())
+        .collect();
+    let largest = matrices.iter().filter_map(Matrix::largest);
+    let largest = largest.fold(0.0, |most: f64, (_, value)| most.max(value.abs()));
+    let figures = matrices
+        .iter()
+        .map(Matrix::figure)
         .collect::<Result<String>>()?;
-    Ok(format!("<div class=\"plots\">\n{figures}</div>\n"))
+    if figures.is_empty() {
+        return Ok(figures);
+    }
+    Ok(folded_unless(
+        largest >= OF_INTEREST,
+        &format!(
+            "Correlations within an image, at most {}",
+            label(largest, 2)
+        ),
+        &format!("<div class=\"plots\">\n{figures}</div>\n"),
+    ))
 }
 
 /// The unknowns of an image that are solved for, and their correlations, row by row.
@@ -75,6 +93,14 @@ impl<'a> Matrix<'a> {
 
     fn count(&self) -> usize {
         self.names.len()
+    }
+
+    /// The largest correlation of two unknowns by its size, with its place.
+    fn largest(&self) -> Option<(usize, f64)> {
+        let count = self.count();
+        let off_diagonal = (0..count * count).filter(|place| place / count < place % count);
+        let values = off_diagonal.map(|place| (place, self.values[place]));
+        values.max_by(|one, other| one.1.abs().total_cmp(&other.1.abs()))
     }
 
     /// Side of a cell.
@@ -130,16 +156,10 @@ impl<'a> Matrix<'a> {
 
     fn words(&self) -> String {
         let count = self.count();
-        let off_diagonal = (0..count * count).filter(|place| place / count < place % count);
-        let largest = off_diagonal.max_by(|one, other| {
-            self.values[*one]
-                .abs()
-                .total_cmp(&self.values[*other].abs())
-        });
-        let most = largest.map_or_else(String::new, |place| {
+        let most = self.largest().map_or_else(String::new, |(place, value)| {
             format!(
                 " Largest: {} for {} and {}.",
-                label(self.values[place], 4),
+                label(value, 4),
                 self.names[place / count],
                 self.names[place % count]
             )

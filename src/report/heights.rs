@@ -6,7 +6,7 @@ mod readings;
 mod relief;
 
 use super::{
-    html::{Cell, Column, Table, counted, heading, paragraph},
+    html::{Cell, Column, Table, counted, folded, heading, paragraph},
     misregistration::BeforeAfter,
     numbers::whole,
     plots::{figure, label},
@@ -38,13 +38,15 @@ fn write(geometric: &GeometricProducts) -> Result<String> {
     let mut html = adjustment.map_or_else(String::new, |of| statements(geometric, of));
     if let Ok(surface) = &geometric.heights.surface {
         html += &heading("Heights against the MOLA surface");
-        html += &surface_in_words(surface);
         html += &compared(geometric);
-        html += &footprints(geometric);
         html += &apart(geometric.heights);
         html += &format!(
             "<div class=\"plots\">\n{}</div>\n",
             figure(&profile::plot(geometric))?
+        );
+        html += &folded(
+            "The surface, and heights of footprints by images",
+            &(surface_in_words(surface) + &footprints(geometric)),
         );
     }
     Ok(html)
@@ -76,7 +78,8 @@ fn statements(geometric: &GeometricProducts, adjustment: &AdjustmentProducts) ->
             after.map_or_else(nothing, |after| {
                 format!("{after}; residuals {} σ", label(along, 2))
             }),
-            "how well the images agree along track; nothing about height or position".to_owned(),
+            "how well the images agree along track; says nothing about height or position"
+                .to_owned(),
         ],
         [
             "agreement with MOLA, height".to_owned(),
@@ -88,11 +91,11 @@ fn statements(geometric: &GeometricProducts, adjustment: &AdjustmentProducts) ->
             "absolute, height".to_owned(),
             format!("a priori: what is known of {}", known_beforehand(geometric)),
             height,
-            "standard deviation common to all tie points, and of single ones".to_owned(),
+            "standard deviation of the common offset, and of individual tie points".to_owned(),
         ],
         [
             "absolute, position".to_owned(),
-            "as after it".to_owned(),
+            "same as after".to_owned(),
             place,
             place_says(geometric, adjustment),
         ],
@@ -101,7 +104,7 @@ fn statements(geometric: &GeometricProducts, adjustment: &AdjustmentProducts) ->
         table.row(true, cells.map(Cell::from));
     }
     table.finish()
-        + &relief::relief(adjustment.adjusted)
+        + &relief::relief(adjustment.adjusted, known_beforehand(geometric))
         + &boresight::boresight(adjustment.adjusted)
         + &readings::two_readings(adjustment.adjusted)
 }
@@ -195,7 +198,7 @@ pub(super) fn absolute(
     // What is stated holds only if errors of both images are as likely; half of their difference is no less open.
     let half = if half_m > east_m.max(north_m) {
         format!(
-            "; open: half of the images' along-track disagreement, {} m, as neither is known to be right",
+            "; open: half of the images' along-track disagreement, {} m, because neither image is known to be correct",
             label(half_m, 0)
         )
     } else {
@@ -237,7 +240,7 @@ fn surface_in_words(surface: &SurfaceFigures) -> String {
     ];
     sentence(
         "Surface kriged from {} shots of {}; {} m RMS over 300 m, slope {} per axis. Errors at \
-         neighbouring tie points are correlated, so averaging does not reduce them.",
+         neighbouring tie points are correlated, so averaging reduces them little.",
         &[
             (whole(surface.shots), OF[0]),
             (counted(surface.profiles, "profile"), OF[1]),
@@ -350,7 +353,7 @@ fn apart(check: &HeightCheck) -> String {
         (first, second)
     };
     sentence(
-        "At the tie points the surface from profile {} alone is {} m above that from {} alone (expected σ {} m).",
+        "At the tie points the surface interpolated from {} alone lies {} m above that from {} alone (expected σ {} m).",
         &[
             (upper.clone(), ""),
             (label(apart.mean_m.abs(), 1), OF[0]),

@@ -133,10 +133,19 @@ pub(super) fn heading(text: &str) -> String {
     format!("<h3>{}</h3>\n", escape(text))
 }
 
-/// HTML that is unfolded on request.
+/// HTML that is unfolded on request, and on paper: evidence rather than result. Nothing for nothing.
 pub(super) fn folded(title: &str, html: &str) -> String {
+    folded_unless(false, title, html)
+}
+
+/// The same, unfolded from the start where it `matters`.
+pub(super) fn folded_unless(matters: bool, title: &str, html: &str) -> String {
+    if html.is_empty() {
+        return String::new();
+    }
+    let open = if matters { " open" } else { "" };
     format!(
-        "<details class=\"more\"><summary>{}</summary>\n{html}</details>\n",
+        "<details class=\"more\"{open}><summary>{}</summary>\n{html}</details>\n",
         escape(title)
     )
 }
@@ -380,6 +389,15 @@ mod tests {
         let html = table.finish();
         assert_eq!(html.matches("beyond the limit").count(), 2);
         assert_eq!(html.matches("--share:50%").count(), 1);
+    }
+
+    #[test]
+    fn evidence_is_folded_unless_it_matters() {
+        assert_eq!(folded("Tables", ""), "");
+        assert!(
+            folded("a & b", "<p>c</p>").starts_with("<details class=\"more\"><summary>a &amp; b")
+        );
+        assert!(folded_unless(true, "a", "<p>c</p>").starts_with("<details class=\"more\" open>"));
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! Exterior orientation: Table 4 and figure 3 of Shan et al. 2005.
 
 use super::{
-    html::{Cell, Column, Table, paragraph},
+    html::{Cell, Column, Table, folded_unless, paragraph},
     numbers::whole,
     plots::{GREY, Panel, Plot, Series, figure, label},
     section::Section,
@@ -34,9 +34,17 @@ fn write(site: &SiteProducts) -> Result<String> {
         .collect::<Result<String>>()?;
     Ok(taken(site)
         + &sky::figure(site)?
-        + &light_time(site)
-        + &models(site)
-        + &format!("<div class=\"plots\">\n{figures}</div>\n"))
+        + &folded_unless(
+            site.images
+                .iter()
+                .any(|image| !image.invalid_because().is_empty()),
+            "Light time, polynomials of the orientation, and their residuals",
+            &format!(
+                "{}{}<div class=\"plots\">\n{figures}</div>\n",
+                light_time(site),
+                models(site)
+            ),
+        ))
 }
 
 /// When and how the images were taken: Table 2.

@@ -5,7 +5,7 @@ mod pair;
 use std::collections::BTreeMap;
 
 use super::{
-    html::{Cell, Column, Table, counted, heading, paragraph},
+    html::{Cell, Column, Table, counted, folded, heading, paragraph},
     moved,
     numbers::whole,
     plots::label,
@@ -48,9 +48,8 @@ fn write(site: &SiteProducts, geometric: &GeometricProducts) -> Result<String> {
     }
     html += &read(geometric);
     if !pairs.is_empty() {
-        html += &geometry(&pairs);
-        html += &reprojection(&pairs);
-        html += &footprints(&pairs);
+        let tables = geometry(&pairs) + &reprojection(&pairs) + &footprints(&pairs);
+        html += &folded("Tables of the pairs", &tables);
     }
     html += &heading(match geometric.adjustment {
         Some(_) => "Before and after on the image planes",
@@ -105,7 +104,7 @@ fn read(geometric: &GeometricProducts) -> String {
     }
     if outliers > 0 {
         words += &filled(
-            " {}, left out of the pairs.",
+            " {}, excluded from the pair statistics.",
             &[(
                 counted(outliers, "reprojection outlier"),
                 "adjustment.json#/before/outliers",
@@ -246,7 +245,7 @@ fn reprojection(pairs: &[BeforeAfter]) -> String {
 
 fn footprints(pairs: &[BeforeAfter]) -> String {
     let mut table = Table::new(
-        "Footprints between the images, by tie points; positive along track, samples with the parallax of relief",
+        "Footprints between the images, by tie points; positive along track; samples include relief parallax",
         &[
             Column::Text("profile"),
             Column::Text("pair"),
@@ -305,8 +304,8 @@ fn not_counted(found: &FootprintsByTies) -> String {
         ""
     };
     format!(
-        "{none}Not counted: {} footprints outside an image or the tie points.",
-        whole(found.outside)
+        "{none}{} omitted: outside an image or the tie-point area.",
+        counted(found.outside as usize, "footprint")
     )
 }
 

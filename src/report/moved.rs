@@ -48,7 +48,9 @@ pub(super) fn figures(site: &SiteProducts, geometric: &GeometricProducts) -> Res
         if let Some(plot) = after.and_then(|after| footprints(image, after)) {
             html += &figure(&plot)?;
         }
-        html += &figure(&vectors(image, index, geometric, limit))?;
+        if let Some(plot) = vectors(image, index, geometric, limit) {
+            html += &figure(&plot)?;
+        }
     }
     Ok(format!("<div class=\"plots\">\n{html}</div>\n"))
 }
@@ -138,13 +140,13 @@ fn moves(before: &RegisteredPoints, after: &RegisteredPoints) -> Vec<Arrow> {
     moved.collect()
 }
 
-/// Figure 6: reprojection residuals where the tie points were measured.
+/// Figure 6: reprojection residuals where the tie points were measured; nothing for an image without any.
 fn vectors(
     image: &ImageProducts,
     index: usize,
     geometric: &GeometricProducts,
     limit: usize,
-) -> Plot {
+) -> Option<Plot> {
     let samples = f64::from(image.times.samples);
     let lines = f64::from(image.times.line_times.lines());
     let ends = [0.0, f64::from(image.times.lines_delivered)].map(|x| Mark {
@@ -165,6 +167,9 @@ fn vectors(
     ] {
         let Some(ties) = ties else { continue };
         let (all, outliers) = residuals(image, index, ties);
+        if all.is_empty() {
+            continue;
+        }
         let each = thinned(&all, limit);
         let room = (LONGEST * lines, LONGEST * samples);
         let arrows = Arrows {
@@ -195,7 +200,7 @@ fn vectors(
             ..Panel::of("sample", Vec::new())
         });
     }
-    Plot {
+    (!panels.is_empty()).then(|| Plot {
         x: Extent::of([0.0, lines].into_iter()),
         ..Plot::of(
             format!("Residual vectors on {}", image.times.id),
@@ -203,7 +208,7 @@ fn vectors(
             "line",
             panels,
         )
-    }
+    })
 }
 
 /// Residual vectors of good points in lines and samples, and the number of outliers.

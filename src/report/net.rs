@@ -131,8 +131,8 @@ fn deviations(net: &Triangulation) -> Result<String> {
         .map(|picture| km(picture.centre_m))
         .collect();
     let places: Vec<(f64, f64)> = net.points.iter().map(|point| km(point.place_m)).collect();
-    let caption = "Images of ties from the mean of their point within the brick, where the point lies on the map. Of very \
-        many every so many is drawn.";
+    let caption = "Images of ties from the mean of their point within the brick, where the point lies on the map. \
+        Thinned for display.";
     map(
         "Vectors of deviations",
         caption,
@@ -241,13 +241,15 @@ fn bricks(net: &Triangulation) -> String {
 fn blunders(net: &Triangulation) -> String {
     let mut worst: Vec<&MeasurementResult> =
         net.measurements.iter().filter(|of| shown(of)).collect();
+    // One reference for all: what was left out has no deviation within its brick.
+    let length_m = |of: &MeasurementResult| of.deviation.x_m.hypot(of.deviation.y_m);
     worst.sort_by(|a, b| {
         b.removed
             .cmp(&a.removed)
-            .then(b.length_m().total_cmp(&a.length_m()))
+            .then(length_m(b).total_cmp(&length_m(a)))
     });
     let mut table = Table::new(
-        "What was left out, then the largest deviations; all stand in deviations.csv",
+        "What was left out, then the largest deviations, from the mean of the point over all pictures; full list in deviations.csv",
         &[
             Column::Text("point"),
             Column::Text("picture"),
@@ -258,7 +260,6 @@ fn blunders(net: &Triangulation) -> String {
         ],
     );
     for of in worst.iter().take(LISTED) {
-        let deviation = of.in_brick.unwrap_or(of.deviation);
         let verdict = match (of.removed, of.flagged) {
             (true, _) => "left out",
             (false, true) => "flagged, in use",
@@ -267,17 +268,28 @@ fn blunders(net: &Triangulation) -> String {
         let cells: [Cell; 6] = [
             (&of.point).into(),
             (&of.picture).into(),
-            metres(deviation.x_m),
-            metres(deviation.y_m),
-            metres(of.length_m()),
+            metres(of.deviation.x_m),
+            metres(of.deviation.y_m),
+            metres(length_m(of)),
             verdict.into(),
         ];
         table.row(!of.removed, cells);
     }
+    let on_two = |of: &&MeasurementResult| {
+        let same = net
+            .measurements
+            .iter()
+            .filter(|other| other.point == of.point);
+        of.removed && same.count() == 2
+    };
+    let both_go = if worst.iter().copied().any(|of| on_two(&of)) {
+        " Of a point on two pictures the two cannot be told apart, and both go."
+    } else {
+        ""
+    };
     let words = "Flagged is what lies beyond 3.5 robust standard deviations (by the median) of its brick. A measurement is left \
-        out when the root mean square of the brick falls by 30 % without it, alone or with others of the same size. Of a \
-        point on two pictures the two cannot be told apart, and both go.";
-    table.finish() + &paragraph(words)
+        out when the root mean square of the brick falls by 30 % without it, alone or with others of the same size.";
+    table.finish() + &paragraph(&format!("{words}{both_go}"))
 }
 
 fn controls(net: &Triangulation) -> Result<String> {
@@ -378,7 +390,7 @@ fn precision(config: &NetConfig, net: &Triangulation) -> String {
 
 fn pictures(net: &Triangulation) -> String {
     let mut table = Table::new(
-        "Pictures; all stand in pictures.csv",
+        "Pictures; full list in pictures.csv",
         &[
             Column::Text("picture"),
             Column::Text("brick"),

@@ -82,7 +82,7 @@ fn write(site: &SiteProducts) -> String {
     paragraph(&words)
         + &made
         + LINKS
-        + &files.finish()
+        + &folded("Files that were read", &files.finish())
         + &settings(site)
         + &methods(site)
         + &products(site)

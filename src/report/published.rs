@@ -1,7 +1,7 @@
 //! Appendix: tables 2, 3 and 4 of Yoon & Shan 2004 for this site.
 
 use super::{
-    html::{Cell, Column, Table, paragraph},
+    html::{Cell, Column, Table, folded, paragraph},
     numbers::whole,
     plots::label,
     section::Section,
@@ -22,7 +22,9 @@ pub(super) const SECTION: Section = Section {
 };
 
 fn write(summary: &AdjustmentSummary) -> String {
-    ground_corrections(summary) + &image_coordinates(summary) + &ground_sigmas(summary)
+    let tables =
+        ground_corrections(summary) + &image_coordinates(summary) + &ground_sigmas(summary);
+    folded("Tables 2, 3 and 4 for this site", &tables)
 }
 
 /// Where the products have the summary.

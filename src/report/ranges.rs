@@ -3,7 +3,7 @@
 mod plots;
 
 use super::{
-    html::{Cell, Column, Table, escape, folded, heading, paragraph},
+    html::{Cell, Column, Table, escape, folded, folded_unless, heading, paragraph},
     numbers::{number, whole},
     plots::label,
     section::Section,
@@ -28,12 +28,19 @@ fn write(site: &SiteProducts) -> Result<String> {
         return Ok(paragraph("No profile."));
     }
     let figures = format!("<div class=\"plots\">\n{}</div>\n", plots::figures(site)?);
-    let tables = statistics(site) + &three_ways(site);
     if many(site) {
         let title = format!("Tables of all {} profiles", whole(site.profiles.len()));
+        let tables = statistics(site) + &limits(site) + &three_ways(site);
         return Ok(all_profiles(site) + &figures + &folded(&title, &tables));
     }
-    Ok(tables + &heading("Along the profiles") + &figures)
+    let profiles = &site.ranges.profiles;
+    let invalid = profiles.iter().any(|of| !of.invalid_because.is_empty());
+    let ways = folded_unless(
+        invalid,
+        "Limits, and three ways to check a range",
+        &(limits(site) + &three_ways(site)),
+    );
+    Ok(statistics(site) + &ways + &heading("Along the profiles") + &figures)
 }
 
 /// Millimetres are enough for ranges that come in centimetres.
@@ -152,7 +159,13 @@ fn statistics(site: &SiteProducts) -> String {
             ],
         );
     }
-    let words = sentence(
+    table.finish()
+}
+
+/// What the table of the profiles is judged by.
+fn limits(site: &SiteProducts) -> String {
+    let limits = &site.config.range_check;
+    sentence(
         "Limits: at least {} shots, at most {} % outliers (beyond {} robust σ of the median). Bars: share of a limit that is used.",
         &[
             (
@@ -168,8 +181,7 @@ fn statistics(site: &SiteProducts) -> String {
                 "ranges.json#/limits/outlier_sigma",
             ),
         ],
-    );
-    table.finish() + &words
+    )
 }
 
 /// Share of a limit that may be 0: then nothing of it is used by 0, and all is beyond otherwise.
@@ -258,7 +270,7 @@ fn three_ways(site: &SiteProducts) -> String {
         ));
     }
     words.push(filled(
-        "PEDR's own orbit: without kernels; beyond ±{} m the file was read wrongly.",
+        "PEDR's own orbit: without kernels; a mean beyond ±{} m indicates a reading error.",
         &[(
             limits.decoding_max_m.to_string(),
             "ranges.json#/limits/decoding_max_m",

@@ -1,7 +1,7 @@
 //! Registration: profiles on the image plane.
 
 use super::{
-    html::{Cell, Column, Table, counted, paragraph},
+    html::{Cell, Column, Table, counted, folded, paragraph},
     numbers::whole,
     plots::{COLOURS, Extent, GREY, INK, Mark, Panel, Plot, Series, Style, figure, label, thinned},
     section::Section,
@@ -39,7 +39,12 @@ fn write(site: &SiteProducts) -> Result<String> {
         planes += &figure(&plane(site.profiles, image))?;
     }
     let planes = format!("<div class=\"plots\">\n{planes}</div>\n");
-    Ok(profiles(site, &images) + &planes + &models(site, &images))
+    let evidence = planes + &models(site, &images);
+    Ok(profiles(site, &images)
+        + &folded(
+            "Footprints over the lines, and what other camera models move",
+            &evidence,
+        ))
 }
 
 /// Where the products tell of an image.
@@ -56,7 +61,7 @@ fn profiles(site: &SiteProducts, images: &[&ImageProducts]) -> String {
         &[
             Column::Text("image"),
             Column::Text("profile"),
-            Column::Text("exposed with it"),
+            Column::Text("simultaneous"),
             Column::Number("footprints in the image"),
             Column::Number("lines"),
             Column::Number("samples"),

@@ -3,7 +3,7 @@
 
 use super::{
     heights::{known_beforehand, place_by},
-    html::{Cell, Column, Table, counted, paragraph},
+    html::{Cell, Column, Table, counted, folded, paragraph},
     numbers::whole,
     plots::label,
     source::sentence,
@@ -163,7 +163,7 @@ impl Controlled {
 pub(super) fn redundancy(site: &SiteProducts, adjusted: &Adjusted) -> String {
     let all = Controlled::all(site, adjusted);
     let mut table = Table::new(
-        "Share of a gross error that its own residual shows",
+        "Redundancy: fraction of a gross error visible in its own residual",
         &[
             Column::Text("observation"),
             Column::Number("number"),
@@ -203,7 +203,8 @@ pub(super) fn redundancy(site: &SiteProducts, adjusted: &Adjusted) -> String {
     }
     let words =
         "Shown: the redundancy number r; found by Baarda's test (3.29, power 80 %): 4.13 σ/√r.";
-    sentences + &table.finish() + &paragraph(words)
+    let table = table.finish() + &paragraph(words);
+    sentences + &folded("Redundancy by kind of observation", &table)
 }
 
 /// A share; one that rounds to nothing is still there.
@@ -286,7 +287,7 @@ pub(super) fn rejected(adjusted: &Adjusted) -> String {
         Column::Text("tie point"),
         Column::Number("largest standardised residual"),
     ];
-    let mut table = Table::new("Blunders, in the order that they were found", columns);
+    let mut table = Table::new("Blunders, in order of detection", columns);
     for (id, standardised) in blunders.iter().take(BLUNDERS_SHOWN) {
         table.row(true, [(*id).into(), label(*standardised, 1).into()]);
     }

@@ -27,13 +27,13 @@ fn write(site: &SiteProducts) -> Result<String> {
         }
     }
     let words = paragraph(
-        "The time-tag correction that minimises the spread of the residuals, with raw or crossover-corrected radii, whichever spread less. Nadir profiles constrain it poorly.",
+        "The time-tag correction that minimises the spread of the residuals, with raw or crossover-corrected radii, whichever gives the smaller scatter. Nadir profiles constrain it poorly.",
     );
     let figures = format!("<div class=\"plots\">\n{figures}</div>\n");
     if many(site) {
         return Ok(words + &figures + &folded("Table of all profiles", &table(site)));
     }
-    Ok(words + &table(site) + &figures)
+    Ok(words + &table(site) + &folded("Spread against correction", &figures))
 }
 
 fn table(site: &SiteProducts) -> String {

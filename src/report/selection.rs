@@ -2,7 +2,7 @@
 
 use super::{
     html::{Cell, Column, Table, paragraph},
-    numbers::whole,
+    numbers::{number, whole},
     section::Section,
     source::member,
 };
@@ -111,9 +111,9 @@ fn outline(window: &WindowConfig) -> String {
             south_rad,
             north_rad,
         } => {
-            let [west, east, south, north] =
-                [west_rad, east_rad, south_rad, north_rad].map(|angle| angle / RADIANS_PER_DEGREE);
-            format!("longitude {west:.4}° to {east:.4}°, latitude {south:.4}° to {north:.4}°")
+            let [west, east, south, north] = [west_rad, east_rad, south_rad, north_rad]
+                .map(|angle| number(angle / RADIANS_PER_DEGREE, 4));
+            format!("longitude {west}° to {east}°, latitude {south}° to {north}°")
         }
         WindowShape::Polygons { polygons } => {
             let vertices: usize = polygons.iter().flatten().map(Vec::len).sum();

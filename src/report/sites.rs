@@ -33,12 +33,12 @@ pub struct SiteSummary {
     pub remarks: Vec<String>,
     /// Shots, profiles, images.
     pub counts: [u64; 3],
-    /// Largest |mean| of range − distance of a profile, metres.
+    /// Mean of range − distance of the profile where it is largest, metres.
     pub range_mean_m: Option<f64>,
     /// Largest along-track parallax of two images at their tie points, with the orientation of the kernels and the
     /// adjusted one, metres.
     pub images_apart_m: [Option<f64>; 2],
-    /// Median height of tie points above or below the MOLA surface, likewise, metres.
+    /// Median height of tie points above the MOLA surface, below it negative, likewise, metres.
     pub height_off_m: [Option<f64>; 2],
     /// The body that it lies on.
     pub body: Body,
@@ -209,10 +209,12 @@ impl SiteSummary {
             .next()
             .map_or_else(String::new, |(before_m, now_m, (what, name))| {
                 let [was, is] = [before_m, now_m].map(|metres| number(metres, 2));
+                let now = figure_place(name, now_m);
                 let moved = if was == is {
-                    told(&format!("{what} {is} m"), &format!("/figures/{name}"))
+                    told(&format!("{what} {is} m"), &now)
                 } else {
-                    let places = format!("{}#/figures/{name} /figures/{name}", before.manifest);
+                    let places =
+                        format!("{}#{} {now}", before.manifest, figure_place(name, before_m));
                     told(&format!("{what} {was} → {is} m"), &places)
                 };
                 format!("<br><small>{moved}</small>")
@@ -264,9 +266,10 @@ fn cells(site: &SiteLine, newest: Option<DateTime<FixedOffset>>) -> Vec<Cell> {
     );
     cells.push(moved(summary.height_off_m, "height_off_surface_m"));
     cells.push(moved(summary.images_apart_m, "along_track_parallax_m"));
-    let range_mean_m = summary.range_mean_m.map(|mean_m| number(mean_m, 2));
-    let range_mean_m = Cell::from(range_mean_m.unwrap_or_else(dash));
-    cells.push(range_mean_m.told("/figures/range_mean_m"));
+    cells.push(summary.range_mean_m.map_or_else(
+        || dash().into(),
+        |mean_m| Cell::from(number(mean_m, 2)).told(figure_place("range_mean_m", mean_m)),
+    ));
     cells.push(summary.trend());
     cells.push(Cell::Html(format!(
         "<span class=\"short\">{}</span><br><small>{}, areograph {}</small>",
@@ -289,15 +292,22 @@ fn moved([before, after]: [Option<f64>; 2], name: &str) -> Cell {
         (None, None) => dash(),
         _ => format!("{} → {}", text(before), text(after)),
     });
+    let place = |name: &str, value: Option<f64>| figure_place(name, value.unwrap_or(0.0));
     let [before_place, after_place] = [
-        format!("/figures/{name}"),
-        format!("/figures/adjusted_{name}"),
+        place(name, before),
+        place(&format!("adjusted_{name}"), after),
     ];
     match (before, after) {
         (Some(_), Some(_)) => both.told(format!("{before_place} {after_place}")),
         (Some(_), None) => both.told(before_place),
         (None, _) => both.told(after_place),
     }
+}
+
+/// Where a manifest has a figure, which it keeps without its sign.
+fn figure_place(name: &str, value: f64) -> String {
+    let sign = if value < 0.0 { "*-1" } else { "" };
+    format!("/figures/{name}{sign}")
 }
 
 fn dash() -> String {
@@ -331,7 +341,7 @@ mod tests {
             reasons: reasons.iter().map(ToString::to_string).collect(),
             remarks: Vec::new(),
             counts: [10, 1, 0],
-            range_mean_m: Some(1.25),
+            range_mean_m: Some(-1.25),
             images_apart_m: [Some(261.2), Some(0.04)],
             height_off_m: [None, None],
             body: Body::Mars,
@@ -364,7 +374,7 @@ mod tests {
         let mut moved = summary("valid", &[]);
         moved.earlier = Some(Earlier {
             verdict: "INVALID",
-            figures_m: [None, Some(31.5), Some(1.25)],
+            figures_m: [None, Some(31.5), Some(-1.25)],
             finished_utc: String::new(),
             manifest: "moved/before.json".to_owned(),
         });
@@ -375,7 +385,8 @@ mod tests {
         moved.images_apart_m = [None, None];
         let trend = sites_page(&[line("moved", Some(moved))]).unwrap();
         assert!(trend.contains("INVALID as before<br>"));
-        assert!(trend.contains("range − distance 1.25 m"));
+        assert!(trend.contains("range − distance −1.25 m"));
+        assert!(trend.contains("data-from=\"/figures/range_mean_m*-1\""));
         // All of the three ran at the same time; an older one says so.
         assert_eq!(page.matches("newest, areograph 1").count(), 3);
         let mut older = summary("valid", &[]);

@@ -4,7 +4,7 @@ use chrono::{DateTime, TimeDelta};
 use plotters::{prelude::*, style::text_anchor::HPos};
 
 use super::{
-    html::{Column, Table, heading, paragraph},
+    html::{Column, Table, folded_unless, paragraph},
     plots::{COLOURS, Canvas, Drawn, INK, Key, MARK, WIDTH, draw_text, drawn, figure_html, quoted},
     section::Section,
 };
@@ -51,7 +51,25 @@ fn write(site: &SiteProducts) -> Result<String> {
         );
         body += &paragraph(&words);
     }
-    Ok(body + &heading("Kernel coverage") + &table(site))
+    body += &table(site);
+    let missing_s: f64 = stretches
+        .iter()
+        .map(|stretch| missing_s(site, *stretch))
+        .sum();
+    let words = if missing_s > 0.0 {
+        format!("Of the requested time, margins included, {missing_s:.3} s are not covered.")
+    } else {
+        "Everything requested is covered.".to_owned()
+    };
+    let kernels = folded_unless(missing_s > 0.0, "Coverage of every kernel", &body);
+    Ok(paragraph(&words) + &kernels)
+}
+
+/// Time that is asked for and not covered.
+fn missing_s(site: &SiteProducts, stretch: Interval) -> f64 {
+    let rows = rows(site, stretch);
+    let gaps: Vec<Interval> = rows.iter().filter(|row| row.sum).flat_map(gaps).collect();
+    total_s(&gaps)
 }
 
 /// What is asked, merged where it lies close together, with room at both sides.
@@ -225,8 +243,8 @@ fn table(site: &SiteProducts) -> String {
             Column::Text("from (TDB)"),
             Column::Text("to (TDB)"),
             Column::Number("intervals"),
-            Column::Number("covered part of the span, %"),
-            Column::Number("requested of it, s"),
+            Column::Number("coverage of span, %"),
+            Column::Number("requested duration, s"),
         ],
     );
     for kernel in site

@@ -1,7 +1,7 @@
 //! The budget of eq. 5 to 9 of Shan et al. 2005: how far apart the two footprints of one point lie.
 
 use super::{
-    html::{Cell, Column, Table, paragraph},
+    html::{Cell, Column, Table, folded, paragraph},
     misregistration::BeforeAfter,
     plots::label,
     section::Section,
@@ -25,7 +25,9 @@ fn write(geometric: &GeometricProducts) -> String {
     let pairs = BeforeAfter::all(geometric);
     let explained = "D = √(M² + σ²) of the reprojection residuals; the whole is one MOLA spacing. Across track the paper averages where \
                      its eq. 7 adds squares: both are given. Agreement of two images, not accuracy.";
-    budgets(&pairs) + &pairs.iter().map(without_budget).collect::<String>() + &paragraph(explained)
+    let without: String = pairs.iter().map(without_budget).collect();
+    let html = budgets(&pairs) + &without + &paragraph(explained);
+    folded("The budget by eq. 5 to 9", &html)
 }
 
 fn budgets(pairs: &[BeforeAfter]) -> String {

@@ -14,7 +14,7 @@ use crate::{
         statistics::Summary,
     },
     spice::State,
-    time::Et,
+    time::{Et, Interval},
 };
 
 /// Sets whose distances from the mean differ by less than this share of the least are equally close.
@@ -150,6 +150,42 @@ impl Comparison {
         }
     }
 
+    /// The set that decides which is closest by pulling the mean: without it another is, or nothing tells.
+    #[must_use]
+    pub fn decided_by(&self) -> Option<&Deviation> {
+        let far = self.pulls_the_mean()?;
+        let mut others: Vec<usize> = (0..self.deviations.len()).collect();
+        others.retain(|index| self.deviations[*index].set != far.set);
+        // Two sets are equally far from their own mean.
+        if others.len() < 3 {
+            return Some(far);
+        }
+        // The mean of the others lies that far on the other side of the mean of all.
+        let rms = |index: &usize| {
+            let of = self.deviations[*index].radial_along_cross.iter();
+            let both = of.zip(&far.radial_along_cross);
+            let count = others.len() as f64;
+            rms(both.map(|(of, far)| Vector3::from(*of) + Vector3::from(*far) / count))
+        };
+        let closest = others.iter().min_by(|a, b| rms(a).total_cmp(&rms(b)));
+        (closest != Some(&self.closest)).then_some(far)
+    }
+
+    /// The set that is closest to the mean within a part of the time, with its root mean square distance and that of the
+    /// set that is closest over all; nothing where that is the same one.
+    #[must_use]
+    pub fn closer_within(&self, span: Interval) -> Option<(&Deviation, [f64; 2])> {
+        let within = |of: &Deviation| {
+            let vectors = self.epochs.iter().zip(&of.radial_along_cross);
+            let inside = vectors.filter(|(et, _)| span.contains(**et));
+            rms(inside.map(|(_, vector)| Vector3::from(*vector)))
+        };
+        let own = within(self.closest());
+        let each = self.deviations.iter().map(|of| (of, within(of)));
+        let (least, least_rms) = each.min_by(|one, other| one.1.total_cmp(&other.1))?;
+        (least_rms < (1.0 - TIE_SHARE) * own).then_some((least, [least_rms, own]))
+    }
+
     /// Each two sets once, by index, the earlier first.
     pub fn pairs(&self) -> impl Iterator<Item = (usize, usize)> + use<> {
         let count = self.deviations.len();
@@ -174,6 +210,11 @@ impl Comparison {
             .collect();
         Size::of(&differences)
     }
+}
+
+/// Root mean square length.
+fn rms(vectors: impl Iterator<Item = Vector3<f64>>) -> f64 {
+    root_mean_square(&vectors.map(|vector| vector.norm()).collect::<Vec<_>>())
 }
 
 impl Size {

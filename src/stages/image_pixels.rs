@@ -8,7 +8,7 @@ use crate::{
     error::{Cause, Kind, Locate as _, Result},
     files::HashedFile,
     instruments::Instrument,
-    pds::{ImageLabel, pixel_file::PixelFile, product_named},
+    pds::{ImageLabel, image_file::ImageFile, pixel_file::PixelFile, product_named},
     stage::{Input, Inputs},
 };
 
@@ -107,6 +107,14 @@ enum PixelsError {
         images[0], images[1], size[0], size[1]
     )]
     Alike { images: [String; 2], size: [u32; 2] },
+    #[error(
+        "image {image}: label and pixels of one file contradict each other: {first} ({count} contradictions in all)"
+    )]
+    Contradiction {
+        image: String,
+        first: String,
+        count: usize,
+    },
     #[error("image {image}: its pixels have {found} {what}; expected {expected}")]
     Size {
         image: String,
@@ -124,7 +132,10 @@ impl Cause for PixelsError {
     fn advice(&self) -> String {
         match self {
             Self::Product { .. } | Self::Size { .. } => {
-                "check that images.pixels are not exchanged, and are all of the image"
+                "check that images.pixels are not exchanged, and are all of the image; and its lines_delivered, if it is given"
+            }
+            Self::Contradiction { .. } => {
+                "fetch the file again, label and pixels in one: either may be of another image"
             }
             Self::Map { .. } => {
                 "give the cube before its projection, or the file of the archive (.imq, .img)"
@@ -152,8 +163,8 @@ fn open_pixels(path: &Path, times: &ImageTimes) -> Result<PixelFile> {
     Ok(file)
 }
 
-/// Whether what a file says of its image agrees with what is known of it. The lines of an image that came down in part may be fewer;
-/// without a label, nothing says which ones.
+/// Whether what a file says of its image agrees with what is known of it. The lines of an image that came down in part may be
+/// fewer; without a label, nothing says which ones.
 fn belongs(file: &PixelFile, times: &ImageTimes) -> std::result::Result<(), PixelsError> {
     let image = || times.id.clone();
     if file.is_projected() {
@@ -165,6 +176,9 @@ fn belongs(file: &PixelFile, times: &ImageTimes) -> std::result::Result<(), Pixe
         found,
         expected,
     };
+    if let Some(archive) = file.archive() {
+        of_one_image(archive, times)?;
+    }
     let (lines, samples) = (file.lines(), file.samples());
     let [delivered, header] = [times.lines_delivered, times.line_times.lines()];
     if let Some(label) = file.label() {
@@ -187,7 +201,28 @@ fn belongs(file: &PixelFile, times: &ImageTimes) -> std::result::Result<(), Pixe
     if lines > header {
         return Err(size("lines", lines, format!("at most {header}")));
     }
+    // All lines that were exposed are in a file, some of them empty, or those that came down; of a complete one, all came down.
+    let may_lack = file.archive().is_none_or(|archive| !archive.is_complete());
+    if lines > delivered && !(lines == header && may_lack) {
+        return Err(size(
+            "lines",
+            lines,
+            format!("at most {delivered}, which lines_delivered says came down of {header}"),
+        ));
+    }
     Ok(())
+}
+
+/// Whether the fragments of a file are of the image that its label describes.
+fn of_one_image(file: &ImageFile, times: &ImageTimes) -> std::result::Result<(), PixelsError> {
+    match file.contradictions() {
+        [] => Ok(()),
+        [first, ..] => Err(PixelsError::Contradiction {
+            image: times.id.clone(),
+            first: first.to_string(),
+            count: file.contradictions().len(),
+        }),
+    }
 }
 
 /// Whether a label names the product and the clock of the image.

@@ -201,6 +201,9 @@ fn the_quoted_row_is_found_where_it_lies_and_makes_an_image_of_a_site() {
     let path = folder.path().join("cumindex.tab");
     fs::write(&path, format!("{CYDONIA}\r\n")).unwrap();
     assert!(found(&path, "349,351,41,43", "table").contains("M19/00850"));
+    // Quotes within a text are doubled in the index, and again in the answer.
+    let answer = found(&path, "349,351,41,43", "csv");
+    assert!(answer.contains(r#","Cydonia, ""Face"""#), "{answer}");
     // 10° west is 350° east.
     assert!(!found(&path, "9,11,41,43", "table").contains("M19/00850"));
     let geojson: Value = serde_json::from_str(&found(&path, "349,351,41,43", "geojson")).unwrap();
@@ -474,6 +477,16 @@ fn what_is_no_index_is_refused_with_its_line() {
         let told = String::from_utf8_lossy(&output.stderr);
         assert_eq!(output.status.code(), Some(code));
         assert!(told.contains(message), "{told}");
+    }
+    for (limit, value) in [
+        ("--emission-max-deg", "nan"),
+        ("--incidence-max-deg", "-1"),
+        ("--pixel-max-m", "inf"),
+    ] {
+        let output = areograph(&["search", text(&path), "--box=0,1,0,1", limit, value]);
+        let told = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{told}");
+        assert!(told.contains("expected a number above 0, up to"), "{told}");
     }
     let output = areograph(&["search", text(&path), "--box=0,1,0,1", "--camera", "hrsc"]);
     assert_eq!(output.status.code(), Some(2));

@@ -18,7 +18,10 @@ const ELSEWHERE: [(&str, &str); 10] = [
         "Images, one row each",
         "sums over single residuals; tests/report_geometric",
     ),
-    ("Share of a gross error", "means over single observations"),
+    (
+        "Redundancy: fraction of a gross error",
+        "means over single observations",
+    ),
     ("Blunders", "words of a reason"),
     ("Rejected tie points", "counted by reason"),
     ("Ranges of shots fired", "means of parts of profiles"),

@@ -8,6 +8,7 @@ use crate::{
     cli::output,
     config::built_in_instruments,
     error::{Cause, Kind, Locate as _, Result},
+    files::require_apart,
     pds::{
         image_file::{ImageFile, LineState, OddEven, Radiometry, Strip},
         pixel_file::PixelFile,
@@ -100,6 +101,8 @@ struct Calibration {
 pub(super) fn run(arguments: &Arguments) -> Result<()> {
     let format = format(&arguments.out)?;
     let mask_format = arguments.mask.as_deref().map(self::format).transpose()?;
+    let outputs = std::iter::once(&arguments.out).chain(&arguments.mask);
+    require_apart(outputs.map(PathBuf::as_path), [arguments.file.as_path()])?;
     let image = PixelFile::open(&arguments.file, built_in_instruments())?;
     let (mut lines, mut odd_even, mut complaints) = (
         0,

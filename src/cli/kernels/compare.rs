@@ -223,7 +223,8 @@ fn print_table(comparison: &Comparison, unit: f64, attitude: Option<&AttitudeCom
     let row = |name: &str, size: &Size, ground: &str| {
         let components = size.components.map(|one| {
             let (mean, spread) = (one.mean / unit, one.standard_deviation / unit);
-            format!("{mean:>11.3} ± {spread:<9.3}")
+            let mean = format!("{mean:.3}").replace('-', "−");
+            format!("{mean:>11} ± {spread:<9.3}")
         });
         let (rms, max) = (size.rms / unit, size.max / unit);
         let components = components.concat();
@@ -239,11 +240,13 @@ fn print_table(comparison: &Comparison, unit: f64, attitude: Option<&AttitudeCom
     }
     for (first, second) in comparison.pairs() {
         let sets = [second, first].map(|index| &*comparison.deviations[index].set);
-        row(&sets.join(" - "), &comparison.difference(first, second), "");
+        row(&sets.join(" − "), &comparison.difference(first, second), "");
     }
     let closest = &comparison.closest().set;
     let tied: Vec<&str> = comparison.tied_sets().collect();
-    if tied.is_empty() {
+    if let [_, _] = &*comparison.deviations {
+        output::line("  two sets are equally far from their mean: which is better takes a third");
+    } else if tied.is_empty() {
         output::line(format_args!("  closest to the mean of all: {closest}"));
     } else {
         output::line(format_args!(
@@ -259,5 +262,8 @@ fn print_table(comparison: &Comparison, unit: f64, attitude: Option<&AttitudeCom
     }
     if let Some(far) = comparison.pulls_the_mean() {
         output::line(format_args!("  pulls the mean towards itself: {}", far.set));
+    }
+    if let Some(far) = comparison.decided_by() {
+        output::line(format_args!("  which set is closest rests on {}", far.set));
     }
 }

@@ -51,7 +51,9 @@ pub(super) fn run(arguments: &Arguments) -> Result<()> {
     let windows = arguments.windows.windows()?;
     let time = arguments.time()?;
     let signals = Signals::heard()?;
+    arguments.check_paths()?;
     let Opened { sources, failures } = Opened::all(&arguments.paths)?;
+    arguments.require_apart(&sources, &failures)?;
     let mut answer = Answer {
         window_ids: windows.iter().map(|window| window.id.clone()).collect(),
         files: sources.iter().map(Source::file).collect(),
@@ -77,6 +79,13 @@ pub(super) fn run(arguments: &Arguments) -> Result<()> {
         file.finish(&told)?;
     }
     output::json(&told);
+    let complaints: u64 = answer.complaint_counts.values().sum();
+    if complaints > 0 {
+        tracing::warn!(
+            "{complaints} complaints: bad records are left out; `complaints` of the answer counts them by reason, \
+             `first_complaints` has the first {COMPLAINTS_MAX}"
+        );
+    }
     answer.end()
 }
 
@@ -92,6 +101,8 @@ struct Answer {
     failures: Vec<Error>,
     complaints: Vec<String>,
     complaint_counts: BTreeMap<String, u64>,
+    /// Records with shots that are left out for a complaint: some may have been in a window.
+    records_left_out: u64,
     rejected: BTreeMap<String, u64>,
     frames_read: u64,
     shots_read: u64,
@@ -125,7 +136,8 @@ impl Answer {
             })
             .collect();
         let mut told = json!({
-            "complete": self.failures.is_empty(),
+            "complete": self.failures.is_empty() && self.records_left_out == 0,
+            "records_left_out": self.records_left_out,
             "in_order_of_time": self.disorder.is_none(),
             "rows": self.rows,
             "windows": windows,
@@ -193,6 +205,7 @@ impl Answer {
 impl Sink for Answer {
     fn found(&mut self, _file: usize, found: Found) -> Result<()> {
         for complaint in &found.complaints {
+            self.records_left_out += u64::from(complaint.leaves_out());
             if self.complaints.len() < COMPLAINTS_MAX {
                 self.complaints.push(complaint.to_string());
             }

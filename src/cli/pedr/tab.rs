@@ -1,6 +1,7 @@
 //! `areograph pedr tab`.
 
 use std::{
+    collections::BTreeMap,
     fs,
     io::{BufWriter, Write},
     path::{Path, PathBuf},
@@ -11,7 +12,7 @@ use clap::{Args, ValueEnum};
 use crate::{
     cli::{output, stop::Signals},
     error::{Cause, IoError, Kind, Locate as _, Result, Stopped},
-    files::StagedFile,
+    files::{StagedFile, require_apart},
     pds::{
         pedr::{Complaint, File},
         pedr_table::{Preferences, Rules, Table, Variant},
@@ -45,9 +46,10 @@ pub(super) struct Arguments {
     /// A PEDR file (its name holds .b or .B), or a text file with the name of one in each line.
     #[arg(default_value = "FILELIST")]
     input: PathBuf,
-    /// Preferences. Without the file those of pedr2tab hold: ground returns, group 0, headings, one table a file.
-    #[arg(long, value_name = "FILE", default_value = "PEDR2TAB.PRM")]
-    preferences: PathBuf,
+    /// Preferences. Without it PEDR2TAB.PRM; where that is not there, those of pedr2tab hold: ground returns, group 0,
+    /// headings, one table a file.
+    #[arg(long, value_name = "FILE")]
+    preferences: Option<PathBuf>,
     /// Whose program the table is like: column widths, and the order of sums.
     #[arg(long, default_value = "team")]
     variant: Program,
@@ -84,11 +86,30 @@ impl Cause for NoMarker {
     }
 }
 
+/// Two files whose tables have one name.
+#[derive(Debug, thiserror::Error)]
+#[error("would be the table of {} and of {}; expected a table for each", .0.display(), .1.display())]
+struct OneName(PathBuf, PathBuf);
+
+impl Cause for OneName {
+    fn kind(&self) -> Kind {
+        Kind::Configuration
+    }
+
+    fn advice(&self) -> String {
+        "name each file once; print files of one name into different folders (--out), or all into one table (T before its \
+         name in the preferences)"
+            .to_owned()
+    }
+}
+
+/// Preferences where the program looks for them.
+const PREFERENCES: &str = "PEDR2TAB.PRM";
 /// Complaints printed of a file; all are counted.
 const COMPLAINTS_PRINTED: usize = 20;
 
 pub(super) fn run(arguments: &Arguments) -> Result<()> {
-    let preferences = read_preferences(&arguments.preferences)?;
+    let preferences = read_preferences(arguments.preferences.as_deref())?;
     let rules = if arguments.per_shot {
         Rules::PerShot
     } else {
@@ -101,9 +122,10 @@ pub(super) fn run(arguments: &Arguments) -> Result<()> {
     let mut table = Table::new(preferences, variant, rules);
     let mut one_table: Option<Output> = None;
     let (files, is_list) = files(&arguments.input)?;
+    let tables = tables(arguments, &files, table.preferences())?;
     let mut failure = None;
     let signals = Signals::heard()?;
-    for path in files {
+    for (path, table_path) in files.into_iter().zip(tables) {
         Stopped::check(signals.stop())?;
         let file = match File::open(&path) {
             Ok(file) => file,
@@ -133,7 +155,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<()> {
         let headed = one_table.is_some();
         let mut output = match one_table.take() {
             Some(output) => output,
-            None => Output::create(&arguments.out.join(table_name(&path, table.preferences())))?,
+            None => Output::create(&table_path)?,
         };
         if !headed {
             output.write(|out| table.write_headings(out))?;
@@ -152,10 +174,12 @@ pub(super) fn run(arguments: &Arguments) -> Result<()> {
     failure.map_or(Ok(()), Err)
 }
 
-fn read_preferences(path: &Path) -> Result<Preferences> {
+/// Those of the file that was named, else of the usual one, which need not be there.
+fn read_preferences(named: Option<&Path>) -> Result<Preferences> {
+    let path = named.unwrap_or(Path::new(PREFERENCES));
     let bytes = match fs::read(path) {
         Ok(bytes) => bytes,
-        Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
+        Err(error) if named.is_none() && error.kind() == std::io::ErrorKind::NotFound => {
             output::line(format_args!(
                 "{}: not there; the preferences of pedr2tab hold",
                 path.display()
@@ -165,9 +189,9 @@ fn read_preferences(path: &Path) -> Result<Preferences> {
         Err(error) => return Err(IoError::on("read")(error)).in_file(path),
     };
     let preferences = Preferences::parse(&String::from_utf8_lossy(&bytes));
-    if !preferences.is_whole {
+    if let Some(ended) = &preferences.ended {
         output::line(format_args!(
-            "{}: ends early or holds something else than expected; from there on the preferences of pedr2tab hold",
+            "{}: {ended}; from there on the preferences of pedr2tab hold",
             path.display()
         ));
     }
@@ -195,6 +219,33 @@ fn files(input: &Path) -> Result<(Vec<PathBuf>, bool)> {
         }
     }
     Ok((files, true))
+}
+
+/// The table of each file: none of them is another one's, or a file that is read.
+fn tables(
+    arguments: &Arguments,
+    files: &[PathBuf],
+    preferences: &Preferences,
+) -> Result<Vec<PathBuf>> {
+    let table = |path: &PathBuf| arguments.out.join(table_name(path, preferences));
+    let tables: Vec<PathBuf> = files.iter().map(table).collect();
+    let mut of_table: BTreeMap<&Path, &Path> = BTreeMap::new();
+    for (table, path) in tables.iter().zip(files) {
+        let earlier = of_table.insert(table, path);
+        if let Some(earlier) = earlier.filter(|_| !preferences.one_table) {
+            return Err(OneName(earlier.to_owned(), path.clone())).in_file(table);
+        }
+    }
+    let usual = Path::new(PREFERENCES);
+    let read = [
+        &*arguments.input,
+        arguments.preferences.as_deref().unwrap_or(usual),
+    ];
+    require_apart(
+        of_table.keys().copied(),
+        read.into_iter().chain(files.iter().map(PathBuf::as_path)),
+    )?;
+    Ok(tables)
 }
 
 /// Name of the one table, or of a file's own: the last eight characters before its extension, and that of the template.

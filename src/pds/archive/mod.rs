@@ -21,5 +21,5 @@ pub use found::{Found, ShotRejection, WindowLists};
 pub use index::{INDEX, Index, IndexedFile, Indexes};
 pub use opened::Opened;
 pub use query::{Judged, Query};
-pub use search::{Sink, search};
+pub use search::{Sink, UNUSABLE_MAX, UNUSABLE_SHARE_MAX, search};
 pub use source::Source;

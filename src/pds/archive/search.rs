@@ -11,8 +11,8 @@ use rayon::prelude::*;
 
 use super::{Found, Query, Source, scan::Scan};
 use crate::{
-    error::{Error, Kind, Result, Stopped},
-    pds::pedr::{RECORD_BYTES, Reader, Stretch},
+    error::{Cause, Error, Kind, Result, Stopped},
+    pds::pedr::{Complaint, RECORD_BYTES, Reader, Stretch},
 };
 
 /// Records in memory at once: 51 MB, more than any day of the mission takes.
@@ -24,6 +24,60 @@ const TASK_RECORDS: usize = 512;
 /// Tasks of a wave for each thread, and the most of a wave: what they find stands in memory at once.
 const TASKS_PER_THREAD: usize = 16;
 const TASKS_MAX: usize = 64;
+
+/// Records that cannot be used: more than so many and `UNUSABLE_SHARE_MAX` of a file are damage of the file and not of some
+/// records. Files of the archive have none, or a few.
+pub const UNUSABLE_MAX: u64 = 10;
+/// The same of a file.
+pub const UNUSABLE_SHARE_MAX: f64 = 0.01;
+
+/// A file that has lost more than some records.
+#[derive(Debug, thiserror::Error)]
+#[error(
+    "{unusable} of {records} records cannot be used; expected at most {UNUSABLE_MAX} and one in a hundred. The first: {first}"
+)]
+struct Damaged {
+    unusable: u64,
+    records: u64,
+    first: String,
+}
+
+impl Cause for Damaged {
+    fn kind(&self) -> Kind {
+        Kind::Input
+    }
+
+    fn advice(&self) -> String {
+        "the file was damaged on its way: fetch it again, or leave it out".to_owned()
+    }
+}
+
+/// Records of a file that cannot be used.
+#[derive(Default)]
+struct Unusable {
+    count: u64,
+    first: Option<String>,
+}
+
+impl Unusable {
+    fn add(&mut self, complaints: &[Complaint]) {
+        for complaint in complaints.iter().filter(|of| of.leaves_out()) {
+            self.count += 1;
+            self.first.get_or_insert_with(|| complaint.to_string());
+        }
+    }
+
+    /// Why a file with so many of them is not to be used.
+    fn failure(self, records: u64) -> Option<Damaged> {
+        let allowed = UNUSABLE_SHARE_MAX * records as f64 + UNUSABLE_MAX as f64;
+        let first = self.first.filter(|_| self.count as f64 > allowed)?;
+        Some(Damaged {
+            unusable: self.count,
+            records,
+            first,
+        })
+    }
+}
 
 /// Takes what a search gives, in the order of files, records and shots.
 pub trait Sink {
@@ -59,6 +113,7 @@ pub fn search(
         sink,
         readers: BTreeMap::new(),
         failed: BTreeSet::new(),
+        unusable: BTreeMap::new(),
         buffers: Vec::new(),
     };
     let mut pieces: Vec<Piece> = Vec::new();
@@ -144,6 +199,7 @@ struct Search<'a> {
     /// Files that pieces in memory are of.
     readers: BTreeMap<usize, Reader>,
     failed: BTreeSet<usize>,
+    unusable: BTreeMap<usize, Unusable>,
     /// Memory of earlier pieces, for the next ones: fresh memory costs as much as reading.
     buffers: Vec<Vec<u8>>,
 }
@@ -287,13 +343,22 @@ impl Search<'_> {
             let reader = self.readers.get(&file);
             failure = reader.and_then(|reader| reader.unchanged().err());
         }
-        match failure {
-            None => self.sink.found(file, found),
-            Some(failure) => {
-                self.failed.insert(file);
-                self.sink.failed(file, failure)
+        if failure.is_none() {
+            let unusable = self.unusable.entry(file).or_default();
+            unusable.add(&found.complaints);
+            self.sink.found(file, found)?;
+            if task.is_last {
+                let source = &self.sources[file];
+                let unusable = self.unusable.remove(&file).unwrap_or_default();
+                let damaged = unusable.failure(source.records() as u64);
+                failure = damaged.map(|damaged| Error::from(damaged).in_file(source.path()));
             }
         }
+        if let Some(failure) = failure {
+            self.failed.insert(file);
+            self.sink.failed(file, failure)?;
+        }
+        Ok(())
     }
 }
 

@@ -26,6 +26,15 @@ pub enum Fault {
         /// Their sum, each byte unsigned.
         sum: u32,
     },
+    /// Label and fragments do not say the same: the label is of another image, or the fragments are.
+    Contradiction {
+        /// Keyword of the label.
+        key: &'static str,
+        /// What the label says.
+        label: String,
+        /// What the fragments say.
+        fragment: String,
+    },
     /// Header, data and checksum byte of a fragment do not add up.
     FragmentChecksum,
     /// A header that is none, or of another image.
@@ -95,6 +104,14 @@ impl fmt::Display for Fault {
             Self::LabelChecksum { label, sum } => write!(
                 formatter,
                 "the label's CHECKSUM is 16#{label:08X}#; the bytes from here on add up to 16#{sum:08X}# (unsigned)"
+            ),
+            Self::Contradiction {
+                key,
+                label,
+                fragment,
+            } => write!(
+                formatter,
+                "the label says {key} = {label}; the fragments say {fragment}"
             ),
             Self::FragmentChecksum => {
                 formatter.write_str("the checksum byte is wrong; its lines may be wrong too")

@@ -5,8 +5,9 @@ use std::fmt::Write as _;
 use super::{
     bits::BitWriter,
     codes::RESIDUALS,
+    coding::{Coding, Predictor, Transform},
     encode_transform::encode_blocks,
-    fragment::{Coding, FULL, Predictor, Transform},
+    fragment::FULL,
     predictive::{BLOCK_LINES, MARK},
     transform::EDGE,
     walk::HEADER,

@@ -3,7 +3,9 @@
 use std::{fs::File, io};
 
 use super::{
+    coding::Coding,
     complaint::{Complaint, Complaints, Fault},
+    header::{Header, Witness},
     walk::{HEADER, Walk},
 };
 
@@ -16,49 +18,6 @@ const LOST_MAX: u64 = 64;
 const MOST: usize = 1 << 16;
 /// Most data bytes of a fragment that are believed: those of the archive have 245,760.
 const DATA_BYTES_MAX: u64 = 1 << 22;
-
-/// How the first header says that pixels are coded.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Coding {
-    /// One byte a pixel.
-    Raw,
-    /// Residuals from a predicted pixel, in a prefix code.
-    Predictive {
-        /// What predicts a pixel.
-        predictor: Predictor,
-        /// Code of the residuals, 0 to 7.
-        table: u8,
-    },
-    /// Quantised coefficients of blocks of 16 × 16 pixels.
-    Transform {
-        /// Which transform.
-        transform: Transform,
-        /// Groups of blocks with tables of their own, 1 to 8.
-        groups: u8,
-        /// Step of the quantiser.
-        spacing: u16,
-    },
-}
-
-/// What predicts a pixel.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Predictor {
-    /// The pixel to its left.
-    X,
-    /// The pixel above.
-    Y,
-    /// The pixel above, and the difference of those to the left.
-    Xy,
-}
-
-/// A transform of blocks.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Transform {
-    /// Walsh–Hadamard.
-    Walsh,
-    /// Cosines.
-    Cosine,
-}
 
 /// Size and coding of an image.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -76,108 +35,6 @@ pub struct Layout {
     pub gain_changes: u16,
 }
 
-impl Coding {
-    /// Most pixels that a byte of data can hold.
-    const fn pixels_of_byte(self) -> u64 {
-        match self {
-            Self::Raw => 1,
-            // A bit a pixel.
-            Self::Predictive { .. } => 8,
-            // A block of 256 pixels in 3 bits of its group and 8 for its mean and for the length of the rest each.
-            Self::Transform { .. } => 256 * 8 / 19,
-        }
-    }
-}
-
-/// What a header says.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Header {
-    bytes: [u8; HEADER],
-}
-
-impl Header {
-    pub(super) const fn new(bytes: [u8; HEADER]) -> Self {
-        Self { bytes }
-    }
-
-    const fn two(&self, at: usize) -> u16 {
-        u16::from_le_bytes([self.bytes[at], self.bytes[at + 1]])
-    }
-
-    const fn number(&self) -> u16 {
-        self.two(2)
-    }
-
-    /// Lines of the whole image.
-    pub(super) fn total_lines(&self) -> u32 {
-        u32::from(self.two(40)) * 16
-    }
-
-    /// Changes of gain and offset within the image.
-    pub(super) const fn gain_changes(&self) -> u16 {
-        self.two(38)
-    }
-
-    /// Samples of a line.
-    pub(super) fn width(&self) -> u32 {
-        u32::from(self.bytes[43]) * 16
-    }
-
-    const fn data_bytes(&self) -> u32 {
-        u32::from_le_bytes([
-            self.bytes[58],
-            self.bytes[59],
-            self.bytes[60],
-            self.bytes[61],
-        ])
-    }
-
-    /// `None` for a predictor and a transform at once, or a transform that there is not.
-    pub(super) const fn coding(&self) -> Option<Coding> {
-        let (kind, table) = (self.bytes[44], self.bytes[45]);
-        let predictor = match kind & 3 {
-            0 => None,
-            1 => Some(Predictor::X),
-            2 => Some(Predictor::Y),
-            _ => Some(Predictor::Xy),
-        };
-        let transform = match kind >> 2 & 3 {
-            0 => None,
-            1 => Some(Transform::Walsh),
-            2 => Some(Transform::Cosine),
-            _ => return None,
-        };
-        match (predictor, transform) {
-            (None, None) => Some(Coding::Raw),
-            (Some(predictor), None) if table & 15 < 8 => Some(Coding::Predictive {
-                predictor,
-                table: table & 15,
-            }),
-            (None, Some(transform)) => Some(Coding::Transform {
-                transform,
-                groups: (table >> 5) + 1,
-                spacing: self.two(48),
-            }),
-            _ => None,
-        }
-    }
-
-    fn is_possible(&self) -> bool {
-        self.width() > 0
-            && self.total_lines() > 0
-            && self.data_bytes() > 0
-            && self.coding().is_some()
-    }
-
-    /// What all fragments of an image have in common: identifier, clock, size and coding.
-    fn is_of_image(&self, first: &Self) -> bool {
-        [0..2, 8..13, 40..50]
-            .into_iter()
-            .all(|range| self.bytes[range.clone()] == first.bytes[range])
-            && self.data_bytes() > 0
-    }
-}
-
 /// What the label tells of the headers.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Expected {
@@ -190,7 +47,7 @@ pub(super) struct Expected {
 impl Expected {
     fn holds(&self, header: &Header) -> bool {
         header.is_possible()
-            && self.clock.is_none_or(|clock| header.bytes[8..13] == clock)
+            && self.clock.is_none_or(|clock| header.clock() == clock)
             && self.width.is_none_or(|width| header.width() == width)
             && (self.clock.is_some() || self.width.is_some())
     }
@@ -220,6 +77,8 @@ pub(super) struct Fragments {
     pub(super) all: Vec<Fragment>,
     /// Whether the last one is there.
     pub(super) has_last: bool,
+    /// The first one that is sound.
+    pub(super) witness: Option<Witness>,
 }
 
 impl Fragments {
@@ -250,6 +109,7 @@ impl Fragments {
             first,
             all: Vec::new(),
             has_last: false,
+            witness: None,
         };
         fragments.walk(&mut walk, at, complaints)?;
         Ok(Some(fragments))
@@ -269,12 +129,12 @@ impl Fragments {
             {
                 let first = self.first;
                 let next = walk.find(at, &|bytes| Header::new(*bytes).is_of_image(&first))?;
-                let Some(next) = next else {
+                if next.is_none() && header.bytes == [0; HEADER] {
                     break;
-                };
-                let skipped = next - at;
+                }
+                let skipped = next.unwrap_or(walk.end()) - at;
                 complaints.push(complaint(None, at, Fault::Header { skipped }));
-                at = next;
+                at += skipped;
                 continue;
             }
             if self.all.len() == MOST {
@@ -335,6 +195,10 @@ impl Fragments {
             complaints.push(complaint(Some(number), at, Fault::Repeated));
             return Ok((next, false));
         }
+        if is_sound && self.witness.is_none() && header.is_of_image(&self.first) {
+            let header = *header;
+            self.witness = Some(Witness { number, at, header });
+        }
         let lost_before = number - expected;
         if lost_before > 0 {
             let fragments = lost_before;
@@ -369,13 +233,14 @@ impl Fragments {
         lines.filter(|lines| *lines < self.first.total_lines())
     }
 
+    /// Whether each of them is there.
+    pub(super) fn are_complete(&self) -> bool {
+        self.has_last && self.all.iter().all(|fragment| fragment.lost_before == 0)
+    }
+
     /// Whether anything is wrong with them.
     pub(super) fn are_sound(&self) -> bool {
-        self.has_last
-            && self
-                .all
-                .iter()
-                .all(|fragment| fragment.is_sound && fragment.lost_before == 0)
+        self.are_complete() && self.all.iter().all(|fragment| fragment.is_sound)
     }
 }
 

@@ -6,10 +6,13 @@
 
 mod bits;
 mod codes;
+mod coding;
 mod complaint;
+mod contradiction;
 mod encode;
 mod encode_transform;
 mod fragment;
+mod header;
 mod opened;
 mod placed;
 mod predictive;
@@ -22,9 +25,10 @@ mod transform;
 mod walk;
 
 pub use self::{
+    coding::{Coding, Predictor, Transform},
     complaint::{Complaint, Complaints, Fault},
     encode::{EncodeError, Encoded, NewImage, encode},
-    fragment::{Coding, Layout, Predictor, Transform},
+    fragment::Layout,
     opened::{ImageFile, ImageFileError},
     radiometry::{OddEven, Radiometry},
     statistics::{PixelStatistics, Statistics},

@@ -8,6 +8,7 @@ use std::{
 
 use super::{
     complaint::{Complaint, Complaints, Fault},
+    contradiction::{clock_bytes, contradictions},
     fragment::{Expected, Fragments, Layout},
     strips::Strips,
     walk::byte_sum,
@@ -88,6 +89,7 @@ pub struct ImageFile {
     /// First byte of the pixels or fragments, and the end of the file.
     span: [u64; 2],
     fragments: Option<Fragments>,
+    contradictions: Vec<Complaint>,
     complaints: Complaints,
 }
 
@@ -128,6 +130,7 @@ impl ImageFile {
             label,
             span,
             fragments: None,
+            contradictions: Vec::new(),
             complaints,
         };
         if image.value("ENCODING_TYPE").is_some() {
@@ -146,6 +149,10 @@ impl ImageFile {
         let fragments = found.map_err(IoError::on("read"))?;
         let offset = self.span[0];
         let fragments = fragments.ok_or(ImageFileError::NoFragment { offset })?;
+        self.contradictions = contradictions(&self.label, &fragments);
+        for contradiction in &self.contradictions {
+            self.complaints.push(contradiction.clone());
+        }
         let header = fragments.first.total_lines();
         let possible = fragments.lines_possible();
         if let Some(possible) = possible {
@@ -189,6 +196,18 @@ impl ImageFile {
     #[must_use]
     pub const fn layout(&self) -> Layout {
         self.layout
+    }
+
+    /// Where label and fragments contradict each other; these are complaints as well.
+    #[must_use]
+    pub fn contradictions(&self) -> &[Complaint] {
+        &self.contradictions
+    }
+
+    /// Whether it has fragments, and each of them is there, damaged or not.
+    #[must_use]
+    pub fn is_complete(&self) -> bool {
+        self.fragments.as_ref().is_some_and(Fragments::are_complete)
     }
 
     /// What was found wrong so far, before any pixel was decoded.
@@ -296,12 +315,4 @@ fn check_sum(
         });
     }
     Ok(())
-}
-
-/// A clock string as headers have it: ticks, then seconds from their least significant byte on.
-fn clock_bytes(clock: &str) -> Option<[u8; 5]> {
-    let count = clock.split_once('/').map_or(clock, |(_, count)| count);
-    let (seconds, ticks) = count.split_once([':', '.'])?;
-    let [first, second, third, fourth] = seconds.parse::<u32>().ok()?.to_le_bytes();
-    Some([ticks.parse().ok()?, first, second, third, fourth])
 }

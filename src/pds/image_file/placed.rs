@@ -3,8 +3,9 @@
 use std::{collections::VecDeque, io, ops::Range};
 
 use super::{
+    coding::Predictor,
     complaint::{Complaint, Complaints, Fault},
-    fragment::{Fragments, Layout, Predictor},
+    fragment::{Fragments, Layout},
     predictive::{BLOCK_LINES, Block, Blocks},
     stream::{Piece, Stream},
     strip::{LineState, Strip},

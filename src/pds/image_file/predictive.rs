@@ -5,7 +5,7 @@ use std::io;
 use super::{
     bits::Bits,
     codes::{Code, RESIDUALS},
-    fragment::Predictor,
+    coding::Predictor,
     stream::Stream,
 };
 

@@ -3,8 +3,9 @@
 use std::{collections::VecDeque, fs::File, io};
 
 use super::{
+    coding::Coding,
     complaint::{Complaint, Complaints, Fault},
-    fragment::{Coding, FULL, Fragment, Fragments, Layout},
+    fragment::{FULL, Fragment, Fragments, Layout},
     placed::Placed,
     predictive::BLOCK_LINES,
     stream::{Piece, Stream},

@@ -5,7 +5,7 @@ use std::{f64::consts::PI, sync::LazyLock};
 use super::{
     bits::Bits,
     codes::{COEFFICIENTS, LARGE_NEGATIVE, LARGE_POSITIVE},
-    fragment::Transform,
+    coding::Transform,
 };
 
 /// Edge of a block, pixels.

@@ -1,6 +1,6 @@
 //! Columns of the index, and the fields of a row.
 
-use std::collections::BTreeMap;
+use std::{borrow::Cow, collections::BTreeMap};
 
 use crate::pds::label::Label;
 
@@ -61,6 +61,9 @@ pub(super) const COLUMNS: [&str; 53] = [
     "ORBIT_NUMBER",
 ];
 
+/// The fields of a row by the names of its columns.
+pub(super) type Fields<'a> = BTreeMap<&'a str, Cow<'a, str>>;
+
 /// A column: its name, and where its bytes stand in a row, where the label tells.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Column {
@@ -103,30 +106,39 @@ pub(super) fn of_label(label: &Label) -> Vec<Column> {
     named.collect()
 }
 
-/// The fields of a row by the names of its columns, without quotes and blanks around them.
-pub(super) fn fields<'a>(
-    row: &'a [u8],
-    columns: &'a [Column],
-) -> Result<BTreeMap<&'a str, &'a str>, String> {
+/// The fields of a row by the names of its columns, without quotes and blanks around them; a doubled quote within quotes is
+/// one.
+pub(super) fn fields<'a>(row: &'a [u8], columns: &'a [Column]) -> Result<Fields<'a>, String> {
     let row = std::str::from_utf8(row).map_err(|_| "no text of ASCII".to_owned())?;
     let separated = separated(row);
     if separated.len() == columns.len() && separated.iter().all(|field| is_whole(field)) {
-        let separated = separated
-            .into_iter()
-            .map(|field| field.trim_matches('"').trim());
+        let separated = separated.into_iter().map(unquoted);
         let names = columns.iter().map(|column| &*column.name);
         return Ok(names.zip(separated).collect());
     }
     // A quote within a text hides separators: where the label tells places, they help.
     let by_place = columns
         .iter()
-        .map(|column| Some((&*column.name, at_place(row, column.bytes?)?)));
+        .map(|column| Some((&*column.name, at_place(row, column.bytes?)?.into())));
     by_place
         .collect::<Option<_>>()
         .ok_or_else(|| match (separated.len(), columns.len()) {
             (found, expected) if found == expected => "a quote within a field".to_owned(),
             (found, expected) => format!("{found} fields; expected {expected}"),
         })
+}
+
+/// What a field says that stands within quotes, or has none.
+fn unquoted(field: &str) -> Cow<'_, str> {
+    let within = field
+        .strip_prefix('"')
+        .and_then(|rest| rest.strip_suffix('"'));
+    let text = within.unwrap_or(field).trim();
+    if text.contains("\"\"") {
+        text.replace("\"\"", "\"").into()
+    } else {
+        text.into()
+    }
 }
 
 /// The field at a place of the row, if it stands between separators there.
@@ -168,6 +180,16 @@ mod tests {
         );
     }
 
+    #[test]
+    fn a_doubled_quote_within_quotes_is_one() {
+        assert_eq!(unquoted(r#""Cydonia, ""Face""""#), r#"Cydonia, "Face""#);
+        assert_eq!(unquoted(r#""""Face"" ""#), r#""Face""#);
+        assert_eq!(
+            [r#""N/A ""#, r#""""#, "1.5"].map(unquoted),
+            ["N/A", "", "1.5"]
+        );
+    }
+
     fn label_of(places: [(usize, usize); 2]) -> Vec<Column> {
         let [(first, first_bytes), (second, second_bytes)] = places;
         let text = format!(
@@ -180,7 +202,7 @@ mod tests {
     #[test]
     fn places_of_the_label_help_where_a_text_holds_a_quote() {
         let columns = label_of([(2, 4), (8, 3)]);
-        let expected = BTreeMap::from([("PRODUCT_ID", "a\",b"), ("LINES", "12")]);
+        let expected = BTreeMap::from([("PRODUCT_ID", "a\",b".into()), ("LINES", "12".into())]);
         assert_eq!(fields(br#""a",b",12 "#, &columns), Ok(expected));
         assert_eq!(
             fields(b"1,2,3", &columns),
@@ -192,7 +214,7 @@ mod tests {
     fn places_without_separators_are_not_believed() {
         // A row one byte off the places of its label is read by its separators.
         let columns = label_of([(2, 4), (8, 3)]);
-        let expected = BTreeMap::from([("PRODUCT_ID", "abc"), ("LINES", "127")]);
+        let expected = BTreeMap::from([("PRODUCT_ID", "abc".into()), ("LINES", "127".into())]);
         assert_eq!(fields(br#""abc",127"#, &columns), Ok(expected));
         // And with a quote too many there is nothing to read it by.
         let refused = Err("1 fields; expected 2".to_owned());

@@ -25,6 +25,12 @@ impl Complaint {
     pub const fn is_of_many_records(&self) -> bool {
         matches!(self.reason, Reason::TimeOrder | Reason::Repeated)
     }
+
+    /// Whether shots of a record are left out for it that are nowhere else.
+    #[must_use]
+    pub fn leaves_out(&self) -> bool {
+        self.record.is_some() && !self.is_of_many_records()
+    }
 }
 
 impl fmt::Display for Complaint {

@@ -75,7 +75,7 @@ pub enum RecordError {
         integers_s: f64,
     },
     /// The record is not between its neighbours.
-    #[error("time is {0} s, out of the order of the neighbouring records")]
+    #[error("time is {} s, out of the order of the neighbouring records", legible(*.0))]
     Order(f64),
     /// The same shots stand in another record of the file.
     #[error(
@@ -260,9 +260,9 @@ impl RecordError {
     }
 }
 
-/// The number, in powers of ten where no clock of ours counts so far: a spoiled double has 300 digits.
+/// The number, in powers of ten where no clock of ours counts so far or so finely: a spoiled double has 300 digits.
 fn legible(seconds: f64) -> String {
-    if seconds.abs() < 1e12 {
+    if matches!(seconds.abs(), 0.0 | 1e-9..1e12) {
         seconds.to_string()
     } else {
         format!("{seconds:e}")
@@ -293,6 +293,10 @@ mod tests {
             told(-1.25e300),
             "the times of the record are -1.25e300 s and 4.5 s; expected equal to 1e-6 s"
         );
+        assert!(told(-1.5e-308).contains("are -1.5e-308 s and"));
+        let order = RecordError::Order(-1.5e-308).to_string();
+        assert!(order.starts_with("time is -1.5e-308 s, out"), "{order}");
+        assert!(told(0.0).contains("are 0 s and"));
         assert!(told(38_593_125.159_874).contains("are 38593125.159874 s"));
     }
 }

@@ -3,7 +3,6 @@
 use std::{
     collections::BTreeMap,
     fs,
-    io::Read as _,
     ops::Range,
     path::{Path, PathBuf},
     sync::{Arc, OnceLock},
@@ -106,19 +105,6 @@ pub(super) fn open_regular(path: &Path) -> Result<fs::File> {
 }
 
 impl File {
-    /// Reads a file; [`Reader`](super::Reader) reads one piece by piece.
-    ///
-    /// # Errors
-    /// The system's refusal; not a regular file. What is wrong inside is complained of, not refused.
-    pub fn open(path: &Path) -> Result<Self> {
-        let mut bytes = Vec::new();
-        let mut file = open_regular(path)?;
-        file.read_to_end(&mut bytes)
-            .map_err(IoError::on("read"))
-            .in_file(path)?;
-        Ok(Self::from_bytes(bytes, path))
-    }
-
     /// A file that is already in memory; `name` stands for its path.
     #[must_use]
     pub fn from_bytes(bytes: Vec<u8>, name: &Path) -> Self {

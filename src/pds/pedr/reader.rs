@@ -80,6 +80,17 @@ impl Cause for Changed {
     }
 }
 
+impl File {
+    /// Reads a file as a whole; a [`Reader`] reads one piece by piece.
+    ///
+    /// # Errors
+    /// The system's refusal; not a regular file; one that changes meanwhile. What is wrong inside is complained of, not
+    /// refused.
+    pub fn open(path: &Path) -> Result<Self> {
+        Reader::open(path)?.whole()
+    }
+}
+
 impl Reader {
     /// Opens a file and reads its label.
     ///
@@ -204,6 +215,24 @@ impl Reader {
         }
         let found = Chronology::new(misplaced(&times_s));
         Ok(Arc::clone(self.misplaced.get_or_init(|| found)))
+    }
+
+    /// Reads all of the file.
+    ///
+    /// # Errors
+    /// What the disk refuses; a file that has become shorter, has changed or lost its name.
+    fn whole(&self) -> Result<File> {
+        let path = self.head.path();
+        let length = usize::try_from(self.identity.bytes).unwrap_or(usize::MAX);
+        let mut bytes = Vec::new();
+        bytes
+            .try_reserve_exact(length)
+            .map_err(|_| IoError::on("read")(io::ErrorKind::OutOfMemory.into()))
+            .in_file(path)?;
+        bytes.resize(length, 0);
+        read_at(&self.handle, &mut bytes, 0, self.identity.bytes).in_file(path)?;
+        self.unchanged()?;
+        Ok(File::from_bytes(bytes, path))
     }
 
     /// Has the system read the file ahead; whether it does is its own affair.
@@ -349,4 +378,34 @@ fn read_at(handle: &fs::File, buffer: &mut [u8], from: u64, bytes: u64) -> Resul
             io::ErrorKind::UnexpectedEof => Changed::Shorter(bytes).into(),
             _ => IoError::on("read")(error).into(),
         })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    #[allow(clippy::disallowed_methods, reason = "a file of a test")]
+    fn a_file_that_changes_while_it_is_read_is_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("ap19019l.b");
+        fs::write(&path, vec![b' '; 10_000]).unwrap();
+        assert_eq!(File::open(&path).unwrap().into_bytes(), vec![b' '; 10_000]);
+        let refused = |change: &dyn Fn(&fs::File)| {
+            let reader = Reader::open(&path).unwrap();
+            change(&fs::File::options().write(true).open(&path).unwrap());
+            let failure = reader.whole().unwrap_err();
+            assert_eq!(failure.kind(), Kind::Input);
+            failure.to_string()
+        };
+        let said = refused(&|file| file.set_len(9_000).unwrap());
+        assert!(said.contains("ap19019l.b: the file ended early"), "{said}");
+        let said = refused(&|file| file.set_len(10_000).unwrap());
+        assert!(said.contains("the file changed while"), "{said}");
+        // Other bytes, as many as before: the time tells.
+        let said = refused(&|file| file.set_modified(SystemTime::UNIX_EPOCH).unwrap());
+        assert!(said.contains("the file changed while"), "{said}");
+        let said = refused(&|_| fs::remove_file(&path).unwrap());
+        assert!(said.contains("the file was removed"), "{said}");
+    }
 }

@@ -10,5 +10,5 @@ mod preferences;
 mod rows;
 
 pub use columns::Variant;
-pub use preferences::Preferences;
+pub use preferences::{Ended, Preferences};
 pub use rows::{Rules, Table};

@@ -29,8 +29,8 @@ pub struct Preferences {
     pub latitude_deg: [f64; 2],
     /// `(a/c)²` of areographic latitudes.
     pub axes_squared: f64,
-    /// Whether everything was read.
-    pub is_whole: bool,
+    /// Where and why reading ended before everything was read.
+    pub ended: Option<Ended>,
 }
 
 impl Default for Preferences {
@@ -48,7 +48,7 @@ impl Default for Preferences {
             latitude_deg: [-90.0, 90.0],
             // A figure of the Viking maps.
             axes_squared: (3393.4_f64 / 3375.73).powi(2),
-            is_whole: false,
+            ended: None,
         }
     }
 }
@@ -62,7 +62,7 @@ impl Preferences {
     #[must_use]
     pub fn parse(text: &str) -> Self {
         let mut preferences = Self::default();
-        preferences.is_whole = preferences.read(&mut Lines::of(text)).is_ok();
+        preferences.ended = preferences.read(&mut Lines::of(text)).err();
         preferences
     }
 
@@ -76,16 +76,17 @@ impl Preferences {
         lines.logical(&mut self.ground)?;
         lines.logical(&mut self.crossover)?;
         lines.statement();
-        self.one_table = lines.value(logical)?.unwrap_or(self.one_table);
-        if let Some(name) = lines.value(|item| Some(item.text.chars().take(NAME_MAX).collect()))? {
+        self.one_table = lines.value(SWITCH, logical)?.unwrap_or(self.one_table);
+        let name = |item: &Item| Some(item.text.chars().take(NAME_MAX).collect());
+        if let Some(name) = lines.value("the name of a table", name)? {
             self.table_name = name;
         }
         for limit in self.longitude_deg.iter_mut().chain(&mut self.latitude_deg) {
             lines.statement();
-            *limit = lines.value(real)?.unwrap_or(*limit);
+            *limit = lines.value(DEGREES, real)?.unwrap_or(*limit);
         }
         lines.statement();
-        let inverse_flattening = lines.value(real)?.unwrap_or(0.0);
+        let inverse_flattening = lines.value("the inverse flattening", real)?.unwrap_or(0.0);
         let axes = 1.0 - 1.0 / inverse_flattening;
         self.axes_squared = 1.0 / (axes * axes);
         Ok(())
@@ -93,7 +94,26 @@ impl Preferences {
 }
 
 /// The file ends, or holds something else than the program reads.
-struct Ended;
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum Ended {
+    /// No value is left.
+    #[error("ends after line {0}; expected {1}")]
+    Early(usize, &'static str),
+    /// Another kind of value.
+    #[error("line {line} holds {found:?}; expected {expected}")]
+    Value {
+        /// Line of the file, counted from 1.
+        line: usize,
+        /// What stands there.
+        found: String,
+        /// What the program reads there.
+        expected: &'static str,
+    },
+}
+
+/// What the program reads.
+const SWITCH: &str = "T or F";
+const DEGREES: &str = "a number of degrees";
 
 /// One value of a list.
 struct Item {
@@ -123,6 +143,8 @@ fn real(item: &Item) -> Option<f64> {
 /// The records of the file. A read statement begins with the next one, and goes on to further ones until it has its values.
 struct Lines<'a> {
     lines: std::str::Lines<'a>,
+    /// Number of the record that was read last.
+    line: usize,
     rest: &'a str,
     /// A slash ended the statement: what is left of it keeps its values.
     ended: bool,
@@ -135,6 +157,7 @@ impl<'a> Lines<'a> {
     fn of(text: &'a str) -> Self {
         Self {
             lines: text.lines(),
+            line: 0,
             rest: "",
             ended: false,
             repeated: 0,
@@ -151,17 +174,22 @@ impl<'a> Lines<'a> {
 
     fn logical(&mut self, value: &mut bool) -> Result<(), Ended> {
         self.statement();
-        *value = self.value(logical)?.unwrap_or(*value);
+        *value = self.value(SWITCH, logical)?.unwrap_or(*value);
         Ok(())
     }
 
     /// The next value, `None` for an empty one; an error at the end of the file or for one of another kind.
-    fn value<T>(&mut self, read: impl Fn(&Item) -> Option<T>) -> Result<Option<T>, Ended> {
+    fn value<T>(
+        &mut self,
+        expected: &'static str,
+        read: impl Fn(&Item) -> Option<T>,
+    ) -> Result<Option<T>, Ended> {
         if self.ended {
             return Ok(None);
         }
         if self.repeated == 0 {
-            self.next_item().ok_or(Ended)?;
+            self.last = None;
+            self.next_item().ok_or_else(|| self.ended_at(expected))?;
         }
         if self.ended {
             return Ok(None);
@@ -169,7 +197,24 @@ impl<'a> Lines<'a> {
         self.repeated -= 1;
         match self.last.clone() {
             None => Ok(None),
-            Some(text) => read(&Item { text }).map(Some).ok_or(Ended),
+            Some(text) => {
+                let value = read(&Item { text });
+                value.map(Some).ok_or_else(|| self.ended_at(expected))
+            }
+        }
+    }
+
+    /// The end of reading at the last value, or at what is left of the line.
+    fn ended_at(&self, expected: &'static str) -> Ended {
+        let line = self.line;
+        let rest = self.last.as_deref().unwrap_or(self.rest.trim());
+        if rest.is_empty() {
+            return Ended::Early(line, expected);
+        }
+        Ended::Value {
+            line,
+            found: rest.to_owned(),
+            expected,
         }
     }
 
@@ -181,6 +226,7 @@ impl<'a> Lines<'a> {
                 break;
             }
             self.rest = self.lines.next()?;
+            self.line += 1;
         }
         self.repeated = 1;
         if self.rest.starts_with('/') {

@@ -346,11 +346,16 @@ impl Preferences {
     /// Whether the window holds a shot, whichever turn its limits are written in.
     fn holds(&self, row: &Row) -> bool {
         let within = |value: f64, [least, most]: [f64; 2]| (least..=most).contains(&value);
+        let [west_deg, mut east_deg] = self.longitude_deg;
+        // West above east: the window goes on across the end of the turn.
+        if west_deg > east_deg {
+            east_deg = west_deg + (east_deg - west_deg).rem_euclid(360.0);
+        }
         let turns = [-360.0, 0.0, 360.0].map(|turn| row.longitude_deg + turn);
         within(row.latitude_deg, self.latitude_deg)
             && turns
                 .into_iter()
-                .any(|longitude_deg| within(longitude_deg, self.longitude_deg))
+                .any(|longitude_deg| within(longitude_deg, [west_deg, east_deg]))
     }
 }
 

@@ -22,7 +22,9 @@ pub(in crate::products) static README: Declaration = Declaration {
     rows: "",
     role: Role::Metadata,
     content: Content::Foreign,
-    write: Write::Site(|path, of| write_text(path, &text(of)).map(|()| Some(0))),
+    write: Write::Site(|path, of| {
+        write_text(path, &of.site.config.wording().of(text(of))).map(|()| Some(0))
+    }),
     uses: &[],
 };
 

@@ -1,4 +1,4 @@
-//! The checks of both runs, those whose value or outcome changed.
+//! The checks of both runs whose outcome changed.
 
 use super::super::{
     checks::{limit, value},
@@ -19,7 +19,7 @@ pub(super) fn changed(site: &RunDifference) -> String {
     let mut rows = Vec::new();
     for after in b {
         let before = a.iter().find(|before| before.kind == after.kind);
-        if before.is_none_or(|before| told(before) != told(after)) {
+        if before.is_none_or(|before| before.outcome != after.outcome) {
             rows.push((after.words(), before, Some(after)));
         }
     }
@@ -31,7 +31,7 @@ pub(super) fn changed(site: &RunDifference) -> String {
         return String::new();
     }
     let columns = &[Column::Text("check"), Column::Text("A"), Column::Text("B")];
-    let mut table = Table::new("Checks that came out otherwise", columns);
+    let mut table = Table::new("Checks that changed", columns);
     for (words, before, after) in rows {
         let fails = after.is_some_and(|check| check.outcome == CheckOutcome::Fail);
         let [before, after] = [before, after].map(|check| check.map_or("–".to_owned(), told));

@@ -5,7 +5,7 @@ use crate::{
     files::short_hash,
     products::read::ProfileDocument,
     report::{
-        html::{Cell, Column, Table, list, paragraph},
+        html::{Cell, Column, Table, counted, list, paragraph},
         numbers::{self, number, whole},
     },
 };
@@ -88,10 +88,13 @@ pub(super) fn values(site: &RunDifference) -> String {
             Column::Number("B − A"),
         ],
     );
-    let mut rows = 0;
+    let (mut rows, mut rounding) = (0, 0);
     let mut add = |of: &str, changes: &[Change]| {
-        rows += changes.len();
-        for change in changes {
+        let (small, listed): (Vec<&Change>, Vec<&Change>) =
+            changes.iter().partition(|change| change.is_rounding());
+        rounding += small.len();
+        rows += listed.len();
+        for change in listed {
             let [a, b] = [&change.a, &change.b].map(|value| text(value.as_ref()));
             let difference = change.difference().map(signed).unwrap_or_default();
             let what = (&change.what).into();
@@ -124,10 +127,18 @@ pub(super) fn values(site: &RunDifference) -> String {
             ],
         );
     }
+    let not_listed = if rounding == 0 {
+        String::new()
+    } else {
+        paragraph(&format!(
+            "Not listed: {} that differ by less than one part in a million.",
+            counted(rounding, "value")
+        ))
+    };
     if rows == 0 {
-        return String::new();
+        return not_listed;
     }
-    table.finish()
+    table.finish() + &not_listed
 }
 
 /// Kernels, stages and products that differ.

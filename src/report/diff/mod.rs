@@ -5,6 +5,8 @@ mod inputs;
 mod map;
 mod movement;
 
+use std::cmp::Reverse;
+
 use super::html::{self, Section, Tone, heading, list, paragraph};
 use crate::{
     difference::{Outcome, RunDifference},
@@ -20,7 +22,10 @@ pub fn difference_page(sites: &[&RunDifference], not_compared: &[String]) -> Res
         [one] => format!("{}: difference of two runs", one.site),
         _ => "Difference of two runs".to_owned(),
     };
-    let lead: String = sites.iter().map(|site| verdict(site)).collect();
+    let mut sites = sites.to_vec();
+    sites.sort_by_key(|site| Reverse(site.severity()));
+    let sites = &*sites;
+    let lead = lead(sites);
     let sections = [
         of_each("Checks", sites, |site| Ok(checks::changed(site)))?,
         of_each("Movement", sites, |site| {
@@ -61,9 +66,21 @@ fn of_each(
     Ok(Section::new(name, body))
 }
 
-/// A verdict that changed, alone and first; then what moved.
-fn verdict(site: &RunDifference) -> String {
-    changed_verdict(site) + &moved(site)
+/// Verdicts that changed, alone and first; then what moved; of several sites those in which nothing changed in one line.
+fn lead(sites: &[&RunDifference]) -> String {
+    let verdicts = sites.iter().map(|site| changed_verdict(site));
+    if let [one] = sites {
+        return verdicts.collect::<String>() + &moved(one);
+    }
+    let (unchanged, changed): (Vec<&RunDifference>, Vec<&RunDifference>) =
+        sites.iter().partition(|site| site.is_unchanged());
+    let moved = changed.iter().map(|site| moved(site));
+    let mut lead: String = verdicts.chain(moved).collect();
+    if !unchanged.is_empty() {
+        let names: Vec<&str> = unchanged.iter().map(|site| &*site.site).collect();
+        lead += &paragraph(&format!("Unchanged: {}.", names.join(", ")));
+    }
+    lead
 }
 
 fn changed_verdict(site: &RunDifference) -> String {

@@ -17,8 +17,8 @@ pub(super) fn two_readings(adjusted: &Adjusted) -> String {
     }
 }
 
-const WORDS: &str = "Tie points tell how far apart images lie along track, not which is right. One offset of the attitude clock turns images \
-    that follow nadir, not those held towards a star. Each σ holds for its own reading (adjustment.attitude_clock).";
+const WORDS: &str = "Tie points show the offset between images, not which image is wrong. A clock offset rotates nadir-tracking images but not \
+    inertially held ones.";
 
 fn table(adjusted: &Adjusted, other: &OtherReading) -> String {
     let mut table = Table::new(
@@ -72,7 +72,7 @@ fn table(adjusted: &Adjusted, other: &OtherReading) -> String {
 
 fn reading(clock_s: Option<(f64, f64)>) -> String {
     clock_s.map_or_else(
-        || "evenly: all images as likely to be wrong".to_owned(),
+        || "shared: all images equally likely to be in error".to_owned(),
         |(offset_s, sigma_s)| {
             format!(
                 "by the attitude's clock, off by {} ± {} s",

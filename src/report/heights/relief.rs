@@ -8,9 +8,11 @@ use crate::stages::adjust::{Adjusted, HeightSummary, ProfileOffset};
 
 /// Of use where relief knows the place to less than this share of what is known beforehand.
 const SHARE_OF_USE: f64 = 0.5;
+/// Beyond this relief says nothing of the place, metres.
+const BEYOND_USE_M: f64 = 1e3;
 
 /// To what relief tells the place, whether that is worth using, and what became of it where it is used.
-pub(super) fn relief(adjusted: &Adjusted) -> String {
+pub(super) fn relief(adjusted: &Adjusted, beforehand: &str) -> String {
     let Some(heights) = &adjusted.heights else {
         return String::new();
     };
@@ -20,37 +22,35 @@ pub(super) fn relief(adjusted: &Adjusted) -> String {
         );
     };
     let [east_m, north_m] = relief.sigma_m;
-    let told = format!(
-        "Relief alone places the images to ±{} m east and ±{} m north;",
-        label(east_m, 0),
-        label(north_m, 0)
-    );
+    let axes = format!("±{} m E, ±{} m N", label(east_m, 0), label(north_m, 0));
     if relief.used {
-        let used = "it is used (adjustment.relief_for_plan).";
-        paragraph(&format!("{told} {used}"))
+        let used =
+            format!("Relief alone fixes position to {axes}; used (adjustment.relief_for_plan).");
+        return paragraph(&used)
             + &profiles(
                 "Where profiles are recorded against where relief and images put them, metres",
                 &relief.profile_shifts,
-            )
-    } else {
-        paragraph(&format!("{told} {}", advice([east_m, north_m], heights)))
+            );
     }
+    if !(east_m.max(north_m) <= BEYOND_USE_M) {
+        return paragraph("Relief cannot fix the position here.");
+    }
+    let than = if is_of_use([east_m, north_m], heights) {
+        "much better than"
+    } else {
+        "no better than"
+    };
+    paragraph(&format!(
+        "Matching relief alone would fix position to {axes}, {than} {beforehand}; not used \
+         (adjustment.relief_for_plan)."
+    ))
 }
 
-fn advice(relief_m: [f64; 2], heights: &HeightSummary) -> String {
+/// Whether relief knows the place so well that it should be used.
+fn is_of_use(relief_m: [f64; 2], heights: &HeightSummary) -> bool {
     let [east_m, north_m, _] = heights.mean_sigma_m;
     let is_of_use = |relief_m: f64, known_m: f64| relief_m < SHARE_OF_USE * known_m;
-    let use_it = is_of_use(relief_m[0], east_m) && is_of_use(relief_m[1], north_m);
-    format!(
-        "it is not used, and {} (±{} m and ±{} m without it; adjustment.relief_for_plan).",
-        if use_it {
-            "would help"
-        } else {
-            "would not help"
-        },
-        label(east_m, 0),
-        label(north_m, 0)
-    )
+    is_of_use(relief_m[0], east_m) && is_of_use(relief_m[1], north_m)
 }
 
 /// Shifts of profiles; nothing where there are none.

@@ -1,9 +1,6 @@
 //! What other orbits have against a calibration that they took no part in.
 
-use super::{
-    judge::Evidence,
-    result::{PointKind, ValidationResult},
-};
+use super::result::{CameraResult, PointKind, ValidationResult};
 
 /// A figure of control may become worse by so many standard deviations of measurement and laser.
 const WORSE_MAX: f64 = 3.0;
@@ -30,11 +27,17 @@ struct Compared {
 }
 
 /// Reasons, then remarks.
-pub(super) fn elsewhere(of: &Evidence<'_>) -> (Vec<String>, Vec<String>) {
+///
+/// * `noise` – of every orbit
+pub(super) fn elsewhere(
+    validation: &[ValidationResult],
+    noise: &[Noise],
+    cameras: &[CameraResult],
+) -> (Vec<String>, Vec<String>) {
     let (mut reasons, mut remarks) = (Vec::new(), Vec::new());
-    for (orbit, noise) in of.validation.iter().zip(of.validation_noise) {
-        remarks.extend(ties(orbit, of));
-        for compared in control(orbit, *noise, of, &mut remarks) {
+    for (orbit, noise) in validation.iter().zip(noise) {
+        remarks.extend(ties(orbit, cameras));
+        for compared in control(orbit, *noise, cameras, &mut remarks) {
             match compared.reason() {
                 Some(reason) => reasons.push(format!("orbit {}: {reason}", orbit.orbit)),
                 None if compared.is_kept() => remarks.push(format!(
@@ -50,10 +53,10 @@ pub(super) fn elsewhere(of: &Evidence<'_>) -> (Vec<String>, Vec<String>) {
 }
 
 /// Ties that the calibration makes worse.
-fn ties(orbit: &ValidationResult, of: &Evidence<'_>) -> Vec<String> {
+fn ties(orbit: &ValidationResult, cameras: &[CameraResult]) -> Vec<String> {
     let mut worse = Vec::new();
     let [before, after] = [&orbit.before, &orbit.after].map(|of| &of.ties.cameras_px);
-    for (camera, (before, after)) in of.cameras.iter().zip(before.iter().zip(after)) {
+    for (camera, (before, after)) in cameras.iter().zip(before.iter().zip(after)) {
         for (what, axis) in [("across", 0), ("along", 1)] {
             if let Some((before, after)) = before[axis].zip(after[axis])
                 && after > TIES_WORSE * before
@@ -73,7 +76,7 @@ fn ties(orbit: &ValidationResult, of: &Evidence<'_>) -> Vec<String> {
 fn control(
     orbit: &ValidationResult,
     noise: Noise,
-    of: &Evidence<'_>,
+    cameras: &[CameraResult],
     remarks: &mut Vec<String>,
 ) -> Vec<Compared> {
     let [before, after] = [&orbit.before, &orbit.after].map(|of| of.of(PointKind::Control));
@@ -82,8 +85,8 @@ fn control(
         return Vec::new();
     };
     let mut all = Vec::new();
-    let cameras = before.cameras.iter().zip(&after.cameras);
-    let figures = cameras.zip(of.cameras).map(|((before, after), camera)| {
+    let figures = before.cameras.iter().zip(&after.cameras).zip(cameras);
+    let figures = figures.map(|((before, after), camera)| {
         let what = format!("control in the plane of camera {}", camera.camera);
         (what, [before.plane_m, after.plane_m, noise.plane_m])
     });

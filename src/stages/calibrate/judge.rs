@@ -88,7 +88,7 @@ pub(super) fn judge(of: &Evidence<'_>) -> Verdict {
             ));
         }
     }
-    let (worse, doubts) = elsewhere(of);
+    let (worse, doubts) = elsewhere(of.validation, of.validation_noise, of.cameras);
     reasons.extend(worse);
     let mut remarks = remarks(of);
     remarks.extend(doubts);

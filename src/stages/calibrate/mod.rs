@@ -1,5 +1,6 @@
 //! Calibration of the lines of a camera: ties alone, then with laser control, judged by control that was held back.
 
+mod demands;
 mod elsewhere;
 mod error;
 mod geometry;

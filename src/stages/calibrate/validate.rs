@@ -3,13 +3,13 @@
 use nalgebra::DMatrix;
 
 use super::{
+    demands::{CONTROLS_MIN, belong_together, enough_ties},
     elsewhere::Noise,
     error::CalibrateError,
     geometry::{CameraImage, Laboratory, Orbit},
     measure::{Squares, figures},
     read::{OrbitPoint, OrbitTables, points_of},
     result::{PointKind, ValidationResult},
-    run::{CONTROLS_MIN, belong_together, enough_ties},
     tables::Complaints,
 };
 use crate::{

@@ -10,6 +10,7 @@ use crate::{
     altimetry::{MolaClock, ShotFilter},
     config::RangeCheckConfig,
     files::Identity,
+    pds::archive::{UNUSABLE_MAX, UNUSABLE_SHARE_MAX},
     stages::judge::Verdict,
 };
 
@@ -172,6 +173,7 @@ impl ArchiveRanges {
                 "copies of other files, whose shots count once: {count}"
             ));
         }
+        reasons.extend(self.damaged());
         let complaints = self.sum(|file| file.complaint_count);
         if complaints > 0 {
             remarks.push(format!(
@@ -204,6 +206,22 @@ impl ArchiveRanges {
         let named = self.worst(beyond.min(NAMED)).into_iter();
         let named = named.map(|(_, of)| format!("{}: {}", of.id(), of.invalid_because.join("; ")));
         told.chain(named).collect()
+    }
+
+    /// Files that lost more than some records, of which the other files' profiles say nothing.
+    fn damaged(&self) -> impl Iterator<Item = String> {
+        let files = self.files.iter().map(|file| &file.found);
+        let damaged = files.filter(|file| {
+            file.complaint_count as f64
+                > UNUSABLE_SHARE_MAX * file.records as f64 + UNUSABLE_MAX as f64
+        });
+        damaged.take(NAMED).map(|file| {
+            format!(
+                "{}: {} complaints of {} records; expected at most {UNUSABLE_MAX} and one in a hundred: the file was damaged on \
+                 its way",
+                file.file, file.complaint_count, file.records
+            )
+        })
     }
 
     fn unread(&self) -> Option<String> {

@@ -95,7 +95,7 @@ impl RangeFigures {
         // Written so that NaN breaks the limit.
         (!(apart_m <= limit_m)).then(|| {
             format!(
-                "the file's own spacecraft lies {apart_m:.0} m from that of the kernels ({} m up, {} m along \
+                "the spacecraft position of the PEDR differs by {apart_m:.0} m from the kernels' ({} m up, {} m along \
                  the flight, {} m across it); limit {limit_m} m: {}",
                 signed(radial, 0),
                 signed(along, 0),

@@ -244,7 +244,7 @@ fn track_axes(position: &Vector3<f64>, velocity: &Vector3<f64>) -> Matrix3<f64> 
 /// the residuals by the vector's part along each line of sight, and a metre along the track cannot be
 /// told from 0.3 ms. How well the orbit is known is taken from its difference to the orbit of the PEDR
 /// file across the flight, as likely in any direction: along it the two also lie apart by the very error of the correction,
-/// which would bound itself.
+/// which would bound itself. An orbit whose error changes along the profile leaves a slope too: as much as that difference does.
 fn uncertainty_s(
     shots: &[Footprint],
     radius: ScannedRadius,
@@ -255,6 +255,7 @@ fn uncertainty_s(
     let mut rates_m_s = Vec::with_capacity(shots.len());
     let mut directions: [Vec<f64>; 3] = std::array::from_fn(|_| Vec::with_capacity(shots.len()));
     let mut orbit_difference_m = Vector3::zeros();
+    let mut sighted_differences_m = Vec::with_capacity(shots.len());
     for shot in shots {
         let residual = |correction_s| residual_m(shot, radius, trajectory, correction_s);
         let change_m = residual(best_s + RATE_STEP_S)? - residual(best_s - RATE_STEP_S)?;
@@ -272,8 +273,9 @@ fn uncertainty_s(
         for (axis, component) in directions.iter_mut().zip(&direction) {
             axis.push(*component);
         }
-        let difference_m = own_spacecraft(shot).xyz_m - spacecraft.xyz_m;
-        orbit_difference_m += to_track * difference_m;
+        let difference_m = to_track * (own_spacecraft(shot).xyz_m - spacecraft.xyz_m);
+        orbit_difference_m += difference_m;
+        sighted_differences_m.push(difference_m.yz().dot(&direction.yz()));
     }
     let noise_s = Trend::of(&rates_m_s, &residuals_m)?.uncertainty;
     let mut seconds_per_metre = Vector3::zeros();
@@ -283,5 +285,10 @@ fn uncertainty_s(
     let difference_m = orbit_difference_m / shots.len() as f64;
     let across_m = difference_m.y.hypot(difference_m.z) / f64::sqrt(2.0);
     let orbit_s = seconds_per_metre.norm() * across_m;
-    Some(noise_s.hypot(orbit_s))
+    let change_s = match radius {
+        ScannedRadius::Raw => Trend::of(&rates_m_s, &sighted_differences_m)?.slope,
+        // Crossovers have taken it out.
+        ScannedRadius::Crossover => 0.0,
+    };
+    Some(noise_s.hypot(orbit_s).hypot(change_s))
 }

@@ -249,3 +249,48 @@ fn pictures_that_may_be_exchanged_are_not_matched() {
     let files = [hashed("one.imq", &archive(&pixels)), files[1].clone()];
     assert!(PixelFiles(&files).told_apart(&[&one, &two]).is_ok());
 }
+
+#[test]
+fn a_label_and_fragments_of_two_images_are_refused() {
+    let (folder, pixels) = (Folder::new(), pixels());
+    let own = archive(&pixels);
+    let other = String::from_utf8_lossy(&own[..2048]).replace("M01/00123", "M01/00124");
+    let mixed = [other.as_bytes(), &own[2048..]].concat();
+    let told = folder.refusal(&mixed, &times("M01-00124"));
+    assert!(
+        told.contains("fragment 0, byte 2048: the label says PRODUCT_ID = M01/00124; the fragments say image 123"),
+        "{told}"
+    );
+}
+
+#[test]
+fn lines_beyond_those_delivered_are_refused() {
+    let folder = Folder::new();
+    let less = ImageTimes {
+        lines_delivered: 144,
+        ..times("M01-00123")
+    };
+    // Between what came down and what was exposed: neither.
+    for file in [archive(&pixels()), cube(&pixels(), &of_the_camera())] {
+        let told = folder.refusal(&file, &less);
+        assert!(
+            told.contains(
+                "160 lines; expected at most 144, which lines_delivered says came down of 176"
+            ),
+            "{told}"
+        );
+    }
+    // Every line that was exposed: in a complete file all came down; else some may be empty.
+    let all = vec![80; (LINES[1] * SAMPLES) as usize];
+    let told = folder.refusal(&archive(&all), &times("M01-00123"));
+    assert!(told.contains("176 lines; expected at most 160"), "{told}");
+    let whole = archive(&all);
+    for file in [
+        whole[..8192].to_vec(),
+        cube(&all, &of_the_camera()),
+        png(&all),
+    ] {
+        let path = folder.write("pixels", &file);
+        assert!(open_pixels(&path, &times("M01-00123")).is_ok());
+    }
+}

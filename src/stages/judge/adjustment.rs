@@ -175,8 +175,8 @@ impl AdjustmentEvidence<'_> {
         let [_, _, up_m] = heights.mean_sigma_m;
         if !(up_m <= HEIGHT_LOOSE_M) {
             remarks.push(format!(
-                "MOLA controls heights to ±{up_m:.0} m only: the tie points lie far from its shots, or mola_surface says that \
-                 little is known of it"
+                "MOLA controls heights to ±{up_m:.0} m only: the tie points lie far from its shots, or the a priori σ in \
+                 mola_surface is large"
             ));
         }
         let share = heights.beyond_share();

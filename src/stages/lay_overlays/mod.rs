@@ -44,6 +44,31 @@ pub struct ShownImage {
     pub image: usize,
     /// The whole of it.
     pub quick_look: QuickLook,
+    /// Lines of its file, those that are missing among them.
+    pub lines: u32,
+    /// What is wrong with its file; at most 1000 are kept.
+    pub complaints: Vec<String>,
+    /// All of them.
+    pub complaint_count: u64,
+}
+
+impl ShownImage {
+    /// What a reader must know of pixels that are not all as they were sent.
+    #[must_use]
+    pub fn damage(&self) -> Option<String> {
+        let (missing, suspect) = (self.quick_look.lines_missing, self.quick_look.lines_suspect);
+        let first = match (self.complaint_count, self.complaints.first()) {
+            (1, Some(only)) => format!("1 complaint: {only}"),
+            (count, Some(first)) => format!("{count} complaints, first: {first}"),
+            (_, None) => "no complaint".to_owned(),
+        };
+        (missing > 0 || suspect > 0 || self.complaint_count > 0).then(|| {
+            format!(
+                "{missing} of {} lines are missing, {suspect} may be damaged, {first}",
+                self.lines
+            )
+        })
+    }
 }
 
 /// A place on the ground in one image or two.
@@ -151,11 +176,12 @@ impl Stage for LayOverlays<'_> {
         for (image, file) in files.iter().enumerate() {
             let Some(file) = file else { continue };
             let patches = planned.iter_mut().flat_map(|place| place.patches_of(image));
-            let quick_look = pixels::read(file, times[image], patches.collect(), stop);
-            images.push(ShownImage {
-                image,
-                quick_look: quick_look?,
-            });
+            images.push(pixels::read(
+                file,
+                (image, times[image]),
+                patches.collect(),
+                stop,
+            )?);
         }
         let places = planned.into_iter().map(views::PlannedPlace::cut);
         Ok(Overlays {

@@ -5,10 +5,11 @@ use std::{ops::Range, sync::atomic::AtomicBool};
 
 use serde::{Deserialize, Serialize};
 
+use super::ShownImage;
 use crate::{
     error::{Result, Stopped},
     pds::{
-        image_file::{LineState, Strip},
+        image_file::{ImageFile, LineState, Strip},
         pixel_file::PixelFile,
     },
     stages::tag_times::ImageTimes,
@@ -16,6 +17,8 @@ use crate::{
 
 /// Most pixels of a quick look.
 const QUICK_LOOK_PIXELS: u64 = 1_200_000;
+/// Complaints kept with their text; all are counted.
+const COMPLAINTS_MAX: usize = 1_000;
 /// Share of the darkest and of the brightest pixels that are shown as black and as white.
 const CLIPPED: f64 = 0.005;
 
@@ -124,10 +127,10 @@ impl Patch {
 /// The system's refusal to read; [`Stopped`].
 pub(super) fn read(
     file: &PixelFile,
-    times: &ImageTimes,
+    (image, times): (usize, &ImageTimes),
     mut patches: Vec<&mut Patch>,
     stop: &AtomicBool,
-) -> Result<QuickLook> {
+) -> Result<ShownImage> {
     let (samples, lines) = (times.samples, file.lines());
     let mut reduced = Reduced::new(samples, lines, reduction(samples, lines, QUICK_LOOK_PIXELS));
     let mut counts = [0_u64; 256];
@@ -147,11 +150,22 @@ pub(super) fn read(
             }
         }
     }
-    Ok(QuickLook {
+    let quick_look = QuickLook {
         range_dn: range_dn(&counts),
         lines_missing: lines - lines_there,
         lines_suspect,
         ..reduced.finish()
+    };
+    let opened = file.archive().map(ImageFile::complaints);
+    let (opened, count) = opened.map_or((&[][..], 0), |of| (of.kept(), of.count()));
+    let (decoded, count_decoded) = strips.complaints();
+    let complaints = opened.iter().chain(decoded).take(COMPLAINTS_MAX);
+    Ok(ShownImage {
+        image,
+        quick_look,
+        lines,
+        complaints: complaints.map(ToString::to_string).collect(),
+        complaint_count: count + count_decoded,
     })
 }
 
@@ -280,6 +294,31 @@ mod tests {
         assert_eq!(smaller.range_dn, [3, 200]);
         // 15, 35 and nothing below them; 1 and 101 alone.
         assert_eq!(smaller.pixels, [25, 50, 51, 7]);
+    }
+
+    #[test]
+    fn damage_of_a_file_is_told_with_its_numbers() {
+        let shown = |missing, complaints: &[&str]| {
+            let mut quick_look = Reduced::new(5, 6, 2).finish();
+            quick_look.lines_missing = missing;
+            ShownImage {
+                image: 0,
+                quick_look,
+                lines: 8960,
+                complaints: complaints.iter().map(ToString::to_string).collect(),
+                complaint_count: complaints.len() as u64,
+            }
+        };
+        assert_eq!(shown(0, &[]).damage(), None);
+        let damage = shown(1536, &["byte 7: one", "byte 9: other"]).damage();
+        assert_eq!(
+            damage.as_deref(),
+            Some(
+                "1536 of 8960 lines are missing, 0 may be damaged, 2 complaints, first: byte 7: one"
+            )
+        );
+        let damage = shown(3, &[]).damage();
+        assert!(damage.is_some_and(|told| told.ends_with("no complaint")));
     }
 
     #[test]

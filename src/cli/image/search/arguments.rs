@@ -5,13 +5,18 @@ use std::path::PathBuf;
 use clap::{ArgGroup, Args, ValueEnum};
 
 use crate::{
-    cli::windows::WindowArguments,
+    cli::{numbers::above_to, windows::WindowArguments},
     config::{WindowConfig, built_in_instruments, load, require_outlines},
     error::{Cause, Kind, Locate as _, Result},
     instruments::Instrument,
     pds::image_index::IndexedImage,
     units::RADIANS_PER_DEGREE,
 };
+
+/// Largest angle between two directions, degrees.
+const ANGLE_MAX_DEG: f64 = 180.0;
+/// Wider than Mars: no pixel is.
+const PIXEL_MAX_M: f64 = 1e7;
 
 /// Finds the images of the mission's cumulative index that may show ground of a window, and pairs of them.
 ///
@@ -40,13 +45,13 @@ pub(in crate::cli::image) struct Arguments {
     #[arg(long = "camera", value_name = "ID", value_delimiter = ',')]
     cameras: Vec<String>,
     /// Largest emission angle, degrees.
-    #[arg(long, value_name = "DEGREES")]
+    #[arg(long, value_name = "DEGREES", value_parser = above_to(0.0, ANGLE_MAX_DEG), allow_negative_numbers = true)]
     emission_max_deg: Option<f64>,
     /// Largest incidence angle, degrees.
-    #[arg(long, value_name = "DEGREES")]
+    #[arg(long, value_name = "DEGREES", value_parser = above_to(0.0, ANGLE_MAX_DEG), allow_negative_numbers = true)]
     incidence_max_deg: Option<f64>,
     /// Largest width of a pixel on the ground, metres.
-    #[arg(long, value_name = "METRES")]
+    #[arg(long, value_name = "METRES", value_parser = above_to(0.0, PIXEL_MAX_M), allow_negative_numbers = true)]
     pixel_max_m: Option<f64>,
     /// Metakernel: holds the corners of the images that were found against those by these kernels, where they cover them, and warns
     /// of images whose corners are off by more than the search allows.

@@ -1,13 +1,15 @@
 //! What `areograph pedr search` is asked for.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::{ArgGroup, Args, ValueEnum};
 
 use crate::{
     altimetry::ShotFilter,
     cli::{pedr::filter::FilterArguments, windows::WindowArguments},
-    error::{Cause, Kind, Result},
+    error::{Cause, Error, Kind, Result},
+    files::require_apart,
+    pds::archive::Source,
     products::ShotsFormat,
     spice::{KernelSet, Session},
     time::{Et, Interval},
@@ -56,6 +58,19 @@ pub(super) enum Format {
     Count,
 }
 
+impl Format {
+    /// That of the files with this ending, if it is one of ours.
+    fn of_ending(path: &Path) -> Option<Self> {
+        let ending = path.extension()?.to_ascii_lowercase();
+        match ending.to_str()? {
+            "parquet" => Some(Self::Parquet),
+            "csv" => Some(Self::Csv),
+            "geojson" | "json" => Some(Self::Geojson),
+            _ => None,
+        }
+    }
+}
+
 /// What is wrong with the command line.
 #[derive(Debug, thiserror::Error)]
 pub(super) enum Usage {
@@ -63,6 +78,12 @@ pub(super) enum Usage {
     Time(String),
     #[error("{0}; expected an ending .parquet, .csv or .geojson")]
     Ending(String),
+    #[error("{out}: the ending is of another format than --format {format}")]
+    OtherEnding { out: String, format: String },
+    #[error("{0}: shots that are only counted (--format count) are not written")]
+    Count(String),
+    #[error("{0:?} is no file; expected values of a filter in one list")]
+    Value(String),
 }
 
 impl Cause for Usage {
@@ -76,6 +97,13 @@ impl Cause for Usage {
                 "write A..B with seconds past J2000 (-25000000..-24990000), or with UTC (1999-03-16T00:00:00..1999-03-17T00:00:00) and --leap-seconds"
             }
             Self::Ending(_) => "say --format, or give the file another ending",
+            Self::OtherEnding { .. } => {
+                "leave out --format, or give the file an ending of the format"
+            }
+            Self::Count(_) => {
+                "leave out --out, counts are printed; or leave out --format, and shots are written"
+            }
+            Self::Value(_) => "separate values by commas (--classes 0,1), or say the filter once for each",
         }
         .to_owned()
     }
@@ -84,19 +112,19 @@ impl Cause for Usage {
 impl Arguments {
     /// None only counts.
     pub(super) fn format(&self) -> Result<Option<ShotsFormat>> {
-        let of_ending = |out: &PathBuf| {
-            let ending = out.extension().unwrap_or_default().to_ascii_lowercase();
-            match ending.to_str() {
-                Some("parquet") => Ok(Format::Parquet),
-                Some("csv") => Ok(Format::Csv),
-                Some("geojson" | "json") => Ok(Format::Geojson),
-                _ => Err(Usage::Ending(out.display().to_string())),
+        let out = self.out.as_deref();
+        let named = || out.unwrap_or(Path::new("")).display().to_string();
+        let format = match (self.format, out, out.and_then(Format::of_ending)) {
+            (Some(Format::Count), Some(_), _) => return Err(Usage::Count(named()).into()),
+            (Some(format), Some(_), Some(of_ending)) if format != of_ending => {
+                let format = format.to_possible_value();
+                let format = format.map(|value| value.get_name().to_owned());
+                let (out, format) = (named(), format.unwrap_or_default());
+                return Err(Usage::OtherEnding { out, format }.into());
             }
-        };
-        let format = match (self.format, &self.out) {
-            (Some(format), _) => format,
-            (None, Some(out)) => of_ending(out)?,
-            (None, None) => Format::Count,
+            (Some(format), _, _) | (None, Some(_), Some(format)) => format,
+            (None, Some(_), None) => return Err(Usage::Ending(named()).into()),
+            (None, None, _) => Format::Count,
         };
         Ok(match format {
             Format::Parquet => Some(ShotsFormat::Parquet),
@@ -104,6 +132,44 @@ impl Arguments {
             Format::Geojson => Some(ShotsFormat::GeoJson),
             Format::Count => None,
         })
+    }
+
+    /// # Errors
+    /// A value that was left outside of a list, and so would be searched as a file.
+    pub(super) fn check_paths(&self) -> Result<()> {
+        let is_value = |path: &&PathBuf| {
+            let number = path.to_str().and_then(|text| text.parse::<i64>().ok());
+            number.is_some() && !path.exists()
+        };
+        match self.paths.iter().find(is_value) {
+            Some(path) => Err(Usage::Value(path.display().to_string()).into()),
+            None => Ok(()),
+        }
+    }
+
+    /// Makes sure that nothing that is read is written over.
+    ///
+    /// # Errors
+    /// An output is one of these files, or of those that say what to search for.
+    pub(super) fn require_apart(&self, sources: &[Source], failures: &[Error]) -> Result<()> {
+        // What was asked for stands in a file beside CSV.
+        let beside = self.out.as_ref().map(|out| {
+            let mut name = out.clone().into_os_string();
+            name.push(".json");
+            PathBuf::from(name)
+        });
+        let is_csv = self.format()? == Some(ShotsFormat::Csv);
+        let outputs = self.out.iter().chain(beside.iter().filter(|_| is_csv));
+        let read = sources.iter().map(Source::path);
+        let unread = failures
+            .iter()
+            .filter_map(|failure| failure.file.as_deref());
+        let asked = self.windows.files();
+        let asked = asked.chain(self.leap_seconds.as_deref());
+        require_apart(
+            outputs.map(PathBuf::as_path),
+            read.chain(unread).chain(asked),
+        )
     }
 
     pub(super) fn filter(&self) -> ShotFilter {
