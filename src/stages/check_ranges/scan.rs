@@ -285,6 +285,10 @@ fn uncertainty_s(
     let difference_m = orbit_difference_m / shots.len() as f64;
     let across_m = difference_m.y.hypot(difference_m.z) / f64::sqrt(2.0);
     let orbit_s = seconds_per_metre.norm() * across_m;
-    let change_s = Trend::of(&rates_m_s, &sighted_differences_m)?.slope;
+    let change_s = match radius {
+        ScannedRadius::Raw => Trend::of(&rates_m_s, &sighted_differences_m)?.slope,
+        // Crossovers have taken it out.
+        ScannedRadius::Crossover => 0.0,
+    };
     Some(noise_s.hypot(orbit_s).hypot(change_s))
 }
