@@ -256,7 +256,7 @@ fn hardly_a_number_of_a_table_is_without_its_place() {
 
 /// Paragraphs and lists with numbers that no document tells, by their first words, with what holds them instead.
 const TEXTS: [(&str, &str); 18] = [
-    ("Relief alone", "tests/report_geometric"),
+    ("Matching relief alone", "tests/report_geometric"),
     ("Surface kriged", "300 m is part of what roughness means"),
     ("At the tie points the surface", "names of profiles"),
     ("E02-00665 and E02-01453", "the table below has the same"),
