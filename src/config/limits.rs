@@ -8,7 +8,7 @@ use super::{
 };
 
 declare_table! {
-    /// Limits on tie points and their adjustment that make a site valid or invalid. What took no part in a result
+    /// Limits on tie points, their adjustment and a terrain model that make a site valid or invalid. What took no part in a result
     /// judges it first: heights by MOLA, then what images say of each other.
     pub struct LimitsConfig: Deserialize {
         /// Largest |median| height of tie points above the MOLA surface before the adjustment. A priori the height of a
@@ -33,6 +33,10 @@ declare_table! {
         sigma0_max: f64 = key(above_to(0.0, 1000.0)).or(1.5),
         /// Fewest tie points of a sound adjustment.
         ties_min: u32 = key(whole_from_to(0, 1_000_000)).or(10),
+        /// Least share of the common ground that a terrain model must have heights of.
+        surface_filled_min: f64 = key(from_to(0.0, 1.0)).or(0.2),
+        /// Largest robust spread of the altimeter's shots about a terrain model, in their standard deviations.
+        surface_spread_max_sigma: f64 = key(above_to(0.0, 1000.0)).or(3.0),
         /// Largest share of tie points that a sound adjustment rejects; of more than half the site is invalid.
         rejected_share_max: f64 = key(from_to(0.0, 1.0)).or(0.1),
     }

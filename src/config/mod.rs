@@ -27,6 +27,7 @@ mod range_check;
 mod service;
 mod shots;
 mod site;
+mod surface;
 mod ties;
 mod unknowns;
 mod window_list;
@@ -75,6 +76,7 @@ pub use service::{
 };
 pub use shots::{ShotColumns, ShotLayout, ShotTableConfig};
 pub use site::SiteConfig;
+pub use surface::SurfaceConfig;
 pub use ties::{IntersectionConfig, TiesConfig};
 pub use unknowns::{PositionUnknowns, RotationUnknowns};
 pub use window_list::{load_windows, require_outlines, window_of_box, window_of_polygon};

@@ -30,6 +30,7 @@ use super::{
     pointing::{PointingConfig, has_turned_sign},
     range_check::RangeCheckConfig,
     shots::{SHOTS, ShotTableConfig},
+    surface::SurfaceConfig,
     ties::{IntersectionConfig, TiesConfig},
     windows::{WINDOWS, WINDOWS_MAX, WindowConfig},
 };
@@ -90,7 +91,9 @@ declare_table! {
         mola_surface: MolaSurfaceConfig = table(),
         /// Combined adjustment.
         adjustment: AdjustmentConfig = table(),
-        /// Limits on tie points and their adjustment.
+        /// Terrain model of a pair of images.
+        surface: SurfaceConfig = table(),
+        /// Limits on tie points, their adjustment and the terrain model.
         limits: LimitsConfig = table(),
     }
     settle clock_of_altimeter
@@ -144,6 +147,7 @@ fn across_tables(site: &SiteConfig, keys: &mut Keys<'_, '_>) {
         keys.refuse("ties", "at least two images that tie points can join");
     }
     matched_images(site, keys);
+    images_of_surface(site, keys);
     priors_of_images(site, keys);
     images_of_windows(site, keys);
 }
@@ -157,6 +161,35 @@ fn matched_images(site: &SiteConfig, keys: &mut Keys<'_, '_>) {
             "match",
             "at least two images with images.pixels, or false",
         );
+    }
+}
+
+/// A terrain model needs two images whose pixels are there, and their names where there are more.
+fn images_of_surface(site: &SiteConfig, keys: &mut Keys<'_, '_>) {
+    if !site.surface.is_asked_for() {
+        return;
+    }
+    let with_pixels = site.images.iter().filter(|image| image.pixels.is_some());
+    let known: Vec<&str> = with_pixels.map(|image| &*image.id).collect();
+    match &site.surface.images {
+        None if known.len() == 2 => {}
+        None if known.len() < 2 => {
+            keys.refuse("surface", "at least two images with images.pixels");
+        }
+        None => keys.refuse(
+            "surface",
+            format!("images = two of {}, which have pixels", known.join(", ")),
+        ),
+        Some([one, other]) => {
+            let is_known = |id: &String| known.contains(&&**id);
+            if one == other || !is_known(one) || !is_known(other) {
+                let expected = format!(
+                    "two different images with images.pixels, of which the site has {}",
+                    if known.is_empty() { "none".to_owned() } else { known.join(", ") }
+                );
+                keys.refuse_below("surface", "images", expected);
+            }
+        }
     }
 }
 

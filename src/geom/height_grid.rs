@@ -1,9 +1,11 @@
 //! Heights above a sphere on an even grid of longitude and latitude, in memory.
 
+use serde::{Deserialize, Serialize};
+
 use crate::units::wrap_pi;
 
 /// A grid of heights. Places in it are rows (southwards) and columns (eastwards), 0 in the middle of the first cell.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct HeightGrid {
     /// Rows and columns.
     pub size: [usize; 2],

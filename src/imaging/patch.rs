@@ -92,6 +92,24 @@ impl Patch {
         Some(between)
     }
 
+    /// The number alone, by the same rule: NaN where one of the 16 pixels is missing.
+    #[must_use]
+    pub fn number(&self, place: &Vector2<f64>) -> f32 {
+        let (Some((top, down)), Some((left, right))) =
+            (self.split(0, place.x), self.split(1, place.y))
+        else {
+            return f32::NAN;
+        };
+        #[allow(clippy::cast_possible_truncation, reason = "weights of bytes")]
+        let [lines, samples] = [down, right].map(|t| cubic(t)[0].map(|weight| weight as f32));
+        let rows = lines.iter().enumerate().map(|(line, weight)| {
+            let row = self.row(top + line, left..left + 4);
+            let [a, b, c, d] = [0, 1, 2, 3].map(|at| row[at] * samples[at]);
+            weight * ((a + b) + (c + d))
+        });
+        rows.sum()
+    }
+
     /// The first of the four pixels around a coordinate, and how far it is behind the second.
     #[allow(
         clippy::cast_possible_truncation,

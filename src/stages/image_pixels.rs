@@ -2,13 +2,15 @@
 
 use std::path::Path;
 
+use rayon::prelude::*;
+
 use super::{site_image::SiteImage, tag_times::ImageTimes};
 use crate::{
     config::built_in_instruments,
     error::{Cause, Kind, Locate as _, Result},
     files::HashedFile,
     instruments::Instrument,
-    pds::{ImageLabel, image_file::ImageFile, pixel_file::PixelFile, product_named},
+    pds::{ImageLabel, image_file::ImageFile, pixel_file::{PixelFile, Pyramid}, product_named},
     stage::{Input, Inputs},
 };
 
@@ -65,6 +67,16 @@ impl PixelFiles<'_> {
             }
         }
         Ok(opened)
+    }
+
+    /// The pixels of all images that have some, as windows are read of them.
+    ///
+    /// # Errors
+    /// Those of [`Self::told_apart`]; the system's refusal to write temporary files.
+    pub fn decoded(&self, times: &[&ImageTimes]) -> Result<Vec<Option<Pyramid>>> {
+        let opened = self.told_apart(times)?;
+        let decode = |file: &Option<PixelFile>| file.as_ref().map(Pyramid::of).transpose();
+        opened.par_iter().map(decode).collect()
     }
 
     /// Every file whose image has its times, and what opening it gives.

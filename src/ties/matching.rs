@@ -34,6 +34,9 @@ pub enum Unmatched {
     /// Found, but not well enough.
     #[error("its standard deviation is too large")]
     Uncertain,
+    /// A cell of a terrain model that most cells around it contradict.
+    #[error("most cells around it have other heights")]
+    Alone,
 }
 
 /// A pair of images, and what became of the places that both show.
@@ -72,6 +75,7 @@ impl Unmatched {
             Self::Unsettled => "unsettled",
             Self::OneWay => "one_way",
             Self::Uncertain => "uncertain",
+            Self::Alone => "alone",
         }
     }
 }

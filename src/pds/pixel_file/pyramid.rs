@@ -146,22 +146,56 @@ impl Pyramid {
         if !level.is_good[top..bottom].iter().all(|is_good| *is_good) {
             return Ok(None);
         }
-        let width = right - left;
-        let mut bytes = vec![0; (bottom - top) * width];
-        for (line, row) in (top..bottom).zip(bytes.chunks_exact_mut(width)) {
-            let at = level.at + (line * level.size[1] + left) as u64;
-            self.file
-                .read_exact_at(row, at)
-                .map_err(IoError::on("read a temporary file"))?;
-        }
+        let bytes = self.bytes(level, [&(top..bottom), &(left..right)])?;
         if self.zero_is_none && bytes.contains(&0) {
             return Ok(None);
         }
         Ok(Some(Patch {
             first: [top, left].map(|first| i64::try_from(first).unwrap_or(i64::MAX)),
-            size: [bottom - top, width],
+            size: [bottom - top, right - left],
             values: bytes.into_iter().map(f32::from).collect(),
         }))
+    }
+
+    /// These lines and samples of a level, with NaN where lines or pixels are missing.
+    ///
+    /// # Errors
+    /// The system's refusal to read the temporary file.
+    pub fn window_with_gaps(&self, level: usize, spans: [&Range<usize>; 2]) -> Result<Patch> {
+        let level = &self.levels[level.min(self.halvings())];
+        let [lines, samples] = [0, 1].map(|axis| {
+            let end = spans[axis].end.min(level.size[axis]);
+            spans[axis].start.min(end)..end
+        });
+        let bytes = self.bytes(level, [&lines, &samples])?;
+        let mut values = Vec::with_capacity(bytes.len());
+        let rows = bytes.chunks_exact(samples.len().max(1));
+        for (line, row) in lines.clone().zip(rows) {
+            let is_good = level.is_good[line];
+            values.extend(row.iter().map(|byte| match *byte {
+                0 if self.zero_is_none => f32::NAN,
+                byte if is_good => f32::from(byte),
+                _ => f32::NAN,
+            }));
+        }
+        Ok(Patch {
+            first: [&lines, &samples].map(|span| i64::try_from(span.start).unwrap_or(i64::MAX)),
+            size: [lines.len(), samples.len()],
+            values,
+        })
+    }
+
+    /// Pixels of lines and samples that are there.
+    fn bytes(&self, level: &Level, [lines, samples]: [&Range<usize>; 2]) -> Result<Vec<u8>> {
+        let mut bytes = vec![0; lines.len() * samples.len()];
+        let rows = bytes.chunks_exact_mut(samples.len().max(1));
+        for (line, row) in lines.clone().zip(rows) {
+            let at = level.at + (line * level.size[1] + samples.start) as u64;
+            self.file
+                .read_exact_at(row, at)
+                .map_err(IoError::on("read a temporary file"))?;
+        }
+        Ok(bytes)
     }
 }
 

@@ -5,15 +5,12 @@ use std::ops::Range;
 use nalgebra::Vector2;
 use rayon::prelude::*;
 
-use super::{
-    heights::Heights,
-    search::{HALF_LEAST_SQUARES, scale},
-    view::View,
-};
+use super::search::{HALF_LEAST_SQUARES, scale};
 use crate::{
     error::Result,
     imaging::{Patch, noise_dn, texture},
     pds::pixel_file::Pyramid,
+    stages::{image_view::View, shot_heights::Heights},
     ties::Unmatched,
 };
 

@@ -7,26 +7,20 @@
 //! different in the two directions is counted and left out; blunders are left to the adjustment.
 
 mod cells;
-mod heights;
 mod margin;
 mod pair;
-mod pixels;
 mod search;
-mod view;
 
 #[cfg(test)]
 mod tests;
 
 use std::{collections::BTreeMap, sync::atomic::AtomicBool};
 
-use self::{
-    heights::Heights,
-    pair::{Matched, match_pair},
-    view::View,
-};
+use self::pair::{Matched, match_pair};
 use super::{
     convert_datum::Converted, group_profiles::Profile, image_pixels::PixelFiles,
-    oriented::OrientedImage, read_ties::Ties, site_image::SiteImage, tag_times::ImageTimes,
+    image_view::View, oriented::OrientedImage, read_ties::Ties, shot_heights::Heights,
+    site_image::SiteImage, tag_times::ImageTimes,
 };
 use crate::{
     error::{Cause, Kind, Result},
@@ -126,7 +120,7 @@ impl Stage for MatchTies<'_> {
         let oriented = SiteImage::oriented(self.images.0)?;
         let times = self.images.0.iter().map(|image| image.times.value());
         let times: Vec<&ImageTimes> = times.collect::<Result<_>>()?;
-        let pixels = pixels::decode(&self.pixels, &times)?;
+        let pixels = self.pixels.decoded(&times)?;
         let mut views = Vec::new();
         for (index, (image, pixels)) in oriented.iter().zip(&pixels).enumerate() {
             if let Some(pixels) = pixels {

@@ -7,13 +7,12 @@ use rayon::prelude::*;
 
 use super::{
     cells::{Common, places},
-    heights::Heights,
     margin::Margin,
     search::{Found, Search},
-    view::View,
 };
 use crate::{
     error::Result,
+    stages::{image_view::View, shot_heights::Heights},
     ties::{MatchedPair, TieMeasure, Unmatched},
     watch::Watch,
 };

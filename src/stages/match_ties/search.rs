@@ -2,11 +2,11 @@
 
 use nalgebra::{Matrix2, Vector2};
 
-use super::view::View;
 use crate::{
     error::Result,
     imaging::{Affine, LeastSquaresFailure, Patch, match_least_squares, search},
     pds::pixel_file::Pyramid,
+    stages::image_view::View,
     ties::Unmatched,
 };
 

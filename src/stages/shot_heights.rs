@@ -18,24 +18,24 @@ const SIGMA_MIN_M: f64 = 10.0;
 const SIGMA_WITHOUT_SHOTS_M: f64 = 2_000.0;
 
 /// What is known of the ground's height.
-pub(super) struct Heights {
+pub(in crate::stages) struct Heights {
     body: Body,
     shots_m: Vec<Vector3<f64>>,
 }
 
 /// A radius with its standard deviation, metres.
-pub(super) struct Height {
-    pub(super) radius_m: f64,
-    pub(super) sigma_m: f64,
+pub(in crate::stages) struct Height {
+    pub(in crate::stages) radius_m: f64,
+    pub(in crate::stages) sigma_m: f64,
 }
 
 impl Heights {
     /// Of shots at these places, body-fixed, metres.
-    pub(super) const fn at(body: Body, shots_m: Vec<Vector3<f64>>) -> Self {
+    pub(in crate::stages) const fn at(body: Body, shots_m: Vec<Vector3<f64>>) -> Self {
         Self { body, shots_m }
     }
 
-    pub(super) fn of(footprints: &Footprints<BodyFixed>, profiles: &[Profile]) -> Self {
+    pub(in crate::stages) fn of(footprints: &Footprints<BodyFixed>, profiles: &[Profile]) -> Self {
         let rows = profiles.iter().flat_map(|profile| &profile.rows);
         let shots = rows.map(|row| {
             let at = *row as usize;
@@ -47,7 +47,7 @@ impl Heights {
 
     /// The height at a place, metres body-fixed, whose own radius does not count: the mean of the nearest shots, the nearer
     /// the more. Farther away it is less certain.
-    pub(super) fn near(&self, place_m: &Vector3<f64>) -> Height {
+    pub(in crate::stages) fn near(&self, place_m: &Vector3<f64>) -> Height {
         let direction = place_m.normalize();
         let mut nearest: Vec<(f64, f64)> = Vec::with_capacity(SHOTS + 1);
         for shot_m in &self.shots_m {

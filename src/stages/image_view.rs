@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix2, Matrix3x2, Vector2, Vector3};
 
-use super::heights::Heights;
+use super::shot_heights::Heights;
 use crate::{
     geom::{
         oriented_camera::OrientedCamera,
@@ -21,26 +21,26 @@ const HEIGHT_STEPS: u32 = 4;
 const HEIGHT_CHANGE_M: f64 = 100.0;
 
 /// An image as it looks at the ground.
-pub(super) struct View<'a> {
-    pub(super) camera: OrientedCamera<&'a (dyn ExteriorOrientation + 'static)>,
+pub(in crate::stages) struct View<'a> {
+    pub(in crate::stages) camera: OrientedCamera<&'a (dyn ExteriorOrientation + 'static)>,
     projector: Projector<'a, dyn ExteriorOrientation>,
-    pub(super) pixels: &'a Pyramid,
+    pub(in crate::stages) pixels: &'a Pyramid,
 }
 
 /// Where another image is expected to show a place.
-pub(super) struct Prediction {
+pub(in crate::stages) struct Prediction {
     /// From the image to the other.
-    pub(super) affine: Affine,
+    pub(in crate::stages) affine: Affine,
     /// Lines and samples of the other image for a standard deviation of the height.
-    pub(super) height_px: Vector2<f64>,
+    pub(in crate::stages) height_px: Vector2<f64>,
     /// Metres on the ground of a line and a sample of the image, and of the other.
-    pub(super) spacing_m: [Vector2<f64>; 2],
+    pub(in crate::stages) spacing_m: [Vector2<f64>; 2],
     /// Where the place lies, metres Mars-fixed.
-    pub(super) ground_m: Vector3<f64>,
+    pub(in crate::stages) ground_m: Vector3<f64>,
 }
 
 impl<'a> View<'a> {
-    pub(super) fn of(
+    pub(in crate::stages) fn of(
         image: &'a OrientedImage<'a>,
         model: CameraModel,
         pixels: &'a Pyramid,
@@ -48,7 +48,7 @@ impl<'a> View<'a> {
         Self::through(image.oriented_camera(model), pixels)
     }
 
-    pub(super) fn through(
+    pub(in crate::stages) fn through(
         camera: OrientedCamera<&'a (dyn ExteriorOrientation + 'static)>,
         pixels: &'a Pyramid,
     ) -> Result<Self, Unseen> {
@@ -61,13 +61,13 @@ impl<'a> View<'a> {
     }
 
     /// Lines and samples of the pixels that are there.
-    pub(super) fn size_px(&self) -> Vector2<f64> {
+    pub(in crate::stages) fn size_px(&self) -> Vector2<f64> {
         let [lines, samples] = self.pixels.size(0);
         Vector2::new(lines as f64, samples as f64)
     }
 
     /// Whether a place lies in the image.
-    pub(super) fn holds(&self, place: &Vector2<f64>) -> bool {
+    pub(in crate::stages) fn holds(&self, place: &Vector2<f64>) -> bool {
         let size = self.size_px();
         (0.0..size.x).contains(&place.x) && (0.0..size.y).contains(&place.y)
     }
@@ -97,7 +97,7 @@ impl<'a> View<'a> {
     }
 
     /// Line and sample of a point, in the image or beyond it.
-    pub(super) fn place(&self, ground_m: &Vector3<f64>) -> Option<Vector2<f64>> {
+    pub(in crate::stages) fn place(&self, ground_m: &Vector3<f64>) -> Option<Vector2<f64>> {
         let seen = self.projector.project(ground_m).ok()?;
         let focal_px = self.camera.detector.focal_px(&seen.camera_m).ok()?;
         Some(Vector2::new(
@@ -107,7 +107,7 @@ impl<'a> View<'a> {
     }
 
     /// Where `other` is expected to show `place`.
-    pub(super) fn predict(
+    pub(in crate::stages) fn predict(
         &self,
         other: &View<'_>,
         place: &Vector2<f64>,

@@ -1,0 +1,41 @@
+//! `[surface]`.
+
+use serde::Deserialize;
+use serde_json::json;
+
+use super::{
+    declare::{Keys, declare_table, key},
+    forms::{above_to, identifier, several},
+};
+
+declare_table! {
+    /// A terrain model that areograph makes of a pair of images with `pixels`, with the adjusted orientation where there is
+    /// one: `surface.tif`, its standard deviations, and what the altimeter says of it. Without `cell_m` none is made.
+    pub struct SurfaceConfig: Deserialize {
+        /// Edge of a cell. Three pixels of the coarser image are usual, a fifth of what is compared for one height: at most
+        /// as fine as a pixel, and above five pixels images are compared at a coarser size, which is quick.
+        cell_m: Option<f64> = key(above_to(0.0, 1e5)).unused("15.0"),
+        /// Identifiers of the two images, where more than two of the site have pixels.
+        images: Option<[String; 2]> = key(several(identifier(), "identifiers of two images")).unused(r#"["m0402852", "m0403104"]"#),
+    }
+    check a_cell_is_given
+}
+
+/// What is asked for has a cell.
+fn a_cell_is_given(surface: &SurfaceConfig, keys: &mut Keys<'_, '_>) {
+    keys.rule(|| json!({"dependentRequired": {"images": ["cell_m"]}}));
+    if surface.images.is_some() && keys.span_of("cell_m").is_none() {
+        keys.missing(
+            "cell_m",
+            "the edge of a cell in metres (or no table surface at all)",
+        );
+    }
+}
+
+impl SurfaceConfig {
+    /// Whether a terrain model is asked for.
+    #[must_use]
+    pub const fn is_asked_for(&self) -> bool {
+        self.cell_m.is_some()
+    }
+}
