@@ -10,7 +10,7 @@ use crate::{
     frames::{BodyFixed, Position},
 };
 
-pub use matching::{MatchedPair, Unmatched};
+pub use matching::{MatchedPair, Unmatched, reasons};
 
 /// A point measured in images.
 ///

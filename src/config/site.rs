@@ -185,7 +185,11 @@ fn images_of_surface(site: &SiteConfig, keys: &mut Keys<'_, '_>) {
             if one == other || !is_known(one) || !is_known(other) {
                 let expected = format!(
                     "two different images with images.pixels, of which the site has {}",
-                    if known.is_empty() { "none".to_owned() } else { known.join(", ") }
+                    if known.is_empty() {
+                        "none".to_owned()
+                    } else {
+                        known.join(", ")
+                    }
                 );
                 keys.refuse_below("surface", "images", expected);
             }

@@ -8,6 +8,7 @@ use crate::{
     error::Result,
     geom::pushbroom::CameraModel,
     instruments::Instrument,
+    stage::Output,
     stages::{
         judge::{AdjustmentEvidence, Evidence, JudgedImage, Verdict, judge},
         lay_overlays::ShownImage,
@@ -43,6 +44,7 @@ pub(super) fn judged(
         .adjustment_failure
         .as_ref()
         .map(|failure| format!("{}; {}", failure.cause, failure.cause.advice()));
+    let surface = site.surface.as_ref().map(Output::value).transpose()?;
     let searched = config.has_shots();
     let verdict = judge(&Evidence {
         wording: config.wording(),
@@ -56,6 +58,7 @@ pub(super) fn judged(
         warnings,
         complaints,
         adjustment,
+        surface: surface.map(|of| &of.account),
         adjustment_failure: failure.as_deref(),
     });
     Ok((

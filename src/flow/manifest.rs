@@ -157,6 +157,11 @@ fn counts(site: &Site) -> Result<BTreeMap<String, u64>> {
     if let Some(ties) = &site.ties {
         counts.extend(matched(ties.value()?));
     }
+    if let Some(surface) = &site.surface {
+        let account = &surface.value()?.account;
+        counts.insert("surface_cells".to_owned(), u64::from(account.cells));
+        counts.insert("surface_filled".to_owned(), u64::from(account.filled));
+    }
     Ok(counts)
 }
 

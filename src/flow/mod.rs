@@ -30,6 +30,7 @@ mod run;
 mod single;
 mod site;
 mod sites;
+mod surface;
 mod triangulate;
 
 pub use archive::{

@@ -9,8 +9,9 @@ use crate::{
         adjust::Adjusted, check_heights::HeightCheck, check_ranges::RangeCheck,
         compare_pairs::PairComparison, convert_datum::Converted,
         describe_kernels::KernelDescription, group_profiles::Profile, intersect::IntersectedTies,
-        lay_overlays::Overlays, read_ties::Ties, search_footprints::SearchResult,
-        site_image::SiteImage, tabulate_kernels::KernelTables, tag_times::ImageTimes,
+        lay_overlays::Overlays, map_surface::Surface, read_ties::Ties,
+        search_footprints::SearchResult, site_image::SiteImage, tabulate_kernels::KernelTables,
+        tag_times::ImageTimes,
     },
 };
 
@@ -48,6 +49,8 @@ pub(super) struct Site {
     pub(super) adjustment: Option<Adjustment>,
     /// What the images show; nothing for a site without pixels.
     pub(super) overlays: Option<Output<Overlays>>,
+    /// A terrain model; nothing for a site that asks for none.
+    pub(super) surface: Option<Output<Surface>>,
     /// Why there is no adjustment although there are tie points.
     pub(super) adjustment_failure: Option<Error>,
 }

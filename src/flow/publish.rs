@@ -154,6 +154,7 @@ pub(super) fn publish(
         verdict: &verdict,
         geometric: geometric_products(site, adjustment.transpose()?)?,
         overlays: site.overlays.as_ref().map(Output::value).transpose()?,
+        surface: site.surface.as_ref().map(Output::value).transpose()?,
         program: &Program {
             cspice: Session::version_of_cspice()?,
             methods: methods.to_vec(),

@@ -8,6 +8,7 @@ use super::{
     outputs::{Prepared, Site},
     overlays::overlays,
     registered::registered,
+    surface::surface,
     triangulate::{is_of_adjustment, triangulate},
 };
 use crate::{
@@ -52,6 +53,7 @@ pub(super) fn site<D: Driver>(flow: &mut D, config: &SiteConfig) -> Flow<()> {
         }
         Err(leave) => return Err(leave),
     }
+    site.surface = surface(flow, config, &site)?;
     site.overlays = overlays(flow, config, &site)?;
     flow.publish(config, &site)
 }
@@ -253,6 +255,7 @@ pub(super) fn orient<D: Driver>(
         intersection: None,
         adjustment: None,
         overlays: None,
+        surface: None,
         adjustment_failure: None,
     })
 }

@@ -21,6 +21,7 @@ mod found_shots;
 mod generated;
 mod geojson;
 mod geoparquet;
+mod geotiff;
 mod gis;
 mod heights;
 mod isd;
@@ -45,6 +46,7 @@ mod registry;
 #[cfg(feature = "sql")]
 mod shot_columns;
 mod site;
+mod surface;
 mod table;
 mod text_table;
 mod ties;
@@ -157,6 +159,14 @@ fn write(
         (Write::Matched(write), _, Some(geometric)) if !geometric.ties.matched.is_empty() => {
             write(&path, of, geometric).map(Some)
         }
+        (Write::Surface(write), ..) => match of.site.surface {
+            Some(surface) => write(&path, of, surface).map(Some),
+            None => Ok(None),
+        },
+        (Write::Model(write), ..) => match of.site.surface {
+            Some(surface) if !surface.account.is_refused => write(&path, of, surface).map(Some),
+            _ => Ok(None),
+        },
         (Write::Adjustment(write), _, Some(geometric)) => match &geometric.adjustment {
             Some(adjustment) => write(&path, of, geometric, adjustment),
             None => Ok(None),

@@ -27,11 +27,22 @@ use crate::{
     frames::BodyFixed,
     spice::{KernelSet, RequiredCoverage},
     stages::{
-        adjust::Adjusted, check_heights::HeightCheck, check_ranges::RangeCheck,
-        compare_pairs::PairComparison, convert_datum::FileConversion, describe_kernels::KernelLine,
-        fit_sensor_model::SensorModel, group_profiles::Profile, intersect::IntersectedTies,
-        judge::Verdict, lay_overlays::Overlays, read_ties::Ties, register::ImageRegistration,
-        sample_orientation::Orientation, tag_times::ImageTimes,
+        adjust::Adjusted,
+        check_heights::HeightCheck,
+        check_ranges::RangeCheck,
+        compare_pairs::PairComparison,
+        convert_datum::FileConversion,
+        describe_kernels::KernelLine,
+        fit_sensor_model::SensorModel,
+        group_profiles::Profile,
+        intersect::IntersectedTies,
+        judge::Verdict,
+        lay_overlays::Overlays,
+        map_surface::{Surface, SurfaceAccount, SurfaceModel},
+        read_ties::Ties,
+        register::ImageRegistration,
+        sample_orientation::Orientation,
+        tag_times::ImageTimes,
     },
 };
 
@@ -71,6 +82,8 @@ pub struct PageData<'a> {
     notes: Cow<'a, [String]>,
     geometric: Option<Geometric<'a>>,
     overlays: Option<Cow<'a, Overlays>>,
+    /// The page shows no more of a terrain model than what is told of it.
+    surface: Option<Cow<'a, SurfaceAccount>>,
     program: Cow<'a, Program>,
 }
 
@@ -131,6 +144,7 @@ impl<'a> PageData<'a> {
             notes: site.notes.into(),
             geometric: site.geometric.map(geometric),
             overlays: site.overlays.map(Cow::Borrowed),
+            surface: site.surface.map(|of| Cow::Borrowed(&of.account)),
             program: Cow::Borrowed(site.program),
         })
     }
@@ -172,6 +186,10 @@ impl<'a> PageData<'a> {
             pairs: &of.pairs,
             images_agree: of.images_agree,
         });
+        let surface = self.surface.as_ref().map(|account| Surface {
+            account: account.clone().into_owned(),
+            model: SurfaceModel::nothing(),
+        });
         with(&SiteProducts {
             config: &config,
             kernels: &self.kernels,
@@ -195,6 +213,7 @@ impl<'a> PageData<'a> {
                 adjustment,
             }),
             overlays: self.overlays.as_deref(),
+            surface: surface.as_ref(),
             program: &self.program,
         })
     }

@@ -9,6 +9,7 @@ use super::{
 use crate::{
     error::{Locate as _, Result},
     schema::DocumentSchema,
+    stages::map_surface::Surface,
 };
 
 /// A file that was written.
@@ -103,6 +104,10 @@ pub(super) enum Write {
     Ties(fn(&Path, &Context, &GeometricProducts) -> Result<u64>),
     /// For a site with tie points that were matched.
     Matched(fn(&Path, &Context, &GeometricProducts) -> Result<u64>),
+    /// For a site with a terrain model.
+    Surface(fn(&Path, &Context, &Surface) -> Result<u64>),
+    /// For a site with a terrain model that is believed.
+    Model(fn(&Path, &Context, &Surface) -> Result<u64>),
     /// For a site with an adjustment.
     Adjustment(fn(&Path, &Context, &GeometricProducts, &AdjustmentProducts) -> Result<Option<u64>>),
     /// For every image of a site with an adjustment.
@@ -197,6 +202,7 @@ impl Declaration {
             Write::Overlay(_) => "every image with pixels",
             Write::Ties(_) => "a site with tie points",
             Write::Matched(_) => "a site with matched tie points",
+            Write::Surface(_) | Write::Model(_) => "a site with a terrain model",
             Write::Adjustment(_) | Write::Several(_) => "a site with an adjustment",
             Write::AdjustedImage(_) | Write::WithAnother => {
                 "every image of a site with an adjustment"
@@ -224,6 +230,7 @@ impl<W> Declaration<W> {
             "dbf" => "application/vnd.dbf",
             "html" => "text/html",
             "png" => "image/png",
+            "tif" => "image/tiff; application=geotiff; profile=cloud-optimized",
             "svg" => "image/svg+xml",
             "xml" => "application/xml",
             "txt" | "prj" | "cpg" | "tm" => "text/plain",

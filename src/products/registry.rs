@@ -5,7 +5,7 @@ use super::{
     exchange::{adjusted, geopackage, jigsaw, matched, readme, shapefile, stac, tables},
     figures, footprints, heights, isd, kernel_report, orientation, overlays, page, page_data,
     product::Declaration,
-    ranges, registration, ties,
+    ranges, registration, surface, ties,
 };
 
 /// The products. Those of an image that follow each other are written image by image; the catalogue is last, as it
@@ -36,6 +36,9 @@ pub(super) static PRODUCTS: &[&Declaration] = &[
     &adjusted_kernels::ATTITUDE,
     &adjusted_kernels::POSITION,
     &adjusted_kernels::METAKERNEL,
+    &surface::HEIGHTS,
+    &surface::SIGMAS,
+    &surface::DOCUMENT,
     &page::PAGE,
     &page::OVERLAYS,
     &figures::FIGURE,

@@ -24,6 +24,7 @@ use crate::{
         intersect::IntersectedTies,
         judge::Verdict,
         lay_overlays::Overlays,
+        map_surface::Surface,
         read_ties::Ties,
         register::ImageRegistration,
         sample_orientation::Orientation,
@@ -67,6 +68,8 @@ pub struct SiteProducts<'a> {
     pub geometric: Option<GeometricProducts<'a>>,
     /// What images show; nothing for a site without pixels.
     pub overlays: Option<&'a Overlays>,
+    /// The terrain model of a pair of images; nothing for a site that asks for none.
+    pub surface: Option<&'a Surface>,
     /// What the products were computed by.
     pub program: &'a Program,
 }

@@ -7,7 +7,7 @@ use super::{
     numbers::{number, signed, whole},
     ranges, scan,
     section::Section,
-    selection, timeline,
+    selection, surface, timeline,
 };
 use crate::{
     products::SiteProducts,
@@ -139,6 +139,9 @@ const fn section(kind: CheckKind) -> Option<&'static Section> {
         | CheckKind::Correction => &adjustment::SECTION,
         CheckKind::PositionRmse | CheckKind::PointingRmse | CheckKind::TableError => {
             &images::SECTION
+        }
+        CheckKind::SurfaceFilled | CheckKind::SurfaceHeight | CheckKind::SurfaceSpread => {
+            &surface::SECTION
         }
         CheckKind::Attitude => &timeline::SECTION,
         CheckKind::SkippedRecords => &notes::SECTION,

@@ -4,7 +4,7 @@ mod ellipses;
 pub(super) mod labels;
 mod legend;
 mod names;
-mod relief;
+pub(super) mod relief;
 mod sheets;
 mod told;
 
@@ -322,7 +322,7 @@ fn ties_rad(site: &SiteProducts) -> Vec<(f64, f64)> {
 }
 
 /// 1, 2 or 5 times a power of ten, at most `length`.
-fn round_length_m(length: f64) -> f64 {
+pub(super) fn round_length_m(length: f64) -> f64 {
     let power = 10_f64.powf(length.log10().floor());
     let lead = [5.0, 2.0]
         .into_iter()

@@ -56,6 +56,7 @@ mod sky;
 mod source;
 mod summary;
 mod support_data;
+mod surface;
 mod timeline;
 mod uncertainty;
 
@@ -81,6 +82,7 @@ const SECTIONS: &[Section] = &[
     heights::SECTION,
     misregistration::SECTION,
     matching::SECTION,
+    surface::SECTION,
     adjustment::SECTION,
     ranges::SECTION,
     scan::SECTION,

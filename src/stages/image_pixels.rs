@@ -10,7 +10,12 @@ use crate::{
     error::{Cause, Kind, Locate as _, Result},
     files::HashedFile,
     instruments::Instrument,
-    pds::{ImageLabel, image_file::ImageFile, pixel_file::{PixelFile, Pyramid}, product_named},
+    pds::{
+        ImageLabel,
+        image_file::ImageFile,
+        pixel_file::{PixelFile, Pyramid},
+        product_named,
+    },
     stage::{Input, Inputs},
 };
 

@@ -74,7 +74,10 @@ pub(in crate::stages) fn waves(seed: u64) -> Vec<[f64; 5]> {
 }
 
 /// A camera that flies north and looks at the ground below the first one; `off_m` away from there, north and east.
-pub(in crate::stages) fn camera(number: usize, off_m: [f64; 2]) -> OrientedCamera<SampledOrientation> {
+pub(in crate::stages) fn camera(
+    number: usize,
+    off_m: [f64; 2],
+) -> OrientedCamera<SampledOrientation> {
     let poses: Vec<(f64, Pose)> = (0..=30)
         .map(|step| {
             let x_lines = f64::from(LINES) * (f64::from(step) / 30.0 - 0.5);

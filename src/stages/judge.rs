@@ -3,6 +3,7 @@
 mod adjustment;
 mod check;
 mod checks;
+mod surface;
 
 pub use check::{Check, CheckKind, CheckOutcome};
 
@@ -15,6 +16,7 @@ use super::{
     check_ranges::{BiasScan, RangeCheck},
     compare_pairs::PairComparison,
     fit_sensor_model::SensorModel,
+    map_surface::SurfaceAccount,
     orientation::Orientation,
     read_ties::Ties,
 };
@@ -91,6 +93,8 @@ pub struct Evidence<'a> {
     pub complaints: &'a [String],
     /// The adjustment; nothing for a site without tie points.
     pub adjustment: Option<AdjustmentEvidence<'a>>,
+    /// The terrain model of a pair; nothing for a site that asks for none.
+    pub surface: Option<&'a SurfaceAccount>,
     /// Why there is no adjustment although there are tie points.
     pub adjustment_failure: Option<&'a str>,
 }
@@ -185,6 +189,7 @@ impl Evidence<'_> {
                 .iter()
                 .flat_map(|of| of.invalid_because(self.limits)),
         );
+        reasons.extend(surface::invalid_because(self));
         let failed = self.adjustment_failure;
         reasons.extend(failed.map(|failure| format!("no adjustment: {failure}")));
         reasons
@@ -218,6 +223,7 @@ impl Evidence<'_> {
                 .iter()
                 .flat_map(|of| of.remarks(self.limits)),
         );
+        remarks.extend(surface::remarks(self));
         remarks
     }
 }

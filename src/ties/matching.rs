@@ -94,9 +94,15 @@ impl MatchedPair {
     /// Why cells have no tie point, the most frequent reason first.
     #[must_use]
     pub fn reasons(&self) -> String {
-        let mut reasons: Vec<(&Unmatched, &u32)> = self.unmatched.iter().collect();
-        reasons.sort_by_key(|(_, count)| std::cmp::Reverse(**count));
-        let reasons = reasons.iter().map(|(why, count)| format!("{count}: {why}"));
-        reasons.collect::<Vec<_>>().join("; ")
+        reasons(&self.unmatched)
     }
+}
+
+/// Reasons with how often they hold, the most frequent first.
+#[must_use]
+pub fn reasons(counted: &BTreeMap<Unmatched, u32>) -> String {
+    let mut reasons: Vec<(&Unmatched, &u32)> = counted.iter().collect();
+    reasons.sort_by_key(|(_, count)| std::cmp::Reverse(**count));
+    let reasons = reasons.iter().map(|(why, count)| format!("{count}: {why}"));
+    reasons.collect::<Vec<_>>().join("; ")
 }

@@ -186,6 +186,7 @@ impl Site {
             warnings: &self.warnings,
             complaints: &self.complaints,
             adjustment: None,
+            surface: None,
             adjustment_failure: None,
         });
         with(&SiteProducts {
@@ -204,6 +205,7 @@ impl Site {
             verdict: &verdict,
             geometric: None,
             overlays: None,
+            surface: None,
             conversions: &self.conversions,
             program: &Program {
                 cspice: "CSPICE_N0067".to_owned(),

@@ -145,6 +145,7 @@ impl Site {
             notes: &[],
             verdict: &verdict,
             overlays: None,
+            surface: None,
             program: &Program::default(),
             geometric: Some(GeometricProducts {
                 ties: &self.ties,
@@ -209,6 +210,7 @@ impl Site {
             warnings: &[],
             complaints: &[],
             adjustment: Some(adjustment),
+            surface: None,
             adjustment_failure: None,
         };
         with(&evidence, &adjustment)

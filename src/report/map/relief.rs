@@ -30,7 +30,7 @@ pub(super) const COLOURS: [[f64; 3]; 7] = [
 ];
 
 /// The colour of a height by its share of the range.
-pub(super) fn colour(share: f64) -> [u8; 3] {
+pub(in crate::report) fn colour(share: f64) -> [u8; 3] {
     let last = COLOURS.len() - 1;
     let place = share.clamp(0.0, 1.0) * last as f64;
     let below = (place as usize).min(last - 1);
@@ -277,7 +277,7 @@ fn smooth(surface: &Grid) -> Vec<f64> {
 ///
 /// # Source
 /// Horn 1981, Hill shading and the reflectance map, Proc. IEEE 69.
-fn shade(east: f64, south: f64) -> f64 {
+pub(in crate::report) fn shade(east: f64, south: f64) -> f64 {
     // East and south components of the horizontal direction to the light, times its cosine and sine.
     let [to_east, to_south, up] = [-0.5, -0.5, std::f64::consts::FRAC_1_SQRT_2];
     let normal = (1.0 + east * east + south * south).sqrt();
@@ -285,7 +285,7 @@ fn shade(east: f64, south: f64) -> f64 {
 }
 
 /// A channel of a colour in the light: level ground keeps it.
-fn lit(channel: u8, light: f64) -> u8 {
+pub(in crate::report) fn lit(channel: u8, light: f64) -> u8 {
     let level = std::f64::consts::FRAC_1_SQRT_2;
     let channel = f64::from(channel);
     let lit = if light < level {
@@ -296,7 +296,15 @@ fn lit(channel: u8, light: f64) -> u8 {
     lit.round() as u8
 }
 
-fn png(pixels: &[u8], columns: u32, rows: u32) -> std::result::Result<Vec<u8>, png::EncodingError> {
+/// Pixels of four bytes, the last of them how much is seen, as PNG.
+///
+/// # Errors
+/// A picture that the library refuses.
+pub(in crate::report) fn png(
+    pixels: &[u8],
+    columns: u32,
+    rows: u32,
+) -> std::result::Result<Vec<u8>, png::EncodingError> {
     let mut file = Vec::new();
     let mut encoder = png::Encoder::new(&mut file, columns, rows);
     encoder.set_color(png::ColorType::Rgba);

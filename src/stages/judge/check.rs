@@ -43,6 +43,12 @@ pub enum CheckKind {
     HeightOutliers,
     /// Standard deviation of the mean height of the adjusted tie points.
     HeightSigma,
+    /// Share of the common ground that a terrain model has heights of.
+    SurfaceFilled,
+    /// Median height of the altimeter's shots above a terrain model.
+    SurfaceHeight,
+    /// Robust spread of the shots about a terrain model, in their standard deviations.
+    SurfaceSpread,
     /// Images with a tie point in the adjustment.
     ImagesJoined,
     /// Pairs of images whose tie points took part in the adjustment.
@@ -86,6 +92,9 @@ impl CheckKind {
             Self::HeightBefore => "Tie points above MOLA, before (median)",
             Self::HeightOutliers => "Tie points beyond 3.29 σ of MOLA",
             Self::ProfilesApart => "MOLA profiles against each other",
+            Self::SurfaceFilled => "Terrain model, ground with heights",
+            Self::SurfaceHeight => "MOLA above the terrain model (median)",
+            Self::SurfaceSpread => "MOLA about the terrain model",
             Self::ImagesJoined => "Images joined by tie points",
             Self::PairsJoined => "Pairs joined by tie points",
             Self::HeightSigma => "Uncertainty of the mean height",
@@ -118,14 +127,19 @@ impl CheckKind {
             Self::HeightAfter
             | Self::HeightBefore
             | Self::HeightSigma
+            | Self::SurfaceHeight
             | Self::RangeMean
             | Self::OrbitsApart
             | Self::Decoding
             | Self::ParallaxAfter
             | Self::ParallaxBefore
             | Self::PositionRmse => "m",
-            Self::HeightOutliers | Self::RangeOutliers | Self::TiesRejected => "%",
+            Self::HeightOutliers
+            | Self::RangeOutliers
+            | Self::SurfaceFilled
+            | Self::TiesRejected => "%",
             Self::ProfilesApart
+            | Self::SurfaceSpread
             | Self::TieResidualsAlong
             | Self::TieResidualsAcross
             | Self::Correction
@@ -154,6 +168,7 @@ impl CheckKind {
                 | Self::ImagesJoined
                 | Self::PairsJoined
                 | Self::Shots
+                | Self::SurfaceFilled
                 | Self::TiesUsed
         )
     }
@@ -165,6 +180,7 @@ impl CheckKind {
             self,
             Self::HeightAfter
                 | Self::HeightBefore
+                | Self::SurfaceHeight
                 | Self::RangeMean
                 | Self::Decoding
                 | Self::ClockCorrection

@@ -7,7 +7,7 @@ use super::{
         Check, CheckKind,
         CheckOutcome::{self, Fail, Pass, Warning},
     },
-    clock_limit_s,
+    clock_limit_s, surface,
 };
 use crate::{
     config::LimitsConfig,
@@ -47,6 +47,7 @@ pub(super) fn checks(evidence: &Evidence<'_>) -> Vec<Check> {
         checks.extend(of_heights(adjustment, evidence.limits));
         checks.extend(of_ties(adjustment, evidence.limits));
     }
+    checks.extend(surface::checks(evidence));
     let skipped = evidence.complaints.len();
     if skipped > 0 {
         checks.push(Check::new(

@@ -34,7 +34,9 @@ pub(super) enum PairError {
         images[0], images[1]
     )]
     Parallel { images: [String; 2], degrees: f64 },
-    #[error("surface.cell_m is {cell_m}; expected at least {least_m:.1}, a pixel of the coarser image")]
+    #[error(
+        "surface.cell_m is {cell_m}; expected at least {least_m:.1}, a pixel of the coarser image"
+    )]
     Fine { cell_m: f64, least_m: f64 },
     #[error(
         "surface.cell_m is {cell_m}, of which the common ground of the images has {cells}; expected at most {CELLS_MAX} cells"
@@ -94,7 +96,9 @@ impl Common {
                 degrees: convergence_rad.to_degrees(),
             });
         }
-        let pixels_m = middle.spacing_m.map(|spacing| (spacing.x * spacing.y).sqrt());
+        let pixels_m = middle
+            .spacing_m
+            .map(|spacing| (spacing.x * spacing.y).sqrt());
         let pixel_m = pixels_m[0].max(pixels_m[1]);
         let fits = |per_cell: &&usize| cell_m / **per_cell as f64 >= SAMPLE_PX_MIN * pixel_m;
         let Some(per_cell) = PER_CELL.iter().rev().find(fits) else {
@@ -169,9 +173,8 @@ impl Common {
             let sample_m = self.sample_m() * (1_u64 << times) as f64;
             has_pixels && self.width_m >= (4 * HALF) as f64 * sample_m
         };
-        let reaches = |times: &usize| {
-            reach_m <= FEW * self.height_of_sample_m() * (1_u64 << times) as f64
-        };
+        let reaches =
+            |times: &usize| reach_m <= FEW * self.height_of_sample_m() * (1_u64 << times) as f64;
         let deepest = (0..8).take_while(fits).last().unwrap_or(0);
         (0..deepest).find(reaches).unwrap_or(deepest)
     }

@@ -42,7 +42,9 @@ pub(super) fn compare(
         }
     }
     let above_m = summary(&shots);
-    let normalised = shots.iter().map(|of| (of.above_m - above_m.median) / of.sigma_m);
+    let normalised = shots
+        .iter()
+        .map(|of| (of.above_m - above_m.median) / of.sigma_m);
     let normalised: Vec<f64> = normalised.collect();
     let square = shots.iter().map(|of| of.sigma_m * of.sigma_m).sum::<f64>();
     ShotComparison {
@@ -73,10 +75,15 @@ fn on_model(
     let sigma_m = nearest(grid, &model.sigmas_m, cell)?;
     let slope = slope(grid, cell);
     let plan_m = options.plan_sigma_m * slope;
-    let variance_m2 = [sigma_m, options.shot_sigma_m, options.profile_sigma_m, plan_m]
-        .iter()
-        .map(|sigma_m| sigma_m * sigma_m)
-        .sum::<f64>();
+    let variance_m2 = [
+        sigma_m,
+        options.shot_sigma_m,
+        options.profile_sigma_m,
+        plan_m,
+    ]
+    .iter()
+    .map(|sigma_m| sigma_m * sigma_m)
+    .sum::<f64>();
     Some((radius_m - grid.radius_m - height_m, variance_m2.sqrt()))
 }
 

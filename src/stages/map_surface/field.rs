@@ -28,7 +28,11 @@ impl Field {
         let split = |at: f64, count: usize| {
             let at = at.clamp(0.0, (count - 1) as f64);
             let first = (at as usize).min(count.saturating_sub(2));
-            (first, (first + 1).min(count - 1), (at - first as f64) as f32)
+            (
+                first,
+                (first + 1).min(count - 1),
+                (at - first as f64) as f32,
+            )
         };
         let (top, bottom, down) = split(row, self.size[0]);
         let (left, right, along) = split(column, self.size[1]);

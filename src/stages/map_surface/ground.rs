@@ -43,8 +43,7 @@ impl Ground {
     pub(super) fn over(body: Body, places_m: &[Vector3<f64>], cell_m: f64) -> Option<Self> {
         let middle = Spherical::from_xyz_m(&places_m.iter().sum());
         let degrees = (middle.latitude.0 / RADIANS_PER_DEGREE).round();
-        let parallel_rad =
-            degrees.clamp(-PARALLEL_MAX_DEG, PARALLEL_MAX_DEG) * RADIANS_PER_DEGREE;
+        let parallel_rad = degrees.clamp(-PARALLEL_MAX_DEG, PARALLEL_MAX_DEG) * RADIANS_PER_DEGREE;
         let radius_m = body.map().radius_m;
         let mut edges = [f64::INFINITY, f64::INFINITY, -f64::INFINITY, -f64::INFINITY];
         for place_m in places_m {
@@ -103,10 +102,7 @@ impl Ground {
         let east_rad = north_rad / self.parallel_rad.cos();
         HeightGrid {
             size: self.size,
-            first_rad: [
-                (self.west + 0.5) * east_rad,
-                (self.north - 0.5) * north_rad,
-            ],
+            first_rad: [(self.west + 0.5) * east_rad, (self.north - 0.5) * north_rad],
             cell_rad: [east_rad, north_rad],
             radius_m: self.radius_m,
             heights_m,
@@ -120,9 +116,8 @@ mod tests {
 
     #[test]
     fn cells_hold_their_places_also_across_the_antimeridian() {
-        let places_m = [-0.002, 0.001].map(|east_rad| {
-            spherical_to_xyz_m(std::f64::consts::PI + east_rad, -0.3, 3_390_000.0)
-        });
+        let places_m = [-0.002, 0.001]
+            .map(|east_rad| spherical_to_xyz_m(std::f64::consts::PI + east_rad, -0.3, 3_390_000.0));
         let ground = Ground::over(Body::Mars, &places_m, 20.0).unwrap();
         let grid = ground.height_grid(vec![0.0; ground.cells()]);
         // 3 mrad at 17° S, and the cells beyond.

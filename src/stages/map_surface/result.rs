@@ -146,7 +146,10 @@ impl SurfaceModel {
             if !height_m.is_nan() {
                 let cell = at / columns / step * size[1] + at % columns / step;
                 let [height_m, sigma_m] = [height_m, sigma_m].map(|of| f64::from(*of));
-                for (sum, term) in sums[cell].iter_mut().zip([height_m, sigma_m * sigma_m, 1.0]) {
+                for (sum, term) in sums[cell]
+                    .iter_mut()
+                    .zip([height_m, sigma_m * sigma_m, 1.0])
+                {
                     *sum += term;
                 }
             }

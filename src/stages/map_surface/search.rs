@@ -43,20 +43,23 @@ pub(super) fn search(
             alike.push(sums.about(*middle));
         }
     }
-    let judged = cells.into_iter().zip(&alike).map(|((cell, middle), alike)| {
-        let at = middle[0] * width + middle[1];
-        let from_edges_px = pair.from_edges_px(at);
-        if from_edges_px < 0.0 {
-            return (cell, None);
-        }
-        let found = best(alike, from_edges_px).map(|(step, correlation)| Found {
-            height_m: pair.height_m(at) + (step - reach as f64) * step_m,
-            sigma_m: step_m,
-            aside: pair.aside(at),
-            correlation,
+    let judged = cells
+        .into_iter()
+        .zip(&alike)
+        .map(|((cell, middle), alike)| {
+            let at = middle[0] * width + middle[1];
+            let from_edges_px = pair.from_edges_px(at);
+            if from_edges_px < 0.0 {
+                return (cell, None);
+            }
+            let found = best(alike, from_edges_px).map(|(step, correlation)| Found {
+                height_m: pair.height_m(at) + (step - reach as f64) * step_m,
+                sigma_m: step_m,
+                aside: pair.aside(at),
+                correlation,
+            });
+            (cell, Some(found))
         });
-        (cell, Some(found))
-    });
     Ok(judged.collect())
 }
 
@@ -159,10 +162,13 @@ impl Sums {
             &self.sums[(line + down - HALF) * self.width + sample + right - HALF]
         };
         let edge = 2 * HALF + 1;
-        let [first, right, below, last] =
-            [corner(0, 0), corner(0, edge), corner(edge, 0), corner(edge, edge)];
-        let sum: [f64; 6] =
-            std::array::from_fn(|of| last[of] - right[of] - below[of] + first[of]);
+        let [first, right, below, last] = [
+            corner(0, 0),
+            corner(0, edge),
+            corner(edge, 0),
+            corner(edge, edge),
+        ];
+        let sum: [f64; 6] = std::array::from_fn(|of| last[of] - right[of] - below[of] + first[of]);
         let count = (edge * edge) as f64;
         let [missing, a, b, aa, bb, ab] = sum;
         let [variance, other] = [aa - a * a / count, bb - b * b / count];

@@ -43,7 +43,9 @@ pub(super) fn settle(level: &Level<'_>, tile: Tile, known: &Known) -> Result<Vec
         return Ok(cells.into_iter().map(|(cell, _)| (cell, None)).collect());
     };
     let width = pair.tile.size[1];
-    let images = pair.laid(0.0).map(|image| Slopes::of(image, width, &pair.axes()));
+    let images = pair
+        .laid(0.0)
+        .map(|image| Slopes::of(image, width, &pair.axes()));
     let settled = cells.into_iter().map(|(cell, middle)| {
         let at = middle[0] * width + middle[1];
         let from_edges_px = pair.from_edges_px(at);
@@ -194,7 +196,9 @@ fn one_way(
         along: solution[2] / gain,
         aside: solution[3] / gain,
         variance: independent.max(joined(&moves) * count / freedom),
-        correlation: (1.0 - residual / spread.max(f64::MIN_POSITIVE)).max(0.0).sqrt(),
+        correlation: (1.0 - residual / spread.max(f64::MIN_POSITIVE))
+            .max(0.0)
+            .sqrt(),
     })
 }
 

@@ -147,10 +147,8 @@ impl Sight {
             node([middle[0], middle[1] + STEP])?,
         ];
         let step = STEP as f64;
-        let px_per_sample = Matrix2::from_columns(&[
-            (below[0] - here[0]) / step,
-            (beside[0] - here[0]) / step,
-        ]);
+        let px_per_sample =
+            Matrix2::from_columns(&[(below[0] - here[0]) / step, (beside[0] - here[0]) / step]);
         Some(Self {
             middle_m,
             powers: between(&nodes, counts, tile.size),
@@ -220,9 +218,7 @@ fn between(
         let (node, down) = (line / STEP, (line % STEP) as f64 / STEP as f64);
         let rows = [node, node + 1].map(|row| &nodes[row * counts[1]..(row + 1) * counts[1]]);
         let across = rows[0].iter().zip(rows[1]);
-        let row: Vec<_> = across
-            .map(|(one, other)| mixed(one, other, down))
-            .collect();
+        let row: Vec<_> = across.map(|(one, other)| mixed(one, other, down)).collect();
         for sample in 0..size[1] {
             let (node, right) = (sample / STEP, (sample % STEP) as f64 / STEP as f64);
             samples.push(mixed(&row[node], &row[node + 1], right));

@@ -68,7 +68,14 @@ fn root_mean_square(values: impl Iterator<Item = f64>) -> f64 {
 }
 
 fn pair_of_images() -> [Vec<u8>; 2] {
-    [0, 1].map(|number| rendered(&camera(number, [0.0; 2]), hill_m, &waves(5), number as u64 + 1))
+    [0, 1].map(|number| {
+        rendered(
+            &camera(number, [0.0; 2]),
+            hill_m,
+            &waves(5),
+            number as u64 + 1,
+        )
+    })
 }
 
 #[test]
@@ -76,20 +83,41 @@ fn heights_are_within_what_they_state() {
     let [one, two] = pair_of_images();
     let surface = mapped([&one, &two], [0.0; 2], CELL_M);
     let SurfaceAccount { look, .. } = &surface.account;
-    println!("{:?}", SurfaceAccount { look: look.clone(), ..surface.account.clone() }.unfilled);
+    println!(
+        "{:?}",
+        SurfaceAccount {
+            look: look.clone(),
+            ..surface.account.clone()
+        }
+        .unfilled
+    );
     let account = &surface.account;
     println!(
         "{} of {}, sigma {:.2} m, {:.2} m a pixel, correlation {:.3}, aside {:.3}, sample {:.2}, compared {:.1}",
-        account.filled, account.cells, account.sigma_m, account.height_of_pixel_m, account.correlation, account.aside_m,
-        account.sample_m, account.compared_m
+        account.filled,
+        account.cells,
+        account.sigma_m,
+        account.height_of_pixel_m,
+        account.correlation,
+        account.aside_m,
+        account.sample_m,
+        account.compared_m
     );
     let errors = errors(&surface);
     let rms_m = root_mean_square(errors.iter().map(|of| of[0]));
     let mean_m = errors.iter().map(|of| of[0]).sum::<f64>() / errors.len() as f64;
     let over = root_mean_square(errors.iter().map(|of| of[1]));
     let within = errors.iter().filter(|of| of[1].abs() <= 3.0).count();
-    println!("rms {rms_m:.3} m, mean {mean_m:.3}, {over:.3} sigma, {within} of {}", errors.len());
+    println!(
+        "rms {rms_m:.3} m, mean {mean_m:.3}, {over:.3} sigma, {within} of {}",
+        errors.len()
+    );
     let mut sorted: Vec<f64> = errors.iter().map(|of| of[0].abs()).collect();
     sorted.sort_by(f64::total_cmp);
-    println!("median {:.2} 90% {:.2} 99% {:.2}", sorted[sorted.len() / 2], sorted[sorted.len() * 9 / 10], sorted[sorted.len() * 99 / 100]);
+    println!(
+        "median {:.2} 90% {:.2} 99% {:.2}",
+        sorted[sorted.len() / 2],
+        sorted[sorted.len() * 9 / 10],
+        sorted[sorted.len() * 99 / 100]
+    );
 }

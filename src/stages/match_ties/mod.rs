@@ -18,9 +18,9 @@ use std::{collections::BTreeMap, sync::atomic::AtomicBool};
 
 use self::pair::{Matched, match_pair};
 use super::{
-    convert_datum::Converted, group_profiles::Profile, image_pixels::PixelFiles,
-    image_view::View, oriented::OrientedImage, read_ties::Ties, shot_heights::Heights,
-    site_image::SiteImage, tag_times::ImageTimes,
+    convert_datum::Converted, group_profiles::Profile, image_pixels::PixelFiles, image_view::View,
+    oriented::OrientedImage, read_ties::Ties, shot_heights::Heights, site_image::SiteImage,
+    tag_times::ImageTimes,
 };
 use crate::{
     error::{Cause, Kind, Result},

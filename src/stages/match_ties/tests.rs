@@ -60,7 +60,14 @@ fn errors_px(matched: &Matched) -> Vec<[[f64; 2]; 2]> {
 }
 
 fn pair_of_images() -> [Vec<u8>; 2] {
-    [0, 1].map(|number| rendered(&camera(number, [0.0; 2]), hill_m, &waves(5), number as u64 + 1))
+    [0, 1].map(|number| {
+        rendered(
+            &camera(number, [0.0; 2]),
+            hill_m,
+            &waves(5),
+            number as u64 + 1,
+        )
+    })
 }
 
 #[test]
