@@ -230,6 +230,8 @@ fn others(kind: &ValueKind, now: Option<&Value>, names: &[&str]) -> Vec<Value> {
                     lists.push(Value::Array(list));
                 }
             }
+            // In another order.
+            lists.push(Value::Array(now.iter().rev().cloned().collect()));
             if !names.is_empty() {
                 let longer = others(of, None, names)
                     .into_iter()
@@ -444,6 +446,7 @@ fn sites(site: &Table) -> Vec<Table> {
              rotation_arcsec = [10, 1, 0, 10, 1, 0, 10, 1, 0] }]",
         ),
         matched(site),
+        mapped(site),
         with("adjustment.model = 'published'"),
         with("adjustment.robust = 'huber'"),
         of_any_body(site),
@@ -500,6 +503,15 @@ fn matched(site: &Table) -> Table {
     }
     let ties = site["ties"].as_table_mut().unwrap();
     ties.insert("match".to_owned(), Value::from(true));
+    site
+}
+
+/// The same with a terrain model of both.
+fn mapped(site: &Table) -> Table {
+    let mut site = matched(site);
+    let surface = "cell_m = 60.0\nimages = ['E02-01301', 'E02-02016']";
+    let surface: Table = surface.parse().unwrap();
+    site.insert("surface".to_owned(), Value::Table(surface));
     site
 }
 

@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 use rayon::prelude::*;
 
-use super::{ground::Ground, pair::Level, search::HALF};
+use super::{ground::Ground, level::Level, search::HALF};
 use crate::{
     body::Body,
     error::{Cause, Kind},

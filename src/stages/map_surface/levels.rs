@@ -6,7 +6,7 @@ use super::{
     Cell,
     common::Common,
     field::Field,
-    pair::{Known, Level},
+    level::{Known, Level},
     search::{self, search},
     settle::settle,
     sight::Tile,
@@ -78,16 +78,17 @@ pub(super) fn all_levels(
         let sample_m = height_of_sample_m(times);
         cells = every_tile(&level, watch, |tile| search(&level, tile, &known, reach))?;
         cells = without_strays(&cells, size, sample_m);
-        known.heights_m = field(&cells, size, SMOOTH[0], |found| found.height_m);
+        known.heights_m = field(&cells, &known.heights_m, SMOOTH[0], |found| found.height_m);
         for step in 0..STEPS[usize::from(times > 0)] {
             if step > 0 {
-                known.heights_m = field(&cells, size, SMOOTH[1], |found| found.height_m);
+                known.heights_m =
+                    field(&cells, &known.heights_m, SMOOTH[1], |found| found.height_m);
             }
             cells = every_tile(&level, watch, |tile| settle(&level, tile, &known))?;
             cells = without_strays(&cells, size, sample_m);
-            known.aside = field(&cells, size, SMOOTH_ASIDE, |found| found.aside);
+            known.aside = field(&cells, &known.aside, SMOOTH_ASIDE, |found| found.aside);
         }
-        known.heights_m = field(&cells, size, SMOOTH[1], |found| found.height_m);
+        known.heights_m = field(&cells, &known.heights_m, SMOOTH[1], |found| found.height_m);
         reach = REACH;
     }
     Ok(cells)

@@ -9,6 +9,7 @@ mod common;
 mod compare;
 mod field;
 mod ground;
+mod level;
 mod levels;
 mod pair;
 mod result;

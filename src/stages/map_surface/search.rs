@@ -2,7 +2,8 @@
 
 use super::{
     Cell, Found,
-    pair::{Known, Level, Pair},
+    level::{Known, Level},
+    pair::Pair,
     sight::Tile,
 };
 use crate::{error::Result, ties::Unmatched};

@@ -7,7 +7,8 @@ use nalgebra::{Matrix2, Matrix4, Vector4};
 
 use super::{
     Cell, Found,
-    pair::{Known, Level, Pair},
+    level::{Known, Level},
+    pair::Pair,
     search::HALF,
     sight::Tile,
 };

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use nalgebra::{Matrix2, Vector2};
 
-use super::{field::Field, pair::Level};
+use super::{field::Field, level::Level};
 use crate::stages::image_view::View;
 
 /// Samples from node to node. Over as many pixels an orientation bends by less than a thousandth of one.

@@ -49,17 +49,22 @@ pub(super) fn without_strays(cells: &[Cell], size: [usize; 2], sample_m: f64) ->
     judged.collect()
 }
 
-/// A number of the cells that were found as a field without holes, smoothed over squares of `2 half + 1` cells.
+/// A number of the cells that were found as a field without holes, smoothed over squares of `2 half + 1` cells; `before` where
+/// none was found.
 #[allow(
     clippy::cast_possible_truncation,
     reason = "heights of a planet keep a millimetre"
 )]
 pub(super) fn field(
     cells: &[Cell],
-    size: [usize; 2],
+    before: &Field,
     half: usize,
     of: impl Fn(&Found) -> f64,
 ) -> Field {
+    if !cells.iter().any(|cell| matches!(cell, Some(Ok(_)))) {
+        return before.clone();
+    }
+    let size = before.size;
     let value = |cell: &Cell| match cell {
         Some(Ok(found)) => of(found) as f32,
         _ => f32::NAN,

@@ -12,9 +12,7 @@ use nalgebra::{Vector2, Vector3};
 use super::*;
 use crate::{
     body::Body,
-    stages::invented_pair::{
-        LINES, RADIUS_M, Random, SAMPLES, camera, ground_m, pyramid, rendered, view, waves,
-    },
+    stages::invented_pair::{Invented, LINES, RADIUS_M, Random, SAMPLES},
     ties::Unmatched,
 };
 
@@ -26,9 +24,9 @@ pub(in crate::stages) fn hill_m(place_m: &Vector3<f64>) -> f64 {
 /// What becomes of two images with these pixels, the second of which is believed to look `off_m` farther north and east.
 fn matched(pixels: [&[u8]; 2], off_m: [f64; 2], most_m: f64) -> Matched {
     let folder = tempfile::tempdir().unwrap();
-    let pyramids = pixels.map(|pixels| pyramid(folder.path(), pixels));
-    let cameras = [camera(0, [0.0; 2]), camera(1, off_m)];
-    let view = |number: usize| (number, view(&cameras[number], &pyramids[number]));
+    let pyramids = pixels.map(|pixels| Invented::pyramid(folder.path(), pixels));
+    let cameras = [Invented::camera(0, [0.0; 2]), Invented::camera(1, off_m)];
+    let view = |number: usize| (number, Invented::view(&cameras[number], &pyramids[number]));
     let (first, second) = (view(0), view(1));
     let shots = (-30..=30).map(|shot| {
         let place_m = Vector3::new(RADIUS_M, 0.0, 300.0 * f64::from(shot));
@@ -43,14 +41,16 @@ fn matched(pixels: [&[u8]; 2], off_m: [f64; 2], most_m: f64) -> Matched {
 
 /// Differences from where the second camera truly sees what the first one sees, over their standard deviations.
 fn errors_px(matched: &Matched) -> Vec<[[f64; 2]; 2]> {
-    let cameras = [camera(0, [0.0; 2]), camera(1, [0.0; 2])];
+    let cameras = [Invented::camera(0, [0.0; 2]), Invented::camera(1, [0.0; 2])];
     let folder = tempfile::tempdir().unwrap();
-    let blank = pyramid(folder.path(), &vec![0; (LINES * SAMPLES) as usize]);
-    let truth = view(&cameras[1], &blank);
+    let blank = Invented::pyramid(folder.path(), &vec![0; (LINES * SAMPLES) as usize]);
+    let truth = Invented::view(&cameras[1], &blank);
     let ties = matched.ties.iter();
     ties.map(|[first, second]| {
         let place = Vector2::new(first.line, first.sample);
-        let seen = truth.place(&ground_m(&cameras[0], &place, hill_m)).unwrap();
+        let seen = truth
+            .place(&Invented::ground_m(&cameras[0], &place, hill_m))
+            .unwrap();
         let error = [second.line - seen.x, second.sample - seen.y];
         // Either image has half of the variance, and pixels of nearly the same size.
         let sigmas = second.sigma_px.unwrap().map(|sigma| sigma * 2.0_f64.sqrt());
@@ -61,10 +61,11 @@ fn errors_px(matched: &Matched) -> Vec<[[f64; 2]; 2]> {
 
 fn pair_of_images() -> [Vec<u8>; 2] {
     [0, 1].map(|number| {
-        rendered(
-            &camera(number, [0.0; 2]),
+        Invented::rendered(
+            &Invented::camera(number, [0.0; 2]),
+            LINES,
             hill_m,
-            &waves(5),
+            &Invented::waves(5),
             number as u64 + 1,
         )
     })
@@ -124,7 +125,13 @@ fn matched_places_are_within_what_they_state_and_other_images_give_none() {
         .iter()
         .map(|_| (100.0 + 20.0 * random.unit()) as u8)
         .collect();
-    let elsewhere = rendered(&camera(1, [0.0; 2]), hill_m, &waves(6), 2);
+    let elsewhere = Invented::rendered(
+        &Invented::camera(1, [0.0; 2]),
+        LINES,
+        hill_m,
+        &Invented::waves(6),
+        2,
+    );
     // Exchanged pixels are refused by their labels: nothing else could tell them from orientations that err.
     for (what, first, second) in [
         ("mirrored", &one, &mirrored),
