@@ -394,6 +394,7 @@ fn declarations_are_complete() {
         "limits.sigma0_max",
         "limits.ties_min",
         "limits.rejected_share_max",
+        "limits.surface_filled_min",
     ];
     for key in &keys {
         let path = &*key.path;

@@ -174,11 +174,16 @@ fn images_of_surface(site: &SiteConfig, keys: &mut Keys<'_, '_>) {
     match &site.surface.images {
         None if known.len() == 2 => {}
         None if known.len() < 2 => {
-            keys.refuse("surface", "at least two images with images.pixels");
+            let expected = "no cell, or at least two images with images.pixels";
+            keys.refuse_below("surface", "cell_m", expected);
         }
-        None => keys.refuse(
+        None => keys.refuse_below(
             "surface",
-            format!("images = two of {}, which have pixels", known.join(", ")),
+            "cell_m",
+            format!(
+                "surface.images beside it: two of {}, which have pixels",
+                known.join(", ")
+            ),
         ),
         Some([one, other]) => {
             let is_known = |id: &String| known.contains(&&**id);

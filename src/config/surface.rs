@@ -12,8 +12,8 @@ declare_table! {
     /// A terrain model that areograph makes of a pair of images with `pixels`, with the adjusted orientation where there is
     /// one: `surface.tif`, its standard deviations, and what the altimeter says of it. Without `cell_m` none is made.
     pub struct SurfaceConfig: Deserialize {
-        /// Edge of a cell. Three pixels of the coarser image are usual, a fifth of what is compared for one height: at most
-        /// as fine as a pixel, and above five pixels images are compared at a coarser size, which is quick.
+        /// Edge of a cell. Three pixels of the coarser image are usual: a height is that of a square of 17 pixels. Cells finer
+        /// than a pixel are refused; for cells above six pixels images are compared at a coarser size, which is quick.
         cell_m: Option<f64> = key(above_to(0.0, 1e5)).unused("15.0"),
         /// Identifiers of the two images, where more than two of the site have pixels.
         images: Option<[String; 2]> = key(several(identifier(), "identifiers of two images")).unused(r#"["m0402852", "m0403104"]"#),

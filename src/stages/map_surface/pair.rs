@@ -101,9 +101,9 @@ impl Pair {
     }
 
     /// Least distance of a sample from the edges of an image, pixels of its level; below 0 beyond them.
-    pub(super) fn from_edges_px(&self, at: usize) -> f64 {
+    pub(super) fn edge_px(&self, at: usize) -> f64 {
         let height_m = f64::from(self.heights_m[at]);
-        let [one, other] = [0, 1].map(|image| self.sights[image].from_edges_px(at, height_m));
+        let [one, other] = [0, 1].map(|image| self.sights[image].edge_px(at, height_m));
         one.min(other)
     }
 }

@@ -49,11 +49,11 @@ pub(super) fn search(
         .zip(&alike)
         .map(|((cell, middle), alike)| {
             let at = middle[0] * width + middle[1];
-            let from_edges_px = pair.from_edges_px(at);
-            if from_edges_px < 0.0 {
+            let edge_px = pair.edge_px(at);
+            if edge_px < 0.0 {
                 return (cell, None);
             }
-            let found = best(alike, from_edges_px).map(|(step, correlation)| Found {
+            let found = best(alike, edge_px).map(|(step, correlation)| Found {
                 height_m: pair.height_m(at) + (step - reach as f64) * step_m,
                 sigma_m: step_m,
                 aside: pair.aside(at),
@@ -65,11 +65,11 @@ pub(super) fn search(
 }
 
 /// The best of the steps, between them by a parabola, and its correlation.
-fn best(alike: &[Alike], from_edges_px: f64) -> std::result::Result<(f64, f64), Unmatched> {
+fn best(alike: &[Alike], edge_px: f64) -> std::result::Result<(f64, f64), Unmatched> {
     let whole = alike.iter().filter(|of| of.whole);
     if whole.clone().count() == 0 {
         // Half of what is compared, and what smoothing and interpolation take.
-        let near = from_edges_px < (HALF + 4) as f64;
+        let near = edge_px < (HALF + 4) as f64;
         return Err(if near {
             Unmatched::Edge
         } else {

@@ -49,8 +49,8 @@ pub(super) fn settle(level: &Level<'_>, tile: Tile, known: &Known) -> Result<Vec
         .map(|image| Slopes::of(image, width, &pair.axes()));
     let settled = cells.into_iter().map(|(cell, middle)| {
         let at = middle[0] * width + middle[1];
-        let from_edges_px = pair.from_edges_px(at);
-        if from_edges_px < 0.0 {
+        let edge_px = pair.edge_px(at);
+        if edge_px < 0.0 {
             return (cell, None);
         }
         let found = shift([&images[0], &images[1]], middle, width).map(|shift| Found {
@@ -59,16 +59,16 @@ pub(super) fn settle(level: &Level<'_>, tile: Tile, known: &Known) -> Result<Vec
             aside: pair.aside(at) + shift.aside,
             correlation: shift.correlation,
         });
-        (cell, Some(found.map_err(|why| at_edge(why, from_edges_px))))
+        (cell, Some(found.map_err(|why| at_edge(why, edge_px))))
     });
     Ok(settled.collect())
 }
 
 /// What is missing near an edge is the edge.
-fn at_edge(why: Unmatched, from_edges_px: f64) -> Unmatched {
+fn at_edge(why: Unmatched, edge_px: f64) -> Unmatched {
     match why {
         // Half of what is compared, and what smoothing, slopes and interpolation take.
-        Unmatched::Missing if from_edges_px < (HALF + 5) as f64 => Unmatched::Edge,
+        Unmatched::Missing if edge_px < (HALF + 5) as f64 => Unmatched::Edge,
         why => why,
     }
 }

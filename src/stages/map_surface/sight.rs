@@ -193,7 +193,7 @@ impl Sight {
     }
 
     /// Distance of a sample from the nearest edge of the image, pixels of its level; below 0 beyond, and where there is no place.
-    pub(super) fn from_edges_px(&self, at: usize, height_m: f64) -> f64 {
+    pub(super) fn edge_px(&self, at: usize, height_m: f64) -> f64 {
         let place = self.place_px(at, height_m);
         let behind = self.size_px - place;
         let nearest = place.x.min(place.y).min(behind.x).min(behind.y);

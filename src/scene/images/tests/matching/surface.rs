@@ -68,8 +68,14 @@ impl Published {
             self.document
         );
         // What is stated of all heights together, and what the unknown place makes of the mean slope.
-        assert!(error_m.median.abs() <= 3.0 * common_m.hypot(PLAN_M * slope / 3.0), "{error_m:?}");
-        assert!(error_m.standard_deviation <= 2.0 * expected_m, "{error_m:?}");
+        assert!(
+            error_m.median.abs() <= 3.0 * common_m.hypot(PLAN_M * slope / 3.0),
+            "{error_m:?}"
+        );
+        assert!(
+            error_m.standard_deviation <= 2.0 * expected_m,
+            "{error_m:?}"
+        );
         assert!(error_m.n > 5_000, "{error_m:?}");
         // The altimeter says of the heights what the truth does.
         let by_shots_m = self.stated("/mola_minus_surface/all/median");
