@@ -1,6 +1,7 @@
 //! The page of a match of laser profiles with a terrain model: verdict, map of the shifts, held-out shots, every unit.
 
 use super::{
+    checks,
     html::{Cell, Column, Section, Table, Tone, counted, list, page, paragraph, verdict},
     numbers::signed,
     plots::{Arrow, Arrows, GREY, Panel, Plot, Series, figure, label, magnification},
@@ -71,7 +72,7 @@ fn lead(of: &LaserMatch) -> String {
         + &paragraph(&made)
         + &list(&of.verdict.reasons)
         + &list(&of.verdict.remarks);
-    verdict(tone, &headline, &body)
+    verdict(tone, &headline, &body) + &checks::listed(&of.verdict.checks)
 }
 
 fn kept(of: &LaserMatch) -> impl Iterator<Item = &UnitResult> {

@@ -105,7 +105,7 @@ fn footprints(before: &ImageProducts, after: &ImageProducts) -> Option<Plot> {
         each: shown,
     });
     let words = format!(
-        "Footprints near the middle, flight to the right. Median shift of all {}: {} lines, {} samples.",
+        "Footprints near the middle, flight to the right. Median shift of all {} within its lines, seen or beside it: {} lines, {} samples.",
         whole(all.len()),
         label(lines, 2),
         label(across, 2)

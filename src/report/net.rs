@@ -1,6 +1,7 @@
 //! The page of a triangulated net: verdict, bricks, blunders, controls, and vectors of all of them on a map.
 
 use super::{
+    checks,
     html::{Cell, Column, Section, Table, Tone, counted, list, page, paragraph, verdict},
     plots::{
         Arrow, Arrows, Extent, GREY, Panel, Plot, Series, figure, label, magnification, thinned,
@@ -60,7 +61,7 @@ fn lead(config: &NetConfig, net: &Triangulation) -> String {
         words = format!("{}. {words}", config.description);
     }
     let body = paragraph(&words) + &list(&net.verdict.reasons) + &list(&net.verdict.remarks);
-    verdict(tone, &headline, &body)
+    verdict(tone, &headline, &body) + &checks::listed(&net.verdict.checks)
 }
 
 /// What was done, by the paper's names.
