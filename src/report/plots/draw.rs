@@ -3,7 +3,7 @@
 use plotters::prelude::*;
 
 use super::{
-    Extent, GRID, INK, LETTERS, MARK, Panel, Plot, Series, Style, WIDTH,
+    Frame, GRID, INK, LETTERS, MARK, Panel, Plot, Series, Style, WIDTH,
     arrows::draw_arrows,
     canvas::{Canvas, Chart, Drawn, label},
 };
@@ -22,9 +22,9 @@ const BARS: u32 = 150;
 const BAR_COUNT: usize = 24;
 
 pub(super) fn plot<'a>(plot: &Plot, area: &Canvas<'a>) -> Drawn<'a> {
-    let last = plot.panels.len().saturating_sub(1);
+    let last = plot.drawn().count().saturating_sub(1);
     let mut rest = area.clone();
-    for (place, panel) in plot.panels.iter().enumerate() {
+    for (place, panel) in plot.drawn().enumerate() {
         let lowest = place == last;
         let height = panel.height + if lowest { FOOT } else { 0 };
         let (own, below) = rest.split_vertically(height);
@@ -36,7 +36,7 @@ pub(super) fn plot<'a>(plot: &Plot, area: &Canvas<'a>) -> Drawn<'a> {
 
 fn draw_panel<'a>(plot: &Plot, panel: &Panel, lowest: bool, area: &Canvas<'a>) -> Drawn<'a> {
     let foot = if lowest { FOOT } else { 0 };
-    let histograms = plot.panels.iter().any(|panel| panel.histogram);
+    let histograms = plot.drawn().any(|panel| panel.histogram);
     let width = if histograms { WIDTH - BARS } else { WIDTH };
     let (left, right) = area.split_horizontally(width);
     let mut chart = ChartBuilder::on(&left)
@@ -70,7 +70,7 @@ fn draw_panel<'a>(plot: &Plot, panel: &Panel, lowest: bool, area: &Canvas<'a>) -
         .draw()?;
     draw_marks(plot, panel, &mut chart)?;
     for series in &panel.series {
-        draw_series(plot.x, panel.y, series, &mut chart)?;
+        draw_series(&plot.frame(panel), series, &mut chart)?;
     }
     for arrows in &panel.arrows {
         draw_arrows(plot, panel, arrows, &mut chart)?;
@@ -114,18 +114,17 @@ fn draw_marks<'a>(plot: &Plot, panel: &Panel, chart: &mut Chart<'a, '_>) -> Draw
     Ok(())
 }
 
-fn draw_series<'a>(x: Extent, y: Extent, series: &Series, chart: &mut Chart<'a, '_>) -> Drawn<'a> {
+fn draw_series<'a>(frame: &Frame, series: &Series, chart: &mut Chart<'a, '_>) -> Drawn<'a> {
     let colour = series.rgb();
-    let points = series
-        .points
-        .iter()
-        .map(|point| (x.clamp(point.0), y.clamp(point.1)));
+    let points = series.points.iter().map(|point| frame.hold(*point));
     match series.style {
         Style::Dots => {
             chart.draw_series(points.map(|point| Circle::new(point, 4, colour.filled())))?;
         }
         Style::Line => {
-            chart.draw_series(LineSeries::new(points, colour.stroke_width(3)))?;
+            for piece in frame.pieces(&series.points) {
+                chart.draw_series(LineSeries::new(piece, colour.stroke_width(3)))?;
+            }
         }
         Style::Bars => {
             let points: Vec<(f64, f64)> = points.collect();
@@ -194,7 +193,7 @@ fn histogram(panel: &Panel) -> Vec<u32> {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
+    use super::{super::Extent, *};
 
     #[test]
     fn logarithmic_axes_have_values() {
