@@ -25,6 +25,7 @@ const FOOT: i32 = 44;
 /// The map: a degree of latitude is as long as one of longitude.
 const MAP_WIDTH: i32 = WIDTH as i32 - LEFT - RIGHT;
 const MAP_HEIGHT: i32 = MAP_WIDTH / 2;
+const PER_DEGREE: f64 = MAP_WIDTH as f64 / 360.0;
 const HEIGHT: i32 = TOP + MAP_HEIGHT + FOOT;
 /// Degrees between lines, and between meridians with a name.
 const STEP_DEG: i32 = 30;
@@ -34,8 +35,8 @@ const MARK_SIZE: i32 = 12;
 /// Colours of valid sites and of those with remarks.
 const VALID: usize = 2;
 const REMARKS: usize = 1;
-/// Features wider than this have their name on them, degrees of longitude; others beside them.
-const WIDE_DEG: f64 = 20.0;
+/// Size of the letters of what is not a site.
+const SMALL: i32 = 21;
 /// Radius of the ring of a landing site.
 const RING: i32 = 4;
 /// Corners of the outline of a feature.
@@ -94,8 +95,8 @@ pub(super) fn figure(body: Body, places: &[Place]) -> Result<String> {
 
 /// A place on the map; at its edge what is beyond.
 fn pixel((longitude, latitude): (f64, f64)) -> (i32, i32) {
-    let x = f64::from(MAP_WIDTH) / 360.0 * longitude.clamp(0.0, 360.0);
-    let y = f64::from(MAP_HEIGHT) / 180.0 * (90.0 - latitude);
+    let x = PER_DEGREE * longitude.clamp(0.0, 360.0);
+    let y = PER_DEGREE * (90.0 - latitude);
     (LEFT + x.round() as i32, TOP + y.round() as i32)
 }
 
@@ -121,24 +122,35 @@ fn names<'a>(places: &[Place<'a>], features: &[&Feature]) -> (Labels, Vec<&'a st
     {
         names.keep_off(pixel(landing.place_deg), RING);
     }
+    names.set_letters(SMALL);
     for feature in features {
-        let (x, y) = pixel(feature.place_deg);
-        let wide = labels::width(feature.name);
-        let middle = (x - wide / 2, y);
-        let beside = [
-            (x + 12, y),
-            (x - wide - 12, y),
-            (x - wide / 2, y - 24),
-            (x - wide / 2, y + 24),
-        ];
-        match feature.kind {
-            Kind::Extent([east_deg, _]) if east_deg > WIDE_DEG => {
-                names.place(feature.name, SOFT, std::iter::once(middle).chain(beside))
-            }
-            _ => names.place(feature.name, SOFT, beside.into_iter()),
-        };
+        name_feature(feature, &mut names);
     }
     (names, unnamed)
+}
+
+/// The name of a wide feature on it, of another one beside it, where there is room.
+fn name_feature(feature: &Feature, names: &mut Labels) {
+    let (x, y) = pixel(feature.place_deg);
+    let wide = labels::width_in(feature.name, SMALL);
+    let (half_width, half_height) = match feature.kind {
+        Kind::Extent([east_deg, north_deg]) => (
+            (0.5 * east_deg * PER_DEGREE) as i32,
+            (0.5 * north_deg * PER_DEGREE) as i32,
+        ),
+        Kind::Landing => (RING, RING),
+    };
+    let (aside, up) = (half_width + 6, half_height + SMALL / 2 + 2);
+    let middle = x - wide / 2;
+    let on =
+        (2 * half_width > wide).then_some([(middle, y), (middle, y - SMALL), (middle, y + SMALL)]);
+    let beside = [
+        (x + aside, y),
+        (x - wide - aside, y),
+        (middle, y - up),
+        (middle, y + up),
+    ];
+    names.place(feature.name, SOFT, on.into_iter().flatten().chain(beside));
 }
 
 fn draw<'a>(
@@ -196,7 +208,7 @@ fn outline(feature: &Feature, [east_deg, north_deg]: [f64; 2]) -> Vec<Vec<(i32, 
         };
         let ring: Vec<(f64, f64)> = (0..CORNERS).map(corner).collect();
         let seen = ring.iter().any(|(east, _)| (0.0..360.0).contains(east));
-        seen.then(|| ring.into_iter().map(|place| pixel(place)).collect())
+        seen.then(|| ring.into_iter().map(pixel).collect())
     };
     [-360.0, 0.0, 360.0].into_iter().filter_map(ring).collect()
 }

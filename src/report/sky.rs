@@ -143,7 +143,7 @@ impl<'a> Sky<'a> {
         names.place("N", INK, std::iter::once(above));
         names.place("E", INK, std::iter::once((east.0 + 12, east.1)));
         for (of, image) in seen.iter().zip(&sky.images) {
-            if !names.place_around(of.image, COLOURS[IMAGE], *image) {
+            if !names.place_around(of.image, INK, *image) {
                 sky.unnamed.push(of.image);
             }
         }

@@ -22,7 +22,18 @@ pub(in crate::report) fn write<'a>(
     anchor: HPos,
     colour: RGBColor,
 ) -> Drawn<'a> {
-    let style = TextStyle::from(("sans-serif", LETTERS).into_font())
+    write_in(area, text, at, anchor, (LETTERS, colour))
+}
+
+/// Words on a map, in letters of a size and colour.
+fn write_in<'a>(
+    area: &Canvas<'a>,
+    text: &str,
+    at: (i32, i32),
+    anchor: HPos,
+    (letters, colour): (i32, RGBColor),
+) -> Drawn<'a> {
+    let style = TextStyle::from(("sans-serif", letters).into_font())
         .color(&colour)
         .pos(Pos::new(anchor, VPos::Center));
     area.draw_text(text, &style, at)
@@ -33,12 +44,15 @@ pub(in crate::report) struct Label {
     pub(in crate::report) text: String,
     pub(in crate::report) at: (i32, i32),
     pub(in crate::report) colour: RGBColor,
+    letters: i32,
 }
 
 /// The names of a map so far.
 pub(in crate::report) struct Labels {
     width: i32,
     height: i32,
+    /// Size of the letters of names to come.
+    letters: i32,
     taken: Vec<[i32; 4]>,
     /// From a mark to a name that does not stand beside it.
     leaders: Vec<[(i32, i32); 2]>,
@@ -51,10 +65,16 @@ impl Labels {
         Self {
             width,
             height,
+            letters: LETTERS,
             taken: Vec::new(),
             leaders: Vec::new(),
             placed: Vec::new(),
         }
+    }
+
+    /// Names to come have letters of another size.
+    pub(in crate::report) const fn set_letters(&mut self, letters: i32) {
+        self.letters = letters;
     }
 
     /// Puts a name with its left edge, at half its height, at the first of `places` where it fits on the map and on no
@@ -65,9 +85,9 @@ impl Labels {
         colour: RGBColor,
         places: impl Iterator<Item = (i32, i32)>,
     ) -> bool {
-        let wide = width(text);
+        let (wide, half) = (width_in(text, self.letters), self.letters / 2);
         for (x, y) in places {
-            let own = [x - 3, y - LETTERS / 2, x + wide + 3, y + LETTERS / 2];
+            let own = [x - 3, y - half, x + wide + 3, y + half];
             let inside = own[0] >= 0 && own[1] >= 0 && own[2] < self.width && own[3] < self.height;
             if inside && !self.taken.iter().any(|other| overlap(&own, other)) {
                 self.taken.push(own);
@@ -75,6 +95,7 @@ impl Labels {
                     text: text.to_owned(),
                     at: (x, y),
                     colour,
+                    letters: self.letters,
                 });
                 return true;
             }
@@ -118,7 +139,10 @@ impl Labels {
             ))?;
         }
         let mut names = self.placed.iter();
-        names.try_for_each(|name| write(area, &name.text, name.at, HPos::Left, name.colour))
+        names.try_for_each(|name| {
+            let look = (name.letters, name.colour);
+            write_in(area, &name.text, name.at, HPos::Left, look)
+        })
     }
 }
 
@@ -141,14 +165,19 @@ fn around(text: &str, (x, y): (i32, i32), far: i32) -> [(i32, i32); 8] {
 
 /// Width of a text in units of the drawing, at most: as wide as the widest of the usual sans-serif fonts has its letters.
 pub(in crate::report) fn width(text: &str) -> i32 {
+    width_in(text, LETTERS)
+}
+
+/// The same in letters of another size.
+pub(in crate::report) fn width_in(text: &str, letters: i32) -> i32 {
     let share = |letter: char| match letter {
         'i' | 'j' | 'l' | 'I' | '.' | ',' | ':' | ' ' | '-' | '/' | '\'' => 0.42,
         'm' | 'w' | 'M' | 'W' | '−' => 0.98,
         letter if letter.is_uppercase() => 0.76,
         _ => 0.64,
     };
-    let letters: f64 = text.chars().map(share).sum();
-    (letters * f64::from(LETTERS)).ceil() as i32
+    let shares: f64 = text.chars().map(share).sum();
+    (shares * f64::from(letters)).ceil() as i32
 }
 
 fn overlap(one: &[i32; 4], other: &[i32; 4]) -> bool {
