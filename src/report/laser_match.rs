@@ -116,6 +116,9 @@ fn map(of: &LaserMatch) -> Result<String> {
         magnification: magnification(&each, (room(plot.x.low, plot.x.high), room(y.low, y.high))),
         each,
     };
+    let tips = || arrows.each.iter().map(|arrow| arrows.tip(arrow));
+    plot.x = plot.x.with(tips().map(|tip| tip.0));
+    plot.panels[0].y = y.with(tips().map(|tip| tip.1));
     plot.panels[0].arrows.push(arrows);
     plot.panels[0].height = 620;
     Ok(format!("<div class=\"plots\">\n{}</div>\n", figure(&plot)?))
