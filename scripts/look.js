@@ -7,9 +7,28 @@ const [chromiumPath, pictures, ...pages] = process.argv.slice(2);
 const axe = fs.readFileSync(require.resolve('axe-core/axe.min.js'), 'utf8');
 const views = [
   { name: 'phone', width: 360, scheme: 'light' },
+  { name: 'phone-dark', width: 390, scheme: 'dark' },
   { name: 'tablet', width: 800, scheme: 'dark' },
   { name: 'desktop', width: 1440, scheme: 'light' },
+  { name: 'desktop-dark', width: 1440, scheme: 'dark' },
 ];
+
+// Pairs of words in a figure whose letters overlap; a fifth of their height above and below is room, not letters.
+function overprints() {
+  const pairs = [];
+  for (const svg of document.querySelectorAll('svg')) {
+    const boxes = [...svg.querySelectorAll('text')].map((text) => {
+      const box = text.getBoundingClientRect();
+      const room = box.height / 5;
+      return { words: text.textContent.trim(), left: box.left + 1, right: box.right - 1, top: box.top + room, bottom: box.bottom - room };
+    }).filter((box) => box.words);
+    boxes.forEach((one, place) => boxes.slice(0, place).forEach((other) => {
+      const overlap = one.left < other.right && other.left < one.right && one.top < other.bottom && other.top < one.bottom;
+      if (overlap) pairs.push(`${other.words} and ${one.words}`);
+    }));
+  }
+  return pairs;
+}
 
 async function look(browser, file, view) {
   const context = await browser.newContext({
@@ -27,8 +46,12 @@ async function look(browser, file, view) {
     if (!/^(file|data):/.test(request.url())) problems.push(`asks for ${request.url()}`);
   });
   await page.goto('file://' + path.resolve(file));
+  // What is folded is looked at too.
+  await page.evaluate(() => document.querySelectorAll('details').forEach((folded) => { folded.open = true; }));
   const wide = await page.evaluate(() => document.documentElement.scrollWidth);
   if (wide > view.width) problems.push(`scrolls sideways: ${wide} of ${view.width} pixels`);
+  const overprinted = await page.evaluate(overprints);
+  for (const pair of overprinted) problems.push(`labels lie on each other: ${pair}`);
   const name = path.resolve(file).split(path.sep).slice(-3).filter(Boolean).join('-').replace(/\.html$/, '');
   await page.screenshot({ path: path.join(pictures, `${name}-${view.name}.png`), fullPage: true });
   // Paper, once a page.

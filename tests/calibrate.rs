@@ -255,10 +255,17 @@ fn every_step_has_the_size_of_the_paper() {
 #[test]
 fn stated_standard_deviations_hold_against_the_truth() {
     let (mut normalised, mut held_back, mut stated) = (Vec::new(), Vec::new(), Vec::new());
+    let mut drift = Vec::new();
     for seed in 1..=8 {
         let folder = scene_of(seed, &[]);
         let found = calibrated(folder.path()).unwrap();
-        let errors = errors_m(&found, &truth(folder.path()), PointKind::Tie);
+        let truth = truth(folder.path());
+        let drift_is = &truth["orbit_drift_m_per_line"]["i864"];
+        drift.extend((0..3).map(|axis| {
+            let of = found.drift_m_per_line[axis];
+            (of.value - drift_is[axis].as_f64().unwrap()) / of.sigma
+        }));
+        let errors = errors_m(&found, &truth, PointKind::Tie);
         normalised.extend(errors.iter().map(|of| of[1]));
         let of = found.held_back.unwrap();
         held_back.push(of.normalised);
@@ -273,6 +280,10 @@ fn stated_standard_deviations_hold_against_the_truth() {
         // Eight draws of some parameters that the points of a seed share: a fifth to a third.
         assert!((0.7..1.4).contains(&z), "axis {axis}: {z}");
     }
+    // The same orbit's error in every seed, half of what is known beforehand: one draw of it, small but not nothing.
+    println!("drift {drift:.2?}");
+    assert!(drift.iter().all(|z| z.abs() < 3.0), "{drift:?}");
+    assert!(rms(drift.iter().copied()) > 0.1, "{drift:?}");
     // 119 points of four coordinates a seed.
     let z = rms(held_back.iter().copied());
     assert!((0.9..1.1).contains(&z), "{held_back:?}");

@@ -12,6 +12,8 @@ mod common;
 
 use std::fs;
 
+use serde_json::Value;
+
 use common::{
     case::Case,
     daf::{change_packets, without_rates},
@@ -361,6 +363,13 @@ const MISTAKES: &[Mistake] = &[
     ),
 ];
 
+/// Exit code and answer of `areograph check`.
+fn check(case: &Case) -> (Option<i32>, Value) {
+    let output = case.check().arg("--json").output().unwrap();
+    let answer: Value = serde_json::from_slice(&output.stdout).unwrap_or_default();
+    (output.status.code(), answer[0].clone())
+}
+
 #[test]
 fn no_mistake_passes_as_valid() {
     let mut golden = Golden::folder("contradictions");
@@ -382,12 +391,20 @@ fn no_mistake_passes_as_valid() {
             said.contains(part),
             "{mistake} does not say {part:?}: {said}"
         );
-        if matches!(end, End::Error(_)) {
+        let checked = check(&case);
+        if let End::Error(code) = end {
+            assert_eq!(checked.0, Some(*code), "{mistake}: check and run differ");
             golden.compare(mistake, &said);
             continue;
         }
-        // The table of checks says the same as the reasons.
+        // The table of checks says the same as the reasons, and a check as the run.
         let verdict = &json(&case.path("out/isidis/manifest.json"))["verdict"];
+        assert_eq!(
+            &checked.1["verdict"], verdict,
+            "{mistake}: check and run differ"
+        );
+        assert_eq!(checked.1["ready"], verdict["valid"], "{mistake}");
+        assert_eq!(checked.0 == Some(0), verdict["valid"] == true, "{mistake}");
         let checks = verdict["checks"].as_array().unwrap();
         let fails = checks.iter().any(|check| check["outcome"] == "fail");
         assert_eq!(verdict["valid"], !fails, "{mistake}: {checks:?}");

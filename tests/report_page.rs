@@ -119,7 +119,7 @@ fn a_gap_in_attitude_is_seen_and_measured() {
     );
     // One red bar for the gap; the swatch of its key is not part of the picture.
     let svg = picture.split("</svg>").next().unwrap();
-    assert_eq!(svg.matches("fill=\"#B3261E\"").count(), 1);
+    assert_eq!(svg.matches("fill=\"#C10019\"").count(), 1);
 }
 
 #[test]

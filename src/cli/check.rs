@@ -12,7 +12,8 @@ use crate::{
     store::hashes::HashCache,
 };
 
-/// Checks configuration, files and kernel coverage; reports everything that a run would stumble over.
+/// Checks configuration, files and kernel coverage; reports everything that a run would stumble over, and what would make its
+/// products invalid.
 ///
 /// Examples:
 ///   areograph check sites/gusev.toml
@@ -69,6 +70,13 @@ fn print(site: &str, checked: &Checked) {
     for finding in &checked.findings {
         output::line(format_args!("  {finding}"));
     }
+    let Some(verdict) = &checked.verdict else {
+        return;
+    };
+    output::line(format_args!("  a run would be {}", verdict.word()));
+    for remark in &verdict.remarks {
+        output::line(format_args!("  {remark}"));
+    }
 }
 
 fn answer(site: &str, checked: &Checked) -> serde_json::Value {
@@ -77,6 +85,7 @@ fn answer(site: &str, checked: &Checked) -> serde_json::Value {
         "site": site,
         "ready": checked.failures.is_empty(),
         "findings": checked.findings,
+        "verdict": checked.verdict,
         "failures": failures.collect::<Vec<_>>(),
     })
 }

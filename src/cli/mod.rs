@@ -6,7 +6,7 @@ mod completions;
 mod image;
 mod init;
 mod kernels;
-mod manual;
+mod man;
 mod nightly;
 mod numbers;
 mod open;
@@ -40,7 +40,12 @@ use crate::{
 /// Exit codes: 0 done, 1 bug in areograph, 2 usage or configuration, 3 input data, 4 kernel coverage,
 /// 5 products written but invalid, or moved beyond a limit, 6 input/output, 130 interrupted.
 #[derive(Debug, Parser)]
-#[command(name = "areograph", version, arg_required_else_help = true)]
+#[command(
+    name = "areograph",
+    version,
+    arg_required_else_help = true,
+    after_help = "Example: areograph run sites/gusev.toml --out products"
+)]
 struct Cli {
     /// Print errors only.
     #[arg(short, long, global = true, conflicts_with = "verbose")]
@@ -71,10 +76,13 @@ enum Command {
     Check(check::Arguments),
     Plan(plan::Arguments),
     /// Inspect kernels: what is loaded, where the gaps are, how alternative sets differ.
+    #[command(after_help = "Example: areograph kernels coverage kernels/nav.tm")]
     Kernels(kernels::Arguments),
     /// Read images of the camera, find them in the mission's index.
+    #[command(after_help = "Example: areograph image info M0100115.imq")]
     Image(image::Arguments),
     /// Inspect PEDR files.
+    #[command(after_help = "Example: areograph pedr info ap10001l.b")]
     Pedr(pedr::Arguments),
     Report(report::Arguments),
     Triangulate(triangulate::Arguments),
@@ -83,10 +91,10 @@ enum Command {
     Serve(serve::Arguments),
     Nightly(nightly::Arguments),
     /// Keep a service: copies of its database, its tokens.
+    #[command(after_help = "Example: areograph service token list areograph.toml")]
     Service(service::Arguments),
     Completions(completions::Arguments),
-    #[command(hide = true)]
-    Manual(manual::Arguments),
+    Man(man::Arguments),
     #[command(hide = true)]
     Worker(worker::Arguments),
 }
@@ -157,7 +165,7 @@ fn run(command: Command) -> ExitCode {
             completions::run(&arguments);
             ExitCode::SUCCESS
         }
-        Command::Manual(arguments) => finish(manual::run(&arguments)),
+        Command::Man(arguments) => finish(man::run(&arguments)),
         Command::Worker(arguments) => worker::run(&arguments),
     }
 }
@@ -208,15 +216,14 @@ mod tests {
 
     use super::Cli;
 
-    /// Commands that do something and have no example in their help.
+    /// Commands and groups of them that have no example in their help.
     fn without_example(command: &mut clap::Command, named: &str, found: &mut Vec<String>) {
         let help = command.render_long_help().to_string();
-        let mut below = command.get_subcommands_mut().peekable();
-        if below.peek().is_none() && !help.contains("Example") {
+        if !help.contains("Example") {
             found.push(named.to_owned());
         }
         let own = |command: &&mut clap::Command| !["worker", "help"].contains(&command.get_name());
-        for command in below.filter(own) {
+        for command in command.get_subcommands_mut().filter(own) {
             let named = format!("{named} {}", command.get_name());
             without_example(command, &named, found);
         }

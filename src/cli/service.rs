@@ -43,7 +43,10 @@ enum Command {
         config: PathBuf,
     },
     /// Tokens, with which people and programs may use the service.
-    #[command(subcommand)]
+    #[command(
+        subcommand,
+        after_help = "Example: areograph service token list areograph.toml"
+    )]
     Token(TokenCommand),
 }
 

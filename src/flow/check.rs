@@ -1,14 +1,16 @@
-//! The flow that tries: configuration, files and kernel coverage of a site, without writing anything.
+//! The flow that tries: configuration, files and kernel coverage of a site, then what a run of it would be judged as, without
+//! writing anything.
 
 use std::{collections::BTreeSet, path::PathBuf, sync::atomic::AtomicBool};
 
 use super::{
     RivalSet,
     driver::{Driver, Flow, Leave},
+    evidence::{complaints, judged, warnings},
     kernels::{load_rivals, required_coverage},
     outputs::{Prepared, Site},
     overlays::overlays,
-    site::{kernels, orient, prepare},
+    site::{finish, kernels, orient, prepare},
     triangulate::{match_ties, ties_of_files},
 };
 use crate::{
@@ -18,7 +20,7 @@ use crate::{
     kernel_source::KernelSource,
     spice::RequiredCoverage,
     stage::{Output, Provenance, Round, Stage},
-    stages::{group_profiles::Profile, tag_times::ImageTimes},
+    stages::{group_profiles::Profile, judge::Verdict, tag_times::ImageTimes},
     store::hashes::HashCache,
 };
 
@@ -29,12 +31,15 @@ pub struct Checked {
     pub findings: Vec<String>,
     /// What a run would stumble over; all of it, not only the first.
     pub failures: Vec<Error>,
+    /// What a run would be judged as; nothing where an input keeps it from being made.
+    pub verdict: Option<Verdict>,
 }
 
 /// Checks a site's kernels, labels, PEDR and tie point files, and coverage at its images and at its shots; of rival
 /// sets of kernels every one, since any of them may be chosen.
 ///
-/// The PEDR files are searched as a run does it: only shots in the windows tell which times are needed.
+/// The PEDR files are searched as a run does it: only shots in the windows tell which times are needed. When nothing is
+/// wrong with any input, all stages run as in a run, and what would make its products invalid is a failure too.
 ///
 /// * `hashes` – kernels that are known there are not read again to check their words; nothing is added to them
 #[must_use]
@@ -71,40 +76,20 @@ pub fn rival_sets(config: &SiteConfig) -> Result<Vec<RivalSet>> {
     load_rivals(config, &InputFiles::default()).in_site(&config.site)
 }
 
-/// No shot would be found.
+/// What a run would make is invalid.
 #[derive(Debug, thiserror::Error)]
-#[error("no shot in any window: products would be invalid")]
-struct NoShot;
+#[error("products would be invalid: {reason}")]
+struct WouldBeInvalid {
+    reason: String,
+}
 
-impl Cause for NoShot {
+impl Cause for WouldBeInvalid {
     fn kind(&self) -> Kind {
         Kind::Validation
     }
 
     fn advice(&self) -> String {
-        "look at windows and pedr.filter, and whether pedr.files are of the site's orbits"
-            .to_owned()
-    }
-}
-
-/// A profile would make the products invalid.
-#[derive(Debug, thiserror::Error)]
-#[error(
-    "profile {profile} has {shots} shots; expected at least {least}: products would be invalid"
-)]
-struct FewShots {
-    profile: String,
-    shots: usize,
-    least: u32,
-}
-
-impl Cause for FewShots {
-    fn kind(&self) -> Kind {
-        Kind::Validation
-    }
-
-    fn advice(&self) -> String {
-        "move the window so that it does not clip the profile, or lower range_check.shots_min"
+        "a run makes the products none the less, marks them, and its report has the numbers"
             .to_owned()
     }
 }
@@ -115,6 +100,8 @@ struct Check<'a> {
     never: AtomicBool,
     /// Set of kernels that findings are about.
     prefix: String,
+    /// Whether all inputs are sound, so that every stage runs as it does in a run.
+    is_trial: bool,
     checked: Checked,
     /// Failures that have been noted.
     told: BTreeSet<String>,
@@ -127,6 +114,7 @@ impl<'a> Check<'a> {
             files,
             never: AtomicBool::new(false),
             prefix: String::new(),
+            is_trial: false,
             checked: Checked::default(),
             told: BTreeSet::new(),
         }
@@ -134,43 +122,23 @@ impl<'a> Check<'a> {
 
     fn all(&mut self, config: &SiteConfig) -> Flow<()> {
         let prepared = prepare(self, config)?;
-        let searched = config.has_shots() && self.checked.failures.is_empty();
-        if searched && prepared.profiles.get().is_some_and(Vec::is_empty) {
-            // A run would make products and mark them invalid; a check that says ready would not be believed again.
-            let failure = Error::from(NoShot).in_site(&config.site);
-            self.checked.failures.push(failure);
-        }
-        if searched {
-            self.few_shots(config, prepared.profiles.get().map_or(&[], Vec::as_slice));
-        }
         if !config.ties.files.is_empty() {
             ties_of_files(self, config)?;
         }
-        let KernelSource::Sets(sets) = &config.kernels.source else {
-            return self.check_kernels(config, prepared, 0);
-        };
-        for (index, set) in sets.iter().enumerate() {
-            self.prefix = format!("kernel set {}: ", set.id);
-            self.check_kernels(config, prepared.clone(), index)?;
+        if let KernelSource::Sets(sets) = &config.kernels.source {
+            for (index, set) in sets.iter().enumerate() {
+                self.prefix = format!("kernel set {}: ", set.id);
+                self.check_kernels(config, prepared.clone(), index)?;
+            }
+            self.prefix.clear();
+        } else {
+            self.check_kernels(config, prepared.clone(), 0)?;
+        }
+        if self.checked.failures.is_empty() {
+            self.is_trial = true;
+            finish(self, config, prepared)?;
         }
         Ok(())
-    }
-
-    /// Profiles of too few shots, as the range check of a run judges them.
-    fn few_shots(&mut self, config: &SiteConfig, profiles: &[Profile]) {
-        let least = config.range_check.shots_min;
-        for profile in profiles {
-            let shots = profile.rows.len();
-            if shots < least as usize {
-                let few = FewShots {
-                    profile: profile.id.clone(),
-                    shots,
-                    least,
-                };
-                let failure = Error::from(few).in_site(&config.site);
-                self.checked.failures.push(failure);
-            }
-        }
     }
 
     /// Orbit and orientation with one set of kernels.
@@ -253,6 +221,10 @@ impl Driver for Check<'_> {
 
     fn stage<S: Stage>(&mut self, stage: &S) -> Flow<Output<S::Output>> {
         let label = stage.label();
+        if self.is_trial {
+            let made = stage.run(&self.never).in_stage(&label)?;
+            return Ok(known(label, made));
+        }
         let mut sound = true;
         for found in stage.examine() {
             match self.note(&label, found) {
@@ -271,15 +243,28 @@ impl Driver for Check<'_> {
         for finding in stage.findings(&value) {
             self.tell(&finding);
         }
-        // Nothing is kept by an output's origin here.
-        let nowhere = Provenance {
-            blake3: String::new(),
-            fingerprint: String::new(),
-        };
-        Ok(Output::known(label, value, nowhere))
+        Ok(known(label, value))
     }
 
-    fn publish(&mut self, _config: &SiteConfig, _site: &Site) -> Flow<()> {
+    /// The verdict, as a run would publish it.
+    fn publish(&mut self, config: &SiteConfig, site: &Site) -> Flow<()> {
+        let warnings = warnings(config, site)?;
+        let (verdict, _) = judged(config, site, &warnings, &complaints(site)?)?;
+        for reason in &verdict.reasons {
+            let reason = reason.clone();
+            let failure = Error::from(WouldBeInvalid { reason });
+            self.checked.failures.push(failure.in_site(&config.site));
+        }
+        self.checked.verdict = Some(verdict);
         Ok(())
     }
+}
+
+/// Nothing is kept by an output's origin here.
+fn known<T>(label: String, value: T) -> Output<T> {
+    let nowhere = Provenance {
+        blake3: String::new(),
+        fingerprint: String::new(),
+    };
+    Output::known(label, value, nowhere)
 }

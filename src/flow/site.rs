@@ -1,4 +1,4 @@
-//! The flow of one site, told once: [`site`] is driven by run and plan, its parts by check.
+//! The flow of one site, told once: [`site`] is driven by run and plan, its two halves by check.
 
 use super::{
     LOAD_KERNELS,
@@ -37,6 +37,11 @@ use crate::{
 /// The flow of one site, from its configuration to its products.
 pub(super) fn site<D: Driver>(flow: &mut D, config: &SiteConfig) -> Flow<()> {
     let prepared = prepare(flow, config)?;
+    finish(flow, config, prepared)
+}
+
+/// From the kernels' choice to the products.
+pub(super) fn finish<D: Driver>(flow: &mut D, config: &SiteConfig, prepared: Prepared) -> Flow<()> {
     let (choice, chosen) = choose(flow, config, prepared.required.as_ref())?;
     let kernels = match chosen {
         Some(chosen) => kernels(flow, config, prepared.required.as_ref(), chosen)?,

@@ -36,6 +36,8 @@ pub struct Misregistration {
     pub lines: Summary,
     /// Transformed minus projected sample of every footprint.
     pub samples: Summary,
+    /// Standard deviation of the mean of `lines` by the scatter of the tie points.
+    pub lines_sigma: f64,
     /// Footprints that were left out because their line lies beyond the tie points'.
     pub beyond_ties: usize,
 }
@@ -125,6 +127,7 @@ impl ImageToImage {
         Misregistration {
             lines: summary(0),
             samples: summary(1),
+            lines_sigma: self.mean_sigma(&seen),
             beyond_ties: footprints.len() - seen.len(),
         }
     }
@@ -135,6 +138,22 @@ impl ImageToImage {
 struct Frame {
     middle: [f64; 2],
     half_width: [f64; 2],
+}
+
+impl ImageToImage {
+    /// Standard deviation of the mean transformed line of `pairs`, by the residuals of the tie points: relief that no
+    /// polynomial follows counts as scatter. Zero without pairs.
+    fn mean_sigma(&self, pairs: &[Pair]) -> f64 {
+        let fit = &self.transformation;
+        let mut mean = DVector::zeros(fit.coefficients[0].len());
+        for pair in pairs {
+            mean += DVector::from_vec(fit.frame.terms(pair.first, fit.order)) / pairs.len() as f64;
+        }
+        let scatter = self.tie_lines.standard_deviation;
+        // The summary divides by one less than the number; the fit has used up as many as it has coefficients.
+        let spare = (self.ties - 1) as f64 / (self.ties - mean.len()) as f64;
+        scatter * (spare * mean.dot(&(&fit.cofactors * &mean))).sqrt()
+    }
 }
 
 impl Frame {
@@ -171,6 +190,8 @@ struct Transformation {
     frame: Frame,
     order: u8,
     coefficients: [DVector<f64>; 2],
+    /// Inverse of the normal matrix of either axis.
+    cofactors: DMatrix<f64>,
 }
 
 /// Singular values below this share of the largest tell of tie points on one line.
@@ -191,6 +212,7 @@ impl Transformation {
             return None;
         }
         let design = DMatrix::from_fn(ties.len(), terms, |row, term| rows[row][term]);
+        let cofactors = design.tr_mul(&design).try_inverse()?;
         let decomposition = design.svd(true, true);
         let least = SINGULAR_SHARE * decomposition.singular_values.max();
         if decomposition.rank(least) < terms {
@@ -205,6 +227,7 @@ impl Transformation {
             frame,
             order,
             coefficients: [solve(0)?, solve(1)?],
+            cofactors,
         })
     }
 

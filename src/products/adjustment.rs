@@ -216,6 +216,10 @@ struct FootprintsDocument<'a> {
     ties_rejected: u32,
     tie_lines: &'a Summary,
     tie_samples: &'a Summary,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    apart_m: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    apart_sigma_m: Option<f64>,
     profiles: Vec<ProfileDocument<'a>>,
     outside: u32,
 }
@@ -226,6 +230,7 @@ struct ProfileDocument<'a> {
     lines: &'a Summary,
     samples: &'a Summary,
     along_m: f64,
+    along_sigma_m: f64,
     above_mola_m: &'a Summary,
     #[serde(skip_serializing_if = "Option::is_none")]
     along_spacings: Option<f64>,
@@ -404,6 +409,7 @@ fn pair(pair: &PairComparison) -> PairDocument<'_> {
             lines: &profile.lines,
             samples: &profile.samples,
             along_m: profile.along_m,
+            along_sigma_m: profile.along_sigma_m,
             above_mola_m: &profile.above_m,
             along_spacings: profile.along_spacings,
             beyond_ties: profile.beyond_ties,
@@ -425,6 +431,8 @@ fn pair(pair: &PairComparison) -> PairDocument<'_> {
             ties_rejected: by_ties.ties_rejected,
             tie_lines: &by_ties.tie_lines,
             tie_samples: &by_ties.tie_samples,
+            apart_m: by_ties.apart_m,
+            apart_sigma_m: by_ties.apart_sigma_m,
             profiles: by_ties.profiles.iter().map(profile).collect(),
             outside: by_ties.outside,
         }),

@@ -181,12 +181,12 @@ mod tests {
     #[test]
     fn a_figure_is_taken_with_all_that_belongs_to_it() {
         let html = "f\">\n<p id=\"f-title\">A &lt; B</p>\n<svg role=\"img\" viewBox=\"0 0 1040 500\" xmlns=\"x\"><circle r=\"2\"/>\
-                    </svg><ul class=\"keys\"><li><i class=\"k0\" data-colour=\"#0072B2\"></i>shots</li></ul>\n\
+                    </svg><ul class=\"keys\"><li><i class=\"k0\" data-colour=\"#0E5A99\"></i>shots</li></ul>\n\
                     <figcaption><span id=\"f-words\">Words.</span> </figcaption>\n</figure>\n<p>";
         let figure = Figure::of(3, html).unwrap();
         assert_eq!(
             (figure.id, figure.keys.as_slice()),
-            ("f", &[("#0072B2", "shots")][..])
+            ("f", &[("#0E5A99", "shots")][..])
         );
         let svg = figure.svg();
         assert!(
@@ -194,7 +194,7 @@ mod tests {
                 && svg.contains(">Figure 3. A &lt; B. Words.</text>")
         );
         assert!(
-            svg.contains("fill=\"#0072B2\"") && svg.contains("viewBox=\"0 0 1040 590\""),
+            svg.contains("fill=\"#0E5A99\"") && svg.contains("viewBox=\"0 0 1040 590\""),
             "{svg}"
         );
     }

@@ -67,14 +67,17 @@ fn write(
 fn overview(adjusted: &Adjusted) -> String {
     let summary = &adjusted.summary;
     let [along, across] = summary.tie_components;
-    let verdict = if summary.degrees_of_freedom == 0 {
-        "nothing is redundant"
-    } else if along < WORSE_THAN_CONFIGURED.recip() {
-        "along track better than configured"
-    } else if along <= WORSE_THAN_CONFIGURED {
-        "along track as configured"
-    } else {
-        "along track worse than configured"
+    let against_configured = |component: f64| {
+        let words = if summary.degrees_of_freedom == 0 {
+            "nothing is redundant"
+        } else if component < WORSE_THAN_CONFIGURED.recip() {
+            "better than configured"
+        } else if component <= WORSE_THAN_CONFIGURED {
+            "as configured"
+        } else {
+            "worse than configured"
+        };
+        (words.to_owned(), String::new())
     };
     let at = |pointer: &str| format!("adjustment.json#/adjustment/summary{pointer}");
     let numbers = [
@@ -96,13 +99,14 @@ fn overview(adjusted: &Adjusted) -> String {
             at("/degrees_of_freedom"),
         ),
         (label(along, 3), at("/tie_components/0")),
+        against_configured(along),
         (label(across, 3), at("/tie_components/1")),
-        (verdict.to_owned(), String::new()),
+        against_configured(across),
         (label(summary.sigma0, 3), at("/sigma0")),
     ];
     sentence(
-        "{}, {} and {} adjusted together in {}; {} degrees of freedom. Unit-weight σ of tie points {} along track, {} across: \
-         {}. σ0 of all observations: {}.",
+        "{}, {} and {} adjusted together in {}; {} degrees of freedom. Unit-weight σ of tie points {} along track ({}), {} \
+         across ({}). σ0 of all observations: {}.",
         &numbers
             .each_ref()
             .map(|(number, place)| (number.clone(), &**place)),

@@ -1,6 +1,7 @@
 //! The page of a calibration: verdict, figures of every step, what ties cannot see, cameras, other orbits.
 
 use super::{
+    checks,
     html::{Cell, Column, Section, Table, Tone, counted, list, page, paragraph, verdict},
     numbers::signed,
     plots::{Panel, Plot, Series, figure, label, thinned},
@@ -52,7 +53,7 @@ fn lead(config: &CalibrationConfig, of: &Calibration) -> String {
         words = format!("{}. {words}", config.description);
     }
     let body = paragraph(&words) + &list(&of.verdict.reasons) + &list(&of.verdict.remarks);
-    verdict(tone, &headline, &body)
+    verdict(tone, &headline, &body) + &checks::listed(&of.verdict.checks)
 }
 
 fn stated(of: &HeldBack) -> String {

@@ -16,7 +16,29 @@ use crate::{
 
 /// The table of the checks of a site.
 pub(super) fn table(site: &SiteProducts) -> String {
-    let mut table = Table::new(
+    let mut table = empty();
+    for (index, check) in site.verdict.checks.iter().enumerate() {
+        let more = section(check.kind).filter(|section| (section.appears)(site));
+        let what = more.map_or_else(
+            || escape(check.words()),
+            |section| link(&format!("#{}", section.anchor), check.words()),
+        );
+        row(&mut table, check, what, &place(index));
+    }
+    table.finish()
+}
+
+/// The table of the checks of a net, a calibration or a match.
+pub(super) fn listed(checks: &[Check]) -> String {
+    let mut table = empty();
+    for check in checks {
+        row(&mut table, check, escape(check.words()), "");
+    }
+    table.finish()
+}
+
+fn empty() -> Table {
+    Table::new(
         "Checks",
         &[
             Column::Text("result"),
@@ -24,29 +46,28 @@ pub(super) fn table(site: &SiteProducts) -> String {
             Column::Number("value"),
             Column::Number("limit"),
         ],
-    );
-    for (index, check) in site.verdict.checks.iter().enumerate() {
-        let words = check.words();
-        let more = section(check.kind).filter(|section| (section.appears)(site));
-        let mut what = more.map_or_else(
-            || escape(words),
-            |section| link(&format!("#{}", section.anchor), words),
-        );
-        if !check.subject.is_empty() {
-            what += &format!(" <small>{}</small>", escape(&check.subject));
-        }
-        table.row_of(
-            &place(index),
-            check.outcome != CheckOutcome::Fail,
-            [
-                result(check.outcome),
-                Cell::Html(what),
-                Cell::from(value(check)).told(value_place(check)),
-                Cell::from(limit(check)).told("/limit"),
-            ],
-        );
+    )
+}
+
+/// A check in a table: `what` is checked, as HTML, and the `place` where the products tell of it.
+fn row(table: &mut Table, check: &Check, mut what: String, place: &str) {
+    if !check.subject.is_empty() {
+        what += &format!(" <small>{}</small>", escape(&check.subject));
     }
-    table.finish()
+    let told = |text: String, at: &str| match place {
+        "" => Cell::from(text),
+        _ => Cell::from(text).told(at),
+    };
+    table.row_of(
+        place,
+        check.outcome != CheckOutcome::Fail,
+        [
+            result(check.outcome),
+            Cell::Html(what),
+            told(value(check), value_place(check)),
+            told(limit(check), "/limit"),
+        ],
+    );
 }
 
 /// Where the products tell of a check.
@@ -145,6 +166,25 @@ const fn section(kind: CheckKind) -> Option<&'static Section> {
         }
         CheckKind::Attitude => &timeline::SECTION,
         CheckKind::SkippedRecords => &notes::SECTION,
+        // Of nets, calibrations and matches, whose pages have no such sections.
+        CheckKind::HeldBackControl
+        | CheckKind::OtherOrbits
+        | CheckKind::PlaceKnown
+        | CheckKind::HeightKnown
+        | CheckKind::LinesAgree
+        | CheckKind::CameraMoved
+        | CheckKind::TiesLeftOut
+        | CheckKind::ControlLeftOut
+        | CheckKind::HeldOutShots
+        | CheckKind::UnitsKept
+        | CheckKind::UnitsAgree
+        | CheckKind::ModelBias
+        | CheckKind::Redundancy
+        | CheckKind::MeasurementsRemoved
+        | CheckKind::MeasurementsFlagged
+        | CheckKind::ControlsKept
+        | CheckKind::ControlsRefused
+        | CheckKind::Seams => return None,
     })
 }
 

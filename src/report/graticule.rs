@@ -2,6 +2,7 @@
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
+use super::plots::{Extent, Frame};
 use crate::{
     geom::map_projection::MapProjection,
     units::{RADIANS_PER_DEGREE, wrap_pi, wrap_two_pi},
@@ -76,26 +77,14 @@ impl View {
         (self.west_m..=self.east_m).contains(&x) && (self.south_m..=self.north_m).contains(&y)
     }
 
-    /// The part of a segment inside the view, by its parameters along it (Liang and Barsky 1984).
-    pub(super) fn clip(&self, from: (f64, f64), to: (f64, f64)) -> Option<[(f64, f64); 2]> {
-        let (dx, dy) = (to.0 - from.0, to.1 - from.1);
-        let (mut enter, mut leave) = (0.0_f64, 1.0_f64);
-        for (step, room) in [
-            (-dx, from.0 - self.west_m),
-            (dx, self.east_m - from.0),
-            (-dy, from.1 - self.south_m),
-            (dy, self.north_m - from.1),
-        ] {
-            if step < 0.0 {
-                enter = enter.max(room / step);
-            } else if step > 0.0 {
-                leave = leave.min(room / step);
-            } else if room < 0.0 {
-                return None;
-            }
-        }
-        let at = |share: f64| (from.0 + share * dx, from.1 + share * dy);
-        (enter < leave).then(|| [at(enter), at(leave)])
+    /// The part of a segment inside the view.
+    fn clip(&self, from: (f64, f64), to: (f64, f64)) -> Option<[(f64, f64); 2]> {
+        let extent = |low, high| Extent { low, high };
+        let frame = Frame {
+            x: extent(self.west_m, self.east_m),
+            y: extent(self.south_m, self.north_m),
+        };
+        frame.clip(from, to)
     }
 }
 
@@ -313,21 +302,5 @@ mod tests {
     fn the_whole_globe_has_lines_too() {
         let names = names(0.0, 0.0, 8e6);
         assert!(names.len() >= 12 && names.len() < 40, "{names:?}");
-    }
-
-    #[test]
-    fn segments_end_at_the_edge() {
-        let view = View {
-            west_m: 0.0,
-            east_m: 10.0,
-            south_m: 0.0,
-            north_m: 10.0,
-        };
-        assert_eq!(
-            view.clip((-10.0, 5.0), (20.0, 5.0)),
-            Some([(0.0, 5.0), (10.0, 5.0)])
-        );
-        assert_eq!(view.clip((-1.0, 5.0), (-1.0, 7.0)), None);
-        assert_eq!(view.clip((-5.0, 12.0), (5.0, 22.0)), None);
     }
 }

@@ -192,18 +192,17 @@ pub(super) fn absolute(
     };
     let single = single_sigmas_m(adjustment);
     let [east_m, north_m, up_m] = heights.mean_sigma_m;
-    let pairs = BeforeAfter::all(geometric);
-    let worst = BeforeAfter::worst(&pairs);
-    let half_m = worst.map_or(0.0, |pair| 0.5 * pair.before.along_track_parallax_m.abs());
-    // What is stated holds only if errors of both images are as likely; half of their difference is no less open.
-    let half = if half_m > east_m.max(north_m) {
-        format!(
-            "; open: half of the images' along-track disagreement, {} m, because neither image is known to be correct",
+    let half = half_apart_m(geometric).map_or_else(String::new, |half_m| {
+        let half = format!(
+            "half of the images' along-track disagreement, {} m",
             label(half_m, 0)
-        )
-    } else {
-        String::new()
-    };
+        );
+        if is_open(geometric, adjustment) {
+            format!("; open: {half}, because neither image is known to be correct")
+        } else {
+            format!("; {half}, is within that")
+        }
+    });
     [
         format!(
             "mean ±{} m, single tie points ±{} to ±{} m",
@@ -217,6 +216,23 @@ pub(super) fn absolute(
             label(north_m, 0)
         ),
     ]
+}
+
+/// Half of what the images of the worst pair disagree by along the flight before the adjustment, metres.
+fn half_apart_m(geometric: &GeometricProducts) -> Option<f64> {
+    let pairs = BeforeAfter::all(geometric);
+    let worst = BeforeAfter::worst(&pairs)?;
+    Some(0.5 * worst.before.along_track_parallax_m.abs())
+}
+
+/// Whether the stated position is more certain than the images allow: it holds only if errors of both images are as likely,
+/// and half of their difference is no less open.
+pub(super) fn is_open(geometric: &GeometricProducts, adjustment: &AdjustmentProducts) -> bool {
+    let heights = adjustment.adjusted.heights.as_ref();
+    let stated = heights.map(|of| of.mean_sigma_m[0].max(of.mean_sigma_m[1]));
+    stated
+        .zip(half_apart_m(geometric))
+        .is_some_and(|(stated_m, half_m)| half_m > stated_m)
 }
 
 /// Least and largest standard deviation of the height of a tie point, metres.
@@ -261,7 +277,7 @@ fn compared(geometric: &GeometricProducts) -> String {
             Column::Number("1.48 MAD"),
             Column::Number("mean"),
             Column::Number("standard deviation"),
-            Column::Number("σ of the mean, surface"),
+            Column::Number("σ of the mean by the surface alone"),
         ],
     );
     let after = geometric.adjustment.iter().map(|of| ("after", of.heights));
@@ -334,7 +350,7 @@ fn footprints(geometric: &GeometricProducts) -> String {
     if rows == 0 {
         return String::new();
     }
-    let words = "Relief between tie points scatters single heights, not the median.";
+    let words = "Relief between tie points moves single heights, and the median where it is of one sign along a profile.";
     table.finish() + &paragraph(words)
 }
 

@@ -13,6 +13,9 @@ const SHORT: usize = 28;
 /// Rows up to which a table is not broken between two sheets of paper.
 const ROWS_TOGETHER: usize = 10;
 
+/// Columns up to which a long table is set beside itself on paper.
+const COLUMNS_NARROW: usize = 2;
+
 /// `text` with the five characters that HTML reads as markup replaced.
 pub(super) fn escape(text: &str) -> String {
     let mut escaped = String::with_capacity(text.len());
@@ -237,6 +240,8 @@ pub(super) struct Table {
     html: String,
     columns: &'static [Column],
     rows: usize,
+    /// Whether the cells say their heads themselves, for where they stand below each other.
+    cards: bool,
 }
 
 impl Table {
@@ -261,7 +266,18 @@ impl Table {
             html,
             columns,
             rows: 0,
+            cards: false,
         }
+    }
+
+    /// A table whose rows become cards on a narrow screen.
+    pub(super) fn of_cards(caption: &str, columns: &'static [Column]) -> Self {
+        let mut table = Self::new(caption, columns);
+        table.html = table
+            .html
+            .replacen("class=\"wide\"", "class=\"wide cards\"", 1);
+        table.cards = true;
+        table
     }
 
     /// Adds a row, tinted when it is not `valid`.
@@ -297,11 +313,16 @@ impl Table {
             Some(Column::Number(_)) => "number",
             _ => "",
         };
-        let (tag, scope) = if place == 0 {
-            ("th", " scope=\"row\"")
+        let (tag, mut scope) = if place == 0 {
+            ("th", " scope=\"row\"".to_owned())
         } else {
-            ("td", "")
+            ("td", String::new())
         };
+        if let Some(Column::Text(head) | Column::Number(head)) =
+            self.columns.get(place).filter(|_| self.cards && place > 0)
+        {
+            scope = format!(" data-head=\"{}\"", escape(head));
+        }
         match cell {
             Cell::Limited(text, share) => limited(class, from, &text, share),
             Cell::Html(html) => format!("<{tag}{scope} class=\"{class}\"{from}>{html}</{tag}>"),
@@ -325,10 +346,15 @@ impl Table {
     /// The finished table.
     pub(super) fn finish(self) -> String {
         let html = self.html + "</tbody>\n</table></div>\n";
-        if self.rows > ROWS_TOGETHER {
-            return html;
-        }
-        html.replacen("class=\"wide\"", "class=\"wide brief\"", 1)
+        let kind = match (
+            self.rows > ROWS_TOGETHER,
+            self.columns.len() > COLUMNS_NARROW,
+        ) {
+            (false, _) => "brief",
+            (true, false) => "narrow",
+            (true, true) => return html,
+        };
+        html.replacen("class=\"wide", &format!("class=\"wide {kind}"), 1)
     }
 }
 

@@ -249,6 +249,9 @@ fn row(
     cells
 }
 
+/// Residuals below this, millimetres, arcseconds and metres, round to zero in the caption and have no axis.
+const LEAST: f64 = 5e-4;
+
 /// Figure 3: residuals of the second-order model at every sample, and what they do on the ground.
 fn residual_plot(image: &ImageProducts) -> Plot {
     let model = &image.model.second_order;
@@ -288,6 +291,7 @@ fn residual_plot(image: &ImageProducts) -> Plot {
     }
     for panel in &mut panels {
         panel.height = 250;
+        panel.least = LEAST;
     }
     Plot::of(
         format!("Residuals of {}", image.times.id),

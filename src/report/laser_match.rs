@@ -1,6 +1,7 @@
 //! The page of a match of laser profiles with a terrain model: verdict, map of the shifts, held-out shots, every unit.
 
 use super::{
+    checks,
     html::{Cell, Column, Section, Table, Tone, counted, list, page, paragraph, verdict},
     numbers::signed,
     plots::{Arrow, Arrows, GREY, Panel, Plot, Series, figure, label, magnification},
@@ -71,7 +72,7 @@ fn lead(of: &LaserMatch) -> String {
         + &paragraph(&made)
         + &list(&of.verdict.reasons)
         + &list(&of.verdict.remarks);
-    verdict(tone, &headline, &body)
+    verdict(tone, &headline, &body) + &checks::listed(&of.verdict.checks)
 }
 
 fn kept(of: &LaserMatch) -> impl Iterator<Item = &UnitResult> {
@@ -115,6 +116,9 @@ fn map(of: &LaserMatch) -> Result<String> {
         magnification: magnification(&each, (room(plot.x.low, plot.x.high), room(y.low, y.high))),
         each,
     };
+    let tips = || arrows.each.iter().map(|arrow| arrows.tip(arrow));
+    plot.x = plot.x.with(tips().map(|tip| tip.0));
+    plot.panels[0].y = y.with(tips().map(|tip| tip.1));
     plot.panels[0].arrows.push(arrows);
     plot.panels[0].height = 620;
     Ok(format!("<div class=\"plots\">\n{}</div>\n", figure(&plot)?))

@@ -40,6 +40,10 @@ const MAP_TIES: usize = 400;
 const RATIO: (f64, f64) = (0.5, 0.78);
 /// What rounding takes a point of a line off it at most, units of the drawing.
 const ROUNDING: f64 = 0.75;
+/// Shots farther apart, in units of the drawing, are not joined.
+const TRACK_GAP: f64 = 60.0;
+/// Colour of shots, which the page's style leaves as it is.
+const TRACK: RGBColor = RGBColor(0x1a, 0x1a, 0x1a);
 /// Colours of image outlines and of tie points; the ground has none like them.
 const IMAGE: usize = 3;
 const TIE: usize = 1;
@@ -218,13 +222,7 @@ impl Sheet {
             let ends = segment.map(|place| self.pixel(place)).to_vec();
             area.draw(&PathElement::new(ends, GRID.stroke_width(2)))?;
         }
-        for place in self
-            .shots
-            .iter()
-            .filter_map(|shot| self.place(shot.place_rad))
-        {
-            area.draw(&Circle::new(place, 2, INK.filled()))?;
-        }
+        self.draw_shots(area)?;
         for window in &self.shown.windows {
             self.draw_ring(&window.ring, INK.stroke_width(3), area)?;
         }
@@ -243,7 +241,7 @@ impl Sheet {
         }
         let frame = [(0, 0), (WIDTH as i32 - 1, self.height() - 1)];
         area.draw(&Rectangle::new(frame, INK.stroke_width(2)))?;
-        self.names(&lines).draw(area)?;
+        self.names(&lines).0.draw(area)?;
         let has_shots = !self.shown.rows.is_empty();
         let legend = Legend {
             top: self.height(),
@@ -252,6 +250,26 @@ impl Sheet {
             centre_rad: (self.map.longitude_rad(), self.map.latitude_rad()),
         };
         legend.draw(area)
+    }
+
+    /// Dark dots on a light band: both are the same on light and dark pages, as the ground is, which may be either.
+    fn draw_shots<'a>(&self, area: &Canvas<'a>) -> Drawn<'a> {
+        for (_, places) in &self.profiles {
+            let places: Vec<Option<(i32, i32)>> =
+                places.iter().map(|place| self.place(*place)).collect();
+            for track in tracks(&places) {
+                area.draw(&PathElement::new(track, WHITE.mix(0.55).stroke_width(9)))?;
+            }
+        }
+        let places = self
+            .shots
+            .iter()
+            .filter_map(|shot| self.place(shot.place_rad));
+        let dots = places.map(|place| Circle::new(place, 2, TRACK.filled()));
+        for dot in dots {
+            area.draw(&dot)?;
+        }
+        Ok(())
     }
 
     fn draw_ring<'a>(
@@ -270,6 +288,24 @@ impl Sheet {
         }
         Ok(())
     }
+}
+
+/// Lines along the shots of a profile, with a gap where shots are missing.
+fn tracks(places: &[Option<(i32, i32)>]) -> Vec<Vec<(i32, i32)>> {
+    let mut tracks: Vec<Vec<(i32, i32)>> = Vec::new();
+    for place in places.iter().copied().flatten() {
+        let is_near = |last: &(i32, i32)| {
+            f64::from(place.0 - last.0).hypot(f64::from(place.1 - last.1)) < TRACK_GAP
+        };
+        match tracks.last_mut() {
+            Some(track) if track.last().is_some_and(is_near) => track.push(place),
+            _ => tracks.push(vec![place]),
+        }
+    }
+    let lines = tracks
+        .into_iter()
+        .map(|track| straightened(track.into_iter()));
+    lines.filter(|line| line.len() > 1).collect()
 }
 
 /// A line without the points that rounding alone takes off it: straight edges stay straight.
@@ -334,6 +370,23 @@ pub(super) fn round_length_m(length: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn tracks_have_gaps_where_shots_are_missing() {
+        let places = [
+            Some((0, 0)),
+            Some((3, 20)),
+            Some((6, 40)),
+            None,
+            Some((30, 200)),
+            Some((33, 220)),
+            Some((500, 500)),
+        ];
+        assert_eq!(
+            tracks(&places),
+            [vec![(0, 0), (6, 40)], vec![(30, 200), (33, 220)]]
+        );
+    }
 
     #[test]
     fn scales_have_round_lengths() {

@@ -27,7 +27,7 @@ use crate::{
 /// Pairs that have a sentence of their own; tables have all.
 const PAIRS_TOLD: usize = 6;
 
-pub(super) use pair::BeforeAfter;
+pub(super) use pair::{BeforeAfter, by_footprints};
 
 pub(super) const SECTION: Section = Section {
     title: "Tie points and misregistration",
@@ -254,6 +254,8 @@ fn footprints(pairs: &[BeforeAfter]) -> String {
             Column::Number("after"),
             Column::Number("metres, before"),
             Column::Number("after"),
+            Column::Number("σ, m, before"),
+            Column::Number("after"),
             Column::Number("MOLA spacings, before"),
             Column::Number("after"),
             Column::Number("samples, before"),
@@ -323,9 +325,10 @@ fn profile_cells(
         pair.name().into(),
         pair.told("before", before.0, "lines/n", whole(before.1.lines.n)),
     ];
-    let quantities: [Quantity; 4] = [
+    let quantities: [Quantity; 5] = [
         ("lines/mean", |of| Some(label(of.lines.mean, 2))),
         ("along_m", |of| Some(label(of.along_m, 1))),
+        ("along_sigma_m", |of| Some(label(of.along_sigma_m, 1))),
         ("along_spacings", |of| Some(label(of.along_spacings?, 3))),
         ("samples/mean", |of| Some(label(of.samples.mean, 2))),
     ];

@@ -59,11 +59,11 @@ pub(super) fn figures(site: &SiteProducts, geometric: &GeometricProducts) -> Res
 /// the difference can be seen.
 fn footprints(before: &ImageProducts, after: &ImageProducts) -> Option<Plot> {
     let samples = f64::from(before.times.samples);
-    let near = -WIDTHS_BESIDE * samples..=(1.0 + WIDTHS_BESIDE) * samples;
+    let beside = -WIDTHS_BESIDE * samples..=(1.0 + WIDTHS_BESIDE) * samples;
     let all = moves(&before.registration.points, &after.registration.points);
     let all: Vec<Arrow> = all
         .into_iter()
-        .filter(|moved| near.contains(&moved.from.1))
+        .filter(|moved| beside.contains(&moved.from.1))
         .collect();
     let median = |of: fn(&Arrow) -> f64| {
         let values: Vec<f64> = all.iter().map(of).collect();
@@ -72,14 +72,11 @@ fn footprints(before: &ImageProducts, after: &ImageProducts) -> Option<Plot> {
     let (lines, across) = (median(|moved| moved.by.0), median(|moved| moved.by.1));
     let half = (MOVES_BESIDE * lines.abs()).max(LINES_BESIDE_MIN);
     let middle = median(|moved| moved.from.0);
-    let x = Extent {
-        low: middle - half,
-        high: middle + half,
-    };
+    let near = middle - half..=middle + half;
     let shown: Vec<Arrow> = all
         .iter()
         .copied()
-        .filter(|moved| x.contains(moved.from.0))
+        .filter(|moved| near.contains(&moved.from.0))
         .collect();
     let shown = thinned(&shown, DOTS_MAX);
     if shown.len() < NEAR_MIN {
@@ -97,6 +94,8 @@ fn footprints(before: &ImageProducts, after: &ImageProducts) -> Option<Plot> {
             (moved.from.0 + moved.by.0, moved.from.1 + moved.by.1)
         }),
     ];
+    let ends = shown.iter().map(|moved| moved.from.0 + moved.by.0);
+    let x = Extent::of(shown.iter().map(|moved| moved.from.0).chain(ends));
     let mut panel = Panel::of("sample", series);
     panel.arrows.push(Arrows {
         label: "moved".to_owned(),
@@ -105,7 +104,7 @@ fn footprints(before: &ImageProducts, after: &ImageProducts) -> Option<Plot> {
         each: shown,
     });
     let words = format!(
-        "Footprints near the middle, flight to the right. Median shift of all {}: {} lines, {} samples.",
+        "Footprints near the middle, flight to the right. Median shift of all {} within its lines, seen or beside it: {} lines, {} samples.",
         whole(all.len()),
         label(lines, 2),
         label(across, 2)
@@ -201,7 +200,10 @@ fn vectors(
         });
     }
     (!panels.is_empty()).then(|| Plot {
-        x: Extent::of([0.0, lines].into_iter()),
+        x: Extent {
+            low: -LONGEST * lines,
+            high: lines + LONGEST * lines,
+        },
         ..Plot::of(
             format!("Residual vectors on {}", image.times.id),
             words,

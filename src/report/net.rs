@@ -1,6 +1,7 @@
 //! The page of a triangulated net: verdict, bricks, blunders, controls, and vectors of all of them on a map.
 
 use super::{
+    checks,
     html::{Cell, Column, Section, Table, Tone, counted, list, page, paragraph, verdict},
     plots::{
         Arrow, Arrows, Extent, GREY, Panel, Plot, Series, figure, label, magnification, thinned,
@@ -60,7 +61,7 @@ fn lead(config: &NetConfig, net: &Triangulation) -> String {
         words = format!("{}. {words}", config.description);
     }
     let body = paragraph(&words) + &list(&net.verdict.reasons) + &list(&net.verdict.remarks);
-    verdict(tone, &headline, &body)
+    verdict(tone, &headline, &body) + &checks::listed(&net.verdict.checks)
 }
 
 /// What was done, by the paper's names.
@@ -89,11 +90,15 @@ fn map(title: &str, caption: &str, mut arrows: Vec<Arrows>, series: Vec<Series>)
     let points = || panel.series.iter().flat_map(|series| &series.points);
     plot.x = Extent::of(points().map(|point| point.0));
     panel.y = Extent::of(points().map(|point| point.1));
-    let (width, height) = (plot.x.high - plot.x.low, panel.y.high - panel.y.low);
-    panel.height = (AXIS_WIDTH * height / width).clamp(300.0, 1_400.0) as u32;
+    let width = plot.x.high - plot.x.low;
     for of in &mut arrows {
         of.magnification = magnification(&of.each, (VECTOR_ROOM * width, VECTOR_ROOM * width));
+        let tips = || of.each.iter().map(|arrow| of.tip(arrow));
+        plot.x = plot.x.with(tips().map(|tip| tip.0));
+        panel.y = panel.y.with(tips().map(|tip| tip.1));
     }
+    let (width, height) = (plot.x.high - plot.x.low, panel.y.high - panel.y.low);
+    panel.height = (AXIS_WIDTH * height / width).clamp(300.0, 1_400.0) as u32;
     panel.arrows = arrows
         .into_iter()
         .filter(|of| !of.each.is_empty())

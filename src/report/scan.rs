@@ -47,7 +47,7 @@ fn table(site: &SiteProducts) -> String {
             Column::Number("uncertainty"),
             Column::Number("configured"),
             Column::Number("best − configured"),
-            Column::Number("least spread scanned, m"),
+            Column::Number("spread at the nearest scanned, m"),
         ],
     );
     for (index, ranges) in site.ranges.profiles.iter().enumerate() {

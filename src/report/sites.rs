@@ -135,7 +135,7 @@ fn tone(site: &SiteLine) -> Tone {
 }
 
 fn table(sites: &[SiteLine]) -> String {
-    let mut table = Table::new(
+    let mut table = Table::of_cards(
         "Sites",
         &[
             Column::Text("site"),

@@ -7,7 +7,7 @@ use plotters::prelude::*;
 
 use super::{
     html::counted,
-    map::labels::{self, Labels, write},
+    map::labels::{self, Labels},
     misregistration::BeforeAfter,
     plots::{COLOURS, Canvas, Drawn, GRID, INK, WIDTH, drawn, figure_html, label, quoted},
 };
@@ -17,7 +17,6 @@ use crate::{
     products::{ImageProducts, SiteProducts},
     units::RADIANS_PER_DEGREE,
 };
-use plotters::style::text_anchor::HPos;
 
 /// Height of the picture, its centre and the radius of the outermost circle.
 const HEIGHT: u32 = 720;
@@ -29,6 +28,8 @@ const CIRCLES: i32 = 3;
 const OUTERMOST_DEG: [f64; 8] = [3.0, 6.0, 12.0, 30.0, 45.0, 60.0, 75.0, 90.0];
 /// Pairs that the caption tells; the table has all.
 const PAIRS_TOLD: usize = 3;
+/// Radius of the dot of an image.
+const DOT: i32 = 9;
 /// Colour of the images.
 const IMAGE: usize = 3;
 
@@ -48,7 +49,8 @@ pub(super) fn figure(site: &SiteProducts) -> Result<String> {
     if seen.len() < 2 {
         return Ok(String::new());
     }
-    let svg = drawn(HEIGHT, |area| draw(&seen, area))?;
+    let sky = Sky::of(&seen);
+    let svg = drawn(HEIGHT, |area| sky.draw(area))?;
     let mut csv = "image,azimuth_deg,emission_deg\n".to_owned();
     for of in &seen {
         let [azimuth, emission] =
@@ -61,7 +63,7 @@ pub(super) fn figure(site: &SiteProducts) -> Result<String> {
         title,
         &svg,
         &[],
-        &words(site, seen.len()),
+        &words(site, seen.len(), &sky.unnamed),
         &csv,
     ))
 }
@@ -86,11 +88,14 @@ fn azimuth_rad(ground_m: &Vector3<f64>, camera_m: &Vector3<f64>) -> f64 {
     towards.x.atan2(towards.y).rem_euclid(TAU)
 }
 
-fn words(site: &SiteProducts, images: usize) -> String {
+fn words(site: &SiteProducts, images: usize, unnamed: &[&str]) -> String {
     let mut words = format!(
         "{} seen from the ground at their middle; zenith at the centre.",
         counted(images, "image")
     );
+    if !unnamed.is_empty() {
+        words += &format!(" Not named for want of room: {}.", unnamed.join(", "));
+    }
     let Some(geometric) = &site.geometric else {
         return words;
     };
@@ -107,48 +112,87 @@ fn words(site: &SiteProducts, images: usize) -> String {
     words
 }
 
-fn draw<'a>(seen: &[Seen], area: &Canvas<'a>) -> Drawn<'a> {
-    let largest_deg = seen.iter().map(|of| of.emission_rad / RADIANS_PER_DEGREE);
-    let largest_deg = largest_deg.fold(0.0, f64::max);
-    let outermost = OUTERMOST_DEG.iter().find(|angle| **angle >= largest_deg);
-    let outermost_deg = outermost.copied().unwrap_or(90.0);
-    let place = |azimuth_rad: f64, emission_deg: f64| {
-        let far = RADIUS * emission_deg / outermost_deg;
+/// The plot, laid out.
+struct Sky<'a> {
+    outermost_deg: f64,
+    images: Vec<(i32, i32)>,
+    names: Labels,
+    /// Images for whose names there is no room.
+    unnamed: Vec<&'a str>,
+}
+
+impl<'a> Sky<'a> {
+    fn of(seen: &[Seen<'a>]) -> Self {
+        let emission_deg = |of: &Seen| of.emission_rad / RADIANS_PER_DEGREE;
+        let largest_deg = seen.iter().map(emission_deg).fold(0.0, f64::max);
+        let outermost = OUTERMOST_DEG.iter().find(|angle| **angle >= largest_deg);
+        let mut sky = Self {
+            outermost_deg: outermost.copied().unwrap_or(90.0),
+            images: Vec::new(),
+            names: Labels::new(WIDTH as i32, HEIGHT as i32),
+            unnamed: Vec::new(),
+        };
+        let at = |of: &Seen| sky.place(of.azimuth_rad, emission_deg(of));
+        sky.images = seen.iter().map(at).collect();
+        for image in &sky.images {
+            sky.names.keep_off(*image, DOT);
+        }
+        let [north, east] = [0.0, TAU / 4.0].map(|azimuth| sky.place(azimuth, sky.outermost_deg));
+        let above = (north.0 - labels::width("N") / 2, north.1 - 22);
+        let mut names = sky.names;
+        names.place("N", INK, std::iter::once(above));
+        names.place("E", INK, std::iter::once((east.0 + 12, east.1)));
+        for (of, image) in seen.iter().zip(&sky.images) {
+            if !names.place_around(of.image, INK, *image) {
+                sky.unnamed.push(of.image);
+            }
+        }
+        sky.names = names;
+        sky.name_circles();
+        sky
+    }
+
+    fn place(&self, azimuth_rad: f64, emission_deg: f64) -> (i32, i32) {
+        let far = RADIUS * emission_deg / self.outermost_deg;
         let (sine, cosine) = azimuth_rad.sin_cos();
         (
             CENTRE.0 + (far * sine).round() as i32,
             CENTRE.1 - (far * cosine).round() as i32,
         )
-    };
-    for spoke in 0..12 {
-        let ends = vec![CENTRE, place(f64::from(spoke) * TAU / 12.0, outermost_deg)];
-        area.draw(&PathElement::new(ends, GRID.stroke_width(2)))?;
     }
-    let mut names = Labels::new(WIDTH as i32, HEIGHT as i32);
-    for of in seen {
-        let (x, y) = place(of.azimuth_rad, of.emission_rad / RADIANS_PER_DEGREE);
-        area.draw(&Circle::new((x, y), 9, COLOURS[IMAGE].filled()))?;
-        let wide = labels::width(of.image);
-        let beside = [
-            (x + 16, y),
-            (x - wide - 16, y),
-            (x - wide / 2, y - 30),
-            (x - wide / 2, y + 30),
-        ];
-        names.place(of.image, COLOURS[IMAGE], beside.into_iter());
+
+    /// Emission angles of the circles, degrees.
+    fn circles(&self) -> impl Iterator<Item = f64> + use<> {
+        let outermost_deg = self.outermost_deg;
+        (1..=CIRCLES).map(move |circle| outermost_deg * f64::from(circle) / f64::from(CIRCLES))
     }
-    for circle in 1..=CIRCLES {
-        let emission_deg = outermost_deg * f64::from(circle) / f64::from(CIRCLES);
-        let radius = (RADIUS * emission_deg / outermost_deg).round() as i32;
-        area.draw(&Circle::new(CENTRE, radius, INK.mix(0.5).stroke_width(2)))?;
-        let text = format!("{}°", label(emission_deg, 0));
-        let (x, y) = place(TAU / 8.0, emission_deg);
-        names.place(&text, INK, [(x + 4, y - 14), (x - 50, y + 16)].into_iter());
+
+    /// The angle of each circle, on the first diagonal where there is room for it.
+    fn name_circles(&mut self) {
+        for emission_deg in self.circles() {
+            let text = format!("{}°", label(emission_deg, 0));
+            let diagonals = [1.0, 3.0, 5.0, 7.0].map(|eighth| {
+                let (x, y) = self.place(eighth * TAU / 8.0, emission_deg);
+                (x + 4, y - 14)
+            });
+            self.names.place(&text, INK, diagonals.into_iter());
+        }
     }
-    let (north, east) = (place(0.0, outermost_deg), place(TAU / 4.0, outermost_deg));
-    write(area, "N", (north.0, north.1 - 22), HPos::Center, INK)?;
-    write(area, "E", (east.0 + 12, east.1), HPos::Left, INK)?;
-    names.draw(area)
+
+    fn draw<'b>(&self, area: &Canvas<'b>) -> Drawn<'b> {
+        for spoke in 0..12 {
+            let end = self.place(f64::from(spoke) * TAU / 12.0, self.outermost_deg);
+            area.draw(&PathElement::new(vec![CENTRE, end], GRID.stroke_width(2)))?;
+        }
+        for emission_deg in self.circles() {
+            let radius = (RADIUS * emission_deg / self.outermost_deg).round() as i32;
+            area.draw(&Circle::new(CENTRE, radius, INK.mix(0.5).stroke_width(2)))?;
+        }
+        for image in &self.images {
+            area.draw(&Circle::new(*image, DOT, COLOURS[IMAGE].filled()))?;
+        }
+        self.names.draw(area)
+    }
 }
 
 #[cfg(test)]
@@ -165,5 +209,21 @@ mod tests {
         assert!((at(Vector3::new(0.0, 1e5, 0.0)) - 90.0).abs() < 1e-9); // degrees, rounding
         assert!((at(Vector3::new(0.0, -1e5, 0.0)) - 270.0).abs() < 1e-9);
         assert!(at(Vector3::new(0.0, 0.0, 1e5)).abs() < 1e-9);
+    }
+
+    #[test]
+    fn images_from_nearly_the_same_direction_are_all_named() {
+        let seen: Vec<Seen> = (0..9)
+            .map(|image| Seen {
+                image: "M00-00001",
+                // Beside the letter of the east, and at the zenith.
+                azimuth_rad: TAU / 4.0,
+                emission_rad: f64::from(image % 3) * 15.0 * RADIANS_PER_DEGREE,
+            })
+            .collect();
+        let sky = Sky::of(&seen);
+        assert_eq!(sky.unnamed, Vec::<&str>::new());
+        // North, east, nine images, three circles.
+        assert_eq!(sky.names.placed.len(), 2 + 9 + 3);
     }
 }

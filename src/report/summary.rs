@@ -2,10 +2,10 @@
 
 use super::{
     checks,
-    heights::{absolute, place_by},
+    heights::{is_open, place_by},
     html::{Tone, counted, escape, list, paragraph, verdict},
     map,
-    misregistration::BeforeAfter,
+    misregistration::{BeforeAfter, by_footprints},
     numbers::{number, signed, whole},
     source::told,
 };
@@ -13,7 +13,10 @@ use crate::{
     error::Result,
     footprints::AdjustmentModel,
     products::SiteProducts,
-    stages::judge::{Check, CheckKind},
+    stages::{
+        compare_pairs::PairComparison,
+        judge::{Check, CheckKind},
+    },
 };
 
 /// Reasons, and remarks, that are listed; the rest is counted.
@@ -186,11 +189,30 @@ fn between_images(site: &SiteProducts) -> Option<KeyNumber> {
             &format!("|{place}"),
         ),
         note: format!(
-            "at the tie points of {}; {} m before",
+            "at the tie points of {}, which the adjustment fits; {} m before{}",
             escape(&after.subject),
-            told(&number(before_m, 0), &before_place)
+            told(&number(before_m, 0), &before_place),
+            at_footprints(pair)
         ),
     })
+}
+
+/// How far apart the same images place footprints, which are not fitted, and how well the tie points tell that.
+fn at_footprints(pair: &BeforeAfter) -> String {
+    let of = |state: &str, pair_of: &PairComparison| {
+        let [apart_m, sigma_m] = by_footprints(pair_of)?;
+        let place = format!("{}/footprints", pair.place(state));
+        let told = |value: f64, name: &str| told(&number(value, 0), &format!("{place}/{name}"));
+        Some([told(apart_m, "apart_m"), told(sigma_m, "apart_sigma_m")])
+    };
+    let [before, after] = [("before", Some(pair.before)), ("after", pair.after)]
+        .map(|(state, found)| of(state, found?));
+    let (Some([before_m, before_sigma_m]), Some([after_m, sigma_m])) = (before, after) else {
+        return String::new();
+    };
+    format!(
+        ". Footprints, not fitted: {after_m} m (σ {sigma_m} m), before {before_m} m (σ {before_sigma_m} m)"
+    )
 }
 
 /// Where the products tell of heights.
@@ -201,31 +223,28 @@ fn in_place(site: &SiteProducts) -> Option<KeyNumber> {
     let (geometric, adjustment) = site.adjustment()?;
     let heights = adjustment.adjusted.heights.as_ref()?;
     let [east_m, north_m, up_m] = heights.mean_sigma_m;
-    let [_, place] = absolute(&geometric, &adjustment);
     Some(KeyNumber {
         what: "Absolute accuracy, 1 σ",
         value: told(
             &format!(
-                "±{} m plan, ±{} m height",
-                number(east_m.max(north_m), 0),
+                "±{} m east, ±{} m north, ±{} m height",
+                number(east_m, 0),
+                number(north_m, 0),
                 number(up_m, 1)
             ),
-            &format!(
-                "{HEIGHTS}/mean_sigma_m/{} {HEIGHTS}/mean_sigma_m/2",
-                usize::from(north_m > east_m)
-            ),
+            &format!("{HEIGHTS}/mean_sigma_m/0 {HEIGHTS}/mean_sigma_m/1 {HEIGHTS}/mean_sigma_m/2"),
         ),
-        note: if place.contains(';') {
-            escape(&format!(
+        note: escape(&if is_open(&geometric, &adjustment) {
+            format!(
                 "by {}; see accuracy for what is open",
                 place_by(&geometric, &adjustment)
-            ))
+            )
         } else {
-            escape(&format!(
-                "plan by {}, height by MOLA",
+            format!(
+                "position by {}, height by MOLA",
                 place_by(&geometric, &adjustment)
-            ))
-        },
+            )
+        }),
     })
 }
 

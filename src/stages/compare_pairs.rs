@@ -76,6 +76,11 @@ pub struct FootprintsByTies {
     pub tie_lines: Summary,
     /// What it leaves of the tie points' samples.
     pub tie_samples: Summary,
+    /// How far apart along the flight the images place their footprints, metres: the size of `along_m`, averaged over the
+    /// footprints of all profiles. `None` without any.
+    pub apart_m: Option<f64>,
+    /// Its standard deviation by the scatter of the tie points, metres; that of all profiles is one error.
+    pub apart_sigma_m: Option<f64>,
     /// Profiles with footprints that both images show.
     pub profiles: Vec<ProfileByTies>,
     /// Footprints within the lines of both images that one of them does not show: they do not count.
@@ -93,6 +98,8 @@ pub struct ProfileByTies {
     pub samples: Summary,
     /// The mean in lines on the ground, metres.
     pub along_m: f64,
+    /// Its standard deviation by the scatter of the tie points, metres.
+    pub along_sigma_m: f64,
     /// The same in distances of successive footprints of the profile; `None` for a single one.
     pub along_spacings: Option<f64>,
     /// Footprints beyond the tie points.
@@ -128,7 +135,7 @@ stage_inputs! {
 
 impl Stage for ComparePairs<'_> {
     const NAME: &'static str = "compare_pairs";
-    const METHOD: u32 = 3;
+    const METHOD: u32 = 4;
     type Output = Vec<PairComparison>;
     stage_inputs!(fingerprint);
 
@@ -341,6 +348,7 @@ fn footprints_by_ties<M: ExteriorOrientation>(
             lines: found.lines,
             samples: found.samples,
             along_m,
+            along_sigma_m: found.lines_sigma * line_spacing_m,
             along_spacings: spacing_m.map(|spacing_m| along_m / spacing_m),
             beyond_ties: u32::try_from(found.beyond_ties).unwrap_or(u32::MAX),
             heights,
@@ -354,9 +362,21 @@ fn footprints_by_ties<M: ExteriorOrientation>(
         ties_rejected: count(fit.ties_rejected),
         tie_lines: fit.tie_lines,
         tie_samples: fit.tie_samples,
+        apart_m: over_footprints(&compared, |of| of.along_m.abs()),
+        apart_sigma_m: over_footprints(&compared, |of| of.along_sigma_m),
         profiles: compared,
         outside: count(outside),
     })
+}
+
+/// Mean of a number of each profile, its footprints as weights; `None` without any.
+fn over_footprints(profiles: &[ProfileByTies], of: fn(&ProfileByTies) -> f64) -> Option<f64> {
+    let (mut footprints, mut sum) = (0.0, 0.0);
+    for profile in profiles {
+        footprints += f64::from(profile.lines.n);
+        sum += f64::from(profile.lines.n) * of(profile);
+    }
+    (footprints > 0.0).then(|| sum / footprints)
 }
 
 /// Line and sample of a tie point in both images.

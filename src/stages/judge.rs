@@ -3,9 +3,11 @@
 mod adjustment;
 mod check;
 mod checks;
+mod kind;
 mod surface;
 
-pub use check::{Check, CheckKind, CheckOutcome};
+pub use check::{Check, CheckOutcome};
+pub use kind::CheckKind;
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -34,12 +36,38 @@ pub struct Verdict {
     pub reasons: Vec<String>,
     /// What a reader must weigh although no limit is broken.
     pub remarks: Vec<String>,
-    /// Every limit with what uses most of it, the worst first; of a net of pictures none.
+    /// Every limit with what uses most of it, the worst first.
     #[serde(default)]
     pub checks: Vec<Check>,
 }
 
 impl Verdict {
+    /// Sentences and checks are two accounts of the same evidence: what either finds is told.
+    pub(in crate::stages) fn of(
+        mut reasons: Vec<String>,
+        mut remarks: Vec<String>,
+        mut checks: Vec<Check>,
+    ) -> Self {
+        let failed = in_words(&checks, CheckOutcome::Fail);
+        if reasons.is_empty() {
+            reasons = failed;
+        } else if failed.is_empty() {
+            let told = Check::told(CheckKind::Contradiction, "", CheckOutcome::Fail);
+            checks.push(told);
+        }
+        if remarks.is_empty() {
+            remarks = in_words(&checks, CheckOutcome::Warning);
+        }
+        // The worst first, and of equals the most independent.
+        checks.sort_by_key(|check| (check.outcome, check.kind));
+        Self {
+            valid: reasons.is_empty(),
+            reasons,
+            remarks,
+            checks,
+        }
+    }
+
     /// The verdict in one word or three, as every message and page has it.
     #[must_use]
     pub const fn word(&self) -> &'static str {
@@ -132,31 +160,16 @@ pub struct AdjustmentEvidence<'a> {
 /// Judges a site by its limits and by what contradicts itself.
 #[must_use]
 pub fn judge(evidence: &Evidence<'_>) -> Verdict {
-    let mut reasons = evidence.invalid_because();
     let mut checks = checks::checks(evidence);
     for check in &mut checks {
         check.say(&evidence.wording);
     }
-    let mut remarks = evidence.remarks();
-    // Sentences and checks are two accounts of the same evidence: what either finds is told.
-    let failed = in_words(&checks, CheckOutcome::Fail);
-    if reasons.is_empty() {
-        reasons = failed;
-    } else if failed.is_empty() {
-        checks.insert(
-            0,
-            Check::told(CheckKind::Contradiction, "", CheckOutcome::Fail),
-        );
-    }
-    if remarks.is_empty() {
-        remarks = in_words(&checks, CheckOutcome::Warning);
-    }
+    let verdict = Verdict::of(evidence.invalid_because(), evidence.remarks(), checks);
     let said = |sentence: String| with_minus(&evidence.wording.of(sentence));
     Verdict {
-        valid: reasons.is_empty(),
-        reasons: reasons.into_iter().map(said).collect(),
-        remarks: remarks.into_iter().map(said).collect(),
-        checks,
+        reasons: verdict.reasons.into_iter().map(said).collect(),
+        remarks: verdict.remarks.into_iter().map(said).collect(),
+        ..verdict
     }
 }
 
@@ -171,7 +184,10 @@ impl Evidence<'_> {
     fn invalid_because(&self) -> Vec<String> {
         let mut reasons = Vec::new();
         if self.footprints == Some(0) {
-            reasons.push("no footprint in any window".to_owned());
+            reasons.push(
+                "no footprint in any window: look at windows and pedr.filter, and whether pedr.files are of the site's orbits"
+                    .to_owned(),
+            );
         }
         for profile in &self.ranges.profiles {
             for reason in &profile.invalid_because {

@@ -35,7 +35,10 @@ const ELSEWHERE: [(&str, &str); 10] = [
 /// Columns of numbers that follow from others of their row or from Parquet, by the table that they are in.
 const DERIVED: [(&str, &str); 14] = [
     ("Correction of least spread", "best − configured"),
-    ("Correction of least spread", "least spread scanned, m"),
+    (
+        "Correction of least spread",
+        "spread at the nearest scanned, m",
+    ),
     ("Images (Table 2", "duration, s"),
     ("Images (Table 2", "range at the middle, km"),
     ("Images (Table 2", "emission, degrees"),

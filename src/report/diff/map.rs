@@ -49,13 +49,25 @@ pub(super) fn figure_of(site: &RunDifference) -> Result<String> {
             (*name, arrows.collect())
         })
         .collect();
-    let (x, y, height) = sheet(groups.iter().flat_map(|(_, arrows)| arrows));
+    let starts = || {
+        let all = groups.iter().flat_map(|(_, arrows)| arrows);
+        all.map(|arrow| arrow.from)
+    };
+    let (x, y, _) = sheet(starts());
     let room = (LONGEST * (x.high - x.low), LONGEST * (y.high - y.low));
     let longest: Vec<Arrow> = groups
         .iter()
         .flat_map(|(_, arrows)| arrows.clone())
         .collect();
     let times = magnification(&longest, room);
+    let tip = |arrow: &Arrow| {
+        (
+            arrow.from.0 + times * arrow.by.0,
+            arrow.from.1 + times * arrow.by.1,
+        )
+    };
+    // With room for the vectors themselves.
+    let (x, y, height) = sheet(starts().chain(longest.iter().map(tip)));
     let mut panel = Panel {
         y,
         height,
@@ -109,9 +121,9 @@ fn kinds(site: &RunDifference) -> [(&'static str, Vec<Moved>); 3] {
 }
 
 /// Axes of one scale that hold all places, and the height of the map.
-fn sheet<'a>(arrows: impl Iterator<Item = &'a Arrow> + Clone) -> (Extent, Extent, u32) {
-    let x = Extent::of(arrows.clone().map(|arrow| arrow.from.0));
-    let y = Extent::of(arrows.map(|arrow| arrow.from.1));
+fn sheet(places: impl Iterator<Item = (f64, f64)> + Clone) -> (Extent, Extent, u32) {
+    let x = Extent::of(places.clone().map(|place| place.0));
+    let y = Extent::of(places.map(|place| place.1));
     let wide = f64::from(WIDTH - BESIDE);
     let (width_km, height_km) = (x.high - x.low, y.high - y.low);
     let height = (wide * height_km / width_km).clamp(HEIGHTS[0], HEIGHTS[1]);
@@ -134,13 +146,9 @@ mod tests {
 
     #[test]
     fn both_axes_have_one_scale() {
-        let at = |x: f64, y: f64| Arrow {
-            from: (x, y),
-            by: (0.0, 0.0),
-        };
         for (width_km, height_km) in [(1.0, 1.0), (3.0, 200.0), (500.0, 2.0)] {
-            let ends = [at(0.0, 0.0), at(width_km, height_km)];
-            let (x, y, height) = sheet(ends.iter());
+            let ends = [(0.0, 0.0), (width_km, height_km)];
+            let (x, y, height) = sheet(ends.into_iter());
             let [across, up] = [
                 f64::from(WIDTH - BESIDE) / (x.high - x.low),
                 f64::from(height) / (y.high - y.low),

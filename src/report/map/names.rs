@@ -12,8 +12,10 @@ use super::{
 };
 
 impl Sheet {
-    /// Names of images first, then of the graticule, then of as many profiles as there is room for.
-    pub(super) fn names(&self, lines: &[GridLine]) -> Labels {
+    /// Names of images first, then of the graticule, then of as many profiles as there is room for; and how many images
+    /// and profiles are left without.
+    pub(super) fn names(&self, lines: &[GridLine]) -> (Labels, usize) {
+        let mut unnamed = 0;
         let mut labels = Labels::new(WIDTH as i32, self.height());
         for image in &self.shown.images {
             let wide = labels::width(&image.name);
@@ -26,7 +28,8 @@ impl Sheet {
             let beside = corners
                 .iter()
                 .flat_map(|(x, y)| [(x + 10, *y), (x - wide - 10, *y), (x - wide / 2, y - 22)]);
-            labels.place(&image.name, COLOURS[IMAGE], beside);
+            let placed = labels.place(&image.name, COLOURS[IMAGE], beside);
+            unnamed += usize::from(!placed);
         }
         for line in lines {
             labels.place(&line.name, labels::PLAIN, self.places_of(line).into_iter());
@@ -41,9 +44,10 @@ impl Sheet {
                     .into_iter()
                     .chain([(x + 8, y), (x - wide - 8, y)])
             });
-            labels.place(name, labels::PLAIN, beside);
+            let placed = labels.place(name, labels::PLAIN, beside);
+            unnamed += usize::from(!placed);
         }
-        labels
+        (labels, unnamed)
     }
 
     /// Where a line of the graticule may have its name: a parallel at the left or right edge, a meridian at the lower or

@@ -4,6 +4,7 @@ use std::fmt::Write as _;
 
 use super::{
     super::{
+        graticule::graticule,
         html::counted,
         outlines::Outline,
         plots::{Key, label, quoted},
@@ -52,6 +53,11 @@ impl Sheet {
             );
         }
         words += &self.ellipses.words();
+        let lines = graticule(&self.map, &self.view);
+        let (_, unnamed) = self.names(&lines);
+        if unnamed > 0 {
+            words += &format!("Without room for {}. ", counted(unnamed, "name"));
+        }
         let south = self.map.latitude_rad() < 0.0;
         words
             + &format!(

@@ -106,16 +106,16 @@ impl<'a> BeforeAfter<'a> {
 
     /// Whether footprints tell how far apart the images are, before and after alike; otherwise tie points do.
     fn by_footprints(&self) -> bool {
-        self.states()
-            .all(|(_, pair)| footprints_apart_m(pair).is_some())
+        self.states().all(|(_, pair)| by_footprints(pair).is_some())
     }
 
     /// How far apart the images of `pair`, one of the states, place the same thing.
     fn apart(&self, pair: &PairComparison) -> Apart {
-        let by_footprints_m = footprints_apart_m(pair).filter(|_| self.by_footprints());
-        let metres = by_footprints_m.unwrap_or(pair.along_track_parallax_m);
+        let by_footprints = by_footprints(pair).filter(|_| self.by_footprints());
+        let metres = by_footprints.map_or(pair.along_track_parallax_m, |[metres, _]| metres);
         Apart {
             metres,
+            sigma_m: by_footprints.map(|[_, sigma_m]| sigma_m),
             spacings: pair.mola_spacing_m.map(|spacing_m| metres / spacing_m),
         }
     }
@@ -125,30 +125,31 @@ impl<'a> BeforeAfter<'a> {
 struct Apart {
     /// Metres on the ground, without sign.
     metres: f64,
+    /// Its standard deviation; `None` where tie points tell.
+    sigma_m: Option<f64>,
     /// The same in distances of successive footprints.
     spacings: Option<f64>,
 }
 
 impl Apart {
     fn in_words(&self) -> String {
-        let metres = label(self.metres, usize::from(self.metres < 10.0));
+        let metres = |metres| format!("{} m", label(metres, usize::from(metres < 10.0)));
+        let sigma = self
+            .sigma_m
+            .map(|sigma_m| format!(", σ {}", metres(sigma_m)));
+        let metres = metres(self.metres) + &sigma.unwrap_or_default();
         self.spacings.map_or_else(
-            || format!("{metres} m"),
+            || metres.clone(),
             |spacings| {
                 let decimals = if spacings < 0.1 { 3 } else { 2 };
-                format!("{} MOLA spacings ({metres} m)", label(spacings, decimals))
+                format!("{} MOLA spacings ({metres})", label(spacings, decimals))
             },
         )
     }
 }
 
-/// Mean size over all footprints that both images of `pair` show, metres; `None` where there are none.
-fn footprints_apart_m(pair: &PairComparison) -> Option<f64> {
-    let profiles = pair.footprints.iter().flat_map(|found| &found.profiles);
-    let (mut shots, mut metres) = (0.0, 0.0);
-    for profile in profiles {
-        shots += f64::from(profile.lines.n);
-        metres += f64::from(profile.lines.n) * profile.along_m.abs();
-    }
-    (shots > 0.0).then(|| metres / shots)
+/// How far apart two images place their footprints, and the standard deviation of that, metres.
+pub(in crate::report) fn by_footprints(pair: &PairComparison) -> Option<[f64; 2]> {
+    let found = pair.footprints.as_ref()?;
+    Some([found.apart_m?, found.apart_sigma_m?])
 }

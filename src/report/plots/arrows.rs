@@ -50,7 +50,8 @@ impl Arrows {
         self.magnification.to_string()
     }
 
-    fn tip(&self, arrow: &Arrow) -> (f64, f64) {
+    /// Where an arrow ends as it is drawn.
+    pub(in crate::report) fn tip(&self, arrow: &Arrow) -> (f64, f64) {
         (
             arrow.from.0 + self.magnification * arrow.by.0,
             arrow.from.1 + self.magnification * arrow.by.1,
@@ -79,16 +80,25 @@ pub(super) fn draw_arrows<'a>(
     chart: &mut Chart<'a, '_>,
 ) -> Drawn<'a> {
     let style = COLOURS[arrows.colour % COLOURS.len()].stroke_width(2);
-    let held = |(x, y): (f64, f64)| (plot.x.clamp(x), panel.y.clamp(y));
-    let ends = arrows.each.iter().map(|arrow| {
-        let (from, tip) = (held(arrow.from), held(arrows.tip(arrow)));
-        let [start, end] = [from, tip].map(|place| chart.backend_coord(&place));
-        (from, (end.0 - start.0, end.1 - start.1))
+    let frame = plot.frame(panel);
+    let drawn = arrows.each.iter().filter_map(|arrow| {
+        let tip = arrows.tip(arrow);
+        let [from, end] = frame.clip(arrow.from, tip)?;
+        let [start, stop] = [from, end].map(|place| chart.backend_coord(&place));
+        let by = (stop.0 - start.0, stop.1 - start.1);
+        // What is cut has no point: it goes on.
+        let line = if frame.contains(tip) {
+            outline(by)
+        } else {
+            vec![(0, 0), by]
+        };
+        Some((from, line))
     });
-    let ends: Vec<_> = ends.collect();
+    let drawn: Vec<_> = drawn.collect();
     chart.draw_series(
-        ends.into_iter()
-            .map(|(from, by)| EmptyElement::at(from) + PathElement::new(outline(by), style)),
+        drawn
+            .into_iter()
+            .map(|(from, line)| EmptyElement::at(from) + PathElement::new(line, style)),
     )?;
     Ok(())
 }

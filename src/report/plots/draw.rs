@@ -3,7 +3,7 @@
 use plotters::prelude::*;
 
 use super::{
-    Extent, GRID, INK, LETTERS, MARK, Panel, Plot, Series, Style, WIDTH,
+    Frame, GRID, INK, LETTERS, MARK, Panel, Plot, Series, Style, WIDTH,
     arrows::draw_arrows,
     canvas::{Canvas, Chart, Drawn, label},
 };
@@ -18,13 +18,15 @@ const X_LABELS: usize = 6;
 const SIDE: u32 = 176;
 /// Width of the bars at the right side.
 const BARS: u32 = 150;
+/// Labels with so many decimals have no room beside the name of their axis.
+const DECIMALS_MANY: usize = 5;
 /// Number of bars over the range of a panel.
 const BAR_COUNT: usize = 24;
 
 pub(super) fn plot<'a>(plot: &Plot, area: &Canvas<'a>) -> Drawn<'a> {
-    let last = plot.panels.len().saturating_sub(1);
+    let last = plot.drawn().count().saturating_sub(1);
     let mut rest = area.clone();
-    for (place, panel) in plot.panels.iter().enumerate() {
+    for (place, panel) in plot.drawn().enumerate() {
         let lowest = place == last;
         let height = panel.height + if lowest { FOOT } else { 0 };
         let (own, below) = rest.split_vertically(height);
@@ -36,7 +38,7 @@ pub(super) fn plot<'a>(plot: &Plot, area: &Canvas<'a>) -> Drawn<'a> {
 
 fn draw_panel<'a>(plot: &Plot, panel: &Panel, lowest: bool, area: &Canvas<'a>) -> Drawn<'a> {
     let foot = if lowest { FOOT } else { 0 };
-    let histograms = plot.panels.iter().any(|panel| panel.histogram);
+    let histograms = plot.drawn().any(|panel| panel.histogram);
     let width = if histograms { WIDTH - BARS } else { WIDTH };
     let (left, right) = area.split_horizontally(width);
     let mut chart = ChartBuilder::on(&left)
@@ -47,11 +49,12 @@ fn draw_panel<'a>(plot: &Plot, panel: &Panel, lowest: bool, area: &Canvas<'a>) -
         .y_label_area_size(SIDE)
         .build_cartesian_2d(plot.x.range(), panel.y.range())?;
     let y_labels = if panel.height < 300 { 5 } else { 8 };
-    let (x_decimals, y_decimals) = (plot.x.decimals(X_LABELS), panel.y.decimals(y_labels));
+    let x_decimals = plot.x.decimals(X_LABELS);
+    let (y_label, y_scale, y_decimals) = scaled(panel.y_label, panel.y.decimals(y_labels));
     chart
         .configure_mesh()
         .x_desc(if lowest { plot.x_label } else { "" })
-        .y_desc(panel.y_label)
+        .y_desc(y_label)
         .x_labels(X_LABELS)
         .y_labels(y_labels)
         .max_light_lines(0)
@@ -64,13 +67,13 @@ fn draw_panel<'a>(plot: &Plot, panel: &Panel, lowest: bool, area: &Canvas<'a>) -
             if panel.log {
                 power(*y)
             } else {
-                label(*y, y_decimals)
+                label(*y * y_scale, y_decimals)
             }
         })
         .draw()?;
     draw_marks(plot, panel, &mut chart)?;
     for series in &panel.series {
-        draw_series(plot.x, panel.y, series, &mut chart)?;
+        draw_series(&plot.frame(panel), series, &mut chart)?;
     }
     for arrows in &panel.arrows {
         draw_arrows(plot, panel, arrows, &mut chart)?;
@@ -79,6 +82,24 @@ fn draw_panel<'a>(plot: &Plot, panel: &Panel, lowest: bool, area: &Canvas<'a>) -
         draw_histogram(panel, foot, &right)?;
     }
     Ok(())
+}
+
+/// The name of an axis, what its labels are multiplied by, and their decimals: many zeros go into the unit.
+fn scaled(name: &str, decimals: usize) -> (String, f64, usize) {
+    let (power, written) = match decimals {
+        0..DECIMALS_MANY => return (name.to_owned(), 1.0, decimals),
+        DECIMALS_MANY..=6 => (6, "10⁻⁶"),
+        _ => (9, "10⁻⁹"),
+    };
+    let name = name.rsplit_once(", ").map_or_else(
+        || format!("{name}, {written}"),
+        |(what, unit)| format!("{what}, {written} {unit}"),
+    );
+    (
+        name,
+        10_f64.powi(power),
+        decimals.saturating_sub(power as usize),
+    )
 }
 
 /// The value of a logarithm, to a digit between the powers of ten.
@@ -114,18 +135,17 @@ fn draw_marks<'a>(plot: &Plot, panel: &Panel, chart: &mut Chart<'a, '_>) -> Draw
     Ok(())
 }
 
-fn draw_series<'a>(x: Extent, y: Extent, series: &Series, chart: &mut Chart<'a, '_>) -> Drawn<'a> {
+fn draw_series<'a>(frame: &Frame, series: &Series, chart: &mut Chart<'a, '_>) -> Drawn<'a> {
     let colour = series.rgb();
-    let points = series
-        .points
-        .iter()
-        .map(|point| (x.clamp(point.0), y.clamp(point.1)));
+    let points = series.points.iter().map(|point| frame.hold(*point));
     match series.style {
         Style::Dots => {
             chart.draw_series(points.map(|point| Circle::new(point, 4, colour.filled())))?;
         }
         Style::Line => {
-            chart.draw_series(LineSeries::new(points, colour.stroke_width(3)))?;
+            for piece in frame.pieces(&series.points) {
+                chart.draw_series(LineSeries::new(piece, colour.stroke_width(3)))?;
+            }
         }
         Style::Bars => {
             let points: Vec<(f64, f64)> = points.collect();
@@ -170,7 +190,7 @@ fn draw_histogram<'a>(panel: &Panel, foot: u32, area: &Canvas<'a>) -> Drawn<'a> 
                 (0.0, low + 0.1 * step),
                 (f64::from(*count), low + 0.9 * step),
             ],
-            super::COLOURS[super::GREY].filled(),
+            super::COLOURS[super::GREY].mix(0.6).filled(),
         )
     }))?;
     Ok(())
@@ -194,12 +214,21 @@ fn histogram(panel: &Panel) -> Vec<u32> {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
+    use super::{super::Extent, *};
 
     #[test]
     fn logarithmic_axes_have_values() {
         let names = [-3.0, -0.5, 0.0, 1.5, 4.0].map(power);
         assert_eq!(names, ["0.001", "0.32", "1", "32", "10\u{202f}000"]);
+    }
+
+    #[test]
+    fn many_zeros_go_into_the_unit() {
+        let of = |decimals| scaled("camera moved, m", decimals);
+        assert_eq!(of(4), ("camera moved, m".to_owned(), 1.0, 4));
+        assert_eq!(of(6), ("camera moved, 10⁻⁶ m".to_owned(), 1e6, 0));
+        assert_eq!(of(8).2, 0);
+        assert_eq!(scaled("strain", 5).0, "strain, 10⁻⁶");
     }
 
     #[test]

@@ -2,14 +2,18 @@
 
 mod arrows;
 mod canvas;
+#[cfg(test)]
+mod colour_difference;
 mod draw;
 mod figure;
+mod frame;
 mod palette;
 
 pub(super) use arrows::{Arrow, Arrows, magnification};
 pub(super) use canvas::{Canvas, Drawn, draw_text, drawn, label};
 pub(super) use figure::{Key, figure_html, with_files};
-pub(super) use palette::{COLOURS, GREY, GRID, INK, MARK};
+pub(super) use frame::Frame;
+pub(super) use palette::{COLOURS, GREY, GRID, INK, MARK, SOFT};
 
 use std::fmt::Write as _;
 
@@ -18,12 +22,17 @@ use plotters::{
     style::RGBColor,
 };
 
+use super::html::paragraph;
 use crate::error::Result;
 
 /// Width of a plot in its own units; pages show about half as many pixels, so that lines stay fine.
 pub(super) const WIDTH: u32 = 1040;
 /// Size of letters in the same units.
 pub(super) const LETTERS: u32 = 34;
+/// Values below this are what rounding leaves of zero.
+const ROUNDING: f64 = 1e-9;
+/// The shortest axis: labels have at most nine decimals.
+const SHORTEST: f64 = 1e-7;
 
 /// How a series is drawn.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -82,7 +91,7 @@ pub(super) struct Mark {
     pub(super) colour: RGBColor,
 }
 
-/// One panel; points outside its range are drawn at the edge.
+/// One panel; points outside its range are drawn at the edge, and counted in the caption.
 #[derive(Debug)]
 pub(super) struct Panel {
     pub(super) y_label: &'static str,
@@ -96,6 +105,8 @@ pub(super) struct Panel {
     pub(super) limits: Vec<f64>,
     /// Whether the dots are counted in bars at the right side.
     pub(super) histogram: bool,
+    /// What is smaller than this everywhere is said in the caption instead.
+    pub(super) least: f64,
     /// Whether the points hold logarithms to base 10 of the values; axis and data have the values.
     pub(super) log: bool,
 }
@@ -113,6 +124,7 @@ impl Panel {
             marks: Vec::new(),
             limits: Vec::new(),
             histogram: false,
+            least: ROUNDING,
             log: false,
         }
     }
@@ -177,7 +189,7 @@ impl Plot {
     /// Entries of the legend: every label once.
     fn keys(&self) -> Vec<Key> {
         let mut keys: Vec<Key> = Vec::new();
-        for panel in &self.panels {
+        for panel in self.drawn() {
             let series = panel
                 .series
                 .iter()
@@ -211,18 +223,21 @@ pub(super) fn quoted(text: &str) -> String {
     }
 }
 
-/// The plot as a figure.
+/// The plot as a figure; in words alone where there is nothing to draw.
 ///
 /// # Errors
 /// A plot that the library refuses, which is a bug in areograph.
 pub(super) fn figure(plot: &Plot) -> Result<String> {
-    let height = plot.panels.iter().map(|panel| panel.height).sum::<u32>() + draw::FOOT;
+    if plot.drawn().next().is_none() {
+        return Ok(paragraph(&format!("{}: {}", plot.title, plot.told())));
+    }
+    let height = plot.drawn().map(|panel| panel.height).sum::<u32>() + draw::FOOT;
     let svg = drawn(height, |area| draw::plot(plot, area))?;
     Ok(figure_html(
         &plot.title,
         &svg,
         &plot.keys(),
-        &plot.caption,
+        &plot.told(),
         &plot.csv(),
     ))
 }
@@ -248,14 +263,28 @@ impl Extent {
                 high: 1.0,
             };
         }
-        // Values that agree to a thousandth (of a metre, degree, second) still get an axis with room for labels.
-        let margin = (0.05 * (high - low))
-            .max(1e-9 * high.abs().max(low.abs()))
-            .max(1e-3);
+        let (length, size) = (high - low, high.abs().max(low.abs()));
+        // Values that agree still get an axis with room for labels.
+        let margin = if length > SHORTEST.max(1e-9 * size) {
+            0.05 * length
+        } else if size > SHORTEST {
+            (0.5 * size).min(1e-3).max(1e-9 * size)
+        } else {
+            1.0
+        };
         Self {
             low: low - margin,
             high: high + margin,
         }
+    }
+
+    /// The same, longer where that takes to hold `values` too, with a margin.
+    pub(super) fn with(self, values: impl Iterator<Item = f64>) -> Self {
+        let beyond: Vec<f64> = values.filter(|value| !self.contains(*value)).collect();
+        if beyond.is_empty() {
+            return self;
+        }
+        Self::of(beyond.into_iter().chain([self.low, self.high]))
     }
 
     fn clamp(self, value: f64) -> f64 {
@@ -309,6 +338,8 @@ mod tests {
             vec![],
             vec![0.0],
             vec![3.4e6],
+            vec![1e-12, 2e-12],
+            vec![2e-5],
             vec![-1.0, 2.0],
             vec![f64::NAN, 1.0],
         ] {
@@ -320,6 +351,17 @@ mod tests {
                     .all(|v| v.is_nan() || (extent.low < *v && *v < extent.high))
             );
         }
+    }
+
+    #[test]
+    fn axes_fit_what_is_small() {
+        let extent = Extent::of([0.0, 2e-5].into_iter());
+        let length = extent.high - extent.low;
+        assert!((length / 2.2e-5 - 1.0).abs() < 1e-9, "{length}"); // rounding
+        assert_eq!(extent.decimals(6), 6);
+        // A single value shows where zero is not.
+        let extent = Extent::of(std::iter::once(2e-5));
+        assert!(extent.low > 0.0 && extent.high < 1e-4);
     }
 
     #[test]

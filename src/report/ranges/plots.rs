@@ -126,11 +126,15 @@ fn profile_plot(site: &SiteProducts, index: usize, limit: usize) -> Plot {
         .iter()
         .any(|limit| panel.y.low < *limit && *limit < panel.y.high);
     let angles = Series::dots("shots", 0, thinned(&shots.off_nadir_deg, limit));
-    let mut angle_panel = Panel::of("off nadir, °", vec![angles]);
-    angle_panel.height = 190;
-    angle_panel.y = Extent {
-        low: 0.0,
-        high: angle_panel.y.high.max(OFF_NADIR_LEAST_DEG),
+    let from_zero = Extent::of(angles.points.iter().map(|shot| shot.1).chain([0.0]));
+    let angle_panel = Panel {
+        height: 190,
+        y: Extent {
+            low: 0.0,
+            high: from_zero.high.max(OFF_NADIR_LEAST_DEG),
+        },
+        least: NADIR_DEG,
+        ..Panel::of("off nadir, °", vec![angles])
     };
     let mut caption = words(ranges);
     let within = ranges.mean_without_outliers_m.abs() <= mean_max_m;
@@ -146,6 +150,8 @@ fn profile_plot(site: &SiteProducts, index: usize, limit: usize) -> Plot {
     Plot::of(title, caption, x, vec![panel, angle_panel])
 }
 
+/// Profiles that never look farther off nadir than this have no axis of it.
+const NADIR_DEG: f64 = 0.05;
 /// The axis of off-nadir angles reaches this at least: below, nothing is worth an axis.
 const OFF_NADIR_LEAST_DEG: f64 = 1.0;
 

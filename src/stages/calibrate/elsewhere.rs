@@ -1,6 +1,7 @@
 //! What other orbits have against a calibration that they took no part in.
 
 use super::result::{CameraResult, PointKind, ValidationResult};
+use crate::stages::judge::{Check, CheckKind, CheckOutcome};
 
 /// A figure of control may become worse by so many standard deviations of measurement and laser.
 const WORSE_MAX: f64 = 3.0;
@@ -26,21 +27,33 @@ struct Compared {
     noise_m: f64,
 }
 
-/// Reasons, then remarks.
+/// What other orbits say.
+#[derive(Default)]
+pub(super) struct Elsewhere {
+    pub(super) reasons: Vec<String>,
+    pub(super) remarks: Vec<String>,
+    /// Of every figure of control in every orbit.
+    pub(super) checks: Vec<Check>,
+}
+
+/// Compares every orbit without the calibration and with it.
 ///
 /// * `noise` – of every orbit
 pub(super) fn elsewhere(
     validation: &[ValidationResult],
     noise: &[Noise],
     cameras: &[CameraResult],
-) -> (Vec<String>, Vec<String>) {
-    let (mut reasons, mut remarks) = (Vec::new(), Vec::new());
+) -> Elsewhere {
+    let mut found = Elsewhere::default();
     for (orbit, noise) in validation.iter().zip(noise) {
-        remarks.extend(ties(orbit, cameras));
-        for compared in control(orbit, *noise, cameras, &mut remarks) {
+        found.remarks.extend(ties(orbit, cameras));
+        for compared in control(orbit, *noise, cameras, &mut found.remarks) {
+            found.checks.push(compared.check(&orbit.orbit));
             match compared.reason() {
-                Some(reason) => reasons.push(format!("orbit {}: {reason}", orbit.orbit)),
-                None if compared.is_kept() => remarks.push(format!(
+                Some(reason) => found
+                    .reasons
+                    .push(format!("orbit {}: {reason}", orbit.orbit)),
+                None if compared.is_kept() => found.remarks.push(format!(
                     "orbit {}: {}, which is hardly better",
                     orbit.orbit,
                     compared.words()
@@ -49,7 +62,7 @@ pub(super) fn elsewhere(
             }
         }
     }
-    (reasons, remarks)
+    found
 }
 
 /// Ties that the calibration makes worse.
@@ -119,9 +132,26 @@ impl Compared {
         self.after_m > CONTROL_KEPT * self.before_m && self.after_m > WORSE_MAX * self.noise_m
     }
 
-    fn reason(&self) -> Option<String> {
+    /// By how much it is worse with the calibration, in standard deviations of measurement and laser.
+    fn worse_sigmas(&self) -> f64 {
         let squares = self.after_m * self.after_m - self.before_m * self.before_m;
-        (squares.max(0.0).sqrt() > WORSE_MAX * self.noise_m).then(|| {
+        squares.max(0.0).sqrt() / self.noise_m
+    }
+
+    fn check(&self, orbit: &str) -> Check {
+        let (kind, subject) = (CheckKind::OtherOrbits, format!("{orbit}: {}", self.what));
+        Check::new(
+            kind,
+            subject,
+            self.worse_sigmas(),
+            WORSE_MAX,
+            CheckOutcome::Fail,
+        )
+    }
+
+    fn reason(&self) -> Option<String> {
+        // Written so that NaN counts.
+        (!(self.worse_sigmas() <= WORSE_MAX)).then(|| {
             format!(
                 "{}, worse by more than {WORSE_MAX} standard deviations of measurement and laser: check datum, epoch, lines and \
                  samples of the laser points of both orbits, and that the orbits are known as well as [a_priori] says",

@@ -125,6 +125,20 @@ impl Orbit {
         }
     }
 
+    /// Standard deviations along the body's axes of the drift that a constant error of the orbit, of `sigma_m` along each axis
+    /// of the spacecraft, is taken for, metres per line.
+    ///
+    /// Offset angles turn with the spacecraft, and absorb what is constant in its axes: an orbit's error that is constant in
+    /// the body's axes is not, and leaves as much drift as these axes turn from line to line.
+    pub(super) fn turned_m_per_line(&self, sigma_m: f64) -> Vector3<f64> {
+        let [lines, _] = self.images[0].size();
+        let [first, last] = [0.25, 0.75].map(|share| self.pose(0, share * lines));
+        let apart_lines = last.after_lines - first.after_lines;
+        let turned = (last.body_to_axes - first.body_to_axes) / apart_lines;
+        let turn = turned.tr_mul(&first.body_to_axes);
+        Vector3::from_fn(|axis, _| sigma_m * turn.row(axis).norm())
+    }
+
     /// What an orbit is wrong by at an instant, J2000 metres.
     pub(super) fn shift_m(
         &self,

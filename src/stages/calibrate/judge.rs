@@ -4,7 +4,11 @@ use super::{
     elsewhere::{Noise, elsewhere},
     result::{CalibrationStep, CameraResult, HeldBack, PointKind, ValidationResult},
 };
-use crate::{config::CalibrationMode, geom::calibration::TieSight, stages::judge::Verdict};
+use crate::{
+    config::CalibrationMode,
+    geom::calibration::TieSight,
+    stages::judge::{Check, CheckKind, CheckOutcome::Fail, Verdict},
+};
 
 /// Residuals of held-back control over their standard deviations: beyond, these are not true.
 const NORMALISED_MAX: f64 = 1.5;
@@ -88,16 +92,61 @@ pub(super) fn judge(of: &Evidence<'_>) -> Verdict {
             ));
         }
     }
-    let (worse, doubts) = elsewhere(of.validation, of.validation_noise, of.cameras);
-    reasons.extend(worse);
+    let elsewhere = elsewhere(of.validation, of.validation_noise, of.cameras);
+    reasons.extend(elsewhere.reasons);
     let mut remarks = remarks(of);
-    remarks.extend(doubts);
-    Verdict {
-        valid: reasons.is_empty(),
-        reasons,
-        remarks,
-        checks: Vec::new(),
+    remarks.extend(elsewhere.remarks);
+    let mut checks = checks(of);
+    checks.extend(Check::worst(elsewhere.checks.into_iter()));
+    Verdict::of(reasons, remarks, checks)
+}
+
+fn checks(of: &Evidence<'_>) -> Vec<Check> {
+    let check = |kind, found: f64, limit: f64| Check::new(kind, "", found, limit, Fail);
+    let mut checks = Vec::new();
+    match of.held_back {
+        None => checks.push(Check::told(
+            CheckKind::HeldBackControl,
+            "no laser control",
+            Fail,
+        )),
+        Some(held_back) => {
+            checks.push(check(
+                CheckKind::HeldBackControl,
+                held_back.normalised,
+                NORMALISED_MAX,
+            ));
+            let known_m = of.known.ground_m;
+            let plane = held_back.accuracy_plane_m.map(|found_m| {
+                let known_m = std::f64::consts::SQRT_2 * known_m;
+                check(CheckKind::PlaceKnown, found_m, known_m)
+            });
+            let height = held_back.accuracy_height_m;
+            let height = height.map(|found_m| check(CheckKind::HeightKnown, found_m, known_m));
+            checks.extend(plane.into_iter().chain(height));
+        }
     }
+    let ties = of
+        .steps
+        .last()
+        .and_then(|last| last.figures.ties.worst_px());
+    checks.extend(ties.map(|worst_px| check(CheckKind::LinesAgree, worst_px, TIES_MAX_PX)));
+    let kinds = [CheckKind::TiesLeftOut, CheckKind::ControlLeftOut];
+    for (kind, [all, left_out]) in kinds.into_iter().zip(of.left_out) {
+        let share = left_out as f64 / all.max(1) as f64;
+        checks.push(Check::of_share(kind, "", share, LEFT_OUT_MAX, Fail));
+    }
+    let limit_px = MOVED_MAX * of.known.image_px;
+    checks.extend(Check::worst(of.cameras.iter().map(|camera| {
+        Check::new(
+            CheckKind::CameraMoved,
+            &*camera.camera,
+            camera.moved_px,
+            limit_px,
+            Fail,
+        )
+    })));
+    checks
 }
 
 /// Why the ground is not known better than beforehand, if it is not.

@@ -34,12 +34,21 @@ pub(super) struct Outcome<'a> {
     pub(super) covariance: &'a DMatrix<f64>,
 }
 
-/// The drift of the orbit with standard deviations.
-pub(super) fn drift(state: &CalibrationState, covariance: &DMatrix<f64>) -> [Value; 3] {
+/// The drift of the orbit with standard deviations, to which its constant error of `orbit_bias_m` adds.
+pub(super) fn drift(
+    state: &CalibrationState,
+    covariance: &DMatrix<f64>,
+    orbit: &Orbit,
+    orbit_bias_m: f64,
+) -> [Value; 3] {
     let first = state.layout().len() - 3;
-    [0, 1, 2].map(|axis| Value {
-        value: state.drift_m_per_line[axis],
-        sigma: covariance[(first + axis, first + axis)].max(0.0).sqrt(),
+    let turned_m = orbit.turned_m_per_line(orbit_bias_m);
+    [0, 1, 2].map(|axis| {
+        let variance = covariance[(first + axis, first + axis)].max(0.0);
+        Value {
+            value: state.drift_m_per_line[axis],
+            sigma: variance.sqrt().hypot(turned_m[axis]),
+        }
     })
 }
 

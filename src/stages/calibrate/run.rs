@@ -132,7 +132,12 @@ pub(super) fn calibrate(config: &CalibrationConfig) -> Result<Calibration> {
         complaints: complaints.count,
     });
     Ok(Calibration {
-        drift_m_per_line: outcome::drift(&work.state, &work.covariance),
+        drift_m_per_line: outcome::drift(
+            &work.state,
+            &work.covariance,
+            &orbit,
+            config.a_priori.orbit_bias_m,
+        ),
         tie_sight: sight,
         points: outcome.points(),
         images: outcome.images(),

@@ -354,7 +354,7 @@ impl AdjustmentEvidence<'_> {
         }
         for image in self.untied() {
             remarks.push(format!(
-                "image {image} has no tie point in the adjustment: its adjusted orientation is that of the kernels"
+                "image {image} has no tie point in the adjustment: no measurement of its own tests or corrects its orientation"
             ));
         }
         remarks

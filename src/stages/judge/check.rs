@@ -5,201 +5,8 @@ use std::fmt;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::kind::CheckKind;
 use crate::wording::Wording;
-
-/// What is checked, data that took no part in the result first, then what took part in it, then what images say of
-/// each other.
-#[derive(
-    Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema,
-)]
-#[serde(rename_all = "snake_case")]
-pub enum CheckKind {
-    /// What contradicts itself and has no number: told in the reasons.
-    Contradiction,
-    /// Footprints in the windows.
-    Footprints,
-    /// An adjustment that was asked for.
-    AdjustmentMade,
-    /// Median height of tie points above the MOLA surface, with the orientation of the kernels.
-    HeightBefore,
-    /// Mean difference of the surfaces of two profiles, in its standard deviations.
-    ProfilesApart,
-    /// Mean of range minus distance of a profile, its outliers left out.
-    RangeMean,
-    /// Mean distance of the spacecraft of the PEDR file from that of the kernels.
-    OrbitsApart,
-    /// Mean of range minus distance to the spacecraft of the PEDR file itself.
-    Decoding,
-    /// Share of outliers among the ranges of a profile.
-    RangeOutliers,
-    /// Shots of a profile.
-    Shots,
-    /// Clock correction of least spread minus the configured one.
-    ClockCorrection,
-    /// Median height of tie points above the MOLA surface, adjusted: of a default adjustment MOLA is part.
-    HeightAfter,
-    /// Share of tie points that lie farther from the MOLA surface than 3.29 of their standard deviations, or were
-    /// rejected for it.
-    HeightOutliers,
-    /// Standard deviation of the mean height of the adjusted tie points.
-    HeightSigma,
-    /// Share of the common ground that a terrain model has heights of.
-    SurfaceFilled,
-    /// Median height of the altimeter's shots above a terrain model.
-    SurfaceHeight,
-    /// Robust spread of the shots about a terrain model, in their standard deviations.
-    SurfaceSpread,
-    /// Images with a tie point in the adjustment.
-    ImagesJoined,
-    /// Pairs of images whose tie points took part in the adjustment.
-    PairsJoined,
-    /// Distance along the flight between two images at their tie points, adjusted.
-    ParallaxAfter,
-    /// The same with the orientation of the kernels.
-    ParallaxBefore,
-    /// Standard deviation of unit weight of tie points along the track.
-    TieResidualsAlong,
-    /// The same across the track.
-    TieResidualsAcross,
-    /// Share of the tie points that took no part in the adjustment.
-    TiesRejected,
-    /// Tie points that took part in the adjustment.
-    TiesUsed,
-    /// Largest correction of an image, in standard deviations of what was known of it.
-    Correction,
-    /// Boresight of the laser or place of a profile, by the images of a common bus, in standard deviations.
-    Boresight,
-    /// Time that attitudes of an image are extrapolated by beyond what is trusted: as a sentence among the reasons.
-    Attitude,
-    /// RMSE of the second-order polynomials of position.
-    PositionRmse,
-    /// RMSE of the second-order rotation vector.
-    PointingRmse,
-    /// Error of the camera tables between their nodes.
-    TableError,
-    /// Records that could not be read.
-    SkippedRecords,
-}
-
-impl CheckKind {
-    /// What is checked, in words.
-    const fn words(self) -> &'static str {
-        match self {
-            Self::Contradiction => "Inputs do not contradict each other",
-            Self::Footprints => "Footprints in the windows",
-            Self::AdjustmentMade => "Adjustment converged",
-            Self::HeightAfter => "Tie points above MOLA, adjusted (median)",
-            Self::HeightBefore => "Tie points above MOLA, before (median)",
-            Self::HeightOutliers => "Tie points beyond 3.29 σ of MOLA",
-            Self::ProfilesApart => "MOLA profiles against each other",
-            Self::SurfaceFilled => "Terrain model, ground with heights",
-            Self::SurfaceHeight => "MOLA above the terrain model (median)",
-            Self::SurfaceSpread => "MOLA about the terrain model",
-            Self::ImagesJoined => "Images joined by tie points",
-            Self::PairsJoined => "Pairs joined by tie points",
-            Self::HeightSigma => "Uncertainty of the mean height",
-            Self::RangeMean => "Range − distance (mean)",
-            Self::OrbitsApart => "Orbit of the PEDR against kernels",
-            Self::Decoding => "Range − distance, orbit of the PEDR",
-            Self::RangeOutliers => "Outliers among ranges",
-            Self::Shots => "Shots in a profile",
-            Self::ClockCorrection => "Clock correction, best − configured",
-            Self::ParallaxAfter => "Images apart along track, adjusted",
-            Self::ParallaxBefore => "Images apart along track, before",
-            Self::TieResidualsAlong => "Tie residuals along track",
-            Self::TieResidualsAcross => "Tie residuals across track",
-            Self::TiesRejected => "Tie points rejected",
-            Self::TiesUsed => "Tie points used",
-            Self::Correction => "Largest orientation correction",
-            Self::Boresight => "Laser against its mounting",
-            Self::Attitude => "Attitude covered",
-            Self::PositionRmse => "Position model, RMSE",
-            Self::PointingRmse => "Pointing model, RMSE",
-            Self::TableError => "Camera table, interpolation error",
-            Self::SkippedRecords => "Records skipped",
-        }
-    }
-
-    /// Unit of value and limit; empty for a count or where there is neither.
-    #[must_use]
-    pub const fn unit(self) -> &'static str {
-        match self {
-            Self::HeightAfter
-            | Self::HeightBefore
-            | Self::HeightSigma
-            | Self::SurfaceHeight
-            | Self::RangeMean
-            | Self::OrbitsApart
-            | Self::Decoding
-            | Self::ParallaxAfter
-            | Self::ParallaxBefore
-            | Self::PositionRmse => "m",
-            Self::HeightOutliers
-            | Self::RangeOutliers
-            | Self::SurfaceFilled
-            | Self::TiesRejected => "%",
-            Self::ProfilesApart
-            | Self::SurfaceSpread
-            | Self::TieResidualsAlong
-            | Self::TieResidualsAcross
-            | Self::Correction
-            | Self::Boresight => "σ",
-            Self::ClockCorrection => "s",
-            Self::PointingRmse => "″",
-            Self::TableError => "px",
-            Self::Contradiction
-            | Self::Footprints
-            | Self::AdjustmentMade
-            | Self::ImagesJoined
-            | Self::PairsJoined
-            | Self::Shots
-            | Self::TiesUsed
-            | Self::Attitude
-            | Self::SkippedRecords => "",
-        }
-    }
-
-    /// Whether the limit is the least that is allowed.
-    #[must_use]
-    pub const fn at_least(self) -> bool {
-        matches!(
-            self,
-            Self::Footprints
-                | Self::ImagesJoined
-                | Self::PairsJoined
-                | Self::Shots
-                | Self::SurfaceFilled
-                | Self::TiesUsed
-        )
-    }
-
-    /// Whether values have a sign, and the limit holds for both.
-    #[must_use]
-    pub const fn is_signed(self) -> bool {
-        matches!(
-            self,
-            Self::HeightAfter
-                | Self::HeightBefore
-                | Self::SurfaceHeight
-                | Self::RangeMean
-                | Self::Decoding
-                | Self::ClockCorrection
-                | Self::ParallaxAfter
-                | Self::ParallaxBefore
-                | Self::ProfilesApart
-        )
-    }
-
-    /// Decimals of a value that is not near its limit.
-    const fn least_decimals(self, is_small: bool) -> usize {
-        match self {
-            Self::ParallaxAfter | Self::PointingRmse if is_small => 2,
-            Self::ClockCorrection | Self::TableError => 4,
-            Self::RangeMean | Self::Decoding | Self::PositionRmse => 2,
-            _ => 1,
-        }
-    }
-}
 
 /// Most decimals that a number is written with.
 const DECIMALS_MAX: usize = 9;
@@ -244,7 +51,7 @@ pub struct Check {
 
 impl Check {
     /// A check of `value` against `limit`; when broken, it came out as `broken`. What is no number breaks every limit.
-    pub(super) fn new(
+    pub(in crate::stages) fn new(
         kind: CheckKind,
         subject: impl Into<String>,
         value: f64,
@@ -268,7 +75,7 @@ impl Check {
     }
 
     /// A check of shares, which pages show in percent. They are compared as they are: 29 % are not 28.999 999 999 999 996.
-    pub(super) fn of_share(
+    pub(in crate::stages) fn of_share(
         kind: CheckKind,
         subject: impl Into<String>,
         share: f64,
@@ -284,7 +91,11 @@ impl Check {
     }
 
     /// A check that has no number.
-    pub(super) fn told(kind: CheckKind, subject: impl Into<String>, outcome: CheckOutcome) -> Self {
+    pub(in crate::stages) fn told(
+        kind: CheckKind,
+        subject: impl Into<String>,
+        outcome: CheckOutcome,
+    ) -> Self {
         Self {
             kind,
             what: kind.words().to_owned(),
@@ -297,7 +108,7 @@ impl Check {
     }
 
     /// Says what is checked in the words of a site.
-    pub(super) fn say(&mut self, wording: &Wording<'_>) {
+    pub(in crate::stages) fn say(&mut self, wording: &Wording<'_>) {
         self.what = wording.of(self.kind.words()).into_owned();
         self.subject = wording.of(&*self.subject).into_owned();
     }
@@ -351,7 +162,7 @@ impl Check {
     }
 
     /// The worst of several checks of one kind; nothing of none.
-    pub(super) fn worst(checks: impl Iterator<Item = Self>) -> Option<Self> {
+    pub(in crate::stages) fn worst(checks: impl Iterator<Item = Self>) -> Option<Self> {
         // The first of equals: `max_by` would take the last.
         checks.reduce(|worst, check| {
             let worse = check.outcome.cmp(&worst.outcome).reverse();

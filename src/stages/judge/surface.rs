@@ -1,9 +1,9 @@
 //! What is judged of a terrain model: how much of the ground it has, and what the altimeter says of it.
 
 use super::{
-    Evidence,
+    CheckKind, Evidence,
     check::{
-        Check, CheckKind,
+        Check,
         CheckOutcome::{Fail, Warning},
     },
 };

@@ -4,7 +4,11 @@ use super::{
     result::{HeldOut, UnitResult},
     similarity::Similarity,
 };
-use crate::stages::judge::Verdict;
+use crate::stages::judge::{
+    Check, CheckKind,
+    CheckOutcome::{Fail, Pass, Warning},
+    Verdict,
+};
 
 /// Fewest units: so many control points a calibration needs, and as many to hold back.
 const UNITS_MIN: usize = 10;
@@ -103,12 +107,46 @@ pub(super) fn judge(of: &Evidence<'_>) -> Verdict {
             of.complaints
         ));
     }
-    Verdict {
-        valid: reasons.is_empty(),
-        reasons,
-        remarks,
-        checks: Vec::new(),
+    Verdict::of(reasons, remarks, checks(of, kept))
+}
+
+fn checks(of: &Evidence<'_>, kept: usize) -> Vec<Check> {
+    let mut checks = vec![Check::new(
+        CheckKind::UnitsKept,
+        "",
+        kept as f64,
+        UNITS_MIN as f64,
+        Fail,
+    )];
+    if of.matching > 0 {
+        let share = kept as f64 / of.matching as f64;
+        checks.push(Check::of_share(
+            CheckKind::UnitsAgree,
+            "",
+            share,
+            AGREE_MIN,
+            Fail,
+        ));
     }
+    checks.extend(of.held_out.map(|held_out| {
+        Check::new(
+            CheckKind::HeldOutShots,
+            "",
+            held_out.after_m,
+            of.limit_m,
+            Fail,
+        )
+    }));
+    checks.extend(of.located_m.map(|[bias_m, limit_m]| {
+        // Correlation sees no bias.
+        let broken = match of.similarity {
+            Similarity::Ccc => Fail,
+            Similarity::Pearson if of.is_auto => Warning,
+            _ => Pass,
+        };
+        Check::new(CheckKind::ModelBias, "", bias_m, limit_m, broken)
+    }));
+    checks
 }
 
 /// What is wrong with a bias, and what is doubtful.

@@ -1,7 +1,11 @@
 //! The verdict on a net.
 
 use super::result::{BrickResult, ControlResult, Seams, Totals};
-use crate::stages::judge::Verdict;
+use crate::stages::judge::{
+    Check, CheckKind,
+    CheckOutcome::{Fail, Warning},
+    Verdict,
+};
 
 /// Share of measurements that may be blunders in a net that is to be used.
 const REMOVED_MAX: f64 = 0.1;
@@ -36,12 +40,62 @@ pub(super) fn judge(of: &Evidence) -> Verdict {
             totals.removed, of.measurements
         ));
     }
-    Verdict {
-        valid: reasons.is_empty(),
-        reasons,
-        remarks: remarks(of),
-        checks: Vec::new(),
-    }
+    Verdict::of(reasons, remarks(of), checks(of))
+}
+
+/// Fewer controls cannot tell a gross error of one of them.
+const CONTROLS_MIN: usize = 5;
+/// Seams that are wider than so many standard deviations of a measurement tell of a bent brick.
+const SEAMS_SIGMA: f64 = 3.0;
+
+fn checks(of: &Evidence) -> Vec<Check> {
+    let share = |count: u64| count as f64 / of.measurements.max(1) as f64;
+    let count = |kind, found: usize, limit: usize, broken| {
+        Check::new(kind, "", found as f64, limit as f64, broken)
+    };
+    let totals = of.totals;
+    let refused = of.controls.iter().filter(|control| !control.kept).count();
+    let mut checks = vec![
+        Check::new(
+            CheckKind::Redundancy,
+            "",
+            totals.redundancy as f64,
+            1.0,
+            Fail,
+        ),
+        Check::of_share(
+            CheckKind::MeasurementsRemoved,
+            "",
+            share(totals.removed),
+            REMOVED_MAX,
+            Fail,
+        ),
+        Check::of_share(
+            CheckKind::MeasurementsFlagged,
+            "",
+            share(totals.flagged),
+            FLAGGED_MAX,
+            Warning,
+        ),
+        count(
+            CheckKind::ControlsKept,
+            of.controls.len() - refused,
+            CONTROLS_MIN,
+            Warning,
+        ),
+        count(CheckKind::ControlsRefused, refused, 0, Warning),
+    ];
+    checks.extend(of.seams.zip(totals.tie_sigma_m).map(|(seams, sigma_m)| {
+        let [x, y] = seams.rms_m;
+        Check::new(
+            CheckKind::Seams,
+            "",
+            x.max(y),
+            SEAMS_SIGMA * sigma_m,
+            Warning,
+        )
+    }));
+    checks
 }
 
 fn remarks(of: &Evidence) -> Vec<String> {
@@ -85,7 +139,7 @@ fn remarks(of: &Evidence) -> Vec<String> {
     );
     let kept = of.controls.len() - rejected.len();
     say(
-        kept < 5,
+        kept < CONTROLS_MIN,
         format!("{kept} controls: a gross error of one could not be told from the others"),
     );
     say(
@@ -99,7 +153,7 @@ fn remarks(of: &Evidence) -> Vec<String> {
     if let (Some(seams), Some(sigma_m)) = (of.seams, totals.tie_sigma_m) {
         let [x, y] = seams.rms_m;
         say(
-            x.max(y) > 3.0 * sigma_m,
+            x.max(y) > SEAMS_SIGMA * sigma_m,
             format!(
                 "bricks differ at their seams by {:.1} m (rms), measurements within bricks by {sigma_m:.1} m: a brick may \
                  be bent",

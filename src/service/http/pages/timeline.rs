@@ -56,8 +56,8 @@ pub(super) fn timeline(rows: &[Row]) -> Markup {
                 @for (k, row) in rows.iter().enumerate() {
                     @let y = k as f64 * LINE;
                     text x="0" y=(y + 12.0) font-size="13" fill="#222222" { (row.name) }
-                    (bars(&row.position, &x, y + 16.0, "#0072B2"))
-                    (bars(&row.attitude, &x, y + 16.0 + if row.position.is_empty() { 0.0 } else { BAR }, "#C25000"))
+                    (bars(&row.position, &x, y + 16.0, "#0E5A99"))
+                    (bars(&row.attitude, &x, y + 16.0 + if row.position.is_empty() { 0.0 } else { BAR }, "#FF610D"))
                 }
                 text x="0" y=(height - 6.0) font-size="13" fill="#222222" { (day(start)) }
                 text x=(WIDTH) y=(height - 6.0) font-size="13" text-anchor="end" fill="#222222" { (day(stop)) }

@@ -163,19 +163,19 @@ fn plot(name: &str, runs: &[&Run], values: &[Option<f64>], steps: &[Option<Strin
                 }
                 @for (k, step) in steps.iter().enumerate() {
                     @if let Some(words) = step {
-                        line x1=(format!("{:.1}", x(k))) x2=(format!("{:.1}", x(k))) y1=(TOP) y2=(HEIGHT - BOTTOM) stroke="#C25000" stroke-dasharray="4 3" {
+                        line x1=(format!("{:.1}", x(k))) x2=(format!("{:.1}", x(k))) y1=(TOP) y2=(HEIGHT - BOTTOM) stroke="#FF610D" stroke-dasharray="4 3" {
                             title { (words) }
                         }
                     }
                 }
-                polyline points=(path.join(" ")) fill="none" stroke="#0072B2" stroke-width="2" {}
+                polyline points=(path.join(" ")) fill="none" stroke="#0E5A99" stroke-width="2" {}
                 @for (k, value) in &points {
                     @let run = runs[*k];
                     @let (across, down) = (x(*k), y(*value));
                     @if run.valid {
-                        circle cx=(format!("{across:.1}")) cy=(format!("{down:.1}")) r="3.5" fill="#0072B2" { title { (run.id) ": " (figure(*value)) } }
+                        circle cx=(format!("{across:.1}")) cy=(format!("{down:.1}")) r="3.5" fill="#0E5A99" { title { (run.id) ": " (figure(*value)) } }
                     } @else {
-                        path d=(format!("M{:.1} {:.1}l10 10m0 -10l-10 10", across - 5.0, down - 5.0)) stroke="#B3261E" stroke-width="2.5" {
+                        path d=(format!("M{:.1} {:.1}l10 10m0 -10l-10 10", across - 5.0, down - 5.0)) stroke="#C10019" stroke-width="2.5" {
                             title { (run.id) ": " (figure(*value)) ", not valid" }
                         }
                     }

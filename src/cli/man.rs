@@ -1,4 +1,4 @@
-//! `areograph manual`.
+//! `areograph man`.
 
 use std::path::PathBuf;
 
@@ -9,7 +9,7 @@ use crate::error::{IoError, Locate, Result};
 
 /// Writes the manual pages, one for each command, as `man` reads them.
 ///
-/// Example: `areograph manual ~/.local/share/man/man1`
+/// Example: `areograph man ~/.local/share/man/man1`
 #[derive(Debug, Args)]
 #[command(verbatim_doc_comment)]
 pub(super) struct Arguments {

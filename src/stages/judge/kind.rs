@@ -1,0 +1,273 @@
+//! What can be checked, of sites, nets, calibrations and matches.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// What is checked, data that took no part in the result first, then what took part in it, then what images say of
+/// each other.
+#[derive(
+    Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema,
+)]
+#[serde(rename_all = "snake_case")]
+pub enum CheckKind {
+    /// What contradicts itself and has no number: told in the reasons.
+    Contradiction,
+    /// Footprints in the windows.
+    Footprints,
+    /// An adjustment that was asked for.
+    AdjustmentMade,
+    /// Median height of tie points above the MOLA surface, with the orientation of the kernels.
+    HeightBefore,
+    /// Mean difference of the surfaces of two profiles, in its standard deviations.
+    ProfilesApart,
+    /// Mean of range minus distance of a profile, its outliers left out.
+    RangeMean,
+    /// Mean distance of the spacecraft of the PEDR file from that of the kernels.
+    OrbitsApart,
+    /// Mean of range minus distance to the spacecraft of the PEDR file itself.
+    Decoding,
+    /// Share of outliers among the ranges of a profile.
+    RangeOutliers,
+    /// Shots of a profile.
+    Shots,
+    /// Clock correction of least spread minus the configured one.
+    ClockCorrection,
+    /// Median height of tie points above the MOLA surface, adjusted: of a default adjustment MOLA is part.
+    HeightAfter,
+    /// Share of tie points that lie farther from the MOLA surface than 3.29 of their standard deviations, or were
+    /// rejected for it.
+    HeightOutliers,
+    /// Standard deviation of the mean height of the adjusted tie points.
+    HeightSigma,
+    /// Share of the common ground that a terrain model has heights of.
+    SurfaceFilled,
+    /// Median height of the altimeter's shots above a terrain model.
+    SurfaceHeight,
+    /// Robust spread of the shots about a terrain model, in their standard deviations.
+    SurfaceSpread,
+    /// Images with a tie point in the adjustment.
+    ImagesJoined,
+    /// Pairs of images whose tie points took part in the adjustment.
+    PairsJoined,
+    /// Distance along the flight between two images at their tie points, adjusted.
+    ParallaxAfter,
+    /// The same with the orientation of the kernels.
+    ParallaxBefore,
+    /// Standard deviation of unit weight of tie points along the track.
+    TieResidualsAlong,
+    /// The same across the track.
+    TieResidualsAcross,
+    /// Share of the tie points that took no part in the adjustment.
+    TiesRejected,
+    /// Tie points that took part in the adjustment.
+    TiesUsed,
+    /// Largest correction of an image, in standard deviations of what was known of it.
+    Correction,
+    /// Boresight of the laser or place of a profile, by the images of a common bus, in standard deviations.
+    Boresight,
+    /// Time that attitudes of an image are extrapolated by beyond what is trusted: as a sentence among the reasons.
+    Attitude,
+    /// RMSE of the second-order polynomials of position.
+    PositionRmse,
+    /// RMSE of the second-order rotation vector.
+    PointingRmse,
+    /// Error of the camera tables between their nodes.
+    TableError,
+    /// Records that could not be read.
+    SkippedRecords,
+    /// Laser control that was held back from a calibration: root mean square of its residuals in their standard deviations.
+    HeldBackControl,
+    /// By how much control of an orbit that took no part in a calibration becomes worse, in standard deviations.
+    OtherOrbits,
+    /// How well a calibration places a tie point in the plane, beside what was known beforehand.
+    PlaceKnown,
+    /// The same in height.
+    HeightKnown,
+    /// Root mean square of the residuals of tie points between the lines of a camera.
+    LinesAgree,
+    /// How far a calibration moves the image of a camera.
+    CameraMoved,
+    /// Share of the tie points that a calibration left out.
+    TiesLeftOut,
+    /// Share of its control.
+    ControlLeftOut,
+    /// Laser shots that were held out of a match: root mean square of model minus laser, bias removed.
+    HeldOutShots,
+    /// Units of laser shots that were matched and kept.
+    UnitsKept,
+    /// Share of the matching units that agree with each other.
+    UnitsAgree,
+    /// Terrain model above the laser.
+    ModelBias,
+    /// Equations of a net that nothing needs, by which its measurements test each other.
+    Redundancy,
+    /// Share of the measurements of a net that were left out as blunders.
+    MeasurementsRemoved,
+    /// Share of those in use that lie beyond 3.5 robust standard deviations.
+    MeasurementsFlagged,
+    /// Controls of a net that were kept.
+    ControlsKept,
+    /// Controls of a net that were left out.
+    ControlsRefused,
+    /// Differences of bricks at their seams.
+    Seams,
+}
+
+impl CheckKind {
+    /// What is checked, in words.
+    pub(super) const fn words(self) -> &'static str {
+        match self {
+            Self::Contradiction => "Inputs do not contradict each other",
+            Self::Footprints => "Footprints in the windows",
+            Self::AdjustmentMade => "Adjustment converged",
+            Self::HeightAfter => "Tie points above MOLA, adjusted (median)",
+            Self::HeightBefore => "Tie points above MOLA, before (median)",
+            Self::HeightOutliers => "Tie points beyond 3.29 σ of MOLA",
+            Self::ProfilesApart => "MOLA profiles against each other",
+            Self::SurfaceFilled => "Terrain model, ground with heights",
+            Self::SurfaceHeight => "MOLA above the terrain model (median)",
+            Self::SurfaceSpread => "MOLA about the terrain model",
+            Self::ImagesJoined => "Images joined by tie points",
+            Self::PairsJoined => "Pairs joined by tie points",
+            Self::HeightSigma => "Uncertainty of the mean height",
+            Self::RangeMean => "Range − distance (mean)",
+            Self::OrbitsApart => "Orbit of the PEDR against kernels",
+            Self::Decoding => "Range − distance, orbit of the PEDR",
+            Self::RangeOutliers => "Outliers among ranges",
+            Self::Shots => "Shots in a profile",
+            Self::ClockCorrection => "Clock correction, best − configured",
+            Self::ParallaxAfter => "Images apart along track, adjusted",
+            Self::ParallaxBefore => "Images apart along track, before",
+            Self::TieResidualsAlong => "Tie residuals along track",
+            Self::TieResidualsAcross => "Tie residuals across track",
+            Self::TiesRejected => "Tie points rejected",
+            Self::TiesUsed => "Tie points used",
+            Self::Correction => "Largest orientation correction",
+            Self::Boresight => "Laser against its mounting",
+            Self::Attitude => "Attitude covered",
+            Self::PositionRmse => "Position model, RMSE",
+            Self::PointingRmse => "Pointing model, RMSE",
+            Self::TableError => "Camera table, interpolation error",
+            Self::SkippedRecords => "Records skipped",
+            Self::HeldBackControl => "Control held back, off by",
+            Self::OtherOrbits => "Control of other orbits, worse by",
+            Self::PlaceKnown => "Tie points known in the plane",
+            Self::HeightKnown => "Tie points known in height",
+            Self::LinesAgree => "Tie points between lines",
+            Self::CameraMoved => "Image moved by the calibration",
+            Self::TiesLeftOut => "Tie points left out",
+            Self::ControlLeftOut => "Control left out",
+            Self::HeldOutShots => "Shots held out, model − laser",
+            Self::UnitsKept => "Units kept",
+            Self::UnitsAgree => "Matching units that agree",
+            Self::ModelBias => "Model above the laser (median)",
+            Self::Redundancy => "Equations left over",
+            Self::MeasurementsRemoved => "Measurements left out as blunders",
+            Self::MeasurementsFlagged => "Measurements beyond 3.5 robust σ",
+            Self::ControlsKept => "Controls kept",
+            Self::ControlsRefused => "Controls left out",
+            Self::Seams => "Bricks apart at their seams",
+        }
+    }
+
+    /// Unit of value and limit; empty for a count or where there is neither.
+    #[must_use]
+    pub const fn unit(self) -> &'static str {
+        match self {
+            Self::HeightAfter
+            | Self::HeightBefore
+            | Self::HeightSigma
+            | Self::SurfaceHeight
+            | Self::RangeMean
+            | Self::OrbitsApart
+            | Self::Decoding
+            | Self::ParallaxAfter
+            | Self::ParallaxBefore
+            | Self::PositionRmse
+            | Self::PlaceKnown
+            | Self::HeightKnown
+            | Self::HeldOutShots
+            | Self::ModelBias
+            | Self::Seams => "m",
+            Self::HeightOutliers
+            | Self::RangeOutliers
+            | Self::SurfaceFilled
+            | Self::TiesRejected
+            | Self::TiesLeftOut
+            | Self::ControlLeftOut
+            | Self::UnitsAgree
+            | Self::MeasurementsRemoved
+            | Self::MeasurementsFlagged => "%",
+            Self::ProfilesApart
+            | Self::SurfaceSpread
+            | Self::TieResidualsAlong
+            | Self::TieResidualsAcross
+            | Self::Correction
+            | Self::Boresight
+            | Self::HeldBackControl
+            | Self::OtherOrbits => "σ",
+            Self::ClockCorrection => "s",
+            Self::PointingRmse => "″",
+            Self::TableError | Self::LinesAgree | Self::CameraMoved => "px",
+            Self::Contradiction
+            | Self::Footprints
+            | Self::AdjustmentMade
+            | Self::ImagesJoined
+            | Self::PairsJoined
+            | Self::Shots
+            | Self::TiesUsed
+            | Self::Attitude
+            | Self::SkippedRecords
+            | Self::UnitsKept
+            | Self::Redundancy
+            | Self::ControlsKept
+            | Self::ControlsRefused => "",
+        }
+    }
+
+    /// Whether the limit is the least that is allowed.
+    #[must_use]
+    pub const fn at_least(self) -> bool {
+        matches!(
+            self,
+            Self::Footprints
+                | Self::ImagesJoined
+                | Self::PairsJoined
+                | Self::Shots
+                | Self::SurfaceFilled
+                | Self::TiesUsed
+                | Self::UnitsKept
+                | Self::UnitsAgree
+                | Self::Redundancy
+                | Self::ControlsKept
+        )
+    }
+
+    /// Whether values have a sign, and the limit holds for both.
+    #[must_use]
+    pub const fn is_signed(self) -> bool {
+        matches!(
+            self,
+            Self::HeightAfter
+                | Self::HeightBefore
+                | Self::SurfaceHeight
+                | Self::RangeMean
+                | Self::Decoding
+                | Self::ClockCorrection
+                | Self::ParallaxAfter
+                | Self::ParallaxBefore
+                | Self::ProfilesApart
+                | Self::ModelBias
+        )
+    }
+
+    /// Decimals of a value that is not near its limit.
+    pub(super) const fn least_decimals(self, is_small: bool) -> usize {
+        match self {
+            Self::ParallaxAfter | Self::PointingRmse if is_small => 2,
+            Self::ClockCorrection | Self::TableError => 4,
+            Self::RangeMean | Self::Decoding | Self::PositionRmse | Self::LinesAgree => 2,
+            _ => 1,
+        }
+    }
+}
