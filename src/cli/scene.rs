@@ -9,8 +9,8 @@ use crate::{
     error::Error,
     scene::{
         ArchiveOptions, Coder, Roughness, SceneErrors, SceneOptions, write_archive,
-        write_calibration_scene, write_plane_scene, write_scene, write_scene_along,
-        write_scene_with_images, write_terrain_model_scene,
+        write_calibration_loop_scene, write_calibration_scene, write_plane_scene, write_scene,
+        write_scene_along, write_scene_with_images, write_terrain_model_scene,
     },
     units::SECONDS_PER_DAY,
 };
@@ -51,11 +51,11 @@ pub(super) struct Arguments {
     /// With --realistic: one offset of the attitude's clock for all images instead of line times of each.
     #[arg(long, requires = "realistic")]
     attitude_clock: bool,
-    /// Also render the narrow-angle images, `images/*.imq`, which takes minutes.
+    /// Also render the narrow-angle images, `images/*.imq`, which takes minutes; with --calibration `images/*.tif`.
     #[arg(long, conflicts_with_all = ["along", "plane"])]
     images: bool,
     /// With --images: the code of the images; that by a transform loses something, as it did on board.
-    #[arg(long, value_enum, default_value_t = Code::Predictive, requires = "images")]
+    #[arg(long, value_enum, default_value_t = Code::Predictive, requires = "images", conflicts_with = "calibration")]
     coder: Code,
     /// Fly these kernels instead of the invented orbit.
     #[arg(long, value_name = "KERNELS.tm")]
@@ -63,8 +63,9 @@ pub(super) struct Arguments {
     /// A net of rectified pictures for `areograph triangulate` instead of a mission.
     #[arg(long, conflicts_with_all = ["along", "realistic", "day_s"])]
     plane: bool,
-    /// Two stereo lines of a camera for `areograph calibrate` instead of a mission.
-    #[arg(long, conflicts_with_all = ["along", "realistic", "day_s", "images", "plane"])]
+    /// Two stereo lines of a camera for `areograph calibrate` instead of a mission; with --images three lines of one orbit,
+    /// with their pixels and laser passes instead of tables of points.
+    #[arg(long, conflicts_with_all = ["along", "realistic", "day_s", "plane"])]
     calibration: bool,
     /// A terrain model and laser passes over it for `areograph pedr match` instead of a mission.
     #[arg(long, conflicts_with_all = ["along", "realistic", "day_s", "images", "plane", "calibration"])]
@@ -141,10 +142,12 @@ pub(super) fn run(arguments: &Arguments) -> Result<(), Error> {
         return Ok(());
     }
     if arguments.calibration {
-        output::line(write_calibration_scene(
-            &arguments.directory,
-            arguments.seed,
-        )?);
+        let write = if arguments.images {
+            write_calibration_loop_scene
+        } else {
+            write_calibration_scene
+        };
+        output::line(write(&arguments.directory, arguments.seed)?);
         return Ok(());
     }
     if arguments.terrain_model {

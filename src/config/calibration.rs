@@ -15,7 +15,10 @@ use super::{
         Declare as _, Keys, Many, declare_table, example, key, of_the_file, schema, table, tables,
     },
     described,
-    forms::{any_text, from_to, identifier, lower_case_identifier, whole_from_to, words},
+    forms::{
+        Switch, above_to, any_text, from_to, identifier, lower_case_identifier, whole_from_to,
+        words,
+    },
     parse_file,
     paths::{FILE, Globs},
     problems::Problems,
@@ -29,8 +32,9 @@ const HEADER: &str = "\
 # A calibration of the lines of a camera for `areograph calibrate`, every key with its unit, range and default.
 #
 # Only `calibration`, two [[cameras]] and [ties] are required; a key that is left out has the default written
-# here. Without [control] nothing tells where the camera looks, and the result is marked invalid. Relative paths count
-# from this file's folder. Schema: ../schema/calibration.schema.json
+# here. Without [control] nothing tells where the camera looks, and the result is marked invalid. Where every camera has
+# `pixels`, ties.match and [laser] take the place of tables of points. Relative paths count from this file's folder.
+# Schema: ../schema/calibration.schema.json
 
 ";
 
@@ -71,6 +75,8 @@ declare_table! {
         ties: CalibrationTiesConfig = table(),
         /// Points whose place the laser knows.
         control: CalibrationControlConfig = table(),
+        /// Laser passes from which such points are found.
+        laser: CalibrationLaserConfig = table(),
         /// What is known beforehand.
         a_priori: APrioriConfig = table(),
         /// How it is solved.
@@ -87,6 +93,7 @@ fn across_tables(written: &CalibrationConfig, keys: &mut Keys<'_, '_>) {
     if written.ties.files.is_empty() && keys.span_of("ties").is_none() {
         keys.missing("ties", "a table ties with files");
     }
+    from_pixels(written, keys);
     let mut seen = BTreeSet::new();
     for camera in keys.entries(&["cameras"]) {
         let Some(id) = camera.get("id") else { continue };
@@ -101,6 +108,50 @@ fn across_tables(written: &CalibrationConfig, keys: &mut Keys<'_, '_>) {
     }
 }
 
+/// Either tables of points or pixels and laser passes.
+fn from_pixels(written: &CalibrationConfig, keys: &mut Keys<'_, '_>) {
+    if !written.ties.matched {
+        if keys.span_of("laser").is_some() {
+            keys.missing(
+                "ties.match",
+                "ties.match = true, since a table laser finds control points in a terrain model of matched pixels",
+            );
+        }
+        return;
+    }
+    if keys.span_of("laser").is_none() {
+        keys.missing(
+            "laser",
+            "a table laser with files and cell_m, since tie points are matched (ties.match)",
+        );
+    }
+    let entries = keys.entries(&["cameras"]);
+    let without = entries.iter().filter(|entry| !entry.contains_key("pixels"));
+    for camera in without.filter_map(|entry| entry.get("id")) {
+        let id = camera.get_ref().as_str().unwrap_or_default();
+        keys.review().refuse(
+            camera.span(),
+            "cameras.pixels",
+            format!(
+                "a file with the pixels of camera {id}, since tie points are matched (ties.match)"
+            ),
+        );
+    }
+    for (given, key) in [
+        (&written.ties.files, "ties.files"),
+        (&written.control.files, "control.files"),
+    ] {
+        if !given.is_empty() {
+            let span = keys.span_of("ties").unwrap_or_default();
+            keys.review().refuse(
+                span,
+                key,
+                "no table of points: with ties.match points are measured in pixels",
+            );
+        }
+    }
+}
+
 declare_table! {
     /// 2 to 9 lines of one camera, which fly together.
     pub struct CameraConfig {
@@ -111,6 +162,9 @@ declare_table! {
         /// `constant_rotation` leads to each of them.
         #[serde(skip)]
         isd: PathBuf = key(FILE).required().example(r#""isd/s1.json""#),
+        /// The pixels of the whole image: TIFF or PNG of one band of grey, or a cube. Only for ties.match.
+        #[serde(skip)]
+        pixels: Option<PathBuf> = key(FILE).unused(r#""images/s1.tif""#),
     }
 }
 
@@ -120,13 +174,70 @@ declare_table! {
         /// Paths or globs of tables (.csv), one row an image of a point: `point`, `camera`, `line`, `sample` (0 at the outer
         /// edge of the first line and sample), and where known `sigma_line`, `sigma_sample`.
         #[serde(skip)]
-        files: Vec<PathBuf> = key(Globs)
-            .required_as("paths or globs of tables of tie points")
-            .example(r#"["ties.csv"]"#),
+        files: Vec<PathBuf> = key(Globs).or(Vec::new()).example(r#"["ties.csv"]"#),
+        /// Whether areograph measures tie points itself, in the `pixels` of all cameras. Tie points, terrain model, laser control
+        /// and calibration then follow each other in rounds, each with the cameras of the round before (Li et al. 2023), until
+        /// they change no more.
+        matched as "match": bool = key(Switch).or(false),
         /// Standard deviation of lines and samples, where the table has none.
         sigma_px: f64 = key(from_to(SIGMA_MIN, 100.0)).or(0.2),
         /// Distance of a tie point's images from where the uncalibrated cameras see one point, beyond which it is left out.
         limit_px: f64 = key(from_to(1.0, 1e4)).or(100.0),
+    }
+    check something_measures
+}
+
+/// Without files and without matching there is no tie point.
+fn something_measures(ties: &CalibrationTiesConfig, keys: &mut Keys<'_, '_>) {
+    keys.rule(|| {
+        serde_json::json!({"anyOf": [
+            {"required": ["files"]},
+            {"required": ["match"], "properties": {"match": {"const": true}}},
+        ]})
+    });
+    if !ties.matched && keys.span_of("files").is_none() {
+        keys.missing(
+            "files",
+            "paths or globs of tables of tie points, or match = true",
+        );
+    }
+}
+
+declare_table! {
+    /// Laser passes over the ground of the images, in which control points are found by a terrain model of the two lines that
+    /// differ most in where they look, as `areograph pedr match` does. Only for ties.match.
+    pub struct CalibrationLaserConfig {
+        /// Paths or globs of PEDR files.
+        #[serde(skip)]
+        files: Vec<PathBuf> = key(Globs).or(Vec::new()).unused(r#"["pedr/*.b"]"#),
+        /// Edge of a cell of the terrain model, metres. It is a pixel at least.
+        cell_m: Option<f64> = key(above_to(0.0, 1e5)).unused("100.0"),
+        /// Shifts of a unit of shots are tried within so many cells: what orbit and mounting may be wrong by.
+        search_cells: u32 = key(whole_from_to(1, 500)).or(70),
+        /// Most shots of a segment.
+        segment_points: u32 = key(whole_from_to(3, 1_000)).or(15),
+        /// Variance of heights that a segment must exceed, square metres.
+        least_variance_m2: f64 = key(above_to(0.0, 1e9)).or(1_000.0),
+        /// Similarity that a unit must exceed.
+        least_score: f64 = key(from_to(0.01, 0.999)).or(0.9),
+        /// Largest root mean square of model minus laser at shots that take no part in the search, bias removed, metres.
+        limit_m: f64 = key(above_to(0.0, 1e5)).or(60.0),
+        /// Of the clusters of shots, and of which ground is held back.
+        seed: u32 = key(whole_from_to(0, u32::MAX)).or(1),
+        /// Most rounds; a calibration that has not converged by then is invalid.
+        rounds_max: u32 = key(whole_from_to(1, 100)).or(10),
+    }
+    check what_is_searched
+}
+
+/// A table without files or cells finds nothing.
+fn what_is_searched(laser: &CalibrationLaserConfig, keys: &mut Keys<'_, '_>) {
+    keys.rule(|| serde_json::json!({"required": ["files", "cell_m"]}));
+    if laser.files.is_empty() && keys.span_of("files").is_none() {
+        keys.missing("files", "paths or globs of PEDR files");
+    }
+    if laser.cell_m.is_none() && keys.span_of("cell_m").is_none() {
+        keys.missing("cell_m", "the edge of a cell in metres");
     }
 }
 
@@ -145,7 +256,8 @@ declare_table! {
         sigma_horizontal_m: f64 = key(from_to(SIGMA_MIN, CONTROL_SIGMA_MAX_M)).or(100.0),
         /// Standard deviation of its radius, where the table has none.
         sigma_vertical_m: f64 = key(from_to(SIGMA_MIN, CONTROL_SIGMA_MAX_M)).or(10.0),
-        /// Every so manieth control point along the flight judges the result and is never used for it.
+        /// Every so manieth control point along the flight judges the result and is never used for it; with ties.match
+        /// every so manieth square of 5 km of the ground, with all of its shots.
         held_back_every: u32 = key(whole_from_to(2, 100)).or(4),
         /// Distance of a control point from where the uncalibrated cameras see it, beyond which it is left out.
         limit_px: f64 = key(from_to(1.0, 1e4)).or(300.0),

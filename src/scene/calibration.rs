@@ -7,7 +7,7 @@ use serde::Serialize;
 
 use super::{
     files::{Draft, put},
-    pushbroom_pair::{Orbit, OrbitError, StereoLine, samples},
+    pushbroom_pair::{LONG, Orbit, OrbitError, StereoLine},
     random::Random,
 };
 use crate::{
@@ -37,7 +37,7 @@ fn lines() -> [StereoLine; 2] {
         omega_rad: omega.to_radians(),
         kappa_rad: kappa.to_radians(),
     };
-    let half = 0.5 * samples();
+    let half = 0.5 * f64::from(LONG[1]);
     let errors = |sense: f64| {
         [
             sense * 2e-7 * half,
@@ -69,6 +69,7 @@ fn orbits() -> [Orbit; 2] {
             start_et_s: 596_764_800.0,
             longitude_deg: -63.13,
             latitude_deg: -33.0,
+            size: LONG,
             error: OrbitError {
                 bias_m: [350.0, 500.0, -420.0],
                 drift_m_per_line: [0.006, -0.006, 0.006],
@@ -79,6 +80,7 @@ fn orbits() -> [Orbit; 2] {
             start_et_s: 595_641_600.0,
             longitude_deg: -45.31,
             latitude_deg: -30.0,
+            size: LONG,
             error: OrbitError {
                 bias_m: [150.0, 470.0, -340.0],
                 drift_m_per_line: [-0.004, 0.003, 0.004],

@@ -13,7 +13,8 @@
 //! | `archive`, `archive_frames` | PEDR files of any number of days, with kernels to check them by |
 //! | `ties` | places that two images show, in images that were truly taken elsewhere and at other times |
 //! | `calibration`, `pushbroom_pair` | two stereo lines of a camera for its calibration |
-//! | `terrain_model` | a terrain model that lies aside, laser passes over it |
+//! | `calibration_loop`, `line_images` | three lines with their pixels and laser passes: the calibration from pixels |
+//! | `terrain_model`, `passes` | a terrain model that lies aside, laser passes over it |
 //! | `kernels`, `pedr`, `sites`, `truth` | the files |
 //! | `mission`, `along` | the entry points of a mission |
 //!
@@ -27,6 +28,7 @@ mod archive;
 mod archive_frames;
 mod attitude;
 mod calibration;
+mod calibration_loop;
 mod context;
 mod drawn;
 mod error;
@@ -35,8 +37,10 @@ mod files;
 mod images;
 mod kernels;
 mod laser;
+mod line_images;
 mod mission;
 mod orbit;
+mod passes;
 mod pedr;
 pub mod plan;
 mod plane;
@@ -50,6 +54,7 @@ mod terrain;
 mod terrain_model;
 mod ties;
 mod truth;
+mod value_noise;
 mod versions;
 
 use std::{
@@ -62,6 +67,7 @@ use crate::geom::random;
 pub use along::write_scene_along;
 pub use archive::{ArchiveOptions, ArchiveSummary, write_archive};
 pub use calibration::write_calibration_scene;
+pub use calibration_loop::write_calibration_loop_scene;
 pub use error::SceneError;
 pub use error_sources::{
     AltimeterErrors, AttitudeErrors, Jitter, Misregistration, PositionErrors, Relief, Roughness,

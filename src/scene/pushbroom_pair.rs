@@ -14,9 +14,8 @@ use crate::{
     units::METRES_PER_KM,
 };
 
-/// Samples in a line, and lines of an image.
-const SAMPLES: u32 = 2_584;
-const LINES: u32 = 20_000;
+/// Lines of a long image, and samples of a whole line.
+pub(super) const LONG: [u32; 2] = [20_000, 2_584];
 /// Focal length and pixel, millimetres: those of the HRSC, pixels summed by two.
 const FOCAL_MM: f64 = 175.0;
 const PIXEL_MM: f64 = 0.014;
@@ -36,15 +35,6 @@ const AROUND_S: f64 = 5.0;
 const SUN_M: f64 = 2.2e11;
 /// Steps in the search for the place in an image.
 const STEPS: usize = 20;
-
-/// Samples of a line.
-pub(super) fn samples() -> f64 {
-    f64::from(SAMPLES)
-}
-
-fn lines() -> f64 {
-    f64::from(LINES)
-}
 
 /// A line of the camera.
 pub(super) struct StereoLine {
@@ -80,8 +70,18 @@ pub(super) struct Orbit {
     /// East longitude and latitude of the middle.
     pub(super) longitude_deg: f64,
     pub(super) latitude_deg: f64,
+    /// Lines and samples of its images.
+    pub(super) size: [u32; 2],
     /// True minus support data.
     pub(super) error: OrbitError,
+}
+
+/// Where a line truly looks from while it is exposed, Mars-fixed.
+pub(super) struct TruePose {
+    /// Metres.
+    pub(super) position_m: Vector3<f64>,
+    /// From the camera's own axes.
+    pub(super) to_mars: Matrix3<f64>,
 }
 
 impl StereoLine {
@@ -92,13 +92,13 @@ impl StereoLine {
         Matrix3::from_rows(&[y.cross(&z).transpose(), y.transpose(), z.transpose()])
     }
 
-    /// The line as it truly is.
-    fn truth(&self) -> LineCamera {
+    /// The line as it truly is, with so many samples.
+    pub(super) fn truth(&self, samples: f64) -> LineCamera {
         let (sin, cos) = self.pitch_deg.to_radians().sin_cos();
         let [m1, n1, n2] = self.errors;
         LineCamera {
             offset: self.offset,
-            m: vec![0.0, 0.5 * samples() * PIXEL_MM / (FOCAL_MM * cos) + m1, 0.0],
+            m: vec![0.0, 0.5 * samples * PIXEL_MM / (FOCAL_MM * cos) + m1, 0.0],
             n: vec![sin / cos, n1, n2],
         }
     }
@@ -112,6 +112,15 @@ fn bus_axes() -> Matrix3<f64> {
 impl Orbit {
     fn radius_m() -> f64 {
         SPHERE_M + HEIGHT_M
+    }
+
+    fn lines(&self) -> f64 {
+        f64::from(self.size[0])
+    }
+
+    /// Samples of a line.
+    pub(super) fn samples(&self) -> f64 {
+        f64::from(self.size[1])
     }
 
     fn rate_rad_s() -> f64 {
@@ -164,13 +173,13 @@ impl Orbit {
     /// When the first line of a camera's image is exposed: its middle looks at the middle of the stretch.
     fn first_s(&self, line: &StereoLine) -> f64 {
         let ahead_rad = line.pitch_deg.to_radians().tan() * HEIGHT_M / SPHERE_M;
-        self.start_et_s - ahead_rad / Self::rate_rad_s() - 0.5 * lines() * Self::period_s()
+        self.start_et_s - ahead_rad / Self::rate_rad_s() - 0.5 * self.lines() * Self::period_s()
     }
 
     /// A place of the ground, Mars-fixed metres: `share` of the way along the stretch, and across it from -1 to 1.
     pub(super) fn ground(&self, share: f64, across: f64) -> Vector3<f64> {
-        let along_m = (share - 0.5) * lines() * LINE_M;
-        let across_m = across * 0.5 * samples() * PIXEL_MM / FOCAL_MM * HEIGHT_M;
+        let along_m = (share - 0.5) * self.lines() * LINE_M;
+        let across_m = across * 0.5 * self.samples() * PIXEL_MM / FOCAL_MM * HEIGHT_M;
         let (angle, side) = (along_m / SPHERE_M, across_m / SPHERE_M);
         let frame = Self::to_mars(self.start_et_s) * self.frame();
         let local = Vector3::new(
@@ -188,6 +197,25 @@ impl Orbit {
         frame * local * (SPHERE_M + height_m)
     }
 
+    /// Where a line truly looks from at a line of its image.
+    pub(super) fn true_pose(
+        &self,
+        line: &StereoLine,
+        camera: &LineCamera,
+        at_line: f64,
+    ) -> TruePose {
+        let period_s = Self::period_s();
+        let et_s = self.first_s(line) + at_line * period_s;
+        let to_mars = Self::to_mars(et_s);
+        // All lines' images lie evenly about the middle of the stretch.
+        let after_lines = (et_s - self.start_et_s) / period_s;
+        let to_axes = self.axes(et_s) * to_mars.transpose();
+        TruePose {
+            position_m: to_mars * self.state(et_s)[0] + self.error.at(after_lines),
+            to_mars: to_axes.transpose() * camera.offset.rotation(),
+        }
+    }
+
     /// What a line misses a place by when it sees it with a sample: tangents.
     fn missed(
         &self,
@@ -196,24 +224,15 @@ impl Orbit {
         at: Vector2<f64>,
         place_m: &Vector3<f64>,
     ) -> Vector2<f64> {
-        let period_s = Self::period_s();
-        let et_s = self.first_s(line) + at.x * period_s;
-        let to_mars = Self::to_mars(et_s);
-        // Both cameras' images lie evenly about the middle of the stretch.
-        let after_lines = (et_s - self.start_et_s) / period_s;
-        let position_m = to_mars * self.state(et_s)[0] + self.error.at(after_lines);
-        let axes = self.axes(et_s) * to_mars.transpose();
-        let seen = camera
-            .offset
-            .rotation()
-            .tr_mul(&(axes * (place_m - position_m)));
-        seen.xy() / seen.z - camera.tangents(2.0 * at.y / samples() - 1.0)
+        let pose = self.true_pose(line, camera, at.x);
+        let seen = pose.to_mars.tr_mul(&(place_m - pose.position_m));
+        seen.xy() / seen.z - camera.tangents(2.0 * at.y / self.samples() - 1.0)
     }
 
     /// Line and sample at which a line of the camera truly sees a place; nothing outside of the image.
     pub(super) fn sees(&self, line: &StereoLine, place_m: &Vector3<f64>) -> Option<[f64; 2]> {
-        let camera = line.truth();
-        let mut at = Vector2::new(0.5 * lines(), 0.5 * samples());
+        let camera = line.truth(self.samples());
+        let mut at = Vector2::new(0.5 * self.lines(), 0.5 * self.samples());
         for _ in 0..STEPS {
             let missed = |at: Vector2<f64>| self.missed(line, &camera, at, place_m);
             let by_line = missed(at + Vector2::x()) - missed(at - Vector2::x());
@@ -221,7 +240,8 @@ impl Orbit {
             let slope = Matrix2::from_columns(&[by_line, by_sample]) * 0.5;
             at -= slope.try_inverse()? * missed(at);
         }
-        let inside = (5.0..lines() - 5.0).contains(&at.x) && (5.0..samples() - 5.0).contains(&at.y);
+        let inside = (5.0..self.lines() - 5.0).contains(&at.x)
+            && (5.0..self.samples() - 5.0).contains(&at.y);
         inside.then(|| at.into())
     }
 
@@ -229,7 +249,7 @@ impl Orbit {
     pub(super) fn support_data(&self, line: &StereoLine) -> String {
         let period_s = Self::period_s();
         let first_s = self.first_s(line);
-        let half_s = 0.5 * lines() * period_s;
+        let half_s = 0.5 * self.lines() * period_s;
         let nodes = ((2.0 * (half_s + AROUND_S)) / NODE_S).ceil();
         #[allow(
             clippy::cast_possible_truncation,
@@ -246,10 +266,10 @@ impl Orbit {
         let ends = [et_s[0], et_s[et_s.len() - 1]];
         let states = et_s.iter().map(|et_s| self.state(*et_s));
         let sun = ends.map(|_| [Vector3::x() * SUN_M, Vector3::zeros()]);
-        let number = if line.pitch_deg > 0.0 {
-            -41_211
-        } else {
-            -41_212
+        let number = match line.pitch_deg {
+            ahead if ahead > 0.0 => -41_211,
+            behind if behind < 0.0 => -41_212,
+            _ => -41_213,
         };
         let mounting = (line.mounting() * bus_axes().transpose()).transpose();
         let mut pointing = rotation(&et_s, bus, &normal.into_owned(), -41_000);
@@ -258,8 +278,8 @@ impl Orbit {
         let document = json!({
             "isis_camera_version": 1,
             "image_identifier": format!("{}_{}", self.name, line.name),
-            "image_lines": LINES,
-            "image_samples": SAMPLES,
+            "image_lines": self.size[0],
+            "image_samples": self.size[1],
             "name_platform": "SYNTHETIC ORBITER",
             "name_sensor": format!("STEREO LINE {}", line.name.to_uppercase()),
             "reference_height": {"maxheight": 1_000, "minheight": -1_000, "unit": "m"},
@@ -279,7 +299,7 @@ impl Orbit {
             "detector_sample_summing": 1,
             "detector_line_summing": 1,
             "focal_length_model": {"focal_length": FOCAL_MM},
-            "detector_center": {"line": 0.0, "sample": 0.5 * samples()},
+            "detector_center": {"line": 0.0, "sample": 0.5 * self.samples()},
             "focal2pixel_lines": [0.0, PIXEL_MM.recip(), 0.0],
             "focal2pixel_samples": [0.0, 0.0, PIXEL_MM.recip()],
             "optical_distortion": {"radial": {"coefficients": [0.0, 0.0, 0.0]}},

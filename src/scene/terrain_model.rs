@@ -3,7 +3,6 @@
 
 use std::{fs::File, io::BufWriter, path::Path};
 
-use nalgebra::Vector3;
 use rayon::prelude::*;
 use serde::Serialize;
 use tiff::{
@@ -12,28 +11,17 @@ use tiff::{
 };
 
 use super::{
-    arc::{Beam, Flight},
-    drawn::ProfileShift,
-    error_sources::{Relief, Roughness, SceneErrors},
+    error_sources::{Relief, Roughness},
     files::{Draft, put},
-    laser::LaserErrors,
-    orbit::Orbit,
-    pedr::{PedrRequest, frame_tags, write_pedr},
+    passes::Passes,
     pushbroom_pair::{self, OrbitError, StereoLine},
     random::{mix, normal_of, unit_of},
     terrain::Terrain,
 };
 use crate::{
-    body::{Datum, MARS_IAU2000},
     error::{Error, IoError, Locate as _, Result},
-    geom::{
-        body_rotation::body_matrix,
-        calibration::Offset,
-        ellipsoid::{Spherical, spherical_to_xyz_m},
-        height_grid::HeightGrid,
-    },
-    time::{Et, Interval},
-    units::{RADIANS_PER_DEGREE, wrap_pi},
+    geom::{calibration::Offset, ellipsoid::spherical_to_xyz_m, height_grid::HeightGrid},
+    units::RADIANS_PER_DEGREE,
 };
 
 const README: &str = "A stereo terrain model (model.tif) that lies aside of the ground, PEDR files of passes over it (pedr/) and support\n\
@@ -56,13 +44,14 @@ const NOISE_M: f64 = 8.0;
 /// What stands for no height, in the corner of so many cells.
 const NO_HEIGHT: f32 = -32_768.0;
 const CORNER: u32 = 20;
-/// Passes in each of two directions, half the width that they are spread over, metres, and half their length, seconds.
-const PASSES: u32 = 14;
-const HALF_WIDTH_M: f64 = 27_000.0;
-const HALF_S: f64 = 14.0;
-/// The first pass, ET seconds: 1999-03-01; the others follow by days.
-const START_S: f64 = -26_570_000.0;
-const APART_S: f64 = 86_400.0;
+/// Passes over it.
+const PASSES: Passes = Passes {
+    longitude_rad: LONGITUDE_RAD,
+    latitude_rad: LATITUDE_RAD,
+    of_direction: 14,
+    half_width_m: 27_000.0,
+    half_s: 14.0,
+};
 
 /// `truth.json`.
 #[derive(Serialize)]
@@ -79,47 +68,6 @@ struct Truth {
     radius_m: f64,
 }
 
-/// A pass that looks at nadir.
-struct Pass(Orbit);
-
-impl Flight for Pass {
-    fn beam(&self, et: Et) -> Result<Beam> {
-        let spacecraft_m = self.0.state(et).position_m;
-        let direction = -spacecraft_m.normalize();
-        Ok(Beam {
-            spacecraft_m,
-            position_error_m: Vector3::zeros(),
-            direction,
-            steady_direction: direction,
-        })
-    }
-}
-
-impl Pass {
-    /// The pass that is over a place at `et`, on its way north or south.
-    fn over(et: Et, longitude_rad: f64, latitude_rad: f64, northwards: bool) -> Self {
-        /// Steps towards it: each leaves a fiftieth, the eccentricity's share.
-        const STEPS: usize = 8;
-        let sense = if northwards { 1.0 } else { -1.0 };
-        let from_node_rad = if northwards {
-            latitude_rad
-        } else {
-            std::f64::consts::PI - latitude_rad
-        };
-        let mut node_rad = longitude_rad;
-        let mut anomaly_rad = from_node_rad + std::f64::consts::FRAC_PI_2;
-        let mut orbit = Orbit::new(et, node_rad, anomaly_rad);
-        for _ in 0..STEPS {
-            let place = body_matrix(&MARS_IAU2000, et) * orbit.state(et).position_m;
-            let place = Spherical::from_xyz_m(&place);
-            node_rad += wrap_pi(longitude_rad - place.longitude_rad);
-            anomaly_rad += sense * (latitude_rad - place.latitude.0);
-            orbit = Orbit::new(et, node_rad, anomaly_rad);
-        }
-        Self(orbit)
-    }
-}
-
 /// Writes the scene into `directory`, replacing an older one that nobody added to or changed. The same seed gives the same bytes.
 ///
 /// # Errors
@@ -132,9 +80,7 @@ pub fn write_terrain_model_scene(directory: &Path, seed: u64) -> Result<String> 
     let terrain = Terrain::new(seed, &[middle], relief);
     let path = draft.root().join("model.tif");
     write_model(&path, &terrain, seed).in_file(&path)?;
-    for number in 0..2 * PASSES {
-        write_pass(&pedr, &terrain, number, seed)?;
-    }
+    PASSES.write(&pedr, &terrain, seed)?;
     for (name, pitch_deg) in [("s1", 18.9), ("s2", -18.9)] {
         let path = isd.join(format!("{name}.json"));
         put(&path, &support_data(name, pitch_deg))?;
@@ -155,7 +101,7 @@ pub fn write_terrain_model_scene(directory: &Path, seed: u64) -> Result<String> 
     let directory = directory.display();
     Ok(format!(
         "{directory}: a terrain model, {} passes over it; next: areograph pedr match {directory}/model.tif {directory}/pedr",
-        2 * PASSES
+        PASSES.count()
     ))
 }
 
@@ -232,29 +178,6 @@ fn encode(file: File, grid: &HeightGrid, heights_m: &[f32]) -> tiff::TiffResult<
     image.write_data(heights_m)
 }
 
-/// Writes the file of a pass: the first half of them fly north, the others south.
-fn write_pass(folder: &Path, terrain: &Terrain, number: u32, seed: u64) -> Result<()> {
-    let et = Et::from_seconds(START_S + APART_S * f64::from(number));
-    let share = (f64::from(number % PASSES) + 0.5) / f64::from(PASSES);
-    let aside_m = HALF_WIDTH_M * (2.0 * share - 1.0);
-    let longitude_rad = LONGITUDE_RAD + aside_m / (RADIUS_M * LATITUDE_RAD.cos());
-    let pass = Pass::over(et, longitude_rad, LATITUDE_RAD, number < PASSES);
-    let tags = frame_tags(Interval::new(et.plus(-HALF_S), et.plus(HALF_S)));
-    let orbit = number + 1;
-    let request = PedrRequest {
-        name: &format!("ap{:05}l.b", 10_000 + orbit),
-        tags: &tags,
-        datum: Datum::Iau2000,
-        orbit: &|_| orbit,
-        seed: mix(seed ^ u64::from(number)),
-        errors: LaserErrors {
-            altimeter: SceneErrors::realistic(Roughness::Rough).altimeter,
-            shift: ProfileShift::none(),
-        },
-    };
-    write_pedr(folder, &pass, terrain, &request, |_| false).map(|_| ())
-}
-
 /// Support data of an image that is what they say.
 fn support_data(name: &'static str, pitch_deg: f64) -> String {
     let line = StereoLine {
@@ -268,6 +191,7 @@ fn support_data(name: &'static str, pitch_deg: f64) -> String {
         start_et_s: 596_764_800.0,
         longitude_deg: LONGITUDE_RAD / RADIANS_PER_DEGREE,
         latitude_deg: LATITUDE_RAD / RADIANS_PER_DEGREE,
+        size: pushbroom_pair::LONG,
         error: OrbitError {
             bias_m: [0.0; 3],
             drift_m_per_line: [0.0; 3],

@@ -20,6 +20,7 @@ pub mod intersect;
 mod invented_pair;
 pub mod judge;
 pub mod lay_overlays;
+pub mod line_camera;
 pub mod map_surface;
 pub mod match_laser;
 pub mod match_ties;

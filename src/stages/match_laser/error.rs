@@ -15,9 +15,11 @@ pub enum MatchError {
     },
     /// No shot lies on the model.
     #[error(
-        "no shot lies on the model, which reaches from {west:.3} to {east:.3} degrees east and from {south:.3} to {north:.3} degrees of latitude"
+        "no shot lies on {ground}, which reaches from {west:.3} to {east:.3} degrees east and from {south:.3} to {north:.3} degrees of latitude"
     )]
     NoShots {
+        /// What ground.
+        ground: &'static str,
         /// Its edges, degrees.
         west: f64,
         /// East.
@@ -26,14 +28,6 @@ pub enum MatchError {
         south: f64,
         /// North.
         north: f64,
-    },
-    /// An image has no lines for ground points.
-    #[error("image {image}: {problem}")]
-    Image {
-        /// The image.
-        image: String,
-        /// What is wrong.
-        problem: String,
     },
 }
 
@@ -46,9 +40,8 @@ impl Cause for MatchError {
         match self {
             Self::SharedShots { .. } => "name only one of the two files",
             Self::NoShots { .. } => {
-                "name PEDR files of passes over the model, and look at its place: longitudes are east, latitudes areocentric"
+                "name PEDR files of passes over it, and look at its place: longitudes are east, latitudes areocentric"
             }
-            Self::Image { .. } => "check the support data: they must be those of an image that sees the ground",
         }
         .to_owned()
     }

@@ -17,11 +17,12 @@ mod units;
 
 use std::{collections::BTreeMap, path::PathBuf, sync::atomic::AtomicBool};
 
+use nalgebra::Vector3;
 use rayon::prelude::*;
 
 use self::{
     clusters::clusters,
-    images::{camera, enter},
+    images::enter,
     judge::{Evidence, bias_limit_m, judge, pooled},
     shots::{Shot, is_kept, shots_over},
     units::{Unit, refuse_lonely},
@@ -29,15 +30,17 @@ use self::{
 pub use self::{
     error::MatchError,
     result::{
-        HeldOut, LaserMatch, MatchImage, MatchOptions, MatchRequest, MatchedPoint, UnitMatch,
-        UnitResult,
+        HeldBackGround, HeldOut, LaserMatch, MatchImage, MatchOptions, MatchRequest, MatchedPoint,
+        ModelRequest, UnitMatch, UnitResult,
     },
     similarity::{Moments, Similarity},
 };
+use super::line_camera::LineCamera;
 use crate::{
+    altimetry::ShotFilter,
     error::{Result, Stopped},
     files::HashedFile,
-    geom::{height_grid::HeightGrid, statistics::Summary},
+    geom::{ellipsoid::spherical_to_xyz_m, height_grid::HeightGrid, statistics::Summary},
     pds::terrain_model::{HeightsAbove, read_terrain_model},
     stage::{InOrder, Stage},
     stage_inputs,
@@ -55,6 +58,7 @@ stage_inputs! {
 
 impl Stage for MatchLaser<'_> {
     const NAME: &'static str = "match_laser";
+    const METHOD: u32 = 2;
     type Output = LaserMatch;
     stage_inputs!(fingerprint);
 
@@ -76,7 +80,6 @@ pub fn match_files(of: &MatchRequest) -> Vec<PathBuf> {
 /// # Errors
 /// Files that cannot be read; no shot on the model; shots that two files hold; [`Stopped`].
 pub fn match_laser(request: &MatchRequest, stop: &AtomicBool) -> Result<LaserMatch> {
-    let options = &request.options;
     let above = HeightsAbove {
         radius_m: request.radius_m,
         apart: request.heights_apart,
@@ -84,51 +87,136 @@ pub fn match_laser(request: &MatchRequest, stop: &AtomicBool) -> Result<LaserMat
     let cameras = request
         .images
         .iter()
-        .map(|image| camera(image, request.body));
+        .map(|image| LineCamera::read(&image.isd, &image.name, request.body));
     let cameras = cameras.collect::<Result<Vec<_>>>()?;
     let grid = read_terrain_model(&request.model, request.body, above)?;
-    let shots = shots_over(&grid, &request.pedr, &options.filter, stop)?;
-    if shots.shots.is_empty() {
-        let [west, south, east, north] = grid.edges_rad().map(f64::to_degrees);
-        return Err(MatchError::NoShots {
-            west,
-            south,
-            east,
-            north,
-        }
-        .into());
+    let asked = Asked {
+        grid: &grid,
+        pedr: &request.pedr,
+        cameras: &cameras,
+        options: &request.options,
+        held_back: None,
+        radius_is_stated: request.radius_m.is_some(),
+    };
+    matched(&asked, stop)
+}
+
+/// Matches laser profiles with a terrain model that was made just now, some of the ground held back.
+///
+/// # Errors
+/// Files that cannot be read; no shot on the model; shots that two files hold; [`Stopped`].
+pub fn match_model(request: &ModelRequest<'_>, stop: &AtomicBool) -> Result<LaserMatch> {
+    let asked = Asked {
+        grid: request.model,
+        pedr: request.pedr,
+        cameras: request.images,
+        options: request.options,
+        held_back: Some(request.held_back),
+        // Its heights count from where its cameras have them.
+        radius_is_stated: true,
+    };
+    matched(&asked, stop)
+}
+
+/// Body-fixed places, metres, of at most `most` shots, evenly taken from all between west, south, east and north.
+///
+/// # Errors
+/// Files that cannot be read; no shot there; shots that two files hold; [`Stopped`].
+pub fn shots_within(
+    edges_rad: [f64; 4],
+    pedr: &[PathBuf],
+    filter: &ShotFilter,
+    most: usize,
+    stop: &AtomicBool,
+) -> Result<Vec<Vector3<f64>>> {
+    let [west, south, east, north] = edges_rad;
+    let cell_rad = [east - west, north - south];
+    let grid = HeightGrid {
+        size: [1, 1],
+        first_rad: [west + 0.5 * cell_rad[0], north - 0.5 * cell_rad[1]],
+        cell_rad,
+        radius_m: 0.0,
+        heights_m: vec![f32::NAN],
+    };
+    let shots = shots_over(&grid, pedr, filter, stop)?.shots;
+    if shots.is_empty() {
+        return Err(no_shots("the ground of the images", edges_rad).into());
     }
-    let segments = shots.segments(options.segment_points);
+    let places = shots.iter().step_by(shots.len().div_ceil(most.max(1)));
+    Ok(places
+        .map(|shot| spherical_to_xyz_m(shot.longitude_rad, shot.latitude_rad, shot.radius_m))
+        .collect())
+}
+
+fn no_shots(ground: &'static str, edges_rad: [f64; 4]) -> MatchError {
+    let [west, south, east, north] = edges_rad.map(f64::to_degrees);
+    MatchError::NoShots {
+        ground,
+        west,
+        south,
+        east,
+        north,
+    }
+}
+
+/// What is matched.
+struct Asked<'a> {
+    grid: &'a HeightGrid,
+    pedr: &'a [PathBuf],
+    cameras: &'a [LineCamera],
+    options: &'a MatchOptions,
+    held_back: Option<HeldBackGround>,
+    /// Whether somebody said what heights of the model count from.
+    radius_is_stated: bool,
+}
+
+fn matched(asked: &Asked<'_>, stop: &AtomicBool) -> Result<LaserMatch> {
+    let (grid, options) = (asked.grid, asked.options);
+    let shots = shots_over(grid, asked.pedr, &options.filter, stop)?;
+    if shots.shots.is_empty() {
+        return Err(no_shots("the model", grid.edges_rad()).into());
+    }
+    let segments = shots.segments(options.segment_points, asked.held_back);
     let kept: Vec<&[Shot]> = segments
         .iter()
         .copied()
-        .filter(|segment| is_kept(&grid, segment, options))
+        .filter(|segment| is_kept(grid, segment, options))
         .collect();
-    let units = units_of(&grid, &kept, options.seed);
+    let units = units_of(grid, &kept, asked.held_back, options.seed);
     Stopped::check(stop)?;
-    let mut search = searched(&grid, &units, options);
+    let mut search = searched(grid, &units, options);
     let matching = refuse_lonely(&mut search.units, options.search_cells);
     let points = units.iter().zip(&search.units);
     let points = points.filter(|(_, told)| told.is_kept());
     let mut points: Vec<MatchedPoint> = points
-        .filter_map(|(unit, told)| unit.point(&grid, told))
+        .filter_map(|(unit, told)| unit.point(grid, told))
         .collect();
-    enter(&cameras, &mut points)?;
-    let images: Vec<String> = request.images.iter().map(|of| of.name.clone()).collect();
+    enter(asked.cameras, &mut points)?;
+    let images: Vec<String> = asked
+        .cameras
+        .iter()
+        .map(|of| of.camera.id.clone())
+        .collect();
     let mut complaints = shots.complaints.clone();
     let unseen = unseen(&images, &points);
     let complaint_count = shots.complaint_count + unseen.len() as u64;
     complaints.extend(unseen);
-    let (bias_m, held_out) = (median_bias_m(&search.units), pooled(&search.units));
+    let used: Vec<UnitResult> = search
+        .units
+        .iter()
+        .filter(|unit| !unit.judges)
+        .cloned()
+        .collect();
+    let (bias_m, held_out) = (median_bias_m(&used), pooled(&used));
     let verdict = judge(&Evidence {
-        units: &search.units,
+        units: &used,
         matching,
         similarity: search.measure,
         located_m: search.located_m,
         is_auto: options.similarity.is_none(),
         held_out,
         limit_m: options.limit_m,
-        radius_is_stated: request.radius_m.is_some(),
+        radius_is_stated: asked.radius_is_stated,
         complaints: complaint_count,
     });
     Ok(LaserMatch {
@@ -151,23 +239,38 @@ pub fn match_laser(request: &MatchRequest, stop: &AtomicBool) -> Result<LaserMat
     })
 }
 
-/// Units of the points of segments, in the order of their first points.
-fn units_of<'a>(grid: &HeightGrid, segments: &[&'a [Shot]], seed: u64) -> Vec<Unit<'a>> {
-    let points: Vec<&Shot> = segments.iter().copied().flatten().collect();
-    let places_m: Vec<[f64; 2]> = points.iter().map(|shot| shot.plan_m).collect();
-    let mut members: BTreeMap<usize, Vec<&Shot>> = BTreeMap::new();
-    let mut order = Vec::new();
-    for (shot, cluster) in points.into_iter().zip(clusters(&places_m, seed)) {
-        let of_cluster = members.entry(cluster).or_default();
-        if of_cluster.is_empty() {
-            order.push(cluster);
+/// Units of the points of segments, in the order of their first points; behind them those of ground that is held back.
+fn units_of<'a>(
+    grid: &HeightGrid,
+    segments: &[&'a [Shot]],
+    held_back: Option<HeldBackGround>,
+    seed: u64,
+) -> Vec<Unit<'a>> {
+    let mut units = Vec::new();
+    for judges in [false, true] {
+        // All shots of a segment are on one side.
+        let of_side = segments.iter().copied().filter(|segment| {
+            segment
+                .first()
+                .is_some_and(|shot| shot.is_held_back(held_back))
+                == judges
+        });
+        let points: Vec<&Shot> = of_side.flatten().collect();
+        let places_m: Vec<[f64; 2]> = points.iter().map(|shot| shot.plan_m).collect();
+        let mut members: BTreeMap<usize, Vec<&Shot>> = BTreeMap::new();
+        let mut order = Vec::new();
+        for (shot, cluster) in points.into_iter().zip(clusters(&places_m, seed)) {
+            let of_cluster = members.entry(cluster).or_default();
+            if of_cluster.is_empty() {
+                order.push(cluster);
+            }
+            of_cluster.push(shot);
         }
-        of_cluster.push(shot);
+        for cluster in &order {
+            units.push(Unit::of(grid, units.len() + 1, judges, &members[cluster]));
+        }
     }
-    let units = (1..).zip(&order);
     units
-        .map(|(number, cluster)| Unit::of(grid, number, &members[cluster]))
-        .collect()
 }
 
 /// What a search of all units gave.
@@ -189,7 +292,7 @@ fn searched(grid: &HeightGrid, units: &[Unit<'_>], options: &MatchOptions) -> Se
     };
     let located = by(Similarity::Pearson);
     let located_m = median_bias_m(&located).map(|bias_m| {
-        let kept = located.iter().filter(|unit| unit.is_kept());
+        let kept = located.iter().filter(|unit| unit.is_kept() && !unit.judges);
         let reliefs_m: Vec<f64> = kept.map(|unit| unit.relief_m).collect();
         [bias_m, bias_limit_m(Summary::of(&reliefs_m).median)]
     });
@@ -211,9 +314,9 @@ fn searched(grid: &HeightGrid, units: &[Unit<'_>], options: &MatchOptions) -> Se
     }
 }
 
-/// Median of model minus laser over the units that are kept, metres.
+/// Median of model minus laser over the units that are kept and do not judge, metres.
 fn median_bias_m(units: &[UnitResult]) -> Option<f64> {
-    let kept = units.iter().filter(|unit| unit.is_kept());
+    let kept = units.iter().filter(|unit| unit.is_kept() && !unit.judges);
     let biases_m: Vec<f64> = kept.filter_map(|unit| Some(unit.found?.bias_m)).collect();
     (!biases_m.is_empty()).then(|| Summary::of(&biases_m).median)
 }

@@ -5,7 +5,12 @@ use std::path::PathBuf;
 use serde::{Deserialize, Serialize};
 
 use super::similarity::Similarity;
-use crate::{altimetry::ShotFilter, body::Body, stages::judge::Verdict};
+use crate::{
+    altimetry::ShotFilter,
+    body::Body,
+    geom::height_grid::HeightGrid,
+    stages::{judge::Verdict, line_camera::LineCamera},
+};
 
 /// How laser profiles are matched with a terrain model. Li et al. 2023 and its published program have 15 points, 1000 m², 70 cells,
 /// similarities above 0.9 and contrasts above 1.
@@ -29,6 +34,31 @@ pub struct MatchOptions {
     pub seed: u64,
     /// Shots that are taken.
     pub filter: ShotFilter,
+}
+
+/// Which ground is held back: every so manieth square of a lattice, shifted by a seed. Squares do not depend on the model, so that
+/// a shot stays on its side whatever model it is matched with.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub struct HeldBackGround {
+    /// Every so manieth square.
+    pub every: u32,
+    /// Which of them.
+    pub seed: u64,
+}
+
+/// A terrain model in memory, to be matched.
+#[derive(Debug, Clone, Copy)]
+pub struct ModelRequest<'a> {
+    /// Its heights.
+    pub model: &'a HeightGrid,
+    /// PEDR files.
+    pub pedr: &'a [PathBuf],
+    /// Images that it was made from.
+    pub images: &'a [LineCamera],
+    /// How.
+    pub options: &'a MatchOptions,
+    /// Ground that judges.
+    pub held_back: HeldBackGround,
 }
 
 /// What to match.
@@ -117,6 +147,8 @@ pub struct UnitResult {
     pub unit: usize,
     /// East longitude and latitude of its middle, radians.
     pub place_rad: [f64; 2],
+    /// Whether its ground is held back: it judges, and no other unit shares a shot with it.
+    pub judges: bool,
     /// Shots.
     pub shots: usize,
     /// Passes that they are of.
@@ -163,6 +195,8 @@ pub struct UnitMatch {
 pub struct MatchedPoint {
     /// Number of its unit.
     pub unit: usize,
+    /// Whether that is held back.
+    pub judges: bool,
     /// File, record and shot.
     pub name: String,
     /// East longitude, latitude, radians, and radius, metres, by the laser.

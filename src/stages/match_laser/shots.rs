@@ -2,7 +2,10 @@
 
 use std::sync::atomic::AtomicBool;
 
-use super::{error::MatchError, result::MatchOptions};
+use super::{
+    error::MatchError,
+    result::{HeldBackGround, MatchOptions},
+};
 use crate::{
     altimetry::ShotFilter,
     error::{Error, Locate as _, Result},
@@ -27,6 +30,9 @@ const GAP_S: f64 = 0.3;
 const SAME_SHOT_S: f64 = 0.05;
 /// Of the points of a segment so many must have a height in the model.
 const COVERED: f64 = 13.0 / 15.0;
+/// Edge of a square of ground that is held back or not: a unit or two of shots; and the radius on which it is one, metres.
+const HELD_BACK_M: f64 = 5_000.0;
+const RADIUS_M: f64 = 3_396_190.0;
 /// Complaints kept with their text; all are counted.
 const COMPLAINTS_MAX: usize = 1_000;
 
@@ -48,6 +54,29 @@ pub(super) struct Shot {
     pub(super) plan_m: [f64; 2],
     /// Which pass over the box.
     pub(super) track: usize,
+}
+
+impl Shot {
+    /// Whether it lies on ground that is held back.
+    #[allow(
+        clippy::cast_possible_truncation,
+        reason = "squares of a planet are some thousands"
+    )]
+    pub(super) fn is_held_back(&self, held_back: Option<HeldBackGround>) -> bool {
+        let Some(HeldBackGround { every, seed }) = held_back else {
+            return false;
+        };
+        let square_rad = HELD_BACK_M / RADIUS_M;
+        let row = (self.latitude_rad / square_rad).floor();
+        // As wide as high at the southern edge of the row, so that rows need not know of each other.
+        let east_rad = square_rad / (row * square_rad).cos().max(0.01);
+        let column = (self.longitude_rad / east_rad).floor();
+        // Rows shifted by half of the distance: held-back squares surround each other evenly.
+        let half = i64::from((every / 2).max(1));
+        let place = column as i64 + half * row as i64;
+        let shift = (seed % u64::from(every)) as i64;
+        (place + shift).rem_euclid(i64::from(every)) == 0
+    }
 }
 
 /// What a search gave.
@@ -185,11 +214,16 @@ impl Shots {
         self.tracks = self.shots.last().map_or(0, |last| last.track + 1);
     }
 
-    /// Segments: shots of one track without a gap, at most so many.
-    pub(super) fn segments(&self, points: usize) -> Vec<&[Shot]> {
-        let runs = self
-            .shots
-            .chunk_by(|a, b| a.track == b.track && b.tag_s - a.tag_s < GAP_S);
+    /// Segments: shots of one track without a gap, at most so many, none of them half on ground that is held back.
+    pub(super) fn segments(
+        &self,
+        points: usize,
+        held_back: Option<HeldBackGround>,
+    ) -> Vec<&[Shot]> {
+        let runs = self.shots.chunk_by(|a, b| {
+            let is_near = a.track == b.track && b.tag_s - a.tag_s < GAP_S;
+            is_near && a.is_held_back(held_back) == b.is_held_back(held_back)
+        });
         runs.flat_map(|run| run.chunks(points)).collect()
     }
 }

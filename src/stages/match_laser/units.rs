@@ -29,7 +29,7 @@ pub(super) struct Unit<'a> {
 
 impl<'a> Unit<'a> {
     /// The unit of number `unit` with these shots, which are in the order of time; at least one.
-    pub(super) fn of(grid: &HeightGrid, unit: usize, shots: &[&'a Shot]) -> Self {
+    pub(super) fn of(grid: &HeightGrid, unit: usize, judges: bool, shots: &[&'a Shot]) -> Self {
         let (mut used, mut held_out) = (Vec::new(), Vec::new());
         for (index, shot) in shots.iter().enumerate() {
             if index % HELD_OUT_EVERY == HELD_OUT_EVERY - 1 {
@@ -53,6 +53,7 @@ impl<'a> Unit<'a> {
         let told = UnitResult {
             unit,
             place_rad: grid.place_rad(middle),
+            judges,
             shots: shots.len(),
             strips: tracks.len(),
             radius_m: far.fold(0.0, f64::max),
@@ -168,6 +169,7 @@ impl<'a> Unit<'a> {
             grid.place_rad([shot.cell[0] + shift[0], shot.cell[1] + shift[1]]);
         Some(MatchedPoint {
             unit: told.unit,
+            judges: told.judges,
             name: shot.name.clone(),
             laser: [shot.longitude_rad, shot.latitude_rad, shot.radius_m],
             model: [longitude_rad, latitude_rad, grid.radius_m + height_m],
@@ -207,11 +209,11 @@ fn not_better(held_out: Option<&HeldOut>, [south, east]: [f64; 2]) -> Option<Str
     })
 }
 
-/// Refuses units whose shift is far from the median of all that are kept so far, for a search within so many cells; how many were
-/// kept before.
+/// Refuses units whose shift is far from the median of all that are kept so far and do not judge, for a search within so many cells;
+/// how many of these were kept before.
 pub(super) fn refuse_lonely(units: &mut [UnitResult], search_cells: u32) -> usize {
     let most = AGREE_CELLS.min(AGREE_SHARE * f64::from(search_cells));
-    let kept = units.iter().filter(|unit| unit.is_kept());
+    let kept = units.iter().filter(|unit| unit.is_kept() && !unit.judges);
     let shifts: Vec<[f64; 2]> = kept
         .filter_map(|unit| Some(unit.found?.shift_cells))
         .collect();
