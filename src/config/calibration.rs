@@ -8,7 +8,7 @@ use std::{
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::{body::Body, error::Error, units::RADIANS_PER_DEGREE};
+use crate::{altimetry::ShotFilter, body::Body, error::Error, units::RADIANS_PER_DEGREE};
 
 use super::{
     declare::{
@@ -226,6 +226,8 @@ declare_table! {
         seed: u32 = key(whole_from_to(0, u32::MAX)).or(1),
         /// Most rounds; a calibration that has not converged by then is invalid.
         rounds_max: u32 = key(whole_from_to(1, 100)).or(10),
+        /// Shots to keep.
+        filter: ShotFilter = table(),
     }
     check what_is_searched
 }

@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use super::{
+    calibration_loop::CalibrationLoop,
     out::check_out_path,
     single::{Single, SingleOutcome, Told, made},
 };
@@ -43,11 +44,12 @@ pub fn run_calibration(
     single.run(
         &calibration_files(config),
         |hashed, cache, stop| {
-            let stage = Calibrate {
-                calibration: CalibrationKeys(config),
-                files: CalibrationFiles(hashed),
-            };
-            made(&stage, cache, stop)
+            let (calibration, files) = (CalibrationKeys(config), CalibrationFiles(hashed));
+            if config.ties.matched {
+                let rounds = CalibrationLoop { calibration, files };
+                return made(&rounds, cache, stop);
+            }
+            made(&Calibrate { calibration, files }, cache, stop)
         },
         |staging, result| {
             let page = calibration_page(config, result)?;

@@ -7,6 +7,7 @@
 mod archive;
 mod bounds;
 mod calibration;
+mod calibration_loop;
 mod check;
 mod choice;
 mod compare;

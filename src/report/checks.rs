@@ -175,6 +175,8 @@ const fn section(kind: CheckKind) -> Option<&'static Section> {
         | CheckKind::CameraMoved
         | CheckKind::TiesLeftOut
         | CheckKind::ControlLeftOut
+        | CheckKind::RoundShift
+        | CheckKind::RoundControl
         | CheckKind::HeldOutShots
         | CheckKind::UnitsKept
         | CheckKind::UnitsAgree

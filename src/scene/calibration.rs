@@ -70,6 +70,7 @@ fn orbits() -> [Orbit; 2] {
             longitude_deg: -63.13,
             latitude_deg: -33.0,
             size: LONG,
+            is_steered: false,
             error: OrbitError {
                 bias_m: [350.0, 500.0, -420.0],
                 drift_m_per_line: [0.006, -0.006, 0.006],
@@ -81,6 +82,7 @@ fn orbits() -> [Orbit; 2] {
             longitude_deg: -45.31,
             latitude_deg: -30.0,
             size: LONG,
+            is_steered: false,
             error: OrbitError {
                 bias_m: [150.0, 470.0, -340.0],
                 drift_m_per_line: [-0.004, 0.003, 0.004],

@@ -85,6 +85,7 @@ fn orbit() -> Orbit {
         longitude_deg: LONGITUDE_DEG,
         latitude_deg: LATITUDE_DEG,
         size: SIZE,
+        is_steered: true,
         error: OrbitError {
             bias_m: [350.0, 500.0, -420.0],
             drift_m_per_line: [0.006, -0.006, 0.006],

@@ -72,6 +72,9 @@ pub(super) struct Orbit {
     pub(super) latitude_deg: f64,
     /// Lines and samples of its images.
     pub(super) size: [u32; 2],
+    /// Whether the spacecraft is yawed until it flies along over the turning ground: minutes apart its lines then see the same
+    /// ground also where the swath is narrow.
+    pub(super) is_steered: bool,
     /// True minus support data.
     pub(super) error: OrbitError,
 }
@@ -162,12 +165,30 @@ impl Orbit {
     /// From J2000 to the axes across the flight, along it and down.
     fn axes(&self, et_s: f64) -> Matrix3<f64> {
         let [position_m, velocity_m_s] = self.state(et_s);
-        let (down, along) = (-position_m.normalize(), velocity_m_s.normalize());
+        let of_ground_m_s = if self.is_steered {
+            spin_rad_s(&MARS_IAU2000).cross(&position_m)
+        } else {
+            Vector3::zeros()
+        };
+        let down = -position_m.normalize();
+        let along = (velocity_m_s - of_ground_m_s).normalize();
         Matrix3::from_rows(&[
             along.cross(&down).transpose(),
             along.transpose(),
             down.transpose(),
         ])
+    }
+
+    /// How fast the spacecraft turns, J2000.
+    fn turn_rad_s(&self, et_s: f64) -> Vector3<f64> {
+        /// Seconds to either side over which it is taken.
+        const SIDE_S: f64 = 0.5;
+        if !self.is_steered {
+            return self.frame().column(2) * Self::rate_rad_s();
+        }
+        let [before, here, after] = [-SIDE_S, 0.0, SIDE_S].map(|side_s| self.axes(et_s + side_s));
+        let skew = (after - before).tr_mul(&here) / (2.0 * SIDE_S);
+        Vector3::new(skew[(2, 1)], skew[(0, 2)], skew[(1, 0)])
     }
 
     /// When the first line of a camera's image is exposed: its middle looks at the middle of the stretch.
@@ -181,7 +202,12 @@ impl Orbit {
         let along_m = (share - 0.5) * self.lines() * LINE_M;
         let across_m = across * 0.5 * self.samples() * PIXEL_MM / FOCAL_MM * HEIGHT_M;
         let (angle, side) = (along_m / SPHERE_M, across_m / SPHERE_M);
-        let frame = Self::to_mars(self.start_et_s) * self.frame();
+        let [across_axis, along_axis, down] = {
+            let axes = self.axes(self.start_et_s);
+            [0, 1, 2].map(|row| axes.row(row).transpose())
+        };
+        let frame = Self::to_mars(self.start_et_s)
+            * Matrix3::from_columns(&[-down, along_axis, across_axis]);
         let local = Vector3::new(
             angle.cos() * side.cos(),
             angle.sin() * side.cos(),
@@ -261,7 +287,6 @@ impl Orbit {
             .collect();
         let bus = et_s.iter().map(|et_s| bus_axes() * self.axes(*et_s));
         let mars = et_s.iter().map(|et_s| Self::to_mars(*et_s));
-        let normal = self.frame().column(2) * Self::rate_rad_s();
         let spin = spin_rad_s(&MARS_IAU2000);
         let ends = [et_s[0], et_s[et_s.len() - 1]];
         let states = et_s.iter().map(|et_s| self.state(*et_s));
@@ -272,7 +297,11 @@ impl Orbit {
             _ => -41_213,
         };
         let mounting = (line.mounting() * bus_axes().transpose()).transpose();
-        let mut pointing = rotation(&et_s, bus, &normal.into_owned(), -41_000);
+        let rates: Vec<[f64; 3]> = et_s
+            .iter()
+            .map(|et_s| self.turn_rad_s(*et_s).into())
+            .collect();
+        let mut pointing = rotation(&et_s, bus, rates, -41_000);
         pointing["constant_frames"] = json!([number, -41_000]);
         pointing["constant_rotation"] = json!(mounting.as_slice());
         let document = json!({
@@ -293,7 +322,7 @@ impl Orbit {
                 "semiminor": MARS_IAU2000.polar_radius_m / METRES_PER_KM,
                 "unit": "km",
             },
-            "body_rotation": rotation(&et_s, mars, &spin, 10_014),
+            "body_rotation": rotation(&et_s, mars, vec![spin.into(); et_s.len()], 10_014),
             "instrument_pointing": pointing,
             "naif_keywords": {"BODY_CODE": 499},
             "detector_sample_summing": 1,
@@ -315,12 +344,11 @@ impl Orbit {
 fn rotation(
     et_s: &[f64],
     from_j2000: impl Iterator<Item = Matrix3<f64>>,
-    rate_rad_s: &Vector3<f64>,
+    rates_rad_s: Vec<[f64; 3]>,
     frame: i32,
 ) -> Value {
     let matrices: Vec<Matrix3<f64>> = from_j2000.collect();
     let quaternions = continuous_quaternions(matrices.iter());
-    let rates: Vec<[f64; 3]> = et_s.iter().map(|_| (*rate_rad_s).into()).collect();
     json!({
         "time_dependent_frames": [frame, 1],
         "ck_table_start_time": et_s[0],
@@ -328,7 +356,7 @@ fn rotation(
         "ck_table_original_size": et_s.len(),
         "ephemeris_times": et_s,
         "quaternions": quaternions,
-        "angular_velocities": rates,
+        "angular_velocities": rates_rad_s,
         "reference_frame": 1,
     })
 }

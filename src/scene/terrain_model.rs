@@ -192,6 +192,7 @@ fn support_data(name: &'static str, pitch_deg: f64) -> String {
         longitude_deg: LONGITUDE_RAD / RADIANS_PER_DEGREE,
         latitude_deg: LATITUDE_RAD / RADIANS_PER_DEGREE,
         size: pushbroom_pair::LONG,
+        is_steered: false,
         error: OrbitError {
             bias_m: [0.0; 3],
             drift_m_per_line: [0.0; 3],

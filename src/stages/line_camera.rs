@@ -2,12 +2,16 @@
 
 use std::path::Path;
 
+use nalgebra::Vector3;
+
 use crate::{
     body::Body,
     error::{Cause, Kind, Locate as _, Result},
     geom::{
+        ellipsoid::Spherical,
+        intersection::Ray,
         oriented_camera::OrientedCamera,
-        pushbroom::{Detector, Pose, SampledOrientation},
+        pushbroom::{Detector, ExteriorOrientation, Pose, SampledOrientation},
     },
     pds::isd::{ImageSupport, read_isd},
 };
@@ -22,6 +26,8 @@ const SAMPLES: [f64; 2] = [64.0, 20_000.0];
 pub struct LineCamera {
     /// Orientation, detector and line times.
     pub camera: OrientedCamera<SampledOrientation>,
+    /// Samples of a line.
+    pub samples: u32,
 }
 
 /// Support data that are no orientation.
@@ -43,6 +49,56 @@ impl Cause for NoSight {
 }
 
 impl LineCamera {
+    /// Where the middle of the image looks, unit vector, body-fixed.
+    #[must_use]
+    pub fn looks(&self) -> Vector3<f64> {
+        self.ray([0.5, 0.5]).direction()
+    }
+
+    /// Edge of a pixel below the spacecraft on a sphere, metres.
+    #[must_use]
+    pub fn pixel_m(&self, radius_m: f64) -> f64 {
+        self.height_m(radius_m) / self.camera.detector.focal_length_px
+    }
+
+    /// Height of the spacecraft above a sphere, metres.
+    #[must_use]
+    pub fn height_m(&self, radius_m: f64) -> f64 {
+        self.ray([0.5, 0.5]).position_m.norm() - radius_m
+    }
+
+    /// Where corners and middle of the image meet a sphere: east longitudes and latitudes, radians.
+    #[must_use]
+    pub fn corners_rad(&self, radius_m: f64) -> Vec<[f64; 2]> {
+        let shares = [[0.0, 0.0], [0.0, 1.0], [1.0, 0.0], [1.0, 1.0], [0.5, 0.5]];
+        let corners = shares.into_iter().filter_map(|share| {
+            let ray = self.ray(share);
+            let (from_m, direction) = (ray.position_m, ray.direction());
+            let along_m = -from_m.dot(&direction);
+            let square_m2 = radius_m * radius_m - (from_m.norm_squared() - along_m * along_m);
+            let place_m = from_m + (along_m - square_m2.max(0.0).sqrt()) * direction;
+            let place = Spherical::from_xyz_m(&place_m);
+            (square_m2 >= 0.0).then_some([place.longitude_rad, place.latitude.0])
+        });
+        corners.collect()
+    }
+
+    /// The ray of a place, shares of lines and samples.
+    fn ray(&self, [line, sample]: [f64; 2]) -> Ray {
+        let camera = &self.camera;
+        camera.ray(line * camera.lines(), sample * f64::from(self.samples))
+    }
+
+    /// The same, borrowed.
+    pub(in crate::stages) fn seen(&self) -> OrientedCamera<&(dyn ExteriorOrientation + 'static)> {
+        OrientedCamera {
+            id: self.camera.id.clone(),
+            orientation: &self.camera.orientation,
+            detector: self.camera.detector,
+            line_times: self.camera.line_times.clone(),
+        }
+    }
+
     /// The image `name` by the support data at `path`, which see `body`.
     ///
     /// # Errors
@@ -68,6 +124,7 @@ impl LineCamera {
                 ),
                 line_times: support.line_times,
             },
+            samples: support.samples,
         })
     }
 }

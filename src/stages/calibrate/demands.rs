@@ -1,7 +1,6 @@
 //! What must be there for a calibration.
 
 use super::{error::CalibrateError, geometry::CameraImage, read::OrbitPoint, result::PointKind};
-use crate::config::CalibrationConfig;
 
 /// Fewest ties, and fewest control points of each kind, that a calibration makes sense with.
 const TIES_MIN: usize = 10;
@@ -58,13 +57,12 @@ pub(super) fn enough_ties(
 pub(super) fn enough(
     points: &[OrbitPoint],
     names: &[String],
-    config: &CalibrationConfig,
+    is_controlled: bool,
 ) -> std::result::Result<(), CalibrateError> {
     enough_ties(points, names)?;
     let count = |kind| points.iter().filter(|of| of.is(kind)).count();
     let [controls, held_back] = [PointKind::Control, PointKind::HeldBack].map(count);
-    let controlled = !config.control.files.is_empty();
-    if controlled && controls.min(held_back) < CONTROLS_MIN {
+    if is_controlled && controls.min(held_back) < CONTROLS_MIN {
         return Err(CalibrateError::TooFewControls {
             found: controls,
             held_back,

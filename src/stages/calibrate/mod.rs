@@ -4,11 +4,13 @@ mod demands;
 mod elsewhere;
 mod error;
 mod geometry;
+mod given;
 mod judge;
 mod measure;
 mod outcome;
 mod read;
 mod result;
+mod rounds;
 mod run;
 mod support;
 mod tables;
@@ -25,10 +27,13 @@ use crate::{
 };
 
 pub use error::CalibrateError;
+pub use given::GivenPoints;
 pub use result::{
-    Calibration, CalibrationStep, CameraResult, ControlFigures, Figures, HeldBack, ImageResult,
-    PixelsAndMetres, PointKind, PointResult, TieFigures, ValidationResult, Value,
+    Calibration, CalibrationRound, CalibrationStep, CameraResult, ControlFigures, Figures,
+    HeldBack, ImageResult, PixelsAndMetres, PointKind, PointResult, Rounds, TieFigures,
+    ValidationResult, Value,
 };
+pub use run::calibrate_given;
 
 stage_inputs! {
     /// A calibration and its files.
@@ -50,6 +55,7 @@ impl Input for CalibrationKeys<'_> {
         inputs.setting("cameras", &self.0.cameras);
         inputs.setting("ties", &self.0.ties);
         inputs.setting("control", &self.0.control);
+        inputs.setting("laser", &self.0.laser);
         inputs.setting("a_priori", &self.0.a_priori);
         inputs.setting("solution", &self.0.solution);
         inputs.setting("validation", &self.0.validation);
@@ -71,7 +77,7 @@ impl Input for CalibrationFiles<'_> {
 
 impl Stage for Calibrate<'_> {
     const NAME: &'static str = "calibrate";
-    const METHOD: u32 = 2;
+    const METHOD: u32 = 3;
     type Output = Calibration;
     stage_inputs!(fingerprint);
 
@@ -89,10 +95,16 @@ pub fn calibration_files(of: &CalibrationConfig) -> Vec<PathBuf> {
 /// The files of each key: of cameras, ties and control, and of each other orbit.
 fn kinds(of: &CalibrationConfig) -> Vec<Vec<&PathBuf>> {
     let cameras = of.cameras.iter().map(|camera| &camera.isd).collect();
+    let pixels = of
+        .cameras
+        .iter()
+        .filter_map(|camera| camera.pixels.as_ref());
     let mut kinds: Vec<Vec<&PathBuf>> = vec![
         cameras,
         of.ties.files.iter().collect(),
         of.control.files.iter().collect(),
+        pixels.collect(),
+        of.laser.files.iter().collect(),
     ];
     for orbit in &of.validation {
         kinds.extend([&orbit.isd, &orbit.ties, &orbit.control].map(|files| files.iter().collect()));

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use super::{
     error::CalibrateError,
     geometry::{CameraImage, Laboratory, Orbit},
+    given::{self, GivenPoints},
     result::PointKind,
     tables::{Cameras, Complaints, ControlSigma, Measured, MeasuredPoint, control, ties},
 };
@@ -44,12 +45,17 @@ impl OrbitPoint {
     }
 }
 
-/// Where the tables of an orbit are.
-pub(super) struct OrbitTables<'a> {
-    pub(super) ties: &'a [PathBuf],
-    pub(super) control: &'a [PathBuf],
-    /// Every so manieth control point is held back; none in other orbits.
-    pub(super) held_back_every: Option<u32>,
+/// Where the points of an orbit come from.
+pub(super) enum PointSource<'a> {
+    /// Tables.
+    Tables {
+        ties: &'a [PathBuf],
+        control: &'a [PathBuf],
+        /// Every so manieth control point is held back; none in other orbits.
+        held_back_every: Option<u32>,
+    },
+    /// They were measured just now.
+    Given(&'a GivenPoints),
 }
 
 /// The points of an orbit.
@@ -58,7 +64,7 @@ pub(super) fn points_of(
     names: &[String],
     orbit: &Orbit,
     laboratory: &Laboratory,
-    tables: &OrbitTables<'_>,
+    source: &PointSource<'_>,
     complaints: &mut Complaints,
 ) -> Result<Vec<OrbitPoint>> {
     let sizes: Vec<[f64; 2]> = orbit.images.iter().map(CameraImage::size).collect();
@@ -66,38 +72,50 @@ pub(super) fn points_of(
         names,
         sizes: &sizes,
     };
-    let tied = ties(tables.ties, config.ties.sigma_px, &cameras, complaints)?;
     let sigma = ControlSigma {
         image_px: config.control.sigma_px,
         horizontal_m: config.control.sigma_horizontal_m,
         vertical_m: config.control.sigma_vertical_m,
     };
-    let controlled = control(tables.control, sigma, &cameras, complaints)?;
-    let state = &laboratory.state;
-    let make = |kind: PointKind, of: MeasuredPoint| {
-        let sights = of
-            .measured
-            .iter()
-            .map(|measured| orbit.sight(state, measured.camera, measured.place, measured.sigma_px));
-        OrbitPoint {
-            point: GroundPoint {
-                sights: sights.collect(),
-                known: of.known,
-            },
-            name: of.name,
-            kind,
-            measured: of.measured,
-            left_out: false,
-        }
+    let tie_px = config.ties.sigma_px;
+    let (tied, controlled, judging) = match source {
+        PointSource::Tables {
+            ties: of_ties,
+            control: of_control,
+            ..
+        } => (
+            ties(of_ties, tie_px, &cameras, complaints)?,
+            control(of_control, sigma, &cameras, complaints)?,
+            Vec::new(),
+        ),
+        PointSource::Given(given) => (
+            given::ties(&given.ties, tie_px),
+            given::control(&given.control, sigma),
+            given::control(&given.held_back, sigma),
+        ),
     };
-    let mut tied: Vec<OrbitPoint> = tied
-        .into_iter()
-        .map(|of| make(PointKind::Tie, of))
-        .collect();
-    let mut controlled: Vec<OrbitPoint> = controlled
-        .into_iter()
-        .map(|of| make(PointKind::Control, of))
-        .collect();
+    let state = &laboratory.state;
+    let make = |kind: PointKind, of: Vec<MeasuredPoint>| -> Vec<OrbitPoint> {
+        let point = |of: MeasuredPoint| {
+            let sights = of.measured.iter().map(|measured| {
+                orbit.sight(state, measured.camera, measured.place, measured.sigma_px)
+            });
+            OrbitPoint {
+                point: GroundPoint {
+                    sights: sights.collect(),
+                    known: of.known,
+                },
+                name: of.name,
+                kind,
+                measured: of.measured,
+                left_out: false,
+            }
+        };
+        of.into_iter().map(point).collect()
+    };
+    let mut tied = make(PointKind::Tie, tied);
+    let mut controlled = make(PointKind::Control, controlled);
+    controlled.extend(make(PointKind::HeldBack, judging));
     let pixels: Vec<f64> = orbit.images.iter().map(CameraImage::pixel).collect();
     let limits = [
         (&mut tied, "tie points", config.ties.limit_px),
@@ -112,8 +130,12 @@ pub(super) fn points_of(
         };
         leave_out(points, what, &expected, complaints)?;
     }
-    if let Some(every) = tables.held_back_every {
-        hold_back(&mut controlled, every as usize);
+    if let PointSource::Tables {
+        held_back_every: Some(every),
+        ..
+    } = source
+    {
+        hold_back(&mut controlled, *every as usize);
     }
     tied.append(&mut controlled);
     Ok(tied)

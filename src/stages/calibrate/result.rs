@@ -18,6 +18,8 @@ pub struct Calibration {
     pub steps: Vec<CalibrationStep>,
     /// What the control that was held back says; none without control.
     pub held_back: Option<HeldBack>,
+    /// The rounds of a calibration from pixels, of which this is the last.
+    pub rounds: Option<Rounds>,
     /// Other orbits.
     pub validation: Vec<ValidationResult>,
     /// Every point.
@@ -172,6 +174,50 @@ pub struct HeldBack {
     /// Likewise of its height, metres.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub accuracy_height_m: Option<f64>,
+}
+
+/// A calibration in rounds.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Rounds {
+    /// The rounds in order.
+    pub rounds: Vec<CalibrationRound>,
+    /// Most that were allowed.
+    pub rounds_max: u32,
+    /// Edge of a cell of the terrain models, metres.
+    pub cell_m: f64,
+}
+
+/// The numbers of a round: terrain model and units as the cameras of the round before see them, then the cameras.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct CalibrationRound {
+    /// From 1.
+    pub round: u32,
+    /// Tie points.
+    pub ties: u64,
+    /// Their residuals in the worst line, root mean square, pixels, with the cameras that the terrain model was made with.
+    pub model_tie_px: Option<f64>,
+    /// The same with the cameras of this round.
+    pub tie_px: Option<f64>,
+    /// Share of the cells of the terrain model with a height.
+    pub filled: f64,
+    /// Units that calibrate: kept, and refused.
+    pub units: [u64; 2],
+    /// Units that judge: kept, and refused.
+    pub judging: [u64; 2],
+    /// Median length of the shifts of kept units that calibrate, cells.
+    pub shift_cells: f64,
+    /// Median of model minus laser, metres.
+    pub bias_m: Option<f64>,
+    /// Residuals of control, root mean square over all lines, pixels and metres on the ground.
+    pub control: PixelsAndMetres,
+    /// The same of control that was held back.
+    pub held_back: PixelsAndMetres,
+    /// Residuals of control that was held back in their standard deviations, root mean square.
+    pub held_back_sigmas: Option<f64>,
+    /// φ, ω and κ of every line, radians.
+    pub angles_rad: Vec<[f64; 3]>,
+    /// Drift of the orbit, metres a line.
+    pub drift_m_per_line: [f64; 3],
 }
 
 /// Another orbit.

@@ -6,10 +6,11 @@ use super::{
     demands::{belong_together, enough},
     error::CalibrateError,
     geometry::{CameraImage, Laboratory, Orbit},
+    given::GivenPoints,
     judge::{Evidence, Known, judge},
     measure::figures,
     outcome::{self, Outcome},
-    read::{OrbitPoint, OrbitTables, points_of},
+    read::{OrbitPoint, PointSource, points_of},
     result::{Calibration, CalibrationStep, PointKind},
     tables::Complaints,
     validate::{Calibrated, validate},
@@ -47,8 +48,30 @@ struct Work<'a> {
     covariance: DMatrix<f64>,
 }
 
-/// Calibrates the lines of a camera.
+/// Calibrates the lines of a camera by the tables of its configuration.
 pub(super) fn calibrate(config: &CalibrationConfig) -> Result<Calibration> {
+    let tables = PointSource::Tables {
+        ties: &config.ties.files,
+        control: &config.control.files,
+        held_back_every: Some(config.control.held_back_every),
+    };
+    calibrate_by(config, &tables, !config.control.files.is_empty())
+}
+
+/// Calibrates the lines of a camera by points that were measured just now; without control by ties alone.
+///
+/// # Errors
+/// Support data that cannot be read or do not belong together; points that do not fit them, too few of them; other orbits likewise.
+pub fn calibrate_given(config: &CalibrationConfig, given: &GivenPoints) -> Result<Calibration> {
+    let is_controlled = !(given.control.is_empty() && given.held_back.is_empty());
+    calibrate_by(config, &PointSource::Given(given), is_controlled)
+}
+
+fn calibrate_by(
+    config: &CalibrationConfig,
+    source: &PointSource<'_>,
+    is_controlled: bool,
+) -> Result<Calibration> {
     let names: Vec<String> = config.cameras.iter().map(|of| of.id.clone()).collect();
     let images = config
         .cameras
@@ -59,20 +82,8 @@ pub(super) fn calibrate(config: &CalibrationConfig) -> Result<Calibration> {
     let orbit = Orbit::of(images, config.body, None)?;
     let laboratory = orbit.laboratory(&names, config.solution.order as usize)?;
     let mut complaints = Complaints::default();
-    let tables = OrbitTables {
-        ties: &config.ties.files,
-        control: &config.control.files,
-        held_back_every: Some(config.control.held_back_every),
-    };
-    let points = points_of(
-        config,
-        &names,
-        &orbit,
-        &laboratory,
-        &tables,
-        &mut complaints,
-    )?;
-    enough(&points, &names, config)?;
+    let points = points_of(config, &names, &orbit, &laboratory, source, &mut complaints)?;
+    enough(&points, &names, is_controlled)?;
     let state = laboratory.state.clone();
     let parameters = state.layout().len();
     let mut work = Work {
@@ -143,6 +154,7 @@ pub(super) fn calibrate(config: &CalibrationConfig) -> Result<Calibration> {
         images: outcome.images(),
         cameras,
         held_back,
+        rounds: None,
         validation,
         verdict,
         steps: work.steps,
@@ -288,7 +300,7 @@ impl Work<'_> {
             if !self.leave_out(complaints) {
                 break;
             }
-            enough(&self.points, names, self.config)?;
+            enough(&self.points, names, true)?;
             steps = self.adjust("joint", ALL, &freedom)?;
         }
         self.tell(

@@ -259,6 +259,14 @@ fn known(row: &ControlRow, sigma: ControlSigma) -> KnownPlace {
     );
     let horizontal_m = row.sigma_m[0].unwrap_or(sigma.horizontal_m);
     let vertical_m = row.sigma_m[1].unwrap_or(sigma.vertical_m);
+    known_place(place_m, [horizontal_m, vertical_m])
+}
+
+/// A place with its standard deviations in the plane and in height, metres.
+pub(super) fn known_place(
+    place_m: Vector3<f64>,
+    [horizontal_m, vertical_m]: [f64; 2],
+) -> KnownPlace {
     let over = Vector3::new(horizontal_m, horizontal_m, vertical_m).map(f64::recip);
     KnownPlace {
         place_m,

@@ -8,7 +8,7 @@ use super::{
     error::CalibrateError,
     geometry::{CameraImage, Laboratory, Orbit},
     measure::{Squares, figures},
-    read::{OrbitPoint, OrbitTables, points_of},
+    read::{OrbitPoint, PointSource, points_of},
     result::{PointKind, ValidationResult},
     tables::Complaints,
 };
@@ -45,7 +45,7 @@ pub(super) fn validate(
     let order = config.solution.order as usize;
     let laboratory = orbit.laboratory(calibrated.names, order)?;
     same_mounting(&of.id, calibrated, &laboratory, &orbit)?;
-    let tables = OrbitTables {
+    let tables = PointSource::Tables {
         ties: &of.ties,
         control: &of.control,
         held_back_every: None,

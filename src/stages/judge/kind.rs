@@ -91,6 +91,10 @@ pub enum CheckKind {
     TiesLeftOut,
     /// Share of its control.
     ControlLeftOut,
+    /// Median shift of the units of the last round of a calibration.
+    RoundShift,
+    /// By how much the residuals of control changed in that round.
+    RoundControl,
     /// Laser shots that were held out of a match: root mean square of model minus laser, bias removed.
     HeldOutShots,
     /// Units of laser shots that were matched and kept.
@@ -157,6 +161,8 @@ impl CheckKind {
             Self::CameraMoved => "Image moved by the calibration",
             Self::TiesLeftOut => "Tie points left out",
             Self::ControlLeftOut => "Control left out",
+            Self::RoundShift => "Units shifted in the last round (median)",
+            Self::RoundControl => "Control, change in the last round",
             Self::HeldOutShots => "Shots held out, model − laser",
             Self::UnitsKept => "Units kept",
             Self::UnitsAgree => "Matching units that agree",
@@ -196,6 +202,7 @@ impl CheckKind {
             | Self::TiesLeftOut
             | Self::ControlLeftOut
             | Self::UnitsAgree
+            | Self::RoundControl
             | Self::MeasurementsRemoved
             | Self::MeasurementsFlagged => "%",
             Self::ProfilesApart
@@ -206,6 +213,7 @@ impl CheckKind {
             | Self::Boresight
             | Self::HeldBackControl
             | Self::OtherOrbits => "σ",
+            Self::RoundShift => "cells",
             Self::ClockCorrection => "s",
             Self::PointingRmse => "″",
             Self::TableError | Self::LinesAgree | Self::CameraMoved => "px",
@@ -266,7 +274,11 @@ impl CheckKind {
         match self {
             Self::ParallaxAfter | Self::PointingRmse if is_small => 2,
             Self::ClockCorrection | Self::TableError => 4,
-            Self::RangeMean | Self::Decoding | Self::PositionRmse | Self::LinesAgree => 2,
+            Self::RangeMean
+            | Self::Decoding
+            | Self::PositionRmse
+            | Self::LinesAgree
+            | Self::RoundShift => 2,
             _ => 1,
         }
     }

@@ -11,6 +11,7 @@ mod field;
 mod ground;
 mod level;
 mod levels;
+mod lines;
 mod pair;
 mod result;
 mod search;
@@ -39,6 +40,7 @@ use crate::{
     watch::Watch,
 };
 
+pub use lines::{LinesToMap, map_lines};
 pub use result::{
     ProfileOnSurface, ShotComparison, ShotOnSurface, Surface, SurfaceAccount, SurfaceLook,
     SurfaceModel,

@@ -11,7 +11,7 @@ pub(super) fn enter(
     cameras: &[LineCamera],
     points: &mut [MatchedPoint],
 ) -> std::result::Result<(), NoSight> {
-    for LineCamera { camera } in cameras {
+    for LineCamera { camera, .. } in cameras {
         let projector = Projector::new(&camera.orientation, camera.lines())
             .map_err(|problem| NoSight {
                 image: camera.id.clone(),

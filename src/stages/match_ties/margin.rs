@@ -40,7 +40,6 @@ impl Margin {
     }
 
     /// A margin that is the same for all of so many images, metres.
-    #[cfg(test)]
     pub(super) fn within(images: usize, most_m: f64) -> Self {
         Self {
             images: vec![[most_m, 0.0]; images],

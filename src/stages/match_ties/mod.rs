@@ -7,6 +7,7 @@
 //! different in the two directions is counted and left out; blunders are left to the adjustment.
 
 mod cells;
+mod lines;
 mod margin;
 mod pair;
 mod search;
@@ -31,6 +32,7 @@ use crate::{
     watch::Watch,
 };
 
+pub use lines::{LinesToMatch, TiesOfLines, match_lines};
 pub use margin::Margin;
 
 /// A pair with fewer tie points is remarked on.

@@ -1,0 +1,382 @@
+//! A calibration from pixels, round by round: tie points, a consistent camera, a terrain model, laser control, the calibrated camera,
+//! with which the next round begins.
+//!
+//! # Source
+//! Li et al. 2023, figure 4. The paper ends "until accuracy converges"; when that is, `Rounds::is_converged` says.
+
+use std::{
+    path::{Path, PathBuf},
+    sync::atomic::AtomicBool,
+};
+
+use nalgebra::Vector3;
+
+use crate::{
+    config::{CalibrationConfig, CameraConfig},
+    error::{Cause, IoError, Kind, Locate as _, Result},
+    geom::ellipsoid::spherical_to_xyz_m,
+    pds::pixel_file::{PixelFile, Pyramid},
+    stage::{Input, Inputs, Stage},
+    stages::{
+        calibrate::{
+            Calibration, CalibrationFiles, CalibrationKeys, CalibrationRound, GivenPoints, Rounds,
+            calibrate_given,
+        },
+        line_camera::LineCamera,
+        map_surface::{LinesToMap, Surface, map_lines},
+        match_laser::{
+            HeldBackGround, LaserMatch, MatchOptions, MatchedPoint, ModelRequest, match_model,
+            shots_within,
+        },
+        match_ties::{LinesToMatch, TiesOfLines, match_lines},
+    },
+    units::wrap_pi,
+};
+
+/// Shots that tell heights of the ground before there is a terrain model: kilometres apart, as relief asks.
+const SHOTS: usize = 256;
+/// Standard deviations that a search covers.
+const SIGMAS: f64 = 3.0;
+/// Once there is control, lines see a place within so many pixels of where another one expects it: heights by a few shots are off by
+/// more than the cameras.
+const LATER_PX: f64 = 20.0;
+/// Tie points that say how high the ground is, and how far heights may be off them as a whole, pixels.
+const PLACES: usize = 400;
+const OFF_PX: f64 = 3.0;
+
+/// A calibration from pixels.
+pub(super) struct CalibrationLoop<'a> {
+    pub(super) calibration: CalibrationKeys<'a>,
+    pub(super) files: CalibrationFiles<'a>,
+}
+
+/// Pixels of another image.
+#[derive(Debug, thiserror::Error)]
+enum PixelsError {
+    #[error("camera {camera}: its pixels have {} lines of {} samples; expected {} of {}, as its support data say", found[0], found[1], expected[0], expected[1])]
+    Size {
+        camera: String,
+        found: [u32; 2],
+        expected: [u32; 2],
+    },
+    #[error(
+        "camera {camera}: its pixels are those of a map; expected the image as its camera took it"
+    )]
+    Map { camera: String },
+    #[error("camera {camera} has no pixels")]
+    Missing { camera: String },
+}
+
+impl Cause for PixelsError {
+    fn kind(&self) -> Kind {
+        Kind::Input
+    }
+
+    fn advice(&self) -> String {
+        "check that cameras.pixels are not exchanged, and are the whole images that cameras.isd describe".to_owned()
+    }
+}
+
+impl Stage for CalibrationLoop<'_> {
+    const NAME: &'static str = "calibration_loop";
+    type Output = Calibration;
+
+    fn inputs(&self) -> Inputs {
+        let mut inputs = Inputs::new(Self::METHOD);
+        self.calibration.add_to("calibration", &mut inputs);
+        self.files.add_to("files", &mut inputs);
+        inputs
+    }
+
+    fn run(&self, stop: &AtomicBool) -> Result<Calibration> {
+        let config = self.calibration.0;
+        let work = tempfile::tempdir().map_err(IoError::on("make a temporary folder"))?;
+        let mut lines = Lines::open(config, work.path())?;
+        let mut rounds = Rounds {
+            rounds: Vec::new(),
+            rounds_max: config.laser.rounds_max,
+            cell_m: config.laser.cell_m.unwrap_or_default(),
+        };
+        let mut round = 1;
+        loop {
+            let in_stage = |stage: &str| format!("round {round}/{stage}");
+            let done = lines.round(round, &in_stage, stop)?;
+            rounds.rounds.push(done.told);
+            tracing::info!(stage = Self::NAME, round, "done");
+            if rounds.is_converged() || round >= rounds.rounds_max {
+                let (laser, pairs) = (&done.control.verdict, &done.ties.pairs);
+                return Ok(done.calibration.in_rounds(rounds, laser, pairs));
+            }
+            lines.take(&done.calibration)?;
+            round += 1;
+        }
+    }
+}
+
+/// What a round gave.
+struct Round {
+    ties: TiesOfLines,
+    control: LaserMatch,
+    calibration: Calibration,
+    told: CalibrationRound,
+}
+
+/// The lines of the camera as the last round left them.
+struct Lines<'a> {
+    config: &'a CalibrationConfig,
+    pixels: Vec<Pyramid>,
+    /// Their support data, and where those of a round are written.
+    isd: Vec<PathBuf>,
+    folder: &'a Path,
+    /// Places of the ground by the laser, body-fixed, metres.
+    ground_m: Vec<Vector3<f64>>,
+    /// The two lines that differ most in where they look.
+    pair: [usize; 2],
+}
+
+impl<'a> Lines<'a> {
+    fn open(config: &'a CalibrationConfig, folder: &'a Path) -> Result<Self> {
+        let isd: Vec<PathBuf> = config.cameras.iter().map(|of| of.isd.clone()).collect();
+        let cameras = cameras(config, &isd)?;
+        let pixels = config.cameras.iter().zip(&cameras);
+        let pixels = pixels.map(|(camera, line)| pixels_of(camera, line));
+        Ok(Self {
+            pixels: pixels.collect::<Result<_>>()?,
+            pair: widest(&cameras),
+            ground_m: Vec::new(),
+            config,
+            isd,
+            folder,
+        })
+    }
+
+    /// Ties, a consistent camera, a terrain model, laser control, a calibration.
+    fn round(
+        &mut self,
+        round: u32,
+        stage: &dyn Fn(&str) -> String,
+        stop: &AtomicBool,
+    ) -> Result<Round> {
+        let config = self.config;
+        let before = cameras(config, &self.isd)?;
+        if self.ground_m.is_empty() {
+            self.ground_m = self.shots(&before, stop).in_stage(&stage("match_laser"))?;
+        }
+        let ties = match_lines(
+            &LinesToMatch {
+                body: config.body,
+                cameras: &before,
+                pixels: &self.pixels,
+                ground_m: &self.ground_m,
+                reach_m: self.reach_m(round, &before),
+            },
+            stop,
+        );
+        let ties = ties.in_stage(&stage("match_ties"))?;
+        let of_ties = GivenPoints {
+            ties: ties.points.clone(),
+            ..GivenPoints::default()
+        };
+        let tied = calibrate_given(&self.by_ties(), &of_ties).in_stage(&stage("calibrate"))?;
+        self.take(&tied)?;
+        let consistent = cameras(config, &self.isd)?;
+        let surface = self
+            .surface(&consistent, &tied, stop)
+            .in_stage(&stage("map_surface"))?;
+        let control = self
+            .control(&consistent, &surface, stop)
+            .in_stage(&stage("match_laser"))?;
+        let (held_back, used): (Vec<MatchedPoint>, Vec<MatchedPoint>) = control
+            .points
+            .iter()
+            .cloned()
+            .partition(|point| point.judges);
+        let given = GivenPoints {
+            control: used,
+            held_back,
+            ..of_ties
+        };
+        let calibration = calibrate_given(config, &given).in_stage(&stage("calibrate"))?;
+        let account = &surface.account;
+        let filled = f64::from(account.filled) / f64::from(account.cells.max(1));
+        Ok(Round {
+            told: CalibrationRound::of(round, &tied, filled, &control, &calibration),
+            ties,
+            control,
+            calibration,
+        })
+    }
+
+    /// The configuration of a calibration of the present cameras by ties alone.
+    fn by_ties(&self) -> CalibrationConfig {
+        let mut config = self.config.clone();
+        for (camera, isd) in config.cameras.iter_mut().zip(&self.isd) {
+            camera.isd.clone_from(isd);
+        }
+        config.validation.clear();
+        config
+    }
+
+    /// Goes on with the cameras of a calibration.
+    fn take(&mut self, calibration: &Calibration) -> Result<()> {
+        for (at, camera) in calibration.cameras.iter().enumerate() {
+            let path = self.folder.join(format!("{}.json", camera.camera));
+            std::fs::write(&path, &camera.isd)
+                .map_err(IoError::on("write"))
+                .in_file(&path)?;
+            self.isd[at] = path;
+        }
+        Ok(())
+    }
+
+    /// Shots over the ground that the lines see.
+    fn shots(&self, lines: &[LineCamera], stop: &AtomicBool) -> Result<Vec<Vector3<f64>>> {
+        let radius_m = self.config.body.map().radius_m;
+        let mut edges = [
+            f64::INFINITY,
+            f64::INFINITY,
+            f64::NEG_INFINITY,
+            f64::NEG_INFINITY,
+        ];
+        let mut middle_rad = None;
+        for [longitude_rad, north] in lines.iter().flat_map(|line| line.corners_rad(radius_m)) {
+            let middle = *middle_rad.get_or_insert(longitude_rad);
+            let east = middle + wrap_pi(longitude_rad - middle);
+            edges = [
+                edges[0].min(east),
+                edges[1].min(north),
+                edges[2].max(east),
+                edges[3].max(north),
+            ];
+        }
+        shots_within(
+            edges,
+            &self.config.laser.files,
+            &self.config.laser.filter,
+            SHOTS,
+            stop,
+        )
+    }
+
+    /// How far from where it is expected a line may see a place, metres on the ground: by what is known beforehand; in later rounds
+    /// a few pixels.
+    fn reach_m(&self, round: u32, lines: &[LineCamera]) -> f64 {
+        let (line, radius_m) = (&lines[self.pair[0]], self.config.body.map().radius_m);
+        if round > 1 {
+            return LATER_PX * line.pixel_m(radius_m);
+        }
+        let known = &self.config.a_priori;
+        // What lines have in common they see by its height: as much aside as they look apart.
+        let apart = convergence_rad(lines, self.pair).tan();
+        let pointing_m = std::f64::consts::SQRT_2 * known.angle_rad * line.height_m(radius_m);
+        SIGMAS * pointing_m.hypot(apart * known.orbit_bias_m)
+    }
+
+    /// The terrain model of the widest pair, about the places of the ties.
+    fn surface(
+        &self,
+        lines: &[LineCamera],
+        tied: &Calibration,
+        stop: &AtomicBool,
+    ) -> Result<Surface> {
+        let places = tied.points.iter().filter(|point| !point.left_out);
+        let places: Vec<[f64; 3]> = places.filter_map(|point| point.place).collect();
+        let every = places.len().div_ceil(PLACES).max(1);
+        let ground_m: Vec<Vector3<f64>> = (places.iter().step_by(every))
+            .map(|[longitude_rad, latitude_rad, radius_m]| {
+                spherical_to_xyz_m(*longitude_rad, *latitude_rad, *radius_m)
+            })
+            .collect();
+        let [one, other] = self.pair;
+        map_lines(
+            &LinesToMap {
+                body: self.config.body,
+                pair: [one, other].map(|at| (&lines[at], &self.pixels[at])),
+                ground_m: &ground_m,
+                off_m: OFF_PX * lines[one].pixel_m(self.config.body.map().radius_m),
+                cell_m: self.config.laser.cell_m.unwrap_or_default(),
+            },
+            stop,
+        )
+    }
+
+    /// What the laser finds in a terrain model.
+    fn control(
+        &self,
+        lines: &[LineCamera],
+        surface: &Surface,
+        stop: &AtomicBool,
+    ) -> Result<LaserMatch> {
+        let laser = &self.config.laser;
+        let options = MatchOptions {
+            segment_points: laser.segment_points as usize,
+            least_variance_m2: laser.least_variance_m2,
+            similarity: None,
+            search_cells: laser.search_cells,
+            least_score: laser.least_score,
+            least_contrast: 1.0,
+            limit_m: laser.limit_m,
+            seed: u64::from(laser.seed),
+            filter: laser.filter.clone(),
+        };
+        let request = ModelRequest {
+            model: &surface.model.heights,
+            pedr: &laser.files,
+            images: lines,
+            options: &options,
+            held_back: HeldBackGround {
+                every: self.config.control.held_back_every,
+                seed: u64::from(laser.seed),
+            },
+        };
+        match_model(&request, stop)
+    }
+}
+
+fn cameras(config: &CalibrationConfig, isd: &[PathBuf]) -> Result<Vec<LineCamera>> {
+    let cameras = config.cameras.iter().zip(isd);
+    cameras
+        .map(|(camera, isd)| LineCamera::read(isd, &camera.id, config.body))
+        .collect()
+}
+
+fn pixels_of(camera: &CameraConfig, line: &LineCamera) -> Result<Pyramid> {
+    let id = || camera.id.clone();
+    let Some(path) = &camera.pixels else {
+        return Err(PixelsError::Missing { camera: id() }.into());
+    };
+    let file = PixelFile::open(path, &[])?;
+    let wrong = {
+        let found = [file.lines(), file.samples()];
+        let expected = [line.camera.line_times.lines(), line.samples];
+        let size = PixelsError::Size {
+            camera: id(),
+            found,
+            expected,
+        };
+        let map = PixelsError::Map { camera: id() };
+        let is_map = file.is_projected().then_some(map);
+        is_map.or((found != expected).then_some(size))
+    };
+    match wrong {
+        Some(wrong) => Err(wrong).in_file(path),
+        None => Pyramid::of(&file),
+    }
+}
+
+/// Angle between what two lines look at in the middle.
+fn convergence_rad(lines: &[LineCamera], pair: [usize; 2]) -> f64 {
+    let [one, other] = pair.map(|at| lines[at].looks());
+    one.angle(&other)
+}
+
+/// The two lines that differ most in where they look.
+fn widest(lines: &[LineCamera]) -> [usize; 2] {
+    let all =
+        (0..lines.len()).flat_map(|one| (one + 1..lines.len()).map(move |other| [one, other]));
+    let widest = all.max_by(|a, b| {
+        let [a, b] = [a, b].map(|pair| convergence_rad(lines, *pair));
+        a.total_cmp(&b)
+    });
+    widest.unwrap_or([0, 1])
+}

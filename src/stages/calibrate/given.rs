@@ -1,0 +1,63 @@
+//! Points that were measured in pixels just now, instead of read from tables.
+
+use crate::{
+    geom::{calibration::KnownPlace, ellipsoid::spherical_to_xyz_m},
+    stages::match_laser::MatchedPoint,
+    ties::TiePoint,
+};
+
+use super::tables::{ControlSigma, Measured, MeasuredPoint, known_place};
+
+/// Tie points, control, and control that is held back; images by the index of their camera.
+#[derive(Debug, Clone, Default)]
+pub struct GivenPoints {
+    /// Tie points.
+    pub ties: Vec<TiePoint>,
+    /// Laser points that are used.
+    pub control: Vec<MatchedPoint>,
+    /// Laser points that judge.
+    pub held_back: Vec<MatchedPoint>,
+}
+
+/// Tie points, with standard deviations of their own where they have some.
+pub(super) fn ties(given: &[TiePoint], sigma_px: f64) -> Vec<MeasuredPoint> {
+    let measured = |point: &TiePoint| {
+        let measures = point.measures.iter().map(|of| Measured {
+            camera: of.image,
+            place: [of.line, of.sample],
+            sigma_px: of.sigma_px.unwrap_or([sigma_px; 2]),
+        });
+        let mut measured: Vec<Measured> = measures.collect();
+        measured.sort_by_key(|of| of.camera);
+        MeasuredPoint {
+            name: point.id.clone(),
+            measured,
+            known: None,
+        }
+    };
+    given.iter().map(measured).collect()
+}
+
+/// Control points in all images that show them; those that no image shows are left out.
+pub(super) fn control(given: &[MatchedPoint], sigma: ControlSigma) -> Vec<MeasuredPoint> {
+    let measured = |point: &MatchedPoint| {
+        let images = point.in_images.iter().enumerate();
+        let measured = images.filter_map(|(camera, seen)| {
+            Some(Measured {
+                camera,
+                place: (*seen)?,
+                sigma_px: [sigma.image_px; 2],
+            })
+        });
+        let [longitude_rad, latitude_rad, radius_m] = point.laser;
+        let place_m = spherical_to_xyz_m(longitude_rad, latitude_rad, radius_m);
+        let known: KnownPlace = known_place(place_m, [sigma.horizontal_m, sigma.vertical_m]);
+        MeasuredPoint {
+            name: point.name.clone(),
+            measured: measured.collect(),
+            known: Some(known),
+        }
+    };
+    let points = given.iter().map(measured);
+    points.filter(|point| !point.measured.is_empty()).collect()
+}
