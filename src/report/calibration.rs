@@ -1,6 +1,7 @@
 //! The page of a calibration: verdict, figures of every step, what ties cannot see, cameras, other orbits.
 
 use super::{
+    calibration_rounds::rounds as rounds_of,
     checks,
     html::{Cell, Column, Section, Table, Tone, counted, list, page, paragraph, verdict},
     numbers::signed,
@@ -20,6 +21,12 @@ const DRAWN: usize = 3_000;
 /// # Errors
 /// A plot that cannot be drawn, which is a bug in areograph.
 pub fn calibration_page(config: &CalibrationConfig, of: &Calibration) -> Result<String> {
+    let rounds = of.rounds.as_ref();
+    let rounds = rounds.map(|told| -> Result<Section> {
+        let section = rounds_of(told, &of.cameras)?;
+        Ok(Section::new("From round to round", section))
+    });
+    let rounds: Option<Section> = rounds.transpose()?;
     let sections = [
         Section::new("From step to step", steps(of)),
         Section::new("Residuals", residuals(of)?),
@@ -27,6 +34,7 @@ pub fn calibration_page(config: &CalibrationConfig, of: &Calibration) -> Result<
         Section::new("The lines of the camera", cameras(of)),
         Section::new("Other orbits", validation(of)),
     ];
+    let sections: Vec<Section> = rounds.into_iter().chain(sections).collect();
     Ok(page(&config.calibration, &lead(config, of), &sections))
 }
 

@@ -18,6 +18,7 @@
 mod adjustment;
 mod archive;
 mod calibration;
+mod calibration_rounds;
 mod checks;
 mod clocks_and_datum;
 mod compare;

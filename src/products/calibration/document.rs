@@ -14,7 +14,10 @@ use crate::{
     },
     schema::DocumentSchema,
     stages::{
-        calibrate::{CalibrationStep, CameraResult, HeldBack, ValidationResult, Value},
+        calibrate::{
+            CalibrationRound, CalibrationStep, CameraResult, HeldBack, PixelsAndMetres, Rounds,
+            ValidationResult, Value,
+        },
         judge::Verdict,
     },
 };
@@ -62,11 +65,70 @@ struct Document<'a> {
     tie_sight: TieSightDocument,
     /// Figures before, and after every step.
     steps: &'a [CalibrationStep],
+    /// The rounds of a calibration from pixels, of which all else is the last; absent where points were read from tables.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    rounds: Option<RoundsDocument>,
     /// What held-back control says; absent without control.
     #[serde(skip_serializing_if = "Option::is_none")]
     held_back: Option<&'a HeldBack>,
     /// Other orbits.
     validation: &'a [ValidationResult],
+}
+
+/// A calibration in rounds.
+#[derive(Serialize, JsonSchema)]
+struct RoundsDocument {
+    /// Whether the last one changed nothing that matters: half of the units shifted by less than half a cell, residuals of control
+    /// changed by less than 2 %.
+    converged: bool,
+    /// Most rounds that were allowed.
+    rounds_max: u32,
+    /// Edge of a cell of the terrain models, metres.
+    cell_m: f64,
+    /// The rounds in order.
+    rounds: Vec<RoundDocument>,
+}
+
+/// The numbers of a round: terrain model and units as the cameras of the round before see them, then the cameras.
+#[derive(Serialize, JsonSchema)]
+struct RoundDocument {
+    /// From 1.
+    round: u32,
+    /// Tie points.
+    ties: u64,
+    /// Their residuals in the worst line, root mean square, pixels, with the cameras that the terrain model was made with.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    model_tie_rms_px: Option<f64>,
+    /// The same with the cameras of this round.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    tie_rms_px: Option<f64>,
+    /// Share of the cells of the terrain model that have a height.
+    model_filled: f64,
+    /// Units of shots that calibrate.
+    units_kept: u64,
+    /// Such units that were refused.
+    units_refused: u64,
+    /// Units of shots that judge.
+    judging_kept: u64,
+    /// Such units that were refused.
+    judging_refused: u64,
+    /// Median length of the shifts of kept units that calibrate, cells; absent where none was kept.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    shift_cells: Option<f64>,
+    /// Median of model minus laser, metres.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    bias_m: Option<f64>,
+    /// Residuals of control, root mean square over all lines.
+    control: PixelsAndMetres,
+    /// The same of control that was held back.
+    held_back: PixelsAndMetres,
+    /// Residuals of control that was held back in their standard deviations, root mean square.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    held_back_normalised: Option<f64>,
+    /// φ, ω and κ of every line, degrees, in the order of `cameras`.
+    angles_deg: Vec<[f64; 3]>,
+    /// Drift of the orbit from line to line, body-fixed, metres.
+    drift_m_per_line: [f64; 3],
 }
 
 /// A line of the camera.
@@ -146,6 +208,7 @@ impl<'a> Document<'a> {
             drift_m_per_line: result.drift_m_per_line,
             tie_sight: tie_sight(&result.tie_sight),
             steps: &result.steps,
+            rounds: result.rounds.as_ref().map(rounds),
             held_back: result.held_back.as_ref(),
             validation: &result.validation,
         }
@@ -170,6 +233,33 @@ fn camera(of: &CameraResult) -> CameraDocument<'_> {
         samples: of.samples,
         moved_px: of.moved_px,
         isd_left_px: of.isd_left_px,
+    }
+}
+
+fn rounds(of: &Rounds) -> RoundsDocument {
+    let round = |round: &CalibrationRound| RoundDocument {
+        round: round.round,
+        ties: round.ties,
+        model_tie_rms_px: round.model_tie_px,
+        tie_rms_px: round.tie_px,
+        model_filled: round.filled,
+        units_kept: round.units[0],
+        units_refused: round.units[1],
+        judging_kept: round.judging[0],
+        judging_refused: round.judging[1],
+        shift_cells: round.shift_cells.is_finite().then_some(round.shift_cells),
+        bias_m: round.bias_m,
+        control: round.control,
+        held_back: round.held_back,
+        held_back_normalised: round.held_back_sigmas,
+        angles_deg: round.angles_rad.iter().map(|of| of.map(degrees)).collect(),
+        drift_m_per_line: round.drift_m_per_line,
+    };
+    RoundsDocument {
+        converged: of.is_converged(),
+        rounds_max: of.rounds_max,
+        cell_m: of.cell_m,
+        rounds: of.rounds.iter().map(round).collect(),
     }
 }
 
