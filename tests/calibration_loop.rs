@@ -24,7 +24,7 @@ use common::{assert_keeps_schema, golden::assert_messages, json, number};
 use nalgebra::{Matrix3, Vector3};
 use serde_json::Value;
 
-/// Pixel of the stereo lines on the ground, metres: 14 µm at 175 mm from 350 km, and the line.
+/// Pixel of the stereo lines on the ground, metres: a line, and 14 µm at 175 mm from 350 km.
 const PIXEL_M: f64 = 27.0;
 const STEREO: [&str; 2] = ["s1", "s2"];
 
@@ -140,7 +140,10 @@ fn places_are_as_near_as_stated_to_where_they_truly_are() {
     let errors_m = errors_m(|line| RUN.folder.join(format!("cameras/{line}/isd.json")));
     let [plane_m, height_m] = plane_and_height_m(&errors_m);
     let before_m = plane_and_height_m(&given);
-    println!("before {before_m:.1?}; plane {plane_m:.2} m, height {height_m:.2} m of {}", errors_m.len());
+    println!(
+        "before {before_m:.1?}; plane {plane_m:.2} m, height {height_m:.2} m of {}",
+        errors_m.len()
+    );
     assert!(errors_m.len() >= 80);
     assert!(before_m[0] > 500.0 && before_m[1] > 300.0, "{before_m:?}");
     // The issue's bounds: half a pixel of the stereo lines, and 20 m.
@@ -152,7 +155,10 @@ fn places_are_as_near_as_stated_to_where_they_truly_are() {
     // All places share the errors of a few parameters: of such a mean three standard deviations are rarely exceeded, and an
     // accuracy that is never used up by a sixth says nothing.
     for (found_m, stated_m) in [plane_m, height_m].iter().zip(stated_m) {
-        assert!((stated_m / 6.0..3.0 * stated_m).contains(found_m), "{found_m} of {stated_m}");
+        assert!(
+            (stated_m / 6.0..3.0 * stated_m).contains(found_m),
+            "{found_m} of {stated_m}"
+        );
     }
 }
 
@@ -205,11 +211,23 @@ fn input_that_is_missing_or_of_another_place_is_told() {
         ),
         (
             "tables of points as well",
-            refused("tables", &[("match = true", "match = true\nfiles = [\"truth.json\"]")]),
+            refused(
+                "tables",
+                &[("match = true", "match = true\nfiles = [\"truth.json\"]")],
+            ),
         ),
+        ("wrong keys", {
+            let text = "calibration = \"c\"\n[ties]\nmatch = \"yes\"\n[laser]\ncell_m = 0\nsearch_cells = 0\nsegment_points = 2\n\
+                        least_variance_m2 = -1\nleast_score = 1.5\nlimit_m = 0\nseed = -1\nrounds_max = 0\n[laser.filter]\nclasses = []\n";
+            parse_calibration(text, Path::new("c.toml"))
+                .unwrap_err()
+                .to_string()
+        }),
         ("no laser", {
             let text = "calibration = \"c\"\n[[cameras]]\nid = \"a\"\n[[cameras]]\nid = \"b\"\n[ties]\nmatch = true\n";
-            parse_calibration(text, Path::new("c.toml")).unwrap_err().to_string()
+            parse_calibration(text, Path::new("c.toml"))
+                .unwrap_err()
+                .to_string()
         }),
     ];
     assert_messages("calibration_loop", &told);

@@ -15,10 +15,12 @@ use crate::{
 
 /// Calibrates the lines of a camera in orbit: ties between them, then laser points, part of which only judges.
 ///
+/// Points are read from tables; with `ties.match` and `[laser]` they are measured in pixels, round by round until nothing changes.
+///
 /// Products go to `<out>/<calibration>`, with calibrated support data (ISD) of every line. Which angles ties cannot see is
 /// found and told.
 ///
-/// Example: `areograph scene hrsc --calibration && areograph calibrate hrsc/calibration.toml --out products`
+/// Example: `areograph scene hrsc --calibration --images && areograph calibrate hrsc/calibration.toml --out products`
 #[derive(Debug, Args)]
 #[command(verbatim_doc_comment)]
 pub(super) struct Arguments {

@@ -259,7 +259,7 @@ declare_table! {
         /// Standard deviation of its radius, where the table has none.
         sigma_vertical_m: f64 = key(from_to(SIGMA_MIN, CONTROL_SIGMA_MAX_M)).or(10.0),
         /// Every so manieth control point along the flight judges the result and is never used for it; with ties.match
-        /// every so manieth square of 5 km of the ground, with all of its shots.
+        /// every so manieth rectangle of 5 by 10 km of the ground, with all of its shots.
         held_back_every: u32 = key(whole_from_to(2, 100)).or(4),
         /// Distance of a control point from where the uncalibrated cameras see it, beyond which it is left out.
         limit_px: f64 = key(from_to(1.0, 1e4)).or(300.0),

@@ -4,6 +4,8 @@
 //! # Source
 //! Li et al. 2023, figure 4. The paper ends "until accuracy converges"; when that is, `Rounds::is_converged` says.
 
+mod refused;
+
 use std::{
     path::{Path, PathBuf},
     sync::atomic::AtomicBool,
@@ -11,22 +13,23 @@ use std::{
 
 use nalgebra::Vector3;
 
+use self::refused::{FewUnits, pixels_of};
 use crate::{
-    config::{CalibrationConfig, CameraConfig},
-    error::{Cause, IoError, Kind, Locate as _, Result},
+    config::CalibrationConfig,
+    error::{IoError, Locate as _, Result},
     geom::ellipsoid::spherical_to_xyz_m,
-    pds::pixel_file::{PixelFile, Pyramid},
+    pds::pixel_file::Pyramid,
     stage::{Input, Inputs, Stage},
     stages::{
         calibrate::{
-            Calibration, CalibrationFiles, CalibrationKeys, CalibrationRound, GivenPoints, Rounds,
-            calibrate_given,
+            Calibration, CalibrationFiles, CalibrationKeys, CalibrationRound, GivenPoints,
+            PointKind, Rounds, calibrate_given,
         },
         line_camera::LineCamera,
         map_surface::{LinesToMap, Surface, map_lines},
         match_laser::{
-            HeldBackGround, LaserMatch, MatchOptions, MatchedPoint, ModelRequest, match_model,
-            shots_within,
+            HeldBackGround, LaserMatch, MatchOptions, MatchedPoint, ModelRequest, UnitShots,
+            match_model, shots_within,
         },
         match_ties::{LinesToMatch, TiesOfLines, match_lines},
     },
@@ -37,7 +40,7 @@ use crate::{
 const SHOTS: usize = 256;
 /// Standard deviations that a search covers.
 const SIGMAS: f64 = 3.0;
-/// Once there is control, lines see a place within so many pixels of where another one expects it: heights by a few shots are off by
+/// Once lines agree, they see a place within so many pixels of where another one expects it: heights between tie points are off by
 /// more than the cameras.
 const LATER_PX: f64 = 20.0;
 /// Tie points that say how high the ground is, and how far heights may be off them as a whole, pixels.
@@ -48,33 +51,6 @@ const OFF_PX: f64 = 3.0;
 pub(super) struct CalibrationLoop<'a> {
     pub(super) calibration: CalibrationKeys<'a>,
     pub(super) files: CalibrationFiles<'a>,
-}
-
-/// Pixels of another image.
-#[derive(Debug, thiserror::Error)]
-enum PixelsError {
-    #[error("camera {camera}: its pixels have {} lines of {} samples; expected {} of {}, as its support data say", found[0], found[1], expected[0], expected[1])]
-    Size {
-        camera: String,
-        found: [u32; 2],
-        expected: [u32; 2],
-    },
-    #[error(
-        "camera {camera}: its pixels are those of a map; expected the image as its camera took it"
-    )]
-    Map { camera: String },
-    #[error("camera {camera} has no pixels")]
-    Missing { camera: String },
-}
-
-impl Cause for PixelsError {
-    fn kind(&self) -> Kind {
-        Kind::Input
-    }
-
-    fn advice(&self) -> String {
-        "check that cameras.pixels are not exchanged, and are the whole images that cameras.isd describe".to_owned()
-    }
 }
 
 impl Stage for CalibrationLoop<'_> {
@@ -128,10 +104,12 @@ struct Lines<'a> {
     /// Their support data, and where those of a round are written.
     isd: Vec<PathBuf>,
     folder: &'a Path,
-    /// Places of the ground by the laser, body-fixed, metres.
+    /// Places of the ground as these see it, before there are any by the laser; body-fixed, metres.
     ground_m: Vec<Vector3<f64>>,
     /// The two lines that differ most in where they look.
     pair: [usize; 2],
+    /// Which shots make units: those of the first round, so that rounds can be compared.
+    units: Option<UnitShots>,
 }
 
 impl<'a> Lines<'a> {
@@ -144,6 +122,7 @@ impl<'a> Lines<'a> {
             pixels: pixels.collect::<Result<_>>()?,
             pair: widest(&cameras),
             ground_m: Vec::new(),
+            units: None,
             config,
             isd,
             folder,
@@ -158,34 +137,31 @@ impl<'a> Lines<'a> {
         stop: &AtomicBool,
     ) -> Result<Round> {
         let config = self.config;
-        let before = cameras(config, &self.isd)?;
-        if self.ground_m.is_empty() {
-            self.ground_m = self.shots(&before, stop).in_stage(&stage("match_laser"))?;
+        if round == 1 {
+            // So wide a search finds few places, but these say enough for a narrow one.
+            let given = cameras(config, &self.isd)?;
+            let reach_m = self.first_reach_m(&given);
+            self.ground_m = self.shots(&given, stop).in_stage(&stage("match_laser"))?;
+            let ties = self.ties(&given, reach_m, stop);
+            let tied = self.tied(&ties.in_stage(&stage("match_ties"))?);
+            self.take(&tied.in_stage(&stage("calibrate"))?)?;
         }
-        let ties = match_lines(
-            &LinesToMatch {
-                body: config.body,
-                cameras: &before,
-                pixels: &self.pixels,
-                ground_m: &self.ground_m,
-                reach_m: self.reach_m(round, &before),
-            },
-            stop,
-        );
+        let before = cameras(config, &self.isd)?;
+        let reach_m = LATER_PX * before[self.pair[0]].pixel_m(config.body.map().radius_m);
+        let ties = self.ties(&before, reach_m, stop);
         let ties = ties.in_stage(&stage("match_ties"))?;
-        let of_ties = GivenPoints {
-            ties: ties.points.clone(),
-            ..GivenPoints::default()
-        };
-        let tied = calibrate_given(&self.by_ties(), &of_ties).in_stage(&stage("calibrate"))?;
+        let tied = self.tied(&ties).in_stage(&stage("calibrate"))?;
         self.take(&tied)?;
         let consistent = cameras(config, &self.isd)?;
         let surface = self
-            .surface(&consistent, &tied, stop)
+            .surface(&consistent, stop)
             .in_stage(&stage("map_surface"))?;
         let control = self
             .control(&consistent, &surface, stop)
             .in_stage(&stage("match_laser"))?;
+        if let Some(few) = FewUnits::of(&control) {
+            return Err(few).in_stage(&stage("match_laser"));
+        }
         let (held_back, used): (Vec<MatchedPoint>, Vec<MatchedPoint>) = control
             .points
             .iter()
@@ -194,7 +170,7 @@ impl<'a> Lines<'a> {
         let given = GivenPoints {
             control: used,
             held_back,
-            ..of_ties
+            ties: ties.points.clone(),
         };
         let calibration = calibrate_given(config, &given).in_stage(&stage("calibrate"))?;
         let account = &surface.account;
@@ -207,18 +183,43 @@ impl<'a> Lines<'a> {
         })
     }
 
-    /// The configuration of a calibration of the present cameras by ties alone.
-    fn by_ties(&self) -> CalibrationConfig {
+    /// Tie points as these cameras find them.
+    fn ties(&self, lines: &[LineCamera], reach_m: f64, stop: &AtomicBool) -> Result<TiesOfLines> {
+        let lines = LinesToMatch {
+            body: self.config.body,
+            cameras: lines,
+            pixels: &self.pixels,
+            ground_m: &self.ground_m,
+            reach_m,
+        };
+        match_lines(&lines, stop)
+    }
+
+    /// A calibration of the present cameras by ties alone.
+    fn tied(&self, ties: &TiesOfLines) -> Result<Calibration> {
         let mut config = self.config.clone();
         for (camera, isd) in config.cameras.iter_mut().zip(&self.isd) {
             camera.isd.clone_from(isd);
         }
         config.validation.clear();
-        config
+        let given = GivenPoints {
+            ties: ties.points.clone(),
+            ..GivenPoints::default()
+        };
+        calibrate_given(&config, &given)
     }
 
-    /// Goes on with the cameras of a calibration.
+    /// Goes on with the cameras of a calibration, and with the ground where they see it.
     fn take(&mut self, calibration: &Calibration) -> Result<()> {
+        let places = calibration.points.iter();
+        let places = places.filter(|point| point.kind == PointKind::Tie && !point.left_out);
+        let places: Vec<[f64; 3]> = places.filter_map(|point| point.place).collect();
+        let every = places.len().div_ceil(PLACES).max(1);
+        self.ground_m = (places.iter().step_by(every))
+            .map(|[longitude_rad, latitude_rad, radius_m]| {
+                spherical_to_xyz_m(*longitude_rad, *latitude_rad, *radius_m)
+            })
+            .collect();
         for (at, camera) in calibration.cameras.iter().enumerate() {
             let path = self.folder.join(format!("{}.json", camera.camera));
             std::fs::write(&path, &camera.isd)
@@ -258,13 +259,9 @@ impl<'a> Lines<'a> {
         )
     }
 
-    /// How far from where it is expected a line may see a place, metres on the ground: by what is known beforehand; in later rounds
-    /// a few pixels.
-    fn reach_m(&self, round: u32, lines: &[LineCamera]) -> f64 {
+    /// How far from where it is expected a line may see a place by what is known beforehand, metres on the ground.
+    fn first_reach_m(&self, lines: &[LineCamera]) -> f64 {
         let (line, radius_m) = (&lines[self.pair[0]], self.config.body.map().radius_m);
-        if round > 1 {
-            return LATER_PX * line.pixel_m(radius_m);
-        }
         let known = &self.config.a_priori;
         // What lines have in common they see by its height: as much aside as they look apart.
         let apart = convergence_rad(lines, self.pair).tan();
@@ -273,26 +270,13 @@ impl<'a> Lines<'a> {
     }
 
     /// The terrain model of the widest pair, about the places of the ties.
-    fn surface(
-        &self,
-        lines: &[LineCamera],
-        tied: &Calibration,
-        stop: &AtomicBool,
-    ) -> Result<Surface> {
-        let places = tied.points.iter().filter(|point| !point.left_out);
-        let places: Vec<[f64; 3]> = places.filter_map(|point| point.place).collect();
-        let every = places.len().div_ceil(PLACES).max(1);
-        let ground_m: Vec<Vector3<f64>> = (places.iter().step_by(every))
-            .map(|[longitude_rad, latitude_rad, radius_m]| {
-                spherical_to_xyz_m(*longitude_rad, *latitude_rad, *radius_m)
-            })
-            .collect();
+    fn surface(&self, lines: &[LineCamera], stop: &AtomicBool) -> Result<Surface> {
         let [one, other] = self.pair;
         map_lines(
             &LinesToMap {
                 body: self.config.body,
                 pair: [one, other].map(|at| (&lines[at], &self.pixels[at])),
-                ground_m: &ground_m,
+                ground_m: &self.ground_m,
                 off_m: OFF_PX * lines[one].pixel_m(self.config.body.map().radius_m),
                 cell_m: self.config.laser.cell_m.unwrap_or_default(),
             },
@@ -302,7 +286,7 @@ impl<'a> Lines<'a> {
 
     /// What the laser finds in a terrain model.
     fn control(
-        &self,
+        &mut self,
         lines: &[LineCamera],
         surface: &Surface,
         stop: &AtomicBool,
@@ -329,7 +313,9 @@ impl<'a> Lines<'a> {
                 seed: u64::from(laser.seed),
             },
         };
-        match_model(&request, stop)
+        let (control, units) = match_model(&request, self.units.as_ref(), stop)?;
+        self.units.get_or_insert(units);
+        Ok(control)
     }
 }
 
@@ -338,30 +324,6 @@ fn cameras(config: &CalibrationConfig, isd: &[PathBuf]) -> Result<Vec<LineCamera
     cameras
         .map(|(camera, isd)| LineCamera::read(isd, &camera.id, config.body))
         .collect()
-}
-
-fn pixels_of(camera: &CameraConfig, line: &LineCamera) -> Result<Pyramid> {
-    let id = || camera.id.clone();
-    let Some(path) = &camera.pixels else {
-        return Err(PixelsError::Missing { camera: id() }.into());
-    };
-    let file = PixelFile::open(path, &[])?;
-    let wrong = {
-        let found = [file.lines(), file.samples()];
-        let expected = [line.camera.line_times.lines(), line.samples];
-        let size = PixelsError::Size {
-            camera: id(),
-            found,
-            expected,
-        };
-        let map = PixelsError::Map { camera: id() };
-        let is_map = file.is_projected().then_some(map);
-        is_map.or((found != expected).then_some(size))
-    };
-    match wrong {
-        Some(wrong) => Err(wrong).in_file(path),
-        None => Pyramid::of(&file),
-    }
 }
 
 /// Angle between what two lines look at in the middle.

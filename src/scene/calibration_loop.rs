@@ -27,18 +27,18 @@ const README: &str = "Three lines of a camera in one orbit: support data (isd/),
 /// Middle of the ground.
 const LONGITUDE_DEG: f64 = -63.13;
 const LATITUDE_DEG: f64 = -33.0;
-/// Lines and samples of an image: 49 by 18 km.
-const SIZE: [u32; 2] = [1_800, 640];
-/// Laser passes: a mean distance of 1.4 km between those of a direction.
+/// Lines and samples of an image: 65 by 22 km.
+const SIZE: [u32; 2] = [2_400, 800];
+/// Laser passes: those of a direction lie 1.4 km apart, of both as dense as the 126 over a whole swath in Li et al. 2023.
 const PASSES: Passes = Passes {
     longitude_rad: LONGITUDE_DEG * RADIANS_PER_DEGREE,
     latitude_rad: LATITUDE_DEG * RADIANS_PER_DEGREE,
-    of_direction: 14,
-    half_width_m: 10_000.0,
-    half_s: 10.0,
+    of_direction: 17,
+    half_width_m: 12_000.0,
+    half_s: 12.0,
 };
 /// Places along and across the ground at which the truth is told, and the share of the swath that they cover.
-const CHECKED: [u32; 2] = [16, 7];
+const CHECKED: [u32; 2] = [19, 7];
 const CHECKED_SHARE: [f64; 2] = [0.84, 0.9];
 
 /// The lines as they truly are: offsets and errors of the paper's synthetic case, and a third line between them.
@@ -220,7 +220,7 @@ cell_m = 100
 search_cells = 30
 
 [control]
-sigma_px = 0.5
-sigma_horizontal_m = 30.0
-sigma_vertical_m = 10.0
+sigma_px = 0.2
+sigma_horizontal_m = 16.0
+sigma_vertical_m = 3.0
 ";

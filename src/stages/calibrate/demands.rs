@@ -2,9 +2,10 @@
 
 use super::{error::CalibrateError, geometry::CameraImage, read::OrbitPoint, result::PointKind};
 
-/// Fewest ties, and fewest control points of each kind, that a calibration makes sense with.
+/// Fewest ties that a calibration makes sense with.
 const TIES_MIN: usize = 10;
-pub(super) const CONTROLS_MIN: usize = 5;
+/// Fewest control points of each kind that a calibration makes sense with.
+pub const CONTROLS_MIN: usize = 5;
 
 /// Whether the images are of different lines on one spacecraft.
 pub(super) fn belong_together(

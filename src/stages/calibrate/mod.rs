@@ -26,6 +26,7 @@ use crate::{
     stage_inputs,
 };
 
+pub use demands::CONTROLS_MIN;
 pub use error::CalibrateError;
 pub use given::GivenPoints;
 pub use result::{

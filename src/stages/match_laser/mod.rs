@@ -98,14 +98,50 @@ pub fn match_laser(request: &MatchRequest, stop: &AtomicBool) -> Result<LaserMat
         held_back: None,
         radius_is_stated: request.radius_m.is_some(),
     };
-    matched(&asked, stop)
+    Ok(matched(&asked, None, stop)?.0)
 }
 
-/// Matches laser profiles with a terrain model that was made just now, some of the ground held back.
+/// Which shots make which units, by their names: units that one model gave can be matched with another one.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct UnitShots(Vec<(bool, Vec<String>)>);
+
+impl UnitShots {
+    fn of(units: &[Unit<'_>]) -> Self {
+        let named = units.iter().map(|unit| (unit.judges(), unit.names()));
+        Self(named.collect())
+    }
+
+    /// The units of `shots`, which are in the order of time; those without a shot are left out.
+    fn units<'a>(&self, grid: &HeightGrid, shots: &'a [Shot]) -> Vec<Unit<'a>> {
+        let numbered = self.0.iter().enumerate();
+        let of_name: BTreeMap<&str, usize> = numbered
+            .flat_map(|(unit, (_, names))| names.iter().map(move |name| (&**name, unit)))
+            .collect();
+        let mut members: Vec<Vec<&Shot>> = vec![Vec::new(); self.0.len()];
+        for shot in shots {
+            if let Some(unit) = of_name.get(&*shot.name) {
+                members[*unit].push(shot);
+            }
+        }
+        let members = members.iter().zip(&self.0).enumerate();
+        members
+            .filter(|(_, (shots, _))| !shots.is_empty())
+            .map(|(unit, (shots, (judges, _)))| Unit::of(grid, unit + 1, *judges, shots))
+            .collect()
+    }
+}
+
+/// Matches laser profiles with a terrain model that was made just now, some of the ground held back; and which shots made the units.
+///
+/// * `units` – those of an earlier model; without them segments and clusters are made anew
 ///
 /// # Errors
 /// Files that cannot be read; no shot on the model; shots that two files hold; [`Stopped`].
-pub fn match_model(request: &ModelRequest<'_>, stop: &AtomicBool) -> Result<LaserMatch> {
+pub fn match_model(
+    request: &ModelRequest<'_>,
+    units: Option<&UnitShots>,
+    stop: &AtomicBool,
+) -> Result<(LaserMatch, UnitShots)> {
     let asked = Asked {
         grid: request.model,
         pedr: request.pedr,
@@ -115,7 +151,7 @@ pub fn match_model(request: &ModelRequest<'_>, stop: &AtomicBool) -> Result<Lase
         // Its heights count from where its cameras have them.
         radius_is_stated: true,
     };
-    matched(&asked, stop)
+    matched(&asked, units, stop)
 }
 
 /// Body-fixed places, metres, of at most `most` shots, evenly taken from all between west, south, east and north.
@@ -170,7 +206,11 @@ struct Asked<'a> {
     radius_is_stated: bool,
 }
 
-fn matched(asked: &Asked<'_>, stop: &AtomicBool) -> Result<LaserMatch> {
+fn matched(
+    asked: &Asked<'_>,
+    known: Option<&UnitShots>,
+    stop: &AtomicBool,
+) -> Result<(LaserMatch, UnitShots)> {
     let (grid, options) = (asked.grid, asked.options);
     let shots = shots_over(grid, asked.pedr, &options.filter, stop)?;
     if shots.shots.is_empty() {
@@ -182,7 +222,10 @@ fn matched(asked: &Asked<'_>, stop: &AtomicBool) -> Result<LaserMatch> {
         .copied()
         .filter(|segment| is_kept(grid, segment, options))
         .collect();
-    let units = units_of(grid, &kept, asked.held_back, options.seed);
+    let units = known.map_or_else(
+        || units_of(grid, &kept, asked.held_back, options.seed),
+        |known| known.units(grid, &shots.shots),
+    );
     Stopped::check(stop)?;
     let mut search = searched(grid, &units, options);
     let matching = refuse_lonely(&mut search.units, options.search_cells);
@@ -219,7 +262,7 @@ fn matched(asked: &Asked<'_>, stop: &AtomicBool) -> Result<LaserMatch> {
         radius_is_stated: asked.radius_is_stated,
         complaints: complaint_count,
     });
-    Ok(LaserMatch {
+    let told = LaserMatch {
         radius_m: grid.radius_m,
         cell_m: grid.cell_m(),
         shots: shots.shots.len(),
@@ -236,7 +279,8 @@ fn matched(asked: &Asked<'_>, stop: &AtomicBool) -> Result<LaserMatch> {
         verdict,
         complaints,
         complaint_count,
-    })
+    };
+    Ok((told, UnitShots::of(&units)))
 }
 
 /// Units of the points of segments, in the order of their first points; behind them those of ground that is held back.

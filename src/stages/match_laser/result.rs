@@ -36,11 +36,11 @@ pub struct MatchOptions {
     pub filter: ShotFilter,
 }
 
-/// Which ground is held back: every so manieth square of a lattice, shifted by a seed. Squares do not depend on the model, so that
+/// Which ground is held back: every so manieth rectangle of a lattice, shifted by a seed. They do not depend on the model, so that
 /// a shot stays on its side whatever model it is matched with.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub struct HeldBackGround {
-    /// Every so manieth square.
+    /// Every so manieth rectangle.
     pub every: u32,
     /// Which of them.
     pub seed: u64,

@@ -30,8 +30,9 @@ const GAP_S: f64 = 0.3;
 const SAME_SHOT_S: f64 = 0.05;
 /// Of the points of a segment so many must have a height in the model.
 const COVERED: f64 = 13.0 / 15.0;
-/// Edge of a square of ground that is held back or not: a unit or two of shots; and the radius on which it is one, metres.
-const HELD_BACK_M: f64 = 5_000.0;
+/// Edges to the east and the north of a rectangle of ground that is held back or not: a few units of shots, and two segments of a
+/// profile, which runs north or south; and the radius on which they are as long, metres.
+const HELD_BACK_M: [f64; 2] = [5_000.0, 10_000.0];
 const RADIUS_M: f64 = 3_396_190.0;
 /// Complaints kept with their text; all are counted.
 const COMPLAINTS_MAX: usize = 1_000;
@@ -60,18 +61,18 @@ impl Shot {
     /// Whether it lies on ground that is held back.
     #[allow(
         clippy::cast_possible_truncation,
-        reason = "squares of a planet are some thousands"
+        reason = "rectangles of a planet are some thousands"
     )]
     pub(super) fn is_held_back(&self, held_back: Option<HeldBackGround>) -> bool {
         let Some(HeldBackGround { every, seed }) = held_back else {
             return false;
         };
-        let square_rad = HELD_BACK_M / RADIUS_M;
-        let row = (self.latitude_rad / square_rad).floor();
-        // As wide as high at the southern edge of the row, so that rows need not know of each other.
-        let east_rad = square_rad / (row * square_rad).cos().max(0.01);
+        let [width_rad, height_rad] = HELD_BACK_M.map(|edge_m| edge_m / RADIUS_M);
+        let row = (self.latitude_rad / height_rad).floor();
+        // So wide at the southern edge of the row: rows need not know of each other.
+        let east_rad = width_rad / (row * height_rad).cos().max(0.01);
         let column = (self.longitude_rad / east_rad).floor();
-        // Rows shifted by half of the distance: held-back squares surround each other evenly.
+        // Rows shifted by half of the distance: held-back rectangles surround each other evenly.
         let half = i64::from((every / 2).max(1));
         let place = column as i64 + half * row as i64;
         let shift = (seed % u64::from(every)) as i64;

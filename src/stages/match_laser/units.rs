@@ -69,6 +69,17 @@ impl<'a> Unit<'a> {
         }
     }
 
+    /// Whether its ground is held back.
+    pub(super) const fn judges(&self) -> bool {
+        self.told.judges
+    }
+
+    /// Names of its shots.
+    pub(super) fn names(&self) -> Vec<String> {
+        let shots = self.used.iter().chain(&self.held_out);
+        shots.map(|shot| shot.name.clone()).collect()
+    }
+
     /// Searches the unit, and judges what is found by its own shots.
     pub(super) fn matched(
         &self,

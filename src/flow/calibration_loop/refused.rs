@@ -1,0 +1,114 @@
+//! Input that a calibration from pixels refuses.
+
+use crate::{
+    config::CameraConfig,
+    error::{Cause, Kind, Locate as _, Result},
+    pds::pixel_file::{PixelFile, Pyramid},
+    stages::{calibrate::CONTROLS_MIN, line_camera::LineCamera, match_laser::LaserMatch},
+};
+
+/// Pixels of another image.
+#[derive(Debug, thiserror::Error)]
+enum PixelsError {
+    #[error("camera {camera}: its pixels have {} lines of {} samples; expected {} of {}, as its support data say", found[0], found[1], expected[0], expected[1])]
+    Size {
+        camera: String,
+        found: [u32; 2],
+        expected: [u32; 2],
+    },
+    #[error(
+        "camera {camera}: its pixels are those of a map; expected the image as its camera took it"
+    )]
+    Map { camera: String },
+    #[error("camera {camera} has no pixels")]
+    Missing { camera: String },
+}
+
+impl Cause for PixelsError {
+    fn kind(&self) -> Kind {
+        Kind::Input
+    }
+
+    fn advice(&self) -> String {
+        "check that cameras.pixels are not exchanged, and are the whole images that cameras.isd describe".to_owned()
+    }
+}
+
+/// Too little laser control was found.
+#[derive(Debug, thiserror::Error)]
+#[error(
+    "{used} of {} units of laser shots match the terrain model of the images, and {judging} of {} that are held back; expected at least \
+     {CONTROLS_MIN} of each. {example}", of[0], of[1]
+)]
+pub(super) struct FewUnits {
+    used: usize,
+    judging: usize,
+    of: [usize; 2],
+    example: String,
+}
+
+impl Cause for FewUnits {
+    fn kind(&self) -> Kind {
+        Kind::Input
+    }
+
+    fn advice(&self) -> String {
+        "check that cameras.pixels are not exchanged and laser.files are passes over this ground with relief; give more passes, or a larger \
+         laser.search_cells if orbit and mounting are farther off"
+            .to_owned()
+    }
+}
+
+impl FewUnits {
+    /// Of what the laser found in a terrain model; nothing where it is enough.
+    pub(super) fn of(control: &LaserMatch) -> Option<Self> {
+        let units = |judges: bool| {
+            control
+                .units
+                .iter()
+                .filter(move |unit| unit.judges == judges)
+        };
+        let points = |judges: bool| {
+            control
+                .points
+                .iter()
+                .filter(|point| point.judges == judges)
+                .count()
+        };
+        let refused = control.units.iter().find(|unit| !unit.is_kept());
+        let few = Self {
+            used: points(false),
+            judging: points(true),
+            of: [false, true].map(|judges| units(judges).count()),
+            example: refused.map_or_else(String::new, |unit| {
+                format!("Unit {}: {}", unit.unit, unit.refused_because)
+            }),
+        };
+        (few.used.min(few.judging) < CONTROLS_MIN).then_some(few)
+    }
+}
+
+/// The pixels of a camera, which must be those of its whole image.
+pub(super) fn pixels_of(camera: &CameraConfig, line: &LineCamera) -> Result<Pyramid> {
+    let id = || camera.id.clone();
+    let Some(path) = &camera.pixels else {
+        return Err(PixelsError::Missing { camera: id() }.into());
+    };
+    let file = PixelFile::open(path, &[])?;
+    let wrong = {
+        let found = [file.lines(), file.samples()];
+        let expected = [line.camera.line_times.lines(), line.samples];
+        let size = PixelsError::Size {
+            camera: id(),
+            found,
+            expected,
+        };
+        let map = PixelsError::Map { camera: id() };
+        let is_map = file.is_projected().then_some(map);
+        is_map.or((found != expected).then_some(size))
+    };
+    match wrong {
+        Some(wrong) => Err(wrong).in_file(path),
+        None => Pyramid::of(&file),
+    }
+}
