@@ -144,22 +144,22 @@ fn places_are_as_near_as_stated_to_where_they_truly_are() {
         "before {before_m:.1?}; plane {plane_m:.2} m, height {height_m:.2} m of {}",
         errors_m.len()
     );
-    assert!(errors_m.len() >= 80);
+    assert!(errors_m.len() >= 100);
     assert!(before_m[0] > 500.0 && before_m[1] > 300.0, "{before_m:?}");
     // The bounds: half a pixel of the stereo lines, and 20 m.
     assert!(plane_m < 0.5 * PIXEL_M, "{plane_m}");
     assert!(height_m < 20.0, "{height_m}");
     let held_back = &document()["held_back"];
     let stated_m = ["accuracy_plane_m", "accuracy_height_m"].map(|key| number(&held_back[key]));
-    println!("stated {stated_m:.2?}");
-    // All places share the errors of a few parameters: of such a mean three standard deviations are rarely exceeded, and an
-    // accuracy that is never used up by a sixth says nothing.
+    let normalised = number(&held_back["normalised"]);
+    println!("stated {stated_m:.2?}, held back {normalised:.2} standard deviations");
+    // The checked places are measured without error, so that only that of the calibration is left, which all of them share: two
+    // standard deviations of it are rarely exceeded.
     for (found_m, stated_m) in [plane_m, height_m].iter().zip(stated_m) {
-        assert!(
-            (stated_m / 6.0..3.0 * stated_m).contains(found_m),
-            "{found_m} of {stated_m}"
-        );
+        assert!(*found_m < 2.0 * stated_m, "{found_m} of {stated_m}");
     }
+    // Nor are standard deviations so large that they always hold: the range within which the verdict has no word to say.
+    assert!((0.6..1.5).contains(&normalised), "{normalised}");
 }
 
 #[test]
@@ -176,10 +176,17 @@ fn exchanged_pixels_are_refused() {
         ("images/s1.tif", "images/other.tif"),
         ("images/s2.tif", "images/s1.tif"),
         ("images/other.tif", "images/s2.tif"),
-        ("rounds_max = 10", "rounds_max = 3"),
+        ("search_cells = 30", "search_cells = 30\nrounds_max = 3"),
     ];
+    // Mountains are valleys then, which the laser contradicts.
     let told = refused("exchanged", &exchanged);
     println!("{told}");
+    assert!(
+        told.contains("units of laser shots match the terrain model")
+            || told.contains("terrain model")
+            || told.contains("do not fit"),
+        "{told}"
+    );
 }
 
 #[test]

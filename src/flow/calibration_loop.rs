@@ -313,8 +313,14 @@ impl<'a> Lines<'a> {
                 seed: u64::from(laser.seed),
             },
         };
-        let (control, units) = match_model(&request, self.units.as_ref(), stop)?;
+        let (mut control, units) = match_model(&request, self.units.as_ref(), stop)?;
         self.units.get_or_insert(units);
+        // Where other lines have the model's places is for them to say: they did not make it.
+        for point in &mut control.points {
+            for (camera, seen) in point.in_images.iter_mut().enumerate() {
+                *seen = seen.filter(|_| self.pair.contains(&camera));
+            }
+        }
         Ok(control)
     }
 }

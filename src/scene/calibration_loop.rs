@@ -220,7 +220,11 @@ cell_m = 100
 search_cells = 30
 
 [control]
-sigma_px = 0.2
-sigma_horizontal_m = 16.0
-sigma_vertical_m = 3.0
+sigma_px = 0.1
+sigma_horizontal_m = 13.0
+sigma_vertical_m = 1.5
+
+[a_priori]
+control_angle_deg = 0.3
+look_px = 10.0
 ";

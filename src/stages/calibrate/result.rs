@@ -1,5 +1,7 @@
 //! What a calibration gives, with names, in metres, radians and pixels.
 
+use std::collections::BTreeMap;
+
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -212,6 +214,8 @@ pub struct CalibrationRound {
     pub control: PixelsAndMetres,
     /// The same of control that was held back.
     pub held_back: PixelsAndMetres,
+    /// Residuals of control in the lines that see it, root mean square, pixels, by the number of its unit.
+    pub unit_px: BTreeMap<usize, f64>,
     /// Residuals of control that was held back in their standard deviations, root mean square.
     pub held_back_sigmas: Option<f64>,
     /// φ, ω and κ of every line, radians.

@@ -1,5 +1,7 @@
 //! Rounds of a calibration from pixels: the numbers of each, when they end, and what that says of the result.
 
+use std::collections::BTreeMap;
+
 use super::result::{Calibration, CalibrationRound, PixelsAndMetres, PointKind, Rounds};
 use crate::{
     geom::statistics::Summary,
@@ -64,6 +66,7 @@ impl CalibrationRound {
             bias_m: control.bias_m,
             control: rms(PointKind::Control),
             held_back: rms(PointKind::HeldBack),
+            unit_px: unit_px(control, done),
             held_back_sigmas: done.held_back.as_ref().map(|of| of.normalised),
             angles_rad: done
                 .cameras
@@ -73,6 +76,25 @@ impl CalibrationRound {
             drift_m_per_line: done.drift_m_per_line.map(|of| of.value),
         }
     }
+}
+
+/// Residuals of the control points that were used, by their units.
+fn unit_px(control: &LaserMatch, done: &Calibration) -> BTreeMap<usize, f64> {
+    let points = control.points.iter();
+    let of_name: BTreeMap<&str, usize> = points.map(|of| (&*of.name, of.unit)).collect();
+    let mut squares: BTreeMap<usize, Vec<f64>> = BTreeMap::new();
+    let used = done.images.iter();
+    for image in used.filter(|of| of.kind == PointKind::Control && !of.left_out) {
+        if let Some((unit, [across, along])) = of_name.get(&*image.point).zip(image.after_px) {
+            let of_unit = squares.entry(*unit).or_default();
+            of_unit.push(across * across + along * along);
+        }
+    }
+    let mean = |of: Vec<f64>| (of.iter().sum::<f64>() / of.len() as f64).sqrt();
+    squares
+        .into_iter()
+        .map(|(unit, of)| (unit, mean(of)))
+        .collect()
 }
 
 /// Median length of the shifts of kept units that calibrate.
@@ -90,14 +112,23 @@ fn shift_cells(units: &[UnitResult]) -> f64 {
 }
 
 impl Rounds {
-    /// By which share the residuals of control changed in the last round; infinite in the first.
+    /// By which share the residuals of control changed in the last round, root mean square over units that were used in it and in the
+    /// one before: units come and go about the limits of a match. Infinite in the first.
     fn control_share(&self) -> f64 {
-        let px = |of: &CalibrationRound| of.control.plane_px;
-        match &self.rounds[..] {
-            [.., before, last] => px(before)
-                .zip(px(last))
-                .map_or(f64::INFINITY, |(before, last)| (last / before - 1.0).abs()),
-            _ => f64::INFINITY,
+        let [.., before, last] = &self.rounds[..] else {
+            return f64::INFINITY;
+        };
+        let both = || {
+            let units = last.unit_px.iter();
+            units.filter_map(|(unit, px)| Some([*before.unit_px.get(unit)?, *px]))
+        };
+        let square = |at: usize| both().map(|px| px[at] * px[at]).sum::<f64>();
+        let share = ((square(1) / square(0)).sqrt() - 1.0).abs();
+        // NaN without a unit in common.
+        if share.is_finite() {
+            share
+        } else {
+            f64::INFINITY
         }
     }
 
