@@ -62,6 +62,7 @@ fn request(search_cells: u32, similarity: Option<Similarity>) -> MatchRequest {
             least_variance_m2: 1_000.0,
             similarity,
             search_cells,
+            settles: false,
             least_score: 0.9,
             least_contrast: 1.0,
             limit_m: 60.0,

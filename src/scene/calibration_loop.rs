@@ -221,7 +221,7 @@ search_cells = 30
 
 [control]
 sigma_px = 0.1
-sigma_horizontal_m = 13.0
+sigma_horizontal_m = 8.0
 sigma_vertical_m = 1.5
 
 [a_priori]

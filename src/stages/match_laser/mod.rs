@@ -11,6 +11,7 @@ mod images;
 mod judge;
 mod result;
 mod search;
+mod settle;
 mod shots;
 mod similarity;
 mod units;

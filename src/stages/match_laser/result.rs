@@ -24,6 +24,8 @@ pub struct MatchOptions {
     pub similarity: Option<Similarity>,
     /// Shifts are tried within so many cells.
     pub search_cells: u32,
+    /// Whether least squares find the place between cells, beginning at that of a quadratic through similarities.
+    pub settles: bool,
     /// Similarity that a unit must exceed.
     pub least_score: f64,
     /// What the best similarity over the mean of those above 0 must exceed.

@@ -3,6 +3,7 @@
 use super::{
     result::{HeldOut, MatchOptions, MatchedPoint, UnitMatch, UnitResult},
     search::{Best, find, is_one_relief, moments, rms_m, shifted_m},
+    settle::settled,
     shots::Shot,
     similarity::Similarity,
 };
@@ -106,9 +107,15 @@ impl<'a> Unit<'a> {
         if told.strips < STRIPS_MIN {
             return format!("shots of one pass; expected {STRIPS_MIN} or more");
         }
-        let Some(best) = find(grid, &self.used, measure, options.search_cells) else {
+        let Some(mut best) = find(grid, &self.used, measure, options.search_cells) else {
             return "the model has no heights, or no relief, around its shots".to_owned();
         };
+        if options.settles
+            && !best.at_border
+            && let Some(shift) = settled(grid, &self.used, best.shift)
+        {
+            best.shift = shift;
+        }
         let Some(at_best) = moments(grid, &self.used, best.shift) else {
             return "the model has too few heights at its best shift".to_owned();
         };
