@@ -509,7 +509,7 @@ fn matched(site: &Table) -> Table {
 /// The same with a terrain model of both.
 fn mapped(site: &Table) -> Table {
     let mut site = matched(site);
-    let surface = "cell_m = 60.0\nimages = ['E02-01301', 'E02-02016']";
+    let surface = "cell_m = 200.0\nimages = ['E02-01301', 'E02-02016']";
     let surface: Table = surface.parse().unwrap();
     site.insert("surface".to_owned(), Value::Table(surface));
     site
