@@ -257,8 +257,8 @@ fn files_stay_short() {
     }
 }
 
-/// Words that name the spacecraft or one of its cameras.
-const INSTRUMENT_WORDS: [&str; 2] = ["mgs", "moc"];
+/// Words that name a spacecraft or one of its cameras.
+const INSTRUMENT_WORDS: [&str; 4] = ["mgs", "moc", "mex", "hrsc"];
 
 /// Where they may stand in code, and why; comments may say where a rule comes from.
 const NAME_INSTRUMENTS: [(&str, &str); 8] = [
@@ -266,7 +266,7 @@ const NAME_INSTRUMENTS: [(&str, &str); 8] = [
     ("src/scene", "imitates the mission, whose files it names"),
     (
         "src/constants.rs",
-        "the one line that takes in the file of the spacecraft",
+        "the lines that take in the files of the spacecraft",
     ),
     (
         "src/config/instruments.rs",

@@ -63,7 +63,9 @@ impl ExposureRows {
         if !(first_line.fract() == 0.0 && (0.0..f64::from(LINES_MAX)).contains(&first_line)) {
             found.refuse(
                 review,
-                format!("a row whose first number is a line, a whole number from 0 below {LINES_MAX}"),
+                format!(
+                    "a row whose first number is a line, a whole number from 0 below {LINES_MAX}"
+                ),
             );
             return None;
         }

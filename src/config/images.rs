@@ -19,7 +19,6 @@ use super::{
     declare::{Declare, Keys, Many, declare_table, group, key},
     exposures::{ExposurePiece, ExposureRows, LINES_MAX, MILLISECONDS_MAX, line_times_of},
     forms::{Switch, Whole, above_to, identifier, matching, text, whole_from_to},
-
     instruments::CAMERA,
     paths::FILE,
 };
@@ -228,15 +227,22 @@ fn of_pieces(image: &ImageConfig, keys: &mut Keys<'_, '_>) {
         return;
     };
     for key in ["exposure_ms", "line_period_ms"] {
-        keys.refuse(key, "no such key beside images.exposures, which say it for every piece");
+        keys.refuse(
+            key,
+            "no such key beside images.exposures, which say it for every piece",
+        );
     }
     let Some(lines) = image.fields.lines_header else {
-        return keys.missing("lines_header", "the number of all lines, with images.exposures");
+        return keys.missing(
+            "lines_header",
+            "the number of all lines, with images.exposures",
+        );
     };
     match line_times_of(pieces, lines) {
         Err(wrong) => {
             let span = keys.span_of("exposures");
-            keys.review().problem(span, format!("images.exposures: {wrong}"));
+            keys.review()
+                .problem(span, format!("images.exposures: {wrong}"));
         }
         Ok(times) if !(times.duration_s() < IMAGE_DURATION_END_S) => {
             let expected = format!(

@@ -239,11 +239,7 @@ fn naif(
     if !of_spacecraft && !review.has_problems() {
         let text = format!(
             "naif.bus is {} and naif.bus_frame {}; expected {} and {}, those of {} (key spacecraft)",
-            names.bus,
-            names.bus_frame,
-            spacecraft.bus,
-            spacecraft.bus_frame,
-            spacecraft.full_name
+            names.bus, names.bus_frame, spacecraft.bus, spacecraft.bus_frame, spacecraft.full_name
         );
         review.problem(None, text);
     }

@@ -55,8 +55,8 @@ pub use declare::{Accept, DeclaredKey, ValueKind, Word};
 pub use exposures::{ExposurePiece, line_times_of};
 pub use images::ImageConfig;
 pub use instruments::{
-    all_instruments, altimeter, built_in_altimeters, built_in_instruments, instrument, usual_altimeter,
-    usual_instrument,
+    all_instruments, altimeter, built_in_altimeters, built_in_instruments, instrument,
+    usual_altimeter, usual_instrument,
 };
 pub use kernels::KernelsConfig;
 pub use limits::LimitsConfig;

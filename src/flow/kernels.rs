@@ -64,7 +64,12 @@ pub(super) fn required_coverage(
         trajectory_reach_s(&config.range_check, &config.mola_clock),
     );
     // Those of support data read no kernels.
-    let images = || images.iter().copied().filter(|image| image.support.is_none());
+    let images = || {
+        images
+            .iter()
+            .copied()
+            .filter(|image| image.support.is_none())
+    };
     let has_laser = |image: &ImageTimes| image.instrument.spacecraft.has_laser();
     // No kernels have the spacecraft of tables.
     let flown = if config.shots.is_empty() {
@@ -86,8 +91,20 @@ pub(super) fn required_coverage(
     for image in images().filter(|image| !has_laser(image)) {
         let of = others.entry(image.instrument.spacecraft.id.clone());
         let of = of.or_default();
-        of.positions = Intervals::union_of(of.positions.as_slice().iter().copied().chain([position(image)]));
-        of.attitudes = Intervals::union_of(of.attitudes.as_slice().iter().copied().chain([attitude(image)]));
+        of.positions = Intervals::union_of(
+            of.positions
+                .as_slice()
+                .iter()
+                .copied()
+                .chain([position(image)]),
+        );
+        of.attitudes = Intervals::union_of(
+            of.attitudes
+                .as_slice()
+                .iter()
+                .copied()
+                .chain([attitude(image)]),
+        );
     }
     let own = || images().filter(|image| has_laser(image));
     RequiredCoverage {

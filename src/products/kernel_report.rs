@@ -72,7 +72,9 @@ fn qualities(site: &SiteProducts) -> BTreeMap<String, &'static str> {
         let of_type = site.kernels.iter().filter(|line| type_of(line) == required);
         of_type.map(|kernel| quality(&kernel)).min()
     };
-    let keys = ids.iter().flat_map(|id| ["ck", "spk"].map(|kind| (id, kind)));
+    let keys = ids
+        .iter()
+        .flat_map(|id| ["ck", "spk"].map(|kind| (id, kind)));
     keys.filter_map(|(id, kind)| Some((format!("{id}_{kind}_quality"), least(kind)?)))
         .collect()
 }

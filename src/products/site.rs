@@ -184,7 +184,10 @@ impl<'a> SiteProducts<'a> {
         let own = required.others.is_empty() || !required.positions.as_slice().is_empty();
         let others = required.others.keys();
         let others = others.filter_map(|id| Spacecraft::of_id(id));
-        own.then_some(*SPACECRAFT).into_iter().chain(others).collect()
+        own.then_some(*SPACECRAFT)
+            .into_iter()
+            .chain(others)
+            .collect()
     }
 
     /// The spacecraft of footprints and images: those whose kernels are read, and those that support data name; where nothing names
@@ -195,7 +198,11 @@ impl<'a> SiteProducts<'a> {
         let searched = self.config.shots.is_empty() && !self.footprints.is_empty();
         let mut names: Vec<&str> = Vec::new();
         names.extend(searched.then_some(&*SPACECRAFT.full_name));
-        for image in self.images.iter().filter(|image| image.times.support.is_none()) {
+        for image in self
+            .images
+            .iter()
+            .filter(|image| image.times.support.is_none())
+        {
             let name = &*image.times.instrument.spacecraft.full_name;
             if !names.contains(&name) {
                 names.push(name);

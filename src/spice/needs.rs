@@ -49,7 +49,11 @@ pub(super) fn bus_frame(of: &'static Spacecraft) -> Need {
     Need {
         variable: format!("FRAME_{}_NAME", of.bus).into(),
         what: format!("the frame of the {} bus", of.name).into(),
-        kernel: format!("kernel that defines the frame {} (.tsc or .tf)", of.bus_frame).into(),
+        kernel: format!(
+            "kernel that defines the frame {} (.tsc or .tf)",
+            of.bus_frame
+        )
+        .into(),
         example: Cow::Borrowed(&of.frame_kernel),
     }
 }

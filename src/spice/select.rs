@@ -31,8 +31,14 @@ const DEPTH_MAX: usize = 16;
 /// Most files that are looked into.
 const FILES_MAX: usize = 100_000;
 /// What time tagging and geometry need from text kernels, but for the frame of the camera.
-static NEEDS: LazyLock<[Need; 4]> =
-    LazyLock::new(|| [LEAP_SECONDS, clock(&SPACECRAFT), MARS, bus_frame(&SPACECRAFT)]);
+static NEEDS: LazyLock<[Need; 4]> = LazyLock::new(|| {
+    [
+        LEAP_SECONDS,
+        clock(&SPACECRAFT),
+        MARS,
+        bus_frame(&SPACECRAFT),
+    ]
+});
 /// Orbit solutions that mark their files by name; a file without a mark is `nav`.
 const MARKED_FAMILIES: [&str; 2] = ["gsfc", "ipng"];
 

@@ -244,7 +244,12 @@ impl Session {
         let state = self
             .cspice()
             .apparent_state(self.spacecraft.naif, et.seconds(), NAIF_MARS)?;
-        self.finite("apparent position or velocity", &self.spacecraft.name, et, state)
+        self.finite(
+            "apparent position or velocity",
+            &self.spacecraft.name,
+            et,
+            state,
+        )
     }
 
     /// Geometric state of Mars relative to the barycentre of the solar system.
@@ -339,7 +344,9 @@ impl Session {
     /// # Errors
     /// As [`Self::et_to_sclk`].
     pub fn et_to_ticks(&self, et: Et) -> Result<f64> {
-        let ticks = self.cspice().et_to_ticks(self.spacecraft.naif, et.seconds());
+        let ticks = self
+            .cspice()
+            .et_to_ticks(self.spacecraft.naif, et.seconds());
         Ok(ticks.map_err(|error| self.explain(error, &clocks(self.spacecraft)))?)
     }
 

@@ -133,7 +133,12 @@ pub fn write_ck(
         angular_velocities_rad_s: segment.angular_velocities_rad_s,
         interval_starts: starts,
     });
-    fill_ck(session.cspice(), path, &encoded.collect::<Vec<_>>(), comment)
+    fill_ck(
+        session.cspice(),
+        path,
+        &encoded.collect::<Vec<_>>(),
+        comment,
+    )
 }
 
 /// Writes a new CK whose instants are encoded already.

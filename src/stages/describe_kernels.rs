@@ -143,7 +143,10 @@ pub fn describe_kernels(
 /// CSPICE passes over attitudes without rates as if they were not there; whoever loads them should know.
 fn rates_note(session: &Session, without: &BTreeSet<usize>) -> Option<String> {
     let kernels = session.kernels().kernels();
-    let names: Vec<String> = without.iter().map(|index| kernels[*index].file_name()).collect();
+    let names: Vec<String> = without
+        .iter()
+        .map(|index| kernels[*index].file_name())
+        .collect();
     (!names.is_empty()).then(|| {
         format!(
             "{}: attitudes without angular rates, which are not read; where another C-kernel reaches, its attitude is \

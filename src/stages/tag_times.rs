@@ -257,11 +257,7 @@ fn image_times(image: &ImageConfig, session: &Session) -> Result<ImageTimes> {
             instrument.detector.pixels
         ));
     }
-    of_one_clock(
-        image,
-        instrument.spacecraft,
-        fields.sclk_start.as_deref(),
-    )?;
+    of_one_clock(image, instrument.spacecraft, fields.sclk_start.as_deref())?;
     let told = start_time(image, &fields, session, &mut notes, &mut remarks)?;
     let pieces = Pieces {
         image,
