@@ -43,6 +43,10 @@ pub struct Instrument {
     pub pointing: PointingTime,
 }
 
+#[expect(
+    clippy::trivially_copy_pass_by_ref,
+    reason = "serde hands fields over by reference"
+)]
 fn id_of_spacecraft<S: Serializer>(
     spacecraft: &&'static Spacecraft,
     serializer: S,

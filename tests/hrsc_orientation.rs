@@ -1,4 +1,4 @@
-//! HRSC on Mars Express by real kernels, image h5270_0000_ir2: the nine lines as their kernels have them, orbit, attitude and
+//! HRSC on Mars Express by real kernels, image `h5270_0000_ir2`: the nine lines as their kernels have them, orbit, attitude and
 //! rotation of Mars against ALE's support data, ground seen as those data see it, and what is wrong with kernels, camera or
 //! line times said.
 #![allow(
@@ -18,14 +18,16 @@ use std::{
     io::Write as _,
     path::{Path, PathBuf},
     process::Stdio,
+    slice,
 };
 
 use areograph::{
     body::Body,
     config::{
         ExposurePiece, ImageConfig, KernelsConfig, OrientationConfig, PointingConfig,
-        all_instruments, instrument,
+        all_instruments, instrument, window_of_box,
     },
+    footprints::Footprints,
     frames::{BodyFixed, Position},
     geom::{
         attitude::{bus_to_camera, matrix_of_spice_quaternion, rotation_vector},
@@ -43,6 +45,7 @@ use areograph::{
     },
     spice::{KernelSet, Session},
     stages::{
+        group_profiles::group_profiles,
         sample_orientation::{Orientation, sample_orientation},
         tabulate_kernels::{require_same, tabulate_kernels},
         tag_times::{ImageTimes, StartFrom, tag_times},
@@ -381,6 +384,27 @@ fn ground_is_seen_where_it_was_and_as_by_the_support_data() {
     }
 }
 
+#[test]
+fn shots_of_the_time_of_the_image_are_none_of_its_own() {
+    let Some(folder) = common::real_data(FOLDER, "shots beside HRSC") else {
+        return;
+    };
+    let mut times = tag_times(&[image()], &session(&folder)).unwrap().remove(0);
+    let start_s = times.line_times.start().seconds();
+    let mut shots = Footprints::<BodyFixed>::new(Vec::new());
+    shots.et_s = (0..50).map(|shot| start_s + f64::from(shot)).collect();
+    (shots.orbit, shots.windows) = (vec![1; 50], vec![1; 50]);
+    let window = window_of_box("window", [0.0, 1.0, 0.0, 1.0]).unwrap();
+    let beside = |times: &ImageTimes| {
+        let profiles = group_profiles(&shots, slice::from_ref(&window), slice::from_ref(times));
+        profiles[0].simultaneous.len()
+    };
+    assert_eq!(beside(&times), 0);
+    // Were it on the spacecraft of the laser, they would be.
+    times.instrument = line("moc_na").clone();
+    assert_eq!(beside(&times), 1);
+}
+
 /// A folder with the kernels, and a site file of the image over them.
 fn case(folder: &Path, names: &[&str]) -> Case {
     let case = Case::empty();
@@ -443,6 +467,17 @@ fn a_site_of_the_image_is_valid_and_seen_alike_by_usgscsm() {
     succeed(&mut case.run());
     let site = case.path("out/hrsc");
     let manifest = json(&site.join("manifest.json"));
+    let mut coverage = case.areograph();
+    coverage.args(["kernels", "coverage", PASSES[1][0], TEXTS[0], "--json"]);
+    let coverage: Value = serde_json::from_slice(&succeed(&mut coverage).stdout).unwrap();
+    assert_eq!(coverage["position"], serde_json::json!([]));
+    assert_eq!(
+        coverage["others"]["mex"]["position"]
+            .as_array()
+            .unwrap()
+            .len(),
+        1
+    );
     let report = json(&site.join("exchange/kernels.json"));
     let count = |kernels: &Value, name: &str, key: &str| {
         let mut kernels = kernels.as_array().unwrap().iter();

@@ -232,11 +232,9 @@ fn of_pieces(image: &ImageConfig, keys: &mut Keys<'_, '_>) {
             "no such key beside images.exposures, which say it for every piece",
         );
     }
+    // Those of a label are held against them when it is read.
     let Some(lines) = image.fields.lines_header else {
-        return keys.missing(
-            "lines_header",
-            "the number of all lines, with images.exposures",
-        );
+        return;
     };
     match line_times_of(pieces, lines) {
         Err(wrong) => {

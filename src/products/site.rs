@@ -179,6 +179,7 @@ impl<'a> SiteProducts<'a> {
     }
 
     /// The spacecraft that kernels are read of: that of the laser, where none of another one alone are needed, and others.
+    #[must_use]
     pub fn spacecraft_of_kernels(&self) -> Vec<&'static Spacecraft> {
         let required = self.required;
         let own = required.others.is_empty() || !required.positions.as_slice().is_empty();

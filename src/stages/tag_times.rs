@@ -265,16 +265,13 @@ fn image_times(image: &ImageConfig, session: &Session) -> Result<ImageTimes> {
         lines: lines_header,
         downtrack_summing,
     };
-    let (line_times, exposure_s, start_from) = match &image.exposures {
-        Some(exposures) => {
-            let (times, exposure_s) = pieces.listed(exposures, told, &mut remarks)?;
-            (times, exposure_s, StartFrom::Exposures)
-        }
-        None => {
-            let (start, start_from) = told.ok_or_else(|| missing("sclk_start"))?;
-            let (times, exposure_s) = pieces.even(start)?;
-            (times, exposure_s, start_from)
-        }
+    let (line_times, exposure_s, start_from) = if let Some(exposures) = &image.exposures {
+        let (times, exposure_s) = pieces.listed(exposures, told, &mut remarks)?;
+        (times, exposure_s, StartFrom::Exposures)
+    } else {
+        let (start, start_from) = told.ok_or_else(|| missing("sclk_start"))?;
+        let (times, exposure_s) = pieces.even(start)?;
+        (times, exposure_s, start_from)
     };
     let start = line_times.start();
     // Without the camera's frame its orientation says what is missing.
