@@ -261,7 +261,7 @@ fn files_stay_short() {
 const INSTRUMENT_WORDS: [&str; 4] = ["mgs", "moc", "mex", "hrsc"];
 
 /// Where they may stand in code, and why; comments may say where a rule comes from.
-const NAME_INSTRUMENTS: [(&str, &str); 8] = [
+const NAME_INSTRUMENTS: [(&str, &str); 9] = [
     ("src/pds", "reads the labels and files of the mission"),
     ("src/scene", "imitates the mission, whose files it names"),
     (
@@ -272,6 +272,7 @@ const NAME_INSTRUMENTS: [(&str, &str); 8] = [
         "src/config/instruments.rs",
         "the list of instrument files that are built in",
     ),
+    ("src/config/calibration.rs", "examples of keys"),
     ("src/config/images.rs", "examples of keys"),
     ("src/config/kernels.rs", "examples of keys"),
     ("src/config/pointing.rs", "examples of keys"),
