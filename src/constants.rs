@@ -17,12 +17,19 @@ pub const NAIF_SOLAR_SYSTEM_BARYCENTRE: i32 = 0;
 /// Speed of light, metres per second.
 pub const SPEED_OF_LIGHT_M_S: f64 = 299_792_458.0;
 
-/// The spacecraft whose clock, orbit and attitude are read.
-pub static SPACECRAFT: LazyLock<Spacecraft> =
-    LazyLock::new(|| of_the_program(include_str!("../config/spacecraft/mgs.toml")));
+/// All that the program knows; the first is that of the laser.
+static ALL: LazyLock<[Spacecraft; 2]> = LazyLock::new(|| {
+    [
+        of_the_program(include_str!("../config/spacecraft/mgs.toml")),
+        of_the_program(include_str!("../config/spacecraft/mex.toml")),
+    ]
+});
+
+/// The spacecraft of the laser, and of cameras that name no other one.
+pub static SPACECRAFT: LazyLock<&Spacecraft> = LazyLock::new(|| &ALL[0]);
 
 /// A spacecraft, as its file under `config/spacecraft` says.
-#[derive(Debug, Clone, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Spacecraft {
     /// Identifier, the name of its file; kernels of its archive have names that begin with it and an underscore.
@@ -39,10 +46,36 @@ pub struct Spacecraft {
     pub bus: i32,
     /// Name of that frame.
     pub bus_frame: String,
-    /// A file of the archive that defines clock and frame.
+    /// Whether its labels hold the clock of the clock kernels.
+    pub labels_tell_clock: bool,
+    /// A file of the archive that defines the clock.
     pub clock_kernel: String,
+    /// A file of the archive that defines the frame of the bus.
+    pub frame_kernel: String,
+    /// Largest time correction of its attitude kernels that is taken, seconds; 0 where they need none.
+    pub ck_bias_max_s: f64,
     /// Where these come from.
     pub source: String,
+}
+
+impl Spacecraft {
+    /// All that the program knows; the first is that of the laser.
+    #[must_use]
+    pub fn all() -> &'static [Self] {
+        &*ALL
+    }
+
+    /// The one with this identifier.
+    #[must_use]
+    pub fn of_id(id: &str) -> Option<&'static Self> {
+        ALL.iter().find(|spacecraft| spacecraft.id == id)
+    }
+
+    /// Whether it carries the laser.
+    #[must_use]
+    pub fn has_laser(&self) -> bool {
+        self.naif == SPACECRAFT.naif
+    }
 }
 
 #[expect(

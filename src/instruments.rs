@@ -3,9 +3,9 @@
 use std::fmt;
 
 use nalgebra::{Matrix3, Vector3};
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Deserializer, Serialize, Serializer, de::Error as _};
 
-use crate::time::PointingBias;
+use crate::{constants::Spacecraft, time::PointingBias};
 
 /// Most coefficients of a distortion.
 pub const COEFFICIENTS_MAX: usize = 10;
@@ -19,6 +19,12 @@ pub struct Instrument {
     pub id: String,
     /// Its name, for people.
     pub name: String,
+    /// What carries it: whose clock, orbit and attitude are read for its images.
+    #[serde(
+        serialize_with = "id_of_spacecraft",
+        deserialize_with = "spacecraft_of_id"
+    )]
+    pub spacecraft: &'static Spacecraft,
     /// Its names in labels.
     pub label: LabelNames,
     /// Numbers and frames in kernels.
@@ -37,6 +43,24 @@ pub struct Instrument {
     pub pointing: PointingTime,
 }
 
+#[expect(
+    clippy::trivially_copy_pass_by_ref,
+    reason = "serde hands fields over by reference"
+)]
+fn id_of_spacecraft<S: Serializer>(
+    spacecraft: &&'static Spacecraft,
+    serializer: S,
+) -> Result<S::Ok, S::Error> {
+    serializer.serialize_str(&spacecraft.id)
+}
+
+fn spacecraft_of_id<'de, D: Deserializer<'de>>(
+    deserializer: D,
+) -> Result<&'static Spacecraft, D::Error> {
+    let id = String::deserialize(deserializer)?;
+    Spacecraft::of_id(&id).ok_or_else(|| D::Error::custom(format!("no spacecraft {id} is known")))
+}
+
 /// How labels and image identifiers of ISIS name an instrument.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct LabelNames {
@@ -44,8 +68,8 @@ pub struct LabelNames {
     pub instrument: String,
     /// Filter keyword, where it tells cameras of one instrument apart.
     pub filter: Option<String>,
-    /// Instrument and filter in the serial numbers of ISIS.
-    pub serial: String,
+    /// Instrument and filter in the serial numbers of ISIS; none where these are made otherwise.
+    pub serial: Option<String>,
 }
 
 impl fmt::Display for LabelNames {
@@ -59,12 +83,16 @@ impl fmt::Display for LabelNames {
 }
 
 /// Names and numbers of NAIF.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct NaifNames {
     /// Number of the instrument.
     pub instrument: i32,
     /// Frame of the camera.
     pub frame: String,
+    /// Number of that frame, mostly that of the instrument.
+    pub frame_id: i32,
+    /// From that frame to the camera axes, about their common +Z, radians.
+    pub turn_rad: f64,
     /// Number of the bus, the object of attitude kernels.
     pub bus: i32,
     /// Frame of the bus.

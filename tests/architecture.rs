@@ -257,21 +257,22 @@ fn files_stay_short() {
     }
 }
 
-/// Words that name the spacecraft or one of its cameras.
-const INSTRUMENT_WORDS: [&str; 2] = ["mgs", "moc"];
+/// Words that name a spacecraft or one of its cameras.
+const INSTRUMENT_WORDS: [&str; 4] = ["mgs", "moc", "mex", "hrsc"];
 
 /// Where they may stand in code, and why; comments may say where a rule comes from.
-const NAME_INSTRUMENTS: [(&str, &str); 8] = [
+const NAME_INSTRUMENTS: [(&str, &str); 9] = [
     ("src/pds", "reads the labels and files of the mission"),
     ("src/scene", "imitates the mission, whose files it names"),
     (
         "src/constants.rs",
-        "the one line that takes in the file of the spacecraft",
+        "the lines that take in the files of the spacecraft",
     ),
     (
         "src/config/instruments.rs",
         "the list of instrument files that are built in",
     ),
+    ("src/config/calibration.rs", "examples of keys"),
     ("src/config/images.rs", "examples of keys"),
     ("src/config/kernels.rs", "examples of keys"),
     ("src/config/pointing.rs", "examples of keys"),

@@ -440,6 +440,10 @@ fn sites(site: &Table) -> Vec<Table> {
         with("windows = [{ id = 'isidis', polygon = 'outline.geojson' }]"),
         with("windows = [{ id = 'isidis', image = 'E02-01301', margin_km = 5.0 }]"),
         with("images = [{ isd = 'image.json' }]"),
+        // The image's own line times, in two pieces.
+        with(
+            "images = [{ exposures = [[0, 37971361.905, 0.9642], [4000, 37971365.7618, 0.9642]] }]",
+        ),
         with("altimeter = 'laser.toml'\nimages = [{ instrument = 'camera.toml' }]"),
         with(
             "adjustment.images = [{ id = 'E02-01301', position_m = [30, 0.3, 0, 30, 0.3, 0, 30, 0.3, 0], \
@@ -509,7 +513,7 @@ fn matched(site: &Table) -> Table {
 /// The same with a terrain model of both.
 fn mapped(site: &Table) -> Table {
     let mut site = matched(site);
-    let surface = "cell_m = 60.0\nimages = ['E02-01301', 'E02-02016']";
+    let surface = "cell_m = 200.0\nimages = ['E02-01301', 'E02-02016']";
     let surface: Table = surface.parse().unwrap();
     site.insert("surface".to_owned(), Value::Table(surface));
     site

@@ -395,6 +395,7 @@ fn declarations_are_complete() {
         "limits.ties_min",
         "limits.rejected_share_max",
         "limits.surface_filled_min",
+        "limits.surface_spread_max_sigma",
     ];
     for key in &keys {
         let path = &*key.path;

@@ -57,9 +57,11 @@ fn the_first_lines_tell_how_far_images_disagree_before_and_after() {
     let (before_m, after_m) = (apart_m(&site.pairs[0]), apart_m(&site.adjusted_pairs[0]));
     // The mission is made so: most of a spacing before, metres after.
     assert!(before_m > 0.5 * spacing_m && after_m < 0.05 * spacing_m);
+    let [before_sigma_m, sigma_m] = [&site.pairs[0], &site.adjusted_pairs[0]]
+        .map(|pair| pair.footprints.as_ref().unwrap().apart_sigma_m.unwrap());
     let words = format!(
-        ", along track: a footprint falls {:.2} MOLA spacings ({before_m:.0} m) apart before the adjustment; {:.3} MOLA \
-         spacings ({after_m:.1} m) after it.",
+        ", along track: a footprint falls {:.2} MOLA spacings ({before_m:.0} m, σ {before_sigma_m:.1} m) apart before the \
+         adjustment; {:.3} MOLA spacings ({after_m:.1} m, σ {sigma_m:.1} m) after it.",
         before_m / spacing_m,
         after_m / spacing_m,
     );
@@ -74,7 +76,7 @@ fn the_first_lines_tell_how_far_images_disagree_before_and_after() {
         site.heights.above_m.n
     );
     let images = format!(
-        "{:.2} m at the tie points of {}; {:.0} m before",
+        "{:.2} m at the tie points of {}, which the adjustment fits; {:.0} m before",
         site.adjusted_pairs[0].along_track_parallax_m.abs(),
         site.pairs[0].images.join(" and "),
         site.pairs[0].along_track_parallax_m.abs()
@@ -169,7 +171,8 @@ fn pairs_tell_their_residuals_and_footprints_before_and_after() {
         for (state, of) in of.into_iter().enumerate() {
             agree(&row[3 + state], of.lines.mean, 2);
             agree(&row[5 + state], of.along_m, 1);
-            agree(&row[7 + state], of.along_spacings.unwrap(), 3);
+            agree(&row[7 + state], of.along_sigma_m, 1);
+            agree(&row[9 + state], of.along_spacings.unwrap(), 3);
         }
     }
 }
@@ -484,6 +487,7 @@ fn tie_points_tell_the_misregistration_where_no_footprint_is_in_both_images() {
     let mut site = Site::gusev();
     // In one of the two states is enough: the two numbers of a sentence are of one kind.
     let adjusted = site.adjusted_pairs[0].footprints.as_mut().unwrap();
+    (adjusted.apart_m, adjusted.apart_sigma_m) = (None, None);
     adjusted.profiles.clear();
     let (before_m, after_m) = (
         site.pairs[0].along_track_parallax_m,
@@ -498,6 +502,7 @@ fn tie_points_tell_the_misregistration_where_no_footprint_is_in_both_images() {
         "{words}"
     );
     let before = site.pairs[0].footprints.as_mut().unwrap();
+    (before.apart_m, before.apart_sigma_m) = (None, None);
     before.profiles.clear();
     before.outside = 1;
     let page = site.page();

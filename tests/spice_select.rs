@@ -106,6 +106,7 @@ fn around(exposures: Interval) -> RequiredCoverage {
     RequiredCoverage {
         positions: Intervals::union_of([exposures.padded(1.0)]),
         attitudes: Intervals::union_of([attitudes]),
+        ..RequiredCoverage::default()
     }
 }
 

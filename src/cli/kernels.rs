@@ -9,8 +9,9 @@ use serde_json::json;
 
 use super::output;
 use crate::{
+    constants::Spacecraft,
     error::Error,
-    spice::{KernelSet, Session},
+    spice::{Coverage, KernelSet, Session},
     time::Intervals,
 };
 
@@ -26,7 +27,7 @@ enum Command {
     /// Lists kernels in load order: role by content, size, hash, and why each is there.
     #[command(after_help = "Example: areograph kernels list kernels/nav.tm")]
     List(Files),
-    /// Shows position and attitude coverage of Mars Global Surveyor, with the gaps inside.
+    /// Shows position and attitude coverage of Mars Global Surveyor, with the gaps inside; of other spacecraft what is held.
     #[command(after_help = "Example: areograph kernels coverage kernels/nav.tm")]
     Coverage(Files),
     Compare(compare::Arguments),
@@ -92,13 +93,34 @@ fn list(files: &Files) -> Result<(), Error> {
 fn coverage(files: &Files) -> Result<(), Error> {
     let session = Session::open(&files.load()?)?;
     let coverage = session.coverage()?;
-    if files.json {
-        output::json(&json!({ "position": coverage.spk, "attitude": coverage.ck }));
-        return Ok(());
+    let others = Spacecraft::all().iter().filter(|one| !one.has_laser());
+    let others: Vec<Session> = others.map(|one| session.of(one)).collect();
+    let mut found = json!({ "position": coverage.spk, "attitude": coverage.ck });
+    if !files.json {
+        print_coverage("", &session, coverage)?;
     }
+    // Of other spacecraft what is there.
+    for session in &others {
+        let (spacecraft, coverage) = (session.spacecraft(), session.coverage()?);
+        if coverage.per_kernel.is_empty() {
+            continue;
+        }
+        found["others"][&*spacecraft.id] =
+            json!({ "position": coverage.spk, "attitude": coverage.ck });
+        if !files.json {
+            print_coverage(&format!(" of {}", spacecraft.name), session, coverage)?;
+        }
+    }
+    if files.json {
+        output::json(&found);
+    }
+    Ok(())
+}
+
+fn print_coverage(of: &str, session: &Session, coverage: &Coverage) -> Result<(), Error> {
     for (what, intervals) in [("position", &coverage.spk), ("attitude", &coverage.ck)] {
-        output::line(format_args!("{what}:"));
-        print_intervals(&session, intervals)?;
+        output::line(format_args!("{what}{of}:"));
+        print_intervals(session, intervals)?;
     }
     Ok(())
 }

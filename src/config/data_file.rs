@@ -147,6 +147,48 @@ impl<'i> DataTable<'i> {
         })
     }
 
+    /// The meaning of the word of `key`, where it is written.
+    pub(super) fn optional_word<T: Copy>(
+        &mut self,
+        review: &mut Review<'_>,
+        key: &'static str,
+        choices: &[(&str, T)],
+    ) -> Option<T> {
+        if self.has(key) {
+            return self.word(review, key, choices);
+        }
+        self.known.push(key);
+        None
+    }
+
+    /// The number of `key` from `low` to `high`, where it is written.
+    pub(super) fn optional_number(
+        &mut self,
+        review: &mut Review<'_>,
+        key: &'static str,
+        limits: [f64; 2],
+    ) -> Option<f64> {
+        if self.has(key) {
+            return Some(self.number(review, key, limits));
+        }
+        self.known.push(key);
+        None
+    }
+
+    /// The whole number of `key` from `low` to `high`, where it is written.
+    pub(super) fn optional_whole(
+        &mut self,
+        review: &mut Review<'_>,
+        key: &'static str,
+        limits: [i32; 2],
+    ) -> Option<i32> {
+        if self.has(key) {
+            return Some(self.whole(review, key, limits));
+        }
+        self.known.push(key);
+        None
+    }
+
     /// The number of `key` from `low` to `high`.
     pub(super) fn number(
         &mut self,

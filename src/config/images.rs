@@ -6,6 +6,7 @@ use serde::Deserialize;
 use serde_json::json;
 
 use crate::{
+    constants::SPACECRAFT,
     image::{
         CLOCK_STRING, IMAGE_DURATION_END_S, IMAGE_LINES_MIN, ImageFields, is_clock_string,
         line_period_agrees,
@@ -16,25 +17,22 @@ use crate::{
 
 use super::{
     declare::{Declare, Keys, Many, declare_table, group, key},
+    exposures::{ExposurePiece, ExposureRows, LINES_MAX, MILLISECONDS_MAX, line_times_of},
     forms::{Switch, Whole, above_to, identifier, matching, text, whole_from_to},
     instruments::CAMERA,
     paths::FILE,
 };
 
-/// Longest exposure or line period, milliseconds: a hundred times those of the camera.
-const MILLISECONDS_MAX: f64 = 1_000.0;
 /// Largest summing of the wide-angle cameras; the narrow-angle camera sums up to 8.
 const SUMMING: Whole<u32> = whole_from_to(1, 127);
-/// Beyond every image of the mission, so that line counts cannot make a run endless.
-const LINES_MAX: u32 = 1_000_000;
-/// Beyond the detectors of all three cameras.
-const DETECTORS_MAX: u32 = 4_096;
+/// Beyond the detectors of all cameras.
+const DETECTORS_MAX: u32 = 8_192;
 
 /// Images of a site.
 pub(super) const IMAGES: Many = Many {
     further: &[&[
         " Without a label or support data these are required: `sclk_start` or `utc_start`, `exposure_ms` or",
-        " `line_period_ms`, `downtrack_summing`, `lines_header`, `samples`.",
+        " `line_period_ms` (or for both of these `exposures`), `downtrack_summing`, `lines_header`, `samples`.",
     ]],
     ..Many::ANY
 };
@@ -64,14 +62,23 @@ declare_table! {
         /// Whether the laser flew on the spacecraft of these support data, and their positions are geometric: then ranges of
         /// shots that were fired while the image was exposed are measured from them. With support data alone.
         has_laser: bool = key(Switch).or(false).unused("true"),
-        /// The camera: `moc_na`, `moc_wa_red`, `moc_wa_blue`, or the path of an instrument file like those in
-        /// `config/instruments`. Without it, the camera that the label names, and without a label `moc_na`.
+        /// The camera: `moc_na`, `moc_wa_red`, `moc_wa_blue`; a line of HRSC on Mars Express: `hrsc_nd`, `hrsc_s1`, `hrsc_s2`,
+        /// `hrsc_p1`, `hrsc_p2`, `hrsc_ir`, `hrsc_gr`, `hrsc_bl`, `hrsc_re`, whose images have the keys below and no label; or
+        /// the path of an instrument file like those in `config/instruments`. Without it, the camera that the label names,
+        /// and without a label `moc_na`. Clock, orbit and attitude are those of the spacecraft that carries it.
         instrument: Option<Instrument> = key(CAMERA).example(r#""moc_na""#),
         /// Its name in tie point files and in what is written for ISIS, when that is not the identifier: for a
         /// control network the ISIS serial number, in which the clock must be that of the image. Without it, the
         /// identifier.
         serial_number: Option<String> =
             key(text()).example(r#""MGS/651158134:116/MOC-NA""#),
+        /// When its lines were exposed, where their exposure changes inside the image, as HRSC's does: for every piece its
+        /// first line, counted from 0, the start of that line in ephemeris time (TDB seconds past J2000), and the time
+        /// between two lines in milliseconds. ISIS has them in the table `LineScanTimes` (there lines count from 1), ALE in
+        /// `line_scan_rate` (seconds from `center_ephemeris_time`). With `lines_header`; then neither `exposure_ms` nor
+        /// `line_period_ms`. A start beside it must agree, and more than half a line between two pieces is remarked on.
+        exposures: Option<Vec<ExposurePiece>> = key(ExposureRows)
+            .unused("[[0, 255744599.027482, 12.800791], [6665, 255744684.345045, 13.227428]]"),
         /// Keys written in the configuration.
         fields: ImageFields = group(),
     }
@@ -97,7 +104,8 @@ declare_table! {
     fill ImageFields {
         /// Spacecraft clock at the start of the first line, seconds:ticks with 256 ticks a second (":28" and
         /// ":028" are both 28/256 s). Preferred: label UTC is rounded, 1.0 to 4.8 ms off in five labels. Farther
-        /// apart than 20 ms they are remarked on, farther than 1 s refused.
+        /// apart than 20 ms they are remarked on, farther than 1 s refused. Not for Mars Express, whose labels hold
+        /// counts that lie seconds from its clock kernels.
         sclk_start = key(matching(
             CLOCK_STRING,
             "^(1/)?[0-9]+[:.][0-9]+$",
@@ -139,7 +147,8 @@ fn milliseconds(example: &'static str) -> impl Declare<Value = Option<f64>> {
 }
 
 /// Keys that stand in for a label.
-const OF_FIELDS: [&str; 10] = [
+const OF_FIELDS: [&str; 11] = [
+    "exposures",
     "sclk_start",
     "utc_start",
     "exposure_ms",
@@ -153,10 +162,10 @@ const OF_FIELDS: [&str; 10] = [
 ];
 
 /// Without a label the keys must give what times and sensor model need: start, line period, summing, size.
-fn is_complete(_: &ImageConfig, keys: &mut Keys<'_, '_>) {
+fn is_complete(image: &ImageConfig, keys: &mut Keys<'_, '_>) {
     const NEEDS: [&[&str]; 5] = [
-        &["sclk_start", "utc_start"],
-        &["exposure_ms", "line_period_ms"],
+        &["sclk_start", "utc_start", "exposures"],
+        &["exposure_ms", "line_period_ms", "exposures"],
         &["downtrack_summing"],
         &["lines_header"],
         &["samples"],
@@ -179,6 +188,8 @@ fn is_complete(_: &ImageConfig, keys: &mut Keys<'_, '_>) {
         "has_laser",
         "positions of kernels are those of the spacecraft with the laser",
     );
+    of_spacecraft(image, keys);
+    of_pieces(image, keys);
     let lacking: Vec<String> = NEEDS
         .into_iter()
         .filter(|ways| !ways.iter().any(|way| keys.span_of(way).is_some()))
@@ -190,6 +201,55 @@ fn is_complete(_: &ImageConfig, keys: &mut Keys<'_, '_>) {
             lacking.join(", ")
         );
         keys.missing("label", &expected);
+    }
+}
+
+/// Clock and label are those of the spacecraft that carries the camera; labels are read of one alone.
+fn of_spacecraft(image: &ImageConfig, keys: &mut Keys<'_, '_>) {
+    let named = image.instrument.as_ref().map(|camera| camera.spacecraft);
+    let spacecraft = named.unwrap_or(&SPACECRAFT);
+    let of = &spacecraft.full_name;
+    if !spacecraft.labels_tell_clock {
+        let expected = format!(
+            "utc_start or exposures instead: the clock in labels of {of} lies seconds from its clock kernels"
+        );
+        keys.refuse("sclk_start", expected);
+    }
+    if !spacecraft.has_laser() {
+        let expected = format!("the keys of the image instead: labels of {of} are not read");
+        keys.refuse("label", expected);
+    }
+}
+
+/// Pieces of line times follow each other, and nothing says otherwise beside them.
+fn of_pieces(image: &ImageConfig, keys: &mut Keys<'_, '_>) {
+    let Some(pieces) = &image.exposures else {
+        return;
+    };
+    for key in ["exposure_ms", "line_period_ms"] {
+        keys.refuse(
+            key,
+            "no such key beside images.exposures, which say it for every piece",
+        );
+    }
+    // Those of a label are held against them when it is read.
+    let Some(lines) = image.fields.lines_header else {
+        return;
+    };
+    match line_times_of(pieces, lines) {
+        Err(wrong) => {
+            let span = keys.span_of("exposures");
+            keys.review()
+                .problem(span, format!("images.exposures: {wrong}"));
+        }
+        Ok(times) if !(times.duration_s() < IMAGE_DURATION_END_S) => {
+            let expected = format!(
+                "less than {IMAGE_DURATION_END_S} s in all; these pieces take {:.1} s",
+                times.duration_s()
+            );
+            keys.refuse("exposures", expected);
+        }
+        Ok(_) => {}
     }
 }
 

@@ -10,6 +10,7 @@ use super::{
     problems::{Problems, Review},
 };
 use crate::{
+    constants::{SPACECRAFT, Spacecraft},
     geom::pushbroom::Distortion,
     instruments::{
         Altimeter, COEFFICIENTS_MAX, DetectorLine, DistortionModel, Instrument, LabelNames,
@@ -25,11 +26,21 @@ macro_rules! built_in {
     };
 }
 
-/// Files of cameras that the program knows; the first is that of images which name none.
+/// Files of cameras that the program knows; the first is that of images which name none, and those on its spacecraft
+/// stand before all others.
 const INSTRUMENTS: &[(&str, &str)] = &built_in![
     "instruments/moc_na.toml",
     "instruments/moc_wa_red.toml",
     "instruments/moc_wa_blue.toml",
+    "instruments/hrsc_nd.toml",
+    "instruments/hrsc_s1.toml",
+    "instruments/hrsc_s2.toml",
+    "instruments/hrsc_p1.toml",
+    "instruments/hrsc_p2.toml",
+    "instruments/hrsc_ir.toml",
+    "instruments/hrsc_gr.toml",
+    "instruments/hrsc_bl.toml",
+    "instruments/hrsc_re.toml",
 ];
 /// Files of altimeters that the program knows; the first is that of sites which name none.
 const ALTIMETERS: &[(&str, &str)] = &built_in!["altimeters/mola.toml", "altimeters/lola.toml"];
@@ -56,9 +67,16 @@ fn of_the_program<T>(read: Result<T, Problems>) -> T {
     read.unwrap_or_else(|problems| panic!("built with a bad file: {problems}"))
 }
 
-/// The cameras that the program knows.
+/// The cameras whose labels, files and archive the program reads: those on the spacecraft of the laser.
 #[must_use]
 pub fn built_in_instruments() -> &'static [Instrument] {
+    let own = CAMERAS.partition_point(|camera| camera.spacecraft.has_laser());
+    &CAMERAS[..own]
+}
+
+/// All cameras that the program knows, those on other spacecraft too.
+#[must_use]
+pub fn all_instruments() -> &'static [Instrument] {
     &CAMERAS
 }
 
@@ -95,7 +113,7 @@ pub(super) struct DataFile<T: 'static> {
 /// The camera of an image: one of the program's, or an instrument file.
 pub(super) const CAMERA: DataFile<Instrument> = DataFile {
     what: "an instrument file",
-    known: built_in_instruments,
+    known: all_instruments,
     id: |camera| &camera.id,
     read: instrument,
 };
@@ -165,20 +183,21 @@ pub fn instrument(text: &str, file: &Path) -> Result<Instrument, Problems> {
 }
 
 fn camera(top: &mut DataTable<'_>, review: &mut Review<'_>) -> Instrument {
+    let all = Spacecraft::all().iter();
+    let choices: Vec<(&str, &'static Spacecraft)> = all.map(|one| (&*one.id, one)).collect();
+    let spacecraft = top.optional_word(review, "spacecraft", &choices);
+    let spacecraft = spacecraft.unwrap_or(&SPACECRAFT);
     Instrument {
         id: top.text(review, "id"),
         name: top.text(review, "name"),
+        spacecraft,
         label: top.table(review, "label", |table, _, review| LabelNames {
             instrument: table.text(review, "instrument"),
             filter: table.optional_text(review, "filter"),
-            serial: table.text(review, "serial"),
+            serial: table.optional_text(review, "serial"),
         }),
-        naif: top.table(review, "naif", |table, _, review| NaifNames {
-            instrument: table.whole(review, "instrument", NAIF_IDS),
-            frame: table.text(review, "frame"),
-            bus: table.whole(review, "bus", NAIF_IDS),
-            bus_frame: table.text(review, "bus_frame"),
-            kernel: table.text(review, "kernel"),
+        naif: top.table(review, "naif", |table, _, review| {
+            naif(table, spacecraft, review)
         }),
         mounting: top.table(review, "mounting", mounting),
         optics: top.table(review, "optics", |table, _, review| Optics {
@@ -192,10 +211,62 @@ fn camera(top: &mut DataTable<'_>, review: &mut Review<'_>) -> Instrument {
             variable_codes: table.optional_counts(review, "variable_codes", 1_000),
         }),
         pointing: top.table(review, "pointing", |table, source, review| PointingTime {
-            ck_bias_s: table.number(review, "ck_bias_s", [-10.0, 10.0]),
+            ck_bias_s: ck_bias_s(table, spacecraft, review),
             source,
         }),
     }
+}
+
+/// Names and numbers of NAIF; the bus is that of the spacecraft.
+fn naif(
+    table: &mut DataTable<'_>,
+    spacecraft: &'static Spacecraft,
+    review: &mut Review<'_>,
+) -> NaifNames {
+    let instrument = table.whole(review, "instrument", NAIF_IDS);
+    let frame_id = table.optional_whole(review, "frame_id", NAIF_IDS);
+    let turn_deg = table.optional_number(review, "turn_deg", [-360.0, 360.0]);
+    let names = NaifNames {
+        instrument,
+        frame: table.text(review, "frame"),
+        frame_id: frame_id.unwrap_or(instrument),
+        turn_rad: turn_deg.unwrap_or(0.0) * RADIANS_PER_DEGREE,
+        bus: table.whole(review, "bus", NAIF_IDS),
+        bus_frame: table.text(review, "bus_frame"),
+        kernel: table.text(review, "kernel"),
+    };
+    let of_spacecraft = names.bus == spacecraft.bus && names.bus_frame == spacecraft.bus_frame;
+    if !of_spacecraft && !review.has_problems() {
+        let text = format!(
+            "naif.bus is {} and naif.bus_frame {}; expected {} and {}, those of {} (key spacecraft)",
+            names.bus, names.bus_frame, spacecraft.bus, spacecraft.bus_frame, spacecraft.full_name
+        );
+        review.problem(None, text);
+    }
+    names
+}
+
+/// The time correction of the attitude, which is that of the kernels of one spacecraft.
+fn ck_bias_s(
+    table: &mut DataTable<'_>,
+    spacecraft: &'static Spacecraft,
+    review: &mut Review<'_>,
+) -> f64 {
+    let bias_s = table.number(review, "ck_bias_s", [-10.0, 10.0]);
+    let max_s = spacecraft.ck_bias_max_s;
+    if bias_s.abs() > max_s {
+        let expected = if max_s > 0.0 {
+            format!("at most {max_s}")
+        } else {
+            "0: its attitude kernels need no time correction".to_owned()
+        };
+        let text = format!(
+            "pointing.ck_bias_s is {bias_s} of a camera on {}; expected {expected}",
+            spacecraft.full_name
+        );
+        review.problem(None, text);
+    }
+    bias_s
 }
 
 fn mounting(table: &mut DataTable<'_>, _source: String, review: &mut Review<'_>) -> Mounting {

@@ -9,6 +9,7 @@ mod adjustment;
 mod calibration;
 mod data_file;
 mod declare;
+mod exposures;
 mod forms;
 mod geojson;
 mod images;
@@ -51,10 +52,11 @@ pub use calibration::{
     calibration_schema, load_calibration, parse_calibration,
 };
 pub use declare::{Accept, DeclaredKey, ValueKind, Word};
+pub use exposures::{ExposurePiece, line_times_of};
 pub use images::ImageConfig;
 pub use instruments::{
-    altimeter, built_in_altimeters, built_in_instruments, instrument, usual_altimeter,
-    usual_instrument,
+    all_instruments, altimeter, built_in_altimeters, built_in_instruments, instrument,
+    usual_altimeter, usual_instrument,
 };
 pub use kernels::KernelsConfig;
 pub use limits::LimitsConfig;

@@ -12,6 +12,7 @@ use crate::{
     altimetry::MolaClock,
     body::Body,
     instruments::{Altimeter, Instrument},
+    kernel_source::KernelSource,
     time::PointingBias,
     wording::Wording,
 };
@@ -143,6 +144,7 @@ fn across_tables(site: &SiteConfig, keys: &mut Keys<'_, '_>) {
     other_bodies(site, keys);
     serial_numbers(keys);
     pointing_of_instruments(site, keys);
+    kernels_of_spacecraft(site, keys);
     if site.images.len() < 2 {
         keys.refuse("ties", "at least two images that tie points can join");
     }
@@ -253,7 +255,7 @@ fn other_bodies(site: &SiteConfig, keys: &mut Keys<'_, '_>) {
     }
     if site.images.iter().any(|image| image.isd.is_none()) {
         let text = format!(
-            "images on {body} need support data (images.isd): labels and kernels are read of Mars Global Surveyor alone"
+            "images on {body} need support data (images.isd): labels and kernels are read of spacecraft at Mars alone"
         );
         let span = keys.span_of("images");
         keys.review().problem(span, text);
@@ -273,6 +275,16 @@ fn pointing_of_instruments(site: &SiteConfig, keys: &mut Keys<'_, '_>) {
         if !told.insert(&*camera.id) {
             continue;
         }
+        let spacecraft = camera.spacecraft;
+        if used_s.abs() > spacecraft.ck_bias_max_s {
+            let expected = format!(
+                "no such key: it holds for all images of the site, and attitude kernels of {}, which carries {}, need no \
+                 time correction; that of another camera belongs in an instrument file of its own",
+                spacecraft.full_name, camera.name
+            );
+            keys.refuse_below("pointing", "ck_bias_s", expected);
+            continue;
+        }
         let known_s = camera.pointing.ck_bias_s;
         if has_turned_sign(used_s, known_s) {
             keys.refuse_below(
@@ -285,6 +297,23 @@ fn pointing_of_instruments(site: &SiteConfig, keys: &mut Keys<'_, '_>) {
                 ),
             );
         }
+    }
+}
+
+/// A folder of kernels is searched, and rival sets are weighed, for one spacecraft alone.
+fn kernels_of_spacecraft(site: &SiteConfig, keys: &mut Keys<'_, '_>) {
+    let key = match &site.kernels.source {
+        KernelSource::Listed(_) => return,
+        KernelSource::Root(_) => "root",
+        KernelSource::Sets(_) => "sets",
+    };
+    let mut cameras = cameras(&site.images).into_iter();
+    if let Some(camera) = cameras.find(|camera| !camera.spacecraft.has_laser()) {
+        let expected = format!(
+            "kernels.files or kernels.metakernel: kernels of {}, which carries {}, are not chosen by the program",
+            camera.spacecraft.full_name, camera.name
+        );
+        keys.refuse_below("kernels", key, expected);
     }
 }
 

@@ -1,5 +1,7 @@
 //! Which kernels a site uses, and for which times.
 
+use std::collections::BTreeMap;
+
 use super::RivalSet;
 use crate::{
     config::SiteConfig,
@@ -62,8 +64,13 @@ pub(super) fn required_coverage(
         trajectory_reach_s(&config.range_check, &config.mola_clock),
     );
     // Those of support data read no kernels.
-    let images = || images.iter().filter(|image| image.support.is_none());
-    let exposures = images().map(|image| image.exposures());
+    let images = || {
+        images
+            .iter()
+            .copied()
+            .filter(|image| image.support.is_none())
+    };
+    let has_laser = |image: &ImageTimes| image.instrument.spacecraft.has_laser();
     // No kernels have the spacecraft of tables.
     let flown = if config.shots.is_empty() {
         profiles
@@ -72,16 +79,37 @@ pub(super) fn required_coverage(
     };
     let flights = flown.iter().map(|profile| profile.interval.padded(reach_s));
     let light_time = config.orientation.light_time;
-    let positions =
-        exposures.map(|exposures| light_time.read_over(exposures.padded(kernels.padding_s)));
+    let position =
+        |image: &ImageTimes| light_time.read_over(image.exposures().padded(kernels.padding_s));
     // Within the tolerance a look-up reaches kernels that end before it or begin after it.
     let padding_s = kernels.padding_s + kernels.ck_tolerance_s;
-    let attitudes = images().map(|image| {
+    let attitude = |image: &ImageTimes| {
         let bias_s = config.pointing.bias_of(&image.instrument).seconds();
         image.exposures().shifted(bias_s).padded(padding_s)
-    });
+    };
+    let mut others: BTreeMap<String, RequiredCoverage> = BTreeMap::new();
+    for image in images().filter(|image| !has_laser(image)) {
+        let of = others.entry(image.instrument.spacecraft.id.clone());
+        let of = of.or_default();
+        of.positions = Intervals::union_of(
+            of.positions
+                .as_slice()
+                .iter()
+                .copied()
+                .chain([position(image)]),
+        );
+        of.attitudes = Intervals::union_of(
+            of.attitudes
+                .as_slice()
+                .iter()
+                .copied()
+                .chain([attitude(image)]),
+        );
+    }
+    let own = || images().filter(|image| has_laser(image));
     RequiredCoverage {
-        positions: Intervals::union_of(positions.chain(flights)),
-        attitudes: Intervals::union_of(attitudes),
+        positions: Intervals::union_of(own().map(position).chain(flights)),
+        attitudes: Intervals::union_of(own().map(attitude)),
+        others,
     }
 }

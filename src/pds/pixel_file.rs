@@ -99,7 +99,7 @@ impl Cause for PixelFileError {
             }
             Self::Short { .. } => "fetch or write the cube again: it is cut off",
             Self::Picture { .. } => {
-                "give a whole picture of one band of grey with 8, 16 or 32 bits a pixel, a TIFF without compression"
+                "give a whole picture of one band of grey with 8, 16 or 32 bits a pixel, a TIFF without compression, with LZW or with deflate"
             }
         }
         .to_owned()

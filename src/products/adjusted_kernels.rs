@@ -13,7 +13,7 @@ use super::{
 };
 use crate::{
     config::PointingConfig,
-    constants::{NAIF_MARS, SPACECRAFT},
+    constants::NAIF_MARS,
     error::{IoError, Locate, Result},
     geom::light_time::LightTime,
     spice::{EncodedCkSegment, Kernel, KernelSet, SpkSegment, write_encoded_ck, write_spk},
@@ -166,6 +166,7 @@ fn segment_name(image: &AdjustedImage) -> String {
 fn write_attitude(path: &Path, image: &AdjustedImage, comment: &str) -> Result<u64> {
     let tables = image.tables;
     let segment = EncodedCkSegment {
+        bus: image.times.instrument.spacecraft.bus,
         name: &segment_name(image),
         ticks: &tables.ticks,
         quaternions: &tables.quaternions,
@@ -179,7 +180,7 @@ fn write_attitude(path: &Path, image: &AdjustedImage, comment: &str) -> Result<u
 fn write_position(path: &Path, image: &AdjustedImage, comment: &str) -> Result<u64> {
     let tables = image.tables;
     let segment = SpkSegment {
-        target: SPACECRAFT.naif,
+        target: image.times.instrument.spacecraft.naif,
         centre: NAIF_MARS,
         name: &segment_name(image),
         degree: KernelTables::STATE_DEGREE,
@@ -217,8 +218,8 @@ fn comment(image: &AdjustedImage, to: &AdjustedKernels) -> String {
          Attitudes: J2000 to {bus_frame}. The attitude of an exposure at t stands at t {sign} {size:.3} s,\n\
          as in the kernels that this file replaces. {others}\n",
         id = times.id,
-        spacecraft = SPACECRAFT.name,
-        bus_frame = SPACECRAFT.bus_frame,
+        spacecraft = times.instrument.spacecraft.name,
+        bus_frame = times.instrument.spacecraft.bus_frame,
         version = env!("CARGO_PKG_VERSION"),
         exposed = times.exposures(),
         utc = times.utc_start,

@@ -34,7 +34,6 @@ use super::{
 };
 use crate::{
     body::Body,
-    constants::SPACECRAFT,
     error::Result,
     frames::{self, Frame, J2000},
     geom::{attitude::continuous_quaternions, pushbroom::Distortion},
@@ -108,7 +107,9 @@ fn isd<'a>(site: &SiteProducts<'a>, image: &ImageProducts<'a>, round: Round) -> 
         name_platform: times
             .support
             .as_ref()
-            .map_or(&SPACECRAFT.label_name, |support| &support.platform),
+            .map_or(&times.instrument.spacecraft.label_name, |support| {
+                &support.platform
+            }),
         name_sensor: &naif.frame,
         reference_height: ReferenceHeight {
             maxheight: REFERENCE_HEIGHT_M,

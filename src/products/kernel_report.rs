@@ -11,7 +11,7 @@ use super::{
     site::SiteProducts,
 };
 use crate::{
-    constants::SPACECRAFT, kernel_source::CkQuality, schema::DocumentSchema, spice::quality_of,
+    kernel_source::CkQuality, schema::DocumentSchema, spice::quality_of,
     stages::describe_kernels::KernelLine, time::Intervals,
 };
 
@@ -52,14 +52,16 @@ fn type_of(kernel: &KernelLine) -> String {
     }
 }
 
-/// The least of the qualities of the spacecraft's kernels of one type, in SpiceQL's words: commanded attitude
+/// By its key, the least of the qualities of a spacecraft's kernels of one type, in SpiceQL's words: commanded attitude
 /// is `predicted`, archived kernels are `reconstructed`, names that tell nothing give `noquality`.
-fn qualities(site: &SiteProducts) -> BTreeMap<&'static str, &'static str> {
+fn qualities(site: &SiteProducts) -> BTreeMap<String, &'static str> {
+    let ids = site.spacecraft_of_kernels().into_iter();
+    let ids: Vec<&str> = ids.map(|spacecraft| &*spacecraft.id).collect();
     let quality = |kernel: &&KernelLine| {
         let name = kernel.name.to_lowercase();
         if quality_of(Path::new(&name)) == CkQuality::Nominal {
             "predicted"
-        } else if name.starts_with(&format!("{}_", SPACECRAFT.id)) {
+        } else if ids.iter().any(|id| name.starts_with(&format!("{id}_"))) {
             "reconstructed"
         } else {
             "noquality"
@@ -70,9 +72,10 @@ fn qualities(site: &SiteProducts) -> BTreeMap<&'static str, &'static str> {
         let of_type = site.kernels.iter().filter(|line| type_of(line) == required);
         of_type.map(|kernel| quality(&kernel)).min()
     };
-    [("mgs_ck_quality", "ck"), ("mgs_spk_quality", "spk")]
-        .into_iter()
-        .filter_map(|(key, kind)| Some((key, least(kind)?)))
+    let keys = ids
+        .iter()
+        .flat_map(|id| ["ck", "spk"].map(|kind| (id, kind)));
+    keys.filter_map(|(id, kind)| Some((format!("{id}_{kind}_quality"), least(kind)?)))
         .collect()
 }
 
@@ -83,10 +86,14 @@ fn qualities(site: &SiteProducts) -> BTreeMap<&'static str, &'static str> {
     description = "exchange/kernels.json of areograph: kernel names by type and qualities as SpiceQL reports them; \
                    under areograph each kernel with size, hash and coverage.",
     extend("dependentRequired" = {
-        "ck": ["mgs_ck_quality"],
-        "spk": ["mgs_spk_quality"],
         "mgs_ck_quality": ["ck"],
         "mgs_spk_quality": ["spk"],
+        "mex_ck_quality": ["ck"],
+        "mex_spk_quality": ["spk"],
+    }),
+    extend("dependentSchemas" = {
+        "ck": {"anyOf": [{"required": ["mgs_ck_quality"]}, {"required": ["mex_ck_quality"]}]},
+        "spk": {"anyOf": [{"required": ["mgs_spk_quality"]}, {"required": ["mex_spk_quality"]}]},
     })
 )]
 struct Report<'a> {
@@ -108,6 +115,12 @@ pub(super) struct KernelsByType<'a> {
     ik: Option<Names<'a>>,
     #[serde(skip_serializing_if = "Option::is_none")]
     lsk: Option<Names<'a>>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("enum" = QUALITIES))]
+    mex_ck_quality: Option<&'static str>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("enum" = QUALITIES))]
+    mex_spk_quality: Option<&'static str>,
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(extend("enum" = QUALITIES))]
     mgs_ck_quality: Option<&'static str>,
@@ -169,14 +182,17 @@ fn report<'a>(site: &SiteProducts<'a>) -> Report<'a> {
         blake3: &kernel.blake3,
         coverage_et_s: kernel.held.as_ref().map(ends),
     };
+    let names = site.spacecraft_of_kernels().into_iter();
+    let names: Vec<&str> = names.map(|spacecraft| &*spacecraft.full_name).collect();
+    let [positions, attitudes] = site.required.of_all();
     let areograph = Extension {
         coverage: format!(
             "intervals of TDB seconds past J2000 in which the kernel holds {}: its position in an spk, its attitude in \
              a ck, whose gaps lie between the intervals",
-            SPACECRAFT.full_name
+            names.join(" or ")
         ),
-        wanted_positions_et_s: ends(&site.required.positions),
-        wanted_attitudes_et_s: ends(&site.required.attitudes),
+        wanted_positions_et_s: ends(&positions),
+        wanted_attitudes_et_s: ends(&attitudes),
         kernels: site.kernels.iter().map(entry).collect(),
     };
     Report {
@@ -196,6 +212,8 @@ pub(super) fn kernels_by_type<'a>(site: &SiteProducts<'a>) -> KernelsByType<'a> 
         iak: of_type("iak"),
         ik: of_type("ik"),
         lsk: of_type("lsk"),
+        mex_ck_quality: qualities.get("mex_ck_quality").copied(),
+        mex_spk_quality: qualities.get("mex_spk_quality").copied(),
         mgs_ck_quality: qualities.get("mgs_ck_quality").copied(),
         mgs_spk_quality: qualities.get("mgs_spk_quality").copied(),
         pck: of_type("pck"),

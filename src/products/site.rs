@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use super::error::ProductError;
 use crate::{
     config::{SiteConfig, UsedBias},
-    constants::SPACECRAFT,
+    constants::{SPACECRAFT, Spacecraft},
     error::Result,
     footprints::Footprints,
     frames::BodyFixed,
@@ -178,15 +178,37 @@ impl<'a> SiteProducts<'a> {
         ids.join(";")
     }
 
-    /// The spacecraft of footprints and images: that of the program, and those that support data name; where nothing names
+    /// The spacecraft that kernels are read of: that of the laser, where none of another one alone are needed, and others.
+    #[must_use]
+    pub fn spacecraft_of_kernels(&self) -> Vec<&'static Spacecraft> {
+        let required = self.required;
+        let own = required.others.is_empty() || !required.positions.as_slice().is_empty();
+        let others = required.others.keys();
+        let others = others.filter_map(|id| Spacecraft::of_id(id));
+        own.then_some(*SPACECRAFT)
+            .into_iter()
+            .chain(others)
+            .collect()
+    }
+
+    /// The spacecraft of footprints and images: those whose kernels are read, and those that support data name; where nothing names
     /// any, the altimeter.
     pub(super) fn spacecraft(&self) -> String {
         let supports = || self.images.iter().map(|image| &image.times.support);
         // Tables of shots do not name theirs.
         let searched = self.config.shots.is_empty() && !self.footprints.is_empty();
-        let own = searched || supports().any(Option::is_none);
         let mut names: Vec<&str> = Vec::new();
-        names.extend(own.then_some(&*SPACECRAFT.full_name));
+        names.extend(searched.then_some(&*SPACECRAFT.full_name));
+        for image in self
+            .images
+            .iter()
+            .filter(|image| image.times.support.is_none())
+        {
+            let name = &*image.times.instrument.spacecraft.full_name;
+            if !names.contains(&name) {
+                names.push(name);
+            }
+        }
         for support in supports().flatten() {
             let is_it = |name: &&str| name.eq_ignore_ascii_case(&support.platform);
             if !names.iter().any(is_it) {

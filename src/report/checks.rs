@@ -137,7 +137,6 @@ pub(super) fn limit(check: &Check) -> String {
 const fn section(kind: CheckKind) -> Option<&'static Section> {
     Some(match kind {
         CheckKind::Footprints => &selection::SECTION,
-        CheckKind::AdjustmentMade | CheckKind::Contradiction => return None,
         CheckKind::HeightAfter
         | CheckKind::HeightBefore
         | CheckKind::HeightOutliers
@@ -166,8 +165,10 @@ const fn section(kind: CheckKind) -> Option<&'static Section> {
         }
         CheckKind::Attitude => &timeline::SECTION,
         CheckKind::SkippedRecords => &notes::SECTION,
-        // Of nets, calibrations and matches, whose pages have no such sections.
-        CheckKind::HeldBackControl
+        // Of the whole, or of nets, calibrations and matches, whose pages have no such sections.
+        CheckKind::AdjustmentMade
+        | CheckKind::Contradiction
+        | CheckKind::HeldBackControl
         | CheckKind::OtherOrbits
         | CheckKind::PlaceKnown
         | CheckKind::HeightKnown

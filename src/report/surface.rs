@@ -93,8 +93,8 @@ fn made(site: &SiteProducts, account: &SurfaceAccount) -> String {
     );
     table.finish()
         + &paragraph(
-            "σ, matching: of one cell against the others, by the residuals of its match; what both images have common errors of \
-             is stated apart (σ, common, by the adjustment). Heights within the square that is compared share what they show.",
+            "σ, matching: of one cell against the others, by the residuals of its match. Errors that all heights share are stated \
+             apart (σ, common, by the adjustment). Neighbouring heights within the compared square are correlated.",
         )
 }
 

@@ -9,7 +9,6 @@ use super::{
     section::Section,
 };
 use crate::{
-    constants::SPACECRAFT,
     error::Result,
     products::SiteProducts,
     stages::describe_kernels::KernelLine,
@@ -74,9 +73,9 @@ fn missing_s(site: &SiteProducts, stretch: Interval) -> f64 {
 
 /// What is asked, merged where it lies close together, with room at both sides.
 fn stretches(site: &SiteProducts) -> Vec<Interval> {
-    let asked = [&site.required.positions, &site.required.attitudes];
+    let asked = site.required.of_all();
     let wide = asked
-        .into_iter()
+        .iter()
         .flat_map(Intervals::as_slice)
         .map(|interval| interval.padded(0.5 * APART_S));
     let merged = Intervals::union_of(wide);
@@ -99,9 +98,10 @@ struct Row {
 /// Rows of one stretch: position and attitude as a whole, then every kernel that holds some of it.
 fn rows(site: &SiteProducts, stretch: Interval) -> Vec<Row> {
     let mut rows = Vec::new();
+    let [positions, attitudes] = site.required.of_all();
     for (role, name, asked) in [
-        ("SPK", "position, all kernels", &site.required.positions),
-        ("CK", "attitude, all kernels", &site.required.attitudes),
+        ("SPK", "position, all kernels", &positions),
+        ("CK", "attitude, all kernels", &attitudes),
     ] {
         let within = Intervals::union_of([stretch]);
         let asked = asked.intersection(&within);
@@ -235,8 +235,11 @@ fn csv(rows: &[Row]) -> String {
 }
 
 fn table(site: &SiteProducts) -> String {
+    let names = site.spacecraft_of_kernels().into_iter();
+    let names: Vec<&str> = names.map(|spacecraft| &*spacecraft.name).collect();
+    let [positions, attitudes] = site.required.of_all();
     let mut table = Table::new(
-        &format!("Kernels with data of {}", SPACECRAFT.name),
+        &format!("Kernels with data of {}", names.join(" and ")),
         &[
             Column::Text("kernel"),
             Column::Text("role"),
@@ -256,8 +259,8 @@ fn table(site: &SiteProducts) -> String {
         let span = Interval::new(intervals[0].start, intervals[intervals.len() - 1].stop);
         let held_s = total_s(intervals);
         let asked = match &*kernel.role {
-            "CK" => &site.required.attitudes,
-            _ => &site.required.positions,
+            "CK" => &attitudes,
+            _ => &positions,
         };
         let used = Intervals::union_of(intervals.iter().copied()).intersection(asked);
         let used_s = total_s(used.as_slice());

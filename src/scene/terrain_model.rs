@@ -6,7 +6,7 @@ use std::{fs::File, io::BufWriter, path::Path};
 use rayon::prelude::*;
 use serde::Serialize;
 use tiff::{
-    encoder::{TiffEncoder, colortype::Gray32Float},
+    encoder::{Compression, DeflateLevel, TiffEncoder, colortype::Gray32Float},
     tags::Tag,
 };
 
@@ -165,7 +165,8 @@ fn encode(file: File, grid: &HeightGrid, heights_m: &[f32]) -> tiff::TiffResult<
         west_rad * RADIUS_M * LATITUDE_RAD.cos(),
         north_rad * RADIUS_M,
     ];
-    let mut encoder = TiffEncoder::new(BufWriter::new(file))?;
+    let compression = Compression::Deflate(DeflateLevel::Balanced);
+    let mut encoder = TiffEncoder::new(BufWriter::new(file))?.with_compression(compression);
     let mut image = encoder.new_image::<Gray32Float>(SIZE[1], SIZE[0])?;
     let tags = image.encoder();
     tags.write_tag(Tag::ModelPixelScaleTag, &[CELL_M, CELL_M, 0.0][..])?;

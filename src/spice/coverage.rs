@@ -8,11 +8,11 @@ use super::{
     daf,
     ffi::Cspice,
     kernels::KernelSet,
-    needs::{CLOCKS, explain},
+    needs::{clocks, explain},
     role::KernelRole,
 };
 use crate::{
-    constants::{NAIF_MARS, SPACECRAFT},
+    constants::{NAIF_MARS, Spacecraft},
     error::{Locate, Result},
     time::{Et, Interval, Intervals},
 };
@@ -20,14 +20,14 @@ use crate::{
 /// Positions of one body relative to each centre that some segment uses.
 type ByCentre = BTreeMap<i32, Vec<Interval>>;
 
-/// What the kernels of a session hold.
+/// What the kernels of a session hold of one spacecraft.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct Coverage {
-    /// When the position of MGS relative to Mars is known.
+    /// When the position of the spacecraft relative to Mars is known.
     pub spk: Intervals,
     /// When the attitude of the bus is known with its rates; time as the C-kernels count it.
     pub ck: Intervals,
-    /// For each kernel that holds MGS: its index in the set, and its own intervals.
+    /// For each kernel that holds the spacecraft: its index in the set, and its own intervals.
     pub per_kernel: Vec<(usize, Intervals)>,
     /// C-kernels with attitudes of the bus that have no rates, by their index: these are not read.
     #[serde(skip)]
@@ -37,11 +37,15 @@ pub struct Coverage {
 }
 
 impl Coverage {
-    /// What `set` holds, which `cspice` has loaded.
+    /// What `set`, which `cspice` has loaded, holds of `spacecraft`.
     ///
     /// # Errors
     /// [`super::SpiceError::Spice`] when a C-kernel cannot be read; [`super::SpiceError::MissingText`] without clock.
-    pub(super) fn of(set: &KernelSet, cspice: &Cspice) -> Result<Self> {
+    pub(super) fn of(
+        set: &KernelSet,
+        cspice: &Cspice,
+        spacecraft: &'static Spacecraft,
+    ) -> Result<Self> {
         let mut coverage = Self::default();
         let (mut of_spacecraft, mut of_mars) = (ByCentre::new(), ByCentre::new());
         let mut attitude = Vec::new();
@@ -53,26 +57,26 @@ impl Coverage {
                         let [target, centre, ..] = segment.integers;
                         let interval = interval_of([segment.start, segment.stop]);
                         let by_centre = match target {
-                            target if target == SPACECRAFT.naif => &mut of_spacecraft,
+                            target if target == spacecraft.naif => &mut of_spacecraft,
                             NAIF_MARS => &mut of_mars,
                             _ => continue,
                         };
                         by_centre.entry(centre).or_default().push(interval);
                         coverage.seams.extend([interval.start, interval.stop]);
-                        if target == SPACECRAFT.naif {
+                        if target == spacecraft.naif {
                             held.push(interval);
                         }
                     }
                 }
                 KernelRole::Ck => {
                     let windows = cspice
-                        .ck_coverage(&kernel.path, SPACECRAFT.bus)
-                        .map_err(|error| explain(set, error, &*CLOCKS))
+                        .ck_coverage(&kernel.path, spacecraft.bus)
+                        .map_err(|error| explain(set, error, &clocks(spacecraft)))
                         .in_file(&kernel.path)?;
                     held.extend(windows.into_iter().map(interval_of));
                     attitude.extend_from_slice(&held);
                     let mut segments = daf::segments(&kernel.path)?.into_iter();
-                    if segments.any(|segment| is_without_rates(&segment)) {
+                    if segments.any(|segment| is_without_rates(&segment, spacecraft.bus)) {
                         coverage.without_rates.push(index);
                     }
                 }
@@ -97,25 +101,39 @@ impl Coverage {
     }
 }
 
-/// Times for which kernels are needed.
+/// Times for which kernels of the spacecraft of the laser are needed, and of others.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct RequiredCoverage {
     /// Instants that ephemerides must touch.
     pub positions: Intervals,
     /// Instants that attitudes must touch, as the C-kernels count time: exposures with the pointing bias.
     pub attitudes: Intervals,
+    /// The same of other spacecraft, by their identifiers.
+    pub others: BTreeMap<String, RequiredCoverage>,
 }
 
-fn is_without_rates(segment: &daf::Segment) -> bool {
+impl RequiredCoverage {
+    /// When kernels of any spacecraft must hold positions and attitudes.
+    #[must_use]
+    pub fn of_all(&self) -> [Intervals; 2] {
+        let all = || std::iter::once(self).chain(self.others.values());
+        let union = |of: fn(&Self) -> &Intervals| {
+            Intervals::union_of(all().flat_map(|one| of(one).as_slice()).copied())
+        };
+        [union(|one| &one.positions), union(|one| &one.attitudes)]
+    }
+}
+
+fn is_without_rates(segment: &daf::Segment, bus: i32) -> bool {
     let [object, _, _, rates, ..] = segment.integers;
-    object == SPACECRAFT.bus && rates == 0
+    object == bus && rates == 0
 }
 
 pub(super) fn interval_of([start, stop]: [f64; 2]) -> Interval {
     Interval::new(Et::from_seconds(start), Et::from_seconds(stop))
 }
 
-/// When MGS relative to Mars follows: directly, or through a centre that both are known from.
+/// When the spacecraft relative to Mars follows: directly, or through a centre that both are known from.
 fn relative_to_mars(of_spacecraft: &ByCentre, of_mars: &ByCentre) -> Intervals {
     let mut known = Vec::new();
     for (centre, intervals) in of_spacecraft {

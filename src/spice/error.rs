@@ -1,7 +1,6 @@
 //! What can go wrong with kernels and with CSPICE.
 
 use crate::{
-    constants::SPACECRAFT,
     error::{Cause, Kind},
     time::{Et, Interval},
 };
@@ -87,10 +86,12 @@ pub enum SpiceError {
         problem: String,
     },
     /// Kernels do not hold what was asked.
-    #[error("no {what} of {} for {gap} ({gap_utc}), required for {required}; {neighbours}", SPACECRAFT.name)]
+    #[error("no {what} of {of} for {gap} ({gap_utc}), required for {required}; {neighbours}")]
     CoverageGap {
         /// `position` or `attitude`.
         what: &'static str,
+        /// The spacecraft.
+        of: String,
         /// The part that is missing.
         gap: Interval,
         /// The same in UTC.
@@ -101,8 +102,10 @@ pub enum SpiceError {
         neighbours: String,
     },
     /// No attitude sample near enough.
-    #[error("no attitude of {} within {tolerance_s} s of {kernel_time} (time of the C-kernel)", SPACECRAFT.name)]
+    #[error("no attitude of {of} within {tolerance_s} s of {kernel_time} (time of the C-kernel)")]
     NoAttitude {
+        /// The spacecraft.
+        of: String,
         /// Instant as the C-kernel counts time.
         kernel_time: Et,
         /// How far it was allowed to look.

@@ -2,13 +2,12 @@
 
 use super::{coverage::RequiredCoverage, error::SpiceError, role::KernelRole, session::Session};
 use crate::{
-    constants::SPACECRAFT,
     error::Result,
     time::{Et, Interval, Intervals, PointingBias},
 };
 
 impl Session {
-    /// For each kernel that holds MGS: its index in the set, and the required instants for which CSPICE reads
+    /// For each kernel that holds the spacecraft: its index in the set, and the required instants for which CSPICE reads
     /// it, because no later kernel of its role holds them.
     ///
     /// * `tolerance_s` – how far outside its intervals a C-kernel may be asked, seconds
@@ -36,7 +35,7 @@ impl Session {
         Ok(in_use)
     }
 
-    /// Makes sure that the position of MGS is known throughout `required`.
+    /// Makes sure that the position of the spacecraft is known throughout `required`.
     ///
     /// # Errors
     /// [`SpiceError::CoverageGap`] with the first gap and the kernels beside it.
@@ -82,12 +81,23 @@ impl Session {
         let neighbours = self.neighbours(gap, role)?;
         Err(SpiceError::CoverageGap {
             what,
+            of: self.whom(role),
             gap,
             gap_utc,
             required,
             neighbours,
         }
         .into())
+    }
+
+    /// The spacecraft, and its number where another one is meant than usual: files of several may be at hand.
+    pub(super) fn whom(&self, role: KernelRole) -> String {
+        let of = self.spacecraft();
+        match role {
+            _ if of.has_laser() => of.name.clone(),
+            KernelRole::Ck => format!("{} ({}, {})", of.name, of.bus, of.bus_frame),
+            _ => format!("{} ({})", of.name, of.naif),
+        }
     }
 
     /// Which kernels end before a gap and begin after it.
@@ -119,7 +129,7 @@ impl Session {
             sentences.push(format!(
                 "{} holds {} then, but no kernel links its centre to Mars",
                 name(index),
-                SPACECRAFT.name
+                self.spacecraft().name
             ));
         }
         if let Some((stop, index)) = before {

@@ -1,6 +1,6 @@
 //! What times and geometry need from text kernels, and how its absence is told.
 
-use std::{borrow::Cow, sync::LazyLock};
+use std::borrow::Cow;
 
 use super::{
     error::SpiceError,
@@ -8,7 +8,7 @@ use super::{
     role::KernelRole,
     text_kernel::{self, values_of},
 };
-use crate::{constants::SPACECRAFT, instruments::Instrument};
+use crate::{constants::Spacecraft, instruments::Instrument};
 
 /// Something that one text kernel of a set must define.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -29,40 +29,53 @@ pub(super) const LEAP_SECONDS: Need = Need {
     kernel: Cow::Borrowed("leap-second kernel (.tls)"),
     example: Cow::Borrowed("naif0012.tls"),
 };
-pub(super) static CLOCK: LazyLock<Need> = LazyLock::new(|| Need {
-    variable: format!("SCLK_DATA_TYPE_{}", SPACECRAFT.naif.unsigned_abs()).into(),
-    what: format!("the {} clock", SPACECRAFT.name).into(),
-    kernel: format!("spacecraft clock kernel of {} (.tsc)", SPACECRAFT.name).into(),
-    example: Cow::Borrowed(&SPACECRAFT.clock_kernel),
-});
+/// The clock of a spacecraft.
+pub(super) fn clock(of: &'static Spacecraft) -> Need {
+    Need {
+        variable: format!("SCLK_DATA_TYPE_{}", of.naif.unsigned_abs()).into(),
+        what: format!("the {} clock", of.name).into(),
+        kernel: format!("spacecraft clock kernel of {} (.tsc)", of.name).into(),
+        example: Cow::Borrowed(&of.clock_kernel),
+    }
+}
 pub(super) const MARS: Need = Need {
     variable: Cow::Borrowed("BODY499_PM"),
     what: Cow::Borrowed("the rotation of Mars"),
     kernel: Cow::Borrowed("planetary constants kernel (.tpc)"),
     example: Cow::Borrowed("pck00010.tpc"),
 };
-pub(super) static BUS_FRAME: LazyLock<Need> = LazyLock::new(|| Need {
-    variable: format!("FRAME_{}_NAME", SPACECRAFT.bus).into(),
-    what: format!("the frame of the {} bus", SPACECRAFT.name).into(),
-    kernel: format!(
-        "kernel that defines the frame {} (.tsc or .tf)",
-        SPACECRAFT.bus_frame
-    )
-    .into(),
-    example: Cow::Borrowed(&SPACECRAFT.clock_kernel),
-});
+/// The frame of the bus of a spacecraft.
+pub(super) fn bus_frame(of: &'static Spacecraft) -> Need {
+    Need {
+        variable: format!("FRAME_{}_NAME", of.bus).into(),
+        what: format!("the frame of the {} bus", of.name).into(),
+        kernel: format!(
+            "kernel that defines the frame {} (.tsc or .tf)",
+            of.bus_frame
+        )
+        .into(),
+        example: Cow::Borrowed(&of.frame_kernel),
+    }
+}
 /// The frame of a camera.
 pub(super) fn camera_frame(instrument: &Instrument) -> Need {
+    let naif = &instrument.naif;
     Need {
-        variable: format!("FRAME_{}_NAME", instrument.naif.instrument).into(),
+        variable: format!("FRAME_{}_NAME", naif.frame_id).into(),
         what: format!("the frame of the {} camera", instrument.name).into(),
-        kernel: format!("instrument kernel of {} (.ti)", instrument.name).into(),
+        kernel: if naif.frame_id == naif.instrument {
+            format!("instrument kernel of {} (.ti)", instrument.name).into()
+        } else {
+            format!("kernel that defines the frame {} (.tf or .ti)", naif.frame).into()
+        },
         example: instrument.naif.kernel.clone().into(),
     }
 }
 
 /// What clock strings and attitude need.
-pub(super) static CLOCKS: LazyLock<[Need; 2]> = LazyLock::new(|| [LEAP_SECONDS, CLOCK.clone()]);
+pub(super) fn clocks(of: &'static Spacecraft) -> [Need; 2] {
+    [LEAP_SECONDS, clock(of)]
+}
 
 /// An error of CSPICE, or the kernel whose absence explains it: the first of `needs` that no text
 /// kernel of `set` defines.

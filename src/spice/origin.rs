@@ -50,16 +50,17 @@ pub(super) fn of_spacecraft(set: &KernelSet, et: Et) -> Option<PathBuf> {
     found.map(|kernel| kernel.path.clone())
 }
 
-/// The interval of attitude that CSPICE reads at `kernel_time`, or within `reach_s` seconds of it.
+/// The interval of attitude of `bus` that CSPICE reads at `kernel_time`, or within `reach_s` seconds of it.
 pub(super) fn of_attitude(
     set: &KernelSet,
     cspice: &Cspice,
+    bus: i32,
     kernel_time: Et,
     reach_s: f64,
 ) -> Option<Origin> {
     let cks = set.kernels().iter().rev();
     for kernel in cks.filter(|kernel| kernel.role == KernelRole::Ck) {
-        let intervals = cspice.ck_coverage(&kernel.path, SPACECRAFT.bus).ok()?;
+        let intervals = cspice.ck_coverage(&kernel.path, bus).ok()?;
         let mut parts = intervals.into_iter().map(interval_of);
         if let Some(part) = parts.find(|part| part.padded(reach_s).contains(kernel_time)) {
             let path = kernel.path.clone();

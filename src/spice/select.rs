@@ -11,7 +11,7 @@ use super::{
     daf::{self, Segment},
     error::SpiceError,
     kernels::{KernelSet, read_text, role_of},
-    needs::{BUS_FRAME, CLOCK, LEAP_SECONDS, MARS, Need, camera_frame},
+    needs::{LEAP_SECONDS, MARS, Need, bus_frame, camera_frame, clock},
     role::KernelRole,
     session::Session,
     text_kernel::{self, Assignment, values_of},
@@ -31,8 +31,14 @@ const DEPTH_MAX: usize = 16;
 /// Most files that are looked into.
 const FILES_MAX: usize = 100_000;
 /// What time tagging and geometry need from text kernels, but for the frame of the camera.
-static NEEDS: LazyLock<[Need; 4]> =
-    LazyLock::new(|| [LEAP_SECONDS, CLOCK.clone(), MARS, BUS_FRAME.clone()]);
+static NEEDS: LazyLock<[Need; 4]> = LazyLock::new(|| {
+    [
+        LEAP_SECONDS,
+        clock(&SPACECRAFT),
+        MARS,
+        bus_frame(&SPACECRAFT),
+    ]
+});
 /// Orbit solutions that mark their files by name; a file without a mark is `nav`.
 const MARKED_FAMILIES: [&str; 2] = ["gsfc", "ipng"];
 
@@ -315,7 +321,7 @@ fn select_attitudes(
         for path in of_quality {
             let name = file_name(path);
             let held = session
-                .cspice
+                .cspice()
                 .ck_coverage(path, SPACECRAFT.bus)
                 .in_file(path)?;
             let hull = held.first().zip(held.last());

@@ -1,6 +1,11 @@
 //! A session with CSPICE: times, states and attitudes from one set of kernels.
 
-use std::{cell::OnceCell, ffi::CString};
+use std::{
+    cell::{OnceCell, RefCell},
+    collections::BTreeMap,
+    ffi::CString,
+    rc::Rc,
+};
 
 use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
@@ -10,14 +15,16 @@ use super::{
     error::SpiceError,
     ffi::{Cspice, Rows, StateKm},
     kernels::KernelSet,
-    needs::{BUS_FRAME, CLOCKS, LEAP_SECONDS, Need, camera_frame, explain},
+    needs::{LEAP_SECONDS, Need, bus_frame, camera_frame, clocks, explain},
     origin::{self, Origin, all_finite},
+    role::KernelRole,
 };
 use crate::{
     body::Body,
-    constants::{NAIF_MARS, NAIF_SOLAR_SYSTEM_BARYCENTRE, NAIF_SUN, SPACECRAFT},
+    constants::{NAIF_MARS, NAIF_SOLAR_SYSTEM_BARYCENTRE, NAIF_SUN, SPACECRAFT, Spacecraft},
     error::{Error, Locate, Result},
     frames::{CameraFrame, J2000, Position, Rotation, SpacecraftBus},
+    geom::body_rotation::frame_rotation_3,
     instruments::Instrument,
     time::{CkLookup, Et},
     units::METRES_PER_KM,
@@ -59,7 +66,8 @@ pub struct Attitude {
 /// The only way to CSPICE: holds the process-wide lock and one set of loaded kernels.
 ///
 /// A second session on another thread waits for this one to end; on the same thread it is refused.
-/// Kernels are unloaded when the session goes.
+/// Kernels are unloaded when the session goes. Clock, orbit and attitude are those of one spacecraft, that of the laser
+/// unless [`Session::of`] says otherwise.
 ///
 /// ```
 /// use std::path::Path;
@@ -76,9 +84,17 @@ pub struct Attitude {
 /// ```
 #[derive(Debug)]
 pub struct Session {
-    pub(super) cspice: Cspice,
+    loaded: Rc<Loaded>,
+    spacecraft: &'static Spacecraft,
+    coverage: Rc<OnceCell<Coverage>>,
+}
+
+/// CSPICE with its kernels, and what they hold of every spacecraft that was asked for.
+#[derive(Debug)]
+struct Loaded {
+    cspice: Cspice,
     kernels: KernelSet,
-    coverage: OnceCell<Coverage>,
+    coverages: RefCell<BTreeMap<i32, Rc<OnceCell<Coverage>>>>,
 }
 
 impl Session {
@@ -91,11 +107,39 @@ impl Session {
         for kernel in kernels.kernels() {
             cspice.furnish(&kernel.path).in_file(&kernel.path)?;
         }
-        Ok(Self {
+        let loaded = Loaded {
             cspice,
             kernels: kernels.clone(),
-            coverage: OnceCell::new(),
-        })
+            coverages: RefCell::default(),
+        };
+        Ok(Self::view(Rc::new(loaded), &SPACECRAFT))
+    }
+
+    fn view(loaded: Rc<Loaded>, spacecraft: &'static Spacecraft) -> Self {
+        let mut coverages = loaded.coverages.borrow_mut();
+        let coverage = Rc::clone(coverages.entry(spacecraft.naif).or_default());
+        drop(coverages);
+        Self {
+            loaded,
+            spacecraft,
+            coverage,
+        }
+    }
+
+    /// The same session for the clock, orbit and attitude of `spacecraft`.
+    #[must_use]
+    pub fn of(&self, spacecraft: &'static Spacecraft) -> Self {
+        Self::view(Rc::clone(&self.loaded), spacecraft)
+    }
+
+    /// The spacecraft whose clock, orbit and attitude are read.
+    #[must_use]
+    pub const fn spacecraft(&self) -> &'static Spacecraft {
+        self.spacecraft
+    }
+
+    pub(super) fn cspice(&self) -> &Cspice {
+        &self.loaded.cspice
     }
 
     /// The version of CSPICE, for example `CSPICE_N0067`.
@@ -108,11 +152,11 @@ impl Session {
 
     /// The kernels of this session.
     #[must_use]
-    pub const fn kernels(&self) -> &KernelSet {
-        &self.kernels
+    pub fn kernels(&self) -> &KernelSet {
+        &self.loaded.kernels
     }
 
-    /// Coverage of all loaded kernels, at the level of intervals.
+    /// What all loaded kernels hold of the spacecraft, at the level of intervals.
     ///
     /// # Errors
     /// [`SpiceError::Spice`] when a C-kernel cannot be read; [`SpiceError::MissingText`] without clock.
@@ -120,13 +164,13 @@ impl Session {
         if let Some(coverage) = self.coverage.get() {
             return Ok(coverage);
         }
-        let coverage = Coverage::of(&self.kernels, &self.cspice)?;
+        let coverage = Coverage::of(self.kernels(), self.cspice(), self.spacecraft)?;
         Ok(self.coverage.get_or_init(|| coverage))
     }
 
     /// An error of CSPICE, or the absence of a kernel that explains it.
     fn explain(&self, error: SpiceError, needs: &[Need]) -> SpiceError {
-        explain(&self.kernels, error, needs)
+        explain(self.kernels(), error, needs)
     }
 
     /// Instant of a UTC string such as `1999-08-24T14:12:13.64`, with or without a closing `Z`.
@@ -136,7 +180,7 @@ impl Session {
     pub fn utc_to_et(&self, utc: &str) -> Result<Et> {
         let utc = utc.trim();
         let seconds = self
-            .cspice
+            .cspice()
             .utc_to_et(utc.strip_suffix('Z').unwrap_or(utc))
             .map_err(|error| self.explain(error, &[LEAP_SECONDS]))?;
         Ok(Et::from_seconds(seconds))
@@ -155,42 +199,42 @@ impl Session {
     /// # Errors
     /// [`SpiceError::MissingText`] without a leap-second kernel.
     pub fn et_to_utc_with(&self, et: Et, decimals: u8) -> Result<String> {
-        let utc = self.cspice.et_to_utc(et.seconds(), decimals);
+        let utc = self.cspice().et_to_utc(et.seconds(), decimals);
         Ok(utc.map_err(|error| self.explain(error, &[LEAP_SECONDS]))?)
     }
 
-    /// Instant of a spacecraft clock string of MGS, such as `619971158:28` or `1/0844996544.086`.
+    /// Instant of a string of the spacecraft's clock, such as `619971158:28` or `1/0844996544.086`.
     ///
     /// # Errors
     /// [`SpiceError::Spice`] when the string is no clock reading; [`SpiceError::MissingText`].
     pub fn sclk_to_et(&self, sclk: &str) -> Result<Et> {
-        let seconds = self.cspice.sclk_to_et(SPACECRAFT.naif, sclk.trim());
-        let seconds = seconds.map_err(|error| self.explain(error, &*CLOCKS))?;
+        let seconds = self.cspice().sclk_to_et(self.spacecraft.naif, sclk.trim());
+        let seconds = seconds.map_err(|error| self.explain(error, &clocks(self.spacecraft)))?;
         Ok(Et::from_seconds(seconds))
     }
 
-    /// Spacecraft clock string of MGS, with partition, rounded to 1/256 s.
+    /// String of the spacecraft's clock, with partition, rounded to a tick.
     ///
     /// # Errors
     /// [`SpiceError::Spice`] outside the clock kernel's range; [`SpiceError::MissingText`].
     pub fn et_to_sclk(&self, et: Et) -> Result<String> {
-        let sclk = self.cspice.et_to_sclk(SPACECRAFT.naif, et.seconds());
-        Ok(sclk.map_err(|error| self.explain(error, &*CLOCKS))?)
+        let sclk = self.cspice().et_to_sclk(self.spacecraft.naif, et.seconds());
+        Ok(sclk.map_err(|error| self.explain(error, &clocks(self.spacecraft)))?)
     }
 
-    /// Geometric state of MGS relative to Mars: no light time, no aberration.
+    /// Geometric state of the spacecraft relative to Mars: no light time, no aberration.
     ///
     /// # Errors
     /// [`SpiceError::Spice`], of kind coverage when the kernels do not reach there;
     /// [`SpiceError::NotFinite`] with the kernel that holds NaN or an infinity.
     pub fn state(&self, et: Et) -> Result<State> {
         let state = self
-            .cspice
-            .geometric_state(SPACECRAFT.naif, et.seconds(), NAIF_MARS)?;
-        self.finite("position or velocity", &SPACECRAFT.name, et, state)
+            .cspice()
+            .geometric_state(self.spacecraft.naif, et.seconds(), NAIF_MARS)?;
+        self.finite("position or velocity", &self.spacecraft.name, et, state)
     }
 
-    /// State of MGS as seen from the centre of Mars, corrected for light time and aberration (`LT+S`).
+    /// State of the spacecraft as seen from the centre of Mars, corrected for light time and aberration (`LT+S`).
     ///
     /// The geometry takes it only where a run follows the convention of ISIS and ALE.
     ///
@@ -198,9 +242,14 @@ impl Session {
     /// As [`Self::state`].
     pub fn apparent_state(&self, et: Et) -> Result<State> {
         let state = self
-            .cspice
-            .apparent_state(SPACECRAFT.naif, et.seconds(), NAIF_MARS)?;
-        self.finite("apparent position or velocity", &SPACECRAFT.name, et, state)
+            .cspice()
+            .apparent_state(self.spacecraft.naif, et.seconds(), NAIF_MARS)?;
+        self.finite(
+            "apparent position or velocity",
+            &self.spacecraft.name,
+            et,
+            state,
+        )
     }
 
     /// Geometric state of Mars relative to the barycentre of the solar system.
@@ -209,7 +258,7 @@ impl Session {
     /// As [`Self::state`].
     pub fn mars_state(&self, et: Et) -> Result<State> {
         let state =
-            self.cspice
+            self.cspice()
                 .geometric_state(NAIF_MARS, et.seconds(), NAIF_SOLAR_SYSTEM_BARYCENTRE)?;
         self.finite("position or velocity", "Mars", et, state)
     }
@@ -220,7 +269,7 @@ impl Session {
     /// As [`Self::state`].
     pub fn sun_state(&self, et: Et) -> Result<State> {
         let state = self
-            .cspice
+            .cspice()
             .apparent_state(NAIF_SUN, et.seconds(), NAIF_MARS)?;
         self.finite("apparent position or velocity", "the Sun", et, state)
     }
@@ -233,7 +282,7 @@ impl Session {
         if finite {
             return Ok(state);
         }
-        let origin = origin::of_state(&self.kernels, &self.cspice, et);
+        let origin = origin::of_state(self.kernels(), self.cspice(), et);
         Err(self.not_finite(format!("{what} of {of}"), et, origin))
     }
 
@@ -266,9 +315,10 @@ impl Session {
         let ticks = self.et_to_ticks(kernel_time)?;
         let ticks_per_s = self.et_to_ticks(kernel_time.plus(1.0))? - ticks;
         let pointing = self
-            .cspice
-            .pointing(SPACECRAFT.bus, ticks, tolerance_s * ticks_per_s)?
-            .ok_or(SpiceError::NoAttitude {
+            .cspice()
+            .pointing(self.spacecraft.bus, ticks, tolerance_s * ticks_per_s)?
+            .ok_or_else(|| SpiceError::NoAttitude {
+                of: self.whom(KernelRole::Ck),
                 kernel_time,
                 tolerance_s,
             })?;
@@ -276,8 +326,10 @@ impl Session {
         let rates = &pointing.angular_velocity_rad_s;
         if !(all_finite(rows) && all_finite(rates) && pointing.ticks.is_finite()) {
             let reach_s = tolerance_s.max(0.0);
-            let origin = origin::of_attitude(&self.kernels, &self.cspice, kernel_time, reach_s);
-            let what = format!("attitude of {} or its rate", SPACECRAFT.name);
+            let bus = self.spacecraft.bus;
+            let (set, cspice) = (self.kernels(), self.cspice());
+            let origin = origin::of_attitude(set, cspice, bus, kernel_time, reach_s);
+            let what = format!("attitude of {} or its rate", self.spacecraft.name);
             return Err(self.not_finite(what, kernel_time, origin));
         }
         Ok(Attitude {
@@ -287,16 +339,18 @@ impl Session {
         })
     }
 
-    /// Encoded clock of MGS, ticks of 1/256 s.
+    /// Encoded clock of the spacecraft, ticks.
     ///
     /// # Errors
     /// As [`Self::et_to_sclk`].
     pub fn et_to_ticks(&self, et: Et) -> Result<f64> {
-        let ticks = self.cspice.et_to_ticks(SPACECRAFT.naif, et.seconds());
-        Ok(ticks.map_err(|error| self.explain(error, &*CLOCKS))?)
+        let ticks = self
+            .cspice()
+            .et_to_ticks(self.spacecraft.naif, et.seconds());
+        Ok(ticks.map_err(|error| self.explain(error, &clocks(self.spacecraft)))?)
     }
 
-    /// Mounting of `instrument` as the loaded kernels have it.
+    /// Mounting of `instrument` as the loaded kernels have it, turned to its camera axes.
     ///
     /// # Errors
     /// [`SpiceError::MissingText`] when no loaded kernel defines the two frames.
@@ -308,15 +362,17 @@ impl Session {
         let [bus, camera] = [&instrument.naif.bus_frame, &instrument.naif.frame]
             // A name with a zero byte is cut there, and then no kernel defines it.
             .map(|name| CString::new(name.split('\0').next().unwrap_or_default()));
+        let needs = [camera_frame(instrument), bus_frame(instrument.spacecraft)];
         let rows = self
-            .cspice
+            .cspice()
             .frame_matrix(
                 &bus.unwrap_or_default(),
                 &camera.unwrap_or_default(),
                 et.seconds(),
             )
-            .map_err(|error| self.explain(error, &[camera_frame(instrument), BUS_FRAME.clone()]))?;
-        Ok(Rotation::new(matrix(&rows), et))
+            .map_err(|error| self.explain(error, &needs))?;
+        let turn = frame_rotation_3(instrument.naif.turn_rad);
+        Ok(Rotation::new(turn * matrix(&rows), et))
     }
 
     /// Matrix from J2000 to the frame of `body` in the loaded planetary constants, to tell which report they follow.
@@ -326,7 +382,7 @@ impl Session {
     pub fn body_matrix(&self, body: Body, et: Et) -> Result<Matrix3<f64>> {
         // The name is one of the program's own.
         let frame = CString::new(&*body.naif().pck_frame).unwrap_or_default();
-        let rows = self.cspice.frame_matrix(c"J2000", &frame, et.seconds())?;
+        let rows = self.cspice().frame_matrix(c"J2000", &frame, et.seconds())?;
         Ok(matrix(&rows))
     }
 }

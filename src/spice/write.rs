@@ -14,7 +14,6 @@ use super::{
     session::{Session, State},
 };
 use crate::{
-    constants::SPACECRAFT,
     error::{IoError, Locate, Result},
     time::Et,
     units::METRES_PER_KM,
@@ -43,7 +42,7 @@ pub struct SpkSegment<'a> {
     pub states: &'a [State],
 }
 
-/// Linearly interpolated attitudes with rates (CK type 3) of the MGS bus, base frame J2000.
+/// Linearly interpolated attitudes with rates (CK type 3) of the bus of the session's spacecraft, base frame J2000.
 #[derive(Debug, Clone, Copy)]
 pub struct CkSegment<'a> {
     /// Name of the segment, at most 40 characters.
@@ -61,6 +60,8 @@ pub struct CkSegment<'a> {
 /// The same with instants encoded by the spacecraft clock, which takes no kernel to write.
 #[derive(Debug, Clone, Copy)]
 pub struct EncodedCkSegment<'a> {
+    /// NAIF id of the bus whose attitudes they are.
+    pub bus: i32,
     /// Name of the segment, at most 40 characters.
     pub name: &'a str,
     /// Encoded clock of every attitude, increasing.
@@ -125,13 +126,19 @@ pub fn write_ck(
     }
     let encoded = segments.iter().zip(&encoded);
     let encoded = encoded.map(|(segment, (ticks, starts))| EncodedCkSegment {
+        bus: session.spacecraft().bus,
         name: segment.name,
         ticks,
         quaternions: segment.quaternions,
         angular_velocities_rad_s: segment.angular_velocities_rad_s,
         interval_starts: starts,
     });
-    fill_ck(&session.cspice, path, &encoded.collect::<Vec<_>>(), comment)
+    fill_ck(
+        session.cspice(),
+        path,
+        &encoded.collect::<Vec<_>>(),
+        comment,
+    )
 }
 
 /// Writes a new CK whose instants are encoded already.
@@ -167,7 +174,7 @@ fn fill_ck(
                 rates_rad_s: segment.angular_velocities_rad_s,
                 starts: segment.interval_starts,
             };
-            cspice.write_ck_3(handle, SPACECRAFT.bus, &columns)?;
+            cspice.write_ck_3(handle, segment.bus, &columns)?;
         }
         Ok(())
     })

@@ -1,11 +1,12 @@
 //! What each kernel holds and what the site uses of it, for the manifest and the report.
 
-use std::sync::atomic::AtomicBool;
+use std::{collections::BTreeSet, sync::atomic::AtomicBool};
 
 use serde::{Deserialize, Serialize};
 
 use crate::{
     body::Body,
+    constants::{SPACECRAFT, Spacecraft},
     error::Result,
     geom::{attitude::rotation_vector, body_rotation::body_rotation},
     spice::{KernelView, RequiredCoverage, Session},
@@ -41,7 +42,8 @@ pub struct KernelLine {
     pub bytes: u64,
     /// BLAKE3 of its bytes, hexadecimal.
     pub blake3: String,
-    /// When it holds MGS itself, its position in an SPK, its attitude in a CK; `None` for other kernels.
+    /// When it holds a spacecraft of the site itself, its position in an SPK, its attitude in a CK; `None` for other
+    /// kernels.
     pub held: Option<Intervals>,
     /// Which of the required intervals are read from this kernel: where several hold an instant, the last one is.
     pub used: Vec<Interval>,
@@ -71,6 +73,7 @@ impl Input for Required<'_> {
             Some(required) => {
                 inputs.setting(&format!("{field} positions"), &required.positions);
                 inputs.setting(&format!("{field} attitudes"), &required.attitudes);
+                inputs.setting(&format!("{field} others"), &required.others);
             }
             None => inputs.not_known_yet(&format!("key {field}"), &format!("key {field}")),
         }
@@ -79,7 +82,7 @@ impl Input for Required<'_> {
 
 impl Stage for DescribeKernels<'_> {
     const NAME: &'static str = "describe_kernels";
-    const METHOD: u32 = 2;
+    const METHOD: u32 = 3;
     type Output = KernelDescription;
     stage_inputs!(fingerprint);
 
@@ -107,12 +110,19 @@ pub fn describe_kernels(
     required: &RequiredCoverage,
     ck_tolerance_s: f64,
 ) -> Result<KernelDescription> {
-    let in_use = session.coverage_in_use(required, ck_tolerance_s)?;
-    let held = &session.coverage()?.per_kernel;
+    let (mut in_use, mut held) = (Vec::new(), Vec::new());
+    let mut without_rates = BTreeSet::new();
+    for (spacecraft, required) in by_spacecraft(required) {
+        let session = session.of(spacecraft);
+        in_use.extend(session.coverage_in_use(required, ck_tolerance_s)?);
+        held.extend_from_slice(&session.coverage()?.per_kernel);
+        without_rates.extend(session.coverage()?.without_rates.iter().copied());
+    }
     let of = |entries: &[(usize, Intervals)], index: usize| {
-        let mut entries = entries.iter();
-        let entry = entries.find(|(of, _)| *of == index);
-        entry.map(|(_, intervals)| intervals.clone())
+        let entries = entries.iter().filter(|(of, _)| *of == index);
+        let intervals: Vec<&Intervals> = entries.map(|(_, intervals)| intervals).collect();
+        let all = intervals.iter().flat_map(|of| of.as_slice()).copied();
+        (!intervals.is_empty()).then(|| Intervals::union_of(all))
     };
     let kernels = session.kernels().kernels().iter().enumerate();
     let kernels = kernels.map(|(index, kernel)| KernelLine {
@@ -120,28 +130,39 @@ pub fn describe_kernels(
         role: kernel.role.to_string(),
         bytes: kernel.bytes,
         blake3: kernel.blake3.clone(),
-        held: of(held, index),
+        held: of(&held, index),
         used: of(&in_use, index).map_or_else(Vec::new, |used| used.as_slice().to_vec()),
     });
     Ok(KernelDescription {
         kernels: kernels.collect(),
-        pck_note: pck_note(body, session, &required.positions),
-        rates_note: rates_note(session)?,
+        pck_note: pck_note(body, session, &required.of_all()[0]),
+        rates_note: rates_note(session, &without_rates),
     })
 }
 
 /// CSPICE passes over attitudes without rates as if they were not there; whoever loads them should know.
-fn rates_note(session: &Session) -> Result<Option<String>> {
+fn rates_note(session: &Session, without: &BTreeSet<usize>) -> Option<String> {
     let kernels = session.kernels().kernels();
-    let without = session.coverage()?.without_rates.iter();
-    let names: Vec<String> = without.map(|index| kernels[*index].file_name()).collect();
-    Ok((!names.is_empty()).then(|| {
+    let names: Vec<String> = without
+        .iter()
+        .map(|index| kernels[*index].file_name())
+        .collect();
+    (!names.is_empty()).then(|| {
         format!(
             "{}: attitudes without angular rates, which are not read; where another C-kernel reaches, its attitude is \
              taken",
             names.join(", ")
         )
-    }))
+    })
+}
+
+/// What the site reads of each spacecraft; that of the laser comes first, whether it is read or not.
+fn by_spacecraft(
+    required: &RequiredCoverage,
+) -> impl Iterator<Item = (&'static Spacecraft, &RequiredCoverage)> {
+    let others = required.others.iter();
+    let others = others.filter_map(|(id, of)| Some((Spacecraft::of_id(id)?, of)));
+    std::iter::once((*SPACECRAFT, required)).chain(others)
 }
 
 /// Products use their own formula whatever the PCK says; whoever loads `kernels.tm` should know.

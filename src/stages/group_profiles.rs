@@ -63,6 +63,7 @@ stage_inputs! {
 
 impl Stage for GroupProfiles<'_> {
     const NAME: &'static str = "group_profiles";
+    const METHOD: u32 = 2;
     const CHECKED: bool = true;
     type Output = Vec<Profile>;
     stage_inputs!(fingerprint);
@@ -128,6 +129,8 @@ fn profile(
     let simultaneous = images
         .iter()
         .enumerate()
+        // The laser is not where the kernels of another spacecraft are.
+        .filter(|(_, image)| image.support.is_some() || image.has_laser())
         .filter_map(|(index, image)| {
             let exposures = image.exposures();
             let before = rows.partition_point(|row| time(row) < exposures.start);

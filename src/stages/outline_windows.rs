@@ -77,8 +77,9 @@ impl OutlineWindows<'_> {
             let nodes = Nodes::new(&CameraTables::of_support(&support.tables));
             return GroundPoint::outline(times, |et| Ok(nodes.camera(et)));
         }
+        let session = self.kernels.session()?.of(times.instrument.spacecraft);
         let reader = CameraReader {
-            session: self.kernels.session()?,
+            session: &session,
             instrument: &times.instrument,
             bias: self.pointing.bias_of(&times.instrument),
             tolerance_s: self.coverage.ck_tolerance_s,

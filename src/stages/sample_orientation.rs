@@ -127,6 +127,7 @@ pub fn sample_orientation(
     pointing: &PointingConfig,
     sampling: &OrientationConfig,
 ) -> Result<Orientation> {
+    let session = &session.of(image.instrument.spacecraft);
     let reader = CameraReader {
         session,
         instrument: &image.instrument,
@@ -173,6 +174,7 @@ fn require_orientation(
         let sampled = sample_orientation(session, image, kernels, pointing, sampling)?;
         return Ok(sampled.invalid_because);
     }
+    let session = &session.of(image.instrument.spacecraft);
     let reader = CameraReader {
         session,
         instrument: &image.instrument,

@@ -4,6 +4,7 @@
 mod agreement;
 mod detector;
 mod error;
+mod pieces;
 mod support;
 
 use std::sync::atomic::AtomicBool;
@@ -14,16 +15,17 @@ use serde::{Deserialize, Serialize};
 use agreement::{mounting_agrees, of_one_clock, of_one_product, start_agrees, stop_agrees};
 use detector::fits_detector;
 use error::ImageError;
+use pieces::Pieces;
 pub use support::SupportFile;
 use support::supported;
 
 use crate::{
     body::Body,
     config::{ImageConfig, PointingConfig, UsedBias, built_in_instruments, usual_instrument},
-    error::{Error, Locate, Result},
+    error::{Locate, Result},
     files::HashedFile,
     geom::pushbroom::Detector,
-    image::{IMAGE_DURATION_END_S, IMAGE_LINES_MIN, ImageFields, line_period_agrees},
+    image::ImageFields,
     instruments::Instrument,
     line_times::LineTimes,
     pds::{ImageLabel, read_label},
@@ -31,7 +33,6 @@ use crate::{
     stage::Stage,
     stage_inputs,
     time::{Et, Interval},
-    units::SECONDS_PER_MS,
 };
 
 /// When and how the lines of an image were exposed.
@@ -81,15 +82,18 @@ pub enum StartFrom {
     Utc,
     /// Ephemeris time of support data.
     Support,
+    /// Ephemeris time of the configuration.
+    Exposures,
 }
 
 impl ImageTimes {
     /// Whether its positions are those of the spacecraft with the laser, so that ranges are measured from them.
     #[must_use]
     pub fn has_laser(&self) -> bool {
-        self.support
-            .as_ref()
-            .is_none_or(|support| support.has_laser)
+        match &self.support {
+            Some(support) => support.has_laser,
+            None => self.instrument.spacecraft.has_laser(),
+        }
     }
 
     /// Where the samples of a line look.
@@ -167,7 +171,7 @@ stage_inputs! {
 
 impl Stage for TagTimes<'_> {
     const NAME: &'static str = "tag_times";
-    const METHOD: u32 = 5;
+    const METHOD: u32 = 6;
     const CHECKED: bool = true;
     type Output = ImageTimes;
     stage_inputs!(fingerprint);
@@ -223,6 +227,7 @@ fn tag_image(
 fn image_times(image: &ImageConfig, session: &Session) -> Result<ImageTimes> {
     let (mut notes, mut remarks) = (Vec::new(), Vec::new());
     let (instrument, label) = labelled(image)?;
+    let session = &session.of(instrument.spacecraft);
     let utc_stop = label.as_ref().and_then(|label| label.utc_stop.clone());
     let of_label = label.map_or_else(ImageFields::default, |label| label.fields);
     let fields = merged(&image.fields, of_label, &mut notes);
@@ -252,20 +257,23 @@ fn image_times(image: &ImageConfig, session: &Session) -> Result<ImageTimes> {
             instrument.detector.pixels
         ));
     }
-    let (line_period_s, exposure_s) =
-        line_period(image, &fields, downtrack_summing)?.ok_or_else(|| missing("exposure_ms"))?;
-    let duration_s = f64::from(lines_header) * line_period_s;
-    if lines_header < IMAGE_LINES_MIN || !(line_period_s > 0.0 && duration_s < IMAGE_DURATION_END_S)
-    {
-        return Err(Error::from(ImageError::Duration {
-            image: image.id.clone(),
-            lines: lines_header,
-            line_period_s,
-        }));
-    }
-    of_one_clock(image, fields.sclk_start.as_deref())?;
-    let (start, start_from) = start_time(image, &fields, session, &mut notes, &mut remarks)?
-        .ok_or_else(|| missing("sclk_start"))?;
+    of_one_clock(image, instrument.spacecraft, fields.sclk_start.as_deref())?;
+    let told = start_time(image, &fields, session, &mut notes, &mut remarks)?;
+    let pieces = Pieces {
+        image,
+        fields: &fields,
+        lines: lines_header,
+        downtrack_summing,
+    };
+    let (line_times, exposure_s, start_from) = if let Some(exposures) = &image.exposures {
+        let (times, exposure_s) = pieces.listed(exposures, told, &mut remarks)?;
+        (times, exposure_s, StartFrom::Exposures)
+    } else {
+        let (start, start_from) = told.ok_or_else(|| missing("sclk_start"))?;
+        let (times, exposure_s) = pieces.even(start)?;
+        (times, exposure_s, start_from)
+    };
+    let start = line_times.start();
     // Without the camera's frame its orientation says what is missing.
     if let Ok(mounting) = session.mounting(&instrument, start) {
         remarks.extend(mounting_agrees(&instrument, mounting.matrix()));
@@ -277,7 +285,8 @@ fn image_times(image: &ImageConfig, session: &Session) -> Result<ImageTimes> {
             .utc_start
             .as_deref()
             .map_or(Ok(start), |utc| session.utc_to_et(utc))?;
-        let remark = stop_agrees(&image.id, start, stop, (lines_header, line_period_s))?;
+        let of_lines = (lines_header, line_times.mean_period_s());
+        let remark = stop_agrees(&image.id, start, stop, of_lines)?;
         remarks.extend(remark);
     }
     Ok(ImageTimes {
@@ -285,7 +294,7 @@ fn image_times(image: &ImageConfig, session: &Session) -> Result<ImageTimes> {
         // Labels, clocks and kernels are those of a spacecraft at Mars.
         body: Body::Mars,
         instrument,
-        line_times: LineTimes::even(start, lines_header, line_period_s)?,
+        line_times,
         start_from,
         utc_start: session.et_to_utc(start)?,
         sclk_start: fields.sclk_start,
@@ -378,36 +387,6 @@ fn merged(written: &ImageFields, label: ImageFields, notes: &mut Vec<String>) ->
     )
 }
 
-/// Line period and exposure in seconds; `None` when neither is given.
-///
-/// Source: exposure × downtrack summing, ISIS and ALE (`mgs_drivers.py`); the "exposure time" of
-/// Shan et al. 2005, Table 2 is the period already summed.
-fn line_period(
-    image: &ImageConfig,
-    fields: &ImageFields,
-    summing: u32,
-) -> std::result::Result<Option<(f64, f64)>, ImageError> {
-    let summed = |exposure_s: f64| exposure_s * f64::from(summing);
-    match (fields.line_period_s, fields.exposure_s) {
-        (Some(period_s), Some(exposure_s)) => {
-            let computed_s = summed(exposure_s);
-            if !line_period_agrees(period_s, exposure_s, summing) {
-                return Err(ImageError::Period {
-                    image: image.id.clone(),
-                    stated_ms: period_s / SECONDS_PER_MS,
-                    exposure_ms: exposure_s / SECONDS_PER_MS,
-                    summing,
-                    computed_ms: computed_s / SECONDS_PER_MS,
-                });
-            }
-            Ok(Some((period_s, exposure_s)))
-        }
-        (Some(period_s), None) => Ok(Some((period_s, period_s / f64::from(summing.max(1))))),
-        (None, Some(exposure_s)) => Ok(Some((summed(exposure_s), exposure_s))),
-        (None, None) => Ok(None),
-    }
-}
-
 /// The clock where there is one, else UTC; both together must agree.
 fn start_time(
     image: &ImageConfig,
@@ -422,7 +401,7 @@ fn start_time(
         None => None,
     };
     let Some(sclk) = fields.sclk_start.as_deref() else {
-        if from_utc.is_some() {
+        if from_utc.is_some() && session.spacecraft().labels_tell_clock {
             notes.push("start from UTC, which labels cut to 10 ms; no clock string".to_owned());
         }
         return Ok(from_utc.map(|(_, start)| (start, StartFrom::Utc)));

@@ -102,6 +102,7 @@ impl Site {
             required: RequiredCoverage {
                 positions: Intervals::union_of([seconds(-1.0, 8.0)]),
                 attitudes: Intervals::union_of([seconds(-2.15, 6.0)]),
+                ..RequiredCoverage::default()
             },
             warnings: Vec::new(),
             conversions: vec![FileConversion::default()],

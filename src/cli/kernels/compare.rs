@@ -182,6 +182,7 @@ fn wanted_by_time(
     Ok(RequiredCoverage {
         attitudes: span.shifted(bias.seconds()),
         positions: span,
+        ..RequiredCoverage::default()
     })
 }
 

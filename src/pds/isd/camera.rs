@@ -8,6 +8,7 @@ use nalgebra::{Matrix2, Matrix3, Vector2};
 
 use super::document::{IsdError, Object};
 use crate::{
+    constants::{SPACECRAFT, Spacecraft},
     geom::{attitude::OmegaPhiKappa, body_rotation::frame_rotation_3, pushbroom::Distortion},
     instruments::{
         DetectorLine, DistortionModel, Instrument, LabelNames, Mounting, NaifNames, Optics,
@@ -110,10 +111,11 @@ pub(super) fn camera(
     let instrument = Instrument {
         id: identifier(sensor),
         name: sensor.to_owned(),
+        spacecraft: spacecraft(document.text("name_platform")?),
         label: LabelNames {
             instrument: sensor.to_owned(),
             filter: None,
-            serial: identifier(sensor),
+            serial: Some(identifier(sensor)),
         },
         naif: naif_names(document, frame_name(sensor, line.turn_rad))?,
         mounting: mounting(&(turn * sensor_mounting)),
@@ -167,10 +169,19 @@ fn naif_names(document: &Object<'_>, frame: String) -> Result<NaifNames, IsdErro
     Ok(NaifNames {
         instrument,
         frame,
+        frame_id: instrument,
+        turn_rad: 0.0,
         bus,
         bus_frame: format!("frame {bus} of {platform}"),
         kernel: String::new(),
     })
+}
+
+/// The spacecraft of this name; of one that is not known nothing is read but its support data, and it is filed under the
+/// usual one.
+fn spacecraft(platform: &str) -> &'static Spacecraft {
+    let named = |one: &&Spacecraft| one.label_name.eq_ignore_ascii_case(platform);
+    Spacecraft::all().iter().find(named).unwrap_or(&SPACECRAFT)
 }
 
 /// Angles of a rotation `[yaw]₃ [pitch]₂ [roll]₁`.

@@ -3,6 +3,7 @@
 use std::{io::Write as _, sync::LazyLock};
 
 use proptest::{collection::vec, prelude::*, sample::Index};
+use tiff::encoder::{Compression, DeflateLevel, TiffEncoder, colortype::Gray8};
 
 use super::*;
 use crate::{
@@ -56,14 +57,25 @@ static WHOLE: LazyLock<Vec<Vec<u8>>> = LazyLock::new(|| {
         .unwrap()
         .write_image_data(&pixels)
         .unwrap();
-    let mut tiff = std::io::Cursor::new(Vec::new());
-    let mut encoder = tiff::encoder::TiffEncoder::new(&mut tiff).unwrap();
-    encoder
-        .write_image::<tiff::encoder::colortype::Gray8>(64, 160, &pixels)
-        .unwrap();
+    let tiffs = [
+        Compression::Uncompressed,
+        Compression::Lzw,
+        Compression::Deflate(DeflateLevel::Balanced),
+    ]
+    .map(|compression| {
+        let mut tiff = std::io::Cursor::new(Vec::new());
+        let encoder = TiffEncoder::new(&mut tiff).unwrap();
+        encoder
+            .with_compression(compression)
+            .with_predictor(tiff::encoder::Predictor::Horizontal)
+            .write_image::<Gray8>(64, 160, &pixels)
+            .unwrap();
+        tiff.into_inner()
+    });
     archive
         .into_iter()
-        .chain([cube, png, tiff.into_inner()])
+        .chain([cube, png])
+        .chain(tiffs)
         .collect()
 });
 
@@ -95,7 +107,7 @@ fn whole_files_of_every_kind_are_read() {
 proptest! {
     #[test]
     fn any_damaged_file_of_pixels_is_read_in_bounds(
-        kind in 0..6_usize,
+        kind in 0..8_usize,
         changes in vec((any::<Index>(), any::<u8>()), 0..8),
         header in vec((0..640_usize, any::<u8>()), 0..4),
         cut in any::<Option<Index>>(),

@@ -104,8 +104,8 @@ impl Cause for TerrainModelError {
     fn advice(&self) -> String {
         match self {
             Self::Tiff(_) | Self::TooLarge { .. } => {
-                "give a whole GeoTIFF of one band without compression (gdal_translate -co COMPRESS=NONE), cut to what is needed \
-                 (-projwin)"
+                "give a whole GeoTIFF of one band without compression, with LZW or with deflate (gdal_translate -co COMPRESS=DEFLATE), \
+                 cut to what is needed (-projwin)"
             }
             Self::Georeference { .. } => {
                 "give heights over longitude and latitude or in an equirectangular map about a sphere, in degrees or metres: \

@@ -16,7 +16,6 @@ use serde::Serialize;
 
 use super::points::{GroundEstimate, ImageMeasure, above_zero};
 use crate::{
-    constants::SPACECRAFT,
     error::{Locate, Result},
     products::{error::ProductError, files::write_json},
     stages::tag_times::ImageTimes,
@@ -86,7 +85,8 @@ struct Measure<'a> {
     serial_number: &'a str,
 }
 
-/// Serial number that ISIS composes for an image; `None` when its label has no clock string.
+/// Serial number that ISIS composes for an image; `None` when its label has no clock string, or where
+/// ISIS names images of its camera in another way.
 ///
 /// # Source
 /// `MgsMocSerialNumber.trn` of ISIS (spacecraft, clock, instrument, filter) and the network of M01/00115, which names that image
@@ -94,8 +94,9 @@ struct Measure<'a> {
 #[must_use]
 pub fn isis_serial_number(image: &ImageTimes) -> Option<String> {
     let clock = image.sclk_start.as_ref()?;
-    let camera = &image.instrument.label.serial;
-    Some(format!("{}/{}/{camera}", SPACECRAFT.name, clock.trim()))
+    let camera = image.instrument.label.serial.as_ref()?;
+    let spacecraft = &image.instrument.spacecraft.name;
+    Some(format!("{spacecraft}/{}/{camera}", clock.trim()))
 }
 
 /// Writes `points` to `path`, which must end in `.json` for ISIS to take it, and reads it back.

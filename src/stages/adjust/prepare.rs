@@ -251,7 +251,10 @@ fn exposed(images: &[&ImageTimes], instant: Et) -> Vec<usize> {
 mod tests {
     use super::*;
     use crate::{
-        body::Body, config::usual_instrument, line_times::LineTimes, stages::tag_times::StartFrom,
+        body::Body,
+        config::{all_instruments, usual_instrument},
+        line_times::LineTimes,
+        stages::tag_times::StartFrom,
     };
 
     fn image(id: &str, start_s: f64, lines: u32, period_s: f64) -> ImageTimes {
@@ -295,5 +298,11 @@ mod tests {
             assert_eq!(ids(&images, 5.0), ["context"]);
             assert!(ids(&images, 50.0).is_empty());
         }
+        // From another spacecraft, whatever its times.
+        let mut elsewhere = image("elsewhere", 0.0, 400, 0.1);
+        let mut cameras = all_instruments().iter();
+        let other = cameras.find(|camera| !camera.spacecraft.has_laser());
+        elsewhere.instrument = other.unwrap().clone();
+        assert!(ids(&[&elsewhere], 15.0).is_empty());
     }
 }

@@ -25,7 +25,7 @@ const STEPS: u32 = 3;
 /// Where the rays of an exposure start.
 #[derive(Debug, Clone, Copy)]
 pub(in crate::stages) struct RayOrigin {
-    /// MGS relative to the centre of Mars.
+    /// The spacecraft relative to the centre of Mars.
     pub(in crate::stages) state: State,
     /// Mars as it stands for the ground that is seen; stamped with the exposure's instant.
     pub(in crate::stages) to_mars: Rotation<J2000, BodyFixed>,

@@ -67,7 +67,7 @@ pub struct OrientationSample {
     pub angles: OmegaPhiKappa,
     /// Where the boresight meets the ellipsoid, if it does.
     pub boresight: Option<BoresightGround>,
-    /// From the perspective centre to where the kernels have MGS at the epoch, geometrically, body-fixed, metres: what
+    /// From the perspective centre to where the kernels have the spacecraft at the epoch, geometrically, body-fixed, metres: what
     /// ranges are measured from.
     pub to_spacecraft_m: Vector3<f64>,
 }

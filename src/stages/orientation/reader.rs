@@ -15,6 +15,7 @@ use crate::{
 /// Reads where the camera of an image was and looked.
 #[derive(Clone, Copy)]
 pub(in crate::stages) struct CameraReader<'a> {
+    /// Of the spacecraft that carries the camera.
     pub(in crate::stages) session: &'a Session,
     pub(in crate::stages) instrument: &'a Instrument,
     pub(in crate::stages) bias: PointingBias,
@@ -54,7 +55,7 @@ impl CameraReader<'_> {
         Ok(mounting * attitude.inertial_to_bus)
     }
 
-    /// Where MGS is.
+    /// Where the spacecraft is.
     pub(in crate::stages) fn geometric(&self, et: Et) -> Result<Position<BodyFixed>> {
         Ok(body_rotation(Body::Mars, et).apply(&self.session.state(et)?.position))
     }

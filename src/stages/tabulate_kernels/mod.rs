@@ -38,7 +38,7 @@ use tables::Source;
 pub struct KernelTables {
     /// Instants of the states, increasing.
     pub epochs: Vec<Et>,
-    /// MGS from Mars, geometric, J2000, for Hermite interpolation of [`Self::STATE_DEGREE`].
+    /// The spacecraft from Mars, geometric, J2000, for Hermite interpolation of [`Self::STATE_DEGREE`].
     pub states: Vec<State>,
     /// Encoded clock of the attitudes as the CK counts time, increasing.
     pub ticks: Vec<f64>,
@@ -144,7 +144,7 @@ pub fn tabulate_kernels(
     pointing: &PointingConfig,
 ) -> Result<KernelTables> {
     let source = Source {
-        session,
+        session: &session.of(images[index].instrument.spacecraft),
         times: images[index],
         orientation,
         tolerance_s: kernels.ck_tolerance_s,
@@ -155,11 +155,17 @@ pub fn tabulate_kernels(
     source.tables()
 }
 
-/// The time that the kernels of an image hold: its exposures with padding, half way to other images at most.
+/// The time that the kernels of an image hold: its exposures with padding, half way to other images of its spacecraft at
+/// most.
 fn span(images: &[&ImageTimes], index: usize, padding_s: f64) -> Interval {
+    let spacecraft = images[index].instrument.spacecraft;
     let exposed = images[index].exposures();
     let mut span = exposed.padded(padding_s);
-    for other in images {
+    // Kernels of another spacecraft are none of this one's.
+    for other in images
+        .iter()
+        .filter(|other| other.instrument.spacecraft == spacecraft)
+    {
         let others = other.exposures();
         if others.stop <= exposed.start {
             let middle = others.stop.plus(0.5 * exposed.start.since(others.stop));

@@ -30,6 +30,7 @@ pub fn require_same(
     kernels: &KernelsConfig,
     pointing: &PointingConfig,
 ) -> Result<()> {
+    let session = &session.of(image.instrument.spacecraft);
     let (mut distances_m, mut turns_rad) = (Vec::new(), Vec::new());
     for sample in &orientation.samples {
         let lookup = pointing.bias_of(&image.instrument).lookup(sample.et);

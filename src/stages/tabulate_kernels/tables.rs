@@ -70,7 +70,7 @@ impl Source<'_> {
         })
     }
 
-    /// When and where MGS was for each sample.
+    /// When and where the spacecraft was for each sample.
     fn flown(&self) -> Result<Vec<(Et, Position<J2000>)>> {
         let light_time = self.orientation.light_time.convention;
         let samples = self.orientation.samples.iter();

@@ -2,12 +2,14 @@
 
 use nalgebra::Matrix3;
 
+use super::StartFrom;
 use crate::{
     config::ImageConfig,
-    constants::SPACECRAFT,
+    constants::Spacecraft,
     error::{Cause, Kind},
     geom::attitude::{bus_to_camera, rotation_vector},
     instruments::Instrument,
+    line_times::LinePiece,
     pds::product_named,
     time::Et,
     units::{RADIANS_PER_DEGREE, SECONDS_PER_MS},
@@ -58,6 +60,15 @@ pub(super) enum Contradiction {
         apart_s: f64,
     },
     #[error(
+        "image {image}: the first of its exposures begins {apart_s:.3} s away from its {told}; expected at most \
+         {TOLERANCE_S} s"
+    )]
+    Exposures {
+        image: String,
+        told: &'static str,
+        apart_s: f64,
+    },
+    #[error(
         "image {image}: STOP_TIME {stop} is {after_s:.3} s after the start, but its lines take {duration_s:.3} s; \
          expected them to agree"
     )]
@@ -86,6 +97,9 @@ impl Cause for Contradiction {
                 "check which of the two belongs to this image, and that no leap second before it is missing in the kernels; the \
                  clock is what would be used"
             }
+            Self::Exposures { .. } => {
+                "check which of the two belongs to this image: the exposures are what would be used"
+            }
             Self::Stop { .. } => {
                 "check start and stop time, lines, exposure and downtrack summing; one of them is not of this image"
             }
@@ -113,10 +127,14 @@ pub(super) fn of_one_product(
 }
 
 /// A serial number of ISIS, `MGS/<clock>/MOC-NA/…`, holds the clock of the image.
-pub(super) fn of_one_clock(image: &ImageConfig, sclk: Option<&str>) -> Result<(), Contradiction> {
+pub(super) fn of_one_clock(
+    image: &ImageConfig,
+    spacecraft: &Spacecraft,
+    sclk: Option<&str>,
+) -> Result<(), Contradiction> {
     let serial = image.serial_number.as_deref();
     let serial_clock = serial.and_then(|serial| {
-        let of_spacecraft = serial.strip_prefix(&*SPACECRAFT.name)?.strip_prefix('/')?;
+        let of_spacecraft = serial.strip_prefix(&*spacecraft.name)?.strip_prefix('/')?;
         of_spacecraft.split('/').next()
     });
     let seconds = |clock: &str| -> Option<i64> {
@@ -164,6 +182,49 @@ pub(super) fn start_agrees(
             ground(apart_s * GROUND_SPEED_M_S)
         )
     }))
+}
+
+/// A remark on exposures that do not begin when clock or UTC say.
+pub(super) fn pieces_agree(
+    image: &str,
+    first: Et,
+    told: Et,
+    from: StartFrom,
+) -> Result<Option<String>, Contradiction> {
+    let apart_s = first.since(told).abs();
+    let told = match from {
+        StartFrom::Sclk => "sclk_start",
+        _ => "utc_start",
+    };
+    // Written so that NaN contradicts.
+    if !(apart_s <= TOLERANCE_S) {
+        return Err(Contradiction::Exposures {
+            image: image.to_owned(),
+            told,
+            apart_s,
+        });
+    }
+    Ok((apart_s > CLOSE_S).then(|| {
+        format!(
+            "the first of its exposures begins {apart_s:.3} s away from {told}, {} on the ground; the exposures are used",
+            ground(apart_s * GROUND_SPEED_M_S)
+        )
+    }))
+}
+
+/// A remark on a piece of line times that does not follow the one before it.
+pub(super) fn piece_follows(piece: &LinePiece, next: &LinePiece) -> Option<String> {
+    let lines = f64::from(next.first_line - piece.first_line);
+    let pause_s = next.start.since(piece.start) - lines * piece.period_s;
+    // Written so that NaN is told.
+    (!(pause_s <= 0.5 * piece.period_s)).then(|| {
+        format!(
+            "nothing is exposed for {pause_s:.4} s, {:.1} lines, before line {}; a first line or a start of its exposures \
+             may be wrong",
+            pause_s / piece.period_s,
+            next.first_line
+        )
+    })
 }
 
 /// A remark on a stop time that does not agree with the lines.
@@ -230,6 +291,7 @@ fn ground(metres: f64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::constants::SPACECRAFT;
 
     fn image(id: &str, serial_number: Option<&str>) -> ImageConfig {
         ImageConfig {
@@ -308,12 +370,12 @@ mod tests {
             "A",
         ] {
             assert!(
-                of_one_clock(&image("i", Some(serial)), clock).is_ok(),
+                of_one_clock(&image("i", Some(serial)), &SPACECRAFT, clock).is_ok(),
                 "{serial}"
             );
         }
         let exchanged = image("i", Some("MGS/669166526:3/MOC-NA/BROAD_BAND"));
-        assert!(of_one_clock(&exchanged, clock).is_err());
-        assert!(of_one_clock(&exchanged, None).is_ok());
+        assert!(of_one_clock(&exchanged, &SPACECRAFT, clock).is_err());
+        assert!(of_one_clock(&exchanged, &SPACECRAFT, None).is_ok());
     }
 }
