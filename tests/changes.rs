@@ -449,7 +449,6 @@ fn sites(site: &Table) -> Vec<Table> {
             "adjustment.images = [{ id = 'E02-01301', position_m = [30, 0.3, 0, 30, 0.3, 0, 30, 0.3, 0], \
              rotation_arcsec = [10, 1, 0, 10, 1, 0, 10, 1, 0] }]",
         ),
-        matched(site),
         mapped(site),
         with("adjustment.model = 'published'"),
         with("adjustment.robust = 'huber'"),
