@@ -33,6 +33,7 @@ use crate::{
         },
         match_ties::{LinesToMatch, TiesOfLines, match_lines},
     },
+    store::atomic,
     units::wrap_pi,
 };
 
@@ -222,9 +223,7 @@ impl<'a> Lines<'a> {
             .collect();
         for (at, camera) in calibration.cameras.iter().enumerate() {
             let path = self.folder.join(format!("{}.json", camera.camera));
-            std::fs::write(&path, &camera.isd)
-                .map_err(IoError::on("write"))
-                .in_file(&path)?;
+            atomic::write(&path, camera.isd.as_bytes())?;
             self.isd[at] = path;
         }
         Ok(())

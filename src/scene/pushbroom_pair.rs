@@ -301,7 +301,7 @@ impl Orbit {
             .iter()
             .map(|et_s| self.turn_rad_s(*et_s).into())
             .collect();
-        let mut pointing = rotation(&et_s, bus, rates, -41_000);
+        let mut pointing = rotation(&et_s, bus, &rates, -41_000);
         pointing["constant_frames"] = json!([number, -41_000]);
         pointing["constant_rotation"] = json!(mounting.as_slice());
         let document = json!({
@@ -322,7 +322,7 @@ impl Orbit {
                 "semiminor": MARS_IAU2000.polar_radius_m / METRES_PER_KM,
                 "unit": "km",
             },
-            "body_rotation": rotation(&et_s, mars, vec![spin.into(); et_s.len()], 10_014),
+            "body_rotation": rotation(&et_s, mars, &vec![spin.into(); et_s.len()], 10_014),
             "instrument_pointing": pointing,
             "naif_keywords": {"BODY_CODE": 499},
             "detector_sample_summing": 1,
@@ -344,7 +344,7 @@ impl Orbit {
 fn rotation(
     et_s: &[f64],
     from_j2000: impl Iterator<Item = Matrix3<f64>>,
-    rates_rad_s: Vec<[f64; 3]>,
+    rates_rad_s: &[[f64; 3]],
     frame: i32,
 ) -> Value {
     let matrices: Vec<Matrix3<f64>> = from_j2000.collect();

@@ -75,7 +75,7 @@ impl Shot {
         // Rows shifted by half of the distance: held-back rectangles surround each other evenly.
         let half = i64::from((every / 2).max(1));
         let place = column as i64 + half * row as i64;
-        let shift = (seed % u64::from(every)) as i64;
+        let shift = (seed % u64::from(every)).cast_signed();
         (place + shift).rem_euclid(i64::from(every)) == 0
     }
 }
