@@ -1,6 +1,7 @@
 //! Map of the site: shaded ground by its own shots, profiles by name, windows, image outlines, tie points.
 
 mod ellipses;
+pub(super) mod keys;
 pub(super) mod labels;
 mod legend;
 mod names;

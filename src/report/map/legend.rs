@@ -2,23 +2,22 @@
 
 use std::f64::consts::{PI, TAU};
 
-use plotters::{prelude::*, style::text_anchor::HPos};
+use plotters::prelude::*;
 
 use super::{
     super::{
         graticule::View,
-        plots::{Canvas, Drawn, GRID, INK, MARK, WIDTH, label},
+        plots::{Canvas, Drawn, GRID, INK, MARK, WIDTH},
     },
-    labels::write,
+    keys::{ColourBar, draw_scale},
     relief, round_length_m,
 };
-use crate::units::{METRES_PER_KM, RADIANS_PER_DEGREE};
+use crate::units::RADIANS_PER_DEGREE;
 
 /// Height of the strip.
 pub(super) const STRIP: i32 = 176;
-/// Left and right end of the bar of colours, and the number of its steps.
+/// Left and right end of the bar of colours.
 const BAR: (i32, i32) = (330, 800);
-const BAR_STEPS: i32 = 94;
 /// Radius of the globe.
 const GLOBE: f64 = 76.0;
 
@@ -45,62 +44,24 @@ impl Legend<'_> {
     fn draw_scale<'a>(&self, area: &Canvas<'a>) -> Drawn<'a> {
         let length_m = round_length_m(0.24 * self.view.width_m());
         let pixels = (length_m / self.view.width_m() * f64::from(WIDTH)).round() as i32;
-        let (left, y) = (12, self.top + 74);
-        let bar = vec![
-            (left, y - 12),
-            (left, y),
-            (left + pixels, y),
-            (left + pixels, y - 12),
-        ];
-        area.draw(&PathElement::new(bar, INK.stroke_width(4)))?;
-        let text = if length_m < METRES_PER_KM {
-            format!("{} m", label(length_m, 0))
-        } else {
-            format!("{} km", label(length_m / METRES_PER_KM, 0))
-        };
-        write(area, &text, (left, y + 28), HPos::Left, INK)
+        draw_scale(area, (12, self.top + 74), length_m, pixels)
     }
 
     fn draw_bar<'a>(&self, (low, high): (f64, f64), area: &Canvas<'a>) -> Drawn<'a> {
-        let (left, right) = BAR;
-        let (top, bottom) = (self.top + 62, self.top + 92);
-        let step = (right - left) / BAR_STEPS;
-        for place in 0..BAR_STEPS {
-            let [red, green, blue] =
-                relief::colour((f64::from(place) + 0.5) / f64::from(BAR_STEPS));
-            let x = left + place * step;
-            // One unit into the next step, so that no paper shows between them.
-            let corners = [(x, top), (x + step + 1, bottom)];
-            area.draw(&Rectangle::new(
-                corners,
-                RGBColor(red, green, blue).filled(),
-            ))?;
-        }
-        let middle = i32::midpoint(left, right);
-        write(
-            area,
-            "height above the areoid, m",
-            (middle, self.top + 36),
-            HPos::Center,
-            INK,
-        )?;
+        let bar = ColourBar {
+            ends: BAR,
+            top: self.top + 62,
+            words: "height above the areoid, m",
+            numbers: [low, high],
+            colour: relief::colour,
+        };
         // Heights that agree to half a metre have one colour and one name.
-        let names: &[f64] = if high - low < 0.5 {
+        let shares: &[f64] = if high - low < 0.5 {
             &[0.5]
         } else {
             &[0.0, 0.5, 1.0]
         };
-        for share in names {
-            let x = left + (share * f64::from(BAR_STEPS * step)).round() as i32;
-            let decimals = usize::from(high - low < 10.0);
-            let text = label(low + share * (high - low), decimals);
-            area.draw(&PathElement::new(
-                vec![(x, bottom), (x, bottom + 8)],
-                INK.stroke_width(2),
-            ))?;
-            write(area, &text, (x, bottom + 26), HPos::Center, INK)?;
-        }
-        Ok(())
+        bar.draw(shares, area)
     }
 
     /// Mars from above the site, tilted towards the equator, with parallels and meridians every 30°.

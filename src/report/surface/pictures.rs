@@ -3,10 +3,13 @@
 use std::fmt::Write as _;
 
 use base64::{Engine as _, engine::general_purpose::STANDARD};
-use plotters::{prelude::*, style::text_anchor::HPos};
+use plotters::prelude::*;
 
 use super::super::{
-    map::{labels::write, relief, round_length_m},
+    map::{
+        keys::{ColourBar, draw_scale},
+        relief, round_length_m,
+    },
     plots::{Canvas, Drawn, INK, WIDTH, drawn, figure_html, label, thinned},
 };
 use crate::{
@@ -14,16 +17,15 @@ use crate::{
     error::Result,
     products::error::ProductError,
     stages::map_surface::{ShotOnSurface, SurfaceAccount, SurfaceLook},
-    units::{METRES_PER_KM, RADIANS_PER_DEGREE},
+    units::RADIANS_PER_DEGREE,
 };
 
 /// Greatest height of a picture, units of the drawing; narrower ground gets a narrower picture.
 const HEIGHT_MAX: f64 = 1_300.0;
 /// Height of the strip below it: scale and colours.
 const STRIP: i32 = 130;
-/// Left and right end of the bar of colours, and the number of its steps.
+/// Left and right end of the bar of colours.
 const BAR: (i32, i32) = (460, 1_000);
-const BAR_STEPS: i32 = 90;
 /// Shots that are drawn.
 const SHOTS: usize = 1_500;
 /// Radius of a shot.
@@ -262,20 +264,7 @@ impl<'a> Frame<'a> {
         let width_m = self.look.heights.size[1] as f64 * east_m;
         let length_m = round_length_m(width_m.min(0.35 * f64::from(WIDTH) / self.width * width_m));
         let pixels = (length_m / width_m * self.width).round() as i32;
-        let (left, y) = (12, self.height as i32 + 56);
-        let bar = vec![
-            (left, y - 12),
-            (left, y),
-            (left + pixels, y),
-            (left + pixels, y - 12),
-        ];
-        area.draw(&PathElement::new(bar, INK.stroke_width(4)))?;
-        let text = if length_m < METRES_PER_KM {
-            format!("{} m", label(length_m, 0))
-        } else {
-            format!("{} km", label(length_m / METRES_PER_KM, 0))
-        };
-        write(area, &text, (left, y + 28), HPos::Left, INK)
+        draw_scale(area, (12, self.height as i32 + 56), length_m, pixels)
     }
 }
 
@@ -286,28 +275,14 @@ impl Bar {
     }
 
     fn draw<'b>(&self, top: i32, area: &Canvas<'b>) -> Drawn<'b> {
-        let (left, right) = BAR;
-        let (top, bottom) = (top + 46, top + 74);
-        let step = (right - left) / BAR_STEPS;
-        for place in 0..BAR_STEPS {
-            let [red, green, blue] = (self.colour)((f64::from(place) + 0.5) / f64::from(BAR_STEPS));
-            let x = left + place * step;
-            // One unit into the next step, so that no paper shows between them.
-            let corners = [(x, top), (x + step + 1, bottom)];
-            area.draw(&Rectangle::new(
-                corners,
-                RGBColor(red, green, blue).filled(),
-            ))?;
-        }
-        let middle = i32::midpoint(left, right);
-        write(area, self.words, (middle, top - 24), HPos::Center, INK)?;
-        let [low, high] = self.ends;
-        for share in [0.0, 0.5, 1.0] {
-            let x = left + (share * f64::from(BAR_STEPS * step)).round() as i32;
-            let text = label(low + share * (high - low), usize::from(high - low < 10.0));
-            write(area, &text, (x, bottom + 26), HPos::Center, INK)?;
-        }
-        Ok(())
+        let bar = ColourBar {
+            ends: BAR,
+            top: top + 46,
+            words: self.words,
+            numbers: self.ends,
+            colour: self.colour,
+        };
+        bar.draw(&[0.0, 0.5, 1.0], area)
     }
 }
 
