@@ -71,6 +71,13 @@ impl Spacecraft {
         ALL.iter().find(|spacecraft| spacecraft.id == id)
     }
 
+    /// Its place among [`Self::all`].
+    #[must_use]
+    pub fn place(&self) -> usize {
+        let place = ALL.iter().position(|one| one.naif == self.naif);
+        place.unwrap_or_default()
+    }
+
     /// Whether it carries the laser.
     #[must_use]
     pub fn has_laser(&self) -> bool {

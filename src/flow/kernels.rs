@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use super::RivalSet;
 use crate::{
     config::SiteConfig,
+    constants::SPACECRAFT,
     error::Result,
     files::InputFiles,
     kernel_source::{KernelList, KernelSource},
@@ -63,14 +64,12 @@ pub(super) fn required_coverage(
         &config.kernels,
         trajectory_reach_s(&config.range_check, &config.mola_clock),
     );
+    let mut by_spacecraft: BTreeMap<&str, Vec<&ImageTimes>> = BTreeMap::new();
     // Those of support data read no kernels.
-    let images = || {
-        images
-            .iter()
-            .copied()
-            .filter(|image| image.support.is_none())
-    };
-    let has_laser = |image: &ImageTimes| image.instrument.spacecraft.has_laser();
+    for image in images.iter().filter(|image| image.support.is_none()) {
+        let of = by_spacecraft.entry(&image.instrument.spacecraft.id);
+        of.or_default().push(image);
+    }
     // No kernels have the spacecraft of tables.
     let flown = if config.shots.is_empty() {
         profiles
@@ -80,36 +79,25 @@ pub(super) fn required_coverage(
     let flights = flown.iter().map(|profile| profile.interval.padded(reach_s));
     let light_time = config.orientation.light_time;
     let position =
-        |image: &ImageTimes| light_time.read_over(image.exposures().padded(kernels.padding_s));
+        |image: &&ImageTimes| light_time.read_over(image.exposures().padded(kernels.padding_s));
     // Within the tolerance a look-up reaches kernels that end before it or begin after it.
     let padding_s = kernels.padding_s + kernels.ck_tolerance_s;
-    let attitude = |image: &ImageTimes| {
+    let attitude = |image: &&ImageTimes| {
         let bias_s = config.pointing.bias_of(&image.instrument).seconds();
         image.exposures().shifted(bias_s).padded(padding_s)
     };
-    let mut others: BTreeMap<String, RequiredCoverage> = BTreeMap::new();
-    for image in images().filter(|image| !has_laser(image)) {
-        let of = others.entry(image.instrument.spacecraft.id.clone());
-        let of = of.or_default();
-        of.positions = Intervals::union_of(
-            of.positions
-                .as_slice()
-                .iter()
-                .copied()
-                .chain([position(image)]),
-        );
-        of.attitudes = Intervals::union_of(
-            of.attitudes
-                .as_slice()
-                .iter()
-                .copied()
-                .chain([attitude(image)]),
-        );
-    }
-    let own = || images().filter(|image| has_laser(image));
+    let own = by_spacecraft.remove(&*SPACECRAFT.id).unwrap_or_default();
+    let others = by_spacecraft.into_iter().map(|(id, images)| {
+        let required = RequiredCoverage {
+            positions: Intervals::union_of(images.iter().map(position)),
+            attitudes: Intervals::union_of(images.iter().map(attitude)),
+            ..RequiredCoverage::default()
+        };
+        (id.to_owned(), required)
+    });
     RequiredCoverage {
-        positions: Intervals::union_of(own().map(position).chain(flights)),
-        attitudes: Intervals::union_of(own().map(attitude)),
-        others,
+        positions: Intervals::union_of(own.iter().map(position).chain(flights)),
+        attitudes: Intervals::union_of(own.iter().map(attitude)),
+        others: others.collect(),
     }
 }

@@ -131,16 +131,7 @@ impl ImageToImage {
             beyond_ties: footprints.len() - seen.len(),
         }
     }
-}
 
-/// Middle and half width of the first image's coordinates, so that powers stay near one.
-#[derive(Debug, Clone, Copy, PartialEq)]
-struct Frame {
-    middle: [f64; 2],
-    half_width: [f64; 2],
-}
-
-impl ImageToImage {
     /// Standard deviation of the mean transformed line of `pairs`, by the residuals of the tie points: relief that no
     /// polynomial follows counts as scatter. Zero without pairs.
     fn mean_sigma(&self, pairs: &[Pair]) -> f64 {
@@ -154,6 +145,13 @@ impl ImageToImage {
         let spare = (self.ties - 1) as f64 / (self.ties - mean.len()) as f64;
         scatter * (spare * mean.dot(&(&fit.cofactors * &mean))).sqrt()
     }
+}
+
+/// Middle and half width of the first image's coordinates, so that powers stay near one.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Frame {
+    middle: [f64; 2],
+    half_width: [f64; 2],
 }
 
 impl Frame {

@@ -3,10 +3,7 @@
 use std::path::PathBuf;
 
 use super::{coverage::interval_of, daf, ffi::Cspice, kernels::KernelSet, role::KernelRole};
-use crate::{
-    constants::SPACECRAFT,
-    time::{Et, Interval},
-};
+use crate::time::{Et, Interval};
 
 /// A part of a kernel.
 pub(super) struct Origin {
@@ -36,11 +33,11 @@ pub(super) fn of_state(set: &KernelSet, cspice: &Cspice, et: Et) -> Option<Origi
     None
 }
 
-/// The ephemeris that CSPICE reads for the spacecraft at `et`.
-pub(super) fn of_spacecraft(set: &KernelSet, et: Et) -> Option<PathBuf> {
+/// The ephemeris that CSPICE reads for the spacecraft `naif` at `et`.
+pub(super) fn of_spacecraft(set: &KernelSet, naif: i32, et: Et) -> Option<PathBuf> {
     let holds = |segment: &daf::Segment| {
         let part = interval_of([segment.start, segment.stop]);
-        segment.integers[0] == SPACECRAFT.naif && part.contains(et)
+        segment.integers[0] == naif && part.contains(et)
     };
     let mut spks = set.kernels().iter().rev();
     let found = spks.find(|kernel| {

@@ -1,11 +1,6 @@
 //! A session with CSPICE: times, states and attitudes from one set of kernels.
 
-use std::{
-    cell::{OnceCell, RefCell},
-    collections::BTreeMap,
-    ffi::CString,
-    rc::Rc,
-};
+use std::{cell::OnceCell, ffi::CString, rc::Rc};
 
 use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
@@ -86,15 +81,15 @@ pub struct Attitude {
 pub struct Session {
     loaded: Rc<Loaded>,
     spacecraft: &'static Spacecraft,
-    coverage: Rc<OnceCell<Coverage>>,
 }
 
-/// CSPICE with its kernels, and what they hold of every spacecraft that was asked for.
+/// CSPICE with its kernels, and what they hold of every spacecraft, once it was asked for.
 #[derive(Debug)]
 struct Loaded {
     cspice: Cspice,
     kernels: KernelSet,
-    coverages: RefCell<BTreeMap<i32, Rc<OnceCell<Coverage>>>>,
+    /// In the order of [`Spacecraft::all`].
+    coverages: Vec<OnceCell<Coverage>>,
 }
 
 impl Session {
@@ -110,26 +105,21 @@ impl Session {
         let loaded = Loaded {
             cspice,
             kernels: kernels.clone(),
-            coverages: RefCell::default(),
+            coverages: vec![OnceCell::new(); Spacecraft::all().len()],
         };
-        Ok(Self::view(Rc::new(loaded), &SPACECRAFT))
-    }
-
-    fn view(loaded: Rc<Loaded>, spacecraft: &'static Spacecraft) -> Self {
-        let mut coverages = loaded.coverages.borrow_mut();
-        let coverage = Rc::clone(coverages.entry(spacecraft.naif).or_default());
-        drop(coverages);
-        Self {
-            loaded,
-            spacecraft,
-            coverage,
-        }
+        Ok(Self {
+            loaded: Rc::new(loaded),
+            spacecraft: &SPACECRAFT,
+        })
     }
 
     /// The same session for the clock, orbit and attitude of `spacecraft`.
     #[must_use]
     pub fn of(&self, spacecraft: &'static Spacecraft) -> Self {
-        Self::view(Rc::clone(&self.loaded), spacecraft)
+        Self {
+            loaded: Rc::clone(&self.loaded),
+            spacecraft,
+        }
     }
 
     /// The spacecraft whose clock, orbit and attitude are read.
@@ -161,11 +151,12 @@ impl Session {
     /// # Errors
     /// [`SpiceError::Spice`] when a C-kernel cannot be read; [`SpiceError::MissingText`] without clock.
     pub fn coverage(&self) -> Result<&Coverage> {
-        if let Some(coverage) = self.coverage.get() {
+        let known = &self.loaded.coverages[self.spacecraft.place()];
+        if let Some(coverage) = known.get() {
             return Ok(coverage);
         }
         let coverage = Coverage::of(self.kernels(), self.cspice(), self.spacecraft)?;
-        Ok(self.coverage.get_or_init(|| coverage))
+        Ok(known.get_or_init(|| coverage))
     }
 
     /// An error of CSPICE, or the absence of a kernel that explains it.

@@ -122,10 +122,12 @@ impl Session {
                 tolerance_m,
             };
             let failure = Error::from(error);
-            return Err(match origin::of_spacecraft(self.kernels(), middle) {
-                Some(kernel) => failure.in_file(kernel),
-                None => failure,
-            });
+            return Err(
+                match origin::of_spacecraft(self.kernels(), self.spacecraft().naif, middle) {
+                    Some(kernel) => failure.in_file(kernel),
+                    None => failure,
+                },
+            );
         }
         to_do.push(Interval::new(middle, interval.stop));
         to_do.push(Interval::new(interval.start, middle));
