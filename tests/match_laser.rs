@@ -5,6 +5,7 @@
     clippy::disallowed_methods,
     clippy::unwrap_used,
     clippy::panic,
+    clippy::cast_possible_truncation,
     clippy::too_many_lines,
     reason = "tests work in temporary folders and may fail loudly"
 )]
@@ -14,6 +15,8 @@ mod common;
 mod model;
 #[path = "match_laser/refused.rs"]
 mod refused;
+#[path = "match_laser/sigma.rs"]
+mod sigma;
 
 use std::{
     fs,
@@ -62,7 +65,6 @@ fn request(search_cells: u32, similarity: Option<Similarity>) -> MatchRequest {
             least_variance_m2: 1_000.0,
             similarity,
             search_cells,
-            settles: false,
             least_score: 0.9,
             least_contrast: 1.0,
             limit_m: 60.0,

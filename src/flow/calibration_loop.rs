@@ -296,7 +296,6 @@ impl<'a> Lines<'a> {
             least_variance_m2: laser.least_variance_m2,
             similarity: None,
             search_cells: laser.search_cells,
-            settles: true,
             least_score: laser.least_score,
             least_contrast: 1.0,
             limit_m: laser.limit_m,

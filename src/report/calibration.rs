@@ -10,7 +10,9 @@ use super::{
 use crate::{
     config::{CalibrationConfig, CalibrationMode},
     error::Result,
-    stages::calibrate::{Calibration, ControlFigures, Figures, HeldBack, PointKind, Value},
+    stages::calibrate::{
+        Calibration, ControlFigures, Figures, HeldBack, PointKind, Scattered, Value,
+    },
 };
 
 /// Points that are drawn.
@@ -66,17 +68,20 @@ fn lead(config: &CalibrationConfig, of: &Calibration) -> String {
 
 fn stated(of: &HeldBack) -> String {
     let metres = |of: Option<f64>| of.map_or_else(|| "–".to_owned(), |of| format!("{of:.1} m"));
+    let times =
+        |of: Option<Scattered>| of.map_or_else(|| "–".to_owned(), |of| format!("{:.2}", of.sigmas));
     format!(
         "A tie point is known to {} in the plane and {} in height (root mean square). {} that were never used judge this: they \
-         lie {:.2} standard deviations off, and the {} of them in two lines or more {} in the plane and {} in height with the \
-         laser's own errors.",
+         lie {} times as far off as expected in the plane and {} times in height, and the {} of them in two lines or more {} in the \
+         plane and {} in height with the laser's own errors.",
         metres(of.accuracy_plane_m),
         metres(of.accuracy_height_m),
         counted(
             usize::try_from(of.points).unwrap_or(usize::MAX),
             "laser point"
         ),
-        of.normalised,
+        times(of.scatter.plane),
+        times(of.scatter.height),
         of.intersected,
         metres(of.plane_m),
         metres(of.height_m)

@@ -7,7 +7,7 @@ use super::{
 };
 use crate::{
     error::Result,
-    stages::calibrate::{CalibrationRound, CameraResult, Rounds},
+    stages::calibrate::{CalibrationRound, CameraResult, Rounds, Scatter, Scattered},
 };
 
 /// The rounds of these lines.
@@ -44,7 +44,8 @@ fn numbers(of: &Rounds) -> String {
             Column::Number("model − laser (median), m"),
             Column::Number("control, px"),
             Column::Number("control held back, px"),
-            Column::Number("held back, σ"),
+            Column::Number("held back, σ in the plane"),
+            Column::Number("σ in height"),
         ],
     );
     for round in &of.rounds {
@@ -52,6 +53,9 @@ fn numbers(of: &Rounds) -> String {
         let bias = round
             .bias_m
             .map_or_else(|| "–".to_owned(), |of| signed(of, 1));
+        let scatter = |of: fn(Scatter) -> Option<Scattered>| {
+            round.held_back_scatter.and_then(of).map(|of| of.sigmas)
+        };
         table.row(
             true,
             [
@@ -64,7 +68,8 @@ fn numbers(of: &Rounds) -> String {
                 bias.into(),
                 text(round.control.plane_px, 3),
                 text(round.held_back.plane_px, 3),
-                text(round.held_back_sigmas, 2),
+                text(scatter(|of| of.plane), 2),
+                text(scatter(|of| of.height), 2),
             ],
         );
     }

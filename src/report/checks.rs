@@ -168,7 +168,10 @@ const fn section(kind: CheckKind) -> Option<&'static Section> {
         // Of the whole, or of nets, calibrations and matches, whose pages have no such sections.
         CheckKind::AdjustmentMade
         | CheckKind::Contradiction
-        | CheckKind::HeldBackControl
+        | CheckKind::HeldBackPlane
+        | CheckKind::HeldBackHeight
+        | CheckKind::ControlPlane
+        | CheckKind::ControlHeight
         | CheckKind::OtherOrbits
         | CheckKind::PlaceKnown
         | CheckKind::HeightKnown

@@ -8,7 +8,7 @@ use super::{
 };
 use crate::{
     error::Result,
-    stages::match_laser::{LaserMatch, UnitResult},
+    stages::match_laser::{LaserMatch, MatchSigma, UnitResult},
     units::wrap_pi,
 };
 
@@ -58,6 +58,13 @@ fn lead(of: &LaserMatch) -> String {
             signed(bias_m, 1)
         )
     });
+    let known = of.widened.map_or_else(String::new, |widened| {
+        format!(
+            " Standard deviations are those of leaving out single shots, {:.1} times as large for shifts and {:.1} times for biases, as \
+             units scatter about a plane.",
+            widened.shift, widened.bias
+        )
+    });
     let [east_m, north_m] = of.cell_m;
     let made = format!(
         "{} in {}, {} of {} segments with relief, cells of {east_m:.1} by {north_m:.1} m, heights above {} m. The measure was {}.",
@@ -68,7 +75,7 @@ fn lead(of: &LaserMatch) -> String {
         of.radius_m,
         of.similarity.word(),
     );
-    let body = paragraph(&(judged + &bias))
+    let body = paragraph(&(judged + &bias + &known))
         + &paragraph(&made)
         + &list(&of.verdict.reasons)
         + &list(&of.verdict.remarks);
@@ -163,6 +170,9 @@ fn units(of: &LaserMatch) -> String {
             Column::Number("north, cells"),
             Column::Number("score"),
             Column::Number("bias, m"),
+            Column::Number("σ east, m"),
+            Column::Number("σ north, m"),
+            Column::Number("σ bias, m"),
             Column::Number("held out before, m"),
             Column::Number("after, m"),
             Column::Text("not kept because"),
@@ -173,6 +183,12 @@ fn units(of: &LaserMatch) -> String {
             unit.found
                 .as_ref()
                 .map_or_else(|| "–".to_owned(), value)
+                .into()
+        };
+        let sigma = |value: fn(MatchSigma) -> f64| -> Cell {
+            let sigma = unit.found.and_then(|of| of.sigma).map(value);
+            sigma
+                .map_or_else(|| "–".to_owned(), |of| label(of, 1))
                 .into()
         };
         let judged = |value: Option<f64>| -> Cell {
@@ -191,6 +207,9 @@ fn units(of: &LaserMatch) -> String {
                 found(|of| signed(of.shift_cells[1], 2)),
                 found(|of| label(of.score, 3)),
                 found(|of| signed(of.bias_m, 1)),
+                sigma(|of| of.shift_m[0]),
+                sigma(|of| of.shift_m[1]),
+                sigma(|of| of.bias_m),
                 judged(unit.held_out.map(|of| of.before_m)),
                 judged(unit.held_out.map(|of| of.after_m)),
                 (&unit.refused_because).into(),

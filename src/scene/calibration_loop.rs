@@ -220,9 +220,9 @@ cell_m = 100
 search_cells = 30
 
 [control]
-sigma_px = 0.1
-sigma_horizontal_m = 8.0
-sigma_vertical_m = 1.5
+sigma_px = 0.03
+sigma_horizontal_m = 1.0
+sigma_vertical_m = 1.0
 
 [a_priori]
 control_angle_deg = 0.3

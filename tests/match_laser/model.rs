@@ -9,7 +9,7 @@ use tiff::{
 };
 
 /// What stands for no height in the scene.
-const NO_HEIGHT: f32 = -32_768.0;
+pub(crate) const NO_HEIGHT: f32 = -32_768.0;
 
 /// A model as its file has it.
 pub(crate) struct Model {

@@ -141,7 +141,6 @@ impl Arguments {
                     Measure::CccBiasRemoved => Some(Similarity::CccBiasRemoved),
                 },
                 search_cells: u32::from(self.search),
-                settles: false,
                 least_score: self.least_score,
                 least_contrast: self.least_contrast,
                 limit_m: self.limit_m,

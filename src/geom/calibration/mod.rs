@@ -12,6 +12,7 @@
 mod camera;
 mod elimination;
 mod freedom;
+mod misfit;
 mod null_space;
 mod sight;
 mod solve;
@@ -20,6 +21,7 @@ mod tests;
 
 pub use camera::{CalibrationState, LineCamera, LinePose, Offset};
 pub use freedom::{Freedom, Layout, Parameter};
+pub use misfit::{Misfit, Missed, TookPart};
 pub use null_space::{AngleCombination, Axis, Combination, TieDirection, TieSight, tie_sight};
-pub use sight::{GroundPoint, KnownPlace, Misfit, Sight, SightError};
+pub use sight::{GroundPoint, KnownPlace, Sight, SightError};
 pub use solve::{CalibrationError, Solved, Start, solve};

@@ -1,6 +1,6 @@
 //! Ground points and what sees them: their places under a calibration, with covariances, and what they miss.
 
-use nalgebra::{DMatrix, DVector, Matrix2x3, Matrix3, Vector2, Vector3};
+use nalgebra::{DMatrix, Matrix2x3, Matrix3, Vector2, Vector3};
 
 use super::camera::{CalibrationState, LinePose};
 
@@ -54,15 +54,6 @@ pub enum SightError {
     /// The steps did not end.
     #[error("its rays lead to no place")]
     NotConverged,
-}
-
-/// What a point of known place misses, and how likely that is.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Misfit {
-    /// Residuals of its sights at the known place, tangents across and along.
-    pub residuals: Vec<Vector2<f64>>,
-    /// Mean square of the residuals over their standard deviations: near 1 when these are true.
-    pub normalised_square: f64,
 }
 
 /// A sight's rows over its standard deviations.
@@ -141,6 +132,15 @@ impl Sight {
 }
 
 impl GroundPoint {
+    /// The point by its sights alone.
+    #[must_use]
+    pub fn unaided(&self) -> Self {
+        Self {
+            sights: self.sights.clone(),
+            known: None,
+        }
+    }
+
     /// The point nearest to its rays.
     fn start(&self, state: &CalibrationState) -> Result<Vector3<f64>, SightError> {
         if let Some(known) = &self.known {
@@ -238,47 +238,5 @@ impl GroundPoint {
         }
         let of_parameters = &gain * covariance * gain.transpose();
         Ok(inverse + of_parameters.fixed_view::<3, 3>(0, 0))
-    }
-
-    /// What a point of known place that was not used misses; `None` for one of unknown place.
-    ///
-    /// # Errors
-    /// [`SightError::Behind`].
-    pub fn misfit(
-        &self,
-        state: &CalibrationState,
-        covariance: &DMatrix<f64>,
-    ) -> Result<Option<Misfit>, SightError> {
-        let Some(known) = &self.known else {
-            return Ok(None);
-        };
-        let count = 2 * self.sights.len();
-        let mut by_place = DMatrix::zeros(count, 3);
-        let mut by_parameters = DMatrix::zeros(count, covariance.nrows());
-        let mut weighted = DVector::zeros(count);
-        for (index, sight) in self.sights.iter().enumerate() {
-            let rows = sight.rows(state, &known.place_m)?;
-            by_place.rows_mut(2 * index, 2).copy_from(&rows.by_place);
-            by_parameters
-                .rows_mut(2 * index, 2)
-                .copy_from(&rows.by_parameters);
-            weighted.rows_mut(2 * index, 2).copy_from(&rows.residual);
-        }
-        let inverse = known
-            .whitening
-            .try_inverse()
-            .ok_or(SightError::NotConverged)?;
-        let spread = by_place * inverse;
-        let of_residuals = DMatrix::identity(count, count)
-            + &spread * spread.transpose()
-            + &by_parameters * covariance * by_parameters.transpose();
-        let solved = of_residuals
-            .cholesky()
-            .ok_or(SightError::NotConverged)?
-            .solve(&weighted);
-        Ok(Some(Misfit {
-            residuals: self.residuals(state, &known.place_m)?,
-            normalised_square: weighted.dot(&solved) / count as f64,
-        }))
     }
 }

@@ -376,11 +376,8 @@ fn a_calibration_of_exact_points_is_exact_where_it_can_be_seen() {
             let off_px = residual.norm() / PIXEL;
             assert!(off_px < 0.02, "camera {}: {off_px} px", sight.camera);
         }
-        let unaided = GroundPoint {
-            sights: point.sights.clone(),
-            known: None,
-        };
-        let covariance = unaided
+        let covariance = point
+            .unaided()
             .covariance_m2(&solved.state, &solved.covariance, &place_m)
             .unwrap();
         // 0.2 px are 5 m on the ground and 11 m in height.

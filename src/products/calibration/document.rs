@@ -16,7 +16,7 @@ use crate::{
     stages::{
         calibrate::{
             CalibrationRound, CalibrationStep, CameraResult, HeldBack, PixelsAndMetres, Rounds,
-            ValidationResult, Value,
+            Scatter, ValidationResult, Value,
         },
         judge::Verdict,
     },
@@ -71,6 +71,9 @@ struct Document<'a> {
     /// What held-back control says; absent without control.
     #[serde(skip_serializing_if = "Option::is_none")]
     held_back: Option<&'a HeldBack>,
+    /// What the control that was used misses over what is expected.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    control_scatter: Option<Scatter>,
     /// Other orbits.
     validation: &'a [ValidationResult],
 }
@@ -122,9 +125,9 @@ struct RoundDocument {
     control: PixelsAndMetres,
     /// The same of control that was held back.
     held_back: PixelsAndMetres,
-    /// Residuals of control that was held back in their standard deviations, root mean square.
+    /// What control that was held back misses over what is expected.
     #[serde(skip_serializing_if = "Option::is_none")]
-    held_back_normalised: Option<f64>,
+    held_back_scatter: Option<Scatter>,
     /// φ, ω and κ of every line, degrees, in the order of `cameras`.
     angles_deg: Vec<[f64; 3]>,
     /// Drift of the orbit from line to line, body-fixed, metres.
@@ -210,6 +213,7 @@ impl<'a> Document<'a> {
             steps: &result.steps,
             rounds: result.rounds.as_ref().map(rounds),
             held_back: result.held_back.as_ref(),
+            control_scatter: result.used,
             validation: &result.validation,
         }
     }
@@ -251,7 +255,7 @@ fn rounds(of: &Rounds) -> RoundsDocument {
         bias_m: round.bias_m,
         control: round.control,
         held_back: round.held_back,
-        held_back_normalised: round.held_back_sigmas,
+        held_back_scatter: round.held_back_scatter,
         angles_deg: round.angles_rad.iter().map(|of| of.map(degrees)).collect(),
         drift_m_per_line: round.drift_m_per_line,
     };

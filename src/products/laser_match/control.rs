@@ -79,5 +79,17 @@ fn columns<'a>() -> Vec<Column<Row<'a>>> {
             "distance from the centre of Mars by the laser, metres",
             |row: &Row| row.point.laser[2],
         ),
+        column(
+            "sigma_horizontal_m",
+            Unit::Metre,
+            "standard deviation of a horizontal coordinate, of the matching, metres: errors of the laser's own are not in it",
+            |row: &Row| row.point.sigma_horizontal_m(),
+        ),
+        column(
+            "sigma_vertical_m",
+            Unit::Metre,
+            "likewise of the radius",
+            |row: &Row| row.point.sigma_m[2],
+        ),
     ]
 }

@@ -87,5 +87,23 @@ fn columns<'a>() -> Vec<Column<Row<'a>>> {
             "height of the model there, from the centre of Mars, metres",
             |row: &Row| row.model[2],
         ),
+        column(
+            "sigma_east_m",
+            Unit::Metre,
+            "standard deviation of model minus laser towards the east, by the matching alone, metres",
+            |row: &Row| row.sigma_m[0],
+        ),
+        column(
+            "sigma_north_m",
+            Unit::Metre,
+            "likewise towards the north",
+            |row: &Row| row.sigma_m[1],
+        ),
+        column(
+            "sigma_up_m",
+            Unit::Metre,
+            "likewise in height",
+            |row: &Row| row.sigma_m[2],
+        ),
     ]
 }

@@ -86,6 +86,7 @@ fn columns<'a>() -> Vec<Column<Row<'a>>> {
         ),
     ];
     columns.extend(shifts());
+    columns.extend(deviations());
     columns.extend(judged());
     columns
 }
@@ -128,6 +129,30 @@ fn shifts<'a>() -> [Column<Row<'a>>; 6] {
             Unit::Degree,
             "the same in latitude, degrees",
             |row: &Row| row.found.map(|of| degrees(of.shift_rad[1])),
+        ),
+    ]
+}
+
+/// How well that is known.
+fn deviations<'a>() -> [Column<Row<'a>>; 3] {
+    [
+        column(
+            "sigma_east_m",
+            Unit::Metre,
+            "standard deviation of the shift to the east, by leaving out single shots and by the scatter of all units, metres",
+            |row: &Row| row.found.and_then(|of| Some(of.sigma?.shift_m[0])),
+        ),
+        column(
+            "sigma_north_m",
+            Unit::Metre,
+            "likewise to the north",
+            |row: &Row| row.found.and_then(|of| Some(of.sigma?.shift_m[1])),
+        ),
+        column(
+            "sigma_bias_m",
+            Unit::Metre,
+            "likewise of `bias_m`",
+            |row: &Row| row.found.and_then(|of| Some(of.sigma?.bias_m)),
         ),
     ]
 }

@@ -114,9 +114,9 @@ pub enum CalibrateError {
         /// Its camera.
         camera: String,
     },
-    /// The calibrated cameras cannot see a point that was held back.
-    #[error("control point {point}, which was held back, cannot judge the calibration: {problem}")]
-    HeldBack {
+    /// The calibrated cameras cannot see a control point.
+    #[error("control point {point} cannot judge the calibration: {problem}")]
+    Unseen {
         /// The point.
         point: String,
         /// Why.
@@ -197,7 +197,7 @@ impl Cause for CalibrateError {
                 "what a calibration was made from cannot judge it: give files of another orbit, or leave this one out"
             }
             Self::TwoPlaces { .. } => "give every laser point a name of its own",
-            Self::HeldBack { .. } => "look at the place of this point and at its lines and samples",
+            Self::Unseen { .. } => "look at the place of this point and at its lines and samples",
             Self::OtherMounting { .. } => {
                 "give support data that have the same mounting, focal length and focal plane: the calibration is an offset from them"
             }

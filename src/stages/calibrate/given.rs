@@ -51,7 +51,10 @@ pub(super) fn control(given: &[MatchedPoint], sigma: ControlSigma) -> Vec<Measur
         });
         let [longitude_rad, latitude_rad, radius_m] = point.laser;
         let place_m = spherical_to_xyz_m(longitude_rad, latitude_rad, radius_m);
-        let known: KnownPlace = known_place(place_m, [sigma.horizontal_m, sigma.vertical_m]);
+        // What the laser errs by, and the matching.
+        let horizontal_m = sigma.horizontal_m.hypot(point.sigma_horizontal_m());
+        let vertical_m = sigma.vertical_m.hypot(point.sigma_m[2]);
+        let known: KnownPlace = known_place(place_m, [horizontal_m, vertical_m]);
         MeasuredPoint {
             name: point.name.clone(),
             measured: measured.collect(),

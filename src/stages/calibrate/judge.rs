@@ -2,18 +2,20 @@
 
 use super::{
     elsewhere::{Noise, elsewhere},
-    result::{CalibrationStep, CameraResult, HeldBack, PointKind, ValidationResult},
+    result::{
+        CalibrationStep, CameraResult, HeldBack, PointKind, Scatter, Scattered, ValidationResult,
+    },
 };
 use crate::{
     config::CalibrationMode,
-    geom::calibration::TieSight,
+    geom::{calibration::TieSight, statistics::unit_weight_limits},
     stages::judge::{Check, CheckKind, CheckOutcome::Fail, Verdict},
 };
 
-/// Residuals of held-back control over their standard deviations: beyond, these are not true.
-const NORMALISED_MAX: f64 = 1.5;
+/// What control misses over what is expected: beyond, standard deviations are not true.
+const SCATTER_MAX: f64 = 1.5;
 /// Below, they are larger than they need be.
-const NORMALISED_MIN: f64 = 0.6;
+const SCATTER_MIN: f64 = 0.6;
 /// Residuals of ties, pixels, beyond which the lines do not see one ground.
 const TIES_MAX_PX: f64 = 1.0;
 /// Share of points that may be left out.
@@ -27,6 +29,7 @@ const ISD_LEFT_PX: f64 = 0.5;
 pub(super) struct Evidence<'a> {
     pub(super) mode: CalibrationMode,
     pub(super) steps: &'a [CalibrationStep],
+    pub(super) used: Option<Scatter>,
     pub(super) held_back: Option<&'a HeldBack>,
     pub(super) cameras: &'a [CameraResult],
     pub(super) sight: &'a TieSight,
@@ -58,12 +61,14 @@ pub(super) fn judge(of: &Evidence<'_>) -> Verdict {
             "no laser control: nothing tells where the camera looks, nor how well ties tell the rest; not seen by ties: {}",
             of.sight.unseen_words()
         )),
-        Some(held_back) if !(held_back.normalised <= NORMALISED_MAX) => reasons.push(format!(
-            "control that was held back lies {:.2} standard deviations from where it should (root mean square); expected \
-             at most {NORMALISED_MAX}: standard deviations are too small, or something else than the camera is wrong",
-            held_back.normalised
-        )),
-        Some(held_back) => reasons.extend(coarse(held_back, of.known)),
+        Some(held_back) => {
+            let scatters = scatters(of);
+            let scattered = scatters.iter().filter_map(Judged::reason);
+            reasons.extend(scattered);
+            if reasons.is_empty() {
+                reasons.extend(coarse(held_back, of.known));
+            }
+        }
     }
     if let Some(last) = of.steps.last() {
         match last.figures.ties.worst_px() {
@@ -101,21 +106,88 @@ pub(super) fn judge(of: &Evidence<'_>) -> Verdict {
     Verdict::of(reasons, remarks, checks)
 }
 
+/// What control misses in the plane or in height, used or held back, and what it may.
+struct Judged {
+    kind: CheckKind,
+    /// In words.
+    what: &'static str,
+    found: Scattered,
+    limit: f64,
+}
+
+impl Judged {
+    /// Why standard deviations are not true, if they are not.
+    fn reason(&self) -> Option<String> {
+        let Self {
+            what, found, limit, ..
+        } = self;
+        // Written so that NaN is a reason.
+        (!(found.sigmas <= *limit)).then(|| {
+            format!(
+                "{what} {:.2} times as far as expected (root mean square); expected at most {limit:.2} times: standard deviations are too \
+                 small, or something else than the camera is wrong",
+                found.sigmas
+            )
+        })
+    }
+}
+
+fn scatters(of: &Evidence<'_>) -> Vec<Judged> {
+    let judged = |kind, what, found: Option<Scattered>| {
+        let found = found?;
+        // Few coordinates scatter more by chance; less than one says nothing. Hundredths are what is printed.
+        let [_, by_chance] = unit_weight_limits(found.coordinates)?;
+        Some(Judged {
+            kind,
+            what,
+            found,
+            limit: SCATTER_MAX.max((100.0 * by_chance).ceil() / 100.0),
+        })
+    };
+    let held_back = of.held_back.map(|of| of.scatter);
+    let both = |of: Option<Scatter>| of.map_or((None, None), |of| (of.plane, of.height));
+    let [(plane, height), (held_plane, held_height)] = [of.used, held_back].map(both);
+    [
+        judged(
+            CheckKind::HeldBackPlane,
+            "control that was held back is off in the plane",
+            held_plane,
+        ),
+        judged(
+            CheckKind::HeldBackHeight,
+            "control that was held back is off in height",
+            held_height,
+        ),
+        judged(
+            CheckKind::ControlPlane,
+            "control that was used is off in the plane",
+            plane,
+        ),
+        judged(
+            CheckKind::ControlHeight,
+            "control that was used is off in height",
+            height,
+        ),
+    ]
+    .into_iter()
+    .flatten()
+    .collect()
+}
+
 fn checks(of: &Evidence<'_>) -> Vec<Check> {
     let check = |kind, found: f64, limit: f64| Check::new(kind, "", found, limit, Fail);
     let mut checks = Vec::new();
     match of.held_back {
         None => checks.push(Check::told(
-            CheckKind::HeldBackControl,
+            CheckKind::HeldBackPlane,
             "no laser control",
             Fail,
         )),
         Some(held_back) => {
-            checks.push(check(
-                CheckKind::HeldBackControl,
-                held_back.normalised,
-                NORMALISED_MAX,
-            ));
+            let scatters = scatters(of).into_iter();
+            checks.extend(
+                scatters.map(|judged| check(judged.kind, judged.found.sigmas, judged.limit)),
+            );
             let known_m = of.known.ground_m;
             let plane = held_back.accuracy_plane_m.map(|found_m| {
                 let known_m = std::f64::consts::SQRT_2 * known_m;
@@ -196,8 +268,11 @@ fn remarks(of: &Evidence<'_>) -> Vec<String> {
         );
     }
     say(
-        of.held_back
-            .is_some_and(|held_back| held_back.normalised < NORMALISED_MIN),
+        of.held_back.is_some_and(|held_back| {
+            let Scatter { plane, height } = held_back.scatter;
+            let both = [plane, height].into_iter().flatten();
+            both.clone().next().is_some() && both.into_iter().all(|of| of.sigmas < SCATTER_MIN)
+        }),
         "control that was held back fits better than its standard deviations say: they may be smaller".to_owned(),
     );
     for camera in of.cameras {

@@ -84,7 +84,7 @@ fn control(
             }
         }
         if of.point.sights.len() > 1
-            && let Ok(place_m) = of.unaided().place(state)
+            && let Ok(place_m) = of.point.unaided().place(state)
         {
             heights.add(place_m.norm() - known.place_m.norm());
         }

@@ -31,8 +31,8 @@ pub use error::CalibrateError;
 pub use given::GivenPoints;
 pub use result::{
     Calibration, CalibrationRound, CalibrationStep, CameraResult, ControlFigures, Figures,
-    HeldBack, ImageResult, PixelsAndMetres, PointKind, PointResult, Rounds, TieFigures,
-    ValidationResult, Value,
+    HeldBack, ImageResult, PixelsAndMetres, PointKind, PointResult, Rounds, Scatter, Scattered,
+    TieFigures, ValidationResult, Value,
 };
 pub use run::calibrate_given;
 

@@ -7,20 +7,24 @@ use super::{
     geometry::{Laboratory, Orbit},
     measure::Squares,
     read::OrbitPoint,
-    result::{CameraResult, HeldBack, ImageResult, PointKind, PointResult, Value},
+    result::{
+        CameraResult, HeldBack, ImageResult, PointKind, PointResult, Scatter, Scattered, Value,
+    },
     support::calibrated,
 };
 use crate::{
     config::CalibrationConfig,
     error::Result,
     geom::{
-        calibration::{CalibrationState, GroundPoint},
+        calibration::{CalibrationState, GroundPoint, Missed, TookPart},
         ellipsoid::local_axes,
     },
 };
 
 /// Places at which look directions are compared, `s′`.
 const COMPARED_AT: [f64; 3] = [-1.0, 0.0, 1.0];
+/// Fewer coordinates than this are left over by rounding alone.
+const EXPECTED_MIN: f64 = 0.01;
 
 /// A calibration that is done.
 pub(super) struct Outcome<'a> {
@@ -49,6 +53,14 @@ pub(super) fn drift(
             value: state.drift_m_per_line[axis],
             sigma: variance.sqrt().hypot(turned_m[axis]),
         }
+    })
+}
+
+/// None where what is expected is rounding: the calibration follows every point.
+fn scattered(of: Missed) -> Option<Scattered> {
+    (of.expected >= EXPECTED_MIN).then(|| Scattered {
+        sigmas: (of.square / of.expected).sqrt(),
+        coordinates: of.expected,
     })
 }
 
@@ -90,22 +102,44 @@ impl Outcome<'_> {
         Ok(cameras)
     }
 
+    /// What control of a kind misses over what is expected; none without such points.
+    ///
+    /// # Errors
+    /// A point that the calibrated cameras cannot see.
+    pub(super) fn scatter(
+        &self,
+        kind: PointKind,
+    ) -> std::result::Result<Option<Scatter>, CalibrateError> {
+        let took_part = match kind {
+            PointKind::HeldBack => TookPart::No,
+            PointKind::Tie | PointKind::Control => TookPart::Yes,
+        };
+        let (mut plane, mut height, mut points) = (Missed::default(), Missed::default(), 0_u32);
+        for of in self.points.iter().filter(|of| of.is(kind)) {
+            let misfit = of.point.misfit(self.state, self.covariance, took_part);
+            let misfit = misfit.map_err(|why| CalibrateError::Unseen {
+                point: of.name.clone(),
+                problem: why.to_string(),
+            })?;
+            let Some(misfit) = misfit else { continue };
+            plane = plane.and(misfit.plane);
+            height = height.and(misfit.height.unwrap_or_default());
+            points += 1;
+        }
+        Ok((points > 0).then(|| Scatter {
+            plane: scattered(plane),
+            height: scattered(height),
+        }))
+    }
+
     /// What the control that was held back says; none without such points.
     ///
     /// # Errors
     /// A point that the calibrated cameras cannot see.
     pub(super) fn held_back(&self) -> std::result::Result<Option<HeldBack>, CalibrateError> {
-        let mut normalised = 0.0;
         let (mut plane, mut height) = (Squares::default(), Squares::default());
         let (mut sum_m, mut intersected, mut points) = (Vector3::zeros(), 0_u32, 0_u32);
         for of in self.points.iter().filter(|of| of.is(PointKind::HeldBack)) {
-            let misfit = of.point.misfit(self.state, self.covariance);
-            let misfit = misfit.map_err(|why| CalibrateError::HeldBack {
-                point: of.name.clone(),
-                problem: why.to_string(),
-            })?;
-            let Some(misfit) = misfit else { continue };
-            normalised += misfit.normalised_square;
             points += 1;
             if let Some(off_m) = self.off_m(of) {
                 plane.add(off_m.xy().norm());
@@ -114,21 +148,27 @@ impl Outcome<'_> {
                 intersected += 1;
             }
         }
-        if points == 0 {
+        let Some(scatter) = self.scatter(PointKind::HeldBack)? else {
             return Ok(None);
-        }
-        let normalised = (normalised / f64::from(points)).sqrt();
-        let wider = normalised.max(1.0);
+        };
+        let used = self.scatter(PointKind::Control)?;
+        // What scatters says that standard deviations are too small, whichever side it is on.
+        let wider = |of: fn(&Scatter) -> Option<Scattered>| {
+            let both = [Some(scatter), used].into_iter().flatten();
+            let sigmas = both.filter_map(|both| Some(of(&both)?.sigmas));
+            sigmas.fold(1.0, f64::max)
+        };
+        let [wider_plane, wider_height] = [wider(|of| of.plane), wider(|of| of.height)];
         let (mut stated_plane, mut stated_height) = (Squares::default(), Squares::default());
         for of in self.points.iter().filter(|of| of.is(PointKind::Tie)) {
             if let Some([east, north, up]) = self.placed(of).and_then(|of| of.1) {
-                stated_plane.add(east.hypot(north) * wider);
-                stated_height.add(up * wider);
+                stated_plane.add(east.hypot(north) * wider_plane);
+                stated_height.add(up * wider_height);
             }
         }
         Ok(Some(HeldBack {
             points: points.into(),
-            normalised,
+            scatter,
             intersected: intersected.into(),
             plane_m: plane.rms(),
             height_m: height.rms(),
@@ -140,7 +180,7 @@ impl Outcome<'_> {
 
     /// A point's place by its images alone, and its standard deviations east, north and up, metres.
     fn placed(&self, of: &OrbitPoint) -> Option<(Vector3<f64>, Option<[f64; 3]>)> {
-        let unaided: GroundPoint = of.unaided();
+        let unaided: GroundPoint = of.point.unaided();
         let place_m = unaided.place(self.state).ok()?;
         let covariance = unaided.covariance_m2(self.state, self.covariance, &place_m);
         let sigma_m = covariance.ok().map(|covariance| {
@@ -154,7 +194,7 @@ impl Outcome<'_> {
     /// Intersected minus the laser's place, east, north and up, metres.
     fn off_m(&self, of: &OrbitPoint) -> Option<Vector3<f64>> {
         let known = of.point.known?;
-        let place_m = of.unaided().place(self.state).ok()?;
+        let place_m = of.point.unaided().place(self.state).ok()?;
         let off_m = local_axes(&known.place_m) * (place_m - known.place_m);
         Some(off_m)
     }

@@ -35,14 +35,6 @@ impl OrbitPoint {
     pub(super) fn is(&self, kind: PointKind) -> bool {
         self.kind == kind && !self.left_out
     }
-
-    /// The point by its images alone.
-    pub(super) fn unaided(&self) -> GroundPoint {
-        GroundPoint {
-            sights: self.point.sights.clone(),
-            known: None,
-        }
-    }
 }
 
 /// Where the points of an orbit come from.

@@ -18,6 +18,8 @@ pub struct Calibration {
     pub tie_sight: TieSight,
     /// The figures after every step, the first before any.
     pub steps: Vec<CalibrationStep>,
+    /// What the control that was used says; none without control.
+    pub used: Option<Scatter>,
     /// What the control that was held back says; none without control.
     pub held_back: Option<HeldBack>,
     /// The rounds of a calibration from pixels, of which this is the last.
@@ -155,8 +157,8 @@ pub struct PixelsAndMetres {
 pub struct HeldBack {
     /// Points.
     pub points: u64,
-    /// Root mean square residual over its standard deviation, which has measurement, laser and calibration in it.
-    pub normalised: f64,
+    /// What they miss over what is expected.
+    pub scatter: Scatter,
     /// How many of them are in two cameras or more, whose places are intersected.
     pub intersected: u64,
     /// Root mean square of intersected minus laser's place, horizontally, metres: errors of the laser and of the measurement
@@ -169,13 +171,36 @@ pub struct HeldBack {
     /// Mean of the same east, north and up, metres.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub mean_m: Option<[f64; 3]>,
-    /// Stated accuracy of a tie point in the plane, metres: root mean square of the standard deviations, larger by
-    /// `normalised` where that is above 1.
+    /// Stated accuracy of a tie point in the plane, metres: root mean square of the standard deviations, so many times larger as
+    /// control scatters, used or held back, beyond what is expected of it in the plane.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub accuracy_plane_m: Option<f64>,
     /// Likewise of its height, metres.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub accuracy_height_m: Option<f64>,
+}
+
+/// Root mean square of what control misses over what measurement, laser and calibration let expect: near 1 when standard deviations are
+/// true. In the plane and in height apart, as errors of the one hide behind too large standard deviations of the other.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Scatter {
+    /// East and north; none where the calibration follows every point.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub plane: Option<Scattered>,
+    /// Up, of points in two cameras or more; none without such a point.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub height: Option<Scattered>,
+}
+
+/// A root mean square over what is expected.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Scattered {
+    /// It.
+    #[schemars(range(min = 0.0))]
+    pub sigmas: f64,
+    /// Of how many coordinates; of points that were used less, as the calibration follows them.
+    #[schemars(range(min = 0.0))]
+    pub coordinates: f64,
 }
 
 /// A calibration in rounds.
@@ -216,8 +241,8 @@ pub struct CalibrationRound {
     pub held_back: PixelsAndMetres,
     /// Residuals of control in the lines that see it, root mean square, pixels, by the number of its unit.
     pub unit_px: BTreeMap<usize, f64>,
-    /// Residuals of control that was held back in their standard deviations, root mean square.
-    pub held_back_sigmas: Option<f64>,
+    /// What control that was held back misses over what is expected.
+    pub held_back_scatter: Option<Scatter>,
     /// φ, ω and κ of every line, radians.
     pub angles_rad: Vec<[f64; 3]>,
     /// Drift of the orbit, metres a line.

@@ -67,7 +67,7 @@ impl CalibrationRound {
             control: rms(PointKind::Control),
             held_back: rms(PointKind::HeldBack),
             unit_px: unit_px(control, done),
-            held_back_sigmas: done.held_back.as_ref().map(|of| of.normalised),
+            held_back_scatter: done.held_back.as_ref().map(|of| of.scatter),
             angles_rad: done
                 .cameras
                 .iter()

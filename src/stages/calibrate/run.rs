@@ -126,10 +126,12 @@ fn calibrate_by(
         covariance: &work.covariance,
     };
     let cameras = outcome.cameras()?;
+    let used = outcome.scatter(PointKind::Control)?;
     let held_back = outcome.held_back()?;
     let verdict = judge(&Evidence {
         mode: config.solution.mode,
         steps: &work.steps,
+        used,
         held_back: held_back.as_ref(),
         cameras: &cameras,
         sight: &sight,
@@ -153,6 +155,7 @@ fn calibrate_by(
         points: outcome.points(),
         images: outcome.images(),
         cameras,
+        used,
         held_back,
         rounds: None,
         validation,

@@ -113,7 +113,11 @@ fn noise(points: &[OrbitPoint], state: &CalibrationState) -> Noise {
             let [across, along] = sight.sigma.map(|sigma| sigma * range_m);
             plane.add(east_m.hypot(north_m).hypot(across.hypot(along)));
         }
-        if let Ok(covariance) = of.unaided().covariance_m2(state, &exact, &known.place_m) {
+        if let Ok(covariance) = of
+            .point
+            .unaided()
+            .covariance_m2(state, &exact, &known.place_m)
+        {
             let up = known.place_m.normalize();
             height.add((up.dot(&(covariance * up))).max(0.0).sqrt().hypot(up_m));
         }

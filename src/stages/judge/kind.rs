@@ -75,8 +75,14 @@ pub enum CheckKind {
     TableError,
     /// Records that could not be read.
     SkippedRecords,
-    /// Laser control that was held back from a calibration: root mean square of its residuals in their standard deviations.
-    HeldBackControl,
+    /// What laser control that was held back from a calibration misses in the plane, over what is expected.
+    HeldBackPlane,
+    /// The same in height.
+    HeldBackHeight,
+    /// What laser control that a calibration used misses in the plane, over what is expected.
+    ControlPlane,
+    /// The same in height.
+    ControlHeight,
     /// By how much control of an orbit that took no part in a calibration becomes worse, in standard deviations.
     OtherOrbits,
     /// How well a calibration places a tie point in the plane, beside what was known beforehand.
@@ -153,7 +159,10 @@ impl CheckKind {
             Self::PointingRmse => "Pointing model, RMSE",
             Self::TableError => "Camera table, interpolation error",
             Self::SkippedRecords => "Records skipped",
-            Self::HeldBackControl => "Control held back, off by",
+            Self::HeldBackPlane => "Control held back, off in the plane",
+            Self::HeldBackHeight => "Control held back, off in height",
+            Self::ControlPlane => "Control used, off in the plane",
+            Self::ControlHeight => "Control used, off in height",
             Self::OtherOrbits => "Control of other orbits, worse by",
             Self::PlaceKnown => "Tie points known in the plane",
             Self::HeightKnown => "Tie points known in height",
@@ -211,7 +220,10 @@ impl CheckKind {
             | Self::TieResidualsAcross
             | Self::Correction
             | Self::Boresight
-            | Self::HeldBackControl
+            | Self::HeldBackPlane
+            | Self::HeldBackHeight
+            | Self::ControlPlane
+            | Self::ControlHeight
             | Self::OtherOrbits => "σ",
             Self::RoundShift => "cells",
             Self::ClockCorrection => "s",
@@ -278,6 +290,10 @@ impl CheckKind {
             | Self::Decoding
             | Self::PositionRmse
             | Self::LinesAgree
+            | Self::HeldBackPlane
+            | Self::HeldBackHeight
+            | Self::ControlPlane
+            | Self::ControlHeight
             | Self::RoundShift => 2,
             _ => 1,
         }

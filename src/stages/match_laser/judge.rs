@@ -1,7 +1,7 @@
 //! The verdict on a match.
 
 use super::{
-    result::{HeldOut, UnitResult},
+    result::{HeldOut, UnitResult, Widened},
     similarity::Similarity,
 };
 use crate::stages::judge::{
@@ -19,6 +19,8 @@ const AGREE_MIN: f64 = 0.5;
 /// a bias costs half a per cent of similarity; and never beyond so many metres (the fact sheet's limit).
 const BIAS_SHARE: f64 = 0.1;
 const BIAS_MAX_M: f64 = 100.0;
+/// Standard deviations are widened so many times without a word.
+const WIDENED_MAX: f64 = 2.0;
 /// What the two spheres in use for Mars differ by, and how near a bias is to be taken for it, metres.
 const SPHERES_M: [f64; 2] = [190.0, 25.0];
 
@@ -57,6 +59,7 @@ pub(super) struct Evidence<'a> {
     /// Whether the measure was chosen by it.
     pub(super) is_auto: bool,
     pub(super) held_out: Option<HeldOut>,
+    pub(super) widened: Option<Widened>,
     /// Limit on held-out shots.
     pub(super) limit_m: f64,
     /// Whether somebody said what heights of the model count from.
@@ -94,6 +97,7 @@ pub(super) fn judge(of: &Evidence<'_>) -> Verdict {
         reasons.extend(wrong);
         remarks.extend(doubt);
     }
+    remarks.extend(of.widened.and_then(scattered));
     let refused = of.units.len() - kept;
     if refused > 0 {
         remarks.push(format!(
@@ -147,6 +151,17 @@ fn checks(of: &Evidence<'_>, kept: usize) -> Vec<Check> {
         Check::new(CheckKind::ModelBias, "", bias_m, limit_m, broken)
     }));
     checks
+}
+
+/// That units scatter far more than their shots say, if they do.
+fn scattered(widened: Widened) -> Option<String> {
+    let Widened { shift, bias } = widened;
+    (shift.max(bias) > WIDENED_MAX).then(|| {
+        format!(
+            "units scatter more than their shots say, shifts {shift:.1} times and biases {bias:.1} times: the model errs in common over \
+             the shots of a unit; standard deviations are so much wider"
+        )
+    })
 }
 
 /// What is wrong with a bias, and what is doubtful.

@@ -10,6 +10,7 @@ mod error;
 mod images;
 mod judge;
 mod result;
+mod scatter;
 mod search;
 mod settle;
 mod shots;
@@ -25,14 +26,15 @@ use self::{
     clusters::clusters,
     images::enter,
     judge::{Evidence, bias_limit_m, judge, pooled},
+    scatter::widen,
     shots::{Shot, is_kept, shots_over},
     units::{Unit, refuse_lonely},
 };
 pub use self::{
     error::MatchError,
     result::{
-        HeldBackGround, HeldOut, LaserMatch, MatchImage, MatchOptions, MatchRequest, MatchedPoint,
-        ModelRequest, UnitMatch, UnitResult,
+        HeldBackGround, HeldOut, LaserMatch, MatchImage, MatchOptions, MatchRequest, MatchSigma,
+        MatchedPoint, ModelRequest, UnitMatch, UnitResult, Widened,
     },
     similarity::{Moments, Similarity},
 };
@@ -59,7 +61,7 @@ stage_inputs! {
 
 impl Stage for MatchLaser<'_> {
     const NAME: &'static str = "match_laser";
-    const METHOD: u32 = 2;
+    const METHOD: u32 = 3;
     type Output = LaserMatch;
     stage_inputs!(fingerprint);
 
@@ -230,6 +232,7 @@ fn matched(
     Stopped::check(stop)?;
     let mut search = searched(grid, &units, options);
     let matching = refuse_lonely(&mut search.units, options.search_cells);
+    let widened = widen(&mut search.units, grid.cell_m());
     let points = units.iter().zip(&search.units);
     let points = points.filter(|(_, told)| told.is_kept());
     let mut points: Vec<MatchedPoint> = points
@@ -259,6 +262,7 @@ fn matched(
         located_m: search.located_m,
         is_auto: options.similarity.is_none(),
         held_out,
+        widened,
         limit_m: options.limit_m,
         radius_is_stated: asked.radius_is_stated,
         complaints: complaint_count,
@@ -274,6 +278,7 @@ fn matched(
         located_bias_m: search.located_m.map(|[bias_m, _]| bias_m),
         bias_m,
         held_out,
+        widened,
         units: search.units,
         points,
         images,

@@ -24,8 +24,6 @@ pub struct MatchOptions {
     pub similarity: Option<Similarity>,
     /// Shifts are tried within so many cells.
     pub search_cells: u32,
-    /// Whether least squares find the place between cells, beginning at that of a quadratic through similarities.
-    pub settles: bool,
     /// Similarity that a unit must exceed.
     pub least_score: f64,
     /// What the best similarity over the mean of those above 0 must exceed.
@@ -117,6 +115,8 @@ pub struct LaserMatch {
     pub bias_m: Option<f64>,
     /// Of the kept units all shots that were held out.
     pub held_out: Option<HeldOut>,
+    /// By how much their standard deviations were widened; none of too few units.
+    pub widened: Option<Widened>,
     /// Every unit, kept or not.
     pub units: Vec<UnitResult>,
     /// A control point of every kept unit.
@@ -190,6 +190,38 @@ pub struct UnitMatch {
     pub contrast: f64,
     /// Mean of model minus laser over the shots that were used, metres.
     pub bias_m: f64,
+    /// Standard deviations; none where least squares have no place.
+    pub sigma: Option<MatchSigma>,
+}
+
+/// Standard deviations of a unit: those of leaving out single shots, widened as all units ask for ([`Widened`]). Errors of the laser
+/// that its shots share are not in them.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct MatchSigma {
+    /// Of the shift to the east and the north, metres.
+    pub shift_m: [f64; 2],
+    /// Of model minus laser, metres.
+    pub bias_m: f64,
+}
+
+impl MatchSigma {
+    /// The same, so many times as wide.
+    pub(super) fn wider(self, by: Widened) -> Self {
+        Self {
+            shift_m: self.shift_m.map(|sigma_m| by.shift * sigma_m),
+            bias_m: by.bias * self.bias_m,
+        }
+    }
+}
+
+/// By how much standard deviations of units were widened, 1 and more: by as much units scatter about a plane over the ground beyond
+/// what leaving out their shots says. A model errs in common over the shots of a unit, which these cannot tell.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Widened {
+    /// Of shifts.
+    pub shift: f64,
+    /// Of biases.
+    pub bias: f64,
 }
 
 /// A laser control point: the shot of a unit that lies nearest to its bias.
@@ -205,6 +237,17 @@ pub struct MatchedPoint {
     pub laser: [f64; 3],
     /// The same where the model has it.
     pub model: [f64; 3],
+    /// Standard deviations of what the two differ by towards the east, the north and up, metres, by the matching alone.
+    pub sigma_m: [f64; 3],
     /// Line and sample in each image, where the image shows it.
     pub in_images: Vec<Option<[f64; 2]>>,
+}
+
+impl MatchedPoint {
+    /// Standard deviation of a horizontal coordinate, metres: root mean square of east and north.
+    #[must_use]
+    pub fn sigma_horizontal_m(&self) -> f64 {
+        let [east_m, north_m, _] = self.sigma_m;
+        std::f64::consts::FRAC_1_SQRT_2 * east_m.hypot(north_m)
+    }
 }

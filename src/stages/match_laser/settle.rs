@@ -1,7 +1,11 @@
-//! The place of a unit between cells by least squares: where model and laser differ least about a bias.
+//! The place of a unit between cells by least squares: where model and laser differ least about a bias, and how well that is known.
 //!
-//! A quadratic through similarities a cell apart errs by tenths of a cell on ground that is rough within a cell. Once a model lies within
-//! a cell of the laser that is more than there is to find, and shots that were held out do not bear it out.
+//! A quadratic through similarities a cell apart errs by tenths of a cell on ground that is rough within a cell. Standard deviations are
+//! those of leaving out one shot after the other, as the model errs by other amounts here than there.
+//!
+//! # Source
+//! Leaving out: MacKinnon & White 1985, *Some heteroskedasticity-consistent covariance matrix estimators*, HC3, which is the jackknife of
+//! a linear model.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -9,18 +13,48 @@ use super::{search::shifted_m, shots::Shot};
 use crate::geom::height_grid::HeightGrid;
 
 /// Steps that are tried, and the length of the last, cells.
-const STEPS: usize = 12;
+const STEPS: usize = 30;
 const STEP: f64 = 1e-3;
 /// Slopes are taken over so many cells to either side.
 const SIDE: f64 = 0.5;
 /// A place farther from where similarity has it is another one, cells.
 const FAR: f64 = 1.0;
+/// Leverage of a shot from which the place is what this shot makes it: the others leave it open.
+const LEVERAGE_MAX: f64 = 0.9;
 
-/// The shift near `from` at which differences of `shots` are least; none where steps lead away.
-pub(super) fn settled(grid: &HeightGrid, shots: &[&Shot], from: [f64; 2]) -> Option<[f64; 2]> {
-    let mut shift = from;
-    for _ in 0..STEPS {
+/// Where least squares have a unit.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Settled {
+    /// Rows (southwards) and columns (eastwards), cells.
+    pub(super) shift: [f64; 2],
+    /// Standard deviations of these, cells.
+    pub(super) sigma_cells: [f64; 2],
+    /// Standard deviation of the bias, metres.
+    pub(super) sigma_bias_m: f64,
+}
+
+/// Why least squares have no place for a unit.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub(super) enum Unsettled {
+    /// Steps lead away, or do not end.
+    #[error("least squares find no place within a cell of its best shift")]
+    NotFound,
+    /// Without one of the shots the place would be open.
+    #[error("its place hangs on one shot")]
+    OneShot,
+}
+
+/// Differences of model and laser about a shift: normal equations of bias and shift, and of every shot its row and what it misses.
+struct Linear {
+    normals: Matrix3<f64>,
+    right: Vector3<f64>,
+    shots: Vec<(Vector3<f64>, f64)>,
+}
+
+impl Linear {
+    fn at(grid: &HeightGrid, shots: &[&Shot], shift: [f64; 2]) -> Self {
         let (mut normals, mut right) = (Matrix3::zeros(), Vector3::zeros());
+        let mut rows = Vec::with_capacity(shots.len());
         for shot in shots {
             let at =
                 |row: f64, column: f64| shifted_m(grid, shot, [shift[0] + row, shift[1] + column]);
@@ -30,21 +64,72 @@ pub(super) fn settled(grid: &HeightGrid, shots: &[&Shot], from: [f64; 2]) -> Opt
             let slopes = slope([SIDE, 0.0]).zip(slope([0.0, SIDE]));
             if let Some((here_m, (south, east))) = at(0.0, 0.0).zip(slopes) {
                 let row = Vector3::new(1.0, south, east);
+                let missed_m = shot.height_m - here_m;
                 normals += row * row.transpose();
-                right += row * (shot.height_m - here_m);
+                right += row * missed_m;
+                rows.push((row, missed_m));
             }
         }
-        let step = normals.cholesky()?.solve(&right);
-        shift = [shift[0] + step[1], shift[1] + step[2]];
+        Self {
+            normals,
+            right,
+            shots: rows,
+        }
+    }
+
+    /// Standard deviations of bias and shift by leaving out one shot after the other.
+    fn sigmas(&self) -> Result<[f64; 3], Unsettled> {
+        let inverse = self.normals.try_inverse().ok_or(Unsettled::NotFound)?;
+        let solved = inverse * self.right;
+        let mut covariance = Matrix3::zeros();
+        for (row, missed_m) in &self.shots {
+            let leverage = row.dot(&(inverse * row));
+            if !(leverage < LEVERAGE_MAX) {
+                return Err(Unsettled::OneShot);
+            }
+            let moved = inverse * row * ((missed_m - row.dot(&solved)) / (1.0 - leverage));
+            covariance += moved * moved.transpose();
+        }
+        Ok([0, 1, 2].map(|axis| covariance[(axis, axis)].sqrt()))
+    }
+}
+
+/// The shift near `from`, rows and columns, at which differences of `shots` are least, with its standard deviations.
+///
+/// # Errors
+/// [`Unsettled`].
+pub(super) fn settled(
+    grid: &HeightGrid,
+    shots: &[&Shot],
+    from: [f64; 2],
+) -> Result<Settled, Unsettled> {
+    let mut shift = from;
+    let (mut damping, mut last) = (1.0, [0.0; 2]);
+    for _ in 0..STEPS {
+        let linear = Linear::at(grid, shots, shift);
+        let solved = linear.normals.cholesky().ok_or(Unsettled::NotFound)?;
+        let step = solved.solve(&linear.right);
+        let step = [step[1], step[2]];
+        // On ground that is rough within a cell whole steps may lead to and fro for ever.
+        if step[0] * last[0] + step[1] * last[1] < 0.0 {
+            damping *= 0.5;
+        }
+        last = step;
+        shift = [0, 1].map(|axis| shift[axis] + damping * step[axis]);
         let is_near = [0, 1]
             .iter()
             .all(|axis| (shift[*axis] - from[*axis]).abs() <= FAR);
         if !is_near {
-            return None;
+            return Err(Unsettled::NotFound);
         }
-        if step[1].hypot(step[2]) < STEP {
-            return Some(shift);
+        if damping * step[0].hypot(step[1]) < STEP {
+            let [sigma_bias_m, south, east] = Linear::at(grid, shots, shift).sigmas()?;
+            return Ok(Settled {
+                shift,
+                sigma_cells: [south, east],
+                sigma_bias_m,
+            });
         }
     }
-    None
+    Err(Unsettled::NotFound)
 }

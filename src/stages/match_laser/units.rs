@@ -1,9 +1,9 @@
 //! Units: their search, and what shots say that took no part in it.
 
 use super::{
-    result::{HeldOut, MatchOptions, MatchedPoint, UnitMatch, UnitResult},
+    result::{HeldOut, MatchOptions, MatchSigma, MatchedPoint, UnitMatch, UnitResult},
     search::{Best, find, is_one_relief, moments, rms_m, shifted_m},
-    settle::settled,
+    settle::{Settled, settled},
     shots::Shot,
     similarity::Similarity,
 };
@@ -110,17 +110,15 @@ impl<'a> Unit<'a> {
         let Some(mut best) = find(grid, &self.used, measure, options.search_cells) else {
             return "the model has no heights, or no relief, around its shots".to_owned();
         };
-        if options.settles
-            && !best.at_border
-            && let Some(shift) = settled(grid, &self.used, best.shift)
-        {
-            best.shift = shift;
+        let settled = settled(grid, &self.used, best.shift);
+        if let Ok(settled) = &settled {
+            best.shift = settled.shift;
         }
         let Some(at_best) = moments(grid, &self.used, best.shift) else {
             return "the model has too few heights at its best shift".to_owned();
         };
         let bias_m = at_best.bias();
-        told.found = Some(found(grid, &best, bias_m));
+        told.found = Some(found(grid, &best, bias_m, settled.ok()));
         told.held_out = self.held_out(grid, best.shift, bias_m);
         let [model_m, laser_m] = at_best.variances().map(f64::sqrt);
         let wrong = [
@@ -153,6 +151,7 @@ impl<'a> Unit<'a> {
             .into_iter()
             .find_map(|(is_so, why)| is_so.then_some(why));
         wrong
+            .or_else(|| settled.err().map(|why| why.to_string()))
             .or_else(|| not_better(told.held_out.as_ref(), best.shift))
             .unwrap_or_default()
     }
@@ -171,6 +170,7 @@ impl<'a> Unit<'a> {
     /// is no accident of its own.
     pub(super) fn point(&self, grid: &HeightGrid, told: &UnitResult) -> Option<MatchedPoint> {
         let found = told.found.as_ref()?;
+        let sigma = found.sigma?;
         let [east, north] = found.shift_cells;
         let shift = [-north, east];
         let off_m = |shot: &Shot| {
@@ -191,12 +191,13 @@ impl<'a> Unit<'a> {
             name: shot.name.clone(),
             laser: [shot.longitude_rad, shot.latitude_rad, shot.radius_m],
             model: [longitude_rad, latitude_rad, grid.radius_m + height_m],
+            sigma_m: [sigma.shift_m[0], sigma.shift_m[1], sigma.bias_m],
             in_images: Vec::new(),
         })
     }
 }
 
-fn found(grid: &HeightGrid, best: &Best, bias_m: f64) -> UnitMatch {
+fn found(grid: &HeightGrid, best: &Best, bias_m: f64, settled: Option<Settled>) -> UnitMatch {
     let [south, east] = best.shift;
     // Not −south: no shift has no sign.
     let shift_cells = [east, 0.0 - south];
@@ -208,6 +209,14 @@ fn found(grid: &HeightGrid, best: &Best, bias_m: f64) -> UnitMatch {
         score: best.score,
         contrast: best.contrast,
         bias_m,
+        sigma: settled.map(|of| {
+            let [south, east] = of.sigma_cells;
+            let [east_m, north_m] = grid.cell_m();
+            MatchSigma {
+                shift_m: [east * east_m, south * north_m],
+                bias_m: of.sigma_bias_m,
+            }
+        }),
     }
 }
 
