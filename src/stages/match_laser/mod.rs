@@ -14,6 +14,7 @@ mod search;
 mod settle;
 mod shots;
 mod similarity;
+mod surface;
 mod units;
 
 use std::{collections::BTreeMap, path::PathBuf, sync::atomic::AtomicBool};
@@ -35,6 +36,7 @@ pub use self::{
         ModelRequest, UnitMatch, UnitResult,
     },
     similarity::{Moments, Similarity},
+    surface::SimilaritySurface,
 };
 use super::line_camera::LineCamera;
 use crate::{
@@ -59,7 +61,7 @@ stage_inputs! {
 
 impl Stage for MatchLaser<'_> {
     const NAME: &'static str = "match_laser";
-    const METHOD: u32 = 2;
+    const METHOD: u32 = 3;
     type Output = LaserMatch;
     stage_inputs!(fingerprint);
 
@@ -98,6 +100,7 @@ pub fn match_laser(request: &MatchRequest, stop: &AtomicBool) -> Result<LaserMat
         options: &request.options,
         held_back: None,
         radius_is_stated: request.radius_m.is_some(),
+        has_surfaces: true,
     };
     Ok(matched(&asked, None, stop)?.0)
 }
@@ -151,6 +154,7 @@ pub fn match_model(
         held_back: Some(request.held_back),
         // Its heights count from where its cameras have them.
         radius_is_stated: true,
+        has_surfaces: false,
     };
     matched(&asked, units, stop)
 }
@@ -205,6 +209,8 @@ struct Asked<'a> {
     held_back: Option<HeldBackGround>,
     /// Whether somebody said what heights of the model count from.
     radius_is_stated: bool,
+    /// Whether pages show the similarities of units.
+    has_surfaces: bool,
 }
 
 fn matched(
@@ -230,6 +236,10 @@ fn matched(
     Stopped::check(stop)?;
     let mut search = searched(grid, &units, options);
     let matching = refuse_lonely(&mut search.units, options.search_cells);
+    if asked.has_surfaces {
+        Stopped::check(stop)?;
+        enter_surfaces(grid, &units, &mut search, options.search_cells);
+    }
     let points = units.iter().zip(&search.units);
     let points = points.filter(|(_, told)| told.is_kept());
     let mut points: Vec<MatchedPoint> = points
@@ -357,6 +367,15 @@ fn searched(grid: &HeightGrid, units: &[Unit<'_>], options: &MatchOptions) -> Se
         measure,
         located_m,
     }
+}
+
+/// Enters similarities at all shifts by the measure that ran, of every unit that was searched. They are computed for themselves,
+/// since most searches, of a calibration's rounds or of another measure, come on no page.
+fn enter_surfaces(grid: &HeightGrid, units: &[Unit<'_>], search: &mut Searched, reach: u32) {
+    let measure = search.measure;
+    let each = units.par_iter().zip(&mut search.units);
+    each.filter(|(_, told)| told.found.is_some())
+        .for_each(|(unit, told)| told.similarity = Some(unit.surface(grid, measure, reach)));
 }
 
 /// Median of model minus laser over the units that are kept and do not judge, metres.
