@@ -13,6 +13,8 @@
 mod common;
 #[path = "match_laser/model.rs"]
 mod model;
+#[path = "match_laser/pictures.rs"]
+mod pictures;
 #[path = "match_laser/refused.rs"]
 mod refused;
 #[path = "match_laser/sigma.rs"]

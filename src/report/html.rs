@@ -386,7 +386,11 @@ fn within(place: &str) -> String {
 
 /// A number of things, in the plural where there are several.
 pub(super) fn counted(count: usize, what: &str) -> String {
-    let plural = if count == 1 { "" } else { "s" };
+    let plural = match count {
+        1 => "",
+        _ if what.ends_with('s') => "es",
+        _ => "s",
+    };
     format!("{} {what}{plural}", whole(count))
 }
 
@@ -424,6 +428,13 @@ mod tests {
             folded("a & b", "<p>c</p>").starts_with("<details class=\"more\"><summary>a &amp; b")
         );
         assert!(folded_unless(true, "a", "<p>c</p>").starts_with("<details class=\"more\" open>"));
+    }
+
+    #[test]
+    fn several_things_are_in_the_plural() {
+        assert_eq!(counted(1, "pass"), "1 pass");
+        assert_eq!(counted(2, "pass"), "2 passes");
+        assert_eq!(counted(0, "shot"), "0 shots");
     }
 
     #[test]

@@ -1,4 +1,7 @@
-//! The page of a match of laser profiles with a terrain model: verdict, map of the shifts, held-out shots, every unit.
+//! The page of a match of laser profiles with a terrain model: verdict, map of the shifts, held-out shots, every unit and its
+//! similarities.
+
+mod similarity;
 
 use super::{
     checks,
@@ -24,6 +27,7 @@ pub fn match_page(of: &LaserMatch) -> Result<String> {
         Section::new("Shifts", map(of)?),
         Section::new("Held-out shots", held_out(of)?),
         Section::new("Units", units(of)),
+        Section::new("Similarity", similarity::pictures(of)?),
         Section::new("Left out", list(&of.complaints)),
     ];
     Ok(page(
@@ -69,7 +73,7 @@ fn lead(of: &LaserMatch) -> String {
     let made = format!(
         "{} in {}, {} of {} segments with relief, cells of {east_m:.1} by {north_m:.1} m, heights above {} m. The measure was {}.",
         counted(of.shots, "shot"),
-        counted(of.tracks, "pass").replace("passs", "passes"),
+        counted(of.tracks, "pass"),
         of.segments_kept,
         of.segments,
         of.radius_m,

@@ -15,6 +15,7 @@ mod search;
 mod settle;
 mod shots;
 mod similarity;
+mod surface;
 mod units;
 
 use std::{collections::BTreeMap, path::PathBuf, sync::atomic::AtomicBool};
@@ -37,6 +38,7 @@ pub use self::{
         MatchedPoint, ModelRequest, UnitMatch, UnitResult, Widened,
     },
     similarity::{Moments, Similarity},
+    surface::SimilaritySurface,
 };
 use super::line_camera::LineCamera;
 use crate::{
@@ -100,6 +102,7 @@ pub fn match_laser(request: &MatchRequest, stop: &AtomicBool) -> Result<LaserMat
         options: &request.options,
         held_back: None,
         radius_is_stated: request.radius_m.is_some(),
+        has_surfaces: true,
     };
     Ok(matched(&asked, None, stop)?.0)
 }
@@ -153,6 +156,7 @@ pub fn match_model(
         held_back: Some(request.held_back),
         // Its heights count from where its cameras have them.
         radius_is_stated: true,
+        has_surfaces: false,
     };
     matched(&asked, units, stop)
 }
@@ -207,6 +211,8 @@ struct Asked<'a> {
     held_back: Option<HeldBackGround>,
     /// Whether somebody said what heights of the model count from.
     radius_is_stated: bool,
+    /// Whether pages show the similarities of units.
+    has_surfaces: bool,
 }
 
 fn matched(
@@ -233,6 +239,10 @@ fn matched(
     let mut search = searched(grid, &units, options);
     let matching = refuse_lonely(&mut search.units, options.search_cells);
     let widened = widen(&mut search.units, grid.cell_m());
+    if asked.has_surfaces {
+        Stopped::check(stop)?;
+        enter_surfaces(grid, &units, &mut search, options.search_cells);
+    }
     let points = units.iter().zip(&search.units);
     let points = points.filter(|(_, told)| told.is_kept());
     let mut points: Vec<MatchedPoint> = points
@@ -362,6 +372,15 @@ fn searched(grid: &HeightGrid, units: &[Unit<'_>], options: &MatchOptions) -> Se
         measure,
         located_m,
     }
+}
+
+/// Enters similarities at all shifts by the measure that ran, of every unit that was searched. They are computed for themselves,
+/// since most searches, of a calibration's rounds or of another measure, come on no page.
+fn enter_surfaces(grid: &HeightGrid, units: &[Unit<'_>], search: &mut Searched, reach: u32) {
+    let measure = search.measure;
+    let each = units.par_iter().zip(&mut search.units);
+    each.filter(|(_, told)| told.found.is_some())
+        .for_each(|(unit, told)| told.similarity = Some(unit.surface(grid, measure, reach)));
 }
 
 /// Median of model minus laser over the units that are kept and do not judge, metres.

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use serde::{Deserialize, Serialize};
 
-use super::similarity::Similarity;
+use super::{similarity::Similarity, surface::SimilaritySurface};
 use crate::{
     altimetry::ShotFilter,
     body::Body,
@@ -163,6 +163,8 @@ pub struct UnitResult {
     pub found: Option<UnitMatch>,
     /// Shots that were held out, where the model has heights with and without the shift.
     pub held_out: Option<HeldOut>,
+    /// Similarity over the shifts of that search; absent in matches of models that are made round by round.
+    pub similarity: Option<SimilaritySurface>,
     /// Why it is not kept; empty for one that is.
     pub refused_because: String,
 }

@@ -192,6 +192,7 @@ mod tests {
                     }),
                 }),
                 held_out: None,
+                similarity: None,
                 refused_because: String::new(),
             }
         };

@@ -3,6 +3,7 @@
 use super::{
     shots::Shot,
     similarity::{Moments, Similarity},
+    surface::SimilaritySurface,
 };
 use crate::geom::height_grid::HeightGrid;
 
@@ -152,6 +153,17 @@ pub(super) fn find(
     reach: u32,
 ) -> Option<Best> {
     Surface::of(grid, shots, measure, i64::from(reach)).best()
+}
+
+/// Similarities of `shots` at all shifts within `reach` cells, for pictures.
+pub(super) fn surface(
+    grid: &HeightGrid,
+    shots: &[&Shot],
+    measure: Similarity,
+    reach: u32,
+) -> SimilaritySurface {
+    let surface = Surface::of(grid, shots, measure, i64::from(reach));
+    SimilaritySurface::of(surface.reach, |shift| surface.at(shift))
 }
 
 /// Moments at a shift between cells; `None` where the model covers too few shots.

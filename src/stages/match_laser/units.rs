@@ -2,10 +2,11 @@
 
 use super::{
     result::{HeldOut, MatchOptions, MatchSigma, MatchedPoint, UnitMatch, UnitResult},
-    search::{Best, find, is_one_relief, moments, rms_m, shifted_m},
+    search::{Best, find, is_one_relief, moments, rms_m, shifted_m, surface},
     settle::{Settled, settled},
     shots::Shot,
     similarity::Similarity,
+    surface::SimilaritySurface,
 };
 use crate::geom::{height_grid::HeightGrid, statistics::Summary};
 
@@ -61,6 +62,7 @@ impl<'a> Unit<'a> {
             relief_m: (squares.sum::<f64>() / shots.len() as f64).sqrt(),
             found: None,
             held_out: None,
+            similarity: None,
             refused_because: String::new(),
         };
         Self {
@@ -91,6 +93,16 @@ impl<'a> Unit<'a> {
         let mut told = self.told.clone();
         told.refused_because = self.judged(grid, measure, options, &mut told);
         told
+    }
+
+    /// How alike its heights are at all shifts of the search.
+    pub(super) fn surface(
+        &self,
+        grid: &HeightGrid,
+        measure: Similarity,
+        reach: u32,
+    ) -> SimilaritySurface {
+        surface(grid, &self.used, measure, reach)
     }
 
     /// Why the unit is not kept, after what is found is entered.
