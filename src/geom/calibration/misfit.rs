@@ -1,6 +1,6 @@
 //! What cameras miss the known place of a point by, in the plane and in height, and what is to be expected of that.
 
-use nalgebra::{DMatrix, DVector, Matrix3};
+use nalgebra::{DMatrix, Matrix3, Vector3};
 
 use super::{
     camera::CalibrationState,
@@ -37,6 +37,19 @@ pub enum TookPart {
 }
 
 impl GroundPoint {
+    /// The middle of where its sights meet the sphere of a radius.
+    fn at_radius(
+        &self,
+        state: &CalibrationState,
+        radius_m: f64,
+    ) -> Result<Vector3<f64>, SightError> {
+        let mut sum_m = Vector3::zeros();
+        for sight in &self.sights {
+            sum_m += (sight.at_radius(state, radius_m)).ok_or(SightError::Behind)?;
+        }
+        Ok(sum_m / self.sights.len() as f64)
+    }
+
     /// What the cameras miss a known place by; `None` for a point of unknown place.
     ///
     /// * `covariance` – of the parameters
@@ -52,22 +65,20 @@ impl GroundPoint {
         let Some(known) = &self.known else {
             return Ok(None);
         };
-        let rows = self.sights.iter();
-        let rows = rows.map(|sight| sight.rows(state, &known.place_m));
+        // By one sight, or by parallel ones, a place is seen in the plane alone.
+        let (place_m, axes) = match self.unaided().place(state) {
+            Ok(place_m) => (place_m, 3),
+            Err(_) => (self.at_radius(state, known.place_m.norm())?, 2),
+        };
+        // Where it is seen: control may lie kilometres off, where angles that cancel in the solution would not.
+        let rows = self.sights.iter().map(|sight| sight.rows(state, &place_m));
         let of = Stacked::of(&rows.collect::<Result<Vec<_>, _>>()?, known)?;
         let by_place = &of.by_place * local_axes(&known.place_m).transpose();
-        let placed = self.unaided().place(state).ok();
-        // By one sight, or by parallel ones, the place moves in the plane alone.
-        let axes = if placed.is_some() { 3 } else { 2 };
         let moves = by_place.columns(0, axes);
         let normal = moves.transpose() * moves;
         let gain = normal.try_inverse().ok_or(SightError::Parallel)? * moves.transpose();
-        let mut off_m = &gain * of.residual;
-        if let Some(place_m) = placed {
-            // Control may lie kilometres off, where what is linear in the place errs by more than heights do.
-            off_m.copy_from(&(local_axes(&known.place_m) * (place_m - known.place_m)));
-            off_m[2] = place_m.norm() - known.place_m.norm();
-        }
+        let mut off_m = local_axes(&known.place_m) * (place_m - known.place_m);
+        off_m[2] = place_m.norm() - known.place_m.norm();
         let noise_m2 = &gain * of.noise * gain.transpose();
         let drawn = gain * of.by_parameters;
         let drawn_m2 = &drawn * covariance * drawn.transpose();
@@ -99,9 +110,8 @@ impl Missed {
     }
 }
 
-/// Rows of all sights of a point at its known place, over their standard deviations.
+/// Rows of all sights of a point where they see it, over their standard deviations.
 struct Stacked {
-    residual: DVector<f64>,
     by_place: DMatrix<f64>,
     by_parameters: DMatrix<f64>,
     /// Covariance of the residuals by measurement and known place.
@@ -112,11 +122,9 @@ impl Stacked {
     fn of(rows: &[SightRows], known: &KnownPlace) -> Result<Self, SightError> {
         let count = 2 * rows.len();
         let parameters = rows.first().map_or(0, |of| of.by_parameters.ncols());
-        let mut residual = DVector::zeros(count);
         let mut by_place = DMatrix::zeros(count, 3);
         let mut by_parameters = DMatrix::zeros(count, parameters);
         for (index, of) in rows.iter().enumerate() {
-            residual.rows_mut(2 * index, 2).copy_from(&of.residual);
             by_place.rows_mut(2 * index, 2).copy_from(&of.by_place);
             by_parameters
                 .rows_mut(2 * index, 2)
@@ -126,7 +134,6 @@ impl Stacked {
         let spread = &by_place * inverse;
         Ok(Self {
             noise: DMatrix::identity(count, count) + &spread * spread.transpose(),
-            residual,
             by_place,
             by_parameters,
         })
