@@ -24,8 +24,8 @@ impl Prefix {
     /// significant byte first, whatever the order of samples.
     ///
     /// # Source
-    /// `hrsc2isis` of ISIS; the prefixes of h0279_0000_re2 and h7926_0009_s22.
-    fn of(bytes: [u8; PREFIX_BYTES_MIN as usize]) -> Self {
+    /// `hrsc2isis` of ISIS; the prefixes of `h0279_0000_re2` and `h7926_0009_s22`.
+    fn of(bytes: [u8; PREFIX_BYTES_MIN]) -> Self {
         let [a, b, c, d, e, f, g, h, i, j, k, l] = bytes;
         let start_s = f64::from_le_bytes([a, b, c, d, e, f, g, h]);
         let period_ms = f32::from_le_bytes([i, j, k, l]);
@@ -45,7 +45,7 @@ impl Prefix {
 /// The system's refusal to read.
 pub(super) fn read(raster: &Raster, file: &File) -> io::Result<Vec<Prefix>> {
     let prefix = |line| {
-        let mut bytes = [0; PREFIX_BYTES_MIN as usize];
+        let mut bytes = [0; PREFIX_BYTES_MIN];
         file.read_exact_at(&mut bytes, raster.row(line))?;
         Ok(Prefix::of(bytes))
     };

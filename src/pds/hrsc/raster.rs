@@ -12,7 +12,7 @@ use crate::{
 };
 
 /// Bytes of a prefix that are read: the time of the line and its exposure.
-pub(super) const PREFIX_BYTES_MIN: u64 = 12;
+pub(super) const PREFIX_BYTES_MIN: usize = 12;
 /// Largest prefix that is believed; the archive has 68 bytes.
 const PREFIX_BYTES_MAX: u64 = 4_096;
 /// Largest size of a line that is believed: the pixels of the detector, those that are covered included.
@@ -87,7 +87,7 @@ impl Raster {
                 return Err(refused(key, entry, right));
             }
         }
-        let prefix = [PREFIX_BYTES_MIN, PREFIX_BYTES_MAX];
+        let prefix = [PREFIX_BYTES_MIN as u64, PREFIX_BYTES_MAX];
         let raster = Self {
             start: start(pointer, record_bytes, bytes)?,
             prefix_bytes: whole(label, "LINE_PREFIX_BYTES", prefix, "68, or 12 at least")?,

@@ -31,7 +31,7 @@ impl Pieces<'_> {
     /// When the lines were exposed, by what tells it first: the pieces of the configuration, the `rows` of a file, a start with
     /// a line period. And the exposure of a detector line in seconds, and where the start comes from.
     ///
-    /// Of an image whose rows tell their times (`in_rows`) a label without rows says too little.
+    /// Of an image whose rows tell their times (`in_rows`), and its label no clock, a label without rows says too little.
     pub(super) fn line_times(
         &self,
         rows: Option<&RowTimes>,
@@ -50,7 +50,7 @@ impl Pieces<'_> {
         } else {
             let (start, from) = told.ok_or_else(|| ImageError::Missing {
                 image: self.image.id.clone(),
-                key: "sclk_start",
+                key: if in_rows { "utc_start" } else { "sclk_start" },
             })?;
             let (times, exposure_s) = self.even(start)?;
             (times, exposure_s, from)
